@@ -1,0 +1,71 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstdint>
+
+namespace gpureg {
+
+/// How a raw cloud becomes a PreparedCloud. All lengths in metres (or the unit of the points).
+struct PrepareOptions {
+  float voxel_size = 0.05f;     ///< edge of the downsampling voxel, one centroid each (paper: 0.05); 0: keep the points as they are
+  float normal_radius = 0.1f;   ///< neighbourhood of the normal's PCA (paper: 0.1)
+  float feature_radius = 0.25f; ///< neighbourhood of FPFH, also of its SPFH (paper: 0.25)
+  /// Cell of the closest-point look-up of alignment; derived from max_correspondence_distance, see RegistrationOptions.
+  float search_distance = 0.075f;  ///< farthest neighbour that alignment will ever ask this cloud for
+
+  /// Throws InvalidArgument naming field and value.
+  void validate() const;
+};
+
+/// Where hypotheses come from: uniform quadruples of cached feature matches (paper, Algorithm 1).
+struct HypothesisOptions {
+  std::uint32_t count = 4'000'000;     ///< quadruples drawn per pair (paper: 4,000,000); at most 2^30
+  std::uint32_t neighbors = 1;         ///< nearest features kept per source point, 1..16 (paper: 1)
+  bool mutual = false;                 ///< keep only matches that are nearest in both directions
+  float edge_similarity = 0.9f;        ///< tau of the polygon test: sides may differ by this ratio, in (0, 1] (paper: 0.9)
+  bool smaller_as_source = true;       ///< sample and score the cloud with fewer points (Choi et al. 2015); the pose is turned back
+  std::uint64_t seed = 1;              ///< same seed, same bits, on any backend, thread count and batch split
+
+  void validate() const;
+};
+
+/// What makes a point an inlier and a hypothesis a result.
+struct ScoreOptions {
+  float max_correspondence_distance = 0.075f;  ///< metres (paper: 0.075)
+  float max_normal_angle = 30.0f;              ///< degrees between the normals of an inlier, (0, 180]; 180 switches the test off (CZK: 30)
+  float min_inlier_ratio = 0.3f;               ///< inliers / points scored below which no alignment is reported, [0, 1] (CZK: 0.33)
+
+  void validate() const;
+};
+
+/// Robust point-to-plane ICP that polishes the winning hypothesis.
+struct RefineOptions {
+  std::uint32_t max_iterations = 20;           ///< 0 switches the refinement off (paper: off)
+  float max_correspondence_distance = 0.075f;  ///< metres, <= PrepareOptions::search_distance
+  float kernel_width = 0.025f;                 ///< metres, width of the Geman-McClure kernel on the point-to-plane distance
+
+  void validate() const;
+};
+
+/// All options of one registration. An aggregate with in-class defaults: set what you want to change.
+struct RegistrationOptions {
+  PrepareOptions prepare;
+  HypothesisOptions hypothesis;
+  ScoreOptions score;
+  RefineOptions refine;
+
+  /// Every radius from the voxel size: normals 2 v, FPFH 5 v, correspondence distance 1.5 v, kernel 0.5 v.
+  /// Throws InvalidArgument unless v is finite and > 0.
+  static RegistrationOptions from_voxel_size(float voxel_size);
+
+  /// The paper's algorithm with the paper's numbers (Zhang and Chen, LoopSmart, section III): 4,000,000 quadruples, no refinement.
+  static RegistrationOptions loopsmart();
+
+  /// The paper's algorithm with its lengths scaled to another voxel size (the paper's own is 0.05).
+  static RegistrationOptions loopsmart(float voxel_size);
+
+  /// Throws InvalidArgument naming the first field that is out of range, and its value.
+  void validate() const;
+};
+
+}  // namespace gpureg

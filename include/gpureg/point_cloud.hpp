@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <Eigen/Core>
+#include <cstddef>
+#include <vector>
+
+namespace gpureg {
+
+/// Non-owning view of a point cloud in host memory. Whatever it points at must outlive the call that it is given to.
+///
+/// Rows may be strided (in floats), so a view fits std::vector<Eigen::Vector3f>, pcl::PointXYZ (stride 4) and numpy rows alike.
+/// Points with a NaN or infinite coordinate are allowed: prepare() drops and counts them.
+struct PointCloudView {
+  const float* points = nullptr;       ///< size rows of x, y, z; metres
+  std::size_t size = 0;                ///< number of points
+  std::size_t point_stride = 3;        ///< floats from one point to the next, >= 3
+  const float* normals = nullptr;      ///< optional: size rows of nx, ny, nz; any length, (0,0,0) and NaN mean unknown
+  std::size_t normal_stride = 3;       ///< floats from one normal to the next, >= 3
+  const float* features = nullptr;     ///< optional: size rows of feature_dimension floats, used instead of FPFH
+  std::size_t feature_dimension = 0;   ///< floats per feature, >= 1 where features are given
+  std::size_t feature_stride = 0;      ///< floats from one feature to the next; 0: feature_dimension
+  const float* viewpoints = nullptr;   ///< optional: viewpoint_count rows of x, y, z (tight): sensor positions in the cloud's frame
+  std::size_t viewpoint_count = 0;     ///< 0: the origin is the only viewpoint
+
+  PointCloudView() = default;
+  PointCloudView(const float* xyz, std::size_t count) : points(xyz), size(count) {}
+  explicit PointCloudView(const std::vector<Eigen::Vector3f>& xyz)
+      : points(xyz.empty() ? nullptr : xyz.front().data()), size(xyz.size()) {}
+
+  /// Throws InvalidArgument where pointers, counts and strides contradict each other or sizes exceed 2^31 - 1 points.
+  void validate() const;
+};
+
+/// Owning cloud, for readers and generators; view() is what the library takes. Empty normals/viewpoints mean "not known".
+struct PointCloud {
+  std::vector<Eigen::Vector3f> points;      ///< metres
+  std::vector<Eigen::Vector3f> normals;     ///< empty or one per point
+  std::vector<Eigen::Vector3f> viewpoints;  ///< sensor positions in the cloud's frame, may be empty
+
+  /// View of this cloud, valid as long as its vectors do not change.
+  PointCloudView view() const;
+};
+
+}  // namespace gpureg
