@@ -3,7 +3,7 @@ include(CMakePackageConfigHelpers)
 set(_gpureg_cmake_dir ${CMAKE_INSTALL_LIBDIR}/cmake/gpureg)
 install(DIRECTORY include/gpureg DESTINATION ${CMAKE_INSTALL_INCLUDEDIR})
 install(EXPORT gpureg-targets NAMESPACE gpureg:: DESTINATION ${_gpureg_cmake_dir})
-if(GPUREG_HAVE_PCL)
+if(TARGET gpureg_io)
   install(EXPORT gpureg-io-targets NAMESPACE gpureg:: DESTINATION ${_gpureg_cmake_dir})
 endif()
 configure_package_config_file(cmake/gpureg-config.cmake.in ${PROJECT_BINARY_DIR}/gpureg-config.cmake

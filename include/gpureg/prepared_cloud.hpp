@@ -8,21 +8,11 @@
 #include <vector>
 
 #include "gpureg/options.hpp"
+#include "gpureg/statistics.hpp"
 
 namespace gpureg {
 
 struct PreparedState;
-
-/// Counts and wall times (milliseconds) of the preparation of one cloud.
-struct PrepareStatistics {
-  std::uint64_t input_points = 0;
-  std::uint64_t invalid_points = 0;       ///< dropped for NaN or infinite coordinates
-  std::uint32_t points = 0;               ///< after downsampling
-  std::uint32_t points_without_normal = 0;   ///< fewer than 3 neighbours
-  std::uint32_t points_without_feature = 0;  ///< no neighbour within the feature radius, or no normal: never matched
-  double downsample = 0, normals = 0, features = 0, grid = 0;
-  double total() const { return downsample + normals + features + grid; }
-};
 
 /// A fragment ready for alignment: downsampled points, normals, features and search grid, in the memory of the context that made it.
 /// Immutable and shareable between threads; copies share the data. Usable with any context of the same backend and device.

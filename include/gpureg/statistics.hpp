@@ -1,0 +1,63 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstdint>
+
+namespace gpureg {
+
+enum class RegistrationStatus : std::uint8_t {
+  aligned,      ///< target_from_source passed every threshold
+  not_aligned,  ///< no pose passed; reason says why, and target_from_source holds the best candidate where has_candidate
+  skipped       ///< never tried, because the batch was cancelled before
+};
+
+/// Why a pair is not aligned. none means aligned.
+enum class RegistrationReason : std::uint8_t {
+  none,
+  too_few_source_points,     ///< fewer than 4 usable points after downsampling
+  too_few_target_points,
+  no_usable_features,        ///< fewer than 4 correspondences: points without neighbours have no feature
+  no_hypothesis_survived,    ///< all quadruples failed the polygon test
+  degenerate_geometry,       ///< all surviving quadruples were collinear or coincident
+  inlier_ratio_too_low,      ///< the best candidate is below ScoreOptions::min_inlier_ratio
+  cancelled
+};
+
+const char* to_string(RegistrationStatus status);
+const char* to_string(RegistrationReason reason);
+/// One sentence for a person.
+const char* explain(RegistrationReason reason);
+
+/// What went in and what was left after each stage of one pair: enough to answer "why did it fail".
+struct RegistrationStatistics {
+  std::uint32_t source_points = 0;    ///< prepared points of the source
+  std::uint32_t target_points = 0;
+  std::uint32_t correspondences = 0;  ///< feature matches that quadruples are drawn from
+  std::uint64_t hypotheses = 0;       ///< quadruples drawn
+  std::uint64_t survivors = 0;        ///< passed the polygon test
+  std::uint64_t scored = 0;           ///< of these with a well-defined rigid fit
+  std::uint32_t points_scored = 0;    ///< points that the inlier ratio is relative to
+  std::uint32_t inliers = 0;          ///< of the returned pose
+  std::uint32_t refine_iterations = 0;
+  bool swapped = false;               ///< the target was sampled and scored, being the smaller cloud
+};
+
+/// Wall time of each stage in milliseconds. In a batch a chunk of pairs goes through a stage together: then each pair carries its
+/// equal share, so that sums over pairs are right.
+struct StageTimings {
+  double match = 0, sample = 0, fit = 0, score = 0, refine = 0, information = 0;
+  double total() const { return match + sample + fit + score + refine + information; }
+};
+
+/// Counts and wall times (milliseconds) of the preparation of one cloud.
+struct PrepareStatistics {
+  std::uint64_t input_points = 0;
+  std::uint64_t invalid_points = 0;       ///< dropped for NaN or infinite coordinates
+  std::uint32_t points = 0;               ///< after downsampling
+  std::uint32_t points_without_normal = 0;   ///< fewer than 3 neighbours
+  std::uint32_t points_without_feature = 0;  ///< no neighbour within the feature radius, or no normal: never matched
+  double downsample = 0, normals = 0, features = 0, grid = 0;
+  double total() const { return downsample + normals + features + grid; }
+};
+
+}  // namespace gpureg

@@ -1,0 +1,50 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include "math/jacobi.hpp"
+#include "math/rigid.hpp"
+
+namespace gpureg {
+
+/// Least-squares rigid motion of four point pairs (Horn 1987: the largest eigenvector of a 4 x 4 matrix, by Jacobi with fixed sweeps).
+/// False where the points do not determine a rotation (collinear or coincident in either cloud).
+GPUREG_HD bool fit_rigid(const Vec3 (&p)[4], const Vec3 (&q)[4], Pose<float>& pose) {
+  const Vec3 cp = (p[0] + p[1] + p[2] + p[3]) * 0.25f;
+  const Vec3 cq = (q[0] + q[1] + q[2] + q[3]) * 0.25f;
+  float s[3][3] = {{0, 0, 0}, {0, 0, 0}, {0, 0, 0}};
+  for (int k = 0; k < 4; ++k) {
+    const Vec3 a = p[k] - cp, b = q[k] - cq;
+    s[0][0] = fmaf(a.x, b.x, s[0][0]), s[0][1] = fmaf(a.x, b.y, s[0][1]), s[0][2] = fmaf(a.x, b.z, s[0][2]);
+    s[1][0] = fmaf(a.y, b.x, s[1][0]), s[1][1] = fmaf(a.y, b.y, s[1][1]), s[1][2] = fmaf(a.y, b.z, s[1][2]);
+    s[2][0] = fmaf(a.z, b.x, s[2][0]), s[2][1] = fmaf(a.z, b.y, s[2][1]), s[2][2] = fmaf(a.z, b.z, s[2][2]);
+  }
+  float n[4][4], v[4][4];
+  n[0][0] = s[0][0] + s[1][1] + s[2][2];
+  n[1][1] = s[0][0] - s[1][1] - s[2][2];
+  n[2][2] = s[1][1] - s[0][0] - s[2][2];
+  n[3][3] = s[2][2] - s[0][0] - s[1][1];
+  n[0][1] = n[1][0] = s[1][2] - s[2][1];
+  n[0][2] = n[2][0] = s[2][0] - s[0][2];
+  n[0][3] = n[3][0] = s[0][1] - s[1][0];
+  n[1][2] = n[2][1] = s[0][1] + s[1][0];
+  n[1][3] = n[3][1] = s[2][0] + s[0][2];
+  n[2][3] = n[3][2] = s[1][2] + s[2][1];
+  jacobi_eigen<4, 6>(n, v);
+  int hi = 0;
+  for (int k = 1; k < 4; ++k)
+    if (n[k][k] > n[hi][hi]) hi = k;
+  float second = -3.402823466e38f;
+  for (int k = 0; k < 4; ++k)
+    if (k != hi && n[k][k] > second) second = n[k][k];
+  // Collinear points leave the turn about their line open: the two largest eigenvalues meet.
+  if (!(n[hi][hi] > 0.0f) || !(n[hi][hi] - second > 1e-4f * n[hi][hi])) return false;
+  const float w = v[0][hi], x = v[1][hi], y = v[2][hi], z = v[3][hi];
+  const float length = sqrtf(fmaf(w, w, fmaf(x, x, fmaf(y, y, z * z))));
+  pose.w = w / length, pose.x = x / length, pose.y = y / length, pose.z = z / length;
+  pose.tx = pose.ty = pose.tz = 0.0f;
+  const Vec3 t = cq - rotate(to_rigid(pose), cp);
+  pose.tx = t.x, pose.ty = t.y, pose.tz = t.z;
+  return true;
+}
+
+}  // namespace gpureg

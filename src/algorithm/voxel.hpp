@@ -1,0 +1,21 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include "algorithm/cell.hpp"
+
+namespace gpureg {
+
+/// Centre of a cloud's bounding box moved to a multiple of the voxel size. Work happens in coordinates relative to it, so that a cloud
+/// ten kilometres from its origin loses no precision after the subtraction, and voxels stay those of floor(x / voxel_size).
+GPUREG_HD float local_origin(float lo, float hi, float voxel_size) {
+  const double mid = 0.5 * (static_cast<double>(lo) + static_cast<double>(hi));
+  if (!(voxel_size > 0.0f)) return static_cast<float>(mid);
+  const double steps = mid / static_cast<double>(voxel_size);
+  const double whole = static_cast<double>(static_cast<std::int64_t>(steps + (steps < 0.0 ? -0.5 : 0.5)));
+  return static_cast<float>(whole * static_cast<double>(voxel_size));
+}
+
+/// Voxel of a local point.
+GPUREG_HD Cell voxel_of(Vec3 local, float inverse_voxel_size) { return cell_of(local, inverse_voxel_size); }
+
+}  // namespace gpureg

@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "gpureg/context.hpp"
+
+#include <thread>
+
+#include "api/validate.hpp"
+#include "pipeline/engine.hpp"
+
+namespace gpureg {
+
+const char* to_string(Backend backend) { return backend == Backend::cpu ? "cpu" : "cuda"; }
+
+Context Context::cpu(unsigned threads) {
+  require(threads <= 1024, "threads", threads, "at most 1024");
+  if (threads == 0) threads = std::thread::hardware_concurrency();
+  return Context(make_cpu_engine(threads == 0 ? 1 : threads));
+}
+
+Context Context::cuda(int device) {
+  require(device >= 0, "device", device, "0 or more");
+  return Context(make_cuda_engine(device));
+}
+
+Context Context::best() {
+  try {
+    return cuda(0);
+  } catch (const BackendUnavailable&) {
+    return cpu();
+  }
+}
+
+Backend Context::backend() const { return engine_->backend(); }
+unsigned Context::threads() const { return engine_->threads(); }
+std::string Context::description() const { return engine_->description(); }
+
+std::vector<std::string> describe_backends() {
+  std::vector<std::string> lines;
+  try {
+    lines.push_back(Context::cpu().description());
+  } catch (const Error& error) {
+    lines.push_back(std::string("cpu: ") + error.what());
+  }
+  for (std::string& line : describe_cuda_devices()) lines.push_back(std::move(line));
+  return lines;
+}
+
+}  // namespace gpureg

@@ -1,0 +1,80 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "gpureg/options.hpp"
+
+#include "api/validate.hpp"
+
+namespace gpureg {
+
+namespace {
+/// Lengths beyond this are a mistake of units, and their squares would overflow float.
+constexpr float kLongest = 1e6f;
+bool length(float v) { return positive(v) && v <= kLongest && v >= 1e-6f; }
+constexpr const char* kLength = "a length in [1e-6, 1e6]";
+}  // namespace
+
+void PrepareOptions::validate() const {
+  require(voxel_size == 0.0f || length(voxel_size), "prepare.voxel_size", voxel_size, "0 or a length in [1e-6, 1e6]");
+  require(length(normal_radius), "prepare.normal_radius", normal_radius, kLength);
+  require(length(feature_radius), "prepare.feature_radius", feature_radius, kLength);
+  require(length(search_distance), "prepare.search_distance", search_distance, kLength);
+  require(voxel_size == 0.0f || feature_radius <= 100.0f * voxel_size, "prepare.feature_radius", feature_radius,
+          "at most 100 times prepare.voxel_size");
+  require(normal_radius <= 4.0f * feature_radius, "prepare.normal_radius", normal_radius, "at most 4 times prepare.feature_radius");
+  require(voxel_size == 0.0f || search_distance <= 20.0f * voxel_size, "prepare.search_distance", search_distance,
+          "at most 20 times prepare.voxel_size");
+}
+
+void HypothesisOptions::validate() const {
+  require(count >= 1 && count <= (1u << 30), "hypothesis.count", count, "1 to 2^30");
+  require(neighbors >= 1 && neighbors <= 16, "hypothesis.neighbors", neighbors, "1 to 16");
+  require(std::isfinite(edge_similarity) && edge_similarity > 0 && edge_similarity <= 1, "hypothesis.edge_similarity", edge_similarity,
+          "a ratio in (0, 1]");
+}
+
+void ScoreOptions::validate() const {
+  require(length(max_correspondence_distance), "score.max_correspondence_distance", max_correspondence_distance, kLength);
+  require(std::isfinite(max_normal_angle) && max_normal_angle > 0 && max_normal_angle <= 180, "score.max_normal_angle", max_normal_angle,
+          "degrees in (0, 180]");
+  require(std::isfinite(min_inlier_ratio) && min_inlier_ratio >= 0 && min_inlier_ratio <= 1, "score.min_inlier_ratio", min_inlier_ratio,
+          "a ratio in [0, 1]");
+}
+
+void RefineOptions::validate() const {
+  require(max_iterations <= 1000, "refine.max_iterations", max_iterations, "at most 1000");
+  require(length(max_correspondence_distance), "refine.max_correspondence_distance", max_correspondence_distance, kLength);
+  require(length(kernel_width), "refine.kernel_width", kernel_width, kLength);
+}
+
+RegistrationOptions RegistrationOptions::from_voxel_size(float voxel_size) {
+  require(length(voxel_size), "voxel_size", voxel_size, kLength);
+  RegistrationOptions o;
+  o.prepare.voxel_size = voxel_size;
+  o.prepare.normal_radius = 2.0f * voxel_size;
+  o.prepare.feature_radius = 5.0f * voxel_size;
+  o.prepare.search_distance = 1.5f * voxel_size;
+  o.score.max_correspondence_distance = 1.5f * voxel_size;
+  o.refine.max_correspondence_distance = 1.5f * voxel_size;
+  o.refine.kernel_width = 0.5f * voxel_size;
+  return o;
+}
+
+RegistrationOptions RegistrationOptions::loopsmart() { return loopsmart(0.05f); }
+
+RegistrationOptions RegistrationOptions::loopsmart(float voxel_size) {
+  RegistrationOptions o = from_voxel_size(voxel_size);
+  o.refine.max_iterations = 0;
+  return o;
+}
+
+void RegistrationOptions::validate() const {
+  prepare.validate();
+  hypothesis.validate();
+  score.validate();
+  refine.validate();
+  require(score.max_correspondence_distance <= prepare.search_distance, "score.max_correspondence_distance",
+          score.max_correspondence_distance, "at most prepare.search_distance");
+  require(refine.max_iterations == 0 || refine.max_correspondence_distance <= prepare.search_distance,
+          "refine.max_correspondence_distance", refine.max_correspondence_distance, "at most prepare.search_distance");
+}
+
+}  // namespace gpureg

@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "gpureg/point_cloud.hpp"
+
+#include "api/validate.hpp"
+
+namespace gpureg {
+
+void PointCloudView::validate() const {
+  require(size <= 0x7fffffffu, "cloud.size", size, "at most 2^31 - 1 points");
+  require(points != nullptr || size == 0, "cloud.points", "null", "a pointer, as size is not 0");
+  require(point_stride >= 3, "cloud.point_stride", point_stride, "at least 3 floats");
+  require(normals == nullptr || normal_stride >= 3, "cloud.normal_stride", normal_stride, "at least 3 floats");
+  require(features == nullptr || (feature_dimension >= 1 && feature_dimension <= 4096), "cloud.feature_dimension", feature_dimension,
+          "1 to 4096, as features are given");
+  require(features != nullptr || feature_dimension == 0, "cloud.features", "null", "a pointer, as feature_dimension is not 0");
+  require(feature_stride == 0 || feature_stride >= feature_dimension, "cloud.feature_stride", feature_stride,
+          "0 or at least feature_dimension");
+  require(viewpoints != nullptr || viewpoint_count == 0, "cloud.viewpoints", "null", "a pointer, as viewpoint_count is not 0");
+  for (std::size_t k = 0; k < 3 * viewpoint_count; ++k)
+    require(std::isfinite(viewpoints[k]), "cloud.viewpoints", viewpoints[k], "finite coordinates");
+}
+
+PointCloudView PointCloud::view() const {
+  PointCloudView v(points);
+  require(normals.empty() || normals.size() == points.size(), "cloud.normals", normals.size(), "none or as many as points");
+  if (!normals.empty()) v.normals = normals.front().data();
+  if (!viewpoints.empty()) {
+    v.viewpoints = viewpoints.front().data();
+    v.viewpoint_count = viewpoints.size();
+  }
+  return v;
+}
+
+}  // namespace gpureg

@@ -1,0 +1,157 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <algorithm>
+#include <string>
+
+#include "algorithm/closest_build.hpp"
+#include "cpu/stages.hpp"
+#include "gpureg/error.hpp"
+
+namespace gpureg::cpu {
+namespace {
+
+constexpr int kEdge = ClosestGridView::kBlockEdge;
+constexpr int kCells = ClosestGridView::kBlockCells;
+/// Lists this long mean millions of points within one search distance of each other; downsampling is the answer, not memory.
+constexpr std::size_t kMaxCandidates = std::size_t(1) << 28;
+constexpr std::size_t kMaxBlockCandidates = std::size_t(1) << 24;
+
+[[noreturn]] void throw_too_dense(float search_distance) {
+  throw InvalidArgument("point cloud is too dense for search_distance " + std::to_string(search_distance) +
+                        ": prepare it with voxel_size > 0");
+}
+
+/// Keys of all blocks that a query with a point in reach can fall into, ascending.
+std::vector<std::uint64_t> reachable_blocks(const std::vector<Vec3>& points, const ClosestGeometry& g) {
+  const float inverse = 1.0f / (g.cell_size * kEdge);
+  const float reach = g.search_distance + 2.0f * g.margin;
+  std::vector<std::uint64_t> keys;
+  for (const Vec3& p : points) {
+    const Cell lo = cell_of({p.x - reach, p.y - reach, p.z - reach}, inverse);
+    const Cell hi = cell_of({p.x + reach, p.y + reach, p.z + reach}, inverse);
+    for (std::int32_t z = lo.z; z <= hi.z; ++z)
+      for (std::int32_t y = lo.y; y <= hi.y; ++y)
+        for (std::int32_t x = lo.x; x <= hi.x; ++x) {
+          const std::uint64_t key = cell_key({x, y, z});
+          if (keys.empty() || keys.back() != key) keys.push_back(key);
+        }
+    if (keys.size() > (std::size_t(1) << 22)) {
+      std::sort(keys.begin(), keys.end());
+      keys.erase(std::unique(keys.begin(), keys.end()), keys.end());
+    }
+  }
+  std::sort(keys.begin(), keys.end());
+  keys.erase(std::unique(keys.begin(), keys.end()), keys.end());
+  return keys;
+}
+
+struct BlockLists {
+  std::vector<std::uint32_t> counts;      // per cell
+  std::vector<std::uint32_t> candidates;  // cells one after another
+};
+
+/// Points whose reach touches the block, ascending by index.
+std::vector<std::uint32_t> points_near_block(const GridView& grid, Vec3 center, const ClosestGeometry& g) {
+  const float reach = 0.5f * kEdge * g.cell_size + g.search_distance + 2.0f * g.margin;
+  const Cell lo = cell_of({center.x - reach, center.y - reach, center.z - reach}, grid.inverse_cell_size);
+  const Cell hi = cell_of({center.x + reach, center.y + reach, center.z + reach}, grid.inverse_cell_size);
+  std::vector<std::uint32_t> near;
+  for (std::int32_t z = lo.z; z <= hi.z; ++z)
+    for (std::int32_t y = lo.y; y <= hi.y; ++y)
+      for (std::int32_t x = lo.x; x <= hi.x; ++x) {
+        const std::uint32_t cell = find_cell(grid.table, cell_key({x, y, z}));
+        if (cell == kNoValue) continue;
+        for (std::uint32_t k = grid.cell_start[cell]; k < grid.cell_start[cell + 1]; ++k) {
+          const Vec3 d = grid.points[k] - center;
+          if (std::fabs(d.x) <= reach && std::fabs(d.y) <= reach && std::fabs(d.z) <= reach) near.push_back(grid.index[k]);
+        }
+      }
+  std::sort(near.begin(), near.end());
+  return near;
+}
+
+void build_block(const GridView& grid, const std::vector<Vec3>& points, Cell block, const ClosestGeometry& g, BlockLists& out) {
+  const float edge = kEdge * g.cell_size;
+  const Vec3 block_center = cell_center(block, edge);
+  const std::vector<std::uint32_t> near = points_near_block(grid, block_center, g);
+  const std::size_t n = near.size();
+  std::vector<float> x(n), y(n), z(n), d2(n);
+  for (std::size_t k = 0; k < n; ++k) x[k] = points[near[k]].x, y[k] = points[near[k]].y, z[k] = points[near[k]].z;
+  out.counts.assign(kCells, 0);
+  const float half_diagonal = 0.8660255f * g.cell_size;
+  for (int cell = 0; cell < kCells; ++cell) {
+    const Cell c{block.x * kEdge + (cell & 7), block.y * kEdge + ((cell >> 3) & 7), block.z * kEdge + (cell >> 6)};
+    const Vec3 center = cell_center(c, g.cell_size);
+    float nearest2 = 3.402823466e38f;
+    for (std::size_t k = 0; k < n; ++k) {
+      const float dx = x[k] - center.x, dy = y[k] - center.y, dz = z[k] - center.z;
+      d2[k] = std::fmaf(dz, dz, std::fmaf(dy, dy, dx * dx));
+      nearest2 = d2[k] < nearest2 ? d2[k] : nearest2;
+    }
+    const float nearest = std::sqrt(nearest2);
+    if (n == 0 || !can_reach_cell(nearest, g)) continue;
+    // Who is farther from the centre than the nearest point plus the cell's diameter is never the closest.
+    const float limit = std::min(nearest + 2.0f * half_diagonal, g.search_distance + half_diagonal) + 2.0f * g.margin;
+    const float limit2 = limit * limit;
+    std::size_t first = 0;
+    while (d2[first] != nearest2) ++first;
+    const Vec3 best = points[near[first]];
+    for (std::size_t k = 0; k < n; ++k) {
+      if (d2[k] > limit2) continue;
+      const Vec3 p{x[k], y[k], z[k]};
+      if (k != first && dominated_in_cell(center, best, p, g)) continue;
+      // Of points in the very same place only the first can win.
+      if (k > first && p.x == best.x && p.y == best.y && p.z == best.z) continue;
+      out.candidates.push_back(near[k]);
+      ++out.counts[cell];
+    }
+    if (out.candidates.size() > kMaxBlockCandidates) throw_too_dense(g.search_distance);
+  }
+}
+
+}  // namespace
+
+ClosestGridView ClosestGrid::view() const {
+  return {1.0f / cell_size, span_of(table.entries), span_of(cell_start), span_of(candidates)};
+}
+
+std::vector<ClosestGrid> build_closest_grids(Exec& exec, const std::vector<DownsampledCloud>& clouds, const std::vector<Grid>& grids,
+                                             const PrepareOptions& options) {
+  std::vector<ClosestGrid> out(clouds.size());
+  std::vector<ClosestGeometry> geometry(clouds.size());
+  std::vector<std::vector<std::uint64_t>> keys(clouds.size());
+  std::vector<std::vector<BlockLists>> lists(clouds.size());
+  exec.parallel(clouds.size(), [&](std::size_t c) {
+    geometry[c] = closest_geometry(options.search_distance, clouds[c].radius);
+    keys[c] = reachable_blocks(clouds[c].points, geometry[c]);
+    lists[c].resize(keys[c].size());
+  });
+  exec.parallel_items(clouds.size(), [&](std::size_t c) { return keys[c].size(); }, 16,
+                      [&](std::size_t c, std::size_t begin, std::size_t end) {
+                        const GridView grid = grids[c].view();
+                        for (std::size_t b = begin; b < end; ++b)
+                          build_block(grid, clouds[c].points, cell_from_key(keys[c][b]), geometry[c], lists[c][b]);
+                      });
+  exec.parallel(clouds.size(), [&](std::size_t c) {
+    ClosestGrid& grid = out[c];
+    grid.cell_size = geometry[c].cell_size;
+    std::size_t total = 0;
+    for (const BlockLists& l : lists[c]) total += l.candidates.size();
+    if (total > kMaxCandidates) throw_too_dense(options.search_distance);
+    grid.table.reset(keys[c].size());
+    grid.cell_start.reserve(keys[c].size() * (kCells + 1));
+    grid.candidates.reserve(total);
+    for (std::size_t b = 0; b < keys[c].size(); ++b) {
+      grid.table.insert(keys[c][b], static_cast<std::uint32_t>(b));
+      std::uint32_t offset = static_cast<std::uint32_t>(grid.candidates.size());
+      for (int cell = 0; cell < kCells; ++cell) {
+        grid.cell_start.push_back(offset);
+        offset += lists[c][b].counts[cell];
+      }
+      grid.cell_start.push_back(offset);
+      grid.candidates.insert(grid.candidates.end(), lists[c][b].candidates.begin(), lists[c][b].candidates.end());
+    }
+  });
+  return out;
+}
+
+}  // namespace gpureg::cpu

@@ -1,0 +1,67 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <chrono>
+#include <condition_variable>
+#include <cstddef>
+#include <exception>
+#include <functional>
+#include <mutex>
+#include <thread>
+#include <vector>
+
+namespace gpureg::cpu {
+
+/// Threads and clock of the CPU backend. Which thread runs which block is not determined; what a block writes must depend on the block only.
+class Exec {
+ public:
+  explicit Exec(unsigned threads);
+  ~Exec();
+  Exec(const Exec&) = delete;
+  Exec& operator=(const Exec&) = delete;
+
+  unsigned threads() const { return static_cast<unsigned>(workers_.size()) + 1; }
+
+  /// Calls task(k) once for each k in [0, count), on all threads; returns when all are done. Rethrows the first exception.
+  void parallel(std::size_t count, const std::function<void(std::size_t)>& task);
+
+  /// One batch entry's blocks after another's: calls work(entry, begin, end) for blocks of at most grain items of every entry.
+  /// counts[k] is the number of items of entry k.
+  template <typename Count, typename Work>
+  void parallel_items(std::size_t entries, Count&& count, std::size_t grain, Work&& work) {
+    struct Block {
+      std::size_t entry, begin, end;
+    };
+    std::vector<Block> blocks;
+    for (std::size_t e = 0; e < entries; ++e) {
+      const std::size_t n = count(e);
+      for (std::size_t b = 0; b < n; b += grain) blocks.push_back({e, b, b + grain < n ? b + grain : n});
+    }
+    parallel(blocks.size(), [&](std::size_t k) { work(blocks[k].entry, blocks[k].begin, blocks[k].end); });
+  }
+
+  void start_clock() { clock_ = std::chrono::steady_clock::now(); }
+  /// Milliseconds since start_clock() or the last lap().
+  double lap() {
+    const auto now = std::chrono::steady_clock::now();
+    const double ms = std::chrono::duration<double, std::milli>(now - clock_).count();
+    clock_ = now;
+    return ms;
+  }
+
+ private:
+  void run_tasks();
+  void worker();
+
+  std::vector<std::thread> workers_;
+  std::mutex mutex_;
+  std::condition_variable wake_, done_;
+  const std::function<void(std::size_t)>* task_ = nullptr;
+  std::size_t next_ = 0, count_ = 0, running_ = 0;
+  unsigned long generation_ = 0;
+  bool stop_ = false;
+  std::exception_ptr error_;
+  std::chrono::steady_clock::time_point clock_;
+};
+
+}  // namespace gpureg::cpu

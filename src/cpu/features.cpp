@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "algorithm/fpfh.hpp"
+#include "cpu/stages.hpp"
+
+namespace gpureg::cpu {
+namespace {
+
+bool finite_row(const float* row, std::size_t dimension) {
+  for (std::size_t d = 0; d < dimension; ++d)
+    if (!(row[d] - row[d] == 0.0f)) return false;
+  return true;
+}
+
+}  // namespace
+
+std::vector<Features> compute_features(Exec& exec, const std::vector<DownsampledCloud>& clouds,
+                                       const std::vector<std::vector<Vec3>>& normals, const std::vector<Grid>& grids,
+                                       const PrepareOptions& options) {
+  constexpr std::size_t kGrain = 128;
+  std::vector<Features> features(clouds.size());
+  std::vector<std::vector<float>> spfh(clouds.size());
+  // Custom features come as they are; their rows with a NaN are never matched.
+  for (std::size_t c = 0; c < clouds.size(); ++c) {
+    const std::size_t n = clouds[c].points.size();
+    features[c].valid.assign(n, 0);
+    if (clouds[c].feature_dimension > 0) {
+      features[c].dimension = clouds[c].feature_dimension;
+      features[c].values = clouds[c].features;
+      for (std::size_t i = 0; i < n; ++i)
+        features[c].valid[i] = finite_row(features[c].values.data() + i * features[c].dimension, features[c].dimension);
+    } else {
+      features[c].dimension = kFpfhSize;
+      features[c].values.resize(n * kFpfhSize);
+      spfh[c].resize(n * kFpfhSize);
+    }
+  }
+  const auto items = [&](std::size_t c) { return clouds[c].feature_dimension > 0 ? std::size_t(0) : clouds[c].points.size(); };
+  exec.parallel_items(clouds.size(), items, kGrain, [&](std::size_t c, std::size_t begin, std::size_t end) {
+    const GridView grid = grids[c].view();
+    for (std::size_t i = begin; i < end; ++i) {
+      std::uint32_t counts[kFpfhSize];
+      const int neighbors = spfh_counts(grid, span_of(normals[c]), static_cast<std::uint32_t>(i), clouds[c].points[i],
+                                        options.feature_radius, counts);
+      for (int b = 0; b < kFpfhSize; ++b) spfh[c][i * kFpfhSize + b] = spfh_value(counts[b], neighbors);
+    }
+  });
+  exec.parallel_items(clouds.size(), items, kGrain, [&](std::size_t c, std::size_t begin, std::size_t end) {
+    const GridView grid = grids[c].view();
+    for (std::size_t i = begin; i < end; ++i)
+      features[c].valid[i] = weighted_fpfh(grid, span_of(normals[c]), spfh[c].data(), static_cast<std::uint32_t>(i), clouds[c].points[i],
+                                           options.feature_radius, features[c].values.data() + i * kFpfhSize);
+  });
+  return features;
+}
+
+}  // namespace gpureg::cpu

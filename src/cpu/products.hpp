@@ -1,0 +1,90 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "algorithm/closest.hpp"
+#include "algorithm/grid.hpp"
+#include "algorithm/moments.hpp"
+#include "algorithm/quadruple.hpp"
+#include "algorithm/support.hpp"
+#include "pipeline/engine.hpp"
+
+/// What the CPU stages hand on: values, one entry per cloud or pair of the batch.
+namespace gpureg::cpu {
+
+struct DownsampledCloud {
+  float origin[3] = {0, 0, 0};
+  float radius = 1;                  ///< of the points about the origin
+  std::uint64_t input_points = 0, invalid_points = 0;
+  std::vector<Vec3> points;          ///< local, in voxel order (z, y, x), or input order without downsampling
+  std::vector<Vec3> guides;          ///< empty, or the mean input normal of each point, zero where unknown
+  std::vector<float> features;       ///< empty, or the mean input feature of each point
+  std::uint32_t feature_dimension = 0;
+  std::vector<Vec3> viewpoints;      ///< local, at least one
+};
+
+struct CellTable {
+  std::vector<CellEntry> entries;
+  /// Makes room for that many keys.
+  void reset(std::size_t keys);
+  void insert(std::uint64_t key, std::uint32_t value);
+};
+
+struct Grid {
+  float cell_size = 1;
+  CellTable table;
+  std::vector<std::uint32_t> cell_start;
+  std::vector<Vec3> points;
+  std::vector<std::uint32_t> index;
+  GridView view() const;
+};
+
+struct Features {
+  std::vector<float> values;
+  std::vector<std::uint8_t> valid;
+  std::uint32_t dimension = 0;
+};
+
+struct ClosestGrid {
+  float cell_size = 1;
+  CellTable table;
+  std::vector<std::uint32_t> cell_start;
+  std::vector<std::uint32_t> candidates;
+  ClosestGridView view() const;
+};
+
+/// The fragment that a PreparedCloud holds.
+struct CpuCloud : PreparedState {
+  std::vector<Vec3> points, normals;
+  Features features;
+  ClosestGrid closest;
+  std::vector<Vec3> copy_points() const override { return points; }
+  std::vector<Vec3> copy_normals() const override { return normals; }
+  std::vector<float> copy_features() const override { return features.values; }
+  CloudView view() const;
+};
+
+struct Matches {
+  std::vector<MatchedPoints> pairs;
+};
+
+struct Hypotheses {
+  std::vector<std::uint32_t> id;   ///< number among all drawn, ascending
+  std::vector<Pose<float>> pose;
+};
+
+/// Best hypothesis of a pair, or none (found false).
+struct BestPose {
+  bool found = false;
+  Pose<double> pose{1, 0, 0, 0, 0, 0, 0};
+  Support support{0, 0, 0};
+  std::uint32_t iterations = 0;
+};
+
+struct PairMoments {
+  Moments source, target;
+};
+
+}  // namespace gpureg::cpu

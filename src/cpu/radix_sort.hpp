@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstdint>
+#include <utility>
+#include <vector>
+
+namespace gpureg::cpu {
+
+struct KeyIndex {
+  std::uint64_t key;
+  std::uint32_t index;
+};
+
+/// Stable least-significant-digit radix sort by key; digits that are the same everywhere cost nothing.
+inline void radix_sort(std::vector<KeyIndex>& items) {
+  constexpr int kBits = 11;
+  constexpr std::uint32_t kBuckets = 1u << kBits;
+  std::uint64_t all_or = 0, all_and = ~std::uint64_t(0);
+  for (const KeyIndex& item : items) all_or |= item.key, all_and &= item.key;
+  const std::uint64_t varying = all_or ^ all_and;
+  std::vector<KeyIndex> other(items.size());
+  for (int shift = 0; shift < 64; shift += kBits) {
+    if (((varying >> shift) & (kBuckets - 1)) == 0) continue;
+    std::uint32_t start[kBuckets] = {0};
+    for (const KeyIndex& item : items) ++start[(item.key >> shift) & (kBuckets - 1)];
+    std::uint32_t sum = 0;
+    for (std::uint32_t& s : start) {
+      const std::uint32_t n = s;
+      s = sum;
+      sum += n;
+    }
+    for (const KeyIndex& item : items) other[start[(item.key >> shift) & (kBuckets - 1)]++] = item;
+    items.swap(other);
+  }
+}
+
+}  // namespace gpureg::cpu

@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "pipeline/types.hpp"
+
+namespace gpureg {
+
+enum class Backend;
+
+/// What a PreparedCloud holds: facts on the host, data wherever the engine keeps it.
+struct PreparedState {
+  virtual ~PreparedState() = default;
+  /// Host copies, relative to the local origin.
+  virtual std::vector<Vec3> copy_points() const = 0;
+  virtual std::vector<Vec3> copy_normals() const = 0;
+  virtual std::vector<float> copy_features() const = 0;
+
+  const void* owner = nullptr;        ///< identifies the memory that the data lives in: clouds of one owner can be aligned
+  PrepareOptions options;
+  PrepareStatistics statistics;
+  float origin[3] = {0, 0, 0};        ///< local origin in the cloud's frame
+  std::uint32_t size = 0;
+  std::uint32_t feature_dimension = 0;
+  float radius = 1;                   ///< see CloudView
+  std::vector<Vec3> viewpoints;       ///< relative to the local origin
+};
+
+/// A pair of clouds for the engine, and optionally the caller's own correspondences.
+struct PairInput {
+  const PreparedState* source;
+  const PreparedState* target;
+  Span<const std::uint32_t> custom_source{};
+  Span<const std::uint32_t> custom_target{};
+};
+
+/// Private interface between the public door (src/api) and the backends (src/cpu, cuda). Calls are serialised inside.
+class Engine {
+ public:
+  virtual ~Engine() = default;
+  virtual Backend backend() const = 0;
+  virtual unsigned threads() const = 0;
+  virtual std::string description() const = 0;
+  virtual const void* memory() const = 0;      ///< owner of the clouds that this engine can align
+  virtual std::size_t pairs_per_chunk() const = 0;  ///< how many pairs go through the stages together
+  virtual std::vector<std::shared_ptr<PreparedState>> prepare(Span<const RawCloud> clouds, const PrepareOptions& options) = 0;
+  virtual void align(Span<const PairInput> pairs, const RegistrationOptions& options, Span<PairOutcome> outcomes) = 0;
+};
+
+/// threads > 0. Throws BackendUnavailable where this processor lacks instructions that the stages were compiled for.
+std::shared_ptr<Engine> make_cpu_engine(unsigned threads);
+/// Throws BackendUnavailable.
+std::shared_ptr<Engine> make_cuda_engine(int device);
+/// One line per CUDA device, or one line that says why there is none.
+std::vector<std::string> describe_cuda_devices();
+
+}  // namespace gpureg
