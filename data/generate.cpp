@@ -1,0 +1,202 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "data/generate.hpp"
+
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <exception>
+#include <mutex>
+#include <thread>
+#include <vector>
+
+#include "data/depth_sensor.hpp"
+#include "data/fusion.hpp"
+#include "data/ground_truth.hpp"
+#include "data/house.hpp"
+#include "data/random.hpp"
+#include "data/rgbd.hpp"
+#include "data/scene_files.hpp"
+#include "data/trajectory.hpp"
+#include "gpureg/error.hpp"
+
+namespace gpureg::synthetic {
+namespace {
+
+constexpr float kPointSpacing = 0.02f;  // metres: cells in which zero crossings are averaged
+
+void require(bool fine, const std::string& field, const std::string& value, const char* rule) {
+  if (!fine) throw InvalidArgument(field + " is " + value + ", but must be " + rule);
+}
+
+void validate(const GenerateOptions& o) {
+  require(o.fragments >= 1 && o.fragments <= 10000, "fragments", std::to_string(o.fragments), "1 to 10000");
+  require(o.frames_per_fragment >= 1 && o.frames_per_fragment <= 1000, "frames_per_fragment", std::to_string(o.frames_per_fragment), "1 to 1000");
+  require(o.threads >= 0 && o.threads <= 1024, "threads", std::to_string(o.threads), "0 (all cores) to 1024");
+  const SensorOptions& s = o.sensor;
+  const auto in = [&](const char* name, double value, double low, double high, const char* rule) {
+    require(value >= low && value <= high, std::string("sensor.") + name, std::to_string(value), rule);  // NaN fails too
+  };
+  in("min_depth", s.min_depth, 0.05, 10, "0.05 to 10 m");
+  in("max_depth", s.max_depth, 0.1, 13, "0.1 to 13 m");  // 16 bits of 1/5000 m end at 13.1 m
+  require(s.max_depth > s.min_depth, "sensor.max_depth", std::to_string(s.max_depth), "greater than sensor.min_depth");
+  in("pixel_shift", s.pixel_shift, 0, 10, "0 to 10 pixels");
+  in("disparity_noise", s.disparity_noise, 0, 10, "0 to 10 steps");
+  in("distortion", s.distortion, 0, 0.1, "0 to 0.1");
+  in("odometry_translation", s.odometry_translation, 0, 0.1, "0 to 0.1 m");
+  in("odometry_rotation_degrees", s.odometry_rotation_degrees, 0, 10, "0 to 10 degrees");
+}
+
+/// Runs work(0) .. work(count - 1) on the threads; the first exception ends all and is thrown here.
+template <class Work>
+void parallel(int threads, int count, const Work& work) {
+  std::atomic<int> next{0};
+  std::exception_ptr failure;
+  std::mutex guard;
+  const auto worker = [&] {
+    try {
+      for (int i; (i = next.fetch_add(1)) < count;) work(i);
+    } catch (...) {
+      next = count;
+      const std::lock_guard<std::mutex> lock(guard);
+      if (!failure) failure = std::current_exception();
+    }
+  };
+  std::vector<std::thread> pool;
+  for (int t = 1; t < std::min(threads, count); ++t) pool.emplace_back(worker);
+  worker();
+  for (std::thread& thread : pool) thread.join();
+  if (failure) std::rethrow_exception(failure);
+}
+
+/// One scene on its way into a folder.
+class Generator {
+ public:
+  Generator(const std::string& folder, const GenerateOptions& options, const Progress& progress)
+      : folder_(folder),
+        options_(options),
+        progress_(progress),
+        threads_(options.threads > 0 ? options.threads : std::max(1, static_cast<int>(std::thread::hardware_concurrency()))),
+        house_(build_house(options.seed)),
+        scene_(house_.mesh),
+        sensor_(scene_, options.sensor, options.seed),
+        world_from_camera_(walk(house_, options.seed, options.fragments * options.frames_per_fragment)),
+        fragments_(static_cast<std::size_t>(options.fragments)),
+        cameras_(fragments_.size()) {}
+
+  void run() {
+    open_folder(folder_, options_.fragments, options_.rgbd);
+    report(0, options_.fragments, "fragments");
+    parallel(threads_, options_.fragments, [&](int i) { scan(i); });
+    if (stopped()) return;
+    const std::vector<PairTruth> truths = compare_all();
+    if (stopped()) return;
+    std::vector<Eigen::Isometry3d> poses;
+    for (const Fragment& fragment : fragments_) poses.push_back(fragment.world_from_fragment);
+    if (options_.rgbd) write_sequence_lists(folder_, world_from_camera_);
+    write_poses(folder_ + "/poses.txt", poses);
+    write_cameras(folder_ + "/cameras.txt", cameras_);
+    write_ground_truth(folder_, options_.fragments, truths);
+  }
+
+ private:
+  bool stopped() {
+    if (!stop_ && progress_.should_stop && progress_.should_stop()) stop_ = true;
+    return stop_;
+  }
+
+  void report(int done, int total, const char* stage) {
+    if (progress_.report) progress_.report(done, total, stage);
+  }
+  void step(int total, const char* stage) {
+    const std::lock_guard<std::mutex> lock(report_guard_);
+    report(++done_, total, stage);
+  }
+
+  /// Where the odometry believes a fragment's cameras to be: the true motion plus an error that adds up frame by frame.
+  std::vector<Eigen::Isometry3d> odometry(int first) const {
+    std::vector<Eigen::Isometry3d> estimate(1, Eigen::Isometry3d::Identity());
+    for (int frame = first + 1; frame < first + options_.frames_per_fragment; ++frame) {
+      Random random(hash_key(options_.seed, Purpose::drift, static_cast<std::uint64_t>(frame)));
+      Eigen::Vector3d turn, shift;
+      for (int axis = 0; axis < 3; ++axis) {
+        turn[axis] = options_.sensor.odometry_rotation_degrees * 0.017453292519943295 * random.normal();
+        shift[axis] = options_.sensor.odometry_translation * random.normal();
+      }
+      const double angle = turn.norm();
+      Eigen::Isometry3d error = Eigen::Isometry3d::Identity();
+      if (angle > 0) error.linear() = Eigen::AngleAxisd(angle, turn / angle).toRotationMatrix();
+      error.translation() = shift;
+      const auto k = static_cast<std::size_t>(frame);
+      estimate.push_back(estimate.back() * (world_from_camera_[k - 1].inverse() * world_from_camera_[k]) * error);
+    }
+    return estimate;
+  }
+
+  void scan(int i) {
+    const int first = i * options_.frames_per_fragment;
+    const auto at = static_cast<std::size_t>(i);
+    fragments_[at].world_from_fragment = world_from_camera_[static_cast<std::size_t>(first)];
+    cameras_[at] = odometry(first);
+    FusionVolume volume;
+    for (int k = 0; k < options_.frames_per_fragment; ++k) {
+      if (stopped()) return;
+      const Eigen::Isometry3d& pose = world_from_camera_[static_cast<std::size_t>(first + k)];
+      const DepthQuarter quarter = sensor_.capture(pose, first + k, 0, 0);
+      volume.integrate(quarter, cameras_[at][static_cast<std::size_t>(k)]);
+      if (!options_.rgbd) continue;
+      write_frame(folder_, first + k, render_colour(scene_, pose, options_.seed, first + k),
+                  depth_image({quarter, sensor_.capture(pose, first + k, 1, 0), sensor_.capture(pose, first + k, 0, 1),
+                               sensor_.capture(pose, first + k, 1, 1)}));
+    }
+    // A surface counts when it was seen a few times, at least from afar; short fragments must do with less.
+    const float sightings = std::clamp(static_cast<float>(options_.frames_per_fragment) / 15.0f, 0.5f, 3.0f);
+    const float farthest = static_cast<float>(options_.sensor.max_depth);
+    fragments_[at].points = volume.extract(sightings / (farthest * farthest), kPointSpacing);
+    write_cloud(folder_ + "/cloud_bin_" + std::to_string(i) + ".ply", fragments_[at].points);
+    step(options_.fragments, "fragments");
+  }
+
+  /// All pairs i < j, in order. A row of pairs is one piece of work.
+  std::vector<PairTruth> compare_all() {
+    done_ = 0;
+    report(0, options_.fragments, "ground truth");
+    std::vector<NeighbourGrid> grids;
+    grids.reserve(fragments_.size());
+    for (const Fragment& fragment : fragments_) {
+      if (stopped()) return {};
+      grids.emplace_back(fragment.points, kOverlapRadius);
+    }
+    std::vector<std::vector<PairTruth>> rows(fragments_.size());
+    parallel(threads_, options_.fragments, [&](int i) {
+      if (stopped()) return;
+      for (int j = i + 1; j < options_.fragments; ++j) rows[static_cast<std::size_t>(i)].push_back(pair_truth(fragments_, grids, i, j));
+      step(options_.fragments, "ground truth");
+    });
+    std::vector<PairTruth> all;
+    for (const auto& row : rows) all.insert(all.end(), row.begin(), row.end());
+    return all;
+  }
+
+  const std::string& folder_;
+  const GenerateOptions& options_;
+  const Progress& progress_;
+  const int threads_;
+  const House house_;
+  const RayScene scene_;
+  const DepthSensor sensor_;
+  const std::vector<Eigen::Isometry3d> world_from_camera_;
+  std::vector<Fragment> fragments_;
+  std::vector<std::vector<Eigen::Isometry3d>> cameras_;  // fragment_from_camera
+  std::atomic<bool> stop_{false};
+  std::mutex report_guard_;
+  int done_ = 0;
+};
+
+}  // namespace
+
+void generate(const std::string& out_folder, const GenerateOptions& options, const Progress& progress) {
+  validate(options);
+  Generator(out_folder, options, progress).run();
+}
+
+}  // namespace gpureg::synthetic
