@@ -21,14 +21,16 @@ struct InformationEntry {
   Eigen::Matrix<double, 6, 6> information = Eigen::Matrix<double, 6, 6>::Zero();
 };
 
-/// Read or write. Throw IoError naming file, line and reason; writing goes through a temporary file, flushes, and renames, so a full
-/// disk or a crash never leaves a truncated file under the final name.
+/// Read or write. Throw IoError naming file, line and reason; a transform must be a rotation and a translation, every number finite.
+/// Writing goes through a temporary file, flushes, and renames, so a full disk or a crash never leaves a truncated file under the
+/// final name. Writers throw InvalidArgument for entries that no reader would take back (NaN, a negative index).
 std::vector<LogEntry> read_log(const std::string& path);
 std::vector<InformationEntry> read_information(const std::string& path);
 void write_log(const std::string& path, const std::vector<LogEntry>& entries);
 void write_information(const std::string& path, const std::vector<InformationEntry>& entries);
 
-/// Writes text to path with the same all-or-nothing guarantee. Throws IoError.
+/// Writes any bytes to path with the same all-or-nothing guarantee: the old file stays until the new one is complete. Links are
+/// followed, the mode of an existing file is kept, devices and pipes are written in place. Throws IoError. Thread-safe.
 void write_file_atomically(const std::string& path, const std::string& content);
 
 /// A report of one pair, ranked by score.
@@ -46,7 +48,8 @@ struct GroundTruth {
   std::vector<InformationEntry> all_information;
 };
 
-/// Reads gt.log, gt.info and, where they exist, gt_all.log and gt_all.info of a folder. Throws IoError.
+/// Reads gt.log, gt.info and, where they exist, gt_all.log and gt_all.info of a folder. Throws IoError, also where a .log and its
+/// .info do not list the same pairs in the same order.
 GroundTruth read_ground_truth(const std::string& folder);
 
 /// Counts and ratios of one scene under one rule. Ratios in [0, 1]; precision is 1 where nothing is reported.
@@ -73,10 +76,13 @@ struct Evaluation {
 };
 
 /// error^2 = e' Info e / Info(0,0), e = [t; q_xyz] of inverse(T_gt) T; good iff <= 0.2^2 (Choi et al. 2015). Returns metres.
+/// Throws InvalidArgument unless Info(0,0), the number of correspondences, is > 0.
 double redwood_error(const Eigen::Matrix4d& ground_truth, const Eigen::Matrix4d& result,
                      const Eigen::Matrix<double, 6, 6>& information);
 
 /// The protocol. Only reports and truths with j - i > 1 count; duplicates count twice. ranked: also fill the ranked scores.
+/// Equal scores enter the ranking together. Average precision is the sum of precision times gain in recall over all thresholds.
+/// Throws InvalidArgument for truths without their information matrices and, where ranked, for a score that is NaN.
 Evaluation evaluate(const GroundTruth& truth, const std::vector<Report>& reports, bool ranked);
 
 /// Unweighted mean of recall and precision over scenes, as Redwood's table has it.

@@ -1,0 +1,133 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <fcntl.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <atomic>
+#include <cerrno>
+#include <cstdlib>
+#include <memory>
+#include <string_view>
+#include <system_error>
+
+#include "gpureg/error.hpp"
+#include "gpureg/evaluation.hpp"
+
+namespace gpureg::evaluation {
+namespace {
+
+[[noreturn]] void fail(const std::string& path, const std::string& reason) {
+  throw IoError("cannot write " + path + ": " + reason);
+}
+
+std::string why(int error) { return std::generic_category().message(error); }
+
+// An open file which the destructor closes, and deletes again unless it was kept.
+class OutputFile {
+ public:
+  OutputFile(int fd, std::string remove_path) : fd_(fd), remove_path_(std::move(remove_path)) {}
+  OutputFile(const OutputFile&) = delete;
+  OutputFile& operator=(const OutputFile&) = delete;
+  ~OutputFile() {
+    if (fd_ >= 0) ::close(fd_);
+    if (!remove_path_.empty()) ::unlink(remove_path_.c_str());
+  }
+
+  int fd() const { return fd_; }
+  void keep() { remove_path_.clear(); }
+
+  // close() is where network file systems report a full disk.
+  int close() {
+    const int result = ::close(fd_) == 0 ? 0 : errno;
+    fd_ = -1;
+    return result;
+  }
+
+ private:
+  int fd_;
+  std::string remove_path_;
+};
+
+int write_all(int fd, std::string_view rest) {
+  while (!rest.empty()) {
+    const ssize_t written = ::write(fd, rest.data(), rest.size());
+    if (written < 0) {
+      if (errno == EINTR) continue;
+      return errno;
+    }
+    rest.remove_prefix(static_cast<std::size_t>(written));
+  }
+  return 0;
+}
+
+// Devices and pipes cannot be replaced by a rename (as root it would even succeed, and /dev/null be
+// gone).
+void write_special_file(const std::string& path, std::string_view content) {
+  OutputFile file(::open(path.c_str(), O_WRONLY | O_CLOEXEC), {});
+  if (file.fd() < 0) fail(path, why(errno));
+  if (const int error = write_all(file.fd(), content)) fail(path, why(error));
+  if (const int error = file.close()) fail(path, why(error));
+}
+
+std::string folder_of(const std::string& path) {
+  const std::size_t slash = path.rfind('/');
+  if (slash == std::string::npos) return "./";
+  return path.substr(0, slash + 1);
+}
+
+// The name does not derive from the final one, which may already be as long as the file system
+// allows.
+OutputFile open_temporary(const std::string& path, std::string& temporary) {
+  static std::atomic<unsigned> counter{0};
+  for (int attempt = 0; attempt < 100; ++attempt) {
+    temporary = folder_of(path) + ".gpureg-" + std::to_string(::getpid()) + "-" +
+                std::to_string(counter++) + ".tmp";
+    const int fd = ::open(temporary.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
+    if (fd >= 0) return {fd, temporary};
+    if (errno != EEXIST) fail(path, why(errno));
+  }
+  fail(path, "no free name for a temporary file");
+}
+
+// Without this a power cut may forget the rename; where a file system cannot sync folders there is
+// nothing better to do.
+void sync_folder(const std::string& folder) {
+  const int fd = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  if (fd < 0) return;
+  (void)::fsync(fd);
+  ::close(fd);
+}
+
+// A rename would replace a link itself: write where it points to.
+std::string behind_links(const std::string& path) {
+  const std::unique_ptr<char, decltype(&std::free)> real(::realpath(path.c_str(), nullptr),
+                                                         &std::free);
+  return real ? std::string(real.get()) : path;
+}
+
+}  // namespace
+
+void write_file_atomically(const std::string& path, const std::string& content) {
+  if (path.empty()) fail("''", "the path is empty");
+  struct stat existing {};
+  const bool exists = ::stat(path.c_str(), &existing) == 0;
+  if (!exists && errno != ENOENT) fail(path, why(errno));
+  if (exists && S_ISDIR(existing.st_mode)) fail(path, "it is a folder");
+  if (exists && !S_ISREG(existing.st_mode)) return write_special_file(path, content);
+  // The folder alone decides about a rename; a file that was made read-only on purpose should stay
+  // as it is.
+  if (exists && ::access(path.c_str(), W_OK) != 0) fail(path, why(errno));
+
+  const std::string target = exists ? behind_links(path) : path;
+  std::string temporary;
+  OutputFile file = open_temporary(target, temporary);
+  if (exists) (void)::fchmod(file.fd(), existing.st_mode & 07777);
+  if (const int error = write_all(file.fd(), content)) fail(path, why(error));
+  if (::fsync(file.fd()) != 0) fail(path, why(errno));
+  if (const int error = file.close()) fail(path, why(error));
+  if (::rename(temporary.c_str(), target.c_str()) != 0) fail(path, why(errno));
+  file.keep();
+  sync_folder(folder_of(target));
+}
+
+}  // namespace gpureg::evaluation
