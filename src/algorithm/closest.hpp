@@ -22,21 +22,12 @@ struct Closest {
   float squared_distance;
 };
 
-/// Closest point of the cloud to q within max_squared (inclusive); the lower index wins a tie. Exactly what an exhaustive search over
-/// squared_norm(points[k] - q) finds, provided that max_squared is within the grid's search distance.
-GPUREG_HD Closest find_closest(const ClosestGridView& grid, const Vec3* points, Vec3 q, float max_squared) {
+/// Closest of the candidates first to last (exclusive), see find_closest.
+GPUREG_HD Closest closest_candidate(const std::uint32_t* candidates, std::uint32_t first, std::uint32_t last, const Vec3* points, Vec3 q,
+                                    float max_squared) {
   Closest best{kNoValue, max_squared};
-  const float fx = q.x * grid.inverse_cell_size, fy = q.y * grid.inverse_cell_size, fz = q.z * grid.inverse_cell_size;
-  const float limit = static_cast<float>(kCellBias) * static_cast<float>(ClosestGridView::kBlockEdge) - 1.0f;
-  if (!(fx > -limit && fx < limit && fy > -limit && fy < limit && fz > -limit && fz < limit)) return best;
-  const Cell c{floor_to_int(fx), floor_to_int(fy), floor_to_int(fz)};
-  const std::uint32_t block = find_cell(grid.table, cell_key({c.x >> 3, c.y >> 3, c.z >> 3}));
-  if (block == kNoValue) return best;
-  const std::uint32_t cell = static_cast<std::uint32_t>(((c.z & 7) << 6) | ((c.y & 7) << 3) | (c.x & 7));
-  const std::uint32_t* start = grid.cell_start.data + static_cast<std::size_t>(block) * (ClosestGridView::kBlockCells + 1) + cell;
-  const std::uint32_t end = start[1];
-  for (std::uint32_t k = start[0]; k < end; ++k) {
-    const std::uint32_t i = grid.candidates[k];
+  for (std::uint32_t k = first; k < last; ++k) {
+    const std::uint32_t i = candidates[k];
     const float d2 = squared_norm(points[i] - q);
     // Candidates ascend, so "less" keeps the lower index among equals; the first may lie exactly on the limit.
     if (d2 < best.squared_distance || (best.index == kNoValue && d2 == best.squared_distance)) {
@@ -45,6 +36,21 @@ GPUREG_HD Closest find_closest(const ClosestGridView& grid, const Vec3* points, 
     }
   }
   return best;
+}
+
+/// Closest point of the cloud to q within max_squared (inclusive); the lower index wins a tie. Exactly what an exhaustive search over
+/// squared_norm(points[k] - q) finds, provided that max_squared is within the grid's search distance.
+GPUREG_HD Closest find_closest(const ClosestGridView& grid, const Vec3* points, Vec3 q, float max_squared) {
+  const Closest none{kNoValue, max_squared};
+  const float fx = q.x * grid.inverse_cell_size, fy = q.y * grid.inverse_cell_size, fz = q.z * grid.inverse_cell_size;
+  const float limit = static_cast<float>(kCellBias) * static_cast<float>(ClosestGridView::kBlockEdge) - 1.0f;
+  if (!(fx > -limit && fx < limit && fy > -limit && fy < limit && fz > -limit && fz < limit)) return none;
+  const Cell c{floor_to_int(fx), floor_to_int(fy), floor_to_int(fz)};
+  const std::uint32_t block = find_cell(grid.table, cell_key({c.x >> 3, c.y >> 3, c.z >> 3}));
+  if (block == kNoValue) return none;
+  const std::uint32_t cell = static_cast<std::uint32_t>(((c.z & 7) << 6) | ((c.y & 7) << 3) | (c.x & 7));
+  const std::uint32_t* start = grid.cell_start.data + static_cast<std::size_t>(block) * (ClosestGridView::kBlockCells + 1) + cell;
+  return closest_candidate(grid.candidates.data, start[0], start[1], points, q, max_squared);
 }
 
 }  // namespace gpureg

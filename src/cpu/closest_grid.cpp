@@ -142,6 +142,7 @@ std::vector<ClosestGrid> build_closest_grids(Exec& exec, const std::vector<Downs
     grid.candidates.reserve(total);
     for (std::size_t b = 0; b < keys[c].size(); ++b) {
       grid.table.insert(keys[c][b], static_cast<std::uint32_t>(b));
+      grid.blocks.push_back(cell_from_key(keys[c][b]));
       std::uint32_t offset = static_cast<std::uint32_t>(grid.candidates.size());
       for (int cell = 0; cell < kCells; ++cell) {
         grid.cell_start.push_back(offset);

@@ -2,6 +2,7 @@
 #include <mutex>
 #include <string>
 
+#include "cpu/cell_summary.hpp"
 #include "cpu/stages.hpp"
 #include "gpureg/error.hpp"
 #include "pipeline/align.hpp"
@@ -51,14 +52,14 @@ class CpuEngine final : public Engine {
 }  // namespace
 
 CloudView CpuCloud::view() const {
-  return {points.data(), normals.data(), features.values.data(), features.valid.data(), size, feature_dimension, radius, closest.view()};
+  return {points.data(), normals.data(), features.values.data(), features.valid.data(), size, feature_dimension, radius, closest.view(), this};
 }
 
-std::vector<std::shared_ptr<CpuCloud>> assemble(Exec&, std::vector<DownsampledCloud>& clouds, std::vector<std::vector<Vec3>>& normals,
+std::vector<std::shared_ptr<CpuCloud>> assemble(Exec& exec, std::vector<DownsampledCloud>& clouds, std::vector<std::vector<Vec3>>& normals,
                                                 std::vector<Features>& features, std::vector<ClosestGrid>& closest,
                                                 const PrepareOptions& options) {
-  std::vector<std::shared_ptr<CpuCloud>> out;
-  for (std::size_t c = 0; c < clouds.size(); ++c) {
+  std::vector<std::shared_ptr<CpuCloud>> out(clouds.size());
+  exec.parallel(clouds.size(), [&](std::size_t c) {
     auto cloud = std::make_shared<CpuCloud>();
     cloud->options = options;
     for (int k = 0; k < 3; ++k) cloud->origin[k] = clouds[c].origin[k];
@@ -75,8 +76,10 @@ std::vector<std::shared_ptr<CpuCloud>> assemble(Exec&, std::vector<DownsampledCl
     cloud->normals = std::move(normals[c]);
     cloud->features = std::move(features[c]);
     cloud->closest = std::move(closest[c]);
-    out.push_back(std::move(cloud));
-  }
+    cloud->order = scoring_order(cloud->points, cloud->normals, options.search_distance);
+    cloud->summaries = summarize_cells(cloud->closest, options.search_distance, cloud->radius, cloud->points, cloud->normals);
+    out[c] = std::move(cloud);
+  });
   return out;
 }
 

@@ -47,11 +47,28 @@ struct Features {
   std::uint32_t dimension = 0;
 };
 
+/// See cell_summary.hpp.
+struct ScoringOrder {
+  std::vector<float> x, y, z, nx, ny, nz;
+  std::vector<std::uint32_t> index;      ///< of the point, kNoValue for padding
+  std::vector<std::uint32_t> remaining;  ///< per group of 64: points in the groups after it
+};
+
+/// See cell_summary.hpp. Empty for a cloud too wide for the table.
+struct CellSummaries {
+  float inverse_cell_size = 1;
+  Vec3 offset{0, 0, 0};                ///< in cells: cell = p * inverse_cell_size + offset
+  std::int32_t nx = 0, ny = 0, nz = 0; ///< blocks
+  std::vector<std::int32_t> block;     ///< 1 + index of the block, or 0
+  std::vector<std::uint32_t> summary;  ///< (1 + blocks) x 512
+};
+
 struct ClosestGrid {
   float cell_size = 1;
   CellTable table;
   std::vector<std::uint32_t> cell_start;
   std::vector<std::uint32_t> candidates;
+  std::vector<Cell> blocks;            ///< in order of their index
   ClosestGridView view() const;
 };
 
@@ -60,6 +77,8 @@ struct CpuCloud : PreparedState {
   std::vector<Vec3> points, normals;
   Features features;
   ClosestGrid closest;
+  ScoringOrder order;
+  CellSummaries summaries;
   std::vector<Vec3> copy_points() const override { return points; }
   std::vector<Vec3> copy_normals() const override { return normals; }
   std::vector<float> copy_features() const override { return features.values; }

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include <algorithm>
 #include <atomic>
 
+#include "cpu/cell_summary.hpp"
 #include "cpu/stages.hpp"
 
 namespace gpureg::cpu {
@@ -16,32 +18,104 @@ struct Threshold {
                                                                                       3.14159265358979323846 / 180.0))) {}
 };
 
-/// Support of one pose, given up (inliers 0) as soon as even all points that are left cannot reach `needed` inliers: such a hypothesis
-/// is not the best one, so giving it up changes no result.
-Support support_of(const CloudView& source, const CloudView& target, const Rigid& pose, const Threshold& t, std::uint32_t needed) {
-  Support s{0, 0, 0};
-  for (std::uint32_t i = 0; i < source.size; ++i) {
-    if (s.inliers + (source.size - i) < needed) return {0, 0, 0};
-    const Closest c = find_closest(target.closest, target.points, apply(pose, source.points[i]), t.max_squared);
-    if (c.index == kNoValue) continue;
-    if (!normals_agree(t.min_cosine <= -1.0f ? Vec3{0, 0, 0} : rotate(pose, source.normals[i]), target.normals[c.index], t.min_cosine))
-      continue;
-    ++s.inliers;
-    s.residual += fixed_residual(c.squared_distance, t.inverse_max_squared);
-  }
-  return s;
+/// Adds point i of the source, moved to q and with closest target point c, to s if it is an inlier.
+inline void count_inlier(const CloudView& source, const CloudView& target, const Rigid& pose, const Threshold& t, std::uint32_t i, Closest c,
+                         Support& s) {
+  if (c.index == kNoValue) return;
+  if (!normals_agree(t.min_cosine <= -1.0f ? Vec3{0, 0, 0} : rotate(pose, source.normals[i]), target.normals[c.index], t.min_cosine)) return;
+  ++s.inliers;
+  s.residual += fixed_residual(c.squared_distance, t.inverse_max_squared);
 }
+
+inline void count_point(const CloudView& source, const CloudView& target, const Rigid& pose, const Threshold& t, std::uint32_t i, Support& s) {
+  count_inlier(source, target, pose, t, i, find_closest(target.closest, target.points, apply(pose, source.points[i]), t.max_squared), s);
+}
+
+const CpuCloud& executor_data(const CloudView& cloud) { return *static_cast<const CpuCloud*>(cloud.executor_data); }
+
+/// Everything that the hypotheses of one pair share.
+class PairScorer {
+ public:
+  PairScorer(const PairView& pair, const Threshold& threshold, const SummaryLimits& exact, const SummaryLimits& reach)
+      : source_(pair.source),
+        target_(pair.target),
+        threshold_(threshold),
+        order_(executor_data(pair.source).order),
+        cells_(executor_data(pair.target).summaries),
+        limits_(executor_data(pair.target).options.search_distance * executor_data(pair.target).options.search_distance == threshold.max_squared
+                    ? exact
+                    : reach),
+        bounds_(order_.remaining.size()),
+        cell_(order_.x.size()) {}
+
+  /// Support of one pose, given up (inliers 0) as soon as it cannot reach `needed` inliers: such a hypothesis is not the best one, so
+  /// giving it up changes no result. First every point is bounded by its cell's summary, then only undecided ones are looked at, and
+  /// only a pose that reaches `needed` has its residual measured.
+  Support score(const Rigid& pose, std::uint32_t needed) {
+    if (cells_.block.empty()) return all_points(pose);
+    std::uint32_t possible = 0;
+    for (std::size_t g = 0; g < bounds_.size(); ++g) {
+      bounds_[g] = bound_inliers(order_, g * 64, pose, cells_, limits_, cell_.data() + g * 64);
+      possible += static_cast<std::uint32_t>(__builtin_popcountll(bounds_[g].possible));
+      if (possible + order_.remaining[g] < needed) return {0, 0, 0};
+    }
+    for (std::size_t g = 0; g < bounds_.size(); ++g) {
+      Support undecided{0, 0, 0};
+      const std::uint64_t mask = bounds_[g].possible & ~bounds_[g].certain;
+      count_group(pose, g, mask, undecided);
+      possible -= static_cast<std::uint32_t>(__builtin_popcountll(mask)) - undecided.inliers;
+      if (possible < needed) return {0, 0, 0};
+    }
+    Support s{0, 0, 0};
+    for (std::size_t g = 0; g < bounds_.size(); ++g) count_group(pose, g, bounds_[g].possible, s);
+    return s;
+  }
+
+ private:
+  Support all_points(const Rigid& pose) const {
+    Support s{0, 0, 0};
+    for (std::uint32_t i = 0; i < source_.size; ++i) count_point(source_, target_, pose, threshold_, i, s);
+    return s;
+  }
+
+  /// Looks at the points of one group that the mask names. Their cells are known from the bounds: no search for the block.
+  void count_group(const Rigid& pose, std::size_t group, std::uint64_t mask, Support& s) const {
+    constexpr std::uint32_t kCells = ClosestGridView::kBlockCells;
+    const ClosestGridView& grid = target_.closest;
+    for (; mask != 0; mask &= mask - 1) {
+      const std::size_t k = group * 64 + static_cast<std::size_t>(__builtin_ctzll(mask));
+      const std::uint32_t summary = static_cast<std::uint32_t>(cell_[k]), block = summary / kCells - 1;
+      const std::uint32_t* start = grid.cell_start.data + static_cast<std::size_t>(block) * (kCells + 1) + summary % kCells;
+      const Vec3 q = apply(pose, {order_.x[k], order_.y[k], order_.z[k]});
+      count_inlier(source_, target_, pose, threshold_, order_.index[k],
+                   closest_candidate(grid.candidates.data, start[0], start[1], target_.points, q, threshold_.max_squared), s);
+    }
+  }
+
+  const CloudView& source_;
+  const CloudView& target_;
+  const Threshold& threshold_;
+  const ScoringOrder& order_;
+  const CellSummaries& cells_;
+  const SummaryLimits& limits_;
+  std::vector<PointBounds> bounds_;
+  std::vector<std::int32_t> cell_;
+};
 
 }  // namespace
 
 Support measure_support(const CloudView& source, const CloudView& target, const Rigid& pose, const ScoreOptions& options) {
-  return support_of(source, target, pose, Threshold(options), 0);
+  const Threshold threshold(options);
+  Support s{0, 0, 0};
+  for (std::uint32_t i = 0; i < source.size; ++i) count_point(source, target, pose, threshold, i, s);
+  return s;
 }
 
 std::vector<BestPose> score_hypotheses(Exec& exec, Span<const PairView> pairs, const std::vector<Hypotheses>& hypotheses,
                                        const ScoreOptions& options) {
   constexpr std::size_t kGrain = 32;
   const Threshold threshold(options);
+  const SummaryLimits exact_limits(options.max_normal_angle, true), reach_limits(options.max_normal_angle, false);
   std::vector<std::vector<Support>> best_of_block(pairs.size);
   std::vector<std::vector<std::size_t>> index_of_block(pairs.size);
   std::vector<std::atomic<std::uint32_t>> most(pairs.size);
@@ -54,9 +128,10 @@ std::vector<BestPose> score_hypotheses(Exec& exec, Span<const PairView> pairs, c
   exec.parallel_items(pairs.size, [&](std::size_t p) { return hypotheses[p].id.size(); }, kGrain,
                       [&](std::size_t p, std::size_t begin, std::size_t end) {
                         Support& best = best_of_block[p][begin / kGrain];
+                        PairScorer scorer(pairs[p], threshold, exact_limits, reach_limits);
                         for (std::size_t k = begin; k < end; ++k) {
                           const std::uint32_t needed = most[p].load(std::memory_order_relaxed);
-                          Support s = support_of(pairs[p].source, pairs[p].target, to_rigid(hypotheses[p].pose[k]), threshold, needed);
+                          Support s = scorer.score(to_rigid(hypotheses[p].pose[k]), needed);
                           s.hypothesis = hypotheses[p].id[k];
                           if (!better(s, best)) continue;
                           best = s;

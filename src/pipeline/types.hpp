@@ -32,6 +32,7 @@ struct CloudView {
   std::uint32_t feature_dimension;
   float radius;                     ///< largest distance of a point from the local origin, > 0
   ClosestGridView closest;
+  const void* executor_data;        ///< what the executor keeps beside, for itself
 };
 
 /// One pair as stages see it. matches: the caller's own correspondences instead of features; count 0 and null otherwise.

@@ -1,0 +1,240 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "cpu/cell_summary.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numeric>
+
+#include "cpu/radix_sort.hpp"
+
+#if defined(__AVX2__) && defined(__FMA__)
+#include <immintrin.h>
+#endif
+
+namespace gpureg::cpu {
+namespace {
+
+constexpr int kEdge = ClosestGridView::kBlockEdge;
+constexpr int kCells = ClosestGridView::kBlockCells;
+/// Block tables larger than this (a cloud with far stray points) are not worth their memory: then every point is looked at.
+constexpr double kMaxBlocks = double(1 << 22);
+constexpr double kDegrees = 3.14159265358979323846 / 180.0;
+/// Rounding a unit vector to steps of 1/127 turns it by less than this.
+constexpr double kQuantisation = 0.6;
+
+// A summary is one word: the mean normal as three signed bytes, then a code: bit 7 = every place in the cell has a candidate in reach,
+// bits 0..6 = largest angle between the mean and a candidate's normal in steps of 1.5 degrees (127: no bound).
+constexpr double kAngleStep = 1.5;
+constexpr int kNoBound = 127;
+
+std::uint32_t pack(Vec3 mean, int code) {
+  const auto byte = [](float v) { return static_cast<std::uint32_t>(static_cast<std::uint8_t>(static_cast<std::int8_t>(std::lrint(v * 127.0f)))); };
+  return byte(mean.x) | byte(mean.y) << 8 | byte(mean.z) << 16 | static_cast<std::uint32_t>(code) << 24;
+}
+
+/// The low 21 bits of each coordinate, interleaved.
+std::uint64_t morton_key(Cell c) {
+  const auto spread = [](std::int32_t v) {
+    std::uint64_t x = static_cast<std::uint32_t>(v + kCellBias) & 0x1fffffu;
+    x = (x | x << 32) & 0x1f00000000ffffull;
+    x = (x | x << 16) & 0x1f0000ff0000ffull;
+    x = (x | x << 8) & 0x100f00f00f00f00full;
+    x = (x | x << 4) & 0x10c30c30c30c30c3ull;
+    return (x | x << 2) & 0x1249249249249249ull;
+  };
+  return spread(c.x) | spread(c.y) << 1 | spread(c.z) << 2;
+}
+
+/// True where all of the cell lies within the search distance of p.
+bool covers_cell(Vec3 p, Vec3 center, const ClosestGeometry& g) {
+  const float h = 0.5f * g.cell_size + g.margin;
+  const Vec3 far{std::fabs(p.x - center.x) + h, std::fabs(p.y - center.y) + h, std::fabs(p.z - center.z) + h};
+  return norm(far) <= g.search_distance - g.margin;
+}
+
+std::uint32_t summarize(Span<const std::uint32_t> candidates, Vec3 center, const ClosestGeometry& g, const std::vector<Vec3>& points,
+                        const std::vector<Vec3>& normals) {
+  Vec3 sum{0, 0, 0};
+  bool covered = false, bounded = true;
+  for (const std::uint32_t i : candidates) {
+    sum = sum + normals[i];
+    bounded = bounded && !is_zero(normals[i]);
+    covered = covered || covers_cell(points[i], center, g);
+  }
+  const Vec3 mean = normalized_or_zero(sum);
+  int step = kNoBound;
+  if (bounded && !is_zero(mean)) {
+    float cosine = 1;
+    for (const std::uint32_t i : candidates) cosine = std::min(cosine, dot(mean, normals[i]));
+    const double angle = std::acos(std::max(-1.0, std::min(1.0, static_cast<double>(cosine)))) / kDegrees + kQuantisation;
+    step = std::min(kNoBound, static_cast<int>(std::ceil(angle / kAngleStep)));
+  }
+  return pack(mean, step | (covered ? 128 : 0));
+}
+
+}  // namespace
+
+ScoringOrder scoring_order(const std::vector<Vec3>& points, const std::vector<Vec3>& normals, float cell_size) {
+  ScoringOrder out;
+  const std::size_t n = points.size();
+  const std::size_t groups = (n + 63) / 64;
+  // Neighbours in space (Morton order) share a group of 64, so that a group's cells share cache lines; the groups themselves come in
+  // steps of the golden section, so that the first few tell about the whole cloud.
+  std::vector<KeyIndex> morton(n);
+  for (std::size_t i = 0; i < n; ++i) morton[i] = {morton_key(cell_of(points[i], 1.0f / cell_size)), static_cast<std::uint32_t>(i)};
+  radix_sort(morton);
+  std::size_t step = static_cast<std::size_t>(0.6180339887 * static_cast<double>(groups)) | 1;
+  while (groups > 0 && std::gcd(step, groups) != 1) ++step;
+  const float nan = std::numeric_limits<float>::quiet_NaN();
+  for (auto* v : {&out.x, &out.y, &out.z}) v->assign(groups * 64, nan);
+  for (auto* v : {&out.nx, &out.ny, &out.nz}) v->assign(groups * 64, 0.0f);
+  out.index.assign(groups * 64, kNoValue);
+  for (std::size_t g = 0, from = 0; g < groups; ++g, from = (from + step) % groups) {
+    for (std::size_t l = 0; l < 64 && from * 64 + l < n; ++l) {
+      const std::size_t k = g * 64 + l;
+      const std::uint32_t i = morton[from * 64 + l].index;
+      out.index[k] = i;
+      out.x[k] = points[i].x, out.y[k] = points[i].y, out.z[k] = points[i].z;
+      out.nx[k] = normals[i].x, out.ny[k] = normals[i].y, out.nz[k] = normals[i].z;
+    }
+    out.remaining.push_back(0);
+  }
+  std::uint32_t after = 0;
+  for (std::size_t g = groups; g-- > 0;) {
+    out.remaining[g] = after;
+    for (std::size_t l = 0; l < 64; ++l) after += out.index[g * 64 + l] != kNoValue;
+  }
+  return out;
+}
+
+CellSummaries summarize_cells(const ClosestGrid& closest, float search_distance, float cloud_radius, const std::vector<Vec3>& points,
+                              const std::vector<Vec3>& normals) {
+  CellSummaries out;
+  if (closest.blocks.empty()) return out;
+  Cell lo = closest.blocks[0], hi = lo;
+  for (const Cell& c : closest.blocks) {
+    lo = {std::min(lo.x, c.x), std::min(lo.y, c.y), std::min(lo.z, c.z)};
+    hi = {std::max(hi.x, c.x), std::max(hi.y, c.y), std::max(hi.z, c.z)};
+  }
+  const double nx = hi.x - lo.x + 1.0, ny = hi.y - lo.y + 1.0, nz = hi.z - lo.z + 1.0;
+  if (nx * ny * nz > kMaxBlocks) return out;
+  const ClosestGeometry g = closest_geometry(search_distance, cloud_radius);
+  out.inverse_cell_size = 1.0f / closest.cell_size;
+  out.offset = {-static_cast<float>(lo.x * kEdge), -static_cast<float>(lo.y * kEdge), -static_cast<float>(lo.z * kEdge)};
+  out.nx = static_cast<std::int32_t>(nx), out.ny = static_cast<std::int32_t>(ny), out.nz = static_cast<std::int32_t>(nz);
+  // Block 0 is the empty one: places without a block read zeros from it instead of taking a branch.
+  out.block.assign(static_cast<std::size_t>(nx * ny * nz), 0);
+  out.summary.assign((closest.blocks.size() + 1) * kCells, 0);
+  for (std::size_t b = 0; b < closest.blocks.size(); ++b) {
+    const Cell block = closest.blocks[b];
+    out.block[(static_cast<std::size_t>(block.z - lo.z) * out.ny + (block.y - lo.y)) * out.nx + (block.x - lo.x)] =
+        static_cast<std::int32_t>(b + 1);
+    const std::uint32_t* start = closest.cell_start.data() + b * (kCells + 1);
+    for (int cell = 0; cell < kCells; ++cell) {
+      if (start[cell] == start[cell + 1]) continue;
+      const Cell c{block.x * kEdge + (cell & 7), block.y * kEdge + ((cell >> 3) & 7), block.z * kEdge + (cell >> 6)};
+      out.summary[(b + 1) * kCells + cell] = summarize({closest.candidates.data() + start[cell], start[cell + 1] - start[cell]},
+                                                       cell_center(c, closest.cell_size), g, points, normals);
+    }
+  }
+  return out;
+}
+
+SummaryLimits::SummaryLimits(float max_normal_angle, bool exact_distance) {
+  for (int code = 0; code < 256; ++code) {
+    const int step = code & 127;
+    const double spread = step * kAngleStep + kQuantisation;
+    none_below[code] = -2.0f;
+    all_above[code] = 2.0f;
+    const bool covered = (code & 128) != 0 && exact_distance;
+    if (max_normal_angle >= 180.0f) {
+      // Without a normal test only reach decides.
+      if (covered) all_above[code] = -2.0f;
+    } else if (step != kNoBound) {
+      const double widest = static_cast<double>(max_normal_angle) + spread, narrowest = static_cast<double>(max_normal_angle) - spread;
+      if (widest < 180.0) none_below[code] = static_cast<float>(std::cos(widest * kDegrees)) - 1e-5f;
+      if (covered && narrowest > 0.0) all_above[code] = static_cast<float>(std::cos(narrowest * kDegrees)) + 1e-5f;
+    }
+  }
+  // Code 0 is a cell without candidates (a real one has a spread of at least one step): no inlier, whatever the normals.
+  none_below[0] = 3.0f;
+  all_above[0] = 3.0f;
+}
+
+PointBounds bound_inliers(const ScoringOrder& order, std::size_t first, const Rigid& pose, const CellSummaries& v, const SummaryLimits& limits,
+                          std::int32_t* cells) {
+  PointBounds out{0, 0};
+#if defined(__AVX2__) && defined(__FMA__)
+  // The pose in cells of the volume. Rounding here may differ from apply() by a small part of a cell, which the margin of the
+  // closest-point grid covers.
+  const float s = v.inverse_cell_size;
+  __m256 r[9], rs[9], t[3];
+  const float offset[3] = {v.offset.x, v.offset.y, v.offset.z};
+  for (int k = 0; k < 9; ++k) r[k] = _mm256_set1_ps(pose.r[k] * (1.0f / 127.0f)), rs[k] = _mm256_set1_ps(pose.r[k] * s);
+  for (int k = 0; k < 3; ++k) t[k] = _mm256_set1_ps(pose.t[k] * s + offset[k]);
+  const __m256i nx = _mm256_set1_epi32(v.nx), ny = _mm256_set1_epi32(v.ny), nz = _mm256_set1_epi32(v.nz);
+  const __m256i minus_one = _mm256_set1_epi32(-1), seven = _mm256_set1_epi32(7);
+  for (int k = 0; k < 64; k += 8) {
+    const __m256 x = _mm256_loadu_ps(order.x.data() + first + k), y = _mm256_loadu_ps(order.y.data() + first + k),
+                 z = _mm256_loadu_ps(order.z.data() + first + k);
+    const __m256 fx = _mm256_fmadd_ps(rs[2], z, _mm256_fmadd_ps(rs[1], y, _mm256_fmadd_ps(rs[0], x, t[0])));
+    const __m256 fy = _mm256_fmadd_ps(rs[5], z, _mm256_fmadd_ps(rs[4], y, _mm256_fmadd_ps(rs[3], x, t[1])));
+    const __m256 fz = _mm256_fmadd_ps(rs[8], z, _mm256_fmadd_ps(rs[7], y, _mm256_fmadd_ps(rs[6], x, t[2])));
+    // NaN (padding) and overflow become INT_MIN, which is outside.
+    const __m256i ix = _mm256_cvttps_epi32(_mm256_floor_ps(fx)), iy = _mm256_cvttps_epi32(_mm256_floor_ps(fy)),
+                  iz = _mm256_cvttps_epi32(_mm256_floor_ps(fz));
+    const __m256i bx = _mm256_srai_epi32(ix, 3), by = _mm256_srai_epi32(iy, 3), bz = _mm256_srai_epi32(iz, 3);
+    __m256i inside = _mm256_and_si256(_mm256_cmpgt_epi32(bx, minus_one), _mm256_cmpgt_epi32(nx, bx));
+    inside = _mm256_and_si256(inside, _mm256_and_si256(_mm256_cmpgt_epi32(by, minus_one), _mm256_cmpgt_epi32(ny, by)));
+    inside = _mm256_and_si256(inside, _mm256_and_si256(_mm256_cmpgt_epi32(bz, minus_one), _mm256_cmpgt_epi32(nz, bz)));
+    const __m256i at = _mm256_add_epi32(_mm256_mullo_epi32(_mm256_add_epi32(_mm256_mullo_epi32(bz, ny), by), nx), bx);
+    const __m256i block = _mm256_mask_i32gather_epi32(_mm256_setzero_si256(), v.block.data(), at, inside, 4);
+    const __m256i occupied = _mm256_cmpgt_epi32(block, _mm256_setzero_si256());
+    if (_mm256_testz_si256(occupied, occupied)) continue;
+    const __m256i cell = _mm256_or_si256(
+        _mm256_or_si256(_mm256_slli_epi32(block, 9), _mm256_slli_epi32(_mm256_and_si256(iz, seven), 6)),
+        _mm256_or_si256(_mm256_slli_epi32(_mm256_and_si256(iy, seven), 3), _mm256_and_si256(ix, seven)));
+    _mm256_storeu_si256(reinterpret_cast<__m256i*>(cells + k), cell);
+    const __m256i word = _mm256_mask_i32gather_epi32(_mm256_setzero_si256(), reinterpret_cast<const int*>(v.summary.data()), cell, occupied, 4);
+    if (_mm256_testz_si256(word, word)) continue;
+    const __m256 mx = _mm256_cvtepi32_ps(_mm256_srai_epi32(_mm256_slli_epi32(word, 24), 24)),
+                 my = _mm256_cvtepi32_ps(_mm256_srai_epi32(_mm256_slli_epi32(word, 16), 24)),
+                 mz = _mm256_cvtepi32_ps(_mm256_srai_epi32(_mm256_slli_epi32(word, 8), 24));
+    // n' R' m: the mean normal is turned back instead of the source's being turned, three products fewer.
+    const __m256 sx = _mm256_fmadd_ps(r[6], mz, _mm256_fmadd_ps(r[3], my, _mm256_mul_ps(r[0], mx)));
+    const __m256 sy = _mm256_fmadd_ps(r[7], mz, _mm256_fmadd_ps(r[4], my, _mm256_mul_ps(r[1], mx)));
+    const __m256 sz = _mm256_fmadd_ps(r[8], mz, _mm256_fmadd_ps(r[5], my, _mm256_mul_ps(r[2], mx)));
+    const __m256 cosine = _mm256_fmadd_ps(_mm256_loadu_ps(order.nz.data() + first + k), sz,
+                                          _mm256_fmadd_ps(_mm256_loadu_ps(order.ny.data() + first + k), sy,
+                                                          _mm256_mul_ps(_mm256_loadu_ps(order.nx.data() + first + k), sx)));
+    const __m256i code = _mm256_srli_epi32(word, 24);
+    const __m256 below = _mm256_i32gather_ps(limits.none_below, code, 4), above = _mm256_i32gather_ps(limits.all_above, code, 4);
+    const unsigned possible = static_cast<unsigned>(_mm256_movemask_ps(_mm256_cmp_ps(cosine, below, _CMP_GE_OQ)));
+    const unsigned certain = static_cast<unsigned>(_mm256_movemask_ps(_mm256_cmp_ps(cosine, above, _CMP_GE_OQ)));
+    out.possible |= static_cast<std::uint64_t>(possible) << k;
+    out.certain |= static_cast<std::uint64_t>(certain) << k;
+  }
+#else
+  for (int k = 0; k < 64; ++k) {
+    const std::size_t i = first + static_cast<std::size_t>(k);
+    const Vec3 q = apply(pose, {order.x[i], order.y[i], order.z[i]});
+    const float fx = std::floor(q.x * v.inverse_cell_size + v.offset.x), fy = std::floor(q.y * v.inverse_cell_size + v.offset.y),
+                fz = std::floor(q.z * v.inverse_cell_size + v.offset.z);
+    if (!(fx >= 0 && fy >= 0 && fz >= 0 && fx < static_cast<float>(v.nx * kEdge) && fy < static_cast<float>(v.ny * kEdge) &&
+          fz < static_cast<float>(v.nz * kEdge)))
+      continue;
+    const std::int32_t x = static_cast<std::int32_t>(fx), y = static_cast<std::int32_t>(fy), z = static_cast<std::int32_t>(fz);
+    const std::int32_t block = v.block[(static_cast<std::size_t>(z >> 3) * v.ny + (y >> 3)) * v.nx + (x >> 3)];
+    cells[k] = block * kCells + (((z & 7) << 6) | ((y & 7) << 3) | (x & 7));
+    const std::uint32_t word = v.summary[static_cast<std::size_t>(cells[k])];
+    const auto part = [&](int shift) { return static_cast<float>(static_cast<std::int8_t>(word >> shift)) * (1.0f / 127.0f); };
+    const float cosine = dot(rotate(pose, {order.nx[i], order.ny[i], order.nz[i]}), {part(0), part(8), part(16)});
+    out.possible |= static_cast<std::uint64_t>(cosine >= limits.none_below[word >> 24]) << k;
+    out.certain |= static_cast<std::uint64_t>(cosine >= limits.all_above[word >> 24]) << k;
+  }
+#endif
+  return out;
+}
+
+}  // namespace gpureg::cpu

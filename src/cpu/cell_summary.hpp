@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "algorithm/closest_build.hpp"
+#include "cpu/products.hpp"
+
+/// What lets the CPU decide most points of a hypothesis without looking at a single target point: per cell of the closest-point grid,
+/// a bound on the normals of all its candidates and whether every place in the cell has one of them in reach.
+namespace gpureg::cpu {
+
+/// Points in groups of 64 that spread over the cloud, one array per coordinate, padded with NaN for the vector unit.
+ScoringOrder scoring_order(const std::vector<Vec3>& points, const std::vector<Vec3>& normals, float cell_size);
+
+/// Summaries of the cells of one closest-point grid; points and normals are the cloud's.
+CellSummaries summarize_cells(const ClosestGrid& closest, float search_distance, float cloud_radius, const std::vector<Vec3>& points,
+                              const std::vector<Vec3>& normals);
+
+/// Cosines between a moved normal and a cell's mean normal below which no candidate agrees, and above which all agree.
+struct SummaryLimits {
+  float none_below[256];
+  float all_above[256];
+  /// exact_distance: the correspondence distance asked for is the one that the grid was built for.
+  SummaryLimits(float max_normal_angle_degrees, bool exact_distance);
+};
+
+struct PointBounds {
+  std::uint64_t possible;  ///< bit k is 0 only where point first + k is certainly no inlier
+  std::uint64_t certain;   ///< bit k is 1 only where it certainly is one
+};
+
+/// Bounds of 64 points, first a multiple of 64. cells: out, for each possible point, the index of its cell's summary.
+PointBounds bound_inliers(const ScoringOrder& order, std::size_t first, const Rigid& pose, const CellSummaries& summaries,
+                          const SummaryLimits& limits, std::int32_t* cells);
+
+}  // namespace gpureg::cpu

@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <charconv>
+#include <filesystem>
+#include <optional>
+
+#include "gpureg/error.hpp"
+#include "gpureg/io.hpp"
+
+namespace gpureg::io {
+namespace {
+
+constexpr std::string_view kPrefix = "cloud_bin_";
+
+// Number of a name like cloud_bin_12.ply; none for other names.
+std::optional<int> fragment_number(std::string_view name) {
+  if (name.size() < kPrefix.size() + 5 || name.substr(0, kPrefix.size()) != kPrefix) return {};
+  const std::string_view extension = name.substr(name.size() - 4);
+  if (extension != ".ply" && extension != ".pcd") return {};
+  const std::string_view digits = name.substr(kPrefix.size(), name.size() - kPrefix.size() - 4);
+  int number = 0;
+  const auto [stop, error] = std::from_chars(digits.data(), digits.data() + digits.size(), number);
+  if (error != std::errc() || stop != digits.data() + digits.size() || digits[0] == '-') return {};
+  return number;
+}
+
+}  // namespace
+
+std::vector<std::pair<int, std::string>> list_fragments(const std::string& folder) {
+  std::error_code error;
+  std::filesystem::directory_iterator entries(folder, error);
+  if (error) throw IoError("cannot list the folder " + folder + ": " + error.message());
+  std::map<int, std::string> fragments;
+  for (; entries != std::filesystem::directory_iterator(); entries.increment(error)) {
+    const auto number = fragment_number(entries->path().filename().string());
+    std::error_code unreadable;  // a dangling link is not a fragment
+    if (number && std::filesystem::is_regular_file(entries->path(), unreadable)) {
+      const auto [twin, is_new] = fragments.emplace(*number, entries->path().string());
+      if (!is_new)
+        throw IoError("fragment " + std::to_string(*number) + " is twice in the folder: " +
+                      twin->second + " and " + entries->path().string());
+    }
+  }
+  if (error) throw IoError("cannot list the folder " + folder + ": " + error.message());
+  if (fragments.empty())
+    throw IoError("no fragments cloud_bin_<i>.ply or .pcd in the folder " + folder);
+  return {fragments.begin(), fragments.end()};
+}
+
+}  // namespace gpureg::io

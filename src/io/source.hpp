@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstddef>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace gpureg::io {
+
+/// The bytes of a file, a position in them, and the way to complain about them.
+class Source {
+ public:
+  Source(std::string path, std::string_view bytes) : path_(std::move(path)), bytes_(bytes) {}
+
+  /// Next line without its line end (\n or \r\n); false at the end of the bytes.
+  bool next_line(std::string_view& line);
+
+  std::string_view rest() const { return bytes_.substr(position_); }
+  void skip(std::size_t bytes) { position_ += bytes; }  ///< at most rest().size()
+
+  /// Throws IoError naming the file, or file and line of the last next_line().
+  [[noreturn]] void fail(const std::string& reason) const;
+  [[noreturn]] void fail_line(const std::string& reason) const;
+
+ private:
+  std::string path_;
+  std::string_view bytes_;
+  std::size_t position_ = 0;
+  std::size_t line_ = 0;
+};
+
+/// Cuts a line at spaces and tabs into fields, whose old content is replaced.
+void split(std::string_view line, std::vector<std::string_view>& fields);
+
+/// The whole field as a decimal number of at most 18 digits; false for anything else.
+bool parse_count(std::string_view field, std::size_t& value);
+
+}  // namespace gpureg::io

@@ -1,0 +1,77 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "io/table.hpp"
+
+#include <initializer_list>
+
+namespace gpureg::io {
+
+std::size_t size_of(Scalar type) {
+  switch (type) {
+    case Scalar::int8:
+    case Scalar::uint8:
+      return 1;
+    case Scalar::int16:
+    case Scalar::uint16:
+      return 2;
+    case Scalar::int32:
+    case Scalar::uint32:
+    case Scalar::float32:
+      return 4;
+    default:
+      return 8;
+  }
+}
+
+std::size_t Table::values_per_row() const {
+  std::size_t sum = 0;
+  for (const Column& column : columns) sum += column.count;
+  return sum;
+}
+
+std::size_t Table::bytes_per_row() const {
+  std::size_t sum = 0;
+  for (const Column& column : columns) sum += column.count * size_of(column.type);
+  return sum;
+}
+
+namespace {
+
+std::optional<std::size_t> find(const Table& table, std::initializer_list<const char*> names,
+                                const Source& source) {
+  std::optional<std::size_t> found;
+  for (std::size_t k = 0; k < table.columns.size(); ++k)
+    for (const char* name : names) {
+      if (table.columns[k].name != name) continue;
+      if (found) source.fail(std::string("the header declares ") + name + " twice");
+      if (table.columns[k].count != 1)
+        source.fail(std::string("the header gives ") + name + " several values per point");
+      found = k;
+    }
+  return found;
+}
+
+}  // namespace
+
+Axes find_axes(const Table& table, const Source& source) {
+  Axes axes;
+  const char* const names[3] = {"x", "y", "z"};
+  for (std::size_t k = 0; k < 3; ++k) {
+    const auto column = find(table, {names[k]}, source);
+    if (!column) source.fail(std::string("the points have no coordinate ") + names[k]);
+    axes.point[k] = *column;
+  }
+  // PLY's habit and PCL's.
+  const auto nx = find(table, {"nx", "normal_x"}, source);
+  const auto ny = find(table, {"ny", "normal_y"}, source);
+  const auto nz = find(table, {"nz", "normal_z"}, source);
+  if (nx && ny && nz) axes.normal = {*nx, *ny, *nz};
+  return axes;
+}
+
+void check_rows(std::size_t rows, const Source& source) {
+  if (rows > 0x7fffffff)
+    source.fail("the header announces " + std::to_string(rows) +
+                " points, more than the limit of 2^31 - 1");
+}
+
+}  // namespace gpureg::io
