@@ -162,25 +162,24 @@ SummaryLimits::SummaryLimits(float max_normal_angle, bool exact_distance) {
   all_above[0] = 3.0f;
 }
 
-PointBounds bound_inliers(const ScoringOrder& order, std::size_t first, const Rigid& pose, const CellSummaries& v, const SummaryLimits& limits,
-                          std::int32_t* cells) {
-  PointBounds out{0, 0};
 #if defined(__AVX2__) && defined(__FMA__)
-  // The pose in cells of the volume. Rounding here may differ from apply() by a small part of a cell, which the margin of the
+
+void locate_cells(const ScoringOrder& order, std::size_t first, const Rigid& pose, const CellSummaries& v, std::int32_t* cells) {
+  // The pose in cells of the table. Rounding here may differ from apply() by a small part of a cell, which the margin of the
   // closest-point grid covers.
   const float s = v.inverse_cell_size;
-  __m256 r[9], rs[9], t[3];
+  __m256 r[9], t[3];
   const float offset[3] = {v.offset.x, v.offset.y, v.offset.z};
-  for (int k = 0; k < 9; ++k) r[k] = _mm256_set1_ps(pose.r[k] * (1.0f / 127.0f)), rs[k] = _mm256_set1_ps(pose.r[k] * s);
+  for (int k = 0; k < 9; ++k) r[k] = _mm256_set1_ps(pose.r[k] * s);
   for (int k = 0; k < 3; ++k) t[k] = _mm256_set1_ps(pose.t[k] * s + offset[k]);
   const __m256i nx = _mm256_set1_epi32(v.nx), ny = _mm256_set1_epi32(v.ny), nz = _mm256_set1_epi32(v.nz);
   const __m256i minus_one = _mm256_set1_epi32(-1), seven = _mm256_set1_epi32(7);
   for (int k = 0; k < 64; k += 8) {
     const __m256 x = _mm256_loadu_ps(order.x.data() + first + k), y = _mm256_loadu_ps(order.y.data() + first + k),
                  z = _mm256_loadu_ps(order.z.data() + first + k);
-    const __m256 fx = _mm256_fmadd_ps(rs[2], z, _mm256_fmadd_ps(rs[1], y, _mm256_fmadd_ps(rs[0], x, t[0])));
-    const __m256 fy = _mm256_fmadd_ps(rs[5], z, _mm256_fmadd_ps(rs[4], y, _mm256_fmadd_ps(rs[3], x, t[1])));
-    const __m256 fz = _mm256_fmadd_ps(rs[8], z, _mm256_fmadd_ps(rs[7], y, _mm256_fmadd_ps(rs[6], x, t[2])));
+    const __m256 fx = _mm256_fmadd_ps(r[2], z, _mm256_fmadd_ps(r[1], y, _mm256_fmadd_ps(r[0], x, t[0])));
+    const __m256 fy = _mm256_fmadd_ps(r[5], z, _mm256_fmadd_ps(r[4], y, _mm256_fmadd_ps(r[3], x, t[1])));
+    const __m256 fz = _mm256_fmadd_ps(r[8], z, _mm256_fmadd_ps(r[7], y, _mm256_fmadd_ps(r[6], x, t[2])));
     // NaN (padding) and overflow become INT_MIN, which is outside.
     const __m256i ix = _mm256_cvttps_epi32(_mm256_floor_ps(fx)), iy = _mm256_cvttps_epi32(_mm256_floor_ps(fy)),
                   iz = _mm256_cvttps_epi32(_mm256_floor_ps(fz));
@@ -190,18 +189,27 @@ PointBounds bound_inliers(const ScoringOrder& order, std::size_t first, const Ri
     inside = _mm256_and_si256(inside, _mm256_and_si256(_mm256_cmpgt_epi32(bz, minus_one), _mm256_cmpgt_epi32(nz, bz)));
     const __m256i at = _mm256_add_epi32(_mm256_mullo_epi32(_mm256_add_epi32(_mm256_mullo_epi32(bz, ny), by), nx), bx);
     const __m256i block = _mm256_mask_i32gather_epi32(_mm256_setzero_si256(), v.block.data(), at, inside, 4);
-    const __m256i occupied = _mm256_cmpgt_epi32(block, _mm256_setzero_si256());
-    if (_mm256_testz_si256(occupied, occupied)) continue;
     const __m256i cell = _mm256_or_si256(
         _mm256_or_si256(_mm256_slli_epi32(block, 9), _mm256_slli_epi32(_mm256_and_si256(iz, seven), 6)),
         _mm256_or_si256(_mm256_slli_epi32(_mm256_and_si256(iy, seven), 3), _mm256_and_si256(ix, seven)));
     _mm256_storeu_si256(reinterpret_cast<__m256i*>(cells + k), cell);
-    const __m256i word = _mm256_mask_i32gather_epi32(_mm256_setzero_si256(), reinterpret_cast<const int*>(v.summary.data()), cell, occupied, 4);
-    if (_mm256_testz_si256(word, word)) continue;
+  }
+  // The summaries of this group are read after the next group's cells are known: time enough to fetch them.
+  for (int k = 0; k < 64; ++k) _mm_prefetch(reinterpret_cast<const char*>(v.summary.data() + cells[k]), _MM_HINT_T0);
+}
+
+PointBounds bound_inliers(const ScoringOrder& order, std::size_t first, const Rigid& pose, const CellSummaries& v, const SummaryLimits& limits,
+                          const std::int32_t* cells) {
+  PointBounds out{0, 0};
+  __m256 r[9];
+  for (int k = 0; k < 9; ++k) r[k] = _mm256_set1_ps(pose.r[k] * (1.0f / 127.0f));
+  for (int k = 0; k < 64; k += 8) {
+    const __m256i cell = _mm256_loadu_si256(reinterpret_cast<const __m256i*>(cells + k));
+    const __m256i word = _mm256_i32gather_epi32(reinterpret_cast<const int*>(v.summary.data()), cell, 4);
     const __m256 mx = _mm256_cvtepi32_ps(_mm256_srai_epi32(_mm256_slli_epi32(word, 24), 24)),
                  my = _mm256_cvtepi32_ps(_mm256_srai_epi32(_mm256_slli_epi32(word, 16), 24)),
                  mz = _mm256_cvtepi32_ps(_mm256_srai_epi32(_mm256_slli_epi32(word, 8), 24));
-    // n' R' m: the mean normal is turned back instead of the source's being turned, three products fewer.
+    // n' R' m: the mean normal is turned back, which the source's normals need not be.
     const __m256 sx = _mm256_fmadd_ps(r[6], mz, _mm256_fmadd_ps(r[3], my, _mm256_mul_ps(r[0], mx)));
     const __m256 sy = _mm256_fmadd_ps(r[7], mz, _mm256_fmadd_ps(r[4], my, _mm256_mul_ps(r[1], mx)));
     const __m256 sz = _mm256_fmadd_ps(r[8], mz, _mm256_fmadd_ps(r[5], my, _mm256_mul_ps(r[2], mx)));
@@ -215,26 +223,41 @@ PointBounds bound_inliers(const ScoringOrder& order, std::size_t first, const Ri
     out.possible |= static_cast<std::uint64_t>(possible) << k;
     out.certain |= static_cast<std::uint64_t>(certain) << k;
   }
+  return out;
+}
+
 #else
+
+void locate_cells(const ScoringOrder& order, std::size_t first, const Rigid& pose, const CellSummaries& v, std::int32_t* cells) {
   for (int k = 0; k < 64; ++k) {
     const std::size_t i = first + static_cast<std::size_t>(k);
     const Vec3 q = apply(pose, {order.x[i], order.y[i], order.z[i]});
     const float fx = std::floor(q.x * v.inverse_cell_size + v.offset.x), fy = std::floor(q.y * v.inverse_cell_size + v.offset.y),
                 fz = std::floor(q.z * v.inverse_cell_size + v.offset.z);
+    cells[k] = 0;
     if (!(fx >= 0 && fy >= 0 && fz >= 0 && fx < static_cast<float>(v.nx * kEdge) && fy < static_cast<float>(v.ny * kEdge) &&
           fz < static_cast<float>(v.nz * kEdge)))
       continue;
     const std::int32_t x = static_cast<std::int32_t>(fx), y = static_cast<std::int32_t>(fy), z = static_cast<std::int32_t>(fz);
     const std::int32_t block = v.block[(static_cast<std::size_t>(z >> 3) * v.ny + (y >> 3)) * v.nx + (x >> 3)];
     cells[k] = block * kCells + (((z & 7) << 6) | ((y & 7) << 3) | (x & 7));
+  }
+}
+
+PointBounds bound_inliers(const ScoringOrder& order, std::size_t first, const Rigid& pose, const CellSummaries& v, const SummaryLimits& limits,
+                          const std::int32_t* cells) {
+  PointBounds out{0, 0};
+  for (int k = 0; k < 64; ++k) {
+    const std::size_t i = first + static_cast<std::size_t>(k);
     const std::uint32_t word = v.summary[static_cast<std::size_t>(cells[k])];
     const auto part = [&](int shift) { return static_cast<float>(static_cast<std::int8_t>(word >> shift)) * (1.0f / 127.0f); };
     const float cosine = dot(rotate(pose, {order.nx[i], order.ny[i], order.nz[i]}), {part(0), part(8), part(16)});
     out.possible |= static_cast<std::uint64_t>(cosine >= limits.none_below[word >> 24]) << k;
     out.certain |= static_cast<std::uint64_t>(cosine >= limits.all_above[word >> 24]) << k;
   }
-#endif
   return out;
 }
+
+#endif
 
 }  // namespace gpureg::cpu

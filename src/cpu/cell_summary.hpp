@@ -31,8 +31,12 @@ struct PointBounds {
   std::uint64_t certain;   ///< bit k is 1 only where it certainly is one
 };
 
-/// Bounds of 64 points, first a multiple of 64. cells: out, for each possible point, the index of its cell's summary.
+/// Index of the summary of the cell that each of 64 moved points falls into; 0, an empty one, where there is no block. first is a
+/// multiple of 64.
+void locate_cells(const ScoringOrder& order, std::size_t first, const Rigid& pose, const CellSummaries& summaries, std::int32_t* cells);
+
+/// Bounds of 64 points from the summaries of their cells.
 PointBounds bound_inliers(const ScoringOrder& order, std::size_t first, const Rigid& pose, const CellSummaries& summaries,
-                          const SummaryLimits& limits, std::int32_t* cells);
+                          const SummaryLimits& limits, const std::int32_t* cells);
 
 }  // namespace gpureg::cpu

@@ -54,7 +54,9 @@ class PairScorer {
   Support score(const Rigid& pose, std::uint32_t needed) {
     if (cells_.block.empty()) return all_points(pose);
     std::uint32_t possible = 0;
+    if (!bounds_.empty()) locate_cells(order_, 0, pose, cells_, cell_.data());
     for (std::size_t g = 0; g < bounds_.size(); ++g) {
+      if (g + 1 < bounds_.size()) locate_cells(order_, (g + 1) * 64, pose, cells_, cell_.data() + (g + 1) * 64);
       bounds_[g] = bound_inliers(order_, g * 64, pose, cells_, limits_, cell_.data() + g * 64);
       possible += static_cast<std::uint32_t>(__builtin_popcountll(bounds_[g].possible));
       if (possible + order_.remaining[g] < needed) return {0, 0, 0};
@@ -78,17 +80,24 @@ class PairScorer {
     return s;
   }
 
-  /// Looks at the points of one group that the mask names. Their cells are known from the bounds: no search for the block.
+  /// Looks at the points of one group that the mask names. Their cells are known from the bounds: no search for the block. Lists are
+  /// fetched for all points before the first is read, because each alone would wait for memory.
   void count_group(const Rigid& pose, std::size_t group, std::uint64_t mask, Support& s) const {
     constexpr std::uint32_t kCells = ClosestGridView::kBlockCells;
     const ClosestGridView& grid = target_.closest;
-    for (; mask != 0; mask &= mask - 1) {
+    const std::uint32_t* start[64];
+    int count = 0;
+    for (std::uint64_t left = mask; left != 0; left &= left - 1) {
+      const std::uint32_t cell = static_cast<std::uint32_t>(cell_[group * 64 + static_cast<std::size_t>(__builtin_ctzll(left))]);
+      start[count] = grid.cell_start.data + static_cast<std::size_t>(cell / kCells - 1) * (kCells + 1) + cell % kCells;
+      __builtin_prefetch(start[count++]);
+    }
+    for (int k = 0; k < count; ++k) __builtin_prefetch(grid.candidates.data + *start[k]);
+    for (int n = 0; mask != 0; mask &= mask - 1, ++n) {
       const std::size_t k = group * 64 + static_cast<std::size_t>(__builtin_ctzll(mask));
-      const std::uint32_t summary = static_cast<std::uint32_t>(cell_[k]), block = summary / kCells - 1;
-      const std::uint32_t* start = grid.cell_start.data + static_cast<std::size_t>(block) * (kCells + 1) + summary % kCells;
       const Vec3 q = apply(pose, {order_.x[k], order_.y[k], order_.z[k]});
       count_inlier(source_, target_, pose, threshold_, order_.index[k],
-                   closest_candidate(grid.candidates.data, start[0], start[1], target_.points, q, threshold_.max_squared), s);
+                   closest_candidate(grid.candidates.data, start[n][0], start[n][1], target_.points, q, threshold_.max_squared), s);
     }
   }
 

@@ -15,7 +15,9 @@ GPUREG_HD void jacobi_eigen(float (&a)[N][N], float (&v)[N][N]) {
     for (int p = 0; p < N - 1; ++p) {
       for (int q = p + 1; q < N; ++q) {
         const float apq = a[p][q];
-        if (apq == 0.0f) continue;
+        const float size = (apq < 0.0f ? -apq : apq) * 1e8f;
+        // Below the last bit of both eigenvalues a rotation changes nothing: late sweeps cost next to nothing.
+        if (apq == 0.0f || (size < (a[p][p] < 0.0f ? -a[p][p] : a[p][p]) && size < (a[q][q] < 0.0f ? -a[q][q] : a[q][q]))) continue;
         const float theta = (a[q][q] - a[p][p]) / (2.0f * apq);
         const float magnitude = theta < 0.0f ? -theta : theta;
         // Beyond 1e9 theta^2 would overflow; there t is 1 / (2 theta) to the last bit.
