@@ -171,7 +171,8 @@ std::string unpack(const Table& table, const Source& source) {
     source.fail("truncated: " + std::to_string(packed_size) +
                 " bytes of compressed data are announced, but only " +
                 std::to_string(rest.size() - 8) + " follow");
-  if (size != table.rows * table.bytes_per_row())
+  const std::size_t row = table.bytes_per_row();
+  if (size / row != table.rows || size % row != 0)  // the product might not fit
     source.fail("the compressed data hold " + std::to_string(size) +
                 " bytes, but the header announces " + std::to_string(table.rows) + " points of " +
                 std::to_string(table.bytes_per_row()) + " bytes");

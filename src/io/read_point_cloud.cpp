@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include <limits>
-
 #include "evaluation/text_file.hpp"
 #include "gpureg/io.hpp"
 #include "io/pcd.hpp"
