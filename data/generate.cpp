@@ -79,7 +79,7 @@ class Generator {
         house_(build_house(options.seed)),
         scene_(house_.mesh),
         sensor_(scene_, options.sensor, options.seed),
-        world_from_camera_(walk(house_, options.seed, options.fragments * options.frames_per_fragment)),
+        world_from_camera_(walk(house_, scene_, options.seed, options.fragments * options.frames_per_fragment)),
         fragments_(static_cast<std::size_t>(options.fragments)),
         cameras_(fragments_.size()) {}
 

@@ -56,7 +56,7 @@ struct House {
   Mesh mesh;
 };
 
-/// Plans, builds and furnishes a house of 5 to 8 rooms. The same seed gives the same house.
+/// Plans, builds and furnishes a house of 4 to 7 rooms. The same seed gives the same house.
 House build_house(std::uint64_t seed);
 
 // The steps of build_house.

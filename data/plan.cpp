@@ -15,7 +15,7 @@ constexpr float kWall = 0.14f;  // thickness of the walls between rooms
 void add_row(House& house, Random& random, float bottom, float depth, int count, float height) {
   float x = 0, width = 0;
   for (int i = 0; i < count; ++i) {
-    if (i == 0 || !random.chance(0.3f)) width = random.uniform(3.0f, 4.9f);
+    if (i == 0 || !random.chance(0.3f)) width = random.uniform(3.3f, 5.6f);
     Room room;
     room.floor = {{x, bottom}, {x + width, bottom + depth}};
     room.height = height;
@@ -120,7 +120,7 @@ Eigen::Affine3f Room::world_from_side(int side) const {
 }
 
 void plan_rooms(House& house, Random& random) {
-  const float height = random.uniform(2.4f, 2.7f), south = random.uniform(3.1f, 4.6f), north = random.uniform(3.1f, 4.6f);
+  const float height = random.uniform(2.4f, 2.7f), south = random.uniform(3.4f, 5.2f), north = random.uniform(3.4f, 5.2f);
   add_row(house, random, 0, south, random.between(2, 3), height);
   float y = south + kWall;
   if (random.chance(0.35f)) {  // a corridor between the rows, over their full width or a part of it

@@ -12,10 +12,11 @@ namespace {
 using Eigen::Vector2f;
 
 constexpr float kSpacing = 0.02f;      // metres between samples of the path
-constexpr float kSpeed = 0.0155f;      // metres per frame, on average
+constexpr float kSpeed = 0.0165f;      // metres per frame, on average
 constexpr float kMaximumSpeed = 1.35f * kSpeed;
+constexpr float kEyeLevel = 1.47f;     // metres, on average
 constexpr int kGazeFrames = 45;        // how long a direction of view is kept
-constexpr int kTurnFrames = 22;        // sigma of the smoothing of turns
+constexpr int kTurnFrames = 26;        // sigma of the smoothing of turns
 
 float radians(float degrees) { return degrees * 0.0174532925f; }
 
@@ -106,21 +107,29 @@ std::vector<Vector2f> tour(const House& house, const WalkMap& map, std::uint64_t
   return line;
 }
 
-/// Of a few directions beside the way, the one with something to see at the sensor's working distance.
-float choose_gaze(const WalkMap& map, const Vector2f& at, float heading, std::uint64_t seed, int glance) {
+/// Of a few directions beside the way, the one where most of the view lies within the sensor's comfortable range.
+float choose_gaze(const RayScene& scene, const Vector2f& at, float heading, std::uint64_t seed, int glance) {
   Random random(hash_key(seed, Purpose::gaze, static_cast<std::uint64_t>(glance)));
-  float best = 0, score = 1e9f;
-  for (int k = 0; k < 4; ++k) {
-    const float offset = std::clamp(radians(48) * random.normal(), radians(-110), radians(110));
-    const float miss = std::abs(map.open_distance(at, heading + offset, 5) - 2.6f) + 0.3f * std::abs(offset);
-    if (miss < score) score = miss, best = offset;
+  float best = 0, score = -1e9f;
+  for (int k = 0; k < 6; ++k) {
+    const float offset = std::clamp(radians(42) * random.normal(), radians(-100), radians(100));
+    float seen = 0;
+    for (float side = -30; side <= 30; side += 7.5f) {
+      for (float pitch = -36; pitch <= 8; pitch += 11) {
+        const float yaw = heading + offset + radians(side), level = std::cos(radians(pitch));
+        const RayHit hit = scene.cast({at.x(), at.y(), kEyeLevel}, {level * std::cos(yaw), level * std::sin(yaw), std::sin(radians(pitch))});
+        if (hit.hit) seen += std::clamp((hit.t - 0.5f) / 1.5f, 0.0f, 1.0f) * std::clamp(4.5f - hit.t, 0.0f, 1.0f);
+      }
+    }
+    const float value = seen / 45 - 0.12f * std::abs(offset);
+    if (value > score) score = value, best = offset;
   }
   return best;
 }
 
 }  // namespace
 
-std::vector<Eigen::Isometry3d> walk(const House& house, std::uint64_t seed, int frames) {
+std::vector<Eigen::Isometry3d> walk(const House& house, const RayScene& scene, std::uint64_t seed, int frames) {
   const WalkMap map(house);
   // Frames beyond the last one, so that smoothing treats a short walk like the beginning of a long one.
   const int total = frames + 6 * kTurnFrames + 2 * kGazeFrames;
@@ -142,7 +151,7 @@ std::vector<Eigen::Isometry3d> walk(const House& house, std::uint64_t seed, int 
     last = angle;
     position.push_back(sample(s));
     heading.push_back(angle);
-    offset.push_back(k % kGazeFrames == 0 ? choose_gaze(map, position.back(), angle, seed, k / kGazeFrames) : offset.back());
+    offset.push_back(k % kGazeFrames == 0 ? choose_gaze(scene, position.back(), angle, seed, k / kGazeFrames) : offset.back());
     s += kSpeed * (1 + 0.3f * wander(seed, 0, static_cast<float>(k) / 45.0f));
   }
   heading = smoothed(heading, kTurnFrames);
@@ -153,9 +162,9 @@ std::vector<Eigen::Isometry3d> walk(const House& house, std::uint64_t seed, int 
     const float t = static_cast<float>(k);
     const auto tremble = [&](std::uint64_t channel, float period) { return wander(seed, channel, t / period); };
     const double yaw = heading[i] + offset[i] + radians(6) * tremble(1, 35) + radians(0.4f) * tremble(2, 5);
-    const double pitch = radians(-14) + radians(9) * tremble(3, 70) + radians(0.4f) * tremble(4, 5);
+    const double pitch = radians(-15.5f) + radians(9) * tremble(3, 70) + radians(0.4f) * tremble(4, 5);
     const double roll = radians(4) * tremble(5, 60) + radians(0.4f) * tremble(6, 5);
-    const double height = 1.47 + 0.17 * tremble(7, 130) + 0.012 * std::sin(0.42 * t);
+    const double height = kEyeLevel + 0.17 * tremble(7, 130) + 0.012 * std::sin(0.42 * t);
     Eigen::Matrix3d level;  // columns: the camera's right, down and forward when it looks along world x
     level << 0, 0, 1, -1, 0, 0, 0, -1, 0;
     Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();

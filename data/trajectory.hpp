@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "data/house.hpp"
+#include "data/ray_scene.hpp"
 
 namespace gpureg::synthetic {
 
@@ -17,8 +18,6 @@ class WalkMap {
   bool free(const Eigen::Vector2f& p) const;
   /// From the first to the last point through walkable cells; empty where there is no way.
   std::vector<Eigen::Vector2f> path(const Eigen::Vector2f& from, const Eigen::Vector2f& to) const;
-  /// Distance from a point to the next wall or tall piece along a direction, at most limit.
-  float open_distance(const Eigen::Vector2f& from, float yaw, float limit) const;
 
  private:
   static constexpr float kCell = 0.1f;
@@ -27,12 +26,11 @@ class WalkMap {
 
   Eigen::Vector2f origin_;
   int columns_ = 0, rows_ = 0;
-  std::vector<float> cost_;         // 0: blocked
-  std::vector<std::uint8_t> solid_; // wall or tall furniture
+  std::vector<float> cost_;  // 0: blocked
 };
 
 /// A hand-held camera that is carried through the rooms, comes back to them, and looks around: world_from_camera per frame (x right,
-/// y down, z forward). The first frames of a long walk are those of a short one.
-std::vector<Eigen::Isometry3d> walk(const House& house, std::uint64_t seed, int frames);
+/// y down, z forward). The first frames of a long walk are those of a short one. scene: the house's mesh, to look at.
+std::vector<Eigen::Isometry3d> walk(const House& house, const RayScene& scene, std::uint64_t seed, int frames);
 
 }  // namespace gpureg::synthetic

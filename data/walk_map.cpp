@@ -29,21 +29,21 @@ WalkMap::WalkMap(const House& house) {
   columns_ = static_cast<int>(std::ceil((high.x() - low.x()) / kCell));
   rows_ = static_cast<int>(std::ceil((high.y() - low.y()) / kCell));
   const int cells = columns_ * rows_;
-  solid_.assign(static_cast<std::size_t>(cells), 1);
+  std::vector<std::uint8_t> solid(static_cast<std::size_t>(cells), 1);  // a wall or tall furniture
   cost_.assign(static_cast<std::size_t>(cells), 0.0f);
   std::vector<std::uint8_t> low_furniture(static_cast<std::size_t>(cells), 0);
   for (int cell = 0; cell < cells; ++cell) {
     const Vector2f p = centre(cell);
     const auto i = static_cast<std::size_t>(cell);
     for (const Room& room : house.rooms) {
-      if (contains(room.floor, p, 0)) solid_[i] = 0;
+      if (contains(room.floor, p, 0)) solid[i] = 0;
     }
     for (const Doorway& door : house.doors) {
       const Vector2f d = p - door.centre, across(-door.through.y(), door.through.x());
-      if (std::abs(d.dot(door.through)) < 0.2f && std::abs(d.dot(across)) < 0.42f) solid_[i] = 0;
+      if (std::abs(d.dot(door.through)) < 0.2f && std::abs(d.dot(across)) < 0.42f) solid[i] = 0;
     }
     for (const Obstacle& obstacle : house.obstacles) {
-      if (obstacle.height > kTall && contains(obstacle.rect, p, 0)) solid_[i] = 1;
+      if (obstacle.height > kTall && contains(obstacle.rect, p, 0)) solid[i] = 1;
       if (obstacle.height > 0.3f && contains(obstacle.rect, p, 0.15f)) low_furniture[i] = 1;
     }
   }
@@ -55,7 +55,7 @@ WalkMap::WalkMap(const House& house) {
       for (int dx = -kReach; dx <= kReach; ++dx) {
         const int nx = x + dx, ny = y + dy;
         const bool outside = nx < 0 || ny < 0 || nx >= columns_ || ny >= rows_;
-        if (!outside && solid_[static_cast<std::size_t>(ny * columns_ + nx)] == 0) continue;
+        if (!outside && solid[static_cast<std::size_t>(ny * columns_ + nx)] == 0) continue;
         nearest = std::min(nearest, kCell * std::sqrt(static_cast<float>(dx * dx + dy * dy)));
       }
     }
@@ -76,15 +76,6 @@ Vector2f WalkMap::centre(int cell) const {
 bool WalkMap::free(const Vector2f& p) const {
   const int cell = cell_of(p);
   return cell >= 0 && cost_[static_cast<std::size_t>(cell)] > 0 && cost_[static_cast<std::size_t>(cell)] < 5;
-}
-
-float WalkMap::open_distance(const Vector2f& from, float yaw, float limit) const {
-  const Vector2f direction(std::cos(yaw), std::sin(yaw));
-  for (float d = 0; d < limit; d += 0.5f * kCell) {
-    const int cell = cell_of(from + d * direction);
-    if (cell < 0 || solid_[static_cast<std::size_t>(cell)] != 0) return d;
-  }
-  return limit;
 }
 
 std::vector<Vector2f> WalkMap::path(const Vector2f& from, const Vector2f& to) const {

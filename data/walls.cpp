@@ -37,7 +37,9 @@ void reveal(MeshBuilder& mesh, const Opening& h) {
   mesh.quad({h.from, 0, h.bottom}, {h.from, d, h.bottom}, {h.from, d, h.top}, {h.from, 0, h.top});
   mesh.quad({h.to, 0, h.bottom}, {h.to, d, h.bottom}, {h.to, d, h.top}, {h.to, 0, h.top});
   mesh.quad({h.from, 0, h.top}, {h.to, 0, h.top}, {h.to, d, h.top}, {h.from, d, h.top});
-  mesh.quad({h.from, 0, h.bottom}, {h.to, 0, h.bottom}, {h.to, d, h.bottom}, {h.from, d, h.bottom});
+  // A doorway's floor belongs to the room; two coincident surfaces would flicker.
+  const float sill = h.bottom + (h.bottom > 0 ? 0.0f : 0.004f);
+  if (h.kind != Opening::Kind::door) mesh.quad({h.from, 0, sill}, {h.to, 0, sill}, {h.to, d, sill}, {h.from, d, sill});
   if (h.kind == Opening::Kind::niche) {
     mesh.quad({h.from, d, h.bottom}, {h.to, d, h.bottom}, {h.to, d, h.top}, {h.from, d, h.top});
   }
@@ -56,7 +58,7 @@ void window_frame(MeshBuilder& mesh, Random& random, const Opening& h) {
   mesh.box({h.from - 0.05f, -0.02f, h.bottom - 0.03f}, {h.to + 0.05f, 0.06f, h.bottom});
 }
 
-void door_frame(MeshBuilder& mesh, Random& random, const Opening& h) {
+void door_frame(MeshBuilder& mesh, Random& random, const Opening& h, const Room& room) {
   const float rim = 0.07f, out = 0.018f;
   mesh.box({h.from - rim, 0, 0}, {h.from, out, h.top + rim});
   mesh.box({h.to, 0, 0}, {h.to + rim, out, h.top + rim});
@@ -65,7 +67,11 @@ void door_frame(MeshBuilder& mesh, Random& random, const Opening& h) {
   const Eigen::Affine3f frame = mesh.frame();
   const bool left = random.chance(0.5f);
   const float angle = random.uniform(1.75f, 2.6f), width = h.to - h.from - 0.02f;
-  mesh.place(frame * upright({left ? h.from : h.to, 0.02f, 0}, left ? angle : 3.14159265f - angle));
+  const Eigen::Affine3f world_from_leaf =
+      frame * upright({left ? h.from : h.to, 0.02f, 0}, left ? angle : 3.14159265f - angle);
+  const Eigen::Vector2f end = (world_from_leaf * Vector3f(width, 0, 0)).head<2>();
+  if ((end.array() < room.floor.low.array() + 0.05f).any() || (end.array() > room.floor.high.array() - 0.05f).any()) return;
+  mesh.place(world_from_leaf);
   mesh.box({0, -0.02f, 0.01f}, {width, 0.02f, h.top - 0.01f});
   for (const float z : {0.25f, 1.1f}) mesh.box({0.12f, -0.03f, z}, {width - 0.12f, 0.03f, z + 0.7f});
   mesh.tube({{width - 0.06f, -0.06f, 1.02f}, {width - 0.06f, 0.06f, 1.02f}, {width - 0.17f, 0.06f, 1.02f}}, 0.01f);
@@ -136,7 +142,7 @@ void build_walls(House& house, Random& random) {
       baseboard(mesh, room, side);
       for (const Opening& hole : room.openings[static_cast<std::size_t>(side)]) {
         if (hole.kind == Opening::Kind::window) window_frame(mesh, random, hole);
-        if (hole.kind == Opening::Kind::door) door_frame(mesh, random, hole);
+        if (hole.kind == Opening::Kind::door) door_frame(mesh, random, hole, room);
       }
     }
   }
