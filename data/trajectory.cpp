@@ -111,8 +111,8 @@ std::vector<Vector2f> tour(const House& house, const WalkMap& map, std::uint64_t
 float choose_gaze(const RayScene& scene, const Vector2f& at, float heading, std::uint64_t seed, int glance) {
   Random random(hash_key(seed, Purpose::gaze, static_cast<std::uint64_t>(glance)));
   float best = 0, score = -1e9f;
-  for (int k = 0; k < 6; ++k) {
-    const float offset = std::clamp(radians(42) * random.normal(), radians(-100), radians(100));
+  for (int k = 0; k < 8; ++k) {
+    const float offset = std::clamp(radians(48) * random.normal(), radians(-130), radians(130));
     float seen = 0;
     for (float side = -30; side <= 30; side += 7.5f) {
       for (float pitch = -36; pitch <= 8; pitch += 11) {
@@ -121,7 +121,7 @@ float choose_gaze(const RayScene& scene, const Vector2f& at, float heading, std:
         if (hit.hit) seen += std::clamp((hit.t - 0.5f) / 1.5f, 0.0f, 1.0f) * std::clamp(4.5f - hit.t, 0.0f, 1.0f);
       }
     }
-    const float value = seen / 45 - 0.12f * std::abs(offset);
+    const float value = seen / 45 - 0.08f * std::abs(offset);
     if (value > score) score = value, best = offset;
   }
   return best;
@@ -151,10 +151,13 @@ std::vector<Eigen::Isometry3d> walk(const House& house, const RayScene& scene, s
     last = angle;
     position.push_back(sample(s));
     heading.push_back(angle);
-    offset.push_back(k % kGazeFrames == 0 ? choose_gaze(scene, position.back(), angle, seed, k / kGazeFrames) : offset.back());
     s += kSpeed * (1 + 0.3f * wander(seed, 0, static_cast<float>(k) / 45.0f));
   }
   heading = smoothed(heading, kTurnFrames);
+  for (int k = 0; k < total; ++k) {  // a gaze suits the middle of its time
+    const auto middle = static_cast<std::size_t>(std::min(k + kGazeFrames / 2, total - 1));
+    offset.push_back(k % kGazeFrames == 0 ? choose_gaze(scene, position[middle], heading[middle], seed, k / kGazeFrames) : offset.back());
+  }
   offset = smoothed(offset, kTurnFrames);
   std::vector<Eigen::Isometry3d> poses;
   for (int k = 0; k < frames; ++k) {

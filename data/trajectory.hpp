@@ -15,6 +15,7 @@ class WalkMap {
  public:
   explicit WalkMap(const House& house);
 
+  /// Half a metre from walls and tall furniture, and not in other furniture.
   bool free(const Eigen::Vector2f& p) const;
   /// From the first to the last point through walkable cells; empty where there is no way.
   std::vector<Eigen::Vector2f> path(const Eigen::Vector2f& from, const Eigen::Vector2f& to) const;

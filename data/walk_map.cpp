@@ -13,6 +13,8 @@ using Eigen::Vector2f;
 
 constexpr float kTall = 1.15f;  // metres; the camera is carried over what is lower
 
+constexpr float kComfortable = 2;  // cost of a cell half a metre from walls, without furniture
+
 bool contains(const Rect& r, const Vector2f& p, float margin) {
   return (p.array() > r.low.array() - margin).all() && (p.array() < r.high.array() + margin).all();
 }
@@ -75,7 +77,7 @@ Vector2f WalkMap::centre(int cell) const {
 
 bool WalkMap::free(const Vector2f& p) const {
   const int cell = cell_of(p);
-  return cell >= 0 && cost_[static_cast<std::size_t>(cell)] > 0 && cost_[static_cast<std::size_t>(cell)] < 5;
+  return cell >= 0 && cost_[static_cast<std::size_t>(cell)] > 0 && cost_[static_cast<std::size_t>(cell)] < kComfortable;
 }
 
 std::vector<Vector2f> WalkMap::path(const Vector2f& from, const Vector2f& to) const {

@@ -55,7 +55,7 @@ void window_frame(MeshBuilder& mesh, Random& random, const Opening& h) {
     const float z = h.bottom + 0.65f * (h.top - h.bottom);
     mesh.box({h.from, back, z}, {h.to, front, z + 0.03f});
   }
-  mesh.box({h.from - 0.05f, -0.02f, h.bottom - 0.03f}, {h.to + 0.05f, 0.06f, h.bottom});
+  mesh.box({h.from - 0.05f, 0.001f, h.bottom - 0.03f}, {h.to + 0.05f, 0.06f, h.bottom});
 }
 
 void door_frame(MeshBuilder& mesh, Random& random, const Opening& h, const Room& room) {

@@ -32,12 +32,17 @@ TEST(Fusion, PointsLieOnTheSurface) {
   EXPECT_GT(points.size(), 2500u);
   EXPECT_LT(points.size(), 8000u);
   double squares = 0;
+  int facing = 0;
   for (const Eigen::Vector3f& p : points) {
-    const double error = (p - Eigen::Vector3f(0, 0, 1.5f)).norm() - 0.5;
+    const Eigen::Vector3f out = p - Eigen::Vector3f(0, 0, 1.5f);
+    const double error = out.norm() - 0.5;
+    EXPECT_LT(std::abs(error), 0.03) << "towards the rim, distances along the ray are longer than those to the surface";
+    if (-out.normalized().dot(p.normalized()) < 0.7f) continue;
     squares += error * error;
-    EXPECT_LT(std::abs(error), 0.02);
+    ++facing;
   }
-  EXPECT_LT(std::sqrt(squares / static_cast<double>(points.size())), 0.004) << "less than half a voxel";
+  EXPECT_GT(facing, 1000);
+  EXPECT_LT(std::sqrt(squares / facing), 0.003) << "a third of a voxel where the surface faces the camera";
 }
 
 TEST(Fusion, PoseMovesThePoints) {
@@ -45,7 +50,7 @@ TEST(Fusion, PoseMovesThePoints) {
   synthetic::FusionVolume volume;
   volume.integrate(sphere(0.5f, 1.5f), pose);
   const Eigen::Vector3f centre = pose.cast<float>() * Eigen::Vector3f(0, 0, 1.5f);
-  for (const Eigen::Vector3f& p : volume.extract(0, 0.02f)) ASSERT_NEAR((p - centre).norm(), 0.5f, 0.02f);
+  for (const Eigen::Vector3f& p : volume.extract(0, 0.02f)) ASSERT_NEAR((p - centre).norm(), 0.5f, 0.03f);
 }
 
 TEST(Fusion, NothingSeenGivesNothing) {

@@ -32,7 +32,7 @@ inline std::vector<Eigen::Vector3f> read_cloud(const std::string& path) {
   const std::size_t count = std::stoul(bytes.substr(bytes.find("vertex ") + 7));
   if (bytes.size() != body + 12 * count) throw std::runtime_error(path + ": wrong size");
   std::vector<Eigen::Vector3f> points(count);
-  std::memcpy(points.data(), bytes.data() + body, 12 * count);  // tests run on little-endian machines
+  std::memcpy(static_cast<void*>(points.data()), bytes.data() + body, 12 * count);  // tests run on little-endian machines
   return points;
 }
 
