@@ -30,7 +30,7 @@ struct RegistrationResult {
   bool has_candidate = false;  ///< target_from_source holds a pose, reported or not
   Eigen::Isometry3d target_from_source = Eigen::Isometry3d::Identity();
   double score = 0;            ///< what ranks results: today the inlier ratio
-  double inlier_ratio = 0;     ///< inliers / points scored, [0, 1]
+  double inlier_ratio = 0;     ///< inliers (judged) / points scored, [0, 1]
   double inlier_rmse = 0;      ///< metres, over the inliers
   CorrespondenceMoments source_moments;  ///< of the inliers, points of the source, in the source's frame (Redwood's convention)
   CorrespondenceMoments target_moments;  ///< of the inliers, points of the target, in the target's frame (Open3D's convention)

@@ -37,7 +37,8 @@ struct RegistrationStatistics {
   std::uint64_t survivors = 0;        ///< passed the polygon test
   std::uint64_t scored = 0;           ///< of these with a well-defined rigid fit
   std::uint32_t points_scored = 0;    ///< points that the inlier ratio is relative to
-  std::uint32_t inliers = 0;          ///< of the returned pose
+  std::uint32_t consensus = 0;        ///< inliers of the returned pose under ScoreOptions::max_normal_angle: what it won by
+  std::uint32_t inliers = 0;          ///< under max_judged_normal_angle: what the inlier ratio counts
   std::uint32_t refine_iterations = 0;
   bool swapped = false;               ///< the target was sampled and scored, being the smaller cloud
 };
@@ -45,8 +46,8 @@ struct RegistrationStatistics {
 /// Wall time of each stage in milliseconds. In a batch a chunk of pairs goes through a stage together: then each pair carries its
 /// equal share, so that sums over pairs are right.
 struct StageTimings {
-  double match = 0, sample = 0, fit = 0, score = 0, refine = 0, information = 0;
-  double total() const { return match + sample + fit + score + refine + information; }
+  double match = 0, sample = 0, fit = 0, score = 0, refine = 0, judge = 0;
+  double total() const { return match + sample + fit + score + refine + judge; }
 };
 
 /// Counts and wall times (milliseconds) of the preparation of one cloud.

@@ -25,17 +25,17 @@ struct Closest {
 /// Closest of the candidates first to last (exclusive), see find_closest.
 GPUREG_HD Closest closest_candidate(const std::uint32_t* candidates, std::uint32_t first, std::uint32_t last, const Vec3* points, Vec3 q,
                                     float max_squared) {
-  Closest best{kNoValue, max_squared};
+  // No branch on the distance: which candidate wins is a coin toss that no processor predicts. Candidates ascend, so "less" keeps the
+  // lower index among equals.
+  Closest best{kNoValue, 3.402823466e38f};
   for (std::uint32_t k = first; k < last; ++k) {
     const std::uint32_t i = candidates[k];
     const float d2 = squared_norm(points[i] - q);
-    // Candidates ascend, so "less" keeps the lower index among equals; the first may lie exactly on the limit.
-    if (d2 < best.squared_distance || (best.index == kNoValue && d2 == best.squared_distance)) {
-      best.index = i;
-      best.squared_distance = d2;
-    }
+    const bool less = d2 < best.squared_distance;
+    best.index = less ? i : best.index;
+    best.squared_distance = less ? d2 : best.squared_distance;
   }
-  return best;
+  return best.squared_distance <= max_squared ? best : Closest{kNoValue, max_squared};
 }
 
 /// Closest point of the cloud to q within max_squared (inclusive); the lower index wins a tie. Exactly what an exhaustive search over

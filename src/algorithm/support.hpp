@@ -33,8 +33,9 @@ GPUREG_HD std::uint64_t truncated_cost(const Support& s, std::uint32_t n) {
 /// Normal test of an inlier: angle between the moved source normal and the target's at most the limit; a missing normal fails unless
 /// the test is off (min_cosine <= -1).
 GPUREG_HD bool normals_agree(Vec3 moved_source_normal, Vec3 target_normal, float min_cosine) {
-  if (min_cosine <= -1.0f) return true;
-  return !is_zero(moved_source_normal) && !is_zero(target_normal) && dot(moved_source_normal, target_normal) >= min_cosine;
+  const float cosine = dot(moved_source_normal, target_normal);
+  // A zero normal gives a cosine of 0, which would pass limits beyond 90 degrees.
+  return (min_cosine <= -1.0f) | ((cosine >= min_cosine) & !is_zero(moved_source_normal) & !is_zero(target_normal));
 }
 
 }  // namespace gpureg

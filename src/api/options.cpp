@@ -35,6 +35,8 @@ void ScoreOptions::validate() const {
   require(length(max_correspondence_distance), "score.max_correspondence_distance", max_correspondence_distance, kLength);
   require(std::isfinite(max_normal_angle) && max_normal_angle > 0 && max_normal_angle <= 180, "score.max_normal_angle", max_normal_angle,
           "degrees in (0, 180]");
+  require(std::isfinite(max_judged_normal_angle) && max_judged_normal_angle > 0 && max_judged_normal_angle <= 180,
+          "score.max_judged_normal_angle", max_judged_normal_angle, "degrees in (0, 180]");
   require(std::isfinite(min_inlier_ratio) && min_inlier_ratio >= 0 && min_inlier_ratio <= 1, "score.min_inlier_ratio", min_inlier_ratio,
           "a ratio in [0, 1]");
 }

@@ -6,7 +6,7 @@ namespace gpureg::cpu {
 
 void conclude(Exec&, Span<const PairView> pairs, const std::vector<Matches>& matches,
               const std::vector<std::vector<std::uint32_t>>& quadruples, const std::vector<Hypotheses>& hypotheses,
-              const std::vector<BestPose>& poses, const std::vector<PairMoments>& moments, const RegistrationOptions& options,
+              const std::vector<BestPose>& poses, const std::vector<Judgement>& judgements, const RegistrationOptions& options,
               Span<PairOutcome> outcomes) {
   for (std::size_t p = 0; p < pairs.size; ++p) {
     PairOutcome& out = outcomes[p];
@@ -18,13 +18,14 @@ void conclude(Exec&, Span<const PairView> pairs, const std::vector<Matches>& mat
     s.survivors = quadruples[p].size();
     s.scored = hypotheses[p].id.size();
     s.points_scored = pairs[p].source.size;
-    s.inliers = poses[p].support.inliers;
+    s.consensus = poses[p].support.inliers;
+    s.inliers = judgements[p].support.inliers;
     s.refine_iterations = poses[p].iterations;
     out.has_pose = poses[p].found;
     out.pose = poses[p].pose;
-    out.support = poses[p].support;
-    out.source_moments = moments[p].source;
-    out.target_moments = moments[p].target;
+    out.support = judgements[p].support;
+    out.source_moments = judgements[p].source;
+    out.target_moments = judgements[p].target;
     out.reason = pipeline::reason_of(s, out.has_pose, options.score);
   }
 }

@@ -102,8 +102,11 @@ struct BestPose {
   std::uint32_t iterations = 0;
 };
 
-struct PairMoments {
-  Moments source, target;
+/// What the final pose is judged and described by: its support under the judge's normal test, and the moments of all points in reach.
+struct Judgement {
+  Support support{0, 0, 0};
+  Moments source{0, {0, 0, 0}, {0, 0, 0, 0, 0, 0}};
+  Moments target{0, {0, 0, 0}, {0, 0, 0, 0, 0, 0}};
 };
 
 }  // namespace gpureg::cpu

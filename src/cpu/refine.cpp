@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "algorithm/icp.hpp"
+#include "algorithm/inlier.hpp"
 #include <algorithm>
 
 #include "cpu/stages.hpp"
@@ -42,8 +43,7 @@ std::vector<BestPose> refine_poses(Exec& exec, Span<const PairView> pairs, const
                                    const RefineOptions& options) {
   std::vector<BestPose> out = best;
   if (options.max_iterations == 0) return out;
-  const float min_cosine =
-      score.max_normal_angle >= 180.0f ? -1.0f : static_cast<float>(std::cos(static_cast<double>(score.max_normal_angle) * 3.14159265358979323846 / 180.0));
+  const float min_cosine = inlier_test(score.max_correspondence_distance, score.max_normal_angle).min_cosine;
   // Pairs side by side would leave threads idle at the end of a small batch; points side by side never do.
   for (std::size_t p = 0; p < pairs.size; ++p) {
     if (!best[p].found) continue;

@@ -3,46 +3,24 @@
 #include <atomic>
 
 #include "cpu/cell_summary.hpp"
+#include "cpu/inlier.hpp"
 #include "cpu/stages.hpp"
 
 namespace gpureg::cpu {
 namespace {
-
-struct Threshold {
-  float max_squared, inverse_max_squared, min_cosine;
-  explicit Threshold(const ScoreOptions& options)
-      : max_squared(options.max_correspondence_distance * options.max_correspondence_distance),
-        inverse_max_squared(1.0f / max_squared),
-        min_cosine(options.max_normal_angle >= 180.0f ? -1.0f
-                                                       : static_cast<float>(std::cos(static_cast<double>(options.max_normal_angle) *
-                                                                                      3.14159265358979323846 / 180.0))) {}
-};
-
-/// Adds point i of the source, moved to q and with closest target point c, to s if it is an inlier.
-inline void count_inlier(const CloudView& source, const CloudView& target, const Rigid& pose, const Threshold& t, std::uint32_t i, Closest c,
-                         Support& s) {
-  if (c.index == kNoValue) return;
-  if (!normals_agree(t.min_cosine <= -1.0f ? Vec3{0, 0, 0} : rotate(pose, source.normals[i]), target.normals[c.index], t.min_cosine)) return;
-  ++s.inliers;
-  s.residual += fixed_residual(c.squared_distance, t.inverse_max_squared);
-}
-
-inline void count_point(const CloudView& source, const CloudView& target, const Rigid& pose, const Threshold& t, std::uint32_t i, Support& s) {
-  count_inlier(source, target, pose, t, i, find_closest(target.closest, target.points, apply(pose, source.points[i]), t.max_squared), s);
-}
 
 const CpuCloud& executor_data(const CloudView& cloud) { return *static_cast<const CpuCloud*>(cloud.executor_data); }
 
 /// Everything that the hypotheses of one pair share.
 class PairScorer {
  public:
-  PairScorer(const PairView& pair, const Threshold& threshold, const SummaryLimits& exact, const SummaryLimits& reach)
+  PairScorer(const PairView& pair, const InlierTest& test, const SummaryLimits& exact, const SummaryLimits& reach)
       : source_(pair.source),
         target_(pair.target),
-        threshold_(threshold),
+        test_(test),
         order_(executor_data(pair.source).order),
         cells_(executor_data(pair.target).summaries),
-        limits_(executor_data(pair.target).options.search_distance * executor_data(pair.target).options.search_distance == threshold.max_squared
+        limits_(executor_data(pair.target).options.search_distance * executor_data(pair.target).options.search_distance == test.max_squared
                     ? exact
                     : reach),
         bounds_(order_.remaining.size()),
@@ -76,7 +54,7 @@ class PairScorer {
  private:
   Support all_points(const Rigid& pose) const {
     Support s{0, 0, 0};
-    for (std::uint32_t i = 0; i < source_.size; ++i) count_point(source_, target_, pose, threshold_, i, s);
+    for (std::uint32_t i = 0; i < source_.size; ++i) count_point(source_, target_, pose, test_, i, s);
     return s;
   }
 
@@ -96,14 +74,14 @@ class PairScorer {
     for (int n = 0; mask != 0; mask &= mask - 1, ++n) {
       const std::size_t k = group * 64 + static_cast<std::size_t>(__builtin_ctzll(mask));
       const Vec3 q = apply(pose, {order_.x[k], order_.y[k], order_.z[k]});
-      count_inlier(source_, target_, pose, threshold_, order_.index[k],
-                   closest_candidate(grid.candidates.data, start[n][0], start[n][1], target_.points, q, threshold_.max_squared), s);
+      count_inlier(source_, target_, pose, test_, order_.index[k],
+                   closest_candidate(grid.candidates.data, start[n][0], start[n][1], target_.points, q, test_.max_squared), s);
     }
   }
 
   const CloudView& source_;
   const CloudView& target_;
-  const Threshold& threshold_;
+  const InlierTest& test_;
   const ScoringOrder& order_;
   const CellSummaries& cells_;
   const SummaryLimits& limits_;
@@ -114,16 +92,16 @@ class PairScorer {
 }  // namespace
 
 Support measure_support(const CloudView& source, const CloudView& target, const Rigid& pose, const ScoreOptions& options) {
-  const Threshold threshold(options);
+  const InlierTest test = inlier_test(options.max_correspondence_distance, options.max_normal_angle);
   Support s{0, 0, 0};
-  for (std::uint32_t i = 0; i < source.size; ++i) count_point(source, target, pose, threshold, i, s);
+  for (std::uint32_t i = 0; i < source.size; ++i) count_point(source, target, pose, test, i, s);
   return s;
 }
 
 std::vector<BestPose> score_hypotheses(Exec& exec, Span<const PairView> pairs, const std::vector<Hypotheses>& hypotheses,
                                        const ScoreOptions& options) {
   constexpr std::size_t kGrain = 32;
-  const Threshold threshold(options);
+  const InlierTest test = inlier_test(options.max_correspondence_distance, options.max_normal_angle);
   const SummaryLimits exact_limits(options.max_normal_angle, true), reach_limits(options.max_normal_angle, false);
   std::vector<std::vector<Support>> best_of_block(pairs.size);
   std::vector<std::vector<std::size_t>> index_of_block(pairs.size);
@@ -137,7 +115,7 @@ std::vector<BestPose> score_hypotheses(Exec& exec, Span<const PairView> pairs, c
   exec.parallel_items(pairs.size, [&](std::size_t p) { return hypotheses[p].id.size(); }, kGrain,
                       [&](std::size_t p, std::size_t begin, std::size_t end) {
                         Support& best = best_of_block[p][begin / kGrain];
-                        PairScorer scorer(pairs[p], threshold, exact_limits, reach_limits);
+                        PairScorer scorer(pairs[p], test, exact_limits, reach_limits);
                         for (std::size_t k = begin; k < end; ++k) {
                           const std::uint32_t needed = most[p].load(std::memory_order_relaxed);
                           Support s = scorer.score(to_rigid(hypotheses[p].pose[k]), needed);

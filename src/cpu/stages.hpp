@@ -32,11 +32,11 @@ std::vector<BestPose> score_hypotheses(Exec& exec, Span<const PairView> pairs, c
                                        const ScoreOptions& options);
 std::vector<BestPose> refine_poses(Exec& exec, Span<const PairView> pairs, const std::vector<BestPose>& best, const ScoreOptions& score,
                                    const RefineOptions& options);
-std::vector<PairMoments> measure_moments(Exec& exec, Span<const PairView> pairs, const std::vector<BestPose>& poses,
+std::vector<Judgement> judge_poses(Exec& exec, Span<const PairView> pairs, const std::vector<BestPose>& poses,
                                          const ScoreOptions& options);
 void conclude(Exec& exec, Span<const PairView> pairs, const std::vector<Matches>& matches,
               const std::vector<std::vector<std::uint32_t>>& quadruples, const std::vector<Hypotheses>& hypotheses,
-              const std::vector<BestPose>& poses, const std::vector<PairMoments>& moments, const RegistrationOptions& options,
+              const std::vector<BestPose>& poses, const std::vector<Judgement>& judgements, const RegistrationOptions& options,
               Span<PairOutcome> outcomes);
 
 /// Nearest features of every query row: k indices per query in order of distance (squared_norm of the difference as a chain of fmaf

@@ -21,10 +21,10 @@ void align(Exec& exec, Span<const PairView> pairs, const RegistrationOptions& op
   ms.score = exec.lap();
   auto poses = refine_poses(exec, pairs, best, options.score, options.refine);
   ms.refine = exec.lap();
-  auto moments = measure_moments(exec, pairs, poses, options.score);
-  ms.information = exec.lap();
+  auto judgements = judge_poses(exec, pairs, poses, options.score);
+  ms.judge = exec.lap();
 
-  conclude(exec, pairs, matches, quadruples, hypotheses, poses, moments, options, outcomes);
+  conclude(exec, pairs, matches, quadruples, hypotheses, poses, judgements, options, outcomes);
   const double share = 1.0 / static_cast<double>(pairs.size);
   for (PairOutcome& outcome : outcomes) {
     outcome.timings.match = ms.match * share;
@@ -32,7 +32,7 @@ void align(Exec& exec, Span<const PairView> pairs, const RegistrationOptions& op
     outcome.timings.fit = ms.fit * share;
     outcome.timings.score = ms.score * share;
     outcome.timings.refine = ms.refine * share;
-    outcome.timings.information = ms.information * share;
+    outcome.timings.judge = ms.judge * share;
   }
 }
 
