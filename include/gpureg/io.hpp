@@ -31,7 +31,7 @@ void write_overlay(const std::string& path, const PointCloud& source, const Poin
 std::vector<std::pair<int, std::string>> list_fragments(const std::string& folder);
 
 /// cameras.txt: `fragment frame tx ty tz qx qy qz qw` (fragment_from_camera); returns the camera positions of each fragment,
-/// in the order of the file. '#' starts a comment. /// Throws IoError naming file and line.
+/// in the order of the file. '#' starts a comment. Throws IoError naming file and line.
 std::map<int, std::vector<Eigen::Vector3f>> read_cameras(const std::string& path);
 
 /// Indices `i j` per line, i != j; '#' starts a comment. Throws IoError naming file and line.

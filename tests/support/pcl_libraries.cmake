@@ -1,0 +1,10 @@
+# SPDX-License-Identifier: BSD-3-Clause
+# pcl_libraries(out common io ...): what a test links for these modules of PCL. All but common go by file: Debian's targets lead through
+# pcl_io to all of VTK, whose targets in turn cannot be used in a project without the language C and MPI.
+function(pcl_libraries out)
+  set(_libraries pcl_common)
+  foreach(_module IN LISTS ARGN)
+    list(APPEND _libraries $<TARGET_FILE:pcl_${_module}>)
+  endforeach()
+  set(${out} ${_libraries} PARENT_SCOPE)
+endfunction()
