@@ -8,7 +8,8 @@
 
 namespace gpureg::synthetic {
 
-/// A piece of furniture in its own frame: x in [-width/2, width/2], y from 0 (its back, at the wall) to depth, z from 0 up. Metres.
+/// A piece of furniture in its own frame: x in [-width/2, width/2], y from 0 (its back, at the
+/// wall) to depth, z from 0 up. Metres.
 struct Piece {
   float width = 0, depth = 0, height = 0;
   std::function<void(MeshBuilder&, Random&)> build;
@@ -47,12 +48,15 @@ Piece plant(Random& random);
 Piece bicycle(Random& random);
 Piece drying_rack(Random& random);
 Piece clutter_heap(Random& random);
-/// One small thing (book pile, vase, box, ball, bowl, mug, lamp ...) that stands at a point and fits into a circle of this radius.
+/// One small thing (book pile, vase, box, ball, bowl, mug, lamp ...) that stands at a point and
+/// fits into a circle of this radius.
 void small_thing(MeshBuilder& mesh, Random& random, const Eigen::Vector3f& at, float radius);
-/// Small things spread over a surface.
-void litter(MeshBuilder& mesh, Random& random, const Eigen::Vector3f& low, const Eigen::Vector3f& high, int count);
+/// At most count small things spread over a surface.
+void litter(MeshBuilder& mesh, Random& random, const Eigen::Vector3f& low,
+            const Eigen::Vector3f& high, int count);
 /// Books (and gaps) from left to right on a board.
-void book_row(MeshBuilder& mesh, Random& random, float left, float right, float back, float depth, float bottom, float max_height);
+void book_row(MeshBuilder& mesh, Random& random, float left, float right, float back, float depth,
+              float bottom, float max_height);
 
 // wall_things.cpp: x along the wall, y away from it, z above the floor; origin on the wall's foot.
 void picture(MeshBuilder& mesh, Random& random, float x, float z, float width, float height);

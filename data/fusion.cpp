@@ -12,9 +12,12 @@ namespace {
 using Eigen::Vector3f;
 using Eigen::Vector3i;
 
-constexpr float kTruncation = 0.04f;  // metres on each side: wider than the noise at 4 m, narrower than most furniture is thick
+constexpr float kTruncation = 0.04f;  // metres on each side: wider than the noise at 4 m, narrower
+                                      // than most furniture is thick
 
-std::size_t inside(const Vector3i& v) { return static_cast<std::size_t>((v.x() & 7) | ((v.y() & 7) << 3) | ((v.z() & 7) << 6)); }
+std::size_t inside(const Vector3i& v) {
+  return static_cast<std::size_t>((v.x() & 7) | ((v.y() & 7) << 3) | ((v.z() & 7) << 6));
+}
 Vector3i block_of(const Vector3i& v) { return {v.x() >> 3, v.y() >> 3, v.z() >> 3}; }
 
 }  // namespace
@@ -59,7 +62,8 @@ const FusionVolume::Voxel* FusionVolume::voxel(const Vector3i& v) const {
   return block == kEmpty ? nullptr : &blocks_[block].voxels[inside(v)];
 }
 
-void FusionVolume::integrate(const DepthQuarter& image, const Eigen::Isometry3d& fragment_from_camera) {
+void FusionVolume::integrate(const DepthQuarter& image,
+                             const Eigen::Isometry3d& fragment_from_camera) {
   const Eigen::Matrix3f rotation = fragment_from_camera.rotation().cast<float>();
   const Vector3f origin = fragment_from_camera.translation().cast<float>();
   Vector3i last_block(1 << 30, 0, 0);
@@ -67,12 +71,16 @@ void FusionVolume::integrate(const DepthQuarter& image, const Eigen::Isometry3d&
   const int steps = static_cast<int>(std::lround(2 * kTruncation / voxel_));
   for (int row = 0; row < DepthQuarter::kHeight; ++row) {
     for (int column = 0; column < DepthQuarter::kWidth; ++column) {
-      const float z = image.depth[static_cast<std::size_t>(row) * DepthQuarter::kWidth + static_cast<std::size_t>(column)];
+      const float z = image.depth[static_cast<std::size_t>(row) * DepthQuarter::kWidth +
+                                  static_cast<std::size_t>(column)];
       if (z <= 0) continue;
       const Vector3f ray = rotation * camera::ray(image.pixel_x(column), image.pixel_y(row));
       const float length = ray.norm(), range = z * length;
       const Vector3f unit = ray / length;
-      const float weight = 1.0f / std::max(0.25f, z * z);  // the disparity step grows with z^2; its square root's share is bias
+      const float weight =
+          1.0f /
+          std::max(0.25f,
+                   z * z);  // the disparity step grows with z^2; its square root's share is bias
       Vector3i before(1 << 30, 0, 0);
       for (int k = 0; k <= steps; ++k) {
         const Vector3f at = origin + (range - kTruncation + voxel_ * static_cast<float>(k)) * unit;
@@ -108,8 +116,10 @@ std::vector<Vector3f> FusionVolume::extract(float min_weight, float cell_size) c
       for (int axis = 0; axis < 3; ++axis) {
         Vector3i next = v;
         ++next[axis];
-        const Voxel* b = block_of(next) == block.coordinate ? &block.voxels[inside(next)] : voxel(next);
-        if (b == nullptr || b->weight < min_weight || (a.distance > 0) == (b->distance > 0)) continue;
+        const Voxel* b =
+            block_of(next) == block.coordinate ? &block.voxels[inside(next)] : voxel(next);
+        if (b == nullptr || b->weight < min_weight || (a.distance > 0) == (b->distance > 0))
+          continue;
         // Where the backs of two surfaces meet the sign changes too, but not through small values.
         if (std::abs(a.distance - b->distance) > 2.5f * voxel_) continue;
         Vector3f p = voxel_ * (v.cast<float>() + Vector3f::Constant(0.5f));
@@ -119,12 +129,14 @@ std::vector<Vector3f> FusionVolume::extract(float min_weight, float cell_size) c
       }
     }
   }
-  std::stable_sort(crossings.begin(), crossings.end(), [](const Crossing& a, const Crossing& b) { return a.cell < b.cell; });
+  std::stable_sort(crossings.begin(), crossings.end(),
+                   [](const Crossing& a, const Crossing& b) { return a.cell < b.cell; });
   std::vector<Vector3f> points;
   for (std::size_t from = 0; from < crossings.size();) {
     std::size_t to = from;
     Vector3f sum = Vector3f::Zero();
-    for (; to < crossings.size() && crossings[to].cell == crossings[from].cell; ++to) sum += crossings[to].point;
+    for (; to < crossings.size() && crossings[to].cell == crossings[from].cell; ++to)
+      sum += crossings[to].point;
     points.push_back(sum / static_cast<float>(to - from));
     from = to;
   }

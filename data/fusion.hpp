@@ -10,15 +10,17 @@
 
 namespace gpureg::synthetic {
 
-/// A truncated signed distance function in blocks of 8^3 voxels that are made where surfaces are (Curless & Levoy 1996; Niessner et al.
-/// 2013). Not thread-safe; the same images in the same order give the same bytes.
+/// A truncated signed distance function in blocks of 8^3 voxels that are made where surfaces are
+/// (Curless & Levoy 1996; Niessner et al. 2013). Not thread-safe; the same images in the same order
+/// give the same bytes.
 class FusionVolume {
  public:
   explicit FusionVolume(float voxel_size = 0.01f) : voxel_(voxel_size), slots_(1u << 12, Slot{}) {}
 
   void integrate(const DepthQuarter& image, const Eigen::Isometry3d& fragment_from_camera);
 
-  /// Zero crossings of voxels seen with at least min_weight, averaged in cells of cell_size; ordered by cell. Metres, fragment's frame.
+  /// Zero crossings of voxels seen with at least min_weight, averaged in cells of cell_size;
+  /// ordered by cell. Metres, fragment's frame.
   std::vector<Eigen::Vector3f> extract(float min_weight, float cell_size) const;
 
  private:

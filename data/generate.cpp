@@ -29,16 +29,21 @@ void require(bool fine, const std::string& field, const std::string& value, cons
 }
 
 void validate(const GenerateOptions& o) {
-  require(o.fragments >= 1 && o.fragments <= 10000, "fragments", std::to_string(o.fragments), "1 to 10000");
-  require(o.frames_per_fragment >= 1 && o.frames_per_fragment <= 1000, "frames_per_fragment", std::to_string(o.frames_per_fragment), "1 to 1000");
-  require(o.threads >= 0 && o.threads <= 1024, "threads", std::to_string(o.threads), "0 (all cores) to 1024");
+  require(o.fragments >= 1 && o.fragments <= 10000, "fragments", std::to_string(o.fragments),
+          "1 to 10000");
+  require(o.frames_per_fragment >= 1 && o.frames_per_fragment <= 1000, "frames_per_fragment",
+          std::to_string(o.frames_per_fragment), "1 to 1000");
+  require(o.threads >= 0 && o.threads <= 1024, "threads", std::to_string(o.threads),
+          "0 (all cores) to 1024");
   const SensorOptions& s = o.sensor;
   const auto in = [&](const char* name, double value, double low, double high, const char* rule) {
-    require(value >= low && value <= high, std::string("sensor.") + name, std::to_string(value), rule);  // NaN fails too
+    require(value >= low && value <= high, std::string("sensor.") + name, std::to_string(value),
+            rule);  // NaN fails too
   };
   in("min_depth", s.min_depth, 0.05, 10, "0.05 to 10 m");
   in("max_depth", s.max_depth, 0.1, 13, "0.1 to 13 m");  // 16 bits of 1/5000 m end at 13.1 m
-  require(s.max_depth > s.min_depth, "sensor.max_depth", std::to_string(s.max_depth), "greater than sensor.min_depth");
+  require(s.max_depth > s.min_depth, "sensor.max_depth", std::to_string(s.max_depth),
+          "greater than sensor.min_depth");
   in("pixel_shift", s.pixel_shift, 0, 10, "0 to 10 pixels");
   in("disparity_noise", s.disparity_noise, 0, 10, "0 to 10 steps");
   in("distortion", s.distortion, 0, 0.1, "0 to 0.1");
@@ -75,11 +80,14 @@ class Generator {
       : folder_(folder),
         options_(options),
         progress_(progress),
-        threads_(options.threads > 0 ? options.threads : std::max(1, static_cast<int>(std::thread::hardware_concurrency()))),
+        threads_(options.threads > 0
+                     ? options.threads
+                     : std::max(1, static_cast<int>(std::thread::hardware_concurrency()))),
         house_(build_house(options.seed)),
         scene_(house_.mesh),
         sensor_(scene_, options.sensor, options.seed),
-        world_from_camera_(walk(house_, scene_, options.seed, options.fragments * options.frames_per_fragment)),
+        world_from_camera_(
+            walk(house_, scene_, options.seed, options.fragments * options.frames_per_fragment)),
         fragments_(static_cast<std::size_t>(options.fragments)),
         cameras_(fragments_.size()) {}
 
@@ -112,14 +120,16 @@ class Generator {
     report(++done_, total, stage);
   }
 
-  /// Where the odometry believes a fragment's cameras to be: the true motion plus an error that adds up frame by frame.
+  /// Where the odometry believes a fragment's cameras to be: the true motion plus an error that
+  /// adds up frame by frame.
   std::vector<Eigen::Isometry3d> odometry(int first) const {
     std::vector<Eigen::Isometry3d> estimate(1, Eigen::Isometry3d::Identity());
     for (int frame = first + 1; frame < first + options_.frames_per_fragment; ++frame) {
       Random random(hash_key(options_.seed, Purpose::drift, static_cast<std::uint64_t>(frame)));
       Eigen::Vector3d turn, shift;
       for (int axis = 0; axis < 3; ++axis) {
-        turn[axis] = options_.sensor.odometry_rotation_degrees * 0.017453292519943295 * random.normal();
+        turn[axis] =
+            options_.sensor.odometry_rotation_degrees * 0.017453292519943295 * random.normal();
         shift[axis] = options_.sensor.odometry_translation * random.normal();
       }
       const double angle = turn.norm();
@@ -127,7 +137,8 @@ class Generator {
       if (angle > 0) error.linear() = Eigen::AngleAxisd(angle, turn / angle).toRotationMatrix();
       error.translation() = shift;
       const auto k = static_cast<std::size_t>(frame);
-      estimate.push_back(estimate.back() * (world_from_camera_[k - 1].inverse() * world_from_camera_[k]) * error);
+      estimate.push_back(estimate.back() *
+                         (world_from_camera_[k - 1].inverse() * world_from_camera_[k]) * error);
     }
     return estimate;
   }
@@ -145,11 +156,14 @@ class Generator {
       volume.integrate(quarter, cameras_[at][static_cast<std::size_t>(k)]);
       if (!options_.rgbd) continue;
       write_frame(folder_, first + k, render_colour(scene_, pose, options_.seed, first + k),
-                  depth_image({quarter, sensor_.capture(pose, first + k, 1, 0), sensor_.capture(pose, first + k, 0, 1),
+                  depth_image({quarter, sensor_.capture(pose, first + k, 1, 0),
+                               sensor_.capture(pose, first + k, 0, 1),
                                sensor_.capture(pose, first + k, 1, 1)}));
     }
-    // A surface counts when it was seen a few times, at least from afar; short fragments must do with less.
-    const float sightings = std::clamp(static_cast<float>(options_.frames_per_fragment) / 15.0f, 0.5f, 3.0f);
+    // A surface counts when it was seen a few times, at least from afar; short fragments must do
+    // with less.
+    const float sightings =
+        std::clamp(static_cast<float>(options_.frames_per_fragment) / 15.0f, 0.5f, 3.0f);
     const float farthest = static_cast<float>(options_.sensor.max_depth);
     fragments_[at].points = volume.extract(sightings / (farthest * farthest), kPointSpacing);
     write_cloud(folder_ + "/cloud_bin_" + std::to_string(i) + ".ply", fragments_[at].points);
@@ -169,7 +183,8 @@ class Generator {
     std::vector<std::vector<PairTruth>> rows(fragments_.size());
     parallel(threads_, options_.fragments, [&](int i) {
       if (stopped()) return;
-      for (int j = i + 1; j < options_.fragments; ++j) rows[static_cast<std::size_t>(i)].push_back(pair_truth(fragments_, grids, i, j));
+      for (int j = i + 1; j < options_.fragments; ++j)
+        rows[static_cast<std::size_t>(i)].push_back(pair_truth(fragments_, grids, i, j));
       step(options_.fragments, "ground truth");
     });
     std::vector<PairTruth> all;
@@ -194,7 +209,8 @@ class Generator {
 
 }  // namespace
 
-void generate(const std::string& out_folder, const GenerateOptions& options, const Progress& progress) {
+void generate(const std::string& out_folder, const GenerateOptions& options,
+              const Progress& progress) {
   validate(options);
   Generator(out_folder, options, progress).run();
 }

@@ -16,8 +16,8 @@ struct Rect {
   Eigen::Vector2f size() const { return high - low; }
   Eigen::Vector2f centre() const { return 0.5f * (low + high); }
   bool overlaps(const Rect& other, float margin) const {
-    return low.x() < other.high.x() + margin && other.low.x() < high.x() + margin && low.y() < other.high.y() + margin &&
-           other.low.y() < high.y() + margin;
+    return low.x() < other.high.x() + margin && other.low.x() < high.x() + margin &&
+           low.y() < other.high.y() + margin && other.low.y() < high.y() + margin;
   }
 };
 
@@ -27,7 +27,8 @@ struct Opening {
   float from, to, bottom, top, depth;  ///< depth: how far it reaches into the wall
 };
 
-/// Side 0 is the south wall, then east, north, west. Its frame: x along the wall, y into the room, z up, origin on the floor.
+/// Side 0 is the south wall, then east, north, west. Its frame: x along the wall, y into the room,
+/// z up, origin on the floor.
 struct Room {
   Rect floor;
   float height = 2.5f;

@@ -8,7 +8,9 @@ using Eigen::Vector3f;
 
 /// A hue circle, good enough for paint and cloth.
 Vector3f hue(float angle, float saturation, float value) {
-  const auto channel = [&](float shift) { return value * (1 - saturation * (0.5f - 0.5f * std::cos(angle + shift))); };
+  const auto channel = [&](float shift) {
+    return value * (1 - saturation * (0.5f - 0.5f * std::cos(angle + shift)));
+  };
   return {channel(0), channel(2.0944f), channel(4.1888f)};
 }
 

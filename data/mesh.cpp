@@ -8,7 +8,9 @@ namespace {
 
 constexpr float kPi = 3.14159265f;
 
-float signed_power(float x, float exponent) { return std::copysign(std::pow(std::abs(x), exponent), x); }
+float signed_power(float x, float exponent) {
+  return std::copysign(std::pow(std::abs(x), exponent), x);
+}
 
 }  // namespace
 
@@ -50,7 +52,8 @@ void MeshBuilder::quad(const Vector3f& a, const Vector3f& b, const Vector3f& c, 
 
 void MeshBuilder::box(const Vector3f& low, const Vector3f& high) {
   const auto corner = [&](int i) {
-    return Vector3f(i & 1 ? high.x() : low.x(), i & 2 ? high.y() : low.y(), i & 4 ? high.z() : low.z());
+    return Vector3f(i & 1 ? high.x() : low.x(), i & 2 ? high.y() : low.y(),
+                    i & 4 ? high.z() : low.z());
   };
   quad(corner(0), corner(2), corner(3), corner(1));
   quad(corner(4), corner(5), corner(7), corner(6));
@@ -60,7 +63,8 @@ void MeshBuilder::box(const Vector3f& low, const Vector3f& high) {
   quad(corner(1), corner(3), corner(7), corner(5));
 }
 
-void MeshBuilder::lathe(const Vector3f& centre, const std::vector<Vector2f>& profile, int segments) {
+void MeshBuilder::lathe(const Vector3f& centre, const std::vector<Vector2f>& profile,
+                        int segments) {
   const auto first = static_cast<std::uint32_t>(mesh_.vertices.size());
   for (const Vector2f& ring : profile) {
     for (int s = 0; s <= segments; ++s) {
@@ -80,7 +84,8 @@ void MeshBuilder::ellipsoid(const Vector3f& centre, const Vector3f& radii) {
       [&](float u, float v) -> Vector3f {
         const float longitude = 2 * kPi * u, latitude = kPi * (v - 0.5f);
         return centre + radii.cwiseProduct(Vector3f(std::cos(latitude) * std::cos(longitude),
-                                                    std::cos(latitude) * std::sin(longitude), std::sin(latitude)));
+                                                    std::cos(latitude) * std::sin(longitude),
+                                                    std::sin(latitude)));
       },
       20, 12);
 }
@@ -93,9 +98,10 @@ void MeshBuilder::cushion(const Vector3f& low, const Vector3f& high, float round
       [&](float u, float v) -> Vector3f {
         const float longitude = 2 * kPi * u, latitude = kPi * (v - 0.5f);
         const float ring = signed_power(std::cos(latitude), vertical);
-        return centre + radii.cwiseProduct(Vector3f(ring * signed_power(std::cos(longitude), horizontal),
-                                                    ring * signed_power(std::sin(longitude), horizontal),
-                                                    signed_power(std::sin(latitude), vertical)));
+        return centre +
+               radii.cwiseProduct(Vector3f(ring * signed_power(std::cos(longitude), horizontal),
+                                           ring * signed_power(std::sin(longitude), horizontal),
+                                           signed_power(std::sin(latitude), vertical)));
       },
       32, 14);
 }
@@ -103,8 +109,10 @@ void MeshBuilder::cushion(const Vector3f& low, const Vector3f& high, float round
 void MeshBuilder::tube(const std::vector<Vector3f>& line, float radius, int segments) {
   const auto first = static_cast<std::uint32_t>(mesh_.vertices.size());
   for (std::size_t i = 0; i < line.size(); ++i) {
-    const Vector3f along = (line[std::min(i + 1, line.size() - 1)] - line[i == 0 ? 0 : i - 1]).normalized();
-    const Vector3f helper = std::abs(along.z()) < 0.9f ? Vector3f(Vector3f::UnitZ()) : Vector3f(Vector3f::UnitX());
+    const Vector3f along =
+        (line[std::min(i + 1, line.size() - 1)] - line[i == 0 ? 0 : i - 1]).normalized();
+    const Vector3f helper =
+        std::abs(along.z()) < 0.9f ? Vector3f(Vector3f::UnitZ()) : Vector3f(Vector3f::UnitX());
     const Vector3f side = along.cross(helper).normalized(), up = side.cross(along);
     for (int s = 0; s <= segments; ++s) {
       const float angle = 2 * kPi * static_cast<float>(s) / static_cast<float>(segments);
@@ -118,7 +126,8 @@ void MeshBuilder::sheet(const std::function<Vector3f(float, float)>& point, int 
   const auto first = static_cast<std::uint32_t>(mesh_.vertices.size());
   for (int r = 0; r <= rows; ++r) {
     for (int c = 0; c <= columns; ++c) {
-      vertex(point(static_cast<float>(c) / static_cast<float>(columns), static_cast<float>(r) / static_cast<float>(rows)));
+      vertex(point(static_cast<float>(c) / static_cast<float>(columns),
+                   static_cast<float>(r) / static_cast<float>(rows)));
     }
   }
   connect_grid(first, columns, rows);

@@ -10,22 +10,35 @@
 namespace gpureg::synthetic {
 
 /// How a surface is coloured: two colours and the pattern that mixes them (texture.hpp).
-enum class Pattern : std::uint8_t { plain, plaster, wood, planks, tiles, bricks, fabric, stripes, marble, leaf, picture };
+enum class Pattern : std::uint8_t {
+  plain,
+  plaster,
+  wood,
+  planks,
+  tiles,
+  bricks,
+  fabric,
+  stripes,
+  marble,
+  leaf,
+  picture
+};
 
 struct Material {
   Pattern pattern = Pattern::plain;
   Eigen::Vector3f base{0.8f, 0.8f, 0.8f}, second{0.6f, 0.6f, 0.6f};  ///< linear RGB, 0 .. 1
-  float scale = 0.1f;                                                   ///< metres per repetition
+  float scale = 0.1f;                                                ///< metres per repetition
 };
 
 struct Mesh {
   std::vector<Eigen::Vector3f> vertices;  ///< world, metres
   std::vector<std::array<std::uint32_t, 3>> triangles;
-  std::vector<std::uint16_t> materials;   ///< per triangle, an index into palette
+  std::vector<std::uint16_t> materials;  ///< per triangle, an index into palette
   std::vector<Material> palette;
 };
 
-/// Adds primitives to a mesh, in the frame of the object that is being built (z up). Surfaces are seen from both sides.
+/// Adds primitives to a mesh, in the frame of the object that is being built (z up). Surfaces are
+/// seen from both sides.
 class MeshBuilder {
  public:
   explicit MeshBuilder(Mesh& mesh) : mesh_(mesh) {}
@@ -36,10 +49,13 @@ class MeshBuilder {
   /// What the following primitives are made of.
   void paint(const Material& material);
 
-  void quad(const Eigen::Vector3f& a, const Eigen::Vector3f& b, const Eigen::Vector3f& c, const Eigen::Vector3f& d);
+  void quad(const Eigen::Vector3f& a, const Eigen::Vector3f& b, const Eigen::Vector3f& c,
+            const Eigen::Vector3f& d);
   void box(const Eigen::Vector3f& low, const Eigen::Vector3f& high);
-  /// Surface of revolution around the z axis through centre: profile is (radius, height) from bottom to top.
-  void lathe(const Eigen::Vector3f& centre, const std::vector<Eigen::Vector2f>& profile, int segments = 20);
+  /// Surface of revolution around the z axis through centre: profile is (radius, height) from
+  /// bottom to top.
+  void lathe(const Eigen::Vector3f& centre, const std::vector<Eigen::Vector2f>& profile,
+             int segments = 20);
   void cylinder(const Eigen::Vector3f& base_centre, float radius, float height, int segments = 16);
   void ellipsoid(const Eigen::Vector3f& centre, const Eigen::Vector3f& radii);
   /// A box with swollen faces and round edges: cushions, pillows, mattresses.

@@ -4,10 +4,12 @@
 #include <cmath>
 #include <cstdint>
 
-/// Randomness as a function of its key. The standard distributions differ between libraries, so they are not used.
+/// Randomness as a function of its key. The standard distributions differ between libraries, so
+/// they are not used.
 namespace gpureg::synthetic {
 
-/// The finaliser of splitmix64: a bijection of 64 bits whose every output bit depends on every input bit.
+/// The finaliser of splitmix64: a bijection of 64 bits whose every output bit depends on every
+/// input bit.
 inline std::uint64_t mix64(std::uint64_t x) {
   x += 0x9E3779B97F4A7C15ull;
   x = (x ^ (x >> 30)) * 0xBF58476D1CE4E5B9ull;
@@ -16,14 +18,28 @@ inline std::uint64_t mix64(std::uint64_t x) {
 }
 
 /// What a random number is for: part of its key, so that no two uses share a stream.
-enum class Purpose : std::uint64_t { house, furniture, path, gaze, shake, pixel, hole, distortion, drift, texture };
+enum class Purpose : std::uint64_t {
+  house,
+  furniture,
+  path,
+  gaze,
+  shake,
+  pixel,
+  hole,
+  distortion,
+  drift,
+  texture
+};
 
-inline std::uint64_t hash_key(std::uint64_t seed, Purpose purpose, std::uint64_t a = 0, std::uint64_t b = 0) {
+inline std::uint64_t hash_key(std::uint64_t seed, Purpose purpose, std::uint64_t a = 0,
+                              std::uint64_t b = 0) {
   return mix64(mix64(mix64(mix64(seed) ^ static_cast<std::uint64_t>(purpose)) ^ a) ^ b);
 }
 
 /// 24 bits to [0, 1).
-inline float unit_float(std::uint64_t bits24) { return static_cast<float>(bits24 & 0xFFFFFFu) * 0x1p-24f; }
+inline float unit_float(std::uint64_t bits24) {
+  return static_cast<float>(bits24 & 0xFFFFFFu) * 0x1p-24f;
+}
 
 /// Two independent N(0, 1) from 64 random bits (Box-Muller).
 struct NormalPair {

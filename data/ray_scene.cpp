@@ -25,28 +25,31 @@ struct RayScene::Embree {
 };
 
 RayScene::RayScene(const Mesh& mesh) : mesh_(mesh), embree_(std::make_unique<Embree>()) {
-  // One build thread: the tree, and with it which of two coincident triangles is hit, must not depend on the machine's load.
+  // One build thread: the tree, and with it which of two coincident triangles is hit, must not
+  // depend on the machine's load.
   embree_->device = rtcNewDevice("threads=1,user_threads=1");
   if (embree_->device == nullptr) {
     throw Error("Embree cannot start (error " + std::to_string(rtcGetDeviceError(nullptr)) + ")");
   }
   RTCGeometry geometry = rtcNewGeometry(embree_->device, RTC_GEOMETRY_TYPE_TRIANGLE);
-  void* vertices = rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, sizeof(Eigen::Vector3f),
-                                           mesh.vertices.size());
-  void* indices = rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, sizeof(mesh.triangles[0]),
-                                          mesh.triangles.size());
+  void* vertices = rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3,
+                                           sizeof(Eigen::Vector3f), mesh.vertices.size());
+  void* indices = rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3,
+                                          sizeof(mesh.triangles[0]), mesh.triangles.size());
   if (vertices != nullptr && indices != nullptr) {
     std::memcpy(vertices, mesh.vertices.data(), mesh.vertices.size() * sizeof(Eigen::Vector3f));
     std::memcpy(indices, mesh.triangles.data(), mesh.triangles.size() * sizeof(mesh.triangles[0]));
     rtcCommitGeometry(geometry);
     embree_->scene = rtcNewScene(embree_->device);
-    rtcSetSceneFlags(embree_->scene, RTC_SCENE_FLAG_ROBUST);  // no leaks between the triangles of a wall
+    rtcSetSceneFlags(embree_->scene,
+                     RTC_SCENE_FLAG_ROBUST);  // no leaks between the triangles of a wall
     rtcAttachGeometry(embree_->scene, geometry);
     rtcCommitScene(embree_->scene);
   }
   rtcReleaseGeometry(geometry);
   const RTCError error = rtcGetDeviceError(embree_->device);
-  if (error != RTC_ERROR_NONE) throw Error("Embree cannot build the scene (error " + std::to_string(error) + ")");
+  if (error != RTC_ERROR_NONE)
+    throw Error("Embree cannot build the scene (error " + std::to_string(error) + ")");
 }
 
 RayScene::~RayScene() = default;

@@ -10,7 +10,7 @@ namespace gpureg::synthetic {
 
 struct RayHit {
   bool hit = false;
-  float t = 0;                ///< in lengths of the ray's direction
+  float t = 0;                      ///< in lengths of the ray's direction
   Eigen::Vector3f normal{0, 0, 1};  ///< unit, towards the ray's origin
   std::uint32_t triangle = 0;
 };

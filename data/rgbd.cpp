@@ -30,14 +30,16 @@ std::string timestamp(int frame) {
 void append_bytes(png_structp png, png_bytep data, png_size_t size) {
   bool failed = false;
   try {
-    static_cast<std::string*>(png_get_io_ptr(png))->append(reinterpret_cast<const char*>(data), size);
+    static_cast<std::string*>(png_get_io_ptr(png))
+        ->append(reinterpret_cast<const char*>(data), size);
   } catch (const std::exception&) {
     failed = true;  // no exception may pass through libpng, which is C
   }
   if (failed) png_error(png, "out of memory");
 }
 
-/// A PNG in memory. rows: big-endian samples, as the format has them. An empty string where libpng fails (it has no memory then).
+/// A PNG in memory. rows: big-endian samples, as the format has them. An empty string where libpng
+/// fails (it has no memory then).
 std::string encode_png(const std::vector<std::uint8_t>& rows, int colour_type, int bit_depth) {
   std::string bytes;
   png_structp png = png_create_write_struct(PNG_LIBPNG_VER_STRING, nullptr, nullptr, nullptr);
@@ -48,17 +50,19 @@ std::string encode_png(const std::vector<std::uint8_t>& rows, int colour_type, i
   }
   png_set_write_fn(png, &bytes, append_bytes, nullptr);
   png_set_compression_level(png, 2);  // several times as fast as the default for a tenth more bytes
-  png_set_IHDR(png, info, camera::kWidth, camera::kHeight, bit_depth, colour_type, PNG_INTERLACE_NONE, PNG_COMPRESSION_TYPE_DEFAULT,
-               PNG_FILTER_TYPE_DEFAULT);
+  png_set_IHDR(png, info, camera::kWidth, camera::kHeight, bit_depth, colour_type,
+               PNG_INTERLACE_NONE, PNG_COMPRESSION_TYPE_DEFAULT, PNG_FILTER_TYPE_DEFAULT);
   png_write_info(png, info);
   const std::size_t stride = rows.size() / camera::kHeight;
-  for (std::size_t row = 0; row < camera::kHeight; ++row) png_write_row(png, rows.data() + row * stride);
+  for (std::size_t row = 0; row < camera::kHeight; ++row)
+    png_write_row(png, rows.data() + row * stride);
   png_write_end(png, info);
   png_destroy_write_struct(&png, &info);
   return bytes;
 }
 
-void write_png(const std::string& path, const std::vector<std::uint8_t>& rows, int colour_type, int bit_depth) {
+void write_png(const std::string& path, const std::vector<std::uint8_t>& rows, int colour_type,
+               int bit_depth) {
   const std::string bytes = encode_png(rows, colour_type, bit_depth);
   if (bytes.empty()) throw IoError(path + ": the image cannot be encoded");
   evaluation::write_file_atomically(path, bytes);
@@ -66,17 +70,22 @@ void write_png(const std::string& path, const std::vector<std::uint8_t>& rows, i
 
 /// Linear light to an sRGB byte, near enough: gamma 2.2.
 std::uint8_t to_byte(float linear, float noise) {
-  return static_cast<std::uint8_t>(std::clamp(255.0f * std::pow(std::max(linear, 0.0f), 0.4545f) + noise + 0.5f, 0.0f, 255.0f));
+  return static_cast<std::uint8_t>(
+      std::clamp(255.0f * std::pow(std::max(linear, 0.0f), 0.4545f) + noise + 0.5f, 0.0f, 255.0f));
 }
 
 }  // namespace
 
-std::vector<std::uint8_t> render_colour(const RayScene& scene, const Eigen::Isometry3d& world_from_camera, std::uint64_t seed, int frame) {
+std::vector<std::uint8_t> render_colour(const RayScene& scene,
+                                        const Eigen::Isometry3d& world_from_camera,
+                                        std::uint64_t seed, int frame) {
   std::vector<std::uint8_t> image(static_cast<std::size_t>(camera::kWidth) * camera::kHeight * 3);
   const Eigen::Matrix3f rotation = world_from_camera.rotation().cast<float>();
   const Vector3f origin = world_from_camera.translation().cast<float>();
   const Vector3f daylight = Vector3f(0.4f, 0.3f, 0.85f).normalized();
-  const std::uint64_t texture = hash_key(seed, Purpose::texture), noise = hash_key(seed, Purpose::texture, 1, static_cast<std::uint64_t>(frame));
+  const std::uint64_t texture = hash_key(seed, Purpose::texture),
+                      noise =
+                          hash_key(seed, Purpose::texture, 1, static_cast<std::uint64_t>(frame));
   for (int y = 0; y < camera::kHeight; ++y) {
     for (int x = 0; x < camera::kWidth; ++x) {
       const auto pixel = static_cast<std::size_t>(y) * camera::kWidth + static_cast<std::size_t>(x);
@@ -86,8 +95,10 @@ std::vector<std::uint8_t> render_colour(const RayScene& scene, const Eigen::Isom
       if (hit.hit) {
         const Vector3f point = origin + hit.t * ray;
         const Mesh& mesh = scene.mesh();
-        const Vector3f colour = surface_colour(mesh.palette[mesh.materials[hit.triangle]], point, hit.normal, texture);
-        const float shade = 0.45f + 0.3f * std::abs(hit.normal.dot(daylight)) + 0.2f * std::max(0.0f, hit.normal.z());
+        const Vector3f colour =
+            surface_colour(mesh.palette[mesh.materials[hit.triangle]], point, hit.normal, texture);
+        const float shade = 0.45f + 0.3f * std::abs(hit.normal.dot(daylight)) +
+                            0.2f * std::max(0.0f, hit.normal.z());
         light = shade * colour;
       }
       const std::uint64_t dice = mix64(noise ^ pixel);
@@ -105,16 +116,20 @@ std::vector<std::uint16_t> depth_image(const std::array<DepthQuarter, 4>& quarte
   for (const DepthQuarter& quarter : quarters) {
     for (int row = 0; row < DepthQuarter::kHeight; ++row) {
       for (int column = 0; column < DepthQuarter::kWidth; ++column) {
-        const float z = quarter.depth[static_cast<std::size_t>(row) * DepthQuarter::kWidth + static_cast<std::size_t>(column)];
-        const std::size_t x = static_cast<std::size_t>(2 * column + quarter.phase_x), y = static_cast<std::size_t>(2 * row + quarter.phase_y);
-        image[y * camera::kWidth + x] = static_cast<std::uint16_t>(std::min(65535.0f, z * kDepthUnits + 0.5f));
+        const float z = quarter.depth[static_cast<std::size_t>(row) * DepthQuarter::kWidth +
+                                      static_cast<std::size_t>(column)];
+        const std::size_t x = static_cast<std::size_t>(2 * column + quarter.phase_x),
+                          y = static_cast<std::size_t>(2 * row + quarter.phase_y);
+        image[y * camera::kWidth + x] =
+            static_cast<std::uint16_t>(std::min(65535.0f, z * kDepthUnits + 0.5f));
       }
     }
   }
   return image;
 }
 
-void write_frame(const std::string& folder, int frame, const std::vector<std::uint8_t>& colour, const std::vector<std::uint16_t>& depth) {
+void write_frame(const std::string& folder, int frame, const std::vector<std::uint8_t>& colour,
+                 const std::vector<std::uint16_t>& depth) {
   std::vector<std::uint8_t> bytes(2 * depth.size());
   for (std::size_t i = 0; i < depth.size(); ++i) {
     bytes[2 * i] = static_cast<std::uint8_t>(depth[i] >> 8);
@@ -125,10 +140,13 @@ void write_frame(const std::string& folder, int frame, const std::vector<std::ui
   write_png(folder + "/rgb/" + name, colour, PNG_COLOR_TYPE_RGB, 8);
 }
 
-void write_sequence_lists(const std::string& folder, const std::vector<Eigen::Isometry3d>& world_from_camera) {
+void write_sequence_lists(const std::string& folder,
+                          const std::vector<Eigen::Isometry3d>& world_from_camera) {
   std::string rgb = "# color images\n# file: rgb.txt\n# timestamp filename\n";
   std::string depth = "# depth maps\n# file: depth.txt\n# timestamp filename\n";
-  std::string associations, truth = "# ground truth trajectory\n# file: groundtruth.txt\n# timestamp tx ty tz qx qy qz qw\n";
+  std::string associations,
+      truth =
+          "# ground truth trajectory\n# file: groundtruth.txt\n# timestamp tx ty tz qx qy qz qw\n";
   char line[192];
   for (std::size_t k = 0; k < world_from_camera.size(); ++k) {
     const std::string time = timestamp(static_cast<int>(k));
@@ -137,7 +155,8 @@ void write_sequence_lists(const std::string& folder, const std::vector<Eigen::Is
     associations += time + " rgb/" + time + ".png " + time + " depth/" + time + ".png\n";
     const Eigen::Vector3d t = world_from_camera[k].translation();
     const Eigen::Vector4d q = quaternion(world_from_camera[k]);
-    std::snprintf(line, sizeof(line), " %.6f %.6f %.6f %.7f %.7f %.7f %.7f\n", t.x(), t.y(), t.z(), q.x(), q.y(), q.z(), q.w());
+    std::snprintf(line, sizeof(line), " %.6f %.6f %.6f %.7f %.7f %.7f %.7f\n", t.x(), t.y(), t.z(),
+                  q.x(), q.y(), q.z(), q.w());
     truth += time + line;
   }
   evaluation::write_file_atomically(folder + "/rgb.txt", rgb);

@@ -17,7 +17,8 @@ void make_folder(const fs::path& path) {
   std::error_code error;
   fs::create_directories(path, error);
   if (error || !fs::is_directory(path, error)) {
-    throw IoError(path.string() + ": cannot make this folder" + (error ? ": " + error.message() : std::string()));
+    throw IoError(path.string() + ": cannot make this folder" +
+                  (error ? ": " + error.message() : std::string()));
   }
 }
 
@@ -43,16 +44,21 @@ void open_folder(const std::string& folder, int fragments, bool rgbd) {
   if (folder.empty()) throw IoError("the output folder has no name");
   make_folder(folder);
   std::error_code error;
-  for (fs::directory_iterator entry(folder, error), end; !error && entry != end; entry.increment(error)) {
+  for (fs::directory_iterator entry(folder, error), end; !error && entry != end;
+       entry.increment(error)) {
     if (cloud_number(entry->path().filename().string()) >= fragments) {
-      throw IoError(entry->path().string() + ": this cloud is of a scene with more than " + std::to_string(fragments) +
-                    " fragments and would be taken for one of them; remove it or choose another folder");
+      throw IoError(
+          entry->path().string() + ": this cloud is of a scene with more than " +
+          std::to_string(fragments) +
+          " fragments and would be taken for one of them; remove it or choose another folder");
     }
   }
   if (error) throw IoError(folder + ": cannot read this folder: " + error.message());
-  for (const char* name : {"gt.log", "gt.info", "gt_all.log", "gt_all.info", "gt_overlap.txt", "poses.txt", "cameras.txt"}) {
+  for (const char* name : {"gt.log", "gt.info", "gt_all.log", "gt_all.info", "gt_overlap.txt",
+                           "poses.txt", "cameras.txt"}) {
     fs::remove(fs::path(folder) / name, error);
-    if (error) throw IoError(folder + "/" + name + ": cannot replace this file: " + error.message());
+    if (error)
+      throw IoError(folder + "/" + name + ": cannot replace this file: " + error.message());
   }
   if (!rgbd) return;
   make_folder(fs::path(folder) / "rgb");
@@ -60,7 +66,8 @@ void open_folder(const std::string& folder, int fragments, bool rgbd) {
 }
 
 void write_cloud(const std::string& path, const std::vector<Eigen::Vector3f>& points) {
-  std::string bytes = "ply\nformat binary_little_endian 1.0\nelement vertex " + std::to_string(points.size()) +
+  std::string bytes = "ply\nformat binary_little_endian 1.0\nelement vertex " +
+                      std::to_string(points.size()) +
                       "\nproperty float x\nproperty float y\nproperty float z\nend_header\n";
   bytes.reserve(bytes.size() + 12 * points.size());
   for (const Eigen::Vector3f& p : points) {
@@ -69,14 +76,16 @@ void write_cloud(const std::string& path, const std::vector<Eigen::Vector3f>& po
   evaluation::write_file_atomically(path, bytes);
 }
 
-void write_poses(const std::string& path, const std::vector<Eigen::Isometry3d>& world_from_fragment) {
+void write_poses(const std::string& path,
+                 const std::vector<Eigen::Isometry3d>& world_from_fragment) {
   std::string text;
   char line[160];
   for (std::size_t i = 0; i < world_from_fragment.size(); ++i) {
     text += std::to_string(i) + "\n";
     const Eigen::Matrix4d m = world_from_fragment[i].matrix();
     for (int row = 0; row < 4; ++row) {
-      std::snprintf(line, sizeof(line), "%.10f %.10f %.10f %.10f\n", m(row, 0), m(row, 1), m(row, 2), m(row, 3));
+      std::snprintf(line, sizeof(line), "%.10f %.10f %.10f %.10f\n", m(row, 0), m(row, 1),
+                    m(row, 2), m(row, 3));
       text += line;
     }
   }
@@ -88,14 +97,16 @@ Eigen::Vector4d quaternion(const Eigen::Isometry3d& pose) {
   return q.w() < 0 ? Eigen::Vector4d(-q.coeffs()) : q.coeffs();
 }
 
-void write_cameras(const std::string& path, const std::vector<std::vector<Eigen::Isometry3d>>& fragment_from_camera) {
+void write_cameras(const std::string& path,
+                   const std::vector<std::vector<Eigen::Isometry3d>>& fragment_from_camera) {
   std::string text;
   char line[192];
   for (std::size_t i = 0; i < fragment_from_camera.size(); ++i) {
     for (std::size_t k = 0; k < fragment_from_camera[i].size(); ++k) {
       const Eigen::Vector3d t = fragment_from_camera[i][k].translation();
       const Eigen::Vector4d q = quaternion(fragment_from_camera[i][k]);
-      std::snprintf(line, sizeof(line), "%zu %zu %.5f %.5f %.5f %.6f %.6f %.6f %.6f\n", i, k, t.x(), t.y(), t.z(), q.x(), q.y(), q.z(), q.w());
+      std::snprintf(line, sizeof(line), "%zu %zu %.5f %.5f %.5f %.6f %.6f %.6f %.6f\n", i, k, t.x(),
+                    t.y(), t.z(), q.x(), q.y(), q.z(), q.w());
       text += line;
     }
   }

@@ -5,20 +5,24 @@
 #include <string>
 #include <vector>
 
-/// The plain files of a scene. All or nothing: a file under its final name is complete. Throw IoError.
+/// The plain files of a scene. All or nothing: a file under its final name is complete. Throw
+/// IoError.
 namespace gpureg::synthetic {
 
-/// Makes the folder, tells of clouds of a larger scene that would stay, and removes ground truth that no longer belongs to the clouds.
+/// Makes the folder, tells of clouds of a larger scene that would stay, and removes ground truth
+/// that no longer belongs to the clouds.
 void open_folder(const std::string& folder, int fragments, bool rgbd);
 
 /// Binary little-endian PLY, float32 x y z.
 void write_cloud(const std::string& path, const std::vector<Eigen::Vector3f>& points);
 
 /// poses.txt: blocks of five lines, the number and world_from_fragment.
-void write_poses(const std::string& path, const std::vector<Eigen::Isometry3d>& world_from_fragment);
+void write_poses(const std::string& path,
+                 const std::vector<Eigen::Isometry3d>& world_from_fragment);
 
 /// cameras.txt: `fragment frame tx ty tz qx qy qz qw`, w >= 0.
-void write_cameras(const std::string& path, const std::vector<std::vector<Eigen::Isometry3d>>& fragment_from_camera);
+void write_cameras(const std::string& path,
+                   const std::vector<std::vector<Eigen::Isometry3d>>& fragment_from_camera);
 
 /// The unit quaternion (x, y, z, w) with w >= 0.
 Eigen::Vector4d quaternion(const Eigen::Isometry3d& pose);

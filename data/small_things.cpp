@@ -23,13 +23,16 @@ std::vector<Vector3f> circle(const Vector3f& centre, float radius, int steps) {
 
 }  // namespace
 
-void book_row(MeshBuilder& mesh, Random& random, float left, float right, float back, float depth, float bottom, float max_height) {
+void book_row(MeshBuilder& mesh, Random& random, float left, float right, float back, float depth,
+              float bottom, float max_height) {
   float x = left;
   while (true) {
-    const float width = random.uniform(0.012f, 0.05f), height = std::min(max_height, random.uniform(0.16f, 0.32f));
+    const float width = random.uniform(0.012f, 0.05f),
+                height = std::min(max_height, random.uniform(0.2f, 0.28f));
     if (x + width > right) return;
     mesh.paint(paint(random));
-    mesh.box({x, back, bottom}, {x + width - 0.002f, back + depth * random.uniform(0.6f, 0.95f), bottom + height});
+    mesh.box({x, back, bottom},
+             {x + width - 0.002f, back + depth * random.uniform(0.85f, 0.95f), bottom + height});
     x += width;
     if (random.chance(0.06f)) x += random.uniform(0.02f, 0.12f);
   }
@@ -44,7 +47,8 @@ void small_thing(MeshBuilder& mesh, Random& random, const Vector3f& at, float ra
     case 0: {  // a pile of books
       float z = 0;
       for (int i = random.between(1, 5); i > 0; --i) {
-        const float t = random.uniform(0.015f, 0.04f), a = s * random.uniform(0.5f, 0.7f), b = s * random.uniform(0.7f, 0.8f);
+        const float t = random.uniform(0.015f, 0.04f), a = s * random.uniform(0.5f, 0.7f),
+                    b = s * random.uniform(0.7f, 0.8f);
         mesh.paint(paint(random));
         mesh.box({-a, -b, z}, {a, b, z + t});
         z += t;
@@ -53,7 +57,14 @@ void small_thing(MeshBuilder& mesh, Random& random, const Vector3f& at, float ra
     }
     case 1: {  // a vase
       const float h = random.uniform(1.5f, 3.0f) * s, belly = random.uniform(0.5f, 0.9f) * s;
-      mesh.lathe({0, 0, 0}, {{0, 0}, {0.4f * s, 0}, {belly, 0.35f * h}, {0.6f * belly, 0.7f * h}, {0.25f * s, 0.85f * h}, {0.4f * s, h}}, 18);
+      mesh.lathe({0, 0, 0},
+                 {{0, 0},
+                  {0.4f * s, 0},
+                  {belly, 0.35f * h},
+                  {0.6f * belly, 0.7f * h},
+                  {0.25f * s, 0.85f * h},
+                  {0.4f * s, h}},
+                 18);
       break;
     }
     case 2:
@@ -67,7 +78,8 @@ void small_thing(MeshBuilder& mesh, Random& random, const Vector3f& at, float ra
       for (int i = 0; i < 4; ++i) {
         const float a = 1.6f * static_cast<float>(i);
         mesh.paint(paint(random));
-        mesh.ellipsoid({0.4f * s * std::cos(a), 0.4f * s * std::sin(a), 0.5f * s}, Vector3f::Constant(0.3f * s));
+        mesh.ellipsoid({0.4f * s * std::cos(a), 0.4f * s * std::sin(a), 0.5f * s},
+                       Vector3f::Constant(0.3f * s));
       }
       break;
     case 5: {  // mugs and bottles
@@ -76,13 +88,16 @@ void small_thing(MeshBuilder& mesh, Random& random, const Vector3f& at, float ra
         if (random.chance(0.5f)) {
           mesh.cylinder(p, 0.04f, 0.1f, 12);
         } else {
-          mesh.lathe(p, {{0, 0}, {0.04f, 0}, {0.04f, 0.16f}, {0.014f, 0.22f}, {0.014f, 0.28f}, {0, 0.28f}}, 12);
+          mesh.lathe(
+              p, {{0, 0}, {0.04f, 0}, {0.04f, 0.16f}, {0.014f, 0.22f}, {0.014f, 0.28f}, {0, 0.28f}},
+              12);
         }
       }
       break;
     }
     case 6:  // a table lamp
-      mesh.lathe({0, 0, 0}, {{0, 0}, {0.5f * s, 0}, {0.12f * s, 0.2f * s}, {0.1f * s, 1.3f * s}}, 14);
+      mesh.lathe({0, 0, 0}, {{0, 0}, {0.5f * s, 0}, {0.12f * s, 0.2f * s}, {0.1f * s, 1.3f * s}},
+                 14);
       mesh.paint(fabric(random));
       mesh.lathe({0, 0, 1.2f * s}, {{0.9f * s, 0}, {0.5f * s, 0.9f * s}}, 18);
       break;
@@ -97,18 +112,24 @@ void small_thing(MeshBuilder& mesh, Random& random, const Vector3f& at, float ra
       break;
     default:  // a bag
       mesh.cushion({-0.6f * s, -0.35f * s, 0}, {0.6f * s, 0.35f * s, 1.2f * s}, 0.5f);
-      mesh.tube({{-0.3f * s, 0, 1.1f * s}, {-0.2f * s, 0, 1.6f * s}, {0.2f * s, 0, 1.6f * s}, {0.3f * s, 0, 1.1f * s}}, 0.012f);
+      mesh.tube({{-0.3f * s, 0, 1.1f * s},
+                 {-0.2f * s, 0, 1.6f * s},
+                 {0.2f * s, 0, 1.6f * s},
+                 {0.3f * s, 0, 1.1f * s}},
+                0.012f);
   }
   mesh.place(frame);
 }
 
-void litter(MeshBuilder& mesh, Random& random, const Vector3f& low, const Vector3f& high, int count) {
+void litter(MeshBuilder& mesh, Random& random, const Vector3f& low, const Vector3f& high,
+            int count) {
   const float room = 0.5f * std::min(high.x() - low.x(), high.y() - low.y());
   const float radius = std::clamp(room, 0.02f, 0.16f);
-  for (int i = 0; i < count; ++i) {
+  for (int i = random.between(0, count); i > 0; --i) {
     const float margin = std::min(radius, 0.9f * room);
     small_thing(mesh, random,
-                {random.uniform(low.x() + margin, high.x() - margin), random.uniform(low.y() + margin, high.y() - margin), low.z()},
+                {random.uniform(low.x() + margin, high.x() - margin),
+                 random.uniform(low.y() + margin, high.y() - margin), low.z()},
                 random.uniform(0.5f, 1.0f) * radius);
   }
 }
@@ -117,7 +138,9 @@ Piece floor_lamp(Random& random) {
   const float h = random.uniform(1.4f, 1.8f), shade = random.uniform(0.16f, 0.24f);
   return {0.45f, 0.45f, h, [=](MeshBuilder& mesh, Random& r) {
             mesh.paint(metal(r));
-            mesh.lathe({0, 0.22f, 0}, {{0, 0}, {0.15f, 0}, {0.14f, 0.03f}, {0.015f, 0.05f}, {0.015f, h - 0.2f}}, 16);
+            mesh.lathe({0, 0.22f, 0},
+                       {{0, 0}, {0.15f, 0}, {0.14f, 0.03f}, {0.015f, 0.05f}, {0.015f, h - 0.2f}},
+                       16);
             mesh.paint(fabric(r));
             mesh.lathe({0, 0.22f, h - 0.3f}, {{shade, 0}, {0.6f * shade, 0.3f}}, 22);
           }};
@@ -128,20 +151,30 @@ Piece plant(Random& random) {
   const int leaves = random.between(10, 26);
   return {0.6f, 0.6f, h, [=](MeshBuilder& mesh, Random& r) {
             mesh.paint(paint(r));
-            mesh.lathe({0, 0.3f, 0}, {{0, 0}, {0.7f * pot, 0}, {pot, 1.6f * pot}, {1.08f * pot, 1.7f * pot}, {0.9f * pot, 1.7f * pot}, {0, 1.5f * pot}}, 20);
+            mesh.lathe({0, 0.3f, 0},
+                       {{0, 0},
+                        {0.7f * pot, 0},
+                        {pot, 1.6f * pot},
+                        {1.08f * pot, 1.7f * pot},
+                        {0.9f * pot, 1.7f * pot},
+                        {0, 1.5f * pot}},
+                       20);
             Material green;
             green.pattern = Pattern::leaf;
             green.base = {0.08f, 0.25f, 0.06f};
             green.second = {0.25f, 0.5f, 0.15f};
             mesh.paint(green);
             for (int i = 0; i < leaves; ++i) {
-              const float a = r.uniform(0, kTurn), z = r.uniform(1.7f * pot, h - 0.1f), length = r.uniform(0.2f, 0.45f), width = r.uniform(0.04f, 0.12f);
-              const Vector3f out(std::cos(a), std::sin(a), 0), side(-out.y(), out.x(), 0), root(0, 0.3f, z);
+              const float a = r.uniform(0, kTurn), z = r.uniform(1.7f * pot, h - 0.1f),
+                          length = r.uniform(0.2f, 0.45f), width = r.uniform(0.04f, 0.12f);
+              const Vector3f out(std::cos(a), std::sin(a), 0), side(-out.y(), out.x(), 0),
+                  root(0, 0.3f, z);
               const float rise = r.uniform(0.0f, 0.25f), sag = r.uniform(0.1f, 0.35f);
               mesh.sheet(
                   [&](float u, float v) -> Vector3f {
                     const float half = width * std::sin(3.1f * v + 0.03f) * (2 * u - 1);
-                    return root + length * v * out + half * side + Vector3f(0, 0, rise * v - sag * v * v + 0.6f * std::abs(half));
+                    return root + length * v * out + half * side +
+                           Vector3f(0, 0, rise * v - sag * v * v + 0.6f * std::abs(half));
                   },
                   4, 8);
             }
@@ -153,7 +186,8 @@ Piece bicycle(Random& random) {
   const float tilt = random.uniform(0.05f, 0.12f);
   return {1.7f, 0.5f, 1.05f, [=](MeshBuilder& mesh, Random& r) {
             const Eigen::Affine3f frame = mesh.frame();
-            mesh.place(frame * Eigen::Translation3f(0, 0.2f, 0) * Eigen::AngleAxisf(tilt, Vector3f::UnitX()));
+            mesh.place(frame * Eigen::Translation3f(0, 0.2f, 0) *
+                       Eigen::AngleAxisf(tilt, Vector3f::UnitX()));
             mesh.paint(metal(r));
             for (const float x : {-0.52f, 0.52f}) {
               const Vector3f hub(x, 0, 0.34f);
@@ -165,11 +199,18 @@ Piece bicycle(Random& random) {
               }
             }
             mesh.paint(paint(r));
-            const Vector3f pedal(-0.08f, 0, 0.3f), saddle(-0.2f, 0, 0.85f), head(0.36f, 0, 0.85f), rear(-0.52f, 0, 0.34f), front(0.52f, 0, 0.34f);
-            for (const auto& line : {std::vector<Vector3f>{pedal, saddle, head, pedal}, {saddle, rear, pedal}, {front, head, head + Vector3f(-0.04f, 0, 0.15f)}}) {
+            const Vector3f pedal(-0.08f, 0, 0.3f), saddle(-0.2f, 0, 0.85f), head(0.36f, 0, 0.85f),
+                rear(-0.52f, 0, 0.34f), front(0.52f, 0, 0.34f);
+            for (const auto& line : {std::vector<Vector3f>{pedal, saddle, head, pedal},
+                                     {saddle, rear, pedal},
+                                     {front, head, head + Vector3f(-0.04f, 0, 0.15f)}}) {
               mesh.tube(line, 0.017f);
             }
-            mesh.tube({{0.22f, -0.28f, 1.0f}, {0.32f, -0.15f, 1.02f}, {0.32f, 0.15f, 1.02f}, {0.22f, 0.28f, 1.0f}}, 0.014f);
+            mesh.tube({{0.22f, -0.28f, 1.0f},
+                       {0.32f, -0.15f, 1.02f},
+                       {0.32f, 0.15f, 1.02f},
+                       {0.22f, 0.28f, 1.0f}},
+                      0.014f);
             mesh.cushion({-0.33f, -0.07f, 0.85f}, {-0.08f, 0.07f, 0.92f}, 0.6f);
             mesh.tube(circle(pedal, 0.09f, 16), 0.008f);
             mesh.place(frame);
@@ -210,7 +251,8 @@ Piece clutter_heap(Random& random) {
             for (int i = 0; i < boxes && z < 0.8f; ++i) {
               const Eigen::Affine3f frame = mesh.frame();
               mesh.place(frame * upright({0, d / 2, z}, r.uniform(-0.3f, 0.3f)));
-              const float a = 0.45f * w * r.uniform(0.6f, 1.0f), b = 0.45f * d * r.uniform(0.6f, 1.0f), h = r.uniform(0.12f, 0.35f);
+              const float a = 0.45f * w * r.uniform(0.6f, 1.0f),
+                          b = 0.45f * d * r.uniform(0.6f, 1.0f), h = r.uniform(0.12f, 0.35f);
               Material card = wood(r);
               card.pattern = Pattern::plain;
               mesh.paint(card);

@@ -60,18 +60,24 @@ float mixture(const Material& m, const Vector3f& point, const Vector3f& normal, 
       return fraction(6.0f * fractal_noise(p.cwiseProduct(Vector3f(0.25f, 2.0f, 2.0f)), key));
     case Pattern::planks: {
       const float board = std::floor(uv.y());
-      const float tone = lattice(static_cast<int>(board), static_cast<int>(std::floor(0.2f * uv.x() + 0.37f * board)), 0, key);
+      const float tone =
+          lattice(static_cast<int>(board),
+                  static_cast<int>(std::floor(0.2f * uv.x() + 0.37f * board)), 0, key);
       const float grain = fractal_noise(Vector3f(0.6f * uv.x(), 9.0f * uv.y(), board), key);
-      return std::max(joint(uv.cwiseProduct(Vector2f(0.2f, 1.0f)), 0.37f, 0.03f), 0.5f * tone + 0.4f * grain);
+      return std::max(joint(uv.cwiseProduct(Vector2f(0.2f, 1.0f)), 0.37f, 0.03f),
+                      0.5f * tone + 0.4f * grain);
     }
     case Pattern::tiles: {
-      const float tone = lattice(static_cast<int>(std::floor(uv.x())), static_cast<int>(std::floor(uv.y())), 7, key);
+      const float tone = lattice(static_cast<int>(std::floor(uv.x())),
+                                 static_cast<int>(std::floor(uv.y())), 7, key);
       return std::max(joint(uv, 0, 0.03f), 0.3f * tone + 0.2f * fractal_noise(5.0f * p, key));
     }
     case Pattern::bricks:
-      return std::max(joint(uv.cwiseProduct(Vector2f(0.5f, 1.5f)), 0.5f, 0.06f), 0.5f * fractal_noise(6.0f * p, key));
+      return std::max(joint(uv.cwiseProduct(Vector2f(0.5f, 1.5f)), 0.5f, 0.06f),
+                      0.5f * fractal_noise(6.0f * p, key));
     case Pattern::fabric:
-      return 0.5f + 0.25f * std::sin(40.0f * uv.x()) * std::sin(40.0f * uv.y()) + 0.3f * (fractal_noise(p, key) - 0.5f);
+      return 0.5f + 0.25f * std::sin(40.0f * uv.x()) * std::sin(40.0f * uv.y()) +
+             0.3f * (fractal_noise(p, key) - 0.5f);
     case Pattern::stripes:
       return fraction(uv.x()) < 0.5f ? 0.9f : 0.1f * fractal_noise(8.0f * p, key);
     case Pattern::marble:
@@ -96,7 +102,8 @@ float fractal_noise(const Vector3f& p, std::uint64_t key) {
   return sum;
 }
 
-Vector3f surface_colour(const Material& material, const Vector3f& point, const Vector3f& normal, std::uint64_t key) {
+Vector3f surface_colour(const Material& material, const Vector3f& point, const Vector3f& normal,
+                        std::uint64_t key) {
   const float t = std::clamp(mixture(material, point, normal, key), 0.0f, 1.0f);
   return (1 - t) * material.base + t * material.second;
 }

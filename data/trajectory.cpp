@@ -11,20 +11,24 @@ namespace {
 
 using Eigen::Vector2f;
 
-constexpr float kSpacing = 0.02f;      // metres between samples of the path
-constexpr float kSpeed = 0.0165f;      // metres per frame, on average
+constexpr float kSpacing = 0.02f;  // metres between samples of the path
+constexpr float kSpeed = 0.0165f;  // metres per frame, on average
 constexpr float kMaximumSpeed = 1.35f * kSpeed;
-constexpr float kEyeLevel = 1.47f;     // metres, on average
-constexpr int kGazeFrames = 45;        // how long a direction of view is kept
-constexpr int kTurnFrames = 26;        // sigma of the smoothing of turns
+constexpr float kEyeLevel = 1.47f;  // metres, on average
+constexpr int kGazeFrames = 45;     // how long a direction of view is kept
+constexpr int kTurnFrames = 26;     // sigma of the smoothing of turns
 
 float radians(float degrees) { return degrees * 0.0174532925f; }
 
-/// Smooth noise over frames in about [-1, 1]: hashed values, cubic in between; a function of its arguments alone.
+/// Smooth noise over frames in about [-1, 1]: hashed values, cubic in between; a function of its
+/// arguments alone.
 float wander(std::uint64_t seed, std::uint64_t channel, float t) {
   const float cell = std::floor(t), f = t - cell, w = f * f * (3 - 2 * f);
   const auto value = [&](float at) {
-    return 2 * unit_float(hash_key(seed, Purpose::shake, channel, static_cast<std::uint64_t>(static_cast<std::int64_t>(at))) >> 40) - 1;
+    return 2 * unit_float(hash_key(seed, Purpose::shake, channel,
+                                   static_cast<std::uint64_t>(static_cast<std::int64_t>(at))) >>
+                          40) -
+           1;
   };
   return (1 - w) * value(cell) + w * value(cell + 1);
 }
@@ -34,7 +38,8 @@ template <class T>
 std::vector<T> smoothed(const std::vector<T>& values, float sigma) {
   const int reach = static_cast<int>(3 * sigma), n = static_cast<int>(values.size());
   std::vector<float> kernel;
-  for (int k = -reach; k <= reach; ++k) kernel.push_back(std::exp(-0.5f * static_cast<float>(k * k) / (sigma * sigma)));
+  for (int k = -reach; k <= reach; ++k)
+    kernel.push_back(std::exp(-0.5f * static_cast<float>(k * k) / (sigma * sigma)));
   std::vector<T> result(values.size());
   for (int i = 0; i < n; ++i) {
     T sum = values[0] * 0.0f;
@@ -54,19 +59,24 @@ Vector2f place_in(const Room& room, const WalkMap& map, Random& random, const Ve
   Vector2f best = room.floor.centre();
   float score = -1;
   for (int attempt = 0; attempt < 24; ++attempt) {
-    const Vector2f p(random.uniform(room.floor.low.x(), room.floor.high.x()), random.uniform(room.floor.low.y(), room.floor.high.y()));
-    const float value = map.free(p) ? std::min(1.6f, (p - last).norm()) + 0.2f * random.uniform() : -2;
+    const Vector2f p(random.uniform(room.floor.low.x(), room.floor.high.x()),
+                     random.uniform(room.floor.low.y(), room.floor.high.y()));
+    const float value =
+        map.free(p) ? std::min(1.6f, (p - last).norm()) + 0.2f * random.uniform() : -2;
     if (value > score) score = value, best = p;
   }
   return best;
 }
 
-/// A tour of the rooms, as long as wanted (metres): round each room, then through a door, mostly to where it was least.
-std::vector<Vector2f> tour(const House& house, const WalkMap& map, std::uint64_t seed, float length) {
+/// A tour of the rooms, as long as wanted (metres): round each room, then through a door, mostly to
+/// where it was least.
+std::vector<Vector2f> tour(const House& house, const WalkMap& map, std::uint64_t seed,
+                           float length) {
   Random random(hash_key(seed, Purpose::path));
   std::vector<int> visits(house.rooms.size(), 0);
   std::size_t room = 0;
-  while (house.rooms[room].floor.size().minCoeff() < 2.2f) ++room;  // start in a room, not in the corridor
+  while (house.rooms[room].floor.size().minCoeff() < 2.2f)
+    ++room;  // start in a room, not in the corridor
   Vector2f at = place_in(house.rooms[room], map, random, house.rooms[room].floor.low);
   std::vector<Vector2f> line{at};
   float walked = 0;
@@ -82,18 +92,24 @@ std::vector<Vector2f> tour(const House& house, const WalkMap& map, std::uint64_t
     }
     at = target;
   };
-  // A room that cannot be walked in would keep the tour from growing: it is bounded by its number of legs too.
+  // A room that cannot be walked in would keep the tour from growing: it is bounded by its number
+  // of legs too.
   for (int leg = 0; walked < length && leg < 1000 + static_cast<int>(length); ++leg) {
     ++visits[room];
     const int places = house.rooms[room].floor.size().minCoeff() < 2.2f ? 1 : random.between(2, 4);
     for (int i = 0; i < places; ++i) go_to(place_in(house.rooms[room], map, random, at));
     std::vector<const Doorway*> ways;
     for (const Doorway& door : house.doors) {
-      if (door.room_a == static_cast<int>(room) || door.room_b == static_cast<int>(room)) ways.push_back(&door);
+      if (door.room_a == static_cast<int>(room) || door.room_b == static_cast<int>(room))
+        ways.push_back(&door);
     }
     if (ways.empty()) continue;
-    const auto beyond = [&](const Doorway* door) { return static_cast<std::size_t>(door->room_a == static_cast<int>(room) ? door->room_b : door->room_a); };
-    const Doorway* next = ways[static_cast<std::size_t>(random.below(static_cast<int>(ways.size())))];
+    const auto beyond = [&](const Doorway* door) {
+      return static_cast<std::size_t>(door->room_a == static_cast<int>(room) ? door->room_b
+                                                                             : door->room_a);
+    };
+    const Doorway* next =
+        ways[static_cast<std::size_t>(random.below(static_cast<int>(ways.size())))];
     if (random.chance(0.6f)) {
       for (const Doorway* door : ways) {
         if (visits[beyond(door)] < visits[beyond(next)]) next = door;
@@ -107,8 +123,10 @@ std::vector<Vector2f> tour(const House& house, const WalkMap& map, std::uint64_t
   return line;
 }
 
-/// Of a few directions beside the way, the one where most of the view lies within the sensor's comfortable range.
-float choose_gaze(const RayScene& scene, const Vector2f& at, float heading, std::uint64_t seed, int glance) {
+/// Of a few directions beside the way, the one where most of the view lies within the sensor's
+/// comfortable range.
+float choose_gaze(const RayScene& scene, const Vector2f& at, float heading, std::uint64_t seed,
+                  int glance) {
   Random random(hash_key(seed, Purpose::gaze, static_cast<std::uint64_t>(glance)));
   float best = 0, score = -1e9f;
   for (int k = 0; k < 8; ++k) {
@@ -117,8 +135,12 @@ float choose_gaze(const RayScene& scene, const Vector2f& at, float heading, std:
     for (float side = -30; side <= 30; side += 7.5f) {
       for (float pitch = -36; pitch <= 8; pitch += 11) {
         const float yaw = heading + offset + radians(side), level = std::cos(radians(pitch));
-        const RayHit hit = scene.cast({at.x(), at.y(), kEyeLevel}, {level * std::cos(yaw), level * std::sin(yaw), std::sin(radians(pitch))});
-        if (hit.hit) seen += std::clamp((hit.t - 0.5f) / 1.5f, 0.0f, 1.0f) * std::clamp(4.5f - hit.t, 0.0f, 1.0f);
+        const RayHit hit =
+            scene.cast({at.x(), at.y(), kEyeLevel},
+                       {level * std::cos(yaw), level * std::sin(yaw), std::sin(radians(pitch))});
+        if (hit.hit)
+          seen +=
+              std::clamp((hit.t - 0.5f) / 1.5f, 0.0f, 1.0f) * std::clamp(4.5f - hit.t, 0.0f, 1.0f);
       }
     }
     const float value = seen / 45 - 0.08f * std::abs(offset);
@@ -129,11 +151,14 @@ float choose_gaze(const RayScene& scene, const Vector2f& at, float heading, std:
 
 }  // namespace
 
-std::vector<Eigen::Isometry3d> walk(const House& house, const RayScene& scene, std::uint64_t seed, int frames) {
+std::vector<Eigen::Isometry3d> walk(const House& house, const RayScene& scene, std::uint64_t seed,
+                                    int frames) {
   const WalkMap map(house);
-  // Frames beyond the last one, so that smoothing treats a short walk like the beginning of a long one.
+  // Frames beyond the last one, so that smoothing treats a short walk like the beginning of a long
+  // one.
   const int total = frames + 6 * kTurnFrames + 2 * kGazeFrames;
-  const std::vector<Vector2f> line = smoothed(tour(house, map, seed, kMaximumSpeed * static_cast<float>(total) + 4), 12);
+  const std::vector<Vector2f> line =
+      smoothed(tour(house, map, seed, kMaximumSpeed * static_cast<float>(total) + 4), 12);
   const auto sample = [&](float s) {
     const float u = std::clamp(s / kSpacing, 0.0f, static_cast<float>(line.size() - 2));
     const auto i = static_cast<std::size_t>(u);
@@ -156,24 +181,34 @@ std::vector<Eigen::Isometry3d> walk(const House& house, const RayScene& scene, s
   heading = smoothed(heading, kTurnFrames);
   for (int k = 0; k < total; ++k) {  // a gaze suits the middle of its time
     const auto middle = static_cast<std::size_t>(std::min(k + kGazeFrames / 2, total - 1));
-    offset.push_back(k % kGazeFrames == 0 ? choose_gaze(scene, position[middle], heading[middle], seed, k / kGazeFrames) : offset.back());
+    offset.push_back(k % kGazeFrames == 0 ? choose_gaze(scene, position[middle], heading[middle],
+                                                        seed, k / kGazeFrames)
+                                          : offset.back());
   }
   offset = smoothed(offset, kTurnFrames);
   std::vector<Eigen::Isometry3d> poses;
   for (int k = 0; k < frames; ++k) {
     const auto i = static_cast<std::size_t>(k);
     const float t = static_cast<float>(k);
-    const auto tremble = [&](std::uint64_t channel, float period) { return wander(seed, channel, t / period); };
-    const double yaw = heading[i] + offset[i] + radians(6) * tremble(1, 35) + radians(0.4f) * tremble(2, 5);
-    const double pitch = radians(-15.5f) + radians(9) * tremble(3, 70) + radians(0.4f) * tremble(4, 5);
+    const auto tremble = [&](std::uint64_t channel, float period) {
+      return wander(seed, channel, t / period);
+    };
+    const double yaw =
+        heading[i] + offset[i] + radians(6) * tremble(1, 35) + radians(0.4f) * tremble(2, 5);
+    const double pitch =
+        radians(-15.5f) + radians(9) * tremble(3, 70) + radians(0.4f) * tremble(4, 5);
     const double roll = radians(4) * tremble(5, 60) + radians(0.4f) * tremble(6, 5);
     const double height = kEyeLevel + 0.17 * tremble(7, 130) + 0.012 * std::sin(0.42 * t);
-    Eigen::Matrix3d level;  // columns: the camera's right, down and forward when it looks along world x
+    Eigen::Matrix3d
+        level;  // columns: the camera's right, down and forward when it looks along world x
     level << 0, 0, 1, -1, 0, 0, 0, -1, 0;
     Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
-    pose.linear() = (Eigen::AngleAxisd(yaw, Eigen::Vector3d::UnitZ()) * Eigen::AngleAxisd(-pitch, Eigen::Vector3d::UnitY())).toRotationMatrix() *
+    pose.linear() = (Eigen::AngleAxisd(yaw, Eigen::Vector3d::UnitZ()) *
+                     Eigen::AngleAxisd(-pitch, Eigen::Vector3d::UnitY()))
+                        .toRotationMatrix() *
                     level * Eigen::AngleAxisd(roll, Eigen::Vector3d::UnitZ()).toRotationMatrix();
-    pose.translation() = Eigen::Vector3d(position[i].x() + 0.004 * tremble(8, 6), position[i].y() + 0.004 * tremble(9, 6), height);
+    pose.translation() = Eigen::Vector3d(position[i].x() + 0.004 * tremble(8, 6),
+                                         position[i].y() + 0.004 * tremble(9, 6), height);
     poses.push_back(pose);
   }
   return poses;

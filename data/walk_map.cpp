@@ -62,22 +62,26 @@ WalkMap::WalkMap(const House& house) {
       }
     }
     if (nearest < 0.25f) continue;
-    cost_[static_cast<std::size_t>(cell)] = 1 + 8 * (0.6f - nearest) + (low_furniture[static_cast<std::size_t>(cell)] ? 8.0f : 0.0f);
+    cost_[static_cast<std::size_t>(cell)] =
+        1 + 8 * (0.6f - nearest) + (low_furniture[static_cast<std::size_t>(cell)] ? 8.0f : 0.0f);
   }
 }
 
 int WalkMap::cell_of(const Vector2f& p) const {
-  const int x = static_cast<int>(std::floor((p.x() - origin_.x()) / kCell)), y = static_cast<int>(std::floor((p.y() - origin_.y()) / kCell));
+  const int x = static_cast<int>(std::floor((p.x() - origin_.x()) / kCell)),
+            y = static_cast<int>(std::floor((p.y() - origin_.y()) / kCell));
   return x < 0 || y < 0 || x >= columns_ || y >= rows_ ? -1 : y * columns_ + x;
 }
 
 Vector2f WalkMap::centre(int cell) const {
-  return origin_ + kCell * Vector2f(static_cast<float>(cell % columns_) + 0.5f, static_cast<float>(cell / columns_) + 0.5f);
+  return origin_ + kCell * Vector2f(static_cast<float>(cell % columns_) + 0.5f,
+                                    static_cast<float>(cell / columns_) + 0.5f);
 }
 
 bool WalkMap::free(const Vector2f& p) const {
   const int cell = cell_of(p);
-  return cell >= 0 && cost_[static_cast<std::size_t>(cell)] > 0 && cost_[static_cast<std::size_t>(cell)] < kComfortable;
+  return cell >= 0 && cost_[static_cast<std::size_t>(cell)] > 0 &&
+         cost_[static_cast<std::size_t>(cell)] < kComfortable;
 }
 
 std::vector<Vector2f> WalkMap::path(const Vector2f& from, const Vector2f& to) const {
@@ -112,7 +116,8 @@ std::vector<Vector2f> WalkMap::path(const Vector2f& from, const Vector2f& to) co
   }
   if (goal != start && parent[static_cast<std::size_t>(goal)] < 0) return {};
   std::vector<Vector2f> line;
-  for (int cell = goal; cell >= 0; cell = parent[static_cast<std::size_t>(cell)]) line.push_back(centre(cell));
+  for (int cell = goal; cell >= 0; cell = parent[static_cast<std::size_t>(cell)])
+    line.push_back(centre(cell));
   std::reverse(line.begin(), line.end());
   return line;
 }

@@ -8,7 +8,7 @@ namespace gpureg::synthetic {
 using Eigen::Vector3f;
 
 void picture(MeshBuilder& mesh, Random& random, float x, float z, float width, float height) {
-  const float out = random.uniform(0.015f, 0.04f), rim = random.uniform(0.015f, 0.05f);
+  const float out = random.uniform(0.01f, 0.025f), rim = random.uniform(0.015f, 0.05f);
   mesh.paint(wood(random));
   mesh.box({x - width / 2, 0, z}, {x + width / 2, out, z + rim});
   mesh.box({x - width / 2, 0, z + height - rim}, {x + width / 2, out, z + height});
@@ -33,16 +33,22 @@ void radiator(MeshBuilder& mesh, Random& random, float x, float width) {
   }
   mesh.tube({{x - width / 2, 0.085f, 0.18f}, {x + width / 2, 0.085f, 0.18f}}, 0.018f);
   mesh.tube({{x - width / 2, 0.085f, 0.62f}, {x + width / 2, 0.085f, 0.62f}}, 0.018f);
-  mesh.tube({{x + width / 2, 0.085f, 0.18f}, {x + width / 2 + 0.06f, 0.085f, 0.18f}, {x + width / 2 + 0.06f, 0.085f, 0}}, 0.012f);
-  if (random.chance(0.5f)) mesh.box({x - width / 2 - 0.1f, 0, 0.8f}, {x + width / 2 + 0.1f, 0.2f, 0.83f});
+  mesh.tube({{x + width / 2, 0.085f, 0.18f},
+             {x + width / 2 + 0.06f, 0.085f, 0.18f},
+             {x + width / 2 + 0.06f, 0.085f, 0}},
+            0.012f);
+  if (random.chance(0.5f))
+    mesh.box({x - width / 2 - 0.1f, 0, 0.8f}, {x + width / 2 + 0.1f, 0.2f, 0.83f});
 }
 
 void curtain(MeshBuilder& mesh, Random& random, float x, float width, float top) {
   mesh.paint(fabric(random));
-  const float waves = random.uniform(40, 60), phase = random.uniform(0, 6), bottom = random.uniform(0.03f, 0.2f);
+  const float waves = random.uniform(40, 60), phase = random.uniform(0, 6),
+              bottom = random.uniform(0.03f, 0.2f);
   mesh.sheet(
       [&](float u, float v) -> Vector3f {
-        const float fold = 0.035f * (0.4f + 0.6f * v) * std::sin(waves * width * u + phase + 0.8f * std::sin(3 * v + 5 * u));
+        const float fold = 0.035f * (0.4f + 0.6f * v) *
+                           std::sin(waves * width * u + phase + 0.8f * std::sin(3 * v + 5 * u));
         return {x + width * (u - 0.5f), 0.14f + fold, top + (bottom - top) * v};
       },
       static_cast<int>(60 * width) + 8, 8);
@@ -71,10 +77,12 @@ void coat_rack(MeshBuilder& mesh, Random& random, float x) {
     mesh.tube({{at, 0.02f, 1.7f}, {at, 0.08f, 1.68f}, {at, 0.09f, 1.73f}}, 0.008f);
     if (!random.chance(0.65f)) continue;
     mesh.paint(fabric(random));  // a coat: a folded lathe that hangs from the hook
-    const float length = random.uniform(0.6f, 1.0f), girth = random.uniform(0.08f, 0.13f), folds = static_cast<float>(random.between(3, 6));
+    const float length = random.uniform(0.6f, 1.0f), girth = random.uniform(0.08f, 0.13f),
+                folds = static_cast<float>(random.between(3, 6));
     mesh.sheet(
         [&](float u, float v) -> Vector3f {
-          const float a = 6.2831853f * u, r = girth * (0.35f + 0.65f * std::sqrt(v)) * (1 + 0.18f * std::sin(folds * a));
+          const float a = 6.2831853f * u, r = girth * (0.35f + 0.65f * std::sqrt(v)) *
+                                              (1 + 0.18f * std::sin(folds * a));
           return {at + r * std::cos(a), 0.11f + 0.7f * r * std::sin(a), 1.72f - length * v};
         },
         28, 10);

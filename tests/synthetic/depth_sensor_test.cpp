@@ -12,7 +12,8 @@ using Eigen::Vector3f;
 using synthetic::DepthQuarter;
 using synthetic::SensorOptions;
 
-/// A large plane that the camera at the world's origin, looking along z, meets at this depth; tilt turns it around the y axis.
+/// A large plane that the camera at the world's origin, looking along z, meets at this depth; tilt
+/// turns it around the y axis.
 synthetic::Mesh plane(float depth, float tilt = 0) {
   synthetic::Mesh mesh;
   synthetic::MeshBuilder builder(mesh);
@@ -45,11 +46,14 @@ Statistics errors(const DepthQuarter& image, float truth) {
 Statistics measure(float depth, const SensorOptions& options, float tilt = 0) {
   const synthetic::Mesh mesh = plane(depth, tilt);
   const synthetic::RayScene scene(mesh);
-  return errors(synthetic::DepthSensor(scene, options, 5).capture(Eigen::Isometry3d::Identity(), 0, 0, 0), depth);
+  return errors(
+      synthetic::DepthSensor(scene, options, 5).capture(Eigen::Isometry3d::Identity(), 0, 0, 0),
+      depth);
 }
 
 TEST(DepthSensor, NoiseGrowsWithTheSquareOfTheDepth) {
-  // A frontal plane: noise of 1/6 step plus rounding to a step, so a deviation between 0.15 and 0.7 steps of z^2 / 351.3 m.
+  // A frontal plane: noise of 1/6 step plus rounding to a step, so a deviation between 0.15 and 0.7
+  // steps of z^2 / 351.3 m.
   for (const float depth : {0.8f, 1.5f, 2.2f, 3.1f, 3.8f}) {
     const Statistics s = measure(depth, {});
     const double step = depth * depth / 351.3;
@@ -63,7 +67,8 @@ TEST(DepthSensor, NoiseGrowsWithTheSquareOfTheDepth) {
 TEST(DepthSensor, DepthsAreWholeDisparitySteps) {
   const synthetic::Mesh mesh = plane(2.0f, 0.5f);
   const synthetic::RayScene scene(mesh);
-  for (const float z : synthetic::DepthSensor(scene, {}, 5).capture(Eigen::Isometry3d::Identity(), 0, 0, 0).depth) {
+  for (const float z :
+       synthetic::DepthSensor(scene, {}, 5).capture(Eigen::Isometry3d::Identity(), 0, 0, 0).depth) {
     if (z <= 0) continue;
     ASSERT_NEAR(351.3f / z, std::round(351.3f / z), 1e-3f);
   }
@@ -103,18 +108,21 @@ TEST(DepthSensor, GrazingSurfacesHaveHoles) {
 }
 
 TEST(DepthSensor, ABoxCastsAShadowToItsRight) {
-  // A strip at 1 m before a wall at 3 m, seen from a camera whose projector is 7.5 cm to its left: the strip's shadow on the wall is
-  // f b (1/1 - 1/3) = 26 pixels wide and lies at the strip's right edge.
+  // A strip at 1 m before a wall at 3 m, seen from a camera whose projector is 7.5 cm to its left:
+  // the strip's shadow on the wall is f b (1/1 - 1/3) = 26 pixels wide and lies at the strip's
+  // right edge.
   synthetic::Mesh mesh = plane(3.0f);
   synthetic::MeshBuilder builder(mesh);
   builder.paint({});
   builder.box({-0.1f, -5, 1.0f}, {0.1f, 5, 1.01f});
   const synthetic::RayScene scene(mesh);
-  const DepthQuarter image = synthetic::DepthSensor(scene, {}, 5).capture(Eigen::Isometry3d::Identity(), 0, 0, 0);
+  const DepthQuarter image =
+      synthetic::DepthSensor(scene, {}, 5).capture(Eigen::Isometry3d::Identity(), 0, 0, 0);
   const auto valid = [&](int from, int to) {
     int count = 0;
     for (int row = 0; row < DepthQuarter::kHeight; ++row) {
-      for (int column = from; column < to; ++column) count += image.depth[static_cast<std::size_t>(row * DepthQuarter::kWidth + column)] > 0;
+      for (int column = from; column < to; ++column)
+        count += image.depth[static_cast<std::size_t>(row * DepthQuarter::kWidth + column)] > 0;
     }
     return static_cast<double>(count) / ((to - from) * DepthQuarter::kHeight);
   };

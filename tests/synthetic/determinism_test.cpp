@@ -27,7 +27,8 @@ TEST(Determinism, SameBytesOnAnyNumberOfThreads) {
 
 TEST(Determinism, SeedsDifferInEveryCloud) {
   const auto a = files_of(small_scene(1)), b = files_of(small_scene(2));
-  for (const char* name : {"cloud_bin_0.ply", "cloud_bin_1.ply", "cloud_bin_2.ply", "poses.txt", "cameras.txt"}) {
+  for (const char* name :
+       {"cloud_bin_0.ply", "cloud_bin_1.ply", "cloud_bin_2.ply", "poses.txt", "cameras.txt"}) {
     EXPECT_NE(a.at(name), b.at(name)) << name;
   }
 }
@@ -47,7 +48,8 @@ TEST(Determinism, LongScenesBeginWithShortOnes) {
   const auto three = files_of(options);
   options.fragments = 5;
   const auto five = files_of(options);
-  for (const char* name : {"cloud_bin_0.ply", "cloud_bin_1.ply", "cloud_bin_2.ply"}) EXPECT_EQ(three.at(name), five.at(name)) << name;
+  for (const char* name : {"cloud_bin_0.ply", "cloud_bin_1.ply", "cloud_bin_2.ply"})
+    EXPECT_EQ(three.at(name), five.at(name)) << name;
 }
 
 }  // namespace

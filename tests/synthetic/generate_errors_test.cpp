@@ -27,15 +27,24 @@ TEST(GenerateErrors, OptionsOutOfRange) {
   expect_invalid([](GenerateOptions& o) { o.fragments = 0; }, "fragments is 0");
   expect_invalid([](GenerateOptions& o) { o.fragments = 10001; }, "fragments is 10001");
   expect_invalid([](GenerateOptions& o) { o.frames_per_fragment = 0; }, "frames_per_fragment is 0");
-  expect_invalid([](GenerateOptions& o) { o.frames_per_fragment = 1001; }, "frames_per_fragment is 1001");
+  expect_invalid([](GenerateOptions& o) { o.frames_per_fragment = 1001; },
+                 "frames_per_fragment is 1001");
   expect_invalid([](GenerateOptions& o) { o.threads = -1; }, "threads is -1");
-  expect_invalid([](GenerateOptions& o) { o.sensor.min_depth = std::numeric_limits<double>::quiet_NaN(); }, "sensor.min_depth");
+  expect_invalid(
+      [](GenerateOptions& o) { o.sensor.min_depth = std::numeric_limits<double>::quiet_NaN(); },
+      "sensor.min_depth");
   expect_invalid([](GenerateOptions& o) { o.sensor.max_depth = 0.3; }, "sensor.max_depth");
   expect_invalid([](GenerateOptions& o) { o.sensor.pixel_shift = -1; }, "sensor.pixel_shift");
-  expect_invalid([](GenerateOptions& o) { o.sensor.disparity_noise = std::numeric_limits<double>::infinity(); }, "sensor.disparity_noise");
+  expect_invalid(
+      [](GenerateOptions& o) {
+        o.sensor.disparity_noise = std::numeric_limits<double>::infinity();
+      },
+      "sensor.disparity_noise");
   expect_invalid([](GenerateOptions& o) { o.sensor.distortion = 0.5; }, "sensor.distortion");
-  expect_invalid([](GenerateOptions& o) { o.sensor.odometry_translation = -1; }, "sensor.odometry_translation");
-  expect_invalid([](GenerateOptions& o) { o.sensor.odometry_rotation_degrees = 11; }, "sensor.odometry_rotation_degrees");
+  expect_invalid([](GenerateOptions& o) { o.sensor.odometry_translation = -1; },
+                 "sensor.odometry_translation");
+  expect_invalid([](GenerateOptions& o) { o.sensor.odometry_rotation_degrees = 11; },
+                 "sensor.odometry_rotation_degrees");
 }
 
 TEST(GenerateErrors, FolderThatCannotBe) {

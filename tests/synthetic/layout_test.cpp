@@ -25,19 +25,22 @@ TEST_F(Layout, HasEveryFileAndNothingElse) {
   std::string names;
   for (const auto& [name, bytes] : all_files(folder().path())) names += name + " ";
   EXPECT_EQ(names,
-            "cameras.txt cloud_bin_0.ply cloud_bin_1.ply cloud_bin_2.ply gt.info gt.log gt_all.info gt_all.log gt_overlap.txt poses.txt ");
+            "cameras.txt cloud_bin_0.ply cloud_bin_1.ply cloud_bin_2.ply gt.info gt.log "
+            "gt_all.info gt_all.log gt_overlap.txt poses.txt ");
 }
 
 TEST_F(Layout, CloudsAreBinaryPlyInFrontOfTheFirstCamera) {
   for (int i = 0; i < 3; ++i) {
     const std::string path = folder() / ("cloud_bin_" + std::to_string(i) + ".ply");
-    EXPECT_EQ(content_of(path).rfind("ply\nformat binary_little_endian 1.0\nelement vertex ", 0), 0u);
+    EXPECT_EQ(content_of(path).rfind("ply\nformat binary_little_endian 1.0\nelement vertex ", 0),
+              0u);
     const auto points = read_cloud(path);
     EXPECT_GT(points.size(), 3000u);
     EXPECT_LT(points.size(), 200000u);
     for (const Eigen::Vector3f& p : points) {
       ASSERT_TRUE(p.allFinite());
-      ASSERT_LT(p.norm(), 5.5f);  // 4 m of depth along rays of up to 38 degrees, and a few frames of motion
+      ASSERT_LT(p.norm(),
+                5.5f);  // 4 m of depth along rays of up to 38 degrees, and a few frames of motion
       ASSERT_GT(p.z(), 0.2f);
     }
   }
@@ -47,7 +50,8 @@ TEST_F(Layout, PosesStandUprightInTheHouse) {
   const auto poses = read_poses(folder() / "poses.txt");
   ASSERT_EQ(poses.size(), 3u);
   for (const auto& pose : poses) {
-    EXPECT_NEAR((pose.linear() * pose.linear().transpose() - Eigen::Matrix3d::Identity()).norm(), 0, 1e-8);  // 10 decimals
+    EXPECT_NEAR((pose.linear() * pose.linear().transpose() - Eigen::Matrix3d::Identity()).norm(), 0,
+                1e-8);  // 10 decimals
     EXPECT_GT(pose.translation().z(), 1.2);
     EXPECT_LT(pose.translation().z(), 1.75);
     EXPECT_LT(pose.linear()(2, 1), -0.8) << "the camera's y axis points down";

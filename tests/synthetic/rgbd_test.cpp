@@ -25,7 +25,8 @@ Png read_png(const std::string& path) {
   png_infop info = png_create_info_struct(png);
   png_init_io(png, file);
   png_read_info(png, info);
-  png_get_IHDR(png, info, &result.width, &result.height, &result.bits, &result.colour, nullptr, nullptr, nullptr);
+  png_get_IHDR(png, info, &result.width, &result.height, &result.bits, &result.colour, nullptr,
+               nullptr, nullptr);
   for (png_uint_32 y = 0; y < result.height; ++y) {
     result.rows.emplace_back(png_get_rowbytes(png, info));
     png_read_row(png, result.rows.back().data(), nullptr);
@@ -89,15 +90,18 @@ TEST(Rgbd, SequenceInTumLayout) {
   EXPECT_LT((first.translation() - t).norm(), 1e-5);
   EXPECT_LT((first.linear() - q.normalized().toRotationMatrix()).norm(), 1e-5);
 
-  // The depth image, moved by its pose, lies on the fragment: the two outputs tell of the same room.
+  // The depth image, moved by its pose, lies on the fragment: the two outputs tell of the same
+  // room.
   const auto cloud = read_cloud(folder / "cloud_bin_0.ply");
   const Png distance = read_png(folder / "depth/0.000000.png");
   int near = 0, tried = 0;
   for (std::size_t y = 5; y < 480; y += 24) {
     for (std::size_t x = 5; x < 640; x += 24) {
-      const float z = static_cast<float>(distance.rows[y][2 * x] * 256 + distance.rows[y][2 * x + 1]) / 5000.0f;
+      const float z =
+          static_cast<float>(distance.rows[y][2 * x] * 256 + distance.rows[y][2 * x + 1]) / 5000.0f;
       if (z == 0) continue;
-      const Eigen::Vector3f p = z * synthetic::camera::ray(static_cast<float>(x), static_cast<float>(y));
+      const Eigen::Vector3f p =
+          z * synthetic::camera::ray(static_cast<float>(x), static_cast<float>(y));
       float best = 1e9f;
       for (const Eigen::Vector3f& c : cloud) best = std::min(best, (c - p).squaredNorm());
       near += best < 0.05f * 0.05f ? 1 : 0;

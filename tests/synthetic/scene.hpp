@@ -32,7 +32,8 @@ inline std::vector<Eigen::Vector3f> read_cloud(const std::string& path) {
   const std::size_t count = std::stoul(bytes.substr(bytes.find("vertex ") + 7));
   if (bytes.size() != body + 12 * count) throw std::runtime_error(path + ": wrong size");
   std::vector<Eigen::Vector3f> points(count);
-  std::memcpy(static_cast<void*>(points.data()), bytes.data() + body, 12 * count);  // tests run on little-endian machines
+  std::memcpy(static_cast<void*>(points.data()), bytes.data() + body,
+              12 * count);  // tests run on little-endian machines
   return points;
 }
 
@@ -42,7 +43,8 @@ inline std::vector<Eigen::Isometry3d> read_poses(const std::string& path) {
   for (std::size_t number; file >> number;) {
     Eigen::Isometry3d pose;
     for (int k = 0; k < 16; ++k) file >> pose.matrix()(k / 4, k % 4);
-    if (number != poses.size() || !file) throw std::runtime_error(path + ": wrong order or truncated");
+    if (number != poses.size() || !file)
+      throw std::runtime_error(path + ": wrong order or truncated");
     poses.push_back(pose);
   }
   return poses;
@@ -53,7 +55,8 @@ inline std::map<std::string, std::string> all_files(const std::string& folder) {
   std::map<std::string, std::string> files;
   for (const auto& entry : std::filesystem::recursive_directory_iterator(folder)) {
     if (!entry.is_regular_file()) continue;
-    files[std::filesystem::relative(entry.path(), folder).string()] = content_of(entry.path().string());
+    files[std::filesystem::relative(entry.path(), folder).string()] =
+        content_of(entry.path().string());
   }
   return files;
 }

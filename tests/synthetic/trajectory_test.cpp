@@ -18,13 +18,15 @@ TEST(Trajectory, IsSmoothAndStaysInTheHouse) {
       const Eigen::Vector2f p = poses[k].translation().head<2>().cast<float>();
       bool inside = false;
       for (const synthetic::Room& room : house.rooms) {
-        inside = inside || ((p.array() > room.floor.low.array() - 0.15f).all() && (p.array() < room.floor.high.array() + 0.15f).all());
+        inside = inside || ((p.array() > room.floor.low.array() - 0.15f).all() &&
+                            (p.array() < room.floor.high.array() + 0.15f).all());
       }
       ASSERT_TRUE(inside) << "seed " << seed << " frame " << k;
       if (k == 0) continue;
       const Eigen::Isometry3d motion = poses[k - 1].inverse() * poses[k];
       ASSERT_LT(motion.translation().norm(), 0.04) << "seed " << seed << " frame " << k;  // 1.2 m/s
-      ASSERT_LT(Eigen::AngleAxisd(motion.rotation()).angle(), 0.12) << "seed " << seed << " frame " << k;
+      ASSERT_LT(Eigen::AngleAxisd(motion.rotation()).angle(), 0.12)
+          << "seed " << seed << " frame " << k;
     }
   }
 }
@@ -39,9 +41,12 @@ TEST(Trajectory, ComesBackToOtherRoomsAndPlaces) {
     const Eigen::Vector3d p = poses[k].translation();
     for (std::size_t r = 0; r < house.rooms.size(); ++r) {
       const synthetic::Rect& floor = house.rooms[r].floor;
-      if (p.x() > floor.low.x() && p.x() < floor.high.x() && p.y() > floor.low.y() && p.y() < floor.high.y()) seen[r] = true;
+      if (p.x() > floor.low.x() && p.x() < floor.high.x() && p.y() > floor.low.y() &&
+          p.y() < floor.high.y())
+        seen[r] = true;
     }
-    for (std::size_t j = 0; j + 300 < k; j += 50) returns += (poses[j].translation() - p).norm() < 0.7 ? 1 : 0;
+    for (std::size_t j = 0; j + 300 < k; j += 50)
+      returns += (poses[j].translation() - p).norm() < 0.7 ? 1 : 0;
   }
   EXPECT_GE(std::count(seen.begin(), seen.end(), true), 3);
   EXPECT_GT(returns, 5);
@@ -50,7 +55,8 @@ TEST(Trajectory, ComesBackToOtherRoomsAndPlaces) {
 TEST(Trajectory, ShortWalksBeginLongOnes) {
   const synthetic::House house = synthetic::build_house(2);
   const synthetic::RayScene scene(house.mesh);
-  const auto few = synthetic::walk(house, scene, 2, 40), many = synthetic::walk(house, scene, 2, 900);
+  const auto few = synthetic::walk(house, scene, 2, 40),
+             many = synthetic::walk(house, scene, 2, 900);
   for (std::size_t k = 0; k < few.size(); ++k) ASSERT_EQ(few[k].matrix(), many[k].matrix()) << k;
 }
 
