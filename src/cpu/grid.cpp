@@ -26,16 +26,17 @@ GridView Grid::view() const {
 
 namespace {
 
-/// Neighbourhoods of tens of thousands of points make features meaningless and take hours: better an error at once.
+/// Cells are half a radius wide, so a thousand points in one mean many thousands within the radius: such neighbourhoods make features
+/// meaningless and take hours. Better an error at once.
 void check_density(const Grid& grid, const PrepareOptions& options) {
   double squares = 0;
   for (std::size_t k = 0; k + 1 < grid.cell_start.size(); ++k) {
     const double n = grid.cell_start[k + 1] - grid.cell_start[k];
     squares += n * n;
   }
-  const double neighbors = grid.points.empty() ? 0 : squares / static_cast<double>(grid.points.size());
-  if (neighbors > 20000)
-    throw InvalidArgument("about " + std::to_string(static_cast<long>(neighbors)) + " or more points lie within feature_radius " +
+  const double per_cell = grid.points.empty() ? 0 : squares / static_cast<double>(grid.points.size());
+  if (per_cell > 1000)
+    throw InvalidArgument("on average more than " + std::to_string(static_cast<long>(per_cell)) + " points lie within feature_radius " +
                           std::to_string(options.feature_radius) + " of each other: use a larger voxel_size or a smaller radius");
 }
 

@@ -1,0 +1,91 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cstring>
+
+#include "gpureg/registration.hpp"
+#include "support/scan.hpp"
+
+namespace gpureg {
+namespace {
+
+/// Everything but the timings, as bytes.
+std::vector<char> bytes(const RegistrationResult& r) {
+  std::vector<char> out;
+  const auto add = [&](const void* data, std::size_t size) { out.insert(out.end(), static_cast<const char*>(data), static_cast<const char*>(data) + size); };
+  add(r.target_from_source.matrix().data(), 16 * sizeof(double));
+  add(&r.status, sizeof r.status), add(&r.reason, sizeof r.reason);
+  add(&r.score, sizeof r.score), add(&r.inlier_rmse, sizeof r.inlier_rmse);
+  const RegistrationStatistics& s = r.statistics;
+  for (const std::uint64_t v : {std::uint64_t(s.source_points), std::uint64_t(s.target_points), std::uint64_t(s.correspondences), s.hypotheses, s.survivors,
+                                s.scored, std::uint64_t(s.points_scored), std::uint64_t(s.consensus), std::uint64_t(s.inliers), std::uint64_t(s.refine_iterations)})
+    add(&v, sizeof v);
+  const auto redwood = r.source_moments.information_redwood(), open3d = r.target_moments.information_open3d();
+  add(redwood.data(), 36 * sizeof(double)), add(open3d.data(), 36 * sizeof(double));
+  return out;
+}
+
+class Determinism : public ::testing::Test {
+ protected:
+  Determinism() : options(RegistrationOptions::from_voxel_size(0.12f)) {
+    options.hypothesis.count = 2000;
+    options.hypothesis.seed = 42;
+    std::mt19937 random(1);
+    for (int k = 0; k < 4; ++k) scans.push_back(test::moved(test::random_pose(random), test::scan_room(random)));
+    scans.push_back({});  // an empty cloud among the others
+    for (const auto& s : scans) views.emplace_back(s);
+    for (std::uint32_t i = 0; i < 5; ++i)
+      for (std::uint32_t j = i + 1; j < 5; ++j) pairs.push_back({j, i});
+  }
+  std::vector<std::vector<char>> run(const Context& context, const std::vector<Pair>& list) {
+    std::vector<std::vector<char>> out;
+    for (const RegistrationResult& r : align_batch(context, prepare_batch(context, views, options.prepare), list, options)) out.push_back(bytes(r));
+    return out;
+  }
+  RegistrationOptions options;
+  std::vector<std::vector<Eigen::Vector3f>> scans;
+  std::vector<PointCloudView> views;
+  std::vector<Pair> pairs;
+};
+
+TEST_F(Determinism, SameBytesOnOneTwoAndSevenThreads) {
+  const auto one = run(Context::cpu(1), pairs);
+  EXPECT_EQ(run(Context::cpu(2), pairs), one);
+  EXPECT_EQ(run(Context::cpu(7), pairs), one);
+}
+
+TEST_F(Determinism, SameBytesInAnyOrderAndAnySplit) {
+  const Context context = Context::cpu(2);
+  const auto expected = run(context, pairs);
+  std::vector<Pair> reversed(pairs.rbegin(), pairs.rend());
+  auto backwards = run(context, reversed);
+  std::reverse(backwards.begin(), backwards.end());
+  EXPECT_EQ(backwards, expected);
+  for (std::size_t k = 0; k < pairs.size(); ++k) {
+    // A batch of one, and the single call on clouds that were prepared alone.
+    EXPECT_EQ(run(context, {pairs[k]})[0], expected[k]);
+    const PreparedCloud a = prepare(context, views[pairs[k].source], options.prepare), b = prepare(context, views[pairs[k].target], options.prepare);
+    EXPECT_EQ(bytes(align(context, a, b, options)), expected[k]);
+    EXPECT_EQ(bytes(align(context, views[pairs[k].source], views[pairs[k].target], options)), expected[k]);
+  }
+}
+
+TEST_F(Determinism, PreparedCloudsAreTheSameAloneAndInABatch) {
+  const std::vector<PreparedCloud> batch = prepare_batch(Context::cpu(7), views, options.prepare);
+  for (std::size_t k = 0; k < views.size(); ++k) {
+    const PreparedCloud alone = prepare(Context::cpu(1), views[k], options.prepare);
+    EXPECT_EQ(alone.points(), batch[k].points());
+    EXPECT_EQ(alone.normals(), batch[k].normals());
+    EXPECT_EQ(alone.features(), batch[k].features());
+  }
+}
+
+TEST_F(Determinism, AnotherSeedDrawsOtherHypotheses) {
+  const auto first = run(Context::cpu(2), {pairs[0]});
+  options.hypothesis.seed = 43;
+  EXPECT_NE(run(Context::cpu(2), {pairs[0]}), first);
+}
+
+}  // namespace
+}  // namespace gpureg

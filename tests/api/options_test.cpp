@@ -1,0 +1,81 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "gpureg/options.hpp"
+
+#include <gtest/gtest.h>
+
+#include <limits>
+
+#include "gpureg/error.hpp"
+#include "support/expect_error.hpp"
+
+namespace gpureg {
+namespace {
+
+const float kNan = std::numeric_limits<float>::quiet_NaN();
+const float kInf = std::numeric_limits<float>::infinity();
+
+template <typename Change>
+void expect_refused(Change&& change, const std::string& field) {
+  RegistrationOptions options;
+  change(options);
+  test::expect_error<InvalidArgument>([&] { options.validate(); }, {field});
+}
+
+TEST(Options, PaperNumbers) {
+  const RegistrationOptions o = RegistrationOptions::loopsmart();
+  EXPECT_FLOAT_EQ(o.prepare.voxel_size, 0.05f);
+  EXPECT_FLOAT_EQ(o.prepare.normal_radius, 0.1f);
+  EXPECT_FLOAT_EQ(o.prepare.feature_radius, 0.25f);
+  EXPECT_EQ(o.hypothesis.count, 4'000'000u);
+  EXPECT_FLOAT_EQ(o.hypothesis.edge_similarity, 0.9f);
+  EXPECT_FLOAT_EQ(o.score.max_correspondence_distance, 0.075f);
+  EXPECT_LT(o.score.max_normal_angle, 180);
+  EXPECT_EQ(o.refine.max_iterations, 0u);
+  EXPECT_NO_THROW(o.validate());
+}
+
+TEST(Options, EverythingScalesWithTheVoxel) {
+  for (const float v : {0.001f, 0.05f, 0.3f, 2.0f}) {
+    const RegistrationOptions o = RegistrationOptions::from_voxel_size(v);
+    EXPECT_NO_THROW(o.validate());
+    EXPECT_FLOAT_EQ(o.prepare.feature_radius / v, 5);
+    EXPECT_FLOAT_EQ(o.score.max_correspondence_distance / v, 1.5f);
+    EXPECT_GT(o.refine.max_iterations, 0u);
+  }
+}
+
+TEST(Options, VoxelSizeMustBeALength) {
+  for (const float v : {0.0f, -1.0f, kNan, kInf, 1e30f, 1e-30f})
+    test::expect_error<InvalidArgument>([&] { RegistrationOptions::from_voxel_size(v); }, {"voxel_size"});
+}
+
+TEST(Options, EachFieldIsNamed) {
+  for (const float bad : {kNan, kInf, -0.1f, 0.0f, 1e9f}) {
+    expect_refused([&](auto& o) { o.prepare.normal_radius = bad; }, "prepare.normal_radius");
+    expect_refused([&](auto& o) { o.prepare.feature_radius = bad; }, "prepare.feature_radius");
+    expect_refused([&](auto& o) { o.prepare.search_distance = bad; }, "prepare.search_distance");
+    expect_refused([&](auto& o) { o.score.max_correspondence_distance = bad; }, "score.max_correspondence_distance");
+    expect_refused([&](auto& o) { o.score.max_normal_angle = bad; }, "score.max_normal_angle");
+    expect_refused([&](auto& o) { o.score.max_judged_normal_angle = bad; }, "score.max_judged_normal_angle");
+    expect_refused([&](auto& o) { o.refine.kernel_width = bad; }, "refine.kernel_width");
+    expect_refused([&](auto& o) { o.refine.max_correspondence_distance = bad; }, "refine.max_correspondence_distance");
+    expect_refused([&](auto& o) { o.hypothesis.edge_similarity = bad; }, "hypothesis.edge_similarity");
+  }
+  for (const float bad : {kNan, -0.1f, 1.1f}) expect_refused([&](auto& o) { o.score.min_inlier_ratio = bad; }, "score.min_inlier_ratio");
+  expect_refused([](auto& o) { o.prepare.voxel_size = kNan; }, "prepare.voxel_size");
+  expect_refused([](auto& o) { o.prepare.voxel_size = 1e-5f; }, "prepare.feature_radius");
+  expect_refused([](auto& o) { o.hypothesis.count = 0; }, "hypothesis.count");
+  expect_refused([](auto& o) { o.hypothesis.neighbors = 0; }, "hypothesis.neighbors");
+  expect_refused([](auto& o) { o.hypothesis.neighbors = 17; }, "hypothesis.neighbors");
+  expect_refused([](auto& o) { o.refine.max_iterations = 5000; }, "refine.max_iterations");
+  expect_refused([](auto& o) { o.score.max_correspondence_distance = 0.5f; }, "score.max_correspondence_distance");
+}
+
+TEST(Options, MessageHoldsTheValue) {
+  RegistrationOptions o;
+  o.hypothesis.edge_similarity = 1.5f;
+  test::expect_error<InvalidArgument>([&] { o.validate(); }, {"hypothesis.edge_similarity", "1.5"});
+}
+
+}  // namespace
+}  // namespace gpureg
