@@ -9,16 +9,20 @@
 /// Redwood's pairwise files and protocol (component `evaluation`; standard library and Eigen only).
 namespace gpureg::evaluation {
 
+/// Matrices without alignment, so that these structures have one layout whatever processor a program is compiled for.
+using UnalignedMatrix4d = Eigen::Matrix<double, 4, 4, Eigen::DontAlign>;
+using UnalignedMatrix6d = Eigen::Matrix<double, 6, 6, Eigen::DontAlign>;
+
 /// One block of a Redwood .log: target_from_source = T_ij maps points of fragment j (source) into fragment i (target).
 struct LogEntry {
   int i = 0, j = 0, count = 0;  ///< count: number of fragments of the scene, as in the file's third number
-  Eigen::Matrix4d transform = Eigen::Matrix4d::Identity();
+  UnalignedMatrix4d transform = UnalignedMatrix4d::Identity();
 };
 
 /// One block of a Redwood .info: translation first, quaternion vector with factor 2.
 struct InformationEntry {
   int i = 0, j = 0, count = 0;
-  Eigen::Matrix<double, 6, 6> information = Eigen::Matrix<double, 6, 6>::Zero();
+  UnalignedMatrix6d information = UnalignedMatrix6d::Zero();
 };
 
 /// Read or write. Throw IoError naming file, line and reason; a transform must be a rotation and a translation, every number finite.
@@ -36,7 +40,7 @@ void write_file_atomically(const std::string& path, const std::string& content);
 /// A report of one pair, ranked by score.
 struct Report {
   int i = 0, j = 0;
-  Eigen::Matrix4d transform = Eigen::Matrix4d::Identity();
+  UnalignedMatrix4d transform = UnalignedMatrix4d::Identity();
   double score = 1;
   bool reported = true;  ///< false: tried, but below the caller's threshold (counts in curves and in raw recall only)
 };

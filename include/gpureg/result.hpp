@@ -9,6 +9,10 @@
 
 namespace gpureg {
 
+/// Eigen::Isometry3d without alignment: Eigen aligns by the processor that a file is compiled for, so with it a program built with
+/// -march=native would see another layout of results than the library does.
+using UnalignedIsometry3d = Eigen::Transform<double, 3, Eigen::Isometry, Eigen::DontAlign>;
+
 /// Moments of the points that take part in correspondences: what both information-matrix conventions are made of.
 struct CorrespondenceMoments {
   std::uint64_t count = 0;
@@ -23,12 +27,10 @@ struct CorrespondenceMoments {
 
 /// Result of one pair. A plain value.
 struct RegistrationResult {
-  EIGEN_MAKE_ALIGNED_OPERATOR_NEW
-
   RegistrationStatus status = RegistrationStatus::skipped;
   RegistrationReason reason = RegistrationReason::cancelled;
   bool has_candidate = false;  ///< target_from_source holds a pose, reported or not
-  Eigen::Isometry3d target_from_source = Eigen::Isometry3d::Identity();
+  UnalignedIsometry3d target_from_source = UnalignedIsometry3d::Identity();  ///< converts to Eigen::Isometry3d
   double score = 0;            ///< what ranks results: today the inlier ratio
   double inlier_ratio = 0;     ///< inliers (judged) / points scored, [0, 1]
   double inlier_rmse = 0;      ///< metres, over the inliers
