@@ -307,7 +307,7 @@ void furnish(House& house, std::uint64_t seed) {
     const bool corridor = room.floor.size().minCoeff() < 2.2f;
     const int kind = corridor ? 4 : (first + static_cast<int>(i)) % 4;
     // Some rooms are nearly bare: walls and floor are all that registration has there.
-    const float fullness = random.uniform(0.3f, 0.8f);
+    const float fullness = random.uniform(0.4f, 0.95f);
     if (!corridor && random.chance(0.4f)) filler.rug();
     if (kind == 2 || (kind == 0 && random.chance(0.4f)) || (kind == 3 && random.chance(0.3f))) {
       const bool round = random.chance(0.3f);
