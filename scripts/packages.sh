@@ -1,0 +1,43 @@
+# SPDX-License-Identifier: BSD-3-Clause
+# Sourced by the other scripts: say, run_as_root, install_packages.
+
+say() { printf '\n== %s\n' "$*"; }
+
+run_as_root() {
+  if [ "$(id -u)" -eq 0 ]; then
+    "$@"
+  elif command -v sudo > /dev/null; then
+    sudo "$@"
+  else
+    echo "error: '$*' needs root: run as root or install sudo" >&2
+    exit 2
+  fi
+}
+
+# Installs the Debian or Ubuntu packages that are missing; silent where there is nothing to do.
+install_packages() {
+  if ! command -v dpkg-query > /dev/null; then
+    echo "note: this is no Debian or Ubuntu; these packages must be there already: $*" >&2
+    return 0
+  fi
+  local missing=() package
+  for package in "$@"; do
+    dpkg-query -W -f='${Status}' "$package" 2> /dev/null | grep -q 'ok installed' || missing+=("$package")
+  done
+  [ "${#missing[@]}" -eq 0 ] && return 0
+  say "installing ${missing[*]}"
+  run_as_root apt-get update -qq
+  run_as_root env DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends "${missing[@]}" > /dev/null
+}
+
+# What the library, its io component and the command are built with.
+build_packages=(build-essential cmake ninja-build libeigen3-dev libpcl-dev libembree-dev libcli11-dev nlohmann-json3-dev libpng-dev)
+# What the tests and benchmarks need besides.
+test_packages=(libgtest-dev libbenchmark-dev libflann-dev liblz4-dev ccache python3)
+
+# Configure arguments that make rebuilds cheap where ccache is installed.
+launcher_arguments() {
+  if command -v ccache > /dev/null; then
+    echo "-DCMAKE_CXX_COMPILER_LAUNCHER=ccache -DCMAKE_CUDA_COMPILER_LAUNCHER=ccache"
+  fi
+}
