@@ -8,3 +8,11 @@ function(pcl_libraries out)
   endforeach()
   set(${out} ${_libraries} PARENT_SCOPE)
 endfunction()
+
+# adapt_to_pcl(target): under AddressSanitizer Eigen's headers switch to an allocator of their own, which PCL's ready-made libraries do
+# not know, although both sides free what the other one has allocated.
+function(adapt_to_pcl target)
+  if(GPUREG_SANITIZE MATCHES "address")
+    target_compile_definitions(${target} PRIVATE EIGEN_MALLOC_ALREADY_ALIGNED=1)
+  endif()
+endfunction()
