@@ -1,0 +1,251 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <sys/stat.h>
+
+#include <chrono>
+#include <filesystem>
+#include <iostream>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "command.hpp"
+#include "gpureg/evaluation.hpp"
+#include "gpureg/io.hpp"
+#include "interrupt.hpp"
+#include "journal.hpp"
+#include "json_file.hpp"
+#include "method_options.hpp"
+#include "options_json.hpp"
+#include "progress.hpp"
+#include "result_json.hpp"
+#include "scene.hpp"
+#include "text.hpp"
+
+namespace gpureg::cli {
+namespace {
+
+struct BatchOptions {
+  std::string folder, pairs = "all";
+  MethodOptions method;
+  std::optional<float> min_score;
+  std::string log, info, json;
+  bool resume = false, quiet = false;
+
+  RegistrationOptions registration() const {
+    RegistrationOptions options = method.registration();
+    if (min_score) options.score.min_inlier_ratio = *min_score;
+    options.validate();
+    return options;
+  }
+};
+
+// Found out now, not after hours of work.
+void check_output(const std::string& path) {
+  if (path.empty()) return;
+  namespace fs = std::filesystem;
+  if (fs::is_directory(path)) throw IoError("cannot write " + path + ": it is a folder");
+  const fs::path folder = fs::path(path).parent_path();
+  if (!folder.empty() && !fs::is_directory(folder))
+    throw IoError("cannot write " + path + ": there is no folder " + folder.string());
+}
+
+void check_outputs(const BatchOptions& o) {
+  for (const std::string* path : {&o.log, &o.info, &o.json}) check_output(*path);
+  if (o.log == o.info || o.log == o.json || (!o.info.empty() && o.info == o.json))
+    throw InvalidArgument("-o, --info and --json must name different files");
+}
+
+// A device or pipe (/dev/stdout, say) has no place beside it.
+bool can_have_journal(const std::string& path) {
+  struct stat status {};
+  return ::stat(path.c_str(), &status) != 0 || S_ISREG(status.st_mode);
+}
+
+using Pairs = std::vector<std::pair<std::uint32_t, std::uint32_t>>;  // indices i < j into the scene
+
+// Backend and threads may change between runs: they do not change results.
+Json header_of(const BatchOptions& o, const Scene& scene, const Pairs& pairs) {
+  std::uint64_t hash = pairs.size();
+  for (const auto& [i, j] : pairs)
+    hash = (hash ^ (static_cast<std::uint64_t>(i) << 32 | j)) * 0x9E3779B97F4A7C15ull;
+  Json fragments = Json::array();
+  for (std::size_t k = 0; k < scene.numbers.size(); ++k)
+    fragments.push_back({{"number", scene.numbers[k]}, {"hash", scene.hashes[k]}});
+  return {{"gpureg_journal", 1},
+          {"version", GPUREG_VERSION},
+          {"options", to_json(o.registration())},
+          {"pairs", {{"count", pairs.size()}, {"hash", hash}}},
+          {"fragments", fragments}};
+}
+
+/// One run, from the folder to the files.
+class Batch {
+ public:
+  explicit Batch(const BatchOptions& o)
+      : o_(o), options_(o.registration()), context_(o.method.context()) {}
+
+  int run() {
+    check_outputs(o_);
+    if (o_.resume && !can_have_journal(o_.log))
+      throw InvalidArgument("--resume needs a file for -o, but " + o_.log + " is none");
+    const InterruptGuard guard;
+    scene_ = prepare_scene(context_, o_.folder, options_.prepare, o_.quiet);
+    if (scene_.interrupted) {
+      std::cerr << "gpureg: interrupted before the first pair, nothing written" << std::endl;
+      return kInterrupted;
+    }
+    pairs_ = choose_pairs(scene_, o_.pairs);
+    if (pairs_.empty())
+      throw InvalidArgument(o_.pairs == "all" ? o_.folder + " holds one fragment; a batch needs two"
+                                              : o_.pairs + " lists no pair");
+    open_journal();
+    align_all();
+    write_outputs();
+    if (done_.size() < pairs_.size()) return say_interrupted();
+    if (journal_) journal_->remove();
+    return summarise();
+  }
+
+ private:
+  void open_journal() {
+    if (!can_have_journal(o_.log)) return;
+    const std::string path = o_.log + ".journal";
+    journal_.emplace(path, header_of(o_, scene_, pairs_), o_.resume);
+    if (journal_->discarded() && !o_.quiet)
+      std::cerr << "gpureg: starting anew, " << path << " of an unfinished run is discarded"
+                << std::endl;
+    done_ = journal_->entries();
+    resumed_ = done_.size();
+    if (o_.resume && !o_.quiet)
+      std::cerr << "gpureg: " << resumed_ << " of " << pairs_.size() << " pairs are done already"
+                << std::endl;
+  }
+
+  void align_all() {
+    std::vector<Pair> left;
+    for (const auto& [i, j] : pairs_)
+      if (done_.count({scene_.numbers[i], scene_.numbers[j]}) == 0) left.push_back({j, i});
+    Progress progress("aligning", "pairs", pairs_.size(), o_.quiet, done_.size());
+    BatchCallbacks callbacks;
+    callbacks.on_result = [&](std::size_t k, const RegistrationResult& result) {
+      const int i = scene_.numbers[left[k].target], j = scene_.numbers[left[k].source];
+      const PairRecord record = PairRecord::from_result(i, j, result);
+      const Json information = to_json(result.source_moments.information_redwood());
+      if (journal_) journal_->add(record, information);
+      done_.emplace(std::make_pair(i, j), Journal::Entry{record, information});
+      progress.update(done_.size());
+    };
+    callbacks.should_stop = [&] {
+      if (journal_) journal_->flush();
+      return InterruptGuard::requested();
+    };
+    align_batch(context_, scene_.clouds, left, options_, callbacks);
+    if (journal_) journal_->flush();
+    seconds_ = progress.seconds();
+  }
+
+  void write_outputs() {
+    std::vector<evaluation::LogEntry> log;
+    std::vector<evaluation::InformationEntry> information;
+    Json records = Json::array();
+    for (const auto& [a, b] : pairs_) {
+      const auto found = done_.find({scene_.numbers[a], scene_.numbers[b]});
+      if (found == done_.end()) continue;
+      const auto& [pair, matrix] = found->second;
+      records.push_back(pair.json);
+      if (!pair.aligned) {
+        ++reasons_[pair.reason];
+        continue;
+      }
+      log.push_back({pair.i, pair.j, scene_.count(), *pair.transform});
+      information.push_back({pair.i, pair.j, scene_.count(), information_from_json(matrix)});
+    }
+    aligned_ = log.size();
+    evaluation::write_log(o_.log, log);
+    if (!o_.info.empty()) evaluation::write_information(o_.info, information);
+    if (!o_.json.empty()) write_document(o_.json, document(std::move(records)));
+  }
+
+  Json document(Json records) const {
+    Json json;
+    json["gpureg"] = "batch";
+    json["environment"] = environment(context_);
+    json["options"] = to_json(options_);
+    json["folder"] = o_.folder;
+    json["complete"] = done_.size() == pairs_.size();
+    json["seconds"] = {{"prepare", scene_.seconds},
+                       {"align", seconds_},
+                       {"pairs_per_second", rate()},
+                       {"pairs_in_this_run", done_.size() - resumed_}};
+    json["peak_memory_mib"] = peak_memory_mib();
+    Json fragments = Json::array();
+    for (std::size_t k = 0; k < scene_.numbers.size(); ++k) {
+      Json fragment = {{"number", scene_.numbers[k]}, {"file", base_name(scene_.files[k])}};
+      fragment.update(to_json(scene_.clouds[k].statistics()));
+      fragments.push_back(std::move(fragment));
+    }
+    json["fragments"] = std::move(fragments);
+    json["pairs"] = std::move(records);
+    return json;
+  }
+
+  double rate() const {
+    return seconds_ > 0 ? static_cast<double>(done_.size() - resumed_) / seconds_ : 0;
+  }
+
+  int say_interrupted() const {
+    std::cerr << "gpureg: interrupted, " << done_.size() << " of " << pairs_.size()
+              << " pairs are done and written; go on with the same command and --resume"
+              << std::endl;
+    return kInterrupted;
+  }
+
+  int summarise() const {
+    if (!o_.quiet) {
+      std::cout << "fragments  " << scene_.numbers.size() << ", prepared in "
+                << fixed(scene_.seconds, 2) << " s\n"
+                << "pairs      " << pairs_.size() << ", in " << fixed(seconds_, 2) << " s ("
+                << significant(rate(), 3) << " pairs/s, " << context_.description() << ")\n"
+                << "aligned    " << aligned_ << ", written to " << o_.log << "\n";
+      for (const auto& [reason, count] : reasons_)
+        std::cout << "not        " << count << ", " << reason << "\n";
+      std::cout << "memory     " << fixed(peak_memory_mib(), 0) << " MiB at most\n";
+    }
+    return aligned_ > 0 ? kOk : kNoAlignment;
+  }
+
+  const BatchOptions& o_;
+  RegistrationOptions options_;
+  Context context_;
+  Scene scene_;
+  Pairs pairs_;
+  std::optional<Journal> journal_;
+  Journal::Entries done_;
+  std::size_t resumed_ = 0, aligned_ = 0;
+  std::map<std::string, std::size_t> reasons_;
+  double seconds_ = 0;
+};
+
+}  // namespace
+
+void add_batch(CLI::App& app, Action& chosen) {
+  const auto o = std::make_shared<BatchOptions>();
+  CLI::App* verb = app.add_subcommand("batch", "Align the fragments cloud_bin_<i> of a folder");
+  verb->add_option("DIR", o->folder, "Folder with cloud_bin_<i>.ply|pcd, and perhaps cameras.txt")
+      ->required();
+  verb->add_option("--pairs", o->pairs, "all, or a file with one pair `i j` a line")
+      ->capture_default_str();
+  o->method.add_to(*verb);
+  verb->add_option("--min-score", o->min_score,
+                   "Report a pair from this score on (0: every best candidate)");
+  verb->add_option("-o,--output", o->log, "Redwood log of the aligned pairs: T_ij, j into i")
+      ->required();
+  verb->add_option("--info", o->info, "Redwood information matrices of the same pairs");
+  verb->add_option("--json", o->json, "Everything about every pair tried");
+  verb->add_flag("--resume", o->resume, "Go on where an interrupted run of this output stopped");
+  verb->add_flag("--quiet", o->quiet, "No progress, no summary");
+  verb->callback([o, &chosen] { chosen = [o] { return Batch(*o).run(); }; });
+}
+
+}  // namespace gpureg::cli

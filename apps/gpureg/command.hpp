@@ -1,0 +1,24 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <functional>
+
+namespace gpureg::cli {
+
+/// What the command tells its caller. Errors are exceptions up to main(), which turns them into
+/// bad_input.
+enum ExitStatus { kOk = 0, kNoAlignment = 1, kBadInput = 2, kInterrupted = 130 };
+
+/// What main() runs once the command line is read; returns the exit status.
+using Action = std::function<int()>;
+
+/// Each verb adds its subcommand and sets chosen when the user asks for it.
+void add_register(CLI::App& app, Action& chosen);
+void add_batch(CLI::App& app, Action& chosen);
+void add_evaluate(CLI::App& app, Action& chosen);
+void add_report(CLI::App& app, Action& chosen);
+void add_generate(CLI::App& app, Action& chosen);
+void add_info(CLI::App& app, Action& chosen);
+
+}  // namespace gpureg::cli

@@ -1,0 +1,69 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "data/generate.hpp"
+
+#include <iostream>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "command.hpp"
+#include "interrupt.hpp"
+#include "method_options.hpp"
+#include "progress.hpp"
+
+namespace gpureg::cli {
+namespace {
+
+struct GenerateOptions {
+  std::string folder;
+  synthetic::GenerateOptions scene;
+  bool quiet = false;
+};
+
+int run(const GenerateOptions& o) {
+  const InterruptGuard guard;
+  std::string stage;
+  std::optional<Progress> progress;
+  synthetic::Progress hooks;
+  hooks.report = [&](int done, int total, const char* name) {
+    if (stage != name) {
+      progress.emplace(name, name == std::string("fragments") ? "scanned" : "done",
+                       static_cast<std::size_t>(total), o.quiet);
+      stage = name;
+    }
+    progress->update(static_cast<std::size_t>(done));
+  };
+  hooks.should_stop = [] { return InterruptGuard::requested(); };
+  synthetic::generate(o.folder, o.scene, hooks);
+  progress.reset();
+  if (InterruptGuard::requested()) {
+    std::cerr << "gpureg: interrupted, " << o.folder << " holds an unfinished scene" << std::endl;
+    return kInterrupted;
+  }
+  if (!o.quiet)
+    std::cout << o.scene.fragments << " fragments of " << o.scene.frames_per_fragment
+              << " frames written to " << o.folder << "\n";
+  return kOk;
+}
+
+}  // namespace
+
+void add_generate(CLI::App& app, Action& chosen) {
+  const auto o = std::make_shared<GenerateOptions>();
+  CLI::App* verb =
+      app.add_subcommand("generate", "Make a synthetic scene in Redwood's layout, with its truth");
+  verb->add_option("OUT", o->folder, "Folder to write")->required();
+  verb->add_option("--fragments", o->scene.fragments, "Number of fragments")->capture_default_str();
+  verb->add_option("--frames-per-fragment", o->scene.frames_per_fragment,
+                   "Depth frames fused into each")
+      ->capture_default_str();
+  verb->add_option("--seed", o->scene.seed, "Building, furniture, path and noise follow from it")
+      ->check(natural_number())
+      ->capture_default_str();
+  verb->add_option("--threads", o->scene.threads, "0: all")->capture_default_str();
+  verb->add_flag("--rgbd", o->scene.rgbd, "Also write the frames as a sequence in TUM's layout");
+  verb->add_flag("--quiet", o->quiet, "No progress, no summary");
+  verb->callback([o, &chosen] { chosen = [o] { return run(*o); }; });
+}
+
+}  // namespace gpureg::cli

@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <Eigen/Geometry>
+#include <iostream>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "command.hpp"
+#include "gpureg/context.hpp"
+#include "gpureg/io.hpp"
+#include "spacing.hpp"
+#include "text.hpp"
+
+namespace gpureg::cli {
+namespace {
+
+std::string describe(const Eigen::Vector3f& v) {
+  return significant(v.x(), 4) + " " + significant(v.y(), 4) + " " + significant(v.z(), 4);
+}
+
+void print_cloud(const std::string& path) {
+  const PointCloud cloud = io::read_point_cloud(path);
+  const std::vector<Eigen::Vector3f> points = finite_points(cloud.points);
+  std::cout << path << "\n  points           " << grouped(cloud.points.size())
+            << (cloud.normals.empty() ? ", without normals" : ", with normals") << "\n"
+            << "  not finite       " << grouped(cloud.points.size() - points.size()) << "\n";
+  if (points.empty()) return;
+  Eigen::AlignedBox3f box;
+  for (const Eigen::Vector3f& p : points) box.extend(p);
+  const double spacing = median_spacing(points);
+  const double voxel = suggested_voxel_size(points, spacing);
+  std::cout << "  extent           " << describe(box.sizes()) << ", from " << describe(box.min())
+            << " to " << describe(box.max()) << "\n  spacing          "
+            << (spacing > 0
+                    ? significant(spacing, 3) + " (median distance to the nearest neighbour)"
+                    : "none, all points are at one place")
+            << "\n";
+  if (voxel > 0)
+    std::cout << "  suggested        --voxel-size " << significant(voxel, 3)
+              << " (leaves about 5000 points, or all where there are fewer)\n";
+}
+
+int run(const std::vector<std::string>& clouds) {
+  if (clouds.empty()) {
+    std::cout << "gpureg " GPUREG_VERSION "\n";
+    for (const std::string& line : describe_backends()) std::cout << line << "\n";
+  }
+  for (const std::string& path : clouds) print_cloud(path);
+  return kOk;
+}
+
+}  // namespace
+
+void add_info(CLI::App& app, Action& chosen) {
+  const auto clouds = std::make_shared<std::vector<std::string>>();
+  CLI::App* verb =
+      app.add_subcommand("info", "Tell about clouds; without any, about version and devices");
+  verb->add_option("CLOUD", *clouds, "PLY or PCD files");
+  verb->callback([clouds, &chosen] { chosen = [clouds] { return run(*clouds); }; });
+}
+
+}  // namespace gpureg::cli

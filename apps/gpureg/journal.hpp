@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <map>
+#include <string>
+#include <utility>
+
+#include "json.hpp"
+#include "pair_record.hpp"
+
+namespace gpureg::cli {
+
+/// What a batch has done so far, beside its output: a line that says what the run is, then one line
+/// per pair. A kill at any moment leaves whole lines and at most one torn line at the end, which is
+/// cut off when the run goes on.
+class Journal {
+ public:
+  struct Entry {
+    PairRecord pair;
+    Json information;  ///< 6x6 of Redwood's convention, row by row
+  };
+  using Entries = std::map<std::pair<int, int>, Entry>;
+
+  /// Opens or creates. header: what must be the same for a run to go on; resume: take up what is
+  /// there (refused where headers differ), else start anew. Throws IoError, also where another
+  /// process writes the same journal.
+  Journal(std::string path, const Json& header, bool resume);
+  ~Journal();
+  Journal(const Journal&) = delete;
+  Journal& operator=(const Journal&) = delete;
+
+  const Entries& entries() const { return entries_; }
+  bool discarded() const { return discarded_; }  ///< an older journal was there and not asked for
+
+  /// Adds a pair; flush() hands all pairs added to the system. Throw IoError.
+  void add(const PairRecord& pair, const Json& information);
+  void flush();
+
+  /// Deletes the file: the outputs are complete.
+  void remove();
+
+ private:
+  std::size_t take_up(const std::string& text, const Json& header);
+
+  std::string path_;
+  int fd_ = -1;
+  std::string pending_;
+  Entries entries_;
+  bool discarded_ = false;
+};
+
+}  // namespace gpureg::cli

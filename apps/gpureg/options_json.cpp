@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "options_json.hpp"
+
+#include <charconv>
+#include <cstdlib>
+
+namespace gpureg::cli {
+namespace {
+
+double shortest(float value) {
+  char text[64] = {};
+  std::to_chars(text, text + sizeof(text) - 1, value);
+  return std::strtod(text, nullptr);
+}
+
+}  // namespace
+
+Json to_json(const RegistrationOptions& options) {
+  const PrepareOptions& p = options.prepare;
+  const HypothesisOptions& h = options.hypothesis;
+  const ScoreOptions& s = options.score;
+  const RefineOptions& r = options.refine;
+  Json json;
+  json["prepare"] = {{"voxel_size", shortest(p.voxel_size)},
+                     {"normal_radius", shortest(p.normal_radius)},
+                     {"feature_radius", shortest(p.feature_radius)},
+                     {"search_distance", shortest(p.search_distance)}};
+  json["hypothesis"] = {{"count", h.count},
+                        {"neighbors", h.neighbors},
+                        {"mutual", h.mutual},
+                        {"edge_similarity", shortest(h.edge_similarity)},
+                        {"smaller_as_source", h.smaller_as_source},
+                        {"seed", h.seed}};
+  json["score"] = {{"max_correspondence_distance", shortest(s.max_correspondence_distance)},
+                   {"max_normal_angle", shortest(s.max_normal_angle)},
+                   {"max_judged_normal_angle", shortest(s.max_judged_normal_angle)},
+                   {"min_inlier_ratio", shortest(s.min_inlier_ratio)}};
+  json["refine"] = {{"max_iterations", r.max_iterations},
+                    {"max_correspondence_distance", shortest(r.max_correspondence_distance)},
+                    {"kernel_width", shortest(r.kernel_width)}};
+  return json;
+}
+
+}  // namespace gpureg::cli

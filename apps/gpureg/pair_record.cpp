@@ -1,0 +1,84 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "pair_record.hpp"
+
+#include <cmath>
+
+#include "gpureg/error.hpp"
+#include "result_json.hpp"
+
+namespace gpureg::cli {
+namespace {
+
+const Json& member(const Json& json, const char* name) {
+  if (!json.is_object()) throw InvalidArgument("a pair is no object");
+  const auto found = json.find(name);
+  if (found == json.end()) throw InvalidArgument(std::string("a pair lacks \"") + name + "\"");
+  return *found;
+}
+
+int index(const Json& json, const char* name) {
+  const Json& value = member(json, name);
+  if (!value.is_number_integer() || value.get<std::int64_t>() < 0 ||
+      value.get<std::int64_t>() > 0x7fffffff)
+    throw InvalidArgument(std::string("\"") + name + "\" of a pair is " + value.dump() +
+                          ", expected the number of a fragment");
+  return value.get<int>();
+}
+
+std::string text(const Json& json, const char* name) {
+  const Json& value = member(json, name);
+  if (!value.is_string())
+    throw InvalidArgument(std::string("\"") + name + "\" of a pair is " + value.dump() +
+                          ", expected a text");
+  return value.get<std::string>();
+}
+
+double number(const Json& value, const char* name) {
+  // Infinity and NaN cannot be written in JSON, but 1e999 can be read.
+  if (!value.is_number() || !std::isfinite(value.get<double>()))
+    throw InvalidArgument(std::string("\"") + name + "\" holds " + value.dump() +
+                          ", expected a finite number");
+  return value.get<double>();
+}
+
+template <int Size>
+Eigen::Matrix<double, Size, Size> square(const Json& json, const char* name) {
+  if (!json.is_array() || json.size() != Size * Size)
+    throw InvalidArgument(std::string("\"") + name + "\" is not an array of " +
+                          std::to_string(Size * Size) + " numbers");
+  Eigen::Matrix<double, Size, Size> matrix;
+  for (int k = 0; k < Size * Size; ++k)
+    matrix(k / Size, k % Size) = number(json[static_cast<std::size_t>(k)], name);
+  return matrix;
+}
+
+}  // namespace
+
+PairRecord PairRecord::from_result(int i, int j, const RegistrationResult& result) {
+  Json json = {{"i", i}, {"j", j}};
+  json.update(to_json(result, "T_ij"));
+  return from_json(json);
+}
+
+PairRecord PairRecord::from_json(const Json& json) {
+  PairRecord record;
+  record.i = index(json, "i");
+  record.j = index(json, "j");
+  record.aligned = text(json, "status") == to_string(RegistrationStatus::aligned);
+  record.reason = text(json, "reason");
+  record.score = number(member(json, "score"), "score");
+  const Json& pose = member(json, "T_ij");
+  if (!pose.is_null()) record.transform = square<4>(pose, "T_ij");
+  if (record.aligned && !record.transform)
+    throw InvalidArgument("a pair is aligned, but its \"T_ij\" is null");
+  const Json& ms = member(json, "ms");
+  record.milliseconds = number(member(ms, "total"), "total");
+  record.json = json;
+  return record;
+}
+
+Eigen::Matrix<double, 6, 6> information_from_json(const Json& json) {
+  return square<6>(json, "information");
+}
+
+}  // namespace gpureg::cli

@@ -1,0 +1,33 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <Eigen/Core>
+#include <optional>
+#include <string>
+
+#include "gpureg/result.hpp"
+#include "json.hpp"
+
+namespace gpureg::cli {
+
+/// One pair of a batch as it stands in RESULT.json and in the journal. The outputs of a resumed run
+/// equal those of an uninterrupted one, because both are made of records that went through JSON.
+struct PairRecord {
+  int i = 0, j = 0;
+  bool aligned = false;
+  std::string reason;
+  double score = 0;
+  std::optional<Eigen::Matrix4d> transform;  ///< T_ij: fragment j into fragment i
+  double milliseconds = 0;                   ///< all stages
+  Json json;                                 ///< everything, as written to RESULT.json
+
+  static PairRecord from_result(int i, int j, const RegistrationResult& result);
+
+  /// Throws InvalidArgument saying what is wrong with the record.
+  static PairRecord from_json(const Json& json);
+};
+
+/// 6x6, row by row. Throws InvalidArgument.
+Eigen::Matrix<double, 6, 6> information_from_json(const Json& json);
+
+}  // namespace gpureg::cli

@@ -1,0 +1,133 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <iostream>
+#include <memory>
+#include <string>
+
+#include "before_after.hpp"
+#include "command.hpp"
+#include "gpureg/evaluation.hpp"
+#include "gpureg/io.hpp"
+#include "gpureg/registration.hpp"
+#include "image.hpp"
+#include "json_file.hpp"
+#include "method_options.hpp"
+#include "options_json.hpp"
+#include "result_json.hpp"
+#include "text.hpp"
+
+namespace gpureg::cli {
+namespace {
+
+struct RegisterOptions {
+  std::string source, target;
+  MethodOptions method;
+  std::string json, overlay, image;
+};
+
+std::string describe(const PrepareStatistics& s) {
+  std::string text = grouped(s.input_points) + " points";
+  if (s.invalid_points > 0) text += " (" + grouped(s.invalid_points) + " not finite, dropped)";
+  text += ", " + grouped(s.points) + " prepared";
+  if (s.points_without_feature > 0)
+    text += " (" + grouped(s.points_without_feature) + " without a feature)";
+  return text;
+}
+
+std::string describe(const Eigen::Matrix4d& pose) {
+  std::string text;
+  for (int row = 0; row < 4; ++row) {
+    text += "   ";
+    for (int column = 0; column < 4; ++column)
+      text += pad_left(fixed(pose(row, column), 6), column < 3 ? 11 : 14);
+    text += "\n";
+  }
+  return text;
+}
+
+void print_report(const RegisterOptions& o, const Context& context, const PreparedCloud& source,
+                  const PreparedCloud& target, const RegistrationResult& r) {
+  const RegistrationStatistics& s = r.statistics;
+  const StageTimings& t = r.timings;
+  const PrepareStatistics &a = source.statistics(), &b = target.statistics();
+  std::cout << "source   " << o.source << ": " << describe(a) << "\n"
+            << "target   " << o.target << ": " << describe(b) << "\n"
+            << "backend  " << context.description() << "\n"
+            << "status   " << to_string(r.status);
+  if (!r.aligned()) std::cout << ": " << to_string(r.reason) << ", " << explain(r.reason);
+  std::cout << "\n";
+  if (r.has_candidate) {
+    std::cout << (r.aligned() ? "target_from_source\n" : "best candidate, target_from_source\n")
+              << describe(r.target_from_source.matrix()) << "score    " << fixed(r.score, 3)
+              << ", inliers " << grouped(s.inliers) << " of " << grouped(s.points_scored) << " ("
+              << percent(r.inlier_ratio) << " %), rmse " << significant(r.inlier_rmse, 3) << " m\n";
+  }
+  std::cout << "counts   correspondences " << grouped(s.correspondences) << ", hypotheses "
+            << grouped(s.hypotheses) << ", survivors " << grouped(s.survivors) << ", scored "
+            << grouped(s.scored) << ", consensus " << grouped(s.consensus) << ", refine iterations "
+            << s.refine_iterations << "\n"
+            << "ms       prepare " << fixed(a.total() + b.total(), 1) << " (downsample "
+            << fixed(a.downsample + b.downsample, 1) << ", normals "
+            << fixed(a.normals + b.normals, 1) << ", features " << fixed(a.features + b.features, 1)
+            << ", grid " << fixed(a.grid + b.grid, 1) << ")\n         align " << fixed(t.total(), 1)
+            << " (match " << fixed(t.match, 1) << ", sample " << fixed(t.sample, 1) << ", fit "
+            << fixed(t.fit, 1) << ", score " << fixed(t.score, 1) << ", refine "
+            << fixed(t.refine, 1) << ", judge " << fixed(t.judge, 1) << ")\n";
+}
+
+Json document(const RegisterOptions& o, const RegistrationOptions& options, const Context& context,
+              const PreparedCloud& source, const PreparedCloud& target,
+              const RegistrationResult& result) {
+  Json json;
+  json["gpureg"] = "register";
+  json["environment"] = environment(context);
+  json["options"] = to_json(options);
+  json["source"] = {{"file", o.source}, {"prepare", to_json(source.statistics())}};
+  json["target"] = {{"file", o.target}, {"prepare", to_json(target.statistics())}};
+  json["result"] = to_json(result, "target_from_source");
+  json["result"]["explanation"] = explain(result.reason);
+  json["result"]["information_redwood"] = to_json(result.source_moments.information_redwood());
+  json["result"]["information_open3d"] = to_json(result.target_moments.information_open3d());
+  json["peak_memory_mib"] = peak_memory_mib();
+  return json;
+}
+
+int run(const RegisterOptions& o) {
+  const RegistrationOptions options = o.method.registration();
+  const Context context = o.method.context();
+  const PointCloud source_cloud = io::read_point_cloud(o.source);
+  const PointCloud target_cloud = io::read_point_cloud(o.target);
+  const PreparedCloud source = prepare(context, source_cloud.view(), options.prepare);
+  const PreparedCloud target = prepare(context, target_cloud.view(), options.prepare);
+  const RegistrationResult result = align(context, source, target, options);
+  print_report(o, context, source, target, result);
+
+  if (!o.json.empty())
+    write_document(o.json, document(o, options, context, source, target, result));
+  if (!o.overlay.empty()) {
+    if (result.has_candidate)
+      io::write_overlay(o.overlay, source_cloud, target_cloud, result.target_from_source);
+    else
+      std::cerr << "gpureg: no overlay written, as there is no pose to show" << std::endl;
+  }
+  if (!o.image.empty()) {
+    const Image picture = before_after(source_cloud, target_cloud, pose_of(result));
+    evaluation::write_file_atomically(o.image, encode_png(picture));
+  }
+  return result.aligned() ? kOk : kNoAlignment;
+}
+
+}  // namespace
+
+void add_register(CLI::App& app, Action& chosen) {
+  const auto o = std::make_shared<RegisterOptions>();
+  CLI::App* verb = app.add_subcommand("register", "Align two clouds (PLY or PCD)");
+  verb->add_option("SOURCE", o->source, "Cloud that is moved")->required();
+  verb->add_option("TARGET", o->target, "Cloud that stays")->required();
+  o->method.add_to(*verb);
+  verb->add_option("--json", o->json, "Write options, result, counts and times");
+  verb->add_option("--overlay", o->overlay, "Write both clouds in colour, aligned, as PLY");
+  verb->add_option("--image", o->image, "Draw both clouds before and after, as PNG");
+  verb->callback([o, &chosen] { chosen = [o] { return run(*o); }; });
+}
+
+}  // namespace gpureg::cli

@@ -1,0 +1,91 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "result_file.hpp"
+
+#include "gpureg/error.hpp"
+#include "json_file.hpp"
+
+namespace gpureg::cli {
+namespace {
+
+void read_pairs(ResultFile& file, Json document) {
+  if (!document.is_object() || !document.contains("pairs") || !document["pairs"].is_array())
+    throw IoError(file.path + ": no result of `gpureg batch`, it has no array \"pairs\"");
+  Json& pairs = document["pairs"];
+  for (std::size_t k = 0; k < pairs.size(); ++k) try {
+      file.pairs.push_back(PairRecord::from_json(pairs[k]));
+    } catch (const InvalidArgument& error) {
+      throw IoError(file.path + ": pairs[" + std::to_string(k) + "]: " + error.what());
+    }
+  document.erase("pairs");
+  file.document = std::move(document);
+  for (const PairRecord& pair : file.pairs)
+    if (pair.transform)
+      file.reports.push_back({pair.i, pair.j, *pair.transform, pair.score, pair.aligned});
+}
+
+Json to_json(const evaluation::Scores& s) {
+  return {
+      {"good", s.good},         {"good_recall", s.good_recall}, {"ground_truth", s.ground_truth},
+      {"reported", s.reported}, {"recall", s.recall()},         {"precision", s.precision()}};
+}
+
+Json to_json(const evaluation::RankedScores& r) {
+  return {{"raw_recall", r.raw_recall},
+          {"recall_at_precision",
+           {{"50", r.recall_at_50},
+            {"80", r.recall_at_80},
+            {"95", r.recall_at_95},
+            {"99", r.recall_at_99}}},
+          {"average_precision", r.average_precision}};
+}
+
+}  // namespace
+
+double ResultFile::mean_milliseconds() const {
+  double sum = 0;
+  for (const PairRecord& pair : pairs) sum += pair.milliseconds;
+  return pairs.empty() ? 0 : sum / static_cast<double>(pairs.size());
+}
+
+double ResultFile::mean_prepare_milliseconds() const try {
+  const Json& fragments = document.at("fragments");
+  double sum = 0;
+  for (const Json& fragment : fragments) sum += fragment.at("ms").at("total").get<double>();
+  return fragments.empty() ? 0 : sum / static_cast<double>(fragments.size());
+} catch (const Json::exception&) {
+  return 0;  // not every program that writes pairs tells it
+}
+
+ResultFile read_result(const std::string& path) {
+  ResultFile file;
+  file.path = path;
+  const std::string text = read_text(path);
+  const std::size_t start = text.find_first_not_of(" \t\r\n");
+  file.has_scores = start != std::string::npos && text[start] == '{';
+  if (file.has_scores) {
+    Json document;
+    try {
+      document = Json::parse(text);
+    } catch (const Json::exception& error) {
+      throw IoError(path + ": " + error.what());
+    }
+    read_pairs(file, std::move(document));
+  } else {
+    for (const evaluation::LogEntry& entry : evaluation::read_log(path))
+      file.reports.push_back({entry.i, entry.j, entry.transform});
+  }
+  return file;
+}
+
+Json to_json(const evaluation::Evaluation& e) {
+  Json json;
+  json["strict"] = to_json(e.strict);
+  if (e.strict_ranked) json["strict"].update(to_json(*e.strict_ranked));
+  if (e.geometric) {
+    json["geometric"] = to_json(*e.geometric);
+    if (e.geometric_ranked) json["geometric"].update(to_json(*e.geometric_ranked));
+  }
+  return json;
+}
+
+}  // namespace gpureg::cli

@@ -1,0 +1,31 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "gpureg/evaluation.hpp"
+#include "json.hpp"
+#include "pair_record.hpp"
+
+namespace gpureg::cli {
+
+/// What `evaluate` and `report` read: RESULT.log, or RESULT.json of a batch.
+struct ResultFile {
+  std::string path;
+  bool has_scores = false;        ///< it was JSON: scores and unreported candidates are known
+  std::vector<PairRecord> pairs;  ///< JSON only
+  std::vector<evaluation::Report> reports;
+  Json document;  ///< JSON only, without its pairs
+
+  double mean_milliseconds() const;          ///< per pair; 0 without pairs
+  double mean_prepare_milliseconds() const;  ///< per fragment; 0 where not known
+};
+
+/// Told apart by content. Throws IoError naming the file and what is wrong.
+ResultFile read_result(const std::string& path);
+
+/// JSON of scores, as `evaluate --json` writes it.
+Json to_json(const evaluation::Evaluation& evaluation);
+
+}  // namespace gpureg::cli

@@ -1,0 +1,75 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "result_json.hpp"
+
+#include <sys/resource.h>
+
+namespace gpureg::cli {
+
+Json to_json(const Eigen::Ref<const Eigen::MatrixXd>& matrix) {
+  Json numbers = Json::array();
+  for (Eigen::Index row = 0; row < matrix.rows(); ++row)
+    for (Eigen::Index column = 0; column < matrix.cols(); ++column)
+      numbers.push_back(matrix(row, column));
+  return numbers;
+}
+
+Json to_json(const RegistrationStatistics& s) {
+  return {{"source_points", s.source_points},
+          {"target_points", s.target_points},
+          {"correspondences", s.correspondences},
+          {"hypotheses", s.hypotheses},
+          {"survivors", s.survivors},
+          {"scored", s.scored},
+          {"points_scored", s.points_scored},
+          {"consensus", s.consensus},
+          {"inliers", s.inliers},
+          {"refine_iterations", s.refine_iterations},
+          {"swapped", s.swapped}};
+}
+
+Json to_json(const StageTimings& t) {
+  return {{"match", t.match},   {"sample", t.sample}, {"fit", t.fit},      {"score", t.score},
+          {"refine", t.refine}, {"judge", t.judge},   {"total", t.total()}};
+}
+
+Json to_json(const PrepareStatistics& p) {
+  return {{"input_points", p.input_points},
+          {"invalid_points", p.invalid_points},
+          {"points", p.points},
+          {"points_without_normal", p.points_without_normal},
+          {"points_without_feature", p.points_without_feature},
+          {"ms",
+           {{"downsample", p.downsample},
+            {"normals", p.normals},
+            {"features", p.features},
+            {"grid", p.grid},
+            {"total", p.total()}}}};
+}
+
+Json to_json(const RegistrationResult& result, const char* pose_name) {
+  Json json;
+  json["status"] = to_string(result.status);
+  json["reason"] = to_string(result.reason);
+  json["score"] = result.score;
+  json["inlier_ratio"] = result.inlier_ratio;
+  json["inlier_rmse"] = result.inlier_rmse;
+  json[pose_name] =
+      result.has_candidate ? to_json(result.target_from_source.matrix()) : Json(nullptr);
+  json["statistics"] = to_json(result.statistics);
+  json["ms"] = to_json(result.timings);
+  return json;
+}
+
+Json environment(const Context& context) {
+  return {{"version", GPUREG_VERSION},
+          {"backend", to_string(context.backend())},
+          {"description", context.description()}};
+}
+
+double peak_memory_mib() {
+  rusage usage{};
+  getrusage(RUSAGE_SELF, &usage);
+  return static_cast<double>(usage.ru_maxrss) / 1024.0;  // Linux counts in KiB
+}
+
+}  // namespace gpureg::cli

@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "gpureg/registration.hpp"
+
+namespace gpureg::cli {
+
+/// The fragments of a folder, prepared; the raw clouds are let go as soon as they are.
+struct Scene {
+  std::vector<int> numbers;  ///< as in the file names, ascending
+  std::vector<std::string> files;
+  std::vector<std::uint64_t>
+      hashes;  ///< of what went into prepare(): points, normals, sensor positions
+  std::vector<PreparedCloud> clouds;
+  double seconds = 0;
+  bool interrupted = false;  ///< stopped before all were prepared
+
+  /// What Redwood's files give as the number of fragments; larger than the number of files where
+  /// numbers are missing.
+  int count() const { return numbers.empty() ? 0 : numbers.back() + 1; }
+};
+
+/// Reads and prepares all fragments, with their sensor positions from cameras.txt where that is
+/// there. Throws IoError.
+Scene prepare_scene(const Context& context, const std::string& folder,
+                    const PrepareOptions& options, bool quiet);
+
+/// Pairs i < j as indices into numbers, in the file's order without repetitions, or all of them for
+/// "all". Throws IoError for a number that no fragment has.
+std::vector<std::pair<std::uint32_t, std::uint32_t>> choose_pairs(const Scene& scene,
+                                                                  const std::string& pairs);
+
+}  // namespace gpureg::cli

@@ -1,0 +1,20 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+namespace gpureg::cli {
+
+/// The points with finite coordinates.
+std::vector<Eigen::Vector3f> finite_points(const std::vector<Eigen::Vector3f>& points);
+
+/// Median distance from a sample of the points to their nearest (or rank-th nearest) neighbour that
+/// is not at the same place; 0 where there is none. The points must be finite.
+double median_spacing(const std::vector<Eigen::Vector3f>& points, int rank = 1);
+
+/// A voxel size that leaves about 5000 points, which is what registration works well and fast with,
+/// rounded to 1 or 2 digits, and not below the spacing; 0 where the points have no extent.
+double suggested_voxel_size(const std::vector<Eigen::Vector3f>& points, double spacing);
+
+}  // namespace gpureg::cli
