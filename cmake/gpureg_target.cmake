@@ -8,7 +8,7 @@ function(gpureg_target target)
   target_compile_options(${target} PRIVATE
     $<$<COMPILE_LANGUAGE:CXX>:-ffp-contract=off -fno-fast-math -Wall -Wextra -Wpedantic -Wshadow -Wno-psabi>
     $<$<COMPILE_LANGUAGE:CUDA>:-fmad=false -prec-div=true -prec-sqrt=true -ftz=false --expt-relaxed-constexpr
-      -Xcompiler=-ffp-contract=off,-Wall,-Wextra>)
+      -Xcompiler=-ffp-contract=off,-Wall,-Wextra,-Wno-dangling-else>)
   if(GPUREG_WERROR)
     target_compile_options(${target} PRIVATE $<$<COMPILE_LANGUAGE:CXX>:-Werror>)
   endif()
