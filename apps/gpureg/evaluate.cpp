@@ -54,7 +54,7 @@ void print_table(const char* rule, const std::vector<SceneEvaluation>& scenes, s
   for (const SceneEvaluation& scene : scenes)
     if (get(scene.evaluation).first) ranked |= get(scene.evaluation).second.has_value();
   std::string head = pad_right(rule, width) + cell("good") + cell("truth") + cell("reported") +
-                     cell("recall") + cell("precision");
+                     cell("recall") + pad_left("precision", kNumber + 2);
   if (ranked)
     head +=
         cell("raw") + cell("R@P50") + cell("R@P80") + cell("R@P95") + cell("R@P99") + cell("AP");

@@ -33,7 +33,7 @@ int run(int argc, char** argv) {
   add_register(app, action);
   add_batch(app, action);
   add_evaluate(app, action);
-  // REPORT
+  add_report(app, action);
   add_generate(app, action);
   add_info(app, action);
   // Last, as verbs inherit it.
