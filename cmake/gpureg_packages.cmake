@@ -25,16 +25,16 @@ endif()
 gpureg_optional(GPUREG_HAVE_CUDA "the CUDA backend (GPUREG_CUDA=${GPUREG_CUDA})")
 
 find_package(PCL 1.11 QUIET COMPONENTS common io features kdtree search filters registration)
-set(GPUREG_HAVE_PCL ${PCL_FOUND})
-gpureg_optional(GPUREG_HAVE_PCL "component io and the PCL adapter (needs PCL)")
+set(GPUREG_HAVE_PCL ${PCL_FOUND})  # the header-only adapter gpureg/pcl.hpp is installed all the same
+gpureg_optional(GPUREG_HAVE_PCL "the oracle tests against PCL and the tests of its adapter (needs PCL)")
 
 find_package(nlohmann_json 3.9 QUIET)
 find_package(CLI11 2.1 QUIET)
 find_package(PNG QUIET)
-if(nlohmann_json_FOUND AND CLI11_FOUND AND PNG_FOUND AND GPUREG_HAVE_PCL)
+if(nlohmann_json_FOUND AND CLI11_FOUND AND PNG_FOUND)
   set(GPUREG_HAVE_CLI ON)
 endif()
-gpureg_optional(GPUREG_HAVE_CLI "the command gpureg (needs CLI11, nlohmann-json, libpng and PCL)")
+gpureg_optional(GPUREG_HAVE_CLI "the command gpureg (needs CLI11, nlohmann-json and libpng)")
 
 find_package(embree QUIET)  # 3 (Debian 12) or 4 (Ubuntu 24.04)
 if(embree_FOUND AND embree_VERSION_MAJOR MATCHES "^[34]$")

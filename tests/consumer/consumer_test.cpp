@@ -1,0 +1,165 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// What somebody does who uses the installed package: install, find_package, build, run.
+#include <gtest/gtest.h>
+
+#include <fstream>
+#include <random>
+#include <sstream>
+
+#include "command.hpp"
+#include "gpureg/io.hpp"
+#include "project/layout.hpp"
+#include "support/scan.hpp"
+#include "support/temporary_folder.hpp"
+
+namespace gpureg {
+namespace {
+
+using test::Outcome;
+using test::run_command;
+
+const std::string kProjects = CONSUMER_SOURCE "/tests/consumer/";
+
+// CMake breaks the lines of a message.
+std::string one_line(const std::string& text) {
+  std::istringstream words(text);
+  std::string line;
+  for (std::string word; words >> word;) line += (line.empty() ? "" : " ") + word;
+  return line;
+}
+
+class Consumer : public testing::Test {
+ protected:
+  void SetUp() override {
+    const Outcome installed = run_command({CONSUMER_CMAKE, "--install", CONSUMER_BUILD, "--config",
+                                           CONSUMER_CONFIG, "--prefix", prefix_});
+    ASSERT_EQ(installed.status, 0) << installed.output;
+  }
+
+  Outcome configure(const std::string& project, const std::string& flags,
+                    std::vector<std::string> more = {}) {
+    std::vector<std::string> arguments = {CONSUMER_CMAKE,
+                                          "-S",
+                                          project,
+                                          "-B",
+                                          build_,
+                                          "-G",
+                                          CONSUMER_GENERATOR,
+                                          "-DCMAKE_BUILD_TYPE=" CONSUMER_CONFIG,
+                                          "-DCMAKE_CXX_COMPILER=" CONSUMER_COMPILER,
+                                          "-DCMAKE_CXX_FLAGS=" CONSUMER_FLAGS " " + flags,
+                                          "-DCMAKE_PREFIX_PATH=" + prefix_};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    return run_command(arguments);
+  }
+
+  void build(const std::string& project, const std::string& flags) {
+    const Outcome configured = configure(project, flags);
+    ASSERT_EQ(configured.status, 0) << configured.output;
+    // The package that was just installed, and no other one of this machine.
+    std::ifstream file(build_ + "/CMakeCache.txt");
+    const std::string cache((std::istreambuf_iterator<char>(file)),
+                            std::istreambuf_iterator<char>());
+    ASSERT_NE(cache.find("gpureg_DIR:PATH=" + prefix_), std::string::npos) << cache;
+    const Outcome built =
+        run_command({CONSUMER_CMAKE, "--build", build_, "--config", CONSUMER_CONFIG});
+    ASSERT_EQ(built.status, 0) << built.output;
+  }
+
+  // Two scans of one room, each in the frame of its sensor; returns target_from_source.
+  Eigen::Isometry3d write_scans() {
+    std::mt19937 random(7);
+    const Eigen::Vector3d sensor = test::kRoomSensor.cast<double>();
+    Eigen::Isometry3d target_from_room = Eigen::Isometry3d::Identity(),
+                      source_from_room = test::random_pose(random, 0);
+    target_from_room.translation() = -sensor;
+    source_from_room.translation() =
+        source_from_room.linear() * (-sensor - Eigen::Vector3d(0.2, -0.1, 0.05));
+    PointCloud cloud;
+    cloud.points = test::moved(source_from_room, test::scan_room(random));
+    io::write_point_cloud(folder_ / "source.ply", cloud);
+    cloud.points = test::moved(target_from_room, test::scan_room(random));
+    io::write_point_cloud(folder_ / "target.ply", cloud);
+    return target_from_room * source_from_room.inverse();
+  }
+
+  // A voxel is 5 cm and the noise 1 mm: what the refinement leaves is millimetres, a wrong pose is
+  // off by decimetres.
+  void expect_pose(const Outcome& outcome, const Eigen::Isometry3d& truth) {
+    ASSERT_EQ(outcome.status, 0) << outcome.output;
+    Eigen::Matrix4d pose;
+    std::istringstream text(outcome.output);
+    for (int k = 0; k < 16; ++k) ASSERT_TRUE(text >> pose(k / 4, k % 4)) << outcome.output;
+    EXPECT_LT(test::translation_error(truth, Eigen::Isometry3d(pose)), 0.01) << outcome.output;
+    EXPECT_LT(test::rotation_error_degrees(truth, Eigen::Isometry3d(pose)), 0.5) << outcome.output;
+  }
+
+  Outcome run(const std::string& program) {
+    return run_command({build_ + "/" + program, folder_ / "source.ply", folder_ / "target.ply"});
+  }
+
+  void expect_working(const std::string& flags) {
+    const Eigen::Isometry3d truth = write_scans();
+    ASSERT_NO_FATAL_FAILURE(build(kProjects + "project", flags));
+    expect_pose(run("register_two_clouds"), truth);
+    const Outcome printed = run_command({build_ + "/layout"});
+    EXPECT_EQ(printed.status, 0) << printed.output;
+    EXPECT_EQ(printed.output, layout() + kInformation);
+  }
+
+  test::TemporaryFolder folder_;
+  const std::string prefix_ = folder_ / "prefix", build_ = folder_ / "build";
+  // By hand from the moments in layout.cpp: [n I, -2 [s]x; 2 [s]x, 4 (tr(S) I - S)], s = (1, 2, 3),
+  // S = diag(4, 5, 6), n = 3.
+  static constexpr const char* kInformation =
+      "information\n"
+      " 3  0  0  0  6 -4\n"
+      " 0  3  0 -6  0  2\n"
+      " 0  0  3  4 -2  0\n"
+      " 0 -6  4 44  0  0\n"
+      " 6  0 -2  0 40  0\n"
+      "-4  2  0  0  0 36\n"
+      "error 0.25\n";
+};
+
+TEST_F(Consumer, DefaultFlags) { expect_working(""); }
+
+// Eigen aligns by the processor that a file is compiled for: the public types must not depend on
+// it.
+TEST_F(Consumer, MarchNative) { expect_working("-march=native"); }
+
+TEST_F(Consumer, Pcl) {
+  if (!CONSUMER_HAVE_PCL) GTEST_SKIP() << "PCL is not installed";
+  if (std::string(CONSUMER_FLAGS).find("-fsanitize=address") != std::string::npos)
+    GTEST_SKIP() << "under AddressSanitizer Eigen allocates in another way than PCL's ready-made "
+                    "libraries do";
+  const Eigen::Isometry3d truth = write_scans();
+  ASSERT_NO_FATAL_FAILURE(build(kProjects + "pcl_project", ""));
+  expect_pose(run("register_with_pcl"), truth);
+}
+
+// A component that this build does not have.
+TEST_F(Consumer, MissingComponent) {
+  std::ofstream(folder_ / "CMakeLists.txt")
+      << "cmake_minimum_required(VERSION 3.20)\nproject(wish LANGUAGES CXX)\n"
+         "find_package(gpureg CONFIG REQUIRED COMPONENTS io teleport)\n";
+  const Outcome configured = configure(folder_.path(), "");
+  EXPECT_NE(configured.status, 0);
+  EXPECT_NE(one_line(configured.output).find(R"(no component "teleport" (it has: evaluation, io)"),
+            std::string::npos)
+      << configured.output;
+}
+
+// One that is asked for and may be missing is no error.
+TEST_F(Consumer, OptionalComponent) {
+  std::ofstream(folder_ / "CMakeLists.txt")
+      << "cmake_minimum_required(VERSION 3.20)\nproject(wish LANGUAGES CXX)\n"
+         "find_package(gpureg CONFIG REQUIRED COMPONENTS io OPTIONAL_COMPONENTS teleport)\n"
+         "if(NOT TARGET gpureg::io OR NOT gpureg_io_FOUND OR gpureg_teleport_FOUND)\n"
+         "  message(FATAL_ERROR \"wrong components\")\nendif()\n";
+  const Outcome configured = configure(folder_.path(), "");
+  EXPECT_EQ(configured.status, 0) << configured.output;
+}
+
+}  // namespace
+}  // namespace gpureg
