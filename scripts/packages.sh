@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 # Sourced by the other scripts: say, run_as_root, install_packages.
 
-say() { printf '\n== %s\n' "$*"; }
+# With the minutes since the start.
+say() { printf '\n== %d:%02d  %s\n' $((SECONDS / 60)) $((SECONDS % 60)) "$*"; }
 
 run_as_root() {
   if [ "$(id -u)" -eq 0 ]; then
@@ -31,9 +32,9 @@ install_packages() {
 }
 
 # What the library, its io component and the command are built with.
-build_packages=(build-essential cmake ninja-build libeigen3-dev libpcl-dev libembree-dev libcli11-dev nlohmann-json3-dev libpng-dev)
-# What the tests and benchmarks need besides.
-test_packages=(libgtest-dev libbenchmark-dev libflann-dev liblz4-dev ccache python3)
+build_packages=(build-essential cmake ninja-build libeigen3-dev libembree-dev libcli11-dev nlohmann-json3-dev libpng-dev)
+# What the tests and benchmarks need besides; PCL and FLANN are oracles.
+test_packages=(libgtest-dev libbenchmark-dev libpcl-dev libflann-dev liblz4-dev ccache python3)
 
 # Configure arguments that make rebuilds cheap where ccache is installed.
 launcher_arguments() {
