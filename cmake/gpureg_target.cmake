@@ -1,6 +1,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
 # Everything that all targets share: warnings, exact floating point, sanitizers, tests, benchmarks.
 
+# Where libraries are shared, what is installed finds them wherever the prefix lies.
+if(NOT DEFINED CMAKE_INSTALL_RPATH AND NOT APPLE)
+  file(RELATIVE_PATH _gpureg_lib_from_bin ${CMAKE_INSTALL_FULL_BINDIR} ${CMAKE_INSTALL_FULL_LIBDIR})
+  set(CMAKE_INSTALL_RPATH "$ORIGIN;$ORIGIN/${_gpureg_lib_from_bin}")
+endif()
+
 # The contract "same bits on the CPU and on the GPU" needs the compiler to contract nothing by itself: where a fused
 # multiply-add is wanted, the shared code says fmaf.
 function(gpureg_target target)
