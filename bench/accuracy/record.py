@@ -1,0 +1,63 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What the accuracy benchmarks share: arguments, the command gpureg, and a JSON record that says how its numbers were made."""
+import argparse
+import json
+import os
+import pathlib
+import platform
+import subprocess
+import sys
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+
+
+def parser(description, output):
+    result = argparse.ArgumentParser(description=description, formatter_class=argparse.RawDescriptionHelpFormatter)
+    result.add_argument("--gpureg", type=pathlib.Path, default=ROOT / "build/cpu/bin/gpureg", help="the command")
+    result.add_argument("--backend", default="auto", choices=["auto", "cpu", "cuda"])
+    result.add_argument("--data", type=pathlib.Path, default=os.environ.get("GPUREG_DATA_DIR"),
+                        help="folder of the real data sets (default: GPUREG_DATA_DIR)")
+    result.add_argument("-o", "--output", type=pathlib.Path, default=ROOT / "bench/results" / output, help="the JSON record")
+    return result
+
+
+def data_folder(arguments, name):
+    if arguments.data is None:
+        sys.exit("error: say where the data is, with --data or GPUREG_DATA_DIR")
+    folder = pathlib.Path(arguments.data) / name
+    if not folder.is_dir():
+        sys.exit(f"error: there is no folder {folder}")
+    return folder
+
+
+def gpureg(arguments, *words):
+    """Runs the command. Exit status 1, no alignment, is a result; any other failure ends the benchmark."""
+    done = subprocess.run([arguments.gpureg, *map(str, words)], capture_output=True, text=True)
+    if done.returncode not in (0, 1):
+        sys.exit(f"error: gpureg {words[0]}: {done.stderr.strip()}")
+    return done.stdout
+
+
+def commit():
+    """The commit of the working tree; with a plus sign where the library or the command differ from it."""
+    def git(*words):
+        return subprocess.run(["git", "-C", ROOT, *words], capture_output=True, text=True).stdout.strip()
+    changed = git("status", "--porcelain", "--untracked-files=no", "--", "include", "src", "cuda", "apps", "cmake", "CMakeLists.txt")
+    return git("rev-parse", "--short=12", "HEAD") + ("+" if changed else "")
+
+
+def processor():
+    try:
+        lines = pathlib.Path("/proc/cpuinfo").read_text().splitlines()
+    except OSError:
+        return platform.processor()
+    names = [line.split(":", 1)[1].strip() for line in lines if line.startswith("model name")]
+    return f"{names[0]}, {len(names)} threads" if names else platform.processor()
+
+
+def write(arguments, command, content):
+    """`command` is the line that makes this record again, free of this machine's paths."""
+    record = {"command": command, "commit": commit(), "processor": processor(), **content}
+    arguments.output.parent.mkdir(parents=True, exist_ok=True)
+    arguments.output.write_text(json.dumps(record, indent=1) + "\n")
+    print(f"written: {arguments.output}")
