@@ -37,4 +37,23 @@ GPUREG_HD bool dominated_in_cell(Vec3 center, Vec3 p, Vec3 q, const ClosestGeome
   return at_center > l1 * (g.cell_size + 2.0f * g.margin) + 8.0f * g.margin * g.margin;
 }
 
+/// Edge of a block, how far a point's reach goes, and how far from a block's centre (along an axis) a point can matter to it.
+GPUREG_HD float block_edge(const ClosestGeometry& g) { return static_cast<float>(ClosestGridView::kBlockEdge) * g.cell_size; }
+GPUREG_HD float point_reach(const ClosestGeometry& g) { return g.search_distance + 2.0f * g.margin; }
+GPUREG_HD float block_reach(const ClosestGeometry& g) { return 0.5f * block_edge(g) + g.search_distance + 2.0f * g.margin; }
+
+/// Who is farther from a cell's centre than this is never the closest: nearest is the distance of the point nearest to the centre.
+GPUREG_HD float candidate_limit(float nearest, const ClosestGeometry& g) {
+  const float half_diagonal = 0.8660255f * g.cell_size;
+  const float by_nearest = nearest + 2.0f * half_diagonal, by_search = g.search_distance + half_diagonal;
+  return (by_search < by_nearest ? by_search : by_nearest) + 2.0f * g.margin;
+}
+
+/// False where point p is never the answer in a cell whose centre is nearest to another point, best. after_best: p has the higher index.
+GPUREG_HD bool can_win_in_cell(Vec3 center, Vec3 best, Vec3 p, bool after_best, const ClosestGeometry& g) {
+  if (dominated_in_cell(center, best, p, g)) return false;
+  // Of points in the very same place only the first can win.
+  return !(after_best && p.x == best.x && p.y == best.y && p.z == best.z);
+}
+
 }  // namespace gpureg

@@ -9,7 +9,8 @@ namespace gpureg {
 /// ten kilometres from its origin loses no precision after the subtraction, and voxels stay those of floor(x / voxel_size).
 GPUREG_HD float local_origin(float lo, float hi, float voxel_size) {
   const double mid = 0.5 * (static_cast<double>(lo) + static_cast<double>(hi));
-  if (!(voxel_size > 0.0f)) return static_cast<float>(mid);
+  // + 0: a box that begins or ends at -0 must not give another origin than one at 0.
+  if (!(voxel_size > 0.0f)) return static_cast<float>(mid) + 0.0f;
   const double steps = mid / static_cast<double>(voxel_size);
   const double whole = static_cast<double>(static_cast<std::int64_t>(steps + (steps < 0.0 ? -0.5 : 0.5)));
   return static_cast<float>(whole * static_cast<double>(voxel_size));

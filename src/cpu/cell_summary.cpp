@@ -19,20 +19,6 @@ constexpr int kEdge = ClosestGridView::kBlockEdge;
 constexpr int kCells = ClosestGridView::kBlockCells;
 /// Block tables larger than this (a cloud with far stray points) are not worth their memory: then every point is looked at.
 constexpr double kMaxBlocks = double(1 << 22);
-constexpr double kDegrees = 3.14159265358979323846 / 180.0;
-/// Rounding a unit vector to steps of 1/127 turns it by less than this.
-constexpr double kQuantisation = 0.6;
-
-// A summary is one word: the mean normal as three signed bytes, then a code: bit 7 = every place in the cell has a candidate in reach,
-// bits 0..6 = largest angle between the mean and a candidate's normal in steps of 1.5 degrees (127: no bound).
-constexpr double kAngleStep = 1.5;
-constexpr int kNoBound = 127;
-
-std::uint32_t pack(Vec3 mean, int code) {
-  const auto byte = [](float v) { return static_cast<std::uint32_t>(static_cast<std::uint8_t>(static_cast<std::int8_t>(std::lrint(v * 127.0f)))); };
-  return byte(mean.x) | byte(mean.y) << 8 | byte(mean.z) << 16 | static_cast<std::uint32_t>(code) << 24;
-}
-
 /// The low 21 bits of each coordinate, interleaved.
 std::uint64_t morton_key(Cell c) {
   const auto spread = [](std::int32_t v) {
@@ -44,33 +30,6 @@ std::uint64_t morton_key(Cell c) {
     return (x | x << 2) & 0x1249249249249249ull;
   };
   return spread(c.x) | spread(c.y) << 1 | spread(c.z) << 2;
-}
-
-/// True where all of the cell lies within the search distance of p.
-bool covers_cell(Vec3 p, Vec3 center, const ClosestGeometry& g) {
-  const float h = 0.5f * g.cell_size + g.margin;
-  const Vec3 far{std::fabs(p.x - center.x) + h, std::fabs(p.y - center.y) + h, std::fabs(p.z - center.z) + h};
-  return norm(far) <= g.search_distance - g.margin;
-}
-
-std::uint32_t summarize(Span<const std::uint32_t> candidates, Vec3 center, const ClosestGeometry& g, const std::vector<Vec3>& points,
-                        const std::vector<Vec3>& normals) {
-  Vec3 sum{0, 0, 0};
-  bool covered = false, bounded = true;
-  for (const std::uint32_t i : candidates) {
-    sum = sum + normals[i];
-    bounded = bounded && !is_zero(normals[i]);
-    covered = covered || covers_cell(points[i], center, g);
-  }
-  const Vec3 mean = normalized_or_zero(sum);
-  int step = kNoBound;
-  if (bounded && !is_zero(mean)) {
-    float cosine = 1;
-    for (const std::uint32_t i : candidates) cosine = std::min(cosine, dot(mean, normals[i]));
-    const double angle = std::acos(std::max(-1.0, std::min(1.0, static_cast<double>(cosine)))) / kDegrees + kQuantisation;
-    step = std::min(kNoBound, static_cast<int>(std::ceil(angle / kAngleStep)));
-  }
-  return pack(mean, step | (covered ? 128 : 0));
 }
 
 }  // namespace
@@ -134,32 +93,11 @@ CellSummaries summarize_cells(const ClosestGrid& closest, float search_distance,
     for (int cell = 0; cell < kCells; ++cell) {
       if (start[cell] == start[cell + 1]) continue;
       const Cell c{block.x * kEdge + (cell & 7), block.y * kEdge + ((cell >> 3) & 7), block.z * kEdge + (cell >> 6)};
-      out.summary[(b + 1) * kCells + cell] = summarize({closest.candidates.data() + start[cell], start[cell + 1] - start[cell]},
-                                                       cell_center(c, closest.cell_size), g, points, normals);
+      out.summary[(b + 1) * kCells + cell] = summarize_cell({closest.candidates.data() + start[cell], start[cell + 1] - start[cell]},
+                                                            cell_center(c, closest.cell_size), g, points.data(), normals.data());
     }
   }
   return out;
-}
-
-SummaryLimits::SummaryLimits(float max_normal_angle, bool exact_distance) {
-  for (int code = 0; code < 256; ++code) {
-    const int step = code & 127;
-    const double spread = step * kAngleStep + kQuantisation;
-    none_below[code] = -2.0f;
-    all_above[code] = 2.0f;
-    const bool covered = (code & 128) != 0 && exact_distance;
-    if (max_normal_angle >= 180.0f) {
-      // Without a normal test only reach decides.
-      if (covered) all_above[code] = -2.0f;
-    } else if (step != kNoBound) {
-      const double widest = static_cast<double>(max_normal_angle) + spread, narrowest = static_cast<double>(max_normal_angle) - spread;
-      if (widest < 180.0) none_below[code] = static_cast<float>(std::cos(widest * kDegrees)) - 1e-5f;
-      if (covered && narrowest > 0.0) all_above[code] = static_cast<float>(std::cos(narrowest * kDegrees)) + 1e-5f;
-    }
-  }
-  // Code 0 is a cell without candidates (a real one has a spread of at least one step): no inlier, whatever the normals.
-  none_below[0] = 3.0f;
-  all_above[0] = 3.0f;
 }
 
 #if defined(__AVX2__) && defined(__FMA__)

@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "algorithm/closest_build.hpp"
+#include "algorithm/cell_summary.hpp"
 #include "cpu/products.hpp"
 
 /// What lets the CPU decide most points of a hypothesis without looking at a single target point: per cell of the closest-point grid,
@@ -17,14 +17,6 @@ ScoringOrder scoring_order(const std::vector<Vec3>& points, const std::vector<Ve
 /// Summaries of the cells of one closest-point grid; points and normals are the cloud's.
 CellSummaries summarize_cells(const ClosestGrid& closest, float search_distance, float cloud_radius, const std::vector<Vec3>& points,
                               const std::vector<Vec3>& normals);
-
-/// Cosines between a moved normal and a cell's mean normal below which no candidate agrees, and above which all agree.
-struct SummaryLimits {
-  float none_below[256];
-  float all_above[256];
-  /// exact_distance: the correspondence distance asked for is the one that the grid was built for.
-  SummaryLimits(float max_normal_angle_degrees, bool exact_distance);
-};
 
 struct PointBounds {
   std::uint64_t possible;  ///< bit k is 0 only where point first + k is certainly no inlier

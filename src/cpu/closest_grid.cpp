@@ -1,29 +1,19 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <algorithm>
-#include <string>
 
 #include "algorithm/closest_build.hpp"
 #include "cpu/stages.hpp"
-#include "gpureg/error.hpp"
+#include "pipeline/checks.hpp"
 
 namespace gpureg::cpu {
 namespace {
 
 constexpr int kEdge = ClosestGridView::kBlockEdge;
 constexpr int kCells = ClosestGridView::kBlockCells;
-/// Lists this long mean millions of points within one search distance of each other; downsampling is the answer, not memory.
-constexpr std::size_t kMaxCandidates = std::size_t(1) << 28;
-constexpr std::size_t kMaxBlockCandidates = std::size_t(1) << 24;
-
-[[noreturn]] void throw_too_dense(float search_distance) {
-  throw InvalidArgument("point cloud is too dense for search_distance " + std::to_string(search_distance) +
-                        ": prepare it with voxel_size > 0");
-}
-
 /// Keys of all blocks that a query with a point in reach can fall into, ascending.
 std::vector<std::uint64_t> reachable_blocks(const std::vector<Vec3>& points, const ClosestGeometry& g) {
-  const float inverse = 1.0f / (g.cell_size * kEdge);
-  const float reach = g.search_distance + 2.0f * g.margin;
+  const float inverse = 1.0f / block_edge(g);
+  const float reach = point_reach(g);
   std::vector<std::uint64_t> keys;
   for (const Vec3& p : points) {
     const Cell lo = cell_of({p.x - reach, p.y - reach, p.z - reach}, inverse);
@@ -51,7 +41,7 @@ struct BlockLists {
 
 /// Points whose reach touches the block, ascending by index.
 std::vector<std::uint32_t> points_near_block(const GridView& grid, Vec3 center, const ClosestGeometry& g) {
-  const float reach = 0.5f * kEdge * g.cell_size + g.search_distance + 2.0f * g.margin;
+  const float reach = block_reach(g);
   const Cell lo = cell_of({center.x - reach, center.y - reach, center.z - reach}, grid.inverse_cell_size);
   const Cell hi = cell_of({center.x + reach, center.y + reach, center.z + reach}, grid.inverse_cell_size);
   std::vector<std::uint32_t> near;
@@ -70,27 +60,24 @@ std::vector<std::uint32_t> points_near_block(const GridView& grid, Vec3 center, 
 }
 
 void build_block(const GridView& grid, const std::vector<Vec3>& points, Cell block, const ClosestGeometry& g, BlockLists& out) {
-  const float edge = kEdge * g.cell_size;
-  const Vec3 block_center = cell_center(block, edge);
+  const Vec3 block_center = cell_center(block, block_edge(g));
   const std::vector<std::uint32_t> near = points_near_block(grid, block_center, g);
   const std::size_t n = near.size();
   std::vector<float> x(n), y(n), z(n), d2(n);
   for (std::size_t k = 0; k < n; ++k) x[k] = points[near[k]].x, y[k] = points[near[k]].y, z[k] = points[near[k]].z;
   out.counts.assign(kCells, 0);
-  const float half_diagonal = 0.8660255f * g.cell_size;
   for (int cell = 0; cell < kCells; ++cell) {
     const Cell c{block.x * kEdge + (cell & 7), block.y * kEdge + ((cell >> 3) & 7), block.z * kEdge + (cell >> 6)};
     const Vec3 center = cell_center(c, g.cell_size);
     float nearest2 = 3.402823466e38f;
     for (std::size_t k = 0; k < n; ++k) {
       const float dx = x[k] - center.x, dy = y[k] - center.y, dz = z[k] - center.z;
-      d2[k] = std::fmaf(dz, dz, std::fmaf(dy, dy, dx * dx));
+      d2[k] = fmaf(dz, dz, fmaf(dy, dy, dx * dx));
       nearest2 = d2[k] < nearest2 ? d2[k] : nearest2;
     }
     const float nearest = std::sqrt(nearest2);
     if (n == 0 || !can_reach_cell(nearest, g)) continue;
-    // Who is farther from the centre than the nearest point plus the cell's diameter is never the closest.
-    const float limit = std::min(nearest + 2.0f * half_diagonal, g.search_distance + half_diagonal) + 2.0f * g.margin;
+    const float limit = candidate_limit(nearest, g);
     const float limit2 = limit * limit;
     std::size_t first = 0;
     while (d2[first] != nearest2) ++first;
@@ -98,13 +85,11 @@ void build_block(const GridView& grid, const std::vector<Vec3>& points, Cell blo
     for (std::size_t k = 0; k < n; ++k) {
       if (d2[k] > limit2) continue;
       const Vec3 p{x[k], y[k], z[k]};
-      if (k != first && dominated_in_cell(center, best, p, g)) continue;
-      // Of points in the very same place only the first can win.
-      if (k > first && p.x == best.x && p.y == best.y && p.z == best.z) continue;
+      if (k != first && !can_win_in_cell(center, best, p, k > first, g)) continue;
       out.candidates.push_back(near[k]);
       ++out.counts[cell];
     }
-    if (out.candidates.size() > kMaxBlockCandidates) throw_too_dense(g.search_distance);
+    if (out.candidates.size() > pipeline::kMaxBlockCandidates) pipeline::throw_too_dense(g.search_distance);
   }
 }
 
@@ -136,7 +121,7 @@ std::vector<ClosestGrid> build_closest_grids(Exec& exec, const std::vector<Downs
     grid.cell_size = geometry[c].cell_size;
     std::size_t total = 0;
     for (const BlockLists& l : lists[c]) total += l.candidates.size();
-    if (total > kMaxCandidates) throw_too_dense(options.search_distance);
+    if (total > pipeline::kMaxCandidates) pipeline::throw_too_dense(options.search_distance);
     grid.table.reset(keys[c].size());
     grid.cell_start.reserve(keys[c].size() * (kCells + 1));
     grid.candidates.reserve(total);

@@ -1,11 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <limits>
-#include <string>
 
 #include "algorithm/voxel.hpp"
 #include "cpu/radix_sort.hpp"
 #include "cpu/stages.hpp"
-#include "gpureg/error.hpp"
+#include "pipeline/checks.hpp"
 
 namespace gpureg::cpu {
 namespace {
@@ -35,18 +34,6 @@ void find_origin(const RawCloud& raw, float voxel_size, DownsampledCloud& out, s
     for (int k = 0; k < 3; ++k) out.origin[k] = local_origin(lo[k], hi[k], voxel_size);
 }
 
-/// Cells of every structure that will be built must fit their keys; the smallest of them decides.
-void check_extent(float radius, const PrepareOptions& options) {
-  float cell = options.feature_radius * 0.5f;
-  if (options.voxel_size > 0 && options.voxel_size < cell) cell = options.voxel_size;
-  const float blocks = options.search_distance / 3.0f * static_cast<float>(ClosestGridView::kBlockEdge);
-  if (blocks < cell) cell = blocks;
-  if (!(radius < cell * (static_cast<float>(kCellBias) - 8.0f)))
-    throw InvalidArgument("point cloud reaches " + std::to_string(radius) + " from its centre, more than 2^20 cells of " +
-                          std::to_string(cell) + ": voxel_size " + std::to_string(options.voxel_size) +
-                          " is too small for it, or it holds stray points");
-}
-
 void downsample_one(const RawCloud& raw, const PrepareOptions& options, DownsampledCloud& out) {
   std::vector<std::uint32_t> finite;
   find_origin(raw, options.voxel_size, out, finite);
@@ -62,7 +49,7 @@ void downsample_one(const RawCloud& raw, const PrepareOptions& options, Downsamp
     const float d2 = squared_norm(local[k]);
     largest = d2 > largest ? d2 : largest;
   }
-  check_extent(sqrtf(largest), options);
+  pipeline::check_extent(sqrtf(largest), options);
 
   // Groups of points that become one: voxels in order of their key, or every point for itself.
   std::vector<KeyIndex> order(finite.size());

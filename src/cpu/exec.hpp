@@ -40,14 +40,10 @@ class Exec {
     parallel(blocks.size(), [&](std::size_t k) { work(blocks[k].entry, blocks[k].begin, blocks[k].end); });
   }
 
-  void start_clock() { clock_ = std::chrono::steady_clock::now(); }
-  /// Milliseconds since start_clock() or the last lap().
-  double lap() {
-    const auto now = std::chrono::steady_clock::now();
-    const double ms = std::chrono::duration<double, std::milli>(now - clock_).count();
-    clock_ = now;
-    return ms;
-  }
+  /// A point in time, and the time between two.
+  using Mark = std::chrono::steady_clock::time_point;
+  Mark mark() const { return std::chrono::steady_clock::now(); }
+  double milliseconds(Mark from, Mark to) const { return std::chrono::duration<double, std::milli>(to - from).count(); }
 
  private:
   void run_tasks();
@@ -61,7 +57,6 @@ class Exec {
   unsigned long generation_ = 0;
   bool stop_ = false;
   std::exception_ptr error_;
-  std::chrono::steady_clock::time_point clock_;
 };
 
 }  // namespace gpureg::cpu

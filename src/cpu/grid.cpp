@@ -1,9 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include <string>
-
 #include "cpu/radix_sort.hpp"
 #include "cpu/stages.hpp"
-#include "gpureg/error.hpp"
+#include "pipeline/checks.hpp"
 
 namespace gpureg::cpu {
 
@@ -26,18 +24,13 @@ GridView Grid::view() const {
 
 namespace {
 
-/// Cells are half a radius wide, so a thousand points in one mean many thousands within the radius: such neighbourhoods make features
-/// meaningless and take hours. Better an error at once.
-void check_density(const Grid& grid, const PrepareOptions& options) {
+double squared_cell_sizes(const Grid& grid) {
   double squares = 0;
   for (std::size_t k = 0; k + 1 < grid.cell_start.size(); ++k) {
     const double n = grid.cell_start[k + 1] - grid.cell_start[k];
     squares += n * n;
   }
-  const double per_cell = grid.points.empty() ? 0 : squares / static_cast<double>(grid.points.size());
-  if (per_cell > 1000)
-    throw InvalidArgument("on average more than " + std::to_string(static_cast<long>(per_cell)) + " points lie within feature_radius " +
-                          std::to_string(options.feature_radius) + " of each other: use a larger voxel_size or a smaller radius");
+  return squares;
 }
 
 }  // namespace
@@ -63,7 +56,7 @@ std::vector<Grid> build_grids(Exec& exec, const std::vector<DownsampledCloud>& c
       grid.index.push_back(order[i].index);
     }
     grid.cell_start.push_back(static_cast<std::uint32_t>(points.size()));
-    check_density(grid, options);
+    pipeline::check_density(squared_cell_sizes(grid), points.size(), options);
     grid.table.reset(keys.size());
     for (std::size_t k = 0; k < keys.size(); ++k) grid.table.insert(keys[k], static_cast<std::uint32_t>(k));
   });

@@ -6,34 +6,33 @@
 namespace gpureg::pipeline {
 
 /// Pairs of prepared clouds to outcomes (LoopSmart, Algorithm 1), one statement per stage. Exec brings the stages, found by its
-/// namespace; every stage takes all pairs at once.
+/// namespace; every stage takes all pairs at once. Only conclude() waits for the results.
 template <typename Exec>
 void align(Exec& exec, Span<const PairView> pairs, const RegistrationOptions& options, Span<PairOutcome> outcomes) {
-  StageTimings ms;
-  exec.start_clock();
+  const auto begin = exec.mark();
   auto matches = match_features(exec, pairs, options.hypothesis);
-  ms.match = exec.lap();
+  const auto matched = exec.mark();
   auto quadruples = sample_quadruples(exec, matches, options.hypothesis);
-  ms.sample = exec.lap();
+  const auto sampled = exec.mark();
   auto hypotheses = fit_hypotheses(exec, matches, quadruples, options.hypothesis);
-  ms.fit = exec.lap();
+  const auto fitted = exec.mark();
   auto best = score_hypotheses(exec, pairs, hypotheses, options.score);
-  ms.score = exec.lap();
+  const auto scored = exec.mark();
   auto poses = refine_poses(exec, pairs, best, options.score, options.refine);
-  ms.refine = exec.lap();
+  const auto refined = exec.mark();
   auto judgements = judge_poses(exec, pairs, poses, options.score);
-  ms.judge = exec.lap();
-
+  const auto judged = exec.mark();
   conclude(exec, pairs, matches, quadruples, hypotheses, poses, judgements, options, outcomes);
+
   const double share = 1.0 / static_cast<double>(pairs.size);
-  for (PairOutcome& outcome : outcomes) {
-    outcome.timings.match = ms.match * share;
-    outcome.timings.sample = ms.sample * share;
-    outcome.timings.fit = ms.fit * share;
-    outcome.timings.score = ms.score * share;
-    outcome.timings.refine = ms.refine * share;
-    outcome.timings.judge = ms.judge * share;
-  }
+  StageTimings ms;
+  ms.match = exec.milliseconds(begin, matched) * share;
+  ms.sample = exec.milliseconds(matched, sampled) * share;
+  ms.fit = exec.milliseconds(sampled, fitted) * share;
+  ms.score = exec.milliseconds(fitted, scored) * share;
+  ms.refine = exec.milliseconds(scored, refined) * share;
+  ms.judge = exec.milliseconds(refined, judged) * share;
+  for (PairOutcome& outcome : outcomes) outcome.timings = ms;
 }
 
 }  // namespace gpureg::pipeline

@@ -5,28 +5,30 @@
 
 namespace gpureg::pipeline {
 
-/// Raw clouds to fragments, one statement per stage (LoopSmart, section III). Exec brings the stages, found by its namespace.
+/// Raw clouds to fragments, one statement per stage (LoopSmart, section III). Exec brings the stages, found by its namespace; assemble()
+/// waits for the results.
 template <typename Exec>
 auto prepare(Exec& exec, Span<const RawCloud> clouds, const PrepareOptions& options) {
-  exec.start_clock();
+  const auto begin = exec.mark();
   auto points = downsample(exec, clouds, options);
-  const double downsample_ms = exec.lap();
+  const auto downsampled = exec.mark();
   auto grids = build_grids(exec, points, options);
-  const double grid_ms = exec.lap();
+  const auto gridded = exec.mark();
   auto normals = estimate_normals(exec, points, grids, options);
-  const double normals_ms = exec.lap();
+  const auto oriented = exec.mark();
   auto features = compute_features(exec, points, normals, grids, options);
-  const double features_ms = exec.lap();
+  const auto described = exec.mark();
   auto closest = build_closest_grids(exec, points, grids, options);
-  const double closest_ms = exec.lap();
-
+  const auto searchable = exec.mark();
   auto prepared = assemble(exec, points, normals, features, closest, options);
+
+  const double share = 1.0 / static_cast<double>(clouds.size);
   for (auto& cloud : prepared) {
-    const double share = 1.0 / static_cast<double>(clouds.size);
-    cloud->statistics.downsample = downsample_ms * share;
-    cloud->statistics.normals = normals_ms * share;
-    cloud->statistics.features = features_ms * share;
-    cloud->statistics.grid = (grid_ms + closest_ms) * share;
+    PrepareStatistics& ms = cloud->statistics;
+    ms.downsample = exec.milliseconds(begin, downsampled) * share;
+    ms.normals = exec.milliseconds(gridded, oriented) * share;
+    ms.features = exec.milliseconds(oriented, described) * share;
+    ms.grid = (exec.milliseconds(downsampled, gridded) + exec.milliseconds(described, searchable)) * share;
   }
   return prepared;
 }
