@@ -2,7 +2,6 @@
 #include <sys/stat.h>
 
 #include <chrono>
-#include <filesystem>
 #include <iostream>
 #include <map>
 #include <memory>
@@ -17,9 +16,11 @@
 #include "json_file.hpp"
 #include "method_options.hpp"
 #include "options_json.hpp"
+#include "output_path.hpp"
 #include "progress.hpp"
 #include "result_json.hpp"
 #include "scene.hpp"
+#include "spacing.hpp"
 #include "text.hpp"
 
 namespace gpureg::cli {
@@ -39,16 +40,6 @@ struct BatchOptions {
     return options;
   }
 };
-
-// Found out now, not after hours of work.
-void check_output(const std::string& path) {
-  if (path.empty()) return;
-  namespace fs = std::filesystem;
-  if (fs::is_directory(path)) throw IoError("cannot write " + path + ": it is a folder");
-  const fs::path folder = fs::path(path).parent_path();
-  if (!folder.empty() && !fs::is_directory(folder))
-    throw IoError("cannot write " + path + ": there is no folder " + folder.string());
-}
 
 void check_outputs(const BatchOptions& o) {
   for (const std::string* path : {&o.log, &o.info, &o.json}) check_output(*path);
@@ -95,6 +86,7 @@ class Batch {
       std::cerr << "gpureg: interrupted before the first pair, nothing written" << std::endl;
       return kInterrupted;
     }
+    check_voxel_size(options_.prepare.voxel_size, scene_.extent, "the largest fragment");
     pairs_ = choose_pairs(scene_, o_.pairs);
     if (pairs_.empty())
       throw InvalidArgument(o_.pairs == "all" ? o_.folder + " holds one fragment; a batch needs two"

@@ -8,6 +8,7 @@
 #include "command.hpp"
 #include "gpureg/error.hpp"
 #include "json_file.hpp"
+#include "output_path.hpp"
 #include "result_file.hpp"
 #include "text.hpp"
 
@@ -122,6 +123,7 @@ int run(const EvaluateOptions& o) {
     throw InvalidArgument("--ground-truth names " + std::to_string(o.truths.size()) +
                           " folders for " + std::to_string(o.results.size()) +
                           " results; give one for each, in the same order");
+  check_output(o.json);
   std::vector<SceneEvaluation> scenes;
   for (std::size_t k = 0; k < o.results.size(); ++k) {
     ResultFile result = read_result(o.results[k]);
@@ -147,11 +149,15 @@ void add_evaluate(CLI::App& app, Action& chosen) {
       ->required();
   verb->add_option("--json", o->json, "Write the numbers");
   verb->footer(
-      "Numbers in %. Only pairs with j - i > 1 count. strict: a report that is not in gt.log is "
-      "wrong;\n"
-      "geometric: right where the pair is in gt_all.log and within 0.2 m. raw: recall when every "
-      "best\n"
-      "candidate is reported; R@P: recall at that precision; AP: average precision.");
+      std::string(
+          "Numbers in %. Only pairs with j - i > 1 count. strict: a report that is not in gt.log "
+          "is "
+          "wrong;\n"
+          "geometric: right where the pair is in gt_all.log and within 0.2 m. raw: recall when "
+          "every "
+          "best\n"
+          "candidate is reported; R@P: recall at that precision; AP: average precision.\n") +
+      app.get_footer());
   verb->callback([o, &chosen] { chosen = [o] { return run(*o); }; });
 }
 

@@ -6,6 +6,7 @@
 #include <iostream>
 #include <new>
 #include <string>
+#include <vector>
 
 #include "command.hpp"
 #include "gpureg/error.hpp"
@@ -25,10 +26,40 @@ int finish(int status) {
   return std::cout ? status : fail("cannot write to standard output");
 }
 
+std::string list_of_verbs(const CLI::App& app) {
+  std::string list;
+  for (const CLI::App* verb : app.get_subcommands(nullptr))
+    list += (list.empty() ? "" : ", ") + verb->get_name();
+  return list;
+}
+
+// CLI11's own words for a misspelt verb or option do not always name it.
+std::string what_is_wrong(const CLI::App& app, const CLI::ParseError& error, int argc,
+                          char** argv) {
+  const auto chosen = app.get_subcommands();
+  if (chosen.empty()) {
+    const std::string first = argc > 1 ? argv[1] : "";
+    return (first.empty() ? std::string("no verb given") : "there is no verb " + first) +
+           "; verbs: " + list_of_verbs(app) + " (see `gpureg --help`)";
+  }
+  const std::string help = " (see `gpureg " + chosen.front()->get_name() + " --help`)";
+  const std::vector<std::string> unknown = app.remaining(true);
+  if (dynamic_cast<const CLI::ExtrasError*>(&error) == nullptr || unknown.empty())
+    return error.what() + help;
+  const auto option = std::find_if(unknown.begin(), unknown.end(),
+                                   [](const std::string& text) { return text.rfind("-", 0) == 0; });
+  return option == unknown.end() ? "unexpected argument " + unknown.front() + help
+                                 : "unknown option " + *option + help;
+}
+
 int run(int argc, char** argv) {
   CLI::App app{"Global registration of point clouds, on the CPU and on the GPU.", "gpureg"};
   app.set_version_flag("--version", "gpureg " GPUREG_VERSION);
   app.require_subcommand(1);
+  // Verbs take it over when they are added.
+  app.footer(
+      "Exit status: 0 aligned or done, 1 no alignment found, 2 bad usage or input, 130 "
+      "interrupted.");
   Action action;
   add_register(app, action);
   add_batch(app, action);
@@ -36,17 +67,12 @@ int run(int argc, char** argv) {
   add_report(app, action);
   add_generate(app, action);
   add_info(app, action);
-  // Last, as verbs inherit it.
-  app.footer(
-      "Exit status: 0 aligned or done, 1 no alignment found, 2 bad usage or input, 130 "
-      "interrupted.\n"
-      "`gpureg VERB --help` explains a verb.");
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
     // Help and version come as exceptions, too.
     if (error.get_exit_code() == 0) return finish(app.exit(error));
-    return fail(std::string(error.what()) + " (see `gpureg --help`)");
+    return fail(what_is_wrong(app, error, argc, argv));
   }
   return finish(action());
 }

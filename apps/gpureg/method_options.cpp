@@ -33,6 +33,10 @@ void MethodOptions::add_to(CLI::App& verb) {
   verb.add_option("--threads", threads, "Threads of the CPU backend; 0: all")
       ->check(natural_number())
       ->capture_default_str();
+  verb.add_option("--hypotheses", hypotheses,
+                  "Quadruples of matches tried per pair: fewer are faster, more find less overlap")
+      ->check(natural_number())
+      ->capture_default_str();
   verb.add_option("--seed", seed, "Same seed, same result, on any machine")
       ->check(natural_number())
       ->capture_default_str();
@@ -42,6 +46,7 @@ RegistrationOptions MethodOptions::registration() const {
   RegistrationOptions options = preset == "loopsmart"
                                     ? RegistrationOptions::loopsmart(voxel_size)
                                     : RegistrationOptions::from_voxel_size(voxel_size);
+  options.hypothesis.count = hypotheses;
   options.hypothesis.seed = seed;
   options.validate();
   return options;

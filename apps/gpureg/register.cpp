@@ -12,7 +12,9 @@
 #include "json_file.hpp"
 #include "method_options.hpp"
 #include "options_json.hpp"
+#include "output_path.hpp"
 #include "result_json.hpp"
+#include "spacing.hpp"
 #include "text.hpp"
 
 namespace gpureg::cli {
@@ -93,9 +95,12 @@ Json document(const RegisterOptions& o, const RegistrationOptions& options, cons
 
 int run(const RegisterOptions& o) {
   const RegistrationOptions options = o.method.registration();
+  for (const std::string* path : {&o.json, &o.overlay, &o.image}) check_output(*path);
   const Context context = o.method.context();
   const PointCloud source_cloud = io::read_point_cloud(o.source);
   const PointCloud target_cloud = io::read_point_cloud(o.target);
+  check_voxel_size(options.prepare.voxel_size, extent_of(source_cloud.points), o.source);
+  check_voxel_size(options.prepare.voxel_size, extent_of(target_cloud.points), o.target);
   const PreparedCloud source = prepare(context, source_cloud.view(), options.prepare);
   const PreparedCloud target = prepare(context, target_cloud.view(), options.prepare);
   const RegistrationResult result = align(context, source, target, options);

@@ -9,6 +9,7 @@
 #include "command.hpp"
 #include "gpureg/error.hpp"
 #include "gpureg/io.hpp"
+#include "output_path.hpp"
 #include "report_page.hpp"
 #include "report_pairs.hpp"
 #include "text.hpp"
@@ -46,6 +47,7 @@ std::vector<Picture> draw(const std::vector<SamplePair>& samples, const std::str
 }
 
 int run(const ReportOptions& o) {
+  check_output(o.output);
   const ResultFile result = read_result(o.result);
   if (!result.has_scores)
     throw IoError(o.result +

@@ -7,6 +7,13 @@
 namespace gpureg::cli {
 namespace {
 
+// The library's number of the error, which its messages begin with, means nothing to a user.
+std::string plain(const std::string& message) {
+  const std::size_t end = message.find("] ");
+  return message.rfind("[json.", 0) == 0 && end != std::string::npos ? message.substr(end + 2)
+                                                                     : message;
+}
+
 void read_pairs(ResultFile& file, Json document) {
   if (!document.is_object() || !document.contains("pairs") || !document["pairs"].is_array())
     throw IoError(file.path + ": no result of `gpureg batch`, it has no array \"pairs\"");
@@ -67,7 +74,7 @@ ResultFile read_result(const std::string& path) {
     try {
       document = Json::parse(text);
     } catch (const Json::exception& error) {
-      throw IoError(path + ": " + error.what());
+      throw IoError(path + ": " + plain(error.what()));
     }
     read_pairs(file, std::move(document));
   } else {

@@ -10,6 +10,7 @@
 #include "gpureg/io.hpp"
 #include "interrupt.hpp"
 #include "progress.hpp"
+#include "spacing.hpp"
 
 namespace gpureg::cli {
 namespace {
@@ -67,6 +68,7 @@ Scene prepare_scene(const Context& context, const std::string& folder,
       scene.numbers.push_back(number);
       scene.files.push_back(file);
       scene.hashes.push_back(hash_of(chunk.back()));
+      scene.extent = std::max(scene.extent, extent_of(chunk.back().points));
     }
     std::vector<PointCloudView> views;
     for (const PointCloud& cloud : chunk) views.push_back(cloud.view());
@@ -95,7 +97,8 @@ std::vector<std::pair<std::uint32_t, std::uint32_t>> choose_pairs(const Scene& s
   };
   std::set<std::pair<std::uint32_t, std::uint32_t>> seen;
   for (const auto& [a, b] : io::read_pairs(pairs)) {
-    const auto pair = std::minmax(index_of(a), index_of(b));
+    const std::uint32_t i = index_of(a), j = index_of(b);
+    const std::pair<std::uint32_t, std::uint32_t> pair(std::min(i, j), std::max(i, j));
     if (seen.insert(pair).second) chosen.push_back(pair);
   }
   return chosen;

@@ -17,6 +17,7 @@ struct Scene {
   std::vector<std::uint64_t>
       hashes;  ///< of what went into prepare(): points, normals, sensor positions
   std::vector<PreparedCloud> clouds;
+  double extent = 0;  ///< longest side of the largest fragment
   double seconds = 0;
   bool interrupted = false;  ///< stopped before all were prepared
 

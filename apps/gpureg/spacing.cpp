@@ -7,6 +7,9 @@
 #include <cstdint>
 #include <limits>
 
+#include "gpureg/error.hpp"
+#include "text.hpp"
+
 namespace gpureg::cli {
 namespace {
 
@@ -104,6 +107,18 @@ double suggested_voxel_size(const std::vector<Eigen::Vector3f>& points, double s
     (occupied_voxels(sample, box.min(), middle) > kWantedPoints ? low : high) = middle;
   }
   return rounded(std::max(high, spacing));
+}
+
+double extent_of(const std::vector<Eigen::Vector3f>& points) {
+  const Eigen::AlignedBox3f box = box_of(finite_points(points));
+  return box.isEmpty() ? 0 : box.sizes().cast<double>().maxCoeff();
+}
+
+void check_voxel_size(float voxel_size, double extent, const std::string& what) {
+  if (extent > 0 && static_cast<double>(voxel_size) > extent)
+    throw InvalidArgument("voxel_size is " + significant(static_cast<double>(voxel_size), 6) +
+                          ", but " + what + " extends over " + significant(extent, 3) +
+                          " only; `gpureg info` suggests a size");
 }
 
 }  // namespace gpureg::cli

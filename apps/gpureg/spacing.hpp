@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <string>
 #include <vector>
 
 namespace gpureg::cli {
@@ -16,5 +17,13 @@ double median_spacing(const std::vector<Eigen::Vector3f>& points, int rank = 1);
 /// A voxel size that leaves about 5000 points, which is what registration works well and fast with,
 /// rounded to 1 or 2 digits, and not below the spacing; 0 where the points have no extent.
 double suggested_voxel_size(const std::vector<Eigen::Vector3f>& points, double spacing);
+
+/// Longest side of the box around the finite points; 0 where there are fewer than two.
+double extent_of(const std::vector<Eigen::Vector3f>& points);
+
+/// A voxel larger than the whole cloud leaves next to nothing, and any pose fits that. Throws
+/// InvalidArgument naming the size and what is smaller; an extent of 0 passes, as alignment itself
+/// says why such a cloud is of no use.
+void check_voxel_size(float voxel_size, double extent, const std::string& what);
 
 }  // namespace gpureg::cli

@@ -1,0 +1,152 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <gtest/gtest.h>
+
+#include <map>
+
+#include "cli/command.hpp"
+#include "cli/scene.hpp"
+#include "gpureg/evaluation.hpp"
+#include "support/scan.hpp"
+
+namespace gpureg::test {
+namespace {
+
+constexpr int kScans = 4, kAll = (kScans + 2) * (kScans + 1) / 2;
+
+class Batch : public ::testing::Test {
+ protected:
+  Batch() { write_scans(scans_, kScans, true); }
+
+  Outcome batch(const std::string& name, const std::vector<std::string>& more = {}) const {
+    return run(joined(joined({"batch", scans_.path(), "-o", out_ / (name + ".log"), "--info",
+                              out_ / (name + ".info"), "--json", out_ / (name + ".json")},
+                             kSmall),
+                      more));
+  }
+
+  const TemporaryFolder scans_, out_;
+};
+
+TEST_F(Batch, LogAndInformationOfTheAlignedPairs) {
+  const Outcome outcome = batch("r");
+  ASSERT_EQ(outcome.status, 0) << outcome.err;
+  expect_holds(outcome.out, {"fragments  6", "pairs      15", "aligned    6, written to",
+                             "inlier_ratio_too_low", "too_few", "memory"});
+  const auto log = evaluation::read_log(out_ / "r.log");
+  const auto information = evaluation::read_information(out_ / "r.info");
+  ASSERT_EQ(log.size(), 6u);  // the scans of the room, each with each
+  ASSERT_EQ(information.size(), 6u);
+  for (std::size_t k = 0; k < log.size(); ++k) {
+    EXPECT_LT(log[k].i, log[k].j);
+    EXPECT_LT(log[k].j, kScans);
+    EXPECT_EQ(log[k].count, kScans + 2);
+    EXPECT_EQ(information[k].i, log[k].i);
+    EXPECT_EQ(information[k].j, log[k].j);
+    EXPECT_GT(information[k].information(0, 0), 1000);
+    // T_ij takes points of j to i, here to a fraction of the voxels of 0.1 m.
+    const Eigen::Isometry3d truth = scan_from_room(log[k].i) * scan_from_room(log[k].j).inverse();
+    EXPECT_LT(translation_error(truth, Eigen::Isometry3d(log[k].transform)), 0.05);
+    EXPECT_LT(rotation_error_degrees(truth, Eigen::Isometry3d(log[k].transform)), 1);
+  }
+  EXPECT_EQ(out_.count(), 3u) << "the journal must be gone";
+}
+
+TEST_F(Batch, JsonHasEveryFieldOfEveryPair) {
+  ASSERT_EQ(batch("r").status, 0);
+  const auto json = json_of(out_ / "r.json");
+  for (const char* name : {"environment", "options", "folder", "seconds", "peak_memory_mib"})
+    EXPECT_TRUE(json.contains(name)) << name;
+  EXPECT_EQ(json["complete"], true);
+  ASSERT_EQ(json["fragments"].size(), 6u);
+  EXPECT_EQ(json["fragments"][5]["number"], 5);
+  EXPECT_EQ(json["fragments"][5]["file"], "cloud_bin_5.ply");
+  EXPECT_EQ(json["fragments"][5]["input_points"], 2);
+  ASSERT_EQ(json["pairs"].size(), static_cast<std::size_t>(kAll));
+  std::map<std::string, int> reasons;
+  int i = 0, j = 1;
+  for (const auto& pair : json["pairs"]) {
+    SCOPED_TRACE(pair.dump());
+    EXPECT_EQ(pair["i"], i);
+    EXPECT_EQ(pair["j"], j);
+    if (++j == kScans + 2) j = ++i + 1;
+    EXPECT_TRUE(pair["score"].is_number());
+    for (const char* count :
+         {"source_points", "target_points", "correspondences", "hypotheses", "survivors", "scored",
+          "points_scored", "consensus", "inliers", "refine_iterations"})
+      EXPECT_TRUE(pair["statistics"][count].is_number_unsigned()) << count;
+    for (const char* stage : {"match", "sample", "fit", "score", "refine", "judge", "total"})
+      EXPECT_GE(pair["ms"][stage].get<double>(), 0) << stage;
+    const std::string status = pair["status"], reason = pair["reason"];
+    ++reasons[reason];
+    EXPECT_EQ(status, reason == "none" ? "aligned" : "not_aligned");
+    if (reason == "too_few_source_points")
+      EXPECT_TRUE(pair["T_ij"].is_null());
+    else if (reason == "none" || reason == "inlier_ratio_too_low")
+      EXPECT_EQ(pair["T_ij"].size(), 16u);  // the best candidate, reported or not
+  }
+  EXPECT_EQ(reasons["none"], 6);
+  EXPECT_EQ(reasons["inlier_ratio_too_low"], kScans);
+  EXPECT_EQ(reasons["too_few_source_points"], kScans + 1);
+}
+
+TEST_F(Batch, ThreadsChangeNoByte) {
+  ASSERT_EQ(batch("t1", {"--threads", "1"}).status, 0);
+  for (const std::string threads : {"2", "7"}) {
+    const std::string name = "t" + threads;
+    ASSERT_EQ(batch(name, {"--threads", threads}).status, 0);
+    EXPECT_EQ(content_of(out_ / (name + ".log")), content_of(out_ / "t1.log"));
+    EXPECT_EQ(content_of(out_ / (name + ".info")), content_of(out_ / "t1.info"));
+    EXPECT_EQ(without_times(json_of(out_ / (name + ".json"))).dump(),
+              without_times(json_of(out_ / "t1.json")).dump());
+  }
+}
+
+TEST_F(Batch, PairsOfAFile) {
+  const std::string pairs = out_.write("pairs.txt", "# i j\n3 1\n0 2\n1 3\n0 5\n");
+  const Outcome outcome = batch("some", {"--pairs", pairs});
+  ASSERT_EQ(outcome.status, 0) << outcome.err;
+  expect_holds(outcome.out, {"pairs      3"});  // 3 1 and 1 3 are the same
+  const auto json = json_of(out_ / "some.json");
+  ASSERT_EQ(json["pairs"].size(), 3u);
+  EXPECT_EQ(json["pairs"][0]["i"], 1);
+  EXPECT_EQ(json["pairs"][0]["j"], 3);
+  EXPECT_EQ(json["pairs"][1]["j"], 2);
+  // The same pair among all of them has the same result.
+  ASSERT_EQ(batch("all").status, 0);
+  for (auto pair : without_times(json_of(out_ / "all.json"))["pairs"])
+    if (pair["i"] == 1 && pair["j"] == 3) EXPECT_EQ(pair, without_times(json)["pairs"][0]);
+}
+
+TEST_F(Batch, MinimalScoreDecidesWhatIsReported) {
+  ASSERT_EQ(batch("all", {"--min-score", "0"}).status, 0);
+  // Every pair that has a pose is in the log now.
+  EXPECT_EQ(evaluation::read_log(out_ / "all.log").size(), 6u + kScans);
+  const Outcome none = batch("none", {"--min-score", "1"});
+  EXPECT_EQ(none.status, 1) << "no pair aligned";
+  EXPECT_TRUE(evaluation::read_log(out_ / "none.log").empty());
+  EXPECT_EQ(json_of(out_ / "none.json")["options"]["score"]["min_inlier_ratio"], 1.0);
+  // The candidates are the same whatever is reported.
+  const auto poses = [&](const char* name) {
+    auto pairs = without_times(json_of(out_ / name))["pairs"];
+    for (auto& pair : pairs) pair.erase("status"), pair.erase("reason");
+    return pairs;
+  };
+  EXPECT_EQ(poses("all.json"), poses("none.json"));
+}
+
+TEST_F(Batch, QuietSaysNothing) {
+  const Outcome outcome = batch("r", {"--quiet"});
+  EXPECT_EQ(outcome.status, 0);
+  EXPECT_EQ(outcome.out + outcome.err, "");
+}
+
+TEST_F(Batch, CamerasOrientTheNormals) {
+  ASSERT_EQ(batch("without").status, 0);
+  // The sensor of fragment 0 behind its walls: all its normals turn round.
+  scans_.write("cameras.txt", "0 0 -9 -9 -9 0 0 0 1\n");
+  batch("with");
+  EXPECT_NE(content_of(out_ / "with.log"), content_of(out_ / "without.log"));
+}
+
+}  // namespace
+}  // namespace gpureg::test

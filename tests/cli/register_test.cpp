@@ -1,0 +1,110 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <gtest/gtest.h>
+
+#include "cli/command.hpp"
+#include "cli/scene.hpp"
+#include "gpureg/io.hpp"
+
+namespace gpureg::test {
+namespace {
+
+class Register : public ::testing::Test {
+ protected:
+  Outcome align(const std::vector<std::string>& more) const {
+    return run(joined(joined({"register", source_, target_}, kSmall), more));
+  }
+
+  const TemporaryFolder folder_;
+  const std::string source_ = write_cloud(folder_, "source.ply", room_scan(0));
+  const std::string target_ = write_cloud(folder_, "target.ply", room_scan(1));
+};
+
+TEST_F(Register, SaysWhatItFound) {
+  const Outcome outcome = align({});
+  EXPECT_EQ(outcome.status, 0);
+  EXPECT_EQ(outcome.err, "");
+  expect_holds(outcome.out, {source_, target_, "backend  cpu", "status   aligned",
+                             "target_from_source\n", "score", "inliers", "correspondences",
+                             "hypotheses 40,000", "survivors", "features", "match", "refine"});
+}
+
+TEST_F(Register, Json) {
+  const std::string path = folder_ / "r.json";
+  ASSERT_EQ(align({"--json", path, "--seed", "7"}).status, 0);
+  const auto json = json_of(path);
+  EXPECT_EQ(json["options"]["hypothesis"]["seed"], 7);
+  EXPECT_EQ(json["options"]["prepare"]["voxel_size"], 0.1);
+  EXPECT_EQ(json["environment"]["backend"], "cpu");
+  EXPECT_EQ(json["source"]["file"], source_);
+  EXPECT_EQ(json["source"]["prepare"]["input_points"], room_scan(0).points.size());
+  const auto& result = json["result"];
+  EXPECT_EQ(result["status"], "aligned");
+  EXPECT_EQ(result["reason"], "none");
+  EXPECT_GT(result["score"], 0.5);
+  EXPECT_EQ(result["target_from_source"].size(), 16u);
+  EXPECT_EQ(result["information_redwood"].size(), 36u);
+  // Redwood counts the correspondences in the first entry, Open3D behind the rotation block;
+  // inliers also pass the normal test.
+  EXPECT_EQ(result["information_redwood"][0], result["information_open3d"][21]);
+  EXPECT_GE(result["information_redwood"][0], result["statistics"]["inliers"]);
+  EXPECT_LE(result["information_redwood"][0], result["statistics"]["source_points"]);
+}
+
+TEST_F(Register, SeedDecidesAndThreadsDoNot) {
+  const auto result = [&](const std::vector<std::string>& more) {
+    EXPECT_EQ(align(joined({"--json", folder_ / "r.json"}, more)).status, 0);
+    auto json = json_of(folder_ / "r.json")["result"];
+    json.erase("ms");
+    return json;
+  };
+  const auto one = result({"--threads", "1"});
+  EXPECT_EQ(one, result({"--threads", "7"}));
+  EXPECT_NE(one["statistics"]["survivors"], result({"--seed", "2"})["statistics"]["survivors"]);
+  EXPECT_EQ(result({"--preset", "loopsmart"})["statistics"]["refine_iterations"], 0);
+}
+
+TEST_F(Register, Overlay) {
+  const std::string path = folder_ / "overlay.ply";
+  ASSERT_EQ(align({"--overlay", path}).status, 0);
+  const PointCloud overlay = io::read_point_cloud(path);
+  EXPECT_EQ(overlay.points.size(), room_scan(0).points.size() + room_scan(1).points.size());
+  expect_holds(content_of(path).substr(0, 400), {"property uchar red"});
+}
+
+// Width and height stand at fixed places of a PNG, high byte first.
+std::pair<unsigned, unsigned> png_size(const std::string& bytes) {
+  const auto number = [&](std::size_t at) {
+    unsigned value = 0;
+    for (std::size_t k = at; k < at + 4; ++k)
+      value = value << 8 | static_cast<unsigned char>(bytes[k]);
+    return value;
+  };
+  return {number(16), number(20)};
+}
+
+TEST_F(Register, Image) {
+  const std::string path = folder_ / "picture.png";
+  ASSERT_EQ(align({"--image", path}).status, 0);
+  const std::string bytes = content_of(path);
+  ASSERT_EQ(bytes.substr(0, 8), "\x89PNG\r\n\x1a\n");
+  const auto [width, height] = png_size(bytes);
+  EXPECT_GT(width, 800u);
+  EXPECT_GT(height, 300u);
+  EXPECT_GT(bytes.size(), 20000u) << "an empty picture compresses to less";
+}
+
+TEST_F(Register, WithoutAPoseThereIsNoOverlayButAPicture) {
+  PointCloud nothing;
+  const Outcome outcome =
+      run(joined({"register", write_cloud(folder_, "none.ply", nothing), target_, "--overlay",
+                  folder_ / "o.ply", "--image", folder_ / "p.png", "--json", folder_ / "r.json"},
+                 kSmall));
+  EXPECT_EQ(outcome.status, 1);
+  expect_holds(outcome.err, {"no overlay written"});
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "o.ply"));
+  EXPECT_EQ(content_of(folder_ / "p.png").substr(1, 3), "PNG");
+  EXPECT_TRUE(json_of(folder_ / "r.json")["result"]["target_from_source"].is_null());
+}
+
+}  // namespace
+}  // namespace gpureg::test

@@ -1,0 +1,167 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <csignal>
+#include <thread>
+
+#include "cli/command.hpp"
+#include "cli/scene.hpp"
+
+namespace gpureg::test {
+namespace {
+
+constexpr int kScans = 8, kPairs = kScans * (kScans - 1) / 2;
+
+/// Runs that end in the middle, and runs that go on.
+class Resume : public ::testing::Test {
+ protected:
+  Resume() {
+    write_scans(scans_, kScans, false);
+    EXPECT_EQ(run(batch("whole")).status, 0);
+  }
+
+  std::vector<std::string> batch(const std::string& name,
+                                 const std::vector<std::string>& more = {}) const {
+    return joined(joined({"batch", scans_.path(), "-o", out_ / (name + ".log"), "--info",
+                          out_ / (name + ".info"), "--json", out_ / (name + ".json")},
+                         kSmall),
+                  more);
+  }
+
+  std::string journal(const std::string& name) const { return out_ / (name + ".log.journal"); }
+
+  std::size_t lines(const std::string& path) const {
+    const std::string text = content_of(path);
+    return static_cast<std::size_t>(std::count(text.begin(), text.end(), '\n'));
+  }
+
+  // Ends a run by a signal when it has done a few pairs.
+  Outcome ended_midway(const std::string& name, int signal) const {
+    Command command(batch(name, {"--threads", "1"}));  // small chunks, so that there is a midway
+    while (command.running() && lines(journal(name)) < 4)
+      std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    command.send(signal);
+    return command.wait();
+  }
+
+  void expect_like_whole(const std::string& name) const {
+    for (const char* end : {".log", ".info"})
+      EXPECT_TRUE(content_of(out_ / (name + end)) ==
+                  content_of(out_ / (std::string("whole") + end)))
+          << name << end << " differs";
+    EXPECT_TRUE(without_times(json_of(out_ / (name + ".json"))) ==
+                without_times(json_of(out_ / "whole.json")));
+    EXPECT_FALSE(std::filesystem::exists(journal(name)));
+  }
+
+  const TemporaryFolder scans_, out_;
+};
+
+TEST_F(Resume, AfterAKill) {
+  const Outcome killed = ended_midway("r", SIGKILL);
+  ASSERT_EQ(killed.signal, SIGKILL);
+  EXPECT_FALSE(std::filesystem::exists(out_ / "r.log")) << "half a result must not look like one";
+  const std::size_t done = lines(journal("r")) - 1;
+  ASSERT_GT(done, 0u);
+  ASSERT_LT(done, static_cast<std::size_t>(kPairs));
+  const Outcome resumed = run(batch("r", {"--resume"}));
+  EXPECT_EQ(resumed.status, 0);
+  expect_holds(resumed.err, {std::to_string(done) + " of 28 pairs are done already"});
+  expect_like_whole("r");
+  EXPECT_EQ(json_of(out_ / "r.json")["seconds"]["pairs_in_this_run"], kPairs - done);
+}
+
+TEST_F(Resume, AfterAKillInTheMiddleOfALine) {
+  ASSERT_EQ(ended_midway("r", SIGKILL).signal, SIGKILL);
+  const std::string text = content_of(journal("r"));
+  out_.write("r.log.journal", text.substr(0, text.size() - 40));
+  EXPECT_EQ(run(batch("r", {"--resume"})).status, 0);
+  expect_like_whole("r");
+}
+
+TEST_F(Resume, AfterCtrlC) {
+  for (const int signal : {SIGINT, SIGTERM}) {
+    const Outcome interrupted = ended_midway("r", signal);
+    EXPECT_EQ(interrupted.status, 130);
+    expect_holds(interrupted.err, {"interrupted", "of 28 pairs are done", "--resume"});
+    // What is done is kept: files that are whole, and say that they are not all.
+    const auto json = json_of(out_ / "r.json");
+    EXPECT_EQ(json["complete"], false);
+    const std::size_t done = json["pairs"].size();
+    EXPECT_GT(done, 0u);
+    EXPECT_LT(done, static_cast<std::size_t>(kPairs));
+    EXPECT_EQ(lines(out_ / "r.log"), 5 * done);
+    EXPECT_EQ(content_of(out_ / "whole.log").rfind(content_of(out_ / "r.log"), 0), 0u);
+    EXPECT_EQ(run(batch("r", {"--resume"})).status, 0);
+    expect_like_whole("r");
+  }
+}
+
+TEST_F(Resume, NothingToResumeStartsAnew) {
+  EXPECT_EQ(run(batch("r", {"--resume"})).status, 0);
+  expect_like_whole("r");
+}
+
+TEST_F(Resume, WithoutResumeItStartsAnewAndSaysSo) {
+  ended_midway("r", SIGINT);
+  const Outcome anew = run(batch("r"));
+  EXPECT_EQ(anew.status, 0);
+  expect_holds(anew.err, {"starting anew", "discarded"});
+  expect_like_whole("r");
+}
+
+TEST_F(Resume, ChangedOptionsAreRefused) {
+  ended_midway("r", SIGINT);
+  const std::string before = content_of(journal("r"));
+  const auto refused = [&](const std::vector<std::string>& change,
+                           std::initializer_list<std::string> fragments) {
+    expect_refused(batch("r", joined({"--resume", "--quiet"}, change)), fragments);
+    EXPECT_EQ(content_of(journal("r")), before);
+  };
+  refused({"--seed", "2"}, {"cannot resume", "options.hypothesis.seed was 1, now 2"});
+  refused({"--min-score", "0.5"}, {"options.score.min_inlier_ratio was 0.3, now 0.5"});
+  refused({"--preset", "loopsmart"}, {"cannot resume", "options."});
+  const std::string pairs = out_.write("pairs.txt", "0 1\n");
+  refused({"--pairs", pairs}, {"pairs.count was 28, now 1"});
+  // The fragments themselves count as well.
+  write_cloud(scans_, "cloud_bin_3.ply", room_scan(9));
+  refused({}, {"fragments[3].hash was"});
+  std::filesystem::remove(scans_ / "cloud_bin_7.ply");
+  refused({}, {"cannot resume"});
+}
+
+TEST_F(Resume, DamagedJournalsAreRefused) {
+  ended_midway("r", SIGINT);
+  std::string text = content_of(journal("r"));
+  const std::size_t second = text.find('\n') + 1;
+  text[second] = '!';
+  out_.write("r.log.journal", text);
+  expect_refused(batch("r", {"--resume"}), {journal("r"), "line 2", "damaged"});
+  EXPECT_EQ(content_of(journal("r")), text);
+}
+
+TEST_F(Resume, TwoRunsOfTheSameResult) {
+  Command first(batch("r", {"--threads", "1"}));
+  while (first.running() && lines(journal("r")) < 1)
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  first.send(SIGSTOP);
+  expect_refused(batch("r", {"--quiet"}), {journal("r"), "in use"});
+  first.send(SIGCONT);
+  EXPECT_EQ(first.wait().status, 0);
+  expect_like_whole("r");
+}
+
+TEST_F(Resume, InterruptedBeforeTheFirstPair) {
+  Command command(batch("early"));
+  // The handler may not be there yet: a death by the signal is as good, files are not.
+  std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  command.send(SIGINT);
+  const Outcome outcome = command.wait();
+  EXPECT_TRUE(outcome.signal == SIGINT || outcome.status == 130) << outcome.status;
+  if (outcome.status == 130) expect_holds(outcome.err, {"interrupted"});
+  if (outcome.signal == SIGINT) EXPECT_FALSE(std::filesystem::exists(out_ / "early.log"));
+}
+
+}  // namespace
+}  // namespace gpureg::test

@@ -1,0 +1,93 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <gtest/gtest.h>
+
+#include "cli/command.hpp"
+#include "cli/scene.hpp"
+
+namespace gpureg::test {
+namespace {
+
+class Usage : public ::testing::Test {
+ protected:
+  // A run that has all it needs, but for what a test adds.
+  std::vector<std::string> with(const std::vector<std::string>& more) const {
+    return joined({"register", cloud_, cloud_}, more);
+  }
+
+  const TemporaryFolder folder_;
+  const std::string cloud_ = write_cloud(folder_, "cloud.ply", room_scan(0));
+};
+
+TEST_F(Usage, HelpAndVersionAreNoErrors) {
+  for (const char* verb : {"register", "batch", "evaluate", "report", "generate", "info"}) {
+    const Outcome help = run({verb, "--help"});
+    EXPECT_EQ(help.status, 0);
+    EXPECT_EQ(help.err, "");
+    expect_holds(help.out, {verb, "Exit status: 0 aligned"});
+  }
+  const Outcome version = run({"--version"});
+  EXPECT_EQ(version.status, 0);
+  EXPECT_EQ(version.out.rfind("gpureg ", 0), 0u);
+}
+
+TEST_F(Usage, VerbsAndOptionsThatDoNotExist) {
+  expect_refused({}, {"no verb", "register, batch, evaluate, report, generate, info"});
+  expect_refused({"regsiter", "a", "b"}, {"regsiter", "register, batch"});
+  expect_refused({"--bogus"}, {"--bogus"});
+  expect_refused(with({"--sed", "3"}), {"--sed", "gpureg register --help"});
+  expect_refused(with({"third.ply"}), {"third.ply"});
+  expect_refused({"register", cloud_}, {"TARGET"});
+  expect_refused({"batch", folder_.path()}, {"--output"});
+  expect_refused({"evaluate", "a.log"}, {"--ground-truth"});
+  expect_refused(with({"--json"}), {"--json"});
+}
+
+TEST_F(Usage, VoxelSizes) {
+  expect_refused(with({"--voxel-size", "0"}), {"voxel_size is 0", "expected"});
+  expect_refused(with({"--voxel-size", "nan"}), {"voxel_size is nan"});
+  expect_refused(with({"--voxel-size", "-0.05"}), {"voxel_size is -0.05"});
+  expect_refused(with({"--voxel-size", "inf"}), {"voxel_size is inf"});
+  expect_refused(with({"--voxel-size", "1e30"}), {"voxel_size is 1e+30"});
+  expect_refused(with({"--voxel-size", "1e-30"}), {"voxel_size is 1e-30"});
+  expect_refused(with({"--voxel-size", "1e99"}), {"voxel_size is inf"});  // no float holds it
+  expect_refused(with({"--voxel-size", "5cm"}), {"--voxel-size", "5cm"});
+  expect_refused(with({"--voxel-size", ""}), {"voxel_size is 0"});
+  // A good number, but the cloud has more than 2^20 such voxels along an edge.
+  PointCloud wide = room_scan(0);
+  wide.points.emplace_back(10000.f, 0.f, 0.f);
+  expect_refused(
+      {"register", write_cloud(folder_, "wide.ply", wide), cloud_, "--voxel-size", "0.002"},
+      {"voxel_size 0.002", "too small"});
+}
+
+TEST_F(Usage, AVoxelLargerThanTheCloud) {
+  // Five points would be left, which any pose brings together.
+  expect_refused(with({"--voxel-size", "1000"}), {"voxel_size is 1000", cloud_, "extends over"});
+  write_scans(folder_, 2, false);
+  expect_refused({"batch", folder_.path(), "-o", folder_ / "r.log", "--voxel-size", "1000"},
+                 {"voxel_size is 1000", "extends over"});
+}
+
+TEST_F(Usage, OtherValues) {
+  expect_refused(with({"--seed", "-4"}), {"--seed", "-4"});
+  expect_refused(with({"--seed", "1.5"}), {"--seed", "1.5"});
+  expect_refused(with({"--seed", "18446744073709551616"}), {"--seed", "18446744073709551616"});
+  expect_refused(with({"--hypotheses", "0"}), {"hypothesis.count is 0"});
+  expect_refused(with({"--hypotheses", "2000000000"}), {"hypothesis.count is 2000000000"});
+  expect_refused(with({"--hypotheses", "4e6"}), {"--hypotheses", "4e6"});
+  expect_refused(with({"--hypotheses", "4294967297"}), {"--hypotheses", "4294967297"});
+  expect_refused(with({"--threads", "-1"}), {"--threads", "-1"});
+  expect_refused(with({"--threads", "two"}), {"--threads", "two"});
+  expect_refused(with({"--preset", "fast"}), {"--preset", "fast", "loopsmart"});
+  expect_refused(with({"--backend", "gpu"}), {"--backend", "gpu", "cuda"});
+  for (const char* score : {"-0.1", "1.01", "nan", "high"})
+    expect_refused({"batch", folder_.path(), "-o", folder_ / "r.log", "--min-score", score},
+                   {"score", score});
+}
+
+TEST_F(Usage, MessagesStayInOneLine) {
+  expect_refused({"info", folder_ / "two\nlines.ply"}, {"two lines.ply"});
+}
+
+}  // namespace
+}  // namespace gpureg::test
