@@ -27,6 +27,7 @@ Json to_json(const RegistrationOptions& options) {
                      {"search_distance", shortest(p.search_distance)}};
   json["hypothesis"] = {{"count", h.count},
                         {"neighbors", h.neighbors},
+                        {"max_survivors", h.max_survivors},
                         {"mutual", h.mutual},
                         {"edge_similarity", shortest(h.edge_similarity)},
                         {"smaller_as_source", h.smaller_as_source},

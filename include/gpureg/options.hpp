@@ -23,6 +23,9 @@ struct HypothesisOptions {
   std::uint32_t neighbors = 1;         ///< nearest features kept per source point, 1..16 (paper: 1)
   bool mutual = false;                 ///< keep only matches that are nearest in both directions
   float edge_similarity = 0.9f;        ///< tau of the polygon test: sides may differ by this ratio, in (0, 1] (paper: 0.9)
+  /// Of the quadruples that pass the polygon test, the first so many are scored. Real pairs stay far below (a hundred thousand where
+  /// almost every match is right); two copies of one cloud would let millions through, each as good as the next. 1..2^22.
+  std::uint32_t max_survivors = 1u << 18;
   bool smaller_as_source = true;       ///< sample and score the cloud with fewer points (Choi et al. 2015); the pose is turned back
   std::uint64_t seed = 1;              ///< same seed, same bits, on any backend, thread count and batch split
 

@@ -34,7 +34,7 @@ struct RegistrationStatistics {
   std::uint32_t target_points = 0;
   std::uint32_t correspondences = 0;  ///< feature matches that quadruples are drawn from
   std::uint64_t hypotheses = 0;       ///< quadruples drawn
-  std::uint64_t survivors = 0;        ///< passed the polygon test
+  std::uint64_t survivors = 0;        ///< passed the polygon test, at most HypothesisOptions::max_survivors
   std::uint64_t scored = 0;           ///< of these with a well-defined rigid fit
   std::uint32_t points_scored = 0;    ///< points that the inlier ratio is relative to
   std::uint32_t consensus = 0;        ///< inliers of the returned pose under ScoreOptions::max_normal_angle: what it won by

@@ -27,6 +27,7 @@ void PrepareOptions::validate() const {
 void HypothesisOptions::validate() const {
   require(count >= 1 && count <= (1u << 30), "hypothesis.count", count, "1 to 2^30");
   require(neighbors >= 1 && neighbors <= 16, "hypothesis.neighbors", neighbors, "1 to 16");
+  require(max_survivors >= 1 && max_survivors <= (1u << 22), "hypothesis.max_survivors", max_survivors, "1 to 2^22");
   require(std::isfinite(edge_similarity) && edge_similarity > 0 && edge_similarity <= 1, "hypothesis.edge_similarity", edge_similarity,
           "a ratio in (0, 1]");
 }

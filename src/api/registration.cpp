@@ -124,7 +124,7 @@ std::vector<RegistrationResult> align_batch(const Context& context, const std::v
   }
 
   std::vector<RegistrationResult> results(pairs.size());
-  const std::size_t chunk = context.engine()->pairs_per_chunk();
+  const std::size_t chunk = context.engine()->pairs_per_chunk(options);
   for (std::size_t begin = 0; begin < pairs.size(); begin += chunk) {
     if (callbacks.should_stop && callbacks.should_stop()) break;
     const std::size_t end = std::min(pairs.size(), begin + chunk);

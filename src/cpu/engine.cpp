@@ -26,7 +26,7 @@ class CpuEngine final : public Engine {
   }
   const void* memory() const override { return &kHostMemory; }
   // Enough that no thread waits at the end of a stage, few enough that progress and cancelling stay lively.
-  std::size_t pairs_per_chunk() const override { return 2 * exec_.threads() + 2; }
+  std::size_t pairs_per_chunk(const RegistrationOptions&) const override { return 2 * exec_.threads() + 2; }
 
   std::vector<std::shared_ptr<PreparedState>> prepare(Span<const RawCloud> clouds, const PrepareOptions& options) override {
     std::lock_guard<std::mutex> lock(mutex_);

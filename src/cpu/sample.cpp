@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include <algorithm>
+
 #include "cpu/stages.hpp"
 
 #if defined(__AVX2__)
@@ -107,7 +109,10 @@ std::vector<std::vector<std::uint32_t>> sample_quadruples(Exec& exec, const std:
   });
   std::vector<std::vector<std::uint32_t>> out(matches.size());
   for (std::size_t p = 0; p < matches.size(); ++p)
-    for (const auto& part : parts[p]) out[p].insert(out[p].end(), part.begin(), part.end());
+    for (const auto& part : parts[p]) {
+      const std::size_t room = options.max_survivors - out[p].size();
+      out[p].insert(out[p].end(), part.begin(), part.begin() + static_cast<std::ptrdiff_t>(std::min(room, part.size())));
+    }
   return out;
 }
 

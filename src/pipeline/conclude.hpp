@@ -20,4 +20,41 @@ inline RegistrationReason reason_of(const RegistrationStatistics& s, bool has_po
   return RegistrationReason::none;
 }
 
+/// What each stage left of one pair.
+struct PairCounts {
+  std::uint32_t source_points, target_points, correspondences;
+  std::uint64_t survivors, scored;
+};
+struct FinalPose {
+  bool found;
+  Pose<double> pose;
+  Support support;  ///< under the test that hypotheses are ranked by
+  std::uint32_t iterations;
+};
+struct FinalJudgement {
+  Support support;  ///< under the judge's test
+  Moments source, target;
+};
+
+inline void conclude_pair(const PairCounts& counts, const FinalPose& pose, const FinalJudgement& judgement, const RegistrationOptions& options,
+                          PairOutcome& out) {
+  RegistrationStatistics& s = out.statistics;
+  s.source_points = counts.source_points;
+  s.target_points = counts.target_points;
+  s.correspondences = counts.correspondences;
+  s.hypotheses = s.correspondences >= 4 ? options.hypothesis.count : 0;
+  s.survivors = counts.survivors;
+  s.scored = counts.scored;
+  s.points_scored = counts.source_points;
+  s.consensus = pose.support.inliers;
+  s.inliers = judgement.support.inliers;
+  s.refine_iterations = pose.iterations;
+  out.has_pose = pose.found;
+  out.pose = pose.pose;
+  out.support = judgement.support;
+  out.source_moments = judgement.source;
+  out.target_moments = judgement.target;
+  out.reason = reason_of(s, out.has_pose, options.score);
+}
+
 }  // namespace gpureg::pipeline

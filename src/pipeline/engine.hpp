@@ -45,7 +45,8 @@ class Engine {
   virtual unsigned threads() const = 0;
   virtual std::string description() const = 0;
   virtual const void* memory() const = 0;      ///< owner of the clouds that this engine can align
-  virtual std::size_t pairs_per_chunk() const = 0;  ///< how many pairs go through the stages together
+  /// How many pairs go through the stages together.
+  virtual std::size_t pairs_per_chunk(const RegistrationOptions& options) const = 0;
   virtual std::vector<std::shared_ptr<PreparedState>> prepare(Span<const RawCloud> clouds, const PrepareOptions& options) = 0;
   virtual void align(Span<const PairInput> pairs, const RegistrationOptions& options, Span<PairOutcome> outcomes) = 0;
 };

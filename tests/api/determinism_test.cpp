@@ -2,29 +2,15 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <cstring>
 
 #include "gpureg/registration.hpp"
+#include "support/result_bytes.hpp"
 #include "support/scan.hpp"
 
 namespace gpureg {
 namespace {
 
-/// Everything but the timings, as bytes.
-std::vector<char> bytes(const RegistrationResult& r) {
-  std::vector<char> out;
-  const auto add = [&](const void* data, std::size_t size) { out.insert(out.end(), static_cast<const char*>(data), static_cast<const char*>(data) + size); };
-  add(r.target_from_source.matrix().data(), 16 * sizeof(double));
-  add(&r.status, sizeof r.status), add(&r.reason, sizeof r.reason);
-  add(&r.score, sizeof r.score), add(&r.inlier_rmse, sizeof r.inlier_rmse);
-  const RegistrationStatistics& s = r.statistics;
-  for (const std::uint64_t v : {std::uint64_t(s.source_points), std::uint64_t(s.target_points), std::uint64_t(s.correspondences), s.hypotheses, s.survivors,
-                                s.scored, std::uint64_t(s.points_scored), std::uint64_t(s.consensus), std::uint64_t(s.inliers), std::uint64_t(s.refine_iterations)})
-    add(&v, sizeof v);
-  const auto redwood = r.source_moments.information_redwood(), open3d = r.target_moments.information_open3d();
-  add(redwood.data(), 36 * sizeof(double)), add(open3d.data(), 36 * sizeof(double));
-  return out;
-}
+using test::bytes;
 
 class Determinism : public ::testing::Test {
  protected:

@@ -67,6 +67,7 @@ TEST(Options, EachFieldIsNamed) {
   expect_refused([](auto& o) { o.hypothesis.count = 0; }, "hypothesis.count");
   expect_refused([](auto& o) { o.hypothesis.neighbors = 0; }, "hypothesis.neighbors");
   expect_refused([](auto& o) { o.hypothesis.neighbors = 17; }, "hypothesis.neighbors");
+  expect_refused([](auto& o) { o.hypothesis.max_survivors = 0; }, "hypothesis.max_survivors");
   expect_refused([](auto& o) { o.refine.max_iterations = 5000; }, "refine.max_iterations");
   expect_refused([](auto& o) { o.score.max_correspondence_distance = 0.5f; }, "score.max_correspondence_distance");
 }

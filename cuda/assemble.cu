@@ -1,0 +1,146 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "scoring_data.hpp"
+#include "stages.hpp"
+#include "warp.cuh"
+
+namespace gpureg::cuda {
+namespace {
+
+/// One array on its way into a cloud's own memory.
+struct Part {
+  const char* from;
+  char* to;
+  std::size_t bytes;
+};
+
+__global__ void copy_parts(const Part* parts) {
+  const Part part = parts[blockIdx.y];
+  const std::size_t stride = static_cast<std::size_t>(gridDim.x) * blockDim.x, first = static_cast<std::size_t>(blockIdx.x) * blockDim.x + threadIdx.x;
+  const bool words = (reinterpret_cast<std::size_t>(part.from) | part.bytes) % 4 == 0;
+  if (words) {
+    for (std::size_t k = first; k < part.bytes / 4; k += stride)
+      reinterpret_cast<std::uint32_t*>(part.to)[k] = reinterpret_cast<const std::uint32_t*>(part.from)[k];
+  } else {
+    for (std::size_t k = first; k < part.bytes; k += stride) part.to[k] = part.from[k];
+  }
+}
+
+struct Missing {
+  std::uint32_t normals, features;
+};
+
+__global__ void count_missing(const std::uint32_t* offset, const Vec3* normals, const std::uint8_t* valid, Missing* missing) {
+  const std::uint32_t c = blockIdx.y, end = offset[c + 1];
+  std::uint32_t no_normal = 0, no_feature = 0;
+  for (std::uint32_t i = offset[c] + blockIdx.x * blockDim.x + threadIdx.x; i < end; i += gridDim.x * blockDim.x) {
+    no_normal += is_zero(normals[i]);
+    no_feature += !valid[i];
+  }
+  no_normal = warp_sum(no_normal);
+  no_feature = warp_sum(no_feature);
+  if (threadIdx.x % 32 != 0) return;
+  if (no_normal > 0) atomicAdd(&missing[c].normals, no_normal);
+  if (no_feature > 0) atomicAdd(&missing[c].features, no_feature);
+}
+
+template <typename T>
+std::vector<T> copy_back(const T* device, std::size_t size) {
+  std::vector<T> host(size);
+  if (size > 0) {
+    // Finished data: any stream may read it, and this one waits for nobody else's work.
+    cudaStream_t stream = nullptr;
+    check(cudaStreamCreateWithFlags(&stream, cudaStreamNonBlocking), "cudaStreamCreateWithFlags");
+    cudaError_t error = cudaMemcpyAsync(host.data(), device, size * sizeof(T), cudaMemcpyDeviceToHost, stream);
+    if (error == cudaSuccess) error = cudaStreamSynchronize(stream);
+    cudaStreamDestroy(stream);
+    check(error, "copying a cloud to the host");
+  }
+  return host;
+}
+
+}  // namespace
+
+std::vector<Vec3> CudaCloud::copy_points() const { return copy_back(view_on_device.points, size); }
+std::vector<Vec3> CudaCloud::copy_normals() const { return copy_back(view_on_device.normals, size); }
+std::vector<float> CudaCloud::copy_features() const {
+  return copy_back(view_on_device.features, static_cast<std::size_t>(size) * feature_dimension);
+}
+
+std::vector<std::shared_ptr<CudaCloud>> assemble(Exec& exec, const DownsampledClouds& clouds, const DeviceBuffer<Vec3>& normals,
+                                                 const Features& features, const ClosestGrids& closest, const PrepareOptions& options) {
+  const Segments& segments = clouds.segments;
+  const std::size_t count = segments.entries();
+  std::vector<std::shared_ptr<CudaCloud>> out;
+  std::vector<Part> parts;
+  for (std::size_t c = 0; c < count; ++c) {
+    auto cloud = std::make_shared<CudaCloud>();
+    const CloudFacts& facts = clouds.facts[c];
+    cloud->options = options;
+    for (int k = 0; k < 3; ++k) cloud->origin[k] = facts.origin[k];
+    cloud->size = segments.size(c);
+    cloud->feature_dimension = features.dimension[c];
+    cloud->radius = facts.radius;
+    cloud->viewpoints = facts.viewpoints;
+    cloud->statistics.input_points = facts.input_points;
+    cloud->statistics.invalid_points = facts.invalid_points;
+    cloud->statistics.points = cloud->size;
+    cloud->block_count = closest.blocks.size(c);
+    cloud->candidate_count = closest.candidate_offset[c + 1] - closest.candidate_offset[c];
+
+    // First the places, then the memory, then the pointers.
+    const std::size_t first_part = parts.size();
+    std::size_t bytes = 0;
+    const auto place = [&](const auto* from, std::size_t size) {
+      parts.push_back({reinterpret_cast<const char*>(from), reinterpret_cast<char*>(bytes), size * sizeof(*from)});
+      bytes += (size * sizeof(*from) + 255) / 256 * 256;
+    };
+    const std::size_t begin = segments.offset[c], n = cloud->size, block_begin = closest.blocks.offset[c];
+    place(clouds.points.data() + begin, n);
+    place(normals.data() + begin, n);
+    place(features.values.data() + features.offset[c], n * cloud->feature_dimension);
+    place(features.valid.data() + begin, n);
+    place(closest.table.data() + closest.table_offset[c], closest.table_offset[c + 1] - closest.table_offset[c]);
+    place(closest.cell_start.data() + block_begin * (ClosestGridView::kBlockCells + 1),
+          std::size_t(cloud->block_count) * (ClosestGridView::kBlockCells + 1));
+    place(closest.candidates.data() + closest.candidate_offset[c], cloud->candidate_count);
+    place(closest.block.data() + block_begin, cloud->block_count);
+    const std::size_t copied = bytes;
+    const ScoringLayout layout = scoring_layout(*cloud, closest.block_range[c]);
+    cloud->data = exec.buffer<char>(copied + layout.bytes);
+    for (std::size_t k = first_part; k < parts.size(); ++k) parts[k].to = cloud->data.data() + reinterpret_cast<std::size_t>(parts[k].to);
+    const Part* part = parts.data() + first_part;
+    CloudView& view = cloud->view_on_device;
+    view.points = reinterpret_cast<const Vec3*>(part[0].to);
+    view.normals = reinterpret_cast<const Vec3*>(part[1].to);
+    view.features = reinterpret_cast<const float*>(part[2].to);
+    view.has_feature = reinterpret_cast<const std::uint8_t*>(part[3].to);
+    view.size = cloud->size;
+    view.feature_dimension = cloud->feature_dimension;
+    view.radius = cloud->radius;
+    view.closest = {1.0f / closest.geometry[c].cell_size,
+                    {reinterpret_cast<const CellEntry*>(part[4].to), closest.table_offset[c + 1] - closest.table_offset[c]},
+                    {reinterpret_cast<const std::uint32_t*>(part[5].to), std::size_t(cloud->block_count) * (ClosestGridView::kBlockCells + 1)},
+                    {reinterpret_cast<const std::uint32_t*>(part[6].to), cloud->candidate_count}};
+    view.executor_data = cloud.get();
+    cloud->blocks = reinterpret_cast<const Cell*>(part[7].to);
+    place_scoring_data(layout, closest.geometry[c], cloud->data.data() + copied, *cloud);
+    out.push_back(std::move(cloud));
+  }
+  const auto parts_on_device = exec.upload(parts);
+  const auto missing = exec.filled<Missing>(count, 0);
+  copy_parts<<<dim3(16, static_cast<unsigned>(parts.size())), 256, 0, exec.stream()>>>(parts_on_device.data());
+  check_launch("copy_parts");
+  count_missing<<<dim3(8, static_cast<unsigned>(count)), 256, 0, exec.stream()>>>(segments.on_device.data(), normals.data(),
+                                                                                  features.valid.data(), missing.data());
+  check_launch("count_missing");
+  fill_scoring_data(exec, out, closest.geometry);
+  const Missing* counted = exec.download(missing.data(), count);
+  exec.synchronize();
+  for (std::size_t c = 0; c < count; ++c) {
+    out[c]->statistics.points_without_normal = counted[c].normals;
+    out[c]->statistics.points_without_feature = counted[c].features;
+  }
+  return out;
+}
+
+}  // namespace gpureg::cuda

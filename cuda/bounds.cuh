@@ -1,0 +1,68 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include "algorithm/cell_summary.hpp"
+#include "algorithm/inlier.hpp"
+#include "products.hpp"
+
+/// What a warp knows of 32 moved points before it looks at a single target point.
+namespace gpureg::cuda {
+
+/// One pair as scoring reads it.
+struct ScorePair {
+  CloudView source, target;
+  ScoringOrder order;        ///< of the source
+  CellSummaries cells;       ///< of the target
+  std::uint32_t limits;      ///< which of the two tables of limits holds
+};
+
+struct Limits {
+  float none_below, all_above;
+};
+
+/// A pose in the target's cells. Rounding may differ from apply() by a small part of a cell, which the margin of the closest-point
+/// grid covers.
+struct PoseInCells {
+  float r[9], t[3];
+  __device__ PoseInCells(const Rigid& pose, const CellSummaries& v) {
+#pragma unroll
+    for (int k = 0; k < 9; ++k) r[k] = pose.r[k] * v.inverse_cell_size;
+    // Half a cell less: then rounding to the nearest integer is floor().
+    t[0] = fmaf(pose.t[0], v.inverse_cell_size, v.offset.x - 0.5f);
+    t[1] = fmaf(pose.t[1], v.inverse_cell_size, v.offset.y - 0.5f);
+    t[2] = fmaf(pose.t[2], v.inverse_cell_size, v.offset.z - 0.5f);
+  }
+};
+
+/// Index of the summary of the cell that a moved point falls into; below 512, an empty one, where there is no block. NaN goes there too.
+__device__ inline std::uint32_t locate(const PoseInCells& pose, const CellSummaries& v, float4 p) {
+  // Adding 1.5 * 2^23 leaves the rounded coordinate in the low bits: full speed, unlike a conversion. What is too large for it has other
+  // high bits and is outside.
+  constexpr float kMagic = 12582912.0f;
+  const float fx = fmaf(pose.r[2], p.z, fmaf(pose.r[1], p.y, fmaf(pose.r[0], p.x, pose.t[0]))) + kMagic;
+  const float fy = fmaf(pose.r[5], p.z, fmaf(pose.r[4], p.y, fmaf(pose.r[3], p.x, pose.t[1]))) + kMagic;
+  const float fz = fmaf(pose.r[8], p.z, fmaf(pose.r[7], p.y, fmaf(pose.r[6], p.x, pose.t[2]))) + kMagic;
+  const std::uint32_t x = __float_as_uint(fx) - 0x4b400000u, y = __float_as_uint(fy) - 0x4b400000u, z = __float_as_uint(fz) - 0x4b400000u;
+  const std::uint32_t bx = x >> 3, by = y >> 3, bz = z >> 3;
+  if (bx >= static_cast<std::uint32_t>(v.nx) || by >= static_cast<std::uint32_t>(v.ny) || bz >= static_cast<std::uint32_t>(v.nz)) return 0;
+  const std::uint32_t block = static_cast<std::uint32_t>(__ldg(v.block + ((bz * static_cast<std::uint32_t>(v.ny) + by) * static_cast<std::uint32_t>(v.nx) + bx)));
+  return block << 9 | (z & 7) << 6 | (y & 7) << 3 | (x & 7);
+}
+
+/// Cosine between a moved normal and the mean normal of a summary.
+__device__ inline float cosine_to_mean(const Rigid& pose, float4 n, std::uint32_t word) {
+  const Vec3 moved = rotate(pose, {n.x, n.y, n.z});
+  const float x = static_cast<float>(static_cast<std::int32_t>(word << 24) >> 24), y = static_cast<float>(static_cast<std::int32_t>(word << 16) >> 24),
+              z = static_cast<float>(static_cast<std::int32_t>(word << 8) >> 24);
+  return fmaf(moved.z, z, fmaf(moved.y, y, moved.x * x)) * (1.0f / 127.0f);
+}
+
+/// Closest target point of a moved source point whose cell is known.
+__device__ inline Closest closest_in_cell(const CloudView& target, std::uint32_t cell, Vec3 q, float max_squared) {
+  constexpr std::uint32_t kCells = ClosestGridView::kBlockCells;
+  if (cell < kCells) return {kNoValue, max_squared};
+  const std::uint32_t* start = target.closest.cell_start.data + static_cast<std::size_t>(cell / kCells - 1) * (kCells + 1) + cell % kCells;
+  return closest_candidate(target.closest.candidates.data, start[0], start[1], target.points, q, max_squared);
+}
+
+}  // namespace gpureg::cuda

@@ -1,0 +1,18 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cuda_runtime_api.h>
+
+namespace gpureg::cuda {
+
+/// Throws DeviceError that names what was tried, the device's answer and whether the context stays usable.
+[[noreturn]] void throw_device_error(cudaError_t error, const char* what);
+
+inline void check(cudaError_t error, const char* what) {
+  if (error != cudaSuccess) throw_device_error(error, what);
+}
+
+/// After every kernel launch.
+inline void check_launch(const char* kernel) { check(cudaGetLastError(), kernel); }
+
+}  // namespace gpureg::cuda

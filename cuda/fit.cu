@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "algorithm/fit.hpp"
+
+#include "entry_of.cuh"
+#include "stages.hpp"
+
+namespace gpureg::cuda {
+namespace {
+
+__global__ void __launch_bounds__(128) fit(const std::uint32_t* offset, std::uint32_t pairs, const std::uint32_t* id, const std::uint32_t* room,
+                                           const MatchedPoints* matches, const std::uint32_t* match_count, std::uint64_t seed,
+                                           Pose<float>* poses, std::uint8_t* valid, std::uint32_t* valid_count) {
+  const std::uint32_t h = blockIdx.x * blockDim.x + threadIdx.x;
+  if (h >= offset[pairs]) return;
+  const std::uint32_t p = entry_of(offset, pairs, h);
+  const MatchedPoints* m = matches + room[p];
+  const Quadruple q = draw_quadruple(id[h], seed, match_count[p]);
+  Vec3 source[4], target[4];
+  for (int c = 0; c < 4; ++c) source[c] = m[q.match[c]].source, target[c] = m[q.match[c]].target;
+  Pose<float> pose{1, 0, 0, 0, 0, 0, 0};
+  const bool fits = fit_rigid(source, target, pose);
+  poses[h] = pose;
+  valid[h] = fits;
+  if (fits) atomicAdd(&valid_count[p], 1u);
+}
+
+}  // namespace
+
+Hypotheses fit_hypotheses(Exec& exec, const Matches& matches, const Quadruples& quadruples, const HypothesisOptions& options) {
+  const std::uint32_t total = quadruples.segments.total();
+  const std::uint32_t pairs = static_cast<std::uint32_t>(quadruples.segments.entries());
+  Hypotheses out;
+  out.segments = &quadruples.segments;
+  out.id = quadruples.id.data();
+  out.pose = exec.buffer<Pose<float>>(total);
+  out.valid = exec.buffer<std::uint8_t>(total);
+  out.count = exec.filled<std::uint32_t>(pairs, 0);
+  if (total == 0) return out;
+  fit<<<blocks_for(total, 128), 128, 0, exec.stream()>>>(quadruples.segments.on_device.data(), pairs, quadruples.id.data(),
+                                                         matches.room.on_device.data(), matches.pairs.data(), matches.count.data(),
+                                                         options.seed, out.pose.data(), out.valid.data(), out.count.data());
+  check_launch("fit");
+  return out;
+}
+
+}  // namespace gpureg::cuda

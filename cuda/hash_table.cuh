@@ -1,0 +1,22 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include "algorithm/cell.hpp"
+
+namespace gpureg::cuda {
+
+/// Entries for that many keys: a power of two with room to spare, as on the CPU.
+inline std::size_t table_size(std::size_t keys) {
+  std::size_t size = 8;
+  while (size < 3 * keys) size *= 2;
+  return size;
+}
+
+/// Inserts a key that is not in the table yet. All entries start as bytes of 0xff.
+__device__ inline void insert_key(CellEntry* table, std::uint32_t size, std::uint64_t key, std::uint32_t value) {
+  std::uint32_t slot = cell_slot(key, size - 1);
+  while (atomicCAS(reinterpret_cast<unsigned long long*>(&table[slot].key), kEmptyKey, key) != kEmptyKey) slot = (slot + 1) & (size - 1);
+  table[slot].value = value;
+}
+
+}  // namespace gpureg::cuda

@@ -1,0 +1,116 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "memory.hpp"
+
+#include <algorithm>
+#include <cstdint>
+#include <string>
+
+#include "check.hpp"
+#include "gpureg/error.hpp"
+
+namespace gpureg::cuda {
+
+void throw_device_error(cudaError_t error, const char* what) {
+  cudaGetLastError();  // an error that is not sticky would else be found by the next, innocent call
+  const bool lost = cudaGetLastError() != cudaSuccess;
+  throw DeviceError(std::string(what) + ": " + cudaGetErrorName(error) + ", " + cudaGetErrorString(error) +
+                    (lost ? "; the device's state is lost: no CUDA context of this process is usable any more"
+                          : "; the context stays usable"));
+}
+
+DeviceScope::DeviceScope(int device) {
+  check(cudaGetDevice(&previous_), "cudaGetDevice");
+  if (previous_ != device) check(cudaSetDevice(device), "cudaSetDevice");
+}
+
+DeviceScope::~DeviceScope() {
+  if (previous_ >= 0) cudaSetDevice(previous_);
+}
+
+DeviceMemory::DeviceMemory(int device) : device_(device) {
+  const DeviceScope scope(device);
+  check(cudaStreamCreateWithFlags(&stream_, cudaStreamNonBlocking), "cudaStreamCreateWithFlags");
+  cudaMemPoolProps properties{};
+  properties.allocType = cudaMemAllocationTypePinned;
+  properties.location.type = cudaMemLocationTypeDevice;
+  properties.location.id = device;
+  cudaError_t error = cudaMemPoolCreate(&pool_, &properties);
+  std::uint64_t threshold = ~std::uint64_t(0);
+  if (error == cudaSuccess) error = cudaMemPoolSetAttribute(pool_, cudaMemPoolAttrReleaseThreshold, &threshold);
+  if (error == cudaSuccess) return;
+  cudaStreamDestroy(stream_);
+  throw_device_error(error, "cudaMemPoolCreate");
+}
+
+DeviceMemory::~DeviceMemory() {
+  cudaStreamSynchronize(stream_);
+  cudaMemPoolDestroy(pool_);
+  cudaStreamDestroy(stream_);
+}
+
+void* DeviceMemory::allocate(std::size_t bytes) {
+  void* pointer = nullptr;
+  cudaError_t error = cudaMallocFromPoolAsync(&pointer, bytes, pool_, stream_);
+  if (error == cudaErrorMemoryAllocation) {
+    // What the pool kept may be in pieces too small: hand it back and ask once more.
+    cudaGetLastError();
+    cudaStreamSynchronize(stream_);
+    cudaMemPoolTrimTo(pool_, 0);
+    error = cudaMallocFromPoolAsync(&pointer, bytes, pool_, stream_);
+  }
+  if (error == cudaSuccess) return pointer;
+  std::size_t free = 0, total = 0;
+  if (error == cudaErrorMemoryAllocation && (cudaGetLastError(), cudaMemGetInfo(&free, &total) == cudaSuccess))
+    throw DeviceError("device " + std::to_string(device_) + " is out of memory: " + std::to_string(bytes >> 20) + " MiB asked for, " +
+                      std::to_string(free >> 20) + " of " + std::to_string(total >> 20) + " MiB free; the context stays usable");
+  throw_device_error(error, "cudaMallocFromPoolAsync");
+}
+
+void DeviceMemory::free(void* pointer) noexcept { cudaFreeAsync(pointer, stream_); }
+
+std::size_t DeviceMemory::bytes_in_use() const {
+  std::uint64_t bytes = 0;
+  cudaMemPoolGetAttribute(pool_, cudaMemPoolAttrUsedMemCurrent, &bytes);
+  return bytes;
+}
+
+std::size_t DeviceMemory::most_bytes_in_use() const {
+  std::uint64_t bytes = 0;
+  cudaMemPoolGetAttribute(pool_, cudaMemPoolAttrUsedMemHigh, &bytes);
+  return bytes;
+}
+
+PinnedArena::~PinnedArena() {
+  while (chunks_) {
+    Chunk* next = chunks_->next;
+    cudaFreeHost(chunks_->data);
+    delete chunks_;
+    chunks_ = next;
+  }
+}
+
+void* PinnedArena::take(std::size_t bytes) {
+  bytes = (bytes + 255) / 256 * 256;
+  if (!chunks_ || chunks_->size - chunks_->used < bytes) {
+    const std::size_t size = std::max<std::size_t>(bytes, std::max<std::size_t>(std::size_t(1) << 20, chunks_ ? 2 * chunks_->size : 0));
+    void* data = nullptr;
+    check(cudaHostAlloc(&data, size, cudaHostAllocDefault), "cudaHostAlloc");
+    chunks_ = new Chunk{static_cast<char*>(data), size, 0, chunks_};
+  }
+  void* piece = chunks_->data + chunks_->used;
+  chunks_->used += bytes;
+  return piece;
+}
+
+void PinnedArena::reset() {
+  if (!chunks_) return;
+  // The newest chunk is the largest: keep it, so that the next call of this size finds room in one.
+  while (Chunk* old = chunks_->next) {
+    chunks_->next = old->next;
+    cudaFreeHost(old->data);
+    delete old;
+  }
+  chunks_->used = 0;
+}
+
+}  // namespace gpureg::cuda

@@ -1,0 +1,96 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cuda_runtime_api.h>
+
+#include <cstddef>
+#include <memory>
+#include <utility>
+
+namespace gpureg::cuda {
+
+/// Makes a device the calling thread's current one and gives the caller's back at the end of the scope.
+class DeviceScope {
+ public:
+  explicit DeviceScope(int device);
+  ~DeviceScope();
+  DeviceScope(const DeviceScope&) = delete;
+  DeviceScope& operator=(const DeviceScope&) = delete;
+
+ private:
+  int previous_ = -1;
+};
+
+/// A stream and a pool of device memory that nobody else uses. The pool gives nothing back to the driver before its end, so a warm
+/// context allocates without asking it. Shared by the context and by every prepared cloud that lives in it.
+class DeviceMemory {
+ public:
+  explicit DeviceMemory(int device);
+  ~DeviceMemory();
+  DeviceMemory(const DeviceMemory&) = delete;
+  DeviceMemory& operator=(const DeviceMemory&) = delete;
+
+  int device() const { return device_; }
+  cudaStream_t stream() const { return stream_; }
+  /// In order with the stream. Throws DeviceError where the device has no more.
+  void* allocate(std::size_t bytes);
+  void free(void* pointer) noexcept;
+  std::size_t bytes_in_use() const;
+  std::size_t most_bytes_in_use() const;
+
+ private:
+  int device_;
+  cudaStream_t stream_ = nullptr;
+  cudaMemPool_t pool_ = nullptr;
+};
+
+/// Owns an array in device memory; what it holds is undefined until something writes it.
+template <typename T>
+class DeviceBuffer {
+ public:
+  DeviceBuffer() = default;
+  DeviceBuffer(std::shared_ptr<DeviceMemory> memory, std::size_t size)
+      : memory_(std::move(memory)), size_(size), data_(size == 0 ? nullptr : static_cast<T*>(memory_->allocate(size * sizeof(T)))) {}
+  DeviceBuffer(DeviceBuffer&& other) noexcept
+      : memory_(std::move(other.memory_)), size_(std::exchange(other.size_, 0)), data_(std::exchange(other.data_, nullptr)) {}
+  DeviceBuffer& operator=(DeviceBuffer&& other) noexcept {
+    std::swap(memory_, other.memory_);
+    std::swap(size_, other.size_);
+    std::swap(data_, other.data_);
+    return *this;
+  }
+  ~DeviceBuffer() {
+    if (data_) memory_->free(data_);
+  }
+
+  T* data() const { return data_; }
+  std::size_t size() const { return size_; }
+
+ private:
+  std::shared_ptr<DeviceMemory> memory_;
+  std::size_t size_ = 0;
+  T* data_ = nullptr;
+};
+
+/// Page-locked host memory handed out piece by piece for one call and taken back as a whole. Grows to what the largest call needs.
+class PinnedArena {
+ public:
+  PinnedArena() = default;
+  ~PinnedArena();
+  PinnedArena(const PinnedArena&) = delete;
+  PinnedArena& operator=(const PinnedArena&) = delete;
+
+  void* take(std::size_t bytes);
+  /// Only when nothing reads or writes the pieces any more.
+  void reset();
+
+ private:
+  struct Chunk {
+    char* data;
+    std::size_t size, used;
+    Chunk* next;
+  };
+  Chunk* chunks_ = nullptr;
+};
+
+}  // namespace gpureg::cuda

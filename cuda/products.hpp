@@ -1,0 +1,129 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "algorithm/closest_build.hpp"
+#include "algorithm/grid.hpp"
+#include "algorithm/quadruple.hpp"
+#include "pipeline/engine.hpp"
+#include "segments.hpp"
+
+/// What the CUDA stages hand on: arrays on the device, one for the whole batch, and what the host must know of them.
+namespace gpureg::cuda {
+
+struct CellRange {
+  Cell lo, hi;
+};
+
+/// What the host knows of one cloud.
+struct CloudFacts {
+  float origin[3] = {0, 0, 0};
+  float radius = 1;                          ///< of the points about the origin, see CloudView
+  Vec3 lo{0, 0, 0}, hi{0, 0, 0};             ///< corners of the raw points' box, local
+  std::uint64_t input_points = 0, invalid_points = 0;
+  std::vector<Vec3> viewpoints;              ///< local, at least one
+  std::uint32_t feature_dimension = 0;       ///< of the input; 0: none
+  bool has_guides = false;
+  std::size_t feature_offset = 0;            ///< floats before this cloud's input features
+};
+
+struct DownsampledClouds {
+  std::vector<CloudFacts> facts;
+  Segments segments;
+  DeviceBuffer<Vec3> points;       ///< local, in voxel order (z, y, x), or input order without downsampling
+  DeviceBuffer<Vec3> guides;       ///< mean input normal of each point, zero where unknown
+  DeviceBuffer<float> features;    ///< mean input features, cloud by cloud
+};
+
+/// Grids of a batch; views are on the device, one per cloud.
+struct Grids {
+  DeviceBuffer<CellEntry> table;
+  DeviceBuffer<std::uint32_t> cell_start;
+  DeviceBuffer<Vec3> points;
+  DeviceBuffer<std::uint32_t> index;
+  DeviceBuffer<GridView> views;
+};
+
+struct Features {
+  std::vector<std::uint32_t> dimension;      ///< per cloud
+  std::vector<std::size_t> offset;           ///< floats before each cloud's rows, and all floats
+  DeviceBuffer<float> values;
+  DeviceBuffer<std::uint8_t> valid;          ///< by point
+};
+
+struct ClosestGrids {
+  std::vector<ClosestGeometry> geometry;     ///< per cloud
+  std::vector<CellRange> block_range;        ///< per cloud: no block is outside
+  Segments blocks;                           ///< per cloud
+  DeviceBuffer<Cell> block;                  ///< ascending by key within a cloud
+  DeviceBuffer<std::uint32_t> cell_start;    ///< blocks x 513, relative to the cloud's candidates
+  std::vector<std::size_t> candidate_offset; ///< before each cloud's, and all
+  DeviceBuffer<std::uint32_t> candidates;
+  std::vector<std::size_t> table_offset;     ///< entries before each cloud's, and all; powers of two in between
+  DeviceBuffer<CellEntry> table;
+};
+
+/// See algorithm/cell_summary.hpp. Arrays on the device.
+struct CellSummaries {
+  float inverse_cell_size = 1;
+  Vec3 offset{0, 0, 0};                      ///< in cells: cell = p * inverse_cell_size + offset
+  std::int32_t nx = 0, ny = 0, nz = 0;       ///< blocks; 0: none, the cloud is too wide for a table
+  std::int32_t* block = nullptr;             ///< 1 + index of the block, or 0
+  std::uint32_t* word = nullptr;             ///< (1 + blocks) x 512
+};
+
+/// Points in groups of 32 neighbours; the groups spread over the cloud, so that the first few tell about the whole of it.
+struct ScoringOrder {
+  float4* point = nullptr;                   ///< x, y, z; NaN where the last group has no more. w: index as bits
+  float4* normal = nullptr;
+  std::uint32_t groups = 0;
+};
+
+/// The fragment that a PreparedCloud holds: one piece of device memory.
+struct CudaCloud : PreparedState {
+  DeviceBuffer<char> data;
+  CloudView view_on_device;                  ///< host struct of device pointers; executor_data is this
+  std::uint32_t block_count = 0;
+  std::size_t candidate_count = 0;
+  const Cell* blocks = nullptr;
+  CellSummaries summaries;
+  ScoringOrder order;
+  std::vector<Vec3> copy_points() const override;
+  std::vector<Vec3> copy_normals() const override;
+  std::vector<float> copy_features() const override;
+};
+
+struct Matches {
+  Segments room;                             ///< where each pair's matches lie; as many as there could be
+  DeviceBuffer<MatchedPoints> pairs;
+  DeviceBuffer<std::uint32_t> count;         ///< per pair
+};
+
+struct Quadruples {
+  Segments segments;                         ///< survivors of each pair
+  DeviceBuffer<std::uint32_t> id;            ///< ascending within a pair
+};
+
+struct Hypotheses {
+  const Segments* segments;                  ///< of the quadruples that they were fitted to
+  const std::uint32_t* id;
+  DeviceBuffer<Pose<float>> pose;            ///< one per survivor
+  DeviceBuffer<std::uint8_t> valid;          ///< 0: no rigid motion fits
+  DeviceBuffer<std::uint32_t> count;         ///< valid ones per pair
+};
+
+struct BestPose {
+  std::uint32_t found;
+  std::uint32_t iterations;
+  Support support;
+  Pose<double> pose;
+};
+
+struct Judgement {
+  Support support;
+  Moments source, target;
+};
+
+}  // namespace gpureg::cuda

@@ -1,0 +1,182 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "device_algorithms.hpp"
+#include "stages.hpp"
+#include "warp.cuh"
+
+namespace gpureg::cuda {
+namespace {
+
+constexpr std::uint32_t kThreads = 1024;
+constexpr std::uint32_t kWordsPerChunk = 1024;  // 32 hypotheses a word; chunks are counted, then expanded, one by one
+
+struct SampleBatch {
+  const std::uint32_t* room;
+  const MatchedPoints* matches;
+  const std::uint32_t* count;
+  std::uint32_t hypotheses, chunks;
+  std::uint64_t seed;
+  float tau2;
+  std::uint32_t* words;        // pairs x chunks x kWordsPerChunk: one bit per hypothesis
+  std::uint32_t* chunk_count;  // pairs x chunks
+};
+
+/// Where a match's two points come from: shared memory, or global where there are too many.
+struct SharedPoints {
+  const float4* a;  // source x, y, z, target x
+  const float2* b;  // target y, z
+  __device__ void get(std::uint32_t i, Vec3& source, Vec3& target) const {
+    const float4 v = a[i];
+    const float2 w = b[i];
+    source = {v.x, v.y, v.z};
+    target = {v.w, w.x, w.y};
+  }
+};
+struct GlobalPoints {
+  const MatchedPoints* m;
+  __device__ void get(std::uint32_t i, Vec3& source, Vec3& target) const { source = m[i].source, target = m[i].target; }
+};
+
+struct Corner {
+  Vec3 source, target;
+};
+
+template <typename Points>
+__device__ Corner corner(const Points& points, std::uint32_t i) {
+  Corner c;
+  points.get(i, c.source, c.target);
+  return c;
+}
+
+/// similar_sides() of two corners.
+__device__ bool similar(const Corner& a, const Corner& b, float tau2) {
+  const float p = squared_norm(a.source - b.source), q = squared_norm(a.target - b.target);
+  return p >= tau2 * q && q >= tau2 * p;
+}
+
+/// passes_polygon_test() of one hypothesis, side by side so that most need two matches only. Repeated source points are told by the
+/// caller, who has the indices.
+template <typename Points>
+__device__ bool sides_pass(const Points& points, const Quadruple& q, float tau2) {
+  const Corner c0 = corner(points, q.match[0]), c1 = corner(points, q.match[1]);
+  if (!similar(c0, c1, tau2)) return false;
+  const Corner c2 = corner(points, q.match[2]);
+  if (!similar(c1, c2, tau2)) return false;
+  const Corner c3 = corner(points, q.match[3]);
+  return similar(c2, c3, tau2) && similar(c3, c0, tau2);
+}
+
+__device__ bool distinct_sources(const MatchedPoints* m, const Quadruple& q) {
+  const std::uint32_t a = m[q.match[0]].source_index, b = m[q.match[1]].source_index, c = m[q.match[2]].source_index,
+                      d = m[q.match[3]].source_index;
+  return a != b && a != c && a != d && b != c && b != d && c != d;
+}
+
+template <typename Points>
+__device__ void sample_chunks(const SampleBatch& s, const Points& points, const MatchedPoints* m, std::uint32_t count) {
+  const std::uint32_t p = blockIdx.y, warp = threadIdx.x / 32, lane = threadIdx.x % 32;
+  for (std::uint32_t chunk = blockIdx.x; chunk < s.chunks; chunk += gridDim.x) {
+    const std::size_t first_word = (static_cast<std::size_t>(p) * s.chunks + chunk) * kWordsPerChunk;
+    std::uint32_t kept = 0, mine = 0;
+    for (std::uint32_t k = 0; k < 32; ++k) {
+      const std::uint32_t hypothesis = (chunk * kWordsPerChunk + warp * 32 + k) * 32 + lane;
+      bool pass = false;
+      if (hypothesis < s.hypotheses) {
+        const Quadruple q = draw_quadruple(hypothesis, s.seed, count);
+        pass = sides_pass(points, q, s.tau2) && distinct_sources(m, q);
+      }
+      const unsigned word = __ballot_sync(~0u, pass);
+      kept += static_cast<std::uint32_t>(__popc(static_cast<int>(word)));
+      if (lane == k) mine = word;
+    }
+    s.words[first_word + warp * 32 + lane] = mine;
+    if (lane == 0 && kept > 0) atomicAdd(&s.chunk_count[static_cast<std::size_t>(p) * s.chunks + chunk], kept);
+  }
+}
+
+/// Draws and tests all hypotheses of a pair; blockIdx.y is the pair.
+__global__ void __launch_bounds__(kThreads) sample(SampleBatch s, std::uint32_t shared_capacity) {
+  extern __shared__ float4 shared[];
+  const std::uint32_t p = blockIdx.y, count = s.count[p];
+  if (count < 4) return;
+  const MatchedPoints* m = s.matches + s.room[p];
+  if (count > shared_capacity) {
+    sample_chunks(s, GlobalPoints{m}, m, count);
+    return;
+  }
+  float2* rest = reinterpret_cast<float2*>(shared + shared_capacity);
+  for (std::uint32_t i = threadIdx.x; i < count; i += kThreads) {
+    shared[i] = make_float4(m[i].source.x, m[i].source.y, m[i].source.z, m[i].target.x);
+    rest[i] = make_float2(m[i].target.y, m[i].target.z);
+  }
+  __syncthreads();
+  sample_chunks(s, SharedPoints{shared, rest}, m, count);
+}
+
+/// Bits to numbers, in order. before: survivors in front of each chunk, over all pairs.
+__global__ void __launch_bounds__(kWordsPerChunk) expand(const std::uint32_t* words, const std::uint32_t* before, std::uint32_t chunks,
+                                                         const std::uint32_t* offset, std::uint32_t* id) {
+  __shared__ std::uint32_t warp_sums[32];
+  const std::uint32_t p = blockIdx.y, chunk = blockIdx.x, lane = threadIdx.x % 32, warp = threadIdx.x / 32;
+  const std::size_t at = static_cast<std::size_t>(p) * chunks + chunk;
+  if (before[at] == before[at + 1]) return;
+  const std::uint32_t first = before[at] - before[static_cast<std::size_t>(p) * chunks], room = offset[p + 1] - offset[p];
+  if (first >= room) return;
+  std::uint32_t word = words[at * kWordsPerChunk + threadIdx.x];
+  const std::uint32_t mine = static_cast<std::uint32_t>(__popc(static_cast<int>(word)));
+  std::uint32_t sum = mine;
+  for (std::uint32_t step = 1; step < 32; step *= 2) {
+    const std::uint32_t below = __shfl_up_sync(~0u, sum, step);
+    if (lane >= step) sum += below;
+  }
+  if (lane == 31) warp_sums[warp] = sum;
+  __syncthreads();
+  std::uint32_t rank = first + sum - mine;
+  for (std::uint32_t w = 0; w < warp; ++w) rank += warp_sums[w];
+  for (; word != 0 && rank < room; word &= word - 1, ++rank)
+    id[offset[p] + rank] = (chunk * kWordsPerChunk + threadIdx.x) * 32 + static_cast<std::uint32_t>(__ffs(static_cast<int>(word)) - 1);
+}
+
+}  // namespace
+
+Quadruples sample_quadruples(Exec& exec, const Matches& matches, const HypothesisOptions& options) {
+  const std::size_t pairs = matches.room.entries();
+  const std::uint32_t chunks = blocks_for(options.count, 32 * kWordsPerChunk);
+  const std::size_t all_chunks = pairs * chunks;
+  auto words = exec.buffer<std::uint32_t>(all_chunks * kWordsPerChunk);
+  auto before = exec.filled<std::uint32_t>(all_chunks + 1, 0);
+
+  // As many matches as the largest pair can have, if they fit; the others read global memory.
+  constexpr std::size_t kBytesPerMatch = sizeof(float4) + sizeof(float2);
+  const std::uint32_t fits = static_cast<std::uint32_t>((exec.shared_bytes_per_block() - 1024) / kBytesPerMatch);
+  const std::uint32_t capacity = std::min(matches.room.largest, fits);
+  const std::size_t shared_bytes = capacity * kBytesPerMatch;
+  check(cudaFuncSetAttribute(sample, cudaFuncAttributeMaxDynamicSharedMemorySize, static_cast<int>(shared_bytes)), "cudaFuncSetAttribute");
+  // A thread block stages the matches once and then draws for many chunks: few blocks per pair, but all processors busy.
+  const unsigned wanted = blocks_for(static_cast<std::size_t>(exec.multiprocessors()) * 8, static_cast<unsigned>(pairs));
+  const unsigned blocks = std::max(1u, std::min(chunks, std::max(4u, wanted)));
+  sample<<<dim3(blocks, static_cast<unsigned>(pairs)), kThreads, shared_bytes, exec.stream()>>>(
+      SampleBatch{matches.room.on_device.data(), matches.pairs.data(), matches.count.data(), options.count, chunks, options.seed,
+                  options.edge_similarity * options.edge_similarity, words.data(), before.data()},
+      capacity);
+  check_launch("sample");
+  exclusive_sum(exec, before.data(), before.data(), all_chunks + 1);
+  // One number per pair: the survivors in front of its first chunk.
+  std::uint32_t* starts = exec.staging<std::uint32_t>(pairs + 1);
+  check(cudaMemcpy2DAsync(starts, sizeof(std::uint32_t), before.data(), chunks * sizeof(std::uint32_t), sizeof(std::uint32_t), pairs,
+                          cudaMemcpyDeviceToHost, exec.stream()),
+        "cudaMemcpy2DAsync");
+  check(cudaMemcpyAsync(starts + pairs, before.data() + all_chunks, sizeof(std::uint32_t), cudaMemcpyDeviceToHost, exec.stream()),
+        "cudaMemcpyAsync");
+  exec.synchronize();
+
+  Quadruples out;
+  out.segments = make_segments(exec, pairs, [&](std::size_t p) { return std::min(starts[p + 1] - starts[p], options.max_survivors); });
+  out.id = exec.buffer<std::uint32_t>(out.segments.total());
+  if (out.segments.total() == 0) return out;
+  expand<<<dim3(chunks, static_cast<unsigned>(pairs)), kWordsPerChunk, 0, exec.stream()>>>(words.data(), before.data(), chunks,
+                                                                                          out.segments.on_device.data(), out.id.data());
+  check_launch("expand");
+  return out;
+}
+
+}  // namespace gpureg::cuda

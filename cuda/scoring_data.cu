@@ -1,0 +1,163 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "scoring_data.hpp"
+
+#include <numeric>
+
+#include "algorithm/cell_summary.hpp"
+#include "device_algorithms.hpp"
+
+namespace gpureg::cuda {
+namespace {
+
+constexpr int kCells = ClosestGridView::kBlockCells;
+/// Tables larger than this (a cloud with far stray points) are not worth their memory: then every point is looked at.
+constexpr std::uint64_t kMaxBlocks = std::uint64_t(1) << 22;
+
+struct Slot {
+  CloudView view;
+  CellSummaries summaries;
+  ScoringOrder order;
+  ClosestGeometry geometry;
+  const Cell* blocks;
+  std::uint32_t block_count;
+  std::uint32_t group_step;    // coprime to the number of groups
+  std::uint32_t point_offset;  // in the batch
+};
+
+__global__ void fill_block_tables(const Slot* slots) {
+  const Slot& s = slots[blockIdx.y];
+  const CellSummaries& v = s.summaries;
+  if (v.nx == 0) return;
+  for (std::uint32_t b = blockIdx.x * blockDim.x + threadIdx.x; b < s.block_count; b += gridDim.x * blockDim.x) {
+    const Cell c = s.blocks[b];
+    const std::int32_t x = c.x * 8 + static_cast<std::int32_t>(v.offset.x), y = c.y * 8 + static_cast<std::int32_t>(v.offset.y),
+                       z = c.z * 8 + static_cast<std::int32_t>(v.offset.z);
+    v.block[(static_cast<std::size_t>(z / 8) * v.ny + y / 8) * v.nx + x / 8] = static_cast<std::int32_t>(b + 1);
+  }
+}
+
+__global__ void summarize(const Slot* slots) {
+  const Slot& s = slots[blockIdx.y];
+  if (s.summaries.nx == 0) return;
+  const std::size_t cells = static_cast<std::size_t>(s.block_count) * kCells;
+  for (std::size_t k = static_cast<std::size_t>(blockIdx.x) * blockDim.x + threadIdx.x; k < cells; k += static_cast<std::size_t>(gridDim.x) * blockDim.x) {
+    const std::size_t b = k / kCells;
+    const int cell = static_cast<int>(k % kCells);
+    const std::uint32_t* start = s.view.closest.cell_start.data + b * (kCells + 1) + cell;
+    const Cell block = s.blocks[b];
+    const Cell c{block.x * 8 + (cell & 7), block.y * 8 + ((cell >> 3) & 7), block.z * 8 + (cell >> 6)};
+    s.summaries.word[kCells + k] =
+        start[0] == start[1] ? 0u
+                             : summarize_cell({s.view.closest.candidates.data + start[0], start[1] - start[0]},
+                                              cell_center(c, s.geometry.cell_size), s.geometry, s.view.points, s.view.normals);
+  }
+}
+
+/// The low 10 bits of each coordinate, interleaved.
+__device__ std::uint32_t morton(std::uint32_t x, std::uint32_t y, std::uint32_t z) {
+  const auto spread = [](std::uint32_t v) {
+    v = (v | v << 16) & 0x030000ffu;
+    v = (v | v << 8) & 0x0300f00fu;
+    v = (v | v << 4) & 0x030c30c3u;
+    return (v | v << 2) & 0x09249249u;
+  };
+  return spread(x) | spread(y) << 1 | spread(z) << 2;
+}
+
+__global__ void write_morton_keys(const Slot* slots, std::uint64_t* keys, std::uint32_t* index) {
+  const Slot& s = slots[blockIdx.y];
+  const float scale = 511.0f / s.view.radius;
+  for (std::uint32_t i = blockIdx.x * blockDim.x + threadIdx.x; i < s.view.size; i += gridDim.x * blockDim.x) {
+    const Vec3 p = s.view.points[i] * scale;
+    const auto unit = [](float v) { return static_cast<std::uint32_t>(v + 512.0f); };
+    keys[s.point_offset + i] = static_cast<std::uint64_t>(blockIdx.y) << 30 | morton(unit(p.x), unit(p.y), unit(p.z));
+    index[s.point_offset + i] = i;
+  }
+}
+
+__global__ void write_order(const Slot* slots, const std::uint32_t* index) {
+  const Slot& s = slots[blockIdx.y];
+  for (std::uint32_t k = blockIdx.x * blockDim.x + threadIdx.x; k < s.order.groups * 32; k += gridDim.x * blockDim.x) {
+    const std::uint32_t from = static_cast<std::uint32_t>(static_cast<std::uint64_t>(k / 32) * s.group_step % s.order.groups) * 32 + k % 32;
+    const float nan = __uint_as_float(0x7fc00000u);
+    float4 point = make_float4(nan, nan, nan, __uint_as_float(kNoValue)), normal = make_float4(0, 0, 0, 0);
+    if (from < s.view.size) {
+      const std::uint32_t i = index[s.point_offset + from];
+      const Vec3 p = s.view.points[i], n = s.view.normals[i];
+      point = make_float4(p.x, p.y, p.z, __uint_as_float(i));
+      normal = make_float4(n.x, n.y, n.z, 0);
+    }
+    s.order.point[k] = point;
+    s.order.normal[k] = normal;
+  }
+}
+
+}  // namespace
+
+ScoringLayout scoring_layout(const CudaCloud& cloud, const CellRange& blocks) {
+  ScoringLayout l{};
+  l.first_block = blocks.lo;
+  const std::uint64_t nx = static_cast<std::uint64_t>(blocks.hi.x - blocks.lo.x + 1), ny = static_cast<std::uint64_t>(blocks.hi.y - blocks.lo.y + 1),
+                      nz = static_cast<std::uint64_t>(blocks.hi.z - blocks.lo.z + 1);
+  const bool fits = nx <= kMaxBlocks && ny <= kMaxBlocks && nz <= kMaxBlocks && nx * ny <= kMaxBlocks && nx * ny * nz <= kMaxBlocks;
+  if (fits) l.nx = static_cast<std::int32_t>(nx), l.ny = static_cast<std::int32_t>(ny), l.nz = static_cast<std::int32_t>(nz);
+  const auto take = [&](std::size_t bytes) {
+    const std::size_t at = l.bytes;
+    l.bytes += (bytes + 255) / 256 * 256;
+    return at;
+  };
+  const std::size_t padded = (cloud.size + 31) / 32 * 32;
+  l.table = take(fits ? nx * ny * nz * sizeof(std::int32_t) : 0);
+  l.words = take(fits ? (std::size_t(cloud.block_count) + 1) * kCells * sizeof(std::uint32_t) : 0);
+  l.points = take(padded * sizeof(float4));
+  l.normals = take(padded * sizeof(float4));
+  return l;
+}
+
+void place_scoring_data(const ScoringLayout& l, const ClosestGeometry& geometry, char* memory, CudaCloud& cloud) {
+  CellSummaries& v = cloud.summaries;
+  v.inverse_cell_size = 1.0f / geometry.cell_size;
+  v.offset = {-static_cast<float>(l.first_block.x) * 8.0f, -static_cast<float>(l.first_block.y) * 8.0f, -static_cast<float>(l.first_block.z) * 8.0f};
+  v.nx = l.nx, v.ny = l.ny, v.nz = l.nz;
+  v.block = reinterpret_cast<std::int32_t*>(memory + l.table);
+  v.word = reinterpret_cast<std::uint32_t*>(memory + l.words);
+  cloud.order.groups = (cloud.size + 31) / 32;
+  cloud.order.point = reinterpret_cast<float4*>(memory + l.points);
+  cloud.order.normal = reinterpret_cast<float4*>(memory + l.normals);
+}
+
+void fill_scoring_data(Exec& exec, const std::vector<std::shared_ptr<CudaCloud>>& clouds, const std::vector<ClosestGeometry>& geometry) {
+  std::vector<Slot> slots;
+  std::uint32_t total = 0;
+  for (std::size_t c = 0; c < clouds.size(); ++c) {
+    CudaCloud& cloud = *clouds[c];
+    const CellSummaries& v = cloud.summaries;
+    if (v.nx > 0) {
+      check(cudaMemsetAsync(v.block, 0, static_cast<std::size_t>(v.nx) * v.ny * v.nz * sizeof(std::int32_t), exec.stream()), "cudaMemsetAsync");
+      check(cudaMemsetAsync(v.word, 0, kCells * sizeof(std::uint32_t), exec.stream()), "cudaMemsetAsync");
+    }
+    const std::uint32_t groups = cloud.order.groups;
+    std::uint32_t step = static_cast<std::uint32_t>(0.6180339887 * groups) | 1u;
+    while (groups > 0 && std::gcd(step, groups) != 1) ++step;
+    slots.push_back({cloud.view_on_device, v, cloud.order, geometry[c], cloud.blocks, cloud.block_count, step, total});
+    total += cloud.size;
+  }
+  if (total == 0) return;
+  const auto on_device = exec.upload(slots);
+  auto keys = exec.buffer<std::uint64_t>(total);
+  auto index = exec.buffer<std::uint32_t>(total);
+  const unsigned count = static_cast<unsigned>(clouds.size());
+  fill_block_tables<<<dim3(8, count), 128, 0, exec.stream()>>>(on_device.data());
+  check_launch("fill_block_tables");
+  summarize<<<dim3(128, count), 256, 0, exec.stream()>>>(on_device.data());
+  check_launch("summarize");
+  write_morton_keys<<<dim3(16, count), 256, 0, exec.stream()>>>(on_device.data(), keys.data(), index.data());
+  check_launch("write_morton_keys");
+  int bits = 30;
+  while ((std::size_t(1) << (bits - 30)) < clouds.size()) ++bits;
+  sort_pairs(exec, keys, index, bits);
+  write_order<<<dim3(16, count), 256, 0, exec.stream()>>>(on_device.data(), index.data());
+  check_launch("write_order");
+}
+
+}  // namespace gpureg::cuda

@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <algorithm>
+#include <string>
+#include <vector>
+
+#include "exec.hpp"
+#include "gpureg/error.hpp"
+
+namespace gpureg::cuda {
+
+/// A batch laid end to end: the items of entry e are [offset[e], offset[e + 1]) of every array.
+struct Segments {
+  std::vector<std::uint32_t> offset;
+  DeviceBuffer<std::uint32_t> on_device;
+  std::uint32_t largest = 0;
+
+  std::size_t entries() const { return offset.size() - 1; }
+  std::uint32_t total() const { return offset.back(); }
+  std::uint32_t size(std::size_t entry) const { return offset[entry + 1] - offset[entry]; }
+};
+
+/// From the offsets, the first of which is 0.
+inline Segments segments_of(Exec& exec, std::vector<std::uint32_t> offset) {
+  Segments s;
+  s.offset = std::move(offset);
+  s.on_device = exec.upload(s.offset);
+  for (std::size_t e = 0; e < s.entries(); ++e) s.largest = std::max(s.largest, s.size(e));
+  return s;
+}
+
+/// size(e): number of items of entry e. Throws InvalidArgument where the whole exceeds what 31 bits count.
+template <typename Size>
+Segments make_segments(Exec& exec, std::size_t entries, Size&& size) {
+  std::vector<std::uint32_t> offset{0};
+  std::uint64_t sum = 0;
+  for (std::size_t e = 0; e < entries; ++e) {
+    sum += size(e);
+    if (sum > 0x7fffffffu) throw InvalidArgument("a batch of " + std::to_string(sum) + " items exceeds 2^31 - 1: hand it over in parts");
+    offset.push_back(static_cast<std::uint32_t>(sum));
+  }
+  return segments_of(exec, std::move(offset));
+}
+
+}  // namespace gpureg::cuda

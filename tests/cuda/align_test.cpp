@@ -1,0 +1,202 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Alignment on both backends, stage by stage: the same bits after each.
+#include "cuda/gpu.hpp"
+#include "cpu/stages.hpp"
+#include "stages.hpp"
+#include "support/prepared.hpp"
+#include "support/random_clouds.hpp"
+
+namespace gpureg {
+namespace {
+
+using test::host;
+using test::same_bytes;
+
+bool same(const Support& a, const Support& b) { return a.inliers == b.inliers && a.residual == b.residual && a.hypothesis == b.hypothesis; }
+
+bool same(const Pose<double>& a, const Pose<double>& b) { return std::memcmp(&a, &b, sizeof a) == 0; }
+
+struct PairOfClouds {
+  std::size_t source, target;
+  std::vector<std::uint32_t> custom_source, custom_target;
+};
+
+/// Prepares the clouds and aligns the pairs on both backends; every product is compared.
+void expect_same_alignment(const std::vector<RawCloud>& raw, const std::vector<PairOfClouds>& wanted, const RegistrationOptions& options) {
+  cpu::Exec on_cpu(2);
+  cuda::Exec on_cuda(0);
+  on_cuda.begin();
+  const auto cpu_clouds = pipeline::prepare(on_cpu, span_of(raw), options.prepare);
+  const auto cuda_clouds = pipeline::prepare(on_cuda, span_of(raw), options.prepare);
+  std::vector<PairView> cpu_pairs, cuda_pairs;
+  for (const PairOfClouds& w : wanted) {
+    const auto custom = static_cast<std::uint32_t>(w.custom_source.size());
+    cpu_pairs.push_back({cpu_clouds[w.source]->view(), cpu_clouds[w.target]->view(), w.custom_source.data(), w.custom_target.data(), custom});
+    cuda_pairs.push_back({cuda_clouds[w.source]->view_on_device, cuda_clouds[w.target]->view_on_device, w.custom_source.data(),
+                          w.custom_target.data(), custom});
+  }
+  const auto cpu_views = span_of(cpu_pairs), cuda_views = span_of(cuda_pairs);
+  const std::size_t count = wanted.size();
+
+  const auto cpu_matches = cpu::match_features(on_cpu, cpu_views, options.hypothesis);
+  const auto cuda_matches = cuda::match_features(on_cuda, cuda_views, options.hypothesis);
+  const auto match_count = host(on_cuda, cuda_matches.count.data(), count);
+  for (std::size_t p = 0; p < count; ++p) {
+    SCOPED_TRACE("match, pair " + std::to_string(p));
+    ASSERT_EQ(cpu_matches[p].pairs.size(), match_count[p]);
+    ASSERT_TRUE(same_bytes(cpu_matches[p].pairs, host(on_cuda, cuda_matches.pairs.data() + cuda_matches.room.offset[p], match_count[p])));
+  }
+  const auto cpu_quadruples = cpu::sample_quadruples(on_cpu, cpu_matches, options.hypothesis);
+  const auto cuda_quadruples = cuda::sample_quadruples(on_cuda, cuda_matches, options.hypothesis);
+  for (std::size_t p = 0; p < count; ++p) {
+    SCOPED_TRACE("sample, pair " + std::to_string(p));
+    ASSERT_TRUE(same_bytes(cpu_quadruples[p], host(on_cuda, cuda_quadruples.id.data() + cuda_quadruples.segments.offset[p],
+                                                   cuda_quadruples.segments.size(p))));
+  }
+  const auto cpu_hypotheses = cpu::fit_hypotheses(on_cpu, cpu_matches, cpu_quadruples, options.hypothesis);
+  const auto cuda_hypotheses = cuda::fit_hypotheses(on_cuda, cuda_matches, cuda_quadruples, options.hypothesis);
+  const auto valid_count = host(on_cuda, cuda_hypotheses.count.data(), count);
+  for (std::size_t p = 0; p < count; ++p) {
+    SCOPED_TRACE("fit, pair " + std::to_string(p));
+    const std::size_t begin = cuda_quadruples.segments.offset[p], size = cuda_quadruples.segments.size(p);
+    const auto poses = host(on_cuda, cuda_hypotheses.pose.data() + begin, size);
+    const auto valid = host(on_cuda, cuda_hypotheses.valid.data() + begin, size);
+    std::vector<Pose<float>> kept;
+    for (std::size_t k = 0; k < size; ++k)
+      if (valid[k]) kept.push_back(poses[k]);
+    ASSERT_TRUE(same_bytes(cpu_hypotheses[p].pose, kept));
+    ASSERT_EQ(kept.size(), valid_count[p]);
+  }
+  const auto cpu_best = cpu::score_hypotheses(on_cpu, cpu_views, cpu_hypotheses, options.score);
+  const auto cuda_best = cuda::score_hypotheses(on_cuda, cuda_views, cuda_hypotheses, options.score);
+  const auto cpu_refined = cpu::refine_poses(on_cpu, cpu_views, cpu_best, options.score, options.refine);
+  const auto cuda_refined = cuda::refine_poses(on_cuda, cuda_views, cuda_best, options.score, options.refine);
+  const auto cpu_judged = cpu::judge_poses(on_cpu, cpu_views, cpu_refined, options.score);
+  const auto cuda_judged = cuda::judge_poses(on_cuda, cuda_views, cuda_refined, options.score);
+  const auto best = host(on_cuda, cuda_best.data(), count), refined = host(on_cuda, cuda_refined.data(), count);
+  const auto judged = host(on_cuda, cuda_judged.data(), count);
+  for (std::size_t p = 0; p < count; ++p) {
+    SCOPED_TRACE("score to judge, pair " + std::to_string(p));
+    ASSERT_EQ(cpu_best[p].found, best[p].found != 0);
+    if (!cpu_best[p].found) continue;
+    ASSERT_TRUE(same(cpu_best[p].support, best[p].support)) << cpu_best[p].support.inliers << " and " << best[p].support.inliers << ", hypotheses "
+                                                            << cpu_best[p].support.hypothesis << " and " << best[p].support.hypothesis;
+    ASSERT_TRUE(same(cpu_best[p].pose, best[p].pose));
+    ASSERT_TRUE(same(cpu_refined[p].support, refined[p].support));
+    ASSERT_TRUE(same(cpu_refined[p].pose, refined[p].pose));
+    ASSERT_EQ(cpu_refined[p].iterations, refined[p].iterations);
+    ASSERT_TRUE(same(cpu_judged[p].support, judged[p].support));
+    ASSERT_EQ(std::memcmp(&cpu_judged[p].source, &judged[p].source, sizeof(Moments)), 0);
+    ASSERT_EQ(std::memcmp(&cpu_judged[p].target, &judged[p].target, sizeof(Moments)), 0);
+  }
+}
+
+class AlignOnCuda : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    GPUREG_GPU_OR_SKIP();
+    // Samplings of one sheet, of another, something else, and what has no alignment.
+    for (int k = 0; k < 3; ++k) keep(sheet(5, 30000));
+    keep(sheet(6, 20000));
+    keep(test::cube(random, 3000, 1.5f));
+    keep({});
+    keep({{0, 0, 0}, {1, 0, 0}, {0, 1, 0}});
+    for (std::size_t a = 0; a < kept.size(); ++a)
+      for (std::size_t b = 0; b < kept.size(); ++b)
+        if (a != b) pairs.push_back({a, b, {}, {}});
+    options.hypothesis.count = 100'000;
+  }
+  std::vector<Vec3> sheet(unsigned shape, std::size_t size) {
+    // The shape is drawn first: samplings differ in their points only.
+    std::mt19937 same_shape(shape);
+    std::vector<Vec3> all = test::bumpy_sheet(same_shape, 90000, 1.7f);
+    std::shuffle(all.begin(), all.end(), random);
+    all.resize(size);
+    return all;
+  }
+  void keep(std::vector<Vec3> points) { kept.push_back(std::move(points)); }
+  std::vector<RawCloud> raw() const {
+    std::vector<RawCloud> out;
+    for (const auto& points : kept) out.push_back(test::raw_cloud(points));
+    return out;
+  }
+  std::mt19937 random{3};
+  std::vector<std::vector<Vec3>> kept;
+  std::vector<PairOfClouds> pairs;
+  RegistrationOptions options;
+};
+
+TEST_F(AlignOnCuda, Default) { expect_same_alignment(raw(), pairs, options); }
+
+TEST_F(AlignOnCuda, Paper) {
+  options = RegistrationOptions::loopsmart();
+  options.hypothesis.count = 300'000;
+  expect_same_alignment(raw(), pairs, options);
+}
+
+TEST_F(AlignOnCuda, MutualMatches) {
+  options.hypothesis.mutual = true;
+  expect_same_alignment(raw(), pairs, options);
+}
+
+TEST_F(AlignOnCuda, SeveralNeighbors) {
+  for (const std::uint32_t k : {2u, 5u, 16u}) {
+    options.hypothesis.neighbors = k;
+    options.hypothesis.seed = 1000 + k;
+    expect_same_alignment(raw(), pairs, options);
+  }
+}
+
+TEST_F(AlignOnCuda, ShorterDistanceWithoutNormals) {
+  options.score.max_correspondence_distance = 0.05f;
+  options.score.max_normal_angle = 180;
+  options.refine.max_correspondence_distance = 0.06f;
+  expect_same_alignment(raw(), pairs, options);
+}
+
+TEST_F(AlignOnCuda, OddHypothesisCountsAndSurvivorLimit) {
+  for (const std::uint32_t count : {1u, 33u, 32768u, 65537u}) {
+    options.hypothesis.count = count;
+    expect_same_alignment(raw(), pairs, options);
+  }
+  options.hypothesis.count = 200'000;
+  options.hypothesis.max_survivors = 37;
+  expect_same_alignment(raw(), pairs, options);
+}
+
+TEST_F(AlignOnCuda, CorrespondencesOfTheCaller) {
+  const auto clouds = pipeline::prepare(*std::make_unique<cpu::Exec>(2), span_of(raw()), options.prepare);
+  std::vector<PairOfClouds> custom;
+  for (std::size_t p = 0; p < 12; ++p) {
+    custom.push_back(pairs[p]);
+    const std::uint32_t n = clouds[pairs[p].source]->size, m = clouds[pairs[p].target]->size;
+    if (n == 0 || m == 0) continue;
+    for (int k = 0; k < (p % 3 == 0 ? 3 : 5000); ++k)
+      custom.back().custom_source.push_back(static_cast<std::uint32_t>(random() % n)), custom.back().custom_target.push_back(static_cast<std::uint32_t>(random() % m));
+  }
+  expect_same_alignment(raw(), custom, options);
+}
+
+TEST_F(AlignOnCuda, MoreMatchesThanSharedMemoryHolds) {
+  std::vector<std::vector<Vec3>> dense{test::cube(random, 60000, 2.2f), test::bumpy_sheet(random, 400000, 6.0f)};
+  kept = dense;
+  pairs = {{0, 1, {}, {}}, {1, 0, {}, {}}};
+  expect_same_alignment(raw(), pairs, options);
+}
+
+TEST_F(AlignOnCuda, StrayPointsMakeTheCloudTooWideForATable) {
+  for (auto& points : kept)
+    if (points.size() > 1000) points.push_back({9000, 9000, 9000});
+  options.hypothesis.count = 20'000;
+  expect_same_alignment(raw(), pairs, options);
+}
+
+TEST_F(AlignOnCuda, ACloudWithItself) {
+  pairs = {{0, 0, {}, {}}};
+  options.hypothesis.count = 50'000;
+  options.hypothesis.max_survivors = 5'000;
+  expect_same_alignment(raw(), pairs, options);
+}
+
+}  // namespace
+}  // namespace gpureg

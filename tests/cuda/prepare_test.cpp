@@ -1,0 +1,226 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// The contract of the CUDA backend: every product of every stage of preparation has the CPU's bits.
+#include <filesystem>
+#include <limits>
+
+#include "cuda/gpu.hpp"
+#include "cpu/stages.hpp"
+#include "stages.hpp"
+#include "support/data_folder.hpp"
+#include "support/plain_ply.hpp"
+#include "support/prepared.hpp"
+#include "support/random_clouds.hpp"
+
+namespace gpureg {
+namespace {
+
+using test::host;
+using test::same_bytes;
+
+/// Runs both backends over one batch and compares after every stage.
+void expect_same_preparation(const std::vector<RawCloud>& raw, const PrepareOptions& options) {
+  cpu::Exec on_cpu(2);
+  cuda::Exec on_cuda(0);
+  on_cuda.begin();
+  const Span<const RawCloud> clouds = span_of(raw);
+
+  auto cpu_points = cpu::downsample(on_cpu, clouds, options);
+  auto cuda_points = cuda::downsample(on_cuda, clouds, options);
+  const auto points = host(on_cuda, cuda_points.points.data(), cuda_points.segments.total());
+  for (std::size_t c = 0; c < raw.size(); ++c) {
+    SCOPED_TRACE("downsample, cloud " + std::to_string(c));
+    const auto& expected = cpu_points[c];
+    const auto begin = points.begin() + cuda_points.segments.offset[c];
+    ASSERT_TRUE(same_bytes(expected.points, std::vector<Vec3>(begin, begin + cuda_points.segments.size(c))));
+    for (int k = 0; k < 3; ++k) ASSERT_EQ(expected.origin[k], cuda_points.facts[c].origin[k]);
+    ASSERT_EQ(expected.radius, cuda_points.facts[c].radius);
+    ASSERT_EQ(expected.invalid_points, cuda_points.facts[c].invalid_points);
+    ASSERT_TRUE(same_bytes(expected.viewpoints, cuda_points.facts[c].viewpoints));
+    if (!expected.guides.empty())
+      ASSERT_TRUE(same_bytes(expected.guides, host(on_cuda, cuda_points.guides.data() + cuda_points.segments.offset[c], expected.guides.size())));
+    if (!expected.features.empty())
+      ASSERT_TRUE(same_bytes(expected.features, host(on_cuda, cuda_points.features.data() + cuda_points.facts[c].feature_offset, expected.features.size())));
+  }
+
+  const auto cpu_grids = cpu::build_grids(on_cpu, cpu_points, options);
+  const auto cuda_grids = cuda::build_grids(on_cuda, cuda_points, options);
+  for (std::size_t c = 0; c < raw.size(); ++c) {
+    SCOPED_TRACE("grid, cloud " + std::to_string(c));
+    const auto& expected = cpu_grids[c];
+    const std::size_t begin = cuda_points.segments.offset[c];
+    ASSERT_TRUE(same_bytes(expected.index, host(on_cuda, cuda_grids.index.data() + begin, expected.index.size())));
+    ASSERT_TRUE(same_bytes(expected.points, host(on_cuda, cuda_grids.points.data() + begin, expected.points.size())));
+    ASSERT_TRUE(same_bytes(expected.cell_start, host(on_cuda, cuda_grids.cell_start.data() + begin + c, expected.cell_start.size())));
+  }
+
+  const auto cpu_normals = cpu::estimate_normals(on_cpu, cpu_points, cpu_grids, options);
+  const auto cuda_normals = cuda::estimate_normals(on_cuda, cuda_points, cuda_grids, options);
+  for (std::size_t c = 0; c < raw.size(); ++c) {
+    SCOPED_TRACE("normals, cloud " + std::to_string(c));
+    ASSERT_TRUE(same_bytes(cpu_normals[c], host(on_cuda, cuda_normals.data() + cuda_points.segments.offset[c], cpu_normals[c].size())));
+  }
+
+  const auto cpu_features = cpu::compute_features(on_cpu, cpu_points, cpu_normals, cpu_grids, options);
+  const auto cuda_features = cuda::compute_features(on_cuda, cuda_points, cuda_normals, cuda_grids, options);
+  for (std::size_t c = 0; c < raw.size(); ++c) {
+    SCOPED_TRACE("features, cloud " + std::to_string(c));
+    ASSERT_EQ(cpu_features[c].dimension, cuda_features.dimension[c]);
+    ASSERT_TRUE(same_bytes(cpu_features[c].valid, host(on_cuda, cuda_features.valid.data() + cuda_points.segments.offset[c], cpu_features[c].valid.size())));
+    ASSERT_TRUE(same_bytes(cpu_features[c].values, host(on_cuda, cuda_features.values.data() + cuda_features.offset[c], cpu_features[c].values.size())));
+  }
+
+  const auto cpu_closest = cpu::build_closest_grids(on_cpu, cpu_points, cpu_grids, options);
+  const auto cuda_closest = cuda::build_closest_grids(on_cuda, cuda_points, cuda_grids, options);
+  for (std::size_t c = 0; c < raw.size(); ++c) {
+    SCOPED_TRACE("closest grid, cloud " + std::to_string(c));
+    const auto& expected = cpu_closest[c];
+    const std::size_t first = cuda_closest.blocks.offset[c];
+    ASSERT_EQ(expected.blocks.size(), cuda_closest.blocks.size(c));
+    ASSERT_TRUE(same_bytes(expected.blocks, host(on_cuda, cuda_closest.block.data() + first, expected.blocks.size())));
+    ASSERT_TRUE(same_bytes(expected.cell_start, host(on_cuda, cuda_closest.cell_start.data() + first * 513, expected.cell_start.size())));
+    ASSERT_TRUE(same_bytes(expected.candidates, host(on_cuda, cuda_closest.candidates.data() + cuda_closest.candidate_offset[c], expected.candidates.size())));
+  }
+
+  const auto assembled = cuda::assemble(on_cuda, cuda_points, cuda_normals, cuda_features, cuda_closest, options);
+  for (std::size_t c = 0; c < raw.size(); ++c) {
+    SCOPED_TRACE("assembled, cloud " + std::to_string(c));
+    ASSERT_TRUE(same_bytes(cpu_points[c].points, assembled[c]->copy_points()));
+    ASSERT_TRUE(same_bytes(cpu_normals[c], assembled[c]->copy_normals()));
+    ASSERT_TRUE(same_bytes(cpu_features[c].values, assembled[c]->copy_features()));
+    // The tables answer alike, wherever their entries lie.
+    for (std::size_t b = 0; b < cpu_closest[c].blocks.size(); b += 7) {
+      const auto table = host(on_cuda, assembled[c]->view_on_device.closest.table.data, assembled[c]->view_on_device.closest.table.size);
+      ASSERT_EQ(find_cell(span_of(table), cell_key(cpu_closest[c].blocks[b])), b);
+      if (b > 70) break;
+    }
+  }
+}
+
+class PrepareOnCuda : public ::testing::Test {
+ protected:
+  void SetUp() override { GPUREG_GPU_OR_SKIP(); }
+  const RawCloud& keep(std::vector<Vec3> points) {
+    kept.push_back(std::make_unique<std::vector<Vec3>>(std::move(points)));
+    raw.push_back(test::raw_cloud(*kept.back()));
+    return raw.back();
+  }
+  std::mt19937 random{7};
+  std::vector<std::unique_ptr<std::vector<Vec3>>> kept;
+  std::vector<RawCloud> raw;
+  PrepareOptions options;
+};
+
+TEST_F(PrepareOnCuda, RandomSheetsOfManySizes) {
+  for (const std::size_t size : {20000u, 1u, 0u, 3u, 150000u, 33u, 4000u}) keep(test::bumpy_sheet(random, size, 2.0f));
+  expect_same_preparation(raw, options);
+}
+
+TEST_F(PrepareOnCuda, CubesFarFromTheOriginWithBadPoints) {
+  for (const float shift : {0.0f, 10.0f, -10000.0f}) {
+    auto points = test::cube(random, 5000, 1.5f);
+    for (std::size_t k = 0; k < points.size(); ++k) {
+      points[k].x += shift;
+      if (k % 97 == 0) points[k].y = std::numeric_limits<float>::quiet_NaN();
+      if (k % 89 == 0) points[k].z = std::numeric_limits<float>::infinity();
+    }
+    keep(std::move(points));
+  }
+  keep(std::vector<Vec3>(100, Vec3{1, 2, 3}));
+  std::vector<Vec3> line;
+  for (int k = 0; k < 500; ++k) line.push_back({0.01f * static_cast<float>(k), 0, 0});
+  keep(std::move(line));
+  keep(std::vector<Vec3>(10, Vec3{std::numeric_limits<float>::quiet_NaN(), 0, 0}));
+  expect_same_preparation(raw, options);
+}
+
+TEST_F(PrepareOnCuda, PointsAsTheyAre) {
+  keep(test::bumpy_sheet(random, 3000, 1.5f));
+  keep(test::bumpy_sheet(random, 1, 1.5f));
+  keep(test::cube(random, 2000, 2.0f));
+  options.voxel_size = 0;
+  expect_same_preparation(raw, options);
+}
+
+TEST_F(PrepareOnCuda, OtherRadii) {
+  keep(test::bumpy_sheet(random, 60000, 3.0f));
+  keep(test::cube(random, 5000, 1.5f));
+  for (const float v : {0.03f, 0.1f, 0.7f}) {
+    const auto scaled = RegistrationOptions::from_voxel_size(v).prepare;
+    expect_same_preparation(raw, scaled);
+  }
+  options.search_distance = 0.4f;  // lists of hundreds of candidates, blocks with thousands of points
+  expect_same_preparation(raw, options);
+}
+
+TEST_F(PrepareOnCuda, NormalsViewpointsAndFeaturesOfTheCaller) {
+  const std::size_t size = 8000, dimension = 5;
+  const auto points = test::bumpy_sheet(random, size, 2.0f);
+  std::vector<Vec3> normals(size), viewpoints;
+  std::vector<float> features(size * (dimension + 2));
+  std::normal_distribution<float> normal;
+  for (std::size_t k = 0; k < size; ++k) normals[k] = k % 50 == 0 ? Vec3{0, 0, 0} : test::random_unit(random);
+  for (float& f : features) f = normal(random);
+  features[3] = std::numeric_limits<float>::quiet_NaN();
+  for (int k = 0; k < 20; ++k) viewpoints.push_back(test::random_unit(random) * 2.0f);
+  RawCloud plain = test::raw_cloud(points), with_normals = plain, with_views = plain, with_features = plain;
+  with_normals.normals = &normals[0].x;
+  with_views.viewpoints = &viewpoints[0].x, with_views.viewpoint_count = viewpoints.size();
+  with_features.features = features.data(), with_features.feature_dimension = dimension, with_features.feature_stride = dimension + 2;
+  expect_same_preparation({plain, with_normals, with_views, with_features}, options);
+}
+
+TEST_F(PrepareOnCuda, ErrorsAreTheCpus) {
+  keep({{0, 0, 0}, {3e6f, 0, 0}});
+  const auto message = [&](auto&& prepare) {
+    try {
+      prepare();
+    } catch (const InvalidArgument& error) {
+      return std::string(error.what());
+    }
+    return std::string("no error");
+  };
+  cpu::Exec on_cpu(1);
+  cuda::Exec on_cuda(0);
+  const auto expect_same = [&] {
+    const auto expected = message([&] { pipeline::prepare(on_cpu, span_of(raw), options); });
+    EXPECT_NE(expected, "no error");
+    EXPECT_EQ(message([&] { on_cuda.begin(), pipeline::prepare(on_cuda, span_of(raw), options); }), expected);
+  };
+  expect_same();
+  raw.clear();
+  keep(test::cube(random, 200000, 0.3f));
+  options.voxel_size = 0;
+  expect_same();
+}
+
+TEST_F(PrepareOnCuda, RedKitchenFragments) {
+  GPUREG_DATA_FOLDER_OR_SKIP(folder, "redkitchen/fragments");
+  std::vector<PointCloud> clouds;
+  for (int k = 0; std::filesystem::exists(folder + "/cloud_bin_" + std::to_string(k) + ".ply"); ++k)
+    clouds.push_back(test::read_plain_ply(folder + "/cloud_bin_" + std::to_string(k) + ".ply"));
+  ASSERT_EQ(clouds.size(), 20u);
+  for (const PointCloud& cloud : clouds) {
+    RawCloud one{};
+    one.points = cloud.points[0].data(), one.size = cloud.points.size(), one.point_stride = 3;
+    if (!cloud.normals.empty()) one.normals = cloud.normals[0].data(), one.normal_stride = 3;
+    raw.push_back(one);
+  }
+  expect_same_preparation(raw, options);
+}
+
+TEST_F(PrepareOnCuda, FgrRangePairs) {
+  GPUREG_DATA_FOLDER_OR_SKIP(folder, "fgr");
+  std::vector<PointCloud> clouds;
+  for (const auto& entry : std::filesystem::recursive_directory_iterator(folder))
+    if (entry.path().extension() == ".ply") clouds.push_back(test::read_plain_ply(entry.path().string()));
+  ASSERT_GT(clouds.size(), 40u);
+  for (const PointCloud& cloud : clouds) {
+    RawCloud one{};
+    one.points = cloud.points[0].data(), one.size = cloud.points.size(), one.point_stride = 3;
+    raw.push_back(one);
+  }
+  expect_same_preparation(raw, options);
+}
+
+}  // namespace
+}  // namespace gpureg
