@@ -1,0 +1,23 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <benchmark/benchmark.h>
+
+#include <string>
+#include <vector>
+
+#include "gpureg/registration.hpp"
+
+/// What the benchmarks of the whole pipeline work on: the fragments of one scene, read once. The folder is GPUREG_BENCH_SCENE, else
+/// redkitchen/fragments in GPUREG_DATA_DIR.
+namespace gpureg::bench {
+
+const std::vector<PointCloud>& fragments();
+std::vector<PointCloudView> views();
+/// Every pair once.
+std::vector<Pair> all_pairs();
+
+/// Context of a backend by name ("cpu", "cuda"), made once; null, and the benchmark skipped, where there is none.
+const Context* context(benchmark::State& state, const std::string& backend);
+
+}  // namespace gpureg::bench

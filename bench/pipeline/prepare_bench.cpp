@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "fragments.hpp"
+
+namespace gpureg::bench {
+namespace {
+
+void report(benchmark::State& state, const std::vector<PreparedCloud>& clouds, std::size_t runs) {
+  PrepareStatistics sum;
+  double raw = 0, points = 0;
+  for (const PreparedCloud& cloud : clouds) {
+    const PrepareStatistics& s = cloud.statistics();
+    sum.downsample += s.downsample, sum.normals += s.normals, sum.features += s.features, sum.grid += s.grid;
+    raw += static_cast<double>(s.input_points), points += s.points;
+  }
+  const double n = static_cast<double>(clouds.size());
+  state.counters["fragments"] = n;
+  state.counters["raw_points"] = raw / n;
+  state.counters["points"] = points / n;
+  state.counters["ms_downsample"] = sum.downsample / n;
+  state.counters["ms_normals"] = sum.normals / n;
+  state.counters["ms_features"] = sum.features / n;
+  state.counters["ms_grid"] = sum.grid / n;
+  state.counters["ms_per_fragment"] =
+      benchmark::Counter(n * static_cast<double>(runs) * 1e-3, benchmark::Counter::kIsRate | benchmark::Counter::kInvert);
+}
+
+/// All fragments of the scene from host memory in one call.
+void prepare_batch_of_fragments(benchmark::State& state, const std::string& backend) {
+  const Context* on = context(state, backend);
+  if (!on) return;
+  const RegistrationOptions options = RegistrationOptions::loopsmart();
+  std::vector<PreparedCloud> clouds = prepare_batch(*on, views(), options.prepare);
+  std::size_t runs = 0;
+  for (auto _ : state) clouds = prepare_batch(*on, views(), options.prepare), ++runs;
+  report(state, clouds, runs);
+}
+
+/// One fragment at a time.
+void prepare_one_fragment(benchmark::State& state, const std::string& backend) {
+  const Context* on = context(state, backend);
+  if (!on) return;
+  const RegistrationOptions options = RegistrationOptions::loopsmart();
+  const auto all = views();
+  std::vector<PreparedCloud> cloud{prepare(*on, all[0], options.prepare)};
+  std::size_t runs = 0;
+  for (auto _ : state) cloud[0] = prepare(*on, all[runs++ % all.size()], options.prepare);
+  report(state, cloud, runs);
+}
+
+BENCHMARK_CAPTURE(prepare_batch_of_fragments, cuda, "cuda")->Unit(benchmark::kMillisecond)->UseRealTime();
+BENCHMARK_CAPTURE(prepare_one_fragment, cuda, "cuda")->Unit(benchmark::kMillisecond)->UseRealTime();
+BENCHMARK_CAPTURE(prepare_batch_of_fragments, cpu, "cpu")->Unit(benchmark::kMillisecond)->UseRealTime();
+
+}  // namespace
+}  // namespace gpureg::bench
