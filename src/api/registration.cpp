@@ -21,7 +21,7 @@ RawCloud raw_of(const PointCloudView& v) {
 }
 
 /// A cloud that this context and these options can work with. name: for the message.
-const PreparedState& checked(const Context& context, const PreparedCloud& cloud, const RegistrationOptions& options, const std::string& name) {
+const PreparedState& checked(const Context& context, const PreparedCloud& cloud, const RegistrationOptions& options, std::string name) {
   if (!cloud.valid()) throw InvalidArgument(name + " is an empty handle: it was not made by prepare()");
   const PreparedState& state = *cloud.state();
   if (state.owner != context.engine()->memory())
