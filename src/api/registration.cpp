@@ -21,7 +21,7 @@ RawCloud raw_of(const PointCloudView& v) {
 }
 
 /// A cloud that this context and these options can work with. name: for the message.
-const PreparedState& checked(const Context& context, const PreparedCloud& cloud, const RegistrationOptions& options, std::string name) {
+const PreparedState* checked(const Context& context, const PreparedCloud& cloud, const RegistrationOptions& options, const std::string& name) {
   if (!cloud.valid()) throw InvalidArgument(name + " is an empty handle: it was not made by prepare()");
   const PreparedState& state = *cloud.state();
   if (state.owner != context.engine()->memory())
@@ -32,7 +32,7 @@ const PreparedState& checked(const Context& context, const PreparedCloud& cloud,
   if (needed > state.options.search_distance)
     throw InvalidArgument(name + " was prepared with search_distance " + std::to_string(state.options.search_distance) +
                           ", less than the correspondence distance " + std::to_string(needed) + " asked for now");
-  return state;
+  return &state;
 }
 
 void check_dimensions(const PreparedState& source, const PreparedState& target) {
@@ -79,8 +79,8 @@ RegistrationResult align(const Context& context, const PointCloudView& source, c
 RegistrationResult align(const Context& context, const PreparedCloud& source, const PreparedCloud& target,
                          const std::vector<Correspondence>& correspondences, const RegistrationOptions& options) {
   options.validate();
-  const PreparedState& s = checked(context, source, options, "source");
-  const PreparedState& t = checked(context, target, options, "target");
+  const PreparedState& s = *checked(context, source, options, "source");
+  const PreparedState& t = *checked(context, target, options, "target");
   require(correspondences.size() <= 0x7fffffffu, "correspondences.size", correspondences.size(), "at most 2^31 - 1");
   const bool swapped = swaps(s, t, options.hypothesis);
   std::vector<std::uint32_t> from, to;
