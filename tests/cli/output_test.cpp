@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <gtest/gtest.h>
+#include <sched.h>
 #include <sys/mount.h>
 
 #include "cli/command.hpp"
@@ -106,11 +107,14 @@ TEST_F(Output, DiskFullWhileAResultIsReplaced) {
   }
 }
 
-// A disk of a few pages, where the process may mount one.
+// A disk of a few pages, where the process may mount one. Nobody else sees it, and it goes with the
+// process.
 class SmallDisk {
  public:
   explicit SmallDisk(const std::string& folder) : folder_(folder) {
-    mounted_ = ::mount("tmpfs", folder_.c_str(), "tmpfs", 0, "size=16k") == 0;
+    mounted_ = ::unshare(CLONE_NEWNS) == 0 &&
+               ::mount(nullptr, "/", nullptr, MS_REC | MS_PRIVATE, nullptr) == 0 &&
+               ::mount("tmpfs", folder_.c_str(), "tmpfs", 0, "size=16k") == 0;
   }
   ~SmallDisk() {
     if (mounted_) ::umount2(folder_.c_str(), MNT_DETACH);
