@@ -36,8 +36,7 @@ class Consumer : public testing::Test {
     ASSERT_EQ(installed.status, 0) << installed.output;
   }
 
-  Outcome configure(const std::string& project, const std::string& flags,
-                    std::vector<std::string> more = {}) {
+  Outcome configure(const std::string& project, const std::string& flags) {
     std::vector<std::string> arguments = {CONSUMER_CMAKE,
                                           "-S",
                                           project,
@@ -49,7 +48,8 @@ class Consumer : public testing::Test {
                                           "-DCMAKE_CXX_COMPILER=" CONSUMER_COMPILER,
                                           "-DCMAKE_CXX_FLAGS=" CONSUMER_FLAGS " " + flags,
                                           "-DCMAKE_PREFIX_PATH=" + prefix_};
-    arguments.insert(arguments.end(), more.begin(), more.end());
+    const std::string toolkit = CONSUMER_CUDA_TOOLKIT;
+    if (!toolkit.empty()) arguments.push_back("-DCUDAToolkit_ROOT=" + toolkit);
     return run_command(arguments);
   }
 
