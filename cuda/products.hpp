@@ -74,10 +74,12 @@ struct CellSummaries {
   std::uint32_t* word = nullptr;             ///< (1 + blocks) x 512
 };
 
-/// Points in groups of 32 neighbours; the groups spread over the cloud, so that the first few tell about the whole of it.
+/// Points in groups of 32 neighbours; the groups spread over the cloud, so that the first few tell about the whole of it. Normals in
+/// half precision: they serve bounds only.
 struct ScoringOrder {
-  float4* point = nullptr;                   ///< x, y, z; NaN where the last group has no more. w: index as bits
-  float4* normal = nullptr;
+  float4* point = nullptr;                   ///< x, y, z, NaN where the last group has no more; w: x and y of the normal, half each
+  std::uint16_t* normal_z = nullptr;
+  std::uint32_t* index = nullptr;            ///< of the point in the cloud
   std::uint32_t groups = 0;
 };
 

@@ -1,116 +1,81 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "bounds.cuh"
 #include "entry_of.cuh"
+#include "score_batch.cuh"
 #include "stages.hpp"
-#include "warp.cuh"
 
 namespace gpureg::cuda {
 namespace {
 
-constexpr int kThreads = 256;
 constexpr std::uint32_t kProbeGroups = 4;   // groups of 32 points that tell promising hypotheses from others
 constexpr std::uint32_t kLeaders = 16;      // promising hypotheses of a pair that are scored first
-constexpr std::uint32_t kGrab = 8;          // hypotheses that a warp takes at a time
+constexpr int kProbeThreads = 256;
+constexpr int kThreads = 768;               // as many as 80 registers each allow
+constexpr int kUnroll = 4;                  // groups in flight per warp
 
-struct ScoreBatch {
-  const ScorePair* pairs;
-  std::uint32_t pair_count;
-  const std::uint32_t* offset;      // of the pairs' hypotheses
-  const Pose<float>* poses;
-  const std::uint8_t* valid;
-  const std::uint32_t* id;
-  InlierTest test;
-  const Limits* limits;             // 2 x 256
-  std::uint32_t* possible;          // per hypothesis: points of the probe that may be inliers
-  std::uint32_t* inliers;           // per hypothesis; 0 where it was given up
-  unsigned long long* leaders;      // pairs x kLeaders: (possible, ~number), the largest of each residue class
-  std::uint32_t* most;              // per pair: inliers of the best so far
-  std::uint32_t* next;              // hypotheses handed out
+/// Hypotheses [begin, end) of one pair.
+struct Slice {
+  std::uint32_t pair, begin, end;
 };
 
-/// One warp's view of one hypothesis.
-struct Candidate {
-  const ScorePair& pair;
-  const InlierTest& test;
-  const Limits* limits;             // in shared memory
-  Rigid rigid;
-  PoseInCells in_cells;
-  std::uint32_t lane;
-
-  __device__ Candidate(const ScorePair& p, const InlierTest& t, const Limits* all_limits, const Pose<float>& pose)
-      : pair(p), test(t), limits(all_limits + p.limits * 256), rigid(to_rigid(pose)), in_cells(rigid, p.cells), lane(threadIdx.x % 32) {}
-
-  __device__ float4 point(std::uint32_t group) const { return __ldg(pair.order.point + group * 32 + lane); }
-  __device__ float4 normal(std::uint32_t group) const { return __ldg(pair.order.normal + group * 32 + lane); }
-
-  /// Points of a group that may be inliers: as many as this lane's bit says, over the warp.
-  __device__ bool may_be_inlier(std::uint32_t group, std::uint32_t& cell, Limits& limit, float& cosine, float4& p, float4& n) const {
-    p = point(group);
-    cell = locate(in_cells, pair.cells, p);
-    const std::uint32_t word = __ldg(pair.cells.word + cell);
-    if (!__any_sync(~0u, word != 0)) return false;
-    n = normal(group);
-    cosine = cosine_to_mean(rigid, n, word);
-    limit = limits[word >> 24];
-    return word != 0 && cosine >= limit.none_below;
-  }
-
-  /// Inliers of a group that are possible.
-  __device__ std::uint32_t count_possible(std::uint32_t group) const {
-    std::uint32_t cell;
-    Limits limit;
-    float cosine;
-    float4 p, n;
-    return static_cast<std::uint32_t>(__popc(static_cast<int>(__ballot_sync(~0u, may_be_inlier(group, cell, limit, cosine, p, n)))));
-  }
-
-  __device__ bool is_inlier(float4 p, float4 n, std::uint32_t cell, Closest& c) const {
-    const Vec3 q = apply(rigid, {p.x, p.y, p.z});
-    c = closest_in_cell(pair.target, cell, q, test.max_squared);
-    return c.index != kNoValue && normals_agree(rotate(rigid, {n.x, n.y, n.z}), pair.target.normals[c.index], test.min_cosine);
+/// Source points in shared memory, or in global where they are too many.
+template <bool kShared>
+struct Points {
+  const float4* point;
+  const std::uint16_t* normal_z;
+  __device__ PackedPoint operator[](std::uint32_t k) const {
+    if (kShared) return {point[k], normal_z[k]};
+    return {__ldg(point + k), __ldg(normal_z + k)};
   }
 };
 
-/// Clouds too wide for a table of blocks: every point is looked up by its key.
-__device__ std::uint32_t inliers_by_search(const Candidate& c, unsigned long long* residual) {
-  std::uint32_t inliers = 0;
-  unsigned long long sum = 0;
-  for (std::uint32_t i = c.lane; i < c.pair.source.size; i += 32) {
-    const Closest found = find_closest(c.pair.target.closest, c.pair.target.points, apply(c.rigid, c.pair.source.points[i]), c.test.max_squared);
-    if (found.index == kNoValue) continue;
-    if (!normals_agree(rotate(c.rigid, c.pair.source.normals[i]), c.pair.target.normals[found.index], c.test.min_cosine)) continue;
-    ++inliers;
-    sum += fixed_residual(found.squared_distance, c.test.inverse_max_squared);
-  }
-  if (residual) *residual = static_cast<unsigned long long>(warp_sum(static_cast<std::int64_t>(sum)));
-  return warp_sum(inliers);
+/// Groups [begin, begin + N): how many of this lane's points may be inliers.
+template <int N, bool kShared>
+__device__ std::uint32_t count_possible(const CellMotion& motion, const Limits* limits, const Points<kShared>& points, std::uint32_t begin) {
+  const std::uint32_t lane = threadIdx.x % 32;
+  PackedPoint p[N];
+  std::uint32_t word[N];
+#pragma unroll
+  for (int k = 0; k < N; ++k) p[k] = points[(begin + static_cast<std::uint32_t>(k)) * 32 + lane];
+#pragma unroll
+  for (int k = 0; k < N; ++k) word[k] = motion.locate(p[k].point);
+#pragma unroll
+  for (int k = 0; k < N; ++k) word[k] = __ldg(motion.word + word[k]);
+  std::uint32_t possible = 0;
+#pragma unroll
+  for (int k = 0; k < N; ++k) possible += word[k] != 0 && motion.cosine(p[k], word[k]) >= limits[word[k] >> 24].none_below;
+  return possible;
 }
 
 /// Exact number of inliers, or 0 as soon as it cannot reach the most seen so far: such a hypothesis is not the best one. possible: upper
 /// bound over the groups before `begin`.
-__device__ std::uint32_t count_inliers(const Candidate& c, std::uint32_t begin, std::uint32_t possible, const volatile std::uint32_t* most) {
-  if (c.pair.cells.nx == 0) return inliers_by_search(c, nullptr);
-  const std::uint32_t groups = c.pair.order.groups;
-  std::uint32_t needed = *most;
-  for (std::uint32_t g = begin; g < groups; ++g) {
-    if (possible + (groups - g) * 32 < needed) return 0;
-    possible += c.count_possible(g);
-    if (g % 16 == 15) needed = *most;
+template <bool kShared>
+__device__ std::uint32_t count_inliers(const ScorePair& pair, const InlierTest& test, const Limits* limits, const Points<kShared>& points,
+                                       const Pose<float>& pose, std::uint32_t begin, std::uint32_t possible,
+                                       const volatile std::uint32_t* most) {
+  const std::uint32_t lane = threadIdx.x % 32;
+  const Rigid rigid = to_rigid(pose);
+  if (pair.cells.nx == 0) {
+    unsigned long long residual;
+    return support_by_search(pair, test, rigid, residual);
   }
-  for (std::uint32_t g = 0; g < groups; ++g) {
+  const CellMotion motion(rigid, pair.cells);
+  const std::uint32_t groups = pair.order.groups;
+  std::uint32_t needed = *most, g = begin;
+  for (; g + kUnroll <= groups; g += kUnroll) {
+    if (possible + (groups - g) * 32 < needed) return 0;
+    possible += warp_sum(count_possible<kUnroll>(motion, limits, points, g));
+    if (g % 32 < kUnroll) needed = *most;
+  }
+  for (; g < groups; ++g) possible += warp_sum(count_possible<1>(motion, limits, points, g));
+  for (g = 0; g < groups; ++g) {
     if (possible < needed) return 0;
-    std::uint32_t cell;
-    Limits limit;
-    float cosine;
-    float4 p, n;
-    const bool undecided = c.may_be_inlier(g, cell, limit, cosine, p, n) && cosine < limit.all_above;
-    const unsigned asked = __ballot_sync(~0u, undecided);
-    if (asked == 0) continue;
-    bool refuted = undecided;
-    if (undecided) {
-      Closest closest;
-      refuted = !c.is_inlier(p, n, cell, closest);
-    }
+    const PackedPoint p = points[g * 32 + lane];
+    const std::uint32_t cell = motion.locate(p.point), word = __ldg(motion.word + cell);
+    const Limits limit = limits[word >> 24];
+    const float cosine = motion.cosine(p, word);
+    const bool undecided = word != 0 && cosine >= limit.none_below && cosine < limit.all_above;
+    if (!__any_sync(~0u, undecided)) continue;
+    const bool refuted = undecided && !is_inlier(pair, test, rigid, __ldg(pair.order.index + g * 32 + lane), cell);
     possible -= static_cast<std::uint32_t>(__popc(static_cast<int>(__ballot_sync(~0u, refuted))));
     if (g % 16 == 15) needed = *most;
   }
@@ -118,27 +83,33 @@ __device__ std::uint32_t count_inliers(const Candidate& c, std::uint32_t begin, 
 }
 
 __device__ void load_limits(const Limits* from, Limits* to) {
-  for (int k = static_cast<int>(threadIdx.x); k < 512; k += kThreads) to[k] = from[k];
+  for (unsigned k = threadIdx.x; k < 512; k += blockDim.x) to[k] = from[k];
   __syncthreads();
 }
 
 /// A warp per hypothesis looks at a few groups and proposes it as one of its pair's leaders.
-__global__ void __launch_bounds__(kThreads) probe(ScoreBatch b) {
+__global__ void __launch_bounds__(kProbeThreads) probe(ScoreBatch b) {
   __shared__ Limits limits[512];
   load_limits(b.limits, limits);
-  const std::uint32_t total = b.offset[b.pair_count], warps = gridDim.x * (kThreads / 32);
-  for (std::uint32_t h = (blockIdx.x * kThreads + threadIdx.x) / 32; h < total; h += warps) {
+  const std::uint32_t total = b.offset[b.pair_count], warps = gridDim.x * (kProbeThreads / 32);
+  for (std::uint32_t h = (blockIdx.x * kProbeThreads + threadIdx.x) / 32; h < total; h += warps) {
     const std::uint32_t p = entry_of(b.offset, b.pair_count, h);
     const ScorePair& pair = b.pairs[p];
-    if (!b.valid[h] || pair.cells.nx == 0) {
-      if (threadIdx.x % 32 == 0) b.possible[h] = 0;
-      continue;
-    }
-    const Candidate c(pair, b.test, limits, b.poses[h]);
     std::uint32_t possible = 0;
-    for (std::uint32_t g = 0; g < min(kProbeGroups, pair.order.groups); ++g) possible += c.count_possible(g);
-    if (c.lane != 0) continue;
+    const bool look = b.valid[h] && pair.cells.nx > 0;
+    if (look) {
+      const CellMotion motion(to_rigid(b.poses[h]), pair.cells);
+      const Points<false> points{pair.order.point, pair.order.normal_z};
+      const Limits* limit = limits + pair.limits * 256;
+      if (pair.order.groups >= kProbeGroups) {
+        possible = warp_sum(count_possible<kProbeGroups>(motion, limit, points, 0));
+      } else {
+        for (std::uint32_t g = 0; g < pair.order.groups; ++g) possible += warp_sum(count_possible<1>(motion, limit, points, g));
+      }
+    }
+    if (threadIdx.x % 32 != 0) continue;
     b.possible[h] = possible;
+    if (!look) continue;
     const std::uint32_t number = h - b.offset[p];
     unsigned long long* leader = b.leaders + static_cast<std::size_t>(p) * kLeaders + number % kLeaders;
     const unsigned long long claim = static_cast<unsigned long long>(possible + 1) << 32 | ~number;
@@ -146,77 +117,77 @@ __global__ void __launch_bounds__(kThreads) probe(ScoreBatch b) {
   }
 }
 
-/// A warp per leader: what they reach is what the others must beat.
-__global__ void __launch_bounds__(kThreads) score_leaders(ScoreBatch b) {
-  __shared__ Limits limits[512];
-  load_limits(b.limits, limits);
-  const std::uint32_t k = (blockIdx.x * kThreads + threadIdx.x) / 32, p = k / kLeaders;
-  if (p >= b.pair_count || b.leaders[k] == 0) return;
-  const std::uint32_t h = b.offset[p] + ~static_cast<std::uint32_t>(b.leaders[k]);
-  const Candidate c(b.pairs[p], b.test, limits, b.poses[h]);
-  const std::uint32_t inliers = count_inliers(c, 0, 0, b.most + p);
-  if (c.lane == 0 && inliers > 0) atomicMax(b.most + p, inliers);
+/// A thread block per leader counts its inliers: what the others must beat.
+__global__ void __launch_bounds__(kProbeThreads) score_leaders(ScoreBatch b) {
+  __shared__ std::uint32_t inliers;
+  const std::uint32_t p = blockIdx.x / kLeaders;
+  const unsigned long long leader = b.leaders[blockIdx.x];
+  if (leader == 0) return;
+  if (threadIdx.x == 0) inliers = 0;
+  __syncthreads();
+  const ScorePair& pair = b.pairs[p];
+  const Rigid rigid = to_rigid(b.poses[b.offset[p] + ~static_cast<std::uint32_t>(leader)]);
+  const CellMotion motion(rigid, pair.cells);
+  std::uint32_t mine = 0;
+  for (std::uint32_t k = threadIdx.x; k < pair.order.groups * 32; k += kProbeThreads) {
+    const std::uint32_t cell = motion.locate(__ldg(pair.order.point + k));
+    mine += __ldg(motion.word + cell) != 0 && is_inlier(pair, b.test, rigid, __ldg(pair.order.index + k), cell);
+  }
+  mine = warp_sum(mine);
+  if (threadIdx.x % 32 == 0) atomicAdd(&inliers, mine);
+  __syncthreads();
+  if (threadIdx.x == 0 && inliers > 0) atomicMax(b.most + p, inliers);
 }
 
-/// Warps take hypotheses until none is left: how long one takes is not known before.
-__global__ void __launch_bounds__(kThreads) score_all(ScoreBatch b) {
-  __shared__ Limits limits[512];
-  load_limits(b.limits, limits);
-  const std::uint32_t total = b.offset[b.pair_count], lane = threadIdx.x % 32;
+template <bool kShared>
+__device__ void score_slice(const ScoreBatch& b, const Slice& slice, const Limits* limits, const Points<kShared>& points, std::uint32_t* next) {
+  const std::uint32_t lane = threadIdx.x % 32;
+  const ScorePair& pair = b.pairs[slice.pair];
   for (;;) {
-    std::uint32_t first = 0;
-    if (lane == 0) first = atomicAdd(b.next, kGrab);
-    first = __shfl_sync(~0u, first, 0);
-    if (first >= total) return;
-    const std::uint32_t last = min(total, first + kGrab);
-    for (std::uint32_t h = first; h < last; ++h) {
-      std::uint32_t inliers = 0;
-      if (b.valid[h]) {
-        const std::uint32_t p = entry_of(b.offset, b.pair_count, h);
-        const Candidate c(b.pairs[p], b.test, limits, b.poses[h]);
-        inliers = count_inliers(c, min(kProbeGroups, c.pair.order.groups), b.possible[h], b.most + p);
-        if (lane == 0 && inliers > 0) atomicMax(b.most + p, inliers);
-      }
-      if (lane == 0) b.inliers[h] = inliers;
+    std::uint32_t h = 0;
+    if (lane == 0) h = atomicAdd(next, 1);
+    h = __shfl_sync(~0u, h, 0);
+    if (h >= slice.end) return;
+    std::uint32_t inliers = 0;
+    if (b.valid[h]) {
+      inliers = count_inliers<kShared>(pair, b.test, limits + pair.limits * 256, points, b.poses[h], min(kProbeGroups, pair.order.groups),
+                                       b.possible[h], b.most + slice.pair);
+      if (lane == 0 && inliers > 0) atomicMax(b.most + slice.pair, inliers);
     }
+    if (lane == 0) b.inliers[h] = inliers;
   }
 }
 
-/// Residuals of those that share the most inliers, and the smallest of each pair.
-__global__ void __launch_bounds__(kThreads) measure_ties(ScoreBatch b, unsigned long long* residual, unsigned long long* least) {
-  const std::uint32_t total = b.offset[b.pair_count], warps = gridDim.x * (kThreads / 32), lane = threadIdx.x % 32;
-  for (std::uint32_t h = (blockIdx.x * kThreads + threadIdx.x) / 32; h < total; h += warps) {
-    if (!b.valid[h]) continue;
-    const std::uint32_t p = entry_of(b.offset, b.pair_count, h);
-    if (b.inliers[h] != b.most[p]) continue;
-    const Candidate c(b.pairs[p], b.test, b.limits, b.poses[h]);
-    unsigned long long sum = 0;
-    inliers_by_search(c, &sum);
-    if (lane != 0) continue;
-    residual[h] = sum;
-    atomicMin(least + p, sum);
+/// Thread blocks take slices until none is left; in a slice the warps take hypotheses: how long one takes is not known before. The
+/// source's points are in shared memory, so that the cache is left to the target's cells.
+__global__ void __launch_bounds__(kThreads, 1) score_slices(ScoreBatch b, const Slice* slices, std::uint32_t count, std::uint32_t capacity) {
+  extern __shared__ float4 shared_points[];
+  std::uint16_t* shared_z = reinterpret_cast<std::uint16_t*>(shared_points + capacity);
+  __shared__ Limits limits[512];
+  __shared__ std::uint32_t taken, next;
+  load_limits(b.limits, limits);
+  std::uint32_t loaded = kNoValue;
+  for (;;) {
+    __syncthreads();
+    if (threadIdx.x == 0) {
+      taken = atomicAdd(b.next, 1);
+      if (taken < count) next = slices[taken].begin;
+    }
+    __syncthreads();
+    if (taken >= count) return;
+    const Slice slice = slices[taken];
+    const ScoringOrder& order = b.pairs[slice.pair].order;
+    if (order.groups * 32 > capacity) {
+      score_slice(b, slice, limits, Points<false>{order.point, order.normal_z}, &next);
+      continue;
+    }
+    if (loaded != slice.pair) {
+      for (std::uint32_t k = threadIdx.x; k < order.groups * 32; k += kThreads) shared_points[k] = order.point[k], shared_z[k] = order.normal_z[k];
+      loaded = slice.pair;
+      __syncthreads();
+    }
+    score_slice(b, slice, limits, Points<true>{shared_points, shared_z}, &next);
   }
-}
-
-/// Of those the first one drawn. Hypotheses are in the order of their numbers, so the first is the lowest.
-__global__ void find_first(ScoreBatch b, const unsigned long long* residual, const unsigned long long* least, std::uint32_t* winner) {
-  const std::uint32_t h = blockIdx.x * blockDim.x + threadIdx.x;
-  if (h >= b.offset[b.pair_count] || !b.valid[h]) return;
-  const std::uint32_t p = entry_of(b.offset, b.pair_count, h);
-  if (b.inliers[h] == b.most[p] && residual[h] == least[p]) atomicMin(winner + p, h);
-}
-
-__global__ void write_best(ScoreBatch b, const unsigned long long* least, const std::uint32_t* winner, BestPose* best) {
-  const std::uint32_t p = blockIdx.x * blockDim.x + threadIdx.x;
-  if (p >= b.pair_count) return;
-  BestPose out{0, 0, {0, 0, 0}, {1, 0, 0, 0, 0, 0, 0}};
-  const std::uint32_t h = winner[p];
-  if (h != kNoValue) {
-    out.found = 1;
-    out.support = {b.most[p], b.id[h], least[p]};
-    out.pose = widen(b.poses[h]);
-  }
-  best[p] = out;
 }
 
 std::vector<ScorePair> score_pairs(Span<const PairView> pairs, const ScoreOptions& options) {
@@ -241,6 +212,16 @@ std::vector<Limits> limit_tables(const ScoreOptions& options) {
   return out;
 }
 
+/// Slices small enough to keep every multiprocessor busy to the end, large enough to be worth loading the points.
+std::vector<Slice> cut_slices(const Segments& segments, unsigned multiprocessors) {
+  const std::uint32_t size = std::max(32u, std::min(2048u, segments.total() / (multiprocessors * 8)));
+  std::vector<Slice> out;
+  for (std::uint32_t p = 0; p < segments.entries(); ++p)
+    for (std::uint32_t begin = segments.offset[p]; begin < segments.offset[p + 1]; begin += size)
+      out.push_back({p, begin, std::min(begin + size, segments.offset[p + 1])});
+  return out;
+}
+
 }  // namespace
 
 DeviceBuffer<BestPose> score_hypotheses(Exec& exec, Span<const PairView> pairs, const Hypotheses& hypotheses, const ScoreOptions& options) {
@@ -253,30 +234,30 @@ DeviceBuffer<BestPose> score_hypotheses(Exec& exec, Span<const PairView> pairs, 
   const auto leaders = exec.filled<unsigned long long>(static_cast<std::size_t>(count) * kLeaders, 0);
   const auto most = exec.filled<std::uint32_t>(count, 0);
   const auto next = exec.filled<std::uint32_t>(1, 0);
-  const auto residual = exec.buffer<unsigned long long>(total);
-  const auto least = exec.filled<unsigned long long>(count, 0xff);
-  const auto winner = exec.filled<std::uint32_t>(count, 0xff);
-  auto best = exec.buffer<BestPose>(count);
   const ScoreBatch batch{pairs_on_device.data(), count, hypotheses.segments->on_device.data(), hypotheses.pose.data(), hypotheses.valid.data(),
                          hypotheses.id, inlier_test(options.max_correspondence_distance, options.max_normal_angle), limits.data(),
                          possible.data(), inliers.data(), leaders.data(), most.data(), next.data()};
   if (total > 0) {
-    const unsigned full = static_cast<unsigned>(exec.multiprocessors()) * 8;
-    const unsigned warp_blocks = std::min(blocks_for(static_cast<std::size_t>(total) * 32, kThreads), full);
-    probe<<<warp_blocks, kThreads, 0, exec.stream()>>>(batch);
+    const unsigned processors = static_cast<unsigned>(exec.multiprocessors());
+    probe<<<std::min(blocks_for(static_cast<std::size_t>(total) * 32, kProbeThreads), processors * 8), kProbeThreads, 0, exec.stream()>>>(batch);
     check_launch("probe");
-    score_leaders<<<blocks_for(static_cast<std::size_t>(count) * kLeaders * 32, kThreads), kThreads, 0, exec.stream()>>>(batch);
+    score_leaders<<<count * kLeaders, kProbeThreads, 0, exec.stream()>>>(batch);
     check_launch("score_leaders");
-    score_all<<<warp_blocks, kThreads, 0, exec.stream()>>>(batch);
-    check_launch("score_all");
-    measure_ties<<<warp_blocks, kThreads, 0, exec.stream()>>>(batch, residual.data(), least.data());
-    check_launch("measure_ties");
-    find_first<<<blocks_for(total, kThreads), kThreads, 0, exec.stream()>>>(batch, residual.data(), least.data(), winner.data());
-    check_launch("find_first");
+
+    const std::vector<Slice> slices = cut_slices(*hypotheses.segments, processors);
+    const auto slices_on_device = exec.upload(slices);
+    std::uint32_t largest = 0;
+    for (const PairView& pair : pairs) largest = std::max(largest, (pair.source.size + 31) / 32 * 32);
+    constexpr std::size_t kBytesPerPoint = sizeof(float4) + sizeof(std::uint16_t);
+    const std::uint32_t fits = static_cast<std::uint32_t>((exec.shared_bytes_per_block() - 8192) / kBytesPerPoint) / 32 * 32;
+    const std::uint32_t capacity = std::min(largest, fits);
+    const std::size_t bytes = capacity * kBytesPerPoint;
+    check(cudaFuncSetAttribute(score_slices, cudaFuncAttributeMaxDynamicSharedMemorySize, static_cast<int>(bytes)), "cudaFuncSetAttribute");
+    score_slices<<<std::min(static_cast<unsigned>(slices.size()), processors), kThreads, bytes, exec.stream()>>>(
+        batch, slices_on_device.data(), static_cast<std::uint32_t>(slices.size()), capacity);
+    check_launch("score_slices");
   }
-  write_best<<<blocks_for(count, 128), 128, 0, exec.stream()>>>(batch, least.data(), winner.data(), best.data());
-  check_launch("write_best");
-  return best;
+  return select_best(exec, batch, total);
 }
 
 }  // namespace gpureg::cuda

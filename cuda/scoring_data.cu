@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "scoring_data.hpp"
 
+#include <cuda_fp16.h>
+
 #include <numeric>
 
 #include "algorithm/cell_summary.hpp"
@@ -75,20 +77,24 @@ __global__ void write_morton_keys(const Slot* slots, std::uint64_t* keys, std::u
   }
 }
 
+__device__ std::uint32_t half_bits(float v) { return __half_as_ushort(__float2half_rn(v)); }
+
 __global__ void write_order(const Slot* slots, const std::uint32_t* index) {
   const Slot& s = slots[blockIdx.y];
   for (std::uint32_t k = blockIdx.x * blockDim.x + threadIdx.x; k < s.order.groups * 32; k += gridDim.x * blockDim.x) {
     const std::uint32_t from = static_cast<std::uint32_t>(static_cast<std::uint64_t>(k / 32) * s.group_step % s.order.groups) * 32 + k % 32;
     const float nan = __uint_as_float(0x7fc00000u);
-    float4 point = make_float4(nan, nan, nan, __uint_as_float(kNoValue)), normal = make_float4(0, 0, 0, 0);
+    float4 point = make_float4(nan, nan, nan, 0);
+    std::uint32_t rest = 0, i = kNoValue;
     if (from < s.view.size) {
-      const std::uint32_t i = index[s.point_offset + from];
+      i = index[s.point_offset + from];
       const Vec3 p = s.view.points[i], n = s.view.normals[i];
-      point = make_float4(p.x, p.y, p.z, __uint_as_float(i));
-      normal = make_float4(n.x, n.y, n.z, 0);
+      point = make_float4(p.x, p.y, p.z, __uint_as_float(half_bits(n.x) | half_bits(n.y) << 16));
+      rest = half_bits(n.z);
     }
     s.order.point[k] = point;
-    s.order.normal[k] = normal;
+    s.order.normal_z[k] = static_cast<std::uint16_t>(rest);
+    s.order.index[k] = i;
   }
 }
 
@@ -110,7 +116,8 @@ ScoringLayout scoring_layout(const CudaCloud& cloud, const CellRange& blocks) {
   l.table = take(fits ? nx * ny * nz * sizeof(std::int32_t) : 0);
   l.words = take(fits ? (std::size_t(cloud.block_count) + 1) * kCells * sizeof(std::uint32_t) : 0);
   l.points = take(padded * sizeof(float4));
-  l.normals = take(padded * sizeof(float4));
+  l.normals = take(padded * sizeof(std::uint16_t));
+  l.index = take(padded * sizeof(std::uint32_t));
   return l;
 }
 
@@ -123,7 +130,8 @@ void place_scoring_data(const ScoringLayout& l, const ClosestGeometry& geometry,
   v.word = reinterpret_cast<std::uint32_t*>(memory + l.words);
   cloud.order.groups = (cloud.size + 31) / 32;
   cloud.order.point = reinterpret_cast<float4*>(memory + l.points);
-  cloud.order.normal = reinterpret_cast<float4*>(memory + l.normals);
+  cloud.order.normal_z = reinterpret_cast<std::uint16_t*>(memory + l.normals);
+  cloud.order.index = reinterpret_cast<std::uint32_t*>(memory + l.index);
 }
 
 void fill_scoring_data(Exec& exec, const std::vector<std::shared_ptr<CudaCloud>>& clouds, const std::vector<ClosestGeometry>& geometry) {

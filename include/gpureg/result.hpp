@@ -34,8 +34,8 @@ struct RegistrationResult {
   double score = 0;            ///< what ranks results: today the inlier ratio
   double inlier_ratio = 0;     ///< inliers (judged) / points scored, [0, 1]
   double inlier_rmse = 0;      ///< metres, over the inliers
-  CorrespondenceMoments source_moments;  ///< of the inliers, points of the source, in the source's frame (Redwood's convention)
-  CorrespondenceMoments target_moments;  ///< of the inliers, points of the target, in the target's frame (Open3D's convention)
+  CorrespondenceMoments source_moments;  ///< of all correspondences within the distance, whatever their normals: points of the source, in its frame (Redwood's convention)
+  CorrespondenceMoments target_moments;  ///< the same, points of the target, in its frame (Open3D's convention)
   RegistrationStatistics statistics;
   StageTimings timings;
 

@@ -12,8 +12,10 @@ namespace gpureg {
 
 constexpr double kSummaryAngleStep = 1.5;
 constexpr int kSummaryNoBound = 127;
-/// Rounding a unit vector to steps of 1/127 turns it by less than this many degrees.
+/// Rounding a unit vector to steps of 1/127 turns it by less than this many degrees, and changes its length by less than this part; a
+/// little more, for moved normals that are kept in half precision.
 constexpr double kSummaryQuantisation = 0.6;
+constexpr double kSummaryStretch = 0.0075;
 constexpr double kDegrees = 3.14159265358979323846 / 180.0;
 
 /// True where all of the cell lies within the search distance of p.
@@ -72,8 +74,12 @@ struct SummaryLimits {
         // Without a normal test only reach decides.
         if (covered) all_above[code] = -2.0f;
       } else if (step != kSummaryNoBound) {
-        if (angle + spread < 180.0) none_below[code] = static_cast<float>(std::cos((angle + spread) * kDegrees)) - 1e-5f;
-        if (covered && angle - spread > 0.0) all_above[code] = static_cast<float>(std::cos((angle - spread) * kDegrees)) + 1e-5f;
+        // The mean's length is not quite 1, which stretches the cosine either way.
+        const double widest = std::cos((angle + spread) * kDegrees), narrowest = std::cos((angle - spread) * kDegrees);
+        if (angle + spread < 180.0)
+          none_below[code] = static_cast<float>(widest * (widest > 0 ? 1 - kSummaryStretch : 1 + kSummaryStretch)) - 1e-5f;
+        if (covered && angle - spread > 0.0)
+          all_above[code] = static_cast<float>(narrowest * (narrowest > 0 ? 1 + kSummaryStretch : 1 - kSummaryStretch)) + 1e-5f;
       }
     }
     // Code 0 is a cell without candidates (a real one has a spread of at least one step): no inlier, whatever the normals.

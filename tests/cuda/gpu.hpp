@@ -23,7 +23,7 @@ std::vector<T> host(cuda::Exec& exec, const T* device, std::size_t size) {
   return std::vector<T>(staged, staged + size);
 }
 
-/// Equal as bytes, so that a NaN equals itself and 0 differs from -0.
+/// Equal as bytes, so that 0 differs from -0.
 template <typename T>
 ::testing::AssertionResult same_bytes(const std::vector<T>& cpu, const std::vector<T>& cuda) {
   if (cpu.size() != cuda.size()) return ::testing::AssertionFailure() << "sizes " << cpu.size() << " and " << cuda.size();

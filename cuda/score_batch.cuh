@@ -1,0 +1,50 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include "bounds.cuh"
+#include "warp.cuh"
+
+namespace gpureg::cuda {
+
+/// What the kernels of scoring share.
+struct ScoreBatch {
+  const ScorePair* pairs;
+  std::uint32_t pair_count;
+  const std::uint32_t* offset;      ///< of the pairs' hypotheses
+  const Pose<float>* poses;
+  const std::uint8_t* valid;
+  const std::uint32_t* id;
+  InlierTest test;
+  const Limits* limits;             ///< 2 x 256
+  std::uint32_t* possible;          ///< per hypothesis: points of the probe that may be inliers
+  std::uint32_t* inliers;           ///< per hypothesis; 0 where it was given up
+  unsigned long long* leaders;      ///< pairs x kLeaders: (possible + 1, ~number), the largest of each residue class; 0: none
+  std::uint32_t* most;              ///< per pair: inliers of the best so far
+  std::uint32_t* next;              ///< slices handed out
+};
+
+/// Exact test of one source point.
+__device__ inline bool is_inlier(const ScorePair& pair, const InlierTest& test, const Rigid& rigid, std::uint32_t i, std::uint32_t cell) {
+  const Closest c = closest_in_cell(pair.target, cell, apply(rigid, pair.source.points[i]), test.max_squared);
+  return c.index != kNoValue && normals_agree(rotate(rigid, pair.source.normals[i]), pair.target.normals[c.index], test.min_cosine);
+}
+
+/// Support of one pose by looking every point up: clouds too wide for a table of blocks, and residuals. A warp's work; all lanes get it.
+__device__ inline std::uint32_t support_by_search(const ScorePair& pair, const InlierTest& test, const Rigid& rigid, unsigned long long& residual) {
+  std::uint32_t inliers = 0;
+  std::int64_t sum = 0;
+  for (std::uint32_t i = threadIdx.x % 32; i < pair.source.size; i += 32) {
+    const Closest found = find_closest(pair.target.closest, pair.target.points, apply(rigid, pair.source.points[i]), test.max_squared);
+    if (found.index == kNoValue) continue;
+    if (!normals_agree(rotate(rigid, pair.source.normals[i]), pair.target.normals[found.index], test.min_cosine)) continue;
+    ++inliers;
+    sum += fixed_residual(found.squared_distance, test.inverse_max_squared);
+  }
+  residual = static_cast<unsigned long long>(warp_sum(sum));
+  return warp_sum(inliers);
+}
+
+/// Chooses the best of the hypotheses whose `inliers` are the pair's most: smallest residual, then lowest number.
+DeviceBuffer<BestPose> select_best(Exec& exec, const ScoreBatch& batch, std::uint32_t total);
+
+}  // namespace gpureg::cuda
