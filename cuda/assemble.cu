@@ -26,8 +26,32 @@ __global__ void copy_parts(const Part* parts) {
 }
 
 struct Missing {
-  std::uint32_t normals, features;
+  std::uint32_t normals, features, extreme_features;
 };
+
+struct NormSlot {
+  const float* features;
+  const std::uint8_t* valid;
+  std::uint32_t size, dimension;
+  float2* out;
+};
+
+/// Lengths of the features, for bounds in the feature search.
+__global__ void measure_features(const NormSlot* slots, Missing* missing) {
+  const NormSlot s = slots[blockIdx.y];
+  std::uint32_t extreme = 0;
+  for (std::uint32_t i = blockIdx.x * blockDim.x + threadIdx.x; i < s.size; i += gridDim.x * blockDim.x) {
+    float sum = 0.0f;
+    for (std::uint32_t d = 0; d < s.dimension; ++d) {
+      const float v = s.features[static_cast<std::size_t>(i) * s.dimension + d];
+      sum = fmaf(v, v, sum);
+    }
+    if (!s.valid[i]) sum = __uint_as_float(0x7f800000u);
+    s.out[i] = make_float2(sum, sqrtf(sum));
+    extreme += s.valid[i] && !(sum < 1e30f);
+  }
+  if (extreme > 0) atomicAdd(&missing[blockIdx.y].extreme_features, extreme);
+}
 
 __global__ void count_missing(const std::uint32_t* offset, const Vec3* normals, const std::uint8_t* valid, Missing* missing) {
   const std::uint32_t c = blockIdx.y, end = offset[c + 1];
@@ -72,6 +96,7 @@ std::vector<std::shared_ptr<CudaCloud>> assemble(Exec& exec, const DownsampledCl
   const std::size_t count = segments.entries();
   std::vector<std::shared_ptr<CudaCloud>> out;
   std::vector<Part> parts;
+  std::vector<NormSlot> norm_slots;
   for (std::size_t c = 0; c < count; ++c) {
     auto cloud = std::make_shared<CudaCloud>();
     const CloudFacts& facts = clouds.facts[c];
@@ -104,6 +129,8 @@ std::vector<std::shared_ptr<CudaCloud>> assemble(Exec& exec, const DownsampledCl
           std::size_t(cloud->block_count) * (ClosestGridView::kBlockCells + 1));
     place(closest.candidates.data() + closest.candidate_offset[c], cloud->candidate_count);
     place(closest.block.data() + block_begin, cloud->block_count);
+    const std::size_t norms = bytes;
+    bytes += (n * sizeof(float2) + 255) / 256 * 256;
     const std::size_t copied = bytes;
     const ScoringLayout layout = scoring_layout(*cloud, closest.block_range[c]);
     cloud->data = exec.buffer<char>(copied + layout.bytes);
@@ -122,6 +149,8 @@ std::vector<std::shared_ptr<CudaCloud>> assemble(Exec& exec, const DownsampledCl
                     {reinterpret_cast<const std::uint32_t*>(part[5].to), std::size_t(cloud->block_count) * (ClosestGridView::kBlockCells + 1)},
                     {reinterpret_cast<const std::uint32_t*>(part[6].to), cloud->candidate_count}};
     view.executor_data = cloud.get();
+    cloud->feature_norm = reinterpret_cast<float2*>(cloud->data.data() + norms);
+    norm_slots.push_back({view.features, view.has_feature, view.size, view.feature_dimension, cloud->feature_norm});
     cloud->blocks = reinterpret_cast<const Cell*>(part[7].to);
     place_scoring_data(layout, closest.geometry[c], cloud->data.data() + copied, *cloud);
     out.push_back(std::move(cloud));
@@ -133,12 +162,16 @@ std::vector<std::shared_ptr<CudaCloud>> assemble(Exec& exec, const DownsampledCl
   count_missing<<<dim3(8, static_cast<unsigned>(count)), 256, 0, exec.stream()>>>(segments.on_device.data(), normals.data(),
                                                                                   features.valid.data(), missing.data());
   check_launch("count_missing");
+  const auto norm_slots_on_device = exec.upload(norm_slots);
+  measure_features<<<dim3(16, static_cast<unsigned>(count)), 256, 0, exec.stream()>>>(norm_slots_on_device.data(), missing.data());
+  check_launch("measure_features");
   fill_scoring_data(exec, out, closest.geometry);
   const Missing* counted = exec.download(missing.data(), count);
   exec.synchronize();
   for (std::size_t c = 0; c < count; ++c) {
     out[c]->statistics.points_without_normal = counted[c].normals;
     out[c]->statistics.points_without_feature = counted[c].features;
+    out[c]->moderate_features = counted[c].extreme_features == 0;
   }
   return out;
 }

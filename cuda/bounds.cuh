@@ -1,13 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <cuda_fp16.h>
-
 #include "algorithm/cell_summary.hpp"
 #include "algorithm/inlier.hpp"
 #include "products.hpp"
 
-/// What is known of moved points before a single target point is looked at.
+/// What is known of a moved point before a single target point is looked at.
 namespace gpureg::cuda {
 
 /// One pair as scoring reads it.
@@ -22,24 +20,14 @@ struct Limits {
   float none_below, all_above;
 };
 
-/// A source point with its normal, as ScoringOrder keeps it.
-struct PackedPoint {
-  float4 point;
-  std::uint16_t normal_z;
-};
-
-/// The motion in units of the target's cells, and the look-up of cells. Rounding may differ from apply() by a small part of a cell,
-/// which the margin of the closest-point grid covers.
+/// The motion in units of the target's cells. Rounding may differ from apply() by a small part of a cell, which the margin of the
+/// closest-point grid covers.
 struct CellMotion {
   float r[9], t[3];
   std::uint32_t nx, ny, nz;
-  const std::int32_t* block;
-  const std::uint32_t* word;
-  float scale;
 
   __device__ CellMotion(const Rigid& pose, const CellSummaries& v)
-      : nx(static_cast<std::uint32_t>(v.nx)), ny(static_cast<std::uint32_t>(v.ny)), nz(static_cast<std::uint32_t>(v.nz)), block(v.block),
-        word(v.word), scale(1.0f / (127.0f * v.inverse_cell_size)) {
+      : nx(static_cast<std::uint32_t>(v.nx)), ny(static_cast<std::uint32_t>(v.ny)), nz(static_cast<std::uint32_t>(v.nz)) {
 #pragma unroll
     for (int k = 0; k < 9; ++k) r[k] = pose.r[k] * v.inverse_cell_size;
     // Half a cell less: then rounding to the nearest integer is floor().
@@ -48,8 +36,10 @@ struct CellMotion {
     t[2] = fmaf(pose.t[2], v.inverse_cell_size, v.offset.z - 0.5f);
   }
 
-  /// Index of the summary of the cell that a moved point falls into; below 512, an empty one, where there is no block (NaN too).
-  __device__ std::uint32_t locate(float4 p) const {
+  /// Index of the cell that a moved point falls into; below 512, an empty one, where there is no block (NaN too). blocks: the cloud's
+  /// table or a copy of it.
+  template <typename Block>
+  __device__ std::uint32_t locate(float4 p, const Block* blocks) const {
     // Adding 1.5 * 2^23 leaves the rounded coordinate in the low bits: full speed, unlike a conversion. What is too large for it has
     // other high bits and is outside.
     constexpr float kMagic = 12582912.0f;
@@ -58,25 +48,16 @@ struct CellMotion {
     const std::uint32_t z = __float_as_uint(fmaf(r[8], p.z, fmaf(r[7], p.y, fmaf(r[6], p.x, t[2]))) + kMagic) - 0x4b400000u;
     const std::uint32_t bx = x >> 3, by = y >> 3, bz = z >> 3;
     if (bx >= nx || by >= ny || bz >= nz) return 0;
-    return static_cast<std::uint32_t>(__ldg(block + ((bz * ny + by) * nx + bx))) << 9 | (z & 7) << 6 | (y & 7) << 3 | (x & 7);
-  }
-
-  /// Cosine between a moved normal and the mean normal of a summary.
-  __device__ float cosine(const PackedPoint& p, std::uint32_t w) const {
-    const std::uint32_t xy = __float_as_uint(p.point.w);
-    const float nx_ = __half2float(__ushort_as_half(static_cast<unsigned short>(xy & 0xffffu)));
-    const float ny_ = __half2float(__ushort_as_half(static_cast<unsigned short>(xy >> 16)));
-    const float nz_ = __half2float(__ushort_as_half(p.normal_z));
-    // A byte becomes a float as the low bits of 2^23 + 128 + byte: two fast steps instead of a slow conversion.
-    const float mx = __uint_as_float(__byte_perm(w ^ 0x00808080u, 0x4b000000u, 0x7440)) - 8388736.0f;
-    const float my = __uint_as_float(__byte_perm(w ^ 0x00808080u, 0x4b000000u, 0x7441)) - 8388736.0f;
-    const float mz = __uint_as_float(__byte_perm(w ^ 0x00808080u, 0x4b000000u, 0x7442)) - 8388736.0f;
-    const float x = fmaf(r[2], nz_, fmaf(r[1], ny_, r[0] * nx_));
-    const float y = fmaf(r[5], nz_, fmaf(r[4], ny_, r[3] * nx_));
-    const float z = fmaf(r[8], nz_, fmaf(r[7], ny_, r[6] * nx_));
-    return fmaf(z, mz, fmaf(y, my, x * mx)) * scale;
+    return static_cast<std::uint32_t>(blocks[(bz * ny + by) * nx + bx]) << 9 | (z & 7) << 6 | (y & 7) << 3 | (x & 7);
   }
 };
+
+/// Cosine between a moved normal and the mean normal of a summary.
+__device__ inline float cosine_to_mean(const Rigid& pose, float4 n, std::uint32_t word) {
+  const Vec3 moved = rotate(pose, {n.x, n.y, n.z});
+  const auto part = [&](int shift) { return static_cast<float>(static_cast<std::int32_t>(word << shift) >> 24); };
+  return fmaf(moved.z, part(8), fmaf(moved.y, part(16), moved.x * part(24))) * (1.0f / 127.0f);
+}
 
 /// Closest target point of a moved source point whose cell is known.
 __device__ inline Closest closest_in_cell(const CloudView& target, std::uint32_t cell, Vec3 q, float max_squared) {

@@ -23,6 +23,7 @@ class Exec {
   cudaStream_t stream() const { return memory_->stream(); }
   const std::shared_ptr<DeviceMemory>& memory() const { return memory_; }
   int multiprocessors() const { return multiprocessors_; }
+  int compute_capability() const { return compute_capability_; }  ///< 90 for 9.0
   std::size_t shared_bytes_per_block() const { return shared_bytes_per_block_; }
 
   /// Begins a call: what the last one staged is free again, its events too.
@@ -77,7 +78,7 @@ class Exec {
   PinnedArena staging_;
   std::vector<cudaEvent_t> events_;
   std::size_t events_used_ = 0;
-  int multiprocessors_ = 1;
+  int multiprocessors_ = 1, compute_capability_ = 0;
   std::size_t shared_bytes_per_block_ = 48 << 10;
 };
 

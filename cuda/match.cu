@@ -53,6 +53,12 @@ __global__ void __launch_bounds__(1024) collect_matches(MatchBatch m) {
   if (threadIdx.x == 0) m.count[p] = written;
 }
 
+FeatureQuery query(const CloudView& from, const CloudView& in, std::uint32_t out) {
+  const auto &a = *static_cast<const CudaCloud*>(from.executor_data), &b = *static_cast<const CudaCloud*>(in.executor_data);
+  return {from.features, from.has_feature, from.size, in.features, in.has_feature, in.size, from.feature_dimension, out,
+          a.feature_norm, b.feature_norm, a.moderate_features && b.moderate_features};
+}
+
 }  // namespace
 
 Matches match_features(Exec& exec, Span<const PairView> pairs, const HypothesisOptions& options) {
@@ -63,7 +69,7 @@ Matches match_features(Exec& exec, Span<const PairView> pairs, const HypothesisO
   for (std::size_t p = 0; p < pairs.size; ++p) {
     if (!asks(p)) continue;
     const CloudView &s = pairs[p].source, &t = pairs[p].target;
-    forward.push_back({s.features, s.has_feature, s.size, t.features, t.has_feature, t.size, s.feature_dimension, forward_segments.offset[p]});
+    forward.push_back(query(s, t, forward_segments.offset[p]));
   }
   MatchBatch batch{};
   const auto forward_answers = nearest_features(exec, forward, k, forward_segments.total());
@@ -74,7 +80,7 @@ Matches match_features(Exec& exec, Span<const PairView> pairs, const HypothesisO
     for (std::size_t p = 0; p < pairs.size; ++p) {
       if (!asks(p)) continue;
       const CloudView &s = pairs[p].source, &t = pairs[p].target;
-      backward.push_back({t.features, t.has_feature, t.size, s.features, s.has_feature, s.size, s.feature_dimension, backward_segments.offset[p]});
+      backward.push_back(query(t, s, backward_segments.offset[p]));
     }
     backward_answers = nearest_features(exec, backward, 1, backward_segments.total());
     batch.backward_offset = backward_segments.on_device.data();

@@ -129,6 +129,12 @@ __global__ void __launch_bounds__(128) nearest_many(const FeatureQuery* batch, s
 
 }  // namespace
 
+std::uint32_t rows_of_part(const Exec& exec, std::size_t query_blocks, std::uint32_t most_rows, std::uint32_t tile) {
+  const std::size_t tiles = blocks_for(most_rows, tile), wanted = static_cast<std::size_t>(exec.multiprocessors()) * 8;
+  const std::size_t parts = std::max<std::size_t>(1, std::min(tiles, wanted / query_blocks));
+  return blocks_for(tiles, static_cast<unsigned>(parts)) * tile;
+}
+
 DeviceBuffer<std::uint32_t> nearest_features(Exec& exec, const std::vector<FeatureQuery>& queries, std::uint32_t k, std::size_t answers) {
   auto out = exec.buffer<std::uint32_t>(answers);
   if (answers == 0) return out;
@@ -143,13 +149,17 @@ DeviceBuffer<std::uint32_t> nearest_features(Exec& exec, const std::vector<Featu
   }
   // All bits set is greater than every answer, and its index is kNoValue.
   auto best = exec.filled<unsigned long long>(answers, 0xff);
-  // Rows are cut into parts only where the queries alone do not fill the device.
-  const unsigned query_blocks = blocks_for(most_queries, kQueries);
-  const std::size_t wanted = static_cast<std::size_t>(exec.multiprocessors()) * 8;
-  const std::size_t parts = std::max<std::size_t>(1, std::min<std::size_t>(blocks_for(most_rows, kRows), wanted / (std::size_t(query_blocks) * entries)));
-  const std::uint32_t rows_per_part = blocks_for(blocks_for(most_rows, kRows), static_cast<unsigned>(parts)) * kRows;
-  nearest_one<<<dim3(query_blocks, blocks_for(most_rows, rows_per_part), entries), kThreads, 0, exec.stream()>>>(batch.data(), rows_per_part, best.data());
-  check_launch("nearest_one");
+  std::uint32_t most_dimensions = 0;
+  bool moderate = true;
+  for (const FeatureQuery& f : queries) most_dimensions = std::max(most_dimensions, f.dimension), moderate = moderate && f.moderate;
+  if (exec.compute_capability() >= 80 && most_dimensions <= kFilterDimensions && moderate) {
+    filter_nearest(exec, batch.data(), entries, most_queries, most_rows, most_dimensions, answers, best.data());
+  } else {
+    const std::uint32_t rows_per_part = rows_of_part(exec, blocks_for(most_queries, kQueries) * std::size_t(entries), most_rows, kRows);
+    nearest_one<<<dim3(blocks_for(most_queries, kQueries), blocks_for(most_rows, rows_per_part), entries), kThreads, 0, exec.stream()>>>(
+        batch.data(), rows_per_part, best.data());
+    check_launch("nearest_one");
+  }
   unpack_nearest<<<dim3(blocks_for(most_queries, 256), entries), 256, 0, exec.stream()>>>(batch.data(), best.data(), out.data());
   check_launch("unpack_nearest");
   return out;

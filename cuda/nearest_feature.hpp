@@ -17,10 +17,22 @@ struct FeatureQuery {
   std::uint32_t row_count;
   std::uint32_t dimension;
   std::uint32_t out;  ///< where its answers begin
+  const float2* query_norm;  ///< squared length and length
+  const float2* row_norm;    ///< infinite where the row is not valid
+  bool moderate;             ///< all lengths up to 1e15
 };
 
 /// Nearest rows of every query: k indices per query in order of distance (squared norm of the difference as a chain of fmaf over the
 /// dimensions, then the lower index), kNoValue where fewer exist. Exactly what cpu::nearest_features finds.
 DeviceBuffer<std::uint32_t> nearest_features(Exec& exec, const std::vector<FeatureQuery>& queries, std::uint32_t k, std::size_t answers);
+
+/// Rows are cut into parts only where the queries alone do not fill the device: rows per part, a multiple of the tile.
+std::uint32_t rows_of_part(const Exec& exec, std::size_t query_blocks, std::uint32_t most_rows, std::uint32_t tile);
+
+/// For k = 1 and up to kFilterDimensions: the tensor cores tell which rows can be the nearest, and only those are measured exactly. Folds
+/// (distance, index) into `best` by atomicMin, as the plain search does. batch is on the device. Needs compute capability 8.0.
+constexpr std::uint32_t kFilterDimensions = 64;
+void filter_nearest(Exec& exec, const FeatureQuery* batch, unsigned entries, std::uint32_t most_queries, std::uint32_t most_rows,
+                    std::uint32_t most_dimensions, std::size_t answers, unsigned long long* best);
 
 }  // namespace gpureg::cuda

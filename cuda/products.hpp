@@ -72,14 +72,13 @@ struct CellSummaries {
   std::int32_t nx = 0, ny = 0, nz = 0;       ///< blocks; 0: none, the cloud is too wide for a table
   std::int32_t* block = nullptr;             ///< 1 + index of the block, or 0
   std::uint32_t* word = nullptr;             ///< (1 + blocks) x 512
+  std::uint8_t* code = nullptr;              ///< (1 + blocks) x 512: the same, coarser, see directions.hpp
 };
 
-/// Points in groups of 32 neighbours; the groups spread over the cloud, so that the first few tell about the whole of it. Normals in
-/// half precision: they serve bounds only.
+/// Points in groups of 32 neighbours; the groups spread over the cloud, so that the first few tell about the whole of it.
 struct ScoringOrder {
-  float4* point = nullptr;                   ///< x, y, z, NaN where the last group has no more; w: x and y of the normal, half each
-  std::uint16_t* normal_z = nullptr;
-  std::uint32_t* index = nullptr;            ///< of the point in the cloud
+  float4* point = nullptr;                   ///< x, y, z, NaN where the last group has no more; w: 16 times the normal's class, see directions.hpp
+  float4* normal = nullptr;                  ///< w: index of the point in the cloud
   std::uint32_t groups = 0;
 };
 
@@ -92,6 +91,8 @@ struct CudaCloud : PreparedState {
   const Cell* blocks = nullptr;
   CellSummaries summaries;
   ScoringOrder order;
+  float2* feature_norm = nullptr;            ///< squared length and length of each feature; infinite where it is not to be matched
+  bool moderate_features = true;             ///< no length beyond 1e15: differences of squares mean something in float
   std::vector<Vec3> copy_points() const override;
   std::vector<Vec3> copy_normals() const override;
   std::vector<float> copy_features() const override;

@@ -9,73 +9,103 @@ namespace {
 constexpr std::uint32_t kProbeGroups = 4;   // groups of 32 points that tell promising hypotheses from others
 constexpr std::uint32_t kLeaders = 16;      // promising hypotheses of a pair that are scored first
 constexpr int kProbeThreads = 256;
-constexpr int kThreads = 768;               // as many as 80 registers each allow
-constexpr int kUnroll = 4;                  // groups in flight per warp
+constexpr int kThreads = 768;
+constexpr std::uint32_t kUnroll = 4;        // groups in flight per warp
+constexpr std::size_t kRowBytes = 64 * 16;  // of the table of compatible levels, one per warp
+constexpr std::uint32_t kSharedBlocks = 24 << 10;  // entries of the largest block table that is copied
 
 /// Hypotheses [begin, end) of one pair.
 struct Slice {
   std::uint32_t pair, begin, end;
 };
 
-/// Source points in shared memory, or in global where they are too many.
-template <bool kShared>
-struct Points {
+/// What a thread block keeps of a pair while it scores a slice: in shared memory, or where it is too large, in global.
+template <typename Block>
+struct Staged {
   const float4* point;
-  const std::uint16_t* normal_z;
-  __device__ PackedPoint operator[](std::uint32_t k) const {
-    if (kShared) return {point[k], normal_z[k]};
-    return {__ldg(point + k), __ldg(normal_z + k)};
-  }
+  const Block* blocks;
 };
 
-/// Groups [begin, begin + N): how many of this lane's points may be inliers.
-template <int N, bool kShared>
-__device__ std::uint32_t count_possible(const CellMotion& motion, const Limits* limits, const Points<kShared>& points, std::uint32_t begin) {
+/// Source points of a group that may be inliers, by the word of their cell.
+__device__ bool may_be_inlier(const ScorePair& pair, const Rigid& rigid, const Limits* limits, std::uint32_t cell, float4 n, bool& certain) {
+  const std::uint32_t word = __ldg(pair.cells.word + cell);
+  const float cosine = cosine_to_mean(rigid, n, word);
+  const Limits limit = limits[word >> 24];
+  certain = cosine >= limit.all_above;
+  return word != 0 && cosine >= limit.none_below;
+}
+
+/// Groups [begin, begin + N): how many of this lane's points may be inliers, by the code of their cell. rows: levels that each class of
+/// normals needs, in shared memory.
+template <std::uint32_t N, typename Block>
+__device__ std::uint32_t count_possible(const CellMotion& motion, const Staged<Block>& staged, const std::uint8_t* codes, const std::uint8_t* rows,
+                                        std::uint32_t begin) {
   const std::uint32_t lane = threadIdx.x % 32;
-  PackedPoint p[N];
-  std::uint32_t word[N];
+  float4 p[N];
+  std::uint32_t code[N];
 #pragma unroll
-  for (int k = 0; k < N; ++k) p[k] = points[(begin + static_cast<std::uint32_t>(k)) * 32 + lane];
+  for (std::uint32_t k = 0; k < N; ++k) p[k] = staged.point[(begin + k) * 32 + lane];
 #pragma unroll
-  for (int k = 0; k < N; ++k) word[k] = motion.locate(p[k].point);
+  for (std::uint32_t k = 0; k < N; ++k) code[k] = motion.locate(p[k], staged.blocks);
 #pragma unroll
-  for (int k = 0; k < N; ++k) word[k] = __ldg(motion.word + word[k]);
+  for (std::uint32_t k = 0; k < N; ++k) code[k] = __ldg(codes + code[k]);
   std::uint32_t possible = 0;
 #pragma unroll
-  for (int k = 0; k < N; ++k) possible += word[k] != 0 && motion.cosine(p[k], word[k]) >= limits[word[k] >> 24].none_below;
+  for (std::uint32_t k = 0; k < N; ++k) possible += (code[k] & 15u) >= rows[__float_as_uint(p[k].w) + (code[k] >> 4)];
   return possible;
 }
 
-/// Exact number of inliers, or 0 as soon as it cannot reach the most seen so far: such a hypothesis is not the best one. possible: upper
-/// bound over the groups before `begin`.
-template <bool kShared>
-__device__ std::uint32_t count_inliers(const ScorePair& pair, const InlierTest& test, const Limits* limits, const Points<kShared>& points,
-                                       const Pose<float>& pose, std::uint32_t begin, std::uint32_t possible,
+/// Exact number of inliers, or 0 as soon as it cannot reach the most seen so far: such a hypothesis is not the best one. First every point
+/// is bounded by its cell's code, then by its word, and only undecided ones are looked at. possible: upper bound by words over the groups
+/// before `begin`. A warp's work; rows: its own 64 x 16 bytes of shared memory.
+template <typename Block>
+__device__ std::uint32_t count_inliers(const ScoreBatch& b, const ScorePair& pair, const Limits* limits, const Staged<Block>& staged,
+                                       std::uint8_t* rows, const Pose<float>& pose, std::uint32_t begin, std::uint32_t possible,
                                        const volatile std::uint32_t* most) {
   const std::uint32_t lane = threadIdx.x % 32;
   const Rigid rigid = to_rigid(pose);
   if (pair.cells.nx == 0) {
     unsigned long long residual;
-    return support_by_search(pair, test, rigid, residual);
+    return support_by_search(pair, b.test, rigid, residual);
   }
+  __syncwarp();
+  for (std::uint32_t k = lane; k < 64; k += 32) {
+    std::uint8_t row[16];
+    compatible_levels(*b.directions, b.thresholds, rigid, k, row);
+    std::uint32_t packed[4];
+#pragma unroll
+    for (int w = 0; w < 4; ++w)
+      packed[w] = static_cast<std::uint32_t>(row[4 * w]) | static_cast<std::uint32_t>(row[4 * w + 1]) << 8 |
+                  static_cast<std::uint32_t>(row[4 * w + 2]) << 16 | static_cast<std::uint32_t>(row[4 * w + 3]) << 24;
+    *reinterpret_cast<uint4*>(rows + k * 16) = make_uint4(packed[0], packed[1], packed[2], packed[3]);
+  }
+  __syncwarp();
   const CellMotion motion(rigid, pair.cells);
   const std::uint32_t groups = pair.order.groups;
+  const std::uint8_t* codes = pair.cells.code;
   std::uint32_t needed = *most, g = begin;
   for (; g + kUnroll <= groups; g += kUnroll) {
     if (possible + (groups - g) * 32 < needed) return 0;
-    possible += warp_sum(count_possible<kUnroll>(motion, limits, points, g));
+    possible += warp_sum(count_possible<kUnroll>(motion, staged, codes, rows, g));
     if (g % 32 < kUnroll) needed = *most;
   }
-  for (; g < groups; ++g) possible += warp_sum(count_possible<1>(motion, limits, points, g));
+  for (; g < groups; ++g) possible += warp_sum(count_possible<1>(motion, staged, codes, rows, g));
+
   for (g = 0; g < groups; ++g) {
     if (possible < needed) return 0;
-    const PackedPoint p = points[g * 32 + lane];
-    const std::uint32_t cell = motion.locate(p.point), word = __ldg(motion.word + cell);
-    const Limits limit = limits[word >> 24];
-    const float cosine = motion.cosine(p, word);
-    const bool undecided = word != 0 && cosine >= limit.none_below && cosine < limit.all_above;
-    if (!__any_sync(~0u, undecided)) continue;
-    const bool refuted = undecided && !is_inlier(pair, test, rigid, __ldg(pair.order.index + g * 32 + lane), cell);
+    const float4 p = staged.point[g * 32 + lane];
+    const std::uint32_t cell = motion.locate(p, staged.blocks), code = __ldg(codes + cell);
+    const bool by_code = (code & 15u) >= rows[__float_as_uint(p.w) + (code >> 4)];
+    // The first groups were bounded by words already, not by codes.
+    const bool counted = by_code || g < begin;
+    if (!__any_sync(~0u, counted)) continue;
+    bool refuted = false;
+    if (counted) {
+      const float4 n = __ldg(pair.order.normal + g * 32 + lane);
+      bool certain;
+      const bool by_word = may_be_inlier(pair, rigid, limits, cell, n, certain);
+      refuted = by_word ? !certain && !is_inlier(pair, b.test, rigid, p, n, cell) : g >= begin;
+    }
     possible -= static_cast<std::uint32_t>(__popc(static_cast<int>(__ballot_sync(~0u, refuted))));
     if (g % 16 == 15) needed = *most;
   }
@@ -91,23 +121,25 @@ __device__ void load_limits(const Limits* from, Limits* to) {
 __global__ void __launch_bounds__(kProbeThreads) probe(ScoreBatch b) {
   __shared__ Limits limits[512];
   load_limits(b.limits, limits);
-  const std::uint32_t total = b.offset[b.pair_count], warps = gridDim.x * (kProbeThreads / 32);
+  const std::uint32_t total = b.offset[b.pair_count], warps = gridDim.x * (kProbeThreads / 32), lane = threadIdx.x % 32;
   for (std::uint32_t h = (blockIdx.x * kProbeThreads + threadIdx.x) / 32; h < total; h += warps) {
     const std::uint32_t p = entry_of(b.offset, b.pair_count, h);
     const ScorePair& pair = b.pairs[p];
     std::uint32_t possible = 0;
     const bool look = b.valid[h] && pair.cells.nx > 0;
     if (look) {
-      const CellMotion motion(to_rigid(b.poses[h]), pair.cells);
-      const Points<false> points{pair.order.point, pair.order.normal_z};
-      const Limits* limit = limits + pair.limits * 256;
-      if (pair.order.groups >= kProbeGroups) {
-        possible = warp_sum(count_possible<kProbeGroups>(motion, limit, points, 0));
-      } else {
-        for (std::uint32_t g = 0; g < pair.order.groups; ++g) possible += warp_sum(count_possible<1>(motion, limit, points, g));
+      const Rigid rigid = to_rigid(b.poses[h]);
+      const CellMotion motion(rigid, pair.cells);
+      bool certain;
+#pragma unroll
+      for (std::uint32_t g = 0; g < kProbeGroups; ++g) {
+        if (g >= pair.order.groups) break;
+        const std::uint32_t cell = motion.locate(__ldg(pair.order.point + g * 32 + lane), pair.cells.block);
+        possible += may_be_inlier(pair, rigid, limits + pair.limits * 256, cell, __ldg(pair.order.normal + g * 32 + lane), certain);
       }
+      possible = warp_sum(possible);
     }
-    if (threadIdx.x % 32 != 0) continue;
+    if (lane != 0) continue;
     b.possible[h] = possible;
     if (!look) continue;
     const std::uint32_t number = h - b.offset[p];
@@ -130,8 +162,9 @@ __global__ void __launch_bounds__(kProbeThreads) score_leaders(ScoreBatch b) {
   const CellMotion motion(rigid, pair.cells);
   std::uint32_t mine = 0;
   for (std::uint32_t k = threadIdx.x; k < pair.order.groups * 32; k += kProbeThreads) {
-    const std::uint32_t cell = motion.locate(__ldg(pair.order.point + k));
-    mine += __ldg(motion.word + cell) != 0 && is_inlier(pair, b.test, rigid, __ldg(pair.order.index + k), cell);
+    const float4 point = __ldg(pair.order.point + k);
+    const std::uint32_t cell = motion.locate(point, pair.cells.block);
+    mine += __ldg(pair.cells.word + cell) != 0 && is_inlier(pair, b.test, rigid, point, __ldg(pair.order.normal + k), cell);
   }
   mine = warp_sum(mine);
   if (threadIdx.x % 32 == 0) atomicAdd(&inliers, mine);
@@ -139,8 +172,9 @@ __global__ void __launch_bounds__(kProbeThreads) score_leaders(ScoreBatch b) {
   if (threadIdx.x == 0 && inliers > 0) atomicMax(b.most + p, inliers);
 }
 
-template <bool kShared>
-__device__ void score_slice(const ScoreBatch& b, const Slice& slice, const Limits* limits, const Points<kShared>& points, std::uint32_t* next) {
+template <typename Block>
+__device__ void score_slice(const ScoreBatch& b, const Slice& slice, const Limits* limits, const Staged<Block>& staged, std::uint8_t* rows,
+                            std::uint32_t* next) {
   const std::uint32_t lane = threadIdx.x % 32;
   const ScorePair& pair = b.pairs[slice.pair];
   for (;;) {
@@ -150,22 +184,25 @@ __device__ void score_slice(const ScoreBatch& b, const Slice& slice, const Limit
     if (h >= slice.end) return;
     std::uint32_t inliers = 0;
     if (b.valid[h]) {
-      inliers = count_inliers<kShared>(pair, b.test, limits + pair.limits * 256, points, b.poses[h], min(kProbeGroups, pair.order.groups),
-                                       b.possible[h], b.most + slice.pair);
+      inliers = count_inliers(b, pair, limits + pair.limits * 256, staged, rows, b.poses[h], min(kProbeGroups, pair.order.groups),
+                              b.possible[h], b.most + slice.pair);
       if (lane == 0 && inliers > 0) atomicMax(b.most + slice.pair, inliers);
     }
     if (lane == 0) b.inliers[h] = inliers;
   }
 }
 
-/// Thread blocks take slices until none is left; in a slice the warps take hypotheses: how long one takes is not known before. The
-/// source's points are in shared memory, so that the cache is left to the target's cells.
-__global__ void __launch_bounds__(kThreads, 1) score_slices(ScoreBatch b, const Slice* slices, std::uint32_t count, std::uint32_t capacity) {
+/// Thread blocks take slices until none is left; in a slice the warps take hypotheses: how long one takes is not known before. The source's
+/// points and the target's block table are in shared memory, so that the cache is left to the target's cells.
+__global__ void __launch_bounds__(kThreads, 1) score_slices(ScoreBatch b, const Slice* slices, std::uint32_t count, std::uint32_t point_room,
+                                                            std::uint32_t block_room) {
   extern __shared__ float4 shared_points[];
-  std::uint16_t* shared_z = reinterpret_cast<std::uint16_t*>(shared_points + capacity);
+  std::uint8_t* shared_rows = reinterpret_cast<std::uint8_t*>(shared_points + point_room);
+  std::uint16_t* shared_blocks = reinterpret_cast<std::uint16_t*>(shared_rows + kThreads / 32 * kRowBytes);
   __shared__ Limits limits[512];
   __shared__ std::uint32_t taken, next;
   load_limits(b.limits, limits);
+  std::uint8_t* rows = shared_rows + threadIdx.x / 32 * kRowBytes;
   std::uint32_t loaded = kNoValue;
   for (;;) {
     __syncthreads();
@@ -176,17 +213,20 @@ __global__ void __launch_bounds__(kThreads, 1) score_slices(ScoreBatch b, const 
     __syncthreads();
     if (taken >= count) return;
     const Slice slice = slices[taken];
-    const ScoringOrder& order = b.pairs[slice.pair].order;
-    if (order.groups * 32 > capacity) {
-      score_slice(b, slice, limits, Points<false>{order.point, order.normal_z}, &next);
+    const ScorePair& pair = b.pairs[slice.pair];
+    const std::uint32_t points = pair.order.groups * 32;
+    const std::uint32_t blocks = static_cast<std::uint32_t>(pair.cells.nx * pair.cells.ny * pair.cells.nz);
+    if (points > point_room || blocks > block_room) {
+      score_slice(b, slice, limits, Staged<std::int32_t>{pair.order.point, pair.cells.block}, rows, &next);
       continue;
     }
     if (loaded != slice.pair) {
-      for (std::uint32_t k = threadIdx.x; k < order.groups * 32; k += kThreads) shared_points[k] = order.point[k], shared_z[k] = order.normal_z[k];
+      for (std::uint32_t k = threadIdx.x; k < points; k += kThreads) shared_points[k] = pair.order.point[k];
+      for (std::uint32_t k = threadIdx.x; k < blocks; k += kThreads) shared_blocks[k] = static_cast<std::uint16_t>(pair.cells.block[k]);
       loaded = slice.pair;
       __syncthreads();
     }
-    score_slice(b, slice, limits, Points<true>{shared_points, shared_z}, &next);
+    score_slice(b, slice, limits, Staged<std::uint16_t>{shared_points, shared_blocks}, rows, &next);
   }
 }
 
@@ -227,7 +267,10 @@ std::vector<Slice> cut_slices(const Segments& segments, unsigned multiprocessors
 DeviceBuffer<BestPose> score_hypotheses(Exec& exec, Span<const PairView> pairs, const Hypotheses& hypotheses, const ScoreOptions& options) {
   const std::uint32_t total = hypotheses.segments->total();
   const std::uint32_t count = static_cast<std::uint32_t>(pairs.size);
-  const auto pairs_on_device = exec.upload(score_pairs(pairs, options));
+  const std::vector<ScorePair> host_pairs = score_pairs(pairs, options);
+  const auto pairs_on_device = exec.upload(host_pairs);
+  const DirectionTables directions = direction_tables();
+  const auto directions_on_device = exec.upload(&directions, 1);
   const auto limits = exec.upload(limit_tables(options));
   const auto possible = exec.buffer<std::uint32_t>(total);
   const auto inliers = exec.buffer<std::uint32_t>(total);
@@ -236,7 +279,7 @@ DeviceBuffer<BestPose> score_hypotheses(Exec& exec, Span<const PairView> pairs, 
   const auto next = exec.filled<std::uint32_t>(1, 0);
   const ScoreBatch batch{pairs_on_device.data(), count, hypotheses.segments->on_device.data(), hypotheses.pose.data(), hypotheses.valid.data(),
                          hypotheses.id, inlier_test(options.max_correspondence_distance, options.max_normal_angle), limits.data(),
-                         possible.data(), inliers.data(), leaders.data(), most.data(), next.data()};
+                         directions_on_device.data(), level_thresholds(options.max_normal_angle), possible.data(), inliers.data(), leaders.data(), most.data(), next.data()};
   if (total > 0) {
     const unsigned processors = static_cast<unsigned>(exec.multiprocessors());
     probe<<<std::min(blocks_for(static_cast<std::size_t>(total) * 32, kProbeThreads), processors * 8), kProbeThreads, 0, exec.stream()>>>(batch);
@@ -246,15 +289,20 @@ DeviceBuffer<BestPose> score_hypotheses(Exec& exec, Span<const PairView> pairs, 
 
     const std::vector<Slice> slices = cut_slices(*hypotheses.segments, processors);
     const auto slices_on_device = exec.upload(slices);
-    std::uint32_t largest = 0;
-    for (const PairView& pair : pairs) largest = std::max(largest, (pair.source.size + 31) / 32 * 32);
-    constexpr std::size_t kBytesPerPoint = sizeof(float4) + sizeof(std::uint16_t);
-    const std::uint32_t fits = static_cast<std::uint32_t>((exec.shared_bytes_per_block() - 8192) / kBytesPerPoint) / 32 * 32;
-    const std::uint32_t capacity = std::min(largest, fits);
-    const std::size_t bytes = capacity * kBytesPerPoint;
+    std::uint32_t most_points = 0, most_blocks = 0;
+    for (const ScorePair& pair : host_pairs) {
+      most_points = std::max(most_points, pair.order.groups * 32);
+      most_blocks = std::max(most_blocks, static_cast<std::uint32_t>(pair.cells.nx * pair.cells.ny * pair.cells.nz));
+    }
+    // The table numbers blocks with 16 bits; what does not fit stays in global memory.
+    const std::uint32_t block_room = std::min(most_blocks, kSharedBlocks);
+    const std::size_t fixed = kThreads / 32 * kRowBytes + block_room * sizeof(std::uint16_t) + 8192;
+    const std::uint32_t point_room =
+        std::min(most_points, static_cast<std::uint32_t>(exec.shared_bytes_per_block() > fixed ? (exec.shared_bytes_per_block() - fixed) / sizeof(float4) : 0));
+    const std::size_t bytes = point_room * sizeof(float4) + kThreads / 32 * kRowBytes + block_room * sizeof(std::uint16_t);
     check(cudaFuncSetAttribute(score_slices, cudaFuncAttributeMaxDynamicSharedMemorySize, static_cast<int>(bytes)), "cudaFuncSetAttribute");
     score_slices<<<std::min(static_cast<unsigned>(slices.size()), processors), kThreads, bytes, exec.stream()>>>(
-        batch, slices_on_device.data(), static_cast<std::uint32_t>(slices.size()), capacity);
+        batch, slices_on_device.data(), static_cast<std::uint32_t>(slices.size()), point_room, block_room);
     check_launch("score_slices");
   }
   return select_best(exec, batch, total);

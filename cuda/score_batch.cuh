@@ -2,6 +2,7 @@
 #pragma once
 
 #include "bounds.cuh"
+#include "directions.hpp"
 #include "warp.cuh"
 
 namespace gpureg::cuda {
@@ -16,6 +17,8 @@ struct ScoreBatch {
   const std::uint32_t* id;
   InlierTest test;
   const Limits* limits;             ///< 2 x 256
+  const DirectionTables* directions;
+  LevelThresholds thresholds;
   std::uint32_t* possible;          ///< per hypothesis: points of the probe that may be inliers
   std::uint32_t* inliers;           ///< per hypothesis; 0 where it was given up
   unsigned long long* leaders;      ///< pairs x kLeaders: (possible + 1, ~number), the largest of each residue class; 0: none
@@ -23,10 +26,10 @@ struct ScoreBatch {
   std::uint32_t* next;              ///< slices handed out
 };
 
-/// Exact test of one source point.
-__device__ inline bool is_inlier(const ScorePair& pair, const InlierTest& test, const Rigid& rigid, std::uint32_t i, std::uint32_t cell) {
-  const Closest c = closest_in_cell(pair.target, cell, apply(rigid, pair.source.points[i]), test.max_squared);
-  return c.index != kNoValue && normals_agree(rotate(rigid, pair.source.normals[i]), pair.target.normals[c.index], test.min_cosine);
+/// Exact test of one source point in a known cell.
+__device__ inline bool is_inlier(const ScorePair& pair, const InlierTest& test, const Rigid& rigid, float4 p, float4 n, std::uint32_t cell) {
+  const Closest c = closest_in_cell(pair.target, cell, apply(rigid, {p.x, p.y, p.z}), test.max_squared);
+  return c.index != kNoValue && normals_agree(rotate(rigid, {n.x, n.y, n.z}), pair.target.normals[c.index], test.min_cosine);
 }
 
 /// Support of one pose by looking every point up: clouds too wide for a table of blocks, and residuals. A warp's work; all lanes get it.

@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "scoring_data.hpp"
 
-#include <cuda_fp16.h>
-
 #include <numeric>
 
 #include "algorithm/cell_summary.hpp"
 #include "device_algorithms.hpp"
+#include "directions.hpp"
 
 namespace gpureg::cuda {
 namespace {
@@ -38,7 +37,7 @@ __global__ void fill_block_tables(const Slot* slots) {
   }
 }
 
-__global__ void summarize(const Slot* slots) {
+__global__ void summarize(const Slot* slots, const DirectionTables* tables) {
   const Slot& s = slots[blockIdx.y];
   if (s.summaries.nx == 0) return;
   const std::size_t cells = static_cast<std::size_t>(s.block_count) * kCells;
@@ -48,10 +47,11 @@ __global__ void summarize(const Slot* slots) {
     const std::uint32_t* start = s.view.closest.cell_start.data + b * (kCells + 1) + cell;
     const Cell block = s.blocks[b];
     const Cell c{block.x * 8 + (cell & 7), block.y * 8 + ((cell >> 3) & 7), block.z * 8 + (cell >> 6)};
+    const Span<const std::uint32_t> candidates{s.view.closest.candidates.data + start[0], start[1] - start[0]};
+    const bool empty = candidates.size == 0;
     s.summaries.word[kCells + k] =
-        start[0] == start[1] ? 0u
-                             : summarize_cell({s.view.closest.candidates.data + start[0], start[1] - start[0]},
-                                              cell_center(c, s.geometry.cell_size), s.geometry, s.view.points, s.view.normals);
+        empty ? 0u : summarize_cell(candidates, cell_center(c, s.geometry.cell_size), s.geometry, s.view.points, s.view.normals);
+    s.summaries.code[kCells + k] = empty ? std::uint8_t(0) : code_of_cell(*tables, candidates, s.view.normals);
   }
 }
 
@@ -77,24 +77,21 @@ __global__ void write_morton_keys(const Slot* slots, std::uint64_t* keys, std::u
   }
 }
 
-__device__ std::uint32_t half_bits(float v) { return __half_as_ushort(__float2half_rn(v)); }
-
-__global__ void write_order(const Slot* slots, const std::uint32_t* index) {
+__global__ void write_order(const Slot* slots, const std::uint32_t* index, const DirectionTables* tables) {
   const Slot& s = slots[blockIdx.y];
   for (std::uint32_t k = blockIdx.x * blockDim.x + threadIdx.x; k < s.order.groups * 32; k += gridDim.x * blockDim.x) {
     const std::uint32_t from = static_cast<std::uint32_t>(static_cast<std::uint64_t>(k / 32) * s.group_step % s.order.groups) * 32 + k % 32;
     const float nan = __uint_as_float(0x7fc00000u);
-    float4 point = make_float4(nan, nan, nan, 0);
-    std::uint32_t rest = 0, i = kNoValue;
+    float4 point = make_float4(nan, nan, nan, __uint_as_float(kClassNone * 16));
+    float4 normal = make_float4(0, 0, 0, __uint_as_float(kNoValue));
     if (from < s.view.size) {
-      i = index[s.point_offset + from];
+      const std::uint32_t i = index[s.point_offset + from];
       const Vec3 p = s.view.points[i], n = s.view.normals[i];
-      point = make_float4(p.x, p.y, p.z, __uint_as_float(half_bits(n.x) | half_bits(n.y) << 16));
-      rest = half_bits(n.z);
+      point = make_float4(p.x, p.y, p.z, __uint_as_float(class_of_normal(*tables, n) * 16));
+      normal = make_float4(n.x, n.y, n.z, __uint_as_float(i));
     }
     s.order.point[k] = point;
-    s.order.normal_z[k] = static_cast<std::uint16_t>(rest);
-    s.order.index[k] = i;
+    s.order.normal[k] = normal;
   }
 }
 
@@ -116,8 +113,8 @@ ScoringLayout scoring_layout(const CudaCloud& cloud, const CellRange& blocks) {
   l.table = take(fits ? nx * ny * nz * sizeof(std::int32_t) : 0);
   l.words = take(fits ? (std::size_t(cloud.block_count) + 1) * kCells * sizeof(std::uint32_t) : 0);
   l.points = take(padded * sizeof(float4));
-  l.normals = take(padded * sizeof(std::uint16_t));
-  l.index = take(padded * sizeof(std::uint32_t));
+  l.normals = take(padded * sizeof(float4));
+  l.codes = take(fits ? (std::size_t(cloud.block_count) + 1) * kCells : 0);
   return l;
 }
 
@@ -130,8 +127,8 @@ void place_scoring_data(const ScoringLayout& l, const ClosestGeometry& geometry,
   v.word = reinterpret_cast<std::uint32_t*>(memory + l.words);
   cloud.order.groups = (cloud.size + 31) / 32;
   cloud.order.point = reinterpret_cast<float4*>(memory + l.points);
-  cloud.order.normal_z = reinterpret_cast<std::uint16_t*>(memory + l.normals);
-  cloud.order.index = reinterpret_cast<std::uint32_t*>(memory + l.index);
+  cloud.order.normal = reinterpret_cast<float4*>(memory + l.normals);
+  v.code = reinterpret_cast<std::uint8_t*>(memory + l.codes);
 }
 
 void fill_scoring_data(Exec& exec, const std::vector<std::shared_ptr<CudaCloud>>& clouds, const std::vector<ClosestGeometry>& geometry) {
@@ -143,6 +140,7 @@ void fill_scoring_data(Exec& exec, const std::vector<std::shared_ptr<CudaCloud>>
     if (v.nx > 0) {
       check(cudaMemsetAsync(v.block, 0, static_cast<std::size_t>(v.nx) * v.ny * v.nz * sizeof(std::int32_t), exec.stream()), "cudaMemsetAsync");
       check(cudaMemsetAsync(v.word, 0, kCells * sizeof(std::uint32_t), exec.stream()), "cudaMemsetAsync");
+      check(cudaMemsetAsync(v.code, 0, kCells, exec.stream()), "cudaMemsetAsync");
     }
     const std::uint32_t groups = cloud.order.groups;
     std::uint32_t step = static_cast<std::uint32_t>(0.6180339887 * groups) | 1u;
@@ -152,19 +150,21 @@ void fill_scoring_data(Exec& exec, const std::vector<std::shared_ptr<CudaCloud>>
   }
   if (total == 0) return;
   const auto on_device = exec.upload(slots);
+  const DirectionTables host_tables = direction_tables();
+  const auto tables = exec.upload(&host_tables, 1);
   auto keys = exec.buffer<std::uint64_t>(total);
   auto index = exec.buffer<std::uint32_t>(total);
   const unsigned count = static_cast<unsigned>(clouds.size());
   fill_block_tables<<<dim3(8, count), 128, 0, exec.stream()>>>(on_device.data());
   check_launch("fill_block_tables");
-  summarize<<<dim3(128, count), 256, 0, exec.stream()>>>(on_device.data());
+  summarize<<<dim3(128, count), 256, 0, exec.stream()>>>(on_device.data(), tables.data());
   check_launch("summarize");
   write_morton_keys<<<dim3(16, count), 256, 0, exec.stream()>>>(on_device.data(), keys.data(), index.data());
   check_launch("write_morton_keys");
   int bits = 30;
   while ((std::size_t(1) << (bits - 30)) < clouds.size()) ++bits;
   sort_pairs(exec, keys, index, bits);
-  write_order<<<dim3(16, count), 256, 0, exec.stream()>>>(on_device.data(), index.data());
+  write_order<<<dim3(16, count), 256, 0, exec.stream()>>>(on_device.data(), index.data(), tables.data());
   check_launch("write_order");
 }
 

@@ -177,6 +177,27 @@ TEST_F(AlignOnCuda, CorrespondencesOfTheCaller) {
   expect_same_alignment(raw(), custom, options);
 }
 
+// The feature search bounds distances before it measures them: dimensions and magnitudes where the bounds are loose, tight, or mean nothing.
+TEST_F(AlignOnCuda, FeaturesOfTheCaller) {
+  std::normal_distribution<float> normal;
+  options.hypothesis.count = 5'000;
+  for (const std::size_t dimension : {1u, 3u, 16u, 32u, 33u, 40u, 64u, 65u, 130u})
+    for (const float scale : {1.0f, 1e-12f, 3e18f}) {
+      std::vector<std::vector<float>> features;
+      auto clouds = raw();
+      for (RawCloud& cloud : clouds) {
+        features.emplace_back(cloud.size * dimension);
+        // Many equal values, so that distances tie.
+        for (float& f : features.back()) f = scale * (random() % 4 == 0 ? normal(random) : static_cast<float>(random() % 3));
+        cloud.features = features.back().data(), cloud.feature_dimension = dimension, cloud.feature_stride = dimension;
+      }
+      options.prepare.voxel_size = 0.12f;
+      SCOPED_TRACE("dimension " + std::to_string(dimension) + ", scale " + std::to_string(scale));
+      expect_same_alignment(clouds, {{0, 1, {}, {}}, {4, 0, {}, {}}, {5, 0, {}, {}}}, options);
+      options.hypothesis.mutual = !options.hypothesis.mutual;
+    }
+}
+
 TEST_F(AlignOnCuda, MoreMatchesThanSharedMemoryHolds) {
   std::vector<std::vector<Vec3>> dense{test::cube(random, 60000, 2.2f), test::bumpy_sheet(random, 400000, 6.0f)};
   kept = dense;
