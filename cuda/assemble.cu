@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include "nearest_feature.hpp"
 #include "scoring_data.hpp"
 #include "stages.hpp"
 #include "warp.cuh"
@@ -32,11 +33,15 @@ struct Missing {
 struct NormSlot {
   const float* features;
   const std::uint8_t* valid;
-  std::uint32_t size, dimension;
+  std::uint32_t size, dimension, width;
   float2* out;
+  std::uint32_t* tf32;  // null: none
 };
 
-/// Lengths of the features, for bounds in the feature search.
+/// Rounded to 10 bits of mantissa, as the tensor cores take them; ties away from zero.
+__device__ std::uint32_t to_tf32(float v) { return (__float_as_uint(v) + 0x1000u) & ~0x1fffu; }
+
+/// What the feature search reads beside the features: their lengths, and copies for the tensor cores.
 __global__ void measure_features(const NormSlot* slots, Missing* missing) {
   const NormSlot s = slots[blockIdx.y];
   std::uint32_t extreme = 0;
@@ -48,6 +53,9 @@ __global__ void measure_features(const NormSlot* slots, Missing* missing) {
     }
     if (!s.valid[i]) sum = __uint_as_float(0x7f800000u);
     s.out[i] = make_float2(sum, sqrtf(sum));
+    for (std::uint32_t d = 0; s.tf32 && d < s.width; ++d)
+      s.tf32[static_cast<std::size_t>(i) * s.width + d] =
+          s.valid[i] && d < s.dimension ? to_tf32(s.features[static_cast<std::size_t>(i) * s.dimension + d]) : 0u;
     extreme += s.valid[i] && !(sum < 1e30f);
   }
   if (extreme > 0) atomicAdd(&missing[blockIdx.y].extreme_features, extreme);
@@ -131,6 +139,9 @@ std::vector<std::shared_ptr<CudaCloud>> assemble(Exec& exec, const DownsampledCl
     place(closest.block.data() + block_begin, cloud->block_count);
     const std::size_t norms = bytes;
     bytes += (n * sizeof(float2) + 255) / 256 * 256;
+    const std::size_t tf32 = bytes;
+    const std::uint32_t width = filter_width(cloud->feature_dimension);
+    bytes += (n * width * sizeof(std::uint32_t) + 255) / 256 * 256;
     const std::size_t copied = bytes;
     const ScoringLayout layout = scoring_layout(*cloud, closest.block_range[c]);
     cloud->data = exec.buffer<char>(copied + layout.bytes);
@@ -150,7 +161,8 @@ std::vector<std::shared_ptr<CudaCloud>> assemble(Exec& exec, const DownsampledCl
                     {reinterpret_cast<const std::uint32_t*>(part[6].to), cloud->candidate_count}};
     view.executor_data = cloud.get();
     cloud->feature_norm = reinterpret_cast<float2*>(cloud->data.data() + norms);
-    norm_slots.push_back({view.features, view.has_feature, view.size, view.feature_dimension, cloud->feature_norm});
+    if (width > 0) cloud->feature_tf32 = reinterpret_cast<std::uint32_t*>(cloud->data.data() + tf32);
+    norm_slots.push_back({view.features, view.has_feature, view.size, view.feature_dimension, width, cloud->feature_norm, cloud->feature_tf32});
     cloud->blocks = reinterpret_cast<const Cell*>(part[7].to);
     place_scoring_data(layout, closest.geometry[c], cloud->data.data() + copied, *cloud);
     out.push_back(std::move(cloud));
@@ -171,7 +183,7 @@ std::vector<std::shared_ptr<CudaCloud>> assemble(Exec& exec, const DownsampledCl
   for (std::size_t c = 0; c < count; ++c) {
     out[c]->statistics.points_without_normal = counted[c].normals;
     out[c]->statistics.points_without_feature = counted[c].features;
-    out[c]->moderate_features = counted[c].extreme_features == 0;
+    if (counted[c].extreme_features > 0) out[c]->feature_tf32 = nullptr;
   }
   return out;
 }

@@ -3,6 +3,7 @@
 
 #include "algorithm/cell_summary.hpp"
 #include "algorithm/inlier.hpp"
+#include "packed_normal.cuh"
 #include "products.hpp"
 
 /// What is known of a moved point before a single target point is looked at.
@@ -59,12 +60,33 @@ __device__ inline float cosine_to_mean(const Rigid& pose, float4 n, std::uint32_
   return fmaf(moved.z, part(8), fmaf(moved.y, part(16), moved.x * part(24))) * (1.0f / 127.0f);
 }
 
-/// Closest target point of a moved source point whose cell is known.
-__device__ inline Closest closest_in_cell(const CloudView& target, std::uint32_t cell, Vec3 q, float max_squared) {
+/// Exact test of a moved source point in a known cell; p: the point, n: its normal, record: the cell's.
+__device__ inline bool is_inlier(const ScorePair& pair, const InlierTest& test, const Rigid& rigid, float4 p, float4 n, std::uint32_t cell,
+                                 std::uint32_t list) {
   constexpr std::uint32_t kCells = ClosestGridView::kBlockCells;
-  if (cell < kCells) return {kNoValue, max_squared};
-  const std::uint32_t* start = target.closest.cell_start.data + static_cast<std::size_t>(cell / kCells - 1) * (kCells + 1) + cell % kCells;
-  return closest_candidate(target.closest.candidates.data, start[0], start[1], target.points, q, max_squared);
+  const Vec3 q = apply(rigid, {p.x, p.y, p.z});
+  std::uint32_t first = list >> 8, last = first + (list & 255u);
+  if (list == kNoValue) {
+    const std::uint32_t* start = pair.target.closest.cell_start.data + static_cast<std::size_t>(cell / kCells - 1) * (kCells + 1) + cell % kCells;
+    first = start[0], last = start[1];
+  }
+  // closest_candidate() on copies of the candidates that lie side by side.
+  std::uint32_t best = kNoValue, best_normal = 0;
+  float best_squared = 3.402823466e38f;
+  for (std::uint32_t k = first; k < last; ++k) {
+    const float4 c = __ldg(pair.cells.candidate + k);
+    const float d2 = squared_norm(Vec3{c.x, c.y, c.z} - q);
+    const bool less = d2 < best_squared;
+    best = less ? k : best;
+    best_squared = less ? d2 : best_squared;
+    best_normal = less ? __float_as_uint(c.w) : best_normal;
+  }
+  if (best == kNoValue || !(best_squared <= test.max_squared)) return false;
+  if (test.min_cosine <= -1.0f) return true;
+  const Vec3 moved = rotate(rigid, {n.x, n.y, n.z});
+  const float off = dot(moved, unpack_normal(best_normal)) - test.min_cosine;
+  if (best_normal != kPackedZero && fabsf(off) > kPackedNormalError) return off > 0.0f && !is_zero(moved);
+  return normals_agree(moved, pair.target.normals[pair.target.closest.candidates[best]], test.min_cosine);
 }
 
 }  // namespace gpureg::cuda

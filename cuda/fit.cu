@@ -11,8 +11,8 @@ __global__ void __launch_bounds__(128) fit(const std::uint32_t* offset, std::uin
                                            const MatchedPoints* matches, const std::uint32_t* match_count, std::uint64_t seed,
                                            Pose<float>* poses, std::uint8_t* valid, std::uint32_t* valid_count) {
   const std::uint32_t h = blockIdx.x * blockDim.x + threadIdx.x;
+  const std::uint32_t p = entry_in_block(offset, pairs, blockIdx.x * blockDim.x, h);
   if (h >= offset[pairs]) return;
-  const std::uint32_t p = entry_of(offset, pairs, h);
   const MatchedPoints* m = matches + room[p];
   const Quadruple q = draw_quadruple(id[h], seed, match_count[p]);
   Vec3 source[4], target[4];

@@ -149,11 +149,10 @@ DeviceBuffer<std::uint32_t> nearest_features(Exec& exec, const std::vector<Featu
   }
   // All bits set is greater than every answer, and its index is kNoValue.
   auto best = exec.filled<unsigned long long>(answers, 0xff);
-  std::uint32_t most_dimensions = 0;
-  bool moderate = true;
-  for (const FeatureQuery& f : queries) most_dimensions = std::max(most_dimensions, f.dimension), moderate = moderate && f.moderate;
-  if (exec.compute_capability() >= 80 && most_dimensions <= kFilterDimensions && moderate) {
-    filter_nearest(exec, batch.data(), entries, most_queries, most_rows, most_dimensions, answers, best.data());
+  bool filterable = exec.compute_capability() >= 80;
+  for (const FeatureQuery& f : queries) filterable = filterable && f.query_tf32 && f.row_tf32 && f.dimension == queries[0].dimension;
+  if (filterable) {
+    filter_nearest(exec, batch.data(), entries, most_queries, most_rows, queries[0].dimension, answers, best.data());
   } else {
     const std::uint32_t rows_per_part = rows_of_part(exec, blocks_for(most_queries, kQueries) * std::size_t(entries), most_rows, kRows);
     nearest_one<<<dim3(blocks_for(most_queries, kQueries), blocks_for(most_rows, rows_per_part), entries), kThreads, 0, exec.stream()>>>(

@@ -17,9 +17,10 @@ struct FeatureQuery {
   std::uint32_t row_count;
   std::uint32_t dimension;
   std::uint32_t out;  ///< where its answers begin
-  const float2* query_norm;  ///< squared length and length
-  const float2* row_norm;    ///< infinite where the row is not valid
-  bool moderate;             ///< all lengths up to 1e15
+  const float2* query_norm;        ///< squared length and length
+  const float2* row_norm;          ///< infinite where the row is not valid
+  const std::uint32_t* query_tf32;  ///< see filter_width(); null: not made
+  const std::uint32_t* row_tf32;
 };
 
 /// Nearest rows of every query: k indices per query in order of distance (squared norm of the difference as a chain of fmaf over the
@@ -29,10 +30,12 @@ DeviceBuffer<std::uint32_t> nearest_features(Exec& exec, const std::vector<Featu
 /// Rows are cut into parts only where the queries alone do not fill the device: rows per part, a multiple of the tile.
 std::uint32_t rows_of_part(const Exec& exec, std::size_t query_blocks, std::uint32_t most_rows, std::uint32_t tile);
 
-/// For k = 1 and up to kFilterDimensions: the tensor cores tell which rows can be the nearest, and only those are measured exactly. Folds
-/// (distance, index) into `best` by atomicMin, as the plain search does. batch is on the device. Needs compute capability 8.0.
-constexpr std::uint32_t kFilterDimensions = 64;
+/// Features for the tensor cores: rounded to tf32, rows padded with zeros to this width, zero where not valid. 0: too many dimensions.
+inline std::uint32_t filter_width(std::uint32_t dimension) { return dimension <= 16 ? 16 : dimension <= 40 ? 40 : dimension <= 64 ? 64 : 0; }
+
+/// For k = 1: the tensor cores tell which rows can be the nearest, and only those are measured exactly. Folds (distance, index) into `best`
+/// by atomicMin, as the plain search does. batch is on the device; all entries have these dimensions. Needs compute capability 8.0.
 void filter_nearest(Exec& exec, const FeatureQuery* batch, unsigned entries, std::uint32_t most_queries, std::uint32_t most_rows,
-                    std::uint32_t most_dimensions, std::size_t answers, unsigned long long* best);
+                    std::uint32_t dimensions, std::size_t answers, unsigned long long* best);
 
 }  // namespace gpureg::cuda

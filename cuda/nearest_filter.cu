@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include <cuda_pipeline.h>
+
 #include <algorithm>
 
 #include "nearest_feature.hpp"
@@ -35,11 +37,6 @@ __device__ std::int32_t ordered(float v) {
 __device__ float from_ordered(std::int32_t v) { return __int_as_float(v ^ ((v >> 31) & 0x7fffffff)); }
 
 #if !defined(__CUDA_ARCH__) || __CUDA_ARCH__ >= 800
-__device__ std::uint32_t to_tf32(float v) {
-  std::uint32_t out;
-  asm("cvt.rna.tf32.f32 %0, %1;" : "=r"(out) : "f"(v));
-  return out;
-}
 __device__ void multiply_add(float (&c)[4], const std::uint32_t (&a)[4], std::uint32_t b0, std::uint32_t b1) {
   asm("mma.sync.aligned.m16n8k8.row.col.f32.tf32.tf32.f32 {%0,%1,%2,%3}, {%4,%5,%6,%7}, {%8,%9}, {%0,%1,%2,%3};"
       : "+f"(c[0]), "+f"(c[1]), "+f"(c[2]), "+f"(c[3])
@@ -47,7 +44,6 @@ __device__ void multiply_add(float (&c)[4], const std::uint32_t (&a)[4], std::ui
 }
 #else
 // Never launched there.
-__device__ std::uint32_t to_tf32(float) { return 0; }
 __device__ void multiply_add(float (&)[4], const std::uint32_t (&)[4], std::uint32_t, std::uint32_t) {}
 #endif
 
@@ -68,10 +64,11 @@ __device__ void measure(const FeatureQuery& f, std::uint32_t q, std::uint32_t r,
 /// kSteps: dimensions over 8. First pass (kCollect false): bounds; second: the rows within them. Blocks: x queries, y part of the rows, z
 /// entry.
 template <int kSteps, bool kCollect>
-__global__ void __launch_bounds__(kThreads) filter(FilterBatch batch) {
-  constexpr int kStride = kSteps * 8 + 4;  // lanes of a fragment read 32 different banks
-  __shared__ std::uint32_t tile[kRows * kStride];
-  __shared__ float2 norm[kRows];
+__global__ void __launch_bounds__(kThreads, 2) filter(FilterBatch batch) {
+  constexpr int kWidth = kSteps * 8, kStride = kWidth + 4;  // lanes of a fragment read 32 different banks
+  constexpr float kInfinity = 3.402823466e38f * 2.0f;
+  __shared__ __align__(16) std::uint32_t tile[2][kRows * kStride];
+  __shared__ __align__(16) float2 norm[2][kRows];
   __shared__ std::uint32_t queue[kCollect ? kWarps : 1][kQueue];
   __shared__ std::uint32_t queued[kWarps];
   const FeatureQuery f = batch.queries[blockIdx.z];
@@ -80,6 +77,23 @@ __global__ void __launch_bounds__(kThreads) filter(FilterBatch batch) {
   const int warp = static_cast<int>(threadIdx.x / 32), lane = static_cast<int>(threadIdx.x % 32), row_of_lane = lane / 4, k_of_lane = lane % 4;
   const std::uint32_t q_first = blockIdx.x * kQueries + static_cast<std::uint32_t>(warp * kQueriesPerWarp);
   if (lane == 0) queued[warp] = 0;
+
+  const auto fetch = [&](std::uint32_t base, int buffer) {
+    for (int k = static_cast<int>(threadIdx.x); k < kRows * kSteps * 2; k += kThreads) {
+      const int row = k / (kSteps * 2), part = k % (kSteps * 2) * 4;
+      const std::uint32_t r = min(base + static_cast<std::uint32_t>(row), f.row_count - 1);
+      __pipeline_memcpy_async(&tile[buffer][row * kStride + part], f.row_tf32 + static_cast<std::size_t>(r) * kWidth + part, 16);
+    }
+    if (threadIdx.x < kRows) {
+      const std::uint32_t r = base + threadIdx.x;
+      if (r < r_last)
+        __pipeline_memcpy_async(&norm[buffer][threadIdx.x], f.row_norm + r, sizeof(float2));
+      else
+        norm[buffer][threadIdx.x] = make_float2(kInfinity, kInfinity);
+    }
+    __pipeline_commit();
+  };
+  fetch(r_first, 0);
 
   // Two tiles of 16 queries; this lane holds parts of queries row_of_lane and row_of_lane + 8 of each.
   std::uint32_t a[2][kSteps][4];
@@ -90,71 +104,78 @@ __global__ void __launch_bounds__(kThreads) filter(FilterBatch batch) {
     const bool asks = q < f.query_count && f.query_valid[q];
     const float2 n = asks ? f.query_norm[q] : make_float2(0, 0);
     length[m] = n.y * kProductError;
-    limit[m] = kCollect ? -__uint_as_float(0x7f800000u) : __uint_as_float(0x7f800000u);
+    limit[m] = kCollect ? -kInfinity : kInfinity;
     if (kCollect && asks) limit[m] = from_ordered(batch.bound[f.out + q]) + 2.0f * kNormError * n.x + 1e-30f;
 #pragma unroll
     for (int s = 0; s < kSteps; ++s)
 #pragma unroll
-      for (int half = 0; half < 2; ++half) {
-        const std::uint32_t d = static_cast<std::uint32_t>(s * 8 + half * 4 + k_of_lane);
-        a[m / 2][s][m % 2 + 2 * half] = to_tf32(asks && d < f.dimension ? f.queries[static_cast<std::size_t>(q) * f.dimension + d] : 0.0f);
-      }
+      for (int half = 0; half < 2; ++half)
+        a[m / 2][s][m % 2 + 2 * half] = asks ? f.query_tf32[static_cast<std::size_t>(q) * kWidth + s * 8 + half * 4 + k_of_lane] : 0u;
   }
 
-  for (std::uint32_t base = r_first; base < r_last; base += kRows) {
-    __syncthreads();
-    for (int k = static_cast<int>(threadIdx.x); k < kRows * kSteps * 8; k += kThreads) {
-      const int row = k / (kSteps * 8), d = k % (kSteps * 8);
-      const std::uint32_t r = base + static_cast<std::uint32_t>(row);
-      const bool there = r < r_last && static_cast<std::uint32_t>(d) < f.dimension && f.row_valid[r];
-      tile[row * kStride + d] = to_tf32(there ? f.rows[static_cast<std::size_t>(r) * f.dimension + d] : 0.0f);
-    }
-    for (int row = static_cast<int>(threadIdx.x); row < kRows; row += kThreads) {
-      const float inf = __uint_as_float(0x7f800000u);
-      const std::uint32_t r = base + static_cast<std::uint32_t>(row);
-      const float2 n = r < r_last ? f.row_norm[r] : make_float2(inf, inf);
-      // Squares a little longer in the first pass, a little shorter in the second: bounds. Lengths of invalid rows must not make NaNs.
-      norm[row] = make_float2(n.x * (kCollect ? 1.0f - kNormError : 1.0f + kNormError), n.x < inf ? n.y : 0.0f);
-    }
+  int buffer = 0;
+  for (std::uint32_t base = r_first; base < r_last; base += kRows, buffer ^= 1) {
+    if (base + kRows < r_last)
+      fetch(base + kRows, buffer ^ 1);
+    else
+      __pipeline_commit();
+    __pipeline_wait_prior(1);
     __syncthreads();
 #pragma unroll 2
     for (int n0 = 0; n0 < kRows; n0 += 8) {
       float c[2][4] = {{0, 0, 0, 0}, {0, 0, 0, 0}};
-      const std::uint32_t* fragment = tile + (n0 + row_of_lane) * kStride + k_of_lane;
+      const std::uint32_t* fragment = tile[buffer] + (n0 + row_of_lane) * kStride + k_of_lane;
 #pragma unroll
       for (int s = 0; s < kSteps; ++s) {
         const std::uint32_t b0 = fragment[s * 8], b1 = fragment[s * 8 + 4];
         multiply_add(c[0], a[0][s], b0, b1);
         multiply_add(c[1], a[1][s], b0, b1);
       }
-      // Of each result this lane has the columns 2 k_of_lane and 2 k_of_lane + 1.
-      const float2 n[2] = {norm[n0 + 2 * k_of_lane], norm[n0 + 2 * k_of_lane + 1]};
+      // Of each result this lane has the columns 2 k_of_lane and 2 k_of_lane + 1. Rows that are not valid have infinite norms: their bounds
+      // are infinite or NaN, which no comparison lets through.
+      const float4 n = *reinterpret_cast<const float4*>(&norm[buffer][n0 + 2 * k_of_lane]);
+      // Squares a little longer in the first pass, a little shorter in the second: bounds.
+      const float squared[2] = {n.x * (kCollect ? 1.0f - kNormError : 1.0f + kNormError), n.z * (kCollect ? 1.0f - kNormError : 1.0f + kNormError)};
+      const float row_length[2] = {n.y, n.w};
+      bool any = false;
+      float lower[4][2];
 #pragma unroll
       for (int m = 0; m < 4; ++m)
 #pragma unroll
         for (int j = 0; j < 2; ++j) {
-          const float middle = fmaf(-2.0f, c[m / 2][m % 2 * 2 + j], n[j].x);
+          const float middle = fmaf(-2.0f, c[m / 2][m % 2 * 2 + j], squared[j]);
           if (!kCollect) {
-            limit[m] = fminf(limit[m], fmaf(length[m], n[j].y, middle));
-          } else if (fmaf(-length[m], n[j].y, middle) <= limit[m]) {
-            queue[warp][atomicAdd(&queued[warp], 1u)] =
-                static_cast<std::uint32_t>(m * 8 + row_of_lane) << 27 | (base - r_first + static_cast<std::uint32_t>(n0 + 2 * k_of_lane + j));
+            limit[m] = fminf(limit[m], fmaf(length[m], row_length[j], middle));
+          } else {
+            lower[m][j] = fmaf(-length[m], row_length[j], middle);
+            any = any || lower[m][j] <= limit[m];
           }
         }
-      if (kCollect) {
-        __syncwarp();
-        const std::uint32_t waiting = queued[warp];
-        if (waiting >= 32 || (waiting > 0 && n0 + 8 == kRows && base + kRows >= r_last)) {
-          for (std::uint32_t k = static_cast<std::uint32_t>(lane); k < waiting; k += 32) {
-            const std::uint32_t entry = queue[warp][k], r = r_first + (entry & 0x7ffffffu);
-            if (r < r_last && f.row_valid[r]) measure(f, q_first + (entry >> 27), r, batch.best);
-          }
-          __syncwarp();
-          if (lane == 0) queued[warp] = 0;
-          __syncwarp();
-        }
+      if (!kCollect) continue;
+      if (any) {
+#pragma unroll
+        for (int m = 0; m < 4; ++m)
+#pragma unroll
+          for (int j = 0; j < 2; ++j)
+            if (lower[m][j] <= limit[m])
+              queue[warp][atomicAdd(&queued[warp], 1u)] =
+                  static_cast<std::uint32_t>(m * 8 + row_of_lane) << 27 | (base - r_first + static_cast<std::uint32_t>(n0 + 2 * k_of_lane + j));
       }
+      const bool last = n0 + 8 == kRows && base + kRows >= r_last;
+      if (!last && !__any_sync(~0u, any)) continue;
+      __syncwarp();
+      const std::uint32_t waiting = queued[warp];
+      if (waiting >= 32 || last) {
+        for (std::uint32_t k = static_cast<std::uint32_t>(lane); k < waiting; k += 32) {
+          const std::uint32_t entry = queue[warp][k];
+          measure(f, q_first + (entry >> 27), r_first + (entry & 0x7ffffffu), batch.best);
+        }
+        __syncwarp();
+        if (lane == 0) queued[warp] = 0;
+      }
+      __syncwarp();
     }
+    __syncthreads();
   }
   if constexpr (!kCollect) {
 #pragma unroll
@@ -178,19 +199,18 @@ void run(Exec& exec, dim3 grid, const FilterBatch& batch) {
 }  // namespace
 
 void filter_nearest(Exec& exec, const FeatureQuery* batch, unsigned entries, std::uint32_t most_queries, std::uint32_t most_rows,
-                    std::uint32_t most_dimensions, std::size_t answers, unsigned long long* best) {
+                    std::uint32_t dimensions, std::size_t answers, unsigned long long* best) {
   // Bytes of 0x7f are an integer above every ordered float.
   const auto bound = exec.filled<std::int32_t>(answers, 0x7f);
   const unsigned query_blocks = blocks_for(most_queries, kQueries);
   const std::uint32_t rows_per_part = std::min(rows_of_part(exec, std::size_t(query_blocks) * entries, most_rows, kRows), 1u << 26);
   const dim3 grid(query_blocks, blocks_for(most_rows, rows_per_part), entries);
   const FilterBatch filter_batch{batch, rows_per_part, bound.data(), best};
-  if (most_dimensions <= 16)
-    run<2>(exec, grid, filter_batch);
-  else if (most_dimensions <= 40)
-    run<5>(exec, grid, filter_batch);
-  else
-    run<8>(exec, grid, filter_batch);
+  switch (filter_width(dimensions)) {
+    case 16: return run<2>(exec, grid, filter_batch);
+    case 40: return run<5>(exec, grid, filter_batch);
+    default: return run<8>(exec, grid, filter_batch);
+  }
 }
 
 }  // namespace gpureg::cuda

@@ -71,8 +71,9 @@ struct CellSummaries {
   Vec3 offset{0, 0, 0};                      ///< in cells: cell = p * inverse_cell_size + offset
   std::int32_t nx = 0, ny = 0, nz = 0;       ///< blocks; 0: none, the cloud is too wide for a table
   std::int32_t* block = nullptr;             ///< 1 + index of the block, or 0
-  std::uint32_t* word = nullptr;             ///< (1 + blocks) x 512
-  std::uint8_t* code = nullptr;              ///< (1 + blocks) x 512: the same, coarser, see directions.hpp
+  uint2* record = nullptr;                   ///< (1 + blocks) x 512: the summary; the cell's candidates: first << 8 | number, or kNoValue
+  float4* candidate = nullptr;               ///< the candidates of all cells: x, y, z, packed normal
+  std::uint8_t* code = nullptr;              ///< (1 + blocks) x 512: the summary, coarser, see directions.hpp
 };
 
 /// Points in groups of 32 neighbours; the groups spread over the cloud, so that the first few tell about the whole of it.
@@ -92,7 +93,7 @@ struct CudaCloud : PreparedState {
   CellSummaries summaries;
   ScoringOrder order;
   float2* feature_norm = nullptr;            ///< squared length and length of each feature; infinite where it is not to be matched
-  bool moderate_features = true;             ///< no length beyond 1e15: differences of squares mean something in float
+  std::uint32_t* feature_tf32 = nullptr;     ///< see nearest_feature.hpp; null where the dimension or a length (over 1e15) forbids it
   std::vector<Vec3> copy_points() const override;
   std::vector<Vec3> copy_normals() const override;
   std::vector<float> copy_features() const override;

@@ -11,13 +11,20 @@ constexpr std::uint32_t kLeaders = 16;      // promising hypotheses of a pair th
 constexpr int kProbeThreads = 256;
 constexpr int kThreads = 768;
 constexpr std::uint32_t kUnroll = 4;        // groups in flight per warp
-constexpr std::size_t kRowBytes = 64 * 16;  // of the table of compatible levels, one per warp
+constexpr std::size_t kRowBytes = 64 * 16;  // of the table of compatible levels
 constexpr std::uint32_t kSharedBlocks = 24 << 10;  // entries of the largest block table that is copied
 
 /// Hypotheses [begin, end) of one pair.
 struct Slice {
   std::uint32_t pair, begin, end;
 };
+
+/// A point that only its closest target point can decide.
+struct Undecided {
+  std::uint32_t point, cell, list;
+};
+
+constexpr std::size_t kWarpBytes = kRowBytes + 64 * sizeof(Undecided);  // of shared memory for each warp
 
 /// What a thread block keeps of a pair while it scores a slice: in shared memory, or where it is too large, in global.
 template <typename Block>
@@ -26,9 +33,8 @@ struct Staged {
   const Block* blocks;
 };
 
-/// Source points of a group that may be inliers, by the word of their cell.
-__device__ bool may_be_inlier(const ScorePair& pair, const Rigid& rigid, const Limits* limits, std::uint32_t cell, float4 n, bool& certain) {
-  const std::uint32_t word = __ldg(pair.cells.word + cell);
+/// Whether a source point may be an inlier, or certainly is one, by the summary of its cell.
+__device__ bool may_be_inlier(const Rigid& rigid, const Limits* limits, std::uint32_t word, float4 n, bool& certain) {
   const float cosine = cosine_to_mean(rigid, n, word);
   const Limits limit = limits[word >> 24];
   certain = cosine >= limit.all_above;
@@ -57,11 +63,11 @@ __device__ std::uint32_t count_possible(const CellMotion& motion, const Staged<B
 
 /// Exact number of inliers, or 0 as soon as it cannot reach the most seen so far: such a hypothesis is not the best one. First every point
 /// is bounded by its cell's code, then by its word, and only undecided ones are looked at. possible: upper bound by words over the groups
-/// before `begin`. A warp's work; rows: its own 64 x 16 bytes of shared memory.
+/// before `begin`. A warp's work; rows and queue: its own 64 x 16 bytes and 64 entries of shared memory.
 template <typename Block>
 __device__ std::uint32_t count_inliers(const ScoreBatch& b, const ScorePair& pair, const Limits* limits, const Staged<Block>& staged,
-                                       std::uint8_t* rows, const Pose<float>& pose, std::uint32_t begin, std::uint32_t possible,
-                                       const volatile std::uint32_t* most) {
+                                       std::uint8_t* rows, Undecided* queue, const Pose<float>& pose, std::uint32_t begin,
+                                       std::uint32_t possible, const volatile std::uint32_t* most) {
   const std::uint32_t lane = threadIdx.x % 32;
   const Rigid rigid = to_rigid(pose);
   if (pair.cells.nx == 0) {
@@ -91,24 +97,49 @@ __device__ std::uint32_t count_inliers(const ScoreBatch& b, const ScorePair& pai
   }
   for (; g < groups; ++g) possible += warp_sum(count_possible<1>(motion, staged, codes, rows, g));
 
+  // Undecided points wait until there is one for every lane.
+  std::uint32_t waiting = 0;
+  const auto settle = [&](std::uint32_t count) {
+    __syncwarp();
+    bool refuted = false;
+    if (lane < count) {
+      const Undecided u = queue[lane];
+      refuted = !is_inlier(pair, b.test, rigid, staged.point[u.point], __ldg(pair.order.normal + u.point), u.cell, u.list);
+    }
+    possible -= static_cast<std::uint32_t>(__popc(static_cast<int>(__ballot_sync(~0u, refuted))));
+    __syncwarp();
+  };
   for (g = 0; g < groups; ++g) {
     if (possible < needed) return 0;
     const float4 p = staged.point[g * 32 + lane];
     const std::uint32_t cell = motion.locate(p, staged.blocks), code = __ldg(codes + cell);
-    const bool by_code = (code & 15u) >= rows[__float_as_uint(p.w) + (code >> 4)];
-    // The first groups were bounded by words already, not by codes.
-    const bool counted = by_code || g < begin;
+    // The first groups were bounded by summaries already, not by codes.
+    const bool counted = (code & 15u) >= rows[__float_as_uint(p.w) + (code >> 4)] || g < begin;
     if (!__any_sync(~0u, counted)) continue;
-    bool refuted = false;
+    bool refuted = false, undecided = false;
+    uint2 record = make_uint2(0, 0);
     if (counted) {
-      const float4 n = __ldg(pair.order.normal + g * 32 + lane);
+      record = __ldg(pair.cells.record + cell);
       bool certain;
-      const bool by_word = may_be_inlier(pair, rigid, limits, cell, n, certain);
-      refuted = by_word ? !certain && !is_inlier(pair, b.test, rigid, p, n, cell) : g >= begin;
+      const bool possible_still = may_be_inlier(rigid, limits, record.x, __ldg(pair.order.normal + g * 32 + lane), certain);
+      refuted = !possible_still && g >= begin;
+      undecided = possible_still && !certain;
     }
     possible -= static_cast<std::uint32_t>(__popc(static_cast<int>(__ballot_sync(~0u, refuted))));
-    if (g % 16 == 15) needed = *most;
+    const unsigned asked = __ballot_sync(~0u, undecided);
+    if (undecided) queue[waiting + static_cast<std::uint32_t>(__popc(static_cast<int>(asked & ((1u << lane) - 1))))] = {g * 32 + lane, cell, record.y};
+    waiting += static_cast<std::uint32_t>(__popc(static_cast<int>(asked)));
+    if (waiting >= 32) {
+      settle(32);
+      waiting -= 32;
+      const Undecided moved = queue[32 + lane];
+      __syncwarp();
+      if (lane < waiting) queue[lane] = moved;
+      needed = *most;
+    }
   }
+  if (possible < needed) return 0;
+  settle(waiting);
   return possible;
 }
 
@@ -135,7 +166,8 @@ __global__ void __launch_bounds__(kProbeThreads) probe(ScoreBatch b) {
       for (std::uint32_t g = 0; g < kProbeGroups; ++g) {
         if (g >= pair.order.groups) break;
         const std::uint32_t cell = motion.locate(__ldg(pair.order.point + g * 32 + lane), pair.cells.block);
-        possible += may_be_inlier(pair, rigid, limits + pair.limits * 256, cell, __ldg(pair.order.normal + g * 32 + lane), certain);
+        possible += may_be_inlier(rigid, limits + pair.limits * 256, __ldg(&pair.cells.record[cell].x),
+                                  __ldg(pair.order.normal + g * 32 + lane), certain);
       }
       possible = warp_sum(possible);
     }
@@ -164,7 +196,8 @@ __global__ void __launch_bounds__(kProbeThreads) score_leaders(ScoreBatch b) {
   for (std::uint32_t k = threadIdx.x; k < pair.order.groups * 32; k += kProbeThreads) {
     const float4 point = __ldg(pair.order.point + k);
     const std::uint32_t cell = motion.locate(point, pair.cells.block);
-    mine += __ldg(pair.cells.word + cell) != 0 && is_inlier(pair, b.test, rigid, point, __ldg(pair.order.normal + k), cell);
+    const uint2 record = __ldg(pair.cells.record + cell);
+    mine += record.x != 0 && is_inlier(pair, b.test, rigid, point, __ldg(pair.order.normal + k), cell, record.y);
   }
   mine = warp_sum(mine);
   if (threadIdx.x % 32 == 0) atomicAdd(&inliers, mine);
@@ -174,7 +207,7 @@ __global__ void __launch_bounds__(kProbeThreads) score_leaders(ScoreBatch b) {
 
 template <typename Block>
 __device__ void score_slice(const ScoreBatch& b, const Slice& slice, const Limits* limits, const Staged<Block>& staged, std::uint8_t* rows,
-                            std::uint32_t* next) {
+                            Undecided* queue, std::uint32_t* next) {
   const std::uint32_t lane = threadIdx.x % 32;
   const ScorePair& pair = b.pairs[slice.pair];
   for (;;) {
@@ -184,7 +217,7 @@ __device__ void score_slice(const ScoreBatch& b, const Slice& slice, const Limit
     if (h >= slice.end) return;
     std::uint32_t inliers = 0;
     if (b.valid[h]) {
-      inliers = count_inliers(b, pair, limits + pair.limits * 256, staged, rows, b.poses[h], min(kProbeGroups, pair.order.groups),
+      inliers = count_inliers(b, pair, limits + pair.limits * 256, staged, rows, queue, b.poses[h], min(kProbeGroups, pair.order.groups),
                               b.possible[h], b.most + slice.pair);
       if (lane == 0 && inliers > 0) atomicMax(b.most + slice.pair, inliers);
     }
@@ -198,11 +231,12 @@ __global__ void __launch_bounds__(kThreads, 1) score_slices(ScoreBatch b, const 
                                                             std::uint32_t block_room) {
   extern __shared__ float4 shared_points[];
   std::uint8_t* shared_rows = reinterpret_cast<std::uint8_t*>(shared_points + point_room);
-  std::uint16_t* shared_blocks = reinterpret_cast<std::uint16_t*>(shared_rows + kThreads / 32 * kRowBytes);
+  std::uint16_t* shared_blocks = reinterpret_cast<std::uint16_t*>(shared_rows + kThreads / 32 * kWarpBytes);
   __shared__ Limits limits[512];
   __shared__ std::uint32_t taken, next;
   load_limits(b.limits, limits);
-  std::uint8_t* rows = shared_rows + threadIdx.x / 32 * kRowBytes;
+  std::uint8_t* rows = shared_rows + threadIdx.x / 32 * kWarpBytes;
+  Undecided* queue = reinterpret_cast<Undecided*>(rows + kRowBytes);
   std::uint32_t loaded = kNoValue;
   for (;;) {
     __syncthreads();
@@ -217,7 +251,7 @@ __global__ void __launch_bounds__(kThreads, 1) score_slices(ScoreBatch b, const 
     const std::uint32_t points = pair.order.groups * 32;
     const std::uint32_t blocks = static_cast<std::uint32_t>(pair.cells.nx * pair.cells.ny * pair.cells.nz);
     if (points > point_room || blocks > block_room) {
-      score_slice(b, slice, limits, Staged<std::int32_t>{pair.order.point, pair.cells.block}, rows, &next);
+      score_slice(b, slice, limits, Staged<std::int32_t>{pair.order.point, pair.cells.block}, rows, queue, &next);
       continue;
     }
     if (loaded != slice.pair) {
@@ -226,7 +260,7 @@ __global__ void __launch_bounds__(kThreads, 1) score_slices(ScoreBatch b, const 
       loaded = slice.pair;
       __syncthreads();
     }
-    score_slice(b, slice, limits, Staged<std::uint16_t>{shared_points, shared_blocks}, rows, &next);
+    score_slice(b, slice, limits, Staged<std::uint16_t>{shared_points, shared_blocks}, rows, queue, &next);
   }
 }
 
@@ -296,10 +330,10 @@ DeviceBuffer<BestPose> score_hypotheses(Exec& exec, Span<const PairView> pairs, 
     }
     // The table numbers blocks with 16 bits; what does not fit stays in global memory.
     const std::uint32_t block_room = std::min(most_blocks, kSharedBlocks);
-    const std::size_t fixed = kThreads / 32 * kRowBytes + block_room * sizeof(std::uint16_t) + 8192;
+    const std::size_t fixed = kThreads / 32 * kWarpBytes + block_room * sizeof(std::uint16_t) + 8192;
     const std::uint32_t point_room =
         std::min(most_points, static_cast<std::uint32_t>(exec.shared_bytes_per_block() > fixed ? (exec.shared_bytes_per_block() - fixed) / sizeof(float4) : 0));
-    const std::size_t bytes = point_room * sizeof(float4) + kThreads / 32 * kRowBytes + block_room * sizeof(std::uint16_t);
+    const std::size_t bytes = point_room * sizeof(float4) + kThreads / 32 * kWarpBytes + block_room * sizeof(std::uint16_t);
     check(cudaFuncSetAttribute(score_slices, cudaFuncAttributeMaxDynamicSharedMemorySize, static_cast<int>(bytes)), "cudaFuncSetAttribute");
     score_slices<<<std::min(static_cast<unsigned>(slices.size()), processors), kThreads, bytes, exec.stream()>>>(
         batch, slices_on_device.data(), static_cast<std::uint32_t>(slices.size()), point_room, block_room);

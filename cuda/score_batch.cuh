@@ -26,12 +26,6 @@ struct ScoreBatch {
   std::uint32_t* next;              ///< slices handed out
 };
 
-/// Exact test of one source point in a known cell.
-__device__ inline bool is_inlier(const ScorePair& pair, const InlierTest& test, const Rigid& rigid, float4 p, float4 n, std::uint32_t cell) {
-  const Closest c = closest_in_cell(pair.target, cell, apply(rigid, {p.x, p.y, p.z}), test.max_squared);
-  return c.index != kNoValue && normals_agree(rotate(rigid, {n.x, n.y, n.z}), pair.target.normals[c.index], test.min_cosine);
-}
-
 /// Support of one pose by looking every point up: clouds too wide for a table of blocks, and residuals. A warp's work; all lanes get it.
 __device__ inline std::uint32_t support_by_search(const ScorePair& pair, const InlierTest& test, const Rigid& rigid, unsigned long long& residual) {
   std::uint32_t inliers = 0;

@@ -6,6 +6,7 @@
 #include "algorithm/cell_summary.hpp"
 #include "device_algorithms.hpp"
 #include "directions.hpp"
+#include "packed_normal.cuh"
 
 namespace gpureg::cuda {
 namespace {
@@ -49,9 +50,20 @@ __global__ void summarize(const Slot* slots, const DirectionTables* tables) {
     const Cell c{block.x * 8 + (cell & 7), block.y * 8 + ((cell >> 3) & 7), block.z * 8 + (cell >> 6)};
     const Span<const std::uint32_t> candidates{s.view.closest.candidates.data + start[0], start[1] - start[0]};
     const bool empty = candidates.size == 0;
-    s.summaries.word[kCells + k] =
+    const std::uint32_t word =
         empty ? 0u : summarize_cell(candidates, cell_center(c, s.geometry.cell_size), s.geometry, s.view.points, s.view.normals);
+    const bool short_list = candidates.size < 256 && start[0] < (1u << 24);
+    s.summaries.record[kCells + k] = make_uint2(word, short_list ? start[0] << 8 | static_cast<std::uint32_t>(candidates.size) : kNoValue);
     s.summaries.code[kCells + k] = empty ? std::uint8_t(0) : code_of_cell(*tables, candidates, s.view.normals);
+  }
+}
+
+__global__ void copy_candidates(const Slot* slots) {
+  const Slot& s = slots[blockIdx.y];
+  const Span<const std::uint32_t> candidates = s.view.closest.candidates;
+  for (std::size_t k = static_cast<std::size_t>(blockIdx.x) * blockDim.x + threadIdx.x; k < candidates.size; k += static_cast<std::size_t>(gridDim.x) * blockDim.x) {
+    const Vec3 p = s.view.points[candidates[k]];
+    s.summaries.candidate[k] = make_float4(p.x, p.y, p.z, __uint_as_float(pack_normal(s.view.normals[candidates[k]])));
   }
 }
 
@@ -111,7 +123,8 @@ ScoringLayout scoring_layout(const CudaCloud& cloud, const CellRange& blocks) {
   };
   const std::size_t padded = (cloud.size + 31) / 32 * 32;
   l.table = take(fits ? nx * ny * nz * sizeof(std::int32_t) : 0);
-  l.words = take(fits ? (std::size_t(cloud.block_count) + 1) * kCells * sizeof(std::uint32_t) : 0);
+  l.records = take(fits ? (std::size_t(cloud.block_count) + 1) * kCells * sizeof(uint2) : 0);
+  l.candidates = take(cloud.candidate_count * sizeof(float4));
   l.points = take(padded * sizeof(float4));
   l.normals = take(padded * sizeof(float4));
   l.codes = take(fits ? (std::size_t(cloud.block_count) + 1) * kCells : 0);
@@ -124,7 +137,8 @@ void place_scoring_data(const ScoringLayout& l, const ClosestGeometry& geometry,
   v.offset = {-static_cast<float>(l.first_block.x) * 8.0f, -static_cast<float>(l.first_block.y) * 8.0f, -static_cast<float>(l.first_block.z) * 8.0f};
   v.nx = l.nx, v.ny = l.ny, v.nz = l.nz;
   v.block = reinterpret_cast<std::int32_t*>(memory + l.table);
-  v.word = reinterpret_cast<std::uint32_t*>(memory + l.words);
+  v.record = reinterpret_cast<uint2*>(memory + l.records);
+  v.candidate = reinterpret_cast<float4*>(memory + l.candidates);
   cloud.order.groups = (cloud.size + 31) / 32;
   cloud.order.point = reinterpret_cast<float4*>(memory + l.points);
   cloud.order.normal = reinterpret_cast<float4*>(memory + l.normals);
@@ -139,7 +153,7 @@ void fill_scoring_data(Exec& exec, const std::vector<std::shared_ptr<CudaCloud>>
     const CellSummaries& v = cloud.summaries;
     if (v.nx > 0) {
       check(cudaMemsetAsync(v.block, 0, static_cast<std::size_t>(v.nx) * v.ny * v.nz * sizeof(std::int32_t), exec.stream()), "cudaMemsetAsync");
-      check(cudaMemsetAsync(v.word, 0, kCells * sizeof(std::uint32_t), exec.stream()), "cudaMemsetAsync");
+      check(cudaMemsetAsync(v.record, 0, kCells * sizeof(uint2), exec.stream()), "cudaMemsetAsync");
       check(cudaMemsetAsync(v.code, 0, kCells, exec.stream()), "cudaMemsetAsync");
     }
     const std::uint32_t groups = cloud.order.groups;
@@ -159,6 +173,8 @@ void fill_scoring_data(Exec& exec, const std::vector<std::shared_ptr<CudaCloud>>
   check_launch("fill_block_tables");
   summarize<<<dim3(128, count), 256, 0, exec.stream()>>>(on_device.data(), tables.data());
   check_launch("summarize");
+  copy_candidates<<<dim3(128, count), 256, 0, exec.stream()>>>(on_device.data());
+  check_launch("copy_candidates");
   write_morton_keys<<<dim3(16, count), 256, 0, exec.stream()>>>(on_device.data(), keys.data(), index.data());
   check_launch("write_morton_keys");
   int bits = 30;
