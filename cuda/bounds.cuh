@@ -53,18 +53,23 @@ struct CellMotion {
   }
 };
 
-/// Cosine between a moved normal and the mean normal of a summary.
-__device__ inline float cosine_to_mean(const Rigid& pose, float4 n, std::uint32_t word) {
-  const Vec3 moved = rotate(pose, {n.x, n.y, n.z});
+/// Whether a source point may be an inlier, or certainly is one, by the summary of its cell. normal: packed.
+__device__ inline bool may_be_inlier(const Rigid& rigid, const Limits* limits, std::uint32_t word, std::uint32_t normal, bool& certain) {
+  // Without a normal the cosine is 0, as normals_agree() has it for limits up to 90 degrees; beyond them nothing is certain.
+  const Vec3 moved = rotate(rigid, normal == kPackedZero ? Vec3{0, 0, 0} : unpack_normal(normal));
   const auto part = [&](int shift) { return static_cast<float>(static_cast<std::int32_t>(word << shift) >> 24); };
-  return fmaf(moved.z, part(8), fmaf(moved.y, part(16), moved.x * part(24))) * (1.0f / 127.0f);
+  const float cosine = fmaf(moved.z, part(8), fmaf(moved.y, part(16), moved.x * part(24))) * (1.0f / 127.0f);
+  const Limits limit = limits[word >> 24];
+  certain = cosine >= limit.all_above && (normal != kPackedZero || limit.all_above <= -2.0f);
+  return word != 0 && cosine >= limit.none_below;
 }
 
-/// Exact test of a moved source point in a known cell; p: the point, n: its normal, record: the cell's.
-__device__ inline bool is_inlier(const ScorePair& pair, const InlierTest& test, const Rigid& rigid, float4 p, float4 n, std::uint32_t cell,
-                                 std::uint32_t list) {
+/// Exact test of a moved source point in a known cell. slot: the point's in the scoring order.
+__device__ inline bool is_inlier(const ScorePair& pair, const InlierTest& test, const Rigid& rigid, float4 p, std::uint32_t normal,
+                                 std::uint32_t slot, std::uint32_t cell) {
   constexpr std::uint32_t kCells = ClosestGridView::kBlockCells;
   const Vec3 q = apply(rigid, {p.x, p.y, p.z});
+  const std::uint32_t list = __ldg(pair.cells.list + cell);
   std::uint32_t first = list >> 8, last = first + (list & 255u);
   if (list == kNoValue) {
     const std::uint32_t* start = pair.target.closest.cell_start.data + static_cast<std::size_t>(cell / kCells - 1) * (kCells + 1) + cell % kCells;
@@ -83,10 +88,11 @@ __device__ inline bool is_inlier(const ScorePair& pair, const InlierTest& test, 
   }
   if (best == kNoValue || !(best_squared <= test.max_squared)) return false;
   if (test.min_cosine <= -1.0f) return true;
-  const Vec3 moved = rotate(rigid, {n.x, n.y, n.z});
-  const float off = dot(moved, unpack_normal(best_normal)) - test.min_cosine;
-  if (best_normal != kPackedZero && fabsf(off) > kPackedNormalError) return off > 0.0f && !is_zero(moved);
-  return normals_agree(moved, pair.target.normals[pair.target.closest.candidates[best]], test.min_cosine);
+  if (best_normal == kPackedZero || normal == kPackedZero) return false;
+  const float off = dot(rotate(rigid, unpack_normal(normal)), unpack_normal(best_normal)) - test.min_cosine;
+  if (fabsf(off) > kPackedCosineError) return off > 0.0f;
+  return normals_agree(rotate(rigid, pair.source.normals[pair.order.index[slot]]),
+                       pair.target.normals[pair.target.closest.candidates[best]], test.min_cosine);
 }
 
 }  // namespace gpureg::cuda

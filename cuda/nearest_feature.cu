@@ -130,7 +130,7 @@ __global__ void __launch_bounds__(128) nearest_many(const FeatureQuery* batch, s
 }  // namespace
 
 std::uint32_t rows_of_part(const Exec& exec, std::size_t query_blocks, std::uint32_t most_rows, std::uint32_t tile) {
-  const std::size_t tiles = blocks_for(most_rows, tile), wanted = static_cast<std::size_t>(exec.multiprocessors()) * 8;
+  const std::size_t tiles = blocks_for(most_rows, tile), wanted = static_cast<std::size_t>(exec.multiprocessors()) * 4;
   const std::size_t parts = std::max<std::size_t>(1, std::min(tiles, wanted / query_blocks));
   return blocks_for(tiles, static_cast<unsigned>(parts)) * tile;
 }

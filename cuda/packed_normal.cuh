@@ -5,8 +5,8 @@
 
 namespace gpureg::cuda {
 
-/// A normal in 30 bits. A cosine with it is off by less than kPackedNormalError; a zero normal has its own word.
-constexpr float kPackedNormalError = 0.0025f;
+/// A normal in 30 bits. A cosine between two of them is off by less than kPackedCosineError; a zero normal has its own word.
+constexpr float kPackedCosineError = 0.005f;
 constexpr std::uint32_t kPackedZero = ~std::uint32_t(0);
 
 __device__ inline std::uint32_t pack_normal(Vec3 n) {

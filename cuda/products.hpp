@@ -71,7 +71,8 @@ struct CellSummaries {
   Vec3 offset{0, 0, 0};                      ///< in cells: cell = p * inverse_cell_size + offset
   std::int32_t nx = 0, ny = 0, nz = 0;       ///< blocks; 0: none, the cloud is too wide for a table
   std::int32_t* block = nullptr;             ///< 1 + index of the block, or 0
-  uint2* record = nullptr;                   ///< (1 + blocks) x 512: the summary; the cell's candidates: first << 8 | number, or kNoValue
+  std::uint32_t* word = nullptr;             ///< (1 + blocks) x 512: the summary
+  std::uint32_t* list = nullptr;             ///< (1 + blocks) x 512: the cell's candidates, first << 8 | number, or kNoValue
   float4* candidate = nullptr;               ///< the candidates of all cells: x, y, z, packed normal
   std::uint8_t* code = nullptr;              ///< (1 + blocks) x 512: the summary, coarser, see directions.hpp
 };
@@ -79,7 +80,8 @@ struct CellSummaries {
 /// Points in groups of 32 neighbours; the groups spread over the cloud, so that the first few tell about the whole of it.
 struct ScoringOrder {
   float4* point = nullptr;                   ///< x, y, z, NaN where the last group has no more; w: 16 times the normal's class, see directions.hpp
-  float4* normal = nullptr;                  ///< w: index of the point in the cloud
+  std::uint32_t* normal = nullptr;           ///< packed, see packed_normal.cuh
+  std::uint32_t* index = nullptr;            ///< of the point in the cloud
   std::uint32_t groups = 0;
 };
 

@@ -9,9 +9,11 @@ namespace {
 constexpr std::uint32_t kProbeGroups = 4;   // groups of 32 points that tell promising hypotheses from others
 constexpr std::uint32_t kLeaders = 16;      // promising hypotheses of a pair that are scored first
 constexpr int kProbeThreads = 256;
+constexpr std::uint32_t kByBlock = 64;      // hypotheses per multiprocessor up to which each gets a thread block of its own
 constexpr int kThreads = 768;
 constexpr std::uint32_t kUnroll = 4;        // groups in flight per warp
 constexpr std::size_t kRowBytes = 64 * 16;  // of the table of compatible levels
+constexpr std::size_t kPointBytes = sizeof(float4) + sizeof(std::uint32_t);
 constexpr std::uint32_t kSharedBlocks = 24 << 10;  // entries of the largest block table that is copied
 
 /// Hypotheses [begin, end) of one pair.
@@ -21,7 +23,7 @@ struct Slice {
 
 /// A point that only its closest target point can decide.
 struct Undecided {
-  std::uint32_t point, cell, list;
+  std::uint32_t slot, cell;
 };
 
 constexpr std::size_t kWarpBytes = kRowBytes + 64 * sizeof(Undecided);  // of shared memory for each warp
@@ -30,16 +32,9 @@ constexpr std::size_t kWarpBytes = kRowBytes + 64 * sizeof(Undecided);  // of sh
 template <typename Block>
 struct Staged {
   const float4* point;
+  const std::uint32_t* normal;
   const Block* blocks;
 };
-
-/// Whether a source point may be an inlier, or certainly is one, by the summary of its cell.
-__device__ bool may_be_inlier(const Rigid& rigid, const Limits* limits, std::uint32_t word, float4 n, bool& certain) {
-  const float cosine = cosine_to_mean(rigid, n, word);
-  const Limits limit = limits[word >> 24];
-  certain = cosine >= limit.all_above;
-  return word != 0 && cosine >= limit.none_below;
-}
 
 /// Groups [begin, begin + N): how many of this lane's points may be inliers, by the code of their cell. rows: levels that each class of
 /// normals needs, in shared memory.
@@ -104,7 +99,7 @@ __device__ std::uint32_t count_inliers(const ScoreBatch& b, const ScorePair& pai
     bool refuted = false;
     if (lane < count) {
       const Undecided u = queue[lane];
-      refuted = !is_inlier(pair, b.test, rigid, staged.point[u.point], __ldg(pair.order.normal + u.point), u.cell, u.list);
+      refuted = !is_inlier(pair, b.test, rigid, staged.point[u.slot], staged.normal[u.slot], u.slot, u.cell);
     }
     possible -= static_cast<std::uint32_t>(__popc(static_cast<int>(__ballot_sync(~0u, refuted))));
     __syncwarp();
@@ -117,17 +112,15 @@ __device__ std::uint32_t count_inliers(const ScoreBatch& b, const ScorePair& pai
     const bool counted = (code & 15u) >= rows[__float_as_uint(p.w) + (code >> 4)] || g < begin;
     if (!__any_sync(~0u, counted)) continue;
     bool refuted = false, undecided = false;
-    uint2 record = make_uint2(0, 0);
     if (counted) {
-      record = __ldg(pair.cells.record + cell);
       bool certain;
-      const bool possible_still = may_be_inlier(rigid, limits, record.x, __ldg(pair.order.normal + g * 32 + lane), certain);
+      const bool possible_still = may_be_inlier(rigid, limits, __ldg(pair.cells.word + cell), staged.normal[g * 32 + lane], certain);
       refuted = !possible_still && g >= begin;
       undecided = possible_still && !certain;
     }
     possible -= static_cast<std::uint32_t>(__popc(static_cast<int>(__ballot_sync(~0u, refuted))));
     const unsigned asked = __ballot_sync(~0u, undecided);
-    if (undecided) queue[waiting + static_cast<std::uint32_t>(__popc(static_cast<int>(asked & ((1u << lane) - 1))))] = {g * 32 + lane, cell, record.y};
+    if (undecided) queue[waiting + static_cast<std::uint32_t>(__popc(static_cast<int>(asked & ((1u << lane) - 1))))] = {g * 32 + lane, cell};
     waiting += static_cast<std::uint32_t>(__popc(static_cast<int>(asked)));
     if (waiting >= 32) {
       settle(32);
@@ -166,7 +159,7 @@ __global__ void __launch_bounds__(kProbeThreads) probe(ScoreBatch b) {
       for (std::uint32_t g = 0; g < kProbeGroups; ++g) {
         if (g >= pair.order.groups) break;
         const std::uint32_t cell = motion.locate(__ldg(pair.order.point + g * 32 + lane), pair.cells.block);
-        possible += may_be_inlier(rigid, limits + pair.limits * 256, __ldg(&pair.cells.record[cell].x),
+        possible += may_be_inlier(rigid, limits + pair.limits * 256, __ldg(pair.cells.word + cell),
                                   __ldg(pair.order.normal + g * 32 + lane), certain);
       }
       possible = warp_sum(possible);
@@ -181,28 +174,63 @@ __global__ void __launch_bounds__(kProbeThreads) probe(ScoreBatch b) {
   }
 }
 
-/// A thread block per leader counts its inliers: what the others must beat.
-__global__ void __launch_bounds__(kProbeThreads) score_leaders(ScoreBatch b) {
+/// Inliers of one hypothesis by a whole thread block: the paper's way, one block per hypothesis and a parallel reduction. Thread 0 gets it.
+__device__ std::uint32_t count_by_block(const ScoreBatch& b, const ScorePair& pair, const Limits* limits, const Pose<float>& pose) {
   __shared__ std::uint32_t inliers;
+  __syncthreads();
+  if (threadIdx.x == 0) inliers = 0;
+  __syncthreads();
+  const Rigid rigid = to_rigid(pose);
+  std::uint32_t mine = 0;
+  if (pair.cells.nx > 0) {
+    const CellMotion motion(rigid, pair.cells);
+    for (std::uint32_t k = threadIdx.x; k < pair.order.groups * 32; k += blockDim.x) {
+      const float4 point = __ldg(pair.order.point + k);
+      const std::uint32_t cell = motion.locate(point, pair.cells.block), word = __ldg(pair.cells.word + cell);
+      if (word == 0) continue;
+      const std::uint32_t normal = __ldg(pair.order.normal + k);
+      bool certain;
+      if (!may_be_inlier(rigid, limits, word, normal, certain)) continue;
+      mine += certain || is_inlier(pair, b.test, rigid, point, normal, k, cell);
+    }
+  } else {
+    for (std::uint32_t i = threadIdx.x; i < pair.source.size; i += blockDim.x) {
+      const Closest found = find_closest(pair.target.closest, pair.target.points, apply(rigid, pair.source.points[i]), b.test.max_squared);
+      mine += found.index != kNoValue &&
+              normals_agree(rotate(rigid, pair.source.normals[i]), pair.target.normals[found.index], b.test.min_cosine);
+    }
+  }
+  mine = warp_sum(mine);
+  if (threadIdx.x % 32 == 0 && mine > 0) atomicAdd(&inliers, mine);
+  __syncthreads();
+  return inliers;
+}
+
+/// What the leaders reach the others must beat.
+__global__ void __launch_bounds__(kProbeThreads) score_leaders(ScoreBatch b) {
+  __shared__ Limits limits[512];
   const std::uint32_t p = blockIdx.x / kLeaders;
   const unsigned long long leader = b.leaders[blockIdx.x];
   if (leader == 0) return;
-  if (threadIdx.x == 0) inliers = 0;
-  __syncthreads();
+  load_limits(b.limits, limits);
   const ScorePair& pair = b.pairs[p];
-  const Rigid rigid = to_rigid(b.poses[b.offset[p] + ~static_cast<std::uint32_t>(leader)]);
-  const CellMotion motion(rigid, pair.cells);
-  std::uint32_t mine = 0;
-  for (std::uint32_t k = threadIdx.x; k < pair.order.groups * 32; k += kProbeThreads) {
-    const float4 point = __ldg(pair.order.point + k);
-    const std::uint32_t cell = motion.locate(point, pair.cells.block);
-    const uint2 record = __ldg(pair.cells.record + cell);
-    mine += record.x != 0 && is_inlier(pair, b.test, rigid, point, __ldg(pair.order.normal + k), cell, record.y);
-  }
-  mine = warp_sum(mine);
-  if (threadIdx.x % 32 == 0) atomicAdd(&inliers, mine);
-  __syncthreads();
+  const std::uint32_t inliers = count_by_block(b, pair, limits + pair.limits * 256, b.poses[b.offset[p] + ~static_cast<std::uint32_t>(leader)]);
   if (threadIdx.x == 0 && inliers > 0) atomicMax(b.most + p, inliers);
+}
+
+/// A thread block per hypothesis: the shortest way through a few of them, as no warp walks over a whole cloud.
+__global__ void __launch_bounds__(kProbeThreads) score_by_block(ScoreBatch b) {
+  __shared__ Limits limits[512];
+  load_limits(b.limits, limits);
+  const std::uint32_t total = b.offset[b.pair_count];
+  for (std::uint32_t h = blockIdx.x; h < total; h += gridDim.x) {
+    const std::uint32_t p = entry_of(b.offset, b.pair_count, h);
+    const ScorePair& pair = b.pairs[p];
+    const std::uint32_t inliers = b.valid[h] ? count_by_block(b, pair, limits + pair.limits * 256, b.poses[h]) : 0;
+    if (threadIdx.x != 0) continue;
+    b.inliers[h] = inliers;
+    if (inliers > 0) atomicMax(b.most + p, inliers);
+  }
 }
 
 template <typename Block>
@@ -230,7 +258,8 @@ __device__ void score_slice(const ScoreBatch& b, const Slice& slice, const Limit
 __global__ void __launch_bounds__(kThreads, 1) score_slices(ScoreBatch b, const Slice* slices, std::uint32_t count, std::uint32_t point_room,
                                                             std::uint32_t block_room) {
   extern __shared__ float4 shared_points[];
-  std::uint8_t* shared_rows = reinterpret_cast<std::uint8_t*>(shared_points + point_room);
+  std::uint32_t* shared_normals = reinterpret_cast<std::uint32_t*>(shared_points + point_room);
+  std::uint8_t* shared_rows = reinterpret_cast<std::uint8_t*>(shared_normals + point_room);
   std::uint16_t* shared_blocks = reinterpret_cast<std::uint16_t*>(shared_rows + kThreads / 32 * kWarpBytes);
   __shared__ Limits limits[512];
   __shared__ std::uint32_t taken, next;
@@ -251,16 +280,16 @@ __global__ void __launch_bounds__(kThreads, 1) score_slices(ScoreBatch b, const 
     const std::uint32_t points = pair.order.groups * 32;
     const std::uint32_t blocks = static_cast<std::uint32_t>(pair.cells.nx * pair.cells.ny * pair.cells.nz);
     if (points > point_room || blocks > block_room) {
-      score_slice(b, slice, limits, Staged<std::int32_t>{pair.order.point, pair.cells.block}, rows, queue, &next);
+      score_slice(b, slice, limits, Staged<std::int32_t>{pair.order.point, pair.order.normal, pair.cells.block}, rows, queue, &next);
       continue;
     }
     if (loaded != slice.pair) {
-      for (std::uint32_t k = threadIdx.x; k < points; k += kThreads) shared_points[k] = pair.order.point[k];
+      for (std::uint32_t k = threadIdx.x; k < points; k += kThreads) shared_points[k] = pair.order.point[k], shared_normals[k] = pair.order.normal[k];
       for (std::uint32_t k = threadIdx.x; k < blocks; k += kThreads) shared_blocks[k] = static_cast<std::uint16_t>(pair.cells.block[k]);
       loaded = slice.pair;
       __syncthreads();
     }
-    score_slice(b, slice, limits, Staged<std::uint16_t>{shared_points, shared_blocks}, rows, queue, &next);
+    score_slice(b, slice, limits, Staged<std::uint16_t>{shared_points, shared_normals, shared_blocks}, rows, queue, &next);
   }
 }
 
@@ -316,6 +345,11 @@ DeviceBuffer<BestPose> score_hypotheses(Exec& exec, Span<const PairView> pairs, 
                          directions_on_device.data(), level_thresholds(options.max_normal_angle), possible.data(), inliers.data(), leaders.data(), most.data(), next.data()};
   if (total > 0) {
     const unsigned processors = static_cast<unsigned>(exec.multiprocessors());
+    if (total <= processors * kByBlock) {
+      score_by_block<<<std::min(total, processors * 8), kProbeThreads, 0, exec.stream()>>>(batch);
+      check_launch("score_by_block");
+      return select_best(exec, batch, total);
+    }
     probe<<<std::min(blocks_for(static_cast<std::size_t>(total) * 32, kProbeThreads), processors * 8), kProbeThreads, 0, exec.stream()>>>(batch);
     check_launch("probe");
     score_leaders<<<count * kLeaders, kProbeThreads, 0, exec.stream()>>>(batch);
@@ -332,8 +366,8 @@ DeviceBuffer<BestPose> score_hypotheses(Exec& exec, Span<const PairView> pairs, 
     const std::uint32_t block_room = std::min(most_blocks, kSharedBlocks);
     const std::size_t fixed = kThreads / 32 * kWarpBytes + block_room * sizeof(std::uint16_t) + 8192;
     const std::uint32_t point_room =
-        std::min(most_points, static_cast<std::uint32_t>(exec.shared_bytes_per_block() > fixed ? (exec.shared_bytes_per_block() - fixed) / sizeof(float4) : 0));
-    const std::size_t bytes = point_room * sizeof(float4) + kThreads / 32 * kWarpBytes + block_room * sizeof(std::uint16_t);
+        std::min(most_points, static_cast<std::uint32_t>(exec.shared_bytes_per_block() > fixed ? (exec.shared_bytes_per_block() - fixed) / kPointBytes / 32 * 32 : 0));
+    const std::size_t bytes = point_room * kPointBytes + kThreads / 32 * kWarpBytes + block_room * sizeof(std::uint16_t);
     check(cudaFuncSetAttribute(score_slices, cudaFuncAttributeMaxDynamicSharedMemorySize, static_cast<int>(bytes)), "cudaFuncSetAttribute");
     score_slices<<<std::min(static_cast<unsigned>(slices.size()), processors), kThreads, bytes, exec.stream()>>>(
         batch, slices_on_device.data(), static_cast<std::uint32_t>(slices.size()), point_room, block_room);

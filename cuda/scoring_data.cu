@@ -50,10 +50,10 @@ __global__ void summarize(const Slot* slots, const DirectionTables* tables) {
     const Cell c{block.x * 8 + (cell & 7), block.y * 8 + ((cell >> 3) & 7), block.z * 8 + (cell >> 6)};
     const Span<const std::uint32_t> candidates{s.view.closest.candidates.data + start[0], start[1] - start[0]};
     const bool empty = candidates.size == 0;
-    const std::uint32_t word =
-        empty ? 0u : summarize_cell(candidates, cell_center(c, s.geometry.cell_size), s.geometry, s.view.points, s.view.normals);
     const bool short_list = candidates.size < 256 && start[0] < (1u << 24);
-    s.summaries.record[kCells + k] = make_uint2(word, short_list ? start[0] << 8 | static_cast<std::uint32_t>(candidates.size) : kNoValue);
+    s.summaries.word[kCells + k] =
+        empty ? 0u : summarize_cell(candidates, cell_center(c, s.geometry.cell_size), s.geometry, s.view.points, s.view.normals);
+    s.summaries.list[kCells + k] = short_list ? start[0] << 8 | static_cast<std::uint32_t>(candidates.size) : kNoValue;
     s.summaries.code[kCells + k] = empty ? std::uint8_t(0) : code_of_cell(*tables, candidates, s.view.normals);
   }
 }
@@ -95,15 +95,16 @@ __global__ void write_order(const Slot* slots, const std::uint32_t* index, const
     const std::uint32_t from = static_cast<std::uint32_t>(static_cast<std::uint64_t>(k / 32) * s.group_step % s.order.groups) * 32 + k % 32;
     const float nan = __uint_as_float(0x7fc00000u);
     float4 point = make_float4(nan, nan, nan, __uint_as_float(kClassNone * 16));
-    float4 normal = make_float4(0, 0, 0, __uint_as_float(kNoValue));
+    std::uint32_t normal = kPackedZero, i = kNoValue;
     if (from < s.view.size) {
-      const std::uint32_t i = index[s.point_offset + from];
+      i = index[s.point_offset + from];
       const Vec3 p = s.view.points[i], n = s.view.normals[i];
       point = make_float4(p.x, p.y, p.z, __uint_as_float(class_of_normal(*tables, n) * 16));
-      normal = make_float4(n.x, n.y, n.z, __uint_as_float(i));
+      normal = pack_normal(n);
     }
     s.order.point[k] = point;
     s.order.normal[k] = normal;
+    s.order.index[k] = i;
   }
 }
 
@@ -123,10 +124,12 @@ ScoringLayout scoring_layout(const CudaCloud& cloud, const CellRange& blocks) {
   };
   const std::size_t padded = (cloud.size + 31) / 32 * 32;
   l.table = take(fits ? nx * ny * nz * sizeof(std::int32_t) : 0);
-  l.records = take(fits ? (std::size_t(cloud.block_count) + 1) * kCells * sizeof(uint2) : 0);
+  l.words = take(fits ? (std::size_t(cloud.block_count) + 1) * kCells * sizeof(std::uint32_t) : 0);
+  l.lists = take(fits ? (std::size_t(cloud.block_count) + 1) * kCells * sizeof(std::uint32_t) : 0);
   l.candidates = take(cloud.candidate_count * sizeof(float4));
   l.points = take(padded * sizeof(float4));
-  l.normals = take(padded * sizeof(float4));
+  l.normals = take(padded * sizeof(std::uint32_t));
+  l.index = take(padded * sizeof(std::uint32_t));
   l.codes = take(fits ? (std::size_t(cloud.block_count) + 1) * kCells : 0);
   return l;
 }
@@ -137,11 +140,13 @@ void place_scoring_data(const ScoringLayout& l, const ClosestGeometry& geometry,
   v.offset = {-static_cast<float>(l.first_block.x) * 8.0f, -static_cast<float>(l.first_block.y) * 8.0f, -static_cast<float>(l.first_block.z) * 8.0f};
   v.nx = l.nx, v.ny = l.ny, v.nz = l.nz;
   v.block = reinterpret_cast<std::int32_t*>(memory + l.table);
-  v.record = reinterpret_cast<uint2*>(memory + l.records);
+  v.word = reinterpret_cast<std::uint32_t*>(memory + l.words);
+  v.list = reinterpret_cast<std::uint32_t*>(memory + l.lists);
   v.candidate = reinterpret_cast<float4*>(memory + l.candidates);
   cloud.order.groups = (cloud.size + 31) / 32;
   cloud.order.point = reinterpret_cast<float4*>(memory + l.points);
-  cloud.order.normal = reinterpret_cast<float4*>(memory + l.normals);
+  cloud.order.normal = reinterpret_cast<std::uint32_t*>(memory + l.normals);
+  cloud.order.index = reinterpret_cast<std::uint32_t*>(memory + l.index);
   v.code = reinterpret_cast<std::uint8_t*>(memory + l.codes);
 }
 
@@ -153,7 +158,8 @@ void fill_scoring_data(Exec& exec, const std::vector<std::shared_ptr<CudaCloud>>
     const CellSummaries& v = cloud.summaries;
     if (v.nx > 0) {
       check(cudaMemsetAsync(v.block, 0, static_cast<std::size_t>(v.nx) * v.ny * v.nz * sizeof(std::int32_t), exec.stream()), "cudaMemsetAsync");
-      check(cudaMemsetAsync(v.record, 0, kCells * sizeof(uint2), exec.stream()), "cudaMemsetAsync");
+      check(cudaMemsetAsync(v.word, 0, kCells * sizeof(std::uint32_t), exec.stream()), "cudaMemsetAsync");
+      check(cudaMemsetAsync(v.list, 0, kCells * sizeof(std::uint32_t), exec.stream()), "cudaMemsetAsync");
       check(cudaMemsetAsync(v.code, 0, kCells, exec.stream()), "cudaMemsetAsync");
     }
     const std::uint32_t groups = cloud.order.groups;

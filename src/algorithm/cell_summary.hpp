@@ -13,9 +13,9 @@ namespace gpureg {
 constexpr double kSummaryAngleStep = 1.5;
 constexpr int kSummaryNoBound = 127;
 /// Rounding a unit vector to steps of 1/127 turns it by less than this many degrees, and changes its length by less than this part; a
-/// little more, for moved normals that are kept in half precision.
+/// little more, for moved normals that are kept in 30 bits.
 constexpr double kSummaryQuantisation = 0.6;
-constexpr double kSummaryStretch = 0.0075;
+constexpr double kSummaryStretch = 0.009;
 constexpr double kDegrees = 3.14159265358979323846 / 180.0;
 
 /// True where all of the cell lies within the search distance of p.

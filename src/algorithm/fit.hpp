@@ -30,15 +30,17 @@ GPUREG_HD bool fit_rigid(const Vec3 (&p)[4], const Vec3 (&q)[4], Pose<float>& po
   n[1][3] = n[3][1] = s[2][0] + s[0][2];
   n[2][3] = n[3][2] = s[1][2] + s[2][1];
   jacobi_eigen<4, 6>(n, v);
-  int hi = 0;
-  for (int k = 1; k < 4; ++k)
-    if (n[k][k] > n[hi][hi]) hi = k;
-  float second = -3.402823466e38f;
-  for (int k = 0; k < 4; ++k)
-    if (k != hi && n[k][k] > second) second = n[k][k];
+  // By comparison, not by index: an array that is indexed at run time lives in memory on the GPU.
+  float largest = n[0][0], second = -3.402823466e38f;
+  float w = v[0][0], x = v[1][0], y = v[2][0], z = v[3][0];
+  for (int k = 1; k < 4; ++k) {
+    const bool more = n[k][k] > largest;
+    second = more ? largest : (n[k][k] > second ? n[k][k] : second);
+    largest = more ? n[k][k] : largest;
+    w = more ? v[0][k] : w, x = more ? v[1][k] : x, y = more ? v[2][k] : y, z = more ? v[3][k] : z;
+  }
   // Collinear points leave the turn about their line open: the two largest eigenvalues meet.
-  if (!(n[hi][hi] > 0.0f) || !(n[hi][hi] - second > 1e-4f * n[hi][hi])) return false;
-  const float w = v[0][hi], x = v[1][hi], y = v[2][hi], z = v[3][hi];
+  if (!(largest > 0.0f) || !(largest - second > 1e-4f * largest)) return false;
   const float length = sqrtf(fmaf(w, w, fmaf(x, x, fmaf(y, y, z * z))));
   pose.w = w / length, pose.x = x / length, pose.y = y / length, pose.z = z / length;
   pose.tx = pose.ty = pose.tz = 0.0f;
