@@ -3,6 +3,9 @@
 
 #include <sys/resource.h>
 
+#include <fstream>
+#include <string>
+
 namespace gpureg::cli {
 
 Json to_json(const Eigen::Ref<const Eigen::MatrixXd>& matrix) {
@@ -67,6 +70,11 @@ Json environment(const Context& context) {
 }
 
 double peak_memory_mib() {
+  // getrusage also counts the program that started this one, from before exec: a script that holds a
+  // gigabyte would be reported as ours.
+  std::ifstream status("/proc/self/status");
+  for (std::string key; status >> key; std::getline(status, key))
+    if (double kib = 0; key == "VmHWM:" && status >> kib) return kib / 1024.0;
   rusage usage{};
   getrusage(RUSAGE_SELF, &usage);
   return static_cast<double>(usage.ru_maxrss) / 1024.0;  // Linux counts in KiB

@@ -7,21 +7,23 @@ Open3D gets its own preparation (voxels of 5 cm, normals from 10 cm, FPFH from 2
 preset (4,000,000 hypotheses) through its command; its time is that of all stages of a prepared pair. The two take turns in blocks of
 pairs, so that a busy machine slows both.
 
-usage: open3d_ransac.py FRAGMENTS_DIR --gpureg build/cpu/bin/gpureg [--blocks 5] [--json FILE]
+Afterwards the command registers all pairs at once, which gives its peak memory.
+usage: open3d_ransac.py [--blocks 5] [--backend cpu] [--scene redkitchen/fragments] [--data DIR] [-o FILE]
 Needs Python 3 with open3d (Debian: python3-open3d).
 """
-import argparse
 import json
-import os
 import pathlib
-import subprocess
+import sys
 import tempfile
 import time
 
 import numpy as np
 import open3d as o3d
 
-VOXEL, DISTANCE = 0.05, 0.075
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "accuracy"))
+import record  # noqa: E402
+
+VOXEL, DISTANCE, ITERATIONS = 0.05, 0.075, 400_000
 
 
 def prepare(path):
@@ -40,24 +42,46 @@ def register(source, target):
     result = registration.registration_ransac_based_on_feature_matching(
         source[0], target[0], source[1], target[1], False, DISTANCE, registration.TransformationEstimationPointToPoint(False), 4,
         [registration.CorrespondenceCheckerBasedOnEdgeLength(0.9), registration.CorrespondenceCheckerBasedOnDistance(DISTANCE)],
-        registration.RANSACConvergenceCriteria(400000, 0.999))
+        registration.RANSACConvergenceCriteria(ITERATIONS, 0.999))
     return result, time.perf_counter() - begin
 
 
-def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("fragments", type=pathlib.Path)
-    parser.add_argument("--gpureg", required=True, type=pathlib.Path)
-    parser.add_argument("--blocks", type=int, default=5)
-    parser.add_argument("--json", type=pathlib.Path)
-    arguments = parser.parse_args()
+def block_of_pairs(arguments, folder, temporary, part):
+    """gpureg's report on some pairs of the folder; None: on all of them."""
+    words = []
+    if part is not None:
+        (temporary / "pairs.txt").write_text("".join(f"{i} {j}\n" for i, j in part))
+        words = ["--pairs", temporary / "pairs.txt"]
+    record.gpureg(arguments, "batch", folder, "--preset", "loopsmart", "--backend", arguments.backend, "--quiet", *words,
+                  "-o", temporary / "result.log", "--json", temporary / "result.json")
+    return json.loads((temporary / "result.json").read_text())
 
-    count = len(list(arguments.fragments.glob("cloud_bin_*.ply")))
-    clouds = [prepare(arguments.fragments / f"cloud_bin_{i}.ply") for i in range(count)]
+
+def scores(arguments, folder, temporary, result):
+    output = temporary / "scores.json"
+    record.gpureg(arguments, "evaluate", result, "--ground-truth", folder, "--json", output)
+    strict = json.loads(output.read_text())["scenes"][0]["strict"]
+    return {key: strict[key] for key in ("good", "ground_truth", "reported", "recall", "precision")}
+
+
+def times(milliseconds, points):
+    return {"ms_mean": float(np.mean(milliseconds)), "ms_median": float(np.median(milliseconds)), "points_mean": float(np.mean(points))}
+
+
+def main():
+    parser = record.parser(__doc__, "open3d_ransac.json")
+    parser.set_defaults(backend="cpu")
+    parser.add_argument("--scene", default="redkitchen/fragments", help="a folder of the data with fragments and their ground truth")
+    parser.add_argument("--blocks", type=int, default=5)
+    arguments = parser.parse_args()
+    folder = record.data_folder(arguments, arguments.scene)
+
+    count = len(list(folder.glob("cloud_bin_*.ply")))
+    clouds = [prepare(folder / f"cloud_bin_{i}.ply") for i in range(count)]
     pairs = [(i, j) for i in range(count) for j in range(i + 1, count)]
-    ours, theirs, log, entries = [], [], [], []
-    with tempfile.TemporaryDirectory() as folder:
-        folder = pathlib.Path(folder)
+    ours, theirs, log = [], [], []
+    with tempfile.TemporaryDirectory() as temporary:
+        temporary = pathlib.Path(temporary)
         for block in np.array_split(np.arange(len(pairs)), arguments.blocks):
             part = [pairs[k] for k in block]
             for i, j in part:
@@ -66,27 +90,27 @@ def main():
                 rows = "\n".join("\t".join(f"{v:.10f}" for v in row) for row in result.transformation)
                 if result.fitness >= 0.3:
                     log.append(f"{i}\t{j}\t{count}\n{rows}\n")
-            (folder / "pairs.txt").write_text("".join(f"{i} {j}\n" for i, j in part))
-            subprocess.run([arguments.gpureg, "batch", arguments.fragments, "--preset", "loopsmart", "--backend", "cpu", "--quiet", "--pairs",
-                            folder / "pairs.txt", "-o", folder / "part.log", "--json", folder / "part.json"], check=True)
-            report = json.loads((folder / "part.json").read_text())
-            ours += [sum(pair["ms"].values()) for pair in report["pairs"]]
-            entries += report["pairs"]
-        report["pairs"] = entries
-        (folder / "gpureg.json").write_text(json.dumps(report))
-        (folder / "open3d.log").write_text("".join(log))
-        for name, result in (("Open3D, fitness >= 0.30", "open3d.log"), ("gpureg, inlier ratio >= 0.30", "gpureg.json")):
-            print(f"--- {name}", flush=True)
-            subprocess.run([arguments.gpureg, "evaluate", folder / result, "--ground-truth", arguments.fragments], check=True)
-    summary = {
-        "fragments": str(arguments.fragments.name), "pairs": len(pairs), "cpus": os.cpu_count(), "open3d": o3d.__version__,
-        "open3d_ms": {"mean": float(np.mean(theirs)), "median": float(np.median(theirs))},
-        "gpureg_ms": {"mean": float(np.mean(ours)), "median": float(np.median(ours))},
-        "ratio_of_means": float(np.mean(ours) / np.mean(theirs)),
-    }
-    print(f"time per prepared pair, mean: Open3D {np.mean(theirs):.1f} ms, gpureg {np.mean(ours):.1f} ms, ratio {summary['ratio_of_means']:.3f}")
-    if arguments.json:
-        arguments.json.write_text(json.dumps(summary, indent=1) + "\n")
+            report = block_of_pairs(arguments, folder, temporary, part)
+            ours += [pair["ms"]["total"] for pair in report["pairs"]]
+        report = block_of_pairs(arguments, folder, temporary, None)
+        memory = report["peak_memory_mib"]
+        (temporary / "open3d.log").write_text("".join(log))
+        ratio = float(np.mean(ours) / np.mean(theirs))
+        content = {
+            "environment": report["environment"], "scene": arguments.scene, "pairs": len(pairs), "ratio_of_means": ratio,
+            "gpureg": {**times(ours, [fragment["points"] for fragment in report["fragments"]]), "peak_memory_mib": round(memory),
+                       "hypotheses": report["options"]["hypothesis"]["count"],
+                       **scores(arguments, folder, temporary, temporary / "result.json")},
+            "open3d": {"version": o3d.__version__, **times(theirs, [len(cloud.points) for cloud, _ in clouds]), "iterations": ITERATIONS,
+                       **scores(arguments, folder, temporary, temporary / "open3d.log")},
+        }
+    for name in ("open3d", "gpureg"):
+        own = content[name]
+        print(f"{name}: {own['ms_mean']:.1f} ms per prepared pair (median {own['ms_median']:.1f}), recall {100 * own['recall']:.1f} % at precision "
+              f"{100 * own['precision']:.1f} %, {own['points_mean']:.0f} points per cloud")
+    print(f"{len(pairs)} pairs; gpureg takes {ratio:.3f} of Open3D's time; its peak memory is {memory:.0f} MiB")
+    record.write(arguments, f"bench/peers/open3d_ransac.py --blocks {arguments.blocks} --backend {report['environment']['backend']} "
+                 f"--scene {arguments.scene}", content)
 
 
 main()
