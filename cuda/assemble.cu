@@ -36,6 +36,7 @@ struct NormSlot {
   std::uint32_t size, dimension, width;
   float2* out;
   std::uint32_t* tf32;  // null: none
+  float* padded;
 };
 
 /// Rounded to 10 bits of mantissa, as the tensor cores take them; ties away from zero.
@@ -53,9 +54,11 @@ __global__ void measure_features(const NormSlot* slots, Missing* missing) {
     }
     if (!s.valid[i]) sum = __uint_as_float(0x7f800000u);
     s.out[i] = make_float2(sum, sqrtf(sum));
-    for (std::uint32_t d = 0; s.tf32 && d < s.width; ++d)
-      s.tf32[static_cast<std::size_t>(i) * s.width + d] =
-          s.valid[i] && d < s.dimension ? to_tf32(s.features[static_cast<std::size_t>(i) * s.dimension + d]) : 0u;
+    for (std::uint32_t d = 0; s.tf32 && d < s.width; ++d) {
+      const float v = s.valid[i] && d < s.dimension ? s.features[static_cast<std::size_t>(i) * s.dimension + d] : 0.0f;
+      s.tf32[static_cast<std::size_t>(i) * s.width + d] = to_tf32(v);
+      s.padded[static_cast<std::size_t>(i) * s.width + d] = v;
+    }
     extreme += s.valid[i] && !(sum < 1e30f);
   }
   if (extreme > 0) atomicAdd(&missing[blockIdx.y].extreme_features, extreme);
@@ -142,6 +145,8 @@ std::vector<std::shared_ptr<CudaCloud>> assemble(Exec& exec, const DownsampledCl
     const std::size_t tf32 = bytes;
     const std::uint32_t width = filter_width(cloud->feature_dimension);
     bytes += (n * width * sizeof(std::uint32_t) + 255) / 256 * 256;
+    const std::size_t padded = bytes;
+    bytes += (n * width * sizeof(float) + 255) / 256 * 256;
     const std::size_t copied = bytes;
     const ScoringLayout layout = scoring_layout(*cloud, closest.block_range[c]);
     cloud->data = exec.buffer<char>(copied + layout.bytes);
@@ -161,8 +166,12 @@ std::vector<std::shared_ptr<CudaCloud>> assemble(Exec& exec, const DownsampledCl
                     {reinterpret_cast<const std::uint32_t*>(part[6].to), cloud->candidate_count}};
     view.executor_data = cloud.get();
     cloud->feature_norm = reinterpret_cast<float2*>(cloud->data.data() + norms);
-    if (width > 0) cloud->feature_tf32 = reinterpret_cast<std::uint32_t*>(cloud->data.data() + tf32);
-    norm_slots.push_back({view.features, view.has_feature, view.size, view.feature_dimension, width, cloud->feature_norm, cloud->feature_tf32});
+    if (width > 0) {
+      cloud->feature_tf32 = reinterpret_cast<std::uint32_t*>(cloud->data.data() + tf32);
+      cloud->feature_padded = reinterpret_cast<float*>(cloud->data.data() + padded);
+    }
+    norm_slots.push_back({view.features, view.has_feature, view.size, view.feature_dimension, width, cloud->feature_norm, cloud->feature_tf32,
+                          cloud->feature_padded});
     cloud->blocks = reinterpret_cast<const Cell*>(part[7].to);
     place_scoring_data(layout, closest.geometry[c], cloud->data.data() + copied, *cloud);
     out.push_back(std::move(cloud));

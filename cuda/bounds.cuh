@@ -5,6 +5,7 @@
 #include "algorithm/inlier.hpp"
 #include "packed_normal.cuh"
 #include "products.hpp"
+#include "stream_load.cuh"
 
 /// What is known of a moved point before a single target point is looked at.
 namespace gpureg::cuda {
@@ -69,7 +70,7 @@ __device__ inline bool is_inlier(const ScorePair& pair, const InlierTest& test, 
                                  std::uint32_t slot, std::uint32_t cell) {
   constexpr std::uint32_t kCells = ClosestGridView::kBlockCells;
   const Vec3 q = apply(rigid, {p.x, p.y, p.z});
-  const std::uint32_t list = __ldg(pair.cells.list + cell);
+  const std::uint32_t list = load_passing(pair.cells.list + cell);
   std::uint32_t first = list >> 8, last = first + (list & 255u);
   if (list == kNoValue) {
     const std::uint32_t* start = pair.target.closest.cell_start.data + static_cast<std::size_t>(cell / kCells - 1) * (kCells + 1) + cell % kCells;
@@ -79,7 +80,7 @@ __device__ inline bool is_inlier(const ScorePair& pair, const InlierTest& test, 
   std::uint32_t best = kNoValue, best_normal = 0;
   float best_squared = 3.402823466e38f;
   for (std::uint32_t k = first; k < last; ++k) {
-    const float4 c = __ldg(pair.cells.candidate + k);
+    const float4 c = load_passing(pair.cells.candidate + k);
     const float d2 = squared_norm(Vec3{c.x, c.y, c.z} - q);
     const bool less = d2 < best_squared;
     best = less ? k : best;

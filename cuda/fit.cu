@@ -12,16 +12,26 @@ __global__ void __launch_bounds__(128) fit(const std::uint32_t* offset, std::uin
                                            Pose<float>* poses, std::uint8_t* valid, std::uint32_t* valid_count) {
   const std::uint32_t h = blockIdx.x * blockDim.x + threadIdx.x;
   const std::uint32_t p = entry_in_block(offset, pairs, blockIdx.x * blockDim.x, h);
-  if (h >= offset[pairs]) return;
-  const MatchedPoints* m = matches + room[p];
-  const Quadruple q = draw_quadruple(id[h], seed, match_count[p]);
-  Vec3 source[4], target[4];
-  for (int c = 0; c < 4; ++c) source[c] = m[q.match[c]].source, target[c] = m[q.match[c]].target;
-  Pose<float> pose{1, 0, 0, 0, 0, 0, 0};
-  const bool fits = fit_rigid(source, target, pose);
-  poses[h] = pose;
-  valid[h] = fits;
-  if (fits) atomicAdd(&valid_count[p], 1u);
+  const bool there = h < offset[pairs];
+  bool fits = false;
+  if (there) {
+    const MatchedPoints* m = matches + room[p];
+    const Quadruple q = draw_quadruple(id[h], seed, match_count[p]);
+    Vec3 source[4], target[4];
+    for (int c = 0; c < 4; ++c) source[c] = m[q.match[c]].source, target[c] = m[q.match[c]].target;
+    Pose<float> pose{1, 0, 0, 0, 0, 0, 0};
+    fits = fit_rigid(source, target, pose);
+    poses[h] = pose;
+    valid[h] = fits;
+  }
+  // Neighbours mostly belong to one pair: a warp counts for all of them at once.
+  const std::uint32_t first = __shfl_sync(~0u, p, 0);
+  if (__all_sync(~0u, p == first)) {
+    const unsigned fitting = __ballot_sync(~0u, fits);
+    if (threadIdx.x % 32 == 0 && fitting != 0) atomicAdd(&valid_count[p], static_cast<std::uint32_t>(__popc(static_cast<int>(fitting))));
+  } else if (fits) {
+    atomicAdd(&valid_count[p], 1u);
+  }
 }
 
 }  // namespace

@@ -56,7 +56,7 @@ __global__ void __launch_bounds__(1024) collect_matches(MatchBatch m) {
 FeatureQuery query(const CloudView& from, const CloudView& in, std::uint32_t out) {
   const auto &a = *static_cast<const CudaCloud*>(from.executor_data), &b = *static_cast<const CudaCloud*>(in.executor_data);
   return {from.features, from.has_feature, from.size, in.features, in.has_feature, in.size, from.feature_dimension, out,
-          a.feature_norm, b.feature_norm, a.feature_tf32, b.feature_tf32};
+          a.feature_norm, b.feature_norm, a.feature_tf32, b.feature_tf32, a.feature_padded, b.feature_padded};
 }
 
 }  // namespace

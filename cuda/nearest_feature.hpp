@@ -21,6 +21,8 @@ struct FeatureQuery {
   const float2* row_norm;          ///< infinite where the row is not valid
   const std::uint32_t* query_tf32;  ///< see filter_width(); null: not made
   const std::uint32_t* row_tf32;
+  const float* query_padded;        ///< rows as wide, not rounded
+  const float* row_padded;
 };
 
 /// Nearest rows of every query: k indices per query in order of distance (squared norm of the difference as a chain of fmaf over the

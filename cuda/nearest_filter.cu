@@ -47,14 +47,20 @@ __device__ void multiply_add(float (&c)[4], const std::uint32_t (&a)[4], std::ui
 __device__ void multiply_add(float (&)[4], const std::uint32_t (&)[4], std::uint32_t, std::uint32_t) {}
 #endif
 
-/// The distance that everything is about.
+/// The distance that everything is about. The zeros at the end of a row change nothing.
+template <int kWidth>
 __device__ void measure(const FeatureQuery& f, std::uint32_t q, std::uint32_t r, unsigned long long* best) {
-  const float* query = f.queries + static_cast<std::size_t>(q) * f.dimension;
-  const float* row = f.rows + static_cast<std::size_t>(r) * f.dimension;
+  const float4* query = reinterpret_cast<const float4*>(f.query_padded + static_cast<std::size_t>(q) * kWidth);
+  const float4* row = reinterpret_cast<const float4*>(f.row_padded + static_cast<std::size_t>(r) * kWidth);
   float sum = 0.0f;
-  for (std::uint32_t d = 0; d < f.dimension; ++d) {
-    const float difference = __ldg(query + d) - __ldg(row + d);
+  const auto add = [&](float a, float b) {
+    const float difference = a - b;
     sum = fmaf(difference, difference, sum);
+  };
+#pragma unroll
+  for (int k = 0; k < kWidth / 4; ++k) {
+    const float4 a = __ldg(query + k), b = __ldg(row + k);
+    add(a.x, b.x), add(a.y, b.y), add(a.z, b.z), add(a.w, b.w);
   }
   if (!(sum < __uint_as_float(0x7f800000u))) return;
   const unsigned long long found = static_cast<unsigned long long>(__float_as_uint(sum)) << 32 | r;
@@ -168,7 +174,7 @@ __global__ void __launch_bounds__(kThreads, 2) filter(FilterBatch batch) {
       if (waiting >= 32 || last) {
         for (std::uint32_t k = static_cast<std::uint32_t>(lane); k < waiting; k += 32) {
           const std::uint32_t entry = queue[warp][k];
-          measure(f, q_first + (entry >> 27), r_first + (entry & 0x7ffffffu), batch.best);
+          measure<kWidth>(f, q_first + (entry >> 27), r_first + (entry & 0x7ffffffu), batch.best);
         }
         __syncwarp();
         if (lane == 0) queued[warp] = 0;

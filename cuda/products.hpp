@@ -95,6 +95,7 @@ struct CudaCloud : PreparedState {
   CellSummaries summaries;
   ScoringOrder order;
   float2* feature_norm = nullptr;            ///< squared length and length of each feature; infinite where it is not to be matched
+  float* feature_padded = nullptr;           ///< rows as wide as those of feature_tf32, filled up with zeros
   std::uint32_t* feature_tf32 = nullptr;     ///< see nearest_feature.hpp; null where the dimension or a length (over 1e15) forbids it
   std::vector<Vec3> copy_points() const override;
   std::vector<Vec3> copy_normals() const override;

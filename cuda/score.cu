@@ -114,7 +114,7 @@ __device__ std::uint32_t count_inliers(const ScoreBatch& b, const ScorePair& pai
     bool refuted = false, undecided = false;
     if (counted) {
       bool certain;
-      const bool possible_still = may_be_inlier(rigid, limits, __ldg(pair.cells.word + cell), staged.normal[g * 32 + lane], certain);
+      const bool possible_still = may_be_inlier(rigid, limits, load_passing(pair.cells.word + cell), staged.normal[g * 32 + lane], certain);
       refuted = !possible_still && g >= begin;
       undecided = possible_still && !certain;
     }
