@@ -5,7 +5,6 @@
 #include "algorithm/inlier.hpp"
 #include "packed_normal.cuh"
 #include "products.hpp"
-#include "stream_load.cuh"
 
 /// What is known of a moved point before a single target point is looked at.
 namespace gpureg::cuda {
@@ -20,6 +19,14 @@ struct ScorePair {
 
 struct Limits {
   float none_below, all_above;
+};
+
+struct CellInBlock {
+  std::uint32_t block, x, y, z;
+  /// Of the closest-point grid.
+  __device__ std::uint32_t cell() const { return block << 9 | (z & 7) << 6 | (y & 7) << 3 | (x & 7); }
+  /// Of the codes, twice as wide.
+  __device__ std::uint32_t wide_cell() const { return block << 6 | (z & 6) << 3 | (y & 6) << 1 | (x & 6) >> 1; }
 };
 
 /// The motion in units of the target's cells. Rounding may differ from apply() by a small part of a cell, which the margin of the
@@ -38,19 +45,20 @@ struct CellMotion {
     t[2] = fmaf(pose.t[2], v.inverse_cell_size, v.offset.z - 0.5f);
   }
 
-  /// Index of the cell that a moved point falls into; below 512, an empty one, where there is no block (NaN too). blocks: the cloud's
-  /// table or a copy of it.
+  /// Block that a moved point falls into, 0 where there is none (NaN too), and its place in the block. blocks: the cloud's table or a copy
+  /// of it.
   template <typename Block>
-  __device__ std::uint32_t locate(float4 p, const Block* blocks) const {
+  __device__ CellInBlock locate(float4 p, const Block* blocks) const {
     // Adding 1.5 * 2^23 leaves the rounded coordinate in the low bits: full speed, unlike a conversion. What is too large for it has
     // other high bits and is outside.
     constexpr float kMagic = 12582912.0f;
-    const std::uint32_t x = __float_as_uint(fmaf(r[2], p.z, fmaf(r[1], p.y, fmaf(r[0], p.x, t[0]))) + kMagic) - 0x4b400000u;
-    const std::uint32_t y = __float_as_uint(fmaf(r[5], p.z, fmaf(r[4], p.y, fmaf(r[3], p.x, t[1]))) + kMagic) - 0x4b400000u;
-    const std::uint32_t z = __float_as_uint(fmaf(r[8], p.z, fmaf(r[7], p.y, fmaf(r[6], p.x, t[2]))) + kMagic) - 0x4b400000u;
-    const std::uint32_t bx = x >> 3, by = y >> 3, bz = z >> 3;
-    if (bx >= nx || by >= ny || bz >= nz) return 0;
-    return static_cast<std::uint32_t>(blocks[(bz * ny + by) * nx + bx]) << 9 | (z & 7) << 6 | (y & 7) << 3 | (x & 7);
+    CellInBlock c;
+    c.x = __float_as_uint(fmaf(r[2], p.z, fmaf(r[1], p.y, fmaf(r[0], p.x, t[0]))) + kMagic) - 0x4b400000u;
+    c.y = __float_as_uint(fmaf(r[5], p.z, fmaf(r[4], p.y, fmaf(r[3], p.x, t[1]))) + kMagic) - 0x4b400000u;
+    c.z = __float_as_uint(fmaf(r[8], p.z, fmaf(r[7], p.y, fmaf(r[6], p.x, t[2]))) + kMagic) - 0x4b400000u;
+    const std::uint32_t bx = c.x >> 3, by = c.y >> 3, bz = c.z >> 3;
+    c.block = bx < nx && by < ny && bz < nz ? static_cast<std::uint32_t>(blocks[(bz * ny + by) * nx + bx]) : 0u;
+    return c;
   }
 };
 
@@ -70,7 +78,7 @@ __device__ inline bool is_inlier(const ScorePair& pair, const InlierTest& test, 
                                  std::uint32_t slot, std::uint32_t cell) {
   constexpr std::uint32_t kCells = ClosestGridView::kBlockCells;
   const Vec3 q = apply(rigid, {p.x, p.y, p.z});
-  const std::uint32_t list = load_passing(pair.cells.list + cell);
+  const std::uint32_t list = __ldg(pair.cells.list + cell);
   std::uint32_t first = list >> 8, last = first + (list & 255u);
   if (list == kNoValue) {
     const std::uint32_t* start = pair.target.closest.cell_start.data + static_cast<std::size_t>(cell / kCells - 1) * (kCells + 1) + cell % kCells;
@@ -80,7 +88,7 @@ __device__ inline bool is_inlier(const ScorePair& pair, const InlierTest& test, 
   std::uint32_t best = kNoValue, best_normal = 0;
   float best_squared = 3.402823466e38f;
   for (std::uint32_t k = first; k < last; ++k) {
-    const float4 c = load_passing(pair.cells.candidate + k);
+    const float4 c = __ldg(pair.cells.candidate + k);
     const float d2 = squared_norm(Vec3{c.x, c.y, c.z} - q);
     const bool less = d2 < best_squared;
     best = less ? k : best;

@@ -14,6 +14,7 @@ constexpr int kThreads = 768;
 constexpr std::uint32_t kUnroll = 4;        // groups in flight per warp
 constexpr std::size_t kRowBytes = 64 * 16;  // of the table of compatible levels
 constexpr std::size_t kPointBytes = sizeof(float4) + sizeof(std::uint32_t);
+constexpr std::uint32_t kSharedCodes = 72 << 10;   // bytes of the largest codes that are copied
 constexpr std::uint32_t kSharedBlocks = 24 << 10;  // entries of the largest block table that is copied
 
 /// Hypotheses [begin, end) of one pair.
@@ -34,22 +35,22 @@ struct Staged {
   const float4* point;
   const std::uint32_t* normal;
   const Block* blocks;
+  const std::uint8_t* codes;
 };
 
 /// Groups [begin, begin + N): how many of this lane's points may be inliers, by the code of their cell. rows: levels that each class of
 /// normals needs, in shared memory.
 template <std::uint32_t N, typename Block>
-__device__ std::uint32_t count_possible(const CellMotion& motion, const Staged<Block>& staged, const std::uint8_t* codes, const std::uint8_t* rows,
-                                        std::uint32_t begin) {
+__device__ std::uint32_t count_possible(const CellMotion& motion, const Staged<Block>& staged, const std::uint8_t* rows, std::uint32_t begin) {
   const std::uint32_t lane = threadIdx.x % 32;
   float4 p[N];
   std::uint32_t code[N];
 #pragma unroll
   for (std::uint32_t k = 0; k < N; ++k) p[k] = staged.point[(begin + k) * 32 + lane];
 #pragma unroll
-  for (std::uint32_t k = 0; k < N; ++k) code[k] = motion.locate(p[k], staged.blocks);
+  for (std::uint32_t k = 0; k < N; ++k) code[k] = motion.locate(p[k], staged.blocks).wide_cell();
 #pragma unroll
-  for (std::uint32_t k = 0; k < N; ++k) code[k] = __ldg(codes + code[k]);
+  for (std::uint32_t k = 0; k < N; ++k) code[k] = staged.codes[code[k]];
   std::uint32_t possible = 0;
 #pragma unroll
   for (std::uint32_t k = 0; k < N; ++k) possible += (code[k] & 15u) >= rows[__float_as_uint(p[k].w) + (code[k] >> 4)];
@@ -83,14 +84,13 @@ __device__ std::uint32_t count_inliers(const ScoreBatch& b, const ScorePair& pai
   __syncwarp();
   const CellMotion motion(rigid, pair.cells);
   const std::uint32_t groups = pair.order.groups;
-  const std::uint8_t* codes = pair.cells.code;
   std::uint32_t needed = *most, g = begin;
   for (; g + kUnroll <= groups; g += kUnroll) {
     if (possible + (groups - g) * 32 < needed) return 0;
-    possible += warp_sum(count_possible<kUnroll>(motion, staged, codes, rows, g));
+    possible += warp_sum(count_possible<kUnroll>(motion, staged, rows, g));
     if (g % 32 < kUnroll) needed = *most;
   }
-  for (; g < groups; ++g) possible += warp_sum(count_possible<1>(motion, staged, codes, rows, g));
+  for (; g < groups; ++g) possible += warp_sum(count_possible<1>(motion, staged, rows, g));
 
   // Undecided points wait until there is one for every lane.
   std::uint32_t waiting = 0;
@@ -107,20 +107,21 @@ __device__ std::uint32_t count_inliers(const ScoreBatch& b, const ScorePair& pai
   for (g = 0; g < groups; ++g) {
     if (possible < needed) return 0;
     const float4 p = staged.point[g * 32 + lane];
-    const std::uint32_t cell = motion.locate(p, staged.blocks), code = __ldg(codes + cell);
+    const CellInBlock cell = motion.locate(p, staged.blocks);
+    const std::uint32_t code = staged.codes[cell.wide_cell()];
     // The first groups were bounded by summaries already, not by codes.
     const bool counted = (code & 15u) >= rows[__float_as_uint(p.w) + (code >> 4)] || g < begin;
     if (!__any_sync(~0u, counted)) continue;
     bool refuted = false, undecided = false;
     if (counted) {
       bool certain;
-      const bool possible_still = may_be_inlier(rigid, limits, load_passing(pair.cells.word + cell), staged.normal[g * 32 + lane], certain);
+      const bool possible_still = may_be_inlier(rigid, limits, __ldg(pair.cells.word + cell.cell()), staged.normal[g * 32 + lane], certain);
       refuted = !possible_still && g >= begin;
       undecided = possible_still && !certain;
     }
     possible -= static_cast<std::uint32_t>(__popc(static_cast<int>(__ballot_sync(~0u, refuted))));
     const unsigned asked = __ballot_sync(~0u, undecided);
-    if (undecided) queue[waiting + static_cast<std::uint32_t>(__popc(static_cast<int>(asked & ((1u << lane) - 1))))] = {g * 32 + lane, cell};
+    if (undecided) queue[waiting + static_cast<std::uint32_t>(__popc(static_cast<int>(asked & ((1u << lane) - 1))))] = {g * 32 + lane, cell.cell()};
     waiting += static_cast<std::uint32_t>(__popc(static_cast<int>(asked)));
     if (waiting >= 32) {
       settle(32);
@@ -158,7 +159,7 @@ __global__ void __launch_bounds__(kProbeThreads) probe(ScoreBatch b) {
 #pragma unroll
       for (std::uint32_t g = 0; g < kProbeGroups; ++g) {
         if (g >= pair.order.groups) break;
-        const std::uint32_t cell = motion.locate(__ldg(pair.order.point + g * 32 + lane), pair.cells.block);
+        const std::uint32_t cell = motion.locate(__ldg(pair.order.point + g * 32 + lane), pair.cells.block).cell();
         possible += may_be_inlier(rigid, limits + pair.limits * 256, __ldg(pair.cells.word + cell),
                                   __ldg(pair.order.normal + g * 32 + lane), certain);
       }
@@ -186,7 +187,7 @@ __device__ std::uint32_t count_by_block(const ScoreBatch& b, const ScorePair& pa
     const CellMotion motion(rigid, pair.cells);
     for (std::uint32_t k = threadIdx.x; k < pair.order.groups * 32; k += blockDim.x) {
       const float4 point = __ldg(pair.order.point + k);
-      const std::uint32_t cell = motion.locate(point, pair.cells.block), word = __ldg(pair.cells.word + cell);
+      const std::uint32_t cell = motion.locate(point, pair.cells.block).cell(), word = __ldg(pair.cells.word + cell);
       if (word == 0) continue;
       const std::uint32_t normal = __ldg(pair.order.normal + k);
       bool certain;
@@ -256,11 +257,12 @@ __device__ void score_slice(const ScoreBatch& b, const Slice& slice, const Limit
 /// Thread blocks take slices until none is left; in a slice the warps take hypotheses: how long one takes is not known before. The source's
 /// points and the target's block table are in shared memory, so that the cache is left to the target's cells.
 __global__ void __launch_bounds__(kThreads, 1) score_slices(ScoreBatch b, const Slice* slices, std::uint32_t count, std::uint32_t point_room,
-                                                            std::uint32_t block_room) {
+                                                            std::uint32_t block_room, std::uint32_t code_room) {
   extern __shared__ float4 shared_points[];
   std::uint32_t* shared_normals = reinterpret_cast<std::uint32_t*>(shared_points + point_room);
   std::uint8_t* shared_rows = reinterpret_cast<std::uint8_t*>(shared_normals + point_room);
-  std::uint16_t* shared_blocks = reinterpret_cast<std::uint16_t*>(shared_rows + kThreads / 32 * kWarpBytes);
+  std::uint8_t* shared_codes = shared_rows + kThreads / 32 * kWarpBytes;
+  std::uint16_t* shared_blocks = reinterpret_cast<std::uint16_t*>(shared_codes + code_room);
   __shared__ Limits limits[512];
   __shared__ std::uint32_t taken, next;
   load_limits(b.limits, limits);
@@ -279,17 +281,20 @@ __global__ void __launch_bounds__(kThreads, 1) score_slices(ScoreBatch b, const 
     const ScorePair& pair = b.pairs[slice.pair];
     const std::uint32_t points = pair.order.groups * 32;
     const std::uint32_t blocks = static_cast<std::uint32_t>(pair.cells.nx * pair.cells.ny * pair.cells.nz);
-    if (points > point_room || blocks > block_room) {
-      score_slice(b, slice, limits, Staged<std::int32_t>{pair.order.point, pair.order.normal, pair.cells.block}, rows, queue, &next);
+    const std::uint32_t codes = (pair.cells.block_count + 1) * kCodesPerBlock;
+    if (points > point_room || blocks > block_room || codes > code_room) {
+      score_slice(b, slice, limits, Staged<std::int32_t>{pair.order.point, pair.order.normal, pair.cells.block, pair.cells.code}, rows, queue, &next);
       continue;
     }
     if (loaded != slice.pair) {
       for (std::uint32_t k = threadIdx.x; k < points; k += kThreads) shared_points[k] = pair.order.point[k], shared_normals[k] = pair.order.normal[k];
       for (std::uint32_t k = threadIdx.x; k < blocks; k += kThreads) shared_blocks[k] = static_cast<std::uint16_t>(pair.cells.block[k]);
+      for (std::uint32_t k = threadIdx.x; k < codes / 16; k += kThreads)
+        reinterpret_cast<uint4*>(shared_codes)[k] = reinterpret_cast<const uint4*>(pair.cells.code)[k];
       loaded = slice.pair;
       __syncthreads();
     }
-    score_slice(b, slice, limits, Staged<std::uint16_t>{shared_points, shared_normals, shared_blocks}, rows, queue, &next);
+    score_slice(b, slice, limits, Staged<std::uint16_t>{shared_points, shared_normals, shared_blocks, shared_codes}, rows, queue, &next);
   }
 }
 
@@ -357,20 +362,21 @@ DeviceBuffer<BestPose> score_hypotheses(Exec& exec, Span<const PairView> pairs, 
 
     const std::vector<Slice> slices = cut_slices(*hypotheses.segments, processors);
     const auto slices_on_device = exec.upload(slices);
-    std::uint32_t most_points = 0, most_blocks = 0;
+    std::uint32_t most_points = 0, most_blocks = 0, most_codes = 0;
     for (const ScorePair& pair : host_pairs) {
       most_points = std::max(most_points, pair.order.groups * 32);
       most_blocks = std::max(most_blocks, static_cast<std::uint32_t>(pair.cells.nx * pair.cells.ny * pair.cells.nz));
+      most_codes = std::max(most_codes, (pair.cells.block_count + 1) * kCodesPerBlock);
     }
-    // The table numbers blocks with 16 bits; what does not fit stays in global memory.
-    const std::uint32_t block_room = std::min(most_blocks, kSharedBlocks);
-    const std::size_t fixed = kThreads / 32 * kWarpBytes + block_room * sizeof(std::uint16_t) + 8192;
+    // The table numbers blocks with 16 bits. A pair of which something does not fit is read from global memory.
+    const std::uint32_t block_room = std::min(most_blocks, kSharedBlocks), code_room = std::min(most_codes, kSharedCodes);
+    const std::size_t fixed = kThreads / 32 * kWarpBytes + block_room * sizeof(std::uint16_t) + code_room + 8192;
     const std::uint32_t point_room =
         std::min(most_points, static_cast<std::uint32_t>(exec.shared_bytes_per_block() > fixed ? (exec.shared_bytes_per_block() - fixed) / kPointBytes / 32 * 32 : 0));
-    const std::size_t bytes = point_room * kPointBytes + kThreads / 32 * kWarpBytes + block_room * sizeof(std::uint16_t);
+    const std::size_t bytes = point_room * kPointBytes + kThreads / 32 * kWarpBytes + block_room * sizeof(std::uint16_t) + code_room;
     check(cudaFuncSetAttribute(score_slices, cudaFuncAttributeMaxDynamicSharedMemorySize, static_cast<int>(bytes)), "cudaFuncSetAttribute");
     score_slices<<<std::min(static_cast<unsigned>(slices.size()), processors), kThreads, bytes, exec.stream()>>>(
-        batch, slices_on_device.data(), static_cast<std::uint32_t>(slices.size()), point_room, block_room);
+        batch, slices_on_device.data(), static_cast<std::uint32_t>(slices.size()), point_room, block_room, code_room);
     check_launch("score_slices");
   }
   return select_best(exec, batch, total);
