@@ -13,7 +13,7 @@ constexpr std::uint32_t kByBlock = 64;      // hypotheses per multiprocessor up 
 constexpr int kThreads = 768;
 constexpr std::uint32_t kUnroll = 4;        // groups in flight per warp
 constexpr std::size_t kRowBytes = 64 * 16;  // of the table of compatible levels
-constexpr std::size_t kPointBytes = sizeof(float4) + sizeof(std::uint32_t);
+constexpr std::size_t kPointBytes = sizeof(float4) + sizeof(std::uint32_t) + 1;  // and two orders of groups of 32
 constexpr std::uint32_t kSharedCodes = 72 << 10;   // bytes of the largest codes that are copied
 constexpr std::uint32_t kSharedBlocks = 24 << 10;  // entries of the largest block table that is copied
 
@@ -36,6 +36,8 @@ struct Staged {
   const std::uint32_t* normal;
   const Block* blocks;
   const std::uint8_t* codes;
+  const std::uint32_t* by_misses;
+  const std::uint32_t* by_refuted;
 };
 
 /// Groups [begin, begin + N): how many of this lane's points may be inliers, by the code of their cell. rows: levels that each class of
@@ -46,7 +48,7 @@ __device__ std::uint32_t count_possible(const CellMotion& motion, const Staged<B
   float4 p[N];
   std::uint32_t code[N];
 #pragma unroll
-  for (std::uint32_t k = 0; k < N; ++k) p[k] = staged.point[(begin + k) * 32 + lane];
+  for (std::uint32_t k = 0; k < N; ++k) p[k] = staged.point[staged.by_misses[begin + k] * 32u + lane];
 #pragma unroll
   for (std::uint32_t k = 0; k < N; ++k) code[k] = motion.locate(p[k], staged.blocks).wide_cell();
 #pragma unroll
@@ -104,8 +106,9 @@ __device__ std::uint32_t count_inliers(const ScoreBatch& b, const ScorePair& pai
     possible -= static_cast<std::uint32_t>(__popc(static_cast<int>(__ballot_sync(~0u, refuted))));
     __syncwarp();
   };
-  for (g = 0; g < groups; ++g) {
+  for (std::uint32_t k = 0; k < groups; ++k) {
     if (possible < needed) return 0;
+    g = staged.by_refuted[k];
     const float4 p = staged.point[g * 32 + lane];
     const CellInBlock cell = motion.locate(p, staged.blocks);
     const std::uint32_t code = staged.codes[cell.wide_cell()];
@@ -175,8 +178,10 @@ __global__ void __launch_bounds__(kProbeThreads) probe(ScoreBatch b) {
   }
 }
 
-/// Inliers of one hypothesis by a whole thread block: the paper's way, one block per hypothesis and a parallel reduction. Thread 0 gets it.
-__device__ std::uint32_t count_by_block(const ScoreBatch& b, const ScorePair& pair, const Limits* limits, const Pose<float>& pose) {
+/// Inliers of one hypothesis by a whole thread block: the paper's way, one block per hypothesis and a parallel reduction. All threads get
+/// it. Where asked for, misses are added up per group of points.
+__device__ std::uint32_t count_by_block(const ScoreBatch& b, const ScorePair& pair, const Limits* limits, const Pose<float>& pose,
+                                        std::uint32_t* misses, std::uint32_t* refuted) {
   __shared__ std::uint32_t inliers;
   __syncthreads();
   if (threadIdx.x == 0) inliers = 0;
@@ -185,14 +190,23 @@ __device__ std::uint32_t count_by_block(const ScoreBatch& b, const ScorePair& pa
   std::uint32_t mine = 0;
   if (pair.cells.nx > 0) {
     const CellMotion motion(rigid, pair.cells);
+    // A warp takes a group at a time.
     for (std::uint32_t k = threadIdx.x; k < pair.order.groups * 32; k += blockDim.x) {
       const float4 point = __ldg(pair.order.point + k);
       const std::uint32_t cell = motion.locate(point, pair.cells.block).cell(), word = __ldg(pair.cells.word + cell);
-      if (word == 0) continue;
-      const std::uint32_t normal = __ldg(pair.order.normal + k);
-      bool certain;
-      if (!may_be_inlier(rigid, limits, word, normal, certain)) continue;
-      mine += certain || is_inlier(pair, b.test, rigid, point, normal, k, cell);
+      bool possible = false, inlier = false;
+      if (word != 0) {
+        const std::uint32_t normal = __ldg(pair.order.normal + k);
+        bool certain;
+        possible = may_be_inlier(rigid, limits, word, normal, certain);
+        inlier = possible && (certain || is_inlier(pair, b.test, rigid, point, normal, k, cell));
+      }
+      mine += inlier;
+      if (!misses) continue;
+      const unsigned missing = __ballot_sync(~0u, !inlier), late = __ballot_sync(~0u, possible && !inlier);
+      if (threadIdx.x % 32 != 0) continue;
+      atomicAdd(misses + k / 32, static_cast<std::uint32_t>(__popc(static_cast<int>(missing))));
+      atomicAdd(refuted + k / 32, static_cast<std::uint32_t>(__popc(static_cast<int>(late))));
     }
   } else {
     for (std::uint32_t i = threadIdx.x; i < pair.source.size; i += blockDim.x) {
@@ -215,8 +229,27 @@ __global__ void __launch_bounds__(kProbeThreads) score_leaders(ScoreBatch b) {
   if (leader == 0) return;
   load_limits(b.limits, limits);
   const ScorePair& pair = b.pairs[p];
-  const std::uint32_t inliers = count_by_block(b, pair, limits + pair.limits * 256, b.poses[b.offset[p] + ~static_cast<std::uint32_t>(leader)]);
+  const std::uint32_t inliers = count_by_block(b, pair, limits + pair.limits * 256, b.poses[b.offset[p] + ~static_cast<std::uint32_t>(leader)],
+                                               b.misses + b.group_offset[p], b.refuted + b.group_offset[p]);
   if (threadIdx.x == 0 && inliers > 0) atomicMax(b.most + p, inliers);
+}
+
+/// Orders the groups of each pair by what the leaders say of them: where points fail first, a hypothesis is given up soonest. A thread block
+/// per pair counts for each group how many come before it.
+__global__ void __launch_bounds__(kProbeThreads) order_groups(ScoreBatch b) {
+  const std::uint32_t begin = b.group_offset[blockIdx.x], groups = b.group_offset[blockIdx.x + 1] - begin;
+  for (std::uint32_t g = threadIdx.x; g < groups; g += kProbeThreads) {
+    const std::uint32_t misses = b.misses[begin + g], refuted = b.refuted[begin + g];
+    std::uint32_t before = 0, before_refuted = 0;
+    for (std::uint32_t o = 0; o < groups; ++o) {
+      const std::uint32_t m = b.misses[begin + o], r = b.refuted[begin + o];
+      const bool probed = o < kProbeGroups;
+      before += g < kProbeGroups ? o < g : probed || m > misses || (m == misses && o < g);
+      before_refuted += r > refuted || (r == refuted && o < g);
+    }
+    b.by_misses[begin + before] = g;
+    b.by_refuted[begin + before_refuted] = g;
+  }
 }
 
 /// A thread block per hypothesis: the shortest way through a few of them, as no warp walks over a whole cloud.
@@ -227,7 +260,7 @@ __global__ void __launch_bounds__(kProbeThreads) score_by_block(ScoreBatch b) {
   for (std::uint32_t h = blockIdx.x; h < total; h += gridDim.x) {
     const std::uint32_t p = entry_of(b.offset, b.pair_count, h);
     const ScorePair& pair = b.pairs[p];
-    const std::uint32_t inliers = b.valid[h] ? count_by_block(b, pair, limits + pair.limits * 256, b.poses[h]) : 0;
+    const std::uint32_t inliers = b.valid[h] ? count_by_block(b, pair, limits + pair.limits * 256, b.poses[h], nullptr, nullptr) : 0;
     if (threadIdx.x != 0) continue;
     b.inliers[h] = inliers;
     if (inliers > 0) atomicMax(b.most + p, inliers);
@@ -260,7 +293,8 @@ __global__ void __launch_bounds__(kThreads, 1) score_slices(ScoreBatch b, const 
                                                             std::uint32_t block_room, std::uint32_t code_room) {
   extern __shared__ float4 shared_points[];
   std::uint32_t* shared_normals = reinterpret_cast<std::uint32_t*>(shared_points + point_room);
-  std::uint8_t* shared_rows = reinterpret_cast<std::uint8_t*>(shared_normals + point_room);
+  std::uint32_t* shared_order = shared_normals + point_room;
+  std::uint8_t* shared_rows = reinterpret_cast<std::uint8_t*>(shared_order + point_room / 4);
   std::uint8_t* shared_codes = shared_rows + kThreads / 32 * kWarpBytes;
   std::uint16_t* shared_blocks = reinterpret_cast<std::uint16_t*>(shared_codes + code_room);
   __shared__ Limits limits[512];
@@ -281,20 +315,25 @@ __global__ void __launch_bounds__(kThreads, 1) score_slices(ScoreBatch b, const 
     const ScorePair& pair = b.pairs[slice.pair];
     const std::uint32_t points = pair.order.groups * 32;
     const std::uint32_t blocks = static_cast<std::uint32_t>(pair.cells.nx * pair.cells.ny * pair.cells.nz);
+    const std::uint32_t first_group = b.group_offset[slice.pair];
     const std::uint32_t codes = (pair.cells.block_count + 1) * kCodesPerBlock;
     if (points > point_room || blocks > block_room || codes > code_room) {
-      score_slice(b, slice, limits, Staged<std::int32_t>{pair.order.point, pair.order.normal, pair.cells.block, pair.cells.code}, rows, queue, &next);
+      score_slice(b, slice, limits, Staged<std::int32_t>{pair.order.point, pair.order.normal, pair.cells.block, pair.cells.code, b.by_misses + first_group,
+                                                          b.by_refuted + first_group}, rows, queue, &next);
       continue;
     }
     if (loaded != slice.pair) {
       for (std::uint32_t k = threadIdx.x; k < points; k += kThreads) shared_points[k] = pair.order.point[k], shared_normals[k] = pair.order.normal[k];
+      for (std::uint32_t k = threadIdx.x; k < pair.order.groups; k += kThreads)
+        shared_order[k] = b.by_misses[first_group + k], shared_order[pair.order.groups + k] = b.by_refuted[first_group + k];
       for (std::uint32_t k = threadIdx.x; k < blocks; k += kThreads) shared_blocks[k] = static_cast<std::uint16_t>(pair.cells.block[k]);
       for (std::uint32_t k = threadIdx.x; k < codes / 16; k += kThreads)
         reinterpret_cast<uint4*>(shared_codes)[k] = reinterpret_cast<const uint4*>(pair.cells.code)[k];
       loaded = slice.pair;
       __syncthreads();
     }
-    score_slice(b, slice, limits, Staged<std::uint16_t>{shared_points, shared_normals, shared_blocks, shared_codes}, rows, queue, &next);
+    score_slice(b, slice, limits, Staged<std::uint16_t>{shared_points, shared_normals, shared_blocks, shared_codes,
+                                                 shared_order, shared_order + pair.order.groups}, rows, queue, &next);
   }
 }
 
@@ -345,9 +384,13 @@ DeviceBuffer<BestPose> score_hypotheses(Exec& exec, Span<const PairView> pairs, 
   const auto leaders = exec.filled<unsigned long long>(static_cast<std::size_t>(count) * kLeaders, 0);
   const auto most = exec.filled<std::uint32_t>(count, 0);
   const auto next = exec.filled<std::uint32_t>(1, 0);
+  const Segments groups = make_segments(exec, count, [&](std::size_t p) { return host_pairs[p].order.groups; });
+  const auto misses = exec.filled<std::uint32_t>(groups.total(), 0), refuted = exec.filled<std::uint32_t>(groups.total(), 0);
+  const auto by_misses = exec.buffer<std::uint32_t>(groups.total()), by_refuted = exec.buffer<std::uint32_t>(groups.total());
   const ScoreBatch batch{pairs_on_device.data(), count, hypotheses.segments->on_device.data(), hypotheses.pose.data(), hypotheses.valid.data(),
                          hypotheses.id, inlier_test(options.max_correspondence_distance, options.max_normal_angle), limits.data(),
-                         directions_on_device.data(), level_thresholds(options.max_normal_angle), possible.data(), inliers.data(), leaders.data(), most.data(), next.data()};
+                         directions_on_device.data(), level_thresholds(options.max_normal_angle), possible.data(), inliers.data(), leaders.data(), most.data(), next.data(), groups.on_device.data(), misses.data(), refuted.data(), by_misses.data(),
+                         by_refuted.data()};
   if (total > 0) {
     const unsigned processors = static_cast<unsigned>(exec.multiprocessors());
     if (total <= processors * kByBlock) {
@@ -359,7 +402,8 @@ DeviceBuffer<BestPose> score_hypotheses(Exec& exec, Span<const PairView> pairs, 
     check_launch("probe");
     score_leaders<<<count * kLeaders, kProbeThreads, 0, exec.stream()>>>(batch);
     check_launch("score_leaders");
-
+    order_groups<<<count, kProbeThreads, 0, exec.stream()>>>(batch);
+    check_launch("order_groups");
     const std::vector<Slice> slices = cut_slices(*hypotheses.segments, processors);
     const auto slices_on_device = exec.upload(slices);
     std::uint32_t most_points = 0, most_blocks = 0, most_codes = 0;

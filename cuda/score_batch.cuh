@@ -24,6 +24,11 @@ struct ScoreBatch {
   unsigned long long* leaders;      ///< pairs x kLeaders: (possible + 1, ~number), the largest of each residue class; 0: none
   std::uint32_t* most;              ///< per pair: inliers of the best so far
   std::uint32_t* next;              ///< slices handed out
+  const std::uint32_t* group_offset;  ///< per pair, of the arrays by group
+  std::uint32_t* misses;            ///< per group: points that the leaders' poses leave without a partner
+  std::uint32_t* refuted;           ///< per group: of those, the ones that look like inliers until their closest point is found
+  std::uint32_t* by_misses;         ///< groups of a pair, those with the most misses first, but the probe's before all
+  std::uint32_t* by_refuted;        ///< the same by refuted points
 };
 
 /// Support of one pose by looking every point up: clouds too wide for a table of blocks, and residuals. A warp's work; all lanes get it.
