@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <algorithm>
 #include <atomic>
+#include <numeric>
 
 #include "cpu/cell_summary.hpp"
 #include "cpu/inlier.hpp"
@@ -10,6 +11,29 @@ namespace gpureg::cpu {
 namespace {
 
 const CpuCloud& executor_data(const CloudView& cloud) { return *static_cast<const CpuCloud*>(cloud.executor_data); }
+
+/// Groups of points in the order of how often poses failed at them so far, the most frequent first. The order decides when a pose is
+/// given up, never whether.
+class GroupOrder {
+ public:
+  explicit GroupOrder(std::size_t groups) : group_(groups), looked_(groups, 1), failed_(groups, 0), rate_(groups) {
+    std::iota(group_.begin(), group_.end(), std::size_t(0));
+  }
+  std::size_t group(std::size_t n) const { return group_[n]; }
+  void record(std::size_t g, std::uint32_t looked, std::uint32_t failed) {
+    looked_[g] += looked;
+    failed_[g] += failed;
+  }
+  void renew() {
+    for (std::size_t g = 0; g < rate_.size(); ++g) rate_[g] = static_cast<float>(failed_[g]) / static_cast<float>(looked_[g]);
+    std::stable_sort(group_.begin(), group_.end(), [&](std::size_t a, std::size_t b) { return rate_[a] > rate_[b]; });
+  }
+
+ private:
+  std::vector<std::size_t> group_;
+  std::vector<std::uint32_t> looked_, failed_;
+  std::vector<float> rate_;
+};
 
 /// Everything that the hypotheses of one pair share.
 class PairScorer {
@@ -24,26 +48,39 @@ class PairScorer {
                     ? exact
                     : reach),
         bounds_(order_.remaining.size()),
-        cell_(order_.x.size()) {}
+        cell_(order_.x.size()),
+        by_bound_(bounds_.size()),
+        by_look_(bounds_.size()) {}
 
   /// Support of one pose, given up (inliers 0) as soon as it cannot reach `needed` inliers: such a hypothesis is not the best one, so
   /// giving it up changes no result. First every point is bounded by its cell's summary, then only undecided ones are looked at, and
-  /// only a pose that reaches `needed` has its residual measured.
+  /// only a pose that reaches `needed` has its residual measured. The groups that poses of this pair fail at come first.
   Support score(const Rigid& pose, std::uint32_t needed) {
     if (cells_.block.empty()) return all_points(pose);
-    std::uint32_t possible = 0;
-    if (!bounds_.empty()) locate_cells(order_, 0, pose, cells_, cell_.data());
-    for (std::size_t g = 0; g < bounds_.size(); ++g) {
-      if (g + 1 < bounds_.size()) locate_cells(order_, (g + 1) * 64, pose, cells_, cell_.data() + (g + 1) * 64);
-      bounds_[g] = bound_inliers(order_, g * 64, pose, cells_, limits_, cell_.data() + g * 64);
-      possible += static_cast<std::uint32_t>(__builtin_popcountll(bounds_[g].possible));
-      if (possible + order_.remaining[g] < needed) return {0, 0, 0};
+    if (scored_++ % kRenewal == 0) {
+      by_bound_.renew();
+      by_look_.renew();
     }
-    for (std::size_t g = 0; g < bounds_.size(); ++g) {
-      Support undecided{0, 0, 0};
+    std::uint32_t possible = source_.size;
+    if (!bounds_.empty()) locate(by_bound_.group(0), pose);
+    for (std::size_t n = 0; n < bounds_.size(); ++n) {
+      const std::size_t g = by_bound_.group(n);
+      if (n + 1 < bounds_.size()) locate(by_bound_.group(n + 1), pose);
+      bounds_[g] = bound_inliers(order_, g * 64, pose, cells_, limits_, cell_.data() + g * 64);
+      const std::uint32_t failed = points_in(g) - static_cast<std::uint32_t>(__builtin_popcountll(bounds_[g].possible));
+      by_bound_.record(g, points_in(g), failed);
+      possible -= failed;
+      if (possible < needed) return {0, 0, 0};
+    }
+    for (std::size_t n = 0; n < bounds_.size(); ++n) {
+      const std::size_t g = by_look_.group(n);
       const std::uint64_t mask = bounds_[g].possible & ~bounds_[g].certain;
+      if (mask == 0) continue;
+      Support undecided{0, 0, 0};
       count_group(pose, g, mask, undecided);
-      possible -= static_cast<std::uint32_t>(__builtin_popcountll(mask)) - undecided.inliers;
+      const std::uint32_t looked = static_cast<std::uint32_t>(__builtin_popcountll(mask));
+      by_look_.record(g, looked, looked - undecided.inliers);
+      possible -= looked - undecided.inliers;
       if (possible < needed) return {0, 0, 0};
     }
     Support s{0, 0, 0};
@@ -52,6 +89,12 @@ class PairScorer {
   }
 
  private:
+  static constexpr std::uint32_t kRenewal = 8;  ///< hypotheses between two renewals of the groups' order
+
+  void locate(std::size_t g, const Rigid& pose) { locate_cells(order_, g * 64, pose, cells_, cell_.data() + g * 64); }
+
+  std::uint32_t points_in(std::size_t g) const { return (g == 0 ? source_.size : order_.remaining[g - 1]) - order_.remaining[g]; }
+
   Support all_points(const Rigid& pose) const {
     Support s{0, 0, 0};
     for (std::uint32_t i = 0; i < source_.size; ++i) count_point(source_, target_, pose, test_, i, s);
@@ -87,6 +130,8 @@ class PairScorer {
   const SummaryLimits& limits_;
   std::vector<PointBounds> bounds_;
   std::vector<std::int32_t> cell_;
+  GroupOrder by_bound_, by_look_;
+  std::uint32_t scored_ = 0;
 };
 
 }  // namespace
@@ -100,7 +145,7 @@ Support measure_support(const CloudView& source, const CloudView& target, const 
 
 std::vector<BestPose> score_hypotheses(Exec& exec, Span<const PairView> pairs, const std::vector<Hypotheses>& hypotheses,
                                        const ScoreOptions& options) {
-  constexpr std::size_t kGrain = 32;
+  constexpr std::size_t kGrain = 256;
   const InlierTest test = inlier_test(options.max_correspondence_distance, options.max_normal_angle);
   const SummaryLimits exact_limits(options.max_normal_angle, true), reach_limits(options.max_normal_angle, false);
   std::vector<std::vector<Support>> best_of_block(pairs.size);
