@@ -83,6 +83,7 @@ __global__ void __launch_bounds__(32 * kWarps) weighted_histograms(FpfhBatch f, 
   __syncwarp();
   bool valid = false;
   if (lane == 0) valid = has_normal && normalize_fpfh(histogram[warp]);
+  __syncwarp();  // lane 0 has changed the histogram
   valid = __shfl_sync(~0u, valid, 0);
   const std::uint32_t at = grid.index[i];
   float* out = f.values + f.feature_offset[c] + static_cast<std::size_t>(at) * kFpfhSize;

@@ -1,18 +1,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include "count_inliers.cuh"
 #include "entry_of.cuh"
-#include "score_batch.cuh"
 #include "stages.hpp"
 
 namespace gpureg::cuda {
 namespace {
 
-constexpr std::uint32_t kProbeGroups = 4;   // groups of 32 points that tell promising hypotheses from others
-constexpr std::uint32_t kLeaders = 16;      // promising hypotheses of a pair that are scored first
-constexpr int kProbeThreads = 256;
-constexpr std::uint32_t kByBlock = 64;      // hypotheses per multiprocessor up to which each gets a thread block of its own
+constexpr std::uint32_t kByBlock = 64;  // hypotheses per multiprocessor up to which each gets a thread block of its own
 constexpr int kThreads = 768;
-constexpr std::uint32_t kUnroll = 4;        // groups in flight per warp
-constexpr std::size_t kRowBytes = 64 * 16;  // of the table of compatible levels
 constexpr std::size_t kPointBytes = sizeof(float4) + sizeof(std::uint32_t) + 1;  // and two orders of groups of 32
 constexpr std::uint32_t kSharedCodes = 72 << 10;   // bytes of the largest codes that are copied
 constexpr std::uint32_t kSharedBlocks = 24 << 10;  // entries of the largest block table that is copied
@@ -21,236 +16,6 @@ constexpr std::uint32_t kSharedBlocks = 24 << 10;  // entries of the largest blo
 struct Slice {
   std::uint32_t pair, begin, end;
 };
-
-/// A point that only its closest target point can decide.
-struct Undecided {
-  std::uint32_t slot, cell;
-};
-
-constexpr std::size_t kWarpBytes = kRowBytes + 64 * sizeof(Undecided);  // of shared memory for each warp
-
-/// What a thread block keeps of a pair while it scores a slice: in shared memory, or where it is too large, in global.
-template <typename Block>
-struct Staged {
-  const float4* point;
-  const std::uint32_t* normal;
-  const Block* blocks;
-  const std::uint8_t* codes;
-  const std::uint32_t* by_misses;
-  const std::uint32_t* by_refuted;
-};
-
-/// Groups [begin, begin + N): how many of this lane's points may be inliers, by the code of their cell. rows: levels that each class of
-/// normals needs, in shared memory.
-template <std::uint32_t N, typename Block>
-__device__ std::uint32_t count_possible(const CellMotion& motion, const Staged<Block>& staged, const std::uint8_t* rows, std::uint32_t begin) {
-  const std::uint32_t lane = threadIdx.x % 32;
-  float4 p[N];
-  std::uint32_t code[N];
-#pragma unroll
-  for (std::uint32_t k = 0; k < N; ++k) p[k] = staged.point[staged.by_misses[begin + k] * 32u + lane];
-#pragma unroll
-  for (std::uint32_t k = 0; k < N; ++k) code[k] = motion.locate(p[k], staged.blocks).wide_cell();
-#pragma unroll
-  for (std::uint32_t k = 0; k < N; ++k) code[k] = staged.codes[code[k]];
-  std::uint32_t possible = 0;
-#pragma unroll
-  for (std::uint32_t k = 0; k < N; ++k) possible += (code[k] & 15u) >= rows[__float_as_uint(p[k].w) + (code[k] >> 4)];
-  return possible;
-}
-
-/// Exact number of inliers, or 0 as soon as it cannot reach the most seen so far: such a hypothesis is not the best one. First every point
-/// is bounded by its cell's code, then by its word, and only undecided ones are looked at. possible: upper bound by words over the groups
-/// before `begin`. A warp's work; rows and queue: its own 64 x 16 bytes and 64 entries of shared memory.
-template <typename Block>
-__device__ std::uint32_t count_inliers(const ScoreBatch& b, const ScorePair& pair, const Limits* limits, const Staged<Block>& staged,
-                                       std::uint8_t* rows, Undecided* queue, const Pose<float>& pose, std::uint32_t begin,
-                                       std::uint32_t possible, const volatile std::uint32_t* most) {
-  const std::uint32_t lane = threadIdx.x % 32;
-  const Rigid rigid = to_rigid(pose);
-  if (pair.cells.nx == 0) {
-    unsigned long long residual;
-    return support_by_search(pair, b.test, rigid, residual);
-  }
-  __syncwarp();
-  for (std::uint32_t k = lane; k < 64; k += 32) {
-    std::uint8_t row[16];
-    compatible_levels(*b.directions, b.thresholds, rigid, k, row);
-    std::uint32_t packed[4];
-#pragma unroll
-    for (int w = 0; w < 4; ++w)
-      packed[w] = static_cast<std::uint32_t>(row[4 * w]) | static_cast<std::uint32_t>(row[4 * w + 1]) << 8 |
-                  static_cast<std::uint32_t>(row[4 * w + 2]) << 16 | static_cast<std::uint32_t>(row[4 * w + 3]) << 24;
-    *reinterpret_cast<uint4*>(rows + k * 16) = make_uint4(packed[0], packed[1], packed[2], packed[3]);
-  }
-  __syncwarp();
-  const CellMotion motion(rigid, pair.cells);
-  const std::uint32_t groups = pair.order.groups;
-  std::uint32_t needed = *most, g = begin;
-  for (; g + kUnroll <= groups; g += kUnroll) {
-    if (possible + (groups - g) * 32 < needed) return 0;
-    possible += warp_sum(count_possible<kUnroll>(motion, staged, rows, g));
-    if (g % 32 < kUnroll) needed = *most;
-  }
-  for (; g < groups; ++g) possible += warp_sum(count_possible<1>(motion, staged, rows, g));
-
-  // Undecided points wait until there is one for every lane.
-  std::uint32_t waiting = 0;
-  const auto settle = [&](std::uint32_t count) {
-    __syncwarp();
-    bool refuted = false;
-    if (lane < count) {
-      const Undecided u = queue[lane];
-      refuted = !is_inlier(pair, b.test, rigid, staged.point[u.slot], staged.normal[u.slot], u.slot, u.cell);
-    }
-    possible -= static_cast<std::uint32_t>(__popc(static_cast<int>(__ballot_sync(~0u, refuted))));
-    __syncwarp();
-  };
-  for (std::uint32_t k = 0; k < groups; ++k) {
-    if (possible < needed) return 0;
-    g = staged.by_refuted[k];
-    const float4 p = staged.point[g * 32 + lane];
-    const CellInBlock cell = motion.locate(p, staged.blocks);
-    const std::uint32_t code = staged.codes[cell.wide_cell()];
-    // The first groups were bounded by summaries already, not by codes.
-    const bool counted = (code & 15u) >= rows[__float_as_uint(p.w) + (code >> 4)] || g < begin;
-    if (!__any_sync(~0u, counted)) continue;
-    bool refuted = false, undecided = false;
-    if (counted) {
-      bool certain;
-      const bool possible_still = may_be_inlier(rigid, limits, __ldg(pair.cells.word + cell.cell()), staged.normal[g * 32 + lane], certain);
-      refuted = !possible_still && g >= begin;
-      undecided = possible_still && !certain;
-    }
-    possible -= static_cast<std::uint32_t>(__popc(static_cast<int>(__ballot_sync(~0u, refuted))));
-    const unsigned asked = __ballot_sync(~0u, undecided);
-    if (undecided) queue[waiting + static_cast<std::uint32_t>(__popc(static_cast<int>(asked & ((1u << lane) - 1))))] = {g * 32 + lane, cell.cell()};
-    waiting += static_cast<std::uint32_t>(__popc(static_cast<int>(asked)));
-    if (waiting >= 32) {
-      settle(32);
-      waiting -= 32;
-      const Undecided moved = queue[32 + lane];
-      __syncwarp();
-      if (lane < waiting) queue[lane] = moved;
-      needed = *most;
-    }
-  }
-  if (possible < needed) return 0;
-  settle(waiting);
-  return possible;
-}
-
-__device__ void load_limits(const Limits* from, Limits* to) {
-  for (unsigned k = threadIdx.x; k < 512; k += blockDim.x) to[k] = from[k];
-  __syncthreads();
-}
-
-/// A warp per hypothesis looks at a few groups and proposes it as one of its pair's leaders.
-__global__ void __launch_bounds__(kProbeThreads) probe(ScoreBatch b) {
-  __shared__ Limits limits[512];
-  load_limits(b.limits, limits);
-  const std::uint32_t total = b.offset[b.pair_count], warps = gridDim.x * (kProbeThreads / 32), lane = threadIdx.x % 32;
-  for (std::uint32_t h = (blockIdx.x * kProbeThreads + threadIdx.x) / 32; h < total; h += warps) {
-    const std::uint32_t p = entry_of(b.offset, b.pair_count, h);
-    const ScorePair& pair = b.pairs[p];
-    std::uint32_t possible = 0;
-    const bool look = b.valid[h] && pair.cells.nx > 0;
-    if (look) {
-      const Rigid rigid = to_rigid(b.poses[h]);
-      const CellMotion motion(rigid, pair.cells);
-      bool certain;
-#pragma unroll
-      for (std::uint32_t g = 0; g < kProbeGroups; ++g) {
-        if (g >= pair.order.groups) break;
-        const std::uint32_t cell = motion.locate(__ldg(pair.order.point + g * 32 + lane), pair.cells.block).cell();
-        possible += may_be_inlier(rigid, limits + pair.limits * 256, __ldg(pair.cells.word + cell),
-                                  __ldg(pair.order.normal + g * 32 + lane), certain);
-      }
-      possible = warp_sum(possible);
-    }
-    if (lane != 0) continue;
-    b.possible[h] = possible;
-    if (!look) continue;
-    const std::uint32_t number = h - b.offset[p];
-    unsigned long long* leader = b.leaders + static_cast<std::size_t>(p) * kLeaders + number % kLeaders;
-    const unsigned long long claim = static_cast<unsigned long long>(possible + 1) << 32 | ~number;
-    if (claim > *leader) atomicMax(leader, claim);
-  }
-}
-
-/// Inliers of one hypothesis by a whole thread block: the paper's way, one block per hypothesis and a parallel reduction. All threads get
-/// it. Where asked for, misses are added up per group of points.
-__device__ std::uint32_t count_by_block(const ScoreBatch& b, const ScorePair& pair, const Limits* limits, const Pose<float>& pose,
-                                        std::uint32_t* misses, std::uint32_t* refuted) {
-  __shared__ std::uint32_t inliers;
-  __syncthreads();
-  if (threadIdx.x == 0) inliers = 0;
-  __syncthreads();
-  const Rigid rigid = to_rigid(pose);
-  std::uint32_t mine = 0;
-  if (pair.cells.nx > 0) {
-    const CellMotion motion(rigid, pair.cells);
-    // A warp takes a group at a time.
-    for (std::uint32_t k = threadIdx.x; k < pair.order.groups * 32; k += blockDim.x) {
-      const float4 point = __ldg(pair.order.point + k);
-      const std::uint32_t cell = motion.locate(point, pair.cells.block).cell(), word = __ldg(pair.cells.word + cell);
-      bool possible = false, inlier = false;
-      if (word != 0) {
-        const std::uint32_t normal = __ldg(pair.order.normal + k);
-        bool certain;
-        possible = may_be_inlier(rigid, limits, word, normal, certain);
-        inlier = possible && (certain || is_inlier(pair, b.test, rigid, point, normal, k, cell));
-      }
-      mine += inlier;
-      if (!misses) continue;
-      const unsigned missing = __ballot_sync(~0u, !inlier), late = __ballot_sync(~0u, possible && !inlier);
-      if (threadIdx.x % 32 != 0) continue;
-      atomicAdd(misses + k / 32, static_cast<std::uint32_t>(__popc(static_cast<int>(missing))));
-      atomicAdd(refuted + k / 32, static_cast<std::uint32_t>(__popc(static_cast<int>(late))));
-    }
-  } else {
-    for (std::uint32_t i = threadIdx.x; i < pair.source.size; i += blockDim.x) {
-      const Closest found = find_closest(pair.target.closest, pair.target.points, apply(rigid, pair.source.points[i]), b.test.max_squared);
-      mine += found.index != kNoValue &&
-              normals_agree(rotate(rigid, pair.source.normals[i]), pair.target.normals[found.index], b.test.min_cosine);
-    }
-  }
-  mine = warp_sum(mine);
-  if (threadIdx.x % 32 == 0 && mine > 0) atomicAdd(&inliers, mine);
-  __syncthreads();
-  return inliers;
-}
-
-/// What the leaders reach the others must beat.
-__global__ void __launch_bounds__(kProbeThreads) score_leaders(ScoreBatch b) {
-  __shared__ Limits limits[512];
-  const std::uint32_t p = blockIdx.x / kLeaders;
-  const unsigned long long leader = b.leaders[blockIdx.x];
-  if (leader == 0) return;
-  load_limits(b.limits, limits);
-  const ScorePair& pair = b.pairs[p];
-  const std::uint32_t inliers = count_by_block(b, pair, limits + pair.limits * 256, b.poses[b.offset[p] + ~static_cast<std::uint32_t>(leader)],
-                                               b.misses + b.group_offset[p], b.refuted + b.group_offset[p]);
-  if (threadIdx.x == 0 && inliers > 0) atomicMax(b.most + p, inliers);
-}
-
-/// Orders the groups of each pair by what the leaders say of them: where points fail first, a hypothesis is given up soonest. A thread block
-/// per pair counts for each group how many come before it.
-__global__ void __launch_bounds__(kProbeThreads) order_groups(ScoreBatch b) {
-  const std::uint32_t begin = b.group_offset[blockIdx.x], groups = b.group_offset[blockIdx.x + 1] - begin;
-  for (std::uint32_t g = threadIdx.x; g < groups; g += kProbeThreads) {
-    const std::uint32_t misses = b.misses[begin + g], refuted = b.refuted[begin + g];
-    std::uint32_t before = 0, before_refuted = 0;
-    for (std::uint32_t o = 0; o < groups; ++o) {
-      const std::uint32_t m = b.misses[begin + o], r = b.refuted[begin + o];
-      const bool probed = o < kProbeGroups;
-      before += g < kProbeGroups ? o < g : probed || m > misses || (m == misses && o < g);
-      before_refuted += r > refuted || (r == refuted && o < g);
-    }
-    b.by_misses[begin + before] = g;
-    b.by_refuted[begin + before_refuted] = g;
-  }
-}
 
 /// A thread block per hypothesis: the shortest way through a few of them, as no warp walks over a whole cloud.
 __global__ void __launch_bounds__(kProbeThreads) score_by_block(ScoreBatch b) {
@@ -398,12 +163,7 @@ DeviceBuffer<BestPose> score_hypotheses(Exec& exec, Span<const PairView> pairs, 
       check_launch("score_by_block");
       return select_best(exec, batch, total);
     }
-    probe<<<std::min(blocks_for(static_cast<std::size_t>(total) * 32, kProbeThreads), processors * 8), kProbeThreads, 0, exec.stream()>>>(batch);
-    check_launch("probe");
-    score_leaders<<<count * kLeaders, kProbeThreads, 0, exec.stream()>>>(batch);
-    check_launch("score_leaders");
-    order_groups<<<count, kProbeThreads, 0, exec.stream()>>>(batch);
-    check_launch("order_groups");
+    score_leaders(exec, batch, total);
     const std::vector<Slice> slices = cut_slices(*hypotheses.segments, processors);
     const auto slices_on_device = exec.upload(slices);
     std::uint32_t most_points = 0, most_blocks = 0, most_codes = 0;

@@ -7,6 +7,10 @@
 
 namespace gpureg::cuda {
 
+constexpr std::uint32_t kProbeGroups = 4;   ///< groups of 32 points that tell promising hypotheses from others
+constexpr std::uint32_t kLeaders = 16;      ///< promising hypotheses of a pair that are scored first
+constexpr int kProbeThreads = 256;
+
 /// What the kernels of scoring share.
 struct ScoreBatch {
   const ScorePair* pairs;
@@ -31,6 +35,12 @@ struct ScoreBatch {
   std::uint32_t* by_refuted;        ///< the same by refuted points
 };
 
+/// Both tables into shared memory, by all threads of the block.
+__device__ inline void load_limits(const Limits* from, Limits* to) {
+  for (unsigned k = threadIdx.x; k < 512; k += blockDim.x) to[k] = from[k];
+  __syncthreads();
+}
+
 /// Support of one pose by looking every point up: clouds too wide for a table of blocks, and residuals. A warp's work; all lanes get it.
 __device__ inline std::uint32_t support_by_search(const ScorePair& pair, const InlierTest& test, const Rigid& rigid, unsigned long long& residual) {
   std::uint32_t inliers = 0;
@@ -45,6 +55,9 @@ __device__ inline std::uint32_t support_by_search(const ScorePair& pair, const I
   residual = static_cast<unsigned long long>(warp_sum(sum));
   return warp_sum(inliers);
 }
+
+/// Finds promising hypotheses of each pair, scores them, and learns from them in which order to look at the groups of points.
+void score_leaders(Exec& exec, const ScoreBatch& batch, std::uint32_t total);
 
 /// Chooses the best of the hypotheses whose `inliers` are the pair's most: smallest residual, then lowest number.
 DeviceBuffer<BestPose> select_best(Exec& exec, const ScoreBatch& batch, std::uint32_t total);
