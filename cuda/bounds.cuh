@@ -25,8 +25,6 @@ struct CellInBlock {
   std::uint32_t block, x, y, z;
   /// Of the closest-point grid.
   __device__ std::uint32_t cell() const { return block << 9 | (z & 7) << 6 | (y & 7) << 3 | (x & 7); }
-  /// Of the codes, twice as wide.
-  __device__ std::uint32_t wide_cell() const { return block << 6 | (z & 6) << 3 | (y & 6) << 1 | (x & 6) >> 1; }
 };
 
 /// The motion in units of the target's cells. Rounding may differ from apply() by a small part of a cell, which the margin of the

@@ -37,9 +37,9 @@ __device__ std::uint32_t count_possible(const CellMotion& motion, const Staged<B
 #pragma unroll
   for (std::uint32_t k = 0; k < N; ++k) p[k] = staged.point[staged.by_misses[begin + k] * 32u + lane];
 #pragma unroll
-  for (std::uint32_t k = 0; k < N; ++k) code[k] = motion.locate(p[k], staged.blocks).wide_cell();
+  for (std::uint32_t k = 0; k < N; ++k) code[k] = motion.locate(p[k], staged.blocks).cell();
 #pragma unroll
-  for (std::uint32_t k = 0; k < N; ++k) code[k] = staged.codes[code[k]];
+  for (std::uint32_t k = 0; k < N; ++k) code[k] = __ldg(staged.codes + code[k]);
   std::uint32_t possible = 0;
 #pragma unroll
   for (std::uint32_t k = 0; k < N; ++k) possible += (code[k] & 15u) >= rows[__float_as_uint(p[k].w) + (code[k] >> 4)];
@@ -56,8 +56,9 @@ __device__ std::uint32_t count_inliers(const ScoreBatch& b, const ScorePair& pai
   const std::uint32_t lane = threadIdx.x % 32;
   const Rigid rigid = to_rigid(pose);
   if (pair.cells.nx == 0) {
-    unsigned long long residual;
-    return support_by_search(pair, b.test, rigid, residual);
+    std::uint32_t inliers;
+    support_by_search(pair, b.test, rigid, lane, 32, inliers);
+    return warp_sum(inliers);
   }
   __syncwarp();
   for (std::uint32_t k = lane; k < 64; k += 32) {
@@ -98,7 +99,7 @@ __device__ std::uint32_t count_inliers(const ScoreBatch& b, const ScorePair& pai
     g = staged.by_refuted[k];
     const float4 p = staged.point[g * 32 + lane];
     const CellInBlock cell = motion.locate(p, staged.blocks);
-    const std::uint32_t code = staged.codes[cell.wide_cell()];
+    const std::uint32_t code = __ldg(staged.codes + cell.cell());
     // The first groups were bounded by summaries already, not by codes.
     const bool counted = (code & 15u) >= rows[__float_as_uint(p.w) + (code >> 4)] || g < begin;
     if (!__any_sync(~0u, counted)) continue;
@@ -158,11 +159,7 @@ __device__ inline std::uint32_t count_by_block(const ScoreBatch& b, const ScoreP
       atomicAdd(refuted + k / 32, static_cast<std::uint32_t>(__popc(static_cast<int>(late))));
     }
   } else {
-    for (std::uint32_t i = threadIdx.x; i < pair.source.size; i += blockDim.x) {
-      const Closest found = find_closest(pair.target.closest, pair.target.points, apply(rigid, pair.source.points[i]), b.test.max_squared);
-      mine += found.index != kNoValue &&
-              normals_agree(rotate(rigid, pair.source.normals[i]), pair.target.normals[found.index], b.test.min_cosine);
-    }
+    support_by_search(pair, b.test, rigid, threadIdx.x, blockDim.x, mine);
   }
   mine = warp_sum(mine);
   if (threadIdx.x % 32 == 0 && mine > 0) atomicAdd(&inliers, mine);

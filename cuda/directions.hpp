@@ -8,7 +8,7 @@
 #include "algorithm/cell_summary.hpp"
 
 /// A coarse alphabet of directions, so that "may a point with this normal agree with a cell?" is one look-up in a small table. A normal
-/// belongs to one of 62 classes. A wide cell's code is one byte: the nearest of 14 directions to its candidates' mean normal (high bits, 1..14;
+/// belongs to one of 62 classes. A cell's code is one byte: the nearest of 14 directions to its candidates' mean normal (high bits, 1..14;
 /// 0: no candidate), and how far the candidates stray from it in steps of 10 degrees (low bits; 15: no bound). Per hypothesis and class
 /// a row of 16 bytes says which low bits a code must have at least. Bounds only: no result depends on them.
 namespace gpureg::cuda {
@@ -77,14 +77,11 @@ GPUREG_HD std::uint32_t class_of_normal(const DirectionTables& t, Vec3 n) {
   return cosine >= t.class_cosine ? best : kClassAny;
 }
 
-/// Code of a cell whose candidates are in eight lists, 0 where there is none. Candidates without a normal never agree, so they do not
-/// widen the bound; where normals are not tested, every code but 0 passes.
-GPUREG_HD std::uint8_t code_of_cells(const DirectionTables& t, const Span<const std::uint32_t> (&lists)[8], const Vec3* normals) {
+/// Code of a cell with at least one candidate. Candidates without a normal never agree, so they do not widen the bound; where normals are
+/// not tested, every code but 0 passes.
+GPUREG_HD std::uint8_t code_of_cell(const DirectionTables& t, Span<const std::uint32_t> candidates, const Vec3* normals) {
   Vec3 sum{0, 0, 0};
-  bool any = false;
-  for (const auto& list : lists)
-    for (const std::uint32_t i : list) sum = sum + normals[i], any = true;
-  if (!any) return 0;
+  for (const std::uint32_t i : candidates) sum = sum + normals[i];
   int best = 0;
   float nearest = dot(t.cell[0], sum);
   for (int k = 1; k < kCellDirections; ++k) {
@@ -92,11 +89,10 @@ GPUREG_HD std::uint8_t code_of_cells(const DirectionTables& t, const Span<const 
     if (c > nearest) nearest = c, best = k;
   }
   float cosine = 1.0f;
-  for (const auto& list : lists)
-    for (const std::uint32_t i : list) {
-      const float c = dot(t.cell[best], normals[i]);
-      if (!is_zero(normals[i]) && c < cosine) cosine = c;
-    }
+  for (const std::uint32_t i : candidates) {
+    const float c = dot(t.cell[best], normals[i]);
+    if (!is_zero(normals[i]) && c < cosine) cosine = c;
+  }
   const double spread = acos(static_cast<double>(cosine < -1.0f ? -1.0f : cosine)) / kDegrees + static_cast<double>(kSlackDegrees);
   const int level = static_cast<int>(spread / static_cast<double>(kLevelDegrees));
   return static_cast<std::uint8_t>((best + 1) << 4 | (level < kLevels ? level : kLevels));

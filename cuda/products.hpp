@@ -65,8 +65,6 @@ struct ClosestGrids {
   DeviceBuffer<CellEntry> table;
 };
 
-constexpr std::uint32_t kCodesPerBlock = 64;
-
 /// See algorithm/cell_summary.hpp. Arrays on the device.
 struct CellSummaries {
   float inverse_cell_size = 1;
@@ -76,7 +74,7 @@ struct CellSummaries {
   std::uint32_t* word = nullptr;             ///< (1 + blocks) x 512: the summary
   std::uint32_t* list = nullptr;             ///< (1 + blocks) x 512: the cell's candidates, first << 8 | number, or kNoValue
   float4* candidate = nullptr;               ///< the candidates of all cells: x, y, z, packed normal
-  std::uint8_t* code = nullptr;              ///< (1 + blocks) x kCodesPerBlock: of cells twice as wide, see directions.hpp
+  std::uint8_t* code = nullptr;              ///< (1 + blocks) x 512: the summary, coarser, see directions.hpp
   std::uint32_t block_count = 0;
 };
 

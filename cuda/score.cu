@@ -7,9 +7,8 @@ namespace gpureg::cuda {
 namespace {
 
 constexpr std::uint32_t kByBlock = 64;  // hypotheses per multiprocessor up to which each gets a thread block of its own
-constexpr int kThreads = 768;
+constexpr int kThreads = 1024;
 constexpr std::size_t kPointBytes = sizeof(float4) + sizeof(std::uint32_t) + 1;  // and two orders of groups of 32
-constexpr std::uint32_t kSharedCodes = 72 << 10;   // bytes of the largest codes that are copied
 constexpr std::uint32_t kSharedBlocks = 24 << 10;  // entries of the largest block table that is copied
 
 /// Hypotheses [begin, end) of one pair.
@@ -55,13 +54,12 @@ __device__ void score_slice(const ScoreBatch& b, const Slice& slice, const Limit
 /// Thread blocks take slices until none is left; in a slice the warps take hypotheses: how long one takes is not known before. The source's
 /// points and the target's block table are in shared memory, so that the cache is left to the target's cells.
 __global__ void __launch_bounds__(kThreads, 1) score_slices(ScoreBatch b, const Slice* slices, std::uint32_t count, std::uint32_t point_room,
-                                                            std::uint32_t block_room, std::uint32_t code_room) {
+                                                            std::uint32_t block_room) {
   extern __shared__ float4 shared_points[];
   std::uint32_t* shared_normals = reinterpret_cast<std::uint32_t*>(shared_points + point_room);
   std::uint32_t* shared_order = shared_normals + point_room;
   std::uint8_t* shared_rows = reinterpret_cast<std::uint8_t*>(shared_order + point_room / 4);
-  std::uint8_t* shared_codes = shared_rows + kThreads / 32 * kWarpBytes;
-  std::uint16_t* shared_blocks = reinterpret_cast<std::uint16_t*>(shared_codes + code_room);
+  std::uint16_t* shared_blocks = reinterpret_cast<std::uint16_t*>(shared_rows + kThreads / 32 * kWarpBytes);
   __shared__ Limits limits[512];
   __shared__ std::uint32_t taken, next;
   load_limits(b.limits, limits);
@@ -81,8 +79,7 @@ __global__ void __launch_bounds__(kThreads, 1) score_slices(ScoreBatch b, const 
     const std::uint32_t points = pair.order.groups * 32;
     const std::uint32_t blocks = static_cast<std::uint32_t>(pair.cells.nx * pair.cells.ny * pair.cells.nz);
     const std::uint32_t first_group = b.group_offset[slice.pair];
-    const std::uint32_t codes = (pair.cells.block_count + 1) * kCodesPerBlock;
-    if (points > point_room || blocks > block_room || codes > code_room) {
+    if (points > point_room || blocks > block_room) {
       score_slice(b, slice, limits, Staged<std::int32_t>{pair.order.point, pair.order.normal, pair.cells.block, pair.cells.code, b.by_misses + first_group,
                                                           b.by_refuted + first_group}, rows, queue, &next);
       continue;
@@ -92,12 +89,10 @@ __global__ void __launch_bounds__(kThreads, 1) score_slices(ScoreBatch b, const 
       for (std::uint32_t k = threadIdx.x; k < pair.order.groups; k += kThreads)
         shared_order[k] = b.by_misses[first_group + k], shared_order[pair.order.groups + k] = b.by_refuted[first_group + k];
       for (std::uint32_t k = threadIdx.x; k < blocks; k += kThreads) shared_blocks[k] = static_cast<std::uint16_t>(pair.cells.block[k]);
-      for (std::uint32_t k = threadIdx.x; k < codes / 16; k += kThreads)
-        reinterpret_cast<uint4*>(shared_codes)[k] = reinterpret_cast<const uint4*>(pair.cells.code)[k];
       loaded = slice.pair;
       __syncthreads();
     }
-    score_slice(b, slice, limits, Staged<std::uint16_t>{shared_points, shared_normals, shared_blocks, shared_codes,
+    score_slice(b, slice, limits, Staged<std::uint16_t>{shared_points, shared_normals, shared_blocks, pair.cells.code,
                                                  shared_order, shared_order + pair.order.groups}, rows, queue, &next);
   }
 }
@@ -166,21 +161,20 @@ DeviceBuffer<BestPose> score_hypotheses(Exec& exec, Span<const PairView> pairs, 
     score_leaders(exec, batch, total);
     const std::vector<Slice> slices = cut_slices(*hypotheses.segments, processors);
     const auto slices_on_device = exec.upload(slices);
-    std::uint32_t most_points = 0, most_blocks = 0, most_codes = 0;
+    std::uint32_t most_points = 0, most_blocks = 0;
     for (const ScorePair& pair : host_pairs) {
       most_points = std::max(most_points, pair.order.groups * 32);
       most_blocks = std::max(most_blocks, static_cast<std::uint32_t>(pair.cells.nx * pair.cells.ny * pair.cells.nz));
-      most_codes = std::max(most_codes, (pair.cells.block_count + 1) * kCodesPerBlock);
     }
     // The table numbers blocks with 16 bits. A pair of which something does not fit is read from global memory.
-    const std::uint32_t block_room = std::min(most_blocks, kSharedBlocks), code_room = std::min(most_codes, kSharedCodes);
-    const std::size_t fixed = kThreads / 32 * kWarpBytes + block_room * sizeof(std::uint16_t) + code_room + 8192;
+    const std::uint32_t block_room = std::min(most_blocks, kSharedBlocks);
+    const std::size_t fixed = kThreads / 32 * kWarpBytes + block_room * sizeof(std::uint16_t) + 8192;
     const std::uint32_t point_room =
         std::min(most_points, static_cast<std::uint32_t>(exec.shared_bytes_per_block() > fixed ? (exec.shared_bytes_per_block() - fixed) / kPointBytes / 32 * 32 : 0));
-    const std::size_t bytes = point_room * kPointBytes + kThreads / 32 * kWarpBytes + block_room * sizeof(std::uint16_t) + code_room;
+    const std::size_t bytes = point_room * kPointBytes + kThreads / 32 * kWarpBytes + block_room * sizeof(std::uint16_t);
     check(cudaFuncSetAttribute(score_slices, cudaFuncAttributeMaxDynamicSharedMemorySize, static_cast<int>(bytes)), "cudaFuncSetAttribute");
     score_slices<<<std::min(static_cast<unsigned>(slices.size()), processors), kThreads, bytes, exec.stream()>>>(
-        batch, slices_on_device.data(), static_cast<std::uint32_t>(slices.size()), point_room, block_room, code_room);
+        batch, slices_on_device.data(), static_cast<std::uint32_t>(slices.size()), point_room, block_room);
     check_launch("score_slices");
   }
   return select_best(exec, batch, total);

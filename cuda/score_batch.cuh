@@ -41,19 +41,19 @@ __device__ inline void load_limits(const Limits* from, Limits* to) {
   __syncthreads();
 }
 
-/// Support of one pose by looking every point up: clouds too wide for a table of blocks, and residuals. A warp's work; all lanes get it.
-__device__ inline std::uint32_t support_by_search(const ScorePair& pair, const InlierTest& test, const Rigid& rigid, unsigned long long& residual) {
-  std::uint32_t inliers = 0;
-  std::int64_t sum = 0;
-  for (std::uint32_t i = threadIdx.x % 32; i < pair.source.size; i += 32) {
+/// Looks up every `step`th point of one pose from the first: how many are inliers, and the sum of their residuals.
+__device__ inline unsigned long long support_by_search(const ScorePair& pair, const InlierTest& test, const Rigid& rigid, std::uint32_t first,
+                                                       std::uint32_t step, std::uint32_t& inliers) {
+  inliers = 0;
+  unsigned long long residual = 0;
+  for (std::uint32_t i = first; i < pair.source.size; i += step) {
     const Closest found = find_closest(pair.target.closest, pair.target.points, apply(rigid, pair.source.points[i]), test.max_squared);
     if (found.index == kNoValue) continue;
     if (!normals_agree(rotate(rigid, pair.source.normals[i]), pair.target.normals[found.index], test.min_cosine)) continue;
     ++inliers;
-    sum += fixed_residual(found.squared_distance, test.inverse_max_squared);
+    residual += fixed_residual(found.squared_distance, test.inverse_max_squared);
   }
-  residual = static_cast<unsigned long long>(warp_sum(sum));
-  return warp_sum(inliers);
+  return residual;
 }
 
 /// Finds promising hypotheses of each pair, scores them, and learns from them in which order to look at the groups of points.

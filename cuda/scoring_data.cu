@@ -38,7 +38,7 @@ __global__ void fill_block_tables(const Slot* slots) {
   }
 }
 
-__global__ void summarize(const Slot* slots) {
+__global__ void summarize(const Slot* slots, const DirectionTables* tables) {
   const Slot& s = slots[blockIdx.y];
   if (s.summaries.nx == 0) return;
   const std::size_t cells = static_cast<std::size_t>(s.block_count) * kCells;
@@ -53,25 +53,8 @@ __global__ void summarize(const Slot* slots) {
     const bool short_list = candidates.size < 256 && start[0] < (1u << 24);
     s.summaries.word[kCells + k] =
         empty ? 0u : summarize_cell(candidates, cell_center(c, s.geometry.cell_size), s.geometry, s.view.points, s.view.normals);
+    s.summaries.code[kCells + k] = empty ? std::uint8_t(0) : code_of_cell(*tables, candidates, s.view.normals);
     s.summaries.list[kCells + k] = short_list ? start[0] << 8 | static_cast<std::uint32_t>(candidates.size) : kNoValue;
-  }
-}
-
-/// Codes of cells that are 2 x 2 x 2 of the grid's.
-__global__ void encode(const Slot* slots, const DirectionTables* tables) {
-  const Slot& s = slots[blockIdx.y];
-  if (s.summaries.nx == 0) return;
-  const std::uint32_t cells = s.block_count * kCodesPerBlock;
-  for (std::uint32_t k = blockIdx.x * blockDim.x + threadIdx.x; k < cells; k += gridDim.x * blockDim.x) {
-    const std::uint32_t b = k / kCodesPerBlock, wide = k % kCodesPerBlock;
-    const std::uint32_t first = (wide & 3) * 2 | (wide >> 2 & 3) << 4 | (wide >> 4) << 7;
-    const std::uint32_t* start = s.view.closest.cell_start.data + static_cast<std::size_t>(b) * (kCells + 1);
-    Span<const std::uint32_t> lists[8];
-    for (std::uint32_t e = 0; e < 8; ++e) {
-      const std::uint32_t cell = first + (e & 1) + (e >> 1 & 1) * 8 + (e >> 2) * 64;
-      lists[e] = {s.view.closest.candidates.data + start[cell], start[cell + 1] - start[cell]};
-    }
-    s.summaries.code[kCodesPerBlock + k] = code_of_cells(*tables, lists, s.view.normals);
   }
 }
 
@@ -147,7 +130,7 @@ ScoringLayout scoring_layout(const CudaCloud& cloud, const CellRange& blocks) {
   l.points = take(padded * sizeof(float4));
   l.normals = take(padded * sizeof(std::uint32_t));
   l.index = take(padded * sizeof(std::uint32_t));
-  l.codes = take(fits ? (std::size_t(cloud.block_count) + 1) * kCodesPerBlock : 0);
+  l.codes = take(fits ? (std::size_t(cloud.block_count) + 1) * kCells : 0);
   return l;
 }
 
@@ -178,7 +161,7 @@ void fill_scoring_data(Exec& exec, const std::vector<std::shared_ptr<CudaCloud>>
       check(cudaMemsetAsync(v.block, 0, static_cast<std::size_t>(v.nx) * v.ny * v.nz * sizeof(std::int32_t), exec.stream()), "cudaMemsetAsync");
       check(cudaMemsetAsync(v.word, 0, kCells * sizeof(std::uint32_t), exec.stream()), "cudaMemsetAsync");
       check(cudaMemsetAsync(v.list, 0, kCells * sizeof(std::uint32_t), exec.stream()), "cudaMemsetAsync");
-      check(cudaMemsetAsync(v.code, 0, kCodesPerBlock, exec.stream()), "cudaMemsetAsync");
+      check(cudaMemsetAsync(v.code, 0, kCells, exec.stream()), "cudaMemsetAsync");
     }
     const std::uint32_t groups = cloud.order.groups;
     std::uint32_t step = static_cast<std::uint32_t>(0.6180339887 * groups) | 1u;
@@ -195,10 +178,8 @@ void fill_scoring_data(Exec& exec, const std::vector<std::shared_ptr<CudaCloud>>
   const unsigned count = static_cast<unsigned>(clouds.size());
   fill_block_tables<<<dim3(8, count), 128, 0, exec.stream()>>>(on_device.data());
   check_launch("fill_block_tables");
-  summarize<<<dim3(128, count), 256, 0, exec.stream()>>>(on_device.data());
+  summarize<<<dim3(128, count), 256, 0, exec.stream()>>>(on_device.data(), tables.data());
   check_launch("summarize");
-  encode<<<dim3(32, count), 256, 0, exec.stream()>>>(on_device.data(), tables.data());
-  check_launch("encode");
   copy_candidates<<<dim3(128, count), 256, 0, exec.stream()>>>(on_device.data());
   check_launch("copy_candidates");
   write_morton_keys<<<dim3(16, count), 256, 0, exec.stream()>>>(on_device.data(), keys.data(), index.data());

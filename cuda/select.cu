@@ -7,27 +7,29 @@ namespace {
 
 constexpr int kThreads = 256;
 
-/// Residuals of those that share the most inliers, and the smallest of each pair.
-__global__ void __launch_bounds__(kThreads) measure_ties(ScoreBatch b, unsigned long long* residual, unsigned long long* least) {
-  const std::uint32_t total = b.offset[b.pair_count], warps = gridDim.x * (kThreads / 32), lane = threadIdx.x % 32;
-  // Ties are few: a warp looks through 32 hypotheses at a time.
-  for (std::uint32_t base = (blockIdx.x * kThreads + threadIdx.x) / 32 * 32; base < total; base += warps * 32) {
-    const std::uint32_t mine = base + lane;
-    std::uint32_t my_pair = 0;
-    bool tied = false;
-    if (mine < total && b.valid[mine]) {
-      my_pair = entry_of(b.offset, b.pair_count, mine);
-      tied = b.inliers[mine] == b.most[my_pair];
-    }
-    for (unsigned left = __ballot_sync(~0u, tied); left != 0; left &= left - 1) {
-      const int from = __ffs(static_cast<int>(left)) - 1;
-      const std::uint32_t h = base + static_cast<std::uint32_t>(from), p = __shfl_sync(~0u, my_pair, from);
-      unsigned long long sum = 0;
-      support_by_search(b.pairs[p], b.test, to_rigid(b.poses[h]), sum);
-      if (lane != 0) continue;
-      residual[h] = sum;
-      atomicMin(least + p, sum);
-    }
+/// Lists the hypotheses that share the most inliers of their pair, in any order.
+__global__ void __launch_bounds__(kThreads) list_ties(ScoreBatch b, std::uint32_t* ties, std::uint32_t* count) {
+  const std::uint32_t h = blockIdx.x * kThreads + threadIdx.x, total = b.offset[b.pair_count];
+  const std::uint32_t p = entry_in_block(b.offset, b.pair_count, blockIdx.x * kThreads, h);
+  if (h < total && b.valid[h] && b.inliers[h] == b.most[p]) ties[atomicAdd(count, 1u)] = h;
+}
+
+/// Their residuals, a thread block each, and the smallest of each pair.
+__global__ void __launch_bounds__(kThreads) measure_ties(ScoreBatch b, const std::uint32_t* ties, const std::uint32_t* count,
+                                                         unsigned long long* residual, unsigned long long* least) {
+  __shared__ unsigned long long sum;
+  for (std::uint32_t k = blockIdx.x; k < *count; k += gridDim.x) {
+    const std::uint32_t h = ties[k], p = entry_of(b.offset, b.pair_count, h);
+    __syncthreads();
+    if (threadIdx.x == 0) sum = 0;
+    __syncthreads();
+    std::uint32_t inliers;
+    const unsigned long long mine = support_by_search(b.pairs[p], b.test, to_rigid(b.poses[h]), threadIdx.x, kThreads, inliers);
+    if (mine > 0) atomicAdd(&sum, mine);
+    __syncthreads();
+    if (threadIdx.x != 0) continue;
+    residual[h] = sum;
+    atomicMin(least + p, sum);
   }
 }
 
@@ -60,8 +62,12 @@ DeviceBuffer<BestPose> select_best(Exec& exec, const ScoreBatch& batch, std::uin
   const auto winner = exec.filled<std::uint32_t>(batch.pair_count, 0xff);
   auto best = exec.buffer<BestPose>(batch.pair_count);
   if (total > 0) {
+    const auto ties = exec.buffer<std::uint32_t>(total);
+    const auto tie_count = exec.filled<std::uint32_t>(1, 0);
+    list_ties<<<blocks_for(total, kThreads), kThreads, 0, exec.stream()>>>(batch, ties.data(), tie_count.data());
+    check_launch("list_ties");
     const unsigned full = static_cast<unsigned>(exec.multiprocessors()) * 8;
-    measure_ties<<<std::min(blocks_for(total, kThreads), full), kThreads, 0, exec.stream()>>>(batch, residual.data(), least.data());
+    measure_ties<<<std::min(total, full), kThreads, 0, exec.stream()>>>(batch, ties.data(), tie_count.data(), residual.data(), least.data());
     check_launch("measure_ties");
     find_first<<<blocks_for(total, kThreads), kThreads, 0, exec.stream()>>>(batch, residual.data(), least.data(), winner.data());
     check_launch("find_first");
