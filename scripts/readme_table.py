@@ -14,7 +14,7 @@ import sys
 
 ROOT = pathlib.Path(__file__).resolve().parents[1]
 RESULTS = ROOT / "bench/results"
-FILES = ["README.md", "docs/accuracy.md"]
+FILES = ["README.md", "docs/accuracy.md", "docs/performance.md"]
 
 
 def load(name):
@@ -85,7 +85,73 @@ def other_pairs():
     return rows + ["", source(record) + "."]
 
 
-TABLES = {"redkitchen": redkitchen, "redkitchen_seeds": redkitchen_seeds, "range_pairs": range_pairs, "other_pairs": other_pairs}
+def open3d():
+    record = load("open3d_ransac.json")
+    ours, theirs = record["gpureg"], record["open3d"]
+    rows = ["| method | ms per pair: mean, median | recall / precision |", "| --- | --- | --- |"]
+    for name, own in ((f"gpureg `loopsmart`, {ours['hypotheses']:,} hypotheses, {record['environment']['description']}", ours),
+                      (f"Open3D {theirs['version']}, RANSAC, {theirs['iterations']:,} iterations", theirs)):
+        rows.append(f"| {name} | {own['ms_mean']:.0f}, {own['ms_median']:.0f} | {percent(own['recall'])} / {percent(own['precision'])} % |")
+    return rows + ["", f"{record['processor']}; peak memory of gpureg with all {record['pairs']} pairs: {ours['peak_memory_mib']:.0f} MiB.", source(record) + "."]
+
+
+def benchmarks():
+    record = load("pipeline_h200.json")
+    return record["context"], {run["name"].split("/real_time")[0].split("/iterations")[0]: run for run in record["benchmarks"]}
+
+
+def made_by(context):
+    return f"Made by `scripts/gpu_check` at commit {context['commit']} on one {context['gpu']} and {context['num_cpus']} cores of its host."
+
+
+def speed():
+    context, runs = benchmarks()
+    batch, cpu = runs["align_many/cuda_loopsmart/11"]["ms_per_pair"], runs["align_many/cpu_loopsmart/1"]["ms_per_pair"]
+    one, whole = runs["align_one/cuda_loopsmart"]["ms_median"], runs["raw_to_pose/cuda_loopsmart"]["ms_median"]
+    fragment, on_cpu = runs["prepare_batch_of_fragments/cuda"]["ms_per_fragment"], runs["prepare_batch_of_fragments/cpu"]["ms_per_fragment"]
+    return ["| | GPU, ms | CPU, ms | |", "| --- | --- | --- | --- |",
+            f"| a prepared pair, 4,000,000 hypotheses, in a batch | {batch:.2f} | {cpu:.1f} | {cpu / batch:.0f} x |",
+            f"| a fragment prepared ({runs['prepare_batch_of_fragments/cuda']['raw_points'] / 1000:.0f}k raw points), in a batch | {fragment:.2f} | {on_cpu:.1f} | {on_cpu / fragment:.0f} x |",
+            f"| one prepared pair alone, median | {one:.2f} | | |",
+            f"| one pair alone, from raw points in host memory to the pose, median | {whole:.2f} | | |",
+            "", made_by(context)]
+
+
+def pipeline():
+    context, runs = benchmarks()
+    rows = [("a prepared pair, `loopsmart`, in a batch of 2,090", "align_many/cuda_loopsmart/11", "ms_per_pair", 0.10),
+            ("a prepared pair, `default`, in a batch of 2,090", "align_many/cuda_default/11", "ms_per_pair", None),
+            ("the same on the CPU of the host, in a batch of 190", "align_many/cpu_loopsmart/1", "ms_per_pair", None),
+            ("one prepared pair alone, median of 190", "align_one/cuda_loopsmart", "ms_median", 0.4),
+            ("one pair alone, raw points in host memory to the pose, median of 100", "raw_to_pose/cuda_loopsmart", "ms_median", 3.0),
+            ("a fragment prepared, in a batch of 20", "prepare_batch_of_fragments/cuda", "ms_per_fragment", 0.5),
+            ("a fragment prepared alone", "prepare_one_fragment/cuda", "ms_per_fragment", 1.5),
+            ("the same on the CPU, in a batch of 20", "prepare_batch_of_fragments/cpu", "ms_per_fragment", None),
+            ("207 fragments and 5,280 pairs from raw points, cold", "redwood_sized/cuda", "real_time", 1500.0)]
+    out = ["| | ms | goal | ms / goal |", "| --- | --- | --- | --- |"]
+    for text, name, key, goal in rows:
+        value = runs[name][key]
+        out.append(f"| {text} | {value:.3g} | {'' if goal is None else f'{goal:g}'} | {'' if goal is None else f'{value / goal:.2f}'} |")
+    return out + ["", made_by(context)]
+
+
+def floors():
+    context, runs = benchmarks()
+    run = runs["align_many/cuda_loopsmart/11"]
+    points, survivors = run["points"], run["survivors"]
+    instructions = 29.6e12
+    floor = {"match": 2 * points ** 2 * 40 * 2 / 495e12 * 1e3, "sample": 4e6 * 100 / instructions * 1e3, "fit": survivors * 2500 / instructions * 1e3,
+             "score": survivors * points * 0.75 * 36 / instructions * 1e3}
+    what = {"match": "two products of 40 dimensions for every two features", "sample": "100 instructions a hypothesis",
+            "fit": "2,500 instructions a survivor", "score": "36 instructions for each of three quarters of the point tests"}
+    out = ["| stage | ms a pair | floor, ms | ratio | the floor counts |", "| --- | --- | --- | --- | --- |"]
+    for stage in floor:
+        out.append(f"| {stage} | {run['ms_' + stage]:.4f} | {floor[stage]:.4f} | {run['ms_' + stage] / floor[stage]:.1f} | {what[stage]} |")
+    return out + [f"| judge, refine | {run['ms_judge'] + run['ms_refine']:.4f} | | | |"]
+
+
+TABLES = {"redkitchen": redkitchen, "redkitchen_seeds": redkitchen_seeds, "range_pairs": range_pairs, "other_pairs": other_pairs,
+          "open3d": open3d, "speed": speed, "pipeline": pipeline, "floors": floors}
 
 
 def rewritten(text):
