@@ -1,0 +1,22 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <pybind11/pybind11.h>
+
+/// The private module gpureg._core: one file per subject. Arguments are strict here (float32
+/// arrays, no conversion); python/gpureg is the face that takes whatever people have.
+namespace gpureg::python {
+
+namespace py = pybind11;
+
+void bind_errors(py::module_& m);
+void bind_context(py::module_& m);
+void bind_options(py::module_& m);
+void bind_result(py::module_& m);
+void bind_cloud(py::module_& m);
+void bind_prepare(py::module_& m);
+void bind_align(py::module_& m);
+void bind_files(py::module_& m);
+void bind_evaluation(py::module_& m);
+
+}  // namespace gpureg::python

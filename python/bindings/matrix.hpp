@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <pybind11/numpy.h>
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "bindings.hpp"
+
+namespace gpureg::python {
+
+/// A new C-ordered float64 array with the numbers of an Eigen matrix; vectors become
+/// one-dimensional.
+template <typename Derived>
+py::array_t<double> array_of(const Eigen::MatrixBase<Derived>& matrix) {
+  constexpr bool vector = Derived::ColsAtCompileTime == 1;
+  std::vector<py::ssize_t> shape{matrix.rows()};
+  if (!vector) shape.push_back(matrix.cols());
+  py::array_t<double> out(shape);
+  double* next = out.mutable_data();
+  for (Eigen::Index row = 0; row < matrix.rows(); ++row)
+    for (Eigen::Index column = 0; column < matrix.cols(); ++column) *next++ = matrix(row, column);
+  return out;
+}
+
+/// Takes only what has exactly that shape. Raises InvalidArgument.
+template <typename Matrix>
+Matrix matrix_of(const py::array_t<double, py::array::c_style | py::array::forcecast>& array,
+                 const char* name) {
+  constexpr int rows = Matrix::RowsAtCompileTime, columns = Matrix::ColsAtCompileTime;
+  const bool fits = columns == 1
+                        ? array.ndim() == 1 && array.shape(0) == rows
+                        : array.ndim() == 2 && array.shape(0) == rows && array.shape(1) == columns;
+  if (!fits)
+    throw py::value_error(std::string(name) + ": expected shape (" + std::to_string(rows) +
+                          (columns == 1 ? ",)" : ", " + std::to_string(columns) + ")") + ", got " +
+                          py::str(array.attr("shape")).cast<std::string>());
+  Matrix out;
+  for (int row = 0; row < rows; ++row)
+    for (int column = 0; column < columns; ++column)
+      out(row, column) = array.data()[row * columns + column];
+  return out;
+}
+
+/// Rows of three floats as a new (N, 3) float32 array.
+inline py::array_t<float> array_of(const std::vector<Eigen::Vector3f>& rows) {
+  py::array_t<float> out({static_cast<py::ssize_t>(rows.size()), py::ssize_t(3)});
+  float* next = out.mutable_data();
+  for (const Eigen::Vector3f& row : rows)
+    for (int k = 0; k < 3; ++k) *next++ = row[k];
+  return out;
+}
+
+}  // namespace gpureg::python

@@ -1,0 +1,17 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "bindings.hpp"
+
+PYBIND11_MODULE(_core, m) {
+  using namespace gpureg::python;
+  m.doc() = "Private: use the package gpureg.";
+  m.attr("__version__") = GPUREG_VERSION;
+  bind_errors(m);
+  bind_context(m);
+  bind_options(m);
+  bind_result(m);
+  bind_cloud(m);
+  bind_prepare(m);
+  bind_align(m);
+  bind_files(m);
+  bind_evaluation(m);
+}

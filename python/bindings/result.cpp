@@ -1,0 +1,202 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "gpureg/result.hpp"
+
+#include <cstdio>
+#include <limits>
+
+#include "fields.hpp"
+#include "matrix.hpp"
+
+namespace gpureg::python {
+namespace {
+
+std::vector<Field<RegistrationStatistics>> statistics_fields() {
+  using S = RegistrationStatistics;
+  return {
+      field("source_points", &S::source_points, "Prepared points of the source."),
+      field("target_points", &S::target_points, "Prepared points of the target."),
+      field("correspondences", &S::correspondences,
+            "Feature matches that quadruples are drawn from."),
+      field("hypotheses", &S::hypotheses, "Quadruples drawn."),
+      field("survivors", &S::survivors, "Of these, passed the polygon test."),
+      field("scored", &S::scored, "Of these, with a well-defined rigid fit."),
+      field("points_scored", &S::points_scored, "Points that the inlier ratio is relative to."),
+      field("consensus", &S::consensus, "Inliers that the pose won by."),
+      field("inliers", &S::inliers, "Inliers that the inlier ratio counts."),
+      field("refine_iterations", &S::refine_iterations, "Iterations of the refinement."),
+      field("swapped", &S::swapped, "The target, being smaller, was sampled and scored."),
+  };
+}
+
+std::vector<Field<StageTimings>> timing_fields() {
+  using T = StageTimings;
+  return {field("match", &T::match, "Feature matching."), field("sample", &T::sample, "Sampling."),
+          field("fit", &T::fit, "Rigid fits."),           field("score", &T::score, "Scoring."),
+          field("refine", &T::refine, "Refinement."),     field("judge", &T::judge, "Judging.")};
+}
+
+std::vector<Field<PrepareStatistics>> prepare_fields() {
+  using P = PrepareStatistics;
+  return {
+      field("input_points", &P::input_points, "Points that came in."),
+      field("invalid_points", &P::invalid_points, "Of these, dropped for NaN or infinity."),
+      field("points", &P::points, "After downsampling."),
+      field("points_without_normal", &P::points_without_normal, "Fewer than 3 neighbours."),
+      field("points_without_feature", &P::points_without_feature, "Never matched."),
+      field("downsample", &P::downsample, "Milliseconds of downsampling."),
+      field("normals", &P::normals, "Milliseconds of the normals."),
+      field("features", &P::features, "Milliseconds of the features."),
+      field("grid", &P::grid, "Milliseconds of the search grid."),
+  };
+}
+
+py::dict state_of(const CorrespondenceMoments& m) {
+  py::dict state;
+  state["count"] = m.count;
+  state["sum"] = array_of(m.sum);
+  state["outer"] = array_of(m.outer);
+  return state;
+}
+
+CorrespondenceMoments moments_from(const py::dict& state) {
+  CorrespondenceMoments m;
+  m.count = state["count"].cast<std::uint64_t>();
+  m.sum = matrix_of<Eigen::Vector3d>(state["sum"].cast<py::array_t<double>>(), "sum");
+  m.outer = matrix_of<Eigen::Matrix3d>(state["outer"].cast<py::array_t<double>>(), "outer");
+  return m;
+}
+
+void bind_moments(py::module_& m) {
+  using M = CorrespondenceMoments;
+  py::class_<M>(m, "CorrespondenceMoments",
+                "Moments of the points that take part in correspondences.")
+      .def_readonly("count", &M::count, "Number of points.")
+      .def_property_readonly(
+          "sum", [](const M& o) { return array_of(o.sum); }, "(3,): sum of p.")
+      .def_property_readonly(
+          "outer", [](const M& o) { return array_of(o.outer); }, "(3, 3): sum of p p'.")
+      .def(
+          "information_redwood", [](const M& o) { return array_of(o.information_redwood()); },
+          "(6, 6): translation first, rotation as quaternion vector.")
+      .def(
+          "information_open3d", [](const M& o) { return array_of(o.information_open3d()); },
+          "(6, 6): rotation (angles) first.")
+      .def(py::pickle(&state_of, &moments_from))
+      .def("__repr__", [](const M& o) {
+        return "<gpureg.CorrespondenceMoments of " + std::to_string(o.count) + " points>";
+      });
+}
+
+// NaN rather than the identity where there is no pose: nobody shall take it for one.
+py::array_t<double> pose_of(const RegistrationResult& r) {
+  Eigen::Matrix4d pose = Eigen::Matrix4d::Constant(std::numeric_limits<double>::quiet_NaN());
+  if (r.has_candidate) pose = r.target_from_source.matrix();
+  return array_of(pose);
+}
+
+std::string text_of(const RegistrationResult& r) {
+  char numbers[160];
+  std::snprintf(numbers, sizeof(numbers), "score %.3f, rmse %.4g, %u of %u inliers, %.1f ms",
+                r.score, r.inlier_rmse, r.statistics.inliers, r.statistics.points_scored,
+                r.timings.total());
+  std::string text = std::string("<gpureg.RegistrationResult ") + to_string(r.status);
+  if (!r.aligned()) text += std::string(": ") + to_string(r.reason);
+  if (r.has_candidate) text += std::string(", ") + numbers;
+  return text + ">";
+}
+
+RegistrationStatus status_from(const std::string& name) {
+  for (const auto s :
+       {RegistrationStatus::aligned, RegistrationStatus::not_aligned, RegistrationStatus::skipped})
+    if (name == to_string(s)) return s;
+  throw py::value_error("status: '" + name + "' is none");
+}
+
+RegistrationReason reason_from(const std::string& name) {
+  for (int k = 0; k <= static_cast<int>(RegistrationReason::cancelled); ++k)
+    if (const auto r = static_cast<RegistrationReason>(k); name == to_string(r)) return r;
+  throw py::value_error("reason: '" + name + "' is none");
+}
+
+py::dict result_state(const RegistrationResult& r) {
+  py::dict state;
+  state["status"] = to_string(r.status);
+  state["reason"] = to_string(r.reason);
+  state["has_candidate"] = r.has_candidate;
+  state["target_from_source"] = array_of(r.target_from_source.matrix());
+  state["score"] = r.score;
+  state["inlier_ratio"] = r.inlier_ratio;
+  state["inlier_rmse"] = r.inlier_rmse;
+  state["source_moments"] = state_of(r.source_moments);
+  state["target_moments"] = state_of(r.target_moments);
+  state["statistics"] = to_dict(r.statistics, statistics_fields());
+  state["timings"] = to_dict(r.timings, timing_fields());
+  return state;
+}
+
+RegistrationResult result_from(const py::dict& state) {
+  RegistrationResult r;
+  r.status = status_from(state["status"].cast<std::string>());
+  r.reason = reason_from(state["reason"].cast<std::string>());
+  r.has_candidate = state["has_candidate"].cast<bool>();
+  r.target_from_source.matrix() = matrix_of<Eigen::Matrix4d>(
+      state["target_from_source"].cast<py::array_t<double>>(), "target_from_source");
+  r.score = state["score"].cast<double>();
+  r.inlier_ratio = state["inlier_ratio"].cast<double>();
+  r.inlier_rmse = state["inlier_rmse"].cast<double>();
+  r.source_moments = moments_from(state["source_moments"]);
+  r.target_moments = moments_from(state["target_moments"]);
+  assign(r.statistics, statistics_fields(), state["statistics"], "RegistrationStatistics");
+  assign(r.timings, timing_fields(), state["timings"], "StageTimings");
+  return r;
+}
+
+void bind_registration_result(py::module_& m) {
+  using R = RegistrationResult;
+  py::class_<R>(m, "RegistrationResult", "Result of one pair.")
+      .def_property_readonly(
+          "status", [](const R& r) { return to_string(r.status); },
+          "\"aligned\", \"not_aligned\", or \"skipped\" (never tried).")
+      .def_property_readonly(
+          "reason", [](const R& r) { return to_string(r.reason); },
+          "Why the pair is not aligned; \"none\" where it is.")
+      .def_property_readonly(
+          "explanation", [](const R& r) { return explain(r.reason); }, "The reason as a sentence.")
+      .def_property_readonly("aligned", &R::aligned, "status == \"aligned\".")
+      .def_readonly("has_candidate", &R::has_candidate,
+                    "target_from_source holds a pose, reported or not.")
+      .def_property_readonly("target_from_source", &pose_of,
+                             "(4, 4) float64: maps points of the source into the target's frame; "
+                             "NaN where there is no candidate.")
+      .def_readonly("score", &R::score, "What ranks results.")
+      .def_readonly("inlier_ratio", &R::inlier_ratio, "Inliers over points scored, [0, 1].")
+      .def_readonly("inlier_rmse", &R::inlier_rmse, "Metres, over the inliers.")
+      .def_readonly("source_moments", &R::source_moments,
+                    "Of all correspondences: points of the source, in its frame.")
+      .def_readonly("target_moments", &R::target_moments,
+                    "Of all correspondences: points of the target, in its frame.")
+      .def_readonly("statistics", &R::statistics, "What was left after each stage.")
+      .def_readonly("timings", &R::timings, "Milliseconds per stage.")
+      .def("to_dict", &result_state, "All values as plain Python and numpy objects.")
+      .def(py::pickle(&result_state, &result_from))
+      .def("__repr__", &text_of);
+}
+
+}  // namespace
+
+void bind_result(py::module_& m) {
+  bind_record_class<RegistrationStatistics>(m, "RegistrationStatistics",
+                                            "What went in and was left after each stage.",
+                                            statistics_fields());
+  bind_record_class<StageTimings>(m, "StageTimings", "Milliseconds of each stage of one pair.",
+                                  timing_fields())
+      .def_property_readonly("total", &StageTimings::total, "Milliseconds of all stages.");
+  bind_record_class<PrepareStatistics>(m, "PrepareStatistics",
+                                       "Counts and milliseconds of the preparation of one cloud.",
+                                       prepare_fields())
+      .def_property_readonly("total", &PrepareStatistics::total, "Milliseconds of all stages.");
+  bind_moments(m);
+  bind_registration_result(m);
+}
+
+}  // namespace gpureg::python

@@ -1,0 +1,184 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Whatever people hold their clouds in, as what the core takes: float32 rows on the host.
+
+Errors name the argument and the shape or type that it has.
+"""
+
+from __future__ import annotations
+
+import os
+from typing import Any, Optional, Tuple, Union
+
+import numpy as np
+import numpy.typing as npt
+
+from . import _core
+from ._core import PointCloud, PrepareOptions
+
+FloatArray = npt.NDArray[np.float32]
+#: (points, normals, features, viewpoints, origin), the last four may be None.
+CoreCloud = Tuple[
+    FloatArray,
+    Optional[FloatArray],
+    Optional[FloatArray],
+    Optional[FloatArray],
+    Optional[npt.NDArray[np.float64]],
+]
+
+_HOST_DEVICES = (1, 3)  # DLPack's kDLCPU and kDLCUDAHost
+# float32 must resolve this part of a voxel, or coordinates are moved before they become float32.
+_PARTS_OF_VOXEL = 256
+_MILLIMETRE = 1e-3  # what stands in for the voxel where points are kept as they are
+
+
+def to_numpy(value: Any, name: str) -> npt.NDArray[Any]:
+    """An array on the host that shares memory with value where that is possible."""
+    if isinstance(value, np.ndarray):
+        return value
+    if hasattr(value, "detach"):  # a tensor that is part of a graph refuses DLPack
+        value = value.detach()
+    if hasattr(value, "__dlpack_device__"):
+        if value.__dlpack_device__()[0] not in _HOST_DEVICES:
+            return _from_device(value, name)
+        try:
+            return np.from_dlpack(value)
+        except (BufferError, RuntimeError, TypeError, ValueError) as error:
+            raise TypeError(f"{name}: numpy cannot take this {_kind(value)}: {error}") from None
+    if hasattr(value, "__cuda_array_interface__"):
+        return _from_device(value, name)
+    try:
+        return np.asarray(value)
+    except (TypeError, ValueError) as error:  # such as rows of different lengths
+        raise TypeError(f"{name}: no array can be made of this {_kind(value)}: {error}") from None
+
+
+def _kind(value: Any) -> str:
+    dtype = f" of {value.dtype}" if hasattr(value, "dtype") else ""
+    return f"{type(value).__name__}{dtype}"
+
+
+def _from_device(value: Any, name: str) -> npt.NDArray[Any]:
+    """A copy on the host, by the means of the library that the array is from."""
+    for method in ("cpu", "get", "copy_to_host"):  # torch, cupy, numba
+        if hasattr(value, method):
+            return np.asarray(getattr(value, method)())
+    raise TypeError(f"{name}: no way to copy a {_kind(value)} from its device")
+
+
+def matrix(value: Any, name: str, columns: Optional[int], rows: Optional[int] = None) -> npt.NDArray[Any]:
+    """Checks type and shape; returns the array as it is."""
+    array = to_numpy(value, name)
+    if array.dtype.kind not in "fiu":
+        raise TypeError(f"{name}: expected numbers, got dtype {array.dtype} (shape {array.shape})")
+    wanted = f"({'N' if rows is None else rows}, {'D' if columns is None else columns})"
+    if array.ndim != 2 or (columns is not None and array.shape[1] != columns):
+        raise ValueError(f"{name}: expected shape {wanted}, got {array.shape}")
+    if rows is not None and array.shape[0] != rows:
+        raise ValueError(f"{name}: expected shape {wanted}, one row per point, got {array.shape}")
+    return array
+
+
+def float_rows(array: npt.NDArray[Any], name: str) -> FloatArray:
+    """float32 rows. No copy where they are that already, also with room between the rows."""
+    size = array.itemsize
+    if (
+        array.dtype == np.float32
+        and array.dtype.isnative
+        and array.flags.aligned
+        and (array.shape[1] <= 1 or array.strides[1] == size)
+        and (array.shape[0] <= 1 or (array.strides[0] % size == 0 and array.strides[0] >= size * array.shape[1]))
+    ):
+        return array
+    with np.errstate(over="ignore"):
+        rows = np.array(array, dtype=np.float32, order="C")
+    if rows.dtype != array.dtype and array.dtype.itemsize > 4:
+        lost = np.isfinite(array) & ~np.isfinite(rows)
+        if lost.any():
+            row = int(np.argwhere(lost)[0][0])
+            raise ValueError(f"{name}: row {row} is {array[row].tolist()}, too large for float32 (shape {array.shape})")
+    return rows
+
+
+def origin_of(points: npt.NDArray[Any], voxel_size: float) -> Optional[npt.NDArray[np.float64]]:
+    """What to take off coordinates that float32 is too coarse for; None where it is fine enough.
+
+    Only types finer than float32 can hold such coordinates.
+    """
+    if points.dtype.itemsize <= 4 or len(points) == 0:
+        return None
+    finite = points[np.isfinite(points).all(axis=1)]
+    if len(finite) == 0:
+        return None
+    low, high = finite.min(axis=0).astype(np.float64), finite.max(axis=0).astype(np.float64)
+    largest = max(float(np.abs(low).max()), float(np.abs(high).max()))
+    if largest > float(np.finfo(np.float32).max):
+        return None  # an error that float_rows explains
+    if float(np.spacing(np.float32(largest))) * _PARTS_OF_VOXEL <= (voxel_size or _MILLIMETRE):
+        return None
+    return np.asarray(np.round(low + (high - low) / 2))
+
+
+def core_cloud(
+    points: Any,
+    normals: Any,
+    features: Any,
+    viewpoints: Any,
+    options: PrepareOptions,
+    name: str = "points",
+) -> CoreCloud:
+    """One cloud for the core. points may also be a PointCloud, a path, or look like Open3D's cloud."""
+    prefix = "" if name == "points" else f"{name}."
+    points, normals, viewpoints = _unpack(points, normals, viewpoints)
+    raw = matrix(points, name, 3)
+    count = raw.shape[0]
+    origin = origin_of(raw, options.voxel_size)
+    views = None if viewpoints is None else matrix(viewpoints, prefix + "viewpoints", 3)
+    if origin is not None:
+        # With no viewpoint given, the sensor was where the caller's frame has its origin.
+        views = np.zeros((1, 3)) if views is None else views
+        raw, views = raw - origin, views - origin
+    return (
+        float_rows(raw, name),
+        None if normals is None else float_rows(matrix(normals, prefix + "normals", 3, count), prefix + "normals"),
+        None if features is None else float_rows(matrix(features, prefix + "features", None, count), prefix + "features"),
+        None if views is None else np.ascontiguousarray(float_rows(views, prefix + "viewpoints")),
+        origin,
+    )
+
+
+def _unpack(points: Any, normals: Any, viewpoints: Any) -> Tuple[Any, Any, Any]:
+    """Clouds that carry their normals along."""
+    if isinstance(points, (str, os.PathLike)):
+        points = _core.read_point_cloud(os.fspath(points))
+    if isinstance(points, PointCloud):
+        if normals is None and len(points.normals):
+            normals = points.normals
+        if viewpoints is None and len(points.viewpoints):
+            viewpoints = points.viewpoints
+        return points.points, normals, viewpoints
+    if hasattr(points, "points") and hasattr(points, "has_normals"):  # open3d.geometry.PointCloud
+        if normals is None and points.has_normals():
+            normals = np.asarray(points.normals)
+        return np.asarray(points.points).reshape(-1, 3), normals, viewpoints
+    if hasattr(points, "point") and hasattr(points.point, "positions"):  # open3d.t.geometry.PointCloud
+        if normals is None and "normals" in points.point:
+            normals = points.point.normals
+        return points.point.positions, normals, viewpoints
+    return points, normals, viewpoints
+
+
+def index_pairs(value: Any, name: str, count: Union[int, Tuple[int, int]]) -> npt.NDArray[np.uint32]:
+    """(M, 2) indices below count (one for each column); an empty list is (0, 2)."""
+    array = to_numpy(value if hasattr(value, "shape") else list(value), name)
+    if array.size == 0 and array.ndim <= 2:
+        array = np.zeros((0, 2), np.int64)
+    if array.dtype.kind not in "iu":
+        raise TypeError(f"{name}: expected whole numbers, got dtype {array.dtype} (shape {array.shape})")
+    if array.ndim != 2 or array.shape[1] != 2:
+        raise ValueError(f"{name}: expected shape (M, 2), got {array.shape}")
+    limits = (count, count) if isinstance(count, int) else count
+    wrong = (array < 0) | (array >= np.asarray(limits))
+    if wrong.any():
+        row = int(np.argwhere(wrong)[0][0])
+        raise ValueError(f"{name}[{row}] is {tuple(array[row].tolist())}, but there are {' and '.join(map(str, limits[:1] if isinstance(count, int) else limits))} (shape {array.shape})")
+    return np.ascontiguousarray(array, dtype=np.uint32)

@@ -1,0 +1,51 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Clouds from and to files."""
+
+from __future__ import annotations
+
+import os
+from typing import Any, Union
+
+from . import _core
+from ._arrays import float_rows, matrix
+from ._core import PointCloud
+
+Path = Union[str, "os.PathLike[str]"]
+
+
+def read_point_cloud(path: Path) -> PointCloud:
+    """Read a PLY or PCD file, told apart by content.
+
+    Raises
+    ------
+    IoError
+        An OSError, naming the file (and the line, in text) and the reason.
+    """
+    return _core.read_point_cloud(os.fspath(path))
+
+
+def write_point_cloud(path: Path, points: Any, normals: Any = None) -> None:
+    """Write a binary PLY with float32 points and, where given, normals: all of it, or nothing.
+
+    Parameters
+    ----------
+    path : str or PathLike
+    points : (N, 3) array or PointCloud
+    normals : (N, 3) array, optional
+
+    Examples
+    --------
+    >>> import gpureg, tempfile, os
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     file = os.path.join(folder, "two.ply")
+    ...     gpureg.write_point_cloud(file, [[0, 0, 0], [1, 2, 3]])
+    ...     gpureg.read_point_cloud(file).points
+    array([[0., 0., 0.],
+           [1., 2., 3.]], dtype=float32)
+    """
+    if not isinstance(points, PointCloud):
+        rows = float_rows(matrix(points, "points", 3), "points")
+        if normals is not None:
+            normals = float_rows(matrix(normals, "normals", 3, len(rows)), "normals")
+        points = PointCloud(rows, normals)
+    _core.write_point_cloud(os.fspath(path), points)

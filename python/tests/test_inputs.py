@@ -1,0 +1,252 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What goes in as a cloud: the right answer, or an exception that names argument and shape."""
+
+import gc
+import resource
+import types
+
+import numpy as np
+import pytest
+from conftest import error_of, few, moved
+
+import gpureg
+from gpureg._arrays import float_rows, to_numpy
+
+
+def same_points(cloud, expected):
+    return np.array_equal(cloud.points, expected.points)
+
+
+@pytest.fixture(scope="module")
+def reference(source):
+    return gpureg.prepare(source.astype(np.float32))
+
+
+@pytest.mark.parametrize("dtype", ["float32", ">f4", "float64", ">f8", "longdouble"])
+def test_float_types_give_the_same_cloud(source, reference, dtype):
+    exact = source.astype(np.float32).astype(dtype)
+    assert same_points(gpureg.prepare(exact), reference)
+
+
+@pytest.mark.parametrize("dtype", ["float16", "int8", "uint16", "int64"])
+def test_coarse_types_are_converted(source, dtype):
+    points = (source * 8).astype(dtype)
+    options = gpureg.RegistrationOptions.from_voxel_size(0.4).prepare
+    assert same_points(gpureg.prepare(points, options=options), gpureg.prepare(points.astype("f4"), options=options))
+
+
+def layouts(points):
+    read_only = points.copy()
+    read_only.flags.writeable = False
+    wide = np.full((len(points), 7), np.nan, np.float32)
+    wide[:, 2:5] = points
+    spread = np.zeros((2 * len(points), 6), np.float32)
+    spread[::2, ::2] = points
+    raw = np.zeros(points.nbytes + 1, np.uint8)
+    unaligned = raw[1:].view(np.float32).reshape(points.shape)
+    unaligned[:] = points
+    backwards = points[::-1].copy()[::-1]
+    return {
+        "fortran": np.asfortranarray(points),
+        "read-only": read_only,
+        "columns of a wide matrix": wide[:, 2:5],
+        "every other row and column": spread[::2, ::2],
+        "not aligned": unaligned,
+        "backwards": backwards,
+        "list": points.tolist(),
+        "buffer": memoryview(points),
+    }
+
+
+@pytest.mark.parametrize("layout", list(layouts(np.zeros((2, 3), np.float32))))
+def test_layouts_give_the_same_cloud(source, reference, layout):
+    given = layouts(source.astype(np.float32))[layout]
+    assert same_points(gpureg.prepare(given), reference)
+
+
+def test_one_copy_at_most():
+    wide = np.zeros((10, 4), np.float32)
+    assert float_rows(wide, "x") is wide
+    assert np.shares_memory(float_rows(wide[:, :3], "x"), wide)  # rows as PCL has them
+    assert np.shares_memory(float_rows(wide[2:7:2, 1:], "x"), wide)
+    assert not np.shares_memory(float_rows(wide.T, "x"), wide)
+    assert to_numpy(wide, "x") is wide
+
+
+def test_map_coordinates_lose_nothing(source, truth):
+    offset_a, offset_b = np.array([455_000.25, 5_410_000.5, 310.0]), np.array([-7e6, 12.0, 3e5])
+    a, b = gpureg.prepare(source + offset_a), gpureg.prepare(moved(source, truth) + offset_b)
+    assert a.origin.any() and a.points.dtype == np.float64
+    assert np.abs(a.points.mean(axis=0) - source.mean(axis=0) - offset_a).max() < 0.05
+    assert np.array_equal(a.viewpoints, np.zeros((1, 3)))  # where the caller's frame has its origin
+    result = gpureg.align(a, b, options=few())
+    where = moved(source + offset_a, result.target_from_source) - (moved(source, truth) + offset_b)
+    # As without offsets: a fraction of the voxel. float32 at 7e6 would be off by 0.5.
+    assert result.aligned and np.abs(where).max() < 0.03
+    again = gpureg.align_batch([a, b], [(0, 1)], options=few())[0]
+    assert np.array_equal(again.target_from_source, result.target_from_source)
+    moments = result.source_moments
+    assert np.abs(moments.sum / moments.count - (source + offset_a).mean(axis=0)).max() < 0.2
+
+
+def test_small_float64_coordinates_are_only_cast(source, reference):
+    assert not gpureg.prepare(source + 100.0).origin.any()
+    assert same_points(gpureg.prepare(source), reference)
+
+
+def test_nan_and_infinite_rows_are_dropped_and_counted(source, reference):
+    dirty = np.insert(source.astype(np.float32), [0, 5, len(source)], np.nan, axis=0)
+    dirty[0] = [np.inf, 0, 0]
+    cloud = gpureg.prepare(dirty)
+    assert cloud.statistics.invalid_points == 3 and same_points(cloud, reference)
+    assert len(gpureg.prepare(np.full((4, 3), np.nan))) == 0
+
+
+def test_empty_clouds_have_a_reason(source):
+    for empty in (np.zeros((0, 3)), np.zeros((0, 3), np.float32), np.zeros((0, 3), np.int64)):
+        assert gpureg.register(empty, source).reason == "too_few_source_points"
+    assert gpureg.register(source, source[:3], hypotheses=100).reason == "too_few_target_points"
+    assert len(gpureg.prepare(np.zeros((0, 3)), features=np.zeros((0, 8)), normals=np.zeros((0, 3)))) == 0
+    assert gpureg.align_batch([], []) == [] and gpureg.prepare_batch([]) == []
+
+
+@pytest.mark.parametrize(
+    ("value", "error", "message"),
+    [
+        (np.zeros((3, 100)), ValueError, r"points: expected shape \(N, 3\), got \(3, 100\)"),
+        (np.zeros(3), ValueError, r"points: expected shape \(N, 3\), got \(3,\)"),
+        (np.zeros((2, 3, 3)), ValueError, r"got \(2, 3, 3\)"),
+        (np.zeros(()), ValueError, r"got \(\)"),
+        ([], ValueError, r"points: expected shape \(N, 3\), got \(0,\)"),
+        (np.zeros((5, 3), complex), TypeError, r"points: expected numbers, got dtype complex128 \(shape \(5, 3\)\)"),
+        (np.zeros((5, 3), bool), TypeError, "points: expected numbers, got dtype bool"),
+        (np.full((5, 3), "1"), TypeError, "points: expected numbers, got dtype <U1"),
+        (np.full((5, 3), None), TypeError, "points: expected numbers, got dtype object"),
+        (np.zeros((5, 3), "M8[s]"), TypeError, "points: expected numbers, got dtype datetime64"),
+        ([[1, 2, 3], [4, 5]], TypeError, "points: no array can be made of this list"),
+        (None, TypeError, "points: expected numbers, got dtype object"),
+        (np.array([[0, 0, 0], [1e300, 0, 0]]), ValueError, r"points: row 1 is \[1e\+300.*too large for float32"),
+    ],
+)
+def test_wrong_points_are_named(value, error, message):
+    with pytest.raises(error, match=message):
+        gpureg.prepare(value)
+
+
+def test_wrong_companions_are_named(source):
+    with pytest.raises(ValueError, match=r"normals: expected shape \(6000, 3\), one row per point, got \(4, 3\)"):
+        gpureg.prepare(source, normals=np.zeros((4, 3)))
+    with pytest.raises(ValueError, match=r"features: expected shape \(6000, D\), got \(6000,\)"):
+        gpureg.prepare(source, features=np.zeros(len(source)))
+    with pytest.raises(gpureg.InvalidArgument, match="feature_dimension is 0"):
+        gpureg.prepare(source, features=np.zeros((len(source), 0)))
+    with pytest.raises(ValueError, match=r"viewpoints: expected shape \(N, 3\), got \(3,\)"):
+        gpureg.prepare(source, viewpoints=[0, 0, 0])
+    with pytest.raises(gpureg.InvalidArgument, match="viewpoints is nan"):
+        gpureg.prepare(source, viewpoints=[[0, np.nan, 0]])
+    with pytest.raises(ValueError, match=r"target: expected shape \(N, 3\), got \(5, 2\)"):
+        gpureg.register(source, np.zeros((5, 2)))
+    with pytest.raises(ValueError, match=r"clouds\[1\]: expected shape"):
+        gpureg.prepare_batch([source, np.zeros((5, 2))])
+    with pytest.raises(TypeError, match=r"source: expected a PreparedCloud, got ndarray of shape \(6000, 3\)"):
+        gpureg.align(source, source)
+    with pytest.raises(TypeError, match="options: expected a RegistrationOptions"):
+        gpureg.register(source, source, options={"voxel_size": 1})
+    with pytest.raises(TypeError, match="either options, or"):
+        gpureg.register(source, source, 0.1, options=few())
+
+
+@pytest.mark.parametrize(
+    ("pairs", "error", "message"),
+    [
+        ([(0, 2)], ValueError, r"pairs\[0\] is \(0, 2\), but there are 2"),
+        ([(0, 1), (-1, 0)], ValueError, r"pairs\[1\] is \(-1, 0\)"),
+        ([(0, 1, 2)], ValueError, r"pairs: expected shape \(M, 2\), got \(1, 3\)"),
+        ([(0.0, 1.0)], TypeError, "pairs: expected whole numbers, got dtype float64"),
+        ("all", TypeError, "pairs: expected whole numbers"),
+    ],
+)
+def test_wrong_pairs_are_named(source, pairs, error, message):
+    with pytest.raises(error, match=message):
+        gpureg.align_batch([source, source], pairs)
+
+
+def test_normals_are_used(source):
+    # They choose the side: all against all, but for those at a right angle to what was given.
+    side = np.tile([0.3, 0.5, 2.0], (len(source), 1))
+    one, other = gpureg.prepare(source, normals=side), gpureg.prepare(source, normals=-side)
+    assert (np.einsum("ij,j->i", one.normals, side[0]) >= 0).all() and one.normals.any()
+    turned = np.einsum("ij,ij->i", one.normals, other.normals)
+    assert np.mean(turned < -0.99) > 0.95
+
+
+def test_dlpack(source, reference):
+    class OnlyDlpack:
+        def __init__(self, array):
+            self.array = array
+
+        def __dlpack__(self, **keywords):
+            return self.array.__dlpack__(**keywords)
+
+        def __dlpack_device__(self):
+            return self.array.__dlpack_device__()
+
+    assert same_points(gpureg.prepare(OnlyDlpack(source.astype(np.float32))), reference)
+
+
+def test_torch(source, reference):
+    torch = pytest.importorskip("torch")
+    tensor = torch.from_numpy(source.astype(np.float32))
+    assert same_points(gpureg.prepare(tensor), reference)
+    assert same_points(gpureg.prepare(tensor.clone().requires_grad_()), reference)
+    assert same_points(gpureg.prepare(tensor.T.contiguous().T), reference)
+    assert same_points(gpureg.prepare(tensor.double()), reference)
+    with pytest.raises(TypeError, match="points: .*bfloat16"):
+        gpureg.prepare(tensor.to(torch.bfloat16))
+
+
+def test_open3d_by_its_looks(source, reference):
+    cloud = types.SimpleNamespace(points=source, normals=source, has_normals=lambda: False)
+    assert same_points(gpureg.prepare(cloud), reference)
+    cloud.has_normals = lambda: True
+    cloud.normals = np.tile([0.3, 0.5, 2.0], (len(source), 1))
+    assert np.array_equal(gpureg.prepare(cloud).normals, gpureg.prepare(source, normals=cloud.normals).normals)
+
+
+def test_files(source, tmp_path, reference):
+    path = tmp_path / "room.ply"
+    gpureg.write_point_cloud(path, source)
+    cloud = gpureg.read_point_cloud(path)
+    assert len(cloud) == len(source) and cloud.normals.shape == (0, 3)
+    for given in (path, str(path), cloud):
+        assert same_points(gpureg.prepare(given), reference)
+    with pytest.raises(OSError, match="nowhere.ply"):
+        gpureg.prepare(tmp_path / "nowhere.ply")
+
+
+def test_no_leak(source):
+    """Resident memory is flat over ten thousand calls of each kind."""
+    context = gpureg.Context.cpu(1)
+    small = np.ascontiguousarray(source[:60])
+    cloud = gpureg.prepare(small, context=context)
+    options = few(4)
+
+    def work(calls):
+        for _ in range(calls):
+            gpureg.prepare(small, context=context)
+            gpureg.align(cloud, cloud, options=options, context=context).to_dict()
+            try:
+                gpureg.prepare(small.T)
+            except ValueError:
+                pass
+
+    def resident():
+        gc.collect()
+        with open("/proc/self/statm") as file:
+            return int(file.read().split()[1]) * resource.getpagesize()
+
+    work(1000)
+    before = resident()
+    work(10000)
+    # One leaked result or cloud per call would be 5 MB and more; what is allowed is the allocator's.
+    assert resident() - before < 2_000_000

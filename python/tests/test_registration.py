@@ -1,0 +1,193 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""register, prepare, align, align_batch: poses, equal bits, interruption, threads."""
+
+import copy
+import os
+import pickle
+import signal
+import threading
+import time
+
+import numpy as np
+import pytest
+from conftest import error_of, few, moved, pose, room
+
+import gpureg
+
+# Voxels of the moved cloud hold other points than those of the cloud at rest: centroids, and so the pose, differ by a
+# fraction of the voxel (5 cm).
+CLOSE = 0.02
+
+
+def bits(result):
+    """Everything but times."""
+    state = result.to_dict()
+    del state["timings"]
+    return pickle.dumps(state)
+
+
+def test_register_finds_the_pose(source, target, truth):
+    result = gpureg.register(source, target, hypotheses=20000)
+    assert result.aligned and result.status == "aligned" and result.reason == "none"
+    assert error_of(result, truth) < CLOSE
+    assert result.target_from_source.dtype == np.float64
+    assert 0.4 < result.inlier_ratio <= 1 and 0 < result.inlier_rmse < 0.05
+    assert result.statistics.hypotheses == 20000
+    assert result.timings.total > 0
+    assert repr(result).startswith("<gpureg.RegistrationResult aligned, score 0.")
+
+
+def test_register_equals_prepare_and_align(source, target):
+    options = few()
+    a, b = gpureg.prepare(source), gpureg.prepare(target)
+    assert bits(gpureg.register(source, target, options=options)) == bits(gpureg.align(a, b, options=options))
+    both = gpureg.align_batch([a, b], [(0, 1), (1, 0)], options=options)
+    assert bits(both[0]) == bits(gpureg.align(a, b, options=options))
+    assert bits(both[1]) == bits(gpureg.align(b, a, options=options))
+
+
+def test_any_number_of_threads_gives_the_same_bits(source, target):
+    results = [
+        gpureg.register(source, target, hypotheses=5000, context=gpureg.Context.cpu(n)) for n in (1, 2, 5)
+    ]
+    assert len({bits(r) for r in results}) == 1
+
+
+def test_seed_and_voxel_size_are_used(source, target):
+    first = gpureg.register(source, target, hypotheses=2000, seed=1)
+    assert bits(first) != bits(gpureg.register(source, target, hypotheses=2000, seed=2))
+    coarse = gpureg.register(source, target, 0.1, hypotheses=2000)
+    assert coarse.statistics.source_points < first.statistics.source_points
+
+
+def test_no_alignment_is_a_status(source):
+    result = gpureg.register(source, np.random.default_rng(0).random((9000, 3)), hypotheses=2000)
+    assert result.status == "not_aligned" and not result.aligned
+    assert result.reason in ("inlier_ratio_too_low", "no_hypothesis_survived", "degenerate_geometry")
+    assert result.explanation
+    if not result.has_candidate:
+        assert np.isnan(result.target_from_source).all()
+
+
+def test_own_features_and_correspondences(source, target, truth):
+    # Features that know the answer: the coordinates at rest.
+    options = few(2000)
+    options.prepare.voxel_size = 0
+    a = gpureg.prepare(source, features=source, options=options.prepare)
+    b = gpureg.prepare(target, features=source, options=options.prepare)
+    assert a.feature_dimension == 3
+    assert error_of(gpureg.align(a, b, options=options), truth) < 1e-4  # the same points, in float32
+    index = np.arange(len(a))
+    result = gpureg.align(a, b, correspondences=np.stack([index, index], axis=1), options=options)
+    assert error_of(result, truth) < 1e-4
+    assert gpureg.align(a, b, correspondences=[], options=options).reason == "no_usable_features"
+
+
+def test_prepared_cloud_shows_what_it_holds(source):
+    cloud = gpureg.prepare(source, viewpoints=[[1, 1, 5]])
+    n = len(cloud)
+    assert cloud.points.shape == cloud.normals.shape == (n, 3)
+    assert cloud.features.shape == (n, 33)
+    assert cloud.viewpoints.tolist() == [[1, 1, 5]]
+    assert cloud.statistics.points == n and cloud.options == gpureg.PrepareOptions()
+    assert cloud.origin.tolist() == [0, 0, 0]
+    with pytest.raises(AttributeError):
+        cloud.points = source
+
+
+def test_results_travel(source, target):
+    result = gpureg.register(source, target, hypotheses=2000)
+    for twin in (pickle.loads(pickle.dumps(result)), copy.deepcopy(result)):
+        assert bits(twin) == bits(result)
+        assert twin.timings == result.timings and twin.statistics == result.statistics
+    information = result.source_moments.information_redwood()
+    assert information.shape == (6, 6) and np.array_equal(information, information.T)
+    assert information[0, 0] == result.source_moments.count
+
+
+def test_progress_counts_up(source):
+    cloud = gpureg.prepare(source)
+    seen = []
+    gpureg.align_batch(
+        [cloud] * 3, [(0, 1)] * 20, options=few(500), context=gpureg.Context.cpu(1), progress=lambda *a: seen.append(a)
+    )
+    assert seen[0] == (0, 20) and seen[-1] == (20, 20) and seen == sorted(seen) and len(seen) > 3
+
+
+def test_error_in_progress_comes_out(source):
+    def progress(done, total):
+        if done:
+            raise RuntimeError("no more")
+
+    with pytest.raises(RuntimeError, match="no more"):
+        gpureg.align_batch([gpureg.prepare(source)], [(0, 0)] * 100, options=few(500), progress=progress)
+
+
+def test_ctrl_c_keeps_what_is_done(source):
+    cloud = gpureg.prepare(source)
+    timer = threading.Timer(0.3, lambda: os.kill(os.getpid(), signal.SIGINT))
+    timer.start()
+    begin = time.monotonic()
+    with pytest.raises(KeyboardInterrupt) as caught:
+        gpureg.align_batch([cloud], [(0, 0)] * 100_000, options=few(20000))
+    assert time.monotonic() - begin < 30
+    assert isinstance(caught.value, gpureg.BatchInterrupted)
+    results = caught.value.results
+    done = [r.status != "skipped" for r in results]
+    assert len(results) == 100_000 and 0 < sum(done) < len(done)
+    assert done == sorted(done, reverse=True)
+    assert bits(results[0]) == bits(gpureg.align(cloud, cloud, options=few(20000)))
+
+
+def test_other_threads_run_during_a_call(source):
+    cloud = gpureg.prepare(source)
+    ticks = []
+    stop = threading.Event()
+
+    def tick():
+        while not stop.wait(0.005):
+            ticks.append(time.monotonic())
+
+    thread = threading.Thread(target=tick)
+    thread.start()
+    begin = time.monotonic()
+    gpureg.align(cloud, cloud, options=few(200_000))
+    end = time.monotonic()
+    stop.set()
+    thread.join()
+    # A call that held the interpreter would show none between its ends.
+    assert sum(begin < t < end for t in ticks) >= min(5, (end - begin) / 0.1)
+
+
+def test_four_threads_get_right_results():
+    clouds = [room(seed, 3000) for seed in range(4)]
+    poses = [pose(seed) for seed in range(4)]
+    expected = [gpureg.register(c, moved(c, t), options=few(5000)) for c, t in zip(clouds, poses)]
+    got = [None] * 4
+
+    def work(k):
+        context = gpureg.Context.cpu(1) if k % 2 else None  # own contexts and the shared one
+        for _ in range(3):
+            got[k] = gpureg.register(clouds[k], moved(clouds[k], poses[k]), options=few(5000), context=context)
+
+    threads = [threading.Thread(target=work, args=(k,)) for k in range(4)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert [bits(r) for r in got] == [bits(r) for r in expected]
+
+
+def test_forked_child_works(source):
+    gpureg.register(source, source, hypotheses=500)  # the default context has threads now
+    child = os.fork()
+    if child == 0:
+        result = gpureg.register(source, source, hypotheses=500)
+        os._exit(0 if result.aligned else 1)
+    assert os.waitpid(child, 0)[1] == 0
+
+
+def test_clouds_of_other_lengths_are_refused(source):
+    cloud = gpureg.prepare(source, options=gpureg.PrepareOptions(search_distance=0.05))
+    with pytest.raises(gpureg.InvalidArgument, match="search_distance"):
+        gpureg.align(cloud, cloud)
