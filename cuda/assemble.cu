@@ -79,9 +79,10 @@ __global__ void count_missing(const std::uint32_t* offset, const Vec3* normals, 
 }
 
 template <typename T>
-std::vector<T> copy_back(const T* device, std::size_t size) {
+std::vector<T> copy_back(const CudaCloud& cloud, const T* device, std::size_t size) {
   std::vector<T> host(size);
   if (size > 0) {
+    const DeviceScope scope(cloud.data.memory()->device());
     // Finished data: any stream may read it, and this one waits for nobody else's work.
     cudaStream_t stream = nullptr;
     check(cudaStreamCreateWithFlags(&stream, cudaStreamNonBlocking), "cudaStreamCreateWithFlags");
@@ -95,10 +96,10 @@ std::vector<T> copy_back(const T* device, std::size_t size) {
 
 }  // namespace
 
-std::vector<Vec3> CudaCloud::copy_points() const { return copy_back(view_on_device.points, size); }
-std::vector<Vec3> CudaCloud::copy_normals() const { return copy_back(view_on_device.normals, size); }
+std::vector<Vec3> CudaCloud::copy_points() const { return copy_back(*this, view_on_device.points, size); }
+std::vector<Vec3> CudaCloud::copy_normals() const { return copy_back(*this, view_on_device.normals, size); }
 std::vector<float> CudaCloud::copy_features() const {
-  return copy_back(view_on_device.features, static_cast<std::size_t>(size) * feature_dimension);
+  return copy_back(*this, view_on_device.features, static_cast<std::size_t>(size) * feature_dimension);
 }
 
 std::vector<std::shared_ptr<CudaCloud>> assemble(Exec& exec, const DownsampledClouds& clouds, const DeviceBuffer<Vec3>& normals,

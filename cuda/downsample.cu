@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <algorithm>
+#include <thread>
 
 #include "algorithm/voxel.hpp"
+#include "host_threads.hpp"
 #include "group.cuh"
 #include "pipeline/checks.hpp"
 #include "stages.hpp"
@@ -133,33 +135,58 @@ void pack_rows(const float* rows, std::size_t size, std::size_t width, std::size
   }
 }
 
-/// All raw clouds in one buffer. Each goes on its way as soon as it is packed.
-DeviceBuffer<float> upload_raw(Exec& exec, Span<const RawCloud> clouds, std::vector<RawSlot>& slots) {
-  const auto floats = [](const RawCloud& raw) { return raw.size * (3 + (raw.normals ? 3 : 0) + (raw.features ? raw.feature_dimension : 0)); };
-  std::size_t total = 0;
-  for (const RawCloud& raw : clouds) total += floats(raw);
-  auto device = exec.buffer<float>(total);
-  float* staged = exec.staging<float>(total);
+std::size_t floats_of(const RawCloud& raw) { return raw.size * (3 + (raw.normals ? 3 : 0) + (raw.features ? raw.feature_dimension : 0)); }
+
+/// Rows that an engine has taken out of device memory, see adopt.cu: tight already.
+bool on_device(const RawCloud& raw) {
+  cudaPointerAttributes attributes{};
+  const bool known = raw.points && cudaPointerGetAttributes(&attributes, raw.points) == cudaSuccess;
+  if (raw.points && !known) cudaGetLastError();
+  return known && attributes.type == cudaMemoryTypeDevice;
+}
+
+/// Packs one cloud and sends it on its way. Returns where its parts will be.
+RawSlot upload_cloud(Exec& exec, const RawCloud& raw, float* staged, float* device) {
   std::size_t at = 0;
+  const auto place = [&](const float* rows, std::size_t width, std::size_t stride) -> const float* {
+    if (!rows || raw.size == 0) return nullptr;
+    pack_rows(rows, raw.size, width, stride, staged + at);
+    const float* where = device + at;
+    at += raw.size * width;
+    return where;
+  };
+  RawSlot slot{};
+  slot.points = reinterpret_cast<const Vec3*>(place(raw.points, 3, raw.point_stride));
+  slot.normals = reinterpret_cast<const Vec3*>(place(raw.normals, 3, raw.normal_stride));
+  slot.features = place(raw.features, raw.feature_dimension, raw.feature_stride);
+  if (at > 0) check(cudaMemcpyAsync(device, staged, at * sizeof(float), cudaMemcpyHostToDevice, exec.stream()), "cudaMemcpyAsync of raw points");
+  return slot;
+}
+
+/// All raw clouds of host memory in one buffer; each goes on its way as soon as it is packed. One core packs slower than the bus carries.
+DeviceBuffer<float> upload_raw(Exec& exec, Span<const RawCloud> clouds, std::vector<RawSlot>& slots) {
+  constexpr std::size_t kFloatsPerThread = std::size_t(1) << 20;
+  std::vector<std::uint8_t> there;
+  std::vector<std::size_t> offset{0};
   for (const RawCloud& raw : clouds) {
-    const std::size_t begin = at;
-    const auto place = [&](const float* rows, std::size_t width, std::size_t stride) -> const float* {
-      if (!rows || raw.size == 0) return nullptr;
-      pack_rows(rows, raw.size, width, stride, staged + at);
-      const float* where = device.data() + at;
-      at += raw.size * width;
-      return where;
-    };
-    RawSlot slot{};
-    slot.points = reinterpret_cast<const Vec3*>(place(raw.points, 3, raw.point_stride));
-    slot.normals = reinterpret_cast<const Vec3*>(place(raw.normals, 3, raw.normal_stride));
-    slot.features = place(raw.features, raw.feature_dimension, raw.feature_stride);
-    slot.dimension = slot.features ? static_cast<std::uint32_t>(raw.feature_dimension) : 0;
-    slots.push_back(slot);
-    if (at > begin)
-      check(cudaMemcpyAsync(device.data() + begin, staged + begin, (at - begin) * sizeof(float), cudaMemcpyHostToDevice, exec.stream()),
-            "cudaMemcpyAsync of raw points");
+    there.push_back(on_device(raw));
+    offset.push_back(offset.back() + (there.back() ? 0 : floats_of(raw)));
   }
+  auto device = exec.buffer<float>(offset.back());
+  float* staged = exec.staging<float>(offset.back());
+  slots.resize(clouds.size);
+  const std::size_t threads = std::min<std::size_t>({4, clouds.size, 1 + offset.back() / kFloatsPerThread, std::max(1u, std::thread::hardware_concurrency())});
+  for_each_index(threads, clouds.size, [&](std::size_t c) {
+    const RawCloud& raw = clouds[c];
+    if (there[c]) {
+      slots[c].points = reinterpret_cast<const Vec3*>(raw.points), slots[c].normals = reinterpret_cast<const Vec3*>(raw.normals);
+      slots[c].features = raw.features;
+      return;
+    }
+    const DeviceScope scope(exec.device());
+    slots[c] = upload_cloud(exec, raw, staged + offset[c], device.data() + offset[c]);
+  });
+  for (std::size_t c = 0; c < clouds.size; ++c) slots[c].dimension = slots[c].features ? static_cast<std::uint32_t>(clouds[c].feature_dimension) : 0;
   return device;
 }
 

@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include <mutex>
+#include "engine.hpp"
+
 #include <string>
+#include <unordered_map>
 
 #include "gpureg/context.hpp"
-#include "gpureg/error.hpp"
 #include "pipeline/align.hpp"
 #include "pipeline/prepare.hpp"
 #include "stages.hpp"
@@ -11,115 +12,95 @@
 namespace gpureg::cuda {
 namespace {
 
-/// Raw points that are prepared together: enough to fill the device, few enough for its memory and the staging.
-constexpr std::size_t kRawPointsPerChunk = std::size_t(1) << 24;
+/// Raw points that are prepared together: enough to fill the device, few enough for its memory and for page-locked staging.
+constexpr std::size_t kRawPointsPerChunk = std::size_t(1) << 22;
 constexpr std::size_t kCloudsPerChunk = 256;
 constexpr std::size_t kPairsPerChunk = 256;
 /// For one bit per hypothesis of every pair of a chunk.
 constexpr std::size_t kSampleBytes = std::size_t(256) << 20;
+/// What a fragment takes, about, for each raw point: with a budget no chunk is prepared that is far beyond it.
+constexpr std::size_t kBytesPerRawPoint = 128;
 
-/// Clouds of one device go with any context of that device.
-const void* memory_of(int device) {
-  static const char tokens[256] = {};
-  return tokens + device % 256;
-}
-
-class CudaEngine final : public Engine {
- public:
-  explicit CudaEngine(int device) : exec_(device) {
-    cudaDeviceProp properties{};
-    check(cudaGetDeviceProperties(&properties, device), "cudaGetDeviceProperties");
-    description_ = "cuda:" + std::to_string(device) + ", " + properties.name;
-  }
-
-  Backend backend() const override { return Backend::cuda; }
-  unsigned threads() const override { return 1; }
-  std::string description() const override { return description_; }
-  const void* memory() const override { return memory_of(exec_.device()); }
-  std::size_t pairs_per_chunk(const RegistrationOptions& options) const override {
-    const std::size_t fit = kSampleBytes / (options.hypothesis.count / 8 + 4096);
-    return fit < 1 ? 1 : (fit < kPairsPerChunk ? fit : kPairsPerChunk);
-  }
-
-  std::vector<std::shared_ptr<PreparedState>> prepare(Span<const RawCloud> clouds, const PrepareOptions& options) override {
-    std::lock_guard<std::mutex> lock(mutex_);
-    const DeviceScope scope(exec_.device());
-    std::vector<std::shared_ptr<PreparedState>> out;
-    for (std::size_t begin = 0, end; begin < clouds.size; begin = end) {
-      std::size_t points = clouds[begin].size;
-      for (end = begin + 1; end < clouds.size && end - begin < kCloudsPerChunk && points + clouds[end].size <= kRawPointsPerChunk; ++end)
-        points += clouds[end].size;
-      exec_.begin();
-      for (auto& cloud : pipeline::prepare(exec_, Span<const RawCloud>{clouds.data + begin, end - begin}, options)) {
-        cloud->owner = memory();
-        out.push_back(std::move(cloud));
-      }
-    }
-    return out;
-  }
-
-  void align(Span<const PairInput> pairs, const RegistrationOptions& options, Span<PairOutcome> outcomes) override {
-    std::lock_guard<std::mutex> lock(mutex_);
-    const DeviceScope scope(exec_.device());
-    exec_.begin();
-    std::vector<PairView> views(pairs.size);
-    for (std::size_t p = 0; p < pairs.size; ++p)
-      views[p] = {static_cast<const CudaCloud*>(pairs[p].source)->view_on_device, static_cast<const CudaCloud*>(pairs[p].target)->view_on_device,
-                  pairs[p].custom_source.data, pairs[p].custom_target.data, static_cast<std::uint32_t>(pairs[p].custom_source.size)};
-    pipeline::align(exec_, span_of(views), options, outcomes);
-  }
-
- private:
-  std::mutex mutex_;
-  Exec exec_;
-  std::string description_;
-};
-
-/// Says what is there, or why nothing is.
-int device_count(std::string& why_none) {
-  int count = 0;
-  const cudaError_t error = cudaGetDeviceCount(&count);
-  if (error == cudaSuccess && count > 0) return count;
-  cudaGetLastError();
-  int driver = 0, runtime = 0;
-  cudaDriverGetVersion(&driver);
-  cudaRuntimeGetVersion(&runtime);
-  const auto version = [](int v) { return std::to_string(v / 1000) + "." + std::to_string(v % 1000 / 10); };
-  if (driver == 0)
-    why_none = "no NVIDIA driver on this machine";
-  else if (error == cudaErrorInsufficientDriver)
-    why_none = "the NVIDIA driver supports CUDA " + version(driver) + ", this build needs " + version(runtime);
-  else
-    why_none = error == cudaSuccess ? "no CUDA device on this machine" : std::string(cudaGetErrorName(error)) + ", " + cudaGetErrorString(error);
-  return 0;
-}
+/// Clouds of one engine go with any other: the memory that they say they live in is that of all devices.
+const char kDeviceMemory = 0;
 
 }  // namespace
-}  // namespace gpureg::cuda
 
-namespace gpureg {
-
-std::shared_ptr<Engine> make_cuda_engine(int device) {
-  std::string why_none;
-  const int count = cuda::device_count(why_none);
-  if (count == 0) throw BackendUnavailable("cuda: " + why_none);
-  if (device >= count)
-    throw BackendUnavailable("cuda: device " + std::to_string(device) + " does not exist, this machine has " + std::to_string(count));
-  return std::make_shared<cuda::CudaEngine>(device);
+CudaEngine::CudaEngine(int device, std::size_t memory_budget) : exec_(device), residence_(exec_, memory_budget) {
+  cudaDeviceProp properties{};
+  check(cudaGetDeviceProperties(&properties, device), "cudaGetDeviceProperties");
+  description_ = "cuda:" + std::to_string(device) + ", " + properties.name;
 }
 
-std::vector<std::string> describe_cuda_devices() {
-  std::string why_none;
-  const int count = cuda::device_count(why_none);
-  if (count == 0) return {"cuda: " + why_none};
-  std::vector<std::string> lines;
-  for (int device = 0; device < count; ++device) {
-    cudaDeviceProp p{};
-    if (cudaGetDeviceProperties(&p, device) != cudaSuccess) continue;
-    lines.push_back("cuda:" + std::to_string(device) + ", " + p.name + ", compute capability " + std::to_string(p.major) + "." +
-                    std::to_string(p.minor) + ", " + std::to_string(p.totalGlobalMem >> 20) + " MiB");
+Backend CudaEngine::backend() const { return Backend::cuda; }
+
+const void* CudaEngine::memory() const { return &kDeviceMemory; }
+
+std::vector<DeviceMemoryUse> CudaEngine::device_memory() const {
+  return {{device(), exec_.memory()->bytes_in_use(), exec_.memory()->bytes_reserved(), residence_.evictions()}};
+}
+
+std::size_t CudaEngine::pairs_per_chunk(const RegistrationOptions& options) const {
+  const std::size_t fit = kSampleBytes / (options.hypothesis.count / 8 + 4096);
+  return fit < 1 ? 1 : (fit < kPairsPerChunk ? fit : kPairsPerChunk);
+}
+
+void CudaEngine::prepare_chunk(Span<const RawCloud> clouds, const PrepareOptions& options, std::vector<std::shared_ptr<PreparedState>>& out) {
+  exec_.begin();
+  for (auto& cloud : pipeline::prepare(exec_, clouds, options)) {
+    cloud->owner = memory();
+    auto fragment = std::make_shared<Fragment>(std::move(cloud));
+    residence_.add(*fragment);
+    out.push_back(std::move(fragment));
   }
-  return lines;
+  residence_.make_room(0, {});
 }
 
-}  // namespace gpureg
+std::vector<std::shared_ptr<PreparedState>> CudaEngine::prepare(Span<const RawCloud> clouds, const PrepareOptions& options) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  const DeviceScope scope(device());
+  return prepare_on_stream(clouds, options);
+}
+
+std::vector<std::shared_ptr<PreparedState>> CudaEngine::prepare_on_stream(Span<const RawCloud> clouds, const PrepareOptions& options) {
+  const std::size_t budget = residence_.budget();
+  const std::size_t most_points = budget > 0 ? std::min(kRawPointsPerChunk, budget / kBytesPerRawPoint) : kRawPointsPerChunk;
+  std::vector<std::shared_ptr<PreparedState>> out;
+  for (std::size_t begin = 0, end; begin < clouds.size; begin = end) {
+    std::size_t points = clouds[begin].size;
+    for (end = begin + 1; end < clouds.size && end - begin < kCloudsPerChunk && points + clouds[end].size <= most_points; ++end) points += clouds[end].size;
+    prepare_chunk({clouds.data + begin, end - begin}, options, out);
+  }
+  return out;
+}
+
+void CudaEngine::align(Span<const PairInput> pairs, const RegistrationOptions& options, Span<PairOutcome> outcomes) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  const DeviceScope scope(device());
+  const std::size_t budget = residence_.budget();
+  for (std::size_t begin = 0, end; begin < pairs.size; begin = end) {
+    // As many pairs as have their clouds within the budget, but one at least.
+    std::vector<const Fragment*> fragments;
+    std::unordered_map<const PreparedState*, std::size_t> place;
+    std::size_t bytes = 0;
+    for (end = begin; end < pairs.size; ++end) {
+      const PreparedState* both[2] = {pairs[end].source, pairs[end].target};
+      std::size_t more = 0;
+      for (int k = 0; k < 2; ++k)
+        if (place.count(both[k]) == 0 && (k == 0 || both[0] != both[1])) more += static_cast<const Fragment*>(both[k])->bytes();
+      if (budget > 0 && end > begin && bytes + more > budget) break;
+      bytes += more;
+      for (const PreparedState* cloud : both)
+        if (place.emplace(cloud, fragments.size()).second) fragments.push_back(static_cast<const Fragment*>(cloud));
+    }
+    exec_.begin();
+    const auto held = residence_.bring(fragments);
+    std::vector<PairView> views;
+    for (std::size_t p = begin; p < end; ++p)
+      views.push_back({held[place[pairs[p].source]]->view_on_device, held[place[pairs[p].target]]->view_on_device, pairs[p].custom_source.data,
+                       pairs[p].custom_target.data, static_cast<std::uint32_t>(pairs[p].custom_source.size)});
+    pipeline::align(exec_, span_of(views), options, {outcomes.data + begin, end - begin});
+  }
+}
+
+}  // namespace gpureg::cuda

@@ -25,7 +25,10 @@ void Exec::begin() {
   events_used_ = 0;
 }
 
-void Exec::synchronize() { check(cudaStreamSynchronize(stream()), "the work on the device"); }
+void Exec::synchronize() {
+  check(cudaStreamSynchronize(stream()), "the work on the device");
+  held_.clear();
+}
 
 Exec::Mark Exec::mark() {
   if (events_used_ == events_.size()) {

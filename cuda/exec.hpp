@@ -30,6 +30,8 @@ class Exec {
   void begin();
   /// Waits for everything enqueued.
   void synchronize();
+  /// Keeps something alive until the next synchronize(): what the work enqueued reads.
+  void hold(std::shared_ptr<const void> what) { held_.push_back(std::move(what)); }
 
   template <typename T>
   DeviceBuffer<T> buffer(std::size_t size) {
@@ -76,6 +78,7 @@ class Exec {
  private:
   std::shared_ptr<DeviceMemory> memory_;
   PinnedArena staging_;
+  std::vector<std::shared_ptr<const void>> held_;
   std::vector<cudaEvent_t> events_;
   std::size_t events_used_ = 0;
   int multiprocessors_ = 1, compute_capability_ = 0;

@@ -37,6 +37,9 @@ DeviceMemory::DeviceMemory(int device) : device_(device) {
   cudaError_t error = cudaMemPoolCreate(&pool_, &properties);
   std::uint64_t threshold = ~std::uint64_t(0);
   if (error == cudaSuccess) error = cudaMemPoolSetAttribute(pool_, cudaMemPoolAttrReleaseThreshold, &threshold);
+  // A caller's stream that takes memory here must not come to wait for ours.
+  int never = 0;
+  if (error == cudaSuccess) error = cudaMemPoolSetAttribute(pool_, cudaMemPoolReuseAllowInternalDependencies, &never);
   if (error == cudaSuccess) return;
   cudaStreamDestroy(stream_);
   throw_device_error(error, "cudaMemPoolCreate");
@@ -48,17 +51,20 @@ DeviceMemory::~DeviceMemory() {
   cudaStreamDestroy(stream_);
 }
 
-void* DeviceMemory::allocate(std::size_t bytes) {
+void* DeviceMemory::allocate(std::size_t bytes, cudaStream_t stream) {
   void* pointer = nullptr;
-  cudaError_t error = cudaMallocFromPoolAsync(&pointer, bytes, pool_, stream_);
+  cudaError_t error = cudaMallocFromPoolAsync(&pointer, bytes, pool_, stream);
   if (error == cudaErrorMemoryAllocation) {
     // What the pool kept may be in pieces too small: hand it back and ask once more.
     cudaGetLastError();
     cudaStreamSynchronize(stream_);
     cudaMemPoolTrimTo(pool_, 0);
-    error = cudaMallocFromPoolAsync(&pointer, bytes, pool_, stream_);
+    error = cudaMallocFromPoolAsync(&pointer, bytes, pool_, stream);
   }
-  if (error == cudaSuccess) return pointer;
+  if (error == cudaSuccess) {
+    in_use_ += bytes;
+    return pointer;
+  }
   std::size_t free = 0, total = 0;
   if (error == cudaErrorMemoryAllocation && (cudaGetLastError(), cudaMemGetInfo(&free, &total) == cudaSuccess))
     throw DeviceError("device " + std::to_string(device_) + " is out of memory: " + std::to_string(bytes >> 20) + " MiB asked for, " +
@@ -66,18 +72,26 @@ void* DeviceMemory::allocate(std::size_t bytes) {
   throw_device_error(error, "cudaMallocFromPoolAsync");
 }
 
-void DeviceMemory::free(void* pointer) noexcept { cudaFreeAsync(pointer, stream_); }
+void DeviceMemory::free(void* pointer, std::size_t bytes) noexcept {
+  cudaFreeAsync(pointer, stream_);
+  in_use_ -= bytes;
+}
 
-std::size_t DeviceMemory::bytes_in_use() const {
+std::size_t DeviceMemory::bytes_reserved() const {
   std::uint64_t bytes = 0;
-  cudaMemPoolGetAttribute(pool_, cudaMemPoolAttrUsedMemCurrent, &bytes);
+  cudaMemPoolGetAttribute(pool_, cudaMemPoolAttrReservedMemCurrent, &bytes);
   return bytes;
 }
 
-std::size_t DeviceMemory::most_bytes_in_use() const {
-  std::uint64_t bytes = 0;
-  cudaMemPoolGetAttribute(pool_, cudaMemPoolAttrUsedMemHigh, &bytes);
-  return bytes;
+PinnedBuffer::PinnedBuffer(std::size_t bytes) {
+  void* data = nullptr;
+  // Portable: a fragment that one device has driven out may come back to another.
+  if (bytes > 0) check(cudaHostAlloc(&data, bytes, cudaHostAllocPortable), "cudaHostAlloc");
+  data_ = static_cast<char*>(data);
+}
+
+PinnedBuffer::~PinnedBuffer() {
+  if (data_) cudaFreeHost(data_);
 }
 
 PinnedArena::~PinnedArena() {

@@ -3,6 +3,7 @@
 
 #include <cuda_runtime_api.h>
 
+#include <atomic>
 #include <cstddef>
 #include <memory>
 #include <utility>
@@ -33,15 +34,18 @@ class DeviceMemory {
   int device() const { return device_; }
   cudaStream_t stream() const { return stream_; }
   /// In order with the stream. Throws DeviceError where the device has no more.
-  void* allocate(std::size_t bytes);
-  void free(void* pointer) noexcept;
-  std::size_t bytes_in_use() const;
-  std::size_t most_bytes_in_use() const;
+  void* allocate(std::size_t bytes) { return allocate(bytes, stream_); }
+  /// In order with a stream of somebody else's.
+  void* allocate(std::size_t bytes, cudaStream_t stream);
+  void free(void* pointer, std::size_t bytes) noexcept;
+  std::size_t bytes_in_use() const { return in_use_; }
+  std::size_t bytes_reserved() const;  ///< taken from the driver: what was in use at most
 
  private:
   int device_;
   cudaStream_t stream_ = nullptr;
   cudaMemPool_t pool_ = nullptr;
+  std::atomic<std::size_t> in_use_{0};
 };
 
 /// Owns an array in device memory; what it holds is undefined until something writes it.
@@ -60,16 +64,35 @@ class DeviceBuffer {
     return *this;
   }
   ~DeviceBuffer() {
-    if (data_) memory_->free(data_);
+    if (data_) memory_->free(data_, size_ * sizeof(T));
   }
 
   T* data() const { return data_; }
   std::size_t size() const { return size_; }
+  const std::shared_ptr<DeviceMemory>& memory() const { return memory_; }
 
  private:
   std::shared_ptr<DeviceMemory> memory_;
   std::size_t size_ = 0;
   T* data_ = nullptr;
+};
+
+/// Owns page-locked host memory: the device copies to and from it at full speed.
+class PinnedBuffer {
+ public:
+  PinnedBuffer() = default;
+  explicit PinnedBuffer(std::size_t bytes);
+  PinnedBuffer(PinnedBuffer&& other) noexcept : data_(std::exchange(other.data_, nullptr)) {}
+  PinnedBuffer& operator=(PinnedBuffer&& other) noexcept {
+    std::swap(data_, other.data_);
+    return *this;
+  }
+  ~PinnedBuffer();
+
+  char* data() const { return data_; }
+
+ private:
+  char* data_ = nullptr;
 };
 
 /// Page-locked host memory handed out piece by piece for one call and taken back as a whole. Grows to what the largest call needs.

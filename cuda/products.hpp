@@ -86,10 +86,9 @@ struct ScoringOrder {
   std::uint32_t groups = 0;
 };
 
-/// The fragment that a PreparedCloud holds: one piece of device memory.
-struct CudaCloud : PreparedState {
-  DeviceBuffer<char> data;
-  CloudView view_on_device;                  ///< host struct of device pointers; executor_data is this
+/// What the stages read of a fragment: pointers into one piece of memory, and what belongs to them.
+struct CloudArrays {
+  CloudView view_on_device{};                ///< host struct of device pointers; executor_data is the CudaCloud
   std::uint32_t block_count = 0;
   std::size_t candidate_count = 0;
   const Cell* blocks = nullptr;
@@ -98,6 +97,14 @@ struct CudaCloud : PreparedState {
   float2* feature_norm = nullptr;            ///< squared length and length of each feature; infinite where it is not to be matched
   float* feature_padded = nullptr;           ///< rows as wide as those of feature_tf32, filled up with zeros
   std::uint32_t* feature_tf32 = nullptr;     ///< see nearest_feature.hpp; null where the dimension or a length (over 1e15) forbids it
+
+  /// The same arrays in a copy of the memory: every pointer from one piece to the other. A new array has its line there.
+  CloudArrays moved(const char* from, char* to) const;
+};
+
+/// A fragment in the memory of one device.
+struct CudaCloud : PreparedState, CloudArrays {
+  DeviceBuffer<char> data;
   std::vector<Vec3> copy_points() const override;
   std::vector<Vec3> copy_normals() const override;
   std::vector<float> copy_features() const override;

@@ -1,14 +1,23 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Stands in for cuda/ in builds without a CUDA compiler.
-#include "gpureg/error.hpp"
-#include "pipeline/engine.hpp"
+#include "gpureg/cuda_interop.hpp"
+#include "pipeline/device_engine.hpp"
 
 namespace gpureg {
 
-std::shared_ptr<Engine> make_cuda_engine(int) {
-  throw BackendUnavailable("this build of gpureg has no CUDA backend (configure with -DGPUREG_CUDA=ON)");
+namespace {
+constexpr char kNotBuilt[] = "this build of gpureg has no CUDA backend (configure with -DGPUREG_CUDA=ON)";
 }
 
+std::shared_ptr<Engine> make_cuda_engine(int) { throw BackendUnavailable(kNotBuilt); }
+std::shared_ptr<Engine> make_cuda_engine(const CudaOptions&) { throw BackendUnavailable(kNotBuilt); }
+
 std::vector<std::string> describe_cuda_devices() { return {"cuda: not in this build"}; }
+
+std::future<PreparedCloud> prepare_async(const Context& context, const DevicePointCloudView& cloud, const PrepareOptions& options, CudaStream) {
+  options.validate();
+  cloud.validate();
+  throw InvalidArgument("clouds in device memory need a CUDA context, this one is " + context.description());
+}
 
 }  // namespace gpureg

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "fragments.hpp"
 
+#include <algorithm>
 #include <cstdlib>
 #include <map>
 #include <memory>
@@ -36,6 +37,43 @@ std::vector<Pair> all_pairs() {
   return out;
 }
 
+void report(benchmark::State& state, const std::vector<RegistrationResult>& results, std::size_t runs) {
+  StageTimings sum;
+  double survivors = 0, aligned = 0, points = 0;
+  for (const RegistrationResult& r : results) {
+    sum.match += r.timings.match, sum.sample += r.timings.sample, sum.fit += r.timings.fit;
+    sum.score += r.timings.score, sum.refine += r.timings.refine, sum.judge += r.timings.judge;
+    survivors += static_cast<double>(r.statistics.survivors), aligned += r.aligned(), points += r.statistics.source_points;
+  }
+  const double n = static_cast<double>(results.size());
+  state.counters["pairs"] = n;
+  state.counters["aligned"] = aligned;
+  state.counters["points"] = points / n;
+  state.counters["survivors"] = survivors / n;
+  state.counters["ms_match"] = sum.match / n;
+  state.counters["ms_sample"] = sum.sample / n;
+  state.counters["ms_fit"] = sum.fit / n;
+  state.counters["ms_score"] = sum.score / n;
+  state.counters["ms_refine"] = sum.refine / n;
+  state.counters["ms_judge"] = sum.judge / n;
+  state.counters["ms_per_pair"] =
+      benchmark::Counter(n * static_cast<double>(runs) * 1e-3, benchmark::Counter::kIsRate | benchmark::Counter::kInvert);
+}
+
+void report_memory(benchmark::State& state, const Context& context) {
+  double most = 0;
+  for (const DeviceMemoryUse& use : context.device_memory()) most = std::max(most, static_cast<double>(use.bytes_reserved));
+  state.counters["devices"] = static_cast<double>(context.device_memory().size());
+  state.counters["GiB_per_device"] = most / (1 << 30);
+}
+
+Context new_context(const std::string& backend) {
+  if (backend == "cpu") return Context::cpu();
+  CudaOptions options;
+  if (backend == "cuda_all") options.devices.clear();
+  return Context::cuda(options);
+}
+
 const Context* context(benchmark::State& state, const std::string& backend) {
   static std::map<std::string, std::unique_ptr<Context>> contexts;
   if (fragments().size() < 2) {
@@ -44,7 +82,7 @@ const Context* context(benchmark::State& state, const std::string& backend) {
   }
   auto& found = contexts[backend];
   try {
-    if (!found) found = std::make_unique<Context>(backend == "cpu" ? Context::cpu() : Context::cuda());
+    if (!found) found = std::make_unique<Context>(new_context(backend));
   } catch (const BackendUnavailable& error) {
     state.SkipWithError(error.what());
     return nullptr;

@@ -17,7 +17,14 @@ std::vector<PointCloudView> views();
 /// Every pair once.
 std::vector<Pair> all_pairs();
 
-/// Context of a backend by name ("cpu", "cuda"), made once; null, and the benchmark skipped, where there is none.
+/// Means over the results, and milliseconds per pair of that many runs.
+void report(benchmark::State& state, const std::vector<RegistrationResult>& results, std::size_t runs);
+/// What the context has taken of its devices' memory.
+void report_memory(benchmark::State& state, const Context& context);
+
+/// Of a backend by name: "cpu", "cuda" (device 0), "cuda_all" (every device).
+Context new_context(const std::string& backend);
+/// Context of a backend by name, made once; null, and the benchmark skipped, where there is none.
 const Context* context(benchmark::State& state, const std::string& backend);
 
 }  // namespace gpureg::bench

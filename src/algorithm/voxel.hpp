@@ -13,7 +13,8 @@ GPUREG_HD float local_origin(float lo, float hi, float voxel_size) {
   if (!(voxel_size > 0.0f)) return static_cast<float>(mid) + 0.0f;
   const double steps = mid / static_cast<double>(voxel_size);
   const double whole = static_cast<double>(static_cast<std::int64_t>(steps + (steps < 0.0 ? -0.5 : 0.5)));
-  return static_cast<float>(whole * static_cast<double>(voxel_size));
+  // + 0 here too: compilers differ in the sign of a zero that has been an integer.
+  return static_cast<float>(whole * static_cast<double>(voxel_size)) + 0.0f;
 }
 
 /// Voxel of a local point.

@@ -4,7 +4,7 @@
 #include <thread>
 
 #include "api/validate.hpp"
-#include "pipeline/engine.hpp"
+#include "pipeline/device_engine.hpp"
 
 namespace gpureg {
 
@@ -21,6 +21,11 @@ Context Context::cuda(int device) {
   return Context(make_cuda_engine(device));
 }
 
+Context Context::cuda(const CudaOptions& options) {
+  for (const int device : options.devices) require(device >= 0, "device", device, "0 or more");
+  return Context(make_cuda_engine(options));
+}
+
 Context Context::best() {
   try {
     return cuda(0);
@@ -32,6 +37,10 @@ Context Context::best() {
 Backend Context::backend() const { return engine_->backend(); }
 unsigned Context::threads() const { return engine_->threads(); }
 std::string Context::description() const { return engine_->description(); }
+std::vector<DeviceMemoryUse> Context::device_memory() const {
+  const auto* engine = dynamic_cast<const DeviceEngine*>(engine_.get());
+  return engine ? engine->device_memory() : std::vector<DeviceMemoryUse>{};
+}
 
 std::vector<std::string> describe_backends() {
   std::vector<std::string> lines;

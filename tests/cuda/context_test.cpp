@@ -2,25 +2,20 @@
 // The public door on the GPU: same results as on the CPU, whatever the split; errors that leave the context usable; threads.
 #include <cuda_runtime_api.h>
 
+#include <chrono>
+#include <future>
 #include <thread>
 
-#include "cuda/gpu.hpp"
+#include "cuda/room_scans.hpp"
+#include "engine.hpp"
 #include "gpureg/error.hpp"
-#include "gpureg/registration.hpp"
-#include "support/result_bytes.hpp"
-#include "support/scan.hpp"
 
 namespace gpureg {
 namespace {
 
+using test::all_bytes;
 using test::bytes;
-using Results = std::vector<std::vector<char>>;
-
-Results all_bytes(const std::vector<RegistrationResult>& results) {
-  Results out;
-  for (const RegistrationResult& r : results) out.push_back(bytes(r));
-  return out;
-}
+using test::Results;
 
 TEST(NoCudaDevice, TheReasonIsSaid) {
   if (test::has_gpu()) GTEST_SKIP() << "this machine has a CUDA device";
@@ -33,26 +28,7 @@ TEST(NoCudaDevice, TheReasonIsSaid) {
   EXPECT_EQ(Context::best().backend(), Backend::cpu);
 }
 
-class CudaContext : public ::testing::Test {
- protected:
-  CudaContext() : options(RegistrationOptions::from_voxel_size(0.08f)) {
-    options.hypothesis.count = 20000;
-    std::mt19937 random(1);
-    for (int k = 0; k < 6; ++k) scans.push_back(test::moved(test::random_pose(random), test::scan_room(random)));
-    scans.push_back({});
-    for (const auto& s : scans) views.emplace_back(s);
-    for (std::uint32_t i = 0; i < scans.size(); ++i)
-      for (std::uint32_t j = i + 1; j < scans.size(); ++j) pairs.push_back({j, i});
-  }
-  void SetUp() override { GPUREG_GPU_OR_SKIP(); }
-  Results run(const Context& context, const std::vector<Pair>& list) const {
-    return all_bytes(align_batch(context, prepare_batch(context, views, options.prepare), list, options));
-  }
-  RegistrationOptions options;
-  std::vector<std::vector<Eigen::Vector3f>> scans;
-  std::vector<PointCloudView> views;
-  std::vector<Pair> pairs;
-};
+class CudaContext : public test::RoomScans {};
 
 TEST_F(CudaContext, ResultsAreTheCpusInAnySplit) {
   const Results expected = run(Context::cpu(), pairs);
@@ -122,11 +98,18 @@ TEST_F(CudaContext, WarmRunsTakeNoMoreMemory) {
   const Context context = Context::cuda();
   const auto clouds = prepare_batch(context, views, options.prepare);
   for (int k = 0; k < 2; ++k) align_batch(context, clouds, pairs, options);
+  prepare_batch(context, views, options.prepare);
   std::size_t before = 0, after = 0, total = 0;
   ASSERT_EQ(cudaMemGetInfo(&before, &total), cudaSuccess);
-  for (int k = 0; k < 5; ++k) align_batch(context, clouds, pairs, options);
+  const std::size_t reserved = context.device_memory()[0].bytes_reserved;
+  for (int k = 0; k < 5; ++k) {
+    align_batch(context, clouds, pairs, options);
+    prepare_batch(context, views, options.prepare);
+  }
   ASSERT_EQ(cudaMemGetInfo(&after, &total), cudaSuccess);
   EXPECT_EQ(before, after);
+  EXPECT_EQ(context.device_memory()[0].bytes_reserved, reserved) << "the pool asked the driver for more";
+  EXPECT_LE(context.device_memory()[0].bytes_in_use, reserved);
 }
 
 TEST_F(CudaContext, ThreadsWithTheirOwnContextsAndThreadsThatShareOne) {
@@ -140,19 +123,28 @@ TEST_F(CudaContext, ThreadsWithTheirOwnContextsAndThreadsThatShareOne) {
   for (const Results& g : got) EXPECT_EQ(g, expected);
 }
 
-TEST_F(CudaContext, EveryDeviceGivesTheSame) {
-  int devices = 0;
-  ASSERT_EQ(cudaGetDeviceCount(&devices), cudaSuccess);
-  const Results expected = run(Context::cuda(0), pairs);
-  for (int d = 1; d < devices; ++d) {
-    const Context other = Context::cuda(d);
-    EXPECT_EQ(run(other, pairs), expected) << "device " << d;
-    EXPECT_THROW(align(other, prepare(Context::cuda(0), views[0], options.prepare), prepare(other, views[1], options.prepare), options),
-                 InvalidArgument);
-  }
-  int current = -1;
-  ASSERT_EQ(cudaGetDevice(&current), cudaSuccess);
-  EXPECT_EQ(current, 0) << "the caller's device was not given back";
+// What the runtime answers on machines that a test cannot have.
+TEST(NoCudaDevice, EveryReasonHasItsWords) {
+  EXPECT_EQ(cuda::why_no_device(cudaErrorInsufficientDriver, 0, 13000), "no NVIDIA driver on this machine");
+  EXPECT_EQ(cuda::why_no_device(cudaErrorInsufficientDriver, 12020, 13000), "the NVIDIA driver supports CUDA 12.2, this build needs 13.0");
+  EXPECT_EQ(cuda::why_no_device(cudaErrorNoDevice, 13000, 13000), "no CUDA device on this machine");
+  EXPECT_NE(cuda::why_no_device(cudaErrorSystemNotReady, 13000, 13000).find("cudaErrorSystemNotReady"), std::string::npos);
+}
+
+// The default stream is held up: whatever ran on it, or waited for it, would not finish.
+TEST_F(CudaContext, NothingRunsOnTheDefaultStream) {
+  const Context context = Context::cuda();
+  const Results expected = run(context, pairs);
+  std::promise<void> release;
+  auto released = release.get_future();
+  ASSERT_EQ(cudaLaunchHostFunc(nullptr, [](void* gate) { static_cast<std::future<void>*>(gate)->wait(); }, &released), cudaSuccess);
+  auto got = std::async(std::launch::async, [&] { return run(context, pairs); });
+  const bool finished = got.wait_for(std::chrono::seconds(60)) == std::future_status::ready;
+  EXPECT_EQ(cudaStreamQuery(nullptr), cudaErrorNotReady) << "the default stream was not held up: the test shows nothing";
+  release.set_value();
+  EXPECT_TRUE(finished) << "some work waits for the default stream";
+  EXPECT_EQ(got.get(), expected);
+  EXPECT_EQ(cudaDeviceSynchronize(), cudaSuccess);
 }
 
 }  // namespace

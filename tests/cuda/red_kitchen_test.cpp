@@ -35,6 +35,15 @@ TEST(RedKitchenOnCuda, AllPairsAreTheCpus) {
     options.hypothesis.seed = seed;
     expect_same(align_batch(cpu, on_cpu, pairs, options), align_batch(cuda, on_cuda, pairs, options));
   }
+  // On every device of the machine together; with one device two engines share it.
+  CudaOptions all;
+  int devices = 0;
+  ASSERT_EQ(cudaGetDeviceCount(&devices), cudaSuccess);
+  all.devices = devices == 1 ? std::vector<int>{0, 0} : std::vector<int>{};
+  const Context together = Context::cuda(all);
+  const auto spread = prepare_batch(together, views, options.prepare);
+  expect_same(align_batch(cuda, on_cuda, pairs, options), align_batch(together, spread, pairs, options));
+  expect_same(align_batch(cuda, on_cuda, pairs, options), align_batch(together, on_cuda, pairs, options));
   // Another split of the batch, and the default preset with its refinement.
   std::vector<RegistrationResult> one_by_one;
   for (const Pair& pair : pairs) one_by_one.push_back(align(cuda, on_cuda[pair.source], on_cuda[pair.target], options));

@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include "pipeline/device_engine.hpp"
+#include "residence.hpp"
+
+namespace gpureg::cuda {
+
+/// The backend on one device. Clouds of any CUDA engine go with any other.
+class CudaEngine final : public DeviceEngine {
+ public:
+  CudaEngine(int device, std::size_t memory_budget);
+
+  int device() const { return exec_.device(); }
+  Backend backend() const override;
+  unsigned threads() const override { return 1; }
+  std::string description() const override { return description_; }
+  const void* memory() const override;
+  std::vector<DeviceMemoryUse> device_memory() const override;
+  std::size_t pairs_per_chunk(const RegistrationOptions& options) const override;
+  std::vector<std::shared_ptr<PreparedState>> prepare(Span<const RawCloud> clouds, const PrepareOptions& options) override;
+  std::shared_ptr<AdoptedCloud> adopt(const RawCloud& cloud, void* stream) override;
+  std::shared_ptr<PreparedState> prepare_adopted(const AdoptedCloud& cloud, const PrepareOptions& options) override;
+  void align(Span<const PairInput> pairs, const RegistrationOptions& options, Span<PairOutcome> outcomes) override;
+
+ private:
+  std::vector<std::shared_ptr<PreparedState>> prepare_on_stream(Span<const RawCloud> clouds, const PrepareOptions& options);
+  void prepare_chunk(Span<const RawCloud> clouds, const PrepareOptions& options, std::vector<std::shared_ptr<PreparedState>>& out);
+
+  std::mutex mutex_;
+  Exec exec_;
+  Residence residence_;
+  std::string description_;
+};
+
+/// Spreads batches over several devices, an engine and a thread for each. devices: two at least; one may be named twice.
+std::shared_ptr<Engine> make_engine_of_many(const std::vector<int>& devices, std::size_t memory_budget);
+
+/// Device that a pointer's memory is on; -1: not device memory.
+int device_of(const void* pointer);
+/// Device that prepares a cloud: that which has it.
+int device_of(const AdoptedCloud& cloud);
+
+/// In words, from what the runtime and the driver answer.
+std::string why_no_device(cudaError_t error, int driver, int runtime);
+
+}  // namespace gpureg::cuda

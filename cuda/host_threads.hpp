@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <atomic>
+#include <cstddef>
+#include <exception>
+#include <thread>
+#include <vector>
+
+namespace gpureg::cuda {
+
+/// work(thread) on that many threads, the caller's the first. When all are done, throws what the first of them that failed has thrown.
+template <typename Work>
+void on_threads(std::size_t threads, const Work& work) {
+  std::vector<std::exception_ptr> failed(threads);
+  const auto guarded = [&](std::size_t thread) {
+    try {
+      work(thread);
+    } catch (...) {
+      failed[thread] = std::current_exception();
+    }
+  };
+  std::vector<std::thread> others;
+  for (std::size_t k = 1; k < threads; ++k) others.emplace_back(guarded, k);
+  guarded(0);
+  for (std::thread& thread : others) thread.join();
+  for (const std::exception_ptr& error : failed)
+    if (error) std::rethrow_exception(error);
+}
+
+/// work(index) for every index below count, in any order.
+template <typename Work>
+void for_each_index(std::size_t threads, std::size_t count, const Work& work) {
+  std::atomic<std::size_t> next{0};
+  on_threads(threads, [&](std::size_t) {
+    for (std::size_t k = next++; k < count; k = next++) work(k);
+  });
+}
+
+}  // namespace gpureg::cuda

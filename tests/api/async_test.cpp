@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Calls that return at once, on the CPU; tests/cuda has the rest.
+#include <gtest/gtest.h>
+
+#include "gpureg/cuda_interop.hpp"
+#include "support/result_bytes.hpp"
+#include "support/scan.hpp"
+
+namespace gpureg {
+namespace {
+
+TEST(Async, FuturesHaveWhatTheCallsReturn) {
+  std::mt19937 random(4);
+  const auto a = test::scan_room(random), b = test::moved(test::random_pose(random), test::scan_room(random));
+  RegistrationOptions options = RegistrationOptions::from_voxel_size(0.1f);
+  options.hypothesis.count = 5000;
+  const Context context = Context::cpu(2);
+  const auto clouds = prepare_batch(context, {PointCloudView(a), PointCloudView(b)}, options.prepare);
+  const auto expected = test::bytes(align(context, clouds[0], clouds[1], options));
+  auto one = align_async(context, clouds[0], clouds[1], options);
+  auto many = align_batch_async(context, clouds, {{0, 1}, {0, 1}}, options);
+  EXPECT_EQ(test::bytes(one.get()), expected);
+  for (const RegistrationResult& result : many.get()) EXPECT_EQ(test::bytes(result), expected);
+  options.hypothesis.count = 0;
+  auto bad = align_async(context, clouds[0], clouds[1], options);
+  EXPECT_THROW(bad.get(), InvalidArgument);
+}
+
+TEST(Async, DeviceMemoryNeedsACudaContext) {
+  const float point[3] = {1, 2, 3};
+  DevicePointCloudView view;
+  view.points = point, view.size = 1;
+  try {
+    prepare_async(Context::cpu(1), view, {}, nullptr);
+    FAIL();
+  } catch (const InvalidArgument& error) {
+    EXPECT_NE(std::string(error.what()).find("need a CUDA context, this one is cpu"), std::string::npos) << error.what();
+  }
+  EXPECT_TRUE(Context::cpu(1).device_memory().empty());
+}
+
+}  // namespace
+}  // namespace gpureg
