@@ -10,6 +10,8 @@ Many clouds: `prepare` each once, then `align_batch` the pairs; folders of fragm
 and `register_all`.
 """
 
+from typing import TYPE_CHECKING, Any
+
 from ._core import (
     BackendUnavailable,
     Context,
@@ -32,6 +34,7 @@ from ._core import (
     __version__,
     describe_backends,
 )
+from .fragments import FragmentSet
 from .files import read_point_cloud, write_point_cloud
 from .registration import (
     BatchInterrupted,
@@ -43,13 +46,28 @@ from .registration import (
     register,
 )
 
+if TYPE_CHECKING:
+    from .batch import BatchRun, register_all
+
+
+def __getattr__(name: str) -> Any:
+    # What needs pyarrow is loaded when it is asked for.
+    if name in ("BatchRun", "register_all"):
+        from . import batch
+
+        return getattr(batch, name)
+    raise AttributeError(f"module 'gpureg' has no attribute '{name}'")
+
+
 __all__ = [
     "BackendUnavailable",
     "BatchInterrupted",
+    "BatchRun",
     "Context",
     "CorrespondenceMoments",
     "DeviceError",
     "Error",
+    "FragmentSet",
     "HypothesisOptions",
     "InvalidArgument",
     "IoError",
@@ -72,5 +90,6 @@ __all__ = [
     "prepare_batch",
     "read_point_cloud",
     "register",
+    "register_all",
     "write_point_cloud",
 ]

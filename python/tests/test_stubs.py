@@ -62,7 +62,7 @@ def test_stub_has_the_fields_of_the_structs():
 
 def run(*arguments):
     # Not installed, but on the path: mypy has to be told.
-    folder = {} if "site-packages" in str(PACKAGE) else {"MYPYPATH": str(PACKAGE.parent)}
+    folder = {} if "site-packages" in str(PACKAGE) else {"MYPYPATH": str(PACKAGE.parent), "PYTHONPATH": str(PACKAGE.parent)}
     done = subprocess.run(
         [sys.executable, "-m", *arguments], capture_output=True, text=True, cwd="/", env={**os.environ, **folder}
     )

@@ -1,0 +1,151 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The fragments of a scene: found once, loaded when they are needed."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+from pathlib import Path
+from typing import Any, Dict, List, Optional, Sequence, Tuple, Union
+
+import numpy as np
+import numpy.typing as npt
+
+from . import _core
+from ._arrays import CoreCloud, core_cloud
+from ._core import PrepareOptions
+
+_ENDS = 1 << 16  # bytes at either end of a file that its fingerprint looks at
+
+
+class FragmentSet:
+    """Fragments with numbers, in ascending order. Holds no points: those stay where they are.
+
+    Examples
+    --------
+    >>> import numpy as np, gpureg
+    >>> rng = np.random.default_rng(1)
+    >>> fragments = gpureg.FragmentSet.from_clouds([rng.random((100, 3)) for _ in range(3)])
+    >>> len(fragments), fragments.numbers
+    (3, (0, 1, 2))
+    """
+
+    def __init__(self, numbers: Sequence[int], sources: Sequence[Any], viewpoints: Optional[Dict[int, Any]] = None) -> None:
+        if len(set(numbers)) != len(numbers):
+            raise ValueError("numbers: one is there twice")
+        if list(numbers) != sorted(numbers):
+            raise ValueError("numbers: not in ascending order")
+        self._numbers = tuple(int(number) for number in numbers)
+        self._sources = tuple(sources)
+        self._viewpoints = viewpoints or {}
+
+    @classmethod
+    def from_directory(cls, directory: Union[str, "os.PathLike[str]"]) -> FragmentSet:
+        """The files ``cloud_bin_<i>.ply|pcd`` of a folder, with sensor positions from its cameras.txt if it has one.
+
+        Raises
+        ------
+        IoError
+            Where there is no fragment, or a number is twice.
+        """
+        found = _core.list_fragments(os.fspath(directory))
+        cameras = Path(directory) / "cameras.txt"
+        viewpoints: Dict[int, Any] = _core.read_cameras(str(cameras)) if cameras.exists() else {}
+        return cls([number for number, _ in found], [path for _, path in found], viewpoints)
+
+    @classmethod
+    def from_clouds(cls, clouds: Sequence[Any]) -> FragmentSet:
+        """Clouds in memory, or paths: whatever `prepare` takes as points. Their numbers are 0, 1, 2, ..."""
+        return cls(range(len(clouds)), clouds)
+
+    def __len__(self) -> int:
+        return len(self._numbers)
+
+    def __repr__(self) -> str:
+        return f"<gpureg.FragmentSet of {len(self)} fragments>"
+
+    @property
+    def numbers(self) -> Tuple[int, ...]:
+        """As in the files' names, ascending."""
+        return self._numbers
+
+    @property
+    def count(self) -> int:
+        """What Redwood's files give as the number of fragments: one more than the largest number."""
+        return self._numbers[-1] + 1 if self._numbers else 0
+
+    def load(self, position: int, options: PrepareOptions) -> CoreCloud:
+        """The fragment at a position (not: of a number), as the core takes it. Thread-safe."""
+        source, number = self._sources[position], self._numbers[position]
+        return core_cloud(source, None, None, self._viewpoints.get(number), options, f"fragments[{position}]")
+
+    def fingerprint(self, position: int) -> str:
+        """Tells whether a fragment is the one that an earlier run saw: by size and both ends of its data."""
+        digest = hashlib.blake2b(digest_size=16)
+        source = self._sources[position]
+        if isinstance(source, (str, os.PathLike)):
+            size = os.stat(source).st_size
+            digest.update(str(size).encode())
+            with open(source, "rb") as file:
+                digest.update(file.read(_ENDS))
+                file.seek(max(0, size - _ENDS))
+                digest.update(file.read(_ENDS))
+        else:
+            for part in self.load(position, PrepareOptions()):
+                digest.update(b"-" if part is None else np.ascontiguousarray(part).tobytes())
+        viewpoints = self._viewpoints.get(self._numbers[position])
+        if viewpoints is not None:
+            digest.update(np.ascontiguousarray(viewpoints).tobytes())
+        return digest.hexdigest()
+
+    def choose_pairs(self, pairs: Any = "all") -> npt.NDArray[np.int64]:
+        """(M, 2) positions i < j.
+
+        Parameters
+        ----------
+        pairs : "all", list of pairs, (M, 2) array, or callable
+            Pairs of fragment numbers, in either order; repetitions count once. A callable gets this set and returns them.
+
+        Examples
+        --------
+        >>> import gpureg
+        >>> fragments = gpureg.FragmentSet([2, 5, 9], [None] * 3)
+        >>> fragments.choose_pairs("all").tolist()
+        [[0, 1], [0, 2], [1, 2]]
+        >>> fragments.choose_pairs([(9, 2), (2, 9)]).tolist()
+        [[0, 2]]
+        """
+        if isinstance(pairs, str):
+            if pairs != "all":
+                raise ValueError(f'pairs: expected "all", pairs of numbers or a callable, got {pairs!r}')
+            return np.stack(np.triu_indices(len(self), 1), axis=1)
+        if callable(pairs):
+            pairs = pairs(self)
+        chosen = np.asarray(pairs if hasattr(pairs, "shape") else list(pairs))
+        if chosen.size == 0:
+            return np.zeros((0, 2), np.int64)
+        if chosen.dtype.kind not in "iu" or chosen.ndim != 2 or chosen.shape[1] != 2:
+            raise ValueError(f"pairs: expected whole numbers of shape (M, 2), got {chosen.dtype} of shape {chosen.shape}")
+        numbers = np.asarray(self._numbers)
+        positions = np.minimum(np.searchsorted(numbers, chosen), len(numbers) - 1)
+        unknown = numbers[positions] != chosen
+        if unknown.any():
+            raise ValueError(f"pairs: there is no fragment {chosen[unknown][0]}")
+        positions.sort(axis=1)
+        same = positions[:, 0] == positions[:, 1]
+        if same.any():
+            raise ValueError(f"pairs: {chosen[same][0].tolist()} is a fragment and itself")
+        _, first = np.unique(positions, axis=0, return_index=True)
+        return np.asarray(positions[np.sort(first)], np.int64)
+
+
+def fragment_set(fragments: Any) -> FragmentSet:
+    """A set as it is; a folder or a list of clouds as a set."""
+    if isinstance(fragments, FragmentSet):
+        return fragments
+    if isinstance(fragments, (str, os.PathLike)):
+        return FragmentSet.from_directory(fragments)
+    return FragmentSet.from_clouds(list(fragments))
+
+
+__all__: List[str] = ["FragmentSet"]

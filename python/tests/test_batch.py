@@ -1,0 +1,237 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""register_all: complete, equal, and not to be killed."""
+
+import json
+import os
+import pathlib
+import random
+import signal
+import subprocess
+import sys
+import threading
+import time
+
+import numpy as np
+import pytest
+from conftest import few, moved, pose, room
+
+import gpureg
+
+pytest.importorskip("pyarrow")
+import many  # noqa: E402
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory):
+    """The uninterrupted run."""
+    return many.run(tmp_path_factory.mktemp("whole"))
+
+
+def files_of(run):
+    return [path.read_bytes() for path in (run.parquet, run.log, run.information)]
+
+
+def test_table_is_what_align_says(whole):
+    assert whole.pairs == many.FRAGMENTS * (many.FRAGMENTS - 1) // 2 and whole.resumed == 0
+    rows = whole.table().to_pylist()
+    assert len({(row["i"], row["j"]) for row in rows}) == whole.pairs
+    clouds = gpureg.prepare_batch(many.fragments(), options=many.options().prepare)
+    assert sum(row["status"] == "aligned" for row in rows) == whole.aligned > 100
+    for row in random.Random(1).sample(rows, 25):
+        result = gpureg.align(clouds[row["j"]], clouds[row["i"]], options=many.options())
+        assert row["status"] == result.status and row["score"] == result.score
+        assert row["inliers"] == result.statistics.inliers
+        if result.has_candidate:
+            assert row["target_from_source"] == result.target_from_source.ravel().tolist()
+        else:
+            assert row["target_from_source"] is None
+    log = gpureg._core.read_log(str(whole.log))
+    assert [entry[:3] for entry in log] == sorted((row["i"], row["j"], many.FRAGMENTS) for row in rows if row["status"] == "aligned")
+    assert sorted(path.name for path in whole.folder.iterdir()) == ["result.info", "result.log", "results.parquet", "run.json", "run.lock"]
+
+
+def test_contexts_and_memory_change_nothing(tmp_path):
+    clouds = many.fragments()[:12]
+    keywords = {"options": few(500, 0.08), "chunk_size": 8, "progress": False}
+    one = gpureg.register_all(clouds, output=tmp_path / "one", **keywords)
+    # Room for three or four fragments: they come and go.
+    contexts = [gpureg.Context.cpu(1) for _ in range(3)]
+    other = gpureg.register_all(clouds, output=tmp_path / "other", contexts=contexts, memory=500_000, **keywords)
+    assert files_of(one) == files_of(other)
+
+
+def test_memory_is_bounded(monkeypatch, tmp_path):
+    from gpureg import _residency
+
+    most = 0
+    align_group = _residency.Residency._align_group
+
+    def watched(self, pairs, rows, held, on_result, stop):
+        nonlocal most
+        most = max(most, sum(map(_residency._bytes_of, {**self._clouds, **{-k - 1: c for k, c in held.items() if k not in self._clouds}}.values())))
+        align_group(self, pairs, rows, held, on_result, stop)
+
+    monkeypatch.setattr(_residency.Residency, "_align_group", watched)
+    clouds = many.fragments()[:20]
+    gpureg.register_all(clouds, output=tmp_path, options=few(10, 0.08), progress=False, contexts=[gpureg.Context.cpu()], memory=1_000_000)
+    largest = max(map(_residency._bytes_of, gpureg.prepare_batch(clouds, options=few(10, 0.08).prepare)))
+    # What is kept, and what a group of pairs holds: each within the budget and one fragment or two.
+    assert most <= 2 * (1_000_000 + 2 * largest)
+
+
+def test_a_finished_run_is_not_done_again(whole):
+    before = {path: path.stat().st_mtime_ns for path in (whole.parquet, whole.log, whole.information)}
+    again = many.run(whole.folder)
+    assert again.resumed == again.pairs == whole.pairs and again.aligned == whole.aligned
+    assert before == {path: path.stat().st_mtime_ns for path in before}
+
+
+def test_ten_kills(whole, tmp_path):
+    """kill -9 at ten random moments, from before the first pair to the middle of a chunk."""
+    seed = int(os.environ.get("GPUREG_KILL_SEED", "1"))
+    rng = random.Random(seed)
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(p for p in sys.path if p)}
+    kept = []
+    for kill in range(10):
+        child = subprocess.Popen([sys.executable, many.__file__, str(tmp_path)], stdout=subprocess.PIPE, text=True, env=environment)
+        assert child.stdout.readline() == "started\n"
+        if kill % 3:
+            child.stdout.readline()  # it aligns
+        time.sleep(rng.random() * 0.6)
+        assert child.poll() is None, "the run ended before it was killed: it is too short for this test"
+        child.send_signal(signal.SIGKILL)
+        child.wait()
+        child.stdout.close()
+        chunks = tmp_path / "chunks"
+        kept.append({p.name: p.stat().st_mtime_ns for p in chunks.glob("*.parquet")} if chunks.exists() else {})
+    for before, after in zip(kept, kept[1:]):
+        assert before.items() <= after.items(), "a finished chunk was lost or done twice"
+    run = many.run(tmp_path)
+    assert run.resumed >= len(kept[-1]) * many.CHUNK - many.CHUNK
+    print(f"seed {seed}: chunks after each kill {[len(k) for k in kept]}, then {run}")
+    assert len(kept[-1]) > 0
+    assert files_of(run) == files_of(whole)
+
+
+def test_ctrl_c_loses_nothing(whole, tmp_path):
+    done = []
+
+    def progress(count, total):
+        done.append(count)
+        if count >= 40:
+            os.kill(os.getpid(), signal.SIGINT)
+
+    with pytest.raises(KeyboardInterrupt):
+        many.run(tmp_path, progress=progress, contexts=[gpureg.Context.cpu(1)])
+    run = many.run(tmp_path)
+    # All that was counted, also of the chunk in the middle of which it came.
+    assert run.resumed >= done[-1] >= 40
+    assert files_of(run) == files_of(whole)
+
+
+def test_an_error_stops_the_run_and_keeps_the_rest(whole, tmp_path):
+    clouds = many.fragments()
+    fragments = gpureg.FragmentSet.from_clouds([*clouds[:40], tmp_path / "missing.ply"])
+    with pytest.raises(FileNotFoundError):
+        gpureg.register_all(fragments, output=tmp_path / "a", progress=False)  # at once, not after hours
+    gpureg.write_point_cloud(tmp_path / "missing.ply", clouds[0])
+    with open(tmp_path / "missing.ply", "r+b") as file:
+        file.truncate(1000)
+    with pytest.raises(gpureg.IoError, match="missing.ply"):
+        gpureg.register_all(fragments, output=tmp_path / "a", options=few(100, 0.1), progress=False, chunk_size=8)
+    assert list((tmp_path / "a" / "chunks").glob("*.parquet"))
+
+
+def test_another_run_is_refused(source, tmp_path):
+    clouds = [source[:500], source[500:1000], source[1000:1500]]
+    gpureg.register_all(clouds, output=tmp_path, options=few(100, 0.1), progress=False)
+    for change, message in [
+        ({"options": few(101, 0.1)}, "options.hypothesis.count was 100, now 101"),
+        ({"options": few(100, 0.1), "pairs": [(0, 1)]}, "pairs.count was 3, now 1"),
+        ({"options": few(100, 0.1), "chunk_size": 1}, "chunk_size was 256, now 1"),
+    ]:
+        with pytest.raises(ValueError, match=message):
+            gpureg.register_all(clouds, output=tmp_path, progress=False, **{"pairs": "all", **change})
+    with pytest.raises(ValueError, match=r"fragments\[0\].fingerprint was"):
+        gpureg.register_all(clouds[::-1], output=tmp_path, options=few(100, 0.1), progress=False)
+    fresh = gpureg.register_all(clouds, [(0, 1)], output=tmp_path, options=few(101, 0.1), progress=False, resume=False)
+    assert fresh.pairs == 1 and fresh.resumed == 0
+    (tmp_path / "run.json").write_text("{")
+    with pytest.raises(gpureg.IoError, match="run.json is damaged"):
+        gpureg.register_all(clouds, output=tmp_path, progress=False)
+
+
+def test_two_processes_do_not_share_a_folder(source, tmp_path):
+    seen = []
+
+    def progress(done, total):
+        try:
+            gpureg.register_all([source, source], output=tmp_path, progress=False)
+        except gpureg.IoError as error:
+            seen.append(str(error))
+
+    gpureg.register_all([source, source], output=tmp_path, options=few(100), progress=progress)
+    assert seen and "is in use by another run" in seen[0]
+
+
+def test_nothing_to_do_is_an_error(source, tmp_path):
+    with pytest.raises(ValueError, match="pairs: there is none"):
+        gpureg.register_all([source], output=tmp_path)
+    with pytest.raises(ValueError, match="chunk_size is 0"):
+        gpureg.register_all([source, source], output=tmp_path, chunk_size=0)
+    assert not list(tmp_path.iterdir())
+
+
+def test_threads_of_a_failed_run_end(source, tmp_path):
+    before = threading.active_count()
+    with pytest.raises(RuntimeError, match="enough"):
+        gpureg.register_all([source] * 30, output=tmp_path, options=few(20000), progress=lambda *_: (_ for _ in ()).throw(RuntimeError("enough")))
+    assert threading.active_count() == before
+
+
+COMMAND = pathlib.Path(gpureg.__file__).with_name("bin") / "gpureg"
+
+
+@pytest.mark.skipif(not COMMAND.exists(), reason="this build has no command")
+class TestCommand:
+    def run(self, *arguments):
+        return subprocess.run([sys.executable, "-m", "gpureg", *map(str, arguments)], capture_output=True, text=True)
+
+    def test_help_and_status(self, tmp_path):
+        shown = self.run("--help")
+        assert shown.returncode == 0
+        for verb in ("register", "batch", "evaluate", "report", "generate", "info"):
+            assert verb in shown.stdout
+        assert self.run("--version").stdout == f"gpureg {gpureg.__version__}\n"
+        assert self.run("info", tmp_path / "nowhere.ply").returncode == 2
+
+    def test_register_all_writes_the_command_s_log(self, tmp_path):
+        folder = tmp_path / "scene"
+        folder.mkdir()
+        whole = room(7, 4000)
+        for k in range(5):
+            gpureg.write_point_cloud(folder / f"cloud_bin_{k}.ply", moved(whole[:: k + 1], pose(k)))
+        self.compare(folder, tmp_path, ["--hypotheses", 20000, "--voxel-size", 0.06], few(20000, 0.06))
+
+    def test_red_kitchen(self, kitchen, tmp_path):
+        options = gpureg.RegistrationOptions()
+        options.hypothesis.count = 200_000  # what is compared does not depend on it, time does
+        self.compare(kitchen, tmp_path, ["--hypotheses", 200_000], options)
+
+    def compare(self, folder, tmp_path, arguments, options):
+        done = self.run("batch", folder, *arguments, "-o", tmp_path / "c.log", "--info", tmp_path / "c.info", "--json", tmp_path / "c.json")
+        assert done.returncode == 0, done.stderr
+        run = gpureg.register_all(folder, output=tmp_path / "run", options=options, progress=False)
+        assert run.log.read_bytes() == (tmp_path / "c.log").read_bytes()
+        assert run.information.read_bytes() == (tmp_path / "c.info").read_bytes()
+        rows = {(row["i"], row["j"]): row for row in run.table().to_pylist()}
+        pairs = json.loads((tmp_path / "c.json").read_text())["pairs"]
+        assert len(pairs) == len(rows) == run.pairs
+        for pair in pairs:
+            row = rows[pair["i"], pair["j"]]
+            assert row["target_from_source"] == pair["T_ij"]
+            for name in ("status", "reason", "score", "inlier_ratio", "inlier_rmse"):
+                assert row[name] == pair[name], name
+            for name, value in pair["statistics"].items():
+                assert row[name] == value, name
+        assert np.isfinite([row["score"] for row in rows.values()]).all()
