@@ -25,7 +25,7 @@ void MethodOptions::add_to(CLI::App& verb) {
                   "Edge of the downsampling voxel in metres; every other length follows from it")
       ->capture_default_str();
   verb.add_option("--preset", preset, "default, or loopsmart: the paper's algorithm, no refinement")
-      ->check(CLI::IsMember({"default", "loopsmart"}))
+      ->check(CLI::IsMember({"default", "loopsmart", "evidence"}))
       ->capture_default_str();
   verb.add_option("--backend", backend, "auto: CUDA where there is a device, else the CPU")
       ->check(CLI::IsMember({"auto", "cpu", "cuda"}))
@@ -45,6 +45,7 @@ void MethodOptions::add_to(CLI::App& verb) {
 RegistrationOptions MethodOptions::registration() const {
   RegistrationOptions options = preset == "loopsmart"
                                     ? RegistrationOptions::loopsmart(voxel_size)
+                                : preset == "evidence" ? RegistrationOptions::by_evidence(voxel_size)
                                     : RegistrationOptions::from_voxel_size(voxel_size);
   options.hypothesis.count = hypotheses;
   options.hypothesis.seed = seed;

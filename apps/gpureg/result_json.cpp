@@ -49,6 +49,23 @@ Json to_json(const PrepareStatistics& p) {
             {"total", p.total()}}}};
 }
 
+Json to_json(const PoseEvidence& e) {
+  return {{"match_inliers", e.match_inliers},
+          {"match_support", e.match_support},
+          {"overlap", {e.source_overlap, e.target_overlap}},
+          {"balanced_overlap", {e.source_balanced_overlap, e.target_balanced_overlap}},
+          {"seen", {e.source_seen, e.target_seen}},
+          {"impossible", {e.source_impossible, e.target_impossible}},
+          {"hidden", {e.source_hidden, e.target_hidden}},
+          {"stiffness", e.stiffness}};
+}
+
+Json to_json(const RegistrationMode& mode, const char* pose_name) {
+  return {{pose_name, to_json(mode.target_from_source.matrix())},
+          {"confidence", mode.confidence},
+          {"evidence", to_json(mode.evidence)}};
+}
+
 Json to_json(const RegistrationResult& result, const char* pose_name) {
   Json json;
   json["status"] = to_string(result.status);
@@ -58,6 +75,10 @@ Json to_json(const RegistrationResult& result, const char* pose_name) {
   json["inlier_rmse"] = result.inlier_rmse;
   json[pose_name] =
       result.has_candidate ? to_json(result.target_from_source.matrix()) : Json(nullptr);
+  if (!result.modes.empty()) {
+    json["modes"] = Json::array();
+    for (const RegistrationMode& mode : result.modes) json["modes"].push_back(to_json(mode, pose_name));
+  }
   json["statistics"] = to_json(result.statistics);
   json["ms"] = to_json(result.timings);
   return json;

@@ -12,13 +12,25 @@ struct PrepareOptions {
   float feature_radius = 0.25f; ///< neighbourhood of FPFH, also of its SPFH (paper: 0.25)
   /// Cell of the closest-point look-up of alignment; derived from max_correspondence_distance, see RegistrationOptions.
   float search_distance = 0.075f;  ///< farthest neighbour that alignment will ever ask this cloud for
+  /// Neighbourhood of a second FPFH, matched beside the first (only where the features are FPFH); 0: none (paper: none). Wide features
+  /// find matches where small neighbourhoods look alike: floors, walls.
+  float wide_feature_radius = 0.0f;
+  /// Viewpoints that depth maps are made of for free-space tests, evenly chosen among the cloud's; 0: no maps. 110 KB each.
+  std::uint32_t depth_maps = 0;
 
   /// Throws InvalidArgument naming field and value.
   void validate() const;
 };
 
+/// How candidate poses are found.
+enum class Proposal : std::uint8_t {
+  quadruples,     ///< uniform quadruples of matches, the winner by its inliers (paper, Algorithm 1)
+  compatibility   ///< second-order spatial compatibility of matches (SC2-PCR, Chen et al. 2022), judged by evidence
+};
+
 /// Where hypotheses come from: uniform quadruples of cached feature matches (paper, Algorithm 1).
 struct HypothesisOptions {
+  Proposal proposal = Proposal::quadruples;
   std::uint32_t count = 4'000'000;     ///< quadruples drawn per pair (paper: 4,000,000); at most 2^30
   std::uint32_t neighbors = 1;         ///< nearest features kept per source point, 1..16 (paper: 1)
   bool mutual = false;                 ///< keep only matches that are nearest in both directions
@@ -28,6 +40,34 @@ struct HypothesisOptions {
   std::uint32_t max_survivors = 1u << 18;
   bool smaller_as_source = true;       ///< sample and score the cloud with fewer points (Choi et al. 2015); the pose is turned back
   std::uint64_t seed = 1;              ///< same seed, same bits, on any backend, thread count and batch split
+
+  void validate() const;
+};
+
+/// Candidate poses from matches that keep each other's distances and angles (Proposal::compatibility).
+struct CompatibilityOptions {
+  std::uint32_t max_matches = 12288;  ///< kept per pair, chosen at random where there are more, 4..65536
+  std::uint32_t seeds = 1024;         ///< matches whose neighbourhoods become candidates, 1..8192
+  std::uint32_t max_members = 512;    ///< of a seed's compatible matches, those looked at, 3..1024
+  std::uint32_t triangles = 128;      ///< tried per seed, each of the seed and two compatible members, 1..4096
+  std::uint32_t refits = 2;           ///< least-squares fits to the members that the best triangle brings together, 1..8
+  float tolerance = 0.05f;            ///< metres that the distances of compatible matches may differ by
+  float max_turn = 0.5f;              ///< that the cosines of the angles of their normals may differ by, (0, 2]; 2: no test
+  float consensus_distance = 0.1f;    ///< metres within which a pose brings a match together
+  float seed_separation = 0.1f;       ///< metres around a seed without a lesser one; shortest side of a triangle
+
+  void validate() const;
+};
+
+/// How candidates are judged (Proposal::compatibility): support by matches and by both clouds, and free space.
+struct EvidenceOptions {
+  std::uint32_t sample = 512;       ///< about so many points of each cloud judge a candidate at first, 64..65536
+  std::uint32_t modes = 32;         ///< distinct poses refined and judged by all points, 1..64
+  float max_normal_angle = 30.0f;   ///< degrees between the normals of an inlier
+  float mode_angle = 11.5f;         ///< degrees, and ...
+  float mode_distance = 0.3f;       ///< ... metres between the cloud's centres, within which two poses are one
+  float free_space_margin = 0.12f;  ///< metres before a seen surface that a point may lie without contradicting it
+  float min_range = 0.3f;           ///< metres from a viewpoint, nearer than which nothing is judged
 
   void validate() const;
 };
@@ -58,12 +98,18 @@ struct RefineOptions {
 struct RegistrationOptions {
   PrepareOptions prepare;
   HypothesisOptions hypothesis;
+  CompatibilityOptions compatibility;
+  EvidenceOptions evidence;
   ScoreOptions score;
   RefineOptions refine;
+  double min_confidence = 0.5;  ///< Proposal::compatibility: confidence below which no alignment is reported, [0, 1]
 
   /// Every radius from the voxel size: normals 2 v, FPFH 5 v, correspondence distance 1.5 v, kernel 0.5 v.
   /// Throws InvalidArgument unless v is finite and > 0.
   static RegistrationOptions from_voxel_size(float voxel_size);
+
+  /// from_voxel_size(v) with candidates from compatible matches, judged by evidence.
+  static RegistrationOptions by_evidence(float voxel_size);
 
   /// The paper's algorithm with the paper's numbers (Zhang and Chen, LoopSmart, section III): 4,000,000 quadruples, no refinement.
   static RegistrationOptions loopsmart();

@@ -3,7 +3,9 @@
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
+#include <array>
 #include <cstdint>
+#include <vector>
 
 #include "gpureg/statistics.hpp"
 
@@ -25,6 +27,33 @@ struct CorrespondenceMoments {
   Eigen::Matrix<double, 6, 6> information_open3d() const;
 };
 
+/// What speaks for and against a pose of Proposal::compatibility. Shares are in [0, 1]. "balanced": points weigh less where many
+/// normals point their way, so that a floor does not outvote what stands on it.
+struct PoseEvidence {
+  std::uint32_t match_inliers = 0;       ///< matches brought together
+  double match_support = 0;              ///< the same as a balanced share of all matches, the smaller one of both sides
+  double source_overlap = 0;             ///< points of the source with a target point in reach and normals alike
+  double target_overlap = 0;             ///< and the other way round
+  double source_balanced_overlap = 0;
+  double target_balanced_overlap = 0;
+  double source_seen = 0;                ///< points of the source in directions that the target's viewpoints saw; 0: none known
+  double target_seen = 0;
+  double source_impossible = 0;          ///< of these, the share that hangs in space that was seen to be free
+  double target_impossible = 0;
+  double source_hidden = 0;              ///< of these, the share behind what was seen
+  double target_hidden = 0;
+  /// Eigenvalues, ascending, of the point-to-plane information of the source's inliers about their centre (rotation and translation,
+  /// lengths in units of 20 voxels): a small one is a direction in which the pose slides.
+  std::array<double, 6> stiffness{};
+};
+
+/// One of the distinct poses of a pair.
+struct RegistrationMode {
+  UnalignedIsometry3d target_from_source = UnalignedIsometry3d::Identity();
+  double confidence = 0;  ///< probability that the pose is right
+  PoseEvidence evidence;
+};
+
 /// Result of one pair. A plain value.
 struct RegistrationResult {
   RegistrationStatus status = RegistrationStatus::skipped;
@@ -36,6 +65,8 @@ struct RegistrationResult {
   double inlier_rmse = 0;      ///< metres, over the inliers
   CorrespondenceMoments source_moments;  ///< of all correspondences within the distance, whatever their normals: points of the source, in its frame (Redwood's convention)
   CorrespondenceMoments target_moments;  ///< the same, points of the target, in its frame (Open3D's convention)
+  /// Distinct poses, the most confident first; the first is target_from_source. Empty with Proposal::quadruples.
+  std::vector<RegistrationMode> modes;
   RegistrationStatistics statistics;
   StageTimings timings;
 

@@ -20,6 +20,7 @@ enum class RegistrationReason : std::uint8_t {
   no_hypothesis_survived,    ///< all quadruples failed the polygon test
   degenerate_geometry,       ///< all surviving quadruples were collinear or coincident
   inlier_ratio_too_low,      ///< the best candidate is below ScoreOptions::min_inlier_ratio
+  confidence_too_low,        ///< the best candidate is below RegistrationOptions::min_confidence
   cancelled
 };
 
@@ -57,8 +58,8 @@ struct PrepareStatistics {
   std::uint32_t points = 0;               ///< after downsampling
   std::uint32_t points_without_normal = 0;   ///< fewer than 3 neighbours
   std::uint32_t points_without_feature = 0;  ///< no neighbour within the feature radius, or no normal: never matched
-  double downsample = 0, normals = 0, features = 0, grid = 0;
-  double total() const { return downsample + normals + features + grid; }
+  double downsample = 0, normals = 0, features = 0, grid = 0, depth_maps = 0;
+  double total() const { return downsample + normals + features + grid + depth_maps; }
 };
 
 }  // namespace gpureg

@@ -17,6 +17,11 @@ void PrepareOptions::validate() const {
   require(length(normal_radius), "prepare.normal_radius", normal_radius, kLength);
   require(length(feature_radius), "prepare.feature_radius", feature_radius, kLength);
   require(length(search_distance), "prepare.search_distance", search_distance, kLength);
+  require(wide_feature_radius == 0.0f || length(wide_feature_radius), "prepare.wide_feature_radius", wide_feature_radius,
+          "0 or a length in [1e-6, 1e6]");
+  require(wide_feature_radius <= 4.0f * feature_radius, "prepare.wide_feature_radius", wide_feature_radius,
+          "at most 4 times prepare.feature_radius");
+  require(depth_maps <= 64, "prepare.depth_maps", depth_maps, "at most 64");
   require(voxel_size == 0.0f || feature_radius <= 100.0f * voxel_size, "prepare.feature_radius", feature_radius,
           "at most 100 times prepare.voxel_size");
   require(normal_radius <= 4.0f * feature_radius, "prepare.normal_radius", normal_radius, "at most 4 times prepare.feature_radius");
@@ -30,6 +35,38 @@ void HypothesisOptions::validate() const {
   require(max_survivors >= 1 && max_survivors <= (1u << 22), "hypothesis.max_survivors", max_survivors, "1 to 2^22");
   require(std::isfinite(edge_similarity) && edge_similarity > 0 && edge_similarity <= 1, "hypothesis.edge_similarity", edge_similarity,
           "a ratio in (0, 1]");
+}
+
+namespace {
+void require_angle(float degrees, const char* name) {
+  require(std::isfinite(degrees) && degrees > 0 && degrees <= 180, name, degrees, "degrees in (0, 180]");
+}
+void require_range(std::uint32_t value, std::uint32_t low, std::uint32_t high, const char* name) {
+  const std::string expected = std::to_string(low) + " to " + std::to_string(high);
+  require(value >= low && value <= high, name, value, expected.c_str());
+}
+}  // namespace
+
+void CompatibilityOptions::validate() const {
+  require_range(max_matches, 4, 65536, "compatibility.max_matches");
+  require_range(seeds, 1, 8192, "compatibility.seeds");
+  require_range(max_members, 3, 1024, "compatibility.max_members");
+  require_range(triangles, 1, 4096, "compatibility.triangles");
+  require_range(refits, 1, 8, "compatibility.refits");
+  require(std::isfinite(max_turn) && max_turn > 0 && max_turn <= 2, "compatibility.max_turn", max_turn, "a difference of cosines in (0, 2]");
+  require(length(tolerance), "compatibility.tolerance", tolerance, kLength);
+  require(length(consensus_distance), "compatibility.consensus_distance", consensus_distance, kLength);
+  require(length(seed_separation), "compatibility.seed_separation", seed_separation, kLength);
+}
+
+void EvidenceOptions::validate() const {
+  require_range(sample, 64, 65536, "evidence.sample");
+  require_range(modes, 1, 64, "evidence.modes");
+  require_angle(max_normal_angle, "evidence.max_normal_angle");
+  require_angle(mode_angle, "evidence.mode_angle");
+  require(length(mode_distance), "evidence.mode_distance", mode_distance, kLength);
+  require(length(free_space_margin), "evidence.free_space_margin", free_space_margin, kLength);
+  require(length(min_range), "evidence.min_range", min_range, kLength);
 }
 
 void ScoreOptions::validate() const {
@@ -61,6 +98,20 @@ RegistrationOptions RegistrationOptions::from_voxel_size(float voxel_size) {
   return o;
 }
 
+RegistrationOptions RegistrationOptions::by_evidence(float voxel_size) {
+  RegistrationOptions o = from_voxel_size(voxel_size);
+  o.prepare.wide_feature_radius = 8.0f * voxel_size;
+  o.prepare.depth_maps = 10;
+  o.hypothesis.proposal = Proposal::compatibility;
+  o.compatibility.tolerance = voxel_size;
+  o.compatibility.consensus_distance = 2.0f * voxel_size;
+  o.compatibility.seed_separation = 2.0f * voxel_size;
+  o.evidence.mode_distance = 6.0f * voxel_size;
+  o.evidence.free_space_margin = 2.4f * voxel_size;
+  o.evidence.min_range = 6.0f * voxel_size;
+  return o;
+}
+
 RegistrationOptions RegistrationOptions::loopsmart() { return loopsmart(0.05f); }
 
 RegistrationOptions RegistrationOptions::loopsmart(float voxel_size) {
@@ -72,8 +123,11 @@ RegistrationOptions RegistrationOptions::loopsmart(float voxel_size) {
 void RegistrationOptions::validate() const {
   prepare.validate();
   hypothesis.validate();
+  compatibility.validate();
+  evidence.validate();
   score.validate();
   refine.validate();
+  require(std::isfinite(min_confidence) && min_confidence >= 0 && min_confidence <= 1, "min_confidence", min_confidence, "a probability in [0, 1]");
   require(score.max_correspondence_distance <= prepare.search_distance, "score.max_correspondence_distance",
           score.max_correspondence_distance, "at most prepare.search_distance");
   require(refine.max_iterations == 0 || refine.max_correspondence_distance <= prepare.search_distance,

@@ -1,7 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "api/outcome.hpp"
 
+#include <algorithm>
 #include <cmath>
+
+#include "api/confidence.hpp"
+#include "api/evidence.hpp"
 
 #include "pipeline/conclude.hpp"
 
@@ -27,10 +31,63 @@ CorrespondenceMoments to_frame(const Moments& m, const PreparedState& cloud) {
   return out;
 }
 
+/// The pose of the pair as the caller knows it: his source, his target, their frames.
+UnalignedIsometry3d to_transform(const Pose<double>& pose, const PreparedState& source, const PreparedState& target, bool swapped) {
+  const PreparedState& moved = swapped ? target : source;
+  const PreparedState& fixed = swapped ? source : target;
+  const Eigen::Quaterniond q(pose.w, pose.x, pose.y, pose.z);
+  Eigen::Isometry3d fixed_from_moved = Eigen::Isometry3d::Identity();
+  fixed_from_moved.linear() = q.normalized().toRotationMatrix();
+  fixed_from_moved.translation() =
+      Eigen::Vector3d(pose.tx, pose.ty, pose.tz) + origin_of(fixed) - fixed_from_moved.linear() * origin_of(moved);
+  return swapped ? fixed_from_moved.inverse() : fixed_from_moved;
+}
+
+double rmse(std::uint64_t residual, std::uint32_t inliers, double distance) {
+  return inliers > 0 ? distance * std::sqrt(static_cast<double>(residual) / static_cast<double>(kResidualScale) / inliers) : 0.0;
+}
+
+RegistrationReason evidence_reason(const RegistrationStatistics& s, double confidence, const RegistrationOptions& options) {
+  if (s.source_points < 4) return RegistrationReason::too_few_source_points;
+  if (s.target_points < 4) return RegistrationReason::too_few_target_points;
+  if (s.correspondences < 4) return RegistrationReason::no_usable_features;
+  if (s.scored == 0) return RegistrationReason::degenerate_geometry;
+  return confidence < options.min_confidence ? RegistrationReason::confidence_too_low : RegistrationReason::none;
+}
+
+void add_modes(const PairOutcome& outcome, const PreparedState& source, const PreparedState& target, bool swapped,
+               const RegistrationOptions& options, RegistrationResult& result) {
+  const PreparedState& moved = swapped ? target : source;
+  const PreparedState& fixed = swapped ? source : target;
+  std::vector<RegistrationMode> modes;
+  for (const ModeOutcome& mode : outcome.modes) {
+    RegistrationMode out;
+    out.target_from_source = to_transform(mode.pose, source, target, swapped);
+    out.evidence = to_evidence(outcome, mode, moved, fixed, swapped);
+    modes.push_back(out);
+  }
+  set_confidences(modes);
+  std::vector<std::size_t> order(modes.size());
+  for (std::size_t k = 0; k < order.size(); ++k) order[k] = k;
+  std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return modes[a].confidence > modes[b].confidence; });
+  for (const std::size_t k : order) result.modes.push_back(modes[k]);
+  const ModeOutcome& best = outcome.modes[order.front()];
+  result.has_candidate = true;
+  result.target_from_source = result.modes.front().target_from_source;
+  result.score = result.modes.front().confidence;
+  result.statistics.points_scored = best.source.tested;
+  result.statistics.inliers = result.statistics.consensus = best.source.inliers;
+  result.statistics.refine_iterations = best.iterations;
+  result.inlier_ratio = pipeline::inlier_ratio(result.statistics);
+  result.inlier_rmse = rmse(best.source.residual, best.source.inliers, static_cast<double>(options.score.max_correspondence_distance));
+  result.source_moments = to_frame(swapped ? best.target_moments : best.source_moments, source);
+  result.target_moments = to_frame(swapped ? best.source_moments : best.target_moments, target);
+}
+
 }  // namespace
 
 RegistrationResult to_result(const PairOutcome& outcome, const PreparedState& source, const PreparedState& target, bool swapped,
-                             const ScoreOptions& options) {
+                             const RegistrationOptions& options) {
   RegistrationResult result;
   result.reason = outcome.reason;
   result.status = outcome.reason == RegistrationReason::none ? RegistrationStatus::aligned : RegistrationStatus::not_aligned;
@@ -45,22 +102,19 @@ RegistrationResult to_result(const PairOutcome& outcome, const PreparedState& so
     else if (result.reason == RegistrationReason::too_few_target_points)
       result.reason = RegistrationReason::too_few_source_points;
   }
+  if (options.hypothesis.proposal == Proposal::compatibility) {
+    if (!outcome.modes.empty()) add_modes(outcome, source, target, swapped, options, result);
+    const RegistrationStatistics& s = result.statistics;
+    result.reason = evidence_reason(s, result.score, options);
+    result.status = result.reason == RegistrationReason::none ? RegistrationStatus::aligned : RegistrationStatus::not_aligned;
+    return result;
+  }
   if (!outcome.has_pose) return result;
 
-  const PreparedState& moved = swapped ? target : source;
-  const PreparedState& fixed = swapped ? source : target;
-  const Eigen::Quaterniond q(outcome.pose.w, outcome.pose.x, outcome.pose.y, outcome.pose.z);
-  Eigen::Isometry3d fixed_from_moved = Eigen::Isometry3d::Identity();
-  fixed_from_moved.linear() = q.normalized().toRotationMatrix();
-  fixed_from_moved.translation() = Eigen::Vector3d(outcome.pose.tx, outcome.pose.ty, outcome.pose.tz) + origin_of(fixed) -
-                                   fixed_from_moved.linear() * origin_of(moved);
-  result.target_from_source = swapped ? fixed_from_moved.inverse() : fixed_from_moved;
-
+  result.target_from_source = to_transform(outcome.pose, source, target, swapped);
   result.inlier_ratio = pipeline::inlier_ratio(outcome.statistics);
   result.score = result.inlier_ratio;
-  if (outcome.support.inliers > 0)
-    result.inlier_rmse = static_cast<double>(options.max_correspondence_distance) *
-                         std::sqrt(static_cast<double>(outcome.support.residual) / static_cast<double>(kResidualScale) / outcome.support.inliers);
+  result.inlier_rmse = rmse(outcome.support.residual, outcome.support.inliers, static_cast<double>(options.score.max_correspondence_distance));
   result.source_moments = to_frame(swapped ? outcome.target_moments : outcome.source_moments, source);
   result.target_moments = to_frame(swapped ? outcome.source_moments : outcome.target_moments, target);
   return result;

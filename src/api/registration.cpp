@@ -104,7 +104,7 @@ RegistrationResult align(const Context& context, const PreparedCloud& source, co
   } else {
     context.engine()->align({&input, 1}, options, {&outcome, 1});
   }
-  return to_result(outcome, s, t, swapped, options.score);
+  return to_result(outcome, s, t, swapped, options);
 }
 
 std::vector<RegistrationResult> align_batch(const Context& context, const std::vector<PreparedCloud>& clouds, const std::vector<Pair>& pairs,
@@ -137,7 +137,7 @@ std::vector<RegistrationResult> align_batch(const Context& context, const std::v
     context.engine()->align(span_of(inputs), options, {outcomes.data(), outcomes.size()});
     for (std::size_t p = begin; p < end; ++p) {
       const PreparedState &s = *clouds[pairs[p].source].state(), &t = *clouds[pairs[p].target].state();
-      results[p] = to_result(outcomes[p - begin], s, t, swaps(s, t, options.hypothesis), options.score);
+      results[p] = to_result(outcomes[p - begin], s, t, swaps(s, t, options.hypothesis), options);
       if (callbacks.on_result) callbacks.on_result(p, results[p]);
     }
   }

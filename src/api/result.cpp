@@ -21,6 +21,7 @@ const char* to_string(RegistrationReason reason) {
     case RegistrationReason::no_hypothesis_survived: return "no_hypothesis_survived";
     case RegistrationReason::degenerate_geometry: return "degenerate_geometry";
     case RegistrationReason::inlier_ratio_too_low: return "inlier_ratio_too_low";
+    case RegistrationReason::confidence_too_low: return "confidence_too_low";
     case RegistrationReason::cancelled: return "cancelled";
   }
   return "unknown";
@@ -35,6 +36,7 @@ const char* explain(RegistrationReason reason) {
     case RegistrationReason::no_hypothesis_survived: return "no quadruple of matches had similar side lengths in both clouds";
     case RegistrationReason::degenerate_geometry: return "all candidate quadruples were collinear or coincident";
     case RegistrationReason::inlier_ratio_too_low: return "the best pose found brings too few points together";
+    case RegistrationReason::confidence_too_low: return "what speaks for the best pose found is too little, or too much speaks against it";
     case RegistrationReason::cancelled: return "the batch was cancelled before this pair";
   }
   return "unknown";

@@ -2,10 +2,12 @@
 #include <mutex>
 #include <string>
 
+#include "algorithm/balance.hpp"
 #include "cpu/cell_summary.hpp"
 #include "cpu/stages.hpp"
 #include "gpureg/error.hpp"
 #include "pipeline/align.hpp"
+#include "pipeline/align_by_evidence.hpp"
 #include "pipeline/backend.hpp"
 #include "pipeline/prepare.hpp"
 
@@ -41,7 +43,10 @@ class CpuEngine final : public Engine {
     for (std::size_t p = 0; p < pairs.size; ++p)
       views[p] = {static_cast<const CpuCloud*>(pairs[p].source)->view(), static_cast<const CpuCloud*>(pairs[p].target)->view(),
                   pairs[p].custom_source.data, pairs[p].custom_target.data, static_cast<std::uint32_t>(pairs[p].custom_source.size)};
-    pipeline::align(exec_, span_of(views), options, outcomes);
+    if (options.hypothesis.proposal == Proposal::compatibility)
+      pipeline::align_by_evidence(exec_, span_of(views), options, outcomes);
+    else
+      pipeline::align(exec_, span_of(views), options, outcomes);
   }
 
  private:
@@ -49,14 +54,26 @@ class CpuEngine final : public Engine {
   Exec exec_;
 };
 
+std::uint64_t balance_points(const std::vector<Vec3>& normals, std::vector<std::uint32_t>& weight) {
+  std::uint32_t count[kBalanceBins] = {};
+  weight.resize(normals.size());
+  for (std::size_t i = 0; i < normals.size(); ++i) ++count[weight[i] = balance_bin(normals[i])];
+  std::uint64_t total = 0;
+  for (std::uint32_t& w : weight) total += w = balance_weight(count[w]);
+  return total;
+}
+
 }  // namespace
 
 CloudView CpuCloud::view() const {
-  return {points.data(), normals.data(), features.values.data(), features.valid.data(), size, feature_dimension, radius, closest.view(), this};
+  const bool wide = !wide_features.values.empty();
+  return {points.data(), normals.data(), features.values.data(), features.valid.data(), size, feature_dimension, radius, closest.view(), this,
+          wide ? wide_features.values.data() : nullptr, wide ? wide_features.valid.data() : nullptr, balance.data(), balance_total, visibility.view()};
 }
 
 std::vector<std::shared_ptr<CpuCloud>> assemble(Exec& exec, std::vector<DownsampledCloud>& clouds, std::vector<std::vector<Vec3>>& normals,
-                                                std::vector<Features>& features, std::vector<ClosestGrid>& closest,
+                                                std::vector<Features>& features, std::vector<Features>& wide_features,
+                                                std::vector<ClosestGrid>& closest, std::vector<Visibility>& visibility,
                                                 const PrepareOptions& options) {
   std::vector<std::shared_ptr<CpuCloud>> out(clouds.size());
   exec.parallel(clouds.size(), [&](std::size_t c) {
@@ -75,6 +92,9 @@ std::vector<std::shared_ptr<CpuCloud>> assemble(Exec& exec, std::vector<Downsamp
     cloud->points = std::move(clouds[c].points);
     cloud->normals = std::move(normals[c]);
     cloud->features = std::move(features[c]);
+    cloud->wide_features = std::move(wide_features[c]);
+    cloud->visibility = std::move(visibility[c]);
+    cloud->balance_total = balance_points(cloud->normals, cloud->balance);
     cloud->closest = std::move(closest[c]);
     cloud->order = scoring_order(cloud->points, cloud->normals, options.search_distance);
     cloud->summaries = summarize_cells(cloud->closest, options.search_distance, cloud->radius, cloud->points, cloud->normals);

@@ -63,6 +63,14 @@ struct CellSummaries {
   std::vector<std::uint32_t> summary;  ///< (1 + blocks) x 512
 };
 
+/// Depth maps of a cloud's viewpoints, see visibility.hpp.
+struct Visibility {
+  std::vector<std::uint16_t> depth;   ///< viewpoints x kMapCells
+  std::vector<Vec3> viewpoints;       ///< local
+  float step = 1;
+  VisibilityView view() const { return {depth.data(), viewpoints.data(), static_cast<std::uint32_t>(viewpoints.size()), step}; }
+};
+
 struct ClosestGrid {
   float cell_size = 1;
   CellTable table;
@@ -75,7 +83,9 @@ struct ClosestGrid {
 /// The fragment that a PreparedCloud holds.
 struct CpuCloud : PreparedState {
   std::vector<Vec3> points, normals;
-  Features features;
+  Features features, wide_features;
+  std::vector<std::uint32_t> balance;
+  Visibility visibility;
   ClosestGrid closest;
   ScoringOrder order;
   CellSummaries summaries;
@@ -87,6 +97,31 @@ struct CpuCloud : PreparedState {
 
 struct Matches {
   std::vector<MatchedPoints> pairs;
+};
+
+/// The matches of a pair that candidates are made of, each coordinate an array of its own; in an order that says nothing about them.
+struct MatchSet {
+  std::vector<float> px, py, pz, qx, qy, qz;       ///< local points of source and target
+  std::vector<float> mx, my, mz, nx, ny, nz;       ///< their normals
+  std::vector<std::uint32_t> source, target;       ///< their indices
+  std::vector<std::uint32_t> source_weight, target_weight;  ///< balanced over the normals of all matches
+  std::uint64_t source_total = 0, target_total = 0;
+  std::uint32_t found = 0;                         ///< before the choice
+  std::uint32_t size() const { return static_cast<std::uint32_t>(source.size()); }
+};
+
+/// Candidate poses of a pair, in the order of their seeds.
+struct Candidates {
+  std::vector<Pose<float>> pose;
+  std::vector<std::uint32_t> seed;      ///< index of the match that it grew from
+  std::vector<MatchEvidence> matches;
+  std::vector<float> promise;
+};
+
+/// A distinct pose and what speaks for it.
+struct Mode {
+  Pose<double> pose{1, 0, 0, 0, 0, 0, 0};
+  std::uint32_t seed = 0, iterations = 0;
 };
 
 struct Hypotheses {

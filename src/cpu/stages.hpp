@@ -18,8 +18,15 @@ std::vector<Features> compute_features(Exec& exec, const std::vector<Downsampled
                                        const PrepareOptions& options);
 std::vector<ClosestGrid> build_closest_grids(Exec& exec, const std::vector<DownsampledCloud>& clouds, const std::vector<Grid>& grids,
                                              const PrepareOptions& options);
+/// FPFH of the second radius; empty where there is none.
+std::vector<Features> compute_wide_features(Exec& exec, const std::vector<DownsampledCloud>& clouds,
+                                            const std::vector<std::vector<Vec3>>& normals, const std::vector<Grid>& grids,
+                                            const PrepareOptions& options);
+std::vector<Visibility> build_depth_maps(Exec& exec, Span<const RawCloud> raw, const std::vector<DownsampledCloud>& clouds,
+                                         const PrepareOptions& options);
 std::vector<std::shared_ptr<CpuCloud>> assemble(Exec& exec, std::vector<DownsampledCloud>& clouds, std::vector<std::vector<Vec3>>& normals,
-                                                std::vector<Features>& features, std::vector<ClosestGrid>& closest,
+                                                std::vector<Features>& features, std::vector<Features>& wide_features,
+                                                std::vector<ClosestGrid>& closest, std::vector<Visibility>& visibility,
                                                 const PrepareOptions& options);
 
 // Alignment, one entry per pair.
@@ -34,6 +41,26 @@ std::vector<BestPose> refine_poses(Exec& exec, Span<const PairView> pairs, const
                                    const RefineOptions& options);
 std::vector<Judgement> judge_poses(Exec& exec, Span<const PairView> pairs, const std::vector<BestPose>& poses,
                                          const ScoreOptions& options);
+// Alignment by compatibility and evidence, one entry per pair.
+/// Nearest features in both directions and of both radii, united; at most max_matches of them.
+std::vector<MatchSet> unite_matches(Exec& exec, Span<const PairView> pairs, const HypothesisOptions& hypothesis,
+                                    const CompatibilityOptions& options);
+/// Matches with the most compatible others, local maxima first.
+std::vector<std::vector<std::uint32_t>> choose_seeds(Exec& exec, const std::vector<MatchSet>& matches, const CompatibilityOptions& options);
+/// A pose for each seed whose neighbourhood determines one, in the order of the seeds, and the matches that it brings together.
+std::vector<Candidates> propose_poses(Exec& exec, const std::vector<MatchSet>& matches, const std::vector<std::vector<std::uint32_t>>& seeds,
+                                      const HypothesisOptions& hypothesis, const CompatibilityOptions& options);
+/// Adds the promise: evidence from a sample of the points.
+void weigh_candidates(Exec& exec, Span<const PairView> pairs, const std::vector<MatchSet>& matches, std::vector<Candidates>& candidates,
+                      const EvidenceOptions& options, const ScoreOptions& score);
+/// The most promising distinct poses.
+std::vector<std::vector<Mode>> select_modes(Exec& exec, const std::vector<Candidates>& candidates, const EvidenceOptions& options);
+void refine_modes(Exec& exec, Span<const PairView> pairs, std::vector<std::vector<Mode>>& modes, const EvidenceOptions& evidence,
+                  const RefineOptions& options);
+/// All evidence, from all points.
+void weigh_modes(Exec& exec, Span<const PairView> pairs, const std::vector<MatchSet>& matches, const std::vector<Candidates>& candidates,
+                 const std::vector<std::vector<Mode>>& modes, const RegistrationOptions& options, Span<PairOutcome> outcomes);
+
 void conclude(Exec& exec, Span<const PairView> pairs, const std::vector<Matches>& matches,
               const std::vector<std::vector<std::uint32_t>>& quadruples, const std::vector<Hypotheses>& hypotheses,
               const std::vector<BestPose>& poses, const std::vector<Judgement>& judgements, const RegistrationOptions& options,
@@ -47,6 +74,9 @@ struct FeatureRows {
   std::uint32_t size, dimension;
 };
 void nearest_features(FeatureRows queries, FeatureRows rows, std::uint32_t k, std::size_t begin, std::size_t end, std::uint32_t* out);
+
+/// Matches that the pose brings within the distance of each other.
+MatchEvidence count_matches(const MatchSet& matches, const Rigid& pose, float squared_distance);
 
 /// Exact support of one pose: the per-pose loop that scoring, refinement and tests share.
 Support measure_support(const CloudView& source, const CloudView& target, const Rigid& pose, const ScoreOptions& options);

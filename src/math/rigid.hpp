@@ -55,6 +55,32 @@ GPUREG_HD Vec3 apply(const Rigid& m, Vec3 p) {
           fmaf(m.r[8], p.z, fmaf(m.r[7], p.y, fmaf(m.r[6], p.x, m.t[2])))};
 }
 
+GPUREG_HD Rigid inverse(const Rigid& m) {
+  Rigid out{{m.r[0], m.r[3], m.r[6], m.r[1], m.r[4], m.r[7], m.r[2], m.r[5], m.r[8]}, {0, 0, 0}};
+  const Vec3 t = rotate(out, {m.t[0], m.t[1], m.t[2]});
+  out.t[0] = -t.x, out.t[1] = -t.y, out.t[2] = -t.z;
+  return out;
+}
+
+/// Motion that carries one triangle to another by their frames: exact for congruent triangles, and for others it keeps the first corner and
+/// the direction of the first side. False where one of them has no area.
+GPUREG_HD bool carry_triangle(Vec3 p0, Vec3 p1, Vec3 p2, Vec3 q0, Vec3 q1, Vec3 q2, Rigid& out) {
+  const Vec3 a = p1 - p0, b = cross(a, p2 - p0), c = cross(b, a);
+  const Vec3 d = q1 - q0, e = cross(d, q2 - q0), f = cross(e, d);
+  const float sa = squared_norm(a), sb = squared_norm(b), sd = squared_norm(d), se = squared_norm(e);
+  if (!(sb > 0.0f) || !(se > 0.0f)) return false;
+  const float first = 1.0f / sqrtf(sa * sd), second = 1.0f / sqrtf(sb * se), third = first * second;
+  const float pa[3] = {a.x, a.y, a.z}, pb[3] = {b.x, b.y, b.z}, pc[3] = {c.x, c.y, c.z};
+  const float qd[3] = {d.x * first, d.y * first, d.z * first}, qe[3] = {e.x * second, e.y * second, e.z * second};
+  const float qf[3] = {f.x * third, f.y * third, f.z * third};
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < 3; ++j) out.r[3 * i + j] = fmaf(qf[i], pc[j], fmaf(qe[i], pb[j], qd[i] * pa[j]));
+  out.t[0] = out.t[1] = out.t[2] = 0.0f;
+  const Vec3 t = q0 - rotate(out, p0);
+  out.t[0] = t.x, out.t[1] = t.y, out.t[2] = t.z;
+  return true;
+}
+
 GPUREG_HD Pose<double> widen(const Pose<float>& p) {
   Pose<double> q{p.w, p.x, p.y, p.z, p.tx, p.ty, p.tz};
   const double n = sqrt(q.w * q.w + q.x * q.x + q.y * q.y + q.z * q.z);

@@ -25,6 +25,7 @@ struct PreparedState {
   float origin[3] = {0, 0, 0};        ///< local origin in the cloud's frame
   std::uint32_t size = 0;
   std::uint32_t feature_dimension = 0;
+  std::uint64_t balance_total = 0;    ///< see CloudView
   float radius = 1;                   ///< see CloudView
   std::vector<Vec3> viewpoints;       ///< relative to the local origin
 };

@@ -17,18 +17,22 @@ auto prepare(Exec& exec, Span<const RawCloud> clouds, const PrepareOptions& opti
   auto normals = estimate_normals(exec, points, grids, options);
   const auto oriented = exec.mark();
   auto features = compute_features(exec, points, normals, grids, options);
-  const auto described = exec.mark();
+  auto wide_features = compute_wide_features(exec, points, normals, grids, options);
+  const auto widened = exec.mark();
   auto closest = build_closest_grids(exec, points, grids, options);
   const auto searchable = exec.mark();
-  auto prepared = assemble(exec, points, normals, features, closest, options);
+  auto depth_maps = build_depth_maps(exec, clouds, points, options);
+  const auto mapped = exec.mark();
+  auto prepared = assemble(exec, points, normals, features, wide_features, closest, depth_maps, options);
 
   const double share = 1.0 / static_cast<double>(clouds.size);
   for (auto& cloud : prepared) {
     PrepareStatistics& ms = cloud->statistics;
     ms.downsample = exec.milliseconds(begin, downsampled) * share;
     ms.normals = exec.milliseconds(gridded, oriented) * share;
-    ms.features = exec.milliseconds(oriented, described) * share;
-    ms.grid = (exec.milliseconds(downsampled, gridded) + exec.milliseconds(described, searchable)) * share;
+    ms.features = exec.milliseconds(oriented, widened) * share;
+    ms.grid = (exec.milliseconds(downsampled, gridded) + exec.milliseconds(widened, searchable)) * share;
+    ms.depth_maps = exec.milliseconds(searchable, mapped) * share;
   }
   return prepared;
 }

@@ -1,11 +1,14 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include "algorithm/closest.hpp"
+#include "algorithm/cloud.hpp"
+#include "algorithm/evidence.hpp"
 #include "algorithm/moments.hpp"
 #include "algorithm/support.hpp"
 #include "gpureg/options.hpp"
 #include "gpureg/statistics.hpp"
+
+#include <vector>
 
 /// What goes through the pipeline: plain data, no Eigen, so that stages may be compiled with flags of their own.
 namespace gpureg {
@@ -22,19 +25,6 @@ struct RawCloud {
   std::size_t viewpoint_count;
 };
 
-/// A prepared cloud as alignment reads it. Pointers are on the executor's side; points are relative to the cloud's local origin.
-struct CloudView {
-  const Vec3* points;
-  const Vec3* normals;
-  const float* features;            ///< size x feature_dimension
-  const std::uint8_t* has_feature;  ///< 0: the row is not to be matched
-  std::uint32_t size;
-  std::uint32_t feature_dimension;
-  float radius;                     ///< largest distance of a point from the local origin, > 0
-  ClosestGridView closest;
-  const void* executor_data;        ///< what the executor keeps beside, for itself
-};
-
 /// One pair as stages see it. matches: the caller's own correspondences instead of features; count 0 and null otherwise.
 struct PairView {
   CloudView source;
@@ -42,6 +32,18 @@ struct PairView {
   const std::uint32_t* custom_source;
   const std::uint32_t* custom_target;
   std::uint32_t custom_count;
+};
+
+/// A refined pose with what speaks for and against it, in local coordinates of both clouds.
+struct ModeOutcome {
+  Pose<double> pose{1, 0, 0, 0, 0, 0, 0};
+  std::uint32_t hypothesis = 0;   ///< seed that it came from
+  std::uint32_t iterations = 0;
+  MatchEvidence matches{0, 0, 0};
+  SideEvidence source{}, target{};
+  InformationSums information{};
+  Moments source_moments{0, {0, 0, 0}, {0, 0, 0, 0, 0, 0}};
+  Moments target_moments{0, {0, 0, 0}, {0, 0, 0, 0, 0, 0}};
 };
 
 /// Result of one pair in local coordinates of both clouds.
@@ -52,6 +54,8 @@ struct PairOutcome {
   Support support{0, 0, 0};
   Moments source_moments{0, {0, 0, 0}, {0, 0, 0, 0, 0, 0}};
   Moments target_moments{0, {0, 0, 0}, {0, 0, 0, 0, 0, 0}};
+  std::vector<ModeOutcome> modes;  ///< distinct poses, in order of their promise
+  std::uint64_t match_weight_source = 0, match_weight_target = 0;  ///< of all matches, what MatchEvidence is relative to
   RegistrationStatistics statistics;
   StageTimings timings;
 };

@@ -1,0 +1,180 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: BSD-3-Clause
+"""Fits the confidence of a pose to its evidence, and says how far it can be trusted in buildings that the fit did not see.
+
+A run is BUILDING=SCENE_FOLDER=RESULT.json: what `gpureg batch --preset default --json` wrote for a scene whose folder has gt.log, gt.info,
+gt_all.log and gt_all.info (right: Redwood's 0.2 m rule against gt_all). Every run is tested with a fit on the other buildings;
+then all of them together give the coefficients that are written into the library.
+
+Two logistic regressions: the first ranks the modes of a pair by their own evidence, the second judges the best of them, and also sees its
+margin over the best distinct rival. Each exists twice: with free space, and without for clouds whose viewpoints are not known.
+
+usage: fit_confidence.py RUN... [--header src/api/confidence_model.hpp] [-o bench/results/confidence.json]
+Needs numpy and scikit-learn.
+"""
+import argparse
+import json
+import pathlib
+
+import numpy as np
+from sklearn.linear_model import LogisticRegression
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+MODELS = ("with_free_space", "without_free_space")
+
+
+def blocks(path, size):
+    rows = [line.split() for line in path.read_text().splitlines() if line.strip()]
+    return {tuple(map(int, rows[k][:2])): np.array(rows[k + 1:k + size], float) for k in range(0, len(rows), size)}
+
+
+def errors(truth, information, poses):
+    """Redwood's error of each pose, metres."""
+    e = np.linalg.inv(truth) @ poses
+    q = np.empty((len(poses), 3))
+    for k, m in enumerate(e[:, :3, :3]):
+        w, v = np.linalg.eigh(np.array([
+            [m[0, 0] - m[1, 1] - m[2, 2], 0, 0, 0], [m[0, 1] + m[1, 0], m[1, 1] - m[0, 0] - m[2, 2], 0, 0],
+            [m[0, 2] + m[2, 0], m[1, 2] + m[2, 1], m[2, 2] - m[0, 0] - m[1, 1], 0],
+            [m[2, 1] - m[1, 2], m[0, 2] - m[2, 0], m[1, 0] - m[0, 1], m[0, 0] + m[1, 1] + m[2, 2]]]))
+        q[k] = v[:3, 3] * (1 if v[3, 3] >= 0 else -1)
+    x = np.concatenate([e[:, :3, 3], q], 1)
+    return np.sqrt(np.maximum(np.einsum("ka,ab,kb->k", x, information, x) / information[0, 0], 0))
+
+
+def measures(evidence, free_space):
+    """What the model sees of one mode; the library computes the same (src/api/confidence.cpp)."""
+    log = lambda value, least: np.log(max(value, least))  # noqa: E731
+    overlap, balanced = evidence["overlap"], evidence["balanced_overlap"]
+    stiffness = evidence["stiffness"]
+    out = [log(evidence["match_support"], 1e-5), log(evidence["match_inliers"], 1), log(min(balanced), 1e-3), log(max(balanced), 1e-3),
+           log(min(overlap), 1e-3), log(stiffness[0], 1e-2), log(stiffness[1], 1e-2), sum(np.log1p(s) for s in stiffness)]
+    if free_space:
+        seen, impossible, hidden = evidence["seen"], evidence["impossible"], evidence["hidden"]
+        known = [k for k in (0, 1) if seen[k] > 0] or [0]
+        seen, impossible, hidden = ([v[k] for k in known] for v in (seen, impossible, hidden))
+        of_all = [s * i for s, i in zip(seen, impossible)]
+        out += [min(seen), max(seen), max(of_all), min(of_all), max(impossible), min(impossible), log(max(impossible), 3e-3), min(hidden)]
+    return out
+
+
+def has_free_space(evidence):
+    return max(evidence["seen"]) > 0
+
+
+class Run:
+    def __init__(self, text):
+        self.building, folder, result = text.split("=")
+        folder = pathlib.Path(folder)
+        self.name = self.building + "/" + folder.name
+        truth, information = blocks(folder / "gt_all.log", 5), blocks(folder / "gt_all.info", 7)
+        strict, strict_information = blocks(folder / "gt.log", 5), blocks(folder / "gt.info", 7)
+        pairs = [p for p in json.loads(pathlib.Path(result).read_text())["pairs"] if p["j"] - p["i"] > 1]
+        self.in_truth = np.array([(p["i"], p["j"]) in strict for p in pairs])
+        self.modes = [p.get("modes", []) for p in pairs]
+        self.free = np.array([bool(m) and has_free_space(m[0]["evidence"]) for m in self.modes])
+        self.right, self.strict = [], []
+        for p, modes in zip(pairs, self.modes):
+            key = (p["i"], p["j"])
+            poses = np.array([m["T_ij"] for m in modes], float).reshape(-1, 4, 4)
+            wrong = np.full(len(modes), 9.0)
+            self.right.append((errors(truth[key], information[key], poses) if key in truth and len(modes) else wrong) <= 0.2)
+            self.strict.append((errors(strict[key], strict_information[key], poses) if key in strict and len(modes) else wrong) <= 0.2)
+        self.x = {free: [np.array([measures(m["evidence"], free) for m in modes]) for modes in self.modes] for free in (True, False)}
+
+
+class Logistic:
+    """Logistic regression on standardised measures, written as weights of the measures themselves."""
+
+    def __init__(self, x, y):
+        mean, scale = x.mean(0), np.maximum(x.std(0), 1e-9)
+        fit = LogisticRegression(C=1.0, max_iter=5000).fit((x - mean) / scale, y)
+        self.weights = fit.coef_[0] / scale
+        self.bias = float(fit.intercept_[0] - (self.weights * mean).sum())
+
+    def logit(self, x):
+        return x @ self.weights + self.bias
+
+
+def second_view(run, free, first):
+    """Measures of the best mode of each pair, its logit and its margin over the best rival; which mode it is."""
+    rows, best = [], []
+    for x in run.x[free]:
+        if not len(x):
+            best.append(-1)
+            continue
+        logits = np.clip(first.logit(x), -14, 14)
+        k = int(logits.argmax())
+        rival = max([v for i, v in enumerate(logits) if i != k], default=-14.0)
+        rows.append(np.r_[x[k], logits[k], logits[k] - rival])
+        best.append(k)
+    return np.array(rows), best
+
+
+def fit(runs, free):
+    x = np.concatenate([v for run in runs for v in run.x[free] if len(v)])
+    y = np.concatenate([np.array(v) for run in runs for v in run.right if len(v)])
+    first = Logistic(x, y)
+    views = [second_view(run, free, first) for run in runs]
+    y2 = np.concatenate([[run.right[k][b] for k, b in enumerate(view[1]) if b >= 0] for run, view in zip(runs, views)])
+    return first, Logistic(np.concatenate([view[0] for view in views]), y2)
+
+
+def figures(run, free, models):
+    x, best = second_view(run, free, models[0])
+    confidence = np.zeros(len(best))
+    found = np.array([b >= 0 for b in best])
+    confidence[found] = 1 / (1 + np.exp(-models[1].logit(x)))
+    right = np.array([b >= 0 and bool(run.right[k][b]) for k, b in enumerate(best)])
+    strict = np.array([b >= 0 and bool(run.strict[k][b]) for k, b in enumerate(best)])
+    total = int(run.in_truth.sum())
+    order = np.argsort(-confidence, kind="stable")
+    recall = np.cumsum(strict[order]) / total
+    out = {"pairs": len(best), "ground_truth": total, "generated": 100 * np.mean([v.any() for v, t in zip(run.strict, run.in_truth) if t]),
+           "raw": 100 * strict.sum() / total}
+    for name, good in (("geo", right), ("strict", strict)):
+        precision = np.cumsum(good[order]) / np.arange(1, len(order) + 1)
+        for at in (80, 95, 99):
+            out[f"{name}_R@P{at}"] = 100 * max([r for r, p in zip(recall, precision) if p >= at / 100], default=0)
+        out[f"{name}_AP"] = 100 * (precision * strict[order]).sum() / total
+    bins = np.minimum((confidence * 10).astype(int), 9)
+    out["ECE"] = sum((bins == b).mean() * abs(confidence[bins == b].mean() - right[bins == b].mean()) for b in range(10) if (bins == b).any())
+    sure = confidence > 0.9
+    out["right_above_0.9"] = 100 * right[sure].mean() if sure.any() else None
+    return out
+
+
+def header(models):
+    lines = ["// SPDX-License-Identifier: BSD-3-Clause", "// Written by bench/accuracy/fit_confidence.py; docs/accuracy.md says how well it does.",
+             "#pragma once", "", "namespace gpureg::confidence_model {", ""]
+    for name, pair in zip(MODELS, models):
+        for stage, model in zip(("ranking", "confidence"), pair):
+            values = ", ".join(f"{w:.9g}" for w in model.weights)
+            lines += [f"constexpr double {stage}_{name}_bias = {model.bias:.9g};", f"constexpr double {stage}_{name}[] = {{{values}}};", ""]
+    return "\n".join(lines + ["}  // namespace gpureg::confidence_model", ""])
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("runs", nargs="+", metavar="RUN", help="BUILDING=SCENE_FOLDER=RESULT.json")
+    parser.add_argument("--header", type=pathlib.Path)
+    parser.add_argument("-o", "--output", type=pathlib.Path)
+    arguments = parser.parse_args()
+    runs = [Run(text) for text in arguments.runs]
+    record = {"runs": []}
+    for free, name in zip((True, False), MODELS):
+        for run in runs:
+            others = [r for r in runs if r.building != run.building and (not free or r.free.any())]
+            if not others or (free and not run.free.any()):
+                continue
+            out = {"scene": run.name, "model": name, **figures(run, free, fit(others, free))}
+            record["runs"].append(out)
+            print(" ".join(f"{k} {v:.3f}" if k == "ECE" else f"{k} {v:.1f}" if isinstance(v, float) else f"{k} {v}" for k, v in out.items()))
+    models = [fit([r for r in runs if not free or r.free.any()], free) for free in (True, False)]
+    if arguments.header:
+        arguments.header.write_text(header(models))
+    if arguments.output:
+        arguments.output.write_text(json.dumps(record, indent=1) + "\n")
+
+
+main()

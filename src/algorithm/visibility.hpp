@@ -1,0 +1,87 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include "math/span.hpp"
+#include "math/vec3.hpp"
+
+namespace gpureg {
+
+/// What a cloud's viewpoints have seen: around each a cube of depth maps. A point that would hang in front of a surface that a viewpoint
+/// saw, on the line between, cannot be there.
+constexpr int kMapEdge = 96;                                ///< cells along an edge of a face: about 1/60 rad each
+constexpr std::uint32_t kMapFace = kMapEdge * kMapEdge;
+constexpr std::uint32_t kMapCells = 6 * kMapFace;
+constexpr std::uint16_t kUnknownDepth = 65535;
+
+/// Cell of a cube map, and the depth: the largest coordinate.
+struct MapRay {
+  std::uint32_t cell;
+  float depth;
+};
+
+/// d: from the viewpoint to the point, not zero.
+GPUREG_HD MapRay map_ray(Vec3 d) {
+  const float ax = d.x < 0 ? -d.x : d.x, ay = d.y < 0 ? -d.y : d.y, az = d.z < 0 ? -d.z : d.z;
+  const bool is_x = (ax >= ay) & (ax >= az), is_y = !is_x & (ay >= az);
+  const float depth = is_x ? ax : is_y ? ay : az;
+  const float along = is_x ? d.x : is_y ? d.y : d.z;
+  const float u = is_x ? d.y : d.x, v = is_x | is_y ? d.z : d.y;
+  const float scale = 0.5f * static_cast<float>(kMapEdge) / depth;
+  const float half = 0.5f * static_cast<float>(kMapEdge);
+  std::int32_t column = static_cast<std::int32_t>(fmaf(u, scale, half)), row = static_cast<std::int32_t>(fmaf(v, scale, half));
+  column = column < 0 ? 0 : column >= kMapEdge ? kMapEdge - 1 : column;
+  row = row < 0 ? 0 : row >= kMapEdge ? kMapEdge - 1 : row;
+  const std::uint32_t face = (is_x ? 0u : is_y ? 2u : 4u) + (along < 0 ? 1u : 0u);
+  return {face * kMapFace + static_cast<std::uint32_t>(row * kMapEdge + column), depth};
+}
+
+/// Depth in the maps' steps; what is too far for them counts as their farthest.
+GPUREG_HD std::uint16_t map_depth(float depth, float inverse_step) {
+  const float steps = depth * inverse_step;
+  return steps < 65534.0f ? static_cast<std::uint16_t>(steps) : static_cast<std::uint16_t>(65534);
+}
+
+/// Nearest depth among the 3 x 3 cells around a known cell of the same face: what hangs before that is in front of all of them.
+GPUREG_HD std::uint16_t eroded_depth(const std::uint16_t* map, std::uint32_t cell) {
+  std::uint16_t nearest = map[cell];
+  if (nearest == kUnknownDepth) return nearest;
+  const std::int32_t in_face = static_cast<std::int32_t>(cell % kMapFace);
+  const std::uint16_t* face = map + (cell - static_cast<std::uint32_t>(in_face));
+  const std::int32_t row = in_face / kMapEdge, column = in_face % kMapEdge;
+  for (std::int32_t r = row > 0 ? row - 1 : 0; r <= row + 1 && r < kMapEdge; ++r)
+    for (std::int32_t c = column > 0 ? column - 1 : 0; c <= column + 1 && c < kMapEdge; ++c)
+      nearest = face[r * kMapEdge + c] < nearest ? face[r * kMapEdge + c] : nearest;
+  return nearest;
+}
+
+/// Which of `known` viewpoints becomes map k of `count`: evenly spread over their order, the first and the last among them.
+GPUREG_HD std::size_t chosen_viewpoint(std::size_t k, std::size_t count, std::size_t known) {
+  return count > 1 ? k * (known - 1) / (count - 1) : 0;
+}
+
+/// Length of a step of depth: 65,534 of them reach two thousand voxels.
+GPUREG_HD float depth_step(float voxel_size) { return voxel_size * 0.03125f; }
+
+/// Maps of one cloud: viewpoints x kMapCells depths, each the nearest within its 3 x 3 cells of the face; unknown where nothing was seen.
+struct VisibilityView {
+  const std::uint16_t* depth;
+  const Vec3* viewpoints;   ///< in the cloud's local frame
+  std::uint32_t count;
+  float step;               ///< length of one step of depth
+};
+
+/// How a place is seen by one map.
+enum class Sight : std::uint32_t { unknown = 0, behind = 1, surface = 2, before = 3 };
+
+/// margin: how far before (or behind) the seen surface still counts as on it; nothing nearer to the viewpoint than min_range is judged.
+GPUREG_HD Sight sight(const VisibilityView& maps, std::uint32_t map, Vec3 p, float margin, float min_range) {
+  const MapRay ray = map_ray(p - maps.viewpoints[map]);
+  if (!(ray.depth > min_range)) return Sight::unknown;
+  const std::uint16_t steps = maps.depth[static_cast<std::size_t>(map) * kMapCells + ray.cell];
+  if (steps == kUnknownDepth) return Sight::unknown;
+  const float depth = static_cast<float>(steps) * maps.step;
+  if (ray.depth < depth - margin) return Sight::before;
+  return ray.depth > depth + margin ? Sight::behind : Sight::surface;
+}
+
+}  // namespace gpureg

@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "api/evidence.hpp"
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+
+namespace gpureg {
+namespace {
+
+double share(std::uint64_t part, std::uint64_t whole) { return whole > 0 ? static_cast<double>(part) / static_cast<double>(whole) : 0.0; }
+
+/// The length that rotations are measured at: twenty voxels, a metre at the usual five centimetres.
+double unit_length(const PrepareOptions& options) {
+  const double voxel = options.voxel_size > 0 ? static_cast<double>(options.voxel_size) : static_cast<double>(options.search_distance) / 1.5;
+  return 20.0 * voxel;
+}
+
+std::array<double, 6> stiffness(const InformationSums& sums, std::uint32_t inliers, double radius, double unit) {
+  const double fixed = 1.0 / static_cast<double>(kIcpFixedScale);
+  Eigen::Matrix<double, 6, 6> a, turn = Eigen::Matrix<double, 6, 6>::Identity();
+  for (int i = 0, k = 0; i < 6; ++i)
+    for (int j = 0; j <= i; ++j, ++k) a(i, j) = a(j, i) = static_cast<double>(sums.v[k]) * fixed;
+  // Arms about the centre of the inliers, in the unit: (arm - c) x n = arm x n - c x n.
+  const double scale = radius / unit;
+  Eigen::Vector3d c = Eigen::Vector3d::Zero();
+  if (inliers > 0)
+    for (int k = 0; k < 3; ++k) c[k] = static_cast<double>(sums.arm[k]) * fixed / inliers;
+  Eigen::Matrix3d cross;
+  cross << 0, -c.z(), c.y(), c.z(), 0, -c.x(), -c.y(), c.x(), 0;
+  turn.topLeftCorner<3, 3>() *= scale;
+  turn.topRightCorner<3, 3>() = -scale * cross;
+  const Eigen::Matrix<double, 6, 6> centred = turn * a * turn.transpose();
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, 6, 6>> solver(centred, Eigen::EigenvaluesOnly);
+  std::array<double, 6> out;
+  for (int k = 0; k < 6; ++k) out[static_cast<std::size_t>(k)] = std::max(0.0, solver.eigenvalues()[k]);
+  return out;
+}
+
+}  // namespace
+
+PoseEvidence to_evidence(const PairOutcome& outcome, const ModeOutcome& mode, const PreparedState& moved, const PreparedState& fixed,
+                         bool swapped) {
+  const SideEvidence &s = swapped ? mode.target : mode.source, &t = swapped ? mode.source : mode.target;
+  const std::uint64_t whole_s = swapped ? fixed.balance_total : moved.balance_total, whole_t = swapped ? moved.balance_total : fixed.balance_total;
+  PoseEvidence e;
+  e.match_inliers = mode.matches.inliers;
+  e.match_support = std::min(share(mode.matches.source_weight, outcome.match_weight_source), share(mode.matches.target_weight, outcome.match_weight_target));
+  e.source_overlap = share(s.inliers, s.tested), e.target_overlap = share(t.inliers, t.tested);
+  e.source_balanced_overlap = share(s.balanced, whole_s), e.target_balanced_overlap = share(t.balanced, whole_t);
+  e.source_seen = share(s.seen, s.tested), e.target_seen = share(t.seen, t.tested);
+  e.source_impossible = share(s.before, s.seen), e.target_impossible = share(t.before, t.seen);
+  e.source_hidden = share(s.hidden, s.seen), e.target_hidden = share(t.hidden, t.seen);
+  e.stiffness = stiffness(mode.information, mode.source.inliers, static_cast<double>(moved.radius), unit_length(moved.options));
+  return e;
+}
+
+}  // namespace gpureg
