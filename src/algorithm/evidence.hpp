@@ -89,6 +89,9 @@ GPUREG_HD std::uint32_t quick_maps(const VisibilityView& maps) { return maps.cou
 /// Weight of a point in [0, 1].
 GPUREG_HD float balance_share(std::uint32_t weight) { return static_cast<float>(weight) * (1.0f / kBalanceScale); }
 
+/// Modes are refined twice: on a sample, then on all points with a kernel this much narrower. The wide kernel pulls from afar; the narrow
+/// one ends at the surfaces, where the wide one is still pulled along by what slides.
+constexpr float kPolishKernel = 0.5f;
 constexpr float kRefineNormalAngle = 45.0f;  ///< degrees between the normals of what refinement pulls together
 
 /// On the host only: trace of the rotation by that angle.

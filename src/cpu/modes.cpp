@@ -9,7 +9,8 @@ namespace gpureg::cpu {
 namespace {
 
 /// Normal equations from every stride-th source point, weighed by its normal's direction.
-IcpSums mode_sums(const PairView& pair, const Pose<double>& pose, const RefineOptions& options, float min_cosine, std::uint32_t stride) {
+IcpSums mode_sums(const PairView& pair, const Pose<double>& pose, const RefineOptions& options, float kernel_width, float min_cosine,
+                  std::uint32_t stride) {
   const Rigid rigid = to_rigid(pose);
   const CloudView &s = pair.source, &t = pair.target;
   const float max_squared = options.max_correspondence_distance * options.max_correspondence_distance;
@@ -23,9 +24,21 @@ IcpSums mode_sums(const PairView& pair, const Pose<double>& pose, const RefineOp
     if (!normals_agree(rotate(rigid, s.normals[i]), t.normals[c.index], min_cosine)) continue;
     const float distance = dot(q - t.points[c.index], t.normals[c.index]);
     add_icp_term(arm * inverse_radius, t.normals[c.index], distance * inverse_max,
-                 robust_weight(distance, options.kernel_width) * balance_share(s.balance[i]), sums);
+                 robust_weight(distance, kernel_width) * balance_share(s.balance[i]), sums);
   }
   return sums;
+}
+
+/// Iterates until it settles, at most max_iterations times.
+void refine_mode(const PairView& pair, const RefineOptions& options, float kernel_width, float min_cosine, std::uint32_t stride, Mode& mode) {
+  for (std::uint32_t k = 0; k < options.max_iterations; ++k) {
+    const IcpStep step = solve_icp(mode_sums(pair, mode.pose, options, kernel_width, min_cosine, stride), pair.source.radius,
+                                   options.max_correspondence_distance);
+    ++mode.iterations;
+    if (!step.valid) break;
+    mode.pose = compose_small(step.omega, step.shift, mode.pose);
+    if (icp_settled(step, pair.source.radius, options.max_correspondence_distance)) break;
+  }
 }
 
 }  // namespace
@@ -54,16 +67,9 @@ void refine_modes(Exec& exec, Span<const PairView> pairs, std::vector<std::vecto
                   const RefineOptions& options) {
   const float min_cosine = inlier_test(options.max_correspondence_distance, kRefineNormalAngle).min_cosine;
   exec.parallel_items(pairs.size, [&](std::size_t p) { return modes[p].size(); }, 1, [&](std::size_t p, std::size_t k, std::size_t) {
-    Mode& mode = modes[p][k];
     const std::uint32_t stride = sample_stride(pairs[p].source.size, 2 * evidence.sample);
-    while (mode.iterations < options.max_iterations) {
-      const IcpStep step =
-          solve_icp(mode_sums(pairs[p], mode.pose, options, min_cosine, stride), pairs[p].source.radius, options.max_correspondence_distance);
-      ++mode.iterations;
-      if (!step.valid) break;
-      mode.pose = compose_small(step.omega, step.shift, mode.pose);
-      if (icp_settled(step, pairs[p].source.radius, options.max_correspondence_distance)) break;
-    }
+    refine_mode(pairs[p], options, options.kernel_width, min_cosine, stride, modes[p][k]);
+    refine_mode(pairs[p], options, kPolishKernel * options.kernel_width, min_cosine, 1, modes[p][k]);
   });
   // Candidates of one basin meet: the most promising of them stays.
   const float min_trace = mode_trace(evidence.mode_angle), squared_distance = evidence.mode_distance * evidence.mode_distance;
