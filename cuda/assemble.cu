@@ -150,7 +150,8 @@ std::vector<std::shared_ptr<CudaCloud>> assemble(Exec& exec, const DownsampledCl
     bytes += (n * width * sizeof(float) + 255) / 256 * 256;
     const std::size_t copied = bytes;
     const ScoringLayout layout = scoring_layout(*cloud, closest.block_range[c]);
-    cloud->data = exec.buffer<char>(copied + layout.bytes);
+    // Filled: tables begin empty, and what lies between the arrays is copied along with them.
+    cloud->data = exec.filled<char>(copied + layout.bytes, 0);
     for (std::size_t k = first_part; k < parts.size(); ++k) parts[k].to = cloud->data.data() + reinterpret_cast<std::size_t>(parts[k].to);
     const Part* part = parts.data() + first_part;
     CloudView& view = cloud->view_on_device;

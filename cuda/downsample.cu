@@ -1,9 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <algorithm>
-#include <thread>
 
 #include "algorithm/voxel.hpp"
-#include "host_threads.hpp"
 #include "group.cuh"
 #include "pipeline/checks.hpp"
 #include "stages.hpp"
@@ -127,16 +125,6 @@ float from_bits(std::uint32_t bits) {
   return v;
 }
 
-void pack_rows(const float* rows, std::size_t size, std::size_t width, std::size_t stride, float* out) {
-  if (stride == width) {
-    std::memcpy(out, rows, size * width * sizeof(float));
-  } else {
-    for (std::size_t i = 0; i < size; ++i) std::copy_n(rows + i * stride, width, out + i * width);
-  }
-}
-
-std::size_t floats_of(const RawCloud& raw) { return raw.size * (3 + (raw.normals ? 3 : 0) + (raw.features ? raw.feature_dimension : 0)); }
-
 /// Rows that an engine has taken out of device memory, see adopt.cu: tight already.
 bool on_device(const RawCloud& raw) {
   cudaPointerAttributes attributes{};
@@ -145,48 +133,34 @@ bool on_device(const RawCloud& raw) {
   return known && attributes.type == cudaMemoryTypeDevice;
 }
 
-/// Packs one cloud and sends it on its way. Returns where its parts will be.
-RawSlot upload_cloud(Exec& exec, const RawCloud& raw, float* staged, float* device) {
-  std::size_t at = 0;
-  const auto place = [&](const float* rows, std::size_t width, std::size_t stride) -> const float* {
-    if (!rows || raw.size == 0) return nullptr;
-    pack_rows(rows, raw.size, width, stride, staged + at);
-    const float* where = device + at;
-    at += raw.size * width;
-    return where;
-  };
-  RawSlot slot{};
-  slot.points = reinterpret_cast<const Vec3*>(place(raw.points, 3, raw.point_stride));
-  slot.normals = reinterpret_cast<const Vec3*>(place(raw.normals, 3, raw.normal_stride));
-  slot.features = place(raw.features, raw.feature_dimension, raw.feature_stride);
-  if (at > 0) check(cudaMemcpyAsync(device, staged, at * sizeof(float), cudaMemcpyHostToDevice, exec.stream()), "cudaMemcpyAsync of raw points");
-  return slot;
-}
-
-/// All raw clouds of host memory in one buffer; each goes on its way as soon as it is packed. One core packs slower than the bus carries.
+/// All raw clouds of host memory in one buffer; those of device memory where they are.
 DeviceBuffer<float> upload_raw(Exec& exec, Span<const RawCloud> clouds, std::vector<RawSlot>& slots) {
-  constexpr std::size_t kFloatsPerThread = std::size_t(1) << 20;
+  const auto floats = [](const RawCloud& raw) { return raw.size * (3 + (raw.normals ? 3 : 0) + (raw.features ? raw.feature_dimension : 0)); };
   std::vector<std::uint8_t> there;
-  std::vector<std::size_t> offset{0};
+  std::size_t total = 0;
   for (const RawCloud& raw : clouds) {
     there.push_back(on_device(raw));
-    offset.push_back(offset.back() + (there.back() ? 0 : floats_of(raw)));
+    if (!there.back()) total += floats(raw);
   }
-  auto device = exec.buffer<float>(offset.back());
-  float* staged = exec.staging<float>(offset.back());
-  slots.resize(clouds.size);
-  const std::size_t threads = std::min<std::size_t>({4, clouds.size, 1 + offset.back() / kFloatsPerThread, std::max(1u, std::thread::hardware_concurrency())});
-  for_each_index(threads, clouds.size, [&](std::size_t c) {
+  auto device = exec.buffer<float>(total);
+  std::vector<RowsToUpload> parts;
+  float* at = device.data();
+  const auto place = [&](const float* rows, std::size_t count, std::size_t width, std::size_t stride, bool is_there) -> const float* {
+    if (!rows || count == 0 || is_there) return count == 0 ? nullptr : rows;
+    parts.push_back({rows, count, width, stride, at});
+    at += count * width;
+    return parts.back().device;
+  };
+  for (std::size_t c = 0; c < clouds.size; ++c) {
     const RawCloud& raw = clouds[c];
-    if (there[c]) {
-      slots[c].points = reinterpret_cast<const Vec3*>(raw.points), slots[c].normals = reinterpret_cast<const Vec3*>(raw.normals);
-      slots[c].features = raw.features;
-      return;
-    }
-    const DeviceScope scope(exec.device());
-    slots[c] = upload_cloud(exec, raw, staged + offset[c], device.data() + offset[c]);
-  });
-  for (std::size_t c = 0; c < clouds.size; ++c) slots[c].dimension = slots[c].features ? static_cast<std::uint32_t>(clouds[c].feature_dimension) : 0;
+    RawSlot slot{};
+    slot.points = reinterpret_cast<const Vec3*>(place(raw.points, raw.size, 3, raw.point_stride, there[c]));
+    slot.normals = reinterpret_cast<const Vec3*>(place(raw.normals, raw.size, 3, raw.normal_stride, there[c]));
+    slot.features = place(raw.features, raw.size, raw.feature_dimension, raw.feature_stride, there[c]);
+    slot.dimension = slot.features ? static_cast<std::uint32_t>(raw.feature_dimension) : 0;
+    slots.push_back(slot);
+  }
+  exec.uploader().upload(span_of(parts), exec.device(), exec.stream());
   return device;
 }
 

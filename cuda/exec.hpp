@@ -8,6 +8,7 @@
 #include "check.hpp"
 #include "math/span.hpp"
 #include "memory.hpp"
+#include "upload.hpp"
 
 namespace gpureg::cuda {
 
@@ -49,6 +50,8 @@ class Exec {
   T* staging(std::size_t size) {
     return static_cast<T*>(staging_.take(size * sizeof(T)));
   }
+  /// For large arrays of the caller's.
+  Uploader& uploader() { return uploader_; }
   template <typename T>
   DeviceBuffer<T> upload(const T* host, std::size_t size) {
     DeviceBuffer<T> out(memory_, size);
@@ -78,6 +81,7 @@ class Exec {
  private:
   std::shared_ptr<DeviceMemory> memory_;
   PinnedArena staging_;
+  Uploader uploader_;
   std::vector<std::shared_ptr<const void>> held_;
   std::vector<cudaEvent_t> events_;
   std::size_t events_used_ = 0;

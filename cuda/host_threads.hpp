@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <atomic>
 #include <cstddef>
 #include <exception>
 #include <thread>
@@ -26,15 +25,6 @@ void on_threads(std::size_t threads, const Work& work) {
   for (std::thread& thread : others) thread.join();
   for (const std::exception_ptr& error : failed)
     if (error) std::rethrow_exception(error);
-}
-
-/// work(index) for every index below count, in any order.
-template <typename Work>
-void for_each_index(std::size_t threads, std::size_t count, const Work& work) {
-  std::atomic<std::size_t> next{0};
-  on_threads(threads, [&](std::size_t) {
-    for (std::size_t k = next++; k < count; k = next++) work(k);
-  });
 }
 
 }  // namespace gpureg::cuda

@@ -6,7 +6,7 @@
 namespace gpureg::cuda {
 namespace {
 
-constexpr int kThreads = 512;
+constexpr int kThreads = 768;
 
 /// A thread block per pair.
 __global__ void __launch_bounds__(kThreads) judge(const PairView* pairs, const BestPose* poses, InlierTest test, Judgement* out) {

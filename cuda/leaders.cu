@@ -5,6 +5,8 @@
 namespace gpureg::cuda {
 namespace {
 
+constexpr int kLeaderThreads = 1024;  // few leaders: each should be done soon
+
 /// A warp per hypothesis looks at a few groups and proposes it as one of its pair's leaders.
 __global__ void __launch_bounds__(kProbeThreads) probe(ScoreBatch b) {
   __shared__ Limits limits[512];
@@ -39,7 +41,7 @@ __global__ void __launch_bounds__(kProbeThreads) probe(ScoreBatch b) {
 }
 
 /// What the leaders reach the others must beat.
-__global__ void __launch_bounds__(kProbeThreads) count_leaders(ScoreBatch b) {
+__global__ void __launch_bounds__(kLeaderThreads) count_leaders(ScoreBatch b) {
   __shared__ Limits limits[512];
   const std::uint32_t p = blockIdx.x / kLeaders;
   const unsigned long long leader = b.leaders[blockIdx.x];
@@ -75,7 +77,7 @@ void score_leaders(Exec& exec, const ScoreBatch& batch, std::uint32_t total) {
   const unsigned most_blocks = static_cast<unsigned>(exec.multiprocessors()) * 8;
   probe<<<std::min(blocks_for(static_cast<std::size_t>(total) * 32, kProbeThreads), most_blocks), kProbeThreads, 0, exec.stream()>>>(batch);
   check_launch("probe");
-  count_leaders<<<batch.pair_count * kLeaders, kProbeThreads, 0, exec.stream()>>>(batch);
+  count_leaders<<<batch.pair_count * kLeaders, kLeaderThreads, 0, exec.stream()>>>(batch);
   check_launch("count_leaders");
   order_groups<<<batch.pair_count, kProbeThreads, 0, exec.stream()>>>(batch);
   check_launch("order_groups");

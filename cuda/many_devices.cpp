@@ -36,7 +36,7 @@ class Runs {
 constexpr std::size_t kLeastPairs = 32;   ///< of a run: fewer do not fill a device
 constexpr std::size_t kLeastClouds = 4;
 constexpr std::size_t kMostClouds = 32;
-constexpr std::size_t kChunksPerDevice = 8;  ///< that go into one call: the devices wait for each other at its end only
+constexpr std::size_t kChunksPerDevice = 16;  ///< that go into one call: the devices wait for each other at its end only
 
 class EngineOfMany final : public DeviceEngine {
  public:

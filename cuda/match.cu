@@ -18,39 +18,46 @@ struct MatchBatch {
   std::uint32_t* count;
 };
 
-/// A thread block per pair writes its matches in order, a tile of answers at a time.
-__global__ void __launch_bounds__(1024) collect_matches(MatchBatch m) {
-  __shared__ std::uint32_t warp_count[32];
-  __shared__ std::uint32_t written;
-  const std::uint32_t p = blockIdx.x;
-  const PairView& pair = m.pairs[p];
-  MatchedPoints* out = m.out + m.room[p];
-  const bool custom = pair.custom_count > 0;
-  const std::uint32_t answers = custom ? pair.custom_count : m.query_offset[p + 1] - m.query_offset[p];
-  const std::uint32_t lane = threadIdx.x % 32, warp = threadIdx.x / 32;
-  if (threadIdx.x == 0) written = 0;
-  for (std::uint32_t base = 0; base < answers; base += 1024) {
-    const std::uint32_t a = base + threadIdx.x;
-    std::uint32_t source = 0, target = kNoValue;
-    if (a < answers) {
-      source = custom ? pair.custom_source[a] : a / m.k;
-      target = custom ? pair.custom_target[a] : m.forward[m.query_offset[p] + a];
-      if (!custom && m.backward && target != kNoValue && m.backward[m.backward_offset[p] + target] != source) target = kNoValue;
-    }
-    const bool keep = target != kNoValue;
-    const unsigned mask = __ballot_sync(~0u, keep);
-    if (lane == 0) warp_count[warp] = static_cast<std::uint32_t>(__popc(static_cast<int>(mask)));
-    __syncthreads();
-    std::uint32_t before = written;
-    for (std::uint32_t w = 0; w < warp; ++w) before += warp_count[w];
-    if (keep)
-      out[before + static_cast<std::uint32_t>(__popc(static_cast<int>(mask & ((1u << lane) - 1))))] = {
-          pair.source.points[source], pair.target.points[target], source, target};
-    __syncthreads();
-    if (threadIdx.x == 1023) written = before + warp_count[31];
-    __syncthreads();
+constexpr std::uint32_t kTile = 1024;
+
+/// Answer `a` of a pair as a match: false where there is none.
+__device__ bool match_of(const MatchBatch& m, const PairView& pair, std::uint32_t p, std::uint32_t a, std::uint32_t& source, std::uint32_t& target) {
+  if (pair.custom_count > 0) {
+    source = pair.custom_source[a], target = pair.custom_target[a];
+    return true;
   }
-  if (threadIdx.x == 0) m.count[p] = written;
+  source = a / m.k, target = m.forward[m.query_offset[p] + a];
+  return target != kNoValue && (!m.backward || m.backward[m.backward_offset[p] + target] == source);
+}
+
+/// Sum over the thread block. All threads get it.
+__device__ std::uint32_t sum_of_block(std::uint32_t mine, std::uint32_t* warp_sums) {
+  mine = warp_sum(mine);
+  __syncthreads();
+  if (threadIdx.x % 32 == 0) warp_sums[threadIdx.x / 32] = mine;
+  __syncthreads();
+  return warp_sum(warp_sums[threadIdx.x % 32]);
+}
+
+/// A thread block per tile of a pair's answers (blockIdx.x) writes its matches in order. It counts for itself what comes before: quicker
+/// than waiting for the blocks of the tiles before.
+__global__ void __launch_bounds__(kTile) collect_matches(MatchBatch m) {
+  __shared__ std::uint32_t warp_sums[32];
+  const std::uint32_t p = blockIdx.y, tile = blockIdx.x;
+  const PairView& pair = m.pairs[p];
+  const std::uint32_t answers = pair.custom_count > 0 ? pair.custom_count : m.query_offset[p + 1] - m.query_offset[p];
+  if (tile * kTile >= answers && tile > 0) return;
+  std::uint32_t source, target, mine = 0;
+  for (std::uint32_t a = threadIdx.x; a < tile * kTile; a += kTile) mine += match_of(m, pair, p, a, source, target);
+  const std::uint32_t before = sum_of_block(mine, warp_sums);
+  const std::uint32_t a = tile * kTile + threadIdx.x, lane = threadIdx.x % 32;
+  const bool keep = a < answers && match_of(m, pair, p, a, source, target);
+  const unsigned mask = __ballot_sync(~0u, keep);
+  const std::uint32_t all = sum_of_block(lane == 0 ? static_cast<std::uint32_t>(__popc(static_cast<int>(mask))) : 0, warp_sums);
+  std::uint32_t at = before + static_cast<std::uint32_t>(__popc(static_cast<int>(mask & ((1u << lane) - 1))));
+  for (std::uint32_t w = 0; w < threadIdx.x / 32; ++w) at += warp_sums[w];
+  if (keep) m.out[m.room[p] + at] = {pair.source.points[source], pair.target.points[target], source, target};
+  if (threadIdx.x == 0 && (tile + 1) * kTile >= answers) m.count[p] = before + all;
 }
 
 FeatureQuery query(const CloudView& from, const CloudView& in, std::uint32_t out) {
@@ -108,7 +115,7 @@ Matches match_features(Exec& exec, Span<const PairView> pairs, const HypothesisO
   batch.room = out.room.on_device.data();
   batch.out = out.pairs.data();
   batch.count = out.count.data();
-  collect_matches<<<static_cast<unsigned>(pairs.size), 1024, 0, exec.stream()>>>(batch);
+  collect_matches<<<dim3(std::max(1u, blocks_for(out.room.largest, kTile)), static_cast<unsigned>(pairs.size)), kTile, 0, exec.stream()>>>(batch);
   check_launch("collect_matches");
   return out;
 }

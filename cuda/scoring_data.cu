@@ -157,12 +157,6 @@ void fill_scoring_data(Exec& exec, const std::vector<std::shared_ptr<CudaCloud>>
   for (std::size_t c = 0; c < clouds.size(); ++c) {
     CudaCloud& cloud = *clouds[c];
     const CellSummaries& v = cloud.summaries;
-    if (v.nx > 0) {
-      check(cudaMemsetAsync(v.block, 0, static_cast<std::size_t>(v.nx) * v.ny * v.nz * sizeof(std::int32_t), exec.stream()), "cudaMemsetAsync");
-      check(cudaMemsetAsync(v.word, 0, kCells * sizeof(std::uint32_t), exec.stream()), "cudaMemsetAsync");
-      check(cudaMemsetAsync(v.list, 0, kCells * sizeof(std::uint32_t), exec.stream()), "cudaMemsetAsync");
-      check(cudaMemsetAsync(v.code, 0, kCells, exec.stream()), "cudaMemsetAsync");
-    }
     const std::uint32_t groups = cloud.order.groups;
     std::uint32_t step = static_cast<std::uint32_t>(0.6180339887 * groups) | 1u;
     while (groups > 0 && std::gcd(step, groups) != 1) ++step;

@@ -17,7 +17,7 @@ struct ScoringLayout {
 ScoringLayout scoring_layout(const CudaCloud& cloud, const CellRange& blocks);
 /// Sets the cloud's pointers into the memory that was laid out.
 void place_scoring_data(const ScoringLayout& layout, const ClosestGeometry& geometry, char* memory, CudaCloud& cloud);
-/// Fills the memory of all clouds.
+/// Fills the memory of all clouds, which is zero before.
 void fill_scoring_data(Exec& exec, const std::vector<std::shared_ptr<CudaCloud>>& clouds, const std::vector<ClosestGeometry>& geometry);
 
 }  // namespace gpureg::cuda

@@ -6,6 +6,7 @@ namespace gpureg::cuda {
 namespace {
 
 constexpr int kThreads = 256;
+constexpr int kTieThreads = 1024;  // mostly one tie a pair: the walk over the cloud should be short
 
 /// Lists the hypotheses that share the most inliers of their pair, in any order.
 __global__ void __launch_bounds__(kThreads) list_ties(ScoreBatch b, std::uint32_t* ties, std::uint32_t* count) {
@@ -15,7 +16,7 @@ __global__ void __launch_bounds__(kThreads) list_ties(ScoreBatch b, std::uint32_
 }
 
 /// Their residuals, a thread block each, and the smallest of each pair.
-__global__ void __launch_bounds__(kThreads) measure_ties(ScoreBatch b, const std::uint32_t* ties, const std::uint32_t* count,
+__global__ void __launch_bounds__(kTieThreads) measure_ties(ScoreBatch b, const std::uint32_t* ties, const std::uint32_t* count,
                                                          unsigned long long* residual, unsigned long long* least) {
   __shared__ unsigned long long sum;
   for (std::uint32_t k = blockIdx.x; k < *count; k += gridDim.x) {
@@ -24,7 +25,7 @@ __global__ void __launch_bounds__(kThreads) measure_ties(ScoreBatch b, const std
     if (threadIdx.x == 0) sum = 0;
     __syncthreads();
     std::uint32_t inliers;
-    const unsigned long long mine = support_by_search(b.pairs[p], b.test, to_rigid(b.poses[h]), threadIdx.x, kThreads, inliers);
+    const unsigned long long mine = support_by_search(b.pairs[p], b.test, to_rigid(b.poses[h]), threadIdx.x, kTieThreads, inliers);
     if (mine > 0) atomicAdd(&sum, mine);
     __syncthreads();
     if (threadIdx.x != 0) continue;
@@ -66,8 +67,8 @@ DeviceBuffer<BestPose> select_best(Exec& exec, const ScoreBatch& batch, std::uin
     const auto tie_count = exec.filled<std::uint32_t>(1, 0);
     list_ties<<<blocks_for(total, kThreads), kThreads, 0, exec.stream()>>>(batch, ties.data(), tie_count.data());
     check_launch("list_ties");
-    const unsigned full = static_cast<unsigned>(exec.multiprocessors()) * 8;
-    measure_ties<<<std::min(total, full), kThreads, 0, exec.stream()>>>(batch, ties.data(), tie_count.data(), residual.data(), least.data());
+    const unsigned full = static_cast<unsigned>(exec.multiprocessors()) * 2;
+    measure_ties<<<std::min(total, full), kTieThreads, 0, exec.stream()>>>(batch, ties.data(), tie_count.data(), residual.data(), least.data());
     check_launch("measure_ties");
     find_first<<<blocks_for(total, kThreads), kThreads, 0, exec.stream()>>>(batch, residual.data(), least.data(), winner.data());
     check_launch("find_first");

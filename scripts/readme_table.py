@@ -96,12 +96,17 @@ def open3d():
 
 
 def benchmarks():
+    """Context and runs by name; of a benchmark that was repeated, the median."""
     record = load("pipeline_h200.json")
-    return record["context"], {run["name"].split("/real_time")[0].split("/iterations")[0]: run for run in record["benchmarks"]}
+    runs = {run["name"].split("/real_time")[0].split("/iterations")[0]: run for run in record["benchmarks"]
+            if run.get("aggregate_name", "median") == "median"}
+    return record["context"], runs
 
 
 def made_by(context):
-    return f"Made by `scripts/gpu_check` at commit {context['commit']} on one {context['gpu']} and {context['num_cpus']} cores of its host."
+    gpus = int(context.get("gpus", 1))
+    return (f"Made by `scripts/gpu_check` at commit {context['commit']} on {'an' if gpus == 1 else f'one of {gpus}'} {context['gpu']}"
+            f" and {context['num_cpus']} cores of its host.")
 
 
 def speed():
@@ -109,10 +114,11 @@ def speed():
     batch, cpu = runs["align_many/cuda_loopsmart/11"]["ms_per_pair"], runs["align_many/cpu_loopsmart/1"]["ms_per_pair"]
     one, whole = runs["align_one/cuda_loopsmart"]["ms_median"], runs["raw_to_pose/cuda_loopsmart"]["ms_median"]
     fragment, on_cpu = runs["prepare_batch_of_fragments/cuda"]["ms_per_fragment"], runs["prepare_batch_of_fragments/cpu"]["ms_per_fragment"]
-    return ["| | GPU, ms | CPU, ms | |", "| --- | --- | --- | --- |",
-            f"| a prepared pair, 4,000,000 hypotheses, in a batch | {batch:.2f} | {cpu:.1f} | {cpu / batch:.0f} x |",
-            f"| a fragment prepared ({runs['prepare_batch_of_fragments/cuda']['raw_points'] / 1000:.0f}k raw points), in a batch | {fragment:.2f} | {on_cpu:.1f} | {on_cpu / fragment:.0f} x |",
-            f"| one prepared pair alone, median | {one:.2f} | | |",
+    naive = runs["paper_mode"]["ms_per_pair"]
+    return [f"| | GPU, ms | naive on the GPU, ms | CPU, {context['num_cpus']} cores, ms |", "| --- | --- | --- | --- |",
+            f"| a prepared pair, 4,000,000 hypotheses, in a batch | {batch:.2f} | {naive:.1f} ({naive / batch:.0f} x) | {cpu:.1f} ({cpu / batch:.0f} x) |",
+            f"| a fragment prepared ({runs['prepare_batch_of_fragments/cuda']['raw_points'] / 1000:.0f}k raw points), in a batch | {fragment:.2f} | | {on_cpu:.1f} ({on_cpu / fragment:.0f} x) |",
+            f"| one prepared pair alone, median | {one:.2f} | {runs['paper_mode']['ms_median']:.1f} | |",
             f"| one pair alone, from raw points in host memory to the pose, median | {whole:.2f} | | |",
             "", made_by(context)]
 
@@ -121,7 +127,8 @@ def pipeline():
     context, runs = benchmarks()
     rows = [("a prepared pair, `loopsmart`, in a batch of 2,090", "align_many/cuda_loopsmart/11", "ms_per_pair", 0.10),
             ("a prepared pair, `default`, in a batch of 2,090", "align_many/cuda_default/11", "ms_per_pair", None),
-            ("the same on the CPU of the host, in a batch of 190", "align_many/cpu_loopsmart/1", "ms_per_pair", None),
+            ("a pair in the naive mode, one after the other", "paper_mode", "ms_per_pair", None),
+            ("a prepared pair on the CPU of the host, in a batch of 190", "align_many/cpu_loopsmart/1", "ms_per_pair", None),
             ("one prepared pair alone, median of 190", "align_one/cuda_loopsmart", "ms_median", 0.4),
             ("one pair alone, raw points in host memory to the pose, median of 100", "raw_to_pose/cuda_loopsmart", "ms_median", 3.0),
             ("a fragment prepared, in a batch of 20", "prepare_batch_of_fragments/cuda", "ms_per_fragment", 0.5),
@@ -132,6 +139,37 @@ def pipeline():
     for text, name, key, goal in rows:
         value = runs[name][key]
         out.append(f"| {text} | {value:.3g} | {'' if goal is None else f'{goal:g}'} | {'' if goal is None else f'{value / goal:.2f}'} |")
+    return out + ["", made_by(context)]
+
+
+def devices():
+    context, runs = benchmarks()
+    one = runs["redwood_sized/cuda"]
+    out = ["| devices | ms | faster by | preparation, ms | memory of each device, GiB |", "| --- | --- | --- | --- | --- |"]
+    for run in [one] + ([runs["redwood_sized/cuda_all"]] if int(context.get("gpus", 1)) > 1 else []):
+        out.append(f"| {run['devices']:.0f} | {run['real_time']:.0f} | {one['real_time'] / run['real_time']:.2f} x | {run['ms_prepare']:.0f} | {run['GiB_per_device']:.1f} |")
+    return out + ["", f"Made by `scripts/gpu_check` at commit {context['commit']} on {context['gpu']}."]
+
+
+def scaling():
+    """Beside what was measured, what the number of operations predicts from the second row: feature products, and tests of points."""
+    context, runs = benchmarks()
+    sizes = [runs[f"points_per_cloud/{n}"] for n in (1000, 5000, 20000, 100000)]
+    base = sizes[1]
+    out = ["| points a cloud | hypotheses scored | match, ms | sample, ms | score, ms | a pair, ms | by the operations, ms |",
+           "| --- | --- | --- | --- | --- | --- | --- |"]
+    for run in sizes:
+        points, survivors = run["points"] / base["points"], run["survivors"] / base["survivors"]
+        rest = base["ms_per_pair"] - base["ms_match"] - base["ms_score"]
+        predicted = base["ms_match"] * points ** 2 + base["ms_score"] * survivors * points + rest
+        out.append(f"| {run['points']:,.0f} | {run['survivors']:,.0f} | {run['ms_match']:.3f} | {run['ms_sample']:.3f} | {run['ms_score']:.2f} | "
+                   f"{run['ms_per_pair']:.2f} | {predicted:.2f} |")
+    out += ["", "| raw points | prepared points | a fragment, ms |", "| --- | --- | --- |"]
+    out += [f"| {n:,} | {runs[f'raw_points/{n}']['points']:,.0f} | {runs[f'raw_points/{n}']['ms_per_fragment']:.2f} |" for n in (100000, 300000, 1000000)]
+    out += ["", "| fragments, each with four others | ms | ms a fragment | memory of the device, GiB |", "| --- | --- | --- | --- |"]
+    for n in (10, 50, 200, 500, 2000):
+        run = runs[f"many_fragments/{n}"]
+        out.append(f"| {n:,} | {run['real_time']:.0f} | {run['ms_per_fragment']:.2f} | {run['GiB_per_device']:.1f} |")
     return out + ["", made_by(context)]
 
 
@@ -151,7 +189,7 @@ def floors():
 
 
 TABLES = {"redkitchen": redkitchen, "redkitchen_seeds": redkitchen_seeds, "range_pairs": range_pairs, "other_pairs": other_pairs,
-          "open3d": open3d, "speed": speed, "pipeline": pipeline, "floors": floors}
+          "open3d": open3d, "speed": speed, "pipeline": pipeline, "devices": devices, "scaling": scaling, "floors": floors}
 
 
 def rewritten(text):

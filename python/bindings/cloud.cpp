@@ -41,14 +41,14 @@ Rows rows_of(const FloatArray& array, const char* name) {
   if (array.ndim() != 2) refuse("not a matrix");
   const auto count = static_cast<std::size_t>(array.shape(0));
   const auto columns = static_cast<std::size_t>(array.shape(1));
-  if (count == 0) return {nullptr, 0, columns};
+  if (count == 0) return {nullptr, 0, columns, columns};
   constexpr py::ssize_t size = sizeof(float);
   if (columns > 1 && array.strides(1) != size) refuse("a row's numbers are not side by side");
   if (reinterpret_cast<std::uintptr_t>(array.data()) % alignof(float) != 0) refuse("not aligned");
-  if (count == 1) return {array.data(), 1, columns};
+  if (count == 1) return {array.data(), 1, columns, columns};
   if (array.strides(0) % size != 0 || array.strides(0) < size * static_cast<py::ssize_t>(columns))
     refuse("rows overlap or lie at parts of floats");
-  return {array.data(), count, static_cast<std::size_t>(array.strides(0) / size)};
+  return {array.data(), count, columns, static_cast<std::size_t>(array.strides(0) / size)};
 }
 
 void move_to_origins(RegistrationResult& result, const Cloud& source, const Cloud& target) {

@@ -26,7 +26,7 @@ using FloatArray = py::array_t<float, 0>;
 /// whose rows are not whole floats side by side: the face copies those.
 struct Rows {
   const float* data;
-  std::size_t count, stride;
+  std::size_t count, columns, stride;
 };
 Rows rows_of(const FloatArray& array, const char* name);
 

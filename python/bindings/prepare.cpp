@@ -1,36 +1,42 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include <future>
+#include <optional>
+
 #include "cloud.hpp"
+#include "gpureg/cuda_interop.hpp"
 #include "gpureg/registration.hpp"
 #include "matrix.hpp"
 
 namespace gpureg::python {
 namespace {
 
-/// One cloud as the face hands it over: (points, normals, features, viewpoints, origin); the last
-/// four may be None. Views into the arrays, which the caller's tuple keeps alive.
+/// One cloud as the face hands it over: (points, normals, features, viewpoints, origin, stream);
+/// all but the points may be None. Points, normals and features are float32 arrays, or, where there
+/// is a stream, (address, rows, columns, stride, owner) of device memory. The caller's tuple keeps
+/// alive what the views point at.
 struct Input {
   PointCloudView view;
   Eigen::Vector3d origin = Eigen::Vector3d::Zero();
+  std::optional<std::uintptr_t> stream;
 
   explicit Input(const py::tuple& parts) {
-    if (parts.size() != 5) throw py::type_error("a cloud is a tuple of five");
-    const Rows points = rows_of(parts[0].cast<FloatArray>(), "points");
+    if (parts.size() != 6) throw py::type_error("a cloud is a tuple of six");
+    if (!parts[5].is_none()) stream = parts[5].cast<std::uintptr_t>();
+    const Rows points = rows(parts[0], "points");
     view.points = points.data;
     view.size = points.count;
     view.point_stride = points.stride;
     if (!parts[1].is_none()) {
-      const Rows normals = rows_of(parts[1].cast<FloatArray>(), "normals");
+      const Rows normals = rows(parts[1], "normals");
       view.normals = normals.data;
       view.normal_stride = normals.stride;
     }
     if (!parts[2].is_none()) {
-      const auto array = parts[2].cast<FloatArray>();
-      const Rows features = rows_of(array, "features");
+      const Rows features = rows(parts[2], "features");
       view.features = features.data;
-      view.feature_stride = features.stride;
       // An empty cloud has no pointer to features, and needs none.
-      view.feature_dimension = features.data ? static_cast<std::size_t>(array.shape(1)) : 0;
-      if (!features.data) view.feature_stride = 0;
+      view.feature_stride = features.data ? features.stride : 0;
+      view.feature_dimension = features.data ? features.columns : 0;
     }
     if (!parts[3].is_none()) {
       const Rows viewpoints = rows_of(parts[3].cast<FloatArray>(), "viewpoints");
@@ -42,22 +48,49 @@ struct Input {
     if (!parts[4].is_none())
       origin = matrix_of<Eigen::Vector3d>(parts[4].cast<py::array_t<double>>(), "origin");
   }
+
+  Rows rows(const py::object& part, const char* name) const {
+    if (!stream) return rows_of(part.cast<FloatArray>(), name);
+    const auto parts = part.cast<py::tuple>();
+    const auto count = parts[1].cast<std::size_t>();
+    return {count ? reinterpret_cast<const float*>(parts[0].cast<std::uintptr_t>()) : nullptr,
+            count, parts[2].cast<std::size_t>(), parts[3].cast<std::size_t>()};
+  }
+
+  DevicePointCloudView device_view() const {
+    DevicePointCloudView v;
+    v.points = view.points;
+    v.size = view.size;
+    v.point_stride = view.point_stride;
+    v.normals = view.normals;
+    v.normal_stride = view.normal_stride;
+    v.features = view.features;
+    v.feature_dimension = view.feature_dimension;
+    v.feature_stride = view.feature_stride;
+    v.viewpoints = view.viewpoints;
+    v.viewpoint_count = view.viewpoint_count;
+    return v;
+  }
 };
 
-std::vector<Cloud> prepare_clouds(const Context& context, const py::list& clouds,
+/// Clouds on a device start at once, those of the host follow as one batch.
+std::vector<Cloud> prepare_clouds(const Context& context, const std::vector<Input>& inputs,
                                   const PrepareOptions& options) {
-  std::vector<Input> inputs;
+  std::vector<std::future<PreparedCloud>> futures(inputs.size());
   std::vector<PointCloudView> views;
-  for (const py::handle cloud : clouds) {
-    inputs.emplace_back(cloud.cast<py::tuple>());
-    views.push_back(inputs.back().view);
+  for (std::size_t k = 0; k < inputs.size(); ++k) {
+    if (inputs[k].stream)
+      futures[k] = prepare_async(context, inputs[k].device_view(), options,
+                                 reinterpret_cast<CudaStream>(*inputs[k].stream));
+    else
+      views.push_back(inputs[k].view);
   }
-  const py::gil_scoped_release release;
-  std::vector<PreparedCloud> prepared = prepare_batch(context, views, options);
+  std::vector<PreparedCloud> hosted = prepare_batch(context, views, options);
   std::vector<Cloud> out;
-  out.reserve(prepared.size());
-  for (std::size_t k = 0; k < prepared.size(); ++k)
-    out.push_back({std::move(prepared[k]), inputs[k].origin});
+  std::size_t next = 0;
+  for (std::size_t k = 0; k < inputs.size(); ++k)
+    out.push_back(
+        {inputs[k].stream ? futures[k].get() : std::move(hosted[next++]), inputs[k].origin});
   return out;
 }
 
@@ -66,8 +99,14 @@ std::vector<Cloud> prepare_clouds(const Context& context, const py::list& clouds
 void bind_prepare(py::module_& m) {
   m.def(
       "prepare_batch",
-      [](const Context& context, const py::list& clouds, const PrepareOptions& options) {
-        std::vector<Cloud> prepared = prepare_clouds(context, clouds, options);
+      [](const Context& context, const py::sequence& clouds, const PrepareOptions& options) {
+        std::vector<Input> inputs;
+        for (const py::handle cloud : clouds) inputs.emplace_back(cloud.cast<py::tuple>());
+        std::vector<Cloud> prepared;
+        {
+          const py::gil_scoped_release release;
+          prepared = prepare_clouds(context, inputs, options);
+        }
         py::list out;
         for (Cloud& cloud : prepared) out.append(py::cast(std::move(cloud)));
         return out;

@@ -14,15 +14,18 @@ import numpy.typing as npt
 
 from . import _core
 from ._core import PointCloud, PrepareOptions
+from ._device import DeviceRows, device_rows, on_device, stream_of
 
 FloatArray = npt.NDArray[np.float32]
-#: (points, normals, features, viewpoints, origin), the last four may be None.
+Rows = Union[FloatArray, DeviceRows]
+#: (points, normals, features, viewpoints, origin, stream), all but the points may be None. With a stream, the first three are on a device.
 CoreCloud = Tuple[
-    FloatArray,
-    Optional[FloatArray],
-    Optional[FloatArray],
+    Rows,
+    Optional[Rows],
+    Optional[Rows],
     Optional[FloatArray],
     Optional[npt.NDArray[np.float64]],
+    Optional[int],
 ]
 
 _HOST_DEVICES = (1, 3)  # DLPack's kDLCPU and kDLCUDAHost
@@ -125,10 +128,18 @@ def core_cloud(
     viewpoints: Any,
     options: PrepareOptions,
     name: str = "points",
+    device: bool = False,
 ) -> CoreCloud:
-    """One cloud for the core. points may also be a PointCloud, a path, or look like Open3D's cloud."""
+    """One cloud for the core. points may also be a PointCloud, a path, or look like Open3D's cloud.
+
+    device: what is on a GPU stays there, where that is possible.
+    """
     prefix = "" if name == "points" else f"{name}."
     points, normals, viewpoints = _unpack(points, normals, viewpoints)
+    if device and on_device(points):
+        stay = _stay_on_device(points, normals, features, viewpoints, prefix)
+        if stay is not None:
+            return stay
     raw = matrix(points, name, 3)
     count = raw.shape[0]
     origin = origin_of(raw, options.voxel_size)
@@ -143,7 +154,23 @@ def core_cloud(
         None if features is None else float_rows(matrix(features, prefix + "features", None, count), prefix + "features"),
         None if views is None else np.ascontiguousarray(float_rows(views, prefix + "viewpoints")),
         origin,
+        None,
     )
+
+
+def _stay_on_device(points: Any, normals: Any, features: Any, viewpoints: Any, prefix: str) -> Optional[CoreCloud]:
+    """None where a part is on the host, or has a type or shape that the host path converts or refuses."""
+    if any(part is not None and not on_device(part) for part in (normals, features)):
+        return None
+    rows, normal_rows, feature_rows = (None if part is None else device_rows(part) for part in (points, normals, features))
+    if rows is None or rows.columns != 3:
+        return None
+    if normals is not None and (normal_rows is None or normal_rows[1:3] != rows[1:3]):
+        return None
+    if features is not None and (feature_rows is None or feature_rows.rows != rows.rows):
+        return None
+    views = None if viewpoints is None else float_rows(matrix(viewpoints, prefix + "viewpoints", 3), prefix + "viewpoints")
+    return rows, normal_rows, feature_rows, None if views is None else np.ascontiguousarray(views), None, stream_of(rows.owner)
 
 
 def _unpack(points: Any, normals: Any, viewpoints: Any) -> Tuple[Any, Any, Any]:

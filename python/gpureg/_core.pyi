@@ -1,13 +1,17 @@
 # SPDX-License-Identifier: BSD-3-Clause
 # Types of the compiled module. python/tests/test_stubs.py compares it with the module.
-from typing import Any, Callable, Dict, List, Literal, Optional, Sequence, Tuple
+from typing import Any, Callable, Dict, List, Literal, Optional, Sequence, Tuple, Union, overload
 
 import numpy as np
 import numpy.typing as npt
 
 _Float32 = npt.NDArray[np.float32]
 _Float64 = npt.NDArray[np.float64]
-_Cloud = Tuple[_Float32, Optional[_Float32], Optional[_Float32], Optional[_Float32], Optional[_Float64]]
+# On a device: address, rows, columns, floats from row to row, and what keeps the memory alive.
+_DeviceRows = Tuple[int, int, int, int, Any]
+_Rows = Union[_Float32, _DeviceRows]
+# Points, normals, features, viewpoints, origin; and the stream that made what is on a device, or None for clouds of the host.
+_Cloud = Tuple[_Rows, Optional[_Rows], Optional[_Rows], Optional[_Float32], Optional[_Float64], Optional[int]]
 
 __version__: str
 
@@ -20,8 +24,12 @@ class IoError(Error, OSError): ...
 class Context:
     @staticmethod
     def cpu(threads: int = 0) -> Context: ...
+    @overload
     @staticmethod
     def cuda(device: int = 0) -> Context: ...
+    @overload
+    @staticmethod
+    def cuda(devices: Sequence[int], memory_budget: int = 0) -> Context: ...
     @staticmethod
     def best() -> Context: ...
     @property
@@ -30,6 +38,8 @@ class Context:
     def threads(self) -> int: ...
     @property
     def description(self) -> str: ...
+    @property
+    def device_memory(self) -> List[Dict[str, int]]: ...
 
 class PrepareOptions:
     voxel_size: float
@@ -316,7 +326,7 @@ class PointCloud:
     def viewpoints(self) -> _Float32: ...
 
 def describe_backends() -> List[str]: ...
-def prepare_batch(context: Context, clouds: List[_Cloud], options: PrepareOptions) -> List[PreparedCloud]: ...
+def prepare_batch(context: Context, clouds: Sequence[_Cloud], options: PrepareOptions) -> List[PreparedCloud]: ...
 def align(
     context: Context,
     source: PreparedCloud,

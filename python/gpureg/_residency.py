@@ -103,7 +103,8 @@ class Residency:
                 break
             if k not in self._clouds and k != wanted:
                 chosen.append(k)
-        inputs = list(self._readers.map(lambda k: self._fragments.load(k, self._options.prepare), chosen))
+        device = self._context.backend == "cuda"
+        inputs = list(self._readers.map(lambda k: self._fragments.load(k, self._options.prepare, device), chosen))
         for k, cloud in zip(chosen, _core.prepare_batch(self._context, inputs, self._options.prepare)):
             self._clouds[k] = cloud
             self._bytes += _bytes_of(cloud)

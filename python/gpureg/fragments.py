@@ -74,10 +74,10 @@ class FragmentSet:
         """What Redwood's files give as the number of fragments: one more than the largest number."""
         return self._numbers[-1] + 1 if self._numbers else 0
 
-    def load(self, position: int, options: PrepareOptions) -> CoreCloud:
-        """The fragment at a position (not: of a number), as the core takes it. Thread-safe."""
+    def load(self, position: int, options: PrepareOptions, device: bool = False) -> CoreCloud:
+        """The fragment at a position (not: of a number), as the core takes it; device: on a GPU, if it is there. Thread-safe."""
         source, number = self._sources[position], self._numbers[position]
-        return core_cloud(source, None, None, self._viewpoints.get(number), options, f"fragments[{position}]")
+        return core_cloud(source, None, None, self._viewpoints.get(number), options, f"fragments[{position}]", device)
 
     def fingerprint(self, position: int) -> str:
         """Tells whether a fragment is the one that an earlier run saw: by size and both ends of its data."""
@@ -91,7 +91,7 @@ class FragmentSet:
                 file.seek(max(0, size - _ENDS))
                 digest.update(file.read(_ENDS))
         else:
-            for part in self.load(position, PrepareOptions()):
+            for part in self.load(position, PrepareOptions())[:5]:
                 digest.update(b"-" if part is None else np.ascontiguousarray(part).tobytes())
         viewpoints = self._viewpoints.get(self._numbers[position])
         if viewpoints is not None:

@@ -73,7 +73,8 @@ def prepare(
         Metres, any real dtype and layout: numpy, DLPack (torch, jax, ...),
         ``__cuda_array_interface__`` (cupy, ...) or nested lists. float32 rows are read in place;
         everything else is copied once, to float32. Rows with NaN or infinity are dropped and
-        counted. float64 coordinates too large for float32 (those of a map) lose nothing: their
+        counted. What is on the context's GPU as float32, float16 or bfloat16 never leaves it. float64
+        coordinates too large for float32 (those of a map) lose nothing: their
         centre is taken off first and put back into results.
     normals : (N, 3) array, optional
         Normals are computed; these, of any length, say which side of the surface they are on. Zeros
@@ -141,13 +142,15 @@ def prepare_batch(
     [True, True]
     """
     options = _checked(options, PrepareOptions, "options") or PrepareOptions()
+    context = _context(context)
+    device = context.backend == "cuda"
     single = len(clouds) == 1
     inputs = []
     for k, cloud in enumerate(clouds):
         points, normals, features, viewpoints = cloud.parts if isinstance(cloud, _Parts) else (cloud, None, None, None)
         name = "points" if single else f"clouds[{k}]"
-        inputs.append(core_cloud(points, normals, features, viewpoints, options, name))
-    return _core.prepare_batch(_context(context), inputs, options)
+        inputs.append(core_cloud(points, normals, features, viewpoints, options, name, device))
+    return _core.prepare_batch(context, inputs, options)
 
 
 def align(
@@ -304,7 +307,7 @@ def register(
     context = _context(context)
     clouds = []
     for cloud, name in ((source, "source"), (target, "target")):
-        clouds.append(core_cloud(cloud, None, None, None, options.prepare, name))
+        clouds.append(core_cloud(cloud, None, None, None, options.prepare, name, context.backend == "cuda"))
     options.validate()
     a, b = _core.prepare_batch(context, clouds, options.prepare)
     return _core.align(context, a, b, options, None)
@@ -331,7 +334,8 @@ def _check_prepared(cloud: Any, name: str) -> None:
 def _prepared(fragments: Sequence[Any], options: PrepareOptions, context: Context) -> List[PreparedCloud]:
     """Those that are not prepared yet, prepared together; a cloud's place stays its own."""
     raw = [k for k, cloud in enumerate(fragments) if not isinstance(cloud, PreparedCloud)]
-    inputs = [core_cloud(fragments[k], None, None, None, options, f"fragments[{k}]") for k in raw]
+    device = context.backend == "cuda"
+    inputs = [core_cloud(fragments[k], None, None, None, options, f"fragments[{k}]", device) for k in raw]
     clouds = list(fragments)
     for k, cloud in zip(raw, _core.prepare_batch(context, inputs, options)):
         clouds[k] = cloud

@@ -18,8 +18,8 @@ def folder(tmp_path, source):
 def test_folder(folder):
     fragments = gpureg.FragmentSet.from_directory(folder)
     assert fragments.numbers == (3, 4, 10) and len(fragments) == 3 and fragments.count == 11
-    points, normals, features, viewpoints, origin = fragments.load(1, gpureg.PrepareOptions())
-    assert points.shape == (100, 3) and normals is features is origin is None
+    points, normals, features, viewpoints, origin, stream = fragments.load(1, gpureg.PrepareOptions())
+    assert points.shape == (100, 3) and normals is features is origin is stream is None
     assert viewpoints.tolist() == [[1, 2, 3]]
     with pytest.raises(gpureg.IoError):
         gpureg.FragmentSet.from_directory(folder / "nowhere")
