@@ -63,6 +63,7 @@ Json to_json(const PoseEvidence& e) {
 Json to_json(const RegistrationMode& mode, const char* pose_name) {
   return {{pose_name, to_json(mode.target_from_source.matrix())},
           {"confidence", mode.confidence},
+          {"overlap_confidence", mode.overlap_confidence},
           {"evidence", to_json(mode.evidence)}};
 }
 

@@ -6,8 +6,10 @@ A run is BUILDING=SCENE_FOLDER=RESULT.json: what `gpureg batch --preset default 
 gt_all.log and gt_all.info (right: Redwood's 0.2 m rule against gt_all). Every run is tested with a fit on the other buildings;
 then all of them together give the coefficients that are written into the library.
 
-Two logistic regressions: the first ranks the modes of a pair by their own evidence, the second judges the best of them, and also sees its
-margin over the best distinct rival. Each exists twice: with free space, and without for clouds whose viewpoints are not known.
+Three logistic regressions: the first ranks the modes of a pair by their own evidence, the second judges the best of them, and also sees
+its margin over the best distinct rival; the third says, from the same, whether the pose is right and the clouds overlap by 30 % or more
+(in gt.log), which is what Redwood's strict protocol counts. Each exists twice: with free space, and without for clouds whose
+viewpoints are not known.
 
 usage: fit_confidence.py RUN... [--header src/api/confidence_model.hpp] [-o bench/results/confidence.json]
 Needs numpy and scikit-learn.
@@ -116,23 +118,27 @@ def fit(runs, free):
     y = np.concatenate([np.array(v) for run in runs for v in run.right if len(v)])
     first = Logistic(x, y)
     views = [second_view(run, free, first) for run in runs]
-    y2 = np.concatenate([[run.right[k][b] for k, b in enumerate(view[1]) if b >= 0] for run, view in zip(runs, views)])
-    return first, Logistic(np.concatenate([view[0] for view in views]), y2)
+    x2 = np.concatenate([view[0] for view in views])
+    labels = lambda kind: np.concatenate([[getattr(run, kind)[k][b] for k, b in enumerate(view[1]) if b >= 0]  # noqa: E731
+                                          for run, view in zip(runs, views)])
+    return first, Logistic(x2, labels("right")), Logistic(x2, labels("strict"))
 
 
 def figures(run, free, models):
     x, best = second_view(run, free, models[0])
     confidence = np.zeros(len(best))
+    overlapping = np.zeros(len(best))
     found = np.array([b >= 0 for b in best])
     confidence[found] = 1 / (1 + np.exp(-models[1].logit(x)))
+    overlapping[found] = 1 / (1 + np.exp(-models[2].logit(x)))
     right = np.array([b >= 0 and bool(run.right[k][b]) for k, b in enumerate(best)])
     strict = np.array([b >= 0 and bool(run.strict[k][b]) for k, b in enumerate(best)])
     total = int(run.in_truth.sum())
-    order = np.argsort(-confidence, kind="stable")
-    recall = np.cumsum(strict[order]) / total
     out = {"pairs": len(best), "ground_truth": total, "generated": 100 * np.mean([v.any() for v, t in zip(run.strict, run.in_truth) if t]),
            "raw": 100 * strict.sum() / total}
-    for name, good in (("geo", right), ("strict", strict)):
+    for name, good, score in (("geo", right, confidence), ("strict", strict, overlapping)):
+        order = np.argsort(-score, kind="stable")
+        recall = np.cumsum(strict[order]) / total
         precision = np.cumsum(good[order]) / np.arange(1, len(order) + 1)
         for at in (80, 95, 99):
             out[f"{name}_R@P{at}"] = 100 * max([r for r, p in zip(recall, precision) if p >= at / 100], default=0)
@@ -145,10 +151,11 @@ def figures(run, free, models):
 
 
 def header(models):
+    # Braces and names as the library's confidence.cpp includes them.
     lines = ["// SPDX-License-Identifier: BSD-3-Clause", "// Written by bench/accuracy/fit_confidence.py; docs/accuracy.md says how well it does.",
              "#pragma once", "", "namespace gpureg::confidence_model {", ""]
     for name, pair in zip(MODELS, models):
-        for stage, model in zip(("ranking", "confidence"), pair):
+        for stage, model in zip(("ranking", "confidence", "overlap"), pair):
             values = ", ".join(f"{w:.9g}" for w in model.weights)
             lines += [f"constexpr double {stage}_{name}_bias = {model.bias:.9g};", f"constexpr double {stage}_{name}[] = {{{values}}};", ""]
     return "\n".join(lines + ["}  // namespace gpureg::confidence_model", ""])

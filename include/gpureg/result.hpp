@@ -50,8 +50,10 @@ struct PoseEvidence {
 /// One of the distinct poses of a pair.
 struct RegistrationMode {
   UnalignedIsometry3d target_from_source = UnalignedIsometry3d::Identity();
-  double confidence = 0;  ///< probability that the pose is right
+  double confidence = 0;          ///< probability that the pose is right
+  double overlap_confidence = 0;  ///< probability that the pose is right and that the clouds overlap by 30 % or more
   PoseEvidence evidence;
+  std::uint32_t found_as = 0;     ///< place among the modes before refinement, the most promising first
 };
 
 /// Result of one pair. A plain value.

@@ -7,7 +7,7 @@
 
 namespace gpureg {
 
-/// Fills in the confidence of every mode of one pair from the evidence of all of them.
+/// Orders the modes of one pair by how much speaks for them, and fills in their confidence from the evidence of all of them.
 void set_confidences(std::vector<RegistrationMode>& modes);
 
 }  // namespace gpureg

@@ -64,14 +64,12 @@ void add_modes(const PairOutcome& outcome, const PreparedState& source, const Pr
     RegistrationMode out;
     out.target_from_source = to_transform(mode.pose, source, target, swapped);
     out.evidence = to_evidence(outcome, mode, moved, fixed, swapped);
+    out.found_as = static_cast<std::uint32_t>(modes.size());
     modes.push_back(out);
   }
   set_confidences(modes);
-  std::vector<std::size_t> order(modes.size());
-  for (std::size_t k = 0; k < order.size(); ++k) order[k] = k;
-  std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return modes[a].confidence > modes[b].confidence; });
-  for (const std::size_t k : order) result.modes.push_back(modes[k]);
-  const ModeOutcome& best = outcome.modes[order.front()];
+  result.modes = std::move(modes);
+  const ModeOutcome& best = outcome.modes[result.modes.front().found_as];
   result.has_candidate = true;
   result.target_from_source = result.modes.front().target_from_source;
   result.score = result.modes.front().confidence;
