@@ -57,9 +57,15 @@ GPUREG_HD bool wide_triangle(Vec3 p0, Vec3 p1, Vec3 p2, float squared_length) {
   return (squared_norm(p1 - p0) >= squared_length) & (squared_norm(p2 - p0) >= squared_length) & (squared_norm(p2 - p1) >= squared_length);
 }
 
-/// The total order of seeds: local maxima first, then by the number of compatible matches, then the earlier one.
-GPUREG_HD std::uint64_t seed_key(std::uint32_t degree, bool peak, std::uint32_t match) {
-  return (peak ? std::uint64_t(1) << 63 : 0) | (static_cast<std::uint64_t>(degree) << 32) | (0xffffffffu - match);
+/// How promising a match is as a seed: the number of its compatible matches times its balanced weight. By the number alone floors and walls,
+/// whose matches are many and alike, would take all seeds. degree <= 2^16, weight <= 2^17.
+GPUREG_HD std::uint32_t seed_strength(std::uint32_t degree, std::uint32_t weight) {
+  return static_cast<std::uint32_t>((static_cast<std::uint64_t>(degree) * weight) >> 10);
+}
+
+/// The total order of seeds: local maxima of the degree first, then the stronger, then the earlier one.
+GPUREG_HD std::uint64_t seed_key(std::uint32_t strength, bool peak, std::uint32_t match) {
+  return (peak ? std::uint64_t(1) << 63 : 0) | (static_cast<std::uint64_t>(strength) << 32) | (0xffffffffu - match);
 }
 GPUREG_HD std::uint32_t match_of_seed_key(std::uint64_t key) { return 0xffffffffu - static_cast<std::uint32_t>(key); }
 

@@ -53,7 +53,7 @@ std::vector<std::vector<std::uint32_t>> choose_seeds(Exec& exec, const std::vect
   std::vector<std::vector<std::uint32_t>> out(matches.size());
   exec.parallel(matches.size(), [&](std::size_t p) {
     std::vector<std::uint64_t> order(degree[p].size());
-    for (std::uint32_t k = 0; k < order.size(); ++k) order[k] = seed_key(degree[p][k], peak[p][k] != 0, k);
+    for (std::uint32_t k = 0; k < order.size(); ++k) order[k] = seed_key(seed_strength(degree[p][k], matches[p].source_weight[k] + matches[p].target_weight[k]), peak[p][k] != 0, k);
     const std::size_t count = std::min<std::size_t>(options.seeds, order.size());
     std::partial_sort(order.begin(), order.begin() + static_cast<std::ptrdiff_t>(count), order.end(), std::greater<>());
     for (std::size_t k = 0; k < count; ++k) out[p].push_back(match_of_seed_key(order[k]));
