@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include "algorithm/balance.hpp"
 #include "nearest_feature.hpp"
 #include "scoring_data.hpp"
 #include "stages.hpp"
@@ -26,8 +27,11 @@ __global__ void copy_parts(const Part* parts) {
   }
 }
 
-struct Missing {
-  std::uint32_t normals, features, extreme_features;
+/// What is counted of a cloud.
+struct Counts {
+  std::uint32_t features;                       // missing
+  std::uint32_t extreme, extreme_wide;          // features that are too long for the tensor cores
+  std::uint32_t balance_bin[kBalanceBins];      // points by the direction of their normals; the last bin: without
 };
 
 struct NormSlot {
@@ -37,13 +41,14 @@ struct NormSlot {
   float2* out;
   std::uint32_t* tf32;  // null: none
   float* padded;
+  std::uint32_t* extreme;
 };
 
 /// Rounded to 10 bits of mantissa, as the tensor cores take them; ties away from zero.
 __device__ std::uint32_t to_tf32(float v) { return (__float_as_uint(v) + 0x1000u) & ~0x1fffu; }
 
 /// What the feature search reads beside the features: their lengths, and copies for the tensor cores.
-__global__ void measure_features(const NormSlot* slots, Missing* missing) {
+__global__ void measure_features(const NormSlot* slots) {
   const NormSlot s = slots[blockIdx.y];
   std::uint32_t extreme = 0;
   for (std::uint32_t i = blockIdx.x * blockDim.x + threadIdx.x; i < s.size; i += gridDim.x * blockDim.x) {
@@ -61,21 +66,34 @@ __global__ void measure_features(const NormSlot* slots, Missing* missing) {
     }
     extreme += s.valid[i] && !(sum < 1e30f);
   }
-  if (extreme > 0) atomicAdd(&missing[blockIdx.y].extreme_features, extreme);
+  if (extreme > 0) atomicAdd(s.extreme, extreme);
 }
 
-__global__ void count_missing(const std::uint32_t* offset, const Vec3* normals, const std::uint8_t* valid, Missing* missing) {
-  const std::uint32_t c = blockIdx.y, end = offset[c + 1];
-  std::uint32_t no_normal = 0, no_feature = 0;
-  for (std::uint32_t i = offset[c] + blockIdx.x * blockDim.x + threadIdx.x; i < end; i += gridDim.x * blockDim.x) {
-    no_normal += is_zero(normals[i]);
+__global__ void count(const std::uint32_t* offset, const Vec3* normals, const std::uint8_t* valid, std::uint32_t* const* balance, Counts* counts) {
+  __shared__ std::uint32_t bins[kBalanceBins];
+  const std::uint32_t c = blockIdx.y, begin = offset[c], end = offset[c + 1];
+  if (threadIdx.x < kBalanceBins) bins[threadIdx.x] = 0;
+  __syncthreads();
+  std::uint32_t no_feature = 0;
+  for (std::uint32_t i = begin + blockIdx.x * blockDim.x + threadIdx.x; i < end; i += gridDim.x * blockDim.x) {
+    const std::uint32_t bin = balance_bin(normals[i]);
+    balance[c][i - begin] = bin;
+    atomicAdd(bins + bin, 1u);
     no_feature += !valid[i];
   }
-  no_normal = warp_sum(no_normal);
   no_feature = warp_sum(no_feature);
-  if (threadIdx.x % 32 != 0) return;
-  if (no_normal > 0) atomicAdd(&missing[c].normals, no_normal);
-  if (no_feature > 0) atomicAdd(&missing[c].features, no_feature);
+  if (threadIdx.x % 32 == 0 && no_feature > 0) atomicAdd(&counts[c].features, no_feature);
+  __syncthreads();
+  if (threadIdx.x < kBalanceBins && bins[threadIdx.x] > 0) atomicAdd(counts[c].balance_bin + threadIdx.x, bins[threadIdx.x]);
+}
+
+/// From bins to weights.
+__global__ void balance_points(const std::uint32_t* offset, const Counts* counts, std::uint32_t* const* balance) {
+  __shared__ std::uint32_t weight[kBalanceBins];
+  const std::uint32_t c = blockIdx.y, size = offset[c + 1] - offset[c];
+  if (threadIdx.x < kBalanceBins) weight[threadIdx.x] = balance_weight(counts[c].balance_bin[threadIdx.x]);
+  __syncthreads();
+  for (std::uint32_t i = blockIdx.x * blockDim.x + threadIdx.x; i < size; i += gridDim.x * blockDim.x) balance[c][i] = weight[balance[c][i]];
 }
 
 template <typename T>
@@ -103,13 +121,16 @@ std::vector<float> CudaCloud::copy_features() const {
 }
 
 std::vector<std::shared_ptr<CudaCloud>> assemble(Exec& exec, const DownsampledClouds& clouds, const DeviceBuffer<Vec3>& normals,
-                                                 const Features& features, const ClosestGrids& closest, const PrepareOptions& options) {
+                                                 const Features& features, const Features& wide_features, const ClosestGrids& closest,
+                                                 const DepthMaps& depth_maps, const PrepareOptions& options) {
   const Segments& segments = clouds.segments;
-  const std::size_t count = segments.entries();
+  const std::size_t clouds_count = segments.entries();
+  const auto counts = exec.filled<Counts>(clouds_count, 0);
   std::vector<std::shared_ptr<CudaCloud>> out;
   std::vector<Part> parts;
   std::vector<NormSlot> norm_slots;
-  for (std::size_t c = 0; c < count; ++c) {
+  std::vector<std::uint32_t*> balance;
+  for (std::size_t c = 0; c < clouds_count; ++c) {
     auto cloud = std::make_shared<CudaCloud>();
     const CloudFacts& facts = clouds.facts[c];
     cloud->options = options;
@@ -141,13 +162,23 @@ std::vector<std::shared_ptr<CudaCloud>> assemble(Exec& exec, const DownsampledCl
           std::size_t(cloud->block_count) * (ClosestGridView::kBlockCells + 1));
     place(closest.candidates.data() + closest.candidate_offset[c], cloud->candidate_count);
     place(closest.block.data() + block_begin, cloud->block_count);
-    const std::size_t norms = bytes;
-    bytes += (n * sizeof(float2) + 255) / 256 * 256;
-    const std::size_t tf32 = bytes;
-    const std::uint32_t width = filter_width(cloud->feature_dimension);
-    bytes += (n * width * sizeof(std::uint32_t) + 255) / 256 * 256;
-    const std::size_t padded = bytes;
-    bytes += (n * width * sizeof(float) + 255) / 256 * 256;
+    const bool has_wide = wide_features.dimension[c] > 0 && n > 0;
+    place(wide_features.values.data() + wide_features.offset[c], n * wide_features.dimension[c]);
+    place(wide_features.valid.data() + (has_wide ? begin : 0), has_wide ? n : 0);
+    const std::uint32_t map_begin = depth_maps.offset[c], maps = depth_maps.offset[c + 1] - map_begin;
+    place(depth_maps.depth.data() + std::size_t(map_begin) * kMapCells, std::size_t(maps) * kMapCells);
+    place(depth_maps.viewpoints.data() + map_begin, maps);
+    // And what is not copied but made there.
+    const auto reserve = [&](std::size_t more) {
+      const std::size_t at = bytes;
+      bytes += (more + 255) / 256 * 256;
+      return at;
+    };
+    const std::uint32_t width = filter_width(cloud->feature_dimension), wide_width = has_wide ? filter_width(wide_features.dimension[c]) : 0;
+    const std::size_t norms = reserve(n * sizeof(float2)), tf32 = reserve(n * width * sizeof(std::uint32_t)), padded = reserve(n * width * sizeof(float));
+    const std::size_t wide_norms = reserve(has_wide ? n * sizeof(float2) : 0), wide_tf32 = reserve(n * wide_width * sizeof(std::uint32_t)),
+                      wide_padded = reserve(n * wide_width * sizeof(float));
+    const std::size_t balanced = reserve(n * sizeof(std::uint32_t));
     const std::size_t copied = bytes;
     const ScoringLayout layout = scoring_layout(*cloud, closest.block_range[c]);
     // Filled: tables begin empty, and what lies between the arrays is copied along with them.
@@ -167,34 +198,50 @@ std::vector<std::shared_ptr<CudaCloud>> assemble(Exec& exec, const DownsampledCl
                     {reinterpret_cast<const std::uint32_t*>(part[5].to), std::size_t(cloud->block_count) * (ClosestGridView::kBlockCells + 1)},
                     {reinterpret_cast<const std::uint32_t*>(part[6].to), cloud->candidate_count}};
     view.executor_data = cloud.get();
-    cloud->feature_norm = reinterpret_cast<float2*>(cloud->data.data() + norms);
-    if (width > 0) {
-      cloud->feature_tf32 = reinterpret_cast<std::uint32_t*>(cloud->data.data() + tf32);
-      cloud->feature_padded = reinterpret_cast<float*>(cloud->data.data() + padded);
-    }
-    norm_slots.push_back({view.features, view.has_feature, view.size, view.feature_dimension, width, cloud->feature_norm, cloud->feature_tf32,
-                          cloud->feature_padded});
+    view.wide_features = has_wide ? reinterpret_cast<const float*>(part[8].to) : nullptr;
+    view.has_wide_feature = has_wide ? reinterpret_cast<const std::uint8_t*>(part[9].to) : nullptr;
+    view.visibility = {reinterpret_cast<const std::uint16_t*>(part[10].to), reinterpret_cast<const Vec3*>(part[11].to), maps, depth_maps.step};
+    char* const memory = cloud->data.data();
+    balance.push_back(reinterpret_cast<std::uint32_t*>(memory + balanced));
+    view.balance = balance.back();
+    const auto measure = [&](FeatureAids& aids, std::size_t norm_at, std::size_t tf32_at, std::size_t padded_at, const float* rows,
+                             const std::uint8_t* valid, std::uint32_t columns, std::uint32_t* extreme) {
+      const std::uint32_t padded_width = filter_width(columns);
+      aids.norm = reinterpret_cast<float2*>(memory + norm_at);
+      if (padded_width > 0) aids.tf32 = reinterpret_cast<std::uint32_t*>(memory + tf32_at), aids.padded = reinterpret_cast<float*>(memory + padded_at);
+      norm_slots.push_back({rows, valid, view.size, columns, padded_width, aids.norm, aids.tf32, aids.padded, extreme});
+    };
+    measure(cloud->narrow_aids, norms, tf32, padded, view.features, view.has_feature, view.feature_dimension, &counts.data()[c].extreme);
+    if (has_wide)
+      measure(cloud->wide_aids, wide_norms, wide_tf32, wide_padded, view.wide_features, view.has_wide_feature, wide_features.dimension[c],
+              &counts.data()[c].extreme_wide);
     cloud->blocks = reinterpret_cast<const Cell*>(part[7].to);
     place_scoring_data(layout, closest.geometry[c], cloud->data.data() + copied, *cloud);
     out.push_back(std::move(cloud));
   }
   const auto parts_on_device = exec.upload(parts);
-  const auto missing = exec.filled<Missing>(count, 0);
   copy_parts<<<dim3(16, static_cast<unsigned>(parts.size())), 256, 0, exec.stream()>>>(parts_on_device.data());
   check_launch("copy_parts");
-  count_missing<<<dim3(8, static_cast<unsigned>(count)), 256, 0, exec.stream()>>>(segments.on_device.data(), normals.data(),
-                                                                                  features.valid.data(), missing.data());
-  check_launch("count_missing");
+  const auto balance_on_device = exec.upload(balance);
+  const dim3 grid(8, static_cast<unsigned>(clouds_count));
+  count<<<grid, 256, 0, exec.stream()>>>(segments.on_device.data(), normals.data(), features.valid.data(), balance_on_device.data(), counts.data());
+  check_launch("count");
+  balance_points<<<grid, 256, 0, exec.stream()>>>(segments.on_device.data(), counts.data(), balance_on_device.data());
+  check_launch("balance_points");
   const auto norm_slots_on_device = exec.upload(norm_slots);
-  measure_features<<<dim3(16, static_cast<unsigned>(count)), 256, 0, exec.stream()>>>(norm_slots_on_device.data(), missing.data());
+  measure_features<<<dim3(16, static_cast<unsigned>(norm_slots.size())), 256, 0, exec.stream()>>>(norm_slots_on_device.data());
   check_launch("measure_features");
   fill_scoring_data(exec, out, closest.geometry);
-  const Missing* counted = exec.download(missing.data(), count);
+  const Counts* counted = exec.download(counts.data(), clouds_count);
   exec.synchronize();
-  for (std::size_t c = 0; c < count; ++c) {
-    out[c]->statistics.points_without_normal = counted[c].normals;
-    out[c]->statistics.points_without_feature = counted[c].features;
-    if (counted[c].extreme_features > 0) out[c]->feature_tf32 = nullptr;
+  for (std::size_t c = 0; c < clouds_count; ++c) {
+    CudaCloud& cloud = *out[c];
+    cloud.statistics.points_without_normal = counted[c].balance_bin[kBalanceBins - 1];
+    cloud.statistics.points_without_feature = counted[c].features;
+    for (const std::uint32_t points : counted[c].balance_bin) cloud.balance_total += std::uint64_t(points) * balance_weight(points);
+    cloud.view_on_device.balance_total = cloud.balance_total;
+    if (counted[c].extreme > 0) cloud.narrow_aids.tf32 = nullptr;
+    if (counted[c].extreme_wide > 0) cloud.wide_aids.tf32 = nullptr;
   }
   return out;
 }

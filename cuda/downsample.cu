@@ -10,15 +10,6 @@
 namespace gpureg::cuda {
 namespace {
 
-/// One raw cloud on the device, rows tight.
-struct RawSlot {
-  const Vec3* points;
-  const Vec3* normals;    // null: none
-  const float* features;  // null: none
-  std::uint32_t dimension;
-  Vec3 origin;
-};
-
 /// Floats as integers of the same order, for atomicMin and atomicMax. -0 comes before 0, which local_origin does not tell apart.
 __host__ __device__ std::int32_t ordered(std::int32_t bits) { return bits ^ ((bits >> 31) & 0x7fffffff); }
 
@@ -200,8 +191,8 @@ CellRange voxel_range(const CloudFacts& facts, std::size_t raw_size, float voxel
 DownsampledClouds downsample(Exec& exec, Span<const RawCloud> clouds, const PrepareOptions& options) {
   constexpr unsigned kThreads = 256;
   std::vector<RawSlot> slots;
-  const auto raw_data = upload_raw(exec, clouds, slots);
-  const Segments raw = make_segments(exec, clouds.size, [&](std::size_t c) { return clouds[c].size; });
+  auto raw_data = upload_raw(exec, clouds, slots);
+  Segments raw = make_segments(exec, clouds.size, [&](std::size_t c) { return clouds[c].size; });
   const dim3 grid(std::max(1u, std::min(blocks_for(raw.largest, kThreads), 256u)), static_cast<unsigned>(clouds.size));
 
   constexpr std::int32_t kMost = 0x7fffffff;
@@ -224,7 +215,7 @@ DownsampledClouds downsample(Exec& exec, Span<const RawCloud> clouds, const Prep
     ranges.push_back(voxel_range(out.facts[c], clouds[c].size, options.voxel_size));
     any_guides = any_guides || out.facts[c].has_guides;
   }
-  const auto slots_on_device = exec.upload(slots);
+  auto slots_on_device = exec.upload(slots);
   measure_radius<<<grid, kThreads, 0, exec.stream()>>>(raw.on_device.data(), slots_on_device.data(), extents.data());
   check_launch("measure_radius");
   const Groups voxels = group_by_cell(exec, raw, ranges, VoxelOf{slots_on_device.data(), options.voxel_size > 0 ? 1.0f / options.voxel_size : 0.0f});
@@ -254,6 +245,7 @@ DownsampledClouds downsample(Exec& exec, Span<const RawCloud> clouds, const Prep
   exec.synchronize();
   for (std::size_t c = 0; c < clouds.size; ++c)
     out.facts[c].radius = radii[c] > 0 ? sqrtf(from_bits(radii[c])) * 1.0001f : 1.0f;
+  if (options.depth_maps > 0) out.raw = {std::move(raw_data), std::move(raw), std::move(slots_on_device)};
   return out;
 }
 

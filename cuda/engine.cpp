@@ -6,6 +6,7 @@
 
 #include "gpureg/context.hpp"
 #include "pipeline/align.hpp"
+#include "pipeline/align_by_evidence.hpp"
 #include "pipeline/prepare.hpp"
 #include "stages.hpp"
 
@@ -18,6 +19,8 @@ constexpr std::size_t kCloudsPerChunk = 256;
 constexpr std::size_t kPairsPerChunk = 256;
 /// For one bit per hypothesis of every pair of a chunk.
 constexpr std::size_t kSampleBytes = std::size_t(256) << 20;
+/// For what every seed is compatible with, and for the matches, of every pair of a chunk.
+constexpr std::size_t kNeighborhoodBytes = std::size_t(1) << 30;
 /// What a fragment takes, about, for each raw point: with a budget no chunk is prepared that is far beyond it.
 constexpr std::size_t kBytesPerRawPoint = 128;
 
@@ -41,7 +44,11 @@ std::vector<DeviceMemoryUse> CudaEngine::device_memory() const {
 }
 
 std::size_t CudaEngine::pairs_per_chunk(const RegistrationOptions& options) const {
-  const std::size_t fit = kSampleBytes / (options.hypothesis.count / 8 + 4096);
+  std::size_t fit = kSampleBytes / (options.hypothesis.count / 8 + 4096);
+  if (options.hypothesis.proposal == Proposal::compatibility) {
+    const CompatibilityOptions& c = options.compatibility;
+    fit = kNeighborhoodBytes / (std::size_t(c.seeds) * (c.max_matches / 8 + 128) + std::size_t(c.max_matches) * 96);
+  }
   return fit < 1 ? 1 : (fit < kPairsPerChunk ? fit : kPairsPerChunk);
 }
 
@@ -99,7 +106,11 @@ void CudaEngine::align(Span<const PairInput> pairs, const RegistrationOptions& o
     for (std::size_t p = begin; p < end; ++p)
       views.push_back({held[place[pairs[p].source]]->view_on_device, held[place[pairs[p].target]]->view_on_device, pairs[p].custom_source.data,
                        pairs[p].custom_target.data, static_cast<std::uint32_t>(pairs[p].custom_source.size)});
-    pipeline::align(exec_, span_of(views), options, {outcomes.data + begin, end - begin});
+    const Span<PairOutcome> part{outcomes.data + begin, end - begin};
+    if (options.hypothesis.proposal == Proposal::compatibility)
+      pipeline::align_by_evidence(exec_, span_of(views), options, part);
+    else
+      pipeline::align(exec_, span_of(views), options, part);
   }
 }
 

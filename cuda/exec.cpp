@@ -42,6 +42,7 @@ Exec::Mark Exec::mark() {
 
 double Exec::milliseconds(Mark from, Mark to) const {
   float ms = 0;
+  check(cudaEventSynchronize(events_[to]), "the work on the device");
   check(cudaEventElapsedTime(&ms, events_[from], events_[to]), "cudaEventElapsedTime");
   return static_cast<double>(ms);
 }

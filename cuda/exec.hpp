@@ -73,7 +73,7 @@ class Exec {
     return staged;
   }
 
-  /// A point in the stream's time, and the time between two of them, known once both are past.
+  /// A point in the stream's time, and the time between two of them; waits for the second.
   using Mark = std::size_t;
   Mark mark();
   double milliseconds(Mark from, Mark to) const;

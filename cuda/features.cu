@@ -17,7 +17,7 @@ struct FpfhBatch {
   float radius;
   float* values;
   std::uint8_t* valid;
-  const std::uint8_t* custom;           // per cloud: 1 where the features are the caller's
+  const std::uint8_t* custom;           // per cloud: 1 where the features are the caller's, and none are made
 };
 
 __global__ void normals_in_cell_order(const std::uint32_t* offset, const GridView* grids, const Vec3* normals, Vec3* out) {
@@ -106,6 +106,24 @@ __global__ void take_features(const std::uint32_t* offset, const std::uint32_t* 
   valid[begin + i] = finite;
 }
 
+/// FPFH of one radius for the clouds without features of the caller's, each at its offset in `out`.
+void describe(Exec& exec, const Segments& segments, const DeviceBuffer<Vec3>& normals, const Grids& grids, float radius,
+              const std::size_t* feature_offset, const std::uint8_t* custom, Features& out) {
+  const unsigned clouds_on_grid = static_cast<unsigned>(segments.entries());
+  auto sorted_normals = exec.buffer<Vec3>(segments.total());
+  normals_in_cell_order<<<dim3(blocks_for(segments.largest, 256), clouds_on_grid), 256, 0, exec.stream()>>>(
+      segments.on_device.data(), grids.views.data(), normals.data(), sorted_normals.data());
+  check_launch("normals_in_cell_order");
+  auto spfh = exec.buffer<float>(static_cast<std::size_t>(segments.total()) * kFpfhSize);
+  const FpfhBatch batch{segments.on_device.data(), grids.views.data(), normals.data(), spfh.data(), feature_offset,
+                        radius, out.values.data(), out.valid.data(), custom};
+  const dim3 grid(blocks_for(segments.largest, kWarps), clouds_on_grid);
+  simplified_histograms<<<grid, 32 * kWarps, 0, exec.stream()>>>(batch, sorted_normals.data());
+  check_launch("simplified_histograms");
+  weighted_histograms<<<grid, 32 * kWarps, 0, exec.stream()>>>(batch, sorted_normals.data());
+  check_launch("weighted_histograms");
+}
+
 }  // namespace
 
 Features compute_features(Exec& exec, DownsampledClouds& clouds, const DeviceBuffer<Vec3>& normals, const Grids& grids,
@@ -130,29 +148,35 @@ Features compute_features(Exec& exec, DownsampledClouds& clouds, const DeviceBuf
   if (segments.total() == 0) return out;
   const auto custom_on_device = exec.upload(custom);
   const auto offset_on_device = exec.upload(out.offset);
-  const unsigned clouds_on_grid = static_cast<unsigned>(count);
-  if (any_fpfh) {
-    auto sorted_normals = exec.buffer<Vec3>(segments.total());
-    normals_in_cell_order<<<dim3(blocks_for(segments.largest, 256), clouds_on_grid), 256, 0, exec.stream()>>>(
-        segments.on_device.data(), grids.views.data(), normals.data(), sorted_normals.data());
-    check_launch("normals_in_cell_order");
-    auto spfh = exec.buffer<float>(static_cast<std::size_t>(segments.total()) * kFpfhSize);
-    const FpfhBatch batch{segments.on_device.data(), grids.views.data(), normals.data(), spfh.data(), offset_on_device.data(),
-                          options.feature_radius, out.values.data(), out.valid.data(), custom_on_device.data()};
-    const dim3 grid(blocks_for(segments.largest, kWarps), clouds_on_grid);
-    simplified_histograms<<<grid, 32 * kWarps, 0, exec.stream()>>>(batch, sorted_normals.data());
-    check_launch("simplified_histograms");
-    weighted_histograms<<<grid, 32 * kWarps, 0, exec.stream()>>>(batch, sorted_normals.data());
-    check_launch("weighted_histograms");
-  }
+  if (any_fpfh) describe(exec, segments, normals, grids, options.feature_radius, offset_on_device.data(), custom_on_device.data(), out);
   if (any_custom) {
     const auto dimension_on_device = exec.upload(out.dimension);
     const auto in_offset_on_device = exec.upload(in_offset);
-    take_features<<<dim3(blocks_for(segments.largest, 256), clouds_on_grid), 256, 0, exec.stream()>>>(
+    take_features<<<dim3(blocks_for(segments.largest, 256), static_cast<unsigned>(count)), 256, 0, exec.stream()>>>(
         segments.on_device.data(), dimension_on_device.data(), custom_on_device.data(), clouds.features.data(), in_offset_on_device.data(),
         offset_on_device.data(), out.values.data(), out.valid.data());
     check_launch("take_features");
   }
+  return out;
+}
+
+Features compute_wide_features(Exec& exec, const DownsampledClouds& clouds, const DeviceBuffer<Vec3>& normals, const Grids& grids,
+                               const PrepareOptions& options) {
+  const Segments& segments = clouds.segments;
+  Features out;
+  std::vector<std::uint8_t> custom;
+  out.offset.push_back(0);
+  for (std::size_t c = 0; c < segments.entries(); ++c) {
+    custom.push_back(clouds.facts[c].feature_dimension > 0);
+    out.dimension.push_back(options.wide_feature_radius > 0 && !custom.back() ? static_cast<std::uint32_t>(kFpfhSize) : 0);
+    out.offset.push_back(out.offset.back() + static_cast<std::size_t>(segments.size(c)) * out.dimension.back());
+  }
+  if (out.offset.back() == 0) return out;
+  out.values = exec.buffer<float>(out.offset.back());
+  out.valid = exec.buffer<std::uint8_t>(segments.total());
+  const auto custom_on_device = exec.upload(custom);
+  const auto offset_on_device = exec.upload(out.offset);
+  describe(exec, segments, normals, grids, options.wide_feature_radius, offset_on_device.data(), custom_on_device.data(), out);
   return out;
 }
 

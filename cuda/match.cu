@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "nearest_feature.hpp"
+#include "feature_query.hpp"
 #include "stages.hpp"
 #include "warp.cuh"
 
@@ -60,12 +60,6 @@ __global__ void __launch_bounds__(kTile) collect_matches(MatchBatch m) {
   if (threadIdx.x == 0 && (tile + 1) * kTile >= answers) m.count[p] = before + all;
 }
 
-FeatureQuery query(const CloudView& from, const CloudView& in, std::uint32_t out) {
-  const auto &a = *static_cast<const CudaCloud*>(from.executor_data), &b = *static_cast<const CudaCloud*>(in.executor_data);
-  return {from.features, from.has_feature, from.size, in.features, in.has_feature, in.size, from.feature_dimension, out,
-          a.feature_norm, b.feature_norm, a.feature_tf32, b.feature_tf32, a.feature_padded, b.feature_padded};
-}
-
 }  // namespace
 
 Matches match_features(Exec& exec, Span<const PairView> pairs, const HypothesisOptions& options) {
@@ -76,7 +70,7 @@ Matches match_features(Exec& exec, Span<const PairView> pairs, const HypothesisO
   for (std::size_t p = 0; p < pairs.size; ++p) {
     if (!asks(p)) continue;
     const CloudView &s = pairs[p].source, &t = pairs[p].target;
-    forward.push_back(query(s, t, forward_segments.offset[p]));
+    forward.push_back(narrow_query(s, t, forward_segments.offset[p]));
   }
   MatchBatch batch{};
   const auto forward_answers = nearest_features(exec, forward, k, forward_segments.total());
@@ -87,7 +81,7 @@ Matches match_features(Exec& exec, Span<const PairView> pairs, const HypothesisO
     for (std::size_t p = 0; p < pairs.size; ++p) {
       if (!asks(p)) continue;
       const CloudView &s = pairs[p].source, &t = pairs[p].target;
-      backward.push_back(query(t, s, backward_segments.offset[p]));
+      backward.push_back(narrow_query(t, s, backward_segments.offset[p]));
     }
     backward_answers = nearest_features(exec, backward, 1, backward_segments.total());
     batch.backward_offset = backward_segments.on_device.data();

@@ -6,6 +6,8 @@
 
 #include "algorithm/closest_build.hpp"
 #include "algorithm/grid.hpp"
+#include "algorithm/evidence.hpp"
+#include "algorithm/moments.hpp"
 #include "algorithm/quadruple.hpp"
 #include "pipeline/engine.hpp"
 #include "segments.hpp"
@@ -29,12 +31,29 @@ struct CloudFacts {
   std::size_t feature_offset = 0;            ///< floats before this cloud's input features
 };
 
+/// One raw cloud on the device, rows tight.
+struct RawSlot {
+  const Vec3* points;
+  const Vec3* normals;    ///< null: none
+  const float* features;  ///< null: none
+  std::uint32_t dimension;
+  Vec3 origin;
+};
+
+/// The raw points, for those stages that still need them.
+struct RawClouds {
+  DeviceBuffer<float> rows;        ///< of clouds that came from host memory
+  Segments segments;
+  DeviceBuffer<RawSlot> slots;
+};
+
 struct DownsampledClouds {
   std::vector<CloudFacts> facts;
   Segments segments;
   DeviceBuffer<Vec3> points;       ///< local, in voxel order (z, y, x), or input order without downsampling
   DeviceBuffer<Vec3> guides;       ///< mean input normal of each point, zero where unknown
   DeviceBuffer<float> features;    ///< mean input features, cloud by cloud
+  RawClouds raw;                   ///< empty where no depth maps are asked for
 };
 
 /// Grids of a batch; views are on the device, one per cloud.
@@ -47,10 +66,18 @@ struct Grids {
 };
 
 struct Features {
-  std::vector<std::uint32_t> dimension;      ///< per cloud
+  std::vector<std::uint32_t> dimension;      ///< per cloud; 0: none
   std::vector<std::size_t> offset;           ///< floats before each cloud's rows, and all floats
   DeviceBuffer<float> values;
   DeviceBuffer<std::uint8_t> valid;          ///< by point
+};
+
+/// Depth maps of a batch, see algorithm/visibility.hpp.
+struct DepthMaps {
+  std::vector<std::uint32_t> offset;         ///< maps before each cloud's, and all
+  float step = 1;
+  DeviceBuffer<std::uint16_t> depth;         ///< maps x kMapCells
+  DeviceBuffer<Vec3> viewpoints;             ///< one per map, local
 };
 
 struct ClosestGrids {
@@ -86,6 +113,13 @@ struct ScoringOrder {
   std::uint32_t groups = 0;
 };
 
+/// What the search reads beside features, see nearest_feature.hpp. Arrays on the device.
+struct FeatureAids {
+  float2* norm = nullptr;                    ///< squared length and length of each feature; infinite where it is not to be matched
+  float* padded = nullptr;                   ///< rows as wide as those of tf32, filled up with zeros
+  std::uint32_t* tf32 = nullptr;             ///< null where the dimension or a length (over 1e15) forbids it
+};
+
 /// What the stages read of a fragment: pointers into one piece of memory, and what belongs to them.
 struct CloudArrays {
   CloudView view_on_device{};                ///< host struct of device pointers; executor_data is the CudaCloud
@@ -94,9 +128,7 @@ struct CloudArrays {
   const Cell* blocks = nullptr;
   CellSummaries summaries;
   ScoringOrder order;
-  float2* feature_norm = nullptr;            ///< squared length and length of each feature; infinite where it is not to be matched
-  float* feature_padded = nullptr;           ///< rows as wide as those of feature_tf32, filled up with zeros
-  std::uint32_t* feature_tf32 = nullptr;     ///< see nearest_feature.hpp; null where the dimension or a length (over 1e15) forbids it
+  FeatureAids narrow_aids, wide_aids;
 
   /// The same arrays in a copy of the memory: every pointer from one piece to the other. A new array has its line there.
   CloudArrays moved(const char* from, char* to) const;
@@ -139,6 +171,59 @@ struct BestPose {
 struct Judgement {
   Support support;
   Moments source, target;
+};
+
+/// The matches of a batch that candidates are made of, as kernels see them; see cpu::MatchSet.
+struct MatchSetView {
+  const float *px, *py, *pz, *qx, *qy, *qz;              ///< local points of source and target
+  const float *mx, *my, *mz, *nx, *ny, *nz;              ///< their normals
+  const std::uint32_t *source, *target;                  ///< their indices
+  const std::uint32_t *source_weight, *target_weight;    ///< balanced over the normals of the pair's matches
+};
+
+struct MatchSets {
+  static constexpr int kColumns = 16;
+  Segments room;                             ///< where each pair's matches lie; as many as there could be
+  DeviceBuffer<std::uint32_t> columns;       ///< the arrays of a MatchSetView one after the other, each as long as the room for all pairs
+  DeviceBuffer<std::uint32_t> count;         ///< per pair
+  DeviceBuffer<std::uint64_t> total;         ///< per pair: weight of all source points, of all target points
+
+  MatchSetView view() const {
+    const std::size_t n = room.total();
+    const std::uint32_t* c = columns.data();
+    const auto real = [&](int k) { return reinterpret_cast<const float*>(c + static_cast<std::size_t>(k) * n); };
+    return {real(0), real(1), real(2), real(3), real(4), real(5), real(6), real(7), real(8), real(9), real(10), real(11),
+            c + 12 * n, c + 13 * n, c + 14 * n, c + 15 * n};
+  }
+};
+
+/// As many places per pair as there may be seeds.
+struct Seeds {
+  std::uint32_t most = 0;                    ///< per pair
+  DeviceBuffer<std::uint32_t> match;         ///< pairs x most
+  DeviceBuffer<std::uint32_t> count;         ///< per pair
+};
+
+/// Candidate poses, in the order of their seeds; as many places per pair as there may be seeds.
+struct Candidates {
+  std::uint32_t most = 0;
+  DeviceBuffer<Pose<float>> pose;
+  DeviceBuffer<std::uint32_t> seed;          ///< the match that it grew from
+  DeviceBuffer<MatchEvidence> matches;
+  DeviceBuffer<float> promise;
+  DeviceBuffer<std::uint32_t> count;         ///< per pair
+};
+
+/// A distinct pose.
+struct Mode {
+  Pose<double> pose;
+  std::uint32_t seed, iterations;
+};
+
+struct Modes {
+  std::uint32_t most = 0;
+  DeviceBuffer<Mode> mode;                   ///< pairs x most
+  DeviceBuffer<std::uint32_t> count;         ///< per pair
 };
 
 }  // namespace gpureg::cuda

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cstdlib>
+#include <fstream>
 #include <map>
 #include <memory>
 
@@ -17,8 +18,13 @@ const std::vector<PointCloud>& fragments() {
     const char* data = std::getenv("GPUREG_DATA_DIR");
     std::vector<PointCloud> out;
     if (!scene && !data) return out;
-    for (const auto& [number, file] : io::list_fragments(scene ? scene : std::string(data) + "/redkitchen/fragments"))
+    const std::string folder = scene ? scene : std::string(data) + "/redkitchen/fragments", cameras = folder + "/cameras.txt";
+    std::map<int, std::vector<Eigen::Vector3f>> viewpoints;
+    if (std::ifstream(cameras)) viewpoints = io::read_cameras(cameras);
+    for (const auto& [number, file] : io::list_fragments(folder)) {
       out.push_back(io::read_point_cloud(file));
+      if (viewpoints.count(number) > 0) out.back().viewpoints = viewpoints[number];
+    }
     return out;
   }();
   return clouds;

@@ -10,6 +10,7 @@ void report(benchmark::State& state, const std::vector<PreparedCloud>& clouds, s
   for (const PreparedCloud& cloud : clouds) {
     const PrepareStatistics& s = cloud.statistics();
     sum.downsample += s.downsample, sum.normals += s.normals, sum.features += s.features, sum.grid += s.grid;
+    sum.depth_maps += s.depth_maps;
     raw += static_cast<double>(s.input_points), points += s.points;
   }
   const double n = static_cast<double>(clouds.size());
@@ -20,15 +21,20 @@ void report(benchmark::State& state, const std::vector<PreparedCloud>& clouds, s
   state.counters["ms_normals"] = sum.normals / n;
   state.counters["ms_features"] = sum.features / n;
   state.counters["ms_grid"] = sum.grid / n;
+  state.counters["ms_depth_maps"] = sum.depth_maps / n;
   state.counters["ms_per_fragment"] =
       benchmark::Counter(n * static_cast<double>(runs) * 1e-3, benchmark::Counter::kIsRate | benchmark::Counter::kInvert);
 }
 
+RegistrationOptions preset(const std::string& name) {
+  return name == "evidence" ? RegistrationOptions::by_evidence(0.05f) : RegistrationOptions::loopsmart();
+}
+
 /// All fragments of the scene from host memory in one call.
-void prepare_batch_of_fragments(benchmark::State& state, const std::string& backend) {
+void prepare_batch_of_fragments(benchmark::State& state, const std::string& backend, const std::string& options_name) {
   const Context* on = context(state, backend);
   if (!on) return;
-  const RegistrationOptions options = RegistrationOptions::loopsmart();
+  const RegistrationOptions options = preset(options_name);
   std::vector<PreparedCloud> clouds = prepare_batch(*on, views(), options.prepare);
   std::size_t runs = 0;
   for (auto _ : state) clouds = prepare_batch(*on, views(), options.prepare), ++runs;
@@ -36,10 +42,10 @@ void prepare_batch_of_fragments(benchmark::State& state, const std::string& back
 }
 
 /// One fragment at a time.
-void prepare_one_fragment(benchmark::State& state, const std::string& backend) {
+void prepare_one_fragment(benchmark::State& state, const std::string& backend, const std::string& options_name) {
   const Context* on = context(state, backend);
   if (!on) return;
-  const RegistrationOptions options = RegistrationOptions::loopsmart();
+  const RegistrationOptions options = preset(options_name);
   const auto all = views();
   std::vector<PreparedCloud> cloud{prepare(*on, all[0], options.prepare)};
   std::size_t runs = 0;
@@ -47,9 +53,10 @@ void prepare_one_fragment(benchmark::State& state, const std::string& backend) {
   report(state, cloud, runs);
 }
 
-BENCHMARK_CAPTURE(prepare_batch_of_fragments, cuda, "cuda")->Unit(benchmark::kMillisecond)->UseRealTime();
-BENCHMARK_CAPTURE(prepare_one_fragment, cuda, "cuda")->Unit(benchmark::kMillisecond)->UseRealTime();
-BENCHMARK_CAPTURE(prepare_batch_of_fragments, cpu, "cpu")->Unit(benchmark::kMillisecond)->UseRealTime();
+BENCHMARK_CAPTURE(prepare_batch_of_fragments, cuda, "cuda", "loopsmart")->Unit(benchmark::kMillisecond)->UseRealTime();
+BENCHMARK_CAPTURE(prepare_batch_of_fragments, cuda_evidence, "cuda", "evidence")->Unit(benchmark::kMillisecond)->UseRealTime();
+BENCHMARK_CAPTURE(prepare_one_fragment, cuda, "cuda", "loopsmart")->Unit(benchmark::kMillisecond)->UseRealTime();
+BENCHMARK_CAPTURE(prepare_batch_of_fragments, cpu, "cpu", "loopsmart")->Unit(benchmark::kMillisecond)->UseRealTime();
 
 }  // namespace
 }  // namespace gpureg::bench

@@ -41,16 +41,20 @@ GPUREG_HD std::uint16_t map_depth(float depth, float inverse_step) {
   return steps < 65534.0f ? static_cast<std::uint16_t>(steps) : static_cast<std::uint16_t>(65534);
 }
 
-/// Nearest depth among the 3 x 3 cells around a known cell of the same face: what hangs before that is in front of all of them.
-GPUREG_HD std::uint16_t eroded_depth(const std::uint16_t* map, std::uint32_t cell) {
-  std::uint16_t nearest = map[cell];
+/// Nearest depth among the 3 x 3 cells around a known cell of the same face: what hangs before that is in front of all of them. Depth:
+/// 16 bits, or wider, of which the lowest 16 count.
+template <typename Depth>
+GPUREG_HD std::uint16_t eroded_depth(const Depth* map, std::uint32_t cell) {
+  std::uint16_t nearest = static_cast<std::uint16_t>(map[cell]);
   if (nearest == kUnknownDepth) return nearest;
   const std::int32_t in_face = static_cast<std::int32_t>(cell % kMapFace);
-  const std::uint16_t* face = map + (cell - static_cast<std::uint32_t>(in_face));
+  const Depth* face = map + (cell - static_cast<std::uint32_t>(in_face));
   const std::int32_t row = in_face / kMapEdge, column = in_face % kMapEdge;
   for (std::int32_t r = row > 0 ? row - 1 : 0; r <= row + 1 && r < kMapEdge; ++r)
-    for (std::int32_t c = column > 0 ? column - 1 : 0; c <= column + 1 && c < kMapEdge; ++c)
-      nearest = face[r * kMapEdge + c] < nearest ? face[r * kMapEdge + c] : nearest;
+    for (std::int32_t c = column > 0 ? column - 1 : 0; c <= column + 1 && c < kMapEdge; ++c) {
+      const std::uint16_t depth = static_cast<std::uint16_t>(face[r * kMapEdge + c]);
+      nearest = depth < nearest ? depth : nearest;
+    }
   return nearest;
 }
 

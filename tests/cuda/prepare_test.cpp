@@ -78,6 +78,25 @@ void expect_same_preparation(const std::vector<RawCloud>& raw, const PrepareOpti
                            one_nan(host(on_cuda, cuda_features.values.data() + cuda_features.offset[c], cpu_features[c].values.size()))));
   }
 
+  auto cpu_wide = cpu::compute_wide_features(on_cpu, cpu_points, cpu_normals, cpu_grids, options);
+  const auto cuda_wide = cuda::compute_wide_features(on_cuda, cuda_points, cuda_normals, cuda_grids, options);
+  for (std::size_t c = 0; c < raw.size(); ++c) {
+    SCOPED_TRACE("wide features, cloud " + std::to_string(c));
+    ASSERT_EQ(cpu_wide[c].values.size(), cuda_wide.offset[c + 1] - cuda_wide.offset[c]);
+    ASSERT_TRUE(same_bytes(cpu_wide[c].values, host(on_cuda, cuda_wide.values.data() + cuda_wide.offset[c], cpu_wide[c].values.size())));
+    ASSERT_TRUE(same_bytes(cpu_wide[c].valid, host(on_cuda, cuda_wide.valid.data() + (cpu_wide[c].valid.empty() ? 0 : cuda_points.segments.offset[c]),
+                                                   cpu_wide[c].valid.size())));
+  }
+
+  auto cpu_maps = cpu::build_depth_maps(on_cpu, clouds, cpu_points, options);
+  const auto cuda_maps = cuda::build_depth_maps(on_cuda, clouds, cuda_points, options);
+  for (std::size_t c = 0; c < raw.size(); ++c) {
+    SCOPED_TRACE("depth maps, cloud " + std::to_string(c));
+    ASSERT_EQ(cpu_maps[c].step, cuda_maps.step);
+    ASSERT_TRUE(same_bytes(cpu_maps[c].viewpoints, host(on_cuda, cuda_maps.viewpoints.data() + cuda_maps.offset[c], cuda_maps.offset[c + 1] - cuda_maps.offset[c])));
+    ASSERT_TRUE(same_bytes(cpu_maps[c].depth, host(on_cuda, cuda_maps.depth.data() + std::size_t(cuda_maps.offset[c]) * kMapCells, cpu_maps[c].depth.size())));
+  }
+
   const auto cpu_closest = cpu::build_closest_grids(on_cpu, cpu_points, cpu_grids, options);
   const auto cuda_closest = cuda::build_closest_grids(on_cuda, cuda_points, cuda_grids, options);
   for (std::size_t c = 0; c < raw.size(); ++c) {
@@ -90,12 +109,32 @@ void expect_same_preparation(const std::vector<RawCloud>& raw, const PrepareOpti
     ASSERT_TRUE(same_bytes(expected.candidates, host(on_cuda, cuda_closest.candidates.data() + cuda_closest.candidate_offset[c], expected.candidates.size())));
   }
 
-  const auto assembled = cuda::assemble(on_cuda, cuda_points, cuda_normals, cuda_features, cuda_closest, options);
+  const auto assembled = cuda::assemble(on_cuda, cuda_points, cuda_normals, cuda_features, cuda_wide, cuda_closest, cuda_maps, options);
+  auto expected_points = cpu_points;
+  auto expected_normals = cpu_normals;
+  auto expected_features = cpu_features;
+  auto expected_closest = cpu_closest;
+  const auto expected = cpu::assemble(on_cpu, expected_points, expected_normals, expected_features, cpu_wide, expected_closest, cpu_maps, options);
   for (std::size_t c = 0; c < raw.size(); ++c) {
     SCOPED_TRACE("assembled, cloud " + std::to_string(c));
     ASSERT_TRUE(same_bytes(cpu_points[c].points, assembled[c]->copy_points()));
     ASSERT_TRUE(same_bytes(cpu_normals[c], assembled[c]->copy_normals()));
     ASSERT_TRUE(same_bytes(one_nan(cpu_features[c].values), one_nan(assembled[c]->copy_features())));
+    const CloudView on_host = expected[c]->view(), &on_gpu = assembled[c]->view_on_device;
+    ASSERT_EQ(on_host.wide_features == nullptr, on_gpu.wide_features == nullptr);
+    if (on_host.wide_features) {
+      ASSERT_TRUE(same_bytes(expected[c]->wide_features.values, host(on_cuda, on_gpu.wide_features, expected[c]->wide_features.values.size())));
+      ASSERT_TRUE(same_bytes(expected[c]->wide_features.valid, host(on_cuda, on_gpu.has_wide_feature, on_host.size)));
+    }
+    ASSERT_TRUE(same_bytes(expected[c]->balance, host(on_cuda, on_gpu.balance, on_gpu.size)));
+    ASSERT_EQ(on_host.balance_total, on_gpu.balance_total);
+    ASSERT_EQ(on_host.balance_total, assembled[c]->balance_total);
+    ASSERT_EQ(on_host.visibility.count, on_gpu.visibility.count);
+    ASSERT_EQ(on_host.visibility.step, on_gpu.visibility.step);
+    ASSERT_TRUE(same_bytes(expected[c]->visibility.depth, host(on_cuda, on_gpu.visibility.depth, std::size_t(on_host.visibility.count) * kMapCells)));
+    ASSERT_TRUE(same_bytes(expected[c]->visibility.viewpoints, host(on_cuda, on_gpu.visibility.viewpoints, on_host.visibility.count)));
+    ASSERT_EQ(expected[c]->statistics.points_without_normal, assembled[c]->statistics.points_without_normal);
+    ASSERT_EQ(expected[c]->statistics.points_without_feature, assembled[c]->statistics.points_without_feature);
     // The tables answer alike, wherever their entries lie.
     for (std::size_t b = 0; b < cpu_closest[c].blocks.size(); b += 7) {
       const auto table = host(on_cuda, assembled[c]->view_on_device.closest.table.data, assembled[c]->view_on_device.closest.table.size);
@@ -176,6 +215,32 @@ TEST_F(PrepareOnCuda, NormalsViewpointsAndFeaturesOfTheCaller) {
   with_views.viewpoints = &viewpoints[0].x, with_views.viewpoint_count = viewpoints.size();
   with_features.features = features.data(), with_features.feature_dimension = dimension, with_features.feature_stride = dimension + 2;
   expect_same_preparation({plain, with_normals, with_views, with_features}, options);
+  options = RegistrationOptions::by_evidence(0.05f).prepare;
+  expect_same_preparation({plain, with_normals, with_views, with_features}, options);
+  options.depth_maps = 64;
+  options.wide_feature_radius = options.feature_radius;
+  expect_same_preparation({with_views, with_features, with_features}, options);
+}
+
+TEST_F(PrepareOnCuda, WideFeaturesAndDepthMaps) {
+  for (const std::size_t size : {20000u, 1u, 0u, 3u, 90000u}) keep(test::bumpy_sheet(random, size, 2.0f));
+  auto broken = test::cube(random, 5000, 1.5f);
+  for (std::size_t k = 0; k < broken.size(); k += 7) broken[k].y = std::numeric_limits<float>::quiet_NaN();
+  keep(std::move(broken));
+  keep(std::vector<Vec3>(10, Vec3{std::numeric_limits<float>::quiet_NaN(), 0, 0}));
+  std::vector<Vec3> viewpoints;
+  for (int k = 0; k < 7; ++k) viewpoints.push_back(test::random_unit(random) * 3.0f);
+  viewpoints.push_back((*kept[0])[5]);  // in the midst of the points, and on one of them
+  for (std::size_t c = 0; c < raw.size(); c += 2) raw[c].viewpoints = &viewpoints[0].x, raw[c].viewpoint_count = viewpoints.size() - c;
+  options = RegistrationOptions::by_evidence(0.05f).prepare;
+  for (const std::uint32_t maps : {1u, 3u, 10u}) {
+    options.depth_maps = maps;
+    expect_same_preparation(raw, options);
+  }
+  options.wide_feature_radius = 0;
+  expect_same_preparation(raw, options);
+  options.depth_maps = 0, options.wide_feature_radius = 0.4f;
+  expect_same_preparation(raw, options);
 }
 
 TEST_F(PrepareOnCuda, ErrorsAreTheCpus) {
@@ -215,6 +280,7 @@ TEST_F(PrepareOnCuda, RedKitchenFragments) {
     raw.push_back(one);
   }
   expect_same_preparation(raw, options);
+  expect_same_preparation(raw, RegistrationOptions::by_evidence(0.05f).prepare);
 }
 
 TEST_F(PrepareOnCuda, FgrRangePairs) {

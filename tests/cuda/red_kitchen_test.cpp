@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // All pairs of a real scene: status, counts and the bits of every pose are the CPU's.
 #include <filesystem>
+#include <fstream>
+#include <sstream>
 
 #include "cuda/gpu.hpp"
 #include "gpureg/registration.hpp"
@@ -11,25 +13,47 @@
 namespace gpureg {
 namespace {
 
+/// With the positions of the cameras that saw the fragments.
+std::vector<PointCloud> scene(const std::string& folder) {
+  std::vector<PointCloud> out;
+  for (int k = 0; std::filesystem::exists(folder + "/cloud_bin_" + std::to_string(k) + ".ply"); ++k)
+    out.push_back(test::read_plain_ply(folder + "/cloud_bin_" + std::to_string(k) + ".ply"));
+  std::ifstream cameras(folder + "/cameras.txt");
+  for (std::string line; std::getline(cameras, line);) {
+    std::istringstream values(line);
+    std::size_t fragment, frame;
+    Eigen::Vector3f at;
+    if (values >> fragment >> frame >> at.x() >> at.y() >> at.z() && fragment < out.size()) out[fragment].viewpoints.push_back(at);
+  }
+  return out;
+}
+
+std::vector<Pair> all_pairs(std::size_t clouds) {
+  std::vector<Pair> out;
+  for (std::uint32_t i = 0; i < clouds; ++i)
+    for (std::uint32_t j = i + 1; j < clouds; ++j) out.push_back({j, i});
+  return out;
+}
+
+int different(const std::vector<RegistrationResult>& a, const std::vector<RegistrationResult>& b) {
+  int count = 0;
+  for (std::size_t k = 0; k < a.size(); ++k) count += test::bytes(a[k]) != test::bytes(b[k]);
+  return count;
+}
+
 TEST(RedKitchenOnCuda, AllPairsAreTheCpus) {
   GPUREG_GPU_OR_SKIP();
   GPUREG_DATA_FOLDER_OR_SKIP(folder, "redkitchen/fragments");
-  std::vector<PointCloud> raw;
+  const std::vector<PointCloud> raw = scene(folder);
   std::vector<PointCloudView> views;
-  for (int k = 0; std::filesystem::exists(folder + "/cloud_bin_" + std::to_string(k) + ".ply"); ++k)
-    raw.push_back(test::read_plain_ply(folder + "/cloud_bin_" + std::to_string(k) + ".ply"));
   for (const PointCloud& cloud : raw) views.push_back(cloud.view());
-  std::vector<Pair> pairs;
-  for (std::uint32_t i = 0; i < raw.size(); ++i)
-    for (std::uint32_t j = i + 1; j < raw.size(); ++j) pairs.push_back({j, i});
+  const std::vector<Pair> pairs = all_pairs(raw.size());
   ASSERT_EQ(pairs.size(), 190u);
   RegistrationOptions options = RegistrationOptions::loopsmart();
   const Context cpu = Context::cpu(), cuda = Context::cuda();
   const auto on_cpu = prepare_batch(cpu, views, options.prepare), on_cuda = prepare_batch(cuda, views, options.prepare);
   const auto expect_same = [&](const std::vector<RegistrationResult>& a, const std::vector<RegistrationResult>& b) {
-    int different = 0;
-    for (std::size_t k = 0; k < pairs.size(); ++k) different += test::bytes(a[k]) != test::bytes(b[k]);
-    EXPECT_EQ(different, 0) << "of 190, seed " << options.hypothesis.seed;
+    EXPECT_EQ(different(a, b), 0) << "of 190, seed " << options.hypothesis.seed;
   };
   for (const std::uint64_t seed : {1, 2, 3}) {
     options.hypothesis.seed = seed;
@@ -52,6 +76,28 @@ TEST(RedKitchenOnCuda, AllPairsAreTheCpus) {
   options = RegistrationOptions::from_voxel_size(0.05f);
   options.hypothesis.seed = seed;
   expect_same(align_batch(cpu, on_cpu, pairs, options), align_batch(cuda, on_cuda, pairs, options));
+}
+
+TEST(RedKitchenOnCuda, AllPairsByEvidenceAreTheCpus) {
+  GPUREG_GPU_OR_SKIP();
+  GPUREG_DATA_FOLDER_OR_SKIP(folder, "redkitchen/fragments");
+  const std::vector<PointCloud> raw = scene(folder);
+  std::vector<PointCloudView> views;
+  for (const PointCloud& cloud : raw) views.push_back(cloud.view());
+  const std::vector<Pair> pairs = all_pairs(raw.size());
+  ASSERT_EQ(pairs.size(), 190u);
+  RegistrationOptions options = RegistrationOptions::by_evidence(0.05f);
+  const Context cpu = Context::cpu(), cuda = Context::cuda();
+  const auto on_cpu = prepare_batch(cpu, views, options.prepare), on_cuda = prepare_batch(cuda, views, options.prepare);
+  for (const std::uint64_t seed : {1, 2}) {
+    SCOPED_TRACE("seed " + std::to_string(seed));
+    options.hypothesis.seed = seed;
+    const auto batch = align_batch(cuda, on_cuda, pairs, options);
+    EXPECT_EQ(different(align_batch(cpu, on_cpu, pairs, options), batch), 0);
+    std::vector<RegistrationResult> one_by_one;
+    for (const Pair& pair : pairs) one_by_one.push_back(align(cuda, on_cuda[pair.source], on_cuda[pair.target], options));
+    EXPECT_EQ(different(batch, one_by_one), 0);
+  }
 }
 
 }  // namespace

@@ -20,6 +20,16 @@ inline std::vector<char> bytes(const RegistrationResult& r) {
     add(&v, sizeof v);
   const auto redwood = r.source_moments.information_redwood(), open3d = r.target_moments.information_open3d();
   add(redwood.data(), 36 * sizeof(double)), add(open3d.data(), 36 * sizeof(double));
+  for (const RegistrationMode& mode : r.modes) {
+    add(mode.target_from_source.matrix().data(), 16 * sizeof(double));
+    add(&mode.confidence, sizeof mode.confidence);
+    const PoseEvidence& e = mode.evidence;
+    add(&e.match_inliers, sizeof e.match_inliers);
+    for (const double v : {e.match_support, e.source_overlap, e.target_overlap, e.source_balanced_overlap, e.target_balanced_overlap, e.source_seen, e.target_seen,
+                           e.source_impossible, e.target_impossible, e.source_hidden, e.target_hidden})
+      add(&v, sizeof v);
+    add(e.stiffness.data(), e.stiffness.size() * sizeof(double));
+  }
   return out;
 }
 

@@ -1,0 +1,173 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <algorithm>
+
+#include "device_algorithms.hpp"
+#include "group.cuh"
+#include "match_set.cuh"
+#include "stages.hpp"
+#include "warp.cuh"
+
+namespace gpureg::cuda {
+namespace {
+
+constexpr int kThreads = 128, kRows = 4;                        // a thread's matches
+constexpr std::uint32_t kBlockRows = kThreads * kRows;          // a thread block's
+constexpr std::uint32_t kTile = kThreads;                       // matches in shared memory at a time
+constexpr int kStrengthBits = 24;                               // 0 to 2^23, see seed_strength()
+constexpr std::uint32_t kMostStrength = (1u << kStrengthBits) - 2;
+constexpr std::uint32_t kPadding = (2u << kStrengthBits) - 1;   // key after those of all matches
+
+struct SeedBatch {
+  MatchSetView matches;
+  const std::uint32_t* room;
+  const std::uint32_t* count;
+  CompatibilityTest test;
+  float squared_separation;
+  std::uint32_t* degree;
+  std::uint8_t* slope;
+};
+
+/// How many matches each is compatible with, itself included. Compatibility is mutual: a thread block compares one range of the matches
+/// (y) with another that does not come before (x), and counts for both. z: pair.
+__global__ void __launch_bounds__(kThreads) count_compatible(SeedBatch b) {
+  __shared__ PackedMatch tile[kTile];
+  __shared__ std::uint32_t column_count[kTile];
+  const std::uint32_t p = blockIdx.z, n = b.count[p], room = b.room[p], row = blockIdx.y * kBlockRows, column = blockIdx.x * kBlockRows;
+  if (blockIdx.x < blockIdx.y || column >= n) return;
+  const std::uint32_t lane = threadIdx.x % 32, last = min(n, column + kBlockRows);
+  const bool mutual = blockIdx.x > blockIdx.y;
+  OrientedMatch own[kRows];
+  std::uint32_t count[kRows];
+#pragma unroll
+  for (int r = 0; r < kRows; ++r) {
+    const std::uint32_t i = row + static_cast<std::uint32_t>(r) * kThreads + threadIdx.x;
+    own[r] = match_at(b.matches, room + min(i, n - 1));
+    if (i >= n) own[r].p.x = __uint_as_float(0x7fffffffu);  // NaN: compatible with nothing
+    count[r] = 0;
+  }
+  for (std::uint32_t base = column; base < last; base += kTile) {
+    const std::uint32_t size = min(kTile, last - base);
+    __syncthreads();
+    if (threadIdx.x < size) tile[threadIdx.x] = packed(match_at(b.matches, room + base + threadIdx.x));
+    column_count[threadIdx.x] = 0;
+    __syncthreads();
+    for (std::uint32_t first = 0; first < size; first += 32) {
+      std::uint32_t kept = 0;  // of the column that has the lane's number
+      for (std::uint32_t k = first; k < min(first + 32, size); ++k) {
+        const OrientedMatch other = tile[k].unpacked();
+        std::uint32_t both = 0;
+#pragma unroll
+        for (int r = 0; r < kRows; ++r) {
+          const std::uint32_t one = compatible(other, own[r], b.test) ? 1u : 0u;
+          count[r] += one, both += one;
+        }
+        if (!mutual) continue;
+        both = warp_sum(both);
+        kept = lane == k - first ? both : kept;
+      }
+      if (kept > 0) atomicAdd(column_count + first + lane, kept);
+    }
+    __syncthreads();
+    if (mutual && threadIdx.x < size && column_count[threadIdx.x] > 0) atomicAdd(b.degree + room + base + threadIdx.x, column_count[threadIdx.x]);
+  }
+#pragma unroll
+  for (int r = 0; r < kRows; ++r) {
+    const std::uint32_t i = row + static_cast<std::uint32_t>(r) * kThreads + threadIdx.x;
+    if (i < n && count[r] > 0) atomicAdd(b.degree + room + i, count[r]);
+  }
+}
+
+/// Marks the matches that have one with more compatible matches near. Thread blocks (x: matches, y: pair, z: part of the matches
+/// that they are compared with); all that mark a match write the same.
+__global__ void __launch_bounds__(kThreads) find_slopes(SeedBatch b, std::uint32_t part) {
+  __shared__ float4 tile[kTile];
+  const std::uint32_t p = blockIdx.y, n = b.count[p], room = b.room[p], first = blockIdx.x * kBlockRows + threadIdx.x;
+  const std::uint32_t begin = blockIdx.z * part, end = min(n, begin + part);
+  if (blockIdx.x * kBlockRows >= n || begin >= n) return;
+  Vec3 own[kRows];
+  std::uint32_t degree[kRows];
+  bool greater[kRows];
+#pragma unroll
+  for (int r = 0; r < kRows; ++r) {
+    const std::uint32_t i = first + static_cast<std::uint32_t>(r) * kThreads;
+    const std::uint32_t at = room + min(i, n - 1);
+    own[r] = {b.matches.px[at], b.matches.py[at], b.matches.pz[at]};
+    degree[r] = b.degree[at];
+    greater[r] = false;
+  }
+  for (std::uint32_t base = begin; base < end; base += kTile) {
+    const std::uint32_t size = min(kTile, end - base);
+    __syncthreads();
+    for (std::uint32_t k = threadIdx.x; k < size; k += kThreads) {
+      const std::size_t at = room + base + k;
+      tile[k] = make_float4(b.matches.px[at], b.matches.py[at], b.matches.pz[at], __uint_as_float(b.degree[at]));
+    }
+    __syncthreads();
+    for (std::uint32_t k = 0; k < size; ++k) {
+      const float4 other = tile[k];
+#pragma unroll
+      for (int r = 0; r < kRows; ++r)
+        greater[r] |= (__float_as_uint(other.w) > degree[r]) & (squared_norm(Vec3{other.x, other.y, other.z} - own[r]) < b.squared_separation);
+    }
+  }
+#pragma unroll
+  for (int r = 0; r < kRows; ++r) {
+    const std::uint32_t i = first + static_cast<std::uint32_t>(r) * kThreads;
+    if (i < n && greater[r]) b.slope[room + i] = 1;
+  }
+}
+
+/// Keys that sort by pair and then as seed_key() does, the best first; equals keep their order, which is that of the matches.
+__global__ void write_keys(SeedBatch b, std::uint64_t* key, std::uint32_t* match) {
+  const std::uint32_t p = blockIdx.y, n = b.count[p], room = b.room[p], i = blockIdx.x * blockDim.x + threadIdx.x;
+  if (i >= b.room[p + 1] - room) return;
+  std::uint32_t order = kPadding;
+  if (i < n) {
+    const std::uint32_t strength = seed_strength(b.degree[room + i], b.matches.source_weight[room + i] + b.matches.target_weight[room + i]);
+    order = (b.slope[room + i] ? 1u << kStrengthBits : 0u) + (kMostStrength - strength);
+  }
+  key[room + i] = static_cast<std::uint64_t>(p) << (kStrengthBits + 1) | order;
+  match[room + i] = i;
+}
+
+__global__ void take_seeds(SeedBatch b, const std::uint32_t* ranked, std::uint32_t most, std::uint32_t* match, std::uint32_t* count) {
+  const std::uint32_t p = blockIdx.y, k = blockIdx.x * blockDim.x + threadIdx.x, size = min(most, b.count[p]);
+  if (k < size) match[p * most + k] = ranked[b.room[p] + k];
+  if (k == 0) count[p] = size;
+}
+
+}  // namespace
+
+Seeds choose_seeds(Exec& exec, const MatchSets& matches, const CompatibilityOptions& options) {
+  const std::size_t pairs = matches.room.entries();
+  const unsigned pair_count = static_cast<unsigned>(pairs);
+  Seeds out;
+  out.most = options.seeds;
+  out.match = exec.buffer<std::uint32_t>(pairs * out.most);
+  out.count = exec.filled<std::uint32_t>(pairs, 0);
+  const std::uint32_t total = matches.room.total(), largest = matches.room.largest;
+  if (total == 0) return out;
+  const auto degree = exec.filled<std::uint32_t>(total, 0);
+  const auto slope = exec.filled<std::uint8_t>(total, 0);
+  const SeedBatch batch{matches.view(), matches.room.on_device.data(), matches.count.data(), test_of(options),
+                        options.seed_separation * options.seed_separation, degree.data(), slope.data()};
+  // Few pairs alone do not fill the device: then their matches are compared in parts.
+  const std::size_t blocks = std::size_t(blocks_for(largest, kBlockRows)) * pairs, wanted = static_cast<std::size_t>(exec.multiprocessors()) * 16;
+  const std::uint32_t parts = static_cast<std::uint32_t>(std::max<std::size_t>(1, std::min<std::size_t>(blocks_for(largest, kTile), wanted / blocks)));
+  const std::uint32_t part = blocks_for(blocks_for(largest, parts), kTile) * kTile;
+  const unsigned ranges = blocks_for(largest, kBlockRows);
+  count_compatible<<<dim3(ranges, ranges, pair_count), kThreads, 0, exec.stream()>>>(batch);
+  check_launch("count_compatible");
+  find_slopes<<<dim3(ranges, pair_count, blocks_for(largest, part)), kThreads, 0, exec.stream()>>>(batch, part);
+  check_launch("find_slopes");
+  auto key = exec.buffer<std::uint64_t>(total);
+  auto match = exec.buffer<std::uint32_t>(total);
+  write_keys<<<dim3(blocks_for(largest, 256), pair_count), 256, 0, exec.stream()>>>(batch, key.data(), match.data());
+  check_launch("write_keys");
+  sort_pairs(exec, key, match, kStrengthBits + 1 + bits_for(pairs));
+  take_seeds<<<dim3(blocks_for(out.most, 256), pair_count), 256, 0, exec.stream()>>>(batch, match.data(), out.most, out.match.data(), out.count.data());
+  check_launch("take_seeds");
+  return out;
+}
+
+}  // namespace gpureg::cuda

@@ -1,0 +1,17 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include "exec.hpp"
+#include "products.hpp"
+
+namespace gpureg::cuda {
+
+/// Which matches the seeds of a batch are compatible with, a bit each.
+struct Neighborhoods {
+  std::uint32_t words = 0;             ///< per seed
+  DeviceBuffer<std::uint32_t> bits;    ///< pairs x seeds x words
+};
+
+Neighborhoods find_neighborhoods(Exec& exec, const MatchSets& matches, const Seeds& seeds, const CompatibilityOptions& options);
+
+}  // namespace gpureg::cuda
