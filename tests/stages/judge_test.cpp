@@ -24,8 +24,8 @@ TEST(Judge, InformationMatricesFollowTheirDefinitions) {
   // Local frames: the clouds lie on each other up to the rounding of their origins to voxels.
   pose[0].pose.tx = 0.011, pose[0].pose.ty = -0.007, pose[0].pose.z = 0.01;
   pose[0].pose.w = std::sqrt(1 - 1e-4);
-  const ScoreOptions options;
-  const Judgement judged = judge_poses(exec, {&pair, 1}, pose, options)[0];
+  RegistrationOptions options;
+  const Judgement judged = judge_poses(exec, {&pair, 1}, pose, options.score)[0];
 
   Eigen::Matrix<double, 6, 6> redwood = Eigen::Matrix<double, 6, 6>::Zero(), open3d = redwood;
   const Rigid rigid = to_rigid(pose[0].pose);
