@@ -56,7 +56,8 @@ def measures(evidence, free_space):
         known = [k for k in (0, 1) if seen[k] > 0] or [0]
         seen, impossible, hidden = ([v[k] for k in known] for v in (seen, impossible, hidden))
         of_all = [s * i for s, i in zip(seen, impossible)]
-        out += [min(seen), max(seen), max(of_all), min(of_all), max(impossible), min(impossible), log(max(impossible), 3e-3), min(hidden)]
+        out += [min(seen), max(seen), max(of_all), min(of_all), max(impossible), min(impossible), log(max(impossible), 3e-3), min(hidden),
+                log(sum(of_all) * (2 / len(of_all)), 1e-3)]
     return out
 
 

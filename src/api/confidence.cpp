@@ -33,7 +33,7 @@ std::vector<double> measures(const PoseEvidence& e, bool free_space) {
   const double of_all[2] = {seen.first * impossible.first, seen.second * impossible.second};
   const double most = std::max(impossible.first, impossible.second), least = std::min(impossible.first, impossible.second);
   for (const double v : {std::min(seen.first, seen.second), std::max(seen.first, seen.second), std::max(of_all[0], of_all[1]),
-                         std::min(of_all[0], of_all[1]), most, least, at_least(most, 3e-3), std::min(hidden.first, hidden.second)})
+                         std::min(of_all[0], of_all[1]), most, least, at_least(most, 3e-3), std::min(hidden.first, hidden.second), at_least(of_all[0] + of_all[1], 1e-3)})
     out.push_back(v);
   return out;
 }
