@@ -3,37 +3,45 @@
 #include <cmath>
 
 #include "algorithm/inlier.hpp"
-#include "cpu/stages.hpp"
+#include "cpu/icp_batch.hpp"
+#include "cpu/moved_points.hpp"
 
 namespace gpureg::cpu {
 namespace {
 
-/// Normal equations from every stride-th source point, weighed by its normal's direction.
-IcpSums mode_sums(const PairView& pair, const Pose<double>& pose, const RefineOptions& options, float kernel_width, float min_cosine,
-                  std::uint32_t stride) {
+/// Normal equations from the points of the walk, weighed by their normals' direction.
+IcpSums mode_sums(MovedPoints& moved, const PairView& pair, const Pose<double>& pose,
+                  const RefineOptions& options, float kernel_width, float min_cosine) {
   const Rigid rigid = to_rigid(pose);
   const CloudView &s = pair.source, &t = pair.target;
-  const float max_squared = options.max_correspondence_distance * options.max_correspondence_distance;
-  const float inverse_max = 1.0f / options.max_correspondence_distance, inverse_radius = 1.0f / s.radius;
-  IcpSums sums{{0}};
-  for (std::uint32_t i = 0; i < s.size; i += stride) {
-    const Vec3 arm = rotate(rigid, s.points[i]);
-    const Vec3 q = apply(rigid, s.points[i]);
-    const Closest c = find_closest(t.closest, t.points, q, max_squared);
-    if (c.index == kNoValue || is_zero(t.normals[c.index])) continue;
-    if (!normals_agree(rotate(rigid, s.normals[i]), t.normals[c.index], min_cosine)) continue;
-    const float distance = dot(q - t.points[c.index], t.normals[c.index]);
-    add_icp_term(arm * inverse_radius, t.normals[c.index], distance * inverse_max,
-                 robust_weight(distance, kernel_width) * balance_share(s.balance[i]), sums);
-  }
-  return sums;
+  const float max_squared =
+      options.max_correspondence_distance * options.max_correspondence_distance;
+  const float inverse_max = 1.0f / options.max_correspondence_distance,
+              inverse_radius = 1.0f / s.radius;
+  IcpBatch batch;
+  moved.for_each_group(rigid, [&](std::size_t group, const PointBounds& bounds) {
+    moved.closest(
+        rigid, group, bounds.possible, max_squared, [&](std::size_t k, Vec3 q, Closest c) {
+          if (c.index == kNoValue || is_zero(t.normals[c.index])) return;
+          if (!normals_agree(rotate(rigid, moved.normal(k)), t.normals[c.index], min_cosine))
+            return;
+          const float distance = dot(q - t.points[c.index], t.normals[c.index]);
+          batch.add(rotate(rigid, moved.point(k)) * inverse_radius, t.normals[c.index],
+                    distance * inverse_max,
+                    robust_weight(distance, kernel_width) *
+                        balance_share(s.balance[moved.order().index[k]]));
+        });
+  });
+  return batch.sums();
 }
 
 /// Iterates until it settles, at most max_iterations times.
-void refine_mode(const PairView& pair, const RefineOptions& options, float kernel_width, float min_cosine, std::uint32_t stride, Mode& mode) {
+void refine_mode(MovedPoints& moved, const PairView& pair, const RefineOptions& options,
+                 float kernel_width, float min_cosine, Mode& mode) {
   for (std::uint32_t k = 0; k < options.max_iterations; ++k) {
-    const IcpStep step = solve_icp(mode_sums(pair, mode.pose, options, kernel_width, min_cosine, stride), pair.source.radius,
-                                   options.max_correspondence_distance);
+    const IcpStep step =
+        solve_icp(mode_sums(moved, pair, mode.pose, options, kernel_width, min_cosine),
+                  pair.source.radius, options.max_correspondence_distance);
     ++mode.iterations;
     if (!step.valid) break;
     mode.pose = compose_small(step.omega, step.shift, mode.pose);
@@ -43,19 +51,25 @@ void refine_mode(const PairView& pair, const RefineOptions& options, float kerne
 
 }  // namespace
 
-std::vector<std::vector<Mode>> select_modes(Exec& exec, const std::vector<Candidates>& candidates, const EvidenceOptions& options) {
-  const float min_trace = mode_trace(options.mode_angle), squared_distance = options.mode_distance * options.mode_distance;
+std::vector<std::vector<Mode>> select_modes(Exec& exec, const std::vector<Candidates>& candidates,
+                                            const EvidenceOptions& options) {
+  const float min_trace = mode_trace(options.mode_angle),
+              squared_distance = options.mode_distance * options.mode_distance;
   std::vector<std::vector<Mode>> out(candidates.size());
   exec.parallel(candidates.size(), [&](std::size_t p) {
     const Candidates& c = candidates[p];
     std::vector<std::uint32_t> order(c.pose.size());
     for (std::uint32_t k = 0; k < order.size(); ++k) order[k] = k;
-    std::stable_sort(order.begin(), order.end(), [&](std::uint32_t a, std::uint32_t b) { return c.promise[a] > c.promise[b]; });
+    std::stable_sort(order.begin(), order.end(),
+                     [&](std::uint32_t a, std::uint32_t b) { return c.promise[a] > c.promise[b]; });
     std::vector<Rigid> taken;
     for (const std::uint32_t k : order) {
       if (taken.size() == options.modes) break;
       const Rigid rigid = to_rigid(c.pose[k]);
-      if (std::any_of(taken.begin(), taken.end(), [&](const Rigid& other) { return same_mode(rigid, other, min_trace, squared_distance); })) continue;
+      if (std::any_of(taken.begin(), taken.end(), [&](const Rigid& other) {
+            return same_mode(rigid, other, min_trace, squared_distance);
+          }))
+        continue;
       taken.push_back(rigid);
       out[p].push_back({widen(c.pose[k]), c.seed[k], 0});
     }
@@ -63,22 +77,35 @@ std::vector<std::vector<Mode>> select_modes(Exec& exec, const std::vector<Candid
   return out;
 }
 
-void refine_modes(Exec& exec, Span<const PairView> pairs, std::vector<std::vector<Mode>>& modes, const EvidenceOptions& evidence,
-                  const RefineOptions& options) {
-  const float min_cosine = inlier_test(options.max_correspondence_distance, kRefineNormalAngle).min_cosine;
-  exec.parallel_items(pairs.size, [&](std::size_t p) { return modes[p].size(); }, 1, [&](std::size_t p, std::size_t k, std::size_t) {
-    const std::uint32_t stride = sample_stride(pairs[p].source.size, 2 * evidence.sample);
-    refine_mode(pairs[p], options, options.kernel_width, min_cosine, stride, modes[p][k]);
-    refine_mode(pairs[p], options, kPolishKernel * options.kernel_width, min_cosine, 1, modes[p][k]);
+void refine_modes(Exec& exec, Span<const PairView> pairs, std::vector<std::vector<Mode>>& modes,
+                  const EvidenceOptions& evidence, const RefineOptions& options) {
+  const float min_cosine =
+      inlier_test(options.max_correspondence_distance, kRefineNormalAngle).min_cosine;
+  const SummaryLimits limits(kRefineNormalAngle, false);
+  std::vector<ScoringOrder> sample(pairs.size);
+  exec.parallel(pairs.size, [&](std::size_t p) {
+    sample[p] = sampled_order(executor_data(pairs[p].source),
+                              sample_stride(pairs[p].source.size, 2 * evidence.sample));
   });
+  exec.parallel_items(
+      pairs.size, [&](std::size_t p) { return modes[p].size(); }, 1,
+      [&](std::size_t p, std::size_t k, std::size_t) {
+        MovedPoints some(sample[p], pairs[p].target, limits),
+            all(executor_data(pairs[p].source).order, pairs[p].target, limits);
+        refine_mode(some, pairs[p], options, options.kernel_width, min_cosine, modes[p][k]);
+        refine_mode(all, pairs[p], options, kPolishKernel * options.kernel_width, min_cosine,
+                    modes[p][k]);
+      });
   // Candidates of one basin meet: the most promising of them stays.
-  const float min_trace = mode_trace(evidence.mode_angle), squared_distance = evidence.mode_distance * evidence.mode_distance;
+  const float min_trace = mode_trace(evidence.mode_angle),
+              squared_distance = evidence.mode_distance * evidence.mode_distance;
   exec.parallel(pairs.size, [&](std::size_t p) {
     std::vector<Mode> distinct;
     for (const Mode& mode : modes[p]) {
       const Rigid rigid = to_rigid(mode.pose);
-      if (std::none_of(distinct.begin(), distinct.end(),
-                       [&](const Mode& other) { return same_mode(rigid, to_rigid(other.pose), min_trace, squared_distance); }))
+      if (std::none_of(distinct.begin(), distinct.end(), [&](const Mode& other) {
+            return same_mode(rigid, to_rigid(other.pose), min_trace, squared_distance);
+          }))
         distinct.push_back(mode);
     }
     modes[p] = std::move(distinct);
