@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <algorithm>
 
+#include "cpu/moved_points.hpp"
+#include "cpu/sights.hpp"
 #include "cpu/stages.hpp"
 
 namespace gpureg::cpu {
@@ -12,68 +14,191 @@ float smaller_share(const MatchEvidence& m, const MatchSet& set) {
   return s < t ? s : t;
 }
 
-/// Weight of the points that a sample with this stride looks at.
-std::uint64_t sampled_weight(const CloudView& cloud, std::uint32_t stride) {
-  std::uint64_t total = 0;
-  for (std::uint32_t i = 0; i < cloud.size; i += stride) total += cloud.balance[i];
-  return total;
+EvidenceTest test_of(const EvidenceOptions& options, const ScoreOptions& score) {
+  return {inlier_test(score.max_correspondence_distance, options.max_normal_angle),
+          options.free_space_margin, options.min_range};
 }
 
-EvidenceTest test_of(const EvidenceOptions& options, const ScoreOptions& score) {
-  return {inlier_test(score.max_correspondence_distance, options.max_normal_angle), options.free_space_margin, options.min_range};
+/// Where the summaries may decide about inliers by themselves; otherwise they only refute.
+bool decides(const EvidenceOptions& options) { return options.max_normal_angle <= 90.0f; }
+
+/// What moves points of one side of a pair into the other side.
+struct Side {
+  const CloudView &moved, &other;
+  const ScoringOrder& order;
+  const SummaryLimits& limits;
+};
+
+/// The sample of a cloud that candidates are judged by.
+struct Sample {
+  ScoringOrder order;
+  std::vector<std::uint32_t> balance;  ///< in that order, 0 for padding
+  std::uint64_t weight = 0;
+};
+
+Sample sample_of(const CloudView& cloud, std::uint32_t most) {
+  Sample out;
+  out.order = sampled_order(executor_data(cloud), sample_stride(cloud.size, most));
+  for (const std::uint32_t i : out.order.index) {
+    out.balance.push_back(i == kNoValue ? 0 : cloud.balance[i]);
+    out.weight += out.balance.back();
+  }
+  return out;
+}
+
+/// Sights of a group by the first `maps` maps of the other cloud.
+Sights sights_of(const Side& side, const Rigid& pose, std::size_t group, std::uint64_t present,
+                 const EvidenceTest& test, std::uint32_t maps) {
+  Sights out;
+  if (maps == 0) return out;
+  const std::size_t first = group * MovedPoints::kGroup;
+  MovedGroup places;
+  places.move(pose, side.order.x.data() + first, side.order.y.data() + first,
+              side.order.z.data() + first);
+  for (std::uint32_t m = 0; m < maps; ++m)
+    add_sights(side.other.visibility, m, places, test.margin, test.min_range, out);
+  out.seen &= present, out.before &= present, out.surface &= present;
+  return out;
+}
+
+std::uint32_t count(std::uint64_t mask) {
+  return static_cast<std::uint32_t>(__builtin_popcountll(mask));
+}
+
+/// What promise() asks of the sample: weigh_point() of the points that the cells' summaries leave
+/// open.
+SideEvidence weigh_sample(MovedPoints& points, const Side& side, const Sample& sample,
+                          const Rigid& pose, const EvidenceTest& test, bool decide) {
+  SideEvidence e{};
+  const std::uint32_t maps = quick_maps(side.other.visibility);
+  points.for_each_group(pose, [&](std::size_t group, const PointBounds& bounds) {
+    const std::uint64_t present = points.present(group),
+                        certain = decide ? bounds.certain & present : 0;
+    Sights s = sights_of(side, pose, group, present, test, maps);
+    for (std::uint64_t left = certain; left != 0; left &= left - 1)
+      e.balanced += sample.balance[group * MovedPoints::kGroup +
+                                   static_cast<std::size_t>(__builtin_ctzll(left))];
+    std::uint64_t hits = certain;
+    const std::uint64_t open =
+        (bounds.possible | points.near_any(group, s.before)) & present & ~certain;
+    points.closest(pose, group, open, test.inlier.max_squared, [&](std::size_t k, Vec3, Closest c) {
+      if (c.index == kNoValue) return;
+      hits |= std::uint64_t(1) << k % MovedPoints::kGroup;
+      const bool inlier = normals_agree(rotate(pose, points.normal(k)), side.other.normals[c.index],
+                                        test.inlier.min_cosine);
+      e.balanced += inlier ? sample.balance[k] : 0u;
+    });
+    e.seen += count(s.seen);
+    e.before += count(s.before & ~hits);
+  });
+  return e;
+}
+
+/// weigh_point() of all points of one side. visit(k, closest, inlier) is called for those with a
+/// closest point.
+template <typename Visit>
+SideEvidence weigh_side(MovedPoints& points, const Side& side, const Rigid& pose,
+                        const EvidenceTest& test, Visit&& visit) {
+  SideEvidence e{};
+  points.for_each_group(pose, [&](std::size_t group, const PointBounds&) {
+    const std::uint64_t present = points.present(group);
+    const Sights s = sights_of(side, pose, group, present, test, side.other.visibility.count);
+    std::uint64_t hits = 0;
+    points.closest(
+        pose, group, points.near_any(group, present), test.inlier.max_squared,
+        [&](std::size_t k, Vec3, Closest c) {
+          if (c.index == kNoValue) return;
+          hits |= std::uint64_t(1) << k % MovedPoints::kGroup;
+          const bool inlier = normals_agree(rotate(pose, points.normal(k)),
+                                            side.other.normals[c.index], test.inlier.min_cosine);
+          e.inliers += inlier ? 1u : 0u;
+          e.balanced += inlier ? side.moved.balance[side.order.index[k]] : 0u;
+          e.residual +=
+              inlier ? fixed_residual(c.squared_distance, test.inlier.inverse_max_squared) : 0u;
+          visit(side.order.index[k], c, inlier);
+        });
+    const std::uint64_t before = s.before & ~hits;
+    e.tested += count(present);
+    e.hits += count(hits);
+    e.seen += count(s.seen);
+    e.before += count(before);
+    e.hidden += count(s.seen & ~before & ~s.surface & ~hits);
+  });
+  return e;
 }
 
 }  // namespace
 
-void weigh_candidates(Exec& exec, Span<const PairView> pairs, const std::vector<MatchSet>& matches, std::vector<Candidates>& candidates,
-                      const EvidenceOptions& options, const ScoreOptions& score) {
+void weigh_candidates(Exec& exec, Span<const PairView> pairs, const std::vector<MatchSet>& matches,
+                      std::vector<Candidates>& candidates, const EvidenceOptions& options,
+                      const ScoreOptions& score) {
   const EvidenceTest test = test_of(options, score);
-  std::vector<std::uint64_t> source_weight(pairs.size), target_weight(pairs.size);
+  const SummaryLimits exact(options.max_normal_angle, true), reach(options.max_normal_angle, false);
+  std::vector<Sample> source(pairs.size), target(pairs.size);
   exec.parallel(pairs.size, [&](std::size_t p) {
-    source_weight[p] = sampled_weight(pairs[p].source, sample_stride(pairs[p].source.size, options.sample));
-    target_weight[p] = sampled_weight(pairs[p].target, sample_stride(pairs[p].target.size, options.sample));
+    source[p] = sample_of(pairs[p].source, options.sample);
+    target[p] = sample_of(pairs[p].target, options.sample);
     candidates[p].promise.resize(candidates[p].pose.size());
   });
-  exec.parallel_items(pairs.size, [&](std::size_t p) { return candidates[p].pose.size(); }, 8,
-                      [&](std::size_t p, std::size_t begin, std::size_t end) {
-                        const CloudView &s = pairs[p].source, &t = pairs[p].target;
-                        const std::uint32_t step_s = sample_stride(s.size, options.sample), step_t = sample_stride(t.size, options.sample);
-                        for (std::size_t k = begin; k < end; ++k) {
-                          const Rigid there = to_rigid(candidates[p].pose[k]), back = inverse(there);
-                          SideEvidence a{}, b{};
-                          for (std::uint32_t i = 0; i < s.size; i += step_s) weigh_point(s, t, there, test, quick_maps(t.visibility), i, a);
-                          for (std::uint32_t i = 0; i < t.size; i += step_t) weigh_point(t, s, back, test, quick_maps(s.visibility), i, b);
-                          candidates[p].promise[k] = promise(smaller_share(candidates[p].matches[k], matches[p]), a,
-                                                             static_cast<float>(source_weight[p]), b, static_cast<float>(target_weight[p]));
-                        }
-                      });
+  exec.parallel_items(
+      pairs.size, [&](std::size_t p) { return candidates[p].pose.size(); }, 32,
+      [&](std::size_t p, std::size_t begin, std::size_t end) {
+        const CloudView &s = pairs[p].source, &t = pairs[p].target;
+        const Side forth{s, t, source[p].order,
+                         exact_distance(t, test.inlier.max_squared) ? exact : reach};
+        const Side back{t, s, target[p].order,
+                        exact_distance(s, test.inlier.max_squared) ? exact : reach};
+        MovedPoints source_points(forth.order, t, forth.limits),
+            target_points(back.order, s, back.limits);
+        for (std::size_t k = begin; k < end; ++k) {
+          const Rigid pose = to_rigid(candidates[p].pose[k]);
+          const SideEvidence a =
+              weigh_sample(source_points, forth, source[p], pose, test, decides(options));
+          const SideEvidence b =
+              weigh_sample(target_points, back, target[p], inverse(pose), test, decides(options));
+          candidates[p].promise[k] = promise(smaller_share(candidates[p].matches[k], matches[p]), a,
+                                             static_cast<float>(source[p].weight), b,
+                                             static_cast<float>(target[p].weight));
+        }
+      });
 }
 
-void weigh_modes(Exec& exec, Span<const PairView> pairs, const std::vector<MatchSet>& matches, const std::vector<Candidates>& candidates,
-                 const std::vector<std::vector<Mode>>& modes, const RegistrationOptions& options, Span<PairOutcome> outcomes) {
+void weigh_modes(Exec& exec, Span<const PairView> pairs, const std::vector<MatchSet>& matches,
+                 const std::vector<Candidates>& candidates,
+                 const std::vector<std::vector<Mode>>& modes, const RegistrationOptions& options,
+                 Span<PairOutcome> outcomes) {
   const EvidenceTest test = test_of(options.evidence, options.score);
-  const float squared_distance = options.compatibility.consensus_distance * options.compatibility.consensus_distance;
+  const SummaryLimits limits(options.evidence.max_normal_angle, false);
+  const float squared_distance =
+      options.compatibility.consensus_distance * options.compatibility.consensus_distance;
   for (std::size_t p = 0; p < pairs.size; ++p) outcomes[p].modes.assign(modes[p].size(), {});
-  exec.parallel_items(pairs.size, [&](std::size_t p) { return modes[p].size(); }, 1, [&](std::size_t p, std::size_t k, std::size_t) {
-    const CloudView &s = pairs[p].source, &t = pairs[p].target;
-    const Mode& mode = modes[p][k];
-    ModeOutcome& out = outcomes[p].modes[k];
-    const Rigid there = to_rigid(mode.pose), back = inverse(there);
-    out.pose = mode.pose, out.hypothesis = mode.seed, out.iterations = mode.iterations;
-    out.matches = count_matches(matches[p], there, squared_distance);
-    for (std::uint32_t i = 0; i < s.size; ++i) {
-      const Weighed w = weigh_point(s, t, there, test, t.visibility.count, i, out.source);
-      if (w.inlier) add_information(s, there, i, out.information);
-      if (w.closest == kNoValue) continue;
-      add_moment(s.points[i] * (1.0f / s.radius), out.source_moments);
-      add_moment(t.points[w.closest] * (1.0f / t.radius), out.target_moments);
-    }
-    for (std::uint32_t i = 0; i < t.size; ++i) weigh_point(t, s, back, test, s.visibility.count, i, out.target);
-  });
+  exec.parallel_items(
+      pairs.size, [&](std::size_t p) { return modes[p].size(); }, 1,
+      [&](std::size_t p, std::size_t k, std::size_t) {
+        const CloudView &s = pairs[p].source, &t = pairs[p].target;
+        const Mode& mode = modes[p][k];
+        ModeOutcome& out = outcomes[p].modes[k];
+        const Rigid there = to_rigid(mode.pose), back = inverse(there);
+        out.pose = mode.pose, out.hypothesis = mode.seed, out.iterations = mode.iterations;
+        out.matches = count_matches(matches[p], there, squared_distance);
+        const Side forth{s, t, executor_data(s).order, limits},
+            reverse{t, s, executor_data(t).order, limits};
+        MovedPoints source_points(forth.order, t, limits), target_points(reverse.order, s, limits);
+        out.source = weigh_side(
+            source_points, forth, there, test, [&](std::uint32_t i, const Closest& c, bool inlier) {
+              if (inlier) add_information(s, there, i, out.information);
+              add_moment(s.points[i] * (1.0f / s.radius), out.source_moments);
+              add_moment(t.points[c.index] * (1.0f / t.radius), out.target_moments);
+            });
+        out.target = weigh_side(target_points, reverse, back, test,
+                                [](std::uint32_t, const Closest&, bool) {});
+      });
   for (std::size_t p = 0; p < pairs.size; ++p) {
     PairOutcome& out = outcomes[p];
-    out.match_weight_source = matches[p].source_total, out.match_weight_target = matches[p].target_total;
-    out.statistics.source_points = pairs[p].source.size, out.statistics.target_points = pairs[p].target.size;
+    out.match_weight_source = matches[p].source_total,
+    out.match_weight_target = matches[p].target_total;
+    out.statistics.source_points = pairs[p].source.size,
+    out.statistics.target_points = pairs[p].target.size;
     out.statistics.correspondences = matches[p].size();
     out.statistics.hypotheses = std::min(options.compatibility.seeds, matches[p].size());
     out.statistics.survivors = candidates[p].pose.size();
