@@ -3,8 +3,9 @@
 
 import sys
 
+from scenes import few, moved, pose, room
+
 import gpureg
-from conftest import few, moved, pose, room
 
 FRAGMENTS, CHUNK = 46, 16  # 1,035 pairs in 65 chunks
 

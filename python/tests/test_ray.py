@@ -12,7 +12,7 @@ pytest.importorskip("pyarrow")
 ray = pytest.importorskip("ray")
 
 import many  # noqa: E402
-from conftest import few  # noqa: E402
+from scenes import few  # noqa: E402
 
 import gpureg  # noqa: E402
 import gpureg.ray  # noqa: E402

@@ -10,7 +10,7 @@ import time
 
 import numpy as np
 import pytest
-from conftest import error_of, few, moved, pose, room
+from scenes import error_of, few, moved, pose, room
 
 import gpureg
 
