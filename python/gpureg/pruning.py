@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import dataclasses
 import time
-from typing import Any, List, Optional, Tuple
+from typing import Any, Iterator, Optional, Sequence, Tuple
 
 import numpy as np
 import numpy.typing as npt
@@ -20,74 +20,103 @@ except ImportError as error:
     raise ImportError("gpureg.pruning needs FAISS: pip install 'gpureg[pruning]'") from error
 
 from . import _core
-from ._core import Context, PreparedCloud, PrepareOptions
+from ._core import Context, PrepareOptions
 from .fragments import FragmentSet, fragment_set
 from .registration import default_context
 
 _TOGETHER = 32  # clouds in memory at once
 _FLAT = 20_000  # fragments up to which the exact search is fast
-_COMPONENTS = 128
+_WORDS = 64
+_SAMPLED, _SAMPLE = 256, 400  # fragments that words are learnt from, and features of each
 
 FloatArray = npt.NDArray[np.float32]
 Pairs = npt.NDArray[np.int64]
 
 
-def describe(cloud: PreparedCloud) -> FloatArray:
-    """Global descriptor of a prepared cloud: second-order pooling of its features.
+def learn_words(features: Sequence[FloatArray], words: int = _WORDS) -> FloatArray:
+    """Centres of k-means (FAISS, fixed seed) over features of some fragments: (words, D) float32.
 
-    The mean of f f' over the square roots f of the features, its upper triangle with signed square roots, at unit length.
-    Points of any order and number give comparable descriptors; it does not change under rigid motions beyond what the
-    downsampling changes.
+    No labels and no training set: the words are those of the scene itself.
+    """
+    some = np.concatenate([_unit(rows) for rows in features] or [np.zeros((0, 1), np.float32)])
+    step = max(1, len(some) // (256 * words))  # what FAISS's k-means would use of them
+    some = np.ascontiguousarray(some[::step])
+    words = min(words, len(some))
+    if words == 0:
+        return np.zeros((0, some.shape[1]), np.float32)
+    means = faiss.Kmeans(some.shape[1], words, niter=20, seed=1, min_points_per_centroid=1)
+    threads = faiss.omp_get_max_threads()
+    faiss.omp_set_num_threads(1)  # sums in one order: the words, and so the pairs, do not depend on the number of cores
+    try:
+        means.train(some)
+    finally:
+        faiss.omp_set_num_threads(threads)
+    return np.asarray(means.centroids, np.float32)
+
+
+def describe(features: FloatArray, words: FloatArray) -> FloatArray:
+    """Global descriptor of a cloud: what is left of its features beyond their nearest words, summed per word (VLAD with
+    intra-normalisation, Jegou et al. 2010, Arandjelovic and Zisserman 2013).
+
+    Rigid motions change it as little as they change the features.
+
+    Parameters
+    ----------
+    features : (N, D) float32
+        ``PreparedCloud.features``, or features of your own.
+    words : (W, D) float32
+        Of `learn_words`.
 
     Returns
     -------
-    (D * (D + 1) / 2,) float32
-        561 numbers for FPFH (D = 33); zeros for a cloud without features.
+    (W * D,) float32
+        Unit length; zeros for a cloud without features.
 
     Examples
     --------
-    >>> import numpy as np, gpureg
+    >>> import numpy as np
     >>> from gpureg import pruning
-    >>> descriptor = pruning.describe(gpureg.prepare(np.random.default_rng(1).random((2000, 3))))
+    >>> features = np.random.default_rng(1).random((300, 33), np.float32)
+    >>> words = pruning.learn_words([features], words=4)
+    >>> descriptor = pruning.describe(features, words)
     >>> descriptor.shape, round(float(np.linalg.norm(descriptor)), 3)
-    ((561,), 1.0)
+    ((132,), 1.0)
     """
-    features = cloud.features.astype(np.float64)
-    rows, columns = np.triu_indices(cloud.feature_dimension)
-    features = features[np.abs(features).sum(axis=1) > 0]
-    if len(features) == 0:
-        return np.zeros(len(rows), np.float32)
-    features = np.sign(features) * np.sqrt(np.abs(features))
-    features /= np.linalg.norm(features, axis=1, keepdims=True)
-    pooled = (features.T @ features / len(features))[rows, columns]
-    pooled = np.sign(pooled) * np.sqrt(np.abs(pooled))
-    return np.asarray(pooled / np.linalg.norm(pooled), np.float32)
+    rows = _unit(features)
+    left: npt.NDArray[np.float64] = np.zeros(words.shape)
+    if len(rows) and len(words):
+        nearest = np.argmax(rows @ words.T - 0.5 * np.einsum("wd,wd->w", words, words), axis=1)
+        np.add.at(left, nearest, rows - words[nearest])
+    lengths = np.linalg.norm(left, axis=1, keepdims=True)
+    flat = (left / np.where(lengths > 0, lengths, 1)).ravel()
+    length = float(np.linalg.norm(flat))
+    return np.asarray(flat / (length or 1.0), np.float32)
 
 
-def describe_all(fragments: Any, *, options: Optional[PrepareOptions] = None, context: Optional[Context] = None) -> FloatArray:
-    """(n, 561) descriptors of a set's fragments, which are loaded and prepared a few at a time."""
+def _unit(features: FloatArray) -> FloatArray:
+    """Signed roots at unit length (FPFH is a set of histograms); points without a feature, all zeros, are left out."""
+    rows = features[np.abs(features).sum(axis=1) > 0]
+    rows = np.sign(rows) * np.sqrt(np.abs(rows))
+    return np.asarray(rows / np.linalg.norm(rows, axis=1, keepdims=True), np.float32)
+
+
+def describe_all(
+    fragments: Any, *, words: int = _WORDS, options: Optional[PrepareOptions] = None, context: Optional[Context] = None
+) -> FloatArray:
+    """(n, words * D) descriptors of a set's fragments, which are loaded and prepared a few at a time."""
     fragments, options, context = fragment_set(fragments), options or PrepareOptions(), context or default_context()
-    out: List[FloatArray] = []
-    for begin in range(0, len(fragments), _TOGETHER):
-        inputs = [
-            fragments.load(k, options, context.backend == "cuda") for k in range(begin, min(begin + _TOGETHER, len(fragments)))
-        ]
-        out += [describe(cloud) for cloud in _core.prepare_batch(context, inputs, options)]
+
+    def features(positions: Sequence[int]) -> Iterator[FloatArray]:
+        for begin in range(0, len(positions), _TOGETHER):
+            part = positions[begin : begin + _TOGETHER]
+            inputs = [fragments.load(k, options, context.backend == "cuda") for k in part]
+            for cloud in _core.prepare_batch(context, inputs, options):
+                yield cloud.features
+
+    n = len(fragments)
+    centres = learn_words([rows[:: max(1, len(rows) // _SAMPLE)] for rows in features(range(0, n, max(1, n // _SAMPLED)))], words)
+    out = [describe(rows, centres) for rows in features(range(n))]
     return np.stack(out) if out else np.zeros((0, 0), np.float32)
-
-
-def whiten(descriptors: FloatArray, components: int = _COMPONENTS) -> FloatArray:
-    """Principal components of the set's descriptors, each divided by the root of its deviation, at unit length.
-
-    What all fragments of a scene share (floors, walls) says nothing about which of them overlap.
-    """
-    centred = descriptors.astype(np.float64) - descriptors.mean(axis=0)
-    values, vectors = np.linalg.eigh(centred.T @ centred / max(1, len(centred)))
-    kept = np.argsort(values)[::-1][: min(components, max(1, len(descriptors) - 1))]
-    kept = kept[values[kept] > 1e-9 * max(float(values.max()), 1e-300)]
-    projected = centred @ (vectors[:, kept] / values[kept] ** 0.25)
-    lengths = np.linalg.norm(projected, axis=1, keepdims=True)
-    return np.ascontiguousarray(projected / np.where(lengths > 0, lengths, 1), dtype=np.float32)
 
 
 @dataclasses.dataclass
@@ -114,10 +143,10 @@ class Nearest:
     >>> import numpy as np, gpureg
     >>> from gpureg import pruning
     >>> rng = np.random.default_rng(1)
-    >>> clouds = [rng.random((500, 3)) * [1, 1, k % 2] for k in range(6)]  # cubes and squares
-    >>> pairs = pruning.Nearest(k=2)(gpureg.FragmentSet.from_clouds(clouds))
-    >>> sorted({int(i + j) % 2 for i, j in pairs}), len(pairs)
-    ([0], 6)
+    >>> fragments = gpureg.FragmentSet.from_clouds([rng.random((500, 3)) for _ in range(6)])
+    >>> pairs = pruning.Nearest(k=1)(fragments)
+    >>> pairs.shape[1], 3 <= len(pairs) <= 6
+    (2, True)
     """
 
     k: int = 20
@@ -131,7 +160,7 @@ class Nearest:
         if self.k < 1:
             raise ValueError(f"k is {self.k}, expected 1 or more")
         begin = time.monotonic()
-        descriptors = whiten(describe_all(fragments, options=self.options, context=self.context))
+        descriptors = describe_all(fragments, options=self.options, context=self.context)
         positions = nearest_pairs(descriptors, self.k)
         n = len(fragments)
         steps = [np.stack([np.arange(n - s), np.arange(s, n)], axis=1) for s in range(1, min(self.consecutive, n - 1) + 1)]
@@ -206,4 +235,4 @@ def _as_set(pairs: Any) -> "set[Tuple[int, int]]":
     return {(min(int(i), int(j)), max(int(i), int(j))) for i, j in pairs}
 
 
-__all__ = ["Nearest", "PruningReport", "describe", "describe_all", "measure", "nearest_pairs", "whiten"]
+__all__ = ["Nearest", "PruningReport", "describe", "describe_all", "learn_words", "measure", "nearest_pairs"]
