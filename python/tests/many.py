@@ -27,4 +27,4 @@ def run(folder, progress=False, **keywords):
 
 if __name__ == "__main__":
     print("started", flush=True)
-    run(sys.argv[1], progress=lambda done, total: print(done, flush=True), contexts=[gpureg.Context.cpu()])
+    run(sys.argv[1], progress=lambda done, total: print(done, flush=True), contexts=[gpureg.Context.cpu(1)])

@@ -36,26 +36,27 @@ def stays(value, **keywords):
 
 def test_same_bits_as_the_cpu(source, target, tmp_path):
     results = []
-    for context in (CPU, GPU, gpureg.Context.cuda([0], memory_budget=1 << 20)):
+    for context in (CPU, GPU, gpureg.Context.cuda([0], memory_budget=64 << 20)):
         state = gpureg.register(source, target, options=few(), context=context).to_dict()
         del state["timings"]
         results.append(pickle.dumps(state))
     assert len(set(results)) == 1
     clouds, keywords = [room(k % 3, 1500) for k in range(8)], {"options": few(2000), "progress": False, "chunk_size": 5}
-    if sys.modules.get("pyarrow") or pytest.importorskip("pyarrow"):
-        runs = [gpureg.register_all(clouds, output=tmp_path / c.backend, contexts=[c], **keywords) for c in (CPU, GPU)]
-        assert runs[0].parquet.read_bytes() == runs[1].parquet.read_bytes()
-        assert runs[0].log.read_bytes() == runs[1].log.read_bytes()
+    pytest.importorskip("pyarrow")
+    runs = [gpureg.register_all(clouds, output=tmp_path / c.backend, contexts=[c], **keywords) for c in (CPU, GPU)]
+    assert runs[0].parquet.read_bytes() == runs[1].parquet.read_bytes()
+    assert runs[0].log.read_bytes() == runs[1].log.read_bytes()
+
+
+@pytest.fixture(scope="module")
+def torch():
+    torch = pytest.importorskip("torch")
+    if not torch.cuda.is_available():
+        pytest.skip("torch has no CUDA")
+    return torch
 
 
 class TestTorch:
-    @pytest.fixture(scope="class")
-    def torch(self):
-        torch = pytest.importorskip("torch")
-        if not torch.cuda.is_available():
-            pytest.skip("torch has no CUDA")
-        return torch
-
     def test_layouts(self, torch, source, reference):
         tensor = torch.from_numpy(source.astype(np.float32)).cuda()
         wide = torch.full((len(source), 7), float("nan"), device="cuda")
@@ -112,8 +113,9 @@ class TestTorch:
         with torch.profiler.profile(activities=[torch.profiler.ProfilerActivity.CUDA]) as profile:
             cloud = gpureg.prepare(tensor, context=GPU)
             torch.cuda.synchronize()
-        to_host = [size for name, size in copies(profile) if "DtoH" in name]
-        to_device = [size for name, size in copies(profile) if "HtoD" in name]
+        seen = copies(profile)
+        to_host = [size for name, size in seen if "DtoH" in name]
+        to_device = [size for name, size in seen if "HtoD" in name]
         print(f"copies to the host: {len(to_host)}, {sum(to_host)} bytes; to the device: {len(to_device)}, {sum(to_device)} bytes")
         assert len(cloud) > 1000 and sum(to_host) < 10_000 and sum(to_device) < 100_000
 
