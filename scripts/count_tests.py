@@ -22,14 +22,15 @@ for file in arguments.files:
     if not file.exists():  # a pattern that no file matches
         continue
     for case in ElementTree.parse(file).getroot().iter("testcase"):
-        output = (case.findtext("system-out") or "").strip().splitlines()
+        output = (case.findtext("system-out") or case.findtext("failure") or case.findtext("error") or "").strip().splitlines()
         if case.find("skipped") is not None and case.get("status") != "fail":
             skipped += 1
             # GoogleTest's reason is the line before its own verdict.
             reason = [line.strip() for line in output if line.strip() and not line.startswith(("[", "Note:", "Running main()"))]
             reason = [line for line in reason if "Skipped" not in line] or [case.get("name")]
-            skipped_tests[reason[-1]] += 1
-        elif case.find("failure") is not None or case.get("status") in ("fail", "notrun"):
+            # pytest has it in a place of its own.
+            skipped_tests[case.find("skipped").get("message") if case.find("skipped").get("type") == "pytest.skip" else reason[-1]] += 1
+        elif case.find("failure") is not None or case.find("error") is not None or case.get("status") in ("fail", "notrun"):
             failed += 1
             print(f"failed: {case.get('name')} ({file.stem})", *output[-LINES:], sep="\n  ")
         else:

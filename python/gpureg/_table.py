@@ -30,10 +30,8 @@ def row_of(i: int, j: int, result: RegistrationResult) -> Dict[str, Any]:
 def _type_of(name: str, value: Any) -> pa.DataType:
     if name in ("i", "j"):
         return pa.int32()
-    if name == "target_from_source":
-        return pa.list_(pa.float64(), 16)
-    if name == "information":
-        return pa.list_(pa.float64(), 36)
+    if name in ("target_from_source", "information"):
+        return pa.list_(pa.float64())  # not of fixed size: older readers of Parquet stumble over nulls among those
     kinds: Dict[type, pa.DataType] = {str: pa.string(), bool: pa.bool_(), int: pa.int64(), float: pa.float64()}
     return kinds[type(value)]
 

@@ -9,7 +9,7 @@ from typing import Any, Callable, List, Optional, Sequence, Union
 
 from . import _core
 from ._arrays import core_cloud, index_pairs
-from ._core import Context, PreparedCloud, PrepareOptions, RegistrationOptions, RegistrationResult
+from ._core import BackendUnavailable, Context, PreparedCloud, PrepareOptions, RegistrationOptions, RegistrationResult
 from ._progress import Progress, batch_progress
 
 _default: Optional[Context] = None
@@ -19,11 +19,15 @@ _default_lock = threading.Lock()
 def default_context() -> Context:
     """The context that calls without one use: CUDA where a device can be used, else all CPU threads.
 
-    Made at the first call, once per process. A forked child makes its own; contexts of your own do
-    not survive a fork, as no thread does.
+    Made at the first call, once per process. A forked child makes its own, on the CPU; CUDA does not
+    survive a fork, nor do contexts of your own, as no thread does.
     """
     global _default
     with _default_lock:
+        if any(context is not None and context.backend == "cuda" for context in _abandoned):
+            raise BackendUnavailable(
+                "CUDA does not survive a fork: start processes by multiprocessing's 'spawn' or 'forkserver', or name a context of the CPU"
+            )
         if _default is None:
             _default = Context.best()
         return _default

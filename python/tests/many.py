@@ -3,8 +3,9 @@
 
 import sys
 
+from scenes import few, moved, pose, room
+
 import gpureg
-from conftest import few, moved, pose, room
 
 FRAGMENTS, CHUNK = 46, 16  # 1,035 pairs in 65 chunks
 
@@ -26,4 +27,4 @@ def run(folder, progress=False, **keywords):
 
 if __name__ == "__main__":
     print("started", flush=True)
-    run(sys.argv[1], progress=lambda done, total: print(done, flush=True), contexts=[gpureg.Context.cpu()])
+    run(sys.argv[1], progress=lambda done, total: print(done, flush=True), contexts=[gpureg.Context.cpu(1)])

@@ -13,7 +13,7 @@ import time
 
 import numpy as np
 import pytest
-from conftest import few, moved, pose, room
+from scenes import few, moved, pose, room
 
 import gpureg
 

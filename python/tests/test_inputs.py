@@ -7,7 +7,7 @@ import types
 
 import numpy as np
 import pytest
-from conftest import error_of, few, moved
+from scenes import error_of, few, moved
 
 import gpureg
 from gpureg._arrays import float_rows, to_numpy

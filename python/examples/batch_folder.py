@@ -1,0 +1,33 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""All pairs of a folder of fragments cloud_bin_<i>.ply: kill it, call it again, nothing is lost.
+
+    python batch_folder.py scans/ --output run/
+"""
+
+from __future__ import annotations
+
+import argparse
+
+import gpureg
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("folder")
+    parser.add_argument("--output", required=True)
+    parser.add_argument("--voxel-size", type=float, default=0.05)
+    parser.add_argument("--hypotheses", type=int)
+    arguments = parser.parse_args()
+
+    options = gpureg.RegistrationOptions.from_voxel_size(arguments.voxel_size)
+    if arguments.hypotheses is not None:
+        options.hypothesis.count = arguments.hypotheses
+    run = gpureg.register_all(arguments.folder, output=arguments.output, options=options)
+    print(run)
+    best = run.table().sort_by([("score", "descending")]).slice(0, 5)
+    for row in best.to_pylist():
+        print(f"{row['j']:4d} into {row['i']:4d}: {row['status']}, score {row['score']:.3f}")
+
+
+if __name__ == "__main__":
+    main()

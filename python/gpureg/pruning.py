@@ -1,0 +1,238 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Which pairs of a large set are worth trying: those whose fragments look alike.
+
+A fragment's global descriptor is an aggregate of its local features that needs no training; candidates are the k nearest
+neighbours (FAISS). The cost of a run then grows as n * k, not as n * n.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import time
+from typing import Any, Iterator, Optional, Sequence, Tuple
+
+import numpy as np
+import numpy.typing as npt
+
+try:
+    import faiss
+except ImportError as error:
+    raise ImportError("gpureg.pruning needs FAISS: pip install 'gpureg[pruning]'") from error
+
+from . import _core
+from ._core import Context, PrepareOptions
+from .fragments import FragmentSet, fragment_set
+from .registration import default_context
+
+_TOGETHER = 32  # clouds in memory at once
+_FLAT = 20_000  # fragments up to which the exact search is fast
+_WORDS = 64
+_SAMPLED, _SAMPLE = 256, 400  # fragments that words are learnt from, and features of each
+
+FloatArray = npt.NDArray[np.float32]
+Pairs = npt.NDArray[np.int64]
+
+
+def learn_words(features: Sequence[FloatArray], words: int = _WORDS) -> FloatArray:
+    """Centres of k-means (FAISS, fixed seed) over features of some fragments: (words, D) float32.
+
+    No labels and no training set: the words are those of the scene itself.
+    """
+    some = np.concatenate([_unit(rows) for rows in features] or [np.zeros((0, 1), np.float32)])
+    step = max(1, len(some) // (256 * words))  # what FAISS's k-means would use of them
+    some = np.ascontiguousarray(some[::step])
+    words = min(words, len(some))
+    if words == 0:
+        return np.zeros((0, some.shape[1]), np.float32)
+    means = faiss.Kmeans(some.shape[1], words, niter=20, seed=1, min_points_per_centroid=1)
+    threads = faiss.omp_get_max_threads()
+    faiss.omp_set_num_threads(1)  # sums in one order: the words, and so the pairs, do not depend on the number of cores
+    try:
+        means.train(some)
+    finally:
+        faiss.omp_set_num_threads(threads)
+    return np.asarray(means.centroids, np.float32)
+
+
+def describe(features: FloatArray, words: FloatArray) -> FloatArray:
+    """Global descriptor of a cloud: what is left of its features beyond their nearest words, summed per word (VLAD with
+    intra-normalisation, Jegou et al. 2010, Arandjelovic and Zisserman 2013).
+
+    Rigid motions change it as little as they change the features.
+
+    Parameters
+    ----------
+    features : (N, D) float32
+        ``PreparedCloud.features``, or features of your own.
+    words : (W, D) float32
+        Of `learn_words`.
+
+    Returns
+    -------
+    (W * D,) float32
+        Unit length; zeros for a cloud without features.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from gpureg import pruning
+    >>> features = np.random.default_rng(1).random((300, 33), np.float32)
+    >>> words = pruning.learn_words([features], words=4)
+    >>> descriptor = pruning.describe(features, words)
+    >>> descriptor.shape, round(float(np.linalg.norm(descriptor)), 3)
+    ((132,), 1.0)
+    """
+    rows = _unit(features)
+    left: npt.NDArray[np.float64] = np.zeros(words.shape)
+    if len(rows) and len(words):
+        nearest = np.argmax(rows @ words.T - 0.5 * np.einsum("wd,wd->w", words, words), axis=1)
+        np.add.at(left, nearest, rows - words[nearest])
+    lengths = np.linalg.norm(left, axis=1, keepdims=True)
+    flat = (left / np.where(lengths > 0, lengths, 1)).ravel()
+    length = float(np.linalg.norm(flat))
+    return np.asarray(flat / (length or 1.0), np.float32)
+
+
+def _unit(features: FloatArray) -> FloatArray:
+    """Signed roots at unit length (FPFH is a set of histograms); points without a feature, all zeros, are left out."""
+    rows = features[np.abs(features).sum(axis=1) > 0]
+    rows = np.sign(rows) * np.sqrt(np.abs(rows))
+    return np.asarray(rows / np.linalg.norm(rows, axis=1, keepdims=True), np.float32)
+
+
+def describe_all(
+    fragments: Any, *, words: int = _WORDS, options: Optional[PrepareOptions] = None, context: Optional[Context] = None
+) -> FloatArray:
+    """(n, words * D) descriptors of a set's fragments, which are loaded and prepared a few at a time."""
+    fragments, options, context = fragment_set(fragments), options or PrepareOptions(), context or default_context()
+
+    def features(positions: Sequence[int]) -> Iterator[FloatArray]:
+        for begin in range(0, len(positions), _TOGETHER):
+            part = positions[begin : begin + _TOGETHER]
+            inputs = [fragments.load(k, options, context.backend == "cuda") for k in part]
+            for cloud in _core.prepare_batch(context, inputs, options):
+                yield cloud.features
+
+    n = len(fragments)
+    centres = learn_words([rows[:: max(1, len(rows) // _SAMPLE)] for rows in features(range(0, n, max(1, n // _SAMPLED)))], words)
+    out = [describe(rows, centres) for rows in features(range(n))]
+    return np.stack(out) if out else np.zeros((0, 0), np.float32)
+
+
+@dataclasses.dataclass
+class Nearest:
+    """Pairs of each fragment and the k that look most like it: for the argument pairs of `register_all`.
+
+    Parameters
+    ----------
+    k : int
+        Neighbours per fragment. A pair is tried where either has the other among them.
+    consecutive : int
+        Also the so many fragments that follow each one by number: scans of a walk.
+    options : PrepareOptions, optional
+        Those of the run, usually.
+    context : Context, optional
+
+    Attributes
+    ----------
+    seconds : float
+        Of the last call: descriptors and search.
+
+    Examples
+    --------
+    >>> import numpy as np, gpureg
+    >>> from gpureg import pruning
+    >>> rng = np.random.default_rng(1)
+    >>> fragments = gpureg.FragmentSet.from_clouds([rng.random((500, 3)) for _ in range(6)])
+    >>> pairs = pruning.Nearest(k=1)(fragments)
+    >>> pairs.shape[1], 3 <= len(pairs) <= 6
+    (2, True)
+    """
+
+    k: int = 20
+    consecutive: int = 0
+    options: Optional[PrepareOptions] = None
+    context: Optional[Context] = None
+    seconds: float = 0.0
+
+    def __call__(self, fragments: FragmentSet) -> Pairs:
+        """(M, 2) pairs i < j of fragment numbers, ascending."""
+        if self.k < 1:
+            raise ValueError(f"k is {self.k}, expected 1 or more")
+        begin = time.monotonic()
+        descriptors = describe_all(fragments, options=self.options, context=self.context)
+        positions = nearest_pairs(descriptors, self.k)
+        n = len(fragments)
+        steps = [np.stack([np.arange(n - s), np.arange(s, n)], axis=1) for s in range(1, min(self.consecutive, n - 1) + 1)]
+        positions = np.unique(np.concatenate([positions, *steps]), axis=0)
+        self.seconds = time.monotonic() - begin
+        return np.asarray(np.asarray(fragments.numbers, np.int64)[positions], np.int64).reshape(-1, 2)
+
+
+def nearest_pairs(descriptors: FloatArray, k: int) -> Pairs:
+    """(M, 2) positions i < j where either has the other among its k nearest. Exact for sets of up to 20,000."""
+    n, dimension = descriptors.shape
+    k = min(k + 1, n)  # the nearest of each is itself
+    index = faiss.IndexFlatIP(dimension) if n <= _FLAT else faiss.IndexHNSWFlat(dimension, 32, faiss.METRIC_INNER_PRODUCT)
+    index.add(descriptors)
+    _, neighbours = index.search(descriptors, k)
+    pairs = np.stack([np.repeat(np.arange(n), k), neighbours.ravel()], axis=1)
+    pairs = np.sort(pairs[(pairs[:, 0] != pairs[:, 1]) & (pairs[:, 1] >= 0)], axis=1)
+    return np.asarray(np.unique(pairs, axis=0), np.int64)
+
+
+@dataclasses.dataclass(frozen=True)
+class PruningReport:
+    """What a choice of pairs saves, and what it loses.
+
+    Attributes
+    ----------
+    tried, pairs : int
+        Pairs chosen, of all that there are.
+    kept, overlapping : int
+        Overlapping pairs chosen, of all that overlap.
+    """
+
+    tried: int
+    pairs: int
+    kept: int
+    overlapping: int
+
+    @property
+    def recall(self) -> float:
+        """Part of the overlapping pairs that are still tried, [0, 1]; 1 where none overlaps."""
+        return self.kept / self.overlapping if self.overlapping else 1.0
+
+    def __str__(self) -> str:
+        return (
+            f"{self.tried} of {self.pairs} pairs tried ({100 * self.tried / max(1, self.pairs):.1f} %),"
+            f" {self.kept} of {self.overlapping} overlapping pairs among them:"
+            f" {100 * (1 - self.recall):.1f} % of the recall lost"
+        )
+
+
+def measure(chosen: Any, overlapping: Any, fragments: int) -> PruningReport:
+    """How much recall a choice of pairs costs.
+
+    Parameters
+    ----------
+    chosen, overlapping : lists or (M, 2) arrays of pairs of fragment numbers, in either order
+        What is to be tried, and what should be found: the pairs of a ground truth, or those that a complete run aligned.
+    fragments : int
+        Number of fragments.
+
+    Examples
+    --------
+    >>> from gpureg import pruning
+    >>> print(pruning.measure([(0, 1), (1, 2)], [(1, 0), (0, 3)], fragments=4))
+    2 of 6 pairs tried (33.3 %), 1 of 2 overlapping pairs among them: 50.0 % of the recall lost
+    """
+    tried, wanted = _as_set(chosen), _as_set(overlapping)
+    return PruningReport(len(tried), fragments * (fragments - 1) // 2, len(tried & wanted), len(wanted))
+
+
+def _as_set(pairs: Any) -> "set[Tuple[int, int]]":
+    return {(min(int(i), int(j)), max(int(i), int(j))) for i, j in pairs}
+
+
+__all__ = ["Nearest", "PruningReport", "describe", "describe_all", "learn_words", "measure", "nearest_pairs"]

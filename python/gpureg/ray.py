@@ -1,0 +1,126 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""register_all on a Ray cluster: an actor per GPU, or per share of the CPUs, each with fragments of its own in memory.
+
+Scheduling, retries and placement are Ray's. What comes out does not depend on them: the files are, byte for byte, those of
+`gpureg.register_all` on one machine.
+"""
+
+from __future__ import annotations
+
+import os
+import time
+from pathlib import Path
+from typing import Any, Dict, List, Optional, Tuple, Union
+
+try:
+    import ray
+    from ray.util import ActorPool
+except ImportError as error:
+    raise ImportError("gpureg.ray needs Ray: pip install 'gpureg[ray]'") from error
+
+from ._core import Context, RegistrationOptions
+from ._plan import Plan
+from ._progress import Progress, batch_progress
+from ._residency import Residency
+from ._store import Row, Store
+from .batch import CHUNK, MEMORY, BatchRun, conclude, make_plan, run_chunk
+
+_DEATHS = 16  # of one actor, before the run gives up: a chunk that kills whoever takes it shall not go on for ever
+
+
+class ChunkWorker:
+    """What an actor does: chunks of a plan, one after another, its fragments resident in between."""
+
+    def __init__(self, plan: Plan, memory: int, threads: int) -> None:
+        context = Context.cpu(threads) if threads else Context.cuda()  # Ray shows an actor its own GPU as device 0
+        self._plan, self._residency = plan, Residency(context, plan.fragments, plan.options, memory)
+
+    def run(self, chunk: int, known: Dict[Any, Row]) -> Tuple[int, List[Row]]:
+        return chunk, run_chunk(self._plan, chunk, self._residency, known)
+
+
+def register_all(
+    fragments: Any,
+    pairs: Any = "all",
+    *,
+    output: Union[str, "os.PathLike[str]"],
+    options: Optional[RegistrationOptions] = None,
+    actors: Optional[int] = None,
+    gpus: Optional[bool] = None,
+    progress: Progress = True,
+    resume: bool = True,
+    chunk_size: int = CHUNK,
+    memory: int = MEMORY,
+) -> BatchRun:
+    """`gpureg.register_all` on the machines of a Ray cluster.
+
+    Connects to the cluster that ``ray.init`` was called for, or that RAY_ADDRESS names; else starts one on this machine.
+    An actor that dies is restarted, and its chunk tried again. The driver writes the files; a run goes on after the driver's
+    death, too, here or with `gpureg.register_all`.
+
+    Parameters
+    ----------
+    fragments, pairs, output, options, progress, resume, chunk_size, memory
+        As for `gpureg.register_all`; memory is per actor. Folders must be where every machine finds them under the same name;
+        clouds in memory travel by Ray's object store.
+    actors : int, optional
+        Default: one per GPU of the cluster, or one per CPU.
+    gpus : bool, optional
+        Whether actors use a GPU each. Default: where the cluster has any.
+
+    Returns
+    -------
+    BatchRun
+
+    Raises
+    ------
+    ray.exceptions.RayActorError
+        Where an actor died more often than can be an accident; what was done is on disk.
+    """
+    begin = time.monotonic()
+    plan = make_plan(fragments, pairs, options, chunk_size)
+    if not ray.is_initialized():
+        ray.init()
+    store = Store(Path(output), plan, resume)
+    workers: List[Any] = []
+    try:
+        finished = store.finished()
+        known = {chunk: store.partial(chunk) for chunk in range(plan.chunks) if chunk not in finished}
+        resumed = sum(len(plan.chunk(chunk)) for chunk in finished) + sum(map(len, known.values()))
+        if known:
+            workers = _start(plan, memory, actors, gpus)
+            done = sum(len(plan.chunk(chunk)) for chunk in finished)
+            with batch_progress(progress, "aligning", len(plan.pairs), done) as report:
+                pool = ActorPool(workers)
+                for chunk, rows in pool.map_unordered(lambda worker, task: worker.run.remote(*task), list(known.items())):
+                    store.write(chunk, rows)
+                    done += len(rows)
+                    if report is not None:
+                        report(done)
+        return conclude(store, plan, resumed, begin)
+    finally:
+        for worker in workers:
+            ray.kill(worker)
+        store.close()
+
+
+def _start(plan: Plan, memory: int, actors: Optional[int], gpus: Optional[bool]) -> List[Any]:
+    resources = ray.cluster_resources()
+    cpus, devices = float(resources.get("CPU", 1)), int(resources.get("GPU", 0))
+    if gpus is None:
+        gpus = devices > 0
+    count = actors or (devices if gpus else int(cpus)) or 1
+    if count < 1:
+        raise ValueError(f"actors is {actors}, expected 1 or more")
+    share = cpus / count
+    limits: Dict[str, Any] = {"max_restarts": _DEATHS, "max_task_retries": _DEATHS}
+    if gpus:
+        limits.update(num_gpus=min(1, devices / count), num_cpus=min(1.0, share))
+    else:
+        limits.update(num_cpus=int(share) if share >= 1 else share)
+    shared = ray.put(plan)
+    actor = ray.remote(ChunkWorker).options(**limits)
+    return [actor.remote(shared, memory, 0 if gpus else max(1, int(share))) for _ in range(count)]
+
+
+__all__ = ["register_all"]

@@ -1,0 +1,62 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The examples run, and are typed."""
+
+import pathlib
+import subprocess
+import sys
+
+import pytest
+from scenes import moved, room
+
+import gpureg
+
+FOLDER = pathlib.Path(__file__).parents[1] / "examples"
+
+
+def run(name, *arguments):
+    done = subprocess.run([sys.executable, FOLDER / name, *map(str, arguments)], capture_output=True, text=True)
+    assert done.returncode == 0, done.stdout + done.stderr
+    return done.stdout
+
+
+@pytest.fixture()
+def scans(tmp_path, source, truth):
+    folder = tmp_path / "scans"
+    folder.mkdir()
+    gpureg.write_point_cloud(folder / "cloud_bin_0.ply", source)
+    gpureg.write_point_cloud(folder / "cloud_bin_1.ply", moved(source, truth))
+    gpureg.write_point_cloud(folder / "cloud_bin_2.ply", room(5))
+    return folder
+
+
+def test_register_two_clouds(scans, tmp_path):
+    pytest.importorskip("matplotlib")
+    picture = tmp_path / "picture.png"
+    shown = run("register_two_clouds.py", scans / "cloud_bin_0.ply", scans / "cloud_bin_1.ply", "--picture", picture)
+    assert "aligned" in shown and picture.read_bytes().startswith(b"\x89PNG")
+
+
+def test_batch_folder(scans, tmp_path):
+    pytest.importorskip("pyarrow")
+    shown = run("batch_folder.py", scans, "--output", tmp_path / "run", "--hypotheses", 20000)
+    assert shown.startswith("3 pairs, ") and "   1 into    0: aligned" in shown
+
+
+def test_many_fragments():
+    pytest.importorskip("faiss")
+    shown = run("many_fragments.py", "--fragments", 24, "--neighbors", 4, "--hypotheses", 500, "--quiet")
+    assert "of the recall lost" in shown and "MiB at most" in shown
+
+
+def test_own_features():
+    pytest.importorskip("torch")
+    assert "aligned" in run("own_features.py")
+
+
+@pytest.mark.parametrize("path", sorted(FOLDER.glob("*.py")), ids=lambda path: path.name)
+def test_mypy_strict(path):
+    pytest.importorskip("mypy")
+    from test_stubs import ROOT
+    from test_stubs import run as run_module
+
+    run_module("mypy", "--config-file", str(ROOT / "pyproject.toml"), str(path))

@@ -1,0 +1,95 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""A real Ray cluster on this machine: any number of actors, also dying ones, gives the table of one machine."""
+
+import os
+import pathlib
+import signal
+import sys
+
+import pytest
+
+pytest.importorskip("pyarrow")
+ray = pytest.importorskip("ray")
+
+import many  # noqa: E402
+from scenes import few  # noqa: E402
+
+import gpureg  # noqa: E402
+import gpureg.ray  # noqa: E402
+
+
+@pytest.fixture(scope="module", autouse=True)
+def cluster():
+    paths = os.pathsep.join(p for p in sys.path if p)
+    ray.init(num_cpus=4, include_dashboard=False, configure_logging=False, log_to_driver=False, runtime_env={"env_vars": {"PYTHONPATH": paths}})
+    yield
+    ray.shutdown()
+
+
+def scene():
+    return many.fragments()[:20], {"options": few(3000, 0.08), "chunk_size": 10, "progress": False}
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory):
+    clouds, keywords = scene()
+    return gpureg.register_all(clouds, output=tmp_path_factory.mktemp("one"), **keywords)
+
+
+def files_of(run):
+    return [path.read_bytes() for path in (run.parquet, run.log, run.information)]
+
+
+@pytest.mark.parametrize("actors", [1, 2, 4])
+def test_any_number_of_actors(whole, tmp_path, actors):
+    clouds, keywords = scene()
+    run = gpureg.ray.register_all(clouds, output=tmp_path, actors=actors, **keywords)
+    assert run.pairs == 190 and run.resumed == 0
+    assert files_of(run) == files_of(whole)
+
+
+def workers():
+    """Process ids of the actors that are in the middle of a chunk: Ray writes that into their titles."""
+    found = []
+    for path in pathlib.Path("/proc").glob("[0-9]*/cmdline"):
+        try:
+            if path.read_bytes().startswith(b"ray::ChunkWorker.run"):
+                found.append(int(path.parent.name))
+        except OSError:
+            pass  # gone meanwhile
+    return found
+
+
+def test_an_actor_is_killed_midway(whole, tmp_path):
+    clouds, keywords = scene()
+    killed = []
+
+    def progress(done, total):
+        if 30 <= done < total and not killed:
+            busy = workers()
+            if busy:
+                os.kill(busy[0], signal.SIGKILL)
+                killed.append(busy[0])
+
+    run = gpureg.ray.register_all(clouds, output=tmp_path, actors=2, **{**keywords, "progress": progress})
+    assert killed
+    assert files_of(run) == files_of(whole)
+
+
+def test_either_goes_on_where_the_other_stopped(whole, tmp_path):
+    clouds, keywords = scene()
+
+    def stop(done, total):
+        if done >= 50:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        gpureg.register_all(clouds, output=tmp_path, **{**keywords, "progress": stop})
+    run = gpureg.ray.register_all(clouds, output=tmp_path, **keywords)
+    assert run.resumed >= 50 and files_of(run) == files_of(whole)
+
+
+def test_errors_come_out(tmp_path):
+    missing = gpureg.FragmentSet.from_clouds([[[0.0, 0, 0]], [[1.0, 2]]])
+    with pytest.raises(ValueError, match=r"fragments\[1\]: expected shape \(N, 3\), got \(1, 2\)"):
+        gpureg.ray.register_all(missing, output=tmp_path, progress=False)
