@@ -35,7 +35,7 @@ struct BatchOptions {
 
   RegistrationOptions registration() const {
     RegistrationOptions options = method.registration();
-    if (min_score) options.score.min_inlier_ratio = *min_score;
+    if (min_score) options.score.min_inlier_ratio = *min_score, options.min_confidence = *min_score;
     options.validate();
     return options;
   }

@@ -24,8 +24,8 @@ void MethodOptions::add_to(CLI::App& verb) {
   verb.add_option("--voxel-size", voxel_size,
                   "Edge of the downsampling voxel in metres; every other length follows from it")
       ->capture_default_str();
-  verb.add_option("--preset", preset, "default, or loopsmart: the paper's algorithm, no refinement")
-      ->check(CLI::IsMember({"default", "loopsmart", "evidence"}))
+  verb.add_option("--preset", preset, "default: poses from compatible matches, judged by evidence; loopsmart: the paper's algorithm")
+      ->check(CLI::IsMember({"default", "loopsmart"}))
       ->capture_default_str();
   verb.add_option("--backend", backend, "auto: CUDA where there is a device, else the CPU")
       ->check(CLI::IsMember({"auto", "cpu", "cuda"}))
@@ -34,7 +34,7 @@ void MethodOptions::add_to(CLI::App& verb) {
       ->check(natural_number())
       ->capture_default_str();
   verb.add_option("--hypotheses", hypotheses,
-                  "Quadruples of matches tried per pair: fewer are faster, more find less overlap")
+                  "Quadruples of matches that the preset loopsmart tries per pair")
       ->check(natural_number())
       ->capture_default_str();
   verb.add_option("--seed", seed, "Same seed, same result, on any machine")
@@ -45,7 +45,6 @@ void MethodOptions::add_to(CLI::App& verb) {
 RegistrationOptions MethodOptions::registration() const {
   RegistrationOptions options = preset == "loopsmart"
                                     ? RegistrationOptions::loopsmart(voxel_size)
-                                : preset == "evidence" ? RegistrationOptions::by_evidence(voxel_size)
                                     : RegistrationOptions::from_voxel_size(voxel_size);
   options.hypothesis.count = hypotheses;
   options.hypothesis.seed = seed;

@@ -65,6 +65,13 @@ std::string figure(const std::string& title, const std::string& content) {
   return "<figure><figcaption>" + escaped(title) + "</figcaption>\n" + content + "</figure>\n";
 }
 
+// From which score on pairs were reported.
+auto threshold(const ResultFile& result) {
+  const bool quadruples = text_of(result.document, "/options/hypothesis/proposal") == "quadruples";
+  return number_of(result.document,
+                   quadruples ? "/options/score/min_inlier_ratio" : "/options/min_confidence");
+}
+
 std::string truth_plots(const ResultFile& result, const evaluation::GroundTruth& truth,
                         const evaluation::Evaluation& e) {
   std::vector<Curve> curves;
@@ -83,7 +90,7 @@ std::string truth_plots(const ResultFile& result, const evaluation::GroundTruth&
                 curve_plot(curves, "recall in %", "precision in %")) +
          figure("Scores of the best candidates",
                 histogram_plot({right, wrong}, "score",
-                               number_of(result.document, "/options/score/min_inlier_ratio"))) +
+                               threshold(result))) +
          "</div>\n";
 }
 
@@ -93,7 +100,7 @@ std::string score_plot(const ResultFile& result) {
     if (pair.transform) (pair.aligned ? aligned : rejected).values.push_back(pair.score);
   return figure("Scores of the best candidates",
                 histogram_plot({aligned, rejected}, "score",
-                               number_of(result.document, "/options/score/min_inlier_ratio")));
+                               threshold(result)));
 }
 
 // Means of the objects "ms" in a list, in the order of the stages.

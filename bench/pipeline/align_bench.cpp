@@ -21,7 +21,7 @@ void report_each(benchmark::State& state, const std::vector<RegistrationResult>&
 }
 
 RegistrationOptions preset(const std::string& name) {
-  if (name == "evidence") return RegistrationOptions::by_evidence(0.05f);
+  if (name == "evidence") return RegistrationOptions::from_voxel_size(0.05f);
   return name == "loopsmart" ? RegistrationOptions::loopsmart() : RegistrationOptions::from_voxel_size(0.05f);
 }
 

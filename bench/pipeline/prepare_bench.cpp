@@ -27,7 +27,7 @@ void report(benchmark::State& state, const std::vector<PreparedCloud>& clouds, s
 }
 
 RegistrationOptions preset(const std::string& name) {
-  return name == "evidence" ? RegistrationOptions::by_evidence(0.05f) : RegistrationOptions::loopsmart();
+  return name == "evidence" ? RegistrationOptions::from_voxel_size(0.05f) : RegistrationOptions::loopsmart();
 }
 
 /// All fragments of the scene from host memory in one call.

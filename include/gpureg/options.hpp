@@ -14,9 +14,9 @@ struct PrepareOptions {
   float search_distance = 0.075f;  ///< farthest neighbour that alignment will ever ask this cloud for
   /// Neighbourhood of a second FPFH, matched beside the first (only where the features are FPFH); 0: none (paper: none). Wide features
   /// find matches where small neighbourhoods look alike: floors, walls.
-  float wide_feature_radius = 0.0f;
+  float wide_feature_radius = 0.4f;
   /// Viewpoints that depth maps are made of for free-space tests, evenly chosen among the cloud's; 0: no maps. 110 KB each.
-  std::uint32_t depth_maps = 0;
+  std::uint32_t depth_maps = 10;
 
   /// Throws InvalidArgument naming field and value.
   void validate() const;
@@ -28,9 +28,12 @@ enum class Proposal : std::uint8_t {
   compatibility   ///< second-order spatial compatibility of matches (SC2-PCR, Chen et al. 2022), judged by evidence
 };
 
-/// Where hypotheses come from: uniform quadruples of cached feature matches (paper, Algorithm 1).
+const char* to_string(Proposal proposal);
+
+/// Where hypotheses come from. All but proposal, smaller_as_source and seed are of Proposal::quadruples: uniform quadruples of cached
+/// feature matches (paper, Algorithm 1).
 struct HypothesisOptions {
-  Proposal proposal = Proposal::quadruples;
+  Proposal proposal = Proposal::compatibility;
   std::uint32_t count = 4'000'000;     ///< quadruples drawn per pair (paper: 4,000,000); at most 2^30
   std::uint32_t neighbors = 1;         ///< nearest features kept per source point, 1..16 (paper: 1)
   bool mutual = false;                 ///< keep only matches that are nearest in both directions
@@ -104,12 +107,10 @@ struct RegistrationOptions {
   RefineOptions refine;
   double min_confidence = 0.5;  ///< Proposal::compatibility: confidence below which no alignment is reported, [0, 1]
 
-  /// Every radius from the voxel size: normals 2 v, FPFH 5 v, correspondence distance 1.5 v, kernel 0.5 v.
+  /// Every length from the voxel size: normals 2 v, FPFH 5 v and 8 v, correspondence distance 1.5 v, kernel 0.5 v, compatibility 1 v,
+  /// free-space margin 2.4 v.
   /// Throws InvalidArgument unless v is finite and > 0.
   static RegistrationOptions from_voxel_size(float voxel_size);
-
-  /// from_voxel_size(v) with candidates from compatible matches, judged by evidence.
-  static RegistrationOptions by_evidence(float voxel_size);
 
   /// The paper's algorithm with the paper's numbers (Zhang and Chen, LoopSmart, section III): 4,000,000 quadruples, no refinement.
   static RegistrationOptions loopsmart();

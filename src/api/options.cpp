@@ -12,6 +12,8 @@ bool length(float v) { return positive(v) && v <= kLongest && v >= 1e-6f; }
 constexpr const char* kLength = "a length in [1e-6, 1e6]";
 }  // namespace
 
+const char* to_string(Proposal proposal) { return proposal == Proposal::quadruples ? "quadruples" : "compatibility"; }
+
 void PrepareOptions::validate() const {
   require(voxel_size == 0.0f || length(voxel_size), "prepare.voxel_size", voxel_size, "0 or a length in [1e-6, 1e6]");
   require(length(normal_radius), "prepare.normal_radius", normal_radius, kLength);
@@ -95,14 +97,7 @@ RegistrationOptions RegistrationOptions::from_voxel_size(float voxel_size) {
   o.score.max_correspondence_distance = 1.5f * voxel_size;
   o.refine.max_correspondence_distance = 1.5f * voxel_size;
   o.refine.kernel_width = 0.5f * voxel_size;
-  return o;
-}
-
-RegistrationOptions RegistrationOptions::by_evidence(float voxel_size) {
-  RegistrationOptions o = from_voxel_size(voxel_size);
   o.prepare.wide_feature_radius = 8.0f * voxel_size;
-  o.prepare.depth_maps = 10;
-  o.hypothesis.proposal = Proposal::compatibility;
   o.compatibility.tolerance = voxel_size;
   o.compatibility.consensus_distance = 2.0f * voxel_size;
   o.compatibility.seed_separation = 2.0f * voxel_size;
@@ -116,6 +111,9 @@ RegistrationOptions RegistrationOptions::loopsmart() { return loopsmart(0.05f); 
 
 RegistrationOptions RegistrationOptions::loopsmart(float voxel_size) {
   RegistrationOptions o = from_voxel_size(voxel_size);
+  o.prepare.wide_feature_radius = 0;
+  o.prepare.depth_maps = 0;
+  o.hypothesis.proposal = Proposal::quadruples;
   o.refine.max_iterations = 0;
   return o;
 }

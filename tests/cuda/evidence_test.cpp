@@ -75,7 +75,7 @@ class EvidenceOnCuda : public ::testing::Test {
   std::vector<std::vector<Vec3>> kept;
   std::vector<Vec3> viewpoints;
   std::vector<PairOfClouds> pairs;
-  RegistrationOptions options = RegistrationOptions::by_evidence(0.05f);
+  RegistrationOptions options = RegistrationOptions::from_voxel_size(0.05f);
 };
 
 /// Prepares the clouds and aligns the pairs on both backends; every product is compared.

@@ -215,7 +215,7 @@ TEST_F(PrepareOnCuda, NormalsViewpointsAndFeaturesOfTheCaller) {
   with_views.viewpoints = &viewpoints[0].x, with_views.viewpoint_count = viewpoints.size();
   with_features.features = features.data(), with_features.feature_dimension = dimension, with_features.feature_stride = dimension + 2;
   expect_same_preparation({plain, with_normals, with_views, with_features}, options);
-  options = RegistrationOptions::by_evidence(0.05f).prepare;
+  options = RegistrationOptions::from_voxel_size(0.05f).prepare;
   expect_same_preparation({plain, with_normals, with_views, with_features}, options);
   options.depth_maps = 64;
   options.wide_feature_radius = options.feature_radius;
@@ -232,7 +232,7 @@ TEST_F(PrepareOnCuda, WideFeaturesAndDepthMaps) {
   for (int k = 0; k < 7; ++k) viewpoints.push_back(test::random_unit(random) * 3.0f);
   viewpoints.push_back((*kept[0])[5]);  // in the midst of the points, and on one of them
   for (std::size_t c = 0; c < raw.size(); c += 2) raw[c].viewpoints = &viewpoints[0].x, raw[c].viewpoint_count = viewpoints.size() - c;
-  options = RegistrationOptions::by_evidence(0.05f).prepare;
+  options = RegistrationOptions::from_voxel_size(0.05f).prepare;
   for (const std::uint32_t maps : {1u, 3u, 10u}) {
     options.depth_maps = maps;
     expect_same_preparation(raw, options);
@@ -280,7 +280,7 @@ TEST_F(PrepareOnCuda, RedKitchenFragments) {
     raw.push_back(one);
   }
   expect_same_preparation(raw, options);
-  expect_same_preparation(raw, RegistrationOptions::by_evidence(0.05f).prepare);
+  expect_same_preparation(raw, RegistrationOptions::from_voxel_size(0.05f).prepare);
 }
 
 TEST_F(PrepareOnCuda, FgrRangePairs) {

@@ -86,7 +86,7 @@ TEST(RedKitchenOnCuda, AllPairsByEvidenceAreTheCpus) {
   for (const PointCloud& cloud : raw) views.push_back(cloud.view());
   const std::vector<Pair> pairs = all_pairs(raw.size());
   ASSERT_EQ(pairs.size(), 190u);
-  RegistrationOptions options = RegistrationOptions::by_evidence(0.05f);
+  RegistrationOptions options = RegistrationOptions::from_voxel_size(0.05f);
   const Context cpu = Context::cpu(), cuda = Context::cuda();
   const auto on_cpu = prepare_batch(cpu, views, options.prepare), on_cuda = prepare_batch(cuda, views, options.prepare);
   for (const std::uint64_t seed : {1, 2}) {
