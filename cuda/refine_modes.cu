@@ -1,16 +1,16 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "algorithm/evidence.hpp"
 #include "block_sum.cuh"
+#include "closest_cells.cuh"
 #include "stages.hpp"
 
 namespace gpureg::cuda {
 namespace {
 
-constexpr int kThreads = 256;
 constexpr std::uint32_t kMostModes = 64;
 
 struct RefineModes {
-  const PairView* pairs;
+  const SearchPair* pairs;
   std::uint32_t most;
   Mode* modes;
   std::uint32_t* count;
@@ -19,11 +19,11 @@ struct RefineModes {
 };
 
 /// Terms of one source point, weighed by its normal's direction.
-__device__ void add_point(const PairView& pair, const RefineModes& r, float kernel_width, const Rigid& rigid, float inverse_radius, std::uint32_t i,
+__device__ void add_point(const SearchPair& pair, const RefineModes& r, float kernel_width, const Rigid& rigid, float inverse_radius, std::uint32_t i,
                           IcpSums& sums) {
   const CloudView &s = pair.source, &t = pair.target;
   const Vec3 q = apply(rigid, s.points[i]);
-  const Closest c = find_closest(t.closest, t.points, q, r.max_distance * r.max_distance);
+  const Closest c = find_closest(t, pair.target_cells, q, r.max_distance * r.max_distance);
   if (c.index == kNoValue) return;
   const Vec3 normal = t.normals[c.index];
   if (is_zero(normal) || !normals_agree(rotate(rigid, s.normals[i]), normal, r.min_cosine)) return;
@@ -33,12 +33,13 @@ __device__ void add_point(const PairView& pair, const RefineModes& r, float kern
 }
 
 /// A thread block per mode runs all its iterations: on a sample, then on all points with a narrower kernel.
+template <int kThreads>
 __global__ void __launch_bounds__(kThreads) refine(RefineModes r) {
   __shared__ std::int64_t scratch[kThreads / 32 * 27];
   __shared__ Pose<double> pose;
   __shared__ bool done;
   if (blockIdx.x >= r.count[blockIdx.y]) return;
-  const PairView& pair = r.pairs[blockIdx.y];
+  const SearchPair& pair = r.pairs[blockIdx.y];
   Mode& mode = r.modes[static_cast<std::size_t>(blockIdx.y) * r.most + blockIdx.x];
   const float inverse_radius = 1.0f / pair.source.radius;
   const std::uint32_t size = pair.source.size;
@@ -91,13 +92,15 @@ __global__ void __launch_bounds__(32) merge(RefineModes r, float min_trace, floa
 
 void refine_modes(Exec& exec, Span<const PairView> pairs, Modes& modes, const EvidenceOptions& evidence, const RefineOptions& options) {
   static_assert(kMostModes >= 64, "as many as EvidenceOptions::modes may be");
-  const auto views = exec.upload(pairs.data, pairs.size);
+  const auto views = upload_search_pairs(exec, pairs);
   const RefineModes batch{views.data(), modes.most, modes.mode.data(), modes.count.data(), evidence.sample, options.max_iterations,
                           options.max_correspondence_distance, options.kernel_width,
                           inlier_test(options.max_correspondence_distance, kRefineNormalAngle).min_cosine};
   const unsigned pair_count = static_cast<unsigned>(pairs.size);
   if (options.max_iterations > 0) {
-    refine<<<dim3(modes.most, pair_count), kThreads, 0, exec.stream()>>>(batch);
+    // Small blocks hide each other's solving; where there are too few to fill the device, large ones are done sooner.
+    const bool few = std::size_t(modes.most) * pairs.size < static_cast<std::size_t>(exec.multiprocessors()) * 2;
+    (few ? refine<512> : refine<128>)<<<dim3(modes.most, pair_count), few ? 512 : 128, 0, exec.stream()>>>(batch);
     check_launch("refine");
   }
   merge<<<pair_count, 32, 0, exec.stream()>>>(batch, mode_trace(evidence.mode_angle), evidence.mode_distance * evidence.mode_distance);

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "algorithm/evidence.hpp"
+#include "closest_cells.cuh"
 #include "stages.hpp"
 #include "warp.cuh"
 
@@ -9,7 +10,7 @@ namespace {
 constexpr int kWarps = 4;  // candidates per thread block
 
 /// Weight of the points that the sample of each cloud looks at: a thread block per cloud (x: pair, y: source or target).
-__global__ void __launch_bounds__(256) sampled_weight(const PairView* pairs, std::uint32_t sample, unsigned long long* out) {
+__global__ void __launch_bounds__(256) sampled_weight(const SearchPair* pairs, std::uint32_t sample, unsigned long long* out) {
   __shared__ unsigned long long sum;
   const CloudView& cloud = blockIdx.y == 0 ? pairs[blockIdx.x].source : pairs[blockIdx.x].target;
   const std::uint32_t stride = sample_stride(cloud.size, sample);
@@ -23,11 +24,13 @@ __global__ void __launch_bounds__(256) sampled_weight(const PairView* pairs, std
 }
 
 /// One side of one candidate, by a warp: what promise() reads of it.
-__device__ SideEvidence weigh_sample(const CloudView& moved, const CloudView& other, const Rigid& pose, const EvidenceTest& test, std::uint32_t sample) {
+__device__ SideEvidence weigh_sample(const CloudView& moved, const CloudView& other, const CellSummaries& cells, const Rigid& pose, const EvidenceTest& test, std::uint32_t sample) {
   SideEvidence e{};
   const std::uint32_t stride = sample_stride(moved.size, sample), maps = quick_maps(other.visibility);
-  for (std::uint64_t i = std::uint64_t(threadIdx.x % 32) * stride; i < moved.size; i += 32ull * stride)
-    weigh_point(moved, other, pose, test, maps, static_cast<std::uint32_t>(i), e);
+  for (std::uint64_t i = std::uint64_t(threadIdx.x % 32) * stride; i < moved.size; i += 32ull * stride) {
+    const Vec3 q = apply(pose, moved.points[i]);
+    weigh_found(moved, other, pose, test, maps, static_cast<std::uint32_t>(i), q, find_closest(other, cells, q, test.inlier.max_squared), e);
+  }
   e.balanced = static_cast<std::uint64_t>(warp_sum(static_cast<std::int64_t>(e.balanced)));
   e.seen = warp_sum(e.seen);
   e.before = warp_sum(e.before);
@@ -41,7 +44,7 @@ __device__ float smaller_share(const MatchEvidence& m, const std::uint64_t* tota
 }
 
 /// A warp per candidate.
-__global__ void __launch_bounds__(32 * kWarps) weigh(const PairView* pairs, const std::uint64_t* match_total, const unsigned long long* weight,
+__global__ void __launch_bounds__(32 * kWarps) weigh(const SearchPair* pairs, const std::uint64_t* match_total, const unsigned long long* weight,
                                                      std::uint32_t most, const std::uint32_t* count, const Pose<float>* pose,
                                                      const MatchEvidence* matches, EvidenceTest test, std::uint32_t sample, float* out) {
   const std::uint32_t p = blockIdx.y, c = blockIdx.x * kWarps + threadIdx.x / 32;
@@ -49,7 +52,7 @@ __global__ void __launch_bounds__(32 * kWarps) weigh(const PairView* pairs, cons
   const std::size_t at = static_cast<std::size_t>(p) * most + c;
   const CloudView &s = pairs[p].source, &t = pairs[p].target;
   const Rigid there = to_rigid(pose[at]), back = inverse(there);
-  const SideEvidence a = weigh_sample(s, t, there, test, sample), b = weigh_sample(t, s, back, test, sample);
+  const SideEvidence a = weigh_sample(s, t, pairs[p].target_cells, there, test, sample), b = weigh_sample(t, s, pairs[p].source_cells, back, test, sample);
   if (threadIdx.x % 32 == 0)
     out[at] = promise(smaller_share(matches[at], match_total + 2 * p), a, static_cast<float>(weight[2 * p]), b, static_cast<float>(weight[2 * p + 1]));
 }
@@ -60,7 +63,7 @@ void weigh_candidates(Exec& exec, Span<const PairView> pairs, const MatchSets& m
                       const ScoreOptions& score) {
   const std::uint32_t most = std::min(candidates.most, matches.room.largest);
   if (most == 0) return;
-  const auto views = exec.upload(pairs.data, pairs.size);
+  const auto views = upload_search_pairs(exec, pairs);
   const auto weight = exec.buffer<unsigned long long>(2 * pairs.size);
   const unsigned pair_count = static_cast<unsigned>(pairs.size);
   sampled_weight<<<dim3(pair_count, 2), 256, 0, exec.stream()>>>(views.data(), options.sample, weight.data());

@@ -3,6 +3,7 @@
 
 #include "algorithm/evidence.hpp"
 #include "block_sum.cuh"
+#include "closest_cells.cuh"
 #include "stages.hpp"
 
 namespace gpureg::cuda {
@@ -11,7 +12,7 @@ namespace {
 constexpr int kThreads = 256;
 
 struct WeighModes {
-  const PairView* pairs;
+  const SearchPair* pairs;
   MatchSetView matches;
   const std::uint32_t *room, *match_count;
   std::uint32_t most;
@@ -61,7 +62,10 @@ __global__ void __launch_bounds__(kThreads) weigh(WeighModes w) {
   SideEvidence side{};
   if (blockIdx.z == 1) {
     const Rigid back = inverse(there);
-    for (std::uint32_t i = threadIdx.x; i < t.size; i += kThreads) weigh_point(t, s, back, w.test, s.visibility.count, i, side);
+    for (std::uint32_t i = threadIdx.x; i < t.size; i += kThreads) {
+      const Vec3 q = apply(back, t.points[i]);
+      weigh_found(t, s, back, w.test, s.visibility.count, i, q, find_closest(s, w.pairs[p].source_cells, q, w.test.inlier.max_squared), side);
+    }
     side = of_block(side, scratch);
     if (threadIdx.x == 0) out.target = side;
     return;
@@ -69,7 +73,9 @@ __global__ void __launch_bounds__(kThreads) weigh(WeighModes w) {
   InformationSums information{};
   Moments source{}, target{};
   for (std::uint32_t i = threadIdx.x; i < s.size; i += kThreads) {
-    const Weighed found = weigh_point(s, t, there, w.test, t.visibility.count, i, side);
+    const Vec3 q = apply(there, s.points[i]);
+    const Weighed found =
+        weigh_found(s, t, there, w.test, t.visibility.count, i, q, find_closest(t, w.pairs[p].target_cells, q, w.test.inlier.max_squared), side);
     if (found.inlier) add_information(s, there, i, information);
     if (found.closest == kNoValue) continue;
     add_moment(s.points[i] * (1.0f / s.radius), source);
@@ -95,7 +101,7 @@ __global__ void __launch_bounds__(kThreads) weigh(WeighModes w) {
 
 void weigh_modes(Exec& exec, Span<const PairView> pairs, const MatchSets& matches, const Candidates& candidates, const Modes& modes,
                  const RegistrationOptions& options, Span<PairOutcome> outcomes) {
-  const auto views = exec.upload(pairs.data, pairs.size);
+  const auto views = upload_search_pairs(exec, pairs);
   // Filled: what no mode is written to is copied along.
   const auto weighed = exec.filled<ModeOutcome>(pairs.size * modes.most, 0);
   const auto& score = options.score;

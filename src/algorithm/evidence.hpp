@@ -43,11 +43,10 @@ struct Weighed {
   bool inlier;
 };
 
-/// One point of `moved` under the pose, against the other cloud; maps: how many of its viewpoints are asked.
-GPUREG_HD Weighed weigh_point(const CloudView& moved, const CloudView& other, const Rigid& pose, const EvidenceTest& test, std::uint32_t maps,
-                           std::uint32_t i, SideEvidence& e) {
-  const Vec3 q = apply(pose, moved.points[i]);
-  const Closest c = find_closest(other.closest, other.points, q, test.inlier.max_squared);
+/// One point of `moved` under the pose, against the other cloud; maps: how many of its viewpoints are asked. q: the moved point, c: what
+/// is closest to it.
+GPUREG_HD Weighed weigh_found(const CloudView& moved, const CloudView& other, const Rigid& pose, const EvidenceTest& test, std::uint32_t maps,
+                           std::uint32_t i, Vec3 q, Closest c, SideEvidence& e) {
   const bool hit = c.index != kNoValue;
   const bool inlier = hit && normals_agree(rotate(pose, moved.normals[i]), other.normals[c.index], test.inlier.min_cosine);
   bool seen = false, before = false, surface = false;
@@ -67,6 +66,12 @@ GPUREG_HD Weighed weigh_point(const CloudView& moved, const CloudView& other, co
   e.before += before ? 1u : 0u;
   e.hidden += (seen & !before & !surface & !hit) ? 1u : 0u;
   return {c.index, inlier};
+}
+
+GPUREG_HD Weighed weigh_point(const CloudView& moved, const CloudView& other, const Rigid& pose, const EvidenceTest& test, std::uint32_t maps,
+                           std::uint32_t i, SideEvidence& e) {
+  const Vec3 q = apply(pose, moved.points[i]);
+  return weigh_found(moved, other, pose, test, maps, i, q, find_closest(other.closest, other.points, q, test.inlier.max_squared), e);
 }
 
 GPUREG_HD void add_information(const CloudView& moved, const Rigid& pose, std::uint32_t i, InformationSums& sums) {

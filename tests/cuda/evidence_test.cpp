@@ -166,6 +166,17 @@ TEST_F(EvidenceOnCuda, Default) {
   expect_same();
 }
 
+TEST_F(EvidenceOnCuda, SmallSheets) {
+  for (const std::size_t size : {2000u, 3000u}) {
+    std::mt19937 same_shape(5);
+    keep(test::bumpy_sheet(same_shape, size, 0.9f));
+  }
+  pairs = {{0, 1, {}, {}}, {1, 0, {}, {}}};
+  options.compatibility.seeds = 100, options.compatibility.triangles = 200;
+  options.evidence.sample = 64, options.evidence.modes = 4;
+  expect_same();
+}
+
 TEST_F(EvidenceOnCuda, OtherSeedWithoutWideFeaturesOrMaps) {
   keep_scene(), all_pairs();
   options.hypothesis.seed = 0x123456789abcdefull;

@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <vector>
+
+#include "exec.hpp"
+#include "products.hpp"
+
+namespace gpureg::cuda {
+
+/// A pair with the tables by which both clouds are searched.
+struct SearchPair {
+  CloudView source, target;
+  CellSummaries source_cells, target_cells;
+};
+
+inline DeviceBuffer<SearchPair> upload_search_pairs(Exec& exec, Span<const PairView> pairs) {
+  std::vector<SearchPair> out;
+  for (const PairView& pair : pairs)
+    out.push_back({pair.source, pair.target, static_cast<const CudaCloud*>(pair.source.executor_data)->summaries,
+                   static_cast<const CudaCloud*>(pair.target.executor_data)->summaries});
+  return exec.upload(out);
+}
+
+/// What find_closest() finds, with a table of blocks instead of a hash table, and on copies of the candidates that lie side by side.
+__device__ inline Closest find_closest(const CloudView& cloud, const CellSummaries& cells, Vec3 q, float max_squared) {
+  if (cells.nx == 0) return find_closest(cloud.closest, cloud.points, q, max_squared);
+  const Closest none{kNoValue, max_squared};
+  const float fx = q.x * cloud.closest.inverse_cell_size, fy = q.y * cloud.closest.inverse_cell_size, fz = q.z * cloud.closest.inverse_cell_size;
+  constexpr float kLimit = static_cast<float>(kCellBias) * static_cast<float>(ClosestGridView::kBlockEdge) - 1.0f;
+  if (!(fabsf(fx) < kLimit && fabsf(fy) < kLimit && fabsf(fz) < kLimit)) return none;
+  const std::uint32_t x = static_cast<std::uint32_t>(floor_to_int(fx) + static_cast<std::int32_t>(cells.offset.x));
+  const std::uint32_t y = static_cast<std::uint32_t>(floor_to_int(fy) + static_cast<std::int32_t>(cells.offset.y));
+  const std::uint32_t z = static_cast<std::uint32_t>(floor_to_int(fz) + static_cast<std::int32_t>(cells.offset.z));
+  const std::uint32_t bx = x >> 3, by = y >> 3, bz = z >> 3;
+  const std::uint32_t nx = static_cast<std::uint32_t>(cells.nx), ny = static_cast<std::uint32_t>(cells.ny), nz = static_cast<std::uint32_t>(cells.nz);
+  if (bx >= nx || by >= ny || bz >= nz) return none;
+  const std::uint32_t block = static_cast<std::uint32_t>(__ldg(cells.block + (bz * ny + by) * nx + bx));
+  if (block == 0) return none;
+  const std::uint32_t cell = (z & 7) << 6 | (y & 7) << 3 | (x & 7);
+  const std::uint32_t list = __ldg(cells.list + (static_cast<std::size_t>(block) << 9 | cell));
+  std::uint32_t first = list >> 8, last = first + (list & 255u);
+  if (list == kNoValue) {
+    const std::uint32_t* start = cloud.closest.cell_start.data + static_cast<std::size_t>(block - 1) * (ClosestGridView::kBlockCells + 1) + cell;
+    first = start[0], last = start[1];
+  }
+  std::uint32_t best = kNoValue;
+  float best_squared = 3.402823466e38f;
+  for (std::uint32_t k = first; k < last; ++k) {
+    const float4 c = __ldg(cells.candidate + k);
+    const float d2 = squared_norm(Vec3{c.x, c.y, c.z} - q);
+    const bool less = d2 < best_squared;
+    best = less ? k : best;
+    best_squared = less ? d2 : best_squared;
+  }
+  if (best == kNoValue || !(best_squared <= max_squared)) return none;
+  return {__ldg(cloud.closest.candidates.data + best), best_squared};
+}
+
+}  // namespace gpureg::cuda
