@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "algorithm/evidence.hpp"
-#include "block_sum.cuh"
 #include "closest_cells.cuh"
 #include "stages.hpp"
 
 namespace gpureg::cuda {
 namespace {
 
+constexpr int kSums = 27;  // of IcpSums
 constexpr std::uint32_t kMostModes = 64;
 
 struct RefineModes {
@@ -18,44 +18,83 @@ struct RefineModes {
   float max_distance, kernel_width, min_cosine;
 };
 
-/// Terms of one source point, weighed by its normal's direction.
-__device__ void add_point(const SearchPair& pair, const RefineModes& r, float kernel_width, const Rigid& rigid, float inverse_radius, std::uint32_t i,
-                          IcpSums& sums) {
+/// What one source point adds: turn, normal, weight and residual, see add_icp_term(). False where it has no partner.
+__device__ bool correspondence(const SearchPair& pair, const RefineModes& r, float kernel_width, const Rigid& rigid, float inverse_radius, std::uint32_t i,
+                               float (&row)[8]) {
   const CloudView &s = pair.source, &t = pair.target;
-  const Vec3 q = apply(rigid, s.points[i]);
+  const Vec3 p = s.points[i], q = apply(rigid, p);
   const Closest c = find_closest(t, pair.target_cells, q, r.max_distance * r.max_distance);
-  if (c.index == kNoValue) return;
+  if (c.index == kNoValue) return false;
   const Vec3 normal = t.normals[c.index];
-  if (is_zero(normal) || !normals_agree(rotate(rigid, s.normals[i]), normal, r.min_cosine)) return;
+  if (is_zero(normal) || !normals_agree(rotate(rigid, s.normals[i]), normal, r.min_cosine)) return false;
   const float distance = dot(q - t.points[c.index], normal);
-  add_icp_term(rotate(rigid, s.points[i]) * inverse_radius, normal, distance * (1.0f / r.max_distance),
-               robust_weight(distance, kernel_width) * balance_share(s.balance[i]), sums);
+  const Vec3 turn = cross(rotate(rigid, p) * inverse_radius, normal);
+  row[0] = turn.x, row[1] = turn.y, row[2] = turn.z, row[3] = normal.x, row[4] = normal.y, row[5] = normal.z;
+  row[6] = robust_weight(distance, kernel_width) * balance_share(s.balance[i]);
+  row[7] = distance * (1.0f / r.max_distance);
+  return true;
+}
+
+/// The sums of all points by a thread block. A lane for each of the 27 sums goes through what the warp's points add: the terms of
+/// add_icp_term(), but one register per thread for them instead of 54. rows, partial: shared, for each warp.
+template <int kThreads>
+__device__ void add_up(const SearchPair& pair, const RefineModes& r, float kernel_width, const Rigid& rigid, std::uint32_t stride,
+                       float (*rows)[32][8], std::int64_t (*partial)[kSums], IcpSums& sums) {
+  const std::uint32_t lane = threadIdx.x % 32, warp = threadIdx.x / 32, size = pair.source.size;
+  const float inverse_radius = 1.0f / pair.source.radius;
+  // Sum number k is the product of entries a and b: the lower triangle row by row, then all with the residual.
+  std::uint32_t a = 0, b = lane;
+  while (b > a) b -= ++a;
+  if (lane >= 21) a = lane < kSums ? lane - 21 : 0, b = 7;
+  std::int64_t sum = 0;
+  for (std::uint64_t base = threadIdx.x - lane; base * stride < size; base += kThreads) {
+    const std::uint64_t i = (base + lane) * stride;
+    float row[8];
+    const bool has = i < size && correspondence(pair, r, kernel_width, rigid, inverse_radius, static_cast<std::uint32_t>(i), row);
+    const unsigned mask = __ballot_sync(~0u, has);
+    if (has) {
+      float4* out = reinterpret_cast<float4*>(rows[warp][__popc(static_cast<int>(mask & ((1u << lane) - 1)))]);
+      out[0] = make_float4(row[0], row[1], row[2], row[3]), out[1] = make_float4(row[4], row[5], row[6], row[7]);
+    }
+    __syncwarp();
+    const int count = __popc(static_cast<int>(mask));
+#pragma unroll 4
+    for (int k = 0; k < count; ++k) {
+      const float* one = rows[warp][k];
+      sum += to_icp_fixed(one[6] * one[a] * one[b]);
+    }
+    __syncwarp();
+  }
+  if (lane < kSums) partial[warp][lane] = sum;
+  __syncthreads();
+  if (threadIdx.x < kSums) {
+    std::int64_t total = 0;
+    for (int w = 0; w < kThreads / 32; ++w) total += partial[w][threadIdx.x];
+    sums.v[threadIdx.x] = total;
+  }
+  __syncthreads();
 }
 
 /// A thread block per mode runs all its iterations: on a sample, then on all points with a narrower kernel.
 template <int kThreads>
-__global__ void __launch_bounds__(kThreads) refine(RefineModes r) {
-  __shared__ std::int64_t scratch[kThreads / 32 * 27];
+__global__ void __launch_bounds__(kThreads, 1024 / kThreads) refine(RefineModes r) {
+  __shared__ float rows[kThreads / 32][32][8];
+  __shared__ std::int64_t partial[kThreads / 32][kSums];
+  __shared__ IcpSums sums;
   __shared__ Pose<double> pose;
   __shared__ bool done;
   if (blockIdx.x >= r.count[blockIdx.y]) return;
   const SearchPair& pair = r.pairs[blockIdx.y];
   Mode& mode = r.modes[static_cast<std::size_t>(blockIdx.y) * r.most + blockIdx.x];
-  const float inverse_radius = 1.0f / pair.source.radius;
-  const std::uint32_t size = pair.source.size;
   if (threadIdx.x == 0) pose = mode.pose;
   std::uint32_t total = 0;
   for (int round = 0; round < 2; ++round) {
-    const std::uint32_t stride = round == 0 ? sample_stride(size, 2 * r.sample) : 1;
+    const std::uint32_t stride = round == 0 ? sample_stride(pair.source.size, 2 * r.sample) : 1;
     const float kernel_width = round == 0 ? r.kernel_width : kPolishKernel * r.kernel_width;
     if (threadIdx.x == 0) done = false;
     __syncthreads();
     for (std::uint32_t iterations = 0; !done;) {
-      const Rigid rigid = to_rigid(pose);
-      IcpSums sums{{0}};
-      for (std::uint64_t i = std::uint64_t(threadIdx.x) * stride; i < size; i += std::uint64_t(kThreads) * stride)
-        add_point(pair, r, kernel_width, rigid, inverse_radius, static_cast<std::uint32_t>(i), sums);
-      block_sum(sums.v, scratch);
+      add_up<kThreads>(pair, r, kernel_width, to_rigid(pose), stride, rows, partial, sums);
       ++iterations, ++total;
       if (threadIdx.x == 0) {
         const IcpStep step = solve_icp(sums, pair.source.radius, r.max_distance);
@@ -100,7 +139,7 @@ void refine_modes(Exec& exec, Span<const PairView> pairs, Modes& modes, const Ev
   if (options.max_iterations > 0) {
     // Small blocks hide each other's solving; where there are too few to fill the device, large ones are done sooner.
     const bool few = std::size_t(modes.most) * pairs.size < static_cast<std::size_t>(exec.multiprocessors()) * 2;
-    (few ? refine<512> : refine<128>)<<<dim3(modes.most, pair_count), few ? 512 : 128, 0, exec.stream()>>>(batch);
+    (few ? refine<1024> : refine<256>)<<<dim3(modes.most, pair_count), few ? 1024 : 256, 0, exec.stream()>>>(batch);
     check_launch("refine");
   }
   merge<<<pair_count, 32, 0, exec.stream()>>>(batch, mode_trace(evidence.mode_angle), evidence.mode_distance * evidence.mode_distance);
