@@ -21,7 +21,6 @@ void report_each(benchmark::State& state, const std::vector<RegistrationResult>&
 }
 
 RegistrationOptions preset(const std::string& name) {
-  if (name == "evidence") return RegistrationOptions::from_voxel_size(0.05f);
   return name == "loopsmart" ? RegistrationOptions::loopsmart() : RegistrationOptions::from_voxel_size(0.05f);
 }
 
@@ -110,10 +109,8 @@ void redwood_sized(benchmark::State& state, const std::string& backend) {
 
 BENCHMARK_CAPTURE(align_many, cuda_loopsmart, "cuda", "loopsmart")->Arg(11)->Unit(benchmark::kMillisecond)->UseRealTime();
 BENCHMARK_CAPTURE(align_many, cuda_default, "cuda", "default")->Arg(11)->Unit(benchmark::kMillisecond)->UseRealTime();
-BENCHMARK_CAPTURE(align_many, cuda_evidence, "cuda", "evidence")->Arg(1)->Unit(benchmark::kMillisecond)->UseRealTime();
 BENCHMARK_CAPTURE(align_one, cuda_loopsmart, "cuda", "loopsmart")->Iterations(190)->Unit(benchmark::kMillisecond)->UseRealTime();
 BENCHMARK_CAPTURE(align_one, cuda_default, "cuda", "default")->Iterations(190)->Unit(benchmark::kMillisecond)->UseRealTime();
-BENCHMARK_CAPTURE(align_one, cuda_evidence, "cuda", "evidence")->Iterations(190)->Unit(benchmark::kMillisecond)->UseRealTime();
 BENCHMARK_CAPTURE(raw_to_pose, cuda_loopsmart, "cuda", "loopsmart")->Iterations(100)->Unit(benchmark::kMillisecond)->UseRealTime();
 BENCHMARK_CAPTURE(redwood_sized, cuda, "cuda")->Iterations(1)->Repetitions(3)->Unit(benchmark::kMillisecond)->UseRealTime();
 BENCHMARK_CAPTURE(redwood_sized, cuda_all, "cuda_all")->Iterations(1)->Repetitions(3)->Unit(benchmark::kMillisecond)->UseRealTime();

@@ -27,7 +27,7 @@ void report(benchmark::State& state, const std::vector<PreparedCloud>& clouds, s
 }
 
 RegistrationOptions preset(const std::string& name) {
-  return name == "evidence" ? RegistrationOptions::from_voxel_size(0.05f) : RegistrationOptions::loopsmart();
+  return name == "default" ? RegistrationOptions::from_voxel_size(0.05f) : RegistrationOptions::loopsmart();
 }
 
 /// All fragments of the scene from host memory in one call.
@@ -54,7 +54,7 @@ void prepare_one_fragment(benchmark::State& state, const std::string& backend, c
 }
 
 BENCHMARK_CAPTURE(prepare_batch_of_fragments, cuda, "cuda", "loopsmart")->Unit(benchmark::kMillisecond)->UseRealTime();
-BENCHMARK_CAPTURE(prepare_batch_of_fragments, cuda_evidence, "cuda", "evidence")->Unit(benchmark::kMillisecond)->UseRealTime();
+BENCHMARK_CAPTURE(prepare_batch_of_fragments, cuda_default, "cuda", "default")->Unit(benchmark::kMillisecond)->UseRealTime();
 BENCHMARK_CAPTURE(prepare_one_fragment, cuda, "cuda", "loopsmart")->Unit(benchmark::kMillisecond)->UseRealTime();
 BENCHMARK_CAPTURE(prepare_batch_of_fragments, cpu, "cpu", "loopsmart")->Unit(benchmark::kMillisecond)->UseRealTime();
 
