@@ -40,11 +40,12 @@ class Plan:
     def chunk(self, index: int) -> npt.NDArray[np.int64]:
         """(n, 2) positions i < j."""
         begin = index * self.chunk_size
-        return self.pairs[self.order[begin : begin + self.chunk_size]]
+        return np.asarray(self.pairs[self.order[begin : begin + self.chunk_size]])
 
     def numbers(self, pairs: npt.NDArray[np.int64]) -> npt.NDArray[np.int64]:
         """Positions to the fragments' numbers."""
-        return np.asarray(self.fragments.numbers, np.int64)[pairs]
+        numbers: npt.NDArray[np.int64] = np.asarray(self.fragments.numbers, np.int64)
+        return np.asarray(numbers[pairs])
 
     def manifest(self) -> Dict[str, Any]:
         """What must be the same for a run to go on. Devices and memory may change: they change no result."""
