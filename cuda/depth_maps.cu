@@ -46,7 +46,7 @@ __global__ void erode_maps(MapBatch m) {
 
 }  // namespace
 
-DepthMaps build_depth_maps(Exec& exec, Span<const RawCloud>, const DownsampledClouds& clouds, const PrepareOptions& options) {
+DepthMaps build_depth_maps(Exec& exec, Span<const RawCloud> raw, const DownsampledClouds& clouds, const PrepareOptions& options) {
   const std::size_t entries = clouds.segments.entries();
   DepthMaps out;
   std::vector<Vec3> viewpoints;
@@ -54,7 +54,8 @@ DepthMaps build_depth_maps(Exec& exec, Span<const RawCloud>, const DownsampledCl
   out.offset.push_back(0);
   for (std::size_t c = 0; c < entries; ++c) {
     const std::vector<Vec3>& all = clouds.facts[c].viewpoints;
-    const std::size_t known = clouds.segments.size(c) == 0 ? 0 : all.size(), count = std::min<std::size_t>(known, options.depth_maps);
+    const std::size_t known = clouds.segments.size(c) == 0 ? 0 : all.size();
+    const std::size_t count = map_count(known, options.depth_maps, raw[c].viewpoint_count > 0, raw[c].normals != nullptr);
     for (std::size_t k = 0; k < count; ++k) {
       viewpoints.push_back(all[chosen_viewpoint(k, count, known)]);
       cloud_of_map.push_back(static_cast<std::uint32_t>(c));

@@ -21,7 +21,9 @@ struct PointCloudView {
   std::size_t feature_dimension = 0;   ///< floats per feature, >= 1 where features are given
   std::size_t feature_stride = 0;      ///< floats from one feature to the next; 0: feature_dimension
   const float* viewpoints = nullptr;   ///< optional: viewpoint_count rows of x, y, z (tight): sensor positions in the cloud's frame
-  std::size_t viewpoint_count = 0;     ///< 0: the origin is the only viewpoint
+  /// 0: normals are turned towards the origin, which also counts as the place that the cloud was seen from, unless the cloud brings normals
+  /// of its own: then nothing is known about free space, and no pose is judged by it.
+  std::size_t viewpoint_count = 0;
 
   PointCloudView() = default;
   PointCloudView(const float* xyz, std::size_t count) : points(xyz), size(count) {}

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "bindings.hpp"
+#include "gpureg/options.hpp"
 
 /// Plain structs of the library as Python classes, made from one list of fields each: constructor,
 /// attributes, repr, equality, pickle. A new field of the struct is one new line in its list.
@@ -34,16 +35,25 @@ struct Field {
 
 template <typename M>
 M convert(py::handle value) {
-  // A bool is an int in Python; as a length or a count it is a mistake.
-  if (!std::is_same_v<M, bool> && std::is_arithmetic_v<M> && PyBool_Check(value.ptr()))
+  if constexpr (std::is_same_v<M, Proposal>) {
+    const auto text = value.cast<std::string>();
+    for (const Proposal p : {Proposal::compatibility, Proposal::quadruples})
+      if (text == to_string(p)) return p;
     throw py::cast_error();
-  return value.cast<M>();
+  } else {
+    // A bool is an int in Python; as a length or a count it is a mistake.
+    if (!std::is_same_v<M, bool> && std::is_arithmetic_v<M> && PyBool_Check(value.ptr()))
+      throw py::cast_error();
+    return value.cast<M>();
+  }
 }
 
 template <typename M>
 std::string expected() {
   if constexpr (std::is_same_v<M, bool>)
     return "True or False";
+  else if constexpr (std::is_same_v<M, Proposal>)
+    return "'compatibility' or 'quadruples'";
   else if constexpr (std::is_floating_point_v<M>)
     return "a number";
   else if constexpr (std::is_integral_v<M>)
@@ -60,6 +70,8 @@ Field<T> field(std::string name, M T::*member, std::string doc) {
   f.get = [member](const T& t) -> py::object {
     if constexpr (std::is_same_v<M, float>)
       return py::float_(shortest(t.*member));
+    else if constexpr (std::is_same_v<M, Proposal>)
+      return py::str(to_string(t.*member));
     else
       return py::cast(t.*member);
   };

@@ -15,12 +15,17 @@ std::vector<Field<PrepareOptions>> prepare_fields() {
       field("feature_radius", &O::feature_radius, "Neighbourhood of FPFH, metres."),
       field("search_distance", &O::search_distance,
             "Farthest neighbour that alignment will ever ask this cloud for, metres."),
+      field("wide_feature_radius", &O::wide_feature_radius,
+            "Neighbourhood of a second FPFH, metres; 0: none."),
+      field("depth_maps", &O::depth_maps,
+            "Viewpoints that depth maps are made of for free-space tests; 0: none."),
   };
 }
 
 std::vector<Field<HypothesisOptions>> hypothesis_fields() {
   using O = HypothesisOptions;
   return {
+      field("proposal", &O::proposal, "How candidate poses are found."),
       field("count", &O::count, "Quadruples drawn per pair, at most 2**30."),
       field("neighbors", &O::neighbors, "Nearest features kept per source point, 1 to 16."),
       field("mutual", &O::mutual, "Keep only matches that are nearest in both directions."),
@@ -30,6 +35,40 @@ std::vector<Field<HypothesisOptions>> hypothesis_fields() {
       field("smaller_as_source", &O::smaller_as_source,
             "Sample and score the cloud with fewer points."),
       field("seed", &O::seed, "Same seed, same bits, on any backend and number of threads."),
+  };
+}
+
+std::vector<Field<CompatibilityOptions>> compatibility_fields() {
+  using O = CompatibilityOptions;
+  return {
+      field("max_matches", &O::max_matches, "Matches kept per pair, 4 to 65536."),
+      field("seeds", &O::seeds, "Matches whose neighbourhoods become candidates, 1 to 8192."),
+      field("max_members", &O::max_members, "Compatible matches looked at per seed, 3 to 1024."),
+      field("triangles", &O::triangles, "Triangles tried per seed, 1 to 4096."),
+      field("refits", &O::refits, "Least-squares fits of each seed's best triangle, 1 to 8."),
+      field("tolerance", &O::tolerance,
+            "Metres that the distances of compatible matches may differ by."),
+      field("max_turn", &O::max_turn,
+            "That the cosines of their normals' angles may differ by, (0, 2]."),
+      field("consensus_distance", &O::consensus_distance,
+            "Metres within which a pose brings a match together."),
+      field("seed_separation", &O::seed_separation, "Metres around a seed without a lesser one."),
+  };
+}
+
+std::vector<Field<EvidenceOptions>> evidence_fields() {
+  using O = EvidenceOptions;
+  return {
+      field("sample", &O::sample, "Points of each cloud that judge a candidate at first."),
+      field("modes", &O::modes, "Distinct poses refined and judged by all points, 1 to 64."),
+      field("max_normal_angle", &O::max_normal_angle,
+            "Degrees between the normals of an inlier, (0, 180]."),
+      field("mode_angle", &O::mode_angle, "Degrees within which two poses are one, and ..."),
+      field("mode_distance", &O::mode_distance, "... metres between the clouds' centres."),
+      field("free_space_margin", &O::free_space_margin,
+            "Metres before a seen surface that a point may lie."),
+      field("min_range", &O::min_range,
+            "Metres from a viewpoint nearer than which nothing is judged."),
   };
 }
 
@@ -62,8 +101,12 @@ std::vector<Field<RegistrationOptions>> registration_fields() {
   return {
       field("prepare", &O::prepare, "How a raw cloud is prepared."),
       field("hypothesis", &O::hypothesis, "Where hypotheses come from."),
+      field("compatibility", &O::compatibility, "Candidates from compatible matches."),
+      field("evidence", &O::evidence, "How candidates are judged."),
       field("score", &O::score, "What makes a hypothesis a result."),
       field("refine", &O::refine, "How the winner is polished."),
+      field("min_confidence", &O::min_confidence,
+            "Confidence below which no alignment is reported, [0, 1]."),
   };
 }
 
@@ -75,6 +118,11 @@ void bind_options(py::module_& m) {
   bind_options_class<HypothesisOptions>(
       m, "HypothesisOptions", "Where hypotheses come from: quadruples of cached feature matches.",
       hypothesis_fields());
+  bind_options_class<CompatibilityOptions>(
+      m, "CompatibilityOptions", "Candidate poses from matches that keep each other's distances.",
+      compatibility_fields());
+  bind_options_class<EvidenceOptions>(m, "EvidenceOptions", "How candidates are judged.",
+                                      evidence_fields());
   bind_options_class<ScoreOptions>(
       m, "ScoreOptions", "What makes a point an inlier and a hypothesis a result.", score_fields());
   bind_options_class<RefineOptions>(

@@ -46,6 +46,8 @@ class PrepareOptions:
     normal_radius: float
     feature_radius: float
     search_distance: float
+    wide_feature_radius: float
+    depth_maps: int
     def __init__(
         self,
         *,
@@ -53,6 +55,8 @@ class PrepareOptions:
         normal_radius: float = ...,
         feature_radius: float = ...,
         search_distance: float = ...,
+        wide_feature_radius: float = ...,
+        depth_maps: int = ...,
     ) -> None: ...
     def replace(
         self,
@@ -61,6 +65,8 @@ class PrepareOptions:
         normal_radius: float = ...,
         feature_radius: float = ...,
         search_distance: float = ...,
+        wide_feature_radius: float = ...,
+        depth_maps: int = ...,
     ) -> PrepareOptions: ...
     def validate(self) -> None: ...
     def __eq__(self, other: object, /) -> bool: ...
@@ -75,6 +81,7 @@ class HypothesisOptions:
     max_survivors: int
     smaller_as_source: bool
     seed: int
+    proposal: Literal["compatibility", "quadruples"]
     def __init__(
         self,
         *,
@@ -85,6 +92,7 @@ class HypothesisOptions:
         max_survivors: int = ...,
         smaller_as_source: bool = ...,
         seed: int = ...,
+        proposal: Literal["compatibility", "quadruples"] = ...,
     ) -> None: ...
     def replace(
         self,
@@ -96,7 +104,84 @@ class HypothesisOptions:
         max_survivors: int = ...,
         smaller_as_source: bool = ...,
         seed: int = ...,
+        proposal: Literal["compatibility", "quadruples"] = ...,
     ) -> HypothesisOptions: ...
+    def validate(self) -> None: ...
+    def __eq__(self, other: object, /) -> bool: ...
+    __hash__: None  # type: ignore[assignment]
+    _fields: Tuple[str, ...]
+
+class CompatibilityOptions:
+    max_matches: int
+    seeds: int
+    max_members: int
+    triangles: int
+    refits: int
+    tolerance: float
+    max_turn: float
+    consensus_distance: float
+    seed_separation: float
+    def __init__(
+        self,
+        *,
+        max_matches: int = ...,
+        seeds: int = ...,
+        max_members: int = ...,
+        triangles: int = ...,
+        refits: int = ...,
+        tolerance: float = ...,
+        max_turn: float = ...,
+        consensus_distance: float = ...,
+        seed_separation: float = ...,
+    ) -> None: ...
+    def replace(
+        self,
+        *,
+        max_matches: int = ...,
+        seeds: int = ...,
+        max_members: int = ...,
+        triangles: int = ...,
+        refits: int = ...,
+        tolerance: float = ...,
+        max_turn: float = ...,
+        consensus_distance: float = ...,
+        seed_separation: float = ...,
+    ) -> CompatibilityOptions: ...
+    def validate(self) -> None: ...
+    def __eq__(self, other: object, /) -> bool: ...
+    __hash__: None  # type: ignore[assignment]
+    _fields: Tuple[str, ...]
+
+class EvidenceOptions:
+    sample: int
+    modes: int
+    max_normal_angle: float
+    mode_angle: float
+    mode_distance: float
+    free_space_margin: float
+    min_range: float
+    def __init__(
+        self,
+        *,
+        sample: int = ...,
+        modes: int = ...,
+        max_normal_angle: float = ...,
+        mode_angle: float = ...,
+        mode_distance: float = ...,
+        free_space_margin: float = ...,
+        min_range: float = ...,
+    ) -> None: ...
+    def replace(
+        self,
+        *,
+        sample: int = ...,
+        modes: int = ...,
+        max_normal_angle: float = ...,
+        mode_angle: float = ...,
+        mode_distance: float = ...,
+        free_space_margin: float = ...,
+        min_range: float = ...,
+    ) -> EvidenceOptions: ...
     def validate(self) -> None: ...
     def __eq__(self, other: object, /) -> bool: ...
     __hash__: None  # type: ignore[assignment]
@@ -156,6 +241,9 @@ class RegistrationOptions:
     hypothesis: HypothesisOptions
     score: ScoreOptions
     refine: RefineOptions
+    compatibility: CompatibilityOptions
+    evidence: EvidenceOptions
+    min_confidence: float
     def __init__(
         self,
         *,
@@ -163,6 +251,9 @@ class RegistrationOptions:
         hypothesis: HypothesisOptions = ...,
         score: ScoreOptions = ...,
         refine: RefineOptions = ...,
+        compatibility: CompatibilityOptions = ...,
+        evidence: EvidenceOptions = ...,
+        min_confidence: float = ...,
     ) -> None: ...
     def replace(
         self,
@@ -171,6 +262,9 @@ class RegistrationOptions:
         hypothesis: HypothesisOptions = ...,
         score: ScoreOptions = ...,
         refine: RefineOptions = ...,
+        compatibility: CompatibilityOptions = ...,
+        evidence: EvidenceOptions = ...,
+        min_confidence: float = ...,
     ) -> RegistrationOptions: ...
     @staticmethod
     def from_voxel_size(voxel_size: float) -> RegistrationOptions: ...

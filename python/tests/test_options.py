@@ -38,6 +38,7 @@ def test_common_face(cls):
     [
         (gpureg.PrepareOptions, "voxel_size", "a", "PrepareOptions.voxel_size: expected a number, got 'a'"),
         (gpureg.PrepareOptions, "voxel_size", True, "expected a number, got True"),
+        (gpureg.HypothesisOptions, "proposal", "luck", "proposal: expected 'compatibility' or 'quadruples', got 'luck'"),
         (gpureg.HypothesisOptions, "count", -1, "count: expected a whole number from 0 to 4294967295, got -1"),
         (gpureg.HypothesisOptions, "count", 2.5, "whole number"),
         (gpureg.HypothesisOptions, "seed", 2**64, "whole number from 0 to 18446744073709551615"),

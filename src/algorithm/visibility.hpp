@@ -58,6 +58,12 @@ GPUREG_HD std::uint16_t eroded_depth(const Depth* map, std::uint32_t cell) {
   return nearest;
 }
 
+/// How many maps a cloud gets. A cloud that brings normals but no viewpoint says nothing about where it was seen from: nothing is made up.
+GPUREG_HD std::size_t map_count(std::size_t viewpoints, std::size_t asked, bool viewpoints_given, bool normals_given) {
+  if (!viewpoints_given && normals_given) return 0;
+  return viewpoints < asked ? viewpoints : asked;
+}
+
 /// Which of `known` viewpoints becomes map k of `count`: evenly spread over their order, the first and the last among them.
 GPUREG_HD std::size_t chosen_viewpoint(std::size_t k, std::size_t count, std::size_t known) {
   return count > 1 ? k * (known - 1) / (count - 1) : 0;

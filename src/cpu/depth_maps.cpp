@@ -17,7 +17,7 @@ std::vector<Visibility> build_depth_maps(Exec& exec, Span<const RawCloud> raw, c
   std::vector<Visibility> out(clouds.size());
   for (std::size_t c = 0; c < clouds.size(); ++c) {
     const std::size_t known = clouds[c].points.empty() ? 0 : clouds[c].viewpoints.size();
-    const std::size_t count = known < options.depth_maps ? known : options.depth_maps;
+    const std::size_t count = map_count(known, options.depth_maps, raw[c].viewpoint_count > 0, raw[c].normals != nullptr);
     for (std::size_t k = 0; k < count; ++k) out[c].viewpoints.push_back(clouds[c].viewpoints[chosen_viewpoint(k, count, known)]);
     out[c].step = depth_step(options.voxel_size > 0 ? options.voxel_size : options.search_distance);
     out[c].depth.assign(count * kMapCells, kUnknownDepth);

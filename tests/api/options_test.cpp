@@ -31,6 +31,9 @@ TEST(Options, PaperNumbers) {
   EXPECT_FLOAT_EQ(o.score.max_correspondence_distance, 0.075f);
   EXPECT_LT(o.score.max_normal_angle, 180);
   EXPECT_EQ(o.refine.max_iterations, 0u);
+  EXPECT_EQ(o.hypothesis.proposal, Proposal::quadruples);
+  EXPECT_EQ(o.prepare.wide_feature_radius, 0);
+  EXPECT_EQ(o.prepare.depth_maps, 0u);
   EXPECT_NO_THROW(o.validate());
 }
 
@@ -60,8 +63,27 @@ TEST(Options, EachFieldIsNamed) {
     expect_refused([&](auto& o) { o.refine.kernel_width = bad; }, "refine.kernel_width");
     expect_refused([&](auto& o) { o.refine.max_correspondence_distance = bad; }, "refine.max_correspondence_distance");
     expect_refused([&](auto& o) { o.hypothesis.edge_similarity = bad; }, "hypothesis.edge_similarity");
+    expect_refused([&](auto& o) { o.compatibility.tolerance = bad; }, "compatibility.tolerance");
+    expect_refused([&](auto& o) { o.compatibility.max_turn = bad; }, "compatibility.max_turn");
+    expect_refused([&](auto& o) { o.compatibility.consensus_distance = bad; }, "compatibility.consensus_distance");
+    expect_refused([&](auto& o) { o.compatibility.seed_separation = bad; }, "compatibility.seed_separation");
+    expect_refused([&](auto& o) { o.evidence.max_normal_angle = bad; }, "evidence.max_normal_angle");
+    expect_refused([&](auto& o) { o.evidence.mode_angle = bad; }, "evidence.mode_angle");
+    expect_refused([&](auto& o) { o.evidence.mode_distance = bad; }, "evidence.mode_distance");
+    expect_refused([&](auto& o) { o.evidence.free_space_margin = bad; }, "evidence.free_space_margin");
+    expect_refused([&](auto& o) { o.evidence.min_range = bad; }, "evidence.min_range");
   }
   for (const float bad : {kNan, -0.1f, 1.1f}) expect_refused([&](auto& o) { o.score.min_inlier_ratio = bad; }, "score.min_inlier_ratio");
+  for (const double bad : {std::numeric_limits<double>::quiet_NaN(), -0.1, 1.1}) expect_refused([&](auto& o) { o.min_confidence = bad; }, "min_confidence");
+  expect_refused([](auto& o) { o.compatibility.max_matches = 3; }, "compatibility.max_matches");
+  expect_refused([](auto& o) { o.compatibility.seeds = 0; }, "compatibility.seeds");
+  expect_refused([](auto& o) { o.compatibility.max_members = 1025; }, "compatibility.max_members");
+  expect_refused([](auto& o) { o.compatibility.triangles = 0; }, "compatibility.triangles");
+  expect_refused([](auto& o) { o.compatibility.refits = 9; }, "compatibility.refits");
+  expect_refused([](auto& o) { o.evidence.sample = 63; }, "evidence.sample");
+  expect_refused([](auto& o) { o.evidence.modes = 65; }, "evidence.modes");
+  expect_refused([](auto& o) { o.prepare.depth_maps = 65; }, "prepare.depth_maps");
+  expect_refused([](auto& o) { o.prepare.wide_feature_radius = 50; }, "prepare.wide_feature_radius");
   expect_refused([](auto& o) { o.prepare.voxel_size = kNan; }, "prepare.voxel_size");
   expect_refused([](auto& o) { o.prepare.voxel_size = 1e-5f; }, "prepare.feature_radius");
   expect_refused([](auto& o) { o.hypothesis.count = 0; }, "hypothesis.count");

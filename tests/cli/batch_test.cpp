@@ -31,7 +31,7 @@ TEST_F(Batch, LogAndInformationOfTheAlignedPairs) {
   const Outcome outcome = batch("r");
   ASSERT_EQ(outcome.status, 0) << outcome.err;
   expect_holds(outcome.out, {"fragments  6", "pairs      15", "aligned    6, written to",
-                             "inlier_ratio_too_low", "too_few", "memory"});
+                             "confidence_too_low", "too_few", "memory"});
   const auto log = evaluation::read_log(out_ / "r.log");
   const auto information = evaluation::read_information(out_ / "r.info");
   ASSERT_EQ(log.size(), 6u);  // the scans of the room, each with each
@@ -81,11 +81,11 @@ TEST_F(Batch, JsonHasEveryFieldOfEveryPair) {
     EXPECT_EQ(status, reason == "none" ? "aligned" : "not_aligned");
     if (reason == "too_few_source_points")
       EXPECT_TRUE(pair["T_ij"].is_null());
-    else if (reason == "none" || reason == "inlier_ratio_too_low")
+    else if (reason == "none" || reason == "confidence_too_low")
       EXPECT_EQ(pair["T_ij"].size(), 16u);  // the best candidate, reported or not
   }
   EXPECT_EQ(reasons["none"], 6);
-  EXPECT_EQ(reasons["inlier_ratio_too_low"], kScans);
+  EXPECT_EQ(reasons["confidence_too_low"], kScans);
   EXPECT_EQ(reasons["too_few_source_points"], kScans + 1);
 }
 

@@ -65,7 +65,7 @@ TEST_F(Report, NumbersAlone) {
   expect_holds(
       html, {"voxel size 0.1 m", "21 pairs of 7 fragments were tried, 10 reported",
              "Preparation, mean per fragment", "Alignment, mean per pair", ">match<", ">features<",
-             "Every pair", "inlier_ratio_too_low", "Options", ">max_judged_normal_angle<"});
+             "Every pair", "confidence_too_low", "Options", ">max_judged_normal_angle<"});
   EXPECT_EQ(html.find("<img"), std::string::npos);
   EXPECT_EQ(html.find("Recall and precision"), std::string::npos);
 }
@@ -87,7 +87,7 @@ TEST_F(Report, MissedPairsAndPicturesWithoutTruth) {
   auto json = json_of(result_);
   for (auto& pair : json["pairs"])
     if (pair["i"] == 0 && pair["j"] == 2)
-      pair["status"] = "not_aligned", pair["reason"] = "inlier_ratio_too_low";
+      pair["status"] = "not_aligned", pair["reason"] = "confidence_too_low";
   out_.write("r.json", json.dump());
   const std::vector<std::string> clouds = {"--clouds", scans_.path()};
   expect_holds(page(joined(clouds, {"--ground-truth", scans_.path()})),

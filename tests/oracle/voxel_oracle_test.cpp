@@ -54,6 +54,7 @@ std::vector<Eigen::Vector3f> downsampled(const std::vector<Eigen::Vector3f>& poi
                                          float voxel_size) {
   PrepareOptions options = RegistrationOptions::from_voxel_size(voxel_size).prepare;
   options.normal_radius = options.feature_radius = voxel_size;
+  options.wide_feature_radius = 0;
   return prepare(Context::cpu(2), PointCloudView(points), options).points();
 }
 

@@ -48,6 +48,7 @@ TEST(Judge, InformationMatricesFollowTheirDefinitions) {
     redwood += a.transpose() * a;
     open3d += g.transpose() * g;
   }
+  options.hypothesis.proposal = Proposal::quadruples;
   PairOutcome outcome;
   outcome.has_pose = true;
   outcome.support = judged.support;
