@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "algorithm/fpfh.hpp"
+#include "cpu/pair_bins.hpp"
 #include "cpu/stages.hpp"
 
 namespace gpureg::cpu {
@@ -11,11 +12,14 @@ bool finite_row(const float* row, std::size_t dimension) {
   return true;
 }
 
-void describe(Exec& exec, const std::vector<DownsampledCloud>& clouds, const std::vector<std::vector<Vec3>>& normals,
-              const std::vector<Grid>& grids, float radius, std::vector<Features>& features) {
+void describe(Exec& exec, const std::vector<DownsampledCloud>& clouds,
+              const std::vector<std::vector<Vec3>>& normals, const std::vector<Grid>& grids,
+              float radius, std::vector<Features>& features) {
   constexpr std::size_t kGrain = 128;
   std::vector<std::vector<float>> spfh(clouds.size());
-  const auto items = [&](std::size_t c) { return clouds[c].feature_dimension > 0 ? std::size_t(0) : clouds[c].points.size(); };
+  const auto items = [&](std::size_t c) {
+    return clouds[c].feature_dimension > 0 ? std::size_t(0) : clouds[c].points.size();
+  };
   for (std::size_t c = 0; c < clouds.size(); ++c) {
     if (clouds[c].feature_dimension > 0) continue;
     features[c].dimension = kFpfhSize;
@@ -23,34 +27,44 @@ void describe(Exec& exec, const std::vector<DownsampledCloud>& clouds, const std
     features[c].values.resize(items(c) * kFpfhSize);
     spfh[c].resize(items(c) * kFpfhSize);
   }
-  exec.parallel_items(clouds.size(), items, kGrain, [&](std::size_t c, std::size_t begin, std::size_t end) {
-    const GridView grid = grids[c].view();
-    for (std::size_t i = begin; i < end; ++i) {
-      std::uint32_t counts[kFpfhSize];
-      const int neighbors = spfh_counts(grid, span_of(normals[c]), static_cast<std::uint32_t>(i), clouds[c].points[i], radius, counts);
-      for (int b = 0; b < kFpfhSize; ++b) spfh[c][i * kFpfhSize + b] = spfh_value(counts[b], neighbors);
-    }
-  });
-  exec.parallel_items(clouds.size(), items, kGrain, [&](std::size_t c, std::size_t begin, std::size_t end) {
-    const GridView grid = grids[c].view();
-    for (std::size_t i = begin; i < end; ++i)
-      features[c].valid[i] = weighted_fpfh(grid, span_of(normals[c]), spfh[c].data(), static_cast<std::uint32_t>(i), clouds[c].points[i],
-                                           radius, features[c].values.data() + i * kFpfhSize);
-  });
+  exec.parallel_items(
+      clouds.size(), items, kGrain, [&](std::size_t c, std::size_t begin, std::size_t end) {
+        const GridView grid = grids[c].view();
+        PairBins bins;
+        for (std::size_t i = begin; i < end; ++i) {
+          std::uint32_t counts[kFpfhSize];
+          const int neighbors =
+              bins.spfh_counts(grid, span_of(normals[c]), static_cast<std::uint32_t>(i),
+                               clouds[c].points[i], radius, counts);
+          for (int b = 0; b < kFpfhSize; ++b)
+            spfh[c][i * kFpfhSize + b] = spfh_value(counts[b], neighbors);
+        }
+      });
+  exec.parallel_items(
+      clouds.size(), items, kGrain, [&](std::size_t c, std::size_t begin, std::size_t end) {
+        const GridView grid = grids[c].view();
+        for (std::size_t i = begin; i < end; ++i)
+          features[c].valid[i] = weighted_fpfh(grid, span_of(normals[c]), spfh[c].data(),
+                                               static_cast<std::uint32_t>(i), clouds[c].points[i],
+                                               radius, features[c].values.data() + i * kFpfhSize);
+      });
 }
 
 }  // namespace
 
 std::vector<Features> compute_wide_features(Exec& exec, const std::vector<DownsampledCloud>& clouds,
-                                            const std::vector<std::vector<Vec3>>& normals, const std::vector<Grid>& grids,
+                                            const std::vector<std::vector<Vec3>>& normals,
+                                            const std::vector<Grid>& grids,
                                             const PrepareOptions& options) {
   std::vector<Features> features(clouds.size());
-  if (options.wide_feature_radius > 0) describe(exec, clouds, normals, grids, options.wide_feature_radius, features);
+  if (options.wide_feature_radius > 0)
+    describe(exec, clouds, normals, grids, options.wide_feature_radius, features);
   return features;
 }
 
 std::vector<Features> compute_features(Exec& exec, const std::vector<DownsampledCloud>& clouds,
-                                       const std::vector<std::vector<Vec3>>& normals, const std::vector<Grid>& grids,
+                                       const std::vector<std::vector<Vec3>>& normals,
+                                       const std::vector<Grid>& grids,
                                        const PrepareOptions& options) {
   std::vector<Features> features(clouds.size());
   // Custom features come as they are; their rows with a NaN are never matched.
@@ -61,7 +75,8 @@ std::vector<Features> compute_features(Exec& exec, const std::vector<Downsampled
     features[c].values = clouds[c].features;
     features[c].valid.assign(n, 0);
     for (std::size_t i = 0; i < n; ++i)
-      features[c].valid[i] = finite_row(features[c].values.data() + i * features[c].dimension, features[c].dimension);
+      features[c].valid[i] =
+          finite_row(features[c].values.data() + i * features[c].dimension, features[c].dimension);
   }
   describe(exec, clouds, normals, grids, options.feature_radius, features);
   return features;

@@ -1,0 +1,143 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <vector>
+
+#include "algorithm/fpfh.hpp"
+
+namespace gpureg::cpu {
+
+/// spfh_counts() with the neighbours gathered first, and pair_feature() without a branch on all of
+/// them, which the compiler turns into vectors. The same operations on the same values, so the same
+/// bins.
+class PairBins {
+ public:
+  int spfh_counts(const GridView& grid, Span<const Vec3> normals, std::uint32_t self, Vec3 p,
+                  float radius, std::uint32_t* counts) {
+    for (int b = 0; b < kFpfhSize; ++b) counts[b] = 0;
+    const Vec3 n = normals[self];
+    if (is_zero(n)) return 0;
+    size_ = 0;
+    for_each_neighbor(grid, p, radius, [&](std::uint32_t other, Vec3 q, float) {
+      if (other == self) return;
+      const Vec3 m = normals[other];
+      if (is_zero(m)) return;
+      if (size_ == x_.size()) grow();
+      x_[size_] = q.x, y_[size_] = q.y, z_[size_] = q.z;
+      mx_[size_] = m.x, my_[size_] = m.y, mz_[size_] = m.z;
+      ++size_;
+    });
+    for (std::size_t first = 0; first < size_; first += kLanes) bin(first, p, n);
+    for (std::size_t k = 0; k < size_; ++k) {
+      const std::uint32_t bins = bins_[k];
+      if (bins == kNoValue) continue;
+      ++counts[bins & 0xffu];
+      ++counts[kFpfhBins + ((bins >> 8) & 0xffu)];
+      ++counts[2 * kFpfhBins + (bins >> 16)];
+    }
+    return static_cast<int>(size_);
+  }
+
+ private:
+  void grow() {
+    const std::size_t size = x_.size() + 512;
+    for (auto* v : {&x_, &y_, &z_, &mx_, &my_, &mz_}) v->resize(size);
+    bins_.resize(size);
+  }
+
+  static constexpr int kLanes = 32;
+  using Lanes = float[kLanes];
+  static float absolute(float v) { return v < 0.0f ? -v : v; }
+
+  /// exact_atan2() of each lane. One choice a loop: the compiler makes a branch of two, and no
+  /// vectors of a loop with a branch.
+  static void angles(const Lanes& y, const Lanes& x, Lanes& out) {
+    alignas(32) Lanes ax, ay, larger, smaller;
+    for (int k = 0; k < kLanes; ++k) ax[k] = absolute(x[k]);
+    for (int k = 0; k < kLanes; ++k) ay[k] = absolute(y[k]);
+    for (int k = 0; k < kLanes; ++k) larger[k] = ax[k] > ay[k] ? ax[k] : ay[k];
+    for (int k = 0; k < kLanes; ++k) smaller[k] = ax[k] > ay[k] ? ay[k] : ax[k];
+    for (int k = 0; k < kLanes; ++k) {
+      const float t = smaller[k] / larger[k], s = t * t;
+      float c = -0.004054547753185034f;
+      c = fmaf(c, s, 0.021862884983420372f);
+      c = fmaf(c, s, -0.05591221898794174f);
+      c = fmaf(c, s, 0.09642188996076584f);
+      c = fmaf(c, s, -0.1390862613916397f);
+      c = fmaf(c, s, 0.19946564733982086f);
+      c = fmaf(c, s, -0.33329859375953674f);
+      c = fmaf(c, s, 0.9999993443489075f);
+      out[k] = c * t;
+    }
+    for (int k = 0; k < kLanes; ++k) out[k] = ay[k] > ax[k] ? 0.5f * kPi - out[k] : out[k];
+    for (int k = 0; k < kLanes; ++k) out[k] = x[k] < 0.0f ? kPi - out[k] : out[k];
+    for (int k = 0; k < kLanes; ++k) out[k] = y[k] < 0.0f ? -out[k] : out[k];
+    for (int k = 0; k < kLanes; ++k) out[k] = larger[k] > 0.0f ? out[k] : 0.0f;
+  }
+
+  /// fpfh_bin() of each lane.
+  static void bins_of(const Lanes& unit, std::int32_t* out) {
+    alignas(32) Lanes scaled;
+    for (int k = 0; k < kLanes; ++k) scaled[k] = static_cast<float>(kFpfhBins) * unit[k];
+    for (int k = 0; k < kLanes; ++k) out[k] = static_cast<std::int32_t>(scaled[k]);
+    for (int k = 0; k < kLanes; ++k) out[k] -= static_cast<float>(out[k]) > scaled[k] ? 1 : 0;
+    for (int k = 0; k < kLanes; ++k) out[k] = out[k] < 0 ? 0 : out[k];
+    for (int k = 0; k < kLanes; ++k) out[k] = out[k] >= kFpfhBins ? kFpfhBins - 1 : out[k];
+  }
+
+  /// pair_feature() of the lanes from `first` on; lanes beyond the neighbours hold older ones,
+  /// which nobody reads.
+  void bin(std::size_t first, Vec3 p, Vec3 n) {
+    const float *x = &x_[first], *y = &y_[first], *z = &z_[first], *mx = &mx_[first],
+                *my = &my_[first], *mz = &mz_[first];
+    alignas(32) Lanes dx, dy, dz, length, a1, a2, phi, fx, fy, fz, tx, ty, tz, v_norm, alpha, sine,
+        cosine, theta;
+    for (int k = 0; k < kLanes; ++k) {
+      const Vec3 d = Vec3{x[k], y[k], z[k]} - p;
+      length[k] = norm(d);
+      a1[k] = dot(n, d) / length[k], a2[k] = dot(Vec3{mx[k], my[k], mz[k]}, d) / length[k];
+      dx[k] = d.x, dy[k] = d.y, dz[k] = d.z;
+    }
+    // Bits say whether the other point is the source: choices by bits are no branches.
+    alignas(32) std::int32_t turned[kLanes];
+    for (int k = 0; k < kLanes; ++k) phi[k] = absolute(a1[k]), theta[k] = absolute(a2[k]);
+    for (int k = 0; k < kLanes; ++k) turned[k] = phi[k] < theta[k] ? 1 : 0;
+    for (int k = 0; k < kLanes; ++k) phi[k] = turned[k] ? -a2[k] : a1[k];
+    for (int k = 0; k < kLanes; ++k) dx[k] = turned[k] ? -dx[k] : dx[k];
+    for (int k = 0; k < kLanes; ++k) dy[k] = turned[k] ? -dy[k] : dy[k];
+    for (int k = 0; k < kLanes; ++k) dz[k] = turned[k] ? -dz[k] : dz[k];
+    for (int k = 0; k < kLanes; ++k) fx[k] = turned[k] ? mx[k] : n.x;
+    for (int k = 0; k < kLanes; ++k) fy[k] = turned[k] ? my[k] : n.y;
+    for (int k = 0; k < kLanes; ++k) fz[k] = turned[k] ? mz[k] : n.z;
+    for (int k = 0; k < kLanes; ++k) tx[k] = turned[k] ? n.x : mx[k];
+    for (int k = 0; k < kLanes; ++k) ty[k] = turned[k] ? n.y : my[k];
+    for (int k = 0; k < kLanes; ++k) tz[k] = turned[k] ? n.z : mz[k];
+    for (int k = 0; k < kLanes; ++k) {
+      const Vec3 from{fx[k], fy[k], fz[k]}, to{tx[k], ty[k], tz[k]};
+      Vec3 v = cross({dx[k], dy[k], dz[k]}, from);
+      v_norm[k] = norm(v);
+      v = {v.x / v_norm[k], v.y / v_norm[k], v.z / v_norm[k]};
+      const Vec3 w = cross(from, v);
+      alpha[k] = dot(v, to), sine[k] = dot(w, to), cosine[k] = dot(from, to);
+    }
+    angles(sine, cosine, theta);
+    for (int k = 0; k < kLanes; ++k) {
+      theta[k] = (theta[k] + kPi) * (0.5f / kPi);
+      alpha[k] = (alpha[k] + 1.0f) * 0.5f;
+      phi[k] = (phi[k] + 1.0f) * 0.5f;
+    }
+    alignas(32) std::int32_t b0[kLanes], b1[kLanes], b2[kLanes];
+    bins_of(theta, b0), bins_of(alpha, b1), bins_of(phi, b2);
+    std::uint32_t* bins = &bins_[first];
+    for (int k = 0; k < kLanes; ++k)
+      bins[k] = static_cast<std::uint32_t>(b0[k] | b1[k] << 8 | b2[k] << 16);
+    for (int k = 0; k < kLanes; ++k) bins[k] = length[k] > 0.0f ? bins[k] : kNoValue;
+    for (int k = 0; k < kLanes; ++k) bins[k] = v_norm[k] > 0.0f ? bins[k] : kNoValue;
+  }
+
+  std::vector<float> x_, y_, z_, mx_, my_, mz_;
+  std::vector<std::uint32_t> bins_;
+  std::size_t size_ = 0;
+};
+
+}  // namespace gpureg::cpu
