@@ -1,0 +1,27 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "evidence_scene.hpp"
+
+namespace gpureg::bench {
+namespace {
+
+void BuildDepthMaps(benchmark::State& state) {
+  EvidenceScene& s = EvidenceScene::get();
+  const auto points = cpu::downsample(s.exec, {s.raw, 1}, s.options.prepare);
+  for (auto _ : state)
+    benchmark::DoNotOptimize(cpu::build_depth_maps(s.exec, {s.raw, 1}, points, s.options.prepare));
+}
+BENCHMARK(BuildDepthMaps)->Unit(benchmark::kMillisecond);
+
+void ComputeWideFeatures(benchmark::State& state) {
+  EvidenceScene& s = EvidenceScene::get();
+  const auto points = cpu::downsample(s.exec, {s.raw, 1}, s.options.prepare);
+  const auto grids = cpu::build_grids(s.exec, points, s.options.prepare);
+  const auto normals = cpu::estimate_normals(s.exec, points, grids, s.options.prepare);
+  for (auto _ : state)
+    benchmark::DoNotOptimize(
+        cpu::compute_wide_features(s.exec, points, normals, grids, s.options.prepare));
+}
+BENCHMARK(ComputeWideFeatures)->Unit(benchmark::kMillisecond);
+
+}  // namespace
+}  // namespace gpureg::bench

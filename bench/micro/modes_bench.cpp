@@ -1,0 +1,19 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "evidence_scene.hpp"
+
+namespace gpureg::bench {
+namespace {
+
+void RefineModes(benchmark::State& state) {
+  EvidenceScene& s = EvidenceScene::get();
+  std::vector<std::vector<cpu::Mode>> modes;
+  for (auto _ : state) {
+    modes = s.modes;
+    cpu::refine_modes(s.exec, {&s.pair, 1}, modes, s.options.evidence, s.options.refine);
+  }
+  state.counters["modes"] = static_cast<double>(s.modes[0].size());
+}
+BENCHMARK(RefineModes)->Unit(benchmark::kMillisecond);
+
+}  // namespace
+}  // namespace gpureg::bench
