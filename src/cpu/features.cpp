@@ -1,7 +1,15 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "algorithm/fpfh.hpp"
+
+#include <algorithm>
+#include <memory>
+
 #include "cpu/pair_bins.hpp"
 #include "cpu/stages.hpp"
+
+#if defined(__AVX2__) && defined(__FMA__)
+#include <immintrin.h>
+#endif
 
 namespace gpureg::cpu {
 namespace {
@@ -12,41 +20,90 @@ bool finite_row(const float* row, std::size_t dimension) {
   return true;
 }
 
+constexpr std::size_t kRow = 40;  // kFpfhSize, rounded up to whole vectors; the rest is zero
+
+/// Adds the weighted row to the sums, each entry by one fmaf.
+class WeightedRows {
+ public:
+#if defined(__AVX2__) && defined(__FMA__)
+  WeightedRows() {
+    for (auto& s : sum_) s = _mm256_setzero_ps();
+  }
+  void add(float weight, const float* row) {
+    const __m256 w = _mm256_set1_ps(weight);
+    for (int k = 0; k < 5; ++k) sum_[k] = _mm256_fmadd_ps(w, _mm256_loadu_ps(row + 8 * k), sum_[k]);
+  }
+  void get(float* out) const {
+    for (int k = 0; k < 5; ++k) _mm256_storeu_ps(out + 8 * k, sum_[k]);
+  }
+
+ private:
+  __m256 sum_[5];
+#else
+  void add(float weight, const float* row) {
+    for (std::size_t k = 0; k < kRow; ++k) sum_[k] = fmaf(weight, row[k], sum_[k]);
+  }
+  void get(float* out) const { std::copy_n(sum_, kRow, out); }
+
+ private:
+  float sum_[kRow] = {};
+#endif
+};
+
+/// weighted_fpfh() of the point at that place; spfh: rows of kRow, by place.
+bool weighted_fpfh(const NeighborRows& rows, const std::vector<float>& spfh, std::size_t self,
+                   float radius, std::vector<std::uint32_t>& places, std::vector<float>& squared,
+                   float* out) {
+  std::fill_n(out, kFpfhSize, 0.0f);
+  if (is_zero(rows.normal(self))) return false;
+  const std::size_t n = rows.within(rows.point(self), radius, places, squared,
+                                    [](std::uint32_t, float d2) { return d2 > 0.0f; });
+  for (std::size_t k = 0; k < n; ++k) squared[k] = 1.0f / squared[k];
+  WeightedRows sum;
+  for (std::size_t k = 0; k < n; ++k) sum.add(squared[k], spfh.data() + places[k] * kRow);
+  float histogram[kRow];
+  sum.get(histogram);
+  if (!normalize_fpfh(histogram)) return false;
+  std::copy_n(histogram, kFpfhSize, out);
+  return true;
+}
+
 void describe(Exec& exec, const std::vector<DownsampledCloud>& clouds,
               const std::vector<std::vector<Vec3>>& normals, const std::vector<Grid>& grids,
               float radius, std::vector<Features>& features) {
   constexpr std::size_t kGrain = 128;
   std::vector<std::vector<float>> spfh(clouds.size());
+  std::vector<std::unique_ptr<NeighborRows>> rows(clouds.size());
   const auto items = [&](std::size_t c) {
     return clouds[c].feature_dimension > 0 ? std::size_t(0) : clouds[c].points.size();
   };
-  for (std::size_t c = 0; c < clouds.size(); ++c) {
-    if (clouds[c].feature_dimension > 0) continue;
+  exec.parallel(clouds.size(), [&](std::size_t c) {
+    if (clouds[c].feature_dimension > 0) return;
     features[c].dimension = kFpfhSize;
     features[c].valid.assign(items(c), 0);
     features[c].values.resize(items(c) * kFpfhSize);
-    spfh[c].resize(items(c) * kFpfhSize);
-  }
+    spfh[c].assign(items(c) * kRow, 0.0f);
+    rows[c] = std::make_unique<NeighborRows>(grids[c], normals[c]);
+  });
+  exec.parallel_items(clouds.size(), items, kGrain,
+                      [&](std::size_t c, std::size_t begin, std::size_t end) {
+                        PairBins bins;
+                        for (std::size_t i = begin; i < end; ++i) {
+                          std::uint32_t counts[kFpfhSize];
+                          const int neighbors = bins.spfh_counts(*rows[c], i, radius, counts);
+                          for (int b = 0; b < kFpfhSize; ++b)
+                            spfh[c][i * kRow + b] = spfh_value(counts[b], neighbors);
+                        }
+                      });
   exec.parallel_items(
       clouds.size(), items, kGrain, [&](std::size_t c, std::size_t begin, std::size_t end) {
-        const GridView grid = grids[c].view();
-        PairBins bins;
-        for (std::size_t i = begin; i < end; ++i) {
-          std::uint32_t counts[kFpfhSize];
-          const int neighbors =
-              bins.spfh_counts(grid, span_of(normals[c]), static_cast<std::uint32_t>(i),
-                               clouds[c].points[i], radius, counts);
-          for (int b = 0; b < kFpfhSize; ++b)
-            spfh[c][i * kFpfhSize + b] = spfh_value(counts[b], neighbors);
+        std::vector<std::uint32_t> places;
+        std::vector<float> squared;
+        for (std::size_t k = begin; k < end; ++k) {
+          const std::size_t i = rows[c]->index(k);
+          features[c].valid[i] = weighted_fpfh(*rows[c], spfh[c], k, radius, places, squared,
+                                               features[c].values.data() + i * kFpfhSize);
         }
-      });
-  exec.parallel_items(
-      clouds.size(), items, kGrain, [&](std::size_t c, std::size_t begin, std::size_t end) {
-        const GridView grid = grids[c].view();
-        for (std::size_t i = begin; i < end; ++i)
-          features[c].valid[i] = weighted_fpfh(grid, span_of(normals[c]), spfh[c].data(),
-                                               static_cast<std::uint32_t>(i), clouds[c].points[i],
-                                               radius, features[c].values.data() + i * kFpfhSize);
       });
 }
 

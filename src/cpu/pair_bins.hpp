@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "algorithm/fpfh.hpp"
+#include "cpu/neighbor_rows.hpp"
 
 namespace gpureg::cpu {
 
@@ -12,21 +13,20 @@ namespace gpureg::cpu {
 /// bins.
 class PairBins {
  public:
-  int spfh_counts(const GridView& grid, Span<const Vec3> normals, std::uint32_t self, Vec3 p,
-                  float radius, std::uint32_t* counts) {
+  /// Counts of the point at that place, and what they are relative to.
+  int spfh_counts(const NeighborRows& rows, std::size_t self, float radius, std::uint32_t* counts) {
     for (int b = 0; b < kFpfhSize; ++b) counts[b] = 0;
-    const Vec3 n = normals[self];
+    const Vec3 p = rows.point(self), n = rows.normal(self);
     if (is_zero(n)) return 0;
-    size_ = 0;
-    for_each_neighbor(grid, p, radius, [&](std::uint32_t other, Vec3 q, float) {
-      if (other == self) return;
-      const Vec3 m = normals[other];
-      if (is_zero(m)) return;
-      if (size_ == x_.size()) grow();
-      x_[size_] = q.x, y_[size_] = q.y, z_[size_] = q.z;
-      mx_[size_] = m.x, my_[size_] = m.y, mz_[size_] = m.z;
-      ++size_;
+    size_ = rows.within(p, radius, places_, squared_, [&](std::uint32_t k, float) {
+      return (k != self) & !is_zero(rows.normal(k));
     });
+    if (x_.size() < size_ + kLanes) grow();
+    for (std::size_t k = 0; k < size_; ++k) {
+      const Vec3 q = rows.point(places_[k]), m = rows.normal(places_[k]);
+      x_[k] = q.x, y_[k] = q.y, z_[k] = q.z;
+      mx_[k] = m.x, my_[k] = m.y, mz_[k] = m.z;
+    }
     for (std::size_t first = 0; first < size_; first += kLanes) bin(first, p, n);
     for (std::size_t k = 0; k < size_; ++k) {
       const std::uint32_t bins = bins_[k];
@@ -40,7 +40,7 @@ class PairBins {
 
  private:
   void grow() {
-    const std::size_t size = x_.size() + 512;
+    const std::size_t size = 2 * (size_ + kLanes);
     for (auto* v : {&x_, &y_, &z_, &mx_, &my_, &mz_}) v->resize(size);
     bins_.resize(size);
   }
@@ -135,7 +135,8 @@ class PairBins {
     for (int k = 0; k < kLanes; ++k) bins[k] = v_norm[k] > 0.0f ? bins[k] : kNoValue;
   }
 
-  std::vector<float> x_, y_, z_, mx_, my_, mz_;
+  std::vector<float> x_, y_, z_, mx_, my_, mz_, squared_;
+  std::vector<std::uint32_t> places_;
   std::vector<std::uint32_t> bins_;
   std::size_t size_ = 0;
 };
