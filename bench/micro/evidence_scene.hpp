@@ -8,7 +8,7 @@ namespace gpureg::bench {
 /// The scene for alignment by evidence: its clouds with both features and depth maps, and the
 /// products of its stages.
 struct EvidenceScene {
-  EvidenceScene() : exec(1), options(RegistrationOptions::by_evidence(0.05f)) {
+  EvidenceScene() : exec(1), options(RegistrationOptions::from_voxel_size(0.05f)) {
     const Scene& scene = Scene::get();
     raw[0] = test::raw_cloud(scene.raw_source), raw[1] = test::raw_cloud(scene.raw_target);
     for (RawCloud& view : raw) view.viewpoints = &viewpoints[0].x, view.viewpoint_count = 12;

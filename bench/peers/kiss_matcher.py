@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""gpureg's evidence preset beside KISS-Matcher: the same pairs from the same raw points, the same machine, one run.
+"""gpureg beside KISS-Matcher: the same pairs from the same raw points, the same machine, one run.
 
 KISS-Matcher gets its defaults for voxels of 5 cm. A pair of it is all that it does from the raw points on, preparation of both clouds
 included, because its interface offers nothing to keep; pairs with at least --inliers final inliers are reported (its examples take fewer
@@ -46,7 +46,7 @@ def batch(arguments, folder, temporary, part):
         (temporary / "pairs.txt").write_text("".join(f"{i} {j}\n" for i, j in part))
         words = ["--pairs", temporary / "pairs.txt"]
     before = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime
-    record.gpureg(arguments, "batch", folder, "--preset", "evidence", "--backend", arguments.backend, "--quiet", *words,
+    record.gpureg(arguments, "batch", folder, "--backend", arguments.backend, "--quiet", *words,
                   "-o", temporary / "result.log", "--json", temporary / "result.json")
     return json.loads((temporary / "result.json").read_text()), resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime - before
 
