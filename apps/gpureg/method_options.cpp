@@ -37,6 +37,9 @@ void MethodOptions::add_to(CLI::App& verb) {
                   "Quadruples of matches that the preset loopsmart tries per pair")
       ->check(natural_number())
       ->capture_default_str();
+  verb.add_option("--quality", quality, "From 0, the fastest, to 10, which finds the most; of the preset default")
+      ->check(CLI::Range(0u, kHighestQuality))
+      ->capture_default_str();
   verb.add_option("--seed", seed, "Same seed, same result, on any machine")
       ->check(natural_number())
       ->capture_default_str();
@@ -45,7 +48,7 @@ void MethodOptions::add_to(CLI::App& verb) {
 RegistrationOptions MethodOptions::registration() const {
   RegistrationOptions options = preset == "loopsmart"
                                     ? RegistrationOptions::loopsmart(voxel_size)
-                                    : RegistrationOptions::from_voxel_size(voxel_size);
+                                    : RegistrationOptions::from_voxel_size(voxel_size, quality);
   options.hypothesis.count = hypotheses;
   options.hypothesis.seed = seed;
   options.validate();

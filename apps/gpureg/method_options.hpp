@@ -17,6 +17,7 @@ struct MethodOptions {
   std::string backend = "auto";
   unsigned threads = 0;
   std::uint32_t hypotheses = HypothesisOptions{}.count;
+  std::uint32_t quality = kDefaultQuality;
   std::uint64_t seed = HypothesisOptions{}.seed;
 
   void add_to(CLI::App& verb);

@@ -97,6 +97,9 @@ struct RefineOptions {
   void validate() const;
 };
 
+/// The steps of the dial between speed and recall: 0 is the fastest, 10 finds the most.
+inline constexpr std::uint32_t kDefaultQuality = 5, kHighestQuality = 10;
+
 /// All options of one registration. An aggregate with in-class defaults: set what you want to change.
 struct RegistrationOptions {
   PrepareOptions prepare;
@@ -108,9 +111,9 @@ struct RegistrationOptions {
   double min_confidence = 0.5;  ///< Proposal::compatibility: confidence below which no alignment is reported, [0, 1]
 
   /// Every length from the voxel size: normals 2 v, FPFH 5 v and 8 v, correspondence distance 1.5 v, kernel 0.5 v, compatibility 1 v,
-  /// free-space margin 2.4 v.
-  /// Throws InvalidArgument unless v is finite and > 0.
-  static RegistrationOptions from_voxel_size(float voxel_size);
+  /// free-space margin 2.4 v. quality, 0 to 10, sets how many candidates are looked at: compatibility.seeds and triangles,
+  /// evidence.modes. Throws InvalidArgument unless v is finite and > 0 and quality at most 10.
+  static RegistrationOptions from_voxel_size(float voxel_size, std::uint32_t quality = kDefaultQuality);
 
   /// The paper's algorithm with the paper's numbers (Zhang and Chen, LoopSmart, section III): 4,000,000 quadruples, no refinement.
   static RegistrationOptions loopsmart();

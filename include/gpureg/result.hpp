@@ -62,7 +62,7 @@ struct RegistrationResult {
   RegistrationReason reason = RegistrationReason::cancelled;
   bool has_candidate = false;  ///< target_from_source holds a pose, reported or not
   UnalignedIsometry3d target_from_source = UnalignedIsometry3d::Identity();  ///< converts to Eigen::Isometry3d
-  double score = 0;            ///< what ranks results: today the inlier ratio
+  double score = 0;            ///< what ranks results: the confidence; the inlier ratio with Proposal::quadruples
   double inlier_ratio = 0;     ///< inliers (judged) / points scored, [0, 1]
   double inlier_rmse = 0;      ///< metres, over the inliers
   CorrespondenceMoments source_moments;  ///< of all correspondences within the distance, whatever their normals: points of the source, in its frame (Redwood's convention)

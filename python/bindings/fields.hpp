@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <array>
 #include <charconv>
 #include <cstdlib>
 #include <functional>
@@ -56,6 +57,8 @@ std::string expected() {
     return "'compatibility' or 'quadruples'";
   else if constexpr (std::is_floating_point_v<M>)
     return "a number";
+  else if constexpr (std::is_same_v<M, std::array<double, 6>>)
+    return "6 numbers";
   else if constexpr (std::is_integral_v<M>)
     return "a whole number from 0 to " + std::to_string(std::numeric_limits<M>::max());
   else

@@ -130,7 +130,8 @@ void bind_options(py::module_& m) {
   auto cls = bind_options_class<RegistrationOptions>(
       m, "RegistrationOptions", "All options of one registration.", registration_fields());
   cls.def_static("from_voxel_size", &RegistrationOptions::from_voxel_size, py::arg("voxel_size"),
-                 "Every length from the voxel size (metres).");
+                 py::arg("quality") = kDefaultQuality,
+                 "Every length from the voxel size (metres); quality, 0 to 10, trades time for recall.");
   cls.def_static(
       "loopsmart", [](float voxel_size) { return RegistrationOptions::loopsmart(voxel_size); },
       py::arg("voxel_size") = shortest(PrepareOptions{}.voxel_size),

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "gpureg/result.hpp"
 
+#include <pybind11/stl.h>
+
 #include <cstdio>
 #include <limits>
 
@@ -47,6 +49,33 @@ std::vector<Field<PrepareStatistics>> prepare_fields() {
       field("normals", &P::normals, "Milliseconds of the normals."),
       field("features", &P::features, "Milliseconds of the features."),
       field("grid", &P::grid, "Milliseconds of the search grid."),
+      field("depth_maps", &P::depth_maps, "Milliseconds of the depth maps."),
+  };
+}
+
+std::vector<Field<PoseEvidence>> evidence_fields() {
+  using E = PoseEvidence;
+  return {
+      field("match_inliers", &E::match_inliers, "Matches that the pose brings together."),
+      field("match_support", &E::match_support, "The same as a balanced share of all matches."),
+      field("source_overlap", &E::source_overlap,
+            "Share of the source's points with a point of the target in reach, normals alike."),
+      field("target_overlap", &E::target_overlap, "The other way round."),
+      field("source_balanced_overlap", &E::source_balanced_overlap,
+            "Points weigh less where many normals point their way."),
+      field("target_balanced_overlap", &E::target_balanced_overlap, "The other way round."),
+      field("source_seen", &E::source_seen,
+            "Share of the source's points in directions that the target's viewpoints saw; 0: "
+            "no viewpoint is known."),
+      field("target_seen", &E::target_seen, "The other way round."),
+      field("source_impossible", &E::source_impossible,
+            "Of these, the share in space that was seen to be free."),
+      field("target_impossible", &E::target_impossible, "The other way round."),
+      field("source_hidden", &E::source_hidden, "Of those seen, the share behind a surface."),
+      field("target_hidden", &E::target_hidden, "The other way round."),
+      field("stiffness", &E::stiffness,
+            "6 eigenvalues, ascending, of the point-to-plane information: a small one is a "
+            "direction in which the pose slides."),
   };
 }
 
@@ -84,6 +113,50 @@ void bind_moments(py::module_& m) {
       .def(py::pickle(&state_of, &moments_from))
       .def("__repr__", [](const M& o) {
         return "<gpureg.CorrespondenceMoments of " + std::to_string(o.count) + " points>";
+      });
+}
+
+py::dict state_of(const RegistrationMode& mode) {
+  py::dict state;
+  state["target_from_source"] = array_of(mode.target_from_source.matrix());
+  state["confidence"] = mode.confidence;
+  state["overlap_confidence"] = mode.overlap_confidence;
+  state["evidence"] = to_dict(mode.evidence, evidence_fields());
+  state["found_as"] = mode.found_as;
+  return state;
+}
+
+RegistrationMode mode_from(const py::dict& state) {
+  RegistrationMode mode;
+  mode.target_from_source.matrix() = matrix_of<Eigen::Matrix4d>(
+      state["target_from_source"].cast<py::array_t<double>>(), "target_from_source");
+  mode.confidence = state["confidence"].cast<double>();
+  mode.overlap_confidence = state["overlap_confidence"].cast<double>();
+  assign(mode.evidence, evidence_fields(), state["evidence"], "PoseEvidence");
+  mode.found_as = state["found_as"].cast<std::uint32_t>();
+  return mode;
+}
+
+void bind_mode(py::module_& m) {
+  using M = RegistrationMode;
+  py::class_<M>(m, "RegistrationMode", "One of the distinct poses of a pair.")
+      .def_property_readonly(
+          "target_from_source", [](const M& o) { return array_of(o.target_from_source.matrix()); },
+          "(4, 4) float64: maps points of the source into the target's frame.")
+      .def_readonly("confidence", &M::confidence, "Probability that the pose is right.")
+      .def_readonly("overlap_confidence", &M::overlap_confidence,
+                    "Probability that it is right and that the clouds overlap by 30 % or more.")
+      .def_readonly("evidence", &M::evidence, "What speaks for and against it.")
+      .def_readonly("found_as", &M::found_as,
+                    "Place before refinement, the most promising first.")
+      .def("to_dict", [](const M& o) { return state_of(o); },
+           "All values as plain Python and numpy objects.")
+      .def(py::pickle([](const M& o) { return state_of(o); }, &mode_from))
+      .def("__repr__", [](const M& o) {
+        char text[96];
+        std::snprintf(text, sizeof(text), "<gpureg.RegistrationMode, confidence %.3f>",
+                      o.confidence);
+        return std::string(text);
       });
 }
 
@@ -129,6 +202,9 @@ py::dict result_state(const RegistrationResult& r) {
   state["inlier_rmse"] = r.inlier_rmse;
   state["source_moments"] = state_of(r.source_moments);
   state["target_moments"] = state_of(r.target_moments);
+  py::list modes;
+  for (const RegistrationMode& mode : r.modes) modes.append(state_of(mode));
+  state["modes"] = modes;
   state["statistics"] = to_dict(r.statistics, statistics_fields());
   state["timings"] = to_dict(r.timings, timing_fields());
   return state;
@@ -146,6 +222,8 @@ RegistrationResult result_from(const py::dict& state) {
   r.inlier_rmse = state["inlier_rmse"].cast<double>();
   r.source_moments = moments_from(state["source_moments"]);
   r.target_moments = moments_from(state["target_moments"]);
+  for (const auto mode : state["modes"].cast<py::list>())
+    r.modes.push_back(mode_from(mode.cast<py::dict>()));
   assign(r.statistics, statistics_fields(), state["statistics"], "RegistrationStatistics");
   assign(r.timings, timing_fields(), state["timings"], "StageTimings");
   return r;
@@ -168,7 +246,13 @@ void bind_registration_result(py::module_& m) {
       .def_property_readonly("target_from_source", &pose_of,
                              "(4, 4) float64: maps points of the source into the target's frame; "
                              "NaN where there is no candidate.")
-      .def_readonly("score", &R::score, "What ranks results.")
+      .def_readonly("score", &R::score,
+                    "What ranks results: the confidence; the inlier ratio where the proposal is "
+                    "'quadruples'.")
+      .def_property_readonly(
+          "modes", [](const R& r) { return r.modes; },
+          "Distinct poses, the most confident first; the first is target_from_source. Empty where "
+          "the proposal is 'quadruples'.")
       .def_readonly("inlier_ratio", &R::inlier_ratio, "Inliers over points scored, [0, 1].")
       .def_readonly("inlier_rmse", &R::inlier_rmse, "Metres, over the inliers.")
       .def_readonly("source_moments", &R::source_moments,
@@ -196,6 +280,9 @@ void bind_result(py::module_& m) {
                                        prepare_fields())
       .def_property_readonly("total", &PrepareStatistics::total, "Milliseconds of all stages.");
   bind_moments(m);
+  bind_record_class<PoseEvidence>(m, "PoseEvidence", "What speaks for and against a pose.",
+                                  evidence_fields());
+  bind_mode(m);
   bind_registration_result(m);
 }
 

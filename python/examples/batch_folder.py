@@ -16,12 +16,10 @@ def main() -> None:
     parser.add_argument("folder")
     parser.add_argument("--output", required=True)
     parser.add_argument("--voxel-size", type=float, default=0.05)
-    parser.add_argument("--hypotheses", type=int)
+    parser.add_argument("--quality", type=int, default=5)
     arguments = parser.parse_args()
 
-    options = gpureg.RegistrationOptions.from_voxel_size(arguments.voxel_size)
-    if arguments.hypotheses is not None:
-        options.hypothesis.count = arguments.hypotheses
+    options = gpureg.RegistrationOptions.from_voxel_size(arguments.voxel_size, arguments.quality)
     run = gpureg.register_all(arguments.folder, output=arguments.output, options=options)
     print(run)
     best = run.table().sort_by([("score", "descending")]).slice(0, 5)

@@ -65,7 +65,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--fragments", type=int, default=200)
     parser.add_argument("--neighbors", type=int, default=20)
-    parser.add_argument("--hypotheses", type=int, default=20_000)
+    parser.add_argument("--quality", type=int, default=5)
     parser.add_argument("--voxel-size", type=float, default=0.12)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--output", type=Path)
@@ -77,8 +77,7 @@ def main() -> None:
     points = sum(map(len, clouds)) // len(clouds)
     print(f"fragments  {len(clouds)} of {points} points, made in {time.monotonic() - begin:.1f} s")
 
-    options = gpureg.RegistrationOptions.from_voxel_size(arguments.voxel_size)
-    options.hypothesis.count = arguments.hypotheses
+    options = gpureg.RegistrationOptions.from_voxel_size(arguments.voxel_size, arguments.quality)
     nearest = pruning.Nearest(k=arguments.neighbors, options=options.prepare)
     fragments = gpureg.FragmentSet.from_clouds(clouds)
     pairs = nearest(fragments)

@@ -74,6 +74,7 @@ class PrepareOptions:
     _fields: Tuple[str, ...]
 
 class HypothesisOptions:
+    proposal: Literal["compatibility", "quadruples"]
     count: int
     neighbors: int
     mutual: bool
@@ -81,10 +82,10 @@ class HypothesisOptions:
     max_survivors: int
     smaller_as_source: bool
     seed: int
-    proposal: Literal["compatibility", "quadruples"]
     def __init__(
         self,
         *,
+        proposal: Literal["compatibility", "quadruples"] = ...,
         count: int = ...,
         neighbors: int = ...,
         mutual: bool = ...,
@@ -92,11 +93,11 @@ class HypothesisOptions:
         max_survivors: int = ...,
         smaller_as_source: bool = ...,
         seed: int = ...,
-        proposal: Literal["compatibility", "quadruples"] = ...,
     ) -> None: ...
     def replace(
         self,
         *,
+        proposal: Literal["compatibility", "quadruples"] = ...,
         count: int = ...,
         neighbors: int = ...,
         mutual: bool = ...,
@@ -104,7 +105,6 @@ class HypothesisOptions:
         max_survivors: int = ...,
         smaller_as_source: bool = ...,
         seed: int = ...,
-        proposal: Literal["compatibility", "quadruples"] = ...,
     ) -> HypothesisOptions: ...
     def validate(self) -> None: ...
     def __eq__(self, other: object, /) -> bool: ...
@@ -239,20 +239,20 @@ class RefineOptions:
 class RegistrationOptions:
     prepare: PrepareOptions
     hypothesis: HypothesisOptions
-    score: ScoreOptions
-    refine: RefineOptions
     compatibility: CompatibilityOptions
     evidence: EvidenceOptions
+    score: ScoreOptions
+    refine: RefineOptions
     min_confidence: float
     def __init__(
         self,
         *,
         prepare: PrepareOptions = ...,
         hypothesis: HypothesisOptions = ...,
-        score: ScoreOptions = ...,
-        refine: RefineOptions = ...,
         compatibility: CompatibilityOptions = ...,
         evidence: EvidenceOptions = ...,
+        score: ScoreOptions = ...,
+        refine: RefineOptions = ...,
         min_confidence: float = ...,
     ) -> None: ...
     def replace(
@@ -260,14 +260,14 @@ class RegistrationOptions:
         *,
         prepare: PrepareOptions = ...,
         hypothesis: HypothesisOptions = ...,
-        score: ScoreOptions = ...,
-        refine: RefineOptions = ...,
         compatibility: CompatibilityOptions = ...,
         evidence: EvidenceOptions = ...,
+        score: ScoreOptions = ...,
+        refine: RefineOptions = ...,
         min_confidence: float = ...,
     ) -> RegistrationOptions: ...
     @staticmethod
-    def from_voxel_size(voxel_size: float) -> RegistrationOptions: ...
+    def from_voxel_size(voxel_size: float, quality: int = 5) -> RegistrationOptions: ...
     @staticmethod
     def loopsmart(voxel_size: float = ...) -> RegistrationOptions: ...
     def validate(self) -> None: ...
@@ -341,6 +341,8 @@ class PrepareStatistics:
     @property
     def grid(self) -> float: ...
     @property
+    def depth_maps(self) -> float: ...
+    @property
     def total(self) -> float: ...
     def __eq__(self, other: object, /) -> bool: ...
     __hash__: None  # type: ignore[assignment]
@@ -355,6 +357,50 @@ class CorrespondenceMoments:
     def outer(self) -> _Float64: ...
     def information_redwood(self) -> _Float64: ...
     def information_open3d(self) -> _Float64: ...
+
+class PoseEvidence:
+    @property
+    def match_inliers(self) -> int: ...
+    @property
+    def match_support(self) -> float: ...
+    @property
+    def source_overlap(self) -> float: ...
+    @property
+    def target_overlap(self) -> float: ...
+    @property
+    def source_balanced_overlap(self) -> float: ...
+    @property
+    def target_balanced_overlap(self) -> float: ...
+    @property
+    def source_seen(self) -> float: ...
+    @property
+    def target_seen(self) -> float: ...
+    @property
+    def source_impossible(self) -> float: ...
+    @property
+    def target_impossible(self) -> float: ...
+    @property
+    def source_hidden(self) -> float: ...
+    @property
+    def target_hidden(self) -> float: ...
+    @property
+    def stiffness(self) -> List[float]: ...
+    def __eq__(self, other: object, /) -> bool: ...
+    __hash__: None  # type: ignore[assignment]
+    _fields: Tuple[str, ...]
+
+class RegistrationMode:
+    @property
+    def target_from_source(self) -> _Float64: ...
+    @property
+    def confidence(self) -> float: ...
+    @property
+    def overlap_confidence(self) -> float: ...
+    @property
+    def evidence(self) -> PoseEvidence: ...
+    @property
+    def found_as(self) -> int: ...
+    def to_dict(self) -> Dict[str, Any]: ...
 
 class RegistrationResult:
     @property
@@ -371,6 +417,8 @@ class RegistrationResult:
     def target_from_source(self) -> _Float64: ...
     @property
     def score(self) -> float: ...
+    @property
+    def modes(self) -> List[RegistrationMode]: ...
     @property
     def inlier_ratio(self) -> float: ...
     @property

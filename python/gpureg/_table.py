@@ -21,6 +21,7 @@ def row_of(i: int, j: int, result: RegistrationResult) -> Dict[str, Any]:
         if isinstance(value, (str, bool, int, float)):
             row[name] = value
     row["target_from_source"] = result.target_from_source.ravel().tolist() if result.has_candidate else None
+    row["overlap_confidence"] = result.modes[0].overlap_confidence if result.modes else None
     row["information"] = result.source_moments.information_redwood().ravel().tolist()
     for name in type(result.statistics)._fields:
         row[name] = getattr(result.statistics, name)
@@ -30,6 +31,8 @@ def row_of(i: int, j: int, result: RegistrationResult) -> Dict[str, Any]:
 def _type_of(name: str, value: Any) -> pa.DataType:
     if name in ("i", "j"):
         return pa.int32()
+    if name == "overlap_confidence":
+        return pa.float64()
     if name in ("target_from_source", "information"):
         return pa.list_(pa.float64())  # not of fixed size: older readers of Parquet stumble over nulls among those
     kinds: Dict[type, pa.DataType] = {str: pa.string(), bool: pa.bool_(), int: pa.int64(), float: pa.float64()}

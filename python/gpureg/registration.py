@@ -188,8 +188,7 @@ def align(
     --------
     >>> import numpy as np, gpureg
     >>> cloud = gpureg.prepare(np.random.default_rng(1).random((2000, 3)))
-    >>> few = gpureg.RegistrationOptions(hypothesis=gpureg.HypothesisOptions(count=1000))
-    >>> result = gpureg.align(cloud, cloud, options=few)
+    >>> result = gpureg.align(cloud, cloud)
     >>> result.status, bool(np.allclose(result.target_from_source, np.eye(4), atol=1e-3))
     ('aligned', True)
     """
@@ -237,8 +236,7 @@ def align_batch(
     >>> import numpy as np, gpureg
     >>> cloud = np.random.default_rng(1).random((2000, 3))
     >>> shifted = cloud + [0.5, 0, 0]
-    >>> few = gpureg.RegistrationOptions(hypothesis=gpureg.HypothesisOptions(count=1000))
-    >>> results = gpureg.align_batch([cloud, shifted], [(0, 1), (1, 0)], options=few)
+    >>> results = gpureg.align_batch([cloud, shifted], [(0, 1), (1, 0)])
     >>> [round(float(r.target_from_source[0, 3]), 2) for r in results]
     [0.5, -0.5]
     """
@@ -260,7 +258,7 @@ def register(
     target: Any,
     voxel_size: Optional[float] = None,
     *,
-    hypotheses: Optional[int] = None,
+    quality: Optional[int] = None,
     seed: Optional[int] = None,
     options: Optional[RegistrationOptions] = None,
     context: Optional[Context] = None,
@@ -274,8 +272,8 @@ def register(
     voxel_size : float, optional
         Edge of the downsampling voxel; every other length follows from it. Default:
         ``PrepareOptions().voxel_size``, 0.05.
-    hypotheses : int, optional
-        Quadruples of matches tried. Fewer are faster, more find less overlap.
+    quality : int, optional
+        From 0, the fastest, to 10, which finds the most. Default: 5.
     seed : int, optional
         Same seed, same bits, on any machine.
     options : RegistrationOptions, optional
@@ -291,21 +289,19 @@ def register(
     >>> import numpy as np, gpureg
     >>> points = np.random.default_rng(1).random((2000, 3))
     >>> turned = points @ np.diag([-1, -1, 1])
-    >>> result = gpureg.register(points, turned, voxel_size=0.05, hypotheses=1000)
+    >>> result = gpureg.register(points, turned, voxel_size=0.05)
     >>> np.round(result.target_from_source[:3, :3]) + 0.0
     array([[-1.,  0.,  0.],
            [ 0., -1.,  0.],
            [ 0.,  0.,  1.]])
     """
     options = _checked(options, RegistrationOptions, "options")
-    if options is not None and not (voxel_size is None and hypotheses is None and seed is None):
-        raise TypeError("options: give either options, or voxel_size, hypotheses and seed")
+    if options is not None and not (voxel_size is None and quality is None and seed is None):
+        raise TypeError("options: give either options, or voxel_size, quality and seed")
     if options is None:
         options = RegistrationOptions.from_voxel_size(
-            PrepareOptions().voxel_size if voxel_size is None else voxel_size
+            PrepareOptions().voxel_size if voxel_size is None else voxel_size, 5 if quality is None else quality
         )
-        if hypotheses is not None:
-            options.hypothesis.count = hypotheses
         if seed is not None:
             options.hypothesis.seed = seed
     context = _context(context)

@@ -216,12 +216,13 @@ class TestCommand:
         whole = room(7, 4000)
         for k in range(5):
             gpureg.write_point_cloud(folder / f"cloud_bin_{k}.ply", moved(whole[:: k + 1], pose(k)))
-        self.compare(folder, tmp_path, ["--hypotheses", 20000, "--voxel-size", 0.06], few(20000, 0.06))
+        options = gpureg.RegistrationOptions.loopsmart(0.06)
+        options.hypothesis.count = 20000
+        self.compare(folder, tmp_path, ["--preset", "loopsmart", "--hypotheses", 20000, "--voxel-size", 0.06], options)
 
     def test_red_kitchen(self, kitchen, tmp_path):
-        options = gpureg.RegistrationOptions()
-        options.hypothesis.count = 200_000  # what is compared does not depend on it, time does
-        self.compare(kitchen, tmp_path, ["--hypotheses", 200_000], options)
+        # What is compared does not depend on the quality, time does.
+        self.compare(kitchen, tmp_path, ["--quality", 0], gpureg.RegistrationOptions.from_voxel_size(0.05, quality=0))
 
     def compare(self, folder, tmp_path, arguments, options):
         done = self.run("batch", folder, *arguments, "-o", tmp_path / "c.log", "--info", tmp_path / "c.info", "--json", tmp_path / "c.json")

@@ -38,13 +38,13 @@ def test_register_two_clouds(scans, tmp_path):
 
 def test_batch_folder(scans, tmp_path):
     pytest.importorskip("pyarrow")
-    shown = run("batch_folder.py", scans, "--output", tmp_path / "run", "--hypotheses", 20000)
+    shown = run("batch_folder.py", scans, "--output", tmp_path / "run", "--quality", 2)
     assert shown.startswith("3 pairs, ") and "   1 into    0: aligned" in shown
 
 
 def test_many_fragments():
     pytest.importorskip("faiss")
-    shown = run("many_fragments.py", "--fragments", 24, "--neighbors", 4, "--hypotheses", 500, "--quiet")
+    shown = run("many_fragments.py", "--fragments", 24, "--neighbors", 4, "--quality", 0, "--quiet")
     assert "of the recall lost" in shown and "MiB at most" in shown
 
 

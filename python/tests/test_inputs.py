@@ -105,7 +105,7 @@ def test_nan_and_infinite_rows_are_dropped_and_counted(source, reference):
 def test_empty_clouds_have_a_reason(source):
     for empty in (np.zeros((0, 3)), np.zeros((0, 3), np.float32), np.zeros((0, 3), np.int64)):
         assert gpureg.register(empty, source).reason == "too_few_source_points"
-    assert gpureg.register(source, source[:3], hypotheses=100).reason == "too_few_target_points"
+    assert gpureg.register(source, source[:3], quality=0).reason == "too_few_target_points"
     assert len(gpureg.prepare(np.zeros((0, 3)), features=np.zeros((0, 8)), normals=np.zeros((0, 3)))) == 0
     assert gpureg.align_batch([], []) == [] and gpureg.prepare_batch([]) == []
 

@@ -27,14 +27,28 @@ def bits(result):
 
 
 def test_register_finds_the_pose(source, target, truth):
-    result = gpureg.register(source, target, hypotheses=20000)
+    result = gpureg.register(source, target, quality=2)
     assert result.aligned and result.status == "aligned" and result.reason == "none"
     assert error_of(result, truth) < CLOSE
     assert result.target_from_source.dtype == np.float64
     assert 0.4 < result.inlier_ratio <= 1 and 0 < result.inlier_rmse < 0.05
-    assert result.statistics.hypotheses == 20000
+    assert result.statistics.hypotheses == gpureg.RegistrationOptions.from_voxel_size(0.05, 2).compatibility.seeds
     assert result.timings.total > 0
-    assert repr(result).startswith("<gpureg.RegistrationResult aligned, score 0.")
+    assert repr(result).startswith("<gpureg.RegistrationResult aligned, score ")
+
+
+def test_modes_say_what_speaks_for_them(source, target):
+    result = gpureg.register(source, target)
+    assert len(result.modes) > 1
+    best, rival = result.modes[:2]
+    assert np.array_equal(best.target_from_source, result.target_from_source) and best.confidence == result.score
+    assert best.confidence >= rival.confidence and best.overlap_confidence <= best.confidence
+    assert best.evidence.match_support > rival.evidence.match_support
+    assert len(best.evidence.stiffness) == 6 and best.evidence.stiffness == sorted(best.evidence.stiffness)
+    assert repr(best).startswith("<gpureg.RegistrationMode, confidence ")
+    paper = gpureg.align(gpureg.prepare(source), gpureg.prepare(target), options=gpureg.RegistrationOptions(
+        hypothesis=gpureg.HypothesisOptions(proposal="quadruples", count=20000)))
+    assert paper.aligned and paper.modes == [] and paper.score == paper.inlier_ratio
 
 
 def test_register_equals_prepare_and_align(source, target):
@@ -48,22 +62,22 @@ def test_register_equals_prepare_and_align(source, target):
 
 def test_any_number_of_threads_gives_the_same_bits(source, target):
     results = [
-        gpureg.register(source, target, hypotheses=5000, context=gpureg.Context.cpu(n)) for n in (1, 2, 5)
+        gpureg.register(source, target, quality=1, context=gpureg.Context.cpu(n)) for n in (1, 2, 5)
     ]
     assert len({bits(r) for r in results}) == 1
 
 
 def test_seed_and_voxel_size_are_used(source, target):
-    first = gpureg.register(source, target, hypotheses=2000, seed=1)
-    assert bits(first) != bits(gpureg.register(source, target, hypotheses=2000, seed=2))
-    coarse = gpureg.register(source, target, 0.1, hypotheses=2000)
+    first = gpureg.register(source, target, quality=1, seed=1)
+    assert bits(first) != bits(gpureg.register(source, target, quality=1, seed=2))
+    coarse = gpureg.register(source, target, 0.1, quality=1)
     assert coarse.statistics.source_points < first.statistics.source_points
 
 
 def test_no_alignment_is_a_status(source):
-    result = gpureg.register(source, np.random.default_rng(0).random((9000, 3)), hypotheses=2000)
+    result = gpureg.register(source, np.random.default_rng(0).random((9000, 3)), quality=1)
     assert result.status == "not_aligned" and not result.aligned
-    assert result.reason in ("inlier_ratio_too_low", "no_hypothesis_survived", "degenerate_geometry")
+    assert result.reason == "confidence_too_low" and result.score < 0.5
     assert result.explanation
     if not result.has_candidate:
         assert np.isnan(result.target_from_source).all()
@@ -96,7 +110,7 @@ def test_prepared_cloud_shows_what_it_holds(source):
 
 
 def test_results_travel(source, target):
-    result = gpureg.register(source, target, hypotheses=2000)
+    result = gpureg.register(source, target, quality=1)
     for twin in (pickle.loads(pickle.dumps(result)), copy.deepcopy(result)):
         assert bits(twin) == bits(result)
         assert twin.timings == result.timings and twin.statistics == result.statistics
@@ -180,12 +194,12 @@ def test_four_threads_get_right_results():
 
 
 def test_forked_child_works(source):
-    gpureg.register(source, source, hypotheses=500)  # the default context has threads now, or a device
+    gpureg.register(source, source, quality=0)  # the default context has threads now, or a device
     cuda = gpureg.default_context().backend == "cuda"
     child = os.fork()
     if child == 0:
         try:
-            good = gpureg.register(source, source, hypotheses=500).aligned
+            good = gpureg.register(source, source, quality=0).aligned
         except gpureg.BackendUnavailable as error:
             good = cuda and "fork" in str(error)
         os._exit(0 if good else 1)

@@ -87,9 +87,26 @@ void RefineOptions::validate() const {
   require(length(kernel_width), "refine.kernel_width", kernel_width, kLength);
 }
 
-RegistrationOptions RegistrationOptions::from_voxel_size(float voxel_size) {
+namespace {
+
+/// What more time buys: more seeds find more of the hard pairs, and more modes keep what they found. The matches and the evidence stay
+/// as they are, so that a confidence means the same at every quality.
+struct Effort {
+  std::uint32_t seeds, triangles, modes;
+};
+constexpr Effort kEfforts[kHighestQuality + 1] = {{64, 32, 8},     {128, 48, 12},    {256, 64, 16},    {384, 96, 24},
+                                                  {512, 128, 32},  {1024, 128, 32},  {1536, 128, 32},  {2048, 128, 48},
+                                                  {3072, 192, 48}, {4096, 256, 64},  {8192, 384, 64}};
+
+}  // namespace
+
+RegistrationOptions RegistrationOptions::from_voxel_size(float voxel_size, std::uint32_t quality) {
   require(length(voxel_size), "voxel_size", voxel_size, kLength);
+  require_range(quality, 0, kHighestQuality, "quality");
   RegistrationOptions o;
+  o.compatibility.seeds = kEfforts[quality].seeds;
+  o.compatibility.triangles = kEfforts[quality].triangles;
+  o.evidence.modes = kEfforts[quality].modes;
   o.prepare.voxel_size = voxel_size;
   o.prepare.normal_radius = 2.0f * voxel_size;
   o.prepare.feature_radius = 5.0f * voxel_size;
@@ -102,7 +119,7 @@ RegistrationOptions RegistrationOptions::from_voxel_size(float voxel_size) {
   o.compatibility.consensus_distance = 2.0f * voxel_size;
   o.compatibility.seed_separation = 2.0f * voxel_size;
   o.evidence.mode_distance = 6.0f * voxel_size;
-  o.evidence.free_space_margin = 2.4f * voxel_size;
+  o.evidence.free_space_margin = voxel_size / 5.0f * 12.0f;  // 2.4 v, and the default's bits at 0.05
   o.evidence.min_range = 6.0f * voxel_size;
   return o;
 }
