@@ -17,6 +17,7 @@ struct PairRecord {
   bool aligned = false;
   std::string reason;
   double score = 0;
+  std::optional<double> strict_score;  ///< probability of a right pose and of 30 % overlap, where it was estimated
   std::optional<Eigen::Matrix4d> transform;  ///< T_ij: fragment j into fragment i
   double milliseconds = 0;                   ///< all stages
   Json json;                                 ///< everything, as written to RESULT.json

@@ -53,7 +53,10 @@ int run(const ReportOptions& o) {
     throw IoError(o.result +
                   ": a report needs RESULT.json of `gpureg batch --json`, this is a log");
   std::optional<evaluation::GroundTruth> truth;
-  if (!o.truth.empty()) truth = evaluation::read_ground_truth(o.truth);
+  if (!o.truth.empty()) {
+    truth = evaluation::read_ground_truth(o.truth);
+    check_belongs(result, o.truth, *truth);
+  }
   std::vector<Picture> pictures;
   if (!o.clouds.empty())
     pictures = draw(truth ? samples(judge(*truth, result), kPicturesOfAKind)

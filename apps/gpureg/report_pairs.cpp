@@ -67,6 +67,11 @@ std::vector<JudgedPair> judge(const GroundTruth& truth, const ResultFile& result
 std::vector<std::pair<double, double>> recall_precision(const GroundTruth& truth,
                                                         const ResultFile& result, bool geometric) {
   std::vector<evaluation::Report> reports = result.reports;
+  if (!geometric)
+    for (evaluation::Report& report : reports) {
+      report.score = report.strict_score.value_or(report.score);
+      report.strict_score.reset();
+    }
   std::vector<double> thresholds;
   for (const evaluation::Report& report : reports) thresholds.push_back(report.score);
   std::sort(thresholds.begin(), thresholds.end(), std::greater<>());

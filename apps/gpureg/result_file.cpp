@@ -1,6 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "result_file.hpp"
 
+#include <algorithm>
+#include <map>
+#include <set>
+
 #include "gpureg/error.hpp"
 #include "json_file.hpp"
 
@@ -14,6 +18,37 @@ std::string plain(const std::string& message) {
                                                                      : message;
 }
 
+// A program that lists fragments says which there are; no pair may name another.
+std::set<int> fragment_numbers(const Json& document) {
+  std::set<int> numbers;
+  const auto fragments = document.find("fragments");
+  if (fragments == document.end() || !fragments->is_array()) return numbers;
+  for (const Json& fragment : *fragments)
+    if (fragment.is_object() && fragment.contains("number") &&
+        fragment["number"].is_number_integer())
+      numbers.insert(fragment["number"].get<int>());
+  return numbers;
+}
+
+void check_pairs(const ResultFile& file, const Json& document) {
+  const std::set<int> numbers = fragment_numbers(document);
+  std::map<std::pair<int, int>, std::size_t> places;
+  for (std::size_t k = 0; k < file.pairs.size(); ++k) {
+    const PairRecord& pair = file.pairs[k];
+    const auto fail = [&](const std::string& reason) {
+      throw IoError(file.path + ": pairs[" + std::to_string(k) + "]: pair " +
+                    std::to_string(pair.i) + " " + std::to_string(pair.j) + " " + reason);
+    };
+    if (pair.i == pair.j) fail("is a fragment and itself");
+    if (!numbers.empty())
+      for (const int number : {pair.i, pair.j})
+        if (numbers.count(number) == 0)
+          fail("names fragment " + std::to_string(number) + ", which \"fragments\" lacks");
+    const auto [first, is_new] = places.insert({{pair.i, pair.j}, k});
+    if (!is_new) fail("stands twice, first as pairs[" + std::to_string(first->second) + "]");
+  }
+}
+
 void read_pairs(ResultFile& file, Json document) {
   if (!document.is_object() || !document.contains("pairs") || !document["pairs"].is_array())
     throw IoError(file.path + ": no result of `gpureg batch`, it has no array \"pairs\"");
@@ -23,11 +58,13 @@ void read_pairs(ResultFile& file, Json document) {
     } catch (const InvalidArgument& error) {
       throw IoError(file.path + ": pairs[" + std::to_string(k) + "]: " + error.what());
     }
+  check_pairs(file, document);
   document.erase("pairs");
   file.document = std::move(document);
   for (const PairRecord& pair : file.pairs)
     if (pair.transform)
-      file.reports.push_back({pair.i, pair.j, *pair.transform, pair.score, pair.aligned});
+      file.reports.push_back(
+          {pair.i, pair.j, *pair.transform, pair.score, pair.aligned, pair.strict_score});
 }
 
 Json to_json(const evaluation::Scores& s) {
@@ -78,10 +115,27 @@ ResultFile read_result(const std::string& path) {
     }
     read_pairs(file, std::move(document));
   } else {
-    for (const evaluation::LogEntry& entry : evaluation::read_log(path))
+    file.log = evaluation::read_log(path);
+    evaluation::check_entries(path, file.log);
+    for (const evaluation::LogEntry& entry : file.log)
       file.reports.push_back({entry.i, entry.j, entry.transform});
   }
   return file;
+}
+
+void check_belongs(const ResultFile& result, const std::string& truth_folder,
+                   const evaluation::GroundTruth& truth) {
+  if (truth.log.empty()) return;
+  const int count = truth.log.front().count;
+  const std::string says = truth_folder + "/gt.log says that there are " + std::to_string(count);
+  if (!result.log.empty() && result.log.front().count != count)
+    throw IoError(result.path + ":" + std::to_string(result.log.front().line) + ": " +
+                  std::to_string(result.log.front().count) + " fragments, but " + says);
+  for (std::size_t k = 0; k < result.pairs.size(); ++k)
+    if (const PairRecord& pair = result.pairs[k]; std::max(pair.i, pair.j) >= count)
+      throw IoError(result.path + ": pairs[" + std::to_string(k) + "]: pair " +
+                    std::to_string(pair.i) + " " + std::to_string(pair.j) + " is out of range, " +
+                    says + " fragments, from 0");
 }
 
 Json to_json(const evaluation::Evaluation& e) {

@@ -16,6 +16,7 @@ struct ResultFile {
   bool has_scores = false;        ///< it was JSON: scores and unreported candidates are known
   std::vector<PairRecord> pairs;  ///< JSON only
   std::vector<evaluation::Report> reports;
+  std::vector<evaluation::LogEntry> log;  ///< logs only
   Json document;  ///< JSON only, without its pairs
 
   double mean_milliseconds() const;          ///< per pair; 0 without pairs
@@ -24,6 +25,10 @@ struct ResultFile {
 
 /// Told apart by content. Throws IoError naming the file and what is wrong.
 ResultFile read_result(const std::string& path);
+
+/// Throws IoError naming file and place where a result cannot be one of the scene that the truth is of.
+void check_belongs(const ResultFile& result, const std::string& truth_folder,
+                   const evaluation::GroundTruth& truth);
 
 /// JSON of scores, as `evaluate --json` writes it.
 Json to_json(const evaluation::Evaluation& evaluation);

@@ -17,12 +17,14 @@ using UnalignedMatrix6d = Eigen::Matrix<double, 6, 6, Eigen::DontAlign>;
 struct LogEntry {
   int i = 0, j = 0, count = 0;  ///< count: number of fragments of the scene, as in the file's third number
   UnalignedMatrix4d transform = UnalignedMatrix4d::Identity();
+  int line = 0;  ///< of the file that it was read from, where the block begins; 0: it was not read
 };
 
 /// One block of a Redwood .info: translation first, quaternion vector with factor 2.
 struct InformationEntry {
   int i = 0, j = 0, count = 0;
   UnalignedMatrix6d information = UnalignedMatrix6d::Zero();
+  int line = 0;  ///< as LogEntry's
 };
 
 /// Read or write. Throw IoError naming file, line and reason; a transform must be a rotation and a translation, every number finite.
@@ -32,6 +34,11 @@ std::vector<LogEntry> read_log(const std::string& path);
 std::vector<InformationEntry> read_information(const std::string& path);
 void write_log(const std::string& path, const std::vector<LogEntry>& entries);
 void write_information(const std::string& path, const std::vector<InformationEntry>& entries);
+
+/// What a single block cannot show: throws IoError naming file and line where a pair stands twice, where the number of fragments
+/// differs from the first block's, and where i or j is not below it.
+void check_entries(const std::string& path, const std::vector<LogEntry>& entries);
+void check_entries(const std::string& path, const std::vector<InformationEntry>& entries);
 
 /// Writes any bytes to path with the same all-or-nothing guarantee: the old file stays until the new one is complete. Links are
 /// followed, the mode of an existing file is kept, devices and pipes are written in place. Throws IoError. Thread-safe.
@@ -43,6 +50,8 @@ struct Report {
   UnalignedMatrix4d transform = UnalignedMatrix4d::Identity();
   double score = 1;
   bool reported = true;  ///< false: tried, but below the caller's threshold (counts in curves and in raw recall only)
+  /// Ranks instead of score under the strict rule, by which a right pose of a pair with little overlap is wrong.
+  std::optional<double> strict_score = std::nullopt;
 };
 
 struct GroundTruth {
@@ -53,7 +62,7 @@ struct GroundTruth {
 };
 
 /// Reads gt.log, gt.info and, where they exist, gt_all.log and gt_all.info of a folder. Throws IoError, also where a .log and its
-/// .info do not list the same pairs in the same order.
+/// .info do not list the same pairs in the same order, and by check_entries.
 GroundTruth read_ground_truth(const std::string& folder);
 
 /// Counts and ratios of one scene under one rule. Ratios in [0, 1]; precision is 1 where nothing is reported.
@@ -85,7 +94,7 @@ double redwood_error(const Eigen::Matrix4d& ground_truth, const Eigen::Matrix4d&
                      const Eigen::Matrix<double, 6, 6>& information);
 
 /// The protocol. Only reports and truths with j - i > 1 count; duplicates count twice. ranked: also fill the ranked scores.
-/// Equal scores enter the ranking together. Average precision is the sum of precision times gain in recall over all thresholds.
+/// Equal scores enter the ranking together; the strict ranking goes by strict_score where a report has one. Average precision is the sum of precision times gain in recall over all thresholds.
 /// Throws InvalidArgument for truths without their information matrices and, where ranked, for a score that is NaN.
 Evaluation evaluate(const GroundTruth& truth, const std::vector<Report>& reports, bool ranked);
 

@@ -14,7 +14,7 @@
 /// Private to the library.
 namespace gpureg::files {
 
-/// Calls take(file, i, j, n, matrix) for each block of the file. Throws IoError naming file and
+/// Calls take(file, i, j, n, matrix, line) for each block of the file; line: where it begins. Throws IoError naming file and
 /// line.
 template <int Size, typename Take>
 void read_blocks(const std::string& path, Take&& take) {
@@ -24,6 +24,7 @@ void read_blocks(const std::string& path, Take&& take) {
     if (file.fields().size() != 3)
       file.fail("a block starts with " + std::to_string(file.fields().size()) +
                 " fields, expected 3: i j n");
+    const int line = static_cast<int>(file.line());
     const int i = file.index(0, "i"), j = file.index(1, "j"), n = file.index(2, "n");
     Eigen::Matrix<double, Size, Size> matrix;
     for (int row = 0; row < Size; ++row) {
@@ -36,7 +37,7 @@ void read_blocks(const std::string& path, Take&& take) {
       for (int column = 0; column < Size; ++column)
         matrix(row, column) = file.number(static_cast<std::size_t>(column), where.c_str());
     }
-    take(file, i, j, n, matrix);
+    take(file, i, j, n, matrix, line);
   }
 }
 

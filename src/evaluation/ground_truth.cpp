@@ -13,13 +13,16 @@ std::string pair_name(int i, int j) { return std::to_string(i) + " " + std::to_s
 void check_same_pairs(const std::string& log_path, const std::vector<LogEntry>& log,
                       const std::string& information_path,
                       const std::vector<InformationEntry>& information) {
+  check_entries(log_path, log);
+  check_entries(information_path, information);
   if (log.size() != information.size())
     throw IoError(information_path + ": has " + std::to_string(information.size()) +
                   " pairs, but " + log_path + " has " + std::to_string(log.size()));
   for (std::size_t k = 0; k < log.size(); ++k) {
     const InformationEntry& entry = information[k];
-    const std::string where = information_path + ": entry " + std::to_string(k + 1) + " (pair " +
-                              pair_name(entry.i, entry.j) + ")";
+    const std::string where = information_path + ":" + std::to_string(entry.line) + ": entry " +
+                              std::to_string(k + 1) + " (pair " + pair_name(entry.i, entry.j) +
+                              ")";
     if (entry.i != log[k].i || entry.j != log[k].j)
       throw IoError(where + " stands where " + log_path + " has pair " +
                     pair_name(log[k].i, log[k].j));

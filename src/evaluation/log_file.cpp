@@ -26,9 +26,9 @@ void check_rigid(const files::TextFile& file, const Eigen::Matrix4d& t) {
 std::vector<LogEntry> read_log(const std::string& path) {
   std::vector<LogEntry> entries;
   files::read_blocks<4>(path, [&](const files::TextFile& file, int i, int j, int n,
-                                  const Eigen::Matrix4d& transform) {
+                                  const Eigen::Matrix4d& transform, int line) {
     check_rigid(file, transform);
-    entries.push_back({i, j, n, transform});
+    entries.push_back({i, j, n, transform, line});
   });
   return entries;
 }

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <gtest/gtest.h>
 
+#include <Eigen/Geometry>
+
 #include "cli/command.hpp"
 #include "cli/scene.hpp"
 #include "gpureg/evaluation.hpp"
@@ -99,6 +101,77 @@ TEST_F(Evaluate, TheGeometricRuleWhereTheTruthAllowsIt) {
   EXPECT_EQ(scene["geometric"]["precision"], 1.0);
 }
 
+TEST_F(Evaluate, TheStrictRankingGoesByTheChanceOfOverlapToo) {
+  // A right pose of a pair that overlaps too little is the surest of all, but says so itself.
+  json low = pair(1, 7, 0.99, true, false), listed = pair(0, 2, 0.8, true, false);
+  low["modes"] = {{{"overlap_confidence", 0.1}}};
+  listed["modes"] = {{{"overlap_confidence", 0.7}}};
+  auto log = evaluation::read_log(truth_ / "gt.log");
+  auto information = evaluation::read_information(truth_ / "gt.info");
+  log.push_back({1, 7, 9, Eigen::Matrix4d::Identity()});
+  information.push_back({1, 7, 9, information[0].information});
+  evaluation::write_log(truth_ / "gt_all.log", log);
+  evaluation::write_information(truth_ / "gt_all.info", information);
+  ASSERT_EQ(evaluate(write({low, listed})).status, 0);
+  json scene = json_of(out_ / "e.json")["scenes"][0];
+  EXPECT_EQ(scene["strict"]["recall_at_precision"]["99"], 0.25);
+  EXPECT_EQ(scene["strict"]["curve"], (json{{0.25, 1.0}, {0.25, 0.5}}));
+  EXPECT_EQ(scene["geometric"]["curve"], (json{{0.0, 1.0}, {0.25, 1.0}}));
+  low.erase("modes"), listed.erase("modes");
+  ASSERT_EQ(evaluate(write({low, listed})).status, 0);
+  scene = json_of(out_ / "e.json")["scenes"][0];
+  EXPECT_EQ(scene["strict"]["recall_at_precision"]["99"], 0.0);
+  low["modes"] = {{{"overlap_confidence", "high"}}};
+  expect_bad(json{{"pairs", {low}}}.dump(), {"pairs[0]", "overlap_confidence", "high"});
+}
+
+TEST_F(Evaluate, EveryPairHasItsVerdict) {
+  const std::string path = write({pair(0, 2, 0.9, true, false), pair(0, 3, 0.4, false, true),
+                                  pair(1, 7, 0.7, true, false), pair(4, 5, 0.9, true, false)});
+  const Outcome outcome = evaluate(path);
+  expect_holds(outcome.out, {"1 poses of pairs with j - i <= 1 do not count",
+                             "2 pairs of the truth were not tried"});
+  const json verdicts = json_of(out_ / "e.json")["scenes"][0]["pairs"];
+  ASSERT_EQ(verdicts.size(), 5u);  // four of the truth and one that it does not list; no neighbours
+  EXPECT_TRUE(verdicts[0]["strict"]);
+  EXPECT_EQ(verdicts[0]["error"], 0.0);
+  EXPECT_FALSE(verdicts[1]["strict"]);
+  EXPECT_FALSE(verdicts[1]["reported"]);
+  EXPECT_NEAR(verdicts[1]["error"].get<double>(), 1, 1e-12);
+  EXPECT_NEAR(verdicts[1]["metres"].get<double>(), 1, 1e-12);
+  EXPECT_NEAR(verdicts[1]["degrees"].get<double>(), 0, 1e-6);
+  EXPECT_FALSE(verdicts[2]["tried"]);
+  EXPECT_TRUE(verdicts[2]["error"].is_null());
+  EXPECT_FALSE(verdicts[4]["known"]);
+  EXPECT_TRUE(verdicts[4]["reported"]);
+}
+
+// As 3DMatch's users count it: all pairs of the log, neighbours too, whatever was reported.
+TEST_F(Evaluate, RegistrationRecall) {
+  const auto turned = [](double degrees, double metres) {
+    Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
+    pose.rotate(Eigen::AngleAxisd(degrees * M_PI / 180, Eigen::Vector3d::UnitY()));
+    pose.translation().x() = metres;
+    return pose.matrix();
+  };
+  const std::string log = out_ / "3dmatch.log";
+  evaluation::write_log(log, {{0, 1, 60, turned(14.9, 0)},
+                              {0, 2, 60, turned(15.1, 0)},
+                              {0, 3, 60, turned(0, 0.31)},
+                              {0, 4, 60, turned(0, 0.29)},
+                              {0, 5, 60, turned(0, 0)}});
+  const std::string result = write({pair(0, 1, 0.1, false, false), pair(0, 2, 0.9, true, false),
+                                    pair(0, 3, 0.9, true, false), pair(0, 4, 0.9, true, false)});
+  const Outcome outcome = run({"evaluate", result, "--ground-truth", truth_.path(),
+                               "--registration-recall", log, "--json", out_ / "e.json"});
+  ASSERT_EQ(outcome.status, 0) << outcome.err;
+  expect_holds(outcome.out, {"registration recall  40.0 % (2 of 5 pairs, 4 tried"});
+  EXPECT_EQ(json_of(out_ / "e.json")["scenes"][0]["registration_recall"][0]["right"], 2);
+  expect_refused({"evaluate", result, "--ground-truth", truth_.path(), "--registration-recall",
+                  out_ / "none.log"},
+                 {"none.log"});
+}
+
 TEST_F(Evaluate, LogsHaveNoRanking) {
   const std::string path = out_ / "r.log";
   evaluation::write_log(path, {{0, 2, 9, Eigen::Matrix4d::Identity()}});
@@ -157,6 +230,58 @@ TEST_F(Evaluate, LogsAndTruthsThatAreWrong) {
   expect_refused(against(nan, truth_.path()), {nan, "nan"});
   truth_.write("gt.info", "");
   expect_refused(against(result, truth_.path()), {"gt.info"});
+}
+
+// Nothing is dropped silently: every complaint names the file and the line (or the entry of a
+// JSON).
+TEST_F(Evaluate, MalformedLogsAreNamedWithTheirLine) {
+  const std::string unit = "1 0 0 0\n0 1 0 0\n0 0 1 0\n0 0 0 1\n";
+  const auto expect_line = [&](const std::string& text, const std::string& line,
+                               const std::string& reason) {
+    const std::string path = out_.write("bad.log", text);
+    expect_refused({"evaluate", path, "--ground-truth", truth_.path()},
+                   {path + ":" + line + ":", reason});
+    const std::string good = truth_.write("r.log", "0 2 9\n" + unit);
+    const std::string as_truth = truth_.write("gt.log", text);
+    expect_refused({"evaluate", good, "--ground-truth", truth_.path()},
+                   {as_truth + ":" + line + ":", reason});
+  };
+  expect_line("0 2 9\n" + unit + "0 3 9\n1 0 0 0\n0 1 0 0\n", "8", "ends before row 3");
+  expect_line("0 2 9\n" + unit + "0 3\n" + unit, "6", "expected 3");
+  expect_line("0 2 9\n" + unit + "0 3 8\n" + unit, "6", "8 fragments, the first block says 9");
+  expect_line("0 2 9\n" + unit + "\n0 9 9\n" + unit, "7", "out of range");
+  expect_line("12 2 9\n" + unit, "1", "out of range");
+  expect_line("2 2 9\n" + unit, "1", "itself");
+  expect_line("0 2 9\n" + unit + "0 3 9\n" + unit + "0 2 9\n" + unit, "11",
+              "stands twice, first in line 1");
+  expect_line("0 2 9\n" + unit + "0 3 9\n1 0 0 0\n0 1 0 0\n0 0 2 0\n0 0 0 1\n", "10", "rotation");
+  expect_line("0 2 9\n" + unit + "0 3 9\n1 0 0 0\n0 1 0 0\n0 0 1 0\n0 0 1 1\n", "10", "last row");
+}
+
+TEST_F(Evaluate, ResultsOfAnotherScene) {
+  const auto against = [&](const std::string& path) {
+    return std::vector<std::string>{"evaluate", path, "--ground-truth", truth_.path()};
+  };
+  const std::string log = out_ / "other.log";
+  evaluation::write_log(log, {{0, 2, 60, Eigen::Matrix4d::Identity()}});
+  expect_refused(against(log), {log + ":1:", "60 fragments", "gt.log", "9"});
+  expect_bad(json{{"pairs", {pair(0, 2, 0.9, true, false), pair(0, 9, 0.9, true, false)}}}.dump(),
+             {"pairs[1]", "pair 0 9", "out of range", "gt.log"});
+  expect_bad(json{{"pairs", {pair(0, 2, 0.9, true, false), pair(0, 2, 0.9, true, false)}}}.dump(),
+             {"pairs[1]", "stands twice", "pairs[0]"});
+  json missing = {{"fragments", {{{"number", 0}}, {{"number", 2}}}},
+                  {"pairs", {pair(0, 2, 0.9, true, false), pair(0, 3, 0.9, true, false)}}};
+  expect_bad(missing.dump(), {"pairs[1]", "fragment 3", "lacks"});
+}
+
+TEST_F(Evaluate, InformationThatContradictsItsLogIsNamedWithItsLine) {
+  const std::string result = out_ / "r.log";
+  evaluation::write_log(result, {{0, 2, 9, Eigen::Matrix4d::Identity()}});
+  auto information = evaluation::read_information(truth_ / "gt.info");
+  std::swap(information[1], information[2]);
+  evaluation::write_information(truth_ / "gt.info", information);
+  expect_refused({"evaluate", result, "--ground-truth", truth_.path()},
+                 {"gt.info:8:", "pair 0 4", "pair 0 3"});
 }
 
 }  // namespace

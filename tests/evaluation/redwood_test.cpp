@@ -166,6 +166,22 @@ TEST(Evaluate, WithheldReportsCountInTheRankingOnly) {
   EXPECT_EQ(result.strict_ranked->raw_recall, 1);
 }
 
+TEST(Evaluate, TheStrictRankingHasItsOwnScoreWhereThereIsOne) {
+  GroundTruth truth = truth_of({{0, 2}, {0, 3}});
+  const GroundTruth all = truth_of({{0, 2}, {0, 3}, {0, 7}});
+  truth.all_log = all.log;
+  truth.all_information = all.information;
+  std::vector<Report> reports = {{0, 7, shifted(0), 0.9, true, 0.1},
+                                 {0, 2, shifted(0), 0.8, true, 0.7}};
+  Evaluation result = evaluate(truth, reports, true);
+  EXPECT_EQ(result.strict_ranked->recall_at_99, 0.5);
+  EXPECT_EQ(result.geometric_ranked->recall_at_99, 0.5);
+  reports[0].strict_score.reset();
+  result = evaluate(truth, reports, true);
+  EXPECT_EQ(result.strict_ranked->recall_at_99, 0);  // 0.9 stands before 0.7
+  EXPECT_EQ(result.strict_ranked->recall_at_50, 0.5);
+}
+
 TEST(Evaluate, GeometricRuleForgivesLowOverlapButRecallStaysWithTheListedPairs) {
   GroundTruth truth = truth_of({{0, 2}, {0, 3}});
   const GroundTruth all = truth_of({{0, 2}, {0, 3}, {0, 7}, {0, 8}});

@@ -1,0 +1,22 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "result_file.hpp"
+
+namespace gpureg::cli {
+
+/// One scene of `evaluate`.
+struct SceneEvaluation {
+  std::string name;
+  ResultFile result;
+  evaluation::GroundTruth truth;
+  evaluation::Evaluation evaluation;
+};
+
+/// The tables of recall, precision and time, and what did not count, on standard output.
+void print_tables(const std::vector<SceneEvaluation>& scenes);
+
+}  // namespace gpureg::cli

@@ -1,0 +1,49 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The clouds that every method gets: raw, and downsampled by gpureg to 5 cm with normals turned to the cameras."""
+import dataclasses
+import pathlib
+import typing
+
+import numpy as np
+
+VOXEL = 0.05
+
+
+@dataclasses.dataclass
+class Cloud:
+    points: np.ndarray  # (n, 3) float64
+    normals: np.ndarray  # (n, 3) float64
+    raw: np.ndarray  # (m, 3) float32
+    raw_normals: typing.Optional[np.ndarray]
+    viewpoints: typing.Optional[np.ndarray]
+
+
+def write(folder, output, voxel=VOXEL):
+    """One .npz per fragment into a folder; the numbers of the fragments."""
+    import gpureg
+    from gpureg import _core
+
+    folder, output = pathlib.Path(folder), pathlib.Path(output)
+    cameras = folder / "cameras.txt"
+    viewpoints = _core.read_cameras(str(cameras)) if cameras.exists() else {}
+    options = gpureg.RegistrationOptions.from_voxel_size(voxel).prepare
+    options.wide_feature_radius, options.depth_maps = 0.0, 0
+    numbers = []
+    for number, path in _core.list_fragments(str(folder)):
+        cloud = gpureg.read_point_cloud(path)
+        normals = cloud.normals if cloud.normals is not None and len(cloud.normals) else None
+        prepared = gpureg.prepare(cloud.points, normals, viewpoints=viewpoints.get(number), options=options, context=gpureg.Context.cpu())
+        arrays = {"points": np.asarray(prepared.points, np.float64), "normals": np.asarray(prepared.normals, np.float64),
+                  "raw": np.asarray(cloud.points, np.float32)}
+        if normals is not None:
+            arrays["raw_normals"] = np.asarray(normals, np.float32)
+        if number in viewpoints:
+            arrays["viewpoints"] = np.asarray(viewpoints[number], np.float32)
+        np.savez(output / f"{number}.npz", **arrays)
+        numbers.append(number)
+    return numbers
+
+
+def read(folder, number):
+    with np.load(pathlib.Path(folder) / f"{number}.npz") as file:
+        return Cloud(file["points"], file["normals"], file["raw"], file.get("raw_normals"), file.get("viewpoints"))
