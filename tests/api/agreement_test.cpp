@@ -1,0 +1,259 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "gpureg/agreement.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <limits>
+#include <random>
+
+#include "gpureg/error.hpp"
+#include "support/expect_error.hpp"
+
+namespace gpureg {
+namespace {
+
+Eigen::Isometry3d moved(double angle, const Eigen::Vector3d& axis, const Eigen::Vector3d& shift) {
+  Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
+  pose.linear() = Eigen::AngleAxisd(angle, axis.normalized()).toRotationMatrix();
+  pose.translation() = shift;
+  return pose;
+}
+
+/// Clouds at known places, and pairs of them with whatever confidence.
+struct Set {
+  std::vector<Eigen::Isometry3d> world_from_cloud;
+  std::vector<Pair> pairs;
+  std::vector<RegistrationResult> results;
+
+  explicit Set(std::uint32_t clouds) {
+    std::mt19937 random(5);
+    std::uniform_real_distribution<double> number(-3.0, 3.0);
+    for (std::uint32_t k = 0; k < clouds; ++k)
+      world_from_cloud.push_back(moved(number(random),
+                                       {number(random), number(random), number(random)},
+                                       {number(random), number(random), number(random)}));
+  }
+  Eigen::Isometry3d right(std::uint32_t source, std::uint32_t target) const {
+    return world_from_cloud[target].inverse() * world_from_cloud[source];
+  }
+  /// `wrong` moves the target on, so that the pose misses the right one by as much.
+  std::size_t add(std::uint32_t source, std::uint32_t target, double confidence,
+                  const Eigen::Isometry3d& wrong = Eigen::Isometry3d::Identity()) {
+    RegistrationResult result;
+    result.status = RegistrationStatus::aligned;
+    result.reason = RegistrationReason::none;
+    result.has_candidate = true;
+    result.target_from_source = wrong * right(source, target);
+    result.score = confidence;
+    RegistrationMode mode;
+    mode.target_from_source = result.target_from_source;
+    mode.confidence = confidence;
+    result.modes.push_back(mode);
+    pairs.push_back({source, target});
+    results.push_back(result);
+    return pairs.size() - 1;
+  }
+  void add_all(double confidence) {
+    for (std::uint32_t i = 0; i < world_from_cloud.size(); ++i)
+      for (std::uint32_t j = i + 1; j < world_from_cloud.size(); ++j) add(i, j, confidence);
+  }
+  std::size_t find(std::uint32_t source, std::uint32_t target) const {
+    std::size_t p = 0;
+    while (pairs[p].source != source || pairs[p].target != target) ++p;
+    return p;
+  }
+  std::vector<PairAgreement> agree(const AgreementOptions& options = {}) const {
+    return agreement(pairs, results, options);
+  }
+};
+
+const Eigen::Isometry3d kWrong = moved(1.0, {0, 0, 1}, {1.0, 0.5, 0});
+
+TEST(Agreement, AWrongPairAmongRightOnesFalls) {
+  Set set(5);
+  set.add_all(0.95);
+  const std::size_t wrong = set.find(1, 3);
+  set.results[wrong].target_from_source = set.results[wrong].modes[0].target_from_source =
+      kWrong * set.right(1, 3);
+  const auto out = set.agree();
+  for (std::size_t p = 0; p < out.size(); ++p) {
+    EXPECT_EQ(out[p].loops, 3u);
+    if (p == wrong)
+      EXPECT_LT(out[p].confidence, 0.5);
+    else
+      EXPECT_GT(out[p].confidence, 0.95) << p;
+  }
+}
+
+TEST(Agreement, AWeakRightPairRises) {
+  Set set(4);
+  set.add_all(0.95);
+  const std::size_t weak = set.find(0, 2);
+  set.results[weak].score = set.results[weak].modes[0].confidence = 0.2;
+  EXPECT_GT(set.agree()[weak].confidence, 0.8);
+}
+
+TEST(Agreement, AnotherModeIsTakenWhereLoopsSupportIt) {
+  Set set(4);
+  set.add_all(0.95);
+  const std::size_t twin = set.find(0, 3);
+  RegistrationResult& r = set.results[twin];
+  r.modes.push_back(r.modes[0]);
+  r.modes[1].confidence = 0.1;
+  r.score = r.modes[0].confidence = 0.5;
+  r.target_from_source = r.modes[0].target_from_source = kWrong * set.right(0, 3);
+  const PairAgreement out = set.agree()[twin];
+  EXPECT_EQ(out.mode, 1u);
+  EXPECT_GT(out.confidence, 0.5);
+  AgreementOptions first_only;
+  first_only.modes = 1;
+  EXPECT_EQ(set.agree(first_only)[twin].mode, 0u);
+  EXPECT_LT(set.agree(first_only)[twin].confidence, 0.2);
+}
+
+TEST(Agreement, LoopsThatLeadThroughDoubtSayLittle) {
+  Set set(3);
+  set.add(0, 1, 0.9);
+  set.add(1, 2, 0.05);
+  set.add(0, 2, 0.05, kWrong);
+  EXPECT_NEAR(set.agree()[0].confidence, 0.9, 0.01);
+}
+
+TEST(Agreement, WithoutLoopsNothingChanges) {
+  Set set(5);
+  for (std::uint32_t k = 0; k + 1 < 5; ++k) set.add(k, k + 1, 0.1 + 0.2 * k);
+  set.add(2, 2, 1.0);  // of a cloud with itself
+  RegistrationResult skipped;
+  set.pairs.push_back({0, 2});
+  set.results.push_back(skipped);
+  const auto out = set.agree();
+  for (std::size_t p = 0; p < out.size(); ++p) {
+    EXPECT_EQ(out[p].confidence, set.results[p].score);
+    EXPECT_EQ(out[p].loops, 0u);
+    EXPECT_EQ(out[p].mode, 0u);
+  }
+  EXPECT_TRUE(agreement({}, {}).empty());
+}
+
+TEST(Agreement, OrderDoesNotMatter) {
+  Set set(9);
+  std::mt19937 random(3);
+  std::uniform_real_distribution<double> number(0.0, 1.0);
+  for (std::uint32_t i = 0; i < 9; ++i)
+    for (std::uint32_t j = 0; j < 9; ++j)
+      if (i != j && number(random) < 0.6)
+        set.add(i, j, number(random),
+                number(random) < 0.3 ? kWrong : moved(0.02, {1, 1, 0}, {0.03, 0, 0}));
+  const auto before = set.agree();
+  std::vector<std::size_t> order(set.pairs.size());
+  for (std::size_t p = 0; p < order.size(); ++p) order[p] = p;
+  for (int round = 0; round < 3; ++round) {
+    std::shuffle(order.begin(), order.end(), random);
+    Set other(9);
+    for (const std::size_t p : order)
+      other.pairs.push_back(set.pairs[p]), other.results.push_back(set.results[p]);
+    const auto after = other.agree();
+    for (std::size_t k = 0; k < order.size(); ++k) {
+      EXPECT_EQ(after[k].confidence, before[order[k]].confidence);
+      EXPECT_EQ(after[k].mode, before[order[k]].mode);
+      EXPECT_EQ(after[k].loops, before[order[k]].loops);
+    }
+  }
+}
+
+TEST(Agreement, ResultsWithoutModesTakePartWithTheirScore) {
+  Set set(4);
+  set.add_all(0.6);
+  const std::size_t wrong = set.find(0, 1);
+  set.results[wrong].target_from_source = kWrong * set.right(0, 1);
+  for (RegistrationResult& r : set.results) r.modes.clear();
+  const auto out = set.agree();
+  EXPECT_LT(out[wrong].confidence, 0.6);
+  EXPECT_GT(out[set.find(2, 3)].confidence, 0.6);
+}
+
+TEST(Agreement, ShiftsAreMeasuredAtTheClouds) {
+  // All clouds lie ten kilometres from the origins of their frames: a hundredth of a degree moves
+  // the origin by metres, the cloud not at all.
+  const auto far_set = [](bool with_moments) {
+    Set set(4);
+    const Eigen::Vector3d middle(10000, 0, 0);
+    for (Eigen::Isometry3d& pose : set.world_from_cloud) pose = Eigen::Isometry3d::Identity();
+    const auto about_middle = [&](double angle) {
+      return Eigen::Isometry3d(Eigen::Translation3d(middle) *
+                               Eigen::AngleAxisd(angle, Eigen::Vector3d::UnitZ()) *
+                               Eigen::Translation3d(-middle));
+    };
+    double angle = 0.002;
+    for (std::uint32_t i = 0; i < 4; ++i)
+      for (std::uint32_t j = i + 1; j < 4; ++j) set.add(i, j, 0.7, about_middle(angle = -angle));
+    if (with_moments)
+      for (RegistrationResult& r : set.results) {
+        r.source_moments.count = r.target_moments.count = 1000;
+        r.source_moments.sum = r.target_moments.sum = 1000.0 * middle;
+      }
+    return set;
+  };
+  for (const PairAgreement& a : far_set(true).agree()) EXPECT_GT(a.confidence, 0.9);
+  for (const PairAgreement& a : far_set(false).agree()) EXPECT_LT(a.confidence, 0.7);
+}
+
+TEST(Agreement, ManyPairsStayBounded) {
+  constexpr std::uint32_t kClouds = 2000, kEach = 40;
+  Set set(kClouds);
+  for (std::uint32_t k = 0; k < kClouds; ++k)
+    for (std::uint32_t step = 1; step <= kEach; ++step) set.add(k, (k + step) % kClouds, 0.9);
+  AgreementOptions few;
+  few.neighbors = 8;
+  for (const PairAgreement& a : set.agree(few)) EXPECT_LE(a.loops, 8u);
+  for (const PairAgreement& a : set.agree()) EXPECT_GE(a.confidence, 0.9);
+}
+
+TEST(Agreement, BadInputIsNamed) {
+  Set set(3);
+  set.add_all(0.9);
+  const auto refused = [&](auto&& change, std::initializer_list<std::string> words) {
+    Set bad = set;
+    change(bad);
+    test::expect_error<InvalidArgument>([&] { bad.agree(); }, words);
+  };
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  refused([](Set& s) { s.results.pop_back(); }, {"results has 2", "pairs has 3"});
+  refused([&](Set& s) { s.results[1].score = nan; }, {"results[1].score", "nan"});
+  refused([](Set& s) { s.results[2].score = 1.5; }, {"results[2].score", "1.5"});
+  refused([](Set& s) { s.results[2].modes[0].confidence = -0.1; },
+          {"results[2].modes[0].confidence", "-0.1"});
+  refused([](Set& s) { s.results[0].target_from_source.matrix()(0, 0) = 7; },
+          {"results[0].target_from_source"});
+  refused([&](Set& s) { s.results[0].modes[0].target_from_source.matrix()(1, 3) = nan; },
+          {"results[0].modes[0].target_from_source"});
+}
+
+TEST(Agreement, BadOptionsAreNamed) {
+  const auto refused = [](auto&& change, const std::string& field) {
+    AgreementOptions options;
+    change(options);
+    test::expect_error<InvalidArgument>([&] { agreement({}, {}, options); }, {field});
+  };
+  const float nan = std::numeric_limits<float>::quiet_NaN();
+  for (const float bad : {nan, 0.0f, -1.0f}) {
+    refused([&](auto& o) { o.closing_angle = bad; }, "closing_angle");
+    refused([&](auto& o) { o.closing_distance = bad; }, "closing_distance");
+    refused([&](auto& o) { o.chance = static_cast<double>(bad); }, "chance");
+    refused([&](auto& o) { o.miss = static_cast<double>(bad); }, "miss");
+    refused([&](auto& o) { o.max_factor = static_cast<double>(bad); }, "max_factor");
+    test::expect_error<InvalidArgument>([&] { AgreementOptions::from_voxel_size(bad); },
+                                        {"voxel_size"});
+  }
+  refused([](auto& o) { o.min_confidence = 2; }, "min_confidence");
+  refused([](auto& o) { o.min_rival = -1; }, "min_rival");
+  refused([](auto& o) { o.modes = 0; }, "modes");
+  refused([](auto& o) { o.neighbors = 1; }, "neighbors");
+  refused([](auto& o) { o.rounds = 0; }, "rounds");
+  EXPECT_FLOAT_EQ(AgreementOptions::from_voxel_size(0.05f).closing_distance,
+                  AgreementOptions{}.closing_distance);
+}
+
+}  // namespace
+}  // namespace gpureg
