@@ -6,7 +6,7 @@ import typing
 
 import numpy as np
 
-VOXEL = 0.05
+from methods import VOXEL
 
 
 @dataclasses.dataclass
@@ -18,7 +18,22 @@ class Cloud:
     viewpoints: typing.Optional[np.ndarray]
 
 
-def write(folder, output, voxel=VOXEL):
+def write_one(output, number, points, normals, viewpoints):
+    """One fragment from arrays into a folder; normals, viewpoints: perhaps None."""
+    import gpureg
+
+    options = gpureg.RegistrationOptions.from_voxel_size(VOXEL).prepare
+    options.wide_feature_radius, options.depth_maps = 0.0, 0
+    prepared = gpureg.prepare(points, normals, viewpoints=viewpoints, options=options, context=gpureg.Context.cpu())
+    arrays = {"points": np.asarray(prepared.points, np.float64), "normals": np.asarray(prepared.normals, np.float64), "raw": np.asarray(points, np.float32)}
+    if normals is not None:
+        arrays["raw_normals"] = np.asarray(normals, np.float32)
+    if viewpoints is not None:
+        arrays["viewpoints"] = np.asarray(viewpoints, np.float32)
+    np.savez(pathlib.Path(output) / f"{number}.npz", **arrays)
+
+
+def write(folder, output):
     """One .npz per fragment into a folder; the numbers of the fragments."""
     import gpureg
     from gpureg import _core
@@ -26,20 +41,11 @@ def write(folder, output, voxel=VOXEL):
     folder, output = pathlib.Path(folder), pathlib.Path(output)
     cameras = folder / "cameras.txt"
     viewpoints = _core.read_cameras(str(cameras)) if cameras.exists() else {}
-    options = gpureg.RegistrationOptions.from_voxel_size(voxel).prepare
-    options.wide_feature_radius, options.depth_maps = 0.0, 0
     numbers = []
     for number, path in _core.list_fragments(str(folder)):
         cloud = gpureg.read_point_cloud(path)
         normals = cloud.normals if cloud.normals is not None and len(cloud.normals) else None
-        prepared = gpureg.prepare(cloud.points, normals, viewpoints=viewpoints.get(number), options=options, context=gpureg.Context.cpu())
-        arrays = {"points": np.asarray(prepared.points, np.float64), "normals": np.asarray(prepared.normals, np.float64),
-                  "raw": np.asarray(cloud.points, np.float32)}
-        if normals is not None:
-            arrays["raw_normals"] = np.asarray(normals, np.float32)
-        if number in viewpoints:
-            arrays["viewpoints"] = np.asarray(viewpoints[number], np.float32)
-        np.savez(output / f"{number}.npz", **arrays)
+        write_one(output, number, cloud.points, normals, viewpoints.get(number))
         numbers.append(number)
     return numbers
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// PCL's SampleConsensusPrerejective for bench/peers. Says PCL's version, then answers binary
-// requests on standard input with lines:
+// PCL's SampleConsensusPrerejective for bench/peers: gpureg_pcl_peer [VOXEL]. Says PCL's version,
+// then answers binary requests on standard input with lines:
 //   'c' n, n points, n normals (float32): a cloud; features of PCL's own. Answer: processor
 //   seconds. 'a' source, target, seed: aligns clouds by number. Answer: inlier fraction, processor
 //   seconds, peak memory in MiB, 16 numbers.
@@ -19,7 +19,7 @@
 
 namespace {
 
-constexpr float kVoxel = 0.05f;  // of the clouds that come in
+float voxel = 0.05f;  // of the clouds that come in
 
 using Points = pcl::PointCloud<pcl::PointNormal>;
 using Features = pcl::PointCloud<pcl::FPFHSignature33>;
@@ -55,7 +55,7 @@ bool read_cloud(Prepared& cloud) {
 
 void compute_features(Prepared& cloud) {
   pcl::FPFHEstimationOMP<pcl::PointNormal, pcl::PointNormal, pcl::FPFHSignature33> estimation;
-  estimation.setRadiusSearch(5 * kVoxel);
+  estimation.setRadiusSearch(5 * voxel);
   estimation.setInputCloud(cloud.points);
   estimation.setInputNormals(cloud.points);
   estimation.compute(*cloud.features);
@@ -73,7 +73,7 @@ void align(const Prepared& source, const Prepared& target, unsigned seed) {
   method.setNumberOfSamples(3);
   method.setCorrespondenceRandomness(5);
   method.setSimilarityThreshold(0.9f);
-  method.setMaxCorrespondenceDistance(2.5f * kVoxel);
+  method.setMaxCorrespondenceDistance(2.5f * voxel);
   method.setInlierFraction(0.25f);
   Points aligned;
   method.align(aligned);
@@ -90,7 +90,8 @@ void align(const Prepared& source, const Prepared& target, unsigned seed) {
 
 }  // namespace
 
-int main() {
+int main(int argc, char** argv) {
+  if (argc > 1) voxel = std::strtof(argv[1], nullptr);
   std::printf("%s\n", PCL_VERSION_PRETTY);
   std::fflush(stdout);
   std::vector<Prepared> clouds;

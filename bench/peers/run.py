@@ -14,7 +14,6 @@ import os
 import pathlib
 import random
 import statistics
-import subprocess
 import sys
 import tempfile
 import time
@@ -25,15 +24,7 @@ import analysis  # noqa: E402
 import record  # noqa: E402
 
 import methods  # noqa: E402
-
-
-def check(name):
-    """What a method says about itself, or a text why it is not here."""
-    done = subprocess.run([sys.executable, HERE / "worker.py", name, "--check"], capture_output=True, text=True)
-    if done.returncode == 0:
-        return json.loads(done.stdout.strip().splitlines()[-1]), None
-    lines = done.stderr.strip().splitlines()
-    return None, lines[-1] if lines else f"exit status {done.returncode}"
+from runner import check, work  # noqa: E402
 
 
 def choose_pairs(folder, fragments, others, seed):
@@ -50,52 +41,6 @@ def choose_pairs(folder, fragments, others, seed):
     kept = [pair for pair in pairs if pair in listed or pair in chosen]
     return kept, (f"all {len(kept) - len(chosen)} pairs of the ground truth with j - i > 1 and {len(chosen)} of the {len(rest)} others, "
                   f"drawn at random (Python's random.Random({seed}).sample)")
-
-
-def lines_of(path):
-    return [json.loads(line) for line in path.read_text().splitlines() if line.endswith("}")] if path.exists() else []
-
-
-def work(name, pairs, initial, folder, temporary, arguments):
-    """Runs the worker until every pair has its line; a pair that ends or hangs it is given up."""
-    journal = temporary / f"{name}.jsonl"
-    environment = dict(os.environ, PYTHONPATH=str(HERE))
-    for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
-        environment[variable] = str(arguments.threads)
-    lost, fragments, memory, done = [], {}, None, {}
-    while True:
-        left = [[i, j, initial.get((i, j))] for i, j in pairs if (i, j) not in done and (i, j) not in lost]
-        if not left:
-            return list(done.values()), list(fragments.values()), memory, lost
-        listing = temporary / f"{name}.pairs"
-        listing.write_text(json.dumps(left))
-        journal.unlink(missing_ok=True)
-        child = subprocess.Popen([sys.executable, HERE / "worker.py", name, folder, listing, journal, str(arguments.seed)], env=environment)
-        size, changed = 0, time.monotonic()
-        while child.poll() is None:
-            time.sleep(0.2)
-            now = journal.stat().st_size if journal.exists() else 0
-            if now != size:
-                size, changed = now, time.monotonic()
-            elif time.monotonic() - changed > arguments.pair_timeout:
-                child.kill()
-                child.wait()
-        current = None
-        for line in lines_of(journal):
-            if "begin" in line:
-                current = tuple(line["begin"])
-            elif "fragment" in line:
-                fragments[line["fragment"]] = line
-            elif "peak_memory_mib" in line:
-                memory = line
-            else:
-                done[line["i"], line["j"]] = line
-                current = None
-        if child.returncode != 0:
-            if current is None:
-                return None, None, None, f"exit status {child.returncode} before the first pair"
-            lost.append(current)
-            print(f"  {name}: gave up pair {current} (exit status {child.returncode})", flush=True)
 
 
 def document(name, about, results, fragments, lost):
@@ -118,6 +63,7 @@ def summary(about, results, fragments, memory, lost, scene, overlap):
     right = [pair["error"] for pair in scene["pairs"] if pair["strict"]]
     return {
         **about, "commit": record.commit(), "strict": strict, "geometric": geometric, "lost_pairs": lost, **analysis.all_of(scene["pairs"], overlap),
+        "fragments": len(fragments), "tried": len(results),
         "error_of_right_m": statistics.median(right) if right else None,
         "ms_per_pair": statistics.fmean(line["ms"] for line in results), "ms_per_pair_median": statistics.median(line["ms"] for line in results),
         "processor_ms_per_pair": statistics.fmean(line["processor_ms"] for line in results),
@@ -186,7 +132,7 @@ def main():
                 continue
             starts = {pair: line["pose"] for pair, line in initial.items()} if said["refines"] else {}
             begin = time.monotonic()
-            results, prepared, memory, lost = work(name, pairs, starts, temporary, temporary, arguments)
+            results, prepared, memory, lost = work(name, pairs, starts, temporary, temporary, arguments.seed, arguments.threads, arguments.pair_timeout)
             if results is None:
                 print(f"skipped: {name}: {lost}")
                 continue
@@ -207,7 +153,7 @@ def main():
     words = ["bench/peers/run.py", "--scene", arguments.scene, "--seed", arguments.seed, "--threads", arguments.threads]
     if arguments.others is not None:
         words += ["--others", arguments.others]
-    record.write(arguments, " ".join(map(str, words)), {"scene": arguments.scene, "pairs": len(pairs), "fragments": len(fragments), "chosen": chosen, "seed": arguments.seed,
+    record.write(arguments, " ".join(map(str, words)), {"kind": "peers", "scene": arguments.scene, "pairs": len(pairs), "fragments": len(fragments), "chosen": chosen, "seed": arguments.seed,
                                                         "threads": arguments.threads, "methods": entries})
 
 

@@ -11,6 +11,9 @@
     align       (source, target, initial, seed) -> (4 x 4 target_from_source or None, score)
 """
 import importlib
+import os
+
+VOXEL = float(os.environ.get("GPUREG_PEER_VOXEL", "0.05"))  # metres; of the clouds, and what every length follows from
 
 # name: (module, class)
 METHODS = {

@@ -2,12 +2,12 @@
 """gpureg itself, through its Python package, on the CPU."""
 import os
 
-VOXEL = 0.05
+from methods import VOXEL
 
 
 class Default:
     label = "gpureg `default`"
-    parameters = "defaults for voxels of 0.05 m"
+    parameters = f"defaults for voxels of {VOXEL:g} m"
     threshold = None  # its own
     refines = False
 
@@ -45,4 +45,4 @@ class LoopSmart(Default):
     parameters = "the paper's: 4,000,000 hypotheses, no refinement"
 
     def make_options(self):
-        return self.gpureg.RegistrationOptions.loopsmart()
+        return self.gpureg.RegistrationOptions.loopsmart(VOXEL)

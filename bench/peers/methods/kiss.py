@@ -4,11 +4,13 @@ import importlib.metadata
 
 import numpy as np
 
+from methods import VOXEL
+
 
 class Fine:
-    label = "KISS-Matcher, 0.05 m"
-    voxel, sample = 0.05, False  # the clouds are downsampled to that already
-    parameters = "voxel size 0.05 m, the rest by default; features of both clouds made anew for each pair"
+    label = f"KISS-Matcher, {VOXEL:g} m"
+    voxel, sample = VOXEL, False  # the clouds are downsampled to that already
+    parameters = f"voxel size {VOXEL:g} m, the rest by default; features of both clouds made anew for each pair"
     threshold = 5  # final inliers; its examples call fewer a failure
     refines = False
 
@@ -34,6 +36,6 @@ class Fine:
 
 
 class Coarse(Fine):
-    label = "KISS-Matcher, 0.1 m"
-    voxel, sample = 0.1, True
-    parameters = "voxel size 0.1 m, the rest by default; features of both clouds made anew for each pair"
+    label = f"KISS-Matcher, {2 * VOXEL:g} m"
+    voxel, sample = 2 * VOXEL, True
+    parameters = f"voxel size {2 * VOXEL:g} m, the rest by default; features of both clouds made anew for each pair"

@@ -2,7 +2,7 @@
 """Open3D's global registration, as its tutorial "Global registration" has it for voxels of 5 cm, with the tutorial's radii."""
 import numpy as np
 
-VOXEL = 0.05
+from methods import VOXEL
 
 
 class Open3d:

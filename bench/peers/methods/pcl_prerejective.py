@@ -7,6 +7,8 @@ import subprocess
 
 import numpy as np
 
+from methods import VOXEL
+
 ROOT = pathlib.Path(__file__).resolve().parents[3]
 
 
@@ -20,7 +22,7 @@ class Prerejective:
         program = pathlib.Path(os.environ.get("GPUREG_PCL_PEER", ROOT / "build/cpu/bin/gpureg_pcl_peer"))
         if not program.exists():
             raise FileNotFoundError(f"there is no program {program}: build the target gpureg_pcl_peer (needs PCL), or set GPUREG_PCL_PEER")
-        self.child = subprocess.Popen([program], stdin=subprocess.PIPE, stdout=subprocess.PIPE)
+        self.child = subprocess.Popen([program, str(VOXEL)], stdin=subprocess.PIPE, stdout=subprocess.PIPE)
         self.known = 0
         self.own_version = self.child.stdout.readline().decode().strip()
 

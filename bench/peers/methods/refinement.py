@@ -5,7 +5,7 @@ import os
 
 import numpy as np
 
-VOXEL = 0.05
+from methods import VOXEL
 
 
 class Open3dIcp:

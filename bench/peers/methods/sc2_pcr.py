@@ -8,6 +8,8 @@ themselves, weighted by the leading eigenvector, give a pose; the pose that most
 """
 import numpy as np
 
+from methods import VOXEL
+
 
 def leading(matrix, rounds=10):
     """Leading eigenvectors of a stack of symmetric non-negative matrices."""
@@ -42,10 +44,10 @@ def best(values, count):
 
 class SecondOrder:
     label = "SC2-PCR's scheme"
-    parameters = "FPFH, one match a point, 0.1 m, seeds 20 %, 30 and 20 members; own runner on numpy"
+    parameters = f"FPFH, one match a point, {2 * VOXEL:g} m, seeds 20 %, 30 and 20 members; own runner on numpy"
     threshold = 0.05  # share of the matches that agree
     refines = False
-    within, suppression, share, first, second = np.float32(0.1), np.float32(0.1), 0.2, 30, 20
+    within, suppression, share, first, second = np.float32(2 * VOXEL), np.float32(2 * VOXEL), 0.2, 30, 20
 
     def __init__(self):
         import gpureg
@@ -56,7 +58,7 @@ class SecondOrder:
         return "CVPR 2022, numpy " + np.__version__
 
     def prepare(self, cloud):
-        options = self.gpureg.PrepareOptions(voxel_size=0.0, wide_feature_radius=0.0, depth_maps=0)
+        options = self.gpureg.PrepareOptions(voxel_size=0.0, normal_radius=2 * VOXEL, feature_radius=5 * VOXEL, search_distance=1.5 * VOXEL, wide_feature_radius=0.0, depth_maps=0)
         prepared = self.gpureg.prepare(cloud.points, cloud.normals, options=options, context=self.gpureg.Context.cpu())
         features = np.ascontiguousarray(prepared.features, np.float32)
         points = np.asarray(prepared.points, np.float32)

@@ -2,12 +2,13 @@
 """TEASER++, where a user has built its Python module; there is no wheel. Matches: mutual nearest neighbours of FPFH."""
 import numpy as np
 
+from methods import VOXEL
 from methods.sc2_pcr import SecondOrder
 
 
 class Teaser(SecondOrder):
     label = "TEASER++"
-    parameters = "mutual FPFH matches, noise bound 0.05 m, GNC-TLS, as its 3DMatch example"
+    parameters = f"mutual FPFH matches, noise bound {VOXEL:g} m, GNC-TLS, as its 3DMatch example"
     threshold = 5  # translation inliers
 
     def __init__(self):
@@ -27,7 +28,7 @@ class Teaser(SecondOrder):
             return {"pose": None, "score": 0.0}
         parameters = self.module.RobustRegistrationSolver.Params()
         parameters.cbar2 = 1
-        parameters.noise_bound = 0.05
+        parameters.noise_bound = VOXEL
         parameters.estimate_scaling = False
         parameters.rotation_estimation_algorithm = self.module.RobustRegistrationSolver.ROTATION_ESTIMATION_ALGORITHM.GNC_TLS
         parameters.rotation_gnc_factor = 1.4
