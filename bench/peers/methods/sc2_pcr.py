@@ -55,7 +55,7 @@ class SecondOrder:
         self.gpureg = gpureg
 
     def version(self):
-        return "CVPR 2022, numpy " + np.__version__
+        return "on numpy " + np.__version__
 
     def prepare(self, cloud):
         options = self.gpureg.PrepareOptions(voxel_size=0.0, normal_radius=2 * VOXEL, feature_radius=5 * VOXEL, search_distance=1.5 * VOXEL, wide_feature_radius=0.0, depth_maps=0)
