@@ -29,14 +29,20 @@ namespace {
 struct BatchOptions {
   std::string folder, pairs = "all";
   MethodOptions method;
-  std::optional<float> min_score;
+  std::optional<double> min_score;
   std::string log, info, json;
   bool resume = false, quiet = false;
 
   RegistrationOptions registration() const {
     RegistrationOptions options = method.registration();
-    if (min_score) options.score.min_inlier_ratio = *min_score, options.min_confidence = *min_score;
-    options.validate();
+    if (!min_score) return options;
+    if (!(*min_score >= 0 && *min_score <= 1))
+      throw InvalidArgument("--min-score is " + significant(*min_score, 6) +
+                            ", expected a number from 0 to 1");
+    if (options.hypothesis.proposal == Proposal::quadruples)
+      options.score.min_inlier_ratio = static_cast<float>(*min_score);
+    else
+      options.min_confidence = *min_score;
     return options;
   }
 };
@@ -230,7 +236,8 @@ void add_batch(CLI::App& app, Action& chosen) {
       ->capture_default_str();
   o->method.add_to(*verb);
   verb->add_option("--min-score", o->min_score,
-                   "Report a pair from this score on (0: every best candidate)");
+                   "Report a pair from this confidence on (without: 0.5); with --preset loopsmart, "
+                   "from this inlier ratio on (0.3). 0: every best candidate");
   verb->add_option("-o,--output", o->log, "Redwood log of the aligned pairs: T_ij, j into i")
       ->required();
   verb->add_option("--info", o->info, "Redwood information matrices of the same pairs");

@@ -39,13 +39,19 @@ std::optional<double> number_of(const Json& json, const char* pointer) {
   return json.at(at).get<double>();
 }
 
+std::string tries_per_pair(const Json& document) {
+  return text_of(document, "/options/hypothesis/proposal") == "compatibility"
+             ? text_of(document, "/options/compatibility/seeds") + " seeds per pair"
+             : text_of(document, "/options/hypothesis/count") + " hypotheses per pair";
+}
+
 std::string opening(const ResultFile& result) {
   const Json& d = result.document;
   std::string html = "<h1>gpureg: " + escaped(base_name(text_of(d, "/folder"))) + "</h1>\n";
   html += "<p class=\"sub\">gpureg " + escaped(text_of(d, "/environment/version")) + " on " +
           escaped(text_of(d, "/environment/description")) + " &middot; voxel size " +
           escaped(text_of(d, "/options/prepare/voxel_size")) + " m &middot; " +
-          escaped(text_of(d, "/options/hypothesis/count")) + " hypotheses per pair &middot; seed " +
+          escaped(tries_per_pair(d)) + " &middot; seed " +
           escaped(text_of(d, "/options/hypothesis/seed")) + "</p>\n";
   const auto aligned = std::count_if(result.pairs.begin(), result.pairs.end(),
                                      [](const PairRecord& pair) { return pair.aligned; });
@@ -89,8 +95,7 @@ std::string truth_plots(const ResultFile& result, const evaluation::GroundTruth&
          figure("Recall and precision while the threshold falls; the dots are this run's",
                 curve_plot(curves, "recall in %", "precision in %")) +
          figure("Scores of the best candidates",
-                histogram_plot({right, wrong}, "score",
-                               threshold(result))) +
+                histogram_plot({right, wrong}, "score", threshold(result))) +
          "</div>\n";
 }
 
@@ -99,8 +104,7 @@ std::string score_plot(const ResultFile& result) {
   for (const PairRecord& pair : result.pairs)
     if (pair.transform) (pair.aligned ? aligned : rejected).values.push_back(pair.score);
   return figure("Scores of the best candidates",
-                histogram_plot({aligned, rejected}, "score",
-                               threshold(result)));
+                histogram_plot({aligned, rejected}, "score", threshold(result)));
 }
 
 // Means of the objects "ms" in a list, in the order of the stages.

@@ -75,7 +75,7 @@ struct EvidenceOptions {
   void validate() const;
 };
 
-/// What makes a point an inlier and a hypothesis a result.
+/// What makes a point an inlier and a hypothesis a result. All but max_correspondence_distance is of Proposal::quadruples.
 struct ScoreOptions {
   float max_correspondence_distance = 0.075f;  ///< metres (paper: 0.075)
   /// Degrees between the normals of an inlier while hypotheses are compared, (0, 180]; 180 switches the test off (CZK: 30).
@@ -88,7 +88,7 @@ struct ScoreOptions {
   void validate() const;
 };
 
-/// Robust point-to-plane ICP that polishes the winning hypothesis.
+/// Robust point-to-plane ICP that polishes the winning hypothesis, or every mode.
 struct RefineOptions {
   std::uint32_t max_iterations = 20;           ///< 0 switches the refinement off (paper: off)
   float max_correspondence_distance = 0.075f;  ///< metres, <= PrepareOptions::search_distance

@@ -14,7 +14,8 @@ namespace gpureg {
 
 struct PreparedState;
 
-/// A fragment ready for alignment: downsampled points, normals, features and search grid, in the memory of the context that made it.
+/// A fragment ready for alignment: downsampled points, normals, features, search grid and depth maps, in the memory of the context that
+/// made it.
 /// Immutable and shareable between threads; copies share the data. Usable with any context of the same backend: a device that
 /// lacks a cloud gets a copy of it.
 class PreparedCloud {

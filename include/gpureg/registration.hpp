@@ -15,8 +15,9 @@
 /// The door of gpureg: prepare each cloud once, align any pairs of them.
 namespace gpureg {
 
-/// Downsamples, estimates and orients normals, computes features (FPFH, or takes the view's own) and builds the search grid.
-/// Never fails for the data itself: an empty cloud gives an empty PreparedCloud, whose alignments say too_few_points.
+/// Downsamples, estimates and orients normals, computes features (FPFH of one or two radii, or takes the view's own), builds the search
+/// grid and draws depth maps from the viewpoints.
+/// Never fails for the data itself: an empty cloud gives an empty PreparedCloud, whose alignments say too_few_source_points (or target).
 /// Throws InvalidArgument for bad options or views, and for clouds wider than 2^20 voxels. Thread-safe.
 PreparedCloud prepare(const Context& context, const PointCloudView& cloud, const PrepareOptions& options = {});
 
@@ -24,8 +25,10 @@ PreparedCloud prepare(const Context& context, const PointCloudView& cloud, const
 std::vector<PreparedCloud> prepare_batch(const Context& context, const std::vector<PointCloudView>& clouds,
                                          const PrepareOptions& options = {});
 
-/// Finds target_from_source of two prepared clouds (LoopSmart, Algorithm 1). Deterministic in clouds, options and seed.
-/// options.prepare is not used but for checking that both clouds can answer options.score. Thread-safe.
+/// Finds target_from_source of two prepared clouds, by options.hypothesis.proposal: from compatible matches, judged by evidence (then
+/// modes holds every distinct pose), or by LoopSmart's Algorithm 1. Deterministic in clouds, options and seed.
+/// options.prepare is checked, but not used: what a cloud was prepared with counts. Throws InvalidArgument where a cloud's search_distance is less than
+/// the correspondence distances, and where the clouds' features differ in dimension. Thread-safe.
 RegistrationResult align(const Context& context, const PreparedCloud& source, const PreparedCloud& target,
                          const RegistrationOptions& options = {});
 

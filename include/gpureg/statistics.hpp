@@ -17,10 +17,10 @@ enum class RegistrationReason : std::uint8_t {
   too_few_source_points,     ///< fewer than 4 usable points after downsampling
   too_few_target_points,
   no_usable_features,        ///< fewer than 4 correspondences: points without neighbours have no feature
-  no_hypothesis_survived,    ///< all quadruples failed the polygon test
-  degenerate_geometry,       ///< all surviving quadruples were collinear or coincident
-  inlier_ratio_too_low,      ///< the best candidate is below ScoreOptions::min_inlier_ratio
-  confidence_too_low,        ///< the best candidate is below RegistrationOptions::min_confidence
+  no_hypothesis_survived,    ///< all quadruples failed the polygon test (Proposal::quadruples)
+  degenerate_geometry,       ///< all surviving quadruples were collinear or coincident; no seed's neighbourhood determined a pose
+  inlier_ratio_too_low,      ///< the best candidate is below ScoreOptions::min_inlier_ratio (Proposal::quadruples)
+  confidence_too_low,        ///< the best candidate is below RegistrationOptions::min_confidence (Proposal::compatibility)
   cancelled
 };
 
@@ -29,22 +29,26 @@ const char* to_string(RegistrationReason reason);
 /// One sentence for a person.
 const char* explain(RegistrationReason reason);
 
-/// What went in and what was left after each stage of one pair: enough to answer "why did it fail".
+/// What went in and what was left after each stage of one pair: enough to answer "why did it fail". Hypotheses are quadruples of matches
+/// (Proposal::quadruples) or seeds (Proposal::compatibility).
 struct RegistrationStatistics {
   std::uint32_t source_points = 0;    ///< prepared points of the source
   std::uint32_t target_points = 0;
-  std::uint32_t correspondences = 0;  ///< feature matches that quadruples are drawn from
-  std::uint64_t hypotheses = 0;       ///< quadruples drawn
-  std::uint64_t survivors = 0;        ///< passed the polygon test, at most HypothesisOptions::max_survivors
+  std::uint32_t correspondences = 0;  ///< matches that hypotheses are made of, at most CompatibilityOptions::max_matches with seeds
+  std::uint64_t hypotheses = 0;       ///< quadruples drawn, or seeds tried
+  std::uint64_t survivors = 0;        ///< quadruples that passed the polygon test, at most max_survivors; seeds that gave a pose
   std::uint64_t scored = 0;           ///< of these with a well-defined rigid fit
   std::uint32_t points_scored = 0;    ///< points that the inlier ratio is relative to
-  std::uint32_t consensus = 0;        ///< inliers of the returned pose under ScoreOptions::max_normal_angle: what it won by
-  std::uint32_t inliers = 0;          ///< under max_judged_normal_angle: what the inlier ratio counts
-  std::uint32_t refine_iterations = 0;
+  /// Inliers of the returned pose under ScoreOptions::max_normal_angle, what it won by; with seeds the same as inliers.
+  std::uint32_t consensus = 0;
+  /// What the inlier ratio counts: under ScoreOptions::max_judged_normal_angle, with seeds under EvidenceOptions::max_normal_angle.
+  std::uint32_t inliers = 0;
+  std::uint32_t refine_iterations = 0;  ///< of the returned pose
   bool swapped = false;               ///< the target was sampled and scored, being the smaller cloud
 };
 
-/// Wall time of each stage in milliseconds. In a batch a chunk of pairs goes through a stage together: then each pair carries its
+/// Wall time of each stage in milliseconds. With Proposal::compatibility sample is the choice of seeds, fit the proposal of poses, score
+/// the weighing and selection of candidates, judge the weighing of modes. In a batch a chunk of pairs goes through a stage together: then each pair carries its
 /// equal share, so that sums over pairs are right.
 struct StageTimings {
   double match = 0, sample = 0, fit = 0, score = 0, refine = 0, judge = 0;

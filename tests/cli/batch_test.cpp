@@ -127,7 +127,9 @@ TEST_F(Batch, MinimalScoreDecidesWhatIsReported) {
   const Outcome none = batch("none", {"--min-score", "1"});
   EXPECT_EQ(none.status, 1) << "no pair aligned";
   EXPECT_TRUE(evaluation::read_log(out_ / "none.log").empty());
-  EXPECT_EQ(json_of(out_ / "none.json")["options"]["score"]["min_inlier_ratio"], 1.0);
+  const auto options = json_of(out_ / "none.json")["options"];
+  EXPECT_EQ(options["min_confidence"], 1.0);
+  EXPECT_FLOAT_EQ(options["score"]["min_inlier_ratio"].get<float>(), 0.3f) << "not asked for";
   // The candidates are the same whatever is reported.
   const auto poses = [&](const char* name) {
     auto pairs = without_times(json_of(out_ / name))["pairs"];
@@ -135,6 +137,25 @@ TEST_F(Batch, MinimalScoreDecidesWhatIsReported) {
     return pairs;
   };
   EXPECT_EQ(poses("all.json"), poses("none.json"));
+}
+
+TEST_F(Batch, MinimalScoreOfLoopsmartIsTheInlierRatio) {
+  const auto reported = [&](const std::string& score) {
+    const std::string name = "ratio" + score;
+    batch(name, {"--preset", "loopsmart", "--min-score", score});
+    const auto json = json_of(out_ / (name + ".json"));
+    EXPECT_FLOAT_EQ(json["options"]["score"]["min_inlier_ratio"].get<float>(), std::stof(score));
+    EXPECT_EQ(json["options"]["min_confidence"], 0.5) << "not asked for";
+    std::size_t expected = 0;
+    for (const auto& pair : json["pairs"]) {
+      EXPECT_EQ(pair["score"], pair["inlier_ratio"]);
+      expected += pair["score"].get<double>() >= std::stod(score) && pair["score"] > 0;
+    }
+    const std::size_t found = evaluation::read_log(out_ / (name + ".log")).size();
+    EXPECT_EQ(found, expected) << score;
+    return found;
+  };
+  EXPECT_GT(reported("0.05"), reported("0.75"));
 }
 
 TEST_F(Batch, QuietSaysNothing) {

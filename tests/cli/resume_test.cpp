@@ -120,7 +120,7 @@ TEST_F(Resume, ChangedOptionsAreRefused) {
     EXPECT_EQ(content_of(journal("r")), before);
   };
   refused({"--seed", "2"}, {"cannot resume", "options.hypothesis.seed was 1, now 2"});
-  refused({"--min-score", "0.5"}, {"options.score.min_inlier_ratio was 0.3, now 0.5"});
+  refused({"--min-score", "0.6"}, {"options.min_confidence was 0.5, now 0.6"});
   refused({"--preset", "loopsmart"}, {"cannot resume", "options."});
   const std::string pairs = out_.write("pairs.txt", "0 1\n");
   refused({"--pairs", pairs}, {"pairs.count was 28, now 1"});

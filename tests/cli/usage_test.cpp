@@ -82,7 +82,7 @@ TEST_F(Usage, OtherValues) {
   expect_refused(with({"--backend", "gpu"}), {"--backend", "gpu", "cuda"});
   for (const char* score : {"-0.1", "1.01", "nan", "high"})
     expect_refused({"batch", folder_.path(), "-o", folder_ / "r.log", "--min-score", score},
-                   {"score", score});
+                   {"--min-score", score});
 }
 
 TEST_F(Usage, MessagesStayInOneLine) {
