@@ -46,6 +46,7 @@ Json to_json(const PrepareStatistics& p) {
             {"normals", p.normals},
             {"features", p.features},
             {"grid", p.grid},
+            {"depth_maps", p.depth_maps},
             {"total", p.total()}}}};
 }
 

@@ -23,9 +23,10 @@ TEST_F(Register, SaysWhatItFound) {
   const Outcome outcome = align({});
   EXPECT_EQ(outcome.status, 0);
   EXPECT_EQ(outcome.err, "");
-  expect_holds(outcome.out, {source_, target_, "backend  cpu", "status   aligned",
-                             "target_from_source\n", "score", "inliers", "correspondences",
-                             "hypotheses 1,024", "survivors", "features", "match", "refine"});
+  expect_holds(outcome.out,
+               {source_, target_, "backend  cpu", "status   aligned", "target_from_source\n",
+                "score", "inliers", "correspondences", "hypotheses 1,024", "survivors", "features",
+                "depth maps", "match", "refine"});
 }
 
 TEST_F(Register, Json) {
@@ -37,6 +38,10 @@ TEST_F(Register, Json) {
   EXPECT_EQ(json["environment"]["backend"], "cpu");
   EXPECT_EQ(json["source"]["file"], source_);
   EXPECT_EQ(json["source"]["prepare"]["input_points"], room_scan(0).points.size());
+  double parts = 0;
+  for (const char* stage : {"downsample", "normals", "features", "grid", "depth_maps"})
+    parts += json["source"]["prepare"]["ms"][stage].get<double>();
+  EXPECT_DOUBLE_EQ(json["source"]["prepare"]["ms"]["total"].get<double>(), parts);
   const auto& result = json["result"];
   EXPECT_EQ(result["status"], "aligned");
   EXPECT_EQ(result["reason"], "none");
