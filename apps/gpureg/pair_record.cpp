@@ -80,6 +80,20 @@ PairRecord PairRecord::from_json(const Json& json) {
   return record;
 }
 
+std::vector<RegistrationMode> modes_from_json(const Json& pair) {
+  std::vector<RegistrationMode> modes;
+  const auto found = pair.find("modes");
+  if (found == pair.end()) return modes;
+  if (!found->is_array()) throw InvalidArgument("\"modes\" of a pair is no array");
+  for (const Json& json : *found) {
+    RegistrationMode mode;
+    mode.target_from_source.matrix() = square<4>(member(json, "T_ij"), "T_ij");
+    mode.confidence = number(member(json, "confidence"), "confidence");
+    modes.push_back(mode);
+  }
+  return modes;
+}
+
 Eigen::Matrix<double, 6, 6> information_from_json(const Json& json) {
   return square<6>(json, "information");
 }

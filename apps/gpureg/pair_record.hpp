@@ -4,6 +4,7 @@
 #include <Eigen/Core>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "gpureg/result.hpp"
 #include "json.hpp"
@@ -27,6 +28,9 @@ struct PairRecord {
   /// Throws InvalidArgument saying what is wrong with the record.
   static PairRecord from_json(const Json& json);
 };
+
+/// The modes of a pair's record: poses and confidences, without their evidence. Throws InvalidArgument.
+std::vector<RegistrationMode> modes_from_json(const Json& pair);
 
 /// 6x6, row by row. Throws InvalidArgument.
 Eigen::Matrix<double, 6, 6> information_from_json(const Json& json);
