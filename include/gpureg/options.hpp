@@ -115,6 +115,9 @@ struct RegistrationOptions {
   /// evidence.modes. Throws InvalidArgument unless v is finite and > 0 and quality at most 10.
   static RegistrationOptions from_voxel_size(float voxel_size, std::uint32_t quality = kDefaultQuality);
 
+  /// A copy with quality's number of candidates, everything else as it is. Throws InvalidArgument where quality is above 10.
+  RegistrationOptions with_quality(std::uint32_t quality) const;
+
   /// The paper's algorithm with the paper's numbers (Zhang and Chen, LoopSmart, section III): 4,000,000 quadruples, no refinement.
   static RegistrationOptions loopsmart();
 

@@ -100,13 +100,18 @@ constexpr Effort kEfforts[kHighestQuality + 1] = {{64, 32, 8},     {128, 48, 12}
 
 }  // namespace
 
-RegistrationOptions RegistrationOptions::from_voxel_size(float voxel_size, std::uint32_t quality) {
-  require(length(voxel_size), "voxel_size", voxel_size, kLength);
+RegistrationOptions RegistrationOptions::with_quality(std::uint32_t quality) const {
   require_range(quality, 0, kHighestQuality, "quality");
-  RegistrationOptions o;
+  RegistrationOptions o = *this;
   o.compatibility.seeds = kEfforts[quality].seeds;
   o.compatibility.triangles = kEfforts[quality].triangles;
   o.evidence.modes = kEfforts[quality].modes;
+  return o;
+}
+
+RegistrationOptions RegistrationOptions::from_voxel_size(float voxel_size, std::uint32_t quality) {
+  require(length(voxel_size), "voxel_size", voxel_size, kLength);
+  RegistrationOptions o = RegistrationOptions{}.with_quality(quality);
   o.prepare.voxel_size = voxel_size;
   o.prepare.normal_radius = 2.0f * voxel_size;
   o.prepare.feature_radius = 5.0f * voxel_size;

@@ -1,0 +1,103 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "gpureg/time_budget.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+
+#include "api/quality_levels.hpp"
+#include "api/validate.hpp"
+
+namespace gpureg {
+namespace {
+
+constexpr double kSure = 0.99;
+
+/// The same place for the cloud: poses as close as two candidates of one mode. The shift is
+/// compared at the middle of what overlaps.
+bool same_pose(const RegistrationResult& a, const RegistrationResult& b,
+               const EvidenceOptions& options) {
+  if (!a.has_candidate || !b.has_candidate) return false;
+  const UnalignedIsometry3d between = a.target_from_source.inverse() * b.target_from_source;
+  const double cosine =
+      std::cos(static_cast<double>(options.mode_angle) * 3.14159265358979323846 / 180.0);
+  Eigen::Vector3d middle = Eigen::Vector3d::Zero();
+  if (a.source_moments.count > 0)
+    middle = a.source_moments.sum / static_cast<double>(a.source_moments.count);
+  return (between.linear().trace() - 1.0) / 2.0 >= cosine &&
+         (between * middle - middle).norm() <= static_cast<double>(options.mode_distance);
+}
+
+double ratio(double a, double b) { return b > 0 ? a / b : 1.0; }
+
+}  // namespace
+
+double predicted_milliseconds(const StageTimings& t, double overhead,
+                              const RegistrationOptions& from, const RegistrationOptions& to) {
+  const double seeds = ratio(to.compatibility.seeds, from.compatibility.seeds);
+  const double triangles = seeds * ratio(to.compatibility.triangles, from.compatibility.triangles);
+  const double modes = ratio(to.evidence.modes, from.evidence.modes);
+  return overhead + t.match + t.sample + t.fit * triangles + t.score * seeds +
+         (t.refine + t.judge) * modes;
+}
+
+TimedResult run_levels(const LevelRunner& runner, double milliseconds,
+                       const RegistrationOptions& options) {
+  const double begin = runner.now();
+  TimedResult best;
+  RegistrationResult last;
+  double last_ms = 0, predicted = 0, previous_ms = 0;
+  // Devices that are not full take less than in proportion: how much less, the growth from one
+  // level to the next has shown.
+  double growth = 1.0;
+  const auto prediction = [&](std::uint32_t quality) {
+    const double overhead = std::max(0.0, last_ms - last.timings.total());
+    const double whole =
+        predicted_milliseconds(last.timings, overhead, options.with_quality(best.highest_quality),
+                               options.with_quality(quality));
+    return std::max(last_ms, last_ms + growth * (whole - last_ms));
+  };
+  for (std::uint32_t quality = 0;;) {
+    const double started = runner.now();
+    RegistrationResult result = runner.align(quality);
+    const double ended = runner.now();
+    const bool agree = best.levels > 0 && result.score >= kSure && last.score >= kSure &&
+                       same_pose(result, last, options.evidence);
+    if (best.levels == 0 || result.score >= best.result.score)
+      best.result = result, best.quality = quality;
+    previous_ms = last_ms, last_ms = ended - started;
+    if (best.levels > 0 && predicted > previous_ms)
+      growth = std::clamp(growth * (last_ms - previous_ms) / (predicted - previous_ms), 0.2, 1.25);
+    ++best.levels, best.highest_quality = quality, best.milliseconds = ended - begin;
+    last = std::move(result);
+    if (agree || quality == kHighestQuality) return best;
+    const double left = milliseconds - best.milliseconds;
+    std::uint32_t next = quality + 1;
+    if (prediction(next) > left) return best;
+    // A sure result needs only to be confirmed; where there is none yet, the time goes into the
+    // highest level that it is enough for.
+    while (last.score < kSure && next < kHighestQuality && prediction(next + 1) <= left) ++next;
+    predicted = prediction(next), quality = next;
+  }
+}
+
+TimedResult align_within(const Context& context, const PreparedCloud& source,
+                         const PreparedCloud& target, double milliseconds,
+                         const RegistrationOptions& options) {
+  const auto begin = std::chrono::steady_clock::now();
+  require(std::isfinite(milliseconds) && milliseconds > 0, "milliseconds", milliseconds,
+          "a time > 0");
+  require(options.hypothesis.proposal == Proposal::compatibility, "hypothesis.proposal",
+          to_string(options.hypothesis.proposal), "compatibility: only it has levels of quality");
+  const auto now = [begin] {
+    return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - begin)
+        .count();
+  };
+  return run_levels({[&](std::uint32_t quality) {
+                       return align(context, source, target, options.with_quality(quality));
+                     },
+                     now},
+                    milliseconds, options);
+}
+
+}  // namespace gpureg
