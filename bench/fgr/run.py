@@ -8,6 +8,7 @@ ground truth is within 0.0125. Every method, gpureg too, runs as bench/peers run
 proportion; a method without a pose for a pair counts with RMSE infinity there (median, shares) and is left out of its mean.
 usage: run.py [--methods gpureg_default ...] [--voxel-size 0.02] [--seeds 1] [--data DIR] [-o FILE]
 Needs Python 3 with numpy and gpureg (pip install .), and what the peers need: bench/peers/requirements.txt."""
+import json
 import math
 import os
 import pathlib
@@ -106,6 +107,7 @@ def main():
     parser.add_argument("--voxel-size", type=float, default=0.02)
     parser.add_argument("--seeds", type=int, nargs="+", default=[1])
     parser.add_argument("--threads", type=int, default=os.cpu_count())
+    parser.add_argument("--update", action="store_true", help="keep the entries of the record for methods that are not named")
     parser.add_argument("--pair-timeout", type=float, default=120)
     arguments = parser.parse_args()
     os.environ["GPUREG_PEER_VOXEL"] = str(arguments.voxel_size)  # read when the methods are imported
@@ -132,7 +134,13 @@ def main():
             errors.setdefault(name, []).extend(values)
             timings.setdefault(name, []).append(ms[name])
             print(f"seed {seed}: {name} done", flush=True)
-    entries = {name: {**about[name], **summary(values), "ms_per_pair": statistics.fmean(timings[name]), "rmse": values} for name, values in errors.items()}
+    entries = {name: {**about[name], "commit": record.commit(), **summary(values), "ms_per_pair": statistics.fmean(timings[name]), "rmse": values} for name, values in errors.items()}
+    if arguments.update:
+        old = json.loads(arguments.output.read_text())
+        if (old["voxel_size"], old["seeds"]) != (arguments.voxel_size, arguments.seeds):
+            sys.exit(f"error: {arguments.output} was made with another voxel size or other seeds, it cannot be updated")
+        entries = {**old["methods"], **entries}
+        entries = {name: entries[name] for name in methods.METHODS if name in entries}
     truth = statistics.fmean(pair.rmse(pair.truth) for pair in pairs)
     print(f"\n{'RMSE (diameter 2)':44}{'mean':>9}{'max':>9}{'<.01':>7}{'<.02':>7}{'<.05':>7}{'ms/pair':>10}")
     for entry in entries.values():

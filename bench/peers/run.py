@@ -59,7 +59,7 @@ def document(name, about, results, fragments, lost):
 
 
 def summary(about, results, fragments, memory, lost, scene, overlap):
-    strict, geometric = dict(scene["strict"]), scene.get("geometric")
+    strict, geometric = analysis.rounded(scene["strict"]), analysis.rounded(scene.get("geometric"))
     right = [pair["error"] for pair in scene["pairs"] if pair["strict"]]
     return {
         **about, "commit": record.commit(), "strict": strict, "geometric": geometric, "lost_pairs": lost, **analysis.all_of(scene["pairs"], overlap),

@@ -75,6 +75,13 @@ def rotation_errors(pairs):
     return {"edges": DEGREE_EDGES, "counts": bins(wrong, DEGREE_EDGES)}
 
 
+def rounded(scores):
+    """Scores of one rule with a curve of four digits: a record need not hold more."""
+    if scores and "curve" in scores:
+        scores["curve"] = [[round(recall, 4), round(precision, 4)] for recall, precision in scores["curve"]]
+    return scores
+
+
 def all_of(pairs, overlap):
     return {"recall_by_overlap": recall_by_overlap(pairs, overlap), "misses": misses(pairs), "wrong_reports": wrong_reports(pairs),
             "rotation_errors_of_wrong_candidates": rotation_errors(pairs)}

@@ -73,7 +73,7 @@ def run_once(arguments, scene, preset, backend, seed, temporary, pictures):
         record.gpureg(arguments, "report", result, "--ground-truth", scene.truth, "--clouds", scene.fragments, "-o", page)
         pictures[scene.name, preset] = page.read_text()
     cost = [[pair["statistics"]["source_points"] + pair["statistics"]["target_points"], round(pair["ms"]["total"], 4)] for pair in batch["pairs"]]
-    return {"seed": seed, "strict": verdict["strict"], "geometric": verdict.get("geometric"), "registration_recall": recalls, "ms": times(batch),
+    return {"seed": seed, "strict": analysis.rounded(verdict["strict"]), "geometric": analysis.rounded(verdict.get("geometric")), "registration_recall": recalls, "ms": times(batch),
             "pairs": len(batch["pairs"]), "peak_memory_mib": round(batch["peak_memory_mib"]), "stages_ms": stages(batch),
             "points_and_ms": cost[::max(1, len(cost) // COST_SAMPLE)], **analysis.all_of(verdict["pairs"], analysis.overlaps(scene.fragments))}, batch
 
@@ -210,6 +210,10 @@ def main():
                     for seed in arguments.seeds:
                         wanted = pictures if seed == arguments.seeds[0] and backend == used[0] else None
                         run, batch = run_once(arguments, scene, preset, backend, seed, temporary, wanted)
+                        if runs:  # of the first seed only
+                            for detail in (run["strict"], run["geometric"] or {}):
+                                detail.pop("curve", None)
+                            del run["points_and_ms"]
                         runs.append(run)
                         environment[backend] = batch["environment"]
                         method["options"] = {**batch["options"], "hypothesis": {k: v for k, v in batch["options"]["hypothesis"].items() if k != "seed"}}
