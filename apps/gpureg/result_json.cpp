@@ -54,11 +54,14 @@ Json to_json(const PoseEvidence& e) {
   return {{"match_inliers", e.match_inliers},
           {"match_support", e.match_support},
           {"overlap", {e.source_overlap, e.target_overlap}},
+          {"reach", {e.source_reach, e.target_reach}},
+          {"residual", {e.source_residual, e.target_residual}},
           {"balanced_overlap", {e.source_balanced_overlap, e.target_balanced_overlap}},
           {"seen", {e.source_seen, e.target_seen}},
           {"impossible", {e.source_impossible, e.target_impossible}},
           {"hidden", {e.source_hidden, e.target_hidden}},
-          {"stiffness", e.stiffness}};
+          {"stiffness", e.stiffness},
+          {"softest", e.softest}};
 }
 
 Json to_json(const RegistrationMode& mode, const char* pose_name) {

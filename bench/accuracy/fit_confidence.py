@@ -7,7 +7,7 @@ gt_all.log and gt_all.info (right: Redwood's 0.2 m rule against gt_all). Every r
 then all of them together give the coefficients that are written into the library.
 
 Three logistic regressions: the first ranks the modes of a pair by their own evidence, the second judges the best of them, and also sees
-its margin over the best distinct rival; the third says, from the same, whether the pose is right and the clouds overlap by 30 % or more
+its margin over the best distinct rival, and no pose gets more than its share of the odds of all, as at most one is right; the third says, from the same, whether the pose is right and the clouds overlap by 30 % or more
 (in gt.log), which is what Redwood's strict protocol counts. Each exists twice: with free space, and without for clouds whose
 viewpoints are not known.
 
@@ -100,18 +100,20 @@ class Logistic:
 
 
 def second_view(run, free, first):
-    """Measures of the best mode of each pair, its logit and its margin over the best rival; which mode it is."""
-    rows, best = [], []
+    """Measures of the best mode of each pair, its logit and its margin over the best rival; which mode it is; its share among the modes."""
+    rows, best, share = [], [], []
     for x in run.x[free]:
         if not len(x):
             best.append(-1)
             continue
-        logits = np.clip(first.logit(x), -14, 14)
-        k = int(logits.argmax())
+        own = first.logit(x)
+        k = int(own.argmax())
+        share.append(1 / np.exp(own - own[k]).sum())
+        logits = np.clip(own, -14, 14)
         rival = max([v for i, v in enumerate(logits) if i != k], default=-14.0)
         rows.append(np.r_[x[k], logits[k], logits[k] - rival])
         best.append(k)
-    return np.array(rows), best
+    return np.array(rows), best, np.array(share)
 
 
 def fit(runs, free):
@@ -126,12 +128,12 @@ def fit(runs, free):
 
 
 def figures(run, free, models):
-    x, best = second_view(run, free, models[0])
+    x, best, share = second_view(run, free, models[0])
     confidence = np.zeros(len(best))
     overlapping = np.zeros(len(best))
     found = np.array([b >= 0 for b in best])
-    confidence[found] = 1 / (1 + np.exp(-models[1].logit(x)))
-    overlapping[found] = 1 / (1 + np.exp(-models[2].logit(x)))
+    confidence[found] = np.minimum(1 / (1 + np.exp(-models[1].logit(x))), share)
+    overlapping[found] = np.minimum(1 / (1 + np.exp(-models[2].logit(x))), confidence[found])
     right = np.array([b >= 0 and bool(run.right[k][b]) for k, b in enumerate(best)])
     strict = np.array([b >= 0 and bool(run.strict[k][b]) for k, b in enumerate(best)])
     total = int(run.in_truth.sum())

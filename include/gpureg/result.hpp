@@ -34,6 +34,10 @@ struct PoseEvidence {
   double match_support = 0;              ///< the same as a balanced share of all matches, the smaller one of both sides
   double source_overlap = 0;             ///< points of the source with a target point in reach and normals alike
   double target_overlap = 0;             ///< and the other way round
+  double source_reach = 0;               ///< the same whatever the normals
+  double target_reach = 0;
+  double source_residual = 1;            ///< RMS distance of the overlapping points over max_correspondence_distance
+  double target_residual = 1;
   double source_balanced_overlap = 0;
   double target_balanced_overlap = 0;
   double source_seen = 0;                ///< points of the source in directions that the target's viewpoints saw; 0: none known
@@ -45,6 +49,9 @@ struct PoseEvidence {
   /// Eigenvalues, ascending, of the point-to-plane information of the source's inliers about their centre (rotation and translation,
   /// lengths in units of 20 voxels): a small one is a direction in which the pose slides.
   std::array<double, 6> stiffness{};
+  /// The direction of the first of them, in the target's frame: rotation (x, y, z), then translation, a unit vector. A corridor slides
+  /// along its last three.
+  std::array<double, 6> softest{};
 };
 
 /// One of the distinct poses of a pair.

@@ -61,6 +61,11 @@ std::vector<Field<PoseEvidence>> evidence_fields() {
       field("source_overlap", &E::source_overlap,
             "Share of the source's points with a point of the target in reach, normals alike."),
       field("target_overlap", &E::target_overlap, "The other way round."),
+      field("source_reach", &E::source_reach, "The same whatever the normals."),
+      field("target_reach", &E::target_reach, "The other way round."),
+      field("source_residual", &E::source_residual,
+            "RMS distance of the overlapping points over max_correspondence_distance."),
+      field("target_residual", &E::target_residual, "The other way round."),
       field("source_balanced_overlap", &E::source_balanced_overlap,
             "Points weigh less where many normals point their way."),
       field("target_balanced_overlap", &E::target_balanced_overlap, "The other way round."),
@@ -76,6 +81,8 @@ std::vector<Field<PoseEvidence>> evidence_fields() {
       field("stiffness", &E::stiffness,
             "6 eigenvalues, ascending, of the point-to-plane information: a small one is a "
             "direction in which the pose slides."),
+      field("softest", &E::softest,
+            "That direction, in the target's frame: rotation, then translation."),
   };
 }
 

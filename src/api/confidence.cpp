@@ -44,6 +44,16 @@ double logit(const std::vector<double>& x, const double* weights, double bias) {
   return sum;
 }
 
+/// Of distinct poses at most one is right: what a pose may have beside the others, were each of them judged by itself. Twins share.
+std::vector<double> shares(const std::vector<double>& logits) {
+  const double most = *std::max_element(logits.begin(), logits.end());
+  double sum = 0;
+  std::vector<double> out;
+  for (const double l : logits) out.push_back(std::exp(l - most)), sum += out.back();
+  for (double& share : out) share /= sum;
+  return out;
+}
+
 double probability(double logit_value) { return 1.0 / (1.0 + std::exp(-logit_value)); }
 
 }  // namespace
@@ -52,14 +62,15 @@ void set_confidences(std::vector<RegistrationMode>& modes) {
   if (modes.empty()) return;
   const PoseEvidence& first = modes.front().evidence;
   const bool free_space = first.source_seen > 0 || first.target_seen > 0;
-  std::vector<double> rank;
+  std::vector<double> own, rank;
   for (const RegistrationMode& mode : modes)
-    rank.push_back(std::clamp(free_space ? logit(measures(mode.evidence, true), model::ranking_with_free_space, model::ranking_with_free_space_bias)
-                                         : logit(measures(mode.evidence, false), model::ranking_without_free_space, model::ranking_without_free_space_bias),
-                              -14.0, 14.0));
+    own.push_back(free_space ? logit(measures(mode.evidence, true), model::ranking_with_free_space, model::ranking_with_free_space_bias)
+                                         : logit(measures(mode.evidence, false), model::ranking_without_free_space, model::ranking_without_free_space_bias));
+  const std::vector<double> share = shares(own);
+  for (const double l : own) rank.push_back(std::clamp(l, -14.0, 14.0));
   std::vector<std::size_t> order(modes.size());
   for (std::size_t k = 0; k < order.size(); ++k) order[k] = k;
-  std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return rank[a] > rank[b]; });
+  std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return own[a] > own[b]; });
   std::vector<RegistrationMode> out;
   for (std::size_t place = 0; place < order.size(); ++place) {
     const std::size_t k = order[place];
@@ -72,6 +83,7 @@ void set_confidences(std::vector<RegistrationMode>& modes) {
                                  : probability(logit(x, model::confidence_without_free_space, model::confidence_without_free_space_bias));
     mode.overlap_confidence = free_space ? probability(logit(x, model::overlap_with_free_space, model::overlap_with_free_space_bias))
                                          : probability(logit(x, model::overlap_without_free_space, model::overlap_without_free_space_bias));
+    mode.confidence = std::min(mode.confidence, share[k]);
     if (place > 0) mode.confidence = std::min(mode.confidence, out.front().confidence);
     mode.overlap_confidence = std::min(mode.overlap_confidence, mode.confidence);
     out.push_back(mode);

@@ -34,7 +34,7 @@ const char* explain(RegistrationReason reason) {
     case RegistrationReason::too_few_target_points: return "the target has fewer than 4 usable points after downsampling";
     case RegistrationReason::no_usable_features: return "fewer than 4 points could be matched: too few have a normal and neighbours";
     case RegistrationReason::no_hypothesis_survived: return "no quadruple of matches had similar side lengths in both clouds";
-    case RegistrationReason::degenerate_geometry: return "all candidate quadruples were collinear or coincident";
+    case RegistrationReason::degenerate_geometry: return "no pose is determined: what matches is collinear or coincident";
     case RegistrationReason::inlier_ratio_too_low: return "the best pose found brings too few points together";
     case RegistrationReason::confidence_too_low: return "what speaks for the best pose found is too little, or too much speaks against it";
     case RegistrationReason::cancelled: return "the batch was cancelled before this pair";
