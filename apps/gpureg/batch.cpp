@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <sys/stat.h>
 
+#include <algorithm>
 #include <chrono>
 #include <iostream>
 #include <map>
@@ -74,6 +75,21 @@ Json header_of(const BatchOptions& o, const Scene& scene, const Pairs& pairs) {
           {"options", to_json(o.registration())},
           {"pairs", {{"count", pairs.size()}, {"hash", hash}}},
           {"fragments", fragments}};
+}
+
+/// The voxel size of a folder is that of some of its fragments, evenly chosen: it is the same for a
+/// run that is resumed.
+void choose_voxel_size(BatchOptions& o) {
+  if (!o.method.automatic_voxel_size) return;
+  constexpr std::size_t kMost = 8;
+  const auto files = io::list_fragments(o.folder);
+  const std::size_t count = std::min(files.size(), kMost);
+  std::vector<PointCloud> clouds;
+  for (std::size_t k = 0; k < count; ++k)
+    clouds.push_back(io::read_point_cloud(files[k * files.size() / count].second));
+  std::vector<PointCloudView> views;
+  for (const PointCloud& cloud : clouds) views.push_back(cloud.view());
+  o.method.choose_voxel_size(views, o.folder);
 }
 
 /// One run, from the folder to the files.
@@ -201,6 +217,9 @@ class Batch {
 
   int summarise() const {
     if (!o_.quiet) {
+      if (o_.method.automatic_voxel_size)
+        std::cout << "voxel size " << significant(static_cast<double>(o_.method.voxel_size), 3)
+                  << "\n";
       std::cout << "fragments  " << scene_.numbers.size() << ", prepared in "
                 << fixed(scene_.seconds, 2) << " s\n"
                 << "pairs      " << pairs_.size() << ", in " << fixed(seconds_, 2) << " s ("
@@ -244,7 +263,12 @@ void add_batch(CLI::App& app, Action& chosen) {
   verb->add_option("--json", o->json, "Everything about every pair tried");
   verb->add_flag("--resume", o->resume, "Go on where an interrupted run of this output stopped");
   verb->add_flag("--quiet", o->quiet, "No progress, no summary");
-  verb->callback([o, &chosen] { chosen = [o] { return Batch(*o).run(); }; });
+  verb->callback([o, &chosen] {
+    chosen = [o] {
+      choose_voxel_size(*o);
+      return Batch(*o).run();
+    };
+  });
 }
 
 }  // namespace gpureg::cli

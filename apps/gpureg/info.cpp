@@ -8,6 +8,7 @@
 #include "command.hpp"
 #include "gpureg/context.hpp"
 #include "gpureg/io.hpp"
+#include "gpureg/voxel_size.hpp"
 #include "spacing.hpp"
 #include "text.hpp"
 
@@ -27,17 +28,19 @@ void print_cloud(const std::string& path) {
   if (points.empty()) return;
   Eigen::AlignedBox3f box;
   for (const Eigen::Vector3f& p : points) box.extend(p);
-  const double spacing = median_spacing(points);
-  const double voxel = suggested_voxel_size(points, spacing);
+  const VoxelSizeSuggestion suggestion = suggest_voxel_size({cloud.view()});
   std::cout << "  extent           " << describe(box.sizes()) << ", from " << describe(box.min())
             << " to " << describe(box.max()) << "\n  spacing          "
-            << (spacing > 0
-                    ? significant(spacing, 3) + " (median distance to the nearest neighbour)"
-                    : "none, all points are at one place")
+            << (suggestion.valid() ? significant(suggestion.spacing, 3) +
+                                         " (median distance to the nearest neighbour)"
+                                   : std::string("none, ") + explain(suggestion.reason))
             << "\n";
-  if (voxel > 0)
-    std::cout << "  suggested        --voxel-size " << significant(voxel, 3)
-              << " (leaves about 5000 points, or all where there are fewer)\n";
+  if (!suggestion.valid()) return;
+  std::cout << "  noise            " << significant(suggestion.noise, 2)
+            << " (median distance from the plane of the surroundings)\n"
+            << "  suggested        --voxel-size "
+            << significant(static_cast<double>(suggestion.voxel_size), 3) << " (leaves about "
+            << grouped(suggestion.points) << " points)\n";
 }
 
 int run(const std::vector<std::string>& clouds) {

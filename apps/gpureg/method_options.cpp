@@ -4,6 +4,10 @@
 #include <cerrno>
 #include <cstdlib>
 
+#include "gpureg/error.hpp"
+#include "gpureg/voxel_size.hpp"
+#include "text.hpp"
+
 namespace gpureg::cli {
 
 namespace {
@@ -21,10 +25,22 @@ std::string check_natural(const std::string& text) {
 CLI::Validator natural_number() { return CLI::Validator(&check_natural, "", "natural number"); }
 
 void MethodOptions::add_to(CLI::App& verb) {
-  verb.add_option("--voxel-size", voxel_size,
-                  "Edge of the downsampling voxel in metres; every other length follows from it")
-      ->capture_default_str();
-  verb.add_option("--preset", preset, "default: poses from compatible matches, judged by evidence; loopsmart: the paper's algorithm")
+  verb.add_option_function<std::string>(
+          "--voxel-size",
+          [this](const std::string& text) {
+            automatic_voxel_size = text == "auto";
+            if (text.empty())
+              voxel_size = 0;  // refused by name, later
+            else if (!automatic_voxel_size && !CLI::detail::lexical_cast(text, voxel_size))
+              throw CLI::ConversionError(text, "--voxel-size");
+          },
+          "Edge of the downsampling voxel in metres; every other length follows from it. auto: "
+          "chosen by the clouds")
+      ->default_str(significant(static_cast<double>(voxel_size), 6))
+      ->type_name("FLOAT or auto");
+  verb.add_option("--preset", preset,
+                  "default: poses from compatible matches, judged by evidence; loopsmart: the "
+                  "paper's algorithm")
       ->check(CLI::IsMember({"default", "loopsmart"}))
       ->capture_default_str();
   verb.add_option("--backend", backend, "auto: CUDA where there is a device, else the CPU")
@@ -37,7 +53,8 @@ void MethodOptions::add_to(CLI::App& verb) {
                   "Quadruples of matches that the preset loopsmart tries per pair")
       ->check(natural_number())
       ->capture_default_str();
-  verb.add_option("--quality", quality, "From 0, the fastest, to 10, which finds the most; of the preset default")
+  verb.add_option("--quality", quality,
+                  "From 0, the fastest, to 10, which finds the most; of the preset default")
       ->check(CLI::Range(0u, kHighestQuality))
       ->capture_default_str();
   verb.add_option("--seed", seed, "Same seed, same result, on any machine")
@@ -53,6 +70,15 @@ RegistrationOptions MethodOptions::registration() const {
   options.hypothesis.seed = seed;
   options.validate();
   return options;
+}
+
+void MethodOptions::choose_voxel_size(const std::vector<PointCloudView>& clouds,
+                                      const std::string& what) {
+  if (!automatic_voxel_size) return;
+  const VoxelSizeSuggestion suggestion = suggest_voxel_size(clouds);
+  if (!suggestion.valid())
+    throw InvalidArgument("--voxel-size auto: " + what + ": " + explain(suggestion.reason));
+  voxel_size = suggestion.voxel_size;
 }
 
 Context MethodOptions::context() const {

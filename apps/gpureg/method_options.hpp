@@ -4,15 +4,18 @@
 #include <CLI/CLI.hpp>
 #include <cstdint>
 #include <string>
+#include <vector>
 
 #include "gpureg/context.hpp"
 #include "gpureg/options.hpp"
+#include "gpureg/point_cloud.hpp"
 
 namespace gpureg::cli {
 
 /// The options that `register` and `batch` have in common.
 struct MethodOptions {
   float voxel_size = PrepareOptions{}.voxel_size;
+  bool automatic_voxel_size = false;  ///< to be chosen by the clouds, see choose_voxel_size
   std::string preset = "default";
   std::string backend = "auto";
   unsigned threads = 0;
@@ -24,6 +27,10 @@ struct MethodOptions {
 
   /// Throws InvalidArgument naming field and value.
   RegistrationOptions registration() const;
+
+  /// Where the voxel size is automatic: makes it the one that the clouds suggest. what: for the message. Throws InvalidArgument where
+  /// they suggest none.
+  void choose_voxel_size(const std::vector<PointCloudView>& clouds, const std::string& what);
 
   /// Throws BackendUnavailable, InvalidArgument.
   Context context() const;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <iostream>
 #include <memory>
+#include <optional>
 #include <string>
 
 #include "before_after.hpp"
@@ -8,6 +9,7 @@
 #include "gpureg/evaluation.hpp"
 #include "gpureg/io.hpp"
 #include "gpureg/registration.hpp"
+#include "gpureg/time_budget.hpp"
 #include "image.hpp"
 #include "json_file.hpp"
 #include "method_options.hpp"
@@ -23,6 +25,7 @@ namespace {
 struct RegisterOptions {
   std::string source, target;
   MethodOptions method;
+  std::optional<double> time_budget;  // milliseconds
   std::string json, overlay, image;
 };
 
@@ -94,21 +97,41 @@ Json document(const RegisterOptions& o, const RegistrationOptions& options, cons
   return json;
 }
 
-int run(const RegisterOptions& o) {
-  const RegistrationOptions options = o.method.registration();
+int run(RegisterOptions o) {
+  o.method.registration();  // what is wrong with it shall be said before clouds are read
   for (const std::string* path : {&o.json, &o.overlay, &o.image}) check_output(*path);
   const Context context = o.method.context();
   const PointCloud source_cloud = io::read_point_cloud(o.source);
   const PointCloud target_cloud = io::read_point_cloud(o.target);
+  o.method.choose_voxel_size({source_cloud.view(), target_cloud.view()},
+                             o.source + " and " + o.target);
+  const RegistrationOptions options = o.method.registration();
   check_voxel_size(options.prepare.voxel_size, extent_of(source_cloud.points), o.source);
   check_voxel_size(options.prepare.voxel_size, extent_of(target_cloud.points), o.target);
   const PreparedCloud source = prepare(context, source_cloud.view(), options.prepare);
   const PreparedCloud target = prepare(context, target_cloud.view(), options.prepare);
-  const RegistrationResult result = align(context, source, target, options);
+  const TimedResult timed = o.time_budget
+                                ? align_within(context, source, target, *o.time_budget, options)
+                                : TimedResult{align(context, source, target, options)};
+  const RegistrationResult& result = timed.result;
   print_report(o, context, source, target, result);
+  if (o.time_budget)
+    std::cout << "budget   " << significant(*o.time_budget, 4) << " ms, "
+              << fixed(timed.milliseconds, 1) << " used; " << timed.levels
+              << " levels of quality up to " << timed.highest_quality << ", the result is of "
+              << timed.quality << "\n";
 
-  if (!o.json.empty())
-    write_document(o.json, document(o, options, context, source, target, result));
+  if (!o.json.empty()) {
+    Json json = document(o, o.time_budget ? options.with_quality(timed.quality) : options, context,
+                         source, target, result);
+    if (o.time_budget)
+      json["time_budget"] = {{"ms", *o.time_budget},
+                             {"used_ms", timed.milliseconds},
+                             {"quality", timed.quality},
+                             {"highest_quality", timed.highest_quality},
+                             {"levels", timed.levels}};
+    write_document(o.json, json);
+  }
   if (!o.overlay.empty()) {
     if (result.has_candidate)
       io::write_overlay(o.overlay, source_cloud, target_cloud, result.target_from_source);
@@ -130,6 +153,9 @@ void add_register(CLI::App& app, Action& chosen) {
   verb->add_option("SOURCE", o->source, "Cloud that is moved")->required();
   verb->add_option("TARGET", o->target, "Cloud that stays")->required();
   o->method.add_to(*verb);
+  verb->add_option("--time-budget", o->time_budget,
+                   "Milliseconds for the alignment: instead of --quality, as much of it as they "
+                   "allow; which is not the same on every run");
   verb->add_option("--json", o->json, "Write options, result, counts and times");
   verb->add_option("--overlay", o->overlay, "Write both clouds in colour, aligned, as PLY");
   verb->add_option("--image", o->image, "Draw both clouds before and after, as PNG");

@@ -14,35 +14,11 @@ namespace gpureg::cli {
 namespace {
 
 constexpr std::size_t kSample = 1000;  // the median of so many is good to a few percent
-constexpr std::size_t kWantedPoints = 5000;
-constexpr std::size_t kVoxelSample =
-    400'000;  // voxels of 5000 points are full enough to be found with it
 
 Eigen::AlignedBox3f box_of(const std::vector<Eigen::Vector3f>& points) {
   Eigen::AlignedBox3f box;
   for (const Eigen::Vector3f& p : points) box.extend(p);
   return box;
-}
-
-std::size_t occupied_voxels(const std::vector<Eigen::Vector3f>& points, const Eigen::Vector3f& low,
-                            double size) {
-  std::vector<std::uint64_t> keys;
-  keys.reserve(points.size());
-  for (const Eigen::Vector3f& p : points) {
-    const Eigen::Vector3d cell = (p - low).cast<double>() / size;
-    keys.push_back(static_cast<std::uint64_t>(cell.x()) << 42 |
-                   static_cast<std::uint64_t>(cell.y()) << 21 |
-                   static_cast<std::uint64_t>(cell.z()));
-  }
-  std::sort(keys.begin(), keys.end());
-  return static_cast<std::size_t>(std::unique(keys.begin(), keys.end()) - keys.begin());
-}
-
-// 0.0473 becomes 0.05, 0.0134 becomes 0.013: what a person would type.
-double rounded(double value) {
-  const double unit = std::pow(10.0, std::floor(std::log10(value)));
-  const double digits = value / unit;
-  return unit * (digits < 2 ? std::round(digits * 10) / 10 : std::round(digits * 2) / 2);
 }
 
 }  // namespace
@@ -91,22 +67,6 @@ double median_spacing(const std::vector<Eigen::Vector3f>& points, int rank) {
   const auto middle = distances.begin() + static_cast<std::ptrdiff_t>(distances.size() / 2);
   std::nth_element(distances.begin(), middle, distances.end());
   return *middle;
-}
-
-double suggested_voxel_size(const std::vector<Eigen::Vector3f>& points, double spacing) {
-  const Eigen::AlignedBox3f box = box_of(points);
-  const double extent = points.empty() ? 0 : box.sizes().cast<double>().maxCoeff();
-  if (!(extent > 0) || !(spacing > 0)) return 0;
-  std::vector<Eigen::Vector3f> sample;
-  const std::size_t step = points.size() / kVoxelSample + 1;
-  for (std::size_t k = 0; k < points.size(); k += step) sample.push_back(points[k]);
-
-  double low = std::max(extent * 1e-5, spacing * 0.5), high = extent;
-  for (int round = 0; round < 20 && high > 1.02 * low; ++round) {
-    const double middle = std::sqrt(low * high);
-    (occupied_voxels(sample, box.min(), middle) > kWantedPoints ? low : high) = middle;
-  }
-  return rounded(std::max(high, spacing));
 }
 
 double extent_of(const std::vector<Eigen::Vector3f>& points) {

@@ -14,10 +14,6 @@ std::vector<Eigen::Vector3f> finite_points(const std::vector<Eigen::Vector3f>& p
 /// is not at the same place; 0 where there is none. The points must be finite.
 double median_spacing(const std::vector<Eigen::Vector3f>& points, int rank = 1);
 
-/// A voxel size that leaves about 5000 points, which is what registration works well and fast with,
-/// rounded to 1 or 2 digits, and not below the spacing; 0 where the points have no extent.
-double suggested_voxel_size(const std::vector<Eigen::Vector3f>& points, double spacing);
-
 /// Longest side of the box around the finite points; 0 where there are fewer than two.
 double extent_of(const std::vector<Eigen::Vector3f>& points);
 

@@ -51,6 +51,22 @@ TEST_F(Batch, LogAndInformationOfTheAlignedPairs) {
   EXPECT_EQ(out_.count(), 3u) << "the journal must be gone";
 }
 
+TEST_F(Batch, VoxelSizeByTheFragments) {
+  const std::vector<std::string> words = {
+      "batch", scans_.path(), "-o", out_ / "r.log", "--json", out_ / "r.json", "--backend",
+      "cpu",   "--quality",   "0",  "--voxel-size", "auto"};
+  const Outcome outcome = run(words);
+  ASSERT_EQ(outcome.status, 0) << outcome.err;
+  expect_holds(outcome.out, {"voxel size 0."});
+  const auto json = json_of(out_ / "r.json");
+  EXPECT_NE(json["options"]["prepare"]["voxel_size"], 0.05);
+  EXPECT_GE(json["fragments"][0]["points"], 3000);
+  EXPECT_LE(json["fragments"][0]["points"], 20000);
+  const TemporaryFolder empty;
+  expect_refused({"batch", empty.path(), "-o", out_ / "e.log", "--voxel-size", "auto"},
+                 {empty.path()});
+}
+
 TEST_F(Batch, JsonHasEveryFieldOfEveryPair) {
   ASSERT_EQ(batch("r").status, 0);
   const auto json = json_of(out_ / "r.json");

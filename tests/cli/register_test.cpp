@@ -29,6 +29,40 @@ TEST_F(Register, SaysWhatItFound) {
                 "depth maps", "match", "refine"});
 }
 
+TEST_F(Register, VoxelSizeByTheClouds) {
+  const std::string path = folder_ / "auto.json";
+  const Outcome outcome = run(
+      {"register", source_, target_, "--backend", "cpu", "--voxel-size", "auto", "--json", path});
+  EXPECT_EQ(outcome.status, 0) << outcome.err;
+  const auto json = json_of(path);
+  EXPECT_NE(json["options"]["prepare"]["voxel_size"], 0.05);  // some 15,000 points in a small room
+  for (const char* cloud : {"source", "target"}) {
+    EXPECT_GE(json[cloud]["prepare"]["points"], 3000);
+    EXPECT_LE(json[cloud]["prepare"]["points"], 20000);
+  }
+  PointCloud one_place;
+  one_place.points.assign(5, {1, 2, 3});
+  const std::string bad = write_cloud(folder_, "one_place.ply", one_place);
+  expect_refused({"register", bad, bad, "--voxel-size", "auto"},
+                 {"--voxel-size auto", bad, "one place"});
+  expect_refused({"register", source_, target_, "--voxel-size", "automatic"},
+                 {"--voxel-size", "automatic"});
+}
+
+TEST_F(Register, TimeBudget) {
+  const std::string path = folder_ / "budget.json";
+  const Outcome outcome = align({"--time-budget", "60000", "--json", path});
+  EXPECT_EQ(outcome.status, 0) << outcome.err;
+  expect_holds(outcome.out, {"budget   60000 ms", "levels of quality up to"});
+  const auto budget = json_of(path)["time_budget"];
+  EXPECT_EQ(budget["ms"], 60000);
+  EXPECT_GE(budget["levels"], 2);
+  EXPECT_LE(budget["quality"], budget["highest_quality"]);
+  expect_refused({"register", source_, target_, "--time-budget", "0"}, {"milliseconds is 0"});
+  expect_refused({"register", source_, target_, "--time-budget", "5", "--preset", "loopsmart"},
+                 {"quadruples"});
+}
+
 TEST_F(Register, Json) {
   const std::string path = folder_ / "r.json";
   ASSERT_EQ(align({"--json", path, "--seed", "7"}).status, 0);

@@ -1,0 +1,224 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "gpureg/voxel_size.hpp"
+
+#include <Eigen/Eigenvalues>
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace gpureg {
+namespace {
+
+constexpr std::size_t kClouds = 16;
+constexpr std::size_t kWantedPoints = 5000, kLeastPoints = 3000;
+/// Of all clouds together: voxels of 5000 points are full enough to be found with them.
+constexpr std::size_t kVoxelSample = 400'000, kLeastVoxelSample = 50'000;
+constexpr std::size_t kSpacingSample = 1000,
+                      kNoiseSample = 200;  // medians of so many are good to a few percent
+constexpr double kNoiseRadius = 1.5;       // voxels around a point that its plane is made of
+constexpr double kMostNoise = 1.0 / 3.0;   // of a voxel: what its centroid still averages out
+
+double median(std::vector<double> values) {
+  if (values.empty()) return 0;
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+/// The finite points of a cloud, sorted along its longest side: what is nearer than d is less than
+/// d away in the order, too.
+class SortedCloud {
+ public:
+  explicit SortedCloud(const PointCloudView& view) {
+    for (std::size_t k = 0; k < view.size; ++k) {
+      const Eigen::Vector3f p =
+          Eigen::Map<const Eigen::Vector3f>(view.points + k * view.point_stride);
+      if (!p.allFinite()) continue;
+      points_.push_back(p);
+      box_.extend(p.cast<double>());
+    }
+    if (points_.empty()) return;
+    box_.sizes().maxCoeff(&axis_);
+    // A total order: equal coordinates of the axis must not leave the order to the library's sort.
+    std::sort(points_.begin(), points_.end(),
+              [a = axis_](const Eigen::Vector3f& p, const Eigen::Vector3f& q) {
+                if (p[a] != q[a]) return p[a] < q[a];
+                return std::lexicographical_compare(p.data(), p.data() + 3, q.data(), q.data() + 3);
+              });
+  }
+
+  std::size_t size() const { return points_.size(); }
+  double extent() const { return points_.empty() ? 0 : box_.sizes().maxCoeff(); }
+
+  double spacing() const {
+    std::vector<double> distances;
+    for_sample(kSpacingSample, [&](std::size_t at) {
+      double nearest = std::numeric_limits<double>::infinity();  // squared
+      const auto visit = [&](std::size_t k) {
+        const Eigen::Vector3d d = (points_[k] - points_[at]).cast<double>();
+        if (d[axis_] * d[axis_] >= nearest) return false;
+        const double squared = d.squaredNorm();
+        if (squared > 0) nearest = std::min(nearest, squared);
+        return true;
+      };
+      around(at, visit);
+      if (std::isfinite(nearest)) distances.push_back(std::sqrt(nearest));
+    });
+    return median(std::move(distances));
+  }
+
+  /// Median over a sample of points of the RMS distance of their surroundings from a plane.
+  double noise(double radius) const {
+    std::vector<double> distances;
+    for_sample(kNoiseSample, [&](std::size_t at) {
+      Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+      Eigen::Matrix3d outer = Eigen::Matrix3d::Zero();
+      std::size_t count = 0;
+      const auto visit = [&](std::size_t k) {
+        const Eigen::Vector3d d = (points_[k] - points_[at]).cast<double>();
+        if (std::abs(d[axis_]) > radius) return false;
+        if (d.squaredNorm() <= radius * radius) sum += d, outer += d * d.transpose(), ++count;
+        return true;
+      };
+      around(at, visit), visit(at);
+      if (count < 8) return;  // a plane fits few points however rough their surface is
+      const Eigen::Vector3d mean = sum / static_cast<double>(count);
+      const Eigen::Matrix3d covariance =
+          outer / static_cast<double>(count) - mean * mean.transpose();
+      const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(covariance,
+                                                                  Eigen::EigenvaluesOnly);
+      distances.push_back(std::sqrt(std::max(0.0, solver.eigenvalues()[0])));
+    });
+    return median(std::move(distances));
+  }
+
+  /// Voxels of that size, those of prepare(), with a point of the sample in them; most: of points
+  /// in the sample.
+  std::size_t occupied(double size, std::size_t most, std::vector<std::uint64_t>& keys) const {
+    keys.clear();
+    const Eigen::Array3d first = (box_.min().array() / size).floor();
+    const std::size_t step = points_.size() / most + 1;
+    for (std::size_t k = 0; k < points_.size(); k += step) {
+      const Eigen::Array3d cell = (points_[k].cast<double>().array() / size).floor() - first;
+      keys.push_back(static_cast<std::uint64_t>(cell.x()) << 42 |
+                     static_cast<std::uint64_t>(cell.y()) << 21 |
+                     static_cast<std::uint64_t>(cell.z()));
+    }
+    std::sort(keys.begin(), keys.end());
+    return static_cast<std::size_t>(std::unique(keys.begin(), keys.end()) - keys.begin());
+  }
+
+ private:
+  template <typename Visit>
+  void for_sample(std::size_t most, Visit&& visit) const {
+    const std::size_t count = std::min(most, points_.size());
+    for (std::size_t s = 0; s < count; ++s) visit(s * points_.size() / count);
+  }
+  /// Points on both sides in the order, each way until visit says that none further on matters.
+  template <typename Visit>
+  void around(std::size_t at, Visit&& visit) const {
+    for (std::size_t k = at + 1; k < points_.size() && visit(k); ++k) {
+    }
+    for (std::size_t k = at; k-- > 0 && visit(k);) {
+    }
+  }
+
+  std::vector<Eigen::Vector3f> points_;
+  Eigen::AlignedBox3d box_;
+  Eigen::Index axis_ = 0;
+};
+
+/// 0.0473 becomes 0.05, 0.0134 becomes 0.013: what a person would type.
+double rounded(double value) {
+  const double unit = std::pow(10.0, std::floor(std::log10(value)));
+  const double digits = value / unit;
+  return unit * (digits < 2 ? std::round(digits * 10) / 10 : std::round(digits * 2) / 2);
+}
+
+template <typename Measure>
+double median_of(const std::vector<SortedCloud>& clouds, Measure&& measure) {
+  std::vector<double> values;
+  for (const SortedCloud& cloud : clouds) values.push_back(measure(cloud));
+  return median(std::move(values));
+}
+
+}  // namespace
+
+VoxelSizeSuggestion suggest_voxel_size(const std::vector<PointCloudView>& views) {
+  for (const PointCloudView& view : views) view.validate();
+  VoxelSizeSuggestion out;
+  if (views.empty()) return out;
+  out.reason = VoxelSizeReason::too_few_points;
+  std::vector<SortedCloud> clouds;
+  const std::size_t chosen = std::min(views.size(), kClouds);
+  for (std::size_t k = 0; k < chosen; ++k) {
+    SortedCloud cloud(views[k * views.size() / chosen]);
+    if (cloud.size() < 4) continue;
+    out.reason = VoxelSizeReason::one_place;
+    if (cloud.extent() > 0) clouds.push_back(std::move(cloud));
+  }
+  if (clouds.empty()) return out;
+
+  const std::size_t sample = std::max(kVoxelSample / clouds.size(), kLeastVoxelSample);
+  std::vector<std::uint64_t> keys;
+  const auto points = [&](double size) {
+    return median_of(clouds, [&](const SortedCloud& cloud) {
+      return static_cast<double>(cloud.occupied(size, sample, keys));
+    });
+  };
+  double extent = 0;
+  for (const SortedCloud& cloud : clouds) extent = std::max(extent, cloud.extent());
+  out.spacing = median_of(clouds, [](const SortedCloud& cloud) { return cloud.spacing(); });
+  const auto size_for = [&](std::size_t wanted) {
+    double low = std::max(extent * 1e-5, out.spacing * 0.5), high = extent;
+    while (high > 1.02 * low) {
+      const double middle = std::sqrt(low * high);
+      (points(middle) > static_cast<double>(wanted) ? low : high) = middle;
+    }
+    return high;
+  };
+  double size = std::max(size_for(kWantedPoints), out.spacing);
+  const auto noise_at = [&](double s) {
+    return median_of(clouds,
+                     [&](const SortedCloud& cloud) { return cloud.noise(kNoiseRadius * s); });
+  };
+  out.noise = noise_at(size);
+  if (out.noise > kMostNoise * size && points(size) > kLeastPoints)
+    size = std::min(out.noise / kMostNoise, size_for(kLeastPoints));
+  size = rounded(size);
+  out.voxel_size = static_cast<float>(size);
+  out.points = static_cast<std::size_t>(points(size));
+  out.reason = VoxelSizeReason::none;
+  return out;
+}
+
+const char* to_string(VoxelSizeReason reason) {
+  switch (reason) {
+    case VoxelSizeReason::none:
+      return "none";
+    case VoxelSizeReason::no_clouds:
+      return "no_clouds";
+    case VoxelSizeReason::too_few_points:
+      return "too_few_points";
+    case VoxelSizeReason::one_place:
+      return "one_place";
+  }
+  return "unknown";
+}
+
+const char* explain(VoxelSizeReason reason) {
+  switch (reason) {
+    case VoxelSizeReason::none:
+      return "a voxel size was found";
+    case VoxelSizeReason::no_clouds:
+      return "there is no cloud to choose a voxel size by";
+    case VoxelSizeReason::too_few_points:
+      return "a voxel size needs a cloud of 4 or more points with finite coordinates";
+    case VoxelSizeReason::one_place:
+      return "all points are at one place";
+  }
+  return "unknown";
+}
+
+}  // namespace gpureg
