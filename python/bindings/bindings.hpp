@@ -16,6 +16,7 @@ void bind_result(py::module_& m);
 void bind_cloud(py::module_& m);
 void bind_prepare(py::module_& m);
 void bind_align(py::module_& m);
+void bind_agreement(py::module_& m);
 void bind_files(py::module_& m);
 void bind_evaluation(py::module_& m);
 

@@ -12,6 +12,7 @@ PYBIND11_MODULE(_core, m) {
   bind_cloud(m);
   bind_prepare(m);
   bind_align(m);
+  bind_agreement(m);
   bind_files(m);
   bind_evaluation(m);
 }

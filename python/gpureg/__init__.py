@@ -12,7 +12,9 @@ and `register_all`.
 
 from typing import TYPE_CHECKING, Any
 
+from ._agreement import agreement
 from ._core import (
+    AgreementOptions,
     BackendUnavailable,
     CompatibilityOptions,
     Context,
@@ -23,6 +25,7 @@ from ._core import (
     HypothesisOptions,
     InvalidArgument,
     IoError,
+    PairAgreement,
     PointCloud,
     PoseEvidence,
     PreparedCloud,
@@ -64,6 +67,7 @@ def __getattr__(name: str) -> Any:
 
 
 __all__ = [
+    "AgreementOptions",
     "BackendUnavailable",
     "BatchInterrupted",
     "BatchRun",
@@ -77,6 +81,7 @@ __all__ = [
     "HypothesisOptions",
     "InvalidArgument",
     "IoError",
+    "PairAgreement",
     "PointCloud",
     "PoseEvidence",
     "PrepareOptions",
@@ -90,6 +95,7 @@ __all__ = [
     "ScoreOptions",
     "StageTimings",
     "__version__",
+    "agreement",
     "align",
     "align_batch",
     "default_context",

@@ -443,6 +443,63 @@ class RegistrationResult:
     def timings(self) -> StageTimings: ...
     def to_dict(self) -> Dict[str, Any]: ...
 
+class AgreementOptions:
+    closing_angle: float
+    closing_distance: float
+    chance: float
+    miss: float
+    max_factor: float
+    min_confidence: float
+    min_rival: float
+    modes: int
+    neighbors: int
+    rounds: int
+    def __init__(
+        self,
+        *,
+        closing_angle: float = ...,
+        closing_distance: float = ...,
+        chance: float = ...,
+        miss: float = ...,
+        max_factor: float = ...,
+        min_confidence: float = ...,
+        min_rival: float = ...,
+        modes: int = ...,
+        neighbors: int = ...,
+        rounds: int = ...,
+    ) -> None: ...
+    def replace(
+        self,
+        *,
+        closing_angle: float = ...,
+        closing_distance: float = ...,
+        chance: float = ...,
+        miss: float = ...,
+        max_factor: float = ...,
+        min_confidence: float = ...,
+        min_rival: float = ...,
+        modes: int = ...,
+        neighbors: int = ...,
+        rounds: int = ...,
+    ) -> AgreementOptions: ...
+    @staticmethod
+    def from_voxel_size(voxel_size: float) -> AgreementOptions: ...
+    def validate(self) -> None: ...
+    def __eq__(self, other: object, /) -> bool: ...
+    __hash__: None  # type: ignore[assignment]
+    _fields: Tuple[str, ...]
+
+class PairAgreement:
+    @property
+    def confidence(self) -> float: ...
+    @property
+    def mode(self) -> int: ...
+    @property
+    def loops(self) -> int: ...
+    def __eq__(self, other: object, /) -> bool: ...
+    __hash__: None  # type: ignore[assignment]
+    _fields: Tuple[str, ...]
+
 class PreparedCloud:
     def __len__(self) -> int: ...
     @property
@@ -493,6 +550,7 @@ def align_batch(
     options: RegistrationOptions,
     progress: Optional[Callable[[int], object]] = None,
 ) -> Tuple[List[RegistrationResult], Optional[BaseException]]: ...
+def agreement(pairs: npt.NDArray[np.uint32], results: Sequence[RegistrationResult], options: AgreementOptions) -> List[PairAgreement]: ...
 def read_point_cloud(path: str) -> PointCloud: ...
 def write_point_cloud(path: str, cloud: PointCloud) -> None: ...
 def list_fragments(folder: str) -> List[Tuple[int, str]]: ...
