@@ -116,10 +116,9 @@ int run(RegisterOptions o) {
   const RegistrationResult& result = timed.result;
   print_report(o, context, source, target, result);
   if (o.time_budget)
-    std::cout << "budget   " << significant(*o.time_budget, 4) << " ms, "
-              << fixed(timed.milliseconds, 1) << " used; " << timed.levels
-              << " levels of quality up to " << timed.highest_quality << ", the result is of "
-              << timed.quality << "\n";
+    std::cout << "budget   " << fixed(*o.time_budget, 1) << " ms, " << fixed(timed.milliseconds, 1)
+              << " used; " << timed.levels << " levels of quality up to " << timed.highest_quality
+              << ", the result is of " << timed.quality << "\n";
 
   if (!o.json.empty()) {
     Json json = document(o, o.time_budget ? options.with_quality(timed.quality) : options, context,

@@ -53,7 +53,7 @@ TEST_F(Register, TimeBudget) {
   const std::string path = folder_ / "budget.json";
   const Outcome outcome = align({"--time-budget", "60000", "--json", path});
   EXPECT_EQ(outcome.status, 0) << outcome.err;
-  expect_holds(outcome.out, {"budget   60000 ms", "levels of quality up to"});
+  expect_holds(outcome.out, {"budget   60000.0 ms", "levels of quality up to"});
   const auto budget = json_of(path)["time_budget"];
   EXPECT_EQ(budget["ms"], 60000);
   EXPECT_GE(budget["levels"], 2);
