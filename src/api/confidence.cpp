@@ -58,24 +58,29 @@ double probability(double logit_value) { return 1.0 / (1.0 + std::exp(-logit_val
 
 }  // namespace
 
-void set_confidences(std::vector<RegistrationMode>& modes) {
+void set_confidences(std::vector<RegistrationMode>& modes, const std::function<bool(const RegistrationMode&, const RegistrationMode&)>& same) {
   if (modes.empty()) return;
   const PoseEvidence& first = modes.front().evidence;
   const bool free_space = first.source_seen > 0 || first.target_seen > 0;
-  std::vector<double> own, rank;
-  for (const RegistrationMode& mode : modes)
-    own.push_back(free_space ? logit(measures(mode.evidence, true), model::ranking_with_free_space, model::ranking_with_free_space_bias)
-                                         : logit(measures(mode.evidence, false), model::ranking_without_free_space, model::ranking_without_free_space_bias));
-  const std::vector<double> share = shares(own);
-  for (const double l : own) rank.push_back(std::clamp(l, -14.0, 14.0));
-  std::vector<std::size_t> order(modes.size());
-  for (std::size_t k = 0; k < order.size(); ++k) order[k] = k;
-  std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return own[a] > own[b]; });
+  std::vector<std::pair<double, std::size_t>> order;
+  for (std::size_t k = 0; k < modes.size(); ++k) {
+    const PoseEvidence& e = modes[k].evidence;
+    order.emplace_back(free_space ? logit(measures(e, true), model::ranking_with_free_space, model::ranking_with_free_space_bias)
+                                  : logit(measures(e, false), model::ranking_without_free_space, model::ranking_without_free_space_bias),
+                       k);
+  }
+  std::stable_sort(order.begin(), order.end(), [](const auto& a, const auto& b) { return a.first > b.first; });
   std::vector<RegistrationMode> out;
-  for (std::size_t place = 0; place < order.size(); ++place) {
-    const std::size_t k = order[place];
-    RegistrationMode mode = modes[k];
-    const double rival = place > 0 ? rank[order[0]] : order.size() > 1 ? rank[order[1]] : -14.0;
+  std::vector<double> own, rank;
+  for (const auto& [value, k] : order) {
+    const RegistrationMode& mode = modes[k];
+    if (std::any_of(out.begin(), out.end(), [&](const RegistrationMode& better) { return same(better, mode); })) continue;
+    out.push_back(mode), own.push_back(value), rank.push_back(std::clamp(value, -14.0, 14.0));
+  }
+  const std::vector<double> share = shares(own);
+  for (std::size_t k = 0; k < out.size(); ++k) {
+    RegistrationMode& mode = out[k];
+    const double rival = k > 0 ? rank[0] : out.size() > 1 ? rank[1] : -14.0;
     std::vector<double> x = measures(mode.evidence, free_space);
     x.push_back(rank[k]);
     x.push_back(rank[k] - rival);
@@ -84,9 +89,8 @@ void set_confidences(std::vector<RegistrationMode>& modes) {
     mode.overlap_confidence = free_space ? probability(logit(x, model::overlap_with_free_space, model::overlap_with_free_space_bias))
                                          : probability(logit(x, model::overlap_without_free_space, model::overlap_without_free_space_bias));
     mode.confidence = std::min(mode.confidence, share[k]);
-    if (place > 0) mode.confidence = std::min(mode.confidence, out.front().confidence);
+    if (k > 0) mode.confidence = std::min(mode.confidence, out.front().confidence);
     mode.overlap_confidence = std::min(mode.overlap_confidence, mode.confidence);
-    out.push_back(mode);
   }
   modes = std::move(out);
 }

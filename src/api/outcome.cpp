@@ -67,7 +67,14 @@ void add_modes(const PairOutcome& outcome, const PreparedState& source, const Pr
     out.found_as = static_cast<std::uint32_t>(modes.size());
     modes.push_back(out);
   }
-  set_confidences(modes);
+  // The stages compare modes at the local origin, which a stray point may draw far from the cloud; here they meet at its points.
+  const CorrespondenceMoments where = to_frame(swapped ? outcome.modes.front().target_moments : outcome.modes.front().source_moments, source);
+  const Eigen::Vector3d centre = where.count > 0 ? Eigen::Vector3d(where.sum / static_cast<double>(where.count)) : origin_of(source);
+  const double min_trace = static_cast<double>(mode_trace(options.evidence.mode_angle)), distance = static_cast<double>(options.evidence.mode_distance);
+  set_confidences(modes, [&](const RegistrationMode& a, const RegistrationMode& b) {
+    return (a.target_from_source.linear().transpose() * b.target_from_source.linear()).trace() >= min_trace &&
+           (a.target_from_source * centre - b.target_from_source * centre).norm() <= distance;
+  });
   result.modes = std::move(modes);
   const ModeOutcome& best = outcome.modes[result.modes.front().found_as];
   result.has_candidate = true;
