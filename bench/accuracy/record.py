@@ -32,6 +32,8 @@ def data_folder(arguments, name):
 
 def gpureg(arguments, *words):
     """Runs the command. Exit status 1, no alignment, is a result; any other failure ends the benchmark."""
+    if not arguments.gpureg.exists():
+        sys.exit(f"error: there is no command {arguments.gpureg}: build it, or name it with --gpureg")
     done = subprocess.run([arguments.gpureg, *map(str, words)], capture_output=True, text=True)
     if done.returncode not in (0, 1):
         sys.exit(f"error: gpureg {words[0]}: {done.stderr.strip()}")

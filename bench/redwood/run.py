@@ -10,6 +10,7 @@ wrong poses, registration recall by 3DMatch's rule where its logs are, and times
 usage: run.py [SCENE ...] [--presets loopsmart default] [--seeds 1 2 3] [--peers all|none|NAME ...] [--report out/redwood/report.html] [-o FILE]"""
 import json
 import pathlib
+import resource
 import statistics
 import subprocess
 import sys
@@ -50,18 +51,23 @@ def backends(arguments):
     return ["cpu", "cuda"] if cuda else ["cpu"]
 
 
-def times(batch):
+def times(batch, processor):
     """Milliseconds: of a pair whose clouds are prepared (in the batch, by the clock), of a fragment, and of a pair from raw points, with
-    each preparation shared by all its pairs and with none shared."""
+    each preparation shared by all its pairs and with none shared. processor: seconds that the whole command took of all processors, which
+    says more than the clock where other programs run beside."""
     pairs, fragments = len(batch["pairs"]), len(batch["fragments"])
     pair, prepare = 1e3 * batch["seconds"]["align"] / pairs, 1e3 * batch["seconds"]["prepare"] / fragments
-    return {"pair": pair, "fragment": prepare, "pair_amortised": pair + prepare * fragments / pairs, "pair_alone": pair + 2 * prepare}
+    return {"pair": pair, "fragment": prepare, "pair_amortised": pair + prepare * fragments / pairs, "pair_alone": pair + 2 * prepare,
+            "processor": 1e3 * processor / pairs}
 
 
 def run_once(arguments, scene, preset, backend, seed, temporary, pictures):
     result, scores = temporary / "result.json", temporary / "scores.json"
+    before = resource.getrusage(resource.RUSAGE_CHILDREN)
     record.gpureg(arguments, "batch", scene.fragments, "--preset", preset, "--backend", backend, "--seed", seed,
                   "-o", temporary / "result.log", "--json", result, "--quiet")
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    processor = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
     words = ["evaluate", result, "--ground-truth", scene.truth, "--json", scores]
     if scene.recall_logs:
         words += ["--registration-recall", *scene.recall_logs]
@@ -73,7 +79,7 @@ def run_once(arguments, scene, preset, backend, seed, temporary, pictures):
         record.gpureg(arguments, "report", result, "--ground-truth", scene.truth, "--clouds", scene.fragments, "-o", page)
         pictures[scene.name, preset] = page.read_text()
     cost = [[pair["statistics"]["source_points"] + pair["statistics"]["target_points"], round(pair["ms"]["total"], 4)] for pair in batch["pairs"]]
-    return {"seed": seed, "strict": analysis.rounded(verdict["strict"]), "geometric": analysis.rounded(verdict.get("geometric")), "registration_recall": recalls, "ms": times(batch),
+    return {"seed": seed, "strict": analysis.rounded(verdict["strict"]), "geometric": analysis.rounded(verdict.get("geometric")), "registration_recall": recalls, "ms": times(batch, processor),
             "pairs": len(batch["pairs"]), "peak_memory_mib": round(batch["peak_memory_mib"]), "stages_ms": stages(batch),
             "points_and_ms": cost[::max(1, len(cost) // COST_SAMPLE)], **analysis.all_of(verdict["pairs"], analysis.overlaps(scene.fragments))}, batch
 
@@ -178,13 +184,13 @@ def print_all(document):
                 said = [f"{value} {key.replace('_', ' ')}" for key, value in {**missed, **false}.items() if value]
                 said += [f"{percent(value['mean'])} % of {log}" for log, value in recalls.items()]
                 print(f"  {method['label']}, {name}: {'; '.join(said) or 'nothing'}")
-    print(f"\n{'ms':{width}}{'scene':>26}{'fragment':>11}{'prepared pair':>16}{'pair, amortised':>17}{'pair alone':>13}")
+    print(f"\n{'ms':{width}}{'scene':>26}{'fragment':>11}{'prepared pair':>16}{'pair, amortised':>17}{'pair alone':>13}{'processor, a pair':>19}")
     for method in document["methods"]:
         for name in names:
             if name in method["scenes"]:
                 ms = method["scenes"][name]["mean"]["ms"]
                 print(f"{method['label']:{width}}{name[-24:]:>26}" + "".join(f"{ms[key]['mean']:{w}.1f}" for key, w in
-                      (("fragment", 11), ("pair", 16), ("pair_amortised", 17), ("pair_alone", 13))))
+                      (("fragment", 11), ("pair", 16), ("pair_amortised", 17), ("pair_alone", 13), ("processor", 19))))
 
 
 def main():
@@ -243,7 +249,8 @@ def add_peers(arguments, scenes, temporary, methods):
         for name, entry in peers_of(arguments, scene, temporary).items():
             run = {**entry, "seed": 1, "registration_recall": [], "ms": {
                 "pair": entry["ms_per_pair"], "fragment": entry["ms_per_fragment"], "pair_alone": entry["ms_per_pair"] + 2 * entry["ms_per_fragment"],
-                "pair_amortised": entry["ms_per_pair"] + entry["ms_per_fragment"] * entry["fragments"] / max(1, entry["tried"])}}
+                "pair_amortised": entry["ms_per_pair"] + entry["ms_per_fragment"] * entry["fragments"] / max(1, entry["tried"]),
+                "processor": entry["processor_ms_per_pair"]}}
             method = found.setdefault(name, {"name": name, "label": f"{entry['label'].replace('`', '')} {entry['version']}", "peer": True, "scenes": {}})
             method["scenes"][scene.name] = {"mean": over_seeds([run]), "runs": [run]}
     methods += found.values()

@@ -103,6 +103,7 @@ def rotation_histogram(entries, title):
     axes.set_xticks(range(len(edges) - 1), [f"{a}-{b}" for a, b in zip(edges, edges[1:])], fontsize=9)
     axes.set(xlabel="rotation error of the wrong best candidates of true pairs, degrees", ylabel="pairs", title=title)
     axes.yaxis.get_major_locator().set_params(integer=True)
+    axes.set_ylim(top=1.3 * max(max(table["counts"]) for *_, table in entries))  # room for the legend
     axes.grid(axis="x", visible=False)
     axes.legend(fontsize=8.5)
     return drawn(figure, title)

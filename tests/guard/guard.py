@@ -107,6 +107,8 @@ def main():
     parser.add_argument("--baseline", type=pathlib.Path, default=pathlib.Path(__file__).with_name("baseline.json"))
     parser.add_argument("--update", action="store_true", help="write what is measured as the new baseline")
     arguments = parser.parse_args()
+    if not arguments.gpureg.exists():
+        sys.exit(f"error: there is no command {arguments.gpureg}")
     arguments.work.mkdir(parents=True, exist_ok=True)
     baseline = json.loads(arguments.baseline.read_text()) if arguments.baseline.exists() else {}
     if arguments.what not in baseline and not arguments.update:
