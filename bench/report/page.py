@@ -66,7 +66,8 @@ def peers_section(record):
     out += table(["method", "right, best candidates, %", "recall, %", "precision, %", "R@P95, %", "AP, %", "geometric R@P95, %", "ms a fragment", "ms a pair",
                   "processor ms a pair", "of gpureg's", "peak MiB"], body)
     out += "<p class=\"sub\">KISS-Matcher makes its features anew for each pair. Rows with + show the refinement's time alone. " \
-           "R@P95: recall at precision 95 %; AP: average precision.</p>\n"
+           "R@P95: recall at precision 95 %; AP: average precision. ms: by the clock, longer where the machine was busy. The confidence of gpureg was fitted on " \
+           "a set of buildings that red kitchen and house are part of; bench/results/confidence.json has fits that left each out.</p>\n"
     shown = [(name, e["label"].replace("`", ""), e) for name, e in entries.items() if not e["refines"]]
     overlap = [(name, label, e["recall_by_overlap"]) for name, label, e in shown]
     out += '<div class="row">' + plots.curves(shown, "strict", "Recall and precision, strict rule (dots: as reported)")
