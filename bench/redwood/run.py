@@ -135,9 +135,9 @@ def percent(value):
 def print_table(entry_rows, names):
     """entry_rows: label, ms text, [(recall, precision) per scene]."""
     width = max(len(row[0]) for row in entry_rows) + 2
-    print(f"{'':{width}}{'ms/pair':>10}" + "".join(f"{name[-19:]:>20}" for name in names) + (f"{'mean':>16}" if len(names) > 1 else ""))
+    print(f"{'':{width}}{'ms/pair':>10}" + "".join(f"{name[-24:]:>26}" for name in names) + (f"{'mean':>16}" if len(names) > 1 else ""))
     for label, ms, cells in entry_rows:
-        line = f"{label:{width}}{ms:>10}" + "".join(f"{percent(r) + ' / ' + percent(p):>20}" for r, p in cells)
+        line = f"{label:{width}}{ms:>10}" + "".join(f"{percent(r) + ' / ' + percent(p):>26}" for r, p in cells)
         if len(cells) > 1:
             line += f"{percent(statistics.fmean(r for r, _ in cells)) + ' / ' + percent(statistics.fmean(p for _, p in cells)):>16}"
         print(line)
