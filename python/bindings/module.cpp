@@ -13,6 +13,8 @@ PYBIND11_MODULE(_core, m) {
   bind_prepare(m);
   bind_align(m);
   bind_agreement(m);
+  bind_time_budget(m);
+  bind_voxel_size(m);
   bind_files(m);
   bind_evaluation(m);
 }

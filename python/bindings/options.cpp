@@ -132,6 +132,8 @@ void bind_options(py::module_& m) {
   cls.def_static("from_voxel_size", &RegistrationOptions::from_voxel_size, py::arg("voxel_size"),
                  py::arg("quality") = kDefaultQuality,
                  "Every length from the voxel size (metres); quality, 0 to 10, trades time for recall.");
+  cls.def("with_quality", &RegistrationOptions::with_quality, py::arg("quality"),
+          "A copy with quality's number of candidates, everything else as it is.");
   cls.def_static(
       "loopsmart", [](float voxel_size) { return RegistrationOptions::loopsmart(voxel_size); },
       py::arg("voxel_size") = shortest(PrepareOptions{}.voxel_size),

@@ -38,6 +38,8 @@ from ._core import (
     RegistrationStatistics,
     ScoreOptions,
     StageTimings,
+    TimedResult,
+    VoxelSizeSuggestion,
     __version__,
     describe_backends,
 )
@@ -47,10 +49,12 @@ from .registration import (
     BatchInterrupted,
     align,
     align_batch,
+    align_within,
     default_context,
     prepare,
     prepare_batch,
     register,
+    suggest_voxel_size,
 )
 
 if TYPE_CHECKING:
@@ -94,10 +98,13 @@ __all__ = [
     "RegistrationStatistics",
     "ScoreOptions",
     "StageTimings",
+    "TimedResult",
+    "VoxelSizeSuggestion",
     "__version__",
     "agreement",
     "align",
     "align_batch",
+    "align_within",
     "default_context",
     "describe_backends",
     "prepare",
@@ -105,5 +112,6 @@ __all__ = [
     "read_point_cloud",
     "register",
     "register_all",
+    "suggest_voxel_size",
     "write_point_cloud",
 ]

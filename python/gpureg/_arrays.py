@@ -158,6 +158,13 @@ def core_cloud(
     )
 
 
+def host_points(cloud: Any, name: str) -> FloatArray:
+    """float32 rows of the points alone, on the host. Large coordinates lose their origin."""
+    raw = matrix(_unpack(cloud, None, None)[0], name, 3)
+    origin = origin_of(raw, 0.0)
+    return float_rows(raw if origin is None else raw - origin, name)
+
+
 def _stay_on_device(points: Any, normals: Any, features: Any, viewpoints: Any, prefix: str) -> Optional[CoreCloud]:
     """None where a part is on the host, or has a type or shape that the host path converts or refuses."""
     if any(part is not None and not on_device(part) for part in (normals, features)):

@@ -5,11 +5,11 @@ from __future__ import annotations
 
 import os
 import threading
-from typing import Any, Callable, List, Optional, Sequence, Union
+from typing import Any, Callable, List, Literal, Optional, Sequence, Union
 
 from . import _core
-from ._arrays import core_cloud, index_pairs
-from ._core import BackendUnavailable, Context, PreparedCloud, PrepareOptions, RegistrationOptions, RegistrationResult
+from ._arrays import core_cloud, host_points, index_pairs
+from ._core import BackendUnavailable, Context, PreparedCloud, PrepareOptions, RegistrationOptions, RegistrationResult, TimedResult, VoxelSizeSuggestion
 from ._progress import Progress, batch_progress
 
 _default: Optional[Context] = None
@@ -200,6 +200,64 @@ def align(
     return _core.align(_context(context), source, target, options, correspondences)
 
 
+def align_within(
+    source: PreparedCloud,
+    target: PreparedCloud,
+    milliseconds: float,
+    *,
+    options: Optional[RegistrationOptions] = None,
+    context: Optional[Context] = None,
+) -> TimedResult:
+    """`align` with as much quality as a time allows: the one thing that is not deterministic.
+
+    Parameters
+    ----------
+    source, target : PreparedCloud
+    milliseconds : float
+        Wall time. Levels of quality are run upwards, and none that would end later is started; the
+        lowest is always run. What is sure early ends early.
+    options : RegistrationOptions, optional
+        What `RegistrationOptions.with_quality` sets is set per level.
+    context : Context, optional
+
+    Returns
+    -------
+    TimedResult
+        ``result`` is that of `align` with ``options.with_quality(quality)``, bit for bit.
+
+    Examples
+    --------
+    >>> import numpy as np, gpureg
+    >>> cloud = gpureg.prepare(np.random.default_rng(1).random((2000, 3)))
+    >>> timed = gpureg.align_within(cloud, cloud, 10000)
+    >>> timed.result.status, timed.quality <= timed.highest_quality
+    ('aligned', True)
+    """
+    _check_prepared(source, "source")
+    _check_prepared(target, "target")
+    options = _checked(options, RegistrationOptions, "options") or RegistrationOptions()
+    return _core.align_within(_context(context), source, target, milliseconds, options)
+
+
+def suggest_voxel_size(clouds: Sequence[Any]) -> VoxelSizeSuggestion:
+    """A voxel size that leaves some thousand points of each cloud, and fits their spacing and noise.
+
+    Parameters
+    ----------
+    clouds : sequence
+        Each whatever `prepare` takes as points. At most 16, evenly chosen, are looked at.
+
+    Examples
+    --------
+    >>> import numpy as np, gpureg
+    >>> sphere = np.random.default_rng(1).normal(size=(50000, 3))
+    >>> sphere /= np.linalg.norm(sphere, axis=1, keepdims=True)
+    >>> gpureg.suggest_voxel_size([sphere]).voxel_size
+    0.06
+    """
+    return _core.suggest_voxel_size([host_points(cloud, f"clouds[{k}]") for k, cloud in enumerate(clouds)])
+
+
 def align_batch(
     fragments: Sequence[Any],
     pairs: Any,
@@ -256,11 +314,12 @@ def align_batch(
 def register(
     source: Any,
     target: Any,
-    voxel_size: Optional[float] = None,
+    voxel_size: Union[float, Literal["auto"], None] = None,
     *,
     quality: Optional[int] = None,
     seed: Optional[int] = None,
     options: Optional[RegistrationOptions] = None,
+    time_budget_ms: Optional[float] = None,
     context: Optional[Context] = None,
 ) -> RegistrationResult:
     """Prepare two clouds and align them: the easy door.
@@ -269,15 +328,18 @@ def register(
     ----------
     source, target : (N, 3) arrays, paths, or whatever `prepare` takes as points
         Metres, or any unit that voxel_size has, too. Pictures: ``gpureg register --image``.
-    voxel_size : float, optional
+    voxel_size : float or "auto", optional
         Edge of the downsampling voxel; every other length follows from it. Default:
-        ``PrepareOptions().voxel_size``, 0.05.
+        ``PrepareOptions().voxel_size``, 0.05. "auto": what `suggest_voxel_size` says.
     quality : int, optional
         From 0, the fastest, to 10, which finds the most. Default: 5.
     seed : int, optional
         Same seed, same bits, on any machine.
     options : RegistrationOptions, optional
         Instead of the three before.
+    time_budget_ms : float, optional
+        Instead of quality: as much of it as so many milliseconds allow for the alignment, without
+        preparation; see `align_within`.
     context : Context, optional
 
     Returns
@@ -298,7 +360,16 @@ def register(
     options = _checked(options, RegistrationOptions, "options")
     if options is not None and not (voxel_size is None and quality is None and seed is None):
         raise TypeError("options: give either options, or voxel_size, quality and seed")
+    if time_budget_ms is not None and quality is not None:
+        raise TypeError("time_budget_ms: give either a time budget or a quality")
     if options is None:
+        if voxel_size == "auto":
+            suggestion = suggest_voxel_size([source, target])
+            if suggestion.reason != "none":
+                raise ValueError(f"voxel_size: 'auto', but {suggestion.explanation}")
+            voxel_size = suggestion.voxel_size
+        elif isinstance(voxel_size, str):
+            raise TypeError(f"voxel_size: expected a number or 'auto', got {voxel_size!r}")
         options = RegistrationOptions.from_voxel_size(
             PrepareOptions().voxel_size if voxel_size is None else voxel_size, 5 if quality is None else quality
         )
@@ -310,6 +381,8 @@ def register(
         clouds.append(core_cloud(cloud, None, None, None, options.prepare, name, context.backend == "cuda"))
     options.validate()
     a, b = _core.prepare_batch(context, clouds, options.prepare)
+    if time_budget_ms is not None:
+        return _core.align_within(context, a, b, time_budget_ms, options).result
     return _core.align(context, a, b, options, None)
 
 
@@ -342,4 +415,15 @@ def _prepared(fragments: Sequence[Any], options: PrepareOptions, context: Contex
     return clouds
 
 
-__all__ = ["BatchInterrupted", "Progress", "align", "align_batch", "default_context", "prepare", "prepare_batch", "register"]
+__all__ = [
+    "BatchInterrupted",
+    "Progress",
+    "align",
+    "align_batch",
+    "align_within",
+    "default_context",
+    "prepare",
+    "prepare_batch",
+    "register",
+    "suggest_voxel_size",
+]

@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "gpureg/voxel_size.hpp"
+
+#include "cloud.hpp"
+#include "fields.hpp"
+
+namespace gpureg::python {
+
+void bind_voxel_size(py::module_& m) {
+  using S = VoxelSizeSuggestion;
+  py::class_<S>(m, "VoxelSizeSuggestion", "A voxel size that suits a set of clouds.")
+      .def_property_readonly(
+          "voxel_size", [](const S& s) { return shortest(s.voxel_size); },
+          "In the unit of the points; 0 where there is none.")
+      .def_property_readonly(
+          "reason", [](const S& s) { return to_string(s.reason); },
+          "Why there is none; \"none\" where there is one.")
+      .def_property_readonly(
+          "explanation", [](const S& s) { return explain(s.reason); }, "The reason as a sentence.")
+      .def_readonly("spacing", &S::spacing, "Median distance of a point to its nearest neighbour.")
+      .def_readonly("noise", &S::noise,
+                    "Median distance of points from the plane of their surroundings.")
+      .def_readonly("points", &S::points, "That a cloud keeps, in the median.");
+  m.def(
+      "suggest_voxel_size",
+      [](const py::list& clouds) {
+        std::vector<FloatArray> held;
+        std::vector<PointCloudView> views;
+        for (const py::handle cloud : clouds) {
+          held.push_back(cloud.cast<FloatArray>());
+          const Rows rows = rows_of(held.back(), "points");
+          PointCloudView view(rows.data, rows.count);
+          view.point_stride = rows.stride;
+          views.push_back(view);
+        }
+        const py::gil_scoped_release release;
+        return suggest_voxel_size(views);
+      },
+      py::arg("clouds"));
+}
+
+}  // namespace gpureg::python

@@ -1,0 +1,63 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Dials instead of numbers: a time budget, and a voxel size from the clouds."""
+
+import numpy as np
+import pytest
+
+import gpureg
+from scenes import error_of, moved, pose, room
+
+
+@pytest.fixture(scope="module")
+def clouds():
+    points = room(points=18000)
+    return points[0::2], moved(points[1::2], pose())
+
+
+def test_a_time_budget_gives_the_result_of_its_level(clouds):
+    options = gpureg.RegistrationOptions.from_voxel_size(0.05)
+    a, b = gpureg.prepare_batch(clouds, options=options.prepare)
+    timed = gpureg.align_within(a, b, 1e6, options=options)
+    assert timed.levels >= 2 and timed.milliseconds > 0
+    alone = gpureg.align(a, b, options=options.with_quality(timed.quality))
+    assert np.array_equal(timed.result.target_from_source, alone.target_from_source)
+    assert timed.result.score == alone.score
+    lowest = gpureg.align_within(a, b, 1e-3, options=options)
+    assert (lowest.quality, lowest.levels) == (0, 1)
+    with pytest.raises(gpureg.InvalidArgument, match="milliseconds is -1"):
+        gpureg.align_within(a, b, -1)
+    with pytest.raises(TypeError, match="source: expected a PreparedCloud"):
+        gpureg.align_within(clouds[0], b, 10)
+
+
+def test_large_coordinates_keep_their_place(clouds):
+    far = np.array([4.5e5, 5.4e6, 100.0])
+    a, b = gpureg.prepare_batch([clouds[0] + far, clouds[1] + far])
+    found = gpureg.align_within(a, b, 1e6).result.target_from_source
+    there = (clouds[0][:50] + far) @ found[:3, :3].T + found[:3, 3]
+    assert np.abs(there - far - moved(clouds[0][:50], pose())).max() < 0.05
+
+
+def test_register_takes_both(clouds):
+    result = gpureg.register(*clouds, voxel_size="auto", time_budget_ms=1e6)
+    assert result.aligned and error_of(result, pose()) < 0.05
+    with pytest.raises(TypeError, match="time_budget_ms: give either"):
+        gpureg.register(*clouds, quality=3, time_budget_ms=10)
+    with pytest.raises(TypeError, match="voxel_size: expected a number or 'auto', got 'large'"):
+        gpureg.register(*clouds, voxel_size="large")
+    with pytest.raises(ValueError, match="voxel_size: 'auto', but all points are at one place"):
+        gpureg.register(np.ones((9, 3)), np.ones((9, 3)), voxel_size="auto")
+
+
+def test_suggestions(clouds):
+    one = gpureg.suggest_voxel_size(clouds)
+    assert one.reason == "none" and 0 < one.noise < one.voxel_size
+    assert 3000 <= one.points <= 20000
+    millimetres = gpureg.suggest_voxel_size([1000 * cloud for cloud in clouds])
+    assert millimetres.voxel_size == pytest.approx(1000 * one.voxel_size, rel=0.1)
+    far = gpureg.suggest_voxel_size([cloud + [4.5e5, 5.4e6, 0] for cloud in clouds])
+    assert far.voxel_size == pytest.approx(one.voxel_size, rel=0.1)
+    nothing = gpureg.suggest_voxel_size([])
+    assert (nothing.voxel_size, nothing.reason) == (0, "no_clouds")
+    with pytest.raises(ValueError, match=r"clouds\[1\]: expected shape \(N, 3\)"):
+        gpureg.suggest_voxel_size([clouds[0], np.ones((4, 2))])
