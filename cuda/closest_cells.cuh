@@ -12,13 +12,14 @@ namespace gpureg::cuda {
 struct SearchPair {
   CloudView source, target;
   CellSummaries source_cells, target_cells;
+  PriorTest prior;
 };
 
 inline DeviceBuffer<SearchPair> upload_search_pairs(Exec& exec, Span<const PairView> pairs) {
   std::vector<SearchPair> out;
   for (const PairView& pair : pairs)
     out.push_back({pair.source, pair.target, static_cast<const CudaCloud*>(pair.source.executor_data)->summaries,
-                   static_cast<const CudaCloud*>(pair.target.executor_data)->summaries});
+                   static_cast<const CudaCloud*>(pair.target.executor_data)->summaries, pair.prior});
   return exec.upload(out);
 }
 

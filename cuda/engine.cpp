@@ -105,7 +105,7 @@ void CudaEngine::align(Span<const PairInput> pairs, const RegistrationOptions& o
     std::vector<PairView> views;
     for (std::size_t p = begin; p < end; ++p)
       views.push_back({held[place[pairs[p].source]]->view_on_device, held[place[pairs[p].target]]->view_on_device, pairs[p].custom_source.data,
-                       pairs[p].custom_target.data, static_cast<std::uint32_t>(pairs[p].custom_source.size)});
+                       pairs[p].custom_target.data, static_cast<std::uint32_t>(pairs[p].custom_source.size), pairs[p].prior});
     const Span<PairOutcome> part{outcomes.data + begin, end - begin};
     if (options.hypothesis.proposal == Proposal::compatibility)
       pipeline::align_by_evidence(exec_, span_of(views), options, part);

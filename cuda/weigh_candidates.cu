@@ -52,6 +52,10 @@ __global__ void __launch_bounds__(32 * kWarps) weigh(const SearchPair* pairs, co
   const std::size_t at = static_cast<std::size_t>(p) * most + c;
   const CloudView &s = pairs[p].source, &t = pairs[p].target;
   const Rigid there = to_rigid(pose[at]), back = inverse(there);
+  if (!permitted(pairs[p].prior, there)) {
+    if (threadIdx.x % 32 == 0) out[at] = 0.0f;
+    return;
+  }
   const SideEvidence a = weigh_sample(s, t, pairs[p].target_cells, there, test, sample), b = weigh_sample(t, s, pairs[p].source_cells, back, test, sample);
   if (threadIdx.x % 32 == 0)
     out[at] = promise(smaller_share(matches[at], match_total + 2 * p), a, static_cast<float>(weight[2 * p]), b, static_cast<float>(weight[2 * p + 1]));

@@ -10,6 +10,7 @@
 #include "gpureg/options.hpp"
 #include "gpureg/point_cloud.hpp"
 #include "gpureg/prepared_cloud.hpp"
+#include "gpureg/prior.hpp"
 #include "gpureg/result.hpp"
 
 /// The door of gpureg: prepare each cloud once, align any pairs of them.
@@ -30,6 +31,11 @@ std::vector<PreparedCloud> prepare_batch(const Context& context, const std::vect
 /// options.prepare is checked, but not used: what a cloud was prepared with counts. Throws InvalidArgument where a cloud's search_distance is less than
 /// the correspondence distances, and where the clouds' features differ in dimension. Thread-safe.
 RegistrationResult align(const Context& context, const PreparedCloud& source, const PreparedCloud& target,
+                         const RegistrationOptions& options = {});
+
+/// The same with what is known of the pose beforehand. Throws InvalidArgument for a bad prior, and for one that is not empty with
+/// Proposal::quadruples, which cannot use it.
+RegistrationResult align(const Context& context, const PreparedCloud& source, const PreparedCloud& target, const RegistrationPrior& prior,
                          const RegistrationOptions& options = {});
 
 /// The easy door: prepares both clouds and aligns them.
@@ -65,5 +71,10 @@ struct BatchCallbacks {
 std::vector<RegistrationResult> align_batch(const Context& context, const std::vector<PreparedCloud>& clouds,
                                             const std::vector<Pair>& pairs, const RegistrationOptions& options = {},
                                             const BatchCallbacks& callbacks = {});
+
+/// The same with a prior for each pair: as many as pairs, or none. Throws as align() with a prior does, naming the pair.
+std::vector<RegistrationResult> align_batch(const Context& context, const std::vector<PreparedCloud>& clouds,
+                                            const std::vector<Pair>& pairs, const std::vector<RegistrationPrior>& priors,
+                                            const RegistrationOptions& options = {}, const BatchCallbacks& callbacks = {});
 
 }  // namespace gpureg

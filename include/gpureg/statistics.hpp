@@ -21,6 +21,7 @@ enum class RegistrationReason : std::uint8_t {
   degenerate_geometry,       ///< all surviving quadruples were collinear or coincident; no seed's neighbourhood determined a pose
   inlier_ratio_too_low,      ///< the best candidate is below ScoreOptions::min_inlier_ratio (Proposal::quadruples)
   confidence_too_low,        ///< the best candidate is below RegistrationOptions::min_confidence (Proposal::compatibility)
+  contradicts_prior,         ///< every pose found contradicts the RegistrationPrior of the pair
   cancelled
 };
 

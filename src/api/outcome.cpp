@@ -47,11 +47,12 @@ double rmse(std::uint64_t residual, std::uint32_t inliers, double distance) {
   return inliers > 0 ? distance * std::sqrt(static_cast<double>(residual) / static_cast<double>(kResidualScale) / inliers) : 0.0;
 }
 
-RegistrationReason evidence_reason(const RegistrationStatistics& s, double confidence, const RegistrationOptions& options) {
+RegistrationReason evidence_reason(const RegistrationStatistics& s, double confidence, bool contradicted, const RegistrationOptions& options) {
   if (s.source_points < 4) return RegistrationReason::too_few_source_points;
   if (s.target_points < 4) return RegistrationReason::too_few_target_points;
   if (s.correspondences < 4) return RegistrationReason::no_usable_features;
   if (s.scored == 0) return RegistrationReason::degenerate_geometry;
+  if (contradicted) return RegistrationReason::contradicts_prior;
   return confidence < options.min_confidence ? RegistrationReason::confidence_too_low : RegistrationReason::none;
 }
 
@@ -91,8 +92,17 @@ void add_modes(const PairOutcome& outcome, const PreparedState& source, const Pr
 
 }  // namespace
 
-RegistrationResult to_result(const PairOutcome& outcome, const PreparedState& source, const PreparedState& target, bool swapped,
-                             const RegistrationOptions& options) {
+RegistrationResult to_result(const PairOutcome& all, const PreparedState& source, const PreparedState& target, bool swapped,
+                             const RegistrationOptions& options, const PriorTest& prior) {
+  // Refinement moves poses, so they are asked again.
+  const bool some_contradict = std::any_of(all.modes.begin(), all.modes.end(), [&](const ModeOutcome& m) { return !permitted(prior, to_rigid(m.pose)); });
+  PairOutcome kept;
+  if (some_contradict) {
+    kept = all;
+    kept.modes.erase(std::remove_if(kept.modes.begin(), kept.modes.end(), [&](const ModeOutcome& m) { return !permitted(prior, to_rigid(m.pose)); }),
+                     kept.modes.end());
+  }
+  const PairOutcome& outcome = some_contradict ? kept : all;
   RegistrationResult result;
   result.reason = outcome.reason;
   result.status = outcome.reason == RegistrationReason::none ? RegistrationStatus::aligned : RegistrationStatus::not_aligned;
@@ -110,7 +120,7 @@ RegistrationResult to_result(const PairOutcome& outcome, const PreparedState& so
   if (options.hypothesis.proposal == Proposal::compatibility) {
     if (!outcome.modes.empty()) add_modes(outcome, source, target, swapped, options, result);
     const RegistrationStatistics& s = result.statistics;
-    result.reason = evidence_reason(s, result.score, options);
+    result.reason = evidence_reason(s, result.score, some_contradict && outcome.modes.empty(), options);
     result.status = result.reason == RegistrationReason::none ? RegistrationStatus::aligned : RegistrationStatus::not_aligned;
     return result;
   }

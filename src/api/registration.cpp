@@ -5,6 +5,7 @@
 #include <string>
 
 #include "api/outcome.hpp"
+#include "api/prior.hpp"
 #include "api/validate.hpp"
 
 namespace gpureg {
@@ -47,6 +48,18 @@ bool swaps(const PreparedState& source, const PreparedState& target, const Hypot
 
 PairInput input_of(const PreparedState& source, const PreparedState& target, bool swapped) {
   return swapped ? PairInput{&target, &source, {}, {}} : PairInput{&source, &target, {}, {}};
+}
+
+void check_priors(const std::vector<RegistrationPrior>& priors, std::size_t pairs, const RegistrationOptions& options) {
+  if (priors.empty()) return;
+  if (priors.size() != pairs)
+    throw InvalidArgument("priors has " + std::to_string(priors.size()) + " entries, but pairs has " + std::to_string(pairs));
+  for (std::size_t p = 0; p < priors.size(); ++p) {
+    priors[p].validate("priors[" + std::to_string(p) + "]");
+    if (!priors[p].empty())
+      require(options.hypothesis.proposal == Proposal::compatibility, "hypothesis.proposal", to_string(options.hypothesis.proposal),
+              "compatibility: only it can use priors");
+  }
 }
 
 }  // namespace
@@ -107,9 +120,22 @@ RegistrationResult align(const Context& context, const PreparedCloud& source, co
   return to_result(outcome, s, t, swapped, options);
 }
 
+RegistrationResult align(const Context& context, const PreparedCloud& source, const PreparedCloud& target, const RegistrationPrior& prior,
+                         const RegistrationOptions& options) {
+  prior.validate();
+  return align_batch(context, {source, target}, {{0, 1}}, {prior}, options).front();
+}
+
 std::vector<RegistrationResult> align_batch(const Context& context, const std::vector<PreparedCloud>& clouds, const std::vector<Pair>& pairs,
                                             const RegistrationOptions& options, const BatchCallbacks& callbacks) {
+  return align_batch(context, clouds, pairs, std::vector<RegistrationPrior>(), options, callbacks);
+}
+
+std::vector<RegistrationResult> align_batch(const Context& context, const std::vector<PreparedCloud>& clouds, const std::vector<Pair>& pairs,
+                                            const std::vector<RegistrationPrior>& priors, const RegistrationOptions& options,
+                                            const BatchCallbacks& callbacks) {
   options.validate();
+  check_priors(priors, pairs.size(), options);
   // Everything that can be wrong is looked at before the first pair runs: a long batch does not die of its last line.
   std::vector<std::uint8_t> used(clouds.size(), 0);
   for (std::size_t p = 0; p < pairs.size(); ++p) {
@@ -132,12 +158,14 @@ std::vector<RegistrationResult> align_batch(const Context& context, const std::v
     std::vector<PairOutcome> outcomes(end - begin);
     for (std::size_t p = begin; p < end; ++p) {
       const PreparedState &s = *clouds[pairs[p].source].state(), &t = *clouds[pairs[p].target].state();
-      inputs.push_back(input_of(s, t, swaps(s, t, options.hypothesis)));
+      const bool swapped = swaps(s, t, options.hypothesis);
+      inputs.push_back(input_of(s, t, swapped));
+      if (!priors.empty()) inputs.back().prior = prior_test(priors[p], s, t, swapped);
     }
     context.engine()->align(span_of(inputs), options, {outcomes.data(), outcomes.size()});
     for (std::size_t p = begin; p < end; ++p) {
       const PreparedState &s = *clouds[pairs[p].source].state(), &t = *clouds[pairs[p].target].state();
-      results[p] = to_result(outcomes[p - begin], s, t, swaps(s, t, options.hypothesis), options);
+      results[p] = to_result(outcomes[p - begin], s, t, swaps(s, t, options.hypothesis), options, inputs[p - begin].prior);
       if (callbacks.on_result) callbacks.on_result(p, results[p]);
     }
   }

@@ -22,6 +22,7 @@ const char* to_string(RegistrationReason reason) {
     case RegistrationReason::degenerate_geometry: return "degenerate_geometry";
     case RegistrationReason::inlier_ratio_too_low: return "inlier_ratio_too_low";
     case RegistrationReason::confidence_too_low: return "confidence_too_low";
+    case RegistrationReason::contradicts_prior: return "contradicts_prior";
     case RegistrationReason::cancelled: return "cancelled";
   }
   return "unknown";
@@ -37,6 +38,7 @@ const char* explain(RegistrationReason reason) {
     case RegistrationReason::degenerate_geometry: return "no pose is determined: what matches is collinear or coincident";
     case RegistrationReason::inlier_ratio_too_low: return "the best pose found brings too few points together";
     case RegistrationReason::confidence_too_low: return "what speaks for the best pose found is too little, or too much speaks against it";
+    case RegistrationReason::contradicts_prior: return "every pose found contradicts what is known of gravity or of the pose";
     case RegistrationReason::cancelled: return "the batch was cancelled before this pair";
   }
   return "unknown";

@@ -42,7 +42,7 @@ class CpuEngine final : public Engine {
     std::vector<PairView> views(pairs.size);
     for (std::size_t p = 0; p < pairs.size; ++p)
       views[p] = {static_cast<const CpuCloud*>(pairs[p].source)->view(), static_cast<const CpuCloud*>(pairs[p].target)->view(),
-                  pairs[p].custom_source.data, pairs[p].custom_target.data, static_cast<std::uint32_t>(pairs[p].custom_source.size)};
+                  pairs[p].custom_source.data, pairs[p].custom_target.data, static_cast<std::uint32_t>(pairs[p].custom_source.size), pairs[p].prior};
     if (options.hypothesis.proposal == Proposal::compatibility)
       pipeline::align_by_evidence(exec_, span_of(views), options, outcomes);
     else

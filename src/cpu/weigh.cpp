@@ -152,6 +152,10 @@ void weigh_candidates(Exec& exec, Span<const PairView> pairs, const std::vector<
             target_points(back.order, s, back.limits);
         for (std::size_t k = begin; k < end; ++k) {
           const Rigid pose = to_rigid(candidates[p].pose[k]);
+          if (!permitted(pairs[p].prior, pose)) {
+            candidates[p].promise[k] = 0.0f;
+            continue;
+          }
           const SideEvidence a =
               weigh_sample(source_points, forth, source[p], pose, test, decides(options));
           const SideEvidence b =

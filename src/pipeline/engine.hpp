@@ -36,6 +36,7 @@ struct PairInput {
   const PreparedState* target;
   Span<const std::uint32_t> custom_source{};
   Span<const std::uint32_t> custom_target{};
+  PriorTest prior{};
 };
 
 /// Private interface between the public door (src/api) and the backends (src/cpu, cuda). Calls are serialised inside.

@@ -4,6 +4,7 @@
 #include "algorithm/cloud.hpp"
 #include "algorithm/evidence.hpp"
 #include "algorithm/moments.hpp"
+#include "algorithm/prior.hpp"
 #include "algorithm/support.hpp"
 #include "gpureg/options.hpp"
 #include "gpureg/statistics.hpp"
@@ -32,6 +33,7 @@ struct PairView {
   const std::uint32_t* custom_source;
   const std::uint32_t* custom_target;
   std::uint32_t custom_count;
+  PriorTest prior{};
 };
 
 /// A refined pose with what speaks for and against it, in local coordinates of both clouds.

@@ -21,6 +21,7 @@ using test::same_bytes;
 struct PairOfClouds {
   std::size_t source, target;
   std::vector<std::uint32_t> custom_source, custom_target;
+  PriorTest prior{};
 };
 
 template <typename Mode>
@@ -88,9 +89,9 @@ void EvidenceOnCuda::expect_same(const std::vector<RawCloud>& clouds) {
   std::vector<PairView> cpu_pairs, cuda_pairs;
   for (const PairOfClouds& w : pairs) {
     const auto custom = static_cast<std::uint32_t>(w.custom_source.size());
-    cpu_pairs.push_back({cpu_clouds[w.source]->view(), cpu_clouds[w.target]->view(), w.custom_source.data(), w.custom_target.data(), custom});
+    cpu_pairs.push_back({cpu_clouds[w.source]->view(), cpu_clouds[w.target]->view(), w.custom_source.data(), w.custom_target.data(), custom, w.prior});
     cuda_pairs.push_back({cuda_clouds[w.source]->view_on_device, cuda_clouds[w.target]->view_on_device, w.custom_source.data(),
-                          w.custom_target.data(), custom});
+                          w.custom_target.data(), custom, w.prior});
   }
   const auto cpu_views = span_of(cpu_pairs), cuda_views = span_of(cuda_pairs);
   const std::size_t count = pairs.size();
@@ -214,6 +215,21 @@ TEST_F(EvidenceOnCuda, ManySeedsWithoutRefinement) {
 TEST_F(EvidenceOnCuda, ACloudWithItself) {
   keep_scene();
   pairs = {{0, 0, {}, {}}, {4, 4, {}, {}}};
+  expect_same();
+}
+
+TEST_F(EvidenceOnCuda, Priors) {
+  keep_scene(), all_pairs();
+  for (std::size_t p = 0; p < pairs.size(); ++p) {
+    // Between what permits most and what permits next to nothing.
+    PriorTest& prior = pairs[p].prior;
+    prior.gravity = p % 3 != 0, prior.pose = p % 3 != 1, prior.swapped = p % 2 == 1;
+    prior.moved_up = test::random_unit(random), prior.fixed_up = test::random_unit(random);
+    prior.min_up_cosine = -0.9f + 0.3f * static_cast<float>(p % 6);
+    prior.expected = to_rigid(Pose<double>{0.6, 0.8, 0, 0, 0.3, -0.2, 0.1 * static_cast<double>(p % 4)});
+    prior.min_trace = -0.8f + 0.5f * static_cast<float>(p % 5);
+    prior.max_squared_distance = 0.1f + static_cast<float>(p % 4);
+  }
   expect_same();
 }
 

@@ -1,0 +1,88 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "api/prior.hpp"
+
+#include <cmath>
+
+#include "api/validate.hpp"
+
+namespace gpureg {
+namespace {
+
+constexpr double kRadians = 3.14159265358979323846 / 180.0;
+/// Directions and poses become floats: what is exactly at a limit must not fall to one side or the
+/// other by their rounding.
+constexpr double kRounding = 1e-6;
+
+void require_direction(const Eigen::Vector3d& v, const std::string& name) {
+  const std::string field = name + ".norm";
+  require(v.allFinite() && v.norm() > 1e-9, field.c_str(), v.norm(),
+          "a direction: finite, and not of length 0");
+}
+
+void require_degrees(double degrees, const std::string& name) {
+  require(std::isfinite(degrees) && degrees > 0 && degrees <= 180, name.c_str(), degrees,
+          "degrees in (0, 180]");
+}
+
+Vec3 to_vec3(const Eigen::Vector3d& v) {
+  return {static_cast<float>(v.x()), static_cast<float>(v.y()), static_cast<float>(v.z())};
+}
+
+Eigen::Vector3d origin_of(const PreparedState& cloud) {
+  return Eigen::Vector3f(cloud.origin[0], cloud.origin[1], cloud.origin[2]).cast<double>();
+}
+
+}  // namespace
+
+void RegistrationPrior::validate(const std::string& name) const {
+  if (gravity) {
+    require_direction(gravity->source_up, name + ".gravity.source_up");
+    require_direction(gravity->target_up, name + ".gravity.target_up");
+    require_degrees(gravity->max_angle, name + ".gravity.max_angle");
+  }
+  if (!pose) return;
+  const Eigen::Matrix4d m = pose->target_from_source.matrix();
+  const Eigen::Matrix3d r = m.topLeftCorner<3, 3>();
+  if (!m.allFinite() ||
+      (r * r.transpose() - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff() > 1e-3 ||
+      r.determinant() < 0)
+    throw InvalidArgument(name + ".pose.target_from_source is no rigid motion");
+  require_degrees(pose->max_rotation, name + ".pose.max_rotation");
+  const std::string field = name + ".pose.max_translation";
+  require(std::isfinite(pose->max_translation) && pose->max_translation > 0, field.c_str(),
+          pose->max_translation, "a length > 0");
+}
+
+PriorTest prior_test(const RegistrationPrior& prior, const PreparedState& source,
+                     const PreparedState& target, bool swapped) {
+  PriorTest out;
+  out.swapped = swapped;
+  if (prior.gravity) {
+    out.gravity = true;
+    const Eigen::Vector3d s = prior.gravity->source_up.normalized(),
+                          t = prior.gravity->target_up.normalized();
+    out.moved_up = to_vec3(swapped ? t : s), out.fixed_up = to_vec3(swapped ? s : t);
+    out.min_up_cosine =
+        static_cast<float>(std::cos(prior.gravity->max_angle * kRadians) - kRounding);
+  }
+  if (prior.pose) {
+    out.pose = true;
+    // p_target = R p_source + t, with points relative to both local origins.
+    Eigen::Isometry3d local = Eigen::Isometry3d::Identity();
+    local.linear() = prior.pose->target_from_source.linear();
+    local.translation() = prior.pose->target_from_source * origin_of(source) - origin_of(target);
+    if (swapped) local = local.inverse();
+    for (int row = 0; row < 3; ++row) {
+      for (int column = 0; column < 3; ++column)
+        out.expected.r[3 * row + column] = static_cast<float>(local.linear()(row, column));
+      out.expected.t[row] = static_cast<float>(local.translation()[row]);
+    }
+    out.min_trace =
+        static_cast<float>(1.0 + 2.0 * std::cos(prior.pose->max_rotation * kRadians) - kRounding);
+    out.max_squared_distance = static_cast<float>(prior.pose->max_translation *
+                                                  prior.pose->max_translation * (1.0 + kRounding));
+  }
+  return out;
+}
+
+}  // namespace gpureg
