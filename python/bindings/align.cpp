@@ -5,6 +5,7 @@
 
 #include "cloud.hpp"
 #include "gpureg/registration.hpp"
+#include "prior.hpp"
 
 namespace gpureg::python {
 namespace {
@@ -24,12 +25,17 @@ std::vector<Entry> entries_of(const IndexArray& array, const char* name) {
 
 RegistrationResult align_pair(const Context& context, const Cloud& source, const Cloud& target,
                               const RegistrationOptions& options,
-                              const std::optional<IndexArray>& correspondences) {
+                              const std::optional<IndexArray>& correspondences,
+                              const std::optional<RegistrationPrior>& prior) {
   RegistrationResult result;
   if (correspondences) {
     const auto entries = entries_of<Correspondence>(*correspondences, "correspondences");
     const py::gil_scoped_release release;
     result = align(context, source.prepared, target.prepared, entries, options);
+  } else if (prior) {
+    const py::gil_scoped_release release;
+    result = align(context, source.prepared, target.prepared,
+                   in_prepared_frames(*prior, source, target), options);
   } else {
     const py::gil_scoped_release release;
     result = align(context, source.prepared, target.prepared, options);
@@ -41,7 +47,8 @@ RegistrationResult align_pair(const Context& context, const Cloud& source, const
 /// Returns (results, error): what was raised between two chunks, by Ctrl-C or by progress, does not
 /// take with it what is done.
 py::tuple align_pairs(const Context& context, const py::list& clouds, const IndexArray& pairs,
-                      const RegistrationOptions& options, const py::object& progress) {
+                      const RegistrationOptions& options, const py::object& progress,
+                      const std::vector<RegistrationPrior>& priors) {
   std::vector<Cloud> held;  // copies share the data
   std::vector<PreparedCloud> prepared;
   for (const py::handle cloud : clouds) {
@@ -67,7 +74,16 @@ py::tuple align_pairs(const Context& context, const py::list& clouds, const Inde
   std::vector<RegistrationResult> results;
   {
     const py::gil_scoped_release release;
-    results = align_batch(context, prepared, entries, options, callbacks);
+    std::vector<RegistrationPrior>
+        moved;  // a wrong number of them, or of clouds, is align_batch's to name
+    for (std::size_t k = 0; k < priors.size(); ++k) {
+      const bool known =
+          k < entries.size() && entries[k].source < held.size() && entries[k].target < held.size();
+      moved.push_back(
+          known ? in_prepared_frames(priors[k], held[entries[k].source], held[entries[k].target])
+                : priors[k]);
+    }
+    results = align_batch(context, prepared, entries, moved, options, callbacks);
     for (std::size_t k = 0; k < results.size(); ++k)
       move_to_origins(results[k], held[entries[k].source], held[entries[k].target]);
   }
@@ -81,9 +97,10 @@ py::tuple align_pairs(const Context& context, const py::list& clouds, const Inde
 
 void bind_align(py::module_& m) {
   m.def("align", &align_pair, py::arg("context"), py::arg("source"), py::arg("target"),
-        py::arg("options"), py::arg("correspondences") = py::none());
+        py::arg("options"), py::arg("correspondences") = py::none(), py::arg("prior") = py::none());
   m.def("align_batch", &align_pairs, py::arg("context"), py::arg("clouds"), py::arg("pairs"),
-        py::arg("options"), py::arg("progress") = py::none());
+        py::arg("options"), py::arg("progress") = py::none(),
+        py::arg("priors") = std::vector<RegistrationPrior>());
 }
 
 }  // namespace gpureg::python

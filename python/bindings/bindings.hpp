@@ -15,6 +15,7 @@ void bind_options(py::module_& m);
 void bind_result(py::module_& m);
 void bind_cloud(py::module_& m);
 void bind_prepare(py::module_& m);
+void bind_prior(py::module_& m);
 void bind_align(py::module_& m);
 void bind_agreement(py::module_& m);
 void bind_time_budget(py::module_& m);

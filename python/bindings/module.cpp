@@ -11,6 +11,7 @@ PYBIND11_MODULE(_core, m) {
   bind_result(m);
   bind_cloud(m);
   bind_prepare(m);
+  bind_prior(m);
   bind_align(m);
   bind_agreement(m);
   bind_time_budget(m);

@@ -527,6 +527,18 @@ class VoxelSizeSuggestion:
     @property
     def points(self) -> int: ...
 
+class RegistrationPrior:
+    def __init__(
+        self,
+        *,
+        source_up: Optional[npt.ArrayLike] = None,
+        target_up: Optional[npt.ArrayLike] = None,
+        max_angle: float = 10.0,
+        target_from_source: Optional[npt.ArrayLike] = None,
+        max_rotation: float = 30.0,
+        max_translation: float = 1.0,
+    ) -> None: ...
+
 class PreparedCloud:
     def __len__(self) -> int: ...
     @property
@@ -569,6 +581,7 @@ def align(
     target: PreparedCloud,
     options: RegistrationOptions,
     correspondences: Optional[npt.NDArray[np.uint32]] = None,
+    prior: Optional[RegistrationPrior] = None,
 ) -> RegistrationResult: ...
 def align_batch(
     context: Context,
@@ -576,6 +589,7 @@ def align_batch(
     pairs: npt.NDArray[np.uint32],
     options: RegistrationOptions,
     progress: Optional[Callable[[int], object]] = None,
+    priors: Sequence[RegistrationPrior] = ...,
 ) -> Tuple[List[RegistrationResult], Optional[BaseException]]: ...
 def agreement(pairs: npt.NDArray[np.uint32], results: Sequence[RegistrationResult], options: AgreementOptions) -> List[PairAgreement]: ...
 def align_within(

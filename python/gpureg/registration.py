@@ -9,7 +9,7 @@ from typing import Any, Callable, List, Literal, Optional, Sequence, Union
 
 from . import _core
 from ._arrays import core_cloud, host_points, index_pairs
-from ._core import BackendUnavailable, Context, PreparedCloud, PrepareOptions, RegistrationOptions, RegistrationResult, TimedResult, VoxelSizeSuggestion
+from ._core import BackendUnavailable, Context, PreparedCloud, PrepareOptions, RegistrationOptions, RegistrationPrior, RegistrationResult, TimedResult, VoxelSizeSuggestion
 from ._progress import Progress, batch_progress
 
 _default: Optional[Context] = None
@@ -162,6 +162,7 @@ def align(
     target: PreparedCloud,
     *,
     correspondences: Any = None,
+    prior: Optional[RegistrationPrior] = None,
     options: Optional[RegistrationOptions] = None,
     context: Optional[Context] = None,
 ) -> RegistrationResult:
@@ -174,6 +175,10 @@ def align(
     correspondences : (M, 2) integer array, optional
         Rows (source point, target point) to use instead of feature matches; indices into
         ``PreparedCloud.points``.
+    prior : RegistrationPrior, optional
+        Gravity (``source_up``, ``target_up``, ``max_angle`` degrees) and an approximate pose
+        (``target_from_source``, ``max_rotation`` degrees, ``max_translation`` of the source's middle):
+        poses that contradict it are dropped. Not together with correspondences.
     options : RegistrationOptions, optional
     context : Context, optional
         Default: `default_context()`. Threads may share one: their calls take turns.
@@ -194,10 +199,13 @@ def align(
     """
     _check_prepared(source, "source")
     _check_prepared(target, "target")
+    _checked(prior, RegistrationPrior, "prior")
+    if prior is not None and correspondences is not None:
+        raise TypeError("prior: not together with correspondences")
     if correspondences is not None:
         correspondences = index_pairs(correspondences, "correspondences", (len(source), len(target)))
     options = _checked(options, RegistrationOptions, "options") or RegistrationOptions()
-    return _core.align(_context(context), source, target, options, correspondences)
+    return _core.align(_context(context), source, target, options, correspondences, prior)
 
 
 def align_within(
@@ -262,6 +270,7 @@ def align_batch(
     fragments: Sequence[Any],
     pairs: Any,
     *,
+    priors: Optional[Sequence[RegistrationPrior]] = None,
     options: Optional[RegistrationOptions] = None,
     context: Optional[Context] = None,
     progress: Union[bool, Callable[[int, int], object]] = False,
@@ -274,6 +283,8 @@ def align_batch(
         Or of whatever `prepare` takes as points; those are prepared with ``options.prepare``.
     pairs : (M, 2) integer array or list of pairs
         Rows (source, target): indices into fragments.
+    priors : sequence of RegistrationPrior, optional
+        One for each pair, see `align`; ``RegistrationPrior()`` where nothing is known.
     options : RegistrationOptions, optional
     context : Context, optional
     progress : bool or callable
@@ -301,9 +312,13 @@ def align_batch(
     options = _checked(options, RegistrationOptions, "options") or RegistrationOptions()
     context = _context(context)
     entries = index_pairs(pairs, "pairs", len(fragments))
+    known = [] if priors is None else list(priors)
+    for k, prior in enumerate(known):
+        if not isinstance(prior, RegistrationPrior):
+            raise TypeError(f"priors[{k}]: expected a RegistrationPrior, got {prior!r}")
     clouds = _prepared(fragments, options.prepare, context)
     with batch_progress(progress, "aligning", len(entries)) as report:
-        results, error = _core.align_batch(context, clouds, entries, options, report)
+        results, error = _core.align_batch(context, clouds, entries, options, report, known)
     if isinstance(error, KeyboardInterrupt):
         raise BatchInterrupted(results) from None
     if error is not None:

@@ -61,3 +61,33 @@ def test_suggestions(clouds):
     assert (nothing.voxel_size, nothing.reason) == (0, "no_clouds")
     with pytest.raises(ValueError, match=r"clouds\[1\]: expected shape \(N, 3\)"):
         gpureg.suggest_voxel_size([clouds[0], np.ones((4, 2))])
+
+
+def test_priors_drop_what_contradicts_them(clouds):
+    a, b = gpureg.prepare_batch(clouds)
+    known = gpureg.RegistrationPrior(target_from_source=pose(), max_rotation=5, max_translation=0.2)
+    result = gpureg.align(a, b, prior=known)
+    assert result.aligned and error_of(result, pose()) < 0.05
+    up = np.array([0.0, 0, 1])
+    tilted = gpureg.RegistrationPrior(source_up=up, target_up=pose()[:3, :3] @ [1, 2, 3], max_angle=1e-3)
+    batch = gpureg.align_batch([a, b], [(0, 1), (0, 1)], priors=[tilted, gpureg.RegistrationPrior()])
+    assert [r.reason for r in batch] == ["contradicts_prior", "none"]
+    assert np.isnan(batch[0].target_from_source).all()
+    assert np.array_equal(batch[1].target_from_source, gpureg.align(a, b).target_from_source)
+    with pytest.raises(gpureg.InvalidArgument, match="priors has 1 entries, but pairs has 2"):
+        gpureg.align_batch([a, b], [(0, 1), (1, 0)], priors=[known])
+    with pytest.raises(ValueError, match="give both, or none"):
+        gpureg.RegistrationPrior(source_up=up)
+    with pytest.raises(gpureg.InvalidArgument, match="prior.pose.max_rotation is 0"):
+        gpureg.RegistrationPrior(target_from_source=np.eye(4), max_rotation=0)
+    with pytest.raises(TypeError, match="prior: expected a RegistrationPrior"):
+        gpureg.align(a, b, prior=np.eye(4))
+
+
+def test_priors_are_in_the_frames_of_the_caller(clouds):
+    far = np.array([4.5e5, 5.4e6, 100.0])
+    a, b = gpureg.prepare_batch([clouds[0] + far, clouds[1]])
+    truth = pose()
+    truth[:3, 3] -= truth[:3, :3] @ far
+    known = gpureg.RegistrationPrior(target_from_source=truth, max_rotation=5, max_translation=0.3)
+    assert gpureg.align(a, b, prior=known).aligned
