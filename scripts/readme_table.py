@@ -81,7 +81,7 @@ def other_pairs():
         what = "refined" if run["refined"] else "before refinement"
         rows.append(f"| LiDAR, {what} | {run['seed']} | {run['status']} | {run['metres']:.3f} m, {run['degrees']:.2f} deg |")
     for run in record["redwood_sample"]:
-        rows.append(f"| Redwood's sample fragments | {run['seed']} | {run['status']} | inlier ratio {run['score']:.2f} (no ground truth) |")
+        rows.append(f"| Redwood's sample fragments | {run['seed']} | {run['status']} | confidence {run['score']:.2f} (no ground truth) |")
     return rows + ["", source(record) + "."]
 
 
@@ -211,7 +211,6 @@ def speed():
 def pipeline():
     context, runs = benchmarks()
     rows = [("a prepared pair, `loopsmart`, in a batch of 2,090", "align_many/cuda_loopsmart/11", "ms_per_pair", 0.10),
-            ("a prepared pair, `default`, in a batch of 2,090", "align_many/cuda_default/11", "ms_per_pair", None),
             ("a pair in the naive mode, one after the other", "paper_mode", "ms_per_pair", None),
             ("a prepared pair on the CPU of the host, in a batch of 190", "align_many/cpu_loopsmart/1", "ms_per_pair", None),
             ("one prepared pair alone, median of 190", "align_one/cuda_loopsmart", "ms_median", 0.4),
@@ -225,6 +224,37 @@ def pipeline():
         value = runs[name][key]
         out.append(f"| {text} | {value:.3g} | {'' if goal is None else f'{goal:g}'} | {'' if goal is None else f'{value / goal:.2f}'} |")
     return out + ["", made_by(context)]
+
+
+def pipeline_house():
+    record = load("pipeline_h200_house_a.json")
+    runs = {run["name"].split("/real_time")[0].split("/iterations")[0]: run for run in record["benchmarks"]}
+    stages = ("match", "sample", "fit", "score", "refine", "judge")
+    out = ["| | ms | " + " | ".join(stages) + " |", "| --- | --- |" + " --- |" * len(stages)]
+    for text, name, key in (("a prepared pair, `default`, in a batch of 13,475", "align_many/cuda_default/11", "ms_per_pair"),
+                            ("one prepared pair alone, `default`, median of 190", "align_one/cuda_default", "ms_median"),
+                            ("a prepared pair, `loopsmart`, in a batch of 13,475", "align_many/cuda_loopsmart/11", "ms_per_pair"),
+                            ("one prepared pair alone, `loopsmart`, median of 190", "align_one/cuda_loopsmart", "ms_median")):
+        run = runs[name]
+        out.append(f"| {text} | {run[key]:.2f} | " + " | ".join(f"{run['ms_' + stage]:.3f}" for stage in stages) + " |")
+    out.append(f"| a fragment prepared for `default`, in a batch of 50 | {runs['prepare_batch_of_fragments/cuda_default']['ms_per_fragment']:.2f} | | | | | | |")
+    context = record["context"]
+    return out + ["", f"{context['scene']}, {runs['align_many/cuda_default/11']['points']:,.0f} points a fragment. Made by `gpureg_pipeline_bench` with"
+                  f" `GPUREG_BENCH_SCENE` at commit {context['commit']} on an {context['gpu']} and {context['num_cpus']} cores of its host."]
+
+
+def confidence():
+    """Fits that have not seen the building they are tested on; means over the runs (seeds) of each scene."""
+    groups = {}
+    for run in load("confidence.json")["runs"]:
+        groups.setdefault((run["model"], run["scene"]), []).append(run)
+    out = ["| viewpoints | scene | runs | found among the modes / best, % | geometric R@P95 / R@P99 / AP, % | strict R@P95 / AP, % | ECE | right above 0.9, % |",
+           "| --- | --- | --- | --- | --- | --- | --- | --- |"]
+    for (model, scene), runs in groups.items():
+        of = lambda key: mean(run[key] for run in runs)  # noqa: B023,E731
+        out.append(f"| {'known' if model == 'with_free_space' else 'unknown'} | {scene} | {len(runs)} | {of('generated'):.1f} / {of('raw'):.1f} | {of('geo_R@P95'):.1f} / "
+                   f"{of('geo_R@P99'):.1f} / {of('geo_AP'):.1f} | {of('strict_R@P95'):.1f} / {of('strict_AP'):.1f} | {of('ECE'):.3f} | {of('right_above_0.9'):.1f} |")
+    return out
 
 
 def devices():
@@ -273,7 +303,7 @@ def floors():
     return out + [f"| judge, refine | {run['ms_judge'] + run['ms_refine']:.4f} | | | |"]
 
 
-TABLES = {"redkitchen": redkitchen, "redkitchen_seeds": redkitchen_seeds, "range_pairs": range_pairs, "other_pairs": other_pairs,
+TABLES = {"confidence": confidence, "pipeline_house": pipeline_house, "redkitchen": redkitchen, "redkitchen_seeds": redkitchen_seeds, "range_pairs": range_pairs, "other_pairs": other_pairs,
           "peers": peers, "peers_redkitchen": peers_redkitchen, "peers_house": peers_house,
           "peer_parameters": peer_parameters, "fgr": fgr, "redwood": redwood, "speed": speed, "pipeline": pipeline, "devices": devices, "scaling": scaling, "floors": floors}
 

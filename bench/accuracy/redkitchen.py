@@ -15,7 +15,10 @@ parser = record.parser(__doc__, "redkitchen_loopsmart.json")
 parser.add_argument("--preset", default="loopsmart")
 parser.add_argument("--seeds", type=int, nargs="+", default=[1, 2, 3])
 parser.add_argument("--scene", default="redkitchen/fragments", help="a folder of the data with fragments and their ground truth")
+parser.set_defaults(output=None)
 arguments = parser.parse_args()
+if arguments.output is None:
+    arguments.output = record.ROOT / f"bench/results/redkitchen_{arguments.preset}.json"
 folder = record.data_folder(arguments, arguments.scene)
 
 runs, batch = [], {}
@@ -27,6 +30,9 @@ with tempfile.TemporaryDirectory() as temporary:
                       "-o", temporary / "result.log", "--json", result, "--quiet")
         record.gpureg(arguments, "evaluate", result, "--ground-truth", folder, "--json", scores)
         batch, scene = json.loads(result.read_text()), json.loads(scores.read_text())["scenes"][0]
+        for detail in ("pairs", "curve"):  # of every pair: too much for a record
+            for part in (scene, scene["strict"], scene["geometric"]):
+                part.pop(detail, None)
         scene.update(scene=arguments.scene, result=f"seed {seed}", ground_truth=arguments.scene)
         runs.append({"seed": seed, "evaluate": scene, "peak_memory_mib": round(batch["peak_memory_mib"])})
         strict = scene["strict"]
