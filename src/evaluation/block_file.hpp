@@ -43,9 +43,10 @@ void read_blocks(const std::string& path, Take&& take) {
 
 /// Appends `i j n` and the matrix with that many decimals. what names the matrix. Throws
 /// InvalidArgument for a matrix that no reader would take back.
-template <int Size>
+template <int Size, int Options>
 void append_block(std::string& text, int i, int j, int n,
-                  const Eigen::Matrix<double, Size, Size>& matrix, int decimals, const char* what) {
+                  const Eigen::Matrix<double, Size, Size, Options>& matrix, int decimals,
+                  const char* what) {
   const auto pair = std::to_string(i) + "\t" + std::to_string(j);
   if (i < 0 || j < 0 || n < 0)
     throw InvalidArgument(std::string(what) + " of pair " + pair +
