@@ -3,6 +3,7 @@
 
 import os
 import pathlib
+import signal
 
 import numpy as np
 import pytest
@@ -31,3 +32,9 @@ def kitchen() -> pathlib.Path:
     if not (folder / "cloud_bin_0.ply").exists():
         pytest.skip("GPUREG_DATA_DIR with redkitchen/fragments is not set")
     return folder
+
+
+@pytest.fixture(autouse=True, scope="session")
+def interruptible():
+    """Shells start background jobs with SIGINT ignored, and Python leaves it so: tests that press Ctrl-C would wait for ever."""
+    signal.signal(signal.SIGINT, signal.default_int_handler)
