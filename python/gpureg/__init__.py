@@ -13,6 +13,7 @@ and `register_all`.
 from typing import TYPE_CHECKING, Any
 
 from ._agreement import agreement
+from ._contexts import default_context
 from ._core import (
     AgreementOptions,
     BackendUnavailable,
@@ -46,14 +47,12 @@ from ._core import (
 )
 from .fragments import FragmentSet
 from .files import read_point_cloud, write_point_cloud
+from .preparation import prepare, prepare_batch
 from .registration import (
     BatchInterrupted,
     align,
     align_batch,
     align_within,
-    default_context,
-    prepare,
-    prepare_batch,
     register,
     suggest_voxel_size,
 )

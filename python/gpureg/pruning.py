@@ -22,7 +22,7 @@ except ImportError as error:
 from . import _core
 from ._core import Context, PrepareOptions
 from .fragments import FragmentSet, fragment_set
-from .registration import default_context
+from ._contexts import default_context
 
 _TOGETHER = 32  # clouds in memory at once
 _FLAT = 20_000  # fragments up to which the exact search is fast

@@ -1,48 +1,16 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The door: prepare each cloud once, align any pairs of them."""
+"""The door: any pairs of prepared clouds, and the easy way for two."""
 
 from __future__ import annotations
 
-import os
-import threading
 from typing import Any, Callable, List, Literal, Optional, Sequence, Union
 
 from . import _core
 from ._arrays import core_cloud, host_points, index_pairs
-from ._core import BackendUnavailable, Context, PreparedCloud, PrepareOptions, RegistrationOptions, RegistrationPrior, RegistrationResult, TimedResult, VoxelSizeSuggestion
-from ._progress import Progress, batch_progress
-
-_default: Optional[Context] = None
-_default_lock = threading.Lock()
-
-
-def default_context() -> Context:
-    """The context that calls without one use: CUDA where a device can be used, else all CPU threads.
-
-    Made at the first call, once per process. A forked child makes its own, on the CPU; CUDA does not
-    survive a fork, nor do contexts of your own, as no thread does.
-    """
-    global _default
-    with _default_lock:
-        if any(context is not None and context.backend == "cuda" for context in _abandoned):
-            raise BackendUnavailable(
-                "CUDA does not survive a fork: start processes by multiprocessing's 'spawn' or 'forkserver', or name a context of the CPU"
-            )
-        if _default is None:
-            _default = Context.best()
-        return _default
-
-
-def _forget_default() -> None:
-    global _default, _default_lock
-    _default_lock = threading.Lock()
-    # The parent's threads do not exist here: joining them would wait for ever, so it is never freed.
-    _abandoned.append(_default)
-    _default = None
-
-
-_abandoned: List[Optional[Context]] = []
-os.register_at_fork(after_in_child=_forget_default)
+from ._contexts import checked, context_of
+from ._core import Context, PreparedCloud, PrepareOptions, RegistrationOptions, RegistrationPrior, RegistrationResult, TimedResult, VoxelSizeSuggestion
+from ._progress import batch_progress
+from .preparation import check_prepared, prepared
 
 
 class BatchInterrupted(KeyboardInterrupt):
@@ -58,103 +26,6 @@ class BatchInterrupted(KeyboardInterrupt):
         done = sum(result.status != "skipped" for result in results)
         super().__init__(f"interrupted after {done} of {len(results)} pairs; they are in .results")
         self.results = results
-
-
-def prepare(
-    points: Any,
-    normals: Any = None,
-    features: Any = None,
-    *,
-    viewpoints: Any = None,
-    options: Optional[PrepareOptions] = None,
-    context: Optional[Context] = None,
-) -> PreparedCloud:
-    """Downsample a cloud, compute normals and features, and build its search grid.
-
-    Parameters
-    ----------
-    points : (N, 3) array, path, PointCloud or Open3D point cloud
-        Metres, any real dtype and layout: numpy, DLPack (torch, jax, ...),
-        ``__cuda_array_interface__`` (cupy, ...) or nested lists. float32 rows are read in place;
-        everything else is copied once, to float32. Rows with NaN or infinity are dropped and
-        counted. What is on the context's GPU as float32, float16 or bfloat16 never leaves it. float64
-        coordinates too large for float32 (those of a map) lose nothing: their
-        centre is taken off first and put back into results.
-    normals : (N, 3) array, optional
-        Normals are computed; these, of any length, say which side of the surface they are on. Zeros
-        and NaN mean unknown.
-    features : (N, D) array, optional
-        Features of your own instead of FPFH, 1 <= D <= 4096.
-    viewpoints : (V, 3) array, optional
-        Sensor positions in the cloud's frame, towards which normals are turned where none are given.
-        Default: the origin.
-    options : PrepareOptions, optional
-        Must suit the options of the alignment: see ``RegistrationOptions.prepare``.
-    context : Context, optional
-        Default: `default_context()`.
-
-    Returns
-    -------
-    PreparedCloud
-        Resides in the context's memory. Immutable; threads may share it.
-
-    Raises
-    ------
-    TypeError, ValueError
-        Naming the argument and its type or shape.
-
-    Examples
-    --------
-    >>> import numpy as np, gpureg
-    >>> points = np.random.default_rng(1).random((2000, 3))
-    >>> cloud = gpureg.prepare(points)
-    >>> cloud.feature_dimension, cloud.statistics.input_points
-    (33, 2000)
-    """
-    return prepare_batch(
-        [_Parts(points, normals, features, viewpoints)], options=options, context=context
-    )[0]
-
-
-class _Parts:
-    """A cloud given as several arguments."""
-
-    def __init__(self, points: Any, normals: Any, features: Any, viewpoints: Any) -> None:
-        self.parts = (points, normals, features, viewpoints)
-
-
-def prepare_batch(
-    clouds: Sequence[Any],
-    *,
-    options: Optional[PrepareOptions] = None,
-    context: Optional[Context] = None,
-) -> List[PreparedCloud]:
-    """`prepare` for many clouds at once: the same results, and faster on a GPU.
-
-    Parameters
-    ----------
-    clouds : sequence
-        Each whatever `prepare` takes as points.
-    options, context
-        As for `prepare`.
-
-    Examples
-    --------
-    >>> import numpy as np, gpureg
-    >>> rng = np.random.default_rng(1)
-    >>> [len(c) > 0 for c in gpureg.prepare_batch([rng.random((500, 3)), rng.random((400, 3))])]
-    [True, True]
-    """
-    options = _checked(options, PrepareOptions, "options") or PrepareOptions()
-    context = _context(context)
-    device = context.backend == "cuda"
-    single = len(clouds) == 1
-    inputs = []
-    for k, cloud in enumerate(clouds):
-        points, normals, features, viewpoints = cloud.parts if isinstance(cloud, _Parts) else (cloud, None, None, None)
-        name = "points" if single else f"clouds[{k}]"
-        inputs.append(core_cloud(points, normals, features, viewpoints, options, name, device))
-    return _core.prepare_batch(context, inputs, options)
 
 
 def align(
@@ -197,15 +68,15 @@ def align(
     >>> result.status, bool(np.allclose(result.target_from_source, np.eye(4), atol=1e-3))
     ('aligned', True)
     """
-    _check_prepared(source, "source")
-    _check_prepared(target, "target")
-    _checked(prior, RegistrationPrior, "prior")
+    check_prepared(source, "source")
+    check_prepared(target, "target")
+    checked(prior, RegistrationPrior, "prior")
     if prior is not None and correspondences is not None:
         raise TypeError("prior: not together with correspondences")
     if correspondences is not None:
         correspondences = index_pairs(correspondences, "correspondences", (len(source), len(target)))
-    options = _checked(options, RegistrationOptions, "options") or RegistrationOptions()
-    return _core.align(_context(context), source, target, options, correspondences, prior)
+    options = checked(options, RegistrationOptions, "options") or RegistrationOptions()
+    return _core.align(context_of(context), source, target, options, correspondences, prior)
 
 
 def align_within(
@@ -241,10 +112,10 @@ def align_within(
     >>> timed.result.status, timed.quality <= timed.highest_quality
     ('aligned', True)
     """
-    _check_prepared(source, "source")
-    _check_prepared(target, "target")
-    options = _checked(options, RegistrationOptions, "options") or RegistrationOptions()
-    return _core.align_within(_context(context), source, target, milliseconds, options)
+    check_prepared(source, "source")
+    check_prepared(target, "target")
+    options = checked(options, RegistrationOptions, "options") or RegistrationOptions()
+    return _core.align_within(context_of(context), source, target, milliseconds, options)
 
 
 def suggest_voxel_size(clouds: Sequence[Any]) -> VoxelSizeSuggestion:
@@ -309,14 +180,14 @@ def align_batch(
     >>> [round(float(r.target_from_source[0, 3]), 2) for r in results]
     [0.5, -0.5]
     """
-    options = _checked(options, RegistrationOptions, "options") or RegistrationOptions()
-    context = _context(context)
+    options = checked(options, RegistrationOptions, "options") or RegistrationOptions()
+    context = context_of(context)
     entries = index_pairs(pairs, "pairs", len(fragments))
     known = [] if priors is None else list(priors)
     for k, prior in enumerate(known):
         if not isinstance(prior, RegistrationPrior):
             raise TypeError(f"priors[{k}]: expected a RegistrationPrior, got {prior!r}")
-    clouds = _prepared(fragments, options.prepare, context)
+    clouds = prepared(fragments, options.prepare, context)
     with batch_progress(progress, "aligning", len(entries)) as report:
         results, error = _core.align_batch(context, clouds, entries, options, report, known)
     if isinstance(error, KeyboardInterrupt):
@@ -372,7 +243,7 @@ def register(
            [ 0., -1.,  0.],
            [ 0.,  0.,  1.]])
     """
-    options = _checked(options, RegistrationOptions, "options")
+    options = checked(options, RegistrationOptions, "options")
     if options is not None and not (voxel_size is None and quality is None and seed is None):
         raise TypeError("options: give either options, or voxel_size, quality and seed")
     if time_budget_ms is not None and quality is not None:
@@ -385,12 +256,12 @@ def register(
             voxel_size = suggestion.voxel_size
         elif isinstance(voxel_size, str):
             raise TypeError(f"voxel_size: expected a number or 'auto', got {voxel_size!r}")
-        options = RegistrationOptions.from_voxel_size(
-            PrepareOptions().voxel_size if voxel_size is None else voxel_size, 5 if quality is None else quality
-        )
+        options = RegistrationOptions.from_voxel_size(PrepareOptions().voxel_size if voxel_size is None else voxel_size)
+        if quality is not None:
+            options = options.with_quality(quality)
         if seed is not None:
             options.hypothesis.seed = seed
-    context = _context(context)
+    context = context_of(context)
     clouds = []
     for cloud, name in ((source, "source"), (target, "target")):
         clouds.append(core_cloud(cloud, None, None, None, options.prepare, name, context.backend == "cuda"))
@@ -399,46 +270,3 @@ def register(
     if time_budget_ms is not None:
         return _core.align_within(context, a, b, time_budget_ms, options).result
     return _core.align(context, a, b, options, None)
-
-
-def _context(context: Optional[Context]) -> Context:
-    return _checked(context, Context, "context") or default_context()
-
-
-def _checked(value: Any, kind: Any, name: str) -> Any:
-    if value is not None and not isinstance(value, kind):
-        raise TypeError(f"{name}: expected a {kind.__name__}, got {value!r}")
-    return value
-
-
-def _check_prepared(cloud: Any, name: str) -> None:
-    if not isinstance(cloud, PreparedCloud):
-        shape = f" of shape {cloud.shape}" if hasattr(cloud, "shape") else ""
-        raise TypeError(
-            f"{name}: expected a PreparedCloud, got {type(cloud).__name__}{shape}; call prepare(), or register() for raw points"
-        )
-
-
-def _prepared(fragments: Sequence[Any], options: PrepareOptions, context: Context) -> List[PreparedCloud]:
-    """Those that are not prepared yet, prepared together; a cloud's place stays its own."""
-    raw = [k for k, cloud in enumerate(fragments) if not isinstance(cloud, PreparedCloud)]
-    device = context.backend == "cuda"
-    inputs = [core_cloud(fragments[k], None, None, None, options, f"fragments[{k}]", device) for k in raw]
-    clouds = list(fragments)
-    for k, cloud in zip(raw, _core.prepare_batch(context, inputs, options)):
-        clouds[k] = cloud
-    return clouds
-
-
-__all__ = [
-    "BatchInterrupted",
-    "Progress",
-    "align",
-    "align_batch",
-    "align_within",
-    "default_context",
-    "prepare",
-    "prepare_batch",
-    "register",
-    "suggest_voxel_size",
-]

@@ -6,13 +6,11 @@
 
 #include "api/confidence.hpp"
 #include "api/evidence.hpp"
-
+#include "api/frames.hpp"
 #include "pipeline/conclude.hpp"
 
 namespace gpureg {
 namespace {
-
-Eigen::Vector3d origin_of(const PreparedState& cloud) { return Eigen::Vector3f(cloud.origin[0], cloud.origin[1], cloud.origin[2]).cast<double>(); }
 
 /// Moments of the local, scaled points to moments of the points in the cloud's frame.
 CorrespondenceMoments to_frame(const Moments& m, const PreparedState& cloud) {
@@ -68,13 +66,10 @@ void add_modes(const PairOutcome& outcome, const PreparedState& source, const Pr
     out.found_as = static_cast<std::uint32_t>(modes.size());
     modes.push_back(out);
   }
-  // The stages compare modes at the local origin, which a stray point may draw far from the cloud; here they meet at its points.
-  const CorrespondenceMoments where = to_frame(swapped ? outcome.modes.front().target_moments : outcome.modes.front().source_moments, source);
-  const Eigen::Vector3d centre = where.count > 0 ? Eigen::Vector3d(where.sum / static_cast<double>(where.count)) : origin_of(source);
-  const double min_trace = static_cast<double>(mode_trace(options.evidence.mode_angle)), distance = static_cast<double>(options.evidence.mode_distance);
+  const ModeOutcome& first = outcome.modes.front();
+  const Eigen::Vector3d middle = middle_of(to_frame(swapped ? first.target_moments : first.source_moments, source), origin_of(source));
   set_confidences(modes, [&](const RegistrationMode& a, const RegistrationMode& b) {
-    return (a.target_from_source.linear().transpose() * b.target_from_source.linear()).trace() >= min_trace &&
-           (a.target_from_source * centre - b.target_from_source * centre).norm() <= distance;
+    return same_mode_at(a.target_from_source, b.target_from_source, middle, options.evidence);
   });
   result.modes = std::move(modes);
   const ModeOutcome& best = outcome.modes[result.modes.front().found_as];

@@ -3,6 +3,7 @@
 
 #include <cmath>
 
+#include "api/frames.hpp"
 #include "api/validate.hpp"
 
 namespace gpureg {
@@ -26,10 +27,6 @@ void require_degrees(double degrees, const std::string& name) {
 
 Vec3 to_vec3(const Eigen::Vector3d& v) {
   return {static_cast<float>(v.x()), static_cast<float>(v.y()), static_cast<float>(v.z())};
-}
-
-Eigen::Vector3d origin_of(const PreparedState& cloud) {
-  return Eigen::Vector3f(cloud.origin[0], cloud.origin[1], cloud.origin[2]).cast<double>();
 }
 
 }  // namespace

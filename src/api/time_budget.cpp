@@ -5,6 +5,7 @@
 #include <chrono>
 #include <cmath>
 
+#include "api/frames.hpp"
 #include "api/quality_levels.hpp"
 #include "api/validate.hpp"
 
@@ -13,19 +14,11 @@ namespace {
 
 constexpr double kSure = 0.99;
 
-/// The same place for the cloud: poses as close as two candidates of one mode. The shift is
-/// compared at the middle of what overlaps.
 bool same_pose(const RegistrationResult& a, const RegistrationResult& b,
                const EvidenceOptions& options) {
-  if (!a.has_candidate || !b.has_candidate) return false;
-  const UnalignedIsometry3d between = a.target_from_source.inverse() * b.target_from_source;
-  const double cosine =
-      std::cos(static_cast<double>(options.mode_angle) * 3.14159265358979323846 / 180.0);
-  Eigen::Vector3d middle = Eigen::Vector3d::Zero();
-  if (a.source_moments.count > 0)
-    middle = a.source_moments.sum / static_cast<double>(a.source_moments.count);
-  return (between.linear().trace() - 1.0) / 2.0 >= cosine &&
-         (between * middle - middle).norm() <= static_cast<double>(options.mode_distance);
+  return a.has_candidate && b.has_candidate &&
+         same_mode_at(a.target_from_source, b.target_from_source,
+                      middle_of(a.source_moments, Eigen::Vector3d::Zero()), options);
 }
 
 double ratio(double a, double b) { return b > 0 ? a / b : 1.0; }

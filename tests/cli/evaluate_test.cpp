@@ -26,6 +26,16 @@ class Evaluate : public ::testing::Test {
     evaluation::write_information(truth_ / "gt.info", information);
   }
 
+  // One pair more, with too little overlap for the strict rule.
+  void write_geometric_truth() const {
+    auto log = evaluation::read_log(truth_ / "gt.log");
+    auto information = evaluation::read_information(truth_ / "gt.info");
+    log.push_back({1, 7, 9, Eigen::Matrix4d::Identity()});
+    information.push_back({1, 7, 9, information[0].information});
+    evaluation::write_log(truth_ / "gt_all.log", log);
+    evaluation::write_information(truth_ / "gt_all.info", information);
+  }
+
   // A record as `batch` writes it; wrong: a metre from the truth.
   static json pair(int i, int j, double score, bool aligned, bool wrong) {
     json pose = {1, 0, 0, wrong ? 1 : 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1};
@@ -89,12 +99,7 @@ TEST_F(Evaluate, TheGeometricRuleWhereTheTruthAllowsIt) {
   const std::string path = write({pair(0, 2, 0.9, true, false), pair(1, 7, 0.7, true, false)});
   expect_holds(evaluate(path).out, {"strict"});
   EXPECT_FALSE(json_of(out_ / "e.json")["scenes"][0].contains("geometric"));
-  auto log = evaluation::read_log(truth_ / "gt.log");
-  auto information = evaluation::read_information(truth_ / "gt.info");
-  log.push_back({1, 7, 9, Eigen::Matrix4d::Identity()});
-  information.push_back({1, 7, 9, information[0].information});
-  evaluation::write_log(truth_ / "gt_all.log", log);
-  evaluation::write_information(truth_ / "gt_all.info", information);
+  write_geometric_truth();
   expect_holds(evaluate(path).out, {"strict", "geometric"});
   const json scene = json_of(out_ / "e.json")["scenes"][0];
   EXPECT_EQ(scene["strict"]["precision"], 0.5);
@@ -106,12 +111,7 @@ TEST_F(Evaluate, TheStrictRankingGoesByTheChanceOfOverlapToo) {
   json low = pair(1, 7, 0.99, true, false), listed = pair(0, 2, 0.8, true, false);
   low["modes"] = {{{"overlap_confidence", 0.1}}};
   listed["modes"] = {{{"overlap_confidence", 0.7}}};
-  auto log = evaluation::read_log(truth_ / "gt.log");
-  auto information = evaluation::read_information(truth_ / "gt.info");
-  log.push_back({1, 7, 9, Eigen::Matrix4d::Identity()});
-  information.push_back({1, 7, 9, information[0].information});
-  evaluation::write_log(truth_ / "gt_all.log", log);
-  evaluation::write_information(truth_ / "gt_all.info", information);
+  write_geometric_truth();
   ASSERT_EQ(evaluate(write({low, listed})).status, 0);
   json scene = json_of(out_ / "e.json")["scenes"][0];
   EXPECT_EQ(scene["strict"]["recall_at_precision"]["99"], 0.25);

@@ -1,0 +1,52 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The context that calls without one use."""
+
+from __future__ import annotations
+
+import os
+import threading
+from typing import Any, List, Optional
+
+from ._core import BackendUnavailable, Context
+
+_default: Optional[Context] = None
+_default_lock = threading.Lock()
+
+
+def default_context() -> Context:
+    """The context that calls without one use: CUDA where a device can be used, else all CPU threads.
+
+    Made at the first call, once per process. A forked child makes its own, on the CPU; CUDA does not
+    survive a fork, nor do contexts of your own, as no thread does.
+    """
+    global _default
+    with _default_lock:
+        if any(context is not None and context.backend == "cuda" for context in _abandoned):
+            raise BackendUnavailable(
+                "CUDA does not survive a fork: start processes by multiprocessing's 'spawn' or 'forkserver', or name a context of the CPU"
+            )
+        if _default is None:
+            _default = Context.best()
+        return _default
+
+
+def _forget_default() -> None:
+    global _default, _default_lock
+    _default_lock = threading.Lock()
+    # The parent's threads do not exist here: joining them would wait for ever, so it is never freed.
+    _abandoned.append(_default)
+    _default = None
+
+
+_abandoned: List[Optional[Context]] = []
+os.register_at_fork(after_in_child=_forget_default)
+
+
+def context_of(context: Optional[Context]) -> Context:
+    return checked(context, Context, "context") or default_context()
+
+
+def checked(value: Any, kind: Any, name: str) -> Any:
+    if value is not None and not isinstance(value, kind):
+        raise TypeError(f"{name}: expected a {kind.__name__}, got {value!r}")
+    return value
