@@ -1,5 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include <array>
+
 #include "algorithm/balance.hpp"
+#include "algorithm/fpfh.hpp"
 #include "nearest_feature.hpp"
 #include "scoring_data.hpp"
 #include "stages.hpp"
@@ -34,39 +37,61 @@ struct Counts {
   std::uint32_t balance_bin[kBalanceBins];      // points by the direction of their normals; the last bin: without
 };
 
-struct NormSlot {
+struct FeatureSlot {
   const float* features;
   const std::uint8_t* valid;
   std::uint32_t size, dimension, width;
-  float2* out;
-  std::uint32_t* tf32;  // null: none
-  float* padded;
+  FeatureAids aids;
+  std::uint32_t* first;       // table of `places`: lowest index of a row with this hash
+  std::uint32_t places;
   std::uint32_t* extreme;
 };
+
+__device__ std::uint32_t place_of(const FeatureSlot& s, const float* row) {
+  std::uint32_t hash = 2166136261u;
+  for (std::uint32_t d = 0; d < s.dimension; ++d) hash = (hash ^ __float_as_uint(row[d])) * 16777619u, hash ^= hash >> 15;
+  return hash % s.places;
+}
 
 /// Rounded to 10 bits of mantissa, as the tensor cores take them; ties away from zero.
 __device__ std::uint32_t to_tf32(float v) { return (__float_as_uint(v) + 0x1000u) & ~0x1fffu; }
 
 /// What the feature search reads beside the features: their lengths, and copies for the tensor cores.
-__global__ void measure_features(const NormSlot* slots) {
-  const NormSlot s = slots[blockIdx.y];
+__global__ void measure_features(const FeatureSlot* slots) {
+  const FeatureSlot s = slots[blockIdx.y];
   std::uint32_t extreme = 0;
   for (std::uint32_t i = blockIdx.x * blockDim.x + threadIdx.x; i < s.size; i += gridDim.x * blockDim.x) {
+    const float* row = s.features + static_cast<std::size_t>(i) * s.dimension;
     float sum = 0.0f;
-    for (std::uint32_t d = 0; d < s.dimension; ++d) {
-      const float v = s.features[static_cast<std::size_t>(i) * s.dimension + d];
-      sum = fmaf(v, v, sum);
+    for (std::uint32_t d = 0; d < s.width; ++d) {
+      const float v = s.valid[i] && d < s.dimension ? row[d] : 0.0f, centred = v - (s.valid[i] && s.aids.centred ? center_of_fpfh(d) : 0.0f);
+      sum = fmaf(centred, centred, sum);
+      s.aids.tf32[static_cast<std::size_t>(i) * s.width + d] = to_tf32(centred);
+      s.aids.padded[static_cast<std::size_t>(i) * s.width + d] = v;
     }
     if (!s.valid[i]) sum = __uint_as_float(0x7f800000u);
-    s.out[i] = make_float2(sum, sqrtf(sum));
-    for (std::uint32_t d = 0; s.tf32 && d < s.width; ++d) {
-      const float v = s.valid[i] && d < s.dimension ? s.features[static_cast<std::size_t>(i) * s.dimension + d] : 0.0f;
-      s.tf32[static_cast<std::size_t>(i) * s.width + d] = to_tf32(v);
-      s.padded[static_cast<std::size_t>(i) * s.width + d] = v;
-    }
+    s.aids.norm[i] = make_float2(sum, sqrtf(sum));
+    if (s.valid[i]) atomicMin(s.first + place_of(s, row), i);
     extreme += s.valid[i] && !(sum < 1e30f);
   }
   if (extreme > 0) atomicAdd(s.extreme, extreme);
+}
+
+/// Of equal features only the first is ever an answer; the others are taken out of the search. On walls without noise thousands are equal.
+__global__ void find_repeated_features(const FeatureSlot* slots) {
+  const FeatureSlot s = slots[blockIdx.y];
+  for (std::uint32_t i = blockIdx.x * blockDim.x + threadIdx.x; i < s.size; i += gridDim.x * blockDim.x) {
+    const float* row = s.features + static_cast<std::size_t>(i) * s.dimension;
+    bool repeats = false;
+    if (s.valid[i]) {
+      const std::uint32_t first = s.first[place_of(s, row)];
+      repeats = first < i;
+      const float* other = s.features + static_cast<std::size_t>(first) * s.dimension;
+      for (std::uint32_t d = 0; repeats && d < s.dimension; ++d) repeats = row[d] == other[d];
+    }
+    constexpr float kInfinity = 3.402823466e38f * 2.0f;
+    s.aids.row_norm[i] = repeats ? make_float2(kInfinity, kInfinity) : s.aids.norm[i];
+  }
 }
 
 __global__ void count(const std::uint32_t* offset, const Vec3* normals, const std::uint8_t* valid, std::uint32_t* const* balance, Counts* counts) {
@@ -112,6 +137,21 @@ std::vector<T> copy_back(const CudaCloud& cloud, const T* device, std::size_t si
   return host;
 }
 
+void add_feature_aids(Exec& exec, std::vector<FeatureSlot>& slots) {
+  if (slots.empty()) return;
+  std::size_t places = 0;
+  for (const FeatureSlot& s : slots) places += s.places;
+  const auto first = exec.filled<std::uint32_t>(places, 0xff);
+  std::uint32_t* at = first.data();
+  for (FeatureSlot& s : slots) s.first = at, at += s.places;
+  const auto on_device = exec.upload(slots);
+  const dim3 grid(16, static_cast<unsigned>(slots.size()));
+  measure_features<<<grid, 256, 0, exec.stream()>>>(on_device.data());
+  check_launch("measure_features");
+  find_repeated_features<<<grid, 256, 0, exec.stream()>>>(on_device.data());
+  check_launch("find_repeated_features");
+}
+
 }  // namespace
 
 std::vector<Vec3> CudaCloud::copy_points() const { return copy_back(*this, view_on_device.points, size); }
@@ -128,7 +168,7 @@ std::vector<std::shared_ptr<CudaCloud>> assemble(Exec& exec, const DownsampledCl
   const auto counts = exec.filled<Counts>(clouds_count, 0);
   std::vector<std::shared_ptr<CudaCloud>> out;
   std::vector<Part> parts;
-  std::vector<NormSlot> norm_slots;
+  std::vector<FeatureSlot> feature_slots;
   std::vector<std::uint32_t*> balance;
   for (std::size_t c = 0; c < clouds_count; ++c) {
     auto cloud = std::make_shared<CudaCloud>();
@@ -175,9 +215,11 @@ std::vector<std::shared_ptr<CudaCloud>> assemble(Exec& exec, const DownsampledCl
       return at;
     };
     const std::uint32_t width = filter_width(cloud->feature_dimension), wide_width = has_wide ? filter_width(wide_features.dimension[c]) : 0;
-    const std::size_t norms = reserve(n * sizeof(float2)), tf32 = reserve(n * width * sizeof(std::uint32_t)), padded = reserve(n * width * sizeof(float));
-    const std::size_t wide_norms = reserve(has_wide ? n * sizeof(float2) : 0), wide_tf32 = reserve(n * wide_width * sizeof(std::uint32_t)),
-                      wide_padded = reserve(n * wide_width * sizeof(float));
+    const auto reserve_aids = [&](std::uint32_t columns) {
+      const std::size_t rows = columns > 0 ? n : 0, norm = reserve(rows * sizeof(float2)), row_norm = reserve(rows * sizeof(float2));
+      return std::array<std::size_t, 4>{norm, row_norm, reserve(rows * columns * sizeof(std::uint32_t)), reserve(rows * columns * sizeof(float))};
+    };
+    const auto aids = reserve_aids(width), wide_aids = reserve_aids(wide_width);
     const std::size_t balanced = reserve(n * sizeof(std::uint32_t));
     const std::size_t copied = bytes;
     const ScoringLayout layout = scoring_layout(*cloud, closest.block_range[c]);
@@ -204,16 +246,18 @@ std::vector<std::shared_ptr<CudaCloud>> assemble(Exec& exec, const DownsampledCl
     char* const memory = cloud->data.data();
     balance.push_back(reinterpret_cast<std::uint32_t*>(memory + balanced));
     view.balance = balance.back();
-    const auto measure = [&](FeatureAids& aids, std::size_t norm_at, std::size_t tf32_at, std::size_t padded_at, const float* rows,
-                             const std::uint8_t* valid, std::uint32_t columns, std::uint32_t* extreme) {
+    const auto measure = [&](FeatureAids& to, const std::array<std::size_t, 4>& at, bool centred, const float* rows, const std::uint8_t* valid,
+                             std::uint32_t columns, std::uint32_t* extreme) {
       const std::uint32_t padded_width = filter_width(columns);
-      aids.norm = reinterpret_cast<float2*>(memory + norm_at);
-      if (padded_width > 0) aids.tf32 = reinterpret_cast<std::uint32_t*>(memory + tf32_at), aids.padded = reinterpret_cast<float*>(memory + padded_at);
-      norm_slots.push_back({rows, valid, view.size, columns, padded_width, aids.norm, aids.tf32, aids.padded, extreme});
+      if (padded_width == 0) return;
+      to = {reinterpret_cast<float2*>(memory + at[0]), reinterpret_cast<float2*>(memory + at[1]), reinterpret_cast<float*>(memory + at[3]),
+            reinterpret_cast<std::uint32_t*>(memory + at[2]), centred};
+      feature_slots.push_back({rows, valid, view.size, columns, padded_width, to, nullptr, 4 * view.size + 1, extreme});
     };
-    measure(cloud->narrow_aids, norms, tf32, padded, view.features, view.has_feature, view.feature_dimension, &counts.data()[c].extreme);
+    measure(cloud->narrow_aids, aids, facts.feature_dimension == 0, view.features, view.has_feature, view.feature_dimension,
+            &counts.data()[c].extreme);
     if (has_wide)
-      measure(cloud->wide_aids, wide_norms, wide_tf32, wide_padded, view.wide_features, view.has_wide_feature, wide_features.dimension[c],
+      measure(cloud->wide_aids, wide_aids, true, view.wide_features, view.has_wide_feature, wide_features.dimension[c],
               &counts.data()[c].extreme_wide);
     cloud->blocks = reinterpret_cast<const Cell*>(part[7].to);
     place_scoring_data(layout, closest.geometry[c], cloud->data.data() + copied, *cloud);
@@ -228,9 +272,7 @@ std::vector<std::shared_ptr<CudaCloud>> assemble(Exec& exec, const DownsampledCl
   check_launch("count");
   balance_points<<<grid, 256, 0, exec.stream()>>>(segments.on_device.data(), counts.data(), balance_on_device.data());
   check_launch("balance_points");
-  const auto norm_slots_on_device = exec.upload(norm_slots);
-  measure_features<<<dim3(16, static_cast<unsigned>(norm_slots.size())), 256, 0, exec.stream()>>>(norm_slots_on_device.data());
-  check_launch("measure_features");
+  add_feature_aids(exec, feature_slots);
   fill_scoring_data(exec, out, closest.geometry);
   const Counts* counted = exec.download(counts.data(), clouds_count);
   exec.synchronize();

@@ -3,6 +3,7 @@
 
 #include <vector>
 
+#include "algorithm/fpfh.hpp"
 #include "exec.hpp"
 
 namespace gpureg::cuda {
@@ -17,8 +18,8 @@ struct FeatureQuery {
   std::uint32_t row_count;
   std::uint32_t dimension;
   std::uint32_t out;  ///< where its answers begin
-  const float2* query_norm;        ///< squared length and length
-  const float2* row_norm;          ///< infinite where the row is not valid
+  const float2* query_norm;        ///< squared length and length, of the difference to a constant where that makes them shorter
+  const float2* row_norm;          ///< infinite where the row is not valid, or equal to one before it
   const std::uint32_t* query_tf32;  ///< see filter_width(); null: not made
   const std::uint32_t* row_tf32;
   const float* query_padded;        ///< rows as wide, not rounded
@@ -31,6 +32,10 @@ DeviceBuffer<std::uint32_t> nearest_features(Exec& exec, const std::vector<Featu
 
 /// Rows are cut into parts only where the queries alone do not fill the device: rows per part, a multiple of the tile.
 std::uint32_t rows_of_part(const Exec& exec, std::size_t query_blocks, std::uint32_t most_rows, std::uint32_t tile);
+
+/// Most features of rooms are near that of a plane. Distances do not change when it is taken off both features, but the lengths that the
+/// rounding of their product grows with do.
+GPUREG_HD float center_of_fpfh(std::uint32_t d) { return d < kFpfhSize && d % kFpfhBins == kFpfhBins / 2 ? 100.0f : 0.0f; }
 
 /// Features for the tensor cores: rounded to tf32, rows padded with zeros to this width, zero where not valid. 0: too many dimensions.
 inline std::uint32_t filter_width(std::uint32_t dimension) { return dimension <= 16 ? 16 : dimension <= 40 ? 40 : dimension <= 64 ? 64 : 0; }

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Alignment on both backends, stage by stage: the same bits after each.
+#include "algorithm/fpfh.hpp"
 #include "cuda/gpu.hpp"
 #include "cpu/stages.hpp"
 #include "stages.hpp"
@@ -196,6 +197,39 @@ TEST_F(AlignOnCuda, FeaturesOfTheCaller) {
       expect_same_alignment(clouds, {{0, 1, {}, {}}, {4, 0, {}, {}}, {5, 0, {}, {}}}, options);
       options.hypothesis.mutual = !options.hypothesis.mutual;
     }
+}
+
+// Features of the library and of the caller have bounds of different kinds, but may be as long.
+TEST_F(AlignOnCuda, FeaturesOfTheCallerAgainstThoseOfTheLibrary) {
+  std::normal_distribution<float> normal(20, 15);
+  std::vector<std::vector<float>> features;
+  auto clouds = raw();
+  for (const std::size_t c : {std::size_t(0), std::size_t(4)}) {
+    features.emplace_back(clouds[c].size * kFpfhSize);
+    for (float& f : features.back()) f = normal(random);
+    clouds[c].features = features.back().data(), clouds[c].feature_dimension = clouds[c].feature_stride = kFpfhSize;
+  }
+  options.prepare.voxel_size = 0.12f;
+  options.hypothesis.count = 5'000;
+  expect_same_alignment(clouds, {{0, 1, {}, {}}, {1, 4, {}, {}}, {0, 4, {}, {}}, {1, 2, {}, {}}}, options);
+}
+
+// Thousands of equal features, of which the first is the answer.
+TEST_F(AlignOnCuda, WallsWithoutNoise) {
+  std::vector<std::vector<Vec3>> rooms(2);
+  std::uniform_real_distribution<float> along(0, 3);
+  for (auto& room : rooms)
+    for (int k = 0; k < 40'000; ++k) {
+      const float a = along(random), b = along(random);
+      room.push_back(k % 3 == 0 ? Vec3{a, b, 0} : k % 3 == 1 ? Vec3{a, 0, b} : Vec3{0, a, b});
+    }
+  kept = rooms;
+  pairs = {{0, 1, {}, {}}, {1, 0, {}, {}}, {0, 0, {}, {}}};
+  options.hypothesis.count = 5'000;
+  for (const bool mutual : {false, true}) {
+    options.hypothesis.mutual = mutual;
+    expect_same_alignment(raw(), pairs, options);
+  }
 }
 
 TEST_F(AlignOnCuda, MoreMatchesThanSharedMemoryHolds) {
