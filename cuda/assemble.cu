@@ -1,5 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include <cuda_fp16.h>
+
 #include <array>
+#include <limits>
 
 #include "algorithm/balance.hpp"
 #include "algorithm/fpfh.hpp"
@@ -10,6 +13,8 @@
 
 namespace gpureg::cuda {
 namespace {
+
+constexpr float kInfinity = std::numeric_limits<float>::infinity();
 
 /// One array on its way into a cloud's own memory.
 struct Part {
@@ -40,12 +45,17 @@ struct Counts {
 struct FeatureSlot {
   const float* features;
   const std::uint8_t* valid;
-  std::uint32_t size, dimension, width;
+  std::uint32_t size, dimension, half_width, padded_width;
   FeatureAids aids;
+  std::uint32_t* largest;     // bits of the greatest magnitude of all values
+  std::uint32_t* extreme;
   std::uint32_t* first;       // table of `places`: lowest index of a row with this hash
   std::uint32_t places;
-  std::uint32_t* extreme;
 };
+
+__device__ float component(const FeatureSlot& s, const float* row, std::uint32_t d) {
+  return d < s.dimension ? row[d] - (s.aids.centred ? center_of_fpfh(d) : 0.0f) : 0.0f;
+}
 
 __device__ std::uint32_t place_of(const FeatureSlot& s, const float* row) {
   std::uint32_t hash = 2166136261u;
@@ -53,27 +63,49 @@ __device__ std::uint32_t place_of(const FeatureSlot& s, const float* row) {
   return hash % s.places;
 }
 
-/// Rounded to 10 bits of mantissa, as the tensor cores take them; ties away from zero.
-__device__ std::uint32_t to_tf32(float v) { return (__float_as_uint(v) + 0x1000u) & ~0x1fffu; }
+__global__ void find_largest(const FeatureSlot* slots) {
+  const FeatureSlot s = slots[blockIdx.y];
+  if (s.aids.centred) return;  // at most 100
+  std::uint32_t largest = 0;
+  for (std::uint32_t i = blockIdx.x * blockDim.x + threadIdx.x; i < s.size; i += gridDim.x * blockDim.x)
+    for (std::uint32_t d = 0; s.valid[i] && d < s.dimension; ++d)
+      largest = max(largest, __float_as_uint(fabsf(component(s, s.features + static_cast<std::size_t>(i) * s.dimension, d))));
+  largest = warp_max(largest);
+  if (threadIdx.x % 32 == 0) atomicMax(s.largest, largest);
+}
 
-/// What the feature search reads beside the features: their lengths, and copies for the tensor cores.
+/// The power of two that brings the greatest value to between 512 and 1024, which binary16 can hold. Lengths stay within float32's range.
+__device__ float scale_to_half(std::uint32_t largest) {
+  const int exponent = 136 - static_cast<int>(largest >> 23);
+  return __uint_as_float(static_cast<std::uint32_t>(127 + max(-40, min(40, exponent))) << 23);
+}
+
+/// What the feature search reads beside the features: copies for the tensor cores, and how far off their products may be.
 __global__ void measure_features(const FeatureSlot* slots) {
   const FeatureSlot s = slots[blockIdx.y];
+  const float scale = s.aids.centred ? 8.0f : scale_to_half(*s.largest);
   std::uint32_t extreme = 0;
   for (std::uint32_t i = blockIdx.x * blockDim.x + threadIdx.x; i < s.size; i += gridDim.x * blockDim.x) {
     const float* row = s.features + static_cast<std::size_t>(i) * s.dimension;
-    float sum = 0.0f;
-    for (std::uint32_t d = 0; d < s.width; ++d) {
-      const float v = s.valid[i] && d < s.dimension ? row[d] : 0.0f, centred = v - (s.valid[i] && s.aids.centred ? center_of_fpfh(d) : 0.0f);
-      sum = fmaf(centred, centred, sum);
-      s.aids.tf32[static_cast<std::size_t>(i) * s.width + d] = to_tf32(centred);
-      s.aids.padded[static_cast<std::size_t>(i) * s.width + d] = v;
+    const bool valid = s.valid[i];
+    float square = 0.0f, lost = 0.0f;
+    for (std::uint32_t d = 0; d < s.half_width; ++d) {
+      const float v = valid ? component(s, row, d) * scale : 0.0f;
+      const __half h = __float2half_rn(v);
+      const float difference = v - __half2float(h);
+      square = fmaf(v, v, square);
+      lost = fmaf(difference, difference, lost);
+      s.aids.half[static_cast<std::size_t>(i) * s.half_width + d] = __half_as_ushort(h);
     }
-    if (!s.valid[i]) sum = __uint_as_float(0x7f800000u);
-    s.aids.norm[i] = make_float2(sum, sqrtf(sum));
-    if (s.valid[i]) atomicMin(s.first + place_of(s, row), i);
-    extreme += s.valid[i] && !(sum < 1e30f);
+    for (std::uint32_t d = 0; d < s.padded_width; ++d)
+      s.aids.padded[static_cast<std::size_t>(i) * s.padded_width + d] = valid && d < s.dimension ? row[d] : 0.0f;
+    const float error = product_error(square, lost);
+    s.aids.error[i] = error;
+    s.aids.square[i] = valid ? make_float2(square - error, square + error) : make_float2(kInfinity, kInfinity);
+    if (valid) atomicMin(s.first + place_of(s, row), i);
+    extreme += valid && !(square < 1e30f * (scale * scale));
   }
+  if (blockIdx.x == 0 && threadIdx.x == 0) *s.aids.scale = scale;
   if (extreme > 0) atomicAdd(s.extreme, extreme);
 }
 
@@ -89,8 +121,7 @@ __global__ void find_repeated_features(const FeatureSlot* slots) {
       const float* other = s.features + static_cast<std::size_t>(first) * s.dimension;
       for (std::uint32_t d = 0; repeats && d < s.dimension; ++d) repeats = row[d] == other[d];
     }
-    constexpr float kInfinity = 3.402823466e38f * 2.0f;
-    s.aids.row_norm[i] = repeats ? make_float2(kInfinity, kInfinity) : s.aids.norm[i];
+    if (repeats) s.aids.square[i] = make_float2(kInfinity, kInfinity);
   }
 }
 
@@ -142,10 +173,13 @@ void add_feature_aids(Exec& exec, std::vector<FeatureSlot>& slots) {
   std::size_t places = 0;
   for (const FeatureSlot& s : slots) places += s.places;
   const auto first = exec.filled<std::uint32_t>(places, 0xff);
+  const auto largest = exec.filled<std::uint32_t>(slots.size(), 0);
   std::uint32_t* at = first.data();
-  for (FeatureSlot& s : slots) s.first = at, at += s.places;
+  for (std::size_t k = 0; k < slots.size(); ++k) slots[k].first = at, at += slots[k].places, slots[k].largest = largest.data() + k;
   const auto on_device = exec.upload(slots);
   const dim3 grid(16, static_cast<unsigned>(slots.size()));
+  find_largest<<<grid, 256, 0, exec.stream()>>>(on_device.data());
+  check_launch("find_largest");
   measure_features<<<grid, 256, 0, exec.stream()>>>(on_device.data());
   check_launch("measure_features");
   find_repeated_features<<<grid, 256, 0, exec.stream()>>>(on_device.data());
@@ -214,12 +248,14 @@ std::vector<std::shared_ptr<CudaCloud>> assemble(Exec& exec, const DownsampledCl
       bytes += (more + 255) / 256 * 256;
       return at;
     };
-    const std::uint32_t width = filter_width(cloud->feature_dimension), wide_width = has_wide ? filter_width(wide_features.dimension[c]) : 0;
-    const auto reserve_aids = [&](std::uint32_t columns) {
-      const std::size_t rows = columns > 0 ? n : 0, norm = reserve(rows * sizeof(float2)), row_norm = reserve(rows * sizeof(float2));
-      return std::array<std::size_t, 4>{norm, row_norm, reserve(rows * columns * sizeof(std::uint32_t)), reserve(rows * columns * sizeof(float))};
+    const auto reserve_aids = [&](std::uint32_t dimension) {
+      const std::size_t width = half_width(dimension), rows = width > 0 ? n : 0;
+      std::array<std::size_t, 5> at{};
+      at[0] = reserve(rows * width * sizeof(std::uint16_t)), at[1] = reserve(rows * padded_width(dimension) * sizeof(float));
+      at[2] = reserve(rows * sizeof(float2)), at[3] = reserve(rows * sizeof(float)), at[4] = reserve(sizeof(float));
+      return at;
     };
-    const auto aids = reserve_aids(width), wide_aids = reserve_aids(wide_width);
+    const auto aids = reserve_aids(cloud->feature_dimension), wide_aids = reserve_aids(has_wide ? wide_features.dimension[c] : 0);
     const std::size_t balanced = reserve(n * sizeof(std::uint32_t));
     const std::size_t copied = bytes;
     const ScoringLayout layout = scoring_layout(*cloud, closest.block_range[c]);
@@ -246,13 +282,13 @@ std::vector<std::shared_ptr<CudaCloud>> assemble(Exec& exec, const DownsampledCl
     char* const memory = cloud->data.data();
     balance.push_back(reinterpret_cast<std::uint32_t*>(memory + balanced));
     view.balance = balance.back();
-    const auto measure = [&](FeatureAids& to, const std::array<std::size_t, 4>& at, bool centred, const float* rows, const std::uint8_t* valid,
-                             std::uint32_t columns, std::uint32_t* extreme) {
-      const std::uint32_t padded_width = filter_width(columns);
-      if (padded_width == 0) return;
-      to = {reinterpret_cast<float2*>(memory + at[0]), reinterpret_cast<float2*>(memory + at[1]), reinterpret_cast<float*>(memory + at[3]),
-            reinterpret_cast<std::uint32_t*>(memory + at[2]), centred};
-      feature_slots.push_back({rows, valid, view.size, columns, padded_width, to, nullptr, 4 * view.size + 1, extreme});
+    const auto measure = [&](FeatureAids& to, const std::array<std::size_t, 5>& at, bool centred, const float* rows, const std::uint8_t* valid,
+                             std::uint32_t dimension, std::uint32_t* extreme) {
+      if (half_width(dimension) == 0) return;
+      to = {reinterpret_cast<std::uint16_t*>(memory + at[0]), reinterpret_cast<float*>(memory + at[1]), reinterpret_cast<float2*>(memory + at[2]),
+            reinterpret_cast<float*>(memory + at[3]), reinterpret_cast<float*>(memory + at[4]), centred};
+      feature_slots.push_back({rows, valid, view.size, dimension, half_width(dimension), padded_width(dimension), to, nullptr, extreme, nullptr,
+                               4 * view.size + 1});
     };
     measure(cloud->narrow_aids, aids, facts.feature_dimension == 0, view.features, view.has_feature, view.feature_dimension,
             &counts.data()[c].extreme);
@@ -282,8 +318,8 @@ std::vector<std::shared_ptr<CudaCloud>> assemble(Exec& exec, const DownsampledCl
     cloud.statistics.points_without_feature = counted[c].features;
     for (const std::uint32_t points : counted[c].balance_bin) cloud.balance_total += std::uint64_t(points) * balance_weight(points);
     cloud.view_on_device.balance_total = cloud.balance_total;
-    if (counted[c].extreme > 0) cloud.narrow_aids.tf32 = nullptr;
-    if (counted[c].extreme_wide > 0) cloud.wide_aids.tf32 = nullptr;
+    if (counted[c].extreme > 0) cloud.narrow_aids.half = nullptr;
+    if (counted[c].extreme_wide > 0) cloud.wide_aids.half = nullptr;
   }
   return out;
 }

@@ -13,6 +13,9 @@ namespace {
 constexpr int kThreads = 128, kRows = 4;                        // a thread's matches
 constexpr std::uint32_t kBlockRows = kThreads * kRows;          // a thread block's
 constexpr std::uint32_t kTile = kThreads;                       // matches in shared memory at a time
+constexpr std::uint32_t kHeld = 8;                              // matches that a lane of find_slopes() holds
+constexpr int kDegreeBits = 17;                                 // 0 to 2^16
+constexpr std::uint32_t kMostDegree = (1u << kDegreeBits) - 1;
 constexpr int kStrengthBits = 24;                               // 0 to 2^23, see seed_strength()
 constexpr std::uint32_t kMostStrength = (1u << kStrengthBits) - 2;
 constexpr std::uint32_t kPadding = (2u << kStrengthBits) - 1;   // key after those of all matches
@@ -77,44 +80,48 @@ __global__ void __launch_bounds__(kThreads) count_compatible(SeedBatch b) {
   }
 }
 
-/// Marks the matches that have one with more compatible matches near. Thread blocks (x: matches, y: pair, z: part of the matches
-/// that they are compared with); all that mark a match write the same.
-__global__ void __launch_bounds__(kThreads) find_slopes(SeedBatch b, std::uint32_t part) {
-  __shared__ float4 tile[kTile];
-  const std::uint32_t p = blockIdx.y, n = b.count[p], room = b.room[p], first = blockIdx.x * kBlockRows + threadIdx.x;
-  const std::uint32_t begin = blockIdx.z * part, end = min(n, begin + part);
-  if (blockIdx.x * kBlockRows >= n || begin >= n) return;
-  Vec3 own[kRows];
-  std::uint32_t degree[kRows];
-  bool greater[kRows];
+/// Keys that sort by pair and then by degree, the greatest first.
+__global__ void write_degree_keys(SeedBatch b, std::uint64_t* key, std::uint32_t* match) {
+  const std::uint32_t p = blockIdx.y, n = b.count[p], room = b.room[p], i = blockIdx.x * blockDim.x + threadIdx.x;
+  if (i >= b.room[p + 1] - room) return;
+  const std::uint32_t before = i < n ? kMostDegree - b.degree[room + i] : kMostDegree;
+  key[room + i] = static_cast<std::uint64_t>(p) << kDegreeBits | before;
+  match[room + i] = i;
+}
+
+/// Source points and degrees in that order.
+__global__ void rank_points(SeedBatch b, const std::uint32_t* match, float4* ranked) {
+  const std::uint32_t p = blockIdx.y, room = b.room[p], k = blockIdx.x * blockDim.x + threadIdx.x;
+  if (k >= b.count[p]) return;
+  const std::uint32_t at = room + match[room + k];
+  ranked[room + k] = make_float4(b.matches.px[at], b.matches.py[at], b.matches.pz[at], __uint_as_float(b.degree[at]));
+}
+
+/// Marks the matches that have one with more compatible matches near. Those with many are looked at first, and most matches have one of them
+/// near. A warp takes 32 matches of similar degree: each of its lanes holds others, all compare them with one of the 32 at a time.
+__global__ void __launch_bounds__(kThreads) find_slopes(SeedBatch b, const float4* ranked, const std::uint32_t* match) {
+  const std::uint32_t p = blockIdx.y, n = b.count[p], room = b.room[p], lane = threadIdx.x % 32;
+  const std::uint32_t k = blockIdx.x * kThreads + threadIdx.x, first = k - lane;
+  if (first >= n) return;
+  const float4 own = ranked[room + min(k, n - 1)];
+  unsigned open = __ballot_sync(~0u, k < n);
+  // Behind the warp's own no degree is greater.
+  for (std::uint32_t base = 0; open != 0 && base < min(n, first + 32); base += 32 * kHeld) {
+    float4 other[kHeld];
 #pragma unroll
-  for (int r = 0; r < kRows; ++r) {
-    const std::uint32_t i = first + static_cast<std::uint32_t>(r) * kThreads;
-    const std::uint32_t at = room + min(i, n - 1);
-    own[r] = {b.matches.px[at], b.matches.py[at], b.matches.pz[at]};
-    degree[r] = b.degree[at];
-    greater[r] = false;
-  }
-  for (std::uint32_t base = begin; base < end; base += kTile) {
-    const std::uint32_t size = min(kTile, end - base);
-    __syncthreads();
-    for (std::uint32_t k = threadIdx.x; k < size; k += kThreads) {
-      const std::size_t at = room + base + k;
-      tile[k] = make_float4(b.matches.px[at], b.matches.py[at], b.matches.pz[at], __uint_as_float(b.degree[at]));
+    for (std::uint32_t h = 0; h < kHeld; ++h) other[h] = ranked[room + min(base + h * 32 + lane, n - 1)];
+    for (unsigned left = open; left != 0; left &= left - 1) {
+      const int l = __ffs(static_cast<int>(left)) - 1;
+      const Vec3 point{__shfl_sync(~0u, own.x, l), __shfl_sync(~0u, own.y, l), __shfl_sync(~0u, own.z, l)};
+      const std::uint32_t degree = __float_as_uint(__shfl_sync(~0u, own.w, l));
+      bool greater = false;
+#pragma unroll
+      for (std::uint32_t h = 0; h < kHeld; ++h)
+        greater |= (__float_as_uint(other[h].w) > degree) & (squared_norm(Vec3{other[h].x, other[h].y, other[h].z} - point) < b.squared_separation);
+      if (__any_sync(~0u, greater)) open &= ~(1u << l);
     }
-    __syncthreads();
-    for (std::uint32_t k = 0; k < size; ++k) {
-      const float4 other = tile[k];
-#pragma unroll
-      for (int r = 0; r < kRows; ++r)
-        greater[r] |= (__float_as_uint(other.w) > degree[r]) & (squared_norm(Vec3{other.x, other.y, other.z} - own[r]) < b.squared_separation);
-    }
   }
-#pragma unroll
-  for (int r = 0; r < kRows; ++r) {
-    const std::uint32_t i = first + static_cast<std::uint32_t>(r) * kThreads;
-    if (i < n && greater[r]) b.slope[room + i] = 1;
-  }
+  if (k < n && (open >> lane & 1) == 0) b.slope[room + match[room + k]] = 1;
 }
 
 /// Keys that sort by pair and then as seed_key() does, the best first; equals keep their order, which is that of the matches.
@@ -151,18 +158,21 @@ Seeds choose_seeds(Exec& exec, const MatchSets& matches, const CompatibilityOpti
   const auto slope = exec.filled<std::uint8_t>(total, 0);
   const SeedBatch batch{matches.view(), matches.room.on_device.data(), matches.count.data(), test_of(options),
                         options.seed_separation * options.seed_separation, degree.data(), slope.data()};
-  // Few pairs alone do not fill the device: then their matches are compared in parts.
-  const std::size_t blocks = std::size_t(blocks_for(largest, kBlockRows)) * pairs, wanted = static_cast<std::size_t>(exec.multiprocessors()) * 16;
-  const std::uint32_t parts = static_cast<std::uint32_t>(std::max<std::size_t>(1, std::min<std::size_t>(blocks_for(largest, kTile), wanted / blocks)));
-  const std::uint32_t part = blocks_for(blocks_for(largest, parts), kTile) * kTile;
   const unsigned ranges = blocks_for(largest, kBlockRows);
   count_compatible<<<dim3(ranges, ranges, pair_count), kThreads, 0, exec.stream()>>>(batch);
   check_launch("count_compatible");
-  find_slopes<<<dim3(ranges, pair_count, blocks_for(largest, part)), kThreads, 0, exec.stream()>>>(batch, part);
-  check_launch("find_slopes");
   auto key = exec.buffer<std::uint64_t>(total);
   auto match = exec.buffer<std::uint32_t>(total);
-  write_keys<<<dim3(blocks_for(largest, 256), pair_count), 256, 0, exec.stream()>>>(batch, key.data(), match.data());
+  const auto ranked = exec.buffer<float4>(total);
+  const dim3 grid(blocks_for(largest, 256), pair_count);
+  write_degree_keys<<<grid, 256, 0, exec.stream()>>>(batch, key.data(), match.data());
+  check_launch("write_degree_keys");
+  sort_pairs(exec, key, match, kDegreeBits + bits_for(pairs));
+  rank_points<<<grid, 256, 0, exec.stream()>>>(batch, match.data(), ranked.data());
+  check_launch("rank_points");
+  find_slopes<<<dim3(blocks_for(largest, kThreads), pair_count), kThreads, 0, exec.stream()>>>(batch, ranked.data(), match.data());
+  check_launch("find_slopes");
+  write_keys<<<grid, 256, 0, exec.stream()>>>(batch, key.data(), match.data());
   check_launch("write_keys");
   sort_pairs(exec, key, match, kStrengthBits + 1 + bits_for(pairs));
   take_seeds<<<dim3(blocks_for(out.most, 256), pair_count), 256, 0, exec.stream()>>>(batch, match.data(), out.most, out.match.data(), out.count.data());

@@ -40,7 +40,7 @@ CloudArrays CloudArrays::moved(const char* from, char* to) const {
   move(s.block), move(s.word), move(s.list), move(s.candidate), move(s.code);
   move(out.order.point), move(out.order.normal), move(out.order.index);
   move(v.wide_features), move(v.has_wide_feature), move(v.balance), move(v.visibility.depth), move(v.visibility.viewpoints);
-  for (FeatureAids* aids : {&out.narrow_aids, &out.wide_aids}) move(aids->norm), move(aids->row_norm), move(aids->padded), move(aids->tf32);
+  for (FeatureAids* aids : {&out.narrow_aids, &out.wide_aids}) move(aids->half), move(aids->padded), move(aids->square), move(aids->error), move(aids->scale);
   return out;
 }
 

@@ -150,7 +150,7 @@ DeviceBuffer<std::uint32_t> nearest_features(Exec& exec, const std::vector<Featu
   // All bits set is greater than every answer, and its index is kNoValue.
   auto best = exec.filled<unsigned long long>(answers, 0xff);
   bool filterable = exec.compute_capability() >= 80;
-  for (const FeatureQuery& f : queries) filterable = filterable && f.query_tf32 && f.row_tf32 && f.dimension == queries[0].dimension;
+  for (const FeatureQuery& f : queries) filterable = filterable && f.query_half && f.row_half && f.dimension == queries[0].dimension;
   if (filterable) {
     filter_nearest(exec, batch.data(), entries, most_queries, most_rows, queries[0].dimension, answers, best.data());
   } else {

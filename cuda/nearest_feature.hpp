@@ -18,12 +18,11 @@ struct FeatureQuery {
   std::uint32_t row_count;
   std::uint32_t dimension;
   std::uint32_t out;  ///< where its answers begin
-  const float2* query_norm;        ///< squared length and length, of the difference to a constant where that makes them shorter
-  const float2* row_norm;          ///< infinite where the row is not valid, or equal to one before it
-  const std::uint32_t* query_tf32;  ///< see filter_width(); null: not made
-  const std::uint32_t* row_tf32;
-  const float* query_padded;        ///< rows as wide, not rounded
-  const float* row_padded;
+  const std::uint16_t *query_half, *row_half;  ///< see FeatureAids; null: not made
+  const float *query_padded, *row_padded;
+  const float* query_error;
+  const float2* row_square;
+  const float *query_scale, *row_scale;
 };
 
 /// Nearest rows of every query: k indices per query in order of distance (squared norm of the difference as a chain of fmaf over the
@@ -37,8 +36,22 @@ std::uint32_t rows_of_part(const Exec& exec, std::size_t query_blocks, std::uint
 /// rounding of their product grows with do.
 GPUREG_HD float center_of_fpfh(std::uint32_t d) { return d < kFpfhSize && d % kFpfhBins == kFpfhBins / 2 ? 100.0f : 0.0f; }
 
-/// Features for the tensor cores: rounded to tf32, rows padded with zeros to this width, zero where not valid. 0: too many dimensions.
-inline std::uint32_t filter_width(std::uint32_t dimension) { return dimension <= 16 ? 16 : dimension <= 40 ? 40 : dimension <= 64 ? 64 : 0; }
+/// Let v be a feature, v' what binary16 makes of it, square = |v|^2 and lost = |v - v'|^2. Then for every two features
+///   | |a - b|^2 - (|a|^2 + |b|^2 - 2 a'.b') |  <=  product_error(a) + product_error(b),
+/// since 2 (a.b - a'.b') = 2 a.(b - b') + 2 (a - a').b - 2 (a - a').(b - b'), and 2 x.y <= s |x|^2 + |y|^2 / s for every s > 0; this s makes
+/// it least for what rounding to 11 bits loses on average. The last term is for the roundings of float32: of the squares, of the products'
+/// sums, and of the distance itself.
+GPUREG_HD float product_error(float square, float lost) {
+  constexpr float kSpread = 2e-4f, kRounding = 2e-5f;
+  return (kSpread + kRounding) * square + (1.0f / kSpread + 2.0f) * lost;
+}
+
+/// Features for the tensor cores: rows padded with zeros to this width, zero where not valid. 0: too many dimensions.
+inline std::uint32_t half_width(std::uint32_t dimension) { return dimension <= 64 ? (dimension + 15) / 16 * 16 : 0; }
+/// The same for those that distances are measured of.
+inline std::uint32_t padded_width(std::uint32_t dimension) {
+  return dimension > 64 ? 0 : dimension > 32 && dimension <= 36 ? 36 : half_width(dimension);
+}
 
 /// For k = 1: the tensor cores tell which rows can be the nearest, and only those are measured exactly. Folds (distance, index) into `best`
 /// by atomicMin, as the plain search does. batch is on the device; all entries have these dimensions. Needs compute capability 8.0.

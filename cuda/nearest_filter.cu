@@ -1,27 +1,26 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include <cuda_fp16.h>
 #include <cuda_pipeline.h>
 
 #include <algorithm>
 
 #include "nearest_feature.hpp"
 
-// Exact nearest features at the speed of the tensor cores. |q - r|^2 = |q|^2 + |r|^2 - 2 q.r, and the product of two vectors rounded to
-// tf32 is off by less than 2^-10 |q| |r|: so for each query an upper bound of its nearest distance comes out of a first pass over all
-// rows, and a second pass lists the rows whose lower bound is not above it (16 of 5,000 for FPFH). Those are measured by the very chain of
-// fmaf that defines the distance, so the answer has the bits of an exhaustive search.
+// Exact nearest features at the speed of the tensor cores. |q - r|^2 = |q|^2 + |r|^2 - 2 q.r, and what rounding q and r to binary16 does to
+// that is bounded by a term of q and a term of r (product_error()). So for each query an upper bound of its nearest distance comes out of a
+// first pass over all rows, and a second pass lists the rows whose lower bound is not above it (4 of 5,000 for FPFH). Those are measured by
+// the very chain of fmaf that defines the distance, so the answer has the bits of an exhaustive search.
 namespace gpureg::cuda {
 namespace {
 
 constexpr int kWarps = 8;
 constexpr int kThreads = 32 * kWarps;
-constexpr int kQueriesPerWarp = 32;
+constexpr int kTiles = 4;                          // of 16 queries, of a warp
+constexpr int kQueriesPerWarp = 16 * kTiles;
 constexpr int kQueries = kWarps * kQueriesPerWarp;
-constexpr int kRows = 64;            // of a tile in shared memory
-constexpr int kQueue = 32 + 8 * 32;  // what waits plus what one step can add
-/// Of |q| |r|: twice the rounding of the product, and room for the sums.
-constexpr float kProductError = 2.0f / 1024.0f * 1.02f;
-/// Of |r|^2 and |q|^2: rounding of norms and of the distance itself.
-constexpr float kNormError = 1e-5f;
+constexpr int kRows = 64;                          // of a tile in shared memory
+constexpr int kQueue = 32 + 8 * kQueriesPerWarp;   // what waits plus what one step can add
+constexpr int kRowBits = 26;                       // of an entry of the queue; the rest: the query
 
 struct FilterBatch {
   const FeatureQuery* queries;
@@ -37,15 +36,35 @@ __device__ std::int32_t ordered(float v) {
 __device__ float from_ordered(std::int32_t v) { return __int_as_float(v ^ ((v >> 31) & 0x7fffffff)); }
 
 #if !defined(__CUDA_ARCH__) || __CUDA_ARCH__ >= 800
-__device__ void multiply_add(float (&c)[4], const std::uint32_t (&a)[4], std::uint32_t b0, std::uint32_t b1) {
-  asm("mma.sync.aligned.m16n8k8.row.col.f32.tf32.tf32.f32 {%0,%1,%2,%3}, {%4,%5,%6,%7}, {%8,%9}, {%0,%1,%2,%3};"
-      : "+f"(c[0]), "+f"(c[1]), "+f"(c[2]), "+f"(c[3])
-      : "r"(a[0]), "r"(a[1]), "r"(a[2]), "r"(a[3]), "r"(b0), "r"(b1));
+/// d = c + a b
+__device__ void multiply_add(float (&d)[4], const std::uint32_t (&a)[4], const std::uint32_t* b, const float (&c)[4]) {
+  asm("mma.sync.aligned.m16n8k16.row.col.f32.f16.f16.f32 {%0,%1,%2,%3}, {%4,%5,%6,%7}, {%8,%9}, {%10,%11,%12,%13};"
+      : "=f"(d[0]), "=f"(d[1]), "=f"(d[2]), "=f"(d[3])
+      : "r"(a[0]), "r"(a[1]), "r"(a[2]), "r"(a[3]), "r"(b[0]), "r"(b[1]), "f"(c[0]), "f"(c[1]), "f"(c[2]), "f"(c[3]));
 }
 #else
 // Never launched there.
-__device__ void multiply_add(float (&)[4], const std::uint32_t (&)[4], std::uint32_t, std::uint32_t) {}
+__device__ void multiply_add(float (&)[4], const std::uint32_t (&)[4], const std::uint32_t*, const float (&)[4]) {}
 #endif
+
+/// The lane's parts of 8 rows: b[2 s], b[2 s + 1] for step s. Matrices of 8 rows and 8 columns, of which lane l says where row l % 8 of matrix
+/// l / 8 begins.
+template <int kSteps>
+__device__ void load_rows(std::uint32_t (&b)[2 * kSteps], const std::uint32_t* tile, int stride, int lane) {
+  const std::uint32_t* row = tile + lane % 8 * stride + lane / 8 * 4;
+#pragma unroll
+  for (int s = 0; s + 1 < kSteps; s += 2)
+    asm volatile("ldmatrix.sync.aligned.m8n8.x4.shared.b16 {%0,%1,%2,%3}, [%4];"
+                 : "=r"(b[2 * s]), "=r"(b[2 * s + 1]), "=r"(b[2 * s + 2]), "=r"(b[2 * s + 3])
+                 : "r"(static_cast<std::uint32_t>(__cvta_generic_to_shared(row + s * 8)))
+                 : "memory");
+  // Addresses of lanes from 16 on do not count.
+  if (kSteps % 2 == 1)
+    asm volatile("ldmatrix.sync.aligned.m8n8.x2.shared.b16 {%0,%1}, [%2];"
+                 : "=r"(b[2 * kSteps - 2]), "=r"(b[2 * kSteps - 1])
+                 : "r"(static_cast<std::uint32_t>(__cvta_generic_to_shared(tile + lane % 8 * stride + lane / 8 % 2 * 4 + (kSteps - 1) * 8)))
+                 : "memory");
+}
 
 /// The distance that everything is about. The zeros at the end of a row change nothing.
 template <int kWidth>
@@ -67,14 +86,14 @@ __device__ void measure(const FeatureQuery& f, std::uint32_t q, std::uint32_t r,
   if (found < best[f.out + q]) atomicMin(best + f.out + q, found);
 }
 
-/// kSteps: dimensions over 8. First pass (kCollect false): bounds; second: the rows within them. Blocks: x queries, y part of the rows, z
+/// kSteps: dimensions over 16. First pass (kCollect false): bounds; second: the rows within them. Blocks: x queries, y part of the rows, z
 /// entry.
-template <int kSteps, bool kCollect>
+template <int kSteps, int kWidth, bool kCollect>
 __global__ void __launch_bounds__(kThreads, 2) filter(FilterBatch batch) {
-  constexpr int kWidth = kSteps * 8, kStride = kWidth + 4;  // lanes of a fragment read 32 different banks
+  constexpr int kWords = kSteps * 8, kStride = kWords + 4;  // 8 rows begin in 8 different quarters of the banks
   constexpr float kInfinity = 3.402823466e38f * 2.0f;
   __shared__ __align__(16) std::uint32_t tile[2][kRows * kStride];
-  __shared__ __align__(16) float2 norm[2][kRows];
+  __shared__ __align__(16) float square[2][kRows];
   __shared__ std::uint32_t queue[kCollect ? kWarps : 1][kQueue];
   __shared__ std::uint32_t queued[kWarps];
   const FeatureQuery f = batch.queries[blockIdx.z];
@@ -86,37 +105,41 @@ __global__ void __launch_bounds__(kThreads, 2) filter(FilterBatch batch) {
 
   const auto fetch = [&](std::uint32_t base, int buffer) {
     for (int k = static_cast<int>(threadIdx.x); k < kRows * kSteps * 2; k += kThreads) {
-      const int row = k / (kSteps * 2), part = k % (kSteps * 2) * 4;
+      const int row = k / (kSteps * 2), part = k % (kSteps * 2);
       const std::uint32_t r = min(base + static_cast<std::uint32_t>(row), f.row_count - 1);
-      __pipeline_memcpy_async(&tile[buffer][row * kStride + part], f.row_tf32 + static_cast<std::size_t>(r) * kWidth + part, 16);
+      __pipeline_memcpy_async(&tile[buffer][row * kStride + part * 4], f.row_half + static_cast<std::size_t>(r) * (kSteps * 16) + part * 8, 16);
     }
     if (threadIdx.x < kRows) {
       const std::uint32_t r = base + threadIdx.x;
       if (r < r_last)
-        __pipeline_memcpy_async(&norm[buffer][threadIdx.x], f.row_norm + r, sizeof(float2));
+        __pipeline_memcpy_async(&square[buffer][threadIdx.x], kCollect ? &f.row_square[r].x : &f.row_square[r].y, sizeof(float));
       else
-        norm[buffer][threadIdx.x] = make_float2(kInfinity, kInfinity);
+        square[buffer][threadIdx.x] = kInfinity;
     }
     __pipeline_commit();
   };
   fetch(r_first, 0);
 
-  // Two tiles of 16 queries; this lane holds parts of queries row_of_lane and row_of_lane + 8 of each.
-  std::uint32_t a[2][kSteps][4];
-  float length[4], limit[4];
+  // Tiles of 16 queries, times -2; this lane holds parts of queries row_of_lane and row_of_lane + 8 of each.
+  std::uint32_t a[kTiles][kSteps][4];
+  float limit[2 * kTiles];
+  // Squares of rows in the unit of the products.
+  const float unit = *f.query_scale / *f.row_scale;
 #pragma unroll
-  for (int m = 0; m < 4; ++m) {
+  for (int m = 0; m < 2 * kTiles; ++m) {
     const std::uint32_t q = q_first + static_cast<std::uint32_t>(m * 8 + row_of_lane);
     const bool asks = q < f.query_count && f.query_valid[q];
-    const float2 n = asks ? f.query_norm[q] : make_float2(0, 0);
-    length[m] = n.y * kProductError;
     limit[m] = kCollect ? -kInfinity : kInfinity;
-    if (kCollect && asks) limit[m] = from_ordered(batch.bound[f.out + q]) + 2.0f * kNormError * n.x + 1e-30f;
+    if (kCollect && asks) limit[m] = from_ordered(batch.bound[f.out + q]) + 2.0f * f.query_error[q] / unit + 1e-30f * (*f.query_scale * *f.row_scale);
+    const std::uint32_t* query = reinterpret_cast<const std::uint32_t*>(f.query_half) + static_cast<std::size_t>(q) * kWords + k_of_lane;
 #pragma unroll
     for (int s = 0; s < kSteps; ++s)
 #pragma unroll
-      for (int half = 0; half < 2; ++half)
-        a[m / 2][s][m % 2 + 2 * half] = asks ? f.query_tf32[static_cast<std::size_t>(q) * kWidth + s * 8 + half * 4 + k_of_lane] : 0u;
+      for (int half = 0; half < 2; ++half) {
+        const std::uint32_t two = asks ? query[s * 8 + half * 4] : 0u;
+        const __half2 doubled = __hmul2(*reinterpret_cast<const __half2*>(&two), __floats2half2_rn(-2.0f, -2.0f));
+        a[m / 2][s][m % 2 + 2 * half] = *reinterpret_cast<const std::uint32_t*>(&doubled);
+      }
   }
 
   int buffer = 0;
@@ -129,43 +152,35 @@ __global__ void __launch_bounds__(kThreads, 2) filter(FilterBatch batch) {
     __syncthreads();
 #pragma unroll 2
     for (int n0 = 0; n0 < kRows; n0 += 8) {
-      float c[2][4] = {{0, 0, 0, 0}, {0, 0, 0, 0}};
-      const std::uint32_t* fragment = tile[buffer] + (n0 + row_of_lane) * kStride + k_of_lane;
+      std::uint32_t b[2 * kSteps];
+      load_rows<kSteps>(b, tile[buffer] + n0 * kStride, kStride, lane);
+      // Of each result this lane has the columns 2 k_of_lane and 2 k_of_lane + 1. Rows that are not to be found have infinite squares, which no
+      // comparison lets through.
+      const float2 two = *reinterpret_cast<const float2*>(&square[buffer][n0 + 2 * k_of_lane]);
+      const float start[4] = {two.x * unit, two.y * unit, two.x * unit, two.y * unit};
+      float c[kTiles][4];
 #pragma unroll
-      for (int s = 0; s < kSteps; ++s) {
-        const std::uint32_t b0 = fragment[s * 8], b1 = fragment[s * 8 + 4];
-        multiply_add(c[0], a[0][s], b0, b1);
-        multiply_add(c[1], a[1][s], b0, b1);
+      for (int t = 0; t < kTiles; ++t) multiply_add(c[t], a[t][0], b, start);
+#pragma unroll
+      for (int s = 1; s < kSteps; ++s)
+#pragma unroll
+        for (int t = 0; t < kTiles; ++t) multiply_add(c[t], a[t][s], b + 2 * s, c[t]);
+      if (!kCollect) {
+#pragma unroll
+        for (int m = 0; m < 2 * kTiles; ++m) limit[m] = fminf(limit[m], fminf(c[m / 2][m % 2 * 2], c[m / 2][m % 2 * 2 + 1]));
+        continue;
       }
-      // Of each result this lane has the columns 2 k_of_lane and 2 k_of_lane + 1. Rows that are not valid have infinite norms: their bounds
-      // are infinite or NaN, which no comparison lets through.
-      const float4 n = *reinterpret_cast<const float4*>(&norm[buffer][n0 + 2 * k_of_lane]);
-      // Squares a little longer in the first pass, a little shorter in the second: bounds.
-      const float squared[2] = {n.x * (kCollect ? 1.0f - kNormError : 1.0f + kNormError), n.z * (kCollect ? 1.0f - kNormError : 1.0f + kNormError)};
-      const float row_length[2] = {n.y, n.w};
       bool any = false;
-      float lower[4][2];
 #pragma unroll
-      for (int m = 0; m < 4; ++m)
-#pragma unroll
-        for (int j = 0; j < 2; ++j) {
-          const float middle = fmaf(-2.0f, c[m / 2][m % 2 * 2 + j], squared[j]);
-          if (!kCollect) {
-            limit[m] = fminf(limit[m], fmaf(length[m], row_length[j], middle));
-          } else {
-            lower[m][j] = fmaf(-length[m], row_length[j], middle);
-            any = any || lower[m][j] <= limit[m];
-          }
-        }
-      if (!kCollect) continue;
+      for (int m = 0; m < 2 * kTiles; ++m) any = any | (fminf(c[m / 2][m % 2 * 2], c[m / 2][m % 2 * 2 + 1]) <= limit[m]);
       if (any) {
 #pragma unroll
-        for (int m = 0; m < 4; ++m)
+        for (int m = 0; m < 2 * kTiles; ++m)
 #pragma unroll
           for (int j = 0; j < 2; ++j)
-            if (lower[m][j] <= limit[m])
+            if (c[m / 2][m % 2 * 2 + j] <= limit[m])
               queue[warp][atomicAdd(&queued[warp], 1u)] =
-                  static_cast<std::uint32_t>(m * 8 + row_of_lane) << 27 | (base - r_first + static_cast<std::uint32_t>(n0 + 2 * k_of_lane + j));
+                  static_cast<std::uint32_t>(m * 8 + row_of_lane) << kRowBits | (base - r_first + static_cast<std::uint32_t>(n0 + 2 * k_of_lane + j));
       }
       const bool last = n0 + 8 == kRows && base + kRows >= r_last;
       if (!last && !__any_sync(~0u, any)) continue;
@@ -174,7 +189,7 @@ __global__ void __launch_bounds__(kThreads, 2) filter(FilterBatch batch) {
       if (waiting >= 32 || last) {
         for (std::uint32_t k = static_cast<std::uint32_t>(lane); k < waiting; k += 32) {
           const std::uint32_t entry = queue[warp][k];
-          measure<kWidth>(f, q_first + (entry >> 27), r_first + (entry & 0x7ffffffu), batch.best);
+          measure<kWidth>(f, q_first + (entry >> kRowBits), r_first + (entry & ((1u << kRowBits) - 1)), batch.best);
         }
         __syncwarp();
         if (lane == 0) queued[warp] = 0;
@@ -185,7 +200,7 @@ __global__ void __launch_bounds__(kThreads, 2) filter(FilterBatch batch) {
   }
   if constexpr (!kCollect) {
 #pragma unroll
-    for (int m = 0; m < 4; ++m) {
+    for (int m = 0; m < 2 * kTiles; ++m) {
       limit[m] = fminf(limit[m], __shfl_xor_sync(~0u, limit[m], 1));
       limit[m] = fminf(limit[m], __shfl_xor_sync(~0u, limit[m], 2));
       const std::uint32_t q = q_first + static_cast<std::uint32_t>(m * 8 + row_of_lane);
@@ -194,11 +209,11 @@ __global__ void __launch_bounds__(kThreads, 2) filter(FilterBatch batch) {
   }
 }
 
-template <int kSteps>
+template <int kSteps, int kWidth>
 void run(Exec& exec, dim3 grid, const FilterBatch& batch) {
-  filter<kSteps, false><<<grid, kThreads, 0, exec.stream()>>>(batch);
+  filter<kSteps, kWidth, false><<<grid, kThreads, 0, exec.stream()>>>(batch);
   check_launch("filter, bounds");
-  filter<kSteps, true><<<grid, kThreads, 0, exec.stream()>>>(batch);
+  filter<kSteps, kWidth, true><<<grid, kThreads, 0, exec.stream()>>>(batch);
   check_launch("filter, candidates");
 }
 
@@ -209,13 +224,15 @@ void filter_nearest(Exec& exec, const FeatureQuery* batch, unsigned entries, std
   // Bytes of 0x7f are an integer above every ordered float.
   const auto bound = exec.filled<std::int32_t>(answers, 0x7f);
   const unsigned query_blocks = blocks_for(most_queries, kQueries);
-  const std::uint32_t rows_per_part = std::min(rows_of_part(exec, std::size_t(query_blocks) * entries, most_rows, kRows), 1u << 26);
+  const std::uint32_t rows_per_part = std::min(rows_of_part(exec, std::size_t(query_blocks) * entries, most_rows, kRows), 1u << kRowBits);
   const dim3 grid(query_blocks, blocks_for(most_rows, rows_per_part), entries);
   const FilterBatch filter_batch{batch, rows_per_part, bound.data(), best};
-  switch (filter_width(dimensions)) {
-    case 16: return run<2>(exec, grid, filter_batch);
-    case 40: return run<5>(exec, grid, filter_batch);
-    default: return run<8>(exec, grid, filter_batch);
+  switch (padded_width(dimensions)) {
+    case 16: return run<1, 16>(exec, grid, filter_batch);
+    case 32: return run<2, 32>(exec, grid, filter_batch);
+    case 36: return run<3, 36>(exec, grid, filter_batch);
+    case 48: return run<3, 48>(exec, grid, filter_batch);
+    default: return run<4, 64>(exec, grid, filter_batch);
   }
 }
 

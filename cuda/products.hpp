@@ -115,11 +115,12 @@ struct ScoringOrder {
 
 /// What the search reads beside features, see nearest_feature.hpp. Arrays on the device.
 struct FeatureAids {
-  float2* norm = nullptr;                    ///< squared length and length of each feature; infinite where it is not to be matched
-  float2* row_norm = nullptr;                ///< the same, infinite also where a row before is equal: it is never the answer
-  float* padded = nullptr;                   ///< rows as wide as those of tf32, filled up with zeros
-  std::uint32_t* tf32 = nullptr;             ///< null where the dimension or a length (over 1e15) forbids it
-  bool centred = false;                      ///< norms and tf32 are of the difference to center_of_fpfh()
+  std::uint16_t* half = nullptr;             ///< rounded to binary16, times *scale; null where the dimension or a length (over 1e15) forbids it
+  float* padded = nullptr;                   ///< the rows filled up with zeros
+  float2* square = nullptr;                  ///< bounds of the squared length; infinite where a row is not to be found
+  float* error = nullptr;                    ///< half of the distance of the bounds
+  float* scale = nullptr;                    ///< one for the cloud, a power of two
+  bool centred = false;                      ///< all but padded is of the difference to center_of_fpfh()
 };
 
 /// What the stages read of a fragment: pointers into one piece of memory, and what belongs to them.
