@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "engine.hpp"
 
+#include <algorithm>
 #include <string>
+#include <thread>
 #include <unordered_map>
 
 #include "gpureg/context.hpp"
@@ -36,6 +38,8 @@ CudaEngine::CudaEngine(int device, std::size_t memory_budget) : exec_(device), r
 }
 
 Backend CudaEngine::backend() const { return Backend::cuda; }
+
+unsigned CudaEngine::host_threads() const { return std::max(1u, std::min(8u, std::thread::hardware_concurrency())); }
 
 const void* CudaEngine::memory() const { return &kDeviceMemory; }
 

@@ -14,6 +14,7 @@ class CudaEngine final : public DeviceEngine {
   int device() const { return exec_.device(); }
   Backend backend() const override;
   unsigned threads() const override { return 1; }
+  unsigned host_threads() const override;
   std::string description() const override { return description_; }
   const void* memory() const override;
   std::vector<DeviceMemoryUse> device_memory() const override;

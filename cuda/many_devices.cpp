@@ -5,7 +5,7 @@
 
 #include "engine.hpp"
 #include "gpureg/context.hpp"
-#include "host_threads.hpp"
+#include "pipeline/host_threads.hpp"
 
 namespace gpureg::cuda {
 namespace {
@@ -46,6 +46,7 @@ class EngineOfMany final : public DeviceEngine {
 
   Backend backend() const override { return Backend::cuda; }
   unsigned threads() const override { return static_cast<unsigned>(engines_.size()); }
+  unsigned host_threads() const override { return engines_[0]->host_threads(); }
   std::string description() const override {
     std::string text;
     for (const auto& engine : engines_) text += (text.empty() ? "" : "; ") + engine->description();

@@ -7,7 +7,7 @@
 #include <thread>
 
 #include "check.hpp"
-#include "host_threads.hpp"
+#include "pipeline/host_threads.hpp"
 
 namespace gpureg::cuda {
 namespace {

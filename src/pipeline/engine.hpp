@@ -45,6 +45,8 @@ class Engine {
   virtual ~Engine() = default;
   virtual Backend backend() const = 0;
   virtual unsigned threads() const = 0;
+  /// Threads that may share what the host has to do for many results.
+  virtual unsigned host_threads() const { return threads(); }
   virtual std::string description() const = 0;
   virtual const void* memory() const = 0;      ///< owner of the clouds that this engine can align
   /// How many pairs go through the stages together.

@@ -6,7 +6,7 @@
 #include <thread>
 #include <vector>
 
-namespace gpureg::cuda {
+namespace gpureg {
 
 /// work(thread) on that many threads, the caller's the first. When all are done, throws what the first of them that failed has thrown.
 template <typename Work>
