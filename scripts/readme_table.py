@@ -257,6 +257,16 @@ def confidence():
     return out
 
 
+def accuracy_attempts():
+    record = load("accuracy_attempts.json")
+    scenes = list(record["before"])
+    rows = ["| tried | " + " | ".join(scenes) + " | |", "| --- |" + " --- |" * (len(scenes) + 1)]
+    for entry in [{"tried": "(nothing)", **record["before"]}, *record["attempts"]]:
+        cells = [f"{entry[s][0]:.1f} / {entry[s][1]:.1f}" if s in entry else "" for s in scenes]
+        rows.append(f"| {entry['tried']} | {' | '.join(cells)} | {entry.get('remark', '')} |")
+    return rows
+
+
 def devices():
     context, runs = benchmarks()
     one = runs["redwood_sized/cuda"]
@@ -303,7 +313,7 @@ def floors():
     return out + [f"| judge, refine | {run['ms_judge'] + run['ms_refine']:.4f} | | | |"]
 
 
-TABLES = {"confidence": confidence, "pipeline_house": pipeline_house, "redkitchen": redkitchen, "redkitchen_seeds": redkitchen_seeds, "range_pairs": range_pairs, "other_pairs": other_pairs,
+TABLES = {"accuracy_attempts": accuracy_attempts, "confidence": confidence, "pipeline_house": pipeline_house, "redkitchen": redkitchen, "redkitchen_seeds": redkitchen_seeds, "range_pairs": range_pairs, "other_pairs": other_pairs,
           "peers": peers, "peers_redkitchen": peers_redkitchen, "peers_house": peers_house,
           "peer_parameters": peer_parameters, "fgr": fgr, "redwood": redwood, "speed": speed, "pipeline": pipeline, "devices": devices, "scaling": scaling, "floors": floors}
 
