@@ -49,10 +49,10 @@ struct HypothesisOptions {
 
 /// Candidate poses from matches that keep each other's distances and angles (Proposal::compatibility).
 struct CompatibilityOptions {
-  std::uint32_t max_matches = 12288;  ///< kept per pair, chosen at random where there are more, 4..65536
+  std::uint32_t max_matches = 8192;   ///< kept per pair, chosen at random where there are more, 4..65536
   std::uint32_t seeds = 1024;         ///< matches whose neighbourhoods become candidates, 1..8192
   std::uint32_t max_members = 512;    ///< of a seed's compatible matches, those looked at, 3..1024
-  std::uint32_t triangles = 128;      ///< tried per seed, each of the seed and two compatible members, 1..4096
+  std::uint32_t triangles = 64;       ///< tried per seed, each of the seed and two compatible members, 1..4096
   std::uint32_t refits = 2;           ///< least-squares fits to the members that the best triangle brings together, 1..8
   float tolerance = 0.05f;            ///< metres that the distances of compatible matches may differ by
   float max_turn = 0.5f;              ///< that the cosines of the angles of their normals may differ by, (0, 2]; 2: no test
@@ -65,7 +65,7 @@ struct CompatibilityOptions {
 /// How candidates are judged (Proposal::compatibility): support by matches and by both clouds, and free space.
 struct EvidenceOptions {
   std::uint32_t sample = 512;       ///< about so many points of each cloud judge a candidate at first, 64..65536
-  std::uint32_t modes = 32;         ///< distinct poses refined and judged by all points, 1..64
+  std::uint32_t modes = 24;         ///< distinct poses refined and judged by all points, 1..64
   float max_normal_angle = 30.0f;   ///< degrees between the normals of an inlier
   float mode_angle = 11.5f;         ///< degrees, and ...
   float mode_distance = 0.3f;       ///< ... metres between the cloud's centres, within which two poses are one

@@ -94,8 +94,8 @@ namespace {
 struct Effort {
   std::uint32_t seeds, triangles, modes;
 };
-constexpr Effort kEfforts[kHighestQuality + 1] = {{64, 32, 8},     {128, 48, 12},    {256, 64, 16},    {384, 96, 24},
-                                                  {512, 128, 32},  {1024, 128, 32},  {1536, 128, 32},  {2048, 128, 48},
+constexpr Effort kEfforts[kHighestQuality + 1] = {{64, 32, 8},     {128, 32, 12},    {256, 48, 16},    {384, 64, 16},
+                                                  {512, 64, 24},   {1024, 64, 24},   {1536, 96, 32},   {2048, 128, 48},
                                                   {3072, 192, 48}, {4096, 256, 64},  {8192, 384, 64}};
 
 }  // namespace

@@ -137,7 +137,7 @@ TEST_F(Resume, DamagedJournalsAreRefused) {
   const std::size_t second = text.find('\n') + 1;
   text[second] = '!';
   out_.write("r.log.journal", text);
-  expect_refused(batch("r", {"--resume"}), {journal("r"), "line 2", "damaged"});
+  expect_refused(batch("r", {"--resume", "--quiet"}), {journal("r"), "line 2", "damaged"});
   EXPECT_EQ(content_of(journal("r")), text);
 }
 
