@@ -115,10 +115,15 @@ def peers():
             cells += [percent(own["strict"]["raw_recall"]), f"{percent(own['strict']['recall_at_precision']['95'])}, "
                       f"{percent(own['geometric']['recall_at_precision']['95'])}", f"{own['processor_ms_per_pair']:.0f}"]
         rows.append(f"| {peer_label(entry)} | " + " | ".join(cells) + " |")
-    context, runs = benchmarks()
-    gpu = runs["align_many/cuda_loopsmart/11"]["ms_per_pair"]
-    rows.append(f"| gpureg `loopsmart`, {context['gpu'].rsplit(' ', 1)[0]}, in a batch | as above | as above | {gpu:.2f} (device) | as above | as above | |")
-    return rows + ["", *[made_with(record) for record in records], f"The device's time: `scripts/gpu_check` at commit {context['commit']}, on another machine, so no ratio is meant."]
+    devices = [benchmarks(), benchmarks("pipeline_h200_house_a.json")]
+    for preset in ("default", "loopsmart"):
+        cells = []
+        for _, runs in devices:
+            cells += ["as above", "as above", f"{runs[f'align_many/cuda_{preset}/11']['ms_per_pair']:.2f} (device)"]
+        rows.append(f"| gpureg `{preset}`, {devices[0][0]['gpu'].rsplit(' ', 1)[0]}, in a batch | " + " | ".join(cells) + " |")
+    commits = sorted({context["commit"] for context, _ in devices})
+    return rows + ["", *[made_with(record) for record in records],
+                   f"The device's times: `gpureg_pipeline_bench` on all pairs at commit {', '.join(commits)}, on another machine, so no ratio is meant."]
 
 
 def peers_of(file):
@@ -180,9 +185,9 @@ def redwood():
     return rows + ["", source(record) + f"; seeds {', '.join(map(str, record['seeds']))}."]
 
 
-def benchmarks():
+def benchmarks(file="pipeline_h200.json"):
     """Context and runs by name; of a benchmark that was repeated, the median."""
-    record = load("pipeline_h200.json")
+    record = load(file)
     runs = {run["name"].split("/real_time")[0].split("/iterations")[0]: run for run in record["benchmarks"]
             if run.get("aggregate_name", "median") == "median"}
     return record["context"], runs
@@ -213,9 +218,12 @@ def pipeline():
     rows = [("a prepared pair, `loopsmart`, in a batch of 2,090", "align_many/cuda_loopsmart/11", "ms_per_pair", 0.10),
             ("a pair in the naive mode, one after the other", "paper_mode", "ms_per_pair", None),
             ("a prepared pair on the CPU of the host, in a batch of 190", "align_many/cpu_loopsmart/1", "ms_per_pair", None),
-            ("one prepared pair alone, median of 190", "align_one/cuda_loopsmart", "ms_median", 0.4),
+            ("a prepared pair, `default`, in a batch of 2,090", "align_many/cuda_default/11", "ms_per_pair", 0.4),
+            ("one prepared pair alone, `loopsmart`, median of 190", "align_one/cuda_loopsmart", "ms_median", 0.4),
+            ("one prepared pair alone, `default`, median of 190", "align_one/cuda_default", "ms_median", 2.0),
             ("one pair alone, raw points in host memory to the pose, median of 100", "raw_to_pose/cuda_loopsmart", "ms_median", 3.0),
             ("a fragment prepared, in a batch of 20", "prepare_batch_of_fragments/cuda", "ms_per_fragment", 0.5),
+            ("a fragment prepared for `default`, in a batch of 20", "prepare_batch_of_fragments/cuda_default", "ms_per_fragment", None),
             ("a fragment prepared alone", "prepare_one_fragment/cuda", "ms_per_fragment", 1.5),
             ("the same on the CPU, in a batch of 20", "prepare_batch_of_fragments/cpu", "ms_per_fragment", None),
             ("207 fragments and 5,280 pairs from raw points, cold", "redwood_sized/cuda", "real_time", 1500.0)]
@@ -227,8 +235,7 @@ def pipeline():
 
 
 def pipeline_house():
-    record = load("pipeline_h200_house_a.json")
-    runs = {run["name"].split("/real_time")[0].split("/iterations")[0]: run for run in record["benchmarks"]}
+    context, runs = benchmarks("pipeline_h200_house_a.json")
     stages = ("match", "sample", "fit", "score", "refine", "judge")
     out = ["| | ms | " + " | ".join(stages) + " |", "| --- | --- |" + " --- |" * len(stages)]
     for text, name, key in (("a prepared pair, `default`, in a batch of 13,475", "align_many/cuda_default/11", "ms_per_pair"),
@@ -238,7 +245,6 @@ def pipeline_house():
         run = runs[name]
         out.append(f"| {text} | {run[key]:.2f} | " + " | ".join(f"{run['ms_' + stage]:.3f}" for stage in stages) + " |")
     out.append(f"| a fragment prepared for `default`, in a batch of 50 | {runs['prepare_batch_of_fragments/cuda_default']['ms_per_fragment']:.2f} | | | | | | |")
-    context = record["context"]
     return out + ["", f"{context['scene']}, {runs['align_many/cuda_default/11']['points']:,.0f} points a fragment. Made by `gpureg_pipeline_bench` with"
                   f" `GPUREG_BENCH_SCENE` at commit {context['commit']} on an {context['gpu']} and {context['num_cpus']} cores of its host."]
 
@@ -254,6 +260,16 @@ def confidence():
         of = lambda key: mean(run[key] for run in runs)  # noqa: B023,E731
         out.append(f"| {'known' if model == 'with_free_space' else 'unknown'} | {scene} | {len(runs)} | {of('generated'):.1f} / {of('raw'):.1f} | {of('geo_R@P95'):.1f} / "
                    f"{of('geo_R@P99'):.1f} / {of('geo_AP'):.1f} | {of('strict_R@P95'):.1f} / {of('strict_AP'):.1f} | {of('ECE'):.3f} | {of('right_above_0.9'):.1f} |")
+    return out
+
+
+def agreement():
+    record = load("agreement.json")
+    out = ["| scene | | best right, % | R@P95 / R@P99 / AP, % | ECE | above 0.9 | of them right, % |", "| --- | --- | --- | --- | --- | --- | --- |"]
+    for scene in record["scenes"]:
+        for text, of in (("each pair alone", scene["before"]), ("with agreement", scene["after"])):
+            out.append(f"| {scene['scene']} | {text} | {of['raw_recall']:.1f} | {of['R@P95']:.1f} / {of['R@P99']:.1f} / {of['AP']:.1f} | "
+                       f"{of['calibration_error']:.3f} | {of['above_0.9']} | {of['right_above_0.9']:.1f} |")
     return out
 
 
@@ -303,9 +319,9 @@ def floors():
     run = runs["align_many/cuda_loopsmart/11"]
     points, survivors = run["points"], run["survivors"]
     instructions = 29.6e12
-    floor = {"match": 2 * points ** 2 * 40 * 2 / 495e12 * 1e3, "sample": 4e6 * 100 / instructions * 1e3, "fit": survivors * 2500 / instructions * 1e3,
+    floor = {"match": 2 * points ** 2 * 48 * 2 / 990e12 * 1e3, "sample": 4e6 * 100 / instructions * 1e3, "fit": survivors * 2500 / instructions * 1e3,
              "score": survivors * points * 0.75 * 36 / instructions * 1e3}
-    what = {"match": "two products of 40 dimensions for every two features", "sample": "100 instructions a hypothesis",
+    what = {"match": "two products of 48 dimensions for every two features", "sample": "100 instructions a hypothesis",
             "fit": "2,500 instructions a survivor", "score": "36 instructions for each of three quarters of the point tests"}
     out = ["| stage | ms a pair | floor, ms | ratio | the floor counts |", "| --- | --- | --- | --- | --- |"]
     for stage in floor:
@@ -313,7 +329,7 @@ def floors():
     return out + [f"| judge, refine | {run['ms_judge'] + run['ms_refine']:.4f} | | | |"]
 
 
-TABLES = {"accuracy_attempts": accuracy_attempts, "confidence": confidence, "pipeline_house": pipeline_house, "redkitchen": redkitchen, "redkitchen_seeds": redkitchen_seeds, "range_pairs": range_pairs, "other_pairs": other_pairs,
+TABLES = {"accuracy_attempts": accuracy_attempts, "agreement": agreement, "confidence": confidence, "pipeline_house": pipeline_house, "redkitchen": redkitchen, "redkitchen_seeds": redkitchen_seeds, "range_pairs": range_pairs, "other_pairs": other_pairs,
           "peers": peers, "peers_redkitchen": peers_redkitchen, "peers_house": peers_house,
           "peer_parameters": peer_parameters, "fgr": fgr, "redwood": redwood, "speed": speed, "pipeline": pipeline, "devices": devices, "scaling": scaling, "floors": floors}
 
