@@ -273,6 +273,21 @@ def agreement():
     return out
 
 
+def accuracy_sweep():
+    record = load("accuracy_sweep.json")
+    scenes = [key for key in record["rows"][0] if key != "setting"]
+    return [f"| setting | {' | '.join(scenes)} |", "| --- |" + " --- |" * len(scenes),
+            *[f"| {row['setting']} | " + " | ".join(" / ".join(f"{v:.1f}" for v in row[s]) for s in scenes) + " |" for row in record["rows"]],
+            "", f"Seeds {' and '.join(map(str, record['seeds']))} at commit {record['commit']}, with the confidence shipped there."]
+
+
+def pipeline_steps():
+    steps = load("pipeline_steps.json")["steps"]
+    cell = lambda step, scene: f"{step[scene]:.2f}" if scene in step else ""  # noqa: E731
+    return ["| | commit | red kitchen | house |", "| --- | --- | --- | --- |",
+            *[f"| {s['step']} | {s['commit']} | {cell(s, 'red kitchen')} | {cell(s, 'house/A')} |" for s in steps]]
+
+
 def accuracy_attempts():
     record = load("accuracy_attempts.json")
     scenes = list(record["before"])
@@ -329,7 +344,7 @@ def floors():
     return out + [f"| judge, refine | {run['ms_judge'] + run['ms_refine']:.4f} | | | |"]
 
 
-TABLES = {"accuracy_attempts": accuracy_attempts, "agreement": agreement, "confidence": confidence, "pipeline_house": pipeline_house, "redkitchen": redkitchen, "redkitchen_seeds": redkitchen_seeds, "range_pairs": range_pairs, "other_pairs": other_pairs,
+TABLES = {"accuracy_attempts": accuracy_attempts, "accuracy_sweep": accuracy_sweep, "pipeline_steps": pipeline_steps, "agreement": agreement, "confidence": confidence, "pipeline_house": pipeline_house, "redkitchen": redkitchen, "redkitchen_seeds": redkitchen_seeds, "range_pairs": range_pairs, "other_pairs": other_pairs,
           "peers": peers, "peers_redkitchen": peers_redkitchen, "peers_house": peers_house,
           "peer_parameters": peer_parameters, "fgr": fgr, "redwood": redwood, "speed": speed, "pipeline": pipeline, "devices": devices, "scaling": scaling, "floors": floors}
 
