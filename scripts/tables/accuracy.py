@@ -1,0 +1,106 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Tables of recall, precision and confidence."""
+import json
+
+from tables.records import RESULTS, load, mean, percent, source
+
+
+def redkitchen():
+    rows = ["| preset | right when every best candidate is reported | reported: recall / precision | recall at precision >= 95 % | average precision |",
+            "| --- | --- | --- | --- | --- |"]
+    sources = []
+    for file in sorted(RESULTS.glob("redkitchen_*.json"), reverse=True):
+        record = json.loads(file.read_text())
+        strict = [run["evaluate"]["strict"] for run in record["runs"]]
+        rows.append(f"| `{record['preset']}` | {percent(mean(s['raw_recall'] for s in strict))} % | {percent(mean(s['recall'] for s in strict))} / "
+                    f"{percent(mean(s['precision'] for s in strict))} % | {percent(mean(s['recall_at_precision']['95'] for s in strict))} % | "
+                    f"{percent(mean(s['average_precision'] for s in strict))} % |")
+        sources.append(source(record))
+    return rows + ["", *[line + "." for line in sources]]
+
+
+def redkitchen_seeds():
+    rows = ["| preset | seed | right, best candidates | reported recall | precision | geometric precision |", "| --- | --- | --- | --- | --- | --- |"]
+    for file in sorted(RESULTS.glob("redkitchen_*.json"), reverse=True):
+        record = json.loads(file.read_text())
+        for run in record["runs"]:
+            strict, geometric = run["evaluate"]["strict"], run["evaluate"]["geometric"]
+            rows.append(f"| `{record['preset']}` | {run['seed']} | {percent(strict['raw_recall'])} % | {percent(strict['recall'])} % "
+                        f"({strict['good_recall']} of {strict['ground_truth']}) | {percent(strict['precision'])} % ({strict['good']} of "
+                        f"{strict['reported']}) | {percent(geometric['precision'])} % |")
+    return rows
+
+
+def range_pairs():
+    rows = ["| method | RMSE, mean / max | pairs below .01 / .02 / .05 |", "| --- | --- | --- |"]
+    sources, best = [], []
+    for file in sorted(RESULTS.glob("range_pairs*.json")):
+        record = json.loads(file.read_text())
+        runs = record["runs"]
+        below = " / ".join(f"{mean(run[f'below_{bound}'] for run in runs):.2f}" for bound in (0.01, 0.02, 0.05))
+        best.append(mean(run["rmse_mean_of_truth"] for run in runs))
+        rows.append(f"| gpureg, default options, voxel {record['options']['prepare']['voxel_size']:g} | {mean(run['rmse_mean'] for run in runs):.4f} / "
+                    f"{max(run['rmse_max'] for run in runs):.4f} | {below} |")
+        sources.append(source(record) + ".")
+    rows.append("| Fast Global Registration, as published | 0.0104 / 0.0193 | 0.60 / 1.00 / 1.00 |")
+    return rows + [f"| (the ground truth itself) | {best[0]:.4f} | |", "", *sources]
+
+
+def other_pairs():
+    record = load("other_pairs.json")
+    rows = ["| pair | seed | status | off by |", "| --- | --- | --- | --- |"]
+    for run in record["lidar"]:
+        what = "refined" if run["refined"] else "before refinement"
+        rows.append(f"| LiDAR, {what} | {run['seed']} | {run['status']} | {run['metres']:.3f} m, {run['degrees']:.2f} deg |")
+    for run in record["redwood_sample"]:
+        rows.append(f"| Redwood's sample fragments | {run['seed']} | {run['status']} | confidence {run['score']:.2f} (no ground truth) |")
+    return rows + ["", source(record) + "."]
+
+
+def confidence():
+    """Fits that have not seen the building they are tested on; means over the runs (seeds) of each scene."""
+    groups = {}
+    for run in load("confidence.json")["runs"]:
+        groups.setdefault((run["model"], run["scene"]), []).append(run)
+    out = ["| viewpoints | scene | runs | found among the modes / best, % | geometric R@P95 / R@P99 / AP, % | strict R@P95 / AP, % | ECE | right above 0.9, % |",
+           "| --- | --- | --- | --- | --- | --- | --- | --- |"]
+    for (model, scene), runs in groups.items():
+        of = lambda key: mean(run[key] for run in runs)  # noqa: B023,E731
+        out.append(f"| {'known' if model == 'with_free_space' else 'unknown'} | {scene} | {len(runs)} | {of('generated'):.1f} / {of('raw'):.1f} | {of('geo_R@P95'):.1f} / "
+                   f"{of('geo_R@P99'):.1f} / {of('geo_AP'):.1f} | {of('strict_R@P95'):.1f} / {of('strict_AP'):.1f} | {of('ECE'):.3f} | {of('right_above_0.9'):.1f} |")
+    return out
+
+
+def agreement():
+    record = load("agreement.json")
+    out = ["| scene | | best right, % | R@P95 / R@P99 / AP, % | ECE | above 0.9 | of them right, % |", "| --- | --- | --- | --- | --- | --- | --- |"]
+    for scene in record["scenes"]:
+        for text, of in (("each pair alone", scene["before"]), ("with agreement", scene["after"])):
+            out.append(f"| {scene['scene']} | {text} | {of['raw_recall']:.1f} | {of['R@P95']:.1f} / {of['R@P99']:.1f} / {of['AP']:.1f} | "
+                       f"{of['calibration_error']:.3f} | {of['above_0.9']} | {of['right_above_0.9']:.1f} |")
+    return out
+
+
+def accuracy_sweep():
+    record = load("accuracy_sweep.json")
+    scenes = [key for key in record["rows"][0] if key != "setting"]
+    return [f"| setting | {' | '.join(scenes)} |", "| --- |" + " --- |" * len(scenes),
+            *[f"| {row['setting']} | " + " | ".join(" / ".join(f"{v:.1f}" for v in row[s]) for s in scenes) + " |" for row in record["rows"]],
+            "", f"Seeds {' and '.join(map(str, record['seeds']))} at commit {record['commit']}, with the confidence shipped there."]
+
+
+def accuracy_attempts():
+    record = load("accuracy_attempts.json")
+    scenes = list(record["before"])
+    rows = ["| tried | " + " | ".join(scenes) + " | |", "| --- |" + " --- |" * (len(scenes) + 1)]
+    for entry in [{"tried": "(nothing)", **record["before"]}, *record["attempts"]]:
+        cells = [f"{entry[s][0]:.1f} / {entry[s][1]:.1f}" if s in entry else "" for s in scenes]
+        rows.append(f"| {entry['tried']} | {' | '.join(cells)} | {entry.get('remark', '')} |")
+    return rows
+
+
+TABLES = {
+    "redkitchen": redkitchen, "redkitchen_seeds": redkitchen_seeds, "range_pairs": range_pairs,
+    "other_pairs": other_pairs, "confidence": confidence, "agreement": agreement, "accuracy_sweep": accuracy_sweep,
+    "accuracy_attempts": accuracy_attempts,
+}
