@@ -1,20 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include <cuda_fp16.h>
-
-#include <array>
-#include <limits>
-
 #include "algorithm/balance.hpp"
-#include "algorithm/fpfh.hpp"
-#include "nearest_feature.hpp"
+#include "feature_aids.hpp"
 #include "scoring_data.hpp"
 #include "stages.hpp"
 #include "warp.cuh"
 
 namespace gpureg::cuda {
 namespace {
-
-constexpr float kInfinity = std::numeric_limits<float>::infinity();
 
 /// One array on its way into a cloud's own memory.
 struct Part {
@@ -41,89 +33,6 @@ struct Counts {
   std::uint32_t extreme, extreme_wide;          // features that are too long for the tensor cores
   std::uint32_t balance_bin[kBalanceBins];      // points by the direction of their normals; the last bin: without
 };
-
-struct FeatureSlot {
-  const float* features;
-  const std::uint8_t* valid;
-  std::uint32_t size, dimension, half_width, padded_width;
-  FeatureAids aids;
-  std::uint32_t* largest;     // bits of the greatest magnitude of all values
-  std::uint32_t* extreme;
-  std::uint32_t* first;       // table of `places`: lowest index of a row with this hash
-  std::uint32_t places;
-};
-
-__device__ float component(const FeatureSlot& s, const float* row, std::uint32_t d) {
-  return d < s.dimension ? row[d] - (s.aids.centred ? center_of_fpfh(d) : 0.0f) : 0.0f;
-}
-
-__device__ std::uint32_t place_of(const FeatureSlot& s, const float* row) {
-  std::uint32_t hash = 2166136261u;
-  for (std::uint32_t d = 0; d < s.dimension; ++d) hash = (hash ^ __float_as_uint(row[d])) * 16777619u, hash ^= hash >> 15;
-  return hash % s.places;
-}
-
-__global__ void find_largest(const FeatureSlot* slots) {
-  const FeatureSlot s = slots[blockIdx.y];
-  if (s.aids.centred) return;  // at most 100
-  std::uint32_t largest = 0;
-  for (std::uint32_t i = blockIdx.x * blockDim.x + threadIdx.x; i < s.size; i += gridDim.x * blockDim.x)
-    for (std::uint32_t d = 0; s.valid[i] && d < s.dimension; ++d)
-      largest = max(largest, __float_as_uint(fabsf(component(s, s.features + static_cast<std::size_t>(i) * s.dimension, d))));
-  largest = warp_max(largest);
-  if (threadIdx.x % 32 == 0) atomicMax(s.largest, largest);
-}
-
-/// The power of two that brings the greatest value to between 512 and 1024, which binary16 can hold. Lengths stay within float32's range.
-__device__ float scale_to_half(std::uint32_t largest) {
-  const int exponent = 136 - static_cast<int>(largest >> 23);
-  return __uint_as_float(static_cast<std::uint32_t>(127 + max(-40, min(40, exponent))) << 23);
-}
-
-/// What the feature search reads beside the features: copies for the tensor cores, and how far off their products may be.
-__global__ void measure_features(const FeatureSlot* slots) {
-  const FeatureSlot s = slots[blockIdx.y];
-  const float scale = s.aids.centred ? 8.0f : scale_to_half(*s.largest);
-  std::uint32_t extreme = 0;
-  for (std::uint32_t i = blockIdx.x * blockDim.x + threadIdx.x; i < s.size; i += gridDim.x * blockDim.x) {
-    const float* row = s.features + static_cast<std::size_t>(i) * s.dimension;
-    const bool valid = s.valid[i];
-    float square = 0.0f, lost = 0.0f;
-    for (std::uint32_t d = 0; d < s.half_width; ++d) {
-      const float v = valid ? component(s, row, d) * scale : 0.0f;
-      const __half h = __float2half_rn(v);
-      const float difference = v - __half2float(h);
-      square = fmaf(v, v, square);
-      lost = fmaf(difference, difference, lost);
-      s.aids.half[static_cast<std::size_t>(i) * s.half_width + d] = __half_as_ushort(h);
-    }
-    for (std::uint32_t d = 0; d < s.padded_width; ++d)
-      s.aids.padded[static_cast<std::size_t>(i) * s.padded_width + d] = valid && d < s.dimension ? row[d] : 0.0f;
-    const float error = product_error(square, lost);
-    s.aids.error[i] = error;
-    s.aids.square[i] = valid ? make_float2(square - error, square + error) : make_float2(kInfinity, kInfinity);
-    if (valid) atomicMin(s.first + place_of(s, row), i);
-    extreme += valid && !(square < 1e30f * (scale * scale));
-  }
-  if (blockIdx.x == 0 && threadIdx.x == 0) *s.aids.scale = scale;
-  if (extreme > 0) atomicAdd(s.extreme, extreme);
-}
-
-/// Of equal features only the first is ever an answer; the others are taken out of the search. On walls without noise thousands are equal.
-__global__ void find_repeated_features(const FeatureSlot* slots) {
-  const FeatureSlot s = slots[blockIdx.y];
-  for (std::uint32_t i = blockIdx.x * blockDim.x + threadIdx.x; i < s.size; i += gridDim.x * blockDim.x) {
-    const float* row = s.features + static_cast<std::size_t>(i) * s.dimension;
-    bool repeats = false;
-    if (s.valid[i]) {
-      const std::uint32_t first = s.first[place_of(s, row)];
-      repeats = first < i;
-      const float* other = s.features + static_cast<std::size_t>(first) * s.dimension;
-      for (std::uint32_t d = 0; repeats && d < s.dimension; ++d) repeats = row[d] == other[d];
-    }
-    if (repeats) s.aids.square[i] = make_float2(kInfinity, kInfinity);
-  }
-}
 
 __global__ void count(const std::uint32_t* offset, const Vec3* normals, const std::uint8_t* valid, std::uint32_t* const* balance, Counts* counts) {
   __shared__ std::uint32_t bins[kBalanceBins];
@@ -168,24 +77,6 @@ std::vector<T> copy_back(const CudaCloud& cloud, const T* device, std::size_t si
   return host;
 }
 
-void add_feature_aids(Exec& exec, std::vector<FeatureSlot>& slots) {
-  if (slots.empty()) return;
-  std::size_t places = 0;
-  for (const FeatureSlot& s : slots) places += s.places;
-  const auto first = exec.filled<std::uint32_t>(places, 0xff);
-  const auto largest = exec.filled<std::uint32_t>(slots.size(), 0);
-  std::uint32_t* at = first.data();
-  for (std::size_t k = 0; k < slots.size(); ++k) slots[k].first = at, at += slots[k].places, slots[k].largest = largest.data() + k;
-  const auto on_device = exec.upload(slots);
-  const dim3 grid(16, static_cast<unsigned>(slots.size()));
-  find_largest<<<grid, 256, 0, exec.stream()>>>(on_device.data());
-  check_launch("find_largest");
-  measure_features<<<grid, 256, 0, exec.stream()>>>(on_device.data());
-  check_launch("measure_features");
-  find_repeated_features<<<grid, 256, 0, exec.stream()>>>(on_device.data());
-  check_launch("find_repeated_features");
-}
-
 }  // namespace
 
 std::vector<Vec3> CudaCloud::copy_points() const { return copy_back(*this, view_on_device.points, size); }
@@ -202,7 +93,7 @@ std::vector<std::shared_ptr<CudaCloud>> assemble(Exec& exec, const DownsampledCl
   const auto counts = exec.filled<Counts>(clouds_count, 0);
   std::vector<std::shared_ptr<CudaCloud>> out;
   std::vector<Part> parts;
-  std::vector<FeatureSlot> feature_slots;
+  std::vector<FeaturesToMeasure> features_to_measure;
   std::vector<std::uint32_t*> balance;
   for (std::size_t c = 0; c < clouds_count; ++c) {
     auto cloud = std::make_shared<CudaCloud>();
@@ -249,10 +140,8 @@ std::vector<std::shared_ptr<CudaCloud>> assemble(Exec& exec, const DownsampledCl
       return at;
     };
     const auto reserve_aids = [&](std::uint32_t dimension) {
-      const std::size_t width = half_width(dimension), rows = width > 0 ? n : 0;
-      std::array<std::size_t, 5> at{};
-      at[0] = reserve(rows * width * sizeof(std::uint16_t)), at[1] = reserve(rows * padded_width(dimension) * sizeof(float));
-      at[2] = reserve(rows * sizeof(float2)), at[3] = reserve(rows * sizeof(float)), at[4] = reserve(sizeof(float));
+      FeatureAidsPlaces at{};
+      for (int k = 0; k < FeatureAidsPlaces::kArrays; ++k) at.begin[k] = reserve(feature_aids_bytes(k, n, dimension));
       return at;
     };
     const auto aids = reserve_aids(cloud->feature_dimension), wide_aids = reserve_aids(has_wide ? wide_features.dimension[c] : 0);
@@ -282,13 +171,11 @@ std::vector<std::shared_ptr<CudaCloud>> assemble(Exec& exec, const DownsampledCl
     char* const memory = cloud->data.data();
     balance.push_back(reinterpret_cast<std::uint32_t*>(memory + balanced));
     view.balance = balance.back();
-    const auto measure = [&](FeatureAids& to, const std::array<std::size_t, 5>& at, bool centred, const float* rows, const std::uint8_t* valid,
+    const auto measure = [&](FeatureAids& to, const FeatureAidsPlaces& at, bool centred, const float* rows, const std::uint8_t* valid,
                              std::uint32_t dimension, std::uint32_t* extreme) {
       if (half_width(dimension) == 0) return;
-      to = {reinterpret_cast<std::uint16_t*>(memory + at[0]), reinterpret_cast<float*>(memory + at[1]), reinterpret_cast<float2*>(memory + at[2]),
-            reinterpret_cast<float*>(memory + at[3]), reinterpret_cast<float*>(memory + at[4]), centred};
-      feature_slots.push_back({rows, valid, view.size, dimension, half_width(dimension), padded_width(dimension), to, nullptr, extreme, nullptr,
-                               4 * view.size + 1});
+      to = feature_aids_at(memory, at, centred);
+      features_to_measure.push_back({rows, valid, view.size, dimension, to, extreme});
     };
     measure(cloud->narrow_aids, aids, facts.feature_dimension == 0, view.features, view.has_feature, view.feature_dimension,
             &counts.data()[c].extreme);
@@ -308,7 +195,7 @@ std::vector<std::shared_ptr<CudaCloud>> assemble(Exec& exec, const DownsampledCl
   check_launch("count");
   balance_points<<<grid, 256, 0, exec.stream()>>>(segments.on_device.data(), counts.data(), balance_on_device.data());
   check_launch("balance_points");
-  add_feature_aids(exec, feature_slots);
+  fill_feature_aids(exec, features_to_measure);
   fill_scoring_data(exec, out, closest.geometry);
   const Counts* counted = exec.download(counts.data(), clouds_count);
   exec.synchronize();

@@ -3,6 +3,7 @@
 
 #include <vector>
 
+#include "bricks.cuh"
 #include "exec.hpp"
 #include "products.hpp"
 
@@ -23,28 +24,22 @@ inline DeviceBuffer<SearchPair> upload_search_pairs(Exec& exec, Span<const PairV
   return exec.upload(out);
 }
 
-/// What find_closest() finds, with a table of blocks instead of a hash table, and on copies of the candidates that lie side by side.
+/// What find_closest() finds, with a table of bricks instead of a hash table, and on copies of the candidates that lie side by side.
 __device__ inline Closest find_closest(const CloudView& cloud, const CellSummaries& cells, Vec3 q, float max_squared) {
   if (cells.nx == 0) return find_closest(cloud.closest, cloud.points, q, max_squared);
   const Closest none{kNoValue, max_squared};
   const float fx = q.x * cloud.closest.inverse_cell_size, fy = q.y * cloud.closest.inverse_cell_size, fz = q.z * cloud.closest.inverse_cell_size;
   constexpr float kLimit = static_cast<float>(kCellBias) * static_cast<float>(ClosestGridView::kBlockEdge) - 1.0f;
   if (!(fabsf(fx) < kLimit && fabsf(fy) < kLimit && fabsf(fz) < kLimit)) return none;
-  const std::uint32_t x = static_cast<std::uint32_t>(floor_to_int(fx) + static_cast<std::int32_t>(cells.offset.x));
-  const std::uint32_t y = static_cast<std::uint32_t>(floor_to_int(fy) + static_cast<std::int32_t>(cells.offset.y));
-  const std::uint32_t z = static_cast<std::uint32_t>(floor_to_int(fz) + static_cast<std::int32_t>(cells.offset.z));
-  const std::uint32_t bx = x >> 3, by = y >> 3, bz = z >> 3;
-  const std::uint32_t nx = static_cast<std::uint32_t>(cells.nx), ny = static_cast<std::uint32_t>(cells.ny), nz = static_cast<std::uint32_t>(cells.nz);
-  if (bx >= nx || by >= ny || bz >= nz) return none;
-  const std::uint32_t block = static_cast<std::uint32_t>(__ldg(cells.block + (bz * ny + by) * nx + bx));
-  if (block == 0) return none;
-  const std::uint32_t cell = (z & 7) << 6 | (y & 7) << 3 | (x & 7);
-  const std::uint32_t list = __ldg(cells.list + (static_cast<std::size_t>(block) << 9 | cell));
-  std::uint32_t first = list >> 8, last = first + (list & 255u);
-  if (list == kNoValue) {
-    const std::uint32_t* start = cloud.closest.cell_start.data + static_cast<std::size_t>(block - 1) * (ClosestGridView::kBlockCells + 1) + cell;
-    first = start[0], last = start[1];
-  }
+  const BrickCell c{static_cast<std::uint32_t>(floor_to_int(fx) + static_cast<std::int32_t>(cells.offset.x) + 8),
+                    static_cast<std::uint32_t>(floor_to_int(fy) + static_cast<std::int32_t>(cells.offset.y) + 8),
+                    static_cast<std::uint32_t>(floor_to_int(fz) + static_cast<std::int32_t>(cells.offset.z) + 8)};
+  const auto inside = [](std::uint32_t v, std::int32_t blocks) { return v >> 3 < static_cast<std::uint32_t>(blocks) + 2; };
+  if (!inside(c.x, cells.nx) || !inside(c.y, cells.ny) || !inside(c.z, cells.nz)) return none;
+  const std::uint32_t word = BrickTable(cells, 0).word_of(c, cells.run);
+  if (word == kNoValue) return none;
+  const std::uint32_t list = __ldg(&cells.cell[std::size_t(word) * 8 + (c.x & 7)].y), first = list >> 8, last = first + (list & 255u);
+  if (list == kNoValue) return find_closest(cloud.closest, cloud.points, q, max_squared);
   std::uint32_t best = kNoValue;
   float best_squared = 3.402823466e38f;
   for (std::uint32_t k = first; k < last; ++k) {

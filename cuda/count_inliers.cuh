@@ -1,58 +1,102 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include "bricks.cuh"
 #include "score_batch.cuh"
 
 /// How many inliers a hypothesis has: by one warp, which gives up as soon as it is not the best, or by a thread block.
 namespace gpureg::cuda {
 
-constexpr std::uint32_t kUnroll = 4;        ///< groups in flight per warp
-constexpr std::size_t kRowBytes = 64 * 16;  ///< of the table of compatible levels
+constexpr std::uint32_t kUnroll = 4;  ///< groups in flight per warp
 
-/// A point that only its closest target point can decide.
-struct Undecided {
-  std::uint32_t slot, cell;
+/// The source's points in groups of 32, the groups in the order in which hypotheses fail at them: in shared memory.
+struct PointsInShared {
+  const float2* xy;
+  const float* z;
+  const std::uint8_t* normal_class;
+  __device__ float4 operator()(std::uint32_t group, std::uint32_t lane) const {
+    const std::uint32_t k = group * 32 + lane;
+    const float2 p = xy[k];
+    return make_float4(p.x, p.y, z[k], __uint_as_float(normal_class[k]));
+  }
 };
 
-constexpr std::size_t kWarpBytes = kRowBytes + 64 * sizeof(Undecided);  // of shared memory for each warp
-
-/// What a thread block keeps of a pair while it scores a slice: in shared memory, or where it is too large, in global.
-template <typename Block>
-struct Staged {
+/// The same where they do not fit.
+struct PointsInGlobal {
   const float4* point;
-  const std::uint32_t* normal;
-  const Block* blocks;
-  const std::uint8_t* codes;
-  const std::uint32_t* by_misses;
-  const std::uint32_t* by_refuted;
+  const std::uint32_t* order;
+  __device__ float4 operator()(std::uint32_t group, std::uint32_t lane) const { return __ldg(point + __ldg(order + group) * 32 + lane); }
 };
 
-/// Groups [begin, begin + N): how many of this lane's points may be inliers, by the code of their cell. rows: levels that each class of
-/// normals needs, in shared memory.
-template <std::uint32_t N, typename Block>
-__device__ std::uint32_t count_possible(const CellMotion& motion, const Staged<Block>& staged, const std::uint8_t* rows, std::uint32_t begin) {
-  const std::uint32_t lane = threadIdx.x % 32;
+/// What all hypotheses of a slice read.
+template <typename Points>
+struct Staged {
+  Points points;
+  const uint2* runs;
+  const std::uint32_t* bricks;
+};
+
+/// A warp's own shared memory.
+struct WarpMemory {
+  std::uint32_t agreeing[64];   ///< codes that agree with each class of normals
+  alignas(16) Rigid rigid;      ///< the hypothesis
+  alignas(16) BrickMotion motion;
+};
+
+/// Groups [begin, begin + N): how many of this lane's points may be inliers, by the code of their cell.
+template <std::uint32_t N, typename Points>
+__device__ std::uint32_t count_possible(const BrickMotion& motion, const Staged<Points>& staged, const WarpMemory& memory, std::uint32_t begin) {
   float4 p[N];
-  std::uint32_t code[N];
+  BrickCell cell[N];
+  std::uint32_t word[N];
 #pragma unroll
-  for (std::uint32_t k = 0; k < N; ++k) p[k] = staged.point[staged.by_misses[begin + k] * 32u + lane];
+  for (std::uint32_t k = 0; k < N; ++k) p[k] = staged.points(begin + k, threadIdx.x % 32);
 #pragma unroll
-  for (std::uint32_t k = 0; k < N; ++k) code[k] = motion.locate(p[k], staged.blocks).cell();
+  for (std::uint32_t k = 0; k < N; ++k) {
+    cell[k] = motion.locate(p[k]);
+    word[k] = motion.word_of(cell[k], staged.runs);
+  }
 #pragma unroll
-  for (std::uint32_t k = 0; k < N; ++k) code[k] = __ldg(staged.codes + code[k]);
+  for (std::uint32_t k = 0; k < N; ++k) word[k] = word[k] == kNoValue ? 0u : staged.bricks[word[k]];
   std::uint32_t possible = 0;
 #pragma unroll
-  for (std::uint32_t k = 0; k < N; ++k) possible += (code[k] & 15u) >= rows[__float_as_uint(p[k].w) + (code[k] >> 4)];
+  for (std::uint32_t k = 0; k < N; ++k) possible += code_agrees(word[k], cell[k], memory.agreeing[__float_as_uint(p[k].w)]);
   return possible;
 }
 
+/// A point to decide, and what is known of its cell.
+struct Look {
+  float4 point, normal;
+  uint2 summary;
+  bool counted;  ///< by its cell's code
+  __device__ bool has_normal() const { return normal.w != 0.0f; }
+};
+
+/// With the point there, asks for its cell's summary.
+template <typename Points>
+__device__ void finish_look(const ScorePair& pair, const Staged<Points>& staged, const WarpMemory& memory, Look& look) {
+  const BrickCell cell = memory.motion.locate(look.point);
+  const std::uint32_t word = memory.motion.word_of(cell, staged.runs);
+  look.counted = word != kNoValue && code_agrees(staged.bricks[word], cell, memory.agreeing[__float_as_uint(look.point.w)]);
+  look.summary = make_uint2(0, 0);
+  if (look.counted) look.summary = __ldg(pair.cells.cell + std::size_t(word) * 8 + (cell.x & 7));
+}
+
+template <typename Points>
+__device__ Look begin_look(const ScorePair& pair, const Staged<Points>& staged, const WarpMemory& memory, const LookOrder& order,
+                           std::uint32_t k) {
+  Look look;
+  look.point = __ldg(order.point + k), look.normal = __ldg(order.normal + k);
+  finish_look(pair, staged, memory, look);
+  return look;
+}
+
 /// Exact number of inliers, or 0 as soon as it cannot reach the most seen so far: such a hypothesis is not the best one. First every point
-/// is bounded by its cell's code, then by its word, and only undecided ones are looked at. possible: upper bound by words over the groups
-/// before `begin`. A warp's work; rows and queue: its own 64 x 16 bytes and 64 entries of shared memory.
-template <typename Block>
-__device__ std::uint32_t count_inliers(const ScoreBatch& b, const ScorePair& pair, const Limits* limits, const Staged<Block>& staged,
-                                       std::uint8_t* rows, Undecided* queue, const Pose<float>& pose, std::uint32_t begin,
-                                       std::uint32_t possible, const volatile std::uint32_t* most) {
+/// is bounded by its cell's code; then those that may be inliers are looked at, where hypotheses are refuted most often first, by their
+/// cell's summary and then by their closest point. A warp's work.
+template <typename Points>
+__device__ std::uint32_t count_inliers(const ScoreBatch& b, const ScorePair& pair, const Limits* limits, const Staged<Points>& staged, WarpMemory& memory,
+                                       const Pose<float>& pose, const LookOrder& look, const volatile std::uint32_t* most) {
   const std::uint32_t lane = threadIdx.x % 32;
   const Rigid rigid = to_rigid(pose);
   if (pair.cells.nx == 0) {
@@ -61,77 +105,76 @@ __device__ std::uint32_t count_inliers(const ScoreBatch& b, const ScorePair& pai
     return warp_sum(inliers);
   }
   __syncwarp();
-  for (std::uint32_t k = lane; k < 64; k += 32) {
-    std::uint8_t row[16];
-    compatible_levels(*b.directions, b.thresholds, rigid, k, row);
-    std::uint32_t packed[4];
-#pragma unroll
-    for (int w = 0; w < 4; ++w)
-      packed[w] = static_cast<std::uint32_t>(row[4 * w]) | static_cast<std::uint32_t>(row[4 * w + 1]) << 8 |
-                  static_cast<std::uint32_t>(row[4 * w + 2]) << 16 | static_cast<std::uint32_t>(row[4 * w + 3]) << 24;
-    *reinterpret_cast<uint4*>(rows + k * 16) = make_uint4(packed[0], packed[1], packed[2], packed[3]);
-  }
+  for (std::uint32_t k = lane; k < 64; k += 32) memory.agreeing[k] = agreeing_codes(*b.directions, b.code_test, rigid, k);
   __syncwarp();
-  const CellMotion motion(rigid, pair.cells);
+  const BrickMotion motion(rigid, pair.cells);
+  if (lane == 0) memory.rigid = rigid, memory.motion = motion;
+  __syncwarp();
   const std::uint32_t groups = pair.order.groups;
-  std::uint32_t needed = *most, g = begin;
+  std::uint32_t needed = *most, possible = 0, g = 0;
   for (; g + kUnroll <= groups; g += kUnroll) {
     if (possible + (groups - g) * 32 < needed) return 0;
-    possible += warp_sum(count_possible<kUnroll>(motion, staged, rows, g));
+    possible += warp_sum(count_possible<kUnroll>(motion, staged, memory, g));
     if (g % 32 < kUnroll) needed = *most;
   }
-  for (; g < groups; ++g) possible += warp_sum(count_possible<1>(motion, staged, rows, g));
+  for (; g < groups; ++g) possible += warp_sum(count_possible<1>(motion, staged, memory, g));
 
-  // Undecided points wait until there is one for every lane.
-  std::uint32_t waiting = 0;
-  const auto settle = [&](std::uint32_t count) {
-    __syncwarp();
-    bool refuted = false;
-    if (lane < count) {
-      const Undecided u = queue[lane];
-      refuted = !is_inlier(pair, b.test, rigid, staged.point[u.slot], staged.normal[u.slot], u.slot, u.cell);
-    }
-    possible -= static_cast<std::uint32_t>(__popc(static_cast<int>(__ballot_sync(~0u, refuted))));
-    __syncwarp();
-  };
-  for (std::uint32_t k = 0; k < groups; ++k) {
+  // Loads of the next points are under way while these are decided.
+  const std::uint32_t end = groups * 32;
+  Look next = begin_look(pair, staged, memory, look, lane);
+  for (std::uint32_t k = lane; k < end; k += 32) {
     if (possible < needed) return 0;
-    g = staged.by_refuted[k];
-    const float4 p = staged.point[g * 32 + lane];
-    const CellInBlock cell = motion.locate(p, staged.blocks);
-    const std::uint32_t code = __ldg(staged.codes + cell.cell());
-    // The first groups were bounded by summaries already, not by codes.
-    const bool counted = (code & 15u) >= rows[__float_as_uint(p.w) + (code >> 4)] || g < begin;
-    if (!__any_sync(~0u, counted)) continue;
-    bool refuted = false, undecided = false;
-    if (counted) {
+    const Look now = next;
+    if (k + 32 < end) next.point = __ldg(look.point + k + 32), next.normal = __ldg(look.normal + k + 32);
+    bool refuted = false;
+    if (now.counted) {
+      const Vec3 moved_normal = rotate_fast(memory.rigid, now.normal);
       bool certain;
-      const bool possible_still = may_be_inlier(rigid, limits, __ldg(pair.cells.word + cell.cell()), staged.normal[g * 32 + lane], certain);
-      refuted = !possible_still && g >= begin;
-      undecided = possible_still && !certain;
+      refuted = !may_be_inlier(limits, now.summary.x, moved_normal, now.has_normal(), certain);
+      if (!refuted && !certain) {
+        const Vec3 q = apply(memory.rigid, {now.point.x, now.point.y, now.point.z});
+        refuted = now.summary.y == kNoValue
+                      ? !is_inlier_by_search(pair, b.test, memory.rigid, q, look.index + k)
+                      : !agrees_with(pair, b.test, memory.rigid, moved_normal, now.has_normal(), kPackedCosineError / 2, look.index + k,
+                                     closest_in_list(pair.cells.candidate, now.summary.y, q));
+      }
     }
+    if (k + 32 < end) finish_look(pair, staged, memory, next);
+    __syncwarp();
     possible -= static_cast<std::uint32_t>(__popc(static_cast<int>(__ballot_sync(~0u, refuted))));
-    const unsigned asked = __ballot_sync(~0u, undecided);
-    if (undecided) queue[waiting + static_cast<std::uint32_t>(__popc(static_cast<int>(asked & ((1u << lane) - 1))))] = {g * 32 + lane, cell.cell()};
-    waiting += static_cast<std::uint32_t>(__popc(static_cast<int>(asked)));
-    if (waiting >= 32) {
-      settle(32);
-      waiting -= 32;
-      const Undecided moved = queue[32 + lane];
-      __syncwarp();
-      if (lane < waiting) queue[lane] = moved;
-      needed = *most;
-    }
+    needed = *most;
   }
-  if (possible < needed) return 0;
-  settle(waiting);
+  return possible < needed ? 0 : possible;
+}
+
+/// How many points may be inliers, by the codes of their cells: by a whole thread block, all threads of which get it. agreeing: 64 words of
+/// shared memory.
+__device__ inline std::uint32_t count_possible_by_block(const ScoreBatch& b, const ScorePair& pair, const Pose<float>& pose, std::uint32_t* agreeing) {
+  __shared__ std::uint32_t possible;
+  if (pair.cells.nx == 0) return pair.source.size;
+  const Rigid rigid = to_rigid(pose);
+  __syncthreads();
+  if (threadIdx.x == 0) possible = 0;
+  for (std::uint32_t k = threadIdx.x; k < 64; k += blockDim.x) agreeing[k] = agreeing_codes(*b.directions, b.code_test, rigid, k);
+  __syncthreads();
+  const BrickMotion motion(rigid, pair.cells);
+  const std::uint32_t points = pair.order.groups * 32;
+  std::uint32_t mine = 0;
+#pragma unroll 4
+  for (std::uint32_t k = threadIdx.x; k < points; k += blockDim.x) {
+    const float4 point = __ldg(pair.order.point + k);
+    const BrickCell cell = motion.locate(point);
+    const std::uint32_t word = motion.word_of(cell, pair.cells.run);
+    mine += code_agrees(word == kNoValue ? 0u : __ldg(pair.cells.brick + word), cell, agreeing[__float_as_uint(point.w)]);
+  }
+  mine = warp_sum(mine);
+  if (threadIdx.x % 32 == 0 && mine > 0) atomicAdd(&possible, mine);
+  __syncthreads();
   return possible;
 }
 
-/// Inliers of one hypothesis by a whole thread block: the paper's way, one block per hypothesis and a parallel reduction. All threads get
-/// it. Where asked for, misses are added up per group of points.
-__device__ inline std::uint32_t count_by_block(const ScoreBatch& b, const ScorePair& pair, const Limits* limits, const Pose<float>& pose,
-                                        std::uint32_t* misses, std::uint32_t* refuted) {
+/// Exact number of inliers by a whole thread block: the paper's way, one block per hypothesis and a parallel reduction. All threads get it.
+__device__ inline std::uint32_t count_by_block(const ScoreBatch& b, const ScorePair& pair, const Limits* limits, const Pose<float>& pose) {
   __shared__ std::uint32_t inliers;
   __syncthreads();
   if (threadIdx.x == 0) inliers = 0;
@@ -139,24 +182,18 @@ __device__ inline std::uint32_t count_by_block(const ScoreBatch& b, const ScoreP
   const Rigid rigid = to_rigid(pose);
   std::uint32_t mine = 0;
   if (pair.cells.nx > 0) {
-    const CellMotion motion(rigid, pair.cells);
+    const BrickMotion motion(rigid, pair.cells);
     // A warp takes a group at a time.
     for (std::uint32_t k = threadIdx.x; k < pair.order.groups * 32; k += blockDim.x) {
       const float4 point = __ldg(pair.order.point + k);
-      const std::uint32_t cell = motion.locate(point, pair.cells.block).cell(), word = __ldg(pair.cells.word + cell);
-      bool possible = false, inlier = false;
-      if (word != 0) {
-        const std::uint32_t normal = __ldg(pair.order.normal + k);
-        bool certain;
-        possible = may_be_inlier(rigid, limits, word, normal, certain);
-        inlier = possible && (certain || is_inlier(pair, b.test, rigid, point, normal, k, cell));
-      }
-      mine += inlier;
-      if (!misses) continue;
-      const unsigned missing = __ballot_sync(~0u, !inlier), late = __ballot_sync(~0u, possible && !inlier);
-      if (threadIdx.x % 32 != 0) continue;
-      atomicAdd(misses + k / 32, static_cast<std::uint32_t>(__popc(static_cast<int>(missing))));
-      atomicAdd(refuted + k / 32, static_cast<std::uint32_t>(__popc(static_cast<int>(late))));
+      const BrickCell cell = motion.locate(point);
+      const std::uint32_t word = motion.word_of(cell, pair.cells.run);
+      if (word == kNoValue) continue;
+      const uint2 summary = __ldg(pair.cells.cell + std::size_t(word) * 8 + (cell.x & 7));
+      const std::uint32_t normal = __ldg(pair.order.normal + k);
+      bool certain;
+      const bool possible = may_be_inlier(rigid, limits, summary.x, normal, certain);
+      mine += possible && (certain || is_inlier(pair, b.test, rigid, point, normal, pair.order.index + k, summary.y));
     }
   } else {
     support_by_search(pair, b.test, rigid, threadIdx.x, blockDim.x, mine);

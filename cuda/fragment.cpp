@@ -37,7 +37,7 @@ CloudArrays CloudArrays::moved(const char* from, char* to) const {
   move(v.closest.table.data), move(v.closest.cell_start.data), move(v.closest.candidates.data);
   move(out.blocks);
   CellSummaries& s = out.summaries;
-  move(s.block), move(s.word), move(s.list), move(s.candidate), move(s.code);
+  move(s.run), move(s.brick), move(s.cell), move(s.candidate);
   move(out.order.point), move(out.order.normal), move(out.order.index);
   move(v.wide_features), move(v.has_wide_feature), move(v.balance), move(v.visibility.depth), move(v.visibility.viewpoints);
   for (FeatureAids* aids : {&out.narrow_aids, &out.wide_aids}) move(aids->half), move(aids->padded), move(aids->square), move(aids->error), move(aids->scale);

@@ -92,22 +92,27 @@ struct ClosestGrids {
   DeviceBuffer<CellEntry> table;
 };
 
-/// See algorithm/cell_summary.hpp. Arrays on the device.
+/// What is known of the cells of a closest-point grid, see algorithm/cell_summary.hpp and bricks.cuh. Arrays on the device.
 struct CellSummaries {
   float inverse_cell_size = 1;
   Vec3 offset{0, 0, 0};                      ///< in cells: cell = p * inverse_cell_size + offset
   std::int32_t nx = 0, ny = 0, nz = 0;       ///< blocks; 0: none, the cloud is too wide for a table
-  std::int32_t* block = nullptr;             ///< 1 + index of the block, or 0
-  std::uint32_t* word = nullptr;             ///< (1 + blocks) x 512: the summary
-  std::uint32_t* list = nullptr;             ///< (1 + blocks) x 512: the cell's candidates, first << 8 | number, or kNoValue
+  uint2* run = nullptr;                      ///< rows z, rows y, words x: 32 bricks along x, the first in the highest bit, and 16 times the number of bricks up to the last of them; then (0, all bricks)
+  std::uint32_t* brick = nullptr;            ///< bricks x 16 (z, y): codes of eight cells along x
+  uint2* cell = nullptr;                     ///< bricks x 128 (z, y, x): the summary; the candidates, first << 8 | number, or kNoValue
   float4* candidate = nullptr;               ///< the candidates of all cells: x, y, z, packed normal
-  std::uint8_t* code = nullptr;              ///< (1 + blocks) x 512: the summary, coarser, see directions.hpp
   std::uint32_t block_count = 0;
+
+  /// A brick is a quarter of a block; one block more on each side.
+  GPUREG_HD std::uint32_t brick_words_x() const { return (static_cast<std::uint32_t>(nx) + 2 + 31) / 32; }
+  GPUREG_HD std::uint32_t brick_rows_y() const { return 2 * (static_cast<std::uint32_t>(ny) + 2); }
+  GPUREG_HD std::uint32_t brick_rows_z() const { return 2 * (static_cast<std::uint32_t>(nz) + 2); }
+  GPUREG_HD std::uint32_t brick_runs() const { return brick_words_x() * brick_rows_y() * brick_rows_z(); }
 };
 
 /// Points in groups of 32 neighbours; the groups spread over the cloud, so that the first few tell about the whole of it.
 struct ScoringOrder {
-  float4* point = nullptr;                   ///< x, y, z, NaN where the last group has no more; w: 16 times the normal's class, see directions.hpp
+  float4* point = nullptr;                   ///< x, y, z, NaN where the last group has no more; w: the normal's class, see directions.hpp
   std::uint32_t* normal = nullptr;           ///< packed, see packed_normal.cuh
   std::uint32_t* index = nullptr;            ///< of the point in the cloud
   std::uint32_t groups = 0;

@@ -7,9 +7,9 @@ namespace gpureg::cuda {
 namespace {
 
 constexpr std::uint32_t kByBlock = 64;  // hypotheses per multiprocessor up to which each gets a thread block of its own
-constexpr int kThreads = 1024;
-constexpr std::size_t kPointBytes = sizeof(float4) + sizeof(std::uint32_t) + 1;  // and two orders of groups of 32
-constexpr std::uint32_t kSharedBlocks = 24 << 10;  // entries of the largest block table that is copied
+constexpr int kThreads = 896;
+constexpr std::size_t kPointBytes = sizeof(float2) + sizeof(float) + 1;
+constexpr std::size_t kFixedBytes = kThreads / 32 * sizeof(WarpMemory) + 512 * sizeof(Limits) + 1024;  // of shared memory beside what is staged
 
 /// Hypotheses [begin, end) of one pair.
 struct Slice {
@@ -19,81 +19,87 @@ struct Slice {
 /// A thread block per hypothesis: the shortest way through a few of them, as no warp walks over a whole cloud.
 __global__ void __launch_bounds__(kProbeThreads) score_by_block(ScoreBatch b) {
   __shared__ Limits limits[512];
+  __shared__ std::uint32_t agreeing[64];
+  __shared__ std::uint32_t needed;
   load_limits(b.limits, limits);
   const std::uint32_t total = b.offset[b.pair_count];
   for (std::uint32_t h = blockIdx.x; h < total; h += gridDim.x) {
     const std::uint32_t p = entry_of(b.offset, b.pair_count, h);
     const ScorePair& pair = b.pairs[p];
-    const std::uint32_t inliers = b.valid[h] ? count_by_block(b, pair, limits + pair.limits * 256, b.poses[h], nullptr, nullptr) : 0;
+    std::uint32_t inliers = 0;
+    if (b.valid[h]) {
+      __syncthreads();
+      if (threadIdx.x == 0) needed = *static_cast<volatile std::uint32_t*>(b.most + p);
+      __syncthreads();
+      const std::uint32_t possible = count_possible_by_block(b, pair, b.poses[h], agreeing);
+      if (possible >= needed) inliers = count_by_block(b, pair, limits + pair.limits * 256, b.poses[h]);
+    }
     if (threadIdx.x != 0) continue;
     b.inliers[h] = inliers;
     if (inliers > 0) atomicMax(b.most + p, inliers);
   }
 }
 
-template <typename Block>
-__device__ void score_slice(const ScoreBatch& b, const Slice& slice, const Limits* limits, const Staged<Block>& staged, std::uint8_t* rows,
-                            Undecided* queue, std::uint32_t* next) {
+/// next, most: of the thread block, in shared memory; most is what it knows of the pair's.
+template <typename Points>
+__device__ void score_slice(const ScoreBatch& b, const Slice& slice, const Limits* limits, const Staged<Points>& staged, WarpMemory& memory,
+                            std::uint32_t* next, std::uint32_t* most) {
   const std::uint32_t lane = threadIdx.x % 32;
   const ScorePair& pair = b.pairs[slice.pair];
+  const LookOrder look = b.look_of(slice.pair);
   for (;;) {
     std::uint32_t h = 0;
     if (lane == 0) h = atomicAdd(next, 1);
     h = __shfl_sync(~0u, h, 0);
     if (h >= slice.end) return;
+    if (b.inliers[h] != kNoValue) continue;  // a leader
     std::uint32_t inliers = 0;
-    if (b.valid[h]) {
-      inliers = count_inliers(b, pair, limits + pair.limits * 256, staged, rows, queue, b.poses[h], min(kProbeGroups, pair.order.groups),
-                              b.possible[h], b.most + slice.pair);
-      if (lane == 0 && inliers > 0) atomicMax(b.most + slice.pair, inliers);
-    }
-    if (lane == 0) b.inliers[h] = inliers;
+    if (b.valid[h]) inliers = count_inliers(b, pair, limits + pair.limits * 256, staged, memory, b.poses[h], look, most);
+    if (lane != 0) continue;
+    b.inliers[h] = inliers;
+    atomicMax(most, inliers > 0 ? max(inliers, atomicMax(b.most + slice.pair, inliers)) : *static_cast<volatile std::uint32_t*>(b.most + slice.pair));
   }
 }
 
 /// Thread blocks take slices until none is left; in a slice the warps take hypotheses: how long one takes is not known before. The source's
-/// points and the target's block table are in shared memory, so that the cache is left to the target's cells.
-__global__ void __launch_bounds__(kThreads, 1) score_slices(ScoreBatch b, const Slice* slices, std::uint32_t count, std::uint32_t point_room,
-                                                            std::uint32_t block_room) {
-  extern __shared__ float4 shared_points[];
-  std::uint32_t* shared_normals = reinterpret_cast<std::uint32_t*>(shared_points + point_room);
-  std::uint32_t* shared_order = shared_normals + point_room;
-  std::uint8_t* shared_rows = reinterpret_cast<std::uint8_t*>(shared_order + point_room / 4);
-  std::uint16_t* shared_blocks = reinterpret_cast<std::uint16_t*>(shared_rows + kThreads / 32 * kWarpBytes);
+/// points and the target's table of bricks are in shared memory where they fit; the codes are left to the cache.
+__global__ void __launch_bounds__(kThreads, 1) score_slices(ScoreBatch b, const Slice* slices, std::uint32_t count, std::uint32_t bytes) {
+  extern __shared__ float2 shared[];
+  __shared__ WarpMemory warps[kThreads / 32];
   __shared__ Limits limits[512];
-  __shared__ std::uint32_t taken, next;
+  __shared__ std::uint32_t taken, next, most;
   load_limits(b.limits, limits);
-  std::uint8_t* rows = shared_rows + threadIdx.x / 32 * kWarpBytes;
-  Undecided* queue = reinterpret_cast<Undecided*>(rows + kRowBytes);
+  WarpMemory& memory = warps[threadIdx.x / 32];
   std::uint32_t loaded = kNoValue;
   for (;;) {
     __syncthreads();
     if (threadIdx.x == 0) {
       taken = atomicAdd(b.next, 1);
-      if (taken < count) next = slices[taken].begin;
+      if (taken < count) next = slices[taken].begin, most = *static_cast<volatile std::uint32_t*>(b.most + slices[taken].pair);
     }
     __syncthreads();
     if (taken >= count) return;
     const Slice slice = slices[taken];
     const ScorePair& pair = b.pairs[slice.pair];
-    const std::uint32_t points = pair.order.groups * 32;
-    const std::uint32_t blocks = static_cast<std::uint32_t>(pair.cells.nx * pair.cells.ny * pair.cells.nz);
-    const std::uint32_t first_group = b.group_offset[slice.pair];
-    if (points > point_room || blocks > block_room) {
-      score_slice(b, slice, limits, Staged<std::int32_t>{pair.order.point, pair.order.normal, pair.cells.block, pair.cells.code, b.by_misses + first_group,
-                                                          b.by_refuted + first_group}, rows, queue, &next);
+    const std::uint32_t* order = b.by_misses + b.group_offset[slice.pair];
+    const std::uint32_t points = pair.order.groups * 32, runs = pair.cells.nx > 0 ? pair.cells.brick_runs() : 0;
+    if (runs == 0 || points * kPointBytes + runs * sizeof(uint2) > bytes) {
+      score_slice(b, slice, limits, Staged<PointsInGlobal>{{pair.order.point, order}, pair.cells.run, pair.cells.brick}, memory, &next, &most);
       continue;
     }
+    uint2* shared_runs = reinterpret_cast<uint2*>(shared + points);
+    float* z = reinterpret_cast<float*>(shared_runs + runs);
+    std::uint8_t* normal_class = reinterpret_cast<std::uint8_t*>(z + points);
     if (loaded != slice.pair) {
-      for (std::uint32_t k = threadIdx.x; k < points; k += kThreads) shared_points[k] = pair.order.point[k], shared_normals[k] = pair.order.normal[k];
-      for (std::uint32_t k = threadIdx.x; k < pair.order.groups; k += kThreads)
-        shared_order[k] = b.by_misses[first_group + k], shared_order[pair.order.groups + k] = b.by_refuted[first_group + k];
-      for (std::uint32_t k = threadIdx.x; k < blocks; k += kThreads) shared_blocks[k] = static_cast<std::uint16_t>(pair.cells.block[k]);
+      for (std::uint32_t k = threadIdx.x; k < points; k += kThreads) {
+        const float4 p = pair.order.point[order[k / 32] * 32 + k % 32];
+        shared[k] = make_float2(p.x, p.y), z[k] = p.z, normal_class[k] = static_cast<std::uint8_t>(__float_as_uint(p.w));
+      }
+      for (std::uint32_t k = threadIdx.x; k < runs; k += kThreads) shared_runs[k] = pair.cells.run[k];
       loaded = slice.pair;
       __syncthreads();
     }
-    score_slice(b, slice, limits, Staged<std::uint16_t>{shared_points, shared_normals, shared_blocks, pair.cells.code,
-                                                 shared_order, shared_order + pair.order.groups}, rows, queue, &next);
+    score_slice(b, slice, limits, Staged<PointsInShared>{{shared, z, normal_class}, shared_runs, pair.cells.brick}, memory, &next, &most);
   }
 }
 
@@ -139,18 +145,20 @@ DeviceBuffer<BestPose> score_hypotheses(Exec& exec, Span<const PairView> pairs, 
   const DirectionTables directions = direction_tables();
   const auto directions_on_device = exec.upload(&directions, 1);
   const auto limits = exec.upload(limit_tables(options));
-  const auto possible = exec.buffer<std::uint32_t>(total);
-  const auto inliers = exec.buffer<std::uint32_t>(total);
+  const auto inliers = exec.filled<std::uint32_t>(total, 0xff);
   const auto leaders = exec.filled<unsigned long long>(static_cast<std::size_t>(count) * kLeaders, 0);
   const auto most = exec.filled<std::uint32_t>(count, 0);
   const auto next = exec.filled<std::uint32_t>(1, 0);
   const Segments groups = make_segments(exec, count, [&](std::size_t p) { return host_pairs[p].order.groups; });
-  const auto misses = exec.filled<std::uint32_t>(groups.total(), 0), refuted = exec.filled<std::uint32_t>(groups.total(), 0);
-  const auto by_misses = exec.buffer<std::uint32_t>(groups.total()), by_refuted = exec.buffer<std::uint32_t>(groups.total());
+  const std::size_t slots = std::size_t(groups.total()) * 32;
+  const auto misses = exec.filled<std::uint32_t>(groups.total(), 0), refuted = exec.filled<std::uint32_t>(slots, 0);
+  const auto by_misses = exec.buffer<std::uint32_t>(groups.total()), look_index = exec.buffer<std::uint32_t>(slots);
+  const auto look_point = exec.buffer<float4>(slots), look_normal = exec.buffer<float4>(slots);
   const ScoreBatch batch{pairs_on_device.data(), count, hypotheses.segments->on_device.data(), hypotheses.pose.data(), hypotheses.valid.data(),
                          hypotheses.id, inlier_test(options.max_correspondence_distance, options.max_normal_angle), limits.data(),
-                         directions_on_device.data(), level_thresholds(options.max_normal_angle), possible.data(), inliers.data(), leaders.data(), most.data(), next.data(), groups.on_device.data(), misses.data(), refuted.data(), by_misses.data(),
-                         by_refuted.data()};
+                         directions_on_device.data(), code_test(options.max_normal_angle), inliers.data(), leaders.data(), most.data(), next.data(),
+                         groups.on_device.data(), misses.data(), refuted.data(), by_misses.data(),
+                         {look_point.data(), look_normal.data(), look_index.data()}};
   if (total > 0) {
     const unsigned processors = static_cast<unsigned>(exec.multiprocessors());
     if (total <= processors * kByBlock) {
@@ -158,23 +166,20 @@ DeviceBuffer<BestPose> score_hypotheses(Exec& exec, Span<const PairView> pairs, 
       check_launch("score_by_block");
       return select_best(exec, batch, total);
     }
-    score_leaders(exec, batch, total);
+    score_leaders(exec, batch);
+    order_points(exec, batch, groups.largest);
     const std::vector<Slice> slices = cut_slices(*hypotheses.segments, processors);
     const auto slices_on_device = exec.upload(slices);
-    std::uint32_t most_points = 0, most_blocks = 0;
+    // What is not taken of the multiprocessor's memory is cache, which has the codes.
+    const std::size_t room = exec.shared_bytes_per_block() > kFixedBytes ? exec.shared_bytes_per_block() - kFixedBytes : 0;
+    std::size_t bytes = 0;
     for (const ScorePair& pair : host_pairs) {
-      most_points = std::max(most_points, pair.order.groups * 32);
-      most_blocks = std::max(most_blocks, static_cast<std::uint32_t>(pair.cells.nx * pair.cells.ny * pair.cells.nz));
+      const std::size_t wanted = std::size_t(pair.order.groups) * 32 * kPointBytes + pair.cells.brick_runs() * sizeof(uint2);
+      if (pair.cells.nx > 0 && wanted <= room) bytes = std::max(bytes, wanted);
     }
-    // The table numbers blocks with 16 bits. A pair of which something does not fit is read from global memory.
-    const std::uint32_t block_room = std::min(most_blocks, kSharedBlocks);
-    const std::size_t fixed = kThreads / 32 * kWarpBytes + block_room * sizeof(std::uint16_t) + 8192;
-    const std::uint32_t point_room =
-        std::min(most_points, static_cast<std::uint32_t>(exec.shared_bytes_per_block() > fixed ? (exec.shared_bytes_per_block() - fixed) / kPointBytes / 32 * 32 : 0));
-    const std::size_t bytes = point_room * kPointBytes + kThreads / 32 * kWarpBytes + block_room * sizeof(std::uint16_t);
     check(cudaFuncSetAttribute(score_slices, cudaFuncAttributeMaxDynamicSharedMemorySize, static_cast<int>(bytes)), "cudaFuncSetAttribute");
     score_slices<<<std::min(static_cast<unsigned>(slices.size()), processors), kThreads, bytes, exec.stream()>>>(
-        batch, slices_on_device.data(), static_cast<std::uint32_t>(slices.size()), point_room, block_room);
+        batch, slices_on_device.data(), static_cast<std::uint32_t>(slices.size()), static_cast<std::uint32_t>(bytes));
     check_launch("score_slices");
   }
   return select_best(exec, batch, total);

@@ -2,14 +2,22 @@
 #pragma once
 
 #include "bounds.cuh"
+#include "closest_cells.cuh"
 #include "directions.hpp"
 #include "warp.cuh"
 
 namespace gpureg::cuda {
 
 constexpr std::uint32_t kProbeGroups = 4;   ///< groups of 32 points that tell promising hypotheses from others
-constexpr std::uint32_t kLeaders = 16;      ///< promising hypotheses of a pair that are scored first
+constexpr std::uint32_t kLeaders = 32;      ///< promising hypotheses of a pair that are scored first
 constexpr int kProbeThreads = 256;
+
+/// Points with the class of their normal, normals (w: 0 where there is none), and their indices in the cloud.
+struct LookOrder {
+  float4* point;
+  float4* normal;
+  std::uint32_t* index;
+};
 
 /// What the kernels of scoring share.
 struct ScoreBatch {
@@ -22,17 +30,21 @@ struct ScoreBatch {
   InlierTest test;
   const Limits* limits;             ///< 2 x 256
   const DirectionTables* directions;
-  LevelThresholds thresholds;
-  std::uint32_t* possible;          ///< per hypothesis: points of the probe that may be inliers
-  std::uint32_t* inliers;           ///< per hypothesis; 0 where it was given up
+  CodeTest code_test;
+  std::uint32_t* inliers;           ///< per hypothesis; kNoValue before it is scored, 0 where it was given up
   unsigned long long* leaders;      ///< pairs x kLeaders: (possible + 1, ~number), the largest of each residue class; 0: none
   std::uint32_t* most;              ///< per pair: inliers of the best so far
   std::uint32_t* next;              ///< slices handed out
-  const std::uint32_t* group_offset;  ///< per pair, of the arrays by group
-  std::uint32_t* misses;            ///< per group: points that the leaders' poses leave without a partner
-  std::uint32_t* refuted;           ///< per group: of those, the ones that look like inliers until their closest point is found
-  std::uint32_t* by_misses;         ///< groups of a pair, those with the most misses first, but the probe's before all
-  std::uint32_t* by_refuted;        ///< the same by refuted points
+  const std::uint32_t* group_offset;  ///< per pair, of the arrays by group; 32 times that, of the arrays by point
+  std::uint32_t* misses;            ///< per group: points that a sample of the hypotheses leaves without a partner, by the codes
+  std::uint32_t* refuted;           ///< per point of the scoring order: how often it looks like an inlier and is none
+  std::uint32_t* by_misses;         ///< groups of a pair, those with the most misses first
+  LookOrder look;                   ///< points of a pair, the most often refuted first
+
+  __device__ LookOrder look_of(std::uint32_t pair) const {
+    const std::size_t at = std::size_t(group_offset[pair]) * 32;
+    return {look.point + at, look.normal + at, look.index + at};
+  }
 };
 
 /// Both tables into shared memory, by all threads of the block.
@@ -47,7 +59,7 @@ __device__ inline unsigned long long support_by_search(const ScorePair& pair, co
   inliers = 0;
   unsigned long long residual = 0;
   for (std::uint32_t i = first; i < pair.source.size; i += step) {
-    const Closest found = find_closest(pair.target.closest, pair.target.points, apply(rigid, pair.source.points[i]), test.max_squared);
+    const Closest found = find_closest(pair.target, pair.cells, apply(rigid, pair.source.points[i]), test.max_squared);
     if (found.index == kNoValue) continue;
     if (!normals_agree(rotate(rigid, pair.source.normals[i]), pair.target.normals[found.index], test.min_cosine)) continue;
     ++inliers;
@@ -56,8 +68,11 @@ __device__ inline unsigned long long support_by_search(const ScorePair& pair, co
   return residual;
 }
 
-/// Finds promising hypotheses of each pair, scores them, and learns from them in which order to look at the groups of points.
-void score_leaders(Exec& exec, const ScoreBatch& batch, std::uint32_t total);
+/// Finds promising hypotheses of each pair and scores them: what they reach the others must beat.
+void score_leaders(Exec& exec, const ScoreBatch& batch);
+
+/// Learns from a sample of each pair's hypotheses in which order to look at the points.
+void order_points(Exec& exec, const ScoreBatch& batch, std::uint32_t most_groups);
 
 /// Chooses the best of the hypotheses whose `inliers` are the pair's most: smallest residual, then lowest number.
 DeviceBuffer<BestPose> select_best(Exec& exec, const ScoreBatch& batch, std::uint32_t total);

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "scoring_data.hpp"
 
+#include <cub/block/block_scan.cuh>
+
 #include <numeric>
 
 #include "algorithm/cell_summary.hpp"
@@ -15,6 +17,8 @@ constexpr int kCells = ClosestGridView::kBlockCells;
 /// Tables larger than this (a cloud with far stray points) are not worth their memory: then every point is looked at.
 constexpr std::uint64_t kMaxBlocks = std::uint64_t(1) << 22;
 
+constexpr int kNumberThreads = 512;
+
 struct Slot {
   CloudView view;
   CellSummaries summaries;
@@ -26,16 +30,54 @@ struct Slot {
   std::uint32_t point_offset;  // in the batch
 };
 
-__global__ void fill_block_tables(const Slot* slots) {
+struct BrickPlace {
+  std::uint32_t run, bit;
+};
+
+/// Where a quarter of a block is noted.
+__device__ BrickPlace place_of_brick(const CellSummaries& v, Cell block, std::uint32_t upper_y, std::uint32_t upper_z) {
+  const auto coordinate = [](std::int32_t c, float offset) { return static_cast<std::uint32_t>(c + static_cast<std::int32_t>(offset) / 8 + 1); };
+  const std::uint32_t x = coordinate(block.x, v.offset.x), y = 2 * coordinate(block.y, v.offset.y) + upper_y,
+                      z = 2 * coordinate(block.z, v.offset.z) + upper_z;
+  return {(z * v.brick_rows_y() + y) * v.brick_words_x() + x / 32, 0x80000000u >> (x % 32)};
+}
+
+/// Sets the bit of each brick that has a cell with candidates.
+__global__ void mark_bricks(const Slot* slots) {
   const Slot& s = slots[blockIdx.y];
   const CellSummaries& v = s.summaries;
   if (v.nx == 0) return;
-  for (std::uint32_t b = blockIdx.x * blockDim.x + threadIdx.x; b < s.block_count; b += gridDim.x * blockDim.x) {
-    const Cell c = s.blocks[b];
-    const std::int32_t x = c.x * 8 + static_cast<std::int32_t>(v.offset.x), y = c.y * 8 + static_cast<std::int32_t>(v.offset.y),
-                       z = c.z * 8 + static_cast<std::int32_t>(v.offset.z);
-    v.block[(static_cast<std::size_t>(z / 8) * v.ny + y / 8) * v.nx + x / 8] = static_cast<std::int32_t>(b + 1);
+  for (std::uint32_t k = blockIdx.x * blockDim.x + threadIdx.x; k < s.block_count * 4; k += gridDim.x * blockDim.x) {
+    const std::uint32_t b = k / 4, upper_y = k & 1, upper_z = (k >> 1) & 1;
+    const std::uint32_t* start = s.view.closest.cell_start.data + static_cast<std::size_t>(b) * (kCells + 1);
+    bool any = false;
+    for (std::uint32_t row = 0; row < 16; ++row) {
+      const std::uint32_t cell = ((upper_z * 4 + row / 4) * 8 + upper_y * 4 + row % 4) * 8;
+      any = any || start[cell] != start[cell + 8];
+    }
+    if (!any) continue;
+    const BrickPlace place = place_of_brick(v, s.blocks[b], upper_y, upper_z);
+    atomicOr(&v.run[place.run].x, place.bit);
   }
+}
+
+/// Numbers them in the order of the runs. A thread block per cloud.
+__global__ void __launch_bounds__(kNumberThreads) number_bricks(const Slot* slots) {
+  using Scan = cub::BlockScan<std::uint32_t, kNumberThreads>;
+  __shared__ typename Scan::TempStorage storage;
+  const CellSummaries& v = slots[blockIdx.x].summaries;
+  if (v.nx == 0) return;
+  const std::uint32_t runs = v.brick_runs();
+  std::uint32_t before = 0;
+  for (std::uint32_t first = 0; first < runs; first += kNumberThreads) {
+    const std::uint32_t k = first + threadIdx.x;
+    std::uint32_t upto, all;
+    Scan(storage).InclusiveSum(k < runs ? static_cast<std::uint32_t>(__popc(static_cast<int>(v.run[k].x))) : 0u, upto, all);
+    if (k < runs) v.run[k].y = 16 * (before + upto);
+    before += all;
+    __syncthreads();
+  }
+  if (threadIdx.x == 0) v.run[runs] = make_uint2(0, before);
 }
 
 __global__ void summarize(const Slot* slots, const DirectionTables* tables) {
@@ -51,10 +93,18 @@ __global__ void summarize(const Slot* slots, const DirectionTables* tables) {
     const Span<const std::uint32_t> candidates{s.view.closest.candidates.data + start[0], start[1] - start[0]};
     const bool empty = candidates.size == 0;
     const bool short_list = candidates.size < 256 && start[0] < (1u << 24);
-    s.summaries.word[kCells + k] =
-        empty ? 0u : summarize_cell(candidates, cell_center(c, s.geometry.cell_size), s.geometry, s.view.points, s.view.normals);
-    s.summaries.code[kCells + k] = empty ? std::uint8_t(0) : code_of_cell(*tables, candidates, s.view.normals);
-    s.summaries.list[kCells + k] = short_list ? start[0] << 8 | static_cast<std::uint32_t>(candidates.size) : kNoValue;
+    // Eight lanes have the cells of a word.
+    std::uint32_t codes = empty ? 0u : code_of_cell(*tables, candidates, s.view.normals) << 4 * (cell & 7);
+    for (int step = 1; step < 8; step *= 2) codes |= __shfl_xor_sync(~0u, codes, step);
+    const BrickPlace place = place_of_brick(s.summaries, block, (cell >> 5) & 1, (cell >> 8) & 1);
+    const uint2 run = s.summaries.run[place.run];
+    if ((run.x & place.bit) == 0) continue;
+    const std::uint32_t from_here = static_cast<std::uint32_t>(__popc(static_cast<int>(run.x & (place.bit * 2 - 1))));
+    const std::uint32_t word = run.y - 16 * from_here + ((cell >> 6) & 3) * 4 + ((cell >> 3) & 3);
+    if ((cell & 7) == 0) s.summaries.brick[word] = codes;
+    s.summaries.cell[std::size_t(word) * 8 + (cell & 7)] =
+        make_uint2(empty ? 0u : summarize_cell(candidates, cell_center(c, s.geometry.cell_size), s.geometry, s.view.points, s.view.normals),
+                   short_list ? start[0] << 8 | static_cast<std::uint32_t>(candidates.size) : kNoValue);
   }
 }
 
@@ -94,12 +144,12 @@ __global__ void write_order(const Slot* slots, const std::uint32_t* index, const
   for (std::uint32_t k = blockIdx.x * blockDim.x + threadIdx.x; k < s.order.groups * 32; k += gridDim.x * blockDim.x) {
     const std::uint32_t from = static_cast<std::uint32_t>(static_cast<std::uint64_t>(k / 32) * s.group_step % s.order.groups) * 32 + k % 32;
     const float nan = __uint_as_float(0x7fc00000u);
-    float4 point = make_float4(nan, nan, nan, __uint_as_float(kClassNone * 16));
+    float4 point = make_float4(nan, nan, nan, __uint_as_float(kClassNone));
     std::uint32_t normal = kPackedZero, i = kNoValue;
     if (from < s.view.size) {
       i = index[s.point_offset + from];
       const Vec3 p = s.view.points[i], n = s.view.normals[i];
-      point = make_float4(p.x, p.y, p.z, __uint_as_float(class_of_normal(*tables, n) * 16));
+      point = make_float4(p.x, p.y, p.z, __uint_as_float(class_of_normal(*tables, n)));
       normal = pack_normal(n);
     }
     s.order.point[k] = point;
@@ -115,7 +165,9 @@ ScoringLayout scoring_layout(const CudaCloud& cloud, const CellRange& blocks) {
   l.first_block = blocks.lo;
   const std::uint64_t nx = static_cast<std::uint64_t>(blocks.hi.x - blocks.lo.x + 1), ny = static_cast<std::uint64_t>(blocks.hi.y - blocks.lo.y + 1),
                       nz = static_cast<std::uint64_t>(blocks.hi.z - blocks.lo.z + 1);
-  const bool fits = nx <= kMaxBlocks && ny <= kMaxBlocks && nz <= kMaxBlocks && nx * ny <= kMaxBlocks && nx * ny * nz <= kMaxBlocks;
+  CellSummaries shape;
+  shape.nx = static_cast<std::int32_t>(nx), shape.ny = static_cast<std::int32_t>(ny), shape.nz = static_cast<std::int32_t>(nz);
+  const bool fits = nx <= kMaxBlocks && ny <= kMaxBlocks && nz <= kMaxBlocks && nx * ny <= kMaxBlocks && nx * ny * nz <= kMaxBlocks && shape.brick_runs() <= kMaxBlocks;
   if (fits) l.nx = static_cast<std::int32_t>(nx), l.ny = static_cast<std::int32_t>(ny), l.nz = static_cast<std::int32_t>(nz);
   const auto take = [&](std::size_t bytes) {
     const std::size_t at = l.bytes;
@@ -123,14 +175,13 @@ ScoringLayout scoring_layout(const CudaCloud& cloud, const CellRange& blocks) {
     return at;
   };
   const std::size_t padded = (cloud.size + 31) / 32 * 32;
-  l.table = take(fits ? nx * ny * nz * sizeof(std::int32_t) : 0);
-  l.words = take(fits ? (std::size_t(cloud.block_count) + 1) * kCells * sizeof(std::uint32_t) : 0);
-  l.lists = take(fits ? (std::size_t(cloud.block_count) + 1) * kCells * sizeof(std::uint32_t) : 0);
   l.candidates = take(cloud.candidate_count * sizeof(float4));
   l.points = take(padded * sizeof(float4));
   l.normals = take(padded * sizeof(std::uint32_t));
   l.index = take(padded * sizeof(std::uint32_t));
-  l.codes = take(fits ? (std::size_t(cloud.block_count) + 1) * kCells : 0);
+  l.cells = take(fits ? std::size_t(cloud.block_count) * kCells * sizeof(uint2) : 0);
+  l.runs = take(fits ? (std::size_t(shape.brick_runs()) + 1) * sizeof(uint2) : 0);
+  l.bricks = take(fits ? std::size_t(cloud.block_count) * 4 * 16 * sizeof(std::uint32_t) : 0);
   return l;
 }
 
@@ -140,15 +191,14 @@ void place_scoring_data(const ScoringLayout& l, const ClosestGeometry& geometry,
   v.offset = {-static_cast<float>(l.first_block.x) * 8.0f, -static_cast<float>(l.first_block.y) * 8.0f, -static_cast<float>(l.first_block.z) * 8.0f};
   v.nx = l.nx, v.ny = l.ny, v.nz = l.nz;
   v.block_count = cloud.block_count;
-  v.block = reinterpret_cast<std::int32_t*>(memory + l.table);
-  v.word = reinterpret_cast<std::uint32_t*>(memory + l.words);
-  v.list = reinterpret_cast<std::uint32_t*>(memory + l.lists);
   v.candidate = reinterpret_cast<float4*>(memory + l.candidates);
   cloud.order.groups = (cloud.size + 31) / 32;
   cloud.order.point = reinterpret_cast<float4*>(memory + l.points);
   cloud.order.normal = reinterpret_cast<std::uint32_t*>(memory + l.normals);
   cloud.order.index = reinterpret_cast<std::uint32_t*>(memory + l.index);
-  v.code = reinterpret_cast<std::uint8_t*>(memory + l.codes);
+  v.cell = reinterpret_cast<uint2*>(memory + l.cells);
+  v.run = reinterpret_cast<uint2*>(memory + l.runs);
+  v.brick = reinterpret_cast<std::uint32_t*>(memory + l.bricks);
 }
 
 void fill_scoring_data(Exec& exec, const std::vector<std::shared_ptr<CudaCloud>>& clouds, const std::vector<ClosestGeometry>& geometry) {
@@ -170,8 +220,10 @@ void fill_scoring_data(Exec& exec, const std::vector<std::shared_ptr<CudaCloud>>
   auto keys = exec.buffer<std::uint64_t>(total);
   auto index = exec.buffer<std::uint32_t>(total);
   const unsigned count = static_cast<unsigned>(clouds.size());
-  fill_block_tables<<<dim3(8, count), 128, 0, exec.stream()>>>(on_device.data());
-  check_launch("fill_block_tables");
+  mark_bricks<<<dim3(8, count), 128, 0, exec.stream()>>>(on_device.data());
+  check_launch("mark_bricks");
+  number_bricks<<<count, kNumberThreads, 0, exec.stream()>>>(on_device.data());
+  check_launch("number_bricks");
   summarize<<<dim3(128, count), 256, 0, exec.stream()>>>(on_device.data(), tables.data());
   check_launch("summarize");
   copy_candidates<<<dim3(128, count), 256, 0, exec.stream()>>>(on_device.data());

@@ -10,7 +10,7 @@ namespace gpureg::cuda {
 struct ScoringLayout {
   Cell first_block;                  ///< of the table
   std::int32_t nx, ny, nz;           ///< 0: too wide for a table
-  std::size_t table, words, lists, candidates, codes, points, normals, index;  ///< where each array begins
+  std::size_t runs, bricks, cells, candidates, points, normals, index;  ///< where each array begins
   std::size_t bytes;
 };
 

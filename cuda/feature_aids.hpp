@@ -1,0 +1,33 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <vector>
+
+#include "nearest_feature.hpp"
+#include "products.hpp"
+
+/// What the feature search reads beside the features: copies for the tensor cores, and how far off their products may be. Part of assemble().
+namespace gpureg::cuda {
+
+/// Where each array of a FeatureAids begins in a cloud's memory.
+struct FeatureAidsPlaces {
+  static constexpr int kArrays = 5;
+  std::size_t begin[kArrays];
+};
+
+/// Bytes of array k for so many features; 0 where the dimension forbids it.
+std::size_t feature_aids_bytes(int k, std::size_t size, std::uint32_t dimension);
+FeatureAids feature_aids_at(char* memory, const FeatureAidsPlaces& places, bool centred);
+
+/// Features of one cloud; all pointers on the device.
+struct FeaturesToMeasure {
+  const float* features;
+  const std::uint8_t* valid;
+  std::uint32_t size, dimension;
+  FeatureAids aids;           ///< laid out, to be filled
+  std::uint32_t* extreme;     ///< counts features that are too long for the tensor cores
+};
+
+void fill_feature_aids(Exec& exec, const std::vector<FeaturesToMeasure>& clouds);
+
+}  // namespace gpureg::cuda

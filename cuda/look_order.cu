@@ -1,0 +1,140 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "count_inliers.cuh"
+
+namespace gpureg::cuda {
+namespace {
+
+constexpr std::uint32_t kSamples = 64;  // hypotheses of a pair that tell where the others fail: its leaders, and some at equal distances
+constexpr std::uint32_t kPoses = 8;     // that a thread moves its point by, at most
+constexpr int kThreads = 256;
+constexpr int kOrderThreads = 1024;
+constexpr std::uint32_t kKeys = kSamples + 1;
+
+/// A thread per point: how many of a few hypotheses leave it without a partner by its cell's code, and how many only by its closest point.
+/// x: points, y: hypotheses, z: pairs.
+__global__ void __launch_bounds__(kThreads) try_samples(ScoreBatch b, std::uint32_t poses_a_thread) {
+  __shared__ std::uint32_t agreeing[kPoses][64];
+  __shared__ Rigid poses[kPoses];
+  __shared__ std::uint32_t valid[kPoses];
+  __shared__ Limits all_limits[512];
+  const std::uint32_t p = blockIdx.z, begin = b.offset[p], count = b.offset[p + 1] - begin;
+  const ScorePair& pair = b.pairs[p];
+  if (count == 0 || pair.cells.nx == 0 || blockIdx.x * kThreads >= pair.order.groups * 32) return;
+  for (std::uint32_t k = threadIdx.x; k < poses_a_thread * 64; k += kThreads) {
+    const std::uint32_t sample = blockIdx.y * poses_a_thread + k / 64;
+    const unsigned long long leader = sample < kLeaders ? b.leaders[p * kLeaders + sample] : 0;
+    const std::uint32_t h = begin + (leader != 0 ? ~static_cast<std::uint32_t>(leader)
+                                                 : static_cast<std::uint32_t>(static_cast<std::uint64_t>(sample) * count / kSamples));
+    const Rigid rigid = to_rigid(b.poses[h]);
+    agreeing[k / 64][k % 64] = agreeing_codes(*b.directions, b.code_test, rigid, k % 64);
+    if (k % 64 != 0) continue;
+    poses[k / 64] = rigid;
+    valid[k / 64] = b.valid[h];
+  }
+  load_limits(b.limits, all_limits);
+  const Limits* limits = all_limits + pair.limits * 256;
+  const std::uint32_t k = blockIdx.x * kThreads + threadIdx.x;
+  if (k >= pair.order.groups * 32) return;
+  const float4 point = __ldg(pair.order.point + k);
+  const std::uint32_t normal = __ldg(pair.order.normal + k);
+  std::uint32_t misses = 0, refuted = 0;
+  for (std::uint32_t s = 0; s < poses_a_thread; ++s) {
+    if (!valid[s]) continue;
+    const BrickMotion motion(poses[s], pair.cells);
+    const BrickCell cell = motion.locate(point);
+    const std::uint32_t word = motion.word_of(cell, pair.cells.run);
+    const bool possible = word != kNoValue && code_agrees(__ldg(pair.cells.brick + word), cell, agreeing[s][__float_as_uint(point.w)]);
+    misses += !possible;
+    if (!possible) continue;
+    const uint2 summary = __ldg(pair.cells.cell + std::size_t(word) * 8 + (cell.x & 7));
+    bool certain;
+    const bool possible_still = may_be_inlier(poses[s], limits, summary.x, normal, certain);
+    refuted += !possible_still || (!certain && !is_inlier(pair, b.test, poses[s], point, normal, pair.order.index + k, summary.y));
+  }
+  const std::size_t first = b.group_offset[p];
+  misses = warp_sum(misses);
+  if (threadIdx.x % 32 == 0 && misses > 0) atomicAdd(b.misses + first + k / 32, misses);
+  if (refuted > 0) atomicAdd(b.refuted + first * 32 + k, refuted);
+}
+
+/// A thread block per pair. Groups: each counts how many come before it. Points: counting sort, stable, so that neighbours stay together;
+/// a warp has a stretch of them.
+__global__ void __launch_bounds__(kOrderThreads) sort_by_failures(ScoreBatch b) {
+  constexpr std::uint32_t kWarps = kOrderThreads / 32;
+  __shared__ std::uint32_t place[kKeys][kWarps];
+  __shared__ std::uint32_t of_key[kKeys];
+  const std::uint32_t p = blockIdx.x, begin = b.group_offset[p], groups = b.group_offset[p + 1] - begin;
+  const ScorePair& pair = b.pairs[p];
+  if (b.offset[p] == b.offset[p + 1] || pair.cells.nx == 0) return;
+  for (std::uint32_t g = threadIdx.x; g < groups; g += kOrderThreads) {
+    const std::uint32_t misses = b.misses[begin + g];
+    std::uint32_t before = 0;
+    for (std::uint32_t o = 0; o < groups; ++o) {
+      const std::uint32_t m = b.misses[begin + o];
+      before += m > misses || (m == misses && o < g);
+    }
+    b.by_misses[begin + before] = g;
+  }
+  const std::uint32_t* refuted = b.refuted + std::size_t(begin) * 32;
+  const std::uint32_t warp = threadIdx.x / 32, lane = threadIdx.x % 32, stretch = (groups + kWarps - 1) / kWarps * 32;
+  const std::uint32_t first = min(warp * stretch, groups * 32), last = min(first + stretch, groups * 32);
+  for (std::uint32_t k = threadIdx.x; k < kKeys * kWarps; k += kOrderThreads) (&place[0][0])[k] = 0;
+  __syncthreads();
+  // Most refuted: key 0.
+  const auto key_of = [&](std::uint32_t k) { return kSamples - min(refuted[k], kSamples); };
+  for (std::uint32_t k = first + lane; k < last; k += 32) atomicAdd(&place[key_of(k)][warp], 1u);
+  __syncthreads();
+  if (threadIdx.x < kKeys) {
+    std::uint32_t sum = 0;
+    for (std::uint32_t w = 0; w < kWarps; ++w) {
+      const std::uint32_t n = place[threadIdx.x][w];
+      place[threadIdx.x][w] = sum;
+      sum += n;
+    }
+    of_key[threadIdx.x] = sum;
+  }
+  __syncthreads();
+  if (threadIdx.x == 0) {
+    std::uint32_t sum = 0;
+    for (std::uint32_t key = 0; key < kKeys; ++key) {
+      const std::uint32_t n = of_key[key];
+      of_key[key] = sum;
+      sum += n;
+    }
+  }
+  __syncthreads();
+  const LookOrder look = b.look_of(p);
+  for (std::uint32_t k = first + lane; k < last; k += 32) {
+    const std::uint32_t key = key_of(k);
+    std::uint32_t same = ~0u;  // lanes with the same key
+#pragma unroll
+    for (int bit = 0; bit < 7; ++bit) {
+      const bool one = (key >> bit & 1) != 0;
+      const std::uint32_t ones = __ballot_sync(~0u, one);
+      same &= one ? ones : ~ones;
+    }
+    const std::uint32_t before = static_cast<std::uint32_t>(__popc(static_cast<int>(same & ((1u << lane) - 1))));
+    const std::uint32_t to = of_key[key] + place[key][warp] + before;
+    __syncwarp();
+    if (before == 0) place[key][warp] += static_cast<std::uint32_t>(__popc(static_cast<int>(same)));
+    __syncwarp();
+    look.point[to] = pair.order.point[k];
+    const std::uint32_t i = pair.order.index[k];
+    const Vec3 n = i != kNoValue ? pair.source.normals[i] : Vec3{0, 0, 0};
+    look.normal[to] = make_float4(n.x, n.y, n.z, is_zero(n) ? 0.0f : 1.0f);
+    look.index[to] = i;
+  }
+}
+
+}  // namespace
+
+void order_points(Exec& exec, const ScoreBatch& batch, std::uint32_t most_groups) {
+  if (most_groups == 0) return;
+  const std::uint32_t poses = batch.pair_count < 8 ? 2 : kPoses;  // few pairs: more threads
+  try_samples<<<dim3(blocks_for(std::size_t(most_groups) * 32, kThreads), kSamples / poses, batch.pair_count), kThreads, 0, exec.stream()>>>(batch, poses);
+  check_launch("try_samples");
+  sort_by_failures<<<batch.pair_count, kOrderThreads, 0, exec.stream()>>>(batch);
+  check_launch("sort_by_failures");
+}
+
+}  // namespace gpureg::cuda
