@@ -15,23 +15,31 @@ struct BrickCell {
   std::uint32_t x, y, z;
 };
 
-/// Finds words of bricks: 16 a brick, in the order (z, y).
+/// Number of the word that a cell's code is in, if there is one: 16 words a brick, in the order (z, y).
+struct BrickWord {
+  std::uint32_t number;
+  bool there;
+};
+
 struct BrickTable {
   std::uint32_t rows_y, words_x, bias;
 
-  /// high: bits above the coordinates, a multiple of 2^22.
   BrickTable() = default;
+  /// high: bits above the coordinates, a multiple of 2^22.
   __device__ BrickTable(const CellSummaries& v, std::uint32_t high)
       : rows_y(v.brick_rows_y()), words_x(v.brick_words_x()), bias(((high >> 2) * rows_y + (high >> 2)) * words_x + (high >> 8)) {}
 
-  /// Number of the word of a cell in the table, kNoValue where there is no brick.
-  __device__ std::uint32_t word_of(BrickCell c, const uint2* runs) const {
+  /// The cell is in the table.
+  __device__ BrickWord find(BrickCell c, const uint2* runs) const {
     const uint2 run = runs[((c.z >> 2) * rows_y + (c.y >> 2)) * words_x + (c.x >> 8) - bias];
     const std::uint32_t from_here = __funnelshift_l(0u, run.x, c.x >> 3);
-    const std::uint32_t word = run.y - 16u * static_cast<std::uint32_t>(__popc(static_cast<int>(from_here))) + (c.z & 3) * 4 + (c.y & 3);
-    return static_cast<std::int32_t>(from_here) < 0 ? word : kNoValue;
+    return {run.y - 16u * static_cast<std::uint32_t>(__popc(static_cast<int>(from_here))) + (c.z & 3) * 4 + (c.y & 3),
+            static_cast<std::int32_t>(from_here) < 0};
   }
 };
+
+/// Where the summary of a cell is.
+__device__ inline std::size_t cell_in_bricks(BrickWord word, BrickCell c) { return std::size_t(word.number) * 8 + (c.x & 7); }
 
 /// A motion in units of the padded table. Rounding may differ from apply() by a small part of a cell, which the margin of the closest-point
 /// grid covers.
@@ -66,7 +74,7 @@ struct BrickMotion : BrickTable {
   }
 };
 
-/// Whether the code of a cell, given its word (0: none), is among the codes that agree with a class of normals (agreeing_codes()).
+/// Whether the code of a cell, given its word (0 where there is none), is among the codes that agree with a class of normals (agreeing_codes()).
 __device__ inline bool code_agrees(std::uint32_t word, BrickCell c, std::uint32_t agreeing) {
   return (__funnelshift_r(agreeing, agreeing, __funnelshift_r(word, word, c.x << 2)) & 1u) != 0;
 }

@@ -36,9 +36,9 @@ __device__ inline Closest find_closest(const CloudView& cloud, const CellSummari
                     static_cast<std::uint32_t>(floor_to_int(fz) + static_cast<std::int32_t>(cells.offset.z) + 8)};
   const auto inside = [](std::uint32_t v, std::int32_t blocks) { return v >> 3 < static_cast<std::uint32_t>(blocks) + 2; };
   if (!inside(c.x, cells.nx) || !inside(c.y, cells.ny) || !inside(c.z, cells.nz)) return none;
-  const std::uint32_t word = BrickTable(cells, 0).word_of(c, cells.run);
-  if (word == kNoValue) return none;
-  const std::uint32_t list = __ldg(&cells.cell[std::size_t(word) * 8 + (c.x & 7)].y), first = list >> 8, last = first + (list & 255u);
+  const BrickWord word = BrickTable(cells, 0).find(c, cells.run);
+  if (!word.there) return none;
+  const std::uint32_t list = __ldg(&cells.cell[cell_in_bricks(word, c)].y), first = list >> 8, last = first + (list & 255u);
   if (list == kNoValue) return find_closest(cloud.closest, cloud.points, q, max_squared);
   std::uint32_t best = kNoValue;
   float best_squared = 3.402823466e38f;

@@ -48,16 +48,15 @@ template <std::uint32_t N, typename Points>
 __device__ std::uint32_t count_possible(const BrickMotion& motion, const Staged<Points>& staged, const WarpMemory& memory, std::uint32_t begin) {
   float4 p[N];
   BrickCell cell[N];
-  std::uint32_t word[N];
+  std::uint32_t word[N] = {};
 #pragma unroll
   for (std::uint32_t k = 0; k < N; ++k) p[k] = staged.points(begin + k, threadIdx.x % 32);
 #pragma unroll
   for (std::uint32_t k = 0; k < N; ++k) {
     cell[k] = motion.locate(p[k]);
-    word[k] = motion.word_of(cell[k], staged.runs);
+    const BrickWord at = motion.find(cell[k], staged.runs);
+    if (at.there) word[k] = staged.bricks[at.number];
   }
-#pragma unroll
-  for (std::uint32_t k = 0; k < N; ++k) word[k] = word[k] == kNoValue ? 0u : staged.bricks[word[k]];
   std::uint32_t possible = 0;
 #pragma unroll
   for (std::uint32_t k = 0; k < N; ++k) possible += code_agrees(word[k], cell[k], memory.agreeing[__float_as_uint(p[k].w)]);
@@ -76,10 +75,10 @@ struct Look {
 template <typename Points>
 __device__ void finish_look(const ScorePair& pair, const Staged<Points>& staged, const WarpMemory& memory, Look& look) {
   const BrickCell cell = memory.motion.locate(look.point);
-  const std::uint32_t word = memory.motion.word_of(cell, staged.runs);
-  look.counted = word != kNoValue && code_agrees(staged.bricks[word], cell, memory.agreeing[__float_as_uint(look.point.w)]);
+  const BrickWord word = memory.motion.find(cell, staged.runs);
+  look.counted = word.there && code_agrees(staged.bricks[word.number], cell, memory.agreeing[__float_as_uint(look.point.w)]);
   look.summary = make_uint2(0, 0);
-  if (look.counted) look.summary = __ldg(pair.cells.cell + std::size_t(word) * 8 + (cell.x & 7));
+  if (look.counted) look.summary = __ldg(pair.cells.cell + cell_in_bricks(word, cell));
 }
 
 template <typename Points>
@@ -164,8 +163,8 @@ __device__ inline std::uint32_t count_possible_by_block(const ScoreBatch& b, con
   for (std::uint32_t k = threadIdx.x; k < points; k += blockDim.x) {
     const float4 point = __ldg(pair.order.point + k);
     const BrickCell cell = motion.locate(point);
-    const std::uint32_t word = motion.word_of(cell, pair.cells.run);
-    mine += code_agrees(word == kNoValue ? 0u : __ldg(pair.cells.brick + word), cell, agreeing[__float_as_uint(point.w)]);
+    const BrickWord word = motion.find(cell, pair.cells.run);
+    mine += word.there && code_agrees(__ldg(pair.cells.brick + word.number), cell, agreeing[__float_as_uint(point.w)]);
   }
   mine = warp_sum(mine);
   if (threadIdx.x % 32 == 0 && mine > 0) atomicAdd(&possible, mine);
@@ -187,9 +186,9 @@ __device__ inline std::uint32_t count_by_block(const ScoreBatch& b, const ScoreP
     for (std::uint32_t k = threadIdx.x; k < pair.order.groups * 32; k += blockDim.x) {
       const float4 point = __ldg(pair.order.point + k);
       const BrickCell cell = motion.locate(point);
-      const std::uint32_t word = motion.word_of(cell, pair.cells.run);
-      if (word == kNoValue) continue;
-      const uint2 summary = __ldg(pair.cells.cell + std::size_t(word) * 8 + (cell.x & 7));
+      const BrickWord word = motion.find(cell, pair.cells.run);
+      if (!word.there) continue;
+      const uint2 summary = __ldg(pair.cells.cell + cell_in_bricks(word, cell));
       const std::uint32_t normal = __ldg(pair.order.normal + k);
       bool certain;
       const bool possible = may_be_inlier(rigid, limits, summary.x, normal, certain);

@@ -14,7 +14,7 @@
 namespace gpureg::cuda {
 
 constexpr int kCellDirections = 14;
-constexpr int kClasses = 62;
+constexpr std::uint32_t kClasses = 62;
 constexpr std::uint32_t kClassAny = 62;   ///< strays too far from every class: agrees with everything
 constexpr std::uint32_t kClassNone = 63;  ///< no normal: agrees with nothing, unless normals are not tested
 constexpr std::uint32_t kCodeAny = 15;
@@ -46,7 +46,7 @@ inline void spiral(Vec3* out, int count) {
 inline DirectionTables direction_tables() {
   DirectionTables t;
   spiral(t.cell, kCellDirections);
-  spiral(t.classes, kClasses);
+  spiral(t.classes, static_cast<int>(kClasses));
   t.class_cosine = static_cast<float>(std::cos(static_cast<double>(kClassRadiusDegrees) * kDegrees));
   t.reach_cosine = static_cast<float>(std::cos(static_cast<double>(kReachDegrees) * kDegrees));
   return t;
@@ -61,9 +61,9 @@ GPUREG_HD std::uint32_t class_of_normal(const DirectionTables& t, Vec3 n) {
   if (is_zero(n)) return kClassNone;
   std::uint32_t best = 0;
   float cosine = -2.0f;
-  for (int k = 0; k < kClasses; ++k) {
+  for (std::uint32_t k = 0; k < kClasses; ++k) {
     const float c = dot(t.classes[k], n);
-    if (c > cosine) cosine = c, best = static_cast<std::uint32_t>(k);
+    if (c > cosine) cosine = c, best = k;
   }
   return cosine >= t.class_cosine ? best : kClassAny;
 }
@@ -87,7 +87,7 @@ GPUREG_HD std::uint32_t code_of_cell(const DirectionTables& t, Span<const std::u
 /// The codes that a class may agree with under one rotation: bit c for code c, and the same again above, as a funnel shift takes five bits.
 GPUREG_HD std::uint32_t agreeing_codes(const DirectionTables& t, const CodeTest& test, const Rigid& rigid, std::uint32_t k) {
   std::uint32_t codes = 1u << kCodeAny;
-  if (k < static_cast<std::uint32_t>(kClasses)) {
+  if (k < kClasses) {
     const Vec3 moved = rotate(rigid, t.classes[k]);
     for (int d = 0; d < kCellDirections; ++d) codes |= dot(moved, t.cell[d]) >= test.min_cosine ? 2u << d : 0u;
   }

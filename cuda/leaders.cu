@@ -29,8 +29,8 @@ __global__ void __launch_bounds__(kProbeThreads) probe(ScoreBatch b) {
       for (std::uint32_t g = 0; g < kProbeGroups; ++g) {
         if (g >= pair.order.groups) break;
         const BrickCell cell = motion.locate(__ldg(pair.order.point + g * 32 + lane));
-        const std::uint32_t word = motion.word_of(cell, pair.cells.run);
-        possible += word != kNoValue && may_be_inlier(rigid, limits + pair.limits * 256, __ldg(&pair.cells.cell[std::size_t(word) * 8 + (cell.x & 7)].x),
+        const BrickWord word = motion.find(cell, pair.cells.run);
+        possible += word.there && may_be_inlier(rigid, limits + pair.limits * 256, __ldg(&pair.cells.cell[cell_in_bricks(word, cell)].x),
                                                       __ldg(pair.order.normal + g * 32 + lane), certain);
       }
       possible = warp_sum(possible);

@@ -42,11 +42,11 @@ __global__ void __launch_bounds__(kThreads) try_samples(ScoreBatch b, std::uint3
     if (!valid[s]) continue;
     const BrickMotion motion(poses[s], pair.cells);
     const BrickCell cell = motion.locate(point);
-    const std::uint32_t word = motion.word_of(cell, pair.cells.run);
-    const bool possible = word != kNoValue && code_agrees(__ldg(pair.cells.brick + word), cell, agreeing[s][__float_as_uint(point.w)]);
+    const BrickWord word = motion.find(cell, pair.cells.run);
+    const bool possible = word.there && code_agrees(__ldg(pair.cells.brick + word.number), cell, agreeing[s][__float_as_uint(point.w)]);
     misses += !possible;
     if (!possible) continue;
-    const uint2 summary = __ldg(pair.cells.cell + std::size_t(word) * 8 + (cell.x & 7));
+    const uint2 summary = __ldg(pair.cells.cell + cell_in_bricks(word, cell));
     bool certain;
     const bool possible_still = may_be_inlier(poses[s], limits, summary.x, normal, certain);
     refuted += !possible_still || (!certain && !is_inlier(pair, b.test, poses[s], point, normal, pair.order.index + k, summary.y));
