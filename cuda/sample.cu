@@ -53,42 +53,67 @@ __device__ bool similar(const Corner& a, const Corner& b, float tau2) {
   return p >= tau2 * q && q >= tau2 * p;
 }
 
-/// passes_polygon_test() of one hypothesis, side by side so that most need two matches only. Repeated source points are told by the
-/// caller, who has the indices.
+/// The first side of passes_polygon_test(), which most hypotheses fail, needs two matches only.
 template <typename Points>
-__device__ bool sides_pass(const Points& points, const Quadruple& q, float tau2) {
-  const Corner c0 = corner(points, q.match[0]), c1 = corner(points, q.match[1]);
-  if (!similar(c0, c1, tau2)) return false;
-  const Corner c2 = corner(points, q.match[2]);
-  if (!similar(c1, c2, tau2)) return false;
-  const Corner c3 = corner(points, q.match[3]);
-  return similar(c2, c3, tau2) && similar(c3, c0, tau2);
+__device__ bool first_side_passes(const Points& points, const Quadruple& q, float tau2) {
+  return similar(corner(points, q.match[0]), corner(points, q.match[1]), tau2);
 }
 
-__device__ bool distinct_sources(const MatchedPoints* m, const Quadruple& q) {
+/// The rest of it. Repeated source points are told by the matches themselves, which have the indices.
+template <typename Points>
+__device__ bool other_sides_pass(const Points& points, const MatchedPoints* m, const Quadruple& q, float tau2) {
+  const Corner c1 = corner(points, q.match[1]), c2 = corner(points, q.match[2]);
+  if (!similar(c1, c2, tau2)) return false;
+  const Corner c3 = corner(points, q.match[3]);
+  if (!similar(c2, c3, tau2) || !similar(c3, corner(points, q.match[0]), tau2)) return false;
   const std::uint32_t a = m[q.match[0]].source_index, b = m[q.match[1]].source_index, c = m[q.match[2]].source_index,
                       d = m[q.match[3]].source_index;
   return a != b && a != c && a != d && b != c && b != d && c != d;
 }
 
+/// A warp's own shared memory.
+struct WarpQueue {
+  std::uint32_t waiting[64];  ///< hypotheses whose first side passes
+  std::uint32_t words[32];    ///< one bit per hypothesis: passes
+};
+
+/// A warp draws 1,024 hypotheses of a chunk. Those that pass the first side wait until there is one for every lane: one in eight passes, and
+/// the others would wait for it three times.
 template <typename Points>
-__device__ void sample_chunks(const SampleBatch& s, const Points& points, const MatchedPoints* m, std::uint32_t count) {
+__device__ void sample_chunks(const SampleBatch& s, const Points& points, const MatchedPoints* m, std::uint32_t count, WarpQueue& queue) {
   const std::uint32_t p = blockIdx.y, warp = threadIdx.x / 32, lane = threadIdx.x % 32;
   for (std::uint32_t chunk = blockIdx.x; chunk < s.chunks; chunk += gridDim.x) {
-    const std::size_t first_word = (static_cast<std::size_t>(p) * s.chunks + chunk) * kWordsPerChunk;
-    std::uint32_t kept = 0, mine = 0;
+    const std::uint32_t first = (chunk * kWordsPerChunk + warp * 32) * 32;
+    queue.words[lane] = 0;
+    __syncwarp();
+    const auto settle = [&](std::uint32_t size) {
+      if (lane >= size) return;
+      const std::uint32_t hypothesis = queue.waiting[lane];
+      if (other_sides_pass(points, m, draw_quadruple(hypothesis, s.seed, count), s.tau2))
+        atomicOr(&queue.words[(hypothesis - first) / 32], 1u << hypothesis % 32);
+    };
+    std::uint32_t waiting = 0;
+#pragma unroll 2
     for (std::uint32_t k = 0; k < 32; ++k) {
-      const std::uint32_t hypothesis = (chunk * kWordsPerChunk + warp * 32 + k) * 32 + lane;
-      bool pass = false;
-      if (hypothesis < s.hypotheses) {
-        const Quadruple q = draw_quadruple(hypothesis, s.seed, count);
-        pass = sides_pass(points, q, s.tau2) && distinct_sources(m, q);
-      }
-      const unsigned word = __ballot_sync(~0u, pass);
-      kept += static_cast<std::uint32_t>(__popc(static_cast<int>(word)));
-      if (lane == k) mine = word;
+      const std::uint32_t hypothesis = first + k * 32 + lane;
+      const bool pass = hypothesis < s.hypotheses && first_side_passes(points, draw_quadruple(hypothesis, s.seed, count), s.tau2);
+      const unsigned passing = __ballot_sync(~0u, pass);
+      if (pass) queue.waiting[waiting + static_cast<std::uint32_t>(__popc(static_cast<int>(passing & ((1u << lane) - 1))))] = hypothesis;
+      waiting += static_cast<std::uint32_t>(__popc(static_cast<int>(passing)));
+      if (waiting < 32) continue;
+      __syncwarp();
+      settle(32);
+      waiting -= 32;
+      __syncwarp();
+      const std::uint32_t rest = queue.waiting[32 + lane];
+      __syncwarp();
+      if (lane < waiting) queue.waiting[lane] = rest;
     }
-    s.words[first_word + warp * 32 + lane] = mine;
+    __syncwarp();
+    settle(waiting);
+    __syncwarp();
+    const std::uint32_t mine = queue.words[lane], kept = warp_sum(static_cast<std::uint32_t>(__popc(static_cast<int>(mine))));
+    s.words[(static_cast<std::size_t>(p) * s.chunks + chunk) * kWordsPerChunk + warp * 32 + lane] = mine;
     if (lane == 0 && kept > 0) atomicAdd(&s.chunk_count[static_cast<std::size_t>(p) * s.chunks + chunk], kept);
   }
 }
@@ -96,11 +121,13 @@ __device__ void sample_chunks(const SampleBatch& s, const Points& points, const 
 /// Draws and tests all hypotheses of a pair; blockIdx.y is the pair.
 __global__ void __launch_bounds__(kThreads) sample(SampleBatch s, std::uint32_t shared_capacity) {
   extern __shared__ float4 shared[];
+  __shared__ WarpQueue queues[kThreads / 32];
+  WarpQueue& queue = queues[threadIdx.x / 32];
   const std::uint32_t p = blockIdx.y, count = s.count[p];
   if (count < 4) return;
   const MatchedPoints* m = s.matches + s.room[p];
   if (count > shared_capacity) {
-    sample_chunks(s, GlobalPoints{m}, m, count);
+    sample_chunks(s, GlobalPoints{m}, m, count, queue);
     return;
   }
   float2* rest = reinterpret_cast<float2*>(shared + shared_capacity);
@@ -109,7 +136,7 @@ __global__ void __launch_bounds__(kThreads) sample(SampleBatch s, std::uint32_t 
     rest[i] = make_float2(m[i].target.y, m[i].target.z);
   }
   __syncthreads();
-  sample_chunks(s, SharedPoints{shared, rest}, m, count);
+  sample_chunks(s, SharedPoints{shared, rest}, m, count, queue);
 }
 
 /// Bits to numbers, in order. before: survivors in front of each chunk, over all pairs.
@@ -147,7 +174,7 @@ Quadruples sample_quadruples(Exec& exec, const Matches& matches, const Hypothesi
 
   // As many matches as the largest pair can have, if they fit; the others read global memory.
   constexpr std::size_t kBytesPerMatch = sizeof(float4) + sizeof(float2);
-  const std::uint32_t fits = static_cast<std::uint32_t>((exec.shared_bytes_per_block() - 1024) / kBytesPerMatch);
+  const std::uint32_t fits = static_cast<std::uint32_t>((exec.shared_bytes_per_block() - 1024 - kThreads / 32 * sizeof(WarpQueue)) / kBytesPerMatch);
   const std::uint32_t capacity = std::min(matches.room.largest, fits);
   const std::size_t shared_bytes = capacity * kBytesPerMatch;
   check(cudaFuncSetAttribute(sample, cudaFuncAttributeMaxDynamicSharedMemorySize, static_cast<int>(shared_bytes)), "cudaFuncSetAttribute");
