@@ -18,7 +18,7 @@ namespace {
 /// Raw points that are prepared together: enough to fill the device, few enough for its memory and for page-locked staging.
 constexpr std::size_t kRawPointsPerChunk = std::size_t(1) << 22;
 constexpr std::size_t kCloudsPerChunk = 256;
-constexpr std::size_t kPairsPerChunk = 256;
+constexpr std::size_t kPairsPerChunk = 512;
 /// For one bit per hypothesis of every pair of a chunk.
 constexpr std::size_t kSampleBytes = std::size_t(256) << 20;
 /// For what every seed is compatible with, and for the matches, of every pair of a chunk.

@@ -5,8 +5,7 @@
 namespace gpureg::cuda {
 namespace {
 
-constexpr std::uint32_t kProbes = 2048;  // hypotheses of a pair
-constexpr int kLeaderThreads = 1024;  // few leaders: each should be done soon
+constexpr std::uint32_t kProbes = 1024;  // hypotheses of a pair
 
 /// A warp per hypothesis looks at a few groups and proposes it as one of its pair's leaders. Of many hypotheses some are asked, at equal
 /// distances.
@@ -42,29 +41,12 @@ __global__ void __launch_bounds__(kProbeThreads) probe(ScoreBatch b) {
   }
 }
 
-/// What the leaders reach the others must beat.
-__global__ void __launch_bounds__(kLeaderThreads) count_leaders(ScoreBatch b) {
-  __shared__ Limits limits[512];
-  const std::uint32_t p = blockIdx.x / kLeaders;
-  const unsigned long long leader = b.leaders[blockIdx.x];
-  if (leader == 0) return;
-  load_limits(b.limits, limits);
-  const std::uint32_t h = b.offset[p] + ~static_cast<std::uint32_t>(leader);
-  const ScorePair& pair = b.pairs[p];
-  const std::uint32_t inliers = count_by_block(b, pair, limits + pair.limits * 256, b.poses[h]);
-  if (threadIdx.x != 0) return;
-  b.inliers[h] = inliers;
-  if (inliers > 0) atomicMax(b.most + p, inliers);
-}
-
 }  // namespace
 
-void score_leaders(Exec& exec, const ScoreBatch& batch) {
+void find_leaders(Exec& exec, const ScoreBatch& batch) {
   const unsigned most_blocks = static_cast<unsigned>(exec.multiprocessors()) * 8;
   probe<<<std::min(blocks_for(static_cast<std::size_t>(batch.pair_count) * kProbes * 32, kProbeThreads), most_blocks), kProbeThreads, 0, exec.stream()>>>(batch);
   check_launch("probe");
-  count_leaders<<<batch.pair_count * kLeaders, kLeaderThreads, 0, exec.stream()>>>(batch);
-  check_launch("count_leaders");
 }
 
 }  // namespace gpureg::cuda

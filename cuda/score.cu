@@ -52,7 +52,7 @@ __device__ void score_slice(const ScoreBatch& b, const Slice& slice, const Limit
     if (lane == 0) h = atomicAdd(next, 1);
     h = __shfl_sync(~0u, h, 0);
     if (h >= slice.end) return;
-    if (b.inliers[h] != kNoValue) continue;  // a leader
+    if (b.inliers[h] != kNoValue) continue;  // a sample
     std::uint32_t inliers = 0;
     if (b.valid[h]) inliers = count_inliers(b, pair, limits + pair.limits * 256, staged, memory, b.poses[h], look, most);
     if (lane != 0) continue;
@@ -166,8 +166,8 @@ DeviceBuffer<BestPose> score_hypotheses(Exec& exec, Span<const PairView> pairs, 
       check_launch("score_by_block");
       return select_best(exec, batch, total);
     }
-    score_leaders(exec, batch);
-    order_points(exec, batch, groups.largest);
+    find_leaders(exec, batch);
+    score_samples(exec, batch, groups.largest);
     const std::vector<Slice> slices = cut_slices(*hypotheses.segments, processors);
     const auto slices_on_device = exec.upload(slices);
     // What is not taken of the multiprocessor's memory is cache, which has the codes.

@@ -9,7 +9,7 @@
 namespace gpureg::cuda {
 
 constexpr std::uint32_t kProbeGroups = 4;   ///< groups of 32 points that tell promising hypotheses from others
-constexpr std::uint32_t kLeaders = 32;      ///< promising hypotheses of a pair that are scored first
+constexpr std::uint32_t kLeaders = 32;      ///< promising hypotheses of a pair, which are scored first
 constexpr int kProbeThreads = 256;
 
 /// Points with the class of their normal, normals (w: 0 where there is none), and their indices in the cloud.
@@ -68,11 +68,12 @@ __device__ inline unsigned long long support_by_search(const ScorePair& pair, co
   return residual;
 }
 
-/// Finds promising hypotheses of each pair and scores them: what they reach the others must beat.
-void score_leaders(Exec& exec, const ScoreBatch& batch);
+/// Finds promising hypotheses of each pair.
+void find_leaders(Exec& exec, const ScoreBatch& batch);
 
-/// Learns from a sample of each pair's hypotheses in which order to look at the points.
-void order_points(Exec& exec, const ScoreBatch& batch, std::uint32_t most_groups);
+/// Scores the leaders and some others of each pair, and learns from them in which order to look at the points. What they reach the others
+/// must beat.
+void score_samples(Exec& exec, const ScoreBatch& batch, std::uint32_t most_groups);
 
 /// Chooses the best of the hypotheses whose `inliers` are the pair's most: smallest residual, then lowest number.
 DeviceBuffer<BestPose> select_best(Exec& exec, const ScoreBatch& batch, std::uint32_t total);
