@@ -6,6 +6,7 @@
 
 #include "algorithm/cell.hpp"
 #include "algorithm/cell_summary.hpp"
+#include "math/rigid.hpp"
 
 /// A coarse alphabet of directions, so that "may a point with this normal agree with a cell?" is one bit. A normal belongs to one of 62
 /// classes. A cell's code has four bits: 0 where it has no candidate, 1 to 14 for a direction that none of its candidates' normals strays
