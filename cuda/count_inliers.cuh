@@ -134,7 +134,7 @@ __device__ std::uint32_t count_inliers(const ScoreBatch& b, const ScorePair& pai
         const Vec3 q = apply(memory.rigid, {now.point.x, now.point.y, now.point.z});
         refuted = now.summary.y == kNoValue
                       ? !is_inlier_by_search(pair, b.test, memory.rigid, q, look.index + k)
-                      : !agrees_with(pair, b.test, memory.rigid, moved_normal, now.has_normal(), kPackedCosineError / 2, look.index + k,
+                      : !agrees_with(pair, b.test, memory.rigid, moved_normal, now.has_normal(), kHalfPackedCosineError, look.index + k,
                                      closest_in_list(pair.cells.candidate, now.summary.y, q));
       }
     }

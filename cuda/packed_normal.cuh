@@ -7,6 +7,8 @@ namespace gpureg::cuda {
 
 /// A normal in 30 bits. A cosine between two of them is off by less than kPackedCosineError; a zero normal has its own word.
 constexpr float kPackedCosineError = 0.005f;
+/// Where only one of the two is packed. Each coordinate is off by up to 1/1022, so the cosine by sqrt(3)/1022 = 0.0017.
+constexpr float kHalfPackedCosineError = 0.0025f;
 constexpr std::uint32_t kPackedZero = ~std::uint32_t(0);
 
 __device__ inline std::uint32_t pack_normal(Vec3 n) {

@@ -16,6 +16,8 @@ namespace {
 constexpr int kCells = ClosestGridView::kBlockCells;
 /// Tables larger than this (a cloud with far stray points) are not worth their memory: then every point is looked at.
 constexpr std::uint64_t kMaxBlocks = std::uint64_t(1) << 22;
+/// BrickMotion counts cells, those of the empty blocks on both sides too, in 22 bits.
+constexpr std::uint64_t kMaxBlocksAlong = (std::uint64_t(1) << 19) - 2;
 
 constexpr int kNumberThreads = 512;
 
@@ -167,7 +169,8 @@ ScoringLayout scoring_layout(const CudaCloud& cloud, const CellRange& blocks) {
                       nz = static_cast<std::uint64_t>(blocks.hi.z - blocks.lo.z + 1);
   CellSummaries shape;
   shape.nx = static_cast<std::int32_t>(nx), shape.ny = static_cast<std::int32_t>(ny), shape.nz = static_cast<std::int32_t>(nz);
-  const bool fits = nx <= kMaxBlocks && ny <= kMaxBlocks && nz <= kMaxBlocks && nx * ny <= kMaxBlocks && nx * ny * nz <= kMaxBlocks && shape.brick_runs() <= kMaxBlocks;
+  const bool fits = nx <= kMaxBlocksAlong && ny <= kMaxBlocksAlong && nz <= kMaxBlocksAlong && nx * ny <= kMaxBlocks && nx * ny * nz <= kMaxBlocks &&
+                    shape.brick_runs() <= kMaxBlocks;
   if (fits) l.nx = static_cast<std::int32_t>(nx), l.ny = static_cast<std::int32_t>(ny), l.nz = static_cast<std::int32_t>(nz);
   const auto take = [&](std::size_t bytes) {
     const std::size_t at = l.bytes;

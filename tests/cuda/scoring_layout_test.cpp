@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Which clouds get a table of bricks: none whose cells the device could not count. No device needed.
+#include <gtest/gtest.h>
+
+#include "scoring_data.hpp"
+
+namespace gpureg::cuda {
+namespace {
+
+ScoringLayout layout_of(Cell lo, Cell hi) {
+  CudaCloud cloud;
+  cloud.size = 2;
+  cloud.block_count = 2;
+  cloud.candidate_count = 2;
+  return scoring_layout(cloud, {lo, hi});
+}
+
+TEST(ScoringLayout, HasATableForARoom) {
+  const ScoringLayout l = layout_of({-8, -7, -3}, {8, 6, 12});
+  EXPECT_EQ(l.nx, 17);
+  EXPECT_EQ(l.ny, 14);
+  EXPECT_EQ(l.nz, 16);
+  EXPECT_LT(l.runs, l.bricks);
+  EXPECT_LT(l.bricks, l.bytes);
+}
+
+/// A cell's coordinate is read from the low 22 bits of a float, the blocks on both sides included.
+TEST(ScoringLayout, CountsCellsIn22BitsAlongEveryAxis) {
+  constexpr std::int32_t kLast = (1 << 19) - 3;  // 2^19 - 2 blocks, so 2^22 cells with those on both sides
+  const Cell ends[3] = {{kLast, 0, 0}, {0, kLast, 0}, {0, 0, kLast}};
+  const Cell beyond[3] = {{kLast + 1, 0, 0}, {0, kLast + 1, 0}, {0, 0, kLast + 1}};
+  EXPECT_EQ(layout_of({0, 0, 0}, ends[0]).nx, kLast + 1);
+  for (int axis = 0; axis < 3; ++axis) {
+    const ScoringLayout l = layout_of({0, 0, 0}, beyond[axis]);
+    EXPECT_EQ(l.nx, 0) << "axis " << axis;
+    EXPECT_EQ(l.runs, l.bricks) << "no table, no memory for it";
+  }
+  const Cell far{1 << 20, 1 << 20, 1 << 20};
+  EXPECT_EQ(layout_of({-(1 << 20), -(1 << 20), -(1 << 20)}, far).nx, 0);
+}
+
+}  // namespace
+}  // namespace gpureg::cuda
