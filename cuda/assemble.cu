@@ -87,7 +87,7 @@ std::vector<float> CudaCloud::copy_features() const {
 
 std::vector<std::shared_ptr<CudaCloud>> assemble(Exec& exec, const DownsampledClouds& clouds, const DeviceBuffer<Vec3>& normals,
                                                  const Features& features, const Features& wide_features, const ClosestGrids& closest,
-                                                 const DepthMaps& depth_maps, const PrepareOptions& options) {
+                                                 const DepthMaps& depth_maps, const Fronts& fronts, const PrepareOptions& options) {
   const Segments& segments = clouds.segments;
   const std::size_t clouds_count = segments.entries();
   const auto counts = exec.filled<Counts>(clouds_count, 0);
@@ -133,6 +133,8 @@ std::vector<std::shared_ptr<CudaCloud>> assemble(Exec& exec, const DownsampledCl
     const std::uint32_t map_begin = depth_maps.offset[c], maps = depth_maps.offset[c + 1] - map_begin;
     place(depth_maps.depth.data() + std::size_t(map_begin) * kMapCells, std::size_t(maps) * kMapCells);
     place(depth_maps.viewpoints.data() + map_begin, maps);
+    const FrontBox& box = fronts.boxes[c];
+    place(fronts.words.data() + fronts.offset[c], box.words());
     // And what is not copied but made there.
     const auto reserve = [&](std::size_t more) {
       const std::size_t at = bytes;
@@ -168,6 +170,7 @@ std::vector<std::shared_ptr<CudaCloud>> assemble(Exec& exec, const DownsampledCl
     view.wide_features = has_wide ? reinterpret_cast<const float*>(part[8].to) : nullptr;
     view.has_wide_feature = has_wide ? reinterpret_cast<const std::uint8_t*>(part[9].to) : nullptr;
     view.visibility = {reinterpret_cast<const std::uint16_t*>(part[10].to), reinterpret_cast<const Vec3*>(part[11].to), maps, depth_maps.step};
+    view.fronts = {box, box.words() > 0 ? reinterpret_cast<const std::uint32_t*>(part[12].to) : nullptr};
     char* const memory = cloud->data.data();
     balance.push_back(reinterpret_cast<std::uint32_t*>(memory + balanced));
     view.balance = balance.back();

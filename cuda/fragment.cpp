@@ -39,7 +39,7 @@ CloudArrays CloudArrays::moved(const char* from, char* to) const {
   CellSummaries& s = out.summaries;
   move(s.run), move(s.brick), move(s.cell), move(s.candidate);
   move(out.order.point), move(out.order.normal), move(out.order.index);
-  move(v.wide_features), move(v.has_wide_feature), move(v.balance), move(v.visibility.depth), move(v.visibility.viewpoints);
+  move(v.wide_features), move(v.has_wide_feature), move(v.balance), move(v.visibility.depth), move(v.visibility.viewpoints), move(v.fronts.words);
   for (FeatureAids* aids : {&out.narrow_aids, &out.wide_aids}) move(aids->half), move(aids->padded), move(aids->square), move(aids->error), move(aids->scale);
   return out;
 }

@@ -80,6 +80,13 @@ struct DepthMaps {
   DeviceBuffer<Vec3> viewpoints;             ///< one per map, local
 };
 
+/// Fronts of a batch, see algorithm/fronts.hpp.
+struct Fronts {
+  std::vector<FrontBox> boxes;               ///< per cloud
+  std::vector<std::size_t> offset;           ///< words before each cloud's, and all
+  DeviceBuffer<std::uint32_t> words;
+};
+
 struct ClosestGrids {
   std::vector<ClosestGeometry> geometry;     ///< per cloud
   std::vector<CellRange> block_range;        ///< per cloud: no block is outside

@@ -77,42 +77,66 @@ struct WarpQueue {
   std::uint32_t words[32];    ///< one bit per hypothesis: passes
 };
 
-/// A warp draws 1,024 hypotheses of a chunk. Those that pass the first side wait until there is one for every lane: one in eight passes, and
-/// the others would wait for it three times.
+/// A warp draws 1,024 hypotheses: which of its 32 words a lane has, one bit per hypothesis that passes. Those that pass the first side wait
+/// until there is one for every lane: one in eight passes, and the others would wait for it three times.
+__device__ std::uint32_t draw_word(const SampleBatch& s, const SharedPoints& points, const MatchedPoints* m, std::uint32_t count, std::uint32_t first,
+                                   WarpQueue& queue) {
+  const std::uint32_t lane = threadIdx.x % 32;
+  queue.words[lane] = 0;
+  __syncwarp();
+  const auto settle = [&](std::uint32_t size) {
+    if (lane >= size) return;
+    const std::uint32_t hypothesis = queue.waiting[lane];
+    if (other_sides_pass(points, m, draw_quadruple(hypothesis, s.seed, count), s.tau2))
+      atomicOr(&queue.words[(hypothesis - first) / 32], 1u << hypothesis % 32);
+  };
+  std::uint32_t waiting = 0;
+#pragma unroll 2
+  for (std::uint32_t k = 0; k < 32; ++k) {
+    const std::uint32_t hypothesis = first + k * 32 + lane;
+    const bool pass = hypothesis < s.hypotheses && first_side_passes(points, draw_quadruple(hypothesis, s.seed, count), s.tau2);
+    const unsigned passing = __ballot_sync(~0u, pass);
+    if (pass) queue.waiting[waiting + static_cast<std::uint32_t>(__popc(static_cast<int>(passing & ((1u << lane) - 1))))] = hypothesis;
+    waiting += static_cast<std::uint32_t>(__popc(static_cast<int>(passing)));
+    if (waiting < 32) continue;
+    __syncwarp();
+    settle(32);
+    waiting -= 32;
+    __syncwarp();
+    const std::uint32_t rest = queue.waiting[32 + lane];
+    __syncwarp();
+    if (lane < waiting) queue.waiting[lane] = rest;
+  }
+  __syncwarp();
+  settle(waiting);
+  __syncwarp();
+  return queue.words[lane];
+}
+
+/// From global memory a second look at the same corners would cost more than the lanes that wait.
+__device__ std::uint32_t draw_word(const SampleBatch& s, const GlobalPoints& points, const MatchedPoints* m, std::uint32_t count, std::uint32_t first,
+                                   WarpQueue&) {
+  const std::uint32_t lane = threadIdx.x % 32;
+  std::uint32_t mine = 0;
+  for (std::uint32_t k = 0; k < 32; ++k) {
+    const std::uint32_t hypothesis = first + k * 32 + lane;
+    bool pass = false;
+    if (hypothesis < s.hypotheses) {
+      const Quadruple q = draw_quadruple(hypothesis, s.seed, count);
+      pass = first_side_passes(points, q, s.tau2) && other_sides_pass(points, m, q, s.tau2);
+    }
+    const unsigned word = __ballot_sync(~0u, pass);
+    if (lane == k) mine = word;
+  }
+  return mine;
+}
+
 template <typename Points>
 __device__ void sample_chunks(const SampleBatch& s, const Points& points, const MatchedPoints* m, std::uint32_t count, WarpQueue& queue) {
   const std::uint32_t p = blockIdx.y, warp = threadIdx.x / 32, lane = threadIdx.x % 32;
   for (std::uint32_t chunk = blockIdx.x; chunk < s.chunks; chunk += gridDim.x) {
-    const std::uint32_t first = (chunk * kWordsPerChunk + warp * 32) * 32;
-    queue.words[lane] = 0;
-    __syncwarp();
-    const auto settle = [&](std::uint32_t size) {
-      if (lane >= size) return;
-      const std::uint32_t hypothesis = queue.waiting[lane];
-      if (other_sides_pass(points, m, draw_quadruple(hypothesis, s.seed, count), s.tau2))
-        atomicOr(&queue.words[(hypothesis - first) / 32], 1u << hypothesis % 32);
-    };
-    std::uint32_t waiting = 0;
-#pragma unroll 2
-    for (std::uint32_t k = 0; k < 32; ++k) {
-      const std::uint32_t hypothesis = first + k * 32 + lane;
-      const bool pass = hypothesis < s.hypotheses && first_side_passes(points, draw_quadruple(hypothesis, s.seed, count), s.tau2);
-      const unsigned passing = __ballot_sync(~0u, pass);
-      if (pass) queue.waiting[waiting + static_cast<std::uint32_t>(__popc(static_cast<int>(passing & ((1u << lane) - 1))))] = hypothesis;
-      waiting += static_cast<std::uint32_t>(__popc(static_cast<int>(passing)));
-      if (waiting < 32) continue;
-      __syncwarp();
-      settle(32);
-      waiting -= 32;
-      __syncwarp();
-      const std::uint32_t rest = queue.waiting[32 + lane];
-      __syncwarp();
-      if (lane < waiting) queue.waiting[lane] = rest;
-    }
-    __syncwarp();
-    settle(waiting);
-    __syncwarp();
-    const std::uint32_t mine = queue.words[lane], kept = warp_sum(static_cast<std::uint32_t>(__popc(static_cast<int>(mine))));
+    const std::uint32_t mine = draw_word(s, points, m, count, (chunk * kWordsPerChunk + warp * 32) * 32, queue);
+    const std::uint32_t kept = warp_sum(static_cast<std::uint32_t>(__popc(static_cast<int>(mine))));
     s.words[(static_cast<std::size_t>(p) * s.chunks + chunk) * kWordsPerChunk + warp * 32 + lane] = mine;
     if (lane == 0 && kept > 0) atomicAdd(&s.chunk_count[static_cast<std::size_t>(p) * s.chunks + chunk], kept);
   }

@@ -19,9 +19,10 @@ Features compute_wide_features(Exec& exec, const DownsampledClouds& clouds, cons
                                const PrepareOptions& options);
 ClosestGrids build_closest_grids(Exec& exec, const DownsampledClouds& clouds, const Grids& grids, const PrepareOptions& options);
 DepthMaps build_depth_maps(Exec& exec, Span<const RawCloud> raw, const DownsampledClouds& clouds, const PrepareOptions& options);
+Fronts build_fronts(Exec& exec, const DownsampledClouds& clouds, const DeviceBuffer<Vec3>& normals, const PrepareOptions& options);
 std::vector<std::shared_ptr<CudaCloud>> assemble(Exec& exec, const DownsampledClouds& clouds, const DeviceBuffer<Vec3>& normals,
                                                  const Features& features, const Features& wide_features, const ClosestGrids& closest,
-                                                 const DepthMaps& depth_maps, const PrepareOptions& options);
+                                                 const DepthMaps& depth_maps, const Fronts& fronts, const PrepareOptions& options);
 
 // Alignment, one entry per pair.
 Matches match_features(Exec& exec, Span<const PairView> pairs, const HypothesisOptions& options);

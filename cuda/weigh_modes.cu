@@ -25,10 +25,11 @@ struct WeighModes {
 
 /// Thread 0 has the whole block's.
 __device__ SideEvidence of_block(const SideEvidence& e, std::int64_t* scratch) {
-  std::int64_t v[8] = {static_cast<std::int64_t>(e.balanced), static_cast<std::int64_t>(e.residual), e.tested, e.inliers, e.hits, e.seen, e.before, e.hidden};
+  std::int64_t v[12] = {static_cast<std::int64_t>(e.balanced), static_cast<std::int64_t>(e.residual), e.tested, e.inliers, e.hits, e.seen, e.before, e.hidden,
+                        e.around, e.near_front, e.far_front, e.at_back};
   block_sum(v, scratch);
   const auto count = [&](int k) { return static_cast<std::uint32_t>(v[k]); };
-  return {static_cast<std::uint64_t>(v[0]), static_cast<std::uint64_t>(v[1]), count(2), count(3), count(4), count(5), count(6), count(7)};
+  return {static_cast<std::uint64_t>(v[0]), static_cast<std::uint64_t>(v[1]), count(2), count(3), count(4), count(5), count(6), count(7), count(8), count(9), count(10), count(11)};
 }
 
 __device__ Moments of_block(const Moments& m, std::int64_t* scratch) {

@@ -26,7 +26,8 @@ Json to_json(const RegistrationOptions& options) {
                      {"feature_radius", shortest(p.feature_radius)},
                      {"search_distance", shortest(p.search_distance)},
                      {"wide_feature_radius", shortest(p.wide_feature_radius)},
-                     {"depth_maps", p.depth_maps}};
+                     {"depth_maps", p.depth_maps},
+                     {"front_reach", shortest(p.front_reach)}};
   json["hypothesis"] = {{"proposal", to_string(h.proposal)},
                         {"count", h.count},
                         {"neighbors", h.neighbors},

@@ -47,6 +47,7 @@ Json to_json(const PrepareStatistics& p) {
             {"features", p.features},
             {"grid", p.grid},
             {"depth_maps", p.depth_maps},
+            {"fronts", p.fronts},
             {"total", p.total()}}}};
 }
 
@@ -60,6 +61,10 @@ Json to_json(const PoseEvidence& e) {
           {"seen", {e.source_seen, e.target_seen}},
           {"impossible", {e.source_impossible, e.target_impossible}},
           {"hidden", {e.source_hidden, e.target_hidden}},
+          {"around", {e.source_around, e.target_around}},
+          {"near_front", {e.source_near_front, e.target_near_front}},
+          {"far_front", {e.source_far_front, e.target_far_front}},
+          {"at_back", {e.source_at_back, e.target_at_back}},
           {"stiffness", e.stiffness},
           {"softest", e.softest}};
 }

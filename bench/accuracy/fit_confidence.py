@@ -8,14 +8,19 @@ then all of them together give the coefficients that are written into the librar
 
 Three logistic regressions: the first ranks the modes of a pair by their own evidence, the second judges the best of them, and also sees
 its margin over the best distinct rival, and no pose gets more than its share of the odds of all, as at most one is right; the third says, from the same, whether the pose is right and the clouds overlap by 30 % or more
-(in gt.log), which is what Redwood's strict protocol counts. Each exists twice: with free space, and without for clouds whose
-viewpoints are not known.
+(in gt.log), which is what Redwood's strict protocol counts. Each exists four times: with and without free space, which clouds without
+known viewpoints do not tell, and with and without the fronts of surfaces, which prepare.front_reach = 0 leaves out.
 
-usage: fit_confidence.py RUN... [--header src/api/confidence_model.hpp] [-o bench/results/confidence.json]
-Where a scene has poses.txt (fragment number, world_from_fragment), it is also told what kind of poses the wrong reports are.
+Nothing moves in these scenes. So that a chair that was moved does not cost a pose its confidence, one pair in twenty is fitted a second
+time as it would look if up to a twentieth of one of its clouds were new.
+
+usage: fit_confidence.py RUN... [--origin RUN...] [--unknown RUN...] [--header src/api/confidence_model.hpp] [-o bench/results/confidence.json]
+--origin, --unknown: runs of the same scenes whose clouds came with the origin as their only viewpoint, or with none; they are tested,
+and nothing is fitted to them. Where a scene has poses.txt (fragment number, world_from_fragment), it is also told what kind of poses the wrong reports are.
 Needs numpy and scikit-learn.
 """
 import argparse
+import copy
 import json
 import pathlib
 
@@ -23,7 +28,8 @@ import numpy as np
 from sklearn.linear_model import LogisticRegression
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
-MODELS = ("with_free_space", "without_free_space")
+# What a model may look at beside the overlap: free space, fronts of surfaces.
+MODELS = {"everything": (True, True), "fronts": (False, True), "free_space": (True, False), "neither": (False, False)}
 
 
 def blocks(path, size):
@@ -51,7 +57,7 @@ def off_by(truth, pose):
     return np.degrees(np.arccos(np.clip((np.trace(e[:3, :3]) - 1) / 2, -1, 1))), np.linalg.norm(e[:3, 3])
 
 
-def measures(evidence, free_space):
+def measures(evidence, free_space, fronts):
     """What the model sees of one mode; the library computes the same (src/api/confidence.cpp)."""
     log = lambda value, least: np.log(max(value, least))  # noqa: E731
     overlap, balanced = evidence["overlap"], evidence["balanced_overlap"]
@@ -65,6 +71,15 @@ def measures(evidence, free_space):
         of_all = [s * i for s, i in zip(seen, impossible)]
         out += [min(seen), max(seen), max(of_all), min(of_all), max(impossible), min(impossible), log(max(impossible), 3e-3), min(hidden),
                 log(sum(of_all) * (2 / len(of_all)), 1e-3)]
+    if fronts:
+        reach, around, back = evidence["reach"], evidence["around"], evidence["at_back"]
+        alike = [o / max(r, 1e-6) for o, r in zip(overlap, reach)]
+        out += [log(sum(evidence["near_front"]), 1e-3), log(sum(evidence["far_front"]), 1e-3), min(alike), max(alike), max(around), min(around)]
+        # Where free space is known it says the rest; without, how much is in front or behind beside what touches.
+        if not free_space:
+            in_front = [n + f for n, f in zip(evidence["near_front"], evidence["far_front"])]
+            beside = lambda shares: [s / max(s + r, 1e-6) for s, r in zip(shares, reach)]  # noqa: E731
+            out += [max(beside(in_front)), min(beside(in_front)), log(sum(back), 1e-3), max(beside(back)), min(beside(back))]
     return out
 
 
@@ -72,8 +87,13 @@ def has_free_space(evidence):
     return max(evidence["seen"]) > 0
 
 
+def has_fronts(evidence):
+    return min(evidence["around"]) > 0
+
+
 class Run:
-    def __init__(self, text):
+    def __init__(self, text, viewpoints="known"):
+        self.viewpoints = viewpoints
         self.building, folder, result = text.split("=")
         folder = pathlib.Path(folder)
         self.name = self.building + "/" + folder.name
@@ -85,7 +105,7 @@ class Run:
         trajectory = folder / "poses.txt"
         self.fragments = {k[0]: v for k, v in blocks(trajectory, 5).items()} if trajectory.exists() else {}
         self.modes = [p.get("modes", []) for p in pairs]
-        self.free = np.array([bool(m) and has_free_space(m[0]["evidence"]) for m in self.modes])
+        self.free = any(m and has_free_space(m[0]["evidence"]) for m in self.modes)
         self.right, self.strict = [], []
         for p, modes in zip(pairs, self.modes):
             key = (p["i"], p["j"])
@@ -93,7 +113,37 @@ class Run:
             wrong = np.full(len(modes), 9.0)
             self.right.append((errors(truth[key], information[key], poses) if key in truth and len(modes) else wrong) <= 0.2)
             self.strict.append((errors(strict[key], strict_information[key], poses) if key in strict and len(modes) else wrong) <= 0.2)
-        self.x = {free: [np.array([measures(m["evidence"], free) for m in modes]) for modes in self.modes] for free in (True, False)}
+        self.x = {model: [np.array([measures(m["evidence"], *model) for m in modes]) for modes in self.modes] for model in MODELS.values()
+                  if self.free or not model[0]}
+
+
+CHANGED_PAIRS, MOST_CHANGED = 0.05, 0.05
+
+
+class ChangedRun:
+    """Some pairs of a run, with things in one of their clouds that the other did not see: in front of its surfaces, as far as it is around."""
+
+    def __init__(self, run, random):
+        chosen = [k for k in range(len(run.modes)) if random.random() < CHANGED_PAIRS]
+        modes = []
+        for k in chosen:
+            side, share, near = random.integers(2), random.uniform(0, MOST_CHANGED), random.uniform(0.3, 0.8)
+            modes.append([{"evidence": changed(m["evidence"], side, share, near)} for m in run.modes[k]])
+        self.right, self.strict = [run.right[k] for k in chosen], [run.strict[k] for k in chosen]
+        self.x = {model: [np.array([measures(m["evidence"], *model) for m in ms]) for ms in modes] for model in run.x}
+
+
+def changed(evidence, side, share, near):
+    out = copy.deepcopy(evidence)
+    for key in ("overlap", "reach", "balanced_overlap", "near_front", "far_front", "at_back"):
+        out[key][side] *= 1 - share
+    out["near_front"][side] += share * evidence["around"][side] * near
+    out["far_front"][side] += share * evidence["around"][side] * (1 - near)
+    if evidence["seen"][side] > 0:
+        out["impossible"][side] = evidence["impossible"][side] * (1 - share) + share
+        out["hidden"][side] *= 1 - share
+    out["match_support"] *= 1 - share
+    return out
 
 
 class Logistic:
@@ -109,10 +159,10 @@ class Logistic:
         return x @ self.weights + self.bias
 
 
-def second_view(run, free, first):
+def second_view(run, model, first):
     """Measures of the best mode of each pair, its logit and its margin over the best rival; which mode it is; its share among the modes."""
     rows, best, share = [], [], []
-    for x in run.x[free]:
+    for x in run.x[model]:
         if not len(x):
             best.append(-1)
             continue
@@ -126,19 +176,21 @@ def second_view(run, free, first):
     return np.array(rows), best, np.array(share)
 
 
-def fit(runs, free):
-    x = np.concatenate([v for run in runs for v in run.x[free] if len(v)])
+def fit(runs, model):
+    random = np.random.default_rng(1)
+    runs = runs + [ChangedRun(run, random) for run in runs]
+    x = np.concatenate([v for run in runs for v in run.x[model] if len(v)])
     y = np.concatenate([np.array(v) for run in runs for v in run.right if len(v)])
     first = Logistic(x, y)
-    views = [second_view(run, free, first) for run in runs]
+    views = [second_view(run, model, first) for run in runs]
     x2 = np.concatenate([view[0] for view in views])
     labels = lambda kind: np.concatenate([[getattr(run, kind)[k][b] for k, b in enumerate(view[1]) if b >= 0]  # noqa: E731
                                           for run, view in zip(runs, views)])
     return first, Logistic(x2, labels("right")), Logistic(x2, labels("strict"))
 
 
-def figures(run, free, models):
-    x, best, share = second_view(run, free, models[0])
+def figures(run, model, models):
+    x, best, share = second_view(run, model, models[0])
     confidence = np.zeros(len(best))
     overlapping = np.zeros(len(best))
     found = np.array([b >= 0 for b in best])
@@ -178,33 +230,44 @@ def kinds_of_mistakes(run, best, confidence, right):
 
 
 def header(models):
-    # Braces and names as the library's confidence.cpp includes them.
+    # Names as the library's confidence.cpp reads them.
     lines = ["// SPDX-License-Identifier: BSD-3-Clause", "// Written by bench/accuracy/fit_confidence.py; docs/accuracy.md says how well it does.",
-             "#pragma once", "", "namespace gpureg::confidence_model {", ""]
-    for name, pair in zip(MODELS, models):
-        for stage, model in zip(("ranking", "confidence", "overlap"), pair):
-            values = ", ".join(f"{w:.9g}" for w in model.weights)
-            lines += [f"constexpr double {stage}_{name}_bias = {model.bias:.9g};", f"constexpr double {stage}_{name}[] = {{{values}}};", ""]
+             "#pragma once", "", "namespace gpureg::confidence_model {", "",
+             "struct Regression {", "  const double* weights;", "  double bias;", "};", "",
+             "struct Model {", "  Regression ranking, confidence, overlap;", "};", ""]
+    stages = ("ranking", "confidence", "overlap")
+    for name, regressions in zip(MODELS, models):
+        for stage, regression in zip(stages, regressions):
+            lines.append(f"constexpr double {name}_{stage}[] = {{{', '.join(f'{w:.9g}' for w in regression.weights)}}};")
+        of = ", ".join(f"{{{name}_{stage}, {regression.bias:.9g}}}" for stage, regression in zip(stages, regressions))
+        lines += [f"constexpr Model {name}{{{of}}};", ""]
     return "\n".join(lines + ["}  // namespace gpureg::confidence_model", ""])
 
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("runs", nargs="+", metavar="RUN", help="BUILDING=SCENE_FOLDER=RESULT.json")
+    parser.add_argument("--origin", nargs="+", default=[], metavar="RUN", help="tested only: the origin was the only viewpoint")
+    parser.add_argument("--unknown", nargs="+", default=[], metavar="RUN", help="tested only: no viewpoint was known")
     parser.add_argument("--header", type=pathlib.Path)
     parser.add_argument("-o", "--output", type=pathlib.Path)
     arguments = parser.parse_args()
     runs = [Run(text) for text in arguments.runs]
+    tests = runs + [Run(text, "origin") for text in arguments.origin] + [Run(text, "unknown") for text in arguments.unknown]
     record = {"runs": []}
-    for free, name in zip((True, False), MODELS):
-        for run in runs:
-            others = [r for r in runs if r.building != run.building and (not free or r.free.any())]
-            if not others or (free and not run.free.any()):
+    for name, model in MODELS.items():
+        fits = {}
+        for run in tests:
+            others = [r for r in runs if r.building != run.building and model in r.x]
+            # Those without free space are tested where there is none; those without fronts on all, to tell what fronts give.
+            if not others or model not in run.x or (not model[0] and run.free):
                 continue
-            out = {"scene": run.name, "model": name, **figures(run, free, fit(others, free))}
+            if run.building not in fits:
+                fits[run.building] = fit(others, model)
+            out = {"scene": run.name, "viewpoints": run.viewpoints, "model": name, **figures(run, model, fits[run.building])}
             record["runs"].append(out)
             print(" ".join(f"{k} {v:.3f}" if k == "ECE" else f"{k} {v:.1f}" if isinstance(v, float) else f"{k} {v}" for k, v in out.items()))
-    models = [fit([r for r in runs if not free or r.free.any()], free) for free in (True, False)]
+    models = [fit([r for r in runs if model in r.x], model) for model in MODELS.values()]
     if arguments.header:
         arguments.header.write_text(header(models))
     if arguments.output:

@@ -11,6 +11,7 @@ void report(benchmark::State& state, const std::vector<PreparedCloud>& clouds, s
     const PrepareStatistics& s = cloud.statistics();
     sum.downsample += s.downsample, sum.normals += s.normals, sum.features += s.features, sum.grid += s.grid;
     sum.depth_maps += s.depth_maps;
+    sum.fronts += s.fronts;
     raw += static_cast<double>(s.input_points), points += s.points;
   }
   const double n = static_cast<double>(clouds.size());
@@ -22,6 +23,7 @@ void report(benchmark::State& state, const std::vector<PreparedCloud>& clouds, s
   state.counters["ms_features"] = sum.features / n;
   state.counters["ms_grid"] = sum.grid / n;
   state.counters["ms_depth_maps"] = sum.depth_maps / n;
+  state.counters["ms_fronts"] = sum.fronts / n;
   state.counters["ms_per_fragment"] =
       benchmark::Counter(n * static_cast<double>(runs) * 1e-3, benchmark::Counter::kIsRate | benchmark::Counter::kInvert);
 }

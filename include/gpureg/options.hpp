@@ -17,6 +17,9 @@ struct PrepareOptions {
   float wide_feature_radius = 0.4f;
   /// Viewpoints that depth maps are made of for free-space tests, evenly chosen among the cloud's; 0: no maps. 110 KB each.
   std::uint32_t depth_maps = 10;
+  /// How far from its surfaces a cloud tells their front, the side from which they were seen, from their back, for the evidence; 0: not
+  /// at all (paper: 0). A bit more than a third of a megabyte for a fragment of a room; a cloud wider than 2^26 cells of a tenth has none.
+  float front_reach = 0.5f;
 
   /// Throws InvalidArgument naming field and value.
   void validate() const;

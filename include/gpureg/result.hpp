@@ -46,6 +46,17 @@ struct PoseEvidence {
   double target_impossible = 0;
   double source_hidden = 0;              ///< of these, the share behind what was seen
   double target_hidden = 0;
+  /// Points of the source around the target's surfaces (up to prepare.front_reach); 0: not known.
+  double source_around = 0;
+  double target_around = 0;
+  /// Points of the source in front of a surface of the target, on the side that its normals point to, without touching any: within half of
+  /// the reach, and beyond. Whoever saw that surface should have seen them.
+  double source_near_front = 0;
+  double target_near_front = 0;
+  double source_far_front = 0;
+  double target_far_front = 0;
+  double source_at_back = 0;             ///< behind one, and in front of none
+  double target_at_back = 0;
   /// Eigenvalues, ascending, of the point-to-plane information of the source's inliers about their centre (rotation and translation,
   /// lengths in units of 20 voxels): a small one is a direction in which the pose slides.
   std::array<double, 6> stiffness{};

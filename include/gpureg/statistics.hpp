@@ -63,8 +63,8 @@ struct PrepareStatistics {
   std::uint32_t points = 0;               ///< after downsampling
   std::uint32_t points_without_normal = 0;   ///< fewer than 3 neighbours
   std::uint32_t points_without_feature = 0;  ///< no neighbour within the feature radius, or no normal: never matched
-  double downsample = 0, normals = 0, features = 0, grid = 0, depth_maps = 0;
-  double total() const { return downsample + normals + features + grid + depth_maps; }
+  double downsample = 0, normals = 0, features = 0, grid = 0, depth_maps = 0, fronts = 0;
+  double total() const { return downsample + normals + features + grid + depth_maps + fronts; }
 };
 
 }  // namespace gpureg

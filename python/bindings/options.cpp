@@ -19,6 +19,9 @@ std::vector<Field<PrepareOptions>> prepare_fields() {
             "Neighbourhood of a second FPFH, metres; 0: none."),
       field("depth_maps", &O::depth_maps,
             "Viewpoints that depth maps are made of for free-space tests; 0: none."),
+      field("front_reach", &O::front_reach,
+            "How far from its surfaces a cloud tells their front from their back, metres; 0: not "
+            "at all."),
   };
 }
 

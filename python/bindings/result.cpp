@@ -50,6 +50,7 @@ std::vector<Field<PrepareStatistics>> prepare_fields() {
       field("features", &P::features, "Milliseconds of the features."),
       field("grid", &P::grid, "Milliseconds of the search grid."),
       field("depth_maps", &P::depth_maps, "Milliseconds of the depth maps."),
+      field("fronts", &P::fronts, "Milliseconds of the fronts of surfaces."),
   };
 }
 
@@ -78,6 +79,17 @@ std::vector<Field<PoseEvidence>> evidence_fields() {
       field("target_impossible", &E::target_impossible, "The other way round."),
       field("source_hidden", &E::source_hidden, "Of those seen, the share behind a surface."),
       field("target_hidden", &E::target_hidden, "The other way round."),
+      field("source_around", &E::source_around,
+            "Share of the source's points around the target's surfaces; 0: not known."),
+      field("target_around", &E::target_around, "The other way round."),
+      field("source_near_front", &E::source_near_front,
+            "Share of the source's points that touch nothing and are close in front of a surface "
+            "of the target, by its normals."),
+      field("target_near_front", &E::target_near_front, "The other way round."),
+      field("source_far_front", &E::source_far_front, "The same, farther in front."),
+      field("target_far_front", &E::target_far_front, "The other way round."),
+      field("source_at_back", &E::source_at_back, "The same, behind one and in front of none."),
+      field("target_at_back", &E::target_at_back, "The other way round."),
       field("stiffness", &E::stiffness,
             "6 eigenvalues, ascending, of the point-to-plane information: a small one is a "
             "direction in which the pose slides."),

@@ -61,12 +61,13 @@ def confidence():
     """Fits that have not seen the building they are tested on; means over the runs (seeds) of each scene."""
     groups = {}
     for run in load("confidence.json")["runs"]:
-        groups.setdefault((run["model"], run["scene"]), []).append(run)
-    out = ["| viewpoints | scene | runs | found among the modes / best, % | geometric R@P95 / R@P99 / AP, % | strict R@P95 / AP, % | ECE | right above 0.9, % |",
-           "| --- | --- | --- | --- | --- | --- | --- | --- |"]
-    for (model, scene), runs in groups.items():
+        groups.setdefault((run["viewpoints"], run["model"], run["scene"]), []).append(run)
+    out = ["| viewpoints | looks at | scene | runs | found among the modes / best, % | geometric R@P95 / R@P99 / AP, % | strict R@P95 / AP, % | ECE | right above 0.9, % |",
+           "| --- | --- | --- | --- | --- | --- | --- | --- | --- |"]
+    looks = {"everything": "free space, fronts", "fronts": "fronts", "free_space": "free space", "neither": "neither"}
+    for (viewpoints, model, scene), runs in sorted(groups.items(), key=lambda group: (["known", "origin", "unknown"].index(group[0][0]), list(looks).index(group[0][1]))):
         of = lambda key: mean(run[key] for run in runs)  # noqa: B023,E731
-        out.append(f"| {'known' if model == 'with_free_space' else 'unknown'} | {scene} | {len(runs)} | {of('generated'):.1f} / {of('raw'):.1f} | {of('geo_R@P95'):.1f} / "
+        out.append(f"| {'the origin' if viewpoints == 'origin' else viewpoints} | {looks[model]} | {scene} | {len(runs)} | {of('generated'):.1f} / {of('raw'):.1f} | {of('geo_R@P95'):.1f} / "
                    f"{of('geo_R@P99'):.1f} / {of('geo_AP'):.1f} | {of('strict_R@P95'):.1f} / {of('strict_AP'):.1f} | {of('ECE'):.3f} | {of('right_above_0.9'):.1f} |")
     return out
 
@@ -75,7 +76,7 @@ def mistakes():
     """What the wrong reports of the fits that have not seen the building are; means over the runs of each scene."""
     groups = {}
     for run in load("confidence.json")["runs"]:
-        if run["model"] == "with_free_space" and "above_half" in run:
+        if run["model"] == "everything" and run["viewpoints"] == "known" and "above_half" in run:
             groups.setdefault(run["scene"], []).append(run["above_half"])
     out = ["| scene | reports above 0.5 | wrong by the 0.2 m rule | of them right by the trajectories, but not in gt_all | less than 5 deg and 0.3 m off | slid, less than 10 deg "
            "| turned: another place that looks alike |", "| --- | --- | --- | --- | --- | --- | --- |"]

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "algorithm/closest.hpp"
+#include "algorithm/fronts.hpp"
 #include "algorithm/visibility.hpp"
 
 namespace gpureg {
@@ -22,6 +23,7 @@ struct CloudView {
   const std::uint32_t* balance;     ///< weight of each point, see balance.hpp
   std::uint64_t balance_total;
   VisibilityView visibility;        ///< no maps where viewpoints are not known or not asked for
+  FrontView fronts;                 ///< none where not asked for, or the cloud is too wide
 };
 
 }  // namespace gpureg

@@ -18,6 +18,8 @@ struct SideEvidence {
   std::uint32_t seen;      ///< in a direction that some viewpoint of the other cloud saw
   std::uint32_t before;    ///< in front of a seen surface without touching any: impossible places
   std::uint32_t hidden;    ///< behind every surface seen in their direction
+  std::uint32_t around;    ///< in cells of the other cloud's fronts, see fronts.hpp
+  std::uint32_t near_front, far_front, at_back;  ///< of those that touch nothing and are in no surface's cell, by the first that holds
 };
 
 /// Matches that a pose brings together, by number and by the weights of their points' normals (see balance.hpp).
@@ -43,6 +45,15 @@ struct Weighed {
   bool inlier;
 };
 
+/// place: of a point, the bits of fronts.hpp.
+GPUREG_HD void add_place(std::uint32_t place, bool hit, SideEvidence& e) {
+  const bool open = !hit & ((place & kOnSurface) == 0), near = (place & kNearFront) != 0, far = (place & kFarFront) != 0;
+  e.around += place != 0 ? 1u : 0u;
+  e.near_front += open & near ? 1u : 0u;
+  e.far_front += open & !near & far ? 1u : 0u;
+  e.at_back += open & !near & !far & (place != 0) ? 1u : 0u;
+}
+
 /// One point of `moved` under the pose, against the other cloud; maps: how many of its viewpoints are asked. q: the moved point, c: what
 /// is closest to it.
 GPUREG_HD Weighed weigh_found(const CloudView& moved, const CloudView& other, const Rigid& pose, const EvidenceTest& test, std::uint32_t maps,
@@ -65,6 +76,7 @@ GPUREG_HD Weighed weigh_found(const CloudView& moved, const CloudView& other, co
   e.seen += seen ? 1u : 0u;
   e.before += before ? 1u : 0u;
   e.hidden += (seen & !before & !surface & !hit) ? 1u : 0u;
+  add_place(other.fronts.words ? place_of(other.fronts, q) : 0u, hit, e);
   return {c.index, inlier};
 }
 

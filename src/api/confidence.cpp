@@ -10,21 +10,9 @@
 namespace gpureg {
 namespace {
 
-namespace model = confidence_model;
-
 double at_least(double value, double least) { return std::log(std::max(value, least)); }
 
-/// What the model sees of one mode; bench/accuracy/fit_confidence.py computes the same.
-std::vector<double> measures(const PoseEvidence& e, bool free_space) {
-  const double low = std::min(e.source_overlap, e.target_overlap);
-  const double low_balanced = std::min(e.source_balanced_overlap, e.target_balanced_overlap);
-  const double high_balanced = std::max(e.source_balanced_overlap, e.target_balanced_overlap);
-  double volume = 0;
-  for (const double s : e.stiffness) volume += std::log1p(s);
-  std::vector<double> out{at_least(e.match_support, 1e-5),  at_least(e.match_inliers, 1),      at_least(low_balanced, 1e-3),
-                          at_least(high_balanced, 1e-3),    at_least(low, 1e-3),               at_least(e.stiffness[0], 1e-2),
-                          at_least(e.stiffness[1], 1e-2),   volume};
-  if (!free_space) return out;
+void add_free_space(const PoseEvidence& e, std::vector<double>& out) {
   // Where only one cloud's viewpoints are known, what they saw stands for both.
   const bool source = e.source_seen > 0, target = e.target_seen > 0;
   const auto both = [&](double s, double t) { return std::pair<double, double>(source ? s : t, target ? t : s); };
@@ -35,13 +23,64 @@ std::vector<double> measures(const PoseEvidence& e, bool free_space) {
   for (const double v : {std::min(seen.first, seen.second), std::max(seen.first, seen.second), std::max(of_all[0], of_all[1]),
                          std::min(of_all[0], of_all[1]), most, least, at_least(most, 3e-3), std::min(hidden.first, hidden.second), at_least(of_all[0] + of_all[1], 1e-3)})
     out.push_back(v);
+}
+
+void add_fronts(const PoseEvidence& e, bool free_space, std::vector<double>& out) {
+  const auto share = [](double part, double whole) { return part / std::max(whole, 1e-6); };
+  // Of what touches, how much does so from the same side.
+  const double source_alike = share(e.source_overlap, e.source_reach), target_alike = share(e.target_overlap, e.target_reach);
+  for (const double v : {at_least(e.source_near_front + e.target_near_front, 1e-3), at_least(e.source_far_front + e.target_far_front, 1e-3),
+                         std::min(source_alike, target_alike), std::max(source_alike, target_alike), std::max(e.source_around, e.target_around),
+                         std::min(e.source_around, e.target_around)})
+    out.push_back(v);
+  if (free_space) return;  // which says the rest
+  const auto beside = [&](double part, double reach) { return share(part, part + reach); };
+  const double source_front = beside(e.source_near_front + e.source_far_front, e.source_reach);
+  const double target_front = beside(e.target_near_front + e.target_far_front, e.target_reach);
+  const double source_back = beside(e.source_at_back, e.source_reach), target_back = beside(e.target_at_back, e.target_reach);
+  for (const double v : {std::max(source_front, target_front), std::min(source_front, target_front), at_least(e.source_at_back + e.target_at_back, 1e-3),
+                         std::max(source_back, target_back), std::min(source_back, target_back)})
+    out.push_back(v);
+}
+
+/// What the model sees of one mode; bench/accuracy/fit_confidence.py computes the same.
+std::vector<double> measures(const PoseEvidence& e, bool free_space, bool fronts) {
+  const double low = std::min(e.source_overlap, e.target_overlap);
+  const double low_balanced = std::min(e.source_balanced_overlap, e.target_balanced_overlap);
+  const double high_balanced = std::max(e.source_balanced_overlap, e.target_balanced_overlap);
+  double volume = 0;
+  for (const double s : e.stiffness) volume += std::log1p(s);
+  std::vector<double> out{at_least(e.match_support, 1e-5),  at_least(e.match_inliers, 1),      at_least(low_balanced, 1e-3),
+                          at_least(high_balanced, 1e-3),    at_least(low, 1e-3),               at_least(e.stiffness[0], 1e-2),
+                          at_least(e.stiffness[1], 1e-2),   volume};
+  if (free_space) add_free_space(e, out);
+  if (fronts) add_fronts(e, free_space, out);
   return out;
 }
 
-double logit(const std::vector<double>& x, const double* weights, double bias) {
-  double sum = bias;
-  for (std::size_t k = 0; k < x.size(); ++k) sum += weights[k] * x[k];
+double logit(const confidence_model::Regression& regression, const std::vector<double>& x) {
+  double sum = regression.bias;
+  for (std::size_t k = 0; k < x.size(); ++k) sum += regression.weights[k] * x[k];
   return sum;
+}
+
+/// What is known of both clouds, and the regressions for that.
+struct Knowledge {
+  bool free_space, fronts;
+  const confidence_model::Model& model;
+};
+
+Knowledge known_of(const std::vector<RegistrationMode>& modes) {
+  static constexpr confidence_model::Model kModels[2][2] = {{confidence_model::neither, confidence_model::fronts},
+                                                            {confidence_model::free_space, confidence_model::everything}};
+  // What no mode touches tells nothing of what the clouds have.
+  bool free_space = false, fronts = false;
+  for (const RegistrationMode& mode : modes) {
+    const PoseEvidence& e = mode.evidence;
+    free_space |= e.source_seen > 0 || e.target_seen > 0;
+    fronts |= e.source_around > 0 && e.target_around > 0;
+  }
+  return {free_space, fronts, kModels[free_space][fronts]};
 }
 
 /// Of distinct poses at most one is right: what a pose may have beside the others, were each of them judged by itself. Twins share.
@@ -60,15 +99,10 @@ double probability(double logit_value) { return 1.0 / (1.0 + std::exp(-logit_val
 
 void set_confidences(std::vector<RegistrationMode>& modes, const std::function<bool(const RegistrationMode&, const RegistrationMode&)>& same) {
   if (modes.empty()) return;
-  const PoseEvidence& first = modes.front().evidence;
-  const bool free_space = first.source_seen > 0 || first.target_seen > 0;
+  const Knowledge known = known_of(modes);
+  const auto seen = [&](const RegistrationMode& mode) { return measures(mode.evidence, known.free_space, known.fronts); };
   std::vector<std::pair<double, std::size_t>> order;
-  for (std::size_t k = 0; k < modes.size(); ++k) {
-    const PoseEvidence& e = modes[k].evidence;
-    order.emplace_back(free_space ? logit(measures(e, true), model::ranking_with_free_space, model::ranking_with_free_space_bias)
-                                  : logit(measures(e, false), model::ranking_without_free_space, model::ranking_without_free_space_bias),
-                       k);
-  }
+  for (std::size_t k = 0; k < modes.size(); ++k) order.emplace_back(logit(known.model.ranking, seen(modes[k])), k);
   std::stable_sort(order.begin(), order.end(), [](const auto& a, const auto& b) { return a.first > b.first; });
   std::vector<RegistrationMode> out;
   std::vector<double> own, rank;
@@ -81,13 +115,11 @@ void set_confidences(std::vector<RegistrationMode>& modes, const std::function<b
   for (std::size_t k = 0; k < out.size(); ++k) {
     RegistrationMode& mode = out[k];
     const double rival = k > 0 ? rank[0] : out.size() > 1 ? rank[1] : -14.0;
-    std::vector<double> x = measures(mode.evidence, free_space);
+    std::vector<double> x = seen(mode);
     x.push_back(rank[k]);
     x.push_back(rank[k] - rival);
-    mode.confidence = free_space ? probability(logit(x, model::confidence_with_free_space, model::confidence_with_free_space_bias))
-                                 : probability(logit(x, model::confidence_without_free_space, model::confidence_without_free_space_bias));
-    mode.overlap_confidence = free_space ? probability(logit(x, model::overlap_with_free_space, model::overlap_with_free_space_bias))
-                                         : probability(logit(x, model::overlap_without_free_space, model::overlap_without_free_space_bias));
+    mode.confidence = probability(logit(known.model.confidence, x));
+    mode.overlap_confidence = probability(logit(known.model.overlap, x));
     mode.confidence = std::min(mode.confidence, share[k]);
     if (k > 0) mode.confidence = std::min(mode.confidence, out.front().confidence);
     mode.overlap_confidence = std::min(mode.overlap_confidence, mode.confidence);

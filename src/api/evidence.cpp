@@ -71,6 +71,10 @@ PoseEvidence to_evidence(const PairOutcome& outcome, const ModeOutcome& mode, co
   e.source_seen = share(s.seen, s.tested), e.target_seen = share(t.seen, t.tested);
   e.source_impossible = share(s.before, s.seen), e.target_impossible = share(t.before, t.seen);
   e.source_hidden = share(s.hidden, s.seen), e.target_hidden = share(t.hidden, t.seen);
+  e.source_around = share(s.around, s.tested), e.target_around = share(t.around, t.tested);
+  e.source_near_front = share(s.near_front, s.tested), e.target_near_front = share(t.near_front, t.tested);
+  e.source_far_front = share(s.far_front, s.tested), e.target_far_front = share(t.far_front, t.tested);
+  e.source_at_back = share(s.at_back, s.tested), e.target_at_back = share(t.at_back, t.tested);
   const Eigen::Matrix3d fixed_from_moved = Eigen::Quaterniond(mode.pose.w, mode.pose.x, mode.pose.y, mode.pose.z).normalized().toRotationMatrix();
   const Stiffness stiff = stiffness(mode.information, mode.source.inliers, static_cast<double>(moved.radius), unit_length(moved.options),
                                     swapped ? Eigen::Matrix3d(fixed_from_moved.transpose()) : Eigen::Matrix3d::Identity());

@@ -24,6 +24,7 @@ void PrepareOptions::validate() const {
   require(wide_feature_radius <= 4.0f * feature_radius, "prepare.wide_feature_radius", wide_feature_radius,
           "at most 4 times prepare.feature_radius");
   require(depth_maps <= 64, "prepare.depth_maps", depth_maps, "at most 64");
+  require(front_reach == 0.0f || length(front_reach), "prepare.front_reach", front_reach, "0 or a length in [1e-6, 1e6]");
   require(voxel_size == 0.0f || feature_radius <= 100.0f * voxel_size, "prepare.feature_radius", feature_radius,
           "at most 100 times prepare.voxel_size");
   require(normal_radius <= 4.0f * feature_radius, "prepare.normal_radius", normal_radius, "at most 4 times prepare.feature_radius");
@@ -120,6 +121,7 @@ RegistrationOptions RegistrationOptions::from_voxel_size(float voxel_size, std::
   o.refine.max_correspondence_distance = 1.5f * voxel_size;
   o.refine.kernel_width = 0.5f * voxel_size;
   o.prepare.wide_feature_radius = 8.0f * voxel_size;
+  o.prepare.front_reach = 10.0f * voxel_size;
   o.compatibility.tolerance = voxel_size;
   o.compatibility.consensus_distance = 2.0f * voxel_size;
   o.compatibility.seed_separation = 2.0f * voxel_size;
@@ -135,6 +137,7 @@ RegistrationOptions RegistrationOptions::loopsmart(float voxel_size) {
   RegistrationOptions o = from_voxel_size(voxel_size);
   o.prepare.wide_feature_radius = 0;
   o.prepare.depth_maps = 0;
+  o.prepare.front_reach = 0;
   o.hypothesis.proposal = Proposal::quadruples;
   o.refine.max_iterations = 0;
   return o;

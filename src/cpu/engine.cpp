@@ -68,13 +68,13 @@ std::uint64_t balance_points(const std::vector<Vec3>& normals, std::vector<std::
 CloudView CpuCloud::view() const {
   const bool wide = !wide_features.values.empty();
   return {points.data(), normals.data(), features.values.data(), features.valid.data(), size, feature_dimension, radius, closest.view(), this,
-          wide ? wide_features.values.data() : nullptr, wide ? wide_features.valid.data() : nullptr, balance.data(), balance_total, visibility.view()};
+          wide ? wide_features.values.data() : nullptr, wide ? wide_features.valid.data() : nullptr, balance.data(), balance_total, visibility.view(), fronts.view()};
 }
 
 std::vector<std::shared_ptr<CpuCloud>> assemble(Exec& exec, std::vector<DownsampledCloud>& clouds, std::vector<std::vector<Vec3>>& normals,
                                                 std::vector<Features>& features, std::vector<Features>& wide_features,
                                                 std::vector<ClosestGrid>& closest, std::vector<Visibility>& visibility,
-                                                const PrepareOptions& options) {
+                                                std::vector<Fronts>& fronts, const PrepareOptions& options) {
   std::vector<std::shared_ptr<CpuCloud>> out(clouds.size());
   exec.parallel(clouds.size(), [&](std::size_t c) {
     auto cloud = std::make_shared<CpuCloud>();
@@ -94,6 +94,7 @@ std::vector<std::shared_ptr<CpuCloud>> assemble(Exec& exec, std::vector<Downsamp
     cloud->features = std::move(features[c]);
     cloud->wide_features = std::move(wide_features[c]);
     cloud->visibility = std::move(visibility[c]);
+    cloud->fronts = std::move(fronts[c]);
     cloud->balance_total = balance_points(cloud->normals, cloud->balance);
     cloud->closest = std::move(closest[c]);
     cloud->order = scoring_order(cloud->points, cloud->normals, options.search_distance);

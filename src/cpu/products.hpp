@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "algorithm/closest.hpp"
+#include "algorithm/fronts.hpp"
 #include "algorithm/grid.hpp"
 #include "algorithm/moments.hpp"
 #include "algorithm/quadruple.hpp"
@@ -17,6 +18,7 @@ namespace gpureg::cpu {
 struct DownsampledCloud {
   float origin[3] = {0, 0, 0};
   float radius = 1;                  ///< of the points about the origin
+  Vec3 lo{0, 0, 0}, hi{0, 0, 0};     ///< corners of the raw points' box, local
   std::uint64_t input_points = 0, invalid_points = 0;
   std::vector<Vec3> points;          ///< local, in voxel order (z, y, x), or input order without downsampling
   std::vector<Vec3> guides;          ///< empty, or the mean input normal of each point, zero where unknown
@@ -71,6 +73,13 @@ struct Visibility {
   VisibilityView view() const { return {depth.data(), viewpoints.data(), static_cast<std::uint32_t>(viewpoints.size()), step}; }
 };
 
+/// See fronts.hpp.
+struct Fronts {
+  FrontBox box;
+  std::vector<std::uint32_t> words;
+  FrontView view() const { return {box, words.empty() ? nullptr : words.data()}; }
+};
+
 struct ClosestGrid {
   float cell_size = 1;
   CellTable table;
@@ -86,6 +95,7 @@ struct CpuCloud : PreparedState {
   Features features, wide_features;
   std::vector<std::uint32_t> balance;
   Visibility visibility;
+  Fronts fronts;
   ClosestGrid closest;
   ScoringOrder order;
   CellSummaries summaries;

@@ -24,10 +24,12 @@ std::vector<Features> compute_wide_features(Exec& exec, const std::vector<Downsa
                                             const PrepareOptions& options);
 std::vector<Visibility> build_depth_maps(Exec& exec, Span<const RawCloud> raw, const std::vector<DownsampledCloud>& clouds,
                                          const PrepareOptions& options);
+std::vector<Fronts> build_fronts(Exec& exec, const std::vector<DownsampledCloud>& clouds, const std::vector<std::vector<Vec3>>& normals,
+                                 const PrepareOptions& options);
 std::vector<std::shared_ptr<CpuCloud>> assemble(Exec& exec, std::vector<DownsampledCloud>& clouds, std::vector<std::vector<Vec3>>& normals,
                                                 std::vector<Features>& features, std::vector<Features>& wide_features,
                                                 std::vector<ClosestGrid>& closest, std::vector<Visibility>& visibility,
-                                                const PrepareOptions& options);
+                                                std::vector<Fronts>& fronts, const PrepareOptions& options);
 
 // Alignment, one entry per pair.
 std::vector<Matches> match_features(Exec& exec, Span<const PairView> pairs, const HypothesisOptions& options);

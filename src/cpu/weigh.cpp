@@ -94,6 +94,16 @@ SideEvidence weigh_sample(MovedPoints& points, const Side& side, const Sample& s
   return e;
 }
 
+/// add_place() of the points of a group.
+void add_places(const MovedPoints& points, std::size_t group, std::uint64_t present, std::uint64_t hits, const Rigid& pose, const FrontView& fronts,
+                SideEvidence& e) {
+  if (!fronts.words) return;
+  for (std::uint64_t left = present; left != 0; left &= left - 1) {
+    const int k = __builtin_ctzll(left);
+    add_place(place_of(fronts, apply(pose, points.point(group * MovedPoints::kGroup + static_cast<std::size_t>(k)))), (hits >> k & 1) != 0, e);
+  }
+}
+
 /// weigh_point() of all points of one side. visit(k, closest, inlier) is called for those with a
 /// closest point.
 template <typename Visit>
@@ -117,6 +127,7 @@ SideEvidence weigh_side(MovedPoints& points, const Side& side, const Rigid& pose
               inlier ? fixed_residual(c.squared_distance, test.inlier.inverse_max_squared) : 0u;
           visit(side.order.index[k], c, inlier);
         });
+    add_places(points, group, present, hits, pose, side.other.fronts, e);
     const std::uint64_t before = s.before & ~hits;
     e.tested += count(present);
     e.hits += count(hits);

@@ -34,6 +34,7 @@ TEST(Options, PaperNumbers) {
   EXPECT_EQ(o.hypothesis.proposal, Proposal::quadruples);
   EXPECT_EQ(o.prepare.wide_feature_radius, 0);
   EXPECT_EQ(o.prepare.depth_maps, 0u);
+  EXPECT_EQ(o.prepare.front_reach, 0.0f);
   EXPECT_NO_THROW(o.validate());
 }
 
@@ -83,6 +84,8 @@ TEST(Options, EachFieldIsNamed) {
   expect_refused([](auto& o) { o.evidence.sample = 63; }, "evidence.sample");
   expect_refused([](auto& o) { o.evidence.modes = 65; }, "evidence.modes");
   expect_refused([](auto& o) { o.prepare.depth_maps = 65; }, "prepare.depth_maps");
+  expect_refused([](auto& o) { o.prepare.front_reach = -0.1f; }, "prepare.front_reach");
+  expect_refused([](auto& o) { o.prepare.front_reach = std::numeric_limits<float>::infinity(); }, "prepare.front_reach");
   expect_refused([](auto& o) { o.prepare.wide_feature_radius = 50; }, "prepare.wide_feature_radius");
   expect_refused([](auto& o) { o.prepare.voxel_size = kNan; }, "prepare.voxel_size");
   expect_refused([](auto& o) { o.prepare.voxel_size = 1e-5f; }, "prepare.feature_radius");

@@ -73,7 +73,7 @@ TEST_F(Register, Json) {
   EXPECT_EQ(json["source"]["file"], source_);
   EXPECT_EQ(json["source"]["prepare"]["input_points"], room_scan(0).points.size());
   double parts = 0;
-  for (const char* stage : {"downsample", "normals", "features", "grid", "depth_maps"})
+  for (const char* stage : {"downsample", "normals", "features", "grid", "depth_maps", "fronts"})
     parts += json["source"]["prepare"]["ms"][stage].get<double>();
   EXPECT_DOUBLE_EQ(json["source"]["prepare"]["ms"]["total"].get<double>(), parts);
   const auto& result = json["result"];

@@ -97,6 +97,14 @@ void expect_same_preparation(const std::vector<RawCloud>& raw, const PrepareOpti
     ASSERT_TRUE(same_bytes(cpu_maps[c].depth, host(on_cuda, cuda_maps.depth.data() + std::size_t(cuda_maps.offset[c]) * kMapCells, cpu_maps[c].depth.size())));
   }
 
+  auto cpu_fronts = cpu::build_fronts(on_cpu, cpu_points, cpu_normals, options);
+  const auto cuda_fronts = cuda::build_fronts(on_cuda, cuda_points, cuda_normals, options);
+  for (std::size_t c = 0; c < raw.size(); ++c) {
+    SCOPED_TRACE("fronts, cloud " + std::to_string(c));
+    ASSERT_EQ(cpu_fronts[c].words.size(), cuda_fronts.boxes[c].words());
+    ASSERT_TRUE(same_bytes(cpu_fronts[c].words, host(on_cuda, cuda_fronts.words.data() + cuda_fronts.offset[c], cpu_fronts[c].words.size())));
+  }
+
   const auto cpu_closest = cpu::build_closest_grids(on_cpu, cpu_points, cpu_grids, options);
   const auto cuda_closest = cuda::build_closest_grids(on_cuda, cuda_points, cuda_grids, options);
   for (std::size_t c = 0; c < raw.size(); ++c) {
@@ -109,12 +117,12 @@ void expect_same_preparation(const std::vector<RawCloud>& raw, const PrepareOpti
     ASSERT_TRUE(same_bytes(expected.candidates, host(on_cuda, cuda_closest.candidates.data() + cuda_closest.candidate_offset[c], expected.candidates.size())));
   }
 
-  const auto assembled = cuda::assemble(on_cuda, cuda_points, cuda_normals, cuda_features, cuda_wide, cuda_closest, cuda_maps, options);
+  const auto assembled = cuda::assemble(on_cuda, cuda_points, cuda_normals, cuda_features, cuda_wide, cuda_closest, cuda_maps, cuda_fronts, options);
   auto expected_points = cpu_points;
   auto expected_normals = cpu_normals;
   auto expected_features = cpu_features;
   auto expected_closest = cpu_closest;
-  const auto expected = cpu::assemble(on_cpu, expected_points, expected_normals, expected_features, cpu_wide, expected_closest, cpu_maps, options);
+  const auto expected = cpu::assemble(on_cpu, expected_points, expected_normals, expected_features, cpu_wide, expected_closest, cpu_maps, cpu_fronts, options);
   for (std::size_t c = 0; c < raw.size(); ++c) {
     SCOPED_TRACE("assembled, cloud " + std::to_string(c));
     ASSERT_TRUE(same_bytes(cpu_points[c].points, assembled[c]->copy_points()));

@@ -26,7 +26,8 @@ inline std::vector<char> bytes(const RegistrationResult& r) {
     const PoseEvidence& e = mode.evidence;
     add(&e.match_inliers, sizeof e.match_inliers);
     for (const double v : {e.match_support, e.source_overlap, e.target_overlap, e.source_balanced_overlap, e.target_balanced_overlap, e.source_seen, e.target_seen,
-                           e.source_impossible, e.target_impossible, e.source_hidden, e.target_hidden})
+                           e.source_impossible, e.target_impossible, e.source_hidden, e.target_hidden, e.source_around, e.target_around, e.source_near_front, e.target_near_front,
+                           e.source_far_front, e.target_far_front, e.source_at_back, e.target_at_back})
       add(&v, sizeof v);
     add(e.stiffness.data(), e.stiffness.size() * sizeof(double));
   }

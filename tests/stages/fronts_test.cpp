@@ -1,0 +1,176 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <gtest/gtest.h>
+
+#include <map>
+#include <tuple>
+
+#include "algorithm/evidence.hpp"
+#include "support/prepared.hpp"
+#include "support/random_clouds.hpp"
+
+namespace gpureg::cpu {
+namespace {
+
+/// A square metre of floor, seen from above, a grid of points at a height.
+std::vector<Vec3> floor_at(float height) {
+  std::vector<Vec3> points;
+  for (int y = 0; y < 60; ++y)
+    for (int x = 0; x < 60; ++x) points.push_back({0.02f * static_cast<float>(x) - 0.6f, 0.02f * static_cast<float>(y) - 0.6f, height});
+  return points;
+}
+
+std::shared_ptr<CpuCloud> seen_from(Exec& exec, const std::vector<Vec3>& points, Vec3 eye, const PrepareOptions& options = {}) {
+  RawCloud raw = test::raw_cloud(points);
+  raw.viewpoints = &eye.x, raw.viewpoint_count = 1;
+  return test::prepare_one(exec, raw, options);
+}
+
+/// Of a place in the cloud's own frame.
+std::uint32_t place(const CpuCloud& cloud, Vec3 p) { return place_of(cloud.fronts.view(), p - Vec3{cloud.origin[0], cloud.origin[1], cloud.origin[2]}); }
+
+TEST(Fronts, AFloorHasAFrontAndABack) {
+  Exec exec(1);
+  const auto cloud = seen_from(exec, floor_at(0.02f), {0, 0, 2});
+  EXPECT_EQ(place(*cloud, {0, 0, 0.02f}) & kOnSurface, kOnSurface);
+  for (const float h : {0.17f, 0.22f}) EXPECT_EQ(place(*cloud, {0.1f, 0.2f, 0.02f + h}), kNearFront) << h;
+  for (const float h : {0.32f, 0.47f}) EXPECT_EQ(place(*cloud, {0.1f, 0.2f, 0.02f + h}), kFarFront) << h;
+  for (const float h : {0.17f, 0.32f, 0.47f}) EXPECT_EQ(place(*cloud, {0.1f, 0.2f, 0.02f - h}), kAtBack) << h;
+  for (const float h : {0.67f, -0.67f, 50.0f, -1e20f, 1e30f}) EXPECT_EQ(place(*cloud, {0.1f, 0.2f, h}), 0u) << h;
+  EXPECT_EQ(place(*cloud, {1.5f, 0, 0.2f}), 0u);
+}
+
+TEST(Fronts, AreThoseOfTheSideThatNormalsTell) {
+  Exec exec(1);
+  const std::vector<Vec3> points = floor_at(0.02f), down(points.size(), Vec3{0.3f, 0, -2});
+  RawCloud raw = test::raw_cloud(points);
+  raw.normals = &down[0].x;
+  const auto cloud = test::prepare_one(exec, raw, {});
+  EXPECT_EQ(place(*cloud, {0.1f, 0.2f, 0.22f}), kAtBack);
+  EXPECT_EQ(place(*cloud, {0.1f, 0.2f, -0.18f}), kNearFront);
+}
+
+TEST(Fronts, EndAtTheNextSurface) {
+  Exec exec(1);
+  std::vector<Vec3> points = floor_at(0.02f);
+  const std::vector<Vec3> ceiling = floor_at(0.32f);
+  points.insert(points.end(), ceiling.begin(), ceiling.end());
+  std::vector<Vec3> up(points.size(), Vec3{0, 0, 1});
+  RawCloud raw = test::raw_cloud(points);
+  raw.normals = &up[0].x;
+  const auto cloud = test::prepare_one(exec, raw, {});
+  // What is above the upper one is in its front alone: the lower one's ends there.
+  EXPECT_EQ(place(*cloud, {0, 0, 0.47f}), kNearFront);
+  EXPECT_EQ(place(*cloud, {0, 0, 0.17f}), kNearFront | kAtBack);
+}
+
+TEST(Fronts, AreWhatMarchingOverAMapOfCellsFinds) {
+  std::mt19937 random(3);
+  Exec exec(2);
+  PrepareOptions options;
+  using Key = std::tuple<int, int, int>;
+  for (int trial = 0; trial < 4; ++trial) {
+    options.front_reach = trial < 2 ? 0.5f : 0.37f;
+    options.voxel_size = trial % 2 == 0 ? 0.05f : 0.0f;
+    const auto points = trial == 3 ? test::cube(random, 3000, 1.0f) : test::bumpy_sheet(random, 4000, 1.7f);
+    const auto cloud = test::prepare_one(exec, test::raw_cloud(points), options);
+    const float inverse = cloud->fronts.box.inverse_cell_size, size = cloud->fronts.box.cell_size;
+    const auto key = [&](Vec3 p) {
+      const Cell c = cell_of(p, inverse);
+      return Key{c.x, c.y, c.z};
+    };
+    std::map<Key, std::uint32_t> surface, expected;
+    for (const Vec3& p : cloud->points) surface[key(p)] = kOnSurface;
+    expected = surface;
+    for (std::size_t i = 0; i < cloud->points.size(); ++i)
+      for (const float side : {1.0f, -1.0f})
+        for (int step = 2; step <= 10 && !is_zero(cloud->normals[i]); ++step) {
+          const float h = side * size * static_cast<float>(step);
+          const Vec3 p = cloud->points[i], n = cloud->normals[i];
+          const Key k = key({fmaf(n.x, h, p.x), fmaf(n.y, h, p.y), fmaf(n.z, h, p.z)});
+          if (surface.count(k)) break;
+          expected[k] |= side < 0 ? kAtBack : step <= 5 ? kNearFront : kFarFront;
+        }
+    std::size_t marked = 0;
+    for (const std::uint32_t word : cloud->fronts.words)
+      for (std::uint32_t shift = 0; shift < 32; shift += 4) marked += (word >> shift & 15) != 0;
+    EXPECT_EQ(marked, expected.size());
+    for (const auto& [k, bits] : expected) {
+      const auto [x, y, z] = k;
+      const Vec3 middle{(static_cast<float>(x) + 0.5f) * size, (static_cast<float>(y) + 0.5f) * size, (static_cast<float>(z) + 0.5f) * size};
+      ASSERT_EQ(place_of(cloud->fronts.view(), middle), bits) << x << " " << y << " " << z;
+    }
+  }
+}
+
+TEST(Fronts, NoneWhereNotAskedForOrTooWide) {
+  Exec exec(1);
+  PrepareOptions options;
+  options.front_reach = 0;
+  EXPECT_EQ(seen_from(exec, floor_at(0), {0, 0, 2}, options)->fronts.view().words, nullptr);
+  EXPECT_EQ(seen_from(exec, {}, {0, 0, 2})->fronts.view().words, nullptr);
+  std::vector<Vec3> wide = floor_at(0);
+  wide.push_back({3e3f, 2e3f, 1e3f});
+  EXPECT_EQ(seen_from(exec, wide, {0, 0, 2})->fronts.view().words, nullptr);
+  wide.back() = {60, 0, 0};
+  EXPECT_NE(seen_from(exec, wide, {0, 0, 2})->fronts.view().words, nullptr);
+  // Corners whose cells no integer counts.
+  for (const float far : {1e9f, 3e18f, 3e38f}) EXPECT_EQ(front_box({-far, -far, -far}, {far, far, far}, 1e-6f, true).words(), 0u);
+  EXPECT_EQ(front_box({3e7f, 0, 0}, {3e7f, 1, 1}, 0.5f, true).words_x > 0, true);
+  EXPECT_EQ(front_box({9e8f, 0, 0}, {9e8f, 1, 1}, 0.5f, true).words(), 0u);
+}
+
+/// Evidence of a pose that is the identity between the clouds' own frames.
+ModeOutcome weigh(Exec& exec, const CpuCloud& source, const CpuCloud& target) {
+  const PairView pair = test::pair_view(source, target);
+  std::vector<Mode> modes(1);
+  modes[0].pose = {1, 0, 0, 0, static_cast<double>(source.origin[0] - target.origin[0]), static_cast<double>(source.origin[1] - target.origin[1]),
+                   static_cast<double>(source.origin[2] - target.origin[2])};
+  PairOutcome outcome;
+  weigh_modes(exec, {&pair, 1}, std::vector<MatchSet>(1), std::vector<Candidates>(1), {modes}, RegistrationOptions{}, {&outcome, 1});
+  return outcome.modes.at(0);
+}
+
+TEST(Fronts, TellOnWhichSidePointsHang) {
+  Exec exec(1);
+  const auto target = seen_from(exec, floor_at(0.02f), {0, 0, 2});
+  const auto of = [&](float height) { return weigh(exec, *seen_from(exec, floor_at(0.02f + height), {0, 0, 2}), *target).source; };
+  const SideEvidence on = of(0), near = of(0.2f), far = of(0.4f), back = of(-0.3f), away = of(1.0f);
+  EXPECT_EQ(on.hits, on.tested);
+  EXPECT_EQ(on.around, on.tested);
+  EXPECT_EQ(on.near_front + on.far_front + on.at_back, 0u);
+  EXPECT_GT(near.near_front, near.tested * 9 / 10);
+  EXPECT_GT(far.far_front, far.tested * 9 / 10);
+  EXPECT_GT(back.at_back, back.tested * 9 / 10);
+  EXPECT_EQ(near.far_front + near.at_back + far.near_front + far.at_back + back.near_front + back.far_front, 0u);
+  EXPECT_EQ(away.around, 0u);
+}
+
+TEST(Fronts, EvidenceInGroupsIsThatOfEachPoint) {
+  std::mt19937 random(4);
+  Exec exec(2);
+  for (int trial = 0; trial < 3; ++trial) {
+    const auto a = test::prepare_one(exec, test::raw_cloud(test::bumpy_sheet(random, 9000, 1.7f)), {});
+    const auto b = test::prepare_one(exec, test::raw_cloud(test::bumpy_sheet(random, 7001, 2.0f)), {});
+    const ModeOutcome outcome = weigh(exec, *a, *b);
+    const RegistrationOptions options;
+    const EvidenceTest test{inlier_test(options.score.max_correspondence_distance, options.evidence.max_normal_angle), options.evidence.free_space_margin,
+                            options.evidence.min_range};
+    const Rigid there = to_rigid(outcome.pose);
+    const CloudView s = a->view(), t = b->view();
+    SideEvidence forth{}, reverse{};
+    for (std::uint32_t i = 0; i < s.size; ++i) weigh_point(s, t, there, test, t.visibility.count, i, forth);
+    for (std::uint32_t i = 0; i < t.size; ++i) weigh_point(t, s, inverse(there), test, s.visibility.count, i, reverse);
+    for (const auto& [expected, found] : {std::pair(forth, outcome.source), std::pair(reverse, outcome.target)}) {
+      EXPECT_EQ(expected.tested, found.tested);
+      EXPECT_EQ(expected.hits, found.hits);
+      EXPECT_EQ(expected.around, found.around);
+      EXPECT_EQ(expected.near_front, found.near_front);
+      EXPECT_EQ(expected.far_front, found.far_front);
+      EXPECT_EQ(expected.at_back, found.at_back);
+      EXPECT_GT(found.near_front, 0u);
+    }
+  }
+}
+
+}  // namespace
+}  // namespace gpureg::cpu
