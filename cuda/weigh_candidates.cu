@@ -27,13 +27,10 @@ __global__ void __launch_bounds__(256) sampled_weight(const SearchPair* pairs, s
 __device__ SideEvidence weigh_sample(const CloudView& moved, const CloudView& other, const CellSummaries& cells, const Rigid& pose, const EvidenceTest& test, std::uint32_t sample) {
   SideEvidence e{};
   const std::uint32_t stride = sample_stride(moved.size, sample), maps = quick_maps(other.visibility);
-  const bool fronts = by_fronts(other);
   for (std::uint64_t i = std::uint64_t(threadIdx.x % 32) * stride; i < moved.size; i += 32ull * stride) {
     const Vec3 q = apply(pose, moved.points[i]);
-    weigh_found(moved, other, pose, test, maps, static_cast<std::uint32_t>(i), q, find_closest(other, cells, q, test.inlier.max_squared),
-                fronts ? place_of(other.fronts, q) : 0u, e);
+    weigh_found(moved, other, pose, test, maps, static_cast<std::uint32_t>(i), q, find_closest(other, cells, q, test.inlier.max_squared), e);
   }
-  if (fronts) e.seen = e.around, e.before = e.near_front + e.far_front;
   e.balanced = static_cast<std::uint64_t>(warp_sum(static_cast<std::int64_t>(e.balanced)));
   e.seen = warp_sum(e.seen);
   e.before = warp_sum(e.before);

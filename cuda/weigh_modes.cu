@@ -65,8 +65,7 @@ __global__ void __launch_bounds__(kThreads) weigh(WeighModes w) {
     const Rigid back = inverse(there);
     for (std::uint32_t i = threadIdx.x; i < t.size; i += kThreads) {
       const Vec3 q = apply(back, t.points[i]);
-      weigh_found(t, s, back, w.test, s.visibility.count, i, q, find_closest(s, w.pairs[p].source_cells, q, w.test.inlier.max_squared),
-                  place_of(s.fronts, q), side);
+      weigh_found(t, s, back, w.test, s.visibility.count, i, q, find_closest(s, w.pairs[p].source_cells, q, w.test.inlier.max_squared), side);
     }
     side = of_block(side, scratch);
     if (threadIdx.x == 0) out.target = side;
@@ -77,8 +76,7 @@ __global__ void __launch_bounds__(kThreads) weigh(WeighModes w) {
   for (std::uint32_t i = threadIdx.x; i < s.size; i += kThreads) {
     const Vec3 q = apply(there, s.points[i]);
     const Weighed found =
-        weigh_found(s, t, there, w.test, t.visibility.count, i, q, find_closest(t, w.pairs[p].target_cells, q, w.test.inlier.max_squared),
-                    place_of(t.fronts, q), side);
+        weigh_found(s, t, there, w.test, t.visibility.count, i, q, find_closest(t, w.pairs[p].target_cells, q, w.test.inlier.max_squared), side);
     if (found.inlier) add_information(s, there, i, information);
     if (found.closest == kNoValue) continue;
     add_moment(s.points[i] * (1.0f / s.radius), source);

@@ -55,9 +55,9 @@ GPUREG_HD void add_place(std::uint32_t place, bool hit, SideEvidence& e) {
 }
 
 /// One point of `moved` under the pose, against the other cloud; maps: how many of its viewpoints are asked. q: the moved point, c: what
-/// is closest to it; place: of q in the other cloud's fronts, 0 where they are not asked.
+/// is closest to it.
 GPUREG_HD Weighed weigh_found(const CloudView& moved, const CloudView& other, const Rigid& pose, const EvidenceTest& test, std::uint32_t maps,
-                           std::uint32_t i, Vec3 q, Closest c, std::uint32_t place, SideEvidence& e) {
+                           std::uint32_t i, Vec3 q, Closest c, SideEvidence& e) {
   const bool hit = c.index != kNoValue;
   const bool inlier = hit && normals_agree(rotate(pose, moved.normals[i]), other.normals[c.index], test.inlier.min_cosine);
   bool seen = false, before = false, surface = false;
@@ -76,14 +76,14 @@ GPUREG_HD Weighed weigh_found(const CloudView& moved, const CloudView& other, co
   e.seen += seen ? 1u : 0u;
   e.before += before ? 1u : 0u;
   e.hidden += (seen & !before & !surface & !hit) ? 1u : 0u;
-  add_place(place, hit, e);
+  add_place(other.fronts.words ? place_of(other.fronts, q) : 0u, hit, e);
   return {c.index, inlier};
 }
 
 GPUREG_HD Weighed weigh_point(const CloudView& moved, const CloudView& other, const Rigid& pose, const EvidenceTest& test, std::uint32_t maps,
                            std::uint32_t i, SideEvidence& e) {
   const Vec3 q = apply(pose, moved.points[i]);
-  return weigh_found(moved, other, pose, test, maps, i, q, find_closest(other.closest, other.points, q, test.inlier.max_squared), place_of(other.fronts, q), e);
+  return weigh_found(moved, other, pose, test, maps, i, q, find_closest(other.closest, other.points, q, test.inlier.max_squared), e);
 }
 
 GPUREG_HD void add_information(const CloudView& moved, const Rigid& pose, std::uint32_t i, InformationSums& sums) {
@@ -102,9 +102,6 @@ GPUREG_HD std::uint32_t sample_stride(std::uint32_t points, std::uint32_t most) 
 
 /// How many depth maps the quick look at a candidate asks.
 GPUREG_HD std::uint32_t quick_maps(const VisibilityView& maps) { return maps.count < 1 ? maps.count : 1; }
-
-/// Whether it asks the fronts of the other cloud's surfaces instead.
-GPUREG_HD bool by_fronts(const CloudView& other) { return other.visibility.count == 0 && other.fronts.words != nullptr; }
 
 /// Weight of a point in [0, 1].
 GPUREG_HD float balance_share(std::uint32_t weight) { return static_cast<float>(weight) * (1.0f / kBalanceScale); }

@@ -78,12 +78,9 @@ GPUREG_HD FrontCell front_cell(const FrontBox& box, Vec3 q) {
 
 /// The bits of a place: those of Place, or 0 where nothing is known.
 GPUREG_HD std::uint32_t place_of(const FrontView& fronts, Vec3 q) {
-  if (!fronts.words) return 0;
   const FrontCell cell = front_cell(fronts.box, q);
   return cell.word == kNoValue ? 0u : (fronts.words[cell.word] >> cell.shift) & 15u;
 }
-
-GPUREG_HD bool in_front(std::uint32_t place) { return (place & kOnSurface) == 0 && (place & (kNearFront | kFarFront)) != 0; }
 
 /// Along a normal and against it, cell by cell, up to the next surface: mark(word, bits). Surfaces must have been marked before. side 0:
 /// the front; 1: the back.

@@ -65,18 +65,6 @@ std::uint32_t count(std::uint64_t mask) {
   return static_cast<std::uint32_t>(__builtin_popcountll(mask));
 }
 
-/// Where no viewpoint is known, what is in front of surfaces stands for what was seen to be free.
-void add_fronts(const MovedPoints& points, std::size_t group, std::uint64_t present,
-                const Rigid& pose, const FrontView& fronts, Sights& s) {
-  for (std::uint64_t left = present; left != 0; left &= left - 1) {
-    const int k = __builtin_ctzll(left);
-    const std::size_t at = group * MovedPoints::kGroup + static_cast<std::size_t>(k);
-    const std::uint32_t place = place_of(fronts, apply(pose, points.point(at)));
-    s.seen |= static_cast<std::uint64_t>(place != 0) << k;
-    s.before |= static_cast<std::uint64_t>(in_front(place)) << k;
-  }
-}
-
 /// What promise() asks of the sample: weigh_point() of the points that the cells' summaries leave
 /// open.
 SideEvidence weigh_sample(MovedPoints& points, const Side& side, const Sample& sample,
@@ -87,7 +75,6 @@ SideEvidence weigh_sample(MovedPoints& points, const Side& side, const Sample& s
     const std::uint64_t present = points.present(group),
                         certain = decide ? bounds.certain & present : 0;
     Sights s = sights_of(side, pose, group, present, test, maps);
-    if (by_fronts(side.other)) add_fronts(points, group, present, pose, side.other.fronts, s);
     for (std::uint64_t left = certain; left != 0; left &= left - 1)
       e.balanced += sample.balance[group * MovedPoints::kGroup +
                                    static_cast<std::size_t>(__builtin_ctzll(left))];
@@ -108,13 +95,12 @@ SideEvidence weigh_sample(MovedPoints& points, const Side& side, const Sample& s
 }
 
 /// add_place() of the points of a group.
-void add_places(const MovedPoints& points, std::size_t group, std::uint64_t present,
-                std::uint64_t hits, const Rigid& pose, const FrontView& fronts, SideEvidence& e) {
+void add_places(const MovedPoints& points, std::size_t group, std::uint64_t present, std::uint64_t hits, const Rigid& pose, const FrontView& fronts,
+                SideEvidence& e) {
   if (!fronts.words) return;
   for (std::uint64_t left = present; left != 0; left &= left - 1) {
     const int k = __builtin_ctzll(left);
-    const std::size_t at = group * MovedPoints::kGroup + static_cast<std::size_t>(k);
-    add_place(place_of(fronts, apply(pose, points.point(at))), (hits >> k & 1) != 0, e);
+    add_place(place_of(fronts, apply(pose, points.point(group * MovedPoints::kGroup + static_cast<std::size_t>(k)))), (hits >> k & 1) != 0, e);
   }
 }
 
