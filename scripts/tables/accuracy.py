@@ -72,6 +72,21 @@ def confidence():
     return out
 
 
+def unseen():
+    """The same in short: what is shipped, in the simulated buildings."""
+    groups = {}
+    for run in load("confidence.json")["runs"]:
+        if run["model"] == ("fronts" if run["viewpoints"] == "unknown" else "everything") and "kitchen" not in run["scene"]:
+            groups.setdefault(run["viewpoints"], {}).setdefault(run["scene"], []).append(run)
+    scenes = list(groups["known"])
+    out = [f"| viewpoints | {' | '.join(scenes)} |", "| --- |" + " --- |" * len(scenes)]
+    names = {"known": "known", "origin": "the origin only", "unknown": "none"}
+    for viewpoints, of in groups.items():
+        cells = [" / ".join(f"{mean(run[key] for run in of[scene]):.1f}" for key in ("raw", "geo_R@P95", "geo_R@P99")) for scene in scenes]
+        out.append(f"| {names[viewpoints]} | {' | '.join(cells)} |")
+    return out
+
+
 def mistakes():
     """What the wrong reports of the fits that have not seen the building are; means over the runs of each scene."""
     groups = {}
@@ -117,6 +132,6 @@ def accuracy_attempts():
 
 TABLES = {
     "redkitchen": redkitchen, "redkitchen_seeds": redkitchen_seeds, "range_pairs": range_pairs,
-    "other_pairs": other_pairs, "confidence": confidence, "mistakes": mistakes, "agreement": agreement, "accuracy_sweep": accuracy_sweep,
+    "other_pairs": other_pairs, "confidence": confidence, "unseen": unseen, "mistakes": mistakes, "agreement": agreement, "accuracy_sweep": accuracy_sweep,
     "accuracy_attempts": accuracy_attempts,
 }
