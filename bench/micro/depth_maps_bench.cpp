@@ -12,6 +12,16 @@ void BuildDepthMaps(benchmark::State& state) {
 }
 BENCHMARK(BuildDepthMaps)->Unit(benchmark::kMillisecond);
 
+void BuildFronts(benchmark::State& state) {
+  EvidenceScene& s = EvidenceScene::get();
+  const auto points = cpu::downsample(s.exec, {s.raw, 1}, s.options.prepare);
+  const auto grids = cpu::build_grids(s.exec, points, s.options.prepare);
+  const auto normals = cpu::estimate_normals(s.exec, points, grids, s.options.prepare);
+  for (auto _ : state)
+    benchmark::DoNotOptimize(cpu::build_fronts(s.exec, points, normals, s.options.prepare));
+}
+BENCHMARK(BuildFronts)->Unit(benchmark::kMillisecond);
+
 void ComputeWideFeatures(benchmark::State& state) {
   EvidenceScene& s = EvidenceScene::get();
   const auto points = cpu::downsample(s.exec, {s.raw, 1}, s.options.prepare);
