@@ -12,24 +12,32 @@ void BuildDepthMaps(benchmark::State& state) {
 }
 BENCHMARK(BuildDepthMaps)->Unit(benchmark::kMillisecond);
 
+/// What stages after the normals start from.
+struct WithNormals {
+  explicit WithNormals(EvidenceScene& s)
+      : points(cpu::downsample(s.exec, {s.raw, 1}, s.options.prepare)),
+        grids(cpu::build_grids(s.exec, points, s.options.prepare)),
+        normals(cpu::estimate_normals(s.exec, points, grids, s.options.prepare)) {}
+  std::vector<cpu::DownsampledCloud> points;
+  std::vector<cpu::Grid> grids;
+  std::vector<std::vector<Vec3>> normals;
+};
+
 void BuildFronts(benchmark::State& state) {
   EvidenceScene& s = EvidenceScene::get();
-  const auto points = cpu::downsample(s.exec, {s.raw, 1}, s.options.prepare);
-  const auto grids = cpu::build_grids(s.exec, points, s.options.prepare);
-  const auto normals = cpu::estimate_normals(s.exec, points, grids, s.options.prepare);
+  const WithNormals cloud(s);
   for (auto _ : state)
-    benchmark::DoNotOptimize(cpu::build_fronts(s.exec, points, normals, s.options.prepare));
+    benchmark::DoNotOptimize(
+        cpu::build_fronts(s.exec, cloud.points, cloud.normals, s.options.prepare));
 }
 BENCHMARK(BuildFronts)->Unit(benchmark::kMillisecond);
 
 void ComputeWideFeatures(benchmark::State& state) {
   EvidenceScene& s = EvidenceScene::get();
-  const auto points = cpu::downsample(s.exec, {s.raw, 1}, s.options.prepare);
-  const auto grids = cpu::build_grids(s.exec, points, s.options.prepare);
-  const auto normals = cpu::estimate_normals(s.exec, points, grids, s.options.prepare);
+  const WithNormals cloud(s);
   for (auto _ : state)
-    benchmark::DoNotOptimize(
-        cpu::compute_wide_features(s.exec, points, normals, grids, s.options.prepare));
+    benchmark::DoNotOptimize(cpu::compute_wide_features(s.exec, cloud.points, cloud.normals,
+                                                        cloud.grids, s.options.prepare));
 }
 BENCHMARK(ComputeWideFeatures)->Unit(benchmark::kMillisecond);
 

@@ -18,7 +18,8 @@ struct PrepareOptions {
   /// Viewpoints that depth maps are made of for free-space tests, evenly chosen among the cloud's; 0: no maps. 110 KB each.
   std::uint32_t depth_maps = 10;
   /// How far from its surfaces a cloud tells their front, the side from which they were seen, from their back, for the evidence; 0: not
-  /// at all (paper: 0). A bit more than a third of a megabyte for a fragment of a room; a cloud wider than 2^26 cells of a tenth has none.
+  /// at all (paper: 0). Half a byte for each cell of a tenth of it in the cloud's box, half a megabyte for a fragment of a room; a box of
+  /// more than 2^26 cells has none.
   float front_reach = 0.5f;
 
   /// Throws InvalidArgument naming field and value.

@@ -30,10 +30,10 @@ void find_origin(const RawCloud& raw, float voxel_size, DownsampledCloud& out, s
   }
   out.input_points = raw.size;
   out.invalid_points = raw.size - finite.size();
-  if (!finite.empty())
-    for (int k = 0; k < 3; ++k) out.origin[k] = local_origin(lo[k], hi[k], voxel_size);
+  if (finite.empty()) return;
+  for (int k = 0; k < 3; ++k) out.origin[k] = local_origin(lo[k], hi[k], voxel_size);
   const Vec3 origin{out.origin[0], out.origin[1], out.origin[2]};
-  if (!finite.empty()) out.lo = Vec3{lo[0], lo[1], lo[2]} - origin, out.hi = Vec3{hi[0], hi[1], hi[2]} - origin;
+  out.lo = Vec3{lo[0], lo[1], lo[2]} - origin, out.hi = Vec3{hi[0], hi[1], hi[2]} - origin;
 }
 
 void downsample_one(const RawCloud& raw, const PrepareOptions& options, DownsampledCloud& out) {

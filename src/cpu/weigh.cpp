@@ -95,12 +95,13 @@ SideEvidence weigh_sample(MovedPoints& points, const Side& side, const Sample& s
 }
 
 /// add_place() of the points of a group.
-void add_places(const MovedPoints& points, std::size_t group, std::uint64_t present, std::uint64_t hits, const Rigid& pose, const FrontView& fronts,
-                SideEvidence& e) {
+void add_places(const MovedPoints& points, std::size_t group, std::uint64_t present,
+                std::uint64_t hits, const Rigid& pose, const FrontView& fronts, SideEvidence& e) {
   if (!fronts.words) return;
   for (std::uint64_t left = present; left != 0; left &= left - 1) {
     const int k = __builtin_ctzll(left);
-    add_place(place_of(fronts, apply(pose, points.point(group * MovedPoints::kGroup + static_cast<std::size_t>(k)))), (hits >> k & 1) != 0, e);
+    const Vec3 p = points.point(group * MovedPoints::kGroup + static_cast<std::size_t>(k));
+    add_place(place_of(fronts, apply(pose, p)), (hits >> k & 1) != 0, e);
   }
 }
 

@@ -1,0 +1,59 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: BSD-3-Clause
+"""A scene as somebody has it who does not know where the sensor was, for fit_confidence.py --origin and --unknown.
+
+Either the same clouds without cameras.txt, whose normals then turn to the origin; or (--unknown) clouds that come with a direction at
+every point, towards the nearest of every fifth camera: they say which side of a surface was seen, and nothing about where from.
+The clouds are those of SCENE (cloud_bin_<i>.ply, cameras.txt); the ground truth is copied along.
+
+usage: without_viewpoints.py SCENE OUT [--unknown]
+Needs numpy, and --unknown the Python package gpureg."""
+import argparse
+import pathlib
+import shutil
+import sys
+
+import numpy as np
+
+
+def cameras(path):
+    """Positions in each fragment's frame, by fragment."""
+    out = {}
+    for line in path.read_text().splitlines():
+        values = line.split()
+        if values:
+            out.setdefault(int(values[0]), []).append([float(v) for v in values[2:5]])
+    return {fragment: np.array(positions[::5]) for fragment, positions in out.items()}
+
+
+def towards(points, positions):
+    squared = ((points[:, None] - positions[None]) ** 2).sum(2)
+    direction = positions[squared.argmin(1)] - points
+    return direction / np.linalg.norm(direction, axis=1, keepdims=True)
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("scene", type=pathlib.Path)
+    parser.add_argument("out", type=pathlib.Path)
+    parser.add_argument("--unknown", action="store_true", help="not even the origin is a viewpoint")
+    arguments = parser.parse_args()
+    clouds = sorted(arguments.scene.glob("cloud_bin_*.ply"))
+    if not clouds:
+        sys.exit(f"error: {arguments.scene}: no cloud_bin_<i>.ply")
+    arguments.out.mkdir(parents=True, exist_ok=True)
+    for truth in [*arguments.scene.glob("gt*"), *arguments.scene.glob("poses.txt")]:
+        shutil.copy(truth, arguments.out)
+    if not arguments.unknown:
+        for cloud in clouds:
+            shutil.copy(cloud, arguments.out)
+        return
+    import gpureg
+
+    positions = cameras(arguments.scene / "cameras.txt")
+    for cloud in clouds:
+        points = np.asarray(gpureg.read_point_cloud(cloud).points, np.float64)
+        gpureg.write_point_cloud(arguments.out / cloud.name, points, towards(points, positions[int(cloud.stem.rsplit("_", 1)[1])]))
+
+
+main()
