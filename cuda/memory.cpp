@@ -34,32 +34,44 @@ DeviceMemory::DeviceMemory(int device) : device_(device) {
   properties.allocType = cudaMemAllocationTypePinned;
   properties.location.type = cudaMemLocationTypeDevice;
   properties.location.id = device;
-  cudaError_t error = cudaMemPoolCreate(&pool_, &properties);
   std::uint64_t threshold = ~std::uint64_t(0);
-  if (error == cudaSuccess) error = cudaMemPoolSetAttribute(pool_, cudaMemPoolAttrReleaseThreshold, &threshold);
-  // A caller's stream that takes memory here must not come to wait for ours.
   int never = 0;
-  if (error == cudaSuccess) error = cudaMemPoolSetAttribute(pool_, cudaMemPoolReuseAllowInternalDependencies, &never);
+  cudaError_t error = cudaSuccess;
+  for (cudaMemPool_t* pool : {&pool_, &lent_pool_}) {
+    if (error == cudaSuccess) error = cudaMemPoolCreate(pool, &properties);
+    if (error == cudaSuccess) error = cudaMemPoolSetAttribute(*pool, cudaMemPoolAttrReleaseThreshold, &threshold);
+    // A caller's stream that takes memory here must not come to wait for ours.
+    if (error == cudaSuccess) error = cudaMemPoolSetAttribute(*pool, cudaMemPoolReuseAllowInternalDependencies, &never);
+  }
+  // Our own stream reuses in its own order alone. What has happened to finish by now would cut the pool differently from run to run, and
+  // now and then a warm one would find no piece that is large enough.
+  if (error == cudaSuccess) error = cudaMemPoolSetAttribute(pool_, cudaMemPoolReuseAllowOpportunistic, &never);
   if (error == cudaSuccess) return;
-  cudaStreamDestroy(stream_);
+  destroy();
   throw_device_error(error, "cudaMemPoolCreate");
+}
+
+void DeviceMemory::destroy() noexcept {
+  for (cudaMemPool_t pool : {pool_, lent_pool_})
+    if (pool) cudaMemPoolDestroy(pool);
+  cudaStreamDestroy(stream_);
 }
 
 DeviceMemory::~DeviceMemory() {
   cudaStreamSynchronize(stream_);
-  cudaMemPoolDestroy(pool_);
-  cudaStreamDestroy(stream_);
+  destroy();
 }
 
 void* DeviceMemory::allocate(std::size_t bytes, cudaStream_t stream) {
   void* pointer = nullptr;
-  cudaError_t error = cudaMallocFromPoolAsync(&pointer, bytes, pool_, stream);
+  const cudaMemPool_t pool = stream == stream_ ? pool_ : lent_pool_;
+  cudaError_t error = cudaMallocFromPoolAsync(&pointer, bytes, pool, stream);
   if (error == cudaErrorMemoryAllocation) {
     // What the pool kept may be in pieces too small: hand it back and ask once more.
     cudaGetLastError();
     cudaStreamSynchronize(stream_);
-    cudaMemPoolTrimTo(pool_, 0);
-    error = cudaMallocFromPoolAsync(&pointer, bytes, pool_, stream);
+    for (cudaMemPool_t each : {pool_, lent_pool_}) cudaMemPoolTrimTo(each, 0);
+    error = cudaMallocFromPoolAsync(&pointer, bytes, pool, stream);
   }
   if (error == cudaSuccess) {
     in_use_ += bytes;
@@ -78,9 +90,13 @@ void DeviceMemory::free(void* pointer, std::size_t bytes) noexcept {
 }
 
 std::size_t DeviceMemory::bytes_reserved() const {
-  std::uint64_t bytes = 0;
-  cudaMemPoolGetAttribute(pool_, cudaMemPoolAttrReservedMemCurrent, &bytes);
-  return bytes;
+  std::uint64_t sum = 0;
+  for (cudaMemPool_t pool : {pool_, lent_pool_}) {
+    std::uint64_t bytes = 0;
+    cudaMemPoolGetAttribute(pool, cudaMemPoolAttrReservedMemCurrent, &bytes);
+    sum += bytes;
+  }
+  return sum;
 }
 
 PinnedBuffer::PinnedBuffer(std::size_t bytes) {

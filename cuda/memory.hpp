@@ -42,9 +42,12 @@ class DeviceMemory {
   std::size_t bytes_reserved() const;  ///< taken from the driver: what was in use at most
 
  private:
+  void destroy() noexcept;
+
   int device_;
   cudaStream_t stream_ = nullptr;
   cudaMemPool_t pool_ = nullptr;
+  cudaMemPool_t lent_pool_ = nullptr;  ///< of what other streams take
   std::atomic<std::size_t> in_use_{0};
 };
 
