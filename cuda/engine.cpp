@@ -85,7 +85,7 @@ std::vector<std::shared_ptr<PreparedState>> CudaEngine::prepare_on_stream(Span<c
   return out;
 }
 
-void CudaEngine::align(Span<const PairInput> pairs, const RegistrationOptions& options, Span<PairOutcome> outcomes) {
+void CudaEngine::align(Span<const PairInput> pairs, const RegistrationOptions& options, Span<PairOutcome> outcomes, const FurtherSearch& further) {
   const std::lock_guard<std::mutex> lock(mutex_);
   const DeviceScope scope(device());
   const std::size_t budget = residence_.budget();
@@ -112,7 +112,7 @@ void CudaEngine::align(Span<const PairInput> pairs, const RegistrationOptions& o
                        pairs[p].custom_target.data, static_cast<std::uint32_t>(pairs[p].custom_source.size), pairs[p].prior});
     const Span<PairOutcome> part{outcomes.data + begin, end - begin};
     if (options.hypothesis.proposal == Proposal::compatibility)
-      pipeline::align_by_evidence(exec_, span_of(views), options, part);
+      pipeline::align_by_evidence(exec_, {pairs.data + begin, end - begin}, span_of(views), options, further, part);
     else
       pipeline::align(exec_, span_of(views), options, part);
   }

@@ -22,7 +22,7 @@ class CudaEngine final : public DeviceEngine {
   std::vector<std::shared_ptr<PreparedState>> prepare(Span<const RawCloud> clouds, const PrepareOptions& options) override;
   std::shared_ptr<AdoptedCloud> adopt(const RawCloud& cloud, void* stream) override;
   std::shared_ptr<PreparedState> prepare_adopted(const AdoptedCloud& cloud, const PrepareOptions& options) override;
-  void align(Span<const PairInput> pairs, const RegistrationOptions& options, Span<PairOutcome> outcomes) override;
+  void align(Span<const PairInput> pairs, const RegistrationOptions& options, Span<PairOutcome> outcomes, const FurtherSearch& further) override;
 
  private:
   std::vector<std::shared_ptr<PreparedState>> prepare_on_stream(Span<const RawCloud> clouds, const PrepareOptions& options);

@@ -77,11 +77,11 @@ class EngineOfMany final : public DeviceEngine {
     return on(device_of(cloud)).prepare_adopted(cloud, options);
   }
 
-  void align(Span<const PairInput> pairs, const RegistrationOptions& options, Span<PairOutcome> outcomes) override {
+  void align(Span<const PairInput> pairs, const RegistrationOptions& options, Span<PairOutcome> outcomes, const FurtherSearch& further) override {
     // Somewhat less than a device would take for itself: the first runs wait for clouds of other devices.
     Runs runs(pairs.size, kLeastPairs, engines_[0]->pairs_per_chunk(options) * 3 / 4, engines_.size());
     on_all(runs, pairs.size > kLeastPairs, [&](CudaEngine& engine, std::size_t begin, std::size_t end) {
-      engine.align({pairs.data + begin, end - begin}, options, {outcomes.data + begin, end - begin});
+      engine.align({pairs.data + begin, end - begin}, options, {outcomes.data + begin, end - begin}, further);
     });
   }
 

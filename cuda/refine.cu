@@ -56,7 +56,7 @@ __global__ void __launch_bounds__(kThreads) refine(RefineBatch r) {
       const IcpStep step = solve_icp(sums, pair.source.radius, r.max_distance);
       ++iterations;
       if (step.valid) pose = compose_small(step.omega, step.shift, pose);
-      done = !step.valid || icp_settled(step, pair.source.radius, r.max_distance) || iterations >= r.max_iterations;
+      done = !step.valid || icp_settled(step, pair.source.radius, r.max_distance, kSettled) || iterations >= r.max_iterations;
     }
     __syncthreads();
   }

@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include <cooperative_groups.h>
+
 #include "algorithm/evidence.hpp"
 #include "closest_cells.cuh"
 #include "stages.hpp"
@@ -35,11 +37,11 @@ __device__ bool correspondence(const SearchPair& pair, const RefineModes& r, flo
   return true;
 }
 
-/// The sums of all points by a thread block. A lane for each of the 27 sums goes through what the warp's points add: the terms of
+/// The sums of every blocks-th kThreads points by a thread block, from the first-th on. A lane for each of the 27 sums goes through what the warp's points add: the terms of
 /// add_icp_term(), but one register per thread for them instead of 54. rows, partial: shared, for each warp.
 template <int kThreads>
 __device__ void add_up(const SearchPair& pair, const RefineModes& r, float kernel_width, const Rigid& rigid, std::uint32_t stride,
-                       float (*rows)[32][8], std::int64_t (*partial)[kSums], IcpSums& sums) {
+                       std::uint32_t first, std::uint32_t blocks, float (*rows)[32][8], std::int64_t (*partial)[kSums], IcpSums& sums) {
   const std::uint32_t lane = threadIdx.x % 32, warp = threadIdx.x / 32, size = pair.source.size;
   const float inverse_radius = 1.0f / pair.source.radius;
   // Sum number k is the product of entries a and b: the lower triangle row by row, then all with the residual.
@@ -47,7 +49,7 @@ __device__ void add_up(const SearchPair& pair, const RefineModes& r, float kerne
   while (b > a) b -= ++a;
   if (lane >= 21) a = lane < kSums ? lane - 21 : 0, b = 7;
   std::int64_t sum = 0;
-  for (std::uint64_t base = threadIdx.x - lane; base * stride < size; base += kThreads) {
+  for (std::uint64_t base = first * kThreads + threadIdx.x - lane; base * stride < size; base += blocks * kThreads) {
     const std::uint64_t i = (base + lane) * stride;
     float row[8];
     const bool has = i < size && correspondence(pair, r, kernel_width, rigid, inverse_radius, static_cast<std::uint32_t>(i), row);
@@ -75,44 +77,88 @@ __device__ void add_up(const SearchPair& pair, const RefineModes& r, float kerne
   __syncthreads();
 }
 
-/// A thread block per mode runs all its iterations: on a sample, then on all points with a narrower kernel.
-template <int kThreads>
-__global__ void __launch_bounds__(kThreads, 1024 / kThreads) refine(RefineModes r) {
+/// What the blocks of a cluster have summed up, for each of them. Two buffers take turns, so that one meeting per iteration is enough.
+template <int kBlocks>
+__device__ void add_over_cluster(IcpSums& mine, IcpSums& total) {
+#if defined(__CUDA_ARCH__) && __CUDA_ARCH__ >= 900
+  const auto cluster = cooperative_groups::this_cluster();
+  cluster.sync();
+  if (threadIdx.x < kSums) {
+    // All are asked for before the first has come.
+    std::int64_t sum = 0;
+#pragma unroll
+    for (int b = 0; b < kBlocks; ++b) sum += cluster.map_shared_rank(&mine, static_cast<unsigned>(b))->v[threadIdx.x];
+    total.v[threadIdx.x] = sum;
+  }
+  __syncthreads();
+#endif
+}
+
+/// No block leaves while another may still read what it has summed up.
+__device__ void leave_cluster() {
+#if defined(__CUDA_ARCH__) && __CUDA_ARCH__ >= 900
+  cooperative_groups::this_cluster().sync();
+#endif
+}
+
+/// A thread block per mode, or a cluster of kBlocks, runs all its iterations: on a sample, then on all points with a narrower kernel.
+template <int kThreads, int kBlocks>
+__global__ void __launch_bounds__(kThreads, kBlocks > 1 ? 1 : 1024 / kThreads) refine(RefineModes r) {
   __shared__ float rows[kThreads / 32][32][8];
   __shared__ std::int64_t partial[kThreads / 32][kSums];
-  __shared__ IcpSums sums;
+  __shared__ IcpSums own[2], total_of_all;
   __shared__ Pose<double> pose;
   __shared__ bool done;
-  if (blockIdx.x >= r.count[blockIdx.y]) return;
+  const std::uint32_t number = blockIdx.x / kBlocks, first = blockIdx.x % kBlocks;
+  if (number >= r.count[blockIdx.y]) return;
   const SearchPair& pair = r.pairs[blockIdx.y];
-  Mode& mode = r.modes[static_cast<std::size_t>(blockIdx.y) * r.most + blockIdx.x];
+  Mode& mode = r.modes[static_cast<std::size_t>(blockIdx.y) * r.most + number];
   if (threadIdx.x == 0) pose = mode.pose;
   std::uint32_t total = 0;
   for (int round = 0; round < 2; ++round) {
     const std::uint32_t stride = round == 0 ? sample_stride(pair.source.size, 2 * r.sample) : 1;
     const float kernel_width = round == 0 ? r.kernel_width : kPolishKernel * r.kernel_width;
+    const double settled = round == 0 ? kRoughSettled : kPolishSettled;
     if (threadIdx.x == 0) done = false;
     __syncthreads();
     for (std::uint32_t iterations = 0; !done;) {
-      add_up<kThreads>(pair, r, kernel_width, to_rigid(pose), stride, rows, partial, sums);
+      IcpSums& mine = own[total % 2];
+      add_up<kThreads>(pair, r, kernel_width, to_rigid(pose), stride, first, kBlocks, rows, partial, mine);
+      if constexpr (kBlocks > 1) add_over_cluster<kBlocks>(mine, total_of_all);
       ++iterations, ++total;
       if (threadIdx.x == 0) {
+        const IcpSums& sums = kBlocks > 1 ? total_of_all : mine;
         const IcpStep step = solve_icp(sums, pair.source.radius, r.max_distance);
         if (step.valid) pose = compose_small(step.omega, step.shift, pose);
-        done = !step.valid || icp_settled(step, pair.source.radius, r.max_distance) || iterations >= r.max_iterations;
+        done = !step.valid || icp_settled(step, pair.source.radius, r.max_distance, settled) || iterations >= r.max_iterations;
       }
       __syncthreads();
     }
     __syncthreads();  // all have left the loop before it begins anew
   }
-  if (threadIdx.x == 0) mode.pose = pose, mode.iterations = total;
+  if constexpr (kBlocks > 1) leave_cluster();
+  if (threadIdx.x == 0 && first == 0) mode.pose = pose, mode.iterations = total;
+}
+
+/// Where there are so few modes that the device would wait for single blocks.
+constexpr int kClusterBlocks = 8, kClusterThreads = 1024;
+
+void refine_by_clusters(Exec& exec, const RefineModes& batch, unsigned pairs) {
+  cudaLaunchAttribute cluster{};
+  cluster.id = cudaLaunchAttributeClusterDimension;
+  cluster.val.clusterDim.x = kClusterBlocks, cluster.val.clusterDim.y = cluster.val.clusterDim.z = 1;
+  cudaLaunchConfig_t config{};
+  config.gridDim = dim3(batch.most * kClusterBlocks, pairs), config.blockDim = dim3(kClusterThreads);
+  config.stream = exec.stream();
+  config.attrs = &cluster, config.numAttrs = 1;
+  check(cudaLaunchKernelEx(&config, refine<kClusterThreads, kClusterBlocks>, batch), "refine by clusters");
 }
 
 /// Modes that have met: the first of them stays. A warp per pair.
-__global__ void __launch_bounds__(32) merge(RefineModes r, float min_trace, float squared_distance) {
+__global__ void __launch_bounds__(32) merge(std::uint32_t most, Mode* all_modes, std::uint32_t* counts, float min_trace, float squared_distance) {
   __shared__ Rigid kept[kMostModes];
-  const std::uint32_t size = r.count[blockIdx.x], lane = threadIdx.x;
-  Mode* modes = r.modes + static_cast<std::size_t>(blockIdx.x) * r.most;
+  const std::uint32_t size = counts[blockIdx.x], lane = threadIdx.x;
+  Mode* modes = all_modes + static_cast<std::size_t>(blockIdx.x) * most;
   std::uint32_t count = 0;
   for (std::uint32_t k = 0; k < size; ++k) {
     const Mode mode = modes[k];
@@ -124,26 +170,48 @@ __global__ void __launch_bounds__(32) merge(RefineModes r, float min_trace, floa
     __syncwarp();
     ++count;
   }
-  if (lane == 0) r.count[blockIdx.x] = count;
+  if (lane == 0) counts[blockIdx.x] = count;
 }
 
 }  // namespace
 
 void refine_modes(Exec& exec, Span<const PairView> pairs, Modes& modes, const EvidenceOptions& evidence, const RefineOptions& options) {
-  static_assert(kMostModes >= 64, "as many as EvidenceOptions::modes may be");
   const auto views = upload_search_pairs(exec, pairs);
   const RefineModes batch{views.data(), modes.most, modes.mode.data(), modes.count.data(), evidence.sample, options.max_iterations,
                           options.max_correspondence_distance, options.kernel_width,
                           inlier_test(options.max_correspondence_distance, kRefineNormalAngle).min_cosine};
   const unsigned pair_count = static_cast<unsigned>(pairs.size);
   if (options.max_iterations > 0) {
-    // Small blocks hide each other's solving; where there are too few to fill the device, large ones are done sooner.
-    const bool few = std::size_t(modes.most) * pairs.size < static_cast<std::size_t>(exec.multiprocessors()) * 2;
-    (few ? refine<1024> : refine<256>)<<<dim3(modes.most, pair_count), few ? 1024 : 256, 0, exec.stream()>>>(batch);
-    check_launch("refine");
+    // Small blocks hide each other's solving; where there are too few to fill the device, large ones are done sooner, or several for each.
+    const std::size_t count = std::size_t(modes.most) * pairs.size, processors = static_cast<std::size_t>(exec.multiprocessors());
+    if (exec.compute_capability() >= 90 && count * kClusterBlocks <= processors * 3) {
+      refine_by_clusters(exec, batch, pair_count);
+    } else {
+      const bool few = count < processors * 2;
+      (few ? refine<1024, 1> : refine<256, 1>)<<<dim3(modes.most, pair_count), few ? 1024 : 256, 0, exec.stream()>>>(batch);
+      check_launch("refine");
+    }
   }
-  merge<<<pair_count, 32, 0, exec.stream()>>>(batch, mode_trace(evidence.mode_angle), evidence.mode_distance * evidence.mode_distance);
+}
+
+void merge_modes(Exec& exec, Modes& modes, const EvidenceOptions& evidence) {
+  static_assert(kMostModes >= 64, "as many as EvidenceOptions::modes may be");
+  const unsigned pairs = static_cast<unsigned>(modes.count.size());
+  merge<<<pairs, 32, 0, exec.stream()>>>(modes.most, modes.mode.data(), modes.count.data(), mode_trace(evidence.mode_angle),
+                                         evidence.mode_distance * evidence.mode_distance);
   check_launch("merge");
+}
+
+Modes modes_of(Exec& exec, const std::vector<FurtherPoses>& poses) {
+  Modes out;
+  out.most = kMostFurtherPoses;
+  std::vector<Mode> modes(poses.size() * out.most);
+  std::vector<std::uint32_t> count(poses.size());
+  for (std::size_t p = 0; p < poses.size(); ++p)
+    for (const Pose<double>& pose : poses[p].poses) modes[p * out.most + count[p]++] = {pose, 0, 0};
+  out.mode = exec.upload(modes);
+  out.count = exec.upload(count);
+  return out;
 }
 
 }  // namespace gpureg::cuda

@@ -47,6 +47,9 @@ void weigh_candidates(Exec& exec, Span<const PairView> pairs, const MatchSets& m
 /// The most promising distinct poses.
 Modes select_modes(Exec& exec, const Candidates& candidates, const EvidenceOptions& options);
 void refine_modes(Exec& exec, Span<const PairView> pairs, Modes& modes, const EvidenceOptions& evidence, const RefineOptions& options);
+/// Modes that have met: the most promising of them stays.
+void merge_modes(Exec& exec, Modes& modes, const EvidenceOptions& evidence);
+Modes modes_of(Exec& exec, const std::vector<FurtherPoses>& poses);
 /// All evidence, from all points.
 void weigh_modes(Exec& exec, Span<const PairView> pairs, const MatchSets& matches, const Candidates& candidates, const Modes& modes,
                  const RegistrationOptions& options, Span<PairOutcome> outcomes);

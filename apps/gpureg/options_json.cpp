@@ -59,6 +59,7 @@ Json to_json(const RegistrationOptions& options) {
                       {"max_normal_angle", shortest(e.max_normal_angle)},
                       {"mode_angle", shortest(e.mode_angle)},
                       {"mode_distance", shortest(e.mode_distance)},
+                      {"slide_distance", shortest(e.slide_distance)},
                       {"free_space_margin", shortest(e.free_space_margin)},
                       {"min_range", shortest(e.min_range)}};
   json["min_confidence"] = options.min_confidence;

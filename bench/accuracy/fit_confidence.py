@@ -11,8 +11,8 @@ its margin over the best distinct rival, and no pose gets more than its share of
 (in gt.log), which is what Redwood's strict protocol counts. Each exists four times: with and without free space, which clouds without
 known viewpoints do not tell, and with and without the fronts of surfaces, which prepare.front_reach = 0 leaves out.
 
-Nothing moves in these scenes. So that a chair that was moved does not cost a pose its confidence, one pair in twenty is fitted a second
-time as it would look if up to a tenth of one of its clouds were new.
+Nothing moves in these scenes. So that a chair that was moved does not cost a pose its confidence, every pair is fitted a second
+time, with a twentieth of the weight, as it would look if up to a tenth of one of its clouds were new.
 
 usage: fit_confidence.py RUN... [--origin RUN...] [--unknown RUN...] [--header src/api/confidence_model.hpp] [-o bench/results/confidence.json]
 --origin, --unknown: runs of the same scenes whose clouds came with the origin as their only viewpoint, or with none; they are tested,
@@ -92,6 +92,8 @@ def has_fronts(evidence):
 
 
 class Run:
+    weight = 1.0
+
     def __init__(self, text, viewpoints="known"):
         self.viewpoints = viewpoints
         self.building, folder, result = text.split("=")
@@ -117,19 +119,21 @@ class Run:
                   if self.free or not model[0]}
 
 
-CHANGED_PAIRS, MOST_CHANGED = 0.05, 0.1
+CHANGED_WEIGHT, MOST_CHANGED = 0.05, 0.1
 
 
 class ChangedRun:
-    """Some pairs of a run, with things in one of their clouds that the other did not see: in front of its surfaces, as far as it is around."""
+    """The pairs of a run, with things in one of their clouds that the other did not see: in front of its surfaces, as far as it is around."""
 
-    def __init__(self, run, random):
-        chosen = [k for k in range(len(run.modes)) if random.random() < CHANGED_PAIRS]
+    weight = CHANGED_WEIGHT
+
+    def __init__(self, run):
+        random = np.random.default_rng(1)
         modes = []
-        for k in chosen:
+        for pair in run.modes:
             side, share, near = random.integers(2), random.uniform(0, MOST_CHANGED), random.uniform(0.3, 0.8)
-            modes.append([{"evidence": changed(m["evidence"], side, share, near)} for m in run.modes[k]])
-        self.right, self.strict = [run.right[k] for k in chosen], [run.strict[k] for k in chosen]
+            modes.append([{"evidence": changed(m["evidence"], side, share, near)} for m in pair])
+        self.right, self.strict = run.right, run.strict
         self.x = {model: [np.array([measures(m["evidence"], *model) for m in ms]) for ms in modes] for model in run.x}
 
 
@@ -147,13 +151,20 @@ def changed(evidence, side, share, near):
 
 
 class Logistic:
-    """Logistic regression on standardised measures, written as weights of the measures themselves."""
+    """Logistic regression on standardised measures, written as weights of the measures themselves.
 
-    def __init__(self, x, y):
+    strength: inverse of the L2 penalty. What few buildings leave undetermined a strong penalty shares out among alike measures, which
+    orders the poses of other buildings better; but it also draws all odds together, so slope and intercept are then fitted anew.
+    """
+
+    def __init__(self, x, y, weight, strength):
         mean, scale = x.mean(0), np.maximum(x.std(0), 1e-9)
-        fit = LogisticRegression(C=1.0, max_iter=5000).fit((x - mean) / scale, y)
+        fit = LogisticRegression(C=strength, max_iter=5000).fit((x - mean) / scale, y, weight)
         self.weights = fit.coef_[0] / scale
         self.bias = float(fit.intercept_[0] - (self.weights * mean).sum())
+        again = LogisticRegression(C=1e6, max_iter=5000).fit(self.logit(x)[:, None], y, weight)
+        slope = float(again.coef_[0, 0])
+        self.weights, self.bias = slope * self.weights, slope * self.bias + float(again.intercept_[0])
 
     def logit(self, x):
         return x @ self.weights + self.bias
@@ -176,17 +187,23 @@ def second_view(run, model, first):
     return np.array(rows), best, np.array(share)
 
 
+RANKING, CONFIDENCE, OVERLAP = 0.1, 0.001, 1.0  # strengths
+
+
 def fit(runs, model):
-    random = np.random.default_rng(1)
-    runs = runs + [ChangedRun(run, random) for run in runs]
-    x = np.concatenate([v for run in runs for v in run.x[model] if len(v)])
-    y = np.concatenate([np.array(v) for run in runs for v in run.right if len(v)])
-    first = Logistic(x, y)
+    runs = runs + [run.changed for run in runs]
+    # Of pairs without a right mode there is nothing to learn about which mode is right. Without free space so little tells modes apart
+    # that their wrong ones help all the same.
+    ranked = [(x, right, np.full(len(x), run.weight)) for run in runs for x, right in zip(run.x[model], run.right)
+              if len(x) and (not model[0] or np.any(right))]
+    x, y, weight = (np.concatenate([np.asarray(row[k]) for row in ranked]) for k in range(3))
+    first = Logistic(x, y, weight, RANKING)
     views = [second_view(run, model, first) for run in runs]
     x2 = np.concatenate([view[0] for view in views])
+    weight = np.concatenate([np.full(len(view[0]), run.weight) for run, view in zip(runs, views)])
     labels = lambda kind: np.concatenate([[getattr(run, kind)[k][b] for k, b in enumerate(view[1]) if b >= 0]  # noqa: E731
                                           for run, view in zip(runs, views)])
-    return first, Logistic(x2, labels("right")), Logistic(x2, labels("strict"))
+    return first, Logistic(x2, labels("right"), weight, CONFIDENCE), Logistic(x2, labels("strict"), weight, OVERLAP)
 
 
 def figures(run, model, models):
@@ -253,6 +270,8 @@ def main():
     parser.add_argument("-o", "--output", type=pathlib.Path)
     arguments = parser.parse_args()
     runs = [Run(text) for text in arguments.runs]
+    for run in runs:
+        run.changed = ChangedRun(run)
     tests = runs + [Run(text, "origin") for text in arguments.origin] + [Run(text, "unknown") for text in arguments.unknown]
     record = {"runs": []}
     for name, model in MODELS.items():

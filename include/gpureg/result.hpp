@@ -40,11 +40,13 @@ struct PoseEvidence {
   double target_residual = 1;
   double source_balanced_overlap = 0;
   double target_balanced_overlap = 0;
-  double source_seen = 0;                ///< points of the source in directions that the target's viewpoints saw; 0: none known
+  /// Points of the source in directions that the target's viewpoints saw, each counted as the squared cosine at which its surface would
+  /// face them; 0: none known.
+  double source_seen = 0;
   double target_seen = 0;
-  double source_impossible = 0;          ///< of these, the share that hangs in space that was seen to be free
+  double source_impossible = 0;          ///< of these (counted so), the share that hangs in space that was seen to be free
   double target_impossible = 0;
-  double source_hidden = 0;              ///< of these, the share behind what was seen
+  double source_hidden = 0;              ///< of the points in such directions, the share behind what was seen
   double target_hidden = 0;
   /// Points of the source around the target's surfaces (up to prepare.front_reach); 0: not known.
   double source_around = 0;

@@ -161,6 +161,7 @@ class EvidenceOptions:
     max_normal_angle: float
     mode_angle: float
     mode_distance: float
+    slide_distance: float
     free_space_margin: float
     min_range: float
     def __init__(
@@ -171,6 +172,7 @@ class EvidenceOptions:
         max_normal_angle: float = ...,
         mode_angle: float = ...,
         mode_distance: float = ...,
+        slide_distance: float = ...,
         free_space_margin: float = ...,
         min_range: float = ...,
     ) -> None: ...
@@ -182,6 +184,7 @@ class EvidenceOptions:
         max_normal_angle: float = ...,
         mode_angle: float = ...,
         mode_distance: float = ...,
+        slide_distance: float = ...,
         free_space_margin: float = ...,
         min_range: float = ...,
     ) -> EvidenceOptions: ...

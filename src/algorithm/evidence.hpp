@@ -12,6 +12,7 @@ namespace gpureg {
 struct SideEvidence {
   std::uint64_t balanced;  ///< sum of the weights of the inliers
   std::uint64_t residual;  ///< of the inliers, see fixed_residual
+  std::uint64_t facing_seen, facing_before;  ///< of those seen and before, sums of how squarely at best, see facing()
   std::uint32_t tested;    ///< points looked at
   std::uint32_t inliers;   ///< closest point within the distance, normals alike
   std::uint32_t hits;      ///< closest point within the distance
@@ -58,14 +59,21 @@ GPUREG_HD void add_place(std::uint32_t place, bool hit, SideEvidence& e) {
 /// is closest to it.
 GPUREG_HD Weighed weigh_found(const CloudView& moved, const CloudView& other, const Rigid& pose, const EvidenceTest& test, std::uint32_t maps,
                            std::uint32_t i, Vec3 q, Closest c, SideEvidence& e) {
+  const Vec3 normal = rotate(pose, moved.normals[i]);
   const bool hit = c.index != kNoValue;
-  const bool inlier = hit && normals_agree(rotate(pose, moved.normals[i]), other.normals[c.index], test.inlier.min_cosine);
+  const bool inlier = hit && normals_agree(normal, other.normals[c.index], test.inlier.min_cosine);
   bool seen = false, before = false, surface = false;
+  float facing_seen = 0.0f, facing_before = 0.0f;
   for (std::uint32_t m = 0; m < maps; ++m) {
     const Sight s = sight(other.visibility, m, q, test.margin, test.min_range);
-    seen |= s != Sight::unknown;
-    before |= s == Sight::before;
+    if (s == Sight::unknown) continue;
+    const float squarely = facing(normal, q - other.visibility.viewpoints[m]);
+    seen = true;
+    facing_seen = squarely > facing_seen ? squarely : facing_seen;
     surface |= s == Sight::surface;
+    if (s != Sight::before) continue;
+    before = true;
+    facing_before = squarely > facing_before ? squarely : facing_before;
   }
   before &= !hit;
   e.tested += 1;
@@ -75,6 +83,8 @@ GPUREG_HD Weighed weigh_found(const CloudView& moved, const CloudView& other, co
   e.residual += inlier ? fixed_residual(c.squared_distance, test.inlier.inverse_max_squared) : 0u;
   e.seen += seen ? 1u : 0u;
   e.before += before ? 1u : 0u;
+  e.facing_seen += fixed_facing(facing_seen);
+  e.facing_before += before ? fixed_facing(facing_before) : 0u;
   e.hidden += (seen & !before & !surface & !hit) ? 1u : 0u;
   add_place(other.fronts.words ? place_of(other.fronts, q) : 0u, hit, e);
   return {c.index, inlier};
@@ -109,6 +119,7 @@ GPUREG_HD float balance_share(std::uint32_t weight) { return static_cast<float>(
 /// Modes are refined twice: on a sample, then on all points with a kernel this much narrower. The wide kernel pulls from afar; the narrow
 /// one ends at the surfaces, where the wide one is still pulled along by what slides.
 constexpr float kPolishKernel = 0.5f;
+constexpr double kRoughSettled = 1e-2, kPolishSettled = 2e-3;  ///< shares of the max distance that end the first and the second refinement
 constexpr float kRefineNormalAngle = 45.0f;  ///< degrees between the normals of what refinement pulls together
 
 /// On the host only: trace of the rotation by that angle.

@@ -36,6 +36,8 @@ GPUREG_HD float robust_weight(float residual, float kernel_width) {
   return f * f;
 }
 
+constexpr double kSettled = 1e-3;  ///< of the max distance
+
 struct IcpStep {
   double omega[3];
   double shift[3];
@@ -66,11 +68,11 @@ GPUREG_HD IcpStep solve_icp(const IcpSums& sums, float radius, float max_distanc
   return step;
 }
 
-/// True where the step moves no point by more than a thousandth of the max distance: the iteration has settled.
-GPUREG_HD bool icp_settled(const IcpStep& step, float radius, float max_distance) {
+/// True where the step moves no point by more than that share of the max distance: the iteration has settled.
+GPUREG_HD bool icp_settled(const IcpStep& step, float radius, float max_distance, double share) {
   const double turn = step.omega[0] * step.omega[0] + step.omega[1] * step.omega[1] + step.omega[2] * step.omega[2];
   const double shift = step.shift[0] * step.shift[0] + step.shift[1] * step.shift[1] + step.shift[2] * step.shift[2];
-  const double limit = 1e-3 * static_cast<double>(max_distance);
+  const double limit = share * static_cast<double>(max_distance);
   return turn * static_cast<double>(radius) * static_cast<double>(radius) + shift < limit * limit;
 }
 

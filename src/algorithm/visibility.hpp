@@ -83,6 +83,16 @@ struct VisibilityView {
 /// How a place is seen by one map.
 enum class Sight : std::uint32_t { unknown = 0, behind = 1, surface = 2, before = 3 };
 
+/// How squarely a surface faces a line of sight: the squared cosine between them, 16-bit fixed point. A surface seen at a grazing angle is
+/// before or behind another as soon as a pose or a depth is off by centimetres, so it says that much less. d: along the line, not zero.
+constexpr float kFacingScale = 65536.0f;
+constexpr float kUnknownFacing = 1.0f / 3.0f;  ///< of a point without normal: the mean over all directions
+GPUREG_HD float facing(Vec3 normal, Vec3 d) {
+  const float along = dot(normal, d);
+  return is_zero(normal) ? kUnknownFacing : along * along / squared_norm(d);
+}
+GPUREG_HD std::uint32_t fixed_facing(float facing) { return static_cast<std::uint32_t>(facing * kFacingScale); }
+
 /// margin: how far before (or behind) the seen surface still counts as on it; nothing nearer to the viewpoint than min_range is judged.
 GPUREG_HD Sight sight(const VisibilityView& maps, std::uint32_t map, Vec3 p, float margin, float min_range) {
   const MapRay ray = map_ray(p - maps.viewpoints[map]);

@@ -70,13 +70,12 @@ struct Knowledge {
   const confidence_model::Model& model;
 };
 
-Knowledge known_of(const std::vector<RegistrationMode>& modes) {
+Knowledge known_of(const std::vector<PoseEvidence>& all) {
   static constexpr confidence_model::Model kModels[2][2] = {{confidence_model::neither, confidence_model::fronts},
                                                             {confidence_model::free_space, confidence_model::everything}};
   // What no mode touches tells nothing of what the clouds have.
   bool free_space = false, fronts = false;
-  for (const RegistrationMode& mode : modes) {
-    const PoseEvidence& e = mode.evidence;
+  for (const PoseEvidence& e : all) {
     free_space |= e.source_seen > 0 || e.target_seen > 0;
     fronts |= e.source_around > 0 && e.target_around > 0;
   }
@@ -97,18 +96,31 @@ double probability(double logit_value) { return 1.0 / (1.0 + std::exp(-logit_val
 
 }  // namespace
 
-void set_confidences(std::vector<RegistrationMode>& modes, const std::function<bool(const RegistrationMode&, const RegistrationMode&)>& same) {
+std::size_t likeliest_of(const std::vector<PoseEvidence>& evidence) {
+  const Knowledge known = known_of(evidence);
+  std::vector<double> value;
+  for (const PoseEvidence& e : evidence) value.push_back(logit(known.model.ranking, measures(e, known.free_space, known.fronts)));
+  return static_cast<std::size_t>(std::max_element(value.begin(), value.end()) - value.begin());
+}
+
+void set_confidences(std::vector<RegistrationMode>& modes, const std::vector<std::uint32_t>& family,
+                     const std::function<bool(const RegistrationMode&, const RegistrationMode&)>& same) {
   if (modes.empty()) return;
-  const Knowledge known = known_of(modes);
+  std::vector<PoseEvidence> evidence;
+  for (const RegistrationMode& mode : modes) evidence.push_back(mode.evidence);
+  const Knowledge known = known_of(evidence);
   const auto seen = [&](const RegistrationMode& mode) { return measures(mode.evidence, known.free_space, known.fronts); };
   std::vector<std::pair<double, std::size_t>> order;
   for (std::size_t k = 0; k < modes.size(); ++k) order.emplace_back(logit(known.model.ranking, seen(modes[k])), k);
   std::stable_sort(order.begin(), order.end(), [](const auto& a, const auto& b) { return a.first > b.first; });
   std::vector<RegistrationMode> out;
   std::vector<double> own, rank;
+  std::vector<std::uint32_t> families;
   for (const auto& [value, k] : order) {
     const RegistrationMode& mode = modes[k];
+    if (std::count(families.begin(), families.end(), family[k]) > 0) continue;
     if (std::any_of(out.begin(), out.end(), [&](const RegistrationMode& better) { return same(better, mode); })) continue;
+    families.push_back(family[k]);
     out.push_back(mode), own.push_back(value), rank.push_back(std::clamp(value, -14.0, 14.0));
   }
   const std::vector<double> share = shares(own);

@@ -68,6 +68,7 @@ void EvidenceOptions::validate() const {
   require_angle(max_normal_angle, "evidence.max_normal_angle");
   require_angle(mode_angle, "evidence.mode_angle");
   require(length(mode_distance), "evidence.mode_distance", mode_distance, kLength);
+  require(slide_distance == 0.0f || length(slide_distance), "evidence.slide_distance", slide_distance, "0 or a length in [1e-6, 1e6]");
   require(length(free_space_margin), "evidence.free_space_margin", free_space_margin, kLength);
   require(length(min_range), "evidence.min_range", min_range, kLength);
 }
@@ -126,6 +127,7 @@ RegistrationOptions RegistrationOptions::from_voxel_size(float voxel_size, std::
   o.compatibility.consensus_distance = 2.0f * voxel_size;
   o.compatibility.seed_separation = 2.0f * voxel_size;
   o.evidence.mode_distance = 6.0f * voxel_size;
+  o.evidence.slide_distance = 8.0f * voxel_size;
   o.evidence.free_space_margin = voxel_size / 5.0f * 12.0f;  // 2.4 v, and the default's bits at 0.05
   o.evidence.min_range = 6.0f * voxel_size;
   return o;

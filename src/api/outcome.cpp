@@ -59,16 +59,17 @@ void add_modes(const PairOutcome& outcome, const PreparedState& source, const Pr
   const PreparedState& moved = swapped ? target : source;
   const PreparedState& fixed = swapped ? source : target;
   std::vector<RegistrationMode> modes;
+  std::vector<std::uint32_t> family;
   for (const ModeOutcome& mode : outcome.modes) {
     RegistrationMode out;
     out.target_from_source = to_transform(mode.pose, source, target, swapped);
     out.evidence = to_evidence(outcome, mode, moved, fixed, swapped);
     out.found_as = static_cast<std::uint32_t>(modes.size());
-    modes.push_back(out);
+    modes.push_back(out), family.push_back(mode.family);
   }
   const ModeOutcome& first = outcome.modes.front();
   const Eigen::Vector3d middle = middle_of(to_frame(swapped ? first.target_moments : first.source_moments, source), origin_of(source));
-  set_confidences(modes, [&](const RegistrationMode& a, const RegistrationMode& b) {
+  set_confidences(modes, family, [&](const RegistrationMode& a, const RegistrationMode& b) {
     return same_mode_at(a.target_from_source, b.target_from_source, middle, options.evidence);
   });
   result.modes = std::move(modes);

@@ -6,6 +6,7 @@
 
 #include "api/outcome.hpp"
 #include "api/prior.hpp"
+#include "api/slide.hpp"
 #include "api/validate.hpp"
 #include "pipeline/host_threads.hpp"
 
@@ -49,6 +50,18 @@ bool swaps(const PreparedState& source, const PreparedState& target, const Hypot
 
 PairInput input_of(const PreparedState& source, const PreparedState& target, bool swapped) {
   return swapped ? PairInput{&target, &source, {}, {}} : PairInput{&source, &target, {}, {}};
+}
+
+/// For the engine: where to look further, some 50 us a pair.
+FurtherSearch further_search(const Context& context, const RegistrationOptions& options) {
+  return [&](Span<const PairInput> pairs, Span<const PairOutcome> outcomes) {
+    std::vector<FurtherPoses> out(pairs.size);
+    const std::size_t workers = std::min<std::size_t>(context.engine()->host_threads(), 1 + pairs.size / 16);
+    on_threads(workers, [&](std::size_t worker) {
+      for (std::size_t p = worker; p < pairs.size; p += workers) out[p] = slide(pairs.data[p], outcomes.data[p], options);
+    });
+    return out;
+  };
 }
 
 void check_priors(const std::vector<RegistrationPrior>& priors, std::size_t pairs, const RegistrationOptions& options) {
@@ -116,7 +129,7 @@ RegistrationResult align(const Context& context, const PreparedCloud& source, co
     outcome.statistics.target_points = input.target->size;
     outcome.reason = RegistrationReason::no_usable_features;
   } else {
-    context.engine()->align({&input, 1}, options, {&outcome, 1});
+    context.engine()->align({&input, 1}, options, {&outcome, 1}, further_search(context, options));
   }
   return to_result(outcome, s, t, swapped, options);
 }
@@ -163,7 +176,7 @@ std::vector<RegistrationResult> align_batch(const Context& context, const std::v
       inputs.push_back(input_of(s, t, swapped));
       if (!priors.empty()) inputs.back().prior = prior_test(priors[p], s, t, swapped);
     }
-    context.engine()->align(span_of(inputs), options, {outcomes.data(), outcomes.size()});
+    context.engine()->align(span_of(inputs), options, {outcomes.data(), outcomes.size()}, further_search(context, options));
     // A result by evidence takes some 50 us, which counts where a device makes ten thousand in a second.
     const std::size_t workers = std::min<std::size_t>(context.engine()->host_threads(), 1 + (end - begin) / 16);
     on_threads(workers, [&](std::size_t worker) {

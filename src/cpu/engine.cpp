@@ -37,14 +37,14 @@ class CpuEngine final : public Engine {
     return {prepared.begin(), prepared.end()};
   }
 
-  void align(Span<const PairInput> pairs, const RegistrationOptions& options, Span<PairOutcome> outcomes) override {
+  void align(Span<const PairInput> pairs, const RegistrationOptions& options, Span<PairOutcome> outcomes, const FurtherSearch& further) override {
     std::lock_guard<std::mutex> lock(mutex_);
     std::vector<PairView> views(pairs.size);
     for (std::size_t p = 0; p < pairs.size; ++p)
       views[p] = {static_cast<const CpuCloud*>(pairs[p].source)->view(), static_cast<const CpuCloud*>(pairs[p].target)->view(),
                   pairs[p].custom_source.data, pairs[p].custom_target.data, static_cast<std::uint32_t>(pairs[p].custom_source.size), pairs[p].prior};
     if (options.hypothesis.proposal == Proposal::compatibility)
-      pipeline::align_by_evidence(exec_, span_of(views), options, outcomes);
+      pipeline::align_by_evidence(exec_, pairs, span_of(views), options, further, outcomes);
     else
       pipeline::align(exec_, span_of(views), options, outcomes);
   }

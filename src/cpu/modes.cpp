@@ -37,7 +37,7 @@ IcpSums mode_sums(MovedPoints& moved, const PairView& pair, const Pose<double>& 
 
 /// Iterates until it settles, at most max_iterations times.
 void refine_mode(MovedPoints& moved, const PairView& pair, const RefineOptions& options,
-                 float kernel_width, float min_cosine, Mode& mode) {
+                 float kernel_width, double settled, float min_cosine, Mode& mode) {
   for (std::uint32_t k = 0; k < options.max_iterations; ++k) {
     const IcpStep step =
         solve_icp(mode_sums(moved, pair, mode.pose, options, kernel_width, min_cosine),
@@ -45,7 +45,7 @@ void refine_mode(MovedPoints& moved, const PairView& pair, const RefineOptions& 
     ++mode.iterations;
     if (!step.valid) break;
     mode.pose = compose_small(step.omega, step.shift, mode.pose);
-    if (icp_settled(step, pair.source.radius, options.max_correspondence_distance)) break;
+    if (icp_settled(step, pair.source.radius, options.max_correspondence_distance, settled)) break;
   }
 }
 
@@ -92,14 +92,16 @@ void refine_modes(Exec& exec, Span<const PairView> pairs, std::vector<std::vecto
       [&](std::size_t p, std::size_t k, std::size_t) {
         MovedPoints some(sample[p], pairs[p].target, limits),
             all(executor_data(pairs[p].source).order, pairs[p].target, limits);
-        refine_mode(some, pairs[p], options, options.kernel_width, min_cosine, modes[p][k]);
-        refine_mode(all, pairs[p], options, kPolishKernel * options.kernel_width, min_cosine,
-                    modes[p][k]);
+        refine_mode(some, pairs[p], options, options.kernel_width, kRoughSettled, min_cosine, modes[p][k]);
+        refine_mode(all, pairs[p], options, kPolishKernel * options.kernel_width, kPolishSettled,
+                    min_cosine, modes[p][k]);
       });
-  // Candidates of one basin meet: the most promising of them stays.
+}
+
+void merge_modes(Exec& exec, std::vector<std::vector<Mode>>& modes, const EvidenceOptions& evidence) {
   const float min_trace = mode_trace(evidence.mode_angle),
               squared_distance = evidence.mode_distance * evidence.mode_distance;
-  exec.parallel(pairs.size, [&](std::size_t p) {
+  exec.parallel(modes.size(), [&](std::size_t p) {
     std::vector<Mode> distinct;
     for (const Mode& mode : modes[p]) {
       const Rigid rigid = to_rigid(mode.pose);
@@ -110,6 +112,13 @@ void refine_modes(Exec& exec, Span<const PairView> pairs, std::vector<std::vecto
     }
     modes[p] = std::move(distinct);
   });
+}
+
+std::vector<std::vector<Mode>> modes_of(Exec&, const std::vector<FurtherPoses>& poses) {
+  std::vector<std::vector<Mode>> out(poses.size());
+  for (std::size_t p = 0; p < poses.size(); ++p)
+    for (const Pose<double>& pose : poses[p].poses) out[p].push_back({pose, 0, 0});
+  return out;
 }
 
 }  // namespace gpureg::cpu

@@ -55,7 +55,7 @@ std::vector<BestPose> refine_poses(Exec& exec, Span<const PairView> pairs, const
       ++iteration;
       if (!step.valid) break;
       pose = compose_small(step.omega, step.shift, pose);
-      if (icp_settled(step, pairs[p].source.radius, options.max_correspondence_distance)) break;
+      if (icp_settled(step, pairs[p].source.radius, options.max_correspondence_distance, kSettled)) break;
     }
     Support support = measure_support(pairs[p].source, pairs[p].target, to_rigid(pose), score);
     support.hypothesis = best[p].support.hypothesis;

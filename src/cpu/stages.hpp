@@ -59,6 +59,9 @@ void weigh_candidates(Exec& exec, Span<const PairView> pairs, const std::vector<
 std::vector<std::vector<Mode>> select_modes(Exec& exec, const std::vector<Candidates>& candidates, const EvidenceOptions& options);
 void refine_modes(Exec& exec, Span<const PairView> pairs, std::vector<std::vector<Mode>>& modes, const EvidenceOptions& evidence,
                   const RefineOptions& options);
+/// Modes that have met: the most promising of them stays.
+void merge_modes(Exec& exec, std::vector<std::vector<Mode>>& modes, const EvidenceOptions& evidence);
+std::vector<std::vector<Mode>> modes_of(Exec& exec, const std::vector<FurtherPoses>& poses);
 /// All evidence, from all points.
 void weigh_modes(Exec& exec, Span<const PairView> pairs, const std::vector<MatchSet>& matches, const std::vector<Candidates>& candidates,
                  const std::vector<std::vector<Mode>>& modes, const RegistrationOptions& options, Span<PairOutcome> outcomes);

@@ -46,17 +46,21 @@ Sample sample_of(const CloudView& cloud, std::uint32_t most) {
   return out;
 }
 
-/// Sights of a group by the first `maps` maps of the other cloud.
+/// Sights of a group by the first `maps` maps of the other cloud, and how squarely, where asked.
 Sights sights_of(const Side& side, const Rigid& pose, std::size_t group, std::uint64_t present,
-                 const EvidenceTest& test, std::uint32_t maps) {
+                 const EvidenceTest& test, std::uint32_t maps, Facings* facings = nullptr) {
   Sights out;
   if (maps == 0) return out;
   const std::size_t first = group * MovedPoints::kGroup;
-  MovedGroup places;
+  MovedGroup places, normals;
   places.move(pose, side.order.x.data() + first, side.order.y.data() + first,
               side.order.z.data() + first);
+  if (facings)
+    normals.turn(pose, side.order.nx.data() + first, side.order.ny.data() + first,
+                 side.order.nz.data() + first);
   for (std::uint32_t m = 0; m < maps; ++m)
-    add_sights(side.other.visibility, m, places, test.margin, test.min_range, out);
+    add_sights(side.other.visibility, m, places, test.margin, test.min_range, out, &normals,
+               facings);
   out.seen &= present, out.before &= present, out.surface &= present;
   return out;
 }
@@ -94,6 +98,12 @@ SideEvidence weigh_sample(MovedPoints& points, const Side& side, const Sample& s
   return e;
 }
 
+std::uint64_t sum_facings(const float (&facings)[64], std::uint64_t mask) {
+  std::uint64_t sum = 0;
+  for (int k = 0; k < 64; ++k) sum += (mask >> k & 1) != 0 ? fixed_facing(facings[k]) : 0u;
+  return sum;
+}
+
 /// add_place() of the points of a group.
 void add_places(const MovedPoints& points, std::size_t group, std::uint64_t present,
                 std::uint64_t hits, const Rigid& pose, const FrontView& fronts, SideEvidence& e) {
@@ -113,7 +123,9 @@ SideEvidence weigh_side(MovedPoints& points, const Side& side, const Rigid& pose
   SideEvidence e{};
   points.for_each_group(pose, [&](std::size_t group, const PointBounds&) {
     const std::uint64_t present = points.present(group);
-    const Sights s = sights_of(side, pose, group, present, test, side.other.visibility.count);
+    Facings facings;
+    const Sights s =
+        sights_of(side, pose, group, present, test, side.other.visibility.count, &facings);
     std::uint64_t hits = 0;
     points.closest(
         pose, group, points.near_any(group, present), test.inlier.max_squared,
@@ -134,6 +146,8 @@ SideEvidence weigh_side(MovedPoints& points, const Side& side, const Rigid& pose
     e.hits += count(hits);
     e.seen += count(s.seen);
     e.before += count(before);
+    e.facing_seen += sum_facings(facings.seen, s.seen);
+    e.facing_before += sum_facings(facings.before, before);
     e.hidden += count(s.seen & ~before & ~s.surface & ~hits);
   });
   return e;

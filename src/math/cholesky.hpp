@@ -5,31 +5,31 @@
 
 namespace gpureg {
 
-/// Solves A x = b for a symmetric positive definite 6 x 6 matrix (lower triangle is read). False where A is not positive definite.
+/// Solves A x = b for a symmetric positive definite 6 x 6 matrix (lower triangle is read) by L D L', whose only divisions are the six
+/// reciprocals of D: one thread solves while a thread block waits. False where A is not positive definite.
 GPUREG_HD bool solve_cholesky6(const double (&matrix)[6][6], const double (&b)[6], double (&x)[6]) {
-  double l[6][6];
+  double l[6][6], inverse[6];
   for (int i = 0; i < 6; ++i) {
-    for (int j = 0; j <= i; ++j) {
+    double row[6];  // of L D
+    for (int j = 0; j < i; ++j) {
       double sum = matrix[i][j];
-      for (int k = 0; k < j; ++k) sum -= l[i][k] * l[j][k];
-      if (i == j) {
-        if (!(sum > 0.0)) return false;
-        l[i][i] = sqrt(sum);
-      } else {
-        l[i][j] = sum / l[j][j];
-      }
+      for (int k = 0; k < j; ++k) sum -= row[k] * l[j][k];
+      row[j] = sum;
+      l[i][j] = sum * inverse[j];
     }
+    double d = matrix[i][i];
+    for (int k = 0; k < i; ++k) d -= row[k] * l[i][k];
+    if (!(d > 0.0)) return false;
+    inverse[i] = 1.0 / d;
   }
   double y[6];
   for (int i = 0; i < 6; ++i) {
-    double sum = b[i];
-    for (int k = 0; k < i; ++k) sum -= l[i][k] * y[k];
-    y[i] = sum / l[i][i];
+    y[i] = b[i];
+    for (int k = 0; k < i; ++k) y[i] -= l[i][k] * y[k];
   }
   for (int i = 5; i >= 0; --i) {
-    double sum = y[i];
-    for (int k = i + 1; k < 6; ++k) sum -= l[k][i] * x[k];
-    x[i] = sum / l[i][i];
+    x[i] = y[i] * inverse[i];
+    for (int k = i + 1; k < 6; ++k) x[i] -= l[k][i] * x[k];
   }
   return true;
 }

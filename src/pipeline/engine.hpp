@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <string>
 #include <vector>
@@ -39,6 +40,15 @@ struct PairInput {
   PriorTest prior{};
 };
 
+/// Poses to try beside the modes of each pair, which have their evidence by then. Only who knows what evidence is worth can say where to
+/// look further, so the backends ask the public door.
+struct FurtherPoses {
+  std::uint32_t family;                ///< the mode that they belong to
+  std::vector<Pose<double>> poses;     ///< in local coordinates of both clouds; at most kMostFurtherPoses
+};
+constexpr std::uint32_t kMostFurtherPoses = 2;
+using FurtherSearch = std::function<std::vector<FurtherPoses>(Span<const PairInput>, Span<const PairOutcome>)>;
+
 /// Private interface between the public door (src/api) and the backends (src/cpu, cuda). Calls are serialised inside.
 class Engine {
  public:
@@ -52,7 +62,7 @@ class Engine {
   /// How many pairs go through the stages together.
   virtual std::size_t pairs_per_chunk(const RegistrationOptions& options) const = 0;
   virtual std::vector<std::shared_ptr<PreparedState>> prepare(Span<const RawCloud> clouds, const PrepareOptions& options) = 0;
-  virtual void align(Span<const PairInput> pairs, const RegistrationOptions& options, Span<PairOutcome> outcomes) = 0;
+  virtual void align(Span<const PairInput> pairs, const RegistrationOptions& options, Span<PairOutcome> outcomes, const FurtherSearch& further) = 0;
 };
 
 /// threads > 0. Throws BackendUnavailable where this processor lacks instructions that the stages were compiled for.

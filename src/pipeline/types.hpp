@@ -41,6 +41,7 @@ struct ModeOutcome {
   Pose<double> pose{1, 0, 0, 0, 0, 0, 0};
   std::uint32_t hypothesis = 0;   ///< seed that it came from
   std::uint32_t iterations = 0;
+  std::uint32_t family = 0;       ///< the mode that it was slid from, by its place among the modes; its own where it was not
   MatchEvidence matches{0, 0, 0};
   SideEvidence source{}, target{};
   InformationSums information{};

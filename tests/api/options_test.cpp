@@ -85,6 +85,8 @@ TEST(Options, EachFieldIsNamed) {
   expect_refused([](auto& o) { o.evidence.modes = 65; }, "evidence.modes");
   expect_refused([](auto& o) { o.prepare.depth_maps = 65; }, "prepare.depth_maps");
   expect_refused([](auto& o) { o.prepare.front_reach = -0.1f; }, "prepare.front_reach");
+  for (const float bad : {kNan, -0.1f, std::numeric_limits<float>::infinity()})
+    expect_refused([&](auto& o) { o.evidence.slide_distance = bad; }, "evidence.slide_distance");
   expect_refused([](auto& o) { o.prepare.front_reach = std::numeric_limits<float>::infinity(); }, "prepare.front_reach");
   expect_refused([](auto& o) { o.prepare.wide_feature_radius = 50; }, "prepare.wide_feature_radius");
   expect_refused([](auto& o) { o.prepare.voxel_size = kNan; }, "prepare.voxel_size");

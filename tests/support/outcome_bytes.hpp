@@ -21,7 +21,7 @@ class Bytes {
   void append(const void* data, std::size_t size) { all.insert(all.end(), static_cast<const char*>(data), static_cast<const char*>(data) + size); }
 };
 
-inline void add(Bytes& out, const SideEvidence& e) { out.add(e.balanced, e.residual, e.tested, e.inliers, e.hits, e.seen, e.before, e.hidden, e.around, e.near_front, e.far_front, e.at_back); }
+inline void add(Bytes& out, const SideEvidence& e) { out.add(e.balanced, e.residual, e.tested, e.inliers, e.hits, e.seen, e.before, e.hidden, e.facing_seen, e.facing_before, e.around, e.near_front, e.far_front, e.at_back); }
 inline void add(Bytes& out, const MatchEvidence& e) { out.add(e.source_weight, e.target_weight, e.inliers); }
 
 inline std::vector<char> bytes(const ModeOutcome& m) {

@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "api/slide.hpp"
+
+#include "api/confidence.hpp"
+#include "api/evidence.hpp"
+
+namespace gpureg {
+namespace {
+
+/// Moved along the softest direction: turned about the centre of the inliers, then shifted.
+Pose<double> moved_along(const InformationSpectrum& spectrum, const Pose<double>& pose, double distance) {
+  const Eigen::Vector3d turn = spectrum.softest.head<3>() * (distance / spectrum.unit);
+  const Eigen::Vector3d still = Eigen::Vector3d::Zero();
+  double r[9];
+  rotation_matrix(compose_small(turn.data(), still.data(), Pose<double>{1, 0, 0, 0, 0, 0, 0}), r);
+  const Eigen::Vector3d turned = Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(r) * spectrum.centre;
+  const Eigen::Vector3d shift = spectrum.centre - turned + spectrum.softest.tail<3>() * distance;
+  return compose_small(turn.data(), shift.data(), pose);
+}
+
+}  // namespace
+
+FurtherPoses slide(const PairInput& pair, const PairOutcome& outcome, const RegistrationOptions& options) {
+  const double distance = static_cast<double>(options.evidence.slide_distance);
+  std::vector<PoseEvidence> evidence;
+  std::vector<const ModeOutcome*> modes;
+  for (const ModeOutcome& mode : outcome.modes) {
+    // What the prior forbids will not be reported.
+    if (!permitted(pair.prior, to_rigid(mode.pose))) continue;
+    evidence.push_back(to_evidence(outcome, mode, *pair.source, *pair.target, false));
+    modes.push_back(&mode);
+  }
+  FurtherPoses out{0, {}};
+  if (modes.empty() || distance == 0.0) return out;
+  const ModeOutcome& likeliest = *modes[likeliest_of(evidence)];
+  const InformationSpectrum spectrum = spectrum_of(likeliest, *pair.source);
+  out.family = likeliest.family;
+  for (const double way : {distance, -distance}) out.poses.push_back(moved_along(spectrum, likeliest.pose, way));
+  return out;
+}
+
+}  // namespace gpureg

@@ -1,0 +1,110 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Where refinement may end anywhere along a wall, the likeliest pose is slid along it, and the evidence says where it belongs.
+#include "api/slide.hpp"
+
+#include <gtest/gtest.h>
+
+#include "api/evidence.hpp"
+#include "gpureg/registration.hpp"
+#include "support/prepared.hpp"
+#include "support/scan.hpp"
+
+namespace gpureg {
+namespace {
+
+/// A floor and a wall along x; what the sensor at eye saw of them.
+std::vector<Vec3> bare_corner(std::mt19937& random, int count) {
+  std::uniform_real_distribution<float> unit;
+  std::vector<Vec3> out;
+  for (int k = 0; k < count; ++k) {
+    const float a = 3 * unit(random) - 1.5f, b = 1.5f * unit(random);
+    out.push_back(k % 2 == 0 ? Vec3{a, b, 0} : Vec3{a, 0, b});
+  }
+  return out;
+}
+
+/// A mode that is the identity between the clouds' own frames, with its evidence.
+PairOutcome weighed(cpu::Exec& exec, const cpu::CpuCloud& source, const cpu::CpuCloud& target) {
+  const PairView pair = test::pair_view(source, target);
+  std::vector<cpu::Mode> modes(1);
+  modes[0].pose = {1, 0, 0, 0, static_cast<double>(source.origin[0] - target.origin[0]), static_cast<double>(source.origin[1] - target.origin[1]),
+                   static_cast<double>(source.origin[2] - target.origin[2])};
+  PairOutcome outcome;
+  weigh_modes(exec, {&pair, 1}, std::vector<cpu::MatchSet>(1), std::vector<cpu::Candidates>(1), {modes}, RegistrationOptions{}, {&outcome, 1});
+  return outcome;
+}
+
+TEST(Slide, BothWaysAlongTheWall) {
+  std::mt19937 random(3);
+  cpu::Exec exec(1);
+  const std::vector<Vec3> a = bare_corner(random, 40000), b = bare_corner(random, 40000);
+  const auto source = test::prepare_one(exec, test::raw_cloud(a), {}), target = test::prepare_one(exec, test::raw_cloud(b), {});
+  const PairOutcome outcome = weighed(exec, *source, *target);
+  RegistrationOptions options;
+  for (const float distance : {0.4f, 0.15f}) {
+    options.evidence.slide_distance = distance;
+    const FurtherPoses more = slide({source.get(), target.get(), {}, {}, {}}, outcome, options);
+    ASSERT_EQ(more.poses.size(), 2u);
+    EXPECT_EQ(more.family, 0u);
+    double sum = 0;
+    for (const Pose<double>& pose : more.poses) {
+      const Pose<double>& from = outcome.modes[0].pose;
+      EXPECT_NEAR(std::abs(pose.tx - from.tx), static_cast<double>(distance), 0.02);
+      EXPECT_NEAR(pose.ty, from.ty, 0.02);
+      EXPECT_NEAR(pose.tz, from.tz, 0.02);
+      EXPECT_GT(std::abs(pose.w), 0.999);
+      sum += pose.tx - from.tx;
+    }
+    EXPECT_NEAR(sum, 0, 1e-3) << "one each way";
+  }
+  options.evidence.slide_distance = 0;
+  EXPECT_TRUE(slide({source.get(), target.get(), {}, {}, {}}, outcome, options).poses.empty());
+  options.evidence.slide_distance = 0.4f;
+  EXPECT_TRUE(slide({source.get(), target.get(), {}, {}, {}}, PairOutcome{}, options).poses.empty());
+}
+
+TEST(Slide, TurnsAboutTheMiddleOfWhatTouches) {
+  std::mt19937 random(5);
+  cpu::Exec exec(1);
+  // A ball, far from both origins: nothing holds its turning, everything its place.
+  std::normal_distribution<float> normal;
+  std::vector<Vec3> ball;
+  for (int k = 0; k < 20000; ++k) {
+    const Eigen::Vector3f d = Eigen::Vector3f(normal(random), normal(random), normal(random)).normalized() * 0.5f;
+    ball.push_back({d.x() + 6, d.y() - 3, d.z() + 1});
+  }
+  ball.push_back({0, 0, 0});
+  const auto cloud = test::prepare_one(exec, test::raw_cloud(ball), {});
+  const PairOutcome outcome = weighed(exec, *cloud, *cloud);
+  RegistrationOptions options;
+  const FurtherPoses more = slide({cloud.get(), cloud.get(), {}, {}, {}}, outcome, options);
+  ASSERT_EQ(more.poses.size(), 2u);
+  const Vec3 middle{6 - cloud->origin[0], -3 - cloud->origin[1], 1 - cloud->origin[2]};
+  for (const Pose<double>& pose : more.poses) {
+    EXPECT_LT(norm(apply(to_rigid(pose), middle) - middle), 0.05f);
+    EXPECT_LT(std::abs(pose.w), 0.99) << "0.4 of a metre at a metre";
+  }
+}
+
+TEST(Slide, AFamilyIsOneMode) {
+  std::mt19937 random(9);
+  const auto room = test::scan_room(random);
+  const Eigen::Isometry3d truth = test::random_pose(random);
+  const auto scanned = test::moved(truth.inverse(), room);
+  const Eigen::Vector3f eye = test::kRoomSensor, moved_eye = (truth.inverse() * eye.cast<double>()).cast<float>();
+  PointCloudView source(scanned), target(room);
+  source.viewpoints = moved_eye.data(), target.viewpoints = eye.data();
+  source.viewpoint_count = target.viewpoint_count = 1;
+  RegistrationOptions slid, still;
+  still.evidence.slide_distance = 0;
+  const RegistrationResult a = align(Context::cpu(), source, target, slid);
+  const RegistrationResult b = align(Context::cpu(), source, target, still);
+  ASSERT_TRUE(a.aligned());
+  ASSERT_TRUE(b.aligned());
+  EXPECT_LT((a.target_from_source.matrix() - truth.matrix()).norm(), 0.02);
+  // What was slid takes the place of what it was slid from, or goes: there are no more modes than before.
+  EXPECT_LE(a.modes.size(), b.modes.size());
+}
+
+}  // namespace
+}  // namespace gpureg
