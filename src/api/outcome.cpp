@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "api/confidence.hpp"
 #include "api/evidence.hpp"
@@ -54,17 +55,35 @@ RegistrationReason evidence_reason(const RegistrationStatistics& s, double confi
   return confidence < options.min_confidence ? RegistrationReason::confidence_too_low : RegistrationReason::none;
 }
 
+/// Root mean square distance between where two poses take the points that take part in correspondences.
+double distance_between(const UnalignedIsometry3d& a, const UnalignedIsometry3d& b, const CorrespondenceMoments& points) {
+  if (points.count == 0) return std::numeric_limits<double>::infinity();
+  const double n = static_cast<double>(points.count);
+  const Eigen::Matrix3d m = a.linear() - b.linear();
+  const Eigen::Vector3d t = a.translation() - b.translation();
+  return std::sqrt(std::max(0.0, ((m * points.outer * m.transpose()).trace() + 2 * t.dot(m * points.sum)) / n + t.squaredNorm()));
+}
+
 void add_modes(const PairOutcome& outcome, const PreparedState& source, const PreparedState& target, bool swapped,
                const RegistrationOptions& options, RegistrationResult& result) {
   const PreparedState& moved = swapped ? target : source;
   const PreparedState& fixed = swapped ? source : target;
   std::vector<RegistrationMode> modes;
   std::vector<std::uint32_t> family;
-  for (const ModeOutcome& mode : outcome.modes) {
+  for (std::size_t k = 0; k < outcome.modes.size(); ++k) {
+    const ModeOutcome& mode = outcome.modes[k];
     RegistrationMode out;
     out.target_from_source = to_transform(mode.pose, source, target, swapped);
+    // What was slid and came back is where it was, but less well refined.
+    const auto before = std::find(family.begin(), family.end(), mode.family);
+    if (before != family.end()) {
+      const RegistrationMode& from = modes[static_cast<std::size_t>(before - family.begin())];
+      const ModeOutcome& origin = outcome.modes[from.found_as];
+      const CorrespondenceMoments touching = to_frame(swapped ? origin.target_moments : origin.source_moments, source);
+      if (distance_between(out.target_from_source, from.target_from_source, touching) <= static_cast<double>(options.score.max_correspondence_distance)) continue;
+    }
     out.evidence = to_evidence(outcome, mode, moved, fixed, swapped);
-    out.found_as = static_cast<std::uint32_t>(modes.size());
+    out.found_as = static_cast<std::uint32_t>(k);
     modes.push_back(out), family.push_back(mode.family);
   }
   const ModeOutcome& first = outcome.modes.front();
