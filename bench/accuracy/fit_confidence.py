@@ -187,7 +187,7 @@ def second_view(run, model, first):
     return np.array(rows), best, np.array(share)
 
 
-RANKING, CONFIDENCE, OVERLAP = 0.1, 0.01, 1.0  # strengths
+RANKING, CONFIDENCE, OVERLAP = 0.1, 0.001, 1.0  # strengths
 
 
 def fit(runs, model):
