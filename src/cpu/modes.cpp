@@ -92,7 +92,8 @@ void refine_modes(Exec& exec, Span<const PairView> pairs, std::vector<std::vecto
       [&](std::size_t p, std::size_t k, std::size_t) {
         MovedPoints some(sample[p], pairs[p].target, limits),
             all(executor_data(pairs[p].source).order, pairs[p].target, limits);
-        refine_mode(some, pairs[p], options, options.kernel_width, kRoughSettled, min_cosine, modes[p][k]);
+        refine_mode(some, pairs[p], options, options.kernel_width, kRoughSettled, min_cosine,
+                    modes[p][k]);
         refine_mode(all, pairs[p], options, kPolishKernel * options.kernel_width, kPolishSettled,
                     min_cosine, modes[p][k]);
       });

@@ -155,6 +155,9 @@ void EvidenceOnCuda::expect_same(const std::vector<RawCloud>& clouds) {
   cpu::refine_modes(on_cpu, cpu_views, modes, options.evidence, options.refine);
   cuda::refine_modes(on_cuda, cuda_views, cuda_modes, options.evidence, options.refine);
   ASSERT_NO_FATAL_FAILURE(expect_same_modes("refined modes"));
+  cpu::merge_modes(on_cpu, modes, options.evidence);
+  cuda::merge_modes(on_cuda, cuda_modes, options.evidence);
+  ASSERT_NO_FATAL_FAILURE(expect_same_modes("merged modes"));
 
   std::vector<PairOutcome> outcomes(count), cuda_outcomes(count);
   cpu::weigh_modes(on_cpu, cpu_views, matches, candidates, modes, options, {outcomes.data(), count});

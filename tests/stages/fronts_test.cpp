@@ -11,18 +11,14 @@
 namespace gpureg::cpu {
 namespace {
 
+using test::seen_from;
+
 /// A square metre of floor, seen from above, a grid of points at a height.
 std::vector<Vec3> floor_at(float height) {
   std::vector<Vec3> points;
   for (int y = 0; y < 60; ++y)
     for (int x = 0; x < 60; ++x) points.push_back({0.02f * static_cast<float>(x) - 0.6f, 0.02f * static_cast<float>(y) - 0.6f, height});
   return points;
-}
-
-std::shared_ptr<CpuCloud> seen_from(Exec& exec, const std::vector<Vec3>& points, Vec3 eye, const PrepareOptions& options = {}) {
-  RawCloud raw = test::raw_cloud(points);
-  raw.viewpoints = &eye.x, raw.viewpoint_count = 1;
-  return test::prepare_one(exec, raw, options);
 }
 
 /// Of a place in the cloud's own frame.
@@ -119,21 +115,10 @@ TEST(Fronts, NoneWhereNotAskedForOrTooWide) {
   EXPECT_EQ(front_box({9e8f, 0, 0}, {9e8f, 1, 1}, 0.5f, true).words(), 0u);
 }
 
-/// Evidence of a pose that is the identity between the clouds' own frames.
-ModeOutcome weigh(Exec& exec, const CpuCloud& source, const CpuCloud& target) {
-  const PairView pair = test::pair_view(source, target);
-  std::vector<Mode> modes(1);
-  modes[0].pose = {1, 0, 0, 0, static_cast<double>(source.origin[0] - target.origin[0]), static_cast<double>(source.origin[1] - target.origin[1]),
-                   static_cast<double>(source.origin[2] - target.origin[2])};
-  PairOutcome outcome;
-  weigh_modes(exec, {&pair, 1}, std::vector<MatchSet>(1), std::vector<Candidates>(1), {modes}, RegistrationOptions{}, {&outcome, 1});
-  return outcome.modes.at(0);
-}
-
 TEST(Fronts, TellOnWhichSidePointsHang) {
   Exec exec(1);
   const auto target = seen_from(exec, floor_at(0.02f), {0, 0, 2});
-  const auto of = [&](float height) { return weigh(exec, *seen_from(exec, floor_at(0.02f + height), {0, 0, 2}), *target).source; };
+  const auto of = [&](float height) { return test::weighed_in_place(exec, *seen_from(exec, floor_at(0.02f + height), {0, 0, 2}), *target).modes[0].source; };
   const SideEvidence on = of(0), near = of(0.2f), far = of(0.4f), back = of(-0.3f), away = of(1.0f);
   EXPECT_EQ(on.hits, on.tested);
   EXPECT_EQ(on.around, on.tested);
@@ -143,33 +128,6 @@ TEST(Fronts, TellOnWhichSidePointsHang) {
   EXPECT_GT(back.at_back, back.tested * 9 / 10);
   EXPECT_EQ(near.far_front + near.at_back + far.near_front + far.at_back + back.near_front + back.far_front, 0u);
   EXPECT_EQ(away.around, 0u);
-}
-
-TEST(Fronts, EvidenceInGroupsIsThatOfEachPoint) {
-  std::mt19937 random(4);
-  Exec exec(2);
-  for (int trial = 0; trial < 3; ++trial) {
-    const auto a = test::prepare_one(exec, test::raw_cloud(test::bumpy_sheet(random, 9000, 1.7f)), {});
-    const auto b = test::prepare_one(exec, test::raw_cloud(test::bumpy_sheet(random, 7001, 2.0f)), {});
-    const ModeOutcome outcome = weigh(exec, *a, *b);
-    const RegistrationOptions options;
-    const EvidenceTest test{inlier_test(options.score.max_correspondence_distance, options.evidence.max_normal_angle), options.evidence.free_space_margin,
-                            options.evidence.min_range};
-    const Rigid there = to_rigid(outcome.pose);
-    const CloudView s = a->view(), t = b->view();
-    SideEvidence forth{}, reverse{};
-    for (std::uint32_t i = 0; i < s.size; ++i) weigh_point(s, t, there, test, t.visibility.count, i, forth);
-    for (std::uint32_t i = 0; i < t.size; ++i) weigh_point(t, s, inverse(there), test, s.visibility.count, i, reverse);
-    for (const auto& [expected, found] : {std::pair(forth, outcome.source), std::pair(reverse, outcome.target)}) {
-      EXPECT_EQ(expected.tested, found.tested);
-      EXPECT_EQ(expected.hits, found.hits);
-      EXPECT_EQ(expected.around, found.around);
-      EXPECT_EQ(expected.near_front, found.near_front);
-      EXPECT_EQ(expected.far_front, found.far_front);
-      EXPECT_EQ(expected.at_back, found.at_back);
-      EXPECT_GT(found.near_front, 0u);
-    }
-  }
 }
 
 }  // namespace

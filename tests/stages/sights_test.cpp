@@ -3,11 +3,14 @@
 #include <gtest/gtest.h>
 
 #include "algorithm/evidence.hpp"
+#include "support/outcome_bytes.hpp"
 #include "support/prepared.hpp"
 #include "support/random_clouds.hpp"
 
 namespace gpureg::cpu {
 namespace {
+
+using test::seen_from;
 
 /// A square metre about its middle, spanned by two directions.
 std::vector<Vec3> panel(Vec3 middle, Vec3 along, Vec3 up) {
@@ -17,22 +20,7 @@ std::vector<Vec3> panel(Vec3 middle, Vec3 along, Vec3 up) {
   return points;
 }
 
-std::shared_ptr<CpuCloud> seen_from(Exec& exec, const std::vector<Vec3>& points, Vec3 eye) {
-  RawCloud raw = test::raw_cloud(points);
-  raw.viewpoints = &eye.x, raw.viewpoint_count = 1;
-  return test::prepare_one(exec, raw, {});
-}
-
-/// Evidence of the pose that is the identity between the clouds' own frames.
-ModeOutcome weigh(Exec& exec, const CpuCloud& source, const CpuCloud& target) {
-  const PairView pair = test::pair_view(source, target);
-  std::vector<Mode> modes(1);
-  modes[0].pose = {1, 0, 0, 0, static_cast<double>(source.origin[0] - target.origin[0]), static_cast<double>(source.origin[1] - target.origin[1]),
-                   static_cast<double>(source.origin[2] - target.origin[2])};
-  PairOutcome outcome;
-  weigh_modes(exec, {&pair, 1}, std::vector<MatchSet>(1), std::vector<Candidates>(1), {modes}, RegistrationOptions{}, {&outcome, 1});
-  return outcome.modes.at(0);
-}
+SideEvidence weigh(Exec& exec, const CpuCloud& source, const CpuCloud& target) { return test::weighed_in_place(exec, source, target).modes[0].source; }
 
 double share(std::uint64_t facing, std::uint32_t points) { return static_cast<double>(facing) / static_cast<double>(kFacingScale) / points; }
 
@@ -54,16 +42,16 @@ TEST(Sights, WhatIsSeenEdgeOnHardlyCounts) {
       wall.insert(wall.end(), part.begin(), part.end());
     }
   const auto target = seen_from(exec, wall, {0, 0, 0});
-  const SideEvidence square = weigh(exec, *seen_from(exec, panel({0, 0, 2}, {1, 0, 0}, {0, 1, 0}), {0, 0, 0}), *target).source;
+  const SideEvidence square = weigh(exec, *seen_from(exec, panel({0, 0, 2}, {1, 0, 0}, {0, 1, 0}), {0, 0, 0}), *target);
   EXPECT_EQ(square.before, square.tested);
   EXPECT_GT(share(square.facing_before, square.tested), 0.9);
   EXPECT_EQ(square.facing_seen, square.facing_before);
   // The same turned about: in the line of sight.
-  const SideEvidence edge = weigh(exec, *seen_from(exec, panel({0, 0, 2}, {0, 0, 1}, {0, 1, 0}), {3, 0, 2}), *target).source;
+  const SideEvidence edge = weigh(exec, *seen_from(exec, panel({0, 0, 2}, {0, 0, 1}, {0, 1, 0}), {3, 0, 2}), *target);
   EXPECT_GT(edge.before, edge.tested / 2);
   EXPECT_LT(share(edge.facing_before, edge.tested), 0.05);
   // Where it touches a surface it is not before one.
-  const SideEvidence on = weigh(exec, *seen_from(exec, panel({0, 0, 3}, {1, 0, 0}, {0, 1, 0}), {0, 0, 0}), *target).source;
+  const SideEvidence on = weigh(exec, *seen_from(exec, panel({0, 0, 3}, {1, 0, 0}, {0, 1, 0}), {0, 0, 0}), *target);
   EXPECT_EQ(on.before, 0u);
   EXPECT_EQ(on.facing_before, 0u);
   EXPECT_GT(share(on.facing_seen, on.tested), 0.9);
@@ -75,7 +63,7 @@ TEST(Sights, EvidenceInGroupsIsThatOfEachPoint) {
   for (int trial = 0; trial < 3; ++trial) {
     const auto points_a = test::bumpy_sheet(random, 9000, 1.7f), points_b = test::bumpy_sheet(random, 7001, 2.0f);
     const auto a = seen_from(exec, points_a, {0.5f, 0.3f, 2.0f}), b = seen_from(exec, points_b, {1.5f, -0.2f, 1.0f});
-    const ModeOutcome outcome = weigh(exec, *a, *b);
+    const ModeOutcome outcome = test::weighed_in_place(exec, *a, *b).modes[0];
     const RegistrationOptions options;
     const EvidenceTest test{inlier_test(options.score.max_correspondence_distance, options.evidence.max_normal_angle), options.evidence.free_space_margin,
                             options.evidence.min_range};
@@ -85,12 +73,11 @@ TEST(Sights, EvidenceInGroupsIsThatOfEachPoint) {
     for (std::uint32_t i = 0; i < s.size; ++i) weigh_point(s, t, there, test, t.visibility.count, i, forth);
     for (std::uint32_t i = 0; i < t.size; ++i) weigh_point(t, s, inverse(there), test, s.visibility.count, i, reverse);
     for (const auto& [expected, found] : {std::pair(forth, outcome.source), std::pair(reverse, outcome.target)}) {
-      EXPECT_EQ(expected.seen, found.seen);
-      EXPECT_EQ(expected.before, found.before);
-      EXPECT_EQ(expected.hidden, found.hidden);
-      EXPECT_EQ(expected.facing_seen, found.facing_seen);
-      EXPECT_EQ(expected.facing_before, found.facing_before);
+      test::Bytes each, groups;
+      add(each, expected), add(groups, found);
+      EXPECT_EQ(each.all, groups.all);
       EXPECT_GT(found.facing_before, 0u);
+      EXPECT_GT(found.near_front, 0u);
     }
   }
 }
