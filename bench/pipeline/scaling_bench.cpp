@@ -87,6 +87,21 @@ void points_per_cloud(benchmark::State& state) {
   report(state, results, static_cast<std::size_t>(state.iterations()));
 }
 
+/// Two scans by the default options, alone on a device: what one pair takes of its time and of its memory as the scans get finer.
+void pair_by_default(benchmark::State& state) {
+  if (!context(state, "cuda")) return;
+  const Hall hall;
+  const auto raw = scans(hall, 2, static_cast<std::size_t>(state.range(0)) * 10);
+  const RegistrationOptions options = RegistrationOptions::from_voxel_size(voxel_for(hall, state.range(0)));
+  // A context of its own: what others have made it keep would hide what this takes.
+  const Context on = new_context("cuda");
+  const auto clouds = prepare_batch(on, views_of(raw), options.prepare);
+  std::vector<RegistrationResult> results{align(on, clouds[1], clouds[0], options)};
+  for (auto _ : state) results.front() = align(on, clouds[1], clouds[0], options);
+  report(state, results, static_cast<std::size_t>(state.iterations()));
+  report_memory(state, on);
+}
+
 void raw_points(benchmark::State& state) {
   const Context* on = context(state, "cuda");
   if (!on) return;
@@ -123,6 +138,7 @@ void many_fragments(benchmark::State& state) {
 }
 
 BENCHMARK(points_per_cloud)->Arg(1000)->Arg(5000)->Arg(20000)->Arg(100000)->Unit(benchmark::kMillisecond)->UseRealTime();
+BENCHMARK(pair_by_default)->Arg(1000)->Arg(5000)->Arg(20000)->Arg(100000)->Unit(benchmark::kMillisecond)->UseRealTime();
 BENCHMARK(raw_points)->Arg(100000)->Arg(300000)->Arg(1000000)->Unit(benchmark::kMillisecond)->UseRealTime();
 BENCHMARK(many_fragments)->Arg(10)->Arg(50)->Arg(200)->Arg(500)->Arg(2000)->Iterations(1)->Unit(benchmark::kMillisecond)->UseRealTime();
 

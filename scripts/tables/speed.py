@@ -91,6 +91,15 @@ def scaling():
     return out + ["", made_by(context)]
 
 
+def pair_by_default():
+    context, runs = benchmarks()
+    out = ["| points a cloud | a pair alone, ms | match, ms | refine, ms | judge, ms | memory of the device, GiB |", "| --- | --- | --- | --- | --- | --- |"]
+    for n in (1000, 5000, 20000, 100000):
+        run = runs[f"pair_by_default/{n}"]
+        out.append(f"| {run['points']:,.0f} | {run['ms_per_pair']:.2f} | {run['ms_match']:.2f} | {run['ms_refine']:.2f} | {run['ms_judge']:.2f} | {run['GiB_per_device']:.2f} |")
+    return out + ["", made_by(context)]
+
+
 def floors():
     context, runs = benchmarks()
     run = runs["align_many/cuda_loopsmart/11"]
@@ -108,5 +117,5 @@ def floors():
 
 TABLES = {
     "speed": speed, "pipeline": pipeline, "pipeline_house": pipeline_house, "pipeline_steps": pipeline_steps,
-    "devices": devices, "scaling": scaling, "floors": floors,
+    "devices": devices, "scaling": scaling, "pair_by_default": pair_by_default, "floors": floors,
 }
