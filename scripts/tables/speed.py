@@ -61,7 +61,7 @@ def pipeline_steps():
 
 
 def devices():
-    context, runs = benchmarks("pipeline_h200_x2.json")
+    context, runs = benchmarks()
     one = runs["redwood_sized/cuda"]
     out = ["| devices | ms | faster by | preparation, ms | memory of each device, GiB |", "| --- | --- | --- | --- | --- |"]
     for run in [one] + ([runs["redwood_sized/cuda_all"]] if int(context.get("gpus", 1)) > 1 else []):
