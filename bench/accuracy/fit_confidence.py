@@ -11,10 +11,16 @@ its margin over the best distinct rival, and no pose gets more than its share of
 (in gt.log), which is what Redwood's strict protocol counts. Each exists four times: with and without free space, which clouds without
 known viewpoints do not tell, and with and without the fronts of surfaces, which prepare.front_reach = 0 leaves out.
 
+Buildings are few, and these were all seen by one kind of sensor. So the second regression also learns from runs that only serve to widen
+it (--beside): the same scenes as other sensors would have seen them (other_sensor.py) or with other voxels, and generated buildings
+(`gpureg generate`), which are full of twins. They are left out with their building, too, and do not say which mode is right.
+
 Nothing moves in these scenes. So that a chair that was moved does not cost a pose its confidence, every pair is fitted a second
 time, with a twentieth of the weight, as it would look if up to a tenth of one of its clouds were new.
 
-usage: fit_confidence.py RUN... [--origin RUN...] [--unknown RUN...] [--header src/api/confidence_model.hpp] [-o bench/results/confidence.json]
+usage: fit_confidence.py RUN... [--beside RUN=LABEL...] [--others RUN=LABEL...] [--origin RUN...] [--unknown RUN...]
+                         [--header src/api/confidence_model.hpp] [-o bench/results/confidence.json]
+--others: tested, and nothing is fitted to them. LABEL: what they are.
 --origin, --unknown: runs of the same scenes whose clouds came with the origin as their only viewpoint, or with none; they are tested,
 and nothing is fitted to them. Where a scene has poses.txt (fragment number, world_from_fragment), it is also told what kind of poses the wrong reports are.
 Needs numpy and scikit-learn.
@@ -96,7 +102,8 @@ class Run:
 
     def __init__(self, text, viewpoints="known"):
         self.viewpoints = viewpoints
-        self.building, folder, result = text.split("=")
+        self.building, folder, result, *label = text.split("=")
+        self.label = {"label": label[0]} if label else {}
         folder = pathlib.Path(folder)
         self.name = self.building + "/" + folder.name
         truth, information = blocks(folder / "gt_all.log", 5), blocks(folder / "gt_all.info", 7)
@@ -187,23 +194,26 @@ def second_view(run, model, first):
     return np.array(rows), best, np.array(share)
 
 
-RANKING, CONFIDENCE, OVERLAP = 0.1, 0.001, 1.0  # strengths
+RANKING, CONFIDENCE, OVERLAP = 0.1, 0.0003, 1.0  # strengths
 
 
-def fit(runs, model):
-    runs = runs + [run.changed for run in runs]
+def fit(runs, beside, model):
+    """The three regressions from the runs; the second from those beside them, too."""
+    runs, beside = ([*of, *(run.changed for run in of)] for of in (runs, beside))
     # Of pairs without a right mode there is nothing to learn about which mode is right. Without free space so little tells modes apart
     # that their wrong ones help all the same.
     ranked = [(x, right, np.full(len(x), run.weight)) for run in runs for x, right in zip(run.x[model], run.right)
               if len(x) and (not model[0] or np.any(right))]
     x, y, weight = (np.concatenate([np.asarray(row[k]) for row in ranked]) for k in range(3))
     first = Logistic(x, y, weight, RANKING)
-    views = [second_view(run, model, first) for run in runs]
-    x2 = np.concatenate([view[0] for view in views])
-    weight = np.concatenate([np.full(len(view[0]), run.weight) for run, view in zip(runs, views)])
-    labels = lambda kind: np.concatenate([[getattr(run, kind)[k][b] for k, b in enumerate(view[1]) if b >= 0]  # noqa: E731
-                                          for run, view in zip(runs, views)])
-    return first, Logistic(x2, labels("right"), weight, CONFIDENCE), Logistic(x2, labels("strict"), weight, OVERLAP)
+
+    def second(of, kind, strength):
+        views = [second_view(run, model, first) for run in of]
+        y = [[getattr(run, kind)[k][b] for k, b in enumerate(view[1]) if b >= 0] for run, view in zip(of, views)]
+        weight = [np.full(len(view[0]), run.weight) for run, view in zip(of, views)]
+        return Logistic(np.concatenate([view[0] for view in views]), np.concatenate(y), np.concatenate(weight), strength)
+
+    return first, second(runs + beside, "right", CONFIDENCE), second(runs, "strict", OVERLAP)
 
 
 def figures(run, model, models):
@@ -264,29 +274,34 @@ def header(models):
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("runs", nargs="+", metavar="RUN", help="BUILDING=SCENE_FOLDER=RESULT.json")
+    parser.add_argument("--beside", nargs="+", default=[], metavar="RUN=LABEL", help="fitted to by the second regression alone: other sensors, other buildings")
+    parser.add_argument("--others", nargs="+", default=[], metavar="RUN=LABEL", help="tested only")
     parser.add_argument("--origin", nargs="+", default=[], metavar="RUN", help="tested only: the origin was the only viewpoint")
     parser.add_argument("--unknown", nargs="+", default=[], metavar="RUN", help="tested only: no viewpoint was known")
     parser.add_argument("--header", type=pathlib.Path)
     parser.add_argument("-o", "--output", type=pathlib.Path)
     arguments = parser.parse_args()
     runs = [Run(text) for text in arguments.runs]
-    for run in runs:
+    beside = [Run(text) for text in arguments.beside]
+    for run in runs + beside:
         run.changed = ChangedRun(run)
-    tests = runs + [Run(text, "origin") for text in arguments.origin] + [Run(text, "unknown") for text in arguments.unknown]
+    tests = runs + beside + [Run(text) for text in arguments.others] + [Run(text, "origin") for text in arguments.origin] + [Run(text, "unknown") for text in arguments.unknown]
     record = {"runs": []}
+    # Who knows neither free space nor fronts has the overlap alone, and what that is worth in bare generated rooms is worth it nowhere else.
+    allowed = lambda of, model, building=None: [r for r in of if model in r.x and r.building != building and (of is runs or any(model))]  # noqa: E731
     for name, model in MODELS.items():
         fits = {}
         for run in tests:
-            others = [r for r in runs if r.building != run.building and model in r.x]
+            others = allowed(runs, model, run.building)
             # Those without free space are tested where there is none; those without fronts on all, to tell what fronts give.
             if not others or model not in run.x or (not model[0] and run.free):
                 continue
             if run.building not in fits:
-                fits[run.building] = fit(others, model)
-            out = {"scene": run.name, "viewpoints": run.viewpoints, "model": name, **figures(run, model, fits[run.building])}
+                fits[run.building] = fit(others, allowed(beside, model, run.building), model)
+            out = {"scene": run.name, **run.label, "viewpoints": run.viewpoints, "model": name, **figures(run, model, fits[run.building])}
             record["runs"].append(out)
             print(" ".join(f"{k} {v:.3f}" if k == "ECE" else f"{k} {v:.1f}" if isinstance(v, float) else f"{k} {v}" for k, v in out.items()))
-    models = [fit([r for r in runs if model in r.x], model) for model in MODELS.values()]
+    models = [fit(allowed(runs, model), allowed(beside, model), model) for model in MODELS.values()]
     if arguments.header:
         arguments.header.write_text(header(models))
     if arguments.output:
