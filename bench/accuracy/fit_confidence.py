@@ -194,7 +194,7 @@ def second_view(run, model, first):
     return np.array(rows), best, np.array(share)
 
 
-RANKING, CONFIDENCE, OVERLAP = 0.1, 0.0005, 1.0  # strengths
+RANKING, CONFIDENCE, OVERLAP = 0.1, 0.0003, 1.0  # strengths
 
 
 def fit(runs, beside, model):
