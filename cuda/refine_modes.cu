@@ -103,7 +103,7 @@ __device__ void leave_cluster() {
 
 /// A thread block per mode, or a cluster of kBlocks, runs all its iterations: on a sample, then on all points with a narrower kernel.
 template <int kThreads, int kBlocks>
-__global__ void __launch_bounds__(kThreads, kBlocks > 1 ? 1 : 1024 / kThreads) refine(RefineModes r) {
+__global__ void __launch_bounds__(kThreads, 1024 / kThreads) refine(RefineModes r) {
   __shared__ float rows[kThreads / 32][32][8];
   __shared__ std::int64_t partial[kThreads / 32][kSums];
   __shared__ IcpSums own[2], total_of_all;
@@ -140,8 +140,9 @@ __global__ void __launch_bounds__(kThreads, kBlocks > 1 ? 1 : 1024 / kThreads) r
   if (threadIdx.x == 0 && first == 0) mode.pose = pose, mode.iterations = total;
 }
 
-/// Where there are so few modes that the device would wait for single blocks.
-constexpr int kClusterBlocks = 8, kClusterThreads = 1024;
+/// Where there are so few modes that the device would wait for single blocks. Two of these blocks share a multiprocessor, so that the 24
+/// modes of one pair are refined all at once: clusters of blocks twice as large would come in two waves.
+constexpr int kClusterBlocks = 8, kClusterThreads = 512;
 
 void refine_by_clusters(Exec& exec, const RefineModes& batch, unsigned pairs) {
   cudaLaunchAttribute cluster{};
