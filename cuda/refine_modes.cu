@@ -37,8 +37,9 @@ __device__ bool correspondence(const SearchPair& pair, const RefineModes& r, flo
   return true;
 }
 
-/// The sums of every blocks-th kThreads points by a thread block, from the first-th on. A lane for each of the 27 sums goes through what the warp's points add: the terms of
-/// add_icp_term(), but one register per thread for them instead of 54. rows, partial: shared, for each warp.
+/// The sums of a thread block that is number `first` of `blocks`, which take turns at kThreads points. A lane for each of the 27 sums goes
+/// through what the warp's points add: the terms of add_icp_term(), but one register per thread for them instead of 54. rows, partial:
+/// shared, for each warp.
 template <int kThreads>
 __device__ void add_up(const SearchPair& pair, const RefineModes& r, float kernel_width, const Rigid& rigid, std::uint32_t stride,
                        std::uint32_t first, std::uint32_t blocks, float (*rows)[32][8], std::int64_t (*partial)[kSums], IcpSums& sums) {

@@ -285,10 +285,16 @@ def main():
     beside = [Run(text) for text in arguments.beside]
     for run in runs + beside:
         run.changed = ChangedRun(run)
-    tests = runs + beside + [Run(text) for text in arguments.others] + [Run(text, "origin") for text in arguments.origin] + [Run(text, "unknown") for text in arguments.unknown]
+    tests = runs + beside + [Run(text) for text in arguments.others]
+    tests += [Run(text, "origin") for text in arguments.origin] + [Run(text, "unknown") for text in arguments.unknown]
     record = {"runs": []}
-    # Who knows neither free space nor fronts has the overlap alone, and what that is worth in bare generated rooms is worth it nowhere else.
-    allowed = lambda of, model, building=None: [r for r in of if model in r.x and r.building != building and (of is runs or any(model))]  # noqa: E731
+
+    def allowed(of, model, building=None):
+        # Who knows neither free space nor fronts has the overlap alone, and what that tells in bare generated rooms it tells nowhere else.
+        if of is beside and not any(model):
+            return []
+        return [run for run in of if model in run.x and run.building != building]
+
     for name, model in MODELS.items():
         fits = {}
         for run in tests:
