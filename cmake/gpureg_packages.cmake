@@ -52,6 +52,10 @@ if(embree_FOUND AND embree_VERSION_MAJOR MATCHES "^[34]$")
 endif()
 gpureg_optional(GPUREG_HAVE_EMBREE "the generator of synthetic rooms (needs Embree 3 or 4)")
 
+find_package(assimp 5 QUIET)
+set(GPUREG_HAVE_ASSIMP ${assimp_FOUND})
+gpureg_optional(GPUREG_HAVE_ASSIMP "the generator's --building (needs Assimp)")
+
 if(GPUREG_BUILD_TESTS)
   find_package(GTest 1.11 QUIET)
   gpureg_optional(GTest_FOUND "tests (needs GoogleTest)")

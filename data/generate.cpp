@@ -9,12 +9,14 @@
 #include <thread>
 #include <vector>
 
+#include "data/building_file.hpp"
 #include "data/depth_sensor.hpp"
 #include "data/fusion.hpp"
 #include "data/ground_truth.hpp"
 #include "data/house.hpp"
 #include "data/random.hpp"
 #include "data/rgbd.hpp"
+#include "data/scatter.hpp"
 #include "data/scene_files.hpp"
 #include "data/trajectory.hpp"
 #include "gpureg/error.hpp"
@@ -35,6 +37,10 @@ void validate(const GenerateOptions& o) {
           std::to_string(o.frames_per_fragment), "1 to 1000");
   require(o.threads >= 0 && o.threads <= 1024, "threads", std::to_string(o.threads),
           "0 (all cores) to 1024");
+  require(o.clutter >= 0 && o.clutter <= 2, "clutter", std::to_string(o.clutter),
+          "0 to 2 a square metre");
+  require(o.clutter == 0 || !o.building.empty(), "clutter", std::to_string(o.clutter),
+          "0 without a building: generated houses are furnished");
   const SensorOptions& s = o.sensor;
   const auto in = [&](const char* name, double value, double low, double high, const char* rule) {
     require(value >= low && value <= high, std::string("sensor.") + name, std::to_string(value),
@@ -73,6 +79,12 @@ void parallel(int threads, int count, const Work& work) {
   if (failure) std::rethrow_exception(failure);
 }
 
+House furnished_building(const GenerateOptions& options) {
+  House house{{}, {}, {}, read_building(options.building)};
+  scatter(house, options.seed, options.clutter);
+  return house;
+}
+
 /// One scene on its way into a folder.
 class Generator {
  public:
@@ -83,7 +95,7 @@ class Generator {
         threads_(options.threads > 0
                      ? options.threads
                      : std::max(1, static_cast<int>(std::thread::hardware_concurrency()))),
-        house_(build_house(options.seed)),
+        house_(options.building.empty() ? build_house(options.seed) : furnished_building(options)),
         scene_(house_.mesh),
         sensor_(scene_, options.sensor, options.seed),
         world_from_camera_(

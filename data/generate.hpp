@@ -29,9 +29,14 @@ struct GenerateOptions {
   int fragments = 20;            ///< 1 .. 10000; about 0.7 MB of memory each
   int frames_per_fragment = 50;  ///< 1 .. 1000; the camera moves about 1.5 cm per frame
   std::uint64_t seed = 1;        ///< building, furniture, path and noise all follow from it
-  bool rgbd = false;  ///< also write the frames as a TUM sequence (about 0.6 MB and several times
-                      ///< the work per frame)
-  int threads = 0;    ///< 0: all cores; each holds one fragment's volume (about 100 MB)
+  /// A mesh to scan instead of a building of its own: metres, z up (glTF and COLLADA: as the file
+  /// has it), floor at z = 0, one storey. Any format that Assimp reads.
+  std::string building;
+  double clutter = 0;  ///< 0 .. 2, with building: pieces of furniture per square metre that are put
+                       ///< into it, so that what was copied in it differs
+  bool rgbd = false;   ///< also write the frames as a TUM sequence (about 0.6 MB and several times
+                       ///< the work per frame)
+  int threads = 0;     ///< 0: all cores; each holds one fragment's volume (about 100 MB)
   SensorOptions sensor;
 };
 
@@ -55,10 +60,11 @@ struct Progress {
 /// a point of B within 7.5 cm, under the exact poses.
 ///
 /// The same seed and options give the same bytes for any number of threads, and the scene of N
-/// fragments begins with the scene of fewer. Throws InvalidArgument (option out of range) and
-/// IoError (folder cannot be written, disk full, clouds of a larger scene in the folder). When
-/// should_stop says so it returns early, without an exception: what is there is complete files, but
-/// no gt.log.
+/// fragments begins with the scene of fewer. Throws InvalidArgument (option out of range, a
+/// building in which nobody can walk), BackendUnavailable (a building, but this build is without
+/// Assimp) and IoError (building cannot be read; folder cannot be written, disk full, clouds of a
+/// larger scene in the folder). When should_stop says so it returns early, without an exception:
+/// what is there is complete files, but no gt.log.
 void generate(const std::string& out_folder, const GenerateOptions& options,
               const Progress& progress = {});
 

@@ -50,6 +50,7 @@ struct Obstacle {
   float height;
 };
 
+/// A building that was read from a file (building_file.hpp) is a mesh alone.
 struct House {
   std::vector<Room> rooms;
   std::vector<Doorway> doors;

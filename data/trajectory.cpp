@@ -5,13 +5,13 @@
 #include <cmath>
 
 #include "data/random.hpp"
+#include "data/tour.hpp"
 
 namespace gpureg::synthetic {
 namespace {
 
 using Eigen::Vector2f;
 
-constexpr float kSpacing = 0.02f;  // metres between samples of the path
 constexpr float kSpeed = 0.0165f;  // metres per frame, on average
 constexpr float kMaximumSpeed = 1.35f * kSpeed;
 constexpr float kEyeLevel = 1.47f;  // metres, on average
@@ -54,75 +54,6 @@ std::vector<T> smoothed(const std::vector<T>& values, float sigma) {
   return result;
 }
 
-/// A free place in a room, not too near to the last one.
-Vector2f place_in(const Room& room, const WalkMap& map, Random& random, const Vector2f& last) {
-  Vector2f best = room.floor.centre();
-  float score = -1;
-  for (int attempt = 0; attempt < 24; ++attempt) {
-    const Vector2f p(random.uniform(room.floor.low.x(), room.floor.high.x()),
-                     random.uniform(room.floor.low.y(), room.floor.high.y()));
-    const float value =
-        map.free(p) ? std::min(1.6f, (p - last).norm()) + 0.2f * random.uniform() : -2;
-    if (value > score) score = value, best = p;
-  }
-  return best;
-}
-
-/// A tour of the rooms, as long as wanted (metres): round each room, then through a door, mostly to
-/// where it was least.
-std::vector<Vector2f> tour(const House& house, const WalkMap& map, std::uint64_t seed,
-                           float length) {
-  Random random(hash_key(seed, Purpose::path));
-  std::vector<int> visits(house.rooms.size(), 0);
-  std::size_t room = 0;
-  while (house.rooms[room].floor.size().minCoeff() < 2.2f)
-    ++room;  // start in a room, not in the corridor
-  Vector2f at = place_in(house.rooms[room], map, random, house.rooms[room].floor.low);
-  std::vector<Vector2f> line{at};
-  float walked = 0;
-  const auto go_to = [&](const Vector2f& target) {
-    std::vector<Vector2f> leg = map.path(at, target);
-    if (leg.empty()) leg = {target};  // boxed in by furniture: step over it
-    for (const Vector2f& p : leg) {
-      while ((p - line.back()).norm() > kSpacing) {
-        const Vector2f step = kSpacing * (p - line.back()).normalized();
-        line.push_back(line.back() + step);
-        walked += kSpacing;
-      }
-    }
-    at = target;
-  };
-  // A room that cannot be walked in would keep the tour from growing: it is bounded by its number
-  // of legs too.
-  for (int leg = 0; walked < length && leg < 1000 + static_cast<int>(length); ++leg) {
-    ++visits[room];
-    const int places = house.rooms[room].floor.size().minCoeff() < 2.2f ? 1 : random.between(2, 4);
-    for (int i = 0; i < places; ++i) go_to(place_in(house.rooms[room], map, random, at));
-    std::vector<const Doorway*> ways;
-    for (const Doorway& door : house.doors) {
-      if (door.room_a == static_cast<int>(room) || door.room_b == static_cast<int>(room))
-        ways.push_back(&door);
-    }
-    if (ways.empty()) continue;
-    const auto beyond = [&](const Doorway* door) {
-      return static_cast<std::size_t>(door->room_a == static_cast<int>(room) ? door->room_b
-                                                                             : door->room_a);
-    };
-    const Doorway* next =
-        ways[static_cast<std::size_t>(random.below(static_cast<int>(ways.size())))];
-    if (random.chance(0.6f)) {
-      for (const Doorway* door : ways) {
-        if (visits[beyond(door)] < visits[beyond(next)]) next = door;
-      }
-    }
-    const Vector2f side = next->through * (next->room_a == static_cast<int>(room) ? 1.0f : -1.0f);
-    go_to(next->centre - 0.5f * side);
-    go_to(next->centre + 0.5f * side);
-    room = beyond(next);
-  }
-  return line;
-}
-
 /// Of a few directions beside the way, the one where most of the view lies within the sensor's
 /// comfortable range.
 float choose_gaze(const RayScene& scene, const Vector2f& at, float heading, std::uint64_t seed,
@@ -153,14 +84,13 @@ float choose_gaze(const RayScene& scene, const Vector2f& at, float heading, std:
 
 std::vector<Eigen::Isometry3d> walk(const House& house, const RayScene& scene, std::uint64_t seed,
                                     int frames) {
-  const WalkMap map(house);
   // Frames beyond the last one, so that smoothing treats a short walk like the beginning of a long
   // one.
   const int total = frames + 6 * kTurnFrames + 2 * kGazeFrames;
   const std::vector<Vector2f> line =
-      smoothed(tour(house, map, seed, kMaximumSpeed * static_cast<float>(total) + 4), 12);
+      smoothed(tour(house, scene, seed, kMaximumSpeed * static_cast<float>(total) + 4), 12);
   const auto sample = [&](float s) {
-    const float u = std::clamp(s / kSpacing, 0.0f, static_cast<float>(line.size() - 2));
+    const float u = std::clamp(s / kTourSpacing, 0.0f, static_cast<float>(line.size() - 2));
     const auto i = static_cast<std::size_t>(u);
     const float f = u - static_cast<float>(i);
     return Vector2f((1 - f) * line[i] + f * line[i + 1]);

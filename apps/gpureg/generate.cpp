@@ -61,6 +61,11 @@ void add_generate(CLI::App& app, Action& chosen) {
       ->check(natural_number())
       ->capture_default_str();
   verb->add_option("--threads", o->scene.threads, "0: all")->capture_default_str();
+  verb->add_option("--building", o->scene.building,
+                   "Mesh to scan instead of a building of its own: metres, z up, floor at z = 0");
+  verb->add_option("--clutter", o->scene.clutter,
+                   "Pieces of furniture per square metre to put into it; copied rooms then differ")
+      ->capture_default_str();
   verb->add_flag("--rgbd", o->scene.rgbd, "Also write the frames as a sequence in TUM's layout");
   verb->add_flag("--quiet", o->quiet, "No progress, no summary");
   verb->callback([o, &chosen] { chosen = [o] { return run(*o); }; });

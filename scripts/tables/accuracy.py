@@ -105,7 +105,8 @@ def other_sensors():
         of = lambda key: mean(run[key] for run in runs)  # noqa: B023,E731
         reports = mean(run["above_half"]["reports"] for run in runs)
         wrong = mean(sum(v for key, v in run["above_half"].items() if key != "reports") for run in runs)
-        text = ", ".join(scenes) if len(scenes) < 4 else f"{len(scenes)} buildings"
+        buildings = len({scene.split("/")[0] for scene in scenes})
+        text = ", ".join(scenes) if len(scenes) < 4 else f"{buildings} buildings" + (f", {len(scenes)} walks" if len(scenes) > buildings else "")
         out.append(f"| {label} | {text} | {of('raw'):.1f} | {of('geo_R@P95'):.1f} / {of('geo_R@P99'):.1f} | {of('ECE'):.3f} | {reports:.0f}, {wrong:.1f} | "
                    f"{of('right_above_0.9'):.1f} |")
     return out
