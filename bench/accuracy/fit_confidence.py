@@ -16,7 +16,7 @@ it (--beside): the same scenes as other sensors would have seen them (other_sens
 (`gpureg generate`), which are full of twins. They are left out with their building, too, and do not say which mode is right.
 
 Nothing moves in these scenes. So that a chair that was moved does not cost a pose its confidence, every pair is fitted a second
-time, with a twentieth of the weight, as it would look if up to a tenth of one of its clouds were new.
+time, with little weight, as it would look if up to a tenth of one of its clouds were new.
 
 usage: fit_confidence.py RUN... [--beside RUN=LABEL...] [--others RUN=LABEL...] [--origin RUN...] [--unknown RUN...]
                          [--header src/api/confidence_model.hpp] [-o bench/results/confidence.json]
@@ -126,7 +126,7 @@ class Run:
                   if self.free or not model[0]}
 
 
-CHANGED_WEIGHT, MOST_CHANGED = 0.05, 0.1
+CHANGED_WEIGHT, MOST_CHANGED = 0.06, 0.1
 
 
 class ChangedRun:
@@ -194,7 +194,7 @@ def second_view(run, model, first):
     return np.array(rows), best, np.array(share)
 
 
-RANKING, CONFIDENCE, OVERLAP = 0.1, 0.0003, 1.0  # strengths
+RANKING, CONFIDENCE, OVERLAP = 0.15, 0.00025, 1.0  # strengths
 
 
 def fit(runs, beside, model):
