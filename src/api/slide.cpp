@@ -21,7 +21,9 @@ Pose<double> moved_along(const InformationSpectrum& spectrum, const Pose<double>
 }  // namespace
 
 FurtherPoses slide(const PairInput& pair, const PairOutcome& outcome, const RegistrationOptions& options) {
+  FurtherPoses out{0, {}};
   const double distance = static_cast<double>(options.evidence.slide_distance);
+  if (distance == 0.0) return out;
   std::vector<PoseEvidence> evidence;
   std::vector<const ModeOutcome*> modes;
   for (const ModeOutcome& mode : outcome.modes) {
@@ -30,8 +32,7 @@ FurtherPoses slide(const PairInput& pair, const PairOutcome& outcome, const Regi
     evidence.push_back(to_evidence(outcome, mode, *pair.source, *pair.target, false));
     modes.push_back(&mode);
   }
-  FurtherPoses out{0, {}};
-  if (modes.empty() || distance == 0.0) return out;
+  if (modes.empty()) return out;
   const ModeOutcome& likeliest = *modes[likeliest_of(evidence)];
   const InformationSpectrum spectrum = spectrum_of(likeliest, *pair.source);
   out.family = likeliest.family;
