@@ -15,9 +15,10 @@ struct AgreementOptions {
   float closing_angle = 3.0f;      ///< degrees, and ...
   float closing_distance = 0.15f;  ///< ... metres by which three right poses typically miss their
                                    ///< beginning (one standard deviation)
-  double chance = 0.1;  ///< how often a loop with a wrong pose closes all the same: near misses,
-                        ///< and rooms that look alike
-  double miss = 0.05;   ///< how often a loop of three right poses does not close
+  double chance = 0.4;  ///< how often a loop with a wrong pose closes all the same: near misses,
+                        ///< and places that look alike, whose wrong poses close their loops with
+                        ///< right ones (0 to 0.5 in seven scenes; docs/accuracy.md)
+  double miss = 0.02;   ///< how often a loop of three right poses does not close
   double max_factor = 55.0;  ///< by which all loops together may raise or lower the odds of a pose;
                              ///< loops are not independent
   double min_confidence = 0.02;  ///< pairs below take no part and keep their confidence
