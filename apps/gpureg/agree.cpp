@@ -52,8 +52,10 @@ RegistrationResult result_of(const PairRecord& record) {
 /// chosen comes first, as readers of results expect.
 Json agreed_record(const PairRecord& record, const PairAgreement& agreed, double min_confidence) {
   Json json = record.json;
-  json["agreement"] = {
-      {"score_alone", record.score}, {"mode", agreed.mode}, {"loops", agreed.loops}};
+  json["agreement"] = {{"score_alone", record.score},
+                       {"mode", agreed.mode},
+                       {"loops", agreed.loops},
+                       {"path", agreed.path}};
   if (!record.transform) return json;
   const bool aligned = agreed.confidence >= min_confidence;
   json["score"] = agreed.confidence;

@@ -6,8 +6,8 @@
 
 #include "gpureg/registration.hpp"
 
-/// Agreement among the pairs of one set of clouds: three poses around a loop must lead back to
-/// where it began.
+/// Agreement among the pairs of one set of clouds: poses around a loop must lead back to where it
+/// began.
 namespace gpureg {
 
 /// How loops are judged. The defaults are for voxels of 5 cm; the tolerances grow with the voxel.
@@ -36,19 +36,25 @@ struct AgreementOptions {
   void validate() const;
 };
 
-/// What the loops say of one pair.
+/// What the other pairs say of one pair.
 struct PairAgreement {
   double confidence = 0;  ///< probability that the mode is right, given all pairs
   std::uint32_t mode =
       0;  ///< index into RegistrationResult::modes; 0 where there are none: target_from_source
-  std::uint32_t loops = 0;  ///< that were looked at; 0: the confidence is the result's own score
+  std::uint32_t loops = 0;  ///< of three that were looked at
+  std::uint32_t path = 0;   ///< pairs on the trusted path that it was compared with; 0: there is
+                            ///< none, or it is on such paths itself. Without loops or a path the
+                            ///< confidence is the result's own score
 };
 
 /// Confidences of pairs in view of each other: results[k] belongs to pairs[k], as align_batch gives
 /// them. In a loop of three clouds the composition of right poses is the identity; that of others
 /// is by chance. Each mode of a pair is judged by the loops that it forms with modes of other
 /// pairs, weighed by how likely those are right, and beliefs are updated in a few damped rounds. A
-/// pair whose other mode the loops support comes back with that mode. Results without modes
+/// pair whose other mode the loops support comes back with that mode. Then the most trusted pairs
+/// that connect all clouds are taken as they are, and every other pair is compared with the path
+/// that they make between its clouds: places that look alike agree with each other in loops of
+/// three, but not with the way from one to the other. Results without modes
 /// (Proposal::quadruples) take part with their pose and score.
 ///
 /// Distances are measured at the clouds' centres, known from the results' moments (results made by

@@ -37,7 +37,10 @@ std::vector<Field<PairAgreement>> result_fields() {
       field("confidence", &A::confidence, "Probability that the mode is right, given all pairs."),
       field("mode", &A::mode,
             "Index into RegistrationResult.modes; 0 where there are none: target_from_source."),
-      field("loops", &A::loops, "That were looked at; 0: the confidence is the result's score."),
+      field("loops", &A::loops, "Of three that were looked at."),
+      field("path", &A::path,
+            "Pairs on the trusted path that it was compared with; 0: none. Without loops or a path "
+            "the confidence is the result's score."),
   };
 }
 
@@ -62,7 +65,7 @@ void bind_agreement(py::module_& m) {
                                                   option_fields());
   cls.def_static("from_voxel_size", &AgreementOptions::from_voxel_size, py::arg("voxel_size"),
                  "The distance is three voxels; the rest does not depend on the voxel.");
-  bind_record_class<PairAgreement>(m, "PairAgreement", "What the loops say of one pair.",
+  bind_record_class<PairAgreement>(m, "PairAgreement", "What the other pairs say of one pair.",
                                    result_fields());
   m.def("agreement", &agree, py::arg("pairs"), py::arg("results"), py::arg("options"));
 }

@@ -16,7 +16,7 @@ def agreement(
     *,
     options: Optional[AgreementOptions] = None,
 ) -> List[PairAgreement]:
-    """Confidences of pairs in view of each other: the poses around a loop of three must lead back.
+    """Confidences of pairs in view of each other: the poses around a loop must lead back.
 
     Parameters
     ----------
@@ -31,7 +31,8 @@ def agreement(
     -------
     list of PairAgreement
         ``confidence`` given all pairs, the index ``mode`` of the pose that the loops support (into
-        ``RegistrationResult.modes``), and the number of ``loops``. Pairs in no loop keep their score.
+        ``RegistrationResult.modes``), the number of ``loops`` of three, and how many trusted pairs make
+        the ``path`` between its clouds that it was compared with. Pairs in no loop keep their score.
 
     Raises
     ------

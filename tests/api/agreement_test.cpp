@@ -131,9 +131,69 @@ TEST(Agreement, WithoutLoopsNothingChanges) {
   for (std::size_t p = 0; p < out.size(); ++p) {
     EXPECT_EQ(out[p].confidence, set.results[p].score);
     EXPECT_EQ(out[p].loops, 0u);
+    EXPECT_EQ(out[p].path, 0u);
     EXPECT_EQ(out[p].mode, 0u);
   }
   EXPECT_TRUE(agreement({}, {}).empty());
+}
+
+/// A walk of ten clouds, each of which knows the next two, that passes two places that look alike:
+/// what sees the first one (clouds 0 to 2) is found in the second one (7 to 9), always by the same
+/// mistake.
+Set walk_past_twins(double confidence_of_twins) {
+  Set set(10);
+  for (std::uint32_t k = 0; k + 1 < 10; ++k) set.add(k, k + 1, 0.9999);
+  for (std::uint32_t k = 0; k + 2 < 10; ++k) set.add(k, k + 2, 0.9);
+  const Eigen::Isometry3d mistake = moved(0.1, {0, 0, 1}, {4.0, 1.0, 0});  // in the world
+  for (std::uint32_t i = 0; i < 3; ++i)
+    for (std::uint32_t j = 7; j < 10; ++j) {
+      const std::size_t p = set.add(i, j, confidence_of_twins);
+      set.results[p].target_from_source = set.results[p].modes[0].target_from_source =
+          set.world_from_cloud[j].inverse() * mistake * set.world_from_cloud[i];
+    }
+  return set;
+}
+
+TEST(Agreement, TwinsThatAgreeWithEachOtherAreToldByTheWay) {
+  const Set set = walk_past_twins(0.95);
+  const auto out = set.agree();
+  for (std::size_t p = 0; p < out.size(); ++p) {
+    const bool twin = set.pairs[p].target >= 7 && set.pairs[p].source < 3;
+    // All their loops of three close, those of right pairs too.
+    EXPECT_GE(out[p].loops, 1u) << p;
+    if (twin)
+      EXPECT_LT(out[p].confidence, 0.5) << p;
+    else
+      EXPECT_GT(out[p].confidence, 0.85) << p;
+  }
+  // They would be believed otherwise.
+  Set alone = set;
+  alone.pairs.erase(alone.pairs.begin() + 4);  // the way is cut: clouds 4 and 5, ...
+  alone.results.erase(alone.results.begin() + 4);
+  for (std::uint32_t k = 3; k < 5; ++k) {
+    const std::size_t p = alone.find(k, k + 2);
+    alone.pairs.erase(alone.pairs.begin() + static_cast<std::ptrdiff_t>(p));
+    alone.results.erase(alone.results.begin() + static_cast<std::ptrdiff_t>(p));
+  }
+  EXPECT_GT(alone.agree()[alone.find(0, 9)].confidence, 0.95);
+}
+
+TEST(Agreement, PathsAreAsLongAsTheWay) {
+  constexpr std::uint32_t kClouds = 30000;
+  Set set(kClouds);
+  for (std::uint32_t k = 0; k + 1 < kClouds; ++k) set.add(k, k + 1, 0.9999999);
+  std::mt19937 random(11);
+  for (int k = 0; k < 20000; ++k) {
+    const std::uint32_t a = random() % kClouds, b = random() % kClouds;
+    if (std::max(a, b) - std::min(a, b) > 1) set.add(a, b, 0.5);
+  }
+  const auto out = set.agree();
+  for (std::size_t p = 0; p < out.size(); ++p) {
+    const std::uint32_t a = set.pairs[p].source, b = set.pairs[p].target;
+    const std::uint32_t steps = std::max(a, b) - std::min(a, b);
+    ASSERT_EQ(out[p].path, steps == 1 ? 0u : steps);
+    if (steps > 1) ASSERT_GT(out[p].confidence, 0.6);  // it closes
+  }
 }
 
 TEST(Agreement, OrderDoesNotMatter) {
@@ -158,6 +218,7 @@ TEST(Agreement, OrderDoesNotMatter) {
       EXPECT_EQ(after[k].confidence, before[order[k]].confidence);
       EXPECT_EQ(after[k].mode, before[order[k]].mode);
       EXPECT_EQ(after[k].loops, before[order[k]].loops);
+      EXPECT_EQ(after[k].path, before[order[k]].path);
     }
   }
 }
