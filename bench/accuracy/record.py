@@ -41,7 +41,10 @@ def gpureg(arguments, *words):
 
 
 def commit():
-    """The commit of the working tree; with a plus sign where the library or the command differ from it."""
+    """The commit of the working tree; with a plus sign where the library or the command differ from it. GPUREG_COMMIT: where git does not know."""
+    if os.environ.get("GPUREG_COMMIT"):
+        return os.environ["GPUREG_COMMIT"]
+
     def git(*words):
         return subprocess.run(["git", "-C", ROOT, *words], capture_output=True, text=True).stdout.strip()
     changed = git("status", "--porcelain", "--untracked-files=no", "--", "include", "src", "cuda", "apps", "cmake", "CMakeLists.txt")

@@ -137,6 +137,15 @@ def agreement():
     return out
 
 
+def agreement_fresh():
+    record = load("agreement_fresh.json")
+    out = ["| scene | best right, % | R@P95, % | R@P99, % | ECE | right above 0.9, % |", "| --- | --- | --- | --- | --- | --- |"]
+    for scene in record["scenes"]:
+        of = lambda key, digits: f"{scene['before'][key]:.{digits}f} -> {scene['after'][key]:.{digits}f}"  # noqa: B023,E731
+        out.append(f"| {scene['scene']} | {of('raw_recall', 1)} | {of('R@P95', 1)} | {of('R@P99', 1)} | {of('calibration_error', 3)} | {of('right_above_0.9', 1)} |")
+    return out
+
+
 def accuracy_sweep():
     record = load("accuracy_sweep.json")
     scenes = [key for key in record["rows"][0] if key != "setting"]
@@ -157,6 +166,6 @@ def accuracy_attempts():
 
 TABLES = {
     "redkitchen": redkitchen, "redkitchen_seeds": redkitchen_seeds, "range_pairs": range_pairs,
-    "other_pairs": other_pairs, "confidence": confidence, "unseen": unseen, "other_sensors": other_sensors, "mistakes": mistakes, "agreement": agreement, "accuracy_sweep": accuracy_sweep,
+    "other_pairs": other_pairs, "confidence": confidence, "unseen": unseen, "other_sensors": other_sensors, "mistakes": mistakes, "agreement": agreement, "agreement_fresh": agreement_fresh, "accuracy_sweep": accuracy_sweep,
     "accuracy_attempts": accuracy_attempts,
 }
