@@ -137,6 +137,14 @@ def agreement():
     return out
 
 
+def closing_loops():
+    out = ["| scene | loops of three right poses | of them close, % | loops with a wrong pose | of them close, % |", "| --- | --- | --- | --- | --- |"]
+    for scene in load("agreement.json")["scenes"]:
+        cells = [f"{count} | {100 * close / count:.1f}" for count, close in (scene["loops"]["right"], scene["loops"]["wrong"])]
+        out.append(f"| {scene['scene']} | {' | '.join(cells)} |")
+    return out
+
+
 def agreement_fresh():
     record = load("agreement_fresh.json")
     out = ["| scene | best right, % | R@P95, % | R@P99, % | ECE | right above 0.9, % |", "| --- | --- | --- | --- | --- | --- |"]
@@ -166,6 +174,6 @@ def accuracy_attempts():
 
 TABLES = {
     "redkitchen": redkitchen, "redkitchen_seeds": redkitchen_seeds, "range_pairs": range_pairs,
-    "other_pairs": other_pairs, "confidence": confidence, "unseen": unseen, "other_sensors": other_sensors, "mistakes": mistakes, "agreement": agreement, "agreement_fresh": agreement_fresh, "accuracy_sweep": accuracy_sweep,
+    "other_pairs": other_pairs, "confidence": confidence, "unseen": unseen, "other_sensors": other_sensors, "mistakes": mistakes, "agreement": agreement, "agreement_fresh": agreement_fresh, "closing_loops": closing_loops, "accuracy_sweep": accuracy_sweep,
     "accuracy_attempts": accuracy_attempts,
 }
