@@ -17,7 +17,7 @@ struct AgreementOptions {
                                    ///< beginning (one standard deviation)
   double chance = 0.4;  ///< how often a loop with a wrong pose closes all the same: near misses,
                         ///< and places that look alike, whose wrong poses close their loops with
-                        ///< right ones (0 to 0.33 of them in seven scenes; and loops share pairs)
+                        ///< right ones (0 to 0.33 of them in seven scenes, and loops share pairs)
   double miss = 0.02;   ///< how often a loop of three right poses does not close
   double max_factor = 55.0;  ///< by which all loops together may raise or lower the odds of a pose;
                              ///< loops are not independent
