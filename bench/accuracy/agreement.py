@@ -30,7 +30,7 @@ def figures(folder, result, temporary):
     file = temporary / "scores.json"
     record.gpureg(arguments, "evaluate", result, "--ground-truth", folder, "--json", file)
     scene = json.loads(file.read_text())["scenes"][0]
-    # The red kitchen has no gt_all.log: there the strict rule is the only one.
+    # Without gt_all.log the strict rule is the only one.
     rule = "geometric" if "geometric" in scene else "strict"
     score = scene[rule]
     pairs = [(pair["score"] or 0.0, pair[rule]) for pair in scene["pairs"] if pair["tried"]]

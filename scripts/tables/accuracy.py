@@ -140,7 +140,7 @@ def agreement():
 def closing_loops():
     out = ["| scene | loops of three right poses | of them close, % | loops with a wrong pose | of them close, % |", "| --- | --- | --- | --- | --- |"]
     for scene in load("agreement.json")["scenes"]:
-        cells = [f"{count} | {100 * close / count:.1f}" for count, close in (scene["loops"]["right"], scene["loops"]["wrong"])]
+        cells = [f"{count} | {100 * close / count:.1f}" if count else "0 |" for count, close in (scene["loops"]["right"], scene["loops"]["wrong"])]
         out.append(f"| {scene['scene']} | {' | '.join(cells)} |")
     return out
 
