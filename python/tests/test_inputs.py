@@ -225,7 +225,7 @@ def test_files(source, tmp_path, reference):
 
 
 def test_no_leak(source):
-    """Resident memory is flat over ten thousand calls of each kind."""
+    """Resident memory is flat over thousands of calls of each kind."""
     context = gpureg.Context.cpu(1)
     small = np.ascontiguousarray(source[:60])
     cloud = gpureg.prepare(small, context=context)
@@ -246,7 +246,10 @@ def test_no_leak(source):
             return int(file.read().split()[1]) * resource.getpagesize()
 
     work(1000)
-    before = resident()
-    work(10000)
-    # One leaked result or cloud per call would be 5 MB and more; what is allowed is the allocator's.
-    assert resident() - before < 2_000_000
+    growth = []
+    for _ in range(3):
+        before = resident()
+        work(4000)
+        growth.append(resident() - before)
+    # One leaked result or cloud per call would be 2 MB and more each time; once, other tests' threads may have needed memory.
+    assert min(growth) < 800_000, growth
