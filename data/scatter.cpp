@@ -14,9 +14,7 @@ namespace {
 using Eigen::Vector2f;
 using Eigen::Vector3f;
 
-constexpr float kHeadroom = 1.9f;   // metres
-constexpr float kCellArea = 0.01f;  // square metres that a free place stands for
-constexpr float kPassage = 0.5f;    // metres left between two pieces
+constexpr float kPassage = 0.5f;  // metres left between two pieces
 constexpr float kFullTurn = 6.2831853f;
 
 using Maker = Piece (*)(Random&);
@@ -35,12 +33,11 @@ class Scatterer {
         random_(hash_key(seed, Purpose::furniture, 0x5CA77E12)) {}
 
   void run(float density) {
-    const auto of = [&](float share) {
-      return static_cast<int>(share * density * kCellArea * static_cast<float>(places_.size()));
-    };
-    for (int i = 0; i < of(1); ++i) put_piece();
-    for (int i = 0; i < of(1); ++i) put_small_thing();
-    for (int i = 0; i < of(1); ++i) put_picture();
+    const float area = WalkMap::kCell * WalkMap::kCell * static_cast<float>(places_.size());
+    const int count = static_cast<int>(density * area);
+    for (int i = 0; i < count; ++i) put_piece();
+    for (int i = 0; i < count; ++i) put_small_thing();
+    for (int i = 0; i < count; ++i) put_picture();
     // Only now: the ray tracer looks at the mesh as it was.
     const auto vertex = static_cast<std::uint32_t>(mesh_.vertices.size());
     const auto material = static_cast<std::uint16_t>(mesh_.palette.size());
@@ -86,8 +83,8 @@ class Scatterer {
   void put_small_thing() {
     for (int attempt = 0; attempt < 60; ++attempt) {
       const Vector2f at = any_place() + Vector2f(random_.normal(), random_.normal());
-      const RayHit down = scene_.cast({at.x(), at.y(), kHeadroom}, {0, 0, -1});
-      const float height = kHeadroom - down.t;
+      const RayHit down = scene_.cast({at.x(), at.y(), WalkMap::kHeadroom}, {0, 0, -1});
+      const float height = WalkMap::kHeadroom - down.t;
       if (!down.hit || down.normal.z() < 0.95f || height < 0.35f || height > 1.2f) continue;
       builder_.place(Eigen::Affine3f::Identity());
       small_thing(builder_, random_, {at.x(), at.y(), height}, random_.uniform(0.06f, 0.15f));
@@ -124,8 +121,8 @@ class Scatterer {
   }
 
   float floor(const Vector2f& at) const {
-    const RayHit down = scene_.cast({at.x(), at.y(), kHeadroom}, {0, 0, -1});
-    return kHeadroom - down.t;
+    const RayHit down = scene_.cast({at.x(), at.y(), WalkMap::kHeadroom}, {0, 0, -1});
+    return WalkMap::kHeadroom - down.t;
   }
 
   struct Circle {

@@ -52,7 +52,6 @@ WalkMap::WalkMap(const House& house) {
 
 WalkMap::WalkMap(const RayScene& scene) {
   constexpr float kLargest = 150;              // metres
-  constexpr float kHeadroom = 1.9f;            // metres
   constexpr float kNear = 0.1f, kFar = 30;     // metres: stands in this cell; walls a place in
   constexpr int kDirections = 8, kWalled = 6;  // a window or two may look outside
   Vector2f low = Vector2f::Constant(1e9f), high = -low;

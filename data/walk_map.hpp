@@ -13,6 +13,10 @@ namespace gpureg::synthetic {
 /// Where a person can walk: cells of 10 cm with the cost of a step, high near walls and furniture.
 class WalkMap {
  public:
+  static constexpr float kCell = 0.1f;  ///< metres
+  static constexpr float kHeadroom =
+      1.9f;  ///< metres that somebody needs, in a building from a file
+
   explicit WalkMap(const House& house);
   /// Of a mesh of which nothing is known: z up, floor at z = 0. The largest connected area that is
   /// walled in. Throws InvalidArgument when there is none, or when the mesh is larger than 150 m.
@@ -28,7 +32,6 @@ class WalkMap {
   std::vector<Eigen::Vector2f> path(const Eigen::Vector2f& from, const Eigen::Vector2f& to) const;
 
  private:
-  static constexpr float kCell = 0.1f;
   void lay_out(const Eigen::Vector2f& low, const Eigen::Vector2f& high);
   /// Costs from what is solid (a wall or tall furniture) and where low furniture stands, per cell.
   void price(const std::vector<std::uint8_t>& solid,

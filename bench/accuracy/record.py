@@ -42,13 +42,11 @@ def gpureg(arguments, *words):
 
 def commit():
     """The commit of the working tree; with a plus sign where the library or the command differ from it. GPUREG_COMMIT: where git does not know."""
-    if os.environ.get("GPUREG_COMMIT"):
-        return os.environ["GPUREG_COMMIT"]
-
     def git(*words):
         return subprocess.run(["git", "-C", ROOT, *words], capture_output=True, text=True).stdout.strip()
     changed = git("status", "--porcelain", "--untracked-files=no", "--", "include", "src", "cuda", "apps", "cmake", "CMakeLists.txt")
-    return git("rev-parse", "--short=12", "HEAD") + ("+" if changed else "")
+    known = git("rev-parse", "--short=12", "HEAD")
+    return known + ("+" if changed else "") if known else os.environ.get("GPUREG_COMMIT", "")
 
 
 def processor():

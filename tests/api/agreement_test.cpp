@@ -68,6 +68,14 @@ struct Set {
   }
 };
 
+/// Where wrong loops seldom close, as where no place looks like another, two loops say much.
+AgreementOptions without_twins() {
+  AgreementOptions options;
+  options.chance = 0.1;
+  options.miss = 0.05;
+  return options;
+}
+
 const Eigen::Isometry3d kWrong = moved(1.0, {0, 0, 1}, {1.0, 0.5, 0});
 
 TEST(Agreement, AWrongPairAmongRightOnesFalls) {
@@ -91,6 +99,7 @@ TEST(Agreement, AWeakRightPairRises) {
   set.add_all(0.95);
   const std::size_t weak = set.find(0, 2);
   set.results[weak].score = set.results[weak].modes[0].confidence = 0.2;
+  EXPECT_GT(set.agree(without_twins())[weak].confidence, 0.8);
   EXPECT_GT(set.agree()[weak].confidence, 0.5);
 }
 
@@ -256,6 +265,7 @@ TEST(Agreement, ShiftsAreMeasuredAtTheClouds) {
       }
     return set;
   };
+  for (const PairAgreement& a : far_set(true).agree(without_twins())) EXPECT_GT(a.confidence, 0.9);
   for (const PairAgreement& a : far_set(true).agree()) EXPECT_GT(a.confidence, 0.85);
   for (const PairAgreement& a : far_set(false).agree()) EXPECT_LT(a.confidence, 0.7);
 }
