@@ -7,7 +7,7 @@ gt_all.log and gt_all.info (right: Redwood's 0.2 m rule against gt_all). Every r
 then all of them together give the coefficients that are written into the library.
 
 Three logistic regressions: the first ranks the modes of a pair by their own evidence, the second judges the best of them, and also sees
-its margin over the best distinct rival, and no pose gets more than its share of the odds of all, as at most one is right; the third says, from the same, whether the pose is right and the clouds overlap by 30 % or more
+its margin over the best distinct rival and how many modes there are, and no pose gets more than its share of the odds of all, as at most one is right; the third says, from the same, whether the pose is right and the clouds overlap by 30 % or more
 (in gt.log), which is what Redwood's strict protocol counts. Each exists four times: with and without free space, which clouds without
 known viewpoints do not tell, and with and without the fronts of surfaces, which prepare.front_reach = 0 leaves out.
 
@@ -108,7 +108,9 @@ class Run:
         self.name = self.building + "/" + folder.name
         truth, information = blocks(folder / "gt_all.log", 5), blocks(folder / "gt_all.info", 7)
         strict, strict_information = blocks(folder / "gt.log", 5), blocks(folder / "gt.info", 7)
-        pairs = [p for p in json.loads(pathlib.Path(result).read_text())["pairs"] if p["j"] - p["i"] > 1]
+        recorded = json.loads(pathlib.Path(result).read_text())
+        pairs = [p for p in recorded["pairs"] if p["j"] - p["i"] > 1]
+        self.refined = recorded["options"]["evidence"]["modes"]
         self.in_truth = np.array([(p["i"], p["j"]) in strict for p in pairs])
         self.keys, self.listed = [(p["i"], p["j"]) for p in pairs], set(truth)
         trajectory = folder / "poses.txt"
@@ -140,7 +142,7 @@ class ChangedRun:
         for pair in run.modes:
             side, share, near = random.integers(2), random.uniform(0, MOST_CHANGED), random.uniform(0.3, 0.8)
             modes.append([{"evidence": changed(m["evidence"], side, share, near)} for m in pair])
-        self.right, self.strict = run.right, run.strict
+        self.right, self.strict, self.refined = run.right, run.strict, run.refined
         self.x = {model: [np.array([measures(m["evidence"], *model) for m in ms]) for ms in modes] for model in run.x}
 
 
@@ -178,7 +180,8 @@ class Logistic:
 
 
 def second_view(run, model, first):
-    """Measures of the best mode of each pair, its logit and its margin over the best rival; which mode it is; its share among the modes."""
+    """Measures of the best mode of each pair, its logit, its margin over the best rival, and how many modes there are of those that were
+    refined (many poses that end in one place agree; where little holds them, each ends in its own); which mode it is; its share."""
     rows, best, share = [], [], []
     for x in run.x[model]:
         if not len(x):
@@ -189,7 +192,7 @@ def second_view(run, model, first):
         share.append(1 / np.exp(own - own[k]).sum())
         logits = np.clip(own, -14, 14)
         rival = max([v for i, v in enumerate(logits) if i != k], default=-14.0)
-        rows.append(np.r_[x[k], logits[k], logits[k] - rival])
+        rows.append(np.r_[x[k], logits[k], logits[k] - rival, len(x) / run.refined])
         best.append(k)
     return np.array(rows), best, np.array(share)
 

@@ -103,7 +103,7 @@ std::size_t likeliest_of(const std::vector<PoseEvidence>& evidence) {
   return static_cast<std::size_t>(std::max_element(value.begin(), value.end()) - value.begin());
 }
 
-void set_confidences(std::vector<RegistrationMode>& modes, const std::vector<std::uint32_t>& family,
+void set_confidences(std::vector<RegistrationMode>& modes, std::uint32_t refined,
                      const std::function<bool(const RegistrationMode&, const RegistrationMode&)>& same) {
   if (modes.empty()) return;
   std::vector<PoseEvidence> evidence;
@@ -115,21 +115,20 @@ void set_confidences(std::vector<RegistrationMode>& modes, const std::vector<std
   std::stable_sort(order.begin(), order.end(), [](const auto& a, const auto& b) { return a.first > b.first; });
   std::vector<RegistrationMode> out;
   std::vector<double> own, rank;
-  std::vector<std::uint32_t> families;
   for (const auto& [value, k] : order) {
     const RegistrationMode& mode = modes[k];
-    if (std::count(families.begin(), families.end(), family[k]) > 0) continue;
     if (std::any_of(out.begin(), out.end(), [&](const RegistrationMode& better) { return same(better, mode); })) continue;
-    families.push_back(family[k]);
     out.push_back(mode), own.push_back(value), rank.push_back(std::clamp(value, -14.0, 14.0));
   }
   const std::vector<double> share = shares(own);
+  const double apart = static_cast<double>(out.size()) / refined;
   for (std::size_t k = 0; k < out.size(); ++k) {
     RegistrationMode& mode = out[k];
     const double rival = k > 0 ? rank[0] : out.size() > 1 ? rank[1] : -14.0;
     std::vector<double> x = seen(mode);
     x.push_back(rank[k]);
     x.push_back(rank[k] - rival);
+    x.push_back(apart);
     mode.confidence = probability(logit(known.model.confidence, x));
     mode.overlap_confidence = probability(logit(known.model.overlap, x));
     mode.confidence = std::min(mode.confidence, share[k]);

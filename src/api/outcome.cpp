@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <map>
 
 #include "api/confidence.hpp"
 #include "api/evidence.hpp"
@@ -64,31 +65,42 @@ double distance_between(const UnalignedIsometry3d& a, const UnalignedIsometry3d&
   return std::sqrt(std::max(0.0, ((m * points.outer * m.transpose()).trace() + 2 * t.dot(m * points.sum)) / n + t.squaredNorm()));
 }
 
+/// What was slid and came back is where it was, but less well refined: within so much of the matching distance.
+constexpr double kCameBack = 0.5;
+/// What was slid and stayed further away than so much of the slide, a quarter of a metre at the usual voxels, is another place, and both
+/// cannot be right. Nearer, only the likelier one is kept.
+constexpr double kApart = 0.625;
+
 void add_modes(const PairOutcome& outcome, const PreparedState& source, const PreparedState& target, bool swapped,
                const RegistrationOptions& options, RegistrationResult& result) {
   const PreparedState& moved = swapped ? target : source;
   const PreparedState& fixed = swapped ? source : target;
   std::vector<RegistrationMode> modes;
-  std::vector<std::uint32_t> family;
+  // Of each family the first mode, from which others were slid.
+  std::map<std::uint32_t, std::size_t> origins;
+  const auto touching = [&](std::uint32_t family) {
+    const ModeOutcome& origin = outcome.modes[origins.at(family)];
+    return to_frame(swapped ? origin.target_moments : origin.source_moments, source);
+  };
   for (std::size_t k = 0; k < outcome.modes.size(); ++k) {
     const ModeOutcome& mode = outcome.modes[k];
     RegistrationMode out;
     out.target_from_source = to_transform(mode.pose, source, target, swapped);
-    // What was slid and came back is where it was, but less well refined.
-    const auto before = std::find(family.begin(), family.end(), mode.family);
-    if (before != family.end()) {
-      const RegistrationMode& from = modes[static_cast<std::size_t>(before - family.begin())];
-      const ModeOutcome& origin = outcome.modes[from.found_as];
-      const CorrespondenceMoments touching = to_frame(swapped ? origin.target_moments : origin.source_moments, source);
-      if (distance_between(out.target_from_source, from.target_from_source, touching) <= static_cast<double>(options.score.max_correspondence_distance)) continue;
+    const auto [origin, is_first] = origins.emplace(mode.family, k);
+    if (!is_first) {
+      const UnalignedIsometry3d before = to_transform(outcome.modes[origin->second].pose, source, target, swapped);
+      if (distance_between(out.target_from_source, before, touching(mode.family)) <= kCameBack * static_cast<double>(options.score.max_correspondence_distance)) continue;
     }
     out.evidence = to_evidence(outcome, mode, moved, fixed, swapped);
     out.found_as = static_cast<std::uint32_t>(k);
-    modes.push_back(out), family.push_back(mode.family);
+    modes.push_back(out);
   }
   const ModeOutcome& first = outcome.modes.front();
   const Eigen::Vector3d middle = middle_of(to_frame(swapped ? first.target_moments : first.source_moments, source), origin_of(source));
-  set_confidences(modes, family, [&](const RegistrationMode& a, const RegistrationMode& b) {
+  set_confidences(modes, options.evidence.modes, [&](const RegistrationMode& a, const RegistrationMode& b) {
+    const std::uint32_t family = outcome.modes[a.found_as].family;
+    if (family == outcome.modes[b.found_as].family)
+      return distance_between(a.target_from_source, b.target_from_source, touching(family)) <= kApart * static_cast<double>(options.evidence.slide_distance);
     return same_mode_at(a.target_from_source, b.target_from_source, middle, options.evidence);
   });
   result.modes = std::move(modes);

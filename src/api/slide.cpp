@@ -36,7 +36,7 @@ FurtherPoses slide(const PairInput& pair, const PairOutcome& outcome, const Regi
   const ModeOutcome& likeliest = *modes[likeliest_of(evidence)];
   const InformationSpectrum spectrum = spectrum_of(likeliest, *pair.source);
   out.family = likeliest.family;
-  for (const double way : {distance, -distance}) out.poses.push_back(moved_along(spectrum, likeliest.pose, way));
+  for (const double way : {distance, -distance, 0.5 * distance, -0.5 * distance}) out.poses.push_back(moved_along(spectrum, likeliest.pose, way));
   return out;
 }
 

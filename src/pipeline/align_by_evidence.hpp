@@ -9,7 +9,7 @@ namespace gpureg::pipeline {
 /// namespace; every stage takes all pairs at once. Only weigh_modes() waits for the results.
 ///
 /// Refinement ends where a surface that has nothing on it lets it: anywhere along a wall. So the likeliest mode is slid both ways along
-/// its softest direction, refined from there and weighed again; the evidence says which of them it is.
+/// its softest direction, refined from there and weighed again; the evidence says which of them it is, and how sure.
 template <typename Exec>
 void align_by_evidence(Exec& exec, Span<const PairInput> inputs, Span<const PairView> pairs, const RegistrationOptions& options, const FurtherSearch& further,
                        Span<PairOutcome> outcomes) {

@@ -4,6 +4,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 #include "api/evidence.hpp"
 #include "gpureg/registration.hpp"
 #include "support/prepared.hpp"
@@ -33,12 +35,12 @@ TEST(Slide, BothWaysAlongTheWall) {
   for (const float distance : {0.4f, 0.15f}) {
     options.evidence.slide_distance = distance;
     const FurtherPoses more = slide({source.get(), target.get(), {}, {}, {}}, outcome, options);
-    ASSERT_EQ(more.poses.size(), 2u);
+    ASSERT_EQ(more.poses.size(), 4u);
     EXPECT_EQ(more.family, 0u);
     double sum = 0;
-    for (const Pose<double>& pose : more.poses) {
-      const Pose<double>& from = outcome.modes[0].pose;
-      EXPECT_NEAR(std::abs(pose.tx - from.tx), static_cast<double>(distance), 0.02);
+    for (std::size_t k = 0; k < 4; ++k) {
+      const Pose<double>&pose = more.poses[k], &from = outcome.modes[0].pose;
+      EXPECT_NEAR(std::abs(pose.tx - from.tx), static_cast<double>(distance) * (k < 2 ? 1 : 0.5), 0.02);
       EXPECT_NEAR(pose.ty, from.ty, 0.02);
       EXPECT_NEAR(pose.tz, from.tz, 0.02);
       EXPECT_GT(std::abs(pose.w), 0.999);
@@ -67,11 +69,11 @@ TEST(Slide, TurnsAboutTheMiddleOfWhatTouches) {
   const PairOutcome outcome = test::weighed_in_place(exec, *cloud, *cloud);
   RegistrationOptions options;
   const FurtherPoses more = slide({cloud.get(), cloud.get(), {}, {}, {}}, outcome, options);
-  ASSERT_EQ(more.poses.size(), 2u);
+  ASSERT_EQ(more.poses.size(), 4u);
   const Vec3 middle{6 - cloud->origin[0], -3 - cloud->origin[1], 1 - cloud->origin[2]};
   for (const Pose<double>& pose : more.poses) {
     EXPECT_LT(norm(apply(to_rigid(pose), middle) - middle), 0.05f);
-    EXPECT_LT(std::abs(pose.w), 0.99) << "0.4 of a metre at a metre";
+    EXPECT_LT(std::abs(pose.w), 0.996) << "0.2 of a metre at a metre, or twice that";
   }
 }
 
@@ -96,6 +98,29 @@ TEST(Slide, WhatComesBackDoesNotCount) {
     EXPECT_EQ(a.target_from_source.matrix(), b.target_from_source.matrix());
     EXPECT_EQ(a.modes.size(), b.modes.size());
   }
+}
+
+// Along a bare wall a slid pose stays where it was put. Both cannot be right, so it is a rival, and costs the other its confidence.
+TEST(Slide, WhatStaysAwayIsARival) {
+  std::mt19937 random(3);
+  std::vector<Eigen::Vector3f> points;
+  for (const Vec3& p : bare_corner(random, 40000)) points.emplace_back(p.x, p.y, p.z);
+  const PointCloudView cloud(points);
+  RegistrationOptions slid, still;
+  still.evidence.slide_distance = 0;
+  const RegistrationResult a = align(Context::cpu(), cloud, cloud, slid), b = align(Context::cpu(), cloud, cloud, still);
+  ASSERT_FALSE(a.modes.empty());
+  ASSERT_FALSE(b.modes.empty());
+  const auto rivals = [&](const RegistrationResult& result) {
+    return std::count_if(result.modes.begin() + 1, result.modes.end(), [&](const RegistrationMode& mode) {
+      const Eigen::Isometry3d between = Eigen::Isometry3d(result.target_from_source).inverse() * Eigen::Isometry3d(mode.target_from_source);
+      const double along = std::abs(between.translation().x()), across = between.translation().tail<2>().norm();
+      return along > 0.25 && along < 0.9 && across < 0.1 && Eigen::AngleAxisd(between.linear()).angle() < 0.1;
+    });
+  };
+  EXPECT_GE(rivals(a), 1);
+  EXPECT_GT(rivals(a), rivals(b));
+  EXPECT_LE(a.score, b.score);
 }
 
 }  // namespace
