@@ -67,9 +67,9 @@ double distance_between(const UnalignedIsometry3d& a, const UnalignedIsometry3d&
 
 /// What was slid and came back is where it was, but less well refined: within so much of the matching distance.
 constexpr double kCameBack = 0.5;
-/// What was slid and stayed further away than so much of the slide, a quarter of a metre at the usual voxels, is another place, and both
-/// cannot be right. Nearer, only the likelier one is kept.
-constexpr double kApart = 0.625;
+/// What was slid and stayed further away than so much of the distance of modes, a quarter of a metre at the usual voxels, is another place,
+/// and both cannot be right. Nearer, only the likelier one is kept.
+constexpr double kApart = 5.0 / 6;
 
 void add_modes(const PairOutcome& outcome, const PreparedState& source, const PreparedState& target, bool swapped,
                const RegistrationOptions& options, RegistrationResult& result) {
@@ -99,8 +99,9 @@ void add_modes(const PairOutcome& outcome, const PreparedState& source, const Pr
   const Eigen::Vector3d middle = middle_of(to_frame(swapped ? first.target_moments : first.source_moments, source), origin_of(source));
   set_confidences(modes, options.evidence.modes, [&](const RegistrationMode& a, const RegistrationMode& b) {
     const std::uint32_t family = outcome.modes[a.found_as].family;
-    if (family == outcome.modes[b.found_as].family)
-      return distance_between(a.target_from_source, b.target_from_source, touching(family)) <= kApart * static_cast<double>(options.evidence.slide_distance);
+    const CorrespondenceMoments points = family == outcome.modes[b.found_as].family ? touching(family) : CorrespondenceMoments{};
+    if (points.count > 0)
+      return distance_between(a.target_from_source, b.target_from_source, points) <= kApart * static_cast<double>(options.evidence.mode_distance);
     return same_mode_at(a.target_from_source, b.target_from_source, middle, options.evidence);
   });
   result.modes = std::move(modes);
