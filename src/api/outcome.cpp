@@ -65,8 +65,6 @@ double distance_between(const UnalignedIsometry3d& a, const UnalignedIsometry3d&
   return std::sqrt(std::max(0.0, ((m * points.outer * m.transpose()).trace() + 2 * t.dot(m * points.sum)) / n + t.squaredNorm()));
 }
 
-/// What was slid and came back is where it was, but less well refined: within so much of the matching distance.
-constexpr double kCameBack = 0.5;
 /// What was slid and stayed further away than so much of the distance of modes, a quarter of a metre at the usual voxels, is another place,
 /// and both cannot be right. Nearer, only the likelier one is kept.
 constexpr double kApart = 5.0 / 6;
@@ -86,10 +84,11 @@ void add_modes(const PairOutcome& outcome, const PreparedState& source, const Pr
     const ModeOutcome& mode = outcome.modes[k];
     RegistrationMode out;
     out.target_from_source = to_transform(mode.pose, source, target, swapped);
+    // What was slid and came back is where it was, but less well refined: nearer than points are matched, evidence cannot tell.
     const auto [origin, is_first] = origins.emplace(mode.family, k);
     if (!is_first) {
       const UnalignedIsometry3d before = to_transform(outcome.modes[origin->second].pose, source, target, swapped);
-      if (distance_between(out.target_from_source, before, touching(mode.family)) <= kCameBack * static_cast<double>(options.score.max_correspondence_distance)) continue;
+      if (distance_between(out.target_from_source, before, touching(mode.family)) <= static_cast<double>(options.score.max_correspondence_distance)) continue;
     }
     out.evidence = to_evidence(outcome, mode, moved, fixed, swapped);
     out.found_as = static_cast<std::uint32_t>(k);
