@@ -73,8 +73,9 @@ struct EvidenceOptions {
   float max_normal_angle = 30.0f;   ///< degrees between the normals of an inlier
   float mode_angle = 11.5f;         ///< degrees, and ...
   float mode_distance = 0.3f;       ///< ... metres between the cloud's centres, within which two poses are one
-  /// Metres that the likeliest pose is slid, and half as far, both ways, along the direction that its surfaces determine least: refinement
-  /// ends anywhere along a bare wall, and the evidence then says where. What stays away from it is a rival. 0: not at all.
+  /// Metres that the likeliest pose is slid, both ways, along the direction that its surfaces determine least (and by quarters of it, where
+  /// it is open whether the pose is right): refinement ends anywhere along a bare wall, and the evidence then says where. What stays away
+  /// from it is a rival. 0: not at all.
   float slide_distance = 0.4f;
   float free_space_margin = 0.12f;  ///< metres before a seen surface that a point may lie without contradicting it
   float min_range = 0.3f;           ///< metres from a viewpoint, nearer than which nothing is judged

@@ -68,7 +68,7 @@ std::vector<Field<EvidenceOptions>> evidence_fields() {
             "Degrees between the normals of an inlier, (0, 180]."),
       field("mode_angle", &O::mode_angle, "Degrees within which two poses are one, and ..."),
       field("mode_distance", &O::mode_distance, "... metres between the clouds' centres."),
-      field("slide_distance", &O::slide_distance, "Metres that the likeliest pose is slid, and half as far, both ways, along the direction that its surfaces determine least; 0: not at all."),
+      field("slide_distance", &O::slide_distance, "Metres that the likeliest pose is slid, both ways, along the direction that its surfaces determine least, and by quarters of it where it is open whether the pose is right; 0: not at all."),
       field("free_space_margin", &O::free_space_margin,
             "Metres before a seen surface that a point may lie."),
       field("min_range", &O::min_range,

@@ -96,11 +96,12 @@ double probability(double logit_value) { return 1.0 / (1.0 + std::exp(-logit_val
 
 }  // namespace
 
-std::size_t likeliest_of(const std::vector<PoseEvidence>& evidence) {
+Likeliest likeliest_of(const std::vector<PoseEvidence>& evidence) {
   const Knowledge known = known_of(evidence);
   std::vector<double> value;
   for (const PoseEvidence& e : evidence) value.push_back(logit(known.model.ranking, measures(e, known.free_space, known.fronts)));
-  return static_cast<std::size_t>(std::max_element(value.begin(), value.end()) - value.begin());
+  const auto most = std::max_element(value.begin(), value.end());
+  return {static_cast<std::size_t>(most - value.begin()), *most};
 }
 
 void set_confidences(std::vector<RegistrationMode>& modes, std::uint32_t refined,

@@ -9,8 +9,14 @@
 
 namespace gpureg {
 
-/// The one that most speaks for; evidence: of the modes of one pair, not empty.
-std::size_t likeliest_of(const std::vector<PoseEvidence>& evidence);
+/// The mode that most speaks for, and the logarithm of its odds, of its own evidence alone.
+struct Likeliest {
+  std::size_t mode;
+  double log_odds;
+};
+
+/// evidence: of the modes of one pair, not empty.
+Likeliest likeliest_of(const std::vector<PoseEvidence>& evidence);
 
 /// Orders the modes of one pair by how much speaks for them, drops those that are the same as a better one, and fills in their confidence
 /// from the evidence of all of them. refined: as many as were refined at most, EvidenceOptions::modes; how many of them ended in places of

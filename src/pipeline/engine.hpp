@@ -46,7 +46,7 @@ struct FurtherPoses {
   std::uint32_t family;                ///< the mode that they belong to
   std::vector<Pose<double>> poses;     ///< in local coordinates of both clouds; at most kMostFurtherPoses
 };
-constexpr std::uint32_t kMostFurtherPoses = 4;
+constexpr std::uint32_t kMostFurtherPoses = 8;
 using FurtherSearch = std::function<std::vector<FurtherPoses>(Span<const PairInput>, Span<const PairOutcome>)>;
 
 /// Private interface between the public door (src/api) and the backends (src/cpu, cuda). Calls are serialised inside.
