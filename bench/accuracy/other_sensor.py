@@ -3,9 +3,12 @@
 """A scene as a worse sensor, or a worse odometry, would have brought it, for fit_confidence.py --beside.
 
 Drift bends each fragment by a smooth field: 24 waves of 0.7 to 3 m that together move a point by --drift metres (root mean square, each
-axis). Noise moves every point by itself, before the voxels average it. Everything else of SCENE (truth, cameras.txt) is copied.
+axis). Noise moves every point by itself, before the voxels average it. What depth cameras do that neither is like: bumps, a field of
+waves of 6 to 25 cm, as their errors are alike next to each other, which turns normals; holes, balls of 5 to 20 cm without a point, where a
+surface was too dark, too bright or too steep; and flying points, patches of 2 to 6 cm that hang 2 to 12 cm before their surface, towards
+one of the cameras. Everything else of SCENE (truth, cameras.txt) is copied.
 
-usage: other_sensor.py SCENE OUT [--drift METRES] [--noise METRES] [--seed N]
+usage: other_sensor.py SCENE OUT [--drift METRES] [--noise METRES] [--bumps METRES] [--holes SHARE] [--flying SHARE] [--seed N]
 Reads cloud_bin_<i>.ply whose vertices are binary floats. Needs numpy."""
 import argparse
 import pathlib
@@ -14,7 +17,10 @@ import sys
 
 import numpy as np
 
-WAVES, SHORTEST, LONGEST = 24, 0.7, 3.0
+WAVES = 24
+DRIFT, BUMPS = (0.7, 3.0), (0.06, 0.25)  # metres, shortest and longest wave
+HOLE, PATCH = (0.05, 0.2), (0.02, 0.06)  # metres, smallest and largest radius
+FLIGHT = (0.02, 0.12)
 
 
 def read(path):
@@ -28,11 +34,28 @@ def read(path):
     return raw[:end], np.frombuffer(raw, "<f4", offset=end).reshape(-1, len(properties)).copy()
 
 
-def drift(points, metres, random):
+def waves(points, metres, lengths, random):
     wave = random.normal(size=(WAVES, 3))
-    wave *= (2 * np.pi / random.uniform(SHORTEST, LONGEST, WAVES) / np.linalg.norm(wave, axis=1))[:, None]
+    wave *= (2 * np.pi / random.uniform(*lengths, WAVES) / np.linalg.norm(wave, axis=1))[:, None]
     amplitude = random.normal(size=(WAVES, 3)) * metres * np.sqrt(2 / WAVES)
     return np.cos(points @ wave.T + random.uniform(0, 2 * np.pi, WAVES)) @ amplitude
+
+
+def balls(points, share, radii, random):
+    """The points in each of some balls, as many as hold that share of all; where balls overlap they have less together."""
+    left = share * len(points)
+    while left > 0:
+        inside = np.flatnonzero(((points - points[random.integers(len(points))]) ** 2).sum(1) <= random.uniform(*radii) ** 2)
+        left -= len(inside)
+        yield inside
+
+
+def cameras(path):
+    """Positions in each fragment's frame, by fragment."""
+    out = {}
+    for values in map(str.split, path.read_text().splitlines() if path.exists() else []):
+        out.setdefault(int(values[0]), []).append([float(v) for v in values[2:5]])
+    return out
 
 
 def main():
@@ -41,23 +64,44 @@ def main():
     parser.add_argument("out", type=pathlib.Path)
     parser.add_argument("--drift", type=float, default=0.0)
     parser.add_argument("--noise", type=float, default=0.0)
+    parser.add_argument("--bumps", type=float, default=0.0)
+    parser.add_argument("--holes", type=float, default=0.0)
+    parser.add_argument("--flying", type=float, default=0.0)
     parser.add_argument("--seed", type=int, default=1)
     arguments = parser.parse_args()
+    for name in ("holes", "flying"):
+        if not 0 <= getattr(arguments, name) < 1:
+            parser.error(f"--{name} is {getattr(arguments, name)}, not a share in [0, 1)")
     if not list(arguments.scene.glob("cloud_bin_*.ply")):
         sys.exit(f"error: {arguments.scene}: no cloud_bin_<i>.ply")
     if arguments.out.exists() and arguments.out.samefile(arguments.scene):
         sys.exit(f"error: {arguments.out} is the scene itself")
+    viewpoints = cameras(arguments.scene / "cameras.txt")
     arguments.out.mkdir(parents=True, exist_ok=True)
     for file in sorted(arguments.scene.iterdir()):
         if not file.name.startswith("cloud_bin_") or file.suffix != ".ply":
             shutil.copy(file, arguments.out / file.name)
             continue
         header, vertices = read(file)
-        random = np.random.default_rng([arguments.seed, int(file.stem.rsplit("_", 1)[1])])
+        fragment = int(file.stem.rsplit("_", 1)[1])
+        random = np.random.default_rng([arguments.seed, fragment])
         points = vertices[:, :3].astype(float)
-        points += drift(points, arguments.drift, random) + random.normal(size=points.shape) * arguments.noise
+        points += waves(points, arguments.drift, DRIFT, random) + random.normal(size=points.shape) * arguments.noise
+        if arguments.bumps > 0:
+            points += waves(points, arguments.bumps, BUMPS, random)
+        still = points.copy()
+        for patch in balls(still, arguments.flying, PATCH, random):
+            seen_from = viewpoints.get(fragment, [[0.0, 0.0, 0.0]])
+            towards = np.array(seen_from[random.integers(len(seen_from))]) - still[patch]
+            points[patch] = still[patch] + towards / np.maximum(np.linalg.norm(towards, axis=1, keepdims=True), 1e-9) * random.uniform(*FLIGHT)
         vertices[:, :3] = points
-        (arguments.out / file.name).write_bytes(header + vertices.tobytes())
+        kept = np.ones(len(points), bool)
+        for hole in balls(still, arguments.holes, HOLE, random):
+            kept[hole] = False
+        count = f"element vertex {len(points)}\n".encode()
+        if count not in header:
+            sys.exit(f"error: {file}: {len(points)} vertices, but not by its header")
+        (arguments.out / file.name).write_bytes(header.replace(count, f"element vertex {kept.sum()}\n".encode()) + vertices[kept].tobytes())
 
 
 main()
