@@ -17,10 +17,12 @@ import sys
 
 import numpy as np
 
+from cameras import cameras
+
 WAVES = 24
 DRIFT, BUMPS = (0.7, 3.0), (0.06, 0.25)  # metres, shortest and longest wave
 HOLE, PATCH = (0.05, 0.2), (0.02, 0.06)  # metres, smallest and largest radius
-FLIGHT = (0.02, 0.12)
+FLIGHT = (0.02, 0.12)  # metres before the surface
 
 
 def read(path):
@@ -48,14 +50,6 @@ def balls(points, share, radii, random):
         inside = np.flatnonzero(((points - points[random.integers(len(points))]) ** 2).sum(1) <= random.uniform(*radii) ** 2)
         left -= len(inside)
         yield inside
-
-
-def cameras(path):
-    """Positions in each fragment's frame, by fragment."""
-    out = {}
-    for values in map(str.split, path.read_text().splitlines() if path.exists() else []):
-        out.setdefault(int(values[0]), []).append([float(v) for v in values[2:5]])
-    return out
 
 
 def main():
@@ -87,6 +81,7 @@ def main():
         random = np.random.default_rng([arguments.seed, fragment])
         points = vertices[:, :3].astype(float)
         points += waves(points, arguments.drift, DRIFT, random) + random.normal(size=points.shape) * arguments.noise
+        # What is not asked for draws no numbers, so that scenes without it keep their bytes.
         if arguments.bumps > 0:
             points += waves(points, arguments.bumps, BUMPS, random)
         still = points.copy()

@@ -15,15 +15,7 @@ import sys
 
 import numpy as np
 
-
-def cameras(path):
-    """Positions in each fragment's frame, by fragment."""
-    out = {}
-    for line in path.read_text().splitlines():
-        values = line.split()
-        if values:
-            out.setdefault(int(values[0]), []).append([float(v) for v in values[2:5]])
-    return {fragment: np.array(positions[::5]) for fragment, positions in out.items()}
+from cameras import cameras
 
 
 def towards(points, positions):
@@ -50,8 +42,10 @@ def main():
         return
     import gpureg
 
-    positions = cameras(arguments.scene / "cameras.txt")
+    positions = {fragment: np.array(every[::5]) for fragment, every in cameras(arguments.scene / "cameras.txt").items()}
     for cloud in clouds:
+        if int(cloud.stem.rsplit("_", 1)[1]) not in positions:
+            sys.exit(f"error: {arguments.scene / 'cameras.txt'}: no camera of {cloud.name}")
         points = np.asarray(gpureg.read_point_cloud(cloud).points, np.float64)
         gpureg.write_point_cloud(arguments.out / cloud.name, points, towards(points, positions[int(cloud.stem.rsplit("_", 1)[1])]))
 
