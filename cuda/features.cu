@@ -160,8 +160,7 @@ Features compute_features(Exec& exec, DownsampledClouds& clouds, const DeviceBuf
   return out;
 }
 
-Features compute_wide_features(Exec& exec, const DownsampledClouds& clouds, const DeviceBuffer<Vec3>& normals, const Grids& grids,
-                               const PrepareOptions& options) {
+Features compute_wide_features(Exec& exec, const DownsampledClouds& clouds, const Grids& grids, const PrepareOptions& options) {
   const Segments& segments = clouds.segments;
   Features out;
   std::vector<std::uint8_t> custom;
@@ -176,6 +175,8 @@ Features compute_wide_features(Exec& exec, const DownsampledClouds& clouds, cons
   out.valid = exec.buffer<std::uint8_t>(segments.total());
   const auto custom_on_device = exec.upload(custom);
   const auto offset_on_device = exec.upload(out.offset);
+  const auto normals =
+      estimate_normals(exec, clouds, grids, wide_normal_radius(options.normal_radius, options.feature_radius, options.wide_feature_radius));
   describe(exec, segments, normals, grids, options.wide_feature_radius, offset_on_device.data(), custom_on_device.data(), out);
   return out;
 }

@@ -11,12 +11,11 @@ namespace gpureg::cuda {
 // Preparation, one entry per cloud.
 DownsampledClouds downsample(Exec& exec, Span<const RawCloud> clouds, const PrepareOptions& options);
 Grids build_grids(Exec& exec, const DownsampledClouds& clouds, const PrepareOptions& options);
-DeviceBuffer<Vec3> estimate_normals(Exec& exec, const DownsampledClouds& clouds, const Grids& grids, const PrepareOptions& options);
+DeviceBuffer<Vec3> estimate_normals(Exec& exec, const DownsampledClouds& clouds, const Grids& grids, float radius);
 Features compute_features(Exec& exec, DownsampledClouds& clouds, const DeviceBuffer<Vec3>& normals, const Grids& grids,
                           const PrepareOptions& options);
-/// FPFH of the second radius; empty where there is none.
-Features compute_wide_features(Exec& exec, const DownsampledClouds& clouds, const DeviceBuffer<Vec3>& normals, const Grids& grids,
-                               const PrepareOptions& options);
+/// FPFH of the second radius, of normals of a second radius, too; empty where there is none.
+Features compute_wide_features(Exec& exec, const DownsampledClouds& clouds, const Grids& grids, const PrepareOptions& options);
 ClosestGrids build_closest_grids(Exec& exec, const DownsampledClouds& clouds, const Grids& grids, const PrepareOptions& options);
 DepthMaps build_depth_maps(Exec& exec, Span<const RawCloud> raw, const DownsampledClouds& clouds, const PrepareOptions& options);
 Fronts build_fronts(Exec& exec, const DownsampledClouds& clouds, const DeviceBuffer<Vec3>& normals, const PrepareOptions& options);

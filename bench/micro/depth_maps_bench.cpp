@@ -17,7 +17,7 @@ struct WithNormals {
   explicit WithNormals(EvidenceScene& s)
       : points(cpu::downsample(s.exec, {s.raw, 1}, s.options.prepare)),
         grids(cpu::build_grids(s.exec, points, s.options.prepare)),
-        normals(cpu::estimate_normals(s.exec, points, grids, s.options.prepare)) {}
+        normals(cpu::estimate_normals(s.exec, points, grids, s.options.prepare.normal_radius)) {}
   std::vector<cpu::DownsampledCloud> points;
   std::vector<cpu::Grid> grids;
   std::vector<std::vector<Vec3>> normals;
@@ -36,8 +36,8 @@ void ComputeWideFeatures(benchmark::State& state) {
   EvidenceScene& s = EvidenceScene::get();
   const WithNormals cloud(s);
   for (auto _ : state)
-    benchmark::DoNotOptimize(cpu::compute_wide_features(s.exec, cloud.points, cloud.normals,
-                                                        cloud.grids, s.options.prepare));
+    benchmark::DoNotOptimize(
+        cpu::compute_wide_features(s.exec, cloud.points, cloud.grids, s.options.prepare));
 }
 BENCHMARK(ComputeWideFeatures)->Unit(benchmark::kMillisecond);
 

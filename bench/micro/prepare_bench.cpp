@@ -22,7 +22,7 @@ struct Products {
     const RawCloud raw = test::raw_cloud(s.raw_source);
     clouds = cpu::downsample(s.exec, {&raw, 1}, s.options.prepare);
     grids = cpu::build_grids(s.exec, clouds, s.options.prepare);
-    normals = cpu::estimate_normals(s.exec, clouds, grids, s.options.prepare);
+    normals = cpu::estimate_normals(s.exec, clouds, grids, s.options.prepare.normal_radius);
   }
   std::vector<cpu::DownsampledCloud> clouds;
   std::vector<cpu::Grid> grids;
@@ -39,7 +39,7 @@ BENCHMARK(BuildGrid)->Unit(benchmark::kMillisecond);
 void EstimateNormals(benchmark::State& state) {
   Scene& s = Scene::get();
   const Products p(s);
-  for (auto _ : state) benchmark::DoNotOptimize(cpu::estimate_normals(s.exec, p.clouds, p.grids, s.options.prepare));
+  for (auto _ : state) benchmark::DoNotOptimize(cpu::estimate_normals(s.exec, p.clouds, p.grids, s.options.prepare.normal_radius));
 }
 BENCHMARK(EstimateNormals)->Unit(benchmark::kMillisecond);
 

@@ -20,7 +20,9 @@ struct PointCloudView {
   const float* features = nullptr;     ///< optional: size rows of feature_dimension floats, used instead of FPFH
   std::size_t feature_dimension = 0;   ///< floats per feature, >= 1 where features are given
   std::size_t feature_stride = 0;      ///< floats from one feature to the next; 0: feature_dimension
-  const float* viewpoints = nullptr;   ///< optional: viewpoint_count rows of x, y, z (tight): sensor positions in the cloud's frame
+  /// Optional: viewpoint_count rows of x, y, z (tight): sensor positions in the cloud's frame. Normals of the cloud's own that face away from
+  /// all of them are turned round, unless more than an eighth of the points have such: then the viewpoints are not what it was seen from.
+  const float* viewpoints = nullptr;
   /// 0: normals are turned towards the origin, which also counts as the place that the cloud was seen from, unless the cloud brings normals
   /// of its own: then nothing is known about free space, and no pose is judged by it.
   std::size_t viewpoint_count = 0;

@@ -6,6 +6,12 @@
 
 namespace gpureg {
 
+/// On the host only. The normals that the wide FPFH describes are those of a neighbourhood that is wider by as much: it looks at the cloud as
+/// if that were coarser, where noise has no say. With the normals of the narrow radius each of the two would err by the same.
+inline float wide_normal_radius(float normal_radius, float feature_radius, float wide_feature_radius) {
+  return normal_radius * (wide_feature_radius / feature_radius);
+}
+
 constexpr int kFpfhBins = 11;
 constexpr int kFpfhSize = 3 * kFpfhBins;
 

@@ -57,4 +57,16 @@ GPUREG_HD Vec3 orient_normal(Vec3 normal, Vec3 point, Vec3 guide, Span<const Vec
   return dot(normal, towards) < 0.0f ? -normal : normal;
 }
 
+/// True where the surface shows its back to every viewpoint, from where it cannot have been seen then.
+GPUREG_HD bool faces_away(Vec3 normal, Vec3 point, Span<const Vec3> viewpoints) {
+  for (std::size_t k = 0; k < viewpoints.size; ++k)
+    if (!(dot(normal, viewpoints[k] - point) < 0.0f)) return false;
+  return true;
+}
+
+/// The input's own normals are wrong here and there, mostly along the edges of a fused surface, where one in twenty of a real scan's shows
+/// all cameras its back: those are turned round. Where many do, it is not the normals: the viewpoints are those of another part of the
+/// scan, or of none.
+GPUREG_HD bool turns_back(std::uint32_t facing_away, std::uint32_t points) { return facing_away <= points / 8; }
+
 }  // namespace gpureg

@@ -110,12 +110,18 @@ void describe(Exec& exec, const std::vector<DownsampledCloud>& clouds,
 }  // namespace
 
 std::vector<Features> compute_wide_features(Exec& exec, const std::vector<DownsampledCloud>& clouds,
-                                            const std::vector<std::vector<Vec3>>& normals,
                                             const std::vector<Grid>& grids,
                                             const PrepareOptions& options) {
   std::vector<Features> features(clouds.size());
-  if (options.wide_feature_radius > 0)
-    describe(exec, clouds, normals, grids, options.wide_feature_radius, features);
+  const bool any = std::any_of(clouds.begin(), clouds.end(), [](const DownsampledCloud& cloud) {
+    return cloud.feature_dimension == 0;
+  });
+  if (!any || !(options.wide_feature_radius > 0)) return features;
+  const auto normals =
+      estimate_normals(exec, clouds, grids,
+                       wide_normal_radius(options.normal_radius, options.feature_radius,
+                                          options.wide_feature_radius));
+  describe(exec, clouds, normals, grids, options.wide_feature_radius, features);
   return features;
 }
 

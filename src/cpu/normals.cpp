@@ -3,9 +3,20 @@
 #include "cpu/stages.hpp"
 
 namespace gpureg::cpu {
+namespace {
 
-std::vector<std::vector<Vec3>> estimate_normals(Exec& exec, const std::vector<DownsampledCloud>& clouds, const std::vector<Grid>& grids,
-                                                const PrepareOptions& options) {
+void turn_to_viewpoints(const DownsampledCloud& cloud, std::vector<Vec3>& normals) {
+  if (cloud.guides.empty() || !cloud.viewpoints_given) return;
+  std::vector<std::uint32_t> away;
+  for (std::uint32_t i = 0; i < normals.size(); ++i)
+    if (faces_away(normals[i], cloud.points[i], span_of(cloud.viewpoints))) away.push_back(i);
+  if (!turns_back(static_cast<std::uint32_t>(away.size()), static_cast<std::uint32_t>(normals.size()))) return;
+  for (const std::uint32_t i : away) normals[i] = -normals[i];
+}
+
+}  // namespace
+
+std::vector<std::vector<Vec3>> estimate_normals(Exec& exec, const std::vector<DownsampledCloud>& clouds, const std::vector<Grid>& grids, float radius) {
   std::vector<std::vector<Vec3>> normals(clouds.size());
   for (std::size_t c = 0; c < clouds.size(); ++c) normals[c].resize(clouds[c].points.size());
   exec.parallel_items(clouds.size(), [&](std::size_t c) { return clouds[c].points.size(); }, 256,
@@ -15,9 +26,10 @@ std::vector<std::vector<Vec3>> estimate_normals(Exec& exec, const std::vector<Do
                         for (std::size_t i = begin; i < end; ++i) {
                           const Vec3 p = cloud.points[i];
                           const Vec3 guide = cloud.guides.empty() ? Vec3{0, 0, 0} : cloud.guides[i];
-                          normals[c][i] = orient_normal(plane_normal(grid, p, options.normal_radius), p, guide, span_of(cloud.viewpoints));
+                          normals[c][i] = orient_normal(plane_normal(grid, p, radius), p, guide, span_of(cloud.viewpoints));
                         }
                       });
+  exec.parallel(clouds.size(), [&](std::size_t c) { turn_to_viewpoints(clouds[c], normals[c]); });
   return normals;
 }
 

@@ -11,16 +11,14 @@ namespace gpureg::cpu {
 // Preparation, one entry per cloud.
 std::vector<DownsampledCloud> downsample(Exec& exec, Span<const RawCloud> clouds, const PrepareOptions& options);
 std::vector<Grid> build_grids(Exec& exec, const std::vector<DownsampledCloud>& clouds, const PrepareOptions& options);
-std::vector<std::vector<Vec3>> estimate_normals(Exec& exec, const std::vector<DownsampledCloud>& clouds, const std::vector<Grid>& grids,
-                                                const PrepareOptions& options);
+std::vector<std::vector<Vec3>> estimate_normals(Exec& exec, const std::vector<DownsampledCloud>& clouds, const std::vector<Grid>& grids, float radius);
 std::vector<Features> compute_features(Exec& exec, const std::vector<DownsampledCloud>& clouds,
                                        const std::vector<std::vector<Vec3>>& normals, const std::vector<Grid>& grids,
                                        const PrepareOptions& options);
 std::vector<ClosestGrid> build_closest_grids(Exec& exec, const std::vector<DownsampledCloud>& clouds, const std::vector<Grid>& grids,
                                              const PrepareOptions& options);
-/// FPFH of the second radius; empty where there is none.
-std::vector<Features> compute_wide_features(Exec& exec, const std::vector<DownsampledCloud>& clouds,
-                                            const std::vector<std::vector<Vec3>>& normals, const std::vector<Grid>& grids,
+/// FPFH of the second radius, of normals of a second radius, too; empty where there is none.
+std::vector<Features> compute_wide_features(Exec& exec, const std::vector<DownsampledCloud>& clouds, const std::vector<Grid>& grids,
                                             const PrepareOptions& options);
 std::vector<Visibility> build_depth_maps(Exec& exec, Span<const RawCloud> raw, const std::vector<DownsampledCloud>& clouds,
                                          const PrepareOptions& options);

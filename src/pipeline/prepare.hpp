@@ -14,10 +14,10 @@ auto prepare(Exec& exec, Span<const RawCloud> clouds, const PrepareOptions& opti
   const auto downsampled = exec.mark();
   auto grids = build_grids(exec, points, options);
   const auto gridded = exec.mark();
-  auto normals = estimate_normals(exec, points, grids, options);
+  auto normals = estimate_normals(exec, points, grids, options.normal_radius);
   const auto oriented = exec.mark();
   auto features = compute_features(exec, points, normals, grids, options);
-  auto wide_features = compute_wide_features(exec, points, normals, grids, options);
+  auto wide_features = compute_wide_features(exec, points, grids, options);
   const auto widened = exec.mark();
   auto closest = build_closest_grids(exec, points, grids, options);
   const auto searchable = exec.mark();

@@ -61,8 +61,8 @@ void expect_same_preparation(const std::vector<RawCloud>& raw, const PrepareOpti
     ASSERT_TRUE(same_bytes(expected.cell_start, host(on_cuda, cuda_grids.cell_start.data() + begin + c, expected.cell_start.size())));
   }
 
-  const auto cpu_normals = cpu::estimate_normals(on_cpu, cpu_points, cpu_grids, options);
-  const auto cuda_normals = cuda::estimate_normals(on_cuda, cuda_points, cuda_grids, options);
+  const auto cpu_normals = cpu::estimate_normals(on_cpu, cpu_points, cpu_grids, options.normal_radius);
+  const auto cuda_normals = cuda::estimate_normals(on_cuda, cuda_points, cuda_grids, options.normal_radius);
   for (std::size_t c = 0; c < raw.size(); ++c) {
     SCOPED_TRACE("normals, cloud " + std::to_string(c));
     ASSERT_TRUE(same_bytes(cpu_normals[c], host(on_cuda, cuda_normals.data() + cuda_points.segments.offset[c], cpu_normals[c].size())));
@@ -78,8 +78,8 @@ void expect_same_preparation(const std::vector<RawCloud>& raw, const PrepareOpti
                            one_nan(host(on_cuda, cuda_features.values.data() + cuda_features.offset[c], cpu_features[c].values.size()))));
   }
 
-  auto cpu_wide = cpu::compute_wide_features(on_cpu, cpu_points, cpu_normals, cpu_grids, options);
-  const auto cuda_wide = cuda::compute_wide_features(on_cuda, cuda_points, cuda_normals, cuda_grids, options);
+  auto cpu_wide = cpu::compute_wide_features(on_cpu, cpu_points, cpu_grids, options);
+  const auto cuda_wide = cuda::compute_wide_features(on_cuda, cuda_points, cuda_grids, options);
   for (std::size_t c = 0; c < raw.size(); ++c) {
     SCOPED_TRACE("wide features, cloud " + std::to_string(c));
     ASSERT_EQ(cpu_wide[c].values.size(), cuda_wide.offset[c + 1] - cuda_wide.offset[c]);
@@ -223,6 +223,14 @@ TEST_F(PrepareOnCuda, NormalsViewpointsAndFeaturesOfTheCaller) {
   with_views.viewpoints = &viewpoints[0].x, with_views.viewpoint_count = viewpoints.size();
   with_features.features = features.data(), with_features.feature_dimension = dimension, with_features.feature_stride = dimension + 2;
   expect_same_preparation({plain, with_normals, with_views, with_features}, options);
+  // Normals and viewpoints: few that face away are turned, many are not.
+  RawCloud few = with_normals, many = with_normals;
+  std::vector<Vec3> up(size);
+  for (std::size_t k = 0; k < size; ++k) up[k] = {0, 0, k % 100 < 70 || points[k].x > -0.6f ? 1.0f : -1.0f};
+  const Vec3 eye{0, 0, 5};
+  few.normals = &up[0].x;
+  few.viewpoints = many.viewpoints = &eye.x, few.viewpoint_count = many.viewpoint_count = 1;
+  expect_same_preparation({few, with_normals, many, with_views}, options);
   options = RegistrationOptions::from_voxel_size(0.05f).prepare;
   expect_same_preparation({plain, with_normals, with_views, with_features}, options);
   options.depth_maps = 64;

@@ -88,5 +88,29 @@ TEST(Features, CustomRowsPassThroughAndNaNIsMarked) {
   }
 }
 
+TEST(Features, TheWideOnesSeeNormalsThatAreAsMuchWider) {
+  std::mt19937 random(3);
+  Exec exec(2);
+  PrepareOptions options;
+  const std::vector<Vec3> points = test::bumpy_sheet(random, 20000, 2.0f);
+  const RawCloud raw = test::raw_cloud(points);
+  auto clouds = downsample(exec, {&raw, 1}, options);
+  const auto grids = build_grids(exec, clouds, options);
+  const auto wide = compute_wide_features(exec, clouds, grids, options);
+  PrepareOptions coarse = options;
+  coarse.feature_radius = options.wide_feature_radius;
+  const auto expected = compute_features(exec, clouds, estimate_normals(exec, clouds, grids, 0.1f * (0.4f / 0.25f)), grids, coarse);
+  const auto narrow = compute_features(exec, clouds, estimate_normals(exec, clouds, grids, 0.1f), grids, coarse);
+  ASSERT_EQ(wide[0].values.size(), clouds[0].points.size() * kFpfhSize);
+  EXPECT_EQ(wide[0].values, expected[0].values);
+  EXPECT_EQ(wide[0].valid, expected[0].valid);
+  EXPECT_NE(wide[0].values, narrow[0].values);
+  options.wide_feature_radius = 0;
+  EXPECT_TRUE(compute_wide_features(exec, clouds, grids, options)[0].values.empty());
+  options.wide_feature_radius = 0.4f;
+  clouds[0].feature_dimension = 5;  // the caller's own: nothing to add to them
+  EXPECT_TRUE(compute_wide_features(exec, clouds, grids, options)[0].values.empty());
+}
+
 }  // namespace
 }  // namespace gpureg::cpu

@@ -67,6 +67,33 @@ TEST(Normals, PointAtTheNearestViewpoint) {
   for (const Vec3& n : normals_of(exec, raw, options)) EXPECT_GT(n.z, 0.999f);  // the input's own side wins
 }
 
+// Two by two metres of floor; some of the input's normals, those of the first rows, point down. Returns how many prepared ones do.
+int downward(std::size_t wrong_rows, const std::vector<Vec3>& viewpoints) {
+  std::vector<Vec3> points, normals;
+  for (std::size_t x = 0; x < 40; ++x)
+    for (std::size_t y = 0; y < 40; ++y) {
+      points.push_back({0.05f * static_cast<float>(x), 0.05f * static_cast<float>(y), 0});
+      normals.push_back({0, 0, x < wrong_rows ? -1.0f : 1.0f});
+    }
+  RawCloud raw = test::raw_cloud(points);
+  raw.normals = &normals[0].x;
+  if (!viewpoints.empty()) raw.viewpoints = &viewpoints[0].x, raw.viewpoint_count = viewpoints.size();
+  Exec exec(2);
+  PrepareOptions options;
+  options.voxel_size = 0;
+  int down = 0;
+  for (const Vec3& n : normals_of(exec, raw, options)) down += n.z < 0;
+  return down;
+}
+
+TEST(Normals, ThoseOfTheInputThatNoViewpointCanHaveSeenAreTurned) {
+  EXPECT_EQ(downward(5, {}), 200);                                   // nothing is known
+  EXPECT_EQ(downward(5, {{1, 1, 2}}), 0);                            // an eighth of the floor
+  EXPECT_EQ(downward(5, {{1, 1, 2}, {0, 0, -1}}), 200);              // somebody was in the cellar
+  EXPECT_EQ(downward(6, {{1, 1, 2}}), 240);                          // so many: the viewpoint is wrong
+  EXPECT_EQ(downward(40, {{1, 1, 2}}), 1600);
+}
+
 TEST(Normals, NoneOnALineOrForLonePoints) {
   std::vector<Vec3> line;
   for (int k = 0; k < 100; ++k) line.push_back({0.01f * static_cast<float>(k), 0.02f * static_cast<float>(k), 0});
