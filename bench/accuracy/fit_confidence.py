@@ -63,6 +63,12 @@ def off_by(truth, pose):
     return np.degrees(np.arccos(np.clip((np.trace(e[:3, :3]) - 1) / 2, -1, 1))), np.linalg.norm(e[:3, 3])
 
 
+# Real rooms are full of things that one cloud saw and the other did not look at: where free space is known, up to the second share in
+# front of surfaces says nothing about whether a pose is right, only which of a pair's poses is the better one.
+LEAST_FRONT, LEAST_JUDGED_FRONT = 1e-3, 2e-2
+NEAR_FRONT = 17  # its place among the measures of a model that looks at both
+
+
 def measures(evidence, free_space, fronts):
     """What the model sees of one mode; the library computes the same (src/api/confidence.cpp)."""
     log = lambda value, least: np.log(max(value, least))  # noqa: E731
@@ -80,9 +86,10 @@ def measures(evidence, free_space, fronts):
     if fronts:
         reach, around, back = evidence["reach"], evidence["around"], evidence["at_back"]
         alike = [o / max(r, 1e-6) for o, r in zip(overlap, reach)]
-        out += [log(sum(evidence["near_front"]), 1e-3), log(sum(evidence["far_front"]), 1e-3), min(alike), max(alike), max(around), min(around)]
+        out += [log(sum(evidence["near_front"]), LEAST_FRONT), min(alike), max(alike), max(around), min(around)]
         # Where free space is known it says the rest; without, how much is in front or behind beside what touches.
         if not free_space:
+            out.append(log(sum(evidence["far_front"]), LEAST_FRONT))
             in_front = [n + f for n, f in zip(evidence["near_front"], evidence["far_front"])]
             beside = lambda shares: [s / max(s + r, 1e-6) for s, r in zip(shares, reach)]  # noqa: E731
             out += [max(beside(in_front)), min(beside(in_front)), log(sum(back), 1e-3), max(beside(back)), min(beside(back))]
@@ -179,6 +186,14 @@ class Logistic:
         return x @ self.weights + self.bias
 
 
+def judged(x, model):
+    """Of the measures by which a mode is ranked, those by which the best one is judged."""
+    x = x.copy()
+    if all(model):
+        x[NEAR_FRONT] = max(x[NEAR_FRONT], np.log(LEAST_JUDGED_FRONT))
+    return x
+
+
 def second_view(run, model, first):
     """Measures of the best mode of each pair, its logit, its margin over the best rival, and how many modes there are of those that were
     refined (many poses that end in one place agree; where little holds them, each ends in its own); which mode it is; its share."""
@@ -192,7 +207,7 @@ def second_view(run, model, first):
         share.append(1 / np.exp(own - own[k]).sum())
         logits = np.clip(own, -14, 14)
         rival = max([v for i, v in enumerate(logits) if i != k], default=-14.0)
-        rows.append(np.r_[x[k], logits[k], logits[k] - rival, len(x) / run.refined])
+        rows.append(np.r_[judged(x[k], model), logits[k], logits[k] - rival, len(x) / run.refined])
         best.append(k)
     return np.array(rows), best, np.array(share)
 

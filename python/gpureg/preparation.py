@@ -37,8 +37,9 @@ def prepare(
     features : (N, D) array, optional
         Features of your own instead of FPFH, 1 <= D <= 4096.
     viewpoints : (V, 3) array, optional
-        Sensor positions in the cloud's frame, towards which normals are turned where none are given.
-        Default: the origin.
+        Sensor positions in the cloud's frame, towards which normals are turned where none are given,
+        and from which free space was seen. Given normals that face away from all of them are turned
+        round, unless more than an eighth do. Default: the origin.
     options : PrepareOptions, optional
         Must suit the options of the alignment: see ``RegistrationOptions.prepare``.
     context : Context, optional

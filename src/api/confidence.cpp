@@ -25,15 +25,23 @@ void add_free_space(const PoseEvidence& e, std::vector<double>& out) {
     out.push_back(v);
 }
 
-void add_fronts(const PoseEvidence& e, bool free_space, std::vector<double>& out) {
+/// Real rooms are full of things that one cloud saw and the other did not look at: where free space is known, up to that share in front of
+/// surfaces says nothing about whether a pose is right, only which of a pair's poses is the better one.
+constexpr double kLeastFront = 1e-3, kLeastJudgedFront = 2e-2;
+
+enum class Question { which_is_best, is_it_right };
+
+void add_fronts(const PoseEvidence& e, bool free_space, Question question, std::vector<double>& out) {
   const auto share = [](double part, double whole) { return part / std::max(whole, 1e-6); };
   // Of what touches, how much does so from the same side.
   const double source_alike = share(e.source_overlap, e.source_reach), target_alike = share(e.target_overlap, e.target_reach);
-  for (const double v : {at_least(e.source_near_front + e.target_near_front, 1e-3), at_least(e.source_far_front + e.target_far_front, 1e-3),
-                         std::min(source_alike, target_alike), std::max(source_alike, target_alike), std::max(e.source_around, e.target_around),
+  const double least = free_space && question == Question::is_it_right ? kLeastJudgedFront : kLeastFront;
+  for (const double v : {at_least(e.source_near_front + e.target_near_front, least), std::min(source_alike, target_alike),
+                         std::max(source_alike, target_alike), std::max(e.source_around, e.target_around),
                          std::min(e.source_around, e.target_around)})
     out.push_back(v);
   if (free_space) return;  // which says the rest
+  out.push_back(at_least(e.source_far_front + e.target_far_front, kLeastFront));
   const auto beside = [&](double part, double reach) { return share(part, part + reach); };
   const double source_front = beside(e.source_near_front + e.source_far_front, e.source_reach);
   const double target_front = beside(e.target_near_front + e.target_far_front, e.target_reach);
@@ -44,7 +52,7 @@ void add_fronts(const PoseEvidence& e, bool free_space, std::vector<double>& out
 }
 
 /// What the model sees of one mode; bench/accuracy/fit_confidence.py computes the same.
-std::vector<double> measures(const PoseEvidence& e, bool free_space, bool fronts) {
+std::vector<double> measures(const PoseEvidence& e, bool free_space, bool fronts, Question question) {
   const double low = std::min(e.source_overlap, e.target_overlap);
   const double low_balanced = std::min(e.source_balanced_overlap, e.target_balanced_overlap);
   const double high_balanced = std::max(e.source_balanced_overlap, e.target_balanced_overlap);
@@ -54,7 +62,7 @@ std::vector<double> measures(const PoseEvidence& e, bool free_space, bool fronts
                           at_least(high_balanced, 1e-3),    at_least(low, 1e-3),               at_least(e.stiffness[0], 1e-2),
                           at_least(e.stiffness[1], 1e-2),   volume};
   if (free_space) add_free_space(e, out);
-  if (fronts) add_fronts(e, free_space, out);
+  if (fronts) add_fronts(e, free_space, question, out);
   return out;
 }
 
@@ -99,7 +107,7 @@ double probability(double logit_value) { return 1.0 / (1.0 + std::exp(-logit_val
 Likeliest likeliest_of(const std::vector<PoseEvidence>& evidence) {
   const Knowledge known = known_of(evidence);
   std::vector<double> value;
-  for (const PoseEvidence& e : evidence) value.push_back(logit(known.model.ranking, measures(e, known.free_space, known.fronts)));
+  for (const PoseEvidence& e : evidence) value.push_back(logit(known.model.ranking, measures(e, known.free_space, known.fronts, Question::which_is_best)));
   const auto most = std::max_element(value.begin(), value.end());
   return {static_cast<std::size_t>(most - value.begin()), *most};
 }
@@ -110,9 +118,9 @@ void set_confidences(std::vector<RegistrationMode>& modes, std::uint32_t refined
   std::vector<PoseEvidence> evidence;
   for (const RegistrationMode& mode : modes) evidence.push_back(mode.evidence);
   const Knowledge known = known_of(evidence);
-  const auto seen = [&](const RegistrationMode& mode) { return measures(mode.evidence, known.free_space, known.fronts); };
+  const auto seen = [&](const RegistrationMode& mode, Question question) { return measures(mode.evidence, known.free_space, known.fronts, question); };
   std::vector<std::pair<double, std::size_t>> order;
-  for (std::size_t k = 0; k < modes.size(); ++k) order.emplace_back(logit(known.model.ranking, seen(modes[k])), k);
+  for (std::size_t k = 0; k < modes.size(); ++k) order.emplace_back(logit(known.model.ranking, seen(modes[k], Question::which_is_best)), k);
   std::stable_sort(order.begin(), order.end(), [](const auto& a, const auto& b) { return a.first > b.first; });
   std::vector<RegistrationMode> out;
   std::vector<double> own, rank;
@@ -126,7 +134,7 @@ void set_confidences(std::vector<RegistrationMode>& modes, std::uint32_t refined
   for (std::size_t k = 0; k < out.size(); ++k) {
     RegistrationMode& mode = out[k];
     const double rival = k > 0 ? rank[0] : out.size() > 1 ? rank[1] : -14.0;
-    std::vector<double> x = seen(mode);
+    std::vector<double> x = seen(mode, Question::is_it_right);
     x.push_back(rank[k]);
     x.push_back(rank[k] - rival);
     x.push_back(apart);
