@@ -135,7 +135,7 @@ class Run:
                   if self.free or not model[0]}
 
 
-CHANGED_WEIGHT, MOST_CHANGED = 0.06, 0.1
+CHANGED_WEIGHT, MOST_CHANGED = 0.12, 0.1
 
 
 class ChangedRun:
