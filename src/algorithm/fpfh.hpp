@@ -7,9 +7,11 @@
 namespace gpureg {
 
 /// On the host only. The normals that the wide FPFH describes are those of a neighbourhood that is wider by as much: it looks at the cloud as
-/// if that were coarser, where noise has no say. With the normals of the narrow radius each of the two would err by the same.
+/// if that were coarser, where noise has no say. With the normals of the narrow radius each of the two would err by the same. At most what
+/// prepare.normal_radius may be: cells are half a feature radius wide, and a neighbourhood of many thousands of them would take hours.
 inline float wide_normal_radius(float normal_radius, float feature_radius, float wide_feature_radius) {
-  return normal_radius * (wide_feature_radius / feature_radius);
+  const float wide = normal_radius * (wide_feature_radius / feature_radius), most = 4.0f * feature_radius;
+  return wide < most ? wide : most;
 }
 
 constexpr int kFpfhBins = 11;

@@ -105,6 +105,8 @@ TEST(Features, TheWideOnesSeeNormalsThatAreAsMuchWider) {
   EXPECT_EQ(wide[0].values, expected[0].values);
   EXPECT_EQ(wide[0].valid, expected[0].valid);
   EXPECT_NE(wide[0].values, narrow[0].values);
+  EXPECT_EQ(wide_normal_radius(0.1f, 0.25f, 0.4f), 0.1f * (0.4f / 0.25f));
+  EXPECT_EQ(wide_normal_radius(0.1f, 0.01f, 0.4f), 0.04f);  // narrow cells, of which a wide neighbourhood would be millions
   options.wide_feature_radius = 0;
   EXPECT_TRUE(compute_wide_features(exec, clouds, grids, options)[0].values.empty());
   options.wide_feature_radius = 0.4f;
