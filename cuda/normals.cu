@@ -40,7 +40,7 @@ void turn_to_viewpoints(Exec& exec, const DownsampledClouds& clouds, const Span<
   constexpr unsigned kThreads = 128;
   const Segments& segments = clouds.segments;
   std::vector<std::uint8_t> asks;
-  for (const CloudFacts& facts : clouds.facts) asks.push_back(facts.has_guides && facts.viewpoints_given);
+  for (const CloudFacts& facts : clouds.facts) asks.push_back(facts.turns_normals);
   if (std::find(asks.begin(), asks.end(), 1) == asks.end()) return;
   const auto asks_on_device = exec.upload(asks);
   const auto away = exec.buffer<std::uint8_t>(segments.total());

@@ -26,7 +26,7 @@ struct CloudFacts {
   Vec3 lo{0, 0, 0}, hi{0, 0, 0};             ///< corners of the raw points' box, local
   std::uint64_t input_points = 0, invalid_points = 0;
   std::vector<Vec3> viewpoints;              ///< local, at least one
-  bool viewpoints_given = false;             ///< else the origin stands for them
+  bool turns_normals = false;                ///< the input's, by the viewpoints
   std::uint32_t feature_dimension = 0;       ///< of the input; 0: none
   bool has_guides = false;
   std::size_t feature_offset = 0;            ///< floats before this cloud's input features

@@ -22,6 +22,7 @@ struct PointCloudView {
   std::size_t feature_stride = 0;      ///< floats from one feature to the next; 0: feature_dimension
   /// Optional: viewpoint_count rows of x, y, z (tight): sensor positions in the cloud's frame. Normals of the cloud's own that face away from
   /// all of them are turned round, unless more than an eighth of the points have such: then the viewpoints are not what it was seen from.
+  /// With PrepareOptions::depth_maps 0 they keep their side, too.
   const float* viewpoints = nullptr;
   /// 0: normals are turned towards the origin, which also counts as the place that the cloud was seen from, unless the cloud brings normals
   /// of its own: then nothing is known about free space, and no pose is judged by it.

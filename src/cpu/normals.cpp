@@ -6,7 +6,7 @@ namespace gpureg::cpu {
 namespace {
 
 void turn_to_viewpoints(const DownsampledCloud& cloud, std::vector<Vec3>& normals) {
-  if (cloud.guides.empty() || !cloud.viewpoints_given) return;
+  if (!cloud.turns_normals) return;
   std::vector<std::uint32_t> away;
   for (std::uint32_t i = 0; i < normals.size(); ++i)
     if (faces_away(normals[i], cloud.points[i], span_of(cloud.viewpoints))) away.push_back(i);

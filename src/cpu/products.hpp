@@ -25,7 +25,7 @@ struct DownsampledCloud {
   std::vector<float> features;       ///< empty, or the mean input feature of each point
   std::uint32_t feature_dimension = 0;
   std::vector<Vec3> viewpoints;      ///< local, at least one
-  bool viewpoints_given = false;     ///< else the origin stands for them
+  bool turns_normals = false;        ///< the input's, by the viewpoints
 };
 
 struct CellTable {

@@ -68,7 +68,7 @@ TEST(Normals, PointAtTheNearestViewpoint) {
 }
 
 // Two by two metres of floor; some of the input's normals, those of the first rows, point down. Returns how many prepared ones do.
-int downward(std::size_t wrong_rows, const std::vector<Vec3>& viewpoints) {
+int downward(std::size_t wrong_rows, const std::vector<Vec3>& viewpoints, std::uint32_t depth_maps = 10) {
   std::vector<Vec3> points, normals;
   for (std::size_t x = 0; x < 40; ++x)
     for (std::size_t y = 0; y < 40; ++y) {
@@ -81,6 +81,7 @@ int downward(std::size_t wrong_rows, const std::vector<Vec3>& viewpoints) {
   Exec exec(2);
   PrepareOptions options;
   options.voxel_size = 0;
+  options.depth_maps = depth_maps;
   int down = 0;
   for (const Vec3& n : normals_of(exec, raw, options)) down += n.z < 0;
   return down;
@@ -92,6 +93,7 @@ TEST(Normals, ThoseOfTheInputThatNoViewpointCanHaveSeenAreTurned) {
   EXPECT_EQ(downward(5, {{1, 1, 2}, {0, 0, -1}}), 200);              // somebody was in the cellar
   EXPECT_EQ(downward(6, {{1, 1, 2}}), 240);                          // so many: the viewpoint is wrong
   EXPECT_EQ(downward(40, {{1, 1, 2}}), 1600);
+  EXPECT_EQ(downward(5, {{1, 1, 2}}, 0), 200);                       // as the paper does: nobody asks the viewpoints
 }
 
 TEST(Normals, NoneOnALineOrForLonePoints) {
