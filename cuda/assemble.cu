@@ -141,12 +141,14 @@ std::vector<std::shared_ptr<CudaCloud>> assemble(Exec& exec, const DownsampledCl
       bytes += (more + 255) / 256 * 256;
       return at;
     };
-    const auto reserve_aids = [&](std::uint32_t dimension) {
+    const HalfCopy copy = facts.feature_dimension == 0 ? HalfCopy::turned : HalfCopy::plain;
+    const auto reserve_aids = [&](std::uint32_t dimension, HalfCopy copy_of) {
       FeatureAidsPlaces at{};
-      for (int k = 0; k < FeatureAidsPlaces::kArrays; ++k) at.begin[k] = reserve(feature_aids_bytes(k, n, dimension));
+      for (int k = 0; k < FeatureAidsPlaces::kArrays; ++k) at.begin[k] = reserve(feature_aids_bytes(k, n, dimension, copy_of));
       return at;
     };
-    const auto aids = reserve_aids(cloud->feature_dimension), wide_aids = reserve_aids(has_wide ? wide_features.dimension[c] : 0);
+    const auto aids = reserve_aids(cloud->feature_dimension, copy);
+    const auto wide_aids = reserve_aids(has_wide ? wide_features.dimension[c] : 0, HalfCopy::turned);
     const std::size_t balanced = reserve(n * sizeof(std::uint32_t));
     const std::size_t copied = bytes;
     const ScoringLayout layout = scoring_layout(*cloud, closest.block_range[c]);
@@ -174,16 +176,16 @@ std::vector<std::shared_ptr<CudaCloud>> assemble(Exec& exec, const DownsampledCl
     char* const memory = cloud->data.data();
     balance.push_back(reinterpret_cast<std::uint32_t*>(memory + balanced));
     view.balance = balance.back();
-    const auto measure = [&](FeatureAids& to, const FeatureAidsPlaces& at, bool centred, const float* rows, const std::uint8_t* valid,
+    const auto measure = [&](FeatureAids& to, const FeatureAidsPlaces& at, HalfCopy copy_of, const float* rows, const std::uint8_t* valid,
                              std::uint32_t dimension, std::uint32_t* extreme) {
-      if (half_width(dimension) == 0) return;
-      to = feature_aids_at(memory, at, centred);
+      if (half_width(dimension, copy_of) == 0) return;
+      to = feature_aids_at(memory, at, copy_of);
       features_to_measure.push_back({rows, valid, view.size, dimension, to, extreme});
     };
-    measure(cloud->narrow_aids, aids, facts.feature_dimension == 0, view.features, view.has_feature, view.feature_dimension,
+    measure(cloud->narrow_aids, aids, copy, view.features, view.has_feature, view.feature_dimension,
             &counts.data()[c].extreme);
     if (has_wide)
-      measure(cloud->wide_aids, wide_aids, true, view.wide_features, view.has_wide_feature, wide_features.dimension[c],
+      measure(cloud->wide_aids, wide_aids, HalfCopy::turned, view.wide_features, view.has_wide_feature, wide_features.dimension[c],
               &counts.data()[c].extreme_wide);
     cloud->blocks = reinterpret_cast<const Cell*>(part[7].to);
     place_scoring_data(layout, closest.geometry[c], cloud->data.data() + copied, *cloud);

@@ -21,7 +21,7 @@ struct FeatureSlot : FeaturesToMeasure {
 };
 
 __device__ float component(const FeatureSlot& s, const float* row, std::uint32_t d) {
-  return d < s.dimension ? row[d] - (s.aids.centred ? center_of_fpfh(d) : 0.0f) : 0.0f;
+  return d < s.dimension ? row[d] - (s.aids.copy == HalfCopy::turned ? center_of_fpfh(d) : 0.0f) : 0.0f;
 }
 
 __device__ std::uint32_t place_of(const FeatureSlot& s, const float* row) {
@@ -32,7 +32,7 @@ __device__ std::uint32_t place_of(const FeatureSlot& s, const float* row) {
 
 __global__ void find_largest(const FeatureSlot* slots) {
   const FeatureSlot s = slots[blockIdx.y];
-  if (s.aids.centred) return;  // at most 100
+  if (s.aids.copy == HalfCopy::turned) return;  // at most 100
   std::uint32_t largest = 0;
   for (std::uint32_t i = blockIdx.x * blockDim.x + threadIdx.x; i < s.size; i += gridDim.x * blockDim.x)
     for (std::uint32_t d = 0; s.valid[i] && d < s.dimension; ++d)
@@ -50,23 +50,41 @@ __device__ float scale_to_half(std::uint32_t largest) {
 /// What the feature search reads beside the features: copies for the tensor cores, and how far off their products may be.
 __global__ void measure_features(const FeatureSlot* slots) {
   const FeatureSlot s = slots[blockIdx.y];
-  const float scale = s.aids.centred ? 8.0f : scale_to_half(*s.largest);
+  const float scale = s.aids.copy == HalfCopy::turned ? 8.0f : scale_to_half(*s.largest);
   std::uint32_t extreme = 0;
   for (std::uint32_t i = blockIdx.x * blockDim.x + threadIdx.x; i < s.size; i += gridDim.x * blockDim.x) {
     const float* row = s.features + static_cast<std::size_t>(i) * s.dimension;
     const bool valid = s.valid[i];
-    float square = 0.0f, lost = 0.0f;
-    for (std::uint32_t d = 0; d < s.half_width; ++d) {
-      const float v = valid ? component(s, row, d) * scale : 0.0f;
+    float square = 0.0f, rest = 0.0f, lost = 0.0f;
+    std::uint16_t* const copy = s.aids.half + static_cast<std::size_t>(i) * s.half_width;
+    const auto value = [&](std::uint32_t d) { return valid ? component(s, row, d) * scale : 0.0f; };
+    // Writes the first 11 bits and returns what comes after them.
+    const auto put_half = [&](std::uint32_t d, float v) {
       const __half h = __float2half_rn(v);
-      const float difference = v - __half2float(h);
-      square = fmaf(v, v, square);
+      copy[d] = __half_as_ushort(h);
+      return v - __half2float(h);
+    };
+    const auto leave_out = [&](float v) { rest = fmaf(v, v, rest), lost = fmaf(v, v, lost); };
+    const auto put = [&](std::uint32_t d, float v) {
+      const float difference = put_half(d, v);
+      rest = fmaf(v, v, rest);
       lost = fmaf(difference, difference, lost);
-      s.aids.half[static_cast<std::size_t>(i) * s.half_width + d] = __half_as_ushort(h);
+    };
+    if (s.aids.copy == HalfCopy::turned) {
+      const auto put_axis = [&](float v) {
+        put_half(kAxisPlace + 2, v);
+        put_half(kAxisPlace + 1, put_half(kAxisPlace, v));
+        square = v * v;
+      };
+      turn_fpfh([&](int d) { return value(static_cast<std::uint32_t>(d)); }, [&](int k, float v) { put(static_cast<std::uint32_t>(k), v); }, put_axis,
+                leave_out);
+    } else {
+      for (std::uint32_t d = 0; d < s.half_width; ++d) put(d, value(d));
     }
+    square = square + rest;
     for (std::uint32_t d = 0; d < s.padded_width; ++d)
       s.aids.padded[static_cast<std::size_t>(i) * s.padded_width + d] = valid && d < s.dimension ? row[d] : 0.0f;
-    const float error = product_error(square, lost);
+    const float error = product_error(square, rest, lost);
     s.aids.error[i] = error;
     s.aids.square[i] = valid ? make_float2(square - error, square + error) : make_float2(kInfinity, kInfinity);
     if (valid) atomicMin(s.first + place_of(s, row), i);
@@ -94,17 +112,18 @@ __global__ void find_repeated_features(const FeatureSlot* slots) {
 
 }  // namespace
 
-std::size_t feature_aids_bytes(int k, std::size_t size, std::uint32_t dimension) {
-  if (half_width(dimension) == 0) return 0;
-  const std::size_t bytes[FeatureAidsPlaces::kArrays] = {size * half_width(dimension) * sizeof(std::uint16_t), size * padded_width(dimension) * sizeof(float),
+std::size_t feature_aids_bytes(int k, std::size_t size, std::uint32_t dimension, HalfCopy copy) {
+  const std::size_t width = half_width(dimension, copy);
+  if (width == 0 || dimension == 0) return 0;
+  const std::size_t bytes[FeatureAidsPlaces::kArrays] = {size * width * sizeof(std::uint16_t), size * padded_width(dimension) * sizeof(float),
                                                          size * sizeof(float2), size * sizeof(float), sizeof(float)};
   return bytes[k];
 }
 
-FeatureAids feature_aids_at(char* memory, const FeatureAidsPlaces& places, bool centred) {
+FeatureAids feature_aids_at(char* memory, const FeatureAidsPlaces& places, HalfCopy copy) {
   const auto at = [&](int k) { return memory + places.begin[k]; };
   return {reinterpret_cast<std::uint16_t*>(at(0)), reinterpret_cast<float*>(at(1)), reinterpret_cast<float2*>(at(2)), reinterpret_cast<float*>(at(3)),
-          reinterpret_cast<float*>(at(4)), centred};
+          reinterpret_cast<float*>(at(4)), copy};
 }
 
 void fill_feature_aids(Exec& exec, const std::vector<FeaturesToMeasure>& clouds) {
@@ -112,7 +131,7 @@ void fill_feature_aids(Exec& exec, const std::vector<FeaturesToMeasure>& clouds)
   std::vector<FeatureSlot> slots;
   std::size_t places = 0;
   for (const FeaturesToMeasure& c : clouds) {
-    slots.push_back({c, half_width(c.dimension), padded_width(c.dimension), nullptr, nullptr, 4 * c.size + 1});
+    slots.push_back({c, half_width(c.dimension, c.aids.copy), padded_width(c.dimension), nullptr, nullptr, 4 * c.size + 1});
     places += slots.back().places;
   }
   const auto first = exec.filled<std::uint32_t>(places, 0xff);

@@ -16,8 +16,8 @@ struct FeatureAidsPlaces {
 };
 
 /// Bytes of array k for so many features; 0 where the dimension forbids it.
-std::size_t feature_aids_bytes(int k, std::size_t size, std::uint32_t dimension);
-FeatureAids feature_aids_at(char* memory, const FeatureAidsPlaces& places, bool centred);
+std::size_t feature_aids_bytes(int k, std::size_t size, std::uint32_t dimension, HalfCopy copy);
+FeatureAids feature_aids_at(char* memory, const FeatureAidsPlaces& places, HalfCopy copy);
 
 /// Features of one cloud; all pointers on the device.
 struct FeaturesToMeasure {

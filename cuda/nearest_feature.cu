@@ -150,9 +150,9 @@ DeviceBuffer<std::uint32_t> nearest_features(Exec& exec, const std::vector<Featu
   // All bits set is greater than every answer, and its index is kNoValue.
   auto best = exec.filled<unsigned long long>(answers, 0xff);
   bool filterable = exec.compute_capability() >= 80;
-  for (const FeatureQuery& f : queries) filterable = filterable && f.query_half && f.row_half && f.dimension == queries[0].dimension;
+  for (const FeatureQuery& f : queries) filterable = filterable && f.query_half && f.row_half && f.dimension == queries[0].dimension && f.copy == queries[0].copy;
   if (filterable) {
-    filter_nearest(exec, batch.data(), entries, most_queries, most_rows, queries[0].dimension, answers, best.data());
+    filter_nearest(exec, batch.data(), entries, most_queries, most_rows, queries[0].dimension, queries[0].copy, answers, best.data());
   } else {
     const std::uint32_t rows_per_part = rows_of_part(exec, blocks_for(most_queries, kQueries) * std::size_t(entries), most_rows, kRows);
     nearest_one<<<dim3(blocks_for(most_queries, kQueries), blocks_for(most_rows, rows_per_part), entries), kThreads, 0, exec.stream()>>>(

@@ -8,8 +8,9 @@
 
 // Exact nearest features at the speed of the tensor cores. |q - r|^2 = |q|^2 + |r|^2 - 2 q.r, and what rounding q and r to binary16 does to
 // that is bounded by a term of q and a term of r (product_error()). So for each query an upper bound of its nearest distance comes out of a
-// first pass over all rows, and a second pass lists the rows whose lower bound is not above it (4 of 5,000 for FPFH). Those are measured by
-// the very chain of fmaf that defines the distance, so the answer has the bits of an exhaustive search.
+// first pass over every fourth row, and a second pass over all lists the rows whose lower bound is not above it (4 of 5,000 for FPFH, 1.2 if
+// the first pass saw all). Those are measured by the very chain of fmaf that defines the distance, so the answer has the bits of an
+// exhaustive search.
 namespace gpureg::cuda {
 namespace {
 
@@ -19,12 +20,15 @@ constexpr int kTiles = 4;                          // of 16 queries, of a warp
 constexpr int kQueriesPerWarp = 16 * kTiles;
 constexpr int kQueries = kWarps * kQueriesPerWarp;
 constexpr int kRows = 64;                          // of a tile in shared memory
-constexpr int kQueue = 32 + 8 * kQueriesPerWarp;   // what waits plus what one step can add
-constexpr int kRowBits = 26;                       // of an entry of the queue; the rest: the query
+constexpr std::uint32_t kStep = 4;                 // of the rows that the first pass looks at: rows near each other have features alike
+constexpr std::uint32_t kFull = 32;                // of a warp's queue: then there is work for every lane
+
+constexpr int blocks_a_multiprocessor(int steps) { return steps <= 2 ? 3 : 2; }
 
 struct FilterBatch {
   const FeatureQuery* queries;
-  std::uint32_t rows_per_part;
+  std::uint32_t tiles_per_part;
+  std::uint32_t step;           // of the rows that a pass looks at
   std::int32_t* bound;          // per answer: smallest upper bound of |r|^2 - 2 q.r, as an ordered integer
   unsigned long long* best;
 };
@@ -86,39 +90,53 @@ __device__ void measure(const FeatureQuery& f, std::uint32_t q, std::uint32_t r,
   if (found < best[f.out + q]) atomicMin(best + f.out + q, found);
 }
 
-/// kSteps: dimensions over 16. First pass (kCollect false): bounds; second: the rows within them. Blocks: x queries, y part of the rows, z
-/// entry.
-template <int kSteps, int kWidth, bool kCollect>
-__global__ void __launch_bounds__(kThreads, 2) filter(FilterBatch batch) {
+/// Rows within the bounds of a lane's queries, of one product of 64 queries and 8 rows: bit 2 m + j is query 8 m + lane / 4 and row
+/// first_row + 2 (lane % 4) + j.
+struct Found {
+  std::uint32_t which, lane, first_row;
+};
+
+template <int kWidth>
+__device__ void measure_found(const FeatureQuery& f, std::uint32_t q_first, Found found, unsigned long long* best) {
+  for (; found.which != 0; found.which &= found.which - 1) {
+    const auto bit = static_cast<std::uint32_t>(__ffs(static_cast<int>(found.which)) - 1);
+    measure<kWidth>(f, q_first + bit / 2 * 8 + found.lane / 4, found.first_row + found.lane % 4 * 2 + bit % 2, best);
+  }
+}
+
+/// kSteps: dimensions of the copies over 16; kWidth: of the rows that are measured. First pass (kCollect false): bounds; second: the rows
+/// within them. Blocks: x queries, y part of the rows, z entry.
+template <int kSteps, int kWidth, HalfCopy kCopy, bool kCollect>
+__global__ void __launch_bounds__(kThreads, blocks_a_multiprocessor(kSteps)) filter(FilterBatch batch) {
   constexpr int kWords = kSteps * 8, kStride = kWords + 4;  // 8 rows begin in 8 different quarters of the banks
   constexpr float kInfinity = 3.402823466e38f * 2.0f;
   __shared__ __align__(16) std::uint32_t tile[2][kRows * kStride];
   __shared__ __align__(16) float square[2][kRows];
-  __shared__ std::uint32_t queue[kCollect ? kWarps : 1][kQueue];
-  __shared__ std::uint32_t queued[kWarps];
+  __shared__ Found queue[kCollect ? kWarps : 1][2 * kFull];
   const FeatureQuery f = batch.queries[blockIdx.z];
-  const std::uint32_t r_first = blockIdx.y * batch.rows_per_part, r_last = min(f.row_count, r_first + batch.rows_per_part);
-  if (blockIdx.x * kQueries >= f.query_count || r_first >= f.row_count) return;
+  const std::uint32_t tiles = (f.row_count + kRows * batch.step - 1) / (kRows * batch.step);
+  const std::uint32_t first_tile = blockIdx.y * batch.tiles_per_part, end_tile = min(tiles, first_tile + batch.tiles_per_part);
+  if (blockIdx.x * kQueries >= f.query_count || first_tile >= tiles) return;
   const int warp = static_cast<int>(threadIdx.x / 32), lane = static_cast<int>(threadIdx.x % 32), row_of_lane = lane / 4, k_of_lane = lane % 4;
   const std::uint32_t q_first = blockIdx.x * kQueries + static_cast<std::uint32_t>(warp * kQueriesPerWarp);
-  if (lane == 0) queued[warp] = 0;
+  std::uint32_t queued = 0;
 
-  const auto fetch = [&](std::uint32_t base, int buffer) {
+  const auto fetch = [&](std::uint32_t row_tile, int buffer) {
     for (int k = static_cast<int>(threadIdx.x); k < kRows * kSteps * 2; k += kThreads) {
       const int row = k / (kSteps * 2), part = k % (kSteps * 2);
-      const std::uint32_t r = min(base + static_cast<std::uint32_t>(row), f.row_count - 1);
+      const std::uint32_t r = min((row_tile * kRows + static_cast<std::uint32_t>(row)) * batch.step, f.row_count - 1);
       __pipeline_memcpy_async(&tile[buffer][row * kStride + part * 4], f.row_half + static_cast<std::size_t>(r) * (kSteps * 16) + part * 8, 16);
     }
     if (threadIdx.x < kRows) {
-      const std::uint32_t r = base + threadIdx.x;
-      if (r < r_last)
+      const std::uint32_t r = (row_tile * kRows + threadIdx.x) * batch.step;
+      if (r < f.row_count)
         __pipeline_memcpy_async(&square[buffer][threadIdx.x], kCollect ? &f.row_square[r].x : &f.row_square[r].y, sizeof(float));
       else
         square[buffer][threadIdx.x] = kInfinity;
     }
     __pipeline_commit();
   };
-  fetch(r_first, 0);
+  fetch(first_tile, 0);
 
   // Tiles of 16 queries, times -2; this lane holds parts of queries row_of_lane and row_of_lane + 8 of each.
   std::uint32_t a[kTiles][kSteps][4];
@@ -136,16 +154,17 @@ __global__ void __launch_bounds__(kThreads, 2) filter(FilterBatch batch) {
     for (int s = 0; s < kSteps; ++s)
 #pragma unroll
       for (int half = 0; half < 2; ++half) {
-        const std::uint32_t two = asks ? query[s * 8 + half * 4] : 0u;
+        std::uint32_t two = asks ? query[s * 8 + half * 4] : 0u;
+        if (kCopy == HalfCopy::turned && s * 8 + half * 4 + k_of_lane == (kAxisPlace + 1) / 2) two = two << 16 | two >> 16;
         const __half2 doubled = __hmul2(*reinterpret_cast<const __half2*>(&two), __floats2half2_rn(-2.0f, -2.0f));
         a[m / 2][s][m % 2 + 2 * half] = *reinterpret_cast<const std::uint32_t*>(&doubled);
       }
   }
 
   int buffer = 0;
-  for (std::uint32_t base = r_first; base < r_last; base += kRows, buffer ^= 1) {
-    if (base + kRows < r_last)
-      fetch(base + kRows, buffer ^ 1);
+  for (std::uint32_t row_tile = first_tile; row_tile < end_tile; ++row_tile, buffer ^= 1) {
+    if (row_tile + 1 < end_tile)
+      fetch(row_tile + 1, buffer ^ 1);
     else
       __pipeline_commit();
     __pipeline_wait_prior(1);
@@ -173,31 +192,29 @@ __global__ void __launch_bounds__(kThreads, 2) filter(FilterBatch batch) {
       bool any = false;
 #pragma unroll
       for (int m = 0; m < 2 * kTiles; ++m) any = any | (fminf(c[m / 2][m % 2 * 2], c[m / 2][m % 2 * 2 + 1]) <= limit[m]);
-      if (any) {
+      const unsigned lanes = __ballot_sync(~0u, any);
+      if (lanes != 0) {
+        if (any) {
+          std::uint32_t which = 0;
 #pragma unroll
-        for (int m = 0; m < 2 * kTiles; ++m)
+          for (int m = 0; m < 2 * kTiles; ++m)
 #pragma unroll
-          for (int j = 0; j < 2; ++j)
-            if (c[m / 2][m % 2 * 2 + j] <= limit[m])
-              queue[warp][atomicAdd(&queued[warp], 1u)] =
-                  static_cast<std::uint32_t>(m * 8 + row_of_lane) << kRowBits | (base - r_first + static_cast<std::uint32_t>(n0 + 2 * k_of_lane + j));
-      }
-      const bool last = n0 + 8 == kRows && base + kRows >= r_last;
-      if (!last && !__any_sync(~0u, any)) continue;
-      __syncwarp();
-      const std::uint32_t waiting = queued[warp];
-      if (waiting >= 32 || last) {
-        for (std::uint32_t k = static_cast<std::uint32_t>(lane); k < waiting; k += 32) {
-          const std::uint32_t entry = queue[warp][k];
-          measure<kWidth>(f, q_first + (entry >> kRowBits), r_first + (entry & ((1u << kRowBits) - 1)), batch.best);
+            for (int j = 0; j < 2; ++j) which |= c[m / 2][m % 2 * 2 + j] <= limit[m] ? 1u << (2 * m + j) : 0u;
+          const auto at = queued + static_cast<std::uint32_t>(__popc(static_cast<int>(lanes & ((1u << lane) - 1))));
+          queue[warp][at] = {which, static_cast<std::uint32_t>(lane), row_tile * kRows + static_cast<std::uint32_t>(n0)};
         }
-        __syncwarp();
-        if (lane == 0) queued[warp] = 0;
+        queued += static_cast<std::uint32_t>(__popc(static_cast<int>(lanes)));
+        if (queued >= kFull) {
+          __syncwarp();
+          queued -= kFull;
+          measure_found<kWidth>(f, q_first, queue[warp][queued + static_cast<std::uint32_t>(lane)], batch.best);
+          __syncwarp();
+        }
       }
-      __syncwarp();
     }
     __syncthreads();
   }
+  if (kCollect && static_cast<std::uint32_t>(lane) < queued) measure_found<kWidth>(f, q_first, queue[warp][lane], batch.best);
   if constexpr (!kCollect) {
 #pragma unroll
     for (int m = 0; m < 2 * kTiles; ++m) {
@@ -209,30 +226,45 @@ __global__ void __launch_bounds__(kThreads, 2) filter(FilterBatch batch) {
   }
 }
 
-template <int kSteps, int kWidth>
-void run(Exec& exec, dim3 grid, const FilterBatch& batch) {
-  filter<kSteps, kWidth, false><<<grid, kThreads, 0, exec.stream()>>>(batch);
+/// How rows are cut into parts, so that the last wave of thread blocks wastes little, and no part is so small that reading the queries counts.
+std::uint32_t tiles_of_part(const Exec& exec, int blocks, std::size_t query_blocks, std::uint32_t rows) {
+  constexpr std::size_t kWaves = 8, kLeast = 6;
+  const std::size_t tiles = blocks_for(rows, kRows), wanted = kWaves * static_cast<std::size_t>(blocks * exec.multiprocessors());
+  const std::size_t parts = std::max<std::size_t>(1, std::min(tiles / kLeast, (wanted + query_blocks - 1) / query_blocks));
+  return static_cast<std::uint32_t>((tiles + parts - 1) / parts);
+}
+
+template <int kSteps, int kWidth, HalfCopy kCopy>
+void run(Exec& exec, unsigned entries, std::uint32_t most_queries, std::uint32_t most_rows, FilterBatch batch) {
+  const unsigned query_blocks = blocks_for(most_queries, kQueries);
+  const auto grid = [&](std::uint32_t step) {
+    batch.step = step;
+    const std::uint32_t rows = blocks_for(most_rows, step);
+    batch.tiles_per_part = tiles_of_part(exec, blocks_a_multiprocessor(kSteps), std::size_t(query_blocks) * entries, rows);
+    return dim3(query_blocks, blocks_for(blocks_for(rows, kRows), batch.tiles_per_part), entries);
+  };
+  const dim3 some = grid(kStep);
+  filter<kSteps, kWidth, kCopy, false><<<some, kThreads, 0, exec.stream()>>>(batch);
   check_launch("filter, bounds");
-  filter<kSteps, kWidth, true><<<grid, kThreads, 0, exec.stream()>>>(batch);
+  const dim3 all = grid(1);
+  filter<kSteps, kWidth, kCopy, true><<<all, kThreads, 0, exec.stream()>>>(batch);
   check_launch("filter, candidates");
 }
 
 }  // namespace
 
 void filter_nearest(Exec& exec, const FeatureQuery* batch, unsigned entries, std::uint32_t most_queries, std::uint32_t most_rows,
-                    std::uint32_t dimensions, std::size_t answers, unsigned long long* best) {
+                    std::uint32_t dimensions, HalfCopy copy, std::size_t answers, unsigned long long* best) {
   // Bytes of 0x7f are an integer above every ordered float.
   const auto bound = exec.filled<std::int32_t>(answers, 0x7f);
-  const unsigned query_blocks = blocks_for(most_queries, kQueries);
-  const std::uint32_t rows_per_part = std::min(rows_of_part(exec, std::size_t(query_blocks) * entries, most_rows, kRows), 1u << kRowBits);
-  const dim3 grid(query_blocks, blocks_for(most_rows, rows_per_part), entries);
-  const FilterBatch filter_batch{batch, rows_per_part, bound.data(), best};
+  const FilterBatch filter_batch{batch, 0, 1, bound.data(), best};
+  if (copy == HalfCopy::turned) return run<kTurnedWidth / 16, 36, HalfCopy::turned>(exec, entries, most_queries, most_rows, filter_batch);
   switch (padded_width(dimensions)) {
-    case 16: return run<1, 16>(exec, grid, filter_batch);
-    case 32: return run<2, 32>(exec, grid, filter_batch);
-    case 36: return run<3, 36>(exec, grid, filter_batch);
-    case 48: return run<3, 48>(exec, grid, filter_batch);
-    default: return run<4, 64>(exec, grid, filter_batch);
+    case 16: return run<1, 16, HalfCopy::plain>(exec, entries, most_queries, most_rows, filter_batch);
+    case 32: return run<2, 32, HalfCopy::plain>(exec, entries, most_queries, most_rows, filter_batch);
+    case 36: return run<3, 36, HalfCopy::plain>(exec, entries, most_queries, most_rows, filter_batch);
+    case 48: return run<3, 48, HalfCopy::plain>(exec, entries, most_queries, most_rows, filter_batch);
+    default: return run<4, 64, HalfCopy::plain>(exec, entries, most_queries, most_rows, filter_batch);
   }
 }
 

@@ -126,6 +126,9 @@ struct ScoringOrder {
   std::uint32_t groups = 0;
 };
 
+/// What binary16 makes of features: the values themselves, or FPFH less its centre, turned, see nearest_feature.hpp.
+enum class HalfCopy : std::uint8_t { plain, turned };
+
 /// What the search reads beside features, see nearest_feature.hpp. Arrays on the device.
 struct FeatureAids {
   std::uint16_t* half = nullptr;             ///< rounded to binary16, times *scale; null where the dimension or a length (over 1e15) forbids it
@@ -133,7 +136,7 @@ struct FeatureAids {
   float2* square = nullptr;                  ///< bounds of the squared length; infinite where a row is not to be found
   float* error = nullptr;                    ///< half of the distance of the bounds
   float* scale = nullptr;                    ///< one for the cloud, a power of two
-  bool centred = false;                      ///< all but padded is of the difference to center_of_fpfh()
+  HalfCopy copy = HalfCopy::plain;           ///< what all but padded is of
 };
 
 /// What the stages read of a fragment: pointers into one piece of memory, and what belongs to them.
