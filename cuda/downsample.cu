@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <algorithm>
 
+#include "algorithm/normal.hpp"
 #include "algorithm/voxel.hpp"
 #include "group.cuh"
 #include "pipeline/checks.hpp"
@@ -169,7 +170,7 @@ CloudFacts facts_of(const RawCloud& raw, const Extent& extent, const PrepareOpti
   if (extent.finite > 0) facts.lo = Vec3{lo[0], lo[1], lo[2]} - origin, facts.hi = Vec3{hi[0], hi[1], hi[2]} - origin;
   for (std::size_t k = 0; k < raw.viewpoint_count; ++k)
     facts.viewpoints.push_back(Vec3{raw.viewpoints[3 * k], raw.viewpoints[3 * k + 1], raw.viewpoints[3 * k + 2]} - origin);
-  facts.turns_normals = raw.normals && raw.viewpoint_count > 0 && options.depth_maps > 0;
+  facts.turns_normals = turns_normals(raw.normals != nullptr, raw.viewpoint_count, options.depth_maps);
   if (facts.viewpoints.empty()) facts.viewpoints.push_back(-origin);
   facts.feature_dimension = raw.features ? static_cast<std::uint32_t>(raw.feature_dimension) : 0;
   facts.has_guides = raw.normals != nullptr;

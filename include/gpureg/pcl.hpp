@@ -33,7 +33,9 @@ PointCloudView view_of(const pcl::PointCloud<PointT>& cloud) {
     view.normal_stride = view.point_stride;
     if (!cloud.empty()) view.normals = &cloud.points.front().normal_x;
   }
-  if (cloud.sensor_origin_.template head<3>().allFinite()) {
+  // PCL's zero is not known from none at all. Without normals the origin is the viewpoint anyway.
+  const auto origin = cloud.sensor_origin_.template head<3>();
+  if (origin.allFinite() && !(view.normals != nullptr && origin.isZero(0))) {
     view.viewpoints = cloud.sensor_origin_.data();
     view.viewpoint_count = 1;
   }

@@ -57,10 +57,15 @@ GPUREG_HD Vec3 orient_normal(Vec3 normal, Vec3 point, Vec3 guide, Span<const Vec
   return dot(normal, towards) < 0.0f ? -normal : normal;
 }
 
-/// True where the surface shows its back to every viewpoint, from where it cannot have been seen then.
+/// True where the surface shows its back to every viewpoint, from where it cannot have been seen then. By ten degrees at least: what is seen
+/// from the side, as a floor far away, is tilted by the noise of its points.
 GPUREG_HD bool faces_away(Vec3 normal, Vec3 point, Span<const Vec3> viewpoints) {
-  for (std::size_t k = 0; k < viewpoints.size; ++k)
-    if (!(dot(normal, viewpoints[k] - point) < 0.0f)) return false;
+  constexpr float kSineSquared = 0.03f;
+  for (std::size_t k = 0; k < viewpoints.size; ++k) {
+    const Vec3 d = viewpoints[k] - point;
+    const float along = dot(normal, d);
+    if (!(along < 0.0f && along * along > kSineSquared * squared_norm(d))) return false;
+  }
   return true;
 }
 
@@ -68,5 +73,8 @@ GPUREG_HD bool faces_away(Vec3 normal, Vec3 point, Span<const Vec3> viewpoints) 
 /// all cameras its back: those are turned round. Where many do, it is not the normals: the viewpoints are those of another part of the
 /// scan, or of none.
 GPUREG_HD bool turns_back(std::uint32_t facing_away, std::uint32_t points) { return facing_away <= points / 8; }
+
+/// On the host only. Both have to be the caller's, and viewpoints asked for evidence (PrepareOptions::depth_maps).
+inline bool turns_normals(bool has_normals, std::size_t viewpoints, std::uint32_t depth_maps) { return has_normals && viewpoints > 0 && depth_maps > 0; }
 
 }  // namespace gpureg

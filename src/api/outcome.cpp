@@ -96,7 +96,11 @@ void add_modes(const PairOutcome& outcome, const PreparedState& source, const Pr
   }
   const ModeOutcome& first = outcome.modes.front();
   const Eigen::Vector3d middle = middle_of(to_frame(swapped ? first.target_moments : first.source_moments, source), origin_of(source));
-  set_confidences(modes, options.evidence.modes, [&](const RegistrationMode& a, const RegistrationMode& b) {
+  const auto points_touching = [&](const RegistrationMode& m) {
+    const ModeOutcome& mode = outcome.modes[m.found_as];
+    return std::min(mode.source.inliers, mode.target.inliers);
+  };
+  set_confidences(modes, options.evidence.modes, points_touching, [&](const RegistrationMode& a, const RegistrationMode& b) {
     const std::uint32_t family = outcome.modes[a.found_as].family;
     const CorrespondenceMoments points = family == outcome.modes[b.found_as].family ? touching(family) : CorrespondenceMoments{};
     if (points.count > 0)

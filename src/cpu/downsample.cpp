@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <limits>
 
+#include "algorithm/normal.hpp"
 #include "algorithm/voxel.hpp"
 #include "cpu/radix_sort.hpp"
 #include "cpu/stages.hpp"
@@ -42,7 +43,7 @@ void downsample_one(const RawCloud& raw, const PrepareOptions& options, Downsamp
   const Vec3 origin{out.origin[0], out.origin[1], out.origin[2]};
 
   for (std::size_t k = 0; k < raw.viewpoint_count; ++k) out.viewpoints.push_back(row(raw.viewpoints, 3, k) - origin);
-  out.turns_normals = raw.normals && raw.viewpoint_count > 0 && options.depth_maps > 0;
+  out.turns_normals = turns_normals(raw.normals != nullptr, raw.viewpoint_count, options.depth_maps);
   if (out.viewpoints.empty()) out.viewpoints.push_back(-origin);
 
   std::vector<Vec3> local(finite.size());

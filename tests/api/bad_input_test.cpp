@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <limits>
+#include <random>
 
 #include "gpureg/registration.hpp"
 #include "support/expect_error.hpp"
@@ -130,6 +132,19 @@ TEST(BadInput, AbsurdScaleAndDensityAreErrorsNotHangs) {
   PrepareOptions keep;
   keep.voxel_size = 0;
   test::expect_error<InvalidArgument>([&] { prepare(context, PointCloudView(dense), keep); }, {"feature_radius"});
+}
+
+TEST(BadInput, SoFewPointsThatAnyPoseWouldDo) {
+  std::mt19937 random(5);
+  std::uniform_real_distribution<float> unit;
+  for (const std::size_t n : {15u, 20u, 40u})
+    for (int k = 0; k < 20; ++k) {
+      std::vector<Eigen::Vector3f> a, b;
+      for (std::size_t i = 0; i < n; ++i) a.emplace_back(unit(random), unit(random), unit(random)), b.emplace_back(unit(random), unit(random), unit(random));
+      const auto options = RegistrationOptions::from_voxel_size(std::pow(1.0f / static_cast<float>(n), 1.0f / 3));
+      const RegistrationResult r = align(Context::cpu(1), PointCloudView(a), PointCloudView(b), options);
+      EXPECT_FALSE(r.aligned()) << n << " points, " << r.score;
+    }
 }
 
 TEST(BadInput, HugeVoxelLeavesTooFewPoints) {

@@ -98,5 +98,13 @@ TEST(PclFeatures, AViewpointThatIsNotFiniteIsLeftOut) {
   EXPECT_EQ(view_of(cloud).viewpoint_count, 0u);
 }
 
+TEST(PclFeatures, AnOriginThatNobodySetIsNoViewpointOfACloudWithNormals) {
+  auto cloud = random_cloud<pcl::PointNormal>(10);
+  EXPECT_EQ(view_of(cloud).viewpoint_count, 0u);
+  cloud.sensor_origin_.x() = 1;
+  EXPECT_EQ(view_of(cloud).viewpoint_count, 1u);
+  EXPECT_EQ(view_of(random_cloud<pcl::PointXYZ>(10)).viewpoint_count, 1u);
+}
+
 }  // namespace
 }  // namespace gpureg

@@ -94,6 +94,7 @@ TEST(Normals, ThoseOfTheInputThatNoViewpointCanHaveSeenAreTurned) {
   EXPECT_EQ(downward(6, {{1, 1, 2}}), 240);                          // so many: the viewpoint is wrong
   EXPECT_EQ(downward(40, {{1, 1, 2}}), 1600);
   EXPECT_EQ(downward(5, {{1, 1, 2}}, 0), 200);                       // as the paper does: nobody asks the viewpoints
+  EXPECT_EQ(downward(5, {{-20, 1, 2}}), 200);                        // seen at six degrees: noise could have tilted them so far
 }
 
 TEST(Normals, NoneOnALineOrForLonePoints) {
