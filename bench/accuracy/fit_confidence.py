@@ -31,7 +31,6 @@ import json
 import pathlib
 
 import numpy as np
-from sklearn.linear_model import LogisticRegression
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 # What a model may look at beside the overlap: free space, fronts of surfaces.
@@ -63,10 +62,10 @@ def off_by(truth, pose):
     return np.degrees(np.arccos(np.clip((np.trace(e[:3, :3]) - 1) / 2, -1, 1))), np.linalg.norm(e[:3, 3])
 
 
-# Real rooms are full of things that one cloud saw and the other did not look at: where free space is known, up to the second share in
-# front of surfaces says nothing about whether a pose is right, only which of a pair's poses is the better one.
+# Real rooms are full of things that one cloud saw and the other did not look at: where free space is known, up to the second sum of both
+# clouds' shares in front of surfaces speaks of which of a pair's poses is the better one, and only through that of whether it is right.
 LEAST_FRONT, LEAST_JUDGED_FRONT = 1e-3, 2e-2
-NEAR_FRONT = 17  # its place among the measures of a model that looks at both
+NEAR_FRONT = 8 + 9  # its place among the measures of a model that looks at both: after the overlap's and those of free space
 
 
 def measures(evidence, free_space, fronts):
@@ -96,6 +95,15 @@ def measures(evidence, free_space, fronts):
     return out
 
 
+FEW = 80  # points that touch
+
+
+def with_so_few_points(evidence, points):
+    """What is left of a confidence where hardly any points touch (src/api/confidence.cpp). points: of the prepared clouds, source and target."""
+    touching = min(share * of for share, of in zip(evidence["overlap"], points))
+    return 1 - np.exp(-(touching / FEW) ** 2)
+
+
 def has_free_space(evidence):
     return max(evidence["seen"]) > 0
 
@@ -123,6 +131,8 @@ class Run:
         trajectory = folder / "poses.txt"
         self.fragments = {k[0]: v for k, v in blocks(trajectory, 5).items()} if trajectory.exists() else {}
         self.modes = [p.get("modes", []) for p in pairs]
+        points = {f["number"]: f["points"] for f in recorded["fragments"]}
+        self.few = [np.array([with_so_few_points(m["evidence"], (points[p["j"]], points[p["i"]])) for m in modes]) for p, modes in zip(pairs, self.modes)]
         self.free = any(m and has_free_space(m[0]["evidence"]) for m in self.modes)
         self.right, self.strict = [], []
         for p, modes in zip(pairs, self.modes):
@@ -174,6 +184,8 @@ class Logistic:
     """
 
     def __init__(self, x, y, weight, strength):
+        from sklearn.linear_model import LogisticRegression  # what only applies a fit needs none
+
         mean, scale = x.mean(0), np.maximum(x.std(0), 1e-9)
         fit = LogisticRegression(C=strength, max_iter=5000).fit((x - mean) / scale, y, weight)
         self.weights = fit.coef_[0] / scale
@@ -239,7 +251,7 @@ def figures(run, model, models):
     confidence = np.zeros(len(best))
     overlapping = np.zeros(len(best))
     found = np.array([b >= 0 for b in best])
-    confidence[found] = np.minimum(1 / (1 + np.exp(-models[1].logit(x))), share)
+    confidence[found] = np.minimum(1 / (1 + np.exp(-models[1].logit(x))), share) * [run.few[k][b] for k, b in enumerate(best) if b >= 0]
     overlapping[found] = np.minimum(1 / (1 + np.exp(-models[2].logit(x))), confidence[found])
     right = np.array([b >= 0 and bool(run.right[k][b]) for k, b in enumerate(best)])
     strict = np.array([b >= 0 and bool(run.strict[k][b]) for k, b in enumerate(best)])
@@ -332,4 +344,5 @@ def main():
         arguments.output.write_text(json.dumps(record, indent=1) + "\n")
 
 
-main()
+if __name__ == "__main__":
+    main()

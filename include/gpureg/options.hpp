@@ -8,14 +8,17 @@ namespace gpureg {
 /// How a raw cloud becomes a PreparedCloud. All lengths in metres (or the unit of the points).
 struct PrepareOptions {
   float voxel_size = 0.05f;     ///< edge of the downsampling voxel, one centroid each (paper: 0.05); 0: keep the points as they are
-  float normal_radius = 0.1f;   ///< neighbourhood of the normal's PCA (paper: 0.1)
+  /// Neighbourhood of the normal's PCA (paper: 0.1). The wide FPFH describes normals of one that is wider by wide_feature_radius /
+  /// feature_radius, at most 4 feature_radius.
+  float normal_radius = 0.1f;
   float feature_radius = 0.25f; ///< neighbourhood of FPFH, also of its SPFH (paper: 0.25)
   /// Cell of the closest-point look-up of alignment; derived from max_correspondence_distance, see RegistrationOptions.
   float search_distance = 0.075f;  ///< farthest neighbour that alignment will ever ask this cloud for
   /// Neighbourhood of a second FPFH, matched beside the first (only where the features are FPFH); 0: none (paper: none). Wide features
   /// find matches where small neighbourhoods look alike: floors, walls.
   float wide_feature_radius = 0.4f;
-  /// Viewpoints that depth maps are made of for free-space tests, evenly chosen among the cloud's; 0: no maps. 110 KB each.
+  /// Viewpoints that depth maps are made of for free-space tests, evenly chosen among the cloud's; 0: no maps, and given normals are
+  /// never turned (PointCloudView::viewpoints). 110 KB each.
   std::uint32_t depth_maps = 10;
   /// How far from its surfaces a cloud tells their front, the side from which they were seen, from their back, for the evidence; 0: not
   /// at all (paper: 0). Half a byte for each cell of a tenth of it in the cloud's box, half a megabyte for a fragment of a room; a box of

@@ -11,14 +11,17 @@ std::vector<Field<PrepareOptions>> prepare_fields() {
   return {
       field("voxel_size", &O::voxel_size,
             "Edge of the downsampling voxel, metres; 0 keeps the points as they are."),
-      field("normal_radius", &O::normal_radius, "Neighbourhood of the normal's PCA, metres."),
+      field("normal_radius", &O::normal_radius,
+            "Neighbourhood of the normal's PCA, metres; of the wide features wider by as much as "
+            "they are."),
       field("feature_radius", &O::feature_radius, "Neighbourhood of FPFH, metres."),
       field("search_distance", &O::search_distance,
             "Farthest neighbour that alignment will ever ask this cloud for, metres."),
       field("wide_feature_radius", &O::wide_feature_radius,
             "Neighbourhood of a second FPFH, metres; 0: none."),
       field("depth_maps", &O::depth_maps,
-            "Viewpoints that depth maps are made of for free-space tests; 0: none."),
+            "Viewpoints that depth maps are made of for free-space tests; 0: none, and given normals "
+            "are never turned."),
       field("front_reach", &O::front_reach,
             "How far from its surfaces a cloud tells their front from their back, metres; 0: not "
             "at all."),

@@ -137,6 +137,15 @@ def agreement():
     return out
 
 
+def few_points():
+    record = load("few_points.json")
+    out = ["| points that touch | poses | confidence before | right | confidence |", "| --- | --- | --- | --- | --- |"]
+    for b in record["bins"]:
+        span = f"{b['from']} to {b['below'] - 1}" if b["below"] else f"{b['from']} or more"
+        out.append(f"| {span} | {b['poses']} | {b['before']:.2f} | {b['right']:.2f} | {b['after']:.2f} |")
+    return [*out, "", source(record) + "."]
+
+
 def closing_loops():
     out = ["| scene | loops of three right poses | of them close, % | loops with a wrong pose | of them close, % |", "| --- | --- | --- | --- | --- |"]
     for scene in load("agreement.json")["scenes"]:
@@ -174,6 +183,6 @@ def accuracy_attempts():
 
 TABLES = {
     "redkitchen": redkitchen, "redkitchen_seeds": redkitchen_seeds, "range_pairs": range_pairs,
-    "other_pairs": other_pairs, "confidence": confidence, "unseen": unseen, "other_sensors": other_sensors, "mistakes": mistakes, "agreement": agreement, "agreement_fresh": agreement_fresh, "closing_loops": closing_loops, "accuracy_sweep": accuracy_sweep,
+    "other_pairs": other_pairs, "confidence": confidence, "unseen": unseen, "other_sensors": other_sensors, "mistakes": mistakes, "agreement": agreement, "agreement_fresh": agreement_fresh, "closing_loops": closing_loops, "few_points": few_points, "accuracy_sweep": accuracy_sweep,
     "accuracy_attempts": accuracy_attempts,
 }

@@ -25,8 +25,8 @@ void add_free_space(const PoseEvidence& e, std::vector<double>& out) {
     out.push_back(v);
 }
 
-/// Real rooms are full of things that one cloud saw and the other did not look at: where free space is known, up to that share in front of
-/// surfaces says nothing about whether a pose is right, only which of a pair's poses is the better one.
+/// Real rooms are full of things that one cloud saw and the other did not look at: where free space is known, up to that sum of both clouds'
+/// shares in front of surfaces speaks of which of a pair's poses is the better one, and only through that of whether it is right.
 constexpr double kLeastFront = 1e-3, kLeastJudgedFront = 2e-2;
 
 enum class Question { which_is_best, is_it_right };
