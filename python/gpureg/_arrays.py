@@ -145,9 +145,11 @@ def core_cloud(
     origin = origin_of(raw, options.voxel_size)
     views = None if viewpoints is None else matrix(viewpoints, prefix + "viewpoints", 3)
     if origin is not None:
-        # With no viewpoint given, the sensor was where the caller's frame has its origin.
-        views = np.zeros((1, 3)) if views is None else views
-        raw, views = raw - origin, views - origin
+        # With no viewpoint given, the sensor was where the caller's frame has its origin. Normals of the cloud's own need none:
+        # they would be turned, and free space be judged, from thousands of kilometres away.
+        if views is None and normals is None:
+            views = np.zeros((1, 3))
+        raw, views = raw - origin, None if views is None else views - origin
     return (
         float_rows(raw, name),
         None if normals is None else float_rows(matrix(normals, prefix + "normals", 3, count), prefix + "normals"),

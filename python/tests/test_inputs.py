@@ -92,6 +92,25 @@ def test_map_coordinates_lose_nothing(source, truth):
     assert np.abs(moments.sum / moments.count - (source + offset_a).mean(axis=0)).max() < 0.2
 
 
+def test_normals_in_map_coordinates_need_no_viewpoint():
+    # A floor, and a wall of a twelfth of the points that turns its back on where the map has its origin: what of a cloud may be
+    # turned towards a viewpoint.
+    rng = np.random.default_rng(1)
+    floor, wall = rng.random((5500, 3)) * [4, 4, 0], rng.random((500, 3)) * [0, 4, 1.5] + [2, 0, 0.5]
+    points, normals = np.concatenate([floor, wall]), np.repeat([[0.0, 0, 1], [1.0, 0, 0]], [5500, 500], axis=0)
+    there = gpureg.prepare(points + [5e6, 5e6, -5e6], normals=normals)
+    here = gpureg.prepare(points, normals=normals)
+    assert there.origin.any() and not here.origin.any()
+    for cloud in (here, there):
+        upright = cloud.points[:, 2] - cloud.points[:, 2].min() > 0.6
+        assert np.median(cloud.normals[upright, 0]) > 0.99
+        evidence = gpureg.align(cloud, cloud).modes[0].evidence
+        assert evidence.source_seen == evidence.target_seen == 0  # nothing is known about free space
+    seen = gpureg.prepare(points + [5e6, 5e6, -5e6], normals=normals, viewpoints=[[5e6 + 4, 5e6 + 2, 1 - 5e6]])
+    assert np.abs(seen.viewpoints - [5e6 + 4, 5e6 + 2, 1 - 5e6]).max() < 1e-6
+    assert gpureg.align(seen, seen).modes[0].evidence.source_seen > 0
+
+
 def test_small_float64_coordinates_are_only_cast(source, reference):
     assert not gpureg.prepare(source + 100.0).origin.any()
     assert same_points(gpureg.prepare(source), reference)
