@@ -1,6 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <pybind11/stl.h>
 
+#include <cmath>
+#include <cstdio>
+#include <limits>
+
+#include "cloud.hpp"
 #include "fields.hpp"
 #include "gpureg/io.hpp"
 #include "matrix.hpp"
@@ -8,17 +13,34 @@
 namespace gpureg::python {
 namespace {
 
-using Float3Array = py::array_t<float, py::array::c_style | py::array::forcecast>;
-
-std::vector<Eigen::Vector3f> vectors_of(const std::optional<Float3Array>& array, const char* name) {
+std::vector<Eigen::Vector3f> vectors_of(const py::object& array, const char* name) {
   std::vector<Eigen::Vector3f> out;
-  if (!array) return out;
-  if (array->ndim() != 2 || array->shape(1) != 3)
-    throw py::value_error(std::string(name) + ": expected shape (N, 3), got " +
-                          py::str(array->attr("shape")).cast<std::string>());
-  for (py::ssize_t k = 0; k < array->shape(0); ++k)
-    out.emplace_back(array->data()[3 * k], array->data()[3 * k + 1], array->data()[3 * k + 2]);
+  if (array.is_none()) return out;
+  const Rows rows = rows_of(array.cast<FloatArray>(), name);
+  for (std::size_t k = 0; k < rows.count; ++k) out.emplace_back(rows.data + k * rows.stride);
   return out;
+}
+
+/// Files are read as float32. Says so where that is too coarse: beyond 1e5, and less than 2^17
+/// steps across the cloud.
+void warn_of_large(const PointCloud& cloud, const std::string& path) {
+  constexpr float kLarge = 1e5f, kSteps = 1 << 17;
+  Eigen::Vector3f low = Eigen::Vector3f::Constant(std::numeric_limits<float>::max()), high = -low;
+  for (const Eigen::Vector3f& point : cloud.points) {
+    if (!point.allFinite()) continue;
+    low = low.cwiseMin(point);
+    high = high.cwiseMax(point);
+  }
+  const float largest = std::max(low.cwiseAbs().maxCoeff(), high.cwiseAbs().maxCoeff());
+  const float step = std::nextafter(largest, std::numeric_limits<float>::infinity()) - largest;
+  if (low.x() > high.x() || largest <= kLarge || step * kSteps <= (high - low).maxCoeff()) return;
+  char numbers[96];
+  std::snprintf(numbers, sizeof(numbers), "coordinates up to %.7g resolve %.2g in float32",
+                static_cast<double>(largest), static_cast<double>(step));
+  const std::string text = path + ": " + numbers +
+                           ", which files are read as; subtract an offset before they are written, "
+                           "or pass float64 arrays";
+  if (PyErr_WarnEx(PyExc_UserWarning, text.c_str(), 2) != 0) throw py::error_already_set();
 }
 
 }  // namespace
@@ -26,10 +48,13 @@ std::vector<Eigen::Vector3f> vectors_of(const std::optional<Float3Array>& array,
 void bind_files(py::module_& m) {
   using release = py::call_guard<py::gil_scoped_release>;
   py::class_<PointCloud>(m, "PointCloud", "A cloud as a file holds it.")
-      .def(py::init([](const Float3Array& points, const std::optional<Float3Array>& normals,
-                       const std::optional<Float3Array>& viewpoints) {
-             return PointCloud{vectors_of(points, "points"), vectors_of(normals, "normals"),
-                               vectors_of(viewpoints, "viewpoints")};
+      .def(py::init([](const py::object& points, const py::object& normals,
+                       const py::object& viewpoints) {
+             // The face takes whatever people have, and names what it refuses.
+             const py::tuple parts = py::module_::import("gpureg._arrays")
+                                         .attr("stored_cloud")(points, normals, viewpoints);
+             return PointCloud{vectors_of(parts[0], "points"), vectors_of(parts[1], "normals"),
+                               vectors_of(parts[2], "viewpoints")};
            }),
            py::arg("points"), py::arg("normals") = py::none(), py::arg("viewpoints") = py::none())
       .def("__len__", [](const PointCloud& c) { return c.points.size(); })
@@ -45,7 +70,18 @@ void bind_files(py::module_& m) {
       .def("__repr__", [](const PointCloud& c) {
         return "<gpureg.PointCloud, " + std::to_string(c.points.size()) + " points>";
       });
-  m.def("read_point_cloud", &io::read_point_cloud, py::arg("path"), release());
+  m.def(
+      "read_point_cloud",
+      [](const std::string& path) {
+        PointCloud cloud;
+        {
+          const py::gil_scoped_release unlocked;
+          cloud = io::read_point_cloud(path);
+        }
+        warn_of_large(cloud, path);
+        return cloud;
+      },
+      py::arg("path"));
   m.def("write_point_cloud", &io::write_point_cloud, py::arg("path"), py::arg("cloud"), release());
   m.def("list_fragments", &io::list_fragments, py::arg("folder"), release());
   m.def(

@@ -32,6 +32,8 @@ _HOST_DEVICES = (1, 3)  # DLPack's kDLCPU and kDLCUDAHost
 # float32 must resolve this part of a voxel, or coordinates are moved before they become float32.
 _PARTS_OF_VOXEL = 256
 _MILLIMETRE = 1e-3  # what stands in for the voxel where points are kept as they are
+# A cloud that float32 divides into so many steps is fine whatever its unit: a part in millimetres, three thousand of them away, say.
+_STEPS = 1 << 17
 
 
 def to_numpy(value: Any, name: str) -> npt.NDArray[Any]:
@@ -107,6 +109,17 @@ def origin_of(points: npt.NDArray[Any], voxel_size: float) -> Optional[npt.NDArr
 
     Only types finer than float32 can hold such coordinates.
     """
+    bounds = _bounds(points)
+    if bounds is None:
+        return None
+    low, high, largest = bounds
+    if _step(largest) * _PARTS_OF_VOXEL <= (voxel_size or _MILLIMETRE):
+        return None
+    return np.asarray(np.round(low + (high - low) / 2))
+
+
+def _bounds(points: npt.NDArray[Any]) -> Optional[Tuple[npt.NDArray[np.float64], npt.NDArray[np.float64], float]]:
+    """Lowest and highest coordinates, and the largest magnitude; None where casting to float32 loses nothing, or is an error."""
     if points.dtype.itemsize <= 4 or len(points) == 0:
         return None
     finite = points[np.isfinite(points).all(axis=1)]
@@ -116,9 +129,34 @@ def origin_of(points: npt.NDArray[Any], voxel_size: float) -> Optional[npt.NDArr
     largest = max(float(np.abs(low).max()), float(np.abs(high).max()))
     if largest > float(np.finfo(np.float32).max):
         return None  # an error that float_rows explains
-    if float(np.spacing(np.float32(largest))) * _PARTS_OF_VOXEL <= (voxel_size or _MILLIMETRE):
-        return None
-    return np.asarray(np.round(low + (high - low) / 2))
+    return low, high, largest
+
+
+def _step(largest: float) -> float:
+    """From one float32 to the next."""
+    return float(np.spacing(np.float32(largest)))
+
+
+def stored_cloud(
+    points: Any, normals: Any, viewpoints: Any
+) -> Tuple[FloatArray, Optional[FloatArray], Optional[FloatArray]]:
+    """What a PointCloud holds. It has no origin: coordinates that need one are refused, not rounded."""
+    raw = matrix(points, "points", 3)
+    rows, bounds = float_rows(raw, "points"), _bounds(raw)
+    if bounds is not None and not np.array_equal(rows, raw, equal_nan=True):
+        low, high, largest = bounds
+        step = _step(largest)
+        if step * _PARTS_OF_VOXEL > PrepareOptions().voxel_size and step * _STEPS > float((high - low).max()):
+            raise ValueError(
+                f"points: coordinates up to {largest:.7g} resolve {step:.2g} in float32, which clouds and files hold; pass the array itself"
+                f" to prepare or register, where nothing is lost, or subtract an offset (dtype {raw.dtype}, shape {raw.shape})"
+            )
+    if normals is not None:
+        normals = matrix(normals, "normals", 3)
+        # As many as points, or none: that is how a cloud shows that it has none.
+        normals = float_rows(matrix(normals, "normals", 3, len(raw)), "normals") if len(normals) else None
+    views = None if viewpoints is None else float_rows(matrix(viewpoints, "viewpoints", 3), "viewpoints")
+    return rows, normals, views
 
 
 def core_cloud(

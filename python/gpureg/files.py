@@ -7,14 +7,15 @@ import os
 from typing import Any, Union
 
 from . import _core
-from ._arrays import float_rows, matrix
 from ._core import PointCloud
 
 Path = Union[str, "os.PathLike[str]"]
 
 
 def read_point_cloud(path: Path) -> PointCloud:
-    """Read a PLY or PCD file, told apart by content.
+    """Read a PLY or PCD file, told apart by content, as float32.
+
+    Warns (UserWarning) of coordinates that float32 is too coarse for: a map's.
 
     Raises
     ------
@@ -31,6 +32,7 @@ def write_point_cloud(path: Path, points: Any, normals: Any = None) -> None:
     ----------
     path : str or PathLike
     points : (N, 3) array or PointCloud
+        float64 coordinates too large for float32 are a ValueError.
     normals : (N, 3) array, optional
 
     Examples
@@ -44,8 +46,5 @@ def write_point_cloud(path: Path, points: Any, normals: Any = None) -> None:
            [1., 2., 3.]], dtype=float32)
     """
     if not isinstance(points, PointCloud):
-        rows = float_rows(matrix(points, "points", 3), "points")
-        if normals is not None:
-            normals = float_rows(matrix(normals, "normals", 3, len(rows)), "normals")
-        points = PointCloud(rows, normals)
+        points = PointCloud(points, normals)
     _core.write_point_cloud(os.fspath(path), points)

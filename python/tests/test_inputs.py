@@ -7,6 +7,7 @@ import resource
 import subprocess
 import sys
 import types
+import warnings
 
 import numpy as np
 import pytest
@@ -244,6 +245,35 @@ def test_files(source, tmp_path, reference):
         assert same_points(gpureg.prepare(given), reference)
     with pytest.raises(OSError, match="nowhere.ply"):
         gpureg.prepare(tmp_path / "nowhere.ply")
+
+
+def test_clouds_that_float32_would_round_are_refused(source, tmp_path):
+    there = source + 5e6
+    with pytest.raises(ValueError, match=r"points: coordinates up to 5000002 resolve 0.5 in float32, .* pass the array itself to prepare"):
+        gpureg.PointCloud(there)
+    with pytest.raises(ValueError, match="points: coordinates up to 5000002 resolve 0.5"):
+        gpureg.write_point_cloud(tmp_path / "there.ply", there)
+    assert not (tmp_path / "there.ply").exists()
+    with pytest.raises(ValueError, match="dtype int64"):
+        gpureg.PointCloud(np.array([[50_000_001, 0, 50_000_000]]))
+    # Fine: what float32 can tell apart, whatever the unit, and what was rounded before.
+    rounded = there.astype(np.float32)
+    for good in (source + 1000, source * 1000 + 3000, rounded, rounded.astype(float), np.full((3, 3), np.nan), np.zeros((0, 3))):
+        assert np.array_equal(gpureg.PointCloud(good).points, good.astype(np.float32), equal_nan=True)
+    nothing = np.zeros((0, 3))
+    assert len(gpureg.PointCloud(source, nothing, nothing)) == len(source)
+
+
+def test_files_with_large_coordinates_warn(source, tmp_path):
+    path = tmp_path / "there.ply"
+    gpureg.write_point_cloud(path, (source + 5e6).astype(np.float32))
+    for read in (gpureg.read_point_cloud, gpureg.prepare):
+        with pytest.warns(UserWarning, match=r"there.ply: coordinates up to 500000[12].* resolve 0.5 in float32, which files are read as"):
+            read(path)
+    gpureg.write_point_cloud(path, source * 1e5)  # large, but not too large for its extent
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        gpureg.read_point_cloud(path)
 
 
 def growth():
