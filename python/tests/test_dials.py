@@ -84,6 +84,25 @@ def test_priors_drop_what_contradicts_them(clouds):
         gpureg.align(a, b, prior=np.eye(4))
 
 
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (lambda t: t.T, r"target_from_source: its last row is \[5, 6, 7, 1\], expected \[0, 0, 0, 1\]; it looks transposed"),
+        (lambda t: t + np.diag([0, 0, 0, 1]), r"target_from_source: its last row is \[0, 0, 0, 2\], expected \[0, 0, 0, 1\]$"),
+        (lambda t: t @ np.diag([1.1, 1.1, 1.1, 1]), r"target_from_source is no rigid motion: .* determinant 1.331, .* by 0.21$"),
+        (lambda t: t @ np.diag([1, -1, 1, 1]), r"target_from_source is no rigid motion: .* determinant -1"),
+        (lambda t: t + np.diag([0, np.nan, 0], -1), r"target_from_source\[2, 1\] is nan, expected a finite number"),
+        (lambda t: t[:3], r"target_from_source: expected shape \(4, 4\), got \(3, 4\)"),
+    ],
+)
+def test_wrong_poses_of_priors_are_named(change, message):
+    right = np.eye(4)
+    right[:3, 3] = 5, 6, 7
+    gpureg.RegistrationPrior(target_from_source=right)
+    with pytest.raises(ValueError, match=message):
+        gpureg.RegistrationPrior(target_from_source=change(right))
+
+
 def test_priors_are_in_the_frames_of_the_caller(clouds):
     far = np.array([4.5e5, 5.4e6, 100.0])
     a, b = gpureg.prepare_batch([clouds[0] + far, clouds[1]])
