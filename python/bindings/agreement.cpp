@@ -63,8 +63,13 @@ std::vector<PairAgreement> agree(const IndexArray& pairs, const py::list& result
 void bind_agreement(py::module_& m) {
   auto cls = bind_options_class<AgreementOptions>(m, "AgreementOptions", "How loops are judged.",
                                                   option_fields());
-  cls.def_static("from_voxel_size", &AgreementOptions::from_voxel_size, py::arg("voxel_size"),
-                 "The distance is three voxels; the rest does not depend on the voxel.");
+  cls.def_static(
+      "from_voxel_size",
+      [](const py::object& voxel_size) {
+        return AgreementOptions::from_voxel_size(argument<float>(voxel_size, "voxel_size"));
+      },
+      py::arg("voxel_size"),
+      "The distance is three voxels; the rest does not depend on the voxel.");
   bind_record_class<PairAgreement>(m, "PairAgreement", "What the other pairs say of one pair.",
                                    result_fields());
   m.def("agreement", &agree, py::arg("pairs"), py::arg("results"), py::arg("options"));

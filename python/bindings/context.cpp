@@ -3,15 +3,45 @@
 
 #include <pybind11/stl.h>
 
-#include "bindings.hpp"
+#include "fields.hpp"
 
 namespace gpureg::python {
+namespace {
+
+Context cpu(const py::object& threads) {
+  const auto count = argument<unsigned>(threads, "threads", "a whole number, 0 or more");
+  const py::gil_scoped_release release;
+  return Context::cpu(count);
+}
+
+/// What no signature of Context.cuda takes.
+Context refuse_cuda(const py::args& positional, const py::kwargs& keywords) {
+  const char* const bytes = "bytes, 0 or more";
+  if (!positional.empty() && !PyLong_Check(positional[0].ptr()))
+    argument<std::vector<int>>(positional[0], "device", "a whole number, or a list of them");
+  if (positional.size() > 1) argument<std::size_t>(positional[1], "memory_budget", bytes);
+  for (const auto& [key, value] : keywords) {
+    const std::string name = py::str(key);
+    if (name == "device")
+      argument<int>(value, name, "a whole number");
+    else if (name == "devices")
+      argument<std::vector<int>>(value, name, "a list of whole numbers");
+    else if (name == "memory_budget")
+      argument<std::size_t>(value, name, bytes);
+    else
+      throw py::type_error("Context.cuda has no argument '" + name +
+                           "'; it has device, or devices and memory_budget");
+  }
+  throw py::type_error("Context.cuda: expected device, or devices and memory_budget");
+}
+
+}  // namespace
 
 void bind_context(py::module_& m) {
   // Starting threads or a device takes time; dropping the last handle joins them.
   using release = py::call_guard<py::gil_scoped_release>;
   py::class_<Context>(m, "Context", "Where work runs: owns threads (CPU) or a device (CUDA).")
-      .def_static("cpu", &Context::cpu, py::arg("threads") = 0, release(),
+      .def_static("cpu", &cpu, py::arg("threads") = 0,
                   "CPU backend; 0 threads: one per hardware thread.")
       .def_static(
           "cuda", [](int device) { return Context::cuda(device); }, py::arg("device") = 0,
@@ -24,6 +54,7 @@ void bind_context(py::module_& m) {
           py::arg("devices"), py::arg("memory_budget") = 0, release(),
           "CUDA backend on several devices (none named: all) that share the work of a batch; "
           "memory_budget: bytes of each that prepared clouds may take, 0: no limit.")
+      .def_static("cuda", &refuse_cuda)
       .def_static("best", &Context::best, release(),
                   "CUDA where a device can be used, else the CPU.")
       .def_property_readonly(

@@ -1,12 +1,14 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <charconv>
 #include <cstdlib>
 #include <functional>
 #include <limits>
 #include <string>
+#include <string_view>
 #include <type_traits>
 #include <utility>
 #include <vector>
@@ -34,6 +36,12 @@ struct Field {
   std::function<void(py::class_<T>&, const Field<T>&, bool writable)> define;
 };
 
+/// Python's bool, or numpy's.
+inline bool is_bool(py::handle value) {
+  return PyBool_Check(value.ptr()) ||
+         std::string_view(Py_TYPE(value.ptr())->tp_name).substr(0, 10) == "numpy.bool";
+}
+
 template <typename M>
 M convert(py::handle value) {
   if constexpr (std::is_same_v<M, Proposal>) {
@@ -43,7 +51,7 @@ M convert(py::handle value) {
     throw py::cast_error();
   } else {
     // A bool is an int in Python; as a length or a count it is a mistake.
-    if (!std::is_same_v<M, bool> && std::is_arithmetic_v<M> && PyBool_Check(value.ptr()))
+    if (!std::is_same_v<M, bool> && std::is_arithmetic_v<M> && is_bool(value))
       throw py::cast_error();
     return value.cast<M>();
   }
@@ -65,6 +73,36 @@ std::string expected() {
     return py::type::of<M>().attr("__name__").template cast<std::string>();
 }
 
+/// A value in an error message: one line, not too long.
+inline std::string shown(py::handle value) {
+  std::string text =
+      py::reinterpret_steal<py::object>(PyObject_ASCII(value.ptr())).cast<std::string>();
+  std::replace(text.begin(), text.end(), '\n', ' ');
+  constexpr std::size_t most = 80;
+  return text.size() <= most ? text : text.substr(0, most - 3) + "...";
+}
+
+/// An argument of a function. Raises TypeError, or ValueError for a whole number out of range, that
+/// names it: what pybind11 raises by itself is a list of signatures.
+template <typename M>
+M argument(py::handle value, const std::string& name, const std::string& what = expected<M>()) {
+  try {
+    return convert<M>(value);
+  } catch (const py::cast_error&) {
+    const std::string message = name + ": expected " + what + ", got " + shown(value);
+    if (PyLong_Check(value.ptr()) && !is_bool(value)) throw py::value_error(message);
+    throw py::type_error(message);
+  }
+}
+
+/// Constructors that take keywords only say so.
+inline void require_no_positional(const py::args& values, const std::string& cls,
+                                  const std::string& keyword) {
+  if (!values.empty())
+    throw py::type_error(cls + ": expected keywords, such as " + cls + "(" + keyword +
+                         "=...), got " + shown(values[0]));
+}
+
 template <typename T, typename M>
 Field<T> field(std::string name, M T::*member, std::string doc) {
   Field<T> f;
@@ -82,8 +120,7 @@ Field<T> field(std::string name, M T::*member, std::string doc) {
     try {
       t.*member = convert<M>(value);
     } catch (const py::cast_error&) {
-      throw py::type_error(name + ": expected " + expected<M>() + ", got " +
-                           py::repr(value).template cast<std::string>());
+      throw py::type_error(name + ": expected " + expected<M>() + ", got " + shown(value));
     }
   };
   f.define = [member](py::class_<T>& cls, const Field<T>& self, bool writable) {
@@ -176,7 +213,8 @@ py::class_<T> bind_options_class(py::module_& m, const std::string& name, const 
     };
   }
   py::class_<T> cls(m, name.c_str(), doc);
-  cls.def(py::init([fields, name](const py::kwargs& values) {
+  cls.def(py::init([fields, name](const py::args& positional, const py::kwargs& values) {
+    require_no_positional(positional, name, fields.front().name);
     T t;
     assign(t, fields, values, name);
     return t;

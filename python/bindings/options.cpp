@@ -117,6 +117,11 @@ std::vector<Field<RegistrationOptions>> registration_fields() {
   };
 }
 
+std::uint32_t quality_of(const py::object& value) {
+  return argument<std::uint32_t>(
+      value, "quality", "a whole number from 0 to " + std::to_string(kHighestQuality));
+}
+
 }  // namespace
 
 void bind_options(py::module_& m) {
@@ -136,13 +141,25 @@ void bind_options(py::module_& m) {
       m, "RefineOptions", "Robust point-to-plane ICP that polishes the winner.", refine_fields());
   auto cls = bind_options_class<RegistrationOptions>(
       m, "RegistrationOptions", "All options of one registration.", registration_fields());
-  cls.def_static("from_voxel_size", &RegistrationOptions::from_voxel_size, py::arg("voxel_size"),
-                 py::arg("quality") = kDefaultQuality,
-                 "Every length from the voxel size (metres); quality, 0 to 10, trades time for recall.");
-  cls.def("with_quality", &RegistrationOptions::with_quality, py::arg("quality"),
-          "A copy with quality's number of candidates, everything else as it is.");
   cls.def_static(
-      "loopsmart", [](float voxel_size) { return RegistrationOptions::loopsmart(voxel_size); },
+      "from_voxel_size",
+      [](const py::object& voxel_size, const py::object& quality) {
+        return RegistrationOptions::from_voxel_size(argument<float>(voxel_size, "voxel_size"),
+                                                    quality_of(quality));
+      },
+      py::arg("voxel_size"), py::arg("quality") = kDefaultQuality,
+      "Every length from the voxel size (metres); quality, 0 to 10, trades time for recall.");
+  cls.def(
+      "with_quality",
+      [](const RegistrationOptions& o, const py::object& quality) {
+        return o.with_quality(quality_of(quality));
+      },
+      py::arg("quality"), "A copy with quality's number of candidates, everything else as it is.");
+  cls.def_static(
+      "loopsmart",
+      [](const py::object& voxel_size) {
+        return RegistrationOptions::loopsmart(argument<float>(voxel_size, "voxel_size"));
+      },
       py::arg("voxel_size") = shortest(PrepareOptions{}.voxel_size),
       "The paper's algorithm with its lengths scaled to the voxel size (metres).");
 }

@@ -7,6 +7,7 @@
 #include <cstdio>
 #include <optional>
 
+#include "fields.hpp"
 #include "gpureg/error.hpp"
 #include "matrix.hpp"
 
@@ -17,8 +18,42 @@ using DoubleArray = py::array_t<double, py::array::c_style | py::array::forcecas
 
 struct PriorParts {
   std::optional<DoubleArray> source_up, target_up, pose;
-  double max_angle, max_rotation, max_translation;
+  double max_angle = GravityPrior{}.max_angle, max_rotation = PosePrior{}.max_rotation,
+         max_translation = PosePrior{}.max_translation;
 };
+
+PriorParts parts_of(const py::kwargs& values) {
+  PriorParts parts;
+  const std::pair<const char*, std::optional<DoubleArray>*> arrays[] = {
+      {"source_up", &parts.source_up},
+      {"target_up", &parts.target_up},
+      {"target_from_source", &parts.pose}};
+  const std::pair<const char*, double*> limits[] = {{"max_angle", &parts.max_angle},
+                                                    {"max_rotation", &parts.max_rotation},
+                                                    {"max_translation", &parts.max_translation}};
+  for (const auto& [key, value] : values) {
+    const std::string name = py::str(key);
+    bool known = false;
+    for (const auto& [field, array] : arrays)
+      if (name == field) {
+        known = true;
+        if (value.is_none()) continue;
+        *array = DoubleArray::ensure(value);
+        if (!**array)
+          throw py::type_error(name + ": expected an array of numbers, got " + shown(value));
+      }
+    for (const auto& [field, limit] : limits)
+      if (name == field) {
+        known = true;
+        *limit = argument<double>(value, name);
+      }
+    if (!known)
+      throw py::type_error("RegistrationPrior has no argument '" + name +
+                           "'; it has source_up, target_up, max_angle, target_from_source, "
+                           "max_rotation, max_translation");
+  }
+  return parts;
+}
 
 std::string number(double value) {
   char text[32];
@@ -84,20 +119,14 @@ RegistrationPrior in_prepared_frames(RegistrationPrior prior, const Cloud& sourc
 
 void bind_prior(py::module_& m) {
   using P = RegistrationPrior;
-  const GravityPrior gravity;
-  const PosePrior pose;
   py::class_<P>(m, "RegistrationPrior",
                 "What is known of a pair's pose beforehand: poses that contradict it are dropped.")
-      .def(py::init([](std::optional<DoubleArray> source_up, std::optional<DoubleArray> target_up,
-                       double max_angle, std::optional<DoubleArray> target_from_source,
-                       double max_rotation, double max_translation) {
-             return prior_of({source_up, target_up, target_from_source, max_angle, max_rotation,
-                              max_translation});
+      .def(py::init([](const py::args& positional, const py::kwargs& values) {
+             require_no_positional(positional, "RegistrationPrior", "target_from_source");
+             return prior_of(parts_of(values));
            }),
-           py::kw_only(), py::arg("source_up") = py::none(), py::arg("target_up") = py::none(),
-           py::arg("max_angle") = gravity.max_angle, py::arg("target_from_source") = py::none(),
-           py::arg("max_rotation") = pose.max_rotation,
-           py::arg("max_translation") = pose.max_translation)
+           "Keywords: source_up and target_up, max_angle (degrees, 10); target_from_source, "
+           "max_rotation (degrees, 30), max_translation (metres, 1).")
       .def("__repr__", [](const P& p) {
         return std::string("<gpureg.RegistrationPrior of ") +
                (p.empty()             ? "nothing"

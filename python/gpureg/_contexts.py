@@ -3,11 +3,15 @@
 
 from __future__ import annotations
 
+import math
+import numbers
 import os
 import threading
 from typing import Any, List, Optional
 
-from ._core import BackendUnavailable, Context
+import numpy as np
+
+from ._core import BackendUnavailable, Context, InvalidArgument
 
 _default: Optional[Context] = None
 _default_lock = threading.Lock()
@@ -44,6 +48,15 @@ os.register_at_fork(after_in_child=_forget_default)
 
 def context_of(context: Optional[Context]) -> Context:
     return checked(context, Context, "context") or default_context()
+
+
+def milliseconds_of(value: Any, name: str) -> float:
+    if isinstance(value, (bool, np.bool_)) or not isinstance(value, numbers.Real):
+        raise TypeError(f"{name}: expected milliseconds, a number, got {value!r}")
+    number = float(value)
+    if not (math.isfinite(number) and number > 0):
+        raise InvalidArgument(f"{name} is {value}, expected a number > 0")
+    return number
 
 
 def checked(value: Any, kind: Any, name: str) -> Any:

@@ -7,7 +7,7 @@ from typing import Any, Callable, List, Literal, Optional, Sequence, Union
 
 from . import _core
 from ._arrays import core_cloud, host_points, index_pairs
-from ._contexts import checked, context_of
+from ._contexts import checked, context_of, milliseconds_of
 from ._core import Context, PreparedCloud, PrepareOptions, RegistrationOptions, RegistrationPrior, RegistrationResult, TimedResult, VoxelSizeSuggestion
 from ._progress import batch_progress
 from .preparation import check_prepared, prepared
@@ -114,6 +114,7 @@ def align_within(
     """
     check_prepared(source, "source")
     check_prepared(target, "target")
+    milliseconds = milliseconds_of(milliseconds, "milliseconds")
     options = checked(options, RegistrationOptions, "options") or RegistrationOptions()
     return _core.align_within(context_of(context), source, target, milliseconds, options)
 
@@ -248,8 +249,10 @@ def register(
         raise TypeError("options: give either options, or voxel_size, quality and seed")
     if time_budget_ms is not None and quality is not None:
         raise TypeError("time_budget_ms: give either a time budget or a quality")
+    if time_budget_ms is not None:
+        time_budget_ms = milliseconds_of(time_budget_ms, "time_budget_ms")
     if options is None:
-        if voxel_size == "auto":
+        if isinstance(voxel_size, str) and voxel_size == "auto":
             suggestion = suggest_voxel_size([source, target])
             if suggestion.reason != "none":
                 raise ValueError(f"voxel_size: 'auto', but {suggestion.explanation}")
