@@ -54,7 +54,7 @@ def agreement(
     for k, result in enumerate(results):
         if not isinstance(result, RegistrationResult):
             raise TypeError(f"results[{k}]: expected a RegistrationResult, got {result!r}")
-    entries = index_pairs(pairs, "pairs", 2**32)
+    entries = index_pairs(pairs, "pairs", None)
     return _core.agreement(entries, results, options or AgreementOptions())
 
 

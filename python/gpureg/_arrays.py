@@ -7,13 +7,13 @@ Errors name the argument and the shape or type that it has.
 from __future__ import annotations
 
 import os
-from typing import Any, Optional, Tuple, Union
+from typing import Any, List, Optional, Tuple, Union
 
 import numpy as np
 import numpy.typing as npt
 
 from . import _core
-from ._core import PointCloud, PrepareOptions
+from ._core import PointCloud, PreparedCloud, PrepareOptions
 from ._device import DeviceRows, device_rows, on_device, stream_of
 
 FloatArray = npt.NDArray[np.float32]
@@ -73,6 +73,8 @@ def _from_device(value: Any, name: str) -> npt.NDArray[Any]:
 def matrix(value: Any, name: str, columns: Optional[int], rows: Optional[int] = None) -> npt.NDArray[Any]:
     """Checks type and shape; returns the array as it is."""
     array = to_numpy(value, name)
+    if array.dtype == object and array.ndim == 0:  # what numpy makes of None, dictionaries and generators
+        raise TypeError(f"{name}: expected an array of numbers, got {_kind(value)}")
     if array.dtype.kind not in "fiu":
         raise TypeError(f"{name}: expected numbers, got dtype {array.dtype} (shape {array.shape})")
     wanted = f"({'N' if rows is None else rows}, {'D' if columns is None else columns})"
@@ -155,8 +157,12 @@ def stored_cloud(
         normals = matrix(normals, "normals", 3)
         # As many as points, or none: that is how a cloud shows that it has none.
         normals = float_rows(matrix(normals, "normals", 3, len(raw)), "normals") if len(normals) else None
-    views = None if viewpoints is None else float_rows(matrix(viewpoints, "viewpoints", 3), "viewpoints")
-    return rows, normals, views
+    if viewpoints is not None:
+        viewpoints = float_rows(matrix(viewpoints, "viewpoints", 3), "viewpoints")
+        if not np.isfinite(viewpoints).all():
+            row = int(np.argwhere(~np.isfinite(viewpoints))[0][0])
+            raise ValueError(f"viewpoints: row {row} is {viewpoints[row].tolist()}, expected finite coordinates (shape {viewpoints.shape})")
+    return rows, normals, viewpoints
 
 
 def core_cloud(
@@ -241,8 +247,22 @@ def _unpack(points: Any, normals: Any, viewpoints: Any) -> Tuple[Any, Any, Any]:
     return points, normals, viewpoints
 
 
-def index_pairs(value: Any, name: str, count: Union[int, Tuple[int, int]]) -> npt.NDArray[np.uint32]:
-    """(M, 2) indices below count (one for each column); an empty list is (0, 2)."""
+def several(value: Any, name: str) -> List[Any]:
+    """A sequence of clouds as a list; refuses what is one cloud, whose letters or points would be taken for clouds."""
+    shape = getattr(value, "shape", None)
+    rows = shape is not None and len(shape) < 3 and getattr(value, "dtype", None) != object
+    single = rows or isinstance(value, (str, bytes, os.PathLike, PointCloud, PreparedCloud))
+    if not single:
+        try:
+            return list(value)
+        except TypeError:  # not iterable
+            pass
+    given = repr(value) if isinstance(value, (str, bytes, os.PathLike)) else _kind(value) + ("" if shape is None else f", shape {tuple(shape)}")
+    raise TypeError(f"{name}: expected a sequence of clouds, got {'one: ' if single else ''}{given}")
+
+
+def index_pairs(value: Any, name: str, count: Union[int, Tuple[int, int], None]) -> npt.NDArray[np.uint32]:
+    """(M, 2) indices below count (one for each column; None: not known); an empty list is (0, 2)."""
     array = to_numpy(value if hasattr(value, "shape") else list(value), name)
     if array.size == 0 and array.ndim <= 2:
         array = np.zeros((0, 2), np.int64)
@@ -250,9 +270,11 @@ def index_pairs(value: Any, name: str, count: Union[int, Tuple[int, int]]) -> np
         raise TypeError(f"{name}: expected whole numbers, got dtype {array.dtype} (shape {array.shape})")
     if array.ndim != 2 or array.shape[1] != 2:
         raise ValueError(f"{name}: expected shape (M, 2), got {array.shape}")
-    limits = (count, count) if isinstance(count, int) else count
+    limits = (count, count) if isinstance(count, int) else count or (2**32, 2**32)
     wrong = (array < 0) | (array >= np.asarray(limits))
     if wrong.any():
         row = int(np.argwhere(wrong)[0][0])
+        if count is None:
+            raise ValueError(f"{name}[{row}] is {tuple(array[row].tolist())}, expected indices from 0 to {2**32 - 1} (shape {array.shape})")
         raise ValueError(f"{name}[{row}] is {tuple(array[row].tolist())}, but there are {' and '.join(map(str, limits[:1] if isinstance(count, int) else limits))} (shape {array.shape})")
     return np.ascontiguousarray(array, dtype=np.uint32)

@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _core
-from ._arrays import CoreCloud, core_cloud
+from ._arrays import CoreCloud, core_cloud, several
 from ._core import PrepareOptions
 
 _ENDS = 1 << 16  # bytes at either end of a file that its fingerprint looks at
@@ -56,6 +56,7 @@ class FragmentSet:
     @classmethod
     def from_clouds(cls, clouds: Sequence[Any]) -> FragmentSet:
         """Clouds in memory, or paths: whatever `prepare` takes as points. Their numbers are 0, 1, 2, ..."""
+        clouds = several(clouds, "clouds")
         return cls(range(len(clouds)), clouds)
 
     def __len__(self) -> int:
@@ -145,7 +146,7 @@ def fragment_set(fragments: Any) -> FragmentSet:
         return fragments
     if isinstance(fragments, (str, os.PathLike)):
         return FragmentSet.from_directory(fragments)
-    return FragmentSet.from_clouds(list(fragments))
+    return FragmentSet.from_clouds(several(fragments, "fragments"))
 
 
 __all__: List[str] = ["FragmentSet"]

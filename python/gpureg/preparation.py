@@ -6,7 +6,7 @@ from __future__ import annotations
 from typing import Any, List, Optional, Sequence
 
 from . import _core
-from ._arrays import core_cloud
+from ._arrays import core_cloud, several
 from ._contexts import checked, context_of
 from ._core import Context, PreparedCloud, PrepareOptions
 
@@ -63,16 +63,10 @@ def prepare(
     >>> cloud.feature_dimension, cloud.statistics.input_points
     (33, 2000)
     """
-    return prepare_batch(
-        [_Parts(points, normals, features, viewpoints)], options=options, context=context
-    )[0]
-
-
-class _Parts:
-    """A cloud given as several arguments."""
-
-    def __init__(self, points: Any, normals: Any, features: Any, viewpoints: Any) -> None:
-        self.parts = (points, normals, features, viewpoints)
+    options = checked(options, PrepareOptions, "options") or PrepareOptions()
+    context = context_of(context)
+    cloud = core_cloud(points, normals, features, viewpoints, options, device=context.backend == "cuda")
+    return _core.prepare_batch(context, [cloud], options)[0]
 
 
 def prepare_batch(
@@ -100,12 +94,7 @@ def prepare_batch(
     options = checked(options, PrepareOptions, "options") or PrepareOptions()
     context = context_of(context)
     device = context.backend == "cuda"
-    single = len(clouds) == 1
-    inputs = []
-    for k, cloud in enumerate(clouds):
-        points, normals, features, viewpoints = cloud.parts if isinstance(cloud, _Parts) else (cloud, None, None, None)
-        name = "points" if single else f"clouds[{k}]"
-        inputs.append(core_cloud(points, normals, features, viewpoints, options, name, device))
+    inputs = [core_cloud(cloud, None, None, None, options, f"clouds[{k}]", device) for k, cloud in enumerate(several(clouds, "clouds"))]
     return _core.prepare_batch(context, inputs, options)
 
 

@@ -6,7 +6,7 @@ from __future__ import annotations
 from typing import Any, Callable, List, Literal, Optional, Sequence, Union
 
 from . import _core
-from ._arrays import core_cloud, host_points, index_pairs
+from ._arrays import core_cloud, host_points, index_pairs, several
 from ._contexts import checked, context_of, milliseconds_of
 from ._core import Context, PreparedCloud, PrepareOptions, RegistrationOptions, RegistrationPrior, RegistrationResult, TimedResult, VoxelSizeSuggestion
 from ._progress import batch_progress
@@ -135,7 +135,7 @@ def suggest_voxel_size(clouds: Sequence[Any]) -> VoxelSizeSuggestion:
     >>> gpureg.suggest_voxel_size([sphere]).voxel_size
     0.06
     """
-    return _core.suggest_voxel_size([host_points(cloud, f"clouds[{k}]") for k, cloud in enumerate(clouds)])
+    return _core.suggest_voxel_size([host_points(cloud, f"clouds[{k}]") for k, cloud in enumerate(several(clouds, "clouds"))])
 
 
 def align_batch(
@@ -183,6 +183,7 @@ def align_batch(
     """
     options = checked(options, RegistrationOptions, "options") or RegistrationOptions()
     context = context_of(context)
+    fragments = several(fragments, "fragments")
     entries = index_pairs(pairs, "pairs", len(fragments))
     known = [] if priors is None else list(priors)
     for k, prior in enumerate(known):

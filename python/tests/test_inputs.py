@@ -147,7 +147,9 @@ def test_empty_clouds_have_a_reason(source):
         (np.full((5, 3), None), TypeError, "points: expected numbers, got dtype object"),
         (np.zeros((5, 3), "M8[s]"), TypeError, "points: expected numbers, got dtype datetime64"),
         ([[1, 2, 3], [4, 5]], TypeError, "points: no array can be made of this list"),
-        (None, TypeError, "points: expected numbers, got dtype object"),
+        (None, TypeError, "points: expected an array of numbers, got NoneType"),
+        ({"points": []}, TypeError, "points: expected an array of numbers, got dict"),
+        ((row for row in [[0, 0, 0]]), TypeError, "points: expected an array of numbers, got generator"),
         (np.array([[0, 0, 0], [1e300, 0, 0]]), ValueError, r"points: row 1 is \[1e\+300.*too large for float32"),
     ],
 )
@@ -177,6 +179,45 @@ def test_wrong_companions_are_named(source):
         gpureg.register(source, source, options={"voxel_size": 1})
     with pytest.raises(TypeError, match="either options, or"):
         gpureg.register(source, source, 0.1, options=few())
+
+
+def test_wrong_sequences_of_clouds_are_named(source):
+    with pytest.raises(TypeError, match="^source: expected an array of numbers, got NoneType$"):
+        gpureg.register(None, source)
+    calls = [
+        ("clouds", gpureg.prepare_batch),
+        ("clouds", gpureg.suggest_voxel_size),
+        ("clouds", gpureg.FragmentSet.from_clouds),
+        ("fragments", lambda clouds: gpureg.align_batch(clouds, [])),
+    ]
+    for name, call in calls:
+        with pytest.raises(TypeError, match=f"^{name}: expected a sequence of clouds, got one: '/a/b.ply'$"):
+            call("/a/b.ply")
+        with pytest.raises(TypeError, match=rf"^{name}: expected a sequence of clouds, got one: ndarray of float64, shape \(6000, 3\)$"):
+            call(source)
+        with pytest.raises(TypeError, match=f"^{name}: expected a sequence of clouds, got one: PointCloud$"):
+            call(gpureg.PointCloud(source))
+        with pytest.raises(TypeError, match=f"^{name}: expected a sequence of clouds, got NoneType$"):
+            call(None)
+    assert [len(cloud) > 0 for cloud in gpureg.prepare_batch(cloud for cloud in (source, source))] == [True, True]
+    held = np.empty(2, object)
+    held[:] = [source, source]
+    assert len(gpureg.prepare_batch(held)) == 2
+    with pytest.raises(TypeError, match=r"^clouds\[0\]: expected an array of numbers, got NoneType"):
+        gpureg.prepare_batch([None])
+    with pytest.raises(TypeError, match=r"^fragments\[1\]: expected an array of numbers, got NoneType"):
+        gpureg.align_batch([source, None], [(0, 1)])
+    with pytest.raises(ValueError, match=r"^pairs\[0\] is \(-1, 0\), expected indices from 0 to 4294967295 \(shape"):
+        gpureg.agreement([(-1, 0)], [])
+
+
+def test_wrong_parts_of_a_cloud_are_named(source):
+    with pytest.raises(ValueError, match=r"^normals: expected shape \(6000, 3\), one row per point, got \(5, 3\)"):
+        gpureg.PointCloud(source, source[:5])
+    with pytest.raises(ValueError, match=r"^viewpoints: row 1 is \[0.0, nan, 0.0\], expected finite coordinates"):
+        gpureg.PointCloud(source, viewpoints=[[1, 2, 3], [0, np.nan, 0]])
+    with pytest.raises(TypeError, match="^points: expected an array of numbers, got NoneType"):
+        gpureg.PointCloud(None)
 
 
 @pytest.mark.parametrize(
