@@ -9,7 +9,7 @@ import json
 import os
 import shutil
 from pathlib import Path
-from typing import Any, Dict, Iterator, List, Sequence, Set
+from typing import Any, Dict, Iterator, List, Optional, Sequence, Set
 
 import pyarrow as pa
 import pyarrow.compute  # noqa: F401  (pa.compute)
@@ -97,7 +97,7 @@ class Store:
         path = self._chunks / f"{chunk:06d}.partial"
         if not path.exists():
             return {}
-        return {(row["i"], row["j"]): row for row in pq.read_table(path).to_pylist()}
+        return {(row["i"], row["j"]): row for row in read_table(path).to_pylist()}
 
     def write(self, chunk: int, rows: Sequence[Row]) -> None:
         """A finished chunk, on disk when this returns."""
@@ -127,7 +127,7 @@ class Store:
 
     def _read(self) -> Iterator[pa.Table]:
         for chunk in range(self._plan.chunks):
-            yield pq.read_table(self._chunks / f"{chunk:06d}.parquet")
+            yield read_table(self._chunks / f"{chunk:06d}.parquet")
 
     def _merge(self, temporary: Path) -> None:
         with contextlib.ExitStack() as stack:
@@ -136,6 +136,17 @@ class Store:
                 if writer is None:
                     writer = stack.enter_context(pq.ParquetWriter(temporary, table.schema))
                 writer.write_table(table)
+
+
+def read_table(path: Path, columns: Optional[List[str]] = None) -> pa.Table:
+    """A Parquet file of a run. Nothing that gpureg writes is ever half there, but disks fail and people edit."""
+    try:
+        return pq.read_table(path, columns=columns)
+    except (FileNotFoundError, PermissionError):
+        raise
+    except (pa.ArrowException, OSError) as error:
+        reason = str(error).partition("\n")[0]
+        raise IoError(f"output: {path} is damaged ({reason}); resume=False starts anew") from None
 
 
 def _write(path: Path, fill: Any) -> None:

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import dataclasses
+import numbers
 import os
 import queue
 import threading
@@ -13,15 +14,14 @@ from typing import Any, Dict, List, Optional, Sequence, Union
 
 try:
     import pyarrow as pa
-    import pyarrow.parquet as pq
 except ImportError as error:
-    raise ImportError("register_all needs pyarrow: pip install 'gpureg[batch]'") from error
+    raise ImportError("register_all needs pyarrow: pip install 'gpureg[batch]', or '.[batch]' from a checkout") from error
 
 from ._core import BackendUnavailable, Context, RegistrationOptions
 from ._plan import Plan
 from ._progress import Progress, batch_progress
 from ._residency import Residency, Stopped
-from ._store import Row, Store
+from ._store import Row, Store, read_table
 from ._table import row_of
 from .fragments import fragment_set
 
@@ -67,7 +67,7 @@ class BatchRun:
 
     def table(self) -> pa.Table:
         """The Parquet file, read."""
-        return pq.read_table(self.parquet)
+        return read_table(self.parquet)
 
     def __str__(self) -> str:
         done = self.pairs - self.resumed
@@ -129,6 +129,8 @@ def register_all(
     ------
     ValueError
         Where the folder holds another run; says what differs.
+    IoError
+        Where a file of the folder is damaged; names it.
     KeyboardInterrupt
         After Ctrl-C; what was done is on disk.
 
@@ -145,7 +147,7 @@ def register_all(
     (3, ['i', 'j', 'status'], [0, 0, 1])
     """
     begin = time.monotonic()
-    plan = make_plan(fragments, pairs, options, chunk_size)
+    plan = make_plan(fragments, pairs, options, chunk_size, memory)
     store = Store(Path(output), plan, resume)
     try:
         finished = store.finished()
@@ -158,12 +160,16 @@ def register_all(
         store.close()
 
 
-def make_plan(fragments: Any, pairs: Any, options: Optional[RegistrationOptions], chunk_size: int) -> Plan:
+def make_plan(fragments: Any, pairs: Any, options: Optional[RegistrationOptions], chunk_size: int, memory: int) -> Plan:
     """Everything that can be wrong is looked at before the first pair runs."""
     options = options or RegistrationOptions()
     options.validate()
-    if chunk_size < 1:
-        raise ValueError(f"chunk_size is {chunk_size}, expected 1 or more")
+    kinds: List[Any] = [numbers.Integral, numbers.Real]  # 4e9 bytes are fine
+    for name, value, kind in zip(("chunk_size", "memory"), (chunk_size, memory), kinds):
+        if isinstance(value, bool) or not isinstance(value, kind):
+            raise TypeError(f"{name}: expected a {'whole ' if kind is numbers.Integral else ''}number, got {value!r}")
+        if not value >= 1:
+            raise ValueError(f"{name} is {value}, expected 1 or more")
     fragments = fragment_set(fragments)
     chosen = fragments.choose_pairs(pairs)
     if len(chosen) == 0:
@@ -174,7 +180,7 @@ def make_plan(fragments: Any, pairs: Any, options: Optional[RegistrationOptions]
 def conclude(store: Store, plan: Plan, resumed: int, begin: float) -> BatchRun:
     """The final files of a run whose chunks are all there."""
     store.conclude()
-    status = pq.read_table(store.table_path, columns=["status"])["status"]
+    status = read_table(store.table_path, ["status"])["status"]
     aligned = status.to_pylist().count("aligned")
     return BatchRun(store.folder, len(plan.pairs), aligned, resumed, time.monotonic() - begin)
 

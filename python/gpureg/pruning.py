@@ -17,7 +17,7 @@ import numpy.typing as npt
 try:
     import faiss
 except ImportError as error:
-    raise ImportError("gpureg.pruning needs FAISS: pip install 'gpureg[pruning]'") from error
+    raise ImportError("gpureg.pruning needs FAISS: pip install 'gpureg[pruning]', or '.[pruning]' from a checkout") from error
 
 from . import _core
 from ._core import Context, PrepareOptions

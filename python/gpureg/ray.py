@@ -16,7 +16,7 @@ try:
     import ray
     from ray.util import ActorPool
 except ImportError as error:
-    raise ImportError("gpureg.ray needs Ray: pip install 'gpureg[ray]'") from error
+    raise ImportError("gpureg.ray needs Ray: pip install 'gpureg[ray]', or '.[ray]' from a checkout") from error
 
 from ._core import Context, RegistrationOptions
 from ._plan import Plan
@@ -78,7 +78,7 @@ def register_all(
         Where an actor died more often than can be an accident; what was done is on disk.
     """
     begin = time.monotonic()
-    plan = make_plan(fragments, pairs, options, chunk_size)
+    plan = make_plan(fragments, pairs, options, chunk_size, memory)
     if not ray.is_initialized():
         ray.init()
     store = Store(Path(output), plan, resume)

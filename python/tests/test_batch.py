@@ -242,3 +242,42 @@ class TestCommand:
             for name, value in pair["statistics"].items():
                 assert row[name] == value, name
         assert np.isfinite([row["score"] for row in rows.values()]).all()
+
+
+@pytest.mark.parametrize(
+    ("library", "code", "extra"),
+    [
+        ("pyarrow", "import gpureg; gpureg.register_all", "batch"),
+        ("faiss", "import gpureg.pruning", "pruning"),
+        ("ray", "import gpureg.ray", "ray"),
+    ],
+)
+def test_what_is_missing_is_named_with_both_ways_to_install_it(library, code, extra):
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(p for p in sys.path if p)}
+    code = f"import sys; sys.modules[{library!r}] = None; {code}"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, env=environment)
+    assert f"pip install 'gpureg[{extra}]', or '.[{extra}]' from a checkout" in done.stderr.splitlines()[-1]
+
+
+def test_damaged_files_are_named(tmp_path):
+    clouds = many.fragments()[:3]
+    keywords = {"output": tmp_path, "options": few(10, 0.08), "progress": False}
+    run = gpureg.register_all(clouds, **keywords)
+    whole = run.parquet.read_bytes()
+    for damaged in (b"PAR1 and no more", whole[: len(whole) // 2], b""):
+        run.parquet.write_bytes(damaged)
+        for call in (run.table, lambda: gpureg.register_all(clouds, **keywords)):
+            with pytest.raises(gpureg.IoError, match=r"results.parquet is damaged \(.*\); resume=False starts anew"):
+                call()
+    assert gpureg.register_all(clouds, resume=False, **keywords).pairs == 3 and run.parquet.read_bytes() == whole
+    run.parquet.unlink()
+    with pytest.raises(FileNotFoundError, match="results.parquet"):
+        run.table()
+
+
+@pytest.mark.parametrize("name", ["memory", "chunk_size"])
+def test_sizes_are_checked(tmp_path, name):
+    for value, error, message in ((-1, ValueError, f"{name} is -1, expected 1 or more"), ("1", TypeError, f"{name}: expected a (whole )?number, got '1'")):
+        with pytest.raises(error, match=message):
+            gpureg.register_all(many.fragments()[:3], output=tmp_path / "run", **{name: value})
+    assert not (tmp_path / "run").exists()

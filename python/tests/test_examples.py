@@ -2,6 +2,7 @@
 """The examples run, and are typed."""
 
 import pathlib
+import re
 import subprocess
 import sys
 
@@ -51,6 +52,20 @@ def test_many_fragments():
 def test_own_features():
     pytest.importorskip("torch")
     assert "aligned" in run("own_features.py")
+
+
+def test_readme(scans, tmp_path, monkeypatch):
+    """The snippet runs as it is printed, where it says that its scans are."""
+    pytest.importorskip("pyarrow")
+    text = (pathlib.Path(__file__).parents[2] / "README.md").read_text()
+    section = text[text.index("## In Python") : text.index("## The command")]
+    assert "pip install '.[batch]'" in section
+    (tmp_path / "out" / "quickstart").mkdir(parents=True)
+    scans.rename(tmp_path / "out" / "quickstart" / "scans-12-1")
+    monkeypatch.chdir(tmp_path)
+    names: dict = {}
+    exec(re.search(r"```python\n(.*?)```", section, re.DOTALL).group(1), names)
+    assert len(names["results"]) == 2 and names["run"].pairs == 3 and names["results"][0].aligned
 
 
 @pytest.mark.parametrize("path", sorted(FOLDER.glob("*.py")), ids=lambda path: path.name)
