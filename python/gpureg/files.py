@@ -31,6 +31,7 @@ def write_point_cloud(path: Path, points: Any, normals: Any = None) -> None:
     Parameters
     ----------
     path : str or PathLike
+        Ending in .ply, or in nothing.
     points : (N, 3) array or PointCloud
         float64 coordinates too large for float32 are a ValueError.
     normals : (N, 3) array, optional
@@ -45,6 +46,9 @@ def write_point_cloud(path: Path, points: Any, normals: Any = None) -> None:
     array([[0., 0., 0.],
            [1., 2., 3.]], dtype=float32)
     """
+    extension = os.path.splitext(os.fspath(path))[1]
+    if extension.lower() not in ("", ".ply"):
+        raise ValueError(f"path: {os.fspath(path)!r} ends in '{extension}', but what is written is PLY: let it end in '.ply'")
     if not isinstance(points, PointCloud):
         points = PointCloud(points, normals)
     _core.write_point_cloud(os.fspath(path), points)

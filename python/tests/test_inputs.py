@@ -288,6 +288,16 @@ def test_files(source, tmp_path, reference):
         gpureg.prepare(tmp_path / "nowhere.ply")
 
 
+def test_only_ply_is_written(source, tmp_path):
+    for name in ("room.pcd", "room.xyz", "room.ply.gz"):
+        with pytest.raises(ValueError, match=rf"path: '.*{name}' ends in '.*', but what is written is PLY: let it end in '.ply'"):
+            gpureg.write_point_cloud(tmp_path / name, source)
+    assert not list(tmp_path.iterdir())
+    for name in ("room.ply", "room.PLY", "room"):
+        gpureg.write_point_cloud(tmp_path / name, source)
+        assert len(gpureg.read_point_cloud(tmp_path / name)) == len(source)
+
+
 def test_clouds_that_float32_would_round_are_refused(source, tmp_path):
     there = source + 5e6
     with pytest.raises(ValueError, match=r"points: coordinates up to 5000002 resolve 0.5 in float32, .* pass the array itself to prepare"):
