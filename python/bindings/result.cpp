@@ -282,6 +282,8 @@ void bind_registration_result(py::module_& m) {
       .def_readonly("timings", &R::timings, "Milliseconds per stage.")
       .def("to_dict", &result_state, "All values as plain Python and numpy objects.")
       .def(py::pickle(&result_state, &result_from))
+      // Else a result without a pose would be true, as any object is.
+      .def("__bool__", &R::aligned, "aligned.")
       .def("__repr__", &text_of);
 }
 

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "gpureg/voxel_size.hpp"
 
+#include <cstdio>
+
 #include "cloud.hpp"
 #include "fields.hpp"
 
@@ -20,7 +22,16 @@ void bind_voxel_size(py::module_& m) {
       .def_readonly("spacing", &S::spacing, "Median distance of a point to its nearest neighbour.")
       .def_readonly("noise", &S::noise,
                     "Median distance of points from the plane of their surroundings.")
-      .def_readonly("points", &S::points, "That a cloud keeps, in the median.");
+      .def_readonly("points", &S::points, "That a cloud keeps, in the median.")
+      .def("__repr__", [](const S& s) {
+        if (!s.valid())
+          return std::string("<gpureg.VoxelSizeSuggestion none: ") + to_string(s.reason) + ">";
+        char text[160];
+        std::snprintf(text, sizeof(text),
+                      "<gpureg.VoxelSizeSuggestion %.6g, spacing %.4g, noise %.4g, %zu points>",
+                      static_cast<double>(s.voxel_size), s.spacing, s.noise, s.points);
+        return std::string(text);
+      });
   m.def(
       "suggest_voxel_size",
       [](const py::list& clouds) {

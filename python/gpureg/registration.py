@@ -206,6 +206,7 @@ def register(
     *,
     quality: Optional[int] = None,
     seed: Optional[int] = None,
+    prior: Optional[RegistrationPrior] = None,
     options: Optional[RegistrationOptions] = None,
     time_budget_ms: Optional[float] = None,
     context: Optional[Context] = None,
@@ -223,16 +224,20 @@ def register(
         From 0, the fastest, to 10, which finds the most. Default: 5.
     seed : int, optional
         Same seed, same bits, on any machine.
+    prior : RegistrationPrior, optional
+        What is known of the pose, in the frames of source and target; see `align`.
     options : RegistrationOptions, optional
-        Instead of the three before.
+        Instead of voxel_size, quality and seed.
     time_budget_ms : float, optional
         Instead of quality: as much of it as so many milliseconds allow for the alignment, without
-        preparation; see `align_within`.
+        preparation; see `align_within`. Not together with a prior.
     context : Context, optional
 
     Returns
     -------
     RegistrationResult
+        ``target_from_source`` moves points of the source into the target's frame:
+        ``p_target = R p_source + t``. As a condition, a result is its ``aligned``.
 
     Examples
     --------
@@ -246,6 +251,9 @@ def register(
            [ 0.,  0.,  1.]])
     """
     options = checked(options, RegistrationOptions, "options")
+    checked(prior, RegistrationPrior, "prior")
+    if prior is not None and time_budget_ms is not None:
+        raise TypeError("prior: not together with time_budget_ms")
     if options is not None and not (voxel_size is None and quality is None and seed is None):
         raise TypeError("options: give either options, or voxel_size, quality and seed")
     if time_budget_ms is not None and quality is not None:
@@ -273,4 +281,4 @@ def register(
     a, b = _core.prepare_batch(context, clouds, options.prepare)
     if time_budget_ms is not None:
         return _core.align_within(context, a, b, time_budget_ms, options).result
-    return _core.align(context, a, b, options, None)
+    return _core.align(context, a, b, options, None, prior)

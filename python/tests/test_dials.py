@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Dials instead of numbers: a time budget, and a voxel size from the clouds."""
 
+import re
+
 import numpy as np
 import pytest
 
@@ -82,6 +84,27 @@ def test_priors_drop_what_contradicts_them(clouds):
         gpureg.RegistrationPrior(target_from_source=np.eye(4), max_rotation=0)
     with pytest.raises(TypeError, match="prior: expected a RegistrationPrior"):
         gpureg.align(a, b, prior=np.eye(4))
+
+
+def test_register_takes_a_prior(clouds):
+    right, wrong = pose(), pose()
+    wrong[:3, 3] += 5
+    for given in (clouds, [clouds[0] + 5e6, clouds[1]]):  # in the caller's frames, also those of a map
+        moved_back = np.eye(4)
+        moved_back[:3, 3] = clouds[0][0] - given[0][0]
+        prior = lambda known: gpureg.RegistrationPrior(target_from_source=known @ moved_back, max_rotation=5, max_translation=0.3)  # noqa: E731
+        assert gpureg.register(*given, quality=1, prior=prior(right)).aligned
+        assert gpureg.register(*given, quality=1, prior=prior(wrong)).reason == "contradicts_prior"
+    with pytest.raises(TypeError, match="prior: expected a RegistrationPrior"):
+        gpureg.register(*clouds, prior=right)
+    with pytest.raises(TypeError, match="prior: not together with time_budget_ms"):
+        gpureg.register(*clouds, prior=gpureg.RegistrationPrior(), time_budget_ms=1)
+
+
+def test_voxel_size_suggestions_show_what_they_hold(clouds):
+    text = repr(gpureg.suggest_voxel_size(clouds))
+    assert re.fullmatch(r"<gpureg.VoxelSizeSuggestion 0.0\d+, spacing [\d.e-]+, noise [\d.e-]+, \d+ points>", text)
+    assert repr(gpureg.suggest_voxel_size([])) == "<gpureg.VoxelSizeSuggestion none: no_clouds>"
 
 
 @pytest.mark.parametrize(

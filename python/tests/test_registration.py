@@ -28,7 +28,7 @@ def bits(result):
 
 def test_register_finds_the_pose(source, target, truth):
     result = gpureg.register(source, target, quality=2)
-    assert result.aligned and result.status == "aligned" and result.reason == "none"
+    assert result and result.aligned and result.status == "aligned" and result.reason == "none"
     assert error_of(result, truth) < CLOSE
     assert result.target_from_source.dtype == np.float64
     assert 0.4 < result.inlier_ratio <= 1 and 0 < result.inlier_rmse < 0.05
@@ -76,7 +76,7 @@ def test_seed_and_voxel_size_are_used(source, target):
 
 def test_no_alignment_is_a_status(source):
     result = gpureg.register(source, np.random.default_rng(0).random((9000, 3)), quality=1)
-    assert result.status == "not_aligned" and not result.aligned
+    assert result.status == "not_aligned" and not result.aligned and not result
     assert result.reason == "confidence_too_low" and result.score < 0.5
     assert result.explanation
     if not result.has_candidate:
