@@ -6,6 +6,7 @@ import re
 import subprocess
 import sys
 
+import numpy as np
 import pytest
 from scenes import moved, room
 
@@ -54,18 +55,20 @@ def test_own_features():
     assert "aligned" in run("own_features.py")
 
 
-def test_readme(scans, tmp_path, monkeypatch):
+def test_readme(scans, tmp_path, monkeypatch, source, truth):
     """The snippet runs as it is printed, where it says that its scans are."""
     pytest.importorskip("pyarrow")
     text = (pathlib.Path(__file__).parents[2] / "README.md").read_text()
     section = text[text.index("## In Python") : text.index("## The command")]
     assert "pip install '.[batch]'" in section
     (tmp_path / "out" / "quickstart").mkdir(parents=True)
-    scans.rename(tmp_path / "out" / "quickstart" / "scans-12-1")
+    scans = scans.rename(tmp_path / "out" / "quickstart" / "scans-12-1")
+    gpureg.write_point_cloud(scans / "cloud_bin_2.ply", moved(source, truth))
     monkeypatch.chdir(tmp_path)
     names: dict = {}
     exec(re.search(r"```python\n(.*?)```", section, re.DOTALL).group(1), names)
-    assert len(names["results"]) == 2 and names["run"].pairs == 3 and names["results"][0].aligned
+    assert len(names["results"]) == 2 and names["run"].pairs == 3 and names["results"][1].aligned
+    assert np.abs(names["moved"] - source).max() < 0.05  # a voxel
 
 
 @pytest.mark.parametrize("path", sorted(FOLDER.glob("*.py")), ids=lambda path: path.name)
