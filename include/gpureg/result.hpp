@@ -5,6 +5,7 @@
 #include <Eigen/Geometry>
 #include <array>
 #include <cstdint>
+#include <limits>
 #include <vector>
 
 #include "gpureg/statistics.hpp"
@@ -14,6 +15,13 @@ namespace gpureg {
 /// Eigen::Isometry3d without alignment: Eigen aligns by the processor that a file is compiled for, so with it a program built with
 /// -march=native would see another layout of results than the library does.
 using UnalignedIsometry3d = Eigen::Transform<double, 3, Eigen::Isometry, Eigen::DontAlign>;
+
+/// What stands where there is no pose: NaN, which nobody takes for one.
+inline UnalignedIsometry3d no_pose() {
+  UnalignedIsometry3d pose;
+  pose.matrix().setConstant(std::numeric_limits<double>::quiet_NaN());
+  return pose;
+}
 
 /// Moments of the points that take part in correspondences: what both information-matrix conventions are made of.
 struct CorrespondenceMoments {
@@ -81,7 +89,9 @@ struct RegistrationResult {
   RegistrationStatus status = RegistrationStatus::skipped;
   RegistrationReason reason = RegistrationReason::cancelled;
   bool has_candidate = false;  ///< target_from_source holds a pose, reported or not
-  UnalignedIsometry3d target_from_source = UnalignedIsometry3d::Identity();  ///< converts to Eigen::Isometry3d
+  /// Moves the source's points into the target's frame: p_target = target_from_source * p_source. Converts to Eigen::Isometry3d. NaN without
+  /// a candidate.
+  UnalignedIsometry3d target_from_source = no_pose();
   double score = 0;            ///< what ranks results: the confidence; the inlier ratio with Proposal::quadruples
   double inlier_ratio = 0;     ///< inliers (judged) / points scored, [0, 1]
   double inlier_rmse = 0;      ///< metres, over the inliers

@@ -100,12 +100,12 @@ std::vector<double> shares(const std::vector<double>& logits) {
   return out;
 }
 
-/// The regressions know clouds of thousands of points. Of rooms in voxels of 10 cm to 1 m (bench/accuracy/few_points.py) poses under which
-/// at least 200 points touch are right as often as they say, with 100 three times in four of that, with 20 hardly ever: so few touch under
-/// some pose of any two clouds.
-double with_so_few_points(std::uint32_t touching) {
-  constexpr double kFew = 80;
-  const double n = touching / kFew;
+/// The regressions know clouds of thousands of points, and what small shares of those are worth. Of small clouds (rooms in voxels of 10 cm to
+/// 1 m: bench/accuracy/few_points.py) poses under which at least 200 points touch are right as often as they say, with 100 three times in
+/// four of that, with 20 hardly ever: so few touch under some pose of any two clouds.
+double with_so_few_points(Touching touching) {
+  constexpr double kFew = 80, kSmallCloud = 1500;
+  const double n = touching.count / kFew * std::max(1.0, touching.of / kSmallCloud);
   return 1.0 - std::exp(-n * n);
 }
 
@@ -121,7 +121,7 @@ Likeliest likeliest_of(const std::vector<PoseEvidence>& evidence) {
   return {static_cast<std::size_t>(most - value.begin()), *most};
 }
 
-void set_confidences(std::vector<RegistrationMode>& modes, std::uint32_t refined, const std::function<std::uint32_t(const RegistrationMode&)>& touching,
+void set_confidences(std::vector<RegistrationMode>& modes, std::uint32_t refined, const std::function<Touching(const RegistrationMode&)>& touching,
                      const std::function<bool(const RegistrationMode&, const RegistrationMode&)>& same) {
   if (modes.empty()) return;
   std::vector<PoseEvidence> evidence;

@@ -18,10 +18,15 @@ struct Likeliest {
 /// evidence: of the modes of one pair, not empty.
 Likeliest likeliest_of(const std::vector<PoseEvidence>& evidence);
 
+/// How many points touch under a pose, and of how many: the smaller number of both clouds.
+struct Touching {
+  std::uint32_t count, of;
+};
+
 /// Orders the modes of one pair by how much speaks for them, drops those that are the same as a better one, and fills in their confidence
 /// from the evidence of all of them. refined: as many as were refined at most, EvidenceOptions::modes; how many of them ended in places of
-/// their own tells how little the clouds say. touching(mode): how many points touch, the smaller number of both sides.
-void set_confidences(std::vector<RegistrationMode>& modes, std::uint32_t refined, const std::function<std::uint32_t(const RegistrationMode&)>& touching,
+/// their own tells how little the clouds say.
+void set_confidences(std::vector<RegistrationMode>& modes, std::uint32_t refined, const std::function<Touching(const RegistrationMode&)>& touching,
                      const std::function<bool(const RegistrationMode&, const RegistrationMode&)>& same);
 
 }  // namespace gpureg

@@ -98,7 +98,7 @@ void add_modes(const PairOutcome& outcome, const PreparedState& source, const Pr
   const Eigen::Vector3d middle = middle_of(to_frame(swapped ? first.target_moments : first.source_moments, source), origin_of(source));
   const auto points_touching = [&](const RegistrationMode& m) {
     const ModeOutcome& mode = outcome.modes[m.found_as];
-    return std::min(mode.source.inliers, mode.target.inliers);
+    return Touching{std::min(mode.source.inliers, mode.target.inliers), std::min(mode.source.tested, mode.target.tested)};
   };
   set_confidences(modes, options.evidence.modes, points_touching, [&](const RegistrationMode& a, const RegistrationMode& b) {
     const std::uint32_t family = outcome.modes[a.found_as].family;

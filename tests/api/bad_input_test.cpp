@@ -32,6 +32,7 @@ void expect_failure(const RegistrationResult& r, RegistrationReason reason) {
   EXPECT_EQ(r.status, RegistrationStatus::not_aligned);
   EXPECT_EQ(r.reason, reason) << to_string(r.reason);
   EXPECT_FALSE(r.has_candidate);
+  EXPECT_TRUE(r.target_from_source.matrix().array().isNaN().all());
   EXPECT_EQ(r.score, 0);
 }
 
