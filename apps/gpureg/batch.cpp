@@ -3,10 +3,12 @@
 
 #include <algorithm>
 #include <chrono>
+#include <filesystem>
 #include <iostream>
 #include <map>
 #include <memory>
 #include <optional>
+#include <set>
 #include <string>
 
 #include "command.hpp"
@@ -32,7 +34,13 @@ struct BatchOptions {
   MethodOptions method;
   std::optional<double> min_score;
   std::string log, info, json;
-  bool resume = false, quiet = false;
+  bool resume = false, restart = false, quiet = false;
+
+  std::string journal() const { return log + ".journal"; }
+  Journal::Mode journal_mode() const {
+    if (resume) return Journal::Mode::resume;
+    return restart ? Journal::Mode::restart : Journal::Mode::fresh;
+  }
 
   RegistrationOptions registration() const {
     RegistrationOptions options = method.registration();
@@ -102,6 +110,7 @@ class Batch {
     check_outputs(o_);
     if (o_.resume && !can_have_journal(o_.log))
       throw InvalidArgument("--resume needs a file for -o, but " + o_.log + " is none");
+    if (can_have_journal(o_.log)) Journal::check(o_.journal(), o_.journal_mode());
     const InterruptGuard guard;
     scene_ = prepare_scene(context_, o_.folder, options_.prepare, o_.quiet);
     if (scene_.interrupted) {
@@ -114,9 +123,12 @@ class Batch {
       throw InvalidArgument(o_.pairs == "all" ? o_.folder + " holds one fragment; a batch needs two"
                                               : o_.pairs + " lists no pair");
     open_journal();
+    keep_outputs();
     align_all();
+    const bool complete = done_.size() == pairs_.size();
+    if (!complete && journal_ && kept_.empty()) journal_->note_outputs();
     write_outputs();
-    if (done_.size() < pairs_.size()) return say_interrupted();
+    if (!complete) return say_interrupted();
     if (journal_) journal_->remove();
     return summarise();
   }
@@ -124,16 +136,27 @@ class Batch {
  private:
   void open_journal() {
     if (!can_have_journal(o_.log)) return;
-    const std::string path = o_.log + ".journal";
-    journal_.emplace(path, header_of(o_, scene_, pairs_), o_.resume);
-    if (journal_->discarded() && !o_.quiet)
-      std::cerr << "gpureg: starting anew, " << path << " of an unfinished run is discarded"
-                << std::endl;
+    const bool found = std::filesystem::exists(o_.journal());
+    journal_.emplace(o_.journal(), header_of(o_, scene_, pairs_), o_.journal_mode());
     done_ = journal_->entries();
     resumed_ = done_.size();
-    if (o_.resume && !o_.quiet)
+    if (!o_.resume || o_.quiet) return;
+    if (found)
       std::cerr << "gpureg: " << resumed_ << " of " << pairs_.size() << " pairs are done already"
                 << std::endl;
+    else
+      std::cerr << "gpureg: there is nothing to resume, as no " << o_.journal()
+                << " of an unfinished run is there; all pairs are aligned" << std::endl;
+  }
+
+  /// Only a whole run replaces what another one left; what an interrupted one wrote is its own.
+  void keep_outputs() {
+    if (journal_ && journal_->wrote_outputs()) return;
+    for (const std::string& path : {o_.log, o_.info, o_.json})
+      if (std::filesystem::is_regular_file(path)) kept_.insert(path);
+  }
+  bool may_write(const std::string& path) const {
+    return !path.empty() && (done_.size() == pairs_.size() || kept_.count(path) == 0);
   }
 
   void align_all() {
@@ -176,9 +199,9 @@ class Batch {
       information.push_back({pair.i, pair.j, scene_.count(), information_from_json(matrix)});
     }
     aligned_ = log.size();
-    evaluation::write_log(o_.log, log);
-    if (!o_.info.empty()) evaluation::write_information(o_.info, information);
-    if (!o_.json.empty()) write_document(o_.json, document(std::move(records)));
+    if (may_write(o_.log)) evaluation::write_log(o_.log, log);
+    if (may_write(o_.info)) evaluation::write_information(o_.info, information);
+    if (may_write(o_.json)) write_document(o_.json, document(std::move(records)));
   }
 
   Json document(Json records) const {
@@ -209,9 +232,12 @@ class Batch {
   }
 
   int say_interrupted() const {
+    std::string kept;
+    for (const std::string& path : kept_) kept += (kept.empty() ? "" : ", ") + path;
     std::cerr << "gpureg: interrupted, " << done_.size() << " of " << pairs_.size()
-              << " pairs are done and written; go on with the same command and --resume"
-              << std::endl;
+              << " pairs are done and written"
+              << (kept.empty() ? "" : " to the journal, " + kept + " left as before")
+              << "; go on with the same command and --resume" << std::endl;
     return kInterrupted;
   }
 
@@ -239,6 +265,7 @@ class Batch {
   Pairs pairs_;
   std::optional<Journal> journal_;
   Journal::Entries done_;
+  std::set<std::string> kept_;  // outputs of another run
   std::size_t resumed_ = 0, aligned_ = 0;
   std::map<std::string, std::size_t> reasons_;
   double seconds_ = 0;
@@ -261,7 +288,10 @@ void add_batch(CLI::App& app, Action& chosen) {
       ->required();
   verb->add_option("--info", o->info, "Redwood information matrices of the same pairs");
   verb->add_option("--json", o->json, "Everything about every pair tried");
-  verb->add_flag("--resume", o->resume, "Go on where an interrupted run of this output stopped");
+  CLI::Option* resume = verb->add_flag("--resume", o->resume,
+                                       "Go on where an interrupted run of this output stopped");
+  verb->add_flag("--restart", o->restart, "Discard what an interrupted run of this output did")
+      ->excludes(resume);
   verb->add_flag("--quiet", o->quiet, "No progress, no summary");
   verb->callback([o, &chosen] {
     chosen = [o] {

@@ -39,17 +39,43 @@ std::string difference(const Json& before, const Json& now, const std::string& n
   return name + " was " + before.dump() + ", now " + now.dump();
 }
 
+constexpr const char* kAnew = "with --restart instead of --resume to start anew";
+
+void lock(int fd, const std::string& path) {
+  if (::flock(fd, LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK)
+    throw IoError(path + " is in use: another run writes the same result");
+}
+
+// A header alone holds no work that could be lost.
+void refuse_unfinished(const std::string& path, const std::string& text) {
+  const std::size_t header = text.find('\n');
+  if (header == std::string::npos || header + 1 == text.size()) return;
+  throw IoError(path + " is of an unfinished run: --resume continues it, --restart discards it");
+}
+
 }  // namespace
 
-Journal::Journal(std::string path, const Json& header, bool resume) : path_(std::move(path)) {
+void Journal::check(const std::string& path, Mode mode) {
+  const int fd = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
+  if (fd < 0) return;  // none, or what the constructor complains about
+  try {
+    lock(fd, path);
+    if (mode == Mode::fresh) refuse_unfinished(path, read_text(path));
+  } catch (...) {
+    ::close(fd);
+    throw;
+  }
+  ::close(fd);
+}
+
+Journal::Journal(std::string path, const Json& header, Mode mode) : path_(std::move(path)) {
   fd_ = ::open(path_.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0666);
   if (fd_ < 0) fail(path_, "write", errno);
   try {
-    if (::flock(fd_, LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK)
-      throw IoError(path_ + " is in use: another run writes the same result");
+    lock(fd_, path_);
     const std::string text = read_text(path_);
-    discarded_ = !resume && !text.empty();
-    const std::size_t good = resume ? take_up(text, header) : 0;
+    if (mode == Mode::fresh) refuse_unfinished(path_, text);
+    const std::size_t good = mode == Mode::resume ? take_up(text, header) : 0;
     if (::ftruncate(fd_, static_cast<off_t>(good)) != 0) fail(path_, "write", errno);
     if (::lseek(fd_, 0, SEEK_END) < 0) fail(path_, "write", errno);
     if (good == 0) {
@@ -78,7 +104,9 @@ std::size_t Journal::take_up(const std::string& text, const Json& header) {
       if (line == 0) {
         if (json != header)
           throw IoError("cannot resume from " + path_ + ": " + difference(json, header, "") +
-                        "; call with the same options, or without --resume to start anew");
+                        "; call with the same options, or " + kAnew);
+      } else if (json.contains("outputs")) {
+        wrote_outputs_ = true;
       } else {
         Entry entry{PairRecord::from_json(json.at("pair")), json.at("information")};
         information_from_json(entry.information);
@@ -89,7 +117,7 @@ std::size_t Journal::take_up(const std::string& text, const Json& header) {
       throw;
     } catch (const std::exception& error) {
       throw IoError("cannot resume from " + path_ + ": line " + std::to_string(line + 1) +
-                    " is damaged (" + error.what() + "); call without --resume to start anew");
+                    " is damaged (" + error.what() + "); call " + kAnew);
     }
     good = end + 1;
   }
@@ -98,6 +126,12 @@ std::size_t Journal::take_up(const std::string& text, const Json& header) {
 void Journal::add(const PairRecord& pair, const Json& information) {
   entries_.emplace(std::make_pair(pair.i, pair.j), Entry{pair, information});
   pending_ += Json{{"pair", pair.json}, {"information", information}}.dump() + "\n";
+}
+
+void Journal::note_outputs() {
+  if (!wrote_outputs_) pending_ += Json{{"outputs", "as far as here"}}.dump() + "\n";
+  wrote_outputs_ = true;
+  flush();
 }
 
 void Journal::flush() {

@@ -15,6 +15,9 @@ namespace gpureg::cli {
 /// cut off when the run goes on.
 class Journal {
  public:
+  /// What becomes of a journal that is there: fresh refuses one that holds pairs.
+  enum class Mode { fresh, resume, restart };
+
   struct Entry {
     PairRecord pair;
     Json information;  ///< 6x6 of Redwood's convention, row by row
@@ -22,15 +25,22 @@ class Journal {
   using Entries = std::map<std::pair<int, int>, Entry>;
 
   /// Opens or creates. header: what must be the same for a run to go on; resume: take up what is
-  /// there (refused where headers differ), else start anew. Throws IoError, also where another
-  /// process writes the same journal.
-  Journal(std::string path, const Json& header, bool resume);
+  /// there (refused where headers differ). Throws IoError, also where another process writes the
+  /// same journal.
+  Journal(std::string path, const Json& header, Mode mode);
   ~Journal();
   Journal(const Journal&) = delete;
   Journal& operator=(const Journal&) = delete;
 
+  /// What can be refused before there is a header, and hours of work: a journal that another process
+  /// writes, and with fresh one that holds pairs. Changes nothing. Throws IoError.
+  static void check(const std::string& path, Mode mode);
+
   const Entries& entries() const { return entries_; }
-  bool discarded() const { return discarded_; }  ///< an older journal was there and not asked for
+
+  /// Whether the outputs are of this run, as far as it was when it was interrupted.
+  bool wrote_outputs() const { return wrote_outputs_; }
+  void note_outputs();
 
   /// Adds a pair; flush() hands all pairs added to the system. Throw IoError.
   void add(const PairRecord& pair, const Json& information);
@@ -46,7 +56,7 @@ class Journal {
   int fd_ = -1;
   std::string pending_;
   Entries entries_;
-  bool discarded_ = false;
+  bool wrote_outputs_ = false;
 };
 
 }  // namespace gpureg::cli

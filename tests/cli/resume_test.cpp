@@ -82,33 +82,67 @@ TEST_F(Resume, AfterAKillInTheMiddleOfALine) {
 
 TEST_F(Resume, AfterCtrlC) {
   for (const int signal : {SIGINT, SIGTERM}) {
-    const Outcome interrupted = ended_midway("r", signal);
+    const std::string name = "r" + std::to_string(signal);
+    const Outcome interrupted = ended_midway(name, signal);
     EXPECT_EQ(interrupted.status, 130);
     expect_holds(interrupted.err, {"interrupted", "of 28 pairs are done", "--resume"});
     // What is done is kept: files that are whole, and say that they are not all.
-    const auto json = json_of(out_ / "r.json");
+    const auto json = json_of(out_ / (name + ".json"));
     EXPECT_EQ(json["complete"], false);
     const std::size_t done = json["pairs"].size();
     EXPECT_GT(done, 0u);
     EXPECT_LT(done, static_cast<std::size_t>(kPairs));
-    EXPECT_EQ(lines(out_ / "r.log"), 5 * done);
-    EXPECT_EQ(content_of(out_ / "whole.log").rfind(content_of(out_ / "r.log"), 0), 0u);
-    EXPECT_EQ(run(batch("r", {"--resume"})).status, 0);
-    expect_like_whole("r");
+    const std::string log = out_ / (name + ".log");
+    EXPECT_EQ(lines(log), 5 * done);
+    EXPECT_EQ(content_of(out_ / "whole.log").rfind(content_of(log), 0), 0u);
+    EXPECT_EQ(run(batch(name, {"--resume"})).status, 0);
+    expect_like_whole(name);
   }
 }
 
 TEST_F(Resume, NothingToResumeStartsAnew) {
-  EXPECT_EQ(run(batch("r", {"--resume"})).status, 0);
+  const Outcome outcome = run(batch("r", {"--resume"}));
+  EXPECT_EQ(outcome.status, 0);
+  expect_holds(outcome.err, {"nothing to resume", journal("r")});
   expect_like_whole("r");
 }
 
-TEST_F(Resume, WithoutResumeItStartsAnewAndSaysSo) {
+TEST_F(Resume, AnUnfinishedRunIsDiscardedOnRequestOnly) {
   ended_midway("r", SIGINT);
-  const Outcome anew = run(batch("r"));
+  const std::string before = content_of(journal("r")), log = content_of(out_ / "r.log");
+  expect_refused(batch("r"), {journal("r"), "unfinished", "--resume continues", "--restart"});
+  expect_refused(batch("r", {"--resume", "--restart"}), {"--resume", "--restart"});
+  EXPECT_EQ(content_of(journal("r")), before);
+  EXPECT_EQ(content_of(out_ / "r.log"), log);
+  const Outcome anew = run(batch("r", {"--restart"}));
   EXPECT_EQ(anew.status, 0);
-  expect_holds(anew.err, {"starting anew", "discarded"});
+  EXPECT_EQ(json_of(out_ / "r.json")["seconds"]["pairs_in_this_run"], kPairs);
   expect_like_whole("r");
+}
+
+TEST_F(Resume, AnInterruptedRunLeavesAFinishedResultAsItIs) {
+  const auto contents = [&] {
+    std::vector<std::string> all;
+    for (const char* name : {"whole.log", "whole.info", "whole.json"})
+      all.push_back(content_of(out_ / name));
+    return all;
+  };
+  const std::vector<std::string> before = contents();
+  const Outcome interrupted = ended_midway("whole", SIGINT);
+  EXPECT_EQ(interrupted.status, 130);
+  expect_holds(interrupted.err, {"to the journal", out_ / "whole.log", "--resume"});
+  EXPECT_TRUE(contents() == before);
+  // Nor does it become the unfinished run's own when that is resumed and interrupted again.
+  Command again(batch("whole", {"--threads", "1", "--resume"}));
+  const std::size_t lines_before = lines(journal("whole"));
+  while (again.running() && lines(journal("whole")) <= lines_before)
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  again.send(SIGINT);
+  EXPECT_EQ(again.wait().status, 130);
+  EXPECT_TRUE(contents() == before);
+  EXPECT_EQ(run(batch("whole", {"--resume"})).status, 0);
+  EXPECT_NE(content_of(out_ / "whole.json"), before[2]) << "it has other times";
+  EXPECT_EQ(content_of(out_ / "whole.log"), before[0]);
 }
 
 TEST_F(Resume, ChangedOptionsAreRefused) {

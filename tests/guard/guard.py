@@ -51,7 +51,7 @@ def measure_accuracy(arguments):
     folder, found = scene(arguments), {}
     for name, words in RUNS.items():
         result, scores = arguments.work / f"{name}.json", arguments.work / f"{name}.scores.json"
-        gpureg(arguments, "batch", folder, "--backend", "cpu", "--voxel-size", VOXEL, *words, "-o", arguments.work / f"{name}.log", "--json", result, "--quiet")
+        gpureg(arguments, "batch", folder, "--restart", "--backend", "cpu", "--voxel-size", VOXEL, *words, "-o", arguments.work / f"{name}.log", "--json", result, "--quiet")
         gpureg(arguments, "evaluate", result, "--ground-truth", folder, "--json", scores)
         verdict = json.loads(scores.read_text())["scenes"][0]
         geometric = verdict["geometric"]
