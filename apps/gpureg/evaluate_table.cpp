@@ -21,9 +21,11 @@ constexpr std::size_t kNumber = 9;  // width of a column
 std::string cell(const std::string& text) { return pad_left(text, kNumber); }
 
 std::string row(const Scores& s, const std::optional<RankedScores>& ranked) {
+  // Of no reports all are right, in the protocol's means; a reader would take it for a success.
+  const std::string precision = s.reported > 0 ? percent(s.precision()) : "n/a";
   std::string text = cell(std::to_string(s.good)) + cell(std::to_string(s.ground_truth)) +
                      cell(std::to_string(s.reported)) + cell(percent(s.recall())) +
-                     pad_left(percent(s.precision()), kNumber + 2);
+                     pad_left(precision, kNumber + 2);
   if (ranked)
     for (const double value :
          {ranked->raw_recall, ranked->recall_at_50, ranked->recall_at_80, ranked->recall_at_95,
@@ -66,6 +68,9 @@ void print_notes(const SceneEvaluation& scene) {
   const auto note = [&](long long number, const char* what) {
     if (number > 0) std::cout << "note: " << scene.name << ": " << number << " " << what << "\n";
   };
+  if (std::none_of(result.reports.begin(), result.reports.end(),
+                   [](const evaluation::Report& report) { return report.reported; }))
+    std::cout << "note: " << scene.name << ": " << result.path << " holds no reports\n";
   std::set<std::pair<int, int>> tried;
   long long neighbors = 0, missing = 0;
   for (const evaluation::Report& report : result.reports) neighbors += report.j - report.i <= 1;

@@ -125,6 +125,20 @@ TEST_F(Evaluate, TheStrictRankingGoesByTheChanceOfOverlapToo) {
   expect_bad(json{{"pairs", {low}}}.dump(), {"pairs[0]", "overlap_confidence", "high"});
 }
 
+TEST_F(Evaluate, NoReportsHaveNoPrecision) {
+  const std::string log = out_.write("empty.log", ""), note = " holds no reports";
+  Outcome outcome = evaluate(log);
+  EXPECT_EQ(outcome.status, 0);
+  expect_holds(outcome.out, {"n/a", log + note});
+  EXPECT_EQ(outcome.out.find("100.0"), std::string::npos) << outcome.out;
+  outcome = evaluate(write(json::array({pair(0, 2, 0.2, false, false)})));
+  expect_holds(outcome.out, {"n/a", out_ / ("r.json" + note)});
+  outcome = evaluate(write(json::array({pair(0, 2, 0.9, true, true)})));
+  expect_holds(outcome.out, {" 0.0"});
+  EXPECT_EQ(outcome.out.find("n/a"), std::string::npos) << outcome.out;
+  EXPECT_EQ(outcome.out.find(note), std::string::npos) << outcome.out;
+}
+
 TEST_F(Evaluate, EveryPairHasItsVerdict) {
   const std::string path = write({pair(0, 2, 0.9, true, false), pair(0, 3, 0.4, false, true),
                                   pair(1, 7, 0.7, true, false), pair(4, 5, 0.9, true, false)});
