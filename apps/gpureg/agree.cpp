@@ -78,7 +78,7 @@ Json agreed_record(const PairRecord& record, const PairAgreement& agreed, double
 }
 
 int run(const AgreeOptions& o) {
-  for (const std::string* path : {&o.json, &o.log}) check_output(*path);
+  check_outputs({{"--json", o.json}, {"-o", o.log}}, {{"RESULT", o.result}});
   ResultFile file = read_result(o.result);
   if (!file.has_scores) throw IoError(o.result + ": is a log; loops need RESULT.json of a batch");
   const AgreementOptions options = agreement_options(o, file.document);

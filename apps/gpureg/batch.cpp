@@ -56,16 +56,18 @@ struct BatchOptions {
   }
 };
 
-void check_outputs(const BatchOptions& o) {
-  for (const std::string* path : {&o.log, &o.info, &o.json}) check_output(*path);
-  if (o.log == o.info || o.log == o.json || (!o.info.empty() && o.info == o.json))
-    throw InvalidArgument("-o, --info and --json must name different files");
-}
-
 // A device or pipe (/dev/stdout, say) has no place beside it.
 bool can_have_journal(const std::string& path) {
   struct stat status {};
   return ::stat(path.c_str(), &status) != 0 || S_ISREG(status.st_mode);
+}
+
+void check_outputs(const BatchOptions& o) {
+  std::vector<NamedPath> inputs = scene_files("DIR", o.folder);
+  if (o.pairs != "all") inputs.push_back({"--pairs", o.pairs});
+  std::vector<NamedPath> outputs = {{"-o", o.log}, {"--info", o.info}, {"--json", o.json}};
+  if (can_have_journal(o.log)) outputs.push_back({"the journal of -o", o.journal()});
+  check_outputs(outputs, inputs);
 }
 
 using Pairs = std::vector<std::pair<std::uint32_t, std::uint32_t>>;  // indices i < j into the scene
@@ -107,7 +109,6 @@ class Batch {
       : o_(o), options_(o.registration()), context_(o.method.context()) {}
 
   int run() {
-    check_outputs(o_);
     if (o_.resume && !can_have_journal(o_.log))
       throw InvalidArgument("--resume needs a file for -o, but " + o_.log + " is none");
     if (can_have_journal(o_.log)) Journal::check(o_.journal(), o_.journal_mode());
@@ -295,6 +296,8 @@ void add_batch(CLI::App& app, Action& chosen) {
   verb->add_flag("--quiet", o->quiet, "No progress, no summary");
   verb->callback([o, &chosen] {
     chosen = [o] {
+      o->registration();  // what is wrong with it shall be said before clouds are read
+      check_outputs(*o);
       choose_voxel_size(*o);
       return Batch(*o).run();
     };

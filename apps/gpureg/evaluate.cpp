@@ -2,6 +2,7 @@
 #include <iostream>
 #include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "command.hpp"
@@ -77,7 +78,12 @@ int run(const EvaluateOptions& o) {
   if (!o.recall_logs.empty() && o.results.size() != 1)
     throw InvalidArgument("--registration-recall takes one result, not " +
                           std::to_string(o.results.size()));
-  check_output(o.json);
+  std::vector<NamedPath> inputs;
+  for (const std::string& folder : o.truths)
+    for (NamedPath& file : truth_files("--ground-truth", folder)) inputs.push_back(std::move(file));
+  for (const std::string& result : o.results) inputs.push_back({"RESULT", result});
+  for (const std::string& log : o.recall_logs) inputs.push_back({"--registration-recall", log});
+  check_outputs({{"--json", o.json}}, inputs);
   std::vector<SceneEvaluation> scenes;
   std::vector<Recalls> recalls;
   for (std::size_t k = 0; k < o.results.size(); ++k) {

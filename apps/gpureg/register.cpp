@@ -100,7 +100,8 @@ Json document(const RegisterOptions& o, const RegistrationOptions& options, cons
 
 int run(RegisterOptions o) {
   o.method.registration();  // what is wrong with it shall be said before clouds are read
-  for (const std::string* path : {&o.json, &o.overlay, &o.image}) check_output(*path);
+  check_outputs({{"--json", o.json}, {"--overlay", o.overlay}, {"--image", o.image}},
+                {{"SOURCE", o.source}, {"TARGET", o.target}});
   const Context context = o.method.context();
   const PointCloud source_cloud = io::read_point_cloud(o.source);
   const PointCloud target_cloud = io::read_point_cloud(o.target);

@@ -4,6 +4,8 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "before_after.hpp"
 #include "command.hpp"
@@ -47,7 +49,10 @@ std::vector<Picture> draw(const std::vector<SamplePair>& samples, const std::str
 }
 
 int run(const ReportOptions& o) {
-  check_output(o.output);
+  std::vector<NamedPath> inputs = truth_files("--ground-truth", o.truth);
+  for (NamedPath& file : scene_files("--clouds", o.clouds)) inputs.push_back(std::move(file));
+  inputs.push_back({"RESULT", o.result});
+  check_outputs({{"-o", o.output}}, inputs);
   const ResultFile result = read_result(o.result);
   if (!result.has_scores)
     throw IoError(o.result +

@@ -52,6 +52,41 @@ TEST_F(Output, PlacesThatCannotBeWritten) {
   EXPECT_EQ(out_.count(), 0u);
 }
 
+TEST_F(Output, NoOutputIsWrittenOverAnInputOrAnotherOutput) {
+  const std::string a = scans_ / "cloud_bin_0.ply", b = scans_ / "cloud_bin_1.ply";
+  const std::string before = content_of(b), log = out_ / "r.log";
+  // However it is spelt.
+  const std::string detour = scans_ / "../" + fs::path(scans_.path()).filename().string();
+  fs::create_symlink(b, out_ / "link.ply");
+  for (const std::string& same : {b, detour + "/cloud_bin_1.ply", out_ / "link.ply"}) {
+    for (const char* option : {"--json", "--overlay", "--image"})
+      expect_refused({"register", a, b, option, same}, {option, "TARGET", "different files", b});
+    expect_refused(batch(log, {"--json", same}), {"--json", "DIR", "different files", b});
+  }
+  expect_refused({"register", a, b, "--image", a}, {"--image", "SOURCE", a});
+  expect_refused({"register", a, b, "--image", out_ / "x", "--json", out_ / "./x"},
+                 {"--image", "--json", out_ / "./x"});
+  const std::string cameras = scans_.write("cameras.txt", "0 0 0 0 0 0 0 0 1\n");
+  expect_refused(batch(log, {"--info", cameras}), {"--info", "DIR", cameras});
+  const std::string pairs = out_.write("pairs.txt", "0 1\n");
+  expect_refused(batch(log, {"--pairs", pairs, "--info", pairs}), {"--info", "--pairs", pairs});
+  expect_refused(batch(log, {"--json", log + ".journal"}), {"--json", "journal of -o"});
+  const std::string json = out_.write("r.json", "{\"pairs\": []}");
+  expect_refused({"report", json, "-o", json}, {"-o", "RESULT", json});
+  expect_refused({"report", json, "-o", b, "--clouds", scans_.path()}, {"-o", "--clouds", b});
+  expect_refused({"agree", json, "--json", json}, {"--json", "RESULT", json});
+  expect_refused({"agree", json, "--json", out_ / "x", "-o", out_ / "x"}, {"--json", "-o"});
+  expect_refused({"evaluate", json, "--ground-truth", scans_.path(), "--json", json},
+                 {"--json", "RESULT", json});
+  expect_refused({"evaluate", json, "--ground-truth", scans_.path(), "--json", scans_ / "gt.log"},
+                 {"--json", "--ground-truth", scans_ / "gt.log"});
+  EXPECT_EQ(content_of(b), before);
+  EXPECT_EQ(content_of(json), "{\"pairs\": []}");
+  EXPECT_FALSE(fs::exists(log));
+  // Nothing is lost in a device.
+  EXPECT_EQ(run(batch("/dev/null", {"--json", "/dev/null"})).status, 0);
+}
+
 TEST_F(Output, UnwritableOutputIsFoundBeforeTheWork) {
   const Outcome outcome = run(joined({"register", scans_ / "cloud_bin_0.ply",
                                       scans_ / "cloud_bin_1.ply", "--json", out_ / "no/r.json"},
