@@ -1,12 +1,15 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "data/generate.hpp"
 
+#include <filesystem>
 #include <iostream>
 #include <memory>
 #include <optional>
 #include <string>
 
 #include "command.hpp"
+#include "gpureg/error.hpp"
+#include "gpureg/evaluation.hpp"
 #include "interrupt.hpp"
 #include "method_options.hpp"
 #include "progress.hpp"
@@ -20,12 +23,33 @@ struct GenerateOptions {
   bool quiet = false;
 };
 
+constexpr const char* kMark = "generated.txt";  // in every folder that is ours to write
+
+std::string mark_of(const std::string& folder) {
+  return (std::filesystem::path(folder) / kMark).string();
+}
+
+// Scans of another origin may have the same names.
+void check_folder(const std::string& folder) {
+  namespace fs = std::filesystem;
+  std::error_code error;  // what else is wrong with the folder comes up when it is written
+  if (!fs::is_directory(folder, error) || fs::exists(mark_of(folder), error)) return;
+  if (!fs::is_empty(folder, error) && !error)
+    throw IoError(folder + " is not empty and, without a " + kMark +
+                  ", no scene of `gpureg generate`; choose another folder");
+}
+
 int run(const GenerateOptions& o) {
+  check_folder(o.folder);
   const InterruptGuard guard;
   std::string stage;
   std::optional<Progress> progress;
   synthetic::Progress hooks;
   hooks.report = [&](int done, int total, const char* name) {
+    // The folder is there by now, and no cloud in it yet.
+    if (stage.empty())
+      evaluation::write_file_atomically(
+          mark_of(o.folder), "Made by gpureg generate, which may replace files of this folder.\n");
     if (stage != name) {
       progress.emplace(name, name == std::string("fragments") ? "scanned" : "done",
                        static_cast<std::size_t>(total), o.quiet);
@@ -52,7 +76,9 @@ void add_generate(CLI::App& app, Action& chosen) {
   const auto o = std::make_shared<GenerateOptions>();
   CLI::App* verb =
       app.add_subcommand("generate", "Make a synthetic scene in Redwood's layout, with its truth");
-  verb->add_option("OUT", o->folder, "Folder to write")->required();
+  verb->add_option("OUT", o->folder,
+                   "Folder to write: new, empty, or of an earlier run, whose files are replaced")
+      ->required();
   verb->add_option("--fragments", o->scene.fragments, "Number of fragments")->capture_default_str();
   verb->add_option("--frames-per-fragment", o->scene.frames_per_fragment,
                    "Depth frames fused into each")

@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <gtest/gtest.h>
 
+#include <csignal>
+#include <thread>
+
 #include "cli/command.hpp"
 #include "cli/scene.hpp"
 
@@ -46,6 +49,23 @@ TEST(Generate, WhatItMakesGoesThroughTheOtherVerbs) {
       run({"report", result, "--ground-truth", scans, "--clouds", scans, "-o", out / "report.html"})
           .status,
       0);
+}
+
+TEST(Generate, WritesIntoNoFolderOfOthers) {
+  const TemporaryFolder out, empty;
+  const std::string mine = out.write("cloud_bin_0.ply", "a scan of mine");
+  expect_refused(generate(out.path(), "5"), {out.path(), "not empty"});
+  EXPECT_EQ(content_of(mine), "a scan of mine");
+  EXPECT_EQ(out.count(), 1u);
+  EXPECT_EQ(run(generate(empty.path(), "5")).status, 0);
+  // A scene of its own is replaced, also one that was never finished.
+  EXPECT_EQ(run(generate(empty.path(), "6")).status, 0);
+  Command killed({"generate", out / "new", "--fragments", "2", "--frames-per-fragment", "50"});
+  while (killed.running() && !std::filesystem::exists(out / "new/cloud_bin_0.ply"))
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  killed.send(SIGKILL);
+  killed.wait();
+  EXPECT_EQ(run(generate(out / "new", "5")).status, 0);
 }
 
 TEST(Generate, BadValues) {
