@@ -9,6 +9,7 @@
 #include "command.hpp"
 #include "gpureg/agreement.hpp"
 #include "gpureg/error.hpp"
+#include "gpureg/options.hpp"
 #include "json_file.hpp"
 #include "output_path.hpp"
 #include "result_file.hpp"
@@ -19,7 +20,7 @@ namespace {
 
 struct AgreeOptions {
   std::string result, json, log;
-  float voxel_size = 0;  // 0: the result's own
+  std::optional<float> voxel_size;  // none: the result's own
   std::optional<double> min_confidence;
 };
 
@@ -32,7 +33,11 @@ double option_of(const Json& document, const char* group, const char* name, doub
 }
 
 AgreementOptions agreement_options(const AgreeOptions& o, const Json& document) {
-  if (o.voxel_size != 0) return AgreementOptions::from_voxel_size(o.voxel_size);
+  if (o.voxel_size) {
+    // The batch would have taken no other one either.
+    RegistrationOptions::from_voxel_size(*o.voxel_size).validate();
+    return AgreementOptions::from_voxel_size(*o.voxel_size);
+  }
   double voxel_size = option_of(document, "prepare", "voxel_size", 0);
   if (voxel_size == 0) voxel_size = option_of(document, "prepare", "search_distance", 0) / 1.5;
   if (voxel_size == 0) throw IoError(o.result + ": does not say the voxel size; give --voxel-size");
@@ -77,10 +82,19 @@ Json agreed_record(const PairRecord& record, const PairAgreement& agreed, double
   return json;
 }
 
+// The same loops would count as new evidence, and poses that were chosen by them as first choices.
+void refuse_agreed(const ResultFile& file) {
+  bool agreed = file.document.contains("agreement");
+  for (const PairRecord& pair : file.pairs) agreed |= pair.json.contains("agreement");
+  if (agreed)
+    throw IoError(file.path + ": its scores are those of `gpureg agree` already; give the RESULT.json of the batch");
+}
+
 int run(const AgreeOptions& o) {
   check_outputs({{"--json", o.json}, {"-o", o.log}}, {{"RESULT", o.result}});
   ResultFile file = read_result(o.result);
   if (!file.has_scores) throw IoError(o.result + ": is a log; loops need RESULT.json of a batch");
+  refuse_agreed(file);
   const AgreementOptions options = agreement_options(o, file.document);
   const double min_confidence =
       o.min_confidence.value_or(option_of(file.document, nullptr, "min_confidence", 0.5));

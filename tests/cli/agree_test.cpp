@@ -88,6 +88,31 @@ TEST_F(Agree, TheResultOfABatch) {
     EXPECT_EQ(after["pairs"][k]["agreement"]["score_alone"], before["pairs"][k]["score"]);
 }
 
+TEST_F(Agree, TheSameEvidenceCountsOnce) {
+  const std::string result = folder_.write("r.json", document(pairs()).dump());
+  ASSERT_EQ(run({"agree", result, "--json", folder_ / "a.json"}).status, 0);
+  const auto expect_refused_again = [&] {
+    expect_refused({"agree", folder_ / "a.json", "--json", folder_ / "b.json"},
+                   {folder_ / "a.json", "gpureg agree", "already", "RESULT.json of the batch"});
+    EXPECT_FALSE(std::filesystem::exists(folder_ / "b.json"));
+  };
+  expect_refused_again();
+  // Also where a program kept the pairs alone.
+  json kept = json_of(folder_ / "a.json");
+  kept.erase("agreement");
+  folder_.write("a.json", kept.dump());
+  expect_refused_again();
+}
+
+TEST_F(Agree, VoxelSizesThatCannotBe) {
+  const std::string result = folder_.write("r.json", document(pairs()).dump());
+  for (const std::string size : {"1e9", "0", "-1", "nan", "1e-9"})
+    expect_refused({"agree", result, "--json", folder_ / "a.json", "--voxel-size", size},
+                   {"voxel_size is "});
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "a.json"));
+  EXPECT_EQ(run({"agree", result, "--json", folder_ / "a.json", "--voxel-size", "0.05"}).status, 0);
+}
+
 TEST_F(Agree, BadInputIsNamed) {
   const auto refused = [&](const json& content, std::initializer_list<std::string> fragments) {
     const std::string path = folder_.write("bad.json", content.dump());
