@@ -25,6 +25,7 @@ std::string check_natural(const std::string& text) {
 CLI::Validator natural_number() { return CLI::Validator(&check_natural, "", "natural number"); }
 
 void MethodOptions::add_to(CLI::App& verb) {
+  verb_ = &verb;
   verb.add_option_function<std::string>(
           "--voxel-size",
           [this](const std::string& text) {
@@ -63,6 +64,10 @@ void MethodOptions::add_to(CLI::App& verb) {
 }
 
 RegistrationOptions MethodOptions::registration() const {
+  const char* idle = preset == "loopsmart" ? "--quality" : "--hypotheses";
+  if (given(idle))
+    throw InvalidArgument(std::string(idle) + " does nothing with --preset " + preset +
+                          (given("--preset") ? "" : ", which is the default"));
   RegistrationOptions options = preset == "loopsmart"
                                     ? RegistrationOptions::loopsmart(voxel_size)
                                     : RegistrationOptions::from_voxel_size(voxel_size, quality);

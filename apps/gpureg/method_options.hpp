@@ -25,7 +25,10 @@ struct MethodOptions {
 
   void add_to(CLI::App& verb);
 
-  /// Throws InvalidArgument naming field and value.
+  /// Whether the user gave the option, as "--quality"; add_to() was called.
+  bool given(const std::string& option) const { return verb_->count(option) > 0; }
+
+  /// Throws InvalidArgument naming field and value, or options that do not go together.
   RegistrationOptions registration() const;
 
   /// Where the voxel size is automatic: makes it the one that the clouds suggest. what: for the message. Throws InvalidArgument where
@@ -34,6 +37,9 @@ struct MethodOptions {
 
   /// Throws BackendUnavailable, InvalidArgument.
   Context context() const;
+
+ private:
+  const CLI::App* verb_ = nullptr;
 };
 
 /// Refuses what is no number of 64 bits without a sign.

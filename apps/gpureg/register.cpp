@@ -6,6 +6,7 @@
 
 #include "before_after.hpp"
 #include "command.hpp"
+#include "gpureg/error.hpp"
 #include "gpureg/evaluation.hpp"
 #include "gpureg/io.hpp"
 #include "gpureg/registration.hpp"
@@ -100,6 +101,8 @@ Json document(const RegisterOptions& o, const RegistrationOptions& options, cons
 
 int run(RegisterOptions o) {
   o.method.registration();  // what is wrong with it shall be said before clouds are read
+  if (o.time_budget && o.method.given("--quality"))
+    throw InvalidArgument("--time-budget chooses the quality, give it or --quality");
   check_outputs({{"--json", o.json}, {"--overlay", o.overlay}, {"--image", o.image}},
                 {{"SOURCE", o.source}, {"TARGET", o.target}});
   const Context context = o.method.context();

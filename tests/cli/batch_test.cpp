@@ -158,7 +158,7 @@ TEST_F(Batch, MinimalScoreDecidesWhatIsReported) {
 TEST_F(Batch, MinimalScoreOfLoopsmartIsTheInlierRatio) {
   const auto reported = [&](const std::string& score) {
     const std::string name = "ratio" + score;
-    batch(name, {"--preset", "loopsmart", "--min-score", score});
+    batch(name, joined(kLoopsmart, {"--min-score", score}));
     const auto json = json_of(out_ / (name + ".json"));
     EXPECT_FLOAT_EQ(json["options"]["score"]["min_inlier_ratio"].get<float>(), std::stof(score));
     EXPECT_EQ(json["options"]["min_confidence"], 0.5) << "not asked for";

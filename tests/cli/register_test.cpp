@@ -99,7 +99,7 @@ TEST_F(Register, SeedDecidesAndThreadsDoNot) {
   const auto one = result({"--threads", "1"});
   EXPECT_EQ(one, result({"--threads", "7"}));
   EXPECT_NE(one["modes"], result({"--seed", "2"})["modes"]);
-  EXPECT_EQ(result({"--preset", "loopsmart"})["statistics"]["refine_iterations"], 0);
+  EXPECT_EQ(result(kLoopsmart)["statistics"]["refine_iterations"], 0);
 }
 
 TEST_F(Register, Overlay) {

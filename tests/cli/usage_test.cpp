@@ -72,8 +72,11 @@ TEST_F(Usage, OtherValues) {
   expect_refused(with({"--seed", "-4"}), {"--seed", "-4"});
   expect_refused(with({"--seed", "1.5"}), {"--seed", "1.5"});
   expect_refused(with({"--seed", "18446744073709551616"}), {"--seed", "18446744073709551616"});
-  expect_refused(with({"--hypotheses", "0"}), {"hypothesis.count is 0"});
-  expect_refused(with({"--hypotheses", "2000000000"}), {"hypothesis.count is 2000000000"});
+  const auto hypotheses = [&](const char* count) {
+    return with({"--preset", "loopsmart", "--hypotheses", count});
+  };
+  expect_refused(hypotheses("0"), {"hypothesis.count is 0"});
+  expect_refused(hypotheses("2000000000"), {"hypothesis.count is 2000000000"});
   expect_refused(with({"--hypotheses", "4e6"}), {"--hypotheses", "4e6"});
   expect_refused(with({"--hypotheses", "4294967297"}), {"--hypotheses", "4294967297"});
   expect_refused(with({"--threads", "-1"}), {"--threads", "-1"});
@@ -83,6 +86,17 @@ TEST_F(Usage, OtherValues) {
   for (const char* score : {"-0.1", "1.01", "nan", "high"})
     expect_refused({"batch", folder_.path(), "-o", folder_ / "r.log", "--min-score", score},
                    {"--min-score", score});
+}
+
+TEST_F(Usage, OptionsThatWouldDoNothing) {
+  expect_refused(with({"--hypotheses", "100"}), {"--hypotheses", "--preset default"});
+  expect_refused(with({"--preset", "default", "--hypotheses", "100"}),
+                 {"--hypotheses", "--preset default"});
+  expect_refused(with({"--preset", "loopsmart", "--quality", "3"}),
+                 {"--quality", "--preset loopsmart"});
+  expect_refused(with({"--time-budget", "10", "--quality", "3"}), {"--time-budget", "--quality"});
+  expect_refused({"batch", folder_.path(), "-o", folder_ / "r.log", "--hypotheses", "100"},
+                 {"--hypotheses", "--preset default"});
 }
 
 TEST_F(Usage, MessagesStayInOneLine) {
