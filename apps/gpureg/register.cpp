@@ -44,7 +44,7 @@ std::string describe(const Eigen::Matrix4d& pose) {
   for (int row = 0; row < 4; ++row) {
     text += "   ";
     for (int column = 0; column < 4; ++column)
-      text += pad_left(fixed(pose(row, column), 6), column < 3 ? 11 : 14);
+      text += " " + pad_left(fixed(pose(row, column), 6), column < 3 ? 10 : 13);
     text += "\n";
   }
   return text;

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <gtest/gtest.h>
 
+#include <sstream>
+
 #include "cli/command.hpp"
 #include "cli/scene.hpp"
 #include "gpureg/io.hpp"
@@ -27,6 +29,21 @@ TEST_F(Register, SaysWhatItFound) {
                {source_, target_, "backend  cpu", "status   aligned", "target_from_source\n",
                 "score", "inliers", "correspondences", "hypotheses 1,024", "survivors", "features",
                 "depth maps", "match", "refine"});
+}
+
+TEST_F(Register, NumbersOfAFarPoseStayApart) {
+  PointCloud far = room_scan(1);
+  for (Eigen::Vector3f& point : far.points) point += Eigen::Vector3f(-201112, -301112, -401112);
+  const Outcome outcome = run(joined(
+      {"register", source_, write_cloud(folder_, "far.ply", far), "--json", folder_ / "r.json"}, kSmall));
+  const auto pose = json_of(folder_ / "r.json")["result"]["target_from_source"];
+  ASSERT_EQ(pose.size(), 16u) << outcome.out << outcome.err;
+  std::istringstream printed(outcome.out.substr(outcome.out.find("target_from_source\n") + 19));
+  for (const auto& expected : pose) {
+    double number = 0;
+    ASSERT_TRUE(printed >> number) << outcome.out;
+    EXPECT_NEAR(number, expected.get<double>(), 1e-6);
+  }
 }
 
 TEST_F(Register, VoxelSizeByTheClouds) {
