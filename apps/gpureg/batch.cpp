@@ -32,7 +32,6 @@ namespace {
 struct BatchOptions {
   std::string folder, pairs = "all";
   MethodOptions method;
-  std::optional<double> min_score;
   std::string log, info, json;
   bool resume = false, restart = false, quiet = false;
 
@@ -40,19 +39,6 @@ struct BatchOptions {
   Journal::Mode journal_mode() const {
     if (resume) return Journal::Mode::resume;
     return restart ? Journal::Mode::restart : Journal::Mode::fresh;
-  }
-
-  RegistrationOptions registration() const {
-    RegistrationOptions options = method.registration();
-    if (!min_score) return options;
-    if (!(*min_score >= 0 && *min_score <= 1))
-      throw InvalidArgument("--min-score is " + significant(*min_score, 6) +
-                            ", expected a number from 0 to 1");
-    if (options.hypothesis.proposal == Proposal::quadruples)
-      options.score.min_inlier_ratio = static_cast<float>(*min_score);
-    else
-      options.min_confidence = *min_score;
-    return options;
   }
 };
 
@@ -82,7 +68,7 @@ Json header_of(const BatchOptions& o, const Scene& scene, const Pairs& pairs) {
     fragments.push_back({{"number", scene.numbers[k]}, {"hash", scene.hashes[k]}});
   return {{"gpureg_journal", 1},
           {"version", GPUREG_VERSION},
-          {"options", to_json(o.registration())},
+          {"options", to_json(o.method.registration())},
           {"pairs", {{"count", pairs.size()}, {"hash", hash}}},
           {"fragments", fragments}};
 }
@@ -106,7 +92,7 @@ void choose_voxel_size(BatchOptions& o) {
 class Batch {
  public:
   explicit Batch(const BatchOptions& o)
-      : o_(o), options_(o.registration()), context_(o.method.context()) {}
+      : o_(o), options_(o.method.registration()), context_(o.method.context()) {}
 
   int run() {
     if (o_.resume && !can_have_journal(o_.log))
@@ -282,9 +268,6 @@ void add_batch(CLI::App& app, Action& chosen) {
   verb->add_option("--pairs", o->pairs, "all, or a file with one pair `i j` a line")
       ->capture_default_str();
   o->method.add_to(*verb);
-  verb->add_option("--min-score", o->min_score,
-                   "Report a pair from this confidence on (without: 0.5); with --preset loopsmart, "
-                   "from this inlier ratio on (0.3). 0: every best candidate");
   verb->add_option("-o,--output", o->log, "Redwood log of the aligned pairs: T_ij, j into i")
       ->required();
   verb->add_option("--info", o->info, "Redwood information matrices of the same pairs");
@@ -296,7 +279,7 @@ void add_batch(CLI::App& app, Action& chosen) {
   verb->add_flag("--quiet", o->quiet, "No progress, no summary");
   verb->callback([o, &chosen] {
     chosen = [o] {
-      o->registration();  // what is wrong with it shall be said before clouds are read
+      o->method.registration();  // what is wrong with it shall be said before clouds are read
       check_outputs(*o);
       choose_voxel_size(*o);
       return Batch(*o).run();

@@ -61,6 +61,9 @@ void MethodOptions::add_to(CLI::App& verb) {
   verb.add_option("--seed", seed, "Same seed, same result, on any machine")
       ->check(natural_number())
       ->capture_default_str();
+  verb.add_option("--min-score", min_score,
+                  "Report a pair from this confidence on (without: 0.5); with --preset loopsmart, "
+                  "from this inlier ratio on (0.3). 0: every best candidate");
 }
 
 RegistrationOptions MethodOptions::registration() const {
@@ -73,6 +76,13 @@ RegistrationOptions MethodOptions::registration() const {
                                     : RegistrationOptions::from_voxel_size(voxel_size, quality);
   options.hypothesis.count = hypotheses;
   options.hypothesis.seed = seed;
+  if (min_score && !(*min_score >= 0 && *min_score <= 1))
+    throw InvalidArgument("--min-score is " + significant(*min_score, 6) +
+                          ", expected a number from 0 to 1");
+  if (min_score && options.hypothesis.proposal == Proposal::quadruples)
+    options.score.min_inlier_ratio = static_cast<float>(*min_score);
+  else if (min_score)
+    options.min_confidence = *min_score;
   options.validate();
   return options;
 }

@@ -3,6 +3,7 @@
 
 #include <CLI/CLI.hpp>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -22,6 +23,7 @@ struct MethodOptions {
   std::uint32_t hypotheses = HypothesisOptions{}.count;
   std::uint32_t quality = kDefaultQuality;
   std::uint64_t seed = HypothesisOptions{}.seed;
+  std::optional<double> min_score;  ///< none: the preset's own
 
   void add_to(CLI::App& verb);
 

@@ -119,6 +119,20 @@ TEST_F(Register, SeedDecidesAndThreadsDoNot) {
   EXPECT_EQ(result(kLoopsmart)["statistics"]["refine_iterations"], 0);
 }
 
+TEST_F(Register, MinimalScoreDecidesWhatIsReported) {
+  const std::string path = folder_ / "r.json";
+  const Outcome none = align({"--min-score", "1", "--json", path});
+  EXPECT_EQ(none.status, 1);
+  expect_holds(none.out, {"not_aligned: confidence_too_low", "best candidate"});
+  EXPECT_EQ(json_of(path)["options"]["min_confidence"], 1.0);
+  align(joined(kLoopsmart, {"--min-score", "0.9", "--json", path}));
+  EXPECT_FLOAT_EQ(json_of(path)["options"]["score"]["min_inlier_ratio"].get<float>(), 0.9f);
+  const std::string other = write_cloud(folder_, "sticks.ply", sticks());
+  const std::vector<std::string> hopeless = joined({"register", source_, other}, kSmall);
+  EXPECT_EQ(run(hopeless).status, 1);
+  EXPECT_EQ(run(joined(hopeless, {"--min-score", "0"})).status, 0);
+}
+
 TEST_F(Register, Overlay) {
   const std::string path = folder_ / "overlay.ply";
   ASSERT_EQ(align({"--overlay", path}).status, 0);
