@@ -40,9 +40,11 @@ TEST_F(Register, NumbersOfAFarPoseStayApart) {
   ASSERT_EQ(pose.size(), 16u) << outcome.out << outcome.err;
   std::istringstream printed(outcome.out.substr(outcome.out.find("target_from_source\n") + 19));
   for (const auto& expected : pose) {
-    double number = 0;
-    ASSERT_TRUE(printed >> number) << outcome.out;
-    EXPECT_NEAR(number, expected.get<double>(), 1e-6);
+    std::string number;  // read as one, as a reader that splits at spaces does
+    ASSERT_TRUE(printed >> number);
+    std::size_t end = 0;
+    EXPECT_NEAR(std::stod(number, &end), expected.get<double>(), 1e-6);
+    EXPECT_EQ(end, number.size()) << number;
   }
 }
 
