@@ -105,7 +105,7 @@ class Batch {
       return kInterrupted;
     }
     check_voxel_size(options_.prepare.voxel_size, scene_.extent, "the largest fragment");
-    pairs_ = choose_pairs(scene_, o_.pairs);
+    pairs_ = choose_pairs(scene_, o_.pairs, o_.quiet);
     if (pairs_.empty())
       throw InvalidArgument(o_.pairs == "all" ? o_.folder + " holds one fragment; a batch needs two"
                                               : o_.pairs + " lists no pair");

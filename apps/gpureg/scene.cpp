@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cstring>
 #include <filesystem>
+#include <fstream>
+#include <iostream>
 #include <map>
 #include <set>
 
@@ -33,6 +35,39 @@ void mix(std::uint64_t& hash, const std::vector<Eigen::Vector3f>& rows) {
   }
 }
 
+using Fragments = std::vector<std::pair<int, std::string>>;
+using Cameras = std::map<int, std::vector<Eigen::Vector3f>>;
+
+// A file that covers half of the scene works, but hardly as meant.
+void note_gaps(const Fragments& fragments, const Cameras& cameras, const std::string& file) {
+  std::size_t covered = 0;
+  for (const auto& [number, path] : fragments) covered += cameras.count(number);
+  const std::size_t lacking = fragments.size() - covered, strangers = cameras.size() - covered;
+  if (lacking > 0)
+    std::cerr << "gpureg: note: " << lacking << " of " << fragments.size()
+              << " fragments have no camera in " << file << std::endl;
+  for (auto at = cameras.begin(); strangers > 0 && at != cameras.end(); ++at)
+    if (std::none_of(fragments.begin(), fragments.end(),
+                     [&](const auto& fragment) { return fragment.first == at->first; })) {
+      std::cerr << "gpureg: note: " << file << " has cameras of fragment " << at->first
+                << (strangers > 1 ? " and " + std::to_string(strangers - 1) + " more" : "")
+                << ", which the folder lacks" << std::endl;
+      return;
+    }
+}
+
+// Of the pair that was read as the k-th from 0: lines without fields do not count.
+std::size_t line_of_pair(const std::string& path, std::size_t k) {
+  std::ifstream file(path);
+  std::size_t number = 0;
+  for (std::string line; std::getline(file, line);) {
+    ++number;
+    const std::size_t field = line.find_first_not_of(" \t\r");
+    if (field != std::string::npos && line[field] != '#' && k-- == 0) break;
+  }
+  return number;
+}
+
 std::uint64_t hash_of(const PointCloud& cloud) {
   std::uint64_t hash = 0x67707572ull;
   mix(hash, cloud.points);
@@ -46,9 +81,12 @@ std::uint64_t hash_of(const PointCloud& cloud) {
 Scene prepare_scene(const Context& context, const std::string& folder,
                     const PrepareOptions& options, bool quiet) {
   const auto fragments = io::list_fragments(folder);
-  std::map<int, std::vector<Eigen::Vector3f>> cameras;
+  Cameras cameras;
   const std::string cameras_file = (std::filesystem::path(folder) / "cameras.txt").string();
-  if (std::filesystem::exists(cameras_file)) cameras = io::read_cameras(cameras_file);
+  if (std::filesystem::exists(cameras_file)) {
+    cameras = io::read_cameras(cameras_file);
+    if (!quiet) note_gaps(fragments, cameras, cameras_file);
+  }
 
   Scene scene;
   Progress progress("preparing", "fragments", fragments.size(), quiet);
@@ -81,7 +119,8 @@ Scene prepare_scene(const Context& context, const std::string& folder,
 }
 
 std::vector<std::pair<std::uint32_t, std::uint32_t>> choose_pairs(const Scene& scene,
-                                                                  const std::string& pairs) {
+                                                                  const std::string& pairs,
+                                                                  bool quiet) {
   std::vector<std::pair<std::uint32_t, std::uint32_t>> chosen;
   const auto size = static_cast<std::uint32_t>(scene.numbers.size());
   if (pairs == "all") {
@@ -89,18 +128,25 @@ std::vector<std::pair<std::uint32_t, std::uint32_t>> choose_pairs(const Scene& s
       for (std::uint32_t j = i + 1; j < size; ++j) chosen.emplace_back(i, j);
     return chosen;
   }
+  const auto listed = io::read_pairs(pairs);
+  std::size_t k = 0;
   const auto index_of = [&](int number) {
     const auto at = std::lower_bound(scene.numbers.begin(), scene.numbers.end(), number);
     if (at == scene.numbers.end() || *at != number)
-      throw IoError(pairs + ": there is no fragment " + std::to_string(number));
+      throw IoError(pairs + ":" + std::to_string(line_of_pair(pairs, k)) +
+                    ": there is no fragment " + std::to_string(number));
     return static_cast<std::uint32_t>(at - scene.numbers.begin());
   };
   std::set<std::pair<std::uint32_t, std::uint32_t>> seen;
-  for (const auto& [a, b] : io::read_pairs(pairs)) {
-    const std::uint32_t i = index_of(a), j = index_of(b);
+  for (; k < listed.size(); ++k) {
+    const std::uint32_t i = index_of(listed[k].first), j = index_of(listed[k].second);
     const std::pair<std::uint32_t, std::uint32_t> pair(std::min(i, j), std::max(i, j));
     if (seen.insert(pair).second) chosen.push_back(pair);
   }
+  const std::size_t repeated = listed.size() - chosen.size();
+  if (repeated > 0 && !quiet)
+    std::cerr << "gpureg: note: " << repeated << " of " << listed.size() << " pairs in " << pairs
+              << " repeat another one" << std::endl;
   return chosen;
 }
 

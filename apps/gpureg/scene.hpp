@@ -27,13 +27,15 @@ struct Scene {
 };
 
 /// Reads and prepares all fragments, with their sensor positions from cameras.txt where that is
-/// there. Throws IoError.
+/// there. Unless quiet, says where that and the fragments do not match. Throws IoError.
 Scene prepare_scene(const Context& context, const std::string& folder,
                     const PrepareOptions& options, bool quiet);
 
 /// Pairs i < j as indices into numbers, in the file's order without repetitions, or all of them for
-/// "all". Throws IoError for a number that no fragment has.
+/// "all". Unless quiet, says how many are repetitions. Throws IoError for a number that no fragment
+/// has.
 std::vector<std::pair<std::uint32_t, std::uint32_t>> choose_pairs(const Scene& scene,
-                                                                  const std::string& pairs);
+                                                                  const std::string& pairs,
+                                                                  bool quiet);
 
 }  // namespace gpureg::cli

@@ -136,6 +136,38 @@ TEST_F(Batch, PairsOfAFile) {
   EXPECT_EQ(same, without_times(json)["pairs"][0]);
 }
 
+TEST_F(Batch, PairsThatRepeatAndPairsThatCannotBe) {
+  const std::string once = out_.write("once.txt", "0 1\n"),
+                    twice = out_.write("twice.txt", "0 1\n# not these:\n1 2\n0 1\n\n1 0\n");
+  EXPECT_EQ(batch("r", {"--pairs", once}).err.find("note"), std::string::npos);
+  const Outcome outcome = batch("r", {"--pairs", twice});
+  expect_holds(outcome.err, {"note: 2 of 4 pairs in " + twice + " repeat"});
+  expect_holds(outcome.out, {"pairs      2"});
+  EXPECT_EQ(batch("r", {"--pairs", twice, "--quiet"}).err, "");
+  const std::string bad = out_.write("bad.txt", "# header\n0 1\n\n  # more\n1 2 # right\n9 1\n");
+  expect_refused(joined({"batch", scans_.path(), "-o", out_ / "b.log", "--pairs", bad, "--quiet"}, kSmall),
+                 {bad + ":6: there is no fragment 9"});
+}
+
+TEST_F(Batch, CamerasThatDoNotMatchTheFragments) {
+  const std::string pairs = out_.write("pairs.txt", "0 1\n"), cameras = scans_ / "cameras.txt";
+  const auto said = [&](const std::string& content, const std::vector<std::string>& more = {}) {
+    scans_.write("cameras.txt", content);
+    return batch("r", joined({"--pairs", pairs}, more)).err;
+  };
+  const auto camera = [](int fragment) { return std::to_string(fragment) + " 0 0 0 0 0 0 0 1\n"; };
+  expect_holds(said(""), {"note: 6 of 6 fragments have no camera in " + cameras});
+  const std::string most = camera(0) + camera(1) + camera(2) + camera(4);
+  expect_holds(said(most), {"note: 2 of 6 fragments have no camera in " + cameras});
+  const std::string all = most + camera(3) + camera(5) + camera(5);
+  EXPECT_EQ(said(all).find("note"), std::string::npos);
+  std::string text = said(all + camera(9));
+  expect_holds(text, {"note: " + cameras + " has cameras of fragment 9, which the folder lacks"});
+  EXPECT_EQ(text.find("have no camera"), std::string::npos) << text;
+  expect_holds(said(all + camera(9) + camera(7)), {"of fragment 7 and 1 more, which"});
+  EXPECT_EQ(said(most + camera(9), {"--quiet"}), "");
+}
+
 TEST_F(Batch, MinimalScoreDecidesWhatIsReported) {
   ASSERT_EQ(batch("all", {"--min-score", "0"}).status, 0);
   // Every pair that has a pose is in the log now.
