@@ -95,13 +95,13 @@ def measures(evidence, free_space, fronts):
     return out
 
 
-FEW = 80  # points that touch
+FEW, SMALL_CLOUD = 80, 1500  # points that touch, of how many
 
 
 def with_so_few_points(evidence, points):
     """What is left of a confidence where hardly any points touch (src/api/confidence.cpp). points: of the prepared clouds, source and target."""
     touching = min(share * of for share, of in zip(evidence["overlap"], points))
-    return 1 - np.exp(-(touching / FEW) ** 2)
+    return 1 - np.exp(-(touching / FEW * max(1, min(points) / SMALL_CLOUD)) ** 2)
 
 
 def has_free_space(evidence):
@@ -145,7 +145,7 @@ class Run:
                   if self.free or not model[0]}
 
 
-CHANGED_WEIGHT, MOST_CHANGED = 0.12, 0.1
+CHANGED_WEIGHT, MOST_CHANGED = 0.11, 0.1
 
 
 class ChangedRun:
