@@ -84,7 +84,7 @@ def test_as_fitted(name):
         eye = np.array([[1.3, 1.4, 1.5]])
         source = gpureg.prepare(a, viewpoints=eye, options=options.prepare)
         target = gpureg.prepare(b, viewpoints=moved(eye, pose(seed)), options=options.prepare)
-        result = gpureg.align(source, target, options)
+        result = gpureg.align(source, target, options=options)
         assert result.modes
         want = expected(result.modes, name, options.evidence.modes, (len(source.points), len(target.points)))
         np.testing.assert_allclose((result.modes[0].confidence, result.modes[0].overlap_confidence), want, rtol=1e-6, atol=1e-9)

@@ -32,6 +32,7 @@ struct FakeLevels {
     RegistrationResult result;
     result.has_candidate = true;
     result.score = confidence(quality);
+    result.target_from_source.setIdentity();
     result.target_from_source.translation().x() = shift(quality);
     result.timings.match = match;
     result.timings.fit =

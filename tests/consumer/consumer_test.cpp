@@ -85,10 +85,12 @@ class Consumer : public testing::Test {
 
   // A voxel is 5 cm and the noise 1 mm: what the refinement leaves is millimetres, a wrong pose is
   // off by decimetres.
-  void expect_pose(const Outcome& outcome, const Eigen::Isometry3d& truth) {
+  void expect_pose(const Outcome& outcome, const Eigen::Isometry3d& truth,
+                   const std::string& before = "") {
     ASSERT_EQ(outcome.status, 0) << outcome.output;
+    ASSERT_EQ(outcome.output.substr(0, before.size()), before);
     Eigen::Matrix4d pose;
-    std::istringstream text(outcome.output);
+    std::istringstream text(outcome.output.substr(before.size()));
     for (int k = 0; k < 16; ++k) ASSERT_TRUE(text >> pose(k / 4, k % 4)) << outcome.output;
     EXPECT_LT(test::translation_error(truth, Eigen::Isometry3d(pose)), 0.01) << outcome.output;
     EXPECT_LT(test::rotation_error_degrees(truth, Eigen::Isometry3d(pose)), 0.5) << outcome.output;
@@ -101,7 +103,8 @@ class Consumer : public testing::Test {
   void expect_working(const std::string& flags) {
     const Eigen::Isometry3d truth = write_scans();
     ASSERT_NO_FATAL_FAILURE(build(kProjects + "project", flags));
-    expect_pose(run("register_two_clouds"), truth);
+    expect_pose(run("register_two_clouds"), truth,
+                std::string(explain(RegistrationReason::none)) + "\n");
     const Outcome printed = run_command({build_ + "/layout"});
     EXPECT_EQ(printed.status, 0) << printed.output;
     EXPECT_EQ(printed.output, layout() + kInformation);
