@@ -19,6 +19,7 @@
 #include "result_json.hpp"
 #include "spacing.hpp"
 #include "text.hpp"
+#include "viewpoint_note.hpp"
 
 namespace gpureg::cli {
 namespace {
@@ -113,6 +114,10 @@ int run(RegisterOptions o) {
   const RegistrationOptions options = o.method.registration();
   check_voxel_size(options.prepare.voxel_size, extent_of(source_cloud.points), o.source);
   check_voxel_size(options.prepare.voxel_size, extent_of(target_cloud.points), o.target);
+  ViewpointNote viewpoints;
+  viewpoints.see(source_cloud, o.source);
+  viewpoints.see(target_cloud, o.target);
+  viewpoints.print();
   const PreparedCloud source = prepare(context, source_cloud.view(), options.prepare);
   const PreparedCloud target = prepare(context, target_cloud.view(), options.prepare);
   const TimedResult timed = o.time_budget

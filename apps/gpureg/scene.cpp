@@ -13,6 +13,7 @@
 #include "interrupt.hpp"
 #include "progress.hpp"
 #include "spacing.hpp"
+#include "viewpoint_note.hpp"
 
 namespace gpureg::cli {
 namespace {
@@ -89,6 +90,7 @@ Scene prepare_scene(const Context& context, const std::string& folder,
   }
 
   Scene scene;
+  ViewpointNote viewpoints;
   Progress progress("preparing", "fragments", fragments.size(), quiet);
   for (std::size_t next = 0; next < fragments.size();) {
     if (InterruptGuard::requested()) {
@@ -102,6 +104,7 @@ Scene prepare_scene(const Context& context, const std::string& folder,
       chunk.push_back(io::read_point_cloud(file));
       if (const auto found = cameras.find(number); found != cameras.end())
         chunk.back().viewpoints = found->second;
+      if (!quiet) viewpoints.see(chunk.back(), file);
       points += chunk.back().points.size();
       scene.numbers.push_back(number);
       scene.files.push_back(file);
@@ -115,6 +118,7 @@ Scene prepare_scene(const Context& context, const std::string& folder,
     progress.update(next);
   }
   scene.seconds = progress.seconds();
+  viewpoints.print();
   return scene;
 }
 

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include <cstdio>
 #include <future>
 #include <optional>
 
@@ -73,6 +74,24 @@ struct Input {
   }
 };
 
+/// Clouds of the host whose viewpoints cannot be what they were seen from: says so, as nothing else
+/// would.
+void warn_of_viewpoints(const std::vector<Input>& inputs) {
+  for (std::size_t k = 0; k < inputs.size(); ++k) {
+    if (inputs[k].stream) continue;
+    const double share = inputs[k].view.share_facing_away();
+    if (share <= PointCloudView::kMostFacingAway) continue;
+    char percent[16];
+    std::snprintf(percent, sizeof(percent), "%.1f %%", 100 * share);
+    const std::string text =
+        std::string("viewpoints: ") + percent + " of the normals" +
+        (inputs.size() > 1 ? " of cloud " + std::to_string(k) + " of " + std::to_string(inputs.size()) : "") +
+        " show all of them their back: are they in the frame of the cloud, and do the normals "
+        "point to where it was seen from?";
+    if (PyErr_WarnEx(PyExc_UserWarning, text.c_str(), 2) != 0) throw py::error_already_set();
+  }
+}
+
 /// Clouds on a device start at once, those of the host follow as one batch.
 std::vector<Cloud> prepare_clouds(const Context& context, const std::vector<Input>& inputs,
                                   const PrepareOptions& options) {
@@ -102,6 +121,7 @@ void bind_prepare(py::module_& m) {
       [](const Context& context, const py::sequence& clouds, const PrepareOptions& options) {
         std::vector<Input> inputs;
         for (const py::handle cloud : clouds) inputs.emplace_back(cloud.cast<py::tuple>());
+        warn_of_viewpoints(inputs);
         std::vector<Cloud> prepared;
         {
           const py::gil_scoped_release release;

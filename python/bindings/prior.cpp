@@ -18,8 +18,7 @@ using DoubleArray = py::array_t<double, py::array::c_style | py::array::forcecas
 
 struct PriorParts {
   std::optional<DoubleArray> source_up, target_up, pose;
-  double max_angle = GravityPrior{}.max_angle, max_rotation = PosePrior{}.max_rotation,
-         max_translation = PosePrior{}.max_translation;
+  std::optional<double> max_angle, max_rotation, max_translation;
 };
 
 PriorParts parts_of(const py::kwargs& values) {
@@ -28,9 +27,10 @@ PriorParts parts_of(const py::kwargs& values) {
       {"source_up", &parts.source_up},
       {"target_up", &parts.target_up},
       {"target_from_source", &parts.pose}};
-  const std::pair<const char*, double*> limits[] = {{"max_angle", &parts.max_angle},
-                                                    {"max_rotation", &parts.max_rotation},
-                                                    {"max_translation", &parts.max_translation}};
+  const std::pair<const char*, std::optional<double>*> limits[] = {
+      {"max_angle", &parts.max_angle},
+      {"max_rotation", &parts.max_rotation},
+      {"max_translation", &parts.max_translation}};
   for (const auto& [key, value] : values) {
     const std::string name = py::str(key);
     bool known = false;
@@ -82,17 +82,29 @@ RegistrationPrior prior_of(const PriorParts& parts) {
   RegistrationPrior prior;
   if (parts.source_up.has_value() != parts.target_up.has_value())
     throw py::value_error("source_up, target_up: give both, or none");
-  if (parts.source_up)
-    prior.gravity =
-        GravityPrior{matrix_of<Eigen::Vector3d>(*parts.source_up, "source_up"),
-                     matrix_of<Eigen::Vector3d>(*parts.target_up, "target_up"), parts.max_angle};
+  const auto require_no = [](const std::optional<double>& limit, const char* name,
+                             const char* of) {
+    if (limit)
+      throw py::value_error(std::string(name) + " is " + number(*limit) + ", but there is no " +
+                            of + " that it limits");
+  };
+  if (parts.source_up) {
+    prior.gravity = GravityPrior{matrix_of<Eigen::Vector3d>(*parts.source_up, "source_up"),
+                                 matrix_of<Eigen::Vector3d>(*parts.target_up, "target_up")};
+    if (parts.max_angle) prior.gravity->max_angle = *parts.max_angle;
+  } else {
+    require_no(parts.max_angle, "max_angle", "source_up and target_up");
+  }
   if (parts.pose) {
     const auto pose = matrix_of<Eigen::Matrix4d>(*parts.pose, "target_from_source");
     require_transform(pose);
     prior.pose = PosePrior{};
     prior.pose->target_from_source.matrix() = pose;
-    prior.pose->max_rotation = parts.max_rotation;
-    prior.pose->max_translation = parts.max_translation;
+    if (parts.max_rotation) prior.pose->max_rotation = *parts.max_rotation;
+    if (parts.max_translation) prior.pose->max_translation = *parts.max_translation;
+  } else {
+    require_no(parts.max_rotation, "max_rotation", "target_from_source");
+    require_no(parts.max_translation, "max_translation", "target_from_source");
   }
   try {
     prior.validate();

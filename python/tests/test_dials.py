@@ -82,6 +82,12 @@ def test_priors_drop_what_contradicts_them(clouds):
         gpureg.RegistrationPrior(source_up=up)
     with pytest.raises(gpureg.InvalidArgument, match="prior.pose.max_rotation is 0"):
         gpureg.RegistrationPrior(target_from_source=np.eye(4), max_rotation=0)
+    with pytest.raises(ValueError, match="max_rotation is 5, but there is no target_from_source that it limits"):
+        gpureg.RegistrationPrior(max_rotation=5, source_up=[0, 0, 1], target_up=[0, 0, 1])
+    with pytest.raises(ValueError, match="max_translation is 0.1, but there is no target_from_source"):
+        gpureg.RegistrationPrior(max_translation=0.1)
+    with pytest.raises(ValueError, match="max_angle is 5, but there is no source_up and target_up"):
+        gpureg.RegistrationPrior(max_angle=5, target_from_source=np.eye(4))
     with pytest.raises(TypeError, match="prior: expected a RegistrationPrior"):
         gpureg.align(a, b, prior=np.eye(4))
 

@@ -360,3 +360,22 @@ def test_no_leak():
     done = subprocess.run([sys.executable, "-c", code], cwd=pathlib.Path(__file__).parent, capture_output=True, text=True, check=True)
     # One leaked result or cloud per call would be 5 MB and more; what is allowed is the allocator's.
     assert int(done.stdout) < 2_000_000
+
+
+def test_viewpoints_that_cannot_be_what_a_cloud_was_seen_from():
+    x, y = np.meshgrid(np.arange(40) * 0.1, np.arange(40) * 0.1)
+    floor = np.stack([x.ravel(), y.ravel(), np.zeros(x.size)], 1)
+    up = np.tile([0.0, 0.0, 1.0], (len(floor), 1))
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        gpureg.prepare(floor, normals=up, viewpoints=[[2, 2, 2]])
+        gpureg.prepare(floor, viewpoints=[[2, 2, -2]])  # estimated normals turn to the viewpoints
+    with pytest.warns(UserWarning, match=r"^viewpoints: 100.0 % of the normals show all of them their back: are they in the frame"):
+        gpureg.prepare(floor, normals=up, viewpoints=[[2, 2, -2]])
+    # Map coordinates: the points are moved before the library sees them, and so are the viewpoints.
+    far = np.array([5e5, 4e6, 100.0])
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        gpureg.prepare(floor + far, normals=up, viewpoints=[[2, 2, 2] + far])
+    with pytest.warns(UserWarning, match=r"of cloud 1 of 2 show"):
+        gpureg.prepare_batch([gpureg.PointCloud(floor, normals=up, viewpoints=[[2, 2, side]]) for side in (2, -2)])

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "gpureg/point_cloud.hpp"
 
+#include "algorithm/normal.hpp"
 #include "api/validate.hpp"
 
 namespace gpureg {
@@ -18,6 +19,21 @@ void PointCloudView::validate() const {
   require(viewpoints != nullptr || viewpoint_count == 0, "cloud.viewpoints", "null", "a pointer, as viewpoint_count is not 0");
   for (std::size_t k = 0; k < 3 * viewpoint_count; ++k)
     require(std::isfinite(viewpoints[k]), "cloud.viewpoints", viewpoints[k], "finite coordinates");
+}
+
+double PointCloudView::share_facing_away() const {
+  validate();
+  if (!normals || viewpoint_count == 0 || size == 0) return 0;
+  std::vector<Vec3> places(viewpoint_count);
+  for (std::size_t k = 0; k < viewpoint_count; ++k) places[k] = {viewpoints[3 * k], viewpoints[3 * k + 1], viewpoints[3 * k + 2]};
+  std::size_t away = 0;
+  for (std::size_t i = 0; i < size; ++i) {
+    const float *n = normals + i * normal_stride, *p = points + i * point_stride;
+    const float length = std::sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
+    // Comparisons with NaN are false: unknown normals and points face nobody, which is not away.
+    if (length > 0) away += faces_away(Vec3{n[0], n[1], n[2]} * (1.0f / length), {p[0], p[1], p[2]}, span_of(places));
+  }
+  return static_cast<double>(away) / static_cast<double>(size);
 }
 
 PointCloudView PointCloud::view() const {

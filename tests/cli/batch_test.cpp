@@ -220,5 +220,30 @@ TEST_F(Batch, CamerasOrientTheNormals) {
   EXPECT_NE(content_of(out_ / "with.log"), content_of(out_ / "without.log"));
 }
 
+TEST_F(Batch, SaysWhereViewpointsCannotBeWhatCloudsWereSeenFrom) {
+  // A floor with its normals up, as three fragments.
+  PointCloud floor;
+  for (int x = 0; x < 40; ++x)
+    for (int y = 0; y < 40; ++y) floor.points.emplace_back(0.1f * x, 0.1f * y, 0.0f);
+  floor.normals.assign(floor.points.size(), Eigen::Vector3f::UnitZ());
+  const TemporaryFolder floors;
+  for (int k = 0; k < 3; ++k) write_cloud(floors, "cloud_bin_" + std::to_string(k) + ".ply", floor);
+  const auto said = [&](float z0, float z1, const std::vector<std::string>& more = {}) {
+    std::string cameras;
+    for (const auto& [fragment, z] : {std::pair{0, z0}, {1, z1}, {2, 2.0f}})
+      cameras += std::to_string(fragment) + " 0 2 2 " + std::to_string(z) + " 0 0 0 1\n";
+    floors.write("cameras.txt", cameras);
+    return run(joined(joined({"batch", floors.path(), "-o", out_ / "f.log", "--restart"}, kSmall),
+                      more))
+        .err;
+  };
+  EXPECT_EQ(said(2, 2).find("note"), std::string::npos);
+  const std::string one = said(2, -2);
+  expect_holds(one, {"note: 100.0 % of the normals of ", "cloud_bin_1.ply show all viewpoints"});
+  EXPECT_EQ(one.find("more clouds"), std::string::npos) << one;
+  expect_holds(said(-2, -2), {"cloud_bin_0.ply", "and many of 1 more clouds: are the viewpoints"});
+  EXPECT_EQ(said(-2, -2, {"--quiet"}), "");
+}
+
 }  // namespace
 }  // namespace gpureg::test
