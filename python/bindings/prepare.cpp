@@ -85,7 +85,9 @@ void warn_of_viewpoints(const std::vector<Input>& inputs) {
     std::snprintf(percent, sizeof(percent), "%.1f %%", 100 * share);
     const std::string text =
         std::string("viewpoints: ") + percent + " of the normals" +
-        (inputs.size() > 1 ? " of cloud " + std::to_string(k) + " of " + std::to_string(inputs.size()) : "") +
+        (inputs.size() > 1
+             ? " of cloud " + std::to_string(k) + " of " + std::to_string(inputs.size())
+             : "") +
         " show all of them their back: are they in the frame of the cloud, and do the normals "
         "point to where it was seen from?";
     if (PyErr_WarnEx(PyExc_UserWarning, text.c_str(), 2) != 0) throw py::error_already_set();

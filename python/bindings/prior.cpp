@@ -82,8 +82,7 @@ RegistrationPrior prior_of(const PriorParts& parts) {
   RegistrationPrior prior;
   if (parts.source_up.has_value() != parts.target_up.has_value())
     throw py::value_error("source_up, target_up: give both, or none");
-  const auto require_no = [](const std::optional<double>& limit, const char* name,
-                             const char* of) {
+  const auto require_no = [](const std::optional<double>& limit, const char* name, const char* of) {
     if (limit)
       throw py::value_error(std::string(name) + " is " + number(*limit) + ", but there is no " +
                             of + " that it limits");
