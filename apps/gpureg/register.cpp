@@ -17,6 +17,7 @@
 #include "options_json.hpp"
 #include "output_path.hpp"
 #include "result_json.hpp"
+#include "scene.hpp"
 #include "spacing.hpp"
 #include "text.hpp"
 #include "viewpoint_note.hpp"
@@ -118,8 +119,8 @@ int run(RegisterOptions o) {
   viewpoints.see(source_cloud, o.source);
   viewpoints.see(target_cloud, o.target);
   viewpoints.print();
-  const PreparedCloud source = prepare(context, source_cloud.view(), options.prepare);
-  const PreparedCloud target = prepare(context, target_cloud.view(), options.prepare);
+  const PreparedCloud source = prepare_file(context, source_cloud.view(), o.source, options.prepare);
+  const PreparedCloud target = prepare_file(context, target_cloud.view(), o.target, options.prepare);
   const TimedResult timed = o.time_budget
                                 ? align_within(context, source, target, *o.time_budget, options)
                                 : TimedResult{align(context, source, target, options)};

@@ -19,7 +19,8 @@ namespace gpureg {
 /// Downsamples, estimates and orients normals, computes features (FPFH of one or two radii, or takes the view's own), builds the search
 /// grid and draws depth maps from the viewpoints.
 /// Never fails for the data itself: an empty cloud gives an empty PreparedCloud, whose alignments say too_few_source_points (or target).
-/// Throws InvalidArgument for bad options or views, and for clouds wider than 2^20 voxels. Thread-safe.
+/// Throws InvalidArgument for bad options or views, and for clouds wider than 2^20 voxels, too dense for the radii, or of more than 20,000
+/// points nearly all of which are alone (millimetres, and a voxel in metres). Thread-safe.
 PreparedCloud prepare(const Context& context, const PointCloudView& cloud, const PrepareOptions& options = {});
 
 /// prepare() for many clouds at once, each with the same result as alone.

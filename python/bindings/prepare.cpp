@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include <pybind11/stl.h>
+
 #include <cstdio>
 #include <future>
 #include <optional>
@@ -76,22 +78,29 @@ struct Input {
 
 /// Clouds of the host whose viewpoints cannot be what they were seen from: says so, as nothing else
 /// would.
-void warn_of_viewpoints(const std::vector<Input>& inputs) {
+void warn_of_viewpoints(const std::vector<Input>& inputs, const std::vector<std::string>& names) {
   for (std::size_t k = 0; k < inputs.size(); ++k) {
     if (inputs[k].stream) continue;
     const double share = inputs[k].view.share_facing_away();
     if (share <= PointCloudView::kMostFacingAway) continue;
     char percent[16];
     std::snprintf(percent, sizeof(percent), "%.1f %%", 100 * share);
-    const std::string text =
-        std::string("viewpoints: ") + percent + " of the normals" +
-        (inputs.size() > 1
-             ? " of cloud " + std::to_string(k) + " of " + std::to_string(inputs.size())
-             : "") +
-        " show all of them their back: are they in the frame of the cloud, and do the normals "
-        "point to where it was seen from?";
+    const std::string text = (names.empty() ? "" : names[k] + ": ") + "viewpoints: " + percent +
+                             " of the normals show all of them their back: are they in the frame "
+                             "of the cloud, and do the normals point to where it was seen from?";
     if (PyErr_WarnEx(PyExc_UserWarning, text.c_str(), 2) != 0) throw py::error_already_set();
   }
+}
+
+/// Throws what the one of several clouds that an error is about says, after its name; returns where
+/// each alone says nothing.
+void find_invalid(const Context& context, const std::vector<Input>& inputs,
+                  const std::vector<std::string>& names, const PrepareOptions& options) {
+  for (std::size_t k = 0; k < inputs.size(); ++k) try {
+      if (!inputs[k].stream) prepare(context, inputs[k].view, options);
+    } catch (const InvalidArgument& error) {
+      throw InvalidArgument(names[k] + ": " + error.what());
+    }
 }
 
 /// Clouds on a device start at once, those of the host follow as one batch.
@@ -120,20 +129,29 @@ std::vector<Cloud> prepare_clouds(const Context& context, const std::vector<Inpu
 void bind_prepare(py::module_& m) {
   m.def(
       "prepare_batch",
-      [](const Context& context, const py::sequence& clouds, const PrepareOptions& options) {
+      [](const Context& context, const py::sequence& clouds, const PrepareOptions& options,
+         const std::vector<std::string>& names) {
         std::vector<Input> inputs;
         for (const py::handle cloud : clouds) inputs.emplace_back(cloud.cast<py::tuple>());
-        warn_of_viewpoints(inputs);
+        if (!names.empty() && names.size() != inputs.size())
+          throw py::value_error("names: expected one for each cloud");
+        warn_of_viewpoints(inputs, names);
         std::vector<Cloud> prepared;
         {
           const py::gil_scoped_release release;
-          prepared = prepare_clouds(context, inputs, options);
+          try {
+            prepared = prepare_clouds(context, inputs, options);
+          } catch (const InvalidArgument&) {
+            if (!names.empty()) find_invalid(context, inputs, names, options);
+            throw;
+          }
         }
         py::list out;
         for (Cloud& cloud : prepared) out.append(py::cast(std::move(cloud)));
         return out;
       },
-      py::arg("context"), py::arg("clouds"), py::arg("options"));
+      py::arg("context"), py::arg("clouds"), py::arg("options"),
+      py::arg("names") = std::vector<std::string>());
 }
 
 }  // namespace gpureg::python

@@ -105,7 +105,8 @@ class Residency:
                 chosen.append(k)
         device = self._context.backend == "cuda"
         inputs = list(self._readers.map(lambda k: self._fragments.load(k, self._options.prepare, device), chosen))
-        for k, cloud in zip(chosen, _core.prepare_batch(self._context, inputs, self._options.prepare)):
+        names = [f"fragments[{k}]" for k in chosen]
+        for k, cloud in zip(chosen, _core.prepare_batch(self._context, inputs, self._options.prepare, names)):
             self._clouds[k] = cloud
             self._bytes += _bytes_of(cloud)
         self.prepared += len(chosen)

@@ -96,7 +96,7 @@ def prepare_batch(
     context = context_of(context)
     device = context.backend == "cuda"
     inputs = [core_cloud(cloud, None, None, None, options, f"clouds[{k}]", device) for k, cloud in enumerate(several(clouds, "clouds"))]
-    return _core.prepare_batch(context, inputs, options)
+    return _core.prepare_batch(context, inputs, options, [f"clouds[{k}]" for k in range(len(inputs))])
 
 
 def check_prepared(cloud: Any, name: str) -> None:
@@ -113,6 +113,6 @@ def prepared(fragments: Sequence[Any], options: PrepareOptions, context: Context
     device = context.backend == "cuda"
     inputs = [core_cloud(fragments[k], None, None, None, options, f"fragments[{k}]", device) for k in raw]
     clouds = list(fragments)
-    for k, cloud in zip(raw, _core.prepare_batch(context, inputs, options)):
+    for k, cloud in zip(raw, _core.prepare_batch(context, inputs, options, [f"fragments[{k}]" for k in raw])):
         clouds[k] = cloud
     return clouds

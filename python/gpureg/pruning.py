@@ -110,7 +110,7 @@ def describe_all(
         for begin in range(0, len(positions), _TOGETHER):
             part = positions[begin : begin + _TOGETHER]
             inputs = [fragments.load(k, options, context.backend == "cuda") for k in part]
-            for cloud in _core.prepare_batch(context, inputs, options):
+            for cloud in _core.prepare_batch(context, inputs, options, [f"fragments[{k}]" for k in part]):
                 yield cloud.features
 
     n = len(fragments)

@@ -278,7 +278,7 @@ def register(
     for cloud, name in ((source, "source"), (target, "target")):
         clouds.append(core_cloud(cloud, None, None, None, options.prepare, name, context.backend == "cuda"))
     options.validate()
-    a, b = _core.prepare_batch(context, clouds, options.prepare)
+    a, b = _core.prepare_batch(context, clouds, options.prepare, ["source", "target"])
     if time_budget_ms is not None:
         return _core.align_within(context, a, b, time_budget_ms, options).result
     return _core.align(context, a, b, options, None, prior)

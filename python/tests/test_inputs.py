@@ -377,5 +377,19 @@ def test_viewpoints_that_cannot_be_what_a_cloud_was_seen_from():
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         gpureg.prepare(floor + far, normals=up, viewpoints=[[2, 2, 2] + far])
-    with pytest.warns(UserWarning, match=r"of cloud 1 of 2 show"):
+    with pytest.warns(UserWarning, match=r"^clouds\[1\]: viewpoints: 100.0 %"):
         gpureg.prepare_batch([gpureg.PointCloud(floor, normals=up, viewpoints=[[2, 2, side]]) for side in (2, -2)])
+
+
+def test_errors_say_which_cloud(source):
+    lonely = np.random.default_rng(1).random((30000, 3)) * 4000  # millimetres with a voxel in metres
+    alone = "nearly all of 30000 points are alone"
+    with pytest.raises(gpureg.InvalidArgument, match=f"^{alone}"):
+        gpureg.prepare(lonely)
+    with pytest.raises(gpureg.InvalidArgument, match=rf"^clouds\[1\]: {alone}"):
+        gpureg.prepare_batch([source, lonely, source])
+    for clouds, name in (((lonely, source), "source"), ((source, lonely), "target")):
+        with pytest.raises(gpureg.InvalidArgument, match=f"^{name}: {alone}"):
+            gpureg.register(*clouds)
+    with pytest.raises(gpureg.InvalidArgument, match=rf"^fragments\[1\]: {alone}"):
+        gpureg.align_batch([source, lonely], [[0, 1]])

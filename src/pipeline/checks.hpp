@@ -24,12 +24,19 @@ inline void check_extent(float radius, const PrepareOptions& options) {
 }
 
 /// Cells are half a radius wide, so a thousand points in one mean many thousands within the radius: such neighbourhoods make features
-/// meaningless and take hours. Better an error at once. squares: sum over the cells of their squared number of points.
+/// meaningless and take hours. And where nearly all of very many points are alone in theirs, farther from each other than alignment will
+/// ever look, as millimetres are with a voxel in metres, there is nothing to align, but the closest-point grid would take some 20 KB a point.
+/// Better an error at once. squares: sum over the cells of their squared number of points.
 inline void check_density(double squares, std::size_t points, const PrepareOptions& options) {
   const double per_cell = points == 0 ? 0 : squares / static_cast<double>(points);
   if (per_cell > 1000)
     throw InvalidArgument("on average more than " + std::to_string(static_cast<long>(per_cell)) + " points lie within feature_radius " +
                           std::to_string(options.feature_radius) + " of each other: use a larger voxel_size or a smaller radius");
+  constexpr std::size_t kMostLonely = 20000;
+  if (points > kMostLonely && per_cell < 1.1 && options.search_distance < 0.5f * options.feature_radius)
+    throw InvalidArgument("nearly all of " + std::to_string(points) + " points are alone within half of feature_radius " +
+                          std::to_string(options.feature_radius) + ": voxel_size " + std::to_string(options.voxel_size) +
+                          " is too small for the cloud; is it in the unit of the points?");
 }
 
 /// Lists this long mean millions of points within one search distance of each other; downsampling is the answer, not memory.

@@ -135,6 +135,38 @@ TEST(BadInput, AbsurdScaleAndDensityAreErrorsNotHangs) {
   test::expect_error<InvalidArgument>([&] { prepare(context, PointCloudView(dense), keep); }, {"feature_radius"});
 }
 
+// Gigabytes otherwise, for nothing.
+TEST(BadInput, MillimetresWithAVoxelInMetres) {
+  const Context context = Context::cpu(2);
+  std::mt19937 random(4);
+  std::vector<Eigen::Vector3f> points;
+  for (int scan = 0; scan < 3; ++scan)
+    for (const Eigen::Vector3f& p : test::scan_room(random)) points.push_back(p);
+  ASSERT_GT(points.size(), 30000u);
+  EXPECT_GT(prepare(context, PointCloudView(points)).size(), 1000u);
+  for (Eigen::Vector3f& p : points) p *= 1000;
+  test::expect_error<InvalidArgument>([&] { prepare(context, PointCloudView(points)); },
+                                      {"points are alone", "voxel_size 0.05", "unit of the points"});
+  // Of several clouds it is said which one.
+  const std::vector<Eigen::Vector3f> good = room();
+  test::expect_error<InvalidArgument>([&] { prepare_batch(context, {PointCloudView(good), PointCloudView(points)}); }, {"clouds[1]: nearly all"});
+  test::expect_error<InvalidArgument>([&] { align(context, PointCloudView(points), PointCloudView(good)); }, {"source: nearly all"});
+  PointCloudView lying(good);
+  lying.point_stride = 1;
+  test::expect_error<InvalidArgument>([&] { align(context, PointCloudView(good), lying); }, {"target: cloud.point_stride"});
+  // By the points' own unit all is as before; and few points cost little.
+  EXPECT_GT(prepare(context, PointCloudView(points), RegistrationOptions::from_voxel_size(50).prepare).size(), 1000u);
+  points.resize(3000);
+  EXPECT_EQ(prepare(context, PointCloudView(points)).size(), 3000u);
+  // Who brings features and looks as far as the points are apart is not refused for a radius that nobody needs.
+  std::vector<Eigen::Vector3f> wide;
+  for (int x = 0; x < 150; ++x)
+    for (int y = 0; y < 150; ++y) wide.emplace_back(0.3f * static_cast<float>(x), 0.3f * static_cast<float>(y), 0.0f);
+  PrepareOptions far;
+  far.search_distance = 0.5f;
+  EXPECT_EQ(prepare(context, PointCloudView(wide), far).size(), 22500u);
+}
+
 TEST(BadInput, SoFewPointsThatAnyPoseWouldDo) {
   std::mt19937 random(5);
   std::uniform_real_distribution<float> unit;

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <gtest/gtest.h>
 
+#include <random>
+
 #include "cli/command.hpp"
 #include "cli/scene.hpp"
 
@@ -78,6 +80,18 @@ TEST_F(BadCloud, CamerasAndPairs) {
   expect_refused(batch(pairs), {pairs, "no pair"});
   scans_.write("cameras.txt", "0 0 1 2 nan 0 0 0 1\n");
   expect_refused(batch("all"), {"cameras.txt:1"});
+}
+
+TEST_F(BadCloud, OfManyTheFileIsNamed) {
+  std::mt19937 random(3);
+  std::uniform_real_distribution<float> millimetres(0, 4000);
+  PointCloud lonely;
+  for (int k = 0; k < 30000; ++k)
+    lonely.points.emplace_back(millimetres(random), millimetres(random), millimetres(random));
+  const std::string bad = write_cloud(scans_, "cloud_bin_3.ply", lonely),
+                    good = write_cloud(scans_, "cloud_bin_5.ply", room_scan(1));
+  expect_refused({"batch", scans_.path(), "-o", scans_ / "r.log"}, {bad + ": nearly all of 30000"});
+  expect_refused({"register", good, bad}, {bad + ": nearly all"});
 }
 
 }  // namespace
