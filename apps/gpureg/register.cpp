@@ -17,7 +17,6 @@
 #include "options_json.hpp"
 #include "output_path.hpp"
 #include "result_json.hpp"
-#include "scene.hpp"
 #include "spacing.hpp"
 #include "text.hpp"
 #include "viewpoint_note.hpp"
@@ -119,8 +118,11 @@ int run(RegisterOptions o) {
   viewpoints.see(source_cloud, o.source);
   viewpoints.see(target_cloud, o.target);
   viewpoints.print();
-  const PreparedCloud source = prepare_file(context, source_cloud.view(), o.source, options.prepare);
-  const PreparedCloud target = prepare_file(context, target_cloud.view(), o.target, options.prepare);
+  const auto prepared = [&](const PointCloud& cloud, const std::string& file) {
+    return prepare_batch(context, {cloud.view()}, options.prepare, {file}).front();
+  };
+  const PreparedCloud source = prepared(source_cloud, o.source);
+  const PreparedCloud target = prepared(target_cloud, o.target);
   const TimedResult timed = o.time_budget
                                 ? align_within(context, source, target, *o.time_budget, options)
                                 : TimedResult{align(context, source, target, options)};

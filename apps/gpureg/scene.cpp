@@ -77,29 +77,7 @@ std::uint64_t hash_of(const PointCloud& cloud) {
   return hash;
 }
 
-// An error says which file it is about.
-std::vector<PreparedCloud> prepare_files(const Context& context,
-                                         const std::vector<PointCloudView>& views,
-                                         const std::string* files, const PrepareOptions& options) {
-  try {
-    return prepare_batch(context, views, options);
-  } catch (const InvalidArgument&) {
-    for (std::size_t k = 0; k < views.size(); ++k)
-      prepare_file(context, views[k], files[k], options);
-    throw;
-  }
-}
-
 }  // namespace
-
-PreparedCloud prepare_file(const Context& context, const PointCloudView& view,
-                           const std::string& file, const PrepareOptions& options) {
-  try {
-    return prepare(context, view, options);
-  } catch (const InvalidArgument& error) {
-    throw InvalidArgument(file + ": " + error.what());
-  }
-}
 
 Scene prepare_scene(const Context& context, const std::string& folder,
                     const PrepareOptions& options, bool quiet) {
@@ -135,8 +113,9 @@ Scene prepare_scene(const Context& context, const std::string& folder,
     }
     std::vector<PointCloudView> views;
     for (const PointCloud& cloud : chunk) views.push_back(cloud.view());
-    const std::string* const files = scene.files.data() + scene.files.size() - chunk.size();
-    for (PreparedCloud& cloud : prepare_files(context, views, files, options))
+    const std::vector<std::string> files(
+        scene.files.end() - static_cast<std::ptrdiff_t>(chunk.size()), scene.files.end());
+    for (PreparedCloud& cloud : prepare_batch(context, views, options, files))
       scene.clouds.push_back(std::move(cloud));
     progress.update(next);
   }

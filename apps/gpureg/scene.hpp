@@ -26,10 +26,6 @@ struct Scene {
   int count() const { return numbers.empty() ? 0 : numbers.back() + 1; }
 };
 
-/// prepare(), whose errors name the file.
-PreparedCloud prepare_file(const Context& context, const PointCloudView& view,
-                           const std::string& file, const PrepareOptions& options);
-
 /// Reads and prepares all fragments, with their sensor positions from cameras.txt where that is
 /// there. Unless quiet, says where that and the fragments do not match. Throws IoError.
 Scene prepare_scene(const Context& context, const std::string& folder,

@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <string>
 #include <vector>
 
 #include "gpureg/context.hpp"
@@ -23,9 +24,10 @@ namespace gpureg {
 /// points nearly all of which are alone (millimetres, and a voxel in metres). Thread-safe.
 PreparedCloud prepare(const Context& context, const PointCloudView& cloud, const PrepareOptions& options = {});
 
-/// prepare() for many clouds at once, each with the same result as alone.
+/// prepare() for many clouds at once, each with the same result as alone. names: what errors call the clouds, files perhaps; without,
+/// clouds[0], clouds[1] ...
 std::vector<PreparedCloud> prepare_batch(const Context& context, const std::vector<PointCloudView>& clouds,
-                                         const PrepareOptions& options = {});
+                                         const PrepareOptions& options = {}, const std::vector<std::string>& names = {});
 
 /// Finds target_from_source of two prepared clouds, by options.hypothesis.proposal: from compatible matches, judged by evidence (then
 /// modes holds every distinct pose), or by LoopSmart's Algorithm 1. Deterministic in clouds, options and seed.

@@ -92,30 +92,23 @@ void warn_of_viewpoints(const std::vector<Input>& inputs, const std::vector<std:
   }
 }
 
-/// Throws what the one of several clouds that an error is about says, after its name; returns where
-/// each alone says nothing.
-void find_invalid(const Context& context, const std::vector<Input>& inputs,
-                  const std::vector<std::string>& names, const PrepareOptions& options) {
-  for (std::size_t k = 0; k < inputs.size(); ++k) try {
-      if (!inputs[k].stream) prepare(context, inputs[k].view, options);
-    } catch (const InvalidArgument& error) {
-      throw InvalidArgument(names[k] + ": " + error.what());
-    }
-}
-
 /// Clouds on a device start at once, those of the host follow as one batch.
 std::vector<Cloud> prepare_clouds(const Context& context, const std::vector<Input>& inputs,
-                                  const PrepareOptions& options) {
+                                  const PrepareOptions& options,
+                                  const std::vector<std::string>& names) {
   std::vector<std::future<PreparedCloud>> futures(inputs.size());
   std::vector<PointCloudView> views;
+  std::vector<std::string> hosted_names;
   for (std::size_t k = 0; k < inputs.size(); ++k) {
     if (inputs[k].stream)
       futures[k] = prepare_async(context, inputs[k].device_view(), options,
                                  reinterpret_cast<CudaStream>(*inputs[k].stream));
-    else
+    else {
       views.push_back(inputs[k].view);
+      if (!names.empty()) hosted_names.push_back(names[k]);
+    }
   }
-  std::vector<PreparedCloud> hosted = prepare_batch(context, views, options);
+  std::vector<PreparedCloud> hosted = prepare_batch(context, views, options, hosted_names);
   std::vector<Cloud> out;
   std::size_t next = 0;
   for (std::size_t k = 0; k < inputs.size(); ++k)
@@ -139,12 +132,7 @@ void bind_prepare(py::module_& m) {
         std::vector<Cloud> prepared;
         {
           const py::gil_scoped_release release;
-          try {
-            prepared = prepare_clouds(context, inputs, options);
-          } catch (const InvalidArgument&) {
-            if (!names.empty()) find_invalid(context, inputs, names, options);
-            throw;
-          }
+          prepared = prepare_clouds(context, inputs, options, names);
         }
         py::list out;
         for (Cloud& cloud : prepared) out.append(py::cast(std::move(cloud)));

@@ -2,7 +2,6 @@
 #include "gpureg/registration.hpp"
 
 #include <algorithm>
-#include <functional>
 #include <string>
 
 #include "api/outcome.hpp"
@@ -22,33 +21,6 @@ RawCloud raw_of(const PointCloudView& v) {
           v.features, v.feature_dimension,
           v.feature_stride ? v.feature_stride : v.feature_dimension,
           v.viewpoints, v.viewpoint_count};
-}
-
-/// Prepares clouds together; where they are several, an error says which of them it is about.
-std::vector<PreparedCloud> prepare_named(const Context& context, const std::vector<PointCloudView>& clouds, const PrepareOptions& options,
-                                         const std::function<std::string(std::size_t)>& name) {
-  options.validate();
-  const auto naming = [&](std::size_t k, auto&& action) {
-    try {
-      return action();
-    } catch (const InvalidArgument& error) {
-      if (clouds.size() == 1) throw;
-      throw InvalidArgument(name(k) + ": " + error.what());
-    }
-  };
-  std::vector<RawCloud> raw;
-  raw.reserve(clouds.size());
-  for (std::size_t k = 0; k < clouds.size(); ++k) raw.push_back(naming(k, [&] { return raw_of(clouds[k]); }));
-  std::vector<PreparedCloud> out;
-  if (raw.empty()) return out;
-  try {
-    for (auto& state : context.engine()->prepare(span_of(raw), options)) out.emplace_back(std::move(state));
-  } catch (const InvalidArgument&) {
-    // Stages see all clouds at once: alone the one that it is about says so again.
-    for (std::size_t k = 0; k < raw.size(); ++k) naming(k, [&] { return context.engine()->prepare({&raw[k], 1}, options); });
-    throw;
-  }
-  return out;
 }
 
 /// A cloud that this context and these options can work with. name: for the message.
@@ -106,8 +78,32 @@ void check_priors(const std::vector<RegistrationPrior>& priors, std::size_t pair
 
 }  // namespace
 
-std::vector<PreparedCloud> prepare_batch(const Context& context, const std::vector<PointCloudView>& clouds, const PrepareOptions& options) {
-  return prepare_named(context, clouds, options, [](std::size_t k) { return "clouds[" + std::to_string(k) + "]"; });
+std::vector<PreparedCloud> prepare_batch(const Context& context, const std::vector<PointCloudView>& clouds, const PrepareOptions& options,
+                                         const std::vector<std::string>& names) {
+  options.validate();
+  if (!names.empty() && names.size() != clouds.size())
+    throw InvalidArgument("names has " + std::to_string(names.size()) + " entries, but clouds has " + std::to_string(clouds.size()));
+  const auto naming = [&](std::size_t k, auto&& action) {
+    try {
+      return action();
+    } catch (const InvalidArgument& error) {
+      if (names.empty() && clouds.size() == 1) throw;
+      throw InvalidArgument((names.empty() ? "clouds[" + std::to_string(k) + "]" : names[k]) + ": " + error.what());
+    }
+  };
+  std::vector<RawCloud> raw;
+  raw.reserve(clouds.size());
+  for (std::size_t k = 0; k < clouds.size(); ++k) raw.push_back(naming(k, [&] { return raw_of(clouds[k]); }));
+  std::vector<PreparedCloud> out;
+  if (raw.empty()) return out;
+  try {
+    for (auto& state : context.engine()->prepare(span_of(raw), options)) out.emplace_back(std::move(state));
+  } catch (const InvalidArgument&) {
+    // Stages see all clouds at once: alone the one that it is about says so again.
+    for (std::size_t k = 0; k < raw.size(); ++k) naming(k, [&] { return context.engine()->prepare({&raw[k], 1}, options); });
+    throw;
+  }
+  return out;
 }
 
 PreparedCloud prepare(const Context& context, const PointCloudView& cloud, const PrepareOptions& options) {
@@ -121,8 +117,7 @@ RegistrationResult align(const Context& context, const PreparedCloud& source, co
 RegistrationResult align(const Context& context, const PointCloudView& source, const PointCloudView& target,
                          const RegistrationOptions& options) {
   options.validate();
-  const auto name = [](std::size_t k) { return std::string(k == 0 ? "source" : "target"); };
-  return align_batch(context, prepare_named(context, {source, target}, options.prepare, name), {{0, 1}}, options).front();
+  return align_batch(context, prepare_batch(context, {source, target}, options.prepare, {"source", "target"}), {{0, 1}}, options).front();
 }
 
 RegistrationResult align(const Context& context, const PreparedCloud& source, const PreparedCloud& target,

@@ -150,6 +150,8 @@ TEST(BadInput, MillimetresWithAVoxelInMetres) {
   // Of several clouds it is said which one.
   const std::vector<Eigen::Vector3f> good = room();
   test::expect_error<InvalidArgument>([&] { prepare_batch(context, {PointCloudView(good), PointCloudView(points)}); }, {"clouds[1]: nearly all"});
+  test::expect_error<InvalidArgument>([&] { prepare_batch(context, {PointCloudView(good), PointCloudView(points)}, {}, {"kitchen", "hall"}); }, {"hall: nearly all"});
+  test::expect_error<InvalidArgument>([&] { prepare_batch(context, {PointCloudView(good), PointCloudView(good)}, {}, {"kitchen"}); }, {"names has 1 entries", "2"});
   test::expect_error<InvalidArgument>([&] { align(context, PointCloudView(points), PointCloudView(good)); }, {"source: nearly all"});
   PointCloudView lying(good);
   lying.point_stride = 1;
