@@ -115,8 +115,10 @@ int run(RegisterOptions o) {
   check_voxel_size(options.prepare.voxel_size, extent_of(source_cloud.points), o.source);
   check_voxel_size(options.prepare.voxel_size, extent_of(target_cloud.points), o.target);
   ViewpointNote viewpoints;
-  viewpoints.see(source_cloud, o.source);
-  viewpoints.see(target_cloud, o.target);
+  if (options.prepare.depth_maps > 0) {
+    viewpoints.see(source_cloud, o.source);
+    viewpoints.see(target_cloud, o.target);
+  }
   viewpoints.print();
   const auto prepared = [&](const PointCloud& cloud, const std::string& file) {
     return prepare_batch(context, {cloud.view()}, options.prepare, {file}).front();

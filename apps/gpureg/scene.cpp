@@ -104,7 +104,7 @@ Scene prepare_scene(const Context& context, const std::string& folder,
       chunk.push_back(io::read_point_cloud(file));
       if (const auto found = cameras.find(number); found != cameras.end())
         chunk.back().viewpoints = found->second;
-      if (!quiet) viewpoints.see(chunk.back(), file);
+      if (!quiet && options.depth_maps > 0) viewpoints.see(chunk.back(), file);
       points += chunk.back().points.size();
       scene.numbers.push_back(number);
       scene.files.push_back(file);

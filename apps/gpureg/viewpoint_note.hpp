@@ -9,7 +9,7 @@
 namespace gpureg::cli {
 
 /// Finds clouds whose normals show the back to all of their viewpoints: then free space speaks
-/// against right poses, and nothing else would say why.
+/// against right poses, and nothing else would say why. Without prepare.depth_maps nobody asks.
 class ViewpointNote {
  public:
   void see(const PointCloud& cloud, const std::string& file);

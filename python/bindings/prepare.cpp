@@ -128,7 +128,7 @@ void bind_prepare(py::module_& m) {
         for (const py::handle cloud : clouds) inputs.emplace_back(cloud.cast<py::tuple>());
         if (!names.empty() && names.size() != inputs.size())
           throw py::value_error("names: expected one for each cloud");
-        warn_of_viewpoints(inputs, names);
+        if (options.depth_maps > 0) warn_of_viewpoints(inputs, names);
         std::vector<Cloud> prepared;
         {
           const py::gil_scoped_release release;

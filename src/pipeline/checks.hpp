@@ -36,7 +36,7 @@ inline void check_density(double squares, std::size_t points, const PrepareOptio
   if (points > kMostLonely && per_cell < 1.1 && options.search_distance < 0.5f * options.feature_radius)
     throw InvalidArgument("nearly all of " + std::to_string(points) + " points are alone within half of feature_radius " +
                           std::to_string(options.feature_radius) + ": voxel_size " + std::to_string(options.voxel_size) +
-                          " is too small for the cloud; is it in the unit of the points?");
+                          " or the radii are too small for the cloud; are they in the unit of the points?");
 }
 
 /// Lists this long mean millions of points within one search distance of each other; downsampling is the answer, not memory.

@@ -3,6 +3,7 @@
 
 #include <limits>
 
+#include "algorithm/normal.hpp"
 #include "gpureg/error.hpp"
 #include "gpureg/point_cloud.hpp"
 #include "support/expect_error.hpp"
@@ -50,6 +51,13 @@ TEST(ShareFacingAway, WhatIsNotKnownDoesNot) {
   cloud.normals.clear();
   EXPECT_EQ(cloud.view().share_facing_away(), 0);
   EXPECT_EQ(PointCloudView().share_facing_away(), 0);
+}
+
+// Where prepare() no longer believes that it is the normals that are wrong.
+TEST(ShareFacingAway, TheLineIsPreparations) {
+  const auto most = static_cast<std::uint32_t>(PointCloudView::kMostFacingAway * 1000);
+  EXPECT_TRUE(turns_back(most, 1000));
+  EXPECT_FALSE(turns_back(most + 1, 1000));
 }
 
 // Nearly from the side noise decides which side it is.

@@ -243,6 +243,8 @@ TEST_F(Batch, SaysWhereViewpointsCannotBeWhatCloudsWereSeenFrom) {
   EXPECT_EQ(one.find("more clouds"), std::string::npos) << one;
   expect_holds(said(-2, -2), {"cloud_bin_0.ply", "and many of 1 more clouds: are the viewpoints"});
   EXPECT_EQ(said(-2, -2, {"--quiet"}), "");
+  // The paper's algorithm asks no viewpoint.
+  EXPECT_EQ(said(-2, -2, {"--preset", "loopsmart"}).find("note"), std::string::npos);
 }
 
 }  // namespace
