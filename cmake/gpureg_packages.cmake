@@ -5,7 +5,7 @@ if(GPUREG_BUILD_PYTHON)
   # pip's build environment holds an Eigen of its own, for machines without one.
   find_package(Eigen3 3.3 QUIET NO_MODULE)
   if(NOT Eigen3_FOUND)
-    find_package(Python 3.9 REQUIRED COMPONENTS Interpreter Development.Module)
+    find_package(Python 3.10 REQUIRED COMPONENTS Interpreter Development.Module)
     execute_process(COMMAND ${Python_EXECUTABLE} -c "import cmeel, pathlib; print(pathlib.Path(cmeel.__file__).parents[1] / 'cmeel.prefix')"
       OUTPUT_VARIABLE _gpureg_cmeel OUTPUT_STRIP_TRAILING_WHITESPACE ERROR_QUIET)
     list(APPEND CMAKE_PREFIX_PATH ${_gpureg_cmeel})

@@ -10,18 +10,25 @@ int device_of(const void* pointer) {
   cudaPointerAttributes attributes{};
   const bool known = cudaPointerGetAttributes(&attributes, pointer) == cudaSuccess;
   if (!known) cudaGetLastError();
-  return known && (attributes.type == cudaMemoryTypeDevice || attributes.type == cudaMemoryTypeManaged) ? attributes.device : -1;
+  return known && (attributes.type == cudaMemoryTypeDevice ||
+                   attributes.type == cudaMemoryTypeManaged)
+             ? attributes.device
+             : -1;
 }
 
 namespace {
 
-/// The cloud's own copy, rows tight: in memory that belongs to the engine, but written and given back in order of the caller's stream.
+/// The cloud's own copy, rows tight: in memory that belongs to the engine, but written and given
+/// back in order of the caller's stream.
 class Adopted final : public AdoptedCloud {
  public:
   explicit Adopted(std::shared_ptr<DeviceMemory> memory) : memory_(std::move(memory)) {}
   ~Adopted() override {
     // The rows go back in order of the engine's stream, which may never have come to read them.
-    if (event_) cudaStreamWaitEvent(memory_->stream(), event_, 0), cudaEventDestroy(event_);
+    if (event_) {
+      cudaStreamWaitEvent(memory_->stream(), event_, 0);
+      cudaEventDestroy(event_);
+    }
     if (rows_) memory_->free(rows_, bytes_);
   }
   void take(const RawCloud& cloud, cudaStream_t stream);
@@ -56,16 +63,19 @@ void check_place(const char* field, const float* pointer, int device) {
   const int found = device_of(pointer);
   if (found < 0) throw InvalidArgument(std::string(field) + " is not device memory");
   if (found != device)
-    throw InvalidArgument(std::string(field) + " lies on device " + std::to_string(found) + ", but the context works on device " + std::to_string(device));
+    throw InvalidArgument(std::string(field) + " lies on device " + std::to_string(found) +
+                          ", but the context works on device " + std::to_string(device));
 }
 
 void Adopted::take(const RawCloud& cloud, cudaStream_t stream) {
   raw = cloud;
-  if (cloud.viewpoint_count > 0) viewpoints_.assign(cloud.viewpoints, cloud.viewpoints + 3 * cloud.viewpoint_count);
+  if (cloud.viewpoint_count > 0)
+    viewpoints_.assign(cloud.viewpoints, cloud.viewpoints + 3 * cloud.viewpoint_count);
   raw.viewpoints = viewpoints_.data();
   Rows parts[3] = {{cloud.points, cloud.point_stride, 3, nullptr},
                    {cloud.normals, cloud.normal_stride, 3, nullptr},
-                   {cloud.features, cloud.feature_stride, static_cast<unsigned>(cloud.feature_dimension), nullptr}};
+                   {cloud.features, cloud.feature_stride,
+                    static_cast<unsigned>(cloud.feature_dimension), nullptr}};
   std::size_t floats = 0;
   for (const Rows& part : parts) floats += part.from ? cloud.size * part.width : 0;
   if (floats > 0) rows_ = static_cast<float*>(memory_->allocate(floats * sizeof(float), stream));
@@ -78,16 +88,20 @@ void Adopted::take(const RawCloud& cloud, cudaStream_t stream) {
     pack_rows<<<blocks_for(cloud.size * part.width, 256), 256, 0, stream>>>(part, cloud.size);
     check_launch("pack_rows");
   }
-  raw.points = parts[0].to, raw.point_stride = 3;
-  raw.normals = parts[1].to, raw.normal_stride = 3;
-  raw.features = parts[2].to, raw.feature_stride = cloud.feature_dimension;
+  raw.points = parts[0].to;
+  raw.point_stride = 3;
+  raw.normals = parts[1].to;
+  raw.normal_stride = 3;
+  raw.features = parts[2].to;
+  raw.feature_stride = cloud.feature_dimension;
   check(cudaEventCreateWithFlags(&event_, cudaEventDisableTiming), "cudaEventCreateWithFlags");
   check(cudaEventRecord(event_, stream), "cudaEventRecord");
 }
 
 }  // namespace
 
-// Not under the engine's lock: whoever hands a cloud over does not wait for the batch that is under way.
+// Not under the engine's lock: whoever hands a cloud over does not wait for the batch that is under
+// way.
 std::shared_ptr<AdoptedCloud> CudaEngine::adopt(const RawCloud& cloud, void* stream) {
   const DeviceScope scope(device());
   check_place("cloud.points", cloud.points, device());
@@ -99,7 +113,8 @@ std::shared_ptr<AdoptedCloud> CudaEngine::adopt(const RawCloud& cloud, void* str
 }
 
 // The stage finds the rows on the device and reads them where they are.
-std::shared_ptr<PreparedState> CudaEngine::prepare_adopted(const AdoptedCloud& cloud, const PrepareOptions& options) {
+std::shared_ptr<PreparedState> CudaEngine::prepare_adopted(const AdoptedCloud& cloud,
+                                                           const PrepareOptions& options) {
   const std::lock_guard<std::mutex> lock(mutex_);
   const DeviceScope scope(device());
   const Adopted& adopted = static_cast<const Adopted&>(cloud);

@@ -17,11 +17,13 @@ struct Part {
 
 __global__ void copy_parts(const Part* parts) {
   const Part part = parts[blockIdx.y];
-  const std::size_t stride = static_cast<std::size_t>(gridDim.x) * blockDim.x, first = static_cast<std::size_t>(blockIdx.x) * blockDim.x + threadIdx.x;
+  const std::size_t stride = static_cast<std::size_t>(gridDim.x) * blockDim.x,
+                    first = static_cast<std::size_t>(blockIdx.x) * blockDim.x + threadIdx.x;
   const bool words = (reinterpret_cast<std::size_t>(part.from) | part.bytes) % 4 == 0;
   if (words) {
     for (std::size_t k = first; k < part.bytes / 4; k += stride)
-      reinterpret_cast<std::uint32_t*>(part.to)[k] = reinterpret_cast<const std::uint32_t*>(part.from)[k];
+      reinterpret_cast<std::uint32_t*>(part.to)[k] =
+          reinterpret_cast<const std::uint32_t*>(part.from)[k];
   } else {
     for (std::size_t k = first; k < part.bytes; k += stride) part.to[k] = part.from[k];
   }
@@ -29,18 +31,21 @@ __global__ void copy_parts(const Part* parts) {
 
 /// What is counted of a cloud.
 struct Counts {
-  std::uint32_t features;                       // missing
-  std::uint32_t extreme, extreme_wide;          // features that are too long for the tensor cores
-  std::uint32_t balance_bin[kBalanceBins];      // points by the direction of their normals; the last bin: without
+  std::uint32_t features;               // missing
+  std::uint32_t extreme, extreme_wide;  // features that are too long for the tensor cores
+  // points by the direction of their normals; the last bin: without
+  std::uint32_t balance_bin[kBalanceBins];
 };
 
-__global__ void count(const std::uint32_t* offset, const Vec3* normals, const std::uint8_t* valid, std::uint32_t* const* balance, Counts* counts) {
+__global__ void count(const std::uint32_t* offset, const Vec3* normals, const std::uint8_t* valid,
+                      std::uint32_t* const* balance, Counts* counts) {
   __shared__ std::uint32_t bins[kBalanceBins];
   const std::uint32_t c = blockIdx.y, begin = offset[c], end = offset[c + 1];
   if (threadIdx.x < kBalanceBins) bins[threadIdx.x] = 0;
   __syncthreads();
   std::uint32_t no_feature = 0;
-  for (std::uint32_t i = begin + blockIdx.x * blockDim.x + threadIdx.x; i < end; i += gridDim.x * blockDim.x) {
+  for (std::uint32_t i = begin + blockIdx.x * blockDim.x + threadIdx.x; i < end;
+       i += gridDim.x * blockDim.x) {
     const std::uint32_t bin = balance_bin(normals[i]);
     balance[c][i - begin] = bin;
     atomicAdd(bins + bin, 1u);
@@ -49,16 +54,21 @@ __global__ void count(const std::uint32_t* offset, const Vec3* normals, const st
   no_feature = warp_sum(no_feature);
   if (threadIdx.x % 32 == 0 && no_feature > 0) atomicAdd(&counts[c].features, no_feature);
   __syncthreads();
-  if (threadIdx.x < kBalanceBins && bins[threadIdx.x] > 0) atomicAdd(counts[c].balance_bin + threadIdx.x, bins[threadIdx.x]);
+  if (threadIdx.x < kBalanceBins && bins[threadIdx.x] > 0)
+    atomicAdd(counts[c].balance_bin + threadIdx.x, bins[threadIdx.x]);
 }
 
 /// From bins to weights.
-__global__ void balance_points(const std::uint32_t* offset, const Counts* counts, std::uint32_t* const* balance) {
+__global__ void balance_points(const std::uint32_t* offset, const Counts* counts,
+                               std::uint32_t* const* balance) {
   __shared__ std::uint32_t weight[kBalanceBins];
   const std::uint32_t c = blockIdx.y, size = offset[c + 1] - offset[c];
-  if (threadIdx.x < kBalanceBins) weight[threadIdx.x] = balance_weight(counts[c].balance_bin[threadIdx.x]);
+  if (threadIdx.x < kBalanceBins)
+    weight[threadIdx.x] = balance_weight(counts[c].balance_bin[threadIdx.x]);
   __syncthreads();
-  for (std::uint32_t i = blockIdx.x * blockDim.x + threadIdx.x; i < size; i += gridDim.x * blockDim.x) balance[c][i] = weight[balance[c][i]];
+  for (std::uint32_t i = blockIdx.x * blockDim.x + threadIdx.x; i < size;
+       i += gridDim.x * blockDim.x)
+    balance[c][i] = weight[balance[c][i]];
 }
 
 template <typename T>
@@ -69,7 +79,8 @@ std::vector<T> copy_back(const CudaCloud& cloud, const T* device, std::size_t si
     // Finished data: any stream may read it, and this one waits for nobody else's work.
     cudaStream_t stream = nullptr;
     check(cudaStreamCreateWithFlags(&stream, cudaStreamNonBlocking), "cudaStreamCreateWithFlags");
-    cudaError_t error = cudaMemcpyAsync(host.data(), device, size * sizeof(T), cudaMemcpyDeviceToHost, stream);
+    cudaError_t error =
+        cudaMemcpyAsync(host.data(), device, size * sizeof(T), cudaMemcpyDeviceToHost, stream);
     if (error == cudaSuccess) error = cudaStreamSynchronize(stream);
     cudaStreamDestroy(stream);
     check(error, "copying a cloud to the host");
@@ -79,15 +90,21 @@ std::vector<T> copy_back(const CudaCloud& cloud, const T* device, std::size_t si
 
 }  // namespace
 
-std::vector<Vec3> CudaCloud::copy_points() const { return copy_back(*this, view_on_device.points, size); }
-std::vector<Vec3> CudaCloud::copy_normals() const { return copy_back(*this, view_on_device.normals, size); }
+std::vector<Vec3> CudaCloud::copy_points() const {
+  return copy_back(*this, view_on_device.points, size);
+}
+std::vector<Vec3> CudaCloud::copy_normals() const {
+  return copy_back(*this, view_on_device.normals, size);
+}
 std::vector<float> CudaCloud::copy_features() const {
-  return copy_back(*this, view_on_device.features, static_cast<std::size_t>(size) * feature_dimension);
+  return copy_back(*this, view_on_device.features,
+                   static_cast<std::size_t>(size) * feature_dimension);
 }
 
-std::vector<std::shared_ptr<CudaCloud>> assemble(Exec& exec, const DownsampledClouds& clouds, const DeviceBuffer<Vec3>& normals,
-                                                 const Features& features, const Features& wide_features, const ClosestGrids& closest,
-                                                 const DepthMaps& depth_maps, const Fronts& fronts, const PrepareOptions& options) {
+std::vector<std::shared_ptr<CudaCloud>> assemble(
+    Exec& exec, const DownsampledClouds& clouds, const DeviceBuffer<Vec3>& normals,
+    const Features& features, const Features& wide_features, const ClosestGrids& closest,
+    const DepthMaps& depth_maps, const Fronts& fronts, const PrepareOptions& options) {
   const Segments& segments = clouds.segments;
   const std::size_t clouds_count = segments.entries();
   const auto counts = exec.filled<Counts>(clouds_count, 0);
@@ -114,15 +131,18 @@ std::vector<std::shared_ptr<CudaCloud>> assemble(Exec& exec, const DownsampledCl
     const std::size_t first_part = parts.size();
     std::size_t bytes = 0;
     const auto place = [&](const auto* from, std::size_t size) {
-      parts.push_back({reinterpret_cast<const char*>(from), reinterpret_cast<char*>(bytes), size * sizeof(*from)});
+      parts.push_back({reinterpret_cast<const char*>(from), reinterpret_cast<char*>(bytes),
+                       size * sizeof(*from)});
       bytes += (size * sizeof(*from) + 255) / 256 * 256;
     };
-    const std::size_t begin = segments.offset[c], n = cloud->size, block_begin = closest.blocks.offset[c];
+    const std::size_t begin = segments.offset[c], n = cloud->size,
+                      block_begin = closest.blocks.offset[c];
     place(clouds.points.data() + begin, n);
     place(normals.data() + begin, n);
     place(features.values.data() + features.offset[c], n * cloud->feature_dimension);
     place(features.valid.data() + begin, n);
-    place(closest.table.data() + closest.table_offset[c], closest.table_offset[c + 1] - closest.table_offset[c]);
+    place(closest.table.data() + closest.table_offset[c],
+          closest.table_offset[c + 1] - closest.table_offset[c]);
     place(closest.cell_start.data() + block_begin * (ClosestGridView::kBlockCells + 1),
           std::size_t(cloud->block_count) * (ClosestGridView::kBlockCells + 1));
     place(closest.candidates.data() + closest.candidate_offset[c], cloud->candidate_count);
@@ -130,8 +150,10 @@ std::vector<std::shared_ptr<CudaCloud>> assemble(Exec& exec, const DownsampledCl
     const bool has_wide = wide_features.dimension[c] > 0 && n > 0;
     place(wide_features.values.data() + wide_features.offset[c], n * wide_features.dimension[c]);
     place(wide_features.valid.data() + (has_wide ? begin : 0), has_wide ? n : 0);
-    const std::uint32_t map_begin = depth_maps.offset[c], maps = depth_maps.offset[c + 1] - map_begin;
-    place(depth_maps.depth.data() + std::size_t(map_begin) * kMapCells, std::size_t(maps) * kMapCells);
+    const std::uint32_t map_begin = depth_maps.offset[c],
+                        maps = depth_maps.offset[c + 1] - map_begin;
+    place(depth_maps.depth.data() + std::size_t(map_begin) * kMapCells,
+          std::size_t(maps) * kMapCells);
     place(depth_maps.viewpoints.data() + map_begin, maps);
     const FrontBox& box = fronts.boxes[c];
     place(fronts.words.data() + fronts.offset[c], box.words());
@@ -144,17 +166,20 @@ std::vector<std::shared_ptr<CudaCloud>> assemble(Exec& exec, const DownsampledCl
     const HalfCopy copy = facts.feature_dimension == 0 ? HalfCopy::turned : HalfCopy::plain;
     const auto reserve_aids = [&](std::uint32_t dimension, HalfCopy copy_of) {
       FeatureAidsPlaces at{};
-      for (int k = 0; k < FeatureAidsPlaces::kArrays; ++k) at.begin[k] = reserve(feature_aids_bytes(k, n, dimension, copy_of));
+      for (int k = 0; k < FeatureAidsPlaces::kArrays; ++k)
+        at.begin[k] = reserve(feature_aids_bytes(k, n, dimension, copy_of));
       return at;
     };
     const auto aids = reserve_aids(cloud->feature_dimension, copy);
-    const auto wide_aids = reserve_aids(has_wide ? wide_features.dimension[c] : 0, HalfCopy::turned);
+    const auto wide_aids =
+        reserve_aids(has_wide ? wide_features.dimension[c] : 0, HalfCopy::turned);
     const std::size_t balanced = reserve(n * sizeof(std::uint32_t));
     const std::size_t copied = bytes;
     const ScoringLayout layout = scoring_layout(*cloud, closest.block_range[c]);
     // Filled: tables begin empty, and what lies between the arrays is copied along with them.
     cloud->data = exec.filled<char>(copied + layout.bytes, 0);
-    for (std::size_t k = first_part; k < parts.size(); ++k) parts[k].to = cloud->data.data() + reinterpret_cast<std::size_t>(parts[k].to);
+    for (std::size_t k = first_part; k < parts.size(); ++k)
+      parts[k].to = cloud->data.data() + reinterpret_cast<std::size_t>(parts[k].to);
     const Part* part = parts.data() + first_part;
     CloudView& view = cloud->view_on_device;
     view.points = reinterpret_cast<const Vec3*>(part[0].to);
@@ -165,19 +190,24 @@ std::vector<std::shared_ptr<CudaCloud>> assemble(Exec& exec, const DownsampledCl
     view.feature_dimension = cloud->feature_dimension;
     view.radius = cloud->radius;
     view.closest = {1.0f / closest.geometry[c].cell_size,
-                    {reinterpret_cast<const CellEntry*>(part[4].to), closest.table_offset[c + 1] - closest.table_offset[c]},
-                    {reinterpret_cast<const std::uint32_t*>(part[5].to), std::size_t(cloud->block_count) * (ClosestGridView::kBlockCells + 1)},
+                    {reinterpret_cast<const CellEntry*>(part[4].to),
+                     closest.table_offset[c + 1] - closest.table_offset[c]},
+                    {reinterpret_cast<const std::uint32_t*>(part[5].to),
+                     std::size_t(cloud->block_count) * (ClosestGridView::kBlockCells + 1)},
                     {reinterpret_cast<const std::uint32_t*>(part[6].to), cloud->candidate_count}};
     view.executor_data = cloud.get();
     view.wide_features = has_wide ? reinterpret_cast<const float*>(part[8].to) : nullptr;
     view.has_wide_feature = has_wide ? reinterpret_cast<const std::uint8_t*>(part[9].to) : nullptr;
-    view.visibility = {reinterpret_cast<const std::uint16_t*>(part[10].to), reinterpret_cast<const Vec3*>(part[11].to), maps, depth_maps.step};
-    view.fronts = {box, box.words() > 0 ? reinterpret_cast<const std::uint32_t*>(part[12].to) : nullptr};
+    view.visibility = {reinterpret_cast<const std::uint16_t*>(part[10].to),
+                       reinterpret_cast<const Vec3*>(part[11].to), maps, depth_maps.step};
+    view.fronts = {box,
+                   box.words() > 0 ? reinterpret_cast<const std::uint32_t*>(part[12].to) : nullptr};
     char* const memory = cloud->data.data();
     balance.push_back(reinterpret_cast<std::uint32_t*>(memory + balanced));
     view.balance = balance.back();
-    const auto measure = [&](FeatureAids& to, const FeatureAidsPlaces& at, HalfCopy copy_of, const float* rows, const std::uint8_t* valid,
-                             std::uint32_t dimension, std::uint32_t* extreme) {
+    const auto measure = [&](FeatureAids& to, const FeatureAidsPlaces& at, HalfCopy copy_of,
+                             const float* rows, const std::uint8_t* valid, std::uint32_t dimension,
+                             std::uint32_t* extreme) {
       if (half_width(dimension, copy_of) == 0) return;
       to = feature_aids_at(memory, at, copy_of);
       features_to_measure.push_back({rows, valid, view.size, dimension, to, extreme});
@@ -185,20 +215,24 @@ std::vector<std::shared_ptr<CudaCloud>> assemble(Exec& exec, const DownsampledCl
     measure(cloud->narrow_aids, aids, copy, view.features, view.has_feature, view.feature_dimension,
             &counts.data()[c].extreme);
     if (has_wide)
-      measure(cloud->wide_aids, wide_aids, HalfCopy::turned, view.wide_features, view.has_wide_feature, wide_features.dimension[c],
-              &counts.data()[c].extreme_wide);
+      measure(cloud->wide_aids, wide_aids, HalfCopy::turned, view.wide_features,
+              view.has_wide_feature, wide_features.dimension[c], &counts.data()[c].extreme_wide);
     cloud->blocks = reinterpret_cast<const Cell*>(part[7].to);
     place_scoring_data(layout, closest.geometry[c], cloud->data.data() + copied, *cloud);
     out.push_back(std::move(cloud));
   }
   const auto parts_on_device = exec.upload(parts);
-  copy_parts<<<dim3(16, static_cast<unsigned>(parts.size())), 256, 0, exec.stream()>>>(parts_on_device.data());
+  copy_parts<<<dim3(16, static_cast<unsigned>(parts.size())), 256, 0, exec.stream()>>>(
+      parts_on_device.data());
   check_launch("copy_parts");
   const auto balance_on_device = exec.upload(balance);
   const dim3 grid(8, static_cast<unsigned>(clouds_count));
-  count<<<grid, 256, 0, exec.stream()>>>(segments.on_device.data(), normals.data(), features.valid.data(), balance_on_device.data(), counts.data());
+  count<<<grid, 256, 0, exec.stream()>>>(segments.on_device.data(), normals.data(),
+                                         features.valid.data(), balance_on_device.data(),
+                                         counts.data());
   check_launch("count");
-  balance_points<<<grid, 256, 0, exec.stream()>>>(segments.on_device.data(), counts.data(), balance_on_device.data());
+  balance_points<<<grid, 256, 0, exec.stream()>>>(segments.on_device.data(), counts.data(),
+                                                  balance_on_device.data());
   check_launch("balance_points");
   fill_feature_aids(exec, features_to_measure);
   fill_scoring_data(exec, out, closest.geometry);
@@ -208,7 +242,8 @@ std::vector<std::shared_ptr<CudaCloud>> assemble(Exec& exec, const DownsampledCl
     CudaCloud& cloud = *out[c];
     cloud.statistics.points_without_normal = counted[c].balance_bin[kBalanceBins - 1];
     cloud.statistics.points_without_feature = counted[c].features;
-    for (const std::uint32_t points : counted[c].balance_bin) cloud.balance_total += std::uint64_t(points) * balance_weight(points);
+    for (const std::uint32_t points : counted[c].balance_bin)
+      cloud.balance_total += std::uint64_t(points) * balance_weight(points);
     cloud.view_on_device.balance_total = cloud.balance_total;
     if (counted[c].extreme > 0) cloud.narrow_aids.half = nullptr;
     if (counted[c].extreme_wide > 0) cloud.wide_aids.half = nullptr;

@@ -5,7 +5,8 @@
 
 namespace gpureg::cuda {
 
-/// Sums of N integers over a thread block; the first warp has them afterwards in v. scratch: shared, N numbers per warp.
+/// Sums of N integers over a thread block; the first warp has them afterwards in v. scratch:
+/// shared, N numbers per warp.
 template <int N>
 __device__ void block_sum(std::int64_t (&v)[N], std::int64_t* scratch) {
   const int warp = static_cast<int>(threadIdx.x / 32), warps = static_cast<int>(blockDim.x / 32);
@@ -18,7 +19,10 @@ __device__ void block_sum(std::int64_t (&v)[N], std::int64_t* scratch) {
   __syncthreads();
   if (warp > 0) return;
 #pragma unroll
-  for (int k = 0; k < N; ++k) v[k] = warp_sum(static_cast<int>(threadIdx.x) < warps ? scratch[static_cast<int>(threadIdx.x) * N + k] : std::int64_t(0));
+  for (int k = 0; k < N; ++k)
+    v[k] = warp_sum(static_cast<int>(threadIdx.x) < warps
+                        ? scratch[static_cast<int>(threadIdx.x) * N + k]
+                        : std::int64_t(0));
 }
 
 }  // namespace gpureg::cuda

@@ -12,9 +12,9 @@ namespace gpureg::cuda {
 /// One pair as scoring reads it.
 struct ScorePair {
   CloudView source, target;
-  ScoringOrder order;        ///< of the source
-  CellSummaries cells;       ///< of the target
-  std::uint32_t limits;      ///< which of the two tables of limits holds
+  ScoringOrder order;    ///< of the source
+  CellSummaries cells;   ///< of the target
+  std::uint32_t limits;  ///< which of the two tables of limits holds
 };
 
 struct Limits {
@@ -23,23 +23,34 @@ struct Limits {
 
 /// rotate() for bounds: fused, so its last bits are others.
 __device__ inline Vec3 rotate_fast(const Rigid& rigid, float4 n) {
-  const auto row = [&](int k) { return fmaf(rigid.r[k + 2], n.z, fmaf(rigid.r[k + 1], n.y, rigid.r[k] * n.x)); };
+  const auto row = [&](int k) {
+    return fmaf(rigid.r[k + 2], n.z, fmaf(rigid.r[k + 1], n.y, rigid.r[k] * n.x));
+  };
   return {row(0), row(3), row(6)};
 }
 
-/// Whether a source point may be an inlier, or certainly is one, by the summary of its cell. moved: its normal, zero where it has none.
-__device__ inline bool may_be_inlier(const Limits* limits, std::uint32_t word, Vec3 moved, bool has_normal, bool& certain) {
-  // Without a normal the cosine is 0, as normals_agree() has it for limits up to 90 degrees; beyond them nothing is certain.
-  const auto part = [&](int shift) { return static_cast<float>(static_cast<std::int32_t>(word << shift) >> 24); };
-  const float cosine = fmaf(moved.z, part(8), fmaf(moved.y, part(16), moved.x * part(24))) * (1.0f / 127.0f);
+/// Whether a source point may be an inlier, or certainly is one, by the summary of its cell. moved:
+/// its normal, zero where it has none.
+__device__ inline bool may_be_inlier(const Limits* limits, std::uint32_t word, Vec3 moved,
+                                     bool has_normal, bool& certain) {
+  // Without a normal the cosine is 0, as normals_agree() has it for limits up to 90 degrees; beyond
+  // them nothing is certain.
+  const auto part = [&](int shift) {
+    return static_cast<float>(static_cast<std::int32_t>(word << shift) >> 24);
+  };
+  const float cosine =
+      fmaf(moved.z, part(8), fmaf(moved.y, part(16), moved.x * part(24))) * (1.0f / 127.0f);
   const Limits limit = limits[word >> 24];
   certain = cosine >= limit.all_above && (has_normal || limit.all_above <= -2.0f);
   return word != 0 && cosine >= limit.none_below;
 }
 
 /// The same of a packed normal.
-__device__ inline bool may_be_inlier(const Rigid& rigid, const Limits* limits, std::uint32_t word, std::uint32_t normal, bool& certain) {
-  return may_be_inlier(limits, word, rotate(rigid, normal == kPackedZero ? Vec3{0, 0, 0} : unpack_normal(normal)), normal != kPackedZero, certain);
+__device__ inline bool may_be_inlier(const Rigid& rigid, const Limits* limits, std::uint32_t word,
+                                     std::uint32_t normal, bool& certain) {
+  return may_be_inlier(limits, word,
+                       rotate(rigid, normal == kPackedZero ? Vec3{0, 0, 0} : unpack_normal(normal)),
+                       normal != kPackedZero, certain);
 }
 
 /// The closest of a cell's candidates, and its packed normal.
@@ -49,7 +60,8 @@ struct ClosestCandidate {
 };
 
 /// closest_candidate() on copies of the candidates that lie side by side. A list has at least one.
-__device__ inline ClosestCandidate closest_in_list(const float4* candidate, std::uint32_t list, Vec3 q) {
+__device__ inline ClosestCandidate closest_in_list(const float4* candidate, std::uint32_t list,
+                                                   Vec3 q) {
   constexpr std::uint32_t kAtOnce = 4;  // each alone would wait for memory
   ClosestCandidate best{3.402823466e38f, 0, kNoValue};
   std::uint32_t k = list >> 8;
@@ -75,32 +87,42 @@ __device__ inline ClosestCandidate closest_in_list(const float4* candidate, std:
   return best;
 }
 
-/// Exact test of a moved source point whose closest target point is known. moved: its normal, error: how far off cosines with a packed one
-/// can be, index: where the point's index is.
-__device__ inline bool agrees_with(const ScorePair& pair, const InlierTest& test, const Rigid& rigid, Vec3 moved, bool has_normal,
-                                   float error, const std::uint32_t* index, const ClosestCandidate& closest) {
+/// Exact test of a moved source point whose closest target point is known. moved: its normal,
+/// error: how far off cosines with a packed one can be, index: where the point's index is.
+__device__ inline bool agrees_with(const ScorePair& pair, const InlierTest& test,
+                                   const Rigid& rigid, Vec3 moved, bool has_normal, float error,
+                                   const std::uint32_t* index, const ClosestCandidate& closest) {
   if (!(closest.squared_distance <= test.max_squared)) return false;
   if (test.min_cosine <= -1.0f) return true;
   if (closest.normal == kPackedZero || !has_normal) return false;
   const float off = dot(moved, unpack_normal(closest.normal)) - test.min_cosine;
   if (fabsf(off) > error) return off > 0.0f;
-  return normals_agree(rotate(rigid, pair.source.normals[*index]), pair.target.normals[pair.target.closest.candidates[closest.place]], test.min_cosine);
+  return normals_agree(rotate(rigid, pair.source.normals[*index]),
+                       pair.target.normals[pair.target.closest.candidates[closest.place]],
+                       test.min_cosine);
 }
 
 /// Exact test by search, for cells with more candidates than a list can tell.
-static __device__ __noinline__ bool is_inlier_by_search(const ScorePair& pair, const InlierTest& test, const Rigid& rigid, Vec3 q, const std::uint32_t* index) {
+static __device__ __noinline__ bool is_inlier_by_search(const ScorePair& pair,
+                                                        const InlierTest& test, const Rigid& rigid,
+                                                        Vec3 q, const std::uint32_t* index) {
   const Closest found = find_closest(pair.target.closest, pair.target.points, q, test.max_squared);
-  return found.index != kNoValue && normals_agree(rotate(rigid, pair.source.normals[*index]), pair.target.normals[found.index], test.min_cosine);
+  return found.index != kNoValue &&
+         normals_agree(rotate(rigid, pair.source.normals[*index]), pair.target.normals[found.index],
+                       test.min_cosine);
 }
 
 /// Exact test of a source point in a known cell. list: of the cell. A thread's work.
-__device__ inline bool is_inlier(const ScorePair& pair, const InlierTest& test, const Rigid& rigid, float4 p, std::uint32_t normal,
-                                 const std::uint32_t* index, std::uint32_t list) {
+__device__ inline bool is_inlier(const ScorePair& pair, const InlierTest& test, const Rigid& rigid,
+                                 float4 p, std::uint32_t normal, const std::uint32_t* index,
+                                 std::uint32_t list) {
   const Vec3 q = apply(rigid, {p.x, p.y, p.z});
   if (list == kNoValue) return is_inlier_by_search(pair, test, rigid, q, index);
   const ClosestCandidate best = closest_in_list(pair.cells.candidate, list, q);
-  return best.place != kNoValue && agrees_with(pair, test, rigid, rotate(rigid, normal == kPackedZero ? Vec3{0, 0, 0} : unpack_normal(normal)),
-                                               normal != kPackedZero, kPackedCosineError, index, best);
+  return best.place != kNoValue &&
+         agrees_with(pair, test, rigid,
+                     rotate(rigid, normal == kPackedZero ? Vec3{0, 0, 0} : unpack_normal(normal)),
+                     normal != kPackedZero, kPackedCosineError, index, best);
 }
 
 }  // namespace gpureg::cuda

@@ -4,18 +4,21 @@
 #include "math/rigid.hpp"
 #include "products.hpp"
 
-/// Cells of the closest-point grid as the device keeps them: in bricks of 8 x 4 x 4, of which those near the surface exist. A bit says which,
-/// in runs of 32 along x; one block (two bricks along y and z) more on each side of the cloud stays empty. The coarsest look at a cell that
-/// tells anything is a code of four bits (directions.hpp), a word for the eight cells along x: 130 KB for a cloud of 5,000 points,
-/// little enough for the first cache.
+/// Cells of the closest-point grid as the device keeps them: in bricks of 8 x 4 x 4, of which those
+/// near the surface exist. A bit says which, in runs of 32 along x; one block (two bricks along y
+/// and z) more on each side of the cloud stays empty. The coarsest look at a cell that tells
+/// anything is a code of four bits (directions.hpp), a word for the eight cells along x: 130 KB for
+/// a cloud of 5,000 points, little enough for the first cache.
 namespace gpureg::cuda {
 
-/// Coordinates of a cell in the padded table. High bits may be set that are the same for all cells: see BrickMotion.
+/// Coordinates of a cell in the padded table. High bits may be set that are the same for all cells:
+/// see BrickMotion.
 struct BrickCell {
   std::uint32_t x, y, z;
 };
 
-/// Number of the word that a cell's code is in, if there is one: 16 words a brick, in the order (z, y).
+/// Number of the word that a cell's code is in, if there is one: 16 words a brick, in the order (z,
+/// y).
 struct BrickWord {
   std::uint32_t number;
   bool there;
@@ -27,22 +30,27 @@ struct BrickTable {
   BrickTable() = default;
   /// high: bits above the coordinates, a multiple of 2^22.
   __device__ BrickTable(const CellSummaries& v, std::uint32_t high)
-      : rows_y(v.brick_rows_y()), words_x(v.brick_words_x()), bias(((high >> 2) * rows_y + (high >> 2)) * words_x + (high >> 8)) {}
+      : rows_y(v.brick_rows_y()),
+        words_x(v.brick_words_x()),
+        bias(((high >> 2) * rows_y + (high >> 2)) * words_x + (high >> 8)) {}
 
   /// The cell is in the table.
   __device__ BrickWord find(BrickCell c, const uint2* runs) const {
     const uint2 run = runs[((c.z >> 2) * rows_y + (c.y >> 2)) * words_x + (c.x >> 8) - bias];
     const std::uint32_t from_here = __funnelshift_l(0u, run.x, c.x >> 3);
-    return {run.y - 16u * static_cast<std::uint32_t>(__popc(static_cast<int>(from_here))) + (c.z & 3) * 4 + (c.y & 3),
+    return {run.y - 16u * static_cast<std::uint32_t>(__popc(static_cast<int>(from_here))) +
+                (c.z & 3) * 4 + (c.y & 3),
             static_cast<std::int32_t>(from_here) < 0};
   }
 };
 
 /// Where the summary of a cell is.
-__device__ inline std::size_t cell_in_bricks(BrickWord word, BrickCell c) { return std::size_t(word.number) * 8 + (c.x & 7); }
+__device__ inline std::size_t cell_in_bricks(BrickWord word, BrickCell c) {
+  return std::size_t(word.number) * 8 + (c.x & 7);
+}
 
-/// A motion in units of the padded table. Rounding may differ from apply() by a small part of a cell, which the margin of the closest-point
-/// grid covers.
+/// A motion in units of the padded table. Rounding may differ from apply() by a small part of a
+/// cell, which the margin of the closest-point grid covers.
 struct BrickMotion : BrickTable {
   /// Adding it leaves the rounded coordinate in the low bits: full speed, unlike a conversion.
   static constexpr float kMagic = 12582912.0f;
@@ -67,14 +75,16 @@ struct BrickMotion : BrickTable {
   /// What is outside, NaN too, falls into the empty bricks at the border.
   __device__ BrickCell locate(float4 p) const {
     const auto axis = [&](int k) {
-      const float unit = __saturatef(fmaf(r[3 * k + 2], p.z, fmaf(r[3 * k + 1], p.y, fmaf(r[3 * k], p.x, t[k]))));
+      const float unit =
+          __saturatef(fmaf(r[3 * k + 2], p.z, fmaf(r[3 * k + 1], p.y, fmaf(r[3 * k], p.x, t[k]))));
       return __float_as_uint(fmaf(unit, last[k], kMagic));
     };
     return {axis(0), axis(1), axis(2)};
   }
 };
 
-/// Whether the code of a cell, given its word (0 where there is none), is among the codes that agree with a class of normals (agreeing_codes()).
+/// Whether the code of a cell, given its word (0 where there is none), is among the codes that
+/// agree with a class of normals (agreeing_codes()).
 __device__ inline bool code_agrees(std::uint32_t word, BrickCell c, std::uint32_t agreeing) {
   return (__funnelshift_r(agreeing, agreeing, __funnelshift_r(word, word, c.x << 2)) & 1u) != 0;
 }

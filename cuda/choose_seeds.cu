@@ -10,15 +10,17 @@
 namespace gpureg::cuda {
 namespace {
 
-constexpr int kThreads = 128, kRows = 4;                        // a thread's matches
-constexpr std::uint32_t kBlockRows = kThreads * kRows;          // a thread block's
-constexpr std::uint32_t kTile = kThreads;                       // matches in shared memory at a time
-constexpr std::uint32_t kHeld = 8;                              // matches that a lane of find_slopes() holds
-constexpr int kDegreeBits = 17;                                 // 0 to 2^16
+constexpr int kThreads = 128, kRows = 4;                // a thread's matches
+constexpr std::uint32_t kBlockRows = kThreads * kRows;  // a thread block's
+// matches in shared memory at a time
+constexpr std::uint32_t kTile = kThreads;
+// matches that a lane of find_slopes() holds
+constexpr std::uint32_t kHeld = 8;
+constexpr int kDegreeBits = 17;  // 0 to 2^16
 constexpr std::uint32_t kMostDegree = (1u << kDegreeBits) - 1;
-constexpr int kStrengthBits = 24;                               // 0 to 2^23, see seed_strength()
+constexpr int kStrengthBits = 24;  // 0 to 2^23, see seed_strength()
 constexpr std::uint32_t kMostStrength = (1u << kStrengthBits) - 2;
-constexpr std::uint32_t kPadding = (2u << kStrengthBits) - 1;   // key after those of all matches
+constexpr std::uint32_t kPadding = (2u << kStrengthBits) - 1;  // key after those of all matches
 
 struct SeedBatch {
   MatchSetView matches;
@@ -30,12 +32,14 @@ struct SeedBatch {
   std::uint8_t* slope;
 };
 
-/// How many matches each is compatible with, itself included. Compatibility is mutual: a thread block compares one range of the matches
-/// (y) with another that does not come before (x), and counts for both. z: pair.
+/// How many matches each is compatible with, itself included. Compatibility is mutual: a thread
+/// block compares one range of the matches (y) with another that does not come before (x), and
+/// counts for both. z: pair.
 __global__ void __launch_bounds__(kThreads) count_compatible(SeedBatch b) {
   __shared__ PackedMatch tile[kTile];
   __shared__ std::uint32_t column_count[kTile];
-  const std::uint32_t p = blockIdx.z, n = b.count[p], room = b.room[p], row = blockIdx.y * kBlockRows, column = blockIdx.x * kBlockRows;
+  const std::uint32_t p = blockIdx.z, n = b.count[p], room = b.room[p],
+                      row = blockIdx.y * kBlockRows, column = blockIdx.x * kBlockRows;
   if (blockIdx.x < blockIdx.y || column >= n) return;
   const std::uint32_t lane = threadIdx.x % 32, last = min(n, column + kBlockRows);
   const bool mutual = blockIdx.x > blockIdx.y;
@@ -51,7 +55,8 @@ __global__ void __launch_bounds__(kThreads) count_compatible(SeedBatch b) {
   for (std::uint32_t base = column; base < last; base += kTile) {
     const std::uint32_t size = min(kTile, last - base);
     __syncthreads();
-    if (threadIdx.x < size) tile[threadIdx.x] = packed(match_at(b.matches, room + base + threadIdx.x));
+    if (threadIdx.x < size)
+      tile[threadIdx.x] = packed(match_at(b.matches, room + base + threadIdx.x));
     column_count[threadIdx.x] = 0;
     __syncthreads();
     for (std::uint32_t first = 0; first < size; first += 32) {
@@ -62,7 +67,8 @@ __global__ void __launch_bounds__(kThreads) count_compatible(SeedBatch b) {
 #pragma unroll
         for (int r = 0; r < kRows; ++r) {
           const std::uint32_t one = compatible(other, own[r], b.test) ? 1u : 0u;
-          count[r] += one, both += one;
+          count[r] += one;
+          both += one;
         }
         if (!mutual) continue;
         both = warp_sum(both);
@@ -71,7 +77,8 @@ __global__ void __launch_bounds__(kThreads) count_compatible(SeedBatch b) {
       if (kept > 0) atomicAdd(column_count + first + lane, kept);
     }
     __syncthreads();
-    if (mutual && threadIdx.x < size && column_count[threadIdx.x] > 0) atomicAdd(b.degree + room + base + threadIdx.x, column_count[threadIdx.x]);
+    if (mutual && threadIdx.x < size && column_count[threadIdx.x] > 0)
+      atomicAdd(b.degree + room + base + threadIdx.x, column_count[threadIdx.x]);
   }
 #pragma unroll
   for (int r = 0; r < kRows; ++r) {
@@ -82,7 +89,8 @@ __global__ void __launch_bounds__(kThreads) count_compatible(SeedBatch b) {
 
 /// Keys that sort by pair and then by degree, the greatest first.
 __global__ void write_degree_keys(SeedBatch b, std::uint64_t* key, std::uint32_t* match) {
-  const std::uint32_t p = blockIdx.y, n = b.count[p], room = b.room[p], i = blockIdx.x * blockDim.x + threadIdx.x;
+  const std::uint32_t p = blockIdx.y, n = b.count[p], room = b.room[p],
+                      i = blockIdx.x * blockDim.x + threadIdx.x;
   if (i >= b.room[p + 1] - room) return;
   const std::uint32_t before = i < n ? kMostDegree - b.degree[room + i] : kMostDegree;
   key[room + i] = static_cast<std::uint64_t>(p) << kDegreeBits | before;
@@ -94,12 +102,15 @@ __global__ void rank_points(SeedBatch b, const std::uint32_t* match, float4* ran
   const std::uint32_t p = blockIdx.y, room = b.room[p], k = blockIdx.x * blockDim.x + threadIdx.x;
   if (k >= b.count[p]) return;
   const std::uint32_t at = room + match[room + k];
-  ranked[room + k] = make_float4(b.matches.px[at], b.matches.py[at], b.matches.pz[at], __uint_as_float(b.degree[at]));
+  ranked[room + k] = make_float4(b.matches.px[at], b.matches.py[at], b.matches.pz[at],
+                                 __uint_as_float(b.degree[at]));
 }
 
-/// Marks the matches that have one with more compatible matches near. Those with many are looked at first, and most matches have one of them
-/// near. A warp takes 32 matches of similar degree: each of its lanes holds others, all compare them with one of the 32 at a time.
-__global__ void __launch_bounds__(kThreads) find_slopes(SeedBatch b, const float4* ranked, const std::uint32_t* match) {
+/// Marks the matches that have one with more compatible matches near. Those with many are looked at
+/// first, and most matches have one of them near. A warp takes 32 matches of similar degree: each
+/// of its lanes holds others, all compare them with one of the 32 at a time.
+__global__ void __launch_bounds__(kThreads)
+    find_slopes(SeedBatch b, const float4* ranked, const std::uint32_t* match) {
   const std::uint32_t p = blockIdx.y, n = b.count[p], room = b.room[p], lane = threadIdx.x % 32;
   const std::uint32_t k = blockIdx.x * kThreads + threadIdx.x, first = k - lane;
   if (first >= n) return;
@@ -109,36 +120,45 @@ __global__ void __launch_bounds__(kThreads) find_slopes(SeedBatch b, const float
   for (std::uint32_t base = 0; open != 0 && base < min(n, first + 32); base += 32 * kHeld) {
     float4 other[kHeld];
 #pragma unroll
-    for (std::uint32_t h = 0; h < kHeld; ++h) other[h] = ranked[room + min(base + h * 32 + lane, n - 1)];
+    for (std::uint32_t h = 0; h < kHeld; ++h)
+      other[h] = ranked[room + min(base + h * 32 + lane, n - 1)];
     for (unsigned left = open; left != 0; left &= left - 1) {
       const int l = __ffs(static_cast<int>(left)) - 1;
-      const Vec3 point{__shfl_sync(~0u, own.x, l), __shfl_sync(~0u, own.y, l), __shfl_sync(~0u, own.z, l)};
+      const Vec3 point{__shfl_sync(~0u, own.x, l), __shfl_sync(~0u, own.y, l),
+                       __shfl_sync(~0u, own.z, l)};
       const std::uint32_t degree = __float_as_uint(__shfl_sync(~0u, own.w, l));
       bool greater = false;
 #pragma unroll
       for (std::uint32_t h = 0; h < kHeld; ++h)
-        greater |= (__float_as_uint(other[h].w) > degree) & (squared_norm(Vec3{other[h].x, other[h].y, other[h].z} - point) < b.squared_separation);
+        greater |=
+            (__float_as_uint(other[h].w) > degree) &
+            (squared_norm(Vec3{other[h].x, other[h].y, other[h].z} - point) < b.squared_separation);
       if (__any_sync(~0u, greater)) open &= ~(1u << l);
     }
   }
   if (k < n && (open >> lane & 1) == 0) b.slope[room + match[room + k]] = 1;
 }
 
-/// Keys that sort by pair and then as seed_key() does, the best first; equals keep their order, which is that of the matches.
+/// Keys that sort by pair and then as seed_key() does, the best first; equals keep their order,
+/// which is that of the matches.
 __global__ void write_keys(SeedBatch b, std::uint64_t* key, std::uint32_t* match) {
-  const std::uint32_t p = blockIdx.y, n = b.count[p], room = b.room[p], i = blockIdx.x * blockDim.x + threadIdx.x;
+  const std::uint32_t p = blockIdx.y, n = b.count[p], room = b.room[p],
+                      i = blockIdx.x * blockDim.x + threadIdx.x;
   if (i >= b.room[p + 1] - room) return;
   std::uint32_t order = kPadding;
   if (i < n) {
-    const std::uint32_t strength = seed_strength(b.degree[room + i], b.matches.source_weight[room + i] + b.matches.target_weight[room + i]);
+    const std::uint32_t strength = seed_strength(
+        b.degree[room + i], b.matches.source_weight[room + i] + b.matches.target_weight[room + i]);
     order = (b.slope[room + i] ? 1u << kStrengthBits : 0u) + (kMostStrength - strength);
   }
   key[room + i] = static_cast<std::uint64_t>(p) << (kStrengthBits + 1) | order;
   match[room + i] = i;
 }
 
-__global__ void take_seeds(SeedBatch b, const std::uint32_t* ranked, std::uint32_t most, std::uint32_t* match, std::uint32_t* count) {
-  const std::uint32_t p = blockIdx.y, k = blockIdx.x * blockDim.x + threadIdx.x, size = min(most, b.count[p]);
+__global__ void take_seeds(SeedBatch b, const std::uint32_t* ranked, std::uint32_t most,
+                           std::uint32_t* match, std::uint32_t* count) {
+  const std::uint32_t p = blockIdx.y, k = blockIdx.x * blockDim.x + threadIdx.x,
+                      size = min(most, b.count[p]);
   if (k < size) match[p * most + k] = ranked[b.room[p] + k];
   if (k == 0) count[p] = size;
 }
@@ -156,8 +176,13 @@ Seeds choose_seeds(Exec& exec, const MatchSets& matches, const CompatibilityOpti
   if (total == 0) return out;
   const auto degree = exec.filled<std::uint32_t>(total, 0);
   const auto slope = exec.filled<std::uint8_t>(total, 0);
-  const SeedBatch batch{matches.view(), matches.room.on_device.data(), matches.count.data(), test_of(options),
-                        options.seed_separation * options.seed_separation, degree.data(), slope.data()};
+  const SeedBatch batch{matches.view(),
+                        matches.room.on_device.data(),
+                        matches.count.data(),
+                        test_of(options),
+                        options.seed_separation * options.seed_separation,
+                        degree.data(),
+                        slope.data()};
   const unsigned ranges = blocks_for(largest, kBlockRows);
   count_compatible<<<dim3(ranges, ranges, pair_count), kThreads, 0, exec.stream()>>>(batch);
   check_launch("count_compatible");
@@ -170,12 +195,14 @@ Seeds choose_seeds(Exec& exec, const MatchSets& matches, const CompatibilityOpti
   sort_pairs(exec, key, match, kDegreeBits + bits_for(pairs));
   rank_points<<<grid, 256, 0, exec.stream()>>>(batch, match.data(), ranked.data());
   check_launch("rank_points");
-  find_slopes<<<dim3(blocks_for(largest, kThreads), pair_count), kThreads, 0, exec.stream()>>>(batch, ranked.data(), match.data());
+  find_slopes<<<dim3(blocks_for(largest, kThreads), pair_count), kThreads, 0, exec.stream()>>>(
+      batch, ranked.data(), match.data());
   check_launch("find_slopes");
   write_keys<<<grid, 256, 0, exec.stream()>>>(batch, key.data(), match.data());
   check_launch("write_keys");
   sort_pairs(exec, key, match, kStrengthBits + 1 + bits_for(pairs));
-  take_seeds<<<dim3(blocks_for(out.most, 256), pair_count), 256, 0, exec.stream()>>>(batch, match.data(), out.most, out.match.data(), out.count.data());
+  take_seeds<<<dim3(blocks_for(out.most, 256), pair_count), 256, 0, exec.stream()>>>(
+      batch, match.data(), out.most, out.match.data(), out.count.data());
   check_launch("take_seeds");
   return out;
 }

@@ -19,26 +19,37 @@ struct SearchPair {
 inline DeviceBuffer<SearchPair> upload_search_pairs(Exec& exec, Span<const PairView> pairs) {
   std::vector<SearchPair> out;
   for (const PairView& pair : pairs)
-    out.push_back({pair.source, pair.target, static_cast<const CudaCloud*>(pair.source.executor_data)->summaries,
-                   static_cast<const CudaCloud*>(pair.target.executor_data)->summaries, pair.prior});
+    out.push_back({pair.source, pair.target,
+                   static_cast<const CudaCloud*>(pair.source.executor_data)->summaries,
+                   static_cast<const CudaCloud*>(pair.target.executor_data)->summaries,
+                   pair.prior});
   return exec.upload(out);
 }
 
-/// What find_closest() finds, with a table of bricks instead of a hash table, and on copies of the candidates that lie side by side.
-__device__ inline Closest find_closest(const CloudView& cloud, const CellSummaries& cells, Vec3 q, float max_squared) {
+/// What find_closest() finds, with a table of bricks instead of a hash table, and on copies of the
+/// candidates that lie side by side.
+__device__ inline Closest find_closest(const CloudView& cloud, const CellSummaries& cells, Vec3 q,
+                                       float max_squared) {
   if (cells.nx == 0) return find_closest(cloud.closest, cloud.points, q, max_squared);
   const Closest none{kNoValue, max_squared};
-  const float fx = q.x * cloud.closest.inverse_cell_size, fy = q.y * cloud.closest.inverse_cell_size, fz = q.z * cloud.closest.inverse_cell_size;
-  constexpr float kLimit = static_cast<float>(kCellBias) * static_cast<float>(ClosestGridView::kBlockEdge) - 1.0f;
+  const float fx = q.x * cloud.closest.inverse_cell_size,
+              fy = q.y * cloud.closest.inverse_cell_size,
+              fz = q.z * cloud.closest.inverse_cell_size;
+  constexpr float kLimit =
+      static_cast<float>(kCellBias) * static_cast<float>(ClosestGridView::kBlockEdge) - 1.0f;
   if (!(fabsf(fx) < kLimit && fabsf(fy) < kLimit && fabsf(fz) < kLimit)) return none;
-  const BrickCell c{static_cast<std::uint32_t>(floor_to_int(fx) + static_cast<std::int32_t>(cells.offset.x) + 8),
-                    static_cast<std::uint32_t>(floor_to_int(fy) + static_cast<std::int32_t>(cells.offset.y) + 8),
-                    static_cast<std::uint32_t>(floor_to_int(fz) + static_cast<std::int32_t>(cells.offset.z) + 8)};
-  const auto inside = [](std::uint32_t v, std::int32_t blocks) { return v >> 3 < static_cast<std::uint32_t>(blocks) + 2; };
+  const BrickCell c{
+      static_cast<std::uint32_t>(floor_to_int(fx) + static_cast<std::int32_t>(cells.offset.x) + 8),
+      static_cast<std::uint32_t>(floor_to_int(fy) + static_cast<std::int32_t>(cells.offset.y) + 8),
+      static_cast<std::uint32_t>(floor_to_int(fz) + static_cast<std::int32_t>(cells.offset.z) + 8)};
+  const auto inside = [](std::uint32_t v, std::int32_t blocks) {
+    return v >> 3 < static_cast<std::uint32_t>(blocks) + 2;
+  };
   if (!inside(c.x, cells.nx) || !inside(c.y, cells.ny) || !inside(c.z, cells.nz)) return none;
   const BrickWord word = BrickTable(cells, 0).find(c, cells.run);
   if (!word.there) return none;
-  const std::uint32_t list = __ldg(&cells.cell[cell_in_bricks(word, c)].y), first = list >> 8, last = first + (list & 255u);
+  const std::uint32_t list = __ldg(&cells.cell[cell_in_bricks(word, c)].y), first = list >> 8,
+                      last = first + (list & 255u);
   if (list == kNoValue) return find_closest(cloud.closest, cloud.points, q, max_squared);
   std::uint32_t best = kNoValue;
   float best_squared = 3.402823466e38f;

@@ -22,12 +22,14 @@ struct Lists {
   const std::uint32_t* point_offset;  // per cloud
   const Vec3* points;
   std::uint32_t clouds;
-  std::uint32_t* near_start;          // per block; first the counts
-  std::uint32_t* near;                // indices of the points that can matter to a block, ascending
-  std::uint32_t* nearest;             // per cell: place in the near list of the point nearest to its centre, or kNoValue
-  std::uint32_t* cell_start;          // blocks x 513
-  std::uint32_t* list_start;          // per block; first the counts
-  unsigned long long* totals;         // near points of all; candidates of each cloud; most of a block
+  std::uint32_t* near_start;  // per block; first the counts
+  std::uint32_t* near;        // indices of the points that can matter to a block, ascending
+  // per cell: place in the near list of the point nearest to its centre, or kNoValue
+  std::uint32_t* nearest;
+  std::uint32_t* cell_start;  // blocks x 513
+  std::uint32_t* list_start;  // per block; first the counts
+  // near points of all; candidates of each cloud; most of a block
+  unsigned long long* totals;
   const std::size_t* candidate_offset;
   std::uint32_t* candidates;
 };
@@ -44,9 +46,11 @@ __device__ void for_each_near(const GridView& grid, Vec3 center, float reach, Vi
   for (int first = 0; first < rows.rows; first += 32) {
     std::uint32_t my_begin, my_end;
     rows.run(grid, first + static_cast<int>(lane), my_begin, my_end);
-    for (unsigned filled = __ballot_sync(~0u, my_begin != my_end); filled != 0; filled &= filled - 1) {
+    for (unsigned filled = __ballot_sync(~0u, my_begin != my_end); filled != 0;
+         filled &= filled - 1) {
       const int row = __ffs(static_cast<int>(filled)) - 1;
-      const std::uint32_t begin = __shfl_sync(~0u, my_begin, row), end = __shfl_sync(~0u, my_end, row);
+      const std::uint32_t begin = __shfl_sync(~0u, my_begin, row),
+                          end = __shfl_sync(~0u, my_end, row);
       for (std::uint32_t base = begin; base < end; base += 32) {
         const std::uint32_t k = base + lane;
         bool inside = k < end;
@@ -67,14 +71,18 @@ __global__ void count_near(Lists l, std::uint32_t blocks) {
   const std::uint32_t c = entry_of(l.block_offset, l.clouds, b);
   const ClosestGeometry g = l.geometry[c];
   std::uint32_t count = 0;
-  for_each_near(l.grids[c], cell_center(l.block[b], block_edge(g)), block_reach(g),
-                [&](std::uint32_t, bool inside) { count += static_cast<std::uint32_t>(__popc(static_cast<int>(__ballot_sync(~0u, inside)))); });
+  for_each_near(
+      l.grids[c], cell_center(l.block[b], block_edge(g)), block_reach(g),
+      [&](std::uint32_t, bool inside) {
+        count += static_cast<std::uint32_t>(__popc(static_cast<int>(__ballot_sync(~0u, inside))));
+      });
   if (threadIdx.x % 32 != 0) return;
   l.near_start[b] = count;
   atomicAdd(&l.totals[0], static_cast<unsigned long long>(count));
 }
 
-/// Sorts ascending by a bitonic network whose comparators all point one way, so that any size works without padding.
+/// Sorts ascending by a bitonic network whose comparators all point one way, so that any size works
+/// without padding.
 __device__ void sort_ascending(std::uint32_t* values, std::uint32_t size) {
   std::uint32_t padded = 1;
   while (padded < size) padded *= 2;
@@ -111,11 +119,14 @@ __global__ void __launch_bounds__(kThreads) list_near(Lists l) {
   std::uint32_t* list = size <= kSortInShared ? sorted : l.near + begin;
   if (threadIdx.x < 32) {
     std::uint32_t at = 0;
-    for_each_near(l.grids[c], cell_center(l.block[b], block_edge(g)), block_reach(g), [&](std::uint32_t index, bool inside) {
-      const unsigned mask = __ballot_sync(~0u, inside);
-      if (inside) list[at + static_cast<std::uint32_t>(__popc(static_cast<int>(mask & ((1u << threadIdx.x) - 1))))] = index;
-      at += static_cast<std::uint32_t>(__popc(static_cast<int>(mask)));
-    });
+    for_each_near(l.grids[c], cell_center(l.block[b], block_edge(g)), block_reach(g),
+                  [&](std::uint32_t index, bool inside) {
+                    const unsigned mask = __ballot_sync(~0u, inside);
+                    if (inside)
+                      list[at + static_cast<std::uint32_t>(__popc(
+                                    static_cast<int>(mask & ((1u << threadIdx.x) - 1))))] = index;
+                    at += static_cast<std::uint32_t>(__popc(static_cast<int>(mask)));
+                  });
   }
   sort_ascending(list, size);
   if (list != sorted) return;
@@ -128,7 +139,8 @@ __device__ Cell cell_of_block(Cell block, int cell) {
 
 /// Calls visit(k, point) for all near points in order, every thread of the block at once.
 template <typename Visit>
-__device__ void for_each_listed(const Vec3* points, const std::uint32_t* near, std::uint32_t size, float4* tile, Visit&& visit) {
+__device__ void for_each_listed(const Vec3* points, const std::uint32_t* near, std::uint32_t size,
+                                float4* tile, Visit&& visit) {
   for (std::uint32_t base = 0; base < size; base += kTile) {
     const std::uint32_t n = min(kTile, size - base);
     __syncthreads();
@@ -141,7 +153,8 @@ __device__ void for_each_listed(const Vec3* points, const std::uint32_t* near, s
   }
 }
 
-/// The point nearest to each cell's centre and the number of its candidates; offsets within the block.
+/// The point nearest to each cell's centre and the number of its candidates; offsets within the
+/// block.
 __global__ void __launch_bounds__(kThreads) count_candidates(Lists l) {
   __shared__ float4 tile[kTile];
   __shared__ std::uint32_t counts[kCells];
@@ -156,7 +169,10 @@ __global__ void __launch_bounds__(kThreads) count_candidates(Lists l) {
     std::uint32_t nearest = kNoValue;
     for_each_listed(points, l.near + begin, size, tile, [&](std::uint32_t k, Vec3 p) {
       const float d2 = squared_norm(p - center);
-      if (d2 < nearest2) nearest2 = d2, nearest = k;
+      if (d2 < nearest2) {
+        nearest2 = d2;
+        nearest = k;
+      }
     });
     const float distance = sqrtf(nearest2);
     std::uint32_t count = 0;
@@ -207,21 +223,25 @@ __global__ void __launch_bounds__(kThreads) write_candidates(Lists l) {
     const Vec3 center = cell_center(cell_of_block(l.block[b], cell), g.cell_size);
     const std::uint32_t nearest = l.nearest[static_cast<std::size_t>(b) * kCells + cell];
     const Vec3 best = nearest != kNoValue ? points[l.near[begin + nearest]] : Vec3{0, 0, 0};
-    const float limit = candidate_limit(sqrtf(squared_norm(best - center)), g), limit2 = limit * limit;
+    const float limit = candidate_limit(sqrtf(squared_norm(best - center)), g),
+                limit2 = limit * limit;
     std::uint32_t at = start[cell];
     for_each_listed(points, l.near + begin, size, tile, [&](std::uint32_t k, Vec3 p) {
       if (nearest == kNoValue || squared_norm(p - center) > limit2) return;
-      if (k == nearest || can_win_in_cell(center, best, p, k > nearest, g)) candidates[at++] = l.near[begin + k];
+      if (k == nearest || can_win_in_cell(center, best, p, k > nearest, g))
+        candidates[at++] = l.near[begin + k];
     });
   }
   __syncthreads();
-  for (int cell = static_cast<int>(threadIdx.x); cell <= kCells; cell += kThreads) start[cell] += base;
+  for (int cell = static_cast<int>(threadIdx.x); cell <= kCells; cell += kThreads)
+    start[cell] += base;
 }
 
 }  // namespace
 
-void fill_closest_lists(Exec& exec, const DownsampledClouds& clouds, const Grids& grids, const ClosestGeometry* geometry,
-                        const PrepareOptions& options, ClosestGrids& out) {
+void fill_closest_lists(Exec& exec, const DownsampledClouds& clouds, const Grids& grids,
+                        const ClosestGeometry* geometry, const PrepareOptions& options,
+                        ClosestGrids& out) {
   const std::size_t count = clouds.segments.entries();
   const std::uint32_t blocks = out.blocks.total();
   out.cell_start = exec.buffer<std::uint32_t>(static_cast<std::size_t>(blocks) * (kCells + 1));
@@ -231,10 +251,19 @@ void fill_closest_lists(Exec& exec, const DownsampledClouds& clouds, const Grids
   const auto list_start = exec.filled<std::uint32_t>(blocks + 1, 0);
   const auto totals = exec.filled<unsigned long long>(2 + count, 0);
   Lists l{};
-  l.block_offset = out.blocks.on_device.data(), l.block = out.block.data(), l.geometry = geometry, l.grids = grids.views.data();
-  l.point_offset = clouds.segments.on_device.data(), l.points = clouds.points.data(), l.clouds = static_cast<std::uint32_t>(count);
-  l.near_start = near_start.data(), l.list_start = list_start.data(), l.totals = totals.data(), l.cell_start = out.cell_start.data();
-  count_near<<<blocks_for(std::size_t(blocks) * 32, kThreads), kThreads, 0, exec.stream()>>>(l, blocks);
+  l.block_offset = out.blocks.on_device.data();
+  l.block = out.block.data();
+  l.geometry = geometry;
+  l.grids = grids.views.data();
+  l.point_offset = clouds.segments.on_device.data();
+  l.points = clouds.points.data();
+  l.clouds = static_cast<std::uint32_t>(count);
+  l.near_start = near_start.data();
+  l.list_start = list_start.data();
+  l.totals = totals.data();
+  l.cell_start = out.cell_start.data();
+  count_near<<<blocks_for(std::size_t(blocks) * 32, kThreads), kThreads, 0, exec.stream()>>>(
+      l, blocks);
   check_launch("count_near");
   exclusive_sum(exec, near_start.data(), near_start.data(), blocks + 1);
   const unsigned long long* near_total = exec.download(totals.data(), 1);
@@ -243,7 +272,8 @@ void fill_closest_lists(Exec& exec, const DownsampledClouds& clouds, const Grids
 
   const auto near = exec.buffer<std::uint32_t>(*near_total);
   const auto nearest = exec.buffer<std::uint32_t>(static_cast<std::size_t>(blocks) * kCells);
-  l.near = near.data(), l.nearest = nearest.data();
+  l.near = near.data();
+  l.nearest = nearest.data();
   list_near<<<blocks, kThreads, 0, exec.stream()>>>(l);
   check_launch("list_near");
   count_candidates<<<blocks, kThreads, 0, exec.stream()>>>(l);
@@ -252,12 +282,14 @@ void fill_closest_lists(Exec& exec, const DownsampledClouds& clouds, const Grids
   const unsigned long long* sums = exec.download(totals.data(), 2 + count);
   exec.synchronize();
   for (std::size_t c = 0; c < count; ++c) {
-    if (sums[2 + c] > pipeline::kMaxCandidates || sums[1] > pipeline::kMaxBlockCandidates) pipeline::throw_too_dense(options.search_distance);
+    if (sums[2 + c] > pipeline::kMaxCandidates || sums[1] > pipeline::kMaxBlockCandidates)
+      pipeline::throw_too_dense(options.search_distance);
     out.candidate_offset[c + 1] = out.candidate_offset[c] + sums[2 + c];
   }
   const auto candidate_offset = exec.upload(out.candidate_offset);
   out.candidates = exec.buffer<std::uint32_t>(out.candidate_offset.back());
-  l.candidate_offset = candidate_offset.data(), l.candidates = out.candidates.data();
+  l.candidate_offset = candidate_offset.data();
+  l.candidates = out.candidates.data();
   write_candidates<<<blocks, kThreads, 0, exec.stream()>>>(l);
   check_launch("write_candidates");
 }

@@ -4,12 +4,14 @@
 #include "bricks.cuh"
 #include "score_batch.cuh"
 
-/// How many inliers a hypothesis has: by one warp, which gives up as soon as it is not the best, or by a thread block.
+/// How many inliers a hypothesis has: by one warp, which gives up as soon as it is not the best, or
+/// by a thread block.
 namespace gpureg::cuda {
 
 constexpr std::uint32_t kUnroll = 4;  ///< groups in flight per warp
 
-/// The source's points in groups of 32, the groups in the order in which hypotheses fail at them: in shared memory.
+/// The source's points in groups of 32, the groups in the order in which hypotheses fail at them:
+/// in shared memory.
 struct PointsInShared {
   const float2* xy;
   const float* z;
@@ -25,7 +27,9 @@ struct PointsInShared {
 struct PointsInGlobal {
   const float4* point;
   const std::uint32_t* order;
-  __device__ float4 operator()(std::uint32_t group, std::uint32_t lane) const { return __ldg(point + __ldg(order + group) * 32 + lane); }
+  __device__ float4 operator()(std::uint32_t group, std::uint32_t lane) const {
+    return __ldg(point + __ldg(order + group) * 32 + lane);
+  }
 };
 
 /// What all hypotheses of a slice read.
@@ -38,14 +42,16 @@ struct Staged {
 
 /// A warp's own shared memory.
 struct WarpMemory {
-  std::uint32_t agreeing[64];   ///< codes that agree with each class of normals
-  alignas(16) Rigid rigid;      ///< the hypothesis
+  std::uint32_t agreeing[64];  ///< codes that agree with each class of normals
+  alignas(16) Rigid rigid;     ///< the hypothesis
   alignas(16) BrickMotion motion;
 };
 
-/// Groups [begin, begin + N): how many of this lane's points may be inliers, by the code of their cell.
+/// Groups [begin, begin + N): how many of this lane's points may be inliers, by the code of their
+/// cell.
 template <std::uint32_t N, typename Points>
-__device__ std::uint32_t count_possible(const BrickMotion& motion, const Staged<Points>& staged, const WarpMemory& memory, std::uint32_t begin) {
+__device__ std::uint32_t count_possible(const BrickMotion& motion, const Staged<Points>& staged,
+                                        const WarpMemory& memory, std::uint32_t begin) {
   float4 p[N];
   BrickCell cell[N];
   std::uint32_t word[N] = {};
@@ -59,7 +65,8 @@ __device__ std::uint32_t count_possible(const BrickMotion& motion, const Staged<
   }
   std::uint32_t possible = 0;
 #pragma unroll
-  for (std::uint32_t k = 0; k < N; ++k) possible += code_agrees(word[k], cell[k], memory.agreeing[__float_as_uint(p[k].w)]);
+  for (std::uint32_t k = 0; k < N; ++k)
+    possible += code_agrees(word[k], cell[k], memory.agreeing[__float_as_uint(p[k].w)]);
   return possible;
 }
 
@@ -73,29 +80,35 @@ struct Look {
 
 /// With the point there, asks for its cell's summary.
 template <typename Points>
-__device__ void finish_look(const ScorePair& pair, const Staged<Points>& staged, const WarpMemory& memory, Look& look) {
+__device__ void finish_look(const ScorePair& pair, const Staged<Points>& staged,
+                            const WarpMemory& memory, Look& look) {
   const BrickCell cell = memory.motion.locate(look.point);
   const BrickWord word = memory.motion.find(cell, staged.runs);
-  look.counted = word.there && code_agrees(staged.bricks[word.number], cell, memory.agreeing[__float_as_uint(look.point.w)]);
+  look.counted = word.there && code_agrees(staged.bricks[word.number], cell,
+                                           memory.agreeing[__float_as_uint(look.point.w)]);
   look.summary = make_uint2(0, 0);
   if (look.counted) look.summary = __ldg(pair.cells.cell + cell_in_bricks(word, cell));
 }
 
 template <typename Points>
-__device__ Look begin_look(const ScorePair& pair, const Staged<Points>& staged, const WarpMemory& memory, const LookOrder& order,
-                           std::uint32_t k) {
+__device__ Look begin_look(const ScorePair& pair, const Staged<Points>& staged,
+                           const WarpMemory& memory, const LookOrder& order, std::uint32_t k) {
   Look look;
-  look.point = __ldg(order.point + k), look.normal = __ldg(order.normal + k);
+  look.point = __ldg(order.point + k);
+  look.normal = __ldg(order.normal + k);
   finish_look(pair, staged, memory, look);
   return look;
 }
 
-/// Exact number of inliers, or 0 as soon as it cannot reach the most seen so far: such a hypothesis is not the best one. First every point
-/// is bounded by its cell's code; then those that may be inliers are looked at, where hypotheses are refuted most often first, by their
-/// cell's summary and then by their closest point. A warp's work.
+/// Exact number of inliers, or 0 as soon as it cannot reach the most seen so far: such a hypothesis
+/// is not the best one. First every point is bounded by its cell's code; then those that may be
+/// inliers are looked at, where hypotheses are refuted most often first, by their cell's summary
+/// and then by their closest point. A warp's work.
 template <typename Points>
-__device__ std::uint32_t count_inliers(const ScoreBatch& b, const ScorePair& pair, const Limits* limits, const Staged<Points>& staged, WarpMemory& memory,
-                                       const Pose<float>& pose, const LookOrder& look, const volatile std::uint32_t* most) {
+__device__ std::uint32_t count_inliers(const ScoreBatch& b, const ScorePair& pair,
+                                       const Limits* limits, const Staged<Points>& staged,
+                                       WarpMemory& memory, const Pose<float>& pose,
+                                       const LookOrder& look, const volatile std::uint32_t* most) {
   const std::uint32_t lane = threadIdx.x % 32;
   const Rigid rigid = to_rigid(pose);
   if (pair.cells.nx == 0) {
@@ -104,10 +117,14 @@ __device__ std::uint32_t count_inliers(const ScoreBatch& b, const ScorePair& pai
     return warp_sum(inliers);
   }
   __syncwarp();
-  for (std::uint32_t k = lane; k < 64; k += 32) memory.agreeing[k] = agreeing_codes(*b.directions, b.code_test, rigid, k);
+  for (std::uint32_t k = lane; k < 64; k += 32)
+    memory.agreeing[k] = agreeing_codes(*b.directions, b.code_test, rigid, k);
   __syncwarp();
   const BrickMotion motion(rigid, pair.cells);
-  if (lane == 0) memory.rigid = rigid, memory.motion = motion;
+  if (lane == 0) {
+    memory.rigid = rigid;
+    memory.motion = motion;
+  }
   __syncwarp();
   const std::uint32_t groups = pair.order.groups;
   std::uint32_t needed = *most, possible = 0, g = 0;
@@ -124,7 +141,10 @@ __device__ std::uint32_t count_inliers(const ScoreBatch& b, const ScorePair& pai
   for (std::uint32_t k = lane; k < end; k += 32) {
     if (possible < needed) return 0;
     const Look now = next;
-    if (k + 32 < end) next.point = __ldg(look.point + k + 32), next.normal = __ldg(look.normal + k + 32);
+    if (k + 32 < end) {
+      next.point = __ldg(look.point + k + 32);
+      next.normal = __ldg(look.normal + k + 32);
+    }
     bool refuted = false;
     if (now.counted) {
       const Vec3 moved_normal = rotate_fast(memory.rigid, now.normal);
@@ -134,7 +154,8 @@ __device__ std::uint32_t count_inliers(const ScoreBatch& b, const ScorePair& pai
         const Vec3 q = apply(memory.rigid, {now.point.x, now.point.y, now.point.z});
         refuted = now.summary.y == kNoValue
                       ? !is_inlier_by_search(pair, b.test, memory.rigid, q, look.index + k)
-                      : !agrees_with(pair, b.test, memory.rigid, moved_normal, now.has_normal(), kHalfPackedCosineError, look.index + k,
+                      : !agrees_with(pair, b.test, memory.rigid, moved_normal, now.has_normal(),
+                                     kHalfPackedCosineError, look.index + k,
                                      closest_in_list(pair.cells.candidate, now.summary.y, q));
       }
     }
@@ -146,15 +167,18 @@ __device__ std::uint32_t count_inliers(const ScoreBatch& b, const ScorePair& pai
   return possible < needed ? 0 : possible;
 }
 
-/// How many points may be inliers, by the codes of their cells: by a whole thread block, all threads of which get it. agreeing: 64 words of
-/// shared memory.
-__device__ inline std::uint32_t count_possible_by_block(const ScoreBatch& b, const ScorePair& pair, const Pose<float>& pose, std::uint32_t* agreeing) {
+/// How many points may be inliers, by the codes of their cells: by a whole thread block, all
+/// threads of which get it. agreeing: 64 words of shared memory.
+__device__ inline std::uint32_t count_possible_by_block(const ScoreBatch& b, const ScorePair& pair,
+                                                        const Pose<float>& pose,
+                                                        std::uint32_t* agreeing) {
   __shared__ std::uint32_t possible;
   if (pair.cells.nx == 0) return pair.source.size;
   const Rigid rigid = to_rigid(pose);
   __syncthreads();
   if (threadIdx.x == 0) possible = 0;
-  for (std::uint32_t k = threadIdx.x; k < 64; k += blockDim.x) agreeing[k] = agreeing_codes(*b.directions, b.code_test, rigid, k);
+  for (std::uint32_t k = threadIdx.x; k < 64; k += blockDim.x)
+    agreeing[k] = agreeing_codes(*b.directions, b.code_test, rigid, k);
   __syncthreads();
   const BrickMotion motion(rigid, pair.cells);
   const std::uint32_t points = pair.order.groups * 32;
@@ -164,7 +188,8 @@ __device__ inline std::uint32_t count_possible_by_block(const ScoreBatch& b, con
     const float4 point = __ldg(pair.order.point + k);
     const BrickCell cell = motion.locate(point);
     const BrickWord word = motion.find(cell, pair.cells.run);
-    mine += word.there && code_agrees(__ldg(pair.cells.brick + word.number), cell, agreeing[__float_as_uint(point.w)]);
+    mine += word.there && code_agrees(__ldg(pair.cells.brick + word.number), cell,
+                                      agreeing[__float_as_uint(point.w)]);
   }
   mine = warp_sum(mine);
   if (threadIdx.x % 32 == 0 && mine > 0) atomicAdd(&possible, mine);
@@ -172,8 +197,10 @@ __device__ inline std::uint32_t count_possible_by_block(const ScoreBatch& b, con
   return possible;
 }
 
-/// Exact number of inliers by a whole thread block: the paper's way, one block per hypothesis and a parallel reduction. All threads get it.
-__device__ inline std::uint32_t count_by_block(const ScoreBatch& b, const ScorePair& pair, const Limits* limits, const Pose<float>& pose) {
+/// Exact number of inliers by a whole thread block: the paper's way, one block per hypothesis and a
+/// parallel reduction. All threads get it.
+__device__ inline std::uint32_t count_by_block(const ScoreBatch& b, const ScorePair& pair,
+                                               const Limits* limits, const Pose<float>& pose) {
   __shared__ std::uint32_t inliers;
   __syncthreads();
   if (threadIdx.x == 0) inliers = 0;
@@ -192,7 +219,8 @@ __device__ inline std::uint32_t count_by_block(const ScoreBatch& b, const ScoreP
       const std::uint32_t normal = __ldg(pair.order.normal + k);
       bool certain;
       const bool possible = may_be_inlier(rigid, limits, summary.x, normal, certain);
-      mine += possible && (certain || is_inlier(pair, b.test, rigid, point, normal, pair.order.index + k, summary.y));
+      mine += possible && (certain || is_inlier(pair, b.test, rigid, point, normal,
+                                                pair.order.index + k, summary.y));
     }
   } else {
     support_by_search(pair, b.test, rigid, threadIdx.x, blockDim.x, mine);

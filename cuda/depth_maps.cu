@@ -8,26 +8,29 @@
 namespace gpureg::cuda {
 namespace {
 
-/// Maps that are made at a time: their 32-bit cells, which atomics need, take a quarter of a megabyte each.
+/// Maps that are made at a time: their 32-bit cells, which atomics need, take a quarter of a
+/// megabyte each.
 constexpr std::uint32_t kMapsAtOnce = 1024;
 
 struct MapBatch {
-  const std::uint32_t* offset;   // of the raw clouds' points
+  const std::uint32_t* offset;  // of the raw clouds' points
   const RawSlot* slots;
-  const std::uint32_t* cloud;    // of each map
+  const std::uint32_t* cloud;  // of each map
   const Vec3* viewpoints;
-  std::uint32_t first;           // map of this batch
+  std::uint32_t first;  // map of this batch
   float inverse_step;
-  std::uint32_t* nearest;        // maps of this batch x kMapCells
-  std::uint16_t* depth;          // all maps x kMapCells
+  std::uint32_t* nearest;  // maps of this batch x kMapCells
+  std::uint16_t* depth;    // all maps x kMapCells
 };
 
 __global__ void draw_points(MapBatch m) {
-  const std::uint32_t map = m.first + blockIdx.y, c = m.cloud[map], size = m.offset[c + 1] - m.offset[c];
+  const std::uint32_t map = m.first + blockIdx.y, c = m.cloud[map],
+                      size = m.offset[c + 1] - m.offset[c];
   const RawSlot slot = m.slots[c];
   const Vec3 viewpoint = m.viewpoints[map];
   std::uint32_t* nearest = m.nearest + static_cast<std::size_t>(blockIdx.y) * kMapCells;
-  for (std::uint32_t i = blockIdx.x * blockDim.x + threadIdx.x; i < size; i += gridDim.x * blockDim.x) {
+  for (std::uint32_t i = blockIdx.x * blockDim.x + threadIdx.x; i < size;
+       i += gridDim.x * blockDim.x) {
     const Vec3 d = slot.points[i] - slot.origin - viewpoint;
     if (!all_finite(d) || is_zero(d)) continue;
     const MapRay ray = map_ray(d);
@@ -46,7 +49,8 @@ __global__ void erode_maps(MapBatch m) {
 
 }  // namespace
 
-DepthMaps build_depth_maps(Exec& exec, Span<const RawCloud> raw, const DownsampledClouds& clouds, const PrepareOptions& options) {
+DepthMaps build_depth_maps(Exec& exec, Span<const RawCloud> raw, const DownsampledClouds& clouds,
+                           const PrepareOptions& options) {
   const std::size_t entries = clouds.segments.entries();
   DepthMaps out;
   std::vector<Vec3> viewpoints;
@@ -55,7 +59,8 @@ DepthMaps build_depth_maps(Exec& exec, Span<const RawCloud> raw, const Downsampl
   for (std::size_t c = 0; c < entries; ++c) {
     const std::vector<Vec3>& all = clouds.facts[c].viewpoints;
     const std::size_t known = clouds.segments.size(c) == 0 ? 0 : all.size();
-    const std::size_t count = map_count(known, options.depth_maps, raw[c].viewpoint_count > 0, raw[c].normals != nullptr);
+    const std::size_t count =
+        map_count(known, options.depth_maps, raw[c].viewpoint_count > 0, raw[c].normals != nullptr);
     for (std::size_t k = 0; k < count; ++k) {
       viewpoints.push_back(all[chosen_viewpoint(k, count, known)]);
       cloud_of_map.push_back(static_cast<std::uint32_t>(c));
@@ -72,9 +77,17 @@ DepthMaps build_depth_maps(Exec& exec, Span<const RawCloud> raw, const Downsampl
     const std::uint32_t count = std::min(kMapsAtOnce, maps - first);
     // All bits set: beyond every depth, and unknown once it is cut to 16 bits.
     const auto nearest = exec.filled<std::uint32_t>(std::size_t(count) * kMapCells, 0xff);
-    const MapBatch batch{clouds.raw.segments.on_device.data(), clouds.raw.slots.data(), cloud_on_device.data(), out.viewpoints.data(), first,
-                         1.0f / out.step, nearest.data(), out.depth.data()};
-    draw_points<<<dim3(std::max(1u, std::min(blocks_for(clouds.raw.segments.largest, 256), 64u)), count), 256, 0, exec.stream()>>>(batch);
+    const MapBatch batch{clouds.raw.segments.on_device.data(),
+                         clouds.raw.slots.data(),
+                         cloud_on_device.data(),
+                         out.viewpoints.data(),
+                         first,
+                         1.0f / out.step,
+                         nearest.data(),
+                         out.depth.data()};
+    draw_points<<<dim3(std::max(1u, std::min(blocks_for(clouds.raw.segments.largest, 256), 64u)),
+                       count),
+                  256, 0, exec.stream()>>>(batch);
     check_launch("draw_points");
     erode_maps<<<dim3(blocks_for(kMapCells, 256), count), 256, 0, exec.stream()>>>(batch);
     check_launch("erode_maps");

@@ -8,15 +8,21 @@ namespace gpureg::cuda {
 namespace {
 
 template <typename Key>
-void sort(Exec& exec, cub::DoubleBuffer<Key>& keys, cub::DoubleBuffer<std::uint32_t>& values, std::size_t size, int bits) {
+void sort(Exec& exec, cub::DoubleBuffer<Key>& keys, cub::DoubleBuffer<std::uint32_t>& values,
+          std::size_t size, int bits) {
   std::size_t bytes = 0;
-  check(cub::DeviceRadixSort::SortPairs(nullptr, bytes, keys, values, static_cast<int>(size), 0, bits, exec.stream()), "radix sort");
+  check(cub::DeviceRadixSort::SortPairs(nullptr, bytes, keys, values, static_cast<int>(size), 0,
+                                        bits, exec.stream()),
+        "radix sort");
   const auto scratch = exec.buffer<char>(bytes);
-  check(cub::DeviceRadixSort::SortPairs(scratch.data(), bytes, keys, values, static_cast<int>(size), 0, bits, exec.stream()), "radix sort");
+  check(cub::DeviceRadixSort::SortPairs(scratch.data(), bytes, keys, values, static_cast<int>(size),
+                                        0, bits, exec.stream()),
+        "radix sort");
 }
 
 template <typename Key>
-void sort_buffers(Exec& exec, DeviceBuffer<Key>& keys, DeviceBuffer<std::uint32_t>& values, int bits) {
+void sort_buffers(Exec& exec, DeviceBuffer<Key>& keys, DeviceBuffer<std::uint32_t>& values,
+                  int bits) {
   if (keys.size() == 0) return;
   auto other_keys = exec.buffer<Key>(keys.size());
   auto other_values = exec.buffer<std::uint32_t>(values.size());
@@ -29,15 +35,18 @@ void sort_buffers(Exec& exec, DeviceBuffer<Key>& keys, DeviceBuffer<std::uint32_
 
 }  // namespace
 
-void sort_pairs(Exec& exec, DeviceBuffer<std::uint32_t>& keys, DeviceBuffer<std::uint32_t>& values, int bits) {
+void sort_pairs(Exec& exec, DeviceBuffer<std::uint32_t>& keys, DeviceBuffer<std::uint32_t>& values,
+                int bits) {
   sort_buffers(exec, keys, values, bits);
 }
 
-void sort_pairs(Exec& exec, DeviceBuffer<std::uint64_t>& keys, DeviceBuffer<std::uint32_t>& values, int bits) {
+void sort_pairs(Exec& exec, DeviceBuffer<std::uint64_t>& keys, DeviceBuffer<std::uint32_t>& values,
+                int bits) {
   sort_buffers(exec, keys, values, bits);
 }
 
-void sort_pairs_in_place(Exec& exec, std::uint64_t* keys, std::uint32_t* values, std::size_t size, int bits) {
+void sort_pairs_in_place(Exec& exec, std::uint64_t* keys, std::uint32_t* values, std::size_t size,
+                         int bits) {
   if (size == 0) return;
   const auto other_keys = exec.buffer<std::uint64_t>(size);
   const auto other_values = exec.buffer<std::uint32_t>(size);
@@ -45,17 +54,25 @@ void sort_pairs_in_place(Exec& exec, std::uint64_t* keys, std::uint32_t* values,
   cub::DoubleBuffer<std::uint32_t> v(values, other_values.data());
   sort(exec, k, v, size, bits);
   if (k.Current() != keys)
-    check(cudaMemcpyAsync(keys, k.Current(), size * sizeof(std::uint64_t), cudaMemcpyDeviceToDevice, exec.stream()), "cudaMemcpyAsync");
+    check(cudaMemcpyAsync(keys, k.Current(), size * sizeof(std::uint64_t), cudaMemcpyDeviceToDevice,
+                          exec.stream()),
+          "cudaMemcpyAsync");
   if (v.Current() != values)
-    check(cudaMemcpyAsync(values, v.Current(), size * sizeof(std::uint32_t), cudaMemcpyDeviceToDevice, exec.stream()), "cudaMemcpyAsync");
+    check(cudaMemcpyAsync(values, v.Current(), size * sizeof(std::uint32_t),
+                          cudaMemcpyDeviceToDevice, exec.stream()),
+          "cudaMemcpyAsync");
 }
 
 void exclusive_sum(Exec& exec, const std::uint32_t* in, std::uint32_t* out, std::size_t size) {
   if (size == 0) return;
   std::size_t bytes = 0;
-  check(cub::DeviceScan::ExclusiveSum(nullptr, bytes, in, out, static_cast<int>(size), exec.stream()), "scan");
+  check(
+      cub::DeviceScan::ExclusiveSum(nullptr, bytes, in, out, static_cast<int>(size), exec.stream()),
+      "scan");
   const auto scratch = exec.buffer<char>(bytes);
-  check(cub::DeviceScan::ExclusiveSum(scratch.data(), bytes, in, out, static_cast<int>(size), exec.stream()), "scan");
+  check(cub::DeviceScan::ExclusiveSum(scratch.data(), bytes, in, out, static_cast<int>(size),
+                                      exec.stream()),
+        "scan");
 }
 
 }  // namespace gpureg::cuda

@@ -8,39 +8,44 @@
 #include "algorithm/cell_summary.hpp"
 #include "math/rigid.hpp"
 
-/// A coarse alphabet of directions, so that "may a point with this normal agree with a cell?" is one bit. A normal belongs to one of 62
-/// classes. A cell's code has four bits: 0 where it has no candidate, 1 to 14 for a direction that none of its candidates' normals strays
-/// from by more than kReachDegrees, 15 where there is no such direction. Per hypothesis and class a word says which codes may agree. Bounds
-/// only: no result depends on them.
+/// A coarse alphabet of directions, so that "may a point with this normal agree with a cell?" is
+/// one bit. A normal belongs to one of 62 classes. A cell's code has four bits: 0 where it has no
+/// candidate, 1 to 14 for a direction that none of its candidates' normals strays from by more than
+/// kReachDegrees, 15 where there is no such direction. Per hypothesis and class a word says which
+/// codes may agree. Bounds only: no result depends on them.
 namespace gpureg::cuda {
 
 constexpr int kCellDirections = 14;
 constexpr std::uint32_t kClasses = 62;
-constexpr std::uint32_t kClassAny = 62;   ///< strays too far from every class: agrees with everything
-constexpr std::uint32_t kClassNone = 63;  ///< no normal: agrees with nothing, unless normals are not tested
+/// strays too far from every class: agrees with everything
+constexpr std::uint32_t kClassAny = 62;
+/// no normal: agrees with nothing, unless normals are not tested
+constexpr std::uint32_t kClassNone = 63;
 constexpr std::uint32_t kCodeAny = 15;
 constexpr float kReachDegrees = 40.0f;
 constexpr float kClassRadiusDegrees = 17.0f;
-constexpr float kSlackDegrees = 0.2f;     ///< for rounding
+constexpr float kSlackDegrees = 0.2f;  ///< for rounding
 
 struct DirectionTables {
   Vec3 cell[kCellDirections];
   Vec3 classes[kClasses];
-  float class_cosine;       ///< of kClassRadiusDegrees
-  float reach_cosine;       ///< of kReachDegrees
+  float class_cosine;  ///< of kClassRadiusDegrees
+  float reach_cosine;  ///< of kReachDegrees
 };
 
 /// When a class may agree with a direction.
 struct CodeTest {
-  float min_cosine;         ///< between the two
-  bool normals;             ///< false: normals are not tested
+  float min_cosine;  ///< between the two
+  bool normals;      ///< false: normals are not tested
 };
 
 /// Points evenly on a sphere along a golden spiral.
 inline void spiral(Vec3* out, int count) {
   for (int k = 0; k < count; ++k) {
-    const double z = 1.0 - (2.0 * k + 1.0) / count, r = std::sqrt(1.0 - z * z), turn = 2.399963229728653 * k;
-    out[k] = {static_cast<float>(r * std::cos(turn)), static_cast<float>(r * std::sin(turn)), static_cast<float>(z)};
+    const double z = 1.0 - (2.0 * k + 1.0) / count, r = std::sqrt(1.0 - z * z),
+                 turn = 2.399963229728653 * k;
+    out[k] = {static_cast<float>(r * std::cos(turn)), static_cast<float>(r * std::sin(turn)),
+              static_cast<float>(z)};
   }
 }
 
@@ -48,14 +53,17 @@ inline DirectionTables direction_tables() {
   DirectionTables t;
   spiral(t.cell, kCellDirections);
   spiral(t.classes, static_cast<int>(kClasses));
-  t.class_cosine = static_cast<float>(std::cos(static_cast<double>(kClassRadiusDegrees) * kDegrees));
+  t.class_cosine =
+      static_cast<float>(std::cos(static_cast<double>(kClassRadiusDegrees) * kDegrees));
   t.reach_cosine = static_cast<float>(std::cos(static_cast<double>(kReachDegrees) * kDegrees));
   return t;
 }
 
 inline CodeTest code_test(float max_normal_angle) {
-  const double apart = static_cast<double>(max_normal_angle) + static_cast<double>(kClassRadiusDegrees + kReachDegrees + kSlackDegrees);
-  return {apart >= 180.0 ? -2.0f : static_cast<float>(std::cos(apart * kDegrees)), max_normal_angle < 180.0f};
+  const double apart = static_cast<double>(max_normal_angle) +
+                       static_cast<double>(kClassRadiusDegrees + kReachDegrees + kSlackDegrees);
+  return {apart >= 180.0 ? -2.0f : static_cast<float>(std::cos(apart * kDegrees)),
+          max_normal_angle < 180.0f};
 }
 
 GPUREG_HD std::uint32_t class_of_normal(const DirectionTables& t, Vec3 n) {
@@ -64,33 +72,43 @@ GPUREG_HD std::uint32_t class_of_normal(const DirectionTables& t, Vec3 n) {
   float cosine = -2.0f;
   for (std::uint32_t k = 0; k < kClasses; ++k) {
     const float c = dot(t.classes[k], n);
-    if (c > cosine) cosine = c, best = k;
+    if (c > cosine) {
+      cosine = c;
+      best = k;
+    }
   }
   return cosine >= t.class_cosine ? best : kClassAny;
 }
 
-/// Code of a cell with at least one candidate. Candidates without a normal never agree, so they do not widen the bound; where normals are
-/// not tested, every code but 0 passes.
-GPUREG_HD std::uint32_t code_of_cell(const DirectionTables& t, Span<const std::uint32_t> candidates, const Vec3* normals) {
+/// Code of a cell with at least one candidate. Candidates without a normal never agree, so they do
+/// not widen the bound; where normals are not tested, every code but 0 passes.
+GPUREG_HD std::uint32_t code_of_cell(const DirectionTables& t, Span<const std::uint32_t> candidates,
+                                     const Vec3* normals) {
   Vec3 sum{0, 0, 0};
   for (const std::uint32_t i : candidates) sum = sum + normals[i];
   std::uint32_t best = 0;
   float nearest = dot(t.cell[0], sum);
   for (int k = 1; k < kCellDirections; ++k) {
     const float c = dot(t.cell[k], sum);
-    if (c > nearest) nearest = c, best = static_cast<std::uint32_t>(k);
+    if (c > nearest) {
+      nearest = c;
+      best = static_cast<std::uint32_t>(k);
+    }
   }
   for (const std::uint32_t i : candidates)
     if (!is_zero(normals[i]) && dot(t.cell[best], normals[i]) < t.reach_cosine) return kCodeAny;
   return best + 1;
 }
 
-/// The codes that a class may agree with under one rotation: bit c for code c, and the same again above, as a funnel shift takes five bits.
-GPUREG_HD std::uint32_t agreeing_codes(const DirectionTables& t, const CodeTest& test, const Rigid& rigid, std::uint32_t k) {
+/// The codes that a class may agree with under one rotation: bit c for code c, and the same again
+/// above, as a funnel shift takes five bits.
+GPUREG_HD std::uint32_t agreeing_codes(const DirectionTables& t, const CodeTest& test,
+                                       const Rigid& rigid, std::uint32_t k) {
   std::uint32_t codes = 1u << kCodeAny;
   if (k < kClasses) {
     const Vec3 moved = rotate(rigid, t.classes[k]);
-    for (int d = 0; d < kCellDirections; ++d) codes |= dot(moved, t.cell[d]) >= test.min_cosine ? 2u << d : 0u;
+    for (int d = 0; d < kCellDirections; ++d)
+      codes |= dot(moved, t.cell[d]) >= test.min_cosine ? 2u << d : 0u;
   }
   if (!test.normals || k == kClassAny) codes = 0xfffeu;
   if (test.normals && k == kClassNone) codes = 0u;

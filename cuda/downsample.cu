@@ -11,8 +11,11 @@
 namespace gpureg::cuda {
 namespace {
 
-/// Floats as integers of the same order, for atomicMin and atomicMax. -0 comes before 0, which local_origin does not tell apart.
-__host__ __device__ std::int32_t ordered(std::int32_t bits) { return bits ^ ((bits >> 31) & 0x7fffffff); }
+/// Floats as integers of the same order, for atomicMin and atomicMax. -0 comes before 0, which
+/// local_origin does not tell apart.
+__host__ __device__ std::int32_t ordered(std::int32_t bits) {
+  return bits ^ ((bits >> 31) & 0x7fffffff);
+}
 
 struct Extent {
   std::int32_t lo[3], hi[3];
@@ -22,29 +25,39 @@ struct Extent {
 
 __global__ void measure_box(const std::uint32_t* offset, const RawSlot* slots, Extent* extents) {
   const std::uint32_t c = blockIdx.y, size = offset[c + 1] - offset[c];
-  std::int32_t lo[3] = {0x7fffffff, 0x7fffffff, 0x7fffffff}, hi[3] = {-0x7fffffff, -0x7fffffff, -0x7fffffff};
+  std::int32_t lo[3] = {0x7fffffff, 0x7fffffff, 0x7fffffff},
+               hi[3] = {-0x7fffffff, -0x7fffffff, -0x7fffffff};
   std::uint32_t finite = 0;
-  for (std::uint32_t i = blockIdx.x * blockDim.x + threadIdx.x; i < size; i += gridDim.x * blockDim.x) {
+  for (std::uint32_t i = blockIdx.x * blockDim.x + threadIdx.x; i < size;
+       i += gridDim.x * blockDim.x) {
     const Vec3 p = slots[c].points[i];
     if (!all_finite(p)) continue;
     ++finite;
     const float v[3] = {p.x, p.y, p.z};
     for (int k = 0; k < 3; ++k) {
       const std::int32_t o = ordered(__float_as_int(v[k]));
-      lo[k] = min(lo[k], o), hi[k] = max(hi[k], o);
+      lo[k] = min(lo[k], o);
+      hi[k] = max(hi[k], o);
     }
   }
   finite = warp_sum(finite);
-  for (int k = 0; k < 3; ++k) lo[k] = warp_min(lo[k]), hi[k] = warp_max(hi[k]);
+  for (int k = 0; k < 3; ++k) {
+    lo[k] = warp_min(lo[k]);
+    hi[k] = warp_max(hi[k]);
+  }
   if (threadIdx.x % 32 != 0 || finite == 0) return;
   atomicAdd(&extents[c].finite, finite);
-  for (int k = 0; k < 3; ++k) atomicMin(&extents[c].lo[k], lo[k]), atomicMax(&extents[c].hi[k], hi[k]);
+  for (int k = 0; k < 3; ++k) {
+    atomicMin(&extents[c].lo[k], lo[k]);
+    atomicMax(&extents[c].hi[k], hi[k]);
+  }
 }
 
 __global__ void measure_radius(const std::uint32_t* offset, const RawSlot* slots, Extent* extents) {
   const std::uint32_t c = blockIdx.y, size = offset[c + 1] - offset[c];
   std::uint32_t largest = 0;
-  for (std::uint32_t i = blockIdx.x * blockDim.x + threadIdx.x; i < size; i += gridDim.x * blockDim.x) {
+  for (std::uint32_t i = blockIdx.x * blockDim.x + threadIdx.x; i < size;
+       i += gridDim.x * blockDim.x) {
     const Vec3 p = slots[c].points[i];
     if (all_finite(p)) largest = max(largest, __float_as_uint(squared_norm(p - slots[c].origin)));
   }
@@ -60,7 +73,8 @@ struct VoxelOf {
     const Vec3 p = slots[c].points[i];
     if (!all_finite(p)) return false;
     cell = inverse > 0 ? voxel_of(p - slots[c].origin, inverse)
-                       : Cell{static_cast<std::int32_t>(i & 0xfffffu), static_cast<std::int32_t>(i >> 20), 0};
+                       : Cell{static_cast<std::int32_t>(i & 0xfffffu),
+                              static_cast<std::int32_t>(i >> 20), 0};
     return true;
   }
 };
@@ -85,9 +99,11 @@ __global__ void average(Average a) {
   const RawSlot slot = a.slots[c];
   const std::uint32_t raw_begin = a.raw_offset[c];
   std::uint32_t largest = 0;
-  for (std::uint32_t v = blockIdx.x * blockDim.x + threadIdx.x; v < size; v += gridDim.x * blockDim.x) {
+  for (std::uint32_t v = blockIdx.x * blockDim.x + threadIdx.x; v < size;
+       v += gridDim.x * blockDim.x) {
     const std::uint32_t begin = a.start[first + v];
-    const std::uint32_t end = v + 1 < size ? a.start[first + v + 1] : raw_begin + a.extents[c].finite;
+    const std::uint32_t end =
+        v + 1 < size ? a.start[first + v + 1] : raw_begin + a.extents[c].finite;
     const float inverse_count = 1.0f / static_cast<float>(end - begin);
     Vec3 sum{0, 0, 0}, guide{0, 0, 0};
     for (std::uint32_t k = begin; k < end; ++k) {
@@ -95,14 +111,16 @@ __global__ void average(Average a) {
       sum = sum + (slot.points[i] - slot.origin);
       if (slot.normals) guide = guide + normalized_or_zero(slot.normals[i]);
     }
-    const Vec3 p = end - begin == 1 ? slot.points[a.item[begin]] - slot.origin : sum * inverse_count;
+    const Vec3 p =
+        end - begin == 1 ? slot.points[a.item[begin]] - slot.origin : sum * inverse_count;
     a.points[first + v] = p;
     if (a.guides) a.guides[first + v] = guide;
     largest = max(largest, __float_as_uint(squared_norm(p)));
     float* out = a.features + a.feature_offset[c] + static_cast<std::size_t>(v) * slot.dimension;
     for (std::uint32_t d = 0; d < slot.dimension; ++d) {
       float mean = 0.0f;
-      for (std::uint32_t k = begin; k < end; ++k) mean += slot.features[static_cast<std::size_t>(a.item[k]) * slot.dimension + d];
+      for (std::uint32_t k = begin; k < end; ++k)
+        mean += slot.features[static_cast<std::size_t>(a.item[k]) * slot.dimension + d];
       out[d] = mean * inverse_count;
     }
   }
@@ -126,8 +144,11 @@ bool on_device(const RawCloud& raw) {
 }
 
 /// All raw clouds of host memory in one buffer; those of device memory where they are.
-DeviceBuffer<float> upload_raw(Exec& exec, Span<const RawCloud> clouds, std::vector<RawSlot>& slots) {
-  const auto floats = [](const RawCloud& raw) { return raw.size * (3 + (raw.normals ? 3 : 0) + (raw.features ? raw.feature_dimension : 0)); };
+DeviceBuffer<float> upload_raw(Exec& exec, Span<const RawCloud> clouds,
+                               std::vector<RawSlot>& slots) {
+  const auto floats = [](const RawCloud& raw) {
+    return raw.size * (3 + (raw.normals ? 3 : 0) + (raw.features ? raw.feature_dimension : 0));
+  };
   std::vector<std::uint8_t> there;
   std::size_t total = 0;
   for (const RawCloud& raw : clouds) {
@@ -137,7 +158,8 @@ DeviceBuffer<float> upload_raw(Exec& exec, Span<const RawCloud> clouds, std::vec
   auto device = exec.buffer<float>(total);
   std::vector<RowsToUpload> parts;
   float* at = device.data();
-  const auto place = [&](const float* rows, std::size_t count, std::size_t width, std::size_t stride, bool is_there) -> const float* {
+  const auto place = [&](const float* rows, std::size_t count, std::size_t width,
+                         std::size_t stride, bool is_there) -> const float* {
     if (!rows || count == 0 || is_there) return count == 0 ? nullptr : rows;
     parts.push_back({rows, count, width, stride, at});
     at += count * width;
@@ -146,9 +168,12 @@ DeviceBuffer<float> upload_raw(Exec& exec, Span<const RawCloud> clouds, std::vec
   for (std::size_t c = 0; c < clouds.size; ++c) {
     const RawCloud& raw = clouds[c];
     RawSlot slot{};
-    slot.points = reinterpret_cast<const Vec3*>(place(raw.points, raw.size, 3, raw.point_stride, there[c]));
-    slot.normals = reinterpret_cast<const Vec3*>(place(raw.normals, raw.size, 3, raw.normal_stride, there[c]));
-    slot.features = place(raw.features, raw.size, raw.feature_dimension, raw.feature_stride, there[c]);
+    slot.points =
+        reinterpret_cast<const Vec3*>(place(raw.points, raw.size, 3, raw.point_stride, there[c]));
+    slot.normals =
+        reinterpret_cast<const Vec3*>(place(raw.normals, raw.size, 3, raw.normal_stride, there[c]));
+    slot.features =
+        place(raw.features, raw.size, raw.feature_dimension, raw.feature_stride, there[c]);
     slot.dimension = slot.features ? static_cast<std::uint32_t>(raw.feature_dimension) : 0;
     slots.push_back(slot);
   }
@@ -167,42 +192,52 @@ CloudFacts facts_of(const RawCloud& raw, const Extent& extent, const PrepareOpti
     facts.origin[k] = local_origin(lo[k], hi[k], options.voxel_size);
   }
   const Vec3 origin{facts.origin[0], facts.origin[1], facts.origin[2]};
-  if (extent.finite > 0) facts.lo = Vec3{lo[0], lo[1], lo[2]} - origin, facts.hi = Vec3{hi[0], hi[1], hi[2]} - origin;
+  if (extent.finite > 0)
+    facts.lo = Vec3{lo[0], lo[1], lo[2]} - origin, facts.hi = Vec3{hi[0], hi[1], hi[2]} - origin;
   for (std::size_t k = 0; k < raw.viewpoint_count; ++k)
-    facts.viewpoints.push_back(Vec3{raw.viewpoints[3 * k], raw.viewpoints[3 * k + 1], raw.viewpoints[3 * k + 2]} - origin);
-  facts.turns_normals = turns_normals(raw.normals != nullptr, raw.viewpoint_count, options.depth_maps);
+    facts.viewpoints.push_back(
+        Vec3{raw.viewpoints[3 * k], raw.viewpoints[3 * k + 1], raw.viewpoints[3 * k + 2]} - origin);
+  facts.turns_normals =
+      turns_normals(raw.normals != nullptr, raw.viewpoint_count, options.depth_maps);
   if (facts.viewpoints.empty()) facts.viewpoints.push_back(-origin);
   facts.feature_dimension = raw.features ? static_cast<std::uint32_t>(raw.feature_dimension) : 0;
   facts.has_guides = raw.normals != nullptr;
   return facts;
 }
 
-/// Voxels of a box. Where it is too wide the radius check will say so; until then the range only must not overflow.
+/// Voxels of a box. Where it is too wide the radius check will say so; until then the range only
+/// must not overflow.
 CellRange voxel_range(const CloudFacts& facts, std::size_t raw_size, float voxel_size) {
-  if (!(voxel_size > 0)) return {{0, 0, 0}, {0xfffff, static_cast<std::int32_t>(raw_size >> 20), 0}};
+  if (!(voxel_size > 0))
+    return {{0, 0, 0}, {0xfffff, static_cast<std::int32_t>(raw_size >> 20), 0}};
   const auto clamped = [](float v) { return std::max(-1048576.0f, std::min(1048575.0f, v)); };
   const float inverse = 1.0f / voxel_size;
   const auto cell = [&](Vec3 p) {
-    return Cell{floor_to_int(clamped(p.x * inverse)), floor_to_int(clamped(p.y * inverse)), floor_to_int(clamped(p.z * inverse))};
+    return Cell{floor_to_int(clamped(p.x * inverse)), floor_to_int(clamped(p.y * inverse)),
+                floor_to_int(clamped(p.z * inverse))};
   };
   return {cell(facts.lo), cell(facts.hi)};
 }
 
 }  // namespace
 
-DownsampledClouds downsample(Exec& exec, Span<const RawCloud> clouds, const PrepareOptions& options) {
+DownsampledClouds downsample(Exec& exec, Span<const RawCloud> clouds,
+                             const PrepareOptions& options) {
   constexpr unsigned kThreads = 256;
   std::vector<RawSlot> slots;
   auto raw_data = upload_raw(exec, clouds, slots);
   Segments raw = make_segments(exec, clouds.size, [&](std::size_t c) { return clouds[c].size; });
-  const dim3 grid(std::max(1u, std::min(blocks_for(raw.largest, kThreads), 256u)), static_cast<unsigned>(clouds.size));
+  const dim3 grid(std::max(1u, std::min(blocks_for(raw.largest, kThreads), 256u)),
+                  static_cast<unsigned>(clouds.size));
 
   constexpr std::int32_t kMost = 0x7fffffff;
-  std::vector<Extent> empty(clouds.size, Extent{{kMost, kMost, kMost}, {-kMost, -kMost, -kMost}, 0, 0});
+  std::vector<Extent> empty(clouds.size,
+                            Extent{{kMost, kMost, kMost}, {-kMost, -kMost, -kMost}, 0, 0});
   auto extents = exec.upload(empty);
   {
     const auto slots_on_device = exec.upload(slots);
-    measure_box<<<grid, kThreads, 0, exec.stream()>>>(raw.on_device.data(), slots_on_device.data(), extents.data());
+    measure_box<<<grid, kThreads, 0, exec.stream()>>>(raw.on_device.data(), slots_on_device.data(),
+                                                      extents.data());
     check_launch("measure_box");
   }
   const Extent* boxes = exec.download(extents.data(), clouds.size);
@@ -218,36 +253,45 @@ DownsampledClouds downsample(Exec& exec, Span<const RawCloud> clouds, const Prep
     any_guides = any_guides || out.facts[c].has_guides;
   }
   auto slots_on_device = exec.upload(slots);
-  measure_radius<<<grid, kThreads, 0, exec.stream()>>>(raw.on_device.data(), slots_on_device.data(), extents.data());
+  measure_radius<<<grid, kThreads, 0, exec.stream()>>>(raw.on_device.data(), slots_on_device.data(),
+                                                       extents.data());
   check_launch("measure_radius");
-  const Groups voxels = group_by_cell(exec, raw, ranges, VoxelOf{slots_on_device.data(), options.voxel_size > 0 ? 1.0f / options.voxel_size : 0.0f});
+  const Groups voxels = group_by_cell(
+      exec, raw, ranges,
+      VoxelOf{slots_on_device.data(), options.voxel_size > 0 ? 1.0f / options.voxel_size : 0.0f});
   const std::uint32_t* voxel_offsets = download_group_offsets(exec, raw, voxels);
   const Extent* measured = exec.download(extents.data(), clouds.size);
   exec.synchronize();
-  for (std::size_t c = 0; c < clouds.size; ++c) pipeline::check_extent(sqrtf(from_bits(measured[c].largest_squared_norm)), options);
+  for (std::size_t c = 0; c < clouds.size; ++c)
+    pipeline::check_extent(sqrtf(from_bits(measured[c].largest_squared_norm)), options);
 
-  out.segments = segments_of(exec, std::vector<std::uint32_t>(voxel_offsets, voxel_offsets + clouds.size + 1));
+  out.segments =
+      segments_of(exec, std::vector<std::uint32_t>(voxel_offsets, voxel_offsets + clouds.size + 1));
   std::vector<std::size_t> feature_offset{0};
   for (std::size_t c = 0; c < clouds.size; ++c) {
     out.facts[c].feature_offset = feature_offset.back();
-    feature_offset.push_back(feature_offset.back() + static_cast<std::size_t>(out.segments.size(c)) * out.facts[c].feature_dimension);
+    feature_offset.push_back(feature_offset.back() +
+                             static_cast<std::size_t>(out.segments.size(c)) *
+                                 out.facts[c].feature_dimension);
   }
   out.points = exec.buffer<Vec3>(out.segments.total());
   if (any_guides) out.guides = exec.buffer<Vec3>(out.segments.total());
   out.features = exec.buffer<float>(feature_offset.back());
   const auto feature_offset_on_device = exec.upload(feature_offset);
   const auto largest = exec.filled<std::uint32_t>(clouds.size, 0);
-  const dim3 voxel_grid(std::max(1u, blocks_for(out.segments.largest, 128)), static_cast<unsigned>(clouds.size));
-  average<<<voxel_grid, 128, 0, exec.stream()>>>(Average{raw.on_device.data(), out.segments.on_device.data(), slots_on_device.data(),
-                                                         extents.data(), voxels.item.data(), voxels.start.data(),
-                                                         feature_offset_on_device.data(), out.points.data(), out.guides.data(),
-                                                         out.features.data(), largest.data()});
+  const dim3 voxel_grid(std::max(1u, blocks_for(out.segments.largest, 128)),
+                        static_cast<unsigned>(clouds.size));
+  average<<<voxel_grid, 128, 0, exec.stream()>>>(Average{
+      raw.on_device.data(), out.segments.on_device.data(), slots_on_device.data(), extents.data(),
+      voxels.item.data(), voxels.start.data(), feature_offset_on_device.data(), out.points.data(),
+      out.guides.data(), out.features.data(), largest.data()});
   check_launch("average");
   const std::uint32_t* radii = exec.download(largest.data(), clouds.size);
   exec.synchronize();
   for (std::size_t c = 0; c < clouds.size; ++c)
     out.facts[c].radius = radii[c] > 0 ? sqrtf(from_bits(radii[c])) * 1.0001f : 1.0f;
-  if (options.depth_maps > 0) out.raw = {std::move(raw_data), std::move(raw), std::move(slots_on_device)};
+  if (options.depth_maps > 0)
+    out.raw = {std::move(raw_data), std::move(raw), std::move(slots_on_device)};
   return out;
 }
 

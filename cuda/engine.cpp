@@ -15,7 +15,8 @@
 namespace gpureg::cuda {
 namespace {
 
-/// Raw points that are prepared together: enough to fill the device, few enough for its memory and for page-locked staging.
+/// Raw points that are prepared together: enough to fill the device, few enough for its memory and
+/// for page-locked staging.
 constexpr std::size_t kRawPointsPerChunk = std::size_t(1) << 22;
 constexpr std::size_t kCloudsPerChunk = 256;
 constexpr std::size_t kPairsPerChunk = 512;
@@ -23,15 +24,18 @@ constexpr std::size_t kPairsPerChunk = 512;
 constexpr std::size_t kSampleBytes = std::size_t(256) << 20;
 /// For what every seed is compatible with, and for the matches, of every pair of a chunk.
 constexpr std::size_t kNeighborhoodBytes = std::size_t(1) << 30;
-/// What a fragment takes, about, for each raw point: with a budget no chunk is prepared that is far beyond it.
+/// What a fragment takes, about, for each raw point: with a budget no chunk is prepared that is far
+/// beyond it.
 constexpr std::size_t kBytesPerRawPoint = 128;
 
-/// Clouds of one engine go with any other: the memory that they say they live in is that of all devices.
+/// Clouds of one engine go with any other: the memory that they say they live in is that of all
+/// devices.
 const char kDeviceMemory = 0;
 
 }  // namespace
 
-CudaEngine::CudaEngine(int device, std::size_t memory_budget) : exec_(device), residence_(exec_, memory_budget) {
+CudaEngine::CudaEngine(int device, std::size_t memory_budget)
+    : exec_(device), residence_(exec_, memory_budget) {
   cudaDeviceProp properties{};
   check(cudaGetDeviceProperties(&properties, device), "cudaGetDeviceProperties");
   description_ = "cuda:" + std::to_string(device) + ", " + properties.name;
@@ -39,24 +43,29 @@ CudaEngine::CudaEngine(int device, std::size_t memory_budget) : exec_(device), r
 
 Backend CudaEngine::backend() const { return Backend::cuda; }
 
-unsigned CudaEngine::host_threads() const { return std::max(1u, std::min(8u, std::thread::hardware_concurrency())); }
+unsigned CudaEngine::host_threads() const {
+  return std::max(1u, std::min(8u, std::thread::hardware_concurrency()));
+}
 
 const void* CudaEngine::memory() const { return &kDeviceMemory; }
 
 std::vector<DeviceMemoryUse> CudaEngine::device_memory() const {
-  return {{device(), exec_.memory()->bytes_in_use(), exec_.memory()->bytes_reserved(), residence_.evictions()}};
+  return {{device(), exec_.memory()->bytes_in_use(), exec_.memory()->bytes_reserved(),
+           residence_.evictions()}};
 }
 
 std::size_t CudaEngine::pairs_per_chunk(const RegistrationOptions& options) const {
   std::size_t fit = kSampleBytes / (options.hypothesis.count / 8 + 4096);
   if (options.hypothesis.proposal == Proposal::compatibility) {
     const CompatibilityOptions& c = options.compatibility;
-    fit = kNeighborhoodBytes / (std::size_t(c.seeds) * (c.max_matches / 8 + 128) + std::size_t(c.max_matches) * 96);
+    fit = kNeighborhoodBytes /
+          (std::size_t(c.seeds) * (c.max_matches / 8 + 128) + std::size_t(c.max_matches) * 96);
   }
   return fit < 1 ? 1 : (fit < kPairsPerChunk ? fit : kPairsPerChunk);
 }
 
-void CudaEngine::prepare_chunk(Span<const RawCloud> clouds, const PrepareOptions& options, std::vector<std::shared_ptr<PreparedState>>& out) {
+void CudaEngine::prepare_chunk(Span<const RawCloud> clouds, const PrepareOptions& options,
+                               std::vector<std::shared_ptr<PreparedState>>& out) {
   exec_.begin();
   for (auto& cloud : pipeline::prepare(exec_, clouds, options)) {
     cloud->owner = memory();
@@ -67,25 +76,32 @@ void CudaEngine::prepare_chunk(Span<const RawCloud> clouds, const PrepareOptions
   residence_.make_room(0, {});
 }
 
-std::vector<std::shared_ptr<PreparedState>> CudaEngine::prepare(Span<const RawCloud> clouds, const PrepareOptions& options) {
+std::vector<std::shared_ptr<PreparedState>> CudaEngine::prepare(Span<const RawCloud> clouds,
+                                                                const PrepareOptions& options) {
   const std::lock_guard<std::mutex> lock(mutex_);
   const DeviceScope scope(device());
   return prepare_on_stream(clouds, options);
 }
 
-std::vector<std::shared_ptr<PreparedState>> CudaEngine::prepare_on_stream(Span<const RawCloud> clouds, const PrepareOptions& options) {
+std::vector<std::shared_ptr<PreparedState>> CudaEngine::prepare_on_stream(
+    Span<const RawCloud> clouds, const PrepareOptions& options) {
   const std::size_t budget = residence_.budget();
-  const std::size_t most_points = budget > 0 ? std::min(kRawPointsPerChunk, budget / kBytesPerRawPoint) : kRawPointsPerChunk;
+  const std::size_t most_points =
+      budget > 0 ? std::min(kRawPointsPerChunk, budget / kBytesPerRawPoint) : kRawPointsPerChunk;
   std::vector<std::shared_ptr<PreparedState>> out;
   for (std::size_t begin = 0, end; begin < clouds.size; begin = end) {
     std::size_t points = clouds[begin].size;
-    for (end = begin + 1; end < clouds.size && end - begin < kCloudsPerChunk && points + clouds[end].size <= most_points; ++end) points += clouds[end].size;
+    for (end = begin + 1; end < clouds.size && end - begin < kCloudsPerChunk &&
+                          points + clouds[end].size <= most_points;
+         ++end)
+      points += clouds[end].size;
     prepare_chunk({clouds.data + begin, end - begin}, options, out);
   }
   return out;
 }
 
-void CudaEngine::align(Span<const PairInput> pairs, const RegistrationOptions& options, Span<PairOutcome> outcomes, const FurtherSearch& further) {
+void CudaEngine::align(Span<const PairInput> pairs, const RegistrationOptions& options,
+                       Span<PairOutcome> outcomes, const FurtherSearch& further) {
   const std::lock_guard<std::mutex> lock(mutex_);
   const DeviceScope scope(device());
   const std::size_t budget = residence_.budget();
@@ -98,21 +114,26 @@ void CudaEngine::align(Span<const PairInput> pairs, const RegistrationOptions& o
       const PreparedState* both[2] = {pairs[end].source, pairs[end].target};
       std::size_t more = 0;
       for (int k = 0; k < 2; ++k)
-        if (place.count(both[k]) == 0 && (k == 0 || both[0] != both[1])) more += static_cast<const Fragment*>(both[k])->bytes();
+        if (place.count(both[k]) == 0 && (k == 0 || both[0] != both[1]))
+          more += static_cast<const Fragment*>(both[k])->bytes();
       if (budget > 0 && end > begin && bytes + more > budget) break;
       bytes += more;
       for (const PreparedState* cloud : both)
-        if (place.emplace(cloud, fragments.size()).second) fragments.push_back(static_cast<const Fragment*>(cloud));
+        if (place.emplace(cloud, fragments.size()).second)
+          fragments.push_back(static_cast<const Fragment*>(cloud));
     }
     exec_.begin();
     const auto held = residence_.bring(fragments);
     std::vector<PairView> views;
     for (std::size_t p = begin; p < end; ++p)
-      views.push_back({held[place[pairs[p].source]]->view_on_device, held[place[pairs[p].target]]->view_on_device, pairs[p].custom_source.data,
-                       pairs[p].custom_target.data, static_cast<std::uint32_t>(pairs[p].custom_source.size), pairs[p].prior});
+      views.push_back({held[place[pairs[p].source]]->view_on_device,
+                       held[place[pairs[p].target]]->view_on_device, pairs[p].custom_source.data,
+                       pairs[p].custom_target.data,
+                       static_cast<std::uint32_t>(pairs[p].custom_source.size), pairs[p].prior});
     const Span<PairOutcome> part{outcomes.data + begin, end - begin};
     if (options.hypothesis.proposal == Proposal::compatibility)
-      pipeline::align_by_evidence(exec_, {pairs.data + begin, end - begin}, span_of(views), options, further, part);
+      pipeline::align_by_evidence(exec_, {pairs.data + begin, end - begin}, span_of(views), options,
+                                  further, part);
     else
       pipeline::align(exec_, span_of(views), options, part);
   }

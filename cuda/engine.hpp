@@ -19,14 +19,19 @@ class CudaEngine final : public DeviceEngine {
   const void* memory() const override;
   std::vector<DeviceMemoryUse> device_memory() const override;
   std::size_t pairs_per_chunk(const RegistrationOptions& options) const override;
-  std::vector<std::shared_ptr<PreparedState>> prepare(Span<const RawCloud> clouds, const PrepareOptions& options) override;
+  std::vector<std::shared_ptr<PreparedState>> prepare(Span<const RawCloud> clouds,
+                                                      const PrepareOptions& options) override;
   std::shared_ptr<AdoptedCloud> adopt(const RawCloud& cloud, void* stream) override;
-  std::shared_ptr<PreparedState> prepare_adopted(const AdoptedCloud& cloud, const PrepareOptions& options) override;
-  void align(Span<const PairInput> pairs, const RegistrationOptions& options, Span<PairOutcome> outcomes, const FurtherSearch& further) override;
+  std::shared_ptr<PreparedState> prepare_adopted(const AdoptedCloud& cloud,
+                                                 const PrepareOptions& options) override;
+  void align(Span<const PairInput> pairs, const RegistrationOptions& options,
+             Span<PairOutcome> outcomes, const FurtherSearch& further) override;
 
  private:
-  std::vector<std::shared_ptr<PreparedState>> prepare_on_stream(Span<const RawCloud> clouds, const PrepareOptions& options);
-  void prepare_chunk(Span<const RawCloud> clouds, const PrepareOptions& options, std::vector<std::shared_ptr<PreparedState>>& out);
+  std::vector<std::shared_ptr<PreparedState>> prepare_on_stream(Span<const RawCloud> clouds,
+                                                                const PrepareOptions& options);
+  void prepare_chunk(Span<const RawCloud> clouds, const PrepareOptions& options,
+                     std::vector<std::shared_ptr<PreparedState>>& out);
 
   std::mutex mutex_;
   Exec exec_;
@@ -34,8 +39,10 @@ class CudaEngine final : public DeviceEngine {
   std::string description_;
 };
 
-/// Spreads batches over several devices, an engine and a thread for each. devices: two at least; one may be named twice.
-std::shared_ptr<Engine> make_engine_of_many(const std::vector<int>& devices, std::size_t memory_budget);
+/// Spreads batches over several devices, an engine and a thread for each. devices: two at least;
+/// one may be named twice.
+std::shared_ptr<Engine> make_engine_of_many(const std::vector<int>& devices,
+                                            std::size_t memory_budget);
 
 /// Device that a pointer's memory is on; -1: not device memory.
 int device_of(const void* pointer);

@@ -12,7 +12,8 @@
 
 namespace gpureg::cuda {
 
-/// Stream, memory and clock of the CUDA backend. Stages enqueue work on the stream; nothing of theirs runs on the default stream.
+/// Stream, memory and clock of the CUDA backend. Stages enqueue work on the stream; nothing of
+/// theirs runs on the default stream.
 class Exec {
  public:
   explicit Exec(int device);
@@ -42,7 +43,8 @@ class Exec {
   template <typename T>
   DeviceBuffer<T> filled(std::size_t size, int byte) {
     DeviceBuffer<T> out(memory_, size);
-    if (size > 0) check(cudaMemsetAsync(out.data(), byte, size * sizeof(T), stream()), "cudaMemsetAsync");
+    if (size > 0)
+      check(cudaMemsetAsync(out.data(), byte, size * sizeof(T), stream()), "cudaMemsetAsync");
     return out;
   }
   /// Page-locked host memory, the caller's until the next begin().
@@ -58,7 +60,8 @@ class Exec {
     if (size == 0) return out;
     T* staged = staging<T>(size);
     std::memcpy(static_cast<void*>(staged), host, size * sizeof(T));
-    check(cudaMemcpyAsync(out.data(), staged, size * sizeof(T), cudaMemcpyHostToDevice, stream()), "cudaMemcpyAsync to the device");
+    check(cudaMemcpyAsync(out.data(), staged, size * sizeof(T), cudaMemcpyHostToDevice, stream()),
+          "cudaMemcpyAsync to the device");
     return out;
   }
   template <typename T>
@@ -69,7 +72,9 @@ class Exec {
   template <typename T>
   const T* download(const T* device, std::size_t size) {
     T* staged = staging<T>(size);
-    if (size > 0) check(cudaMemcpyAsync(staged, device, size * sizeof(T), cudaMemcpyDeviceToHost, stream()), "cudaMemcpyAsync to the host");
+    if (size > 0)
+      check(cudaMemcpyAsync(staged, device, size * sizeof(T), cudaMemcpyDeviceToHost, stream()),
+            "cudaMemcpyAsync to the host");
     return staged;
   }
 
@@ -90,6 +95,8 @@ class Exec {
 };
 
 /// Blocks of `threads` that cover `items`.
-inline unsigned blocks_for(std::size_t items, unsigned threads) { return static_cast<unsigned>((items + threads - 1) / threads); }
+inline unsigned blocks_for(std::size_t items, unsigned threads) {
+  return static_cast<unsigned>((items + threads - 1) / threads);
+}
 
 }  // namespace gpureg::cuda

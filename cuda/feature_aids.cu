@@ -15,18 +15,22 @@ constexpr float kInfinity = std::numeric_limits<float>::infinity();
 
 struct FeatureSlot : FeaturesToMeasure {
   std::uint32_t half_width, padded_width;
-  std::uint32_t* largest;     // bits of the greatest magnitude of all values
-  std::uint32_t* first;       // table of `places`: lowest index of a row with this hash
+  std::uint32_t* largest;  // bits of the greatest magnitude of all values
+  std::uint32_t* first;    // table of `places`: lowest index of a row with this hash
   std::uint32_t places;
 };
 
 __device__ float component(const FeatureSlot& s, const float* row, std::uint32_t d) {
-  return d < s.dimension ? row[d] - (s.aids.copy == HalfCopy::turned ? center_of_fpfh(d) : 0.0f) : 0.0f;
+  return d < s.dimension ? row[d] - (s.aids.copy == HalfCopy::turned ? center_of_fpfh(d) : 0.0f)
+                         : 0.0f;
 }
 
 __device__ std::uint32_t place_of(const FeatureSlot& s, const float* row) {
   std::uint32_t hash = 2166136261u;
-  for (std::uint32_t d = 0; d < s.dimension; ++d) hash = (hash ^ __float_as_uint(row[d])) * 16777619u, hash ^= hash >> 15;
+  for (std::uint32_t d = 0; d < s.dimension; ++d) {
+    hash = (hash ^ __float_as_uint(row[d])) * 16777619u;
+    hash ^= hash >> 15;
+  }
   return hash % s.places;
 }
 
@@ -34,25 +38,30 @@ __global__ void find_largest(const FeatureSlot* slots) {
   const FeatureSlot s = slots[blockIdx.y];
   if (s.aids.copy == HalfCopy::turned) return;  // at most 100
   std::uint32_t largest = 0;
-  for (std::uint32_t i = blockIdx.x * blockDim.x + threadIdx.x; i < s.size; i += gridDim.x * blockDim.x)
+  for (std::uint32_t i = blockIdx.x * blockDim.x + threadIdx.x; i < s.size;
+       i += gridDim.x * blockDim.x)
     for (std::uint32_t d = 0; s.valid[i] && d < s.dimension; ++d)
-      largest = max(largest, __float_as_uint(fabsf(component(s, s.features + static_cast<std::size_t>(i) * s.dimension, d))));
+      largest = max(largest, __float_as_uint(fabsf(component(
+                                 s, s.features + static_cast<std::size_t>(i) * s.dimension, d))));
   largest = warp_max(largest);
   if (threadIdx.x % 32 == 0) atomicMax(s.largest, largest);
 }
 
-/// The power of two that brings the greatest value to between 512 and 1024, which binary16 can hold. Lengths stay within float32's range.
+/// The power of two that brings the greatest value to between 512 and 1024, which binary16 can
+/// hold. Lengths stay within float32's range.
 __device__ float scale_to_half(std::uint32_t largest) {
   const int exponent = 136 - static_cast<int>(largest >> 23);
   return __uint_as_float(static_cast<std::uint32_t>(127 + max(-40, min(40, exponent))) << 23);
 }
 
-/// What the feature search reads beside the features: copies for the tensor cores, and how far off their products may be.
+/// What the feature search reads beside the features: copies for the tensor cores, and how far off
+/// their products may be.
 __global__ void measure_features(const FeatureSlot* slots) {
   const FeatureSlot s = slots[blockIdx.y];
   const float scale = s.aids.copy == HalfCopy::turned ? 8.0f : scale_to_half(*s.largest);
   std::uint32_t extreme = 0;
-  for (std::uint32_t i = blockIdx.x * blockDim.x + threadIdx.x; i < s.size; i += gridDim.x * blockDim.x) {
+  for (std::uint32_t i = blockIdx.x * blockDim.x + threadIdx.x; i < s.size;
+       i += gridDim.x * blockDim.x) {
     const float* row = s.features + static_cast<std::size_t>(i) * s.dimension;
     const bool valid = s.valid[i];
     float square = 0.0f, rest = 0.0f, lost = 0.0f;
@@ -64,7 +73,10 @@ __global__ void measure_features(const FeatureSlot* slots) {
       copy[d] = __half_as_ushort(h);
       return v - __half2float(h);
     };
-    const auto leave_out = [&](float v) { rest = fmaf(v, v, rest), lost = fmaf(v, v, lost); };
+    const auto leave_out = [&](float v) {
+      rest = fmaf(v, v, rest);
+      lost = fmaf(v, v, lost);
+    };
     const auto put = [&](std::uint32_t d, float v) {
       const float difference = put_half(d, v);
       rest = fmaf(v, v, rest);
@@ -76,17 +88,20 @@ __global__ void measure_features(const FeatureSlot* slots) {
         put_half(kAxisPlace + 1, put_half(kAxisPlace, v));
         square = v * v;
       };
-      turn_fpfh([&](int d) { return value(static_cast<std::uint32_t>(d)); }, [&](int k, float v) { put(static_cast<std::uint32_t>(k), v); }, put_axis,
+      turn_fpfh([&](int d) { return value(static_cast<std::uint32_t>(d)); },
+                [&](int k, float v) { put(static_cast<std::uint32_t>(k), v); }, put_axis,
                 leave_out);
     } else {
       for (std::uint32_t d = 0; d < s.half_width; ++d) put(d, value(d));
     }
     square = square + rest;
     for (std::uint32_t d = 0; d < s.padded_width; ++d)
-      s.aids.padded[static_cast<std::size_t>(i) * s.padded_width + d] = valid && d < s.dimension ? row[d] : 0.0f;
+      s.aids.padded[static_cast<std::size_t>(i) * s.padded_width + d] =
+          valid && d < s.dimension ? row[d] : 0.0f;
     const float error = product_error(square, rest, lost);
     s.aids.error[i] = error;
-    s.aids.square[i] = valid ? make_float2(square - error, square + error) : make_float2(kInfinity, kInfinity);
+    s.aids.square[i] =
+        valid ? make_float2(square - error, square + error) : make_float2(kInfinity, kInfinity);
     if (valid) atomicMin(s.first + place_of(s, row), i);
     extreme += valid && !(square < 1e30f * (scale * scale));
   }
@@ -94,10 +109,12 @@ __global__ void measure_features(const FeatureSlot* slots) {
   if (extreme > 0) atomicAdd(s.extreme, extreme);
 }
 
-/// Of equal features only the first is ever an answer; the others are taken out of the search. On walls without noise thousands are equal.
+/// Of equal features only the first is ever an answer; the others are taken out of the search. On
+/// walls without noise thousands are equal.
 __global__ void find_repeated_features(const FeatureSlot* slots) {
   const FeatureSlot s = slots[blockIdx.y];
-  for (std::uint32_t i = blockIdx.x * blockDim.x + threadIdx.x; i < s.size; i += gridDim.x * blockDim.x) {
+  for (std::uint32_t i = blockIdx.x * blockDim.x + threadIdx.x; i < s.size;
+       i += gridDim.x * blockDim.x) {
     const float* row = s.features + static_cast<std::size_t>(i) * s.dimension;
     bool repeats = false;
     if (s.valid[i]) {
@@ -115,15 +132,17 @@ __global__ void find_repeated_features(const FeatureSlot* slots) {
 std::size_t feature_aids_bytes(int k, std::size_t size, std::uint32_t dimension, HalfCopy copy) {
   const std::size_t width = half_width(dimension, copy);
   if (width == 0 || dimension == 0) return 0;
-  const std::size_t bytes[FeatureAidsPlaces::kArrays] = {size * width * sizeof(std::uint16_t), size * padded_width(dimension) * sizeof(float),
-                                                         size * sizeof(float2), size * sizeof(float), sizeof(float)};
+  const std::size_t bytes[FeatureAidsPlaces::kArrays] = {
+      size * width * sizeof(std::uint16_t), size * padded_width(dimension) * sizeof(float),
+      size * sizeof(float2), size * sizeof(float), sizeof(float)};
   return bytes[k];
 }
 
 FeatureAids feature_aids_at(char* memory, const FeatureAidsPlaces& places, HalfCopy copy) {
   const auto at = [&](int k) { return memory + places.begin[k]; };
-  return {reinterpret_cast<std::uint16_t*>(at(0)), reinterpret_cast<float*>(at(1)), reinterpret_cast<float2*>(at(2)), reinterpret_cast<float*>(at(3)),
-          reinterpret_cast<float*>(at(4)), copy};
+  return {reinterpret_cast<std::uint16_t*>(at(0)), reinterpret_cast<float*>(at(1)),
+          reinterpret_cast<float2*>(at(2)),        reinterpret_cast<float*>(at(3)),
+          reinterpret_cast<float*>(at(4)),         copy};
 }
 
 void fill_feature_aids(Exec& exec, const std::vector<FeaturesToMeasure>& clouds) {
@@ -131,13 +150,18 @@ void fill_feature_aids(Exec& exec, const std::vector<FeaturesToMeasure>& clouds)
   std::vector<FeatureSlot> slots;
   std::size_t places = 0;
   for (const FeaturesToMeasure& c : clouds) {
-    slots.push_back({c, half_width(c.dimension, c.aids.copy), padded_width(c.dimension), nullptr, nullptr, 4 * c.size + 1});
+    slots.push_back({c, half_width(c.dimension, c.aids.copy), padded_width(c.dimension), nullptr,
+                     nullptr, 4 * c.size + 1});
     places += slots.back().places;
   }
   const auto first = exec.filled<std::uint32_t>(places, 0xff);
   const auto largest = exec.filled<std::uint32_t>(slots.size(), 0);
   std::uint32_t* at = first.data();
-  for (std::size_t k = 0; k < slots.size(); ++k) slots[k].first = at, at += slots[k].places, slots[k].largest = largest.data() + k;
+  for (std::size_t k = 0; k < slots.size(); ++k) {
+    slots[k].first = at;
+    at += slots[k].places;
+    slots[k].largest = largest.data() + k;
+  }
   const auto on_device = exec.upload(slots);
   const dim3 grid(16, static_cast<unsigned>(slots.size()));
   find_largest<<<grid, 256, 0, exec.stream()>>>(on_device.data());

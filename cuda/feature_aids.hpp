@@ -6,7 +6,8 @@
 #include "nearest_feature.hpp"
 #include "products.hpp"
 
-/// What the feature search reads beside the features: copies for the tensor cores, and how far off their products may be. Part of assemble().
+/// What the feature search reads beside the features: copies for the tensor cores, and how far off
+/// their products may be. Part of assemble().
 namespace gpureg::cuda {
 
 /// Where each array of a FeatureAids begins in a cloud's memory.
@@ -24,8 +25,8 @@ struct FeaturesToMeasure {
   const float* features;
   const std::uint8_t* valid;
   std::uint32_t size, dimension;
-  FeatureAids aids;           ///< laid out, to be filled
-  std::uint32_t* extreme;     ///< counts features that are too long for the tensor cores
+  FeatureAids aids;        ///< laid out, to be filled
+  std::uint32_t* extreme;  ///< counts features that are too long for the tensor cores
 };
 
 void fill_feature_aids(Exec& exec, const std::vector<FeaturesToMeasure>& clouds);

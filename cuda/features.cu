@@ -12,21 +12,26 @@ struct FpfhBatch {
   const std::uint32_t* offset;
   const GridView* grids;
   const Vec3* normals;
-  float* spfh;                          // rows in cell order, so that neighbours' rows are neighbours
+  // rows in cell order, so that neighbours' rows are neighbours
+  float* spfh;
   const std::size_t* feature_offset;
   float radius;
   float* values;
   std::uint8_t* valid;
-  const std::uint8_t* custom;           // per cloud: 1 where the features are the caller's, and none are made
+  // per cloud: 1 where the features are the caller's, and none are made
+  const std::uint8_t* custom;
 };
 
-__global__ void normals_in_cell_order(const std::uint32_t* offset, const GridView* grids, const Vec3* normals, Vec3* out) {
+__global__ void normals_in_cell_order(const std::uint32_t* offset, const GridView* grids,
+                                      const Vec3* normals, Vec3* out) {
   const std::uint32_t c = blockIdx.y, begin = offset[c], i = blockIdx.x * blockDim.x + threadIdx.x;
   if (i < offset[c + 1] - begin) out[begin + i] = normals[begin + grids[c].index[i]];
 }
 
-/// Simplified histograms: a warp per point, a lane per neighbour; the counts are integers, so their order is free.
-__global__ void __launch_bounds__(32 * kWarps) simplified_histograms(FpfhBatch f, const Vec3* sorted_normals) {
+/// Simplified histograms: a warp per point, a lane per neighbour; the counts are integers, so their
+/// order is free.
+__global__ void __launch_bounds__(32 * kWarps)
+    simplified_histograms(FpfhBatch f, const Vec3* sorted_normals) {
   __shared__ std::uint32_t counts[kWarps][kFpfhSize];
   const std::uint32_t c = blockIdx.y, begin = f.offset[c], size = f.offset[c + 1] - begin;
   const int warp = static_cast<int>(threadIdx.x / 32), lane = static_cast<int>(threadIdx.x % 32);
@@ -55,7 +60,8 @@ __global__ void __launch_bounds__(32 * kWarps) simplified_histograms(FpfhBatch f
 }
 
 /// FPFH: a warp per point, a lane per bin (lane 0 has the 33rd too), neighbours in order.
-__global__ void __launch_bounds__(32 * kWarps) weighted_histograms(FpfhBatch f, const Vec3* sorted_normals) {
+__global__ void __launch_bounds__(32 * kWarps)
+    weighted_histograms(FpfhBatch f, const Vec3* sorted_normals) {
   __shared__ float histogram[kWarps][kFpfhSize];
   const std::uint32_t c = blockIdx.y, begin = f.offset[c], size = f.offset[c + 1] - begin;
   const int warp = static_cast<int>(threadIdx.x / 32), lane = static_cast<int>(threadIdx.x % 32);
@@ -72,7 +78,8 @@ __global__ void __launch_bounds__(32 * kWarps) weighted_histograms(FpfhBatch f, 
       for (unsigned left = __ballot_sync(~0u, counts); left != 0; left &= left - 1) {
         const int from = __ffs(static_cast<int>(left)) - 1;
         const float w = __shfl_sync(~0u, weight, from);
-        const float* row = f.spfh + static_cast<std::size_t>(begin + __shfl_sync(~0u, k, from)) * kFpfhSize;
+        const float* row =
+            f.spfh + static_cast<std::size_t>(begin + __shfl_sync(~0u, k, from)) * kFpfhSize;
         sum = fmaf(w, row[lane], sum);
         if (lane == 0) last = fmaf(w, row[32], last);
       }
@@ -92,8 +99,10 @@ __global__ void __launch_bounds__(32 * kWarps) weighted_histograms(FpfhBatch f, 
 }
 
 /// The caller's features: copied; rows that are not finite are never matched.
-__global__ void take_features(const std::uint32_t* offset, const std::uint32_t* dimensions, const std::uint8_t* custom, const float* in,
-                              const std::size_t* in_offset, const std::size_t* out_offset, float* values, std::uint8_t* valid) {
+__global__ void take_features(const std::uint32_t* offset, const std::uint32_t* dimensions,
+                              const std::uint8_t* custom, const float* in,
+                              const std::size_t* in_offset, const std::size_t* out_offset,
+                              float* values, std::uint8_t* valid) {
   const std::uint32_t c = blockIdx.y, begin = offset[c], i = blockIdx.x * blockDim.x + threadIdx.x;
   if (i >= offset[c + 1] - begin || !custom[c]) return;
   const std::uint32_t dimension = dimensions[c];
@@ -107,16 +116,25 @@ __global__ void take_features(const std::uint32_t* offset, const std::uint32_t* 
 }
 
 /// FPFH of one radius for the clouds without features of the caller's, each at its offset in `out`.
-void describe(Exec& exec, const Segments& segments, const DeviceBuffer<Vec3>& normals, const Grids& grids, float radius,
-              const std::size_t* feature_offset, const std::uint8_t* custom, Features& out) {
+void describe(Exec& exec, const Segments& segments, const DeviceBuffer<Vec3>& normals,
+              const Grids& grids, float radius, const std::size_t* feature_offset,
+              const std::uint8_t* custom, Features& out) {
   const unsigned clouds_on_grid = static_cast<unsigned>(segments.entries());
   auto sorted_normals = exec.buffer<Vec3>(segments.total());
-  normals_in_cell_order<<<dim3(blocks_for(segments.largest, 256), clouds_on_grid), 256, 0, exec.stream()>>>(
-      segments.on_device.data(), grids.views.data(), normals.data(), sorted_normals.data());
+  normals_in_cell_order<<<dim3(blocks_for(segments.largest, 256), clouds_on_grid), 256, 0,
+                          exec.stream()>>>(segments.on_device.data(), grids.views.data(),
+                                           normals.data(), sorted_normals.data());
   check_launch("normals_in_cell_order");
   auto spfh = exec.buffer<float>(static_cast<std::size_t>(segments.total()) * kFpfhSize);
-  const FpfhBatch batch{segments.on_device.data(), grids.views.data(), normals.data(), spfh.data(), feature_offset,
-                        radius, out.values.data(), out.valid.data(), custom};
+  const FpfhBatch batch{segments.on_device.data(),
+                        grids.views.data(),
+                        normals.data(),
+                        spfh.data(),
+                        feature_offset,
+                        radius,
+                        out.values.data(),
+                        out.valid.data(),
+                        custom};
   const dim3 grid(blocks_for(segments.largest, kWarps), clouds_on_grid);
   simplified_histograms<<<grid, 32 * kWarps, 0, exec.stream()>>>(batch, sorted_normals.data());
   check_launch("simplified_histograms");
@@ -126,8 +144,8 @@ void describe(Exec& exec, const Segments& segments, const DeviceBuffer<Vec3>& no
 
 }  // namespace
 
-Features compute_features(Exec& exec, DownsampledClouds& clouds, const DeviceBuffer<Vec3>& normals, const Grids& grids,
-                          const PrepareOptions& options) {
+Features compute_features(Exec& exec, DownsampledClouds& clouds, const DeviceBuffer<Vec3>& normals,
+                          const Grids& grids, const PrepareOptions& options) {
   const Segments& segments = clouds.segments;
   const std::size_t count = segments.entries();
   Features out;
@@ -139,8 +157,10 @@ Features compute_features(Exec& exec, DownsampledClouds& clouds, const DeviceBuf
     const CloudFacts& facts = clouds.facts[c];
     custom.push_back(facts.feature_dimension > 0);
     (custom.back() ? any_custom : any_fpfh) = true;
-    out.dimension.push_back(custom.back() ? facts.feature_dimension : static_cast<std::uint32_t>(kFpfhSize));
-    out.offset.push_back(out.offset.back() + static_cast<std::size_t>(segments.size(c)) * out.dimension.back());
+    out.dimension.push_back(custom.back() ? facts.feature_dimension
+                                          : static_cast<std::uint32_t>(kFpfhSize));
+    out.offset.push_back(out.offset.back() +
+                         static_cast<std::size_t>(segments.size(c)) * out.dimension.back());
     in_offset.push_back(facts.feature_offset);
   }
   out.values = exec.buffer<float>(out.offset.back());
@@ -148,27 +168,35 @@ Features compute_features(Exec& exec, DownsampledClouds& clouds, const DeviceBuf
   if (segments.total() == 0) return out;
   const auto custom_on_device = exec.upload(custom);
   const auto offset_on_device = exec.upload(out.offset);
-  if (any_fpfh) describe(exec, segments, normals, grids, options.feature_radius, offset_on_device.data(), custom_on_device.data(), out);
+  if (any_fpfh)
+    describe(exec, segments, normals, grids, options.feature_radius, offset_on_device.data(),
+             custom_on_device.data(), out);
   if (any_custom) {
     const auto dimension_on_device = exec.upload(out.dimension);
     const auto in_offset_on_device = exec.upload(in_offset);
-    take_features<<<dim3(blocks_for(segments.largest, 256), static_cast<unsigned>(count)), 256, 0, exec.stream()>>>(
-        segments.on_device.data(), dimension_on_device.data(), custom_on_device.data(), clouds.features.data(), in_offset_on_device.data(),
-        offset_on_device.data(), out.values.data(), out.valid.data());
+    take_features<<<dim3(blocks_for(segments.largest, 256), static_cast<unsigned>(count)), 256, 0,
+                    exec.stream()>>>(segments.on_device.data(), dimension_on_device.data(),
+                                     custom_on_device.data(), clouds.features.data(),
+                                     in_offset_on_device.data(), offset_on_device.data(),
+                                     out.values.data(), out.valid.data());
     check_launch("take_features");
   }
   return out;
 }
 
-Features compute_wide_features(Exec& exec, const DownsampledClouds& clouds, const Grids& grids, const PrepareOptions& options) {
+Features compute_wide_features(Exec& exec, const DownsampledClouds& clouds, const Grids& grids,
+                               const PrepareOptions& options) {
   const Segments& segments = clouds.segments;
   Features out;
   std::vector<std::uint8_t> custom;
   out.offset.push_back(0);
   for (std::size_t c = 0; c < segments.entries(); ++c) {
     custom.push_back(clouds.facts[c].feature_dimension > 0);
-    out.dimension.push_back(options.wide_feature_radius > 0 && !custom.back() ? static_cast<std::uint32_t>(kFpfhSize) : 0);
-    out.offset.push_back(out.offset.back() + static_cast<std::size_t>(segments.size(c)) * out.dimension.back());
+    out.dimension.push_back(options.wide_feature_radius > 0 && !custom.back()
+                                ? static_cast<std::uint32_t>(kFpfhSize)
+                                : 0);
+    out.offset.push_back(out.offset.back() +
+                         static_cast<std::size_t>(segments.size(c)) * out.dimension.back());
   }
   if (out.offset.back() == 0) return out;
   out.values = exec.buffer<float>(out.offset.back());
@@ -176,8 +204,11 @@ Features compute_wide_features(Exec& exec, const DownsampledClouds& clouds, cons
   const auto custom_on_device = exec.upload(custom);
   const auto offset_on_device = exec.upload(out.offset);
   const auto normals =
-      estimate_normals(exec, clouds, grids, wide_normal_radius(options.normal_radius, options.feature_radius, options.wide_feature_radius));
-  describe(exec, segments, normals, grids, options.wide_feature_radius, offset_on_device.data(), custom_on_device.data(), out);
+      estimate_normals(exec, clouds, grids,
+                       wide_normal_radius(options.normal_radius, options.feature_radius,
+                                          options.wide_feature_radius));
+  describe(exec, segments, normals, grids, options.wide_feature_radius, offset_on_device.data(),
+           custom_on_device.data(), out);
   return out;
 }
 

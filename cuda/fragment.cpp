@@ -12,7 +12,8 @@ void copy_to_host(char* host, const CudaCloud& from, std::size_t bytes) {
   const DeviceScope scope(from.data.memory()->device());
   cudaStream_t stream = nullptr;
   check(cudaStreamCreateWithFlags(&stream, cudaStreamNonBlocking), "cudaStreamCreateWithFlags");
-  cudaError_t error = cudaMemcpyAsync(host, from.data.data(), bytes, cudaMemcpyDeviceToHost, stream);
+  cudaError_t error =
+      cudaMemcpyAsync(host, from.data.data(), bytes, cudaMemcpyDeviceToHost, stream);
   if (error == cudaSuccess) error = cudaStreamSynchronize(stream);
   cudaStreamDestroy(stream);
   check(error, "copying a cloud to the host");
@@ -33,29 +34,53 @@ CloudArrays CloudArrays::moved(const char* from, char* to) const {
     pointer = reinterpret_cast<Pointer>(to + (reinterpret_cast<const char*>(pointer) - from));
   };
   CloudView& v = out.view_on_device;
-  move(v.points), move(v.normals), move(v.features), move(v.has_feature);
-  move(v.closest.table.data), move(v.closest.cell_start.data), move(v.closest.candidates.data);
+  move(v.points);
+  move(v.normals);
+  move(v.features);
+  move(v.has_feature);
+  move(v.closest.table.data);
+  move(v.closest.cell_start.data);
+  move(v.closest.candidates.data);
   move(out.blocks);
   CellSummaries& s = out.summaries;
-  move(s.run), move(s.brick), move(s.cell), move(s.candidate);
-  move(out.order.point), move(out.order.normal), move(out.order.index);
-  move(v.wide_features), move(v.has_wide_feature), move(v.balance), move(v.visibility.depth), move(v.visibility.viewpoints), move(v.fronts.words);
-  for (FeatureAids* aids : {&out.narrow_aids, &out.wide_aids}) move(aids->half), move(aids->padded), move(aids->square), move(aids->error), move(aids->scale);
+  move(s.run);
+  move(s.brick);
+  move(s.cell);
+  move(s.candidate);
+  move(out.order.point);
+  move(out.order.normal);
+  move(out.order.index);
+  move(v.wide_features);
+  move(v.has_wide_feature);
+  move(v.balance);
+  move(v.visibility.depth);
+  move(v.visibility.viewpoints);
+  move(v.fronts.words);
+  for (FeatureAids* aids : {&out.narrow_aids, &out.wide_aids}) {
+    move(aids->half);
+    move(aids->padded);
+    move(aids->square);
+    move(aids->error);
+    move(aids->scale);
+  }
   return out;
 }
 
-Fragment::Fragment(std::shared_ptr<const CudaCloud> made) : PreparedState(*made), bytes_(made->data.size()), copies_{std::move(made)} {}
+Fragment::Fragment(std::shared_ptr<const CudaCloud> made)
+    : PreparedState(*made), bytes_(made->data.size()), copies_{std::move(made)} {}
 
 std::shared_ptr<const CudaCloud> Fragment::on(int device) const {
   const std::lock_guard<std::mutex> lock(mutex_);
   for (const auto& copy : copies_)
-    if (!copy->data.memory() || copy->data.memory()->device() == device) return copy;  // one without any array is everywhere
+    // one without any array is everywhere
+    if (!copy->data.memory() || copy->data.memory()->device() == device) return copy;
   return nullptr;
 }
 
 bool Fragment::in(const DeviceMemory& memory) const {
   const std::lock_guard<std::mutex> lock(mutex_);
-  return std::any_of(copies_.begin(), copies_.end(), [&](const auto& copy) { return copy->data.memory().get() == &memory; });
+  return std::any_of(copies_.begin(), copies_.end(),
+                     [&](const auto& copy) { return copy->data.memory().get() == &memory; });
 }
 
 std::shared_ptr<const CudaCloud> Fragment::any() const {
@@ -83,10 +108,13 @@ std::shared_ptr<const CudaCloud> Fragment::start_copy(Exec& exec) const {
     // From device to device, if only through the driver's own staging.
     const int other_device = other->data.memory() ? other->data.memory()->device() : exec.device();
     const cudaError_t error =
-        bytes_ == 0 ? cudaSuccess : cudaMemcpyPeerAsync(out->data.data(), exec.device(), other->data.data(), other_device, bytes_, exec.stream());
+        bytes_ == 0 ? cudaSuccess
+                    : cudaMemcpyPeerAsync(out->data.data(), exec.device(), other->data.data(),
+                                          other_device, bytes_, exec.stream());
     if (error == cudaSuccess) {
       exec.hold(other);
-      arrays = other.get(), from = other->data.data();
+      arrays = other.get();
+      from = other->data.data();
     } else {
       cudaGetLastError();
     }
@@ -95,7 +123,9 @@ std::shared_ptr<const CudaCloud> Fragment::start_copy(Exec& exec) const {
     const std::lock_guard<std::mutex> lock(mutex_);
     arrays = other ? &make_host_copy(*other) : &host_arrays_;
     from = host_.data();
-    if (bytes_ > 0) check(cudaMemcpyAsync(out->data.data(), from, bytes_, cudaMemcpyHostToDevice, exec.stream()), "copying a cloud to the device");
+    if (bytes_ > 0)
+      check(cudaMemcpyAsync(out->data.data(), from, bytes_, cudaMemcpyHostToDevice, exec.stream()),
+            "copying a cloud to the device");
   }
   static_cast<CloudArrays&>(*out) = arrays->moved(from, out->data.data());
   out->view_on_device.executor_data = out.get();
@@ -129,7 +159,9 @@ std::vector<Vec3> Fragment::copy_normals() const {
 }
 std::vector<float> Fragment::copy_features() const {
   const auto copy = any();
-  return copy ? copy->copy_features() : copied(host_arrays_.view_on_device.features, static_cast<std::size_t>(size) * feature_dimension);
+  return copy ? copy->copy_features()
+              : copied(host_arrays_.view_on_device.features,
+                       static_cast<std::size_t>(size) * feature_dimension);
 }
 
 }  // namespace gpureg::cuda

@@ -9,7 +9,7 @@ namespace gpureg::cuda {
 namespace {
 
 struct FrontBatch {
-  const std::uint32_t* offset;   // of the clouds' points
+  const std::uint32_t* offset;  // of the clouds' points
   const Vec3 *points, *normals;
   const FrontBox* boxes;
   const std::size_t* word_offset;
@@ -21,7 +21,8 @@ __global__ void mark_surfaces(FrontBatch f) {
   const FrontBox box = f.boxes[c];
   if (box.words_x == 0) return;
   std::uint32_t* words = f.words + f.word_offset[c];
-  for (std::uint32_t i = blockIdx.x * blockDim.x + threadIdx.x; i < size; i += gridDim.x * blockDim.x) {
+  for (std::uint32_t i = blockIdx.x * blockDim.x + threadIdx.x; i < size;
+       i += gridDim.x * blockDim.x) {
     const FrontCell cell = front_cell(box, f.points[begin + i]);
     if (cell.word != kNoValue) atomicOr(words + cell.word, kOnSurface << cell.shift);
   }
@@ -33,29 +34,41 @@ __global__ void march(FrontBatch f) {
   const FrontBox box = f.boxes[c];
   if (box.words_x == 0) return;
   std::uint32_t* words = f.words + f.word_offset[c];
-  for (std::uint32_t k = blockIdx.x * blockDim.x + threadIdx.x; k < 2 * size; k += gridDim.x * blockDim.x)
-    march_front(box, words, f.points[begin + k / 2], f.normals[begin + k / 2], k % 2, [&](std::uint32_t word, std::uint32_t bits) {
-      // What is there already was marked by this step of others; bits only ever come.
-      if ((words[word] & bits) != bits) atomicOr(words + word, bits);
-    });
+  for (std::uint32_t k = blockIdx.x * blockDim.x + threadIdx.x; k < 2 * size;
+       k += gridDim.x * blockDim.x)
+    march_front(box, words, f.points[begin + k / 2], f.normals[begin + k / 2], k % 2,
+                [&](std::uint32_t word, std::uint32_t bits) {
+                  // What is there already was marked by this step of others; bits only ever come.
+                  if ((words[word] & bits) != bits) atomicOr(words + word, bits);
+                });
 }
 
 }  // namespace
 
-Fronts build_fronts(Exec& exec, const DownsampledClouds& clouds, const DeviceBuffer<Vec3>& normals, const PrepareOptions& options) {
+Fronts build_fronts(Exec& exec, const DownsampledClouds& clouds, const DeviceBuffer<Vec3>& normals,
+                    const PrepareOptions& options) {
   Fronts out;
   out.offset.push_back(0);
   const std::size_t entries = clouds.segments.entries();
   for (std::size_t c = 0; c < entries; ++c) {
-    out.boxes.push_back(front_box(clouds.facts[c].lo, clouds.facts[c].hi, options.front_reach, clouds.segments.size(c) > 0));
+    out.boxes.push_back(front_box(clouds.facts[c].lo, clouds.facts[c].hi, options.front_reach,
+                                  clouds.segments.size(c) > 0));
     out.offset.push_back(out.offset.back() + out.boxes.back().words());
   }
   if (out.offset.back() == 0) return out;
   out.words = exec.filled<std::uint32_t>(out.offset.back(), 0);
   const auto boxes = exec.upload(out.boxes);
   const auto offset = exec.upload(out.offset);
-  const FrontBatch batch{clouds.segments.on_device.data(), clouds.points.data(), normals.data(), boxes.data(), offset.data(), out.words.data()};
-  const auto grid = [&](std::size_t items) { return dim3(std::max(1u, std::min(blocks_for(items, 256), 64u)), static_cast<unsigned>(entries)); };
+  const FrontBatch batch{clouds.segments.on_device.data(),
+                         clouds.points.data(),
+                         normals.data(),
+                         boxes.data(),
+                         offset.data(),
+                         out.words.data()};
+  const auto grid = [&](std::size_t items) {
+    return dim3(std::max(1u, std::min(blocks_for(items, 256), 64u)),
+                static_cast<unsigned>(entries));
+  };
   mark_surfaces<<<grid(clouds.segments.largest), 256, 0, exec.stream()>>>(batch);
   check_launch("mark_surfaces");
   march<<<grid(2 * std::size_t(clouds.segments.largest)), 256, 0, exec.stream()>>>(batch);

@@ -26,7 +26,8 @@ struct Fill {
   float inverse;
   CellEntry* table;
   const std::size_t* table_offset;
-  std::uint32_t* cell_start;  // a cloud's begins at its offset plus its number: each has one entry more than cells
+  // a cloud's begins at its offset plus its number: each has one entry more than cells
+  std::uint32_t* cell_start;
   Vec3* sorted_points;
 };
 
@@ -35,25 +36,28 @@ __global__ void fill_grid(Fill f) {
   const std::uint32_t c = blockIdx.y, begin = f.offset[c], size = f.offset[c + 1] - begin;
   const std::uint32_t first_rank = f.rank[begin];
   std::uint32_t* cell_start = f.cell_start + begin + c;
-  for (std::uint32_t i = blockIdx.x * blockDim.x + threadIdx.x; i < size; i += gridDim.x * blockDim.x) {
+  for (std::uint32_t i = blockIdx.x * blockDim.x + threadIdx.x; i < size;
+       i += gridDim.x * blockDim.x) {
     const Vec3 p = f.points[begin + f.item[begin + i]];
     f.sorted_points[begin + i] = p;
     const std::uint32_t cell = f.rank[begin + i] - first_rank;
     if (f.rank[begin + i + 1] - first_rank == cell) continue;
     cell_start[cell] = i;
-    insert_key(f.table + f.table_offset[c], static_cast<std::uint32_t>(f.table_offset[c + 1] - f.table_offset[c]),
+    insert_key(f.table + f.table_offset[c],
+               static_cast<std::uint32_t>(f.table_offset[c + 1] - f.table_offset[c]),
                cell_key(cell_of(p, f.inverse)), cell);
   }
   if (blockIdx.x == 0 && threadIdx.x == 0) cell_start[f.rank[begin + size] - first_rank] = size;
 }
 
 /// Sum over the cells of their squared sizes.
-__global__ void measure_density(const std::uint32_t* offset, const std::uint32_t* rank, const std::uint32_t* cell_start,
-                                unsigned long long* squares) {
+__global__ void measure_density(const std::uint32_t* offset, const std::uint32_t* rank,
+                                const std::uint32_t* cell_start, unsigned long long* squares) {
   const std::uint32_t c = blockIdx.y, begin = offset[c];
   const std::uint32_t cells = rank[offset[c + 1]] - rank[begin];
   unsigned long long sum = 0;
-  for (std::uint32_t k = blockIdx.x * blockDim.x + threadIdx.x; k < cells; k += gridDim.x * blockDim.x) {
+  for (std::uint32_t k = blockIdx.x * blockDim.x + threadIdx.x; k < cells;
+       k += gridDim.x * blockDim.x) {
     const unsigned long long n = cell_start[begin + c + k + 1] - cell_start[begin + c + k];
     sum += n * n;
   }
@@ -74,10 +78,13 @@ Grids build_grids(Exec& exec, const DownsampledClouds& clouds, const PrepareOpti
     const Cell lo = cell_of(facts.lo, inverse), hi = cell_of(facts.hi, inverse);
     ranges.push_back({{lo.x - 1, lo.y - 1, lo.z - 1}, {hi.x + 1, hi.y + 1, hi.z + 1}});
   }
-  Groups cells = group_by_cell(exec, segments, ranges, CellOfPoint{segments.on_device.data(), clouds.points.data(), inverse});
+  Groups cells =
+      group_by_cell(exec, segments, ranges,
+                    CellOfPoint{segments.on_device.data(), clouds.points.data(), inverse});
 
   std::vector<std::size_t> table_offset{0};
-  for (std::size_t c = 0; c < count; ++c) table_offset.push_back(table_offset.back() + table_size(segments.size(c)));
+  for (std::size_t c = 0; c < count; ++c)
+    table_offset.push_back(table_offset.back() + table_size(segments.size(c)));
   const auto table_offset_on_device = exec.upload(table_offset);
   Grids out;
   out.table = exec.filled<CellEntry>(table_offset.back(), 0xff);
@@ -87,21 +94,29 @@ Grids build_grids(Exec& exec, const DownsampledClouds& clouds, const PrepareOpti
   std::vector<GridView> views;
   for (std::size_t c = 0; c < count; ++c) {
     const std::size_t begin = segments.offset[c], size = segments.size(c);
-    views.push_back({cell_size, inverse, {out.table.data() + table_offset[c], table_offset[c + 1] - table_offset[c]},
-                     {out.cell_start.data() + begin + c, size + 1}, {out.points.data() + begin, size}, {out.index.data() + begin, size}});
+    views.push_back({cell_size,
+                     inverse,
+                     {out.table.data() + table_offset[c], table_offset[c + 1] - table_offset[c]},
+                     {out.cell_start.data() + begin + c, size + 1},
+                     {out.points.data() + begin, size},
+                     {out.index.data() + begin, size}});
   }
   out.views = exec.upload(views);
-  const dim3 grid(std::max(1u, std::min(blocks_for(segments.largest, kThreads), 1024u)), static_cast<unsigned>(count));
-  fill_grid<<<grid, kThreads, 0, exec.stream()>>>(Fill{segments.on_device.data(), out.index.data(), cells.rank.data(), clouds.points.data(),
-                                                       out.views.data(), inverse, out.table.data(), table_offset_on_device.data(),
-                                                       out.cell_start.data(), out.points.data()});
+  const dim3 grid(std::max(1u, std::min(blocks_for(segments.largest, kThreads), 1024u)),
+                  static_cast<unsigned>(count));
+  fill_grid<<<grid, kThreads, 0, exec.stream()>>>(
+      Fill{segments.on_device.data(), out.index.data(), cells.rank.data(), clouds.points.data(),
+           out.views.data(), inverse, out.table.data(), table_offset_on_device.data(),
+           out.cell_start.data(), out.points.data()});
   check_launch("fill_grid");
   const auto squares = exec.filled<unsigned long long>(count, 0);
-  measure_density<<<grid, kThreads, 0, exec.stream()>>>(segments.on_device.data(), cells.rank.data(), out.cell_start.data(), squares.data());
+  measure_density<<<grid, kThreads, 0, exec.stream()>>>(
+      segments.on_device.data(), cells.rank.data(), out.cell_start.data(), squares.data());
   check_launch("measure_density");
   const unsigned long long* sums = exec.download(squares.data(), count);
   exec.synchronize();
-  for (std::size_t c = 0; c < count; ++c) pipeline::check_density(static_cast<double>(sums[c]), segments.size(c), options);
+  for (std::size_t c = 0; c < count; ++c)
+    pipeline::check_density(static_cast<double>(sums[c]), segments.size(c), options);
   return out;
 }
 

@@ -13,9 +13,12 @@ inline std::size_t table_size(std::size_t keys) {
 }
 
 /// Inserts a key that is not in the table yet. All entries start as bytes of 0xff.
-__device__ inline void insert_key(CellEntry* table, std::uint32_t size, std::uint64_t key, std::uint32_t value) {
+__device__ inline void insert_key(CellEntry* table, std::uint32_t size, std::uint64_t key,
+                                  std::uint32_t value) {
   std::uint32_t slot = cell_slot(key, size - 1);
-  while (atomicCAS(reinterpret_cast<unsigned long long*>(&table[slot].key), kEmptyKey, key) != kEmptyKey) slot = (slot + 1) & (size - 1);
+  while (atomicCAS(reinterpret_cast<unsigned long long*>(&table[slot].key), kEmptyKey, key) !=
+         kEmptyKey)
+    slot = (slot + 1) & (size - 1);
   table[slot].value = value;
 }
 

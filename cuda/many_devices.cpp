@@ -10,16 +10,19 @@
 namespace gpureg::cuda {
 namespace {
 
-/// Hands out runs of items: large ones first, small ones at the end, so that all devices finish together.
+/// Hands out runs of items: large ones first, small ones at the end, so that all devices finish
+/// together.
 class Runs {
  public:
-  Runs(std::size_t items, std::size_t least, std::size_t most, std::size_t takers) : items_(items), least_(least), most_(most), takers_(takers) {}
+  Runs(std::size_t items, std::size_t least, std::size_t most, std::size_t takers)
+      : items_(items), least_(least), most_(most), takers_(takers) {}
 
   /// [begin, end), empty where nothing is left.
   std::pair<std::size_t, std::size_t> take() {
     const std::lock_guard<std::mutex> lock(mutex_);
     const std::size_t left = items_ - next_;
-    const std::size_t size = std::min(left, std::max(least_, std::min(most_, left / (2 * takers_))));
+    const std::size_t size =
+        std::min(left, std::max(least_, std::min(most_, left / (2 * takers_))));
     next_ += size;
     return {next_ - size, next_};
   }
@@ -33,15 +36,17 @@ class Runs {
   std::size_t next_ = 0, items_, least_, most_, takers_;
 };
 
-constexpr std::size_t kLeastPairs = 32;   ///< of a run: fewer do not fill a device
+constexpr std::size_t kLeastPairs = 32;  ///< of a run: fewer do not fill a device
 constexpr std::size_t kLeastClouds = 4;
 constexpr std::size_t kMostClouds = 32;
-constexpr std::size_t kChunksPerDevice = 16;  ///< that go into one call: the devices wait for each other at its end only
+/// that go into one call: the devices wait for each other at its end only
+constexpr std::size_t kChunksPerDevice = 16;
 
 class EngineOfMany final : public DeviceEngine {
  public:
   EngineOfMany(const std::vector<int>& devices, std::size_t memory_budget) {
-    for (const int device : devices) engines_.push_back(std::make_unique<CudaEngine>(device, memory_budget));
+    for (const int device : devices)
+      engines_.push_back(std::make_unique<CudaEngine>(device, memory_budget));
   }
 
   Backend backend() const override { return Backend::cuda; }
@@ -62,27 +67,37 @@ class EngineOfMany final : public DeviceEngine {
     return engines_[0]->pairs_per_chunk(options) * kChunksPerDevice * engines_.size();
   }
 
-  std::vector<std::shared_ptr<PreparedState>> prepare(Span<const RawCloud> clouds, const PrepareOptions& options) override {
+  std::vector<std::shared_ptr<PreparedState>> prepare(Span<const RawCloud> clouds,
+                                                      const PrepareOptions& options) override {
     std::vector<std::shared_ptr<PreparedState>> out(clouds.size);
     Runs runs(clouds.size, kLeastClouds, kMostClouds, engines_.size());
-    on_all(runs, clouds.size > kLeastClouds, [&](CudaEngine& engine, std::size_t begin, std::size_t end) {
-      auto made = engine.prepare({clouds.data + begin, end - begin}, options);
-      std::move(made.begin(), made.end(), out.begin() + static_cast<std::ptrdiff_t>(begin));
-    });
+    on_all(runs, clouds.size > kLeastClouds,
+           [&](CudaEngine& engine, std::size_t begin, std::size_t end) {
+             auto made = engine.prepare({clouds.data + begin, end - begin}, options);
+             std::move(made.begin(), made.end(), out.begin() + static_cast<std::ptrdiff_t>(begin));
+           });
     return out;
   }
 
-  std::shared_ptr<AdoptedCloud> adopt(const RawCloud& cloud, void* stream) override { return on(device_of(cloud.points)).adopt(cloud, stream); }
-  std::shared_ptr<PreparedState> prepare_adopted(const AdoptedCloud& cloud, const PrepareOptions& options) override {
+  std::shared_ptr<AdoptedCloud> adopt(const RawCloud& cloud, void* stream) override {
+    return on(device_of(cloud.points)).adopt(cloud, stream);
+  }
+  std::shared_ptr<PreparedState> prepare_adopted(const AdoptedCloud& cloud,
+                                                 const PrepareOptions& options) override {
     return on(device_of(cloud)).prepare_adopted(cloud, options);
   }
 
-  void align(Span<const PairInput> pairs, const RegistrationOptions& options, Span<PairOutcome> outcomes, const FurtherSearch& further) override {
-    // Somewhat less than a device would take for itself: the first runs wait for clouds of other devices.
-    Runs runs(pairs.size, kLeastPairs, engines_[0]->pairs_per_chunk(options) * 3 / 4, engines_.size());
-    on_all(runs, pairs.size > kLeastPairs, [&](CudaEngine& engine, std::size_t begin, std::size_t end) {
-      engine.align({pairs.data + begin, end - begin}, options, {outcomes.data + begin, end - begin}, further);
-    });
+  void align(Span<const PairInput> pairs, const RegistrationOptions& options,
+             Span<PairOutcome> outcomes, const FurtherSearch& further) override {
+    // Somewhat less than a device would take for itself: the first runs wait for clouds of other
+    // devices.
+    Runs runs(pairs.size, kLeastPairs, engines_[0]->pairs_per_chunk(options) * 3 / 4,
+              engines_.size());
+    on_all(runs, pairs.size > kLeastPairs,
+           [&](CudaEngine& engine, std::size_t begin, std::size_t end) {
+             engine.align({pairs.data + begin, end - begin}, options,
+                          {outcomes.data + begin, end - begin}, further);
+           });
   }
 
  private:
@@ -93,11 +108,14 @@ class EngineOfMany final : public DeviceEngine {
     return *engines_[0];
   }
 
-  /// Works off the runs with a thread for each engine, or with the first engine alone. What the first engine that fails throws is thrown here.
-  void on_all(Runs& runs, bool spread, const std::function<void(CudaEngine&, std::size_t, std::size_t)>& work) {
+  /// Works off the runs with a thread for each engine, or with the first engine alone. What the
+  /// first engine that fails throws is thrown here.
+  void on_all(Runs& runs, bool spread,
+              const std::function<void(CudaEngine&, std::size_t, std::size_t)>& work) {
     on_threads(spread ? engines_.size() : 1, [&](std::size_t e) {
       try {
-        for (auto [begin, end] = runs.take(); begin < end; std::tie(begin, end) = runs.take()) work(*engines_[e], begin, end);
+        for (auto [begin, end] = runs.take(); begin < end; std::tie(begin, end) = runs.take())
+          work(*engines_[e], begin, end);
       } catch (...) {
         runs.stop();
         throw;
@@ -110,7 +128,8 @@ class EngineOfMany final : public DeviceEngine {
 
 }  // namespace
 
-std::shared_ptr<Engine> make_engine_of_many(const std::vector<int>& devices, std::size_t memory_budget) {
+std::shared_ptr<Engine> make_engine_of_many(const std::vector<int>& devices,
+                                            std::size_t memory_budget) {
   return std::make_shared<EngineOfMany>(devices, memory_budget);
 }
 

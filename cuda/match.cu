@@ -8,10 +8,10 @@ namespace {
 
 struct MatchBatch {
   const PairView* pairs;
-  const std::uint32_t* query_offset;    // of the pairs' forward answers, k per query
+  const std::uint32_t* query_offset;  // of the pairs' forward answers, k per query
   const std::uint32_t* forward;
   const std::uint32_t* backward_offset;
-  const std::uint32_t* backward;        // null: not mutual
+  const std::uint32_t* backward;  // null: not mutual
   std::uint32_t k;
   const std::uint32_t* room;
   MatchedPoints* out;
@@ -21,12 +21,15 @@ struct MatchBatch {
 constexpr std::uint32_t kTile = 1024;
 
 /// Answer `a` of a pair as a match: false where there is none.
-__device__ bool match_of(const MatchBatch& m, const PairView& pair, std::uint32_t p, std::uint32_t a, std::uint32_t& source, std::uint32_t& target) {
+__device__ bool match_of(const MatchBatch& m, const PairView& pair, std::uint32_t p,
+                         std::uint32_t a, std::uint32_t& source, std::uint32_t& target) {
   if (pair.custom_count > 0) {
-    source = pair.custom_source[a], target = pair.custom_target[a];
+    source = pair.custom_source[a];
+    target = pair.custom_target[a];
     return true;
   }
-  source = a / m.k, target = m.forward[m.query_offset[p] + a];
+  source = a / m.k;
+  target = m.forward[m.query_offset[p] + a];
   return target != kNoValue && (!m.backward || m.backward[m.backward_offset[p] + target] == source);
 }
 
@@ -39,24 +42,30 @@ __device__ std::uint32_t sum_of_block(std::uint32_t mine, std::uint32_t* warp_su
   return warp_sum(warp_sums[threadIdx.x % 32]);
 }
 
-/// A thread block per tile of a pair's answers (blockIdx.x) writes its matches in order. It counts for itself what comes before: quicker
-/// than waiting for the blocks of the tiles before.
+/// A thread block per tile of a pair's answers (blockIdx.x) writes its matches in order. It counts
+/// for itself what comes before: quicker than waiting for the blocks of the tiles before.
 __global__ void __launch_bounds__(kTile) collect_matches(MatchBatch m) {
   __shared__ std::uint32_t warp_sums[32];
   const std::uint32_t p = blockIdx.y, tile = blockIdx.x;
   const PairView& pair = m.pairs[p];
-  const std::uint32_t answers = pair.custom_count > 0 ? pair.custom_count : m.query_offset[p + 1] - m.query_offset[p];
+  const std::uint32_t answers =
+      pair.custom_count > 0 ? pair.custom_count : m.query_offset[p + 1] - m.query_offset[p];
   if (tile * kTile >= answers && tile > 0) return;
   std::uint32_t source, target, mine = 0;
-  for (std::uint32_t a = threadIdx.x; a < tile * kTile; a += kTile) mine += match_of(m, pair, p, a, source, target);
+  for (std::uint32_t a = threadIdx.x; a < tile * kTile; a += kTile)
+    mine += match_of(m, pair, p, a, source, target);
   const std::uint32_t before = sum_of_block(mine, warp_sums);
   const std::uint32_t a = tile * kTile + threadIdx.x, lane = threadIdx.x % 32;
   const bool keep = a < answers && match_of(m, pair, p, a, source, target);
   const unsigned mask = __ballot_sync(~0u, keep);
-  const std::uint32_t all = sum_of_block(lane == 0 ? static_cast<std::uint32_t>(__popc(static_cast<int>(mask))) : 0, warp_sums);
-  std::uint32_t at = before + static_cast<std::uint32_t>(__popc(static_cast<int>(mask & ((1u << lane) - 1))));
+  const std::uint32_t all = sum_of_block(
+      lane == 0 ? static_cast<std::uint32_t>(__popc(static_cast<int>(mask))) : 0, warp_sums);
+  std::uint32_t at =
+      before + static_cast<std::uint32_t>(__popc(static_cast<int>(mask & ((1u << lane) - 1))));
   for (std::uint32_t w = 0; w < threadIdx.x / 32; ++w) at += warp_sums[w];
-  if (keep) m.out[m.room[p] + at] = {pair.source.points[source], pair.target.points[target], source, target};
+  if (keep)
+    m.out[m.room[p] + at] = {pair.source.points[source], pair.target.points[target], source,
+                             target};
   if (threadIdx.x == 0 && (tile + 1) * kTile >= answers) m.count[p] = before + all;
 }
 
@@ -64,8 +73,12 @@ __global__ void __launch_bounds__(kTile) collect_matches(MatchBatch m) {
 
 Matches match_features(Exec& exec, Span<const PairView> pairs, const HypothesisOptions& options) {
   const std::uint32_t k = options.neighbors;
-  const auto asks = [&](std::size_t p) { return pairs[p].custom_count == 0 && pairs[p].source.size > 0 && pairs[p].target.size > 0; };
-  const Segments forward_segments = make_segments(exec, pairs.size, [&](std::size_t p) { return asks(p) ? std::size_t(pairs[p].source.size) * k : 0; });
+  const auto asks = [&](std::size_t p) {
+    return pairs[p].custom_count == 0 && pairs[p].source.size > 0 && pairs[p].target.size > 0;
+  };
+  const Segments forward_segments = make_segments(exec, pairs.size, [&](std::size_t p) {
+    return asks(p) ? std::size_t(pairs[p].source.size) * k : 0;
+  });
   std::vector<FeatureQuery> forward, backward;
   for (std::size_t p = 0; p < pairs.size; ++p) {
     if (!asks(p)) continue;
@@ -77,7 +90,8 @@ Matches match_features(Exec& exec, Span<const PairView> pairs, const HypothesisO
   Segments backward_segments;
   DeviceBuffer<std::uint32_t> backward_answers;
   if (options.mutual) {
-    backward_segments = make_segments(exec, pairs.size, [&](std::size_t p) { return asks(p) ? pairs[p].target.size : 0; });
+    backward_segments = make_segments(
+        exec, pairs.size, [&](std::size_t p) { return asks(p) ? pairs[p].target.size : 0; });
     for (std::size_t p = 0; p < pairs.size; ++p) {
       if (!asks(p)) continue;
       const CloudView &s = pairs[p].source, &t = pairs[p].target;
@@ -88,7 +102,9 @@ Matches match_features(Exec& exec, Span<const PairView> pairs, const HypothesisO
     batch.backward = backward_answers.data();
   }
   Matches out;
-  out.room = make_segments(exec, pairs.size, [&](std::size_t p) { return std::max(pairs[p].custom_count, forward_segments.size(p)); });
+  out.room = make_segments(exec, pairs.size, [&](std::size_t p) {
+    return std::max(pairs[p].custom_count, forward_segments.size(p));
+  });
   out.pairs = exec.buffer<MatchedPoints>(out.room.total());
   out.count = exec.buffer<std::uint32_t>(pairs.size);
   // The caller's own correspondences lie in host memory.
@@ -109,7 +125,9 @@ Matches match_features(Exec& exec, Span<const PairView> pairs, const HypothesisO
   batch.room = out.room.on_device.data();
   batch.out = out.pairs.data();
   batch.count = out.count.data();
-  collect_matches<<<dim3(std::max(1u, blocks_for(out.room.largest, kTile)), static_cast<unsigned>(pairs.size)), kTile, 0, exec.stream()>>>(batch);
+  collect_matches<<<dim3(std::max(1u, blocks_for(out.room.largest, kTile)),
+                         static_cast<unsigned>(pairs.size)),
+                    kTile, 0, exec.stream()>>>(batch);
   check_launch("collect_matches");
   return out;
 }

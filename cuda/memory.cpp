@@ -13,9 +13,10 @@ namespace gpureg::cuda {
 void throw_device_error(cudaError_t error, const char* what) {
   cudaGetLastError();  // an error that is not sticky would else be found by the next, innocent call
   const bool lost = cudaGetLastError() != cudaSuccess;
-  throw DeviceError(std::string(what) + ": " + cudaGetErrorName(error) + ", " + cudaGetErrorString(error) +
-                    (lost ? "; the device's state is lost: no CUDA context of this process is usable any more"
-                          : "; the context stays usable"));
+  throw DeviceError(
+      std::string(what) + ": " + cudaGetErrorName(error) + ", " + cudaGetErrorString(error) +
+      (lost ? "; the device's state is lost: no CUDA context of this process is usable any more"
+            : "; the context stays usable"));
 }
 
 DeviceScope::DeviceScope(int device) {
@@ -39,13 +40,17 @@ DeviceMemory::DeviceMemory(int device) : device_(device) {
   cudaError_t error = cudaSuccess;
   for (cudaMemPool_t* pool : {&pool_, &lent_pool_}) {
     if (error == cudaSuccess) error = cudaMemPoolCreate(pool, &properties);
-    if (error == cudaSuccess) error = cudaMemPoolSetAttribute(*pool, cudaMemPoolAttrReleaseThreshold, &threshold);
+    if (error == cudaSuccess)
+      error = cudaMemPoolSetAttribute(*pool, cudaMemPoolAttrReleaseThreshold, &threshold);
     // A caller's stream that takes memory here must not come to wait for ours.
-    if (error == cudaSuccess) error = cudaMemPoolSetAttribute(*pool, cudaMemPoolReuseAllowInternalDependencies, &never);
+    if (error == cudaSuccess)
+      error = cudaMemPoolSetAttribute(*pool, cudaMemPoolReuseAllowInternalDependencies, &never);
   }
-  // Our own stream reuses in its own order alone. What has happened to finish by now would cut the pool differently from run to run, and
-  // now and then a warm one would find no piece that is large enough.
-  if (error == cudaSuccess) error = cudaMemPoolSetAttribute(pool_, cudaMemPoolReuseAllowOpportunistic, &never);
+  // Our own stream reuses in its own order alone. What has happened to finish by now would cut the
+  // pool differently from run to run, and now and then a warm one would find no piece that is large
+  // enough.
+  if (error == cudaSuccess)
+    error = cudaMemPoolSetAttribute(pool_, cudaMemPoolReuseAllowOpportunistic, &never);
   if (error == cudaSuccess) return;
   destroy();
   throw_device_error(error, "cudaMemPoolCreate");
@@ -78,9 +83,12 @@ void* DeviceMemory::allocate(std::size_t bytes, cudaStream_t stream) {
     return pointer;
   }
   std::size_t free = 0, total = 0;
-  if (error == cudaErrorMemoryAllocation && (cudaGetLastError(), cudaMemGetInfo(&free, &total) == cudaSuccess))
-    throw DeviceError("device " + std::to_string(device_) + " is out of memory: " + std::to_string(bytes >> 20) + " MiB asked for, " +
-                      std::to_string(free >> 20) + " of " + std::to_string(total >> 20) + " MiB free; the context stays usable");
+  if (error == cudaErrorMemoryAllocation &&
+      (cudaGetLastError(), cudaMemGetInfo(&free, &total) == cudaSuccess))
+    throw DeviceError("device " + std::to_string(device_) +
+                      " is out of memory: " + std::to_string(bytes >> 20) + " MiB asked for, " +
+                      std::to_string(free >> 20) + " of " + std::to_string(total >> 20) +
+                      " MiB free; the context stays usable");
   throw_device_error(error, "cudaMallocFromPoolAsync");
 }
 
@@ -122,7 +130,8 @@ PinnedArena::~PinnedArena() {
 void* PinnedArena::take(std::size_t bytes) {
   bytes = (bytes + 255) / 256 * 256;
   if (!chunks_ || chunks_->size - chunks_->used < bytes) {
-    const std::size_t size = std::max<std::size_t>(bytes, std::max<std::size_t>(std::size_t(1) << 20, chunks_ ? 2 * chunks_->size : 0));
+    const std::size_t size = std::max<std::size_t>(
+        bytes, std::max<std::size_t>(std::size_t(1) << 20, chunks_ ? 2 * chunks_->size : 0));
     void* data = nullptr;
     check(cudaHostAlloc(&data, size, cudaHostAllocDefault), "cudaHostAlloc");
     chunks_ = new Chunk{static_cast<char*>(data), size, 0, chunks_};

@@ -10,7 +10,8 @@
 
 namespace gpureg::cuda {
 
-/// Makes a device the calling thread's current one and gives the caller's back at the end of the scope.
+/// Makes a device the calling thread's current one and gives the caller's back at the end of the
+/// scope.
 class DeviceScope {
  public:
   explicit DeviceScope(int device);
@@ -22,8 +23,9 @@ class DeviceScope {
   int previous_ = -1;
 };
 
-/// A stream and a pool of device memory that nobody else uses. The pool gives nothing back to the driver before its end, so a warm
-/// context allocates without asking it. Shared by the context and by every prepared cloud that lives in it.
+/// A stream and a pool of device memory that nobody else uses. The pool gives nothing back to the
+/// driver before its end, so a warm context allocates without asking it. Shared by the context and
+/// by every prepared cloud that lives in it.
 class DeviceMemory {
  public:
   explicit DeviceMemory(int device);
@@ -57,9 +59,13 @@ class DeviceBuffer {
  public:
   DeviceBuffer() = default;
   DeviceBuffer(std::shared_ptr<DeviceMemory> memory, std::size_t size)
-      : memory_(std::move(memory)), size_(size), data_(size == 0 ? nullptr : static_cast<T*>(memory_->allocate(size * sizeof(T)))) {}
+      : memory_(std::move(memory)),
+        size_(size),
+        data_(size == 0 ? nullptr : static_cast<T*>(memory_->allocate(size * sizeof(T)))) {}
   DeviceBuffer(DeviceBuffer&& other) noexcept
-      : memory_(std::move(other.memory_)), size_(std::exchange(other.size_, 0)), data_(std::exchange(other.data_, nullptr)) {}
+      : memory_(std::move(other.memory_)),
+        size_(std::exchange(other.size_, 0)),
+        data_(std::exchange(other.data_, nullptr)) {}
   DeviceBuffer& operator=(DeviceBuffer&& other) noexcept {
     std::swap(memory_, other.memory_);
     std::swap(size_, other.size_);
@@ -98,7 +104,8 @@ class PinnedBuffer {
   char* data_ = nullptr;
 };
 
-/// Page-locked host memory handed out piece by piece for one call and taken back as a whole. Grows to what the largest call needs.
+/// Page-locked host memory handed out piece by piece for one call and taken back as a whole. Grows
+/// to what the largest call needs.
 class PinnedArena {
  public:
   PinnedArena() = default;

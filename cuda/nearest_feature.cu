@@ -19,13 +19,16 @@ __device__ unsigned long long packed(float distance, std::uint32_t index) {
   return static_cast<unsigned long long>(__float_as_uint(distance)) << 32 | index;
 }
 
-/// k = 1. Thread blocks (x: queries, y: part of the rows, z: pair) fold their best into `best` by atomicMin.
-__global__ void __launch_bounds__(kThreads) nearest_one(const FeatureQuery* batch, std::uint32_t rows_per_part, unsigned long long* best) {
+/// k = 1. Thread blocks (x: queries, y: part of the rows, z: pair) fold their best into `best` by
+/// atomicMin.
+__global__ void __launch_bounds__(kThreads)
+    nearest_one(const FeatureQuery* batch, std::uint32_t rows_per_part, unsigned long long* best) {
   __shared__ float q_tile[kDims][kQueries + 4];
   __shared__ float r_tile[kDims][kRows + 4];
   const FeatureQuery f = batch[blockIdx.z];
   const std::uint32_t q_begin = blockIdx.x * kQueries;
-  const std::uint32_t r_first = blockIdx.y * rows_per_part, r_last = min(f.row_count, r_first + rows_per_part);
+  const std::uint32_t r_first = blockIdx.y * rows_per_part,
+                      r_last = min(f.row_count, r_first + rows_per_part);
   if (q_begin >= f.query_count || r_first >= f.row_count) return;
   const int tq = static_cast<int>(threadIdx.x) / 16, tr = static_cast<int>(threadIdx.x) % 16;
   unsigned long long mine[kPerThreadQ];
@@ -42,12 +45,17 @@ __global__ void __launch_bounds__(kThreads) nearest_one(const FeatureQuery* batc
       for (int k = static_cast<int>(threadIdx.x); k < kQueries * kDims; k += kThreads) {
         const int row = k / kDims, d = k % kDims;
         const std::uint32_t q = q_begin + static_cast<std::uint32_t>(row);
-        if (d < dims) q_tile[d][row] = q < f.query_count ? f.queries[static_cast<std::size_t>(q) * f.dimension + d0 + d] : 0.0f;
+        if (d < dims)
+          q_tile[d][row] = q < f.query_count
+                               ? f.queries[static_cast<std::size_t>(q) * f.dimension + d0 + d]
+                               : 0.0f;
       }
       for (int k = static_cast<int>(threadIdx.x); k < kRows * kDims; k += kThreads) {
         const int row = k / kDims, d = k % kDims;
         const std::uint32_t r = r_begin + static_cast<std::uint32_t>(row);
-        if (d < dims) r_tile[d][row] = r < r_last ? f.rows[static_cast<std::size_t>(r) * f.dimension + d0 + d] : 0.0f;
+        if (d < dims)
+          r_tile[d][row] =
+              r < r_last ? f.rows[static_cast<std::size_t>(r) * f.dimension + d0 + d] : 0.0f;
       }
       __syncthreads();
       for (int d = 0; d < dims; ++d) {
@@ -75,20 +83,25 @@ __global__ void __launch_bounds__(kThreads) nearest_one(const FeatureQuery* batc
     }
   }
   for (int a = 0; a < kPerThreadQ; ++a) {
-    for (int step = 8; step > 0; step /= 2) mine[a] = min(mine[a], __shfl_xor_sync(~0u, mine[a], step));
+    for (int step = 8; step > 0; step /= 2)
+      mine[a] = min(mine[a], __shfl_xor_sync(~0u, mine[a], step));
     const std::uint32_t q = q_begin + static_cast<std::uint32_t>(tq * kPerThreadQ + a);
     if (tr == 0 && q < f.query_count && mine[a] != kNone) atomicMin(best + f.out + q, mine[a]);
   }
 }
 
-__global__ void unpack_nearest(const FeatureQuery* batch, const unsigned long long* best, std::uint32_t* out) {
+__global__ void unpack_nearest(const FeatureQuery* batch, const unsigned long long* best,
+                               std::uint32_t* out) {
   const FeatureQuery f = batch[blockIdx.y];
   const std::uint32_t q = blockIdx.x * blockDim.x + threadIdx.x;
-  if (q < f.query_count) out[f.out + q] = f.query_valid[q] ? static_cast<std::uint32_t>(best[f.out + q]) : kNoValue;
+  if (q < f.query_count)
+    out[f.out + q] = f.query_valid[q] ? static_cast<std::uint32_t>(best[f.out + q]) : kNoValue;
 }
 
-/// Any k up to 16: a warp per query, every lane keeps the best of the rows it sees, then the lanes' lists are merged.
-__global__ void __launch_bounds__(128) nearest_many(const FeatureQuery* batch, std::uint32_t k, std::uint32_t* out) {
+/// Any k up to 16: a warp per query, every lane keeps the best of the rows it sees, then the lanes'
+/// lists are merged.
+__global__ void __launch_bounds__(128)
+    nearest_many(const FeatureQuery* batch, std::uint32_t k, std::uint32_t* out) {
   const FeatureQuery f = batch[blockIdx.y];
   const std::uint32_t q = blockIdx.x * 4 + threadIdx.x / 32, lane = threadIdx.x % 32;
   if (q >= f.query_count) return;
@@ -123,43 +136,58 @@ __global__ void __launch_bounds__(128) nearest_many(const FeatureQuery* batch, s
     unsigned long long least = head;
     for (int step = 16; step > 0; step /= 2) least = min(least, __shfl_xor_sync(~0u, least, step));
     if (head == least && head != kNone) ++taken;
-    if (lane == 0) out[f.out + static_cast<std::size_t>(q) * k + t] = f.query_valid[q] ? static_cast<std::uint32_t>(least) : kNoValue;
+    if (lane == 0)
+      out[f.out + static_cast<std::size_t>(q) * k + t] =
+          f.query_valid[q] ? static_cast<std::uint32_t>(least) : kNoValue;
   }
 }
 
 }  // namespace
 
-std::uint32_t rows_of_part(const Exec& exec, std::size_t query_blocks, std::uint32_t most_rows, std::uint32_t tile) {
-  const std::size_t tiles = blocks_for(most_rows, tile), wanted = static_cast<std::size_t>(exec.multiprocessors()) * 4;
+std::uint32_t rows_of_part(const Exec& exec, std::size_t query_blocks, std::uint32_t most_rows,
+                           std::uint32_t tile) {
+  const std::size_t tiles = blocks_for(most_rows, tile),
+                    wanted = static_cast<std::size_t>(exec.multiprocessors()) * 4;
   const std::size_t parts = std::max<std::size_t>(1, std::min(tiles, wanted / query_blocks));
   return blocks_for(tiles, static_cast<unsigned>(parts)) * tile;
 }
 
-DeviceBuffer<std::uint32_t> nearest_features(Exec& exec, const std::vector<FeatureQuery>& queries, std::uint32_t k, std::size_t answers) {
+DeviceBuffer<std::uint32_t> nearest_features(Exec& exec, const std::vector<FeatureQuery>& queries,
+                                             std::uint32_t k, std::size_t answers) {
   auto out = exec.buffer<std::uint32_t>(answers);
   if (answers == 0) return out;
   const auto batch = exec.upload(queries);
   std::uint32_t most_queries = 0, most_rows = 0;
-  for (const FeatureQuery& f : queries) most_queries = std::max(most_queries, f.query_count), most_rows = std::max(most_rows, f.row_count);
+  for (const FeatureQuery& f : queries) {
+    most_queries = std::max(most_queries, f.query_count);
+    most_rows = std::max(most_rows, f.row_count);
+  }
   const unsigned entries = static_cast<unsigned>(queries.size());
   if (k > 1) {
-    nearest_many<<<dim3(blocks_for(most_queries, 4), entries), 128, 0, exec.stream()>>>(batch.data(), k, out.data());
+    nearest_many<<<dim3(blocks_for(most_queries, 4), entries), 128, 0, exec.stream()>>>(
+        batch.data(), k, out.data());
     check_launch("nearest_many");
     return out;
   }
   // All bits set is greater than every answer, and its index is kNoValue.
   auto best = exec.filled<unsigned long long>(answers, 0xff);
   bool filterable = exec.compute_capability() >= 80;
-  for (const FeatureQuery& f : queries) filterable = filterable && f.query_half && f.row_half && f.dimension == queries[0].dimension && f.copy == queries[0].copy;
+  for (const FeatureQuery& f : queries)
+    filterable = filterable && f.query_half && f.row_half && f.dimension == queries[0].dimension &&
+                 f.copy == queries[0].copy;
   if (filterable) {
-    filter_nearest(exec, batch.data(), entries, most_queries, most_rows, queries[0].dimension, queries[0].copy, answers, best.data());
+    filter_nearest(exec, batch.data(), entries, most_queries, most_rows, queries[0].dimension,
+                   queries[0].copy, answers, best.data());
   } else {
-    const std::uint32_t rows_per_part = rows_of_part(exec, blocks_for(most_queries, kQueries) * std::size_t(entries), most_rows, kRows);
-    nearest_one<<<dim3(blocks_for(most_queries, kQueries), blocks_for(most_rows, rows_per_part), entries), kThreads, 0, exec.stream()>>>(
-        batch.data(), rows_per_part, best.data());
+    const std::uint32_t rows_per_part = rows_of_part(
+        exec, blocks_for(most_queries, kQueries) * std::size_t(entries), most_rows, kRows);
+    nearest_one<<<dim3(blocks_for(most_queries, kQueries), blocks_for(most_rows, rows_per_part),
+                       entries),
+                  kThreads, 0, exec.stream()>>>(batch.data(), rows_per_part, best.data());
     check_launch("nearest_one");
   }
-  unpack_nearest<<<dim3(blocks_for(most_queries, 256), entries), 256, 0, exec.stream()>>>(batch.data(), best.data(), out.data());
+  unpack_nearest<<<dim3(blocks_for(most_queries, 256), entries), 256, 0, exec.stream()>>>(
+      batch.data(), best.data(), out.data());
   check_launch("unpack_nearest");
   return out;
 }

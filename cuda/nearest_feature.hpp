@@ -18,7 +18,7 @@ struct FeatureQuery {
   const std::uint8_t* row_valid;
   std::uint32_t row_count;
   std::uint32_t dimension;
-  std::uint32_t out;  ///< where its answers begin
+  std::uint32_t out;                           ///< where its answers begin
   const std::uint16_t *query_half, *row_half;  ///< see FeatureAids; null: not made
   HalfCopy copy;                               ///< of both
   const float *query_padded, *row_padded;
@@ -27,30 +27,42 @@ struct FeatureQuery {
   const float *query_scale, *row_scale;
 };
 
-/// Nearest rows of every query: k indices per query in order of distance (squared norm of the difference as a chain of fmaf over the
-/// dimensions, then the lower index), kNoValue where fewer exist. Exactly what cpu::nearest_features finds.
-DeviceBuffer<std::uint32_t> nearest_features(Exec& exec, const std::vector<FeatureQuery>& queries, std::uint32_t k, std::size_t answers);
+/// Nearest rows of every query: k indices per query in order of distance (squared norm of the
+/// difference as a chain of fmaf over the dimensions, then the lower index), kNoValue where fewer
+/// exist. Exactly what cpu::nearest_features finds.
+DeviceBuffer<std::uint32_t> nearest_features(Exec& exec, const std::vector<FeatureQuery>& queries,
+                                             std::uint32_t k, std::size_t answers);
 
-/// Rows are cut into parts only where the queries alone do not fill the device: rows per part, a multiple of the tile.
-std::uint32_t rows_of_part(const Exec& exec, std::size_t query_blocks, std::uint32_t most_rows, std::uint32_t tile);
+/// Rows are cut into parts only where the queries alone do not fill the device: rows per part, a
+/// multiple of the tile.
+std::uint32_t rows_of_part(const Exec& exec, std::size_t query_blocks, std::uint32_t most_rows,
+                           std::uint32_t tile);
 
-/// Most features of rooms are near that of a plane. Distances do not change when it is taken off both features, but the lengths that the
-/// rounding of their product grows with do.
-GPUREG_HD float center_of_fpfh(std::uint32_t d) { return d < kFpfhSize && d % kFpfhBins == kFpfhBins / 2 ? 100.0f : 0.0f; }
+/// Most features of rooms are near that of a plane. Distances do not change when it is taken off
+/// both features, but the lengths that the rounding of their product grows with do.
+GPUREG_HD float center_of_fpfh(std::uint32_t d) {
+  return d < kFpfhSize && d % kFpfhBins == kFpfhBins / 2 ? 100.0f : 0.0f;
+}
 
-/// An orthonormal basis (Helmert's) for FPFH less its centre, of which only 30 dimensions are not zero, as each of the three histograms adds
-/// up to 100. What rooms' features differ in most is how much is left in the middle of all three: that is one dimension, which the copies
-/// for the tensor cores hold to 22 bits, in the room of the dimensions that need none. value(d): component d; put(k, v) for k = 0..28;
-/// put_axis(v): that one; leave_out(v): nearly zero. Roundings: below 1e-6 of the length.
+/// An orthonormal basis (Helmert's) for FPFH less its centre, of which only 30 dimensions are not
+/// zero, as each of the three histograms adds up to 100. What rooms' features differ in most is how
+/// much is left in the middle of all three: that is one dimension, which the copies for the tensor
+/// cores hold to 22 bits, in the room of the dimensions that need none. value(d): component d;
+/// put(k, v) for k = 0..28; put_axis(v): that one; leave_out(v): nearly zero. Roundings: below 1e-6
+/// of the length.
 template <typename Value, typename Put, typename PutAxis, typename LeaveOut>
-GPUREG_HD void turn_fpfh(const Value& value, const Put& put, const PutAxis& put_axis, const LeaveOut& leave_out) {
+GPUREG_HD void turn_fpfh(const Value& value, const Put& put, const PutAxis& put_axis,
+                         const LeaveOut& leave_out) {
   constexpr int kMiddle = kFpfhBins / 2, kLast = kFpfhBins - 1;
   float middle[3];
   for (int part = 0; part < 3; ++part) {
     float sum = value(part * kFpfhBins);
     for (int k = 1; k <= kLast; ++k) {
       // The middle comes last.
-      const float v = value(part * kFpfhBins + (k == kLast ? kMiddle : k < kMiddle ? k : k + 1)), n = static_cast<float>(k);
+      const float v = value(part * kFpfhBins + (k == kLast    ? kMiddle
+                                                : k < kMiddle ? k
+                                                              : k + 1)),
+                  n = static_cast<float>(k);
       const float turned = (sum - n * v) / sqrtf(n * (n + 1.0f));
       if (k < kLast)
         put(part * (kLast - 1) + k - 1, turned);
@@ -65,33 +77,40 @@ GPUREG_HD void turn_fpfh(const Value& value, const Put& put, const PutAxis& put_
   put_axis((middle[0] + middle[1] + middle[2]) / sqrtf(3.0f));
 }
 
-/// Let v be a feature, v' what binary16 makes of it, square = |v|^2, rest = what of it is not held to 22 bits, and lost = |v - v'|^2. Then for
-/// every two features
+/// Let v be a feature, v' what binary16 makes of it, square = |v|^2, rest = what of it is not held
+/// to 22 bits, and lost = |v - v'|^2. Then for every two features
 ///   | |a - b|^2 - (|a|^2 + |b|^2 - 2 a'.b') |  <=  product_error(a) + product_error(b),
-/// since 2 (a.b - a'.b') = 2 a.(b - b') + 2 (a - a').b - 2 (a - a').(b - b'), and 2 x.y <= s |x|^2 + |y|^2 / s for every s > 0; this s makes
-/// it least for what rounding to 11 bits loses on average. The last term is for the roundings of float32: of the squares, of the turned
-/// copies, of the products' sums, of what 22 bits lose, and of the distance itself.
+/// since 2 (a.b - a'.b') = 2 a.(b - b') + 2 (a - a').b - 2 (a - a').(b - b'), and 2 x.y <= s |x|^2
+/// + |y|^2 / s for every s > 0; this s makes it least for what rounding to 11 bits loses on
+/// average. The last term is for the roundings of float32: of the squares, of the turned copies, of
+/// the products' sums, of what 22 bits lose, and of the distance itself.
 GPUREG_HD float product_error(float square, float rest, float lost) {
   constexpr float kSpread = 2e-4f, kRounding = 2.5e-5f;
   return kSpread * rest + kRounding * square + (1.0f / kSpread + 2.0f) * lost;
 }
 
-/// Where a turned copy holds the first eleven bits of its axis; next come the bits after those, and the first ones again. A query has them in
-/// the order first, first, next, so that the product of the three is that of 22 bits but for 2^-22 of it.
+/// Where a turned copy holds the first eleven bits of its axis; next come the bits after those, and
+/// the first ones again. A query has them in the order first, first, next, so that the product of
+/// the three is that of 22 bits but for 2^-22 of it.
 constexpr std::uint32_t kAxisPlace = 29, kTurnedWidth = 32;
 
-/// Features for the tensor cores: rows padded with zeros to this width, zero where not valid. 0: too many dimensions.
+/// Features for the tensor cores: rows padded with zeros to this width, zero where not valid. 0:
+/// too many dimensions.
 inline std::uint32_t half_width(std::uint32_t dimension, HalfCopy copy) {
   return copy == HalfCopy::turned ? kTurnedWidth : dimension <= 64 ? (dimension + 15) / 16 * 16 : 0;
 }
 /// The same for those that distances are measured of.
 inline std::uint32_t padded_width(std::uint32_t dimension) {
-  return dimension > 64 ? 0 : dimension > 32 && dimension <= 36 ? 36 : half_width(dimension, HalfCopy::plain);
+  return dimension > 64                      ? 0
+         : dimension > 32 && dimension <= 36 ? 36
+                                             : half_width(dimension, HalfCopy::plain);
 }
 
-/// For k = 1: the tensor cores tell which rows can be the nearest, and only those are measured exactly. Folds (distance, index) into `best`
-/// by atomicMin, as the plain search does. batch is on the device; all entries have these dimensions and copies. Needs compute capability 8.0.
-void filter_nearest(Exec& exec, const FeatureQuery* batch, unsigned entries, std::uint32_t most_queries, std::uint32_t most_rows,
-                    std::uint32_t dimensions, HalfCopy copy, std::size_t answers, unsigned long long* best);
+/// For k = 1: the tensor cores tell which rows can be the nearest, and only those are measured
+/// exactly. Folds (distance, index) into `best` by atomicMin, as the plain search does. batch is on
+/// the device; all entries have these dimensions and copies. Needs compute capability 8.0.
+void filter_nearest(Exec& exec, const FeatureQuery* batch, unsigned entries,
+                    std::uint32_t most_queries, std::uint32_t most_rows, std::uint32_t dimensions,
+                    HalfCopy copy, std::size_t answers, unsigned long long* best);
 
 }  // namespace gpureg::cuda

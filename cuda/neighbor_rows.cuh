@@ -5,8 +5,9 @@
 
 namespace gpureg::cuda {
 
-/// The neighbourhood of one point as a warp walks it: cells that follow each other along x follow each other in the sorted points too,
-/// so a neighbourhood is one run of points per (z, y). The order over all runs is that of for_each_neighbor.
+/// The neighbourhood of one point as a warp walks it: cells that follow each other along x follow
+/// each other in the sorted points too, so a neighbourhood is one run of points per (z, y). The
+/// order over all runs is that of for_each_neighbor.
 struct NeighborRows {
   Cell lo, hi;
   int rows, width;
@@ -19,7 +20,8 @@ struct NeighborRows {
     rows = width * (hi.z - lo.z + 1);
   }
   /// Points [begin, end) of one row, empty where it has none.
-  __device__ void run(const GridView& grid, int row, std::uint32_t& begin, std::uint32_t& end) const {
+  __device__ void run(const GridView& grid, int row, std::uint32_t& begin,
+                      std::uint32_t& end) const {
     begin = end = 0;
     if (row >= rows) return;
     const std::int32_t z = lo.z + row / width, y = lo.y + row % width;
@@ -32,8 +34,8 @@ struct NeighborRows {
   }
 };
 
-/// Calls visit(k, d2, inside) for all lanes of a warp at once, 32 points of a run at a time: k is the sorted position (beyond the run
-/// for idle lanes), inside tells whether it is a neighbour.
+/// Calls visit(k, d2, inside) for all lanes of a warp at once, 32 points of a run at a time: k is
+/// the sorted position (beyond the run for idle lanes), inside tells whether it is a neighbour.
 template <typename Visit>
 __device__ void for_each_neighbor_warp(const GridView& grid, Vec3 q, float radius, Visit&& visit) {
   const int lane = static_cast<int>(threadIdx.x % 32);
@@ -45,7 +47,8 @@ __device__ void for_each_neighbor_warp(const GridView& grid, Vec3 q, float radiu
     unsigned filled = __ballot_sync(~0u, my_begin != my_end);
     for (; filled != 0; filled &= filled - 1) {
       const int row = __ffs(static_cast<int>(filled)) - 1;
-      const std::uint32_t begin = __shfl_sync(~0u, my_begin, row), end = __shfl_sync(~0u, my_end, row);
+      const std::uint32_t begin = __shfl_sync(~0u, my_begin, row),
+                          end = __shfl_sync(~0u, my_end, row);
       for (std::uint32_t base = begin; base < end; base += 32) {
         const std::uint32_t k = base + static_cast<std::uint32_t>(lane);
         const float d2 = k < end ? squared_norm(grid.points[k] - q) : 3.402823466e38f;

@@ -8,19 +8,24 @@ namespace gpureg::cuda {
 namespace {
 
 constexpr int kThreads = 128;
-constexpr int kColumns = 2;                     // a thread's matches
-constexpr std::uint32_t kSeeds = 64;            // a thread block's
+constexpr int kColumns = 2;           // a thread's matches
+constexpr std::uint32_t kSeeds = 64;  // a thread block's
 
-/// Thread blocks (x: matches, y: seeds, z: pair): each warp keeps its matches in registers and goes through the seeds.
-__global__ void __launch_bounds__(kThreads) find_compatible(MatchSetView matches, const std::uint32_t* room, const std::uint32_t* match_count,
-                                                            const std::uint32_t* seed, const std::uint32_t* seed_count, std::uint32_t most_seeds,
-                                                            CompatibilityTest test, std::uint32_t words, std::uint32_t* bits) {
+/// Thread blocks (x: matches, y: seeds, z: pair): each warp keeps its matches in registers and goes
+/// through the seeds.
+__global__ void __launch_bounds__(kThreads)
+    find_compatible(MatchSetView matches, const std::uint32_t* room,
+                    const std::uint32_t* match_count, const std::uint32_t* seed,
+                    const std::uint32_t* seed_count, std::uint32_t most_seeds,
+                    CompatibilityTest test, std::uint32_t words, std::uint32_t* bits) {
   __shared__ PackedMatch tile[kSeeds];
-  const std::uint32_t p = blockIdx.z, n = match_count[p], begin = room[p], first_seed = blockIdx.y * kSeeds;
+  const std::uint32_t p = blockIdx.z, n = match_count[p], begin = room[p],
+                      first_seed = blockIdx.y * kSeeds;
   const std::uint32_t first = blockIdx.x * kThreads * kColumns;
   if (first_seed >= seed_count[p] || first >= n) return;
   const std::uint32_t size = min(kSeeds, seed_count[p] - first_seed), lane = threadIdx.x % 32;
-  for (std::uint32_t k = threadIdx.x; k < size; k += kThreads) tile[k] = packed(match_at(matches, begin + seed[p * most_seeds + first_seed + k]));
+  for (std::uint32_t k = threadIdx.x; k < size; k += kThreads)
+    tile[k] = packed(match_at(matches, begin + seed[p * most_seeds + first_seed + k]));
   OrientedMatch own[kColumns];
   std::uint32_t at[kColumns];
 #pragma unroll
@@ -42,16 +47,20 @@ __global__ void __launch_bounds__(kThreads) find_compatible(MatchSetView matches
 
 }  // namespace
 
-Neighborhoods find_neighborhoods(Exec& exec, const MatchSets& matches, const Seeds& seeds, const CompatibilityOptions& options) {
+Neighborhoods find_neighborhoods(Exec& exec, const MatchSets& matches, const Seeds& seeds,
+                                 const CompatibilityOptions& options) {
   const std::size_t pairs = matches.room.entries();
   const std::uint32_t largest = matches.room.largest;
   Neighborhoods out;
   out.words = (largest + 31) / 32;
   out.bits = exec.buffer<std::uint32_t>(pairs * seeds.most * out.words);
   if (largest == 0) return out;
-  find_compatible<<<dim3(blocks_for(largest, kThreads * kColumns), blocks_for(std::min(seeds.most, largest), kSeeds), static_cast<unsigned>(pairs)), kThreads, 0,
-                    exec.stream()>>>(matches.view(), matches.room.on_device.data(), matches.count.data(), seeds.match.data(), seeds.count.data(), seeds.most,
-                                     test_of(options), out.words, out.bits.data());
+  find_compatible<<<dim3(blocks_for(largest, kThreads * kColumns),
+                         blocks_for(std::min(seeds.most, largest), kSeeds),
+                         static_cast<unsigned>(pairs)),
+                    kThreads, 0, exec.stream()>>>(
+      matches.view(), matches.room.on_device.data(), matches.count.data(), seeds.match.data(),
+      seeds.count.data(), seeds.most, test_of(options), out.words, out.bits.data());
   check_launch("find_compatible");
   return out;
 }

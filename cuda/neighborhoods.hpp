@@ -8,10 +8,11 @@ namespace gpureg::cuda {
 
 /// Which matches the seeds of a batch are compatible with, a bit each.
 struct Neighborhoods {
-  std::uint32_t words = 0;             ///< per seed
-  DeviceBuffer<std::uint32_t> bits;    ///< pairs x seeds x words
+  std::uint32_t words = 0;           ///< per seed
+  DeviceBuffer<std::uint32_t> bits;  ///< pairs x seeds x words
 };
 
-Neighborhoods find_neighborhoods(Exec& exec, const MatchSets& matches, const Seeds& seeds, const CompatibilityOptions& options);
+Neighborhoods find_neighborhoods(Exec& exec, const MatchSets& matches, const Seeds& seeds,
+                                 const CompatibilityOptions& options);
 
 }  // namespace gpureg::cuda

@@ -33,14 +33,17 @@ struct ProposeBatch {
   std::uint32_t max_members, triangles, refits;
   float squared_distance, squared_shortest;
   std::uint64_t random;
-  Pose<float>* pose;       // pairs x most_seeds
+  Pose<float>* pose;  // pairs x most_seeds
   std::uint8_t* valid;
 };
 
-/// Numbers of the seed and of the first of its compatible matches, in their order. Returns how many.
-__device__ std::uint32_t gather_members(const ProposeBatch& b, std::uint32_t p, std::uint32_t s, std::uint32_t seed, Member* members) {
+/// Numbers of the seed and of the first of its compatible matches, in their order. Returns how
+/// many.
+__device__ std::uint32_t gather_members(const ProposeBatch& b, std::uint32_t p, std::uint32_t s,
+                                        std::uint32_t seed, Member* members) {
   __shared__ std::uint32_t warp_count[kWarps];
-  const std::uint32_t lane = threadIdx.x % 32, warp = threadIdx.x / 32, words = (b.match_count[p] + 31) / 32;
+  const std::uint32_t lane = threadIdx.x % 32, warp = threadIdx.x / 32,
+                      words = (b.match_count[p] + 31) / 32;
   const std::uint32_t* bits = b.bits + (static_cast<std::size_t>(p) * b.most_seeds + s) * b.words;
   std::uint32_t size = 1;
   if (threadIdx.x == 0) members[0].b.w = __uint_as_float(seed);
@@ -62,7 +65,8 @@ __device__ std::uint32_t gather_members(const ProposeBatch& b, std::uint32_t p, 
       size += warp_count[o];
     }
     for (; word != 0 && before < b.max_members; word &= word - 1, ++before)
-      members[before].b.w = __uint_as_float(w * 32 + static_cast<std::uint32_t>(__ffs(static_cast<int>(word))) - 1);
+      members[before].b.w =
+          __uint_as_float(w * 32 + static_cast<std::uint32_t>(__ffs(static_cast<int>(word))) - 1);
     __syncthreads();
   }
   size = min(size, b.max_members);
@@ -70,28 +74,38 @@ __device__ std::uint32_t gather_members(const ProposeBatch& b, std::uint32_t p, 
   for (std::uint32_t k = threadIdx.x; k < size; k += kThreads) {
     const std::uint32_t match = members[k].match(), at = b.room[p] + match;
     const MatchSetView& m = b.matches;
-    members[k] = {make_float4(m.px[at], m.py[at], m.pz[at], m.qx[at]),
-                  make_float4(m.qy[at], m.qz[at], __uint_as_float(m.source_weight[at] + m.target_weight[at]), __uint_as_float(match))};
+    members[k] = {
+        make_float4(m.px[at], m.py[at], m.pz[at], m.qx[at]),
+        make_float4(m.qy[at], m.qz[at], __uint_as_float(m.source_weight[at] + m.target_weight[at]),
+                    __uint_as_float(match))};
   }
   __syncthreads();
   return size;
 }
 
-__device__ TrianglePick triangle(const ProposeBatch& b, std::uint32_t seed_at, std::uint32_t trial, std::uint32_t size) {
+__device__ TrianglePick triangle(const ProposeBatch& b, std::uint32_t seed_at, std::uint32_t trial,
+                                 std::uint32_t size) {
   return pick_triangle(b.matches.source[seed_at], b.matches.target[seed_at], trial, b.random, size);
 }
 
 /// The motion of a triangle; false where it is none.
-__device__ bool try_triangle(const ProposeBatch& b, std::uint32_t begin, std::uint32_t seed, std::uint32_t trial, const Member* members,
-                             std::uint32_t size, Rigid& rigid) {
+__device__ bool try_triangle(const ProposeBatch& b, std::uint32_t begin, std::uint32_t seed,
+                             std::uint32_t trial, const Member* members, std::uint32_t size,
+                             Rigid& rigid) {
   const TrianglePick pick = triangle(b, begin + seed, trial, size);
   const Member m0 = members[0], m1 = members[pick.a], m2 = members[pick.b];
-  if (!compatible(match_at(b.matches, begin + m1.match()), match_at(b.matches, begin + m2.match()), b.test)) return false;
-  return wide_triangle(m0.p(), m1.p(), m2.p(), b.squared_shortest) && carry_triangle(m0.p(), m1.p(), m2.p(), m0.q(), m1.q(), m2.q(), rigid);
+  if (!compatible(match_at(b.matches, begin + m1.match()), match_at(b.matches, begin + m2.match()),
+                  b.test))
+    return false;
+  return wide_triangle(m0.p(), m1.p(), m2.p(), b.squared_shortest) &&
+         carry_triangle(m0.p(), m1.p(), m2.p(), m0.q(), m1.q(), m2.q(), rigid);
 }
 
-/// Number of the trial that most of the neighbourhood agrees with, the first of equals; all threads get it. kNoValue: none.
-__device__ std::uint32_t best_triangle(const ProposeBatch& b, std::uint32_t begin, std::uint32_t seed, const Member* members, std::uint32_t size) {
+/// Number of the trial that most of the neighbourhood agrees with, the first of equals; all threads
+/// get it. kNoValue: none.
+__device__ std::uint32_t best_triangle(const ProposeBatch& b, std::uint32_t begin,
+                                       std::uint32_t seed, const Member* members,
+                                       std::uint32_t size) {
   __shared__ Rigid motion[kThreads];
   __shared__ std::uint32_t number[kThreads], support[kThreads], warp_count[kWarps];
   __shared__ unsigned long long best;
@@ -100,17 +114,23 @@ __device__ std::uint32_t best_triangle(const ProposeBatch& b, std::uint32_t begi
   for (std::uint32_t base = 0; base < b.triangles; base += kThreads) {
     const std::uint32_t trial = base + threadIdx.x;
     Rigid rigid;
-    const bool valid = trial < b.triangles && try_triangle(b, begin, seed, trial, members, size, rigid);
+    const bool valid =
+        trial < b.triangles && try_triangle(b, begin, seed, trial, members, size, rigid);
     const unsigned mask = __ballot_sync(~0u, valid);
     if (lane == 0) warp_count[warp] = static_cast<std::uint32_t>(__popc(static_cast<int>(mask)));
     support[threadIdx.x] = 0;
     __syncthreads();
-    std::uint32_t slot = static_cast<std::uint32_t>(__popc(static_cast<int>(mask & ((1u << lane) - 1)))), count = 0;
+    std::uint32_t slot = static_cast<std::uint32_t>(
+                      __popc(static_cast<int>(mask & ((1u << lane) - 1)))),
+                  count = 0;
     for (std::uint32_t o = 0; o < kWarps; ++o) {
       if (o < warp) slot += warp_count[o];
       count += warp_count[o];
     }
-    if (valid) motion[slot] = rigid, number[slot] = trial;
+    if (valid) {
+      motion[slot] = rigid;
+      number[slot] = trial;
+    }
     __syncthreads();
     // Warps that have no triangle of their own share the members with others.
     const std::uint32_t rows = (count + 31) / 32, parts = rows == 1 ? 4 : rows == 2 ? 2 : 1;
@@ -126,23 +146,29 @@ __device__ std::uint32_t best_triangle(const ProposeBatch& b, std::uint32_t begi
     }
     __syncthreads();
     if (threadIdx.x < count && support[threadIdx.x] > 0)
-      atomicMax(&best, static_cast<unsigned long long>(support[threadIdx.x]) << 32 | ~number[threadIdx.x]);
+      atomicMax(&best,
+                static_cast<unsigned long long>(support[threadIdx.x]) << 32 | ~number[threadIdx.x]);
     __syncthreads();
   }
   return best == 0 ? kNoValue : ~static_cast<std::uint32_t>(best);
 }
 
-/// Least squares over the members that the pose brings together, by one warp: the lanes share the sums, each goes through the members in
-/// their order. All lanes have the pose. list: room for all members.
-__device__ bool refit(const Member* members, std::uint32_t size, float squared_distance, std::uint16_t* list, Pose<float>& pose) {
+/// Least squares over the members that the pose brings together, by one warp: the lanes share the
+/// sums, each goes through the members in their order. All lanes have the pose. list: room for all
+/// members.
+__device__ bool refit(const Member* members, std::uint32_t size, float squared_distance,
+                      std::uint16_t* list, Pose<float>& pose) {
   const std::uint32_t lane = threadIdx.x % 32;
   const Rigid rigid = to_rigid(pose);
   std::uint32_t n = 0;
   for (std::uint32_t base = 0; base < size; base += 32) {
     const std::uint32_t k = base + lane;
-    const bool take = k < size && squared_norm(apply(rigid, members[k].p()) - members[k].q()) < squared_distance;
+    const bool take =
+        k < size && squared_norm(apply(rigid, members[k].p()) - members[k].q()) < squared_distance;
     const unsigned mask = __ballot_sync(~0u, take);
-    if (take) list[n + static_cast<std::uint32_t>(__popc(static_cast<int>(mask & ((1u << lane) - 1))))] = static_cast<std::uint16_t>(k);
+    if (take)
+      list[n + static_cast<std::uint32_t>(__popc(static_cast<int>(mask & ((1u << lane) - 1))))] =
+          static_cast<std::uint16_t>(k);
     n += static_cast<std::uint32_t>(__popc(static_cast<int>(mask)));
   }
   __syncwarp();
@@ -161,7 +187,8 @@ __device__ bool refit(const Member* members, std::uint32_t size, float squared_d
   const float *row = value + i, *other = value + 3 + j;
   sum = 0.0f;
 #pragma unroll 8
-  for (std::uint32_t k = 0; k < n; ++k) sum = fmaf(row[list[k] * kStride] - ci, other[list[k] * kStride] - cj, sum);
+  for (std::uint32_t k = 0; k < n; ++k)
+    sum = fmaf(row[list[k] * kStride] - ci, other[list[k] * kStride] - cj, sum);
   float s[3][3];
 #pragma unroll
   for (int k = 0; k < 9; ++k) s[k / 3][k % 3] = __shfl_sync(~0u, sum, k);
@@ -194,9 +221,12 @@ __global__ void __launch_bounds__(kThreads) fit_seeds(ProposeBatch b) {
 }
 
 /// A thread block per pair brings the poses together, in the order of their seeds.
-__global__ void __launch_bounds__(kThreads) keep_valid(ProposeBatch b, Pose<float>* pose, std::uint32_t* seed, MatchEvidence* matches, std::uint32_t* count) {
+__global__ void __launch_bounds__(kThreads)
+    keep_valid(ProposeBatch b, Pose<float>* pose, std::uint32_t* seed, MatchEvidence* matches,
+               std::uint32_t* count) {
   __shared__ std::uint32_t warp_count[kWarps];
-  const std::uint32_t p = blockIdx.x, seeds = b.seed_count[p], begin = p * b.most_seeds, lane = threadIdx.x % 32, warp = threadIdx.x / 32;
+  const std::uint32_t p = blockIdx.x, seeds = b.seed_count[p], begin = p * b.most_seeds,
+                      lane = threadIdx.x % 32, warp = threadIdx.x / 32;
   std::uint32_t written = 0;
   for (std::uint32_t base = 0; base < seeds; base += kThreads) {
     const std::uint32_t s = base + threadIdx.x;
@@ -204,23 +234,31 @@ __global__ void __launch_bounds__(kThreads) keep_valid(ProposeBatch b, Pose<floa
     const unsigned mask = __ballot_sync(~0u, keep);
     if (lane == 0) warp_count[warp] = static_cast<std::uint32_t>(__popc(static_cast<int>(mask)));
     __syncthreads();
-    std::uint32_t to = begin + written + static_cast<std::uint32_t>(__popc(static_cast<int>(mask & ((1u << lane) - 1))));
+    std::uint32_t to =
+        begin + written +
+        static_cast<std::uint32_t>(__popc(static_cast<int>(mask & ((1u << lane) - 1))));
     for (std::uint32_t o = 0; o < kWarps; ++o) {
       if (o < warp) to += warp_count[o];
       written += warp_count[o];
     }
-    if (keep) pose[to] = b.pose[begin + s], seed[to] = b.seed[begin + s], matches[to] = {0, 0, 0};
+    if (keep) {
+      pose[to] = b.pose[begin + s];
+      seed[to] = b.seed[begin + s];
+      matches[to] = {0, 0, 0};
+    }
     __syncthreads();
   }
   if (threadIdx.x == 0) count[p] = written;
 }
 
 /// Thread blocks (x: candidates, y: pair, z: part of the matches); a thread per candidate.
-__global__ void __launch_bounds__(kThreads) count_matches(MatchSetView m, const std::uint32_t* room, const std::uint32_t* match_count, std::uint32_t most,
-                                                          const std::uint32_t* candidate_count, float squared_distance, const Pose<float>* pose,
-                                                          MatchEvidence* out) {
+__global__ void __launch_bounds__(kThreads)
+    count_matches(MatchSetView m, const std::uint32_t* room, const std::uint32_t* match_count,
+                  std::uint32_t most, const std::uint32_t* candidate_count, float squared_distance,
+                  const Pose<float>* pose, MatchEvidence* out) {
   __shared__ float4 tile[2 * kTile];
-  const std::uint32_t p = blockIdx.y, first = blockIdx.z * kMatchesPerBlock, last = min(match_count[p], first + kMatchesPerBlock);
+  const std::uint32_t p = blockIdx.y, first = blockIdx.z * kMatchesPerBlock,
+                      last = min(match_count[p], first + kMatchesPerBlock);
   if (first >= last || blockIdx.x * kThreads >= candidate_count[p]) return;
   const std::uint32_t c = blockIdx.x * kThreads + threadIdx.x;
   const Rigid rigid = to_rigid(pose[p * most + min(c, candidate_count[p] - 1)]);
@@ -231,12 +269,14 @@ __global__ void __launch_bounds__(kThreads) count_matches(MatchSetView m, const 
     for (std::uint32_t k = threadIdx.x; k < size; k += kThreads) {
       const std::uint32_t at = room[p] + base + k;
       tile[2 * k] = make_float4(m.px[at], m.py[at], m.pz[at], m.qx[at]);
-      tile[2 * k + 1] = make_float4(m.qy[at], m.qz[at], __uint_as_float(m.source_weight[at]), __uint_as_float(m.target_weight[at]));
+      tile[2 * k + 1] = make_float4(m.qy[at], m.qz[at], __uint_as_float(m.source_weight[at]),
+                                    __uint_as_float(m.target_weight[at]));
     }
     __syncthreads();
     for (std::uint32_t k = 0; k < size; ++k) {
       const float4 a = tile[2 * k], b = tile[2 * k + 1];
-      const bool take = squared_norm(apply(rigid, {a.x, a.y, a.z}) - Vec3{a.w, b.x, b.y}) < squared_distance;
+      const bool take =
+          squared_norm(apply(rigid, {a.x, a.y, a.z}) - Vec3{a.w, b.x, b.y}) < squared_distance;
       inliers += take ? 1u : 0u;
       source += take ? __float_as_uint(b.z) : 0u;
       target += take ? __float_as_uint(b.w) : 0u;
@@ -244,15 +284,17 @@ __global__ void __launch_bounds__(kThreads) count_matches(MatchSetView m, const 
   }
   if (c >= candidate_count[p] || inliers == 0) return;
   MatchEvidence& e = out[p * most + c];
-  atomicAdd(reinterpret_cast<unsigned long long*>(&e.source_weight), static_cast<unsigned long long>(source));
-  atomicAdd(reinterpret_cast<unsigned long long*>(&e.target_weight), static_cast<unsigned long long>(target));
+  atomicAdd(reinterpret_cast<unsigned long long*>(&e.source_weight),
+            static_cast<unsigned long long>(source));
+  atomicAdd(reinterpret_cast<unsigned long long*>(&e.target_weight),
+            static_cast<unsigned long long>(target));
   atomicAdd(&e.inliers, inliers);
 }
 
 }  // namespace
 
-Candidates propose_poses(Exec& exec, const MatchSets& matches, const Seeds& seeds, const HypothesisOptions& hypothesis,
-                         const CompatibilityOptions& options) {
+Candidates propose_poses(Exec& exec, const MatchSets& matches, const Seeds& seeds,
+                         const HypothesisOptions& hypothesis, const CompatibilityOptions& options) {
   const std::size_t pairs = matches.room.entries(), places = pairs * seeds.most;
   const unsigned pair_count = static_cast<unsigned>(pairs);
   Candidates out;
@@ -268,17 +310,35 @@ Candidates propose_poses(Exec& exec, const MatchSets& matches, const Seeds& seed
   const auto pose = exec.buffer<Pose<float>>(places);
   const auto valid = exec.filled<std::uint8_t>(places, 0);
   const float squared_distance = options.consensus_distance * options.consensus_distance;
-  const ProposeBatch batch{matches.view(), matches.room.on_device.data(), matches.count.data(), seeds.match.data(), seeds.count.data(), seeds.most,
-                           neighborhoods.bits.data(), neighborhoods.words, test_of(options), options.max_members, options.triangles, options.refits,
-                           squared_distance, options.seed_separation * options.seed_separation, hypothesis.seed, pose.data(), valid.data()};
+  const ProposeBatch batch{matches.view(),
+                           matches.room.on_device.data(),
+                           matches.count.data(),
+                           seeds.match.data(),
+                           seeds.count.data(),
+                           seeds.most,
+                           neighborhoods.bits.data(),
+                           neighborhoods.words,
+                           test_of(options),
+                           options.max_members,
+                           options.triangles,
+                           options.refits,
+                           squared_distance,
+                           options.seed_separation * options.seed_separation,
+                           hypothesis.seed,
+                           pose.data(),
+                           valid.data()};
   const std::size_t shared = options.max_members * (sizeof(Member) + sizeof(std::uint16_t));
   const std::uint32_t most_seeds = std::min(seeds.most, largest);
   fit_seeds<<<dim3(most_seeds, pair_count), kThreads, shared, exec.stream()>>>(batch);
   check_launch("fit_seeds");
-  keep_valid<<<pair_count, kThreads, 0, exec.stream()>>>(batch, out.pose.data(), out.seed.data(), out.matches.data(), out.count.data());
+  keep_valid<<<pair_count, kThreads, 0, exec.stream()>>>(batch, out.pose.data(), out.seed.data(),
+                                                         out.matches.data(), out.count.data());
   check_launch("keep_valid");
-  count_matches<<<dim3(blocks_for(most_seeds, kThreads), pair_count, blocks_for(largest, kMatchesPerBlock)), kThreads, 0, exec.stream()>>>(
-      batch.matches, batch.room, batch.match_count, out.most, out.count.data(), squared_distance, out.pose.data(), out.matches.data());
+  count_matches<<<dim3(blocks_for(most_seeds, kThreads), pair_count,
+                       blocks_for(largest, kMatchesPerBlock)),
+                  kThreads, 0, exec.stream()>>>(batch.matches, batch.room, batch.match_count,
+                                                out.most, out.count.data(), squared_distance,
+                                                out.pose.data(), out.matches.data());
   check_launch("count_matches");
   return out;
 }

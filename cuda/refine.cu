@@ -19,8 +19,9 @@ struct RefineBatch {
 };
 
 /// Terms of one source point, if its closest target point is in reach and turned alike.
-__device__ void add_point(const PairView& pair, const RefineBatch& r, const Rigid& rigid, float max_squared, float inverse_max,
-                          float inverse_radius, std::uint32_t i, IcpSums& sums) {
+__device__ void add_point(const PairView& pair, const RefineBatch& r, const Rigid& rigid,
+                          float max_squared, float inverse_max, float inverse_radius,
+                          std::uint32_t i, IcpSums& sums) {
   const Vec3 q = apply(rigid, pair.source.points[i]);
   const Closest c = find_closest(pair.target.closest, pair.target.points, q, max_squared);
   if (c.index == kNoValue) return;
@@ -28,7 +29,8 @@ __device__ void add_point(const PairView& pair, const RefineBatch& r, const Rigi
   if (is_zero(normal)) return;
   if (!normals_agree(rotate(rigid, pair.source.normals[i]), normal, r.test.min_cosine)) return;
   const float distance = dot(q - pair.target.points[c.index], normal);
-  add_icp_term(rotate(rigid, pair.source.points[i]) * inverse_radius, normal, distance * inverse_max, robust_weight(distance, r.kernel_width), sums);
+  add_icp_term(rotate(rigid, pair.source.points[i]) * inverse_radius, normal,
+               distance * inverse_max, robust_weight(distance, r.kernel_width), sums);
 }
 
 /// A thread block per pair runs all its iterations.
@@ -43,9 +45,14 @@ __global__ void __launch_bounds__(kThreads) refine(RefineBatch r) {
     if (threadIdx.x == 0) r.out[blockIdx.x] = best;
     return;
   }
-  if (threadIdx.x == 0) pose = best.pose, iterations = 0, done = false;
+  if (threadIdx.x == 0) {
+    pose = best.pose;
+    iterations = 0;
+    done = false;
+  }
   __syncthreads();
-  const float max_squared = r.max_distance * r.max_distance, inverse_max = 1.0f / r.max_distance, inverse_radius = 1.0f / pair.source.radius;
+  const float max_squared = r.max_distance * r.max_distance, inverse_max = 1.0f / r.max_distance,
+              inverse_radius = 1.0f / pair.source.radius;
   while (!done) {
     const Rigid rigid = to_rigid(pose);
     IcpSums sums{{0}};
@@ -56,7 +63,8 @@ __global__ void __launch_bounds__(kThreads) refine(RefineBatch r) {
       const IcpStep step = solve_icp(sums, pair.source.radius, r.max_distance);
       ++iterations;
       if (step.valid) pose = compose_small(step.omega, step.shift, pose);
-      done = !step.valid || icp_settled(step, pair.source.radius, r.max_distance, kSettled) || iterations >= r.max_iterations;
+      done = !step.valid || icp_settled(step, pair.source.radius, r.max_distance, kSettled) ||
+             iterations >= r.max_iterations;
     }
     __syncthreads();
   }
@@ -64,9 +72,12 @@ __global__ void __launch_bounds__(kThreads) refine(RefineBatch r) {
   const Rigid rigid = to_rigid(pose);
   std::int64_t support[2] = {0, 0};
   for (std::uint32_t i = threadIdx.x; i < pair.source.size; i += kThreads) {
-    const Closest c = find_closest(pair.target.closest, pair.target.points, apply(rigid, pair.source.points[i]), r.test.max_squared);
+    const Closest c = find_closest(pair.target.closest, pair.target.points,
+                                   apply(rigid, pair.source.points[i]), r.test.max_squared);
     if (c.index == kNoValue) continue;
-    if (!normals_agree(rotate(rigid, pair.source.normals[i]), pair.target.normals[c.index], r.test.min_cosine)) continue;
+    if (!normals_agree(rotate(rigid, pair.source.normals[i]), pair.target.normals[c.index],
+                       r.test.min_cosine))
+      continue;
     ++support[0];
     support[1] += fixed_residual(c.squared_distance, r.test.inverse_max_squared);
   }
@@ -74,7 +85,8 @@ __global__ void __launch_bounds__(kThreads) refine(RefineBatch r) {
   if (threadIdx.x != 0) return;
   BestPose out = best;
   out.iterations = iterations;
-  const Support refined{static_cast<std::uint32_t>(support[0]), best.support.hypothesis, static_cast<std::uint64_t>(support[1])};
+  const Support refined{static_cast<std::uint32_t>(support[0]), best.support.hypothesis,
+                        static_cast<std::uint64_t>(support[1])};
   // A refinement that fits worse than what it began with is dropped.
   if (truncated_cost(refined, pair.source.size) <= truncated_cost(best.support, pair.source.size)) {
     out.pose = pose;
@@ -85,17 +97,22 @@ __global__ void __launch_bounds__(kThreads) refine(RefineBatch r) {
 
 }  // namespace
 
-DeviceBuffer<BestPose> refine_poses(Exec& exec, Span<const PairView> pairs, const DeviceBuffer<BestPose>& best, const ScoreOptions& score,
+DeviceBuffer<BestPose> refine_poses(Exec& exec, Span<const PairView> pairs,
+                                    const DeviceBuffer<BestPose>& best, const ScoreOptions& score,
                                     const RefineOptions& options) {
   auto out = exec.buffer<BestPose>(pairs.size);
   if (options.max_iterations == 0) {
-    check(cudaMemcpyAsync(out.data(), best.data(), pairs.size * sizeof(BestPose), cudaMemcpyDeviceToDevice, exec.stream()), "cudaMemcpyAsync");
+    check(cudaMemcpyAsync(out.data(), best.data(), pairs.size * sizeof(BestPose),
+                          cudaMemcpyDeviceToDevice, exec.stream()),
+          "cudaMemcpyAsync");
     return out;
   }
   const auto views = exec.upload(pairs.data, pairs.size);
   refine<<<static_cast<unsigned>(pairs.size), kThreads, 0, exec.stream()>>>(
-      RefineBatch{views.data(), best.data(), inlier_test(score.max_correspondence_distance, score.max_normal_angle), options.max_iterations,
-                  options.max_correspondence_distance, options.kernel_width, out.data()});
+      RefineBatch{views.data(), best.data(),
+                  inlier_test(score.max_correspondence_distance, score.max_normal_angle),
+                  options.max_iterations, options.max_correspondence_distance, options.kernel_width,
+                  out.data()});
   check_launch("refine");
   return out;
 }

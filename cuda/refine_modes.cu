@@ -20,44 +20,63 @@ struct RefineModes {
   float max_distance, kernel_width, min_cosine;
 };
 
-/// What one source point adds: turn, normal, weight and residual, see add_icp_term(). False where it has no partner.
-__device__ bool correspondence(const SearchPair& pair, const RefineModes& r, float kernel_width, const Rigid& rigid, float inverse_radius, std::uint32_t i,
+/// What one source point adds: turn, normal, weight and residual, see add_icp_term(). False where
+/// it has no partner.
+__device__ bool correspondence(const SearchPair& pair, const RefineModes& r, float kernel_width,
+                               const Rigid& rigid, float inverse_radius, std::uint32_t i,
                                float (&row)[8]) {
   const CloudView &s = pair.source, &t = pair.target;
   const Vec3 p = s.points[i], q = apply(rigid, p);
   const Closest c = find_closest(t, pair.target_cells, q, r.max_distance * r.max_distance);
   if (c.index == kNoValue) return false;
   const Vec3 normal = t.normals[c.index];
-  if (is_zero(normal) || !normals_agree(rotate(rigid, s.normals[i]), normal, r.min_cosine)) return false;
+  if (is_zero(normal) || !normals_agree(rotate(rigid, s.normals[i]), normal, r.min_cosine))
+    return false;
   const float distance = dot(q - t.points[c.index], normal);
   const Vec3 turn = cross(rotate(rigid, p) * inverse_radius, normal);
-  row[0] = turn.x, row[1] = turn.y, row[2] = turn.z, row[3] = normal.x, row[4] = normal.y, row[5] = normal.z;
+  row[0] = turn.x;
+  row[1] = turn.y;
+  row[2] = turn.z;
+  row[3] = normal.x;
+  row[4] = normal.y;
+  row[5] = normal.z;
   row[6] = robust_weight(distance, kernel_width) * balance_share(s.balance[i]);
   row[7] = distance * (1.0f / r.max_distance);
   return true;
 }
 
-/// The sums of a thread block that is number `first` of `blocks`, which take turns at kThreads points. A lane for each of the 27 sums goes
-/// through what the warp's points add: the terms of add_icp_term(), but one register per thread for them instead of 54. rows, partial:
-/// shared, for each warp.
+/// The sums of a thread block that is number `first` of `blocks`, which take turns at kThreads
+/// points. A lane for each of the 27 sums goes through what the warp's points add: the terms of
+/// add_icp_term(), but one register per thread for them instead of 54. rows, partial: shared, for
+/// each warp.
 template <int kThreads>
-__device__ void add_up(const SearchPair& pair, const RefineModes& r, float kernel_width, const Rigid& rigid, std::uint32_t stride,
-                       std::uint32_t first, std::uint32_t blocks, float (*rows)[32][8], std::int64_t (*partial)[kSums], IcpSums& sums) {
+__device__ void add_up(const SearchPair& pair, const RefineModes& r, float kernel_width,
+                       const Rigid& rigid, std::uint32_t stride, std::uint32_t first,
+                       std::uint32_t blocks, float (*rows)[32][8], std::int64_t (*partial)[kSums],
+                       IcpSums& sums) {
   const std::uint32_t lane = threadIdx.x % 32, warp = threadIdx.x / 32, size = pair.source.size;
   const float inverse_radius = 1.0f / pair.source.radius;
-  // Sum number k is the product of entries a and b: the lower triangle row by row, then all with the residual.
+  // Sum number k is the product of entries a and b: the lower triangle row by row, then all with
+  // the residual.
   std::uint32_t a = 0, b = lane;
   while (b > a) b -= ++a;
-  if (lane >= 21) a = lane < kSums ? lane - 21 : 0, b = 7;
+  if (lane >= 21) {
+    a = lane < kSums ? lane - 21 : 0;
+    b = 7;
+  }
   std::int64_t sum = 0;
-  for (std::uint64_t base = first * kThreads + threadIdx.x - lane; base * stride < size; base += blocks * kThreads) {
+  for (std::uint64_t base = first * kThreads + threadIdx.x - lane; base * stride < size;
+       base += blocks * kThreads) {
     const std::uint64_t i = (base + lane) * stride;
     float row[8];
-    const bool has = i < size && correspondence(pair, r, kernel_width, rigid, inverse_radius, static_cast<std::uint32_t>(i), row);
+    const bool has = i < size && correspondence(pair, r, kernel_width, rigid, inverse_radius,
+                                                static_cast<std::uint32_t>(i), row);
     const unsigned mask = __ballot_sync(~0u, has);
     if (has) {
-      float4* out = reinterpret_cast<float4*>(rows[warp][__popc(static_cast<int>(mask & ((1u << lane) - 1)))]);
-      out[0] = make_float4(row[0], row[1], row[2], row[3]), out[1] = make_float4(row[4], row[5], row[6], row[7]);
+      float4* out = reinterpret_cast<float4*>(
+          rows[warp][__popc(static_cast<int>(mask & ((1u << lane) - 1)))]);
+      out[0] = make_float4(row[0], row[1], row[2], row[3]);
+      out[1] = make_float4(row[4], row[5], row[6], row[7]);
     }
     __syncwarp();
     const int count = __popc(static_cast<int>(mask));
@@ -78,7 +97,8 @@ __device__ void add_up(const SearchPair& pair, const RefineModes& r, float kerne
   __syncthreads();
 }
 
-/// What the blocks of a cluster have summed up, for each of them. Two buffers take turns, so that one meeting per iteration is enough.
+/// What the blocks of a cluster have summed up, for each of them. Two buffers take turns, so that
+/// one meeting per iteration is enough.
 template <int kBlocks>
 __device__ void add_over_cluster(IcpSums& mine, IcpSums& total) {
 #if defined(__CUDA_ARCH__) && __CUDA_ARCH__ >= 900
@@ -88,7 +108,8 @@ __device__ void add_over_cluster(IcpSums& mine, IcpSums& total) {
     // All are asked for before the first has come.
     std::int64_t sum = 0;
 #pragma unroll
-    for (int b = 0; b < kBlocks; ++b) sum += cluster.map_shared_rank(&mine, static_cast<unsigned>(b))->v[threadIdx.x];
+    for (int b = 0; b < kBlocks; ++b)
+      sum += cluster.map_shared_rank(&mine, static_cast<unsigned>(b))->v[threadIdx.x];
     total.v[threadIdx.x] = sum;
   }
   __syncthreads();
@@ -102,7 +123,8 @@ __device__ void leave_cluster() {
 #endif
 }
 
-/// A thread block per mode, or a cluster of kBlocks, runs all its iterations: on a sample, then on all points with a narrower kernel.
+/// A thread block per mode, or a cluster of kBlocks, runs all its iterations: on a sample, then on
+/// all points with a narrower kernel.
 template <int kThreads, int kBlocks>
 __global__ void __launch_bounds__(kThreads, 1024 / kThreads) refine(RefineModes r) {
   __shared__ float rows[kThreads / 32][32][8];
@@ -124,40 +146,52 @@ __global__ void __launch_bounds__(kThreads, 1024 / kThreads) refine(RefineModes 
     __syncthreads();
     for (std::uint32_t iterations = 0; !done;) {
       IcpSums& mine = own[total % 2];
-      add_up<kThreads>(pair, r, kernel_width, to_rigid(pose), stride, first, kBlocks, rows, partial, mine);
+      add_up<kThreads>(pair, r, kernel_width, to_rigid(pose), stride, first, kBlocks, rows, partial,
+                       mine);
       if constexpr (kBlocks > 1) add_over_cluster<kBlocks>(mine, total_of_all);
       ++iterations, ++total;
       if (threadIdx.x == 0) {
         const IcpSums& sums = kBlocks > 1 ? total_of_all : mine;
         const IcpStep step = solve_icp(sums, pair.source.radius, r.max_distance);
         if (step.valid) pose = compose_small(step.omega, step.shift, pose);
-        done = !step.valid || icp_settled(step, pair.source.radius, r.max_distance, settled) || iterations >= r.max_iterations;
+        done = !step.valid || icp_settled(step, pair.source.radius, r.max_distance, settled) ||
+               iterations >= r.max_iterations;
       }
       __syncthreads();
     }
     __syncthreads();  // all have left the loop before it begins anew
   }
   if constexpr (kBlocks > 1) leave_cluster();
-  if (threadIdx.x == 0 && first == 0) mode.pose = pose, mode.iterations = total;
+  if (threadIdx.x == 0 && first == 0) {
+    mode.pose = pose;
+    mode.iterations = total;
+  }
 }
 
-/// Where there are so few modes that the device would wait for single blocks. Two of these blocks share a multiprocessor, so that the 24
-/// modes of one pair are refined all at once: clusters of blocks twice as large would come in two waves.
+/// Where there are so few modes that the device would wait for single blocks. Two of these blocks
+/// share a multiprocessor, so that the 24 modes of one pair are refined all at once: clusters of
+/// blocks twice as large would come in two waves.
 constexpr int kClusterBlocks = 8, kClusterThreads = 512;
 
 void refine_by_clusters(Exec& exec, const RefineModes& batch, unsigned pairs) {
   cudaLaunchAttribute cluster{};
   cluster.id = cudaLaunchAttributeClusterDimension;
-  cluster.val.clusterDim.x = kClusterBlocks, cluster.val.clusterDim.y = cluster.val.clusterDim.z = 1;
+  cluster.val.clusterDim.x = kClusterBlocks;
+  cluster.val.clusterDim.y = cluster.val.clusterDim.z = 1;
   cudaLaunchConfig_t config{};
-  config.gridDim = dim3(batch.most * kClusterBlocks, pairs), config.blockDim = dim3(kClusterThreads);
+  config.gridDim = dim3(batch.most * kClusterBlocks, pairs);
+  config.blockDim = dim3(kClusterThreads);
   config.stream = exec.stream();
-  config.attrs = &cluster, config.numAttrs = 1;
-  check(cudaLaunchKernelEx(&config, refine<kClusterThreads, kClusterBlocks>, batch), "refine by clusters");
+  config.attrs = &cluster;
+  config.numAttrs = 1;
+  check(cudaLaunchKernelEx(&config, refine<kClusterThreads, kClusterBlocks>, batch),
+        "refine by clusters");
 }
 
 /// Modes that have met: the first of them stays. A warp per pair.
-__global__ void __launch_bounds__(32) merge(std::uint32_t most, Mode* all_modes, std::uint32_t* counts, float min_trace, float squared_distance) {
+__global__ void __launch_bounds__(32)
+    merge(std::uint32_t most, Mode* all_modes, std::uint32_t* counts, float min_trace,
+          float squared_distance) {
   __shared__ Rigid kept[kMostModes];
   const std::uint32_t size = counts[blockIdx.x], lane = threadIdx.x;
   Mode* modes = all_modes + static_cast<std::size_t>(blockIdx.x) * most;
@@ -166,9 +200,13 @@ __global__ void __launch_bounds__(32) merge(std::uint32_t most, Mode* all_modes,
     const Mode mode = modes[k];
     const Rigid rigid = to_rigid(mode.pose);
     bool known = false;
-    for (std::uint32_t o = lane; o < count; o += 32) known |= same_mode(rigid, kept[o], min_trace, squared_distance);
+    for (std::uint32_t o = lane; o < count; o += 32)
+      known |= same_mode(rigid, kept[o], min_trace, squared_distance);
     if (__any_sync(~0u, known)) continue;
-    if (lane == 0) kept[count] = rigid, modes[count] = mode;
+    if (lane == 0) {
+      kept[count] = rigid;
+      modes[count] = mode;
+    }
     __syncwarp();
     ++count;
   }
@@ -177,20 +215,32 @@ __global__ void __launch_bounds__(32) merge(std::uint32_t most, Mode* all_modes,
 
 }  // namespace
 
-void refine_modes(Exec& exec, Span<const PairView> pairs, Modes& modes, const EvidenceOptions& evidence, const RefineOptions& options) {
+void refine_modes(Exec& exec, Span<const PairView> pairs, Modes& modes,
+                  const EvidenceOptions& evidence, const RefineOptions& options) {
   const auto views = upload_search_pairs(exec, pairs);
-  const RefineModes batch{views.data(), modes.most, modes.mode.data(), modes.count.data(), evidence.sample, options.max_iterations,
-                          options.max_correspondence_distance, options.kernel_width,
-                          inlier_test(options.max_correspondence_distance, kRefineNormalAngle).min_cosine};
+  const RefineModes batch{
+      views.data(),
+      modes.most,
+      modes.mode.data(),
+      modes.count.data(),
+      evidence.sample,
+      options.max_iterations,
+      options.max_correspondence_distance,
+      options.kernel_width,
+      inlier_test(options.max_correspondence_distance, kRefineNormalAngle).min_cosine};
   const unsigned pair_count = static_cast<unsigned>(pairs.size);
   if (options.max_iterations > 0) {
-    // Small blocks hide each other's solving; where there are too few to fill the device, large ones are done sooner, or several for each.
-    const std::size_t count = std::size_t(modes.most) * pairs.size, processors = static_cast<std::size_t>(exec.multiprocessors());
+    // Small blocks hide each other's solving; where there are too few to fill the device, large
+    // ones are done sooner, or several for each.
+    const std::size_t count = std::size_t(modes.most) * pairs.size,
+                      processors = static_cast<std::size_t>(exec.multiprocessors());
     if (exec.compute_capability() >= 90 && count * kClusterBlocks <= processors * 3) {
       refine_by_clusters(exec, batch, pair_count);
     } else {
       const bool few = count < processors * 2;
-      (few ? refine<1024, 1> : refine<256, 1>)<<<dim3(modes.most, pair_count), few ? 1024 : 256, 0, exec.stream()>>>(batch);
+      (few ? refine<1024, 1>
+           : refine<256, 1>)<<<dim3(modes.most, pair_count), few ? 1024 : 256, 0, exec.stream()>>>(
+          batch);
       check_launch("refine");
     }
   }
@@ -199,7 +249,8 @@ void refine_modes(Exec& exec, Span<const PairView> pairs, Modes& modes, const Ev
 void merge_modes(Exec& exec, Modes& modes, const EvidenceOptions& evidence) {
   static_assert(kMostModes >= 64, "as many as EvidenceOptions::modes may be");
   const unsigned pairs = static_cast<unsigned>(modes.count.size());
-  merge<<<pairs, 32, 0, exec.stream()>>>(modes.most, modes.mode.data(), modes.count.data(), mode_trace(evidence.mode_angle),
+  merge<<<pairs, 32, 0, exec.stream()>>>(modes.most, modes.mode.data(), modes.count.data(),
+                                         mode_trace(evidence.mode_angle),
                                          evidence.mode_distance * evidence.mode_distance);
   check_launch("merge");
 }

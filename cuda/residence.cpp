@@ -20,8 +20,11 @@ void Residence::add(const Fragment& fragment) {
 
 void Residence::make_room(std::size_t more, const std::vector<const Fragment*>& kept) {
   if (budget_ == 0) return;
-  entries_.erase(std::remove_if(entries_.begin(), entries_.end(), [](const Entry& e) { return e.fragment.expired(); }), entries_.end());
-  std::sort(entries_.begin(), entries_.end(), [](const Entry& a, const Entry& b) { return a.used < b.used; });
+  entries_.erase(std::remove_if(entries_.begin(), entries_.end(),
+                                [](const Entry& e) { return e.fragment.expired(); }),
+                 entries_.end());
+  std::sort(entries_.begin(), entries_.end(),
+            [](const Entry& a, const Entry& b) { return a.used < b.used; });
   std::size_t bytes = more;
   for (const Entry& entry : entries_)
     if (const auto fragment = entry.fragment.lock()) bytes += fragment->bytes();
@@ -33,19 +36,26 @@ void Residence::make_room(std::size_t more, const std::vector<const Fragment*>& 
     bytes -= std::min(bytes, fragment->bytes());
     entry.fragment.reset();
   }
-  entries_.erase(std::remove_if(entries_.begin(), entries_.end(), [](const Entry& e) { return e.fragment.expired(); }), entries_.end());
+  entries_.erase(std::remove_if(entries_.begin(), entries_.end(),
+                                [](const Entry& e) { return e.fragment.expired(); }),
+                 entries_.end());
   if (bytes > budget_ && more > 0)
-    throw DeviceError("memory_budget is " + std::to_string(budget_) + " bytes, but the prepared clouds that are needed at once take " + std::to_string(bytes) +
-                      "; the context stays usable");
+    throw DeviceError("memory_budget is " + std::to_string(budget_) +
+                      " bytes, but the prepared clouds that are needed at once take " +
+                      std::to_string(bytes) + "; the context stays usable");
 }
 
-std::vector<std::shared_ptr<const CudaCloud>> Residence::bring(const std::vector<const Fragment*>& fragments) {
+std::vector<std::shared_ptr<const CudaCloud>> Residence::bring(
+    const std::vector<const Fragment*>& fragments) {
   std::vector<std::shared_ptr<const CudaCloud>> out;
   std::vector<std::size_t> missing;
   std::size_t bytes = 0;
   for (std::size_t k = 0; k < fragments.size(); ++k) {
     out.push_back(fragments[k]->on(exec_.device()));
-    if (!out.back()) missing.push_back(k), bytes += fragments[k]->bytes();
+    if (!out.back()) {
+      missing.push_back(k);
+      bytes += fragments[k]->bytes();
+    }
     if (Entry* entry = budget_ > 0 ? find(*fragments[k]) : nullptr) entry->used = ++clock_;
   }
   if (missing.empty()) return out;

@@ -7,8 +7,8 @@
 
 namespace gpureg::cuda {
 
-/// Which fragments are in the memory of one engine: brings them there, and drives the least recently used out beyond a budget. To be used
-/// by one thread at a time.
+/// Which fragments are in the memory of one engine: brings them there, and drives the least
+/// recently used out beyond a budget. To be used by one thread at a time.
 class Residence {
  public:
   /// budget: bytes; 0: no limit.
@@ -19,10 +19,13 @@ class Residence {
 
   /// A fragment that was made here.
   void add(const Fragment& fragment);
-  /// Copies of these fragments on the exec's device, one each and ready to be read; they stay there while the caller holds them. Throws
-  /// DeviceError where the budget or the device has no room for all of them at once.
-  std::vector<std::shared_ptr<const CudaCloud>> bring(const std::vector<const Fragment*>& fragments);
-  /// Drives fragments out until what is left, but for `kept`, and `more` bytes are within the budget.
+  /// Copies of these fragments on the exec's device, one each and ready to be read; they stay there
+  /// while the caller holds them. Throws DeviceError where the budget or the device has no room for
+  /// all of them at once.
+  std::vector<std::shared_ptr<const CudaCloud>> bring(
+      const std::vector<const Fragment*>& fragments);
+  /// Drives fragments out until what is left, but for `kept`, and `more` bytes are within the
+  /// budget.
   void make_room(std::size_t more, const std::vector<const Fragment*>& kept);
 
  private:

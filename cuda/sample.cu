@@ -7,7 +7,8 @@ namespace gpureg::cuda {
 namespace {
 
 constexpr std::uint32_t kThreads = 1024;
-constexpr std::uint32_t kWordsPerChunk = 1024;  // 32 hypotheses a word; chunks are counted, then expanded, one by one
+// 32 hypotheses a word; chunks are counted, then expanded, one by one
+constexpr std::uint32_t kWordsPerChunk = 1024;
 
 struct SampleBatch {
   const std::uint32_t* room;
@@ -33,7 +34,10 @@ struct SharedPoints {
 };
 struct GlobalPoints {
   const MatchedPoints* m;
-  __device__ void get(std::uint32_t i, Vec3& source, Vec3& target) const { source = m[i].source, target = m[i].target; }
+  __device__ void get(std::uint32_t i, Vec3& source, Vec3& target) const {
+    source = m[i].source;
+    target = m[i].target;
+  }
 };
 
 struct Corner {
@@ -59,15 +63,17 @@ __device__ bool first_side_passes(const Points& points, const Quadruple& q, floa
   return similar(corner(points, q.match[0]), corner(points, q.match[1]), tau2);
 }
 
-/// The rest of it. Repeated source points are told by the matches themselves, which have the indices.
+/// The rest of it. Repeated source points are told by the matches themselves, which have the
+/// indices.
 template <typename Points>
-__device__ bool other_sides_pass(const Points& points, const MatchedPoints* m, const Quadruple& q, float tau2) {
+__device__ bool other_sides_pass(const Points& points, const MatchedPoints* m, const Quadruple& q,
+                                 float tau2) {
   const Corner c1 = corner(points, q.match[1]), c2 = corner(points, q.match[2]);
   if (!similar(c1, c2, tau2)) return false;
   const Corner c3 = corner(points, q.match[3]);
   if (!similar(c2, c3, tau2) || !similar(c3, corner(points, q.match[0]), tau2)) return false;
-  const std::uint32_t a = m[q.match[0]].source_index, b = m[q.match[1]].source_index, c = m[q.match[2]].source_index,
-                      d = m[q.match[3]].source_index;
+  const std::uint32_t a = m[q.match[0]].source_index, b = m[q.match[1]].source_index,
+                      c = m[q.match[2]].source_index, d = m[q.match[3]].source_index;
   return a != b && a != c && a != d && b != c && b != d && c != d;
 }
 
@@ -77,9 +83,11 @@ struct WarpQueue {
   std::uint32_t words[32];    ///< one bit per hypothesis: passes
 };
 
-/// A warp draws 1,024 hypotheses: which of its 32 words a lane has, one bit per hypothesis that passes. Those that pass the first side wait
-/// until there is one for every lane: one in eight passes, and the others would wait for it three times.
-__device__ std::uint32_t draw_word(const SampleBatch& s, const SharedPoints& points, const MatchedPoints* m, std::uint32_t count, std::uint32_t first,
+/// A warp draws 1,024 hypotheses: which of its 32 words a lane has, one bit per hypothesis that
+/// passes. Those that pass the first side wait until there is one for every lane: one in eight
+/// passes, and the others would wait for it three times.
+__device__ std::uint32_t draw_word(const SampleBatch& s, const SharedPoints& points,
+                                   const MatchedPoints* m, std::uint32_t count, std::uint32_t first,
                                    WarpQueue& queue) {
   const std::uint32_t lane = threadIdx.x % 32;
   queue.words[lane] = 0;
@@ -94,9 +102,12 @@ __device__ std::uint32_t draw_word(const SampleBatch& s, const SharedPoints& poi
 #pragma unroll 2
   for (std::uint32_t k = 0; k < 32; ++k) {
     const std::uint32_t hypothesis = first + k * 32 + lane;
-    const bool pass = hypothesis < s.hypotheses && first_side_passes(points, draw_quadruple(hypothesis, s.seed, count), s.tau2);
+    const bool pass = hypothesis < s.hypotheses &&
+                      first_side_passes(points, draw_quadruple(hypothesis, s.seed, count), s.tau2);
     const unsigned passing = __ballot_sync(~0u, pass);
-    if (pass) queue.waiting[waiting + static_cast<std::uint32_t>(__popc(static_cast<int>(passing & ((1u << lane) - 1))))] = hypothesis;
+    if (pass)
+      queue.waiting[waiting + static_cast<std::uint32_t>(__popc(
+                                  static_cast<int>(passing & ((1u << lane) - 1))))] = hypothesis;
     waiting += static_cast<std::uint32_t>(__popc(static_cast<int>(passing)));
     if (waiting < 32) continue;
     __syncwarp();
@@ -114,7 +125,8 @@ __device__ std::uint32_t draw_word(const SampleBatch& s, const SharedPoints& poi
 }
 
 /// From global memory a second look at the same corners would cost more than the lanes that wait.
-__device__ std::uint32_t draw_word(const SampleBatch& s, const GlobalPoints& points, const MatchedPoints* m, std::uint32_t count, std::uint32_t first,
+__device__ std::uint32_t draw_word(const SampleBatch& s, const GlobalPoints& points,
+                                   const MatchedPoints* m, std::uint32_t count, std::uint32_t first,
                                    WarpQueue&) {
   const std::uint32_t lane = threadIdx.x % 32;
   std::uint32_t mine = 0;
@@ -132,13 +144,17 @@ __device__ std::uint32_t draw_word(const SampleBatch& s, const GlobalPoints& poi
 }
 
 template <typename Points>
-__device__ void sample_chunks(const SampleBatch& s, const Points& points, const MatchedPoints* m, std::uint32_t count, WarpQueue& queue) {
+__device__ void sample_chunks(const SampleBatch& s, const Points& points, const MatchedPoints* m,
+                              std::uint32_t count, WarpQueue& queue) {
   const std::uint32_t p = blockIdx.y, warp = threadIdx.x / 32, lane = threadIdx.x % 32;
   for (std::uint32_t chunk = blockIdx.x; chunk < s.chunks; chunk += gridDim.x) {
-    const std::uint32_t mine = draw_word(s, points, m, count, (chunk * kWordsPerChunk + warp * 32) * 32, queue);
+    const std::uint32_t mine =
+        draw_word(s, points, m, count, (chunk * kWordsPerChunk + warp * 32) * 32, queue);
     const std::uint32_t kept = warp_sum(static_cast<std::uint32_t>(__popc(static_cast<int>(mine))));
-    s.words[(static_cast<std::size_t>(p) * s.chunks + chunk) * kWordsPerChunk + warp * 32 + lane] = mine;
-    if (lane == 0 && kept > 0) atomicAdd(&s.chunk_count[static_cast<std::size_t>(p) * s.chunks + chunk], kept);
+    s.words[(static_cast<std::size_t>(p) * s.chunks + chunk) * kWordsPerChunk + warp * 32 + lane] =
+        mine;
+    if (lane == 0 && kept > 0)
+      atomicAdd(&s.chunk_count[static_cast<std::size_t>(p) * s.chunks + chunk], kept);
   }
 }
 
@@ -164,13 +180,16 @@ __global__ void __launch_bounds__(kThreads) sample(SampleBatch s, std::uint32_t 
 }
 
 /// Bits to numbers, in order. before: survivors in front of each chunk, over all pairs.
-__global__ void __launch_bounds__(kWordsPerChunk) expand(const std::uint32_t* words, const std::uint32_t* before, std::uint32_t chunks,
-                                                         const std::uint32_t* offset, std::uint32_t* id) {
+__global__ void __launch_bounds__(kWordsPerChunk)
+    expand(const std::uint32_t* words, const std::uint32_t* before, std::uint32_t chunks,
+           const std::uint32_t* offset, std::uint32_t* id) {
   __shared__ std::uint32_t warp_sums[32];
-  const std::uint32_t p = blockIdx.y, chunk = blockIdx.x, lane = threadIdx.x % 32, warp = threadIdx.x / 32;
+  const std::uint32_t p = blockIdx.y, chunk = blockIdx.x, lane = threadIdx.x % 32,
+                      warp = threadIdx.x / 32;
   const std::size_t at = static_cast<std::size_t>(p) * chunks + chunk;
   if (before[at] == before[at + 1]) return;
-  const std::uint32_t first = before[at] - before[static_cast<std::size_t>(p) * chunks], room = offset[p + 1] - offset[p];
+  const std::uint32_t first = before[at] - before[static_cast<std::size_t>(p) * chunks],
+                      room = offset[p + 1] - offset[p];
   if (first >= room) return;
   std::uint32_t word = words[at * kWordsPerChunk + threadIdx.x];
   const std::uint32_t mine = static_cast<std::uint32_t>(__popc(static_cast<int>(word)));
@@ -184,7 +203,8 @@ __global__ void __launch_bounds__(kWordsPerChunk) expand(const std::uint32_t* wo
   std::uint32_t rank = first + sum - mine;
   for (std::uint32_t w = 0; w < warp; ++w) rank += warp_sums[w];
   for (; word != 0 && rank < room; word &= word - 1, ++rank)
-    id[offset[p] + rank] = (chunk * kWordsPerChunk + threadIdx.x) * 32 + static_cast<std::uint32_t>(__ffs(static_cast<int>(word)) - 1);
+    id[offset[p] + rank] = (chunk * kWordsPerChunk + threadIdx.x) * 32 +
+                           static_cast<std::uint32_t>(__ffs(static_cast<int>(word)) - 1);
 }
 
 }  // namespace
@@ -198,34 +218,44 @@ Quadruples sample_quadruples(Exec& exec, const Matches& matches, const Hypothesi
 
   // As many matches as the largest pair can have, if they fit; the others read global memory.
   constexpr std::size_t kBytesPerMatch = sizeof(float4) + sizeof(float2);
-  const std::uint32_t fits = static_cast<std::uint32_t>((exec.shared_bytes_per_block() - 1024 - kThreads / 32 * sizeof(WarpQueue)) / kBytesPerMatch);
+  const std::uint32_t fits = static_cast<std::uint32_t>(
+      (exec.shared_bytes_per_block() - 1024 - kThreads / 32 * sizeof(WarpQueue)) / kBytesPerMatch);
   const std::uint32_t capacity = std::min(matches.room.largest, fits);
   const std::size_t shared_bytes = capacity * kBytesPerMatch;
-  check(cudaFuncSetAttribute(sample, cudaFuncAttributeMaxDynamicSharedMemorySize, static_cast<int>(shared_bytes)), "cudaFuncSetAttribute");
-  // A thread block stages the matches once and then draws for many chunks: few blocks per pair, but all processors busy.
-  const unsigned wanted = blocks_for(static_cast<std::size_t>(exec.multiprocessors()) * 8, static_cast<unsigned>(pairs));
+  check(cudaFuncSetAttribute(sample, cudaFuncAttributeMaxDynamicSharedMemorySize,
+                             static_cast<int>(shared_bytes)),
+        "cudaFuncSetAttribute");
+  // A thread block stages the matches once and then draws for many chunks: few blocks per pair, but
+  // all processors busy.
+  const unsigned wanted = blocks_for(static_cast<std::size_t>(exec.multiprocessors()) * 8,
+                                     static_cast<unsigned>(pairs));
   const unsigned blocks = std::max(1u, std::min(chunks, std::max(4u, wanted)));
   sample<<<dim3(blocks, static_cast<unsigned>(pairs)), kThreads, shared_bytes, exec.stream()>>>(
-      SampleBatch{matches.room.on_device.data(), matches.pairs.data(), matches.count.data(), options.count, chunks, options.seed,
+      SampleBatch{matches.room.on_device.data(), matches.pairs.data(), matches.count.data(),
+                  options.count, chunks, options.seed,
                   options.edge_similarity * options.edge_similarity, words.data(), before.data()},
       capacity);
   check_launch("sample");
   exclusive_sum(exec, before.data(), before.data(), all_chunks + 1);
   // One number per pair: the survivors in front of its first chunk.
   std::uint32_t* starts = exec.staging<std::uint32_t>(pairs + 1);
-  check(cudaMemcpy2DAsync(starts, sizeof(std::uint32_t), before.data(), chunks * sizeof(std::uint32_t), sizeof(std::uint32_t), pairs,
+  check(cudaMemcpy2DAsync(starts, sizeof(std::uint32_t), before.data(),
+                          chunks * sizeof(std::uint32_t), sizeof(std::uint32_t), pairs,
                           cudaMemcpyDeviceToHost, exec.stream()),
         "cudaMemcpy2DAsync");
-  check(cudaMemcpyAsync(starts + pairs, before.data() + all_chunks, sizeof(std::uint32_t), cudaMemcpyDeviceToHost, exec.stream()),
+  check(cudaMemcpyAsync(starts + pairs, before.data() + all_chunks, sizeof(std::uint32_t),
+                        cudaMemcpyDeviceToHost, exec.stream()),
         "cudaMemcpyAsync");
   exec.synchronize();
 
   Quadruples out;
-  out.segments = make_segments(exec, pairs, [&](std::size_t p) { return std::min(starts[p + 1] - starts[p], options.max_survivors); });
+  out.segments = make_segments(exec, pairs, [&](std::size_t p) {
+    return std::min(starts[p + 1] - starts[p], options.max_survivors);
+  });
   out.id = exec.buffer<std::uint32_t>(out.segments.total());
   if (out.segments.total() == 0) return out;
-  expand<<<dim3(chunks, static_cast<unsigned>(pairs)), kWordsPerChunk, 0, exec.stream()>>>(words.data(), before.data(), chunks,
-                                                                                          out.segments.on_device.data(), out.id.data());
+  expand<<<dim3(chunks, static_cast<unsigned>(pairs)), kWordsPerChunk, 0, exec.stream()>>>(
+      words.data(), before.data(), chunks, out.segments.on_device.data(), out.id.data());
   check_launch("expand");
   return out;
 }

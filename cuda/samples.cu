@@ -4,29 +4,37 @@
 namespace gpureg::cuda {
 namespace {
 
-constexpr std::uint32_t kSamples = 64;  // hypotheses of a pair that tell where the others fail: its leaders, and some at equal distances
-constexpr std::uint32_t kPoses = 8;     // that a thread moves its point by, at most
+// hypotheses of a pair that tell where the others fail: its leaders, and some at equal distances
+constexpr std::uint32_t kSamples = 64;
+constexpr std::uint32_t kPoses = 8;  // that a thread moves its point by, at most
 constexpr int kThreads = 256;
 constexpr int kOrderThreads = 1024;
 constexpr std::uint32_t kKeys = kSamples + 1;
 
 /// Number of a sample among all hypotheses of the batch.
-__device__ std::uint32_t hypothesis_of(const ScoreBatch& b, std::uint32_t pair, std::uint32_t sample) {
+__device__ std::uint32_t hypothesis_of(const ScoreBatch& b, std::uint32_t pair,
+                                       std::uint32_t sample) {
   const std::uint32_t begin = b.offset[pair], count = b.offset[pair + 1] - begin;
   const unsigned long long leader = sample < kLeaders ? b.leaders[pair * kLeaders + sample] : 0;
-  return begin + (leader != 0 ? ~static_cast<std::uint32_t>(leader) : static_cast<std::uint32_t>(static_cast<std::uint64_t>(sample) * count / kSamples));
+  return begin + (leader != 0 ? ~static_cast<std::uint32_t>(leader)
+                              : static_cast<std::uint32_t>(static_cast<std::uint64_t>(sample) *
+                                                           count / kSamples));
 }
 
-/// A thread per point: how many of a few hypotheses leave it without a partner by its cell's code, and how many only by its closest point.
-/// x: points, y: hypotheses, z: pairs. inliers: of the samples.
-__global__ void __launch_bounds__(kThreads) try_samples(ScoreBatch b, std::uint32_t poses_a_thread, std::uint32_t* inliers) {
+/// A thread per point: how many of a few hypotheses leave it without a partner by its cell's code,
+/// and how many only by its closest point. x: points, y: hypotheses, z: pairs. inliers: of the
+/// samples.
+__global__ void __launch_bounds__(kThreads)
+    try_samples(ScoreBatch b, std::uint32_t poses_a_thread, std::uint32_t* inliers) {
   __shared__ std::uint32_t agreeing[kPoses][64];
   __shared__ Rigid poses[kPoses];
   __shared__ std::uint32_t valid[kPoses];
   __shared__ Limits all_limits[512];
   const std::uint32_t p = blockIdx.z, first_sample = blockIdx.y * poses_a_thread;
   const ScorePair& pair = b.pairs[p];
-  if (b.offset[p] == b.offset[p + 1] || pair.cells.nx == 0 || blockIdx.x * kThreads >= pair.order.groups * 32) return;
+  if (b.offset[p] == b.offset[p + 1] || pair.cells.nx == 0 ||
+      blockIdx.x * kThreads >= pair.order.groups * 32)
+    return;
   for (std::uint32_t k = threadIdx.x; k < poses_a_thread * 64; k += kThreads) {
     const std::uint32_t h = hypothesis_of(b, p, first_sample + k / 64);
     const Rigid rigid = to_rigid(b.poses[h]);
@@ -47,18 +55,22 @@ __global__ void __launch_bounds__(kThreads) try_samples(ScoreBatch b, std::uint3
     const BrickMotion motion(poses[s], pair.cells);
     const BrickCell cell = motion.locate(point);
     const BrickWord word = motion.find(cell, pair.cells.run);
-    const bool possible = word.there && code_agrees(__ldg(pair.cells.brick + word.number), cell, agreeing[s][__float_as_uint(point.w)]);
+    const bool possible = word.there && code_agrees(__ldg(pair.cells.brick + word.number), cell,
+                                                    agreeing[s][__float_as_uint(point.w)]);
     bool inlier = false;
     if (possible) {
       const uint2 summary = __ldg(pair.cells.cell + cell_in_bricks(word, cell));
       bool certain;
       inlier = may_be_inlier(poses[s], limits, summary.x, normal, certain) &&
-               (certain || is_inlier(pair, b.test, poses[s], point, normal, pair.order.index + k, summary.y));
+               (certain ||
+                is_inlier(pair, b.test, poses[s], point, normal, pair.order.index + k, summary.y));
     }
     misses += !possible;
     refuted += possible && !inlier;
     const unsigned found = __ballot_sync(~0u, inlier);
-    if (threadIdx.x % 32 == 0 && found != 0) atomicAdd(inliers + p * kSamples + first_sample + s, static_cast<std::uint32_t>(__popc(static_cast<int>(found))));
+    if (threadIdx.x % 32 == 0 && found != 0)
+      atomicAdd(inliers + p * kSamples + first_sample + s,
+                static_cast<std::uint32_t>(__popc(static_cast<int>(found))));
   }
   const std::size_t first = b.group_offset[p];
   misses = warp_sum(misses);
@@ -66,13 +78,16 @@ __global__ void __launch_bounds__(kThreads) try_samples(ScoreBatch b, std::uint3
   if (refuted > 0) atomicAdd(b.refuted + first * 32 + k, refuted);
 }
 
-/// A thread block per pair. Samples: their inliers are known now. Groups: each counts how many come before it. Points: counting sort, stable,
-/// so that neighbours stay together; a warp has a stretch of them.
-__global__ void __launch_bounds__(kOrderThreads) sort_by_failures(ScoreBatch b, const std::uint32_t* inliers) {
+/// A thread block per pair. Samples: their inliers are known now. Groups: each counts how many come
+/// before it. Points: counting sort, stable, so that neighbours stay together; a warp has a stretch
+/// of them.
+__global__ void __launch_bounds__(kOrderThreads)
+    sort_by_failures(ScoreBatch b, const std::uint32_t* inliers) {
   constexpr std::uint32_t kWarps = kOrderThreads / 32;
   __shared__ std::uint32_t place[kKeys][kWarps];
   __shared__ std::uint32_t of_key[kKeys];
-  const std::uint32_t p = blockIdx.x, begin = b.group_offset[p], groups = b.group_offset[p + 1] - begin;
+  const std::uint32_t p = blockIdx.x, begin = b.group_offset[p],
+                      groups = b.group_offset[p + 1] - begin;
   const ScorePair& pair = b.pairs[p];
   if (b.offset[p] == b.offset[p + 1] || pair.cells.nx == 0) return;
   if (threadIdx.x < kSamples) {
@@ -92,8 +107,10 @@ __global__ void __launch_bounds__(kOrderThreads) sort_by_failures(ScoreBatch b, 
     b.by_misses[begin + before] = g;
   }
   const std::uint32_t* refuted = b.refuted + std::size_t(begin) * 32;
-  const std::uint32_t warp = threadIdx.x / 32, lane = threadIdx.x % 32, stretch = (groups + kWarps - 1) / kWarps * 32;
-  const std::uint32_t first = min(warp * stretch, groups * 32), last = min(first + stretch, groups * 32);
+  const std::uint32_t warp = threadIdx.x / 32, lane = threadIdx.x % 32,
+                      stretch = (groups + kWarps - 1) / kWarps * 32;
+  const std::uint32_t first = min(warp * stretch, groups * 32),
+                      last = min(first + stretch, groups * 32);
   for (std::uint32_t k = threadIdx.x; k < kKeys * kWarps; k += kOrderThreads) (&place[0][0])[k] = 0;
   __syncthreads();
   // Most refuted: key 0.
@@ -129,7 +146,8 @@ __global__ void __launch_bounds__(kOrderThreads) sort_by_failures(ScoreBatch b, 
       const std::uint32_t ones = __ballot_sync(~0u, one);
       same &= one ? ones : ~ones;
     }
-    const std::uint32_t before = static_cast<std::uint32_t>(__popc(static_cast<int>(same & ((1u << lane) - 1))));
+    const std::uint32_t before =
+        static_cast<std::uint32_t>(__popc(static_cast<int>(same & ((1u << lane) - 1))));
     const std::uint32_t to = of_key[key] + place[key][warp] + before;
     __syncwarp();
     if (before == 0) place[key][warp] += static_cast<std::uint32_t>(__popc(static_cast<int>(same)));
@@ -146,10 +164,12 @@ __global__ void __launch_bounds__(kOrderThreads) sort_by_failures(ScoreBatch b, 
 
 void score_samples(Exec& exec, const ScoreBatch& batch, std::uint32_t most_groups) {
   if (most_groups == 0) return;
-  const auto inliers = exec.filled<std::uint32_t>(static_cast<std::size_t>(batch.pair_count) * kSamples, 0);
+  const auto inliers =
+      exec.filled<std::uint32_t>(static_cast<std::size_t>(batch.pair_count) * kSamples, 0);
   const std::uint32_t poses = batch.pair_count < 8 ? 2 : kPoses;  // few pairs: more threads
-  try_samples<<<dim3(blocks_for(std::size_t(most_groups) * 32, kThreads), kSamples / poses, batch.pair_count), kThreads, 0, exec.stream()>>>(batch, poses,
-                                                                                                                                          inliers.data());
+  try_samples<<<dim3(blocks_for(std::size_t(most_groups) * 32, kThreads), kSamples / poses,
+                     batch.pair_count),
+                kThreads, 0, exec.stream()>>>(batch, poses, inliers.data());
   check_launch("try_samples");
   sort_by_failures<<<batch.pair_count, kOrderThreads, 0, exec.stream()>>>(batch, inliers.data());
   check_launch("sort_by_failures");

@@ -6,17 +6,21 @@
 namespace gpureg::cuda {
 namespace {
 
-constexpr std::uint32_t kByBlock = 64;  // hypotheses per multiprocessor up to which each gets a thread block of its own
+// hypotheses per multiprocessor up to which each gets a thread block of its own
+constexpr std::uint32_t kByBlock = 64;
 constexpr int kThreads = 896;
 constexpr std::size_t kPointBytes = sizeof(float2) + sizeof(float) + 1;
-constexpr std::size_t kFixedBytes = kThreads / 32 * sizeof(WarpMemory) + 512 * sizeof(Limits) + 1024;  // of shared memory beside what is staged
+// of shared memory beside what is staged
+constexpr std::size_t kFixedBytes =
+    kThreads / 32 * sizeof(WarpMemory) + 512 * sizeof(Limits) + 1024;
 
 /// Hypotheses [begin, end) of one pair.
 struct Slice {
   std::uint32_t pair, begin, end;
 };
 
-/// A thread block per hypothesis: the shortest way through a few of them, as no warp walks over a whole cloud.
+/// A thread block per hypothesis: the shortest way through a few of them, as no warp walks over a
+/// whole cloud.
 __global__ void __launch_bounds__(kProbeThreads) score_by_block(ScoreBatch b) {
   __shared__ Limits limits[512];
   __shared__ std::uint32_t agreeing[64];
@@ -32,7 +36,8 @@ __global__ void __launch_bounds__(kProbeThreads) score_by_block(ScoreBatch b) {
       if (threadIdx.x == 0) needed = *static_cast<volatile std::uint32_t*>(b.most + p);
       __syncthreads();
       const std::uint32_t possible = count_possible_by_block(b, pair, b.poses[h], agreeing);
-      if (possible >= needed) inliers = count_by_block(b, pair, limits + pair.limits * 256, b.poses[h]);
+      if (possible >= needed)
+        inliers = count_by_block(b, pair, limits + pair.limits * 256, b.poses[h]);
     }
     if (threadIdx.x != 0) continue;
     b.inliers[h] = inliers;
@@ -42,8 +47,9 @@ __global__ void __launch_bounds__(kProbeThreads) score_by_block(ScoreBatch b) {
 
 /// next, most: of the thread block, in shared memory; most is what it knows of the pair's.
 template <typename Points>
-__device__ void score_slice(const ScoreBatch& b, const Slice& slice, const Limits* limits, const Staged<Points>& staged, WarpMemory& memory,
-                            std::uint32_t* next, std::uint32_t* most) {
+__device__ void score_slice(const ScoreBatch& b, const Slice& slice, const Limits* limits,
+                            const Staged<Points>& staged, WarpMemory& memory, std::uint32_t* next,
+                            std::uint32_t* most) {
   const std::uint32_t lane = threadIdx.x % 32;
   const ScorePair& pair = b.pairs[slice.pair];
   const LookOrder look = b.look_of(slice.pair);
@@ -54,16 +60,21 @@ __device__ void score_slice(const ScoreBatch& b, const Slice& slice, const Limit
     if (h >= slice.end) return;
     if (b.inliers[h] != kNoValue) continue;  // a sample
     std::uint32_t inliers = 0;
-    if (b.valid[h]) inliers = count_inliers(b, pair, limits + pair.limits * 256, staged, memory, b.poses[h], look, most);
+    if (b.valid[h])
+      inliers = count_inliers(b, pair, limits + pair.limits * 256, staged, memory, b.poses[h], look,
+                              most);
     if (lane != 0) continue;
     b.inliers[h] = inliers;
-    atomicMax(most, inliers > 0 ? max(inliers, atomicMax(b.most + slice.pair, inliers)) : *static_cast<volatile std::uint32_t*>(b.most + slice.pair));
+    atomicMax(most, inliers > 0 ? max(inliers, atomicMax(b.most + slice.pair, inliers))
+                                : *static_cast<volatile std::uint32_t*>(b.most + slice.pair));
   }
 }
 
-/// Thread blocks take slices until none is left; in a slice the warps take hypotheses: how long one takes is not known before. The source's
-/// points and the target's table of bricks are in shared memory where they fit; the codes are left to the cache.
-__global__ void __launch_bounds__(kThreads, 1) score_slices(ScoreBatch b, const Slice* slices, std::uint32_t count, std::uint32_t bytes) {
+/// Thread blocks take slices until none is left; in a slice the warps take hypotheses: how long one
+/// takes is not known before. The source's points and the target's table of bricks are in shared
+/// memory where they fit; the codes are left to the cache.
+__global__ void __launch_bounds__(kThreads, 1)
+    score_slices(ScoreBatch b, const Slice* slices, std::uint32_t count, std::uint32_t bytes) {
   extern __shared__ float2 shared[];
   __shared__ WarpMemory warps[kThreads / 32];
   __shared__ Limits limits[512];
@@ -75,16 +86,23 @@ __global__ void __launch_bounds__(kThreads, 1) score_slices(ScoreBatch b, const 
     __syncthreads();
     if (threadIdx.x == 0) {
       taken = atomicAdd(b.next, 1);
-      if (taken < count) next = slices[taken].begin, most = *static_cast<volatile std::uint32_t*>(b.most + slices[taken].pair);
+      if (taken < count) {
+        next = slices[taken].begin;
+        most = *static_cast<volatile std::uint32_t*>(b.most + slices[taken].pair);
+      }
     }
     __syncthreads();
     if (taken >= count) return;
     const Slice slice = slices[taken];
     const ScorePair& pair = b.pairs[slice.pair];
     const std::uint32_t* order = b.by_misses + b.group_offset[slice.pair];
-    const std::uint32_t points = pair.order.groups * 32, runs = pair.cells.nx > 0 ? pair.cells.brick_runs() : 0;
+    const std::uint32_t points = pair.order.groups * 32,
+                        runs = pair.cells.nx > 0 ? pair.cells.brick_runs() : 0;
     if (runs == 0 || points * kPointBytes + runs * sizeof(uint2) > bytes) {
-      score_slice(b, slice, limits, Staged<PointsInGlobal>{{pair.order.point, order}, pair.cells.run, pair.cells.brick}, memory, &next, &most);
+      score_slice(
+          b, slice, limits,
+          Staged<PointsInGlobal>{{pair.order.point, order}, pair.cells.run, pair.cells.brick},
+          memory, &next, &most);
       continue;
     }
     uint2* shared_runs = reinterpret_cast<uint2*>(shared + points);
@@ -93,13 +111,18 @@ __global__ void __launch_bounds__(kThreads, 1) score_slices(ScoreBatch b, const 
     if (loaded != slice.pair) {
       for (std::uint32_t k = threadIdx.x; k < points; k += kThreads) {
         const float4 p = pair.order.point[order[k / 32] * 32 + k % 32];
-        shared[k] = make_float2(p.x, p.y), z[k] = p.z, normal_class[k] = static_cast<std::uint8_t>(__float_as_uint(p.w));
+        shared[k] = make_float2(p.x, p.y);
+        z[k] = p.z;
+        normal_class[k] = static_cast<std::uint8_t>(__float_as_uint(p.w));
       }
-      for (std::uint32_t k = threadIdx.x; k < runs; k += kThreads) shared_runs[k] = pair.cells.run[k];
+      for (std::uint32_t k = threadIdx.x; k < runs; k += kThreads)
+        shared_runs[k] = pair.cells.run[k];
       loaded = slice.pair;
       __syncthreads();
     }
-    score_slice(b, slice, limits, Staged<PointsInShared>{{shared, z, normal_class}, shared_runs, pair.cells.brick}, memory, &next, &most);
+    score_slice(b, slice, limits,
+                Staged<PointsInShared>{{shared, z, normal_class}, shared_runs, pair.cells.brick},
+                memory, &next, &most);
   }
 }
 
@@ -108,9 +131,11 @@ std::vector<ScorePair> score_pairs(Span<const PairView> pairs, const ScoreOption
   for (const PairView& pair : pairs) {
     const auto& source = *static_cast<const CudaCloud*>(pair.source.executor_data);
     const auto& target = *static_cast<const CudaCloud*>(pair.target.executor_data);
-    // The cells know what is in reach of the distance that they were built for; of a shorter one they only know what is not.
+    // The cells know what is in reach of the distance that they were built for; of a shorter one
+    // they only know what is not.
     const float built = target.options.search_distance;
-    const bool exact = built * built == options.max_correspondence_distance * options.max_correspondence_distance;
+    const bool exact =
+        built * built == options.max_correspondence_distance * options.max_correspondence_distance;
     out.push_back({pair.source, pair.target, source.order, target.summaries, exact ? 0u : 1u});
   }
   return out;
@@ -120,14 +145,17 @@ std::vector<Limits> limit_tables(const ScoreOptions& options) {
   std::vector<Limits> out;
   for (const bool exact : {true, false}) {
     const SummaryLimits limits(options.max_normal_angle, exact);
-    for (int code = 0; code < 256; ++code) out.push_back({limits.none_below[code], limits.all_above[code]});
+    for (int code = 0; code < 256; ++code)
+      out.push_back({limits.none_below[code], limits.all_above[code]});
   }
   return out;
 }
 
-/// Slices small enough to keep every multiprocessor busy to the end, large enough to be worth loading the points.
+/// Slices small enough to keep every multiprocessor busy to the end, large enough to be worth
+/// loading the points.
 std::vector<Slice> cut_slices(const Segments& segments, unsigned multiprocessors) {
-  const std::uint32_t size = std::max(32u, std::min(2048u, segments.total() / (multiprocessors * 8)));
+  const std::uint32_t size =
+      std::max(32u, std::min(2048u, segments.total() / (multiprocessors * 8)));
   std::vector<Slice> out;
   for (std::uint32_t p = 0; p < segments.entries(); ++p)
     for (std::uint32_t begin = segments.offset[p]; begin < segments.offset[p + 1]; begin += size)
@@ -137,7 +165,8 @@ std::vector<Slice> cut_slices(const Segments& segments, unsigned multiprocessors
 
 }  // namespace
 
-DeviceBuffer<BestPose> score_hypotheses(Exec& exec, Span<const PairView> pairs, const Hypotheses& hypotheses, const ScoreOptions& options) {
+DeviceBuffer<BestPose> score_hypotheses(Exec& exec, Span<const PairView> pairs,
+                                        const Hypotheses& hypotheses, const ScoreOptions& options) {
   const std::uint32_t total = hypotheses.segments->total();
   const std::uint32_t count = static_cast<std::uint32_t>(pairs.size);
   const std::vector<ScorePair> host_pairs = score_pairs(pairs, options);
@@ -146,18 +175,36 @@ DeviceBuffer<BestPose> score_hypotheses(Exec& exec, Span<const PairView> pairs, 
   const auto directions_on_device = exec.upload(&directions, 1);
   const auto limits = exec.upload(limit_tables(options));
   const auto inliers = exec.filled<std::uint32_t>(total, 0xff);
-  const auto leaders = exec.filled<unsigned long long>(static_cast<std::size_t>(count) * kLeaders, 0);
+  const auto leaders =
+      exec.filled<unsigned long long>(static_cast<std::size_t>(count) * kLeaders, 0);
   const auto most = exec.filled<std::uint32_t>(count, 0);
   const auto next = exec.filled<std::uint32_t>(1, 0);
-  const Segments groups = make_segments(exec, count, [&](std::size_t p) { return host_pairs[p].order.groups; });
+  const Segments groups =
+      make_segments(exec, count, [&](std::size_t p) { return host_pairs[p].order.groups; });
   const std::size_t slots = std::size_t(groups.total()) * 32;
-  const auto misses = exec.filled<std::uint32_t>(groups.total(), 0), refuted = exec.filled<std::uint32_t>(slots, 0);
-  const auto by_misses = exec.buffer<std::uint32_t>(groups.total()), look_index = exec.buffer<std::uint32_t>(slots);
+  const auto misses = exec.filled<std::uint32_t>(groups.total(), 0),
+             refuted = exec.filled<std::uint32_t>(slots, 0);
+  const auto by_misses = exec.buffer<std::uint32_t>(groups.total()),
+             look_index = exec.buffer<std::uint32_t>(slots);
   const auto look_point = exec.buffer<float4>(slots), look_normal = exec.buffer<float4>(slots);
-  const ScoreBatch batch{pairs_on_device.data(), count, hypotheses.segments->on_device.data(), hypotheses.pose.data(), hypotheses.valid.data(),
-                         hypotheses.id, inlier_test(options.max_correspondence_distance, options.max_normal_angle), limits.data(),
-                         directions_on_device.data(), code_test(options.max_normal_angle), inliers.data(), leaders.data(), most.data(), next.data(),
-                         groups.on_device.data(), misses.data(), refuted.data(), by_misses.data(),
+  const ScoreBatch batch{pairs_on_device.data(),
+                         count,
+                         hypotheses.segments->on_device.data(),
+                         hypotheses.pose.data(),
+                         hypotheses.valid.data(),
+                         hypotheses.id,
+                         inlier_test(options.max_correspondence_distance, options.max_normal_angle),
+                         limits.data(),
+                         directions_on_device.data(),
+                         code_test(options.max_normal_angle),
+                         inliers.data(),
+                         leaders.data(),
+                         most.data(),
+                         next.data(),
+                         groups.on_device.data(),
+                         misses.data(),
+                         refuted.data(),
+                         by_misses.data(),
                          {look_point.data(), look_normal.data(), look_index.data()}};
   if (total > 0) {
     const unsigned processors = static_cast<unsigned>(exec.multiprocessors());
@@ -171,15 +218,22 @@ DeviceBuffer<BestPose> score_hypotheses(Exec& exec, Span<const PairView> pairs, 
     const std::vector<Slice> slices = cut_slices(*hypotheses.segments, processors);
     const auto slices_on_device = exec.upload(slices);
     // What is not taken of the multiprocessor's memory is cache, which has the codes.
-    const std::size_t room = exec.shared_bytes_per_block() > kFixedBytes ? exec.shared_bytes_per_block() - kFixedBytes : 0;
+    const std::size_t room = exec.shared_bytes_per_block() > kFixedBytes
+                                 ? exec.shared_bytes_per_block() - kFixedBytes
+                                 : 0;
     std::size_t bytes = 0;
     for (const ScorePair& pair : host_pairs) {
-      const std::size_t wanted = std::size_t(pair.order.groups) * 32 * kPointBytes + pair.cells.brick_runs() * sizeof(uint2);
+      const std::size_t wanted = std::size_t(pair.order.groups) * 32 * kPointBytes +
+                                 pair.cells.brick_runs() * sizeof(uint2);
       if (pair.cells.nx > 0 && wanted <= room) bytes = std::max(bytes, wanted);
     }
-    check(cudaFuncSetAttribute(score_slices, cudaFuncAttributeMaxDynamicSharedMemorySize, static_cast<int>(bytes)), "cudaFuncSetAttribute");
-    score_slices<<<std::min(static_cast<unsigned>(slices.size()), processors), kThreads, bytes, exec.stream()>>>(
-        batch, slices_on_device.data(), static_cast<std::uint32_t>(slices.size()), static_cast<std::uint32_t>(bytes));
+    check(cudaFuncSetAttribute(score_slices, cudaFuncAttributeMaxDynamicSharedMemorySize,
+                               static_cast<int>(bytes)),
+          "cudaFuncSetAttribute");
+    score_slices<<<std::min(static_cast<unsigned>(slices.size()), processors), kThreads, bytes,
+                   exec.stream()>>>(batch, slices_on_device.data(),
+                                    static_cast<std::uint32_t>(slices.size()),
+                                    static_cast<std::uint32_t>(bytes));
     check_launch("score_slices");
   }
   return select_best(exec, batch, total);

@@ -8,11 +8,14 @@
 
 namespace gpureg::cuda {
 
-constexpr std::uint32_t kProbeGroups = 4;   ///< groups of 32 points that tell promising hypotheses from others
-constexpr std::uint32_t kLeaders = 32;      ///< promising hypotheses of a pair, which are scored first
+/// groups of 32 points that tell promising hypotheses from others
+constexpr std::uint32_t kProbeGroups = 4;
+/// promising hypotheses of a pair, which are scored first
+constexpr std::uint32_t kLeaders = 32;
 constexpr int kProbeThreads = 256;
 
-/// Points with the class of their normal, normals (w: 0 where there is none), and their indices in the cloud.
+/// Points with the class of their normal, normals (w: 0 where there is none), and their indices in
+/// the cloud.
 struct LookOrder {
   float4* point;
   float4* normal;
@@ -23,23 +26,28 @@ struct LookOrder {
 struct ScoreBatch {
   const ScorePair* pairs;
   std::uint32_t pair_count;
-  const std::uint32_t* offset;      ///< of the pairs' hypotheses
+  const std::uint32_t* offset;  ///< of the pairs' hypotheses
   const Pose<float>* poses;
   const std::uint8_t* valid;
   const std::uint32_t* id;
   InlierTest test;
-  const Limits* limits;             ///< 2 x 256
+  const Limits* limits;  ///< 2 x 256
   const DirectionTables* directions;
   CodeTest code_test;
-  std::uint32_t* inliers;           ///< per hypothesis; kNoValue before it is scored, 0 where it was given up
-  unsigned long long* leaders;      ///< pairs x kLeaders: (possible + 1, ~number), the largest of each residue class; 0: none
-  std::uint32_t* most;              ///< per pair: inliers of the best so far
-  std::uint32_t* next;              ///< slices handed out
-  const std::uint32_t* group_offset;  ///< per pair, of the arrays by group; 32 times that, of the arrays by point
-  std::uint32_t* misses;            ///< per group: points that a sample of the hypotheses leaves without a partner, by the codes
-  std::uint32_t* refuted;           ///< per point of the scoring order: how often it looks like an inlier and is none
-  std::uint32_t* by_misses;         ///< groups of a pair, those with the most misses first
-  LookOrder look;                   ///< points of a pair, the most often refuted first
+  /// per hypothesis; kNoValue before it is scored, 0 where it was given up
+  std::uint32_t* inliers;
+  /// pairs x kLeaders: (possible + 1, ~number), the largest of each residue class; 0: none
+  unsigned long long* leaders;
+  std::uint32_t* most;  ///< per pair: inliers of the best so far
+  std::uint32_t* next;  ///< slices handed out
+  /// per pair, of the arrays by group; 32 times that, of the arrays by point
+  const std::uint32_t* group_offset;
+  /// per group: points that a sample of the hypotheses leaves without a partner, by the codes
+  std::uint32_t* misses;
+  /// per point of the scoring order: how often it looks like an inlier and is none
+  std::uint32_t* refuted;
+  std::uint32_t* by_misses;  ///< groups of a pair, those with the most misses first
+  LookOrder look;            ///< points of a pair, the most often refuted first
 
   __device__ LookOrder look_of(std::uint32_t pair) const {
     const std::size_t at = std::size_t(group_offset[pair]) * 32;
@@ -53,15 +61,21 @@ __device__ inline void load_limits(const Limits* from, Limits* to) {
   __syncthreads();
 }
 
-/// Looks up every `step`th point of one pose from the first: how many are inliers, and the sum of their residuals.
-__device__ inline unsigned long long support_by_search(const ScorePair& pair, const InlierTest& test, const Rigid& rigid, std::uint32_t first,
-                                                       std::uint32_t step, std::uint32_t& inliers) {
+/// Looks up every `step`th point of one pose from the first: how many are inliers, and the sum of
+/// their residuals.
+__device__ inline unsigned long long support_by_search(const ScorePair& pair,
+                                                       const InlierTest& test, const Rigid& rigid,
+                                                       std::uint32_t first, std::uint32_t step,
+                                                       std::uint32_t& inliers) {
   inliers = 0;
   unsigned long long residual = 0;
   for (std::uint32_t i = first; i < pair.source.size; i += step) {
-    const Closest found = find_closest(pair.target, pair.cells, apply(rigid, pair.source.points[i]), test.max_squared);
+    const Closest found = find_closest(pair.target, pair.cells, apply(rigid, pair.source.points[i]),
+                                       test.max_squared);
     if (found.index == kNoValue) continue;
-    if (!normals_agree(rotate(rigid, pair.source.normals[i]), pair.target.normals[found.index], test.min_cosine)) continue;
+    if (!normals_agree(rotate(rigid, pair.source.normals[i]), pair.target.normals[found.index],
+                       test.min_cosine))
+      continue;
     ++inliers;
     residual += fixed_residual(found.squared_distance, test.inverse_max_squared);
   }
@@ -71,11 +85,12 @@ __device__ inline unsigned long long support_by_search(const ScorePair& pair, co
 /// Finds promising hypotheses of each pair.
 void find_leaders(Exec& exec, const ScoreBatch& batch);
 
-/// Scores the leaders and some others of each pair, and learns from them in which order to look at the points. What they reach the others
-/// must beat.
+/// Scores the leaders and some others of each pair, and learns from them in which order to look at
+/// the points. What they reach the others must beat.
 void score_samples(Exec& exec, const ScoreBatch& batch, std::uint32_t most_groups);
 
-/// Chooses the best of the hypotheses whose `inliers` are the pair's most: smallest residual, then lowest number.
+/// Chooses the best of the hypotheses whose `inliers` are the pair's most: smallest residual, then
+/// lowest number.
 DeviceBuffer<BestPose> select_best(Exec& exec, const ScoreBatch& batch, std::uint32_t total);
 
 }  // namespace gpureg::cuda

@@ -14,7 +14,8 @@ namespace gpureg::cuda {
 namespace {
 
 constexpr int kCells = ClosestGridView::kBlockCells;
-/// Tables larger than this (a cloud with far stray points) are not worth their memory: then every point is looked at.
+/// Tables larger than this (a cloud with far stray points) are not worth their memory: then every
+/// point is looked at.
 constexpr std::uint64_t kMaxBlocks = std::uint64_t(1) << 22;
 /// BrickMotion counts cells, those of the empty blocks on both sides too, in 22 bits.
 constexpr std::uint64_t kMaxBlocksAlong = (std::uint64_t(1) << 19) - 2;
@@ -37,9 +38,13 @@ struct BrickPlace {
 };
 
 /// Where a quarter of a block is noted.
-__device__ BrickPlace place_of_brick(const CellSummaries& v, Cell block, std::uint32_t upper_y, std::uint32_t upper_z) {
-  const auto coordinate = [](std::int32_t c, float offset) { return static_cast<std::uint32_t>(c + static_cast<std::int32_t>(offset) / 8 + 1); };
-  const std::uint32_t x = coordinate(block.x, v.offset.x), y = 2 * coordinate(block.y, v.offset.y) + upper_y,
+__device__ BrickPlace place_of_brick(const CellSummaries& v, Cell block, std::uint32_t upper_y,
+                                     std::uint32_t upper_z) {
+  const auto coordinate = [](std::int32_t c, float offset) {
+    return static_cast<std::uint32_t>(c + static_cast<std::int32_t>(offset) / 8 + 1);
+  };
+  const std::uint32_t x = coordinate(block.x, v.offset.x),
+                      y = 2 * coordinate(block.y, v.offset.y) + upper_y,
                       z = 2 * coordinate(block.z, v.offset.z) + upper_z;
   return {(z * v.brick_rows_y() + y) * v.brick_words_x() + x / 32, 0x80000000u >> (x % 32)};
 }
@@ -49,9 +54,11 @@ __global__ void mark_bricks(const Slot* slots) {
   const Slot& s = slots[blockIdx.y];
   const CellSummaries& v = s.summaries;
   if (v.nx == 0) return;
-  for (std::uint32_t k = blockIdx.x * blockDim.x + threadIdx.x; k < s.block_count * 4; k += gridDim.x * blockDim.x) {
+  for (std::uint32_t k = blockIdx.x * blockDim.x + threadIdx.x; k < s.block_count * 4;
+       k += gridDim.x * blockDim.x) {
     const std::uint32_t b = k / 4, upper_y = k & 1, upper_z = (k >> 1) & 1;
-    const std::uint32_t* start = s.view.closest.cell_start.data + static_cast<std::size_t>(b) * (kCells + 1);
+    const std::uint32_t* start =
+        s.view.closest.cell_start.data + static_cast<std::size_t>(b) * (kCells + 1);
     bool any = false;
     for (std::uint32_t row = 0; row < 16; ++row) {
       const std::uint32_t cell = ((upper_z * 4 + row / 4) * 8 + upper_y * 4 + row % 4) * 8;
@@ -74,7 +81,9 @@ __global__ void __launch_bounds__(kNumberThreads) number_bricks(const Slot* slot
   for (std::uint32_t first = 0; first < runs; first += kNumberThreads) {
     const std::uint32_t k = first + threadIdx.x;
     std::uint32_t upto, all;
-    Scan(storage).InclusiveSum(k < runs ? static_cast<std::uint32_t>(__popc(static_cast<int>(v.run[k].x))) : 0u, upto, all);
+    Scan(storage).InclusiveSum(
+        k < runs ? static_cast<std::uint32_t>(__popc(static_cast<int>(v.run[k].x))) : 0u, upto,
+        all);
     if (k < runs) v.run[k].y = 16 * (before + upto);
     before += all;
     __syncthreads();
@@ -86,36 +95,45 @@ __global__ void summarize(const Slot* slots, const DirectionTables* tables) {
   const Slot& s = slots[blockIdx.y];
   if (s.summaries.nx == 0) return;
   const std::size_t cells = static_cast<std::size_t>(s.block_count) * kCells;
-  for (std::size_t k = static_cast<std::size_t>(blockIdx.x) * blockDim.x + threadIdx.x; k < cells; k += static_cast<std::size_t>(gridDim.x) * blockDim.x) {
+  for (std::size_t k = static_cast<std::size_t>(blockIdx.x) * blockDim.x + threadIdx.x; k < cells;
+       k += static_cast<std::size_t>(gridDim.x) * blockDim.x) {
     const std::size_t b = k / kCells;
     const int cell = static_cast<int>(k % kCells);
     const std::uint32_t* start = s.view.closest.cell_start.data + b * (kCells + 1) + cell;
     const Cell block = s.blocks[b];
-    const Cell c{block.x * 8 + (cell & 7), block.y * 8 + ((cell >> 3) & 7), block.z * 8 + (cell >> 6)};
-    const Span<const std::uint32_t> candidates{s.view.closest.candidates.data + start[0], start[1] - start[0]};
+    const Cell c{block.x * 8 + (cell & 7), block.y * 8 + ((cell >> 3) & 7),
+                 block.z * 8 + (cell >> 6)};
+    const Span<const std::uint32_t> candidates{s.view.closest.candidates.data + start[0],
+                                               start[1] - start[0]};
     const bool empty = candidates.size == 0;
     const bool short_list = candidates.size < 256 && start[0] < (1u << 24);
     // Eight lanes have the cells of a word.
-    std::uint32_t codes = empty ? 0u : code_of_cell(*tables, candidates, s.view.normals) << 4 * (cell & 7);
+    std::uint32_t codes =
+        empty ? 0u : code_of_cell(*tables, candidates, s.view.normals) << 4 * (cell & 7);
     for (int step = 1; step < 8; step *= 2) codes |= __shfl_xor_sync(~0u, codes, step);
     const BrickPlace place = place_of_brick(s.summaries, block, (cell >> 5) & 1, (cell >> 8) & 1);
     const uint2 run = s.summaries.run[place.run];
     if ((run.x & place.bit) == 0) continue;
-    const std::uint32_t from_here = static_cast<std::uint32_t>(__popc(static_cast<int>(run.x & (place.bit * 2 - 1))));
+    const std::uint32_t from_here =
+        static_cast<std::uint32_t>(__popc(static_cast<int>(run.x & (place.bit * 2 - 1))));
     const std::uint32_t word = run.y - 16 * from_here + ((cell >> 6) & 3) * 4 + ((cell >> 3) & 3);
     if ((cell & 7) == 0) s.summaries.brick[word] = codes;
-    s.summaries.cell[std::size_t(word) * 8 + (cell & 7)] =
-        make_uint2(empty ? 0u : summarize_cell(candidates, cell_center(c, s.geometry.cell_size), s.geometry, s.view.points, s.view.normals),
-                   short_list ? start[0] << 8 | static_cast<std::uint32_t>(candidates.size) : kNoValue);
+    s.summaries.cell[std::size_t(word) * 8 + (cell & 7)] = make_uint2(
+        empty ? 0u
+              : summarize_cell(candidates, cell_center(c, s.geometry.cell_size), s.geometry,
+                               s.view.points, s.view.normals),
+        short_list ? start[0] << 8 | static_cast<std::uint32_t>(candidates.size) : kNoValue);
   }
 }
 
 __global__ void copy_candidates(const Slot* slots) {
   const Slot& s = slots[blockIdx.y];
   const Span<const std::uint32_t> candidates = s.view.closest.candidates;
-  for (std::size_t k = static_cast<std::size_t>(blockIdx.x) * blockDim.x + threadIdx.x; k < candidates.size; k += static_cast<std::size_t>(gridDim.x) * blockDim.x) {
+  for (std::size_t k = static_cast<std::size_t>(blockIdx.x) * blockDim.x + threadIdx.x;
+       k < candidates.size; k += static_cast<std::size_t>(gridDim.x) * blockDim.x) {
     const Vec3 p = s.view.points[candidates[k]];
-    s.summaries.candidate[k] = make_float4(p.x, p.y, p.z, __uint_as_float(pack_normal(s.view.normals[candidates[k]])));
+    s.summaries.candidate[k] =
+        make_float4(p.x, p.y, p.z, __uint_as_float(pack_normal(s.view.normals[candidates[k]])));
   }
 }
 
@@ -133,18 +151,25 @@ __device__ std::uint32_t morton(std::uint32_t x, std::uint32_t y, std::uint32_t 
 __global__ void write_morton_keys(const Slot* slots, std::uint64_t* keys, std::uint32_t* index) {
   const Slot& s = slots[blockIdx.y];
   const float scale = 511.0f / s.view.radius;
-  for (std::uint32_t i = blockIdx.x * blockDim.x + threadIdx.x; i < s.view.size; i += gridDim.x * blockDim.x) {
+  for (std::uint32_t i = blockIdx.x * blockDim.x + threadIdx.x; i < s.view.size;
+       i += gridDim.x * blockDim.x) {
     const Vec3 p = s.view.points[i] * scale;
     const auto unit = [](float v) { return static_cast<std::uint32_t>(v + 512.0f); };
-    keys[s.point_offset + i] = static_cast<std::uint64_t>(blockIdx.y) << 30 | morton(unit(p.x), unit(p.y), unit(p.z));
+    keys[s.point_offset + i] =
+        static_cast<std::uint64_t>(blockIdx.y) << 30 | morton(unit(p.x), unit(p.y), unit(p.z));
     index[s.point_offset + i] = i;
   }
 }
 
-__global__ void write_order(const Slot* slots, const std::uint32_t* index, const DirectionTables* tables) {
+__global__ void write_order(const Slot* slots, const std::uint32_t* index,
+                            const DirectionTables* tables) {
   const Slot& s = slots[blockIdx.y];
-  for (std::uint32_t k = blockIdx.x * blockDim.x + threadIdx.x; k < s.order.groups * 32; k += gridDim.x * blockDim.x) {
-    const std::uint32_t from = static_cast<std::uint32_t>(static_cast<std::uint64_t>(k / 32) * s.group_step % s.order.groups) * 32 + k % 32;
+  for (std::uint32_t k = blockIdx.x * blockDim.x + threadIdx.x; k < s.order.groups * 32;
+       k += gridDim.x * blockDim.x) {
+    const std::uint32_t from = static_cast<std::uint32_t>(static_cast<std::uint64_t>(k / 32) *
+                                                          s.group_step % s.order.groups) *
+                                   32 +
+                               k % 32;
     const float nan = __uint_as_float(0x7fc00000u);
     float4 point = make_float4(nan, nan, nan, __uint_as_float(kClassNone));
     std::uint32_t normal = kPackedZero, i = kNoValue;
@@ -165,13 +190,21 @@ __global__ void write_order(const Slot* slots, const std::uint32_t* index, const
 ScoringLayout scoring_layout(const CudaCloud& cloud, const CellRange& blocks) {
   ScoringLayout l{};
   l.first_block = blocks.lo;
-  const std::uint64_t nx = static_cast<std::uint64_t>(blocks.hi.x - blocks.lo.x + 1), ny = static_cast<std::uint64_t>(blocks.hi.y - blocks.lo.y + 1),
+  const std::uint64_t nx = static_cast<std::uint64_t>(blocks.hi.x - blocks.lo.x + 1),
+                      ny = static_cast<std::uint64_t>(blocks.hi.y - blocks.lo.y + 1),
                       nz = static_cast<std::uint64_t>(blocks.hi.z - blocks.lo.z + 1);
   CellSummaries shape;
-  shape.nx = static_cast<std::int32_t>(nx), shape.ny = static_cast<std::int32_t>(ny), shape.nz = static_cast<std::int32_t>(nz);
-  const bool fits = nx <= kMaxBlocksAlong && ny <= kMaxBlocksAlong && nz <= kMaxBlocksAlong && nx * ny <= kMaxBlocks && nx * ny * nz <= kMaxBlocks &&
+  shape.nx = static_cast<std::int32_t>(nx);
+  shape.ny = static_cast<std::int32_t>(ny);
+  shape.nz = static_cast<std::int32_t>(nz);
+  const bool fits = nx <= kMaxBlocksAlong && ny <= kMaxBlocksAlong && nz <= kMaxBlocksAlong &&
+                    nx * ny <= kMaxBlocks && nx * ny * nz <= kMaxBlocks &&
                     shape.brick_runs() <= kMaxBlocks;
-  if (fits) l.nx = static_cast<std::int32_t>(nx), l.ny = static_cast<std::int32_t>(ny), l.nz = static_cast<std::int32_t>(nz);
+  if (fits) {
+    l.nx = static_cast<std::int32_t>(nx);
+    l.ny = static_cast<std::int32_t>(ny);
+    l.nz = static_cast<std::int32_t>(nz);
+  }
   const auto take = [&](std::size_t bytes) {
     const std::size_t at = l.bytes;
     l.bytes += (bytes + 255) / 256 * 256;
@@ -188,11 +221,16 @@ ScoringLayout scoring_layout(const CudaCloud& cloud, const CellRange& blocks) {
   return l;
 }
 
-void place_scoring_data(const ScoringLayout& l, const ClosestGeometry& geometry, char* memory, CudaCloud& cloud) {
+void place_scoring_data(const ScoringLayout& l, const ClosestGeometry& geometry, char* memory,
+                        CudaCloud& cloud) {
   CellSummaries& v = cloud.summaries;
   v.inverse_cell_size = 1.0f / geometry.cell_size;
-  v.offset = {-static_cast<float>(l.first_block.x) * 8.0f, -static_cast<float>(l.first_block.y) * 8.0f, -static_cast<float>(l.first_block.z) * 8.0f};
-  v.nx = l.nx, v.ny = l.ny, v.nz = l.nz;
+  v.offset = {-static_cast<float>(l.first_block.x) * 8.0f,
+              -static_cast<float>(l.first_block.y) * 8.0f,
+              -static_cast<float>(l.first_block.z) * 8.0f};
+  v.nx = l.nx;
+  v.ny = l.ny;
+  v.nz = l.nz;
   v.block_count = cloud.block_count;
   v.candidate = reinterpret_cast<float4*>(memory + l.candidates);
   cloud.order.groups = (cloud.size + 31) / 32;
@@ -204,7 +242,8 @@ void place_scoring_data(const ScoringLayout& l, const ClosestGeometry& geometry,
   v.brick = reinterpret_cast<std::uint32_t*>(memory + l.bricks);
 }
 
-void fill_scoring_data(Exec& exec, const std::vector<std::shared_ptr<CudaCloud>>& clouds, const std::vector<ClosestGeometry>& geometry) {
+void fill_scoring_data(Exec& exec, const std::vector<std::shared_ptr<CudaCloud>>& clouds,
+                       const std::vector<ClosestGeometry>& geometry) {
   std::vector<Slot> slots;
   std::uint32_t total = 0;
   for (std::size_t c = 0; c < clouds.size(); ++c) {
@@ -213,7 +252,8 @@ void fill_scoring_data(Exec& exec, const std::vector<std::shared_ptr<CudaCloud>>
     const std::uint32_t groups = cloud.order.groups;
     std::uint32_t step = static_cast<std::uint32_t>(0.6180339887 * groups) | 1u;
     while (groups > 0 && std::gcd(step, groups) != 1) ++step;
-    slots.push_back({cloud.view_on_device, v, cloud.order, geometry[c], cloud.blocks, cloud.block_count, step, total});
+    slots.push_back({cloud.view_on_device, v, cloud.order, geometry[c], cloud.blocks,
+                     cloud.block_count, step, total});
     total += cloud.size;
   }
   if (total == 0) return;
@@ -231,12 +271,14 @@ void fill_scoring_data(Exec& exec, const std::vector<std::shared_ptr<CudaCloud>>
   check_launch("summarize");
   copy_candidates<<<dim3(128, count), 256, 0, exec.stream()>>>(on_device.data());
   check_launch("copy_candidates");
-  write_morton_keys<<<dim3(16, count), 256, 0, exec.stream()>>>(on_device.data(), keys.data(), index.data());
+  write_morton_keys<<<dim3(16, count), 256, 0, exec.stream()>>>(on_device.data(), keys.data(),
+                                                                index.data());
   check_launch("write_morton_keys");
   int bits = 30;
   while ((std::size_t(1) << (bits - 30)) < clouds.size()) ++bits;
   sort_pairs(exec, keys, index, bits);
-  write_order<<<dim3(16, count), 256, 0, exec.stream()>>>(on_device.data(), index.data(), tables.data());
+  write_order<<<dim3(16, count), 256, 0, exec.stream()>>>(on_device.data(), index.data(),
+                                                          tables.data());
   check_launch("write_order");
 }
 

@@ -30,14 +30,17 @@ inline Segments segments_of(Exec& exec, std::vector<std::uint32_t> offset) {
   return s;
 }
 
-/// size(e): number of items of entry e. Throws InvalidArgument where the whole exceeds what 31 bits count.
+/// size(e): number of items of entry e. Throws InvalidArgument where the whole exceeds what 31 bits
+/// count.
 template <typename Size>
 Segments make_segments(Exec& exec, std::size_t entries, Size&& size) {
   std::vector<std::uint32_t> offset{0};
   std::uint64_t sum = 0;
   for (std::size_t e = 0; e < entries; ++e) {
     sum += size(e);
-    if (sum > 0x7fffffffu) throw InvalidArgument("a batch of " + std::to_string(sum) + " items exceeds 2^31 - 1: hand it over in parts");
+    if (sum > 0x7fffffffu)
+      throw InvalidArgument("a batch of " + std::to_string(sum) +
+                            " items exceeds 2^31 - 1: hand it over in parts");
     offset.push_back(static_cast<std::uint32_t>(sum));
   }
   return segments_of(exec, std::move(offset));

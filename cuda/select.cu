@@ -6,11 +6,14 @@ namespace gpureg::cuda {
 namespace {
 
 constexpr int kThreads = 256;
-constexpr std::uint32_t kParts = 8;  // thread blocks for a tie: mostly there is one a pair, and the walk over the cloud should be short
+// thread blocks for a tie: mostly there is one a pair, and the walk over the cloud should be short
+constexpr std::uint32_t kParts = 8;
 constexpr int kRankThreads = 1024;
 
 /// Lists the hypotheses that share the most inliers of their pair, in any order.
-__global__ void __launch_bounds__(kThreads) list_ties(ScoreBatch b, std::uint32_t* ties, std::uint32_t* count, unsigned long long* residual) {
+__global__ void __launch_bounds__(kThreads)
+    list_ties(ScoreBatch b, std::uint32_t* ties, std::uint32_t* count,
+              unsigned long long* residual) {
   const std::uint32_t h = blockIdx.x * kThreads + threadIdx.x, total = b.offset[b.pair_count];
   const std::uint32_t p = entry_in_block(b.offset, b.pair_count, blockIdx.x * kThreads, h);
   if (h >= total || !b.valid[h] || b.inliers[h] != b.most[p]) return;
@@ -19,24 +22,30 @@ __global__ void __launch_bounds__(kThreads) list_ties(ScoreBatch b, std::uint32_
 }
 
 /// Their residuals.
-__global__ void __launch_bounds__(kThreads) measure_ties(ScoreBatch b, const std::uint32_t* ties, const std::uint32_t* count, unsigned long long* residual) {
+__global__ void __launch_bounds__(kThreads)
+    measure_ties(ScoreBatch b, const std::uint32_t* ties, const std::uint32_t* count,
+                 unsigned long long* residual) {
   const unsigned long long parts = static_cast<unsigned long long>(*count) * kParts;
   for (unsigned long long k = blockIdx.x; k < parts; k += gridDim.x) {
     const std::uint32_t h = ties[k / kParts], p = entry_of(b.offset, b.pair_count, h);
     std::uint32_t inliers;
-    const unsigned long long mine = support_by_search(b.pairs[p], b.test, to_rigid(b.poses[h]), static_cast<std::uint32_t>(k % kParts) * kThreads + threadIdx.x,
-                                                      kParts * kThreads, inliers);
+    const unsigned long long mine =
+        support_by_search(b.pairs[p], b.test, to_rigid(b.poses[h]),
+                          static_cast<std::uint32_t>(k % kParts) * kThreads + threadIdx.x,
+                          kParts * kThreads, inliers);
     if (mine > 0) atomicAdd(residual + h, mine);
   }
 }
 
-/// The smallest residual of each pair, and the first drawn of those who have it. Hypotheses are in the order of their numbers, so the first is
-/// the lowest. One thread block: there are few ties.
-__global__ void __launch_bounds__(kRankThreads) write_best(ScoreBatch b, const std::uint32_t* ties, const std::uint32_t* count,
-                                                           const unsigned long long* residual, unsigned long long* least, std::uint32_t* winner,
-                                                           BestPose* best) {
+/// The smallest residual of each pair, and the first drawn of those who have it. Hypotheses are in
+/// the order of their numbers, so the first is the lowest. One thread block: there are few ties.
+__global__ void __launch_bounds__(kRankThreads)
+    write_best(ScoreBatch b, const std::uint32_t* ties, const std::uint32_t* count,
+               const unsigned long long* residual, unsigned long long* least, std::uint32_t* winner,
+               BestPose* best) {
   const std::uint32_t ties_in_all = *count;
-  for (std::uint32_t k = threadIdx.x; k < ties_in_all; k += kRankThreads) atomicMin(least + entry_of(b.offset, b.pair_count, ties[k]), residual[ties[k]]);
+  for (std::uint32_t k = threadIdx.x; k < ties_in_all; k += kRankThreads)
+    atomicMin(least + entry_of(b.offset, b.pair_count, ties[k]), residual[ties[k]]);
   __syncthreads();
   for (std::uint32_t k = threadIdx.x; k < ties_in_all; k += kRankThreads) {
     const std::uint32_t h = ties[k], p = entry_of(b.offset, b.pair_count, h);
@@ -65,13 +74,17 @@ DeviceBuffer<BestPose> select_best(Exec& exec, const ScoreBatch& batch, std::uin
   const auto ties = exec.buffer<std::uint32_t>(total);
   const auto tie_count = exec.filled<std::uint32_t>(1, 0);
   if (total > 0) {
-    list_ties<<<blocks_for(total, kThreads), kThreads, 0, exec.stream()>>>(batch, ties.data(), tie_count.data(), residual.data());
+    list_ties<<<blocks_for(total, kThreads), kThreads, 0, exec.stream()>>>(
+        batch, ties.data(), tie_count.data(), residual.data());
     check_launch("list_ties");
     const unsigned full = static_cast<unsigned>(exec.multiprocessors()) * 8;
-    measure_ties<<<full, kThreads, 0, exec.stream()>>>(batch, ties.data(), tie_count.data(), residual.data());
+    measure_ties<<<full, kThreads, 0, exec.stream()>>>(batch, ties.data(), tie_count.data(),
+                                                       residual.data());
     check_launch("measure_ties");
   }
-  write_best<<<1, kRankThreads, 0, exec.stream()>>>(batch, ties.data(), tie_count.data(), residual.data(), least.data(), winner.data(), best.data());
+  write_best<<<1, kRankThreads, 0, exec.stream()>>>(batch, ties.data(), tie_count.data(),
+                                                    residual.data(), least.data(), winner.data(),
+                                                    best.data());
   check_launch("write_best");
   return best;
 }

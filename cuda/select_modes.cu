@@ -8,11 +8,13 @@ namespace {
 constexpr int kThreads = 256, kWarps = kThreads / 32;
 constexpr std::uint32_t kMostCandidates = 32 * kThreads;  // a bit each in a thread's word
 
-/// A thread block per pair takes the most promising candidate, the first of equals, drops all that are the same, and so on: what the
-/// CPU finds by going through them in order.
-__global__ void __launch_bounds__(kThreads) select(std::uint32_t most, const std::uint32_t* count, const Pose<float>* poses, const float* promises,
-                                                   const std::uint32_t* seeds, float min_trace, float squared_distance, std::uint32_t most_modes,
-                                                   Mode* modes, std::uint32_t* mode_count) {
+/// A thread block per pair takes the most promising candidate, the first of equals, drops all that
+/// are the same, and so on: what the CPU finds by going through them in order.
+__global__ void __launch_bounds__(kThreads)
+    select(std::uint32_t most, const std::uint32_t* count, const Pose<float>* poses,
+           const float* promises, const std::uint32_t* seeds, float min_trace,
+           float squared_distance, std::uint32_t most_modes, Mode* modes,
+           std::uint32_t* mode_count) {
   __shared__ unsigned long long warp_best[kWarps];
   const std::uint32_t p = blockIdx.x, size = count[p];
   const std::size_t begin = static_cast<std::size_t>(p) * most;
@@ -22,9 +24,11 @@ __global__ void __launch_bounds__(kThreads) select(std::uint32_t most, const std
   for (; taken < most_modes; ++taken) {
     unsigned long long best = 0;
     for (std::uint32_t bits = left; bits != 0; bits &= bits - 1) {
-      const std::uint32_t k = (static_cast<std::uint32_t>(__ffs(static_cast<int>(bits))) - 1) * kThreads + threadIdx.x;
+      const std::uint32_t k =
+          (static_cast<std::uint32_t>(__ffs(static_cast<int>(bits))) - 1) * kThreads + threadIdx.x;
       // Promises are not negative: their bits have their order.
-      best = max(best, static_cast<unsigned long long>(__float_as_uint(promises[begin + k])) << 32 | ~k);
+      best = max(best,
+                 static_cast<unsigned long long>(__float_as_uint(promises[begin + k])) << 32 | ~k);
     }
     for (int step = 16; step > 0; step /= 2) best = max(best, __shfl_xor_sync(~0u, best, step));
     if (threadIdx.x % 32 == 0) warp_best[threadIdx.x / 32] = best;
@@ -35,11 +39,14 @@ __global__ void __launch_bounds__(kThreads) select(std::uint32_t most, const std
     if (best == 0) break;
     const std::uint32_t winner = ~static_cast<std::uint32_t>(best);
     const Rigid one = to_rigid(poses[begin + winner]);
-    if (threadIdx.x == 0) modes[static_cast<std::size_t>(p) * most_modes + taken] = {widen(poses[begin + winner]), seeds[begin + winner], 0};
+    if (threadIdx.x == 0)
+      modes[static_cast<std::size_t>(p) * most_modes + taken] = {widen(poses[begin + winner]),
+                                                                 seeds[begin + winner], 0};
     for (std::uint32_t bits = left; bits != 0; bits &= bits - 1) {
       const int r = __ffs(static_cast<int>(bits)) - 1;
       const std::uint32_t k = static_cast<std::uint32_t>(r) * kThreads + threadIdx.x;
-      if (k == winner || same_mode(to_rigid(poses[begin + k]), one, min_trace, squared_distance)) left &= ~(1u << r);
+      if (k == winner || same_mode(to_rigid(poses[begin + k]), one, min_trace, squared_distance))
+        left &= ~(1u << r);
     }
   }
   if (threadIdx.x == 0) mode_count[p] = taken;
@@ -54,10 +61,10 @@ Modes select_modes(Exec& exec, const Candidates& candidates, const EvidenceOptio
   out.most = options.modes;
   out.mode = exec.buffer<Mode>(pairs * out.most);
   out.count = exec.buffer<std::uint32_t>(pairs);
-  select<<<static_cast<unsigned>(pairs), kThreads, 0, exec.stream()>>>(candidates.most, candidates.count.data(), candidates.pose.data(),
-                                                                       candidates.promise.data(), candidates.seed.data(), mode_trace(options.mode_angle),
-                                                                       options.mode_distance * options.mode_distance, out.most, out.mode.data(),
-                                                                       out.count.data());
+  select<<<static_cast<unsigned>(pairs), kThreads, 0, exec.stream()>>>(
+      candidates.most, candidates.count.data(), candidates.pose.data(), candidates.promise.data(),
+      candidates.seed.data(), mode_trace(options.mode_angle),
+      options.mode_distance * options.mode_distance, out.most, out.mode.data(), out.count.data());
   check_launch("select");
   return out;
 }

@@ -16,7 +16,8 @@ void pack_rows(const RowsToUpload& part, float* out) {
   if (part.stride == part.width) {
     std::memcpy(out, part.rows, part.count * part.width * sizeof(float));
   } else {
-    for (std::size_t i = 0; i < part.count; ++i) std::copy_n(part.rows + i * part.stride, part.width, out + i * part.width);
+    for (std::size_t i = 0; i < part.count; ++i)
+      std::copy_n(part.rows + i * part.stride, part.width, out + i * part.width);
   }
 }
 
@@ -30,7 +31,8 @@ Uploader::~Uploader() {
 void Uploader::prepare_slots() {
   if (!slots_.data()) slots_ = PinnedBuffer(kThreads * kSlots * kSlotBytes);
   for (cudaEvent_t& event : free_)
-    if (!event) check(cudaEventCreateWithFlags(&event, cudaEventDisableTiming), "cudaEventCreateWithFlags");
+    if (!event)
+      check(cudaEventCreateWithFlags(&event, cudaEventDisableTiming), "cudaEventCreateWithFlags");
 }
 
 void Uploader::upload(Span<const RowsToUpload> parts, int device, cudaStream_t stream) {
@@ -38,12 +40,14 @@ void Uploader::upload(Span<const RowsToUpload> parts, int device, cudaStream_t s
   for (const RowsToUpload& part : parts) {
     const std::size_t rows = kSlotBytes / (part.width * sizeof(float));
     for (std::size_t first = 0; first < part.count; first += rows)
-      pieces.push_back({part.rows + first * part.stride, std::min(rows, part.count - first), part.width, part.stride, part.device + first * part.width});
+      pieces.push_back({part.rows + first * part.stride, std::min(rows, part.count - first),
+                        part.width, part.stride, part.device + first * part.width});
   }
   if (pieces.empty()) return;
   prepare_slots();
   // One core packs slower than the bus carries; for a few pieces a thread is not worth its start.
-  const std::size_t threads = std::min<std::size_t>({kThreads, 1 + pieces.size() / 16, std::max(1u, std::thread::hardware_concurrency())});
+  const std::size_t threads = std::min<std::size_t>(
+      {kThreads, 1 + pieces.size() / 16, std::max(1u, std::thread::hardware_concurrency())});
   std::atomic<std::size_t> next{0};
   on_threads(threads, [&](std::size_t thread) {
     const DeviceScope scope(device);
@@ -53,7 +57,9 @@ void Uploader::upload(Span<const RowsToUpload> parts, int device, cudaStream_t s
       float* staged = reinterpret_cast<float*>(slots_.data() + slot * kSlotBytes);
       check(cudaEventSynchronize(free_[slot]), "the upload of raw points");
       pack_rows(pieces[k], staged);
-      check(cudaMemcpyAsync(pieces[k].device, staged, pieces[k].count * pieces[k].width * sizeof(float), cudaMemcpyHostToDevice, stream),
+      check(cudaMemcpyAsync(pieces[k].device, staged,
+                            pieces[k].count * pieces[k].width * sizeof(float),
+                            cudaMemcpyHostToDevice, stream),
             "cudaMemcpyAsync of raw points");
       check(cudaEventRecord(free_[slot], stream), "cudaEventRecord");
     }

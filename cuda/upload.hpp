@@ -16,8 +16,9 @@ struct RowsToUpload {
   float* device;
 };
 
-/// Brings ordinary host memory to the device at the speed of the bus: some threads pack pieces into page-locked slots, which the device
-/// copies while the next are packed. The slots are few: page-locked memory is slow to come by.
+/// Brings ordinary host memory to the device at the speed of the bus: some threads pack pieces into
+/// page-locked slots, which the device copies while the next are packed. The slots are few:
+/// page-locked memory is slow to come by.
 class Uploader {
  public:
   Uploader() = default;

@@ -5,7 +5,8 @@
 
 namespace gpureg::cuda {
 
-// Integer reductions over a full warp: every lane gets the result. One instruction from compute capability 8.0 on.
+// Integer reductions over a full warp: every lane gets the result. One instruction from compute
+// capability 8.0 on.
 #if !defined(__CUDA_ARCH__) || __CUDA_ARCH__ >= 800
 __device__ inline std::uint32_t warp_sum(std::uint32_t v) { return __reduce_add_sync(~0u, v); }
 __device__ inline std::uint32_t warp_max(std::uint32_t v) { return __reduce_max_sync(~0u, v); }
@@ -14,12 +15,28 @@ __device__ inline std::int32_t warp_min(std::int32_t v) { return __reduce_min_sy
 #else
 template <typename T, typename Combine>
 __device__ T warp_combine(T v, Combine combine) {
-  for (int step = 16; step > 0; step /= 2) v = combine(v, static_cast<T>(__shfl_xor_sync(~0u, v, step)));
+  for (int step = 16; step > 0; step /= 2)
+    v = combine(v, static_cast<T>(__shfl_xor_sync(~0u, v, step)));
   return v;
 }
-struct Add { template <typename T> __device__ T operator()(T a, T b) const { return a + b; } };
-struct Larger { template <typename T> __device__ T operator()(T a, T b) const { return a > b ? a : b; } };
-struct Smaller { template <typename T> __device__ T operator()(T a, T b) const { return a < b ? a : b; } };
+struct Add {
+  template <typename T>
+  __device__ T operator()(T a, T b) const {
+    return a + b;
+  }
+};
+struct Larger {
+  template <typename T>
+  __device__ T operator()(T a, T b) const {
+    return a > b ? a : b;
+  }
+};
+struct Smaller {
+  template <typename T>
+  __device__ T operator()(T a, T b) const {
+    return a < b ? a : b;
+  }
+};
 __device__ inline std::uint32_t warp_sum(std::uint32_t v) { return warp_combine(v, Add()); }
 __device__ inline std::uint32_t warp_max(std::uint32_t v) { return warp_combine(v, Larger()); }
 __device__ inline std::int32_t warp_max(std::int32_t v) { return warp_combine(v, Larger()); }

@@ -34,11 +34,20 @@ __device__ void put(T& out, T value, bool alone) {
     atomicAdd(reinterpret_cast<Atomic*>(&out), static_cast<Atomic>(value));
 }
 __device__ void put(SideEvidence& out, const SideEvidence& e, bool alone) {
-  put(out.balanced, e.balanced, alone), put(out.residual, e.residual, alone);
-  put(out.facing_seen, e.facing_seen, alone), put(out.facing_before, e.facing_before, alone);
-  put(out.tested, e.tested, alone), put(out.inliers, e.inliers, alone), put(out.hits, e.hits, alone);
-  put(out.seen, e.seen, alone), put(out.before, e.before, alone), put(out.hidden, e.hidden, alone);
-  put(out.around, e.around, alone), put(out.near_front, e.near_front, alone), put(out.far_front, e.far_front, alone), put(out.at_back, e.at_back, alone);
+  put(out.balanced, e.balanced, alone);
+  put(out.residual, e.residual, alone);
+  put(out.facing_seen, e.facing_seen, alone);
+  put(out.facing_before, e.facing_before, alone);
+  put(out.tested, e.tested, alone);
+  put(out.inliers, e.inliers, alone);
+  put(out.hits, e.hits, alone);
+  put(out.seen, e.seen, alone);
+  put(out.before, e.before, alone);
+  put(out.hidden, e.hidden, alone);
+  put(out.around, e.around, alone);
+  put(out.near_front, e.near_front, alone);
+  put(out.far_front, e.far_front, alone);
+  put(out.at_back, e.at_back, alone);
 }
 __device__ void put(Moments& out, const Moments& m, bool alone) {
   put(out.count, m.count, alone);
@@ -48,32 +57,73 @@ __device__ void put(Moments& out, const Moments& m, bool alone) {
 
 /// Thread 0 has the whole block's.
 __device__ SideEvidence of_block(const SideEvidence& e, std::int64_t* scratch) {
-  std::int64_t v[14] = {static_cast<std::int64_t>(e.balanced), static_cast<std::int64_t>(e.residual), e.tested, e.inliers, e.hits, e.seen, e.before, e.hidden,
-                        e.around, e.near_front, e.far_front, e.at_back, static_cast<std::int64_t>(e.facing_seen), static_cast<std::int64_t>(e.facing_before)};
+  std::int64_t v[14] = {static_cast<std::int64_t>(e.balanced),
+                        static_cast<std::int64_t>(e.residual),
+                        e.tested,
+                        e.inliers,
+                        e.hits,
+                        e.seen,
+                        e.before,
+                        e.hidden,
+                        e.around,
+                        e.near_front,
+                        e.far_front,
+                        e.at_back,
+                        static_cast<std::int64_t>(e.facing_seen),
+                        static_cast<std::int64_t>(e.facing_before)};
   block_sum(v, scratch);
   const auto count = [&](int k) { return static_cast<std::uint32_t>(v[k]); };
-  return {static_cast<std::uint64_t>(v[0]), static_cast<std::uint64_t>(v[1]), static_cast<std::uint64_t>(v[12]), static_cast<std::uint64_t>(v[13]), count(2), count(3), count(4), count(5), count(6), count(7), count(8), count(9), count(10), count(11)};
+  return {static_cast<std::uint64_t>(v[0]),
+          static_cast<std::uint64_t>(v[1]),
+          static_cast<std::uint64_t>(v[12]),
+          static_cast<std::uint64_t>(v[13]),
+          count(2),
+          count(3),
+          count(4),
+          count(5),
+          count(6),
+          count(7),
+          count(8),
+          count(9),
+          count(10),
+          count(11)};
 }
 
 __device__ Moments of_block(const Moments& m, std::int64_t* scratch) {
-  std::int64_t v[10] = {static_cast<std::int64_t>(m.count), m.sum[0], m.sum[1], m.sum[2], m.outer[0], m.outer[1], m.outer[2], m.outer[3], m.outer[4], m.outer[5]};
+  std::int64_t v[10] = {static_cast<std::int64_t>(m.count),
+                        m.sum[0],
+                        m.sum[1],
+                        m.sum[2],
+                        m.outer[0],
+                        m.outer[1],
+                        m.outer[2],
+                        m.outer[3],
+                        m.outer[4],
+                        m.outer[5]};
   block_sum(v, scratch);
-  return {static_cast<std::uint64_t>(v[0]), {v[1], v[2], v[3]}, {v[4], v[5], v[6], v[7], v[8], v[9]}};
+  return {
+      static_cast<std::uint64_t>(v[0]), {v[1], v[2], v[3]}, {v[4], v[5], v[6], v[7], v[8], v[9]}};
 }
 
-__device__ MatchEvidence count_matches(const WeighModes& w, std::uint32_t p, const Rigid& rigid, std::uint32_t first, std::uint32_t step, std::int64_t* scratch) {
+__device__ MatchEvidence count_matches(const WeighModes& w, std::uint32_t p, const Rigid& rigid,
+                                       std::uint32_t first, std::uint32_t step,
+                                       std::int64_t* scratch) {
   std::int64_t v[3] = {0, 0, 0};
   const MatchSetView& m = w.matches;
   for (std::uint32_t k = first; k < w.match_count[p]; k += step) {
     const std::uint32_t at = w.room[p] + k;
-    if (!(squared_norm(apply(rigid, {m.px[at], m.py[at], m.pz[at]}) - Vec3{m.qx[at], m.qy[at], m.qz[at]}) < w.squared_distance)) continue;
+    if (!(squared_norm(apply(rigid, {m.px[at], m.py[at], m.pz[at]}) -
+                       Vec3{m.qx[at], m.qy[at], m.qz[at]}) < w.squared_distance))
+      continue;
     ++v[0], v[1] += m.source_weight[at], v[2] += m.target_weight[at];
   }
   block_sum(v, scratch);
-  return {static_cast<std::uint64_t>(v[1]), static_cast<std::uint64_t>(v[2]), static_cast<std::uint32_t>(v[0])};
+  return {static_cast<std::uint64_t>(v[1]), static_cast<std::uint64_t>(v[2]),
+          static_cast<std::uint32_t>(v[0])};
 }
 
-/// A thread block per mode and side (z: even ones move the source, odd ones the target), or several.
+/// A thread block per mode and side (z: even ones move the source, odd ones the target), or
+/// several.
 __global__ void __launch_bounds__(kThreads) weigh(WeighModes w) {
   __shared__ std::int64_t scratch[kThreads / 32 * 24];
   const std::uint32_t p = blockIdx.y;
@@ -83,14 +133,16 @@ __global__ void __launch_bounds__(kThreads) weigh(WeighModes w) {
   const Mode& mode = w.modes[at];
   ModeOutcome& out = w.out[at];
   const Rigid there = to_rigid(mode.pose);
-  const std::uint32_t parts = gridDim.z / 2, part = blockIdx.z / 2, first = part * kThreads + threadIdx.x, step = parts * kThreads;
+  const std::uint32_t parts = gridDim.z / 2, part = blockIdx.z / 2,
+                      first = part * kThreads + threadIdx.x, step = parts * kThreads;
   const bool alone = parts == 1;
   SideEvidence side{};
   if (blockIdx.z % 2 == 1) {
     const Rigid back = inverse(there);
     for (std::uint32_t i = first; i < t.size; i += step) {
       const Vec3 q = apply(back, t.points[i]);
-      weigh_found(t, s, back, w.test, s.visibility.count, i, q, find_closest(s, w.pairs[p].source_cells, q, w.test.inlier.max_squared), side);
+      weigh_found(t, s, back, w.test, s.visibility.count, i, q,
+                  find_closest(s, w.pairs[p].source_cells, q, w.test.inlier.max_squared), side);
     }
     side = of_block(side, scratch);
     if (threadIdx.x == 0) put(out.target, side, alone);
@@ -101,7 +153,8 @@ __global__ void __launch_bounds__(kThreads) weigh(WeighModes w) {
   for (std::uint32_t i = first; i < s.size; i += step) {
     const Vec3 q = apply(there, s.points[i]);
     const Weighed found =
-        weigh_found(s, t, there, w.test, t.visibility.count, i, q, find_closest(t, w.pairs[p].target_cells, q, w.test.inlier.max_squared), side);
+        weigh_found(s, t, there, w.test, t.visibility.count, i, q,
+                    find_closest(t, w.pairs[p].target_cells, q, w.test.inlier.max_squared), side);
     if (found.inlier) add_information(s, there, i, information);
     if (found.closest == kNoValue) continue;
     add_moment(s.points[i] * (1.0f / s.radius), source);
@@ -116,30 +169,45 @@ __global__ void __launch_bounds__(kThreads) weigh(WeighModes w) {
   target = of_block(target, scratch);
   const MatchEvidence matches = count_matches(w, p, there, first, step, scratch);
   if (threadIdx.x != 0) return;
-  if (part == 0) out.pose = mode.pose, out.hypothesis = mode.seed, out.iterations = mode.iterations;
-  put(out.matches.source_weight, matches.source_weight, alone), put(out.matches.target_weight, matches.target_weight, alone);
-  put(out.matches.inliers, matches.inliers, alone), put(out.source, side, alone);
+  if (part == 0) {
+    out.pose = mode.pose;
+    out.hypothesis = mode.seed;
+    out.iterations = mode.iterations;
+  }
+  put(out.matches.source_weight, matches.source_weight, alone);
+  put(out.matches.target_weight, matches.target_weight, alone);
+  put(out.matches.inliers, matches.inliers, alone);
+  put(out.source, side, alone);
 #pragma unroll
-  for (int k = 0; k < 24; ++k) put(k < 21 ? out.information.v[k] : out.information.arm[k - 21], sums[k], alone);
-  put(out.source_moments, source, alone), put(out.target_moments, target, alone);
+  for (int k = 0; k < 24; ++k)
+    put(k < 21 ? out.information.v[k] : out.information.arm[k - 21], sums[k], alone);
+  put(out.source_moments, source, alone);
+  put(out.target_moments, target, alone);
 }
 
 }  // namespace
 
-void weigh_modes(Exec& exec, Span<const PairView> pairs, const MatchSets& matches, const Candidates& candidates, const Modes& modes,
+void weigh_modes(Exec& exec, Span<const PairView> pairs, const MatchSets& matches,
+                 const Candidates& candidates, const Modes& modes,
                  const RegistrationOptions& options, Span<PairOutcome> outcomes) {
   const auto views = upload_search_pairs(exec, pairs);
   // Filled: what no mode is written to is copied along, and parts are added up.
   const auto weighed = exec.filled<ModeOutcome>(pairs.size * modes.most, 0);
   const auto& score = options.score;
   const auto& evidence = options.evidence;
-  const EvidenceTest test{inlier_test(score.max_correspondence_distance, evidence.max_normal_angle), evidence.free_space_margin, evidence.min_range};
+  const EvidenceTest test{inlier_test(score.max_correspondence_distance, evidence.max_normal_angle),
+                          evidence.free_space_margin, evidence.min_range};
   // Where there are too few blocks to fill the device, several share a mode.
-  const std::size_t blocks = 2 * std::size_t(modes.most) * pairs.size, processors = static_cast<std::size_t>(exec.multiprocessors());
-  const unsigned parts = static_cast<unsigned>(std::clamp<std::size_t>(4 * processors / blocks, 1, 8));
-  weigh<<<dim3(modes.most, static_cast<unsigned>(pairs.size), 2 * parts), kThreads, 0, exec.stream()>>>(
-      WeighModes{views.data(), matches.view(), matches.room.on_device.data(), matches.count.data(), modes.most, modes.mode.data(), modes.count.data(), test,
-                 options.compatibility.consensus_distance * options.compatibility.consensus_distance, weighed.data()});
+  const std::size_t blocks = 2 * std::size_t(modes.most) * pairs.size,
+                    processors = static_cast<std::size_t>(exec.multiprocessors());
+  const unsigned parts =
+      static_cast<unsigned>(std::clamp<std::size_t>(4 * processors / blocks, 1, 8));
+  weigh<<<dim3(modes.most, static_cast<unsigned>(pairs.size), 2 * parts), kThreads, 0,
+          exec.stream()>>>(WeighModes{
+      views.data(), matches.view(), matches.room.on_device.data(), matches.count.data(), modes.most,
+      modes.mode.data(), modes.count.data(), test,
+      options.compatibility.consensus_distance * options.compatibility.consensus_distance,
+      weighed.data()});
   check_launch("weigh");
   const ModeOutcome* mode = exec.download(weighed.data(), weighed.size());
   const std::uint32_t* mode_count = exec.download(modes.count.data(), pairs.size);
@@ -150,8 +218,10 @@ void weigh_modes(Exec& exec, Span<const PairView> pairs, const MatchSets& matche
   for (std::size_t p = 0; p < pairs.size; ++p) {
     PairOutcome& out = outcomes[p];
     out.modes.assign(mode + p * modes.most, mode + p * modes.most + mode_count[p]);
-    out.match_weight_source = total[2 * p], out.match_weight_target = total[2 * p + 1];
-    out.statistics.source_points = pairs[p].source.size, out.statistics.target_points = pairs[p].target.size;
+    out.match_weight_source = total[2 * p];
+    out.match_weight_target = total[2 * p + 1];
+    out.statistics.source_points = pairs[p].source.size;
+    out.statistics.target_points = pairs[p].target.size;
     out.statistics.correspondences = match_count[p];
     out.statistics.hypotheses = std::min(options.compatibility.seeds, match_count[p]);
     out.statistics.survivors = candidate_count[p];

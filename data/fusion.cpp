@@ -12,8 +12,8 @@ namespace {
 using Eigen::Vector3f;
 using Eigen::Vector3i;
 
-constexpr float kTruncation = 0.04f;  // metres on each side: wider than the noise at 4 m, narrower
-                                      // than most furniture is thick
+// metres on each side: wider than the noise at 4 m, narrower than most furniture is thick
+constexpr float kTruncation = 0.04f;
 
 std::size_t inside(const Vector3i& v) {
   return static_cast<std::size_t>((v.x() & 7) | ((v.y() & 7) << 3) | ((v.z() & 7) << 6));

@@ -17,8 +17,8 @@ struct SensorOptions {
   double pixel_shift = 0.5;  ///< sigma in pixels of the random lookup shift (Barron & Malik 2013)
   double disparity_noise =
       1.0 / 6.0;  ///< sigma in disparity steps, before rounding to a step (Barron & Malik 2013)
-  double distortion = 0.007;  ///< amplitude of the smooth depth distortion, relative to the depth,
-                              ///< at 3 m; grows linearly
+  /// amplitude of the smooth depth distortion, relative to the depth, at 3 m; grows linearly
+  double distortion = 0.007;
   double odometry_translation =
       0.0002;  ///< drift inside a fragment: sigma in metres per frame and axis
   double odometry_rotation_degrees =
@@ -32,11 +32,12 @@ struct GenerateOptions {
   /// A mesh to scan instead of a building of its own: metres, z up (glTF and COLLADA: as the file
   /// has it), floor at z = 0, one storey. Any format that Assimp reads.
   std::string building;
-  double clutter = 0;  ///< 0 .. 2, with building: pieces of furniture per square metre that are put
-                       ///< into it, so that what was copied in it differs
-  bool rgbd = false;   ///< also write the frames as a TUM sequence (about 0.6 MB and several times
-                       ///< the work per frame)
-  int threads = 0;     ///< 0: all cores; each holds one fragment's volume (about 100 MB)
+  /// 0 .. 2, with building: pieces of furniture per square metre that are put into it, so that what
+  /// was copied in it differs
+  double clutter = 0;
+  /// also write the frames as a TUM sequence (about 0.6 MB and several times the work per frame)
+  bool rgbd = false;
+  int threads = 0;  ///< 0: all cores; each holds one fragment's volume (about 100 MB)
   SensorOptions sensor;
 };
 

@@ -45,7 +45,9 @@ void MeshBuilder::connect_grid(std::uint32_t first, int columns, int rows) {
 
 void MeshBuilder::quad(const Vector3f& a, const Vector3f& b, const Vector3f& c, const Vector3f& d) {
   const std::uint32_t first = vertex(a);
-  vertex(b), vertex(c), vertex(d);
+  vertex(b);
+  vertex(c);
+  vertex(d);
   triangle(first, first + 1, first + 2);
   triangle(first, first + 2, first + 3);
 }

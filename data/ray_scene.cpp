@@ -56,8 +56,12 @@ RayScene::~RayScene() = default;
 
 RayHit RayScene::cast(const Eigen::Vector3f& origin, const Eigen::Vector3f& direction) const {
   RTCRayHit ray;
-  ray.ray.org_x = origin.x(), ray.ray.org_y = origin.y(), ray.ray.org_z = origin.z();
-  ray.ray.dir_x = direction.x(), ray.ray.dir_y = direction.y(), ray.ray.dir_z = direction.z();
+  ray.ray.org_x = origin.x();
+  ray.ray.org_y = origin.y();
+  ray.ray.org_z = origin.z();
+  ray.ray.dir_x = direction.x();
+  ray.ray.dir_y = direction.y();
+  ray.ray.dir_z = direction.z();
   ray.ray.tnear = 0;
   ray.ray.tfar = std::numeric_limits<float>::infinity();
   ray.ray.time = 0;

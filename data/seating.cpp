@@ -12,61 +12,61 @@ Piece chair(Random& random) {
               back = random.uniform(0.82f, 1.0f);
   const int slats = random.between(2, 5);
   const bool padded = random.chance(0.5f);
-  return {
-      w, d, back, [=](MeshBuilder& mesh, Random& r) {
-        mesh.paint(wood(r));
-        for (const float x : {-w / 2 + 0.02f, w / 2 - 0.02f}) {
-          mesh.tube({{x, d - 0.03f, 0}, {x * 0.95f, d - 0.05f, 0.44f}}, 0.018f);
-          mesh.tube({{x, 0.0f, 0}, {x, 0.05f, 0.44f}, {x, 0.02f, 0.7f}, {x, -0.03f, back}}, 0.018f);
-          mesh.tube({{x, 0.03f, 0.2f}, {x, d - 0.04f, 0.2f}}, 0.01f);
-        }
-        mesh.box({-w / 2, 0.02f, 0.42f}, {w / 2, d, 0.45f});
-        for (int i = 0; i < slats; ++i) {
-          const float z =
-              0.52f + (back - 0.58f) * static_cast<float>(i + 1) / static_cast<float>(slats);
-          mesh.sheet(
-              [&](float u, float v) -> Vector3f {
-                const float x = (u - 0.5f) * (w - 0.04f);
-                return {x, -0.02f - 0.03f * std::cos(3.0f * x / w), z - 0.05f * v};
-              },
-              6, 1);
-        }
-        if (padded) {
-          mesh.paint(fabric(r));
-          mesh.cushion({-w / 2 + 0.02f, 0.05f, 0.44f}, {w / 2 - 0.02f, d - 0.02f, 0.50f});
-        }
-      }};
+  return {w, d, back, [=](MeshBuilder& mesh, Random& r) {
+            mesh.paint(wood(r));
+            for (const float x : {-w / 2 + 0.02f, w / 2 - 0.02f}) {
+              mesh.tube({{x, d - 0.03f, 0}, {x * 0.95f, d - 0.05f, 0.44f}}, 0.018f);
+              mesh.tube({{x, 0.0f, 0}, {x, 0.05f, 0.44f}, {x, 0.02f, 0.7f}, {x, -0.03f, back}},
+                        0.018f);
+              mesh.tube({{x, 0.03f, 0.2f}, {x, d - 0.04f, 0.2f}}, 0.01f);
+            }
+            mesh.box({-w / 2, 0.02f, 0.42f}, {w / 2, d, 0.45f});
+            for (int i = 0; i < slats; ++i) {
+              const float z =
+                  0.52f + (back - 0.58f) * static_cast<float>(i + 1) / static_cast<float>(slats);
+              mesh.sheet(
+                  [&](float u, float v) -> Vector3f {
+                    const float x = (u - 0.5f) * (w - 0.04f);
+                    return {x, -0.02f - 0.03f * std::cos(3.0f * x / w), z - 0.05f * v};
+                  },
+                  6, 1);
+            }
+            if (padded) {
+              mesh.paint(fabric(r));
+              mesh.cushion({-w / 2 + 0.02f, 0.05f, 0.44f}, {w / 2 - 0.02f, d - 0.02f, 0.50f});
+            }
+          }};
 }
 
 Piece office_chair(Random& random) {
   const float seat = random.uniform(0.45f, 0.52f);
-  return {
-      0.6f, 0.6f, 1.05f, [=](MeshBuilder& mesh, Random& r) {
-        mesh.paint(metal(r));
-        const Vector3f hub(0, 0.3f, 0.1f);
-        for (int i = 0; i < 5; ++i) {
-          const float a = 1.2566f * static_cast<float>(i) + 0.3f;
-          const Vector3f end = hub + Vector3f(0.28f * std::cos(a), 0.28f * std::sin(a), -0.05f);
-          mesh.tube({hub, end}, 0.02f);
-          mesh.ellipsoid(end - Vector3f(0, 0, 0.02f), {0.03f, 0.03f, 0.03f});
-        }
-        mesh.cylinder({0, 0.3f, 0.1f}, 0.03f, seat - 0.12f);
-        mesh.paint(fabric(r));
-        mesh.cushion({-0.25f, 0.06f, seat - 0.04f}, {0.25f, 0.56f, seat + 0.05f});
-        mesh.sheet(
-            [&](float u, float v) -> Vector3f {
-              const float x = 0.46f * (u - 0.5f) * (1 - 0.3f * v * v);
-              return {x, 0.02f + 1.1f * x * x - 0.05f * std::sin(5 * v), seat + 0.1f + 0.5f * v};
-            },
-            10, 10);
-        for (const float x : {-0.29f, 0.29f}) {
-          mesh.tube({{x * 0.8f, 0.3f, seat},
-                     {x, 0.3f, seat},
-                     {x, 0.25f, seat + 0.2f},
-                     {x, 0.45f, seat + 0.2f}},
-                    0.018f);
-        }
-      }};
+  return {0.6f, 0.6f, 1.05f, [=](MeshBuilder& mesh, Random& r) {
+            mesh.paint(metal(r));
+            const Vector3f hub(0, 0.3f, 0.1f);
+            for (int i = 0; i < 5; ++i) {
+              const float a = 1.2566f * static_cast<float>(i) + 0.3f;
+              const Vector3f end = hub + Vector3f(0.28f * std::cos(a), 0.28f * std::sin(a), -0.05f);
+              mesh.tube({hub, end}, 0.02f);
+              mesh.ellipsoid(end - Vector3f(0, 0, 0.02f), {0.03f, 0.03f, 0.03f});
+            }
+            mesh.cylinder({0, 0.3f, 0.1f}, 0.03f, seat - 0.12f);
+            mesh.paint(fabric(r));
+            mesh.cushion({-0.25f, 0.06f, seat - 0.04f}, {0.25f, 0.56f, seat + 0.05f});
+            mesh.sheet(
+                [&](float u, float v) -> Vector3f {
+                  const float x = 0.46f * (u - 0.5f) * (1 - 0.3f * v * v);
+                  return {x, 0.02f + 1.1f * x * x - 0.05f * std::sin(5 * v),
+                          seat + 0.1f + 0.5f * v};
+                },
+                10, 10);
+            for (const float x : {-0.29f, 0.29f}) {
+              mesh.tube({{x * 0.8f, 0.3f, seat},
+                         {x, 0.3f, seat},
+                         {x, 0.25f, seat + 0.2f},
+                         {x, 0.45f, seat + 0.2f}},
+                        0.018f);
+            }
+          }};
 }
 
 namespace {

@@ -109,64 +109,64 @@ Piece kitchen_counter(Random& random) {
   const int units = random.between(3, 5);
   const float w = 0.6f * static_cast<float>(units), d = 0.62f;
   const int sink = random.below(units), stove = random.below(units);
-  return {
-      w, d, 2.1f, [=](MeshBuilder& mesh, Random& r) {
-        const Material front = r.chance(0.5f) ? paint(r) : wood(r);
-        mesh.paint(front);
-        mesh.box({-w / 2, 0, 0.1f}, {w / 2, d - 0.04f, 0.87f});
-        doors(mesh, r, w, d - 0.04f, 0.12f, 0.86f, units);
-        // Upper cupboards, with a gap for the hood.
-        for (int i = 0; i < units; ++i) {
-          const float left = -w / 2 + 0.6f * static_cast<float>(i);
-          if (i == stove) {
-            mesh.sheet(
-                [&](float u, float v) -> Eigen::Vector3f {
-                  const float half = 0.28f - 0.16f * v;
-                  return {left + 0.3f + (2 * u - 1) * half, 0.45f - 0.25f * v, 1.55f + 0.5f * v};
-                },
-                4, 6);
-            mesh.box({left + 0.02f, 0, 1.5f}, {left + 0.58f, 0.45f, 1.55f});
-            mesh.box({left + 0.2f, 0, 1.55f}, {left + 0.4f, 0.2f, 2.4f});
-          } else if (r.chance(0.8f)) {
-            mesh.box({left + 0.005f, 0, 1.45f}, {left + 0.595f, 0.33f, 2.1f});
-            mesh.box({left + 0.02f, 0.33f, 1.46f}, {left + 0.58f, 0.35f, 2.09f});
-            handle(mesh, left + 0.08f, 0.35f, 1.5f, 0.12f);
-          }
-        }
-        Material top;
-        top.pattern = Pattern::marble;
-        top.base = {0.35f, 0.33f, 0.32f};
-        top.second = {0.6f, 0.58f, 0.55f};
-        top.scale = 0.4f;
-        mesh.paint(top);
-        mesh.box({-w / 2, 0, 0.87f}, {w / 2, d, 0.91f});
-        mesh.paint(metal(r));
-        const float basin = -w / 2 + 0.6f * static_cast<float>(sink) + 0.3f;
-        mesh.lathe({basin, 0.32f, 0.91f},
-                   {{0.21f, 0.02f}, {0.19f, 0.02f}, {0.19f, 0.003f}, {0, 0.003f}}, 24);
-        mesh.tube({{basin, 0.08f, 0.91f},
-                   {basin, 0.08f, 1.12f},
-                   {basin, 0.13f, 1.18f},
-                   {basin, 0.22f, 1.18f},
-                   {basin, 0.25f, 1.12f}},
-                  0.013f, 8);
-        const float plate = -w / 2 + 0.6f * static_cast<float>(stove) + 0.3f;
-        for (int i = 0; i < 2; ++i) {
-          const float x = plate + (i ? 0.14f : -0.14f), y = r.uniform(0.2f, 0.42f),
-                      radius = r.uniform(0.08f, 0.13f);
-          const float h = r.uniform(0.06f, 0.2f);
-          mesh.lathe({x, y, 0.91f},
-                     {{0, 0},
-                      {radius, 0},
-                      {radius, h},
-                      {radius - 0.01f, h},
-                      {radius - 0.01f, 0.02f},
-                      {0, 0.02f}},
-                     20);
-          mesh.tube({{x, y + radius, 0.9f + h}, {x, y + radius + 0.15f, 0.92f + h}}, 0.01f);
-        }
-        litter(mesh, r, {-w / 2, 0.05f, 0.91f}, {w / 2, 0.3f, 0.91f}, units + 1);
-      }};
+  return {w, d, 2.1f, [=](MeshBuilder& mesh, Random& r) {
+            const Material front = r.chance(0.5f) ? paint(r) : wood(r);
+            mesh.paint(front);
+            mesh.box({-w / 2, 0, 0.1f}, {w / 2, d - 0.04f, 0.87f});
+            doors(mesh, r, w, d - 0.04f, 0.12f, 0.86f, units);
+            // Upper cupboards, with a gap for the hood.
+            for (int i = 0; i < units; ++i) {
+              const float left = -w / 2 + 0.6f * static_cast<float>(i);
+              if (i == stove) {
+                mesh.sheet(
+                    [&](float u, float v) -> Eigen::Vector3f {
+                      const float half = 0.28f - 0.16f * v;
+                      return {left + 0.3f + (2 * u - 1) * half, 0.45f - 0.25f * v,
+                              1.55f + 0.5f * v};
+                    },
+                    4, 6);
+                mesh.box({left + 0.02f, 0, 1.5f}, {left + 0.58f, 0.45f, 1.55f});
+                mesh.box({left + 0.2f, 0, 1.55f}, {left + 0.4f, 0.2f, 2.4f});
+              } else if (r.chance(0.8f)) {
+                mesh.box({left + 0.005f, 0, 1.45f}, {left + 0.595f, 0.33f, 2.1f});
+                mesh.box({left + 0.02f, 0.33f, 1.46f}, {left + 0.58f, 0.35f, 2.09f});
+                handle(mesh, left + 0.08f, 0.35f, 1.5f, 0.12f);
+              }
+            }
+            Material top;
+            top.pattern = Pattern::marble;
+            top.base = {0.35f, 0.33f, 0.32f};
+            top.second = {0.6f, 0.58f, 0.55f};
+            top.scale = 0.4f;
+            mesh.paint(top);
+            mesh.box({-w / 2, 0, 0.87f}, {w / 2, d, 0.91f});
+            mesh.paint(metal(r));
+            const float basin = -w / 2 + 0.6f * static_cast<float>(sink) + 0.3f;
+            mesh.lathe({basin, 0.32f, 0.91f},
+                       {{0.21f, 0.02f}, {0.19f, 0.02f}, {0.19f, 0.003f}, {0, 0.003f}}, 24);
+            mesh.tube({{basin, 0.08f, 0.91f},
+                       {basin, 0.08f, 1.12f},
+                       {basin, 0.13f, 1.18f},
+                       {basin, 0.22f, 1.18f},
+                       {basin, 0.25f, 1.12f}},
+                      0.013f, 8);
+            const float plate = -w / 2 + 0.6f * static_cast<float>(stove) + 0.3f;
+            for (int i = 0; i < 2; ++i) {
+              const float x = plate + (i ? 0.14f : -0.14f), y = r.uniform(0.2f, 0.42f),
+                          radius = r.uniform(0.08f, 0.13f);
+              const float h = r.uniform(0.06f, 0.2f);
+              mesh.lathe({x, y, 0.91f},
+                         {{0, 0},
+                          {radius, 0},
+                          {radius, h},
+                          {radius - 0.01f, h},
+                          {radius - 0.01f, 0.02f},
+                          {0, 0.02f}},
+                         20);
+              mesh.tube({{x, y + radius, 0.9f + h}, {x, y + radius + 0.15f, 0.92f + h}}, 0.01f);
+            }
+            litter(mesh, r, {-w / 2, 0.05f, 0.91f}, {w / 2, 0.3f, 0.91f}, units + 1);
+          }};
 }
 
 Piece fridge(Random& random) {

@@ -22,7 +22,10 @@ Vector2f place_in(const Room& room, const WalkMap& map, Random& random, const Ve
                      random.uniform(room.floor.low.y(), room.floor.high.y()));
     const float value =
         map.free(p) ? std::min(1.6f, (p - last).norm()) + 0.2f * random.uniform() : -2;
-    if (value > score) score = value, best = p;
+    if (value > score) {
+      score = value;
+      best = p;
+    }
   }
   return best;
 }
@@ -123,7 +126,8 @@ std::vector<Vector2f> tour_of_places(const RayScene& scene, std::uint64_t seed, 
       if ((away < 2 || away > kLeg) && attempt < 40) continue;
       const int before = visits[square(p)];
       if (before >= fewest) continue;
-      fewest = before, best = p;
+      fewest = before;
+      best = p;
       if (back || attempt >= 40) break;
     }
     const std::size_t from = line.points().size();

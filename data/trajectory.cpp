@@ -75,7 +75,10 @@ float choose_gaze(const RayScene& scene, const Vector2f& at, float heading, std:
       }
     }
     const float value = seen / 45 - 0.08f * std::abs(offset);
-    if (value > score) score = value, best = offset;
+    if (value > score) {
+      score = value;
+      best = offset;
+    }
   }
   return best;
 }

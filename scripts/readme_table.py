@@ -1,10 +1,12 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""Writes the tables of measured figures in README.md and docs from the records in bench/results; scripts/tables says how.
+"""Writes the tables of measured figures in README.md and docs from the records in bench/results;
+scripts/tables says how.
 
 A table stands between <!-- table NAME --> and <!-- end -->; no figure in it is typed by hand.
 usage: readme_table.py          rewrite the tables
        readme_table.py --check  exit status 1 where a file does not say what the records say"""
+
 import argparse
 import pathlib
 import re
@@ -20,11 +22,14 @@ TABLES = {**accuracy.TABLES, **peers.TABLES, **speed.TABLES}
 def rewritten(text):
     def table(match):
         return match[1] + "\n" + "\n".join(TABLES[match[2]]()) + "\n" + match[3]
+
     return re.sub(r"(<!-- table (\w+) -->)\n.*?(<!-- end -->)", table, text, flags=re.DOTALL)
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("--check", action="store_true")
     check = parser.parse_args().check
     stale = []

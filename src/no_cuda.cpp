@@ -6,18 +6,23 @@
 namespace gpureg {
 
 namespace {
-constexpr char kNotBuilt[] = "this build of gpureg has no CUDA backend (configure with -DGPUREG_CUDA=ON)";
+constexpr char kNotBuilt[] =
+    "this build of gpureg has no CUDA backend (configure with -DGPUREG_CUDA=ON)";
 }
 
 std::shared_ptr<Engine> make_cuda_engine(int) { throw BackendUnavailable(kNotBuilt); }
-std::shared_ptr<Engine> make_cuda_engine(const CudaOptions&) { throw BackendUnavailable(kNotBuilt); }
+std::shared_ptr<Engine> make_cuda_engine(const CudaOptions&) {
+  throw BackendUnavailable(kNotBuilt);
+}
 
 std::vector<std::string> describe_cuda_devices() { return {"cuda: not in this build"}; }
 
-std::future<PreparedCloud> prepare_async(const Context& context, const DevicePointCloudView& cloud, const PrepareOptions& options, CudaStream) {
+std::future<PreparedCloud> prepare_async(const Context& context, const DevicePointCloudView& cloud,
+                                         const PrepareOptions& options, CudaStream) {
   options.validate();
   cloud.validate();
-  throw InvalidArgument("clouds in device memory need a CUDA context, this one is " + context.description());
+  throw InvalidArgument("clouds in device memory need a CUDA context, this one is " +
+                        context.description());
 }
 
 }  // namespace gpureg

@@ -87,7 +87,9 @@ void refuse_agreed(const ResultFile& file) {
   bool agreed = file.document.contains("agreement");
   for (const PairRecord& pair : file.pairs) agreed |= pair.json.contains("agreement");
   if (agreed)
-    throw IoError(file.path + ": its scores are those of `gpureg agree` already; give the RESULT.json of the batch");
+    throw IoError(
+        file.path +
+        ": its scores are those of `gpureg agree` already; give the RESULT.json of the batch");
 }
 
 int run(const AgreeOptions& o) {
@@ -124,8 +126,10 @@ int run(const AgreeOptions& o) {
     records.push_back(agreed_record(record, agreed[k], min_confidence));
     const PairRecord after = PairRecord::from_json(records.back());
     count = std::max({count, record.i + 1, record.j + 1});
-    raised += agreed[k].confidence > record.score, lowered += agreed[k].confidence < record.score;
-    changed += agreed[k].mode != 0, before += record.aligned;
+    raised += agreed[k].confidence > record.score;
+    lowered += agreed[k].confidence < record.score;
+    changed += agreed[k].mode != 0;
+    before += record.aligned;
     if (after.aligned) log.push_back({after.i, after.j, 0, *after.transform});
   }
   for (const Json& fragment : file.document.value("fragments", Json::array()))

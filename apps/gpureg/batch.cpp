@@ -44,7 +44,7 @@ struct BatchOptions {
 
 // A device or pipe (/dev/stdout, say) has no place beside it.
 bool can_have_journal(const std::string& path) {
-  struct stat status {};
+  struct stat status{};
   return ::stat(path.c_str(), &status) != 0 || S_ISREG(status.st_mode);
 }
 

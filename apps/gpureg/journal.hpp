@@ -32,8 +32,8 @@ class Journal {
   Journal(const Journal&) = delete;
   Journal& operator=(const Journal&) = delete;
 
-  /// What can be refused before there is a header, and hours of work: a journal that another process
-  /// writes, and with fresh one that holds pairs. Changes nothing. Throws IoError.
+  /// What can be refused before there is a header, and hours of work: a journal that another
+  /// process writes, and with fresh one that holds pairs. Changes nothing. Throws IoError.
   static void check(const std::string& path, Mode mode);
 
   const Entries& entries() const { return entries_; }

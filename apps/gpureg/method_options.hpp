@@ -33,8 +33,8 @@ struct MethodOptions {
   /// Throws InvalidArgument naming field and value, or options that do not go together.
   RegistrationOptions registration() const;
 
-  /// Where the voxel size is automatic: makes it the one that the clouds suggest. what: for the message. Throws InvalidArgument where
-  /// they suggest none.
+  /// Where the voxel size is automatic: makes it the one that the clouds suggest. what: for the
+  /// message. Throws InvalidArgument where they suggest none.
   void choose_voxel_size(const std::vector<PointCloudView>& clouds, const std::string& what);
 
   /// Throws BackendUnavailable, InvalidArgument.

@@ -16,7 +16,8 @@ struct NamedPath {
   std::string path;
 };
 
-/// The files of a folder that `name` stands for, as far as they are there: those that the verbs read.
+/// The files of a folder that `name` stands for, as far as they are there: those that the verbs
+/// read.
 std::vector<NamedPath> truth_files(const std::string& name, const std::string& folder);
 std::vector<NamedPath> scene_files(const std::string& name, const std::string& folder);
 

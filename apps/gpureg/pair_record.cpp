@@ -70,8 +70,10 @@ PairRecord PairRecord::from_json(const Json& json) {
   const Json& pose = member(json, "T_ij");
   if (!pose.is_null()) record.transform = square<4>(pose, "T_ij");
   // The first mode is the pose itself.
-  if (const auto modes = json.find("modes"); modes != json.end() && modes->is_array() && !modes->empty())
-    record.strict_score = number(member(modes->front(), "overlap_confidence"), "overlap_confidence");
+  if (const auto modes = json.find("modes");
+      modes != json.end() && modes->is_array() && !modes->empty())
+    record.strict_score =
+        number(member(modes->front(), "overlap_confidence"), "overlap_confidence");
   if (record.aligned && !record.transform)
     throw InvalidArgument("a pair is aligned, but its \"T_ij\" is null");
   const Json& ms = member(json, "ms");

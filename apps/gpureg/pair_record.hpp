@@ -18,7 +18,8 @@ struct PairRecord {
   bool aligned = false;
   std::string reason;
   double score = 0;
-  std::optional<double> strict_score;  ///< probability of a right pose and of 30 % overlap, where it was estimated
+  /// probability of a right pose and of 30 % overlap, where it was estimated
+  std::optional<double> strict_score;
   std::optional<Eigen::Matrix4d> transform;  ///< T_ij: fragment j into fragment i
   double milliseconds = 0;                   ///< all stages
   Json json;                                 ///< everything, as written to RESULT.json
@@ -29,7 +30,8 @@ struct PairRecord {
   static PairRecord from_json(const Json& json);
 };
 
-/// The modes of a pair's record: poses and confidences, without their evidence. Throws InvalidArgument.
+/// The modes of a pair's record: poses and confidences, without their evidence. Throws
+/// InvalidArgument.
 std::vector<RegistrationMode> modes_from_json(const Json& pair);
 
 /// 6x6, row by row. Throws InvalidArgument.

@@ -135,7 +135,9 @@ Image halved(const Image& large) {
       int sum[3] = {0, 0, 0};
       for (int k = 0; k < kSuper * kSuper; ++k) {
         const Color& c = large.at(x * kSuper + k % kSuper, y * kSuper + k / kSuper);
-        sum[0] += c.r, sum[1] += c.g, sum[2] += c.b;
+        sum[0] += c.r;
+        sum[1] += c.g;
+        sum[2] += c.b;
       }
       const auto mean = [](int s) {
         return static_cast<std::uint8_t>((s + kSuper * kSuper / 2) / (kSuper * kSuper));

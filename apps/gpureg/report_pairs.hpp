@@ -13,8 +13,9 @@ namespace gpureg::cli {
 struct JudgedPair {
   const PairRecord* pair = nullptr;
   bool in_truth = false;  ///< overlap >= 30 %: it ought to be found
-  bool right = false;  ///< its pose, reported or not, is within 0.2 m of the truth (of any overlap,
-                       ///< where gt_all is there)
+  /// its pose, reported or not, is within 0.2 m of the truth (of any overlap, where gt_all is
+  /// there)
+  bool right = false;
 };
 std::vector<JudgedPair> judge(const evaluation::GroundTruth& truth, const ResultFile& result);
 

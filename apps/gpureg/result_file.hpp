@@ -17,7 +17,7 @@ struct ResultFile {
   std::vector<PairRecord> pairs;  ///< JSON only
   std::vector<evaluation::Report> reports;
   std::vector<evaluation::LogEntry> log;  ///< logs only
-  Json document;  ///< JSON only, without its pairs
+  Json document;                          ///< JSON only, without its pairs
 
   double mean_milliseconds() const;          ///< per pair; 0 without pairs
   double mean_prepare_milliseconds() const;  ///< per fragment; 0 where not known
@@ -26,7 +26,8 @@ struct ResultFile {
 /// Told apart by content. Throws IoError naming the file and what is wrong.
 ResultFile read_result(const std::string& path);
 
-/// Throws IoError naming file and place where a result cannot be one of the scene that the truth is of.
+/// Throws IoError naming file and place where a result cannot be one of the scene that the truth is
+/// of.
 void check_belongs(const ResultFile& result, const std::string& truth_folder,
                    const evaluation::GroundTruth& truth);
 

@@ -87,7 +87,8 @@ Json to_json(const RegistrationResult& result, const char* pose_name) {
       result.has_candidate ? to_json(result.target_from_source.matrix()) : Json(nullptr);
   if (!result.modes.empty()) {
     json["modes"] = Json::array();
-    for (const RegistrationMode& mode : result.modes) json["modes"].push_back(to_json(mode, pose_name));
+    for (const RegistrationMode& mode : result.modes)
+      json["modes"].push_back(to_json(mode, pose_name));
   }
   json["statistics"] = to_json(result.statistics);
   json["ms"] = to_json(result.timings);
@@ -101,8 +102,8 @@ Json environment(const Context& context) {
 }
 
 double peak_memory_mib() {
-  // getrusage also counts the program that started this one, from before exec: a script that holds a
-  // gigabyte would be reported as ours.
+  // getrusage also counts the program that started this one, from before exec: a script that holds
+  // a gigabyte would be reported as ours.
   std::ifstream status("/proc/self/status");
   for (std::string key; status >> key; std::getline(status, key))
     if (double kib = 0; key == "VmHWM:" && status >> kib) return kib / 1024.0;

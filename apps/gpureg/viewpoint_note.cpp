@@ -11,7 +11,10 @@ void ViewpointNote::see(const PointCloud& cloud, const std::string& file) {
   const double share = cloud.view().share_facing_away();
   if (share <= PointCloudView::kMostFacingAway) return;
   ++clouds_;
-  if (share > most_) most_ = share, worst_ = file;
+  if (share > most_) {
+    most_ = share;
+    worst_ = file;
+  }
 }
 
 void ViewpointNote::print() const {

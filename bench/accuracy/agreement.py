@@ -1,14 +1,18 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""What loops of three add to the confidences of single pairs: `gpureg agree` on results of all pairs of a scene.
+"""What loops of three add to the confidences of single pairs: `gpureg agree` on results of all
+pairs of a scene.
 
-A run is SCENE_FOLDER=RESULT.json: what `gpureg batch --json` wrote for a scene whose folder has gt.log and gt.info, perhaps gt_all.log
-and gt_all.info. The record has `gpureg evaluate`'s geometric figures before and after, the expected calibration error (10 bins) and
-how many of the reports above 0.9 are right. SCENE_FOLDER is relative to the data's folder. Where it has poses.txt, the record also has how often
-loops of three reported poses close (twice the default tolerances), by whether all three are right: AgreementOptions' chance and miss.
+A run is SCENE_FOLDER=RESULT.json: what `gpureg batch --json` wrote for a scene whose folder has
+gt.log and gt.info, perhaps gt_all.log and gt_all.info. The record has `gpureg evaluate`'s geometric
+figures before and after, the expected calibration error (10 bins) and how many of the reports above
+0.9 are right. SCENE_FOLDER is relative to the data's folder. Where it has poses.txt, the record
+also has how often loops of three reported poses close (twice the default tolerances), by whether
+all three are right: AgreementOptions' chance and miss.
 
 usage: agreement.py RUN... [--data DIR] [-o FILE]
 Needs numpy."""
+
 import itertools
 import json
 import pathlib
@@ -18,8 +22,13 @@ import numpy as np
 import record
 
 LEAST_CONFIDENCE = 0.3  # of a pose that takes part in the loops that are counted
-ANGLE, DISTANCE = 6.0, 0.3  # degrees, metres: within which a loop closes; a little more, and a pose is wrong
-AHEAD = np.array([0, 0, 2.0, 1])  # where a fragment is looked at: two metres before its first camera
+ANGLE, DISTANCE = (
+    6.0,
+    0.3,
+)  # degrees, metres: within which a loop closes; a little more, and a pose is wrong
+AHEAD = np.array(
+    [0, 0, 2.0, 1]
+)  # where a fragment is looked at: two metres before its first camera
 
 parser = record.parser(__doc__, "agreement.json")
 parser.add_argument("runs", nargs="+", metavar="RUN")
@@ -39,14 +48,23 @@ def figures(folder, result, temporary):
         inside = [(c, right) for c, right in pairs if min(int(10 * c), 9) == k]
         error += abs(sum(c for c, _ in inside) - sum(right for _, right in inside)) / len(pairs)
     sure = [right for c, right in pairs if c > 0.9]
-    return {"rule": rule, "raw_recall": 100 * score["raw_recall"], "R@P95": 100 * score["recall_at_precision"]["95"],
-            "R@P99": 100 * score["recall_at_precision"]["99"], "AP": 100 * score["average_precision"], "calibration_error": error,
-            "above_0.9": len(sure), "right_above_0.9": 100 * sum(sure) / len(sure) if sure else None}
+    return {
+        "rule": rule,
+        "raw_recall": 100 * score["raw_recall"],
+        "R@P95": 100 * score["recall_at_precision"]["95"],
+        "R@P99": 100 * score["recall_at_precision"]["99"],
+        "AP": 100 * score["average_precision"],
+        "calibration_error": error,
+        "above_0.9": len(sure),
+        "right_above_0.9": 100 * sum(sure) / len(sure) if sure else None,
+    }
 
 
 def off(motion):
     """How far a motion that should be none turns and moves what lies ahead."""
-    return np.degrees(np.arccos(np.clip((np.trace(motion[:3, :3]) - 1) / 2, -1, 1))), np.linalg.norm((motion @ AHEAD - AHEAD)[:3])
+    return np.degrees(
+        np.arccos(np.clip((np.trace(motion[:3, :3]) - 1) / 2, -1, 1))
+    ), np.linalg.norm((motion @ AHEAD - AHEAD)[:3])
 
 
 def closing(folder, result):
@@ -55,7 +73,7 @@ def closing(folder, result):
     if not path.exists():
         return None
     rows = [line.split() for line in path.read_text().splitlines()]
-    world = {int(rows[k][0]): np.array(rows[k + 1:k + 5], float) for k in range(0, len(rows), 5)}
+    world = {int(rows[k][0]): np.array(rows[k + 1 : k + 5], float) for k in range(0, len(rows), 5)}
     poses, right = {}, {}
     for pair in json.loads(pathlib.Path(result).read_text())["pairs"]:
         if (pair["score"] or 0.0) > LEAST_CONFIDENCE:
@@ -76,8 +94,10 @@ def closing(folder, result):
 
 def text(f):
     right = "none" if f["right_above_0.9"] is None else f"{f['right_above_0.9']:.1f} %"
-    return (f"raw {f['raw_recall']:.1f}, R@P95 {f['R@P95']:.1f}, R@P99 {f['R@P99']:.1f}, AP {f['AP']:.1f}, calibration error "
-            f"{f['calibration_error']:.3f}, {f['above_0.9']} above 0.9: {right} right")
+    return (
+        f"raw {f['raw_recall']:.1f}, R@P95 {f['R@P95']:.1f}, R@P99 {f['R@P99']:.1f}, AP {f['AP']:.1f}, calibration error "
+        f"{f['calibration_error']:.3f}, {f['above_0.9']} above 0.9: {right} right"
+    )
 
 
 scenes = []
@@ -89,7 +109,19 @@ with tempfile.TemporaryDirectory() as temporary:
         agreed = temporary / "agreed.json"
         record.gpureg(arguments, "agree", result, "--json", agreed)
         before, after = figures(folder, result, temporary), figures(folder, agreed, temporary)
-        scenes.append({"scene": name, "loops": closing(folder, result), "options": json.loads(pathlib.Path(result).read_text())["options"], "before": before, "after": after})
+        scenes.append(
+            {
+                "scene": name,
+                "loops": closing(folder, result),
+                "options": json.loads(pathlib.Path(result).read_text())["options"],
+                "before": before,
+                "after": after,
+            }
+        )
         print(f"{name}\n  alone      {text(before)}\n  agreement  {text(after)}")
-record.write(arguments, "bench/accuracy/agreement.py " + " ".join(f"{run.split('=')[0]}=RESULT.json" for run in arguments.runs),
-             {"scenes": scenes})
+record.write(
+    arguments,
+    "bench/accuracy/agreement.py "
+    + " ".join(f"{run.split('=')[0]}=RESULT.json" for run in arguments.runs),
+    {"scenes": scenes},
+)

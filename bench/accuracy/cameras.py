@@ -3,7 +3,9 @@
 
 
 def cameras(path):
-    """Positions in each fragment's frame, in the order of the frames, by fragment; path: a scene's cameras.txt, which need not exist."""
+    """Positions in each fragment's frame, in the order of the frames, by fragment; path: a scene's
+    cameras.txt, which need not exist.
+    """
     out = {}
     for values in map(str.split, path.read_text().splitlines() if path.exists() else []):
         if values:

@@ -2,13 +2,15 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Makes one mesh of a Gazebo world, to be scanned by `gpureg generate --building`.
 
-Visual meshes, boxes, cylinders and spheres of all models at their poses; planes are left out. A visual mesh whose file cannot be read is replaced by
-the model's collision geometry. Prints what it left out.
+Visual meshes, boxes, cylinders and spheres of all models at their poses; planes are left out. A
+visual mesh whose file cannot be read is replaced by the model's collision geometry. Prints what it
+left out.
 
 usage: gazebo_building.py FILE.world|FILE.sdf|MESH.dae --models FOLDER... [--floor] -o BUILDING.ply
-FOLDER holds one folder for each model, with its model.sdf; what model://, file:// and package:// name is looked for in it.
-Needs numpy, trimesh and the command assimp (Debian's assimp-utils).
+FOLDER holds one folder for each model, with its model.sdf; what model://, file:// and package://
+name is looked for in it. Needs numpy, trimesh and the command assimp (Debian's assimp-utils).
 """
+
 import argparse
 import pathlib
 import re
@@ -19,7 +21,6 @@ import xml.etree.ElementTree as xml
 
 import numpy as np
 import trimesh
-
 
 FARTHEST = 1000  # metres
 
@@ -52,10 +53,20 @@ class Baker:
         if path not in self.files:
             with tempfile.TemporaryDirectory() as folder:
                 converted = pathlib.Path(folder) / "mesh.stl"
-                done = subprocess.run(["assimp", "export", path, converted, "-ptv"], capture_output=True, text=True)
-                whole = trimesh.load(converted, force="mesh") if done.returncode == 0 and converted.exists() else None
+                done = subprocess.run(
+                    ["assimp", "export", path, converted, "-ptv"], capture_output=True, text=True
+                )
+                whole = (
+                    trimesh.load(converted, force="mesh")
+                    if done.returncode == 0 and converted.exists()
+                    else None
+                )
             # Gazebo takes coordinates as they are; assimp turns z up into y up.
-            if whole is not None and path.suffix.lower() == ".dae" and "<up_axis>Z_UP" in path.read_text(errors="replace"):
+            if (
+                whole is not None
+                and path.suffix.lower() == ".dae"
+                and "<up_axis>Z_UP" in path.read_text(errors="replace")
+            ):
                 whole.apply_transform(trimesh.transformations.rotation_matrix(np.pi / 2, [1, 0, 0]))
             self.files[path] = whole if whole is not None and len(whole.faces) else None
         return self.files[path]
@@ -79,11 +90,15 @@ class Baker:
         if found is None:
             self.missing.add(node.findtext("uri").strip())
             return None
-        return found.copy().apply_scale(numbers("scale") if node.find("scale") is not None else [1, 1, 1])
+        return found.copy().apply_scale(
+            numbers("scale") if node.find("scale") is not None else [1, 1, 1]
+        )
 
     def model(self, node, world_from_parent):
         world_from_model = world_from_parent @ matrix(node.findtext("pose"))
-        if np.abs(world_from_model[:3, 3]).max() > FARTHEST:  # fell through the floor before the world was saved
+        if (
+            np.abs(world_from_model[:3, 3]).max() > FARTHEST
+        ):  # fell through the floor before the world was saved
             self.missing.add(f"{node.get('name')} at {world_from_model[:3, 3]}")
             return
         for include in node.findall("include"):
@@ -97,7 +112,9 @@ class Baker:
                 shapes = [(c, self.shape(c.find("geometry"))) for c in link.findall("collision")]
             for of, shape in shapes:
                 if shape is not None and len(shape.faces):
-                    self.parts.append(shape.apply_transform(world_from_link @ matrix(of.findtext("pose"))))
+                    self.parts.append(
+                        shape.apply_transform(world_from_link @ matrix(of.findtext("pose")))
+                    )
 
     def include(self, node, world_from_parent):
         folder = self.find(node.findtext("uri").strip())
@@ -113,10 +130,16 @@ class Baker:
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("world", type=pathlib.Path)
     parser.add_argument("--models", nargs="+", type=pathlib.Path, default=[])
-    parser.add_argument("--floor", action="store_true", help="with a floor at z = 0 under all of it: where it is Gazebo's ground plane")
+    parser.add_argument(
+        "--floor",
+        action="store_true",
+        help="with a floor at z = 0 under all of it: where it is Gazebo's ground plane",
+    )
     parser.add_argument("-o", "--output", type=pathlib.Path, required=True)
     arguments = parser.parse_args()
     baker = Baker(arguments.models)
@@ -130,12 +153,21 @@ def main():
     if not baker.parts:
         sys.exit(f"{arguments.world} holds no geometry that could be read")
     if arguments.floor:
-        low, high = np.min([p.bounds[0] for p in baker.parts], 0), np.max([p.bounds[1] for p in baker.parts], 0)
-        baker.parts.append(trimesh.creation.box(bounds=[[low[0], low[1], -0.1], [high[0], high[1], 0]]))
-    whole = trimesh.util.concatenate([trimesh.Trimesh(p.vertices, p.faces, process=False) for p in baker.parts])
+        low, high = (
+            np.min([p.bounds[0] for p in baker.parts], 0),
+            np.max([p.bounds[1] for p in baker.parts], 0),
+        )
+        baker.parts.append(
+            trimesh.creation.box(bounds=[[low[0], low[1], -0.1], [high[0], high[1], 0]])
+        )
+    whole = trimesh.util.concatenate(
+        [trimesh.Trimesh(p.vertices, p.faces, process=False) for p in baker.parts]
+    )
     whole.export(arguments.output)
     low, high = whole.bounds
-    print(f"{len(baker.parts)} parts, {len(whole.faces)} triangles, from {low.round(2)} to {high.round(2)} m: {arguments.output}")
+    print(
+        f"{len(baker.parts)} parts, {len(whole.faces)} triangles, from {low.round(2)} to {high.round(2)} m: {arguments.output}"
+    )
 
 
 main()

@@ -1,22 +1,26 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""A scene as a worse sensor, or a worse odometry, would have brought it, for fit_confidence.py --beside.
+"""A scene as a worse sensor, or a worse odometry, would have brought it, for fit_confidence.py
+--beside.
 
-Drift bends each fragment by a smooth field: 24 waves of 0.7 to 3 m that together move a point by --drift metres (root mean square, each
-axis). Noise moves every point by itself, before the voxels average it. What depth cameras do that neither is like: bumps, a field of
-waves of 6 to 25 cm, as their errors are alike next to each other, which turns normals; holes, balls of 5 to 20 cm without a point, where a
-surface was too dark, too bright or too steep; and flying points, patches of 2 to 6 cm that hang 2 to 12 cm before their surface, towards
-one of the cameras. Everything else of SCENE (truth, cameras.txt) is copied.
+Drift bends each fragment by a smooth field: 24 waves of 0.7 to 3 m that together move a point by
+--drift metres (root mean square, each axis). Noise moves every point by itself, before the voxels
+average it. What depth cameras do that neither is like: bumps, a field of waves of 6 to 25 cm, as
+their errors are alike next to each other, which turns normals; holes, balls of 5 to 20 cm without a
+point, where a surface was too dark, too bright or too steep; and flying points, patches of 2 to 6
+cm that hang 2 to 12 cm before their surface, towards one of the cameras. Everything else of SCENE
+(truth, cameras.txt) is copied.
 
-usage: other_sensor.py SCENE OUT [--drift METRES] [--noise METRES] [--bumps METRES] [--holes SHARE] [--flying SHARE] [--seed N]
-Reads cloud_bin_<i>.ply whose vertices are binary floats. Needs numpy."""
+usage: other_sensor.py SCENE OUT [--drift METRES] [--noise METRES] [--bumps METRES] [--holes SHARE]
+[--flying SHARE] [--seed N] Reads cloud_bin_<i>.ply whose vertices are binary floats. Needs
+numpy."""
+
 import argparse
 import pathlib
 import shutil
 import sys
 
 import numpy as np
-
 from cameras import cameras
 
 WAVES = 24
@@ -31,7 +35,11 @@ def read(path):
     end = raw.find(b"end_header\n") + len(b"end_header\n")
     lines = raw[:end].decode("ascii", "replace").splitlines()
     properties = [line.split() for line in lines if line.startswith("property")]
-    if "format binary_little_endian 1.0" not in lines or any(p[1] != "float" for p in properties) or [p[2] for p in properties[:3]] != ["x", "y", "z"]:
+    if (
+        "format binary_little_endian 1.0" not in lines
+        or any(p[1] != "float" for p in properties)
+        or [p[2] for p in properties[:3]] != ["x", "y", "z"]
+    ):
         sys.exit(f"error: {path}: not a binary PLY whose vertices are x, y, z and other floats")
     return raw[:end], np.frombuffer(raw, "<f4", offset=end).reshape(-1, len(properties)).copy()
 
@@ -44,16 +52,23 @@ def waves(points, metres, lengths, random):
 
 
 def balls(points, share, radii, random):
-    """The points in each of some balls, as many as hold that share of all; where balls overlap they have less together."""
+    """The points in each of some balls, as many as hold that share of all; where balls overlap they
+    have less together.
+    """
     left = share * len(points)
     while left > 0:
-        inside = np.flatnonzero(((points - points[random.integers(len(points))]) ** 2).sum(1) <= random.uniform(*radii) ** 2)
+        inside = np.flatnonzero(
+            ((points - points[random.integers(len(points))]) ** 2).sum(1)
+            <= random.uniform(*radii) ** 2
+        )
         left -= len(inside)
         yield inside
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("scene", type=pathlib.Path)
     parser.add_argument("out", type=pathlib.Path)
     parser.add_argument("--drift", type=float, default=0.0)
@@ -80,7 +95,10 @@ def main():
         fragment = int(file.stem.rsplit("_", 1)[1])
         random = np.random.default_rng([arguments.seed, fragment])
         points = vertices[:, :3].astype(float)
-        points += waves(points, arguments.drift, DRIFT, random) + random.normal(size=points.shape) * arguments.noise
+        points += (
+            waves(points, arguments.drift, DRIFT, random)
+            + random.normal(size=points.shape) * arguments.noise
+        )
         # What is not asked for draws no numbers, so that scenes without it keep their bytes.
         if arguments.bumps > 0:
             points += waves(points, arguments.bumps, BUMPS, random)
@@ -88,7 +106,9 @@ def main():
         for patch in balls(still, arguments.flying, PATCH, random):
             seen_from = viewpoints.get(fragment, [[0.0, 0.0, 0.0]])
             towards = np.array(seen_from[random.integers(len(seen_from))]) - still[patch]
-            points[patch] = still[patch] + towards / np.maximum(np.linalg.norm(towards, axis=1, keepdims=True), 1e-9) * random.uniform(*FLIGHT)
+            points[patch] = still[patch] + towards / np.maximum(
+                np.linalg.norm(towards, axis=1, keepdims=True), 1e-9
+            ) * random.uniform(*FLIGHT)
         vertices[:, :3] = points
         kept = np.ones(len(points), bool)
         for hole in balls(still, arguments.holes, HOLE, random):
@@ -96,7 +116,10 @@ def main():
         count = f"element vertex {len(points)}\n".encode()
         if count not in header:
             sys.exit(f"error: {file}: {len(points)} vertices, but not by its header")
-        (arguments.out / file.name).write_bytes(header.replace(count, f"element vertex {kept.sum()}\n".encode()) + vertices[kept].tobytes())
+        (arguments.out / file.name).write_bytes(
+            header.replace(count, f"element vertex {kept.sum()}\n".encode())
+            + vertices[kept].tobytes()
+        )
 
 
 main()

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What the accuracy benchmarks share: arguments, the command gpureg, and a JSON record that says how its numbers were made."""
+"""What the accuracy benchmarks share: arguments, the command gpureg, and a JSON record that says
+how its numbers were made.
+"""
+
 import argparse
 import json
 import os
@@ -12,12 +15,26 @@ ROOT = pathlib.Path(__file__).resolve().parents[2]
 
 
 def parser(description, output):
-    result = argparse.ArgumentParser(description=description, formatter_class=argparse.RawDescriptionHelpFormatter)
-    result.add_argument("--gpureg", type=pathlib.Path, default=ROOT / "build/cpu/bin/gpureg", help="the command")
+    result = argparse.ArgumentParser(
+        description=description, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    result.add_argument(
+        "--gpureg", type=pathlib.Path, default=ROOT / "build/cpu/bin/gpureg", help="the command"
+    )
     result.add_argument("--backend", default="auto", choices=["auto", "cpu", "cuda"])
-    result.add_argument("--data", type=pathlib.Path, default=os.environ.get("GPUREG_DATA_DIR"),
-                        help="folder of the real data sets (default: GPUREG_DATA_DIR)")
-    result.add_argument("-o", "--output", type=pathlib.Path, default=ROOT / "bench/results" / output, help="the JSON record")
+    result.add_argument(
+        "--data",
+        type=pathlib.Path,
+        default=os.environ.get("GPUREG_DATA_DIR"),
+        help="folder of the real data sets (default: GPUREG_DATA_DIR)",
+    )
+    result.add_argument(
+        "-o",
+        "--output",
+        type=pathlib.Path,
+        default=ROOT / "bench/results" / output,
+        help="the JSON record",
+    )
     return result
 
 
@@ -31,9 +48,13 @@ def data_folder(arguments, name):
 
 
 def gpureg(arguments, *words):
-    """Runs the command. Exit status 1, no alignment, is a result; any other failure ends the benchmark."""
+    """Runs the command. Exit status 1, no alignment, is a result; any other failure ends the
+    benchmark.
+    """
     if not arguments.gpureg.exists():
-        sys.exit(f"error: there is no command {arguments.gpureg}: build it, or name it with --gpureg")
+        sys.exit(
+            f"error: there is no command {arguments.gpureg}: build it, or name it with --gpureg"
+        )
     done = subprocess.run([arguments.gpureg, *map(str, words)], capture_output=True, text=True)
     if done.returncode not in (0, 1):
         sys.exit(f"error: gpureg {words[0]}: {done.stderr.strip()}")
@@ -41,10 +62,27 @@ def gpureg(arguments, *words):
 
 
 def commit():
-    """The commit of the working tree; with a plus sign where the library or the command differ from it. GPUREG_COMMIT: where git does not know."""
+    """The commit of the working tree; with a plus sign where the library or the command differ from
+    it. GPUREG_COMMIT: where git does not know.
+    """
+
     def git(*words):
-        return subprocess.run(["git", "-C", ROOT, *words], capture_output=True, text=True).stdout.strip()
-    changed = git("status", "--porcelain", "--untracked-files=no", "--", "include", "src", "cuda", "apps", "cmake", "CMakeLists.txt")
+        return subprocess.run(
+            ["git", "-C", ROOT, *words], capture_output=True, text=True
+        ).stdout.strip()
+
+    changed = git(
+        "status",
+        "--porcelain",
+        "--untracked-files=no",
+        "--",
+        "include",
+        "src",
+        "cuda",
+        "apps",
+        "cmake",
+        "CMakeLists.txt",
+    )
     known = git("rev-parse", "--short=12", "HEAD")
     return known + ("+" if changed else "") if known else os.environ.get("GPUREG_COMMIT", "")
 

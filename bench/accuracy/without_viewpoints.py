@@ -1,20 +1,22 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""A scene as somebody has it who does not know where the sensor was, for fit_confidence.py --origin and --unknown.
+"""A scene as somebody has it who does not know where the sensor was, for fit_confidence.py --origin
+and --unknown.
 
-Either the same clouds without cameras.txt, whose normals then turn to the origin; or (--unknown) clouds that come with a direction at
-every point, towards the nearest of every fifth camera: they say which side of a surface was seen, and nothing about where from.
-The clouds are those of SCENE (cloud_bin_<i>.ply, cameras.txt); the ground truth is copied along.
+Either the same clouds without cameras.txt, whose normals then turn to the origin; or (--unknown)
+clouds that come with a direction at every point, towards the nearest of every fifth camera: they
+say which side of a surface was seen, and nothing about where from. The clouds are those of SCENE
+(cloud_bin_<i>.ply, cameras.txt); the ground truth is copied along.
 
 usage: without_viewpoints.py SCENE OUT [--unknown]
 Needs numpy, and --unknown the Python package gpureg."""
+
 import argparse
 import pathlib
 import shutil
 import sys
 
 import numpy as np
-
 from cameras import cameras
 
 
@@ -25,7 +27,9 @@ def towards(points, positions):
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("scene", type=pathlib.Path)
     parser.add_argument("out", type=pathlib.Path)
     parser.add_argument("--unknown", action="store_true", help="not even the origin is a viewpoint")
@@ -42,12 +46,19 @@ def main():
         return
     import gpureg
 
-    positions = {fragment: np.array(every[::5]) for fragment, every in cameras(arguments.scene / "cameras.txt").items()}
+    positions = {
+        fragment: np.array(every[::5])
+        for fragment, every in cameras(arguments.scene / "cameras.txt").items()
+    }
     for cloud in clouds:
         if int(cloud.stem.rsplit("_", 1)[1]) not in positions:
             sys.exit(f"error: {arguments.scene / 'cameras.txt'}: no camera of {cloud.name}")
         points = np.asarray(gpureg.read_point_cloud(cloud).points, np.float64)
-        gpureg.write_point_cloud(arguments.out / cloud.name, points, towards(points, positions[int(cloud.stem.rsplit("_", 1)[1])]))
+        gpureg.write_point_cloud(
+            arguments.out / cloud.name,
+            points,
+            towards(points, positions[int(cloud.stem.rsplit("_", 1)[1])]),
+        )
 
 
 main()

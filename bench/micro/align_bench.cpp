@@ -17,9 +17,12 @@ BENCHMARK(PrepareCloud)->Arg(1)->Arg(2)->Unit(benchmark::kMillisecond)->UseRealT
 void AlignPair(benchmark::State& state) {
   Scene& s = Scene::get();
   const Context context = Context::cpu(static_cast<unsigned>(state.range(0)));
-  const PreparedCloud source = prepare(context, PointCloudView(&s.raw_source[0].x, s.raw_source.size()));
-  const PreparedCloud target = prepare(context, PointCloudView(&s.raw_target[0].x, s.raw_target.size()));
-  for (auto _ : state) benchmark::DoNotOptimize(align(context, source, target, RegistrationOptions::loopsmart()));
+  const PreparedCloud source =
+      prepare(context, PointCloudView(&s.raw_source[0].x, s.raw_source.size()));
+  const PreparedCloud target =
+      prepare(context, PointCloudView(&s.raw_target[0].x, s.raw_target.size()));
+  for (auto _ : state)
+    benchmark::DoNotOptimize(align(context, source, target, RegistrationOptions::loopsmart()));
 }
 BENCHMARK(AlignPair)->Arg(1)->Arg(2)->Unit(benchmark::kMillisecond)->UseRealTime();
 

@@ -10,8 +10,12 @@ namespace gpureg::bench {
 struct EvidenceScene {
   EvidenceScene() : exec(1), options(RegistrationOptions::from_voxel_size(0.05f)) {
     const Scene& scene = Scene::get();
-    raw[0] = test::raw_cloud(scene.raw_source), raw[1] = test::raw_cloud(scene.raw_target);
-    for (RawCloud& view : raw) view.viewpoints = &viewpoints[0].x, view.viewpoint_count = 12;
+    raw[0] = test::raw_cloud(scene.raw_source);
+    raw[1] = test::raw_cloud(scene.raw_target);
+    for (RawCloud& view : raw) {
+      view.viewpoints = &viewpoints[0].x;
+      view.viewpoint_count = 12;
+    }
     for (int k = 0; k < 12; ++k) viewpoints[k] = {0.2f * static_cast<float>(k) - 1.0f, 0.1f, 2.0f};
     for (int k = 0; k < 2; ++k) cloud[k] = test::prepare_one(exec, raw[k], options.prepare);
     pair = test::pair_view(*cloud[0], *cloud[1]);

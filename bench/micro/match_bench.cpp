@@ -10,8 +10,9 @@ void MatchFeatures(benchmark::State& state) {
   options.neighbors = static_cast<std::uint32_t>(state.range(0));
   for (auto _ : state) benchmark::DoNotOptimize(cpu::match_features(s.exec, {&s.pair, 1}, options));
   // Pairs of values that are subtracted, squared and added.
-  state.counters["terms/s"] = benchmark::Counter(static_cast<double>(s.pair.source.size) * s.pair.target.size * 33,
-                                                 benchmark::Counter::kIsIterationInvariantRate);
+  state.counters["terms/s"] =
+      benchmark::Counter(static_cast<double>(s.pair.source.size) * s.pair.target.size * 33,
+                         benchmark::Counter::kIsIterationInvariantRate);
 }
 BENCHMARK(MatchFeatures)->Arg(1)->Arg(4)->Unit(benchmark::kMillisecond);
 

@@ -12,7 +12,8 @@ void counters(benchmark::State& state, const Scene& s) {
 void Downsample(benchmark::State& state) {
   Scene& s = Scene::get();
   const RawCloud raw = test::raw_cloud(s.raw_source);
-  for (auto _ : state) benchmark::DoNotOptimize(cpu::downsample(s.exec, {&raw, 1}, s.options.prepare));
+  for (auto _ : state)
+    benchmark::DoNotOptimize(cpu::downsample(s.exec, {&raw, 1}, s.options.prepare));
   counters(state, s);
 }
 BENCHMARK(Downsample)->Unit(benchmark::kMillisecond);
@@ -32,28 +33,35 @@ struct Products {
 void BuildGrid(benchmark::State& state) {
   Scene& s = Scene::get();
   const Products p(s);
-  for (auto _ : state) benchmark::DoNotOptimize(cpu::build_grids(s.exec, p.clouds, s.options.prepare));
+  for (auto _ : state)
+    benchmark::DoNotOptimize(cpu::build_grids(s.exec, p.clouds, s.options.prepare));
 }
 BENCHMARK(BuildGrid)->Unit(benchmark::kMillisecond);
 
 void EstimateNormals(benchmark::State& state) {
   Scene& s = Scene::get();
   const Products p(s);
-  for (auto _ : state) benchmark::DoNotOptimize(cpu::estimate_normals(s.exec, p.clouds, p.grids, s.options.prepare.normal_radius));
+  for (auto _ : state)
+    benchmark::DoNotOptimize(
+        cpu::estimate_normals(s.exec, p.clouds, p.grids, s.options.prepare.normal_radius));
 }
 BENCHMARK(EstimateNormals)->Unit(benchmark::kMillisecond);
 
 void ComputeFpfh(benchmark::State& state) {
   Scene& s = Scene::get();
   const Products p(s);
-  for (auto _ : state) benchmark::DoNotOptimize(cpu::compute_features(s.exec, p.clouds, p.normals, p.grids, s.options.prepare));
+  for (auto _ : state)
+    benchmark::DoNotOptimize(
+        cpu::compute_features(s.exec, p.clouds, p.normals, p.grids, s.options.prepare));
 }
 BENCHMARK(ComputeFpfh)->Unit(benchmark::kMillisecond);
 
 void BuildClosestGrid(benchmark::State& state) {
   Scene& s = Scene::get();
   const Products p(s);
-  for (auto _ : state) benchmark::DoNotOptimize(cpu::build_closest_grids(s.exec, p.clouds, p.grids, s.options.prepare));
+  for (auto _ : state)
+    benchmark::DoNotOptimize(
+        cpu::build_closest_grids(s.exec, p.clouds, p.grids, s.options.prepare));
 }
 BENCHMARK(BuildClosestGrid)->Unit(benchmark::kMillisecond);
 

@@ -8,8 +8,9 @@
 #include "support/prepared.hpp"
 #include "support/random_clouds.hpp"
 
-/// What the stage benchmarks work on: two samplings of one bumpy sheet, about 5,000 points each after downsampling, and every product
-/// on the way from them to a pose. Made once, on one thread, so that a benchmark times its own stage only.
+/// What the stage benchmarks work on: two samplings of one bumpy sheet, about 5,000 points each
+/// after downsampling, and every product on the way from them to a pose. Made once, on one thread,
+/// so that a benchmark times its own stage only.
 namespace gpureg::bench {
 
 struct Scene {

@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The clouds that every method gets: raw, and downsampled by gpureg to 5 cm with normals turned to the cameras."""
+"""The clouds that every method gets: raw, and downsampled by gpureg to 5 cm with normals turned to
+the cameras.
+"""
+
 import dataclasses
 import pathlib
-import typing
 
 import numpy as np
-
 from methods import VOXEL
 
 
@@ -14,8 +15,8 @@ class Cloud:
     points: np.ndarray  # (n, 3) float64
     normals: np.ndarray  # (n, 3) float64
     raw: np.ndarray  # (m, 3) float32
-    raw_normals: typing.Optional[np.ndarray]
-    viewpoints: typing.Optional[np.ndarray]
+    raw_normals: np.ndarray | None
+    viewpoints: np.ndarray | None
 
 
 def write_one(output, number, points, normals, viewpoints):
@@ -24,8 +25,14 @@ def write_one(output, number, points, normals, viewpoints):
 
     options = gpureg.RegistrationOptions.from_voxel_size(VOXEL).prepare
     options.wide_feature_radius, options.depth_maps = 0.0, 0
-    prepared = gpureg.prepare(points, normals, viewpoints=viewpoints, options=options, context=gpureg.Context.cpu())
-    arrays = {"points": np.asarray(prepared.points, np.float64), "normals": np.asarray(prepared.normals, np.float64), "raw": np.asarray(points, np.float32)}
+    prepared = gpureg.prepare(
+        points, normals, viewpoints=viewpoints, options=options, context=gpureg.Context.cpu()
+    )
+    arrays = {
+        "points": np.asarray(prepared.points, np.float64),
+        "normals": np.asarray(prepared.normals, np.float64),
+        "raw": np.asarray(points, np.float32),
+    }
     if normals is not None:
         arrays["raw_normals"] = np.asarray(normals, np.float32)
     if viewpoints is not None:
@@ -52,4 +59,10 @@ def write(folder, output):
 
 def read(folder, number):
     with np.load(pathlib.Path(folder) / f"{number}.npz") as file:
-        return Cloud(file["points"], file["normals"], file["raw"], file.get("raw_normals"), file.get("viewpoints"))
+        return Cloud(
+            file["points"],
+            file["normals"],
+            file["raw"],
+            file.get("raw_normals"),
+            file.get("viewpoints"),
+        )

@@ -9,10 +9,13 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-double since(Clock::time_point begin) { return std::chrono::duration<double, std::milli>(Clock::now() - begin).count(); }
+double since(Clock::time_point begin) {
+  return std::chrono::duration<double, std::milli>(Clock::now() - begin).count();
+}
 
 /// One call per pair: the median, as pairs differ, and the worst.
-void report_each(benchmark::State& state, const std::vector<RegistrationResult>& results, std::vector<double> ms) {
+void report_each(benchmark::State& state, const std::vector<RegistrationResult>& results,
+                 std::vector<double> ms) {
   report(state, results, 1);
   std::sort(ms.begin(), ms.end());
   state.counters.erase("ms_per_pair");
@@ -21,11 +24,13 @@ void report_each(benchmark::State& state, const std::vector<RegistrationResult>&
 }
 
 RegistrationOptions preset(const std::string& name) {
-  return name == "loopsmart" ? RegistrationOptions::loopsmart() : RegistrationOptions::from_voxel_size(0.05f);
+  return name == "loopsmart" ? RegistrationOptions::loopsmart()
+                             : RegistrationOptions::from_voxel_size(0.05f);
 }
 
 /// All pairs of the scene, `repeats` times over, on prepared clouds.
-void align_many(benchmark::State& state, const std::string& backend, const std::string& options_name) {
+void align_many(benchmark::State& state, const std::string& backend,
+                const std::string& options_name) {
   const Context* on = context(state, backend);
   if (!on) return;
   const RegistrationOptions options = preset(options_name);
@@ -40,13 +45,15 @@ void align_many(benchmark::State& state, const std::string& backend, const std::
 }
 
 /// One prepared pair at a time, every pair in turn.
-void align_one(benchmark::State& state, const std::string& backend, const std::string& options_name) {
+void align_one(benchmark::State& state, const std::string& backend,
+               const std::string& options_name) {
   const Context* on = context(state, backend);
   if (!on) return;
   const RegistrationOptions options = preset(options_name);
   const auto clouds = prepare_batch(*on, views(), options.prepare);
   const auto pairs = all_pairs();
-  std::vector<RegistrationResult> results{align(*on, clouds[pairs[0].source], clouds[pairs[0].target], options)};
+  std::vector<RegistrationResult> results{
+      align(*on, clouds[pairs[0].source], clouds[pairs[0].target], options)};
   results.clear();
   std::vector<double> ms;
   for (auto _ : state) {
@@ -59,7 +66,8 @@ void align_one(benchmark::State& state, const std::string& backend, const std::s
 }
 
 /// From raw points in host memory to the pose.
-void raw_to_pose(benchmark::State& state, const std::string& backend, const std::string& options_name) {
+void raw_to_pose(benchmark::State& state, const std::string& backend,
+                 const std::string& options_name) {
   const Context* on = context(state, backend);
   if (!on) return;
   const RegistrationOptions options = preset(options_name);
@@ -77,8 +85,9 @@ void raw_to_pose(benchmark::State& state, const std::string& backend, const std:
   report_each(state, results, ms);
 }
 
-/// As large as Redwood's four scenes, 207 fragments and 5,280 pairs, from raw points in host memory: the fragments come round again and
-/// again, and no fragment meets itself. Cold: the context has seen twenty fragments and their pairs only.
+/// As large as Redwood's four scenes, 207 fragments and 5,280 pairs, from raw points in host
+/// memory: the fragments come round again and again, and no fragment meets itself. Cold: the
+/// context has seen twenty fragments and their pairs only.
 void redwood_sized(benchmark::State& state, const std::string& backend) {
   if (!context(state, backend)) return;
   const RegistrationOptions options = RegistrationOptions::loopsmart();
@@ -91,7 +100,8 @@ void redwood_sized(benchmark::State& state, const std::string& backend) {
       if (step % scene.size() != 0) pairs.push_back({i + step, i});
   // A context of its own: what others have made it keep would hide what this takes.
   const Context on = new_context(backend);
-  align_batch(on, prepare_batch(on, {raw.begin(), raw.begin() + 20}, options.prepare), all_pairs(), options);
+  align_batch(on, prepare_batch(on, {raw.begin(), raw.begin() + 20}, options.prepare), all_pairs(),
+              options);
   std::vector<RegistrationResult> results;
   std::size_t runs = 0;
   double prepare_ms = 0;
@@ -107,14 +117,41 @@ void redwood_sized(benchmark::State& state, const std::string& backend) {
   report_memory(state, on);
 }
 
-BENCHMARK_CAPTURE(align_many, cuda_loopsmart, "cuda", "loopsmart")->Arg(11)->Unit(benchmark::kMillisecond)->UseRealTime();
-BENCHMARK_CAPTURE(align_many, cuda_default, "cuda", "default")->Arg(11)->Unit(benchmark::kMillisecond)->UseRealTime();
-BENCHMARK_CAPTURE(align_one, cuda_loopsmart, "cuda", "loopsmart")->Iterations(190)->Unit(benchmark::kMillisecond)->UseRealTime();
-BENCHMARK_CAPTURE(align_one, cuda_default, "cuda", "default")->Iterations(190)->Unit(benchmark::kMillisecond)->UseRealTime();
-BENCHMARK_CAPTURE(raw_to_pose, cuda_loopsmart, "cuda", "loopsmart")->Iterations(100)->Unit(benchmark::kMillisecond)->UseRealTime();
-BENCHMARK_CAPTURE(redwood_sized, cuda, "cuda")->Iterations(1)->Repetitions(3)->Unit(benchmark::kMillisecond)->UseRealTime();
-BENCHMARK_CAPTURE(redwood_sized, cuda_all, "cuda_all")->Iterations(1)->Repetitions(3)->Unit(benchmark::kMillisecond)->UseRealTime();
-BENCHMARK_CAPTURE(align_many, cpu_loopsmart, "cpu", "loopsmart")->Arg(1)->Iterations(1)->Unit(benchmark::kMillisecond)->UseRealTime();
+BENCHMARK_CAPTURE(align_many, cuda_loopsmart, "cuda", "loopsmart")
+    ->Arg(11)
+    ->Unit(benchmark::kMillisecond)
+    ->UseRealTime();
+BENCHMARK_CAPTURE(align_many, cuda_default, "cuda", "default")
+    ->Arg(11)
+    ->Unit(benchmark::kMillisecond)
+    ->UseRealTime();
+BENCHMARK_CAPTURE(align_one, cuda_loopsmart, "cuda", "loopsmart")
+    ->Iterations(190)
+    ->Unit(benchmark::kMillisecond)
+    ->UseRealTime();
+BENCHMARK_CAPTURE(align_one, cuda_default, "cuda", "default")
+    ->Iterations(190)
+    ->Unit(benchmark::kMillisecond)
+    ->UseRealTime();
+BENCHMARK_CAPTURE(raw_to_pose, cuda_loopsmart, "cuda", "loopsmart")
+    ->Iterations(100)
+    ->Unit(benchmark::kMillisecond)
+    ->UseRealTime();
+BENCHMARK_CAPTURE(redwood_sized, cuda, "cuda")
+    ->Iterations(1)
+    ->Repetitions(3)
+    ->Unit(benchmark::kMillisecond)
+    ->UseRealTime();
+BENCHMARK_CAPTURE(redwood_sized, cuda_all, "cuda_all")
+    ->Iterations(1)
+    ->Repetitions(3)
+    ->Unit(benchmark::kMillisecond)
+    ->UseRealTime();
+BENCHMARK_CAPTURE(align_many, cpu_loopsmart, "cpu", "loopsmart")
+    ->Arg(1)
+    ->Iterations(1)
+    ->Unit(benchmark::kMillisecond)
+    ->UseRealTime();
 
 }  // namespace
 }  // namespace gpureg::bench

@@ -18,7 +18,8 @@ const std::vector<PointCloud>& fragments() {
     const char* data = std::getenv("GPUREG_DATA_DIR");
     std::vector<PointCloud> out;
     if (!scene && !data) return out;
-    const std::string folder = scene ? scene : std::string(data) + "/redkitchen/fragments", cameras = folder + "/cameras.txt";
+    const std::string folder = scene ? scene : std::string(data) + "/redkitchen/fragments",
+                      cameras = folder + "/cameras.txt";
     std::map<int, std::vector<Eigen::Vector3f>> viewpoints;
     if (std::ifstream(cameras)) viewpoints = io::read_cameras(cameras);
     for (const auto& [number, file] : io::list_fragments(folder)) {
@@ -43,13 +44,20 @@ std::vector<Pair> all_pairs() {
   return out;
 }
 
-void report(benchmark::State& state, const std::vector<RegistrationResult>& results, std::size_t runs) {
+void report(benchmark::State& state, const std::vector<RegistrationResult>& results,
+            std::size_t runs) {
   StageTimings sum;
   double survivors = 0, aligned = 0, points = 0;
   for (const RegistrationResult& r : results) {
-    sum.match += r.timings.match, sum.sample += r.timings.sample, sum.fit += r.timings.fit;
-    sum.score += r.timings.score, sum.refine += r.timings.refine, sum.judge += r.timings.judge;
-    survivors += static_cast<double>(r.statistics.survivors), aligned += r.aligned(), points += r.statistics.source_points;
+    sum.match += r.timings.match;
+    sum.sample += r.timings.sample;
+    sum.fit += r.timings.fit;
+    sum.score += r.timings.score;
+    sum.refine += r.timings.refine;
+    sum.judge += r.timings.judge;
+    survivors += static_cast<double>(r.statistics.survivors);
+    aligned += r.aligned();
+    points += r.statistics.source_points;
   }
   const double n = static_cast<double>(results.size());
   state.counters["pairs"] = n;
@@ -63,12 +71,14 @@ void report(benchmark::State& state, const std::vector<RegistrationResult>& resu
   state.counters["ms_refine"] = sum.refine / n;
   state.counters["ms_judge"] = sum.judge / n;
   state.counters["ms_per_pair"] =
-      benchmark::Counter(n * static_cast<double>(runs) * 1e-3, benchmark::Counter::kIsRate | benchmark::Counter::kInvert);
+      benchmark::Counter(n * static_cast<double>(runs) * 1e-3,
+                         benchmark::Counter::kIsRate | benchmark::Counter::kInvert);
 }
 
 void report_memory(benchmark::State& state, const Context& context) {
   double most = 0;
-  for (const DeviceMemoryUse& use : context.device_memory()) most = std::max(most, static_cast<double>(use.bytes_reserved));
+  for (const DeviceMemoryUse& use : context.device_memory())
+    most = std::max(most, static_cast<double>(use.bytes_reserved));
   state.counters["devices"] = static_cast<double>(context.device_memory().size());
   state.counters["GiB_per_device"] = most / (1 << 30);
 }

@@ -8,8 +8,8 @@
 
 #include "gpureg/registration.hpp"
 
-/// What the benchmarks of the whole pipeline work on: the fragments of one scene, read once. The folder is GPUREG_BENCH_SCENE, else
-/// redkitchen/fragments in GPUREG_DATA_DIR.
+/// What the benchmarks of the whole pipeline work on: the fragments of one scene, read once. The
+/// folder is GPUREG_BENCH_SCENE, else redkitchen/fragments in GPUREG_DATA_DIR.
 namespace gpureg::bench {
 
 const std::vector<PointCloud>& fragments();
@@ -18,7 +18,8 @@ std::vector<PointCloudView> views();
 std::vector<Pair> all_pairs();
 
 /// Means over the results, and milliseconds per pair of that many runs.
-void report(benchmark::State& state, const std::vector<RegistrationResult>& results, std::size_t runs);
+void report(benchmark::State& state, const std::vector<RegistrationResult>& results,
+            std::size_t runs);
 /// What the context has taken of its devices' memory.
 void report_memory(benchmark::State& state, const Context& context);
 

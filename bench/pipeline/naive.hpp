@@ -15,9 +15,10 @@ struct NaiveResult {
   std::uint32_t survivors;
 };
 
-/// Algorithm 1 as it reads, the baseline of the speed-up: one launch sequence per pair on the default stream, a thread per source point
-/// that compares all features, a thread per hypothesis, a thread block per hypothesis that looks every point up, no bounds and no early
-/// exit. Memory is taken beforehand. Finds what the library finds.
+/// Algorithm 1 as it reads, the baseline of the speed-up: one launch sequence per pair on the
+/// default stream, a thread per source point that compares all features, a thread per hypothesis, a
+/// thread block per hypothesis that looks every point up, no bounds and no early exit. Memory is
+/// taken beforehand. Finds what the library finds.
 class Naive {
  public:
   Naive(std::size_t most_points, const RegistrationOptions& options);

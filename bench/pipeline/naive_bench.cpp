@@ -8,7 +8,8 @@
 namespace gpureg::bench {
 namespace {
 
-/// Algorithm 1 as it reads, one pair after the other, every pair of the scene. The library's results are the measure of its own.
+/// Algorithm 1 as it reads, one pair after the other, every pair of the scene. The library's
+/// results are the measure of its own.
 void paper_mode(benchmark::State& state) {
   const Context* on = context(state, "cuda");
   if (!on) return;
@@ -24,9 +25,13 @@ void paper_mode(benchmark::State& state) {
   for (auto _ : state) {
     for (std::size_t p = 0; p < pairs.size(); ++p) {
       const auto begin = std::chrono::steady_clock::now();
-      const NaiveResult found = naive.align(*clouds[pairs[p].source].state(), *clouds[pairs[p].target].state());
-      ms.push_back(std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - begin).count());
-      if (found.survivors != expected[p].statistics.survivors || found.best.inliers != expected[p].statistics.consensus)
+      const NaiveResult found =
+          naive.align(*clouds[pairs[p].source].state(), *clouds[pairs[p].target].state());
+      ms.push_back(
+          std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - begin)
+              .count());
+      if (found.survivors != expected[p].statistics.survivors ||
+          found.best.inliers != expected[p].statistics.consensus)
         return state.SkipWithError("the naive mode finds something else than the library");
     }
   }

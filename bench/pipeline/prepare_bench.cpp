@@ -9,10 +9,14 @@ void report(benchmark::State& state, const std::vector<PreparedCloud>& clouds, s
   double raw = 0, points = 0;
   for (const PreparedCloud& cloud : clouds) {
     const PrepareStatistics& s = cloud.statistics();
-    sum.downsample += s.downsample, sum.normals += s.normals, sum.features += s.features, sum.grid += s.grid;
+    sum.downsample += s.downsample;
+    sum.normals += s.normals;
+    sum.features += s.features;
+    sum.grid += s.grid;
     sum.depth_maps += s.depth_maps;
     sum.fronts += s.fronts;
-    raw += static_cast<double>(s.input_points), points += s.points;
+    raw += static_cast<double>(s.input_points);
+    points += s.points;
   }
   const double n = static_cast<double>(clouds.size());
   state.counters["fragments"] = n;
@@ -25,15 +29,18 @@ void report(benchmark::State& state, const std::vector<PreparedCloud>& clouds, s
   state.counters["ms_depth_maps"] = sum.depth_maps / n;
   state.counters["ms_fronts"] = sum.fronts / n;
   state.counters["ms_per_fragment"] =
-      benchmark::Counter(n * static_cast<double>(runs) * 1e-3, benchmark::Counter::kIsRate | benchmark::Counter::kInvert);
+      benchmark::Counter(n * static_cast<double>(runs) * 1e-3,
+                         benchmark::Counter::kIsRate | benchmark::Counter::kInvert);
 }
 
 RegistrationOptions preset(const std::string& name) {
-  return name == "default" ? RegistrationOptions::from_voxel_size(0.05f) : RegistrationOptions::loopsmart();
+  return name == "default" ? RegistrationOptions::from_voxel_size(0.05f)
+                           : RegistrationOptions::loopsmart();
 }
 
 /// All fragments of the scene from host memory in one call.
-void prepare_batch_of_fragments(benchmark::State& state, const std::string& backend, const std::string& options_name) {
+void prepare_batch_of_fragments(benchmark::State& state, const std::string& backend,
+                                const std::string& options_name) {
   const Context* on = context(state, backend);
   if (!on) return;
   const RegistrationOptions options = preset(options_name);
@@ -44,7 +51,8 @@ void prepare_batch_of_fragments(benchmark::State& state, const std::string& back
 }
 
 /// One fragment at a time.
-void prepare_one_fragment(benchmark::State& state, const std::string& backend, const std::string& options_name) {
+void prepare_one_fragment(benchmark::State& state, const std::string& backend,
+                          const std::string& options_name) {
   const Context* on = context(state, backend);
   if (!on) return;
   const RegistrationOptions options = preset(options_name);
@@ -55,10 +63,18 @@ void prepare_one_fragment(benchmark::State& state, const std::string& backend, c
   report(state, cloud, runs);
 }
 
-BENCHMARK_CAPTURE(prepare_batch_of_fragments, cuda, "cuda", "loopsmart")->Unit(benchmark::kMillisecond)->UseRealTime();
-BENCHMARK_CAPTURE(prepare_batch_of_fragments, cuda_default, "cuda", "default")->Unit(benchmark::kMillisecond)->UseRealTime();
-BENCHMARK_CAPTURE(prepare_one_fragment, cuda, "cuda", "loopsmart")->Unit(benchmark::kMillisecond)->UseRealTime();
-BENCHMARK_CAPTURE(prepare_batch_of_fragments, cpu, "cpu", "loopsmart")->Unit(benchmark::kMillisecond)->UseRealTime();
+BENCHMARK_CAPTURE(prepare_batch_of_fragments, cuda, "cuda", "loopsmart")
+    ->Unit(benchmark::kMillisecond)
+    ->UseRealTime();
+BENCHMARK_CAPTURE(prepare_batch_of_fragments, cuda_default, "cuda", "default")
+    ->Unit(benchmark::kMillisecond)
+    ->UseRealTime();
+BENCHMARK_CAPTURE(prepare_one_fragment, cuda, "cuda", "loopsmart")
+    ->Unit(benchmark::kMillisecond)
+    ->UseRealTime();
+BENCHMARK_CAPTURE(prepare_batch_of_fragments, cpu, "cpu", "loopsmart")
+    ->Unit(benchmark::kMillisecond)
+    ->UseRealTime();
 
 }  // namespace
 }  // namespace gpureg::bench

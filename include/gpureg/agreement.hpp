@@ -12,21 +12,23 @@ namespace gpureg {
 
 /// How loops are judged. The defaults are for voxels of 5 cm; the tolerances grow with the voxel.
 struct AgreementOptions {
-  float closing_angle = 3.0f;      ///< degrees, and ...
-  float closing_distance = 0.15f;  ///< ... metres by which three right poses typically miss their
-                                   ///< beginning (one standard deviation)
-  double chance = 0.4;  ///< how often a loop with a wrong pose closes all the same: near misses,
-                        ///< and places that look alike, whose wrong poses close their loops with
-                        ///< right ones (0 to 0.33 of them in seven scenes, and loops share pairs)
-  double miss = 0.02;   ///< how often a loop of three right poses does not close
-  double max_factor = 55.0;  ///< by which all loops together may raise or lower the odds of a pose;
-                             ///< loops are not independent
+  float closing_angle = 3.0f;  ///< degrees, and ...
+  /// ... metres by which three right poses typically miss their beginning (one standard deviation)
+  float closing_distance = 0.15f;
+  /// how often a loop with a wrong pose closes all the same: near misses, and places that look
+  /// alike, whose wrong poses close their loops with right ones (0 to 0.33 of them in seven scenes,
+  /// and loops share pairs)
+  double chance = 0.4;
+  double miss = 0.02;  ///< how often a loop of three right poses does not close
+  /// by which all loops together may raise or lower the odds of a pose; loops are not independent
+  double max_factor = 55.0;
   double min_confidence = 0.02;  ///< pairs below take no part and keep their confidence
   double min_rival = 0.002;      ///< confidence from which a mode that is not the first takes part
   std::uint32_t modes = 4;       ///< of a pair, the first so many take part, 1..16
-  std::uint32_t neighbors = 64;  ///< of a cloud, so many pairs, the most confident, judge
-                                 ///< others, 2..1024: cost grows with pairs times this
-  std::uint32_t rounds = 3;      ///< damped updates, 1..100
+  /// of a cloud, so many pairs, the most confident, judge others, 2..1024: cost grows with pairs
+  /// times this
+  std::uint32_t neighbors = 64;
+  std::uint32_t rounds = 3;  ///< damped updates, 1..100
 
   /// The distance is three voxels; the rest does not depend on the voxel. Throws InvalidArgument
   /// unless v is finite and > 0.
@@ -42,9 +44,9 @@ struct PairAgreement {
   std::uint32_t mode =
       0;  ///< index into RegistrationResult::modes; 0 where there are none: target_from_source
   std::uint32_t loops = 0;  ///< of three that were looked at
-  std::uint32_t path = 0;   ///< pairs on the trusted path that it was compared with; 0: there is
-                            ///< none, or it is on such paths itself. Without loops or a path the
-                            ///< confidence is the result's own score
+  /// pairs on the trusted path that it was compared with; 0: there is none, or it is on such paths
+  /// itself. Without loops or a path the confidence is the result's own score
+  std::uint32_t path = 0;
 };
 
 /// Confidences of pairs in view of each other: results[k] belongs to pairs[k], as align_batch gives

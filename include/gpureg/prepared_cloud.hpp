@@ -14,25 +14,28 @@ namespace gpureg {
 
 struct PreparedState;
 
-/// A fragment ready for alignment: downsampled points, normals, features, search grid and depth maps, in the memory of the context that
-/// made it.
-/// Immutable and shareable between threads; copies share the data. Usable with any context of the same backend: a device that
-/// lacks a cloud gets a copy of it.
+/// A fragment ready for alignment: downsampled points, normals, features, search grid and depth
+/// maps, in the memory of the context that made it. Immutable and shareable between threads; copies
+/// share the data. Usable with any context of the same backend: a device that lacks a cloud gets a
+/// copy of it.
 class PreparedCloud {
  public:
   PreparedCloud() = default;  ///< empty handle; valid() is false
   explicit PreparedCloud(std::shared_ptr<const PreparedState> state) : state_(std::move(state)) {}
 
   bool valid() const { return state_ != nullptr; }
-  std::size_t size() const;                        ///< prepared points
-  std::size_t feature_dimension() const;           ///< 33 for FPFH
+  std::size_t size() const;               ///< prepared points
+  std::size_t feature_dimension() const;  ///< 33 for FPFH
   const PrepareStatistics& statistics() const;
   const PrepareOptions& options() const;
 
-  std::vector<Eigen::Vector3f> points() const;     ///< host copy, size() points in the cloud's frame
-  std::vector<Eigen::Vector3f> normals() const;    ///< host copy, unit length, or (0,0,0) where none could be computed
-  std::vector<float> features() const;             ///< host copy, size() x feature_dimension(), row by row
-  std::vector<Eigen::Vector3f> viewpoints() const; ///< sensor positions, at least one
+  /// host copy, size() points in the cloud's frame
+  std::vector<Eigen::Vector3f> points() const;
+  /// host copy, unit length, or (0,0,0) where none could be computed
+  std::vector<Eigen::Vector3f> normals() const;
+  /// host copy, size() x feature_dimension(), row by row
+  std::vector<float> features() const;
+  std::vector<Eigen::Vector3f> viewpoints() const;  ///< sensor positions, at least one
 
   const std::shared_ptr<const PreparedState>& state() const { return state_; }
 

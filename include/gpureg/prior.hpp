@@ -23,9 +23,9 @@ struct GravityPrior {
 /// Roughly where the source is, from odometry, say.
 struct PosePrior {
   UnalignedIsometry3d target_from_source = UnalignedIsometry3d::Identity();
-  double max_rotation = 30;    ///< degrees that the pose may be turned from it, (0, 180]
-  double max_translation = 1;  ///< metres that the middle of the source's bounding box may be
-                               ///< shifted from where it puts it
+  double max_rotation = 30;  ///< degrees that the pose may be turned from it, (0, 180]
+  /// metres that the middle of the source's bounding box may be shifted from where it puts it
+  double max_translation = 1;
 };
 
 /// What a pose of one pair must not contradict. Candidates that do are considered last, and refined

@@ -27,8 +27,8 @@ struct VoxelSizeSuggestion {
   float voxel_size = 0;  ///< for RegistrationOptions::from_voxel_size(); 0: none, see reason
   VoxelSizeReason reason = VoxelSizeReason::no_clouds;
   double spacing = 0;  ///< median distance of a point to its nearest neighbour at another place
-  double noise = 0;    ///< median distance (RMS) of points from the plane of their surroundings,
-                       ///< about a voxel wide
+  /// median distance (RMS) of points from the plane of their surroundings, about a voxel wide
+  double noise = 0;
   std::size_t points = 0;  ///< that a cloud keeps, in the median
 
   bool valid() const { return reason == VoxelSizeReason::none; }

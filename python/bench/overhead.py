@@ -1,9 +1,10 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""What align_batch costs more from Python than from C++, on the same pairs, in turns; and how threads scale.
+"""What align_batch costs more from Python than from C++, on the same pairs, in turns; and how
+threads scale.
 
-    cmake --build build/python/<tag> --target gpureg_python_reference
-    python python/bench/overhead.py scans/ --reference build/python/<tag>/bin/gpureg_python_reference
+cmake --build build/python/<tag> --target gpureg_python_reference
+python python/bench/overhead.py scans/ --reference build/python/<tag>/bin/gpureg_python_reference
 """
 
 from __future__ import annotations
@@ -23,7 +24,10 @@ def overhead(arguments: argparse.Namespace) -> None:
     clouds = [gpureg.prepare(path) for _, path in gpureg._core.list_fragments(arguments.folder)]
     pairs = [(j, i) for i in range(len(clouds)) for j in range(i + 1, len(clouds))]
     reference = subprocess.Popen(
-        [arguments.reference, arguments.folder, str(arguments.hypotheses)], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+        [arguments.reference, arguments.folder, str(arguments.hypotheses)],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        text=True,
     )
     assert reference.stdin and reference.stdout
     seconds: dict[str, list[float]] = {"C++": [], "Python": []}
@@ -32,7 +36,9 @@ def overhead(arguments: argparse.Namespace) -> None:
         reference.stdin.flush()
         cpp = float(reference.stdout.readline())
         begin = time.perf_counter()
-        results = gpureg.align_batch(clouds, pairs, options=options, progress=lambda done, total: None)
+        results = gpureg.align_batch(
+            clouds, pairs, options=options, progress=lambda done, total: None
+        )
         python = time.perf_counter() - begin
         assert len(results) == len(pairs)
         if k > 0:  # the first warms up
@@ -41,10 +47,16 @@ def overhead(arguments: argparse.Namespace) -> None:
     reference.stdin.close()
     reference.wait()
     cpp, python = statistics.median(seconds["C++"]), statistics.median(seconds["Python"])
-    print(f"{gpureg.default_context().description}: {len(pairs)} pairs, {arguments.hypotheses} hypotheses, {arguments.rounds} rounds in turns")
+    print(
+        f"{gpureg.default_context().description}: {len(pairs)} pairs, {arguments.hypotheses} hypotheses, {arguments.rounds} rounds in turns"
+    )
     for name, values in seconds.items():
-        print(f"{name:7s} median {1e3 * statistics.median(values):.2f} ms, least {1e3 * min(values):.2f} ms")
-    print(f"overhead of the binding: {100 * (python / cpp - 1):+.2f} % (median), {100 * (min(seconds['Python']) / min(seconds['C++']) - 1):+.2f} % (least)")
+        print(
+            f"{name:7s} median {1e3 * statistics.median(values):.2f} ms, least {1e3 * min(values):.2f} ms"
+        )
+    print(
+        f"overhead of the binding: {100 * (python / cpp - 1):+.2f} % (median), {100 * (min(seconds['Python']) / min(seconds['C++']) - 1):+.2f} % (least)"
+    )
 
 
 def scaling(arguments: argparse.Namespace) -> None:
@@ -58,10 +70,15 @@ def scaling(arguments: argparse.Namespace) -> None:
 
     def work(k: int, times: int) -> None:
         for _ in range(times):
-            results[k] = gpureg.align(b, a, options=options, context=contexts[k]).target_from_source.tolist()
+            results[k] = gpureg.align(
+                b, a, options=options, context=contexts[k]
+            ).target_from_source.tolist()
 
     def seconds(threads: int) -> float:
-        workers = [threading.Thread(target=work, args=(k, 2 * arguments.threads // threads)) for k in range(threads)]
+        workers = [
+            threading.Thread(target=work, args=(k, 2 * arguments.threads // threads))
+            for k in range(threads)
+        ]
         begin = time.perf_counter()
         for worker in workers:
             worker.start()
@@ -76,7 +93,9 @@ def scaling(arguments: argparse.Namespace) -> None:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("folder")
     parser.add_argument("--reference")
     parser.add_argument("--hypotheses", type=int, default=gpureg.HypothesisOptions().count)

@@ -11,7 +11,7 @@ namespace {
 using DoubleArray = py::array_t<double, py::array::c_style | py::array::forcecast>;
 
 template <typename Entry, typename Matrix>
-std::vector<Entry> entries_of(const py::list& list, Matrix Entry::*matrix, const char* name) {
+std::vector<Entry> entries_of(const py::list& list, Matrix Entry::* matrix, const char* name) {
   std::vector<Entry> entries;
   for (const py::handle item : list) {
     const auto parts = item.cast<py::tuple>();

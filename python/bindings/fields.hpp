@@ -104,7 +104,7 @@ inline void require_no_positional(const py::args& values, const std::string& cls
 }
 
 template <typename T, typename M>
-Field<T> field(std::string name, M T::*member, std::string doc) {
+Field<T> field(std::string name, M T::* member, std::string doc) {
   Field<T> f;
   f.name = name;
   f.doc = doc;

@@ -19,9 +19,10 @@ std::vector<Field<PrepareOptions>> prepare_fields() {
             "Farthest neighbour that alignment will ever ask this cloud for, metres."),
       field("wide_feature_radius", &O::wide_feature_radius,
             "Neighbourhood of a second FPFH, metres; 0: none."),
-      field("depth_maps", &O::depth_maps,
-            "Viewpoints that depth maps are made of for free-space tests; 0: none, and given normals "
-            "are never turned."),
+      field(
+          "depth_maps", &O::depth_maps,
+          "Viewpoints that depth maps are made of for free-space tests; 0: none, and given normals "
+          "are never turned."),
       field("front_reach", &O::front_reach,
             "How far from its surfaces a cloud tells their front from their back, metres; 0: not "
             "at all."),
@@ -71,7 +72,10 @@ std::vector<Field<EvidenceOptions>> evidence_fields() {
             "Degrees between the normals of an inlier, (0, 180]."),
       field("mode_angle", &O::mode_angle, "Degrees within which two poses are one, and ..."),
       field("mode_distance", &O::mode_distance, "... metres between the clouds' centres."),
-      field("slide_distance", &O::slide_distance, "Metres that the likeliest pose is slid, both ways, along the direction that its surfaces determine least, and by quarters of it where it is open whether the pose is right; 0: not at all."),
+      field("slide_distance", &O::slide_distance,
+            "Metres that the likeliest pose is slid, both ways, along the direction that its "
+            "surfaces determine least, and by quarters of it where it is open whether the pose is "
+            "right; 0: not at all."),
       field("free_space_margin", &O::free_space_margin,
             "Metres before a seen surface that a point may lie."),
       field("min_range", &O::min_range,
@@ -118,8 +122,8 @@ std::vector<Field<RegistrationOptions>> registration_fields() {
 }
 
 std::uint32_t quality_of(const py::object& value) {
-  return argument<std::uint32_t>(
-      value, "quality", "a whole number from 0 to " + std::to_string(kHighestQuality));
+  return argument<std::uint32_t>(value, "quality",
+                                 "a whole number from 0 to " + std::to_string(kHighestQuality));
 }
 
 }  // namespace

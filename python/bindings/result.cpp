@@ -166,10 +166,10 @@ void bind_mode(py::module_& m) {
       .def_readonly("overlap_confidence", &M::overlap_confidence,
                     "Probability that it is right and that the clouds overlap by 30 % or more.")
       .def_readonly("evidence", &M::evidence, "What speaks for and against it.")
-      .def_readonly("found_as", &M::found_as,
-                    "Place before refinement, the most promising first.")
-      .def("to_dict", [](const M& o) { return state_of(o); },
-           "All values as plain Python and numpy objects.")
+      .def_readonly("found_as", &M::found_as, "Place before refinement, the most promising first.")
+      .def(
+          "to_dict", [](const M& o) { return state_of(o); },
+          "All values as plain Python and numpy objects.")
       .def(py::pickle([](const M& o) { return state_of(o); }, &mode_from))
       .def("__repr__", [](const M& o) {
         char text[96];

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """All pairs of a folder of fragments cloud_bin_<i>.ply: kill it, call it again, nothing is lost.
 
-    python batch_folder.py scans/ --output run/
+python batch_folder.py scans/ --output run/
 """
 
 from __future__ import annotations
@@ -12,7 +12,9 @@ import gpureg
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("folder")
     parser.add_argument("--output", required=True)
     parser.add_argument("--voxel-size", type=float, default=0.05)

@@ -1,18 +1,19 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Features of your own, as a torch tensor: gpureg matches them instead of FPFH.
 
-A small random network stands in for a learned one: of each point's sorted distances to its neighbours it makes 32 numbers, which
-do not change under rigid motions. On a GPU nothing leaves it.
+A small random network stands in for a learned one: of each point's sorted distances to its
+neighbours it makes 32 numbers, which do not change under rigid motions. On a GPU nothing leaves it.
 """
 
 from __future__ import annotations
 
+import gpureg
 import torch
 
-import gpureg
 
-
-def features_of(points: torch.Tensor, network: torch.nn.Module, neighbors: int = 24) -> torch.Tensor:
+def features_of(
+    points: torch.Tensor, network: torch.nn.Module, neighbors: int = 24
+) -> torch.Tensor:
     """(N, 3) to (N, 32)."""
     distances = torch.cdist(points, points).topk(neighbors + 1, largest=False).values[:, 1:]
     features: torch.Tensor = network(distances)
@@ -20,20 +21,30 @@ def features_of(points: torch.Tensor, network: torch.nn.Module, neighbors: int =
 
 
 def main() -> None:
-    device = "cuda" if torch.cuda.is_available() and gpureg.default_context().backend == "cuda" else "cpu"
+    device = (
+        "cuda"
+        if torch.cuda.is_available() and gpureg.default_context().backend == "cuda"
+        else "cpu"
+    )
     generator = torch.Generator().manual_seed(1)
     source = torch.rand(1500, 3, generator=generator).to(device)
     angle = torch.tensor(1.0)
-    turn = torch.tensor([[angle.cos(), -angle.sin(), 0.0], [angle.sin(), angle.cos(), 0.0], [0.0, 0.0, 1.0]], device=device)
+    turn = torch.tensor(
+        [[angle.cos(), -angle.sin(), 0.0], [angle.sin(), angle.cos(), 0.0], [0.0, 0.0, 1.0]],
+        device=device,
+    )
     target = source @ turn.T + torch.tensor([0.3, -0.2, 0.5], device=device)
 
     torch.manual_seed(1)
-    network = torch.nn.Sequential(torch.nn.Linear(24, 64), torch.nn.ReLU(), torch.nn.Linear(64, 32)).to(device)
+    network = torch.nn.Sequential(
+        torch.nn.Linear(24, 64), torch.nn.ReLU(), torch.nn.Linear(64, 32)
+    ).to(device)
     options = gpureg.RegistrationOptions.from_voxel_size(0.05)
     options.prepare.voxel_size = 0.0  # the network has chosen the points
     options.hypothesis.count = 100_000
     clouds = [
-        gpureg.prepare(points, features=features_of(points, network), options=options.prepare) for points in (source, target)
+        gpureg.prepare(points, features=features_of(points, network), options=options.prepare)
+        for points in (source, target)
     ]
     result = gpureg.align(clouds[0], clouds[1], options=options)
     print(f"{device}: {result}")

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Register two clouds and look at them: a picture by matplotlib, and a viewer where Open3D or rerun is installed.
+"""Register two clouds and look at them: a picture by matplotlib, and a viewer where Open3D or rerun
+is installed.
 
-    python register_two_clouds.py source.ply target.ply --voxel-size 0.05 --picture before_after.png
+python register_two_clouds.py source.ply target.ply --voxel-size 0.05 --picture before_after.png
 """
 
 from __future__ import annotations
@@ -9,10 +10,9 @@ from __future__ import annotations
 import argparse
 import sys
 
+import gpureg
 import numpy as np
 import numpy.typing as npt
-
-import gpureg
 
 Points = npt.NDArray[np.float64]
 
@@ -60,7 +60,9 @@ def view(source: Points, target: Points, target_from_source: Points) -> None:
 
 
 def main() -> int:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("source")
     parser.add_argument("target")
     parser.add_argument("--voxel-size", type=float, default=0.05)
@@ -68,7 +70,10 @@ def main() -> int:
     parser.add_argument("--view", action="store_true")
     arguments = parser.parse_args()
 
-    source, target = gpureg.read_point_cloud(arguments.source), gpureg.read_point_cloud(arguments.target)
+    source, target = (
+        gpureg.read_point_cloud(arguments.source),
+        gpureg.read_point_cloud(arguments.target),
+    )
     result = gpureg.register(source, target, voxel_size=arguments.voxel_size)
     print(result)
     if not result.aligned:

@@ -45,8 +45,8 @@ from ._core import (
     __version__,
     describe_backends,
 )
-from .fragments import FragmentSet
 from .files import read_point_cloud, write_point_cloud
+from .fragments import FragmentSet
 from .preparation import prepare, prepare_batch
 from .registration import (
     BatchInterrupted,

@@ -3,7 +3,8 @@
 
 from __future__ import annotations
 
-from typing import Any, List, Optional, Sequence
+from collections.abc import Sequence
+from typing import Any
 
 from . import _core
 from ._arrays import index_pairs
@@ -14,8 +15,8 @@ def agreement(
     pairs: Any,
     results: Sequence[RegistrationResult],
     *,
-    options: Optional[AgreementOptions] = None,
-) -> List[PairAgreement]:
+    options: AgreementOptions | None = None,
+) -> list[PairAgreement]:
     """Confidences of pairs in view of each other: the poses around a loop must lead back.
 
     Parameters
@@ -31,8 +32,9 @@ def agreement(
     -------
     list of PairAgreement
         ``confidence`` given all pairs, the index ``mode`` of the pose that the loops support (into
-        ``RegistrationResult.modes``), the number of ``loops`` of three, and how many trusted pairs make
-        the ``path`` between its clouds that it was compared with. Pairs in no loop keep their score.
+        ``RegistrationResult.modes``), the number of ``loops`` of three, and how many trusted pairs
+        make the ``path`` between its clouds that it was compared with. Pairs in no loop keep their
+        score.
 
     Raises
     ------

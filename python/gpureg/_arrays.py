@@ -7,7 +7,7 @@ Errors name the argument and the shape or type that it has.
 from __future__ import annotations
 
 import os
-from typing import Any, List, Optional, Tuple, Union
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -17,22 +17,23 @@ from ._core import PointCloud, PreparedCloud, PrepareOptions
 from ._device import DeviceRows, device_rows, on_device, stream_of
 
 FloatArray = npt.NDArray[np.float32]
-Rows = Union[FloatArray, DeviceRows]
+Rows = FloatArray | DeviceRows
 #: (points, normals, features, viewpoints, origin, stream), all but the points may be None. With a stream, the first three are on a device.
-CoreCloud = Tuple[
+CoreCloud = tuple[
     Rows,
-    Optional[Rows],
-    Optional[Rows],
-    Optional[FloatArray],
-    Optional[npt.NDArray[np.float64]],
-    Optional[int],
+    Rows | None,
+    Rows | None,
+    FloatArray | None,
+    npt.NDArray[np.float64] | None,
+    int | None,
 ]
 
 _HOST_DEVICES = (1, 3)  # DLPack's kDLCPU and kDLCUDAHost
 # float32 must resolve this part of a voxel, or coordinates are moved before they become float32.
 _PARTS_OF_VOXEL = 256
 _MILLIMETRE = 1e-3  # what stands in for the voxel where points are kept as they are
-# A cloud that float32 divides into so many steps is fine whatever its unit: a part in millimetres, three thousand of them away, say.
+# A cloud that float32 divides into so many steps is fine whatever its unit: a part in millimetres,
+# three thousand of them away, say.
 _STEPS = 1 << 17
 
 
@@ -70,10 +71,12 @@ def _from_device(value: Any, name: str) -> npt.NDArray[Any]:
     raise TypeError(f"{name}: no way to copy a {_kind(value)} from its device")
 
 
-def matrix(value: Any, name: str, columns: Optional[int], rows: Optional[int] = None) -> npt.NDArray[Any]:
+def matrix(value: Any, name: str, columns: int | None, rows: int | None = None) -> npt.NDArray[Any]:
     """Checks type and shape; returns the array as it is."""
     array = to_numpy(value, name)
-    if array.dtype == object and array.ndim == 0:  # what numpy makes of None, dictionaries and generators
+    if (
+        array.dtype == object and array.ndim == 0
+    ):  # what numpy makes of None, dictionaries and generators
         raise TypeError(f"{name}: expected an array of numbers, got {_kind(value)}")
     if array.dtype.kind not in "fiu":
         raise TypeError(f"{name}: expected numbers, got dtype {array.dtype} (shape {array.shape})")
@@ -93,7 +96,10 @@ def float_rows(array: npt.NDArray[Any], name: str) -> FloatArray:
         and array.dtype.isnative
         and array.flags.aligned
         and (array.shape[1] <= 1 or array.strides[1] == size)
-        and (array.shape[0] <= 1 or (array.strides[0] % size == 0 and array.strides[0] >= size * array.shape[1]))
+        and (
+            array.shape[0] <= 1
+            or (array.strides[0] % size == 0 and array.strides[0] >= size * array.shape[1])
+        )
     ):
         return array
     with np.errstate(over="ignore"):
@@ -102,11 +108,13 @@ def float_rows(array: npt.NDArray[Any], name: str) -> FloatArray:
         lost = np.isfinite(array) & ~np.isfinite(rows)
         if lost.any():
             row = int(np.argwhere(lost)[0][0])
-            raise ValueError(f"{name}: row {row} is {array[row].tolist()}, too large for float32 (shape {array.shape})")
+            raise ValueError(
+                f"{name}: row {row} is {array[row].tolist()}, too large for float32 (shape {array.shape})"
+            )
     return rows
 
 
-def origin_of(points: npt.NDArray[Any], voxel_size: float) -> Optional[npt.NDArray[np.float64]]:
+def origin_of(points: npt.NDArray[Any], voxel_size: float) -> npt.NDArray[np.float64] | None:
     """What to take off coordinates that float32 is too coarse for; None where it is fine enough.
 
     Only types finer than float32 can hold such coordinates.
@@ -120,8 +128,12 @@ def origin_of(points: npt.NDArray[Any], voxel_size: float) -> Optional[npt.NDArr
     return np.asarray(np.round(low + (high - low) / 2))
 
 
-def _bounds(points: npt.NDArray[Any]) -> Optional[Tuple[npt.NDArray[np.float64], npt.NDArray[np.float64], float]]:
-    """Lowest and highest coordinates, and the largest magnitude; None where casting to float32 loses nothing, or is an error."""
+def _bounds(
+    points: npt.NDArray[Any],
+) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64], float] | None:
+    """Lowest and highest coordinates, and the largest magnitude; None where casting to float32
+    loses nothing, or is an error.
+    """
     if points.dtype.itemsize <= 4 or len(points) == 0:
         return None
     finite = points[np.isfinite(points).all(axis=1)]
@@ -141,14 +153,18 @@ def _step(largest: float) -> float:
 
 def stored_cloud(
     points: Any, normals: Any, viewpoints: Any
-) -> Tuple[FloatArray, Optional[FloatArray], Optional[FloatArray]]:
-    """What a PointCloud holds. It has no origin: coordinates that need one are refused, not rounded."""
+) -> tuple[FloatArray, FloatArray | None, FloatArray | None]:
+    """What a PointCloud holds. It has no origin: coordinates that need one are refused, not
+    rounded.
+    """
     raw = matrix(points, "points", 3)
     rows, bounds = float_rows(raw, "points"), _bounds(raw)
     if bounds is not None and not np.array_equal(rows, raw, equal_nan=True):
         low, high, largest = bounds
         step = _step(largest)
-        if step * _PARTS_OF_VOXEL > PrepareOptions().voxel_size and step * _STEPS > float((high - low).max()):
+        if step * _PARTS_OF_VOXEL > PrepareOptions().voxel_size and step * _STEPS > float(
+            (high - low).max()
+        ):
             raise ValueError(
                 f"points: coordinates up to {largest:.7g} resolve {step:.2g} in float32, which clouds and files hold; pass the array itself"
                 f" to prepare or register, where nothing is lost, or subtract an offset (dtype {raw.dtype}, shape {raw.shape})"
@@ -156,12 +172,16 @@ def stored_cloud(
     if normals is not None:
         normals = matrix(normals, "normals", 3)
         # As many as points, or none: that is how a cloud shows that it has none.
-        normals = float_rows(matrix(normals, "normals", 3, len(raw)), "normals") if len(normals) else None
+        normals = (
+            float_rows(matrix(normals, "normals", 3, len(raw)), "normals") if len(normals) else None
+        )
     if viewpoints is not None:
         viewpoints = float_rows(matrix(viewpoints, "viewpoints", 3), "viewpoints")
         if not np.isfinite(viewpoints).all():
             row = int(np.argwhere(~np.isfinite(viewpoints))[0][0])
-            raise ValueError(f"viewpoints: row {row} is {viewpoints[row].tolist()}, expected finite coordinates (shape {viewpoints.shape})")
+            raise ValueError(
+                f"viewpoints: row {row} is {viewpoints[row].tolist()}, expected finite coordinates (shape {viewpoints.shape})"
+            )
     return rows, normals, viewpoints
 
 
@@ -189,15 +209,20 @@ def core_cloud(
     origin = origin_of(raw, options.voxel_size)
     views = None if viewpoints is None else matrix(viewpoints, prefix + "viewpoints", 3)
     if origin is not None:
-        # With no viewpoint given, the sensor was where the caller's frame has its origin. Normals of the cloud's own need none:
-        # they would be turned, and free space be judged, from thousands of kilometres away.
+        # With no viewpoint given, the sensor was where the caller's frame has its origin. Normals
+        # of the cloud's own need none: they would be turned, and free space be judged, from
+        # thousands of kilometres away.
         if views is None and normals is None:
             views = np.zeros((1, 3))
         raw, views = raw - origin, None if views is None else views - origin
     return (
         float_rows(raw, name),
-        None if normals is None else float_rows(matrix(normals, prefix + "normals", 3, count), prefix + "normals"),
-        None if features is None else float_rows(matrix(features, prefix + "features", None, count), prefix + "features"),
+        None
+        if normals is None
+        else float_rows(matrix(normals, prefix + "normals", 3, count), prefix + "normals"),
+        None
+        if features is None
+        else float_rows(matrix(features, prefix + "features", None, count), prefix + "features"),
         None if views is None else np.ascontiguousarray(float_rows(views, prefix + "viewpoints")),
         origin,
         None,
@@ -211,24 +236,41 @@ def host_points(cloud: Any, name: str) -> FloatArray:
     return float_rows(raw if origin is None else raw - origin, name)
 
 
-def _stay_on_device(points: Any, normals: Any, features: Any, viewpoints: Any, prefix: str) -> Optional[CoreCloud]:
-    """None where a part is on the host, or has a type or shape that the host path converts or refuses."""
+def _stay_on_device(
+    points: Any, normals: Any, features: Any, viewpoints: Any, prefix: str
+) -> CoreCloud | None:
+    """None where a part is on the host, or has a type or shape that the host path converts or
+    refuses.
+    """
     if any(part is not None and not on_device(part) for part in (normals, features)):
         return None
-    rows, normal_rows, feature_rows = (None if part is None else device_rows(part) for part in (points, normals, features))
+    rows, normal_rows, feature_rows = (
+        None if part is None else device_rows(part) for part in (points, normals, features)
+    )
     if rows is None or rows.columns != 3:
         return None
     if normals is not None and (normal_rows is None or normal_rows[1:3] != rows[1:3]):
         return None
     if features is not None and (feature_rows is None or feature_rows.rows != rows.rows):
         return None
-    views = None if viewpoints is None else float_rows(matrix(viewpoints, prefix + "viewpoints", 3), prefix + "viewpoints")
-    return rows, normal_rows, feature_rows, None if views is None else np.ascontiguousarray(views), None, stream_of(rows.owner)
+    views = (
+        None
+        if viewpoints is None
+        else float_rows(matrix(viewpoints, prefix + "viewpoints", 3), prefix + "viewpoints")
+    )
+    return (
+        rows,
+        normal_rows,
+        feature_rows,
+        None if views is None else np.ascontiguousarray(views),
+        None,
+        stream_of(rows.owner),
+    )
 
 
-def _unpack(points: Any, normals: Any, viewpoints: Any) -> Tuple[Any, Any, Any]:
+def _unpack(points: Any, normals: Any, viewpoints: Any) -> tuple[Any, Any, Any]:
     """Clouds that carry their normals along."""
-    if isinstance(points, (str, os.PathLike)):
+    if isinstance(points, str | os.PathLike):
         points = _core.read_point_cloud(os.fspath(points))
     if isinstance(points, PointCloud):
         if normals is None and len(points.normals):
@@ -240,34 +282,48 @@ def _unpack(points: Any, normals: Any, viewpoints: Any) -> Tuple[Any, Any, Any]:
         if normals is None and points.has_normals():
             normals = np.asarray(points.normals)
         return np.asarray(points.points).reshape(-1, 3), normals, viewpoints
-    if hasattr(points, "point") and hasattr(points.point, "positions"):  # open3d.t.geometry.PointCloud
+    if hasattr(points, "point") and hasattr(
+        points.point, "positions"
+    ):  # open3d.t.geometry.PointCloud
         if normals is None and "normals" in points.point:
             normals = points.point.normals
         return points.point.positions, normals, viewpoints
     return points, normals, viewpoints
 
 
-def several(value: Any, name: str) -> List[Any]:
-    """A sequence of clouds as a list; refuses what is one cloud, whose letters or points would be taken for clouds."""
+def several(value: Any, name: str) -> list[Any]:
+    """A sequence of clouds as a list; refuses what is one cloud, whose letters or points would be
+    taken for clouds.
+    """
     shape = getattr(value, "shape", None)
     rows = shape is not None and len(shape) < 3 and getattr(value, "dtype", None) != object
-    single = rows or isinstance(value, (str, bytes, os.PathLike, PointCloud, PreparedCloud))
+    single = rows or isinstance(value, str | bytes | os.PathLike | PointCloud | PreparedCloud)
     if not single:
         try:
             return list(value)
         except TypeError:  # not iterable
             pass
-    given = repr(value) if isinstance(value, (str, bytes, os.PathLike)) else _kind(value) + ("" if shape is None else f", shape {tuple(shape)}")
-    raise TypeError(f"{name}: expected a sequence of clouds, got {'one: ' if single else ''}{given}")
+    given = (
+        repr(value)
+        if isinstance(value, str | bytes | os.PathLike)
+        else _kind(value) + ("" if shape is None else f", shape {tuple(shape)}")
+    )
+    raise TypeError(
+        f"{name}: expected a sequence of clouds, got {'one: ' if single else ''}{given}"
+    )
 
 
-def index_pairs(value: Any, name: str, count: Union[int, Tuple[int, int], None]) -> npt.NDArray[np.uint32]:
+def index_pairs(
+    value: Any, name: str, count: int | tuple[int, int] | None
+) -> npt.NDArray[np.uint32]:
     """(M, 2) indices below count (one for each column; None: not known); an empty list is (0, 2)."""
     array = to_numpy(value if hasattr(value, "shape") else list(value), name)
     if array.size == 0 and array.ndim <= 2:
         array = np.zeros((0, 2), np.int64)
     if array.dtype.kind not in "iu":
-        raise TypeError(f"{name}: expected whole numbers, got dtype {array.dtype} (shape {array.shape})")
+        raise TypeError(
+            f"{name}: expected whole numbers, got dtype {array.dtype} (shape {array.shape})"
+        )
     if array.ndim != 2 or array.shape[1] != 2:
         raise ValueError(f"{name}: expected shape (M, 2), got {array.shape}")
     limits = (count, count) if isinstance(count, int) else count or (2**32, 2**32)
@@ -275,6 +331,10 @@ def index_pairs(value: Any, name: str, count: Union[int, Tuple[int, int], None])
     if wrong.any():
         row = int(np.argwhere(wrong)[0][0])
         if count is None:
-            raise ValueError(f"{name}[{row}] is {tuple(array[row].tolist())}, expected indices from 0 to {2**32 - 1} (shape {array.shape})")
-        raise ValueError(f"{name}[{row}] is {tuple(array[row].tolist())}, but there are {' and '.join(map(str, limits[:1] if isinstance(count, int) else limits))} (shape {array.shape})")
+            raise ValueError(
+                f"{name}[{row}] is {tuple(array[row].tolist())}, expected indices from 0 to {2**32 - 1} (shape {array.shape})"
+            )
+        raise ValueError(
+            f"{name}[{row}] is {tuple(array[row].tolist())}, but there are {' and '.join(map(str, limits[:1] if isinstance(count, int) else limits))} (shape {array.shape})"
+        )
     return np.ascontiguousarray(array, dtype=np.uint32)

@@ -7,21 +7,22 @@ import math
 import numbers
 import os
 import threading
-from typing import Any, List, Optional
+from typing import Any
 
 import numpy as np
 
 from ._core import BackendUnavailable, Context, InvalidArgument
 
-_default: Optional[Context] = None
+_default: Context | None = None
 _default_lock = threading.Lock()
 
 
 def default_context() -> Context:
-    """The context that calls without one use: CUDA where a device can be used, else all CPU threads.
+    """The context that calls without one use: CUDA where a device can be used, else all CPU
+    threads.
 
-    Made at the first call, once per process. A forked child makes its own, on the CPU; CUDA does not
-    survive a fork, nor do contexts of your own, as no thread does.
+    Made at the first call, once per process. A forked child makes its own, on the CPU; CUDA does
+    not survive a fork, nor do contexts of your own, as no thread does.
     """
     global _default
     with _default_lock:
@@ -37,21 +38,22 @@ def default_context() -> Context:
 def _forget_default() -> None:
     global _default, _default_lock
     _default_lock = threading.Lock()
-    # The parent's threads do not exist here: joining them would wait for ever, so it is never freed.
+    # The parent's threads do not exist here: joining them would wait for ever, so it is never
+    # freed.
     _abandoned.append(_default)
     _default = None
 
 
-_abandoned: List[Optional[Context]] = []
+_abandoned: list[Context | None] = []
 os.register_at_fork(after_in_child=_forget_default)
 
 
-def context_of(context: Optional[Context]) -> Context:
+def context_of(context: Context | None) -> Context:
     return checked(context, Context, "context") or default_context()
 
 
 def milliseconds_of(value: Any, name: str) -> float:
-    if isinstance(value, (bool, np.bool_)) or not isinstance(value, numbers.Real):
+    if isinstance(value, bool | np.bool_) or not isinstance(value, numbers.Real):
         raise TypeError(f"{name}: expected milliseconds, a number, got {value!r}")
     number = float(value)
     if not (math.isfinite(number) and number > 0):

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 # Types of the compiled module. python/tests/test_stubs.py compares it with the module.
-from typing import Any, Callable, Dict, List, Literal, Optional, Sequence, Tuple, Union, overload
+from collections.abc import Callable, Sequence
+from typing import Any, Literal, overload
 
 import numpy as np
 import numpy.typing as npt
@@ -8,10 +9,10 @@ import numpy.typing as npt
 _Float32 = npt.NDArray[np.float32]
 _Float64 = npt.NDArray[np.float64]
 # On a device: address, rows, columns, floats from row to row, and what keeps the memory alive.
-_DeviceRows = Tuple[int, int, int, int, Any]
-_Rows = Union[_Float32, _DeviceRows]
+_DeviceRows = tuple[int, int, int, int, Any]
+_Rows = _Float32 | _DeviceRows
 # Points, normals, features, viewpoints, origin; and the stream that made what is on a device, or None for clouds of the host.
-_Cloud = Tuple[_Rows, Optional[_Rows], Optional[_Rows], Optional[_Float32], Optional[_Float64], Optional[int]]
+_Cloud = tuple[_Rows, _Rows | None, _Rows | None, _Float32 | None, _Float64 | None, int | None]
 
 __version__: str
 
@@ -39,7 +40,7 @@ class Context:
     @property
     def description(self) -> str: ...
     @property
-    def device_memory(self) -> List[Dict[str, int]]: ...
+    def device_memory(self) -> list[dict[str, int]]: ...
 
 class PrepareOptions:
     voxel_size: float
@@ -74,7 +75,7 @@ class PrepareOptions:
     def validate(self) -> None: ...
     def __eq__(self, other: object, /) -> bool: ...
     __hash__: None  # type: ignore[assignment]
-    _fields: Tuple[str, ...]
+    _fields: tuple[str, ...]
 
 class HypothesisOptions:
     proposal: Literal["compatibility", "quadruples"]
@@ -112,7 +113,7 @@ class HypothesisOptions:
     def validate(self) -> None: ...
     def __eq__(self, other: object, /) -> bool: ...
     __hash__: None  # type: ignore[assignment]
-    _fields: Tuple[str, ...]
+    _fields: tuple[str, ...]
 
 class CompatibilityOptions:
     max_matches: int
@@ -153,7 +154,7 @@ class CompatibilityOptions:
     def validate(self) -> None: ...
     def __eq__(self, other: object, /) -> bool: ...
     __hash__: None  # type: ignore[assignment]
-    _fields: Tuple[str, ...]
+    _fields: tuple[str, ...]
 
 class EvidenceOptions:
     sample: int
@@ -191,7 +192,7 @@ class EvidenceOptions:
     def validate(self) -> None: ...
     def __eq__(self, other: object, /) -> bool: ...
     __hash__: None  # type: ignore[assignment]
-    _fields: Tuple[str, ...]
+    _fields: tuple[str, ...]
 
 class ScoreOptions:
     max_correspondence_distance: float
@@ -217,7 +218,7 @@ class ScoreOptions:
     def validate(self) -> None: ...
     def __eq__(self, other: object, /) -> bool: ...
     __hash__: None  # type: ignore[assignment]
-    _fields: Tuple[str, ...]
+    _fields: tuple[str, ...]
 
 class RefineOptions:
     max_iterations: int
@@ -240,7 +241,7 @@ class RefineOptions:
     def validate(self) -> None: ...
     def __eq__(self, other: object, /) -> bool: ...
     __hash__: None  # type: ignore[assignment]
-    _fields: Tuple[str, ...]
+    _fields: tuple[str, ...]
 
 class RegistrationOptions:
     prepare: PrepareOptions
@@ -280,7 +281,7 @@ class RegistrationOptions:
     def validate(self) -> None: ...
     def __eq__(self, other: object, /) -> bool: ...
     __hash__: None  # type: ignore[assignment]
-    _fields: Tuple[str, ...]
+    _fields: tuple[str, ...]
 
 class RegistrationStatistics:
     @property
@@ -307,7 +308,7 @@ class RegistrationStatistics:
     def swapped(self) -> bool: ...
     def __eq__(self, other: object, /) -> bool: ...
     __hash__: None  # type: ignore[assignment]
-    _fields: Tuple[str, ...]
+    _fields: tuple[str, ...]
 
 class StageTimings:
     @property
@@ -326,7 +327,7 @@ class StageTimings:
     def total(self) -> float: ...
     def __eq__(self, other: object, /) -> bool: ...
     __hash__: None  # type: ignore[assignment]
-    _fields: Tuple[str, ...]
+    _fields: tuple[str, ...]
 
 class PrepareStatistics:
     @property
@@ -355,7 +356,7 @@ class PrepareStatistics:
     def total(self) -> float: ...
     def __eq__(self, other: object, /) -> bool: ...
     __hash__: None  # type: ignore[assignment]
-    _fields: Tuple[str, ...]
+    _fields: tuple[str, ...]
 
 class CorrespondenceMoments:
     @property
@@ -417,12 +418,12 @@ class PoseEvidence:
     @property
     def target_at_back(self) -> float: ...
     @property
-    def stiffness(self) -> List[float]: ...
+    def stiffness(self) -> list[float]: ...
     @property
-    def softest(self) -> List[float]: ...
+    def softest(self) -> list[float]: ...
     def __eq__(self, other: object, /) -> bool: ...
     __hash__: None  # type: ignore[assignment]
-    _fields: Tuple[str, ...]
+    _fields: tuple[str, ...]
 
 class RegistrationMode:
     @property
@@ -435,7 +436,7 @@ class RegistrationMode:
     def evidence(self) -> PoseEvidence: ...
     @property
     def found_as(self) -> int: ...
-    def to_dict(self) -> Dict[str, Any]: ...
+    def to_dict(self) -> dict[str, Any]: ...
 
 class RegistrationResult:
     @property
@@ -453,7 +454,7 @@ class RegistrationResult:
     @property
     def score(self) -> float: ...
     @property
-    def modes(self) -> List[RegistrationMode]: ...
+    def modes(self) -> list[RegistrationMode]: ...
     @property
     def inlier_ratio(self) -> float: ...
     @property
@@ -466,7 +467,7 @@ class RegistrationResult:
     def statistics(self) -> RegistrationStatistics: ...
     @property
     def timings(self) -> StageTimings: ...
-    def to_dict(self) -> Dict[str, Any]: ...
+    def to_dict(self) -> dict[str, Any]: ...
     def __bool__(self) -> bool: ...
 
 class AgreementOptions:
@@ -513,7 +514,7 @@ class AgreementOptions:
     def validate(self) -> None: ...
     def __eq__(self, other: object, /) -> bool: ...
     __hash__: None  # type: ignore[assignment]
-    _fields: Tuple[str, ...]
+    _fields: tuple[str, ...]
 
 class PairAgreement:
     @property
@@ -526,7 +527,7 @@ class PairAgreement:
     def path(self) -> int: ...
     def __eq__(self, other: object, /) -> bool: ...
     __hash__: None  # type: ignore[assignment]
-    _fields: Tuple[str, ...]
+    _fields: tuple[str, ...]
 
 class TimedResult:
     @property
@@ -558,10 +559,10 @@ class RegistrationPrior:
     def __init__(
         self,
         *,
-        source_up: Optional[npt.ArrayLike] = None,
-        target_up: Optional[npt.ArrayLike] = None,
+        source_up: npt.ArrayLike | None = None,
+        target_up: npt.ArrayLike | None = None,
         max_angle: float = 10.0,
-        target_from_source: Optional[npt.ArrayLike] = None,
+        target_from_source: npt.ArrayLike | None = None,
         max_rotation: float = 30.0,
         max_translation: float = 1.0,
     ) -> None: ...
@@ -589,8 +590,8 @@ class PointCloud:
     def __init__(
         self,
         points: npt.ArrayLike,
-        normals: Optional[npt.ArrayLike] = None,
-        viewpoints: Optional[npt.ArrayLike] = None,
+        normals: npt.ArrayLike | None = None,
+        viewpoints: npt.ArrayLike | None = None,
     ) -> None: ...
     def __len__(self) -> int: ...
     @property
@@ -600,37 +601,45 @@ class PointCloud:
     @property
     def viewpoints(self) -> _Float32: ...
 
-def describe_backends() -> List[str]: ...
+def describe_backends() -> list[str]: ...
 def prepare_batch(
     context: Context, clouds: Sequence[_Cloud], options: PrepareOptions, names: Sequence[str] = ...
-) -> List[PreparedCloud]: ...
+) -> list[PreparedCloud]: ...
 def align(
     context: Context,
     source: PreparedCloud,
     target: PreparedCloud,
     options: RegistrationOptions,
-    correspondences: Optional[npt.NDArray[np.uint32]] = None,
-    prior: Optional[RegistrationPrior] = None,
+    correspondences: npt.NDArray[np.uint32] | None = None,
+    prior: RegistrationPrior | None = None,
 ) -> RegistrationResult: ...
 def align_batch(
     context: Context,
-    clouds: List[PreparedCloud],
+    clouds: list[PreparedCloud],
     pairs: npt.NDArray[np.uint32],
     options: RegistrationOptions,
-    progress: Optional[Callable[[int], object]] = None,
+    progress: Callable[[int], object] | None = None,
     priors: Sequence[RegistrationPrior] = ...,
-) -> Tuple[List[RegistrationResult], Optional[BaseException]]: ...
-def agreement(pairs: npt.NDArray[np.uint32], results: Sequence[RegistrationResult], options: AgreementOptions) -> List[PairAgreement]: ...
+) -> tuple[list[RegistrationResult], BaseException | None]: ...
+def agreement(
+    pairs: npt.NDArray[np.uint32], results: Sequence[RegistrationResult], options: AgreementOptions
+) -> list[PairAgreement]: ...
 def align_within(
-    context: Context, source: PreparedCloud, target: PreparedCloud, milliseconds: float, options: RegistrationOptions
+    context: Context,
+    source: PreparedCloud,
+    target: PreparedCloud,
+    milliseconds: float,
+    options: RegistrationOptions,
 ) -> TimedResult: ...
-def suggest_voxel_size(clouds: List[_Float32]) -> VoxelSizeSuggestion: ...
+def suggest_voxel_size(clouds: list[_Float32]) -> VoxelSizeSuggestion: ...
 def read_point_cloud(path: str) -> PointCloud: ...
 def write_point_cloud(path: str, cloud: PointCloud) -> None: ...
-def list_fragments(folder: str) -> List[Tuple[int, str]]: ...
-def read_cameras(path: str) -> Dict[int, _Float32]: ...
-def read_pairs(path: str) -> List[Tuple[int, int]]: ...
-def write_log(path: str, entries: Sequence[Tuple[int, int, int, _Float64]]) -> None: ...
-def write_information(path: str, entries: Sequence[Tuple[int, int, int, _Float64]]) -> None: ...
-def read_log(path: str) -> List[Tuple[int, int, int, _Float64]]: ...
-def evaluate(folder: str, reports: Sequence[Tuple[int, int, int, _Float64]]) -> Dict[str, float]: ...
+def list_fragments(folder: str) -> list[tuple[int, str]]: ...
+def read_cameras(path: str) -> dict[int, _Float32]: ...
+def read_pairs(path: str) -> list[tuple[int, int]]: ...
+def write_log(path: str, entries: Sequence[tuple[int, int, int, _Float64]]) -> None: ...
+def write_information(path: str, entries: Sequence[tuple[int, int, int, _Float64]]) -> None: ...
+def read_log(path: str) -> list[tuple[int, int, int, _Float64]]: ...
+def evaluate(
+    folder: str, reports: Sequence[tuple[int, int, int, _Float64]]
+) -> dict[str, float]: ...

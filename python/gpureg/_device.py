@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import sys
-from typing import Any, NamedTuple, Optional
+from typing import Any, NamedTuple
 
 #: Types that become float32 on the device. float64 goes by the host, which looks for coordinates too large for float32.
 _CONVERTED = ("float16", "bfloat16")
@@ -27,8 +27,10 @@ def on_device(value: Any) -> bool:
     return hasattr(type(value), "__cuda_array_interface__")
 
 
-def device_rows(value: Any) -> Optional[DeviceRows]:
-    """value as device rows; None for what is better copied to the host: float64, whole numbers, wrong shapes (and their errors)."""
+def device_rows(value: Any) -> DeviceRows | None:
+    """value as device rows; None for what is better copied to the host: float64, whole numbers,
+    wrong shapes (and their errors).
+    """
     if hasattr(value, "detach"):
         value = value.detach()  # a tensor that is part of a graph has no interface
     value = _with_interface(value)
@@ -54,7 +56,9 @@ def stream_of(value: Any) -> int:
     if torch is not None and isinstance(value, torch.Tensor):
         return int(torch.cuda.current_stream(value.device).cuda_stream)
     stream = value.__cuda_array_interface__.get("stream")
-    return int(stream or 0)  # 0 is the default stream, which waits for all that does not refuse to be waited for
+    return int(
+        stream or 0
+    )  # 0 is the default stream, which waits for all that does not refuse to be waited for
 
 
 def _with_interface(value: Any) -> Any:

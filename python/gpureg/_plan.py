@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import dataclasses
 import hashlib
-from typing import Any, Dict, Tuple
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -29,7 +29,13 @@ class Plan:
     chunk_size: int
 
     @classmethod
-    def make(cls, fragments: FragmentSet, options: RegistrationOptions, pairs: npt.NDArray[np.int64], chunk_size: int) -> Plan:
+    def make(
+        cls,
+        fragments: FragmentSet,
+        options: RegistrationOptions,
+        pairs: npt.NDArray[np.int64],
+        chunk_size: int,
+    ) -> Plan:
         i, j = pairs[:, 0], pairs[:, 1]
         return cls(fragments, options, pairs, np.lexsort((j, i, j // TILE, i // TILE)), chunk_size)
 
@@ -47,8 +53,10 @@ class Plan:
         numbers: npt.NDArray[np.int64] = np.asarray(self.fragments.numbers, np.int64)
         return np.asarray(numbers[pairs])
 
-    def manifest(self) -> Dict[str, Any]:
-        """What must be the same for a run to go on. Devices and memory may change: they change no result."""
+    def manifest(self) -> dict[str, Any]:
+        """What must be the same for a run to go on. Devices and memory may change: they change no
+        result.
+        """
         return {
             "gpureg_run": 1,
             "version": _core.__version__,
@@ -57,7 +65,9 @@ class Plan:
             "tile": TILE,
             "pairs": {
                 "count": len(self.pairs),
-                "hash": hashlib.blake2b(np.ascontiguousarray(self.pairs, "<i8").tobytes(), digest_size=16).hexdigest(),
+                "hash": hashlib.blake2b(
+                    np.ascontiguousarray(self.pairs, "<i8").tobytes(), digest_size=16
+                ).hexdigest(),
             },
             "fragments": [
                 {"number": number, "fingerprint": self.fragments.fingerprint(position)}
@@ -68,7 +78,7 @@ class Plan:
 
 def options_dict(options: Any) -> Any:
     """Nested dictionaries of plain values."""
-    fields: Tuple[str, ...] = getattr(type(options), "_fields", ())
+    fields: tuple[str, ...] = getattr(type(options), "_fields", ())
     return {name: options_dict(getattr(options, name)) for name in fields} if fields else options
 
 
@@ -86,5 +96,13 @@ def difference(before: Any, now: Any, name: str = "") -> str:
     if isinstance(before, list) and isinstance(now, list):
         if len(before) != len(now):
             return f"{name} had {len(before)} entries, now {len(now)}"
-        return next((found for k, (a, b) in enumerate(zip(before, now)) for found in [difference(a, b, f"{name}[{k}]")] if found), "")
+        return next(
+            (
+                found
+                for k, (a, b) in enumerate(zip(before, now))
+                for found in [difference(a, b, f"{name}[{k}]")]
+                if found
+            ),
+            "",
+        )
     return "" if before == now else f"{name} was {before!r}, now {now!r}"

@@ -4,14 +4,17 @@
 from __future__ import annotations
 
 import contextlib
-from typing import Any, Callable, Iterator, Optional, Union
+from collections.abc import Callable, Iterator
+from typing import Any
 
 #: True: a bar; False: none; a callable gets (done, total).
-Progress = Union[bool, Callable[[int, int], object]]
+Progress = bool | Callable[[int, int], object]
 
 
 @contextlib.contextmanager
-def batch_progress(progress: Progress, title: str, total: int, done: int = 0) -> Iterator[Optional[Callable[[int], object]]]:
+def batch_progress(
+    progress: Progress, title: str, total: int, done: int = 0
+) -> Iterator[Callable[[int], object] | None]:
     """Gives a function of the number done, or None where nobody wants to know."""
     if callable(progress):
         tell = progress

@@ -5,8 +5,8 @@ from __future__ import annotations
 
 import threading
 from collections import OrderedDict
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from typing import Callable, Dict, List, Optional, Sequence
 
 import numpy as np
 import numpy.typing as npt
@@ -30,8 +30,15 @@ class Residency:
     Not thread-safe: one per context, used by one thread.
     """
 
-    def __init__(self, context: Context, fragments: FragmentSet, options: RegistrationOptions, memory: int) -> None:
-        self._context, self._fragments, self._options, self._memory = context, fragments, options, memory
+    def __init__(
+        self, context: Context, fragments: FragmentSet, options: RegistrationOptions, memory: int
+    ) -> None:
+        self._context, self._fragments, self._options, self._memory = (
+            context,
+            fragments,
+            options,
+            memory,
+        )
         self._clouds: OrderedDict[int, PreparedCloud] = OrderedDict()
         self._bytes = 0
         self.prepared = 0  # preparations so far
@@ -44,14 +51,15 @@ class Residency:
         self,
         pairs: npt.NDArray[np.int64],
         on_result: Callable[[int, RegistrationResult], object],
-        stop: Optional[threading.Event] = None,
+        stop: threading.Event | None = None,
     ) -> None:
-        """Calls on_result(row, result) for each row (i, j) of pairs, in order: fragment j into fragment i.
+        """Calls on_result(row, result) for each row (i, j) of pairs, in order: fragment j into
+        fragment i.
 
         Raises Stopped where stop was set; on_result has been called for what was done.
         """
-        group: List[int] = []
-        held: Dict[int, PreparedCloud] = {}
+        group: list[int] = []
+        held: dict[int, PreparedCloud] = {}
         for row, pair in enumerate(pairs.tolist()):
             if stop is not None and stop.is_set():
                 break
@@ -72,9 +80,9 @@ class Residency:
         self,
         pairs: npt.NDArray[np.int64],
         rows: Sequence[int],
-        held: Dict[int, PreparedCloud],
+        held: dict[int, PreparedCloud],
         on_result: Callable[[int, RegistrationResult], object],
-        stop: Optional[threading.Event],
+        stop: threading.Event | None,
     ) -> None:
         places = {k: place for place, k in enumerate(held)}
         entries = np.array([[places[j], places[i]] for i, j in pairs[rows].tolist()], np.uint32)
@@ -83,7 +91,9 @@ class Residency:
             if stop is not None and stop.is_set():
                 raise Stopped
 
-        results, error = _core.align_batch(self._context, list(held.values()), entries, self._options, check)
+        results, error = _core.align_batch(
+            self._context, list(held.values()), entries, self._options, check
+        )
         for row, result in zip(rows, results):
             if result.status != "skipped":
                 on_result(row, result)
@@ -104,9 +114,15 @@ class Residency:
             if k not in self._clouds and k != wanted:
                 chosen.append(k)
         device = self._context.backend == "cuda"
-        inputs = list(self._readers.map(lambda k: self._fragments.load(k, self._options.prepare, device), chosen))
+        inputs = list(
+            self._readers.map(
+                lambda k: self._fragments.load(k, self._options.prepare, device), chosen
+            )
+        )
         names = [f"fragments[{k}]" for k in chosen]
-        for k, cloud in zip(chosen, _core.prepare_batch(self._context, inputs, self._options.prepare, names)):
+        for k, cloud in zip(
+            chosen, _core.prepare_batch(self._context, inputs, self._options.prepare, names)
+        ):
             self._clouds[k] = cloud
             self._bytes += _bytes_of(cloud)
         self.prepared += len(chosen)

@@ -8,11 +8,12 @@ import fcntl
 import json
 import os
 import shutil
+from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Any, Dict, Iterator, List, Optional, Sequence, Set
+from typing import Any
 
 import pyarrow as pa
-import pyarrow.compute  # noqa: F401  (pa.compute)
+import pyarrow.compute
 import pyarrow.parquet as pq
 
 from . import _core
@@ -20,12 +21,12 @@ from ._core import IoError
 from ._plan import Plan, difference
 from ._table import Key, entries_of, table_of
 
-Row = Dict[str, Any]
+Row = dict[str, Any]
 
 
 class Store:
-    """run.json says what the run is; chunks/NNNNNN.parquet are finished chunks; results.parquet, result.log and result.info,
-    made of them at the end, replace them."""
+    """run.json says what the run is; chunks/NNNNNN.parquet are finished chunks; results.parquet,
+    result.log and result.info, made of them at the end, replace them."""
 
     def __init__(self, folder: Path, plan: Plan, resume: bool) -> None:
         self.folder, self._plan = folder, plan
@@ -54,7 +55,9 @@ class Store:
             try:
                 before = json.loads(path.read_text())
             except ValueError as error:
-                raise IoError(f"output: {path} is damaged ({error}); resume=False starts anew") from None
+                raise IoError(
+                    f"output: {path} is damaged ({error}); resume=False starts anew"
+                ) from None
             changed = difference(before, json.loads(json.dumps(manifest)))
             if changed:
                 raise ValueError(
@@ -62,7 +65,9 @@ class Store:
                 )
         else:
             if self._chunks.exists() or self.table_path.exists():
-                raise IoError(f"output: {self.folder} holds results without run.json; take another folder, or resume=False")
+                raise IoError(
+                    f"output: {self.folder} holds results without run.json; take another folder, or resume=False"
+                )
             _write(path, lambda temporary: temporary.write_text(json.dumps(manifest, indent=1)))
         if not self.complete:
             self._chunks.mkdir(exist_ok=True)
@@ -86,13 +91,13 @@ class Store:
     def complete(self) -> bool:
         return self.table_path.exists()
 
-    def finished(self) -> Set[int]:
+    def finished(self) -> set[int]:
         """Numbers of the chunks that are done."""
         if self.complete:
             return set(range(self._plan.chunks))
         return {int(path.stem) for path in self._chunks.glob("*.parquet") if path.stem.isdigit()}
 
-    def partial(self, chunk: int) -> Dict[Key, Row]:
+    def partial(self, chunk: int) -> dict[Key, Row]:
         """What an interrupted run has left of a chunk."""
         path = self._chunks / f"{chunk:06d}.partial"
         if not path.exists():
@@ -112,12 +117,21 @@ class Store:
         _write(path, lambda temporary: pq.write_table(table_of(rows), temporary))
 
     def conclude(self) -> None:
-        """All chunks into one table and the two Redwood files; memory holds the aligned pairs' matrices, nothing else."""
+        """All chunks into one table and the two Redwood files; memory holds the aligned pairs'
+        matrices, nothing else.
+        """
         if not self.complete:
-            positions = {tuple(pair): k for k, pair in enumerate(self._plan.numbers(self._plan.pairs).tolist())}
+            positions = {
+                tuple(pair): k
+                for k, pair in enumerate(self._plan.numbers(self._plan.pairs).tolist())
+            }
 
-            def in_order(column: str, size: int) -> List[Any]:
-                entries = [e for chunk in self._read() for e in entries_of(chunk, column, size, self._plan.fragments.count)]
+            def in_order(column: str, size: int) -> list[Any]:
+                entries = [
+                    e
+                    for chunk in self._read()
+                    for e in entries_of(chunk, column, size, self._plan.fragments.count)
+                ]
                 return sorted(entries, key=lambda entry: positions[entry[:2]])
 
             _core.write_log(str(self.log_path), in_order("target_from_source", 4))
@@ -138,8 +152,10 @@ class Store:
                 writer.write_table(table)
 
 
-def read_table(path: Path, columns: Optional[List[str]] = None) -> pa.Table:
-    """A Parquet file of a run. Nothing that gpureg writes is ever half there, but disks fail and people edit."""
+def read_table(path: Path, columns: list[str] | None = None) -> pa.Table:
+    """A Parquet file of a run. Nothing that gpureg writes is ever half there, but disks fail and
+    people edit.
+    """
     try:
         return pq.read_table(path, columns=columns)
     except (FileNotFoundError, PermissionError):
@@ -150,7 +166,9 @@ def read_table(path: Path, columns: Optional[List[str]] = None) -> pa.Table:
 
 
 def _write(path: Path, fill: Any) -> None:
-    """All or nothing, also over a power cut: a temporary file, flushed, takes the place of the old one."""
+    """All or nothing, also over a power cut: a temporary file, flushed, takes the place of the old
+    one.
+    """
     temporary = path.with_name(path.name + ".tmp")
     fill(temporary)
     with open(temporary, "rb") as file:

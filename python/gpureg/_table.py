@@ -3,7 +3,8 @@
 
 from __future__ import annotations
 
-from typing import Any, Dict, List, Sequence, Tuple
+from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -11,16 +12,18 @@ import pyarrow as pa
 
 from ._core import RegistrationResult
 
-Key = Tuple[int, int]
+Key = tuple[int, int]
 
 
-def row_of(i: int, j: int, result: RegistrationResult) -> Dict[str, Any]:
+def row_of(i: int, j: int, result: RegistrationResult) -> dict[str, Any]:
     """Fragment j into fragment i: target_from_source is Redwood's T_ij."""
-    row: Dict[str, Any] = {"i": i, "j": j}
+    row: dict[str, Any] = {"i": i, "j": j}
     for name, value in result.to_dict().items():
-        if isinstance(value, (str, bool, int, float)):
+        if isinstance(value, str | bool | int | float):
             row[name] = value
-    row["target_from_source"] = result.target_from_source.ravel().tolist() if result.has_candidate else None
+    row["target_from_source"] = (
+        result.target_from_source.ravel().tolist() if result.has_candidate else None
+    )
     row["overlap_confidence"] = result.modes[0].overlap_confidence if result.modes else None
     row["information"] = result.source_moments.information_redwood().ravel().tolist()
     for name in type(result.statistics)._fields:
@@ -34,20 +37,31 @@ def _type_of(name: str, value: Any) -> pa.DataType:
     if name == "overlap_confidence":
         return pa.float64()
     if name in ("target_from_source", "information"):
-        return pa.list_(pa.float64())  # not of fixed size: older readers of Parquet stumble over nulls among those
-    kinds: Dict[type, pa.DataType] = {str: pa.string(), bool: pa.bool_(), int: pa.int64(), float: pa.float64()}
+        return pa.list_(
+            pa.float64()
+        )  # not of fixed size: older readers of Parquet stumble over nulls among those
+    kinds: dict[type, pa.DataType] = {
+        str: pa.string(),
+        bool: pa.bool_(),
+        int: pa.int64(),
+        float: pa.float64(),
+    }
     return kinds[type(value)]
 
 
-def table_of(rows: Sequence[Dict[str, Any]]) -> pa.Table:
+def table_of(rows: Sequence[dict[str, Any]]) -> pa.Table:
     """Rows, at least one, in the order given."""
     schema = pa.schema([(name, _type_of(name, value)) for name, value in rows[0].items()])
     return pa.Table.from_pylist(list(rows), schema=schema)
 
 
-def entries_of(table: pa.Table, column: str, size: int, count: int) -> List[Tuple[int, int, int, npt.NDArray[np.float64]]]:
+def entries_of(
+    table: pa.Table, column: str, size: int, count: int
+) -> list[tuple[int, int, int, npt.NDArray[np.float64]]]:
     """Blocks of a Redwood file: the matrices of the aligned pairs."""
     aligned = table.filter(pa.compute.equal(table["status"], "aligned"))
     i, j = aligned["i"].to_pylist(), aligned["j"].to_pylist()
-    matrices = [np.asarray(values, np.float64).reshape(size, size) for values in aligned[column].to_pylist()]
+    matrices = [
+        np.asarray(values, np.float64).reshape(size, size) for values in aligned[column].to_pylist()
+    ]
     return [(a, b, count, matrix) for a, b, matrix in zip(i, j, matrices)]

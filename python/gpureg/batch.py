@@ -9,13 +9,16 @@ import os
 import queue
 import threading
 import time
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, Dict, List, Optional, Sequence, Union
+from typing import Any
 
 try:
     import pyarrow as pa
 except ImportError as error:
-    raise ImportError("register_all needs pyarrow: pip install 'gpureg[batch]', or '.[batch]' from a checkout") from error
+    raise ImportError(
+        "register_all needs pyarrow: pip install 'gpureg[batch]', or '.[batch]' from a checkout"
+    ) from error
 
 from ._core import BackendUnavailable, Context, RegistrationOptions
 from ._plan import Plan
@@ -75,9 +78,9 @@ class BatchRun:
         return f"{self.pairs} pairs, {self.aligned} aligned, {self.resumed} done before, {self.seconds:.1f} s{rate}: {self.folder}"
 
 
-def all_contexts() -> List[Context]:
+def all_contexts() -> list[Context]:
     """One per CUDA device of this machine; without any, the CPU's."""
-    contexts: List[Context] = []
+    contexts: list[Context] = []
     try:
         while True:
             contexts.append(Context.cuda(len(contexts)))
@@ -89,9 +92,9 @@ def register_all(
     fragments: Any,
     pairs: Any = "all",
     *,
-    output: Union[str, "os.PathLike[str]"],
-    options: Optional[RegistrationOptions] = None,
-    contexts: Optional[Sequence[Context]] = None,
+    output: str | os.PathLike[str],
+    options: RegistrationOptions | None = None,
+    contexts: Sequence[Context] | None = None,
     progress: Progress = True,
     resume: bool = True,
     chunk_size: int = CHUNK,
@@ -99,14 +102,16 @@ def register_all(
 ) -> BatchRun:
     """Align pairs of fragments into a folder that survives every interruption.
 
-    Chunks of pairs are written as they finish. A run that was killed, or stopped by Ctrl-C, goes on when the same call is made
-    again; the files in the end are, byte for byte, those of an uninterrupted run, on any number of devices.
+    Chunks of pairs are written as they finish. A run that was killed, or stopped by Ctrl-C, goes on
+    when the same call is made again; the files in the end are, byte for byte, those of an
+    uninterrupted run, on any number of devices.
 
     Parameters
     ----------
     fragments : FragmentSet, folder, or sequence of clouds
     pairs : "all", list of pairs, (M, 2) array, or callable
-        Pairs of fragment numbers, see `FragmentSet.choose_pairs`; `gpureg.pruning.Nearest` for large sets.
+        Pairs of fragment numbers, see `FragmentSet.choose_pairs`; `gpureg.pruning.Nearest` for
+        large sets.
     output : path
         Folder of the run: results.parquet, result.log, result.info; run.json says what the run is.
     options : RegistrationOptions, optional
@@ -154,20 +159,26 @@ def register_all(
         left = [chunk for chunk in range(plan.chunks) if chunk not in finished]
         resumed = sum(len(plan.chunk(chunk)) for chunk in finished)
         if left:
-            resumed += _Workers(plan, store, left, list(contexts) if contexts else all_contexts(), memory).run(progress, resumed)
+            resumed += _Workers(
+                plan, store, left, list(contexts) if contexts else all_contexts(), memory
+            ).run(progress, resumed)
         return conclude(store, plan, resumed, begin)
     finally:
         store.close()
 
 
-def make_plan(fragments: Any, pairs: Any, options: Optional[RegistrationOptions], chunk_size: int, memory: int) -> Plan:
+def make_plan(
+    fragments: Any, pairs: Any, options: RegistrationOptions | None, chunk_size: int, memory: int
+) -> Plan:
     """Everything that can be wrong is looked at before the first pair runs."""
     options = options or RegistrationOptions()
     options.validate()
-    kinds: List[Any] = [numbers.Integral, numbers.Real]  # 4e9 bytes are fine
+    kinds: list[Any] = [numbers.Integral, numbers.Real]  # 4e9 bytes are fine
     for name, value, kind in zip(("chunk_size", "memory"), (chunk_size, memory), kinds):
         if isinstance(value, bool) or not isinstance(value, kind):
-            raise TypeError(f"{name}: expected a {'whole ' if kind is numbers.Integral else ''}number, got {value!r}")
+            raise TypeError(
+                f"{name}: expected a {'whole ' if kind is numbers.Integral else ''}number, got {value!r}"
+            )
         if not value >= 1:
             raise ValueError(f"{name} is {value}, expected 1 or more")
     fragments = fragment_set(fragments)
@@ -189,11 +200,13 @@ def run_chunk(
     plan: Plan,
     chunk: int,
     residency: Residency,
-    known: Dict[Any, Row],
+    known: dict[Any, Row],
     add: Any = None,
-    stop: Optional[threading.Event] = None,
-) -> List[Row]:
-    """Rows of one chunk, in its order. known: those that are done; add(row) is called for each that is new."""
+    stop: threading.Event | None = None,
+) -> list[Row]:
+    """Rows of one chunk, in its order. known: those that are done; add(row) is called for each that
+    is new.
+    """
     pairs = plan.chunk(chunk)
     keys = [tuple(key) for key in plan.numbers(pairs).tolist()]
     todo = [k for k, key in enumerate(keys) if key not in known]
@@ -210,16 +223,25 @@ def run_chunk(
 
 
 class _Workers:
-    """One thread per context, each taking the next chunk; the calling thread waits, and hears Ctrl-C."""
+    """One thread per context, each taking the next chunk; the calling thread waits, and hears
+    Ctrl-C.
+    """
 
-    def __init__(self, plan: Plan, store: Store, chunks: Sequence[int], contexts: Sequence[Context], memory: int) -> None:
+    def __init__(
+        self,
+        plan: Plan,
+        store: Store,
+        chunks: Sequence[int],
+        contexts: Sequence[Context],
+        memory: int,
+    ) -> None:
         self._plan, self._store, self._contexts, self._memory = plan, store, contexts, memory
         self._chunks: queue.SimpleQueue[int] = queue.SimpleQueue()
         for chunk in chunks:
             self._chunks.put(chunk)
         self._stop = threading.Event()
         self._lock = threading.Lock()
-        self._errors: List[BaseException] = []
+        self._errors: list[BaseException] = []
         self._done = 0
         self._partial = {chunk: store.partial(chunk) for chunk in chunks}
 
@@ -227,7 +249,9 @@ class _Workers:
         """Returns the number of pairs that partial chunks had."""
         partial = sum(map(len, self._partial.values()))
         self._done = before + partial
-        threads = [threading.Thread(target=self._work, args=(context,)) for context in self._contexts]
+        threads = [
+            threading.Thread(target=self._work, args=(context,)) for context in self._contexts
+        ]
         with batch_progress(progress, "aligning", len(self._plan.pairs), self._done) as report:
             for thread in threads:
                 thread.start()
@@ -266,7 +290,7 @@ class _Workers:
 
     def _run(self, chunk: int, residency: Residency) -> None:
         known = self._partial[chunk]
-        new: List[Row] = []
+        new: list[Row] = []
 
         def add(row: Row) -> None:
             new.append(row)
@@ -281,4 +305,4 @@ class _Workers:
         self._store.write(chunk, rows)
 
 
-__all__: List[str] = ["BatchRun", "all_contexts", "register_all"]
+__all__: list[str] = ["BatchRun", "all_contexts", "register_all"]

@@ -48,7 +48,9 @@ def write_point_cloud(path: Path, points: Any, normals: Any = None) -> None:
     """
     extension = os.path.splitext(os.fspath(path))[1]
     if extension.lower() not in ("", ".ply"):
-        raise ValueError(f"path: {os.fspath(path)!r} ends in '{extension}', but what is written is PLY: let it end in '.ply'")
+        raise ValueError(
+            f"path: {os.fspath(path)!r} ends in '{extension}', but what is written is PLY: let it end in '.ply'"
+        )
     if not isinstance(points, PointCloud):
         points = PointCloud(points, normals)
     _core.write_point_cloud(os.fspath(path), points)

@@ -5,8 +5,9 @@ from __future__ import annotations
 
 import hashlib
 import os
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, Dict, List, Optional, Sequence, Tuple, Union
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -30,7 +31,12 @@ class FragmentSet:
     (3, (0, 1, 2))
     """
 
-    def __init__(self, numbers: Sequence[int], sources: Sequence[Any], viewpoints: Optional[Dict[int, Any]] = None) -> None:
+    def __init__(
+        self,
+        numbers: Sequence[int],
+        sources: Sequence[Any],
+        viewpoints: dict[int, Any] | None = None,
+    ) -> None:
         if len(set(numbers)) != len(numbers):
             raise ValueError("numbers: one is there twice")
         if list(numbers) != sorted(numbers):
@@ -40,8 +46,9 @@ class FragmentSet:
         self._viewpoints = viewpoints or {}
 
     @classmethod
-    def from_directory(cls, directory: Union[str, "os.PathLike[str]"]) -> FragmentSet:
-        """The files ``cloud_bin_<i>.ply|pcd`` of a folder, with sensor positions from its cameras.txt if it has one.
+    def from_directory(cls, directory: str | os.PathLike[str]) -> FragmentSet:
+        """The files ``cloud_bin_<i>.ply|pcd`` of a folder, with sensor positions from its
+        cameras.txt if it has one.
 
         Raises
         ------
@@ -50,12 +57,14 @@ class FragmentSet:
         """
         found = _core.list_fragments(os.fspath(directory))
         cameras = Path(directory) / "cameras.txt"
-        viewpoints: Dict[int, Any] = _core.read_cameras(str(cameras)) if cameras.exists() else {}
+        viewpoints: dict[int, Any] = _core.read_cameras(str(cameras)) if cameras.exists() else {}
         return cls([number for number, _ in found], [path for _, path in found], viewpoints)
 
     @classmethod
     def from_clouds(cls, clouds: Sequence[Any]) -> FragmentSet:
-        """Clouds in memory, or paths: whatever `prepare` takes as points. Their numbers are 0, 1, 2, ..."""
+        """Clouds in memory, or paths: whatever `prepare` takes as points. Their numbers are 0, 1,
+        2, ...
+        """
         clouds = several(clouds, "clouds")
         return cls(range(len(clouds)), clouds)
 
@@ -66,7 +75,7 @@ class FragmentSet:
         return f"<gpureg.FragmentSet of {len(self)} fragments>"
 
     @property
-    def numbers(self) -> Tuple[int, ...]:
+    def numbers(self) -> tuple[int, ...]:
         """As in the files' names, ascending."""
         return self._numbers
 
@@ -76,15 +85,27 @@ class FragmentSet:
         return self._numbers[-1] + 1 if self._numbers else 0
 
     def load(self, position: int, options: PrepareOptions, device: bool = False) -> CoreCloud:
-        """The fragment at a position (not: of a number), as the core takes it; device: on a GPU, if it is there. Thread-safe."""
+        """The fragment at a position (not: of a number), as the core takes it; device: on a GPU, if
+        it is there. Thread-safe.
+        """
         source, number = self._sources[position], self._numbers[position]
-        return core_cloud(source, None, None, self._viewpoints.get(number), options, f"fragments[{position}]", device)
+        return core_cloud(
+            source,
+            None,
+            None,
+            self._viewpoints.get(number),
+            options,
+            f"fragments[{position}]",
+            device,
+        )
 
     def fingerprint(self, position: int) -> str:
-        """Tells whether a fragment is the one that an earlier run saw: by size and both ends of its data."""
+        """Tells whether a fragment is the one that an earlier run saw: by size and both ends of its
+        data.
+        """
         digest = hashlib.blake2b(digest_size=16)
         source = self._sources[position]
-        if isinstance(source, (str, os.PathLike)):
+        if isinstance(source, str | os.PathLike):
             size = os.stat(source).st_size
             digest.update(str(size).encode())
             with open(source, "rb") as file:
@@ -105,7 +126,8 @@ class FragmentSet:
         Parameters
         ----------
         pairs : "all", list of pairs, (M, 2) array, or callable
-            Pairs of fragment numbers, in either order; repetitions count once. A callable gets this set and returns them.
+            Pairs of fragment numbers, in either order; repetitions count once. A callable gets this
+            set and returns them.
 
         Examples
         --------
@@ -118,7 +140,9 @@ class FragmentSet:
         """
         if isinstance(pairs, str):
             if pairs != "all":
-                raise ValueError(f'pairs: expected "all", pairs of numbers or a callable, got {pairs!r}')
+                raise ValueError(
+                    f'pairs: expected "all", pairs of numbers or a callable, got {pairs!r}'
+                )
             return np.stack(np.triu_indices(len(self), 1), axis=1)
         if callable(pairs):
             pairs = pairs(self)
@@ -126,7 +150,9 @@ class FragmentSet:
         if chosen.size == 0:
             return np.zeros((0, 2), np.int64)
         if chosen.dtype.kind not in "iu" or chosen.ndim != 2 or chosen.shape[1] != 2:
-            raise ValueError(f"pairs: expected whole numbers of shape (M, 2), got {chosen.dtype} of shape {chosen.shape}")
+            raise ValueError(
+                f"pairs: expected whole numbers of shape (M, 2), got {chosen.dtype} of shape {chosen.shape}"
+            )
         numbers = np.asarray(self._numbers)
         positions = np.minimum(np.searchsorted(numbers, chosen), len(numbers) - 1)
         unknown = numbers[positions] != chosen
@@ -144,9 +170,9 @@ def fragment_set(fragments: Any) -> FragmentSet:
     """A set as it is; a folder or a list of clouds as a set."""
     if isinstance(fragments, FragmentSet):
         return fragments
-    if isinstance(fragments, (str, os.PathLike)):
+    if isinstance(fragments, str | os.PathLike):
         return FragmentSet.from_directory(fragments)
     return FragmentSet.from_clouds(several(fragments, "fragments"))
 
 
-__all__: List[str] = ["FragmentSet"]
+__all__: list[str] = ["FragmentSet"]

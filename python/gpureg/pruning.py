@@ -1,15 +1,16 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Which pairs of a large set are worth trying: those whose fragments look alike.
 
-A fragment's global descriptor is an aggregate of its local features that needs no training; candidates are the k nearest
-neighbours (FAISS). The cost of a run then grows as n * k, not as n * n.
-"""
+A fragment's global descriptor is an aggregate of its local features that needs no training;
+candidates are the k nearest neighbours (FAISS). The cost of a run then grows as n * k, not as n *
+n."""
 
 from __future__ import annotations
 
 import dataclasses
 import time
-from typing import Any, Iterator, Optional, Sequence, Tuple
+from collections.abc import Iterator, Sequence
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -17,12 +18,14 @@ import numpy.typing as npt
 try:
     import faiss
 except ImportError as error:
-    raise ImportError("gpureg.pruning needs FAISS: pip install 'gpureg[pruning]', or '.[pruning]' from a checkout") from error
+    raise ImportError(
+        "gpureg.pruning needs FAISS: pip install 'gpureg[pruning]', or '.[pruning]' from a checkout"
+    ) from error
 
 from . import _core
+from ._contexts import default_context
 from ._core import Context, PrepareOptions
 from .fragments import FragmentSet, fragment_set
-from ._contexts import default_context
 
 _TOGETHER = 32  # clouds in memory at once
 _FLAT = 20_000  # fragments up to which the exact search is fast
@@ -46,7 +49,9 @@ def learn_words(features: Sequence[FloatArray], words: int = _WORDS) -> FloatArr
         return np.zeros((0, some.shape[1]), np.float32)
     means = faiss.Kmeans(some.shape[1], words, niter=20, seed=1, min_points_per_centroid=1)
     threads = faiss.omp_get_max_threads()
-    faiss.omp_set_num_threads(1)  # sums in one order: the words, and so the pairs, do not depend on the number of cores
+    faiss.omp_set_num_threads(
+        1
+    )  # sums in one order: the words, and so the pairs, do not depend on the number of cores
     try:
         means.train(some)
     finally:
@@ -55,8 +60,8 @@ def learn_words(features: Sequence[FloatArray], words: int = _WORDS) -> FloatArr
 
 
 def describe(features: FloatArray, words: FloatArray) -> FloatArray:
-    """Global descriptor of a cloud: what is left of its features beyond their nearest words, summed per word (VLAD with
-    intra-normalisation, Jegou et al. 2010, Arandjelovic and Zisserman 2013).
+    """Global descriptor of a cloud: what is left of its features beyond their nearest words, summed
+    per word (VLAD with intra-normalisation, Jegou et al. 2010, Arandjelovic and Zisserman 2013).
 
     Rigid motions change it as little as they change the features.
 
@@ -94,34 +99,55 @@ def describe(features: FloatArray, words: FloatArray) -> FloatArray:
 
 
 def _unit(features: FloatArray) -> FloatArray:
-    """Signed roots at unit length (FPFH is a set of histograms); points without a feature, all zeros, are left out."""
+    """Signed roots at unit length (FPFH is a set of histograms); points without a feature, all
+    zeros, are left out.
+    """
     rows = features[np.abs(features).sum(axis=1) > 0]
     rows = np.sign(rows) * np.sqrt(np.abs(rows))
     return np.asarray(rows / np.linalg.norm(rows, axis=1, keepdims=True), np.float32)
 
 
 def describe_all(
-    fragments: Any, *, words: int = _WORDS, options: Optional[PrepareOptions] = None, context: Optional[Context] = None
+    fragments: Any,
+    *,
+    words: int = _WORDS,
+    options: PrepareOptions | None = None,
+    context: Context | None = None,
 ) -> FloatArray:
-    """(n, words * D) descriptors of a set's fragments, which are loaded and prepared a few at a time."""
-    fragments, options, context = fragment_set(fragments), options or PrepareOptions(), context or default_context()
+    """(n, words * D) descriptors of a set's fragments, which are loaded and prepared a few at a
+    time.
+    """
+    fragments, options, context = (
+        fragment_set(fragments),
+        options or PrepareOptions(),
+        context or default_context(),
+    )
 
     def features(positions: Sequence[int]) -> Iterator[FloatArray]:
         for begin in range(0, len(positions), _TOGETHER):
             part = positions[begin : begin + _TOGETHER]
             inputs = [fragments.load(k, options, context.backend == "cuda") for k in part]
-            for cloud in _core.prepare_batch(context, inputs, options, [f"fragments[{k}]" for k in part]):
+            for cloud in _core.prepare_batch(
+                context, inputs, options, [f"fragments[{k}]" for k in part]
+            ):
                 yield cloud.features
 
     n = len(fragments)
-    centres = learn_words([rows[:: max(1, len(rows) // _SAMPLE)] for rows in features(range(0, n, max(1, n // _SAMPLED)))], words)
+    centres = learn_words(
+        [
+            rows[:: max(1, len(rows) // _SAMPLE)]
+            for rows in features(range(0, n, max(1, n // _SAMPLED)))
+        ],
+        words,
+    )
     out = [describe(rows, centres) for rows in features(range(n))]
     return np.stack(out) if out else np.zeros((0, 0), np.float32)
 
 
 @dataclasses.dataclass
 class Nearest:
-    """Pairs of each fragment and the k that look most like it: for the argument pairs of `register_all`.
+    """Pairs of each fragment and the k that look most like it: for the argument pairs of
+    `register_all`.
 
     Parameters
     ----------
@@ -151,8 +177,8 @@ class Nearest:
 
     k: int = 20
     consecutive: int = 0
-    options: Optional[PrepareOptions] = None
-    context: Optional[Context] = None
+    options: PrepareOptions | None = None
+    context: Context | None = None
     seconds: float = 0.0
 
     def __call__(self, fragments: FragmentSet) -> Pairs:
@@ -163,17 +189,28 @@ class Nearest:
         descriptors = describe_all(fragments, options=self.options, context=self.context)
         positions = nearest_pairs(descriptors, self.k)
         n = len(fragments)
-        steps = [np.stack([np.arange(n - s), np.arange(s, n)], axis=1) for s in range(1, min(self.consecutive, n - 1) + 1)]
+        steps = [
+            np.stack([np.arange(n - s), np.arange(s, n)], axis=1)
+            for s in range(1, min(self.consecutive, n - 1) + 1)
+        ]
         positions = np.unique(np.concatenate([positions, *steps]), axis=0)
         self.seconds = time.monotonic() - begin
-        return np.asarray(np.asarray(fragments.numbers, np.int64)[positions], np.int64).reshape(-1, 2)
+        return np.asarray(np.asarray(fragments.numbers, np.int64)[positions], np.int64).reshape(
+            -1, 2
+        )
 
 
 def nearest_pairs(descriptors: FloatArray, k: int) -> Pairs:
-    """(M, 2) positions i < j where either has the other among its k nearest. Exact for sets of up to 20,000."""
+    """(M, 2) positions i < j where either has the other among its k nearest. Exact for sets of up
+    to 20,000.
+    """
     n, dimension = descriptors.shape
     k = min(k + 1, n)  # the nearest of each is itself
-    index = faiss.IndexFlatIP(dimension) if n <= _FLAT else faiss.IndexHNSWFlat(dimension, 32, faiss.METRIC_INNER_PRODUCT)
+    index = (
+        faiss.IndexFlatIP(dimension)
+        if n <= _FLAT
+        else faiss.IndexHNSWFlat(dimension, 32, faiss.METRIC_INNER_PRODUCT)
+    )
     index.add(descriptors)
     _, neighbours = index.search(descriptors, k)
     pairs = np.stack([np.repeat(np.arange(n), k), neighbours.ravel()], axis=1)
@@ -217,7 +254,8 @@ def measure(chosen: Any, overlapping: Any, fragments: int) -> PruningReport:
     Parameters
     ----------
     chosen, overlapping : lists or (M, 2) arrays of pairs of fragment numbers, in either order
-        What is to be tried, and what should be found: the pairs of a ground truth, or those that a complete run aligned.
+        What is to be tried, and what should be found: the pairs of a ground truth, or those that a
+        complete run aligned.
     fragments : int
         Number of fragments.
 
@@ -228,11 +266,21 @@ def measure(chosen: Any, overlapping: Any, fragments: int) -> PruningReport:
     2 of 6 pairs tried (33.3 %), 1 of 2 overlapping pairs among them: 50.0 % of the recall lost
     """
     tried, wanted = _as_set(chosen), _as_set(overlapping)
-    return PruningReport(len(tried), fragments * (fragments - 1) // 2, len(tried & wanted), len(wanted))
+    return PruningReport(
+        len(tried), fragments * (fragments - 1) // 2, len(tried & wanted), len(wanted)
+    )
 
 
-def _as_set(pairs: Any) -> "set[Tuple[int, int]]":
+def _as_set(pairs: Any) -> set[tuple[int, int]]:
     return {(min(int(i), int(j)), max(int(i), int(j))) for i, j in pairs}
 
 
-__all__ = ["Nearest", "PruningReport", "describe", "describe_all", "learn_words", "measure", "nearest_pairs"]
+__all__ = [
+    "Nearest",
+    "PruningReport",
+    "describe",
+    "describe_all",
+    "learn_words",
+    "measure",
+    "nearest_pairs",
+]

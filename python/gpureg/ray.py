@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""register_all on a Ray cluster: an actor per GPU, or per share of the CPUs, each with fragments of its own in memory.
+"""register_all on a Ray cluster: an actor per GPU, or per share of the CPUs, each with fragments of
+its own in memory.
 
-Scheduling, retries and placement are Ray's. What comes out does not depend on them: the files are, byte for byte, those of
-`gpureg.register_all` on one machine.
+Scheduling, retries and placement are Ray's. What comes out does not depend on them: the files are,
+byte for byte, those of `gpureg.register_all` on one machine.
 """
 
 from __future__ import annotations
@@ -10,13 +11,15 @@ from __future__ import annotations
 import os
 import time
 from pathlib import Path
-from typing import Any, Dict, List, Optional, Tuple, Union
+from typing import Any
 
 try:
     import ray
     from ray.util import ActorPool
 except ImportError as error:
-    raise ImportError("gpureg.ray needs Ray: pip install 'gpureg[ray]', or '.[ray]' from a checkout") from error
+    raise ImportError(
+        "gpureg.ray needs Ray: pip install 'gpureg[ray]', or '.[ray]' from a checkout"
+    ) from error
 
 from ._core import Context, RegistrationOptions
 from ._plan import Plan
@@ -25,17 +28,21 @@ from ._residency import Residency
 from ._store import Row, Store
 from .batch import CHUNK, MEMORY, BatchRun, conclude, make_plan, run_chunk
 
-_DEATHS = 16  # of one actor, before the run gives up: a chunk that kills whoever takes it shall not go on for ever
+# of one actor, before the run gives up: a chunk that kills whoever takes it shall not go on for
+# ever
+_DEATHS = 16
 
 
 class ChunkWorker:
     """What an actor does: chunks of a plan, one after another, its fragments resident in between."""
 
     def __init__(self, plan: Plan, memory: int, threads: int) -> None:
-        context = Context.cpu(threads) if threads else Context.cuda()  # Ray shows an actor its own GPU as device 0
+        context = (
+            Context.cpu(threads) if threads else Context.cuda()
+        )  # Ray shows an actor its own GPU as device 0
         self._plan, self._residency = plan, Residency(context, plan.fragments, plan.options, memory)
 
-    def run(self, chunk: int, known: Dict[Any, Row]) -> Tuple[int, List[Row]]:
+    def run(self, chunk: int, known: dict[Any, Row]) -> tuple[int, list[Row]]:
         return chunk, run_chunk(self._plan, chunk, self._residency, known)
 
 
@@ -43,10 +50,10 @@ def register_all(
     fragments: Any,
     pairs: Any = "all",
     *,
-    output: Union[str, "os.PathLike[str]"],
-    options: Optional[RegistrationOptions] = None,
-    actors: Optional[int] = None,
-    gpus: Optional[bool] = None,
+    output: str | os.PathLike[str],
+    options: RegistrationOptions | None = None,
+    actors: int | None = None,
+    gpus: bool | None = None,
     progress: Progress = True,
     resume: bool = True,
     chunk_size: int = CHUNK,
@@ -54,15 +61,16 @@ def register_all(
 ) -> BatchRun:
     """`gpureg.register_all` on the machines of a Ray cluster.
 
-    Connects to the cluster that ``ray.init`` was called for, or that RAY_ADDRESS names; else starts one on this machine.
-    An actor that dies is restarted, and its chunk tried again. The driver writes the files; a run goes on after the driver's
-    death, too, here or with `gpureg.register_all`.
+    Connects to the cluster that ``ray.init`` was called for, or that RAY_ADDRESS names; else starts
+    one on this machine. An actor that dies is restarted, and its chunk tried again. The driver
+    writes the files; a run goes on after the driver's death, too, here or with
+    `gpureg.register_all`.
 
     Parameters
     ----------
     fragments, pairs, output, options, progress, resume, chunk_size, memory
-        As for `gpureg.register_all`; memory is per actor. Folders must be where every machine finds them under the same name;
-        clouds in memory travel by Ray's object store.
+        As for `gpureg.register_all`; memory is per actor. Folders must be where every machine finds
+        them under the same name; clouds in memory travel by Ray's object store.
     actors : int, optional
         Default: one per GPU of the cluster, or one per CPU.
     gpus : bool, optional
@@ -82,17 +90,21 @@ def register_all(
     if not ray.is_initialized():
         ray.init()
     store = Store(Path(output), plan, resume)
-    workers: List[Any] = []
+    workers: list[Any] = []
     try:
         finished = store.finished()
-        known = {chunk: store.partial(chunk) for chunk in range(plan.chunks) if chunk not in finished}
+        known = {
+            chunk: store.partial(chunk) for chunk in range(plan.chunks) if chunk not in finished
+        }
         resumed = sum(len(plan.chunk(chunk)) for chunk in finished) + sum(map(len, known.values()))
         if known:
             workers = _start(plan, memory, actors, gpus)
             done = sum(len(plan.chunk(chunk)) for chunk in finished)
             with batch_progress(progress, "aligning", len(plan.pairs), done) as report:
                 pool = ActorPool(workers)
-                for chunk, rows in pool.map_unordered(lambda worker, task: worker.run.remote(*task), list(known.items())):
+                for chunk, rows in pool.map_unordered(
+                    lambda worker, task: worker.run.remote(*task), list(known.items())
+                ):
                     store.write(chunk, rows)
                     done += len(rows)
                     if report is not None:
@@ -104,7 +116,7 @@ def register_all(
         store.close()
 
 
-def _start(plan: Plan, memory: int, actors: Optional[int], gpus: Optional[bool]) -> List[Any]:
+def _start(plan: Plan, memory: int, actors: int | None, gpus: bool | None) -> list[Any]:
     resources = ray.cluster_resources()
     cpus, devices = float(resources.get("CPU", 1)), int(resources.get("GPU", 0))
     if gpus is None:
@@ -113,7 +125,7 @@ def _start(plan: Plan, memory: int, actors: Optional[int], gpus: Optional[bool])
     if count < 1:
         raise ValueError(f"actors is {actors}, expected 1 or more")
     share = cpus / count
-    limits: Dict[str, Any] = {"max_restarts": _DEATHS, "max_task_retries": _DEATHS}
+    limits: dict[str, Any] = {"max_restarts": _DEATHS, "max_task_retries": _DEATHS}
     if gpus:
         limits.update(num_gpus=min(1, devices / count), num_cpus=min(1.0, share))
     else:

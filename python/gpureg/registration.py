@@ -3,12 +3,22 @@
 
 from __future__ import annotations
 
-from typing import Any, Callable, List, Literal, Optional, Sequence, Union
+from collections.abc import Callable, Sequence
+from typing import Any, Literal
 
 from . import _core
 from ._arrays import core_cloud, host_points, index_pairs, several
 from ._contexts import checked, context_of, milliseconds_of
-from ._core import Context, PreparedCloud, PrepareOptions, RegistrationOptions, RegistrationPrior, RegistrationResult, TimedResult, VoxelSizeSuggestion
+from ._core import (
+    Context,
+    PreparedCloud,
+    PrepareOptions,
+    RegistrationOptions,
+    RegistrationPrior,
+    RegistrationResult,
+    TimedResult,
+    VoxelSizeSuggestion,
+)
 from ._progress import batch_progress
 from .preparation import check_prepared, prepared
 
@@ -22,7 +32,7 @@ class BatchInterrupted(KeyboardInterrupt):
         One per pair; pairs never tried have status "skipped".
     """
 
-    def __init__(self, results: List[RegistrationResult]) -> None:
+    def __init__(self, results: list[RegistrationResult]) -> None:
         done = sum(result.status != "skipped" for result in results)
         super().__init__(f"interrupted after {done} of {len(results)} pairs; they are in .results")
         self.results = results
@@ -33,9 +43,9 @@ def align(
     target: PreparedCloud,
     *,
     correspondences: Any = None,
-    prior: Optional[RegistrationPrior] = None,
-    options: Optional[RegistrationOptions] = None,
-    context: Optional[Context] = None,
+    prior: RegistrationPrior | None = None,
+    options: RegistrationOptions | None = None,
+    context: Context | None = None,
 ) -> RegistrationResult:
     """Find the pose of one prepared cloud in the frame of another.
 
@@ -48,8 +58,8 @@ def align(
         ``PreparedCloud.points``.
     prior : RegistrationPrior, optional
         Gravity (``source_up``, ``target_up``, ``max_angle`` degrees) and an approximate pose
-        (``target_from_source``, ``max_rotation`` degrees, ``max_translation`` of the source's middle):
-        poses that contradict it are dropped. Not together with correspondences.
+        (``target_from_source``, ``max_rotation`` degrees, ``max_translation`` of the source's
+        middle): poses that contradict it are dropped. Not together with correspondences.
     options : RegistrationOptions, optional
     context : Context, optional
         Default: `default_context()`. Threads may share one: their calls take turns.
@@ -74,7 +84,9 @@ def align(
     if prior is not None and correspondences is not None:
         raise TypeError("prior: not together with correspondences")
     if correspondences is not None:
-        correspondences = index_pairs(correspondences, "correspondences", (len(source), len(target)))
+        correspondences = index_pairs(
+            correspondences, "correspondences", (len(source), len(target))
+        )
     options = checked(options, RegistrationOptions, "options") or RegistrationOptions()
     return _core.align(context_of(context), source, target, options, correspondences, prior)
 
@@ -84,8 +96,8 @@ def align_within(
     target: PreparedCloud,
     milliseconds: float,
     *,
-    options: Optional[RegistrationOptions] = None,
-    context: Optional[Context] = None,
+    options: RegistrationOptions | None = None,
+    context: Context | None = None,
 ) -> TimedResult:
     """`align` with as much quality as a time allows: the one thing that is not deterministic.
 
@@ -120,7 +132,8 @@ def align_within(
 
 
 def suggest_voxel_size(clouds: Sequence[Any]) -> VoxelSizeSuggestion:
-    """A voxel size that leaves some thousand points of each cloud, and fits their spacing and noise.
+    """A voxel size that leaves some thousand points of each cloud, and fits their spacing and
+    noise.
 
     Parameters
     ----------
@@ -135,18 +148,20 @@ def suggest_voxel_size(clouds: Sequence[Any]) -> VoxelSizeSuggestion:
     >>> gpureg.suggest_voxel_size([sphere]).voxel_size
     0.06
     """
-    return _core.suggest_voxel_size([host_points(cloud, f"clouds[{k}]") for k, cloud in enumerate(several(clouds, "clouds"))])
+    return _core.suggest_voxel_size(
+        [host_points(cloud, f"clouds[{k}]") for k, cloud in enumerate(several(clouds, "clouds"))]
+    )
 
 
 def align_batch(
     fragments: Sequence[Any],
     pairs: Any,
     *,
-    priors: Optional[Sequence[RegistrationPrior]] = None,
-    options: Optional[RegistrationOptions] = None,
-    context: Optional[Context] = None,
-    progress: Union[bool, Callable[[int, int], object]] = False,
-) -> List[RegistrationResult]:
+    priors: Sequence[RegistrationPrior] | None = None,
+    options: RegistrationOptions | None = None,
+    context: Context | None = None,
+    progress: bool | Callable[[int, int], object] = False,
+) -> list[RegistrationResult]:
     """Align many pairs; each result equals that of `align` bit for bit.
 
     Parameters
@@ -202,14 +217,14 @@ def align_batch(
 def register(
     source: Any,
     target: Any,
-    voxel_size: Union[float, Literal["auto"], None] = None,
+    voxel_size: float | Literal["auto"] | None = None,
     *,
-    quality: Optional[int] = None,
-    seed: Optional[int] = None,
-    prior: Optional[RegistrationPrior] = None,
-    options: Optional[RegistrationOptions] = None,
-    time_budget_ms: Optional[float] = None,
-    context: Optional[Context] = None,
+    quality: int | None = None,
+    seed: int | None = None,
+    prior: RegistrationPrior | None = None,
+    options: RegistrationOptions | None = None,
+    time_budget_ms: float | None = None,
+    context: Context | None = None,
 ) -> RegistrationResult:
     """Prepare two clouds and align them: the easy door.
 
@@ -268,7 +283,9 @@ def register(
             voxel_size = suggestion.voxel_size
         elif isinstance(voxel_size, str):
             raise TypeError(f"voxel_size: expected a number or 'auto', got {voxel_size!r}")
-        options = RegistrationOptions.from_voxel_size(PrepareOptions().voxel_size if voxel_size is None else voxel_size)
+        options = RegistrationOptions.from_voxel_size(
+            PrepareOptions().voxel_size if voxel_size is None else voxel_size
+        )
         if quality is not None:
             options = options.with_quality(quality)
         if seed is not None:
@@ -276,7 +293,9 @@ def register(
     context = context_of(context)
     clouds = []
     for cloud, name in ((source, "source"), (target, "target")):
-        clouds.append(core_cloud(cloud, None, None, None, options.prepare, name, context.backend == "cuda"))
+        clouds.append(
+            core_cloud(cloud, None, None, None, options.prepare, name, context.backend == "cuda")
+        )
     options.validate()
     a, b = _core.prepare_batch(context, clouds, options.prepare, ["source", "target"])
     if time_budget_ms is not None:

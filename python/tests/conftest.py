@@ -36,5 +36,7 @@ def kitchen() -> pathlib.Path:
 
 @pytest.fixture(autouse=True, scope="session")
 def interruptible():
-    """Shells start background jobs with SIGINT ignored, and Python leaves it so: tests that press Ctrl-C would wait for ever."""
+    """Shells start background jobs with SIGINT ignored, and Python leaves it so: tests that press
+    Ctrl-C would wait for ever.
+    """
     signal.signal(signal.SIGINT, signal.default_int_handler)

@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A run of more than a thousand pairs, for tests that kill it. As a script: one process of that run."""
+"""A run of more than a thousand pairs, for tests that kill it. As a script: one process of that
+run.
+"""
 
 import sys
 
-from scenes import few, moved, pose, room
-
 import gpureg
+from scenes import few, moved, pose, room
 
 FRAGMENTS, CHUNK = 46, 16  # 1,035 pairs in 65 chunks
 
@@ -21,10 +22,19 @@ def options():
 
 def run(folder, progress=False, **keywords):
     return gpureg.register_all(
-        fragments(), output=folder, options=options(), chunk_size=CHUNK, progress=progress, **keywords
+        fragments(),
+        output=folder,
+        options=options(),
+        chunk_size=CHUNK,
+        progress=progress,
+        **keywords,
     )
 
 
 if __name__ == "__main__":
     print("started", flush=True)
-    run(sys.argv[1], progress=lambda done, total: print(done, flush=True), contexts=[gpureg.Context.cpu(1)])
+    run(
+        sys.argv[1],
+        progress=lambda done, total: print(done, flush=True),
+        contexts=[gpureg.Context.cpu(1)],
+    )

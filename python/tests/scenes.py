@@ -1,9 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Small clouds with enough shape to be registered, and what tests ask about them."""
 
-import numpy as np
-
 import gpureg
+import numpy as np
 
 
 def room(seed: int = 1, points: int = 6000) -> np.ndarray:

@@ -3,10 +3,9 @@
 
 import pickle
 
+import gpureg
 import numpy as np
 import pytest
-
-import gpureg
 from scenes import few, moved, pose, room
 
 
@@ -16,7 +15,9 @@ def loop():
     points = room(points=18000)
     clouds = [points[0::3], moved(points[1::3], pose(4)), moved(points[2::3], pose(5))]
     pairs = [(0, 1), (1, 2), (0, 2)]
-    return pairs, gpureg.align_batch(clouds, pairs, options=gpureg.RegistrationOptions.from_voxel_size(0.05))
+    return pairs, gpureg.align_batch(
+        clouds, pairs, options=gpureg.RegistrationOptions.from_voxel_size(0.05)
+    )
 
 
 def with_state(result, **changes):

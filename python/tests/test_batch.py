@@ -11,14 +11,15 @@ import sys
 import threading
 import time
 
+import gpureg
 import numpy as np
 import pytest
 from scenes import few, moved, pose, room
 
-import gpureg
-
 pytest.importorskip("pyarrow")
-import many  # noqa: E402
+import itertools
+
+import many
 
 
 @pytest.fixture(scope="module")
@@ -46,8 +47,16 @@ def test_table_is_what_align_says(whole):
         else:
             assert row["target_from_source"] is None
     log = gpureg._core.read_log(str(whole.log))
-    assert [entry[:3] for entry in log] == sorted((row["i"], row["j"], many.FRAGMENTS) for row in rows if row["status"] == "aligned")
-    assert sorted(path.name for path in whole.folder.iterdir()) == ["result.info", "result.log", "results.parquet", "run.json", "run.lock"]
+    assert [entry[:3] for entry in log] == sorted(
+        (row["i"], row["j"], many.FRAGMENTS) for row in rows if row["status"] == "aligned"
+    )
+    assert sorted(path.name for path in whole.folder.iterdir()) == [
+        "result.info",
+        "result.log",
+        "results.parquet",
+        "run.json",
+        "run.lock",
+    ]
 
 
 def test_contexts_and_memory_change_nothing(tmp_path):
@@ -56,7 +65,9 @@ def test_contexts_and_memory_change_nothing(tmp_path):
     one = gpureg.register_all(clouds, output=tmp_path / "one", **keywords)
     # Room for three or four fragments: they come and go.
     contexts = [gpureg.Context.cpu(1) for _ in range(3)]
-    other = gpureg.register_all(clouds, output=tmp_path / "other", contexts=contexts, memory=500_000, **keywords)
+    other = gpureg.register_all(
+        clouds, output=tmp_path / "other", contexts=contexts, memory=500_000, **keywords
+    )
     assert files_of(one) == files_of(other)
 
 
@@ -68,19 +79,41 @@ def test_memory_is_bounded(monkeypatch, tmp_path):
 
     def watched(self, pairs, rows, held, on_result, stop):
         nonlocal most
-        most = max(most, sum(map(_residency._bytes_of, {**self._clouds, **{-k - 1: c for k, c in held.items() if k not in self._clouds}}.values())))
+        most = max(
+            most,
+            sum(
+                map(
+                    _residency._bytes_of,
+                    {
+                        **self._clouds,
+                        **{-k - 1: c for k, c in held.items() if k not in self._clouds},
+                    }.values(),
+                )
+            ),
+        )
         align_group(self, pairs, rows, held, on_result, stop)
 
     monkeypatch.setattr(_residency.Residency, "_align_group", watched)
     clouds = many.fragments()[:20]
-    gpureg.register_all(clouds, output=tmp_path, options=few(10, 0.08), progress=False, contexts=[gpureg.Context.cpu()], memory=1_000_000)
-    largest = max(map(_residency._bytes_of, gpureg.prepare_batch(clouds, options=few(10, 0.08).prepare)))
+    gpureg.register_all(
+        clouds,
+        output=tmp_path,
+        options=few(10, 0.08),
+        progress=False,
+        contexts=[gpureg.Context.cpu()],
+        memory=1_000_000,
+    )
+    largest = max(
+        map(_residency._bytes_of, gpureg.prepare_batch(clouds, options=few(10, 0.08).prepare))
+    )
     # What is kept, and what a group of pairs holds: each within the budget and one fragment or two.
     assert most <= 2 * (1_000_000 + 2 * largest)
 
 
 def test_a_finished_run_is_not_done_again(whole):
-    before = {path: path.stat().st_mtime_ns for path in (whole.parquet, whole.log, whole.information)}
+    before = {
+        path: path.stat().st_mtime_ns for path in (whole.parquet, whole.log, whole.information)
+    }
     again = many.run(whole.folder)
     assert again.resumed == again.pairs == whole.pairs and again.aligned == whole.aligned
     assert before == {path: path.stat().st_mtime_ns for path in before}
@@ -93,7 +126,12 @@ def test_ten_kills(whole, tmp_path):
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(p for p in sys.path if p)}
     kept = []
     for kill in range(10):
-        child = subprocess.Popen([sys.executable, many.__file__, str(tmp_path)], stdout=subprocess.PIPE, text=True, env=environment)
+        child = subprocess.Popen(
+            [sys.executable, many.__file__, str(tmp_path)],
+            stdout=subprocess.PIPE,
+            text=True,
+            env=environment,
+        )
         assert child.stdout.readline() == "started\n"
         if kill % 3 == 1:  # a slow machine, too, shall have finished something
             before = len(kept[-1])
@@ -103,13 +141,19 @@ def test_ten_kills(whole, tmp_path):
         elif kill % 3 == 2:
             child.stdout.readline()  # it aligns
         time.sleep(rng.random() * 0.4)
-        assert child.poll() is None, "the run ended before it was killed: it is too short for this test"
+        assert (
+            child.poll() is None
+        ), "the run ended before it was killed: it is too short for this test"
         child.send_signal(signal.SIGKILL)
         child.wait()
         child.stdout.close()
         chunks = tmp_path / "chunks"
-        kept.append({p.name: p.stat().st_mtime_ns for p in chunks.glob("*.parquet")} if chunks.exists() else {})
-    for before, after in zip(kept, kept[1:]):
+        kept.append(
+            {p.name: p.stat().st_mtime_ns for p in chunks.glob("*.parquet")}
+            if chunks.exists()
+            else {}
+        )
+    for before, after in itertools.pairwise(kept):
         assert before.items() <= after.items(), "a finished chunk was lost or done twice"
     run = many.run(tmp_path)
     assert run.resumed >= len(kept[-1]) * many.CHUNK - many.CHUNK
@@ -123,7 +167,9 @@ def test_ctrl_c_loses_nothing(whole, tmp_path):
 
     def progress(count, total):
         done.append(count)
-        if count >= 40 and not pressed:  # once: a second one, while the run winds up, ends it at once
+        if (
+            count >= 40 and not pressed
+        ):  # once: a second one, while the run winds up, ends it at once
             pressed.append(count)
             os.kill(os.getpid(), signal.SIGINT)
 
@@ -139,12 +185,16 @@ def test_an_error_stops_the_run_and_keeps_the_rest(whole, tmp_path):
     clouds = many.fragments()
     fragments = gpureg.FragmentSet.from_clouds([*clouds[:40], tmp_path / "missing.ply"])
     with pytest.raises(FileNotFoundError):
-        gpureg.register_all(fragments, output=tmp_path / "a", progress=False)  # at once, not after hours
+        gpureg.register_all(
+            fragments, output=tmp_path / "a", progress=False
+        )  # at once, not after hours
     gpureg.write_point_cloud(tmp_path / "missing.ply", clouds[0])
     with open(tmp_path / "missing.ply", "r+b") as file:
         file.truncate(1000)
     with pytest.raises(gpureg.IoError, match="missing.ply"):
-        gpureg.register_all(fragments, output=tmp_path / "a", options=few(100, 0.1), progress=False, chunk_size=8)
+        gpureg.register_all(
+            fragments, output=tmp_path / "a", options=few(100, 0.1), progress=False, chunk_size=8
+        )
     assert list((tmp_path / "a" / "chunks").glob("*.parquet"))
 
 
@@ -157,10 +207,14 @@ def test_another_run_is_refused(source, tmp_path):
         ({"options": few(100, 0.1), "chunk_size": 1}, "chunk_size was 256, now 1"),
     ]:
         with pytest.raises(ValueError, match=message):
-            gpureg.register_all(clouds, output=tmp_path, progress=False, **{"pairs": "all", **change})
+            gpureg.register_all(
+                clouds, output=tmp_path, progress=False, **{"pairs": "all", **change}
+            )
     with pytest.raises(ValueError, match=r"fragments\[0\].fingerprint was"):
         gpureg.register_all(clouds[::-1], output=tmp_path, options=few(100, 0.1), progress=False)
-    fresh = gpureg.register_all(clouds, [(0, 1)], output=tmp_path, options=few(101, 0.1), progress=False, resume=False)
+    fresh = gpureg.register_all(
+        clouds, [(0, 1)], output=tmp_path, options=few(101, 0.1), progress=False, resume=False
+    )
     assert fresh.pairs == 1 and fresh.resumed == 0
     (tmp_path / "run.json").write_text("{")
     with pytest.raises(gpureg.IoError, match="run.json is damaged"):
@@ -191,7 +245,12 @@ def test_nothing_to_do_is_an_error(source, tmp_path):
 def test_threads_of_a_failed_run_end(source, tmp_path):
     before = threading.active_count()
     with pytest.raises(RuntimeError, match="enough"):
-        gpureg.register_all([source] * 30, output=tmp_path, options=few(20000), progress=lambda *_: (_ for _ in ()).throw(RuntimeError("enough")))
+        gpureg.register_all(
+            [source] * 30,
+            output=tmp_path,
+            options=few(20000),
+            progress=lambda *_: (_ for _ in ()).throw(RuntimeError("enough")),
+        )
     assert threading.active_count() == before
 
 
@@ -201,7 +260,9 @@ COMMAND = pathlib.Path(gpureg.__file__).with_name("bin") / "gpureg"
 @pytest.mark.skipif(not COMMAND.exists(), reason="this build has no command")
 class TestCommand:
     def run(self, *arguments):
-        return subprocess.run([sys.executable, "-m", "gpureg", *map(str, arguments)], capture_output=True, text=True)
+        return subprocess.run(
+            [sys.executable, "-m", "gpureg", *map(str, arguments)], capture_output=True, text=True
+        )
 
     def test_help_and_status(self, tmp_path):
         shown = self.run("--help")
@@ -219,14 +280,34 @@ class TestCommand:
             gpureg.write_point_cloud(folder / f"cloud_bin_{k}.ply", moved(whole[:: k + 1], pose(k)))
         options = gpureg.RegistrationOptions.loopsmart(0.06)
         options.hypothesis.count = 20000
-        self.compare(folder, tmp_path, ["--preset", "loopsmart", "--hypotheses", 20000, "--voxel-size", 0.06], options)
+        self.compare(
+            folder,
+            tmp_path,
+            ["--preset", "loopsmart", "--hypotheses", 20000, "--voxel-size", 0.06],
+            options,
+        )
 
     def test_red_kitchen(self, kitchen, tmp_path):
         # What is compared does not depend on the quality, time does.
-        self.compare(kitchen, tmp_path, ["--quality", 0], gpureg.RegistrationOptions.from_voxel_size(0.05, quality=0))
+        self.compare(
+            kitchen,
+            tmp_path,
+            ["--quality", 0],
+            gpureg.RegistrationOptions.from_voxel_size(0.05, quality=0),
+        )
 
     def compare(self, folder, tmp_path, arguments, options):
-        done = self.run("batch", folder, *arguments, "-o", tmp_path / "c.log", "--info", tmp_path / "c.info", "--json", tmp_path / "c.json")
+        done = self.run(
+            "batch",
+            folder,
+            *arguments,
+            "-o",
+            tmp_path / "c.log",
+            "--info",
+            tmp_path / "c.info",
+            "--json",
+            tmp_path / "c.json",
+        )
         assert done.returncode == 0, done.stderr
         run = gpureg.register_all(folder, output=tmp_path / "run", options=options, progress=False)
         assert run.log.read_bytes() == (tmp_path / "c.log").read_bytes()
@@ -255,8 +336,13 @@ class TestCommand:
 def test_what_is_missing_is_named_with_both_ways_to_install_it(library, code, extra):
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(p for p in sys.path if p)}
     code = f"import sys; sys.modules[{library!r}] = None; {code}"
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, env=environment)
-    assert f"pip install 'gpureg[{extra}]', or '.[{extra}]' from a checkout" in done.stderr.splitlines()[-1]
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, env=environment
+    )
+    assert (
+        f"pip install 'gpureg[{extra}]', or '.[{extra}]' from a checkout"
+        in done.stderr.splitlines()[-1]
+    )
 
 
 def test_damaged_files_are_named(tmp_path):
@@ -267,9 +353,14 @@ def test_damaged_files_are_named(tmp_path):
     for damaged in (b"PAR1 and no more", whole[: len(whole) // 2], b""):
         run.parquet.write_bytes(damaged)
         for call in (run.table, lambda: gpureg.register_all(clouds, **keywords)):
-            with pytest.raises(gpureg.IoError, match=r"results.parquet is damaged \(.*\); resume=False starts anew"):
+            with pytest.raises(
+                gpureg.IoError, match=r"results.parquet is damaged \(.*\); resume=False starts anew"
+            ):
                 call()
-    assert gpureg.register_all(clouds, resume=False, **keywords).pairs == 3 and run.parquet.read_bytes() == whole
+    assert (
+        gpureg.register_all(clouds, resume=False, **keywords).pairs == 3
+        and run.parquet.read_bytes() == whole
+    )
     run.parquet.unlink()
     with pytest.raises(FileNotFoundError, match="results.parquet"):
         run.table()
@@ -277,7 +368,10 @@ def test_damaged_files_are_named(tmp_path):
 
 @pytest.mark.parametrize("name", ["memory", "chunk_size"])
 def test_sizes_are_checked(tmp_path, name):
-    for value, error, message in ((-1, ValueError, f"{name} is -1, expected 1 or more"), ("1", TypeError, f"{name}: expected a (whole )?number, got '1'")):
+    for value, error, message in (
+        (-1, ValueError, f"{name} is -1, expected 1 or more"),
+        ("1", TypeError, f"{name}: expected a (whole )?number, got '1'"),
+    ):
         with pytest.raises(error, match=message):
             gpureg.register_all(many.fragments()[:3], output=tmp_path / "run", **{name: value})
     assert not (tmp_path / "run").exists()

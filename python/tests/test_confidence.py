@@ -1,23 +1,35 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The library's confidences are those that bench/accuracy/fit_confidence.py computes from the same evidence and coefficients."""
+"""The library's confidences are those that bench/accuracy/fit_confidence.py computes from the same
+evidence and coefficients.
+"""
 
 import pathlib
 import re
 import sys
 
+import gpureg
 import numpy as np
 import pytest
 from scenes import moved, pose
-
-import gpureg
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 if not (ROOT / "bench/accuracy/fit_confidence.py").exists():
     pytest.skip("not in a checkout", allow_module_level=True)
 sys.path.insert(0, str(ROOT / "bench/accuracy"))
-import fit_confidence  # noqa: E402
+import fit_confidence
 
-SIDES = ("overlap", "reach", "balanced_overlap", "seen", "impossible", "hidden", "around", "near_front", "far_front", "at_back")
+SIDES = (
+    "overlap",
+    "reach",
+    "balanced_overlap",
+    "seen",
+    "impossible",
+    "hidden",
+    "around",
+    "near_front",
+    "far_front",
+    "at_back",
+)
 
 
 def shipped(name):
@@ -27,7 +39,9 @@ def shipped(name):
     out = []
     for stage in ("ranking", "confidence", "overlap"):
         fit = fit_confidence.Logistic.__new__(fit_confidence.Logistic)
-        fit.weights = np.array(re.search(rf"{name}_{stage}\[\] = {{([^}}]*)}}", text).group(1).split(","), float)
+        fit.weights = np.array(
+            re.search(rf"{name}_{stage}\[\] = {{([^}}]*)}}", text).group(1).split(","), float
+        )
         fit.bias = float(re.search(rf"{name}_{stage}, ([^}}]*)}}", biases + "}").group(1))
         out.append(fit)
     return out
@@ -35,8 +49,12 @@ def shipped(name):
 
 def evidence_of(mode):
     e = mode.evidence
-    return {**{side: [getattr(e, f"source_{side}"), getattr(e, f"target_{side}")] for side in SIDES}, "match_inliers": e.match_inliers,
-            "match_support": e.match_support, "stiffness": list(e.stiffness)}
+    return {
+        **{side: [getattr(e, f"source_{side}"), getattr(e, f"target_{side}")] for side in SIDES},
+        "match_inliers": e.match_inliers,
+        "match_support": e.match_support,
+        "stiffness": list(e.stiffness),
+    }
 
 
 def expected(modes, name, refined, points):
@@ -44,7 +62,9 @@ def expected(modes, name, refined, points):
     model, (ranking, confidence, overlap) = fit_confidence.MODELS[name], shipped(name)
 
     class Run:
-        x = {model: [np.array([fit_confidence.measures(e, *model) for e in map(evidence_of, modes)])]}
+        x = {
+            model: [np.array([fit_confidence.measures(e, *model) for e in map(evidence_of, modes)])]
+        }
 
     Run.refined = refined
     x, best, share = fit_confidence.second_view(Run, model, ranking)
@@ -79,15 +99,34 @@ def test_as_fitted(name):
     if not fronts:
         options.prepare.front_reach = 0
     seen = set()
-    for seed, boxes, points in ((1, 6, 6000), (2, 3, 6000), (3, 1, 3000), (4, 6, 300), (5, 4, 12000)):
+    for seed, boxes, points in (
+        (1, 6, 6000),
+        (2, 3, 6000),
+        (3, 1, 3000),
+        (4, 6, 300),
+        (5, 4, 12000),
+    ):
         a, b = corner(seed, boxes, points), moved(corner(seed + 50, boxes, points), pose(seed))
         eye = np.array([[1.3, 1.4, 1.5]])
         source = gpureg.prepare(a, viewpoints=eye, options=options.prepare)
         target = gpureg.prepare(b, viewpoints=moved(eye, pose(seed)), options=options.prepare)
         result = gpureg.align(source, target, options=options)
         assert result.modes
-        want = expected(result.modes, name, options.evidence.modes, (len(source.points), len(target.points)))
-        np.testing.assert_allclose((result.modes[0].confidence, result.modes[0].overlap_confidence), want, rtol=1e-6, atol=1e-9)
+        want = expected(
+            result.modes, name, options.evidence.modes, (len(source.points), len(target.points))
+        )
+        np.testing.assert_allclose(
+            (result.modes[0].confidence, result.modes[0].overlap_confidence),
+            want,
+            rtol=1e-6,
+            atol=1e-9,
+        )
         front = sum(evidence_of(result.modes[0])["near_front"])
-        seen.add("above" if front > fit_confidence.LEAST_JUDGED_FRONT else "between" if front > fit_confidence.LEAST_FRONT else "below")
+        seen.add(
+            "above"
+            if front > fit_confidence.LEAST_JUDGED_FRONT
+            else "between"
+            if front > fit_confidence.LEAST_FRONT
+            else "below"
+        )
     assert not fronts or len(seen) > 1, seen

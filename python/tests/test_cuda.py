@@ -5,12 +5,11 @@ import pickle
 import subprocess
 import sys
 
+import gpureg
 import numpy as np
 import pytest
-from scenes import error_of, few, room
-
-import gpureg
 from gpureg._arrays import core_cloud
+from scenes import error_of, few, room
 
 try:
     GPU = gpureg.Context.cuda()
@@ -30,7 +29,14 @@ def reference(source):
 
 
 def stays(value, **keywords):
-    parts = core_cloud(value, keywords.get("normals"), keywords.get("features"), None, gpureg.PrepareOptions(), device=True)
+    parts = core_cloud(
+        value,
+        keywords.get("normals"),
+        keywords.get("features"),
+        None,
+        gpureg.PrepareOptions(),
+        device=True,
+    )
     return parts[5] is not None
 
 
@@ -41,9 +47,15 @@ def test_same_bits_as_the_cpu(source, target, tmp_path):
         del state["timings"]
         results.append(pickle.dumps(state))
     assert len(set(results)) == 1
-    clouds, keywords = [room(k % 3, 1500) for k in range(8)], {"options": few(2000), "progress": False, "chunk_size": 5}
+    clouds, keywords = (
+        [room(k % 3, 1500) for k in range(8)],
+        {"options": few(2000), "progress": False, "chunk_size": 5},
+    )
     pytest.importorskip("pyarrow")
-    runs = [gpureg.register_all(clouds, output=tmp_path / c.backend, contexts=[c], **keywords) for c in (CPU, GPU)]
+    runs = [
+        gpureg.register_all(clouds, output=tmp_path / c.backend, contexts=[c], **keywords)
+        for c in (CPU, GPU)
+    ]
     assert runs[0].parquet.read_bytes() == runs[1].parquet.read_bytes()
     assert runs[0].log.read_bytes() == runs[1].log.read_bytes()
 
@@ -61,7 +73,12 @@ class TestTorch:
         tensor = torch.from_numpy(source.astype(np.float32)).cuda()
         wide = torch.full((len(source), 7), float("nan"), device="cuda")
         wide[:, 2:5] = tensor
-        for given in (tensor, tensor.T.contiguous().T, wide[:, 2:5], tensor.clone().requires_grad_()):
+        for given in (
+            tensor,
+            tensor.T.contiguous().T,
+            wide[:, 2:5],
+            tensor.clone().requires_grad_(),
+        ):
             assert stays(given)
             assert arrays_of(gpureg.prepare(given, context=GPU)) == reference
         assert not stays(tensor.double())
@@ -77,14 +94,24 @@ class TestTorch:
 
     def test_companions(self, torch, source):
         rng = np.random.default_rng(1)
-        normals, features = rng.normal(size=source.shape).astype("f4"), rng.random((len(source), 16)).astype("f4")
+        normals, features = (
+            rng.normal(size=source.shape).astype("f4"),
+            rng.random((len(source), 16)).astype("f4"),
+        )
         points = source.astype("f4")
-        expected = arrays_of(gpureg.prepare(points, normals, features, viewpoints=[[1, 2, 3]], context=CPU))
+        expected = arrays_of(
+            gpureg.prepare(points, normals, features, viewpoints=[[1, 2, 3]], context=CPU)
+        )
         there = [torch.from_numpy(a).cuda() for a in (points, normals, features)]
         assert stays(there[0], normals=there[1], features=there[2])
         for given in ((*there,), (there[0], normals, there[2]), (points, there[1], features)):
-            assert arrays_of(gpureg.prepare(*given, viewpoints=[[1, 2, 3]], context=GPU)) == expected
-        with pytest.raises(ValueError, match=r"normals: expected shape \(6000, 3\), one row per point, got \(5, 3\)"):
+            assert (
+                arrays_of(gpureg.prepare(*given, viewpoints=[[1, 2, 3]], context=GPU)) == expected
+            )
+        with pytest.raises(
+            ValueError,
+            match=r"normals: expected shape \(6000, 3\), one row per point, got \(5, 3\)",
+        ):
             gpureg.prepare(there[0], there[1][:5], context=GPU)
         with pytest.raises(ValueError, match=r"points: expected shape \(N, 3\), got \(6000, 16\)"):
             gpureg.prepare(there[2], context=GPU)
@@ -116,7 +143,9 @@ class TestTorch:
         seen = copies(profile)
         to_host = [size for name, size in seen if "DtoH" in name]
         to_device = [size for name, size in seen if "HtoD" in name]
-        print(f"copies to the host: {len(to_host)}, {sum(to_host)} bytes; to the device: {len(to_device)}, {sum(to_device)} bytes")
+        print(
+            f"copies to the host: {len(to_host)}, {sum(to_host)} bytes; to the device: {len(to_device)}, {sum(to_device)} bytes"
+        )
         assert len(cloud) > 1000 and sum(to_host) < 10_000 and sum(to_device) < 100_000
 
     def test_example(self, torch):
@@ -124,7 +153,9 @@ class TestTorch:
 
         path = pathlib.Path(__file__).parents[1] / "examples" / "own_features.py"
         done = subprocess.run([sys.executable, path], capture_output=True, text=True)
-        assert done.returncode == 0 and done.stdout.startswith("cuda: <gpureg.RegistrationResult aligned"), done.stderr
+        assert done.returncode == 0 and done.stdout.startswith(
+            "cuda: <gpureg.RegistrationResult aligned"
+        ), done.stderr
 
 
 def copies(profile):
@@ -141,7 +172,11 @@ def copies(profile):
 def test_cupy(source, reference, target, truth):
     cupy = pytest.importorskip("cupy")
     array = cupy.asarray(source.astype(np.float32))
-    for given in (array, cupy.asfortranarray(array), cupy.asarray(np.ascontiguousarray(source.astype("f4")))[:]):
+    for given in (
+        array,
+        cupy.asfortranarray(array),
+        cupy.asarray(np.ascontiguousarray(source.astype("f4")))[:],
+    ):
         assert stays(given)
         assert arrays_of(gpureg.prepare(given, context=GPU)) == reference
     assert arrays_of(gpureg.prepare(array.astype("f8"), context=GPU)) == reference

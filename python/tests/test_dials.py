@@ -3,10 +3,9 @@
 
 import re
 
+import gpureg
 import numpy as np
 import pytest
-
-import gpureg
 from scenes import error_of, moved, pose, room
 
 
@@ -71,8 +70,12 @@ def test_priors_drop_what_contradicts_them(clouds):
     result = gpureg.align(a, b, prior=known)
     assert result.aligned and error_of(result, pose()) < 0.05
     up = np.array([0.0, 0, 1])
-    tilted = gpureg.RegistrationPrior(source_up=up, target_up=pose()[:3, :3] @ [1, 2, 3], max_angle=1e-3)
-    batch = gpureg.align_batch([a, b], [(0, 1), (0, 1)], priors=[tilted, gpureg.RegistrationPrior()])
+    tilted = gpureg.RegistrationPrior(
+        source_up=up, target_up=pose()[:3, :3] @ [1, 2, 3], max_angle=1e-3
+    )
+    batch = gpureg.align_batch(
+        [a, b], [(0, 1), (0, 1)], priors=[tilted, gpureg.RegistrationPrior()]
+    )
     assert [r.reason for r in batch] == ["contradicts_prior", "none"]
     assert np.isnan(batch[0].target_from_source).all()
     assert np.array_equal(batch[1].target_from_source, gpureg.align(a, b).target_from_source)
@@ -82,9 +85,13 @@ def test_priors_drop_what_contradicts_them(clouds):
         gpureg.RegistrationPrior(source_up=up)
     with pytest.raises(gpureg.InvalidArgument, match="prior.pose.max_rotation is 0"):
         gpureg.RegistrationPrior(target_from_source=np.eye(4), max_rotation=0)
-    with pytest.raises(ValueError, match="max_rotation is 5, but there is no target_from_source that it limits"):
+    with pytest.raises(
+        ValueError, match="max_rotation is 5, but there is no target_from_source that it limits"
+    ):
         gpureg.RegistrationPrior(max_rotation=5, source_up=[0, 0, 1], target_up=[0, 0, 1])
-    with pytest.raises(ValueError, match="max_translation is 0.1, but there is no target_from_source"):
+    with pytest.raises(
+        ValueError, match="max_translation is 0.1, but there is no target_from_source"
+    ):
         gpureg.RegistrationPrior(max_translation=0.1)
     with pytest.raises(ValueError, match="max_angle is 5, but there is no source_up and target_up"):
         gpureg.RegistrationPrior(max_angle=5, target_from_source=np.eye(4))
@@ -95,10 +102,18 @@ def test_priors_drop_what_contradicts_them(clouds):
 def test_register_takes_a_prior(clouds):
     right, wrong = pose(), pose()
     wrong[:3, 3] += 5
-    for given in (clouds, [clouds[0] + 5e6, clouds[1]]):  # in the caller's frames, also those of a map
+    for given in (
+        clouds,
+        [clouds[0] + 5e6, clouds[1]],
+    ):  # in the caller's frames, also those of a map
         moved_back = np.eye(4)
         moved_back[:3, 3] = clouds[0][0] - given[0][0]
-        prior = lambda known: gpureg.RegistrationPrior(target_from_source=known @ moved_back, max_rotation=5, max_translation=0.3)  # noqa: E731
+
+        def prior(known, moved_back=moved_back):
+            return gpureg.RegistrationPrior(
+                target_from_source=known @ moved_back, max_rotation=5, max_translation=0.3
+            )
+
         assert gpureg.register(*given, quality=1, prior=prior(right)).aligned
         assert gpureg.register(*given, quality=1, prior=prior(wrong)).reason == "contradicts_prior"
     with pytest.raises(TypeError, match="prior: expected a RegistrationPrior"):
@@ -109,18 +124,35 @@ def test_register_takes_a_prior(clouds):
 
 def test_voxel_size_suggestions_show_what_they_hold(clouds):
     text = repr(gpureg.suggest_voxel_size(clouds))
-    assert re.fullmatch(r"<gpureg.VoxelSizeSuggestion 0.0\d+, spacing [\d.e-]+, noise [\d.e-]+, \d+ points>", text)
+    assert re.fullmatch(
+        r"<gpureg.VoxelSizeSuggestion 0.0\d+, spacing [\d.e-]+, noise [\d.e-]+, \d+ points>", text
+    )
     assert repr(gpureg.suggest_voxel_size([])) == "<gpureg.VoxelSizeSuggestion none: no_clouds>"
 
 
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        (lambda t: t.T, r"target_from_source: its last row is \[5, 6, 7, 1\], expected \[0, 0, 0, 1\]; it looks transposed"),
-        (lambda t: t + np.diag([0, 0, 0, 1]), r"target_from_source: its last row is \[0, 0, 0, 2\], expected \[0, 0, 0, 1\]$"),
-        (lambda t: t @ np.diag([1.1, 1.1, 1.1, 1]), r"target_from_source is no rigid motion: .* determinant 1.331, .* by 0.21$"),
-        (lambda t: t @ np.diag([1, -1, 1, 1]), r"target_from_source is no rigid motion: .* determinant -1"),
-        (lambda t: t + np.diag([0, np.nan, 0], -1), r"target_from_source\[2, 1\] is nan, expected a finite number"),
+        (
+            lambda t: t.T,
+            r"target_from_source: its last row is \[5, 6, 7, 1\], expected \[0, 0, 0, 1\]; it looks transposed",
+        ),
+        (
+            lambda t: t + np.diag([0, 0, 0, 1]),
+            r"target_from_source: its last row is \[0, 0, 0, 2\], expected \[0, 0, 0, 1\]$",
+        ),
+        (
+            lambda t: t @ np.diag([1.1, 1.1, 1.1, 1]),
+            r"target_from_source is no rigid motion: .* determinant 1.331, .* by 0.21$",
+        ),
+        (
+            lambda t: t @ np.diag([1, -1, 1, 1]),
+            r"target_from_source is no rigid motion: .* determinant -1",
+        ),
+        (
+            lambda t: t + np.diag([0, np.nan, 0], -1),
+            r"target_from_source\[2, 1\] is nan, expected a finite number",
+        ),
         (lambda t: t[:3], r"target_from_source: expected shape \(4, 4\), got \(3, 4\)"),
     ],
 )

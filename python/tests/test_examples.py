@@ -6,17 +6,18 @@ import re
 import subprocess
 import sys
 
+import gpureg
 import numpy as np
 import pytest
 from scenes import moved, room
-
-import gpureg
 
 FOLDER = pathlib.Path(__file__).parents[1] / "examples"
 
 
 def run(name, *arguments):
-    done = subprocess.run([sys.executable, FOLDER / name, *map(str, arguments)], capture_output=True, text=True)
+    done = subprocess.run(
+        [sys.executable, FOLDER / name, *map(str, arguments)], capture_output=True, text=True
+    )
     assert done.returncode == 0, done.stdout + done.stderr
     return done.stdout
 
@@ -34,7 +35,13 @@ def scans(tmp_path, source, truth):
 def test_register_two_clouds(scans, tmp_path):
     pytest.importorskip("matplotlib")
     picture = tmp_path / "picture.png"
-    shown = run("register_two_clouds.py", scans / "cloud_bin_0.ply", scans / "cloud_bin_1.ply", "--picture", picture)
+    shown = run(
+        "register_two_clouds.py",
+        scans / "cloud_bin_0.ply",
+        scans / "cloud_bin_1.ply",
+        "--picture",
+        picture,
+    )
     assert "aligned" in shown and picture.read_bytes().startswith(b"\x89PNG")
 
 

@@ -1,10 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """FragmentSet: what is in a folder, and which pairs are meant."""
 
+import gpureg
 import numpy as np
 import pytest
-
-import gpureg
 
 
 @pytest.fixture()
@@ -18,7 +17,9 @@ def folder(tmp_path, source):
 def test_folder(folder):
     fragments = gpureg.FragmentSet.from_directory(folder)
     assert fragments.numbers == (3, 4, 10) and len(fragments) == 3 and fragments.count == 11
-    points, normals, features, viewpoints, origin, stream = fragments.load(1, gpureg.PrepareOptions())
+    points, normals, features, viewpoints, origin, stream = fragments.load(
+        1, gpureg.PrepareOptions()
+    )
     assert points.shape == (100, 3) and normals is features is origin is stream is None
     assert viewpoints.tolist() == [[1, 2, 3]]
     with pytest.raises(gpureg.IoError):

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """bench/accuracy/gazebo_building.py: one mesh of a world, every part where the world has it."""
+
 import pathlib
 import shutil
 import subprocess
@@ -34,8 +35,20 @@ def bake(folder, uri, *words):
     trimesh.creation.box([1, 1, 1]).export(crate / "cube.stl")
     (crate / "model.sdf").write_text(CRATE.format(uri=uri))
     (folder / "a.world").write_text(WORLD)
-    done = subprocess.run([sys.executable, SCRIPT, folder / "a.world", "--models", folder / "models", "-o", folder / "out.ply", *words],
-                          capture_output=True, text=True)
+    done = subprocess.run(
+        [
+            sys.executable,
+            SCRIPT,
+            folder / "a.world",
+            "--models",
+            folder / "models",
+            "-o",
+            folder / "out.ply",
+            *words,
+        ],
+        capture_output=True,
+        text=True,
+    )
     assert done.returncode == 0, done.stderr
     return trimesh.load(folder / "out.ply", force="mesh"), done.stderr
 
@@ -68,6 +81,10 @@ def test_floor(tmp_path):
 
 def test_nothing_to_read(tmp_path):
     (tmp_path / "a.world").write_text("<sdf version='1.6'><world name='w'/></sdf>")
-    done = subprocess.run([sys.executable, SCRIPT, tmp_path / "a.world", "-o", tmp_path / "out.ply"], capture_output=True, text=True)
+    done = subprocess.run(
+        [sys.executable, SCRIPT, tmp_path / "a.world", "-o", tmp_path / "out.ply"],
+        capture_output=True,
+        text=True,
+    )
     assert done.returncode != 0 and "a.world" in done.stderr
     assert not (tmp_path / "out.ply").exists()

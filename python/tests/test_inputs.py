@@ -9,12 +9,11 @@ import sys
 import types
 import warnings
 
+import gpureg
 import numpy as np
 import pytest
-from scenes import few, moved, room
-
-import gpureg
 from gpureg._arrays import float_rows, to_numpy
+from scenes import few, moved, room
 
 
 def same_points(cloud, expected):
@@ -36,7 +35,10 @@ def test_float_types_give_the_same_cloud(source, reference, dtype):
 def test_coarse_types_are_converted(source, dtype):
     points = (source * 8).astype(dtype)
     options = gpureg.RegistrationOptions.from_voxel_size(0.4).prepare
-    assert same_points(gpureg.prepare(points, options=options), gpureg.prepare(points.astype("f4"), options=options))
+    assert same_points(
+        gpureg.prepare(points, options=options),
+        gpureg.prepare(points.astype("f4"), options=options),
+    )
 
 
 def layouts(points):
@@ -94,11 +96,17 @@ def test_map_coordinates_lose_nothing(source, truth):
 
 
 def test_normals_in_map_coordinates_need_no_viewpoint():
-    # A floor, and a wall of a twelfth of the points that turns its back on where the map has its origin: what of a cloud may be
-    # turned towards a viewpoint.
+    # A floor, and a wall of a twelfth of the points that turns its back on where the map has its
+    # origin: what of a cloud may be turned towards a viewpoint.
     rng = np.random.default_rng(1)
-    floor, wall = rng.random((5500, 3)) * [4, 4, 0], rng.random((500, 3)) * [0, 4, 1.5] + [2, 0, 0.5]
-    points, normals = np.concatenate([floor, wall]), np.repeat([[0.0, 0, 1], [1.0, 0, 0]], [5500, 500], axis=0)
+    floor, wall = (
+        rng.random((5500, 3)) * [4, 4, 0],
+        rng.random((500, 3)) * [0, 4, 1.5] + [2, 0, 0.5],
+    )
+    points, normals = (
+        np.concatenate([floor, wall]),
+        np.repeat([[0.0, 0, 1], [1.0, 0, 0]], [5500, 500], axis=0),
+    )
     there = gpureg.prepare(points + [5e6, 5e6, -5e6], normals=normals)
     here = gpureg.prepare(points, normals=normals)
     assert there.origin.any() and not here.origin.any()
@@ -106,8 +114,12 @@ def test_normals_in_map_coordinates_need_no_viewpoint():
         upright = cloud.points[:, 2] - cloud.points[:, 2].min() > 0.6
         assert np.median(cloud.normals[upright, 0]) > 0.99
         evidence = gpureg.align(cloud, cloud).modes[0].evidence
-        assert evidence.source_seen == evidence.target_seen == 0  # nothing is known about free space
-    seen = gpureg.prepare(points + [5e6, 5e6, -5e6], normals=normals, viewpoints=[[5e6 + 4, 5e6 + 2, 1 - 5e6]])
+        assert (
+            evidence.source_seen == evidence.target_seen == 0
+        )  # nothing is known about free space
+    seen = gpureg.prepare(
+        points + [5e6, 5e6, -5e6], normals=normals, viewpoints=[[5e6 + 4, 5e6 + 2, 1 - 5e6]]
+    )
     assert np.abs(seen.viewpoints - [5e6 + 4, 5e6 + 2, 1 - 5e6]).max() < 1e-6
     assert gpureg.align(seen, seen).modes[0].evidence.source_seen > 0
 
@@ -129,7 +141,10 @@ def test_empty_clouds_have_a_reason(source):
     for empty in (np.zeros((0, 3)), np.zeros((0, 3), np.float32), np.zeros((0, 3), np.int64)):
         assert gpureg.register(empty, source).reason == "too_few_source_points"
     assert gpureg.register(source, source[:3], quality=0).reason == "too_few_target_points"
-    assert len(gpureg.prepare(np.zeros((0, 3)), features=np.zeros((0, 8)), normals=np.zeros((0, 3)))) == 0
+    assert (
+        len(gpureg.prepare(np.zeros((0, 3)), features=np.zeros((0, 8)), normals=np.zeros((0, 3))))
+        == 0
+    )
     assert gpureg.align_batch([], []) == [] and gpureg.prepare_batch([]) == []
 
 
@@ -172,7 +187,9 @@ def test_open3d_by_its_looks(source, reference):
     assert same_points(gpureg.prepare(cloud), reference)
     cloud.has_normals = lambda: True
     cloud.normals = np.tile([0.3, 0.5, 2.0], (len(source), 1))
-    assert np.array_equal(gpureg.prepare(cloud).normals, gpureg.prepare(source, normals=cloud.normals).normals)
+    assert np.array_equal(
+        gpureg.prepare(cloud).normals, gpureg.prepare(source, normals=cloud.normals).normals
+    )
 
 
 def test_files(source, tmp_path, reference):
@@ -188,7 +205,10 @@ def test_files(source, tmp_path, reference):
 
 def test_only_ply_is_written(source, tmp_path):
     for name in ("room.pcd", "room.xyz", "room.ply.gz"):
-        with pytest.raises(ValueError, match=rf"path: '.*{name}' ends in '.*', but what is written is PLY: let it end in '.ply'"):
+        with pytest.raises(
+            ValueError,
+            match=rf"path: '.*{name}' ends in '.*', but what is written is PLY: let it end in '.ply'",
+        ):
             gpureg.write_point_cloud(tmp_path / name, source)
     assert not list(tmp_path.iterdir())
     for name in ("room.ply", "room.PLY", "room"):
@@ -198,7 +218,10 @@ def test_only_ply_is_written(source, tmp_path):
 
 def test_clouds_that_float32_would_round_are_refused(source, tmp_path):
     there = source + 5e6
-    with pytest.raises(ValueError, match=r"points: coordinates up to 5000002 resolve 0.5 in float32, .* pass the array itself to prepare"):
+    with pytest.raises(
+        ValueError,
+        match=r"points: coordinates up to 5000002 resolve 0.5 in float32, .* pass the array itself to prepare",
+    ):
         gpureg.PointCloud(there)
     with pytest.raises(ValueError, match="points: coordinates up to 5000002 resolve 0.5"):
         gpureg.write_point_cloud(tmp_path / "there.ply", there)
@@ -207,8 +230,17 @@ def test_clouds_that_float32_would_round_are_refused(source, tmp_path):
         gpureg.PointCloud(np.array([[50_000_001, 0, 50_000_000]]))
     # Fine: what float32 can tell apart, whatever the unit, and what was rounded before.
     rounded = there.astype(np.float32)
-    for good in (source + 1000, source * 1000 + 3000, rounded, rounded.astype(float), np.full((3, 3), np.nan), np.zeros((0, 3))):
-        assert np.array_equal(gpureg.PointCloud(good).points, good.astype(np.float32), equal_nan=True)
+    for good in (
+        source + 1000,
+        source * 1000 + 3000,
+        rounded,
+        rounded.astype(float),
+        np.full((3, 3), np.nan),
+        np.zeros((0, 3)),
+    ):
+        assert np.array_equal(
+            gpureg.PointCloud(good).points, good.astype(np.float32), equal_nan=True
+        )
     nothing = np.zeros((0, 3))
     assert len(gpureg.PointCloud(source, nothing, nothing)) == len(source)
 
@@ -217,7 +249,10 @@ def test_files_with_large_coordinates_warn(source, tmp_path):
     path = tmp_path / "there.ply"
     gpureg.write_point_cloud(path, (source + 5e6).astype(np.float32))
     for read in (gpureg.read_point_cloud, gpureg.prepare):
-        with pytest.warns(UserWarning, match=r"there.ply: coordinates up to 500000[12].* resolve 0.5 in float32, which files are read as"):
+        with pytest.warns(
+            UserWarning,
+            match=r"there.ply: coordinates up to 500000[12].* resolve 0.5 in float32, which files are read as",
+        ):
             read(path)
     gpureg.write_point_cloud(path, source * 1e5)  # large, but not too large for its extent
     with warnings.catch_warnings():
@@ -253,10 +288,19 @@ def growth():
 
 
 def test_no_leak():
-    """In a process of its own: what other tests brought along, Ray's threads, say, needs memory when it likes."""
+    """In a process of its own: what other tests brought along, Ray's threads, say, needs memory
+    when it likes.
+    """
     code = "import test_inputs; print(test_inputs.growth())"
-    done = subprocess.run([sys.executable, "-c", code], cwd=pathlib.Path(__file__).parent, capture_output=True, text=True, check=True)
-    # One leaked result or cloud per call would be 5 MB and more; what is allowed is the allocator's.
+    done = subprocess.run(
+        [sys.executable, "-c", code],
+        cwd=pathlib.Path(__file__).parent,
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    # One leaked result or cloud per call would be 5 MB and more; what is allowed is the
+    # allocator's.
     assert int(done.stdout) < 2_000_000
 
 
@@ -270,8 +314,13 @@ def test_viewpoints_that_cannot_be_what_a_cloud_was_seen_from():
         gpureg.prepare(floor, viewpoints=[[2, 2, -2]])  # estimated normals turn to the viewpoints
     with warnings.catch_warnings():
         warnings.simplefilter("error")  # nobody asks them
-        gpureg.prepare(floor, normals=up, viewpoints=[[2, 2, -2]], options=gpureg.PrepareOptions(depth_maps=0))
-    with pytest.warns(UserWarning, match=r"^viewpoints: 100.0 % of the normals show all of them their back: are they in the frame"):
+        gpureg.prepare(
+            floor, normals=up, viewpoints=[[2, 2, -2]], options=gpureg.PrepareOptions(depth_maps=0)
+        )
+    with pytest.warns(
+        UserWarning,
+        match=r"^viewpoints: 100.0 % of the normals show all of them their back: are they in the frame",
+    ):
         gpureg.prepare(floor, normals=up, viewpoints=[[2, 2, -2]])
     # Map coordinates: the points are moved before the library sees them, and so are the viewpoints.
     far = np.array([5e5, 4e6, 100.0])
@@ -279,4 +328,6 @@ def test_viewpoints_that_cannot_be_what_a_cloud_was_seen_from():
         warnings.simplefilter("error")
         gpureg.prepare(floor + far, normals=up, viewpoints=[[2, 2, 2] + far])
     with pytest.warns(UserWarning, match=r"^clouds\[1\]: viewpoints: 100.0 %"):
-        gpureg.prepare_batch([gpureg.PointCloud(floor, normals=up, viewpoints=[[2, 2, side]]) for side in (2, -2)])
+        gpureg.prepare_batch(
+            [gpureg.PointCloud(floor, normals=up, viewpoints=[[2, 2, side]]) for side in (2, -2)]
+        )

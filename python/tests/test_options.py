@@ -4,10 +4,9 @@
 import copy
 import pickle
 
+import gpureg
 import numpy as np
 import pytest
-
-import gpureg
 
 CLASSES = [
     gpureg.PrepareOptions,
@@ -37,14 +36,34 @@ def test_common_face(cls):
 @pytest.mark.parametrize(
     ("cls", "field", "value", "message"),
     [
-        (gpureg.PrepareOptions, "voxel_size", "a", "PrepareOptions.voxel_size: expected a number, got 'a'"),
+        (
+            gpureg.PrepareOptions,
+            "voxel_size",
+            "a",
+            "PrepareOptions.voxel_size: expected a number, got 'a'",
+        ),
         (gpureg.PrepareOptions, "voxel_size", True, "expected a number, got True"),
-        (gpureg.HypothesisOptions, "proposal", "luck", "proposal: expected 'compatibility' or 'quadruples', got 'luck'"),
-        (gpureg.HypothesisOptions, "count", -1, "count: expected a whole number from 0 to 4294967295, got -1"),
+        (
+            gpureg.HypothesisOptions,
+            "proposal",
+            "luck",
+            "proposal: expected 'compatibility' or 'quadruples', got 'luck'",
+        ),
+        (
+            gpureg.HypothesisOptions,
+            "count",
+            -1,
+            "count: expected a whole number from 0 to 4294967295, got -1",
+        ),
         (gpureg.HypothesisOptions, "count", 2.5, "whole number"),
         (gpureg.HypothesisOptions, "seed", 2**64, "whole number from 0 to 18446744073709551615"),
         (gpureg.HypothesisOptions, "mutual", "yes", "mutual: expected True or False, got 'yes'"),
-        (gpureg.RegistrationOptions, "prepare", {}, "RegistrationOptions.prepare: expected PrepareOptions, got {}"),
+        (
+            gpureg.RegistrationOptions,
+            "prepare",
+            {},
+            "RegistrationOptions.prepare: expected PrepareOptions, got {}",
+        ),
     ],
 )
 def test_wrong_values_are_named(cls, field, value, message):
@@ -61,34 +80,134 @@ POINTS = [[0, 0, 0]]
 @pytest.mark.parametrize(
     ("call", "error", "message"),
     [
-        (lambda: FROM(0.05, -1), ValueError, "quality: expected a whole number from 0 to 10, got -1"),
-        (lambda: FROM(0.05, 2.5), TypeError, "quality: expected a whole number from 0 to 10, got 2.5"),
+        (
+            lambda: FROM(0.05, -1),
+            ValueError,
+            "quality: expected a whole number from 0 to 10, got -1",
+        ),
+        (
+            lambda: FROM(0.05, 2.5),
+            TypeError,
+            "quality: expected a whole number from 0 to 10, got 2.5",
+        ),
         (lambda: FROM([0.05]), TypeError, r"voxel_size: expected a number, got \[0.05\]"),
         (lambda: FROM(True), TypeError, "voxel_size: expected a number, got True"),
         (lambda: FROM(np.bool_(True)), TypeError, "voxel_size: expected a number, got (np.)?True"),
-        (lambda: FROM(list(range(10000))), TypeError, r"voxel_size: expected a number, got \[0, 1, .{1,80}\.\.\."),
-        (lambda: gpureg.RegistrationOptions().with_quality("5"), TypeError, "quality: expected .*, got '5'"),
-        (lambda: gpureg.RegistrationOptions.loopsmart("5"), TypeError, "voxel_size: expected a number, got '5'"),
-        (lambda: gpureg.AgreementOptions.from_voxel_size(None), TypeError, "voxel_size: expected a number, got None"),
-        (lambda: gpureg.PrepareOptions(0.05), TypeError, r"PrepareOptions: expected keywords, such as PrepareOptions\(voxel_size=...\), got 0.05"),
-        (lambda: gpureg.register(POINTS, POINTS, quality=-1), ValueError, "quality: expected .*, got -1"),
-        (lambda: gpureg.register(POINTS, POINTS, [0.05]), TypeError, r"voxel_size: expected a number, got \[0.05\]"),
-        (lambda: gpureg.register(POINTS, POINTS, np.ones(2)), TypeError, r"voxel_size: expected a number, got array\(\[1., 1.\]\)"),
-        (lambda: gpureg.register(POINTS, POINTS, True), TypeError, "voxel_size: expected a number, got True"),
-        (lambda: gpureg.register(POINTS, POINTS, time_budget_ms="5"), TypeError, "time_budget_ms: expected milliseconds, a number, got '5'"),
-        (lambda: gpureg.register(POINTS, POINTS, time_budget_ms=-5), ValueError, "time_budget_ms is -5, expected a number > 0"),
-        (lambda: gpureg.register(POINTS, POINTS, time_budget_ms=float("nan")), ValueError, "time_budget_ms is nan"),
-        (lambda: gpureg.Context.cpu(-1), ValueError, "threads: expected a whole number, 0 or more, got -1"),
-        (lambda: gpureg.Context.cpu(threads=1.5), TypeError, "threads: expected a whole number, 0 or more, got 1.5"),
-        (lambda: gpureg.Context.cuda("0"), TypeError, "device: expected a whole number, or a list of them, got '0'"),
-        (lambda: gpureg.Context.cuda(devices=["a"]), TypeError, r"devices: expected a list of whole numbers, got \['a'\]"),
-        (lambda: gpureg.Context.cuda(devices=[0], memory_budget=-1), ValueError, "memory_budget: expected bytes, 0 or more, got -1"),
-        (lambda: gpureg.Context.cuda([0], -1), ValueError, "memory_budget: expected bytes, 0 or more, got -1"),
-        (lambda: gpureg.Context.cuda(gpu=0), TypeError, "Context.cuda has no argument 'gpu'; it has device, or devices"),
-        (lambda: gpureg.RegistrationPrior(up=[0, 0, 1]), TypeError, "RegistrationPrior has no argument 'up'; it has source_up, target_up"),
-        (lambda: gpureg.RegistrationPrior(np.eye(4)), TypeError, "RegistrationPrior: expected keywords, such as"),
-        (lambda: gpureg.RegistrationPrior(source_up="up", target_up=[0, 0, 1]), TypeError, "source_up: expected an array of numbers, got 'up'"),
-        (lambda: gpureg.RegistrationPrior(max_angle="5"), TypeError, "max_angle: expected a number, got '5'"),
+        (
+            lambda: FROM(list(range(10000))),
+            TypeError,
+            r"voxel_size: expected a number, got \[0, 1, .{1,80}\.\.\.",
+        ),
+        (
+            lambda: gpureg.RegistrationOptions().with_quality("5"),
+            TypeError,
+            "quality: expected .*, got '5'",
+        ),
+        (
+            lambda: gpureg.RegistrationOptions.loopsmart("5"),
+            TypeError,
+            "voxel_size: expected a number, got '5'",
+        ),
+        (
+            lambda: gpureg.AgreementOptions.from_voxel_size(None),
+            TypeError,
+            "voxel_size: expected a number, got None",
+        ),
+        (
+            lambda: gpureg.PrepareOptions(0.05),
+            TypeError,
+            r"PrepareOptions: expected keywords, such as PrepareOptions\(voxel_size=...\), got 0.05",
+        ),
+        (
+            lambda: gpureg.register(POINTS, POINTS, quality=-1),
+            ValueError,
+            "quality: expected .*, got -1",
+        ),
+        (
+            lambda: gpureg.register(POINTS, POINTS, [0.05]),
+            TypeError,
+            r"voxel_size: expected a number, got \[0.05\]",
+        ),
+        (
+            lambda: gpureg.register(POINTS, POINTS, np.ones(2)),
+            TypeError,
+            r"voxel_size: expected a number, got array\(\[1., 1.\]\)",
+        ),
+        (
+            lambda: gpureg.register(POINTS, POINTS, True),
+            TypeError,
+            "voxel_size: expected a number, got True",
+        ),
+        (
+            lambda: gpureg.register(POINTS, POINTS, time_budget_ms="5"),
+            TypeError,
+            "time_budget_ms: expected milliseconds, a number, got '5'",
+        ),
+        (
+            lambda: gpureg.register(POINTS, POINTS, time_budget_ms=-5),
+            ValueError,
+            "time_budget_ms is -5, expected a number > 0",
+        ),
+        (
+            lambda: gpureg.register(POINTS, POINTS, time_budget_ms=float("nan")),
+            ValueError,
+            "time_budget_ms is nan",
+        ),
+        (
+            lambda: gpureg.Context.cpu(-1),
+            ValueError,
+            "threads: expected a whole number, 0 or more, got -1",
+        ),
+        (
+            lambda: gpureg.Context.cpu(threads=1.5),
+            TypeError,
+            "threads: expected a whole number, 0 or more, got 1.5",
+        ),
+        (
+            lambda: gpureg.Context.cuda("0"),
+            TypeError,
+            "device: expected a whole number, or a list of them, got '0'",
+        ),
+        (
+            lambda: gpureg.Context.cuda(devices=["a"]),
+            TypeError,
+            r"devices: expected a list of whole numbers, got \['a'\]",
+        ),
+        (
+            lambda: gpureg.Context.cuda(devices=[0], memory_budget=-1),
+            ValueError,
+            "memory_budget: expected bytes, 0 or more, got -1",
+        ),
+        (
+            lambda: gpureg.Context.cuda([0], -1),
+            ValueError,
+            "memory_budget: expected bytes, 0 or more, got -1",
+        ),
+        (
+            lambda: gpureg.Context.cuda(gpu=0),
+            TypeError,
+            "Context.cuda has no argument 'gpu'; it has device, or devices",
+        ),
+        (
+            lambda: gpureg.RegistrationPrior(up=[0, 0, 1]),
+            TypeError,
+            "RegistrationPrior has no argument 'up'; it has source_up, target_up",
+        ),
+        (
+            lambda: gpureg.RegistrationPrior(np.eye(4)),
+            TypeError,
+            "RegistrationPrior: expected keywords, such as",
+        ),
+        (
+            lambda: gpureg.RegistrationPrior(source_up="up", target_up=[0, 0, 1]),
+            TypeError,
+            "source_up: expected an array of numbers, got 'up'",
+        ),
+        (
+            lambda: gpureg.RegistrationPrior(max_angle="5"),
+            TypeError,
+            "max_angle: expected a number, got '5'",
+        ),
     ],
 )
 def test_wrong_arguments_are_named_in_one_line(call, error, message):
@@ -116,7 +235,9 @@ def test_nested_options_are_the_same_object():
 
 def test_presets():
     options = gpureg.RegistrationOptions.from_voxel_size(0.1)
-    assert options.prepare.normal_radius == 0.2 and options.score.max_correspondence_distance == 0.15
+    assert (
+        options.prepare.normal_radius == 0.2 and options.score.max_correspondence_distance == 0.15
+    )
     assert gpureg.RegistrationOptions.from_voxel_size(0.05) == gpureg.RegistrationOptions()
     assert gpureg.RegistrationOptions.loopsmart().refine.max_iterations == 0
     assert gpureg.RegistrationOptions.loopsmart(0.1).prepare.voxel_size == 0.1

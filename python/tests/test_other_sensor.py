@@ -1,19 +1,21 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """bench/accuracy/other_sensor.py: the same scene, worse by as much as was asked for."""
+
 import pathlib
 import subprocess
 import sys
 
+import gpureg
 import numpy as np
 import pytest
-
-import gpureg
 
 SCRIPT = pathlib.Path(__file__).resolve().parents[2] / "bench/accuracy/other_sensor.py"
 
 
 def run(*words):
-    return subprocess.run([sys.executable, SCRIPT, *map(str, words)], capture_output=True, text=True)
+    return subprocess.run(
+        [sys.executable, SCRIPT, *map(str, words)], capture_output=True, text=True
+    )
 
 
 @pytest.fixture
@@ -22,13 +24,20 @@ def scene(tmp_path):
     folder.mkdir()
     random = np.random.default_rng(3)
     for k in range(8):
-        gpureg.write_point_cloud(folder / f"cloud_bin_{k}.ply", random.uniform(-3, 3, (4000, 3)).astype(np.float32))
+        gpureg.write_point_cloud(
+            folder / f"cloud_bin_{k}.ply", random.uniform(-3, 3, (4000, 3)).astype(np.float32)
+        )
     (folder / "cameras.txt").write_text("0 0 0 0 0 0 0 0 1\n")
     return folder
 
 
 def points(folder):
-    return np.concatenate([np.asarray(gpureg.read_point_cloud(folder / f"cloud_bin_{k}.ply").points) for k in range(8)])
+    return np.concatenate(
+        [
+            np.asarray(gpureg.read_point_cloud(folder / f"cloud_bin_{k}.ply").points)
+            for k in range(8)
+        ]
+    )
 
 
 def test_moves_points_by_what_was_asked(scene, tmp_path):
@@ -65,8 +74,12 @@ def test_bumps_turn_what_drift_only_bends(scene, tmp_path):
 def test_holes_leave_the_rest_where_it_is(scene, tmp_path):
     assert run(scene, tmp_path / "holes", "--holes", 0.2).returncode == 0
     for k in range(8):
-        before, after = (np.asarray(gpureg.read_point_cloud(folder / f"cloud_bin_{k}.ply").points) for folder in (scene, tmp_path / "holes"))
-        # Balls drawn at random leave exp(-0.2) = 0.82, as they overlap; the last of them goes beyond what was asked for.
+        before, after = (
+            np.asarray(gpureg.read_point_cloud(folder / f"cloud_bin_{k}.ply").points)
+            for folder in (scene, tmp_path / "holes")
+        )
+        # Balls drawn at random leave exp(-0.2) = 0.82, as they overlap; the last of them goes
+        # beyond what was asked for.
         assert 0.79 < len(after) / len(before) < 0.84
         assert {tuple(p) for p in after} < {tuple(p) for p in before}
 
@@ -85,14 +98,21 @@ def test_flying_points_hang_towards_a_camera(scene, tmp_path):
 
 def test_same_seed_same_bytes(scene, tmp_path):
     for out, seed in (("a", 1), ("b", 1), ("c", 2)):
-        assert run(scene, tmp_path / out, "--drift", 0.01, "--noise", 0.01, "--seed", seed).returncode == 0
+        assert (
+            run(scene, tmp_path / out, "--drift", 0.01, "--noise", 0.01, "--seed", seed).returncode
+            == 0
+        )
     read = {out: (tmp_path / out / "cloud_bin_0.ply").read_bytes() for out in "abc"}
     assert read["a"] == read["b"] != read["c"]
 
 
 def test_says_what_is_wrong(scene, tmp_path):
     assert "no cloud_bin_<i>.ply" in run(tmp_path / "nothing", tmp_path / "out").stderr
-    assert "--holes is 1.0, not a share in [0, 1)" in run(scene, tmp_path / "out", "--holes", 1).stderr
+    assert (
+        "--holes is 1.0, not a share in [0, 1)" in run(scene, tmp_path / "out", "--holes", 1).stderr
+    )
     assert "is the scene itself" in run(scene, scene).stderr
-    (scene / "cloud_bin_0.ply").write_text("ply\nformat ascii 1.0\nelement vertex 0\nproperty float x\nend_header\n")
+    (scene / "cloud_bin_0.ply").write_text(
+        "ply\nformat ascii 1.0\nelement vertex 0\nproperty float x\nend_header\n"
+    )
     assert "not a binary PLY" in run(scene, tmp_path / "out").stderr

@@ -4,25 +4,26 @@
 import pathlib
 import sys
 
+import gpureg
 import numpy as np
 import pytest
 from scenes import few, moved, pose, room
 
-import gpureg
-
 pytest.importorskip("pyarrow")
 pytest.importorskip("faiss")
-from gpureg import pruning  # noqa: E402
+from gpureg import pruning
 
 sys.path.insert(0, str(pathlib.Path(__file__).parents[1] / "examples"))
-import many_fragments  # noqa: E402
+import many_fragments
 
 
 def test_descriptor_belongs_to_the_place_not_to_the_pose():
     clouds = [room(k % 3, 3000) for k in range(6)]
     clouds = [moved(cloud, pose(k)) for k, cloud in enumerate(clouds)]
     descriptors = pruning.describe_all(clouds)
-    assert descriptors.shape == (6, 64 * 33) and np.allclose(np.linalg.norm(descriptors, axis=1), 1, atol=1e-5)
+    assert descriptors.shape == (6, 64 * 33) and np.allclose(
+        np.linalg.norm(descriptors, axis=1), 1, atol=1e-5
+    )
     assert pruning.nearest_pairs(descriptors, 1).tolist() == [[0, 3], [1, 4], [2, 5]]
 
 
@@ -37,7 +38,9 @@ def test_same_candidates_again():
 
 def test_most_overlapping_pairs_are_kept():
     clouds, overlapping = many_fragments.make_fragments(120, seed=1)
-    pairs = pruning.Nearest(k=12, options=few(1, 0.12).prepare)(gpureg.FragmentSet.from_clouds(clouds))
+    pairs = pruning.Nearest(k=12, options=few(1, 0.12).prepare)(
+        gpureg.FragmentSet.from_clouds(clouds)
+    )
     report = pruning.measure(pairs, overlapping, len(clouds))
     # Twelve of 119 at random would keep less than a fifth.
     assert report.tried < 0.2 * report.pairs and report.recall > 0.7
@@ -62,6 +65,10 @@ def test_as_the_pairs_of_a_run(tmp_path):
     clouds, overlapping = many_fragments.make_fragments(20, seed=3)
     options = few(2000, 0.12)
     run = gpureg.register_all(
-        clouds, pruning.Nearest(k=3, options=options.prepare), output=tmp_path, options=options, progress=False
+        clouds,
+        pruning.Nearest(k=3, options=options.prepare),
+        output=tmp_path,
+        options=options,
+        progress=False,
     )
     assert 20 <= run.pairs <= 60

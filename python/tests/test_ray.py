@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A real Ray cluster on this machine: any number of actors, also dying ones, gives the table of one machine."""
+"""A real Ray cluster on this machine: any number of actors, also dying ones, gives the table of one
+machine.
+"""
 
 import os
 import pathlib
@@ -11,17 +13,22 @@ import pytest
 pytest.importorskip("pyarrow")
 ray = pytest.importorskip("ray")
 
-import many  # noqa: E402
-from scenes import few  # noqa: E402
-
-import gpureg  # noqa: E402
-import gpureg.ray  # noqa: E402
+import gpureg
+import gpureg.ray
+import many
+from scenes import few
 
 
 @pytest.fixture(scope="module", autouse=True)
 def cluster():
     paths = os.pathsep.join(p for p in sys.path if p)
-    ray.init(num_cpus=4, include_dashboard=False, configure_logging=False, log_to_driver=False, runtime_env={"env_vars": {"PYTHONPATH": paths}})
+    ray.init(
+        num_cpus=4,
+        include_dashboard=False,
+        configure_logging=False,
+        log_to_driver=False,
+        runtime_env={"env_vars": {"PYTHONPATH": paths}},
+    )
     yield
     ray.shutdown()
 
@@ -49,7 +56,9 @@ def test_any_number_of_actors(whole, tmp_path, actors):
 
 
 def workers():
-    """Process ids of the actors that are in the middle of a chunk: Ray writes that into their titles."""
+    """Process ids of the actors that are in the middle of a chunk: Ray writes that into their
+    titles.
+    """
     found = []
     for path in pathlib.Path("/proc").glob("[0-9]*/cmdline"):
         try:
@@ -71,7 +80,9 @@ def test_an_actor_is_killed_midway(whole, tmp_path):
                 os.kill(busy[0], signal.SIGKILL)
                 killed.append(busy[0])
 
-    run = gpureg.ray.register_all(clouds, output=tmp_path, actors=2, **{**keywords, "progress": progress})
+    run = gpureg.ray.register_all(
+        clouds, output=tmp_path, actors=2, **{**keywords, "progress": progress}
+    )
     assert killed
     assert files_of(run) == files_of(whole)
 

@@ -8,14 +8,13 @@ import signal
 import threading
 import time
 
+import gpureg
 import numpy as np
 import pytest
 from scenes import error_of, few, moved, pose, room
 
-import gpureg
-
-# Voxels of the moved cloud hold other points than those of the cloud at rest: centroids, and so the pose, differ by a
-# fraction of the voxel (5 cm).
+# Voxels of the moved cloud hold other points than those of the cloud at rest: centroids, and so the
+# pose, differ by a fraction of the voxel (5 cm).
 CLOSE = 0.02
 
 
@@ -32,7 +31,10 @@ def test_register_finds_the_pose(source, target, truth):
     assert error_of(result, truth) < CLOSE
     assert result.target_from_source.dtype == np.float64
     assert 0.4 < result.inlier_ratio <= 1 and 0 < result.inlier_rmse < 0.05
-    assert result.statistics.hypotheses == gpureg.RegistrationOptions.from_voxel_size(0.05, 2).compatibility.seeds
+    assert (
+        result.statistics.hypotheses
+        == gpureg.RegistrationOptions.from_voxel_size(0.05, 2).compatibility.seeds
+    )
     assert result.timings.total > 0
     assert repr(result).startswith("<gpureg.RegistrationResult aligned, score ")
 
@@ -41,20 +43,32 @@ def test_modes_say_what_speaks_for_them(source, target):
     result = gpureg.register(source, target)
     assert len(result.modes) > 1
     best, rival = result.modes[:2]
-    assert np.array_equal(best.target_from_source, result.target_from_source) and best.confidence == result.score
+    assert (
+        np.array_equal(best.target_from_source, result.target_from_source)
+        and best.confidence == result.score
+    )
     assert best.confidence >= rival.confidence and best.overlap_confidence <= best.confidence
     assert best.evidence.match_support > rival.evidence.match_support
-    assert len(best.evidence.stiffness) == 6 and best.evidence.stiffness == sorted(best.evidence.stiffness)
+    assert len(best.evidence.stiffness) == 6 and best.evidence.stiffness == sorted(
+        best.evidence.stiffness
+    )
     assert repr(best).startswith("<gpureg.RegistrationMode, confidence ")
-    paper = gpureg.align(gpureg.prepare(source), gpureg.prepare(target), options=gpureg.RegistrationOptions(
-        hypothesis=gpureg.HypothesisOptions(proposal="quadruples", count=20000)))
+    paper = gpureg.align(
+        gpureg.prepare(source),
+        gpureg.prepare(target),
+        options=gpureg.RegistrationOptions(
+            hypothesis=gpureg.HypothesisOptions(proposal="quadruples", count=20000)
+        ),
+    )
     assert paper.aligned and paper.modes == [] and paper.score == paper.inlier_ratio
 
 
 def test_register_equals_prepare_and_align(source, target):
     options = few()
     a, b = gpureg.prepare(source), gpureg.prepare(target)
-    assert bits(gpureg.register(source, target, options=options)) == bits(gpureg.align(a, b, options=options))
+    assert bits(gpureg.register(source, target, options=options)) == bits(
+        gpureg.align(a, b, options=options)
+    )
     both = gpureg.align_batch([a, b], [(0, 1), (1, 0)], options=options)
     assert bits(both[0]) == bits(gpureg.align(a, b, options=options))
     assert bits(both[1]) == bits(gpureg.align(b, a, options=options))
@@ -90,7 +104,9 @@ def test_own_features_and_correspondences(source, target, truth):
     a = gpureg.prepare(source, features=source, options=options.prepare)
     b = gpureg.prepare(target, features=source, options=options.prepare)
     assert a.feature_dimension == 3
-    assert error_of(gpureg.align(a, b, options=options), truth) < 1e-4  # the same points, in float32
+    assert (
+        error_of(gpureg.align(a, b, options=options), truth) < 1e-4
+    )  # the same points, in float32
     index = np.arange(len(a))
     result = gpureg.align(a, b, correspondences=np.stack([index, index], axis=1), options=options)
     assert error_of(result, truth) < 1e-4
@@ -124,7 +140,11 @@ def test_progress_counts_up(source):
     cloud = gpureg.prepare(source, context=context)
     seen = []
     gpureg.align_batch(
-        [cloud] * 3, [(0, 1)] * 20, options=few(500), context=context, progress=lambda *a: seen.append(a)
+        [cloud] * 3,
+        [(0, 1)] * 20,
+        options=few(500),
+        context=context,
+        progress=lambda *a: seen.append(a),
     )
     assert seen[0] == (0, 20) and seen[-1] == (20, 20) and seen == sorted(seen) and len(seen) > 3
 
@@ -135,7 +155,9 @@ def test_error_in_progress_comes_out(source):
             raise RuntimeError("no more")
 
     with pytest.raises(RuntimeError, match="no more"):
-        gpureg.align_batch([gpureg.prepare(source)], [(0, 0)] * 100, options=few(500), progress=progress)
+        gpureg.align_batch(
+            [gpureg.prepare(source)], [(0, 0)] * 100, options=few(500), progress=progress
+        )
 
 
 def test_ctrl_c_keeps_what_is_done(source):
@@ -183,7 +205,9 @@ def test_four_threads_get_right_results():
     def work(k):
         context = gpureg.Context.cpu(1) if k % 2 else None  # own contexts and the shared one
         for _ in range(3):
-            got[k] = gpureg.register(clouds[k], moved(clouds[k], poses[k]), options=few(5000), context=context)
+            got[k] = gpureg.register(
+                clouds[k], moved(clouds[k], poses[k]), options=few(5000), context=context
+            )
 
     threads = [threading.Thread(target=work, args=(k,)) for k in range(4)]
     for thread in threads:

@@ -11,9 +11,8 @@ import pkgutil
 import subprocess
 import sys
 
-import pytest
-
 import gpureg
+import pytest
 from gpureg import _core
 
 ROOT = pathlib.Path(__file__).parents[2]
@@ -48,12 +47,17 @@ def test_stub_has_the_fields_of_the_structs():
         fields = getattr(getattr(_core, name), "_fields", None)
         if fields is None:
             continue
-        declared = [n.target.id for n in node.body if isinstance(n, ast.AnnAssign) and n.target.id[0] != "_"]
+        declared = [
+            n.target.id for n in node.body if isinstance(n, ast.AnnAssign) and n.target.id[0] != "_"
+        ]
         methods = {n.name: n for n in node.body if isinstance(n, ast.FunctionDef)}
         if declared:  # options: attributes, constructor and replace agree
             assert declared == list(fields), name
             for method in ("__init__", "replace"):
-                assert [a.arg for a in methods[method].args.kwonlyargs] == list(fields), (name, method)
+                assert [a.arg for a in methods[method].args.kwonlyargs] == list(fields), (
+                    name,
+                    method,
+                )
         else:
             assert set(fields) <= set(methods), name
         checked += 1
@@ -62,9 +66,17 @@ def test_stub_has_the_fields_of_the_structs():
 
 def run(*arguments):
     # Not installed, but on the path: mypy has to be told.
-    folder = {} if "site-packages" in str(PACKAGE) else {"MYPYPATH": str(PACKAGE.parent), "PYTHONPATH": str(PACKAGE.parent)}
+    folder = (
+        {}
+        if "site-packages" in str(PACKAGE)
+        else {"MYPYPATH": str(PACKAGE.parent), "PYTHONPATH": str(PACKAGE.parent)}
+    )
     done = subprocess.run(
-        [sys.executable, "-m", *arguments], capture_output=True, text=True, cwd="/", env={**os.environ, **folder}
+        [sys.executable, "-m", *arguments],
+        capture_output=True,
+        text=True,
+        cwd="/",
+        env={**os.environ, **folder},
     )
     assert done.returncode == 0, done.stdout + done.stderr
 
@@ -72,9 +84,20 @@ def run(*arguments):
 def test_stubtest(tmp_path):
     pytest.importorskip("mypy")
     # pybind11's metaclass, and constructors that only raise: neither is part of the face.
-    allowed = [r"gpureg\._core\.[A-Za-z]+", r"gpureg\._core\.(?!\w*Options|PointCloud)\w+\.__init__"]
+    allowed = [
+        r"gpureg\._core\.[A-Za-z]+",
+        r"gpureg\._core\.(?!\w*Options|PointCloud)\w+\.__init__",
+    ]
     (tmp_path / "allowed").write_text("\n".join(allowed))
-    run("mypy.stubtest", "gpureg._core", "--allowlist", str(tmp_path / "allowed"), "--ignore-unused-allowlist", "--mypy-config-file", str(ROOT / "pyproject.toml"))
+    run(
+        "mypy.stubtest",
+        "gpureg._core",
+        "--allowlist",
+        str(tmp_path / "allowed"),
+        "--ignore-unused-allowlist",
+        "--mypy-config-file",
+        str(ROOT / "pyproject.toml"),
+    )
 
 
 def test_mypy_strict():

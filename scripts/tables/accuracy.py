@@ -1,33 +1,43 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Tables of recall, precision and confidence."""
+
 import json
 
 from tables.records import RESULTS, load, mean, percent, source
 
 
 def redkitchen():
-    rows = ["| preset | right when every best candidate is reported | reported: recall / precision | recall at precision >= 95 % | average precision |",
-            "| --- | --- | --- | --- | --- |"]
+    rows = [
+        "| preset | right when every best candidate is reported | reported: recall / precision | recall at precision >= 95 % | average precision |",
+        "| --- | --- | --- | --- | --- |",
+    ]
     sources = []
     for file in sorted(RESULTS.glob("redkitchen_*.json"), reverse=True):
         record = json.loads(file.read_text())
         strict = [run["evaluate"]["strict"] for run in record["runs"]]
-        rows.append(f"| `{record['preset']}` | {percent(mean(s['raw_recall'] for s in strict))} % | {percent(mean(s['recall'] for s in strict))} / "
-                    f"{percent(mean(s['precision'] for s in strict))} % | {percent(mean(s['recall_at_precision']['95'] for s in strict))} % | "
-                    f"{percent(mean(s['average_precision'] for s in strict))} % |")
+        rows.append(
+            f"| `{record['preset']}` | {percent(mean(s['raw_recall'] for s in strict))} % | {percent(mean(s['recall'] for s in strict))} / "
+            f"{percent(mean(s['precision'] for s in strict))} % | {percent(mean(s['recall_at_precision']['95'] for s in strict))} % | "
+            f"{percent(mean(s['average_precision'] for s in strict))} % |"
+        )
         sources.append(source(record))
     return rows + ["", *[line + "." for line in sources]]
 
 
 def redkitchen_seeds():
-    rows = ["| preset | seed | right, best candidates | reported recall | precision | geometric precision |", "| --- | --- | --- | --- | --- | --- |"]
+    rows = [
+        "| preset | seed | right, best candidates | reported recall | precision | geometric precision |",
+        "| --- | --- | --- | --- | --- | --- |",
+    ]
     for file in sorted(RESULTS.glob("redkitchen_*.json"), reverse=True):
         record = json.loads(file.read_text())
         for run in record["runs"]:
             strict, geometric = run["evaluate"]["strict"], run["evaluate"]["geometric"]
-            rows.append(f"| `{record['preset']}` | {run['seed']} | {percent(strict['raw_recall'])} % | {percent(strict['recall'])} % "
-                        f"({strict['good_recall']} of {strict['ground_truth']}) | {percent(strict['precision'])} % ({strict['good']} of "
-                        f"{strict['reported']}) | {percent(geometric['precision'])} % |")
+            rows.append(
+                f"| `{record['preset']}` | {run['seed']} | {percent(strict['raw_recall'])} % | {percent(strict['recall'])} % "
+                f"({strict['good_recall']} of {strict['ground_truth']}) | {percent(strict['precision'])} % ({strict['good']} of "
+                f"{strict['reported']}) | {percent(geometric['precision'])} % |"
+            )
     return rows
 
 
@@ -37,10 +47,14 @@ def range_pairs():
     for file in sorted(RESULTS.glob("range_pairs*.json")):
         record = json.loads(file.read_text())
         runs = record["runs"]
-        below = " / ".join(f"{mean(run[f'below_{bound}'] for run in runs):.2f}" for bound in (0.01, 0.02, 0.05))
+        below = " / ".join(
+            f"{mean(run[f'below_{bound}'] for run in runs):.2f}" for bound in (0.01, 0.02, 0.05)
+        )
         best.append(mean(run["rmse_mean_of_truth"] for run in runs))
-        rows.append(f"| gpureg, default options, voxel {record['options']['prepare']['voxel_size']:g} | {mean(run['rmse_mean'] for run in runs):.4f} / "
-                    f"{max(run['rmse_max'] for run in runs):.4f} | {below} |")
+        rows.append(
+            f"| gpureg, default options, voxel {record['options']['prepare']['voxel_size']:g} | {mean(run['rmse_mean'] for run in runs):.4f} / "
+            f"{max(run['rmse_max'] for run in runs):.4f} | {below} |"
+        )
         sources.append(source(record) + ".")
     rows.append("| Fast Global Registration, as published | 0.0104 / 0.0193 | 0.60 / 1.00 / 1.00 |")
     return rows + [f"| (the ground truth itself) | {best[0]:.4f} | |", "", *sources]
@@ -51,9 +65,13 @@ def other_pairs():
     rows = ["| pair | seed | status | off by |", "| --- | --- | --- | --- |"]
     for run in record["lidar"]:
         what = "refined" if run["refined"] else "before refinement"
-        rows.append(f"| LiDAR, {what} | {run['seed']} | {run['status']} | {run['metres']:.3f} m, {run['degrees']:.2f} deg |")
+        rows.append(
+            f"| LiDAR, {what} | {run['seed']} | {run['status']} | {run['metres']:.3f} m, {run['degrees']:.2f} deg |"
+        )
     for run in record["redwood_sample"]:
-        rows.append(f"| Redwood's sample fragments | {run['seed']} | {run['status']} | confidence {run['score']:.2f} (no ground truth) |")
+        rows.append(
+            f"| Redwood's sample fragments | {run['seed']} | {run['status']} | confidence {run['score']:.2f} (no ground truth) |"
+        )
     return rows + ["", source(record) + "."]
 
 
@@ -63,17 +81,34 @@ def tested():
 
 
 def confidence():
-    """Fits that have not seen the building they are tested on; means over the runs (seeds) of each scene."""
+    """Fits that have not seen the building they are tested on; means over the runs (seeds) of each
+    scene.
+    """
     groups = {}
     for run in tested():
         groups.setdefault((run["viewpoints"], run["model"], run["scene"]), []).append(run)
-    out = ["| viewpoints | looks at | scene | runs | found among the modes / best, % | geometric R@P95 / R@P99 / AP, % | strict R@P95 / AP, % | ECE | right above 0.9, % |",
-           "| --- | --- | --- | --- | --- | --- | --- | --- | --- |"]
-    looks = {"everything": "free space, fronts", "fronts": "fronts", "free_space": "free space", "neither": "neither"}
-    for (viewpoints, model, scene), runs in sorted(groups.items(), key=lambda group: (["known", "origin", "unknown"].index(group[0][0]), list(looks).index(group[0][1]))):
+    out = [
+        "| viewpoints | looks at | scene | runs | found among the modes / best, % | geometric R@P95 / R@P99 / AP, % | strict R@P95 / AP, % | ECE | right above 0.9, % |",
+        "| --- | --- | --- | --- | --- | --- | --- | --- | --- |",
+    ]
+    looks = {
+        "everything": "free space, fronts",
+        "fronts": "fronts",
+        "free_space": "free space",
+        "neither": "neither",
+    }
+    for (viewpoints, model, scene), runs in sorted(
+        groups.items(),
+        key=lambda group: (
+            ["known", "origin", "unknown"].index(group[0][0]),
+            list(looks).index(group[0][1]),
+        ),
+    ):
         of = lambda key: mean(run[key] for run in runs)  # noqa: B023,E731
-        out.append(f"| {'the origin' if viewpoints == 'origin' else viewpoints} | {looks[model]} | {scene} | {len(runs)} | {of('generated'):.1f} / {of('raw'):.1f} | {of('geo_R@P95'):.1f} / "
-                   f"{of('geo_R@P99'):.1f} / {of('geo_AP'):.1f} | {of('strict_R@P95'):.1f} / {of('strict_AP'):.1f} | {of('ECE'):.3f} | {of('right_above_0.9'):.1f} |")
+        out.append(
+            f"| {'the origin' if viewpoints == 'origin' else viewpoints} | {looks[model]} | {scene} | {len(runs)} | {of('generated'):.1f} / {of('raw'):.1f} | {of('geo_R@P95'):.1f} / "
+            f"{of('geo_R@P99'):.1f} / {of('geo_AP'):.1f} | {of('strict_R@P95'):.1f} / {of('strict_AP'):.1f} | {of('ECE'):.3f} | {of('right_above_0.9'):.1f} |"
+        )
     return out
 
 
@@ -81,13 +116,22 @@ def unseen():
     """The same in short: what is shipped, in the simulated buildings."""
     groups = {}
     for run in tested():
-        if run["model"] == ("fronts" if run["viewpoints"] == "unknown" else "everything") and "kitchen" not in run["scene"]:
+        if (
+            run["model"] == ("fronts" if run["viewpoints"] == "unknown" else "everything")
+            and "kitchen" not in run["scene"]
+        ):
             groups.setdefault(run["viewpoints"], {}).setdefault(run["scene"], []).append(run)
     scenes = list(groups["known"])
     out = [f"| viewpoints | {' | '.join(scenes)} |", "| --- |" + " --- |" * len(scenes)]
     names = {"known": "known", "origin": "the origin only", "unknown": "none"}
     for viewpoints, of in groups.items():
-        cells = [" / ".join(f"{mean(run[key] for run in of[scene]):.1f}" for key in ("raw", "geo_R@P95", "geo_R@P99")) for scene in scenes]
+        cells = [
+            " / ".join(
+                f"{mean(run[key] for run in of[scene]):.1f}"
+                for key in ("raw", "geo_R@P95", "geo_R@P99")
+            )
+            for scene in scenes
+        ]
         out.append(f"| {names[viewpoints]} | {' | '.join(cells)} |")
     return out
 
@@ -98,77 +142,132 @@ def other_sensors():
     for run in load("confidence.json")["runs"]:
         if run["model"] == "everything" and run["viewpoints"] == "known":
             groups.setdefault(run.get("label", "as they are"), []).append(run)
-    out = ["| | scenes | best right, % | geometric R@P95 / R@P99, % | ECE | above 0.5, wrong of them | right above 0.9, % |", "| --- | --- | --- | --- | --- | --- | --- |"]
+    out = [
+        "| | scenes | best right, % | geometric R@P95 / R@P99, % | ECE | above 0.5, wrong of them | right above 0.9, % |",
+        "| --- | --- | --- | --- | --- | --- | --- |",
+    ]
     for label, runs in groups.items():
         runs = [run for run in runs if "kitchen" not in run["scene"]]
         scenes = list(dict.fromkeys(run["scene"] for run in runs))
         of = lambda key: mean(run[key] for run in runs)  # noqa: B023,E731
         reports = mean(run["above_half"]["reports"] for run in runs)
-        wrong = mean(sum(v for key, v in run["above_half"].items() if key != "reports") for run in runs)
+        wrong = mean(
+            sum(v for key, v in run["above_half"].items() if key != "reports") for run in runs
+        )
         buildings = len({scene.split("/")[0] for scene in scenes})
-        text = ", ".join(scenes) if len(scenes) < 4 else f"{buildings} buildings" + (f", {len(scenes)} walks" if len(scenes) > buildings else "")
-        out.append(f"| {label} | {text} | {of('raw'):.1f} | {of('geo_R@P95'):.1f} / {of('geo_R@P99'):.1f} | {of('ECE'):.3f} | {reports:.0f}, {wrong:.1f} | "
-                   f"{of('right_above_0.9'):.1f} |")
+        text = (
+            ", ".join(scenes)
+            if len(scenes) < 4
+            else f"{buildings} buildings"
+            + (f", {len(scenes)} walks" if len(scenes) > buildings else "")
+        )
+        out.append(
+            f"| {label} | {text} | {of('raw'):.1f} | {of('geo_R@P95'):.1f} / {of('geo_R@P99'):.1f} | {of('ECE'):.3f} | {reports:.0f}, {wrong:.1f} | "
+            f"{of('right_above_0.9'):.1f} |"
+        )
     return out
 
 
 def mistakes():
-    """What the wrong reports of the fits that have not seen the building are; means over the runs of each scene."""
+    """What the wrong reports of the fits that have not seen the building are; means over the runs
+    of each scene.
+    """
     groups = {}
     for run in tested():
         if run["model"] == "everything" and run["viewpoints"] == "known" and "above_half" in run:
             groups.setdefault(run["scene"], []).append(run["above_half"])
-    out = ["| scene | reports above 0.5 | wrong by the 0.2 m rule | of them right by the trajectories, but not in gt_all | less than 5 deg and 0.3 m off | slid, less than 10 deg "
-           "| turned: another place that looks alike |", "| --- | --- | --- | --- | --- | --- | --- |"]
+    out = [
+        "| scene | reports above 0.5 | wrong by the 0.2 m rule | of them right by the trajectories, but not in gt_all | less than 5 deg and 0.3 m off | slid, less than 10 deg "
+        "| turned: another place that looks alike |",
+        "| --- | --- | --- | --- | --- | --- | --- |",
+    ]
     for scene, runs in groups.items():
-        of = {key: mean(run[key] for run in runs) for key in ("reports", "unlisted", "near", "slid", "turned")}
+        of = {
+            key: mean(run[key] for run in runs)
+            for key in ("reports", "unlisted", "near", "slid", "turned")
+        }
         wrong = sum(of.values()) - of["reports"]
-        out.append(f"| {scene} | {of['reports']:.1f} | {wrong:.1f} | {of['unlisted']:.1f} | {of['near']:.1f} | {of['slid']:.1f} | {of['turned']:.1f} |")
+        out.append(
+            f"| {scene} | {of['reports']:.1f} | {wrong:.1f} | {of['unlisted']:.1f} | {of['near']:.1f} | {of['slid']:.1f} | {of['turned']:.1f} |"
+        )
     return out
 
 
 def agreement():
     record = load("agreement.json")
-    out = ["| scene | | best right, % | R@P95 / R@P99 / AP, % | ECE | above 0.9 | of them right, % |", "| --- | --- | --- | --- | --- | --- | --- |"]
+    out = [
+        "| scene | | best right, % | R@P95 / R@P99 / AP, % | ECE | above 0.9 | of them right, % |",
+        "| --- | --- | --- | --- | --- | --- | --- |",
+    ]
     for scene in record["scenes"]:
         for text, of in (("each pair alone", scene["before"]), ("with agreement", scene["after"])):
-            out.append(f"| {scene['scene']} | {text} | {of['raw_recall']:.1f} | {of['R@P95']:.1f} / {of['R@P99']:.1f} / {of['AP']:.1f} | "
-                       f"{of['calibration_error']:.3f} | {of['above_0.9']} | {of['right_above_0.9']:.1f} |")
+            out.append(
+                f"| {scene['scene']} | {text} | {of['raw_recall']:.1f} | {of['R@P95']:.1f} / {of['R@P99']:.1f} / {of['AP']:.1f} | "
+                f"{of['calibration_error']:.3f} | {of['above_0.9']} | {of['right_above_0.9']:.1f} |"
+            )
     return out
 
 
 def few_points():
     record = load("few_points.json")
-    out = ["| points that touch | poses | confidence before | right | confidence |", "| --- | --- | --- | --- | --- |"]
+    out = [
+        "| points that touch | poses | confidence before | right | confidence |",
+        "| --- | --- | --- | --- | --- |",
+    ]
     for b in record["bins"]:
         span = f"{b['from']} to {b['below'] - 1}" if b["below"] else f"{b['from']} or more"
-        out.append(f"| {span} | {b['poses']} | {b['before']:.2f} | {b['right']:.2f} | {b['after']:.2f} |")
+        out.append(
+            f"| {span} | {b['poses']} | {b['before']:.2f} | {b['right']:.2f} | {b['after']:.2f} |"
+        )
     return [*out, "", source(record) + "."]
 
 
 def closing_loops():
-    out = ["| scene | loops of three right poses | of them close, % | loops with a wrong pose | of them close, % |", "| --- | --- | --- | --- | --- |"]
+    out = [
+        "| scene | loops of three right poses | of them close, % | loops with a wrong pose | of them close, % |",
+        "| --- | --- | --- | --- | --- |",
+    ]
     for scene in load("agreement.json")["scenes"]:
-        cells = [f"{count} | {100 * close / count:.1f}" if count else "0 |" for count, close in (scene["loops"]["right"], scene["loops"]["wrong"])]
+        cells = [
+            f"{count} | {100 * close / count:.1f}" if count else "0 |"
+            for count, close in (scene["loops"]["right"], scene["loops"]["wrong"])
+        ]
         out.append(f"| {scene['scene']} | {' | '.join(cells)} |")
     return out
 
 
 def agreement_fresh():
     record = load("agreement_fresh.json")
-    out = ["| scene | best right, % | R@P95, % | R@P99, % | ECE | right above 0.9, % |", "| --- | --- | --- | --- | --- | --- |"]
+    out = [
+        "| scene | best right, % | R@P95, % | R@P99, % | ECE | right above 0.9, % |",
+        "| --- | --- | --- | --- | --- | --- |",
+    ]
     for scene in record["scenes"]:
-        of = lambda key, digits: f"{scene['before'][key]:.{digits}f} -> {scene['after'][key]:.{digits}f}"  # noqa: B023,E731
-        out.append(f"| {scene['scene']} | {of('raw_recall', 1)} | {of('R@P95', 1)} | {of('R@P99', 1)} | {of('calibration_error', 3)} | {of('right_above_0.9', 1)} |")
+
+        def of(key, digits):
+            return f"{scene['before'][key]:.{digits}f} -> {scene['after'][key]:.{digits}f}"  # noqa: B023
+
+        out.append(
+            f"| {scene['scene']} | {of('raw_recall', 1)} | {of('R@P95', 1)} | {of('R@P99', 1)} | {of('calibration_error', 3)} | {of('right_above_0.9', 1)} |"
+        )
     return out
 
 
 def accuracy_sweep():
     record = load("accuracy_sweep.json")
     scenes = [key for key in record["rows"][0] if key != "setting"]
-    return [f"| setting | {' | '.join(scenes)} |", "| --- |" + " --- |" * len(scenes),
-            *[f"| {row['setting']} | " + " | ".join(" / ".join(f"{v:.1f}" for v in row[s]) for s in scenes) + " |" for row in record["rows"]],
-            "", f"Seeds {' and '.join(map(str, record['seeds']))} at commit {record['commit']}, with the confidence shipped there."]
+    return [
+        f"| setting | {' | '.join(scenes)} |",
+        "| --- |" + " --- |" * len(scenes),
+        *[
+            f"| {row['setting']} | "
+            + " | ".join(" / ".join(f"{v:.1f}" for v in row[s]) for s in scenes)
+            + " |"
+            for row in record["rows"]
+        ],
+        "",
+        f"Seeds {' and '.join(map(str, record['seeds']))} at commit {record['commit']}, with the confidence shipped there.",
+    ]
 
 
 def accuracy_attempts():
@@ -182,7 +281,18 @@ def accuracy_attempts():
 
 
 TABLES = {
-    "redkitchen": redkitchen, "redkitchen_seeds": redkitchen_seeds, "range_pairs": range_pairs,
-    "other_pairs": other_pairs, "confidence": confidence, "unseen": unseen, "other_sensors": other_sensors, "mistakes": mistakes, "agreement": agreement, "agreement_fresh": agreement_fresh, "closing_loops": closing_loops, "few_points": few_points, "accuracy_sweep": accuracy_sweep,
+    "redkitchen": redkitchen,
+    "redkitchen_seeds": redkitchen_seeds,
+    "range_pairs": range_pairs,
+    "other_pairs": other_pairs,
+    "confidence": confidence,
+    "unseen": unseen,
+    "other_sensors": other_sensors,
+    "mistakes": mistakes,
+    "agreement": agreement,
+    "agreement_fresh": agreement_fresh,
+    "closing_loops": closing_loops,
+    "few_points": few_points,
+    "accuracy_sweep": accuracy_sweep,
     "accuracy_attempts": accuracy_attempts,
 }

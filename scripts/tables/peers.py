@@ -1,12 +1,17 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Tables beside other methods."""
+
 from tables.records import benchmarks, load, mean, percent, source
 
 PEER_SCENES = {"peers_redkitchen.json": "red kitchen", "peers_house_a.json": "house A"}
 
 
 def peer_label(entry):
-    return f"{entry['label']} {entry['version']}" if not entry["label"].startswith("gpureg") else entry["label"]
+    return (
+        f"{entry['label']} {entry['version']}"
+        if not entry["label"].startswith("gpureg")
+        else entry["label"]
+    )
 
 
 def made_with(record):
@@ -18,8 +23,15 @@ def made_with(record):
 def peers():
     """Both scenes side by side; only what places a cloud globally."""
     records = [load(name) for name in PEER_SCENES]
-    rows = ["| method | " + " | ".join(f"{scene}: right, % | recall at precision >= 95 %: strict, geometric | processor ms a pair" for scene in PEER_SCENES.values()) + " |",
-            "| --- |" + " --- | --- | --- |" * len(records)]
+    rows = [
+        "| method | "
+        + " | ".join(
+            f"{scene}: right, % | recall at precision >= 95 %: strict, geometric | processor ms a pair"
+            for scene in PEER_SCENES.values()
+        )
+        + " |",
+        "| --- |" + " --- | --- | --- |" * len(records),
+    ]
     for name, entry in records[0]["methods"].items():
         if entry["refines"]:
             continue
@@ -29,31 +41,50 @@ def peers():
             if own is None:
                 cells += ["", "", ""]
                 continue
-            cells += [percent(own["strict"]["raw_recall"]), f"{percent(own['strict']['recall_at_precision']['95'])}, "
-                      f"{percent(own['geometric']['recall_at_precision']['95'])}", f"{own['processor_ms_per_pair']:.0f}"]
+            cells += [
+                percent(own["strict"]["raw_recall"]),
+                f"{percent(own['strict']['recall_at_precision']['95'])}, "
+                f"{percent(own['geometric']['recall_at_precision']['95'])}",
+                f"{own['processor_ms_per_pair']:.0f}",
+            ]
         rows.append(f"| {peer_label(entry)} | " + " | ".join(cells) + " |")
     devices = [benchmarks(), benchmarks("pipeline_h200_house_a.json")]
     for preset in ("default", "loopsmart"):
         cells = []
         for _, runs in devices:
-            cells += ["as above", "as above", f"{runs[f'align_many/cuda_{preset}/11']['ms_per_pair']:.2f} (device)"]
-        rows.append(f"| gpureg `{preset}`, {devices[0][0]['gpu'].rsplit(' ', 1)[0]}, in a batch | " + " | ".join(cells) + " |")
+            cells += [
+                "as above",
+                "as above",
+                f"{runs[f'align_many/cuda_{preset}/11']['ms_per_pair']:.2f} (device)",
+            ]
+        rows.append(
+            f"| gpureg `{preset}`, {devices[0][0]['gpu'].rsplit(' ', 1)[0]}, in a batch | "
+            + " | ".join(cells)
+            + " |"
+        )
     commits = sorted({context["commit"] for context, _ in devices})
-    return rows + ["", *[made_with(record) for record in records],
-                   f"The device's times: `gpureg_pipeline_bench` on all pairs at commit {', '.join(commits)}, on another machine, so no ratio is meant."]
+    return rows + [
+        "",
+        *[made_with(record) for record in records],
+        f"The device's times: `gpureg_pipeline_bench` on all pairs at commit {', '.join(commits)}, on another machine, so no ratio is meant.",
+    ]
 
 
 def peers_of(file):
     record = load(file)
     base = record["methods"]["gpureg_default"]["processor_ms_per_pair"]
-    rows = ["| method | right, % | recall / precision, % | R@P95, % | AP, % | geometric R@P95, % | ms a fragment | ms a pair | processor ms a pair | of gpureg's | peak MiB |",
-            "| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |"]
+    rows = [
+        "| method | right, % | recall / precision, % | R@P95, % | AP, % | geometric R@P95, % | ms a fragment | ms a pair | processor ms a pair | of gpureg's | peak MiB |",
+        "| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |",
+    ]
     for entry in record["methods"].values():
         strict = entry["strict"]
         prepared = f"{entry['ms_per_fragment']:.0f}" if entry["ms_per_fragment"] >= 0.5 else "-"
-        rows.append(f"| {peer_label(entry)} | {percent(strict['raw_recall'])} | {percent(strict['recall'])} / {percent(strict['precision'])} | "
-                    f"{percent(strict['recall_at_precision']['95'])} | {percent(strict['average_precision'])} | {percent(entry['geometric']['recall_at_precision']['95'])} | "
-                    f"{prepared} | {entry['ms_per_pair']:.0f} | {entry['processor_ms_per_pair']:.0f} | {entry['processor_ms_per_pair'] / base:.2f} | {entry['peak_memory_mib']} |")
+        rows.append(
+            f"| {peer_label(entry)} | {percent(strict['raw_recall'])} | {percent(strict['recall'])} / {percent(strict['precision'])} | "
+            f"{percent(strict['recall_at_precision']['95'])} | {percent(strict['average_precision'])} | {percent(entry['geometric']['recall_at_precision']['95'])} | "
+            f"{prepared} | {entry['ms_per_pair']:.0f} | {entry['processor_ms_per_pair']:.0f} | {entry['processor_ms_per_pair'] / base:.2f} | {entry['peak_memory_mib']} |"
+        )
     return rows + ["", f"{record['chosen'][0].upper()}{record['chosen'][1:]}.", made_with(record)]
 
 
@@ -69,7 +100,8 @@ def peer_parameters():
     record = load("peers_redkitchen.json")
     return ["| method | parameters | reported from |", "| --- | --- | --- |"] + [
         f"| {peer_label(e)} | {e['parameters']} | {'its own confidence' if e['threshold'] is None and not e['refines'] else '' if e['threshold'] is None else format(e['threshold'], 'g')} |"
-        for e in record["methods"].values()]
+        for e in record["methods"].values()
+    ]
 
 
 def fgr():
@@ -77,32 +109,61 @@ def fgr():
     rows = ["| method | RMSE, mean / max | pairs below .01 / .02 / .05 |", "| --- | --- | --- |"]
     for entry in record["methods"].values():
         lost = f"; {entry['without_pose']} without a pose" if entry["without_pose"] else ""
-        rows.append(f"| {peer_label(entry)} | {entry['rmse_mean']:.4f} / {entry['rmse_max']:.4f} | " + " / ".join(f"{entry[f'below_{b}']:.2f}" for b in ("0.01", "0.02", "0.05")) + f"{lost} |")
+        rows.append(
+            f"| {peer_label(entry)} | {entry['rmse_mean']:.4f} / {entry['rmse_max']:.4f} | "
+            + " / ".join(f"{entry[f'below_{b}']:.2f}" for b in ("0.01", "0.02", "0.05"))
+            + f"{lost} |"
+        )
     for row in record["published"]:
         shares = " / ".join("-" if share is None else f"{share:.2f}" for share in row["below"])
-        rows.append(f"| *{row['label']}* | {row['rmse_mean']:.4f} / {row['rmse_max']:.4f} | {shares} |")
-    return rows + [f"| *(the ground truth itself)* | {record['rmse_of_truth']:.4f} | |", "", source(record) + "."]
+        rows.append(
+            f"| *{row['label']}* | {row['rmse_mean']:.4f} / {row['rmse_max']:.4f} | {shares} |"
+        )
+    return rows + [
+        f"| *(the ground truth itself)* | {record['rmse_of_truth']:.4f} | |",
+        "",
+        source(record) + ".",
+    ]
 
 
 def redwood():
     """The paper's table of the committed record."""
     record = load("redwood.json")
     names = [scene["name"] for scene in record["scenes"]]
-    rows = ["| method | " + " | ".join(f"{name}: recall / precision, %" for name in names) + " | geometric precision, % | registration recall, 3DMatch / 3DLoMatch, % |",
-            "| --- |" + " --- |" * (len(names) + 2)]
+    rows = [
+        "| method | "
+        + " | ".join(f"{name}: recall / precision, %" for name in names)
+        + " | geometric precision, % | registration recall, 3DMatch / 3DLoMatch, % |",
+        "| --- |" + " --- |" * (len(names) + 2),
+    ]
     for method in record["methods"]:
         means = [method["scenes"][name]["mean"] for name in names]
 
         def pm(entry):
-            return percent(entry["mean"]) + (f" ± {100 * entry['stdev']:.1f}" if entry["stdev"] else "")
+            return percent(entry["mean"]) + (
+                f" ± {100 * entry['stdev']:.1f}" if entry["stdev"] else ""
+            )
+
         recalls = {log: value for m in means for log, value in m["registration_recall"].items()}
-        registration = " / ".join(percent(recalls[log]["mean"]) if log in recalls else "-" for log in ("official_3dmatch_gt.log", "official_3dlomatch_gt.log"))
-        rows.append(f"| {method['label']} | " + " | ".join(f"{pm(m['strict']['recall'])} / {pm(m['strict']['precision'])}" for m in means) +
-                    f" | {percent(mean(m['geometric']['precision']['mean'] for m in means))} | {registration} |")
+        registration = " / ".join(
+            percent(recalls[log]["mean"]) if log in recalls else "-"
+            for log in ("official_3dmatch_gt.log", "official_3dlomatch_gt.log")
+        )
+        rows.append(
+            f"| {method['label']} | "
+            + " | ".join(
+                f"{pm(m['strict']['recall'])} / {pm(m['strict']['precision'])}" for m in means
+            )
+            + f" | {percent(mean(m['geometric']['precision']['mean'] for m in means))} | {registration} |"
+        )
     return rows + ["", source(record) + f"; seeds {', '.join(map(str, record['seeds']))}."]
 
 
 TABLES = {
-    "peers": peers, "peers_redkitchen": peers_redkitchen, "peers_house": peers_house,
-    "peer_parameters": peer_parameters, "fgr": fgr, "redwood": redwood,
+    "peers": peers,
+    "peers_redkitchen": peers_redkitchen,
+    "peers_house": peers_house,
+    "peer_parameters": peer_parameters,
+    "fgr": fgr,
+    "redwood": redwood,
 }

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """What the tables read: the records in bench/results."""
+
 import json
 import pathlib
 import statistics
@@ -26,12 +27,17 @@ def source(record):
 def benchmarks(file="pipeline_h200.json"):
     """Context and runs by name; of a benchmark that was repeated, the median."""
     record = load(file)
-    runs = {run["name"].split("/real_time")[0].split("/iterations")[0]: run for run in record["benchmarks"]
-            if run.get("aggregate_name", "median") == "median"}
+    runs = {
+        run["name"].split("/real_time")[0].split("/iterations")[0]: run
+        for run in record["benchmarks"]
+        if run.get("aggregate_name", "median") == "median"
+    }
     return record["context"], runs
 
 
 def made_by(context):
     gpus = int(context.get("gpus", 1))
-    return (f"Made by `scripts/gpu_check` at commit {context['commit']} on {'an' if gpus == 1 else f'one of {gpus}'} {context['gpu']}"
-            f" and {context['num_cpus']} cores of its host.")
+    return (
+        f"Made by `scripts/gpu_check` at commit {context['commit']} on {'an' if gpus == 1 else f'one of {gpus}'} {context['gpu']}"
+        f" and {context['num_cpus']} cores of its host."
+    )

@@ -6,12 +6,14 @@
 
 namespace gpureg {
 
-/// Integer cell of a regular grid, and its packing into one sortable word: z, y, x with 21 bits each.
+/// Integer cell of a regular grid, and its packing into one sortable word: z, y, x with 21 bits
+/// each.
 struct Cell {
   std::int32_t x, y, z;
 };
 
-constexpr std::int32_t kCellBias = 1 << 20;         ///< cells reach from -2^20 to 2^20 - 1 along each axis
+/// cells reach from -2^20 to 2^20 - 1 along each axis
+constexpr std::int32_t kCellBias = 1 << 20;
 constexpr std::uint64_t kEmptyKey = ~std::uint64_t(0);
 
 GPUREG_HD std::int32_t floor_to_int(float v) {
@@ -20,7 +22,8 @@ GPUREG_HD std::int32_t floor_to_int(float v) {
 }
 
 GPUREG_HD Cell cell_of(Vec3 p, float inverse_size) {
-  return {floor_to_int(p.x * inverse_size), floor_to_int(p.y * inverse_size), floor_to_int(p.z * inverse_size)};
+  return {floor_to_int(p.x * inverse_size), floor_to_int(p.y * inverse_size),
+          floor_to_int(p.z * inverse_size)};
 }
 
 GPUREG_HD std::uint64_t cell_key(Cell c) {
@@ -31,17 +34,19 @@ GPUREG_HD std::uint64_t cell_key(Cell c) {
 
 GPUREG_HD Cell cell_from_key(std::uint64_t key) {
   const std::uint64_t mask = (1u << 21) - 1;
-  return {static_cast<std::int32_t>(key & mask) - kCellBias, static_cast<std::int32_t>((key >> 21) & mask) - kCellBias,
+  return {static_cast<std::int32_t>(key & mask) - kCellBias,
+          static_cast<std::int32_t>((key >> 21) & mask) - kCellBias,
           static_cast<std::int32_t>((key >> 42) & mask) - kCellBias};
 }
 
 /// True where the cell is inside the range that keys can hold.
 GPUREG_HD bool in_key_range(Cell c) {
-  return c.x >= -kCellBias && c.x < kCellBias && c.y >= -kCellBias && c.y < kCellBias && c.z >= -kCellBias && c.z < kCellBias;
+  return c.x >= -kCellBias && c.x < kCellBias && c.y >= -kCellBias && c.y < kCellBias &&
+         c.z >= -kCellBias && c.z < kCellBias;
 }
 
-/// Entry of an open-addressing table from cell keys to indices. Which slot a key has depends on the order of insertion; what a look-up
-/// returns does not, so the table may be filled in parallel.
+/// Entry of an open-addressing table from cell keys to indices. Which slot a key has depends on the
+/// order of insertion; what a look-up returns does not, so the table may be filled in parallel.
 struct CellEntry {
   std::uint64_t key;
   std::uint32_t value;

@@ -5,15 +5,16 @@
 
 namespace gpureg {
 
-// What lets scoring decide most points without looking at a single target point: one word per cell of the closest-point grid. Its low
-// bytes are the mean normal of the cell's candidates, each coordinate a signed byte; then comes a code: bit 7 = every place in the cell
-// has a candidate in reach, bits 0..6 = largest angle between the mean and a candidate's normal in steps of 1.5 degrees (127: no
-// bound). Bounds only: no result depends on the last bit of a summary.
+// What lets scoring decide most points without looking at a single target point: one word per cell
+// of the closest-point grid. Its low bytes are the mean normal of the cell's candidates, each
+// coordinate a signed byte; then comes a code: bit 7 = every place in the cell has a candidate in
+// reach, bits 0..6 = largest angle between the mean and a candidate's normal in steps of 1.5
+// degrees (127: no bound). Bounds only: no result depends on the last bit of a summary.
 
 constexpr double kSummaryAngleStep = 1.5;
 constexpr int kSummaryNoBound = 127;
-/// Rounding a unit vector to steps of 1/127 turns it by less than this many degrees, and changes its length by less than this part; a
-/// little more, for moved normals that are kept in 30 bits.
+/// Rounding a unit vector to steps of 1/127 turns it by less than this many degrees, and changes
+/// its length by less than this part; a little more, for moved normals that are kept in 30 bits.
 constexpr double kSummaryQuantisation = 0.6;
 constexpr double kSummaryStretch = 0.009;
 constexpr double kDegrees = 3.14159265358979323846 / 180.0;
@@ -22,7 +23,8 @@ constexpr double kDegrees = 3.14159265358979323846 / 180.0;
 GPUREG_HD bool covers_cell(Vec3 p, Vec3 center, const ClosestGeometry& g) {
   const float h = 0.5f * g.cell_size + g.margin;
   const Vec3 d = p - center;
-  const Vec3 far{(d.x < 0 ? -d.x : d.x) + h, (d.y < 0 ? -d.y : d.y) + h, (d.z < 0 ? -d.z : d.z) + h};
+  const Vec3 far{(d.x < 0 ? -d.x : d.x) + h, (d.y < 0 ? -d.y : d.y) + h,
+                 (d.z < 0 ? -d.z : d.z) + h};
   return norm(far) <= g.search_distance - g.margin;
 }
 
@@ -31,7 +33,8 @@ GPUREG_HD std::uint32_t signed_byte(float unit) {
 }
 
 /// Summary of a cell with at least one candidate.
-GPUREG_HD std::uint32_t summarize_cell(Span<const std::uint32_t> candidates, Vec3 center, const ClosestGeometry& g, const Vec3* points,
+GPUREG_HD std::uint32_t summarize_cell(Span<const std::uint32_t> candidates, Vec3 center,
+                                       const ClosestGeometry& g, const Vec3* points,
                                        const Vec3* normals) {
   Vec3 sum{0, 0, 0};
   bool covered = false, bounded = true;
@@ -48,7 +51,8 @@ GPUREG_HD std::uint32_t summarize_cell(Span<const std::uint32_t> candidates, Vec
       const float c = dot(mean, normals[i]);
       cosine = c < cosine ? c : cosine;
     }
-    const double angle = acos(static_cast<double>(cosine < -1.0f ? -1.0f : cosine)) / kDegrees + kSummaryQuantisation;
+    const double angle = acos(static_cast<double>(cosine < -1.0f ? -1.0f : cosine)) / kDegrees +
+                         kSummaryQuantisation;
     const int steps = static_cast<int>(ceil(angle / kSummaryAngleStep));
     step = steps < kSummaryNoBound ? steps : kSummaryNoBound;
   }
@@ -56,8 +60,8 @@ GPUREG_HD std::uint32_t summarize_cell(Span<const std::uint32_t> candidates, Vec
          static_cast<std::uint32_t>(step | (covered ? 128 : 0)) << 24;
 }
 
-/// Cosines between a moved normal and a cell's mean normal below which no candidate agrees, and from which on all agree and one is in
-/// reach; by code. On the host only.
+/// Cosines between a moved normal and a cell's mean normal below which no candidate agrees, and
+/// from which on all agree and one is in reach; by code. On the host only.
 struct SummaryLimits {
   float none_below[256];
   float all_above[256];
@@ -66,7 +70,8 @@ struct SummaryLimits {
   SummaryLimits(float max_normal_angle_degrees, bool exact_distance) {
     for (int code = 0; code < 256; ++code) {
       const int step = code & 127;
-      const double spread = step * kSummaryAngleStep + kSummaryQuantisation, angle = static_cast<double>(max_normal_angle_degrees);
+      const double spread = step * kSummaryAngleStep + kSummaryQuantisation,
+                   angle = static_cast<double>(max_normal_angle_degrees);
       none_below[code] = -2.0f;
       all_above[code] = 2.0f;
       const bool covered = (code & 128) != 0 && exact_distance;
@@ -75,14 +80,20 @@ struct SummaryLimits {
         if (covered) all_above[code] = -2.0f;
       } else if (step != kSummaryNoBound) {
         // The mean's length is not quite 1, which stretches the cosine either way.
-        const double widest = std::cos((angle + spread) * kDegrees), narrowest = std::cos((angle - spread) * kDegrees);
+        const double widest = std::cos((angle + spread) * kDegrees),
+                     narrowest = std::cos((angle - spread) * kDegrees);
         if (angle + spread < 180.0)
-          none_below[code] = static_cast<float>(widest * (widest > 0 ? 1 - kSummaryStretch : 1 + kSummaryStretch)) - 1e-5f;
+          none_below[code] = static_cast<float>(widest * (widest > 0 ? 1 - kSummaryStretch
+                                                                     : 1 + kSummaryStretch)) -
+                             1e-5f;
         if (covered && angle - spread > 0.0)
-          all_above[code] = static_cast<float>(narrowest * (narrowest > 0 ? 1 + kSummaryStretch : 1 - kSummaryStretch)) + 1e-5f;
+          all_above[code] = static_cast<float>(narrowest * (narrowest > 0 ? 1 + kSummaryStretch
+                                                                          : 1 - kSummaryStretch)) +
+                            1e-5f;
       }
     }
-    // Code 0 is a cell without candidates (a real one has a spread of at least one step): no inlier, whatever the normals.
+    // Code 0 is a cell without candidates (a real one has a spread of at least one step): no
+    // inlier, whatever the normals.
     none_below[0] = 3.0f;
     all_above[0] = 3.0f;
   }

@@ -5,28 +5,30 @@
 
 namespace gpureg {
 
-/// View of a closest-point grid: space around a cloud cut into cells (a third of the search distance), and for each cell the short
-/// list of points that can be the closest one to some place in it (the paper's 3-D grid keeps one point a cell and loses
-/// neighbours; here none within the search distance is lost). Cells come in blocks of 8 x 8 x 8, only near the surface.
+/// View of a closest-point grid: space around a cloud cut into cells (a third of the search
+/// distance), and for each cell the short list of points that can be the closest one to some place
+/// in it (the paper's 3-D grid keeps one point a cell and loses neighbours; here none within the
+/// search distance is lost). Cells come in blocks of 8 x 8 x 8, only near the surface.
 struct ClosestGridView {
   static constexpr int kBlockEdge = 8;
   static constexpr int kBlockCells = kBlockEdge * kBlockEdge * kBlockEdge;
   float inverse_cell_size;
-  Span<const CellEntry> table;             ///< block key -> block
-  Span<const std::uint32_t> cell_start;    ///< blocks x (512 + 1) offsets into candidates
-  Span<const std::uint32_t> candidates;    ///< point indices, ascending within a cell
+  Span<const CellEntry> table;           ///< block key -> block
+  Span<const std::uint32_t> cell_start;  ///< blocks x (512 + 1) offsets into candidates
+  Span<const std::uint32_t> candidates;  ///< point indices, ascending within a cell
 };
 
 struct Closest {
-  std::uint32_t index;       ///< kNoValue: no point within the distance
+  std::uint32_t index;  ///< kNoValue: no point within the distance
   float squared_distance;
 };
 
 /// Closest of the candidates first to last (exclusive), see find_closest.
-GPUREG_HD Closest closest_candidate(const std::uint32_t* candidates, std::uint32_t first, std::uint32_t last, const Vec3* points, Vec3 q,
+GPUREG_HD Closest closest_candidate(const std::uint32_t* candidates, std::uint32_t first,
+                                    std::uint32_t last, const Vec3* points, Vec3 q,
                                     float max_squared) {
-  // No branch on the distance: which candidate wins is a coin toss that no processor predicts. Candidates ascend, so "less" keeps the
-  // lower index among equals.
+  // No branch on the distance: which candidate wins is a coin toss that no processor predicts.
+  // Candidates ascend, so "less" keeps the lower index among equals.
   Closest best{kNoValue, 3.402823466e38f};
   for (std::uint32_t k = first; k < last; ++k) {
     const std::uint32_t i = candidates[k];
@@ -38,18 +40,26 @@ GPUREG_HD Closest closest_candidate(const std::uint32_t* candidates, std::uint32
   return best.squared_distance <= max_squared ? best : Closest{kNoValue, max_squared};
 }
 
-/// Closest point of the cloud to q within max_squared (inclusive); the lower index wins a tie. Exactly what an exhaustive search over
-/// squared_norm(points[k] - q) finds, provided that max_squared is within the grid's search distance.
-GPUREG_HD Closest find_closest(const ClosestGridView& grid, const Vec3* points, Vec3 q, float max_squared) {
+/// Closest point of the cloud to q within max_squared (inclusive); the lower index wins a tie.
+/// Exactly what an exhaustive search over squared_norm(points[k] - q) finds, provided that
+/// max_squared is within the grid's search distance.
+GPUREG_HD Closest find_closest(const ClosestGridView& grid, const Vec3* points, Vec3 q,
+                               float max_squared) {
   const Closest none{kNoValue, max_squared};
-  const float fx = q.x * grid.inverse_cell_size, fy = q.y * grid.inverse_cell_size, fz = q.z * grid.inverse_cell_size;
-  const float limit = static_cast<float>(kCellBias) * static_cast<float>(ClosestGridView::kBlockEdge) - 1.0f;
-  if (!(fx > -limit && fx < limit && fy > -limit && fy < limit && fz > -limit && fz < limit)) return none;
+  const float fx = q.x * grid.inverse_cell_size, fy = q.y * grid.inverse_cell_size,
+              fz = q.z * grid.inverse_cell_size;
+  const float limit =
+      static_cast<float>(kCellBias) * static_cast<float>(ClosestGridView::kBlockEdge) - 1.0f;
+  if (!(fx > -limit && fx < limit && fy > -limit && fy < limit && fz > -limit && fz < limit))
+    return none;
   const Cell c{floor_to_int(fx), floor_to_int(fy), floor_to_int(fz)};
   const std::uint32_t block = find_cell(grid.table, cell_key({c.x >> 3, c.y >> 3, c.z >> 3}));
   if (block == kNoValue) return none;
-  const std::uint32_t cell = static_cast<std::uint32_t>(((c.z & 7) << 6) | ((c.y & 7) << 3) | (c.x & 7));
-  const std::uint32_t* start = grid.cell_start.data + static_cast<std::size_t>(block) * (ClosestGridView::kBlockCells + 1) + cell;
+  const std::uint32_t cell =
+      static_cast<std::uint32_t>(((c.z & 7) << 6) | ((c.y & 7) << 3) | (c.x & 7));
+  const std::uint32_t* start =
+      grid.cell_start.data + static_cast<std::size_t>(block) * (ClosestGridView::kBlockCells + 1) +
+      cell;
   return closest_candidate(grid.candidates.data, start[0], start[1], points, q, max_squared);
 }
 

@@ -6,7 +6,8 @@
 
 namespace gpureg {
 
-constexpr std::uint32_t kTagMatch = 0x4d415443u;     ///< Philox counter word 3 of the order of matches
+/// Philox counter word 3 of the order of matches
+constexpr std::uint32_t kTagMatch = 0x4d415443u;
 constexpr std::uint32_t kTagTriangle = 0x54524941u;  ///< and of the members of triangles
 
 /// A match as the compatibility test sees it: its points and their normals.
@@ -21,52 +22,70 @@ struct CompatibilityTest {
   float squared_turn;  ///< of the cosines
 };
 
-/// Two lengths differ by less than the tolerance. a, b: their squares. Without roots: with x = (sqrt(a) - sqrt(b))^2 it is
-/// (a - b)^2 = x (2 (a + b) - x), which grows with x.
+/// Two lengths differ by less than the tolerance. a, b: their squares. Without roots: with x =
+/// (sqrt(a) - sqrt(b))^2 it is (a - b)^2 = x (2 (a + b) - x), which grows with x.
 GPUREG_HD bool similar_lengths(float a, float b, float squared_tolerance) {
   const float difference = a - b, sum = a + b;
-  return (difference * difference < fmaf(2.0f * squared_tolerance, sum, -(squared_tolerance * squared_tolerance))) |
+  return (difference * difference <
+          fmaf(2.0f * squared_tolerance, sum, -(squared_tolerance * squared_tolerance))) |
          (sum <= squared_tolerance);
 }
 
-/// Two matches are compatible where the motion that brings one together may bring the other together: a rigid motion keeps the distance
-/// of their points (SC2-PCR, Chen et al. 2022) and the angle of their normals.
-GPUREG_HD bool compatible(const OrientedMatch& a, const OrientedMatch& b, const CompatibilityTest& test) {
+/// Two matches are compatible where the motion that brings one together may bring the other
+/// together: a rigid motion keeps the distance of their points (SC2-PCR, Chen et al. 2022) and the
+/// angle of their normals.
+GPUREG_HD bool compatible(const OrientedMatch& a, const OrientedMatch& b,
+                          const CompatibilityTest& test) {
   const float turn = dot(a.m, b.m) - dot(a.n, b.n);
-  return similar_lengths(squared_norm(a.p - b.p), squared_norm(a.q - b.q), test.squared_tolerance) & (turn * turn <= test.squared_turn);
+  return similar_lengths(squared_norm(a.p - b.p), squared_norm(a.q - b.q), test.squared_tolerance) &
+         (turn * turn <= test.squared_turn);
 }
 
-/// Place of a match in the order that decides which are kept where there are too many, and which members of a crowded neighbourhood
-/// are looked at: random, but a function of the match and the seed alone. The match itself breaks ties.
-GPUREG_HD std::uint32_t match_order(std::uint32_t source, std::uint32_t target, std::uint64_t seed) {
-  return philox(source, target, 0, kTagMatch, static_cast<std::uint32_t>(seed), static_cast<std::uint32_t>(seed >> 32)).v[0];
+/// Place of a match in the order that decides which are kept where there are too many, and which
+/// members of a crowded neighbourhood are looked at: random, but a function of the match and the
+/// seed alone. The match itself breaks ties.
+GPUREG_HD std::uint32_t match_order(std::uint32_t source, std::uint32_t target,
+                                    std::uint64_t seed) {
+  return philox(source, target, 0, kTagMatch, static_cast<std::uint32_t>(seed),
+                static_cast<std::uint32_t>(seed >> 32))
+      .v[0];
 }
 
-/// The two members that make triangle number `trial` with the seed (member 0) of a neighbourhood of `members` >= 3.
+/// The two members that make triangle number `trial` with the seed (member 0) of a neighbourhood of
+/// `members` >= 3.
 struct TrianglePick {
   std::uint32_t a, b;
 };
-GPUREG_HD TrianglePick pick_triangle(std::uint32_t source, std::uint32_t target, std::uint32_t trial, std::uint64_t seed, std::uint32_t members) {
+GPUREG_HD TrianglePick pick_triangle(std::uint32_t source, std::uint32_t target,
+                                     std::uint32_t trial, std::uint64_t seed,
+                                     std::uint32_t members) {
   const PhiloxWords w =
-      philox(source, target, trial, kTagTriangle, static_cast<std::uint32_t>(seed), static_cast<std::uint32_t>(seed >> 32));
+      philox(source, target, trial, kTagTriangle, static_cast<std::uint32_t>(seed),
+             static_cast<std::uint32_t>(seed >> 32));
   return {1 + scale_to(w.v[0], members - 1), 1 + scale_to(w.v[1], members - 1)};
 }
 
 /// No side of the triangle is too short to tell a direction.
 GPUREG_HD bool wide_triangle(Vec3 p0, Vec3 p1, Vec3 p2, float squared_length) {
-  return (squared_norm(p1 - p0) >= squared_length) & (squared_norm(p2 - p0) >= squared_length) & (squared_norm(p2 - p1) >= squared_length);
+  return (squared_norm(p1 - p0) >= squared_length) & (squared_norm(p2 - p0) >= squared_length) &
+         (squared_norm(p2 - p1) >= squared_length);
 }
 
-/// How promising a match is as a seed: the number of its compatible matches times its balanced weight. By the number alone floors and walls,
-/// whose matches are many and alike, would take all seeds. degree <= 2^16, weight <= 2^17.
+/// How promising a match is as a seed: the number of its compatible matches times its balanced
+/// weight. By the number alone floors and walls, whose matches are many and alike, would take all
+/// seeds. degree <= 2^16, weight <= 2^17.
 GPUREG_HD std::uint32_t seed_strength(std::uint32_t degree, std::uint32_t weight) {
   return static_cast<std::uint32_t>((static_cast<std::uint64_t>(degree) * weight) >> 10);
 }
 
-/// The total order of seeds: local maxima of the degree first, then the stronger, then the earlier one.
+/// The total order of seeds: local maxima of the degree first, then the stronger, then the earlier
+/// one.
 GPUREG_HD std::uint64_t seed_key(std::uint32_t strength, bool peak, std::uint32_t match) {
-  return (peak ? std::uint64_t(1) << 63 : 0) | (static_cast<std::uint64_t>(strength) << 32) | (0xffffffffu - match);
+  return (peak ? std::uint64_t(1) << 63 : 0) | (static_cast<std::uint64_t>(strength) << 32) |
+         (0xffffffffu - match);
 }
-GPUREG_HD std::uint32_t match_of_seed_key(std::uint64_t key) { return 0xffffffffu - static_cast<std::uint32_t>(key); }
+GPUREG_HD std::uint32_t match_of_seed_key(std::uint64_t key) {
+  return 0xffffffffu - static_cast<std::uint32_t>(key);
+}
 
 }  // namespace gpureg

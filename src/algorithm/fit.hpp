@@ -7,13 +7,20 @@
 namespace gpureg {
 
 GPUREG_HD void add_covariance(Vec3 a, Vec3 b, float (&s)[3][3]) {
-  s[0][0] = fmaf(a.x, b.x, s[0][0]), s[0][1] = fmaf(a.x, b.y, s[0][1]), s[0][2] = fmaf(a.x, b.z, s[0][2]);
-  s[1][0] = fmaf(a.y, b.x, s[1][0]), s[1][1] = fmaf(a.y, b.y, s[1][1]), s[1][2] = fmaf(a.y, b.z, s[1][2]);
-  s[2][0] = fmaf(a.z, b.x, s[2][0]), s[2][1] = fmaf(a.z, b.y, s[2][1]), s[2][2] = fmaf(a.z, b.z, s[2][2]);
+  s[0][0] = fmaf(a.x, b.x, s[0][0]);
+  s[0][1] = fmaf(a.x, b.y, s[0][1]);
+  s[0][2] = fmaf(a.x, b.z, s[0][2]);
+  s[1][0] = fmaf(a.y, b.x, s[1][0]);
+  s[1][1] = fmaf(a.y, b.y, s[1][1]);
+  s[1][2] = fmaf(a.y, b.z, s[1][2]);
+  s[2][0] = fmaf(a.z, b.x, s[2][0]);
+  s[2][1] = fmaf(a.z, b.y, s[2][1]);
+  s[2][2] = fmaf(a.z, b.z, s[2][2]);
 }
 
-/// Rigid motion that turns the cross-covariance s of centred pairs best (Horn 1987: the largest eigenvector of a 4 x 4 matrix, by Jacobi
-/// with fixed sweeps); cp, cq: the centroids. False where the points do not determine a rotation (collinear or coincident).
+/// Rigid motion that turns the cross-covariance s of centred pairs best (Horn 1987: the largest
+/// eigenvector of a 4 x 4 matrix, by Jacobi with fixed sweeps); cp, cq: the centroids. False where
+/// the points do not determine a rotation (collinear or coincident).
 GPUREG_HD bool solve_rigid(const float (&s)[3][3], Vec3 cp, Vec3 cq, Pose<float>& pose) {
   float n[4][4], v[4][4];
   n[0][0] = s[0][0] + s[1][1] + s[2][2];
@@ -34,15 +41,23 @@ GPUREG_HD bool solve_rigid(const float (&s)[3][3], Vec3 cp, Vec3 cq, Pose<float>
     const bool more = n[k][k] > largest;
     second = more ? largest : (n[k][k] > second ? n[k][k] : second);
     largest = more ? n[k][k] : largest;
-    w = more ? v[0][k] : w, x = more ? v[1][k] : x, y = more ? v[2][k] : y, z = more ? v[3][k] : z;
+    w = more ? v[0][k] : w;
+    x = more ? v[1][k] : x;
+    y = more ? v[2][k] : y;
+    z = more ? v[3][k] : z;
   }
   // Collinear points leave the turn about their line open: the two largest eigenvalues meet.
   if (!(largest > 0.0f) || !(largest - second > 1e-4f * largest)) return false;
   const float length = sqrtf(fmaf(w, w, fmaf(x, x, fmaf(y, y, z * z))));
-  pose.w = w / length, pose.x = x / length, pose.y = y / length, pose.z = z / length;
+  pose.w = w / length;
+  pose.x = x / length;
+  pose.y = y / length;
+  pose.z = z / length;
   pose.tx = pose.ty = pose.tz = 0.0f;
   const Vec3 t = cq - rotate(to_rigid(pose), cp);
-  pose.tx = t.x, pose.ty = t.y, pose.tz = t.z;
+  pose.tx = t.x;
+  pose.ty = t.y;
+  pose.tz = t.z;
   return true;
 }
 
@@ -59,9 +74,13 @@ GPUREG_HD bool fit_rigid(const Vec3 (&p)[4], const Vec3 (&q)[4], Pose<float>& po
 GPUREG_HD bool fit_rigid(const Vec3* p, const Vec3* q, int n, Pose<float>& pose) {
   if (n < 3) return false;
   Vec3 cp{0, 0, 0}, cq{0, 0, 0};
-  for (int k = 0; k < n; ++k) cp = cp + p[k], cq = cq + q[k];
+  for (int k = 0; k < n; ++k) {
+    cp = cp + p[k];
+    cq = cq + q[k];
+  }
   const float inverse = 1.0f / static_cast<float>(n);
-  cp = cp * inverse, cq = cq * inverse;
+  cp = cp * inverse;
+  cq = cq * inverse;
   float s[3][3] = {{0, 0, 0}, {0, 0, 0}, {0, 0, 0}};
   for (int k = 0; k < n; ++k) add_covariance(p[k] - cp, q[k] - cq, s);
   return solve_rigid(s, cp, cq, pose);

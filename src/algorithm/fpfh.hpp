@@ -6,11 +6,15 @@
 
 namespace gpureg {
 
-/// On the host only. The normals that the wide FPFH describes are those of a neighbourhood that is wider by as much: it looks at the cloud as
-/// if that were coarser, where noise has no say. With the normals of the narrow radius each of the two would err by the same. At most what
-/// prepare.normal_radius may be: cells are half a feature radius wide, and a neighbourhood of many thousands of them would take hours.
-inline float wide_normal_radius(float normal_radius, float feature_radius, float wide_feature_radius) {
-  const float wide = normal_radius * (wide_feature_radius / feature_radius), most = 4.0f * feature_radius;
+/// On the host only. The normals that the wide FPFH describes are those of a neighbourhood that is
+/// wider by as much: it looks at the cloud as if that were coarser, where noise has no say. With
+/// the normals of the narrow radius each of the two would err by the same. At most what
+/// prepare.normal_radius may be: cells are half a feature radius wide, and a neighbourhood of many
+/// thousands of them would take hours.
+inline float wide_normal_radius(float normal_radius, float feature_radius,
+                                float wide_feature_radius) {
+  const float wide = normal_radius * (wide_feature_radius / feature_radius),
+              most = 4.0f * feature_radius;
   return wide < most ? wide : most;
 }
 
@@ -27,8 +31,9 @@ struct PairFeature {
   bool valid;
 };
 
-/// Darboux-frame angles between two oriented points, binned. Differences to PCL: atan2 is a polynomial and the switch compares the
-/// cosines instead of their arc cosines, so only pairs within about 1e-6 of a bin's edge can fall into the neighbouring bin.
+/// Darboux-frame angles between two oriented points, binned. Differences to PCL: atan2 is a
+/// polynomial and the switch compares the cosines instead of their arc cosines, so only pairs
+/// within about 1e-6 of a bin's edge can fall into the neighbouring bin.
 GPUREG_HD PairFeature pair_feature(Vec3 p1, Vec3 n1, Vec3 p2, Vec3 n2) {
   Vec3 d = p2 - p1;
   const float length = norm(d);
@@ -37,7 +42,8 @@ GPUREG_HD PairFeature pair_feature(Vec3 p1, Vec3 n1, Vec3 p2, Vec3 n2) {
   const float a2 = dot(n2, d) / length;
   float phi = a1;
   if ((a1 < 0.0f ? -a1 : a1) < (a2 < 0.0f ? -a2 : a2)) {
-    // The point whose normal is closer to the connecting line is the source, which makes the feature symmetric.
+    // The point whose normal is closer to the connecting line is the source, which makes the
+    // feature symmetric.
     const Vec3 swap = n1;
     n1 = n2;
     n2 = swap;
@@ -59,9 +65,11 @@ GPUREG_HD PairFeature pair_feature(Vec3 p1, Vec3 n1, Vec3 p2, Vec3 n2) {
   return f;
 }
 
-/// Simplified histogram of one point: integer counts over its neighbours with a normal, which makes their order irrelevant.
-/// Returns the number of neighbours that the counts are relative to (PCL: all neighbours but the point itself).
-GPUREG_HD int spfh_counts(const GridView& grid, Span<const Vec3> normals, std::uint32_t self, Vec3 p, float radius, std::uint32_t* counts) {
+/// Simplified histogram of one point: integer counts over its neighbours with a normal, which makes
+/// their order irrelevant. Returns the number of neighbours that the counts are relative to (PCL:
+/// all neighbours but the point itself).
+GPUREG_HD int spfh_counts(const GridView& grid, Span<const Vec3> normals, std::uint32_t self,
+                          Vec3 p, float radius, std::uint32_t* counts) {
   for (int b = 0; b < kFpfhSize; ++b) counts[b] = 0;
   const Vec3 n = normals[self];
   if (is_zero(n)) return 0;
@@ -81,25 +89,29 @@ GPUREG_HD int spfh_counts(const GridView& grid, Span<const Vec3> normals, std::u
 }
 
 GPUREG_HD float spfh_value(std::uint32_t count, int neighbors) {
-  return neighbors > 0 ? static_cast<float>(count) * (100.0f / static_cast<float>(neighbors)) : 0.0f;
+  return neighbors > 0 ? static_cast<float>(count) * (100.0f / static_cast<float>(neighbors))
+                       : 0.0f;
 }
 
-/// Scales each of the three histograms to a sum of 100. False where one is empty: such a point has no feature.
+/// Scales each of the three histograms to a sum of 100. False where one is empty: such a point has
+/// no feature.
 GPUREG_HD bool normalize_fpfh(float* histogram) {
   for (int part = 0; part < 3; ++part) {
     float sum = 0.0f;
     for (int b = 0; b < kFpfhBins; ++b) sum = sum + histogram[part * kFpfhBins + b];
     if (!(sum > 0.0f)) return false;
     const float scale = 100.0f / sum;
-    for (int b = 0; b < kFpfhBins; ++b) histogram[part * kFpfhBins + b] = histogram[part * kFpfhBins + b] * scale;
+    for (int b = 0; b < kFpfhBins; ++b)
+      histogram[part * kFpfhBins + b] = histogram[part * kFpfhBins + b] * scale;
   }
   return true;
 }
 
-/// FPFH of one point: the neighbours' simplified histograms weighted by 1 / squared distance (as PCL), each part scaled to 100.
-/// spfh: rows of kFpfhSize. False where there is none; the row is then zero.
-GPUREG_HD bool weighted_fpfh(const GridView& grid, Span<const Vec3> normals, const float* spfh, std::uint32_t self, Vec3 p, float radius,
-                             float* out) {
+/// FPFH of one point: the neighbours' simplified histograms weighted by 1 / squared distance (as
+/// PCL), each part scaled to 100. spfh: rows of kFpfhSize. False where there is none; the row is
+/// then zero.
+GPUREG_HD bool weighted_fpfh(const GridView& grid, Span<const Vec3> normals, const float* spfh,
+                             std::uint32_t self, Vec3 p, float radius, float* out) {
   for (int b = 0; b < kFpfhSize; ++b) out[b] = 0.0f;
   if (is_zero(normals[self])) return false;
   for_each_neighbor(grid, p, radius, [&](std::uint32_t other, Vec3, float d2) {

@@ -5,22 +5,25 @@
 
 namespace gpureg {
 
-/// View of points sorted into cells (stable: ascending index within a cell), for fixed-radius neighbourhoods.
+/// View of points sorted into cells (stable: ascending index within a cell), for fixed-radius
+/// neighbourhoods.
 struct GridView {
   float cell_size;
   float inverse_cell_size;
-  Span<const CellEntry> table;         ///< cell key -> index of the cell
+  Span<const CellEntry> table;           ///< cell key -> index of the cell
   Span<const std::uint32_t> cell_start;  ///< cells + 1 offsets into points and index
-  Span<const Vec3> points;             ///< sorted by cell
-  Span<const std::uint32_t> index;     ///< of the sorted points in the cloud
+  Span<const Vec3> points;               ///< sorted by cell
+  Span<const std::uint32_t> index;       ///< of the sorted points in the cloud
 };
 
-/// Calls visit(index, point, squared_distance) for every point within radius of q, q itself included, in cell order: z, y, x, then
-/// index. The order is part of the contract, because the sums over neighbours are floating point.
+/// Calls visit(index, point, squared_distance) for every point within radius of q, q itself
+/// included, in cell order: z, y, x, then index. The order is part of the contract, because the
+/// sums over neighbours are floating point.
 template <typename Visit>
 GPUREG_HD void for_each_neighbor(const GridView& grid, Vec3 q, float radius, Visit&& visit) {
   const float r2 = radius * radius;
-  // A hair more than the radius: the rounding of p * inverse must not lose a neighbour on the border of a cell.
+  // A hair more than the radius: the rounding of p * inverse must not lose a neighbour on the
+  // border of a cell.
   const float reach = radius * 1.0001f;
   const Cell lo = cell_of({q.x - reach, q.y - reach, q.z - reach}, grid.inverse_cell_size);
   const Cell hi = cell_of({q.x + reach, q.y + reach, q.z + reach}, grid.inverse_cell_size);

@@ -6,18 +6,23 @@
 
 namespace gpureg {
 
-/// Normal equations of point-to-plane ICP: 21 entries of J'WJ (lower triangle, row by row), 6 of J'Wr. Sums are 2^-40 fixed point in
-/// 64 bits: integer addition has no order, so threads and blocks may add in any.
+/// Normal equations of point-to-plane ICP: 21 entries of J'WJ (lower triangle, row by row), 6 of
+/// J'Wr. Sums are 2^-40 fixed point in 64 bits: integer addition has no order, so threads and
+/// blocks may add in any.
 struct IcpSums {
   std::int64_t v[27];
 };
 
-constexpr float kIcpFixedScale = 1099511627776.0f;  ///< 2^40; terms are at most 1, so 2^22 points fit
+/// 2^40; terms are at most 1, so 2^22 points fit
+constexpr float kIcpFixedScale = 1099511627776.0f;
 
-GPUREG_HD std::int64_t to_icp_fixed(float term) { return static_cast<std::int64_t>(term * kIcpFixedScale); }
+GPUREG_HD std::int64_t to_icp_fixed(float term) {
+  return static_cast<std::int64_t>(term * kIcpFixedScale);
+}
 
-/// Adds one correspondence. arm: rotated source point (about the source's local origin) over its radius, |arm| <= 1; normal: of the
-/// target; residual: point-to-plane distance over the max distance; weight in [0, 1].
+/// Adds one correspondence. arm: rotated source point (about the source's local origin) over its
+/// radius, |arm| <= 1; normal: of the target; residual: point-to-plane distance over the max
+/// distance; weight in [0, 1].
 GPUREG_HD void add_icp_term(Vec3 arm, Vec3 normal, float residual, float weight, IcpSums& sums) {
   const Vec3 turn = cross(arm, normal);
   const float j[6] = {turn.x, turn.y, turn.z, normal.x, normal.y, normal.z};
@@ -44,8 +49,9 @@ struct IcpStep {
   bool valid;
 };
 
-/// Gauss-Newton step from the sums. radius: length of the arms' unit; max_distance: unit of the residual. A small damping keeps a
-/// sliding pair (a lone plane, a corridor) where it is instead of letting rounding push it along.
+/// Gauss-Newton step from the sums. radius: length of the arms' unit; max_distance: unit of the
+/// residual. A small damping keeps a sliding pair (a lone plane, a corridor) where it is instead of
+/// letting rounding push it along.
 GPUREG_HD IcpStep solve_icp(const IcpSums& sums, float radius, float max_distance) {
   const double unit = 1.0 / 1099511627776.0;
   double a[6][6], b[6], x[6];
@@ -62,16 +68,20 @@ GPUREG_HD IcpStep solve_icp(const IcpSums& sums, float radius, float max_distanc
   IcpStep step;
   step.valid = solve_cholesky6(a, b, x);
   for (int i = 0; i < 3; ++i) {
-    step.omega[i] = step.valid ? x[i] * static_cast<double>(max_distance) / static_cast<double>(radius) : 0.0;
+    step.omega[i] =
+        step.valid ? x[i] * static_cast<double>(max_distance) / static_cast<double>(radius) : 0.0;
     step.shift[i] = step.valid ? x[i + 3] * static_cast<double>(max_distance) : 0.0;
   }
   return step;
 }
 
-/// True where the step moves no point by more than that share of the max distance: the iteration has settled.
+/// True where the step moves no point by more than that share of the max distance: the iteration
+/// has settled.
 GPUREG_HD bool icp_settled(const IcpStep& step, float radius, float max_distance, double share) {
-  const double turn = step.omega[0] * step.omega[0] + step.omega[1] * step.omega[1] + step.omega[2] * step.omega[2];
-  const double shift = step.shift[0] * step.shift[0] + step.shift[1] * step.shift[1] + step.shift[2] * step.shift[2];
+  const double turn =
+      step.omega[0] * step.omega[0] + step.omega[1] * step.omega[1] + step.omega[2] * step.omega[2];
+  const double shift =
+      step.shift[0] * step.shift[0] + step.shift[1] * step.shift[1] + step.shift[2] * step.shift[2];
   const double limit = share * static_cast<double>(max_distance);
   return turn * static_cast<double>(radius) * static_cast<double>(radius) + shift < limit * limit;
 }

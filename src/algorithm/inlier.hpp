@@ -7,16 +7,18 @@ namespace gpureg {
 
 /// What makes a moved source point an inlier.
 struct InlierTest {
-  float max_squared;          ///< of the correspondence distance
+  float max_squared;  ///< of the correspondence distance
   float inverse_max_squared;
-  float min_cosine;           ///< between the normals; -1: no test
+  float min_cosine;  ///< between the normals; -1: no test
 };
 
 /// On the host only: the cosine is libm's, and both executors must be handed the same one.
 inline InlierTest inlier_test(float max_distance, float max_normal_angle_degrees) {
   const float max_squared = max_distance * max_distance;
-  const double angle = static_cast<double>(max_normal_angle_degrees) * 3.14159265358979323846 / 180.0;
-  return {max_squared, 1.0f / max_squared, max_normal_angle_degrees >= 180.0f ? -1.0f : static_cast<float>(std::cos(angle))};
+  const double angle =
+      static_cast<double>(max_normal_angle_degrees) * 3.14159265358979323846 / 180.0;
+  return {max_squared, 1.0f / max_squared,
+          max_normal_angle_degrees >= 180.0f ? -1.0f : static_cast<float>(std::cos(angle))};
 }
 
 }  // namespace gpureg

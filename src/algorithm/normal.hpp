@@ -6,10 +6,11 @@
 
 namespace gpureg {
 
-/// Normal of the plane through the neighbours of q by PCA, sign undecided; zero with fewer than 3 neighbours (q included) or where
-/// the neighbours have no plane (all in one place or on one line).
+/// Normal of the plane through the neighbours of q by PCA, sign undecided; zero with fewer than 3
+/// neighbours (q included) or where the neighbours have no plane (all in one place or on one line).
 GPUREG_HD Vec3 plane_normal(const GridView& grid, Vec3 q, float radius) {
-  // Offsets from q in units of the radius: sums stay near 1, so that float holds them whatever the unit of the cloud.
+  // Offsets from q in units of the radius: sums stay near 1, so that float holds them whatever the
+  // unit of the cloud.
   const float scale = 1.0f / radius;
   int n = 0;
   Vec3 s{0.0f, 0.0f, 0.0f};
@@ -18,8 +19,12 @@ GPUREG_HD Vec3 plane_normal(const GridView& grid, Vec3 q, float radius) {
     const Vec3 d = (p - q) * scale;
     ++n;
     s = s + d;
-    xx = fmaf(d.x, d.x, xx), xy = fmaf(d.x, d.y, xy), xz = fmaf(d.x, d.z, xz);
-    yy = fmaf(d.y, d.y, yy), yz = fmaf(d.y, d.z, yz), zz = fmaf(d.z, d.z, zz);
+    xx = fmaf(d.x, d.x, xx);
+    xy = fmaf(d.x, d.y, xy);
+    xz = fmaf(d.x, d.z, xz);
+    yy = fmaf(d.y, d.y, yy);
+    yz = fmaf(d.y, d.z, yz);
+    zz = fmaf(d.z, d.z, zz);
   });
   if (n < 3) return {0.0f, 0.0f, 0.0f};
   const float inverse = 1.0f / static_cast<float>(n);
@@ -43,7 +48,8 @@ GPUREG_HD Vec3 plane_normal(const GridView& grid, Vec3 q, float radius) {
   return normalized_or_zero({v[0][lo], v[1][lo], v[2][lo]});
 }
 
-/// Sign of a normal: along the guide where there is one (the input's own normals), else towards the nearest viewpoint.
+/// Sign of a normal: along the guide where there is one (the input's own normals), else towards the
+/// nearest viewpoint.
 GPUREG_HD Vec3 orient_normal(Vec3 normal, Vec3 point, Vec3 guide, Span<const Vec3> viewpoints) {
   Vec3 towards = guide;
   if (is_zero(guide)) {
@@ -51,14 +57,18 @@ GPUREG_HD Vec3 orient_normal(Vec3 normal, Vec3 point, Vec3 guide, Span<const Vec
     for (std::size_t k = 0; k < viewpoints.size; ++k) {
       const Vec3 d = viewpoints[k] - point;
       const float d2 = squared_norm(d);
-      if (d2 < best) best = d2, towards = d;
+      if (d2 < best) {
+        best = d2;
+        towards = d;
+      }
     }
   }
   return dot(normal, towards) < 0.0f ? -normal : normal;
 }
 
-/// True where the surface shows its back to every viewpoint, from where it cannot have been seen then. By ten degrees at least: what is seen
-/// from the side, as a floor far away, is tilted by the noise of its points.
+/// True where the surface shows its back to every viewpoint, from where it cannot have been seen
+/// then. By ten degrees at least: what is seen from the side, as a floor far away, is tilted by the
+/// noise of its points.
 GPUREG_HD bool faces_away(Vec3 normal, Vec3 point, Span<const Vec3> viewpoints) {
   constexpr float kSineSquared = 0.03f;
   for (std::size_t k = 0; k < viewpoints.size; ++k) {
@@ -69,12 +79,18 @@ GPUREG_HD bool faces_away(Vec3 normal, Vec3 point, Span<const Vec3> viewpoints) 
   return true;
 }
 
-/// The input's own normals are wrong here and there, mostly along the edges of a fused surface, where one in twenty of a real scan's shows
-/// all cameras its back: those are turned round. Where many do, it is not the normals: the viewpoints are those of another part of the
-/// scan, or of none.
-GPUREG_HD bool turns_back(std::uint32_t facing_away, std::uint32_t points) { return facing_away <= points / 8; }
+/// The input's own normals are wrong here and there, mostly along the edges of a fused surface,
+/// where one in twenty of a real scan's shows all cameras its back: those are turned round. Where
+/// many do, it is not the normals: the viewpoints are those of another part of the scan, or of
+/// none.
+GPUREG_HD bool turns_back(std::uint32_t facing_away, std::uint32_t points) {
+  return facing_away <= points / 8;
+}
 
-/// On the host only. Both have to be the caller's, and viewpoints asked for evidence (PrepareOptions::depth_maps).
-inline bool turns_normals(bool has_normals, std::size_t viewpoints, std::uint32_t depth_maps) { return has_normals && viewpoints > 0 && depth_maps > 0; }
+/// On the host only. Both have to be the caller's, and viewpoints asked for evidence
+/// (PrepareOptions::depth_maps).
+inline bool turns_normals(bool has_normals, std::size_t viewpoints, std::uint32_t depth_maps) {
+  return has_normals && viewpoints > 0 && depth_maps > 0;
+}
 
 }  // namespace gpureg

@@ -9,7 +9,8 @@ namespace gpureg {
 struct Support {
   std::uint32_t inliers;
   std::uint32_t hypothesis;  ///< its number among all drawn
-  std::uint64_t residual;    ///< sum over the inliers of fixed-point (distance / max distance)^2, see fixed_residual
+  /// sum over the inliers of fixed-point (distance / max distance)^2, see fixed_residual
+  std::uint64_t residual;
 };
 
 constexpr float kResidualScale = 1048576.0f;  ///< 2^20 steps for one squared max distance
@@ -25,17 +26,20 @@ GPUREG_HD bool better(const Support& a, const Support& b) {
   return a.hypothesis < b.hypothesis;
 }
 
-/// Truncated squared error over all n points: inliers cost their residual, the others one squared max distance (MSAC).
+/// Truncated squared error over all n points: inliers cost their residual, the others one squared
+/// max distance (MSAC).
 GPUREG_HD std::uint64_t truncated_cost(const Support& s, std::uint32_t n) {
-  return s.residual + static_cast<std::uint64_t>(n - s.inliers) * static_cast<std::uint64_t>(kResidualScale);
+  return s.residual +
+         static_cast<std::uint64_t>(n - s.inliers) * static_cast<std::uint64_t>(kResidualScale);
 }
 
-/// Normal test of an inlier: angle between the moved source normal and the target's at most the limit; a missing normal fails unless
-/// the test is off (min_cosine <= -1).
+/// Normal test of an inlier: angle between the moved source normal and the target's at most the
+/// limit; a missing normal fails unless the test is off (min_cosine <= -1).
 GPUREG_HD bool normals_agree(Vec3 moved_source_normal, Vec3 target_normal, float min_cosine) {
   const float cosine = dot(moved_source_normal, target_normal);
   // A zero normal gives a cosine of 0, which would pass limits beyond 90 degrees.
-  return (min_cosine <= -1.0f) | ((cosine >= min_cosine) & !is_zero(moved_source_normal) & !is_zero(target_normal));
+  return (min_cosine <= -1.0f) |
+         ((cosine >= min_cosine) & !is_zero(moved_source_normal) & !is_zero(target_normal));
 }
 
 }  // namespace gpureg

@@ -6,9 +6,10 @@
 
 namespace gpureg {
 
-/// What a cloud's viewpoints have seen: around each a cube of depth maps. A point that would hang in front of a surface that a viewpoint
-/// saw, on the line between, cannot be there.
-constexpr int kMapEdge = 96;                                ///< cells along an edge of a face: about 1/60 rad each
+/// What a cloud's viewpoints have seen: around each a cube of depth maps. A point that would hang
+/// in front of a surface that a viewpoint saw, on the line between, cannot be there. cells along an
+/// edge of a face: about 1/60 rad each
+constexpr int kMapEdge = 96;
 constexpr std::uint32_t kMapFace = kMapEdge * kMapEdge;
 constexpr std::uint32_t kMapCells = 6 * kMapFace;
 constexpr std::uint16_t kUnknownDepth = 65535;
@@ -28,7 +29,8 @@ GPUREG_HD MapRay map_ray(Vec3 d) {
   const float u = is_x ? d.y : d.x, v = is_x | is_y ? d.z : d.y;
   const float scale = 0.5f * static_cast<float>(kMapEdge) / depth;
   const float half = 0.5f * static_cast<float>(kMapEdge);
-  std::int32_t column = static_cast<std::int32_t>(fmaf(u, scale, half)), row = static_cast<std::int32_t>(fmaf(v, scale, half));
+  std::int32_t column = static_cast<std::int32_t>(fmaf(u, scale, half)),
+               row = static_cast<std::int32_t>(fmaf(v, scale, half));
   column = column < 0 ? 0 : column >= kMapEdge ? kMapEdge - 1 : column;
   row = row < 0 ? 0 : row >= kMapEdge ? kMapEdge - 1 : row;
   const std::uint32_t face = (is_x ? 0u : is_y ? 2u : 4u) + (along < 0 ? 1u : 0u);
@@ -41,8 +43,8 @@ GPUREG_HD std::uint16_t map_depth(float depth, float inverse_step) {
   return steps < 65534.0f ? static_cast<std::uint16_t>(steps) : static_cast<std::uint16_t>(65534);
 }
 
-/// Nearest depth among the 3 x 3 cells around a known cell of the same face: what hangs before that is in front of all of them. Depth:
-/// 16 bits, or wider, of which the lowest 16 count.
+/// Nearest depth among the 3 x 3 cells around a known cell of the same face: what hangs before that
+/// is in front of all of them. Depth: 16 bits, or wider, of which the lowest 16 count.
 template <typename Depth>
 GPUREG_HD std::uint16_t eroded_depth(const Depth* map, std::uint32_t cell) {
   std::uint16_t nearest = static_cast<std::uint16_t>(map[cell]);
@@ -58,13 +60,16 @@ GPUREG_HD std::uint16_t eroded_depth(const Depth* map, std::uint32_t cell) {
   return nearest;
 }
 
-/// How many maps a cloud gets. A cloud that brings normals but no viewpoint says nothing about where it was seen from: nothing is made up.
-GPUREG_HD std::size_t map_count(std::size_t viewpoints, std::size_t asked, bool viewpoints_given, bool normals_given) {
+/// How many maps a cloud gets. A cloud that brings normals but no viewpoint says nothing about
+/// where it was seen from: nothing is made up.
+GPUREG_HD std::size_t map_count(std::size_t viewpoints, std::size_t asked, bool viewpoints_given,
+                                bool normals_given) {
   if (!viewpoints_given && normals_given) return 0;
   return viewpoints < asked ? viewpoints : asked;
 }
 
-/// Which of `known` viewpoints becomes map k of `count`: evenly spread over their order, the first and the last among them.
+/// Which of `known` viewpoints becomes map k of `count`: evenly spread over their order, the first
+/// and the last among them.
 GPUREG_HD std::size_t chosen_viewpoint(std::size_t k, std::size_t count, std::size_t known) {
   return count > 1 ? k * (known - 1) / (count - 1) : 0;
 }
@@ -72,29 +77,36 @@ GPUREG_HD std::size_t chosen_viewpoint(std::size_t k, std::size_t count, std::si
 /// Length of a step of depth: 65,534 of them reach two thousand voxels.
 GPUREG_HD float depth_step(float voxel_size) { return voxel_size * 0.03125f; }
 
-/// Maps of one cloud: viewpoints x kMapCells depths, each the nearest within its 3 x 3 cells of the face; unknown where nothing was seen.
+/// Maps of one cloud: viewpoints x kMapCells depths, each the nearest within its 3 x 3 cells of the
+/// face; unknown where nothing was seen.
 struct VisibilityView {
   const std::uint16_t* depth;
-  const Vec3* viewpoints;   ///< in the cloud's local frame
+  const Vec3* viewpoints;  ///< in the cloud's local frame
   std::uint32_t count;
-  float step;               ///< length of one step of depth
+  float step;  ///< length of one step of depth
 };
 
 /// How a place is seen by one map.
 enum class Sight : std::uint32_t { unknown = 0, behind = 1, surface = 2, before = 3 };
 
-/// How squarely a surface faces a line of sight: the squared cosine between them, 16-bit fixed point. A surface seen at a grazing angle is
-/// before or behind another as soon as a pose or a depth is off by centimetres, so it says that much less. d: along the line, not zero.
+/// How squarely a surface faces a line of sight: the squared cosine between them, 16-bit fixed
+/// point. A surface seen at a grazing angle is before or behind another as soon as a pose or a
+/// depth is off by centimetres, so it says that much less. d: along the line, not zero.
 constexpr float kFacingScale = 65536.0f;
-constexpr float kUnknownFacing = 1.0f / 3.0f;  ///< of a point without normal: the mean over all directions
+/// of a point without normal: the mean over all directions
+constexpr float kUnknownFacing = 1.0f / 3.0f;
 GPUREG_HD float facing(Vec3 normal, Vec3 d) {
   const float along = dot(normal, d);
   return is_zero(normal) ? kUnknownFacing : along * along / squared_norm(d);
 }
-GPUREG_HD std::uint32_t fixed_facing(float facing) { return static_cast<std::uint32_t>(facing * kFacingScale); }
+GPUREG_HD std::uint32_t fixed_facing(float facing) {
+  return static_cast<std::uint32_t>(facing * kFacingScale);
+}
 
-/// margin: how far before (or behind) the seen surface still counts as on it; nothing nearer to the viewpoint than min_range is judged.
-GPUREG_HD Sight sight(const VisibilityView& maps, std::uint32_t map, Vec3 p, float margin, float min_range) {
+/// margin: how far before (or behind) the seen surface still counts as on it; nothing nearer to the
+/// viewpoint than min_range is judged.
+GPUREG_HD Sight sight(const VisibilityView& maps, std::uint32_t map, Vec3 p, float margin,
+                      float min_range) {
   const MapRay ray = map_ray(p - maps.viewpoints[map]);
   if (!(ray.depth > min_range)) return Sight::unknown;
   const std::uint16_t steps = maps.depth[static_cast<std::size_t>(map) * kMapCells + ray.cell];

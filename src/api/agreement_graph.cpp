@@ -67,7 +67,10 @@ AgreementGraph::AgreementGraph(const std::vector<Pair>& pairs,
 /// Dense numbers in the order of the caller's: what follows costs what is there, whatever the
 /// numbers are.
 void AgreementGraph::number_clouds(const std::vector<Pair>& pairs) {
-  for (const Pair& pair : pairs) clouds_.push_back(pair.source), clouds_.push_back(pair.target);
+  for (const Pair& pair : pairs) {
+    clouds_.push_back(pair.source);
+    clouds_.push_back(pair.target);
+  }
   std::sort(clouds_.begin(), clouds_.end());
   clouds_.erase(std::unique(clouds_.begin(), clouds_.end()), clouds_.end());
 }
@@ -86,9 +89,10 @@ void AgreementGraph::find_centres(const std::vector<Pair>& pairs,
     centres_[k] += moments.sum;
     weight[k] += static_cast<double>(moments.count);
   };
-  for (const std::size_t p : sorted(pairs, results))
-    add(pairs[p].source, results[p].source_moments),
-        add(pairs[p].target, results[p].target_moments);
+  for (const std::size_t p : sorted(pairs, results)) {
+    add(pairs[p].source, results[p].source_moments);
+    add(pairs[p].target, results[p].target_moments);
+  }
   for (std::size_t k = 0; k < centres_.size(); ++k)
     if (weight[k] > 0) centres_[k] /= weight[k];
 }

@@ -83,7 +83,9 @@ class TrustedForest {
         if (next.depth != kUnseen) continue;
         const Node &up = nodes_[here], &far = nodes_[up.jump];
         const AgreementEdge& edge = graph_.edges()[n.edge];
-        next.root = root, next.parent = here, next.depth = up.depth + 1;
+        next.root = root;
+        next.parent = here;
+        next.depth = up.depth + 1;
         next.jump = up.depth - far.depth == far.depth - nodes_[far.jump].depth ? far.jump : here;
         next.log_trust = up.log_trust + std::log(std::max(kLeastTrust, edge.trust()));
         next.root_from_here = up.root_from_here * edge.pose(edge.likeliest(), here);
@@ -135,7 +137,8 @@ void listen_to_paths(AgreementGraph& graph) {
     for (std::size_t m = 0; m < out.size(); ++m) {
       const double if_right =
           contradicted ? std::min(edge.belief[m], edge.candidates[m].prior) : edge.belief[m];
-      none -= edge.belief[m], none_if_right -= if_right;
+      none -= edge.belief[m];
+      none_if_right -= if_right;
       sum += out[m] =
           (1.0 - path.trust) * edge.belief[m] + path.trust * ratio(edge.candidates[m]) * if_right;
     }

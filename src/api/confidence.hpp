@@ -23,10 +23,13 @@ struct Touching {
   std::uint32_t count, of;
 };
 
-/// Orders the modes of one pair by how much speaks for them, drops those that are the same as a better one, and fills in their confidence
-/// from the evidence of all of them. refined: as many as were refined at most, EvidenceOptions::modes; how many of them ended in places of
-/// their own tells how little the clouds say.
-void set_confidences(std::vector<RegistrationMode>& modes, std::uint32_t refined, const std::function<Touching(const RegistrationMode&)>& touching,
-                     const std::function<bool(const RegistrationMode&, const RegistrationMode&)>& same);
+/// Orders the modes of one pair by how much speaks for them, drops those that are the same as a
+/// better one, and fills in their confidence from the evidence of all of them. refined: as many as
+/// were refined at most, EvidenceOptions::modes; how many of them ended in places of their own
+/// tells how little the clouds say.
+void set_confidences(
+    std::vector<RegistrationMode>& modes, std::uint32_t refined,
+    const std::function<Touching(const RegistrationMode&)>& touching,
+    const std::function<bool(const RegistrationMode&, const RegistrationMode&)>& same);
 
 }  // namespace gpureg

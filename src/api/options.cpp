@@ -12,37 +12,44 @@ bool length(float v) { return positive(v) && v <= kLongest && v >= 1e-6f; }
 constexpr const char* kLength = "a length in [1e-6, 1e6]";
 }  // namespace
 
-const char* to_string(Proposal proposal) { return proposal == Proposal::quadruples ? "quadruples" : "compatibility"; }
+const char* to_string(Proposal proposal) {
+  return proposal == Proposal::quadruples ? "quadruples" : "compatibility";
+}
 
 void PrepareOptions::validate() const {
-  require(voxel_size == 0.0f || length(voxel_size), "prepare.voxel_size", voxel_size, "0 or a length in [1e-6, 1e6]");
+  require(voxel_size == 0.0f || length(voxel_size), "prepare.voxel_size", voxel_size,
+          "0 or a length in [1e-6, 1e6]");
   require(length(normal_radius), "prepare.normal_radius", normal_radius, kLength);
   require(length(feature_radius), "prepare.feature_radius", feature_radius, kLength);
   require(length(search_distance), "prepare.search_distance", search_distance, kLength);
-  require(wide_feature_radius == 0.0f || length(wide_feature_radius), "prepare.wide_feature_radius", wide_feature_radius,
-          "0 or a length in [1e-6, 1e6]");
-  require(wide_feature_radius <= 4.0f * feature_radius, "prepare.wide_feature_radius", wide_feature_radius,
-          "at most 4 times prepare.feature_radius");
+  require(wide_feature_radius == 0.0f || length(wide_feature_radius), "prepare.wide_feature_radius",
+          wide_feature_radius, "0 or a length in [1e-6, 1e6]");
+  require(wide_feature_radius <= 4.0f * feature_radius, "prepare.wide_feature_radius",
+          wide_feature_radius, "at most 4 times prepare.feature_radius");
   require(depth_maps <= 64, "prepare.depth_maps", depth_maps, "at most 64");
-  require(front_reach == 0.0f || length(front_reach), "prepare.front_reach", front_reach, "0 or a length in [1e-6, 1e6]");
-  require(voxel_size == 0.0f || feature_radius <= 100.0f * voxel_size, "prepare.feature_radius", feature_radius,
-          "at most 100 times prepare.voxel_size");
-  require(normal_radius <= 4.0f * feature_radius, "prepare.normal_radius", normal_radius, "at most 4 times prepare.feature_radius");
-  require(voxel_size == 0.0f || search_distance <= 20.0f * voxel_size, "prepare.search_distance", search_distance,
-          "at most 20 times prepare.voxel_size");
+  require(front_reach == 0.0f || length(front_reach), "prepare.front_reach", front_reach,
+          "0 or a length in [1e-6, 1e6]");
+  require(voxel_size == 0.0f || feature_radius <= 100.0f * voxel_size, "prepare.feature_radius",
+          feature_radius, "at most 100 times prepare.voxel_size");
+  require(normal_radius <= 4.0f * feature_radius, "prepare.normal_radius", normal_radius,
+          "at most 4 times prepare.feature_radius");
+  require(voxel_size == 0.0f || search_distance <= 20.0f * voxel_size, "prepare.search_distance",
+          search_distance, "at most 20 times prepare.voxel_size");
 }
 
 void HypothesisOptions::validate() const {
   require(count >= 1 && count <= (1u << 30), "hypothesis.count", count, "1 to 2^30");
   require(neighbors >= 1 && neighbors <= 16, "hypothesis.neighbors", neighbors, "1 to 16");
-  require(max_survivors >= 1 && max_survivors <= (1u << 22), "hypothesis.max_survivors", max_survivors, "1 to 2^22");
-  require(std::isfinite(edge_similarity) && edge_similarity > 0 && edge_similarity <= 1, "hypothesis.edge_similarity", edge_similarity,
-          "a ratio in (0, 1]");
+  require(max_survivors >= 1 && max_survivors <= (1u << 22), "hypothesis.max_survivors",
+          max_survivors, "1 to 2^22");
+  require(std::isfinite(edge_similarity) && edge_similarity > 0 && edge_similarity <= 1,
+          "hypothesis.edge_similarity", edge_similarity, "a ratio in (0, 1]");
 }
 
 namespace {
 void require_angle(float degrees, const char* name) {
-  require(std::isfinite(degrees) && degrees > 0 && degrees <= 180, name, degrees, "degrees in (0, 180]");
+  require(std::isfinite(degrees) && degrees > 0 && degrees <= 180, name, degrees,
+          "degrees in (0, 180]");
 }
 void require_range(std::uint32_t value, std::uint32_t low, std::uint32_t high, const char* name) {
   const std::string expected = std::to_string(low) + " to " + std::to_string(high);
@@ -56,9 +63,11 @@ void CompatibilityOptions::validate() const {
   require_range(max_members, 3, 1024, "compatibility.max_members");
   require_range(triangles, 1, 4096, "compatibility.triangles");
   require_range(refits, 1, 8, "compatibility.refits");
-  require(std::isfinite(max_turn) && max_turn > 0 && max_turn <= 2, "compatibility.max_turn", max_turn, "a difference of cosines in (0, 2]");
+  require(std::isfinite(max_turn) && max_turn > 0 && max_turn <= 2, "compatibility.max_turn",
+          max_turn, "a difference of cosines in (0, 2]");
   require(length(tolerance), "compatibility.tolerance", tolerance, kLength);
-  require(length(consensus_distance), "compatibility.consensus_distance", consensus_distance, kLength);
+  require(length(consensus_distance), "compatibility.consensus_distance", consensus_distance,
+          kLength);
   require(length(seed_separation), "compatibility.seed_separation", seed_separation, kLength);
 }
 
@@ -68,37 +77,43 @@ void EvidenceOptions::validate() const {
   require_angle(max_normal_angle, "evidence.max_normal_angle");
   require_angle(mode_angle, "evidence.mode_angle");
   require(length(mode_distance), "evidence.mode_distance", mode_distance, kLength);
-  require(slide_distance == 0.0f || length(slide_distance), "evidence.slide_distance", slide_distance, "0 or a length in [1e-6, 1e6]");
+  require(slide_distance == 0.0f || length(slide_distance), "evidence.slide_distance",
+          slide_distance, "0 or a length in [1e-6, 1e6]");
   require(length(free_space_margin), "evidence.free_space_margin", free_space_margin, kLength);
   require(length(min_range), "evidence.min_range", min_range, kLength);
 }
 
 void ScoreOptions::validate() const {
-  require(length(max_correspondence_distance), "score.max_correspondence_distance", max_correspondence_distance, kLength);
-  require(std::isfinite(max_normal_angle) && max_normal_angle > 0 && max_normal_angle <= 180, "score.max_normal_angle", max_normal_angle,
-          "degrees in (0, 180]");
-  require(std::isfinite(max_judged_normal_angle) && max_judged_normal_angle > 0 && max_judged_normal_angle <= 180,
+  require(length(max_correspondence_distance), "score.max_correspondence_distance",
+          max_correspondence_distance, kLength);
+  require(std::isfinite(max_normal_angle) && max_normal_angle > 0 && max_normal_angle <= 180,
+          "score.max_normal_angle", max_normal_angle, "degrees in (0, 180]");
+  require(std::isfinite(max_judged_normal_angle) && max_judged_normal_angle > 0 &&
+              max_judged_normal_angle <= 180,
           "score.max_judged_normal_angle", max_judged_normal_angle, "degrees in (0, 180]");
-  require(std::isfinite(min_inlier_ratio) && min_inlier_ratio >= 0 && min_inlier_ratio <= 1, "score.min_inlier_ratio", min_inlier_ratio,
-          "a ratio in [0, 1]");
+  require(std::isfinite(min_inlier_ratio) && min_inlier_ratio >= 0 && min_inlier_ratio <= 1,
+          "score.min_inlier_ratio", min_inlier_ratio, "a ratio in [0, 1]");
 }
 
 void RefineOptions::validate() const {
   require(max_iterations <= 1000, "refine.max_iterations", max_iterations, "at most 1000");
-  require(length(max_correspondence_distance), "refine.max_correspondence_distance", max_correspondence_distance, kLength);
+  require(length(max_correspondence_distance), "refine.max_correspondence_distance",
+          max_correspondence_distance, kLength);
   require(length(kernel_width), "refine.kernel_width", kernel_width, kLength);
 }
 
 namespace {
 
-/// What more time buys: more seeds find more of the hard pairs, and more modes keep what they found. The matches and the evidence stay
-/// as they are, so that a confidence means the same at every quality.
+/// What more time buys: more seeds find more of the hard pairs, and more modes keep what they
+/// found. The matches and the evidence stay as they are, so that a confidence means the same at
+/// every quality.
 struct Effort {
   std::uint32_t seeds, triangles, modes;
 };
-constexpr Effort kEfforts[kHighestQuality + 1] = {{64, 32, 8},     {128, 32, 12},    {256, 48, 16},    {384, 64, 16},
-                                                  {512, 64, 24},   {1024, 64, 24},   {1536, 96, 32},   {2048, 128, 48},
-                                                  {3072, 192, 48}, {4096, 256, 64},  {8192, 384, 64}};
+constexpr Effort kEfforts[kHighestQuality + 1] = {{64, 32, 8},     {128, 32, 12},   {256, 48, 16},
+                                                  {384, 64, 16},   {512, 64, 24},   {1024, 64, 24},
+                                                  {1536, 96, 32},  {2048, 128, 48}, {3072, 192, 48},
+                                                  {4096, 256, 64}, {8192, 384, 64}};
 
 }  // namespace
 
@@ -128,7 +143,8 @@ RegistrationOptions RegistrationOptions::from_voxel_size(float voxel_size, std::
   o.compatibility.seed_separation = 2.0f * voxel_size;
   o.evidence.mode_distance = 6.0f * voxel_size;
   o.evidence.slide_distance = 8.0f * voxel_size;
-  o.evidence.free_space_margin = voxel_size / 5.0f * 12.0f;  // 2.4 v, and the default's bits at 0.05
+  // 2.4 v, and the default's bits at 0.05
+  o.evidence.free_space_margin = voxel_size / 5.0f * 12.0f;
   o.evidence.min_range = 6.0f * voxel_size;
   return o;
 }
@@ -152,11 +168,15 @@ void RegistrationOptions::validate() const {
   evidence.validate();
   score.validate();
   refine.validate();
-  require(std::isfinite(min_confidence) && min_confidence >= 0 && min_confidence <= 1, "min_confidence", min_confidence, "a probability in [0, 1]");
-  require(score.max_correspondence_distance <= prepare.search_distance, "score.max_correspondence_distance",
-          score.max_correspondence_distance, "at most prepare.search_distance");
-  require(refine.max_iterations == 0 || refine.max_correspondence_distance <= prepare.search_distance,
-          "refine.max_correspondence_distance", refine.max_correspondence_distance, "at most prepare.search_distance");
+  require(std::isfinite(min_confidence) && min_confidence >= 0 && min_confidence <= 1,
+          "min_confidence", min_confidence, "a probability in [0, 1]");
+  require(score.max_correspondence_distance <= prepare.search_distance,
+          "score.max_correspondence_distance", score.max_correspondence_distance,
+          "at most prepare.search_distance");
+  require(
+      refine.max_iterations == 0 || refine.max_correspondence_distance <= prepare.search_distance,
+      "refine.max_correspondence_distance", refine.max_correspondence_distance,
+      "at most prepare.search_distance");
 }
 
 }  // namespace gpureg

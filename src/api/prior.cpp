@@ -58,7 +58,8 @@ PriorTest prior_test(const RegistrationPrior& prior, const PreparedState& source
     out.gravity = true;
     const Eigen::Vector3d s = prior.gravity->source_up.normalized(),
                           t = prior.gravity->target_up.normalized();
-    out.moved_up = to_vec3(swapped ? t : s), out.fixed_up = to_vec3(swapped ? s : t);
+    out.moved_up = to_vec3(swapped ? t : s);
+    out.fixed_up = to_vec3(swapped ? s : t);
     out.min_up_cosine =
         static_cast<float>(std::cos(prior.gravity->max_angle * kRadians) - kRounding);
   }

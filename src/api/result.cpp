@@ -5,41 +5,64 @@ namespace gpureg {
 
 const char* to_string(RegistrationStatus status) {
   switch (status) {
-    case RegistrationStatus::aligned: return "aligned";
-    case RegistrationStatus::not_aligned: return "not_aligned";
-    case RegistrationStatus::skipped: return "skipped";
+    case RegistrationStatus::aligned:
+      return "aligned";
+    case RegistrationStatus::not_aligned:
+      return "not_aligned";
+    case RegistrationStatus::skipped:
+      return "skipped";
   }
   return "unknown";
 }
 
 const char* to_string(RegistrationReason reason) {
   switch (reason) {
-    case RegistrationReason::none: return "none";
-    case RegistrationReason::too_few_source_points: return "too_few_source_points";
-    case RegistrationReason::too_few_target_points: return "too_few_target_points";
-    case RegistrationReason::no_usable_features: return "no_usable_features";
-    case RegistrationReason::no_hypothesis_survived: return "no_hypothesis_survived";
-    case RegistrationReason::degenerate_geometry: return "degenerate_geometry";
-    case RegistrationReason::inlier_ratio_too_low: return "inlier_ratio_too_low";
-    case RegistrationReason::confidence_too_low: return "confidence_too_low";
-    case RegistrationReason::contradicts_prior: return "contradicts_prior";
-    case RegistrationReason::cancelled: return "cancelled";
+    case RegistrationReason::none:
+      return "none";
+    case RegistrationReason::too_few_source_points:
+      return "too_few_source_points";
+    case RegistrationReason::too_few_target_points:
+      return "too_few_target_points";
+    case RegistrationReason::no_usable_features:
+      return "no_usable_features";
+    case RegistrationReason::no_hypothesis_survived:
+      return "no_hypothesis_survived";
+    case RegistrationReason::degenerate_geometry:
+      return "degenerate_geometry";
+    case RegistrationReason::inlier_ratio_too_low:
+      return "inlier_ratio_too_low";
+    case RegistrationReason::confidence_too_low:
+      return "confidence_too_low";
+    case RegistrationReason::contradicts_prior:
+      return "contradicts_prior";
+    case RegistrationReason::cancelled:
+      return "cancelled";
   }
   return "unknown";
 }
 
 const char* explain(RegistrationReason reason) {
   switch (reason) {
-    case RegistrationReason::none: return "the clouds were aligned";
-    case RegistrationReason::too_few_source_points: return "the source has fewer than 4 usable points after downsampling";
-    case RegistrationReason::too_few_target_points: return "the target has fewer than 4 usable points after downsampling";
-    case RegistrationReason::no_usable_features: return "fewer than 4 points could be matched: too few have a normal and neighbours";
-    case RegistrationReason::no_hypothesis_survived: return "no quadruple of matches had similar side lengths in both clouds";
-    case RegistrationReason::degenerate_geometry: return "no pose is determined: what matches is collinear or coincident";
-    case RegistrationReason::inlier_ratio_too_low: return "the best pose found brings too few points together";
-    case RegistrationReason::confidence_too_low: return "what speaks for the best pose found is too little, or too much speaks against it";
-    case RegistrationReason::contradicts_prior: return "every pose found contradicts what is known of gravity or of the pose";
-    case RegistrationReason::cancelled: return "the batch was cancelled before this pair";
+    case RegistrationReason::none:
+      return "the clouds were aligned";
+    case RegistrationReason::too_few_source_points:
+      return "the source has fewer than 4 usable points after downsampling";
+    case RegistrationReason::too_few_target_points:
+      return "the target has fewer than 4 usable points after downsampling";
+    case RegistrationReason::no_usable_features:
+      return "fewer than 4 points could be matched: too few have a normal and neighbours";
+    case RegistrationReason::no_hypothesis_survived:
+      return "no quadruple of matches had similar side lengths in both clouds";
+    case RegistrationReason::degenerate_geometry:
+      return "no pose is determined: what matches is collinear or coincident";
+    case RegistrationReason::inlier_ratio_too_low:
+      return "the best pose found brings too few points together";
+    case RegistrationReason::confidence_too_low:
+      return "what speaks for the best pose found is too little, or too much speaks against it";
+    case RegistrationReason::contradicts_prior:
+      return "every pose found contradicts what is known of gravity or of the pose";
+    case RegistrationReason::cancelled:
+      return "the batch was cancelled before this pair";
   }
   return "unknown";
 }
@@ -52,8 +75,8 @@ Eigen::Matrix3d skew(const Eigen::Vector3d& v) {
 }
 }  // namespace
 
-// Sum of A'A with A = [I | -s [p]x]: the translation block is count I, the mixed block -s [sum p]x, the rotation block
-// s^2 (trace(P) I - P) with P = sum p p'.
+// Sum of A'A with A = [I | -s [p]x]: the translation block is count I, the mixed block -s [sum p]x,
+// the rotation block s^2 (trace(P) I - P) with P = sum p p'.
 Eigen::Matrix<double, 6, 6> CorrespondenceMoments::information_redwood() const {
   Eigen::Matrix<double, 6, 6> m;
   m.topLeftCorner<3, 3>() = static_cast<double>(count) * Eigen::Matrix3d::Identity();

@@ -56,9 +56,12 @@ TimedResult run_levels(const LevelRunner& runner, double milliseconds,
     const double ended = runner.now();
     const bool agree = best.levels > 0 && result.score >= kSure && last.score >= kSure &&
                        same_pose(result, last, options.evidence);
-    if (best.levels == 0 || result.score >= best.result.score)
-      best.result = result, best.quality = quality;
-    previous_ms = last_ms, last_ms = ended - started;
+    if (best.levels == 0 || result.score >= best.result.score) {
+      best.result = result;
+      best.quality = quality;
+    }
+    previous_ms = last_ms;
+    last_ms = ended - started;
     if (best.levels > 0 && predicted > previous_ms)
       growth = std::clamp(growth * (last_ms - previous_ms) / (predicted - previous_ms), 0.2, 1.25);
     ++best.levels, best.highest_quality = quality, best.milliseconds = ended - begin;
@@ -70,7 +73,8 @@ TimedResult run_levels(const LevelRunner& runner, double milliseconds,
     // A sure result needs only to be confirmed; where there is none yet, the time goes into the
     // highest level that it is enough for.
     while (last.score < kSure && next < kHighestQuality && prediction(next + 1) <= left) ++next;
-    predicted = prediction(next), quality = next;
+    predicted = prediction(next);
+    quality = next;
   }
 }
 

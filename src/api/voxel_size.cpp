@@ -81,7 +81,8 @@ class SortedCloud {
         if (d.squaredNorm() <= radius * radius) sum += d, outer += d * d.transpose(), ++count;
         return true;
       };
-      around(at, visit), visit(at);
+      around(at, visit);
+      visit(at);
       if (count < 8) return;  // a plane fits few points however rough their surface is
       const Eigen::Vector3d mean = sum / static_cast<double>(count);
       const Eigen::Matrix3d covariance =

@@ -7,28 +7,33 @@
 #include "algorithm/cell_summary.hpp"
 #include "cpu/products.hpp"
 
-/// What lets the CPU decide most points of a hypothesis without looking at a single target point: per cell of the closest-point grid,
-/// a bound on the normals of all its candidates and whether every place in the cell has one of them in reach.
+/// What lets the CPU decide most points of a hypothesis without looking at a single target point:
+/// per cell of the closest-point grid, a bound on the normals of all its candidates and whether
+/// every place in the cell has one of them in reach.
 namespace gpureg::cpu {
 
-/// Points in groups of 64 that spread over the cloud, one array per coordinate, padded with NaN for the vector unit.
-ScoringOrder scoring_order(const std::vector<Vec3>& points, const std::vector<Vec3>& normals, float cell_size);
+/// Points in groups of 64 that spread over the cloud, one array per coordinate, padded with NaN for
+/// the vector unit.
+ScoringOrder scoring_order(const std::vector<Vec3>& points, const std::vector<Vec3>& normals,
+                           float cell_size);
 
 /// Summaries of the cells of one closest-point grid; points and normals are the cloud's.
-CellSummaries summarize_cells(const ClosestGrid& closest, float search_distance, float cloud_radius, const std::vector<Vec3>& points,
-                              const std::vector<Vec3>& normals);
+CellSummaries summarize_cells(const ClosestGrid& closest, float search_distance, float cloud_radius,
+                              const std::vector<Vec3>& points, const std::vector<Vec3>& normals);
 
 struct PointBounds {
   std::uint64_t possible;  ///< bit k is 0 only where point first + k is certainly no inlier
   std::uint64_t certain;   ///< bit k is 1 only where it certainly is one
 };
 
-/// Index of the summary of the cell that each of 64 moved points falls into; 0, an empty one, where there is no block. first is a
-/// multiple of 64.
-void locate_cells(const ScoringOrder& order, std::size_t first, const Rigid& pose, const CellSummaries& summaries, std::int32_t* cells);
+/// Index of the summary of the cell that each of 64 moved points falls into; 0, an empty one, where
+/// there is no block. first is a multiple of 64.
+void locate_cells(const ScoringOrder& order, std::size_t first, const Rigid& pose,
+                  const CellSummaries& summaries, std::int32_t* cells);
 
 /// Bounds of 64 points from the summaries of their cells.
-PointBounds bound_inliers(const ScoringOrder& order, std::size_t first, const Rigid& pose, const CellSummaries& summaries,
-                          const SummaryLimits& limits, const std::int32_t* cells);
+PointBounds bound_inliers(const ScoringOrder& order, std::size_t first, const Rigid& pose,
+                          const CellSummaries& summaries, const SummaryLimits& limits,
+                          const std::int32_t* cells);
 
 }  // namespace gpureg::cpu

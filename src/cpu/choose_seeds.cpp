@@ -24,7 +24,8 @@ void count_compatible(const MatchSet& matches, const CompatibilityTest& test, st
     std::uint32_t count = compatible(own, own, test) ? 1u : 0u;
     for (std::uint32_t k = i + 1; k < end; ++k) {
       const std::uint32_t one = compatible(columns[k], own, test) ? 1u : 0u;
-      out[k] += one, count += one;
+      out[k] += one;
+      count += one;
     }
     out[i] += count;
   }
@@ -43,17 +44,24 @@ void count_compatible(const MatchSet& matches, const CompatibilityTest& test, st
                             with_b = compatible(other, b, test) ? 1u : 0u;
         const std::uint32_t with_c = compatible(other, c, test) ? 1u : 0u,
                             with_d = compatible(other, d, test) ? 1u : 0u;
-        of_a += with_a, of_b += with_b, of_c += with_c, of_d += with_d;
+        of_a += with_a;
+        of_b += with_b;
+        of_c += with_c;
+        of_d += with_d;
         counts[k] += (with_a + with_b) + (with_c + with_d);
       }
-      out[i] += of_a, out[i + 1] += of_b, out[i + 2] += of_c, out[i + 3] += of_d;
+      out[i] += of_a;
+      out[i + 1] += of_b;
+      out[i + 2] += of_c;
+      out[i + 3] += of_d;
     }
     for (; i < end; ++i) {
       const OrientedMatch own = columns[i];
       std::uint32_t count = 0;
       for (std::uint32_t k = 0; k < size; ++k) {
         const std::uint32_t one = compatible(tile[k], own, test) ? 1u : 0u;
-        counts[k] += one, count += one;
+        counts[k] += one;
+        count += one;
       }
       out[i] += count;
     }
@@ -79,9 +87,12 @@ struct Sorted {
     std::sort(match.begin(), match.end(), [&](std::uint32_t a, std::uint32_t b) {
       return (*axes[axis])[a] < (*axes[axis])[b];
     });
-    for (const std::uint32_t k : match)
-      px.push_back(m.px[k]), py.push_back(m.py[k]), pz.push_back(m.pz[k]),
-          degree.push_back(degrees[k]);
+    for (const std::uint32_t k : match) {
+      px.push_back(m.px[k]);
+      py.push_back(m.py[k]);
+      pz.push_back(m.pz[k]);
+      degree.push_back(degrees[k]);
+    }
     along = axis == 0 ? &px : axis == 1 ? &py : &pz;
   }
   Sorted(const Sorted&) = delete;
@@ -123,8 +134,10 @@ std::vector<std::vector<std::uint32_t>> choose_seeds(Exec& exec,
   const float squared_separation = options.seed_separation * options.seed_separation;
   std::vector<std::vector<std::uint32_t>> degree(matches.size());
   std::vector<std::vector<std::uint8_t>> peak(matches.size());
-  for (std::size_t p = 0; p < matches.size(); ++p)
-    degree[p].resize(matches[p].size()), peak[p].resize(matches[p].size());
+  for (std::size_t p = 0; p < matches.size(); ++p) {
+    degree[p].resize(matches[p].size());
+    peak[p].resize(matches[p].size());
+  }
   std::vector<std::mutex> mutex(matches.size());
   exec.parallel_items(
       matches.size(), [&](std::size_t p) { return degree[p].size(); }, 512,

@@ -11,7 +11,8 @@ namespace {
 constexpr int kEdge = ClosestGridView::kBlockEdge;
 constexpr int kCells = ClosestGridView::kBlockCells;
 /// Keys of all blocks that a query with a point in reach can fall into, ascending.
-std::vector<std::uint64_t> reachable_blocks(const std::vector<Vec3>& points, const ClosestGeometry& g) {
+std::vector<std::uint64_t> reachable_blocks(const std::vector<Vec3>& points,
+                                            const ClosestGeometry& g) {
   const float inverse = 1.0f / block_edge(g);
   const float reach = point_reach(g);
   std::vector<std::uint64_t> keys;
@@ -40,10 +41,13 @@ struct BlockLists {
 };
 
 /// Points whose reach touches the block, ascending by index.
-std::vector<std::uint32_t> points_near_block(const GridView& grid, Vec3 center, const ClosestGeometry& g) {
+std::vector<std::uint32_t> points_near_block(const GridView& grid, Vec3 center,
+                                             const ClosestGeometry& g) {
   const float reach = block_reach(g);
-  const Cell lo = cell_of({center.x - reach, center.y - reach, center.z - reach}, grid.inverse_cell_size);
-  const Cell hi = cell_of({center.x + reach, center.y + reach, center.z + reach}, grid.inverse_cell_size);
+  const Cell lo =
+      cell_of({center.x - reach, center.y - reach, center.z - reach}, grid.inverse_cell_size);
+  const Cell hi =
+      cell_of({center.x + reach, center.y + reach, center.z + reach}, grid.inverse_cell_size);
   std::vector<std::uint32_t> near;
   for (std::int32_t z = lo.z; z <= hi.z; ++z)
     for (std::int32_t y = lo.y; y <= hi.y; ++y)
@@ -52,22 +56,29 @@ std::vector<std::uint32_t> points_near_block(const GridView& grid, Vec3 center, 
         if (cell == kNoValue) continue;
         for (std::uint32_t k = grid.cell_start[cell]; k < grid.cell_start[cell + 1]; ++k) {
           const Vec3 d = grid.points[k] - center;
-          if (std::fabs(d.x) <= reach && std::fabs(d.y) <= reach && std::fabs(d.z) <= reach) near.push_back(grid.index[k]);
+          if (std::fabs(d.x) <= reach && std::fabs(d.y) <= reach && std::fabs(d.z) <= reach)
+            near.push_back(grid.index[k]);
         }
       }
   std::sort(near.begin(), near.end());
   return near;
 }
 
-void build_block(const GridView& grid, const std::vector<Vec3>& points, Cell block, const ClosestGeometry& g, BlockLists& out) {
+void build_block(const GridView& grid, const std::vector<Vec3>& points, Cell block,
+                 const ClosestGeometry& g, BlockLists& out) {
   const Vec3 block_center = cell_center(block, block_edge(g));
   const std::vector<std::uint32_t> near = points_near_block(grid, block_center, g);
   const std::size_t n = near.size();
   std::vector<float> x(n), y(n), z(n), d2(n);
-  for (std::size_t k = 0; k < n; ++k) x[k] = points[near[k]].x, y[k] = points[near[k]].y, z[k] = points[near[k]].z;
+  for (std::size_t k = 0; k < n; ++k) {
+    x[k] = points[near[k]].x;
+    y[k] = points[near[k]].y;
+    z[k] = points[near[k]].z;
+  }
   out.counts.assign(kCells, 0);
   for (int cell = 0; cell < kCells; ++cell) {
-    const Cell c{block.x * kEdge + (cell & 7), block.y * kEdge + ((cell >> 3) & 7), block.z * kEdge + (cell >> 6)};
+    const Cell c{block.x * kEdge + (cell & 7), block.y * kEdge + ((cell >> 3) & 7),
+                 block.z * kEdge + (cell >> 6)};
     const Vec3 center = cell_center(c, g.cell_size);
     float nearest2 = 3.402823466e38f;
     for (std::size_t k = 0; k < n; ++k) {
@@ -89,7 +100,8 @@ void build_block(const GridView& grid, const std::vector<Vec3>& points, Cell blo
       out.candidates.push_back(near[k]);
       ++out.counts[cell];
     }
-    if (out.candidates.size() > pipeline::kMaxBlockCandidates) pipeline::throw_too_dense(g.search_distance);
+    if (out.candidates.size() > pipeline::kMaxBlockCandidates)
+      pipeline::throw_too_dense(g.search_distance);
   }
 }
 
@@ -99,7 +111,9 @@ ClosestGridView ClosestGrid::view() const {
   return {1.0f / cell_size, span_of(table.entries), span_of(cell_start), span_of(candidates)};
 }
 
-std::vector<ClosestGrid> build_closest_grids(Exec& exec, const std::vector<DownsampledCloud>& clouds, const std::vector<Grid>& grids,
+std::vector<ClosestGrid> build_closest_grids(Exec& exec,
+                                             const std::vector<DownsampledCloud>& clouds,
+                                             const std::vector<Grid>& grids,
                                              const PrepareOptions& options) {
   std::vector<ClosestGrid> out(clouds.size());
   std::vector<ClosestGeometry> geometry(clouds.size());
@@ -110,12 +124,13 @@ std::vector<ClosestGrid> build_closest_grids(Exec& exec, const std::vector<Downs
     keys[c] = reachable_blocks(clouds[c].points, geometry[c]);
     lists[c].resize(keys[c].size());
   });
-  exec.parallel_items(clouds.size(), [&](std::size_t c) { return keys[c].size(); }, 16,
-                      [&](std::size_t c, std::size_t begin, std::size_t end) {
-                        const GridView grid = grids[c].view();
-                        for (std::size_t b = begin; b < end; ++b)
-                          build_block(grid, clouds[c].points, cell_from_key(keys[c][b]), geometry[c], lists[c][b]);
-                      });
+  exec.parallel_items(
+      clouds.size(), [&](std::size_t c) { return keys[c].size(); }, 16,
+      [&](std::size_t c, std::size_t begin, std::size_t end) {
+        const GridView grid = grids[c].view();
+        for (std::size_t b = begin; b < end; ++b)
+          build_block(grid, clouds[c].points, cell_from_key(keys[c][b]), geometry[c], lists[c][b]);
+      });
   exec.parallel(clouds.size(), [&](std::size_t c) {
     ClosestGrid& grid = out[c];
     grid.cell_size = geometry[c].cell_size;
@@ -134,7 +149,8 @@ std::vector<ClosestGrid> build_closest_grids(Exec& exec, const std::vector<Downs
         offset += lists[c][b].counts[cell];
       }
       grid.cell_start.push_back(offset);
-      grid.candidates.insert(grid.candidates.end(), lists[c][b].candidates.begin(), lists[c][b].candidates.end());
+      grid.candidates.insert(grid.candidates.end(), lists[c][b].candidates.begin(),
+                             lists[c][b].candidates.end());
     }
   });
   return out;

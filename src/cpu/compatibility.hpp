@@ -6,14 +6,26 @@
 
 namespace gpureg::cpu {
 
-/// Pointers to the coordinates of matches, one array each: loops over them are what the compiler turns into vectors.
+/// Pointers to the coordinates of matches, one array each: loops over them are what the compiler
+/// turns into vectors.
 struct MatchColumns {
   const float *px, *py, *pz, *qx, *qy, *qz, *mx, *my, *mz, *nx, *ny, *nz;
   explicit MatchColumns(const MatchSet& m, std::size_t from = 0)
-      : px(&m.px[from]), py(&m.py[from]), pz(&m.pz[from]), qx(&m.qx[from]), qy(&m.qy[from]), qz(&m.qz[from]),
-        mx(&m.mx[from]), my(&m.my[from]), mz(&m.mz[from]), nx(&m.nx[from]), ny(&m.ny[from]), nz(&m.nz[from]) {}
+      : px(&m.px[from]),
+        py(&m.py[from]),
+        pz(&m.pz[from]),
+        qx(&m.qx[from]),
+        qy(&m.qy[from]),
+        qz(&m.qz[from]),
+        mx(&m.mx[from]),
+        my(&m.my[from]),
+        mz(&m.mz[from]),
+        nx(&m.nx[from]),
+        ny(&m.ny[from]),
+        nz(&m.nz[from]) {}
   OrientedMatch operator[](std::size_t k) const {
-    return {{px[k], py[k], pz[k]}, {qx[k], qy[k], qz[k]}, {mx[k], my[k], mz[k]}, {nx[k], ny[k], nz[k]}};
+    return {
+        {px[k], py[k], pz[k]}, {qx[k], qy[k], qz[k]}, {mx[k], my[k], mz[k]}, {nx[k], ny[k], nz[k]}};
   }
 };
 
@@ -21,9 +33,11 @@ inline CompatibilityTest test_of(const CompatibilityOptions& options) {
   return {options.tolerance * options.tolerance, options.max_turn * options.max_turn};
 }
 
-/// Calls take(k) for all matches that are compatible with one of them, in their order, until it returns false.
+/// Calls take(k) for all matches that are compatible with one of them, in their order, until it
+/// returns false.
 template <typename Take>
-void for_each_compatible(const MatchSet& matches, std::uint32_t seed, const CompatibilityTest& test, Take&& take) {
+void for_each_compatible(const MatchSet& matches, std::uint32_t seed, const CompatibilityTest& test,
+                         Take&& take) {
   constexpr std::uint32_t kBlock = 256;
   const OrientedMatch own = MatchColumns(matches)[seed];
   std::uint8_t flag[kBlock];

@@ -15,7 +15,8 @@ Vec3 row(const float* values, std::size_t stride, std::size_t i) {
   return {v[0], v[1], v[2]};
 }
 
-void find_origin(const RawCloud& raw, float voxel_size, DownsampledCloud& out, std::vector<std::uint32_t>& finite) {
+void find_origin(const RawCloud& raw, float voxel_size, DownsampledCloud& out,
+                 std::vector<std::uint32_t>& finite) {
   constexpr float inf = std::numeric_limits<float>::infinity();
   float lo[3] = {inf, inf, inf}, hi[3] = {-inf, -inf, -inf};
   finite.reserve(raw.size);
@@ -42,8 +43,10 @@ void downsample_one(const RawCloud& raw, const PrepareOptions& options, Downsamp
   find_origin(raw, options.voxel_size, out, finite);
   const Vec3 origin{out.origin[0], out.origin[1], out.origin[2]};
 
-  for (std::size_t k = 0; k < raw.viewpoint_count; ++k) out.viewpoints.push_back(row(raw.viewpoints, 3, k) - origin);
-  out.turns_normals = turns_normals(raw.normals != nullptr, raw.viewpoint_count, options.depth_maps);
+  for (std::size_t k = 0; k < raw.viewpoint_count; ++k)
+    out.viewpoints.push_back(row(raw.viewpoints, 3, k) - origin);
+  out.turns_normals =
+      turns_normals(raw.normals != nullptr, raw.viewpoint_count, options.depth_maps);
   if (out.viewpoints.empty()) out.viewpoints.push_back(-origin);
 
   std::vector<Vec3> local(finite.size());
@@ -59,7 +62,8 @@ void downsample_one(const RawCloud& raw, const PrepareOptions& options, Downsamp
   std::vector<KeyIndex> order(finite.size());
   const float inverse = options.voxel_size > 0 ? 1.0f / options.voxel_size : 0.0f;
   for (std::size_t k = 0; k < finite.size(); ++k)
-    order[k] = {options.voxel_size > 0 ? cell_key(voxel_of(local[k], inverse)) : k, static_cast<std::uint32_t>(k)};
+    order[k] = {options.voxel_size > 0 ? cell_key(voxel_of(local[k], inverse)) : k,
+                static_cast<std::uint32_t>(k)};
   if (options.voxel_size > 0) radix_sort(order);
 
   const std::size_t dimension = raw.features ? raw.feature_dimension : 0;
@@ -73,8 +77,10 @@ void downsample_one(const RawCloud& raw, const PrepareOptions& options, Downsamp
     for (std::size_t k = begin; k < end; ++k) {
       const std::uint32_t i = order[k].index;
       sum = sum + local[i];
-      if (raw.normals) guide = guide + normalized_or_zero(row(raw.normals, raw.normal_stride, finite[i]));
-      for (std::size_t d = 0; d < dimension; ++d) mean[d] += raw.features[finite[i] * raw.feature_stride + d];
+      if (raw.normals)
+        guide = guide + normalized_or_zero(row(raw.normals, raw.normal_stride, finite[i]));
+      for (std::size_t d = 0; d < dimension; ++d)
+        mean[d] += raw.features[finite[i] * raw.feature_stride + d];
     }
     out.points.push_back(end - begin == 1 ? local[order[begin].index] : sum * inverse_count);
     if (raw.normals) out.guides.push_back(guide);
@@ -88,7 +94,8 @@ void downsample_one(const RawCloud& raw, const PrepareOptions& options, Downsamp
 
 }  // namespace
 
-std::vector<DownsampledCloud> downsample(Exec& exec, Span<const RawCloud> clouds, const PrepareOptions& options) {
+std::vector<DownsampledCloud> downsample(Exec& exec, Span<const RawCloud> clouds,
+                                         const PrepareOptions& options) {
   std::vector<DownsampledCloud> out(clouds.size);
   exec.parallel(clouds.size, [&](std::size_t k) { downsample_one(clouds[k], options, out[k]); });
   return out;

@@ -24,25 +24,35 @@ class CpuEngine final : public Engine {
   Backend backend() const override { return Backend::cpu; }
   unsigned threads() const override { return exec_.threads(); }
   std::string description() const override {
-    return "cpu, " + std::to_string(exec_.threads()) + (exec_.threads() == 1 ? " thread" : " threads");
+    return "cpu, " + std::to_string(exec_.threads()) +
+           (exec_.threads() == 1 ? " thread" : " threads");
   }
   const void* memory() const override { return &kHostMemory; }
-  // Enough that no thread waits at the end of a stage, few enough that progress and cancelling stay lively.
-  std::size_t pairs_per_chunk(const RegistrationOptions&) const override { return 2 * exec_.threads() + 2; }
+  // Enough that no thread waits at the end of a stage, few enough that progress and cancelling stay
+  // lively.
+  std::size_t pairs_per_chunk(const RegistrationOptions&) const override {
+    return 2 * exec_.threads() + 2;
+  }
 
-  std::vector<std::shared_ptr<PreparedState>> prepare(Span<const RawCloud> clouds, const PrepareOptions& options) override {
+  std::vector<std::shared_ptr<PreparedState>> prepare(Span<const RawCloud> clouds,
+                                                      const PrepareOptions& options) override {
     std::lock_guard<std::mutex> lock(mutex_);
     auto prepared = pipeline::prepare(exec_, clouds, options);
     for (auto& cloud : prepared) cloud->owner = &kHostMemory;
     return {prepared.begin(), prepared.end()};
   }
 
-  void align(Span<const PairInput> pairs, const RegistrationOptions& options, Span<PairOutcome> outcomes, const FurtherSearch& further) override {
+  void align(Span<const PairInput> pairs, const RegistrationOptions& options,
+             Span<PairOutcome> outcomes, const FurtherSearch& further) override {
     std::lock_guard<std::mutex> lock(mutex_);
     std::vector<PairView> views(pairs.size);
     for (std::size_t p = 0; p < pairs.size; ++p)
-      views[p] = {static_cast<const CpuCloud*>(pairs[p].source)->view(), static_cast<const CpuCloud*>(pairs[p].target)->view(),
-                  pairs[p].custom_source.data, pairs[p].custom_target.data, static_cast<std::uint32_t>(pairs[p].custom_source.size), pairs[p].prior};
+      views[p] = {static_cast<const CpuCloud*>(pairs[p].source)->view(),
+                  static_cast<const CpuCloud*>(pairs[p].target)->view(),
+                  pairs[p].custom_source.data,
+                  pairs[p].custom_target.data,
+                  static_cast<std::uint32_t>(pairs[p].custom_source.size),
+                  pairs[p].prior};
     if (options.hypothesis.proposal == Proposal::compatibility)
       pipeline::align_by_evidence(exec_, pairs, span_of(views), options, further, outcomes);
     else
@@ -67,14 +77,28 @@ std::uint64_t balance_points(const std::vector<Vec3>& normals, std::vector<std::
 
 CloudView CpuCloud::view() const {
   const bool wide = !wide_features.values.empty();
-  return {points.data(), normals.data(), features.values.data(), features.valid.data(), size, feature_dimension, radius, closest.view(), this,
-          wide ? wide_features.values.data() : nullptr, wide ? wide_features.valid.data() : nullptr, balance.data(), balance_total, visibility.view(), fronts.view()};
+  return {points.data(),
+          normals.data(),
+          features.values.data(),
+          features.valid.data(),
+          size,
+          feature_dimension,
+          radius,
+          closest.view(),
+          this,
+          wide ? wide_features.values.data() : nullptr,
+          wide ? wide_features.valid.data() : nullptr,
+          balance.data(),
+          balance_total,
+          visibility.view(),
+          fronts.view()};
 }
 
-std::vector<std::shared_ptr<CpuCloud>> assemble(Exec& exec, std::vector<DownsampledCloud>& clouds, std::vector<std::vector<Vec3>>& normals,
-                                                std::vector<Features>& features, std::vector<Features>& wide_features,
-                                                std::vector<ClosestGrid>& closest, std::vector<Visibility>& visibility,
-                                                std::vector<Fronts>& fronts, const PrepareOptions& options) {
+std::vector<std::shared_ptr<CpuCloud>> assemble(
+    Exec& exec, std::vector<DownsampledCloud>& clouds, std::vector<std::vector<Vec3>>& normals,
+    std::vector<Features>& features, std::vector<Features>& wide_features,
+    std::vector<ClosestGrid>& closest, std::vector<Visibility>& visibility,
+    std::vector<Fronts>& fronts, const PrepareOptions& options) {
   std::vector<std::shared_ptr<CpuCloud>> out(clouds.size());
   exec.parallel(clouds.size(), [&](std::size_t c) {
     auto cloud = std::make_shared<CpuCloud>();
@@ -98,7 +122,8 @@ std::vector<std::shared_ptr<CpuCloud>> assemble(Exec& exec, std::vector<Downsamp
     cloud->balance_total = balance_points(cloud->normals, cloud->balance);
     cloud->closest = std::move(closest[c]);
     cloud->order = scoring_order(cloud->points, cloud->normals, options.search_distance);
-    cloud->summaries = summarize_cells(cloud->closest, options.search_distance, cloud->radius, cloud->points, cloud->normals);
+    cloud->summaries = summarize_cells(cloud->closest, options.search_distance, cloud->radius,
+                                       cloud->points, cloud->normals);
     out[c] = std::move(cloud);
   });
   return out;
@@ -111,7 +136,9 @@ namespace gpureg {
 std::shared_ptr<Engine> make_cpu_engine(unsigned threads) {
 #if defined(__AVX2__) && (defined(__GNUC__) || defined(__clang__))
   if (!__builtin_cpu_supports("avx2") || !__builtin_cpu_supports("fma"))
-    throw BackendUnavailable("this processor has no AVX2 and FMA, which gpureg was compiled for: rebuild with -DGPUREG_CPU_ARCH=");
+    throw BackendUnavailable(
+        "this processor has no AVX2 and FMA, which gpureg was compiled for: rebuild with "
+        "-DGPUREG_CPU_ARCH=");
 #endif
   return std::make_shared<cpu::CpuEngine>(threads);
 }

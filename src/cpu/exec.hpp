@@ -12,7 +12,8 @@
 
 namespace gpureg::cpu {
 
-/// Threads and clock of the CPU backend. Which thread runs which block is not determined; what a block writes must depend on the block only.
+/// Threads and clock of the CPU backend. Which thread runs which block is not determined; what a
+/// block writes must depend on the block only.
 class Exec {
  public:
   explicit Exec(unsigned threads);
@@ -22,11 +23,12 @@ class Exec {
 
   unsigned threads() const { return static_cast<unsigned>(workers_.size()) + 1; }
 
-  /// Calls task(k) once for each k in [0, count), on all threads; returns when all are done. Rethrows the first exception.
+  /// Calls task(k) once for each k in [0, count), on all threads; returns when all are done.
+  /// Rethrows the first exception.
   void parallel(std::size_t count, const std::function<void(std::size_t)>& task);
 
-  /// One batch entry's blocks after another's: calls work(entry, begin, end) for blocks of at most grain items of every entry.
-  /// counts[k] is the number of items of entry k.
+  /// One batch entry's blocks after another's: calls work(entry, begin, end) for blocks of at most
+  /// grain items of every entry. counts[k] is the number of items of entry k.
   template <typename Count, typename Work>
   void parallel_items(std::size_t entries, Count&& count, std::size_t grain, Work&& work) {
     struct Block {
@@ -35,15 +37,19 @@ class Exec {
     std::vector<Block> blocks;
     for (std::size_t e = 0; e < entries; ++e) {
       const std::size_t n = count(e);
-      for (std::size_t b = 0; b < n; b += grain) blocks.push_back({e, b, b + grain < n ? b + grain : n});
+      for (std::size_t b = 0; b < n; b += grain)
+        blocks.push_back({e, b, b + grain < n ? b + grain : n});
     }
-    parallel(blocks.size(), [&](std::size_t k) { work(blocks[k].entry, blocks[k].begin, blocks[k].end); });
+    parallel(blocks.size(),
+             [&](std::size_t k) { work(blocks[k].entry, blocks[k].begin, blocks[k].end); });
   }
 
   /// A point in time, and the time between two.
   using Mark = std::chrono::steady_clock::time_point;
   Mark mark() const { return std::chrono::steady_clock::now(); }
-  double milliseconds(Mark from, Mark to) const { return std::chrono::duration<double, std::milli>(to - from).count(); }
+  double milliseconds(Mark from, Mark to) const {
+    return std::chrono::duration<double, std::milli>(to - from).count();
+  }
 
  private:
   void run_tasks();

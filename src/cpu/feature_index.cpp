@@ -54,7 +54,10 @@ class Splitter {
     float most = -1;
     for (std::uint32_t d = 0; d < rows_.dimension; ++d) {
       const float spread = squares_[d] - sum_[d] * sum_[d] / static_cast<float>(last - first);
-      if (spread > most) most = spread, best = d;
+      if (spread > most) {
+        most = spread;
+        best = d;
+      }
     }
     return best;
   }
@@ -181,7 +184,8 @@ class Search {
       // Rows infinitely far away are not near: best_row_ is kNoValue as long as the best is
       // infinite.
       if (distances[l] == best_ && (best_row_ == kNoValue || row >= best_row_)) continue;
-      best_ = distances[l], best_row_ = row;
+      best_ = distances[l];
+      best_row_ = row;
     }
   }
 

@@ -6,20 +6,29 @@
 namespace gpureg::cpu {
 
 std::vector<Hypotheses> fit_hypotheses(Exec& exec, const std::vector<Matches>& matches,
-                                       const std::vector<std::vector<std::uint32_t>>& quadruples, const HypothesisOptions& options) {
+                                       const std::vector<std::vector<std::uint32_t>>& quadruples,
+                                       const HypothesisOptions& options) {
   std::vector<std::vector<Pose<float>>> poses(matches.size());
   std::vector<std::vector<std::uint8_t>> valid(matches.size());
-  for (std::size_t p = 0; p < matches.size(); ++p) poses[p].resize(quadruples[p].size()), valid[p].resize(quadruples[p].size());
-  exec.parallel_items(matches.size(), [&](std::size_t p) { return quadruples[p].size(); }, 512,
-                      [&](std::size_t p, std::size_t begin, std::size_t end) {
-                        const std::vector<MatchedPoints>& m = matches[p].pairs;
-                        for (std::size_t k = begin; k < end; ++k) {
-                          const Quadruple q = draw_quadruple(quadruples[p][k], options.seed, static_cast<std::uint32_t>(m.size()));
-                          Vec3 source[4], target[4];
-                          for (int c = 0; c < 4; ++c) source[c] = m[q.match[c]].source, target[c] = m[q.match[c]].target;
-                          valid[p][k] = fit_rigid(source, target, poses[p][k]);
-                        }
-                      });
+  for (std::size_t p = 0; p < matches.size(); ++p) {
+    poses[p].resize(quadruples[p].size());
+    valid[p].resize(quadruples[p].size());
+  }
+  exec.parallel_items(
+      matches.size(), [&](std::size_t p) { return quadruples[p].size(); }, 512,
+      [&](std::size_t p, std::size_t begin, std::size_t end) {
+        const std::vector<MatchedPoints>& m = matches[p].pairs;
+        for (std::size_t k = begin; k < end; ++k) {
+          const Quadruple q =
+              draw_quadruple(quadruples[p][k], options.seed, static_cast<std::uint32_t>(m.size()));
+          Vec3 source[4], target[4];
+          for (int c = 0; c < 4; ++c) {
+            source[c] = m[q.match[c]].source;
+            target[c] = m[q.match[c]].target;
+          }
+          valid[p][k] = fit_rigid(source, target, poses[p][k]);
+        }
+      });
   std::vector<Hypotheses> out(matches.size());
   for (std::size_t p = 0; p < matches.size(); ++p)
     for (std::size_t k = 0; k < quadruples[p].size(); ++k)

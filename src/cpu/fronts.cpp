@@ -4,12 +4,14 @@
 
 namespace gpureg::cpu {
 
-std::vector<Fronts> build_fronts(Exec& exec, const std::vector<DownsampledCloud>& clouds, const std::vector<std::vector<Vec3>>& normals,
+std::vector<Fronts> build_fronts(Exec& exec, const std::vector<DownsampledCloud>& clouds,
+                                 const std::vector<std::vector<Vec3>>& normals,
                                  const PrepareOptions& options) {
   std::vector<Fronts> out(clouds.size());
   exec.parallel(clouds.size(), [&](std::size_t c) {
     const std::vector<Vec3>& points = clouds[c].points;
-    const FrontBox box = out[c].box = front_box(clouds[c].lo, clouds[c].hi, options.front_reach, !points.empty());
+    const FrontBox box = out[c].box =
+        front_box(clouds[c].lo, clouds[c].hi, options.front_reach, !points.empty());
     std::vector<std::uint32_t>& words = out[c].words;
     words.assign(box.words(), 0);
     if (words.empty()) return;
@@ -19,7 +21,8 @@ std::vector<Fronts> build_fronts(Exec& exec, const std::vector<DownsampledCloud>
     }
     for (std::size_t i = 0; i < points.size(); ++i)
       for (std::uint32_t side = 0; side < 2; ++side)
-        march_front(box, words.data(), points[i], normals[c][i], side, [&](std::uint32_t word, std::uint32_t bits) { words[word] |= bits; });
+        march_front(box, words.data(), points[i], normals[c][i], side,
+                    [&](std::uint32_t word, std::uint32_t bits) { words[word] |= bits; });
   });
   return out;
 }

@@ -19,7 +19,8 @@ void CellTable::insert(std::uint64_t key, std::uint32_t value) {
 }
 
 GridView Grid::view() const {
-  return {cell_size, 1.0f / cell_size, span_of(table.entries), span_of(cell_start), span_of(points), span_of(index)};
+  return {cell_size,           1.0f / cell_size, span_of(table.entries),
+          span_of(cell_start), span_of(points),  span_of(index)};
 }
 
 namespace {
@@ -35,16 +36,19 @@ double squared_cell_sizes(const Grid& grid) {
 
 }  // namespace
 
-std::vector<Grid> build_grids(Exec& exec, const std::vector<DownsampledCloud>& clouds, const PrepareOptions& options) {
+std::vector<Grid> build_grids(Exec& exec, const std::vector<DownsampledCloud>& clouds,
+                              const PrepareOptions& options) {
   std::vector<Grid> grids(clouds.size());
   exec.parallel(clouds.size(), [&](std::size_t c) {
     Grid& grid = grids[c];
     const std::vector<Vec3>& points = clouds[c].points;
-    // Half the feature radius: a ball touches about 5^3 cells, most of them empty, and few points outside the ball are visited.
+    // Half the feature radius: a ball touches about 5^3 cells, most of them empty, and few points
+    // outside the ball are visited.
     grid.cell_size = options.feature_radius * 0.5f;
     const float inverse = 1.0f / grid.cell_size;
     std::vector<KeyIndex> order(points.size());
-    for (std::size_t i = 0; i < points.size(); ++i) order[i] = {cell_key(cell_of(points[i], inverse)), static_cast<std::uint32_t>(i)};
+    for (std::size_t i = 0; i < points.size(); ++i)
+      order[i] = {cell_key(cell_of(points[i], inverse)), static_cast<std::uint32_t>(i)};
     radix_sort(order);
     std::vector<std::uint64_t> keys;
     for (std::size_t i = 0; i < order.size(); ++i) {
@@ -58,7 +62,8 @@ std::vector<Grid> build_grids(Exec& exec, const std::vector<DownsampledCloud>& c
     grid.cell_start.push_back(static_cast<std::uint32_t>(points.size()));
     pipeline::check_density(squared_cell_sizes(grid), points.size(), options);
     grid.table.reset(keys.size());
-    for (std::size_t k = 0; k < keys.size(); ++k) grid.table.insert(keys[k], static_cast<std::uint32_t>(k));
+    for (std::size_t k = 0; k < keys.size(); ++k)
+      grid.table.insert(keys[k], static_cast<std::uint32_t>(k));
   });
   return grids;
 }

@@ -12,9 +12,14 @@ class IcpBatch {
   static constexpr int kLanes = 8;
 
   void add(Vec3 arm, Vec3 normal, float residual, float weight) {
-    ax_[size_] = arm.x, ay_[size_] = arm.y, az_[size_] = arm.z;
-    nx_[size_] = normal.x, ny_[size_] = normal.y, nz_[size_] = normal.z;
-    residual_[size_] = residual, weight_[size_] = weight;
+    ax_[size_] = arm.x;
+    ay_[size_] = arm.y;
+    az_[size_] = arm.z;
+    nx_[size_] = normal.x;
+    ny_[size_] = normal.y;
+    nz_[size_] = normal.z;
+    residual_[size_] = residual;
+    weight_[size_] = weight;
     if (++size_ == kLanes) flush();
   }
   IcpSums sums() {
@@ -34,8 +39,12 @@ class IcpBatch {
     alignas(32) float j[6][kLanes], weighted[6][kLanes];
     for (int l = 0; l < kLanes; ++l) {
       const Vec3 turn = cross({ax_[l], ay_[l], az_[l]}, {nx_[l], ny_[l], nz_[l]});
-      j[0][l] = turn.x, j[1][l] = turn.y, j[2][l] = turn.z;
-      j[3][l] = nx_[l], j[4][l] = ny_[l], j[5][l] = nz_[l];
+      j[0][l] = turn.x;
+      j[1][l] = turn.y;
+      j[2][l] = turn.z;
+      j[3][l] = nx_[l];
+      j[4][l] = ny_[l];
+      j[5][l] = nz_[l];
     }
     for (int a = 0; a < 6; ++a)
       for (int l = 0; l < kLanes; ++l) weighted[a][l] = weight_[l] * j[a][l];

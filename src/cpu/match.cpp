@@ -11,29 +11,34 @@
 namespace gpureg::cpu {
 namespace {
 
-constexpr int kLanes = 16;    // rows side by side
-constexpr int kQueries = 4;   // queries side by side: their sums stay in registers
+constexpr int kLanes = 16;   // rows side by side
+constexpr int kQueries = 4;  // queries side by side: their sums stay in registers
 
-/// Rows transposed in blocks of kLanes: block, dimension, lane. Invalid and missing rows are so far away that no query meets them.
+/// Rows transposed in blocks of kLanes: block, dimension, lane. Invalid and missing rows are so far
+/// away that no query meets them.
 std::vector<float> transpose_blocks(FeatureRows rows) {
   const std::size_t blocks = (rows.size + kLanes - 1) / kLanes;
   std::vector<float> out(blocks * rows.dimension * kLanes, std::numeric_limits<float>::infinity());
   for (std::size_t i = 0; i < rows.size; ++i) {
     if (!rows.valid[i]) continue;
     float* block = out.data() + i / kLanes * rows.dimension * kLanes + i % kLanes;
-    for (std::size_t d = 0; d < rows.dimension; ++d) block[d * kLanes] = rows.values[i * rows.dimension + d];
+    for (std::size_t d = 0; d < rows.dimension; ++d)
+      block[d * kLanes] = rows.values[i * rows.dimension + d];
   }
   return out;
 }
 
-/// Squared distances of kQueries queries to one block: sum over the dimensions in ascending order, each step one fmaf.
-void block_distances(const float* const* queries, const float* block, std::size_t dimension, float (*out)[kLanes]) {
+/// Squared distances of kQueries queries to one block: sum over the dimensions in ascending order,
+/// each step one fmaf.
+void block_distances(const float* const* queries, const float* block, std::size_t dimension,
+                     float (*out)[kLanes]) {
 #if defined(__AVX2__) && defined(__FMA__)
   static_assert(kLanes == 16 && kQueries == 4, "written out for 4 x 16");
   __m256 sum[kQueries][2];
   for (auto& s : sum) s[0] = s[1] = _mm256_setzero_ps();
   for (std::size_t d = 0; d < dimension; ++d) {
-    const __m256 lo = _mm256_loadu_ps(block + d * kLanes), hi = _mm256_loadu_ps(block + d * kLanes + 8);
+    const __m256 lo = _mm256_loadu_ps(block + d * kLanes),
+                 hi = _mm256_loadu_ps(block + d * kLanes + 8);
     for (int q = 0; q < kQueries; ++q) {
       const __m256 value = _mm256_set1_ps(queries[q][d]);
       const __m256 a = _mm256_sub_ps(value, lo), b = _mm256_sub_ps(value, hi);
@@ -57,7 +62,8 @@ void block_distances(const float* const* queries, const float* block, std::size_
 #endif
 }
 
-/// The k best (distance, index) of one query, ascending; ties keep the lower index because rows come in ascending order.
+/// The k best (distance, index) of one query, ascending; ties keep the lower index because rows
+/// come in ascending order.
 struct TopK {
   float distance[16];
   std::uint32_t index[16];
@@ -70,14 +76,17 @@ struct TopK {
   }
   void insert(float d, std::uint32_t i) {
     std::uint32_t at = k - 1;
-    for (; at > 0 && d < distance[at - 1]; --at) distance[at] = distance[at - 1], index[at] = index[at - 1];
+    for (; at > 0 && d < distance[at - 1]; --at) {
+      distance[at] = distance[at - 1];
+      index[at] = index[at - 1];
+    }
     distance[at] = d;
     index[at] = i;
   }
 };
 
-void search(FeatureRows queries, const std::vector<float>& blocks, FeatureRows rows, std::uint32_t k, std::size_t begin, std::size_t end,
-            std::uint32_t* out) {
+void search(FeatureRows queries, const std::vector<float>& blocks, FeatureRows rows,
+            std::uint32_t k, std::size_t begin, std::size_t end, std::uint32_t* out) {
   const std::size_t block_count = (rows.size + kLanes - 1) / kLanes;
   const std::size_t dimension = rows.dimension;
   TopK top[kQueries];
@@ -93,18 +102,23 @@ void search(FeatureRows queries, const std::vector<float>& blocks, FeatureRows r
       for (int j = 0; j < kQueries; ++j) {
         const float worst = top[j].distance[k - 1];
         float smallest = distances[j][0];
-        for (int l = 1; l < kLanes; ++l) smallest = distances[j][l] < smallest ? distances[j][l] : smallest;
+        for (int l = 1; l < kLanes; ++l)
+          smallest = distances[j][l] < smallest ? distances[j][l] : smallest;
         if (!(smallest < worst)) continue;
         for (int l = 0; l < kLanes; ++l)
-          if (distances[j][l] < top[j].distance[k - 1]) top[j].insert(distances[j][l], static_cast<std::uint32_t>(b * kLanes + l));
+          if (distances[j][l] < top[j].distance[k - 1])
+            top[j].insert(distances[j][l], static_cast<std::uint32_t>(b * kLanes + l));
       }
     }
     for (int j = 0; j < kQueries && q + j < end; ++j)
-      for (std::uint32_t t = 0; t < k; ++t) out[(q + j - begin) * k + t] = queries.valid[q + j] ? top[j].index[t] : kNoValue;
+      for (std::uint32_t t = 0; t < k; ++t)
+        out[(q + j - begin) * k + t] = queries.valid[q + j] ? top[j].index[t] : kNoValue;
   }
 }
 
-FeatureRows rows_of(const CloudView& cloud) { return {cloud.features, cloud.has_feature, cloud.size, cloud.feature_dimension}; }
+FeatureRows rows_of(const CloudView& cloud) {
+  return {cloud.features, cloud.has_feature, cloud.size, cloud.feature_dimension};
+}
 
 MatchedPoints matched(const PairView& pair, std::uint32_t source, std::uint32_t target) {
   return {pair.source.points[source], pair.target.points[target], source, target};
@@ -112,15 +126,19 @@ MatchedPoints matched(const PairView& pair, std::uint32_t source, std::uint32_t 
 
 }  // namespace
 
-void nearest_features(FeatureRows queries, FeatureRows rows, std::uint32_t k, std::size_t begin, std::size_t end, std::uint32_t* out) {
+void nearest_features(FeatureRows queries, FeatureRows rows, std::uint32_t k, std::size_t begin,
+                      std::size_t end, std::uint32_t* out) {
   search(queries, transpose_blocks(rows), rows, k, begin, end, out);
 }
 
-std::vector<Matches> match_features(Exec& exec, Span<const PairView> pairs, const HypothesisOptions& options) {
+std::vector<Matches> match_features(Exec& exec, Span<const PairView> pairs,
+                                    const HypothesisOptions& options) {
   const std::uint32_t k = options.neighbors;
   std::vector<std::vector<float>> forward_blocks(pairs.size), backward_blocks(pairs.size);
   std::vector<std::vector<std::uint32_t>> forward(pairs.size), backward(pairs.size);
-  const auto asks = [&](std::size_t p) { return pairs[p].custom_count == 0 && pairs[p].source.size > 0 && pairs[p].target.size > 0; };
+  const auto asks = [&](std::size_t p) {
+    return pairs[p].custom_count == 0 && pairs[p].source.size > 0 && pairs[p].target.size > 0;
+  };
   exec.parallel(pairs.size, [&](std::size_t p) {
     if (!asks(p)) return;
     forward_blocks[p] = transpose_blocks(rows_of(pairs[p].target));
@@ -129,23 +147,26 @@ std::vector<Matches> match_features(Exec& exec, Span<const PairView> pairs, cons
     backward_blocks[p] = transpose_blocks(rows_of(pairs[p].source));
     backward[p].resize(pairs[p].target.size);
   });
-  exec.parallel_items(pairs.size, [&](std::size_t p) { return asks(p) ? pairs[p].source.size : 0; }, 256,
-                      [&](std::size_t p, std::size_t begin, std::size_t end) {
-                        search(rows_of(pairs[p].source), forward_blocks[p], rows_of(pairs[p].target), k, begin, end,
-                               forward[p].data() + begin * k);
-                      });
+  exec.parallel_items(
+      pairs.size, [&](std::size_t p) { return asks(p) ? pairs[p].source.size : 0; }, 256,
+      [&](std::size_t p, std::size_t begin, std::size_t end) {
+        search(rows_of(pairs[p].source), forward_blocks[p], rows_of(pairs[p].target), k, begin, end,
+               forward[p].data() + begin * k);
+      });
   if (options.mutual)
-    exec.parallel_items(pairs.size, [&](std::size_t p) { return asks(p) ? pairs[p].target.size : 0; }, 256,
-                        [&](std::size_t p, std::size_t begin, std::size_t end) {
-                          search(rows_of(pairs[p].target), backward_blocks[p], rows_of(pairs[p].source), 1, begin, end,
-                                 backward[p].data() + begin);
-                        });
+    exec.parallel_items(
+        pairs.size, [&](std::size_t p) { return asks(p) ? pairs[p].target.size : 0; }, 256,
+        [&](std::size_t p, std::size_t begin, std::size_t end) {
+          search(rows_of(pairs[p].target), backward_blocks[p], rows_of(pairs[p].source), 1, begin,
+                 end, backward[p].data() + begin);
+        });
 
   std::vector<Matches> out(pairs.size);
   exec.parallel(pairs.size, [&](std::size_t p) {
     const PairView& pair = pairs[p];
     std::vector<MatchedPoints>& matches = out[p].pairs;
-    for (std::uint32_t c = 0; c < pair.custom_count; ++c) matches.push_back(matched(pair, pair.custom_source[c], pair.custom_target[c]));
+    for (std::uint32_t c = 0; c < pair.custom_count; ++c)
+      matches.push_back(matched(pair, pair.custom_source[c], pair.custom_target[c]));
     for (std::size_t m = 0; m < forward[p].size(); ++m) {
       const std::uint32_t source = static_cast<std::uint32_t>(m / k), target = forward[p][m];
       if (target == kNoValue || (options.mutual && backward[p][target] != source)) continue;

@@ -99,7 +99,8 @@ void refine_modes(Exec& exec, Span<const PairView> pairs, std::vector<std::vecto
       });
 }
 
-void merge_modes(Exec& exec, std::vector<std::vector<Mode>>& modes, const EvidenceOptions& evidence) {
+void merge_modes(Exec& exec, std::vector<std::vector<Mode>>& modes,
+                 const EvidenceOptions& evidence) {
   const float min_trace = mode_trace(evidence.mode_angle),
               squared_distance = evidence.mode_distance * evidence.mode_distance;
   exec.parallel(modes.size(), [&](std::size_t p) {

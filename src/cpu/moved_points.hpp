@@ -113,8 +113,10 @@ class MovedPoints {
 inline ScoringOrder sampled_order(const CpuCloud& cloud, std::uint32_t stride) {
   if (stride == 1) return cloud.order;
   std::vector<Vec3> points, normals;
-  for (std::size_t i = 0; i < cloud.points.size(); i += stride)
-    points.push_back(cloud.points[i]), normals.push_back(cloud.normals[i]);
+  for (std::size_t i = 0; i < cloud.points.size(); i += stride) {
+    points.push_back(cloud.points[i]);
+    normals.push_back(cloud.normals[i]);
+  }
   ScoringOrder out = scoring_order(points, normals, cloud.options.search_distance);
   for (std::uint32_t& i : out.index) i = i == kNoValue ? kNoValue : i * stride;
   return out;

@@ -19,8 +19,12 @@ class NeighborRows {
     for (auto* v : {&x_, &y_, &z_, &nx_, &ny_, &nz_}) v->resize(n);
     for (std::size_t k = 0; k < n; ++k) {
       const Vec3 p = grid.points[k], m = normals[grid.index[k]];
-      x_[k] = p.x, y_[k] = p.y, z_[k] = p.z;
-      nx_[k] = m.x, ny_[k] = m.y, nz_[k] = m.z;
+      x_[k] = p.x;
+      y_[k] = p.y;
+      z_[k] = p.z;
+      nx_[k] = m.x;
+      ny_[k] = m.y;
+      nz_[k] = m.z;
     }
     for (std::size_t c = 0; c < cells; ++c) {
       const Cell cell = cell_of(grid.points[grid.cell_start[c]], inverse_);
@@ -73,15 +77,18 @@ class NeighborRows {
     const float r2 = radius * radius;
     std::size_t n = 0;
     for_each_run(q, radius, [&](std::uint32_t first, std::uint32_t last) {
-      if (places.size() < n + (last - first))
-        places.resize(2 * (n + (last - first))), squared.resize(places.size());
+      if (places.size() < n + (last - first)) {
+        places.resize(2 * (n + (last - first)));
+        squared.resize(places.size());
+      }
       std::uint32_t* place = places.data();
       float* d2 = squared.data();
       // Whether a point is near is a coin toss: it is written in any case, and the next one
       // overwrites it where it is not.
       for (std::uint32_t k = first; k < last; ++k) {
         const float d = squared_norm(point(k) - q);
-        place[n] = k, d2[n] = d;
+        place[n] = k;
+        d2[n] = d;
         n += static_cast<std::size_t>((d <= r2) & keep(k, d));
       }
     });

@@ -24,8 +24,12 @@ class PairBins {
     if (x_.size() < size_ + kLanes) grow();
     for (std::size_t k = 0; k < size_; ++k) {
       const Vec3 q = rows.point(places_[k]), m = rows.normal(places_[k]);
-      x_[k] = q.x, y_[k] = q.y, z_[k] = q.z;
-      mx_[k] = m.x, my_[k] = m.y, mz_[k] = m.z;
+      x_[k] = q.x;
+      y_[k] = q.y;
+      z_[k] = q.z;
+      mx_[k] = m.x;
+      my_[k] = m.y;
+      mz_[k] = m.z;
     }
     for (std::size_t first = 0; first < size_; first += kLanes) bin(first, p, n);
     for (std::size_t k = 0; k < size_; ++k) {
@@ -95,12 +99,18 @@ class PairBins {
     for (int k = 0; k < kLanes; ++k) {
       const Vec3 d = Vec3{x[k], y[k], z[k]} - p;
       length[k] = norm(d);
-      a1[k] = dot(n, d) / length[k], a2[k] = dot(Vec3{mx[k], my[k], mz[k]}, d) / length[k];
-      dx[k] = d.x, dy[k] = d.y, dz[k] = d.z;
+      a1[k] = dot(n, d) / length[k];
+      a2[k] = dot(Vec3{mx[k], my[k], mz[k]}, d) / length[k];
+      dx[k] = d.x;
+      dy[k] = d.y;
+      dz[k] = d.z;
     }
     // Bits say whether the other point is the source: choices by bits are no branches.
     alignas(32) std::int32_t turned[kLanes];
-    for (int k = 0; k < kLanes; ++k) phi[k] = absolute(a1[k]), theta[k] = absolute(a2[k]);
+    for (int k = 0; k < kLanes; ++k) {
+      phi[k] = absolute(a1[k]);
+      theta[k] = absolute(a2[k]);
+    }
     for (int k = 0; k < kLanes; ++k) turned[k] = phi[k] < theta[k] ? 1 : 0;
     for (int k = 0; k < kLanes; ++k) phi[k] = turned[k] ? -a2[k] : a1[k];
     for (int k = 0; k < kLanes; ++k) dx[k] = turned[k] ? -dx[k] : dx[k];
@@ -118,7 +128,9 @@ class PairBins {
       v_norm[k] = norm(v);
       v = {v.x / v_norm[k], v.y / v_norm[k], v.z / v_norm[k]};
       const Vec3 w = cross(from, v);
-      alpha[k] = dot(v, to), sine[k] = dot(w, to), cosine[k] = dot(from, to);
+      alpha[k] = dot(v, to);
+      sine[k] = dot(w, to);
+      cosine[k] = dot(from, to);
     }
     angles(sine, cosine, theta);
     for (int k = 0; k < kLanes; ++k) {
@@ -127,7 +139,9 @@ class PairBins {
       phi[k] = (phi[k] + 1.0f) * 0.5f;
     }
     alignas(32) std::int32_t b0[kLanes], b1[kLanes], b2[kLanes];
-    bins_of(theta, b0), bins_of(alpha, b1), bins_of(phi, b2);
+    bins_of(theta, b0);
+    bins_of(alpha, b1);
+    bins_of(phi, b2);
     std::uint32_t* bins = &bins_[first];
     for (int k = 0; k < kLanes; ++k)
       bins[k] = static_cast<std::uint32_t>(b0[k] | b1[k] << 8 | b2[k] << 16);

@@ -17,15 +17,17 @@ namespace gpureg::cpu {
 
 struct DownsampledCloud {
   float origin[3] = {0, 0, 0};
-  float radius = 1;                  ///< of the points about the origin
-  Vec3 lo{0, 0, 0}, hi{0, 0, 0};     ///< corners of the raw points' box, local
+  float radius = 1;               ///< of the points about the origin
+  Vec3 lo{0, 0, 0}, hi{0, 0, 0};  ///< corners of the raw points' box, local
   std::uint64_t input_points = 0, invalid_points = 0;
-  std::vector<Vec3> points;          ///< local, in voxel order (z, y, x), or input order without downsampling
-  std::vector<Vec3> guides;          ///< empty, or the mean input normal of each point, zero where unknown
-  std::vector<float> features;       ///< empty, or the mean input feature of each point
+  /// local, in voxel order (z, y, x), or input order without downsampling
+  std::vector<Vec3> points;
+  /// empty, or the mean input normal of each point, zero where unknown
+  std::vector<Vec3> guides;
+  std::vector<float> features;  ///< empty, or the mean input feature of each point
   std::uint32_t feature_dimension = 0;
-  std::vector<Vec3> viewpoints;      ///< local, at least one
-  bool turns_normals = false;        ///< the input's, by the viewpoints
+  std::vector<Vec3> viewpoints;  ///< local, at least one
+  bool turns_normals = false;    ///< the input's, by the viewpoints
 };
 
 struct CellTable {
@@ -60,18 +62,20 @@ struct ScoringOrder {
 /// See cell_summary.hpp. Empty for a cloud too wide for the table.
 struct CellSummaries {
   float inverse_cell_size = 1;
-  Vec3 offset{0, 0, 0};                ///< in cells: cell = p * inverse_cell_size + offset
-  std::int32_t nx = 0, ny = 0, nz = 0; ///< blocks
-  std::vector<std::int32_t> block;     ///< 1 + index of the block, or 0
-  std::vector<std::uint32_t> summary;  ///< (1 + blocks) x 512
+  Vec3 offset{0, 0, 0};                 ///< in cells: cell = p * inverse_cell_size + offset
+  std::int32_t nx = 0, ny = 0, nz = 0;  ///< blocks
+  std::vector<std::int32_t> block;      ///< 1 + index of the block, or 0
+  std::vector<std::uint32_t> summary;   ///< (1 + blocks) x 512
 };
 
 /// Depth maps of a cloud's viewpoints, see visibility.hpp.
 struct Visibility {
-  std::vector<std::uint16_t> depth;   ///< viewpoints x kMapCells
-  std::vector<Vec3> viewpoints;       ///< local
+  std::vector<std::uint16_t> depth;  ///< viewpoints x kMapCells
+  std::vector<Vec3> viewpoints;      ///< local
   float step = 1;
-  VisibilityView view() const { return {depth.data(), viewpoints.data(), static_cast<std::uint32_t>(viewpoints.size()), step}; }
+  VisibilityView view() const {
+    return {depth.data(), viewpoints.data(), static_cast<std::uint32_t>(viewpoints.size()), step};
+  }
 };
 
 /// See fronts.hpp.
@@ -86,7 +90,7 @@ struct ClosestGrid {
   CellTable table;
   std::vector<std::uint32_t> cell_start;
   std::vector<std::uint32_t> candidates;
-  std::vector<Cell> blocks;            ///< in order of their index
+  std::vector<Cell> blocks;  ///< in order of their index
   ClosestGridView view() const;
 };
 
@@ -110,21 +114,23 @@ struct Matches {
   std::vector<MatchedPoints> pairs;
 };
 
-/// The matches of a pair that candidates are made of, each coordinate an array of its own; in an order that says nothing about them.
+/// The matches of a pair that candidates are made of, each coordinate an array of its own; in an
+/// order that says nothing about them.
 struct MatchSet {
-  std::vector<float> px, py, pz, qx, qy, qz;       ///< local points of source and target
-  std::vector<float> mx, my, mz, nx, ny, nz;       ///< their normals
-  std::vector<std::uint32_t> source, target;       ///< their indices
-  std::vector<std::uint32_t> source_weight, target_weight;  ///< balanced over the normals of all matches
+  std::vector<float> px, py, pz, qx, qy, qz;  ///< local points of source and target
+  std::vector<float> mx, my, mz, nx, ny, nz;  ///< their normals
+  std::vector<std::uint32_t> source, target;  ///< their indices
+  /// balanced over the normals of all matches
+  std::vector<std::uint32_t> source_weight, target_weight;
   std::uint64_t source_total = 0, target_total = 0;
-  std::uint32_t found = 0;                         ///< before the choice
+  std::uint32_t found = 0;  ///< before the choice
   std::uint32_t size() const { return static_cast<std::uint32_t>(source.size()); }
 };
 
 /// Candidate poses of a pair, in the order of their seeds.
 struct Candidates {
   std::vector<Pose<float>> pose;
-  std::vector<std::uint32_t> seed;      ///< index of the match that it grew from
+  std::vector<std::uint32_t> seed;  ///< index of the match that it grew from
   std::vector<MatchEvidence> matches;
   std::vector<float> promise;
 };
@@ -136,7 +142,7 @@ struct Mode {
 };
 
 struct Hypotheses {
-  std::vector<std::uint32_t> id;   ///< number among all drawn, ascending
+  std::vector<std::uint32_t> id;  ///< number among all drawn, ascending
   std::vector<Pose<float>> pose;
 };
 
@@ -148,7 +154,8 @@ struct BestPose {
   std::uint32_t iterations = 0;
 };
 
-/// What the final pose is judged and described by: its support under the judge's normal test, and the moments of all points in reach.
+/// What the final pose is judged and described by: its support under the judge's normal test, and
+/// the moments of all points in reach.
 struct Judgement {
   Support support{0, 0, 0};
   Moments source{0, {0, 0, 0}, {0, 0, 0, 0, 0, 0}};

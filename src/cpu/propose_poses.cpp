@@ -19,12 +19,19 @@ struct Members {
 
   explicit Members(std::uint32_t most) {
     for (auto* v : {&px, &py, &pz, &qx, &qy, &qz}) v->resize(most);
-    weight.resize(most), match.resize(most), remaining.resize(most / kBlock + 1);
+    weight.resize(most);
+    match.resize(most);
+    remaining.resize(most / kBlock + 1);
   }
   void add(const MatchSet& m, std::uint32_t k) {
-    px[size] = m.px[k], py[size] = m.py[k], pz[size] = m.pz[k];
-    qx[size] = m.qx[k], qy[size] = m.qy[k], qz[size] = m.qz[k];
-    weight[size] = m.source_weight[k] + m.target_weight[k], match[size] = k;
+    px[size] = m.px[k];
+    py[size] = m.py[k];
+    pz[size] = m.pz[k];
+    qx[size] = m.qx[k];
+    qy[size] = m.qy[k];
+    qz[size] = m.qz[k];
+    weight[size] = m.source_weight[k] + m.target_weight[k];
+    match[size] = k;
     ++size;
   }
   void gather(const MatchSet& m, std::uint32_t seed, const CompatibilityTest& test,
@@ -100,7 +107,12 @@ bool fit_seed(const MatchSet& m, std::uint32_t seed, const CompatibilityOptions&
     const std::uint32_t support = members.support(rigid, squared_distance, best);
     if (support <= best) continue;
     best = support;
-    p[0] = p0, p[1] = p1, p[2] = p2, q[0] = q0, q[1] = q1, q[2] = q2;
+    p[0] = p0;
+    p[1] = p1;
+    p[2] = p2;
+    q[0] = q0;
+    q[1] = q1;
+    q[2] = q2;
   }
   if (best == 0 || !fit_rigid(p, q, 3, pose)) return false;
   for (std::uint32_t k = 0; k < options.refits; ++k) {
@@ -130,7 +142,9 @@ MatchEvidence count_matches(const MatchSet& m, const Rigid& pose, float squared_
       source += take & ws[k];
       target += take & wt[k];
     }
-    total.inliers += inliers, total.source_weight += source, total.target_weight += target;
+    total.inliers += inliers;
+    total.source_weight += source;
+    total.target_weight += target;
   }
   return total;
 }
@@ -141,9 +155,11 @@ std::vector<Candidates> propose_poses(Exec& exec, const std::vector<MatchSet>& m
                                       const CompatibilityOptions& options) {
   std::vector<Candidates> all(matches.size());
   std::vector<std::vector<std::uint8_t>> valid(matches.size());
-  for (std::size_t p = 0; p < matches.size(); ++p)
-    all[p].pose.resize(seeds[p].size()), all[p].matches.resize(seeds[p].size()),
-        valid[p].resize(seeds[p].size());
+  for (std::size_t p = 0; p < matches.size(); ++p) {
+    all[p].pose.resize(seeds[p].size());
+    all[p].matches.resize(seeds[p].size());
+    valid[p].resize(seeds[p].size());
+  }
   const float squared_distance = options.consensus_distance * options.consensus_distance;
   exec.parallel_items(
       matches.size(), [&](std::size_t p) { return seeds[p].size(); }, 32,

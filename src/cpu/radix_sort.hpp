@@ -12,12 +12,16 @@ struct KeyIndex {
   std::uint32_t index;
 };
 
-/// Stable least-significant-digit radix sort by key; digits that are the same everywhere cost nothing.
+/// Stable least-significant-digit radix sort by key; digits that are the same everywhere cost
+/// nothing.
 inline void radix_sort(std::vector<KeyIndex>& items) {
   constexpr int kBits = 11;
   constexpr std::uint32_t kBuckets = 1u << kBits;
   std::uint64_t all_or = 0, all_and = ~std::uint64_t(0);
-  for (const KeyIndex& item : items) all_or |= item.key, all_and &= item.key;
+  for (const KeyIndex& item : items) {
+    all_or |= item.key;
+    all_and &= item.key;
+  }
   const std::uint64_t varying = all_or ^ all_and;
   std::vector<KeyIndex> other(items.size());
   for (int shift = 0; shift < 64; shift += kBits) {

@@ -14,7 +14,8 @@ static_assert(sizeof(MatchedPoints) == 8 * sizeof(float), "first_sides steps by 
 constexpr std::uint32_t kBlock = 1 << 16;  // hypotheses per task
 constexpr int kLanes = 8;
 
-/// The quadruples of kLanes hypotheses side by side, out[draw][lane]: the same integer steps as draw_quadruple.
+/// The quadruples of kLanes hypotheses side by side, out[draw][lane]: the same integer steps as
+/// draw_quadruple.
 #if defined(__AVX2__)
 /// Low and high words of the products of eight words with a constant.
 inline void multiply(__m256i a, std::uint32_t factor, __m256i& low, __m256i& high) {
@@ -24,10 +25,13 @@ inline void multiply(__m256i a, std::uint32_t factor, __m256i& low, __m256i& hig
   high = _mm256_blend_epi32(_mm256_srli_epi64(even, 32), odd, 0xaa);
 }
 
-void draw_lanes(std::uint32_t first, std::uint64_t seed, std::uint32_t count, std::uint32_t (*out)[kLanes]) {
+void draw_lanes(std::uint32_t first, std::uint64_t seed, std::uint32_t count,
+                std::uint32_t (*out)[kLanes]) {
   static_assert(kLanes == 8, "one vector register");
-  __m256i c0 = _mm256_add_epi32(_mm256_set1_epi32(static_cast<int>(first)), _mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7));
-  __m256i c1 = _mm256_setzero_si256(), c2 = c1, c3 = _mm256_set1_epi32(static_cast<int>(kTagQuadruple));
+  __m256i c0 = _mm256_add_epi32(_mm256_set1_epi32(static_cast<int>(first)),
+                                _mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7));
+  __m256i c1 = _mm256_setzero_si256(), c2 = c1,
+          c3 = _mm256_set1_epi32(static_cast<int>(kTagQuadruple));
   std::uint32_t k0 = static_cast<std::uint32_t>(seed), k1 = static_cast<std::uint32_t>(seed >> 32);
   for (int round = 0; round < 10; ++round) {
     __m256i low0, high0, low2, high2;
@@ -48,7 +52,8 @@ void draw_lanes(std::uint32_t first, std::uint64_t seed, std::uint32_t count, st
   }
 }
 #else
-void draw_lanes(std::uint32_t first, std::uint64_t seed, std::uint32_t count, std::uint32_t (*out)[kLanes]) {
+void draw_lanes(std::uint32_t first, std::uint64_t seed, std::uint32_t count,
+                std::uint32_t (*out)[kLanes]) {
   for (int l = 0; l < kLanes; ++l) {
     const Quadruple q = draw_quadruple(first + static_cast<std::uint32_t>(l), seed, count);
     for (int d = 0; d < 4; ++d) out[d][l] = q.match[d];
@@ -59,59 +64,73 @@ void draw_lanes(std::uint32_t first, std::uint64_t seed, std::uint32_t count, st
 /// Bit l is set where the first side of lane l's quadrilateral passes the polygon test.
 #if defined(__AVX2__) && defined(__FMA__)
 unsigned first_sides(const MatchedPoints* m, const std::uint32_t (*draw)[kLanes], float tau2) {
-  // Eight matches of 32 bytes to six vectors of one coordinate each, by gathers with a stride: float k of match i is at 8 i + k.
+  // Eight matches of 32 bytes to six vectors of one coordinate each, by gathers with a stride:
+  // float k of match i is at 8 i + k.
   const float* base = reinterpret_cast<const float*>(m);
-  const __m256i i0 = _mm256_slli_epi32(_mm256_loadu_si256(reinterpret_cast<const __m256i*>(draw[0])), 3);
-  const __m256i i1 = _mm256_slli_epi32(_mm256_loadu_si256(reinterpret_cast<const __m256i*>(draw[1])), 3);
-  const auto difference = [&](int k) { return _mm256_sub_ps(_mm256_i32gather_ps(base + k, i0, 4), _mm256_i32gather_ps(base + k, i1, 4)); };
+  const __m256i i0 =
+      _mm256_slli_epi32(_mm256_loadu_si256(reinterpret_cast<const __m256i*>(draw[0])), 3);
+  const __m256i i1 =
+      _mm256_slli_epi32(_mm256_loadu_si256(reinterpret_cast<const __m256i*>(draw[1])), 3);
+  const auto difference = [&](int k) {
+    return _mm256_sub_ps(_mm256_i32gather_ps(base + k, i0, 4),
+                         _mm256_i32gather_ps(base + k, i1, 4));
+  };
   const auto squared = [&](int k) {
     const __m256 x = difference(k), y = difference(k + 1), z = difference(k + 2);
     return _mm256_fmadd_ps(z, z, _mm256_fmadd_ps(y, y, _mm256_mul_ps(x, x)));
   };
   const __m256 p = squared(0), q = squared(3), tau = _mm256_set1_ps(tau2);
-  const __m256 pass = _mm256_and_ps(_mm256_cmp_ps(p, _mm256_mul_ps(tau, q), _CMP_GE_OQ), _mm256_cmp_ps(q, _mm256_mul_ps(tau, p), _CMP_GE_OQ));
+  const __m256 pass = _mm256_and_ps(_mm256_cmp_ps(p, _mm256_mul_ps(tau, q), _CMP_GE_OQ),
+                                    _mm256_cmp_ps(q, _mm256_mul_ps(tau, p), _CMP_GE_OQ));
   return static_cast<unsigned>(_mm256_movemask_ps(pass));
 }
 #else
 unsigned first_sides(const MatchedPoints* m, const std::uint32_t (*draw)[kLanes], float tau2) {
   unsigned mask = 0;
-  for (int l = 0; l < kLanes; ++l) mask |= static_cast<unsigned>(similar_sides(m[draw[0][l]], m[draw[1][l]], tau2)) << l;
+  for (int l = 0; l < kLanes; ++l)
+    mask |= static_cast<unsigned>(similar_sides(m[draw[0][l]], m[draw[1][l]], tau2)) << l;
   return mask;
 }
 #endif
 
 }  // namespace
 
-std::vector<std::vector<std::uint32_t>> sample_quadruples(Exec& exec, const std::vector<Matches>& matches,
+std::vector<std::vector<std::uint32_t>> sample_quadruples(Exec& exec,
+                                                          const std::vector<Matches>& matches,
                                                           const HypothesisOptions& options) {
   const std::uint32_t blocks = (options.count + kBlock - 1) / kBlock;
   std::vector<std::vector<std::vector<std::uint32_t>>> parts(matches.size());
   for (std::size_t p = 0; p < matches.size(); ++p)
     if (matches[p].pairs.size() >= 4) parts[p].resize(blocks);
   const float tau2 = options.edge_similarity * options.edge_similarity;
-  exec.parallel_items(matches.size(), [&](std::size_t p) { return parts[p].size(); }, 1, [&](std::size_t p, std::size_t block, std::size_t) {
-    const std::vector<MatchedPoints>& m = matches[p].pairs;
-    const std::uint32_t count = static_cast<std::uint32_t>(m.size());
-    std::vector<std::uint32_t>& kept = parts[p][block];
-    const std::uint64_t begin = static_cast<std::uint64_t>(block) * kBlock;
-    const std::uint64_t end = begin + kBlock < options.count ? begin + kBlock : options.count;
-    std::uint32_t draw[4][kLanes];
-    for (std::uint64_t first = begin; first < end; first += kLanes) {
-      draw_lanes(static_cast<std::uint32_t>(first), options.seed, count, draw);
-      const int lanes = end - first < kLanes ? static_cast<int>(end - first) : kLanes;
-      // Most fail at their first side: nothing else is fetched for them.
-      for (unsigned mask = first_sides(m.data(), draw, tau2) & ((1u << lanes) - 1); mask != 0; mask &= mask - 1) {
-        const int l = __builtin_ctz(mask);
-        if (passes_polygon_test(m[draw[0][l]], m[draw[1][l]], m[draw[2][l]], m[draw[3][l]], tau2))
-          kept.push_back(static_cast<std::uint32_t>(first) + static_cast<std::uint32_t>(l));
-      }
-    }
-  });
+  exec.parallel_items(
+      matches.size(), [&](std::size_t p) { return parts[p].size(); }, 1,
+      [&](std::size_t p, std::size_t block, std::size_t) {
+        const std::vector<MatchedPoints>& m = matches[p].pairs;
+        const std::uint32_t count = static_cast<std::uint32_t>(m.size());
+        std::vector<std::uint32_t>& kept = parts[p][block];
+        const std::uint64_t begin = static_cast<std::uint64_t>(block) * kBlock;
+        const std::uint64_t end = begin + kBlock < options.count ? begin + kBlock : options.count;
+        std::uint32_t draw[4][kLanes];
+        for (std::uint64_t first = begin; first < end; first += kLanes) {
+          draw_lanes(static_cast<std::uint32_t>(first), options.seed, count, draw);
+          const int lanes = end - first < kLanes ? static_cast<int>(end - first) : kLanes;
+          // Most fail at their first side: nothing else is fetched for them.
+          for (unsigned mask = first_sides(m.data(), draw, tau2) & ((1u << lanes) - 1); mask != 0;
+               mask &= mask - 1) {
+            const int l = __builtin_ctz(mask);
+            if (passes_polygon_test(m[draw[0][l]], m[draw[1][l]], m[draw[2][l]], m[draw[3][l]],
+                                    tau2))
+              kept.push_back(static_cast<std::uint32_t>(first) + static_cast<std::uint32_t>(l));
+          }
+        }
+      });
   std::vector<std::vector<std::uint32_t>> out(matches.size());
   for (std::size_t p = 0; p < matches.size(); ++p)
     for (const auto& part : parts[p]) {
       const std::size_t room = options.max_survivors - out[p].size();
-      out[p].insert(out[p].end(), part.begin(), part.begin() + static_cast<std::ptrdiff_t>(std::min(room, part.size())));
+      out[p].insert(out[p].end(), part.begin(),
+                    part.begin() + static_cast<std::ptrdiff_t>(std::min(room, part.size())));
     }
   return out;
 }

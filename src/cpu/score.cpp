@@ -10,13 +10,16 @@
 namespace gpureg::cpu {
 namespace {
 
-const CpuCloud& executor_data(const CloudView& cloud) { return *static_cast<const CpuCloud*>(cloud.executor_data); }
+const CpuCloud& executor_data(const CloudView& cloud) {
+  return *static_cast<const CpuCloud*>(cloud.executor_data);
+}
 
-/// Groups of points in the order of how often poses failed at them so far, the most frequent first. The order decides when a pose is
-/// given up, never whether.
+/// Groups of points in the order of how often poses failed at them so far, the most frequent first.
+/// The order decides when a pose is given up, never whether.
 class GroupOrder {
  public:
-  explicit GroupOrder(std::size_t groups) : group_(groups), looked_(groups, 1), failed_(groups, 0), rate_(groups) {
+  explicit GroupOrder(std::size_t groups)
+      : group_(groups), looked_(groups, 1), failed_(groups, 0), rate_(groups) {
     std::iota(group_.begin(), group_.end(), std::size_t(0));
   }
   std::size_t group(std::size_t n) const { return group_[n]; }
@@ -25,8 +28,10 @@ class GroupOrder {
     failed_[g] += failed;
   }
   void renew() {
-    for (std::size_t g = 0; g < rate_.size(); ++g) rate_[g] = static_cast<float>(failed_[g]) / static_cast<float>(looked_[g]);
-    std::stable_sort(group_.begin(), group_.end(), [&](std::size_t a, std::size_t b) { return rate_[a] > rate_[b]; });
+    for (std::size_t g = 0; g < rate_.size(); ++g)
+      rate_[g] = static_cast<float>(failed_[g]) / static_cast<float>(looked_[g]);
+    std::stable_sort(group_.begin(), group_.end(),
+                     [&](std::size_t a, std::size_t b) { return rate_[a] > rate_[b]; });
   }
 
  private:
@@ -38,13 +43,16 @@ class GroupOrder {
 /// Everything that the hypotheses of one pair share.
 class PairScorer {
  public:
-  PairScorer(const PairView& pair, const InlierTest& test, const SummaryLimits& exact, const SummaryLimits& reach)
+  PairScorer(const PairView& pair, const InlierTest& test, const SummaryLimits& exact,
+             const SummaryLimits& reach)
       : source_(pair.source),
         target_(pair.target),
         test_(test),
         order_(executor_data(pair.source).order),
         cells_(executor_data(pair.target).summaries),
-        limits_(executor_data(pair.target).options.search_distance * executor_data(pair.target).options.search_distance == test.max_squared
+        limits_(executor_data(pair.target).options.search_distance *
+                            executor_data(pair.target).options.search_distance ==
+                        test.max_squared
                     ? exact
                     : reach),
         bounds_(order_.remaining.size()),
@@ -52,9 +60,11 @@ class PairScorer {
         by_bound_(bounds_.size()),
         by_look_(bounds_.size()) {}
 
-  /// Support of one pose, given up (inliers 0) as soon as it cannot reach `needed` inliers: such a hypothesis is not the best one, so
-  /// giving it up changes no result. First every point is bounded by its cell's summary, then only undecided ones are looked at, and
-  /// only a pose that reaches `needed` has its residual measured. The groups that poses of this pair fail at come first.
+  /// Support of one pose, given up (inliers 0) as soon as it cannot reach `needed` inliers: such a
+  /// hypothesis is not the best one, so giving it up changes no result. First every point is
+  /// bounded by its cell's summary, then only undecided ones are looked at, and only a pose that
+  /// reaches `needed` has its residual measured. The groups that poses of this pair fail at come
+  /// first.
   Support score(const Rigid& pose, std::uint32_t needed) {
     if (cells_.block.empty()) return all_points(pose);
     if (scored_++ % kRenewal == 0) {
@@ -67,7 +77,8 @@ class PairScorer {
       const std::size_t g = by_bound_.group(n);
       if (n + 1 < bounds_.size()) locate(by_bound_.group(n + 1), pose);
       bounds_[g] = bound_inliers(order_, g * 64, pose, cells_, limits_, cell_.data() + g * 64);
-      const std::uint32_t failed = points_in(g) - static_cast<std::uint32_t>(__builtin_popcountll(bounds_[g].possible));
+      const std::uint32_t failed =
+          points_in(g) - static_cast<std::uint32_t>(__builtin_popcountll(bounds_[g].possible));
       by_bound_.record(g, points_in(g), failed);
       possible -= failed;
       if (possible < needed) return {0, 0, 0};
@@ -89,28 +100,37 @@ class PairScorer {
   }
 
  private:
-  static constexpr std::uint32_t kRenewal = 8;  ///< hypotheses between two renewals of the groups' order
+  /// hypotheses between two renewals of the groups' order
+  static constexpr std::uint32_t kRenewal = 8;
 
-  void locate(std::size_t g, const Rigid& pose) { locate_cells(order_, g * 64, pose, cells_, cell_.data() + g * 64); }
+  void locate(std::size_t g, const Rigid& pose) {
+    locate_cells(order_, g * 64, pose, cells_, cell_.data() + g * 64);
+  }
 
-  std::uint32_t points_in(std::size_t g) const { return (g == 0 ? source_.size : order_.remaining[g - 1]) - order_.remaining[g]; }
+  std::uint32_t points_in(std::size_t g) const {
+    return (g == 0 ? source_.size : order_.remaining[g - 1]) - order_.remaining[g];
+  }
 
   Support all_points(const Rigid& pose) const {
     Support s{0, 0, 0};
-    for (std::uint32_t i = 0; i < source_.size; ++i) count_point(source_, target_, pose, test_, i, s);
+    for (std::uint32_t i = 0; i < source_.size; ++i)
+      count_point(source_, target_, pose, test_, i, s);
     return s;
   }
 
-  /// Looks at the points of one group that the mask names. Their cells are known from the bounds: no search for the block. Lists are
-  /// fetched for all points before the first is read, because each alone would wait for memory.
+  /// Looks at the points of one group that the mask names. Their cells are known from the bounds:
+  /// no search for the block. Lists are fetched for all points before the first is read, because
+  /// each alone would wait for memory.
   void count_group(const Rigid& pose, std::size_t group, std::uint64_t mask, Support& s) const {
     constexpr std::uint32_t kCells = ClosestGridView::kBlockCells;
     const ClosestGridView& grid = target_.closest;
     const std::uint32_t* start[64];
     int count = 0;
     for (std::uint64_t left = mask; left != 0; left &= left - 1) {
-      const std::uint32_t cell = static_cast<std::uint32_t>(cell_[group * 64 + static_cast<std::size_t>(__builtin_ctzll(left))]);
-      start[count] = grid.cell_start.data + static_cast<std::size_t>(cell / kCells - 1) * (kCells + 1) + cell % kCells;
+      const std::uint32_t cell = static_cast<std::uint32_t>(
+          cell_[group * 64 + static_cast<std::size_t>(__builtin_ctzll(left))]);
+      start[count] = grid.cell_start.data +
+                     static_cast<std::size_t>(cell / kCells - 1) * (kCells + 1) + cell % kCells;
       __builtin_prefetch(start[count++]);
     }
     for (int k = 0; k < count; ++k) __builtin_prefetch(grid.candidates.data + *start[k]);
@@ -118,7 +138,9 @@ class PairScorer {
       const std::size_t k = group * 64 + static_cast<std::size_t>(__builtin_ctzll(mask));
       const Vec3 q = apply(pose, {order_.x[k], order_.y[k], order_.z[k]});
       count_inlier(source_, target_, pose, test_, order_.index[k],
-                   closest_candidate(grid.candidates.data, start[n][0], start[n][1], target_.points, q, test_.max_squared), s);
+                   closest_candidate(grid.candidates.data, start[n][0], start[n][1], target_.points,
+                                     q, test_.max_squared),
+                   s);
     }
   }
 
@@ -136,18 +158,23 @@ class PairScorer {
 
 }  // namespace
 
-Support measure_support(const CloudView& source, const CloudView& target, const Rigid& pose, const ScoreOptions& options) {
-  const InlierTest test = inlier_test(options.max_correspondence_distance, options.max_normal_angle);
+Support measure_support(const CloudView& source, const CloudView& target, const Rigid& pose,
+                        const ScoreOptions& options) {
+  const InlierTest test =
+      inlier_test(options.max_correspondence_distance, options.max_normal_angle);
   Support s{0, 0, 0};
   for (std::uint32_t i = 0; i < source.size; ++i) count_point(source, target, pose, test, i, s);
   return s;
 }
 
-std::vector<BestPose> score_hypotheses(Exec& exec, Span<const PairView> pairs, const std::vector<Hypotheses>& hypotheses,
+std::vector<BestPose> score_hypotheses(Exec& exec, Span<const PairView> pairs,
+                                       const std::vector<Hypotheses>& hypotheses,
                                        const ScoreOptions& options) {
   constexpr std::size_t kGrain = 256;
-  const InlierTest test = inlier_test(options.max_correspondence_distance, options.max_normal_angle);
-  const SummaryLimits exact_limits(options.max_normal_angle, true), reach_limits(options.max_normal_angle, false);
+  const InlierTest test =
+      inlier_test(options.max_correspondence_distance, options.max_normal_angle);
+  const SummaryLimits exact_limits(options.max_normal_angle, true),
+      reach_limits(options.max_normal_angle, false);
   std::vector<std::vector<Support>> best_of_block(pairs.size);
   std::vector<std::vector<std::size_t>> index_of_block(pairs.size);
   std::vector<std::atomic<std::uint32_t>> most(pairs.size);
@@ -157,22 +184,24 @@ std::vector<BestPose> score_hypotheses(Exec& exec, Span<const PairView> pairs, c
     index_of_block[p].assign(blocks, 0);
     most[p] = 0;
   }
-  exec.parallel_items(pairs.size, [&](std::size_t p) { return hypotheses[p].id.size(); }, kGrain,
-                      [&](std::size_t p, std::size_t begin, std::size_t end) {
-                        Support& best = best_of_block[p][begin / kGrain];
-                        PairScorer scorer(pairs[p], test, exact_limits, reach_limits);
-                        for (std::size_t k = begin; k < end; ++k) {
-                          const std::uint32_t needed = most[p].load(std::memory_order_relaxed);
-                          Support s = scorer.score(to_rigid(hypotheses[p].pose[k]), needed);
-                          s.hypothesis = hypotheses[p].id[k];
-                          if (!better(s, best)) continue;
-                          best = s;
-                          index_of_block[p][begin / kGrain] = k;
-                          std::uint32_t seen = most[p].load(std::memory_order_relaxed);
-                          while (s.inliers > seen && !most[p].compare_exchange_weak(seen, s.inliers, std::memory_order_relaxed)) {
-                          }
-                        }
-                      });
+  exec.parallel_items(
+      pairs.size, [&](std::size_t p) { return hypotheses[p].id.size(); }, kGrain,
+      [&](std::size_t p, std::size_t begin, std::size_t end) {
+        Support& best = best_of_block[p][begin / kGrain];
+        PairScorer scorer(pairs[p], test, exact_limits, reach_limits);
+        for (std::size_t k = begin; k < end; ++k) {
+          const std::uint32_t needed = most[p].load(std::memory_order_relaxed);
+          Support s = scorer.score(to_rigid(hypotheses[p].pose[k]), needed);
+          s.hypothesis = hypotheses[p].id[k];
+          if (!better(s, best)) continue;
+          best = s;
+          index_of_block[p][begin / kGrain] = k;
+          std::uint32_t seen = most[p].load(std::memory_order_relaxed);
+          while (s.inliers > seen &&
+                 !most[p].compare_exchange_weak(seen, s.inliers, std::memory_order_relaxed)) {
+          }
+        }
+      });
   std::vector<BestPose> out(pairs.size);
   for (std::size_t p = 0; p < pairs.size; ++p)
     for (std::size_t b = 0; b < best_of_block[p].size(); ++b) {

@@ -13,7 +13,8 @@ struct Sights {
 
 /// How squarely 64 places face those that see them, at best; see facing().
 struct Facings {
-  alignas(32) float seen[64] = {}, before[64] = {};
+  alignas(32) float seen[64] = {};
+  alignas(32) float before[64] = {};
 };
 
 /// 64 points moved by a pose, one array per coordinate.
@@ -24,13 +25,17 @@ struct MovedGroup {
   void turn(const Rigid& pose, const float* nx, const float* ny, const float* nz) {
     for (int k = 0; k < kSize; ++k) {
       const Vec3 n = rotate(pose, {nx[k], ny[k], nz[k]});
-      x[k] = n.x, y[k] = n.y, z[k] = n.z;
+      x[k] = n.x;
+      y[k] = n.y;
+      z[k] = n.z;
     }
   }
   void move(const Rigid& pose, const float* px, const float* py, const float* pz) {
     for (int k = 0; k < kSize; ++k) {
       const Vec3 q = apply(pose, {px[k], py[k], pz[k]});
-      x[k] = q.x, y[k] = q.y, z[k] = q.z;
+      x[k] = q.x;
+      y[k] = q.y;
+      z[k] = q.z;
     }
   }
 };
@@ -47,7 +52,8 @@ inline void add_sights(const VisibilityView& maps, std::uint32_t map, const Move
   const Vec3 viewpoint = maps.viewpoints[map];
   for (int k = 0; k < kSize; ++k) {
     const MapRay r = map_ray(Vec3{places.x[k], places.y[k], places.z[k]} - viewpoint);
-    ray[k] = r.depth, cell[k] = r.cell;
+    ray[k] = r.depth;
+    cell[k] = r.cell;
   }
   const std::uint16_t* depths = maps.depth + static_cast<std::size_t>(map) * kMapCells;
   for (int k = 0; k < kSize; ++k) steps[k] = depths[cell[k]];

@@ -4,84 +4,117 @@
 #include "cpu/exec.hpp"
 #include "cpu/products.hpp"
 
-/// The stages of the pipeline on the CPU, each a free function without hidden state, each on a batch. The CUDA backend has the same
-/// names. What one item does is written once, in src/algorithm.
+/// The stages of the pipeline on the CPU, each a free function without hidden state, each on a
+/// batch. The CUDA backend has the same names. What one item does is written once, in
+/// src/algorithm.
 namespace gpureg::cpu {
 
 // Preparation, one entry per cloud.
-std::vector<DownsampledCloud> downsample(Exec& exec, Span<const RawCloud> clouds, const PrepareOptions& options);
-std::vector<Grid> build_grids(Exec& exec, const std::vector<DownsampledCloud>& clouds, const PrepareOptions& options);
-std::vector<std::vector<Vec3>> estimate_normals(Exec& exec, const std::vector<DownsampledCloud>& clouds, const std::vector<Grid>& grids, float radius);
+std::vector<DownsampledCloud> downsample(Exec& exec, Span<const RawCloud> clouds,
+                                         const PrepareOptions& options);
+std::vector<Grid> build_grids(Exec& exec, const std::vector<DownsampledCloud>& clouds,
+                              const PrepareOptions& options);
+std::vector<std::vector<Vec3>> estimate_normals(Exec& exec,
+                                                const std::vector<DownsampledCloud>& clouds,
+                                                const std::vector<Grid>& grids, float radius);
 std::vector<Features> compute_features(Exec& exec, const std::vector<DownsampledCloud>& clouds,
-                                       const std::vector<std::vector<Vec3>>& normals, const std::vector<Grid>& grids,
+                                       const std::vector<std::vector<Vec3>>& normals,
+                                       const std::vector<Grid>& grids,
                                        const PrepareOptions& options);
-std::vector<ClosestGrid> build_closest_grids(Exec& exec, const std::vector<DownsampledCloud>& clouds, const std::vector<Grid>& grids,
+std::vector<ClosestGrid> build_closest_grids(Exec& exec,
+                                             const std::vector<DownsampledCloud>& clouds,
+                                             const std::vector<Grid>& grids,
                                              const PrepareOptions& options);
 /// FPFH of the second radius, of normals of a second radius, too; empty where there is none.
-std::vector<Features> compute_wide_features(Exec& exec, const std::vector<DownsampledCloud>& clouds, const std::vector<Grid>& grids,
+std::vector<Features> compute_wide_features(Exec& exec, const std::vector<DownsampledCloud>& clouds,
+                                            const std::vector<Grid>& grids,
                                             const PrepareOptions& options);
-std::vector<Visibility> build_depth_maps(Exec& exec, Span<const RawCloud> raw, const std::vector<DownsampledCloud>& clouds,
+std::vector<Visibility> build_depth_maps(Exec& exec, Span<const RawCloud> raw,
+                                         const std::vector<DownsampledCloud>& clouds,
                                          const PrepareOptions& options);
-std::vector<Fronts> build_fronts(Exec& exec, const std::vector<DownsampledCloud>& clouds, const std::vector<std::vector<Vec3>>& normals,
+std::vector<Fronts> build_fronts(Exec& exec, const std::vector<DownsampledCloud>& clouds,
+                                 const std::vector<std::vector<Vec3>>& normals,
                                  const PrepareOptions& options);
-std::vector<std::shared_ptr<CpuCloud>> assemble(Exec& exec, std::vector<DownsampledCloud>& clouds, std::vector<std::vector<Vec3>>& normals,
-                                                std::vector<Features>& features, std::vector<Features>& wide_features,
-                                                std::vector<ClosestGrid>& closest, std::vector<Visibility>& visibility,
-                                                std::vector<Fronts>& fronts, const PrepareOptions& options);
+std::vector<std::shared_ptr<CpuCloud>> assemble(
+    Exec& exec, std::vector<DownsampledCloud>& clouds, std::vector<std::vector<Vec3>>& normals,
+    std::vector<Features>& features, std::vector<Features>& wide_features,
+    std::vector<ClosestGrid>& closest, std::vector<Visibility>& visibility,
+    std::vector<Fronts>& fronts, const PrepareOptions& options);
 
 // Alignment, one entry per pair.
-std::vector<Matches> match_features(Exec& exec, Span<const PairView> pairs, const HypothesisOptions& options);
+std::vector<Matches> match_features(Exec& exec, Span<const PairView> pairs,
+                                    const HypothesisOptions& options);
 /// Numbers of the quadruples that pass the polygon test, ascending.
-std::vector<std::vector<std::uint32_t>> sample_quadruples(Exec& exec, const std::vector<Matches>& matches, const HypothesisOptions& options);
+std::vector<std::vector<std::uint32_t>> sample_quadruples(Exec& exec,
+                                                          const std::vector<Matches>& matches,
+                                                          const HypothesisOptions& options);
 std::vector<Hypotheses> fit_hypotheses(Exec& exec, const std::vector<Matches>& matches,
-                                       const std::vector<std::vector<std::uint32_t>>& quadruples, const HypothesisOptions& options);
-std::vector<BestPose> score_hypotheses(Exec& exec, Span<const PairView> pairs, const std::vector<Hypotheses>& hypotheses,
+                                       const std::vector<std::vector<std::uint32_t>>& quadruples,
+                                       const HypothesisOptions& options);
+std::vector<BestPose> score_hypotheses(Exec& exec, Span<const PairView> pairs,
+                                       const std::vector<Hypotheses>& hypotheses,
                                        const ScoreOptions& options);
-std::vector<BestPose> refine_poses(Exec& exec, Span<const PairView> pairs, const std::vector<BestPose>& best, const ScoreOptions& score,
+std::vector<BestPose> refine_poses(Exec& exec, Span<const PairView> pairs,
+                                   const std::vector<BestPose>& best, const ScoreOptions& score,
                                    const RefineOptions& options);
-std::vector<Judgement> judge_poses(Exec& exec, Span<const PairView> pairs, const std::vector<BestPose>& poses,
-                                         const ScoreOptions& options);
+std::vector<Judgement> judge_poses(Exec& exec, Span<const PairView> pairs,
+                                   const std::vector<BestPose>& poses, const ScoreOptions& options);
 // Alignment by compatibility and evidence, one entry per pair.
 /// Nearest features in both directions and of both radii, united; at most max_matches of them.
-std::vector<MatchSet> unite_matches(Exec& exec, Span<const PairView> pairs, const HypothesisOptions& hypothesis,
+std::vector<MatchSet> unite_matches(Exec& exec, Span<const PairView> pairs,
+                                    const HypothesisOptions& hypothesis,
                                     const CompatibilityOptions& options);
 /// Matches with the most compatible others, local maxima first.
-std::vector<std::vector<std::uint32_t>> choose_seeds(Exec& exec, const std::vector<MatchSet>& matches, const CompatibilityOptions& options);
-/// A pose for each seed whose neighbourhood determines one, in the order of the seeds, and the matches that it brings together.
-std::vector<Candidates> propose_poses(Exec& exec, const std::vector<MatchSet>& matches, const std::vector<std::vector<std::uint32_t>>& seeds,
-                                      const HypothesisOptions& hypothesis, const CompatibilityOptions& options);
+std::vector<std::vector<std::uint32_t>> choose_seeds(Exec& exec,
+                                                     const std::vector<MatchSet>& matches,
+                                                     const CompatibilityOptions& options);
+/// A pose for each seed whose neighbourhood determines one, in the order of the seeds, and the
+/// matches that it brings together.
+std::vector<Candidates> propose_poses(Exec& exec, const std::vector<MatchSet>& matches,
+                                      const std::vector<std::vector<std::uint32_t>>& seeds,
+                                      const HypothesisOptions& hypothesis,
+                                      const CompatibilityOptions& options);
 /// Adds the promise: evidence from a sample of the points.
-void weigh_candidates(Exec& exec, Span<const PairView> pairs, const std::vector<MatchSet>& matches, std::vector<Candidates>& candidates,
-                      const EvidenceOptions& options, const ScoreOptions& score);
+void weigh_candidates(Exec& exec, Span<const PairView> pairs, const std::vector<MatchSet>& matches,
+                      std::vector<Candidates>& candidates, const EvidenceOptions& options,
+                      const ScoreOptions& score);
 /// The most promising distinct poses.
-std::vector<std::vector<Mode>> select_modes(Exec& exec, const std::vector<Candidates>& candidates, const EvidenceOptions& options);
-void refine_modes(Exec& exec, Span<const PairView> pairs, std::vector<std::vector<Mode>>& modes, const EvidenceOptions& evidence,
-                  const RefineOptions& options);
+std::vector<std::vector<Mode>> select_modes(Exec& exec, const std::vector<Candidates>& candidates,
+                                            const EvidenceOptions& options);
+void refine_modes(Exec& exec, Span<const PairView> pairs, std::vector<std::vector<Mode>>& modes,
+                  const EvidenceOptions& evidence, const RefineOptions& options);
 /// Modes that have met: the most promising of them stays.
-void merge_modes(Exec& exec, std::vector<std::vector<Mode>>& modes, const EvidenceOptions& evidence);
+void merge_modes(Exec& exec, std::vector<std::vector<Mode>>& modes,
+                 const EvidenceOptions& evidence);
 std::vector<std::vector<Mode>> modes_of(Exec& exec, const std::vector<FurtherPoses>& poses);
 /// All evidence, from all points.
-void weigh_modes(Exec& exec, Span<const PairView> pairs, const std::vector<MatchSet>& matches, const std::vector<Candidates>& candidates,
-                 const std::vector<std::vector<Mode>>& modes, const RegistrationOptions& options, Span<PairOutcome> outcomes);
+void weigh_modes(Exec& exec, Span<const PairView> pairs, const std::vector<MatchSet>& matches,
+                 const std::vector<Candidates>& candidates,
+                 const std::vector<std::vector<Mode>>& modes, const RegistrationOptions& options,
+                 Span<PairOutcome> outcomes);
 
 void conclude(Exec& exec, Span<const PairView> pairs, const std::vector<Matches>& matches,
-              const std::vector<std::vector<std::uint32_t>>& quadruples, const std::vector<Hypotheses>& hypotheses,
-              const std::vector<BestPose>& poses, const std::vector<Judgement>& judgements, const RegistrationOptions& options,
+              const std::vector<std::vector<std::uint32_t>>& quadruples,
+              const std::vector<Hypotheses>& hypotheses, const std::vector<BestPose>& poses,
+              const std::vector<Judgement>& judgements, const RegistrationOptions& options,
               Span<PairOutcome> outcomes);
 
-/// Nearest features of every query row: k indices per query in order of distance (squared_norm of the difference as a chain of fmaf
-/// over the dimensions, then the lower index), kNoValue where fewer exist. Rows marked invalid neither ask nor answer.
+/// Nearest features of every query row: k indices per query in order of distance (squared_norm of
+/// the difference as a chain of fmaf over the dimensions, then the lower index), kNoValue where
+/// fewer exist. Rows marked invalid neither ask nor answer.
 struct FeatureRows {
   const float* values;
   const std::uint8_t* valid;
   std::uint32_t size, dimension;
 };
-void nearest_features(FeatureRows queries, FeatureRows rows, std::uint32_t k, std::size_t begin, std::size_t end, std::uint32_t* out);
+void nearest_features(FeatureRows queries, FeatureRows rows, std::uint32_t k, std::size_t begin,
+                      std::size_t end, std::uint32_t* out);
 
 /// Matches that the pose brings within the distance of each other.
 MatchEvidence count_matches(const MatchSet& matches, const Rigid& pose, float squared_distance);
 
 /// Exact support of one pose: the per-pose loop that scoring, refinement and tests share.
-Support measure_support(const CloudView& source, const CloudView& target, const Rigid& pose, const ScoreOptions& options);
+Support measure_support(const CloudView& source, const CloudView& target, const Rigid& pose,
+                        const ScoreOptions& options);
 
 }  // namespace gpureg::cpu

@@ -40,16 +40,23 @@ std::vector<Search> searches_of(const PairView& pair) {
 /// One index for each set of rows, however many of the pairs and searches share it.
 std::map<const float*, FeatureIndex> index_rows(Exec& exec, const std::vector<Search*>& searches) {
   std::map<const float*, FeatureIndex> out;
-  for (const Search* search : searches) out[search->from.values] = {}, out[search->in.values] = {};
+  for (const Search* search : searches) {
+    out[search->from.values] = {};
+    out[search->in.values] = {};
+  }
   std::map<const float*, FeatureRows> rows;
-  for (const Search* search : searches)
-    rows[search->from.values] = search->from, rows[search->in.values] = search->in;
+  for (const Search* search : searches) {
+    rows[search->from.values] = search->from;
+    rows[search->in.values] = search->in;
+  }
   std::vector<std::pair<FeatureRows, FeatureIndex*>> tasks;
   for (auto& entry : out) tasks.push_back({rows[entry.first], &entry.second});
   exec.parallel(tasks.size(),
                 [&](std::size_t k) { *tasks[k].second = index_features(tasks[k].first); });
-  for (Search* search : searches)
-    search->from_index = &out[search->from.values], search->in_index = &out[search->in.values];
+  for (Search* search : searches) {
+    search->from_index = &out[search->from.values];
+    search->in_index = &out[search->in.values];
+  }
   return out;
 }
 
@@ -95,12 +102,21 @@ MatchSet unite(const PairView& pair, const std::vector<Search>& searches, std::u
     const std::uint32_t s = static_cast<std::uint32_t>(entry.second >> 32),
                         t = static_cast<std::uint32_t>(entry.second);
     const Vec3 p = pair.source.points[s], q = pair.target.points[t];
-    m.source.push_back(s), m.target.push_back(t);
-    m.px.push_back(p.x), m.py.push_back(p.y), m.pz.push_back(p.z);
-    m.qx.push_back(q.x), m.qy.push_back(q.y), m.qz.push_back(q.z);
+    m.source.push_back(s);
+    m.target.push_back(t);
+    m.px.push_back(p.x);
+    m.py.push_back(p.y);
+    m.pz.push_back(p.z);
+    m.qx.push_back(q.x);
+    m.qy.push_back(q.y);
+    m.qz.push_back(q.z);
     const Vec3 a = pair.source.normals[s], b = pair.target.normals[t];
-    m.mx.push_back(a.x), m.my.push_back(a.y), m.mz.push_back(a.z);
-    m.nx.push_back(b.x), m.ny.push_back(b.y), m.nz.push_back(b.z);
+    m.mx.push_back(a.x);
+    m.my.push_back(a.y);
+    m.mz.push_back(a.z);
+    m.nx.push_back(b.x);
+    m.ny.push_back(b.y);
+    m.nz.push_back(b.z);
   }
   m.source_total = balance(pair.source.normals, m.source, m.source_weight);
   m.target_total = balance(pair.target.normals, m.target, m.target_weight);

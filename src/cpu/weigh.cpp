@@ -61,7 +61,9 @@ Sights sights_of(const Side& side, const Rigid& pose, std::size_t group, std::ui
   for (std::uint32_t m = 0; m < maps; ++m)
     add_sights(side.other.visibility, m, places, test.margin, test.min_range, out, &normals,
                facings);
-  out.seen &= present, out.before &= present, out.surface &= present;
+  out.seen &= present;
+  out.before &= present;
+  out.surface &= present;
   return out;
 }
 
@@ -209,7 +211,9 @@ void weigh_modes(Exec& exec, Span<const PairView> pairs, const std::vector<Match
         const Mode& mode = modes[p][k];
         ModeOutcome& out = outcomes[p].modes[k];
         const Rigid there = to_rigid(mode.pose), back = inverse(there);
-        out.pose = mode.pose, out.hypothesis = mode.seed, out.iterations = mode.iterations;
+        out.pose = mode.pose;
+        out.hypothesis = mode.seed;
+        out.iterations = mode.iterations;
         out.matches = count_matches(matches[p], there, squared_distance);
         const Side forth{s, t, executor_data(s).order, limits},
             reverse{t, s, executor_data(t).order, limits};
@@ -225,9 +229,9 @@ void weigh_modes(Exec& exec, Span<const PairView> pairs, const std::vector<Match
       });
   for (std::size_t p = 0; p < pairs.size; ++p) {
     PairOutcome& out = outcomes[p];
-    out.match_weight_source = matches[p].source_total,
+    out.match_weight_source = matches[p].source_total;
     out.match_weight_target = matches[p].target_total;
-    out.statistics.source_points = pairs[p].source.size,
+    out.statistics.source_points = pairs[p].source.size;
     out.statistics.target_points = pairs[p].target.size;
     out.statistics.correspondences = matches[p].size();
     out.statistics.hypotheses = std::min(options.compatibility.seeds, matches[p].size());

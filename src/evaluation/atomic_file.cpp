@@ -109,7 +109,7 @@ std::string behind_links(const std::string& path) {
 
 void write_file_atomically(const std::string& path, const std::string& content) {
   if (path.empty()) fail("''", "the path is empty");
-  struct stat existing {};
+  struct stat existing{};
   const bool exists = ::stat(path.c_str(), &existing) == 0;
   if (!exists && errno != ENOENT) fail(path, why(errno));
   if (exists && S_ISDIR(existing.st_mode)) fail(path, "it is a folder");

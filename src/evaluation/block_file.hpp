@@ -14,8 +14,8 @@
 /// Private to the library.
 namespace gpureg::files {
 
-/// Calls take(file, i, j, n, matrix, line) for each block of the file; line: where it begins. Throws IoError naming file and
-/// line.
+/// Calls take(file, i, j, n, matrix, line) for each block of the file; line: where it begins.
+/// Throws IoError naming file and line.
 template <int Size, typename Take>
 void read_blocks(const std::string& path, Take&& take) {
   const auto columns = std::to_string(Size);

@@ -21,8 +21,7 @@ void check_same_pairs(const std::string& log_path, const std::vector<LogEntry>& 
   for (std::size_t k = 0; k < log.size(); ++k) {
     const InformationEntry& entry = information[k];
     const std::string where = information_path + ":" + std::to_string(entry.line) + ": entry " +
-                              std::to_string(k + 1) + " (pair " + pair_name(entry.i, entry.j) +
-                              ")";
+                              std::to_string(k + 1) + " (pair " + pair_name(entry.i, entry.j) + ")";
     if (entry.i != log[k].i || entry.j != log[k].j)
       throw IoError(where + " stands where " + log_path + " has pair " +
                     pair_name(log[k].i, log[k].j));

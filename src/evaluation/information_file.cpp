@@ -7,9 +7,8 @@ namespace gpureg::evaluation {
 std::vector<InformationEntry> read_information(const std::string& path) {
   std::vector<InformationEntry> entries;
   files::read_blocks<6>(path, [&](const files::TextFile&, int i, int j, int n,
-                                  const Eigen::Matrix<double, 6, 6>& information, int line) {
-    entries.push_back({i, j, n, information, line});
-  });
+                                  const Eigen::Matrix<double, 6, 6>& information,
+                                  int line) { entries.push_back({i, j, n, information, line}); });
   return entries;
 }
 

@@ -43,7 +43,7 @@ bool parse(std::string_view text, T& value) {
 std::string read_file(const std::string& path, std::size_t max_bytes) {
   const Descriptor file{::open(path.c_str(), O_RDONLY | O_CLOEXEC)};
   if (file.fd < 0) fail_reading(path, std::generic_category().message(errno));
-  struct stat info {};
+  struct stat info{};
   if (::fstat(file.fd, &info) != 0) fail_reading(path, std::generic_category().message(errno));
   if (S_ISDIR(info.st_mode)) fail_reading(path, "it is a folder");
   const std::string too_large = "larger than " + std::to_string(max_bytes) + " bytes";

@@ -9,9 +9,10 @@ struct PhiloxWords {
   std::uint32_t v[4];
 };
 
-/// Philox4x32-10 (Salmon et al. 2011): randomness as a function of (counter, key), so that no draw depends on another.
-GPUREG_HD PhiloxWords philox(std::uint32_t c0, std::uint32_t c1, std::uint32_t c2, std::uint32_t c3, std::uint32_t k0,
-                             std::uint32_t k1) {
+/// Philox4x32-10 (Salmon et al. 2011): randomness as a function of (counter, key), so that no draw
+/// depends on another.
+GPUREG_HD PhiloxWords philox(std::uint32_t c0, std::uint32_t c1, std::uint32_t c2, std::uint32_t c3,
+                             std::uint32_t k0, std::uint32_t k1) {
   for (int round = 0; round < 10; ++round) {
     const std::uint64_t a = static_cast<std::uint64_t>(0xD2511F53u) * c0;
     const std::uint64_t b = static_cast<std::uint64_t>(0xCD9E8D57u) * c2;

@@ -5,10 +5,12 @@
 
 namespace gpureg::pipeline {
 
-/// Pairs of prepared clouds to outcomes (LoopSmart, Algorithm 1), one statement per stage. Exec brings the stages, found by its
-/// namespace; every stage takes all pairs at once. Only conclude() waits for the results.
+/// Pairs of prepared clouds to outcomes (LoopSmart, Algorithm 1), one statement per stage. Exec
+/// brings the stages, found by its namespace; every stage takes all pairs at once. Only conclude()
+/// waits for the results.
 template <typename Exec>
-void align(Exec& exec, Span<const PairView> pairs, const RegistrationOptions& options, Span<PairOutcome> outcomes) {
+void align(Exec& exec, Span<const PairView> pairs, const RegistrationOptions& options,
+           Span<PairOutcome> outcomes) {
   const auto begin = exec.mark();
   auto matches = match_features(exec, pairs, options.hypothesis);
   const auto matched = exec.mark();

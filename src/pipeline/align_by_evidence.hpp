@@ -5,13 +5,16 @@
 
 namespace gpureg::pipeline {
 
-/// Pairs of prepared clouds to distinct poses with their evidence, one statement per stage. Exec brings the stages, found by its
-/// namespace; every stage takes all pairs at once. Only weigh_modes() waits for the results.
+/// Pairs of prepared clouds to distinct poses with their evidence, one statement per stage. Exec
+/// brings the stages, found by its namespace; every stage takes all pairs at once. Only
+/// weigh_modes() waits for the results.
 ///
-/// Refinement ends where a surface that has nothing on it lets it: anywhere along a wall. So the likeliest mode is slid both ways along
-/// its softest direction, refined from there and weighed again; the evidence says which of them it is, and how sure.
+/// Refinement ends where a surface that has nothing on it lets it: anywhere along a wall. So the
+/// likeliest mode is slid both ways along its softest direction, refined from there and weighed
+/// again; the evidence says which of them it is, and how sure.
 template <typename Exec>
-void align_by_evidence(Exec& exec, Span<const PairInput> inputs, Span<const PairView> pairs, const RegistrationOptions& options, const FurtherSearch& further,
+void align_by_evidence(Exec& exec, Span<const PairInput> inputs, Span<const PairView> pairs,
+                       const RegistrationOptions& options, const FurtherSearch& further,
                        Span<PairOutcome> outcomes) {
   const auto begin = exec.mark();
   auto matches = unite_matches(exec, pairs, options.hypothesis, options.compatibility);
@@ -29,7 +32,8 @@ void align_by_evidence(Exec& exec, Span<const PairInput> inputs, Span<const Pair
   weigh_modes(exec, pairs, matches, candidates, modes, options, outcomes);
   const auto judged = exec.mark();
   for (PairOutcome& outcome : outcomes)
-    for (std::size_t k = 0; k < outcome.modes.size(); ++k) outcome.modes[k].family = static_cast<std::uint32_t>(k);
+    for (std::size_t k = 0; k < outcome.modes.size(); ++k)
+      outcome.modes[k].family = static_cast<std::uint32_t>(k);
 
   const std::vector<FurtherPoses> more = further(inputs, {outcomes.data, outcomes.size});
   const auto begun = exec.mark();
@@ -37,7 +41,8 @@ void align_by_evidence(Exec& exec, Span<const PairInput> inputs, Span<const Pair
   refine_modes(exec, pairs, slid, options.evidence, options.refine);
   const auto slid_refined = exec.mark();
   std::vector<PairOutcome> weighed_again(pairs.size);
-  weigh_modes(exec, pairs, matches, candidates, slid, options, {weighed_again.data(), weighed_again.size()});
+  weigh_modes(exec, pairs, matches, candidates, slid, options,
+              {weighed_again.data(), weighed_again.size()});
   const auto slid_judged = exec.mark();
   for (std::size_t p = 0; p < pairs.size; ++p)
     for (ModeOutcome& mode : weighed_again[p].modes) {
@@ -51,8 +56,10 @@ void align_by_evidence(Exec& exec, Span<const PairInput> inputs, Span<const Pair
   ms.sample = exec.milliseconds(matched, seeded) * share;
   ms.fit = exec.milliseconds(seeded, proposed) * share;
   ms.score = exec.milliseconds(proposed, weighed) * share;
-  ms.refine = (exec.milliseconds(weighed, refined) + exec.milliseconds(begun, slid_refined)) * share;
-  ms.judge = (exec.milliseconds(refined, judged) + exec.milliseconds(slid_refined, slid_judged)) * share;
+  ms.refine =
+      (exec.milliseconds(weighed, refined) + exec.milliseconds(begun, slid_refined)) * share;
+  ms.judge =
+      (exec.milliseconds(refined, judged) + exec.milliseconds(slid_refined, slid_judged)) * share;
   for (PairOutcome& outcome : outcomes) outcome.timings = ms;
 }
 

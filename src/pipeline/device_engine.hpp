@@ -17,10 +17,12 @@ struct AdoptedCloud {
 class DeviceEngine : public Engine {
  public:
   virtual std::vector<DeviceMemoryUse> device_memory() const = 0;
-  /// Takes a cloud out of device memory without waiting for anything: its pointers are device pointers, but for the viewpoints. stream: a
-  /// cudaStream_t. Throws InvalidArgument where none of the engine's devices has that memory.
+  /// Takes a cloud out of device memory without waiting for anything: its pointers are device
+  /// pointers, but for the viewpoints. stream: a cudaStream_t. Throws InvalidArgument where none of
+  /// the engine's devices has that memory.
   virtual std::shared_ptr<AdoptedCloud> adopt(const RawCloud& cloud, void* stream) = 0;
-  virtual std::shared_ptr<PreparedState> prepare_adopted(const AdoptedCloud& cloud, const PrepareOptions& options) = 0;
+  virtual std::shared_ptr<PreparedState> prepare_adopted(const AdoptedCloud& cloud,
+                                                         const PrepareOptions& options) = 0;
 };
 
 /// Throws BackendUnavailable.

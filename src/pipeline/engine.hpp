@@ -20,15 +20,16 @@ struct PreparedState {
   virtual std::vector<Vec3> copy_normals() const = 0;
   virtual std::vector<float> copy_features() const = 0;
 
-  const void* owner = nullptr;        ///< identifies the memory that the data lives in: clouds of one owner can be aligned
+  /// identifies the memory that the data lives in: clouds of one owner can be aligned
+  const void* owner = nullptr;
   PrepareOptions options;
   PrepareStatistics statistics;
-  float origin[3] = {0, 0, 0};        ///< local origin in the cloud's frame
+  float origin[3] = {0, 0, 0};  ///< local origin in the cloud's frame
   std::uint32_t size = 0;
   std::uint32_t feature_dimension = 0;
-  std::uint64_t balance_total = 0;    ///< see CloudView
-  float radius = 1;                   ///< see CloudView
-  std::vector<Vec3> viewpoints;       ///< relative to the local origin
+  std::uint64_t balance_total = 0;  ///< see CloudView
+  float radius = 1;                 ///< see CloudView
+  std::vector<Vec3> viewpoints;     ///< relative to the local origin
 };
 
 /// A pair of clouds for the engine, and optionally the caller's own correspondences.
@@ -40,16 +41,19 @@ struct PairInput {
   PriorTest prior{};
 };
 
-/// Poses to try beside the modes of each pair, which have their evidence by then. Only who knows what evidence is worth can say where to
-/// look further, so the backends ask the public door.
+/// Poses to try beside the modes of each pair, which have their evidence by then. Only who knows
+/// what evidence is worth can say where to look further, so the backends ask the public door.
 struct FurtherPoses {
-  std::uint32_t family;                ///< the mode that they belong to
-  std::vector<Pose<double>> poses;     ///< in local coordinates of both clouds; at most kMostFurtherPoses
+  std::uint32_t family;  ///< the mode that they belong to
+  /// in local coordinates of both clouds; at most kMostFurtherPoses
+  std::vector<Pose<double>> poses;
 };
 constexpr std::uint32_t kMostFurtherPoses = 8;
-using FurtherSearch = std::function<std::vector<FurtherPoses>(Span<const PairInput>, Span<const PairOutcome>)>;
+using FurtherSearch =
+    std::function<std::vector<FurtherPoses>(Span<const PairInput>, Span<const PairOutcome>)>;
 
-/// Private interface between the public door (src/api) and the backends (src/cpu, cuda). Calls are serialised inside.
+/// Private interface between the public door (src/api) and the backends (src/cpu, cuda). Calls are
+/// serialised inside.
 class Engine {
  public:
   virtual ~Engine() = default;
@@ -58,14 +62,17 @@ class Engine {
   /// Threads that may share what the host has to do for many results.
   virtual unsigned host_threads() const { return threads(); }
   virtual std::string description() const = 0;
-  virtual const void* memory() const = 0;      ///< owner of the clouds that this engine can align
+  virtual const void* memory() const = 0;  ///< owner of the clouds that this engine can align
   /// How many pairs go through the stages together.
   virtual std::size_t pairs_per_chunk(const RegistrationOptions& options) const = 0;
-  virtual std::vector<std::shared_ptr<PreparedState>> prepare(Span<const RawCloud> clouds, const PrepareOptions& options) = 0;
-  virtual void align(Span<const PairInput> pairs, const RegistrationOptions& options, Span<PairOutcome> outcomes, const FurtherSearch& further) = 0;
+  virtual std::vector<std::shared_ptr<PreparedState>> prepare(Span<const RawCloud> clouds,
+                                                              const PrepareOptions& options) = 0;
+  virtual void align(Span<const PairInput> pairs, const RegistrationOptions& options,
+                     Span<PairOutcome> outcomes, const FurtherSearch& further) = 0;
 };
 
-/// threads > 0. Throws BackendUnavailable where this processor lacks instructions that the stages were compiled for.
+/// threads > 0. Throws BackendUnavailable where this processor lacks instructions that the stages
+/// were compiled for.
 std::shared_ptr<Engine> make_cpu_engine(unsigned threads);
 /// Throws BackendUnavailable.
 std::shared_ptr<Engine> make_cuda_engine(int device);

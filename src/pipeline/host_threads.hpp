@@ -8,7 +8,8 @@
 
 namespace gpureg {
 
-/// work(thread) on that many threads, the caller's the first. When all are done, throws what the first of them that failed has thrown.
+/// work(thread) on that many threads, the caller's the first. When all are done, throws what the
+/// first of them that failed has thrown.
 template <typename Work>
 void on_threads(std::size_t threads, const Work& work) {
   std::vector<std::exception_ptr> failed(threads);
@@ -27,4 +28,4 @@ void on_threads(std::size_t threads, const Work& work) {
     if (error) std::rethrow_exception(error);
 }
 
-}  // namespace gpureg::cuda
+}  // namespace gpureg

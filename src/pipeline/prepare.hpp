@@ -5,8 +5,8 @@
 
 namespace gpureg::pipeline {
 
-/// Raw clouds to fragments, one statement per stage (LoopSmart, section III). Exec brings the stages, found by its namespace; assemble()
-/// waits for the results.
+/// Raw clouds to fragments, one statement per stage (LoopSmart, section III). Exec brings the
+/// stages, found by its namespace; assemble() waits for the results.
 template <typename Exec>
 auto prepare(Exec& exec, Span<const RawCloud> clouds, const PrepareOptions& options) {
   const auto begin = exec.mark();
@@ -25,7 +25,8 @@ auto prepare(Exec& exec, Span<const RawCloud> clouds, const PrepareOptions& opti
   const auto mapped = exec.mark();
   auto fronts = build_fronts(exec, points, normals, options);
   const auto fronted = exec.mark();
-  auto prepared = assemble(exec, points, normals, features, wide_features, closest, depth_maps, fronts, options);
+  auto prepared = assemble(exec, points, normals, features, wide_features, closest, depth_maps,
+                           fronts, options);
 
   const double share = 1.0 / static_cast<double>(clouds.size);
   for (auto& cloud : prepared) {
@@ -33,7 +34,8 @@ auto prepare(Exec& exec, Span<const RawCloud> clouds, const PrepareOptions& opti
     ms.downsample = exec.milliseconds(begin, downsampled) * share;
     ms.normals = exec.milliseconds(gridded, oriented) * share;
     ms.features = exec.milliseconds(oriented, widened) * share;
-    ms.grid = (exec.milliseconds(downsampled, gridded) + exec.milliseconds(widened, searchable)) * share;
+    ms.grid =
+        (exec.milliseconds(downsampled, gridded) + exec.milliseconds(widened, searchable)) * share;
     ms.depth_maps = exec.milliseconds(searchable, mapped) * share;
     ms.fronts = exec.milliseconds(mapped, fronted) * share;
   }

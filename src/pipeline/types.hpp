@@ -11,7 +11,8 @@
 
 #include <vector>
 
-/// What goes through the pipeline: plain data, no Eigen, so that stages may be compiled with flags of their own.
+/// What goes through the pipeline: plain data, no Eigen, so that stages may be compiled with flags
+/// of their own.
 namespace gpureg {
 
 /// A cloud as the caller has it (host memory): PointCloudView after validation.
@@ -26,7 +27,8 @@ struct RawCloud {
   std::size_t viewpoint_count;
 };
 
-/// One pair as stages see it. matches: the caller's own correspondences instead of features; count 0 and null otherwise.
+/// One pair as stages see it. matches: the caller's own correspondences instead of features; count
+/// 0 and null otherwise.
 struct PairView {
   CloudView source;
   CloudView target;
@@ -39,9 +41,10 @@ struct PairView {
 /// A refined pose with what speaks for and against it, in local coordinates of both clouds.
 struct ModeOutcome {
   Pose<double> pose{1, 0, 0, 0, 0, 0, 0};
-  std::uint32_t hypothesis = 0;   ///< seed that it came from
+  std::uint32_t hypothesis = 0;  ///< seed that it came from
   std::uint32_t iterations = 0;
-  std::uint32_t family = 0;       ///< the mode that it was slid from, by its place among the modes; its own where it was not
+  /// the mode that it was slid from, by its place among the modes; its own where it was not
+  std::uint32_t family = 0;
   MatchEvidence matches{0, 0, 0};
   SideEvidence source{}, target{};
   InformationSums information{};
@@ -58,7 +61,8 @@ struct PairOutcome {
   Moments source_moments{0, {0, 0, 0}, {0, 0, 0, 0, 0, 0}};
   Moments target_moments{0, {0, 0, 0}, {0, 0, 0, 0, 0, 0}};
   std::vector<ModeOutcome> modes;  ///< distinct poses, in order of their promise
-  std::uint64_t match_weight_source = 0, match_weight_target = 0;  ///< of all matches, what MatchEvidence is relative to
+  /// of all matches, what MatchEvidence is relative to
+  std::uint64_t match_weight_source = 0, match_weight_target = 0;
   RegistrationStatistics statistics;
   StageTimings timings;
 };

@@ -12,8 +12,8 @@
 namespace gpureg {
 namespace {
 
-// A summary may leave a point undecided, but it never decides wrongly: over random sets of candidate normals and random moved normals
-// its limits contain what the candidates themselves say.
+// A summary may leave a point undecided, but it never decides wrongly: over random sets of
+// candidate normals and random moved normals its limits contain what the candidates themselves say.
 TEST(CellSummary, LimitsNeverLie) {
   std::mt19937 random(1);
   std::normal_distribution<float> noise;
@@ -32,17 +32,26 @@ TEST(CellSummary, LimitsNeverLie) {
         points[i] = Vec3{0.01f, 0.01f, 0.01f} * noise(random);
         normals.push_back(normalized_or_zero(axis + test::random_unit(random) * spread));
       }
-      const std::uint32_t word = summarize_cell(span_of(candidates), {0, 0, 0}, geometry, points.data(), normals.data());
+      const std::uint32_t word =
+          summarize_cell(span_of(candidates), {0, 0, 0}, geometry, points.data(), normals.data());
       ASSERT_NE(word, 0u);
       // Near the edge of the cone more often than anywhere.
-      const Vec3 moved = k % 2 ? test::random_unit(random)
-                               : normalized_or_zero(axis * std::cos(angle * 0.0174533f + 0.1f * noise(random)) +
-                                                    normalized_or_zero(cross(axis, test::random_unit(random))) * std::sin(angle * 0.0174533f));
-      const auto part = [&](int shift) { return static_cast<float>(static_cast<std::int8_t>(word >> shift)) * (1.0f / 127.0f); };
+      const Vec3 moved =
+          k % 2 ? test::random_unit(random)
+                : normalized_or_zero(axis * std::cos(angle * 0.0174533f + 0.1f * noise(random)) +
+                                     normalized_or_zero(cross(axis, test::random_unit(random))) *
+                                         std::sin(angle * 0.0174533f));
+      const auto part = [&](int shift) {
+        return static_cast<float>(static_cast<std::int8_t>(word >> shift)) * (1.0f / 127.0f);
+      };
       const float cosine = dot(moved, {part(0), part(8), part(16)});
-      const bool possible = cosine >= limits.none_below[word >> 24], certain = cosine >= limits.all_above[word >> 24];
+      const bool possible = cosine >= limits.none_below[word >> 24],
+                 certain = cosine >= limits.all_above[word >> 24];
       bool any = false, all = true;
-      for (const Vec3& n : normals) any = any || normals_agree(moved, n, min_cosine), all = all && normals_agree(moved, n, min_cosine);
+      for (const Vec3& n : normals) {
+        any = any || normals_agree(moved, n, min_cosine);
+        all = all && normals_agree(moved, n, min_cosine);
+      }
       if (any) ASSERT_TRUE(possible) << angle << " " << k;
       if (certain) ASSERT_TRUE(all) << angle << " " << k;
       decided += !possible || certain;

@@ -12,7 +12,8 @@ TEST(Cell, KeysGoThereAndBackAndKeepTheOrder) {
   std::mt19937 random(1);
   std::uniform_int_distribution<std::int32_t> value(-kCellBias, kCellBias - 1);
   for (int k = 0; k < 10000; ++k) {
-    const Cell a{value(random), value(random), value(random)}, b{value(random), value(random), value(random)};
+    const Cell a{value(random), value(random), value(random)},
+        b{value(random), value(random), value(random)};
     const Cell back = cell_from_key(cell_key(a));
     EXPECT_EQ(back.x, a.x);
     EXPECT_EQ(back.y, a.y);

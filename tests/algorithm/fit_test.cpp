@@ -9,37 +9,48 @@
 namespace gpureg {
 namespace {
 
-Vec3 to_vec3(const Eigen::Vector3d& v) { return {static_cast<float>(v.x()), static_cast<float>(v.y()), static_cast<float>(v.z())}; }
+Vec3 to_vec3(const Eigen::Vector3d& v) {
+  return {static_cast<float>(v.x()), static_cast<float>(v.y()), static_cast<float>(v.z())};
+}
 
 TEST(Fit, AgreesWithUmeyama) {
   std::mt19937 random(11);
   std::normal_distribution<double> normal;
   for (int trial = 0; trial < 5000; ++trial) {
-    const Eigen::Quaterniond turn = Eigen::Quaterniond(normal(random), normal(random), normal(random), normal(random)).normalized();
+    const Eigen::Quaterniond turn =
+        Eigen::Quaterniond(normal(random), normal(random), normal(random), normal(random))
+            .normalized();
     const Eigen::Vector3d shift(normal(random), normal(random), normal(random));
     Eigen::Matrix<double, 3, 4> p, q;
     Vec3 source[4], target[4];
     for (int k = 0; k < 4; ++k) {
       p.col(k) = Eigen::Vector3d(normal(random), normal(random), normal(random));
-      q.col(k) = turn * p.col(k) + shift + 0.03 * Eigen::Vector3d(normal(random), normal(random), normal(random));
-      source[k] = to_vec3(p.col(k)), target[k] = to_vec3(q.col(k));
+      q.col(k) = turn * p.col(k) + shift +
+                 0.03 * Eigen::Vector3d(normal(random), normal(random), normal(random));
+      source[k] = to_vec3(p.col(k));
+      target[k] = to_vec3(q.col(k));
     }
     Pose<float> pose;
     ASSERT_TRUE(fit_rigid(source, target, pose));
     const Eigen::Matrix4d expected = Eigen::umeyama(p, q, false);
     const Pose<double> wide = widen(pose);
     const Eigen::Quaterniond found(wide.w, wide.x, wide.y, wide.z);
-    // The rotation is as well conditioned as the second eigenvalue gap: nearly flat or slim quadruples lose digits of float.
+    // The rotation is as well conditioned as the second eigenvalue gap: nearly flat or slim
+    // quadruples lose digits of float.
     Eigen::Matrix<double, 3, 4> centred = p.colwise() - p.rowwise().mean();
     const double width = Eigen::JacobiSVD<Eigen::Matrix<double, 3, 4>>(centred).singularValues()(1);
     const double tolerance = 1e-5 / std::min(1.0, width * width);
-    EXPECT_LT(found.angularDistance(Eigen::Quaterniond(Eigen::Matrix3d(expected.topLeftCorner<3, 3>()))), tolerance) << trial;
+    EXPECT_LT(
+        found.angularDistance(Eigen::Quaterniond(Eigen::Matrix3d(expected.topLeftCorner<3, 3>()))),
+        tolerance)
+        << trial;
   }
 }
 
 TEST(Fit, ExactMotionIsFound) {
   const Vec3 p[4] = {{0, 0, 0}, {1, 0, 0}, {0, 2, 0}, {0, 0, 3}};
-  const Vec3 q[4] = {{1, 2, 3}, {1, 3, 3}, {-1, 2, 3}, {1, 2, 6}};  // a quarter turn about z, then a shift
+  // a quarter turn about z, then a shift
+  const Vec3 q[4] = {{1, 2, 3}, {1, 3, 3}, {-1, 2, 3}, {1, 2, 6}};
   Pose<float> pose;
   ASSERT_TRUE(fit_rigid(p, q, pose));
   for (int k = 0; k < 4; ++k) {

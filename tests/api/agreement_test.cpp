@@ -220,8 +220,10 @@ TEST(Agreement, OrderDoesNotMatter) {
   for (int round = 0; round < 3; ++round) {
     std::shuffle(order.begin(), order.end(), random);
     Set other(9);
-    for (const std::size_t p : order)
-      other.pairs.push_back(set.pairs[p]), other.results.push_back(set.results[p]);
+    for (const std::size_t p : order) {
+      other.pairs.push_back(set.pairs[p]);
+      other.results.push_back(set.results[p]);
+    }
     const auto after = other.agree();
     for (std::size_t k = 0; k < order.size(); ++k) {
       EXPECT_EQ(after[k].confidence, before[order[k]].confidence);

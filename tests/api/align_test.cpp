@@ -19,12 +19,16 @@ TEST(Align, FindsRandomPoses) {
   for (int trial = 0; trial < 6; ++trial) {
     const std::vector<Eigen::Vector3f> target = test::scan_room(random);
     const Eigen::Isometry3d pose = test::random_pose(random);
-    const std::vector<Eigen::Vector3f> source = test::moved(pose.inverse(), test::scan_room(random));
+    const std::vector<Eigen::Vector3f> source =
+        test::moved(pose.inverse(), test::scan_room(random));
     PointCloudView a(source), b(target);
     // One sensor for both scans, where normals point to.
-    const Eigen::Vector3f eye(1.5f, 2.5f, 1.7f), eye_in_source = (pose.inverse() * eye.cast<double>()).cast<float>();
-    a.viewpoints = eye_in_source.data(), a.viewpoint_count = 1;
-    b.viewpoints = eye.data(), b.viewpoint_count = 1;
+    const Eigen::Vector3f eye(1.5f, 2.5f, 1.7f),
+        eye_in_source = (pose.inverse() * eye.cast<double>()).cast<float>();
+    a.viewpoints = eye_in_source.data();
+    a.viewpoint_count = 1;
+    b.viewpoints = eye.data();
+    b.viewpoint_count = 1;
     const RegistrationResult r = align(context, a, b, quick());
     ASSERT_TRUE(r.aligned()) << to_string(r.reason);
     // Refined on 8 cm centroids of two samplings: some centimetres and half a degree.
@@ -43,7 +47,8 @@ TEST(Align, FindsRandomPoses) {
     EXPECT_LE(s.inliers, s.points_scored);
     EXPECT_EQ(s.points_scored, std::min(s.source_points, s.target_points));
     EXPECT_GT(r.timings.total(), 0);
-    EXPECT_NEAR(r.source_moments.information_redwood()(0, 0), static_cast<double>(r.source_moments.count), 1e-9);
+    EXPECT_NEAR(r.source_moments.information_redwood()(0, 0),
+                static_cast<double>(r.source_moments.count), 1e-9);
     EXPECT_TRUE(r.target_from_source.linear().isUnitary(1e-9));
   }
 }
@@ -58,11 +63,14 @@ TEST(Align, SourceAndTargetAreNotMixedUp) {
   for (const bool smaller_as_source : {false, true}) {
     RegistrationOptions o = quick();
     o.hypothesis.smaller_as_source = smaller_as_source;
-    const Eigen::Vector3f eye(1.5f, 2.5f, 1.7f), eye_in_source = (pose.inverse() * eye.cast<double>()).cast<float>();
+    const Eigen::Vector3f eye(1.5f, 2.5f, 1.7f),
+        eye_in_source = (pose.inverse() * eye.cast<double>()).cast<float>();
     PointCloudView a(source), b(target);
     a.size = a.size * 3 / 4;
-    a.viewpoints = eye_in_source.data(), a.viewpoint_count = 1;
-    b.viewpoints = eye.data(), b.viewpoint_count = 1;
+    a.viewpoints = eye_in_source.data();
+    a.viewpoint_count = 1;
+    b.viewpoints = eye.data();
+    b.viewpoint_count = 1;
     const RegistrationResult forth = align(context, a, b, o), back = align(context, b, a, o);
     ASSERT_TRUE(forth.aligned() && back.aligned());
     EXPECT_LT(test::translation_error(pose, forth.target_from_source), 0.03);
@@ -71,8 +79,10 @@ TEST(Align, SourceAndTargetAreNotMixedUp) {
     EXPECT_FALSE(forth.statistics.swapped);
     EXPECT_EQ(forth.statistics.source_points, back.statistics.target_points);
     // Moments of the source are in the source's frame, whoever was sampled.
-    const Eigen::Vector3d mean = back.source_moments.sum / static_cast<double>(back.source_moments.count);
-    const Eigen::Vector3d expected = forth.target_moments.sum / static_cast<double>(forth.target_moments.count);
+    const Eigen::Vector3d mean =
+        back.source_moments.sum / static_cast<double>(back.source_moments.count);
+    const Eigen::Vector3d expected =
+        forth.target_moments.sum / static_cast<double>(forth.target_moments.count);
     EXPECT_LT((mean - expected).norm(), 0.1);
   }
 }

@@ -11,11 +11,13 @@ namespace {
 
 TEST(Async, FuturesHaveWhatTheCallsReturn) {
   std::mt19937 random(4);
-  const auto a = test::scan_room(random), b = test::moved(test::random_pose(random), test::scan_room(random));
+  const auto a = test::scan_room(random),
+             b = test::moved(test::random_pose(random), test::scan_room(random));
   RegistrationOptions options = RegistrationOptions::from_voxel_size(0.1f);
   options.hypothesis.count = 5000;
   const Context context = Context::cpu(2);
-  const auto clouds = prepare_batch(context, {PointCloudView(a), PointCloudView(b)}, options.prepare);
+  const auto clouds =
+      prepare_batch(context, {PointCloudView(a), PointCloudView(b)}, options.prepare);
   const auto expected = test::bytes(align(context, clouds[0], clouds[1], options));
   auto one = align_async(context, clouds[0], clouds[1], options);
   auto many = align_batch_async(context, clouds, {{0, 1}, {0, 1}}, options);
@@ -29,12 +31,15 @@ TEST(Async, FuturesHaveWhatTheCallsReturn) {
 TEST(Async, DeviceMemoryNeedsACudaContext) {
   const float point[3] = {1, 2, 3};
   DevicePointCloudView view;
-  view.points = point, view.size = 1;
+  view.points = point;
+  view.size = 1;
   try {
     prepare_async(Context::cpu(1), view, {}, nullptr);
     FAIL();
   } catch (const InvalidArgument& error) {
-    EXPECT_NE(std::string(error.what()).find("need a CUDA context, this one is cpu"), std::string::npos) << error.what();
+    EXPECT_NE(std::string(error.what()).find("need a CUDA context, this one is cpu"),
+              std::string::npos)
+        << error.what();
   }
   EXPECT_TRUE(Context::cpu(1).device_memory().empty());
 }

@@ -18,7 +18,8 @@ RegistrationOptions quick() {
   return o;
 }
 
-RegistrationResult run(const std::vector<Eigen::Vector3f>& source, const std::vector<Eigen::Vector3f>& target) {
+RegistrationResult run(const std::vector<Eigen::Vector3f>& source,
+                       const std::vector<Eigen::Vector3f>& target) {
   return align(Context::cpu(2), PointCloudView(source), PointCloudView(target), quick());
 }
 
@@ -39,7 +40,8 @@ void expect_failure(const RegistrationResult& r, RegistrationReason reason) {
 TEST(BadInput, FewPoints) {
   for (std::size_t n = 0; n < 4; ++n) {
     const std::vector<Eigen::Vector3f> all = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
-    const std::vector<Eigen::Vector3f> few(all.begin(), all.begin() + static_cast<std::ptrdiff_t>(n));
+    const std::vector<Eigen::Vector3f> few(all.begin(),
+                                           all.begin() + static_cast<std::ptrdiff_t>(n));
     expect_failure(run(few, room()), RegistrationReason::too_few_source_points);
     expect_failure(run(room(), few), RegistrationReason::too_few_target_points);
     const RegistrationResult both = run(few, few);
@@ -50,18 +52,21 @@ TEST(BadInput, FewPoints) {
 
 TEST(BadInput, CollinearAndIdenticalPoints) {
   std::vector<Eigen::Vector3f> line, place(1000, Eigen::Vector3f(1, 2, 3));
-  for (int k = 0; k < 1000; ++k) line.emplace_back(0.01f * static_cast<float>(k), 0.02f * static_cast<float>(k), 0.0f);
+  for (int k = 0; k < 1000; ++k)
+    line.emplace_back(0.01f * static_cast<float>(k), 0.02f * static_cast<float>(k), 0.0f);
   expect_failure(run(line, line), RegistrationReason::no_usable_features);
   expect_failure(run(line, room()), RegistrationReason::no_usable_features);
   expect_failure(run(place, room()), RegistrationReason::too_few_source_points);
 }
 
 TEST(BadInput, NanAndInfinityAreDroppedAndCounted) {
-  const float nan = std::numeric_limits<float>::quiet_NaN(), inf = std::numeric_limits<float>::infinity();
+  const float nan = std::numeric_limits<float>::quiet_NaN(),
+              inf = std::numeric_limits<float>::infinity();
   std::vector<Eigen::Vector3f> clean = room(), dirty = clean;
   dirty.insert(dirty.begin() + 100, {{nan, 0, 0}, {0, inf, 0}, {0, 0, -inf}});
   const Context context = Context::cpu(2);
-  const PreparedCloud a = prepare(context, PointCloudView(clean), quick().prepare), b = prepare(context, PointCloudView(dirty), quick().prepare);
+  const PreparedCloud a = prepare(context, PointCloudView(clean), quick().prepare),
+                      b = prepare(context, PointCloudView(dirty), quick().prepare);
   EXPECT_EQ(b.statistics().invalid_points, 3u);
   EXPECT_EQ(a.points(), b.points());
   EXPECT_EQ(a.features(), b.features());
@@ -70,15 +75,18 @@ TEST(BadInput, NanAndInfinityAreDroppedAndCounted) {
 }
 
 TEST(BadInput, NoOverlapIsNotAligned) {
-  // A sphere and a room's corner share no surface; and a threshold of 0.9 is beyond chance alignments.
+  // A sphere and a room's corner share no surface; and a threshold of 0.9 is beyond chance
+  // alignments.
   std::mt19937 random(2);
   std::normal_distribution<float> normal;
   std::vector<Eigen::Vector3f> sphere;
-  for (int k = 0; k < 20000; ++k) sphere.push_back(Eigen::Vector3f(normal(random), normal(random), normal(random)).normalized());
+  for (int k = 0; k < 20000; ++k)
+    sphere.push_back(Eigen::Vector3f(normal(random), normal(random), normal(random)).normalized());
   RegistrationOptions options = quick();
   options.score.min_inlier_ratio = 0.9f;
   const std::vector<Eigen::Vector3f> corner = room();
-  const RegistrationResult r = align(Context::cpu(2), PointCloudView(sphere), PointCloudView(corner), options);
+  const RegistrationResult r =
+      align(Context::cpu(2), PointCloudView(sphere), PointCloudView(corner), options);
   EXPECT_EQ(r.status, RegistrationStatus::not_aligned);
   EXPECT_NE(r.reason, RegistrationReason::none);
   EXPECT_STRNE(explain(r.reason), "");
@@ -91,7 +99,8 @@ TEST(BadInput, TenKilometresAway) {
   for (const Eigen::Vector3f& p : b) far.push_back(p + Eigen::Vector3f(10000, -10000, 5000));
   RegistrationOptions options = quick();
   options.hypothesis.count = 50000;
-  const RegistrationResult r = align(Context::cpu(2), PointCloudView(a), PointCloudView(far), options);
+  const RegistrationResult r =
+      align(Context::cpu(2), PointCloudView(a), PointCloudView(far), options);
   ASSERT_TRUE(r.aligned()) << to_string(r.reason);
   // Floats near 10^4 have steps of 1 mm; the pose itself is a double.
   const Eigen::Vector3d moved = r.target_from_source * Eigen::Vector3d(1, 1, 1);
@@ -109,13 +118,29 @@ TEST(BadInput, LyingViews) {
   expect([](auto& v) { v.points = nullptr; }, "cloud.points");
   expect([](auto& v) { v.point_stride = 2; }, "cloud.point_stride");
   expect([](auto& v) { v.size = std::size_t(1) << 40; }, "cloud.size");
-  expect([](auto& v) { v.normals = v.points, v.normal_stride = 1; }, "cloud.normal_stride");
+  expect(
+      [](auto& v) {
+        v.normals = v.points;
+        v.normal_stride = 1;
+      },
+      "cloud.normal_stride");
   expect([](auto& v) { v.features = v.points; }, "cloud.feature_dimension");
   expect([](auto& v) { v.feature_dimension = 3; }, "cloud.features");
-  expect([](auto& v) { v.features = v.points, v.feature_dimension = 3, v.feature_stride = 2; }, "cloud.feature_stride");
+  expect(
+      [](auto& v) {
+        v.features = v.points;
+        v.feature_dimension = 3;
+        v.feature_stride = 2;
+      },
+      "cloud.feature_stride");
   expect([](auto& v) { v.viewpoint_count = 1; }, "cloud.viewpoints");
   const float nan[3] = {0, std::nanf(""), 0};
-  expect([&](auto& v) { v.viewpoints = nan, v.viewpoint_count = 1; }, "cloud.viewpoints");
+  expect(
+      [&](auto& v) {
+        v.viewpoints = nan;
+        v.viewpoint_count = 1;
+      },
+      "cloud.viewpoints");
   PointCloud uneven;
   uneven.points.resize(3);
   uneven.normals.resize(2);
@@ -125,14 +150,16 @@ TEST(BadInput, LyingViews) {
 TEST(BadInput, AbsurdScaleAndDensityAreErrorsNotHangs) {
   const Context context = Context::cpu(2);
   const std::vector<Eigen::Vector3f> wide = {{0, 0, 0}, {1e7f, 0, 0}, {0, 1e7f, 0}, {0, 0, 1e7f}};
-  test::expect_error<InvalidArgument>([&] { prepare(context, PointCloudView(wide)); }, {"voxel_size"});
+  test::expect_error<InvalidArgument>([&] { prepare(context, PointCloudView(wide)); },
+                                      {"voxel_size"});
   std::mt19937 random(4);
   std::uniform_real_distribution<float> place(0, 0.01f);
   std::vector<Eigen::Vector3f> dense(100000);
   for (Eigen::Vector3f& p : dense) p = Eigen::Vector3f(place(random), place(random), place(random));
   PrepareOptions keep;
   keep.voxel_size = 0;
-  test::expect_error<InvalidArgument>([&] { prepare(context, PointCloudView(dense), keep); }, {"feature_radius"});
+  test::expect_error<InvalidArgument>([&] { prepare(context, PointCloudView(dense), keep); },
+                                      {"feature_radius"});
 }
 
 // Gigabytes otherwise, for nothing.
@@ -145,25 +172,45 @@ TEST(BadInput, MillimetresWithAVoxelInMetres) {
   ASSERT_GT(points.size(), 30000u);
   EXPECT_GT(prepare(context, PointCloudView(points)).size(), 1000u);
   for (Eigen::Vector3f& p : points) p *= 1000;
-  test::expect_error<InvalidArgument>([&] { prepare(context, PointCloudView(points)); },
-                                      {"points are alone", "voxel_size 0.05", "unit of the points"});
+  test::expect_error<InvalidArgument>(
+      [&] { prepare(context, PointCloudView(points)); },
+      {"points are alone", "voxel_size 0.05", "unit of the points"});
   // Of several clouds it is said which one.
   const std::vector<Eigen::Vector3f> good = room();
-  test::expect_error<InvalidArgument>([&] { prepare_batch(context, {PointCloudView(good), PointCloudView(points)}); }, {"clouds[1]: nearly all"});
-  test::expect_error<InvalidArgument>([&] { prepare_batch(context, {PointCloudView(good), PointCloudView(points)}, {}, {"kitchen", "hall"}); }, {"hall: nearly all"});
-  test::expect_error<InvalidArgument>([&] { prepare_batch(context, {PointCloudView(good), PointCloudView(good)}, {}, {"kitchen"}); }, {"names has 1 entries", "2"});
-  test::expect_error<InvalidArgument>([&] { align(context, PointCloudView(points), PointCloudView(good)); }, {"source: nearly all"});
+  test::expect_error<InvalidArgument>(
+      [&] { prepare_batch(context, {PointCloudView(good), PointCloudView(points)}); },
+      {"clouds[1]: nearly all"});
+  test::expect_error<InvalidArgument>(
+      [&] {
+        prepare_batch(context, {PointCloudView(good), PointCloudView(points)}, {},
+                      {"kitchen", "hall"});
+      },
+      {"hall: nearly all"});
+  test::expect_error<InvalidArgument>(
+      [&] {
+        prepare_batch(context, {PointCloudView(good), PointCloudView(good)}, {}, {"kitchen"});
+      },
+      {"names has 1 entries", "2"});
+  test::expect_error<InvalidArgument>(
+      [&] { align(context, PointCloudView(points), PointCloudView(good)); },
+      {"source: nearly all"});
   PointCloudView lying(good);
   lying.point_stride = 1;
-  test::expect_error<InvalidArgument>([&] { align(context, PointCloudView(good), lying); }, {"target: cloud.point_stride"});
+  test::expect_error<InvalidArgument>([&] { align(context, PointCloudView(good), lying); },
+                                      {"target: cloud.point_stride"});
   // By the points' own unit all is as before; and few points cost little.
-  EXPECT_GT(prepare(context, PointCloudView(points), RegistrationOptions::from_voxel_size(50).prepare).size(), 1000u);
+  EXPECT_GT(
+      prepare(context, PointCloudView(points), RegistrationOptions::from_voxel_size(50).prepare)
+          .size(),
+      1000u);
   points.resize(3000);
   EXPECT_EQ(prepare(context, PointCloudView(points)).size(), 3000u);
-  // Who brings features and looks as far as the points are apart is not refused for a radius that nobody needs.
+  // Who brings features and looks as far as the points are apart is not refused for a radius that
+  // nobody needs.
   std::vector<Eigen::Vector3f> wide;
   for (int x = 0; x < 150; ++x)
-    for (int y = 0; y < 150; ++y) wide.emplace_back(0.3f * static_cast<float>(x), 0.3f * static_cast<float>(y), 0.0f);
+    for (int y = 0; y < 150; ++y)
+      wide.emplace_back(0.3f * static_cast<float>(x), 0.3f * static_cast<float>(y), 0.0f);
   PrepareOptions far;
   far.search_distance = 0.5f;
   EXPECT_EQ(prepare(context, PointCloudView(wide), far).size(), 22500u);
@@ -175,9 +222,14 @@ TEST(BadInput, SoFewPointsThatAnyPoseWouldDo) {
   for (const std::size_t n : {15u, 20u, 40u})
     for (int k = 0; k < 20; ++k) {
       std::vector<Eigen::Vector3f> a, b;
-      for (std::size_t i = 0; i < n; ++i) a.emplace_back(unit(random), unit(random), unit(random)), b.emplace_back(unit(random), unit(random), unit(random));
-      const auto options = RegistrationOptions::from_voxel_size(std::pow(1.0f / static_cast<float>(n), 1.0f / 3));
-      const RegistrationResult r = align(Context::cpu(1), PointCloudView(a), PointCloudView(b), options);
+      for (std::size_t i = 0; i < n; ++i) {
+        a.emplace_back(unit(random), unit(random), unit(random));
+        b.emplace_back(unit(random), unit(random), unit(random));
+      }
+      const auto options =
+          RegistrationOptions::from_voxel_size(std::pow(1.0f / static_cast<float>(n), 1.0f / 3));
+      const RegistrationResult r =
+          align(Context::cpu(1), PointCloudView(a), PointCloudView(b), options);
       EXPECT_FALSE(r.aligned()) << n << " points, " << r.score;
     }
 }
@@ -187,7 +239,8 @@ TEST(BadInput, HugeVoxelLeavesTooFewPoints) {
   std::vector<Eigen::Vector3f> points = room();
   for (Eigen::Vector3f& p : points) p += Eigen::Vector3f(10, 10, 10);
   const RegistrationResult r =
-      align(Context::cpu(1), PointCloudView(points), PointCloudView(points), RegistrationOptions::from_voxel_size(1000));
+      align(Context::cpu(1), PointCloudView(points), PointCloudView(points),
+            RegistrationOptions::from_voxel_size(1000));
   EXPECT_EQ(r.reason, RegistrationReason::too_few_source_points);
 }
 
@@ -197,11 +250,16 @@ TEST(BadInput, HandlesIndicesAndDistances) {
   const PreparedCloud cloud = prepare(context, PointCloudView(points));
   EXPECT_FALSE(PreparedCloud().valid());
   test::expect_error<InvalidArgument>([&] { PreparedCloud().size(); }, {"prepare()"});
-  test::expect_error<InvalidArgument>([&] { align(context, PreparedCloud(), cloud); }, {"clouds[0]"});
-  test::expect_error<InvalidArgument>([&] { align_batch(context, {cloud}, {{0, 1}}); }, {"pairs[0]", "cloud 1"});
+  test::expect_error<InvalidArgument>([&] { align(context, PreparedCloud(), cloud); },
+                                      {"clouds[0]"});
+  test::expect_error<InvalidArgument>([&] { align_batch(context, {cloud}, {{0, 1}}); },
+                                      {"pairs[0]", "cloud 1"});
   RegistrationOptions far = RegistrationOptions::from_voxel_size(0.2f);
-  test::expect_error<InvalidArgument>([&] { align(context, cloud, cloud, far); }, {"search_distance"});
-  test::expect_error<InvalidArgument>([&] { align(context, cloud, cloud, std::vector<Correspondence>{{0, 1000000}}); }, {"correspondences[0]"});
+  test::expect_error<InvalidArgument>([&] { align(context, cloud, cloud, far); },
+                                      {"search_distance"});
+  test::expect_error<InvalidArgument>(
+      [&] { align(context, cloud, cloud, std::vector<Correspondence>{{0, 1000000}}); },
+      {"correspondences[0]"});
 }
 
 }  // namespace

@@ -31,7 +31,8 @@ TEST(Context, RefusesAbsurdArguments) {
 TEST(Context, CloudsOfOneCpuContextGoWithAnother) {
   std::mt19937 random(1);
   const std::vector<Eigen::Vector3f> points = test::scan_room(random);
-  const PreparedCloud a = prepare(Context::cpu(1), PointCloudView(points)), b = prepare(Context::cpu(2), PointCloudView(points));
+  const PreparedCloud a = prepare(Context::cpu(1), PointCloudView(points)),
+                      b = prepare(Context::cpu(2), PointCloudView(points));
   RegistrationOptions options;
   options.hypothesis.count = 1000;
   EXPECT_NO_THROW(align(Context::cpu(1), a, b, options));
@@ -44,11 +45,15 @@ TEST(Context, SharedByTwoThreads) {
   RegistrationOptions options = RegistrationOptions::from_voxel_size(0.12f);
   const PreparedCloud cloud = prepare(context, PointCloudView(points), options.prepare);
   options.hypothesis.count = 500;
-  const Eigen::Matrix4d expected = align(context, cloud, cloud, options).target_from_source.matrix();
+  const Eigen::Matrix4d expected =
+      align(context, cloud, cloud, options).target_from_source.matrix();
   std::vector<Eigen::Matrix4d> found(4);
   std::vector<std::thread> threads;
   for (std::size_t t = 0; t < 4; ++t)
-    threads.emplace_back([&, t] { for (int k = 0; k < 3; ++k) found[t] = align(context, cloud, cloud, options).target_from_source.matrix(); });
+    threads.emplace_back([&, t] {
+      for (int k = 0; k < 3; ++k)
+        found[t] = align(context, cloud, cloud, options).target_from_source.matrix();
+    });
   for (std::thread& t : threads) t.join();
   for (const Eigen::Matrix4d& m : found) EXPECT_EQ(m, expected);
 }

@@ -34,12 +34,14 @@ std::vector<Eigen::Vector3f> thin(const std::vector<Eigen::Vector3f>& points) {
   return out;
 }
 
-// Features that tell points apart by where they are on the object: what a perfect learned feature would do. Dimensions 1 to 300.
+// Features that tell points apart by where they are on the object: what a perfect learned feature
+// would do. Dimensions 1 to 300.
 TEST(CustomFeatures, OfAnyDimension) {
   const Context context = Context::cpu(2);
   const TwoScans scans(5);
   const std::vector<Eigen::Vector3f> source = thin(scans.source), target = thin(scans.target);
-  for (const std::size_t dimension : {std::size_t(3), std::size_t(32), std::size_t(33), std::size_t(300)}) {
+  for (const std::size_t dimension :
+       {std::size_t(3), std::size_t(32), std::size_t(33), std::size_t(300)}) {
     std::mt19937 random(6);
     std::normal_distribution<float> normal;
     Eigen::MatrixXf lift(static_cast<Eigen::Index>(dimension), 3);
@@ -66,10 +68,12 @@ TEST(CustomFeatures, DimensionsMustAgree) {
   PointCloudView a(scans.source);
   a.features = rows.data();
   a.feature_dimension = 4;
-  const PreparedCloud with = prepare(context, a), without = prepare(context, PointCloudView(scans.target));
+  const PreparedCloud with = prepare(context, a),
+                      without = prepare(context, PointCloudView(scans.target));
   EXPECT_EQ(with.feature_dimension(), 4u);
   EXPECT_EQ(without.feature_dimension(), 33u);
-  test::expect_error<InvalidArgument>([&] { align(context, with, without); }, {"feature_dimension", "4", "33"});
+  test::expect_error<InvalidArgument>([&] { align(context, with, without); },
+                                      {"feature_dimension", "4", "33"});
 }
 
 TEST(CustomCorrespondences, HalfOfThemWrong) {
@@ -77,10 +81,12 @@ TEST(CustomCorrespondences, HalfOfThemWrong) {
   TwoScans scans(8);
   const std::vector<Eigen::Vector3f> source = thin(scans.source), target = thin(scans.target);
   const RegistrationOptions options = keep_points();
-  const PreparedCloud a = prepare(context, PointCloudView(source), options.prepare), b = prepare(context, PointCloudView(target), options.prepare);
+  const PreparedCloud a = prepare(context, PointCloudView(source), options.prepare),
+                      b = prepare(context, PointCloudView(target), options.prepare);
   std::vector<Correspondence> correspondences;
   for (std::uint32_t k = 0; k < a.size(); ++k)
-    correspondences.push_back({k, k % 2 ? k : static_cast<std::uint32_t>(scans.random() % b.size())});
+    correspondences.push_back(
+        {k, k % 2 ? k : static_cast<std::uint32_t>(scans.random() % b.size())});
   const RegistrationResult r = align(context, a, b, correspondences, options);
   ASSERT_TRUE(r.aligned());
   EXPECT_LT(test::translation_error(scans.pose, r.target_from_source), 0.01);
@@ -88,7 +94,8 @@ TEST(CustomCorrespondences, HalfOfThemWrong) {
   const RegistrationResult none = align(context, a, b, std::vector<Correspondence>{}, options);
   EXPECT_EQ(none.reason, RegistrationReason::no_usable_features);
   EXPECT_EQ(none.statistics.source_points, a.size());
-  const RegistrationResult three = align(context, a, b, std::vector<Correspondence>{{0, 0}, {1, 1}, {2, 2}}, options);
+  const RegistrationResult three =
+      align(context, a, b, std::vector<Correspondence>{{0, 0}, {1, 1}, {2, 2}}, options);
   EXPECT_EQ(three.reason, RegistrationReason::no_usable_features);
 }
 

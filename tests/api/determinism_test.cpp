@@ -18,7 +18,8 @@ class Determinism : public ::testing::Test {
     options.hypothesis.count = 2000;
     options.hypothesis.seed = 42;
     std::mt19937 random(1);
-    for (int k = 0; k < 4; ++k) scans.push_back(test::moved(test::random_pose(random), test::scan_room(random)));
+    for (int k = 0; k < 4; ++k)
+      scans.push_back(test::moved(test::random_pose(random), test::scan_room(random)));
     scans.push_back({});  // an empty cloud among the others
     for (const auto& s : scans) views.emplace_back(s);
     for (std::uint32_t i = 0; i < 5; ++i)
@@ -26,7 +27,9 @@ class Determinism : public ::testing::Test {
   }
   std::vector<std::vector<char>> run(const Context& context, const std::vector<Pair>& list) {
     std::vector<std::vector<char>> out;
-    for (const RegistrationResult& r : align_batch(context, prepare_batch(context, views, options.prepare), list, options)) out.push_back(bytes(r));
+    for (const RegistrationResult& r :
+         align_batch(context, prepare_batch(context, views, options.prepare), list, options))
+      out.push_back(bytes(r));
     return out;
   }
   RegistrationOptions options;
@@ -51,9 +54,11 @@ TEST_F(Determinism, SameBytesInAnyOrderAndAnySplit) {
   for (std::size_t k = 0; k < pairs.size(); ++k) {
     // A batch of one, and the single call on clouds that were prepared alone.
     EXPECT_EQ(run(context, {pairs[k]})[0], expected[k]);
-    const PreparedCloud a = prepare(context, views[pairs[k].source], options.prepare), b = prepare(context, views[pairs[k].target], options.prepare);
+    const PreparedCloud a = prepare(context, views[pairs[k].source], options.prepare),
+                        b = prepare(context, views[pairs[k].target], options.prepare);
     EXPECT_EQ(bytes(align(context, a, b, options)), expected[k]);
-    EXPECT_EQ(bytes(align(context, views[pairs[k].source], views[pairs[k].target], options)), expected[k]);
+    EXPECT_EQ(bytes(align(context, views[pairs[k].source], views[pairs[k].target], options)),
+              expected[k]);
   }
 }
 

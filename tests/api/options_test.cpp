@@ -50,7 +50,8 @@ TEST(Options, EverythingScalesWithTheVoxel) {
 
 TEST(Options, VoxelSizeMustBeALength) {
   for (const float v : {0.0f, -1.0f, kNan, kInf, 1e30f, 1e-30f})
-    test::expect_error<InvalidArgument>([&] { RegistrationOptions::from_voxel_size(v); }, {"voxel_size"});
+    test::expect_error<InvalidArgument>([&] { RegistrationOptions::from_voxel_size(v); },
+                                        {"voxel_size"});
 }
 
 TEST(Options, EachFieldIsNamed) {
@@ -58,24 +59,34 @@ TEST(Options, EachFieldIsNamed) {
     expect_refused([&](auto& o) { o.prepare.normal_radius = bad; }, "prepare.normal_radius");
     expect_refused([&](auto& o) { o.prepare.feature_radius = bad; }, "prepare.feature_radius");
     expect_refused([&](auto& o) { o.prepare.search_distance = bad; }, "prepare.search_distance");
-    expect_refused([&](auto& o) { o.score.max_correspondence_distance = bad; }, "score.max_correspondence_distance");
+    expect_refused([&](auto& o) { o.score.max_correspondence_distance = bad; },
+                   "score.max_correspondence_distance");
     expect_refused([&](auto& o) { o.score.max_normal_angle = bad; }, "score.max_normal_angle");
-    expect_refused([&](auto& o) { o.score.max_judged_normal_angle = bad; }, "score.max_judged_normal_angle");
+    expect_refused([&](auto& o) { o.score.max_judged_normal_angle = bad; },
+                   "score.max_judged_normal_angle");
     expect_refused([&](auto& o) { o.refine.kernel_width = bad; }, "refine.kernel_width");
-    expect_refused([&](auto& o) { o.refine.max_correspondence_distance = bad; }, "refine.max_correspondence_distance");
-    expect_refused([&](auto& o) { o.hypothesis.edge_similarity = bad; }, "hypothesis.edge_similarity");
+    expect_refused([&](auto& o) { o.refine.max_correspondence_distance = bad; },
+                   "refine.max_correspondence_distance");
+    expect_refused([&](auto& o) { o.hypothesis.edge_similarity = bad; },
+                   "hypothesis.edge_similarity");
     expect_refused([&](auto& o) { o.compatibility.tolerance = bad; }, "compatibility.tolerance");
     expect_refused([&](auto& o) { o.compatibility.max_turn = bad; }, "compatibility.max_turn");
-    expect_refused([&](auto& o) { o.compatibility.consensus_distance = bad; }, "compatibility.consensus_distance");
-    expect_refused([&](auto& o) { o.compatibility.seed_separation = bad; }, "compatibility.seed_separation");
-    expect_refused([&](auto& o) { o.evidence.max_normal_angle = bad; }, "evidence.max_normal_angle");
+    expect_refused([&](auto& o) { o.compatibility.consensus_distance = bad; },
+                   "compatibility.consensus_distance");
+    expect_refused([&](auto& o) { o.compatibility.seed_separation = bad; },
+                   "compatibility.seed_separation");
+    expect_refused([&](auto& o) { o.evidence.max_normal_angle = bad; },
+                   "evidence.max_normal_angle");
     expect_refused([&](auto& o) { o.evidence.mode_angle = bad; }, "evidence.mode_angle");
     expect_refused([&](auto& o) { o.evidence.mode_distance = bad; }, "evidence.mode_distance");
-    expect_refused([&](auto& o) { o.evidence.free_space_margin = bad; }, "evidence.free_space_margin");
+    expect_refused([&](auto& o) { o.evidence.free_space_margin = bad; },
+                   "evidence.free_space_margin");
     expect_refused([&](auto& o) { o.evidence.min_range = bad; }, "evidence.min_range");
   }
-  for (const float bad : {kNan, -0.1f, 1.1f}) expect_refused([&](auto& o) { o.score.min_inlier_ratio = bad; }, "score.min_inlier_ratio");
-  for (const double bad : {std::numeric_limits<double>::quiet_NaN(), -0.1, 1.1}) expect_refused([&](auto& o) { o.min_confidence = bad; }, "min_confidence");
+  for (const float bad : {kNan, -0.1f, 1.1f})
+    expect_refused([&](auto& o) { o.score.min_inlier_ratio = bad; }, "score.min_inlier_ratio");
+  for (const double bad : {std::numeric_limits<double>::quiet_NaN(), -0.1, 1.1})
+    expect_refused([&](auto& o) { o.min_confidence = bad; }, "min_confidence");
   expect_refused([](auto& o) { o.compatibility.max_matches = 3; }, "compatibility.max_matches");
   expect_refused([](auto& o) { o.compatibility.seeds = 0; }, "compatibility.seeds");
   expect_refused([](auto& o) { o.compatibility.max_members = 1025; }, "compatibility.max_members");
@@ -87,8 +98,10 @@ TEST(Options, EachFieldIsNamed) {
   expect_refused([](auto& o) { o.prepare.front_reach = -0.1f; }, "prepare.front_reach");
   for (const float bad : {kNan, -0.1f, std::numeric_limits<float>::infinity()})
     expect_refused([&](auto& o) { o.evidence.slide_distance = bad; }, "evidence.slide_distance");
-  expect_refused([](auto& o) { o.prepare.front_reach = std::numeric_limits<float>::infinity(); }, "prepare.front_reach");
-  expect_refused([](auto& o) { o.prepare.wide_feature_radius = 50; }, "prepare.wide_feature_radius");
+  expect_refused([](auto& o) { o.prepare.front_reach = std::numeric_limits<float>::infinity(); },
+                 "prepare.front_reach");
+  expect_refused([](auto& o) { o.prepare.wide_feature_radius = 50; },
+                 "prepare.wide_feature_radius");
   expect_refused([](auto& o) { o.prepare.voxel_size = kNan; }, "prepare.voxel_size");
   expect_refused([](auto& o) { o.prepare.voxel_size = 1e-5f; }, "prepare.feature_radius");
   expect_refused([](auto& o) { o.hypothesis.count = 0; }, "hypothesis.count");
@@ -96,7 +109,8 @@ TEST(Options, EachFieldIsNamed) {
   expect_refused([](auto& o) { o.hypothesis.neighbors = 17; }, "hypothesis.neighbors");
   expect_refused([](auto& o) { o.hypothesis.max_survivors = 0; }, "hypothesis.max_survivors");
   expect_refused([](auto& o) { o.refine.max_iterations = 5000; }, "refine.max_iterations");
-  expect_refused([](auto& o) { o.score.max_correspondence_distance = 0.5f; }, "score.max_correspondence_distance");
+  expect_refused([](auto& o) { o.score.max_correspondence_distance = 0.5f; },
+                 "score.max_correspondence_distance");
 }
 
 TEST(Options, MessageHoldsTheValue) {

@@ -48,7 +48,8 @@ struct Scene {
 
   PreparedCloud prepared(const Points& points, const Eigen::Vector3f& eye) const {
     PointCloudView view(points);
-    view.viewpoints = eye.data(), view.viewpoint_count = 1;
+    view.viewpoints = eye.data();
+    view.viewpoint_count = 1;
     return prepare(context, view, options.prepare);
   }
   RegistrationResult align(const RegistrationPrior& prior) const {
@@ -57,7 +58,8 @@ struct Scene {
   RegistrationPrior about_truth(double degrees, double metres) const {
     PosePrior pose;
     pose.target_from_source = truth;
-    pose.max_rotation = degrees, pose.max_translation = metres;
+    pose.max_rotation = degrees;
+    pose.max_translation = metres;
     RegistrationPrior prior;
     prior.pose = pose;
     return prior;
@@ -202,9 +204,7 @@ TEST(Prior, BadInputIsNamed) {
   RegistrationPrior bad = scene.about_truth(10, 1);
   bad.pose->max_rotation = 0;
   test::expect_error<InvalidArgument>(
-      [&] {
-        align_batch(scene.context, clouds, {{0, 1}, {0, 1}}, {RegistrationPrior{}, bad});
-      },
+      [&] { align_batch(scene.context, clouds, {{0, 1}, {0, 1}}, {RegistrationPrior{}, bad}); },
       {"priors[1].pose.max_rotation"});
   test::expect_error<InvalidArgument>(
       [&] {

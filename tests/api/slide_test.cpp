@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Where refinement may end anywhere along a wall, the likeliest pose is slid along it, and the evidence says where it belongs.
+// Where refinement may end anywhere along a wall, the likeliest pose is slid along it, and the
+// evidence says where it belongs.
 #include "api/slide.hpp"
 
 #include <gtest/gtest.h>
@@ -27,7 +28,8 @@ std::vector<Vec3> bare_corner(std::mt19937& random, int count) {
 }
 
 /// Gives the only mode so many matches that its evidence has these odds.
-void match(PairOutcome& outcome, const PreparedState& source, const PreparedState& target, double log_odds) {
+void match(PairOutcome& outcome, const PreparedState& source, const PreparedState& target,
+           double log_odds) {
   ModeOutcome& mode = outcome.modes.at(0);
   const auto odds = [&](std::uint32_t inliers) {
     mode.matches.inliers = inliers;
@@ -43,7 +45,8 @@ TEST(Slide, BothWaysAlongTheWall) {
   std::mt19937 random(3);
   cpu::Exec exec(1);
   const std::vector<Vec3> a = bare_corner(random, 40000), b = bare_corner(random, 40000);
-  const auto source = test::prepare_one(exec, test::raw_cloud(a), {}), target = test::prepare_one(exec, test::raw_cloud(b), {});
+  const auto source = test::prepare_one(exec, test::raw_cloud(a), {}),
+             target = test::prepare_one(exec, test::raw_cloud(b), {});
   PairOutcome outcome = test::weighed_in_place(exec, *source, *target);
   match(outcome, *source, *target, 0);
   RegistrationOptions options;
@@ -55,7 +58,8 @@ TEST(Slide, BothWaysAlongTheWall) {
     double sum = 0;
     for (std::size_t k = 0; k < 8; ++k) {
       const Pose<double>&pose = more.poses[k], &from = outcome.modes[0].pose;
-      EXPECT_NEAR(std::abs(pose.tx - from.tx), static_cast<double>(distance) * (1 - 0.25 * static_cast<double>(k / 2)), 0.02);
+      EXPECT_NEAR(std::abs(pose.tx - from.tx),
+                  static_cast<double>(distance) * (1 - 0.25 * static_cast<double>(k / 2)), 0.02);
       EXPECT_NEAR(pose.ty, from.ty, 0.02);
       EXPECT_NEAR(pose.tz, from.tz, 0.02);
       EXPECT_GT(std::abs(pose.w), 0.999);
@@ -66,10 +70,12 @@ TEST(Slide, BothWaysAlongTheWall) {
   options.evidence.slide_distance = 0;
   EXPECT_TRUE(slide({source.get(), target.get(), {}, {}, {}}, outcome, options).poses.empty());
   options.evidence.slide_distance = 0.4f;
-  EXPECT_TRUE(slide({source.get(), target.get(), {}, {}, {}}, PairOutcome{}, options).poses.empty());
+  EXPECT_TRUE(
+      slide({source.get(), target.get(), {}, {}, {}}, PairOutcome{}, options).poses.empty());
 }
 
-// What evidence leaves open is looked into; what it is sure of is only asked whether it may slide; what is hopeless costs nothing.
+// What evidence leaves open is looked into; what it is sure of is only asked whether it may slide;
+// what is hopeless costs nothing.
 TEST(Slide, MoreWhereMoreIsToBeFound) {
   std::mt19937 random(3);
   cpu::Exec exec(1);
@@ -78,7 +84,8 @@ TEST(Slide, MoreWhereMoreIsToBeFound) {
   PairOutcome outcome = test::weighed_in_place(exec, *cloud, *cloud);
   const auto poses_at = [&](double log_odds) {
     match(outcome, *cloud, *cloud, log_odds);
-    return slide({cloud.get(), cloud.get(), {}, {}, {}}, outcome, RegistrationOptions()).poses.size();
+    return slide({cloud.get(), cloud.get(), {}, {}, {}}, outcome, RegistrationOptions())
+        .poses.size();
   };
   EXPECT_EQ(poses_at(-7), 0u);
   EXPECT_EQ(poses_at(-2), 8u);
@@ -93,7 +100,8 @@ TEST(Slide, TurnsAboutTheMiddleOfWhatTouches) {
   std::normal_distribution<float> normal;
   std::vector<Vec3> ball;
   for (int k = 0; k < 20000; ++k) {
-    const Eigen::Vector3f d = Eigen::Vector3f(normal(random), normal(random), normal(random)).normalized() * 0.5f;
+    const Eigen::Vector3f d =
+        Eigen::Vector3f(normal(random), normal(random), normal(random)).normalized() * 0.5f;
     ball.push_back({d.x() + 6, d.y() - 3, d.z() + 1});
   }
   ball.push_back({0, 0, 0});
@@ -110,7 +118,8 @@ TEST(Slide, TurnsAboutTheMiddleOfWhatTouches) {
   }
 }
 
-// What holds the pose in every direction brings a slid one back, less well refined: it must not take the place of what it was slid from.
+// What holds the pose in every direction brings a slid one back, less well refined: it must not
+// take the place of what it was slid from.
 TEST(Slide, WhatComesBackDoesNotCount) {
   std::normal_distribution<float> noise(0, 0.005f);
   for (const unsigned seed : {9u, 10u, 11u, 12u}) {
@@ -118,14 +127,18 @@ TEST(Slide, WhatComesBackDoesNotCount) {
     const auto room = test::scan_room(random);
     const Eigen::Isometry3d truth = test::random_pose(random);
     auto scanned = test::moved(truth.inverse(), room);
-    for (Eigen::Vector3f& p : scanned) p += Eigen::Vector3f(noise(random), noise(random), noise(random));
-    const Eigen::Vector3f eye = test::kRoomSensor, moved_eye = (truth.inverse() * eye.cast<double>()).cast<float>();
+    for (Eigen::Vector3f& p : scanned)
+      p += Eigen::Vector3f(noise(random), noise(random), noise(random));
+    const Eigen::Vector3f eye = test::kRoomSensor,
+                          moved_eye = (truth.inverse() * eye.cast<double>()).cast<float>();
     PointCloudView source(scanned), target(room);
-    source.viewpoints = moved_eye.data(), target.viewpoints = eye.data();
+    source.viewpoints = moved_eye.data();
+    target.viewpoints = eye.data();
     source.viewpoint_count = target.viewpoint_count = 1;
     RegistrationOptions slid, still;
     still.evidence.slide_distance = 0;
-    const RegistrationResult a = align(Context::cpu(), source, target, slid), b = align(Context::cpu(), source, target, still);
+    const RegistrationResult a = align(Context::cpu(), source, target, slid),
+                             b = align(Context::cpu(), source, target, still);
     ASSERT_TRUE(a.aligned());
     EXPECT_LT((a.target_from_source.matrix() - truth.matrix()).norm(), 0.02);
     EXPECT_EQ(a.target_from_source.matrix(), b.target_from_source.matrix());
@@ -133,7 +146,8 @@ TEST(Slide, WhatComesBackDoesNotCount) {
   }
 }
 
-// Along a bare wall a slid pose stays where it was put. Both cannot be right, so it is a rival, and costs the other its confidence.
+// Along a bare wall a slid pose stays where it was put. Both cannot be right, so it is a rival, and
+// costs the other its confidence.
 TEST(Slide, WhatStaysAwayIsARival) {
   std::mt19937 random(3);
   std::vector<Eigen::Vector3f> points;
@@ -141,15 +155,20 @@ TEST(Slide, WhatStaysAwayIsARival) {
   const PointCloudView cloud(points);
   RegistrationOptions slid, still;
   still.evidence.slide_distance = 0;
-  const RegistrationResult a = align(Context::cpu(), cloud, cloud, slid), b = align(Context::cpu(), cloud, cloud, still);
+  const RegistrationResult a = align(Context::cpu(), cloud, cloud, slid),
+                           b = align(Context::cpu(), cloud, cloud, still);
   ASSERT_FALSE(a.modes.empty());
   ASSERT_FALSE(b.modes.empty());
   const auto rivals = [&](const RegistrationResult& result) {
-    return std::count_if(result.modes.begin() + 1, result.modes.end(), [&](const RegistrationMode& mode) {
-      const Eigen::Isometry3d between = Eigen::Isometry3d(result.target_from_source).inverse() * Eigen::Isometry3d(mode.target_from_source);
-      const double along = std::abs(between.translation().x()), across = between.translation().tail<2>().norm();
-      return along > 0.25 && along < 0.9 && across < 0.1 && Eigen::AngleAxisd(between.linear()).angle() < 0.1;
-    });
+    return std::count_if(
+        result.modes.begin() + 1, result.modes.end(), [&](const RegistrationMode& mode) {
+          const Eigen::Isometry3d between = Eigen::Isometry3d(result.target_from_source).inverse() *
+                                            Eigen::Isometry3d(mode.target_from_source);
+          const double along = std::abs(between.translation().x()),
+                       across = between.translation().tail<2>().norm();
+          return along > 0.25 && along < 0.9 && across < 0.1 &&
+                 Eigen::AngleAxisd(between.linear()).angle() < 0.1;
+        });
   };
   EXPECT_GE(rivals(a), 1);
   EXPECT_GT(rivals(a), rivals(b));

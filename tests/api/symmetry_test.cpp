@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Where more than one pose is as good as the truth, the result says so: low confidence, the other poses among the modes, and the
-// direction in which a pose slides.
+// Where more than one pose is as good as the truth, the result says so: low confidence, the other
+// poses among the modes, and the direction in which a pose slides.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -15,7 +15,8 @@ namespace {
 using Points = std::vector<Eigen::Vector3f>;
 
 /// count points of a surface, with the noise of a scan.
-Points sample(std::mt19937& random, int count, const std::function<Eigen::Vector3f(float, float, float)>& surface) {
+Points sample(std::mt19937& random, int count,
+              const std::function<Eigen::Vector3f(float, float, float)>& surface) {
   std::uniform_real_distribution<float> unit;
   std::normal_distribution<float> noise(0, 0.002f);
   Points out;
@@ -38,7 +39,9 @@ Points cube(std::mt19937& random) {
 
 /// A pipe without ends, along z, about its centre.
 Points pipe(std::mt19937& random) {
-  return sample(random, 30000, [](float a, float b, float) { return Eigen::Vector3f(std::cos(6.2831853f * a), std::sin(6.2831853f * a), 4 * b - 2); });
+  return sample(random, 30000, [](float a, float b, float) {
+    return Eigen::Vector3f(std::cos(6.2831853f * a), std::sin(6.2831853f * a), 4 * b - 2);
+  });
 }
 
 /// Floor, ceiling and walls of a corridor along y, from one place to another.
@@ -50,23 +53,30 @@ Points corridor(std::mt19937& random, float from, float to) {
   });
 }
 
-/// target_from_source is the truth; the source's points are moved away by it. The sensor stands at eye in the target.
-RegistrationResult register_moved(const Points& scanned, const Points& target, const Eigen::Isometry3d& truth, const Eigen::Vector3f& eye) {
+/// target_from_source is the truth; the source's points are moved away by it. The sensor stands at
+/// eye in the target.
+RegistrationResult register_moved(const Points& scanned, const Points& target,
+                                  const Eigen::Isometry3d& truth, const Eigen::Vector3f& eye) {
   const Points source = test::moved(truth.inverse(), scanned);
   const Eigen::Vector3f eye_in_source = (truth.inverse() * eye.cast<double>()).cast<float>();
   PointCloudView a(source), b(target);
-  a.viewpoints = eye_in_source.data(), a.viewpoint_count = 1;
-  b.viewpoints = eye.data(), b.viewpoint_count = 1;
+  a.viewpoints = eye_in_source.data();
+  a.viewpoint_count = 1;
+  b.viewpoints = eye.data();
+  b.viewpoint_count = 1;
   return align(Context::cpu(), a, b, RegistrationOptions::from_voxel_size(0.1f));
 }
 
 /// What the pose does to the target beside the truth: the identity where it is the truth.
-Eigen::Isometry3d beside(const Eigen::Isometry3d& truth, const RegistrationMode& mode) { return mode.target_from_source * truth.inverse(); }
+Eigen::Isometry3d beside(const Eigen::Isometry3d& truth, const RegistrationMode& mode) {
+  return mode.target_from_source * truth.inverse();
+}
 
 TEST(Symmetry, BareCubeRoom) {
   std::mt19937 random(11);
   const Eigen::Isometry3d truth = test::random_pose(random);
-  const RegistrationResult r = register_moved(cube(random), cube(random), truth, Eigen::Vector3f::Zero());
+  const RegistrationResult r =
+      register_moved(cube(random), cube(random), truth, Eigen::Vector3f::Zero());
   EXPECT_FALSE(r.aligned());
   EXPECT_EQ(r.reason, RegistrationReason::confidence_too_low);
   EXPECT_LT(r.score, 0.3);
@@ -75,8 +85,10 @@ TEST(Symmetry, BareCubeRoom) {
   for (const RegistrationMode& mode : r.modes) {
     const Eigen::Isometry3d e = beside(truth, mode);
     const Eigen::Matrix3d nearest = e.linear().array().round();
-    const bool is_rotation = nearest.cwiseAbs().sum() == 3 && std::abs(nearest.determinant() - 1) < 1e-9;
-    symmetric += is_rotation && (e.linear() - nearest).norm() < 0.03 && e.translation().norm() < 0.05;
+    const bool is_rotation =
+        nearest.cwiseAbs().sum() == 3 && std::abs(nearest.determinant() - 1) < 1e-9;
+    symmetric +=
+        is_rotation && (e.linear() - nearest).norm() < 0.03 && e.translation().norm() < 0.05;
   }
   EXPECT_GE(symmetric, 12) << "of " << r.modes.size() << " modes";
   double sum = 0;
@@ -87,7 +99,8 @@ TEST(Symmetry, BareCubeRoom) {
 TEST(Symmetry, Pipe) {
   std::mt19937 random(12);
   const Eigen::Isometry3d truth = test::random_pose(random);
-  const RegistrationResult r = register_moved(pipe(random), pipe(random), truth, Eigen::Vector3f::Zero());
+  const RegistrationResult r =
+      register_moved(pipe(random), pipe(random), truth, Eigen::Vector3f::Zero());
   EXPECT_FALSE(r.aligned()) << r.score;
   ASSERT_GT(r.modes.size(), 4u);
   // Turned about z, or z upside down, and shifted by nothing: all the same to a pipe.
@@ -107,13 +120,15 @@ TEST(Symmetry, CorridorSlides) {
     const Eigen::Isometry3d truth = test::random_pose(random);
     // The smaller cloud is moved inside: both ways round.
     Points a = corridor(random, -7, 3), b = corridor(random, -3, swap ? 5.0f : 9.0f);
-    const RegistrationResult r = register_moved(swap ? a : b, swap ? b : a, truth, Eigen::Vector3f(0.9f, 0, 1.2f));
+    const RegistrationResult r =
+        register_moved(swap ? a : b, swap ? b : a, truth, Eigen::Vector3f(0.9f, 0, 1.2f));
     EXPECT_FALSE(r.aligned()) << r.score;
     ASSERT_FALSE(r.modes.empty());
     const PoseEvidence& e = r.modes.front().evidence;
     EXPECT_LT(e.stiffness[0], 1e-2 * e.stiffness[2]);
     // Along y of the target, and nothing else.
-    EXPECT_GT(std::abs(e.softest[4]), 0.98) << e.softest[3] << " " << e.softest[4] << " " << e.softest[5];
+    EXPECT_GT(std::abs(e.softest[4]), 0.98)
+        << e.softest[3] << " " << e.softest[4] << " " << e.softest[5];
   }
 }
 
@@ -122,7 +137,8 @@ TEST(Symmetry, FurnishedRoomIsStiff) {
   std::mt19937 random(14);
   const Eigen::Isometry3d truth = test::random_pose(random);
   const Points target = test::scan_room(random);
-  const RegistrationResult r = register_moved(test::scan_room(random), target, truth, Eigen::Vector3f(1.5f, 2.5f, 1.7f));
+  const RegistrationResult r =
+      register_moved(test::scan_room(random), target, truth, Eigen::Vector3f(1.5f, 2.5f, 1.7f));
   EXPECT_TRUE(r.aligned());
   EXPECT_GT(r.score, 0.9);
   const PoseEvidence& e = r.modes.front().evidence;

@@ -100,7 +100,12 @@ TEST(TimeBudget, TheMostConfidentLevelIsReturned) {
 
 TEST(TimeBudget, PredictionsFollowTheStages) {
   StageTimings t;
-  t.match = 1, t.sample = 2, t.fit = 3, t.score = 4, t.refine = 5, t.judge = 6;
+  t.match = 1;
+  t.sample = 2;
+  t.fit = 3;
+  t.score = 4;
+  t.refine = 5;
+  t.judge = 6;
   RegistrationOptions from, to;
   to.compatibility.seeds = 2 * from.compatibility.seeds;
   to.compatibility.triangles = 3 * from.compatibility.triangles;

@@ -78,7 +78,8 @@ TEST(ShareFacingAway, StridesAndLies) {
   PointCloudView view(rows.data(), 100);
   view.point_stride = view.normal_stride = 6;
   view.normals = rows.data() + 3;
-  view.viewpoints = below, view.viewpoint_count = 1;
+  view.viewpoints = below;
+  view.viewpoint_count = 1;
   EXPECT_EQ(view.share_facing_away(), 1);
   view.normal_stride = 2;
   test::expect_error<InvalidArgument>([&] { view.share_facing_away(); }, {"cloud.normal_stride"});

@@ -127,7 +127,8 @@ TEST(VoxelSize, RoughSurfacesNeedLargerVoxels) {
   Points smooth, rough;
   for (int k = 0; k < 60000; ++k) {
     const float x = place(random), y = place(random), z = normal(random);
-    smooth.emplace_back(x, y, 0.02f * z), rough.emplace_back(x, y, z);
+    smooth.emplace_back(x, y, 0.02f * z);
+    rough.emplace_back(x, y, z);
   }
   const VoxelSizeSuggestion a = suggest({smooth}), b = suggest({rough});
   EXPECT_LT(a.noise, 0.004);

@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
 """What bench/redwood says about pairs and scenes, on cases counted by hand."""
+
 import pathlib
 import sys
 import tempfile
@@ -9,29 +10,60 @@ import unittest
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 sys.dont_write_bytecode = True
 sys.path.insert(0, str(ROOT / "bench/redwood"))
-import analysis  # noqa: E402
-from scenes import Scene  # noqa: E402
+import analysis
+from scenes import Scene
 
 UNIT = "1 0 0 0\n0 1 0 0\n0 0 1 0\n0 0 0 1\n"
 
 
 def pair(j, listed=True, known=True, tried=True, reported=True, error=0.1, degrees=1.0):
     right = error is not None and error <= 0.2
-    return {"i": 0, "j": j, "listed": listed, "known": known, "tried": tried, "reported": reported, "error": error, "degrees": degrees,
-            "strict": listed and right, "geometric": known and right}
+    return {
+        "i": 0,
+        "j": j,
+        "listed": listed,
+        "known": known,
+        "tried": tried,
+        "reported": reported,
+        "error": error,
+        "degrees": degrees,
+        "strict": listed and right,
+        "geometric": known and right,
+    }
 
 
 class Analysis(unittest.TestCase):
-    pairs = [pair(2), pair(3, reported=False), pair(4, reported=False, error=3, degrees=90), pair(5, error=0.3, degrees=4), pair(6, error=2, degrees=180),
-             pair(7, tried=False, reported=False, error=None, degrees=None), pair(8, reported=False, error=None, degrees=None),
-             pair(9, listed=False), pair(10, listed=False, known=False, error=None, degrees=None), pair(11, listed=False, error=1)]
+    pairs = [
+        pair(2),
+        pair(3, reported=False),
+        pair(4, reported=False, error=3, degrees=90),
+        pair(5, error=0.3, degrees=4),
+        pair(6, error=2, degrees=180),
+        pair(7, tried=False, reported=False, error=None, degrees=None),
+        pair(8, reported=False, error=None, degrees=None),
+        pair(9, listed=False),
+        pair(10, listed=False, known=False, error=None, degrees=None),
+        pair(11, listed=False, error=1),
+    ]
 
     def test_every_miss_has_one_reason(self):
-        self.assertEqual(analysis.misses(self.pairs), {
-            "not_tried": 1, "no_candidate": 1, "right_but_not_reported": 1, "wrong_and_not_reported": 1, "reported_off_by_little": 1, "reported_wrong": 1})
+        self.assertEqual(
+            analysis.misses(self.pairs),
+            {
+                "not_tried": 1,
+                "no_candidate": 1,
+                "right_but_not_reported": 1,
+                "wrong_and_not_reported": 1,
+                "reported_off_by_little": 1,
+                "reported_wrong": 1,
+            },
+        )
 
     def test_false_reports(self):
-        self.assertEqual(analysis.wrong_reports(self.pairs), {"right_but_little_overlap": 1, "wrong_pose": 3, "no_overlap": 1})
+        self.assertEqual(
+            analysis.wrong_reports(self.pairs),
+            {"right_but_little_overlap": 1, "wrong_pose": 3, "no_overlap": 1},
+        )
 
     def test_rotation_errors(self):
         histogram = analysis.rotation_errors(self.pairs)
@@ -41,7 +73,9 @@ class Analysis(unittest.TestCase):
         self.assertEqual(histogram["counts"][-1], 1)  # 180, which closes the last bin
 
     def test_recall_by_overlap(self):
-        table = analysis.recall_by_overlap(self.pairs, {(0, j): 0.3 + 0.1 * (j - 2) for j in range(2, 9)})
+        table = analysis.recall_by_overlap(
+            self.pairs, {(0, j): 0.3 + 0.1 * (j - 2) for j in range(2, 9)}
+        )
         self.assertEqual(sum(table["pairs"]), 7)
         self.assertEqual(table["reported_right"][0], 1)
         self.assertEqual(sum(table["reported_right"]), 1)
@@ -68,7 +102,11 @@ class Scenes(unittest.TestCase):
             self.assertIn(fragment, str(refused.exception))
 
     def test_truth_beside_or_in_a_sibling(self):
-        for place in (self.folder, self.root / "room-evaluation", self.root / "iclnuim-room-evaluation"):
+        for place in (
+            self.folder,
+            self.root / "room-evaluation",
+            self.root / "iclnuim-room-evaluation",
+        ):
             place.mkdir(exist_ok=True)
             (place / "gt.log").write_text("0 2 3\n" + UNIT)
             self.assertEqual(Scene(self.folder, "room").truth, place)

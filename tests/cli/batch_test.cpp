@@ -145,8 +145,9 @@ TEST_F(Batch, PairsThatRepeatAndPairsThatCannotBe) {
   expect_holds(outcome.out, {"pairs      2"});
   EXPECT_EQ(batch("r", {"--pairs", twice, "--quiet"}).err, "");
   const std::string bad = out_.write("bad.txt", "# header\n0 1\n\n  # more\n1 2 # right\n9 1\n");
-  expect_refused(joined({"batch", scans_.path(), "-o", out_ / "b.log", "--pairs", bad, "--quiet"}, kSmall),
-                 {bad + ":6: there is no fragment 9"});
+  expect_refused(
+      joined({"batch", scans_.path(), "-o", out_ / "b.log", "--pairs", bad, "--quiet"}, kSmall),
+      {bad + ":6: there is no fragment 9"});
 }
 
 TEST_F(Batch, CamerasThatDoNotMatchTheFragments) {
@@ -181,7 +182,10 @@ TEST_F(Batch, MinimalScoreDecidesWhatIsReported) {
   // The candidates are the same whatever is reported.
   const auto poses = [&](const char* name) {
     auto pairs = without_times(json_of(out_ / name))["pairs"];
-    for (auto& pair : pairs) pair.erase("status"), pair.erase("reason");
+    for (auto& pair : pairs) {
+      pair.erase("status");
+      pair.erase("reason");
+    }
     return pairs;
   };
   EXPECT_EQ(poses("all.json"), poses("none.json"));

@@ -117,7 +117,8 @@ TEST_F(Evaluate, TheStrictRankingGoesByTheChanceOfOverlapToo) {
   EXPECT_EQ(scene["strict"]["recall_at_precision"]["99"], 0.25);
   EXPECT_EQ(scene["strict"]["curve"], (json{{0.25, 1.0}, {0.25, 0.5}}));
   EXPECT_EQ(scene["geometric"]["curve"], (json{{0.0, 1.0}, {0.25, 1.0}}));
-  low.erase("modes"), listed.erase("modes");
+  low.erase("modes");
+  listed.erase("modes");
   ASSERT_EQ(evaluate(write({low, listed})).status, 0);
   scene = json_of(out_ / "e.json")["scenes"][0];
   EXPECT_EQ(scene["strict"]["recall_at_precision"]["99"], 0.0);

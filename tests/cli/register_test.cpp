@@ -35,7 +35,8 @@ TEST_F(Register, NumbersOfAFarPoseStayApart) {
   PointCloud far = room_scan(1);
   for (Eigen::Vector3f& point : far.points) point += Eigen::Vector3f(-201112, -301112, -401112);
   const Outcome outcome = run(joined(
-      {"register", source_, write_cloud(folder_, "far.ply", far), "--json", folder_ / "r.json"}, kSmall));
+      {"register", source_, write_cloud(folder_, "far.ply", far), "--json", folder_ / "r.json"},
+      kSmall));
   const auto pose = json_of(folder_ / "r.json")["result"]["target_from_source"];
   ASSERT_EQ(pose.size(), 16u) << outcome.out << outcome.err;
   std::istringstream printed(outcome.out.substr(outcome.out.find("target_from_source\n") + 19));

@@ -87,8 +87,10 @@ TEST_F(Report, WithTruthAndPictures) {
 TEST_F(Report, MissedPairsAndPicturesWithoutTruth) {
   auto json = json_of(result_);
   for (auto& pair : json["pairs"])
-    if (pair["i"] == 0 && pair["j"] == 2)
-      pair["status"] = "not_aligned", pair["reason"] = "confidence_too_low";
+    if (pair["i"] == 0 && pair["j"] == 2) {
+      pair["status"] = "not_aligned";
+      pair["reason"] = "confidence_too_low";
+    }
   out_.write("r.json", json.dump());
   const std::vector<std::string> clouds = {"--clouds", scans_.path()};
   expect_holds(page(joined(clouds, {"--ground-truth", scans_.path()})),

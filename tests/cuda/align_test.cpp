@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Alignment on both backends, stage by stage: the same bits after each.
 #include "algorithm/fpfh.hpp"
-#include "cuda/gpu.hpp"
 #include "cpu/stages.hpp"
+#include "cuda/gpu.hpp"
 #include "stages.hpp"
 #include "support/prepared.hpp"
 #include "support/random_clouds.hpp"
@@ -13,9 +13,13 @@ namespace {
 using test::host;
 using test::same_bytes;
 
-bool same(const Support& a, const Support& b) { return a.inliers == b.inliers && a.residual == b.residual && a.hypothesis == b.hypothesis; }
+bool same(const Support& a, const Support& b) {
+  return a.inliers == b.inliers && a.residual == b.residual && a.hypothesis == b.hypothesis;
+}
 
-bool same(const Pose<double>& a, const Pose<double>& b) { return std::memcmp(&a, &b, sizeof a) == 0; }
+bool same(const Pose<double>& a, const Pose<double>& b) {
+  return std::memcmp(&a, &b, sizeof a) == 0;
+}
 
 struct PairOfClouds {
   std::size_t source, target;
@@ -23,7 +27,9 @@ struct PairOfClouds {
 };
 
 /// Prepares the clouds and aligns the pairs on both backends; every product is compared.
-void expect_same_alignment(const std::vector<RawCloud>& raw, const std::vector<PairOfClouds>& wanted, const RegistrationOptions& options) {
+void expect_same_alignment(const std::vector<RawCloud>& raw,
+                           const std::vector<PairOfClouds>& wanted,
+                           const RegistrationOptions& options) {
   cpu::Exec on_cpu(2);
   cuda::Exec on_cuda(0);
   on_cuda.begin();
@@ -32,8 +38,10 @@ void expect_same_alignment(const std::vector<RawCloud>& raw, const std::vector<P
   std::vector<PairView> cpu_pairs, cuda_pairs;
   for (const PairOfClouds& w : wanted) {
     const auto custom = static_cast<std::uint32_t>(w.custom_source.size());
-    cpu_pairs.push_back({cpu_clouds[w.source]->view(), cpu_clouds[w.target]->view(), w.custom_source.data(), w.custom_target.data(), custom});
-    cuda_pairs.push_back({cuda_clouds[w.source]->view_on_device, cuda_clouds[w.target]->view_on_device, w.custom_source.data(),
+    cpu_pairs.push_back({cpu_clouds[w.source]->view(), cpu_clouds[w.target]->view(),
+                         w.custom_source.data(), w.custom_target.data(), custom});
+    cuda_pairs.push_back({cuda_clouds[w.source]->view_on_device,
+                          cuda_clouds[w.target]->view_on_device, w.custom_source.data(),
                           w.custom_target.data(), custom});
   }
   const auto cpu_views = span_of(cpu_pairs), cuda_views = span_of(cuda_pairs);
@@ -45,21 +53,28 @@ void expect_same_alignment(const std::vector<RawCloud>& raw, const std::vector<P
   for (std::size_t p = 0; p < count; ++p) {
     SCOPED_TRACE("match, pair " + std::to_string(p));
     ASSERT_EQ(cpu_matches[p].pairs.size(), match_count[p]);
-    ASSERT_TRUE(same_bytes(cpu_matches[p].pairs, host(on_cuda, cuda_matches.pairs.data() + cuda_matches.room.offset[p], match_count[p])));
+    ASSERT_TRUE(same_bytes(
+        cpu_matches[p].pairs,
+        host(on_cuda, cuda_matches.pairs.data() + cuda_matches.room.offset[p], match_count[p])));
   }
   const auto cpu_quadruples = cpu::sample_quadruples(on_cpu, cpu_matches, options.hypothesis);
   const auto cuda_quadruples = cuda::sample_quadruples(on_cuda, cuda_matches, options.hypothesis);
   for (std::size_t p = 0; p < count; ++p) {
     SCOPED_TRACE("sample, pair " + std::to_string(p));
-    ASSERT_TRUE(same_bytes(cpu_quadruples[p], host(on_cuda, cuda_quadruples.id.data() + cuda_quadruples.segments.offset[p],
-                                                   cuda_quadruples.segments.size(p))));
+    ASSERT_TRUE(
+        same_bytes(cpu_quadruples[p],
+                   host(on_cuda, cuda_quadruples.id.data() + cuda_quadruples.segments.offset[p],
+                        cuda_quadruples.segments.size(p))));
   }
-  const auto cpu_hypotheses = cpu::fit_hypotheses(on_cpu, cpu_matches, cpu_quadruples, options.hypothesis);
-  const auto cuda_hypotheses = cuda::fit_hypotheses(on_cuda, cuda_matches, cuda_quadruples, options.hypothesis);
+  const auto cpu_hypotheses =
+      cpu::fit_hypotheses(on_cpu, cpu_matches, cpu_quadruples, options.hypothesis);
+  const auto cuda_hypotheses =
+      cuda::fit_hypotheses(on_cuda, cuda_matches, cuda_quadruples, options.hypothesis);
   const auto valid_count = host(on_cuda, cuda_hypotheses.count.data(), count);
   for (std::size_t p = 0; p < count; ++p) {
     SCOPED_TRACE("fit, pair " + std::to_string(p));
-    const std::size_t begin = cuda_quadruples.segments.offset[p], size = cuda_quadruples.segments.size(p);
+    const std::size_t begin = cuda_quadruples.segments.offset[p],
+                      size = cuda_quadruples.segments.size(p);
     const auto poses = host(on_cuda, cuda_hypotheses.pose.data() + begin, size);
     const auto valid = host(on_cuda, cuda_hypotheses.valid.data() + begin, size);
     std::vector<Pose<float>> kept;
@@ -69,19 +84,24 @@ void expect_same_alignment(const std::vector<RawCloud>& raw, const std::vector<P
     ASSERT_EQ(kept.size(), valid_count[p]);
   }
   const auto cpu_best = cpu::score_hypotheses(on_cpu, cpu_views, cpu_hypotheses, options.score);
-  const auto cuda_best = cuda::score_hypotheses(on_cuda, cuda_views, cuda_hypotheses, options.score);
-  const auto cpu_refined = cpu::refine_poses(on_cpu, cpu_views, cpu_best, options.score, options.refine);
-  const auto cuda_refined = cuda::refine_poses(on_cuda, cuda_views, cuda_best, options.score, options.refine);
+  const auto cuda_best =
+      cuda::score_hypotheses(on_cuda, cuda_views, cuda_hypotheses, options.score);
+  const auto cpu_refined =
+      cpu::refine_poses(on_cpu, cpu_views, cpu_best, options.score, options.refine);
+  const auto cuda_refined =
+      cuda::refine_poses(on_cuda, cuda_views, cuda_best, options.score, options.refine);
   const auto cpu_judged = cpu::judge_poses(on_cpu, cpu_views, cpu_refined, options.score);
   const auto cuda_judged = cuda::judge_poses(on_cuda, cuda_views, cuda_refined, options.score);
-  const auto best = host(on_cuda, cuda_best.data(), count), refined = host(on_cuda, cuda_refined.data(), count);
+  const auto best = host(on_cuda, cuda_best.data(), count),
+             refined = host(on_cuda, cuda_refined.data(), count);
   const auto judged = host(on_cuda, cuda_judged.data(), count);
   for (std::size_t p = 0; p < count; ++p) {
     SCOPED_TRACE("score to judge, pair " + std::to_string(p));
     ASSERT_EQ(cpu_best[p].found, best[p].found != 0);
     if (!cpu_best[p].found) continue;
-    ASSERT_TRUE(same(cpu_best[p].support, best[p].support)) << cpu_best[p].support.inliers << " and " << best[p].support.inliers << ", hypotheses "
-                                                            << cpu_best[p].support.hypothesis << " and " << best[p].support.hypothesis;
+    ASSERT_TRUE(same(cpu_best[p].support, best[p].support))
+        << cpu_best[p].support.inliers << " and " << best[p].support.inliers << ", hypotheses "
+        << cpu_best[p].support.hypothesis << " and " << best[p].support.hypothesis;
     ASSERT_TRUE(same(cpu_best[p].pose, best[p].pose));
     ASSERT_TRUE(same(cpu_refined[p].support, refined[p].support));
     ASSERT_TRUE(same(cpu_refined[p].pose, refined[p].pose));
@@ -166,19 +186,23 @@ TEST_F(AlignOnCuda, OddHypothesisCountsAndSurvivorLimit) {
 }
 
 TEST_F(AlignOnCuda, CorrespondencesOfTheCaller) {
-  const auto clouds = pipeline::prepare(*std::make_unique<cpu::Exec>(2), span_of(raw()), options.prepare);
+  const auto clouds =
+      pipeline::prepare(*std::make_unique<cpu::Exec>(2), span_of(raw()), options.prepare);
   std::vector<PairOfClouds> custom;
   for (std::size_t p = 0; p < 12; ++p) {
     custom.push_back(pairs[p]);
     const std::uint32_t n = clouds[pairs[p].source]->size, m = clouds[pairs[p].target]->size;
     if (n == 0 || m == 0) continue;
-    for (int k = 0; k < (p % 3 == 0 ? 3 : 5000); ++k)
-      custom.back().custom_source.push_back(static_cast<std::uint32_t>(random() % n)), custom.back().custom_target.push_back(static_cast<std::uint32_t>(random() % m));
+    for (int k = 0; k < (p % 3 == 0 ? 3 : 5000); ++k) {
+      custom.back().custom_source.push_back(static_cast<std::uint32_t>(random() % n));
+      custom.back().custom_target.push_back(static_cast<std::uint32_t>(random() % m));
+    }
   }
   expect_same_alignment(raw(), custom, options);
 }
 
-// The feature search bounds distances before it measures them: dimensions and magnitudes where the bounds are loose, tight, or mean nothing.
+// The feature search bounds distances before it measures them: dimensions and magnitudes where the
+// bounds are loose, tight, or mean nothing.
 TEST_F(AlignOnCuda, FeaturesOfTheCaller) {
   std::normal_distribution<float> normal;
   options.hypothesis.count = 5'000;
@@ -189,8 +213,11 @@ TEST_F(AlignOnCuda, FeaturesOfTheCaller) {
       for (RawCloud& cloud : clouds) {
         features.emplace_back(cloud.size * dimension);
         // Many equal values, so that distances tie.
-        for (float& f : features.back()) f = scale * (random() % 4 == 0 ? normal(random) : static_cast<float>(random() % 3));
-        cloud.features = features.back().data(), cloud.feature_dimension = dimension, cloud.feature_stride = dimension;
+        for (float& f : features.back())
+          f = scale * (random() % 4 == 0 ? normal(random) : static_cast<float>(random() % 3));
+        cloud.features = features.back().data();
+        cloud.feature_dimension = dimension;
+        cloud.feature_stride = dimension;
       }
       options.prepare.voxel_size = 0.12f;
       SCOPED_TRACE("dimension " + std::to_string(dimension) + ", scale " + std::to_string(scale));
@@ -207,11 +234,13 @@ TEST_F(AlignOnCuda, FeaturesOfTheCallerAgainstThoseOfTheLibrary) {
   for (const std::size_t c : {std::size_t(0), std::size_t(4)}) {
     features.emplace_back(clouds[c].size * kFpfhSize);
     for (float& f : features.back()) f = normal(random);
-    clouds[c].features = features.back().data(), clouds[c].feature_dimension = clouds[c].feature_stride = kFpfhSize;
+    clouds[c].features = features.back().data();
+    clouds[c].feature_dimension = clouds[c].feature_stride = kFpfhSize;
   }
   options.prepare.voxel_size = 0.12f;
   options.hypothesis.count = 5'000;
-  expect_same_alignment(clouds, {{0, 1, {}, {}}, {1, 4, {}, {}}, {0, 4, {}, {}}, {1, 2, {}, {}}}, options);
+  expect_same_alignment(clouds, {{0, 1, {}, {}}, {1, 4, {}, {}}, {0, 4, {}, {}}, {1, 2, {}, {}}},
+                        options);
 }
 
 // Thousands of equal features, of which the first is the answer.
@@ -233,7 +262,8 @@ TEST_F(AlignOnCuda, WallsWithoutNoise) {
 }
 
 TEST_F(AlignOnCuda, MoreMatchesThanSharedMemoryHolds) {
-  std::vector<std::vector<Vec3>> dense{test::cube(random, 60000, 2.2f), test::bumpy_sheet(random, 400000, 6.0f)};
+  std::vector<std::vector<Vec3>> dense{test::cube(random, 60000, 2.2f),
+                                       test::bumpy_sheet(random, 400000, 6.0f)};
   kept = dense;
   pairs = {{0, 1, {}, {}}, {1, 0, {}, {}}};
   expect_same_alignment(raw(), pairs, options);

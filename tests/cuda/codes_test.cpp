@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// The codes by which the device's scoring passes most points over. They are bounds: what agrees must never be denied. No device needed.
+// The codes by which the device's scoring passes most points over. They are bounds: what agrees
+// must never be denied. No device needed.
 #include <gtest/gtest.h>
 
 #include <random>
@@ -18,7 +19,8 @@ Vec3 random_normal(std::mt19937& random) {
 
 Rigid random_rotation(std::mt19937& random) {
   std::normal_distribution<float> gauss;
-  const float w = gauss(random), x = gauss(random), y = gauss(random), z = gauss(random), n = std::sqrt(w * w + x * x + y * y + z * z);
+  const float w = gauss(random), x = gauss(random), y = gauss(random), z = gauss(random),
+              n = std::sqrt(w * w + x * x + y * y + z * z);
   return to_rigid(Pose<float>{w / n, x / n, y / n, z / n, 0, 0, 0});
 }
 
@@ -28,7 +30,9 @@ std::vector<Vec3> random_cell(std::mt19937& random) {
   const Vec3 mean = random_normal(random);
   const float spread = unit(random) < 0.7f ? 0.4f * unit(random) : 2.0f;
   std::vector<Vec3> normals(1 + random() % 6);
-  for (Vec3& n : normals) n = unit(random) < 0.1f ? Vec3{0, 0, 0} : normalized_or_zero(mean + random_normal(random) * spread);
+  for (Vec3& n : normals)
+    n = unit(random) < 0.1f ? Vec3{0, 0, 0}
+                            : normalized_or_zero(mean + random_normal(random) * spread);
   return normals;
 }
 
@@ -43,17 +47,21 @@ TEST_P(CellCodes, NeverDenyWhatAgrees) {
   for (int round = 0; round < 20000; ++round) {
     const std::vector<Vec3> normals = random_cell(random);
     std::vector<std::uint32_t> candidates(normals.size());
-    for (std::size_t k = 0; k < candidates.size(); ++k) candidates[k] = static_cast<std::uint32_t>(k);
-    const std::uint32_t code = code_of_cell(tables, {candidates.data(), candidates.size()}, normals.data());
+    for (std::size_t k = 0; k < candidates.size(); ++k)
+      candidates[k] = static_cast<std::uint32_t>(k);
+    const std::uint32_t code =
+        code_of_cell(tables, {candidates.data(), candidates.size()}, normals.data());
     ASSERT_GE(code, 1u);
     ASSERT_LE(code, kCodeAny);
     const Vec3 normal = round % 10 == 0 ? Vec3{0, 0, 0} : random_normal(random);
     const Rigid rotation = random_rotation(random);
-    const std::uint32_t agreeing = agreeing_codes(tables, test, rotation, class_of_normal(tables, normal));
+    const std::uint32_t agreeing =
+        agreeing_codes(tables, test, rotation, class_of_normal(tables, normal));
     EXPECT_EQ(agreeing & 0xffffu, agreeing >> 16);
     EXPECT_EQ(agreeing & 1u, 0u) << "an empty cell has nobody who agrees";
     bool agrees = false;
-    for (const Vec3& n : normals) agrees = agrees || normals_agree(rotate(rotation, normal), n, min_cosine);
+    for (const Vec3& n : normals)
+      agrees = agrees || normals_agree(rotate(rotation, normal), n, min_cosine);
     const bool passes = (agreeing >> code & 1u) != 0;
     ASSERT_TRUE(passes || !agrees) << "round " << round;
     disagree += !agrees;

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// The public door on the GPU: same results as on the CPU, whatever the split; errors that leave the context usable; threads.
+// The public door on the GPU: same results as on the CPU, whatever the split; errors that leave the
+// context usable; threads.
 #include <cuda_runtime_api.h>
 
 #include <chrono>
@@ -38,7 +39,8 @@ TEST_F(CudaContext, ResultsAreTheCpusInAnySplit) {
   EXPECT_EQ(run(context, pairs), expected);
   for (std::size_t k = 0; k < pairs.size(); k += 5) {
     EXPECT_EQ(run(context, {pairs[k]})[0], expected[k]);
-    EXPECT_EQ(bytes(align(context, views[pairs[k].source], views[pairs[k].target], options)), expected[k]);
+    EXPECT_EQ(bytes(align(context, views[pairs[k].source], views[pairs[k].target], options)),
+              expected[k]);
   }
   std::vector<Pair> repeated;
   for (int k = 0; k < 30; ++k) repeated.insert(repeated.end(), pairs.begin(), pairs.end());
@@ -47,7 +49,8 @@ TEST_F(CudaContext, ResultsAreTheCpusInAnySplit) {
 }
 
 TEST_F(CudaContext, HostCopiesAreTheCpus) {
-  const PreparedCloud cpu = prepare(Context::cpu(), views[0], options.prepare), cuda = prepare(Context::cuda(), views[0], options.prepare);
+  const PreparedCloud cpu = prepare(Context::cpu(), views[0], options.prepare),
+                      cuda = prepare(Context::cuda(), views[0], options.prepare);
   EXPECT_EQ(cpu.points(), cuda.points());
   EXPECT_EQ(cpu.normals(), cuda.normals());
   EXPECT_EQ(cpu.features(), cuda.features());
@@ -61,7 +64,8 @@ TEST_F(CudaContext, CloudsOutliveTheirContextAndGoWithAnother) {
     const Context context = Context::cuda();
     clouds = prepare_batch(context, views, options.prepare);
   }
-  EXPECT_EQ(all_bytes(align_batch(Context::cuda(), clouds, pairs, options)), run(Context::cuda(), pairs));
+  EXPECT_EQ(all_bytes(align_batch(Context::cuda(), clouds, pairs, options)),
+            run(Context::cuda(), pairs));
   EXPECT_THROW(align(Context::cpu(), clouds[0], clouds[1], options), InvalidArgument);
 }
 
@@ -70,7 +74,8 @@ TEST_F(CudaContext, ADeviceThatDoesNotExist) {
     Context::cuda(1000);
     FAIL();
   } catch (const BackendUnavailable& error) {
-    EXPECT_NE(std::string(error.what()).find("device 1000 does not exist"), std::string::npos) << error.what();
+    EXPECT_NE(std::string(error.what()).find("device 1000 does not exist"), std::string::npos)
+        << error.what();
   }
 }
 
@@ -97,7 +102,8 @@ TEST_F(CudaContext, OutOfMemoryIsAnErrorThatLeavesTheContextUsable) {
 TEST_F(CudaContext, WarmRunsTakeNoMoreMemory) {
   const Context context = Context::cuda();
   const auto clouds = prepare_batch(context, views, options.prepare);
-  // The pool cuts its memory anew where calls of two kinds follow each other: warm is who has seen both in turn.
+  // The pool cuts its memory anew where calls of two kinds follow each other: warm is who has seen
+  // both in turn.
   for (int k = 0; k < 2; ++k) {
     align_batch(context, clouds, pairs, options);
     prepare_batch(context, views, options.prepare);
@@ -111,7 +117,8 @@ TEST_F(CudaContext, WarmRunsTakeNoMoreMemory) {
   }
   ASSERT_EQ(cudaMemGetInfo(&after, &total), cudaSuccess);
   EXPECT_EQ(before, after);
-  EXPECT_EQ(context.device_memory()[0].bytes_reserved, reserved) << "the pool asked the driver for more";
+  EXPECT_EQ(context.device_memory()[0].bytes_reserved, reserved)
+      << "the pool asked the driver for more";
   EXPECT_LE(context.device_memory()[0].bytes_in_use, reserved);
 }
 
@@ -121,17 +128,23 @@ TEST_F(CudaContext, ThreadsWithTheirOwnContextsAndThreadsThatShareOne) {
   std::vector<Results> got(4);
   std::vector<std::thread> threads;
   for (int t = 0; t < 4; ++t)
-    threads.emplace_back([&, t] { got[static_cast<std::size_t>(t)] = run(t < 2 ? Context::cuda() : shared, pairs); });
+    threads.emplace_back([&, t] {
+      got[static_cast<std::size_t>(t)] = run(t < 2 ? Context::cuda() : shared, pairs);
+    });
   for (std::thread& t : threads) t.join();
   for (const Results& g : got) EXPECT_EQ(g, expected);
 }
 
 // What the runtime answers on machines that a test cannot have.
 TEST(NoCudaDevice, EveryReasonHasItsWords) {
-  EXPECT_EQ(cuda::why_no_device(cudaErrorInsufficientDriver, 0, 13000), "no NVIDIA driver on this machine");
-  EXPECT_EQ(cuda::why_no_device(cudaErrorInsufficientDriver, 12020, 13000), "the NVIDIA driver supports CUDA 12.2, this build needs 13.0");
+  EXPECT_EQ(cuda::why_no_device(cudaErrorInsufficientDriver, 0, 13000),
+            "no NVIDIA driver on this machine");
+  EXPECT_EQ(cuda::why_no_device(cudaErrorInsufficientDriver, 12020, 13000),
+            "the NVIDIA driver supports CUDA 12.2, this build needs 13.0");
   EXPECT_EQ(cuda::why_no_device(cudaErrorNoDevice, 13000, 13000), "no CUDA device on this machine");
-  EXPECT_NE(cuda::why_no_device(cudaErrorSystemNotReady, 13000, 13000).find("cudaErrorSystemNotReady"), std::string::npos);
+  EXPECT_NE(
+      cuda::why_no_device(cudaErrorSystemNotReady, 13000, 13000).find("cudaErrorSystemNotReady"),
+      std::string::npos);
 }
 
 // The default stream is held up: whatever ran on it, or waited for it, would not finish.
@@ -140,10 +153,14 @@ TEST_F(CudaContext, NothingRunsOnTheDefaultStream) {
   const Results expected = run(context, pairs);
   std::promise<void> release;
   auto released = release.get_future();
-  ASSERT_EQ(cudaLaunchHostFunc(nullptr, [](void* gate) { static_cast<std::future<void>*>(gate)->wait(); }, &released), cudaSuccess);
+  ASSERT_EQ(
+      cudaLaunchHostFunc(
+          nullptr, [](void* gate) { static_cast<std::future<void>*>(gate)->wait(); }, &released),
+      cudaSuccess);
   auto got = std::async(std::launch::async, [&] { return run(context, pairs); });
   const bool finished = got.wait_for(std::chrono::seconds(60)) == std::future_status::ready;
-  EXPECT_EQ(cudaStreamQuery(nullptr), cudaErrorNotReady) << "the default stream was not held up: the test shows nothing";
+  EXPECT_EQ(cudaStreamQuery(nullptr), cudaErrorNotReady)
+      << "the default stream was not held up: the test shows nothing";
   release.set_value();
   EXPECT_TRUE(finished) << "some work waits for the default stream";
   EXPECT_EQ(got.get(), expected);

@@ -2,8 +2,8 @@
 // Registration by evidence on both backends, stage by stage: the same bits after each.
 #include <thread>
 
-#include "cuda/gpu.hpp"
 #include "cpu/stages.hpp"
+#include "cuda/gpu.hpp"
 #include "pipeline/align_by_evidence.hpp"
 #include "stages.hpp"
 #include "support/outcome_bytes.hpp"
@@ -42,7 +42,8 @@ class EvidenceOnCuda : public ::testing::Test {
   void SetUp() override { GPUREG_GPU_OR_SKIP(); }
 
   void keep(std::vector<Vec3> points) { kept.push_back(std::move(points)); }
-  /// Three scans of a room from two sides, a sheet, clutter, and what has no alignment; the odd ones with viewpoints.
+  /// Three scans of a room from two sides, a sheet, clutter, and what has no alignment; the odd
+  /// ones with viewpoints.
   void keep_scene() {
     for (int k = 0; k < 3; ++k) {
       std::vector<Vec3> points;
@@ -65,7 +66,10 @@ class EvidenceOnCuda : public ::testing::Test {
     std::vector<RawCloud> out;
     for (const auto& points : kept) {
       out.push_back(test::raw_cloud(points));
-      if (!viewpoints.empty() && out.size() % 2 == 1) out.back().viewpoints = &viewpoints[0].x, out.back().viewpoint_count = viewpoints.size();
+      if (!viewpoints.empty() && out.size() % 2 == 1) {
+        out.back().viewpoints = &viewpoints[0].x;
+        out.back().viewpoint_count = viewpoints.size();
+      }
     }
     return out;
   }
@@ -89,15 +93,19 @@ void EvidenceOnCuda::expect_same(const std::vector<RawCloud>& clouds) {
   std::vector<PairView> cpu_pairs, cuda_pairs;
   for (const PairOfClouds& w : pairs) {
     const auto custom = static_cast<std::uint32_t>(w.custom_source.size());
-    cpu_pairs.push_back({cpu_clouds[w.source]->view(), cpu_clouds[w.target]->view(), w.custom_source.data(), w.custom_target.data(), custom, w.prior});
-    cuda_pairs.push_back({cuda_clouds[w.source]->view_on_device, cuda_clouds[w.target]->view_on_device, w.custom_source.data(),
+    cpu_pairs.push_back({cpu_clouds[w.source]->view(), cpu_clouds[w.target]->view(),
+                         w.custom_source.data(), w.custom_target.data(), custom, w.prior});
+    cuda_pairs.push_back({cuda_clouds[w.source]->view_on_device,
+                          cuda_clouds[w.target]->view_on_device, w.custom_source.data(),
                           w.custom_target.data(), custom, w.prior});
   }
   const auto cpu_views = span_of(cpu_pairs), cuda_views = span_of(cuda_pairs);
   const std::size_t count = pairs.size();
 
-  const auto matches = cpu::unite_matches(on_cpu, cpu_views, options.hypothesis, options.compatibility);
-  const auto cuda_matches = cuda::unite_matches(on_cuda, cuda_views, options.hypothesis, options.compatibility);
+  const auto matches =
+      cpu::unite_matches(on_cpu, cpu_views, options.hypothesis, options.compatibility);
+  const auto cuda_matches =
+      cuda::unite_matches(on_cuda, cuda_views, options.hypothesis, options.compatibility);
   const auto match_count = host(on_cuda, cuda_matches.count.data(), count);
   const auto match_total = host(on_cuda, cuda_matches.total.data(), 2 * count);
   for (std::size_t p = 0; p < count; ++p) {
@@ -106,11 +114,15 @@ void EvidenceOnCuda::expect_same(const std::vector<RawCloud>& clouds) {
     ASSERT_EQ(m.size(), match_count[p]);
     const cuda::MatchSetView v = cuda_matches.view();
     const std::size_t at = cuda_matches.room.offset[p];
-    const std::vector<float>* values[] = {&m.px, &m.py, &m.pz, &m.qx, &m.qy, &m.qz, &m.mx, &m.my, &m.mz, &m.nx, &m.ny, &m.nz};
-    const float* columns[] = {v.px, v.py, v.pz, v.qx, v.qy, v.qz, v.mx, v.my, v.mz, v.nx, v.ny, v.nz};
+    const std::vector<float>* values[] = {&m.px, &m.py, &m.pz, &m.qx, &m.qy, &m.qz,
+                                          &m.mx, &m.my, &m.mz, &m.nx, &m.ny, &m.nz};
+    const float* columns[] = {v.px, v.py, v.pz, v.qx, v.qy, v.qz,
+                              v.mx, v.my, v.mz, v.nx, v.ny, v.nz};
     ASSERT_TRUE(same_bytes(m.source, host(on_cuda, v.source + at, m.size())));
     ASSERT_TRUE(same_bytes(m.target, host(on_cuda, v.target + at, m.size())));
-    for (int k = 0; k < 12; ++k) ASSERT_TRUE(same_bytes(*values[k], host(on_cuda, columns[k] + at, m.size()))) << "column " << k;
+    for (int k = 0; k < 12; ++k)
+      ASSERT_TRUE(same_bytes(*values[k], host(on_cuda, columns[k] + at, m.size())))
+          << "column " << k;
     ASSERT_TRUE(same_bytes(m.source_weight, host(on_cuda, v.source_weight + at, m.size())));
     ASSERT_TRUE(same_bytes(m.target_weight, host(on_cuda, v.target_weight + at, m.size())));
     ASSERT_EQ(m.source_total, match_total[2 * p]);
@@ -123,22 +135,30 @@ void EvidenceOnCuda::expect_same(const std::vector<RawCloud>& clouds) {
   for (std::size_t p = 0; p < count; ++p) {
     SCOPED_TRACE("seeds, pair " + std::to_string(p));
     ASSERT_EQ(seeds[p].size(), seed_count[p]);
-    ASSERT_TRUE(same_bytes(seeds[p], host(on_cuda, cuda_seeds.match.data() + p * cuda_seeds.most, seeds[p].size())));
+    ASSERT_TRUE(same_bytes(
+        seeds[p], host(on_cuda, cuda_seeds.match.data() + p * cuda_seeds.most, seeds[p].size())));
   }
 
-  auto candidates = cpu::propose_poses(on_cpu, matches, seeds, options.hypothesis, options.compatibility);
-  auto cuda_candidates = cuda::propose_poses(on_cuda, cuda_matches, cuda_seeds, options.hypothesis, options.compatibility);
+  auto candidates =
+      cpu::propose_poses(on_cpu, matches, seeds, options.hypothesis, options.compatibility);
+  auto cuda_candidates = cuda::propose_poses(on_cuda, cuda_matches, cuda_seeds, options.hypothesis,
+                                             options.compatibility);
   cpu::weigh_candidates(on_cpu, cpu_views, matches, candidates, options.evidence, options.score);
-  cuda::weigh_candidates(on_cuda, cuda_views, cuda_matches, cuda_candidates, options.evidence, options.score);
+  cuda::weigh_candidates(on_cuda, cuda_views, cuda_matches, cuda_candidates, options.evidence,
+                         options.score);
   const auto candidate_count = host(on_cuda, cuda_candidates.count.data(), count);
   for (std::size_t p = 0; p < count; ++p) {
     SCOPED_TRACE("candidates, pair " + std::to_string(p));
     const std::size_t at = p * cuda_candidates.most, size = candidates[p].pose.size();
     ASSERT_EQ(size, candidate_count[p]);
-    ASSERT_TRUE(same_bytes(candidates[p].seed, host(on_cuda, cuda_candidates.seed.data() + at, size)));
-    ASSERT_TRUE(same_bytes(candidates[p].pose, host(on_cuda, cuda_candidates.pose.data() + at, size)));
-    ASSERT_EQ(evidence_bytes(candidates[p].matches), evidence_bytes(host(on_cuda, cuda_candidates.matches.data() + at, size)));
-    ASSERT_TRUE(same_bytes(candidates[p].promise, host(on_cuda, cuda_candidates.promise.data() + at, size)));
+    ASSERT_TRUE(
+        same_bytes(candidates[p].seed, host(on_cuda, cuda_candidates.seed.data() + at, size)));
+    ASSERT_TRUE(
+        same_bytes(candidates[p].pose, host(on_cuda, cuda_candidates.pose.data() + at, size)));
+    ASSERT_EQ(evidence_bytes(candidates[p].matches),
+              evidence_bytes(host(on_cuda, cuda_candidates.matches.data() + at, size)));
+    ASSERT_TRUE(same_bytes(candidates[p].promise,
+                           host(on_cuda, cuda_candidates.promise.data() + at, size)));
   }
 
   auto modes = cpu::select_modes(on_cpu, candidates, options.evidence);
@@ -148,7 +168,9 @@ void EvidenceOnCuda::expect_same(const std::vector<RawCloud>& clouds) {
     for (std::size_t p = 0; p < count; ++p) {
       SCOPED_TRACE(stage + std::string(", pair ") + std::to_string(p));
       ASSERT_EQ(modes[p].size(), mode_count[p]);
-      ASSERT_EQ(mode_bytes(modes[p]), mode_bytes(host(on_cuda, cuda_modes.mode.data() + p * cuda_modes.most, mode_count[p])));
+      ASSERT_EQ(
+          mode_bytes(modes[p]),
+          mode_bytes(host(on_cuda, cuda_modes.mode.data() + p * cuda_modes.most, mode_count[p])));
     }
   };
   ASSERT_NO_FATAL_FAILURE(expect_same_modes("selected modes"));
@@ -160,13 +182,17 @@ void EvidenceOnCuda::expect_same(const std::vector<RawCloud>& clouds) {
   ASSERT_NO_FATAL_FAILURE(expect_same_modes("merged modes"));
 
   std::vector<PairOutcome> outcomes(count), cuda_outcomes(count);
-  cpu::weigh_modes(on_cpu, cpu_views, matches, candidates, modes, options, {outcomes.data(), count});
-  cuda::weigh_modes(on_cuda, cuda_views, cuda_matches, cuda_candidates, cuda_modes, options, {cuda_outcomes.data(), count});
-  for (std::size_t p = 0; p < count; ++p) ASSERT_EQ(test::bytes(outcomes[p]), test::bytes(cuda_outcomes[p])) << "outcome, pair " << p;
+  cpu::weigh_modes(on_cpu, cpu_views, matches, candidates, modes, options,
+                   {outcomes.data(), count});
+  cuda::weigh_modes(on_cuda, cuda_views, cuda_matches, cuda_candidates, cuda_modes, options,
+                    {cuda_outcomes.data(), count});
+  for (std::size_t p = 0; p < count; ++p)
+    ASSERT_EQ(test::bytes(outcomes[p]), test::bytes(cuda_outcomes[p])) << "outcome, pair " << p;
 }
 
 TEST_F(EvidenceOnCuda, Default) {
-  keep_scene(), all_pairs();
+  keep_scene();
+  all_pairs();
   expect_same();
 }
 
@@ -176,15 +202,19 @@ TEST_F(EvidenceOnCuda, SmallSheets) {
     keep(test::bumpy_sheet(same_shape, size, 0.9f));
   }
   pairs = {{0, 1, {}, {}}, {1, 0, {}, {}}};
-  options.compatibility.seeds = 100, options.compatibility.triangles = 200;
-  options.evidence.sample = 64, options.evidence.modes = 4;
+  options.compatibility.seeds = 100;
+  options.compatibility.triangles = 200;
+  options.evidence.sample = 64;
+  options.evidence.modes = 4;
   expect_same();
 }
 
 TEST_F(EvidenceOnCuda, OtherSeedWithoutWideFeaturesOrMaps) {
-  keep_scene(), all_pairs();
+  keep_scene();
+  all_pairs();
   options.hypothesis.seed = 0x123456789abcdefull;
-  options.prepare.wide_feature_radius = 0, options.prepare.depth_maps = 0;
+  options.prepare.wide_feature_radius = 0;
+  options.prepare.depth_maps = 0;
   expect_same();
 }
 
@@ -210,7 +240,8 @@ TEST_F(EvidenceOnCuda, ManySeedsWithoutRefinement) {
   options.compatibility.seeds = 8192;
   options.compatibility.max_turn = 2;
   options.evidence.modes = 64;
-  options.evidence.mode_angle = 1, options.evidence.mode_distance = 0.02f;
+  options.evidence.mode_angle = 1;
+  options.evidence.mode_distance = 0.02f;
   options.refine.max_iterations = 0;
   expect_same();
 }
@@ -222,14 +253,19 @@ TEST_F(EvidenceOnCuda, ACloudWithItself) {
 }
 
 TEST_F(EvidenceOnCuda, Priors) {
-  keep_scene(), all_pairs();
+  keep_scene();
+  all_pairs();
   for (std::size_t p = 0; p < pairs.size(); ++p) {
     // Between what permits most and what permits next to nothing.
     PriorTest& prior = pairs[p].prior;
-    prior.gravity = p % 3 != 0, prior.pose = p % 3 != 1, prior.swapped = p % 2 == 1;
-    prior.moved_up = test::random_unit(random), prior.fixed_up = test::random_unit(random);
+    prior.gravity = p % 3 != 0;
+    prior.pose = p % 3 != 1;
+    prior.swapped = p % 2 == 1;
+    prior.moved_up = test::random_unit(random);
+    prior.fixed_up = test::random_unit(random);
     prior.min_up_cosine = -0.9f + 0.3f * static_cast<float>(p % 6);
-    prior.expected = to_rigid(Pose<double>{0.6, 0.8, 0, 0, 0.3, -0.2, 0.1 * static_cast<double>(p % 4)});
+    prior.expected =
+        to_rigid(Pose<double>{0.6, 0.8, 0, 0, 0.3, -0.2, 0.1 * static_cast<double>(p % 4)});
     prior.min_trace = -0.8f + 0.5f * static_cast<float>(p % 5);
     prior.max_squared_distance = 0.1f + static_cast<float>(p % 4);
   }
@@ -240,7 +276,8 @@ TEST_F(EvidenceOnCuda, PointsWithoutNormals) {
   // Too far apart for any neighbours: no normals, no features, no matches but the caller's.
   std::vector<Vec3> sparse;
   for (int k = 0; k < 400; ++k) sparse.push_back(test::random_unit(random) * 20.0f);
-  keep(sparse), keep(sparse);
+  keep(sparse);
+  keep(sparse);
   std::vector<std::uint32_t> same(300);
   for (std::uint32_t k = 0; k < 300; ++k) same[k] = k;
   pairs = {{0, 1, {}, {}}, {0, 1, same, same}};
@@ -250,8 +287,10 @@ TEST_F(EvidenceOnCuda, PointsWithoutNormals) {
 }
 
 TEST_F(EvidenceOnCuda, CorrespondencesOfTheCaller) {
-  keep_scene(), all_pairs();
-  const auto clouds = pipeline::prepare(*std::make_unique<cpu::Exec>(2), span_of(raw()), options.prepare);
+  keep_scene();
+  all_pairs();
+  const auto clouds =
+      pipeline::prepare(*std::make_unique<cpu::Exec>(2), span_of(raw()), options.prepare);
   std::vector<PairOfClouds> custom;
   for (std::size_t p = 0; p < 12; ++p) {
     custom.push_back(pairs[p]);
@@ -260,8 +299,10 @@ TEST_F(EvidenceOnCuda, CorrespondencesOfTheCaller) {
     // Some of them many times over.
     for (int k = 0; k < (p % 3 == 0 ? 3 : 15000); ++k) {
       const auto range = static_cast<std::uint32_t>(p % 3 == 1 ? 50 : 1 << 30);
-      custom.back().custom_source.push_back(static_cast<std::uint32_t>(random() % std::min(n, range)));
-      custom.back().custom_target.push_back(static_cast<std::uint32_t>(random() % std::min(m, range)));
+      custom.back().custom_source.push_back(
+          static_cast<std::uint32_t>(random() % std::min(n, range)));
+      custom.back().custom_target.push_back(
+          static_cast<std::uint32_t>(random() % std::min(m, range)));
     }
   }
   pairs = custom;
@@ -276,8 +317,11 @@ TEST_F(EvidenceOnCuda, FeaturesOfTheCaller) {
     auto clouds = raw();
     for (RawCloud& cloud : clouds) {
       features.emplace_back(cloud.size * dimension);
-      for (float& f : features.back()) f = random() % 4 == 0 ? normal(random) : static_cast<float>(random() % 3);
-      cloud.features = features.back().data(), cloud.feature_dimension = dimension, cloud.feature_stride = dimension;
+      for (float& f : features.back())
+        f = random() % 4 == 0 ? normal(random) : static_cast<float>(random() % 3);
+      cloud.features = features.back().data();
+      cloud.feature_dimension = dimension;
+      cloud.feature_stride = dimension;
     }
     pairs = {{0, 1, {}, {}}, {4, 0, {}, {}}, {5, 0, {}, {}}, {6, 3, {}, {}}};
     SCOPED_TRACE(dimension);
@@ -286,7 +330,9 @@ TEST_F(EvidenceOnCuda, FeaturesOfTheCaller) {
 }
 
 TEST_F(EvidenceOnCuda, NothingButDegenerateClouds) {
-  keep({}), keep({{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}), keep(std::vector<Vec3>(100, Vec3{1, 2, 3}));
+  keep({});
+  keep({{0, 0, 0}, {1, 0, 0}, {0, 1, 0}});
+  keep(std::vector<Vec3>(100, Vec3{1, 2, 3}));
   std::vector<Vec3> line;
   for (int k = 0; k < 500; ++k) line.push_back({0.01f * static_cast<float>(k), 0, 0});
   keep(std::move(line));

@@ -26,12 +26,14 @@ std::vector<T> host(cuda::Exec& exec, const T* device, std::size_t size) {
 /// Equal as bytes, so that 0 differs from -0.
 template <typename T>
 ::testing::AssertionResult same_bytes(const std::vector<T>& cpu, const std::vector<T>& cuda) {
-  if (cpu.size() != cuda.size()) return ::testing::AssertionFailure() << "sizes " << cpu.size() << " and " << cuda.size();
+  if (cpu.size() != cuda.size())
+    return ::testing::AssertionFailure() << "sizes " << cpu.size() << " and " << cuda.size();
   std::size_t different = 0, first = 0;
   for (std::size_t k = cpu.size(); k-- > 0;)
     if (std::memcmp(&cpu[k], &cuda[k], sizeof(T)) != 0) ++different, first = k;
   if (different == 0) return ::testing::AssertionSuccess();
-  return ::testing::AssertionFailure() << different << " of " << cpu.size() << " differ, the first at " << first;
+  return ::testing::AssertionFailure()
+         << different << " of " << cpu.size() << " differ, the first at " << first;
 }
 
 }  // namespace gpureg::test

@@ -18,7 +18,10 @@ using test::bytes;
 class Gate {
  public:
   explicit Gate(cudaStream_t stream) {
-    EXPECT_EQ(cudaLaunchHostFunc(stream, [](void* future) { static_cast<std::future<void>*>(future)->wait(); }, &future_), cudaSuccess);
+    EXPECT_EQ(cudaLaunchHostFunc(
+                  stream, [](void* future) { static_cast<std::future<void>*>(future)->wait(); },
+                  &future_),
+              cudaSuccess);
   }
   ~Gate() { open(); }
   void open() {
@@ -43,10 +46,15 @@ class Interop : public test::RoomScans {
   /// Copied in order of the stream; rows of `stride` floats.
   float* on_device(const std::vector<Eigen::Vector3f>& rows, std::size_t stride) {
     std::vector<float> spread(rows.size() * stride, std::numeric_limits<float>::quiet_NaN());
-    for (std::size_t i = 0; i < rows.size(); ++i) std::copy_n(rows[i].data(), 3, spread.data() + i * stride);
+    for (std::size_t i = 0; i < rows.size(); ++i)
+      std::copy_n(rows[i].data(), 3, spread.data() + i * stride);
     float* device = nullptr;
-    EXPECT_EQ(cudaMallocAsync(reinterpret_cast<void**>(&device), spread.size() * sizeof(float) + 4, stream), cudaSuccess);
-    EXPECT_EQ(cudaMemcpyAsync(device, spread.data(), spread.size() * sizeof(float), cudaMemcpyHostToDevice, stream), cudaSuccess);
+    EXPECT_EQ(cudaMallocAsync(reinterpret_cast<void**>(&device), spread.size() * sizeof(float) + 4,
+                              stream),
+              cudaSuccess);
+    EXPECT_EQ(cudaMemcpyAsync(device, spread.data(), spread.size() * sizeof(float),
+                              cudaMemcpyHostToDevice, stream),
+              cudaSuccess);
     EXPECT_EQ(cudaStreamSynchronize(stream), cudaSuccess);
     return device;
   }
@@ -64,27 +72,38 @@ TEST_F(Interop, CloudsOnTheDeviceAreThoseOfTheHost) {
   scans[0][7].x() = std::numeric_limits<float>::infinity();
   for (const std::size_t stride : {3u, 4u, 7u}) {
     DevicePointCloudView view;
-    view.size = scans[0].size(), view.point_stride = stride;
+    view.size = scans[0].size();
+    view.point_stride = stride;
     float* points = on_device(scans[0], stride);
     view.points = points;
     const float viewpoint[3] = {0.5f, 1, 2};
     PointCloudView host(scans[0]);
-    host.viewpoints = view.viewpoints = viewpoint, host.viewpoint_count = view.viewpoint_count = 1;
-    expect_same(prepare(context, view, options.prepare, stream), prepare(context, host, options.prepare));
+    host.viewpoints = view.viewpoints = viewpoint;
+    host.viewpoint_count = view.viewpoint_count = 1;
+    expect_same(prepare(context, view, options.prepare, stream),
+                prepare(context, host, options.prepare));
     // With rows of other things: "normals" and features that are just the points of other scans.
-    scans[1].resize(scans[0].size(), {1, 0, 0}), scans[2].resize(scans[0].size(), {0, 1, 0});
+    scans[1].resize(scans[0].size(), {1, 0, 0});
+    scans[2].resize(scans[0].size(), {0, 1, 0});
     float *normals = on_device(scans[1], stride), *features = on_device(scans[2], stride);
-    view.normals = normals, view.normal_stride = stride;
-    view.features = features, view.feature_dimension = 3, view.feature_stride = stride;
-    host.normals = scans[1][0].data(), host.features = scans[2][0].data(), host.feature_dimension = 3;
-    expect_same(prepare(context, view, options.prepare, stream), prepare(context, host, options.prepare));
+    view.normals = normals;
+    view.normal_stride = stride;
+    view.features = features;
+    view.feature_dimension = 3;
+    view.feature_stride = stride;
+    host.normals = scans[1][0].data();
+    host.features = scans[2][0].data();
+    host.feature_dimension = 3;
+    expect_same(prepare(context, view, options.prepare, stream),
+                prepare(context, host, options.prepare));
     for (float* p : {points, normals, features}) cudaFreeAsync(p, stream);
   }
-  expect_same(prepare(context, DevicePointCloudView{}, options.prepare, stream), prepare(context, PointCloudView{}, options.prepare));
+  expect_same(prepare(context, DevicePointCloudView{}, options.prepare, stream),
+              prepare(context, PointCloudView{}, options.prepare));
 }
 
-// The caller's stream is held up before the cloud is written: the call returns all the same, and once let go, what the stream does to the
-// cloud later does no harm.
+// The caller's stream is held up before the cloud is written: the call returns all the same, and
+// once let go, what the stream does to the cloud later does no harm.
 TEST_F(Interop, TheCallWaitsForNothingAndTheStreamKeepsItsOrder) {
   const Context context = Context::cuda();
   const PreparedCloud expected = prepare(context, PointCloudView(scans[0]), options.prepare);
@@ -94,16 +113,19 @@ TEST_F(Interop, TheCallWaitsForNothingAndTheStreamKeepsItsOrder) {
   ASSERT_EQ(cudaMallocAsync(reinterpret_cast<void**>(&empty), size, stream), cudaSuccess);
   ASSERT_EQ(cudaStreamSynchronize(stream), cudaSuccess);
   DevicePointCloudView view;
-  view.points = empty, view.size = scans[0].size();
+  view.points = empty;
+  view.size = scans[0].size();
   Gate gate(stream);
   ASSERT_EQ(cudaMemcpyAsync(empty, points, size, cudaMemcpyDeviceToDevice, stream), cudaSuccess);
   std::future<PreparedCloud> prepared = prepare_async(context, view, options.prepare, stream);
   ASSERT_EQ(cudaMemsetAsync(empty, 0xff, size, stream), cudaSuccess);
-  EXPECT_EQ(prepared.wait_for(std::chrono::milliseconds(200)), std::future_status::timeout) << "nothing has written the points yet";
+  EXPECT_EQ(prepared.wait_for(std::chrono::milliseconds(200)), std::future_status::timeout)
+      << "nothing has written the points yet";
   EXPECT_EQ(cudaStreamQuery(stream), cudaErrorNotReady);
   gate.open();
   expect_same(prepared.get(), expected);
-  cudaFreeAsync(points, stream), cudaFreeAsync(empty, stream);
+  cudaFreeAsync(points, stream);
+  cudaFreeAsync(empty, stream);
 }
 
 TEST_F(Interop, FuturesHaveWhatTheCallsReturn) {
@@ -112,9 +134,11 @@ TEST_F(Interop, FuturesHaveWhatTheCallsReturn) {
     const auto expected = test::all_bytes(align_batch(context, clouds, pairs, options));
     auto all = align_batch_async(context, clouds, pairs, options);
     std::vector<std::future<RegistrationResult>> one_by_one;
-    for (const Pair& pair : pairs) one_by_one.push_back(align_async(context, clouds[pair.source], clouds[pair.target], options));
+    for (const Pair& pair : pairs)
+      one_by_one.push_back(align_async(context, clouds[pair.source], clouds[pair.target], options));
     EXPECT_EQ(test::all_bytes(all.get()), expected);
-    for (std::size_t k = 0; k < pairs.size(); ++k) EXPECT_EQ(bytes(one_by_one[k].get()), expected[k]);
+    for (std::size_t k = 0; k < pairs.size(); ++k)
+      EXPECT_EQ(bytes(one_by_one[k].get()), expected[k]);
     EXPECT_THROW(align_async(context, clouds[0], PreparedCloud(), options).get(), InvalidArgument);
   }
 }
@@ -124,7 +148,8 @@ TEST_F(Interop, ContextsOfSeveralDevicesFindTheCloudsDevice) {
   int devices = 0;
   ASSERT_EQ(cudaGetDeviceCount(&devices), cudaSuccess);
   two.devices = {0, devices - 1};
-  const PreparedCloud expected = prepare(Context::cuda(), PointCloudView(scans[0]), options.prepare);
+  const PreparedCloud expected =
+      prepare(Context::cuda(), PointCloudView(scans[0]), options.prepare);
   for (int d = 0; d < devices; d += std::max(1, devices - 1)) {
     ASSERT_EQ(cudaSetDevice(d), cudaSuccess);
     cudaStream_t there = nullptr;
@@ -132,12 +157,16 @@ TEST_F(Interop, ContextsOfSeveralDevicesFindTheCloudsDevice) {
     float* points = nullptr;
     const std::size_t size = scans[0].size() * 3 * sizeof(float);
     ASSERT_EQ(cudaMalloc(reinterpret_cast<void**>(&points), size), cudaSuccess);
-    ASSERT_EQ(cudaMemcpyAsync(points, scans[0][0].data(), size, cudaMemcpyHostToDevice, there), cudaSuccess);
+    ASSERT_EQ(cudaMemcpyAsync(points, scans[0][0].data(), size, cudaMemcpyHostToDevice, there),
+              cudaSuccess);
     DevicePointCloudView view;
-    view.points = points, view.size = scans[0].size();
+    view.points = points;
+    view.size = scans[0].size();
     expect_same(prepare(Context::cuda(two), view, options.prepare, there), expected);
-    if (d > 0) EXPECT_THROW(prepare(Context::cuda(0), view, options.prepare, there), InvalidArgument);
-    cudaFree(points), cudaStreamDestroy(there);
+    if (d > 0)
+      EXPECT_THROW(prepare(Context::cuda(0), view, options.prepare, there), InvalidArgument);
+    cudaFree(points);
+    cudaStreamDestroy(there);
   }
   cudaSetDevice(0);
 }
@@ -145,12 +174,15 @@ TEST_F(Interop, ContextsOfSeveralDevicesFindTheCloudsDevice) {
 TEST_F(Interop, WrongMemoryIsAnError) {
   const Context context = Context::cuda();
   DevicePointCloudView view;
-  view.points = scans[0][0].data(), view.size = scans[0].size();
+  view.points = scans[0][0].data();
+  view.size = scans[0].size();
   try {
     prepare_async(context, view, options.prepare, stream);
     FAIL() << "host memory was taken for device memory";
   } catch (const InvalidArgument& error) {
-    EXPECT_NE(std::string(error.what()).find("cloud.points is not device memory"), std::string::npos) << error.what();
+    EXPECT_NE(std::string(error.what()).find("cloud.points is not device memory"),
+              std::string::npos)
+        << error.what();
   }
   float* points = on_device(scans[0], 3);
   view.points = points;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// The contract of src/math and src/algorithm: one source, the same bits on the host and on the device. Every per-item function runs over
-// random inputs on both sides; outputs are compared as bytes.
+// The contract of src/math and src/algorithm: one source, the same bits on the host and on the
+// device. Every per-item function runs over random inputs on both sides; outputs are compared as
+// bytes.
 #include <cuda_runtime.h>
 #include <gtest/gtest.h>
 
@@ -27,22 +28,26 @@ namespace {
 constexpr int kItems = 1 << 20;
 
 void check(cudaError_t error, const char* what) {
-  if (error != cudaSuccess) throw std::runtime_error(std::string(what) + ": " + cudaGetErrorString(error));
+  if (error != cudaSuccess)
+    throw std::runtime_error(std::string(what) + ": " + cudaGetErrorString(error));
 }
 
 template <typename Item, typename In, typename Out>
 __global__ void run_items(Item item, const In* in, Out* out, int count) {
-  const int k = static_cast<int>(blockIdx.x) * static_cast<int>(blockDim.x) + static_cast<int>(threadIdx.x);
+  const int k =
+      static_cast<int>(blockIdx.x) * static_cast<int>(blockDim.x) + static_cast<int>(threadIdx.x);
   if (k < count) out[k] = item(in[k]);
 }
 
-/// Item: a struct with Out operator()(In) const, host and device. Outputs are zeroed first, so that padding compares equal.
+/// Item: a struct with Out operator()(In) const, host and device. Outputs are zeroed first, so that
+/// padding compares equal.
 template <typename Item, typename Out, typename In>
 void expect_same_bits(const std::vector<In>& in) {
   const int count = static_cast<int>(in.size());
   std::vector<Out> host(in.size()), device(in.size());
   std::memset(static_cast<void*>(host.data()), 0, host.size() * sizeof(Out));
-  for (int k = 0; k < count; ++k) host[static_cast<std::size_t>(k)] = Item()(in[static_cast<std::size_t>(k)]);
+  for (int k = 0; k < count; ++k)
+    host[static_cast<std::size_t>(k)] = Item()(in[static_cast<std::size_t>(k)]);
   In* in_device = nullptr;
   Out* out_device = nullptr;
   cudaStream_t stream;
@@ -50,16 +55,21 @@ void expect_same_bits(const std::vector<In>& in) {
   check(cudaMalloc(&in_device, in.size() * sizeof(In)), "cudaMalloc");
   check(cudaMalloc(&out_device, in.size() * sizeof(Out)), "cudaMalloc");
   check(cudaMemsetAsync(out_device, 0, in.size() * sizeof(Out), stream), "cudaMemsetAsync");
-  check(cudaMemcpyAsync(in_device, in.data(), in.size() * sizeof(In), cudaMemcpyHostToDevice, stream), "cudaMemcpyAsync");
+  check(
+      cudaMemcpyAsync(in_device, in.data(), in.size() * sizeof(In), cudaMemcpyHostToDevice, stream),
+      "cudaMemcpyAsync");
   run_items<<<(count + 127) / 128, 128, 0, stream>>>(Item(), in_device, out_device, count);
   check(cudaGetLastError(), "launch");
-  check(cudaMemcpyAsync(device.data(), out_device, in.size() * sizeof(Out), cudaMemcpyDeviceToHost, stream), "cudaMemcpyAsync");
+  check(cudaMemcpyAsync(device.data(), out_device, in.size() * sizeof(Out), cudaMemcpyDeviceToHost,
+                        stream),
+        "cudaMemcpyAsync");
   check(cudaStreamSynchronize(stream), "cudaStreamSynchronize");
   check(cudaFree(in_device), "cudaFree");
   check(cudaFree(out_device), "cudaFree");
   check(cudaStreamDestroy(stream), "cudaStreamDestroy");
   int different = 0;
-  for (std::size_t k = 0; k < in.size(); ++k) different += std::memcmp(&host[k], &device[k], sizeof(Out)) != 0;
+  for (std::size_t k = 0; k < in.size(); ++k)
+    different += std::memcmp(&host[k], &device[k], sizeof(Out)) != 0;
   EXPECT_EQ(different, 0) << "of " << in.size();
 }
 
@@ -68,7 +78,8 @@ class Items : public ::testing::Test {
   void SetUp() override {
     int devices = 0;
     const cudaError_t error = cudaGetDeviceCount(&devices);
-    if (error != cudaSuccess || devices == 0) GTEST_SKIP() << "no CUDA device: " << cudaGetErrorString(error);
+    if (error != cudaSuccess || devices == 0)
+      GTEST_SKIP() << "no CUDA device: " << cudaGetErrorString(error);
   }
   float value(float scale = 1) { return scale * normal(random); }
   Vec3 point(float scale = 1) { return {value(scale), value(scale), value(scale)}; }
@@ -76,7 +87,10 @@ class Items : public ::testing::Test {
   Pose<float> pose() {
     Pose<float> p{value(), value(), value(), value(), value(2), value(2), value(2)};
     const float n = std::sqrt(p.w * p.w + p.x * p.x + p.y * p.y + p.z * p.z);
-    p.w /= n, p.x /= n, p.y /= n, p.z /= n;
+    p.w /= n;
+    p.x /= n;
+    p.y /= n;
+    p.z /= n;
     return p;
   }
   template <typename T, typename Make>
@@ -90,7 +104,9 @@ class Items : public ::testing::Test {
 };
 
 struct Draw {
-  GPUREG_HD Quadruple operator()(std::uint64_t v) const { return draw_quadruple(static_cast<std::uint32_t>(v), v * 0x9E3779B97F4A7C15ull, 4999); }
+  GPUREG_HD Quadruple operator()(std::uint64_t v) const {
+    return draw_quadruple(static_cast<std::uint32_t>(v), v * 0x9E3779B97F4A7C15ull, 4999);
+  }
 };
 TEST_F(Items, Quadruples) {
   std::uint64_t k = 0;
@@ -146,7 +162,8 @@ struct FeatureItem {
   }
 };
 TEST_F(Items, PairFeatures) {
-  expect_same_bits<FeatureItem, FeatureBins>(many<TwoOriented>([&] { return TwoOriented{point(0.1f), unit(), point(0.1f), unit()}; }));
+  expect_same_bits<FeatureItem, FeatureBins>(
+      many<TwoOriented>([&] { return TwoOriented{point(0.1f), unit(), point(0.1f), unit()}; }));
 }
 
 struct Moved {
@@ -167,7 +184,8 @@ struct Score {
   }
 };
 TEST_F(Items, MovedPointsAndResiduals) {
-  expect_same_bits<Score, Residual>(many<Moved>([&] { return Moved{pose(), point(), unit(), point(), unit()}; }));
+  expect_same_bits<Score, Residual>(
+      many<Moved>([&] { return Moved{pose(), point(), unit(), point(), unit()}; }));
 }
 
 struct Sums {
@@ -181,7 +199,8 @@ struct Stepped {
 struct Icp {
   GPUREG_HD Stepped operator()(const Sums& v) const {
     IcpSums sums{{0}};
-    for (int k = 0; k < 8; ++k) add_icp_term(v.arm[k], v.normal[k], v.residual[k], robust_weight(v.residual[k], 0.3f), sums);
+    for (int k = 0; k < 8; ++k)
+      add_icp_term(v.arm[k], v.normal[k], v.residual[k], robust_weight(v.residual[k], 0.3f), sums);
     Stepped out;
     out.step = solve_icp(sums, 2.0f, 0.075f);
     out.pose = compose_small(out.step.omega, out.step.shift, Pose<double>{1, 0, 0, 0, 0, 0, 0});
@@ -196,17 +215,24 @@ struct StepBits {
 struct IcpItem {
   GPUREG_HD StepBits operator()(const Sums& v) const {
     const Stepped s = Icp()(v);
-    return {{s.step.omega[0], s.step.omega[1], s.step.omega[2], s.step.shift[0], s.step.shift[1], s.step.shift[2], s.pose.w, s.pose.x, s.pose.y, s.pose.z,
-             s.pose.tx, s.pose.ty, s.pose.tz},
-            s.step.valid ? 1 : 0};
+    return {
+        {s.step.omega[0], s.step.omega[1], s.step.omega[2], s.step.shift[0], s.step.shift[1],
+         s.step.shift[2], s.pose.w, s.pose.x, s.pose.y, s.pose.z, s.pose.tx, s.pose.ty, s.pose.tz},
+        s.step.valid ? 1 : 0};
   }
 };
 TEST_F(Items, IcpSteps) {
-  expect_same_bits<IcpItem, StepBits>(many<Sums>([&] {
-    Sums v;
-    for (int k = 0; k < 8; ++k) v.arm[k] = point(0.5f), v.normal[k] = unit(), v.residual[k] = value(0.3f);
-    return v;
-  }, 1 << 17));
+  expect_same_bits<IcpItem, StepBits>(many<Sums>(
+      [&] {
+        Sums v;
+        for (int k = 0; k < 8; ++k) {
+          v.arm[k] = point(0.5f);
+          v.normal[k] = unit();
+          v.residual[k] = value(0.3f);
+        }
+        return v;
+      },
+      1 << 17));
 }
 
 struct Symmetric {
@@ -217,7 +243,8 @@ struct Eigen3 {
 };
 struct EigenItem {
   GPUREG_HD Eigen3 operator()(const Symmetric& s) const {
-    float a[3][3] = {{s.a[0], s.a[1], s.a[2]}, {s.a[1], s.a[3], s.a[4]}, {s.a[2], s.a[4], s.a[5]}}, v[3][3];
+    float a[3][3] = {{s.a[0], s.a[1], s.a[2]}, {s.a[1], s.a[3], s.a[4]}, {s.a[2], s.a[4], s.a[5]}},
+          v[3][3];
     jacobi_eigen<3, 5>(a, v);
     Eigen3 out;
     for (int i = 0; i < 3; ++i) {
@@ -230,8 +257,9 @@ struct EigenItem {
 TEST_F(Items, JacobiOfCovariances) {
   expect_same_bits<EigenItem, Eigen3>(many<Symmetric>([&] {
     const Vec3 a = point(), b = point(0.3f), c = point(0.05f);
-    return Symmetric{{a.x * a.x + b.x * b.x + c.x * c.x, a.x * a.y + b.x * b.y + c.x * c.y, a.x * a.z + b.x * b.z + c.x * c.z,
-                      a.y * a.y + b.y * b.y + c.y * c.y, a.y * a.z + b.y * b.z + c.y * c.z, a.z * a.z + b.z * b.z + c.z * c.z}};
+    return Symmetric{{a.x * a.x + b.x * b.x + c.x * c.x, a.x * a.y + b.x * b.y + c.x * c.y,
+                      a.x * a.z + b.x * b.z + c.x * c.z, a.y * a.y + b.y * b.y + c.y * c.y,
+                      a.y * a.z + b.y * b.z + c.y * c.z, a.z * a.z + b.z * b.z + c.z * c.z}};
   }));
 }
 
@@ -244,11 +272,13 @@ struct CellItem {
     const Cell c = cell_of(v.p, 40.0f);
     const ClosestGeometry g = closest_geometry(0.075f, 2.0f);
     const Vec3 center = cell_center(c, g.cell_size);
-    return {cell_key(c), dominated_in_cell(center, v.p, v.q, g) ? 1u : 0u, can_reach_cell(norm(v.q - center), g) ? 1u : 0u};
+    return {cell_key(c), dominated_in_cell(center, v.p, v.q, g) ? 1u : 0u,
+            can_reach_cell(norm(v.q - center), g) ? 1u : 0u};
   }
 };
 TEST_F(Items, CellsAndCandidates) {
-  expect_same_bits<CellItem, CellBits>(many<TwoOriented>([&] { return TwoOriented{point(0.1f), unit(), point(0.1f), unit()}; }));
+  expect_same_bits<CellItem, CellBits>(
+      many<TwoOriented>([&] { return TwoOriented{point(0.1f), unit(), point(0.1f), unit()}; }));
 }
 
 struct MomentItem {

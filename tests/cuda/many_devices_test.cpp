@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Batches spread over several devices: the results of one device. With a single device in the machine two engines share it.
+// Batches spread over several devices: the results of one device. With a single device in the
+// machine two engines share it.
 #include <cuda_runtime_api.h>
 
 #include <thread>
@@ -50,7 +51,8 @@ TEST_F(ManyDevices, TogetherTheyGiveWhatOneGives) {
 
 TEST_F(ManyDevices, EachAloneGivesTheSame) {
   const Results expected = run(Context::cpu(), pairs);
-  for (int d = 0; d < devices; ++d) EXPECT_EQ(run(Context::cuda(d), pairs), expected) << "device " << d;
+  for (int d = 0; d < devices; ++d)
+    EXPECT_EQ(run(Context::cuda(d), pairs), expected) << "device " << d;
   int current = -1;
   ASSERT_EQ(cudaGetDevice(&current), cudaSuccess);
   EXPECT_EQ(current, 0) << "the caller's device was not given back";
@@ -59,10 +61,14 @@ TEST_F(ManyDevices, EachAloneGivesTheSame) {
 TEST_F(ManyDevices, CloudsOfOneDeviceGoWithEveryOther) {
   const Results expected = run(Context::cuda(0), pairs);
   const auto clouds = prepare_batch(Context::cuda(0), views, options.prepare);
-  for (int d = 0; d < devices; ++d) EXPECT_EQ(all_bytes(align_batch(Context::cuda(d), clouds, pairs, options)), expected) << "device " << d;
+  for (int d = 0; d < devices; ++d)
+    EXPECT_EQ(all_bytes(align_batch(Context::cuda(d), clouds, pairs, options)), expected)
+        << "device " << d;
   // And with clouds of another device in one pair.
   const Context last = Context::cuda(devices - 1);
-  EXPECT_EQ(bytes(align(last, clouds[pairs[0].source], prepare(last, views[pairs[0].target], options.prepare), options)), expected[0]);
+  EXPECT_EQ(bytes(align(last, clouds[pairs[0].source],
+                        prepare(last, views[pairs[0].target], options.prepare), options)),
+            expected[0]);
 }
 
 TEST_F(ManyDevices, ThreadsShareThem) {

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Prepared clouds beyond a context's memory budget wait in host memory: the results stay, and the device holds no more than it may.
+// Prepared clouds beyond a context's memory budget wait in host memory: the results stay, and the
+// device holds no more than it may.
 #include "cuda/room_scans.hpp"
 #include "gpureg/error.hpp"
 
@@ -45,7 +46,8 @@ TEST_F(MemoryBudget, ResultsAreTheSameHoweverSmallItIs) {
 
 TEST_F(MemoryBudget, HostCopiesOfWhatWasDrivenOut) {
   const Context free = Context::cuda(), tight = with_budget(1);
-  const auto kept = prepare_batch(free, views, options.prepare), driven_out = prepare_batch(tight, views, options.prepare);
+  const auto kept = prepare_batch(free, views, options.prepare),
+             driven_out = prepare_batch(tight, views, options.prepare);
   EXPECT_EQ(tight.device_memory()[0].bytes_in_use, 0u);
   for (std::size_t k = 0; k < views.size(); ++k) {
     EXPECT_EQ(kept[k].points(), driven_out[k].points());
@@ -64,7 +66,8 @@ TEST_F(MemoryBudget, TooSmallForOnePairIsAnErrorThatLeavesTheContextUsable) {
     align_batch(context, clouds, pairs, options);
     FAIL() << "a pair within 1000 bytes";
   } catch (const DeviceError& error) {
-    EXPECT_NE(std::string(error.what()).find("memory_budget is 1000 bytes"), std::string::npos) << error.what();
+    EXPECT_NE(std::string(error.what()).find("memory_budget is 1000 bytes"), std::string::npos)
+        << error.what();
     EXPECT_NE(std::string(error.what()).find("stays usable"), std::string::npos) << error.what();
   }
   EXPECT_EQ(clouds[0].points().size(), clouds[0].size());
@@ -80,7 +83,8 @@ TEST_F(MemoryBudget, SharedWithAContextThatHasNone) {
     EXPECT_EQ(all_bytes(align_batch(tight, clouds, pairs, options)), expected);
   }
   clouds.clear();
-  EXPECT_EQ(tight.device_memory()[0].bytes_in_use, 0u) << "clouds that nobody has any more take memory";
+  EXPECT_EQ(tight.device_memory()[0].bytes_in_use, 0u)
+      << "clouds that nobody has any more take memory";
 }
 
 }  // namespace

@@ -3,8 +3,8 @@
 #include <filesystem>
 #include <limits>
 
-#include "cuda/gpu.hpp"
 #include "cpu/stages.hpp"
+#include "cuda/gpu.hpp"
 #include "stages.hpp"
 #include "support/data_folder.hpp"
 #include "support/plain_ply.hpp"
@@ -38,16 +38,21 @@ void expect_same_preparation(const std::vector<RawCloud>& raw, const PrepareOpti
     SCOPED_TRACE("downsample, cloud " + std::to_string(c));
     const auto& expected = cpu_points[c];
     const auto begin = points.begin() + cuda_points.segments.offset[c];
-    ASSERT_TRUE(same_bytes(expected.points, std::vector<Vec3>(begin, begin + cuda_points.segments.size(c))));
+    ASSERT_TRUE(same_bytes(expected.points,
+                           std::vector<Vec3>(begin, begin + cuda_points.segments.size(c))));
     for (int k = 0; k < 3; ++k) ASSERT_EQ(expected.origin[k], cuda_points.facts[c].origin[k]);
     ASSERT_EQ(expected.radius, cuda_points.facts[c].radius);
     ASSERT_EQ(expected.invalid_points, cuda_points.facts[c].invalid_points);
     ASSERT_TRUE(same_bytes(expected.viewpoints, cuda_points.facts[c].viewpoints));
     if (!expected.guides.empty())
-      ASSERT_TRUE(same_bytes(expected.guides, host(on_cuda, cuda_points.guides.data() + cuda_points.segments.offset[c], expected.guides.size())));
+      ASSERT_TRUE(same_bytes(
+          expected.guides, host(on_cuda, cuda_points.guides.data() + cuda_points.segments.offset[c],
+                                expected.guides.size())));
     if (!expected.features.empty())
-      ASSERT_TRUE(same_bytes(one_nan(expected.features), one_nan(host(on_cuda, cuda_points.features.data() + cuda_points.facts[c].feature_offset,
-                                                                    expected.features.size()))));
+      ASSERT_TRUE(same_bytes(
+          one_nan(expected.features),
+          one_nan(host(on_cuda, cuda_points.features.data() + cuda_points.facts[c].feature_offset,
+                       expected.features.size()))));
   }
 
   const auto cpu_grids = cpu::build_grids(on_cpu, cpu_points, options);
@@ -56,26 +61,41 @@ void expect_same_preparation(const std::vector<RawCloud>& raw, const PrepareOpti
     SCOPED_TRACE("grid, cloud " + std::to_string(c));
     const auto& expected = cpu_grids[c];
     const std::size_t begin = cuda_points.segments.offset[c];
-    ASSERT_TRUE(same_bytes(expected.index, host(on_cuda, cuda_grids.index.data() + begin, expected.index.size())));
-    ASSERT_TRUE(same_bytes(expected.points, host(on_cuda, cuda_grids.points.data() + begin, expected.points.size())));
-    ASSERT_TRUE(same_bytes(expected.cell_start, host(on_cuda, cuda_grids.cell_start.data() + begin + c, expected.cell_start.size())));
+    ASSERT_TRUE(same_bytes(expected.index,
+                           host(on_cuda, cuda_grids.index.data() + begin, expected.index.size())));
+    ASSERT_TRUE(same_bytes(
+        expected.points, host(on_cuda, cuda_grids.points.data() + begin, expected.points.size())));
+    ASSERT_TRUE(same_bytes(
+        expected.cell_start,
+        host(on_cuda, cuda_grids.cell_start.data() + begin + c, expected.cell_start.size())));
   }
 
-  const auto cpu_normals = cpu::estimate_normals(on_cpu, cpu_points, cpu_grids, options.normal_radius);
-  const auto cuda_normals = cuda::estimate_normals(on_cuda, cuda_points, cuda_grids, options.normal_radius);
+  const auto cpu_normals =
+      cpu::estimate_normals(on_cpu, cpu_points, cpu_grids, options.normal_radius);
+  const auto cuda_normals =
+      cuda::estimate_normals(on_cuda, cuda_points, cuda_grids, options.normal_radius);
   for (std::size_t c = 0; c < raw.size(); ++c) {
     SCOPED_TRACE("normals, cloud " + std::to_string(c));
-    ASSERT_TRUE(same_bytes(cpu_normals[c], host(on_cuda, cuda_normals.data() + cuda_points.segments.offset[c], cpu_normals[c].size())));
+    ASSERT_TRUE(same_bytes(cpu_normals[c],
+                           host(on_cuda, cuda_normals.data() + cuda_points.segments.offset[c],
+                                cpu_normals[c].size())));
   }
 
-  const auto cpu_features = cpu::compute_features(on_cpu, cpu_points, cpu_normals, cpu_grids, options);
-  const auto cuda_features = cuda::compute_features(on_cuda, cuda_points, cuda_normals, cuda_grids, options);
+  const auto cpu_features =
+      cpu::compute_features(on_cpu, cpu_points, cpu_normals, cpu_grids, options);
+  const auto cuda_features =
+      cuda::compute_features(on_cuda, cuda_points, cuda_normals, cuda_grids, options);
   for (std::size_t c = 0; c < raw.size(); ++c) {
     SCOPED_TRACE("features, cloud " + std::to_string(c));
     ASSERT_EQ(cpu_features[c].dimension, cuda_features.dimension[c]);
-    ASSERT_TRUE(same_bytes(cpu_features[c].valid, host(on_cuda, cuda_features.valid.data() + cuda_points.segments.offset[c], cpu_features[c].valid.size())));
-    ASSERT_TRUE(same_bytes(one_nan(cpu_features[c].values),
-                           one_nan(host(on_cuda, cuda_features.values.data() + cuda_features.offset[c], cpu_features[c].values.size()))));
+    ASSERT_TRUE(
+        same_bytes(cpu_features[c].valid,
+                   host(on_cuda, cuda_features.valid.data() + cuda_points.segments.offset[c],
+                        cpu_features[c].valid.size())));
+    ASSERT_TRUE(
+        same_bytes(one_nan(cpu_features[c].values),
+                   one_nan(host(on_cuda, cuda_features.values.data() + cuda_features.offset[c],
+                                cpu_features[c].values.size()))));
   }
 
   auto cpu_wide = cpu::compute_wide_features(on_cpu, cpu_points, cpu_grids, options);
@@ -83,9 +103,15 @@ void expect_same_preparation(const std::vector<RawCloud>& raw, const PrepareOpti
   for (std::size_t c = 0; c < raw.size(); ++c) {
     SCOPED_TRACE("wide features, cloud " + std::to_string(c));
     ASSERT_EQ(cpu_wide[c].values.size(), cuda_wide.offset[c + 1] - cuda_wide.offset[c]);
-    ASSERT_TRUE(same_bytes(cpu_wide[c].values, host(on_cuda, cuda_wide.values.data() + cuda_wide.offset[c], cpu_wide[c].values.size())));
-    ASSERT_TRUE(same_bytes(cpu_wide[c].valid, host(on_cuda, cuda_wide.valid.data() + (cpu_wide[c].valid.empty() ? 0 : cuda_points.segments.offset[c]),
-                                                   cpu_wide[c].valid.size())));
+    ASSERT_TRUE(same_bytes(
+        cpu_wide[c].values,
+        host(on_cuda, cuda_wide.values.data() + cuda_wide.offset[c], cpu_wide[c].values.size())));
+    ASSERT_TRUE(
+        same_bytes(cpu_wide[c].valid,
+                   host(on_cuda,
+                        cuda_wide.valid.data() +
+                            (cpu_wide[c].valid.empty() ? 0 : cuda_points.segments.offset[c]),
+                        cpu_wide[c].valid.size())));
   }
 
   auto cpu_maps = cpu::build_depth_maps(on_cpu, clouds, cpu_points, options);
@@ -93,8 +119,13 @@ void expect_same_preparation(const std::vector<RawCloud>& raw, const PrepareOpti
   for (std::size_t c = 0; c < raw.size(); ++c) {
     SCOPED_TRACE("depth maps, cloud " + std::to_string(c));
     ASSERT_EQ(cpu_maps[c].step, cuda_maps.step);
-    ASSERT_TRUE(same_bytes(cpu_maps[c].viewpoints, host(on_cuda, cuda_maps.viewpoints.data() + cuda_maps.offset[c], cuda_maps.offset[c + 1] - cuda_maps.offset[c])));
-    ASSERT_TRUE(same_bytes(cpu_maps[c].depth, host(on_cuda, cuda_maps.depth.data() + std::size_t(cuda_maps.offset[c]) * kMapCells, cpu_maps[c].depth.size())));
+    ASSERT_TRUE(same_bytes(cpu_maps[c].viewpoints,
+                           host(on_cuda, cuda_maps.viewpoints.data() + cuda_maps.offset[c],
+                                cuda_maps.offset[c + 1] - cuda_maps.offset[c])));
+    ASSERT_TRUE(same_bytes(
+        cpu_maps[c].depth,
+        host(on_cuda, cuda_maps.depth.data() + std::size_t(cuda_maps.offset[c]) * kMapCells,
+             cpu_maps[c].depth.size())));
   }
 
   auto cpu_fronts = cpu::build_fronts(on_cpu, cpu_points, cpu_normals, options);
@@ -102,7 +133,9 @@ void expect_same_preparation(const std::vector<RawCloud>& raw, const PrepareOpti
   for (std::size_t c = 0; c < raw.size(); ++c) {
     SCOPED_TRACE("fronts, cloud " + std::to_string(c));
     ASSERT_EQ(cpu_fronts[c].words.size(), cuda_fronts.boxes[c].words());
-    ASSERT_TRUE(same_bytes(cpu_fronts[c].words, host(on_cuda, cuda_fronts.words.data() + cuda_fronts.offset[c], cpu_fronts[c].words.size())));
+    ASSERT_TRUE(same_bytes(cpu_fronts[c].words,
+                           host(on_cuda, cuda_fronts.words.data() + cuda_fronts.offset[c],
+                                cpu_fronts[c].words.size())));
   }
 
   const auto cpu_closest = cpu::build_closest_grids(on_cpu, cpu_points, cpu_grids, options);
@@ -112,40 +145,58 @@ void expect_same_preparation(const std::vector<RawCloud>& raw, const PrepareOpti
     const auto& expected = cpu_closest[c];
     const std::size_t first = cuda_closest.blocks.offset[c];
     ASSERT_EQ(expected.blocks.size(), cuda_closest.blocks.size(c));
-    ASSERT_TRUE(same_bytes(expected.blocks, host(on_cuda, cuda_closest.block.data() + first, expected.blocks.size())));
-    ASSERT_TRUE(same_bytes(expected.cell_start, host(on_cuda, cuda_closest.cell_start.data() + first * 513, expected.cell_start.size())));
-    ASSERT_TRUE(same_bytes(expected.candidates, host(on_cuda, cuda_closest.candidates.data() + cuda_closest.candidate_offset[c], expected.candidates.size())));
+    ASSERT_TRUE(same_bytes(
+        expected.blocks, host(on_cuda, cuda_closest.block.data() + first, expected.blocks.size())));
+    ASSERT_TRUE(same_bytes(
+        expected.cell_start,
+        host(on_cuda, cuda_closest.cell_start.data() + first * 513, expected.cell_start.size())));
+    ASSERT_TRUE(
+        same_bytes(expected.candidates,
+                   host(on_cuda, cuda_closest.candidates.data() + cuda_closest.candidate_offset[c],
+                        expected.candidates.size())));
   }
 
-  const auto assembled = cuda::assemble(on_cuda, cuda_points, cuda_normals, cuda_features, cuda_wide, cuda_closest, cuda_maps, cuda_fronts, options);
+  const auto assembled = cuda::assemble(on_cuda, cuda_points, cuda_normals, cuda_features,
+                                        cuda_wide, cuda_closest, cuda_maps, cuda_fronts, options);
   auto expected_points = cpu_points;
   auto expected_normals = cpu_normals;
   auto expected_features = cpu_features;
   auto expected_closest = cpu_closest;
-  const auto expected = cpu::assemble(on_cpu, expected_points, expected_normals, expected_features, cpu_wide, expected_closest, cpu_maps, cpu_fronts, options);
+  const auto expected = cpu::assemble(on_cpu, expected_points, expected_normals, expected_features,
+                                      cpu_wide, expected_closest, cpu_maps, cpu_fronts, options);
   for (std::size_t c = 0; c < raw.size(); ++c) {
     SCOPED_TRACE("assembled, cloud " + std::to_string(c));
     ASSERT_TRUE(same_bytes(cpu_points[c].points, assembled[c]->copy_points()));
     ASSERT_TRUE(same_bytes(cpu_normals[c], assembled[c]->copy_normals()));
-    ASSERT_TRUE(same_bytes(one_nan(cpu_features[c].values), one_nan(assembled[c]->copy_features())));
+    ASSERT_TRUE(
+        same_bytes(one_nan(cpu_features[c].values), one_nan(assembled[c]->copy_features())));
     const CloudView on_host = expected[c]->view(), &on_gpu = assembled[c]->view_on_device;
     ASSERT_EQ(on_host.wide_features == nullptr, on_gpu.wide_features == nullptr);
     if (on_host.wide_features) {
-      ASSERT_TRUE(same_bytes(expected[c]->wide_features.values, host(on_cuda, on_gpu.wide_features, expected[c]->wide_features.values.size())));
-      ASSERT_TRUE(same_bytes(expected[c]->wide_features.valid, host(on_cuda, on_gpu.has_wide_feature, on_host.size)));
+      ASSERT_TRUE(same_bytes(
+          expected[c]->wide_features.values,
+          host(on_cuda, on_gpu.wide_features, expected[c]->wide_features.values.size())));
+      ASSERT_TRUE(same_bytes(expected[c]->wide_features.valid,
+                             host(on_cuda, on_gpu.has_wide_feature, on_host.size)));
     }
     ASSERT_TRUE(same_bytes(expected[c]->balance, host(on_cuda, on_gpu.balance, on_gpu.size)));
     ASSERT_EQ(on_host.balance_total, on_gpu.balance_total);
     ASSERT_EQ(on_host.balance_total, assembled[c]->balance_total);
     ASSERT_EQ(on_host.visibility.count, on_gpu.visibility.count);
     ASSERT_EQ(on_host.visibility.step, on_gpu.visibility.step);
-    ASSERT_TRUE(same_bytes(expected[c]->visibility.depth, host(on_cuda, on_gpu.visibility.depth, std::size_t(on_host.visibility.count) * kMapCells)));
-    ASSERT_TRUE(same_bytes(expected[c]->visibility.viewpoints, host(on_cuda, on_gpu.visibility.viewpoints, on_host.visibility.count)));
-    ASSERT_EQ(expected[c]->statistics.points_without_normal, assembled[c]->statistics.points_without_normal);
-    ASSERT_EQ(expected[c]->statistics.points_without_feature, assembled[c]->statistics.points_without_feature);
+    ASSERT_TRUE(same_bytes(
+        expected[c]->visibility.depth,
+        host(on_cuda, on_gpu.visibility.depth, std::size_t(on_host.visibility.count) * kMapCells)));
+    ASSERT_TRUE(same_bytes(expected[c]->visibility.viewpoints,
+                           host(on_cuda, on_gpu.visibility.viewpoints, on_host.visibility.count)));
+    ASSERT_EQ(expected[c]->statistics.points_without_normal,
+              assembled[c]->statistics.points_without_normal);
+    ASSERT_EQ(expected[c]->statistics.points_without_feature,
+              assembled[c]->statistics.points_without_feature);
     // The tables answer alike, wherever their entries lie.
     for (std::size_t b = 0; b < cpu_closest[c].blocks.size(); b += 7) {
-      const auto table = host(on_cuda, assembled[c]->view_on_device.closest.table.data, assembled[c]->view_on_device.closest.table.size);
+      const auto table = host(on_cuda, assembled[c]->view_on_device.closest.table.data,
+                              assembled[c]->view_on_device.closest.table.size);
       ASSERT_EQ(find_cell(span_of(table), cell_key(cpu_closest[c].blocks[b])), b);
       if (b > 70) break;
     }
@@ -167,7 +218,8 @@ class PrepareOnCuda : public ::testing::Test {
 };
 
 TEST_F(PrepareOnCuda, RandomSheetsOfManySizes) {
-  for (const std::size_t size : {20000u, 1u, 0u, 3u, 150000u, 33u, 4000u}) keep(test::bumpy_sheet(random, size, 2.0f));
+  for (const std::size_t size : {20000u, 1u, 0u, 3u, 150000u, 33u, 4000u})
+    keep(test::bumpy_sheet(random, size, 2.0f));
   expect_same_preparation(raw, options);
 }
 
@@ -204,7 +256,8 @@ TEST_F(PrepareOnCuda, OtherRadii) {
     const auto scaled = RegistrationOptions::from_voxel_size(v).prepare;
     expect_same_preparation(raw, scaled);
   }
-  options.search_distance = 0.4f;  // lists of hundreds of candidates, blocks with thousands of points
+  // lists of hundreds of candidates, blocks with thousands of points
+  options.search_distance = 0.4f;
   expect_same_preparation(raw, options);
 }
 
@@ -214,22 +267,29 @@ TEST_F(PrepareOnCuda, NormalsViewpointsAndFeaturesOfTheCaller) {
   std::vector<Vec3> normals(size), viewpoints;
   std::vector<float> features(size * (dimension + 2));
   std::normal_distribution<float> normal;
-  for (std::size_t k = 0; k < size; ++k) normals[k] = k % 50 == 0 ? Vec3{0, 0, 0} : test::random_unit(random);
+  for (std::size_t k = 0; k < size; ++k)
+    normals[k] = k % 50 == 0 ? Vec3{0, 0, 0} : test::random_unit(random);
   for (float& f : features) f = normal(random);
   features[3] = std::numeric_limits<float>::quiet_NaN();
   for (int k = 0; k < 20; ++k) viewpoints.push_back(test::random_unit(random) * 2.0f);
-  RawCloud plain = test::raw_cloud(points), with_normals = plain, with_views = plain, with_features = plain;
+  RawCloud plain = test::raw_cloud(points), with_normals = plain, with_views = plain,
+           with_features = plain;
   with_normals.normals = &normals[0].x;
-  with_views.viewpoints = &viewpoints[0].x, with_views.viewpoint_count = viewpoints.size();
-  with_features.features = features.data(), with_features.feature_dimension = dimension, with_features.feature_stride = dimension + 2;
+  with_views.viewpoints = &viewpoints[0].x;
+  with_views.viewpoint_count = viewpoints.size();
+  with_features.features = features.data();
+  with_features.feature_dimension = dimension;
+  with_features.feature_stride = dimension + 2;
   expect_same_preparation({plain, with_normals, with_views, with_features}, options);
   // Normals and viewpoints: few that face away are turned, many are not.
   RawCloud few = with_normals, many = with_normals;
   std::vector<Vec3> up(size);
-  for (std::size_t k = 0; k < size; ++k) up[k] = {0, 0, k % 100 < 70 || points[k].x > -0.6f ? 1.0f : -1.0f};
+  for (std::size_t k = 0; k < size; ++k)
+    up[k] = {0, 0, k % 100 < 70 || points[k].x > -0.6f ? 1.0f : -1.0f};
   const Vec3 eye{0, 0, 5};
   few.normals = &up[0].x;
-  few.viewpoints = many.viewpoints = &eye.x, few.viewpoint_count = many.viewpoint_count = 1;
+  few.viewpoints = many.viewpoints = &eye.x;
+  few.viewpoint_count = many.viewpoint_count = 1;
   expect_same_preparation({few, with_normals, many, with_views}, options);
   options = RegistrationOptions::from_voxel_size(0.05f).prepare;
   expect_same_preparation({plain, with_normals, with_views, with_features}, options);
@@ -239,15 +299,20 @@ TEST_F(PrepareOnCuda, NormalsViewpointsAndFeaturesOfTheCaller) {
 }
 
 TEST_F(PrepareOnCuda, WideFeaturesAndDepthMaps) {
-  for (const std::size_t size : {20000u, 1u, 0u, 3u, 90000u}) keep(test::bumpy_sheet(random, size, 2.0f));
+  for (const std::size_t size : {20000u, 1u, 0u, 3u, 90000u})
+    keep(test::bumpy_sheet(random, size, 2.0f));
   auto broken = test::cube(random, 5000, 1.5f);
-  for (std::size_t k = 0; k < broken.size(); k += 7) broken[k].y = std::numeric_limits<float>::quiet_NaN();
+  for (std::size_t k = 0; k < broken.size(); k += 7)
+    broken[k].y = std::numeric_limits<float>::quiet_NaN();
   keep(std::move(broken));
   keep(std::vector<Vec3>(10, Vec3{std::numeric_limits<float>::quiet_NaN(), 0, 0}));
   std::vector<Vec3> viewpoints;
   for (int k = 0; k < 7; ++k) viewpoints.push_back(test::random_unit(random) * 3.0f);
   viewpoints.push_back((*kept[0])[5]);  // in the midst of the points, and on one of them
-  for (std::size_t c = 0; c < raw.size(); c += 2) raw[c].viewpoints = &viewpoints[0].x, raw[c].viewpoint_count = viewpoints.size() - c;
+  for (std::size_t c = 0; c < raw.size(); c += 2) {
+    raw[c].viewpoints = &viewpoints[0].x;
+    raw[c].viewpoint_count = viewpoints.size() - c;
+  }
   options = RegistrationOptions::from_voxel_size(0.05f).prepare;
   for (const std::uint32_t maps : {1u, 3u, 10u}) {
     options.depth_maps = maps;
@@ -255,7 +320,8 @@ TEST_F(PrepareOnCuda, WideFeaturesAndDepthMaps) {
   }
   options.wide_feature_radius = 0;
   expect_same_preparation(raw, options);
-  options.depth_maps = 0, options.wide_feature_radius = 0.4f;
+  options.depth_maps = 0;
+  options.wide_feature_radius = 0.4f;
   expect_same_preparation(raw, options);
 }
 
@@ -274,7 +340,11 @@ TEST_F(PrepareOnCuda, ErrorsAreTheCpus) {
   const auto expect_same = [&] {
     const auto expected = message([&] { pipeline::prepare(on_cpu, span_of(raw), options); });
     EXPECT_NE(expected, "no error");
-    EXPECT_EQ(message([&] { on_cuda.begin(), pipeline::prepare(on_cuda, span_of(raw), options); }), expected);
+    EXPECT_EQ(message([&] {
+                on_cuda.begin();
+                pipeline::prepare(on_cuda, span_of(raw), options);
+              }),
+              expected);
   };
   expect_same();
   raw.clear();
@@ -291,8 +361,13 @@ TEST_F(PrepareOnCuda, RedKitchenFragments) {
   ASSERT_EQ(clouds.size(), 20u);
   for (const PointCloud& cloud : clouds) {
     RawCloud one{};
-    one.points = cloud.points[0].data(), one.size = cloud.points.size(), one.point_stride = 3;
-    if (!cloud.normals.empty()) one.normals = cloud.normals[0].data(), one.normal_stride = 3;
+    one.points = cloud.points[0].data();
+    one.size = cloud.points.size();
+    one.point_stride = 3;
+    if (!cloud.normals.empty()) {
+      one.normals = cloud.normals[0].data();
+      one.normal_stride = 3;
+    }
     raw.push_back(one);
   }
   expect_same_preparation(raw, options);
@@ -303,11 +378,14 @@ TEST_F(PrepareOnCuda, FgrRangePairs) {
   GPUREG_DATA_FOLDER_OR_SKIP(folder, "fgr");
   std::vector<PointCloud> clouds;
   for (const auto& entry : std::filesystem::recursive_directory_iterator(folder))
-    if (entry.path().extension() == ".ply") clouds.push_back(test::read_plain_ply(entry.path().string()));
+    if (entry.path().extension() == ".ply")
+      clouds.push_back(test::read_plain_ply(entry.path().string()));
   ASSERT_GT(clouds.size(), 40u);
   for (const PointCloud& cloud : clouds) {
     RawCloud one{};
-    one.points = cloud.points[0].data(), one.size = cloud.points.size(), one.point_stride = 3;
+    one.points = cloud.points[0].data();
+    one.size = cloud.points.size();
+    one.point_stride = 3;
     raw.push_back(one);
   }
   expect_same_preparation(raw, options);

@@ -23,7 +23,8 @@ std::vector<PointCloud> scene(const std::string& folder) {
     std::istringstream values(line);
     std::size_t fragment, frame;
     Eigen::Vector3f at;
-    if (values >> fragment >> frame >> at.x() >> at.y() >> at.z() && fragment < out.size()) out[fragment].viewpoints.push_back(at);
+    if (values >> fragment >> frame >> at.x() >> at.y() >> at.z() && fragment < out.size())
+      out[fragment].viewpoints.push_back(at);
   }
   return out;
 }
@@ -51,13 +52,16 @@ TEST(RedKitchenOnCuda, AllPairsAreTheCpus) {
   ASSERT_EQ(pairs.size(), 190u);
   RegistrationOptions options = RegistrationOptions::loopsmart();
   const Context cpu = Context::cpu(), cuda = Context::cuda();
-  const auto on_cpu = prepare_batch(cpu, views, options.prepare), on_cuda = prepare_batch(cuda, views, options.prepare);
-  const auto expect_same = [&](const std::vector<RegistrationResult>& a, const std::vector<RegistrationResult>& b) {
+  const auto on_cpu = prepare_batch(cpu, views, options.prepare),
+             on_cuda = prepare_batch(cuda, views, options.prepare);
+  const auto expect_same = [&](const std::vector<RegistrationResult>& a,
+                               const std::vector<RegistrationResult>& b) {
     EXPECT_EQ(different(a, b), 0) << "of 190, seed " << options.hypothesis.seed;
   };
   for (const std::uint64_t seed : {1, 2, 3}) {
     options.hypothesis.seed = seed;
-    expect_same(align_batch(cpu, on_cpu, pairs, options), align_batch(cuda, on_cuda, pairs, options));
+    expect_same(align_batch(cpu, on_cpu, pairs, options),
+                align_batch(cuda, on_cuda, pairs, options));
   }
   // On every device of the machine together; with one device two engines share it.
   CudaOptions all;
@@ -66,11 +70,14 @@ TEST(RedKitchenOnCuda, AllPairsAreTheCpus) {
   all.devices = devices == 1 ? std::vector<int>{0, 0} : std::vector<int>{};
   const Context together = Context::cuda(all);
   const auto spread = prepare_batch(together, views, options.prepare);
-  expect_same(align_batch(cuda, on_cuda, pairs, options), align_batch(together, spread, pairs, options));
-  expect_same(align_batch(cuda, on_cuda, pairs, options), align_batch(together, on_cuda, pairs, options));
+  expect_same(align_batch(cuda, on_cuda, pairs, options),
+              align_batch(together, spread, pairs, options));
+  expect_same(align_batch(cuda, on_cuda, pairs, options),
+              align_batch(together, on_cuda, pairs, options));
   // Another split of the batch, and refinement.
   std::vector<RegistrationResult> one_by_one;
-  for (const Pair& pair : pairs) one_by_one.push_back(align(cuda, on_cuda[pair.source], on_cuda[pair.target], options));
+  for (const Pair& pair : pairs)
+    one_by_one.push_back(align(cuda, on_cuda[pair.source], on_cuda[pair.target], options));
   expect_same(align_batch(cuda, on_cuda, pairs, options), one_by_one);
   options.refine.max_iterations = 20;
   expect_same(align_batch(cpu, on_cpu, pairs, options), align_batch(cuda, on_cuda, pairs, options));
@@ -86,14 +93,16 @@ TEST(RedKitchenOnCuda, AllPairsByEvidenceAreTheCpus) {
   ASSERT_EQ(pairs.size(), 190u);
   RegistrationOptions options = RegistrationOptions::from_voxel_size(0.05f);
   const Context cpu = Context::cpu(), cuda = Context::cuda();
-  const auto on_cpu = prepare_batch(cpu, views, options.prepare), on_cuda = prepare_batch(cuda, views, options.prepare);
+  const auto on_cpu = prepare_batch(cpu, views, options.prepare),
+             on_cuda = prepare_batch(cuda, views, options.prepare);
   for (const std::uint64_t seed : {1, 2}) {
     SCOPED_TRACE("seed " + std::to_string(seed));
     options.hypothesis.seed = seed;
     const auto batch = align_batch(cuda, on_cuda, pairs, options);
     EXPECT_EQ(different(align_batch(cpu, on_cpu, pairs, options), batch), 0);
     std::vector<RegistrationResult> one_by_one;
-    for (const Pair& pair : pairs) one_by_one.push_back(align(cuda, on_cuda[pair.source], on_cuda[pair.target], options));
+    for (const Pair& pair : pairs)
+      one_by_one.push_back(align(cuda, on_cuda[pair.source], on_cuda[pair.target], options));
     EXPECT_EQ(different(batch, one_by_one), 0);
   }
 }

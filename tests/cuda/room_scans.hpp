@@ -30,7 +30,8 @@ class RoomScans : public ::testing::Test {
   }
   void SetUp() override { GPUREG_GPU_OR_SKIP(); }
   Results run(const Context& context, const std::vector<Pair>& list) const {
-    return all_bytes(align_batch(context, prepare_batch(context, views, options.prepare), list, options));
+    return all_bytes(
+        align_batch(context, prepare_batch(context, views, options.prepare), list, options));
   }
   RegistrationOptions options;
   std::vector<std::vector<Eigen::Vector3f>> scans;

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Which clouds get a table of bricks: none whose cells the device could not count. No device needed.
+// Which clouds get a table of bricks: none whose cells the device could not count. No device
+// needed.
 #include <gtest/gtest.h>
 
 #include "scoring_data.hpp"
@@ -26,7 +27,8 @@ TEST(ScoringLayout, HasATableForARoom) {
 
 /// A cell's coordinate is read from the low 22 bits of a float, the blocks on both sides included.
 TEST(ScoringLayout, CountsCellsIn22BitsAlongEveryAxis) {
-  constexpr std::int32_t kLast = (1 << 19) - 3;  // 2^19 - 2 blocks, so 2^22 cells with those on both sides
+  // 2^19 - 2 blocks, so 2^22 cells with those on both sides
+  constexpr std::int32_t kLast = (1 << 19) - 3;
   const Cell ends[3] = {{kLast, 0, 0}, {0, kLast, 0}, {0, 0, kLast}};
   const Cell beyond[3] = {{kLast + 1, 0, 0}, {0, kLast + 1, 0}, {0, 0, kLast + 1}};
   EXPECT_EQ(layout_of({0, 0, 0}, ends[0]).nx, kLast + 1);

@@ -28,9 +28,12 @@ TEST(CheckEntries, EntriesKnowTheirLine) {
   check_entries("a.log", entries);
   check_entries("a.log", std::vector<LogEntry>());
   std::vector<InformationEntry> information(2);
-  information[0].j = information[1].j = 1, information[0].count = information[1].count = 2;
-  information[1].i = 0, information[1].j = 1;
-  information[0].i = 1, information[0].j = 0;
+  information[0].j = information[1].j = 1;
+  information[0].count = information[1].count = 2;
+  information[1].i = 0;
+  information[1].j = 1;
+  information[0].i = 1;
+  information[0].j = 0;
   write_information(folder / "a.info", information);
   EXPECT_EQ(read_information(folder / "a.info")[1].line, 8);
   check_entries("a.info", information);

@@ -77,8 +77,11 @@ TEST(Published, CountsOfChoiZhouKoltunPerScene) {
 TEST(Published, PooledCountsWouldGiveAnotherFigure) {
   GPUREG_DATA_FOLDER_OR_SKIP(root, "redwood-logs");
   int good = 0, truths = 0, reported = 0;
-  for (const Scores& s : scores_of(root, "pcl_modified"))
-    good += s.good, truths += s.ground_truth, reported += s.reported;
+  for (const Scores& s : scores_of(root, "pcl_modified")) {
+    good += s.good;
+    truths += s.ground_truth;
+    reported += s.reported;
+  }
   EXPECT_EQ(percent(double(good) / truths, double(good) / reported), "59.7 / 19.9");
 }
 
@@ -164,8 +167,9 @@ TEST(Published, EveryLogAtHandCanBeRead) {
     const std::string extension = entry.path().extension().string();
     SCOPED_TRACE(entry.path().string());
     if (extension != ".log" && extension != ".info") continue;
-    const std::size_t entries = extension == ".log" ? read_log(entry.path().string()).size()
-                                                    : read_information(entry.path().string()).size();
+    const std::size_t entries = extension == ".log"
+                                    ? read_log(entry.path().string()).size()
+                                    : read_information(entry.path().string()).size();
     EXPECT_GT(entries, 0u);
     ++logs;
   }

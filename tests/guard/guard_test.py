@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
 """The guard must notice what is worse and let pass what is not: its rules, without a command."""
+
 import unittest
 
 import guard

@@ -13,8 +13,10 @@ TEST(Atan2, AgreesWithDouble) {
   std::uniform_real_distribution<float> value(-3, 3), exponent(-12, 12);
   double worst = 0;
   for (int k = 0; k < 200000; ++k) {
-    const float y = value(random) * std::exp(exponent(random)), x = value(random) * std::exp(exponent(random));
-    worst = std::max(worst, std::fabs(static_cast<double>(exact_atan2(y, x)) - std::atan2(static_cast<double>(y), static_cast<double>(x))));
+    const float y = value(random) * std::exp(exponent(random)),
+                x = value(random) * std::exp(exponent(random));
+    worst = std::max(worst, std::fabs(static_cast<double>(exact_atan2(y, x)) -
+                                      std::atan2(static_cast<double>(y), static_cast<double>(x))));
   }
   // The polynomial is good to 4e-8, a float near pi to 1.2e-7, and two roundings follow each other.
   EXPECT_LT(worst, 4e-7);

@@ -19,7 +19,8 @@ TEST(Cholesky, AgreesWithEigen) {
       y(i) = normal(random);
       for (int j = 0; j < 6; ++j) b(i, j) = normal(random);
     }
-    const Eigen::Matrix<double, 6, 6> m = b * b.transpose() + 0.01 * Eigen::Matrix<double, 6, 6>::Identity();
+    const Eigen::Matrix<double, 6, 6> m =
+        b * b.transpose() + 0.01 * Eigen::Matrix<double, 6, 6>::Identity();
     double a[6][6], rhs[6], x[6];
     for (int i = 0; i < 6; ++i) {
       rhs[i] = y(i);

@@ -31,7 +31,8 @@ void compare_with_eigen(double spread) {
       Eigen::Matrix<double, N, 1> x;
       for (int i = 0; i < N; ++i) x(i) = v[i][k];
       EXPECT_NEAR(x.norm(), 1, 1e-5);
-      // A residual of some float roundings of the largest eigenvalue: about 60 rotations of 6e-8 each.
+      // A residual of some float roundings of the largest eigenvalue: about 60 rotations of 6e-8
+      // each.
       EXPECT_LT((rounded * x - static_cast<double>(a[k][k]) * x).norm(), 8e-6 * scale);
     }
   }

@@ -30,7 +30,8 @@ void expect_exact(const CpuCloud& cloud, std::mt19937& random, int queries, floa
       q = {p.x + near(random), p.y + near(random), p.z + near(random)};
     }
     const Closest expected = exhaustive(cloud.points, q, max_distance * max_distance);
-    const Closest found_one = find_closest(view.closest, view.points, q, max_distance * max_distance);
+    const Closest found_one =
+        find_closest(view.closest, view.points, q, max_distance * max_distance);
     ASSERT_EQ(found_one.index, expected.index) << k;
     if (expected.index != kNoValue) {
       EXPECT_EQ(found_one.squared_distance, expected.squared_distance);
@@ -40,14 +41,19 @@ void expect_exact(const CpuCloud& cloud, std::mt19937& random, int queries, floa
   EXPECT_GT(found, queries / 4);
 }
 
-// No neighbour within the distance may be missed, and the answer is the exhaustive search's to the bit.
+// No neighbour within the distance may be missed, and the answer is the exhaustive search's to the
+// bit.
 TEST(ClosestGrid, FindsWhatExhaustiveSearchFinds) {
   std::mt19937 random(1);
   Exec exec(2);
   PrepareOptions options;
-  for (const std::size_t n : {std::size_t(1), std::size_t(2), std::size_t(50), std::size_t(4000), std::size_t(30000)}) {
-    expect_exact(*test::prepare_one(exec, test::raw_cloud(test::bumpy_sheet(random, n, 2.5f)), options), random, 4000, 0.075f);
-    expect_exact(*test::prepare_one(exec, test::raw_cloud(test::cube(random, n, 1.0f)), options), random, 4000, 0.075f);
+  for (const std::size_t n :
+       {std::size_t(1), std::size_t(2), std::size_t(50), std::size_t(4000), std::size_t(30000)}) {
+    expect_exact(
+        *test::prepare_one(exec, test::raw_cloud(test::bumpy_sheet(random, n, 2.5f)), options),
+        random, 4000, 0.075f);
+    expect_exact(*test::prepare_one(exec, test::raw_cloud(test::cube(random, n, 1.0f)), options),
+                 random, 4000, 0.075f);
   }
 }
 
@@ -56,7 +62,10 @@ TEST(ClosestGrid, ExactForSmallerDistancesAndOtherScales) {
   Exec exec(2);
   for (const float scale : {0.001f, 1.0f, 50.0f}) {
     PrepareOptions options;
-    options.voxel_size *= scale, options.normal_radius *= scale, options.feature_radius *= scale, options.search_distance *= scale;
+    options.voxel_size *= scale;
+    options.normal_radius *= scale;
+    options.feature_radius *= scale;
+    options.search_distance *= scale;
     std::vector<Vec3> points = test::bumpy_sheet(random, 5000, 2.0f);
     for (Vec3& p : points) p = p * scale;
     const auto cloud = test::prepare_one(exec, test::raw_cloud(points), options);
@@ -76,10 +85,12 @@ TEST(ClosestGrid, DuplicatesAndUndownsampledClouds) {
   expect_exact(*test::prepare_one(exec, test::raw_cloud(points), options), random, 5000, 0.075f);
   const std::vector<Vec3> one_place(500, Vec3{1, 2, 3});
   const auto cloud = test::prepare_one(exec, test::raw_cloud(one_place), options);
-  EXPECT_EQ(find_closest(cloud->view().closest, cloud->points.data(), {0.01f, 0, 0}, 0.01f).index, 0u);
+  EXPECT_EQ(find_closest(cloud->view().closest, cloud->points.data(), {0.01f, 0, 0}, 0.01f).index,
+            0u);
 }
 
-// Points exactly on the borders of cells and blocks, where rounding decides to which side a query falls.
+// Points exactly on the borders of cells and blocks, where rounding decides to which side a query
+// falls.
 TEST(ClosestGrid, LatticePointsAndQueries) {
   std::mt19937 random(4);
   Exec exec(2);
@@ -88,20 +99,26 @@ TEST(ClosestGrid, LatticePointsAndQueries) {
   std::vector<Vec3> points;
   for (int x = -4; x <= 4; ++x)
     for (int y = -4; y <= 4; ++y)
-      for (int z = -4; z <= 4; ++z) points.push_back({0.05f * static_cast<float>(x), 0.05f * static_cast<float>(y), 0.05f * static_cast<float>(z)});
+      for (int z = -4; z <= 4; ++z)
+        points.push_back({0.05f * static_cast<float>(x), 0.05f * static_cast<float>(y),
+                          0.05f * static_cast<float>(z)});
   const auto cloud = test::prepare_one(exec, test::raw_cloud(points), options);
   std::uniform_int_distribution<int> step(-30, 30);
   for (int k = 0; k < 20000; ++k) {
-    const Vec3 q{0.0125f * static_cast<float>(step(random)), 0.025f * static_cast<float>(step(random)) * 0.5f, 0.0125f * static_cast<float>(step(random))};
+    const Vec3 q{0.0125f * static_cast<float>(step(random)),
+                 0.025f * static_cast<float>(step(random)) * 0.5f,
+                 0.0125f * static_cast<float>(step(random))};
     const float limit = 0.075f * 0.075f;
-    EXPECT_EQ(find_closest(cloud->view().closest, cloud->points.data(), q, limit).index, exhaustive(cloud->points, q, limit).index);
+    EXPECT_EQ(find_closest(cloud->view().closest, cloud->points.data(), q, limit).index,
+              exhaustive(cloud->points, q, limit).index);
   }
 }
 
 TEST(ClosestGrid, QueriesFarAwayOrNotANumberFindNothing) {
   std::mt19937 random(5);
   Exec exec(1);
-  const auto cloud = test::prepare_one(exec, test::raw_cloud(test::cube(random, 100, 1.0f)), PrepareOptions{});
+  const auto cloud =
+      test::prepare_one(exec, test::raw_cloud(test::cube(random, 100, 1.0f)), PrepareOptions{});
   const float nan = std::nanf("");
   for (const Vec3 q : {Vec3{1e30f, 0, 0}, Vec3{nan, 0, 0}, Vec3{0, -1e9f, 0}, Vec3{0, 0, INFINITY}})
     EXPECT_EQ(find_closest(cloud->view().closest, cloud->points.data(), q, 0.005f).index, kNoValue);

@@ -31,7 +31,8 @@ TEST(Downsample, CentroidsAgreeWithDouble) {
     };
     std::map<std::tuple<int, int, int>, Sum> voxels;
     for (const Vec3& p : points) {
-      // The cell itself is decided in float, as in every implementation; what is averaged in it is checked in double.
+      // The cell itself is decided in float, as in every implementation; what is averaged in it is
+      // checked in double.
       const Vec3 local{p.x - cloud.origin[0], p.y - cloud.origin[1], p.z - cloud.origin[2]};
       const Cell c = cell_of(local, 1.0f / 0.05f);
       Sum& s = voxels[{c.z, c.y, c.x}];
@@ -50,7 +51,8 @@ TEST(Downsample, CentroidsAgreeWithDouble) {
 }
 
 TEST(Downsample, DropsAndCountsInvalidPoints) {
-  const float nan = std::numeric_limits<float>::quiet_NaN(), inf = std::numeric_limits<float>::infinity();
+  const float nan = std::numeric_limits<float>::quiet_NaN(),
+              inf = std::numeric_limits<float>::infinity();
   const std::vector<Vec3> points = {{0, 0, 0}, {nan, 0, 0}, {1, 1, 1}, {0, inf, 0}, {0, 0, -inf}};
   const DownsampledCloud cloud = downsample_one(test::raw_cloud(points), 0.05f);
   EXPECT_EQ(cloud.points.size(), 2u);
@@ -63,20 +65,24 @@ TEST(Downsample, WithoutVoxelsKeepsPointsAndOrder) {
   const std::vector<Vec3> points = test::cube(random, 500, 3.0f);
   const DownsampledCloud cloud = downsample_one(test::raw_cloud(points), 0.0f);
   ASSERT_EQ(cloud.points.size(), points.size());
-  for (std::size_t k = 0; k < points.size(); ++k) EXPECT_NEAR(cloud.points[k].x + cloud.origin[0], points[k].x, 1e-6);
+  for (std::size_t k = 0; k < points.size(); ++k)
+    EXPECT_NEAR(cloud.points[k].x + cloud.origin[0], points[k].x, 1e-6);
 }
 
 TEST(Downsample, FarFromTheOriginLosesNothing) {
-  // Coordinates that float holds exactly at 10 km and beyond: the local cloud must be the same bits as near the origin.
+  // Coordinates that float holds exactly at 10 km and beyond: the local cloud must be the same bits
+  // as near the origin.
   std::vector<Vec3> near, far;
   std::mt19937 random(3);
   std::uniform_int_distribution<int> place(0, 2047);
   for (int k = 0; k < 2000; ++k) {
-    const Vec3 p{static_cast<float>(place(random)) / 1024, static_cast<float>(place(random)) / 1024, static_cast<float>(place(random)) / 1024};
+    const Vec3 p{static_cast<float>(place(random)) / 1024, static_cast<float>(place(random)) / 1024,
+                 static_cast<float>(place(random)) / 1024};
     near.push_back(p);
     far.push_back({p.x + 8192, p.y - 8192, p.z + 4096});
   }
-  const DownsampledCloud a = downsample_one(test::raw_cloud(near), 0.0625f), b = downsample_one(test::raw_cloud(far), 0.0625f);
+  const DownsampledCloud a = downsample_one(test::raw_cloud(near), 0.0625f),
+                         b = downsample_one(test::raw_cloud(far), 0.0625f);
   ASSERT_EQ(a.points.size(), b.points.size());
   for (std::size_t k = 0; k < a.points.size(); ++k) {
     EXPECT_EQ(a.points[k].x, b.points[k].x);

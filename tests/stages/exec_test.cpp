@@ -17,7 +17,8 @@ TEST(Exec, RunsEveryTaskOnce) {
   for (const unsigned threads : {1u, 2u, 7u}) {
     Exec exec(threads);
     EXPECT_EQ(exec.threads(), threads);
-    for (const std::size_t count : {std::size_t(0), std::size_t(1), std::size_t(5), std::size_t(1000)}) {
+    for (const std::size_t count :
+         {std::size_t(0), std::size_t(1), std::size_t(5), std::size_t(1000)}) {
       std::vector<std::atomic<int>> hits(count);
       exec.parallel(count, [&](std::size_t k) { ++hits[k]; });
       for (const auto& h : hits) EXPECT_EQ(h, 1);
@@ -30,17 +31,23 @@ TEST(Exec, BlocksCoverEveryItemOfEveryEntry) {
   const std::vector<std::size_t> counts = {0, 1, 99, 100, 101, 0, 250};
   std::vector<std::vector<std::atomic<int>>> hits;
   for (const std::size_t n : counts) hits.emplace_back(n);
-  exec.parallel_items(counts.size(), [&](std::size_t e) { return counts[e]; }, 100, [&](std::size_t e, std::size_t begin, std::size_t end) {
-    EXPECT_LE(end - begin, 100u);
-    for (std::size_t k = begin; k < end; ++k) ++hits[e][k];
-  });
+  exec.parallel_items(
+      counts.size(), [&](std::size_t e) { return counts[e]; }, 100,
+      [&](std::size_t e, std::size_t begin, std::size_t end) {
+        EXPECT_LE(end - begin, 100u);
+        for (std::size_t k = begin; k < end; ++k) ++hits[e][k];
+      });
   for (const auto& entry : hits)
     for (const auto& h : entry) EXPECT_EQ(h, 1);
 }
 
 TEST(Exec, RethrowsAndStaysUsable) {
   Exec exec(4);
-  EXPECT_THROW(exec.parallel(100, [](std::size_t k) { if (k == 17) throw std::runtime_error("17"); }), std::runtime_error);
+  EXPECT_THROW(exec.parallel(100,
+                             [](std::size_t k) {
+                               if (k == 17) throw std::runtime_error("17");
+                             }),
+               std::runtime_error);
   std::atomic<int> sum{0};
   exec.parallel(100, [&](std::size_t) { ++sum; });
   EXPECT_EQ(sum, 100);
@@ -51,9 +58,11 @@ TEST(RadixSort, IsStableAndSorts) {
   for (const std::size_t n : {std::size_t(0), std::size_t(1), std::size_t(2), std::size_t(10000)}) {
     std::vector<KeyIndex> items(n);
     // Few distinct keys in the low and the high bits: ties, and digits that never vary.
-    for (std::size_t k = 0; k < n; ++k) items[k] = {(random() % 50) << 40 | random() % 7, static_cast<std::uint32_t>(k)};
+    for (std::size_t k = 0; k < n; ++k)
+      items[k] = {(random() % 50) << 40 | random() % 7, static_cast<std::uint32_t>(k)};
     std::vector<KeyIndex> expected = items;
-    std::stable_sort(expected.begin(), expected.end(), [](const KeyIndex& a, const KeyIndex& b) { return a.key < b.key; });
+    std::stable_sort(expected.begin(), expected.end(),
+                     [](const KeyIndex& a, const KeyIndex& b) { return a.key < b.key; });
     radix_sort(items);
     for (std::size_t k = 0; k < n; ++k) {
       EXPECT_EQ(items[k].key, expected[k].key);

@@ -15,7 +15,8 @@ TEST(Features, FpfhAgreesWithExhaustiveNeighbours) {
   std::mt19937 random(1);
   Exec exec(2);
   PrepareOptions options;
-  const auto cloud = test::prepare_one(exec, test::raw_cloud(test::bumpy_sheet(random, 8000, 2.0f)), options);
+  const auto cloud =
+      test::prepare_one(exec, test::raw_cloud(test::bumpy_sheet(random, 8000, 2.0f)), options);
   const std::size_t n = cloud->points.size();
   const float r2 = options.feature_radius * options.feature_radius;
   std::vector<double> spfh(n * kFpfhSize, 0.0);
@@ -24,24 +25,32 @@ TEST(Features, FpfhAgreesWithExhaustiveNeighbours) {
     int neighbors = 0;
     std::vector<int> counts(kFpfhSize, 0);
     for (std::size_t j = 0; j < n; ++j) {
-      if (j == i || squared_norm(cloud->points[j] - cloud->points[i]) > r2 || is_zero(cloud->normals[j])) continue;
+      if (j == i || squared_norm(cloud->points[j] - cloud->points[i]) > r2 ||
+          is_zero(cloud->normals[j]))
+        continue;
       ++neighbors;
-      const PairFeature f = pair_feature(cloud->points[i], cloud->normals[i], cloud->points[j], cloud->normals[j]);
+      const PairFeature f =
+          pair_feature(cloud->points[i], cloud->normals[i], cloud->points[j], cloud->normals[j]);
       if (!f.valid) continue;
-      for (int part = 0; part < 3; ++part) ++counts[static_cast<std::size_t>(part * kFpfhBins + f.bins[part])];
+      for (int part = 0; part < 3; ++part)
+        ++counts[static_cast<std::size_t>(part * kFpfhBins + f.bins[part])];
     }
-    for (int b = 0; b < kFpfhSize; ++b) spfh[i * kFpfhSize + b] = neighbors ? 100.0 * counts[static_cast<std::size_t>(b)] / neighbors : 0;
+    for (int b = 0; b < kFpfhSize; ++b)
+      spfh[i * kFpfhSize + b] =
+          neighbors ? 100.0 * counts[static_cast<std::size_t>(b)] / neighbors : 0;
   }
   for (std::size_t i = 0; i < n; i += 7) {
     std::vector<double> expected(kFpfhSize, 0.0);
     for (std::size_t j = 0; j < n; ++j) {
       const double d2 = static_cast<double>(squared_norm(cloud->points[j] - cloud->points[i]));
       if (d2 > static_cast<double>(r2) || d2 == 0) continue;
-      for (int b = 0; b < kFpfhSize; ++b) expected[static_cast<std::size_t>(b)] += spfh[j * kFpfhSize + b] / d2;
+      for (int b = 0; b < kFpfhSize; ++b)
+        expected[static_cast<std::size_t>(b)] += spfh[j * kFpfhSize + b] / d2;
     }
     for (int part = 0; part < 3; ++part) {
       double sum = 0;
-      for (int b = 0; b < kFpfhBins; ++b) sum += expected[static_cast<std::size_t>(part * kFpfhBins + b)];
+      for (int b = 0; b < kFpfhBins; ++b)
+        sum += expected[static_cast<std::size_t>(part * kFpfhBins + b)];
       if (!cloud->features.valid[i]) continue;
       double total = 0;
       for (int b = 0; b < kFpfhBins; ++b) {
@@ -99,14 +108,17 @@ TEST(Features, TheWideOnesSeeNormalsThatAreAsMuchWider) {
   const auto wide = compute_wide_features(exec, clouds, grids, options);
   PrepareOptions coarse = options;
   coarse.feature_radius = options.wide_feature_radius;
-  const auto expected = compute_features(exec, clouds, estimate_normals(exec, clouds, grids, 0.1f * (0.4f / 0.25f)), grids, coarse);
-  const auto narrow = compute_features(exec, clouds, estimate_normals(exec, clouds, grids, 0.1f), grids, coarse);
+  const auto expected = compute_features(
+      exec, clouds, estimate_normals(exec, clouds, grids, 0.1f * (0.4f / 0.25f)), grids, coarse);
+  const auto narrow =
+      compute_features(exec, clouds, estimate_normals(exec, clouds, grids, 0.1f), grids, coarse);
   ASSERT_EQ(wide[0].values.size(), clouds[0].points.size() * kFpfhSize);
   EXPECT_EQ(wide[0].values, expected[0].values);
   EXPECT_EQ(wide[0].valid, expected[0].valid);
   EXPECT_NE(wide[0].values, narrow[0].values);
   EXPECT_EQ(wide_normal_radius(0.1f, 0.25f, 0.4f), 0.1f * (0.4f / 0.25f));
-  EXPECT_EQ(wide_normal_radius(0.1f, 0.01f, 0.4f), 0.04f);  // narrow cells, of which a wide neighbourhood would be millions
+  // narrow cells, of which a wide neighbourhood would be millions
+  EXPECT_EQ(wide_normal_radius(0.1f, 0.01f, 0.4f), 0.04f);
   options.wide_feature_radius = 0;
   EXPECT_TRUE(compute_wide_features(exec, clouds, grids, options)[0].values.empty());
   options.wide_feature_radius = 0.4f;

@@ -17,21 +17,29 @@ using test::seen_from;
 std::vector<Vec3> floor_at(float height) {
   std::vector<Vec3> points;
   for (int y = 0; y < 60; ++y)
-    for (int x = 0; x < 60; ++x) points.push_back({0.02f * static_cast<float>(x) - 0.6f, 0.02f * static_cast<float>(y) - 0.6f, height});
+    for (int x = 0; x < 60; ++x)
+      points.push_back(
+          {0.02f * static_cast<float>(x) - 0.6f, 0.02f * static_cast<float>(y) - 0.6f, height});
   return points;
 }
 
 /// Of a place in the cloud's own frame.
-std::uint32_t place(const CpuCloud& cloud, Vec3 p) { return place_of(cloud.fronts.view(), p - Vec3{cloud.origin[0], cloud.origin[1], cloud.origin[2]}); }
+std::uint32_t place(const CpuCloud& cloud, Vec3 p) {
+  return place_of(cloud.fronts.view(), p - Vec3{cloud.origin[0], cloud.origin[1], cloud.origin[2]});
+}
 
 TEST(Fronts, AFloorHasAFrontAndABack) {
   Exec exec(1);
   const auto cloud = seen_from(exec, floor_at(0.02f), {0, 0, 2});
   EXPECT_EQ(place(*cloud, {0, 0, 0.02f}) & kOnSurface, kOnSurface);
-  for (const float h : {0.17f, 0.22f}) EXPECT_EQ(place(*cloud, {0.1f, 0.2f, 0.02f + h}), kNearFront) << h;
-  for (const float h : {0.32f, 0.47f}) EXPECT_EQ(place(*cloud, {0.1f, 0.2f, 0.02f + h}), kFarFront) << h;
-  for (const float h : {0.17f, 0.32f, 0.47f}) EXPECT_EQ(place(*cloud, {0.1f, 0.2f, 0.02f - h}), kAtBack) << h;
-  for (const float h : {0.67f, -0.67f, 50.0f, -1e20f, 1e30f}) EXPECT_EQ(place(*cloud, {0.1f, 0.2f, h}), 0u) << h;
+  for (const float h : {0.17f, 0.22f})
+    EXPECT_EQ(place(*cloud, {0.1f, 0.2f, 0.02f + h}), kNearFront) << h;
+  for (const float h : {0.32f, 0.47f})
+    EXPECT_EQ(place(*cloud, {0.1f, 0.2f, 0.02f + h}), kFarFront) << h;
+  for (const float h : {0.17f, 0.32f, 0.47f})
+    EXPECT_EQ(place(*cloud, {0.1f, 0.2f, 0.02f - h}), kAtBack) << h;
+  for (const float h : {0.67f, -0.67f, 50.0f, -1e20f, 1e30f})
+    EXPECT_EQ(place(*cloud, {0.1f, 0.2f, h}), 0u) << h;
   EXPECT_EQ(place(*cloud, {1.5f, 0, 0.2f}), 0u);
 }
 
@@ -67,7 +75,8 @@ TEST(Fronts, AreWhatMarchingOverAMapOfCellsFinds) {
   for (int trial = 0; trial < 4; ++trial) {
     options.front_reach = trial < 2 ? 0.5f : 0.37f;
     options.voxel_size = trial % 2 == 0 ? 0.05f : 0.0f;
-    const auto points = trial == 3 ? test::cube(random, 3000, 1.0f) : test::bumpy_sheet(random, 4000, 1.7f);
+    const auto points =
+        trial == 3 ? test::cube(random, 3000, 1.0f) : test::bumpy_sheet(random, 4000, 1.7f);
     const auto cloud = test::prepare_one(exec, test::raw_cloud(points), options);
     const float inverse = cloud->fronts.box.inverse_cell_size, size = cloud->fronts.box.cell_size;
     const auto key = [&](Vec3 p) {
@@ -92,7 +101,9 @@ TEST(Fronts, AreWhatMarchingOverAMapOfCellsFinds) {
     EXPECT_EQ(marked, expected.size());
     for (const auto& [k, bits] : expected) {
       const auto [x, y, z] = k;
-      const Vec3 middle{(static_cast<float>(x) + 0.5f) * size, (static_cast<float>(y) + 0.5f) * size, (static_cast<float>(z) + 0.5f) * size};
+      const Vec3 middle{(static_cast<float>(x) + 0.5f) * size,
+                        (static_cast<float>(y) + 0.5f) * size,
+                        (static_cast<float>(z) + 0.5f) * size};
       ASSERT_EQ(place_of(cloud->fronts.view(), middle), bits) << x << " " << y << " " << z;
     }
   }
@@ -110,7 +121,8 @@ TEST(Fronts, NoneWhereNotAskedForOrTooWide) {
   wide.back() = {60, 0, 0};
   EXPECT_NE(seen_from(exec, wide, {0, 0, 2})->fronts.view().words, nullptr);
   // Corners whose cells no integer counts.
-  for (const float far : {1e9f, 3e18f, 3e38f}) EXPECT_EQ(front_box({-far, -far, -far}, {far, far, far}, 1e-6f, true).words(), 0u);
+  for (const float far : {1e9f, 3e18f, 3e38f})
+    EXPECT_EQ(front_box({-far, -far, -far}, {far, far, far}, 1e-6f, true).words(), 0u);
   EXPECT_GT(front_box({3e7f, 0, 0}, {3e7f, 1, 1}, 0.5f, true).words(), 0u);
   EXPECT_EQ(front_box({9e8f, 0, 0}, {9e8f, 1, 1}, 0.5f, true).words(), 0u);
 }
@@ -118,7 +130,12 @@ TEST(Fronts, NoneWhereNotAskedForOrTooWide) {
 TEST(Fronts, TellOnWhichSidePointsHang) {
   Exec exec(1);
   const auto target = seen_from(exec, floor_at(0.02f), {0, 0, 2});
-  const auto of = [&](float height) { return test::weighed_in_place(exec, *seen_from(exec, floor_at(0.02f + height), {0, 0, 2}), *target).modes[0].source; };
+  const auto of = [&](float height) {
+    return test::weighed_in_place(exec, *seen_from(exec, floor_at(0.02f + height), {0, 0, 2}),
+                                  *target)
+        .modes[0]
+        .source;
+  };
   const SideEvidence on = of(0), near = of(0.2f), far = of(0.4f), back = of(-0.3f), away = of(1.0f);
   EXPECT_EQ(on.hits, on.tested);
   EXPECT_EQ(on.around, on.tested);
@@ -126,7 +143,9 @@ TEST(Fronts, TellOnWhichSidePointsHang) {
   EXPECT_GT(near.near_front, near.tested * 9 / 10);
   EXPECT_GT(far.far_front, far.tested * 9 / 10);
   EXPECT_GT(back.at_back, back.tested * 9 / 10);
-  EXPECT_EQ(near.far_front + near.at_back + far.near_front + far.at_back + back.near_front + back.far_front, 0u);
+  EXPECT_EQ(near.far_front + near.at_back + far.near_front + far.at_back + back.near_front +
+                back.far_front,
+            0u);
   EXPECT_EQ(away.around, 0u);
 }
 

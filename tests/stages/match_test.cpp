@@ -12,19 +12,23 @@ namespace {
 struct Rows {
   std::vector<float> values;
   std::vector<std::uint8_t> valid;
-  FeatureRows view(std::uint32_t dimension) const { return {values.data(), valid.data(), static_cast<std::uint32_t>(valid.size()), dimension}; }
+  FeatureRows view(std::uint32_t dimension) const {
+    return {values.data(), valid.data(), static_cast<std::uint32_t>(valid.size()), dimension};
+  }
 };
 
 Rows random_rows(std::mt19937& random, std::size_t n, std::uint32_t dimension, bool coarse) {
   Rows rows;
   std::uniform_real_distribution<float> value(0, 100);
-  for (std::size_t k = 0; k < n * dimension; ++k) rows.values.push_back(coarse ? std::floor(value(random) / 40) : value(random));
+  for (std::size_t k = 0; k < n * dimension; ++k)
+    rows.values.push_back(coarse ? std::floor(value(random) / 40) : value(random));
   for (std::size_t k = 0; k < n; ++k) rows.valid.push_back(random() % 10 != 0);
   return rows;
 }
 
 /// The definition: a chain of fused multiply-adds over the dimensions, ties to the lower index.
-std::vector<std::uint32_t> by_definition(const Rows& queries, const Rows& rows, std::uint32_t dimension, std::uint32_t k) {
+std::vector<std::uint32_t> by_definition(const Rows& queries, const Rows& rows,
+                                         std::uint32_t dimension, std::uint32_t k) {
   std::vector<std::uint32_t> out;
   for (std::size_t q = 0; q < queries.valid.size(); ++q) {
     std::vector<std::pair<float, std::uint32_t>> all;
@@ -45,12 +49,15 @@ std::vector<std::uint32_t> by_definition(const Rows& queries, const Rows& rows, 
 TEST(NearestFeatures, IsTheDefinitionForAnyDimensionAndCount) {
   std::mt19937 random(1);
   for (const std::uint32_t dimension : {1u, 3u, 32u, 33u, 64u, 352u})
-    for (const std::size_t n : {std::size_t(0), std::size_t(1), std::size_t(3), std::size_t(16), std::size_t(17), std::size_t(150)})
+    for (const std::size_t n : {std::size_t(0), std::size_t(1), std::size_t(3), std::size_t(16),
+                                std::size_t(17), std::size_t(150)})
       for (const std::uint32_t k : {1u, 2u, 16u}) {
-        const Rows queries = random_rows(random, 37, dimension, false), rows = random_rows(random, n, dimension, n % 2 == 0);
+        const Rows queries = random_rows(random, 37, dimension, false),
+                   rows = random_rows(random, n, dimension, n % 2 == 0);
         std::vector<std::uint32_t> out(37 * k);
         nearest_features(queries.view(dimension), rows.view(dimension), k, 0, 37, out.data());
-        EXPECT_EQ(out, by_definition(queries, rows, dimension, k)) << dimension << " " << n << " " << k;
+        EXPECT_EQ(out, by_definition(queries, rows, dimension, k))
+            << dimension << " " << n << " " << k;
       }
 }
 
@@ -64,11 +71,13 @@ TEST(NearestFeatures, TiesGoToTheLowerIndex) {
 
 TEST(NearestFeatures, AnySplitOfTheQueriesIsTheSame) {
   std::mt19937 random(3);
-  const Rows queries = random_rows(random, 101, 33, false), rows = random_rows(random, 300, 33, false);
+  const Rows queries = random_rows(random, 101, 33, false),
+             rows = random_rows(random, 300, 33, false);
   std::vector<std::uint32_t> whole(101), parts(101);
   nearest_features(queries.view(33), rows.view(33), 1, 0, 101, whole.data());
   for (std::size_t begin = 0; begin < 101; begin += 7)
-    nearest_features(queries.view(33), rows.view(33), 1, begin, std::min<std::size_t>(begin + 7, 101), parts.data() + begin);
+    nearest_features(queries.view(33), rows.view(33), 1, begin,
+                     std::min<std::size_t>(begin + 7, 101), parts.data() + begin);
   EXPECT_EQ(whole, parts);
 }
 

@@ -38,7 +38,8 @@ TEST(Normals, AgreeWithDoubleOverAllNeighbours) {
       for (const Eigen::Vector3d& q : near) covariance += (q - mean) * (q - mean).transpose();
       const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(covariance);
       // Where two eigenvalues nearly meet the normal is not determined.
-      if (solver.eigenvalues()(1) - solver.eigenvalues()(0) < 1e-2 * solver.eigenvalues()(2)) continue;
+      if (solver.eigenvalues()(1) - solver.eigenvalues()(0) < 1e-2 * solver.eigenvalues()(2))
+        continue;
       const Eigen::Vector3d n(cloud->normals[i].x, cloud->normals[i].y, cloud->normals[i].z);
       EXPECT_GT(std::fabs(n.dot(solver.eigenvectors().col(0))), 1 - 1e-6);  // 0.08 degrees
       ++compared;
@@ -50,7 +51,8 @@ TEST(Normals, AgreeWithDoubleOverAllNeighbours) {
 TEST(Normals, PointAtTheNearestViewpoint) {
   std::vector<Vec3> points;
   for (int x = 0; x < 40; ++x)
-    for (int y = 0; y < 40; ++y) points.push_back({0.05f * static_cast<float>(x), 0.05f * static_cast<float>(y), 1});
+    for (int y = 0; y < 40; ++y)
+      points.push_back({0.05f * static_cast<float>(x), 0.05f * static_cast<float>(y), 1});
   RawCloud raw = test::raw_cloud(points);
   const std::vector<Vec3> viewpoints = {{1, 1, 3}, {50, 50, -50}};
   raw.viewpoints = &viewpoints[0].x;
@@ -61,14 +63,18 @@ TEST(Normals, PointAtTheNearestViewpoint) {
   for (const Vec3& n : normals_of(exec, raw, options)) EXPECT_GT(n.z, 0.999f);
   raw.viewpoints = nullptr;
   raw.viewpoint_count = 0;
-  for (const Vec3& n : normals_of(exec, raw, options)) EXPECT_LT(n.z, -0.999f);  // the origin sees it from below
+  // the origin sees it from below
+  for (const Vec3& n : normals_of(exec, raw, options)) EXPECT_LT(n.z, -0.999f);
   const std::vector<Vec3> up(points.size(), Vec3{0, 0, 1});
   raw.normals = &up[0].x;
-  for (const Vec3& n : normals_of(exec, raw, options)) EXPECT_GT(n.z, 0.999f);  // the input's own side wins
+  // the input's own side wins
+  for (const Vec3& n : normals_of(exec, raw, options)) EXPECT_GT(n.z, 0.999f);
 }
 
-// Two by two metres of floor; some of the input's normals, those of the first rows, point down. Returns how many prepared ones do.
-int downward(std::size_t wrong_rows, const std::vector<Vec3>& viewpoints, std::uint32_t depth_maps = 10) {
+// Two by two metres of floor; some of the input's normals, those of the first rows, point down.
+// Returns how many prepared ones do.
+int downward(std::size_t wrong_rows, const std::vector<Vec3>& viewpoints,
+             std::uint32_t depth_maps = 10) {
   std::vector<Vec3> points, normals;
   for (std::size_t x = 0; x < 40; ++x)
     for (std::size_t y = 0; y < 40; ++y) {
@@ -77,7 +83,10 @@ int downward(std::size_t wrong_rows, const std::vector<Vec3>& viewpoints, std::u
     }
   RawCloud raw = test::raw_cloud(points);
   raw.normals = &normals[0].x;
-  if (!viewpoints.empty()) raw.viewpoints = &viewpoints[0].x, raw.viewpoint_count = viewpoints.size();
+  if (!viewpoints.empty()) {
+    raw.viewpoints = &viewpoints[0].x;
+    raw.viewpoint_count = viewpoints.size();
+  }
   Exec exec(2);
   PrepareOptions options;
   options.voxel_size = 0;
@@ -88,18 +97,22 @@ int downward(std::size_t wrong_rows, const std::vector<Vec3>& viewpoints, std::u
 }
 
 TEST(Normals, ThoseOfTheInputThatNoViewpointCanHaveSeenAreTurned) {
-  EXPECT_EQ(downward(5, {}), 200);                                   // nothing is known
-  EXPECT_EQ(downward(5, {{1, 1, 2}}), 0);                            // an eighth of the floor
-  EXPECT_EQ(downward(5, {{1, 1, 2}, {0, 0, -1}}), 200);              // somebody was in the cellar
-  EXPECT_EQ(downward(6, {{1, 1, 2}}), 240);                          // so many: the viewpoint is wrong
+  EXPECT_EQ(downward(5, {}), 200);                       // nothing is known
+  EXPECT_EQ(downward(5, {{1, 1, 2}}), 0);                // an eighth of the floor
+  EXPECT_EQ(downward(5, {{1, 1, 2}, {0, 0, -1}}), 200);  // somebody was in the cellar
+  // so many: the viewpoint is wrong
+  EXPECT_EQ(downward(6, {{1, 1, 2}}), 240);
   EXPECT_EQ(downward(40, {{1, 1, 2}}), 1600);
-  EXPECT_EQ(downward(5, {{1, 1, 2}}, 0), 200);                       // as the paper does: nobody asks the viewpoints
-  EXPECT_EQ(downward(5, {{-20, 1, 2}}), 200);                        // seen at six degrees: noise could have tilted them so far
+  // as the paper does: nobody asks the viewpoints
+  EXPECT_EQ(downward(5, {{1, 1, 2}}, 0), 200);
+  // seen at six degrees: noise could have tilted them so far
+  EXPECT_EQ(downward(5, {{-20, 1, 2}}), 200);
 }
 
 TEST(Normals, NoneOnALineOrForLonePoints) {
   std::vector<Vec3> line;
-  for (int k = 0; k < 100; ++k) line.push_back({0.01f * static_cast<float>(k), 0.02f * static_cast<float>(k), 0});
+  for (int k = 0; k < 100; ++k)
+    line.push_back({0.01f * static_cast<float>(k), 0.02f * static_cast<float>(k), 0});
   line.push_back({9, 9, 9});
   Exec exec(1);
   PrepareOptions options;

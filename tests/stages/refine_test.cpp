@@ -11,7 +11,8 @@ TEST(Refine, FindsTheWayBackAndNeverGetsWorse) {
   std::mt19937 random(1);
   Exec exec(2);
   PrepareOptions options;
-  const auto cloud = test::prepare_one(exec, test::raw_cloud(test::bumpy_sheet(random, 30000, 2.0f)), options);
+  const auto cloud =
+      test::prepare_one(exec, test::raw_cloud(test::bumpy_sheet(random, 30000, 2.0f)), options);
   const PairView pair = test::pair_view(*cloud, *cloud);
   ScoreOptions score;
   RefineOptions refine;
@@ -25,9 +26,13 @@ TEST(Refine, FindsTheWayBackAndNeverGetsWorse) {
     start[0].pose = compose_small(omega, shift, Pose<double>{1, 0, 0, 0, 0, 0, 0});
     start[0].support = measure_support(pair.source, pair.target, to_rigid(start[0].pose), score);
     const BestPose found = refine_poses(exec, {&pair, 1}, start, score, refine)[0];
-    EXPECT_LE(truncated_cost(found.support, pair.source.size), truncated_cost(start[0].support, pair.source.size));
-    // The cloud on itself: the truth is the identity, reached to the stopping limit (a thousandth of 7.5 cm) and some.
-    EXPECT_LT(std::sqrt(found.pose.tx * found.pose.tx + found.pose.ty * found.pose.ty + found.pose.tz * found.pose.tz), 1e-3);
+    EXPECT_LE(truncated_cost(found.support, pair.source.size),
+              truncated_cost(start[0].support, pair.source.size));
+    // The cloud on itself: the truth is the identity, reached to the stopping limit (a thousandth
+    // of 7.5 cm) and some.
+    EXPECT_LT(std::sqrt(found.pose.tx * found.pose.tx + found.pose.ty * found.pose.ty +
+                        found.pose.tz * found.pose.tz),
+              1e-3);
     EXPECT_GT(std::fabs(found.pose.w), 1 - 1e-6);
     for (const unsigned threads : {1u, 7u}) {
       Exec pool(threads);
@@ -42,7 +47,8 @@ TEST(Refine, FindsTheWayBackAndNeverGetsWorse) {
 TEST(Refine, OffOrWithoutAPoseChangesNothing) {
   std::mt19937 random(2);
   Exec exec(1);
-  const auto cloud = test::prepare_one(exec, test::raw_cloud(test::cube(random, 100, 1)), PrepareOptions{});
+  const auto cloud =
+      test::prepare_one(exec, test::raw_cloud(test::cube(random, 100, 1)), PrepareOptions{});
   const PairView pair = test::pair_view(*cloud, *cloud);
   RefineOptions off;
   off.max_iterations = 0;

@@ -14,7 +14,8 @@ std::vector<Matches> random_matches(std::mt19937& random, std::size_t n) {
   for (std::uint32_t k = 0; k < n; ++k) {
     const Vec3 p{normal(random), normal(random), normal(random)};
     const bool right = random() % 2 == 0;
-    const Vec3 q = right ? Vec3{p.y, p.z, p.x} : Vec3{normal(random), normal(random), normal(random)};
+    const Vec3 q =
+        right ? Vec3{p.y, p.z, p.x} : Vec3{normal(random), normal(random), normal(random)};
     // Several matches of one source point, as with neighbors > 1.
     out[0].pairs.push_back({p, q, k / 2, k});
   }
@@ -34,7 +35,8 @@ TEST(Sample, KeepsExactlyWhatThePolygonTestPasses) {
       for (std::uint32_t h = 0; h < count; ++h) {
         const Quadruple q = draw_quadruple(h, options.seed, static_cast<std::uint32_t>(n));
         const auto& m = matches[0].pairs;
-        if (passes_polygon_test(m[q.match[0]], m[q.match[1]], m[q.match[2]], m[q.match[3]], tau2)) expected.push_back(h);
+        if (passes_polygon_test(m[q.match[0]], m[q.match[1]], m[q.match[2]], m[q.match[3]], tau2))
+          expected.push_back(h);
       }
       for (const unsigned threads : {1u, 2u, 7u}) {
         Exec exec(threads);
@@ -49,7 +51,8 @@ TEST(Sample, FewerThanFourMatchesGiveNone) {
   Exec exec(2);
   HypothesisOptions options;
   options.count = 1000;
-  for (const std::size_t n : {std::size_t(0), std::size_t(1), std::size_t(3)}) EXPECT_TRUE(sample_quadruples(exec, random_matches(random, n), options)[0].empty());
+  for (const std::size_t n : {std::size_t(0), std::size_t(1), std::size_t(3)})
+    EXPECT_TRUE(sample_quadruples(exec, random_matches(random, n), options)[0].empty());
 }
 
 }  // namespace

@@ -11,15 +11,24 @@ namespace {
 
 Pose<float> random_pose(std::mt19937& random, float angle, float shift) {
   std::normal_distribution<float> normal;
-  Pose<float> p{1, angle * normal(random), angle * normal(random), angle * normal(random), shift * normal(random), shift * normal(random),
+  Pose<float> p{1,
+                angle * normal(random),
+                angle * normal(random),
+                angle * normal(random),
+                shift * normal(random),
+                shift * normal(random),
                 shift * normal(random)};
   const float n = std::sqrt(p.w * p.w + p.x * p.x + p.y * p.y + p.z * p.z);
-  p.w /= n, p.x /= n, p.y /= n, p.z /= n;
+  p.w /= n;
+  p.x /= n;
+  p.y /= n;
+  p.z /= n;
   return p;
 }
 
 /// Over all pairs of points, no grid.
-Support exhaustive_support(const CpuCloud& source, const CpuCloud& target, const Rigid& pose, const InlierTest& test) {
+Support exhaustive_support(const CpuCloud& source, const CpuCloud& target, const Rigid& pose,
+                           const InlierTest& test) {
   Support s{0, 0, 0};
   for (std::size_t i = 0; i < source.points.size(); ++i) {
     const Vec3 q = apply(pose, source.points[i]);
@@ -27,9 +36,14 @@ Support exhaustive_support(const CpuCloud& source, const CpuCloud& target, const
     float best2 = test.max_squared;
     for (std::uint32_t j = 0; j < target.points.size(); ++j) {
       const float d2 = squared_norm(target.points[j] - q);
-      if (d2 < best2 || (best == kNoValue && d2 == best2)) best = j, best2 = d2;
+      if (d2 < best2 || (best == kNoValue && d2 == best2)) {
+        best = j;
+        best2 = d2;
+      }
     }
-    if (best == kNoValue || !normals_agree(rotate(pose, source.normals[i]), target.normals[best], test.min_cosine)) continue;
+    if (best == kNoValue ||
+        !normals_agree(rotate(pose, source.normals[i]), target.normals[best], test.min_cosine))
+      continue;
     ++s.inliers;
     s.residual += fixed_residual(best2, test.inverse_max_squared);
   }
@@ -61,7 +75,8 @@ TEST_F(Score, SupportIsTheExhaustiveOne) {
       score.max_correspondence_distance = distance;
       const InlierTest test = inlier_test(distance, angle);
       for (int k = 0; k < 40; ++k) {
-        const Rigid pose = to_rigid(random_pose(random, k % 2 ? 0.02f : 1.0f, k % 2 ? 0.02f : 0.3f));
+        const Rigid pose =
+            to_rigid(random_pose(random, k % 2 ? 0.02f : 1.0f, k % 2 ? 0.02f : 0.3f));
         const Support expected = exhaustive_support(*a, *b, pose, test);
         const Support found = measure_support(a->view(), b->view(), pose, score);
         EXPECT_EQ(found.inliers, expected.inliers);
@@ -87,8 +102,11 @@ TEST_F(Score, BoundsNeverLie) {
           EXPECT_FALSE(possible);
           continue;
         }
-        const Closest c = find_closest(b->view().closest, b->points.data(), apply(pose, a->points[i]), test.max_squared);
-        const bool inlier = c.index != kNoValue && normals_agree(rotate(pose, a->normals[i]), b->normals[c.index], test.min_cosine);
+        const Closest c = find_closest(b->view().closest, b->points.data(),
+                                       apply(pose, a->points[i]), test.max_squared);
+        const bool inlier =
+            c.index != kNoValue &&
+            normals_agree(rotate(pose, a->normals[i]), b->normals[c.index], test.min_cosine);
         if (inlier) EXPECT_TRUE(possible);
         if (certain) EXPECT_TRUE(inlier);
         decided += possible == certain;
@@ -109,12 +127,14 @@ TEST_F(Score, BestIsTheBestOfAllByTheTotalOrder) {
       for (std::uint32_t k = 0; k < 700; ++k) {
         hypotheses[0].id.push_back(3 * k);
         // Every pose twice: equal support, so that the lower number must win.
-        hypotheses[0].pose.push_back(k % 2 ? hypotheses[0].pose.back() : random_pose(random, k % 3 ? 0.03f : 1.0f, 0.03f));
+        hypotheses[0].pose.push_back(k % 2 ? hypotheses[0].pose.back()
+                                           : random_pose(random, k % 3 ? 0.03f : 1.0f, 0.03f));
       }
       const PairView pair = test::pair_view(*a, *b);
       Support best{0, 0, 0};
       for (std::size_t k = 0; k < 700; ++k) {
-        Support s = measure_support(pair.source, pair.target, to_rigid(hypotheses[0].pose[k]), score);
+        Support s =
+            measure_support(pair.source, pair.target, to_rigid(hypotheses[0].pose[k]), score);
         s.hypothesis = hypotheses[0].id[k];
         if (k == 0 || better(s, best)) best = s;
       }
@@ -131,7 +151,8 @@ TEST_F(Score, BestIsTheBestOfAllByTheTotalOrder) {
 
 TEST_F(Score, NoHypothesesNoPose) {
   const PairView pair = test::pair_view(*a, *b);
-  EXPECT_FALSE(score_hypotheses(exec, {&pair, 1}, std::vector<Hypotheses>(1), ScoreOptions{})[0].found);
+  EXPECT_FALSE(
+      score_hypotheses(exec, {&pair, 1}, std::vector<Hypotheses>(1), ScoreOptions{})[0].found);
 }
 
 }  // namespace

@@ -16,13 +16,19 @@ using test::seen_from;
 std::vector<Vec3> panel(Vec3 middle, Vec3 along, Vec3 up) {
   std::vector<Vec3> points;
   for (int y = -25; y <= 25; ++y)
-    for (int x = -25; x <= 25; ++x) points.push_back(middle + along * (0.02f * static_cast<float>(x)) + up * (0.02f * static_cast<float>(y)));
+    for (int x = -25; x <= 25; ++x)
+      points.push_back(middle + along * (0.02f * static_cast<float>(x)) +
+                       up * (0.02f * static_cast<float>(y)));
   return points;
 }
 
-SideEvidence weigh(Exec& exec, const CpuCloud& source, const CpuCloud& target) { return test::weighed_in_place(exec, source, target).modes[0].source; }
+SideEvidence weigh(Exec& exec, const CpuCloud& source, const CpuCloud& target) {
+  return test::weighed_in_place(exec, source, target).modes[0].source;
+}
 
-double share(std::uint64_t facing, std::uint32_t points) { return static_cast<double>(facing) / static_cast<double>(kFacingScale) / points; }
+double share(std::uint64_t facing, std::uint32_t points) {
+  return static_cast<double>(facing) / static_cast<double>(kFacingScale) / points;
+}
 
 TEST(Sights, FacingIsTheSquaredCosine) {
   EXPECT_FLOAT_EQ(facing({0, 0, 1}, {0, 0, -7}), 1.0f);
@@ -42,16 +48,19 @@ TEST(Sights, WhatIsSeenEdgeOnHardlyCounts) {
       wall.insert(wall.end(), part.begin(), part.end());
     }
   const auto target = seen_from(exec, wall, {0, 0, 0});
-  const SideEvidence square = weigh(exec, *seen_from(exec, panel({0, 0, 2}, {1, 0, 0}, {0, 1, 0}), {0, 0, 0}), *target);
+  const SideEvidence square =
+      weigh(exec, *seen_from(exec, panel({0, 0, 2}, {1, 0, 0}, {0, 1, 0}), {0, 0, 0}), *target);
   EXPECT_EQ(square.before, square.tested);
   EXPECT_GT(share(square.facing_before, square.tested), 0.9);
   EXPECT_EQ(square.facing_seen, square.facing_before);
   // The same turned about: in the line of sight.
-  const SideEvidence edge = weigh(exec, *seen_from(exec, panel({0, 0, 2}, {0, 0, 1}, {0, 1, 0}), {3, 0, 2}), *target);
+  const SideEvidence edge =
+      weigh(exec, *seen_from(exec, panel({0, 0, 2}, {0, 0, 1}, {0, 1, 0}), {3, 0, 2}), *target);
   EXPECT_GT(edge.before, edge.tested / 2);
   EXPECT_LT(share(edge.facing_before, edge.tested), 0.05);
   // Where it touches a surface it is not before one.
-  const SideEvidence on = weigh(exec, *seen_from(exec, panel({0, 0, 3}, {1, 0, 0}, {0, 1, 0}), {0, 0, 0}), *target);
+  const SideEvidence on =
+      weigh(exec, *seen_from(exec, panel({0, 0, 3}, {1, 0, 0}, {0, 1, 0}), {0, 0, 0}), *target);
   EXPECT_EQ(on.before, 0u);
   EXPECT_EQ(on.facing_before, 0u);
   EXPECT_GT(share(on.facing_seen, on.tested), 0.9);
@@ -61,20 +70,27 @@ TEST(Sights, EvidenceInGroupsIsThatOfEachPoint) {
   std::mt19937 random(7);
   Exec exec(2);
   for (int trial = 0; trial < 3; ++trial) {
-    const auto points_a = test::bumpy_sheet(random, 9000, 1.7f), points_b = test::bumpy_sheet(random, 7001, 2.0f);
-    const auto a = seen_from(exec, points_a, {0.5f, 0.3f, 2.0f}), b = seen_from(exec, points_b, {1.5f, -0.2f, 1.0f});
+    const auto points_a = test::bumpy_sheet(random, 9000, 1.7f),
+               points_b = test::bumpy_sheet(random, 7001, 2.0f);
+    const auto a = seen_from(exec, points_a, {0.5f, 0.3f, 2.0f}),
+               b = seen_from(exec, points_b, {1.5f, -0.2f, 1.0f});
     const ModeOutcome outcome = test::weighed_in_place(exec, *a, *b).modes[0];
     const RegistrationOptions options;
-    const EvidenceTest test{inlier_test(options.score.max_correspondence_distance, options.evidence.max_normal_angle), options.evidence.free_space_margin,
-                            options.evidence.min_range};
+    const EvidenceTest test{
+        inlier_test(options.score.max_correspondence_distance, options.evidence.max_normal_angle),
+        options.evidence.free_space_margin, options.evidence.min_range};
     const Rigid there = to_rigid(outcome.pose);
     const CloudView s = a->view(), t = b->view();
     SideEvidence forth{}, reverse{};
-    for (std::uint32_t i = 0; i < s.size; ++i) weigh_point(s, t, there, test, t.visibility.count, i, forth);
-    for (std::uint32_t i = 0; i < t.size; ++i) weigh_point(t, s, inverse(there), test, s.visibility.count, i, reverse);
-    for (const auto& [expected, found] : {std::pair(forth, outcome.source), std::pair(reverse, outcome.target)}) {
+    for (std::uint32_t i = 0; i < s.size; ++i)
+      weigh_point(s, t, there, test, t.visibility.count, i, forth);
+    for (std::uint32_t i = 0; i < t.size; ++i)
+      weigh_point(t, s, inverse(there), test, s.visibility.count, i, reverse);
+    for (const auto& [expected, found] :
+         {std::pair(forth, outcome.source), std::pair(reverse, outcome.target)}) {
       test::Bytes each, groups;
-      add(each, expected), add(groups, found);
+      add(each, expected);
+      add(groups, found);
       EXPECT_EQ(each.all, groups.all);
       EXPECT_GT(found.facing_before, 0u);
       EXPECT_GT(found.near_front, 0u);

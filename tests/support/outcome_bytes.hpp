@@ -18,16 +18,25 @@ class Bytes {
   std::vector<char> all;
 
  private:
-  void append(const void* data, std::size_t size) { all.insert(all.end(), static_cast<const char*>(data), static_cast<const char*>(data) + size); }
+  void append(const void* data, std::size_t size) {
+    all.insert(all.end(), static_cast<const char*>(data), static_cast<const char*>(data) + size);
+  }
 };
 
-inline void add(Bytes& out, const SideEvidence& e) { out.add(e.balanced, e.residual, e.tested, e.inliers, e.hits, e.seen, e.before, e.hidden, e.facing_seen, e.facing_before, e.around, e.near_front, e.far_front, e.at_back); }
-inline void add(Bytes& out, const MatchEvidence& e) { out.add(e.source_weight, e.target_weight, e.inliers); }
+inline void add(Bytes& out, const SideEvidence& e) {
+  out.add(e.balanced, e.residual, e.tested, e.inliers, e.hits, e.seen, e.before, e.hidden,
+          e.facing_seen, e.facing_before, e.around, e.near_front, e.far_front, e.at_back);
+}
+inline void add(Bytes& out, const MatchEvidence& e) {
+  out.add(e.source_weight, e.target_weight, e.inliers);
+}
 
 inline std::vector<char> bytes(const ModeOutcome& m) {
   Bytes out;
   out.add(m.pose, m.hypothesis, m.iterations, m.information, m.source_moments, m.target_moments);
-  add(out, m.matches), add(out, m.source), add(out, m.target);
+  add(out, m.matches);
+  add(out, m.source);
+  add(out, m.target);
   return out.all;
 }
 
@@ -35,7 +44,8 @@ inline std::vector<char> bytes(const ModeOutcome& m) {
 inline std::vector<char> bytes(const PairOutcome& o) {
   Bytes out;
   const RegistrationStatistics& s = o.statistics;
-  out.add(o.match_weight_source, o.match_weight_target, s.source_points, s.target_points, s.correspondences, s.hypotheses, s.survivors, s.scored);
+  out.add(o.match_weight_source, o.match_weight_target, s.source_points, s.target_points,
+          s.correspondences, s.hypotheses, s.survivors, s.scored);
   out.add(o.modes.size());
   for (const ModeOutcome& mode : o.modes) {
     const std::vector<char> one = bytes(mode);

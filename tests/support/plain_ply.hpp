@@ -9,8 +9,8 @@
 
 namespace gpureg::test {
 
-/// Reads binary little-endian PLY whose vertices are float32 only, x y z first, normals next where there are six: enough for tests of the core, which has to build
-/// without the io component.
+/// Reads binary little-endian PLY whose vertices are float32 only, x y z first, normals next where
+/// there are six: enough for tests of the core, which has to build without the io component.
 inline PointCloud read_plain_ply(const std::string& path) {
   std::ifstream file(path, std::ios::binary);
   std::string line;
@@ -21,7 +21,8 @@ inline PointCloud read_plain_ply(const std::string& path) {
   }
   if (!file || properties < 3) throw std::runtime_error(path + " is not a plain float32 PLY");
   std::vector<float> values(count * properties);
-  if (!file.read(reinterpret_cast<char*>(values.data()), static_cast<std::streamsize>(values.size() * sizeof(float))))
+  if (!file.read(reinterpret_cast<char*>(values.data()),
+                 static_cast<std::streamsize>(values.size() * sizeof(float))))
     throw std::runtime_error(path + " is truncated");
   PointCloud cloud;
   for (std::size_t k = 0; k < count; ++k) {

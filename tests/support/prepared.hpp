@@ -12,10 +12,20 @@
 namespace gpureg::test {
 
 inline RawCloud raw_cloud(const std::vector<Vec3>& points) {
-  return {points.empty() ? nullptr : &points[0].x, points.size(), 3, nullptr, 3, nullptr, 0, 0, nullptr, 0};
+  return {points.empty() ? nullptr : &points[0].x,
+          points.size(),
+          3,
+          nullptr,
+          3,
+          nullptr,
+          0,
+          0,
+          nullptr,
+          0};
 }
 
-inline std::shared_ptr<cpu::CpuCloud> prepare_one(cpu::Exec& exec, const RawCloud& raw, const PrepareOptions& options) {
+inline std::shared_ptr<cpu::CpuCloud> prepare_one(cpu::Exec& exec, const RawCloud& raw,
+                                                  const PrepareOptions& options) {
   return pipeline::prepare(exec, Span<const RawCloud>{&raw, 1}, options).front();
 }
 
@@ -24,20 +34,29 @@ inline PairView pair_view(const cpu::CpuCloud& source, const cpu::CpuCloud& targ
 }
 
 /// A cloud that was seen from one place.
-inline std::shared_ptr<cpu::CpuCloud> seen_from(cpu::Exec& exec, const std::vector<Vec3>& points, Vec3 eye, const PrepareOptions& options = {}) {
+inline std::shared_ptr<cpu::CpuCloud> seen_from(cpu::Exec& exec, const std::vector<Vec3>& points,
+                                                Vec3 eye, const PrepareOptions& options = {}) {
   RawCloud raw = raw_cloud(points);
-  raw.viewpoints = &eye.x, raw.viewpoint_count = 1;
+  raw.viewpoints = &eye.x;
+  raw.viewpoint_count = 1;
   return prepare_one(exec, raw, options);
 }
 
 /// A pair with one mode, the identity between the clouds' own frames, and the evidence of that.
-inline PairOutcome weighed_in_place(cpu::Exec& exec, const cpu::CpuCloud& source, const cpu::CpuCloud& target) {
+inline PairOutcome weighed_in_place(cpu::Exec& exec, const cpu::CpuCloud& source,
+                                    const cpu::CpuCloud& target) {
   const PairView pair = pair_view(source, target);
   std::vector<cpu::Mode> modes(1);
-  modes[0].pose = {1, 0, 0, 0, static_cast<double>(source.origin[0] - target.origin[0]), static_cast<double>(source.origin[1] - target.origin[1]),
+  modes[0].pose = {1,
+                   0,
+                   0,
+                   0,
+                   static_cast<double>(source.origin[0] - target.origin[0]),
+                   static_cast<double>(source.origin[1] - target.origin[1]),
                    static_cast<double>(source.origin[2] - target.origin[2])};
   PairOutcome outcome;
-  cpu::weigh_modes(exec, {&pair, 1}, std::vector<cpu::MatchSet>(1), std::vector<cpu::Candidates>(1), {modes}, RegistrationOptions{}, {&outcome, 1});
+  cpu::weigh_modes(exec, {&pair, 1}, std::vector<cpu::MatchSet>(1), std::vector<cpu::Candidates>(1),
+                   {modes}, RegistrationOptions{}, {&outcome, 1});
   return outcome;
 }
 

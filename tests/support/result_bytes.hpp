@@ -10,24 +10,36 @@ namespace gpureg::test {
 /// Everything but the timings, as bytes.
 inline std::vector<char> bytes(const RegistrationResult& r) {
   std::vector<char> out;
-  const auto add = [&](const void* data, std::size_t size) { out.insert(out.end(), static_cast<const char*>(data), static_cast<const char*>(data) + size); };
+  const auto add = [&](const void* data, std::size_t size) {
+    out.insert(out.end(), static_cast<const char*>(data), static_cast<const char*>(data) + size);
+  };
   add(r.target_from_source.matrix().data(), 16 * sizeof(double));
-  add(&r.status, sizeof r.status), add(&r.reason, sizeof r.reason);
-  add(&r.score, sizeof r.score), add(&r.inlier_rmse, sizeof r.inlier_rmse);
+  add(&r.status, sizeof r.status);
+  add(&r.reason, sizeof r.reason);
+  add(&r.score, sizeof r.score);
+  add(&r.inlier_rmse, sizeof r.inlier_rmse);
   const RegistrationStatistics& s = r.statistics;
-  for (const std::uint64_t v : {std::uint64_t(s.source_points), std::uint64_t(s.target_points), std::uint64_t(s.correspondences), s.hypotheses, s.survivors,
-                                s.scored, std::uint64_t(s.points_scored), std::uint64_t(s.consensus), std::uint64_t(s.inliers), std::uint64_t(s.refine_iterations)})
+  for (const std::uint64_t v :
+       {std::uint64_t(s.source_points), std::uint64_t(s.target_points),
+        std::uint64_t(s.correspondences), s.hypotheses, s.survivors, s.scored,
+        std::uint64_t(s.points_scored), std::uint64_t(s.consensus), std::uint64_t(s.inliers),
+        std::uint64_t(s.refine_iterations)})
     add(&v, sizeof v);
-  const auto redwood = r.source_moments.information_redwood(), open3d = r.target_moments.information_open3d();
-  add(redwood.data(), 36 * sizeof(double)), add(open3d.data(), 36 * sizeof(double));
+  const auto redwood = r.source_moments.information_redwood(),
+             open3d = r.target_moments.information_open3d();
+  add(redwood.data(), 36 * sizeof(double));
+  add(open3d.data(), 36 * sizeof(double));
   for (const RegistrationMode& mode : r.modes) {
     add(mode.target_from_source.matrix().data(), 16 * sizeof(double));
     add(&mode.confidence, sizeof mode.confidence);
     const PoseEvidence& e = mode.evidence;
     add(&e.match_inliers, sizeof e.match_inliers);
-    for (const double v : {e.match_support, e.source_overlap, e.target_overlap, e.source_balanced_overlap, e.target_balanced_overlap, e.source_seen, e.target_seen,
-                           e.source_impossible, e.target_impossible, e.source_hidden, e.target_hidden, e.source_around, e.target_around, e.source_near_front, e.target_near_front,
-                           e.source_far_front, e.target_far_front, e.source_at_back, e.target_at_back})
+    for (const double v :
+         {e.match_support, e.source_overlap, e.target_overlap, e.source_balanced_overlap,
+          e.target_balanced_overlap, e.source_seen, e.target_seen, e.source_impossible,
+          e.target_impossible, e.source_hidden, e.target_hidden, e.source_around, e.target_around,
+          e.source_near_front, e.target_near_front, e.source_far_front, e.target_far_front,
+          e.source_at_back, e.target_at_back})
       add(&v, sizeof v);
     add(e.stiffness.data(), e.stiffness.size() * sizeof(double));
   }

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """gpureg itself, through its Python package, on the CPU."""
+
 import os
 
 from methods import VOXEL
@@ -25,8 +26,15 @@ class Default:
         return self.gpureg.__version__
 
     def prepare(self, cloud):
-        # It begins where its users do, with raw points: its own downsampling made the clouds that all others get.
-        return self.gpureg.prepare(cloud.raw, cloud.raw_normals, viewpoints=cloud.viewpoints, options=self.options.prepare, context=self.context)
+        # It begins where its users do, with raw points: its own downsampling made the clouds that
+        # all others get.
+        return self.gpureg.prepare(
+            cloud.raw,
+            cloud.raw_normals,
+            viewpoints=cloud.viewpoints,
+            options=self.options.prepare,
+            context=self.context,
+        )
 
     def align(self, source, target, initial, seed):
         self.options.hypothesis.seed = seed

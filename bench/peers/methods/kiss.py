@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""KISS-Matcher. Its interface keeps nothing of a cloud, so that a pair includes the features of both."""
+"""KISS-Matcher. Its interface keeps nothing of a cloud, so that a pair includes the features of
+both.
+"""
+
 import importlib.metadata
 
 import numpy as np
@@ -26,7 +29,9 @@ class Fine:
         return np.asfortranarray(cloud.points.T)
 
     def align(self, source, target, initial, seed):
-        matcher = self.module.KISSMatcher(self.module.KISSMatcherConfig(self.voxel, use_voxel_sampling=self.sample))
+        matcher = self.module.KISSMatcher(
+            self.module.KISSMatcherConfig(self.voxel, use_voxel_sampling=self.sample)
+        )
         solution = matcher.prune_and_solve(*matcher.match(source, target))
         if not solution.valid:
             return {"pose": None, "score": 0.0}

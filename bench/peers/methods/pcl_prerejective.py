@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""PCL's SampleConsensusPrerejective (Buch et al. 2013), which CZK and the paper modified; the program gpureg_pcl_peer does the work."""
+"""PCL's SampleConsensusPrerejective (Buch et al. 2013), which CZK and the paper modified; the
+program gpureg_pcl_peer does the work.
+"""
+
 import os
 import pathlib
 import struct
@@ -19,10 +22,16 @@ class Prerejective:
     refines = False
 
     def __init__(self):
-        program = pathlib.Path(os.environ.get("GPUREG_PCL_PEER", ROOT / "build/cpu/bin/gpureg_pcl_peer"))
+        program = pathlib.Path(
+            os.environ.get("GPUREG_PCL_PEER", ROOT / "build/cpu/bin/gpureg_pcl_peer")
+        )
         if not program.exists():
-            raise FileNotFoundError(f"there is no program {program}: build the target gpureg_pcl_peer (needs PCL), or set GPUREG_PCL_PEER")
-        self.child = subprocess.Popen([program, str(VOXEL)], stdin=subprocess.PIPE, stdout=subprocess.PIPE)
+            raise FileNotFoundError(
+                f"there is no program {program}: build the target gpureg_pcl_peer (needs PCL), or set GPUREG_PCL_PEER"
+            )
+        self.child = subprocess.Popen(
+            [program, str(VOXEL)], stdin=subprocess.PIPE, stdout=subprocess.PIPE
+        )
         self.known = 0
         self.own_version = self.child.stdout.readline().decode().strip()
 
@@ -30,7 +39,9 @@ class Prerejective:
         return self.own_version
 
     def ask(self, command, *arrays):
-        self.child.stdin.write(command + b"".join(np.ascontiguousarray(a, np.float32).tobytes() for a in arrays))
+        self.child.stdin.write(
+            command + b"".join(np.ascontiguousarray(a, np.float32).tobytes() for a in arrays)
+        )
         self.child.stdin.flush()
         answer = self.child.stdout.readline().split()
         if not answer:

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """What polishes a pose: starts from loopsmart's, which is not refined, and keeps its score."""
+
 import importlib.metadata
 import os
 
@@ -29,8 +30,14 @@ class Open3dIcp:
 
     def align(self, source, target, initial, seed):
         registration = self.o3d.pipelines.registration
-        result = registration.registration_icp(source, target, 1.5 * VOXEL, initial, registration.TransformationEstimationPointToPlane(),
-                                               registration.ICPConvergenceCriteria(max_iteration=30))
+        result = registration.registration_icp(
+            source,
+            target,
+            1.5 * VOXEL,
+            initial,
+            registration.TransformationEstimationPointToPlane(),
+            registration.ICPConvergenceCriteria(max_iteration=30),
+        )
         return {"pose": np.asarray(result.transformation)}
 
 
@@ -56,6 +63,14 @@ class SmallGicp:
         return own, tree
 
     def align(self, source, target, initial, seed):
-        result = self.module.align(target[0], source[0], target[1], initial, registration_type="GICP",
-                                   max_correspondence_distance=1.5 * VOXEL, num_threads=self.threads, max_iterations=20)
+        result = self.module.align(
+            target[0],
+            source[0],
+            target[1],
+            initial,
+            registration_type="GICP",
+            max_correspondence_distance=1.5 * VOXEL,
+            num_threads=self.threads,
+            max_iterations=20,
+        )
         return {"pose": np.asarray(result.T_target_source)}

@@ -1,11 +1,14 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The scheme of SC2-PCR (Chen et al., CVPR 2022) with its numbers for 3DMatch with FPFH, written on numpy from the paper.
+"""The scheme of SC2-PCR (Chen et al., CVPR 2022) with its numbers for 3DMatch with FPFH, written on
+numpy from the paper.
 
-Matches are nearest neighbours in feature space from source to target. Two are compatible when their distances differ by less than 0.1 m.
-Seeds: a fifth of the matches, those best supported by the leading eigenvector of the compatibility, non-maxima suppressed. The
-second-order measure of a seed and a match counts what is compatible with both. Its best 30, then of these the best 20 by the measure among
-themselves, weighted by the leading eigenvector, give a pose; the pose that most matches agree with (0.1 m) wins and is fitted again.
-"""
+Matches are nearest neighbours in feature space from source to target. Two are compatible when their
+distances differ by less than 0.1 m. Seeds: a fifth of the matches, those best supported by the
+leading eigenvector of the compatibility, non-maxima suppressed. The second-order measure of a seed
+and a match counts what is compatible with both. Its best 30, then of these the best 20 by the
+measure among themselves, weighted by the leading eigenvector, give a pose; the pose that most
+matches agree with (0.1 m) wins and is fitted again."""
+
 import numpy as np
 
 from methods import VOXEL
@@ -47,7 +50,13 @@ class SecondOrder:
     parameters = f"FPFH, one match a point, {2 * VOXEL:g} m, seeds 20 %, 30 and 20 members; own runner on numpy"
     threshold = 0.05  # share of the matches that agree
     refines = False
-    within, suppression, share, first, second = np.float32(2 * VOXEL), np.float32(2 * VOXEL), 0.2, 30, 20
+    within, suppression, share, first, second = (
+        np.float32(2 * VOXEL),
+        np.float32(2 * VOXEL),
+        0.2,
+        30,
+        20,
+    )
 
     def __init__(self):
         import gpureg
@@ -58,8 +67,17 @@ class SecondOrder:
         return "on numpy " + np.__version__
 
     def prepare(self, cloud):
-        options = self.gpureg.PrepareOptions(voxel_size=0.0, normal_radius=2 * VOXEL, feature_radius=5 * VOXEL, search_distance=1.5 * VOXEL, wide_feature_radius=0.0, depth_maps=0)
-        prepared = self.gpureg.prepare(cloud.points, cloud.normals, options=options, context=self.gpureg.Context.cpu())
+        options = self.gpureg.PrepareOptions(
+            voxel_size=0.0,
+            normal_radius=2 * VOXEL,
+            feature_radius=5 * VOXEL,
+            search_distance=1.5 * VOXEL,
+            wide_feature_radius=0.0,
+            depth_maps=0,
+        )
+        prepared = self.gpureg.prepare(
+            cloud.points, cloud.normals, options=options, context=self.gpureg.Context.cpu()
+        )
         features = np.ascontiguousarray(prepared.features, np.float32)
         points = np.asarray(prepared.points, np.float32)
         norms = np.linalg.norm(features, axis=1, keepdims=True)
@@ -79,18 +97,22 @@ class SecondOrder:
         # A seed has no better match around it.
         local = np.where(apart < self.suppression, confidence[None], 0).max(1)
         order = np.argsort(-(confidence + (confidence >= local)), kind="stable")
-        seeds = order[:max(1, int(self.share * n))]
+        seeds = order[: max(1, int(self.share * n))]
         measure = (compatible[seeds] @ compatible) * compatible[seeds]
         members = best(measure, self.first)
         inside = compatible[members[:, :, None], members[:, None, :]]
         inside = np.matmul(inside, inside) * inside
-        members = np.take_along_axis(members, best(inside[:, 0] + inside.sum(1) * 1e-3, self.second), 1)
+        members = np.take_along_axis(
+            members, best(inside[:, 0] + inside.sum(1) * 1e-3, self.second), 1
+        )
         inside = soft[members[:, :, None], members[:, None, :]]
         rotation, translation = fit(p[members], q[members], leading(inside))
         counts = np.empty(len(seeds))
         for k in range(0, len(seeds), 64):
-            moved = np.einsum("sij,nj->sni", rotation[k:k + 64], p) + translation[k:k + 64, None]
-            counts[k:k + 64] = (((moved - q) ** 2).sum(-1) < self.within**2).sum(1)
+            moved = (
+                np.einsum("sij,nj->sni", rotation[k : k + 64], p) + translation[k : k + 64, None]
+            )
+            counts[k : k + 64] = (((moved - q) ** 2).sum(-1) < self.within**2).sum(1)
         winner = int(np.argmax(counts))
         r, t = rotation[winner], translation[winner]
         for _ in range(20):
@@ -102,4 +124,7 @@ class SecondOrder:
             r, t = (x[0] for x in fit(p[None, inlier], q[None, inlier], weight[None]))
         pose = np.eye(4)
         pose[:3, :3], pose[:3, 3] = r, t
-        return {"pose": pose, "score": float((np.linalg.norm(p @ r.T + t - q, axis=1) < self.within).mean())}
+        return {
+            "pose": pose,
+            "score": float((np.linalg.norm(p @ r.T + t - q, axis=1) < self.within).mean()),
+        }

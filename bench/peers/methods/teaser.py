@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""TEASER++, where a user has built its Python module; there is no wheel. Matches: mutual nearest neighbours of FPFH."""
+"""TEASER++, where a user has built its Python module; there is no wheel. Matches: mutual nearest
+neighbours of FPFH.
+"""
+
 import numpy as np
 
 from methods import VOXEL
@@ -30,12 +33,16 @@ class Teaser(SecondOrder):
         parameters.cbar2 = 1
         parameters.noise_bound = VOXEL
         parameters.estimate_scaling = False
-        parameters.rotation_estimation_algorithm = self.module.RobustRegistrationSolver.ROTATION_ESTIMATION_ALGORITHM.GNC_TLS
+        parameters.rotation_estimation_algorithm = (
+            self.module.RobustRegistrationSolver.ROTATION_ESTIMATION_ALGORITHM.GNC_TLS
+        )
         parameters.rotation_gnc_factor = 1.4
         parameters.rotation_max_iterations = 100
         parameters.rotation_cost_threshold = 1e-12
         solver = self.module.RobustRegistrationSolver(parameters)
-        solver.solve(source[0][mutual].T.astype(np.float64), target[0][forward[mutual]].T.astype(np.float64))
+        solver.solve(
+            source[0][mutual].T.astype(np.float64), target[0][forward[mutual]].T.astype(np.float64)
+        )
         solution = solver.getSolution()
         pose = np.eye(4)
         pose[:3, :3], pose[:3, 3] = solution.rotation, np.asarray(solution.translation).reshape(3)

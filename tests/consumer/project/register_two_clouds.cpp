@@ -11,7 +11,8 @@ int main(int argc, char** argv) try {
   const auto result = gpureg::align(gpureg::Context::best(), source.view(), target.view(), options);
   std::cout << explain(result.reason) << "\n";
   if (!result.aligned()) return 1;
-  std::cout << result.target_from_source.matrix() << "\n";  // p_target = target_from_source * p_source
+  std::cout << result.target_from_source.matrix()
+            << "\n";                    // p_target = target_from_source * p_source
 } catch (const gpureg::Error& error) {  // a file that cannot be read, an option that cannot be
   std::cerr << error.what() << "\n";
   return 2;
