@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "algorithm/balance.hpp"
+#include "algorithm/normal_weight.hpp"
 #include "feature_aids.hpp"
 #include "scoring_data.hpp"
 #include "stages.hpp"
@@ -34,41 +34,41 @@ struct Counts {
   std::uint32_t features;               // missing
   std::uint32_t extreme, extreme_wide;  // features that are too long for the tensor cores
   // points by the direction of their normals; the last bin: without
-  std::uint32_t balance_bin[kBalanceBins];
+  std::uint32_t normal_bin[kNormalBins];
 };
 
 __global__ void count(const std::uint32_t* offset, const Vec3* normals, const std::uint8_t* valid,
-                      std::uint32_t* const* balance, Counts* counts) {
-  __shared__ std::uint32_t bins[kBalanceBins];
+                      std::uint32_t* const* normal_weight, Counts* counts) {
+  __shared__ std::uint32_t bins[kNormalBins];
   const std::uint32_t c = blockIdx.y, begin = offset[c], end = offset[c + 1];
-  if (threadIdx.x < kBalanceBins) bins[threadIdx.x] = 0;
+  if (threadIdx.x < kNormalBins) bins[threadIdx.x] = 0;
   __syncthreads();
   std::uint32_t no_feature = 0;
   for (std::uint32_t i = begin + blockIdx.x * blockDim.x + threadIdx.x; i < end;
        i += gridDim.x * blockDim.x) {
-    const std::uint32_t bin = balance_bin(normals[i]);
-    balance[c][i - begin] = bin;
+    const std::uint32_t bin = normal_bin(normals[i]);
+    normal_weight[c][i - begin] = bin;
     atomicAdd(bins + bin, 1u);
     no_feature += !valid[i];
   }
   no_feature = warp_sum(no_feature);
   if (threadIdx.x % 32 == 0 && no_feature > 0) atomicAdd(&counts[c].features, no_feature);
   __syncthreads();
-  if (threadIdx.x < kBalanceBins && bins[threadIdx.x] > 0)
-    atomicAdd(counts[c].balance_bin + threadIdx.x, bins[threadIdx.x]);
+  if (threadIdx.x < kNormalBins && bins[threadIdx.x] > 0)
+    atomicAdd(counts[c].normal_bin + threadIdx.x, bins[threadIdx.x]);
 }
 
 /// From bins to weights.
-__global__ void balance_points(const std::uint32_t* offset, const Counts* counts,
-                               std::uint32_t* const* balance) {
-  __shared__ std::uint32_t weight[kBalanceBins];
+__global__ void weight_by_normals(const std::uint32_t* offset, const Counts* counts,
+                                  std::uint32_t* const* normal_weight) {
+  __shared__ std::uint32_t weight[kNormalBins];
   const std::uint32_t c = blockIdx.y, size = offset[c + 1] - offset[c];
-  if (threadIdx.x < kBalanceBins)
-    weight[threadIdx.x] = balance_weight(counts[c].balance_bin[threadIdx.x]);
+  if (threadIdx.x < kNormalBins)
+    weight[threadIdx.x] = normal_weight_in_bin(counts[c].normal_bin[threadIdx.x]);
   __syncthreads();
   for (std::uint32_t i = blockIdx.x * blockDim.x + threadIdx.x; i < size;
        i += gridDim.x * blockDim.x)
-    balance[c][i] = weight[balance[c][i]];
+    normal_weight[c][i] = weight[normal_weight[c][i]];
 }
 
 template <typename T>
@@ -104,14 +104,14 @@ std::vector<float> CudaCloud::copy_features() const {
 std::vector<std::shared_ptr<CudaCloud>> assemble(
     Exec& exec, const DownsampledClouds& clouds, const DeviceBuffer<Vec3>& normals,
     const Features& features, const Features& wide_features, const ClosestGrids& closest,
-    const DepthMaps& depth_maps, const Fronts& fronts, const PrepareOptions& options) {
+    const DepthMaps& depth_maps, const SurfaceSides& surface_sides, const PrepareOptions& options) {
   const Segments& segments = clouds.segments;
   const std::size_t clouds_count = segments.entries();
   const auto counts = exec.filled<Counts>(clouds_count, 0);
   std::vector<std::shared_ptr<CudaCloud>> out;
   std::vector<Part> parts;
   std::vector<FeaturesToMeasure> features_to_measure;
-  std::vector<std::uint32_t*> balance;
+  std::vector<std::uint32_t*> normal_weight;
   for (std::size_t c = 0; c < clouds_count; ++c) {
     auto cloud = std::make_shared<CudaCloud>();
     const CloudFacts& facts = clouds.facts[c];
@@ -155,8 +155,8 @@ std::vector<std::shared_ptr<CudaCloud>> assemble(
     place(depth_maps.depth.data() + std::size_t(map_begin) * kMapCells,
           std::size_t(maps) * kMapCells);
     place(depth_maps.viewpoints.data() + map_begin, maps);
-    const FrontBox& box = fronts.boxes[c];
-    place(fronts.words.data() + fronts.offset[c], box.words());
+    const SurfaceSideGrid& box = surface_sides.boxes[c];
+    place(surface_sides.words.data() + surface_sides.offset[c], box.words());
     // And what is not copied but made there.
     const auto reserve = [&](std::size_t more) {
       const std::size_t at = bytes;
@@ -200,11 +200,11 @@ std::vector<std::shared_ptr<CudaCloud>> assemble(
     view.has_wide_feature = has_wide ? reinterpret_cast<const std::uint8_t*>(part[9].to) : nullptr;
     view.visibility = {reinterpret_cast<const std::uint16_t*>(part[10].to),
                        reinterpret_cast<const Vec3*>(part[11].to), maps, depth_maps.step};
-    view.fronts = {box,
-                   box.words() > 0 ? reinterpret_cast<const std::uint32_t*>(part[12].to) : nullptr};
+    view.surface_sides = {
+        box, box.words() > 0 ? reinterpret_cast<const std::uint32_t*>(part[12].to) : nullptr};
     char* const memory = cloud->data.data();
-    balance.push_back(reinterpret_cast<std::uint32_t*>(memory + balanced));
-    view.balance = balance.back();
+    normal_weight.push_back(reinterpret_cast<std::uint32_t*>(memory + balanced));
+    view.normal_weight = normal_weight.back();
     const auto measure = [&](FeatureAids& to, const FeatureAidsPlaces& at, HalfCopy copy_of,
                              const float* rows, const std::uint8_t* valid, std::uint32_t dimension,
                              std::uint32_t* extreme) {
@@ -225,26 +225,26 @@ std::vector<std::shared_ptr<CudaCloud>> assemble(
   copy_parts<<<dim3(16, static_cast<unsigned>(parts.size())), 256, 0, exec.stream()>>>(
       parts_on_device.data());
   check_launch("copy_parts");
-  const auto balance_on_device = exec.upload(balance);
+  const auto normal_weight_on_device = exec.upload(normal_weight);
   const dim3 grid(8, static_cast<unsigned>(clouds_count));
   count<<<grid, 256, 0, exec.stream()>>>(segments.on_device.data(), normals.data(),
-                                         features.valid.data(), balance_on_device.data(),
+                                         features.valid.data(), normal_weight_on_device.data(),
                                          counts.data());
   check_launch("count");
-  balance_points<<<grid, 256, 0, exec.stream()>>>(segments.on_device.data(), counts.data(),
-                                                  balance_on_device.data());
-  check_launch("balance_points");
+  weight_by_normals<<<grid, 256, 0, exec.stream()>>>(segments.on_device.data(), counts.data(),
+                                                     normal_weight_on_device.data());
+  check_launch("weight_by_normals");
   fill_feature_aids(exec, features_to_measure);
   fill_scoring_data(exec, out, closest.geometry);
   const Counts* counted = exec.download(counts.data(), clouds_count);
   exec.synchronize();
   for (std::size_t c = 0; c < clouds_count; ++c) {
     CudaCloud& cloud = *out[c];
-    cloud.statistics.points_without_normal = counted[c].balance_bin[kBalanceBins - 1];
+    cloud.statistics.points_without_normal = counted[c].normal_bin[kNormalBins - 1];
     cloud.statistics.points_without_feature = counted[c].features;
-    for (const std::uint32_t points : counted[c].balance_bin)
-      cloud.balance_total += std::uint64_t(points) * balance_weight(points);
-    cloud.view_on_device.balance_total = cloud.balance_total;
+    for (const std::uint32_t points : counted[c].normal_bin)
+      cloud.normal_weight_total += std::uint64_t(points) * normal_weight_in_bin(points);
+    cloud.view_on_device.normal_weight_total = cloud.normal_weight_total;
     if (counted[c].extreme > 0) cloud.narrow_aids.half = nullptr;
     if (counted[c].extreme_wide > 0) cloud.wide_aids.half = nullptr;
   }

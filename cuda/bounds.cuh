@@ -4,7 +4,7 @@
 #include "algorithm/cell_summary.hpp"
 #include "algorithm/inlier.hpp"
 #include "packed_normal.cuh"
-#include "products.hpp"
+#include "stage_data.hpp"
 
 /// What is known of a moved point before a single target point is looked at.
 namespace gpureg::cuda {

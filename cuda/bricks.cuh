@@ -2,7 +2,7 @@
 #pragma once
 
 #include "math/rigid.hpp"
-#include "products.hpp"
+#include "stage_data.hpp"
 
 /// Cells of the closest-point grid as the device keeps them: in bricks of 8 x 4 x 4, of which those
 /// near the surface exist. A bit says which, in runs of 32 along x; one block (two bricks along y

@@ -2,7 +2,7 @@
 #include <algorithm>
 
 #include "device_algorithms.hpp"
-#include "group.cuh"
+#include "group_by_cell.cuh"
 #include "match_set.cuh"
 #include "stages.hpp"
 #include "warp.cuh"
@@ -17,9 +17,9 @@ constexpr std::uint32_t kTile = kThreads;
 // matches that a lane of find_slopes() holds
 constexpr std::uint32_t kHeld = 8;
 constexpr int kDegreeBits = 17;  // 0 to 2^16
-constexpr std::uint32_t kMostDegree = (1u << kDegreeBits) - 1;
+constexpr std::uint32_t kMaxDegree = (1u << kDegreeBits) - 1;
 constexpr int kStrengthBits = 24;  // 0 to 2^23, see seed_strength()
-constexpr std::uint32_t kMostStrength = (1u << kStrengthBits) - 2;
+constexpr std::uint32_t kMaxStrength = (1u << kStrengthBits) - 2;
 constexpr std::uint32_t kPadding = (2u << kStrengthBits) - 1;  // key after those of all matches
 
 struct SeedBatch {
@@ -92,7 +92,7 @@ __global__ void write_degree_keys(SeedBatch b, std::uint64_t* key, std::uint32_t
   const std::uint32_t p = blockIdx.y, n = b.count[p], room = b.room[p],
                       i = blockIdx.x * blockDim.x + threadIdx.x;
   if (i >= b.room[p + 1] - room) return;
-  const std::uint32_t before = i < n ? kMostDegree - b.degree[room + i] : kMostDegree;
+  const std::uint32_t before = i < n ? kMaxDegree - b.degree[room + i] : kMaxDegree;
   key[room + i] = static_cast<std::uint64_t>(p) << kDegreeBits | before;
   match[room + i] = i;
 }
@@ -149,7 +149,7 @@ __global__ void write_keys(SeedBatch b, std::uint64_t* key, std::uint32_t* match
   if (i < n) {
     const std::uint32_t strength = seed_strength(
         b.degree[room + i], b.matches.source_weight[room + i] + b.matches.target_weight[room + i]);
-    order = (b.slope[room + i] ? 1u << kStrengthBits : 0u) + (kMostStrength - strength);
+    order = (b.slope[room + i] ? 1u << kStrengthBits : 0u) + (kMaxStrength - strength);
   }
   key[room + i] = static_cast<std::uint64_t>(p) << (kStrengthBits + 1) | order;
   match[room + i] = i;
@@ -165,24 +165,25 @@ __global__ void take_seeds(SeedBatch b, const std::uint32_t* ranked, std::uint32
 
 }  // namespace
 
-Seeds choose_seeds(Exec& exec, const MatchSets& matches, const CompatibilityOptions& options) {
+Seeds choose_seeds(Exec& exec, const MatchSets& matches, const RegistrationOptions& options) {
   const std::size_t pairs = matches.room.entries();
   const unsigned pair_count = static_cast<unsigned>(pairs);
   Seeds out;
-  out.most = options.seeds;
+  out.most = options.compatibility.seeds;
   out.match = exec.buffer<std::uint32_t>(pairs * out.most);
   out.count = exec.filled<std::uint32_t>(pairs, 0);
   const std::uint32_t total = matches.room.total(), largest = matches.room.largest;
   if (total == 0) return out;
   const auto degree = exec.filled<std::uint32_t>(total, 0);
   const auto slope = exec.filled<std::uint8_t>(total, 0);
-  const SeedBatch batch{matches.view(),
-                        matches.room.on_device.data(),
-                        matches.count.data(),
-                        test_of(options),
-                        options.seed_separation * options.seed_separation,
-                        degree.data(),
-                        slope.data()};
+  const SeedBatch batch{
+      matches.view(),
+      matches.room.on_device.data(),
+      matches.count.data(),
+      test_of(options.compatibility),
+      options.compatibility.seed_separation * options.compatibility.seed_separation,
+      degree.data(),
+      slope.data()};
   const unsigned ranges = blocks_for(largest, kBlockRows);
   count_compatible<<<dim3(ranges, ranges, pair_count), kThreads, 0, exec.stream()>>>(batch);
   check_launch("count_compatible");

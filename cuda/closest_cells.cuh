@@ -5,7 +5,7 @@
 
 #include "bricks.cuh"
 #include "exec.hpp"
-#include "products.hpp"
+#include "stage_data.hpp"
 
 namespace gpureg::cuda {
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "closest_lists.hpp"
-#include "group.cuh"
+#include "group_by_cell.cuh"
 #include "hash_table.cuh"
 #include "stages.hpp"
 
@@ -58,7 +58,7 @@ ClosestGrids build_closest_grids(Exec& exec, const DownsampledClouds& clouds, co
   // very wide for its search distance.
   std::uint32_t edge = 2;
   for (const CloudFacts& facts : clouds.facts) {
-    const ClosestGeometry g = closest_geometry(options.search_distance, facts.radius);
+    const ClosestGeometry g = closest_geometry(options.max_correspondence_distance, facts.radius);
     out.geometry.push_back(g);
     const float inverse = 1.0f / block_edge(g), reach = point_reach(g);
     edge = std::max(edge, static_cast<std::uint32_t>(2.0f * reach * inverse) + 2);

@@ -268,7 +268,7 @@ void fill_closest_lists(Exec& exec, const DownsampledClouds& clouds, const Grids
   exclusive_sum(exec, near_start.data(), near_start.data(), blocks + 1);
   const unsigned long long* near_total = exec.download(totals.data(), 1);
   exec.synchronize();
-  if (*near_total > 0x7fffffffu) pipeline::throw_too_dense(options.search_distance);
+  if (*near_total > 0x7fffffffu) pipeline::throw_too_dense(options.max_correspondence_distance);
 
   const auto near = exec.buffer<std::uint32_t>(*near_total);
   const auto nearest = exec.buffer<std::uint32_t>(static_cast<std::size_t>(blocks) * kCells);
@@ -283,7 +283,7 @@ void fill_closest_lists(Exec& exec, const DownsampledClouds& clouds, const Grids
   exec.synchronize();
   for (std::size_t c = 0; c < count; ++c) {
     if (sums[2 + c] > pipeline::kMaxCandidates || sums[1] > pipeline::kMaxBlockCandidates)
-      pipeline::throw_too_dense(options.search_distance);
+      pipeline::throw_too_dense(options.max_correspondence_distance);
     out.candidate_offset[c + 1] = out.candidate_offset[c] + sums[2 + c];
   }
   const auto candidate_offset = exec.upload(out.candidate_offset);

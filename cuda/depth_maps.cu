@@ -67,7 +67,8 @@ DepthMaps build_depth_maps(Exec& exec, Span<const RawCloud> raw, const Downsampl
     }
     out.offset.push_back(static_cast<std::uint32_t>(viewpoints.size()));
   }
-  out.step = depth_step(options.voxel_size > 0 ? options.voxel_size : options.search_distance);
+  out.step =
+      depth_step(options.voxel_size > 0 ? options.voxel_size : options.max_correspondence_distance);
   const std::uint32_t maps = out.offset.back();
   if (maps == 0) return out;
   out.viewpoints = exec.upload(viewpoints);

@@ -51,12 +51,6 @@ std::shared_ptr<Engine> make_cuda_engine(const CudaOptions& options) {
   return cuda::make_engine_of_many(devices, options.memory_budget);
 }
 
-std::shared_ptr<Engine> make_cuda_engine(int device) {
-  CudaOptions options;
-  options.devices = {device};
-  return make_cuda_engine(options);
-}
-
 std::vector<std::string> describe_cuda_devices() {
   std::string why_none;
   const int count = device_count(why_none);

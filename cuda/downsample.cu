@@ -3,7 +3,7 @@
 
 #include "algorithm/normal.hpp"
 #include "algorithm/voxel.hpp"
-#include "group.cuh"
+#include "group_by_cell.cuh"
 #include "pipeline/checks.hpp"
 #include "stages.hpp"
 #include "warp.cuh"

@@ -43,9 +43,7 @@ CudaEngine::CudaEngine(int device, std::size_t memory_budget)
 
 Backend CudaEngine::backend() const { return Backend::cuda; }
 
-unsigned CudaEngine::host_threads() const {
-  return std::max(1u, std::min(8u, std::thread::hardware_concurrency()));
-}
+unsigned CudaEngine::host_threads() const { return exec_.host_threads(); }
 
 const void* CudaEngine::memory() const { return &kDeviceMemory; }
 
@@ -55,8 +53,8 @@ std::vector<DeviceMemoryUse> CudaEngine::device_memory() const {
 }
 
 std::size_t CudaEngine::pairs_per_chunk(const RegistrationOptions& options) const {
-  std::size_t fit = kSampleBytes / (options.hypothesis.count / 8 + 4096);
-  if (options.hypothesis.proposal == Proposal::compatibility) {
+  std::size_t fit = kSampleBytes / (options.quadruples.count / 8 + 4096);
+  if (options.method == RegistrationMethod::compatibility) {
     const CompatibilityOptions& c = options.compatibility;
     fit = kNeighborhoodBytes /
           (std::size_t(c.seeds) * (c.max_matches / 8 + 128) + std::size_t(c.max_matches) * 96);
@@ -101,7 +99,7 @@ std::vector<std::shared_ptr<PreparedState>> CudaEngine::prepare_on_stream(
 }
 
 void CudaEngine::align(Span<const PairInput> pairs, const RegistrationOptions& options,
-                       Span<PairOutcome> outcomes, const FurtherSearch& further) {
+                       Span<PairOutcome> outcomes) {
   const std::lock_guard<std::mutex> lock(mutex_);
   const DeviceScope scope(device());
   const std::size_t budget = residence_.budget();
@@ -131,9 +129,9 @@ void CudaEngine::align(Span<const PairInput> pairs, const RegistrationOptions& o
                        pairs[p].custom_target.data,
                        static_cast<std::uint32_t>(pairs[p].custom_source.size), pairs[p].prior});
     const Span<PairOutcome> part{outcomes.data + begin, end - begin};
-    if (options.hypothesis.proposal == Proposal::compatibility)
+    if (options.method == RegistrationMethod::compatibility)
       pipeline::align_by_evidence(exec_, {pairs.data + begin, end - begin}, span_of(views), options,
-                                  further, part);
+                                  part);
     else
       pipeline::align(exec_, span_of(views), options, part);
   }

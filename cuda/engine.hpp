@@ -25,7 +25,7 @@ class CudaEngine final : public DeviceEngine {
   std::shared_ptr<PreparedState> prepare_adopted(const AdoptedCloud& cloud,
                                                  const PrepareOptions& options) override;
   void align(Span<const PairInput> pairs, const RegistrationOptions& options,
-             Span<PairOutcome> outcomes, const FurtherSearch& further) override;
+             Span<PairOutcome> outcomes) override;
 
  private:
   std::vector<std::shared_ptr<PreparedState>> prepare_on_stream(Span<const RawCloud> clouds,

@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <cstring>
+#include <thread>
 #include <vector>
 
 #include "check.hpp"
@@ -26,6 +28,8 @@ class Exec {
   const std::shared_ptr<DeviceMemory>& memory() const { return memory_; }
   int multiprocessors() const { return multiprocessors_; }
   int compute_capability() const { return compute_capability_; }  ///< 90 for 9.0
+  /// Host threads that may share the host's work on a batch. More than eight wait for memory.
+  unsigned host_threads() const { return std::clamp(std::thread::hardware_concurrency(), 1u, 8u); }
   std::size_t shared_bytes_per_block() const { return shared_bytes_per_block_; }
 
   /// Begins a call: what the last one staged is free again, its events too.

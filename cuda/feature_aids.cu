@@ -25,7 +25,7 @@ __device__ float component(const FeatureSlot& s, const float* row, std::uint32_t
                          : 0.0f;
 }
 
-__device__ std::uint32_t place_of(const FeatureSlot& s, const float* row) {
+__device__ std::uint32_t surface_side_at(const FeatureSlot& s, const float* row) {
   std::uint32_t hash = 2166136261u;
   for (std::uint32_t d = 0; d < s.dimension; ++d) {
     hash = (hash ^ __float_as_uint(row[d])) * 16777619u;
@@ -102,7 +102,7 @@ __global__ void measure_features(const FeatureSlot* slots) {
     s.aids.error[i] = error;
     s.aids.square[i] =
         valid ? make_float2(square - error, square + error) : make_float2(kInfinity, kInfinity);
-    if (valid) atomicMin(s.first + place_of(s, row), i);
+    if (valid) atomicMin(s.first + surface_side_at(s, row), i);
     extreme += valid && !(square < 1e30f * (scale * scale));
   }
   if (blockIdx.x == 0 && threadIdx.x == 0) *s.aids.scale = scale;
@@ -118,7 +118,7 @@ __global__ void find_repeated_features(const FeatureSlot* slots) {
     const float* row = s.features + static_cast<std::size_t>(i) * s.dimension;
     bool repeats = false;
     if (s.valid[i]) {
-      const std::uint32_t first = s.first[place_of(s, row)];
+      const std::uint32_t first = s.first[surface_side_at(s, row)];
       repeats = first < i;
       const float* other = s.features + static_cast<std::size_t>(first) * s.dimension;
       for (std::uint32_t d = 0; repeats && d < s.dimension; ++d) repeats = row[d] == other[d];

@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "nearest_feature.hpp"
-#include "products.hpp"
+#include "stage_data.hpp"
 
 /// What the feature search reads beside the features: copies for the tensor cores, and how far off
 /// their products may be. Part of assemble().

@@ -2,7 +2,7 @@
 #pragma once
 
 #include "nearest_feature.hpp"
-#include "products.hpp"
+#include "stage_data.hpp"
 
 namespace gpureg::cuda {
 

@@ -52,10 +52,10 @@ CloudArrays CloudArrays::moved(const char* from, char* to) const {
   move(out.order.index);
   move(v.wide_features);
   move(v.has_wide_feature);
-  move(v.balance);
+  move(v.normal_weight);
   move(v.visibility.depth);
   move(v.visibility.viewpoints);
-  move(v.fronts.words);
+  move(v.surface_sides.words);
   for (FeatureAids* aids : {&out.narrow_aids, &out.wide_aids}) {
     move(aids->half);
     move(aids->padded);

@@ -3,7 +3,7 @@
 
 #include <mutex>
 
-#include "products.hpp"
+#include "stage_data.hpp"
 
 namespace gpureg::cuda {
 

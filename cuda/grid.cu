@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "group.cuh"
+#include "group_by_cell.cuh"
 #include "hash_table.cuh"
 #include "pipeline/checks.hpp"
 #include "stages.hpp"

@@ -3,9 +3,9 @@
 #include <functional>
 #include <tuple>
 
+#include "common/host_threads.hpp"
 #include "engine.hpp"
 #include "gpureg/context.hpp"
-#include "pipeline/host_threads.hpp"
 
 namespace gpureg::cuda {
 namespace {
@@ -36,9 +36,9 @@ class Runs {
   std::size_t next_ = 0, items_, least_, most_, takers_;
 };
 
-constexpr std::size_t kLeastPairs = 32;  ///< of a run: fewer do not fill a device
-constexpr std::size_t kLeastClouds = 4;
-constexpr std::size_t kMostClouds = 32;
+constexpr std::size_t kMinPairs = 32;  ///< of a run: fewer do not fill a device
+constexpr std::size_t kMinClouds = 4;
+constexpr std::size_t kMaxClouds = 32;
 /// that go into one call: the devices wait for each other at its end only
 constexpr std::size_t kChunksPerDevice = 16;
 
@@ -70,8 +70,8 @@ class EngineOfMany final : public DeviceEngine {
   std::vector<std::shared_ptr<PreparedState>> prepare(Span<const RawCloud> clouds,
                                                       const PrepareOptions& options) override {
     std::vector<std::shared_ptr<PreparedState>> out(clouds.size);
-    Runs runs(clouds.size, kLeastClouds, kMostClouds, engines_.size());
-    on_all(runs, clouds.size > kLeastClouds,
+    Runs runs(clouds.size, kMinClouds, kMaxClouds, engines_.size());
+    on_all(runs, clouds.size > kMinClouds,
            [&](CudaEngine& engine, std::size_t begin, std::size_t end) {
              auto made = engine.prepare({clouds.data + begin, end - begin}, options);
              std::move(made.begin(), made.end(), out.begin() + static_cast<std::ptrdiff_t>(begin));
@@ -88,15 +88,15 @@ class EngineOfMany final : public DeviceEngine {
   }
 
   void align(Span<const PairInput> pairs, const RegistrationOptions& options,
-             Span<PairOutcome> outcomes, const FurtherSearch& further) override {
+             Span<PairOutcome> outcomes) override {
     // Somewhat less than a device would take for itself: the first runs wait for clouds of other
     // devices.
-    Runs runs(pairs.size, kLeastPairs, engines_[0]->pairs_per_chunk(options) * 3 / 4,
+    Runs runs(pairs.size, kMinPairs, engines_[0]->pairs_per_chunk(options) * 3 / 4,
               engines_.size());
-    on_all(runs, pairs.size > kLeastPairs,
+    on_all(runs, pairs.size > kMinPairs,
            [&](CudaEngine& engine, std::size_t begin, std::size_t end) {
              engine.align({pairs.data + begin, end - begin}, options,
-                          {outcomes.data + begin, end - begin}, further);
+                          {outcomes.data + begin, end - begin});
            });
   }
 

@@ -71,8 +71,8 @@ __global__ void __launch_bounds__(kTile) collect_matches(MatchBatch m) {
 
 }  // namespace
 
-Matches match_features(Exec& exec, Span<const PairView> pairs, const HypothesisOptions& options) {
-  const std::uint32_t k = options.neighbors;
+Matches match_features(Exec& exec, Span<const PairView> pairs, const RegistrationOptions& options) {
+  const std::uint32_t k = options.quadruples.neighbors;
   const auto asks = [&](std::size_t p) {
     return pairs[p].custom_count == 0 && pairs[p].source.size > 0 && pairs[p].target.size > 0;
   };
@@ -89,7 +89,7 @@ Matches match_features(Exec& exec, Span<const PairView> pairs, const HypothesisO
   const auto forward_answers = nearest_features(exec, forward, k, forward_segments.total());
   Segments backward_segments;
   DeviceBuffer<std::uint32_t> backward_answers;
-  if (options.mutual) {
+  if (options.quadruples.mutual) {
     backward_segments = make_segments(
         exec, pairs.size, [&](std::size_t p) { return asks(p) ? pairs[p].target.size : 0; });
     for (std::size_t p = 0; p < pairs.size; ++p) {

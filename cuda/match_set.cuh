@@ -2,7 +2,7 @@
 #pragma once
 
 #include "algorithm/compatibility.hpp"
-#include "products.hpp"
+#include "stage_data.hpp"
 
 namespace gpureg::cuda {
 

@@ -5,7 +5,7 @@
 
 #include "algorithm/fpfh.hpp"
 #include "exec.hpp"
-#include "products.hpp"
+#include "stage_data.hpp"
 
 namespace gpureg::cuda {
 

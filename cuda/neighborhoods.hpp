@@ -2,7 +2,7 @@
 #pragma once
 
 #include "exec.hpp"
-#include "products.hpp"
+#include "stage_data.hpp"
 
 namespace gpureg::cuda {
 

@@ -294,7 +294,7 @@ __global__ void __launch_bounds__(kThreads)
 }  // namespace
 
 Candidates propose_poses(Exec& exec, const MatchSets& matches, const Seeds& seeds,
-                         const HypothesisOptions& hypothesis, const CompatibilityOptions& options) {
+                         const RegistrationOptions& options) {
   const std::size_t pairs = matches.room.entries(), places = pairs * seeds.most;
   const unsigned pair_count = static_cast<unsigned>(pairs);
   Candidates out;
@@ -302,32 +302,36 @@ Candidates propose_poses(Exec& exec, const MatchSets& matches, const Seeds& seed
   out.pose = exec.buffer<Pose<float>>(places);
   out.seed = exec.buffer<std::uint32_t>(places);
   out.matches = exec.buffer<MatchEvidence>(places);
-  out.promise = exec.buffer<float>(places);
+  out.coarse_score = exec.buffer<float>(places);
   out.count = exec.filled<std::uint32_t>(pairs, 0);
   const std::uint32_t largest = matches.room.largest;
   if (largest == 0) return out;
-  const Neighborhoods neighborhoods = find_neighborhoods(exec, matches, seeds, options);
+  const Neighborhoods neighborhoods =
+      find_neighborhoods(exec, matches, seeds, options.compatibility);
   const auto pose = exec.buffer<Pose<float>>(places);
   const auto valid = exec.filled<std::uint8_t>(places, 0);
-  const float squared_distance = options.consensus_distance * options.consensus_distance;
-  const ProposeBatch batch{matches.view(),
-                           matches.room.on_device.data(),
-                           matches.count.data(),
-                           seeds.match.data(),
-                           seeds.count.data(),
-                           seeds.most,
-                           neighborhoods.bits.data(),
-                           neighborhoods.words,
-                           test_of(options),
-                           options.max_members,
-                           options.triangles,
-                           options.refits,
-                           squared_distance,
-                           options.seed_separation * options.seed_separation,
-                           hypothesis.seed,
-                           pose.data(),
-                           valid.data()};
-  const std::size_t shared = options.max_members * (sizeof(Member) + sizeof(std::uint16_t));
+  const float squared_distance =
+      options.compatibility.consensus_distance * options.compatibility.consensus_distance;
+  const ProposeBatch batch{
+      matches.view(),
+      matches.room.on_device.data(),
+      matches.count.data(),
+      seeds.match.data(),
+      seeds.count.data(),
+      seeds.most,
+      neighborhoods.bits.data(),
+      neighborhoods.words,
+      test_of(options.compatibility),
+      options.compatibility.max_members,
+      options.compatibility.triangles,
+      options.compatibility.refits,
+      squared_distance,
+      options.compatibility.seed_separation * options.compatibility.seed_separation,
+      options.seed,
+      pose.data(),
+      valid.data()};
+  const std::size_t shared =
+      options.compatibility.max_members * (sizeof(Member) + sizeof(std::uint16_t));
   const std::uint32_t most_seeds = std::min(seeds.most, largest);
   fit_seeds<<<dim3(most_seeds, pair_count), kThreads, shared, exec.stream()>>>(batch);
   check_launch("fit_seeds");

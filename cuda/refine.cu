@@ -98,21 +98,21 @@ __global__ void __launch_bounds__(kThreads) refine(RefineBatch r) {
 }  // namespace
 
 DeviceBuffer<BestPose> refine_poses(Exec& exec, Span<const PairView> pairs,
-                                    const DeviceBuffer<BestPose>& best, const ScoreOptions& score,
-                                    const RefineOptions& options) {
+                                    const DeviceBuffer<BestPose>& best,
+                                    const RegistrationOptions& options) {
   auto out = exec.buffer<BestPose>(pairs.size);
-  if (options.max_iterations == 0) {
+  if (options.refine.max_iterations == 0) {
     check(cudaMemcpyAsync(out.data(), best.data(), pairs.size * sizeof(BestPose),
                           cudaMemcpyDeviceToDevice, exec.stream()),
           "cudaMemcpyAsync");
     return out;
   }
   const auto views = exec.upload(pairs.data, pairs.size);
-  refine<<<static_cast<unsigned>(pairs.size), kThreads, 0, exec.stream()>>>(
-      RefineBatch{views.data(), best.data(),
-                  inlier_test(score.max_correspondence_distance, score.max_normal_angle),
-                  options.max_iterations, options.max_correspondence_distance, options.kernel_width,
-                  out.data()});
+  refine<<<static_cast<unsigned>(pairs.size), kThreads, 0, exec.stream()>>>(RefineBatch{
+      views.data(), best.data(),
+      inlier_test(options.prepare.max_correspondence_distance, options.quadruples.max_normal_angle),
+      options.refine.max_iterations, options.prepare.max_correspondence_distance,
+      options.refine.kernel_width, out.data()});
   check_launch("refine");
   return out;
 }

@@ -9,7 +9,7 @@ namespace gpureg::cuda {
 namespace {
 
 constexpr int kSums = 27;  // of IcpSums
-constexpr std::uint32_t kMostModes = 64;
+constexpr std::uint32_t kMaxModes = 64;
 
 struct RefineModes {
   const SearchPair* pairs;
@@ -40,7 +40,7 @@ __device__ bool correspondence(const SearchPair& pair, const RefineModes& r, flo
   row[3] = normal.x;
   row[4] = normal.y;
   row[5] = normal.z;
-  row[6] = robust_weight(distance, kernel_width) * balance_share(s.balance[i]);
+  row[6] = robust_weight(distance, kernel_width) * normal_weight_share(s.normal_weight[i]);
   row[7] = distance * (1.0f / r.max_distance);
   return true;
 }
@@ -192,7 +192,7 @@ void refine_by_clusters(Exec& exec, const RefineModes& batch, unsigned pairs) {
 __global__ void __launch_bounds__(32)
     merge(std::uint32_t most, Mode* all_modes, std::uint32_t* counts, float min_trace,
           float squared_distance) {
-  __shared__ Rigid kept[kMostModes];
+  __shared__ Rigid kept[kMaxModes];
   const std::uint32_t size = counts[blockIdx.x], lane = threadIdx.x;
   Mode* modes = all_modes + static_cast<std::size_t>(blockIdx.x) * most;
   std::uint32_t count = 0;
@@ -216,20 +216,20 @@ __global__ void __launch_bounds__(32)
 }  // namespace
 
 void refine_modes(Exec& exec, Span<const PairView> pairs, Modes& modes,
-                  const EvidenceOptions& evidence, const RefineOptions& options) {
+                  const RegistrationOptions& options) {
   const auto views = upload_search_pairs(exec, pairs);
   const RefineModes batch{
       views.data(),
       modes.most,
       modes.mode.data(),
       modes.count.data(),
-      evidence.sample,
-      options.max_iterations,
-      options.max_correspondence_distance,
-      options.kernel_width,
-      inlier_test(options.max_correspondence_distance, kRefineNormalAngle).min_cosine};
+      options.evidence.sample,
+      options.refine.max_iterations,
+      options.prepare.max_correspondence_distance,
+      options.refine.kernel_width,
+      inlier_test(options.prepare.max_correspondence_distance, kRefineNormalAngle).min_cosine};
   const unsigned pair_count = static_cast<unsigned>(pairs.size);
-  if (options.max_iterations > 0) {
+  if (options.refine.max_iterations > 0) {
     // Small blocks hide each other's solving; where there are too few to fill the device, large
     // ones are done sooner, or several for each.
     const std::size_t count = std::size_t(modes.most) * pairs.size,
@@ -246,18 +246,18 @@ void refine_modes(Exec& exec, Span<const PairView> pairs, Modes& modes,
   }
 }
 
-void merge_modes(Exec& exec, Modes& modes, const EvidenceOptions& evidence) {
-  static_assert(kMostModes >= 64, "as many as EvidenceOptions::modes may be");
+void merge_modes(Exec& exec, Modes& modes, const RegistrationOptions& options) {
+  static_assert(kMaxModes >= 64, "as many as EvidenceOptions::modes may be");
   const unsigned pairs = static_cast<unsigned>(modes.count.size());
-  merge<<<pairs, 32, 0, exec.stream()>>>(modes.most, modes.mode.data(), modes.count.data(),
-                                         mode_trace(evidence.mode_angle),
-                                         evidence.mode_distance * evidence.mode_distance);
+  merge<<<pairs, 32, 0, exec.stream()>>>(
+      modes.most, modes.mode.data(), modes.count.data(), mode_trace(options.evidence.mode_angle),
+      options.evidence.mode_distance * options.evidence.mode_distance);
   check_launch("merge");
 }
 
-Modes modes_of(Exec& exec, const std::vector<FurtherPoses>& poses) {
+Modes modes_from_poses(Exec& exec, const std::vector<PerturbedPoses>& poses) {
   Modes out;
-  out.most = kMostFurtherPoses;
+  out.most = kMaxPerturbedPoses;
   std::vector<Mode> modes(poses.size() * out.most);
   std::vector<std::uint32_t> count(poses.size());
   for (std::size_t p = 0; p < poses.size(); ++p)

@@ -209,9 +209,10 @@ __global__ void __launch_bounds__(kWordsPerChunk)
 
 }  // namespace
 
-Quadruples sample_quadruples(Exec& exec, const Matches& matches, const HypothesisOptions& options) {
+Quadruples sample_quadruples(Exec& exec, const Matches& matches,
+                             const RegistrationOptions& options) {
   const std::size_t pairs = matches.room.entries();
-  const std::uint32_t chunks = blocks_for(options.count, 32 * kWordsPerChunk);
+  const std::uint32_t chunks = blocks_for(options.quadruples.count, 32 * kWordsPerChunk);
   const std::size_t all_chunks = pairs * chunks;
   auto words = exec.buffer<std::uint32_t>(all_chunks * kWordsPerChunk);
   auto before = exec.filled<std::uint32_t>(all_chunks + 1, 0);
@@ -232,8 +233,9 @@ Quadruples sample_quadruples(Exec& exec, const Matches& matches, const Hypothesi
   const unsigned blocks = std::max(1u, std::min(chunks, std::max(4u, wanted)));
   sample<<<dim3(blocks, static_cast<unsigned>(pairs)), kThreads, shared_bytes, exec.stream()>>>(
       SampleBatch{matches.room.on_device.data(), matches.pairs.data(), matches.count.data(),
-                  options.count, chunks, options.seed,
-                  options.edge_similarity * options.edge_similarity, words.data(), before.data()},
+                  options.quadruples.count, chunks, options.seed,
+                  options.quadruples.edge_similarity * options.quadruples.edge_similarity,
+                  words.data(), before.data()},
       capacity);
   check_launch("sample");
   exclusive_sum(exec, before.data(), before.data(), all_chunks + 1);
@@ -250,7 +252,7 @@ Quadruples sample_quadruples(Exec& exec, const Matches& matches, const Hypothesi
 
   Quadruples out;
   out.segments = make_segments(exec, pairs, [&](std::size_t p) {
-    return std::min(starts[p + 1] - starts[p], options.max_survivors);
+    return std::min(starts[p + 1] - starts[p], options.quadruples.max_survivors);
   });
   out.id = exec.buffer<std::uint32_t>(out.segments.total());
   if (out.segments.total() == 0) return out;

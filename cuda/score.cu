@@ -126,25 +126,25 @@ __global__ void __launch_bounds__(kThreads, 1)
   }
 }
 
-std::vector<ScorePair> score_pairs(Span<const PairView> pairs, const ScoreOptions& options) {
+std::vector<ScorePair> score_pairs(Span<const PairView> pairs, const RegistrationOptions& options) {
   std::vector<ScorePair> out;
   for (const PairView& pair : pairs) {
     const auto& source = *static_cast<const CudaCloud*>(pair.source.executor_data);
     const auto& target = *static_cast<const CudaCloud*>(pair.target.executor_data);
     // The cells know what is in reach of the distance that they were built for; of a shorter one
     // they only know what is not.
-    const float built = target.options.search_distance;
-    const bool exact =
-        built * built == options.max_correspondence_distance * options.max_correspondence_distance;
+    const float built = target.options.max_correspondence_distance;
+    const bool exact = built * built == options.prepare.max_correspondence_distance *
+                                            options.prepare.max_correspondence_distance;
     out.push_back({pair.source, pair.target, source.order, target.summaries, exact ? 0u : 1u});
   }
   return out;
 }
 
-std::vector<Limits> limit_tables(const ScoreOptions& options) {
+std::vector<Limits> limit_tables(const RegistrationOptions& options) {
   std::vector<Limits> out;
   for (const bool exact : {true, false}) {
-    const SummaryLimits limits(options.max_normal_angle, exact);
+    const SummaryLimits limits(options.quadruples.max_normal_angle, exact);
     for (int code = 0; code < 256; ++code)
       out.push_back({limits.none_below[code], limits.all_above[code]});
   }
@@ -166,7 +166,8 @@ std::vector<Slice> cut_slices(const Segments& segments, unsigned multiprocessors
 }  // namespace
 
 DeviceBuffer<BestPose> score_hypotheses(Exec& exec, Span<const PairView> pairs,
-                                        const Hypotheses& hypotheses, const ScoreOptions& options) {
+                                        const Hypotheses& hypotheses,
+                                        const RegistrationOptions& options) {
   const std::uint32_t total = hypotheses.segments->total();
   const std::uint32_t count = static_cast<std::uint32_t>(pairs.size);
   const std::vector<ScorePair> host_pairs = score_pairs(pairs, options);
@@ -187,25 +188,26 @@ DeviceBuffer<BestPose> score_hypotheses(Exec& exec, Span<const PairView> pairs,
   const auto by_misses = exec.buffer<std::uint32_t>(groups.total()),
              look_index = exec.buffer<std::uint32_t>(slots);
   const auto look_point = exec.buffer<float4>(slots), look_normal = exec.buffer<float4>(slots);
-  const ScoreBatch batch{pairs_on_device.data(),
-                         count,
-                         hypotheses.segments->on_device.data(),
-                         hypotheses.pose.data(),
-                         hypotheses.valid.data(),
-                         hypotheses.id,
-                         inlier_test(options.max_correspondence_distance, options.max_normal_angle),
-                         limits.data(),
-                         directions_on_device.data(),
-                         code_test(options.max_normal_angle),
-                         inliers.data(),
-                         leaders.data(),
-                         most.data(),
-                         next.data(),
-                         groups.on_device.data(),
-                         misses.data(),
-                         refuted.data(),
-                         by_misses.data(),
-                         {look_point.data(), look_normal.data(), look_index.data()}};
+  const ScoreBatch batch{
+      pairs_on_device.data(),
+      count,
+      hypotheses.segments->on_device.data(),
+      hypotheses.pose.data(),
+      hypotheses.valid.data(),
+      hypotheses.id,
+      inlier_test(options.prepare.max_correspondence_distance, options.quadruples.max_normal_angle),
+      limits.data(),
+      directions_on_device.data(),
+      code_test(options.quadruples.max_normal_angle),
+      inliers.data(),
+      leaders.data(),
+      most.data(),
+      next.data(),
+      groups.on_device.data(),
+      misses.data(),
+      refuted.data(),
+      by_misses.data(),
+      {look_point.data(), look_normal.data(), look_index.data()}};
   if (total > 0) {
     const unsigned processors = static_cast<unsigned>(exec.multiprocessors());
     if (total <= processors * kByBlock) {

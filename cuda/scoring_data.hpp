@@ -2,7 +2,7 @@
 #pragma once
 
 #include "exec.hpp"
-#include "products.hpp"
+#include "stage_data.hpp"
 
 /// What scoring reads beside the cloud itself: cell summaries and the order of the points. Last
 /// step of assemble().

@@ -6,13 +6,13 @@ namespace gpureg::cuda {
 namespace {
 
 constexpr int kThreads = 256, kWarps = kThreads / 32;
-constexpr std::uint32_t kMostCandidates = 32 * kThreads;  // a bit each in a thread's word
+constexpr std::uint32_t kMaxCandidates = 32 * kThreads;  // a bit each in a thread's word
 
 /// A thread block per pair takes the most promising candidate, the first of equals, drops all that
 /// are the same, and so on: what the CPU finds by going through them in order.
 __global__ void __launch_bounds__(kThreads)
     select(std::uint32_t most, const std::uint32_t* count, const Pose<float>* poses,
-           const float* promises, const std::uint32_t* seeds, float min_trace,
+           const float* coarse_scores, const std::uint32_t* seeds, float min_trace,
            float squared_distance, std::uint32_t most_modes, Mode* modes,
            std::uint32_t* mode_count) {
   __shared__ unsigned long long warp_best[kWarps];
@@ -27,8 +27,9 @@ __global__ void __launch_bounds__(kThreads)
       const std::uint32_t k =
           (static_cast<std::uint32_t>(__ffs(static_cast<int>(bits))) - 1) * kThreads + threadIdx.x;
       // Promises are not negative: their bits have their order.
-      best = max(best,
-                 static_cast<unsigned long long>(__float_as_uint(promises[begin + k])) << 32 | ~k);
+      best = max(
+          best,
+          static_cast<unsigned long long>(__float_as_uint(coarse_scores[begin + k])) << 32 | ~k);
     }
     for (int step = 16; step > 0; step /= 2) best = max(best, __shfl_xor_sync(~0u, best, step));
     if (threadIdx.x % 32 == 0) warp_best[threadIdx.x / 32] = best;
@@ -54,17 +55,19 @@ __global__ void __launch_bounds__(kThreads)
 
 }  // namespace
 
-Modes select_modes(Exec& exec, const Candidates& candidates, const EvidenceOptions& options) {
-  static_assert(kMostCandidates >= 8192, "as many as there may be seeds");
+Modes select_modes(Exec& exec, const Candidates& candidates, const RegistrationOptions& options) {
+  static_assert(kMaxCandidates >= 8192, "as many as there may be seeds");
   const std::size_t pairs = candidates.count.size();
   Modes out;
-  out.most = options.modes;
+  out.most = options.evidence.modes;
   out.mode = exec.buffer<Mode>(pairs * out.most);
   out.count = exec.buffer<std::uint32_t>(pairs);
   select<<<static_cast<unsigned>(pairs), kThreads, 0, exec.stream()>>>(
-      candidates.most, candidates.count.data(), candidates.pose.data(), candidates.promise.data(),
-      candidates.seed.data(), mode_trace(options.mode_angle),
-      options.mode_distance * options.mode_distance, out.most, out.mode.data(), out.count.data());
+      candidates.most, candidates.count.data(), candidates.pose.data(),
+      candidates.coarse_score.data(), candidates.seed.data(),
+      mode_trace(options.evidence.mode_angle),
+      options.evidence.mode_distance * options.evidence.mode_distance, out.most, out.mode.data(),
+      out.count.data());
   check_launch("select");
   return out;
 }

@@ -7,7 +7,7 @@
 #include <thread>
 
 #include "check.hpp"
-#include "pipeline/host_threads.hpp"
+#include "common/host_threads.hpp"
 
 namespace gpureg::cuda {
 namespace {

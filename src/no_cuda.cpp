@@ -10,7 +10,6 @@ constexpr char kNotBuilt[] =
     "this build of gpureg has no CUDA backend (configure with -DGPUREG_CUDA=ON)";
 }
 
-std::shared_ptr<Engine> make_cuda_engine(int) { throw BackendUnavailable(kNotBuilt); }
 std::shared_ptr<Engine> make_cuda_engine(const CudaOptions&) {
   throw BackendUnavailable(kNotBuilt);
 }

@@ -74,13 +74,13 @@ RegistrationOptions MethodOptions::registration() const {
   RegistrationOptions options = preset == "loopsmart"
                                     ? RegistrationOptions::loopsmart(voxel_size)
                                     : RegistrationOptions::from_voxel_size(voxel_size, quality);
-  options.hypothesis.count = hypotheses;
-  options.hypothesis.seed = seed;
+  options.quadruples.count = hypotheses;
+  options.seed = seed;
   if (min_score && !(*min_score >= 0 && *min_score <= 1))
     throw InvalidArgument("--min-score is " + significant(*min_score, 6) +
                           ", expected a number from 0 to 1");
-  if (min_score && options.hypothesis.proposal == Proposal::quadruples)
-    options.score.min_inlier_ratio = static_cast<float>(*min_score);
+  if (min_score && options.method == RegistrationMethod::quadruples)
+    options.quadruples.min_inlier_ratio = static_cast<float>(*min_score);
   else if (min_score)
     options.min_confidence = *min_score;
   options.validate();

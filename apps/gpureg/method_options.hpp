@@ -20,9 +20,9 @@ struct MethodOptions {
   std::string preset = "default";
   std::string backend = "auto";
   unsigned threads = 0;
-  std::uint32_t hypotheses = HypothesisOptions{}.count;
+  std::uint32_t hypotheses = QuadrupleOptions{}.count;
   std::uint32_t quality = kDefaultQuality;
-  std::uint64_t seed = HypothesisOptions{}.seed;
+  std::uint64_t seed = RegistrationOptions{}.seed;
   std::optional<double> min_score;  ///< none: the preset's own
 
   void add_to(CLI::App& verb);

@@ -17,31 +17,30 @@ double shortest(float value) {
 
 Json to_json(const RegistrationOptions& options) {
   const PrepareOptions& p = options.prepare;
-  const HypothesisOptions& h = options.hypothesis;
-  const ScoreOptions& s = options.score;
+  const QuadrupleOptions& q = options.quadruples;
   const RefineOptions& r = options.refine;
   Json json;
+  json["seed"] = options.seed;
+  json["min_confidence"] = options.min_confidence;
+  json["method"] = to_string(options.method);
+  json["smaller_as_source"] = options.smaller_as_source;
   json["prepare"] = {{"voxel_size", shortest(p.voxel_size)},
                      {"normal_radius", shortest(p.normal_radius)},
                      {"feature_radius", shortest(p.feature_radius)},
-                     {"search_distance", shortest(p.search_distance)},
                      {"wide_feature_radius", shortest(p.wide_feature_radius)},
+                     {"max_correspondence_distance", shortest(p.max_correspondence_distance)},
                      {"depth_maps", p.depth_maps},
-                     {"front_reach", shortest(p.front_reach)}};
-  json["hypothesis"] = {{"proposal", to_string(h.proposal)},
-                        {"count", h.count},
-                        {"neighbors", h.neighbors},
-                        {"max_survivors", h.max_survivors},
-                        {"mutual", h.mutual},
-                        {"edge_similarity", shortest(h.edge_similarity)},
-                        {"smaller_as_source", h.smaller_as_source},
-                        {"seed", h.seed}};
-  json["score"] = {{"max_correspondence_distance", shortest(s.max_correspondence_distance)},
-                   {"max_normal_angle", shortest(s.max_normal_angle)},
-                   {"max_judged_normal_angle", shortest(s.max_judged_normal_angle)},
-                   {"min_inlier_ratio", shortest(s.min_inlier_ratio)}};
+                     {"surface_side_distance", shortest(p.surface_side_distance)}};
+  json["quadruples"] = {
+      {"count", q.count},
+      {"neighbors", q.neighbors},
+      {"mutual", q.mutual},
+      {"edge_similarity", shortest(q.edge_similarity)},
+      {"max_survivors", q.max_survivors},
+      {"max_normal_angle", shortest(q.max_normal_angle)},
+      {"max_verification_normal_angle", shortest(q.max_verification_normal_angle)},
+      {"min_inlier_ratio", shortest(q.min_inlier_ratio)}};
   json["refine"] = {{"max_iterations", r.max_iterations},
-                    {"max_correspondence_distance", shortest(r.max_correspondence_distance)},
                     {"kernel_width", shortest(r.kernel_width)}};
   const CompatibilityOptions& c = options.compatibility;
   json["compatibility"] = {{"max_matches", c.max_matches},
@@ -59,10 +58,9 @@ Json to_json(const RegistrationOptions& options) {
                       {"max_normal_angle", shortest(e.max_normal_angle)},
                       {"mode_angle", shortest(e.mode_angle)},
                       {"mode_distance", shortest(e.mode_distance)},
-                      {"slide_distance", shortest(e.slide_distance)},
+                      {"degeneracy_search_distance", shortest(e.degeneracy_search_distance)},
                       {"free_space_margin", shortest(e.free_space_margin)},
                       {"min_range", shortest(e.min_range)}};
-  json["min_confidence"] = options.min_confidence;
   return json;
 }
 

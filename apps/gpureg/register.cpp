@@ -76,11 +76,11 @@ void print_report(const RegisterOptions& o, const Context& context, const Prepar
             << fixed(a.downsample + b.downsample, 1) << ", normals "
             << fixed(a.normals + b.normals, 1) << ", features " << fixed(a.features + b.features, 1)
             << ", grid " << fixed(a.grid + b.grid, 1) << ", depth maps "
-            << fixed(a.depth_maps + b.depth_maps, 1) << ", fronts " << fixed(a.fronts + b.fronts, 1)
-            << ")\n         align " << fixed(t.total(), 1) << " (match " << fixed(t.match, 1)
-            << ", sample " << fixed(t.sample, 1) << ", fit " << fixed(t.fit, 1) << ", score "
-            << fixed(t.score, 1) << ", refine " << fixed(t.refine, 1) << ", judge "
-            << fixed(t.judge, 1) << ")\n";
+            << fixed(a.depth_maps + b.depth_maps, 1) << ", surface sides "
+            << fixed(a.surface_sides + b.surface_sides, 1) << ")\n         align "
+            << fixed(t.total(), 1) << " (match " << fixed(t.match, 1) << ", propose "
+            << fixed(t.propose, 1) << ", rank " << fixed(t.rank, 1) << ", refine "
+            << fixed(t.refine, 1) << ", verify " << fixed(t.verify, 1) << ")\n";
 }
 
 Json document(const RegisterOptions& o, const RegistrationOptions& options, const Context& context,

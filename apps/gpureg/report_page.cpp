@@ -89,7 +89,7 @@ std::string truth_plots(const ResultFile& result, const evaluation::GroundTruth&
   if (e.geometric) add("geometric", kBlue, true, *e.geometric);
   add("strict", kAmber, false, e.strict);
   Population right{"right", kGreen, {}}, wrong{"wrong", kRed, {}};
-  for (const JudgedPair& judged : judge(truth, result))
+  for (const EvaluatedPair& judged : judge(truth, result))
     if (judged.pair->transform) (judged.right ? right : wrong).values.push_back(judged.pair->score);
   return "<div class=\"row\">\n" +
          figure("Recall and precision while the threshold falls; the dots are this run's",
@@ -164,7 +164,7 @@ std::string report_page(const ResultFile& result,
     html += score_plot(result);
   }
   return html + time_plots(result) + picture_list(pictures) +
-         pair_table(result, truth ? judge(*truth, result) : std::vector<JudgedPair>()) +
+         pair_table(result, truth ? judge(*truth, result) : std::vector<EvaluatedPair>()) +
          options_table(result.document) + "</body></html>\n";
 }
 

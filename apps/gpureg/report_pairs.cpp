@@ -39,7 +39,7 @@ std::string no_remark(const PairRecord&) { return ""; }
 
 }  // namespace
 
-std::vector<JudgedPair> judge(const GroundTruth& truth, const ResultFile& result) {
+std::vector<EvaluatedPair> judge(const GroundTruth& truth, const ResultFile& result) {
   using Key = std::pair<int, int>;
   std::map<Key, bool> in_truth;
   for (const evaluation::LogEntry& entry : truth.log) in_truth[{entry.i, entry.j}] = true;
@@ -49,11 +49,11 @@ std::vector<JudgedPair> judge(const GroundTruth& truth, const ResultFile& result
   std::map<Key, std::size_t> at;
   for (std::size_t k = 0; k < log.size(); ++k) at[{log[k].i, log[k].j}] = k;
 
-  std::vector<JudgedPair> judged;
+  std::vector<EvaluatedPair> judged;
   for (const PairRecord& pair : result.pairs) {
     if (pair.j - pair.i <= 1) continue;
     const Key key(pair.i, pair.j);
-    JudgedPair verdict{&pair, in_truth.count(key) > 0, false};
+    EvaluatedPair verdict{&pair, in_truth.count(key) > 0, false};
     const auto found = at.find(key);
     if (found != at.end() && pair.transform)
       verdict.right =
@@ -88,10 +88,10 @@ std::vector<std::pair<double, double>> recall_precision(const GroundTruth& truth
   return curve;
 }
 
-std::vector<SamplePair> samples(const std::vector<JudgedPair>& judged, std::size_t each) {
+std::vector<SamplePair> samples(const std::vector<EvaluatedPair>& judged, std::size_t each) {
   std::vector<const PairRecord*> right, wrong, missed;
   std::map<const PairRecord*, bool> candidate_right;
-  for (const JudgedPair& j : judged) {
+  for (const EvaluatedPair& j : judged) {
     if (j.pair->aligned)
       (j.right ? right : wrong).push_back(j.pair);
     else if (j.in_truth)

@@ -10,14 +10,14 @@
 namespace gpureg::cli {
 
 /// A pair next to the truth. Only pairs with j - i > 1 are judged, as in the protocol.
-struct JudgedPair {
+struct EvaluatedPair {
   const PairRecord* pair = nullptr;
   bool in_truth = false;  ///< overlap >= 30 %: it ought to be found
   /// its pose, reported or not, is within 0.2 m of the truth (of any overlap, where gt_all is
   /// there)
   bool right = false;
 };
-std::vector<JudgedPair> judge(const evaluation::GroundTruth& truth, const ResultFile& result);
+std::vector<EvaluatedPair> judge(const evaluation::GroundTruth& truth, const ResultFile& result);
 
 /// Recall and precision while the threshold falls; geometric: by the geometric rule, which the
 /// truth must allow.
@@ -32,7 +32,7 @@ struct SamplePair {
 
 /// With truth: right, wrong and missed pairs, the telling ones; without: sure, narrow and rejected
 /// ones. At most `each` of a kind.
-std::vector<SamplePair> samples(const std::vector<JudgedPair>& judged, std::size_t each);
+std::vector<SamplePair> samples(const std::vector<EvaluatedPair>& judged, std::size_t each);
 std::vector<SamplePair> samples(const ResultFile& result, std::size_t each);
 
 }  // namespace gpureg::cli

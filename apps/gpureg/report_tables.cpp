@@ -22,7 +22,7 @@ std::string cells(const std::vector<std::string>& texts, const char* tag,
 
 // Empty where the truth says nothing: neighbours, and pairs that do not overlap and were not
 // reported.
-std::string verdict(const JudgedPair& judged) {
+std::string verdict(const EvaluatedPair& judged) {
   if (judged.pair->aligned) return judged.right ? "right" : "wrong";
   return judged.in_truth ? "missed" : "";
 }
@@ -76,9 +76,9 @@ std::string score_table(const evaluation::Evaluation& e) {
          "precision; AP: average precision.</p>\n";
 }
 
-std::string pair_table(const ResultFile& result, const std::vector<JudgedPair>& judged) {
+std::string pair_table(const ResultFile& result, const std::vector<EvaluatedPair>& judged) {
   std::map<const PairRecord*, std::string> verdicts;
-  for (const JudgedPair& j : judged) verdicts[j.pair] = verdict(j);
+  for (const EvaluatedPair& j : judged) verdicts[j.pair] = verdict(j);
   std::vector<std::string> titles = {"target i", "source j", "status",  "reason",
                                      "score",    "rmse, m",  "matches", "survivors",
                                      "scored",   "inliers",  "ms"};

@@ -15,7 +15,7 @@ std::string text_of(const Json& json, const char* pointer);
 /// Parts of the page, each with its heading.
 std::string score_table(const evaluation::Evaluation& evaluation);
 /// judged: the verdicts on some of the pairs, in the order of the pairs; none without a truth.
-std::string pair_table(const ResultFile& result, const std::vector<JudgedPair>& judged);
+std::string pair_table(const ResultFile& result, const std::vector<EvaluatedPair>& judged);
 std::string options_table(const Json& document);
 
 }  // namespace gpureg::cli

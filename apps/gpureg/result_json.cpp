@@ -31,8 +31,8 @@ Json to_json(const RegistrationStatistics& s) {
 }
 
 Json to_json(const StageTimings& t) {
-  return {{"match", t.match},   {"sample", t.sample}, {"fit", t.fit},      {"score", t.score},
-          {"refine", t.refine}, {"judge", t.judge},   {"total", t.total()}};
+  return {{"match", t.match},   {"propose", t.propose}, {"rank", t.rank},
+          {"refine", t.refine}, {"verify", t.verify},   {"total", t.total()}};
 }
 
 Json to_json(const PrepareStatistics& p) {
@@ -47,7 +47,7 @@ Json to_json(const PrepareStatistics& p) {
             {"features", p.features},
             {"grid", p.grid},
             {"depth_maps", p.depth_maps},
-            {"fronts", p.fronts},
+            {"surface_sides", p.surface_sides},
             {"total", p.total()}}}};
 }
 
@@ -55,18 +55,19 @@ Json to_json(const PoseEvidence& e) {
   return {{"match_inliers", e.match_inliers},
           {"match_support", e.match_support},
           {"overlap", {e.source_overlap, e.target_overlap}},
-          {"reach", {e.source_reach, e.target_reach}},
+          {"overlap_any_normal", {e.source_overlap_any_normal, e.target_overlap_any_normal}},
           {"residual", {e.source_residual, e.target_residual}},
-          {"balanced_overlap", {e.source_balanced_overlap, e.target_balanced_overlap}},
-          {"seen", {e.source_seen, e.target_seen}},
-          {"impossible", {e.source_impossible, e.target_impossible}},
-          {"hidden", {e.source_hidden, e.target_hidden}},
-          {"around", {e.source_around, e.target_around}},
-          {"near_front", {e.source_near_front, e.target_near_front}},
-          {"far_front", {e.source_far_front, e.target_far_front}},
-          {"at_back", {e.source_at_back, e.target_at_back}},
-          {"stiffness", e.stiffness},
-          {"softest", e.softest}};
+          {"normal_weighted_overlap",
+           {e.source_normal_weighted_overlap, e.target_normal_weighted_overlap}},
+          {"observed", {e.source_observed, e.target_observed}},
+          {"free_space_violation", {e.source_free_space_violation, e.target_free_space_violation}},
+          {"occluded", {e.source_occluded, e.target_occluded}},
+          {"near_surface", {e.source_near_surface, e.target_near_surface}},
+          {"front_violation_near", {e.source_front_violation_near, e.target_front_violation_near}},
+          {"front_violation_far", {e.source_front_violation_far, e.target_front_violation_far}},
+          {"behind_surface", {e.source_behind_surface, e.target_behind_surface}},
+          {"information_eigenvalues", e.information_eigenvalues},
+          {"weakest_direction", e.weakest_direction}};
 }
 
 Json to_json(const RegistrationMode& mode, const char* pose_name) {

@@ -9,7 +9,7 @@ namespace gpureg::cli {
 
 void ViewpointNote::see(const PointCloud& cloud, const std::string& file) {
   const double share = cloud.view().share_facing_away();
-  if (share <= PointCloudView::kMostFacingAway) return;
+  if (share <= PointCloudView::kMaxFacingAway) return;
   ++clouds_;
   if (share > most_) {
     most_ = share;

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""How often poses are right under which only few points touch: what src/api/confidence.cpp leaves
+"""How often poses are right under which only few points touch: what src/confidence/confidence.cpp leaves
 of their confidence.
 
 The confidence is fitted to clouds of thousands of points. Runs with coarse voxels have so few that

@@ -13,8 +13,8 @@ judges the best of them, and also sees its margin over the best distinct rival a
 there are, and no pose gets more than its share of the odds of all, as at most one is right; the
 third says, from the same, whether the pose is right and the clouds overlap by 30 % or more (in
 gt.log), which is what Redwood's strict protocol counts. Each exists four times: with and without
-free space, which clouds without known viewpoints do not tell, and with and without the fronts of
-surfaces, which prepare.front_reach = 0 leaves out.
+free space, which clouds without known viewpoints do not tell, and with and without the surface_sides of
+surfaces, which prepare.surface_side_distance = 0 leaves out.
 
 Buildings are few, and these were all seen by one kind of sensor. So the second regression also
 learns from runs that only serve to widen it (--beside): the same scenes as other sensors would have
@@ -27,7 +27,7 @@ its clouds were new.
 
 usage: fit_confidence.py RUN... [--beside RUN=LABEL...] [--others RUN=LABEL...] [--origin RUN...]
 [--unknown RUN...]
-                         [--header src/api/confidence_model.hpp] [-o bench/results/confidence.json]
+                         [--header src/confidence/confidence_model.hpp] [-o bench/results/confidence.json]
 --others: tested, and nothing is fitted to them. LABEL: what they are.
 --origin, --unknown: runs of the same scenes whose clouds came with the origin as their only
 viewpoint, or with none; they are tested, and nothing is fitted to them. Where a scene has poses.txt
@@ -42,10 +42,10 @@ import pathlib
 import numpy as np
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
-# What a model may look at beside the overlap: free space, fronts of surfaces.
+# What a model may look at beside the overlap: free space, surface_sides of surfaces.
 MODELS = {
     "everything": (True, True),
-    "fronts": (False, True),
+    "surface_sides": (False, True),
     "free_space": (True, False),
     "neither": (False, False),
 }
@@ -95,28 +95,28 @@ def off_by(truth, pose):
 # Real rooms are full of things that one cloud saw and the other did not look at: where free space
 # is known, up to the second sum of both clouds' shares in front of surfaces speaks of which of a
 # pair's poses is the better one, and only through that of whether it is right.
-LEAST_FRONT, LEAST_JUDGED_FRONT = 1e-3, 2e-2
-NEAR_FRONT = (
+MIN_FRONT_VIOLATION, MIN_VERIFIED_FRONT_VIOLATION = 1e-3, 2e-2
+FRONT_VIOLATION_NEAR = (
     8 + 9
     # its place among the measures of a model that looks at both: after the overlap's and those of free
     # space
 )
 
 
-def measures(evidence, free_space, fronts):
-    """What the model sees of one mode; the library computes the same (src/api/confidence.cpp)."""
+def measures(evidence, free_space, surface_sides):
+    """What the model sees of one mode; the library computes the same (src/confidence/confidence.cpp)."""
     log = lambda value, least: np.log(max(value, least))  # noqa: E731
-    overlap, balanced = evidence["overlap"], evidence["balanced_overlap"]
-    stiffness = evidence["stiffness"]
+    overlap, balanced = evidence["overlap"], evidence["normal_weighted_overlap"]
+    information_eigenvalues = evidence["information_eigenvalues"]
     out = [
         log(evidence["match_support"], 1e-5),
         log(evidence["match_inliers"], 1),
         log(min(balanced), 1e-3),
         log(max(balanced), 1e-3),
         log(min(overlap), 1e-3),
-        log(stiffness[0], 1e-2),
-        log(stiffness[1], 1e-2),
-        sum(np.log1p(s) for s in stiffness),
+        log(information_eigenvalues[0], 1e-2),
+        log(information_eigenvalues[1], 1e-2),
+        sum(np.log1p(s) for s in information_eigenvalues),
     ]
     if free_space:
         seen, impossible, hidden = evidence["seen"], evidence["impossible"], evidence["hidden"]
@@ -134,11 +134,11 @@ def measures(evidence, free_space, fronts):
             min(hidden),
             log(sum(of_all) * (2 / len(of_all)), 1e-3),
         ]
-    if fronts:
-        reach, around, back = evidence["reach"], evidence["around"], evidence["at_back"]
+    if surface_sides:
+        reach, around, back = evidence["reach"], evidence["around"], evidence["behind_surface"]
         alike = [o / max(r, 1e-6) for o, r in zip(overlap, reach)]
         out += [
-            log(sum(evidence["near_front"]), LEAST_FRONT),
+            log(sum(evidence["front_violation_near"]), MIN_FRONT_VIOLATION),
             min(alike),
             max(alike),
             max(around),
@@ -147,8 +147,11 @@ def measures(evidence, free_space, fronts):
         # Where free space is known it says the rest; without, how much is in front or behind beside
         # what touches.
         if not free_space:
-            out.append(log(sum(evidence["far_front"]), LEAST_FRONT))
-            in_front = [n + f for n, f in zip(evidence["near_front"], evidence["far_front"])]
+            out.append(log(sum(evidence["front_violation_far"]), MIN_FRONT_VIOLATION))
+            in_front = [
+                n + f
+                for n, f in zip(evidence["front_violation_near"], evidence["front_violation_far"])
+            ]
 
             def beside(shares):
                 return [s / max(s + r, 1e-6) for s, r in zip(shares, reach)]
@@ -167,7 +170,7 @@ FEW, SMALL_CLOUD = 80, 1500  # points that touch, of how many
 
 
 def with_so_few_points(evidence, points):
-    """What is left of a confidence where hardly any points touch (src/api/confidence.cpp). points:
+    """What is left of a confidence where hardly any points touch (src/confidence/confidence.cpp). points:
     of the prepared clouds, source and target.
     """
     touching = min(share * of for share, of in zip(evidence["overlap"], points))
@@ -178,7 +181,7 @@ def has_free_space(evidence):
     return max(evidence["seen"]) > 0
 
 
-def has_fronts(evidence):
+def has_surface_sides(evidence):
     return min(evidence["around"]) > 0
 
 
@@ -270,10 +273,17 @@ class ChangedRun:
 
 def changed(evidence, side, share, near):
     out = copy.deepcopy(evidence)
-    for key in ("overlap", "reach", "balanced_overlap", "near_front", "far_front", "at_back"):
+    for key in (
+        "overlap",
+        "reach",
+        "normal_weighted_overlap",
+        "front_violation_near",
+        "front_violation_far",
+        "behind_surface",
+    ):
         out[key][side] *= 1 - share
-    out["near_front"][side] += share * evidence["around"][side] * near
-    out["far_front"][side] += share * evidence["around"][side] * (1 - near)
+    out["front_violation_near"][side] += share * evidence["around"][side] * near
+    out["front_violation_far"][side] += share * evidence["around"][side] * (1 - near)
     if evidence["seen"][side] > 0:
         out["impossible"][side] = evidence["impossible"][side] * (1 - share) + share
         out["hidden"][side] *= 1 - share
@@ -310,7 +320,7 @@ def judged(x, model):
     """Of the measures by which a mode is ranked, those by which the best one is judged."""
     x = x.copy()
     if all(model):
-        x[NEAR_FRONT] = max(x[NEAR_FRONT], np.log(LEAST_JUDGED_FRONT))
+        x[FRONT_VIOLATION_NEAR] = max(x[FRONT_VIOLATION_NEAR], np.log(MIN_VERIFIED_FRONT_VIOLATION))
     return x
 
 
@@ -511,7 +521,7 @@ def main():
     record = {"runs": []}
 
     def allowed(of, model, building=None):
-        # Who knows neither free space nor fronts has the overlap alone, and what that tells in bare
+        # Who knows neither free space nor surface_sides has the overlap alone, and what that tells in bare
         # generated rooms it tells nowhere else.
         if of is beside and not any(model):
             return []
@@ -521,8 +531,8 @@ def main():
         fits = {}
         for run in tests:
             others = allowed(runs, model, run.building)
-            # Those without free space are tested where there is none; those without fronts on all,
-            # to tell what fronts give.
+            # Those without free space are tested where there is none; those without surface_sides on all,
+            # to tell what surface_sides give.
             if not others or model not in run.x or (not model[0] and run.free):
                 continue
             if run.building not in fits:

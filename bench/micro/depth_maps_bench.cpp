@@ -23,14 +23,14 @@ struct WithNormals {
   std::vector<std::vector<Vec3>> normals;
 };
 
-void BuildFronts(benchmark::State& state) {
+void BuildSurfaceSides(benchmark::State& state) {
   EvidenceScene& s = EvidenceScene::get();
   const WithNormals cloud(s);
   for (auto _ : state)
     benchmark::DoNotOptimize(
-        cpu::build_fronts(s.exec, cloud.points, cloud.normals, s.options.prepare));
+        cpu::build_surface_sides(s.exec, cloud.points, cloud.normals, s.options.prepare));
 }
-BENCHMARK(BuildFronts)->Unit(benchmark::kMillisecond);
+BENCHMARK(BuildSurfaceSides)->Unit(benchmark::kMillisecond);
 
 void ComputeWideFeatures(benchmark::State& state) {
   EvidenceScene& s = EvidenceScene::get();

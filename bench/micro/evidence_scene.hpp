@@ -19,12 +19,11 @@ struct EvidenceScene {
     for (int k = 0; k < 12; ++k) viewpoints[k] = {0.2f * static_cast<float>(k) - 1.0f, 0.1f, 2.0f};
     for (int k = 0; k < 2; ++k) cloud[k] = test::prepare_one(exec, raw[k], options.prepare);
     pair = test::pair_view(*cloud[0], *cloud[1]);
-    matches = cpu::unite_matches(exec, {&pair, 1}, options.hypothesis, options.compatibility);
-    seeds = cpu::choose_seeds(exec, matches, options.compatibility);
-    candidates =
-        cpu::propose_poses(exec, matches, seeds, options.hypothesis, options.compatibility);
-    cpu::weigh_candidates(exec, {&pair, 1}, matches, candidates, options.evidence, options.score);
-    modes = cpu::select_modes(exec, candidates, options.evidence);
+    matches = cpu::merge_matches(exec, {&pair, 1}, options);
+    seeds = cpu::choose_seeds(exec, matches, options);
+    candidates = cpu::propose_poses(exec, matches, seeds, options);
+    cpu::score_candidates(exec, {&pair, 1}, matches, candidates, options);
+    modes = cpu::select_modes(exec, candidates, options);
   }
   static EvidenceScene& get() {
     static EvidenceScene scene;

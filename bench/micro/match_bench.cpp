@@ -6,8 +6,8 @@ namespace {
 
 void MatchFeatures(benchmark::State& state) {
   Scene& s = Scene::get();
-  HypothesisOptions options = s.options.hypothesis;
-  options.neighbors = static_cast<std::uint32_t>(state.range(0));
+  RegistrationOptions options = s.options;
+  options.quadruples.neighbors = static_cast<std::uint32_t>(state.range(0));
   for (auto _ : state) benchmark::DoNotOptimize(cpu::match_features(s.exec, {&s.pair, 1}, options));
   // Pairs of values that are subtracted, squared and added.
   state.counters["terms/s"] =

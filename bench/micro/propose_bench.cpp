@@ -7,8 +7,7 @@ namespace {
 void ProposePoses(benchmark::State& state) {
   EvidenceScene& s = EvidenceScene::get();
   for (auto _ : state)
-    benchmark::DoNotOptimize(cpu::propose_poses(s.exec, s.matches, s.seeds, s.options.hypothesis,
-                                                s.options.compatibility));
+    benchmark::DoNotOptimize(cpu::propose_poses(s.exec, s.matches, s.seeds, s.options));
   state.counters["seeds/s"] = benchmark::Counter(static_cast<double>(s.seeds[0].size()),
                                                  benchmark::Counter::kIsIterationInvariantRate);
 }

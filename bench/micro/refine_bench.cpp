@@ -7,17 +7,16 @@ namespace {
 void RefinePose(benchmark::State& state) {
   Scene& s = Scene::get();
   for (auto _ : state)
-    benchmark::DoNotOptimize(
-        cpu::refine_poses(s.exec, {&s.pair, 1}, s.best, s.options.score, s.options.refine));
+    benchmark::DoNotOptimize(cpu::refine_poses(s.exec, {&s.pair, 1}, s.best, s.options));
 }
 BENCHMARK(RefinePose)->Unit(benchmark::kMillisecond);
 
-void JudgePose(benchmark::State& state) {
+void VerifyPose(benchmark::State& state) {
   Scene& s = Scene::get();
   for (auto _ : state)
-    benchmark::DoNotOptimize(cpu::judge_poses(s.exec, {&s.pair, 1}, s.best, s.options.score));
+    benchmark::DoNotOptimize(cpu::verify_poses(s.exec, {&s.pair, 1}, s.best, s.options));
 }
-BENCHMARK(JudgePose)->Unit(benchmark::kMillisecond);
+BENCHMARK(VerifyPose)->Unit(benchmark::kMillisecond);
 
 }  // namespace
 }  // namespace gpureg::bench

@@ -7,9 +7,9 @@ namespace {
 void SampleQuadruples(benchmark::State& state) {
   Scene& s = Scene::get();
   for (auto _ : state)
-    benchmark::DoNotOptimize(cpu::sample_quadruples(s.exec, s.matches, s.options.hypothesis));
+    benchmark::DoNotOptimize(cpu::sample_quadruples(s.exec, s.matches, s.options));
   state.counters["hypotheses/s"] =
-      benchmark::Counter(s.options.hypothesis.count, benchmark::Counter::kIsIterationInvariantRate);
+      benchmark::Counter(s.options.quadruples.count, benchmark::Counter::kIsIterationInvariantRate);
   state.counters["survivors"] = static_cast<double>(s.quadruples[0].size());
 }
 BENCHMARK(SampleQuadruples)->Unit(benchmark::kMillisecond);
@@ -17,8 +17,7 @@ BENCHMARK(SampleQuadruples)->Unit(benchmark::kMillisecond);
 void FitHypotheses(benchmark::State& state) {
   Scene& s = Scene::get();
   for (auto _ : state)
-    benchmark::DoNotOptimize(
-        cpu::fit_hypotheses(s.exec, s.matches, s.quadruples, s.options.hypothesis));
+    benchmark::DoNotOptimize(cpu::fit_hypotheses(s.exec, s.matches, s.quadruples, s.options));
   state.counters["fits/s"] = benchmark::Counter(static_cast<double>(s.quadruples[0].size()),
                                                 benchmark::Counter::kIsIterationInvariantRate);
 }

@@ -22,10 +22,10 @@ struct Scene {
     source = test::prepare_one(exec, test::raw_cloud(raw_source), options.prepare);
     target = test::prepare_one(exec, test::raw_cloud(raw_target), options.prepare);
     pair = test::pair_view(*source, *target);
-    matches = cpu::match_features(exec, {&pair, 1}, options.hypothesis);
-    quadruples = cpu::sample_quadruples(exec, matches, options.hypothesis);
-    hypotheses = cpu::fit_hypotheses(exec, matches, quadruples, options.hypothesis);
-    best = cpu::score_hypotheses(exec, {&pair, 1}, hypotheses, options.score);
+    matches = cpu::match_features(exec, {&pair, 1}, options);
+    quadruples = cpu::sample_quadruples(exec, matches, options);
+    hypotheses = cpu::fit_hypotheses(exec, matches, quadruples, options);
+    best = cpu::score_hypotheses(exec, {&pair, 1}, hypotheses, options);
   }
   static Scene& get() {
     static Scene scene;

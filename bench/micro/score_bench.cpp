@@ -7,8 +7,7 @@ namespace {
 void ScoreHypotheses(benchmark::State& state) {
   Scene& s = Scene::get();
   for (auto _ : state)
-    benchmark::DoNotOptimize(
-        cpu::score_hypotheses(s.exec, {&s.pair, 1}, s.hypotheses, s.options.score));
+    benchmark::DoNotOptimize(cpu::score_hypotheses(s.exec, {&s.pair, 1}, s.hypotheses, s.options));
   const double tests = static_cast<double>(s.hypotheses[0].id.size()) * s.pair.source.size;
   state.counters["point_tests/s"] =
       benchmark::Counter(tests, benchmark::Counter::kIsIterationInvariantRate);
@@ -19,8 +18,7 @@ void MeasureSupport(benchmark::State& state) {
   Scene& s = Scene::get();
   const Rigid pose = to_rigid(s.best[0].pose);
   for (auto _ : state)
-    benchmark::DoNotOptimize(
-        cpu::measure_support(s.pair.source, s.pair.target, pose, s.options.score));
+    benchmark::DoNotOptimize(cpu::measure_support(s.pair.source, s.pair.target, pose, s.options));
   state.counters["point_tests/s"] =
       benchmark::Counter(s.pair.source.size, benchmark::Counter::kIsIterationInvariantRate);
 }

@@ -6,8 +6,7 @@ namespace {
 
 void ChooseSeeds(benchmark::State& state) {
   EvidenceScene& s = EvidenceScene::get();
-  for (auto _ : state)
-    benchmark::DoNotOptimize(cpu::choose_seeds(s.exec, s.matches, s.options.compatibility));
+  for (auto _ : state) benchmark::DoNotOptimize(cpu::choose_seeds(s.exec, s.matches, s.options));
   const double n = s.matches[0].size();
   state.counters["tests/s"] =
       benchmark::Counter(0.5 * n * n, benchmark::Counter::kIsIterationInvariantRate);

@@ -50,11 +50,10 @@ void report(benchmark::State& state, const std::vector<RegistrationResult>& resu
   double survivors = 0, aligned = 0, points = 0;
   for (const RegistrationResult& r : results) {
     sum.match += r.timings.match;
-    sum.sample += r.timings.sample;
-    sum.fit += r.timings.fit;
-    sum.score += r.timings.score;
+    sum.propose += r.timings.propose;
+    sum.rank += r.timings.rank;
     sum.refine += r.timings.refine;
-    sum.judge += r.timings.judge;
+    sum.verify += r.timings.verify;
     survivors += static_cast<double>(r.statistics.survivors);
     aligned += r.aligned();
     points += r.statistics.source_points;
@@ -65,11 +64,10 @@ void report(benchmark::State& state, const std::vector<RegistrationResult>& resu
   state.counters["points"] = points / n;
   state.counters["survivors"] = survivors / n;
   state.counters["ms_match"] = sum.match / n;
-  state.counters["ms_sample"] = sum.sample / n;
-  state.counters["ms_fit"] = sum.fit / n;
-  state.counters["ms_score"] = sum.score / n;
+  state.counters["ms_propose"] = sum.propose / n;
+  state.counters["ms_rank"] = sum.rank / n;
   state.counters["ms_refine"] = sum.refine / n;
-  state.counters["ms_judge"] = sum.judge / n;
+  state.counters["ms_verify"] = sum.verify / n;
   state.counters["ms_per_pair"] =
       benchmark::Counter(n * static_cast<double>(runs) * 1e-3,
                          benchmark::Counter::kIsRate | benchmark::Counter::kInvert);

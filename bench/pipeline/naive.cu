@@ -140,7 +140,7 @@ struct Naive::Arrays {
 };
 
 Naive::Naive(std::size_t most_points, const RegistrationOptions& options)
-    : options_(options), arrays_(std::make_unique<Arrays>(most_points, options.hypothesis.count)) {}
+    : options_(options), arrays_(std::make_unique<Arrays>(most_points, options.quadruples.count)) {}
 Naive::~Naive() = default;
 
 NaiveResult Naive::align(const PreparedState& source_state, const PreparedState& target_state) {
@@ -149,7 +149,7 @@ NaiveResult Naive::align(const PreparedState& source_state, const PreparedState&
   if (!source_copy || !target_copy)
     throw InvalidArgument("the naive mode wants both clouds on device 0");
   CloudView source = source_copy->view_on_device, target = target_copy->view_on_device;
-  if (options_.hypothesis.smaller_as_source && target.size < source.size) std::swap(source, target);
+  if (options_.smaller_as_source && target.size < source.size) std::swap(source, target);
   Arrays& a = *arrays_;
   const HypothesisOptions& o = options_.hypothesis;
   std::uint32_t* match_count = a.counts.data();
@@ -172,10 +172,11 @@ NaiveResult Naive::align(const PreparedState& source_state, const PreparedState&
                                               result.survivors, o.seed, a.poses.data(),
                                               a.valid.data());
   check_launch("fit");
-  score<<<result.survivors, kThreads>>>(
-      source, target,
-      inlier_test(options_.score.max_correspondence_distance, options_.score.max_normal_angle),
-      a.poses.data(), a.valid.data(), a.survivors.data(), a.supports.data());
+  score<<<result.survivors, kThreads>>>(source, target,
+                                        inlier_test(options_.prepare.max_correspondence_distance,
+                                                    options_.quadruples.max_normal_angle),
+                                        a.poses.data(), a.valid.data(), a.survivors.data(),
+                                        a.supports.data());
   check_launch("score");
   supports_.resize(result.survivors);
   check(cudaMemcpy(supports_.data(), a.supports.data(), result.survivors * sizeof(Support),

@@ -14,7 +14,7 @@ void report(benchmark::State& state, const std::vector<PreparedCloud>& clouds, s
     sum.features += s.features;
     sum.grid += s.grid;
     sum.depth_maps += s.depth_maps;
-    sum.fronts += s.fronts;
+    sum.surface_sides += s.surface_sides;
     raw += static_cast<double>(s.input_points);
     points += s.points;
   }
@@ -27,7 +27,7 @@ void report(benchmark::State& state, const std::vector<PreparedCloud>& clouds, s
   state.counters["ms_features"] = sum.features / n;
   state.counters["ms_grid"] = sum.grid / n;
   state.counters["ms_depth_maps"] = sum.depth_maps / n;
-  state.counters["ms_fronts"] = sum.fronts / n;
+  state.counters["ms_surface_sides"] = sum.surface_sides / n;
   state.counters["ms_per_fragment"] =
       benchmark::Counter(n * static_cast<double>(runs) * 1e-3,
                          benchmark::Counter::kIsRate | benchmark::Counter::kInvert);

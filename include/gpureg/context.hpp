@@ -9,6 +9,7 @@
 namespace gpureg {
 
 class Engine;
+struct Access;
 
 enum class Backend { cpu, cuda };
 const char* to_string(Backend backend);
@@ -63,10 +64,8 @@ class Context {
   /// One entry per device of a CUDA context, none on the CPU.
   std::vector<DeviceMemoryUse> device_memory() const;
 
-  /// private interface of the backends
-  const std::shared_ptr<Engine>& engine() const { return engine_; }
-
  private:
+  friend struct Access;
   explicit Context(std::shared_ptr<Engine> engine) : engine_(std::move(engine)) {}
   std::shared_ptr<Engine> engine_;
 };

@@ -13,8 +13,8 @@ class Error : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// A broken promise of the caller: an option out of range, a view that lies about itself. Names
-/// field and value.
+/// A broken coarse_score of the caller: an option out of range, a view that lies about itself.
+/// Names field and value.
 class InvalidArgument : public Error {
  public:
   using Error::Error;

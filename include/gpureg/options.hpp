@@ -5,162 +5,163 @@
 
 namespace gpureg {
 
+/// How candidate poses are found.
+enum class RegistrationMethod : std::uint8_t {
+  /// Second-order compatibility of matches (SC2-PCR, Chen et al. 2022); distinct poses are refined
+  /// and verified by evidence. The default.
+  compatibility,
+  /// Uniform quadruples of matches, the winner by its inliers (LoopSmart, Algorithm 1).
+  quadruples
+};
+
+const char* to_string(RegistrationMethod method);
+
 /// How a raw cloud becomes a PreparedCloud. All lengths in metres (or the unit of the points).
 struct PrepareOptions {
-  /// edge of the downsampling voxel, one centroid each (paper: 0.05); 0: keep the points as they
-  /// are
+  /// Edge of the downsampling voxel, one centroid each (paper: 0.05); 0: keep the points as they
+  /// are.
   float voxel_size = 0.05f;
-  /// Neighbourhood of the normal's PCA (paper: 0.1). The wide FPFH describes normals of one that is
-  /// wider by wide_feature_radius / feature_radius, at most 4 feature_radius.
+  /// Neighbourhood of the normal's PCA (paper: 0.1). The wide FPFH is computed from normals of a
+  /// radius that is larger by wide_feature_radius / feature_radius, at most 4 feature_radius.
   float normal_radius = 0.1f;
   float feature_radius = 0.25f;  ///< neighbourhood of FPFH, also of its SPFH (paper: 0.25)
-  /// Cell of the closest-point look-up of alignment; derived from max_correspondence_distance, see
-  /// RegistrationOptions. farthest neighbour that alignment will ever ask this cloud for
-  float search_distance = 0.075f;
   /// Neighbourhood of a second FPFH, matched beside the first (only where the features are FPFH);
-  /// 0: none (paper: none). Wide features find matches where small neighbourhoods look alike:
-  /// floors, walls.
+  /// 0: none (paper: none). Wide features find matches on floors and walls, where small
+  /// neighbourhoods look alike.
   float wide_feature_radius = 0.4f;
-  /// Viewpoints that depth maps are made of for free-space tests, evenly chosen among the cloud's;
-  /// 0: no maps, and given normals are never turned (PointCloudView::viewpoints). 110 KB each.
+  /// Largest distance of an inlier and of a correspondence of the refinement (paper: 0.075). It
+  /// sets the cell size of the closest-point grid, so clouds are prepared with it. An alignment may
+  /// use a smaller one than its clouds were prepared with, never a larger one.
+  float max_correspondence_distance = 0.075f;
+  /// Number of viewpoints that get a depth map for free-space tests, evenly chosen among the
+  /// cloud's; 0: no maps, and given normals are never turned (PointCloudView::viewpoints). A map
+  /// takes 110 KB.
   std::uint32_t depth_maps = 10;
-  /// How far from its surfaces a cloud tells their front, the side from which they were seen, from
-  /// their back, for the evidence; 0: not at all (paper: 0). Half a byte for each cell of a tenth
-  /// of it in the cloud's box, half a megabyte for a fragment of a room; a box of more than 2^26
-  /// cells has none.
-  float front_reach = 0.5f;
+  /// Range in front of and behind its surfaces within which a cloud tells the two sides apart, for
+  /// the evidence; 0: not at all (paper: 0). Takes half a byte for each cell of a tenth of it in
+  /// the cloud's box; a box of more than 2^26 cells gets none.
+  float surface_side_distance = 0.5f;
 
-  /// Throws InvalidArgument naming field and value.
-  void validate() const;
-};
-
-/// How candidate poses are found.
-enum class Proposal : std::uint8_t {
-  quadruples,  ///< uniform quadruples of matches, the winner by its inliers (paper, Algorithm 1)
-  /// second-order spatial compatibility of matches (SC2-PCR, Chen et al. 2022), judged by evidence
-  compatibility
-};
-
-const char* to_string(Proposal proposal);
-
-/// Where hypotheses come from. All but proposal, smaller_as_source and seed are of
-/// Proposal::quadruples: uniform quadruples of cached feature matches (paper, Algorithm 1).
-struct HypothesisOptions {
-  Proposal proposal = Proposal::compatibility;
-  /// quadruples drawn per pair (paper: 4,000,000); at most 2^30
-  std::uint32_t count = 4'000'000;
-  std::uint32_t neighbors = 1;  ///< nearest features kept per source point, 1..16 (paper: 1)
-  bool mutual = false;          ///< keep only matches that are nearest in both directions
-  /// tau of the polygon test: sides may differ by this ratio, in (0, 1] (paper: 0.9)
-  float edge_similarity = 0.9f;
-  /// Of the quadruples that pass the polygon test, the first so many are scored. Real pairs stay
-  /// far below (a hundred thousand where almost every match is right); two copies of one cloud
-  /// would let millions through, each as good as the next. 1..2^22.
-  std::uint32_t max_survivors = 1u << 18;
-  /// sample and score the cloud with fewer points (Choi et al. 2015); the pose is turned back
-  bool smaller_as_source = true;
-  /// same seed, same bits, on any backend, thread count and batch split
-  std::uint64_t seed = 1;
-
+  /// @throws InvalidArgument naming field and value.
   void validate() const;
 };
 
 /// Candidate poses from matches that keep each other's distances and angles
-/// (Proposal::compatibility).
+/// (RegistrationMethod::compatibility).
 struct CompatibilityOptions {
-  /// kept per pair, chosen at random where there are more, 4..65536
+  /// Matches kept per pair, chosen at random where there are more, 4..65536.
   std::uint32_t max_matches = 8192;
-  std::uint32_t seeds = 1024;       ///< matches whose neighbourhoods become candidates, 1..8192
-  std::uint32_t max_members = 512;  ///< of a seed's compatible matches, those looked at, 3..1024
-  /// tried per seed, each of the seed and two compatible members, 1..4096
+  std::uint32_t seeds = 1024;  ///< matches whose neighbourhoods become candidates, 1..8192
+  /// Compatible matches of a seed that take part, 3..1024.
+  std::uint32_t max_members = 512;
+  /// Triangles tried per seed, each of the seed and two compatible members, 1..4096.
   std::uint32_t triangles = 64;
-  /// least-squares fits to the members that the best triangle brings together, 1..8
+  /// Least-squares fits to the consensus set of the best triangle, 1..8.
   std::uint32_t refits = 2;
-  /// metres that the distances of compatible matches may differ by
+  /// Metres that the distances of compatible matches may differ by.
   float tolerance = 0.05f;
-  /// that the cosines of the angles of their normals may differ by, (0, 2]; 2: no test
+  /// Largest difference of the cosines between their normals, (0, 2]; 2: no test.
   float max_turn = 0.5f;
-  float consensus_distance = 0.1f;  ///< metres within which a pose brings a match together
-  /// metres around a seed without a lesser one; shortest side of a triangle
+  /// Metres within which a pose brings a match together.
+  float consensus_distance = 0.1f;
+  /// Metres around a seed without a weaker seed; shortest side of a triangle.
   float seed_separation = 0.1f;
 
+  /// @throws InvalidArgument naming field and value.
   void validate() const;
 };
 
-/// How candidates are judged (Proposal::compatibility): support by matches and by both clouds, and
-/// free space.
-struct EvidenceOptions {
-  /// about so many points of each cloud judge a candidate at first, 64..65536
-  std::uint32_t sample = 512;
-  std::uint32_t modes = 24;        ///< distinct poses refined and judged by all points, 1..64
-  float max_normal_angle = 30.0f;  ///< degrees between the normals of an inlier
-  float mode_angle = 11.5f;        ///< degrees, and ...
-  /// ... metres between the cloud's centres, within which two poses are one
-  float mode_distance = 0.3f;
-  /// Metres that the likeliest pose is slid, both ways, along the direction that its surfaces
-  /// determine least (and by quarters of it, where it is open whether the pose is right):
-  /// refinement ends anywhere along a bare wall, and the evidence then says where. What stays away
-  /// from it is a rival. 0: not at all.
-  float slide_distance = 0.4f;
-  /// metres before a seen surface that a point may lie without contradicting it
-  float free_space_margin = 0.12f;
-  /// metres from a viewpoint, nearer than which nothing is judged
-  float min_range = 0.3f;
-
-  void validate() const;
-};
-
-/// What makes a point an inlier and a hypothesis a result. All but max_correspondence_distance is
-/// of Proposal::quadruples.
-struct ScoreOptions {
-  float max_correspondence_distance = 0.075f;  ///< metres (paper: 0.075)
-  /// Degrees between the normals of an inlier while hypotheses are compared, (0, 180]; 180 switches
-  /// the test off (CZK: 30).
+/// The paper's hypotheses (RegistrationMethod::quadruples): uniform quadruples of cached feature
+/// matches, scored by their inliers (LoopSmart, Algorithm 1).
+struct QuadrupleOptions {
+  std::uint32_t count = 4'000'000;  ///< quadruples drawn per pair (paper: 4,000,000); at most 2^30
+  /// Nearest features kept per source point, 1..16 (paper: 1).
+  std::uint32_t neighbors = 1;
+  bool mutual = false;  ///< keep only matches that are nearest in both directions
+  /// tau of the polygon test: smallest ratio between corresponding sides, in (0, 1] (paper: 0.9).
+  float edge_similarity = 0.9f;
+  /// Number of quadruples that are scored, the first ones that pass the polygon test, 1..2^22. Real
+  /// pairs stay far below; two copies of one cloud would let millions of equal ones through.
+  std::uint32_t max_survivors = 1u << 18;
+  /// Degrees between the normals of an inlier while hypotheses are compared, (0, 180]; 180: no test
+  /// (CZK: 30).
   float max_normal_angle = 30.0f;
-  /// The same while the winner is judged. Normals of a coarse cloud turn by tens of degrees at
+  /// The same while the winner is verified. Normals of a coarse cloud turn by tens of degrees at
   /// edges and in clutter: under 30 degrees a true pose loses about a quarter of its overlap
-  /// (measured at ground-truth poses of 5 cm clouds), a wrong one has little to gain.
-  float max_judged_normal_angle = 70.0f;
-  /// judged inlier ratio below which no alignment is reported, [0, 1] (CZK: 0.33)
+  /// (measured at ground-truth poses of 5 cm clouds), a false one gains little.
+  float max_verification_normal_angle = 70.0f;
+  /// Verified inlier ratio below which no alignment is reported, [0, 1] (CZK: 0.33).
   float min_inlier_ratio = 0.3f;
 
+  /// @throws InvalidArgument naming field and value.
   void validate() const;
 };
 
-/// Robust point-to-plane ICP that polishes the winning hypothesis, or every mode.
+/// Robust point-to-plane ICP that refines the winning hypothesis, or every mode.
 struct RefineOptions {
-  std::uint32_t max_iterations = 16;           ///< 0 switches the refinement off (paper: off)
-  float max_correspondence_distance = 0.075f;  ///< metres, <= PrepareOptions::search_distance
-  /// metres, width of the Geman-McClure kernel on the point-to-plane distance
+  std::uint32_t max_iterations = 16;  ///< 0 switches the refinement off (paper: off)
+  /// Width of the Geman-McClure kernel on the point-to-plane distance, metres.
   float kernel_width = 0.025f;
 
+  /// @throws InvalidArgument naming field and value.
   void validate() const;
 };
 
-/// The steps of the dial between speed and recall: 0 is the fastest, 10 finds the most.
+/// How candidates are scored and verified (RegistrationMethod::compatibility): support by matches,
+/// overlap of both clouds, free space.
+struct EvidenceOptions {
+  /// Approximate number of points of each cloud that score a candidate, 64..65536.
+  std::uint32_t sample = 512;
+  std::uint32_t modes = 24;  ///< distinct poses that are refined and verified by all points, 1..64
+  float max_normal_angle = 30.0f;  ///< degrees between the normals of an inlier
+  /// Two poses are one mode where their rotations differ by less than this, degrees, ...
+  float mode_angle = 11.5f;
+  float mode_distance = 0.3f;  ///< ... and the cloud's centre by less than this, metres.
+  /// Range of the degeneracy search, metres: the most likely mode is perturbed along its weakest
+  /// direction by up to this far, both ways, and refined and verified again. Refinement may stop
+  /// anywhere along a bare wall; the evidence then tells where. A perturbed pose that stays away
+  /// counts as a mode of its own. 0: no search.
+  float degeneracy_search_distance = 0.4f;
+  /// Metres in front of an observed surface within which a point does not violate free space.
+  float free_space_margin = 0.12f;
+  float min_range = 0.3f;  ///< metres from a viewpoint below which nothing counts as observed
+
+  /// @throws InvalidArgument naming field and value.
+  void validate() const;
+};
+
+/// The range of `quality`: 0 is the fastest, 10 finds the most.
 inline constexpr std::uint32_t kDefaultQuality = 5, kHighestQuality = 10;
 
-/// All options of one registration. An aggregate with in-class defaults: set what you want to
-/// change.
+/// All options of one registration. An aggregate with in-class defaults: change what you need.
+///
+/// What a user normally sets: the voxel size and the quality, through from_voxel_size(), then seed
+/// and min_confidence. Everything below those is for experts.
 struct RegistrationOptions {
-  PrepareOptions prepare;
-  HypothesisOptions hypothesis;
-  CompatibilityOptions compatibility;
-  EvidenceOptions evidence;
-  ScoreOptions score;
-  RefineOptions refine;
-  /// Proposal::compatibility: confidence below which no alignment is reported, [0, 1]
+  std::uint64_t seed = 1;  ///< same seed, same bits: on any backend, thread count and batch split
+  /// Confidence below which no alignment is reported, [0, 1] (RegistrationMethod::compatibility).
   double min_confidence = 0.5;
+  RegistrationMethod method = RegistrationMethod::compatibility;
+  /// Move the cloud with fewer points (Choi et al. 2015). The result is of the caller's source and
+  /// target either way.
+  bool smaller_as_source = true;
+  PrepareOptions prepare;
+  CompatibilityOptions compatibility;
+  QuadrupleOptions quadruples;
+  RefineOptions refine;
+  EvidenceOptions evidence;
 
   /// Every length from the voxel size: normals 2 v, FPFH 5 v and 8 v, correspondence distance 1.5
-  /// v, kernel 0.5 v, compatibility 1 v, free-space margin 2.4 v. quality, 0 to 10, sets how many
-  /// candidates are looked at: compatibility.seeds and triangles, evidence.modes. Throws
-  /// InvalidArgument unless v is finite and > 0 and quality at most 10.
+  /// v, kernel 0.5 v, compatibility 1 v, free-space margin 2.4 v.
+  /// @param voxel_size in the unit of the points, finite and > 0.
+  /// @param quality 0 to 10, sets the number of candidates: compatibility.seeds and triangles,
+  ///   evidence.modes.
+  /// @throws InvalidArgument for a value out of range.
   static RegistrationOptions from_voxel_size(float voxel_size,
                                              std::uint32_t quality = kDefaultQuality);
 
-  /// A copy with quality's number of candidates, everything else as it is. Throws InvalidArgument
-  /// where quality is above 10.
+  /// A copy with the number of candidates of a quality, everything else as it is.
+  /// @throws InvalidArgument where quality is above 10.
   RegistrationOptions with_quality(std::uint32_t quality) const;
 
   /// The paper's algorithm with the paper's numbers (Zhang and Chen, LoopSmart, section III):
@@ -168,9 +169,10 @@ struct RegistrationOptions {
   static RegistrationOptions loopsmart();
 
   /// The paper's algorithm with its lengths scaled to another voxel size (the paper's own is 0.05).
+  /// @throws InvalidArgument for a voxel size out of range.
   static RegistrationOptions loopsmart(float voxel_size);
 
-  /// Throws InvalidArgument naming the first field that is out of range, and its value.
+  /// @throws InvalidArgument naming the first field that is out of range, and its value.
   void validate() const;
 };
 

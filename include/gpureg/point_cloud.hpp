@@ -46,11 +46,11 @@ struct PointCloudView {
 
   /// Share of the points, in [0, 1], whose normal shows its back to every viewpoint; 0 where there
   /// are no normals, no viewpoints or no points. In a scan with the places that it was seen from it
-  /// is a few per cent, along the edges of surfaces. Above kMostFacingAway either the viewpoints
+  /// is a few per cent, along the edges of surfaces. Above kMaxFacingAway either the viewpoints
   /// are in another frame than the points, and free space will speak against right poses, or the
   /// normals point to any side. Reads every point once, in host memory; throws as validate() does.
   double share_facing_away() const;
-  static constexpr double kMostFacingAway = 0.125;
+  static constexpr double kMaxFacingAway = 0.125;
 };
 
 /// Owning cloud, for readers and generators; view() is what the library takes. Empty

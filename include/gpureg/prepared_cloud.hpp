@@ -12,6 +12,7 @@
 
 namespace gpureg {
 
+struct Access;
 struct PreparedState;
 
 /// A fragment ready for alignment: downsampled points, normals, features, search grid and depth
@@ -21,7 +22,6 @@ struct PreparedState;
 class PreparedCloud {
  public:
   PreparedCloud() = default;  ///< empty handle; valid() is false
-  explicit PreparedCloud(std::shared_ptr<const PreparedState> state) : state_(std::move(state)) {}
 
   bool valid() const { return state_ != nullptr; }
   std::size_t size() const;               ///< prepared points
@@ -37,9 +37,9 @@ class PreparedCloud {
   std::vector<float> features() const;
   std::vector<Eigen::Vector3f> viewpoints() const;  ///< sensor positions, at least one
 
-  const std::shared_ptr<const PreparedState>& state() const { return state_; }
-
  private:
+  friend struct Access;
+  explicit PreparedCloud(std::shared_ptr<const PreparedState> state) : state_(std::move(state)) {}
   std::shared_ptr<const PreparedState> state_;
 };
 

@@ -33,7 +33,7 @@ std::vector<PreparedCloud> prepare_batch(const Context& context,
                                          const PrepareOptions& options = {},
                                          const std::vector<std::string>& names = {});
 
-/// Finds target_from_source of two prepared clouds, by options.hypothesis.proposal: from compatible
+/// Finds target_from_source of two prepared clouds, by options.method: from compatible
 /// matches, judged by evidence (then modes holds every distinct pose), or by LoopSmart's
 /// Algorithm 1. Deterministic in clouds, options and seed. options.prepare is checked, but not
 /// used: what a cloud was prepared with counts. Throws InvalidArgument where a cloud's
@@ -43,7 +43,7 @@ RegistrationResult align(const Context& context, const PreparedCloud& source,
                          const PreparedCloud& target, const RegistrationOptions& options = {});
 
 /// The same with what is known of the pose beforehand. Throws InvalidArgument for a bad prior, and
-/// for one that is not empty with Proposal::quadruples, which cannot use it.
+/// for one that is not empty with RegistrationMethod::quadruples, which cannot use it.
 RegistrationResult align(const Context& context, const PreparedCloud& source,
                          const PreparedCloud& target, const RegistrationPrior& prior,
                          const RegistrationOptions& options = {});

@@ -7,8 +7,7 @@ namespace gpureg {
 
 enum class RegistrationStatus : std::uint8_t {
   aligned,  ///< target_from_source passed every threshold
-  /// no pose passed; reason says why, and target_from_source holds the best candidate where
-  /// has_candidate
+  /// No pose passed. reason says why; target_from_source is the best candidate where has_candidate.
   not_aligned,
   skipped  ///< never tried, because the batch was cancelled before
 };
@@ -18,15 +17,15 @@ enum class RegistrationReason : std::uint8_t {
   none,
   too_few_source_points,  ///< fewer than 4 usable points after downsampling
   too_few_target_points,
-  /// fewer than 4 correspondences: points without neighbours have no feature
+  /// Fewer than 4 correspondences: points without neighbours have no feature.
   no_usable_features,
-  no_hypothesis_survived,  ///< all quadruples failed the polygon test (Proposal::quadruples)
-  /// all surviving quadruples were collinear or coincident; no seed's neighbourhood determined a
-  /// pose
+  /// All quadruples failed the polygon test (RegistrationMethod::quadruples).
+  no_hypothesis_survived,
+  /// All surviving quadruples were collinear or coincident, or no seed determined a pose.
   degenerate_geometry,
-  /// the best candidate is below ScoreOptions::min_inlier_ratio (Proposal::quadruples)
+  /// The best candidate is below quadruples.min_inlier_ratio (RegistrationMethod::quadruples).
   inlier_ratio_too_low,
-  /// the best candidate is below RegistrationOptions::min_confidence (Proposal::compatibility)
+  /// The best candidate is below min_confidence (RegistrationMethod::compatibility).
   confidence_too_low,
   contradicts_prior,  ///< every pose found contradicts the RegistrationPrior of the pair
   cancelled
@@ -37,36 +36,40 @@ const char* to_string(RegistrationReason reason);
 /// One sentence for a person.
 const char* explain(RegistrationReason reason);
 
-/// What went in and what was left after each stage of one pair: enough to answer "why did it fail".
-/// Hypotheses are quadruples of matches (Proposal::quadruples) or seeds (Proposal::compatibility).
+/// What was left after each stage of one pair, which answers "why did it fail?". A hypothesis is a
+/// quadruple of matches (RegistrationMethod::quadruples) or a seed
+/// (RegistrationMethod::compatibility).
 struct RegistrationStatistics {
   std::uint32_t source_points = 0;  ///< prepared points of the source
   std::uint32_t target_points = 0;
-  /// matches that hypotheses are made of, at most CompatibilityOptions::max_matches with seeds
+  /// Matches that hypotheses are made of; with seeds at most compatibility.max_matches.
   std::uint32_t correspondences = 0;
   std::uint64_t hypotheses = 0;  ///< quadruples drawn, or seeds tried
-  /// quadruples that passed the polygon test, at most max_survivors; seeds that gave a pose
+  /// Quadruples that passed the polygon test, at most quadruples.max_survivors; or seeds that gave
+  /// a pose.
   std::uint64_t survivors = 0;
-  std::uint64_t scored = 0;         ///< of these with a well-defined rigid fit
+  std::uint64_t scored = 0;         ///< of these, those with a well-defined rigid fit
   std::uint32_t points_scored = 0;  ///< points that the inlier ratio is relative to
-  /// Inliers of the returned pose under ScoreOptions::max_normal_angle, what it won by; with seeds
+  /// Inliers of the returned pose under quadruples.max_normal_angle, by which it won; with seeds
   /// the same as inliers.
   std::uint32_t consensus = 0;
-  /// What the inlier ratio counts: under ScoreOptions::max_judged_normal_angle, with seeds under
-  /// EvidenceOptions::max_normal_angle.
+  /// Inliers of the inlier ratio: under quadruples.max_verification_normal_angle; with seeds under
+  /// evidence.max_normal_angle.
   std::uint32_t inliers = 0;
   std::uint32_t refine_iterations = 0;  ///< of the returned pose
-  /// the target was sampled and scored, being the smaller cloud
+  /// The target was moved onto the source, being the smaller cloud (smaller_as_source).
   bool swapped = false;
 };
 
-/// Wall time of each stage in milliseconds. With Proposal::compatibility sample is the choice of
-/// seeds, fit the proposal of poses, score the weighing and selection of candidates, judge the
-/// weighing of modes. In a batch a chunk of pairs goes through a stage together: then each pair
-/// carries its equal share, so that sums over pairs are right.
+/// Wall time of each stage in milliseconds. A chunk of pairs of a batch goes through a stage
+/// together; then each pair carries its equal share, so that sums over pairs are right.
 struct StageTimings {
-  double match = 0, sample = 0, fit = 0, score = 0, refine = 0, judge = 0;
-  double total() const { return match + sample + fit + score + refine + judge; }
+  double match = 0;    ///< nearest features
+  double propose = 0;  ///< hypotheses: seeds and their poses, or quadruples and their poses
+  double rank = 0;     ///< coarse scores and distinct modes, or inlier counts of all hypotheses
+  double refine = 0;   ///< ICP
+  double verify = 0;   ///< evidence and degeneracy search, or the winner's support
+  double total() const { return match + propose + rank + refine + verify; }
 };
 
 /// Counts and wall times (milliseconds) of the preparation of one cloud.
@@ -75,10 +78,12 @@ struct PrepareStatistics {
   std::uint64_t invalid_points = 0;         ///< dropped for NaN or infinite coordinates
   std::uint32_t points = 0;                 ///< after downsampling
   std::uint32_t points_without_normal = 0;  ///< fewer than 3 neighbours
-  /// no neighbour within the feature radius, or no normal: never matched
+  /// No neighbour within the feature radius, or no normal: never matched.
   std::uint32_t points_without_feature = 0;
-  double downsample = 0, normals = 0, features = 0, grid = 0, depth_maps = 0, fronts = 0;
-  double total() const { return downsample + normals + features + grid + depth_maps + fronts; }
+  double downsample = 0, normals = 0, features = 0, grid = 0, depth_maps = 0, surface_sides = 0;
+  double total() const {
+    return downsample + normals + features + grid + depth_maps + surface_sides;
+  }
 };
 
 }  // namespace gpureg

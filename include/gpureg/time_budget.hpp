@@ -29,8 +29,8 @@ struct TimedResult {
 /// The one thing in gpureg that is not deterministic: which levels are run depends on the clock.
 /// What each level gives does not. options: as for align(); what with_quality() sets is set per
 /// level. Throws InvalidArgument as align() does, for milliseconds that are not finite and > 0, and
-/// for Proposal::quadruples, which has no levels. Thread-safe, but calls of other threads on the
-/// same context take turns with it and their time counts.
+/// for RegistrationMethod::quadruples, which has no levels. Thread-safe, but calls of other threads
+/// on the same context take turns with it and their time counts.
 TimedResult align_within(const Context& context, const PreparedCloud& source,
                          const PreparedCloud& target, double milliseconds,
                          const RegistrationOptions& options = {});

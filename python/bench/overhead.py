@@ -20,7 +20,7 @@ import gpureg
 
 def overhead(arguments: argparse.Namespace) -> None:
     options = gpureg.RegistrationOptions()
-    options.hypothesis.count = arguments.hypotheses
+    options.quadruples.count = arguments.hypotheses
     clouds = [gpureg.prepare(path) for _, path in gpureg._core.list_fragments(arguments.folder)]
     pairs = [(j, i) for i in range(len(clouds)) for j in range(i + 1, len(clouds))]
     reference = subprocess.Popen(
@@ -62,7 +62,7 @@ def overhead(arguments: argparse.Namespace) -> None:
 def scaling(arguments: argparse.Namespace) -> None:
     """The same work by one thread and by n, each with a context of one CPU thread."""
     options = gpureg.RegistrationOptions()
-    options.hypothesis.count = arguments.hypotheses
+    options.quadruples.count = arguments.hypotheses
     paths = [path for _, path in gpureg._core.list_fragments(arguments.folder)[:2]]
     contexts = [gpureg.Context.cpu(1) for _ in range(arguments.threads)]
     a, b = (gpureg.prepare(path, context=contexts[0]) for path in paths)

@@ -14,7 +14,7 @@ int main(int argc, char** argv) {
   if (argc != 3) return 2;
   const auto context = gpureg::Context::best();
   gpureg::RegistrationOptions options;
-  options.hypothesis.count = static_cast<std::uint32_t>(std::strtoul(argv[2], nullptr, 10));
+  options.quadruples.count = static_cast<std::uint32_t>(std::strtoul(argv[2], nullptr, 10));
   std::vector<gpureg::PreparedCloud> clouds;
   for (const auto& [number, path] : gpureg::io::list_fragments(argv[1]))
     clouds.push_back(gpureg::prepare(context, gpureg::io::read_point_cloud(path).view()));

@@ -44,9 +44,10 @@ inline bool is_bool(py::handle value) {
 
 template <typename M>
 M convert(py::handle value) {
-  if constexpr (std::is_same_v<M, Proposal>) {
+  if constexpr (std::is_same_v<M, RegistrationMethod>) {
     const auto text = value.cast<std::string>();
-    for (const Proposal p : {Proposal::compatibility, Proposal::quadruples})
+    for (const RegistrationMethod p :
+         {RegistrationMethod::compatibility, RegistrationMethod::quadruples})
       if (text == to_string(p)) return p;
     throw py::cast_error();
   } else {
@@ -61,7 +62,7 @@ template <typename M>
 std::string expected() {
   if constexpr (std::is_same_v<M, bool>)
     return "True or False";
-  else if constexpr (std::is_same_v<M, Proposal>)
+  else if constexpr (std::is_same_v<M, RegistrationMethod>)
     return "'compatibility' or 'quadruples'";
   else if constexpr (std::is_floating_point_v<M>)
     return "a number";
@@ -111,7 +112,7 @@ Field<T> field(std::string name, M T::* member, std::string doc) {
   f.get = [member](const T& t) -> py::object {
     if constexpr (std::is_same_v<M, float>)
       return py::float_(shortest(t.*member));
-    else if constexpr (std::is_same_v<M, Proposal>)
+    else if constexpr (std::is_same_v<M, RegistrationMethod>)
       return py::str(to_string(t.*member));
     else
       return py::cast(t.*member);

@@ -13,7 +13,7 @@ PYBIND11_MODULE(_core, m) {
   bind_prepare(m);
   bind_prior(m);
   bind_align(m);
-  bind_agreement(m);
+  bind_loop_consistency(m);
   bind_time_budget(m);
   bind_voxel_size(m);
   bind_files(m);

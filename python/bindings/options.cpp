@@ -23,7 +23,7 @@ std::vector<Field<PrepareOptions>> prepare_fields() {
           "depth_maps", &O::depth_maps,
           "Viewpoints that depth maps are made of for free-space tests; 0: none, and given normals "
           "are never turned."),
-      field("front_reach", &O::front_reach,
+      field("surface_side_distance", &O::surface_side_distance,
             "How far from its surfaces a cloud tells their front from their back, metres; 0: not "
             "at all."),
   };
@@ -72,7 +72,7 @@ std::vector<Field<EvidenceOptions>> evidence_fields() {
             "Degrees between the normals of an inlier, (0, 180]."),
       field("mode_angle", &O::mode_angle, "Degrees within which two poses are one, and ..."),
       field("mode_distance", &O::mode_distance, "... metres between the clouds' centres."),
-      field("slide_distance", &O::slide_distance,
+      field("degeneracy_search_distance", &O::degeneracy_search_distance,
             "Metres that the likeliest pose is slid, both ways, along the direction that its "
             "surfaces determine least, and by quarters of it where it is open whether the pose is "
             "right; 0: not at all."),
@@ -90,7 +90,7 @@ std::vector<Field<ScoreOptions>> score_fields() {
             "Farthest an inlier may be, metres."),
       field("max_normal_angle", &O::max_normal_angle,
             "Degrees between an inlier's normals while hypotheses compete, (0, 180]."),
-      field("max_judged_normal_angle", &O::max_judged_normal_angle,
+      field("max_verification_normal_angle", &O::max_verification_normal_angle,
             "The same while the winner is judged."),
       field("min_inlier_ratio", &O::min_inlier_ratio,
             "Judged inlier ratio below which no alignment is reported, [0, 1]."),

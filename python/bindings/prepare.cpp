@@ -82,7 +82,7 @@ void warn_of_viewpoints(const std::vector<Input>& inputs, const std::vector<std:
   for (std::size_t k = 0; k < inputs.size(); ++k) {
     if (inputs[k].stream) continue;
     const double share = inputs[k].view.share_facing_away();
-    if (share <= PointCloudView::kMostFacingAway) continue;
+    if (share <= PointCloudView::kMaxFacingAway) continue;
     char percent[16];
     std::snprintf(percent, sizeof(percent), "%.1f %%", 100 * share);
     const std::string text = (names.empty() ? "" : names[k] + ": ") + "viewpoints: " + percent +

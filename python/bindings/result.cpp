@@ -50,7 +50,7 @@ std::vector<Field<PrepareStatistics>> prepare_fields() {
       field("features", &P::features, "Milliseconds of the features."),
       field("grid", &P::grid, "Milliseconds of the search grid."),
       field("depth_maps", &P::depth_maps, "Milliseconds of the depth maps."),
-      field("fronts", &P::fronts, "Milliseconds of the fronts of surfaces."),
+      field("surface_sides", &P::surface_sides, "Milliseconds of the surface_sides of surfaces."),
   };
 }
 
@@ -62,38 +62,42 @@ std::vector<Field<PoseEvidence>> evidence_fields() {
       field("source_overlap", &E::source_overlap,
             "Share of the source's points with a point of the target in reach, normals alike."),
       field("target_overlap", &E::target_overlap, "The other way round."),
-      field("source_reach", &E::source_reach, "The same whatever the normals."),
-      field("target_reach", &E::target_reach, "The other way round."),
+      field("source_overlap_any_normal", &E::source_overlap_any_normal,
+            "The same whatever the normals."),
+      field("target_overlap_any_normal", &E::target_overlap_any_normal, "The other way round."),
       field("source_residual", &E::source_residual,
             "RMS distance of the overlapping points over max_correspondence_distance."),
       field("target_residual", &E::target_residual, "The other way round."),
-      field("source_balanced_overlap", &E::source_balanced_overlap,
+      field("source_normal_weighted_overlap", &E::source_normal_weighted_overlap,
             "Points weigh less where many normals point their way."),
-      field("target_balanced_overlap", &E::target_balanced_overlap, "The other way round."),
-      field("source_seen", &E::source_seen,
+      field("target_normal_weighted_overlap", &E::target_normal_weighted_overlap,
+            "The other way round."),
+      field("source_observed", &E::source_observed,
             "Share of the source's points in directions that the target's viewpoints saw; 0: "
             "no viewpoint is known."),
-      field("target_seen", &E::target_seen, "The other way round."),
-      field("source_impossible", &E::source_impossible,
+      field("target_observed", &E::target_observed, "The other way round."),
+      field("source_free_space_violation", &E::source_free_space_violation,
             "Of these, the share in space that was seen to be free."),
-      field("target_impossible", &E::target_impossible, "The other way round."),
-      field("source_hidden", &E::source_hidden, "Of those seen, the share behind a surface."),
-      field("target_hidden", &E::target_hidden, "The other way round."),
-      field("source_around", &E::source_around,
+      field("target_free_space_violation", &E::target_free_space_violation, "The other way round."),
+      field("source_occluded", &E::source_occluded, "Of those seen, the share behind a surface."),
+      field("target_occluded", &E::target_occluded, "The other way round."),
+      field("source_near_surface", &E::source_near_surface,
             "Share of the source's points around the target's surfaces; 0: not known."),
-      field("target_around", &E::target_around, "The other way round."),
-      field("source_near_front", &E::source_near_front,
+      field("target_near_surface", &E::target_near_surface, "The other way round."),
+      field("source_front_violation_near", &E::source_front_violation_near,
             "Share of the source's points that touch nothing and are close in front of a surface "
             "of the target, by its normals."),
-      field("target_near_front", &E::target_near_front, "The other way round."),
-      field("source_far_front", &E::source_far_front, "The same, farther in front."),
-      field("target_far_front", &E::target_far_front, "The other way round."),
-      field("source_at_back", &E::source_at_back, "The same, behind one and in front of none."),
-      field("target_at_back", &E::target_at_back, "The other way round."),
-      field("stiffness", &E::stiffness,
+      field("target_front_violation_near", &E::target_front_violation_near, "The other way round."),
+      field("source_front_violation_far", &E::source_front_violation_far,
+            "The same, farther in front."),
+      field("target_front_violation_far", &E::target_front_violation_far, "The other way round."),
+      field("source_behind_surface", &E::source_behind_surface,
+            "The same, behind one and in front of none."),
+      field("target_behind_surface", &E::target_behind_surface, "The other way round."),
+      field("information_eigenvalues", &E::information_eigenvalues,
             "6 eigenvalues, ascending, of the point-to-plane information: a small one is a "
             "direction in which the pose slides."),
-      field("softest", &E::softest,
+      field("weakest_direction", &E::weakest_direction,
             "That direction, in the target's frame: rotation, then translation."),
   };
 }
@@ -141,7 +145,7 @@ py::dict state_of(const RegistrationMode& mode) {
   state["confidence"] = mode.confidence;
   state["overlap_confidence"] = mode.overlap_confidence;
   state["evidence"] = to_dict(mode.evidence, evidence_fields());
-  state["found_as"] = mode.found_as;
+  state["rank_before_refinement"] = mode.rank_before_refinement;
   return state;
 }
 
@@ -152,7 +156,7 @@ RegistrationMode mode_from(const py::dict& state) {
   mode.confidence = state["confidence"].cast<double>();
   mode.overlap_confidence = state["overlap_confidence"].cast<double>();
   assign(mode.evidence, evidence_fields(), state["evidence"], "PoseEvidence");
-  mode.found_as = state["found_as"].cast<std::uint32_t>();
+  mode.rank_before_refinement = state["rank_before_refinement"].cast<std::uint32_t>();
   return mode;
 }
 
@@ -166,7 +170,8 @@ void bind_mode(py::module_& m) {
       .def_readonly("overlap_confidence", &M::overlap_confidence,
                     "Probability that it is right and that the clouds overlap by 30 % or more.")
       .def_readonly("evidence", &M::evidence, "What speaks for and against it.")
-      .def_readonly("found_as", &M::found_as, "Place before refinement, the most promising first.")
+      .def_readonly("rank_before_refinement", &M::rank_before_refinement,
+                    "SurfaceSide before refinement, the most promising first.")
       .def(
           "to_dict", [](const M& o) { return state_of(o); },
           "All values as plain Python and numpy objects.")

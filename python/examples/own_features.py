@@ -41,7 +41,7 @@ def main() -> None:
     ).to(device)
     options = gpureg.RegistrationOptions.from_voxel_size(0.05)
     options.prepare.voxel_size = 0.0  # the network has chosen the points
-    options.hypothesis.count = 100_000
+    options.quadruples.count = 100_000
     clouds = [
         gpureg.prepare(points, features=features_of(points, network), options=options.prepare)
         for points in (source, target)

@@ -12,10 +12,8 @@ and `register_all`.
 
 from typing import TYPE_CHECKING, Any
 
-from ._agreement import agreement
 from ._contexts import default_context
 from ._core import (
-    AgreementOptions,
     BackendUnavailable,
     CompatibilityOptions,
     Context,
@@ -26,7 +24,8 @@ from ._core import (
     HypothesisOptions,
     InvalidArgument,
     IoError,
-    PairAgreement,
+    LoopConsistencyOptions,
+    PairConsistency,
     PointCloud,
     PoseEvidence,
     PreparedCloud,
@@ -45,6 +44,7 @@ from ._core import (
     __version__,
     describe_backends,
 )
+from ._loop_consistency import agreement
 from .files import read_point_cloud, write_point_cloud
 from .fragments import FragmentSet
 from .preparation import prepare, prepare_batch
@@ -71,7 +71,6 @@ def __getattr__(name: str) -> Any:
 
 
 __all__ = [
-    "AgreementOptions",
     "BackendUnavailable",
     "BatchInterrupted",
     "BatchRun",
@@ -85,7 +84,8 @@ __all__ = [
     "HypothesisOptions",
     "InvalidArgument",
     "IoError",
-    "PairAgreement",
+    "LoopConsistencyOptions",
+    "PairConsistency",
     "PointCloud",
     "PoseEvidence",
     "PrepareOptions",

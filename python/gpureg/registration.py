@@ -289,7 +289,7 @@ def register(
         if quality is not None:
             options = options.with_quality(quality)
         if seed is not None:
-            options.hypothesis.seed = seed
+            options.seed = seed
     context = context_of(context)
     clouds = []
     for cloud, name in ((source, "source"), (target, "target")):

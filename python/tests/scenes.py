@@ -44,6 +44,6 @@ def error_of(result: gpureg.RegistrationResult, truth: np.ndarray) -> float:
 def few(count: int = 20000, voxel_size: float = 0.05) -> gpureg.RegistrationOptions:
     """The paper's sampling with few quadruples, refined: fast."""
     options = gpureg.RegistrationOptions.loopsmart(voxel_size)
-    options.hypothesis.count = count
+    options.quadruples.count = count
     options.refine.max_iterations = 20
     return options

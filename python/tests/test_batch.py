@@ -202,7 +202,7 @@ def test_another_run_is_refused(source, tmp_path):
     clouds = [source[:500], source[500:1000], source[1000:1500]]
     gpureg.register_all(clouds, output=tmp_path, options=few(100, 0.1), progress=False)
     for change, message in [
-        ({"options": few(101, 0.1)}, "options.hypothesis.count was 100, now 101"),
+        ({"options": few(101, 0.1)}, "options.quadruples.count was 100, now 101"),
         ({"options": few(100, 0.1), "pairs": [(0, 1)]}, "pairs.count was 3, now 1"),
         ({"options": few(100, 0.1), "chunk_size": 1}, "chunk_size was 256, now 1"),
     ]:
@@ -279,7 +279,7 @@ class TestCommand:
         for k in range(5):
             gpureg.write_point_cloud(folder / f"cloud_bin_{k}.ply", moved(whole[:: k + 1], pose(k)))
         options = gpureg.RegistrationOptions.loopsmart(0.06)
-        options.hypothesis.count = 20000
+        options.quadruples.count = 20000
         self.compare(
             folder,
             tmp_path,

@@ -21,20 +21,20 @@ import fit_confidence
 SIDES = (
     "overlap",
     "reach",
-    "balanced_overlap",
+    "normal_weighted_overlap",
     "seen",
     "impossible",
     "hidden",
     "around",
-    "near_front",
-    "far_front",
-    "at_back",
+    "front_violation_near",
+    "front_violation_far",
+    "behind_surface",
 )
 
 
 def shipped(name):
     """The three regressions of a model, out of the header."""
-    text = (ROOT / "src/api/confidence_model.hpp").read_text()
+    text = (ROOT / "src/confidence/confidence_model.hpp").read_text()
     biases = re.search(rf"constexpr Model {name}{{{{(.*)}}}};", text).group(1)
     out = []
     for stage in ("ranking", "confidence", "overlap"):
@@ -53,7 +53,7 @@ def evidence_of(mode):
         **{side: [getattr(e, f"source_{side}"), getattr(e, f"target_{side}")] for side in SIDES},
         "match_inliers": e.match_inliers,
         "match_support": e.match_support,
-        "stiffness": list(e.stiffness),
+        "information_eigenvalues": list(e.information_eigenvalues),
     }
 
 
@@ -91,13 +91,13 @@ def corner(seed, boxes, points):
 
 @pytest.mark.parametrize("name", fit_confidence.MODELS)
 def test_as_fitted(name):
-    free_space, fronts = fit_confidence.MODELS[name]
+    free_space, surface_sides = fit_confidence.MODELS[name]
     options = gpureg.RegistrationOptions.from_voxel_size(0.05)
     options.min_confidence = 0
     if not free_space:
         options.prepare.depth_maps = 0
-    if not fronts:
-        options.prepare.front_reach = 0
+    if not surface_sides:
+        options.prepare.surface_side_distance = 0
     seen = set()
     for seed, boxes, points in (
         (1, 6, 6000),
@@ -121,12 +121,12 @@ def test_as_fitted(name):
             rtol=1e-6,
             atol=1e-9,
         )
-        front = sum(evidence_of(result.modes[0])["near_front"])
+        front = sum(evidence_of(result.modes[0])["front_violation_near"])
         seen.add(
             "above"
-            if front > fit_confidence.LEAST_JUDGED_FRONT
+            if front > fit_confidence.MIN_VERIFIED_FRONT_VIOLATION
             else "between"
-            if front > fit_confidence.LEAST_FRONT
+            if front > fit_confidence.MIN_FRONT_VIOLATION
             else "below"
         )
-    assert not fronts or len(seen) > 1, seen
+    assert not surface_sides or len(seen) > 1, seen

@@ -115,13 +115,13 @@ def test_normals_in_map_coordinates_need_no_viewpoint():
         assert np.median(cloud.normals[upright, 0]) > 0.99
         evidence = gpureg.align(cloud, cloud).modes[0].evidence
         assert (
-            evidence.source_seen == evidence.target_seen == 0
+            evidence.source_observed == evidence.target_observed == 0
         )  # nothing is known about free space
     seen = gpureg.prepare(
         points + [5e6, 5e6, -5e6], normals=normals, viewpoints=[[5e6 + 4, 5e6 + 2, 1 - 5e6]]
     )
     assert np.abs(seen.viewpoints - [5e6 + 4, 5e6 + 2, 1 - 5e6]).max() < 1e-6
-    assert gpureg.align(seen, seen).modes[0].evidence.source_seen > 0
+    assert gpureg.align(seen, seen).modes[0].evidence.source_observed > 0
 
 
 def test_small_float64_coordinates_are_only_cast(source, reference):

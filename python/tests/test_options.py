@@ -109,7 +109,7 @@ POINTS = [[0, 0, 0]]
             "voxel_size: expected a number, got '5'",
         ),
         (
-            lambda: gpureg.AgreementOptions.from_voxel_size(None),
+            lambda: gpureg.LoopConsistencyOptions.from_voxel_size(None),
             TypeError,
             "voxel_size: expected a number, got None",
         ),
@@ -226,17 +226,17 @@ def test_numbers_are_as_written():
 
 def test_nested_options_are_the_same_object():
     options = gpureg.RegistrationOptions()
-    options.hypothesis.seed = 7
-    assert options.hypothesis.seed == 7
+    options.seed = 7
+    assert options.seed == 7
     assert options != gpureg.RegistrationOptions()
     options.hypothesis = gpureg.HypothesisOptions(seed=9)
-    assert options.hypothesis.seed == 9
+    assert options.seed == 9
 
 
 def test_presets():
     options = gpureg.RegistrationOptions.from_voxel_size(0.1)
     assert (
-        options.prepare.normal_radius == 0.2 and options.score.max_correspondence_distance == 0.15
+        options.prepare.normal_radius == 0.2 and options.prepare.max_correspondence_distance == 0.15
     )
     assert gpureg.RegistrationOptions.from_voxel_size(0.05) == gpureg.RegistrationOptions()
     assert gpureg.RegistrationOptions.loopsmart().refine.max_iterations == 0

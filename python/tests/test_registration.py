@@ -49,8 +49,10 @@ def test_modes_say_what_speaks_for_them(source, target):
     )
     assert best.confidence >= rival.confidence and best.overlap_confidence <= best.confidence
     assert best.evidence.match_support > rival.evidence.match_support
-    assert len(best.evidence.stiffness) == 6 and best.evidence.stiffness == sorted(
-        best.evidence.stiffness
+    assert len(
+        best.evidence.information_eigenvalues
+    ) == 6 and best.evidence.information_eigenvalues == sorted(
+        best.evidence.information_eigenvalues
     )
     assert repr(best).startswith("<gpureg.RegistrationMode, confidence ")
     paper = gpureg.align(

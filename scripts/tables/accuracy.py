@@ -92,8 +92,8 @@ def confidence():
         "| --- | --- | --- | --- | --- | --- | --- | --- | --- |",
     ]
     looks = {
-        "everything": "free space, fronts",
-        "fronts": "fronts",
+        "everything": "free space, surface_sides",
+        "surface_sides": "surface_sides",
         "free_space": "free space",
         "neither": "neither",
     }
@@ -117,7 +117,7 @@ def unseen():
     groups = {}
     for run in tested():
         if (
-            run["model"] == ("fronts" if run["viewpoints"] == "unknown" else "everything")
+            run["model"] == ("surface_sides" if run["viewpoints"] == "unknown" else "everything")
             and "kitchen" not in run["scene"]
         ):
             groups.setdefault(run["viewpoints"], {}).setdefault(run["scene"], []).append(run)
@@ -236,8 +236,8 @@ def closing_loops():
     return out
 
 
-def agreement_fresh():
-    record = load("agreement_fresh.json")
+def loop_consistency_fresh():
+    record = load("loop_consistency_fresh.json")
     out = [
         "| scene | best right, % | R@P95, % | R@P99, % | ECE | right above 0.9, % |",
         "| --- | --- | --- | --- | --- | --- |",
@@ -290,7 +290,7 @@ TABLES = {
     "other_sensors": other_sensors,
     "mistakes": mistakes,
     "agreement": agreement,
-    "agreement_fresh": agreement_fresh,
+    "loop_consistency_fresh": loop_consistency_fresh,
     "closing_loops": closing_loops,
     "few_points": few_points,
     "accuracy_sweep": accuracy_sweep,

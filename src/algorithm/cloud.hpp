@@ -2,7 +2,7 @@
 #pragma once
 
 #include "algorithm/closest.hpp"
-#include "algorithm/fronts.hpp"
+#include "algorithm/surface_sides.hpp"
 #include "algorithm/visibility.hpp"
 
 namespace gpureg {
@@ -18,14 +18,14 @@ struct CloudView {
   std::uint32_t feature_dimension;
   float radius;  ///< largest distance of a point from the local origin, > 0
   ClosestGridView closest;
-  const void* executor_data;  ///< what the executor keeps beside, for itself
-  /// null, or features of the wide radius, size x feature_dimension
+  const void* executor_data;  ///< further data of the executor
+  /// Features of the wide radius, size x feature_dimension; null: none.
   const float* wide_features;
   const std::uint8_t* has_wide_feature;
-  const std::uint32_t* balance;  ///< weight of each point, see balance.hpp
-  std::uint64_t balance_total;
-  VisibilityView visibility;  ///< no maps where viewpoints are not known or not asked for
-  FrontView fronts;           ///< none where not asked for, or the cloud is too wide
+  const std::uint32_t* normal_weight;  ///< weight of each point, see normal_weight.hpp
+  std::uint64_t normal_weight_total;
+  VisibilityView visibility;      ///< depth maps; none where no viewpoint is known
+  SurfaceSideView surface_sides;  ///< none where the option is 0 or the cloud too wide
 };
 
 }  // namespace gpureg

@@ -41,7 +41,7 @@ GPUREG_HD bool compatible(const OrientedMatch& a, const OrientedMatch& b,
          (turn * turn <= test.squared_turn);
 }
 
-/// Place of a match in the order that decides which are kept where there are too many, and which
+/// Rank of a match in the order that decides which are kept where there are too many, and which
 /// members of a crowded neighbourhood are looked at: random, but a function of the match and the
 /// seed alone. The match itself breaks ties.
 GPUREG_HD std::uint32_t match_order(std::uint32_t source, std::uint32_t target,
@@ -71,9 +71,9 @@ GPUREG_HD bool wide_triangle(Vec3 p0, Vec3 p1, Vec3 p2, float squared_length) {
          (squared_norm(p2 - p1) >= squared_length);
 }
 
-/// How promising a match is as a seed: the number of its compatible matches times its balanced
-/// weight. By the number alone floors and walls, whose matches are many and alike, would take all
-/// seeds. degree <= 2^16, weight <= 2^17.
+/// Strength of a match as a seed: the number of its compatible matches times its normal weight. By
+/// the number alone floors and walls, whose matches are many and alike, would take all seeds.
+/// degree <= 2^16, weight <= 2^17.
 GPUREG_HD std::uint32_t seed_strength(std::uint32_t degree, std::uint32_t weight) {
   return static_cast<std::uint32_t>((static_cast<std::uint64_t>(degree) * weight) >> 10);
 }

@@ -1,39 +1,39 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include "algorithm/balance.hpp"
 #include "algorithm/cloud.hpp"
 #include "algorithm/icp.hpp"
 #include "algorithm/inlier.hpp"
+#include "algorithm/normal_weight.hpp"
 
 namespace gpureg {
 
-/// What speaks for and against a pose on one side: the points of one cloud moved into the other.
-/// Integers only.
+/// Evidence of one side of a pose: counts over the points of one cloud moved into the other.
+/// Integers only, so that every order of summation gives the same bits.
 struct SideEvidence {
-  std::uint64_t balanced;  ///< sum of the weights of the inliers
-  std::uint64_t residual;  ///< of the inliers, see fixed_residual
-  /// of those seen and before, sums of how squarely at best, see facing()
-  std::uint64_t facing_seen, facing_before;
-  std::uint32_t tested;   ///< points looked at
-  std::uint32_t inliers;  ///< closest point within the distance, normals alike
-  std::uint32_t hits;     ///< closest point within the distance
-  std::uint32_t seen;     ///< in a direction that some viewpoint of the other cloud saw
-  std::uint32_t before;   ///< in front of a seen surface without touching any: impossible places
-  std::uint32_t hidden;   ///< behind every surface seen in their direction
-  std::uint32_t around;   ///< in cells of the other cloud's fronts, see fronts.hpp
-  /// of those that touch nothing and are in no surface's cell, by the first that holds
-  std::uint32_t near_front, far_front, at_back;
+  std::uint64_t normal_weighted;  ///< sum of the normal weights of the inliers
+  std::uint64_t residual;         ///< of the inliers, see fixed_residual
+  /// Sums of incidence(), the best of all viewpoints, over the points observed and violating.
+  std::uint64_t incidence_observed, incidence_violating;
+  std::uint32_t tested;        ///< points compared
+  std::uint32_t inliers;       ///< closest point within the distance, normals within the angle
+  std::uint32_t hits;          ///< closest point within the distance, whatever the normals
+  std::uint32_t observed;      ///< in a direction that a viewpoint of the other cloud observed
+  std::uint32_t violating;     ///< in observed free space, without a point within the distance
+  std::uint32_t occluded;      ///< behind every surface observed in their direction
+  std::uint32_t near_surface;  ///< in a marked cell of the other cloud, see surface_sides.hpp
+  /// Points without a hit that lie on no surface, by the first side that holds.
+  std::uint32_t front_violation_near, front_violation_far, behind_surface;
 };
 
-/// Matches that a pose brings together, by number and by the weights of their points' normals (see
-/// balance.hpp).
+/// Matches that a pose brings within the consensus distance: their number and the sums of their
+/// normal weights (normal_weight.hpp).
 struct MatchEvidence {
   std::uint64_t source_weight, target_weight;
   std::uint32_t inliers;
 };
 
-/// What makes a point count for or against.
+/// Thresholds of the evidence.
 struct EvidenceTest {
   InlierTest inlier;
   float margin, min_range;
@@ -46,65 +46,71 @@ struct InformationSums {
   std::int64_t arm[3];
 };
 
-struct Weighed {
+/// Result of comparing one point.
+struct VerifiedPoint {
   std::uint32_t closest;  ///< kNoValue: none within the distance
   bool inlier;
 };
 
-/// place: of a point, the bits of fronts.hpp.
-GPUREG_HD void add_place(std::uint32_t place, bool hit, SideEvidence& e) {
-  const bool open = !hit & ((place & kOnSurface) == 0), near = (place & kNearFront) != 0,
-             far = (place & kFarFront) != 0;
-  e.around += place != 0 ? 1u : 0u;
-  e.near_front += open & near ? 1u : 0u;
-  e.far_front += open & !near & far ? 1u : 0u;
-  e.at_back += open & !near & !far & (place != 0) ? 1u : 0u;
+/// Counts a point by its side of the surfaces. side: bits of SurfaceSide; hit: it has a closest
+/// point.
+GPUREG_HD void add_surface_side(std::uint32_t side, bool hit, SideEvidence& e) {
+  const bool open = !hit & ((side & kOnSurface) == 0), near = (side & kFrontNear) != 0,
+             far = (side & kFrontFar) != 0;
+  e.near_surface += side != 0 ? 1u : 0u;
+  e.front_violation_near += open & near ? 1u : 0u;
+  e.front_violation_far += open & !near & far ? 1u : 0u;
+  e.behind_surface += open & !near & !far & (side != 0) ? 1u : 0u;
 }
 
-/// One point of `moved` under the pose, against the other cloud; maps: how many of its viewpoints
-/// are asked. q: the moved point, c: what is closest to it.
-GPUREG_HD Weighed weigh_found(const CloudView& moved, const CloudView& other, const Rigid& pose,
-                              const EvidenceTest& test, std::uint32_t maps, std::uint32_t i, Vec3 q,
-                              Closest c, SideEvidence& e) {
+/// Evidence of point i of `moved` under the pose. maps: number of depth maps of the other cloud
+/// that are compared; q: the moved point; c: its closest point in the other cloud.
+GPUREG_HD VerifiedPoint verify_found(const CloudView& moved, const CloudView& other,
+                                     const Rigid& pose, const EvidenceTest& test,
+                                     std::uint32_t maps, std::uint32_t i, Vec3 q, Closest c,
+                                     SideEvidence& e) {
   const Vec3 normal = rotate(pose, moved.normals[i]);
   const bool hit = c.index != kNoValue;
   const bool inlier = hit && normals_agree(normal, other.normals[c.index], test.inlier.min_cosine);
-  bool seen = false, before = false, surface = false;
-  float facing_seen = 0.0f, facing_before = 0.0f;
+  bool observed = false, violating = false, surface = false;
+  float incidence_observed = 0.0f, incidence_violating = 0.0f;
   for (std::uint32_t m = 0; m < maps; ++m) {
-    const Sight s = sight(other.visibility, m, q, test.margin, test.min_range);
-    if (s == Sight::unknown) continue;
-    const float squarely = facing(normal, q - other.visibility.viewpoints[m]);
-    seen = true;
-    facing_seen = squarely > facing_seen ? squarely : facing_seen;
-    surface |= s == Sight::surface;
-    if (s != Sight::before) continue;
-    before = true;
-    facing_before = squarely > facing_before ? squarely : facing_before;
+    const Observation s = observe(other.visibility, m, q, test.margin, test.min_range);
+    if (s == Observation::unknown) continue;
+    const float weight = incidence(normal, q - other.visibility.viewpoints[m]);
+    observed = true;
+    incidence_observed = weight > incidence_observed ? weight : incidence_observed;
+    surface |= s == Observation::surface;
+    if (s != Observation::free_space) continue;
+    violating = true;
+    incidence_violating = weight > incidence_violating ? weight : incidence_violating;
   }
-  before &= !hit;
+  violating &= !hit;
   e.tested += 1;
   e.hits += hit ? 1u : 0u;
   e.inliers += inlier ? 1u : 0u;
-  e.balanced += inlier ? moved.balance[i] : 0u;
+  e.normal_weighted += inlier ? moved.normal_weight[i] : 0u;
   e.residual += inlier ? fixed_residual(c.squared_distance, test.inlier.inverse_max_squared) : 0u;
-  e.seen += seen ? 1u : 0u;
-  e.before += before ? 1u : 0u;
-  e.facing_seen += fixed_facing(facing_seen);
-  e.facing_before += before ? fixed_facing(facing_before) : 0u;
-  e.hidden += (seen & !before & !surface & !hit) ? 1u : 0u;
-  add_place(other.fronts.words ? place_of(other.fronts, q) : 0u, hit, e);
+  e.observed += observed ? 1u : 0u;
+  e.violating += violating ? 1u : 0u;
+  e.incidence_observed += fixed_incidence(incidence_observed);
+  e.incidence_violating += violating ? fixed_incidence(incidence_violating) : 0u;
+  e.occluded += (observed & !violating & !surface & !hit) ? 1u : 0u;
+  add_surface_side(other.surface_sides.words ? surface_side_at(other.surface_sides, q) : 0u, hit,
+                   e);
   return {c.index, inlier};
 }
 
-GPUREG_HD Weighed weigh_point(const CloudView& moved, const CloudView& other, const Rigid& pose,
-                              const EvidenceTest& test, std::uint32_t maps, std::uint32_t i,
-                              SideEvidence& e) {
+/// verify_found() with the exact closest point.
+GPUREG_HD VerifiedPoint verify_point(const CloudView& moved, const CloudView& other,
+                                     const Rigid& pose, const EvidenceTest& test,
+                                     std::uint32_t maps, std::uint32_t i, SideEvidence& e) {
   const Vec3 q = apply(pose, moved.points[i]);
-  return weigh_found(moved, other, pose, test, maps, i, q,
-                     find_closest(other.closest, other.points, q, test.inlier.max_squared), e);
+  return verify_found(moved, other, pose, test, maps, i, q,
+                      find_closest(other.closest, other.points, q, test.inlier.max_squared), e);
 }
 
+/// Adds one inlier to the point-to-plane information.
 GPUREG_HD void add_information(const CloudView& moved, const Rigid& pose, std::uint32_t i,
                                InformationSums& sums) {
   const Vec3 arm = rotate(pose, moved.points[i]) * (1.0f / moved.radius);
@@ -119,44 +125,47 @@ GPUREG_HD void add_information(const CloudView& moved, const Rigid& pose, std::u
   sums.arm[2] += to_icp_fixed(arm.z);
 }
 
-/// Step between the points that a sample of about `most` looks at.
+/// Step between the points of a sample of about `most`.
 GPUREG_HD std::uint32_t sample_stride(std::uint32_t points, std::uint32_t most) {
   return points <= most ? 1u : (points + most - 1) / most;
 }
 
-/// How many depth maps the quick look at a candidate asks.
-GPUREG_HD std::uint32_t quick_maps(const VisibilityView& maps) {
+/// Number of depth maps that the coarse score compares.
+GPUREG_HD std::uint32_t coarse_score_maps(const VisibilityView& maps) {
   return maps.count < 1 ? maps.count : 1;
 }
 
 /// Weight of a point in [0, 1].
-GPUREG_HD float balance_share(std::uint32_t weight) {
-  return static_cast<float>(weight) * (1.0f / kBalanceScale);
+GPUREG_HD float normal_weight_share(std::uint32_t weight) {
+  return static_cast<float>(weight) * (1.0f / kNormalWeightScale);
 }
 
-/// Modes are refined twice: on a sample, then on all points with a kernel this much narrower. The
-/// wide kernel pulls from afar; the narrow one ends at the surfaces, where the wide one is still
-/// pulled along by what slides.
+/// Modes are refined twice: on a sample, then on all points with a kernel narrower by this factor.
+/// The wide kernel converges from farther away; the narrow one is less biased by surfaces that only
+/// one of the clouds has.
 constexpr float kPolishKernel = 0.5f;
-/// shares of the max distance that end the first and the second refinement
+/// Step length that ends the first and the second refinement, as a share of the distance limit.
 constexpr double kRoughSettled = 1e-2, kPolishSettled = 2e-3;
-/// degrees between the normals of what refinement pulls together
+/// Largest angle between the normals of a correspondence of the refinement, degrees.
 constexpr float kRefineNormalAngle = 45.0f;
 
-/// On the host only: trace of the rotation by that angle.
+/// Host only: trace of a rotation by that angle.
 inline float mode_trace(float degrees) {
   return static_cast<float>(
       1.0 + 2.0 * std::cos(static_cast<double>(degrees) * 3.14159265358979323846 / 180.0));
 }
 
-/// Ranks candidates before the dear tests: correspondence support, overlap balanced over both
-/// sides, and free space against it. match_share, overlaps: in [0, 1].
-GPUREG_HD float promise(float match_share, const SideEvidence& a, float weight_a,
-                        const SideEvidence& b, float weight_b) {
-  const float overlap =
-      static_cast<float>(a.balanced) / weight_a + static_cast<float>(b.balanced) / weight_b;
-  const float va = a.seen > 0 ? static_cast<float>(a.before) / static_cast<float>(a.seen) : 0.0f;
-  const float vb = b.seen > 0 ? static_cast<float>(b.before) / static_cast<float>(b.seen) : 0.0f;
+/// Coarse score of a candidate, which orders candidates before refinement: root of the match
+/// support times the normal-weighted overlap of both sides, reduced by free-space violations.
+/// match_share: in [0, 1]; weight_a, weight_b: normal weight of each side's whole sample.
+GPUREG_HD float coarse_score(float match_share, const SideEvidence& a, float weight_a,
+                             const SideEvidence& b, float weight_b) {
+  const float overlap = static_cast<float>(a.normal_weighted) / weight_a +
+                        static_cast<float>(b.normal_weighted) / weight_b;
+  const float va =
+      a.observed > 0 ? static_cast<float>(a.violating) / static_cast<float>(a.observed) : 0.0f;
+  const float vb =
+      b.observed > 0 ? static_cast<float>(b.violating) / static_cast<float>(b.observed) : 0.0f;
   // 1 / (series of e^x): e^-x without a library's exp, whose last bit differs between machines.
   const float x = 4.0f * (va + vb);
   const float growth =
@@ -164,8 +173,8 @@ GPUREG_HD float promise(float match_share, const SideEvidence& a, float weight_a
   return sqrtf(match_share) * overlap / growth;
 }
 
-/// True where two poses of the source bring it to the same place: less than the angle apart (by its
-/// cosine's bound on the trace), the cloud's centre less than the distance.
+/// True where two poses belong to one mode: rotations within the angle (as a bound on the trace)
+/// and the cloud's local origin within the distance.
 GPUREG_HD bool same_mode(const Rigid& a, const Rigid& b, float min_trace, float squared_distance) {
   float trace = 0.0f;
   for (int k = 0; k < 9; ++k) trace = fmaf(a.r[k], b.r[k], trace);

@@ -6,9 +6,10 @@
 
 namespace gpureg {
 
-/// What a cloud's viewpoints have seen: around each a cube of depth maps. A point that would hang
-/// in front of a surface that a viewpoint saw, on the line between, cannot be there. cells along an
-/// edge of a face: about 1/60 rad each
+// Free space as observed from a cloud's viewpoints: a cube of depth maps around each. A point of
+// another cloud between a viewpoint and the surface that it observed violates free space.
+
+/// Cells along an edge of a cube face: about 1/60 rad each.
 constexpr int kMapEdge = 96;
 constexpr std::uint32_t kMapFace = kMapEdge * kMapEdge;
 constexpr std::uint32_t kMapCells = 6 * kMapFace;
@@ -78,7 +79,7 @@ GPUREG_HD std::size_t chosen_viewpoint(std::size_t k, std::size_t count, std::si
 GPUREG_HD float depth_step(float voxel_size) { return voxel_size * 0.03125f; }
 
 /// Maps of one cloud: viewpoints x kMapCells depths, each the nearest within its 3 x 3 cells of the
-/// face; unknown where nothing was seen.
+/// face; unknown where nothing was observed.
 struct VisibilityView {
   const std::uint16_t* depth;
   const Vec3* viewpoints;  ///< in the cloud's local frame
@@ -86,34 +87,36 @@ struct VisibilityView {
   float step;  ///< length of one step of depth
 };
 
-/// How a place is seen by one map.
-enum class Sight : std::uint32_t { unknown = 0, behind = 1, surface = 2, before = 3 };
+/// What one depth map says about a location.
+enum class Observation : std::uint32_t { unknown = 0, occluded = 1, surface = 2, free_space = 3 };
 
-/// How squarely a surface faces a line of sight: the squared cosine between them, 16-bit fixed
-/// point. A surface seen at a grazing angle is before or behind another as soon as a pose or a
-/// depth is off by centimetres, so it says that much less. d: along the line, not zero.
-constexpr float kFacingScale = 65536.0f;
-/// of a point without normal: the mean over all directions
-constexpr float kUnknownFacing = 1.0f / 3.0f;
-GPUREG_HD float facing(Vec3 normal, Vec3 d) {
+/// Incidence weight of an observation: the squared cosine between the surface normal and the line
+/// of sight, in 16-bit fixed point. At a grazing angle an error of centimetres in pose or depth
+/// moves a surface in front of or behind another one, so grazing observations weigh less. d: along
+/// the line of sight, not zero.
+constexpr float kIncidenceScale = 65536.0f;
+/// Incidence weight of a point without normal: the mean over all directions.
+constexpr float kUnknownIncidence = 1.0f / 3.0f;
+GPUREG_HD float incidence(Vec3 normal, Vec3 d) {
   const float along = dot(normal, d);
-  return is_zero(normal) ? kUnknownFacing : along * along / squared_norm(d);
+  return is_zero(normal) ? kUnknownIncidence : along * along / squared_norm(d);
 }
-GPUREG_HD std::uint32_t fixed_facing(float facing) {
-  return static_cast<std::uint32_t>(facing * kFacingScale);
+GPUREG_HD std::uint32_t fixed_incidence(float incidence) {
+  return static_cast<std::uint32_t>(incidence * kIncidenceScale);
 }
 
-/// margin: how far before (or behind) the seen surface still counts as on it; nothing nearer to the
-/// viewpoint than min_range is judged.
-GPUREG_HD Sight sight(const VisibilityView& maps, std::uint32_t map, Vec3 p, float margin,
-                      float min_range) {
+/// Compares a location with one depth map. margin: distance in front of or behind the observed
+/// surface that still counts as on it. Locations nearer to the viewpoint than min_range are
+/// unknown.
+GPUREG_HD Observation observe(const VisibilityView& maps, std::uint32_t map, Vec3 p, float margin,
+                              float min_range) {
   const MapRay ray = map_ray(p - maps.viewpoints[map]);
-  if (!(ray.depth > min_range)) return Sight::unknown;
+  if (!(ray.depth > min_range)) return Observation::unknown;
   const std::uint16_t steps = maps.depth[static_cast<std::size_t>(map) * kMapCells + ray.cell];
-  if (steps == kUnknownDepth) return Sight::unknown;
+  if (steps == kUnknownDepth) return Observation::unknown;
   const float depth = static_cast<float>(steps) * maps.step;
-  if (ray.depth < depth - margin) return Sight::before;
-  return ray.depth > depth + margin ? Sight::behind : Sight::surface;
+  if (ray.depth < depth - margin) return Observation::free_space;
+  return ray.depth > depth + margin ? Observation::occluded : Observation::surface;
 }
 
 }  // namespace gpureg

@@ -3,7 +3,7 @@
 
 #include <thread>
 
-#include "api/validate.hpp"
+#include "common/validate.hpp"
 #include "pipeline/device_engine.hpp"
 
 namespace gpureg {
@@ -18,7 +18,9 @@ Context Context::cpu(unsigned threads) {
 
 Context Context::cuda(int device) {
   require(device >= 0, "device", device, "0 or more");
-  return Context(make_cuda_engine(device));
+  CudaOptions options;
+  options.devices = {device};
+  return Context(make_cuda_engine(options));
 }
 
 Context Context::cuda(const CudaOptions& options) {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "gpureg/options.hpp"
 
-#include "api/validate.hpp"
+#include "common/validate.hpp"
 
 namespace gpureg {
 
@@ -12,8 +12,8 @@ bool length(float v) { return positive(v) && v <= kLongest && v >= 1e-6f; }
 constexpr const char* kLength = "a length in [1e-6, 1e6]";
 }  // namespace
 
-const char* to_string(Proposal proposal) {
-  return proposal == Proposal::quadruples ? "quadruples" : "compatibility";
+const char* to_string(RegistrationMethod method) {
+  return method == RegistrationMethod::quadruples ? "quadruples" : "compatibility";
 }
 
 void PrepareOptions::validate() const {
@@ -21,29 +21,22 @@ void PrepareOptions::validate() const {
           "0 or a length in [1e-6, 1e6]");
   require(length(normal_radius), "prepare.normal_radius", normal_radius, kLength);
   require(length(feature_radius), "prepare.feature_radius", feature_radius, kLength);
-  require(length(search_distance), "prepare.search_distance", search_distance, kLength);
+  require(length(max_correspondence_distance), "prepare.max_correspondence_distance",
+          max_correspondence_distance, kLength);
   require(wide_feature_radius == 0.0f || length(wide_feature_radius), "prepare.wide_feature_radius",
           wide_feature_radius, "0 or a length in [1e-6, 1e6]");
   require(wide_feature_radius <= 4.0f * feature_radius, "prepare.wide_feature_radius",
           wide_feature_radius, "at most 4 times prepare.feature_radius");
   require(depth_maps <= 64, "prepare.depth_maps", depth_maps, "at most 64");
-  require(front_reach == 0.0f || length(front_reach), "prepare.front_reach", front_reach,
-          "0 or a length in [1e-6, 1e6]");
+  require(surface_side_distance == 0.0f || length(surface_side_distance),
+          "prepare.surface_side_distance", surface_side_distance, "0 or a length in [1e-6, 1e6]");
   require(voxel_size == 0.0f || feature_radius <= 100.0f * voxel_size, "prepare.feature_radius",
           feature_radius, "at most 100 times prepare.voxel_size");
   require(normal_radius <= 4.0f * feature_radius, "prepare.normal_radius", normal_radius,
           "at most 4 times prepare.feature_radius");
-  require(voxel_size == 0.0f || search_distance <= 20.0f * voxel_size, "prepare.search_distance",
-          search_distance, "at most 20 times prepare.voxel_size");
-}
-
-void HypothesisOptions::validate() const {
-  require(count >= 1 && count <= (1u << 30), "hypothesis.count", count, "1 to 2^30");
-  require(neighbors >= 1 && neighbors <= 16, "hypothesis.neighbors", neighbors, "1 to 16");
-  require(max_survivors >= 1 && max_survivors <= (1u << 22), "hypothesis.max_survivors",
-          max_survivors, "1 to 2^22");
-  require(std::isfinite(edge_similarity) && edge_similarity > 0 && edge_similarity <= 1,
-          "hypothesis.edge_similarity", edge_similarity, "a ratio in (0, 1]");
+  require(voxel_size == 0.0f || max_correspondence_distance <= 20.0f * voxel_size,
+          "prepare.max_correspondence_distance", max_correspondence_distance,
+          "at most 20 times prepare.voxel_size");
 }
 
 namespace {
@@ -56,6 +49,19 @@ void require_range(std::uint32_t value, std::uint32_t low, std::uint32_t high, c
   require(value >= low && value <= high, name, value, expected.c_str());
 }
 }  // namespace
+
+void QuadrupleOptions::validate() const {
+  require(count >= 1 && count <= (1u << 30), "quadruples.count", count, "1 to 2^30");
+  require_range(neighbors, 1, 16, "quadruples.neighbors");
+  require(max_survivors >= 1 && max_survivors <= (1u << 22), "quadruples.max_survivors",
+          max_survivors, "1 to 2^22");
+  require(std::isfinite(edge_similarity) && edge_similarity > 0 && edge_similarity <= 1,
+          "quadruples.edge_similarity", edge_similarity, "a ratio in (0, 1]");
+  require_angle(max_normal_angle, "quadruples.max_normal_angle");
+  require_angle(max_verification_normal_angle, "quadruples.max_verification_normal_angle");
+  require(std::isfinite(min_inlier_ratio) && min_inlier_ratio >= 0 && min_inlier_ratio <= 1,
+          "quadruples.min_inlier_ratio", min_inlier_ratio, "a ratio in [0, 1]");
+}
 
 void CompatibilityOptions::validate() const {
   require_range(max_matches, 4, 65536, "compatibility.max_matches");
@@ -77,28 +83,15 @@ void EvidenceOptions::validate() const {
   require_angle(max_normal_angle, "evidence.max_normal_angle");
   require_angle(mode_angle, "evidence.mode_angle");
   require(length(mode_distance), "evidence.mode_distance", mode_distance, kLength);
-  require(slide_distance == 0.0f || length(slide_distance), "evidence.slide_distance",
-          slide_distance, "0 or a length in [1e-6, 1e6]");
+  require(degeneracy_search_distance == 0.0f || length(degeneracy_search_distance),
+          "evidence.degeneracy_search_distance", degeneracy_search_distance,
+          "0 or a length in [1e-6, 1e6]");
   require(length(free_space_margin), "evidence.free_space_margin", free_space_margin, kLength);
   require(length(min_range), "evidence.min_range", min_range, kLength);
 }
 
-void ScoreOptions::validate() const {
-  require(length(max_correspondence_distance), "score.max_correspondence_distance",
-          max_correspondence_distance, kLength);
-  require(std::isfinite(max_normal_angle) && max_normal_angle > 0 && max_normal_angle <= 180,
-          "score.max_normal_angle", max_normal_angle, "degrees in (0, 180]");
-  require(std::isfinite(max_judged_normal_angle) && max_judged_normal_angle > 0 &&
-              max_judged_normal_angle <= 180,
-          "score.max_judged_normal_angle", max_judged_normal_angle, "degrees in (0, 180]");
-  require(std::isfinite(min_inlier_ratio) && min_inlier_ratio >= 0 && min_inlier_ratio <= 1,
-          "score.min_inlier_ratio", min_inlier_ratio, "a ratio in [0, 1]");
-}
-
 void RefineOptions::validate() const {
   require(max_iterations <= 1000, "refine.max_iterations", max_iterations, "at most 1000");
-  require(length(max_correspondence_distance), "refine.max_correspondence_distance",
-          max_correspondence_distance, kLength);
   require(length(kernel_width), "refine.kernel_width", kernel_width, kLength);
 }
 
@@ -132,17 +125,15 @@ RegistrationOptions RegistrationOptions::from_voxel_size(float voxel_size, std::
   o.prepare.voxel_size = voxel_size;
   o.prepare.normal_radius = 2.0f * voxel_size;
   o.prepare.feature_radius = 5.0f * voxel_size;
-  o.prepare.search_distance = 1.5f * voxel_size;
-  o.score.max_correspondence_distance = 1.5f * voxel_size;
-  o.refine.max_correspondence_distance = 1.5f * voxel_size;
+  o.prepare.max_correspondence_distance = 1.5f * voxel_size;
   o.refine.kernel_width = 0.5f * voxel_size;
   o.prepare.wide_feature_radius = 8.0f * voxel_size;
-  o.prepare.front_reach = 10.0f * voxel_size;
+  o.prepare.surface_side_distance = 10.0f * voxel_size;
   o.compatibility.tolerance = voxel_size;
   o.compatibility.consensus_distance = 2.0f * voxel_size;
   o.compatibility.seed_separation = 2.0f * voxel_size;
   o.evidence.mode_distance = 6.0f * voxel_size;
-  o.evidence.slide_distance = 8.0f * voxel_size;
+  o.evidence.degeneracy_search_distance = 8.0f * voxel_size;
   // 2.4 v, and the default's bits at 0.05
   o.evidence.free_space_margin = voxel_size / 5.0f * 12.0f;
   o.evidence.min_range = 6.0f * voxel_size;
@@ -155,28 +146,20 @@ RegistrationOptions RegistrationOptions::loopsmart(float voxel_size) {
   RegistrationOptions o = from_voxel_size(voxel_size);
   o.prepare.wide_feature_radius = 0;
   o.prepare.depth_maps = 0;
-  o.prepare.front_reach = 0;
-  o.hypothesis.proposal = Proposal::quadruples;
+  o.prepare.surface_side_distance = 0;
+  o.method = RegistrationMethod::quadruples;
   o.refine.max_iterations = 0;
   return o;
 }
 
 void RegistrationOptions::validate() const {
   prepare.validate();
-  hypothesis.validate();
   compatibility.validate();
-  evidence.validate();
-  score.validate();
+  quadruples.validate();
   refine.validate();
+  evidence.validate();
   require(std::isfinite(min_confidence) && min_confidence >= 0 && min_confidence <= 1,
           "min_confidence", min_confidence, "a probability in [0, 1]");
-  require(score.max_correspondence_distance <= prepare.search_distance,
-          "score.max_correspondence_distance", score.max_correspondence_distance,
-          "at most prepare.search_distance");
-  require(
-      refine.max_iterations == 0 || refine.max_correspondence_distance <= prepare.search_distance,
-      "refine.max_correspondence_distance", refine.max_correspondence_distance,
-      "at most prepare.search_distance");
 }
 
 }  // namespace gpureg

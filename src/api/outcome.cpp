@@ -5,10 +5,11 @@
 #include <cmath>
 #include <limits>
 #include <map>
+#include <numeric>
 
-#include "api/confidence.hpp"
-#include "api/evidence.hpp"
 #include "api/frames.hpp"
+#include "confidence/confidence.hpp"
+#include "confidence/pose_evidence.hpp"
 #include "pipeline/conclude.hpp"
 
 namespace gpureg {
@@ -77,61 +78,115 @@ double distance_between(const UnalignedIsometry3d& a, const UnalignedIsometry3d&
                         t.squaredNorm()));
 }
 
-/// What was slid and stayed further away than so much of the distance of modes, a quarter of a
-/// metre at the usual voxels, is another place, and both cannot be right. Nearer, only the likelier
-/// one is kept.
-constexpr double kApart = 5.0 / 6;
+/// Minimum RMS displacement, as a fraction of mode_distance, for a perturbed pose to count as a
+/// mode of its own: a quarter of a metre at the default voxel size. Nearer, only the more likely
+/// one of the two is kept.
+constexpr double kDistinctModeFraction = 5.0 / 6;
+
+/// The modes of one pair, in the caller's frames.
+class Modes {
+ public:
+  Modes(const PairOutcome& outcome, const PreparedState& source, const PreparedState& target,
+        bool swapped, const RegistrationOptions& options)
+      : outcome_(outcome), source_(source), target_(target), swapped_(swapped), options_(options) {
+    for (std::size_t k = 0; k < outcome.modes.size(); ++k) add(k);
+    const ModeOutcome& first = outcome.modes.front();
+    middle_ = middle_of(source_moments(first), origin_of(source));
+  }
+
+  /// Ranks the modes by their evidence, drops each that equals a better one, and fills in the
+  /// confidences.
+  std::vector<RegistrationMode> ranked() const {
+    std::vector<PoseEvidence> evidence;
+    for (const RegistrationMode& mode : modes_) evidence.push_back(mode.evidence);
+    const confidence::AvailableEvidence available = confidence::available_evidence(evidence);
+    const std::vector<double> log_odds = confidence::rank_modes(evidence, available);
+    std::vector<std::size_t> order(modes_.size());
+    std::iota(order.begin(), order.end(), std::size_t(0));
+    std::stable_sort(order.begin(), order.end(),
+                     [&](std::size_t a, std::size_t b) { return log_odds[a] > log_odds[b]; });
+    std::vector<RegistrationMode> out;
+    std::vector<confidence::RankedMode> distinct;
+    for (const std::size_t k : order) {
+      const RegistrationMode& mode = modes_[k];
+      if (std::any_of(out.begin(), out.end(),
+                      [&](const RegistrationMode& better) { return same(better, mode); }))
+        continue;
+      out.push_back(mode);
+      distinct.push_back({mode.evidence, log_odds[k], overlap_of(mode)});
+    }
+    const auto confidences =
+        confidence::confidences_of(distinct, available, options_.evidence.modes);
+    for (std::size_t k = 0; k < out.size(); ++k) {
+      out[k].confidence = confidences[k].confidence;
+      out[k].overlap_confidence = confidences[k].overlap_confidence;
+    }
+    return out;
+  }
+
+ private:
+  CorrespondenceMoments source_moments(const ModeOutcome& mode) const {
+    return to_frame(swapped_ ? mode.target_moments : mode.source_moments, source_);
+  }
+  /// Source points in correspondences under the mode that others were perturbed from.
+  CorrespondenceMoments origin_moments(std::uint32_t origin_mode) const {
+    return source_moments(outcome_.modes[origins_.at(origin_mode)]);
+  }
+
+  void add(std::size_t k) {
+    const ModeOutcome& mode = outcome_.modes[k];
+    RegistrationMode out;
+    out.target_from_source = to_transform(mode.pose, source_, target_, swapped_);
+    // A perturbed pose that came back is its origin, less well refined: evidence cannot tell poses
+    // apart that are closer than points are matched.
+    const auto [origin, is_first] = origins_.emplace(mode.origin_mode, k);
+    if (!is_first) {
+      const UnalignedIsometry3d before =
+          to_transform(outcome_.modes[origin->second].pose, source_, target_, swapped_);
+      if (distance_between(out.target_from_source, before, origin_moments(mode.origin_mode)) <=
+          static_cast<double>(options_.prepare.max_correspondence_distance))
+        return;
+    }
+    out.evidence = confidence::evidence_of(outcome_, mode, swapped_ ? target_ : source_,
+                                           swapped_ ? source_ : target_, swapped_);
+    out.rank_before_refinement = static_cast<std::uint32_t>(k);
+    modes_.push_back(out);
+  }
+
+  const ModeOutcome& outcome_of(const RegistrationMode& mode) const {
+    return outcome_.modes[mode.rank_before_refinement];
+  }
+
+  confidence::OverlapCount overlap_of(const RegistrationMode& m) const {
+    const ModeOutcome& mode = outcome_of(m);
+    return {std::min(mode.source.inliers, mode.target.inliers),
+            std::min(mode.source.tested, mode.target.tested)};
+  }
+
+  bool same(const RegistrationMode& a, const RegistrationMode& b) const {
+    const std::uint32_t origin = outcome_of(a).origin_mode;
+    const CorrespondenceMoments points =
+        origin == outcome_of(b).origin_mode ? origin_moments(origin) : CorrespondenceMoments{};
+    if (points.count > 0)
+      return distance_between(a.target_from_source, b.target_from_source, points) <=
+             kDistinctModeFraction * static_cast<double>(options_.evidence.mode_distance);
+    return same_mode_at(a.target_from_source, b.target_from_source, middle_, options_.evidence);
+  }
+
+  const PairOutcome& outcome_;
+  const PreparedState& source_;
+  const PreparedState& target_;
+  bool swapped_;
+  const RegistrationOptions& options_;
+  std::map<std::uint32_t, std::size_t> origins_;  ///< of each origin mode its first mode
+  std::vector<RegistrationMode> modes_;
+  Eigen::Vector3d middle_;  ///< of the source's points in correspondences
+};
 
 void add_modes(const PairOutcome& outcome, const PreparedState& source, const PreparedState& target,
                bool swapped, const RegistrationOptions& options, RegistrationResult& result) {
-  const PreparedState& moved = swapped ? target : source;
-  const PreparedState& fixed = swapped ? source : target;
-  std::vector<RegistrationMode> modes;
-  // Of each family the first mode, from which others were slid.
-  std::map<std::uint32_t, std::size_t> origins;
-  const auto touching = [&](std::uint32_t family) {
-    const ModeOutcome& origin = outcome.modes[origins.at(family)];
-    return to_frame(swapped ? origin.target_moments : origin.source_moments, source);
-  };
-  for (std::size_t k = 0; k < outcome.modes.size(); ++k) {
-    const ModeOutcome& mode = outcome.modes[k];
-    RegistrationMode out;
-    out.target_from_source = to_transform(mode.pose, source, target, swapped);
-    // What was slid and came back is where it was, but less well refined: nearer than points are
-    // matched, evidence cannot tell.
-    const auto [origin, is_first] = origins.emplace(mode.family, k);
-    if (!is_first) {
-      const UnalignedIsometry3d before =
-          to_transform(outcome.modes[origin->second].pose, source, target, swapped);
-      if (distance_between(out.target_from_source, before, touching(mode.family)) <=
-          static_cast<double>(options.score.max_correspondence_distance))
-        continue;
-    }
-    out.evidence = to_evidence(outcome, mode, moved, fixed, swapped);
-    out.found_as = static_cast<std::uint32_t>(k);
-    modes.push_back(out);
-  }
-  const ModeOutcome& first = outcome.modes.front();
-  const Eigen::Vector3d middle = middle_of(
-      to_frame(swapped ? first.target_moments : first.source_moments, source), origin_of(source));
-  const auto points_touching = [&](const RegistrationMode& m) {
-    const ModeOutcome& mode = outcome.modes[m.found_as];
-    return Touching{std::min(mode.source.inliers, mode.target.inliers),
-                    std::min(mode.source.tested, mode.target.tested)};
-  };
-  set_confidences(
-      modes, options.evidence.modes, points_touching,
-      [&](const RegistrationMode& a, const RegistrationMode& b) {
-        const std::uint32_t family = outcome.modes[a.found_as].family;
-        const CorrespondenceMoments points =
-            family == outcome.modes[b.found_as].family ? touching(family) : CorrespondenceMoments{};
-        if (points.count > 0)
-          return distance_between(a.target_from_source, b.target_from_source, points) <=
-                 kApart * static_cast<double>(options.evidence.mode_distance);
-        return same_mode_at(a.target_from_source, b.target_from_source, middle, options.evidence);
-      });
-  result.modes = std::move(modes);
-  const ModeOutcome& best = outcome.modes[result.modes.front().found_as];
+  result.modes = Modes(outcome, source, target, swapped, options).ranked();
+  const ModeOutcome& best = outcome.modes[result.modes.front().rank_before_refinement];
   result.has_candidate = true;
   result.target_from_source = result.modes.front().target_from_source;
   result.score = result.modes.front().confidence;
@@ -140,7 +195,7 @@ void add_modes(const PairOutcome& outcome, const PreparedState& source, const Pr
   result.statistics.refine_iterations = best.iterations;
   result.inlier_ratio = pipeline::inlier_ratio(result.statistics);
   result.inlier_rmse = rmse(best.source.residual, best.source.inliers,
-                            static_cast<double>(options.score.max_correspondence_distance));
+                            static_cast<double>(options.prepare.max_correspondence_distance));
   result.source_moments = to_frame(swapped ? best.target_moments : best.source_moments, source);
   result.target_moments = to_frame(swapped ? best.source_moments : best.target_moments, target);
 }
@@ -178,7 +233,7 @@ RegistrationResult to_result(const PairOutcome& all, const PreparedState& source
     else if (result.reason == RegistrationReason::too_few_target_points)
       result.reason = RegistrationReason::too_few_source_points;
   }
-  if (options.hypothesis.proposal == Proposal::compatibility) {
+  if (options.method == RegistrationMethod::compatibility) {
     if (!outcome.modes.empty()) add_modes(outcome, source, target, swapped, options, result);
     const RegistrationStatistics& s = result.statistics;
     result.reason =
@@ -193,7 +248,7 @@ RegistrationResult to_result(const PairOutcome& all, const PreparedState& source
   result.inlier_ratio = pipeline::inlier_ratio(outcome.statistics);
   result.score = result.inlier_ratio;
   result.inlier_rmse = rmse(outcome.support.residual, outcome.support.inliers,
-                            static_cast<double>(options.score.max_correspondence_distance));
+                            static_cast<double>(options.prepare.max_correspondence_distance));
   result.source_moments =
       to_frame(swapped ? outcome.target_moments : outcome.source_moments, source);
   result.target_moments =

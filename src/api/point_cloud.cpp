@@ -2,7 +2,7 @@
 #include "gpureg/point_cloud.hpp"
 
 #include "algorithm/normal.hpp"
-#include "api/validate.hpp"
+#include "common/validate.hpp"
 
 namespace gpureg {
 

@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "api/frames.hpp"
-#include "api/validate.hpp"
+#include "common/validate.hpp"
 
 namespace gpureg {
 namespace {

@@ -18,7 +18,7 @@ TimedResult run_levels(const LevelRunner& runner, double milliseconds,
                        const RegistrationOptions& options);
 
 /// Milliseconds that a level would take by those of another one's stages: matching stays the same,
-/// proposals grow with seeds and triangles, refinement and judgement with the modes. overhead:
+/// proposals grow with seeds and triangles, refinement and verification with the modes. overhead:
 /// milliseconds of the call outside its stages.
 double predicted_milliseconds(const StageTimings& measured, double overhead,
                               const RegistrationOptions& measured_options,

@@ -4,47 +4,30 @@
 #include <algorithm>
 #include <string>
 
+#include "api/access.hpp"
 #include "api/outcome.hpp"
 #include "api/prior.hpp"
-#include "api/slide.hpp"
-#include "api/validate.hpp"
-#include "pipeline/host_threads.hpp"
+#include "api/raw_cloud.hpp"
+#include "common/host_threads.hpp"
+#include "common/validate.hpp"
 
 namespace gpureg {
 namespace {
-
-RawCloud raw_of(const PointCloudView& v) {
-  v.validate();
-  return {v.points,
-          v.size,
-          v.point_stride,
-          v.normals,
-          v.normal_stride,
-          v.features,
-          v.feature_dimension,
-          v.feature_stride ? v.feature_stride : v.feature_dimension,
-          v.viewpoints,
-          v.viewpoint_count};
-}
 
 /// A cloud that this context and these options can work with. name: for the message.
 const PreparedState* checked(const Context& context, const PreparedCloud& cloud,
                              const RegistrationOptions& options, const std::string& name) {
   if (!cloud.valid())
     throw InvalidArgument(name + " is an empty handle: it was not made by prepare()");
-  const PreparedState& state = *cloud.state();
-  if (state.owner != context.engine()->memory())
+  const PreparedState& state = *Access::state(cloud);
+  if (state.owner != Access::engine(context)->memory())
     throw InvalidArgument(name + " was prepared by a context of another backend or device than " +
                           context.description());
-  const float needed = options.refine.max_iterations > 0
-                           ? std::max(options.score.max_correspondence_distance,
-                                      options.refine.max_correspondence_distance)
-                           : options.score.max_correspondence_distance;
-  if (needed > state.options.search_distance)
-    throw InvalidArgument(name + " was prepared with search_distance " +
-                          std::to_string(state.options.search_distance) +
-                          ", less than the correspondence distance " + std::to_string(needed) +
-                          " asked for now");
+  const float needed = options.prepare.max_correspondence_distance;
+  if (needed > state.options.max_correspondence_distance)
+    throw InvalidArgument(name + " was prepared with max_correspondence_distance " +
+                          std::to_string(state.options.max_correspondence_distance) +
+                          ", less than " + std::to_string(needed) + " asked for now");
   return &state;
 }
 
@@ -56,26 +39,12 @@ void check_dimensions(const PreparedState& source, const PreparedState& target) 
 }
 
 bool swaps(const PreparedState& source, const PreparedState& target,
-           const HypothesisOptions& options) {
+           const RegistrationOptions& options) {
   return options.smaller_as_source && target.size < source.size;
 }
 
 PairInput input_of(const PreparedState& source, const PreparedState& target, bool swapped) {
   return swapped ? PairInput{&target, &source, {}, {}} : PairInput{&source, &target, {}, {}};
-}
-
-/// For the engine: where to look further, some 50 us a pair.
-FurtherSearch further_search(const Context& context, const RegistrationOptions& options) {
-  return [&](Span<const PairInput> pairs, Span<const PairOutcome> outcomes) {
-    std::vector<FurtherPoses> out(pairs.size);
-    const std::size_t workers =
-        std::min<std::size_t>(context.engine()->host_threads(), 1 + pairs.size / 16);
-    on_threads(workers, [&](std::size_t worker) {
-      for (std::size_t p = worker; p < pairs.size; p += workers)
-        out[p] = slide(pairs.data[p], outcomes.data[p], options);
-    });
-    return out;
-  };
 }
 
 void check_priors(const std::vector<RegistrationPrior>& priors, std::size_t pairs,
@@ -87,8 +56,8 @@ void check_priors(const std::vector<RegistrationPrior>& priors, std::size_t pair
   for (std::size_t p = 0; p < priors.size(); ++p) {
     priors[p].validate("priors[" + std::to_string(p) + "]");
     if (!priors[p].empty())
-      require(options.hypothesis.proposal == Proposal::compatibility, "hypothesis.proposal",
-              to_string(options.hypothesis.proposal), "compatibility: only it can use priors");
+      require(options.method == RegistrationMethod::compatibility, "method",
+              to_string(options.method), "compatibility: only it can use priors");
   }
 }
 
@@ -114,16 +83,16 @@ std::vector<PreparedCloud> prepare_batch(const Context& context,
   std::vector<RawCloud> raw;
   raw.reserve(clouds.size());
   for (std::size_t k = 0; k < clouds.size(); ++k)
-    raw.push_back(naming(k, [&] { return raw_of(clouds[k]); }));
+    raw.push_back(naming(k, [&] { return raw_cloud(clouds[k]); }));
   std::vector<PreparedCloud> out;
   if (raw.empty()) return out;
   try {
-    for (auto& state : context.engine()->prepare(span_of(raw), options))
-      out.emplace_back(std::move(state));
+    for (auto& state : Access::engine(context)->prepare(span_of(raw), options))
+      out.push_back(Access::cloud(std::move(state)));
   } catch (const InvalidArgument&) {
     // Stages see all clouds at once: alone the one that it is about says so again.
     for (std::size_t k = 0; k < raw.size(); ++k)
-      naming(k, [&] { return context.engine()->prepare({&raw[k], 1}, options); });
+      naming(k, [&] { return Access::engine(context)->prepare({&raw[k], 1}, options); });
     throw;
   }
   return out;
@@ -158,7 +127,7 @@ RegistrationResult align(const Context& context, const PreparedCloud& source,
   const PreparedState& t = *checked(context, target, options, "target");
   require(correspondences.size() <= 0x7fffffffu, "correspondences.size", correspondences.size(),
           "at most 2^31 - 1");
-  const bool swapped = swaps(s, t, options.hypothesis);
+  const bool swapped = swaps(s, t, options);
   std::vector<std::uint32_t> from, to;
   for (std::size_t k = 0; k < correspondences.size(); ++k) {
     const Correspondence& c = correspondences[k];
@@ -181,7 +150,7 @@ RegistrationResult align(const Context& context, const PreparedCloud& source,
     outcome.statistics.target_points = input.target->size;
     outcome.reason = RegistrationReason::no_usable_features;
   } else {
-    context.engine()->align({&input, 1}, options, {&outcome, 1}, further_search(context, options));
+    Access::engine(context)->align({&input, 1}, options, {&outcome, 1});
   }
   return to_result(outcome, s, t, swapped, options);
 }
@@ -220,34 +189,34 @@ std::vector<RegistrationResult> align_batch(const Context& context,
       if (!used[k]) checked(context, clouds[k], options, "clouds[" + std::to_string(k) + "]");
       used[k] = 1;
     }
-    check_dimensions(*clouds[pairs[p].source].state(), *clouds[pairs[p].target].state());
+    check_dimensions(*Access::state(clouds[pairs[p].source]),
+                     *Access::state(clouds[pairs[p].target]));
   }
 
   std::vector<RegistrationResult> results(pairs.size());
-  const std::size_t chunk = context.engine()->pairs_per_chunk(options);
+  const std::size_t chunk = Access::engine(context)->pairs_per_chunk(options);
   for (std::size_t begin = 0; begin < pairs.size(); begin += chunk) {
     if (callbacks.should_stop && callbacks.should_stop()) break;
     const std::size_t end = std::min(pairs.size(), begin + chunk);
     std::vector<PairInput> inputs;
     std::vector<PairOutcome> outcomes(end - begin);
     for (std::size_t p = begin; p < end; ++p) {
-      const PreparedState &s = *clouds[pairs[p].source].state(),
-                          &t = *clouds[pairs[p].target].state();
-      const bool swapped = swaps(s, t, options.hypothesis);
+      const PreparedState &s = *Access::state(clouds[pairs[p].source]),
+                          &t = *Access::state(clouds[pairs[p].target]);
+      const bool swapped = swaps(s, t, options);
       inputs.push_back(input_of(s, t, swapped));
       if (!priors.empty()) inputs.back().prior = prior_test(priors[p], s, t, swapped);
     }
-    context.engine()->align(span_of(inputs), options, {outcomes.data(), outcomes.size()},
-                            further_search(context, options));
+    Access::engine(context)->align(span_of(inputs), options, {outcomes.data(), outcomes.size()});
     // A result by evidence takes some 50 us, which counts where a device makes ten thousand in a
     // second.
     const std::size_t workers =
-        std::min<std::size_t>(context.engine()->host_threads(), 1 + (end - begin) / 16);
+        std::min<std::size_t>(Access::engine(context)->host_threads(), 1 + (end - begin) / 16);
     on_threads(workers, [&](std::size_t worker) {
       for (std::size_t p = begin + worker; p < end; p += workers) {
-        const PreparedState &s = *clouds[pairs[p].source].state(),
-                            &t = *clouds[pairs[p].target].state();
-        results[p] = to_result(outcomes[p - begin], s, t, swaps(s, t, options.hypothesis), options,
+        const PreparedState &s = *Access::state(clouds[pairs[p].source]),
+                            &t = *Access::state(clouds[pairs[p].target]);
+        results[p] = to_result(outcomes[p - begin], s, t, swaps(s, t, options), options,
                                inputs[p - begin].prior);
       }
     });

@@ -7,12 +7,12 @@
 
 #include "api/frames.hpp"
 #include "api/quality_levels.hpp"
-#include "api/validate.hpp"
+#include "common/validate.hpp"
 
 namespace gpureg {
 namespace {
 
-constexpr double kSure = 0.99;
+constexpr double kConfident = 0.99;
 
 bool same_pose(const RegistrationResult& a, const RegistrationResult& b,
                const EvidenceOptions& options) {
@@ -30,8 +30,8 @@ double predicted_milliseconds(const StageTimings& t, double overhead,
   const double seeds = ratio(to.compatibility.seeds, from.compatibility.seeds);
   const double triangles = seeds * ratio(to.compatibility.triangles, from.compatibility.triangles);
   const double modes = ratio(to.evidence.modes, from.evidence.modes);
-  return overhead + t.match + t.sample + t.fit * triangles + t.score * seeds +
-         (t.refine + t.judge) * modes;
+  return overhead + t.match + t.propose * triangles + t.rank * seeds +
+         (t.refine + t.verify) * modes;
 }
 
 TimedResult run_levels(const LevelRunner& runner, double milliseconds,
@@ -54,7 +54,7 @@ TimedResult run_levels(const LevelRunner& runner, double milliseconds,
     const double started = runner.now();
     RegistrationResult result = runner.align(quality);
     const double ended = runner.now();
-    const bool agree = best.levels > 0 && result.score >= kSure && last.score >= kSure &&
+    const bool agree = best.levels > 0 && result.score >= kConfident && last.score >= kConfident &&
                        same_pose(result, last, options.evidence);
     if (best.levels == 0 || result.score >= best.result.score) {
       best.result = result;
@@ -64,15 +64,18 @@ TimedResult run_levels(const LevelRunner& runner, double milliseconds,
     last_ms = ended - started;
     if (best.levels > 0 && predicted > previous_ms)
       growth = std::clamp(growth * (last_ms - previous_ms) / (predicted - previous_ms), 0.2, 1.25);
-    ++best.levels, best.highest_quality = quality, best.milliseconds = ended - begin;
+    ++best.levels;
+    best.highest_quality = quality;
+    best.milliseconds = ended - begin;
     last = std::move(result);
     if (agree || quality == kHighestQuality) return best;
     const double left = milliseconds - best.milliseconds;
     std::uint32_t next = quality + 1;
     if (prediction(next) > left) return best;
-    // A sure result needs only to be confirmed; where there is none yet, the time goes into the
-    // highest level that it is enough for.
-    while (last.score < kSure && next < kHighestQuality && prediction(next + 1) <= left) ++next;
+    // A confident result only needs to be confirmed; where there is none yet, the time goes into
+    // the highest level that it is enough for.
+    while (last.score < kConfident && next < kHighestQuality && prediction(next + 1) <= left)
+      ++next;
     predicted = prediction(next);
     quality = next;
   }
@@ -84,8 +87,8 @@ TimedResult align_within(const Context& context, const PreparedCloud& source,
   const auto begin = std::chrono::steady_clock::now();
   require(std::isfinite(milliseconds) && milliseconds > 0, "milliseconds", milliseconds,
           "a time > 0");
-  require(options.hypothesis.proposal == Proposal::compatibility, "hypothesis.proposal",
-          to_string(options.hypothesis.proposal), "compatibility: only it has levels of quality");
+  require(options.method == RegistrationMethod::compatibility, "method", to_string(options.method),
+          "compatibility: only it has levels of quality");
   const auto now = [begin] {
     return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - begin)
         .count();

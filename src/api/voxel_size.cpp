@@ -11,13 +11,13 @@ namespace gpureg {
 namespace {
 
 constexpr std::size_t kClouds = 16;
-constexpr std::size_t kWantedPoints = 5000, kLeastPoints = 3000;
+constexpr std::size_t kWantedPoints = 5000, kMinPoints = 3000;
 /// Of all clouds together: voxels of 5000 points are full enough to be found with them.
-constexpr std::size_t kVoxelSample = 400'000, kLeastVoxelSample = 50'000;
+constexpr std::size_t kVoxelSample = 400'000, kMinVoxelSample = 50'000;
 constexpr std::size_t kSpacingSample = 1000,
                       kNoiseSample = 200;  // medians of so many are good to a few percent
 constexpr double kNoiseRadius = 1.5;       // voxels around a point that its plane is made of
-constexpr double kMostNoise = 1.0 / 3.0;   // of a voxel: what its centroid still averages out
+constexpr double kMaxNoise = 1.0 / 3.0;    // of a voxel: what its centroid still averages out
 
 double median(std::vector<double> values) {
   if (values.empty()) return 0;
@@ -161,7 +161,7 @@ VoxelSizeSuggestion suggest_voxel_size(const std::vector<PointCloudView>& views)
   }
   if (clouds.empty()) return out;
 
-  const std::size_t sample = std::max(kVoxelSample / clouds.size(), kLeastVoxelSample);
+  const std::size_t sample = std::max(kVoxelSample / clouds.size(), kMinVoxelSample);
   std::vector<std::uint64_t> keys;
   const auto points = [&](double size) {
     return median_of(clouds, [&](const SortedCloud& cloud) {
@@ -185,8 +185,8 @@ VoxelSizeSuggestion suggest_voxel_size(const std::vector<PointCloudView>& views)
                      [&](const SortedCloud& cloud) { return cloud.noise(kNoiseRadius * s); });
   };
   out.noise = noise_at(size);
-  if (out.noise > kMostNoise * size && points(size) > kLeastPoints)
-    size = std::min(out.noise / kMostNoise, size_for(kLeastPoints));
+  if (out.noise > kMaxNoise * size && points(size) > kMinPoints)
+    size = std::min(out.noise / kMaxNoise, size_for(kMinPoints));
   size = rounded(size);
   out.voxel_size = static_cast<float>(size);
   out.points = static_cast<std::size_t>(points(size));

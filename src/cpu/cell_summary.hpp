@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "algorithm/cell_summary.hpp"
-#include "cpu/products.hpp"
+#include "cpu/stage_data.hpp"
 
 /// What lets the CPU decide most points of a hypothesis without looking at a single target point:
 /// per cell of the closest-point grid, a bound on the normals of all its candidates and whether

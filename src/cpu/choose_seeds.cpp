@@ -129,9 +129,10 @@ void find_peaks(const MatchSet& m, const std::vector<std::uint32_t>& degrees,
 
 std::vector<std::vector<std::uint32_t>> choose_seeds(Exec& exec,
                                                      const std::vector<MatchSet>& matches,
-                                                     const CompatibilityOptions& options) {
-  const CompatibilityTest test = test_of(options);
-  const float squared_separation = options.seed_separation * options.seed_separation;
+                                                     const RegistrationOptions& options) {
+  const CompatibilityTest test = test_of(options.compatibility);
+  const float squared_separation =
+      options.compatibility.seed_separation * options.compatibility.seed_separation;
   std::vector<std::vector<std::uint32_t>> degree(matches.size());
   std::vector<std::vector<std::uint8_t>> peak(matches.size());
   for (std::size_t p = 0; p < matches.size(); ++p) {
@@ -158,7 +159,7 @@ std::vector<std::vector<std::uint32_t>> choose_seeds(Exec& exec,
       order[k] = seed_key(
           seed_strength(degree[p][k], matches[p].source_weight[k] + matches[p].target_weight[k]),
           peak[p][k] != 0, k);
-    const std::size_t count = std::min<std::size_t>(options.seeds, order.size());
+    const std::size_t count = std::min<std::size_t>(options.compatibility.seeds, order.size());
     std::partial_sort(order.begin(), order.begin() + static_cast<std::ptrdiff_t>(count),
                       order.end(), std::greater<>());
     for (std::size_t k = 0; k < count; ++k) out[p].push_back(match_of_seed_key(order[k]));

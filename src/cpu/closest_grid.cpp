@@ -120,7 +120,7 @@ std::vector<ClosestGrid> build_closest_grids(Exec& exec,
   std::vector<std::vector<std::uint64_t>> keys(clouds.size());
   std::vector<std::vector<BlockLists>> lists(clouds.size());
   exec.parallel(clouds.size(), [&](std::size_t c) {
-    geometry[c] = closest_geometry(options.search_distance, clouds[c].radius);
+    geometry[c] = closest_geometry(options.max_correspondence_distance, clouds[c].radius);
     keys[c] = reachable_blocks(clouds[c].points, geometry[c]);
     lists[c].resize(keys[c].size());
   });
@@ -136,7 +136,8 @@ std::vector<ClosestGrid> build_closest_grids(Exec& exec,
     grid.cell_size = geometry[c].cell_size;
     std::size_t total = 0;
     for (const BlockLists& l : lists[c]) total += l.candidates.size();
-    if (total > pipeline::kMaxCandidates) pipeline::throw_too_dense(options.search_distance);
+    if (total > pipeline::kMaxCandidates)
+      pipeline::throw_too_dense(options.max_correspondence_distance);
     grid.table.reset(keys[c].size());
     grid.cell_start.reserve(keys[c].size() * (kCells + 1));
     grid.candidates.reserve(total);

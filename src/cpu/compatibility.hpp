@@ -2,7 +2,7 @@
 #pragma once
 
 #include "algorithm/compatibility.hpp"
-#include "cpu/products.hpp"
+#include "cpu/stage_data.hpp"
 
 namespace gpureg::cpu {
 

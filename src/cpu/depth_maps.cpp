@@ -23,7 +23,8 @@ std::vector<Visibility> build_depth_maps(Exec& exec, Span<const RawCloud> raw,
         map_count(known, options.depth_maps, raw[c].viewpoint_count > 0, raw[c].normals != nullptr);
     for (std::size_t k = 0; k < count; ++k)
       out[c].viewpoints.push_back(clouds[c].viewpoints[chosen_viewpoint(k, count, known)]);
-    out[c].step = depth_step(options.voxel_size > 0 ? options.voxel_size : options.search_distance);
+    out[c].step = depth_step(options.voxel_size > 0 ? options.voxel_size
+                                                    : options.max_correspondence_distance);
     out[c].depth.assign(count * kMapCells, kUnknownDepth);
   }
   exec.parallel_items(

@@ -2,13 +2,14 @@
 #include <mutex>
 #include <string>
 
-#include "algorithm/balance.hpp"
+#include "algorithm/normal_weight.hpp"
 #include "cpu/cell_summary.hpp"
 #include "cpu/stages.hpp"
+#include "gpureg/context.hpp"
 #include "gpureg/error.hpp"
 #include "pipeline/align.hpp"
 #include "pipeline/align_by_evidence.hpp"
-#include "pipeline/backend.hpp"
+#include "pipeline/engine.hpp"
 #include "pipeline/prepare.hpp"
 
 namespace gpureg::cpu {
@@ -43,7 +44,7 @@ class CpuEngine final : public Engine {
   }
 
   void align(Span<const PairInput> pairs, const RegistrationOptions& options,
-             Span<PairOutcome> outcomes, const FurtherSearch& further) override {
+             Span<PairOutcome> outcomes) override {
     std::lock_guard<std::mutex> lock(mutex_);
     std::vector<PairView> views(pairs.size);
     for (std::size_t p = 0; p < pairs.size; ++p)
@@ -53,8 +54,8 @@ class CpuEngine final : public Engine {
                   pairs[p].custom_target.data,
                   static_cast<std::uint32_t>(pairs[p].custom_source.size),
                   pairs[p].prior};
-    if (options.hypothesis.proposal == Proposal::compatibility)
-      pipeline::align_by_evidence(exec_, pairs, span_of(views), options, further, outcomes);
+    if (options.method == RegistrationMethod::compatibility)
+      pipeline::align_by_evidence(exec_, pairs, span_of(views), options, outcomes);
     else
       pipeline::align(exec_, span_of(views), options, outcomes);
   }
@@ -64,12 +65,13 @@ class CpuEngine final : public Engine {
   Exec exec_;
 };
 
-std::uint64_t balance_points(const std::vector<Vec3>& normals, std::vector<std::uint32_t>& weight) {
-  std::uint32_t count[kBalanceBins] = {};
+std::uint64_t weight_by_normals(const std::vector<Vec3>& normals,
+                                std::vector<std::uint32_t>& weight) {
+  std::uint32_t count[kNormalBins] = {};
   weight.resize(normals.size());
-  for (std::size_t i = 0; i < normals.size(); ++i) ++count[weight[i] = balance_bin(normals[i])];
+  for (std::size_t i = 0; i < normals.size(); ++i) ++count[weight[i] = normal_bin(normals[i])];
   std::uint64_t total = 0;
-  for (std::uint32_t& w : weight) total += w = balance_weight(count[w]);
+  for (std::uint32_t& w : weight) total += w = normal_weight_in_bin(count[w]);
   return total;
 }
 
@@ -88,17 +90,17 @@ CloudView CpuCloud::view() const {
           this,
           wide ? wide_features.values.data() : nullptr,
           wide ? wide_features.valid.data() : nullptr,
-          balance.data(),
-          balance_total,
+          normal_weight.data(),
+          normal_weight_total,
           visibility.view(),
-          fronts.view()};
+          surface_sides.view()};
 }
 
 std::vector<std::shared_ptr<CpuCloud>> assemble(
     Exec& exec, std::vector<DownsampledCloud>& clouds, std::vector<std::vector<Vec3>>& normals,
     std::vector<Features>& features, std::vector<Features>& wide_features,
     std::vector<ClosestGrid>& closest, std::vector<Visibility>& visibility,
-    std::vector<Fronts>& fronts, const PrepareOptions& options) {
+    std::vector<SurfaceSides>& surface_sides, const PrepareOptions& options) {
   std::vector<std::shared_ptr<CpuCloud>> out(clouds.size());
   exec.parallel(clouds.size(), [&](std::size_t c) {
     auto cloud = std::make_shared<CpuCloud>();
@@ -118,12 +120,13 @@ std::vector<std::shared_ptr<CpuCloud>> assemble(
     cloud->features = std::move(features[c]);
     cloud->wide_features = std::move(wide_features[c]);
     cloud->visibility = std::move(visibility[c]);
-    cloud->fronts = std::move(fronts[c]);
-    cloud->balance_total = balance_points(cloud->normals, cloud->balance);
+    cloud->surface_sides = std::move(surface_sides[c]);
+    cloud->normal_weight_total = weight_by_normals(cloud->normals, cloud->normal_weight);
     cloud->closest = std::move(closest[c]);
-    cloud->order = scoring_order(cloud->points, cloud->normals, options.search_distance);
-    cloud->summaries = summarize_cells(cloud->closest, options.search_distance, cloud->radius,
-                                       cloud->points, cloud->normals);
+    cloud->order =
+        scoring_order(cloud->points, cloud->normals, options.max_correspondence_distance);
+    cloud->summaries = summarize_cells(cloud->closest, options.max_correspondence_distance,
+                                       cloud->radius, cloud->points, cloud->normals);
     out[c] = std::move(cloud);
   });
   return out;

@@ -132,8 +132,8 @@ void nearest_features(FeatureRows queries, FeatureRows rows, std::uint32_t k, st
 }
 
 std::vector<Matches> match_features(Exec& exec, Span<const PairView> pairs,
-                                    const HypothesisOptions& options) {
-  const std::uint32_t k = options.neighbors;
+                                    const RegistrationOptions& options) {
+  const std::uint32_t k = options.quadruples.neighbors;
   std::vector<std::vector<float>> forward_blocks(pairs.size), backward_blocks(pairs.size);
   std::vector<std::vector<std::uint32_t>> forward(pairs.size), backward(pairs.size);
   const auto asks = [&](std::size_t p) {
@@ -143,7 +143,7 @@ std::vector<Matches> match_features(Exec& exec, Span<const PairView> pairs,
     if (!asks(p)) return;
     forward_blocks[p] = transpose_blocks(rows_of(pairs[p].target));
     forward[p].resize(static_cast<std::size_t>(pairs[p].source.size) * k);
-    if (!options.mutual) return;
+    if (!options.quadruples.mutual) return;
     backward_blocks[p] = transpose_blocks(rows_of(pairs[p].source));
     backward[p].resize(pairs[p].target.size);
   });
@@ -153,7 +153,7 @@ std::vector<Matches> match_features(Exec& exec, Span<const PairView> pairs,
         search(rows_of(pairs[p].source), forward_blocks[p], rows_of(pairs[p].target), k, begin, end,
                forward[p].data() + begin * k);
       });
-  if (options.mutual)
+  if (options.quadruples.mutual)
     exec.parallel_items(
         pairs.size, [&](std::size_t p) { return asks(p) ? pairs[p].target.size : 0; }, 256,
         [&](std::size_t p, std::size_t begin, std::size_t end) {
@@ -169,7 +169,8 @@ std::vector<Matches> match_features(Exec& exec, Span<const PairView> pairs,
       matches.push_back(matched(pair, pair.custom_source[c], pair.custom_target[c]));
     for (std::size_t m = 0; m < forward[p].size(); ++m) {
       const std::uint32_t source = static_cast<std::uint32_t>(m / k), target = forward[p][m];
-      if (target == kNoValue || (options.mutual && backward[p][target] != source)) continue;
+      if (target == kNoValue || (options.quadruples.mutual && backward[p][target] != source))
+        continue;
       matches.push_back(matched(pair, source, target));
     }
   });

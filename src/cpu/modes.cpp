@@ -11,12 +11,12 @@ namespace {
 
 /// Normal equations from the points of the walk, weighed by their normals' direction.
 IcpSums mode_sums(MovedPoints& moved, const PairView& pair, const Pose<double>& pose,
-                  const RefineOptions& options, float kernel_width, float min_cosine) {
+                  const RegistrationOptions& options, float kernel_width, float min_cosine) {
   const Rigid rigid = to_rigid(pose);
   const CloudView &s = pair.source, &t = pair.target;
   const float max_squared =
-      options.max_correspondence_distance * options.max_correspondence_distance;
-  const float inverse_max = 1.0f / options.max_correspondence_distance,
+      options.prepare.max_correspondence_distance * options.prepare.max_correspondence_distance;
+  const float inverse_max = 1.0f / options.prepare.max_correspondence_distance,
               inverse_radius = 1.0f / s.radius;
   IcpBatch batch;
   moved.for_each_group(rigid, [&](std::size_t group, const PointBounds& bounds) {
@@ -29,42 +29,44 @@ IcpSums mode_sums(MovedPoints& moved, const PairView& pair, const Pose<double>& 
           batch.add(rotate(rigid, moved.point(k)) * inverse_radius, t.normals[c.index],
                     distance * inverse_max,
                     robust_weight(distance, kernel_width) *
-                        balance_share(s.balance[moved.order().index[k]]));
+                        normal_weight_share(s.normal_weight[moved.order().index[k]]));
         });
   });
   return batch.sums();
 }
 
 /// Iterates until it settles, at most max_iterations times.
-void refine_mode(MovedPoints& moved, const PairView& pair, const RefineOptions& options,
+void refine_mode(MovedPoints& moved, const PairView& pair, const RegistrationOptions& options,
                  float kernel_width, double settled, float min_cosine, Mode& mode) {
-  for (std::uint32_t k = 0; k < options.max_iterations; ++k) {
+  for (std::uint32_t k = 0; k < options.refine.max_iterations; ++k) {
     const IcpStep step =
         solve_icp(mode_sums(moved, pair, mode.pose, options, kernel_width, min_cosine),
-                  pair.source.radius, options.max_correspondence_distance);
+                  pair.source.radius, options.prepare.max_correspondence_distance);
     ++mode.iterations;
     if (!step.valid) break;
     mode.pose = compose_small(step.omega, step.shift, mode.pose);
-    if (icp_settled(step, pair.source.radius, options.max_correspondence_distance, settled)) break;
+    if (icp_settled(step, pair.source.radius, options.prepare.max_correspondence_distance, settled))
+      break;
   }
 }
 
 }  // namespace
 
 std::vector<std::vector<Mode>> select_modes(Exec& exec, const std::vector<Candidates>& candidates,
-                                            const EvidenceOptions& options) {
-  const float min_trace = mode_trace(options.mode_angle),
-              squared_distance = options.mode_distance * options.mode_distance;
+                                            const RegistrationOptions& options) {
+  const float min_trace = mode_trace(options.evidence.mode_angle),
+              squared_distance = options.evidence.mode_distance * options.evidence.mode_distance;
   std::vector<std::vector<Mode>> out(candidates.size());
   exec.parallel(candidates.size(), [&](std::size_t p) {
     const Candidates& c = candidates[p];
     std::vector<std::uint32_t> order(c.pose.size());
     for (std::uint32_t k = 0; k < order.size(); ++k) order[k] = k;
-    std::stable_sort(order.begin(), order.end(),
-                     [&](std::uint32_t a, std::uint32_t b) { return c.promise[a] > c.promise[b]; });
+    std::stable_sort(order.begin(), order.end(), [&](std::uint32_t a, std::uint32_t b) {
+      return c.coarse_score[a] > c.coarse_score[b];
+    });
     std::vector<Rigid> taken;
     for (const std::uint32_t k : order) {
-      if (taken.size() == options.modes) break;
+      if (taken.size() == options.evidence.modes) break;
       const Rigid rigid = to_rigid(c.pose[k]);
       if (std::any_of(taken.begin(), taken.end(), [&](const Rigid& other) {
             return same_mode(rigid, other, min_trace, squared_distance);
@@ -78,31 +80,31 @@ std::vector<std::vector<Mode>> select_modes(Exec& exec, const std::vector<Candid
 }
 
 void refine_modes(Exec& exec, Span<const PairView> pairs, std::vector<std::vector<Mode>>& modes,
-                  const EvidenceOptions& evidence, const RefineOptions& options) {
+                  const RegistrationOptions& options) {
   const float min_cosine =
-      inlier_test(options.max_correspondence_distance, kRefineNormalAngle).min_cosine;
+      inlier_test(options.prepare.max_correspondence_distance, kRefineNormalAngle).min_cosine;
   const SummaryLimits limits(kRefineNormalAngle, false);
   std::vector<ScoringOrder> sample(pairs.size);
   exec.parallel(pairs.size, [&](std::size_t p) {
     sample[p] = sampled_order(executor_data(pairs[p].source),
-                              sample_stride(pairs[p].source.size, 2 * evidence.sample));
+                              sample_stride(pairs[p].source.size, 2 * options.evidence.sample));
   });
   exec.parallel_items(
       pairs.size, [&](std::size_t p) { return modes[p].size(); }, 1,
       [&](std::size_t p, std::size_t k, std::size_t) {
         MovedPoints some(sample[p], pairs[p].target, limits),
             all(executor_data(pairs[p].source).order, pairs[p].target, limits);
-        refine_mode(some, pairs[p], options, options.kernel_width, kRoughSettled, min_cosine,
+        refine_mode(some, pairs[p], options, options.refine.kernel_width, kRoughSettled, min_cosine,
                     modes[p][k]);
-        refine_mode(all, pairs[p], options, kPolishKernel * options.kernel_width, kPolishSettled,
-                    min_cosine, modes[p][k]);
+        refine_mode(all, pairs[p], options, kPolishKernel * options.refine.kernel_width,
+                    kPolishSettled, min_cosine, modes[p][k]);
       });
 }
 
 void merge_modes(Exec& exec, std::vector<std::vector<Mode>>& modes,
-                 const EvidenceOptions& evidence) {
-  const float min_trace = mode_trace(evidence.mode_angle),
-              squared_distance = evidence.mode_distance * evidence.mode_distance;
+                 const RegistrationOptions& options) {
+  const float min_trace = mode_trace(options.evidence.mode_angle),
+              squared_distance = options.evidence.mode_distance * options.evidence.mode_distance;
   exec.parallel(modes.size(), [&](std::size_t p) {
     std::vector<Mode> distinct;
     for (const Mode& mode : modes[p]) {
@@ -116,7 +118,7 @@ void merge_modes(Exec& exec, std::vector<std::vector<Mode>>& modes,
   });
 }
 
-std::vector<std::vector<Mode>> modes_of(Exec&, const std::vector<FurtherPoses>& poses) {
+std::vector<std::vector<Mode>> modes_from_poses(Exec&, const std::vector<PerturbedPoses>& poses) {
   std::vector<std::vector<Mode>> out(poses.size());
   for (std::size_t p = 0; p < poses.size(); ++p)
     for (const Pose<double>& pose : poses[p].poses) out[p].push_back({pose, 0, 0});

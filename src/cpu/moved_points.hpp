@@ -117,7 +117,7 @@ inline ScoringOrder sampled_order(const CpuCloud& cloud, std::uint32_t stride) {
     points.push_back(cloud.points[i]);
     normals.push_back(cloud.normals[i]);
   }
-  ScoringOrder out = scoring_order(points, normals, cloud.options.search_distance);
+  ScoringOrder out = scoring_order(points, normals, cloud.options.max_correspondence_distance);
   for (std::uint32_t& i : out.index) i = i == kNoValue ? kNoValue : i * stride;
   return out;
 }
@@ -125,7 +125,7 @@ inline ScoringOrder sampled_order(const CpuCloud& cloud, std::uint32_t stride) {
 /// Whether the summaries' "every place has a candidate in reach" speaks of this correspondence
 /// distance.
 inline bool exact_distance(const CloudView& cloud, float max_squared) {
-  const float built_for = executor_data(cloud).options.search_distance;
+  const float built_for = executor_data(cloud).options.max_correspondence_distance;
   return built_for * built_for == max_squared;
 }
 

@@ -4,13 +4,13 @@
 #include <algorithm>
 #include <vector>
 
-#include "cpu/products.hpp"
+#include "cpu/stage_data.hpp"
 
 namespace gpureg::cpu {
 
 /// A grid's points one array per coordinate, and where each row of cells along x begins: a row's
 /// cells are neighbours in memory, so a ball is a few runs of points instead of many look-ups.
-/// "Place" is a point's position in the grid's order.
+/// "SurfaceSide" is a point's position in the grid's order.
 class NeighborRows {
  public:
   NeighborRows(const Grid& grid, const std::vector<Vec3>& normals)

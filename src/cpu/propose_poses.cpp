@@ -151,8 +151,7 @@ MatchEvidence count_matches(const MatchSet& m, const Rigid& pose, float squared_
 
 std::vector<Candidates> propose_poses(Exec& exec, const std::vector<MatchSet>& matches,
                                       const std::vector<std::vector<std::uint32_t>>& seeds,
-                                      const HypothesisOptions& hypothesis,
-                                      const CompatibilityOptions& options) {
+                                      const RegistrationOptions& options) {
   std::vector<Candidates> all(matches.size());
   std::vector<std::vector<std::uint8_t>> valid(matches.size());
   for (std::size_t p = 0; p < matches.size(); ++p) {
@@ -160,14 +159,15 @@ std::vector<Candidates> propose_poses(Exec& exec, const std::vector<MatchSet>& m
     all[p].matches.resize(seeds[p].size());
     valid[p].resize(seeds[p].size());
   }
-  const float squared_distance = options.consensus_distance * options.consensus_distance;
+  const float squared_distance =
+      options.compatibility.consensus_distance * options.compatibility.consensus_distance;
   exec.parallel_items(
       matches.size(), [&](std::size_t p) { return seeds[p].size(); }, 32,
       [&](std::size_t p, std::size_t begin, std::size_t end) {
-        Members members(options.max_members);
+        Members members(options.compatibility.max_members);
         for (std::size_t k = begin; k < end; ++k) {
-          valid[p][k] =
-              fit_seed(matches[p], seeds[p][k], options, hypothesis.seed, members, all[p].pose[k]);
+          valid[p][k] = fit_seed(matches[p], seeds[p][k], options.compatibility, options.seed,
+                                 members, all[p].pose[k]);
           if (valid[p][k])
             all[p].matches[k] =
                 count_matches(matches[p], to_rigid(all[p].pose[k]), squared_distance);

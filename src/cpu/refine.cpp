@@ -10,12 +10,12 @@ namespace {
 
 /// Normal equations over all source points whose closest target point is in reach and turned alike.
 IcpSums icp_sums(Exec& exec, const PairView& pair, const Pose<double>& pose,
-                 const RefineOptions& options, float min_cosine) {
+                 const RegistrationOptions& options, float min_cosine) {
   constexpr std::size_t kGrain = 1024;
   const Rigid rigid = to_rigid(pose);
   const float max_squared =
-      options.max_correspondence_distance * options.max_correspondence_distance;
-  const float inverse_max = 1.0f / options.max_correspondence_distance;
+      options.prepare.max_correspondence_distance * options.prepare.max_correspondence_distance;
+  const float inverse_max = 1.0f / options.prepare.max_correspondence_distance;
   const float inverse_radius = 1.0f / pair.source.radius;
   const std::size_t blocks = (pair.source.size + kGrain - 1) / kGrain;
   std::vector<IcpSums> parts(blocks, IcpSums{{0}});
@@ -30,7 +30,8 @@ IcpSums icp_sums(Exec& exec, const PairView& pair, const Pose<double>& pose,
       if (!normals_agree(rotate(rigid, pair.source.normals[i]), normal, min_cosine)) continue;
       const float distance = dot(q - pair.target.points[c.index], normal);
       add_icp_term(rotate(rigid, pair.source.points[i]) * inverse_radius, normal,
-                   distance * inverse_max, robust_weight(distance, options.kernel_width), parts[b]);
+                   distance * inverse_max, robust_weight(distance, options.refine.kernel_width),
+                   parts[b]);
     }
   });
   IcpSums total{{0}};
@@ -42,28 +43,31 @@ IcpSums icp_sums(Exec& exec, const PairView& pair, const Pose<double>& pose,
 }  // namespace
 
 std::vector<BestPose> refine_poses(Exec& exec, Span<const PairView> pairs,
-                                   const std::vector<BestPose>& best, const ScoreOptions& score,
-                                   const RefineOptions& options) {
+                                   const std::vector<BestPose>& best,
+                                   const RegistrationOptions& options) {
   std::vector<BestPose> out = best;
-  if (options.max_iterations == 0) return out;
+  if (options.refine.max_iterations == 0) return out;
   const float min_cosine =
-      inlier_test(score.max_correspondence_distance, score.max_normal_angle).min_cosine;
+      inlier_test(options.prepare.max_correspondence_distance, options.quadruples.max_normal_angle)
+          .min_cosine;
   // Pairs side by side would leave threads idle at the end of a small batch; points side by side
   // never do.
   for (std::size_t p = 0; p < pairs.size; ++p) {
     if (!best[p].found) continue;
     Pose<double> pose = best[p].pose;
     std::uint32_t iteration = 0;
-    while (iteration < options.max_iterations) {
-      const IcpStep step = solve_icp(icp_sums(exec, pairs[p], pose, options, min_cosine),
-                                     pairs[p].source.radius, options.max_correspondence_distance);
+    while (iteration < options.refine.max_iterations) {
+      const IcpStep step =
+          solve_icp(icp_sums(exec, pairs[p], pose, options, min_cosine), pairs[p].source.radius,
+                    options.prepare.max_correspondence_distance);
       ++iteration;
       if (!step.valid) break;
       pose = compose_small(step.omega, step.shift, pose);
-      if (icp_settled(step, pairs[p].source.radius, options.max_correspondence_distance, kSettled))
+      if (icp_settled(step, pairs[p].source.radius, options.prepare.max_correspondence_distance,
+                      kSettled))
         break;
     }
-    Support support = measure_support(pairs[p].source, pairs[p].target, to_rigid(pose), score);
+    Support support = measure_support(pairs[p].source, pairs[p].target, to_rigid(pose), options);
     support.hypothesis = best[p].support.hypothesis;
     out[p].iterations = iteration;
     // A refinement that fits worse than what it began with is dropped.

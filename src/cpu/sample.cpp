@@ -97,12 +97,12 @@ unsigned first_sides(const MatchedPoints* m, const std::uint32_t (*draw)[kLanes]
 
 std::vector<std::vector<std::uint32_t>> sample_quadruples(Exec& exec,
                                                           const std::vector<Matches>& matches,
-                                                          const HypothesisOptions& options) {
-  const std::uint32_t blocks = (options.count + kBlock - 1) / kBlock;
+                                                          const RegistrationOptions& options) {
+  const std::uint32_t blocks = (options.quadruples.count + kBlock - 1) / kBlock;
   std::vector<std::vector<std::vector<std::uint32_t>>> parts(matches.size());
   for (std::size_t p = 0; p < matches.size(); ++p)
     if (matches[p].pairs.size() >= 4) parts[p].resize(blocks);
-  const float tau2 = options.edge_similarity * options.edge_similarity;
+  const float tau2 = options.quadruples.edge_similarity * options.quadruples.edge_similarity;
   exec.parallel_items(
       matches.size(), [&](std::size_t p) { return parts[p].size(); }, 1,
       [&](std::size_t p, std::size_t block, std::size_t) {
@@ -110,7 +110,8 @@ std::vector<std::vector<std::uint32_t>> sample_quadruples(Exec& exec,
         const std::uint32_t count = static_cast<std::uint32_t>(m.size());
         std::vector<std::uint32_t>& kept = parts[p][block];
         const std::uint64_t begin = static_cast<std::uint64_t>(block) * kBlock;
-        const std::uint64_t end = begin + kBlock < options.count ? begin + kBlock : options.count;
+        const std::uint64_t end =
+            begin + kBlock < options.quadruples.count ? begin + kBlock : options.quadruples.count;
         std::uint32_t draw[4][kLanes];
         for (std::uint64_t first = begin; first < end; first += kLanes) {
           draw_lanes(static_cast<std::uint32_t>(first), options.seed, count, draw);
@@ -128,7 +129,7 @@ std::vector<std::vector<std::uint32_t>> sample_quadruples(Exec& exec,
   std::vector<std::vector<std::uint32_t>> out(matches.size());
   for (std::size_t p = 0; p < matches.size(); ++p)
     for (const auto& part : parts[p]) {
-      const std::size_t room = options.max_survivors - out[p].size();
+      const std::size_t room = options.quadruples.max_survivors - out[p].size();
       out[p].insert(out[p].end(), part.begin(),
                     part.begin() + static_cast<std::ptrdiff_t>(std::min(room, part.size())));
     }

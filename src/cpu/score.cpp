@@ -50,8 +50,8 @@ class PairScorer {
         test_(test),
         order_(executor_data(pair.source).order),
         cells_(executor_data(pair.target).summaries),
-        limits_(executor_data(pair.target).options.search_distance *
-                            executor_data(pair.target).options.search_distance ==
+        limits_(executor_data(pair.target).options.max_correspondence_distance *
+                            executor_data(pair.target).options.max_correspondence_distance ==
                         test.max_squared
                     ? exact
                     : reach),
@@ -159,9 +159,9 @@ class PairScorer {
 }  // namespace
 
 Support measure_support(const CloudView& source, const CloudView& target, const Rigid& pose,
-                        const ScoreOptions& options) {
+                        const RegistrationOptions& options) {
   const InlierTest test =
-      inlier_test(options.max_correspondence_distance, options.max_normal_angle);
+      inlier_test(options.prepare.max_correspondence_distance, options.quadruples.max_normal_angle);
   Support s{0, 0, 0};
   for (std::uint32_t i = 0; i < source.size; ++i) count_point(source, target, pose, test, i, s);
   return s;
@@ -169,12 +169,12 @@ Support measure_support(const CloudView& source, const CloudView& target, const 
 
 std::vector<BestPose> score_hypotheses(Exec& exec, Span<const PairView> pairs,
                                        const std::vector<Hypotheses>& hypotheses,
-                                       const ScoreOptions& options) {
+                                       const RegistrationOptions& options) {
   constexpr std::size_t kGrain = 256;
   const InlierTest test =
-      inlier_test(options.max_correspondence_distance, options.max_normal_angle);
-  const SummaryLimits exact_limits(options.max_normal_angle, true),
-      reach_limits(options.max_normal_angle, false);
+      inlier_test(options.prepare.max_correspondence_distance, options.quadruples.max_normal_angle);
+  const SummaryLimits exact_limits(options.quadruples.max_normal_angle, true),
+      reach_limits(options.quadruples.max_normal_angle, false);
   std::vector<std::vector<Support>> best_of_block(pairs.size);
   std::vector<std::vector<std::size_t>> index_of_block(pairs.size);
   std::vector<std::atomic<std::uint32_t>> most(pairs.size);

@@ -2,7 +2,7 @@
 #pragma once
 
 #include "cpu/exec.hpp"
-#include "cpu/products.hpp"
+#include "cpu/stage_data.hpp"
 
 /// The stages of the pipeline on the CPU, each a free function without hidden state, each on a
 /// batch. The CUDA backend has the same names. What one item does is written once, in
@@ -32,71 +32,75 @@ std::vector<Features> compute_wide_features(Exec& exec, const std::vector<Downsa
 std::vector<Visibility> build_depth_maps(Exec& exec, Span<const RawCloud> raw,
                                          const std::vector<DownsampledCloud>& clouds,
                                          const PrepareOptions& options);
-std::vector<Fronts> build_fronts(Exec& exec, const std::vector<DownsampledCloud>& clouds,
-                                 const std::vector<std::vector<Vec3>>& normals,
-                                 const PrepareOptions& options);
+std::vector<SurfaceSides> build_surface_sides(Exec& exec,
+                                              const std::vector<DownsampledCloud>& clouds,
+                                              const std::vector<std::vector<Vec3>>& normals,
+                                              const PrepareOptions& options);
 std::vector<std::shared_ptr<CpuCloud>> assemble(
     Exec& exec, std::vector<DownsampledCloud>& clouds, std::vector<std::vector<Vec3>>& normals,
     std::vector<Features>& features, std::vector<Features>& wide_features,
     std::vector<ClosestGrid>& closest, std::vector<Visibility>& visibility,
-    std::vector<Fronts>& fronts, const PrepareOptions& options);
+    std::vector<SurfaceSides>& surface_sides, const PrepareOptions& options);
 
 // Alignment, one entry per pair.
 std::vector<Matches> match_features(Exec& exec, Span<const PairView> pairs,
-                                    const HypothesisOptions& options);
+                                    const RegistrationOptions& options);
 /// Numbers of the quadruples that pass the polygon test, ascending.
 std::vector<std::vector<std::uint32_t>> sample_quadruples(Exec& exec,
                                                           const std::vector<Matches>& matches,
-                                                          const HypothesisOptions& options);
+                                                          const RegistrationOptions& options);
 std::vector<Hypotheses> fit_hypotheses(Exec& exec, const std::vector<Matches>& matches,
                                        const std::vector<std::vector<std::uint32_t>>& quadruples,
-                                       const HypothesisOptions& options);
+                                       const RegistrationOptions& options);
 std::vector<BestPose> score_hypotheses(Exec& exec, Span<const PairView> pairs,
                                        const std::vector<Hypotheses>& hypotheses,
-                                       const ScoreOptions& options);
+                                       const RegistrationOptions& options);
 std::vector<BestPose> refine_poses(Exec& exec, Span<const PairView> pairs,
-                                   const std::vector<BestPose>& best, const ScoreOptions& score,
-                                   const RefineOptions& options);
-std::vector<Judgement> judge_poses(Exec& exec, Span<const PairView> pairs,
-                                   const std::vector<BestPose>& poses, const ScoreOptions& options);
+                                   const std::vector<BestPose>& best,
+                                   const RegistrationOptions& options);
+std::vector<Verification> verify_poses(Exec& exec, Span<const PairView> pairs,
+                                       const std::vector<BestPose>& poses,
+                                       const RegistrationOptions& options);
 // Alignment by compatibility and evidence, one entry per pair.
 /// Nearest features in both directions and of both radii, united; at most max_matches of them.
-std::vector<MatchSet> unite_matches(Exec& exec, Span<const PairView> pairs,
-                                    const HypothesisOptions& hypothesis,
-                                    const CompatibilityOptions& options);
+std::vector<MatchSet> merge_matches(Exec& exec, Span<const PairView> pairs,
+                                    const RegistrationOptions& options);
 /// Matches with the most compatible others, local maxima first.
 std::vector<std::vector<std::uint32_t>> choose_seeds(Exec& exec,
                                                      const std::vector<MatchSet>& matches,
-                                                     const CompatibilityOptions& options);
+                                                     const RegistrationOptions& options);
 /// A pose for each seed whose neighbourhood determines one, in the order of the seeds, and the
 /// matches that it brings together.
 std::vector<Candidates> propose_poses(Exec& exec, const std::vector<MatchSet>& matches,
                                       const std::vector<std::vector<std::uint32_t>>& seeds,
-                                      const HypothesisOptions& hypothesis,
-                                      const CompatibilityOptions& options);
-/// Adds the promise: evidence from a sample of the points.
-void weigh_candidates(Exec& exec, Span<const PairView> pairs, const std::vector<MatchSet>& matches,
-                      std::vector<Candidates>& candidates, const EvidenceOptions& options,
-                      const ScoreOptions& score);
+                                      const RegistrationOptions& options);
+/// Adds the coarse_score: evidence from a sample of the points.
+void score_candidates(Exec& exec, Span<const PairView> pairs, const std::vector<MatchSet>& matches,
+                      std::vector<Candidates>& candidates, const RegistrationOptions& options);
 /// The most promising distinct poses.
 std::vector<std::vector<Mode>> select_modes(Exec& exec, const std::vector<Candidates>& candidates,
-                                            const EvidenceOptions& options);
+                                            const RegistrationOptions& options);
 void refine_modes(Exec& exec, Span<const PairView> pairs, std::vector<std::vector<Mode>>& modes,
-                  const EvidenceOptions& evidence, const RefineOptions& options);
+                  const RegistrationOptions& options);
 /// Modes that have met: the most promising of them stays.
 void merge_modes(Exec& exec, std::vector<std::vector<Mode>>& modes,
-                 const EvidenceOptions& evidence);
-std::vector<std::vector<Mode>> modes_of(Exec& exec, const std::vector<FurtherPoses>& poses);
+                 const RegistrationOptions& options);
+/// Perturbed poses of the most likely mode of each pair; on the host.
+std::vector<PerturbedPoses> search_degeneracies(Exec& exec, Span<const PairInput> inputs,
+                                                Span<const PairOutcome> outcomes,
+                                                const RegistrationOptions& options);
+std::vector<std::vector<Mode>> modes_from_poses(Exec& exec,
+                                                const std::vector<PerturbedPoses>& poses);
 /// All evidence, from all points.
-void weigh_modes(Exec& exec, Span<const PairView> pairs, const std::vector<MatchSet>& matches,
-                 const std::vector<Candidates>& candidates,
-                 const std::vector<std::vector<Mode>>& modes, const RegistrationOptions& options,
-                 Span<PairOutcome> outcomes);
+void verify_modes(Exec& exec, Span<const PairView> pairs, const std::vector<MatchSet>& matches,
+                  const std::vector<Candidates>& candidates,
+                  const std::vector<std::vector<Mode>>& modes, const RegistrationOptions& options,
+                  Span<PairOutcome> outcomes);
 
 void conclude(Exec& exec, Span<const PairView> pairs, const std::vector<Matches>& matches,
               const std::vector<std::vector<std::uint32_t>>& quadruples,
               const std::vector<Hypotheses>& hypotheses, const std::vector<BestPose>& poses,
-              const std::vector<Judgement>& judgements, const RegistrationOptions& options,
+              const std::vector<Verification>& verifications, const RegistrationOptions& options,
               Span<PairOutcome> outcomes);
 
 /// Nearest features of every query row: k indices per query in order of distance (squared_norm of
@@ -115,6 +119,6 @@ MatchEvidence count_matches(const MatchSet& matches, const Rigid& pose, float sq
 
 /// Exact support of one pose: the per-pose loop that scoring, refinement and tests share.
 Support measure_support(const CloudView& source, const CloudView& target, const Rigid& pose,
-                        const ScoreOptions& options);
+                        const RegistrationOptions& options);
 
 }  // namespace gpureg::cpu

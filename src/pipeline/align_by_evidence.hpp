@@ -1,65 +1,61 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include "pipeline/engine.hpp"
+#include "pipeline/prepared_state.hpp"
 
 namespace gpureg::pipeline {
 
-/// Pairs of prepared clouds to distinct poses with their evidence, one statement per stage. Exec
-/// brings the stages, found by its namespace; every stage takes all pairs at once. Only
-/// weigh_modes() waits for the results.
+/// The default method: pairs of prepared clouds to distinct poses with their evidence, one
+/// statement per stage. Exec brings the stages, found by its namespace; every stage takes all pairs
+/// at once.
 ///
-/// Refinement ends where a surface that has nothing on it lets it: anywhere along a wall. So the
-/// likeliest mode is slid both ways along its softest direction, refined from there and weighed
-/// again; the evidence says which of them it is, and how sure.
+/// Refinement may stop anywhere along a surface without detail, a bare wall for example. Therefore
+/// the most likely mode is perturbed both ways along its weakest direction, refined from there and
+/// verified again (degeneracy search); the evidence tells which of the poses it is, and how sure.
 template <typename Exec>
 void align_by_evidence(Exec& exec, Span<const PairInput> inputs, Span<const PairView> pairs,
-                       const RegistrationOptions& options, const FurtherSearch& further,
-                       Span<PairOutcome> outcomes) {
+                       const RegistrationOptions& options, Span<PairOutcome> outcomes) {
   const auto begin = exec.mark();
-  auto matches = unite_matches(exec, pairs, options.hypothesis, options.compatibility);
+  auto matches = merge_matches(exec, pairs, options);
   const auto matched = exec.mark();
-  auto seeds = choose_seeds(exec, matches, options.compatibility);
-  const auto seeded = exec.mark();
-  auto candidates = propose_poses(exec, matches, seeds, options.hypothesis, options.compatibility);
+  auto seeds = choose_seeds(exec, matches, options);
+  auto candidates = propose_poses(exec, matches, seeds, options);
   const auto proposed = exec.mark();
-  weigh_candidates(exec, pairs, matches, candidates, options.evidence, options.score);
-  auto modes = select_modes(exec, candidates, options.evidence);
-  const auto weighed = exec.mark();
-  refine_modes(exec, pairs, modes, options.evidence, options.refine);
-  merge_modes(exec, modes, options.evidence);
+  score_candidates(exec, pairs, matches, candidates, options);
+  auto modes = select_modes(exec, candidates, options);
+  const auto ranked = exec.mark();
+  refine_modes(exec, pairs, modes, options);
+  merge_modes(exec, modes, options);
   const auto refined = exec.mark();
-  weigh_modes(exec, pairs, matches, candidates, modes, options, outcomes);
-  const auto judged = exec.mark();
+  verify_modes(exec, pairs, matches, candidates, modes, options, outcomes);
   for (PairOutcome& outcome : outcomes)
     for (std::size_t k = 0; k < outcome.modes.size(); ++k)
-      outcome.modes[k].family = static_cast<std::uint32_t>(k);
-
-  const std::vector<FurtherPoses> more = further(inputs, {outcomes.data, outcomes.size});
-  const auto begun = exec.mark();
-  auto slid = modes_of(exec, more);
-  refine_modes(exec, pairs, slid, options.evidence, options.refine);
-  const auto slid_refined = exec.mark();
-  std::vector<PairOutcome> weighed_again(pairs.size);
-  weigh_modes(exec, pairs, matches, candidates, slid, options,
-              {weighed_again.data(), weighed_again.size()});
-  const auto slid_judged = exec.mark();
+      outcome.modes[k].origin_mode = static_cast<std::uint32_t>(k);
+  const auto perturbations =
+      search_degeneracies(exec, inputs, {outcomes.data, outcomes.size}, options);
+  const auto verified = exec.mark();
+  auto perturbed = modes_from_poses(exec, perturbations);
+  refine_modes(exec, pairs, perturbed, options);
+  const auto perturbed_refined = exec.mark();
+  std::vector<PairOutcome> more(pairs.size);
+  verify_modes(exec, pairs, matches, candidates, perturbed, options, {more.data(), more.size()});
+  const auto perturbed_verified = exec.mark();
   for (std::size_t p = 0; p < pairs.size; ++p)
-    for (ModeOutcome& mode : weighed_again[p].modes) {
-      mode.family = more[p].family;
+    for (ModeOutcome& mode : more[p].modes) {
+      mode.origin_mode = perturbations[p].origin_mode;
       outcomes[p].modes.push_back(mode);
     }
 
   const double share = 1.0 / static_cast<double>(pairs.size);
   StageTimings ms;
   ms.match = exec.milliseconds(begin, matched) * share;
-  ms.sample = exec.milliseconds(matched, seeded) * share;
-  ms.fit = exec.milliseconds(seeded, proposed) * share;
-  ms.score = exec.milliseconds(proposed, weighed) * share;
+  ms.propose = exec.milliseconds(matched, proposed) * share;
+  ms.rank = exec.milliseconds(proposed, ranked) * share;
   ms.refine =
-      (exec.milliseconds(weighed, refined) + exec.milliseconds(begun, slid_refined)) * share;
-  ms.judge =
-      (exec.milliseconds(refined, judged) + exec.milliseconds(slid_refined, slid_judged)) * share;
+      (exec.milliseconds(ranked, refined) + exec.milliseconds(verified, perturbed_refined)) * share;
+  ms.verify = (exec.milliseconds(refined, verified) +
+               exec.milliseconds(perturbed_refined, perturbed_verified)) *
+              share;
   for (PairOutcome& outcome : outcomes) outcome.timings = ms;
 }
 

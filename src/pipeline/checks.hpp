@@ -16,7 +16,7 @@ inline void check_extent(float radius, const PrepareOptions& options) {
   float cell = options.feature_radius * 0.5f;
   if (options.voxel_size > 0 && options.voxel_size < cell) cell = options.voxel_size;
   const float blocks =
-      options.search_distance / 3.0f * static_cast<float>(ClosestGridView::kBlockEdge);
+      options.max_correspondence_distance / 3.0f * static_cast<float>(ClosestGridView::kBlockEdge);
   if (blocks < cell) cell = blocks;
   if (!(radius < cell * (static_cast<float>(kCellBias) - 8.0f)))
     throw InvalidArgument("point cloud reaches " + std::to_string(radius) +
@@ -38,9 +38,9 @@ inline void check_density(double squares, std::size_t points, const PrepareOptio
                           " points lie within feature_radius " +
                           std::to_string(options.feature_radius) +
                           " of each other: use a larger voxel_size or a smaller radius");
-  constexpr std::size_t kMostLonely = 20000;
-  if (points > kMostLonely && per_cell < 1.1 &&
-      options.search_distance < 0.5f * options.feature_radius)
+  constexpr std::size_t kMaxLonely = 20000;
+  if (points > kMaxLonely && per_cell < 1.1 &&
+      options.max_correspondence_distance < 0.5f * options.feature_radius)
     throw InvalidArgument(
         "nearly all of " + std::to_string(points) +
         " points are alone within half of feature_radius " +

@@ -25,7 +25,7 @@ class DeviceEngine : public Engine {
                                                          const PrepareOptions& options) = 0;
 };
 
-/// Throws BackendUnavailable.
+/// CUDA engine on the devices of the options. Throws BackendUnavailable.
 std::shared_ptr<Engine> make_cuda_engine(const CudaOptions& options);
 
 }  // namespace gpureg

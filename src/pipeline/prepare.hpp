@@ -23,10 +23,10 @@ auto prepare(Exec& exec, Span<const RawCloud> clouds, const PrepareOptions& opti
   const auto searchable = exec.mark();
   auto depth_maps = build_depth_maps(exec, clouds, points, options);
   const auto mapped = exec.mark();
-  auto fronts = build_fronts(exec, points, normals, options);
+  auto surface_sides = build_surface_sides(exec, points, normals, options);
   const auto fronted = exec.mark();
   auto prepared = assemble(exec, points, normals, features, wide_features, closest, depth_maps,
-                           fronts, options);
+                           surface_sides, options);
 
   const double share = 1.0 / static_cast<double>(clouds.size);
   for (auto& cloud : prepared) {
@@ -37,7 +37,7 @@ auto prepare(Exec& exec, Span<const RawCloud> clouds, const PrepareOptions& opti
     ms.grid =
         (exec.milliseconds(downsampled, gridded) + exec.milliseconds(widened, searchable)) * share;
     ms.depth_maps = exec.milliseconds(searchable, mapped) * share;
-    ms.fronts = exec.milliseconds(mapped, fronted) * share;
+    ms.surface_sides = exec.milliseconds(mapped, fronted) * share;
   }
   return prepared;
 }

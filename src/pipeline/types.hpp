@@ -38,13 +38,13 @@ struct PairView {
   PriorTest prior{};
 };
 
-/// A refined pose with what speaks for and against it, in local coordinates of both clouds.
+/// A refined pose with its evidence, in local coordinates of both clouds.
 struct ModeOutcome {
   Pose<double> pose{1, 0, 0, 0, 0, 0, 0};
   std::uint32_t hypothesis = 0;  ///< seed that it came from
   std::uint32_t iterations = 0;
-  /// the mode that it was slid from, by its place among the modes; its own where it was not
-  std::uint32_t family = 0;
+  /// Index of the mode that it was perturbed from (degeneracy search), or its own.
+  std::uint32_t origin_mode = 0;
   MatchEvidence matches{0, 0, 0};
   SideEvidence source{}, target{};
   InformationSums information{};
@@ -60,11 +60,19 @@ struct PairOutcome {
   Support support{0, 0, 0};
   Moments source_moments{0, {0, 0, 0}, {0, 0, 0, 0, 0, 0}};
   Moments target_moments{0, {0, 0, 0}, {0, 0, 0, 0, 0, 0}};
-  std::vector<ModeOutcome> modes;  ///< distinct poses, in order of their promise
+  std::vector<ModeOutcome> modes;  ///< distinct poses, in order of their coarse_score
   /// of all matches, what MatchEvidence is relative to
   std::uint64_t match_weight_source = 0, match_weight_target = 0;
   RegistrationStatistics statistics;
   StageTimings timings;
 };
+
+/// Poses to refine and verify beside the modes of a pair (degeneracy search).
+struct PerturbedPoses {
+  std::uint32_t origin_mode;  ///< index of the mode that they were perturbed from
+  std::vector<Pose<double>>
+      poses;  ///< local coordinates of both clouds; at most kMaxPerturbedPoses
+};
+constexpr std::uint32_t kMaxPerturbedPoses = 8;
 
 }  // namespace gpureg

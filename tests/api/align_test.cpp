@@ -9,7 +9,7 @@ namespace {
 
 RegistrationOptions quick() {
   RegistrationOptions o = RegistrationOptions::from_voxel_size(0.08f);
-  o.hypothesis.count = 300000;
+  o.quadruples.count = 300000;
   return o;
 }
 
@@ -62,7 +62,7 @@ TEST(Align, SourceAndTargetAreNotMixedUp) {
   // Both ways round, and with either cloud the smaller one: the engine swaps inside.
   for (const bool smaller_as_source : {false, true}) {
     RegistrationOptions o = quick();
-    o.hypothesis.smaller_as_source = smaller_as_source;
+    o.smaller_as_source = smaller_as_source;
     const Eigen::Vector3f eye(1.5f, 2.5f, 1.7f),
         eye_in_source = (pose.inverse() * eye.cast<double>()).cast<float>();
     PointCloudView a(source), b(target);
@@ -113,7 +113,7 @@ TEST(AlignBatch, ReportsEveryPairInOrderAndCanBeStopped) {
   for (int k = 0; k < 4; ++k) scans.push_back(test::scan_room(random));
   for (const auto& s : scans) views.emplace_back(s);
   RegistrationOptions o = RegistrationOptions::from_voxel_size(0.15f);
-  o.hypothesis.count = 300;
+  o.quadruples.count = 300;
   const std::vector<PreparedCloud> clouds = prepare_batch(context, views, o.prepare);
   std::vector<Pair> pairs;
   for (int repeat = 0; repeat < 4; ++repeat)

@@ -14,7 +14,7 @@ TEST(Async, FuturesHaveWhatTheCallsReturn) {
   const auto a = test::scan_room(random),
              b = test::moved(test::random_pose(random), test::scan_room(random));
   RegistrationOptions options = RegistrationOptions::from_voxel_size(0.1f);
-  options.hypothesis.count = 5000;
+  options.quadruples.count = 5000;
   const Context context = Context::cpu(2);
   const auto clouds =
       prepare_batch(context, {PointCloudView(a), PointCloudView(b)}, options.prepare);
@@ -23,7 +23,7 @@ TEST(Async, FuturesHaveWhatTheCallsReturn) {
   auto many = align_batch_async(context, clouds, {{0, 1}, {0, 1}}, options);
   EXPECT_EQ(test::bytes(one.get()), expected);
   for (const RegistrationResult& result : many.get()) EXPECT_EQ(test::bytes(result), expected);
-  options.hypothesis.count = 0;
+  options.quadruples.count = 0;
   auto bad = align_async(context, clouds[0], clouds[1], options);
   EXPECT_THROW(bad.get(), InvalidArgument);
 }

@@ -14,7 +14,7 @@ namespace {
 
 RegistrationOptions quick() {
   RegistrationOptions o = RegistrationOptions::from_voxel_size(0.08f);
-  o.hypothesis.count = 20000;
+  o.quadruples.count = 20000;
   return o;
 }
 
@@ -83,7 +83,7 @@ TEST(BadInput, NoOverlapIsNotAligned) {
   for (int k = 0; k < 20000; ++k)
     sphere.push_back(Eigen::Vector3f(normal(random), normal(random), normal(random)).normalized());
   RegistrationOptions options = quick();
-  options.score.min_inlier_ratio = 0.9f;
+  options.quadruples.min_inlier_ratio = 0.9f;
   const std::vector<Eigen::Vector3f> corner = room();
   const RegistrationResult r =
       align(Context::cpu(2), PointCloudView(sphere), PointCloudView(corner), options);
@@ -98,7 +98,7 @@ TEST(BadInput, TenKilometresAway) {
   std::vector<Eigen::Vector3f> far;
   for (const Eigen::Vector3f& p : b) far.push_back(p + Eigen::Vector3f(10000, -10000, 5000));
   RegistrationOptions options = quick();
-  options.hypothesis.count = 50000;
+  options.quadruples.count = 50000;
   const RegistrationResult r =
       align(Context::cpu(2), PointCloudView(a), PointCloudView(far), options);
   ASSERT_TRUE(r.aligned()) << to_string(r.reason);
@@ -212,7 +212,7 @@ TEST(BadInput, MillimetresWithAVoxelInMetres) {
     for (int y = 0; y < 150; ++y)
       wide.emplace_back(0.3f * static_cast<float>(x), 0.3f * static_cast<float>(y), 0.0f);
   PrepareOptions far;
-  far.search_distance = 0.5f;
+  far.max_correspondence_distance = 0.5f;
   EXPECT_EQ(prepare(context, PointCloudView(wide), far).size(), 22500u);
 }
 

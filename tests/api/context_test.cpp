@@ -34,7 +34,7 @@ TEST(Context, CloudsOfOneCpuContextGoWithAnother) {
   const PreparedCloud a = prepare(Context::cpu(1), PointCloudView(points)),
                       b = prepare(Context::cpu(2), PointCloudView(points));
   RegistrationOptions options;
-  options.hypothesis.count = 1000;
+  options.quadruples.count = 1000;
   EXPECT_NO_THROW(align(Context::cpu(1), a, b, options));
 }
 
@@ -44,7 +44,7 @@ TEST(Context, SharedByTwoThreads) {
   const Context context = Context::cpu(2);
   RegistrationOptions options = RegistrationOptions::from_voxel_size(0.12f);
   const PreparedCloud cloud = prepare(context, PointCloudView(points), options.prepare);
-  options.hypothesis.count = 500;
+  options.quadruples.count = 500;
   const Eigen::Matrix4d expected =
       align(context, cloud, cloud, options).target_from_source.matrix();
   std::vector<Eigen::Matrix4d> found(4);

@@ -21,9 +21,9 @@ struct TwoScans {
 RegistrationOptions keep_points() {
   RegistrationOptions o = RegistrationOptions::from_voxel_size(0.05f);
   o.prepare.voxel_size = 0;
-  o.hypothesis.count = 20000;
-  o.hypothesis.smaller_as_source = false;
-  o.score.max_normal_angle = o.score.max_judged_normal_angle = 180;
+  o.quadruples.count = 20000;
+  o.smaller_as_source = false;
+  o.quadruples.max_normal_angle = o.quadruples.max_verification_normal_angle = 180;
   return o;
 }
 

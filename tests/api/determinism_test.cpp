@@ -15,8 +15,8 @@ using test::bytes;
 class Determinism : public ::testing::Test {
  protected:
   Determinism() : options(RegistrationOptions::from_voxel_size(0.12f)) {
-    options.hypothesis.count = 2000;
-    options.hypothesis.seed = 42;
+    options.quadruples.count = 2000;
+    options.seed = 42;
     std::mt19937 random(1);
     for (int k = 0; k < 4; ++k)
       scans.push_back(test::moved(test::random_pose(random), test::scan_room(random)));
@@ -74,7 +74,7 @@ TEST_F(Determinism, PreparedCloudsAreTheSameAloneAndInABatch) {
 
 TEST_F(Determinism, AnotherSeedDrawsOtherHypotheses) {
   const auto first = run(Context::cpu(2), {pairs[0]});
-  options.hypothesis.seed = 43;
+  options.seed = 43;
   EXPECT_NE(run(Context::cpu(2), {pairs[0]}), first);
 }
 

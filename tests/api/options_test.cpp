@@ -26,15 +26,15 @@ TEST(Options, PaperNumbers) {
   EXPECT_FLOAT_EQ(o.prepare.voxel_size, 0.05f);
   EXPECT_FLOAT_EQ(o.prepare.normal_radius, 0.1f);
   EXPECT_FLOAT_EQ(o.prepare.feature_radius, 0.25f);
-  EXPECT_EQ(o.hypothesis.count, 4'000'000u);
-  EXPECT_FLOAT_EQ(o.hypothesis.edge_similarity, 0.9f);
-  EXPECT_FLOAT_EQ(o.score.max_correspondence_distance, 0.075f);
-  EXPECT_LT(o.score.max_normal_angle, 180);
+  EXPECT_EQ(o.quadruples.count, 4'000'000u);
+  EXPECT_FLOAT_EQ(o.quadruples.edge_similarity, 0.9f);
+  EXPECT_FLOAT_EQ(o.prepare.max_correspondence_distance, 0.075f);
+  EXPECT_LT(o.quadruples.max_normal_angle, 180);
   EXPECT_EQ(o.refine.max_iterations, 0u);
-  EXPECT_EQ(o.hypothesis.proposal, Proposal::quadruples);
+  EXPECT_EQ(o.method, RegistrationMethod::quadruples);
   EXPECT_EQ(o.prepare.wide_feature_radius, 0);
   EXPECT_EQ(o.prepare.depth_maps, 0u);
-  EXPECT_EQ(o.prepare.front_reach, 0.0f);
+  EXPECT_EQ(o.prepare.surface_side_distance, 0.0f);
   EXPECT_NO_THROW(o.validate());
 }
 
@@ -43,7 +43,7 @@ TEST(Options, EverythingScalesWithTheVoxel) {
     const RegistrationOptions o = RegistrationOptions::from_voxel_size(v);
     EXPECT_NO_THROW(o.validate());
     EXPECT_FLOAT_EQ(o.prepare.feature_radius / v, 5);
-    EXPECT_FLOAT_EQ(o.score.max_correspondence_distance / v, 1.5f);
+    EXPECT_FLOAT_EQ(o.prepare.max_correspondence_distance / v, 1.5f);
     EXPECT_GT(o.refine.max_iterations, 0u);
   }
 }
@@ -58,17 +58,19 @@ TEST(Options, EachFieldIsNamed) {
   for (const float bad : {kNan, kInf, -0.1f, 0.0f, 1e9f}) {
     expect_refused([&](auto& o) { o.prepare.normal_radius = bad; }, "prepare.normal_radius");
     expect_refused([&](auto& o) { o.prepare.feature_radius = bad; }, "prepare.feature_radius");
-    expect_refused([&](auto& o) { o.prepare.search_distance = bad; }, "prepare.search_distance");
-    expect_refused([&](auto& o) { o.score.max_correspondence_distance = bad; },
-                   "score.max_correspondence_distance");
-    expect_refused([&](auto& o) { o.score.max_normal_angle = bad; }, "score.max_normal_angle");
-    expect_refused([&](auto& o) { o.score.max_judged_normal_angle = bad; },
-                   "score.max_judged_normal_angle");
+    expect_refused([&](auto& o) { o.prepare.max_correspondence_distance = bad; },
+                   "prepare.max_correspondence_distance");
+    expect_refused([&](auto& o) { o.prepare.max_correspondence_distance = bad; },
+                   "prepare.max_correspondence_distance");
+    expect_refused([&](auto& o) { o.quadruples.max_normal_angle = bad; },
+                   "quadruples.max_normal_angle");
+    expect_refused([&](auto& o) { o.quadruples.max_verification_normal_angle = bad; },
+                   "quadruples.max_verification_normal_angle");
     expect_refused([&](auto& o) { o.refine.kernel_width = bad; }, "refine.kernel_width");
-    expect_refused([&](auto& o) { o.refine.max_correspondence_distance = bad; },
-                   "refine.max_correspondence_distance");
-    expect_refused([&](auto& o) { o.hypothesis.edge_similarity = bad; },
-                   "hypothesis.edge_similarity");
+    expect_refused([&](auto& o) { o.prepare.max_correspondence_distance = bad; },
+                   "prepare.max_correspondence_distance");
+    expect_refused([&](auto& o) { o.quadruples.edge_similarity = bad; },
+                   "quadruples.edge_similarity");
     expect_refused([&](auto& o) { o.compatibility.tolerance = bad; }, "compatibility.tolerance");
     expect_refused([&](auto& o) { o.compatibility.max_turn = bad; }, "compatibility.max_turn");
     expect_refused([&](auto& o) { o.compatibility.consensus_distance = bad; },
@@ -84,7 +86,8 @@ TEST(Options, EachFieldIsNamed) {
     expect_refused([&](auto& o) { o.evidence.min_range = bad; }, "evidence.min_range");
   }
   for (const float bad : {kNan, -0.1f, 1.1f})
-    expect_refused([&](auto& o) { o.score.min_inlier_ratio = bad; }, "score.min_inlier_ratio");
+    expect_refused([&](auto& o) { o.quadruples.min_inlier_ratio = bad; },
+                   "quadruples.min_inlier_ratio");
   for (const double bad : {std::numeric_limits<double>::quiet_NaN(), -0.1, 1.1})
     expect_refused([&](auto& o) { o.min_confidence = bad; }, "min_confidence");
   expect_refused([](auto& o) { o.compatibility.max_matches = 3; }, "compatibility.max_matches");
@@ -95,28 +98,31 @@ TEST(Options, EachFieldIsNamed) {
   expect_refused([](auto& o) { o.evidence.sample = 63; }, "evidence.sample");
   expect_refused([](auto& o) { o.evidence.modes = 65; }, "evidence.modes");
   expect_refused([](auto& o) { o.prepare.depth_maps = 65; }, "prepare.depth_maps");
-  expect_refused([](auto& o) { o.prepare.front_reach = -0.1f; }, "prepare.front_reach");
+  expect_refused([](auto& o) { o.prepare.surface_side_distance = -0.1f; },
+                 "prepare.surface_side_distance");
   for (const float bad : {kNan, -0.1f, std::numeric_limits<float>::infinity()})
-    expect_refused([&](auto& o) { o.evidence.slide_distance = bad; }, "evidence.slide_distance");
-  expect_refused([](auto& o) { o.prepare.front_reach = std::numeric_limits<float>::infinity(); },
-                 "prepare.front_reach");
+    expect_refused([&](auto& o) { o.evidence.degeneracy_search_distance = bad; },
+                   "evidence.degeneracy_search_distance");
+  expect_refused(
+      [](auto& o) { o.prepare.surface_side_distance = std::numeric_limits<float>::infinity(); },
+      "prepare.surface_side_distance");
   expect_refused([](auto& o) { o.prepare.wide_feature_radius = 50; },
                  "prepare.wide_feature_radius");
   expect_refused([](auto& o) { o.prepare.voxel_size = kNan; }, "prepare.voxel_size");
   expect_refused([](auto& o) { o.prepare.voxel_size = 1e-5f; }, "prepare.feature_radius");
-  expect_refused([](auto& o) { o.hypothesis.count = 0; }, "hypothesis.count");
-  expect_refused([](auto& o) { o.hypothesis.neighbors = 0; }, "hypothesis.neighbors");
-  expect_refused([](auto& o) { o.hypothesis.neighbors = 17; }, "hypothesis.neighbors");
-  expect_refused([](auto& o) { o.hypothesis.max_survivors = 0; }, "hypothesis.max_survivors");
+  expect_refused([](auto& o) { o.quadruples.count = 0; }, "quadruples.count");
+  expect_refused([](auto& o) { o.quadruples.neighbors = 0; }, "quadruples.neighbors");
+  expect_refused([](auto& o) { o.quadruples.neighbors = 17; }, "quadruples.neighbors");
+  expect_refused([](auto& o) { o.quadruples.max_survivors = 0; }, "quadruples.max_survivors");
   expect_refused([](auto& o) { o.refine.max_iterations = 5000; }, "refine.max_iterations");
-  expect_refused([](auto& o) { o.score.max_correspondence_distance = 0.5f; },
-                 "score.max_correspondence_distance");
+  expect_refused([](auto& o) { o.prepare.max_correspondence_distance = 0.5f; },
+                 "prepare.max_correspondence_distance");
 }
 
 TEST(Options, MessageHoldsTheValue) {
   RegistrationOptions o;
-  o.hypothesis.edge_similarity = 1.5f;
-  test::expect_error<InvalidArgument>([&] { o.validate(); }, {"hypothesis.edge_similarity", "1.5"});
+  o.quadruples.edge_similarity = 1.5f;
+  test::expect_error<InvalidArgument>([&] { o.validate(); }, {"quadruples.edge_similarity", "1.5"});
 }
 
 }  // namespace

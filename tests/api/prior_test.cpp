@@ -211,7 +211,7 @@ TEST(Prior, BadInputIsNamed) {
         align(scene.context, scene.source, scene.target, scene.about_truth(10, 1),
               RegistrationOptions::loopsmart(0.1f));
       },
-      {"hypothesis.proposal", "quadruples"});
+      {"method", "quadruples"});
 }
 
 }  // namespace

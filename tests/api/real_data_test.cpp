@@ -49,7 +49,7 @@ TEST(RealData, FgrRangePairs) {
   GPUREG_DATA_FOLDER_OR_SKIP(folder, "fgr");
   // what `gpureg info` suggests
   RegistrationOptions options = RegistrationOptions::from_voxel_size(0.02f);
-  options.hypothesis.count = 1'000'000;
+  options.quadruples.count = 1'000'000;
   const Context context = Context::cpu();
   double mean = 0, worst = 0;
   for (int k = 1; k <= 25; ++k) {
@@ -102,7 +102,7 @@ TEST(RealData, LidarPair) {
     for (int column = 0; column < 4; ++column) file >> truth.matrix()(row, column);
   ASSERT_TRUE(file);
   RegistrationOptions options = RegistrationOptions::loopsmart(0.5f);
-  options.hypothesis.count = 400'000;
+  options.quadruples.count = 400'000;
   const Context context = Context::cpu();
   const RegistrationResult coarse = align(context, source.view(), target.view(), options);
   ASSERT_TRUE(coarse.aligned());

@@ -111,7 +111,7 @@ TEST(Symmetry, Pipe) {
   }
   EXPECT_GE(symmetric, 4) << "of " << r.modes.size() << " modes";
   const PoseEvidence& e = r.modes.front().evidence;
-  EXPECT_LT(e.stiffness[0], 1e-2 * e.stiffness[3]);
+  EXPECT_LT(e.information_eigenvalues[0], 1e-2 * e.information_eigenvalues[3]);
 }
 
 TEST(Symmetry, CorridorSlides) {
@@ -125,10 +125,10 @@ TEST(Symmetry, CorridorSlides) {
     EXPECT_FALSE(r.aligned()) << r.score;
     ASSERT_FALSE(r.modes.empty());
     const PoseEvidence& e = r.modes.front().evidence;
-    EXPECT_LT(e.stiffness[0], 1e-2 * e.stiffness[2]);
+    EXPECT_LT(e.information_eigenvalues[0], 1e-2 * e.information_eigenvalues[2]);
     // Along y of the target, and nothing else.
-    EXPECT_GT(std::abs(e.softest[4]), 0.98)
-        << e.softest[3] << " " << e.softest[4] << " " << e.softest[5];
+    EXPECT_GT(std::abs(e.weakest_direction[4]), 0.98)
+        << e.weakest_direction[3] << " " << e.weakest_direction[4] << " " << e.weakest_direction[5];
   }
 }
 
@@ -142,7 +142,7 @@ TEST(Symmetry, FurnishedRoomIsStiff) {
   EXPECT_TRUE(r.aligned());
   EXPECT_GT(r.score, 0.9);
   const PoseEvidence& e = r.modes.front().evidence;
-  EXPECT_GT(e.stiffness[0], 1e-2 * e.stiffness[3]);
+  EXPECT_GT(e.information_eigenvalues[0], 1e-2 * e.information_eigenvalues[3]);
 }
 
 }  // namespace

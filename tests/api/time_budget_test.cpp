@@ -35,10 +35,10 @@ struct FakeLevels {
     result.target_from_source.setIdentity();
     result.target_from_source.translation().x() = shift(quality);
     result.timings.match = match;
-    result.timings.fit =
+    result.timings.propose =
         std::pow(per_triangle * o.compatibility.seeds * o.compatibility.triangles, exponent);
-    result.timings.score = std::pow(per_seed * o.compatibility.seeds, exponent);
-    result.timings.refine = result.timings.judge = std::pow(per_mode * o.evidence.modes, exponent);
+    result.timings.rank = std::pow(per_seed * o.compatibility.seeds, exponent);
+    result.timings.refine = result.timings.verify = std::pow(per_mode * o.evidence.modes, exponent);
     clock += result.timings.total() + overhead;
     return result;
   }
@@ -101,17 +101,16 @@ TEST(TimeBudget, TheMostConfidentLevelIsReturned) {
 TEST(TimeBudget, PredictionsFollowTheStages) {
   StageTimings t;
   t.match = 1;
-  t.sample = 2;
-  t.fit = 3;
-  t.score = 4;
+  t.propose = 5;
+  t.rank = 4;
   t.refine = 5;
-  t.judge = 6;
+  t.verify = 6;
   RegistrationOptions from, to;
   to.compatibility.seeds = 2 * from.compatibility.seeds;
   to.compatibility.triangles = 3 * from.compatibility.triangles;
   to.evidence.modes = 2 * from.evidence.modes;
   EXPECT_DOUBLE_EQ(predicted_milliseconds(t, 7, from, from), 28);
-  EXPECT_DOUBLE_EQ(predicted_milliseconds(t, 7, from, to), 7 + 1 + 2 + 3 * 6 + 4 * 2 + 11 * 2);
+  EXPECT_DOUBLE_EQ(predicted_milliseconds(t, 7, from, to), 7 + 1 + 5 * 6 + 4 * 2 + 11 * 2);
 }
 
 TEST(TimeBudget, ResultsAreThoseOfTheirLevel) {
@@ -138,7 +137,7 @@ TEST(TimeBudget, BadInputIsNamed) {
                                         {"milliseconds"});
   test::expect_error<InvalidArgument>(
       [&] { align_within(context, {}, {}, 10, RegistrationOptions::loopsmart()); },
-      {"hypothesis.proposal", "quadruples"});
+      {"method", "quadruples"});
   test::expect_error<InvalidArgument>([&] { align_within(context, {}, {}, 10); }, {"empty handle"});
   test::expect_error<InvalidArgument>([] { RegistrationOptions{}.with_quality(11); }, {"quality"});
 }

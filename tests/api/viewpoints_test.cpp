@@ -55,7 +55,7 @@ TEST(ShareFacingAway, WhatIsNotKnownDoesNot) {
 
 // Where prepare() no longer believes that it is the normals that are wrong.
 TEST(ShareFacingAway, TheLineIsPreparations) {
-  const auto most = static_cast<std::uint32_t>(PointCloudView::kMostFacingAway * 1000);
+  const auto most = static_cast<std::uint32_t>(PointCloudView::kMaxFacingAway * 1000);
   EXPECT_TRUE(turns_back(most, 1000));
   EXPECT_FALSE(turns_back(most + 1, 1000));
 }

@@ -90,7 +90,7 @@ TEST_F(Batch, JsonHasEveryFieldOfEveryPair) {
          {"source_points", "target_points", "correspondences", "hypotheses", "survivors", "scored",
           "points_scored", "consensus", "inliers", "refine_iterations"})
       EXPECT_TRUE(pair["statistics"][count].is_number_unsigned()) << count;
-    for (const char* stage : {"match", "sample", "fit", "score", "refine", "judge", "total"})
+    for (const char* stage : {"match", "propose", "rank", "refine", "verify", "total"})
       EXPECT_GE(pair["ms"][stage].get<double>(), 0) << stage;
     const std::string status = pair["status"], reason = pair["reason"];
     ++reasons[reason];
@@ -178,7 +178,7 @@ TEST_F(Batch, MinimalScoreDecidesWhatIsReported) {
   EXPECT_TRUE(evaluation::read_log(out_ / "none.log").empty());
   const auto options = json_of(out_ / "none.json")["options"];
   EXPECT_EQ(options["min_confidence"], 1.0);
-  EXPECT_FLOAT_EQ(options["score"]["min_inlier_ratio"].get<float>(), 0.3f) << "not asked for";
+  EXPECT_FLOAT_EQ(options["quadruples"]["min_inlier_ratio"].get<float>(), 0.3f) << "not asked for";
   // The candidates are the same whatever is reported.
   const auto poses = [&](const char* name) {
     auto pairs = without_times(json_of(out_ / name))["pairs"];
@@ -196,7 +196,8 @@ TEST_F(Batch, MinimalScoreOfLoopsmartIsTheInlierRatio) {
     const std::string name = "ratio" + score;
     batch(name, joined(kLoopsmart, {"--min-score", score}));
     const auto json = json_of(out_ / (name + ".json"));
-    EXPECT_FLOAT_EQ(json["options"]["score"]["min_inlier_ratio"].get<float>(), std::stof(score));
+    EXPECT_FLOAT_EQ(json["options"]["quadruples"]["min_inlier_ratio"].get<float>(),
+                    std::stof(score));
     EXPECT_EQ(json["options"]["min_confidence"], 0.5) << "not asked for";
     std::size_t expected = 0;
     for (const auto& pair : json["pairs"]) {

@@ -74,8 +74,8 @@ TEST_F(Output, NoOutputIsWrittenOverAnInputOrAnotherOutput) {
   const std::string json = out_.write("r.json", "{\"pairs\": []}");
   expect_refused({"report", json, "-o", json}, {"-o", "RESULT", json});
   expect_refused({"report", json, "-o", b, "--clouds", scans_.path()}, {"-o", "--clouds", b});
-  expect_refused({"agree", json, "--json", json}, {"--json", "RESULT", json});
-  expect_refused({"agree", json, "--json", out_ / "x", "-o", out_ / "x"}, {"--json", "-o"});
+  expect_refused({"consistency", json, "--json", json}, {"--json", "RESULT", json});
+  expect_refused({"consistency", json, "--json", out_ / "x", "-o", out_ / "x"}, {"--json", "-o"});
   expect_refused({"evaluate", json, "--ground-truth", scans_.path(), "--json", json},
                  {"--json", "RESULT", json});
   expect_refused({"evaluate", json, "--ground-truth", scans_.path(), "--json", scans_ / "gt.log"},

@@ -93,7 +93,8 @@ TEST_F(Register, Json) {
   EXPECT_EQ(json["source"]["file"], source_);
   EXPECT_EQ(json["source"]["prepare"]["input_points"], room_scan(0).points.size());
   double parts = 0;
-  for (const char* stage : {"downsample", "normals", "features", "grid", "depth_maps", "fronts"})
+  for (const char* stage :
+       {"downsample", "normals", "features", "grid", "depth_maps", "surface_sides"})
     parts += json["source"]["prepare"]["ms"][stage].get<double>();
   EXPECT_DOUBLE_EQ(json["source"]["prepare"]["ms"]["total"].get<double>(), parts);
   const auto& result = json["result"];
@@ -129,7 +130,7 @@ TEST_F(Register, MinimalScoreDecidesWhatIsReported) {
   expect_holds(none.out, {"not_aligned: confidence_too_low", "best candidate"});
   EXPECT_EQ(json_of(path)["options"]["min_confidence"], 1.0);
   align(joined(kLoopsmart, {"--min-score", "0.9", "--json", path}));
-  EXPECT_FLOAT_EQ(json_of(path)["options"]["score"]["min_inlier_ratio"].get<float>(), 0.9f);
+  EXPECT_FLOAT_EQ(json_of(path)["options"]["quadruples"]["min_inlier_ratio"].get<float>(), 0.9f);
   const std::string other = write_cloud(folder_, "sticks.ply", sticks());
   const std::vector<std::string> hopeless = joined({"register", source_, other}, kSmall);
   EXPECT_EQ(run(hopeless).status, 1);

@@ -66,7 +66,7 @@ TEST_F(Report, NumbersAlone) {
       html,
       {"voxel size 0.1 m", "1024 seeds per pair", "21 pairs of 7 fragments were tried, 10 reported",
        "Preparation, mean per fragment", "Alignment, mean per pair", ">match<", ">features<",
-       "Every pair", "confidence_too_low", "Options", ">max_judged_normal_angle<"});
+       "Every pair", "confidence_too_low", "Options", ">max_verification_normal_angle<"});
   EXPECT_EQ(html.find("<img"), std::string::npos);
   EXPECT_EQ(html.find("Recall and precision"), std::string::npos);
 }

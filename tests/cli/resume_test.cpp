@@ -153,7 +153,7 @@ TEST_F(Resume, ChangedOptionsAreRefused) {
     expect_refused(batch("r", joined({"--resume", "--quiet"}, change)), fragments);
     EXPECT_EQ(content_of(journal("r")), before);
   };
-  refused({"--seed", "2"}, {"cannot resume", "options.hypothesis.seed was 1, now 2"});
+  refused({"--seed", "2"}, {"cannot resume", "options.seed was 1, now 2"});
   refused({"--min-score", "0.6"}, {"options.min_confidence was 0.5, now 0.6"});
   refused({"--preset", "loopsmart"}, {"cannot resume", "options."});
   const std::string pairs = out_.write("pairs.txt", "0 1\n");

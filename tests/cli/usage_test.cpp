@@ -31,7 +31,7 @@ TEST_F(Usage, HelpAndVersionAreNoErrors) {
 }
 
 TEST_F(Usage, VerbsAndOptionsThatDoNotExist) {
-  expect_refused({}, {"no verb", "register, batch, agree, evaluate, report, generate, info"});
+  expect_refused({}, {"no verb", "register, batch, consistency, evaluate, report, generate, info"});
   expect_refused({"regsiter", "a", "b"}, {"regsiter", "register, batch"});
   expect_refused({"--bogus"}, {"--bogus"});
   expect_refused(with({"--sed", "3"}), {"--sed", "gpureg register --help"});
@@ -75,8 +75,8 @@ TEST_F(Usage, OtherValues) {
   const auto hypotheses = [&](const char* count) {
     return with({"--preset", "loopsmart", "--hypotheses", count});
   };
-  expect_refused(hypotheses("0"), {"hypothesis.count is 0"});
-  expect_refused(hypotheses("2000000000"), {"hypothesis.count is 2000000000"});
+  expect_refused(hypotheses("0"), {"quadruples.count is 0"});
+  expect_refused(hypotheses("2000000000"), {"quadruples.count is 2000000000"});
   expect_refused(with({"--hypotheses", "4e6"}), {"--hypotheses", "4e6"});
   expect_refused(with({"--hypotheses", "4294967297"}), {"--hypotheses", "4294967297"});
   expect_refused(with({"--threads", "-1"}), {"--threads", "-1"});

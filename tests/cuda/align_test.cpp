@@ -47,8 +47,8 @@ void expect_same_alignment(const std::vector<RawCloud>& raw,
   const auto cpu_views = span_of(cpu_pairs), cuda_views = span_of(cuda_pairs);
   const std::size_t count = wanted.size();
 
-  const auto cpu_matches = cpu::match_features(on_cpu, cpu_views, options.hypothesis);
-  const auto cuda_matches = cuda::match_features(on_cuda, cuda_views, options.hypothesis);
+  const auto cpu_matches = cpu::match_features(on_cpu, cpu_views, options);
+  const auto cuda_matches = cuda::match_features(on_cuda, cuda_views, options);
   const auto match_count = host(on_cuda, cuda_matches.count.data(), count);
   for (std::size_t p = 0; p < count; ++p) {
     SCOPED_TRACE("match, pair " + std::to_string(p));
@@ -57,8 +57,8 @@ void expect_same_alignment(const std::vector<RawCloud>& raw,
         cpu_matches[p].pairs,
         host(on_cuda, cuda_matches.pairs.data() + cuda_matches.room.offset[p], match_count[p])));
   }
-  const auto cpu_quadruples = cpu::sample_quadruples(on_cpu, cpu_matches, options.hypothesis);
-  const auto cuda_quadruples = cuda::sample_quadruples(on_cuda, cuda_matches, options.hypothesis);
+  const auto cpu_quadruples = cpu::sample_quadruples(on_cpu, cpu_matches, options);
+  const auto cuda_quadruples = cuda::sample_quadruples(on_cuda, cuda_matches, options);
   for (std::size_t p = 0; p < count; ++p) {
     SCOPED_TRACE("sample, pair " + std::to_string(p));
     ASSERT_TRUE(
@@ -66,10 +66,9 @@ void expect_same_alignment(const std::vector<RawCloud>& raw,
                    host(on_cuda, cuda_quadruples.id.data() + cuda_quadruples.segments.offset[p],
                         cuda_quadruples.segments.size(p))));
   }
-  const auto cpu_hypotheses =
-      cpu::fit_hypotheses(on_cpu, cpu_matches, cpu_quadruples, options.hypothesis);
+  const auto cpu_hypotheses = cpu::fit_hypotheses(on_cpu, cpu_matches, cpu_quadruples, options);
   const auto cuda_hypotheses =
-      cuda::fit_hypotheses(on_cuda, cuda_matches, cuda_quadruples, options.hypothesis);
+      cuda::fit_hypotheses(on_cuda, cuda_matches, cuda_quadruples, options);
   const auto valid_count = host(on_cuda, cuda_hypotheses.count.data(), count);
   for (std::size_t p = 0; p < count; ++p) {
     SCOPED_TRACE("fit, pair " + std::to_string(p));
@@ -83,18 +82,15 @@ void expect_same_alignment(const std::vector<RawCloud>& raw,
     ASSERT_TRUE(same_bytes(cpu_hypotheses[p].pose, kept));
     ASSERT_EQ(kept.size(), valid_count[p]);
   }
-  const auto cpu_best = cpu::score_hypotheses(on_cpu, cpu_views, cpu_hypotheses, options.score);
-  const auto cuda_best =
-      cuda::score_hypotheses(on_cuda, cuda_views, cuda_hypotheses, options.score);
-  const auto cpu_refined =
-      cpu::refine_poses(on_cpu, cpu_views, cpu_best, options.score, options.refine);
-  const auto cuda_refined =
-      cuda::refine_poses(on_cuda, cuda_views, cuda_best, options.score, options.refine);
-  const auto cpu_judged = cpu::judge_poses(on_cpu, cpu_views, cpu_refined, options.score);
-  const auto cuda_judged = cuda::judge_poses(on_cuda, cuda_views, cuda_refined, options.score);
+  const auto cpu_best = cpu::score_hypotheses(on_cpu, cpu_views, cpu_hypotheses, options);
+  const auto cuda_best = cuda::score_hypotheses(on_cuda, cuda_views, cuda_hypotheses, options);
+  const auto cpu_refined = cpu::refine_poses(on_cpu, cpu_views, cpu_best, options);
+  const auto cuda_refined = cuda::refine_poses(on_cuda, cuda_views, cuda_best, options);
+  const auto cpu_verified = cpu::verify_poses(on_cpu, cpu_views, cpu_refined, options);
+  const auto cuda_verified = cuda::verify_poses(on_cuda, cuda_views, cuda_refined, options);
   const auto best = host(on_cuda, cuda_best.data(), count),
              refined = host(on_cuda, cuda_refined.data(), count);
-  const auto judged = host(on_cuda, cuda_judged.data(), count);
+  const auto judged = host(on_cuda, cuda_verified.data(), count);
   for (std::size_t p = 0; p < count; ++p) {
     SCOPED_TRACE("score to judge, pair " + std::to_string(p));
     ASSERT_EQ(cpu_best[p].found, best[p].found != 0);
@@ -106,9 +102,9 @@ void expect_same_alignment(const std::vector<RawCloud>& raw,
     ASSERT_TRUE(same(cpu_refined[p].support, refined[p].support));
     ASSERT_TRUE(same(cpu_refined[p].pose, refined[p].pose));
     ASSERT_EQ(cpu_refined[p].iterations, refined[p].iterations);
-    ASSERT_TRUE(same(cpu_judged[p].support, judged[p].support));
-    ASSERT_EQ(std::memcmp(&cpu_judged[p].source, &judged[p].source, sizeof(Moments)), 0);
-    ASSERT_EQ(std::memcmp(&cpu_judged[p].target, &judged[p].target, sizeof(Moments)), 0);
+    ASSERT_TRUE(same(cpu_verified[p].support, judged[p].support));
+    ASSERT_EQ(std::memcmp(&cpu_verified[p].source, &judged[p].source, sizeof(Moments)), 0);
+    ASSERT_EQ(std::memcmp(&cpu_verified[p].target, &judged[p].target, sizeof(Moments)), 0);
   }
 }
 
@@ -125,7 +121,7 @@ class AlignOnCuda : public ::testing::Test {
     for (std::size_t a = 0; a < kept.size(); ++a)
       for (std::size_t b = 0; b < kept.size(); ++b)
         if (a != b) pairs.push_back({a, b, {}, {}});
-    options.hypothesis.count = 100'000;
+    options.quadruples.count = 100'000;
   }
   std::vector<Vec3> sheet(unsigned shape, std::size_t size) {
     // The shape is drawn first: samplings differ in their points only.
@@ -151,37 +147,37 @@ TEST_F(AlignOnCuda, Default) { expect_same_alignment(raw(), pairs, options); }
 
 TEST_F(AlignOnCuda, Paper) {
   options = RegistrationOptions::loopsmart();
-  options.hypothesis.count = 300'000;
+  options.quadruples.count = 300'000;
   expect_same_alignment(raw(), pairs, options);
 }
 
 TEST_F(AlignOnCuda, MutualMatches) {
-  options.hypothesis.mutual = true;
+  options.quadruples.mutual = true;
   expect_same_alignment(raw(), pairs, options);
 }
 
 TEST_F(AlignOnCuda, SeveralNeighbors) {
   for (const std::uint32_t k : {2u, 5u, 16u}) {
-    options.hypothesis.neighbors = k;
-    options.hypothesis.seed = 1000 + k;
+    options.quadruples.neighbors = k;
+    options.seed = 1000 + k;
     expect_same_alignment(raw(), pairs, options);
   }
 }
 
 TEST_F(AlignOnCuda, ShorterDistanceWithoutNormals) {
-  options.score.max_correspondence_distance = 0.05f;
-  options.score.max_normal_angle = 180;
-  options.refine.max_correspondence_distance = 0.06f;
+  options.prepare.max_correspondence_distance = 0.05f;
+  options.quadruples.max_normal_angle = 180;
+  options.prepare.max_correspondence_distance = 0.06f;
   expect_same_alignment(raw(), pairs, options);
 }
 
 TEST_F(AlignOnCuda, OddHypothesisCountsAndSurvivorLimit) {
   for (const std::uint32_t count : {1u, 33u, 32768u, 65537u}) {
-    options.hypothesis.count = count;
+    options.quadruples.count = count;
     expect_same_alignment(raw(), pairs, options);
   }
-  options.hypothesis.count = 200'000;
-  options.hypothesis.max_survivors = 37;
+  options.quadruples.count = 200'000;
+  options.quadruples.max_survivors = 37;
   expect_same_alignment(raw(), pairs, options);
 }
 
@@ -205,7 +201,7 @@ TEST_F(AlignOnCuda, CorrespondencesOfTheCaller) {
 // bounds are loose, tight, or mean nothing.
 TEST_F(AlignOnCuda, FeaturesOfTheCaller) {
   std::normal_distribution<float> normal;
-  options.hypothesis.count = 5'000;
+  options.quadruples.count = 5'000;
   for (const std::size_t dimension : {1u, 3u, 16u, 32u, 33u, 40u, 64u, 65u, 130u})
     for (const float scale : {1.0f, 1e-12f, 3e18f}) {
       std::vector<std::vector<float>> features;
@@ -222,7 +218,7 @@ TEST_F(AlignOnCuda, FeaturesOfTheCaller) {
       options.prepare.voxel_size = 0.12f;
       SCOPED_TRACE("dimension " + std::to_string(dimension) + ", scale " + std::to_string(scale));
       expect_same_alignment(clouds, {{0, 1, {}, {}}, {4, 0, {}, {}}, {5, 0, {}, {}}}, options);
-      options.hypothesis.mutual = !options.hypothesis.mutual;
+      options.quadruples.mutual = !options.quadruples.mutual;
     }
 }
 
@@ -238,7 +234,7 @@ TEST_F(AlignOnCuda, FeaturesOfTheCallerAgainstThoseOfTheLibrary) {
     clouds[c].feature_dimension = clouds[c].feature_stride = kFpfhSize;
   }
   options.prepare.voxel_size = 0.12f;
-  options.hypothesis.count = 5'000;
+  options.quadruples.count = 5'000;
   expect_same_alignment(clouds, {{0, 1, {}, {}}, {1, 4, {}, {}}, {0, 4, {}, {}}, {1, 2, {}, {}}},
                         options);
 }
@@ -254,9 +250,9 @@ TEST_F(AlignOnCuda, WallsWithoutNoise) {
     }
   kept = rooms;
   pairs = {{0, 1, {}, {}}, {1, 0, {}, {}}, {0, 0, {}, {}}};
-  options.hypothesis.count = 5'000;
+  options.quadruples.count = 5'000;
   for (const bool mutual : {false, true}) {
-    options.hypothesis.mutual = mutual;
+    options.quadruples.mutual = mutual;
     expect_same_alignment(raw(), pairs, options);
   }
 }
@@ -272,14 +268,14 @@ TEST_F(AlignOnCuda, MoreMatchesThanSharedMemoryHolds) {
 TEST_F(AlignOnCuda, StrayPointsMakeTheCloudTooWideForATable) {
   for (auto& points : kept)
     if (points.size() > 1000) points.push_back({9000, 9000, 9000});
-  options.hypothesis.count = 20'000;
+  options.quadruples.count = 20'000;
   expect_same_alignment(raw(), pairs, options);
 }
 
 TEST_F(AlignOnCuda, ACloudWithItself) {
   pairs = {{0, 0, {}, {}}};
-  options.hypothesis.count = 50'000;
-  options.hypothesis.max_survivors = 5'000;
+  options.quadruples.count = 50'000;
+  options.quadruples.max_survivors = 5'000;
   expect_same_alignment(raw(), pairs, options);
 }
 

@@ -102,10 +102,8 @@ void EvidenceOnCuda::expect_same(const std::vector<RawCloud>& clouds) {
   const auto cpu_views = span_of(cpu_pairs), cuda_views = span_of(cuda_pairs);
   const std::size_t count = pairs.size();
 
-  const auto matches =
-      cpu::unite_matches(on_cpu, cpu_views, options.hypothesis, options.compatibility);
-  const auto cuda_matches =
-      cuda::unite_matches(on_cuda, cuda_views, options.hypothesis, options.compatibility);
+  const auto matches = cpu::merge_matches(on_cpu, cpu_views, options);
+  const auto cuda_matches = cuda::merge_matches(on_cuda, cuda_views, options);
   const auto match_count = host(on_cuda, cuda_matches.count.data(), count);
   const auto match_total = host(on_cuda, cuda_matches.total.data(), 2 * count);
   for (std::size_t p = 0; p < count; ++p) {
@@ -129,8 +127,8 @@ void EvidenceOnCuda::expect_same(const std::vector<RawCloud>& clouds) {
     ASSERT_EQ(m.target_total, match_total[2 * p + 1]);
   }
 
-  const auto seeds = cpu::choose_seeds(on_cpu, matches, options.compatibility);
-  const auto cuda_seeds = cuda::choose_seeds(on_cuda, cuda_matches, options.compatibility);
+  const auto seeds = cpu::choose_seeds(on_cpu, matches, options);
+  const auto cuda_seeds = cuda::choose_seeds(on_cuda, cuda_matches, options);
   const auto seed_count = host(on_cuda, cuda_seeds.count.data(), count);
   for (std::size_t p = 0; p < count; ++p) {
     SCOPED_TRACE("seeds, pair " + std::to_string(p));
@@ -139,13 +137,10 @@ void EvidenceOnCuda::expect_same(const std::vector<RawCloud>& clouds) {
         seeds[p], host(on_cuda, cuda_seeds.match.data() + p * cuda_seeds.most, seeds[p].size())));
   }
 
-  auto candidates =
-      cpu::propose_poses(on_cpu, matches, seeds, options.hypothesis, options.compatibility);
-  auto cuda_candidates = cuda::propose_poses(on_cuda, cuda_matches, cuda_seeds, options.hypothesis,
-                                             options.compatibility);
-  cpu::weigh_candidates(on_cpu, cpu_views, matches, candidates, options.evidence, options.score);
-  cuda::weigh_candidates(on_cuda, cuda_views, cuda_matches, cuda_candidates, options.evidence,
-                         options.score);
+  auto candidates = cpu::propose_poses(on_cpu, matches, seeds, options);
+  auto cuda_candidates = cuda::propose_poses(on_cuda, cuda_matches, cuda_seeds, options);
+  cpu::score_candidates(on_cpu, cpu_views, matches, candidates, options);
+  cuda::score_candidates(on_cuda, cuda_views, cuda_matches, cuda_candidates, options);
   const auto candidate_count = host(on_cuda, cuda_candidates.count.data(), count);
   for (std::size_t p = 0; p < count; ++p) {
     SCOPED_TRACE("candidates, pair " + std::to_string(p));
@@ -157,12 +152,12 @@ void EvidenceOnCuda::expect_same(const std::vector<RawCloud>& clouds) {
         same_bytes(candidates[p].pose, host(on_cuda, cuda_candidates.pose.data() + at, size)));
     ASSERT_EQ(evidence_bytes(candidates[p].matches),
               evidence_bytes(host(on_cuda, cuda_candidates.matches.data() + at, size)));
-    ASSERT_TRUE(same_bytes(candidates[p].promise,
-                           host(on_cuda, cuda_candidates.promise.data() + at, size)));
+    ASSERT_TRUE(same_bytes(candidates[p].coarse_score,
+                           host(on_cuda, cuda_candidates.coarse_score.data() + at, size)));
   }
 
-  auto modes = cpu::select_modes(on_cpu, candidates, options.evidence);
-  auto cuda_modes = cuda::select_modes(on_cuda, cuda_candidates, options.evidence);
+  auto modes = cpu::select_modes(on_cpu, candidates, options);
+  auto cuda_modes = cuda::select_modes(on_cuda, cuda_candidates, options);
   const auto expect_same_modes = [&](const char* stage) {
     const auto mode_count = host(on_cuda, cuda_modes.count.data(), count);
     for (std::size_t p = 0; p < count; ++p) {
@@ -174,18 +169,18 @@ void EvidenceOnCuda::expect_same(const std::vector<RawCloud>& clouds) {
     }
   };
   ASSERT_NO_FATAL_FAILURE(expect_same_modes("selected modes"));
-  cpu::refine_modes(on_cpu, cpu_views, modes, options.evidence, options.refine);
-  cuda::refine_modes(on_cuda, cuda_views, cuda_modes, options.evidence, options.refine);
+  cpu::refine_modes(on_cpu, cpu_views, modes, options);
+  cuda::refine_modes(on_cuda, cuda_views, cuda_modes, options);
   ASSERT_NO_FATAL_FAILURE(expect_same_modes("refined modes"));
-  cpu::merge_modes(on_cpu, modes, options.evidence);
-  cuda::merge_modes(on_cuda, cuda_modes, options.evidence);
+  cpu::merge_modes(on_cpu, modes, options);
+  cuda::merge_modes(on_cuda, cuda_modes, options);
   ASSERT_NO_FATAL_FAILURE(expect_same_modes("merged modes"));
 
   std::vector<PairOutcome> outcomes(count), cuda_outcomes(count);
-  cpu::weigh_modes(on_cpu, cpu_views, matches, candidates, modes, options,
-                   {outcomes.data(), count});
-  cuda::weigh_modes(on_cuda, cuda_views, cuda_matches, cuda_candidates, cuda_modes, options,
-                    {cuda_outcomes.data(), count});
+  cpu::verify_modes(on_cpu, cpu_views, matches, candidates, modes, options,
+                    {outcomes.data(), count});
+  cuda::verify_modes(on_cuda, cuda_views, cuda_matches, cuda_candidates, cuda_modes, options,
+                     {cuda_outcomes.data(), count});
   for (std::size_t p = 0; p < count; ++p)
     ASSERT_EQ(test::bytes(outcomes[p]), test::bytes(cuda_outcomes[p])) << "outcome, pair " << p;
 }
@@ -212,7 +207,7 @@ TEST_F(EvidenceOnCuda, SmallSheets) {
 TEST_F(EvidenceOnCuda, OtherSeedWithoutWideFeaturesOrMaps) {
   keep_scene();
   all_pairs();
-  options.hypothesis.seed = 0x123456789abcdefull;
+  options.seed = 0x123456789abcdefull;
   options.prepare.wide_feature_radius = 0;
   options.prepare.depth_maps = 0;
   expect_same();

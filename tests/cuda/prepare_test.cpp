@@ -128,14 +128,16 @@ void expect_same_preparation(const std::vector<RawCloud>& raw, const PrepareOpti
              cpu_maps[c].depth.size())));
   }
 
-  auto cpu_fronts = cpu::build_fronts(on_cpu, cpu_points, cpu_normals, options);
-  const auto cuda_fronts = cuda::build_fronts(on_cuda, cuda_points, cuda_normals, options);
+  auto cpu_surface_sides = cpu::build_surface_sides(on_cpu, cpu_points, cpu_normals, options);
+  const auto cuda_surface_sides =
+      cuda::build_surface_sides(on_cuda, cuda_points, cuda_normals, options);
   for (std::size_t c = 0; c < raw.size(); ++c) {
-    SCOPED_TRACE("fronts, cloud " + std::to_string(c));
-    ASSERT_EQ(cpu_fronts[c].words.size(), cuda_fronts.boxes[c].words());
-    ASSERT_TRUE(same_bytes(cpu_fronts[c].words,
-                           host(on_cuda, cuda_fronts.words.data() + cuda_fronts.offset[c],
-                                cpu_fronts[c].words.size())));
+    SCOPED_TRACE("surface_sides, cloud " + std::to_string(c));
+    ASSERT_EQ(cpu_surface_sides[c].words.size(), cuda_surface_sides.boxes[c].words());
+    ASSERT_TRUE(
+        same_bytes(cpu_surface_sides[c].words,
+                   host(on_cuda, cuda_surface_sides.words.data() + cuda_surface_sides.offset[c],
+                        cpu_surface_sides[c].words.size())));
   }
 
   const auto cpu_closest = cpu::build_closest_grids(on_cpu, cpu_points, cpu_grids, options);
@@ -156,14 +158,16 @@ void expect_same_preparation(const std::vector<RawCloud>& raw, const PrepareOpti
                         expected.candidates.size())));
   }
 
-  const auto assembled = cuda::assemble(on_cuda, cuda_points, cuda_normals, cuda_features,
-                                        cuda_wide, cuda_closest, cuda_maps, cuda_fronts, options);
+  const auto assembled =
+      cuda::assemble(on_cuda, cuda_points, cuda_normals, cuda_features, cuda_wide, cuda_closest,
+                     cuda_maps, cuda_surface_sides, options);
   auto expected_points = cpu_points;
   auto expected_normals = cpu_normals;
   auto expected_features = cpu_features;
   auto expected_closest = cpu_closest;
-  const auto expected = cpu::assemble(on_cpu, expected_points, expected_normals, expected_features,
-                                      cpu_wide, expected_closest, cpu_maps, cpu_fronts, options);
+  const auto expected =
+      cpu::assemble(on_cpu, expected_points, expected_normals, expected_features, cpu_wide,
+                    expected_closest, cpu_maps, cpu_surface_sides, options);
   for (std::size_t c = 0; c < raw.size(); ++c) {
     SCOPED_TRACE("assembled, cloud " + std::to_string(c));
     ASSERT_TRUE(same_bytes(cpu_points[c].points, assembled[c]->copy_points()));
@@ -179,9 +183,10 @@ void expect_same_preparation(const std::vector<RawCloud>& raw, const PrepareOpti
       ASSERT_TRUE(same_bytes(expected[c]->wide_features.valid,
                              host(on_cuda, on_gpu.has_wide_feature, on_host.size)));
     }
-    ASSERT_TRUE(same_bytes(expected[c]->balance, host(on_cuda, on_gpu.balance, on_gpu.size)));
-    ASSERT_EQ(on_host.balance_total, on_gpu.balance_total);
-    ASSERT_EQ(on_host.balance_total, assembled[c]->balance_total);
+    ASSERT_TRUE(
+        same_bytes(expected[c]->normal_weight, host(on_cuda, on_gpu.normal_weight, on_gpu.size)));
+    ASSERT_EQ(on_host.normal_weight_total, on_gpu.normal_weight_total);
+    ASSERT_EQ(on_host.normal_weight_total, assembled[c]->normal_weight_total);
     ASSERT_EQ(on_host.visibility.count, on_gpu.visibility.count);
     ASSERT_EQ(on_host.visibility.step, on_gpu.visibility.step);
     ASSERT_TRUE(same_bytes(
@@ -257,7 +262,7 @@ TEST_F(PrepareOnCuda, OtherRadii) {
     expect_same_preparation(raw, scaled);
   }
   // lists of hundreds of candidates, blocks with thousands of points
-  options.search_distance = 0.4f;
+  options.max_correspondence_distance = 0.4f;
   expect_same_preparation(raw, options);
 }
 

@@ -56,10 +56,10 @@ TEST(RedKitchenOnCuda, AllPairsAreTheCpus) {
              on_cuda = prepare_batch(cuda, views, options.prepare);
   const auto expect_same = [&](const std::vector<RegistrationResult>& a,
                                const std::vector<RegistrationResult>& b) {
-    EXPECT_EQ(different(a, b), 0) << "of 190, seed " << options.hypothesis.seed;
+    EXPECT_EQ(different(a, b), 0) << "of 190, seed " << options.seed;
   };
   for (const std::uint64_t seed : {1, 2, 3}) {
-    options.hypothesis.seed = seed;
+    options.seed = seed;
     expect_same(align_batch(cpu, on_cpu, pairs, options),
                 align_batch(cuda, on_cuda, pairs, options));
   }
@@ -97,7 +97,7 @@ TEST(RedKitchenOnCuda, AllPairsByEvidenceAreTheCpus) {
              on_cuda = prepare_batch(cuda, views, options.prepare);
   for (const std::uint64_t seed : {1, 2}) {
     SCOPED_TRACE("seed " + std::to_string(seed));
-    options.hypothesis.seed = seed;
+    options.seed = seed;
     const auto batch = align_batch(cuda, on_cuda, pairs, options);
     EXPECT_EQ(different(align_batch(cpu, on_cpu, pairs, options), batch), 0);
     std::vector<RegistrationResult> one_by_one;

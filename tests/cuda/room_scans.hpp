@@ -20,7 +20,7 @@ inline Results all_bytes(const std::vector<RegistrationResult>& results) {
 class RoomScans : public ::testing::Test {
  protected:
   RoomScans() : options(RegistrationOptions::from_voxel_size(0.08f)) {
-    options.hypothesis.count = 20000;
+    options.quadruples.count = 20000;
     std::mt19937 random(1);
     for (int k = 0; k < 6; ++k) scans.push_back(moved(random_pose(random), scan_room(random)));
     scans.push_back({});

@@ -32,7 +32,7 @@ typename pcl::PointCloud<Point>::Ptr scan(
 
 RegistrationOptions quick_options() {
   RegistrationOptions options = RegistrationOptions::from_voxel_size(0.05f);
-  options.hypothesis.count = 200'000;
+  options.quadruples.count = 200'000;
   return options;
 }
 
@@ -141,7 +141,7 @@ TEST(PclAdapterUse, OptionsAreCheckedAndTakeEffect) {
   std::mt19937 random(7);
   PclRegistration<pcl::PointXYZ> adapter(quick_options(), Context::cpu(2));
   RegistrationOptions options = quick_options();
-  options.score.min_inlier_ratio = 2;
+  options.quadruples.min_inlier_ratio = 2;
   test::expect_error<InvalidArgument>([&] { adapter.setOptions(options); },
                                       {"min_inlier_ratio", "2"});
   adapter.setInputTarget(scan<pcl::PointXYZ>(random));
@@ -151,7 +151,7 @@ TEST(PclAdapterUse, OptionsAreCheckedAndTakeEffect) {
   EXPECT_TRUE(adapter.hasConverged());
   const auto points = adapter.result().statistics.target_points;
   options = RegistrationOptions::from_voxel_size(0.1f);
-  options.hypothesis.count = 100'000;
+  options.quadruples.count = 100'000;
   adapter.setOptions(options);
   adapter.align(moved);
   EXPECT_LT(adapter.result().statistics.target_points, points)

@@ -65,7 +65,7 @@ TEST(ClosestGrid, ExactForSmallerDistancesAndOtherScales) {
     options.voxel_size *= scale;
     options.normal_radius *= scale;
     options.feature_radius *= scale;
-    options.search_distance *= scale;
+    options.max_correspondence_distance *= scale;
     std::vector<Vec3> points = test::bumpy_sheet(random, 5000, 2.0f);
     for (Vec3& p : points) p = p * scale;
     const auto cloud = test::prepare_one(exec, test::raw_cloud(points), options);

@@ -14,8 +14,7 @@ TEST(Refine, FindsTheWayBackAndNeverGetsWorse) {
   const auto cloud =
       test::prepare_one(exec, test::raw_cloud(test::bumpy_sheet(random, 30000, 2.0f)), options);
   const PairView pair = test::pair_view(*cloud, *cloud);
-  ScoreOptions score;
-  RefineOptions refine;
+  const RegistrationOptions registration;
   std::normal_distribution<double> normal;
   for (int trial = 0; trial < 20; ++trial) {
     std::vector<BestPose> start(1);
@@ -24,8 +23,9 @@ TEST(Refine, FindsTheWayBackAndNeverGetsWorse) {
     const double omega[3] = {0.01 * normal(random), 0.01 * normal(random), 0.01 * normal(random)};
     const double shift[3] = {0.01 * normal(random), 0.01 * normal(random), 0.01 * normal(random)};
     start[0].pose = compose_small(omega, shift, Pose<double>{1, 0, 0, 0, 0, 0, 0});
-    start[0].support = measure_support(pair.source, pair.target, to_rigid(start[0].pose), score);
-    const BestPose found = refine_poses(exec, {&pair, 1}, start, score, refine)[0];
+    start[0].support =
+        measure_support(pair.source, pair.target, to_rigid(start[0].pose), registration);
+    const BestPose found = refine_poses(exec, {&pair, 1}, start, registration)[0];
     EXPECT_LE(truncated_cost(found.support, pair.source.size),
               truncated_cost(start[0].support, pair.source.size));
     // The cloud on itself: the truth is the identity, reached to the stopping limit (a thousandth
@@ -36,7 +36,7 @@ TEST(Refine, FindsTheWayBackAndNeverGetsWorse) {
     EXPECT_GT(std::fabs(found.pose.w), 1 - 1e-6);
     for (const unsigned threads : {1u, 7u}) {
       Exec pool(threads);
-      const BestPose again = refine_poses(pool, {&pair, 1}, start, score, refine)[0];
+      const BestPose again = refine_poses(pool, {&pair, 1}, start, registration)[0];
       EXPECT_EQ(again.pose.w, found.pose.w);
       EXPECT_EQ(again.pose.tx, found.pose.tx);
       EXPECT_EQ(again.iterations, found.iterations);
@@ -50,13 +50,13 @@ TEST(Refine, OffOrWithoutAPoseChangesNothing) {
   const auto cloud =
       test::prepare_one(exec, test::raw_cloud(test::cube(random, 100, 1)), PrepareOptions{});
   const PairView pair = test::pair_view(*cloud, *cloud);
-  RefineOptions off;
-  off.max_iterations = 0;
+  RegistrationOptions off;
+  off.refine.max_iterations = 0;
   std::vector<BestPose> start(1);
-  EXPECT_FALSE(refine_poses(exec, {&pair, 1}, start, ScoreOptions{}, RefineOptions{})[0].found);
+  EXPECT_FALSE(refine_poses(exec, {&pair, 1}, start, RegistrationOptions{})[0].found);
   start[0].found = true;
   start[0].pose.tx = 0.3;
-  EXPECT_EQ(refine_poses(exec, {&pair, 1}, start, ScoreOptions{}, off)[0].pose.tx, 0.3);
+  EXPECT_EQ(refine_poses(exec, {&pair, 1}, start, off)[0].pose.tx, 0.3);
 }
 
 }  // namespace

@@ -27,10 +27,10 @@ TEST(Sample, KeepsExactlyWhatThePolygonTestPasses) {
   for (const std::size_t n : {std::size_t(4), std::size_t(5), std::size_t(300)})
     for (const std::uint32_t count : {1u, 7u, 65536u, 100003u}) {
       const std::vector<Matches> matches = random_matches(random, n);
-      HypothesisOptions options;
-      options.count = count;
+      RegistrationOptions options;
+      options.quadruples.count = count;
       options.seed = 0x123456789abcdefull + n;
-      const float tau2 = options.edge_similarity * options.edge_similarity;
+      const float tau2 = options.quadruples.edge_similarity * options.quadruples.edge_similarity;
       std::vector<std::uint32_t> expected;
       for (std::uint32_t h = 0; h < count; ++h) {
         const Quadruple q = draw_quadruple(h, options.seed, static_cast<std::uint32_t>(n));
@@ -49,8 +49,8 @@ TEST(Sample, KeepsExactlyWhatThePolygonTestPasses) {
 TEST(Sample, FewerThanFourMatchesGiveNone) {
   std::mt19937 random(2);
   Exec exec(2);
-  HypothesisOptions options;
-  options.count = 1000;
+  RegistrationOptions options;
+  options.quadruples.count = 1000;
   for (const std::size_t n : {std::size_t(0), std::size_t(1), std::size_t(3)})
     EXPECT_TRUE(sample_quadruples(exec, random_matches(random, n), options)[0].empty());
 }

@@ -70,15 +70,15 @@ class Score : public ::testing::Test {
 TEST_F(Score, SupportIsTheExhaustiveOne) {
   for (const float angle : {30.0f, 90.0f, 180.0f})
     for (const float distance : {0.075f, 0.04f}) {
-      ScoreOptions score;
-      score.max_normal_angle = angle;
-      score.max_correspondence_distance = distance;
+      RegistrationOptions options;
+      options.quadruples.max_normal_angle = angle;
+      options.prepare.max_correspondence_distance = distance;
       const InlierTest test = inlier_test(distance, angle);
       for (int k = 0; k < 40; ++k) {
         const Rigid pose =
             to_rigid(random_pose(random, k % 2 ? 0.02f : 1.0f, k % 2 ? 0.02f : 0.3f));
         const Support expected = exhaustive_support(*a, *b, pose, test);
-        const Support found = measure_support(a->view(), b->view(), pose, score);
+        const Support found = measure_support(a->view(), b->view(), pose, options);
         EXPECT_EQ(found.inliers, expected.inliers);
         EXPECT_EQ(found.residual, expected.residual);
       }
@@ -86,7 +86,7 @@ TEST_F(Score, SupportIsTheExhaustiveOne) {
 }
 
 TEST_F(Score, BoundsNeverLie) {
-  const InlierTest test = inlier_test(options.search_distance, 30);
+  const InlierTest test = inlier_test(options.max_correspondence_distance, 30);
   const SummaryLimits limits(30, true);
   std::size_t decided = 0, all = 0;
   for (int k = 0; k < 200; ++k) {
@@ -120,9 +120,9 @@ TEST_F(Score, BoundsNeverLie) {
 TEST_F(Score, BestIsTheBestOfAllByTheTotalOrder) {
   for (const float angle : {30.0f, 180.0f})
     for (const float distance : {0.075f, 0.05f}) {
-      ScoreOptions score;
-      score.max_normal_angle = angle;
-      score.max_correspondence_distance = distance;
+      RegistrationOptions options;
+      options.quadruples.max_normal_angle = angle;
+      options.prepare.max_correspondence_distance = distance;
       std::vector<Hypotheses> hypotheses(1);
       for (std::uint32_t k = 0; k < 700; ++k) {
         hypotheses[0].id.push_back(3 * k);
@@ -134,13 +134,13 @@ TEST_F(Score, BestIsTheBestOfAllByTheTotalOrder) {
       Support best{0, 0, 0};
       for (std::size_t k = 0; k < 700; ++k) {
         Support s =
-            measure_support(pair.source, pair.target, to_rigid(hypotheses[0].pose[k]), score);
+            measure_support(pair.source, pair.target, to_rigid(hypotheses[0].pose[k]), options);
         s.hypothesis = hypotheses[0].id[k];
         if (k == 0 || better(s, best)) best = s;
       }
       for (const unsigned threads : {1u, 2u, 7u}) {
         Exec pool(threads);
-        const BestPose found = score_hypotheses(pool, {&pair, 1}, hypotheses, score)[0];
+        const BestPose found = score_hypotheses(pool, {&pair, 1}, hypotheses, options)[0];
         ASSERT_TRUE(found.found);
         EXPECT_EQ(found.support.inliers, best.inliers);
         EXPECT_EQ(found.support.residual, best.residual);
@@ -152,7 +152,8 @@ TEST_F(Score, BestIsTheBestOfAllByTheTotalOrder) {
 TEST_F(Score, NoHypothesesNoPose) {
   const PairView pair = test::pair_view(*a, *b);
   EXPECT_FALSE(
-      score_hypotheses(exec, {&pair, 1}, std::vector<Hypotheses>(1), ScoreOptions{})[0].found);
+      score_hypotheses(exec, {&pair, 1}, std::vector<Hypotheses>(1), RegistrationOptions{})[0]
+          .found);
 }
 
 }  // namespace

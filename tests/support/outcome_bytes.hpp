@@ -24,8 +24,9 @@ class Bytes {
 };
 
 inline void add(Bytes& out, const SideEvidence& e) {
-  out.add(e.balanced, e.residual, e.tested, e.inliers, e.hits, e.seen, e.before, e.hidden,
-          e.facing_seen, e.facing_before, e.around, e.near_front, e.far_front, e.at_back);
+  out.add(e.normal_weighted, e.residual, e.tested, e.inliers, e.hits, e.observed, e.violating,
+          e.occluded, e.incidence_observed, e.incidence_violating, e.near_surface,
+          e.front_violation_near, e.front_violation_far, e.behind_surface);
 }
 inline void add(Bytes& out, const MatchEvidence& e) {
   out.add(e.source_weight, e.target_weight, e.inliers);
@@ -40,7 +41,7 @@ inline std::vector<char> bytes(const ModeOutcome& m) {
   return out.all;
 }
 
-/// Everything of a pair of Proposal::compatibility but the timings.
+/// Everything of a pair of RegistrationMethod::compatibility but the timings.
 inline std::vector<char> bytes(const PairOutcome& o) {
   Bytes out;
   const RegistrationStatistics& s = o.statistics;

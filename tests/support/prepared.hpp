@@ -43,8 +43,8 @@ inline std::shared_ptr<cpu::CpuCloud> seen_from(cpu::Exec& exec, const std::vect
 }
 
 /// A pair with one mode, the identity between the clouds' own frames, and the evidence of that.
-inline PairOutcome weighed_in_place(cpu::Exec& exec, const cpu::CpuCloud& source,
-                                    const cpu::CpuCloud& target) {
+inline PairOutcome verified_in_place(cpu::Exec& exec, const cpu::CpuCloud& source,
+                                     const cpu::CpuCloud& target) {
   const PairView pair = pair_view(source, target);
   std::vector<cpu::Mode> modes(1);
   modes[0].pose = {1,
@@ -55,8 +55,8 @@ inline PairOutcome weighed_in_place(cpu::Exec& exec, const cpu::CpuCloud& source
                    static_cast<double>(source.origin[1] - target.origin[1]),
                    static_cast<double>(source.origin[2] - target.origin[2])};
   PairOutcome outcome;
-  cpu::weigh_modes(exec, {&pair, 1}, std::vector<cpu::MatchSet>(1), std::vector<cpu::Candidates>(1),
-                   {modes}, RegistrationOptions{}, {&outcome, 1});
+  cpu::verify_modes(exec, {&pair, 1}, std::vector<cpu::MatchSet>(1),
+                    std::vector<cpu::Candidates>(1), {modes}, RegistrationOptions{}, {&outcome, 1});
   return outcome;
 }
 

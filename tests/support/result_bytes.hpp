@@ -35,13 +35,15 @@ inline std::vector<char> bytes(const RegistrationResult& r) {
     const PoseEvidence& e = mode.evidence;
     add(&e.match_inliers, sizeof e.match_inliers);
     for (const double v :
-         {e.match_support, e.source_overlap, e.target_overlap, e.source_balanced_overlap,
-          e.target_balanced_overlap, e.source_seen, e.target_seen, e.source_impossible,
-          e.target_impossible, e.source_hidden, e.target_hidden, e.source_around, e.target_around,
-          e.source_near_front, e.target_near_front, e.source_far_front, e.target_far_front,
-          e.source_at_back, e.target_at_back})
+         {e.match_support, e.source_overlap, e.target_overlap, e.source_normal_weighted_overlap,
+          e.target_normal_weighted_overlap, e.source_observed, e.target_observed,
+          e.source_free_space_violation, e.target_free_space_violation, e.source_occluded,
+          e.target_occluded, e.source_near_surface, e.target_near_surface,
+          e.source_front_violation_near, e.target_front_violation_near,
+          e.source_front_violation_far, e.target_front_violation_far, e.source_behind_surface,
+          e.target_behind_surface})
       add(&v, sizeof v);
-    add(e.stiffness.data(), e.stiffness.size() * sizeof(double));
+    add(e.information_eigenvalues.data(), e.information_eigenvalues.size() * sizeof(double));
   }
   return out;
 }

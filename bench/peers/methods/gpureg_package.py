@@ -37,7 +37,7 @@ class Default:
         )
 
     def align(self, source, target, initial, seed):
-        self.options.hypothesis.seed = seed
+        self.options.seed = seed
         result = self.gpureg.align(source, target, options=self.options, context=self.context)
         modes = list(getattr(result, "modes", []))
         return {

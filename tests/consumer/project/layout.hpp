@@ -20,12 +20,13 @@ inline std::string layout() {
   TYPE(PointCloudView);
   TYPE(PointCloud);
   TYPE(PrepareOptions);
-  TYPE(HypothesisOptions);
-  TYPE(ScoreOptions);
+  TYPE(CompatibilityOptions);
+  TYPE(QuadrupleOptions);
+  TYPE(EvidenceOptions);
   TYPE(RefineOptions);
   TYPE(RegistrationOptions);
-  MEMBER(RegistrationOptions, hypothesis);
-  MEMBER(RegistrationOptions, score);
+  MEMBER(RegistrationOptions, quadruples);
+  MEMBER(RegistrationOptions, method);
   MEMBER(RegistrationOptions, refine);
   TYPE(Context);
   TYPE(PreparedCloud);

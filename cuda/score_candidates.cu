@@ -1,0 +1,100 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "algorithm/evidence.hpp"
+#include "closest_cells.cuh"
+#include "stages.hpp"
+#include "warp.cuh"
+
+namespace gpureg::cuda {
+namespace {
+
+constexpr int kWarps = 4;  // candidates per thread block
+
+/// Weight of the points that the sample of each cloud looks at: a thread block per cloud (x: pair,
+/// y: source or target).
+__global__ void __launch_bounds__(256)
+    sampled_weight(const SearchPair* pairs, std::uint32_t sample, unsigned long long* out) {
+  __shared__ unsigned long long sum;
+  const CloudView& cloud = blockIdx.y == 0 ? pairs[blockIdx.x].source : pairs[blockIdx.x].target;
+  const std::uint32_t stride = sample_stride(cloud.size, sample);
+  if (threadIdx.x == 0) sum = 0;
+  __syncthreads();
+  unsigned long long mine = 0;
+  for (std::uint64_t i = std::uint64_t(threadIdx.x) * stride; i < cloud.size; i += 256ull * stride)
+    mine += cloud.normal_weight[i];
+  atomicAdd(&sum, mine);
+  __syncthreads();
+  if (threadIdx.x == 0) out[2 * blockIdx.x + blockIdx.y] = sum;
+}
+
+/// One side of one candidate, by a warp: what coarse_score() reads of it.
+__device__ SideEvidence score_sample(const CloudView& moved, const CloudView& other,
+                                     const CellSummaries& cells, const Rigid& pose,
+                                     const EvidenceTest& test, std::uint32_t sample) {
+  SideEvidence e{};
+  const std::uint32_t stride = sample_stride(moved.size, sample),
+                      maps = coarse_score_maps(other.visibility);
+  for (std::uint64_t i = std::uint64_t(threadIdx.x % 32) * stride; i < moved.size;
+       i += 32ull * stride) {
+    const Vec3 q = apply(pose, moved.points[i]);
+    verify_found(moved, other, pose, test, maps, static_cast<std::uint32_t>(i), q,
+                 find_closest(other, cells, q, test.inlier.max_squared), e);
+  }
+  e.normal_weighted =
+      static_cast<std::uint64_t>(warp_sum(static_cast<std::int64_t>(e.normal_weighted)));
+  e.observed = warp_sum(e.observed);
+  e.violating = warp_sum(e.violating);
+  return e;
+}
+
+__device__ float smaller_share(const MatchEvidence& m, const std::uint64_t* total) {
+  const float s = static_cast<float>(m.source_weight) / static_cast<float>(total[0]);
+  const float t = static_cast<float>(m.target_weight) / static_cast<float>(total[1]);
+  return s < t ? s : t;
+}
+
+/// A warp per candidate.
+__global__ void __launch_bounds__(32 * kWarps)
+    score(const SearchPair* pairs, const std::uint64_t* match_total,
+          const unsigned long long* weight, std::uint32_t most, const std::uint32_t* count,
+          const Pose<float>* pose, const MatchEvidence* matches, EvidenceTest test,
+          std::uint32_t sample, float* out) {
+  const std::uint32_t p = blockIdx.y, c = blockIdx.x * kWarps + threadIdx.x / 32;
+  if (c >= count[p]) return;
+  const std::size_t at = static_cast<std::size_t>(p) * most + c;
+  const CloudView &s = pairs[p].source, &t = pairs[p].target;
+  const Rigid there = to_rigid(pose[at]), back = inverse(there);
+  if (!permitted(pairs[p].prior, there)) {
+    if (threadIdx.x % 32 == 0) out[at] = 0.0f;
+    return;
+  }
+  const SideEvidence a = score_sample(s, t, pairs[p].target_cells, there, test, sample),
+                     b = score_sample(t, s, pairs[p].source_cells, back, test, sample);
+  if (threadIdx.x % 32 == 0)
+    out[at] =
+        coarse_score(smaller_share(matches[at], match_total + 2 * p), a,
+                     static_cast<float>(weight[2 * p]), b, static_cast<float>(weight[2 * p + 1]));
+}
+
+}  // namespace
+
+void score_candidates(Exec& exec, Span<const PairView> pairs, const MatchSets& matches,
+                      Candidates& candidates, const RegistrationOptions& options) {
+  const std::uint32_t most = std::min(candidates.most, matches.room.largest);
+  if (most == 0) return;
+  const auto views = upload_search_pairs(exec, pairs);
+  const auto weight = exec.buffer<unsigned long long>(2 * pairs.size);
+  const unsigned pair_count = static_cast<unsigned>(pairs.size);
+  sampled_weight<<<dim3(pair_count, 2), 256, 0, exec.stream()>>>(
+      views.data(), options.evidence.sample, weight.data());
+  check_launch("sampled_weight");
+  const EvidenceTest test{
+      inlier_test(options.prepare.max_correspondence_distance, options.evidence.max_normal_angle),
+      options.evidence.free_space_margin, options.evidence.min_range};
+  score<<<dim3(blocks_for(most, kWarps), pair_count), 32 * kWarps, 0, exec.stream()>>>(
+      views.data(), matches.total.data(), weight.data(), candidates.most, candidates.count.data(),
+      candidates.pose.data(), candidates.matches.data(), test, options.evidence.sample,
+      candidates.coarse_score.data());
+  check_launch("score");
+}
+
+}  // namespace gpureg::cuda

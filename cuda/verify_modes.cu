@@ -1,0 +1,231 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <algorithm>
+#include <type_traits>
+
+#include "algorithm/evidence.hpp"
+#include "block_sum.cuh"
+#include "closest_cells.cuh"
+#include "pipeline/conclude.hpp"
+#include "stages.hpp"
+
+namespace gpureg::cuda {
+namespace {
+
+constexpr int kThreads = 256;
+
+struct VerifyModes {
+  const SearchPair* pairs;
+  MatchSetView matches;
+  const std::uint32_t *room, *match_count;
+  std::uint32_t most;
+  const Mode* modes;
+  const std::uint32_t* count;
+  EvidenceTest test;
+  float squared_distance;
+  ModeOutcome* out;
+};
+
+/// One of several blocks adds its part; a block alone writes.
+template <typename T>
+__device__ void put(T& out, T value, bool alone) {
+  using Atomic = std::conditional_t<sizeof(T) == 8, unsigned long long, unsigned>;
+  if (alone)
+    out = value;
+  else
+    atomicAdd(reinterpret_cast<Atomic*>(&out), static_cast<Atomic>(value));
+}
+__device__ void put(SideEvidence& out, const SideEvidence& e, bool alone) {
+  put(out.normal_weighted, e.normal_weighted, alone);
+  put(out.residual, e.residual, alone);
+  put(out.incidence_observed, e.incidence_observed, alone);
+  put(out.incidence_violating, e.incidence_violating, alone);
+  put(out.tested, e.tested, alone);
+  put(out.inliers, e.inliers, alone);
+  put(out.hits, e.hits, alone);
+  put(out.observed, e.observed, alone);
+  put(out.violating, e.violating, alone);
+  put(out.occluded, e.occluded, alone);
+  put(out.near_surface, e.near_surface, alone);
+  put(out.front_violation_near, e.front_violation_near, alone);
+  put(out.front_violation_far, e.front_violation_far, alone);
+  put(out.behind_surface, e.behind_surface, alone);
+}
+__device__ void put(Moments& out, const Moments& m, bool alone) {
+  put(out.count, m.count, alone);
+  for (int k = 0; k < 3; ++k) put(out.sum[k], m.sum[k], alone);
+  for (int k = 0; k < 6; ++k) put(out.outer[k], m.outer[k], alone);
+}
+
+/// Thread 0 has the whole block's.
+__device__ SideEvidence of_block(const SideEvidence& e, std::int64_t* scratch) {
+  std::int64_t v[14] = {static_cast<std::int64_t>(e.normal_weighted),
+                        static_cast<std::int64_t>(e.residual),
+                        e.tested,
+                        e.inliers,
+                        e.hits,
+                        e.observed,
+                        e.violating,
+                        e.occluded,
+                        e.near_surface,
+                        e.front_violation_near,
+                        e.front_violation_far,
+                        e.behind_surface,
+                        static_cast<std::int64_t>(e.incidence_observed),
+                        static_cast<std::int64_t>(e.incidence_violating)};
+  block_sum(v, scratch);
+  const auto count = [&](int k) { return static_cast<std::uint32_t>(v[k]); };
+  return {static_cast<std::uint64_t>(v[0]),
+          static_cast<std::uint64_t>(v[1]),
+          static_cast<std::uint64_t>(v[12]),
+          static_cast<std::uint64_t>(v[13]),
+          count(2),
+          count(3),
+          count(4),
+          count(5),
+          count(6),
+          count(7),
+          count(8),
+          count(9),
+          count(10),
+          count(11)};
+}
+
+__device__ Moments of_block(const Moments& m, std::int64_t* scratch) {
+  std::int64_t v[10] = {static_cast<std::int64_t>(m.count),
+                        m.sum[0],
+                        m.sum[1],
+                        m.sum[2],
+                        m.outer[0],
+                        m.outer[1],
+                        m.outer[2],
+                        m.outer[3],
+                        m.outer[4],
+                        m.outer[5]};
+  block_sum(v, scratch);
+  return {
+      static_cast<std::uint64_t>(v[0]), {v[1], v[2], v[3]}, {v[4], v[5], v[6], v[7], v[8], v[9]}};
+}
+
+__device__ MatchEvidence count_matches(const VerifyModes& w, std::uint32_t p, const Rigid& rigid,
+                                       std::uint32_t first, std::uint32_t step,
+                                       std::int64_t* scratch) {
+  std::int64_t v[3] = {0, 0, 0};
+  const MatchSetView& m = w.matches;
+  for (std::uint32_t k = first; k < w.match_count[p]; k += step) {
+    const std::uint32_t at = w.room[p] + k;
+    if (!(squared_norm(apply(rigid, {m.px[at], m.py[at], m.pz[at]}) -
+                       Vec3{m.qx[at], m.qy[at], m.qz[at]}) < w.squared_distance))
+      continue;
+    ++v[0];
+    v[1] += m.source_weight[at];
+    v[2] += m.target_weight[at];
+  }
+  block_sum(v, scratch);
+  return {static_cast<std::uint64_t>(v[1]), static_cast<std::uint64_t>(v[2]),
+          static_cast<std::uint32_t>(v[0])};
+}
+
+/// A thread block per mode and side (z: even ones move the source, odd ones the target), or
+/// several.
+__global__ void __launch_bounds__(kThreads) verify(VerifyModes w) {
+  __shared__ std::int64_t scratch[kThreads / 32 * 24];
+  const std::uint32_t p = blockIdx.y;
+  if (blockIdx.x >= w.count[p]) return;
+  const CloudView &s = w.pairs[p].source, &t = w.pairs[p].target;
+  const std::size_t at = static_cast<std::size_t>(p) * w.most + blockIdx.x;
+  const Mode& mode = w.modes[at];
+  ModeOutcome& out = w.out[at];
+  const Rigid there = to_rigid(mode.pose);
+  const std::uint32_t parts = gridDim.z / 2, part = blockIdx.z / 2,
+                      first = part * kThreads + threadIdx.x, step = parts * kThreads;
+  const bool alone = parts == 1;
+  SideEvidence side{};
+  if (blockIdx.z % 2 == 1) {
+    const Rigid back = inverse(there);
+    for (std::uint32_t i = first; i < t.size; i += step) {
+      const Vec3 q = apply(back, t.points[i]);
+      verify_found(t, s, back, w.test, s.visibility.count, i, q,
+                   find_closest(s, w.pairs[p].source_cells, q, w.test.inlier.max_squared), side);
+    }
+    side = of_block(side, scratch);
+    if (threadIdx.x == 0) put(out.target, side, alone);
+    return;
+  }
+  InformationSums information{};
+  Moments source{}, target{};
+  for (std::uint32_t i = first; i < s.size; i += step) {
+    const Vec3 q = apply(there, s.points[i]);
+    const VerifiedPoint found =
+        verify_found(s, t, there, w.test, t.visibility.count, i, q,
+                     find_closest(t, w.pairs[p].target_cells, q, w.test.inlier.max_squared), side);
+    if (found.inlier) add_information(s, there, i, information);
+    if (found.closest == kNoValue) continue;
+    add_moment(s.points[i] * (1.0f / s.radius), source);
+    add_moment(t.points[found.closest] * (1.0f / t.radius), target);
+  }
+  side = of_block(side, scratch);
+  std::int64_t sums[24];
+#pragma unroll
+  for (int k = 0; k < 24; ++k) sums[k] = k < 21 ? information.v[k] : information.arm[k - 21];
+  block_sum(sums, scratch);
+  source = of_block(source, scratch);
+  target = of_block(target, scratch);
+  const MatchEvidence matches = count_matches(w, p, there, first, step, scratch);
+  if (threadIdx.x != 0) return;
+  if (part == 0) {
+    out.pose = mode.pose;
+    out.hypothesis = mode.seed;
+    out.iterations = mode.iterations;
+  }
+  put(out.matches.source_weight, matches.source_weight, alone);
+  put(out.matches.target_weight, matches.target_weight, alone);
+  put(out.matches.inliers, matches.inliers, alone);
+  put(out.source, side, alone);
+#pragma unroll
+  for (int k = 0; k < 24; ++k)
+    put(k < 21 ? out.information.v[k] : out.information.arm[k - 21], sums[k], alone);
+  put(out.source_moments, source, alone);
+  put(out.target_moments, target, alone);
+}
+
+}  // namespace
+
+void verify_modes(Exec& exec, Span<const PairView> pairs, const MatchSets& matches,
+                  const Candidates& candidates, const Modes& modes,
+                  const RegistrationOptions& options, Span<PairOutcome> outcomes) {
+  const auto views = upload_search_pairs(exec, pairs);
+  // Filled: what no mode is written to is copied along, and parts are added up.
+  const auto verified = exec.filled<ModeOutcome>(pairs.size * modes.most, 0);
+  const auto& evidence = options.evidence;
+  const EvidenceTest test{
+      inlier_test(options.prepare.max_correspondence_distance, evidence.max_normal_angle),
+      evidence.free_space_margin, evidence.min_range};
+  // Where there are too few blocks to fill the device, several share a mode.
+  const std::size_t blocks = 2 * std::size_t(modes.most) * pairs.size,
+                    processors = static_cast<std::size_t>(exec.multiprocessors());
+  const unsigned parts =
+      static_cast<unsigned>(std::clamp<std::size_t>(4 * processors / blocks, 1, 8));
+  verify<<<dim3(modes.most, static_cast<unsigned>(pairs.size), 2 * parts), kThreads, 0,
+           exec.stream()>>>(VerifyModes{
+      views.data(), matches.view(), matches.room.on_device.data(), matches.count.data(), modes.most,
+      modes.mode.data(), modes.count.data(), test,
+      options.compatibility.consensus_distance * options.compatibility.consensus_distance,
+      verified.data()});
+  check_launch("verify");
+  const ModeOutcome* mode = exec.download(verified.data(), verified.size());
+  const std::uint32_t* mode_count = exec.download(modes.count.data(), pairs.size);
+  const std::uint32_t* match_count = exec.download(matches.count.data(), pairs.size);
+  const std::uint64_t* total = exec.download(matches.total.data(), 2 * pairs.size);
+  const std::uint32_t* candidate_count = exec.download(candidates.count.data(), pairs.size);
+  exec.synchronize();
+  for (std::size_t p = 0; p < pairs.size; ++p) {
+    PairOutcome& out = outcomes[p];
+    out.modes.assign(mode + p * modes.most, mode + p * modes.most + mode_count[p]);
+    out.match_weight_source = total[2 * p];
+    out.match_weight_target = total[2 * p + 1];
+    pipeline::count_seeds(pairs[p].source.size, pairs[p].target.size, match_count[p],
+                          candidate_count[p], options, out.statistics);
+  }
+}
+
+}  // namespace gpureg::cuda

@@ -1,0 +1,63 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Agreement among the pairs of one set of clouds."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from . import _core
+from ._arrays import index_pairs
+from ._core import LoopConsistencyOptions, PairConsistency, RegistrationResult
+
+
+def agreement(
+    pairs: Any,
+    results: Sequence[RegistrationResult],
+    *,
+    options: LoopConsistencyOptions | None = None,
+) -> list[PairConsistency]:
+    """Confidences of pairs in view of each other: the poses around a loop must lead back.
+
+    Parameters
+    ----------
+    pairs : (M, 2) integer array or list of pairs
+        Rows (source, target), as given to `align_batch`.
+    results : sequence of RegistrationResult
+        One per pair, as `align_batch` returns them. They are not changed.
+    options : LoopConsistencyOptions, optional
+        Default: those of 5 cm voxels; see ``LoopConsistencyOptions.from_voxel_size``.
+
+    Returns
+    -------
+    list of PairConsistency
+        ``confidence`` given all pairs, the index ``mode`` of the pose that the loops support (into
+        ``RegistrationResult.modes``), the number of ``loops`` of three, and how many trusted pairs
+        make the ``path`` between its clouds that it was compared with. Pairs in no loop keep their
+        score.
+
+    Raises
+    ------
+    ValueError
+        Naming the entry: different lengths, scores outside [0, 1], poses that are no rigid motions.
+
+    Examples
+    --------
+    >>> import numpy as np, gpureg
+    >>> cloud = np.random.default_rng(1).random((2000, 3))
+    >>> pairs = [(0, 1), (1, 2), (0, 2)]
+    >>> results = gpureg.align_batch([cloud, cloud + [0.5, 0, 0], cloud - [0, 2, 0]], pairs)
+    >>> [(a.mode, a.loops) for a in gpureg.agreement(pairs, results)]
+    [(0, 1), (0, 1), (0, 1)]
+    """
+    if options is not None and not isinstance(options, LoopConsistencyOptions):
+        raise TypeError(f"options: expected LoopConsistencyOptions, got {options!r}")
+    results = list(results)
+    for k, result in enumerate(results):
+        if not isinstance(result, RegistrationResult):
+            raise TypeError(f"results[{k}]: expected a RegistrationResult, got {result!r}")
+    entries = index_pairs(pairs, "pairs", None)
+    return _core.agreement(entries, results, options or LoopConsistencyOptions())
+
+
+__all__ = ["agreement"]

@@ -1,0 +1,24 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <memory>
+#include <utility>
+
+#include "gpureg/context.hpp"
+#include "gpureg/prepared_cloud.hpp"
+#include "pipeline/engine.hpp"
+
+namespace gpureg {
+
+/// The private parts of public handles, for the library itself.
+struct Access {
+  static const std::shared_ptr<Engine>& engine(const Context& context) { return context.engine_; }
+  static const std::shared_ptr<const PreparedState>& state(const PreparedCloud& cloud) {
+    return cloud.state_;
+  }
+  static PreparedCloud cloud(std::shared_ptr<const PreparedState> state) {
+    return PreparedCloud(std::move(state));
+  }
+};
+
+}  // namespace gpureg

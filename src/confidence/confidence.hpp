@@ -1,0 +1,41 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "confidence/features.hpp"
+
+/// From the evidence of a pair's modes to probabilities, by logistic regressions. `log` and `exp`
+/// appear here and nowhere before.
+namespace gpureg::confidence {
+
+/// Log odds of each mode by its own evidence, which rank the modes of a pair.
+std::vector<double> rank_modes(const std::vector<PoseEvidence>& modes, AvailableEvidence available);
+
+/// Number of overlapping points of the side with fewer of them, and the points of that side.
+struct OverlapCount {
+  std::uint32_t points, of;
+};
+
+/// A mode that takes part in the verdict on its pair.
+struct RankedMode {
+  PoseEvidence evidence;
+  double log_odds;       ///< from rank_modes()
+  OverlapCount overlap;  ///< under its pose
+};
+
+struct ModeConfidence {
+  double confidence;          ///< probability that the pose is correct
+  double overlap_confidence;  ///< that it is correct and the clouds overlap by 30 % or more
+};
+
+/// Confidence of each mode in view of the others. Of distinct poses at most one is correct, so
+/// modes with equal evidence share the probability.
+/// @param modes distinct, in descending order of their log odds.
+/// @param refined largest number of modes that were refined, EvidenceOptions::modes: many distinct
+///   ends of the refinement mean that the clouds determine little.
+std::vector<ModeConfidence> confidences_of(const std::vector<RankedMode>& modes,
+                                           AvailableEvidence available, std::uint32_t refined);
+
+}  // namespace gpureg::confidence

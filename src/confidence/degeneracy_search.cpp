@@ -1,0 +1,87 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "confidence/degeneracy_search.hpp"
+
+#include <algorithm>
+#include <iterator>
+
+#include "common/host_threads.hpp"
+#include "confidence/confidence.hpp"
+#include "confidence/information.hpp"
+#include "confidence/pose_evidence.hpp"
+
+namespace gpureg::confidence {
+namespace {
+
+/// Rotated about the centre of the inliers, then shifted, along the weakest direction.
+Pose<double> moved_along(const InformationSpectrum& spectrum, const Pose<double>& pose,
+                         double distance) {
+  const Eigen::Vector3d turn = spectrum.weakest_direction.head<3>() * (distance / spectrum.unit);
+  const Eigen::Vector3d still = Eigen::Vector3d::Zero();
+  double r[9];
+  rotation_matrix(compose_small(turn.data(), still.data(), Pose<double>{1, 0, 0, 0, 0, 0, 0}), r);
+  const Eigen::Vector3d turned =
+      Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(r) * spectrum.centre;
+  const Eigen::Vector3d shift =
+      spectrum.centre - turned + spectrum.weakest_direction.tail<3>() * distance;
+  return compose_small(turn.data(), shift.data(), pose);
+}
+
+/// Log odds of the most likely mode below which no perturbed pose was ever the correct one, and
+/// above which only the confidence may change. Other limits find as much (docs/accuracy.md); these
+/// need the fewest poses.
+constexpr double kHopelessLogOdds = -5, kConfidentLogOdds = 3;
+
+/// Distances as fractions of evidence.degeneracy_search_distance. Near the truth refinement stops
+/// at places 10 to 20 cm apart at the default voxel size, hence steps of a quarter. A confident
+/// mode is only tested for another stable pose at the full distance.
+Span<const double> fractions_for(double log_odds) {
+  static constexpr double kFractions[] = {1, 0.75, 0.5, 0.25};
+  static_assert(2 * std::size(kFractions) == kMaxPerturbedPoses, "both ways");
+  const std::size_t count = log_odds < kHopelessLogOdds    ? 0
+                            : log_odds < kConfidentLogOdds ? std::size(kFractions)
+                                                           : 1;
+  return {kFractions, count};
+}
+
+PerturbedPoses perturb(const PairInput& pair, const PairOutcome& outcome, double distance) {
+  PerturbedPoses out{0, {}};
+  std::vector<PoseEvidence> evidence;
+  std::vector<const ModeOutcome*> modes;
+  for (const ModeOutcome& mode : outcome.modes) {
+    // A pose that the prior forbids is not reported.
+    if (!permitted(pair.prior, to_rigid(mode.pose))) continue;
+    evidence.push_back(evidence_of(outcome, mode, *pair.source, *pair.target, false));
+    modes.push_back(&mode);
+  }
+  if (modes.empty()) return out;
+  const std::vector<double> log_odds = rank_modes(evidence, available_evidence(evidence));
+  const auto best = std::max_element(log_odds.begin(), log_odds.end());
+  const ModeOutcome& mode = *modes[static_cast<std::size_t>(best - log_odds.begin())];
+  const InformationSpectrum spectrum = spectrum_of(mode, *pair.source);
+  out.origin_mode = mode.origin_mode;
+  for (const double fraction : fractions_for(*best))
+    for (const double step : {fraction * distance, -fraction * distance})
+      out.poses.push_back(moved_along(spectrum, mode.pose, step));
+  return out;
+}
+
+}  // namespace
+
+std::vector<PerturbedPoses> search_degeneracies(Span<const PairInput> pairs,
+                                                Span<const PairOutcome> outcomes,
+                                                const RegistrationOptions& options,
+                                                std::size_t threads) {
+  std::vector<PerturbedPoses> out(pairs.size, PerturbedPoses{0, {}});
+  const double distance = static_cast<double>(options.evidence.degeneracy_search_distance);
+  if (distance == 0.0) return out;
+  // A thread for fewer pairs costs more than it saves.
+  constexpr std::size_t kPairsPerThread = 16;
+  const std::size_t workers = std::min(threads, 1 + pairs.size / kPairsPerThread);
+  on_threads(workers, [&](std::size_t worker) {
+    for (std::size_t p = worker; p < pairs.size; p += workers)
+      out[p] = perturb(pairs.data[p], outcomes.data[p], distance);
+  });
+  return out;
+}
+
+}  // namespace gpureg::confidence

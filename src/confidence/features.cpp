@@ -1,0 +1,150 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "confidence/features.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace gpureg::confidence {
+namespace {
+
+/// Shares and counts below these are as good as none: they bound the logarithms.
+constexpr double kMinMatchSupport = 1e-5, kMinMatchInliers = 1, kMinOverlap = 1e-3;
+constexpr double kMinEigenvalue = 1e-2, kMinViolation = 3e-3, kMinViolationOfAll = 1e-3;
+constexpr double kMinFrontViolation = 1e-3, kMinBehindSurface = 1e-3;
+/// Real rooms are full of things that one cloud observed and the other one did not look at. Where
+/// free space is known, a sum of front violations of both sides below this tells which mode is the
+/// better one, and not whether it is correct.
+constexpr double kMinVerifiedFrontViolation = 2e-2;
+/// Bounds the denominators of shares.
+constexpr double kMinDenominator = 1e-6;
+
+double log_at_least(double value, double least) { return std::log(std::max(value, least)); }
+
+double share(double part, double whole) { return part / std::max(whole, kMinDenominator); }
+
+/// The value of both sides.
+struct Sides {
+  double source, target;
+  double lower() const { return std::min(source, target); }
+  double higher() const { return std::max(source, target); }
+  double sum() const { return source + target; }
+};
+
+class Setter {
+ public:
+  explicit Setter(Features& features) : features_(features) {}
+  void operator()(Feature feature, double value) {
+    features_[static_cast<std::size_t>(feature)] = value;
+  }
+
+ private:
+  Features& features_;
+};
+
+void add_overlap(const PoseEvidence& e, Setter& set) {
+  const Sides overlap{e.source_overlap, e.target_overlap};
+  const Sides weighted{e.source_normal_weighted_overlap, e.target_normal_weighted_overlap};
+  double volume = 0;
+  for (const double value : e.information_eigenvalues) volume += std::log1p(value);
+  set(Feature::log_match_support, log_at_least(e.match_support, kMinMatchSupport));
+  set(Feature::log_match_inliers, log_at_least(e.match_inliers, kMinMatchInliers));
+  set(Feature::log_lower_weighted_overlap, log_at_least(weighted.lower(), kMinOverlap));
+  set(Feature::log_higher_weighted_overlap, log_at_least(weighted.higher(), kMinOverlap));
+  set(Feature::log_lower_overlap, log_at_least(overlap.lower(), kMinOverlap));
+  set(Feature::log_first_eigenvalue, log_at_least(e.information_eigenvalues[0], kMinEigenvalue));
+  set(Feature::log_second_eigenvalue, log_at_least(e.information_eigenvalues[1], kMinEigenvalue));
+  set(Feature::information_volume, volume);
+}
+
+void add_free_space(const PoseEvidence& e, Setter& set) {
+  // Where only one cloud's viewpoints are known, its observations stand for both sides.
+  const bool source = e.source_observed > 0, target = e.target_observed > 0;
+  const auto both = [&](double s, double t) { return Sides{source ? s : t, target ? t : s}; };
+  const Sides observed = both(e.source_observed, e.target_observed);
+  const Sides violation = both(e.source_free_space_violation, e.target_free_space_violation);
+  const Sides occluded = both(e.source_occluded, e.target_occluded);
+  const Sides of_all{observed.source * violation.source, observed.target * violation.target};
+  set(Feature::lower_observed, observed.lower());
+  set(Feature::higher_observed, observed.higher());
+  set(Feature::higher_violation_of_all, of_all.higher());
+  set(Feature::lower_violation_of_all, of_all.lower());
+  set(Feature::higher_violation, violation.higher());
+  set(Feature::lower_violation, violation.lower());
+  set(Feature::log_higher_violation, log_at_least(violation.higher(), kMinViolation));
+  set(Feature::lower_occluded, occluded.lower());
+  set(Feature::log_violation_of_all, log_at_least(of_all.sum(), kMinViolationOfAll));
+}
+
+void add_surface_sides(const PoseEvidence& e, bool free_space, Regressand regressand,
+                       Setter& set) {
+  const Sides any_normal{e.source_overlap_any_normal, e.target_overlap_any_normal};
+  // Share of the points within the distance whose normals agree: the same side of the surface.
+  const Sides agreement{share(e.source_overlap, any_normal.source),
+                        share(e.target_overlap, any_normal.target)};
+  const Sides near_surface{e.source_near_surface, e.target_near_surface};
+  const Sides front_near{e.source_front_violation_near, e.target_front_violation_near};
+  const bool verified = free_space && regressand == Regressand::confidence;
+  set(Feature::log_front_violation_near,
+      log_at_least(front_near.sum(), verified ? kMinVerifiedFrontViolation : kMinFrontViolation));
+  set(Feature::lower_normal_agreement, agreement.lower());
+  set(Feature::higher_normal_agreement, agreement.higher());
+  set(Feature::higher_near_surface, near_surface.higher());
+  set(Feature::lower_near_surface, near_surface.lower());
+  if (free_space) return;  // it tells the rest
+  const Sides front_far{e.source_front_violation_far, e.target_front_violation_far};
+  const Sides behind{e.source_behind_surface, e.target_behind_surface};
+  const auto of_near = [&](const Sides& part) {
+    return Sides{share(part.source, part.source + any_normal.source),
+                 share(part.target, part.target + any_normal.target)};
+  };
+  const Sides front_share =
+      of_near({front_near.source + front_far.source, front_near.target + front_far.target});
+  const Sides behind_share = of_near(behind);
+  set(Feature::log_front_violation_far, log_at_least(front_far.sum(), kMinFrontViolation));
+  set(Feature::higher_front_share, front_share.higher());
+  set(Feature::lower_front_share, front_share.lower());
+  set(Feature::log_behind_surface, log_at_least(behind.sum(), kMinBehindSurface));
+  set(Feature::higher_behind_share, behind_share.higher());
+  set(Feature::lower_behind_share, behind_share.lower());
+}
+
+constexpr const char* kNames[] = {
+    "log_match_support",       "log_match_inliers",       "log_lower_weighted_overlap",
+    "log_higher_weighted_overlap", "log_lower_overlap",   "log_first_eigenvalue",
+    "log_second_eigenvalue",   "information_volume",      "lower_observed",
+    "higher_observed",         "higher_violation_of_all", "lower_violation_of_all",
+    "higher_violation",        "lower_violation",         "log_higher_violation",
+    "lower_occluded",          "log_violation_of_all",    "log_front_violation_near",
+    "lower_normal_agreement",  "higher_normal_agreement", "higher_near_surface",
+    "lower_near_surface",      "log_front_violation_far", "higher_front_share",
+    "lower_front_share",       "log_behind_surface",      "higher_behind_share",
+    "lower_behind_share",      "log_odds",                "margin",
+    "distinct_share"};
+static_assert(std::size(kNames) == kFeatureCount, "a name for each feature");
+
+}  // namespace
+
+const char* to_string(Feature feature) { return kNames[static_cast<std::size_t>(feature)]; }
+
+AvailableEvidence available_evidence(const std::vector<PoseEvidence>& modes) {
+  // A mode without any overlap says nothing about what the clouds have.
+  AvailableEvidence available;
+  for (const PoseEvidence& e : modes) {
+    available.free_space |= e.source_observed > 0 || e.target_observed > 0;
+    available.surface_sides |= e.source_near_surface > 0 && e.target_near_surface > 0;
+  }
+  return available;
+}
+
+Features features_of(const PoseEvidence& evidence, AvailableEvidence available,
+                     Regressand regressand) {
+  Features features{};
+  Setter set(features);
+  add_overlap(evidence, set);
+  if (available.free_space) add_free_space(evidence, set);
+  if (available.surface_sides)
+    add_surface_sides(evidence, available.free_space, regressand, set);
+  return features;
+}
+
+}  // namespace gpureg::confidence

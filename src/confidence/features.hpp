@@ -1,0 +1,81 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "gpureg/evidence.hpp"
+
+/// Features of the regressions that turn evidence into a confidence. Computed here and nowhere else:
+/// bench/accuracy/fit_confidence.py gets them from the library.
+namespace gpureg::confidence {
+
+/// One number that a regression weighs. "Lower" and "higher" are over the two sides of a pair.
+enum class Feature : std::uint8_t {
+  // Overlap and geometry; of every pair.
+  log_match_support,
+  log_match_inliers,
+  log_lower_weighted_overlap,
+  log_higher_weighted_overlap,
+  log_lower_overlap,
+  log_first_eigenvalue,
+  log_second_eigenvalue,
+  information_volume,
+  // Free space; where a viewpoint is known.
+  lower_observed,
+  higher_observed,
+  higher_violation_of_all,
+  lower_violation_of_all,
+  higher_violation,
+  lower_violation,
+  log_higher_violation,
+  lower_occluded,
+  log_violation_of_all,
+  // Sides of surfaces; where both clouds have them.
+  log_front_violation_near,
+  lower_normal_agreement,
+  higher_normal_agreement,
+  higher_near_surface,
+  lower_near_surface,
+  // Sides of surfaces in place of free space; where no viewpoint is known.
+  log_front_violation_far,
+  higher_front_share,
+  lower_front_share,
+  log_behind_surface,
+  higher_behind_share,
+  lower_behind_share,
+  // The mode among the others of its pair; not for the ranking.
+  log_odds,
+  margin,
+  distinct_share,
+  count
+};
+
+constexpr std::size_t kFeatureCount = static_cast<std::size_t>(Feature::count);
+using Features = std::array<double, kFeatureCount>;  ///< 0 where a feature does not apply
+
+const char* to_string(Feature feature);
+
+/// Kinds of evidence that the modes of a pair have. They choose the regressions.
+struct AvailableEvidence {
+  bool free_space = false;
+  bool surface_sides = false;
+};
+
+/// modes: of one pair. Free space is available where any mode has an observed point, the sides of
+/// surfaces where any mode has points near surfaces of both clouds.
+AvailableEvidence available_evidence(const std::vector<PoseEvidence>& modes);
+
+/// What the features are for.
+enum class Regressand : std::uint8_t {
+  ranking,    ///< which mode of a pair is the best
+  confidence  ///< whether the best mode is correct
+};
+
+/// Features of one mode by its own evidence: all but log_odds, margin and distinct_share.
+Features features_of(const PoseEvidence& evidence, AvailableEvidence available,
+                     Regressand regressand);
+
+}  // namespace gpureg::confidence

@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "confidence/information.hpp"
+
+#include <Eigen/Eigenvalues>
+
+namespace gpureg::confidence {
+namespace {
+
+/// Rotations count by the displacement that they cause at this distance: twenty voxels, a metre at
+/// the default voxel size.
+double unit_length(const PrepareOptions& options) {
+  const double voxel = options.voxel_size > 0 ? static_cast<double>(options.voxel_size)
+                                              : static_cast<double>(options.max_correspondence_distance) / 1.5;
+  return 20.0 * voxel;
+}
+
+
+}  // namespace
+
+InformationSpectrum spectrum_of(const ModeOutcome& mode, const PreparedState& moved) {
+  const double fixed = 1.0 / static_cast<double>(kIcpFixedScale),
+               radius = static_cast<double>(moved.radius);
+  const InformationSums& sums = mode.information;
+  Eigen::Matrix<double, 6, 6> a, turn = Eigen::Matrix<double, 6, 6>::Identity();
+  for (int i = 0, k = 0; i < 6; ++i)
+    for (int j = 0; j <= i; ++j, ++k) a(i, j) = a(j, i) = static_cast<double>(sums.v[k]) * fixed;
+  // Arms about the centre of the inliers, in the unit: (arm - c) x n = arm x n - c x n.
+  const double unit = unit_length(moved.options), scale = radius / unit;
+  Eigen::Vector3d c = Eigen::Vector3d::Zero();
+  if (mode.source.inliers > 0)
+    for (int k = 0; k < 3; ++k)
+      c[k] = static_cast<double>(sums.arm[k]) * fixed / mode.source.inliers;
+  Eigen::Matrix3d cross;
+  cross << 0, -c.z(), c.y(), c.z(), 0, -c.x(), -c.y(), c.x(), 0;
+  turn.topLeftCorner<3, 3>() *= scale;
+  turn.topRightCorner<3, 3>() = -scale * cross;
+  const Eigen::Matrix<double, 6, 6> centred = turn * a * turn.transpose();
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, 6, 6>> solver(centred);
+  InformationSpectrum out;
+  out.centre = c * radius;
+  out.unit = unit;
+  out.eigenvalues = solver.eigenvalues();
+  out.weakest_direction = solver.eigenvectors().col(0);
+  return out;
+}
+
+}  // namespace gpureg::confidence

@@ -1,0 +1,14 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include "gpureg/evidence.hpp"
+#include "pipeline/prepared_state.hpp"
+
+namespace gpureg::confidence {
+
+/// The counts of a mode as shares. moved, fixed: the clouds as the engine had them; swapped: the
+/// moved cloud is the caller's target.
+PoseEvidence evidence_of(const PairOutcome& outcome, const ModeOutcome& mode,
+                         const PreparedState& moved, const PreparedState& fixed, bool swapped);
+
+}  // namespace gpureg::confidence

@@ -1,0 +1,150 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <algorithm>
+#include <map>
+
+#include "algorithm/compatibility.hpp"
+#include "algorithm/normal_weight.hpp"
+#include "cpu/feature_index.hpp"
+#include "cpu/stages.hpp"
+
+namespace gpureg::cpu {
+namespace {
+
+/// One search of all rows of one cloud in the other.
+struct Search {
+  FeatureRows from, in;
+  bool forward;  ///< the source asks
+  std::vector<std::uint32_t> nearest;
+  const FeatureIndex *from_index = nullptr, *in_index = nullptr;
+};
+
+FeatureRows narrow(const CloudView& c) {
+  return {c.features, c.has_feature, c.size, c.feature_dimension};
+}
+FeatureRows wide(const CloudView& c) {
+  return {c.wide_features, c.has_wide_feature, c.size, c.feature_dimension};
+}
+
+std::vector<Search> searches_of(const PairView& pair) {
+  std::vector<Search> out;
+  const CloudView &s = pair.source, &t = pair.target;
+  if (pair.custom_count > 0 || s.size == 0 || t.size == 0) return out;
+  out.push_back({narrow(s), narrow(t), true, std::vector<std::uint32_t>(s.size, kNoValue)});
+  out.push_back({narrow(t), narrow(s), false, std::vector<std::uint32_t>(t.size, kNoValue)});
+  if (s.wide_features == nullptr || t.wide_features == nullptr) return out;
+  out.push_back({wide(s), wide(t), true, std::vector<std::uint32_t>(s.size, kNoValue)});
+  out.push_back({wide(t), wide(s), false, std::vector<std::uint32_t>(t.size, kNoValue)});
+  return out;
+}
+
+/// One index for each set of rows, however many of the pairs and searches share it.
+std::map<const float*, FeatureIndex> index_rows(Exec& exec, const std::vector<Search*>& searches) {
+  std::map<const float*, FeatureIndex> out;
+  for (const Search* search : searches) {
+    out[search->from.values] = {};
+    out[search->in.values] = {};
+  }
+  std::map<const float*, FeatureRows> rows;
+  for (const Search* search : searches) {
+    rows[search->from.values] = search->from;
+    rows[search->in.values] = search->in;
+  }
+  std::vector<std::pair<FeatureRows, FeatureIndex*>> tasks;
+  for (auto& entry : out) tasks.push_back({rows[entry.first], &entry.second});
+  exec.parallel(tasks.size(),
+                [&](std::size_t k) { *tasks[k].second = index_features(tasks[k].first); });
+  for (Search* search : searches) {
+    search->from_index = &out[search->from.values];
+    search->in_index = &out[search->in.values];
+  }
+  return out;
+}
+
+std::uint64_t joined(std::uint32_t source, std::uint32_t target) {
+  return static_cast<std::uint64_t>(source) << 32 | target;
+}
+
+/// Weights of the chosen points by how many of them share their normal's direction.
+std::uint64_t normal_weight(const Vec3* normals, const std::vector<std::uint32_t>& index,
+                            std::vector<std::uint32_t>& weight) {
+  std::uint32_t count[kNormalBins] = {};
+  weight.resize(index.size());
+  for (std::size_t k = 0; k < index.size(); ++k) ++count[weight[k] = normal_bin(normals[index[k]])];
+  std::uint64_t total = 0;
+  for (std::uint32_t& w : weight) total += w = normal_weight_in_bin(count[w]);
+  return total;
+}
+
+MatchSet unite(const PairView& pair, const std::vector<Search>& searches, std::uint64_t seed,
+               std::uint32_t most) {
+  std::vector<std::uint64_t> all;
+  for (std::uint32_t c = 0; c < pair.custom_count; ++c)
+    all.push_back(joined(pair.custom_source[c], pair.custom_target[c]));
+  for (const Search& search : searches)
+    for (std::uint32_t k = 0; k < search.nearest.size(); ++k)
+      if (search.nearest[k] != kNoValue)
+        all.push_back(search.forward ? joined(k, search.nearest[k]) : joined(search.nearest[k], k));
+  std::sort(all.begin(), all.end());
+  all.erase(std::unique(all.begin(), all.end()), all.end());
+
+  std::vector<std::pair<std::uint32_t, std::uint64_t>> order(all.size());
+  for (std::size_t k = 0; k < all.size(); ++k)
+    order[k] = {match_order(static_cast<std::uint32_t>(all[k] >> 32),
+                            static_cast<std::uint32_t>(all[k]), seed),
+                all[k]};
+  std::sort(order.begin(), order.end());
+  if (order.size() > most) order.resize(most);
+
+  MatchSet m;
+  m.found = static_cast<std::uint32_t>(all.size());
+  for (const auto& entry : order) {
+    const std::uint32_t s = static_cast<std::uint32_t>(entry.second >> 32),
+                        t = static_cast<std::uint32_t>(entry.second);
+    const Vec3 p = pair.source.points[s], q = pair.target.points[t];
+    m.source.push_back(s);
+    m.target.push_back(t);
+    m.px.push_back(p.x);
+    m.py.push_back(p.y);
+    m.pz.push_back(p.z);
+    m.qx.push_back(q.x);
+    m.qy.push_back(q.y);
+    m.qz.push_back(q.z);
+    const Vec3 a = pair.source.normals[s], b = pair.target.normals[t];
+    m.mx.push_back(a.x);
+    m.my.push_back(a.y);
+    m.mz.push_back(a.z);
+    m.nx.push_back(b.x);
+    m.ny.push_back(b.y);
+    m.nz.push_back(b.z);
+  }
+  m.source_total = normal_weight(pair.source.normals, m.source, m.source_weight);
+  m.target_total = normal_weight(pair.target.normals, m.target, m.target_weight);
+  return m;
+}
+
+}  // namespace
+
+std::vector<MatchSet> merge_matches(Exec& exec, Span<const PairView> pairs,
+                                    const RegistrationOptions& options) {
+  std::vector<std::vector<Search>> searches(pairs.size);
+  std::vector<Search*> flat;
+  for (std::size_t p = 0; p < pairs.size; ++p) {
+    searches[p] = searches_of(pairs[p]);
+    for (Search& search : searches[p]) flat.push_back(&search);
+  }
+  const auto indices = index_rows(exec, flat);
+  exec.parallel_items(
+      flat.size(), [&](std::size_t k) { return flat[k]->from_index->rows; }, 512,
+      [&](std::size_t k, std::size_t begin, std::size_t end) {
+        const Search& s = *flat[k];
+        nearest_features(s.from, *s.from_index, s.in, *s.in_index, begin, end,
+                         flat[k]->nearest.data());
+      });
+  std::vector<MatchSet> out(pairs.size);
+  exec.parallel(pairs.size, [&](std::size_t p) {
+    out[p] = unite(pairs[p], searches[p], options.seed, options.compatibility.max_matches);
+  });
+  return out;
+}
+
+}  // namespace gpureg::cpu

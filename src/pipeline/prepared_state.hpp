@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <vector>
+
+#include "pipeline/types.hpp"
+
+namespace gpureg {
+
+/// Content of a PreparedCloud: facts on the host, data in the memory of its engine.
+struct PreparedState {
+  virtual ~PreparedState() = default;
+  /// Host copies, relative to the local origin.
+  virtual std::vector<Vec3> copy_points() const = 0;
+  virtual std::vector<Vec3> copy_normals() const = 0;
+  virtual std::vector<float> copy_features() const = 0;
+
+  /// Identifies the memory that holds the data: clouds of one owner can be aligned.
+  const void* owner = nullptr;
+  PrepareOptions options;
+  PrepareStatistics statistics;
+  float origin[3] = {0, 0, 0};  ///< local origin in the cloud's frame
+  std::uint32_t size = 0;
+  std::uint32_t feature_dimension = 0;
+  std::uint64_t normal_weight_total = 0;  ///< see CloudView
+  float radius = 1;                       ///< see CloudView
+  std::vector<Vec3> viewpoints;           ///< relative to the local origin
+};
+
+/// A pair of clouds for the engine, and optionally the caller's own correspondences.
+struct PairInput {
+  const PreparedState* source;
+  const PreparedState* target;
+  Span<const std::uint32_t> custom_source{};
+  Span<const std::uint32_t> custom_target{};
+  PriorTest prior{};
+};
+
+}  // namespace gpureg
