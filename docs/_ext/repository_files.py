@@ -29,7 +29,9 @@ def site_link(link: re.Match, folder: pathlib.Path, page: pathlib.Path, source: 
     header = DOCS / "reference" / "cpp" / f"{path.stem}.md"
     if path.parent == ROOT / "include" / "gpureg" and header.exists():
         path = header
-    if path == ROOT / "examples" / "README.md":
+    if path.parent.parent == ROOT / "examples" and path.suffix in (".cpp", ".py"):
+        path, anchor = DOCS / "examples.md", f"#{path.name.replace('.', '')}"
+    elif path == ROOT / "examples" / "README.md":
         path = DOCS / "examples.md"
     elif path in (ROOT / "CHANGELOG.md", ROOT / "CONTRIBUTING.md"):
         path = DOCS / path.name.lower()
@@ -53,7 +55,7 @@ def read_page(app: Sphinx, name: str, content: list[str]) -> None:
 
 def read_included(app: Sphinx, path: pathlib.Path, name: str, content: list[str]) -> None:
     if path.suffix == ".md":
-        folder = (ROOT / path).resolve().parent
+        folder = (DOCS / path).resolve().parent
         content[0] = rewrite(content[0], folder, DOCS / f"{name}.md", name)
 
 
