@@ -8,10 +8,10 @@ namespace {
 
 // They live as long as the interpreter: the translator below may run at any time.
 PyObject* error = nullptr;
-*invalid_argument = nullptr;
-*backend_unavailable = nullptr;
-*device_error = nullptr;
-*io_error = nullptr;
+PyObject* invalid_argument = nullptr;
+PyObject* backend_unavailable = nullptr;
+PyObject* device_error = nullptr;
+PyObject* io_error = nullptr;
 
 PyObject* make(py::module_& m, const char* name, const char* doc, PyObject* bases) {
   const std::string full = std::string("gpureg.") + name;

@@ -151,7 +151,7 @@ class TestTorch:
     def test_example(self, torch):
         import pathlib
 
-        path = pathlib.Path(__file__).parents[1] / "examples" / "own_features.py"
+        path = pathlib.Path(__file__).parents[2] / "examples" / "python" / "04_own_features.py"
         done = subprocess.run([sys.executable, path], capture_output=True, text=True)
         assert done.returncode == 0 and done.stdout.startswith(
             "cuda: <gpureg.RegistrationResult aligned"

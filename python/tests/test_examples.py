@@ -9,9 +9,10 @@ import sys
 import gpureg
 import numpy as np
 import pytest
+from country import make_fragments
 from scenes import moved, room
 
-FOLDER = pathlib.Path(__file__).parents[1] / "examples"
+FOLDER = pathlib.Path(__file__).parents[2] / "examples" / "python"
 
 
 def run(name, *arguments):
@@ -32,11 +33,11 @@ def scans(tmp_path, source, truth):
     return folder
 
 
-def test_register_two_clouds(scans, tmp_path):
+def test_two_clouds(scans, tmp_path):
     pytest.importorskip("matplotlib")
     picture = tmp_path / "picture.png"
     shown = run(
-        "register_two_clouds.py",
+        "01_two_clouds.py",
         scans / "cloud_bin_0.ply",
         scans / "cloud_bin_1.ply",
         "--picture",
@@ -45,21 +46,30 @@ def test_register_two_clouds(scans, tmp_path):
     assert "aligned" in shown and picture.read_bytes().startswith(b"\x89PNG")
 
 
-def test_batch_folder(scans, tmp_path):
+def test_batch(scans, tmp_path):
     pytest.importorskip("pyarrow")
-    shown = run("batch_folder.py", scans, "--output", tmp_path / "run", "--quality", 2)
+    shown = run("02_batch.py", scans, "--output", tmp_path / "run", "--quality", 2)
     assert shown.startswith("3 pairs, ") and "   1 into    0: aligned" in shown
 
 
-def test_many_fragments():
+def test_many_fragments(tmp_path):
+    pytest.importorskip("pyarrow")
     pytest.importorskip("faiss")
-    shown = run("many_fragments.py", "--fragments", 24, "--neighbors", 4, "--quality", 0, "--quiet")
-    assert "of the recall lost" in shown and "MiB at most" in shown
+    scans = tmp_path / "scans"
+    scans.mkdir()
+    for k, cloud in enumerate(make_fragments(24, seed=1)[0]):
+        gpureg.write_point_cloud(scans / f"cloud_bin_{k}.ply", cloud)
+    shown = run(
+        "06_many_fragments.py",
+        *(scans, "--output", tmp_path / "run", "--check", 12, "--neighbors", 4),
+        *("--voxel-size", 0.12, "--quality", 0),
+    )
+    assert "of the recall lost" in shown and "of 66 pairs tried" in shown
 
 
 def test_own_features():
     pytest.importorskip("torch")
-    assert "aligned" in run("own_features.py")
+    assert "aligned" in run("04_own_features.py")
 
 
 def test_readme(scans, tmp_path, monkeypatch, source, truth):

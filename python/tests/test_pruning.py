@@ -1,20 +1,15 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Pruning: descriptors of places, their neighbours, and what is lost."""
 
-import pathlib
-import sys
-
 import gpureg
 import numpy as np
 import pytest
+from country import make_fragments
 from scenes import few, moved, pose, room
 
 pytest.importorskip("pyarrow")
 pytest.importorskip("faiss")
 from gpureg import pruning
-
-sys.path.insert(0, str(pathlib.Path(__file__).parents[1] / "examples"))
-import many_fragments
 
 
 def test_descriptor_belongs_to_the_place_not_to_the_pose():
@@ -28,7 +23,7 @@ def test_descriptor_belongs_to_the_place_not_to_the_pose():
 
 
 def test_same_candidates_again():
-    clouds, _ = many_fragments.make_fragments(30, seed=2)
+    clouds, _ = make_fragments(30, seed=2)
     fragments = gpureg.FragmentSet.from_clouds(clouds)
     nearest = pruning.Nearest(k=4, options=few(1, 0.12).prepare)
     first = nearest(fragments)
@@ -37,7 +32,7 @@ def test_same_candidates_again():
 
 
 def test_most_overlapping_pairs_are_kept():
-    clouds, overlapping = many_fragments.make_fragments(120, seed=1)
+    clouds, overlapping = make_fragments(120, seed=1)
     pairs = pruning.Nearest(k=12, options=few(1, 0.12).prepare)(
         gpureg.FragmentSet.from_clouds(clouds)
     )
@@ -62,7 +57,7 @@ def test_odd_sets():
 
 
 def test_as_the_pairs_of_a_run(tmp_path):
-    clouds, overlapping = many_fragments.make_fragments(20, seed=3)
+    clouds, overlapping = make_fragments(20, seed=3)
     options = few(2000, 0.12)
     run = gpureg.register_all(
         clouds,

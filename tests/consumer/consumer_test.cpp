@@ -83,6 +83,26 @@ class Consumer : public testing::Test {
     return target_from_room * source_from_room.inverse();
   }
 
+  // A third scan of the same room, in the frame of the target.
+  void write_third_scan() {
+    std::mt19937 random(8);
+    Eigen::Isometry3d target_from_room = Eigen::Isometry3d::Identity();
+    target_from_room.translation() = -test::kRoomSensor.cast<double>();
+    PointCloud cloud;
+    cloud.points = test::moved(target_from_room, test::scan_room(random));
+    io::write_point_cloud(folder_ / "third.ply", cloud);
+  }
+
+  // An example prints the pose last.
+  void expect_example(const std::string& program, const Eigen::Isometry3d& truth) {
+    SCOPED_TRACE(program);
+    const Outcome outcome = run(program);
+    const std::size_t title = outcome.output.rfind("target_from_source\n");
+    ASSERT_NE(title, std::string::npos) << outcome.output;
+    EXPECT_NE(outcome.output.find(explain(RegistrationReason::none)), std::string::npos);
+    expect_pose(outcome, truth, outcome.output.substr(0, outcome.output.find('\n', title) + 1));
+  }
+
   // A voxel is 5 cm and the noise 1 mm: what the refinement leaves is millimetres, a wrong pose is
   // off by decimetres.
   void expect_pose(const Outcome& outcome, const Eigen::Isometry3d& truth,
@@ -139,6 +159,38 @@ TEST_F(Consumer, Pcl) {
   const Eigen::Isometry3d truth = write_scans();
   ASSERT_NO_FATAL_FAILURE(build(kProjects + "pcl_project", ""));
   expect_pose(run("register_with_pcl"), truth);
+}
+
+// examples/cpp, as its README says: built from the installed package.
+TEST_F(Consumer, Examples) {
+  const bool address = std::string(CONSUMER_FLAGS).find("-fsanitize=address") != std::string::npos;
+  const Eigen::Isometry3d truth = write_scans();
+  write_third_scan();
+  ASSERT_NO_FATAL_FAILURE(build(CONSUMER_SOURCE "/examples/cpp", "-Wall -Wextra -Werror"));
+  expect_example("01_two_clouds", truth);
+  expect_example("04_own_features", truth);
+  // Under AddressSanitizer Eigen allocates in another way than PCL's ready-made libraries do.
+  if (CONSUMER_HAVE_PCL && !address) expect_example("03_pcl", truth);
+
+  const Outcome batch = run_command({build_ + "/02_batch", folder_ / "target.ply",
+                                     folder_ / "source.ply", folder_ / "third.ply"});
+  EXPECT_EQ(batch.status, 0) << batch.output;
+  EXPECT_NE(batch.output.find("1 into 0: aligned"), std::string::npos) << batch.output;
+  EXPECT_NE(batch.output.find("3 of 3 pairs aligned\n"), std::string::npos) << batch.output;
+
+  // Built where the CUDA toolkit is; without a device it says so.
+  if (std::ifstream(build_ + "/05_cuda_stream")) {
+    const Outcome stream = run("05_cuda_stream");
+    if (stream.status == 0)
+      expect_example("05_cuda_stream", truth);
+    else
+      EXPECT_EQ(stream.output.rfind("error: ", 0), 0u) << stream.output;
+  }
+  for (const char* name : {"01_two_clouds", "02_batch", "04_own_features"}) {
+    const Outcome usage = run_command({build_ + "/" + name});
+    EXPECT_EQ(usage.status, 2) << name;
+    EXPECT_EQ(usage.output.rfind("usage: ", 0), 0u) << usage.output;
+  }
 }
 
 // A component that this build does not have.

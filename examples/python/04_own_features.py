@@ -1,8 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Features of your own, as a torch tensor: gpureg matches them instead of FPFH.
+"""Features of your own: gpureg matches a torch tensor instead of FPFH.
 
-A small random network stands in for a learned one: of each point's sorted distances to its
-neighbours it makes 32 numbers, which do not change under rigid motions. On a GPU nothing leaves it.
+    python 04_own_features.py
+
+A small random network stands for a learned one. It makes 32 numbers of each point's sorted
+distances to its neighbours, which do not change under rigid motions. Tensors on the GPU stay there.
 """
 
 from __future__ import annotations
@@ -41,7 +43,6 @@ def main() -> None:
     ).to(device)
     options = gpureg.RegistrationOptions.from_voxel_size(0.05)
     options.prepare.voxel_size = 0.0  # the network has chosen the points
-    options.quadruples.count = 100_000
     clouds = [
         gpureg.prepare(points, features=features_of(points, network), options=options.prepare)
         for points in (source, target)

@@ -1,7 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""All pairs of a folder of fragments cloud_bin_<i>.ply: kill it, call it again, nothing is lost.
+"""Many clouds: aligns all pairs of a folder of fragments cloud_bin_<i>.ply.
 
-python batch_folder.py scans/ --output run/
+    python 02_batch.py scans/ --output run/
+
+An interrupted run goes on where it stopped. Needs pyarrow.
 """
 
 from __future__ import annotations

@@ -1,24 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Thousands of fragments: try only the pairs that look alike, and see what that saves and loses.
+"""Many small fragments of a generated hilly country, and the pairs of them that overlap."""
 
-Makes a set of small fragments of a hilly country, whose overlaps it therefore knows, and runs it
-with pruned pairs.
-
-    python many_fragments.py --fragments 2000 --neighbors 20 --output out/many
-"""
-
-from __future__ import annotations
-
-import argparse
-import resource
-import tempfile
-import time
-from pathlib import Path
-
-import gpureg
 import numpy as np
 import numpy.typing as npt
-from gpureg import pruning
 
 WIDTH = 3.0  # metres that a fragment sees
 SPACING = 0.1  # metres between its points
@@ -76,53 +60,3 @@ def make_fragments(
     shared = np.maximum(0, WIDTH - np.abs(corners[:, None] - corners[None])).prod(axis=2) / WIDTH**2
     i, j = np.nonzero(np.triu(shared >= 1 / 3, 1))
     return fragments, list(zip(i.tolist(), j.tolist()))
-
-
-def main() -> None:
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    parser.add_argument("--fragments", type=int, default=200)
-    parser.add_argument("--neighbors", type=int, default=20)
-    parser.add_argument("--quality", type=int, default=5)
-    parser.add_argument("--voxel-size", type=float, default=0.12)
-    parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--output", type=Path)
-    parser.add_argument("--quiet", action="store_true", help="no progress bar")
-    arguments = parser.parse_args()
-
-    begin = time.monotonic()
-    clouds, overlapping = make_fragments(arguments.fragments, arguments.seed)
-    points = sum(map(len, clouds)) // len(clouds)
-    print(f"fragments  {len(clouds)} of {points} points, made in {time.monotonic() - begin:.1f} s")
-
-    options = gpureg.RegistrationOptions.from_voxel_size(arguments.voxel_size, arguments.quality)
-    nearest = pruning.Nearest(k=arguments.neighbors, options=options.prepare)
-    fragments = gpureg.FragmentSet.from_clouds(clouds)
-    pairs = nearest(fragments)
-    print(f"pruning    {pruning.measure(pairs, overlapping, len(clouds))}")
-    print(f"           descriptors and search in {nearest.seconds:.1f} s")
-
-    with tempfile.TemporaryDirectory() as folder:
-        run = gpureg.register_all(
-            fragments,
-            pairs,
-            output=arguments.output or folder,
-            options=options,
-            progress=not arguments.quiet,
-        )
-        table = run.table()
-        found = {
-            (i, j)
-            for i, j, s in zip(*(table[c].to_pylist() for c in ("i", "j", "status")))
-            if s == "aligned"
-        }
-    print(f"run        {run}")
-    print(f"aligned    {len(found & set(overlapping))} of the {len(overlapping)} overlapping pairs")
-    print(
-        f"memory     {resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024:.0f} MiB at most, this script's clouds included"
-    )
-
-
-if __name__ == "__main__":
-    main()
