@@ -5,9 +5,9 @@
 
 namespace gpureg::cuda {
 
-std::vector<PerturbedPoses> search_degeneracies(Exec& exec, Span<const PairInput> inputs,
-                                                Span<const PairOutcome> outcomes,
-                                                const RegistrationOptions& options) {
+std::vector<PosesOfPair> search_degeneracies(Exec& exec, Span<const PairInput> inputs,
+                                             Span<const PairOutcome> outcomes,
+                                             const RegistrationOptions& options) {
   return confidence::search_degeneracies(inputs, outcomes, options, exec.host_threads());
 }
 

@@ -10,6 +10,7 @@
 #include "pipeline/align.hpp"
 #include "pipeline/align_by_evidence.hpp"
 #include "pipeline/prepare.hpp"
+#include "pipeline/verify.hpp"
 #include "stages.hpp"
 
 namespace gpureg::cuda {
@@ -98,8 +99,8 @@ std::vector<std::shared_ptr<PreparedState>> CudaEngine::prepare_on_stream(
   return out;
 }
 
-void CudaEngine::align(Span<const PairInput> pairs, const RegistrationOptions& options,
-                       Span<PairOutcome> outcomes) {
+template <typename Work>
+void CudaEngine::for_resident_pairs(Span<const PairInput> pairs, const Work& work) {
   const std::lock_guard<std::mutex> lock(mutex_);
   const DeviceScope scope(device());
   const std::size_t budget = residence_.budget();
@@ -128,13 +129,29 @@ void CudaEngine::align(Span<const PairInput> pairs, const RegistrationOptions& o
                        held[place[pairs[p].target]]->view_on_device, pairs[p].custom_source.data,
                        pairs[p].custom_target.data,
                        static_cast<std::uint32_t>(pairs[p].custom_source.size), pairs[p].prior});
+    work(span_of(views), begin, end);
+  }
+}
+
+void CudaEngine::align(Span<const PairInput> pairs, const RegistrationOptions& options,
+                       Span<PairOutcome> outcomes) {
+  for_resident_pairs(pairs, [&](Span<const PairView> views, std::size_t begin, std::size_t end) {
     const Span<PairOutcome> part{outcomes.data + begin, end - begin};
     if (options.method == RegistrationMethod::compatibility)
-      pipeline::align_by_evidence(exec_, {pairs.data + begin, end - begin}, span_of(views), options,
-                                  part);
+      pipeline::align_by_evidence(exec_, {pairs.data + begin, end - begin}, views, options, part);
     else
-      pipeline::align(exec_, span_of(views), options, part);
-  }
+      pipeline::align(exec_, views, options, part);
+  });
+}
+
+void CudaEngine::verify(Span<const PairInput> pairs, const std::vector<PosesOfPair>& poses,
+                        const RegistrationOptions& options, bool refine,
+                        Span<PairOutcome> outcomes) {
+  for_resident_pairs(pairs, [&](Span<const PairView> views, std::size_t begin, std::size_t end) {
+    const std::vector<PosesOfPair> part(poses.begin() + static_cast<std::ptrdiff_t>(begin),
+                                        poses.begin() + static_cast<std::ptrdiff_t>(end));
+    pipeline::verify(exec_, views, part, options, refine, {outcomes.data + begin, end - begin});
+  });
 }
 
 }  // namespace gpureg::cuda

@@ -26,8 +26,13 @@ class CudaEngine final : public DeviceEngine {
                                                  const PrepareOptions& options) override;
   void align(Span<const PairInput> pairs, const RegistrationOptions& options,
              Span<PairOutcome> outcomes) override;
+  void verify(Span<const PairInput> pairs, const std::vector<PosesOfPair>& poses,
+              const RegistrationOptions& options, bool refine, Span<PairOutcome> outcomes) override;
 
  private:
+  /// Calls work(views, begin, end) for runs of pairs whose clouds fit the memory budget together.
+  template <typename Work>
+  void for_resident_pairs(Span<const PairInput> pairs, const Work& work);
   std::vector<std::shared_ptr<PreparedState>> prepare_on_stream(Span<const RawCloud> clouds,
                                                                 const PrepareOptions& options);
   void prepare_chunk(Span<const RawCloud> clouds, const PrepareOptions& options,

@@ -100,6 +100,19 @@ class EngineOfMany final : public DeviceEngine {
            });
   }
 
+  void verify(Span<const PairInput> pairs, const std::vector<PosesOfPair>& poses,
+              const RegistrationOptions& options, bool refine,
+              Span<PairOutcome> outcomes) override {
+    Runs runs(pairs.size, kMinPairs, engines_[0]->pairs_per_chunk(options), engines_.size());
+    on_all(runs, pairs.size > kMinPairs,
+           [&](CudaEngine& engine, std::size_t begin, std::size_t end) {
+             const std::vector<PosesOfPair> part(poses.begin() + static_cast<std::ptrdiff_t>(begin),
+                                                 poses.begin() + static_cast<std::ptrdiff_t>(end));
+             engine.verify({pairs.data + begin, end - begin}, part, options, refine,
+                           {outcomes.data + begin, end - begin});
+           });
+  }
+
  private:
   /// The engine of a device, or the first one, which will say what is wrong.
   CudaEngine& on(int device) const {

@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include <algorithm>
+
 #include <cooperative_groups.h>
 
 #include "algorithm/evidence.hpp"
@@ -255,15 +257,23 @@ void merge_modes(Exec& exec, Modes& modes, const RegistrationOptions& options) {
   check_launch("merge");
 }
 
-Modes modes_from_poses(Exec& exec, const std::vector<PerturbedPoses>& poses) {
+Modes modes_from_poses(Exec& exec, const std::vector<PosesOfPair>& poses) {
   Modes out;
-  out.most = kMaxPerturbedPoses;
+  for (const PosesOfPair& of_pair : poses)
+    out.most = std::max(out.most, static_cast<std::uint32_t>(of_pair.poses.size()));
+  out.most = std::max(out.most, 1u);  // a launch needs a block
   std::vector<Mode> modes(poses.size() * out.most);
   std::vector<std::uint32_t> count(poses.size());
   for (std::size_t p = 0; p < poses.size(); ++p)
     for (const Pose<double>& pose : poses[p].poses) modes[p * out.most + count[p]++] = {pose, 0, 0};
   out.mode = exec.upload(modes);
   out.count = exec.upload(count);
+  return out;
+}
+
+Candidates no_candidates(Exec& exec, Span<const PairView> pairs) {
+  Candidates out;
+  out.count = exec.filled<std::uint32_t>(pairs.size, 0);
   return out;
 }
 

@@ -65,10 +65,12 @@ void refine_modes(Exec& exec, Span<const PairView> pairs, Modes& modes,
 /// Modes that have met: the most promising of them stays.
 void merge_modes(Exec& exec, Modes& modes, const RegistrationOptions& options);
 /// Perturbed poses of the most likely mode of each pair; on the host.
-std::vector<PerturbedPoses> search_degeneracies(Exec& exec, Span<const PairInput> inputs,
-                                                Span<const PairOutcome> outcomes,
-                                                const RegistrationOptions& options);
-Modes modes_from_poses(Exec& exec, const std::vector<PerturbedPoses>& poses);
+std::vector<PosesOfPair> search_degeneracies(Exec& exec, Span<const PairInput> inputs,
+                                             Span<const PairOutcome> outcomes,
+                                             const RegistrationOptions& options);
+Modes modes_from_poses(Exec& exec, const std::vector<PosesOfPair>& poses);
+/// For poses that were not proposed by the stages before.
+Candidates no_candidates(Exec& exec, Span<const PairView> pairs);
 /// All evidence, from all points.
 void verify_modes(Exec& exec, Span<const PairView> pairs, const MatchSets& matches,
                   const Candidates& candidates, const Modes& modes,

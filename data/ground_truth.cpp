@@ -5,6 +5,7 @@
 #include <cstdio>
 
 #include "gpureg/evaluation.hpp"
+#include "gpureg/files.hpp"
 
 namespace gpureg::synthetic {
 namespace {
@@ -146,7 +147,7 @@ void write_ground_truth(const std::string& folder, int fragments,
     log.push_back(all_log.back());
     information.push_back(all_information.back());
   }
-  evaluation::write_file_atomically(folder + "/gt_overlap.txt", overlap);
+  files::write_atomically(folder + "/gt_overlap.txt", overlap);
   evaluation::write_information(folder + "/gt_all.info", all_information);
   evaluation::write_log(folder + "/gt_all.log", all_log);
   evaluation::write_information(folder + "/gt.info", information);

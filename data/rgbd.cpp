@@ -12,7 +12,7 @@
 #include "data/scene_files.hpp"
 #include "data/texture.hpp"
 #include "gpureg/error.hpp"
-#include "gpureg/evaluation.hpp"
+#include "gpureg/files.hpp"
 
 namespace gpureg::synthetic {
 namespace {
@@ -65,7 +65,7 @@ void write_png(const std::string& path, const std::vector<std::uint8_t>& rows, i
                int bit_depth) {
   const std::string bytes = encode_png(rows, colour_type, bit_depth);
   if (bytes.empty()) throw IoError(path + ": the image cannot be encoded");
-  evaluation::write_file_atomically(path, bytes);
+  files::write_atomically(path, bytes);
 }
 
 /// Linear light to an sRGB byte, near enough: gamma 2.2.
@@ -159,10 +159,10 @@ void write_sequence_lists(const std::string& folder,
                   q.x(), q.y(), q.z(), q.w());
     truth += time + line;
   }
-  evaluation::write_file_atomically(folder + "/rgb.txt", rgb);
-  evaluation::write_file_atomically(folder + "/depth.txt", depth);
-  evaluation::write_file_atomically(folder + "/groundtruth.txt", truth);
-  evaluation::write_file_atomically(folder + "/associations.txt", associations);
+  files::write_atomically(folder + "/rgb.txt", rgb);
+  files::write_atomically(folder + "/depth.txt", depth);
+  files::write_atomically(folder + "/groundtruth.txt", truth);
+  files::write_atomically(folder + "/associations.txt", associations);
 }
 
 }  // namespace gpureg::synthetic

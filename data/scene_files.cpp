@@ -6,7 +6,7 @@
 #include <filesystem>
 
 #include "gpureg/error.hpp"
-#include "gpureg/evaluation.hpp"
+#include "gpureg/files.hpp"
 
 namespace gpureg::synthetic {
 namespace {
@@ -73,7 +73,7 @@ void write_cloud(const std::string& path, const std::vector<Eigen::Vector3f>& po
   for (const Eigen::Vector3f& p : points) {
     for (int axis = 0; axis < 3; ++axis) append(bytes, p[axis]);
   }
-  evaluation::write_file_atomically(path, bytes);
+  files::write_atomically(path, bytes);
 }
 
 void write_poses(const std::string& path,
@@ -89,7 +89,7 @@ void write_poses(const std::string& path,
       text += line;
     }
   }
-  evaluation::write_file_atomically(path, text);
+  files::write_atomically(path, text);
 }
 
 Eigen::Vector4d quaternion(const Eigen::Isometry3d& pose) {
@@ -110,7 +110,7 @@ void write_cameras(const std::string& path,
       text += line;
     }
   }
-  evaluation::write_file_atomically(path, text);
+  files::write_atomically(path, text);
 }
 
 }  // namespace gpureg::synthetic

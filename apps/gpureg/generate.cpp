@@ -9,7 +9,7 @@
 
 #include "command.hpp"
 #include "gpureg/error.hpp"
-#include "gpureg/evaluation.hpp"
+#include "gpureg/files.hpp"
 #include "interrupt.hpp"
 #include "method_options.hpp"
 #include "progress.hpp"
@@ -48,8 +48,8 @@ int run(const GenerateOptions& o) {
   hooks.report = [&](int done, int total, const char* name) {
     // The folder is there by now, and no cloud in it yet.
     if (stage.empty())
-      evaluation::write_file_atomically(
-          mark_of(o.folder), "Made by gpureg generate, which may replace files of this folder.\n");
+      files::write_atomically(mark_of(o.folder),
+                              "Made by gpureg generate, which may replace files of this folder.\n");
     if (stage != name) {
       progress.emplace(name, name == std::string("fragments") ? "scanned" : "done",
                        static_cast<std::size_t>(total), o.quiet);

@@ -8,6 +8,7 @@
 
 #include "gpureg/error.hpp"
 #include "gpureg/evaluation.hpp"
+#include "gpureg/files.hpp"
 
 namespace gpureg::cli {
 namespace {
@@ -43,7 +44,7 @@ std::string format_document(const Json& document) {
 }
 
 void write_document(const std::string& path, const Json& document) {
-  evaluation::write_file_atomically(path, format_document(document));
+  files::write_atomically(path, format_document(document));
 }
 
 std::string read_text(const std::string& path) {

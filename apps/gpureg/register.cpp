@@ -8,6 +8,7 @@
 #include "command.hpp"
 #include "gpureg/error.hpp"
 #include "gpureg/evaluation.hpp"
+#include "gpureg/files.hpp"
 #include "gpureg/io.hpp"
 #include "gpureg/registration.hpp"
 #include "gpureg/time_budget.hpp"
@@ -154,7 +155,7 @@ int run(RegisterOptions o) {
   }
   if (!o.image.empty()) {
     const Image picture = before_after(source_cloud, target_cloud, pose_of(result));
-    evaluation::write_file_atomically(o.image, encode_png(picture));
+    files::write_atomically(o.image, encode_png(picture));
   }
   return result.aligned() ? kOk : kNoAlignment;
 }

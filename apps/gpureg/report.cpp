@@ -10,6 +10,7 @@
 #include "before_after.hpp"
 #include "command.hpp"
 #include "gpureg/error.hpp"
+#include "gpureg/files.hpp"
 #include "gpureg/io.hpp"
 #include "output_path.hpp"
 #include "report_page.hpp"
@@ -67,7 +68,7 @@ int run(const ReportOptions& o) {
     pictures = draw(truth ? samples(judge(*truth, result), kPicturesOfAKind)
                           : samples(result, kPicturesOfAKind),
                     o.clouds);
-  evaluation::write_file_atomically(o.output, report_page(result, truth, pictures));
+  files::write_atomically(o.output, report_page(result, truth, pictures));
   std::cout << "written " << o.output << "\n";
   return kOk;
 }

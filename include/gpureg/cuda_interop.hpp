@@ -30,6 +30,7 @@ struct DevicePointCloudView {
   std::size_t feature_stride = 0;     ///< 0: feature_dimension
   const float* viewpoints = nullptr;  ///< HOST memory, optional: viewpoint_count rows of x, y, z
   std::size_t viewpoint_count = 0;
+  double origin[3] = {0, 0, 0};  ///< as that of PointCloudView
 
   /// Throws InvalidArgument as PointCloudView::validate() does.
   void validate() const {

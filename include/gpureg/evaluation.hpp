@@ -44,11 +44,6 @@ void write_information(const std::string& path, const std::vector<InformationEnt
 void check_entries(const std::string& path, const std::vector<LogEntry>& entries);
 void check_entries(const std::string& path, const std::vector<InformationEntry>& entries);
 
-/// Writes any bytes to path with the same all-or-nothing guarantee: the old file stays until the
-/// new one is complete. Links are followed, the mode of an existing file is kept, devices and pipes
-/// are written in place. Throws IoError. Thread-safe.
-void write_file_atomically(const std::string& path, const std::string& content);
-
 /// A report of one pair, ranked by score.
 struct Report {
   int i = 0, j = 0;

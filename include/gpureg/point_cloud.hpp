@@ -34,6 +34,10 @@ struct PointCloudView {
   /// seen from, unless the cloud brings normals of its own: then nothing is known about free space,
   /// and no pose is judged by it.
   std::size_t viewpoint_count = 0;
+  /// Added to every point and viewpoint: coordinates in the cloud's frame = origin + row. For large
+  /// coordinates (UTM, maps), which float rows cannot hold. Poses and moments of results are in the
+  /// cloud's frame; PreparedCloud::points() are rows, relative to this.
+  double origin[3] = {0, 0, 0};
 
   PointCloudView() = default;
   PointCloudView(const float* xyz, std::size_t count) : points(xyz), size(count) {}

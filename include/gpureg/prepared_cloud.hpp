@@ -30,6 +30,8 @@ class PreparedCloud {
   const PrepareOptions& options() const;
 
   /// host copy, size() points in the cloud's frame
+  /// PointCloudView::origin: added to points() and viewpoints() it gives the cloud's frame.
+  Eigen::Vector3d origin() const;
   std::vector<Eigen::Vector3f> points() const;
   /// host copy, unit length, or (0,0,0) where none could be computed
   std::vector<Eigen::Vector3f> normals() const;

@@ -10,7 +10,7 @@
 
 namespace gpureg {
 
-/// Local origin of a cloud in its own frame: what its points are relative to inside.
+/// Local origin of a prepared cloud, relative to the caller's rows.
 inline Eigen::Vector3d origin_of(const PreparedState& cloud) {
   return Eigen::Vector3f(cloud.origin[0], cloud.origin[1], cloud.origin[2]).cast<double>();
 }
@@ -29,5 +29,30 @@ inline bool same_mode_at(const UnalignedIsometry3d& a, const UnalignedIsometry3d
              static_cast<double>(mode_trace(options.mode_angle)) &&
          (a * middle - b * middle).norm() <= static_cast<double>(options.mode_distance);
 }
+
+inline Eigen::Vector3d offset_of(const PreparedState& cloud) {
+  return Eigen::Map<const Eigen::Vector3d>(cloud.frame_offset);
+}
+
+/// Moments of the local, scaled points to moments of the caller's rows.
+CorrespondenceMoments to_frame(const Moments& moments, const PreparedState& cloud);
+
+/// A local pose of the moved into the fixed cloud as target_from_source between the caller's rows.
+UnalignedIsometry3d to_transform(const Pose<double>& pose, const PreparedState& source,
+                                 const PreparedState& target, bool swapped);
+
+/// The other way round, of target_from_source between the clouds' frames.
+Pose<double> to_local(const UnalignedIsometry3d& target_from_source, const PreparedState& source,
+                      const PreparedState& target, bool swapped);
+
+/// A pose and moments between the rows of two clouds into the clouds' frames.
+void move_to_frame(UnalignedIsometry3d& target_from_source, const PreparedState& source,
+                   const PreparedState& target);
+void move_to_frame(CorrespondenceMoments& moments, const PreparedState& cloud);
+
+/// A result between the rows of two clouds into the clouds' frames, see PointCloudView::origin.
+/// Last of all: with large offsets, differences of poses would lose their digits.
+void move_to_frames(RegistrationResult& result, const PreparedState& source,
+                    const PreparedState& target);
 
 }  // namespace gpureg

@@ -15,39 +15,6 @@
 namespace gpureg {
 namespace {
 
-/// Moments of the local, scaled points to moments of the points in the cloud's frame.
-CorrespondenceMoments to_frame(const Moments& m, const PreparedState& cloud) {
-  const double unit = 1.0 / 1099511627776.0, r = cloud.radius;
-  CorrespondenceMoments out;
-  out.count = m.count;
-  const double n = static_cast<double>(m.count);
-  const Eigen::Vector3d o = origin_of(cloud);
-  const Eigen::Vector3d s =
-      Eigen::Vector3d(static_cast<double>(m.sum[0]), static_cast<double>(m.sum[1]),
-                      static_cast<double>(m.sum[2])) *
-      (unit * r);
-  Eigen::Matrix3d q;
-  const double f = unit * r * r;
-  const auto e = [&](int k) { return static_cast<double>(m.outer[k]) * f; };
-  q << e(0), e(1), e(2), e(1), e(3), e(4), e(2), e(4), e(5);
-  out.sum = s + n * o;
-  out.outer = q + s * o.transpose() + o * s.transpose() + n * o * o.transpose();
-  return out;
-}
-
-/// The pose of the pair as the caller knows it: his source, his target, their frames.
-UnalignedIsometry3d to_transform(const Pose<double>& pose, const PreparedState& source,
-                                 const PreparedState& target, bool swapped) {
-  const PreparedState& moved = swapped ? target : source;
-  const PreparedState& fixed = swapped ? source : target;
-  const Eigen::Quaterniond q(pose.w, pose.x, pose.y, pose.z);
-  Eigen::Isometry3d fixed_from_moved = Eigen::Isometry3d::Identity();
-  fixed_from_moved.linear() = q.normalized().toRotationMatrix();
-  fixed_from_moved.translation() = Eigen::Vector3d(pose.tx, pose.ty, pose.tz) + origin_of(fixed) -
-                                   fixed_from_moved.linear() * origin_of(moved);
-  return swapped ? fixed_from_moved.inverse() : fixed_from_moved;
-}
-
 double rmse(std::uint64_t residual, std::uint32_t inliers, double distance) {
   return inliers > 0 ? distance * std::sqrt(static_cast<double>(residual) /
                                             static_cast<double>(kResidualScale) / inliers)
@@ -200,11 +167,10 @@ void add_modes(const PairOutcome& outcome, const PreparedState& source, const Pr
   result.target_moments = to_frame(swapped ? best.source_moments : best.target_moments, target);
 }
 
-}  // namespace
-
-RegistrationResult to_result(const PairOutcome& all, const PreparedState& source,
-                             const PreparedState& target, bool swapped,
-                             const RegistrationOptions& options, const PriorTest& prior) {
+/// The result between the rows of both clouds.
+RegistrationResult to_row_result(const PairOutcome& all, const PreparedState& source,
+                                 const PreparedState& target, bool swapped,
+                                 const RegistrationOptions& options, const PriorTest& prior) {
   // Refinement moves poses, so they are asked again.
   const bool some_contradict =
       std::any_of(all.modes.begin(), all.modes.end(),
@@ -253,6 +219,16 @@ RegistrationResult to_result(const PairOutcome& all, const PreparedState& source
       to_frame(swapped ? outcome.target_moments : outcome.source_moments, source);
   result.target_moments =
       to_frame(swapped ? outcome.source_moments : outcome.target_moments, target);
+  return result;
+}
+
+}  // namespace
+
+RegistrationResult to_result(const PairOutcome& outcome, const PreparedState& source,
+                             const PreparedState& target, bool swapped,
+                             const RegistrationOptions& options, const PriorTest& prior) {
+  RegistrationResult result = to_row_result(outcome, source, target, swapped, options, prior);
+  move_to_frames(result, source, target);
   return result;
 }
 

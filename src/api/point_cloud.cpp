@@ -22,6 +22,8 @@ void PointCloudView::validate() const {
           "a pointer, as viewpoint_count is not 0");
   for (std::size_t k = 0; k < 3 * viewpoint_count; ++k)
     require(std::isfinite(viewpoints[k]), "cloud.viewpoints", viewpoints[k], "finite coordinates");
+  for (const double coordinate : origin)
+    require(std::isfinite(coordinate), "cloud.origin", coordinate, "finite coordinates");
 }
 
 double PointCloudView::share_facing_away() const {

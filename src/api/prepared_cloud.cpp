@@ -27,6 +27,9 @@ std::size_t PreparedCloud::size() const { return checked(state_).size; }
 std::size_t PreparedCloud::feature_dimension() const { return checked(state_).feature_dimension; }
 const PrepareStatistics& PreparedCloud::statistics() const { return checked(state_).statistics; }
 const PrepareOptions& PreparedCloud::options() const { return checked(state_).options; }
+Eigen::Vector3d PreparedCloud::origin() const {
+  return Eigen::Map<const Eigen::Vector3d>(checked(state_).frame_offset);
+}
 std::vector<Eigen::Vector3f> PreparedCloud::points() const {
   return to_eigen(checked(state_).copy_points(), state_->origin);
 }

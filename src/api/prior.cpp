@@ -68,7 +68,9 @@ PriorTest prior_test(const RegistrationPrior& prior, const PreparedState& source
     // p_target = R p_source + t, with points relative to both local origins.
     Eigen::Isometry3d local = Eigen::Isometry3d::Identity();
     local.linear() = prior.pose->target_from_source.linear();
-    local.translation() = prior.pose->target_from_source * origin_of(source) - origin_of(target);
+    const Eigen::Vector3d from_source = prior.pose->target_from_source * offset_of(source);
+    local.translation() = prior.pose->target_from_source.linear() * origin_of(source) +
+                          (from_source - offset_of(target)) - origin_of(target);
     if (swapped) local = local.inverse();
     for (int row = 0; row < 3; ++row) {
       for (int column = 0; column < 3; ++column)

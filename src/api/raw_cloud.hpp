@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include "pipeline/types.hpp"
+#include "pipeline/prepared_state.hpp"
 
 namespace gpureg {
 
@@ -21,6 +21,25 @@ RawCloud raw_cloud(const View& view) {
   raw.viewpoints = view.viewpoints;
   raw.viewpoint_count = view.viewpoint_count;
   return raw;
+}
+
+/// The origin of a cloud's frame, relative to its rows.
+struct FrameOrigin {
+  float row[3];
+};
+
+/// Without viewpoints and normals a cloud counts as seen from the origin of its frame. storage must
+/// outlive raw.
+inline void view_from_frame_origin(const double (&origin)[3], FrameOrigin& storage, RawCloud& raw) {
+  const bool at_rows = origin[0] == 0 && origin[1] == 0 && origin[2] == 0;
+  if (at_rows || raw.viewpoint_count > 0 || raw.normals) return;
+  for (int k = 0; k < 3; ++k) storage.row[k] = static_cast<float>(-origin[k]);
+  raw.viewpoints = storage.row;
+  raw.viewpoint_count = 1;
+}
+
+inline void set_frame_offset(const double (&origin)[3], PreparedState& state) {
+  for (int k = 0; k < 3; ++k) state.frame_offset[k] = origin[k];
 }
 
 }  // namespace gpureg

@@ -6,6 +6,7 @@
 
 #include "api/access.hpp"
 #include "api/outcome.hpp"
+#include "api/pair_input.hpp"
 #include "api/prior.hpp"
 #include "api/raw_cloud.hpp"
 #include "common/host_threads.hpp"
@@ -13,39 +14,6 @@
 
 namespace gpureg {
 namespace {
-
-/// A cloud that this context and these options can work with. name: for the message.
-const PreparedState* checked(const Context& context, const PreparedCloud& cloud,
-                             const RegistrationOptions& options, const std::string& name) {
-  if (!cloud.valid())
-    throw InvalidArgument(name + " is an empty handle: it was not made by prepare()");
-  const PreparedState& state = *Access::state(cloud);
-  if (state.owner != Access::engine(context)->memory())
-    throw InvalidArgument(name + " was prepared by a context of another backend or device than " +
-                          context.description());
-  const float needed = options.prepare.max_correspondence_distance;
-  if (needed > state.options.max_correspondence_distance)
-    throw InvalidArgument(name + " was prepared with max_correspondence_distance " +
-                          std::to_string(state.options.max_correspondence_distance) +
-                          ", less than " + std::to_string(needed) + " asked for now");
-  return &state;
-}
-
-void check_dimensions(const PreparedState& source, const PreparedState& target) {
-  if (source.feature_dimension != target.feature_dimension)
-    throw InvalidArgument("feature_dimension differs: source has " +
-                          std::to_string(source.feature_dimension) + ", target has " +
-                          std::to_string(target.feature_dimension));
-}
-
-bool swaps(const PreparedState& source, const PreparedState& target,
-           const RegistrationOptions& options) {
-  return options.smaller_as_source && target.size < source.size;
-}
-
-PairInput input_of(const PreparedState& source, const PreparedState& target, bool swapped) {
-  return swapped ? PairInput{&target, &source, {}, {}} : PairInput{&source, &target, {}, {}};
-}
 
 void check_priors(const std::vector<RegistrationPrior>& priors, std::size_t pairs,
                   const RegistrationOptions& options) {
@@ -82,13 +50,18 @@ std::vector<PreparedCloud> prepare_batch(const Context& context,
   };
   std::vector<RawCloud> raw;
   raw.reserve(clouds.size());
-  for (std::size_t k = 0; k < clouds.size(); ++k)
+  std::vector<FrameOrigin> frame_origins(clouds.size());
+  for (std::size_t k = 0; k < clouds.size(); ++k) {
     raw.push_back(naming(k, [&] { return raw_cloud(clouds[k]); }));
+    view_from_frame_origin(clouds[k].origin, frame_origins[k], raw.back());
+  }
   std::vector<PreparedCloud> out;
   if (raw.empty()) return out;
   try {
-    for (auto& state : Access::engine(context)->prepare(span_of(raw), options))
+    for (auto& state : Access::engine(context)->prepare(span_of(raw), options)) {
+      set_frame_offset(clouds[out.size()].origin, *state);
       out.push_back(Access::cloud(std::move(state)));
+    }
   } catch (const InvalidArgument&) {
     // Stages see all clouds at once: alone the one that it is about says so again.
     for (std::size_t k = 0; k < raw.size(); ++k)
@@ -123,8 +96,8 @@ RegistrationResult align(const Context& context, const PreparedCloud& source,
                          const std::vector<Correspondence>& correspondences,
                          const RegistrationOptions& options) {
   options.validate();
-  const PreparedState& s = *checked(context, source, options, "source");
-  const PreparedState& t = *checked(context, target, options, "target");
+  const PreparedState& s = *checked_state(context, source, options, "source");
+  const PreparedState& t = *checked_state(context, target, options, "target");
   require(correspondences.size() <= 0x7fffffffu, "correspondences.size", correspondences.size(),
           "at most 2^31 - 1");
   const bool swapped = swaps(s, t, options);
@@ -178,20 +151,7 @@ std::vector<RegistrationResult> align_batch(const Context& context,
                                             const BatchCallbacks& callbacks) {
   options.validate();
   check_priors(priors, pairs.size(), options);
-  // Everything that can be wrong is looked at before the first pair runs: a long batch does not die
-  // of its last line.
-  std::vector<std::uint8_t> used(clouds.size(), 0);
-  for (std::size_t p = 0; p < pairs.size(); ++p) {
-    for (const std::uint32_t k : {pairs[p].source, pairs[p].target}) {
-      if (k >= clouds.size())
-        throw InvalidArgument("pairs[" + std::to_string(p) + "] names cloud " + std::to_string(k) +
-                              ", but there are " + std::to_string(clouds.size()));
-      if (!used[k]) checked(context, clouds[k], options, "clouds[" + std::to_string(k) + "]");
-      used[k] = 1;
-    }
-    check_dimensions(*Access::state(clouds[pairs[p].source]),
-                     *Access::state(clouds[pairs[p].target]));
-  }
+  check_pairs(context, clouds, pairs, options);
 
   std::vector<RegistrationResult> results(pairs.size());
   const std::size_t chunk = Access::engine(context)->pairs_per_chunk(options);

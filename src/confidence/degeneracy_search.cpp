@@ -43,8 +43,8 @@ Span<const double> fractions_for(double log_odds) {
   return {kFractions, count};
 }
 
-PerturbedPoses perturb(const PairInput& pair, const PairOutcome& outcome, double distance) {
-  PerturbedPoses out{0, {}};
+PosesOfPair perturb(const PairInput& pair, const PairOutcome& outcome, double distance) {
+  PosesOfPair out{0, {}};
   std::vector<PoseEvidence> evidence;
   std::vector<const ModeOutcome*> modes;
   for (const ModeOutcome& mode : outcome.modes) {
@@ -67,11 +67,11 @@ PerturbedPoses perturb(const PairInput& pair, const PairOutcome& outcome, double
 
 }  // namespace
 
-std::vector<PerturbedPoses> search_degeneracies(Span<const PairInput> pairs,
-                                                Span<const PairOutcome> outcomes,
-                                                const RegistrationOptions& options,
-                                                std::size_t threads) {
-  std::vector<PerturbedPoses> out(pairs.size, PerturbedPoses{0, {}});
+std::vector<PosesOfPair> search_degeneracies(Span<const PairInput> pairs,
+                                             Span<const PairOutcome> outcomes,
+                                             const RegistrationOptions& options,
+                                             std::size_t threads) {
+  std::vector<PosesOfPair> out(pairs.size, PosesOfPair{0, {}});
   const double distance = static_cast<double>(options.evidence.degeneracy_search_distance);
   if (distance == 0.0) return out;
   // A thread for fewer pairs costs more than it saves.

@@ -11,6 +11,7 @@
 #include "pipeline/align_by_evidence.hpp"
 #include "pipeline/engine.hpp"
 #include "pipeline/prepare.hpp"
+#include "pipeline/verify.hpp"
 
 namespace gpureg::cpu {
 namespace {
@@ -46,6 +47,23 @@ class CpuEngine final : public Engine {
   void align(Span<const PairInput> pairs, const RegistrationOptions& options,
              Span<PairOutcome> outcomes) override {
     std::lock_guard<std::mutex> lock(mutex_);
+    const std::vector<PairView> views = views_of(pairs);
+    if (options.method == RegistrationMethod::compatibility)
+      pipeline::align_by_evidence(exec_, pairs, span_of(views), options, outcomes);
+    else
+      pipeline::align(exec_, span_of(views), options, outcomes);
+  }
+
+  void verify(Span<const PairInput> pairs, const std::vector<PosesOfPair>& poses,
+              const RegistrationOptions& options, bool refine,
+              Span<PairOutcome> outcomes) override {
+    std::lock_guard<std::mutex> lock(mutex_);
+    const std::vector<PairView> views = views_of(pairs);
+    pipeline::verify(exec_, span_of(views), poses, options, refine, outcomes);
+  }
+
+ private:
+  static std::vector<PairView> views_of(Span<const PairInput> pairs) {
     std::vector<PairView> views(pairs.size);
     for (std::size_t p = 0; p < pairs.size; ++p)
       views[p] = {static_cast<const CpuCloud*>(pairs[p].source)->view(),
@@ -54,13 +72,9 @@ class CpuEngine final : public Engine {
                   pairs[p].custom_target.data,
                   static_cast<std::uint32_t>(pairs[p].custom_source.size),
                   pairs[p].prior};
-    if (options.method == RegistrationMethod::compatibility)
-      pipeline::align_by_evidence(exec_, pairs, span_of(views), options, outcomes);
-    else
-      pipeline::align(exec_, span_of(views), options, outcomes);
+    return views;
   }
 
- private:
   std::mutex mutex_;
   Exec exec_;
 };

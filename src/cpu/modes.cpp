@@ -118,11 +118,15 @@ void merge_modes(Exec& exec, std::vector<std::vector<Mode>>& modes,
   });
 }
 
-std::vector<std::vector<Mode>> modes_from_poses(Exec&, const std::vector<PerturbedPoses>& poses) {
+std::vector<std::vector<Mode>> modes_from_poses(Exec&, const std::vector<PosesOfPair>& poses) {
   std::vector<std::vector<Mode>> out(poses.size());
   for (std::size_t p = 0; p < poses.size(); ++p)
     for (const Pose<double>& pose : poses[p].poses) out[p].push_back({pose, 0, 0});
   return out;
+}
+
+std::vector<Candidates> no_candidates(Exec&, Span<const PairView> pairs) {
+  return std::vector<Candidates>(pairs.size);
 }
 
 }  // namespace gpureg::cpu

@@ -86,11 +86,12 @@ void refine_modes(Exec& exec, Span<const PairView> pairs, std::vector<std::vecto
 void merge_modes(Exec& exec, std::vector<std::vector<Mode>>& modes,
                  const RegistrationOptions& options);
 /// Perturbed poses of the most likely mode of each pair; on the host.
-std::vector<PerturbedPoses> search_degeneracies(Exec& exec, Span<const PairInput> inputs,
-                                                Span<const PairOutcome> outcomes,
-                                                const RegistrationOptions& options);
-std::vector<std::vector<Mode>> modes_from_poses(Exec& exec,
-                                                const std::vector<PerturbedPoses>& poses);
+std::vector<PosesOfPair> search_degeneracies(Exec& exec, Span<const PairInput> inputs,
+                                             Span<const PairOutcome> outcomes,
+                                             const RegistrationOptions& options);
+std::vector<std::vector<Mode>> modes_from_poses(Exec& exec, const std::vector<PosesOfPair>& poses);
+/// For poses that were not proposed by the stages before.
+std::vector<Candidates> no_candidates(Exec& exec, Span<const PairView> pairs);
 /// All evidence, from all points.
 void verify_modes(Exec& exec, Span<const PairView> pairs, const std::vector<MatchSet>& matches,
                   const std::vector<Candidates>& candidates,

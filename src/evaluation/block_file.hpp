@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "evaluation/text_file.hpp"
+#include "files/text_file.hpp"
 #include "gpureg/error.hpp"
 
 /// Redwood's .log and .info share one layout: a line `i j n`, then a square matrix row by row.

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "evaluation/block_file.hpp"
 #include "gpureg/evaluation.hpp"
+#include "gpureg/files.hpp"
 
 namespace gpureg::evaluation {
 
@@ -16,7 +17,7 @@ void write_information(const std::string& path, const std::vector<InformationEnt
   std::string text;
   for (const InformationEntry& e : entries)
     files::append_block(text, e.i, e.j, e.count, e.information, 8, "information");
-  write_file_atomically(path, text);
+  files::write_atomically(path, text);
 }
 
 }  // namespace gpureg::evaluation

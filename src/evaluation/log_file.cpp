@@ -3,6 +3,7 @@
 
 #include "evaluation/block_file.hpp"
 #include "gpureg/evaluation.hpp"
+#include "gpureg/files.hpp"
 
 namespace gpureg::evaluation {
 namespace {
@@ -37,7 +38,7 @@ void write_log(const std::string& path, const std::vector<LogEntry>& entries) {
   std::string text;
   for (const LogEntry& e : entries)
     files::append_block(text, e.i, e.j, e.count, e.transform, 10, "transform");
-  write_file_atomically(path, text);
+  files::write_atomically(path, text);
 }
 
 }  // namespace gpureg::evaluation

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <cmath>
 
-#include "evaluation/text_file.hpp"
+#include "files/text_file.hpp"
 #include "gpureg/io.hpp"
 
 namespace gpureg::io {

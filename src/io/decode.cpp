@@ -6,7 +6,7 @@
 #include <cstring>
 #include <limits>
 
-#include "evaluation/text_file.hpp"
+#include "files/text_file.hpp"
 
 namespace gpureg::io {
 namespace {

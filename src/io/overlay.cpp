@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <algorithm>
 
-#include "gpureg/evaluation.hpp"
+#include "gpureg/files.hpp"
 #include "gpureg/io.hpp"
 #include "io/ply_writer.hpp"
 
@@ -33,7 +33,7 @@ void write_overlay(const std::string& path, const PointCloud& source, const Poin
     ply.append(p);
     ply.append(0, 166, 237);
   }
-  evaluation::write_file_atomically(path, ply.bytes());
+  files::write_atomically(path, ply.bytes());
 }
 
 }  // namespace gpureg::io

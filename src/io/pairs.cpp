@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "evaluation/text_file.hpp"
+#include "files/text_file.hpp"
 #include "gpureg/io.hpp"
 
 namespace gpureg::io {

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <optional>
 
-#include "evaluation/text_file.hpp"
+#include "files/text_file.hpp"
 #include "io/decode.hpp"
 #include "io/lzf.hpp"
 #include "io/table.hpp"

@@ -2,7 +2,7 @@
 #include <algorithm>
 #include <utility>
 
-#include "evaluation/text_file.hpp"
+#include "files/text_file.hpp"
 #include "io/ply.hpp"
 
 namespace gpureg::io {

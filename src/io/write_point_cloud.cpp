@@ -2,7 +2,7 @@
 #include <cstring>
 
 #include "gpureg/error.hpp"
-#include "gpureg/evaluation.hpp"
+#include "gpureg/files.hpp"
 #include "gpureg/io.hpp"
 #include "io/ply_writer.hpp"
 
@@ -35,7 +35,7 @@ void write_point_cloud(const std::string& path, const PointCloud& cloud) {
     ply.append(cloud.points[k]);
     if (has_normals) ply.append(cloud.normals[k]);
   }
-  evaluation::write_file_atomically(path, ply.bytes());
+  files::write_atomically(path, ply.bytes());
 }
 
 }  // namespace gpureg::io

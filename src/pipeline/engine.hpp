@@ -28,6 +28,10 @@ class Engine {
                                                               const PrepareOptions& options) = 0;
   virtual void align(Span<const PairInput> pairs, const RegistrationOptions& options,
                      Span<PairOutcome> outcomes) = 0;
+  /// Evidence of given poses, one entry for each pair; refine: they are refined before.
+  virtual void verify(Span<const PairInput> pairs, const std::vector<PosesOfPair>& poses,
+                      const RegistrationOptions& options, bool refine,
+                      Span<PairOutcome> outcomes) = 0;
 };
 
 /// threads > 0. Throws BackendUnavailable where this processor lacks instructions that the stages

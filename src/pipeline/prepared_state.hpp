@@ -19,7 +19,9 @@ struct PreparedState {
   const void* owner = nullptr;
   PrepareOptions options;
   PrepareStatistics statistics;
-  float origin[3] = {0, 0, 0};  ///< local origin in the cloud's frame
+  float origin[3] = {0, 0, 0};  ///< local origin, relative to the caller's rows
+  double frame_offset[3] = {0, 0,
+                            0};  ///< from the cloud's frame to the rows, PointCloudView::origin
   std::uint32_t size = 0;
   std::uint32_t feature_dimension = 0;
   std::uint64_t normal_weight_total = 0;  ///< see CloudView

@@ -67,12 +67,12 @@ struct PairOutcome {
   StageTimings timings;
 };
 
-/// Poses to refine and verify beside the modes of a pair (degeneracy search).
-struct PerturbedPoses {
-  std::uint32_t origin_mode;  ///< index of the mode that they were perturbed from
-  std::vector<Pose<double>>
-      poses;  ///< local coordinates of both clouds; at most kMaxPerturbedPoses
+/// Poses of a pair to refine and verify, in local coordinates of both clouds.
+struct PosesOfPair {
+  std::uint32_t origin_mode = 0;  ///< index of the mode that they were perturbed from, if any
+  std::vector<Pose<double>> poses;
 };
+/// Perturbed poses of a pair at most (degeneracy search).
 constexpr std::uint32_t kMaxPerturbedPoses = 8;
 
 }  // namespace gpureg

@@ -256,7 +256,7 @@ TEST(BadInput, HandlesIndicesAndDistances) {
                                       {"pairs[0]", "cloud 1"});
   RegistrationOptions far = RegistrationOptions::from_voxel_size(0.2f);
   test::expect_error<InvalidArgument>([&] { align(context, cloud, cloud, far); },
-                                      {"search_distance"});
+                                      {"max_correspondence_distance"});
   test::expect_error<InvalidArgument>(
       [&] { align(context, cloud, cloud, std::vector<Correspondence>{{0, 1000000}}); },
       {"correspondences[0]"});

@@ -60,15 +60,11 @@ TEST(Options, EachFieldIsNamed) {
     expect_refused([&](auto& o) { o.prepare.feature_radius = bad; }, "prepare.feature_radius");
     expect_refused([&](auto& o) { o.prepare.max_correspondence_distance = bad; },
                    "prepare.max_correspondence_distance");
-    expect_refused([&](auto& o) { o.prepare.max_correspondence_distance = bad; },
-                   "prepare.max_correspondence_distance");
     expect_refused([&](auto& o) { o.quadruples.max_normal_angle = bad; },
                    "quadruples.max_normal_angle");
     expect_refused([&](auto& o) { o.quadruples.max_verification_normal_angle = bad; },
                    "quadruples.max_verification_normal_angle");
     expect_refused([&](auto& o) { o.refine.kernel_width = bad; }, "refine.kernel_width");
-    expect_refused([&](auto& o) { o.prepare.max_correspondence_distance = bad; },
-                   "prepare.max_correspondence_distance");
     expect_refused([&](auto& o) { o.quadruples.edge_similarity = bad; },
                    "quadruples.edge_similarity");
     expect_refused([&](auto& o) { o.compatibility.tolerance = bad; }, "compatibility.tolerance");
@@ -115,7 +111,7 @@ TEST(Options, EachFieldIsNamed) {
   expect_refused([](auto& o) { o.quadruples.neighbors = 17; }, "quadruples.neighbors");
   expect_refused([](auto& o) { o.quadruples.max_survivors = 0; }, "quadruples.max_survivors");
   expect_refused([](auto& o) { o.refine.max_iterations = 5000; }, "refine.max_iterations");
-  expect_refused([](auto& o) { o.prepare.max_correspondence_distance = 0.5f; },
+  expect_refused([](auto& o) { o.prepare.max_correspondence_distance = 1.1f; },
                  "prepare.max_correspondence_distance");
 }
 

@@ -43,8 +43,8 @@ void match(PairOutcome& outcome, const PreparedState& source, const PreparedStat
   EXPECT_NEAR(odds(inliers), log_odds, 0.5);
 }
 
-PerturbedPoses perturbed(const PreparedState& source, const PreparedState& target,
-                         const PairOutcome& outcome, const RegistrationOptions& options) {
+PosesOfPair perturbed(const PreparedState& source, const PreparedState& target,
+                      const PairOutcome& outcome, const RegistrationOptions& options) {
   const PairInput pair{&source, &target, {}, {}, {}};
   return confidence::search_degeneracies({&pair, 1}, {&outcome, 1}, options, 1).at(0);
 }
@@ -60,7 +60,7 @@ TEST(DegeneracySearch, BothWaysAlongTheWall) {
   RegistrationOptions options;
   for (const float distance : {0.4f, 0.15f}) {
     options.evidence.degeneracy_search_distance = distance;
-    const PerturbedPoses found = perturbed(*source, *target, outcome, options);
+    const PosesOfPair found = perturbed(*source, *target, outcome, options);
     ASSERT_EQ(found.poses.size(), 8u);
     EXPECT_EQ(found.origin_mode, 0u);
     double sum = 0;
@@ -114,7 +114,7 @@ TEST(DegeneracySearch, RotatesAboutTheCentreOfTheInliers) {
   PairOutcome outcome = test::verified_in_place(exec, *cloud, *cloud);
   match(outcome, *cloud, *cloud, 0);
   RegistrationOptions options;
-  const PerturbedPoses found = perturbed(*cloud, *cloud, outcome, options);
+  const PosesOfPair found = perturbed(*cloud, *cloud, outcome, options);
   ASSERT_EQ(found.poses.size(), 8u);
   const Vec3 middle{6 - cloud->origin[0], -3 - cloud->origin[1], 1 - cloud->origin[2]};
   for (const Pose<double>& pose : found.poses) {

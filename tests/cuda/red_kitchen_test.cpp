@@ -6,9 +6,11 @@
 
 #include "cuda/gpu.hpp"
 #include "gpureg/registration.hpp"
+#include "gpureg/verification.hpp"
 #include "support/data_folder.hpp"
 #include "support/plain_ply.hpp"
 #include "support/result_bytes.hpp"
+#include "support/same_evidence.hpp"
 
 namespace gpureg {
 namespace {
@@ -104,6 +106,40 @@ TEST(RedKitchenOnCuda, AllPairsByEvidenceAreTheCpus) {
     for (const Pair& pair : pairs)
       one_by_one.push_back(align(cuda, on_cuda[pair.source], on_cuda[pair.target], options));
     EXPECT_EQ(different(batch, one_by_one), 0);
+  }
+}
+
+TEST(RedKitchenOnCuda, VerifiedPosesAreTheCpus) {
+  GPUREG_GPU_OR_SKIP();
+  GPUREG_DATA_FOLDER_OR_SKIP(folder, "redkitchen/fragments");
+  const std::vector<PointCloud> raw = scene(folder);
+  std::vector<PointCloudView> views;
+  for (const PointCloud& cloud : raw) views.push_back(cloud.view());
+  const std::vector<Pair> pairs = all_pairs(raw.size());
+  const Context cpu = Context::cpu(), cuda = Context::cuda();
+  const auto on_cpu = prepare_batch(cpu, views), on_cuda = prepare_batch(cuda, views);
+  const auto found = align_batch(cuda, on_cuda, pairs);
+  std::vector<std::vector<UnalignedIsometry3d>> poses(pairs.size());
+  for (std::size_t p = 0; p < pairs.size(); ++p)
+    for (const RegistrationMode& mode : found[p].modes) poses[p].push_back(mode.target_from_source);
+  for (const bool refine : {false, true}) {
+    VerificationOptions options;
+    options.refine = refine;
+    options.search_alternatives = refine;
+    const auto a = verify_poses_batch(cpu, on_cpu, pairs, poses, {}, options);
+    const auto b = verify_poses_batch(cuda, on_cuda, pairs, poses, {}, options);
+    std::size_t verified = 0, different_evidence = 0, different_from_align = 0;
+    for (std::size_t p = 0; p < pairs.size(); ++p)
+      for (std::size_t k = 0; k < poses[p].size(); ++k, ++verified) {
+        different_evidence +=
+            !test::same_evidence(a[p][k].evidence, b[p][k].evidence) ||
+            a[p][k].confidence != b[p][k].confidence ||
+            a[p][k].target_from_source.matrix() != b[p][k].target_from_source.matrix();
+        different_from_align += !test::same_evidence(b[p][k].evidence, found[p].modes[k].evidence);
+      }
+    EXPECT_GT(verified, 1000u);
+    EXPECT_EQ(different_evidence, 0u) << "of " << verified << ", refine " << refine;
+    if (!refine) EXPECT_EQ(different_from_align, 0u) << "of " << verified;
   }
 }
 

@@ -8,12 +8,12 @@
 #include <vector>
 
 #include "gpureg/error.hpp"
-#include "gpureg/evaluation.hpp"
+#include "gpureg/files.hpp"
 #include "support/expect_error.hpp"
 #include "support/limited_file_size.hpp"
 #include "support/temporary_folder.hpp"
 
-namespace gpureg::evaluation {
+namespace gpureg::files {
 namespace {
 
 using test::content_of;
@@ -24,9 +24,9 @@ TEST(AtomicFile, WritesAndReplacesAnyBytes) {
   const TemporaryFolder folder;
   const std::string path = folder / "a.bin";
   const std::string bytes("\0\n\r\xff text", 9);
-  write_file_atomically(path, bytes);
+  write_atomically(path, bytes);
   EXPECT_EQ(content_of(path), bytes);
-  write_file_atomically(path, "");
+  write_atomically(path, "");
   EXPECT_EQ(content_of(path), "");
   EXPECT_EQ(folder.count(), 1u);
 }
@@ -34,10 +34,10 @@ TEST(AtomicFile, WritesAndReplacesAnyBytes) {
 TEST(AtomicFile, RespectsTheUmaskAndKeepsTheModeOfAnExistingFile) {
   const TemporaryFolder folder;
   const mode_t before = ::umask(022);
-  write_file_atomically(folder / "new", "x");
+  write_atomically(folder / "new", "x");
   const std::string old = folder.write("old", "y");
   ::chmod(old.c_str(), 0600);
-  write_file_atomically(old, "z");
+  write_atomically(old, "z");
   ::umask(before);
   EXPECT_EQ(std::filesystem::status(folder / "new").permissions(), std::filesystem::perms(0644));
   EXPECT_EQ(std::filesystem::status(old).permissions(), std::filesystem::perms(0600));
@@ -46,7 +46,7 @@ TEST(AtomicFile, RespectsTheUmaskAndKeepsTheModeOfAnExistingFile) {
 TEST(AtomicFile, WritesThroughALinkInsteadOfReplacingIt) {
   const TemporaryFolder folder;
   std::filesystem::create_symlink(folder.write("real", "old"), folder / "link");
-  write_file_atomically(folder / "link", "new");
+  write_atomically(folder / "link", "new");
   EXPECT_TRUE(std::filesystem::is_symlink(folder / "link"));
   EXPECT_EQ(content_of(folder / "real"), "new");
 }
@@ -54,9 +54,9 @@ TEST(AtomicFile, WritesThroughALinkInsteadOfReplacingIt) {
 TEST(AtomicFile, TakesNamesAsLongAsTheFileSystemDoes) {
   const TemporaryFolder folder;
   const std::string path = folder / std::string(255, 'n');
-  write_file_atomically(path, "x");
+  write_atomically(path, "x");
   EXPECT_EQ(content_of(path), "x");
-  expect_error<IoError>([&] { write_file_atomically(folder / std::string(256, 'n'), "x"); },
+  expect_error<IoError>([&] { write_atomically(folder / std::string(256, 'n'), "x"); },
                         {"cannot write", "too long"});
 }
 
@@ -64,7 +64,7 @@ TEST(AtomicFile, RelativeNamesWithoutAFolderWork) {
   const TemporaryFolder folder;
   const auto before = std::filesystem::current_path();
   std::filesystem::current_path(folder.path());
-  write_file_atomically("plain", "x");
+  write_atomically("plain", "x");
   std::filesystem::current_path(before);
   EXPECT_EQ(content_of(folder / "plain"), "x");
 }
@@ -74,10 +74,10 @@ TEST(AtomicFile, FullDiskIsAnErrorAndLeavesTheOldFileAlone) {
   const std::string path = folder.write("result.log", "the old content");
   {
     const test::LimitedFileSize limit(1000);
-    expect_error<IoError>([&] { write_file_atomically(path, std::string(100000, 'x')); },
+    expect_error<IoError>([&] { write_atomically(path, std::string(100000, 'x')); },
                           {path, "too large"});
-    expect_error<IoError>(
-        [&] { write_file_atomically(folder / "other", std::string(100000, 'x')); }, {"other"});
+    expect_error<IoError>([&] { write_atomically(folder / "other", std::string(100000, 'x')); },
+                          {"other"});
   }
   EXPECT_EQ(content_of(path), "the old content");
   EXPECT_EQ(folder.count(), 1u) << "a partial file was left behind";
@@ -86,29 +86,27 @@ TEST(AtomicFile, FullDiskIsAnErrorAndLeavesTheOldFileAlone) {
 TEST(AtomicFile, FullDeviceIsAnErrorAndTheDeviceStays) {
   if (!std::filesystem::is_character_file("/dev/full"))
     GTEST_SKIP() << "no /dev/full on this machine";
-  expect_error<IoError>([] { write_file_atomically("/dev/full", "x"); },
+  expect_error<IoError>([] { write_atomically("/dev/full", "x"); },
                         {"/dev/full", "No space left on device"});
   EXPECT_TRUE(std::filesystem::is_character_file("/dev/full"));
-  write_file_atomically("/dev/null", "x");
+  write_atomically("/dev/null", "x");
   EXPECT_TRUE(std::filesystem::is_character_file("/dev/null"));
 }
 
 TEST(AtomicFile, UnwritablePathsAreNamed) {
   const TemporaryFolder folder;
-  expect_error<IoError>([&] { write_file_atomically(folder.path(), "x"); },
-                        {folder.path(), "folder"});
-  expect_error<IoError>([&] { write_file_atomically(folder / "no/such", "x"); },
+  expect_error<IoError>([&] { write_atomically(folder.path(), "x"); }, {folder.path(), "folder"});
+  expect_error<IoError>([&] { write_atomically(folder / "no/such", "x"); },
                         {"no/such", "No such file"});
   const std::string file = folder.write("file", "");
-  expect_error<IoError>([&] { write_file_atomically(file + "/below", "x"); },
+  expect_error<IoError>([&] { write_atomically(file + "/below", "x"); },
                         {"below", "Not a directory"});
-  expect_error<IoError>([] { write_file_atomically("", "x"); }, {"empty"});
+  expect_error<IoError>([] { write_atomically("", "x"); }, {"empty"});
   if (::geteuid() != 0) {  // root may write everywhere
     ::chmod(file.c_str(), 0400);
-    expect_error<IoError>([&] { write_file_atomically(file, "x"); }, {file, "Permission denied"});
+    expect_error<IoError>([&] { write_atomically(file, "x"); }, {file, "Permission denied"});
     ::chmod(folder.path().c_str(), 0500);
-    expect_error<IoError>([&] { write_file_atomically(folder / "new", "x"); },
-                          {"Permission denied"});
+    expect_error<IoError>([&] { write_atomically(folder / "new", "x"); }, {"Permission denied"});
     ::chmod(folder.path().c_str(), 0700);
   }
 }
@@ -119,7 +117,7 @@ TEST(AtomicFile, ConcurrentWritersLeaveOneWholeFile) {
   std::vector<std::thread> writers;
   for (char c = 'a'; c < 'a' + 8; ++c)
     writers.emplace_back([&path, c] {
-      for (int k = 0; k < 20; ++k) write_file_atomically(path, std::string(20000, c));
+      for (int k = 0; k < 20; ++k) write_atomically(path, std::string(20000, c));
     });
   for (std::thread& writer : writers) writer.join();
   const std::string content = content_of(path);
@@ -129,4 +127,4 @@ TEST(AtomicFile, ConcurrentWritersLeaveOneWholeFile) {
 }
 
 }  // namespace
-}  // namespace gpureg::evaluation
+}  // namespace gpureg::files

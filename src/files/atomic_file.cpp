@@ -11,9 +11,9 @@
 #include <system_error>
 
 #include "gpureg/error.hpp"
-#include "gpureg/evaluation.hpp"
+#include "gpureg/files.hpp"
 
-namespace gpureg::evaluation {
+namespace gpureg::files {
 namespace {
 
 [[noreturn]] void fail(const std::string& path, const std::string& reason) {
@@ -107,7 +107,7 @@ std::string behind_links(const std::string& path) {
 
 }  // namespace
 
-void write_file_atomically(const std::string& path, const std::string& content) {
+void write_atomically(const std::string& path, const std::string& content) {
   if (path.empty()) fail("''", "the path is empty");
   struct stat existing{};
   const bool exists = ::stat(path.c_str(), &existing) == 0;
@@ -130,4 +130,4 @@ void write_file_atomically(const std::string& path, const std::string& content) 
   sync_folder(folder_of(target));
 }
 
-}  // namespace gpureg::evaluation
+}  // namespace gpureg::files

@@ -1,0 +1,211 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "gpureg/verification.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+
+#include "api/frames.hpp"
+#include "api/outcome.hpp"
+#include "api/pair_input.hpp"
+#include "confidence/confidence.hpp"
+#include "confidence/pose_evidence.hpp"
+
+namespace gpureg {
+namespace {
+
+/// Poses of a pair that go through the engine together: enough to fill a device, few enough for its
+/// memory.
+constexpr std::size_t kPosesPerCall = 64;
+
+void check_pose(const UnalignedIsometry3d& pose, const std::string& name) {
+  const Eigen::Matrix3d r = pose.linear();
+  // A float pose has errors of 1e-6; more than 1e-3 is a scale, a shear or a mirror image.
+  constexpr double kTolerance = 1e-3;
+  if (!pose.matrix().allFinite() ||
+      (r * r.transpose() - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff() > kTolerance ||
+      r.determinant() < 0)
+    throw InvalidArgument(name + " is no rigid motion");
+}
+
+/// One pair whose poses are verified. All poses and moments are in the clouds' frames.
+struct VerifiedPair {
+  const PreparedState& source;
+  const PreparedState& target;
+  bool swapped;
+  const RegistrationOptions& options;
+
+  PoseVerification verification_of(const PairOutcome& outcome, const ModeOutcome& mode) const {
+    PoseVerification out;
+    out.target_from_source = to_transform(mode.pose, source, target, swapped);
+    const PreparedState& moved = swapped ? target : source;
+    const PreparedState& fixed = swapped ? source : target;
+    out.evidence = confidence::evidence_of(outcome, mode, moved, fixed, swapped);
+    out.inlier_ratio = mode.source.tested > 0
+                           ? static_cast<double>(mode.source.inliers) / mode.source.tested
+                           : 0.0;
+    const double distance = static_cast<double>(options.prepare.max_correspondence_distance);
+    out.inlier_rmse =
+        mode.source.inliers > 0
+            ? distance * std::sqrt(static_cast<double>(mode.source.residual) /
+                                   static_cast<double>(kResidualScale) / mode.source.inliers)
+            : 0.0;
+    out.source_moments = to_frame(swapped ? mode.target_moments : mode.source_moments, source);
+    out.target_moments = to_frame(swapped ? mode.source_moments : mode.target_moments, target);
+    move_to_frame(out.target_from_source, source, target);
+    move_to_frame(out.source_moments, source);
+    move_to_frame(out.target_moments, target);
+    return out;
+  }
+
+  /// A pose that competes.
+  struct Candidate {
+    UnalignedIsometry3d target_from_source;
+    PoseEvidence evidence;
+    confidence::OverlapCount overlap;  ///< counts for the verified pose alone
+  };
+
+  static confidence::OverlapCount overlap_of(const ModeOutcome& mode) {
+    return {std::min(mode.source.inliers, mode.target.inliers),
+            std::min(mode.source.tested, mode.target.tested)};
+  }
+
+  /// The distinct poses that align() finds for the pair.
+  std::vector<Candidate> alternatives_of(const PairOutcome& found) const {
+    std::vector<Candidate> out;
+    for (const RegistrationMode& mode : to_result(found, source, target, swapped, options).modes)
+      out.push_back({mode.target_from_source, mode.evidence, {0, 0}});
+    return out;
+  }
+
+  /// Confidence of a pose against the alternatives that are not the same mode.
+  confidence::ModeConfidence confidence_of(const Candidate& pose,
+                                           const std::vector<Candidate>& alternatives,
+                                           const Eigen::Vector3d& middle) const {
+    std::vector<Candidate> all{pose};
+    for (const Candidate& other : alternatives)
+      if (!same_mode_at(pose.target_from_source, other.target_from_source, middle,
+                        options.evidence))
+        all.push_back(other);
+    std::vector<PoseEvidence> evidence;
+    for (const Candidate& c : all) evidence.push_back(c.evidence);
+    const confidence::AvailableEvidence available = confidence::available_evidence(evidence);
+    const std::vector<double> log_odds = confidence::rank_modes(evidence, available);
+    std::vector<std::size_t> order(all.size());
+    for (std::size_t k = 0; k < order.size(); ++k) order[k] = k;
+    std::stable_sort(order.begin(), order.end(),
+                     [&](std::size_t a, std::size_t b) { return log_odds[a] > log_odds[b]; });
+    std::vector<confidence::RankedMode> ranked;
+    std::size_t place = 0;
+    for (const std::size_t k : order) {
+      if (k == 0) place = ranked.size();
+      ranked.push_back({all[k].evidence, log_odds[k], all[k].overlap});
+    }
+    return confidence::confidences_of(ranked, available, options.evidence.modes)[place];
+  }
+};
+
+/// Outcomes of a pair's poses, as many calls as they need.
+std::vector<PairOutcome> verify_all(Engine& engine, const std::vector<PairInput>& inputs,
+                                    const std::vector<std::vector<Pose<double>>>& poses,
+                                    const RegistrationOptions& options, bool refine) {
+  std::vector<PairOutcome> out(inputs.size());
+  std::size_t most = 0;
+  for (const auto& of_pair : poses) most = std::max(most, of_pair.size());
+  for (std::size_t begin = 0; begin < most; begin += kPosesPerCall) {
+    std::vector<PosesOfPair> part(inputs.size());
+    for (std::size_t p = 0; p < inputs.size(); ++p) {
+      const std::size_t first = std::min(begin, poses[p].size()),
+                        last = std::min(begin + kPosesPerCall, poses[p].size());
+      part[p].poses.assign(poses[p].begin() + static_cast<std::ptrdiff_t>(first),
+                           poses[p].begin() + static_cast<std::ptrdiff_t>(last));
+    }
+    std::vector<PairOutcome> more(inputs.size());
+    engine.verify(span_of(inputs), part, options, refine, {more.data(), more.size()});
+    for (std::size_t p = 0; p < inputs.size(); ++p) {
+      std::vector<ModeOutcome> modes = std::move(out[p].modes);
+      modes.insert(modes.end(), more[p].modes.begin(), more[p].modes.end());
+      out[p] = std::move(more[p]);
+      out[p].modes = std::move(modes);
+    }
+  }
+  return out;
+}
+
+}  // namespace
+
+std::vector<std::vector<PoseVerification>> verify_poses_batch(
+    const Context& context, const std::vector<PreparedCloud>& clouds,
+    const std::vector<Pair>& pairs, const std::vector<std::vector<UnalignedIsometry3d>>& poses,
+    const RegistrationOptions& options, const VerificationOptions& verification) {
+  options.validate();
+  if (poses.size() != pairs.size())
+    throw InvalidArgument("poses has " + std::to_string(poses.size()) + " entries, but pairs has " +
+                          std::to_string(pairs.size()));
+  check_pairs(context, clouds, pairs, options);
+  for (std::size_t p = 0; p < poses.size(); ++p)
+    for (std::size_t k = 0; k < poses[p].size(); ++k)
+      check_pose(poses[p][k], "poses[" + std::to_string(p) + "][" + std::to_string(k) + "]");
+
+  Engine& engine = *Access::engine(context);
+  RegistrationOptions by_evidence = options;
+  by_evidence.method = RegistrationMethod::compatibility;
+  std::vector<std::vector<PoseVerification>> results(pairs.size());
+  const std::size_t chunk = engine.pairs_per_chunk(by_evidence);
+  for (std::size_t begin = 0; begin < pairs.size(); begin += chunk) {
+    const std::size_t end = std::min(pairs.size(), begin + chunk);
+    std::vector<PairInput> inputs;
+    std::vector<VerifiedPair> verified;
+    std::vector<std::vector<Pose<double>>> local(end - begin);
+    for (std::size_t p = begin; p < end; ++p) {
+      const PreparedState& s = *Access::state(clouds[pairs[p].source]);
+      const PreparedState& t = *Access::state(clouds[pairs[p].target]);
+      const bool swapped = swaps(s, t, options);
+      inputs.push_back(input_of(s, t, swapped));
+      verified.push_back({s, t, swapped, by_evidence});
+      for (const UnalignedIsometry3d& pose : poses[p])
+        local[p - begin].push_back(to_local(pose, s, t, swapped));
+    }
+    const std::vector<PairOutcome> outcomes =
+        verify_all(engine, inputs, local, by_evidence, verification.refine);
+    std::vector<PairOutcome> found(inputs.size());
+    if (verification.search_alternatives)
+      engine.align(span_of(inputs), by_evidence, {found.data(), found.size()});
+    for (std::size_t p = begin; p < end; ++p) {
+      const VerifiedPair& pair = verified[p - begin];
+      const PairOutcome& outcome = outcomes[p - begin];
+      std::vector<PoseVerification> poses_of_pair;
+      std::vector<VerifiedPair::Candidate> given;
+      for (std::size_t k = 0; k < outcome.modes.size(); ++k) {
+        const ModeOutcome& mode = outcome.modes[k];
+        poses_of_pair.push_back(pair.verification_of(outcome, mode));
+        if (!verification.refine) poses_of_pair.back().target_from_source = poses[p][k];
+        given.push_back({poses_of_pair.back().target_from_source, poses_of_pair.back().evidence,
+                         VerifiedPair::overlap_of(mode)});
+      }
+      const std::vector<VerifiedPair::Candidate> alternatives =
+          verification.search_alternatives ? pair.alternatives_of(found[p - begin]) : given;
+      for (std::size_t k = 0; k < poses_of_pair.size(); ++k) {
+        PoseVerification& out = poses_of_pair[k];
+        const confidence::ModeConfidence confidence = pair.confidence_of(
+            given[k], alternatives,
+            middle_of(out.source_moments, origin_of(pair.source) + offset_of(pair.source)));
+        out.confidence = confidence.confidence;
+        out.overlap_confidence = confidence.overlap_confidence;
+      }
+      results[p] = std::move(poses_of_pair);
+    }
+  }
+  return results;
+}
+
+std::vector<PoseVerification> verify_poses(const Context& context, const PreparedCloud& source,
+                                           const PreparedCloud& target,
+                                           const std::vector<UnalignedIsometry3d>& poses,
+                                           const RegistrationOptions& options,
+                                           const VerificationOptions& verification) {
+  return verify_poses_batch(context, {source, target}, {{0, 1}}, {poses}, options, verification)
+      .front();
+}
+
+}  // namespace gpureg
