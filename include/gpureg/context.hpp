@@ -11,57 +11,65 @@ namespace gpureg {
 class Engine;
 struct Access;
 
+/// Processor that runs the pipeline. Results do not depend on it.
 enum class Backend { cpu, cuda };
+
+/// @return "cpu" or "cuda".
 const char* to_string(Backend backend);
 
-/// How a CUDA context is set up.
+/// Options of a CUDA context.
 struct CudaOptions {
   /// Devices of this host that share the work of a batch; results do not depend on them. Empty:
   /// every device of the machine.
   std::vector<int> devices{0};
-  /// Bytes of each device's memory that prepared clouds may take; 0: no limit. The least recently
-  /// used beyond it move to page-locked host memory and come back when an alignment needs them;
-  /// results do not change. Room for the work itself comes on top.
+  /// Bytes of the memory of each device that prepared clouds may occupy; 0: no limit. Beyond it the
+  /// least recently used clouds move to page-locked host memory, and back when an alignment needs
+  /// them; results do not change. Memory for the work itself comes on top.
   std::size_t memory_budget = 0;
 };
 
-/// Memory that a context has on one device.
+/// Memory of a context on one device.
 struct DeviceMemoryUse {
-  int device;
-  std::size_t bytes_in_use;  ///< by prepared clouds and by work under way
-  /// taken from the driver and kept for the next call: what was in use at most
+  int device;                ///< CUDA device index
+  std::size_t bytes_in_use;  ///< by prepared clouds and running work
+  /// Allocated from the driver and kept for later calls: the peak of bytes_in_use.
   std::size_t bytes_reserved;
-  std::size_t clouds_evicted;  ///< times that the memory budget drove a prepared cloud out
+  std::size_t clouds_evicted;  ///< evictions of prepared clouds under the memory budget
 };
 
-/// Where work runs: owns threads (CPU) or device, streams and memory (CUDA). Cheap to copy: copies
+/// Owns the resources of a backend: threads (CPU), or device, streams and memory (CUDA). Copies
 /// share the same resources.
 ///
-/// Thread safety: one Context may be used by several threads; their calls take turns. Nothing is
-/// global: two contexts are independent.
+/// Thread-safe: threads may share one Context; their calls run one after another. Two contexts are
+/// independent, nothing is global.
 class Context {
  public:
-  /// CPU backend with that many threads; 0: one per hardware thread. Throws BackendUnavailable
-  /// where this CPU lacks what the library was compiled for, InvalidArgument for more than 1024
-  /// threads.
+  /// CPU backend.
+  /// @param threads number of threads, at most 1024; 0: one per hardware thread.
+  /// @throws BackendUnavailable where this CPU lacks instructions that the library was compiled
+  ///   for.
+  /// @throws InvalidArgument for more than 1024 threads.
   static Context cpu(unsigned threads = 0);
 
-  /// CUDA backend on one device. Throws BackendUnavailable without CUDA in the build, driver or
-  /// machine, or without that device.
+  /// CUDA backend on one device.
+  /// @param device CUDA device index.
+  /// @throws BackendUnavailable without CUDA in the build, without a driver, or without that
+  ///   device.
   static Context cuda(int device = 0);
 
-  /// CUDA backend on several devices of this host, or with a memory budget. Throws
-  /// BackendUnavailable as above, InvalidArgument for a negative device.
+  /// CUDA backend on several devices of this host, or with a memory budget.
+  /// @throws BackendUnavailable as above.
+  /// @throws InvalidArgument for a negative device.
   static Context cuda(const CudaOptions& options);
 
-  /// CUDA where a device can be used, else the CPU.
+  /// @return a CUDA context where a device is usable, otherwise a CPU context.
   static Context best();
 
   Backend backend() const;
-  unsigned threads() const;         ///< CPU threads that this context uses
+  unsigned threads() const;         ///< CPU threads of this context
   std::string description() const;  ///< e.g. "cpu, 8 threads" or "cuda:0, NVIDIA H200"
 
-  /// One entry per device of a CUDA context, none on the CPU.
+  /// @return one entry per device of a CUDA context, none on the CPU.
   std::vector<DeviceMemoryUse> device_memory() const;
 
  private:
@@ -70,7 +78,8 @@ class Context {
   std::shared_ptr<Engine> engine_;
 };
 
-/// One line per backend of this build, with its devices or the reason why it cannot be used.
+/// @return one line per backend of this build, with its devices or the reason why it is
+///   unavailable.
 std::vector<std::string> describe_backends();
 
 }  // namespace gpureg

@@ -10,15 +10,14 @@
 
 struct CUstream_st;
 
-/// For programs that work on the GPU themselves: clouds that already live on the device, streams of
-/// the caller, calls that return at once. Needs no CUDA header; without a CUDA backend there is no
-/// context that these functions accept.
+/// Interoperation with CUDA programs: clouds in device memory, streams of the program, asynchronous
+/// calls. Needs no CUDA header. Without a CUDA backend no context fits these functions.
 namespace gpureg {
 
 using CudaStream = CUstream_st*;  ///< cudaStream_t; null is the default stream
 
 /// Non-owning view of a point cloud in device memory: float32 rows, strides in floats. The fields
-/// mean what those of PointCloudView do.
+/// have the meaning of those of PointCloudView.
 struct DevicePointCloudView {
   const float* points = nullptr;  ///< device: size rows of x, y, z; metres
   std::size_t size = 0;
@@ -32,9 +31,9 @@ struct DevicePointCloudView {
   std::size_t viewpoint_count = 0;
   double origin[3] = {0, 0, 0};  ///< as that of PointCloudView
 
-  /// Throws InvalidArgument as PointCloudView::validate() does.
+  /// @throws InvalidArgument as PointCloudView::validate() does.
   void validate() const {
-    PointCloudView v(points, size);  // the same fields; where they point is not looked at
+    PointCloudView v(points, size);  // checks values only, dereferences nothing
     v.point_stride = point_stride;
     v.normals = normals;
     v.normal_stride = normal_stride;
@@ -47,27 +46,32 @@ struct DevicePointCloudView {
   }
 };
 
-/// prepare() of a cloud in device memory; the result is that of the same cloud in host memory, bit
-/// for bit.
+/// prepare() for a cloud in device memory; the result equals that of the same cloud in host memory
+/// bit for bit.
 ///
-/// The rows are read by work in `stream`, after everything enqueued there before: what is enqueued
-/// there later may change or free them. The call waits for nothing, neither for the stream nor for
-/// other work of the context; preparation itself runs on the context's own stream. Errors of the
-/// data come out of the future. Throws InvalidArgument for bad options or views, for memory that is
-/// not on the context's device and for a context that is not CUDA's; DeviceError without memory.
-/// Thread-safe.
+/// Work in `stream` reads the rows, after everything enqueued there before; work enqueued there
+/// later may change or free them. The call waits neither for the stream nor for other work of the
+/// context. Preparation runs on the stream of the context. Thread-safe.
+/// @param cloud device memory on a device of the context; viewpoints in host memory.
+/// @param stream stream that orders the reading of the rows; null: the default stream.
+/// @return future of the prepared cloud; it rethrows errors of the data.
+/// @throws InvalidArgument for options or views out of range, for memory on another device, and for
+///   a context of another backend.
+/// @throws DeviceError where the device has no memory.
 std::future<PreparedCloud> prepare_async(const Context& context, const DevicePointCloudView& cloud,
                                          const PrepareOptions& options, CudaStream stream);
 
-/// The same, waiting for the result.
+/// prepare_async() that waits for the result.
+/// @throws as prepare_async() and its future.
 inline PreparedCloud prepare(const Context& context, const DevicePointCloudView& cloud,
                              const PrepareOptions& options, CudaStream stream) {
   return prepare_async(context, cloud, options, stream).get();
 }
 
-/// align() that returns at once, on any backend. Everything that align() throws comes out of the
-/// future. Each pending call has a thread of its own; calls of one context take turns. Destroying
-/// the future waits for the result, as that of std::async does. Thread-safe.
+/// align() that returns at once, on any backend. Each pending call has a thread of its own; calls
+/// of one context run one after another. Destroying the future waits for the result, as with
+/// std::async. Thread-safe.
+/// @return future of the result; it rethrows all errors of align().
 inline std::future<RegistrationResult> align_async(const Context& context,
                                                    const PreparedCloud& source,
                                                    const PreparedCloud& target,
@@ -77,7 +81,8 @@ inline std::future<RegistrationResult> align_async(const Context& context,
   });
 }
 
-/// The same for many pairs.
+/// align_batch() that returns at once, as align_async().
+/// @return future of one result per pair; it rethrows all errors of align_batch().
 inline std::future<std::vector<RegistrationResult>> align_batch_async(
     const Context& context, std::vector<PreparedCloud> clouds, std::vector<Pair> pairs,
     const RegistrationOptions& options = {}) {

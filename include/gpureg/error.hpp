@@ -6,35 +6,33 @@
 
 namespace gpureg {
 
-/// Base of everything that gpureg throws. "No alignment found" is not an error: it is a
-/// RegistrationStatus.
+/// Base of all exceptions of gpureg. "No alignment found" is no error but a RegistrationStatus.
 class Error : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
 };
 
-/// A broken coarse_score of the caller: an option out of range, a view that lies about itself.
-/// Names field and value.
+/// A violated precondition: an option out of range, or a view whose pointers, counts and strides
+/// contradict each other. The message names field and value.
 class InvalidArgument : public Error {
  public:
   using Error::Error;
 };
 
-/// The wanted backend was not built in, or this machine cannot run it (no device, driver too old,
-/// CPU without AVX2).
+/// The requested backend is not part of the build, or this machine cannot run it (no device, an old
+/// driver, a CPU without AVX2).
 class BackendUnavailable : public Error {
  public:
   using Error::Error;
 };
 
-/// The device failed (out of memory, lost). The message says whether the Context stays usable.
+/// The device failed (out of memory, lost). The message states whether the Context stays usable.
 class DeviceError : public Error {
  public:
   using Error::Error;
 };
 
-/// A file that cannot be read, is malformed, or cannot be written. The message names the file and
-/// the reason.
+/// A file is missing, malformed or not writable. The message names the file and the reason.
 class IoError : public Error {
  public:
   using Error::Error;

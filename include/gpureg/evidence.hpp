@@ -22,8 +22,9 @@ struct PoseEvidence {
   /// RMS distance of the overlapping points over max_correspondence_distance; 1 where there are none.
   double source_residual = 1;
   double target_residual = 1;
-  /// Overlap in which a point weighs less the more normals of its cloud share its direction
-  /// (normal-space weights, after Rusinkiewicz and Levoy 2001): floors do not outweigh furniture.
+  /// Overlap with normal-space weights (after Rusinkiewicz and Levoy 2001): the weight of a point
+  /// decreases with the number of normals of its cloud in its direction. Floors do not dominate
+  /// furniture.
   double source_normal_weighted_overlap = 0;
   double target_normal_weighted_overlap = 0;
   /// Share of the points in directions that viewpoints of the other cloud observed, each weighted by

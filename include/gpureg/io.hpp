@@ -9,37 +9,43 @@
 
 #include "gpureg/point_cloud.hpp"
 
-/// Component `io`: clouds in, overlays out, the fragments of a scene folder. Needs no other
+/// Component `io`: readers of clouds and lists, writers of clouds and overlays. Needs no other
 /// library; every function is thread-safe.
 namespace gpureg::io {
 
-/// Reads PLY (text, binary of either byte order; meshes give their vertices) or PCD (text, binary,
-/// compressed), told apart by content. Coordinates of any numeric type become float. Normals come
-/// along where the file has them; points that are not finite stay (prepare() drops them). A PCD's
-/// VIEWPOINT away from the origin becomes the one viewpoint. Memory is bounded by the file's size.
-/// Throws IoError naming file (and line, in text) and reason: missing, empty, truncated, a header
-/// that lies about the count, no x y z.
+/// Reads a PLY (text or binary of either byte order; of a mesh the vertices) or PCD file (text,
+/// binary, compressed). The content decides, not the extension. Coordinates of any numeric type
+/// become float. Normals are read where the file has them. Points with a NaN or infinite coordinate
+/// stay; prepare() drops them. The VIEWPOINT of a PCD becomes the viewpoint unless it is the
+/// origin. Memory is bounded by the size of the file.
+/// @throws IoError naming file (and line, in text) and reason: missing, empty, truncated, a false
+///   count in the header, no x y z.
 PointCloud read_point_cloud(const std::string& path);
 
-/// Writes binary PLY with float32 x y z (and normals where the cloud has them), all or nothing.
-/// Throws IoError, and InvalidArgument where there are normals but not one per point.
+/// Writes a binary PLY with float32 x y z (and normals where the cloud has them), all or nothing.
+/// @throws IoError where writing fails.
+/// @throws InvalidArgument where the number of normals is neither 0 nor that of the points.
 void write_point_cloud(const std::string& path, const PointCloud& cloud);
 
-/// Source moved by target_from_source (yellow) over target (blue) in one coloured binary PLY,
-/// without the points that are not finite. Throws IoError.
+/// Writes one coloured binary PLY: the source moved by target_from_source (yellow) and the target
+/// (blue), without non-finite points.
+/// @throws IoError where writing fails.
 void write_overlay(const std::string& path, const PointCloud& source, const PointCloud& target,
                    const Eigen::Isometry3d& target_from_source);
 
-/// Number and path of cloud_bin_<i>.ply|pcd in a folder, ascending by number. Throws IoError where
-/// there is none or a number is twice.
+/// Lists cloud_bin_<i>.ply|pcd of a folder.
+/// @return number and path, ascending by number.
+/// @throws IoError where the folder has none, or a number twice.
 std::vector<std::pair<int, std::string>> list_fragments(const std::string& folder);
 
-/// cameras.txt: `fragment frame tx ty tz qx qy qz qw` (fragment_from_camera); returns the camera
-/// positions of each fragment, in the order of the file. '#' starts a comment. Throws IoError
-/// naming file and line.
+/// Reads cameras.txt: lines `fragment frame tx ty tz qx qy qz qw` (fragment_from_camera); '#'
+/// starts a comment.
+/// @return camera positions of each fragment, metres, in the order of the file.
+/// @throws IoError naming file and line.
 std::map<int, std::vector<Eigen::Vector3f>> read_cameras(const std::string& path);
 
-/// Indices `i j` per line, i != j; '#' starts a comment. Throws IoError naming file and line.
+/// Reads pairs: one `i j` per line, i != j; '#' starts a comment.
+/// @throws IoError naming file and line.
 std::vector<std::pair<int, int>> read_pairs(const std::string& path);
 
 }  // namespace gpureg::io

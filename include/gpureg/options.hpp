@@ -142,7 +142,7 @@ struct RegistrationOptions {
   /// Confidence below which no alignment is reported, [0, 1] (RegistrationMethod::compatibility).
   double min_confidence = 0.5;
   RegistrationMethod method = RegistrationMethod::compatibility;
-  /// Move the cloud with fewer points (Choi et al. 2015). The result is of the caller's source and
+  /// Move the cloud with fewer points (Choi et al. 2015). The result refers to the given source and
   /// target either way.
   bool smaller_as_source = true;
   PrepareOptions prepare;

@@ -12,13 +12,14 @@
 
 #include "gpureg/registration.hpp"
 
-/// gpureg for users of PCL. Header only: link your own PCL (common; the adapter also search, kdtree
-/// and registration).
+/// Adapters for PCL. Header only: link PCL yourself (common; the adapter also search, kdtree and
+/// registration).
 namespace gpureg {
 
 /// View of a PCL cloud without a copy: points, normals where PointT has them, and sensor_origin_ as
-/// the viewpoint. Valid as long as the cloud is neither resized nor destroyed. Any PointT with x,
-/// y, z.
+/// the viewpoint.
+/// @tparam PointT any point type with x, y, z.
+/// @return a view, valid until the cloud is resized or destroyed.
 template <typename PointT>
 PointCloudView view_of(const pcl::PointCloud<PointT>& cloud) {
   static_assert(pcl::traits::has_xyz<PointT>::value,
@@ -33,7 +34,7 @@ PointCloudView view_of(const pcl::PointCloud<PointT>& cloud) {
     view.normal_stride = view.point_stride;
     if (!cloud.empty()) view.normals = &cloud.points.front().normal_x;
   }
-  // PCL's zero is not known from none at all. Without normals the origin is the viewpoint anyway.
+  // A zero sensor_origin_ may mean unknown. Without normals the origin is the viewpoint anyway.
   const auto origin = cloud.sensor_origin_.template head<3>();
   if (origin.allFinite() && !(view.normals != nullptr && origin.isZero(0))) {
     view.viewpoints = cloud.sensor_origin_.data();
@@ -42,10 +43,12 @@ PointCloudView view_of(const pcl::PointCloud<PointT>& cloud) {
   return view;
 }
 
-/// view_of() with features of one's own instead of FPFH: any PCL signature with a histogram
-/// (pcl::FPFHSignature33, pcl::VFHSignature308, pcl::Histogram<N>, ...), one per point. They
-/// describe points of the cloud as it is, so prepare it with voxel_size 0. Throws InvalidArgument
-/// where the clouds differ in size.
+/// view_of() with features that replace FPFH. The features describe the points of this very cloud,
+/// so prepare it with voxel_size 0.
+/// @tparam SignatureT any PCL signature with a histogram (pcl::FPFHSignature33,
+///   pcl::VFHSignature308, pcl::Histogram<N>, ...).
+/// @param features one per point.
+/// @throws InvalidArgument where the clouds differ in size.
 template <typename PointT, typename SignatureT>
 PointCloudView view_of(const pcl::PointCloud<PointT>& cloud,
                        const pcl::PointCloud<SignatureT>& features) {
@@ -62,7 +65,8 @@ PointCloudView view_of(const pcl::PointCloud<PointT>& cloud,
   return view;
 }
 
-/// Copies a view into a PCL cloud of one row; normals come along where both sides have them.
+/// Copies a view into a PCL cloud of one row; normals are copied where both sides have them.
+/// @throws InvalidArgument as PointCloudView::validate().
 template <typename PointT>
 pcl::PointCloud<PointT> to_pcl(const PointCloudView& view) {
   view.validate();
@@ -82,16 +86,16 @@ pcl::PointCloud<PointT> to_pcl(const PointCloudView& view) {
   return cloud;
 }
 
-/// gpureg behind the face of pcl::Registration: setInputSource, setInputTarget, align,
+/// gpureg with the interface of pcl::Registration: setInputSource, setInputTarget, align,
 /// hasConverged, getFinalTransformation and getFitnessScore work as in PCL; setIndices selects
 /// points of the source.
 ///
-/// The registration is global, so the guess of align() is not used, and what PCL calls maximum
-/// iterations, epsilons and correspondence distance has no effect: settings are
-/// RegistrationOptions. Where no alignment is found, hasConverged() is false, the transformation is
-/// the identity, and result() says why. Prepares the target once for all sources. Throws what
-/// prepare() and align() throw. Not thread-safe, as all of PCL's algorithm objects; use one per
-/// thread (they may share a Context).
+/// The registration is global: it ignores the guess of align(), and PCL's maximum iterations,
+/// epsilons and correspondence distance have no effect. RegistrationOptions hold the settings.
+/// Without an alignment hasConverged() is false, the transformation is the identity, and result()
+/// has the reason. The target is prepared once for all sources. Throws as prepare() and align().
+/// Not thread-safe, like all algorithm objects of PCL; use one per thread (they may share a
+/// Context).
 template <typename PointSource, typename PointTarget = PointSource>
 class PclRegistration : public pcl::Registration<PointSource, PointTarget, float> {
   using Base = pcl::Registration<PointSource, PointTarget, float>;
@@ -114,7 +118,7 @@ class PclRegistration : public pcl::Registration<PointSource, PointTarget, float
     prepared_target_ = {};
   }
 
-  /// Throws InvalidArgument naming field and value.
+  /// @throws InvalidArgument naming field and value.
   void setOptions(const RegistrationOptions& options) {
     options.validate();
     options_ = options;
@@ -128,12 +132,12 @@ class PclRegistration : public pcl::Registration<PointSource, PointTarget, float
   }
   const Context& getContext() const { return context_; }
 
-  /// Everything about the last align(): status and reason, score, statistics, timings, and the pose
-  /// in double precision.
+  /// @return the full result of the last align(): status and reason, score, statistics, timings,
+  ///   and the pose in double precision.
   const RegistrationResult& result() const { return result_; }
 
  protected:
-  // PCL has already copied the selected points of the source into output.
+  // output already holds the selected points of the source.
   void computeTransformation(PointCloudSource& output, const Matrix4& /*guess*/) override {
     PointCloudView source = view_of(output);
     source.viewpoints = view_of(*this->input_).viewpoints;

@@ -7,32 +7,31 @@
 
 namespace gpureg {
 
-/// Non-owning view of a point cloud in host memory. Whatever it points at must outlive the call
-/// that it is given to.
+/// Non-owning view of a point cloud in host memory. The memory must stay valid and unchanged during
+/// each call that takes the view.
 ///
-/// Rows may be strided (in floats), so a view fits std::vector<Eigen::Vector3f>, pcl::PointXYZ
-/// (stride 4) and numpy rows alike. Points with a NaN or infinite coordinate are allowed: prepare()
-/// drops and counts them.
+/// Strides count floats, so a view fits std::vector<Eigen::Vector3f>, pcl::PointXYZ (stride 4) and
+/// numpy rows alike. Points with a NaN or infinite coordinate are allowed: prepare() drops and
+/// counts them.
 struct PointCloudView {
   const float* points = nullptr;  ///< size rows of x, y, z; metres
   std::size_t size = 0;           ///< number of points
   std::size_t point_stride = 3;   ///< floats from one point to the next, >= 3
-  /// optional: size rows of nx, ny, nz; any length, (0,0,0) and NaN mean unknown
+  /// Optional, size rows of nx, ny, nz of any length; (0,0,0) and NaN mean unknown.
   const float* normals = nullptr;
   std::size_t normal_stride = 3;  ///< floats from one normal to the next, >= 3
-  /// optional: size rows of feature_dimension floats, used instead of FPFH
+  /// Optional, size rows of feature_dimension floats, used instead of FPFH.
   const float* features = nullptr;
   std::size_t feature_dimension = 0;  ///< floats per feature, >= 1 where features are given
-  /// floats from one feature to the next; 0: feature_dimension
+  /// Floats from one feature to the next; 0: feature_dimension.
   std::size_t feature_stride = 0;
-  /// Optional: viewpoint_count rows of x, y, z (tight): sensor positions in the cloud's frame.
-  /// Normals of the cloud's own that face away from all of them are turned round, unless more than
-  /// an eighth of the points have such: then the viewpoints are not what it was seen from. With
-  /// PrepareOptions::depth_maps 0 they keep their side, too.
+  /// Optional, viewpoint_count rows of x, y, z without gaps: sensor positions in the frame of the
+  /// cloud. Input normals that face away from all viewpoints are flipped, because no sensor
+  /// observes the back of a surface. None is flipped where more than one eighth of the points face
+  /// away (the viewpoints then belong to another frame), nor with PrepareOptions::depth_maps 0.
   const float* viewpoints = nullptr;
-  /// 0: normals are turned towards the origin, which also counts as the place that the cloud was
-  /// seen from, unless the cloud brings normals of its own: then nothing is known about free space,
-  /// and no pose is judged by it.
+  /// 0: the origin serves as the viewpoint where the cloud has no input normals. With input normals
+  /// and without viewpoints free space is unknown, and no pose is verified by it.
   std::size_t viewpoint_count = 0;
   /// Added to every point and viewpoint: coordinates in the cloud's frame = origin + row. For large
   /// coordinates (UTM, maps), which float rows cannot hold. Poses and moments of results are in the
@@ -44,27 +43,31 @@ struct PointCloudView {
   explicit PointCloudView(const std::vector<Eigen::Vector3f>& xyz)
       : points(xyz.empty() ? nullptr : xyz.front().data()), size(xyz.size()) {}
 
-  /// Throws InvalidArgument where pointers, counts and strides contradict each other or sizes
-  /// exceed 2^31 - 1 points.
+  /// Checks pointers, counts, strides and viewpoints; reads no point.
+  /// @throws InvalidArgument where they contradict each other, for a viewpoint that is not finite,
+  ///   or for more than 2^31 - 1 points.
   void validate() const;
 
-  /// Share of the points, in [0, 1], whose normal shows its back to every viewpoint; 0 where there
-  /// are no normals, no viewpoints or no points. In a scan with the places that it was seen from it
-  /// is a few per cent, along the edges of surfaces. Above kMaxFacingAway either the viewpoints
-  /// are in another frame than the points, and free space will speak against right poses, or the
-  /// normals point to any side. Reads every point once, in host memory; throws as validate() does.
+  /// Share of the points whose normal faces away from every viewpoint; 0 without normals,
+  /// viewpoints or points. A scan with correct viewpoints has a few per cent, along the edges of
+  /// surfaces. Above kMaxFacingAway the viewpoints are in another frame than the points, or the
+  /// normals have arbitrary signs; free space then contradicts correct poses. Reads every point
+  /// once. Thread-safe.
+  /// @return share in [0, 1].
+  /// @throws InvalidArgument as validate() does.
   double share_facing_away() const;
   static constexpr double kMaxFacingAway = 0.125;
 };
 
-/// Owning cloud, for readers and generators; view() is what the library takes. Empty
-/// normals/viewpoints mean "not known".
+/// Owning point cloud in host memory, made by readers and generators. Empty normals and viewpoints
+/// mean unknown.
 struct PointCloud {
   std::vector<Eigen::Vector3f> points;      ///< metres
-  std::vector<Eigen::Vector3f> normals;     ///< empty or one per point
+  std::vector<Eigen::Vector3f> normals;     ///< empty, or one per point
   std::vector<Eigen::Vector3f> viewpoints;  ///< sensor positions in the cloud's frame, may be empty
 
-  /// View of this cloud, valid as long as its vectors do not change.
+  /// @return a view, valid as long as the vectors do not change.
+  /// @throws InvalidArgument where the number of normals is neither 0 nor that of the points.
   PointCloudView view() const;
 };
 

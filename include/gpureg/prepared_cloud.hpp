@@ -15,29 +15,33 @@ namespace gpureg {
 struct Access;
 struct PreparedState;
 
-/// A fragment ready for alignment: downsampled points, normals, features, search grid and depth
-/// maps, in the memory of the context that made it. Immutable and shareable between threads; copies
-/// share the data. Usable with any context of the same backend: a device that lacks a cloud gets a
-/// copy of it.
+/// Point cloud prepared for alignment: downsampled points, normals, features, search grid and depth
+/// maps, in the memory of the context that made it. An immutable handle: copies share the data, and
+/// threads may share copies. Any context of the same backend accepts it; a device without the cloud
+/// copies it from another.
+///
+/// The accessors throw InvalidArgument on an empty handle. Copies to the host wait for the device.
 class PreparedCloud {
  public:
-  PreparedCloud() = default;  ///< empty handle; valid() is false
+  PreparedCloud() = default;  ///< empty handle
 
+  /// @return false for an empty handle.
   bool valid() const { return state_ != nullptr; }
-  std::size_t size() const;               ///< prepared points
-  std::size_t feature_dimension() const;  ///< 33 for FPFH
+  std::size_t size() const;               ///< number of prepared points
+  std::size_t feature_dimension() const;  ///< floats per feature, 33 for FPFH
   const PrepareStatistics& statistics() const;
   const PrepareOptions& options() const;
 
-  /// host copy, size() points in the cloud's frame
-  /// PointCloudView::origin: added to points() and viewpoints() it gives the cloud's frame.
+  /// @return PointCloudView::origin: points() and viewpoints() are rows relative to it.
   Eigen::Vector3d origin() const;
+  /// @return host copy: size() points, relative to origin().
   std::vector<Eigen::Vector3f> points() const;
-  /// host copy, unit length, or (0,0,0) where none could be computed
+  /// @return host copy: size() unit vectors, (0,0,0) where no normal could be estimated.
   std::vector<Eigen::Vector3f> normals() const;
-  /// host copy, size() x feature_dimension(), row by row
+  /// @return host copy: size() x feature_dimension() floats, row by row.
   std::vector<float> features() const;
-  std::vector<Eigen::Vector3f> viewpoints() const;  ///< sensor positions, at least one
+  /// @return sensor positions relative to origin(), at least one.
+  std::vector<Eigen::Vector3f> viewpoints() const;
 
  private:
   friend struct Access;

@@ -7,36 +7,40 @@
 
 #include "gpureg/result.hpp"
 
-/// What is known of a pair's pose before it is looked for.
+/// Prior knowledge of the pose of a pair.
 namespace gpureg {
 
-/// Which way is up in both clouds, from an accelerometer, say. Leaves the turn about the vertical
-/// and the translation free.
+/// Vertical direction in both clouds, from an accelerometer for example. The rotation about the
+/// vertical and the translation stay free.
 struct GravityPrior {
-  Eigen::Vector3d source_up =
-      Eigen::Vector3d::UnitZ();  ///< in the source's frame, any length but 0
-  Eigen::Vector3d target_up = Eigen::Vector3d::UnitZ();  ///< in the target's frame
-  double max_angle =
-      10;  ///< degrees between the target's up and the source's, turned by the pose, (0, 180]
+  /// Up in the frame of the source, of any length but 0.
+  Eigen::Vector3d source_up = Eigen::Vector3d::UnitZ();
+  /// Up in the frame of the target, of any length but 0.
+  Eigen::Vector3d target_up = Eigen::Vector3d::UnitZ();
+  /// Largest angle between target_up and the rotated source_up, degrees, (0, 180].
+  double max_angle = 10;
 };
 
-/// Roughly where the source is, from odometry, say.
+/// Approximate pose, from odometry for example.
 struct PosePrior {
   UnalignedIsometry3d target_from_source = UnalignedIsometry3d::Identity();
-  double max_rotation = 30;  ///< degrees that the pose may be turned from it, (0, 180]
-  /// metres that the middle of the source's bounding box may be shifted from where it puts it
+  /// Largest rotation between the pose and target_from_source, degrees, (0, 180].
+  double max_rotation = 30;
+  /// Largest distance, metres, between the positions that the pose and target_from_source give the
+  /// centre of the bounding box of the source.
   double max_translation = 1;
 };
 
-/// What a pose of one pair must not contradict. Candidates that do are considered last, and refined
-/// poses that do are dropped; where none is left, the pair is not aligned for
-/// RegistrationReason::contradicts_prior. Without any part nothing changes, not a bit.
+/// Constraints on the pose of one pair. Candidates that contradict them rank last, and refined
+/// poses that contradict them are dropped. Where no pose remains, the pair is not aligned, with
+/// RegistrationReason::contradicts_prior. An empty prior changes no bit of the result.
 struct RegistrationPrior {
   std::optional<GravityPrior> gravity;
   std::optional<PosePrior> pose;
 
   bool empty() const { return !gravity && !pose; }
-  /// Throws InvalidArgument naming the field, after `name`, and its value.
+  /// @param name prefix of the field in error messages.
+  /// @throws InvalidArgument naming field and value.
   void validate(const std::string& name = "prior") const;
 };
 

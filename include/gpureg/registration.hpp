@@ -14,53 +14,71 @@
 #include "gpureg/prior.hpp"
 #include "gpureg/result.hpp"
 
-/// The door of gpureg: prepare each cloud once, align any pairs of them.
+/// The API of gpureg: prepare each cloud once, then align any pairs of them.
 namespace gpureg {
 
-/// Downsamples, estimates and orients normals, computes features (FPFH of one or two radii, or
-/// takes the view's own), builds the search grid and draws depth maps from the viewpoints. Never
-/// fails for the data itself: an empty cloud gives an empty PreparedCloud, whose alignments say
-/// too_few_source_points (or target). Throws InvalidArgument for bad options or views, and for
-/// clouds wider than 2^20 voxels, too dense for the radii, or of more than 20,000 points nearly all
-/// of which are alone (millimetres, and a voxel in metres). Thread-safe.
+/// Prepares a cloud for alignment: downsamples, estimates and orients normals, computes features
+/// (FPFH of one or two radii, or the features of the view), builds the search grid and draws depth
+/// maps from the viewpoints. Empty or degenerate data is no error: an empty cloud gives an empty
+/// PreparedCloud, and its alignments report too_few_source_points or too_few_target_points.
+/// Thread-safe.
+/// @param context backend that prepares and holds the cloud.
+/// @param cloud host memory, lengths in metres (or the unit of the options).
+/// @param options radii and voxel size.
+/// @return handle to the prepared cloud.
+/// @throws InvalidArgument for options or views out of range, for a cloud wider than 2^20 voxels or
+///   too dense for the radii, and for more than 20,000 points of which nearly all are isolated
+///   (millimetres with a voxel size in metres).
+/// @throws DeviceError where the device fails.
 PreparedCloud prepare(const Context& context, const PointCloudView& cloud,
                       const PrepareOptions& options = {});
 
-/// prepare() for many clouds at once, each with the same result as alone. names: what errors call
-/// the clouds, files perhaps; without, clouds[0], clouds[1] ...
+/// prepare() for many clouds at once; each result equals that of prepare() alone.
+/// @param names names of the clouds in error messages, as many as clouds, or none (clouds[0],
+///   clouds[1] ...).
+/// @return one handle per cloud, in order.
+/// @throws as prepare(), naming the cloud.
 std::vector<PreparedCloud> prepare_batch(const Context& context,
                                          const std::vector<PointCloudView>& clouds,
                                          const PrepareOptions& options = {},
                                          const std::vector<std::string>& names = {});
 
-/// Finds target_from_source of two prepared clouds, by options.method: from compatible
-/// matches, judged by evidence (then modes holds every distinct pose), or by LoopSmart's
-/// Algorithm 1. Deterministic in clouds, options and seed. options.prepare is checked, but not
-/// used: what a cloud was prepared with counts. Throws InvalidArgument where a cloud's
-/// search_distance is less than the correspondence distances, and where the clouds' features differ
-/// in dimension. Thread-safe.
+/// Finds target_from_source of two prepared clouds by options.method: second-order compatibility of
+/// matches, verified by evidence (modes then holds every distinct pose), or LoopSmart (Algorithm
+/// 1). Deterministic in clouds, options and seed. Thread-safe.
+/// @param source cloud that the pose moves.
+/// @param target cloud that stays.
+/// @param options options.prepare is validated but not applied; each cloud keeps the options that
+///   it was prepared with.
+/// @return the result; "no alignment" is a status, not an error.
+/// @throws InvalidArgument where a correspondence distance exceeds that of the preparation, where
+///   the dimensions of the features differ, and for clouds of another backend.
+/// @throws DeviceError where the device fails.
 RegistrationResult align(const Context& context, const PreparedCloud& source,
                          const PreparedCloud& target, const RegistrationOptions& options = {});
 
-/// The same with what is known of the pose beforehand. Throws InvalidArgument for a bad prior, and
-/// for one that is not empty with RegistrationMethod::quadruples, which cannot use it.
+/// align() with prior knowledge of the pose.
+/// @param prior constraints on the pose; an empty prior changes nothing.
+/// @throws InvalidArgument as align(), for a prior out of range, and for a non-empty prior with
+///   RegistrationMethod::quadruples.
 RegistrationResult align(const Context& context, const PreparedCloud& source,
                          const PreparedCloud& target, const RegistrationPrior& prior,
                          const RegistrationOptions& options = {});
 
-/// The easy door: prepares both clouds and aligns them.
+/// Prepares both clouds and aligns them. Prepare clouds of several pairs once instead.
+/// @throws as prepare() and align().
 RegistrationResult align(const Context& context, const PointCloudView& source,
                          const PointCloudView& target, const RegistrationOptions& options = {});
 
-/// Indices of a source and a target point (of PreparedCloud::points()) that are believed to be the
-/// same place.
+/// One correspondence: indices into PreparedCloud::points() of source and target.
 struct Correspondence {
   std::uint32_t source;
   std::uint32_t target;
 };
 
-/// align() on correspondences of your own instead of feature matches. Throws InvalidArgument for an
-/// index out of range.
+/// align() from given correspondences instead of feature matches.
+/// @param correspondences any number, in any order.
+/// @throws InvalidArgument as align(), and for an index out of range.
 RegistrationResult align(const Context& context, const PreparedCloud& source,
                          const PreparedCloud& target,
                          const std::vector<Correspondence>& correspondences,
@@ -72,26 +90,33 @@ struct Pair {
   std::uint32_t target;
 };
 
-/// What a caller of align_batch may hook into. Both run on the calling thread.
+/// Callbacks of align_batch(). Both run on the calling thread, and either may be empty.
 struct BatchCallbacks {
-  /// Called once per finished pair, in pair order: index into pairs, and its result.
+  /// Receives each finished pair once, in pair order: index into pairs, result.
   std::function<void(std::size_t, const RegistrationResult&)> on_result;
-  /// Asked between chunks of pairs; true ends the batch: the pairs left over come back as
+  /// Polled between chunks of pairs. true ends the batch; the remaining pairs return
   /// RegistrationStatus::skipped.
   std::function<bool()> should_stop;
 };
 
-/// Aligns many pairs; results by pair index. Each result equals align() of its pair bit for bit,
-/// whatever the order or the split (timings aside). Throws InvalidArgument for a pair index out of
-/// range or clouds of another backend.
+/// Aligns many pairs. Each result equals align() of its pair bit for bit (timings aside), whatever
+/// the order or the split of the batch. Thread-safe.
+/// @param clouds prepared clouds of the backend of the context.
+/// @param pairs indices into clouds.
+/// @param callbacks progress and cancellation.
+/// @return one result per pair, by pair index.
+/// @throws InvalidArgument as align(), and for an index out of range; all pairs are checked before
+///   the first one runs.
+/// @throws DeviceError where the device fails.
 std::vector<RegistrationResult> align_batch(const Context& context,
                                             const std::vector<PreparedCloud>& clouds,
                                             const std::vector<Pair>& pairs,
                                             const RegistrationOptions& options = {},
                                             const BatchCallbacks& callbacks = {});
 
-/// The same with a prior for each pair: as many as pairs, or none. Throws as align() with a prior
-/// does, naming the pair.
+/// align_batch() with a prior for each pair.
+/// @param priors as many as pairs, or none.
+/// @throws InvalidArgument as align() with a prior, naming the pair.
 std::vector<RegistrationResult> align_batch(const Context& context,
                                             const std::vector<PreparedCloud>& clouds,
                                             const std::vector<Pair>& pairs,

@@ -5,32 +5,31 @@
 
 #include "gpureg/registration.hpp"
 
-/// Alignment that is given a time instead of a quality.
+/// Alignment within a time budget.
 namespace gpureg {
 
-/// What was found within a time budget.
+/// Result of align_within().
 struct TimedResult {
-  RegistrationResult result;  ///< of all levels that were run, the one with the highest confidence
-  std::uint32_t quality =
-      0;  ///< the level that it is of: result equals align() with options.with_quality(quality)
-  std::uint32_t highest_quality = 0;  ///< the highest level that was run
-  std::uint32_t levels =
-      0;  ///< how many were run, from quality 0 upwards; some may have been left out
+  RegistrationResult result;  ///< the result with the highest confidence of all levels run
+  /// Quality level of the result: it equals align() with options.with_quality(quality).
+  std::uint32_t quality = 0;
+  std::uint32_t highest_quality = 0;  ///< the highest level run
+  std::uint32_t levels = 0;           ///< number of levels run; some in between may be left out
   double milliseconds = 0;  ///< wall time of the whole call
 };
 
-/// align() with as much quality as `milliseconds` of wall time allow. Runs levels of quality
-/// upwards, from 0; predicts the time of the next ones from the stages of those that were run,
-/// starts none that would end after the budget, and leaves out those in between where time allows
-/// more. Ends early where two levels in a row agree on a pose of confidence 0.99 or more. Quality 0
-/// is always run: a budget below what it needs is overrun. The time counts from the call, and does
-/// not include preparation.
+/// align() at the highest quality that a budget of wall time allows. Runs levels of quality upwards
+/// from 0. It predicts the time of the next levels from the stages of the levels run so far, starts
+/// no level that would end after the budget, and leaves levels out where time allows a higher one.
+/// It ends early where two levels in a row give the same pose with a confidence of 0.99 or more.
+/// Level 0 always runs, even beyond the budget.
 ///
-/// The one thing in gpureg that is not deterministic: which levels are run depends on the clock.
-/// What each level gives does not. options: as for align(); what with_quality() sets is set per
-/// level. Throws InvalidArgument as align() does, for milliseconds that are not finite and > 0, and
-/// for RegistrationMethod::quadruples, which has no levels. Thread-safe, but calls of other threads
-/// on the same context take turns with it and their time counts.
+/// Not deterministic, unlike the rest of gpureg: the clock decides which levels run. The result of
+/// each level is deterministic. Thread-safe; calls of other threads on the same context delay it.
+/// @param milliseconds wall time from the call, without preparation, finite and > 0.
+/// @param options as for align(); with_quality() overrides them per level.
+/// @throws InvalidArgument as align(), for milliseconds out of range, and for
+///   RegistrationMethod::quadruples, which has no levels.
 TimedResult align_within(const Context& context, const PreparedCloud& source,
                          const PreparedCloud& target, double milliseconds,
                          const RegistrationOptions& options = {});

@@ -7,41 +7,43 @@
 
 #include "gpureg/point_cloud.hpp"
 
-/// A voxel size from the clouds themselves.
+/// Suggests a voxel size from the clouds themselves.
 namespace gpureg {
 
-/// Why there is no suggestion. none: there is one.
+/// Reason for a missing suggestion; none: there is a suggestion.
 enum class VoxelSizeReason : std::uint8_t {
   none,
   no_clouds,
   too_few_points,  ///< no cloud has 4 or more points with finite coordinates
-  one_place        ///< all points of each cloud are at one place
+  one_place        ///< all points of each cloud coincide
 };
 
+/// @return the name of the enumerator.
 const char* to_string(VoxelSizeReason reason);
-/// One sentence for a person.
+/// @return one English sentence for messages.
 const char* explain(VoxelSizeReason reason);
 
-/// Lengths in the unit of the points.
+/// Suggestion of suggest_voxel_size(). Lengths are in the unit of the points.
 struct VoxelSizeSuggestion {
   float voxel_size = 0;  ///< for RegistrationOptions::from_voxel_size(); 0: none, see reason
   VoxelSizeReason reason = VoxelSizeReason::no_clouds;
-  double spacing = 0;  ///< median distance of a point to its nearest neighbour at another place
-  /// median distance (RMS) of points from the plane of their surroundings, about a voxel wide
+  double spacing = 0;  ///< median distance of a point to its nearest distinct neighbour
+  /// Median RMS distance of points from the plane fitted to their neighbourhood, about a voxel
+  /// wide.
   double noise = 0;
-  std::size_t points = 0;  ///< that a cloud keeps, in the median
+  std::size_t points = 0;  ///< median number of points that a cloud keeps
 
   bool valid() const { return reason == VoxelSizeReason::none; }
 };
 
-/// The voxel size that suits all the clouds of a set: it leaves about 5,000 points of the median
-/// cloud, which registration works well and fast with, but is not below the spacing of the points;
-/// where surfaces are rougher than a third of it, it grows, as far as 3,000 points are left.
-/// Rounded to one or two digits. At most 16 clouds, evenly chosen, and samples of their points are
-/// looked at; rows with NaN or infinity and repeated points do not matter, nor does the unit.
-///
-/// views: host memory. Deterministic, thread-safe. Bad data is a reason; bad views (see
-/// PointCloudView::validate) are InvalidArgument.
+/// Suggests one voxel size for a set of clouds: about 5,000 points of the median cloud remain,
+/// enough for an accurate and fast registration, and the voxel is not below the spacing of the
+/// points. Where the noise exceeds a third of a voxel, it grows until 3,000 points remain. Rounded
+/// to one or two digits. Reads at most 16 clouds, evenly chosen, and samples of their points;
+/// non-finite and repeated points do not matter. Deterministic, thread-safe.
+/// @param views host memory, all in one unit.
+/// @return the suggestion, or the reason why the data allows none.
+/// @throws InvalidArgument as PointCloudView::validate().
 VoxelSizeSuggestion suggest_voxel_size(const std::vector<PointCloudView>& views);
 
 }  // namespace gpureg

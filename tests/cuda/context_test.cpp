@@ -151,7 +151,7 @@ TEST(NoCudaDevice, EveryReasonHasItsWords) {
 TEST_F(CudaContext, NothingRunsOnTheDefaultStream) {
   const Context context = Context::cuda();
   const Results expected = run(context, pairs);
-  std::coarse_score<void> release;
+  std::promise<void> release;
   auto released = release.get_future();
   ASSERT_EQ(
       cudaLaunchHostFunc(

@@ -25,12 +25,12 @@ class Gate {
   }
   ~Gate() { open(); }
   void open() {
-    if (!std::exchange(open_, true)) coarse_score_.set_value();
+    if (!std::exchange(open_, true)) promise_.set_value();
   }
 
  private:
-  std::coarse_score<void> coarse_score_;
-  std::future<void> future_ = coarse_score_.get_future();
+  std::promise<void> promise_;
+  std::future<void> future_ = promise_.get_future();
   bool open_ = false;
 };
 
