@@ -6,7 +6,7 @@ mean, published rows beside measured ones.
 SCENE: folders in Redwood's layout (the four scenes of scripts/fetch_redwood, 3DMatch's scenes,
 those of `gpureg generate`), as paths or as names under --data. Without one, scenes are generated,
 the same on every machine. Every preset runs with every seed through `gpureg batch` on every backend
-that is there, `gpureg evaluate` judges; peers that are installed run once, through bench/peers
+that is there, `gpureg evaluate` evaluates; peers that are installed run once, through bench/peers
 (--peers none: without). The record holds what else is worth knowing: recall/precision curves,
 recall against overlap, where the misses are, rotation errors of the wrong poses, registration
 recall by 3DMatch's rule where its logs are, and times with and without the preparation of clouds.
@@ -421,12 +421,7 @@ def main():
                         runs.append(run)
                         environment[backend] = batch["environment"]
                         method["options"] = {
-                            **batch["options"],
-                            "hypothesis": {
-                                k: v
-                                for k, v in batch["options"]["hypothesis"].items()
-                                if k != "seed"
-                            },
+                            k: v for k, v in batch["options"].items() if k != "seed"
                         }
                         print(
                             f"{method['label']}, {scene.name}, seed {seed}: {percent(run['strict']['recall'])} / {percent(run['strict']['precision'])}",
