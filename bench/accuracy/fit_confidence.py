@@ -72,14 +72,14 @@ MIN_SEPARATION = 2  # j - i: neighbours in the sequence do not count in Redwood'
 # and by a correct pose in a changed place.
 STRENGTHS = {"ranking": 0.15, "confidence": 0.00025, "overlap": 1.0}
 NO_PENALTY = 1e6  # for slope and intercept, which two numbers cannot overfit
-MAX_ITERATIONS = 5000  # of the solver; it converges before
+MAX_ITERATIONS = 5000  # of the solver, which warns where they are too few
 MIN_SCALE = 1e-9  # bounds the standard deviation of a constant feature
 
-# Changed places: chosen with the figures of docs/accuracy.md, "twice the weight for changed places".
+# Changed places. bench/results/accuracy_attempts.json compares weights; the two bounds were chosen by
+# hand.
 CHANGED_WEIGHT = 0.11  # of a changed pair beside the pair itself
 MAX_CHANGED = 0.1  # share of a cloud that is new
-# Share of the new points in front of surfaces that is near: most furniture stands close to a wall.
-CHANGED_NEAR = (0.3, 0.8)
+CHANGED_NEAR = (0.3, 0.8)  # share of the new points in front of surfaces that is near
 CHANGED_SEED = 1
 
 PRECISIONS = (80, 95, 99)  # percent, at which recall is reported

@@ -22,7 +22,9 @@ import xml.etree.ElementTree as xml
 import numpy as np
 import trimesh
 
-FARTHEST = 1000  # metres
+FLOOR = 0.1  # metres, thickness of the ground plane of --floor
+# Metres from the origin. A model beyond fell through the floor before the world was saved.
+MAX_DISTANCE = 1000
 
 
 def matrix(text):
@@ -96,9 +98,7 @@ class Baker:
 
     def model(self, node, world_from_parent):
         world_from_model = world_from_parent @ matrix(node.findtext("pose"))
-        if (
-            np.abs(world_from_model[:3, 3]).max() > FARTHEST
-        ):  # fell through the floor before the world was saved
+        if np.abs(world_from_model[:3, 3]).max() > MAX_DISTANCE:
             self.missing.add(f"{node.get('name')} at {world_from_model[:3, 3]}")
             return
         for include in node.findall("include"):
@@ -158,7 +158,7 @@ def main():
             np.max([p.bounds[1] for p in baker.parts], 0),
         )
         baker.parts.append(
-            trimesh.creation.box(bounds=[[low[0], low[1], -0.1], [high[0], high[1], 0]])
+            trimesh.creation.box(bounds=[[low[0], low[1], -FLOOR], [high[0], high[1], 0]])
         )
     whole = trimesh.util.concatenate(
         [trimesh.Trimesh(p.vertices, p.faces, process=False) for p in baker.parts]
