@@ -22,13 +22,9 @@ import numpy as np
 import record
 
 MIN_CONFIDENCE = 0.3  # of a pose that takes part in the loops that are counted
-ANGLE, DISTANCE = (
-    6.0,
-    0.3,
-)  # degrees, metres: within which a loop closes, twice the default tolerances
-CORRECT = (
-    1.4  # times these, a single pose is correct: its error has a loop's tolerance and its truth's
-)
+# Degrees and metres within which a loop closes: twice the default tolerances.
+ANGLE, DISTANCE = 6.0, 0.3
+CORRECT = 1.4  # times these: bound of the error of a correct pose, a little more than of a loop
 AHEAD = np.array([0, 0, 2.0, 1])  # point whose shift counts: two metres before the first camera
 CALIBRATION_BINS = 10
 SURE = 0.9  # a confidence of little risk
@@ -81,19 +77,19 @@ def closing(folder, result):
         return None
     rows = [line.split() for line in path.read_text().splitlines()]
     world = {int(rows[k][0]): np.array(rows[k + 1 : k + 5], float) for k in range(0, len(rows), 5)}
-    poses, right = {}, {}
+    poses, correct = {}, {}
     for pair in json.loads(pathlib.Path(result).read_text())["pairs"]:
         if (pair["score"] or 0.0) > MIN_CONFIDENCE:
             key = pair["i"], pair["j"]
             poses[key] = np.array(pair["T_ij"], float).reshape(4, 4)
             turn, shift = off(poses[key] @ np.linalg.inv(world[key[1]]) @ world[key[0]])
-            right[key] = turn < CORRECT * ANGLE and shift < CORRECT * DISTANCE
+            correct[key] = turn < CORRECT * ANGLE and shift < CORRECT * DISTANCE
     counts = {True: [0, 0], False: [0, 0]}
     for a, b, c in itertools.combinations(sorted({k for key in poses for k in key}), 3):
         if not {(a, b), (b, c), (a, c)} <= poses.keys():
             continue
         turn, shift = off(poses[a, b] @ poses[b, c] @ np.linalg.inv(poses[a, c]))
-        count = counts[right[a, b] and right[b, c] and right[a, c]]
+        count = counts[correct[a, b] and correct[b, c] and correct[a, c]]
         count[0] += 1
         count[1] += int(turn < ANGLE and shift < DISTANCE)
     return {"right": counts[True], "wrong": counts[False]}

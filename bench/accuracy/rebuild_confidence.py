@@ -324,9 +324,11 @@ def fit(inputs, runs, absent, arguments):
     tested, models = fit_confidence.test_and_fit(*map(load, ROLES))
     fit_confidence.write_header(arguments.header, models)
     print(f"written: {arguments.header}")
-    content = {"manifest": arguments.manifest.name, "missing": sorted(absent), "runs": tested}
-    words = [f"--only {shlex.join(arguments.only)}"] if arguments.only else []
-    record.write(arguments, " ".join(["bench/accuracy/rebuild_confidence.py", *words]), content)
+    content = {"missing": sorted(absent), "runs": tested}
+    words = ["bench/accuracy/rebuild_confidence.py"]
+    words += ["--manifest", arguments.manifest.name] if arguments.manifest != MANIFEST else []
+    words += ["--only", *arguments.only] if arguments.only else []
+    record.write(arguments, shlex.join(words), content)
 
 
 def parse():
