@@ -267,8 +267,8 @@ class Regression:
 def logistic(x, y, weight, strength):
     """Logistic regression on standardised features, written as weights of the features themselves.
 
-    strength: inverse of the L2 penalty. A strong penalty shares out among similar features what few
-    buildings leave undetermined, which orders the poses of other buildings better. It also draws
+    strength: inverse of the L2 penalty. Where few buildings leave weights undetermined, a strong
+    penalty shares them out among similar features, which orders the poses of other buildings better. It also draws
     all odds together, so slope and intercept are fitted again without it."""
     from sklearn.linear_model import LogisticRegression  # only fits need it
 

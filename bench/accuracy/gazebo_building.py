@@ -3,12 +3,12 @@
 """Makes one mesh of a Gazebo world, to be scanned by `gpureg generate --building`.
 
 Visual meshes, boxes, cylinders and spheres of all models at their poses; planes are left out. A
-visual mesh whose file cannot be read is replaced by the model's collision geometry. Prints what it
-left out.
+visual mesh whose file cannot be read is replaced by the model's collision geometry. Prints the
+files that it left out.
 
 usage: gazebo_building.py FILE.world|FILE.sdf|MESH.dae --models FOLDER... [--floor] -o BUILDING.ply
-FOLDER holds one folder for each model, with its model.sdf; what model://, file:// and package://
-name is looked for in it. Needs numpy, trimesh and the command assimp (Debian's assimp-utils).
+FOLDER holds one folder for each model, with its model.sdf; model://, file:// and package://
+addresses are looked for in it. Needs numpy, trimesh and the command assimp (Debian's assimp-utils).
 """
 
 import argparse
@@ -41,7 +41,7 @@ class Baker:
 
     def find(self, uri):
         name = re.sub(r"^(model|file|package)://", "", uri)
-        # What a package or a models folder is called where the world was made says nothing here.
+        # Packages and folders of models have other names on the machine where the world was made.
         parts = pathlib.PurePosixPath(name).parts
         for folder in self.folders:
             for k in range(len(parts)):

@@ -99,7 +99,7 @@ def main():
             waves(points, arguments.drift, DRIFT, random)
             + random.normal(size=points.shape) * arguments.noise
         )
-        # What is not asked for draws no numbers, so that scenes without it keep their bytes.
+        # Without bumps no numbers are drawn for them, so that such scenes keep their bytes.
         if arguments.bumps > 0:
             points += waves(points, arguments.bumps, BUMPS, random)
         still = points.copy()

@@ -3,7 +3,7 @@
 """Recall and precision on the 190 pairs of 20 real fragments (7-Scenes red kitchen, 3DMatch),
 Redwood's protocol.
 
-`gpureg batch` and `gpureg evaluate` for each seed; the record holds what evaluate's JSON says.
+`gpureg batch` and `gpureg evaluate` for each seed; the record holds evaluate's JSON.
 usage: redkitchen.py [--preset loopsmart] [--seeds 1 2 3] [--backend auto] [--scene
 redkitchen/fragments] [--data DIR] [-o FILE]"""
 

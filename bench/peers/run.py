@@ -49,7 +49,7 @@ def choose_pairs(folder, fragments, others, seed):
 
 
 def document(name, about, results, fragments, lost):
-    """What `gpureg evaluate` reads."""
+    """Input of `gpureg evaluate`."""
     pairs = []
     for line in sorted(results, key=lambda line: (line["i"], line["j"])):
         aligned = line["pose"] is not None and line.get(
@@ -127,8 +127,8 @@ def table(entries):
 
 
 def kept_entries(arguments, pairs):
-    """With --update, what an earlier run on the same pairs says about methods that this one does
-    not run.
+    """With --update, entries of an earlier run on the same pairs, of methods that this one does not
+    run.
     """
     if not arguments.update:
         return {}

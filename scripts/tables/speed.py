@@ -181,7 +181,7 @@ def devices():
 
 
 def scaling():
-    """Beside what was measured, what the number of operations predicts from the second row: feature
+    """Measured times beside those predicted from the second row by the number of operations: feature
     products, and tests of points.
     """
     context, runs = benchmarks()

@@ -12,7 +12,7 @@
 /// else: bench/accuracy/fit_confidence.py gets them from the library.
 namespace gpureg::confidence {
 
-/// One number that a regression weighs. "Lower" and "higher" are over the two sides of a pair.
+/// An input of the regressions. "Lower" and "higher" are over the two sides of a pair.
 enum class Feature : std::uint8_t {
   // Overlap and geometry; of every pair.
   log_match_support,

@@ -84,7 +84,7 @@ class Manifest(unittest.TestCase):
         for change, expected in (
             (lambda m: m["runs"][0]["scenes"].append("moon"), "moon"),
             (lambda m: m["runs"].append(m["runs"][0]), "twice"),
-            (lambda m: m["runs"][0].update(role="judge"), "role"),
+            (lambda m: m["runs"][0].update(role="moon"), "role"),
             (lambda m: m["scenes"]["house/A"].pop("data"), "scene house/A"),
             (lambda m: m["scenes"]["bookstore/1"].update(mesh="moon"), "no mesh moon"),
             (lambda m: m["scenes"]["drift/house/A"].update(script="moon.py"), "no script moon.py"),
