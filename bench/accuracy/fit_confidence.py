@@ -1,54 +1,101 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""Fits the confidence of a pose to its evidence, and says how far it can be trusted in buildings
-that the fit did not see.
+"""Fits the confidence of a pose to its evidence, and tests the fits on buildings that they did not
+see. bench/accuracy/rebuild_confidence.py runs it on all inputs of the shipped coefficients.
 
-A run is BUILDING=SCENE_FOLDER=RESULT.json: what `gpureg batch --preset default --json` wrote for a
-scene whose folder has gt.log, gt.info, gt_all.log and gt_all.info (right: Redwood's 0.2 m rule
-against gt_all). Every run is tested with a fit on the other buildings; then all of them together
-give the coefficients that are written into the library.
+A run is BUILDING=SCENE_FOLDER=RESULT.json: the JSON of `gpureg batch` on a scene whose folder has
+gt.log, gt.info, gt_all.log and gt_all.info. A pose is correct by Redwood's 0.2 m rule against
+gt_all. Each run is tested with a fit on the other buildings. A fit on all of them gives the
+coefficients of the library. Names and values of the features come from the library: this script
+computes none.
 
-Three logistic regressions: the first ranks the modes of a pair by their own evidence, the second
-judges the best of them, and also sees its margin over the best distinct rival and how many modes
-there are, and no pose gets more than its share of the odds of all, as at most one is right; the
-third says, from the same, whether the pose is right and the clouds overlap by 30 % or more (in
-gt.log), which is what Redwood's strict protocol counts. Each exists four times: with and without
-free space, which clouds without known viewpoints do not tell, and with and without the surface_sides of
-surfaces, which prepare.surface_side_distance = 0 leaves out.
+Three logistic regressions. The first ranks the modes of a pair by their own evidence. The second
+gives the probability that the best mode is correct. It also sees its margin over the other modes
+and how many there are. No mode gets more than its share of the odds of all, as at most one is
+correct. The third gives the probability that the pose is correct and the clouds overlap by 30 % or
+more (in gt.log), which Redwood's strict rule asks for. Each exists four times: with and without
+free space, with and without the sides of surfaces.
 
-Buildings are few, and these were all seen by one kind of sensor. So the second regression also
-learns from runs that only serve to widen it (--beside): the same scenes as other sensors would have
-seen them (other_sensor.py) or with other voxels, and generated buildings (`gpureg generate`), which
-are full of twins. They are left out with their building, too, and do not say which mode is right.
+Buildings are few, and one kind of sensor observed them. So the second regression also learns from
+the runs of --beside: the same scenes by other sensors (other_sensor.py) or with other voxels, and
+generated buildings (`gpureg generate`), which are full of perceptual aliases. They are left out
+with their building, too, and take no part in the ranking.
 
-Nothing moves in these scenes. So that a chair that was moved does not cost a pose its confidence,
-every pair is fitted a second time, with little weight, as it would look if up to a tenth of one of
-its clouds were new.
+Nothing moves in these scenes. So that a moved chair does not cost a pose its confidence, every pair
+is fitted a second time, with little weight, as if up to a tenth of one of its clouds were new.
 
 usage: fit_confidence.py RUN... [--beside RUN=LABEL...] [--others RUN=LABEL...] [--origin RUN...]
-[--unknown RUN...]
-                         [--header src/confidence/confidence_model.hpp] [-o bench/results/confidence.json]
---others: tested, and nothing is fitted to them. LABEL: what they are.
---origin, --unknown: runs of the same scenes whose clouds came with the origin as their only
-viewpoint, or with none; they are tested, and nothing is fitted to them. Where a scene has poses.txt
-(fragment number, world_from_fragment), it is also told what kind of poses the wrong reports are.
-Needs numpy and scikit-learn."""
+[--unknown RUN...] [--header src/confidence/confidence_model.hpp] [-o bench/results/confidence.json]
+--others: tested only. LABEL: the row of the table that the run belongs to. --origin, --unknown:
+tested only; runs of the same scenes with the origin as the only viewpoint, or with none. Where a
+scene has poses.txt (fragment number, world_from_fragment), the record also counts the kinds of
+false positives. Needs numpy, scikit-learn, the Python package gpureg, and clang-format for
+--header."""
 
 import argparse
-import copy
 import json
 import pathlib
+import re
+import shutil
+import subprocess
+import sys
+from typing import NamedTuple
 
 import numpy as np
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
-# What a model may look at beside the overlap: free space, surface_sides of surfaces.
+
+
+class Model(NamedTuple):
+    """The evidence beside the overlap that a model has."""
+
+    free_space: bool
+    surface_sides: bool
+
+    @property
+    def overlap_alone(self):
+        return not self.free_space and not self.surface_sides
+
+
 MODELS = {
-    "everything": (True, True),
-    "surface_sides": (False, True),
-    "free_space": (True, False),
-    "neither": (False, False),
+    "free_space_and_surface_sides": Model(True, True),
+    "surface_sides": Model(False, True),
+    "free_space": Model(True, False),
+    "overlap_alone": Model(False, False),
 }
+REGRESSIONS = ("ranking", "confidence", "overlap")
+
+MAX_ERROR = 0.2  # metres, Redwood's rule for a correct pose
+MIN_SEPARATION = 2  # j - i: neighbours in the sequence do not count in Redwood's protocol
+
+# Inverse strengths of the L2 penalty. Chosen among 38 settings by the tables of docs/accuracy.md
+# and by a correct pose in a changed place.
+STRENGTHS = {"ranking": 0.15, "confidence": 0.00025, "overlap": 1.0}
+NO_PENALTY = 1e6  # for slope and intercept, which two numbers cannot overfit
+MAX_ITERATIONS = 5000  # of the solver, which warns where they are too few
+MIN_SCALE = 1e-9  # bounds the standard deviation of a constant feature
+
+# Changed places. bench/results/accuracy_attempts.json compares weights; the two bounds were chosen by
+# hand.
+CHANGED_WEIGHT = 0.11  # of a changed pair beside the pair itself
+MAX_CHANGED = 0.1  # share of a cloud that is new
+CHANGED_NEAR = (0.3, 0.8)  # share of the new points in front of surfaces that is near
+CHANGED_SEED = 1
+
+PRECISIONS = (80, 95, 99)  # percent, at which recall is reported
+CALIBRATION_BINS = 10
+REPORTED, SURE = 0.5, 0.9  # confidences: the default threshold, and one of little risk
+# Kinds of false positives: a pose this close is nearly correct; one with less rotation than that has
+# moved along a wall; all others are in another place that looks alike.
+SMALL_ERROR = (5.0, 0.3)  # degrees, metres
+MAX_TRANSLATED_DEGREES = 10.0
+
+
+def library():
+    """The compiled module, which has the features."""
+    from gpureg import _core
+
+    return _core
 
 
 def blocks(path, size):
@@ -92,392 +139,388 @@ def off_by(truth, pose):
     )
 
 
-# Real rooms are full of things that one cloud saw and the other did not look at: where free space
-# is known, up to the second sum of both clouds' shares in front of surfaces speaks of which of a
-# pair's poses is the better one, and only through that of whether it is right.
-MIN_FRONT_VIOLATION, MIN_VERIFIED_FRONT_VIOLATION = 1e-3, 2e-2
-FRONT_VIOLATION_NEAR = (
-    8 + 9
-    # its place among the measures of a model that looks at both: after the overlap's and those of free
-    # space
-)
+def columns(evidence):
+    """Evidence of modes, as a result's JSON has it, as arrays with a row per mode."""
+    return {key: np.array([e[key] for e in evidence], float) for key in evidence[0]}
 
 
-def measures(evidence, free_space, surface_sides):
-    """What the model sees of one mode; the library computes the same (src/confidence/confidence.cpp)."""
-    log = lambda value, least: np.log(max(value, least))  # noqa: E731
-    overlap, balanced = evidence["overlap"], evidence["normal_weighted_overlap"]
-    information_eigenvalues = evidence["information_eigenvalues"]
-    out = [
-        log(evidence["match_support"], 1e-5),
-        log(evidence["match_inliers"], 1),
-        log(min(balanced), 1e-3),
-        log(max(balanced), 1e-3),
-        log(min(overlap), 1e-3),
-        log(information_eigenvalues[0], 1e-2),
-        log(information_eigenvalues[1], 1e-2),
-        sum(np.log1p(s) for s in information_eigenvalues),
-    ]
-    if free_space:
-        seen, impossible, hidden = evidence["seen"], evidence["impossible"], evidence["hidden"]
-        known = [k for k in (0, 1) if seen[k] > 0] or [0]
-        seen, impossible, hidden = ([v[k] for k in known] for v in (seen, impossible, hidden))
-        of_all = [s * i for s, i in zip(seen, impossible)]
-        out += [
-            min(seen),
-            max(seen),
-            max(of_all),
-            min(of_all),
-            max(impossible),
-            min(impossible),
-            log(max(impossible), 3e-3),
-            min(hidden),
-            log(sum(of_all) * (2 / len(of_all)), 1e-3),
-        ]
-    if surface_sides:
-        reach, around, back = evidence["reach"], evidence["around"], evidence["behind_surface"]
-        alike = [o / max(r, 1e-6) for o, r in zip(overlap, reach)]
-        out += [
-            log(sum(evidence["front_violation_near"]), MIN_FRONT_VIOLATION),
-            min(alike),
-            max(alike),
-            max(around),
-            min(around),
-        ]
-        # Where free space is known it says the rest; without, how much is in front or behind beside
-        # what touches.
-        if not free_space:
-            out.append(log(sum(evidence["front_violation_far"]), MIN_FRONT_VIOLATION))
-            in_front = [
-                n + f
-                for n, f in zip(evidence["front_violation_near"], evidence["front_violation_far"])
-            ]
-
-            def beside(shares):
-                return [s / max(s + r, 1e-6) for s, r in zip(shares, reach)]
-
-            out += [
-                max(beside(in_front)),
-                min(beside(in_front)),
-                log(sum(back), 1e-3),
-                max(beside(back)),
-                min(beside(back)),
-            ]
-    return out
+def rows(evidence, chosen):
+    return {key: values[chosen] for key, values in evidence.items()}
 
 
-FEW, SMALL_CLOUD = 80, 1500  # points that touch, of how many
-
-
-def with_so_few_points(evidence, points):
-    """What is left of a confidence where hardly any points touch (src/confidence/confidence.cpp). points:
-    of the prepared clouds, source and target.
+def overlap_factor(overlap, source_points, target_points):
+    """Factor on a confidence where few points overlap; arguments: (..., 2), and points of the
+    prepared clouds.
     """
-    touching = min(share * of for share, of in zip(evidence["overlap"], points))
-    return 1 - np.exp(-((touching / FEW * max(1, min(points) / SMALL_CLOUD)) ** 2))
-
-
-def has_free_space(evidence):
-    return max(evidence["seen"]) > 0
-
-
-def has_surface_sides(evidence):
-    return min(evidence["around"]) > 0
+    of = np.stack(np.broadcast_arrays(source_points, target_points), -1)
+    points = np.rint(np.asarray(overlap) * of).min(-1)
+    return library()._confidence_factor(points.astype(np.uint32), of.min(-1).astype(np.uint32))
 
 
 class Run:
+    """Modes of all pairs of a scene, in one array each; `pair` tells the pair of a mode."""
+
     weight = 1.0
 
-    def __init__(self, text, viewpoints="known"):
-        self.viewpoints = viewpoints
-        self.building, folder, result, *label = text.split("=")
-        self.label = {"label": label[0]} if label else {}
+    def __init__(self, building, folder, result, label=None, viewpoints="known"):
         folder = pathlib.Path(folder)
-        self.name = self.building + "/" + folder.name
-        truth, information = blocks(folder / "gt_all.log", 5), blocks(folder / "gt_all.info", 7)
-        strict, strict_information = blocks(folder / "gt.log", 5), blocks(folder / "gt.info", 7)
+        self.building, self.label, self.viewpoints = building, label, viewpoints
+        self.name = f"{building}/{folder.name}"
         recorded = json.loads(pathlib.Path(result).read_text())
-        pairs = [p for p in recorded["pairs"] if p["j"] - p["i"] > 1]
+        pairs = [p for p in recorded["pairs"] if p["j"] - p["i"] >= MIN_SEPARATION]
+        modes = [p.get("modes", []) for p in pairs]
+        if not any(modes):
+            sys.exit(f"error: {result}: no pair has a mode with evidence")
         self.refined = recorded["options"]["evidence"]["modes"]
-        self.in_truth = np.array([(p["i"], p["j"]) in strict for p in pairs])
-        self.keys, self.listed = [(p["i"], p["j"]) for p in pairs], set(truth)
+        self.keys = [(p["i"], p["j"]) for p in pairs]
+        self.modes_per_pair = np.array([len(m) for m in modes])
+        self.pair = np.repeat(np.arange(len(pairs)), self.modes_per_pair)
+        self.evidence = columns([m["evidence"] for of in modes for m in of])
+        self.poses = np.array([m["T_ij"] for of in modes for m in of], float).reshape(-1, 4, 4)
+        points = {f["number"]: f["points"] for f in recorded["fragments"]}
+        i, j = (np.array(side)[self.pair] for side in zip(*self.keys))
+        self.factor = overlap_factor(
+            self.evidence["overlap"],
+            np.vectorize(points.get)(j),
+            np.vectorize(points.get)(i),
+        )
+        self.free_space = bool((self.evidence["observed"] > 0).any())
+        self.correct, listed = self.check(folder / "gt_all.log", folder / "gt_all.info")
+        self.strict, in_truth = self.check(folder / "gt.log", folder / "gt.info")
+        self.listed, self.in_truth = listed, np.array([key in in_truth for key in self.keys])
         trajectory = folder / "poses.txt"
         self.fragments = (
             {k[0]: v for k, v in blocks(trajectory, 5).items()} if trajectory.exists() else {}
         )
-        self.modes = [p.get("modes", []) for p in pairs]
-        points = {f["number"]: f["points"] for f in recorded["fragments"]}
-        self.few = [
-            np.array(
-                [with_so_few_points(m["evidence"], (points[p["j"]], points[p["i"]])) for m in modes]
-            )
-            for p, modes in zip(pairs, self.modes)
-        ]
-        self.free = any(m and has_free_space(m[0]["evidence"]) for m in self.modes)
-        self.right, self.strict = [], []
-        for p, modes in zip(pairs, self.modes):
-            key = (p["i"], p["j"])
-            poses = np.array([m["T_ij"] for m in modes], float).reshape(-1, 4, 4)
-            wrong = np.full(len(modes), 9.0)
-            self.right.append(
-                (
-                    errors(truth[key], information[key], poses)
-                    if key in truth and len(modes)
-                    else wrong
-                )
-                <= 0.2
-            )
-            self.strict.append(
-                (
-                    errors(strict[key], strict_information[key], poses)
-                    if key in strict and len(modes)
-                    else wrong
-                )
-                <= 0.2
-            )
-        self.x = {
-            model: [
-                np.array([measures(m["evidence"], *model) for m in modes]) for modes in self.modes
-            ]
-            for model in MODELS.values()
-            if self.free or not model[0]
-        }
+
+    def check(self, log, info):
+        """Which modes are correct, and the pairs of the log."""
+        truth, information = blocks(log, 5), blocks(info, 7)
+        correct = np.zeros(len(self.pair), bool)
+        for k, key in enumerate(self.keys):
+            if key not in truth:
+                continue
+            own = self.pair == k
+            if own.any():
+                correct[own] = errors(truth[key], information[key], self.poses[own]) <= MAX_ERROR
+        return correct, set(truth)
+
+    def has(self, model):
+        return self.free_space or not model.free_space
+
+    def features(self, model, regressand, modes=...):
+        return library()._confidence_features(rows(self.evidence, modes), *model, regressand)
 
 
-CHANGED_WEIGHT, MOST_CHANGED = 0.11, 0.1
-
-
-class ChangedRun:
-    """The pairs of a run, with things in one of their clouds that the other did not see: in front
-    of its surfaces, as far as it is around.
+class ChangedRun(Run):
+    """The pairs of a run with new things in one of their clouds, in front of the surfaces of the
+    other one, where this has any.
     """
 
     weight = CHANGED_WEIGHT
 
     def __init__(self, run):
-        random = np.random.default_rng(1)
-        modes = []
-        for pair in run.modes:
-            side, share, near = (
-                random.integers(2),
-                random.uniform(0, MOST_CHANGED),
-                random.uniform(0.3, 0.8),
-            )
-            modes.append([{"evidence": changed(m["evidence"], side, share, near)} for m in pair])
-        self.right, self.strict, self.refined = run.right, run.strict, run.refined
-        self.x = {
-            model: [np.array([measures(m["evidence"], *model) for m in ms]) for ms in modes]
-            for model in run.x
-        }
+        vars(self).update(vars(run))
+        random = np.random.default_rng(CHANGED_SEED)
+        draws = [
+            (random.integers(2), random.uniform(0, MAX_CHANGED), random.uniform(*CHANGED_NEAR))
+            for _ in run.keys
+        ]
+        side, share, near = (np.array(of)[run.pair] for of in zip(*draws))
+        self.evidence = changed(run.evidence, side, share, near)
 
 
 def changed(evidence, side, share, near):
-    out = copy.deepcopy(evidence)
+    """Evidence as if that share of the cloud on that side were new; arguments: one per mode."""
+    out = {key: values.copy() for key, values in evidence.items()}
+    of_side = np.arange(len(side)), side
     for key in (
         "overlap",
-        "reach",
+        "overlap_any_normal",
         "normal_weighted_overlap",
         "front_violation_near",
         "front_violation_far",
         "behind_surface",
     ):
-        out[key][side] *= 1 - share
-    out["front_violation_near"][side] += share * evidence["around"][side] * near
-    out["front_violation_far"][side] += share * evidence["around"][side] * (1 - near)
-    if evidence["seen"][side] > 0:
-        out["impossible"][side] = evidence["impossible"][side] * (1 - share) + share
-        out["hidden"][side] *= 1 - share
+        out[key][of_side] *= 1 - share
+    new = share * evidence["near_surface"][of_side]
+    out["front_violation_near"][of_side] += new * near
+    out["front_violation_far"][of_side] += new * (1 - near)
+    observed = np.where(evidence["observed"][of_side] > 0, share, 0)
+    out["free_space_violation"][of_side] *= 1 - observed
+    out["free_space_violation"][of_side] += observed
+    out["occluded"][of_side] *= 1 - observed
     out["match_support"] *= 1 - share
     return out
 
 
-class Logistic:
-    """Logistic regression on standardised measures, written as weights of the measures themselves.
+class Regression:
+    """weights: one per feature of the library."""
 
-    strength: inverse of the L2 penalty. What few buildings leave undetermined a strong penalty
-    shares out among alike measures, which orders the poses of other buildings better; but it also
-    draws all odds together, so slope and intercept are then fitted anew."""
+    def __init__(self, weights, bias):
+        self.weights, self.bias = weights, bias
 
-    def __init__(self, x, y, weight, strength):
-        from sklearn.linear_model import LogisticRegression  # what only applies a fit needs none
-
-        mean, scale = x.mean(0), np.maximum(x.std(0), 1e-9)
-        fit = LogisticRegression(C=strength, max_iter=5000).fit((x - mean) / scale, y, weight)
-        self.weights = fit.coef_[0] / scale
-        self.bias = float(fit.intercept_[0] - (self.weights * mean).sum())
-        again = LogisticRegression(C=1e6, max_iter=5000).fit(self.logit(x)[:, None], y, weight)
-        slope = float(again.coef_[0, 0])
-        self.weights, self.bias = (
-            slope * self.weights,
-            slope * self.bias + float(again.intercept_[0]),
-        )
-
-    def logit(self, x):
+    def log_odds(self, x):
         return x @ self.weights + self.bias
 
 
-def judged(x, model):
-    """Of the measures by which a mode is ranked, those by which the best one is judged."""
-    x = x.copy()
-    if all(model):
-        x[FRONT_VIOLATION_NEAR] = max(x[FRONT_VIOLATION_NEAR], np.log(MIN_VERIFIED_FRONT_VIOLATION))
-    return x
+def logistic(x, y, weight, strength):
+    """Logistic regression on standardised features, written as weights of the features themselves.
+
+    strength: inverse of the L2 penalty. Where few buildings leave weights undetermined, a strong
+    penalty shares them out among similar features, which orders the poses of other buildings better. It also draws
+    all odds together, so slope and intercept are fitted again without it."""
+    from sklearn.linear_model import LogisticRegression  # only fits need it
+
+    used = np.flatnonzero((x != 0).any(0))  # others belong to another model
+    mean, scale = x[:, used].mean(0), np.maximum(x[:, used].std(0), MIN_SCALE)
+    fit = LogisticRegression(C=strength, max_iter=MAX_ITERATIONS).fit(
+        (x[:, used] - mean) / scale, y, weight
+    )
+    weights = np.zeros(x.shape[1])
+    weights[used] = fit.coef_[0] / scale
+    first = Regression(weights, float(fit.intercept_[0] - (weights[used] * mean).sum()))
+    again = LogisticRegression(C=NO_PENALTY, max_iter=MAX_ITERATIONS).fit(
+        first.log_odds(x)[:, None], y, weight
+    )
+    slope, intercept = float(again.coef_[0, 0]), float(again.intercept_[0])
+    return Regression(slope * first.weights, slope * first.bias + intercept)
 
 
-def second_view(run, model, first):
-    """Measures of the best mode of each pair, its logit, its margin over the best rival, and how
-    many modes there are of those that were refined (many poses that end in one place agree; where
-    little holds them, each ends in its own); which mode it is; its share."""
-    rows, best, share = [], [], []
-    for x in run.x[model]:
-        if not len(x):
-            best.append(-1)
-            continue
-        own = first.logit(x)
-        k = int(own.argmax())
-        share.append(1 / np.exp(own - own[k]).sum())
-        logits = np.clip(own, -14, 14)
-        rival = max([v for i, v in enumerate(logits) if i != k], default=-14.0)
-        rows.append(np.r_[judged(x[k], model), logits[k], logits[k] - rival, len(x) / run.refined])
-        best.append(k)
-    return np.array(rows), best, np.array(share)
-
-
-RANKING, CONFIDENCE, OVERLAP = 0.15, 0.00025, 1.0  # strengths
+def best_modes(run, model, ranking):
+    """Features of the best mode of each pair that has one, for the second and third regression;
+    which mode it is; its share of the odds of all.
+    """
+    log_odds = ranking.log_odds(run.features(model, "ranking"))
+    rank = library()._confidence_rank_features(log_odds, run.modes_per_pair, run.refined)
+    best, share = [], []
+    for modes in np.split(np.arange(len(log_odds)), np.cumsum(run.modes_per_pair)[:-1]):
+        if len(modes):
+            best.append(modes[log_odds[modes].argmax()])
+            share.append(1 / np.exp(log_odds[modes] - log_odds[best[-1]]).sum())
+    best = np.array(best)
+    return run.features(model, "confidence", best) + rank[best], best, np.array(share)
 
 
 def fit(runs, beside, model):
-    """The three regressions from the runs; the second from those beside them, too."""
-    runs, beside = ([*of, *(run.changed for run in of)] for of in (runs, beside))
-    # Of pairs without a right mode there is nothing to learn about which mode is right. Without
-    # free space so little tells modes apart that their wrong ones help all the same.
-    ranked = [
-        (x, right, np.full(len(x), run.weight))
-        for run in runs
-        for x, right in zip(run.x[model], run.right)
-        if len(x) and (not model[0] or np.any(right))
-    ]
-    x, y, weight = (np.concatenate([np.asarray(row[k]) for row in ranked]) for k in range(3))
-    first = Logistic(x, y, weight, RANKING)
+    """The three regressions by name; the second also from the runs beside."""
+    runs, beside = ([*of, *map(ChangedRun, of)] for of in (runs, beside))
+    x, y, weight = [], [], []
+    for run in runs:
+        # Pairs without a correct mode do not teach which mode is correct. Without free space so
+        # little tells modes apart that their wrong ones help all the same.
+        known = np.bincount(run.pair[run.correct], minlength=len(run.keys)) > 0
+        chosen = known[run.pair] | (not model.free_space)
+        x.append(run.features(model, "ranking", chosen))
+        y.append(run.correct[chosen])
+        weight.append(np.full(chosen.sum(), run.weight))
+    ranking = logistic(*map(np.concatenate, (x, y, weight)), STRENGTHS["ranking"])
 
-    def second(of, kind, strength):
-        views = [second_view(run, model, first) for run in of]
-        y = [
-            [getattr(run, kind)[k][b] for k, b in enumerate(view[1]) if b >= 0]
-            for run, view in zip(of, views)
-        ]
-        weight = [np.full(len(view[0]), run.weight) for run, view in zip(of, views)]
-        return Logistic(
-            np.concatenate([view[0] for view in views]),
-            np.concatenate(y),
-            np.concatenate(weight),
-            strength,
+    def of_best(of, regression, label):
+        views = [best_modes(run, model, ranking) for run in of]
+        return logistic(
+            np.concatenate([x for x, _, _ in views]),
+            np.concatenate([getattr(run, label)[best] for run, (_, best, _) in zip(of, views)]),
+            np.concatenate([np.full(len(x), run.weight) for run, (x, _, _) in zip(of, views)]),
+            STRENGTHS[regression],
         )
 
-    return first, second(runs + beside, "right", CONFIDENCE), second(runs, "strict", OVERLAP)
+    return {
+        "ranking": ranking,
+        "confidence": of_best(runs + beside, "confidence", "correct"),
+        "overlap": of_best(runs, "overlap", "strict"),
+    }
 
 
-def figures(run, model, models):
-    x, best, share = second_view(run, model, models[0])
-    confidence = np.zeros(len(best))
-    overlapping = np.zeros(len(best))
-    found = np.array([b >= 0 for b in best])
-    confidence[found] = np.minimum(1 / (1 + np.exp(-models[1].logit(x))), share) * [
-        run.few[k][b] for k, b in enumerate(best) if b >= 0
-    ]
-    overlapping[found] = np.minimum(1 / (1 + np.exp(-models[2].logit(x))), confidence[found])
-    right = np.array([b >= 0 and bool(run.right[k][b]) for k, b in enumerate(best)])
-    strict = np.array([b >= 0 and bool(run.strict[k][b]) for k, b in enumerate(best)])
+def confidences(run, model, regressions):
+    """Of the best mode of each pair that has one: its index, confidence and overlap confidence."""
+    x, best, share = best_modes(run, model, regressions["ranking"])
+    correct, overlapping = (
+        1 / (1 + np.exp(-regressions[name].log_odds(x))) for name in ("confidence", "overlap")
+    )
+    correct = np.minimum(correct, share) * run.factor[best]
+    return best, correct, np.minimum(overlapping, correct)
+
+
+def figures(run, model, regressions):
+    best, found_confidence, found_overlapping = confidences(run, model, regressions)
+    pairs = len(run.keys)
+    confidence, overlapping = np.zeros(pairs), np.zeros(pairs)
+    correct, strict = np.zeros(pairs, bool), np.zeros(pairs, bool)
+    of = run.pair[best]
+    confidence[of], overlapping[of] = found_confidence, found_overlapping
+    correct[of], strict[of] = run.correct[best], run.strict[best]
     total = int(run.in_truth.sum())
+    among_modes = np.bincount(run.pair[run.strict], minlength=pairs) > 0
     out = {
-        "pairs": len(best),
+        "pairs": pairs,
         "ground_truth": total,
-        "generated": 100 * np.mean([v.any() for v, t in zip(run.strict, run.in_truth) if t]),
+        "generated": 100 * among_modes[run.in_truth].mean(),
         "raw": 100 * strict.sum() / total,
     }
-    for name, good, score in (("geo", right, confidence), ("strict", strict, overlapping)):
+    for name, good, score in (("geo", correct, confidence), ("strict", strict, overlapping)):
         order = np.argsort(-score, kind="stable")
         recall = np.cumsum(strict[order]) / total
         precision = np.cumsum(good[order]) / np.arange(1, len(order) + 1)
-        for at in (80, 95, 99):
+        for at in PRECISIONS:
             out[f"{name}_R@P{at}"] = 100 * max(
                 [r for r, p in zip(recall, precision) if p >= at / 100], default=0
             )
         out[f"{name}_AP"] = 100 * (precision * strict[order]).sum() / total
-    bins = np.minimum((confidence * 10).astype(int), 9)
+    bins = np.minimum((confidence * CALIBRATION_BINS).astype(int), CALIBRATION_BINS - 1)
     out["ECE"] = sum(
-        (bins == b).mean() * abs(confidence[bins == b].mean() - right[bins == b].mean())
-        for b in range(10)
+        (bins == b).mean() * abs(confidence[bins == b].mean() - correct[bins == b].mean())
+        for b in range(CALIBRATION_BINS)
         if (bins == b).any()
     )
-    sure = confidence > 0.9
-    out["right_above_0.9"] = 100 * right[sure].mean() if sure.any() else None
+    sure = confidence > SURE
+    out["right_above_0.9"] = 100 * correct[sure].mean() if sure.any() else None
     if run.fragments:
-        out["above_half"] = kinds_of_mistakes(run, best, confidence, right)
+        out["above_half"] = kinds_of_false_positives(run, best, found_confidence)
     return out
 
 
-def kinds_of_mistakes(run, best, confidence, right):
-    """Of the reports with a confidence above one half that the 0.2 m rule calls wrong: how many
+def kinds_of_false_positives(run, best, confidence):
+    """Of the reports with a confidence above one half that are wrong by the 0.2 m rule: how many
     there are of each kind.
     """
     out = {
-        "reports": int((confidence > 0.5).sum()),
-        "unlisted": 0,
-        "near": 0,
-        "slid": 0,
-        "turned": 0,
+        "reports": int((confidence > REPORTED).sum()),
+        "little_overlap": 0,
+        "small_error": 0,
+        "translated": 0,
+        "alias": 0,
     }
-    for k in np.flatnonzero((confidence > 0.5) & ~right):
-        i, j = run.keys[k]
+    for mode in best[(confidence > REPORTED) & ~run.correct[best]]:
+        i, j = run.keys[run.pair[mode]]
         degrees, metres = off_by(
-            np.linalg.inv(run.fragments[i]) @ run.fragments[j],
-            np.array(run.modes[k][best[k]]["T_ij"], float).reshape(4, 4),
+            np.linalg.inv(run.fragments[i]) @ run.fragments[j], run.poses[mode]
         )
-        # Right by the trajectories, though the clouds share too little for gt_all; a little off;
-        # along a wall; in a place that looks alike.
-        kind = (
-            ("near" if (i, j) in run.listed else "unlisted")
-            if degrees < 5 and metres < 0.3
-            else "slid"
-            if degrees < 10
-            else "turned"
-        )
+        if degrees < SMALL_ERROR[0] and metres < SMALL_ERROR[1]:
+            # Of pairs that overlap too little for gt_all even a correct pose counts as wrong.
+            kind = "small_error" if (i, j) in run.listed else "little_overlap"
+        else:
+            kind = "translated" if degrees < MAX_TRANSLATED_DEGREES else "alias"
         out[kind] += 1
     return out
 
 
+def constant(name):
+    """The C++ constant of a model: kFreeSpace for free_space."""
+    return "k" + "".join(word.capitalize() for word in name.split("_"))
+
+
 def header(models):
-    # Names as the library's confidence.cpp reads them.
+    """C++ of the models by name, each a dictionary of regressions; not yet formatted."""
+    names = library()._confidence_feature_names()
+
+    def regression(of):
+        weights = ", ".join(
+            f"{{Feature::{name}, {weight:.9g}}}"
+            for name, weight in zip(names, of.weights)
+            if weight != 0
+        )
+        return f"{{weights({{{weights}}}), {of.bias:.9g}}}"
+
     lines = [
         "// SPDX-License-Identifier: BSD-3-Clause",
-        "// Written by bench/accuracy/fit_confidence.py; docs/accuracy.md says how well it does.",
+        "// Written by bench/accuracy/fit_confidence.py; docs/accuracy.md has its accuracy.",
         "#pragma once",
         "",
-        "namespace gpureg::confidence_model {",
+        '#include "confidence/regression.hpp"',
         "",
-        "struct Regression {",
-        "  const double* weights;",
-        "  double bias;",
-        "};",
-        "",
-        "struct Model {",
-        "  Regression ranking, confidence, overlap;",
-        "};",
+        "namespace gpureg::confidence {",
         "",
     ]
-    stages = ("ranking", "confidence", "overlap")
-    for name, regressions in zip(MODELS, models):
-        for stage, regression in zip(stages, regressions):
-            lines.append(
-                f"constexpr double {name}_{stage}[] = {{{', '.join(f'{w:.9g}' for w in regression.weights)}}};"
+    for name, of in models.items():
+        three = ", ".join(regression(of[stage]) for stage in REGRESSIONS)
+        lines += [f"constexpr ConfidenceModel {constant(name)}{{{three}}};", ""]
+    return "\n".join([*lines, "}  // namespace gpureg::confidence", ""])
+
+
+def read_header(text):
+    """The models of header(), by name."""
+    names = library()._confidence_feature_names()
+    models = {}
+    for name in MODELS:
+        body = re.search(rf"ConfidenceModel {constant(name)}\{{(.*?)\}};", text, re.DOTALL)
+        if body is None:
+            raise ValueError(f"the header has no {constant(name)}")
+        found = re.findall(r"weights\(\{(.*?)\}\),\s*([^}\s]+)\s*\}", body[1] + "}", re.DOTALL)
+        models[name] = {}
+        for stage, (weights, bias) in zip(REGRESSIONS, found, strict=True):
+            of = dict(re.findall(r"\{Feature::(\w+),\s*([^}\s]+)\s*\}", weights))
+            if unknown := of.keys() - set(names):
+                raise ValueError(f"the library has no feature {sorted(unknown)[0]}")
+            models[name][stage] = Regression(
+                np.array([float(of.get(feature, 0)) for feature in names]), float(bias)
             )
-        of = ", ".join(
-            f"{{{name}_{stage}, {regression.bias:.9g}}}"
-            for stage, regression in zip(stages, regressions)
-        )
-        lines += [f"constexpr Model {name}{{{of}}};", ""]
-    return "\n".join(lines + ["}  // namespace gpureg::confidence_model", ""])
+    return models
+
+
+def clang_format():
+    """The formatter of scripts/format, or another one, or None."""
+    own = ROOT / "build/format-venv/bin/clang-format"
+    return str(own) if own.exists() else shutil.which("clang-format")
+
+
+def write_header(path, models):
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(header(models))
+    tool = clang_format()
+    if tool is None:
+        print(f"{path} is not formatted, as there is no clang-format: run scripts/format")
+    else:
+        style = f"--style=file:{ROOT / '.clang-format'}"
+        subprocess.run([tool, "-i", style, str(path)], check=True)
+
+
+def text_of(figures):
+    def value(key, v):
+        return f"{v:.3f}" if key == "ECE" else f"{v:.1f}" if isinstance(v, float) else f"{v}"
+
+    return " ".join(f"{key} {value(key, v)}" for key, v in figures.items())
+
+
+def test_and_fit(runs, beside, others):
+    """Figures of all runs by fits on other buildings, and the models of the fit on all of them."""
+
+    def allowed(of, model, building=None):
+        # The overlap alone tells other things in bare generated rooms than elsewhere.
+        if of is beside and model.overlap_alone:
+            return []
+        return [run for run in of if run.has(model) and run.building != building]
+
+    tested = []
+    for name, model in MODELS.items():
+        fits = {}
+        for run in [*runs, *beside, *others]:
+            left = allowed(runs, model, run.building)
+            # Models without free space are tested where there is none. Those without sides of
+            # surfaces are tested everywhere, which shows the gain of the sides.
+            if not left or not run.has(model) or (not model.free_space and run.free_space):
+                continue
+            if run.building not in fits:
+                fits[run.building] = fit(left, allowed(beside, model, run.building), model)
+            out = {
+                "scene": run.name,
+                **({"label": run.label} if run.label else {}),
+                "viewpoints": run.viewpoints,
+                "model": name,
+                **figures(run, model, fits[run.building]),
+            }
+            tested.append(out)
+            print(text_of(out), flush=True)
+    models = {
+        name: fit(allowed(runs, model), allowed(beside, model), model)
+        for name, model in MODELS.items()
+    }
+    return tested, models
+
+
+def parse_run(text, viewpoints="known"):
+    building, folder, result, *label = text.split("=")
+    return Run(building, folder, result, label[0] if label else None, viewpoints)
 
 
 def main():
@@ -485,81 +528,27 @@ def main():
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("runs", nargs="+", metavar="RUN", help="BUILDING=SCENE_FOLDER=RESULT.json")
-    parser.add_argument(
-        "--beside",
-        nargs="+",
-        default=[],
-        metavar="RUN=LABEL",
-        help="fitted to by the second regression alone: other sensors, other buildings",
-    )
-    parser.add_argument("--others", nargs="+", default=[], metavar="RUN=LABEL", help="tested only")
-    parser.add_argument(
-        "--origin",
-        nargs="+",
-        default=[],
-        metavar="RUN",
-        help="tested only: the origin was the only viewpoint",
-    )
-    parser.add_argument(
-        "--unknown",
-        nargs="+",
-        default=[],
-        metavar="RUN",
-        help="tested only: no viewpoint was known",
-    )
+    for name, meta, text in (
+        ("--beside", "RUN=LABEL", "the second regression alone is fitted to them"),
+        ("--others", "RUN=LABEL", "tested only"),
+        ("--origin", "RUN", "tested only: the origin was the only viewpoint"),
+        ("--unknown", "RUN", "tested only: no viewpoint was known"),
+    ):
+        parser.add_argument(name, nargs="+", default=[], metavar=meta, help=text)
     parser.add_argument("--header", type=pathlib.Path)
     parser.add_argument("-o", "--output", type=pathlib.Path)
     arguments = parser.parse_args()
-    runs = [Run(text) for text in arguments.runs]
-    beside = [Run(text) for text in arguments.beside]
-    for run in runs + beside:
-        run.changed = ChangedRun(run)
-    tests = runs + beside + [Run(text) for text in arguments.others]
-    tests += [Run(text, "origin") for text in arguments.origin] + [
-        Run(text, "unknown") for text in arguments.unknown
-    ]
-    record = {"runs": []}
-
-    def allowed(of, model, building=None):
-        # Who knows neither free space nor surface_sides has the overlap alone, and what that tells in bare
-        # generated rooms it tells nowhere else.
-        if of is beside and not any(model):
-            return []
-        return [run for run in of if model in run.x and run.building != building]
-
-    for name, model in MODELS.items():
-        fits = {}
-        for run in tests:
-            others = allowed(runs, model, run.building)
-            # Those without free space are tested where there is none; those without surface_sides on all,
-            # to tell what surface_sides give.
-            if not others or model not in run.x or (not model[0] and run.free):
-                continue
-            if run.building not in fits:
-                fits[run.building] = fit(others, allowed(beside, model, run.building), model)
-            out = {
-                "scene": run.name,
-                **run.label,
-                "viewpoints": run.viewpoints,
-                "model": name,
-                **figures(run, model, fits[run.building]),
-            }
-            record["runs"].append(out)
-            print(
-                " ".join(
-                    f"{k} {v:.3f}"
-                    if k == "ECE"
-                    else f"{k} {v:.1f}"
-                    if isinstance(v, float)
-                    else f"{k} {v}"
-                    for k, v in out.items()
-                )
-            )
-    models = [fit(allowed(runs, model), allowed(beside, model), model) for model in MODELS.values()]
+    tested, models = test_and_fit(
+        [parse_run(text) for text in arguments.runs],
+        [parse_run(text) for text in arguments.beside],
+        [parse_run(text) for text in arguments.others]
+        + [parse_run(text, "origin") for text in arguments.origin]
+        + [parse_run(text, "unknown") for text in arguments.unknown],
+    )
     if arguments.header:
-        arguments.header.write_text(header(models))
+        write_header(arguments.header, models)
     if arguments.output:
-        arguments.output.write_text(json.dumps(record, indent=1) + "\n")
+        arguments.output.write_text(json.dumps({"runs": tested}, indent=1) + "\n")
 
 
 if __name__ == "__main__":

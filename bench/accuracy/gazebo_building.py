@@ -3,12 +3,12 @@
 """Makes one mesh of a Gazebo world, to be scanned by `gpureg generate --building`.
 
 Visual meshes, boxes, cylinders and spheres of all models at their poses; planes are left out. A
-visual mesh whose file cannot be read is replaced by the model's collision geometry. Prints what it
-left out.
+visual mesh whose file cannot be read is replaced by the model's collision geometry. Prints the
+files that it left out.
 
 usage: gazebo_building.py FILE.world|FILE.sdf|MESH.dae --models FOLDER... [--floor] -o BUILDING.ply
-FOLDER holds one folder for each model, with its model.sdf; what model://, file:// and package://
-name is looked for in it. Needs numpy, trimesh and the command assimp (Debian's assimp-utils).
+FOLDER holds one folder for each model, with its model.sdf; model://, file:// and package://
+addresses are looked for in it. Needs numpy, trimesh and the command assimp (Debian's assimp-utils).
 """
 
 import argparse
@@ -22,7 +22,9 @@ import xml.etree.ElementTree as xml
 import numpy as np
 import trimesh
 
-FARTHEST = 1000  # metres
+FLOOR = 0.1  # metres, thickness of the ground plane of --floor
+# Metres from the origin. A model beyond fell through the floor before the world was saved.
+MAX_DISTANCE = 1000
 
 
 def matrix(text):
@@ -39,7 +41,7 @@ class Baker:
 
     def find(self, uri):
         name = re.sub(r"^(model|file|package)://", "", uri)
-        # What a package or a models folder is called where the world was made says nothing here.
+        # Packages and folders of models have other names on the machine where the world was made.
         parts = pathlib.PurePosixPath(name).parts
         for folder in self.folders:
             for k in range(len(parts)):
@@ -96,9 +98,7 @@ class Baker:
 
     def model(self, node, world_from_parent):
         world_from_model = world_from_parent @ matrix(node.findtext("pose"))
-        if (
-            np.abs(world_from_model[:3, 3]).max() > FARTHEST
-        ):  # fell through the floor before the world was saved
+        if np.abs(world_from_model[:3, 3]).max() > MAX_DISTANCE:
             self.missing.add(f"{node.get('name')} at {world_from_model[:3, 3]}")
             return
         for include in node.findall("include"):
@@ -158,7 +158,7 @@ def main():
             np.max([p.bounds[1] for p in baker.parts], 0),
         )
         baker.parts.append(
-            trimesh.creation.box(bounds=[[low[0], low[1], -0.1], [high[0], high[1], 0]])
+            trimesh.creation.box(bounds=[[low[0], low[1], -FLOOR], [high[0], high[1], 0]])
         )
     whole = trimesh.util.concatenate(
         [trimesh.Trimesh(p.vertices, p.faces, process=False) for p in baker.parts]

@@ -1,14 +1,13 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""A scene as a worse sensor, or a worse odometry, would have brought it, for fit_confidence.py
---beside.
+"""A scene as of a worse sensor, or a worse odometry, for fit_confidence.py --beside.
 
 Drift bends each fragment by a smooth field: 24 waves of 0.7 to 3 m that together move a point by
 --drift metres (root mean square, each axis). Noise moves every point by itself, before the voxels
-average it. What depth cameras do that neither is like: bumps, a field of waves of 6 to 25 cm, as
-their errors are alike next to each other, which turns normals; holes, balls of 5 to 20 cm without a
+average it. Depth cameras also make bumps, a field of waves of 6 to 25 cm, as
+errors of neighbouring points are similar, which turns normals; holes, balls of 5 to 20 cm without a
 point, where a surface was too dark, too bright or too steep; and flying points, patches of 2 to 6
-cm that hang 2 to 12 cm before their surface, towards one of the cameras. Everything else of SCENE
+cm, 2 to 12 cm in front of their surface, towards one of the cameras. Everything else of SCENE
 (truth, cameras.txt) is copied.
 
 usage: other_sensor.py SCENE OUT [--drift METRES] [--noise METRES] [--bumps METRES] [--holes SHARE]
@@ -23,7 +22,8 @@ import sys
 import numpy as np
 from cameras import cameras
 
-WAVES = 24
+# Chosen by hand; no record compares other values.
+WAVES = 24  # in the sum that makes a field
 DRIFT, BUMPS = (0.7, 3.0), (0.06, 0.25)  # metres, shortest and longest wave
 HOLE, PATCH = (0.05, 0.2), (0.02, 0.06)  # metres, smallest and largest radius
 FLIGHT = (0.02, 0.12)  # metres before the surface
@@ -99,7 +99,7 @@ def main():
             waves(points, arguments.drift, DRIFT, random)
             + random.normal(size=points.shape) * arguments.noise
         )
-        # What is not asked for draws no numbers, so that scenes without it keep their bytes.
+        # Without bumps no numbers are drawn for them, so that such scenes keep their bytes.
         if arguments.bumps > 0:
             points += waves(points, arguments.bumps, BUMPS, random)
         still = points.copy()

@@ -20,7 +20,10 @@ import tempfile
 
 import record
 
-WITHIN = 0.0125
+WITHIN = 0.0125  # data units: distance of points that belong together, as in the paper
+BOUNDS = (0.01, 0.02, 0.05)  # data units: RMSE bounds of the paper's table
+DIAMETER = 2.0  # data units
+COLUMNS = ("x", "y", "z", "nx", "ny", "nz")  # floats of a point
 
 
 def read_ply(path):
@@ -29,22 +32,22 @@ def read_ply(path):
     end = data.index(b"end_header\n") + len(b"end_header\n")
     header = data[:end].decode().split("\n")
     count = next(int(line.split()[2]) for line in header if line.startswith("element vertex"))
-    if (
-        "format binary_little_endian 1.0" not in header
-        or sum(line.startswith("property float") for line in header) != 6
-    ):
+    if "format binary_little_endian 1.0" not in header or sum(
+        line.startswith("property float") for line in header
+    ) != len(COLUMNS):
         sys.exit(f"error: {path}: expected binary x y z nx ny nz")
-    values = array.array("f", data[end : end + 24 * count])
+    size = array.array("f").itemsize * len(COLUMNS)
+    values = array.array("f", data[end : end + size * count])
     if sys.byteorder == "big":
         values.byteswap()
-    return [values[k : k + 6] for k in range(0, len(values), 6)]
+    return [values[k : k + len(COLUMNS)] for k in range(0, len(values), len(COLUMNS))]
 
 
 def write_ply(path, rows):
     values = array.array("f", (value for row in rows for value in row))
     if sys.byteorder == "big":
         values.byteswap()
-    properties = "".join(f"property float {name}\n" for name in ("x", "y", "z", "nx", "ny", "nz"))
+    properties = "".join(f"property float {name}\n" for name in COLUMNS)
     header = f"ply\nformat binary_little_endian 1.0\nelement vertex {len(rows)}\n{properties}end_header\n"
     path.write_bytes(header.encode() + values.tobytes())
 
@@ -61,7 +64,7 @@ def random_pose(generator):
     """Any rotation, uniformly; a translation of about a diameter."""
     q = [generator.gauss(0, 1) for _ in range(4)]
     w, x, y, z = (value / math.hypot(*q) for value in q)
-    t = [generator.gauss(0, 2) for _ in range(3)]
+    t = [generator.gauss(0, DIAMETER) for _ in range(3)]
     return [
         [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y), t[0]],
         [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x), t[1]],
@@ -169,7 +172,7 @@ def main():
                 ),
                 **{
                     f"below_{bound}": sum(e < bound for e in errors) / len(errors)
-                    for bound in (0.01, 0.02, 0.05)
+                    for bound in BOUNDS
                 },
                 "pairs": results,
             }
@@ -180,7 +183,7 @@ def main():
             flush=True,
         )
     options = report["options"]
-    options["hypothesis"].pop("seed", None)
+    options.pop("seed", None)
     command = (
         f"bench/accuracy/range_pairs.py --voxel-size {arguments.voxel_size} --seeds {' '.join(map(str, arguments.seeds))} "
         f"--backend {report['environment']['backend']}"

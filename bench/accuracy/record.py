@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What the accuracy benchmarks share: arguments, the command gpureg, and a JSON record that says
-how its numbers were made.
+"""Shared by the benchmarks: arguments, the command gpureg, and a JSON record with the command and
+the commit that made it.
 """
 
 import argparse

@@ -3,7 +3,7 @@
 """Recall and precision on the 190 pairs of 20 real fragments (7-Scenes red kitchen, 3DMatch),
 Redwood's protocol.
 
-`gpureg batch` and `gpureg evaluate` for each seed; the record holds what evaluate's JSON says.
+`gpureg batch` and `gpureg evaluate` for each seed; the record holds evaluate's JSON.
 usage: redkitchen.py [--preset loopsmart] [--seeds 1 2 3] [--backend auto] [--scene
 redkitchen/fragments] [--data DIR] [-o FILE]"""
 
@@ -76,7 +76,7 @@ def mean(*path):
 
 
 options = batch["options"]
-options["hypothesis"].pop("seed", None)
+options.pop("seed", None)
 command = (
     f"bench/accuracy/redkitchen.py --preset {arguments.preset} --seeds {' '.join(map(str, arguments.seeds))} "
     f"--backend {batch['environment']['backend']} --scene {arguments.scene}"

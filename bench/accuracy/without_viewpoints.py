@@ -1,11 +1,10 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""A scene as somebody has it who does not know where the sensor was, for fit_confidence.py --origin
-and --unknown.
+"""A scene without known viewpoints, for fit_confidence.py --origin and --unknown.
 
 Either the same clouds without cameras.txt, whose normals then turn to the origin; or (--unknown)
-clouds that come with a direction at every point, towards the nearest of every fifth camera: they
-say which side of a surface was seen, and nothing about where from. The clouds are those of SCENE
+clouds with a direction at every point, towards the nearest of every fifth camera: it tells the side
+of a surface that was observed, and no viewpoint. The clouds are those of SCENE
 (cloud_bin_<i>.ply, cameras.txt); the ground truth is copied along.
 
 usage: without_viewpoints.py SCENE OUT [--unknown]
@@ -18,6 +17,8 @@ import sys
 
 import numpy as np
 from cameras import cameras
+
+EVERY = 5  # thins out the cameras, whose neighbours in the sequence stand close together
 
 
 def towards(points, positions):
@@ -47,7 +48,7 @@ def main():
     import gpureg
 
     positions = {
-        fragment: np.array(every[::5])
+        fragment: np.array(every[::EVERY])
         for fragment, every in cameras(arguments.scene / "cameras.txt").items()
     }
     for cloud in clouds:

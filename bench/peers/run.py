@@ -6,7 +6,7 @@ Every method gets the same clouds (gpureg's 5 cm voxel centroids with normals; g
 with the raw points), the same threads and the parameters that its own documentation recommends,
 runs in a process of its own, prepares each fragment once and then aligns pair by pair. A peer that
 is not installed is skipped with a message; one that crashes or hangs on a pair loses that pair.
-`gpureg evaluate` judges. Pairs: those with j - i > 1, as in Redwood's protocol; with --others N,
+`gpureg evaluate` evaluates them. Pairs: those with j - i > 1, as in Redwood's protocol; with --others N,
 all pairs of the ground truth and N others, drawn by --seed. Times of a pair are wall clock and
 processor seconds: the second say more where other programs run beside. usage: run.py [--scene
 redkitchen/fragments] [--methods open3d_ransac ...] [--others N] [--list] [-o FILE] Needs Python 3
@@ -49,7 +49,7 @@ def choose_pairs(folder, fragments, others, seed):
 
 
 def document(name, about, results, fragments, lost):
-    """What `gpureg evaluate` reads."""
+    """Input of `gpureg evaluate`."""
     pairs = []
     for line in sorted(results, key=lambda line: (line["i"], line["j"])):
         aligned = line["pose"] is not None and line.get(
@@ -127,8 +127,8 @@ def table(entries):
 
 
 def kept_entries(arguments, pairs):
-    """With --update, what an earlier run on the same pairs says about methods that this one does
-    not run.
+    """With --update, entries of an earlier run on the same pairs, of methods that this one does not
+    run.
     """
     if not arguments.update:
         return {}

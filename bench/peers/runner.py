@@ -12,7 +12,7 @@ HERE = pathlib.Path(__file__).resolve().parent
 
 
 def check(name):
-    """What a method says about itself, or a text why it is not here."""
+    """Description of a method, or the reason why it cannot run here."""
     done = subprocess.run(
         [sys.executable, HERE / "worker.py", name, "--check"], capture_output=True, text=True
     )

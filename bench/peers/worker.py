@@ -3,8 +3,8 @@
 """One method in a process of its own: started by run.py, a line of JSON a pair, so that a peer that
 hangs or crashes costs one pair.
 
-usage: worker.py METHOD --check                       what it is, or exit status 3 and why it is not
-installed
+usage: worker.py METHOD --check                       its description, or exit status 3 and the
+reason why it is not installed
        worker.py METHOD CLOUDS PAIRS OUTPUT SEED      PAIRS: JSON list of [i, j, initial pose or
        null]"""
 

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What is said about one scene beyond recall and precision, from the verdicts on its pairs (`gpureg
-evaluate --json`).
+"""Figures of a scene beyond recall and precision, from its evaluated pairs (`gpureg evaluate
+--json`).
 """
 
 import pathlib
@@ -83,7 +83,7 @@ def misses(pairs):
 
 
 def wrong_reports(pairs):
-    """What the strict rule calls false: right poses of pairs with little overlap, wrong poses of
+    """False positives of the strict rule: correct poses of pairs with little overlap, wrong poses of
     known pairs, and reports on unknown ones.
     """
     false = [pair for pair in pairs if pair["reported"] and not pair["strict"]]

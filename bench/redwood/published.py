@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What was published for Redwood's four scenes (strict rule, mean of the scenes): recall and
+"""Published figures of Redwood's four scenes (strict rule, mean of the scenes): recall and
 precision in %, time of a pair.
 """
 

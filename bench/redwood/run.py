@@ -6,8 +6,8 @@ mean, published rows beside measured ones.
 SCENE: folders in Redwood's layout (the four scenes of scripts/fetch_redwood, 3DMatch's scenes,
 those of `gpureg generate`), as paths or as names under --data. Without one, scenes are generated,
 the same on every machine. Every preset runs with every seed through `gpureg batch` on every backend
-that is there, `gpureg evaluate` judges; peers that are installed run once, through bench/peers
-(--peers none: without). The record holds what else is worth knowing: recall/precision curves,
+that is there, `gpureg evaluate` evaluates; peers that are installed run once, through bench/peers
+(--peers none: without). The record also holds recall/precision curves,
 recall against overlap, where the misses are, rotation errors of the wrong poses, registration
 recall by 3DMatch's rule where its logs are, and times with and without the preparation of clouds.
 usage: run.py [SCENE ...] [--presets loopsmart default] [--seeds 1 2 3] [--peers all|none|NAME ...]
@@ -170,7 +170,7 @@ def spread(values):
 
 
 def over_seeds(runs):
-    """Mean and standard deviation of what a table shows."""
+    """Mean and standard deviation of the figures of a table."""
 
     def of(rule, *path):
         values = []
@@ -328,7 +328,7 @@ def print_all(document):
             f"{pm('recall_at_95'):>14}{percent(m['recall_at_99']['mean']):>8}{percent(m['average_precision']['mean']):>8}"
         )
     print(
-        "\nwhere true pairs are missed; what false reports are (sums over seeds); registration recall (15 deg, 0.3 m)"
+        "\nmissed true pairs and false positives by kind (sums over seeds); registration recall (15 deg, 0.3 m)"
     )
     for method in document["methods"]:
         for name in names:
@@ -421,12 +421,7 @@ def main():
                         runs.append(run)
                         environment[backend] = batch["environment"]
                         method["options"] = {
-                            **batch["options"],
-                            "hypothesis": {
-                                k: v
-                                for k, v in batch["options"]["hypothesis"].items()
-                                if k != "seed"
-                            },
+                            k: v for k, v in batch["options"].items() if k != "seed"
                         }
                         print(
                             f"{method['label']}, {scene.name}, seed {seed}: {percent(run['strict']['recall'])} / {percent(run['strict']['precision'])}",

@@ -1,7 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Finds fragments and truth of a scene in the layouts that are around, and complains about what is
-missing.
-"""
+"""Finds fragments and truth of a scene in the usual layouts, and names missing files."""
 
 import pathlib
 import re

@@ -1,15 +1,15 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The library's confidences are those that bench/accuracy/fit_confidence.py computes from the same
-evidence and coefficients.
+"""bench/accuracy/fit_confidence.py and the library agree on the features and on the coefficients of
+the confidence.
 """
 
 import pathlib
-import re
 import sys
 
 import gpureg
 import numpy as np
 import pytest
+from gpureg import _core
 from scenes import moved, pose
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
@@ -18,65 +18,53 @@ if not (ROOT / "bench/accuracy/fit_confidence.py").exists():
 sys.path.insert(0, str(ROOT / "bench/accuracy"))
 import fit_confidence
 
+HEADER = (ROOT / "src/confidence/confidence_model.hpp").read_text()
 SIDES = (
     "overlap",
-    "reach",
+    "overlap_any_normal",
     "normal_weighted_overlap",
-    "seen",
-    "impossible",
-    "hidden",
-    "around",
+    "observed",
+    "free_space_violation",
+    "occluded",
+    "near_surface",
     "front_violation_near",
     "front_violation_far",
     "behind_surface",
 )
-
-
-def shipped(name):
-    """The three regressions of a model, out of the header."""
-    text = (ROOT / "src/confidence/confidence_model.hpp").read_text()
-    biases = re.search(rf"constexpr Model {name}{{{{(.*)}}}};", text).group(1)
-    out = []
-    for stage in ("ranking", "confidence", "overlap"):
-        fit = fit_confidence.Logistic.__new__(fit_confidence.Logistic)
-        fit.weights = np.array(
-            re.search(rf"{name}_{stage}\[\] = {{([^}}]*)}}", text).group(1).split(","), float
-        )
-        fit.bias = float(re.search(rf"{name}_{stage}, ([^}}]*)}}", biases + "}").group(1))
-        out.append(fit)
-    return out
+ALONE = ("match_inliers", "match_support", "information_eigenvalues")
 
 
 def evidence_of(mode):
+    """As in a result's JSON."""
     e = mode.evidence
+    sides = {key: [getattr(e, f"source_{key}"), getattr(e, f"target_{key}")] for key in SIDES}
+    return {**sides, **{key: getattr(e, key) for key in ALONE}}
+
+
+def some_evidence(modes=3):
+    rng = np.random.default_rng(1)
+    sides = {key: rng.uniform(0.1, 0.5, (modes, 2)) for key in SIDES}
     return {
-        **{side: [getattr(e, f"source_{side}"), getattr(e, f"target_{side}")] for side in SIDES},
-        "match_inliers": e.match_inliers,
-        "match_support": e.match_support,
-        "information_eigenvalues": list(e.information_eigenvalues),
+        **sides,
+        "match_inliers": np.arange(modes) + 10.0,
+        "match_support": np.full(modes, 0.01),
+        "information_eigenvalues": np.sort(rng.uniform(1, 9, (modes, 6))),
     }
 
 
-def expected(modes, name, refined, points):
-    """Confidence and overlap confidence of the best mode."""
-    model, (ranking, confidence, overlap) = fit_confidence.MODELS[name], shipped(name)
-
-    class Run:
-        x = {
-            model: [np.array([fit_confidence.measures(e, *model) for e in map(evidence_of, modes)])]
-        }
-
-    Run.refined = refined
-    x, best, share = fit_confidence.second_view(Run, model, ranking)
-    assert best == [0]
-    few = fit_confidence.with_so_few_points(evidence_of(modes[0]), points)
-    sigmoid = [1 / (1 + np.exp(-fit.logit(x)[0])) for fit in (confidence, overlap)]
-    sure = min(sigmoid[0], share[0]) * few
-    return sure, min(sigmoid[1], sure)
+def run_of(result, options, source, target):
+    """The modes of one pair, as the script sees them."""
+    run = fit_confidence.Run.__new__(fit_confidence.Run)
+    run.evidence = fit_confidence.columns([evidence_of(mode) for mode in result.modes])
+    run.modes_per_pair, run.refined = np.array([len(result.modes)]), options.evidence.modes
+    run.factor = fit_confidence.overlap_factor(
+        run.evidence["overlap"], len(source.points), len(target.points)
+    )
+    return run
 
 
 def corner(seed, boxes, points):
-    """A corner of a room with boxes, of which it is half seen."""
+    """Half of a corner of a room with boxes."""
     rng = np.random.default_rng(7)
     parts = [rng.random((points, 3)) * 3 * (np.arange(3) != axis) for axis in range(3)]
     for _ in range(boxes):
@@ -90,15 +78,15 @@ def corner(seed, boxes, points):
 
 
 @pytest.mark.parametrize("name", fit_confidence.MODELS)
-def test_as_fitted(name):
-    free_space, surface_sides = fit_confidence.MODELS[name]
+def test_the_shipped_coefficients_make_the_confidences(name):
+    model, regressions = fit_confidence.MODELS[name], fit_confidence.read_header(HEADER)[name]
     options = gpureg.RegistrationOptions.from_voxel_size(0.05)
     options.min_confidence = 0
-    if not free_space:
+    if not model.free_space:
         options.prepare.depth_maps = 0
-    if not surface_sides:
+    if not model.surface_sides:
         options.prepare.surface_side_distance = 0
-    seen = set()
+    differs = set()
     for seed, boxes, points in (
         (1, 6, 6000),
         (2, 3, 6000),
@@ -112,21 +100,86 @@ def test_as_fitted(name):
         target = gpureg.prepare(b, viewpoints=moved(eye, pose(seed)), options=options.prepare)
         result = gpureg.align(source, target, options=options)
         assert result.modes
-        want = expected(
-            result.modes, name, options.evidence.modes, (len(source.points), len(target.points))
-        )
+        run = run_of(result, options, source, target)
+        best, confidence, overlapping = fit_confidence.confidences(run, model, regressions)
+        assert best.tolist() == [0]
         np.testing.assert_allclose(
             (result.modes[0].confidence, result.modes[0].overlap_confidence),
-            want,
-            rtol=1e-6,
-            atol=1e-9,
+            (confidence[0], overlapping[0]),
+            rtol=1e-9,
+            atol=1e-12,
         )
-        front = sum(evidence_of(result.modes[0])["front_violation_near"])
-        seen.add(
-            "above"
-            if front > fit_confidence.MIN_VERIFIED_FRONT_VIOLATION
-            else "between"
-            if front > fit_confidence.MIN_FRONT_VIOLATION
-            else "below"
+        ranking, verified = (
+            run.features(model, regressand, best) for regressand in ("ranking", "confidence")
         )
-    assert not surface_sides or len(seen) > 1, seen
+        names = np.array(_core._confidence_feature_names())
+        differs.update(names[(ranking != verified).any(0)])
+    # Small front violations rank modes alone, where free space is known.
+    assert differs == ({"log_front_violation_near"} if all(model) else set())
+
+
+def test_the_header_is_of_todays_format():
+    written = fit_confidence.header(fit_confidence.read_header(HEADER))
+    assert "".join(written.split()) == "".join(HEADER.split())
+
+
+def test_features_of_each_model_are_those_with_weights():
+    names = np.array(_core._confidence_feature_names())
+    assert len(set(names)) == len(names)
+    rank = {"log_odds", "margin", "distinct_share"}
+    for name, regressions in fit_confidence.read_header(HEADER).items():
+        for stage, regressand in (("ranking", "ranking"), ("confidence", "confidence")):
+            x = _core._confidence_features(
+                some_evidence(), *fit_confidence.MODELS[name], regressand
+            )
+            used = set(names[(x != 0).any(0)]) | (rank if stage == "confidence" else set())
+            assert used == set(names[regressions[stage].weights != 0]), (name, stage)
+
+
+def test_rank_among_the_modes_of_each_pair():
+    names = _core._confidence_feature_names()
+    table = _core._confidence_rank_features([3.0, 20.0, 1.0], [2, 0, 1], 10)
+    rows = [
+        {name: value for name, value in zip(names, row) if value != 0} for row in table.tolist()
+    ]
+    assert rows == [
+        {"log_odds": 3, "margin": -11, "distinct_share": 0.2},
+        {"log_odds": 14, "margin": 11, "distinct_share": 0.2},
+        {"log_odds": 1, "margin": 15, "distinct_share": 0.1},
+    ]
+    for counts in ([2], [2, 2]):
+        with pytest.raises(ValueError, match="modes_per_pair"):
+            _core._confidence_rank_features([3.0, 20.0, 1.0], counts, 10)
+
+
+def test_wrong_evidence_is_named():
+    evidence = some_evidence()
+    for key, values, message in (
+        ("observed", None, "no 'observed'"),
+        ("overlap", np.zeros(3), "expected 2 numbers"),
+        ("occluded", np.zeros((2, 2)), "as many rows"),
+    ):
+        wrong = {k: v for k, v in evidence.items() if k != key}
+        if values is not None:
+            wrong[key] = values
+        with pytest.raises(ValueError, match=message):
+            _core._confidence_features(wrong, True, True, "ranking")
+    with pytest.raises(ValueError, match="regressand"):
+        _core._confidence_features(evidence, True, True, "pose")
+
+
+def test_changed_evidence_is_of_one_side():
+    evidence = some_evidence()
+    evidence["observed"][1] = 0
+    side, share = np.array([0, 1, 1]), np.full(3, 0.1)
+    out = fit_confidence.changed(evidence, side, share, np.full(3, 0.5))
+    of_side, other = (np.arange(3), side), (np.arange(3), 1 - side)
+    for key in SIDES:
+        np.testing.assert_array_equal(out[key][other], evidence[key][other])
+    np.testing.assert_allclose(out["overlap"][of_side], 0.9 * evidence["overlap"][of_side])
+    violation = evidence["free_space_violation"][of_side]
+    np.testing.assert_allclose(
+        out["free_space_violation"][of_side],
+        np.where(np.arange(3) == 1, violation, 0.9 * violation + 0.1),
+    )
+    assert (out["front_violation_far"] >= 0.9 * evidence["front_violation_far"]).all()

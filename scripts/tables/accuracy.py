@@ -92,10 +92,10 @@ def confidence():
         "| --- | --- | --- | --- | --- | --- | --- | --- | --- |",
     ]
     looks = {
-        "everything": "free space, surface_sides",
-        "surface_sides": "surface_sides",
+        "free_space_and_surface_sides": "free space, sides of surfaces",
+        "surface_sides": "sides of surfaces",
         "free_space": "free space",
-        "neither": "neither",
+        "overlap_alone": "neither",
     }
     for (viewpoints, model, scene), runs in sorted(
         groups.items(),
@@ -113,11 +113,16 @@ def confidence():
 
 
 def unseen():
-    """The same in short: what is shipped, in the simulated buildings."""
+    """The same in short: the shipped models, in the simulated buildings."""
     groups = {}
     for run in tested():
         if (
-            run["model"] == ("surface_sides" if run["viewpoints"] == "unknown" else "everything")
+            run["model"]
+            == (
+                "surface_sides"
+                if run["viewpoints"] == "unknown"
+                else "free_space_and_surface_sides"
+            )
             and "kitchen" not in run["scene"]
         ):
             groups.setdefault(run["viewpoints"], {}).setdefault(run["scene"], []).append(run)
@@ -137,10 +142,10 @@ def unseen():
 
 
 def other_sensors():
-    """The same buildings otherwise, and generated ones; what looks at everything."""
+    """Other sensors, voxels and buildings; the model with all evidence."""
     groups = {}
     for run in load("confidence.json")["runs"]:
-        if run["model"] == "everything" and run["viewpoints"] == "known":
+        if run["model"] == "free_space_and_surface_sides" and run["viewpoints"] == "known":
             groups.setdefault(run.get("label", "as they are"), []).append(run)
     out = [
         "| | scenes | best right, % | geometric R@P95 / R@P99, % | ECE | above 0.5, wrong of them | right above 0.9, % |",
@@ -169,38 +174,43 @@ def other_sensors():
 
 
 def mistakes():
-    """What the wrong reports of the fits that have not seen the building are; means over the runs
-    of each scene.
-    """
+    """Kinds of false positives by fits on other buildings; means over the runs of each scene."""
     groups = {}
     for run in tested():
-        if run["model"] == "everything" and run["viewpoints"] == "known" and "above_half" in run:
+        if (
+            run["model"] == "free_space_and_surface_sides"
+            and run["viewpoints"] == "known"
+            and "above_half" in run
+        ):
             groups.setdefault(run["scene"], []).append(run["above_half"])
     out = [
-        "| scene | reports above 0.5 | wrong by the 0.2 m rule | of them right by the trajectories, but not in gt_all | less than 5 deg and 0.3 m off | slid, less than 10 deg "
-        "| turned: another place that looks alike |",
+        "| scene | reports above 0.5 | wrong by the 0.2 m rule | of them right by the trajectories, but not in gt_all | less than 5 deg and 0.3 m off | moved along a wall, less than 10 deg "
+        "| perceptual alias: another place that looks alike |",
         "| --- | --- | --- | --- | --- | --- | --- |",
     ]
     for scene, runs in groups.items():
         of = {
             key: mean(run[key] for run in runs)
-            for key in ("reports", "unlisted", "near", "slid", "turned")
+            for key in ("reports", "little_overlap", "small_error", "translated", "alias")
         }
         wrong = sum(of.values()) - of["reports"]
         out.append(
-            f"| {scene} | {of['reports']:.1f} | {wrong:.1f} | {of['unlisted']:.1f} | {of['near']:.1f} | {of['slid']:.1f} | {of['turned']:.1f} |"
+            f"| {scene} | {of['reports']:.1f} | {wrong:.1f} | {of['little_overlap']:.1f} | {of['small_error']:.1f} | {of['translated']:.1f} | {of['alias']:.1f} |"
         )
     return out
 
 
-def agreement():
-    record = load("agreement.json")
+def loop_consistency():
+    record = load("loop_consistency.json")
     out = [
         "| scene | | best right, % | R@P95 / R@P99 / AP, % | ECE | above 0.9 | of them right, % |",
         "| --- | --- | --- | --- | --- | --- | --- |",
     ]
     for scene in record["scenes"]:
-        for text, of in (("each pair alone", scene["before"]), ("with agreement", scene["after"])):
+        for text, of in (
+            ("each pair alone", scene["before"]),
+            ("with loop consistency", scene["after"]),
+        ):
             out.append(
                 f"| {scene['scene']} | {text} | {of['raw_recall']:.1f} | {of['R@P95']:.1f} / {of['R@P99']:.1f} / {of['AP']:.1f} | "
                 f"{of['calibration_error']:.3f} | {of['above_0.9']} | {of['right_above_0.9']:.1f} |"
@@ -211,7 +221,7 @@ def agreement():
 def few_points():
     record = load("few_points.json")
     out = [
-        "| points that touch | poses | confidence before | right | confidence |",
+        "| overlapping points | poses | confidence before | right | confidence |",
         "| --- | --- | --- | --- | --- |",
     ]
     for b in record["bins"]:
@@ -227,7 +237,7 @@ def closing_loops():
         "| scene | loops of three right poses | of them close, % | loops with a wrong pose | of them close, % |",
         "| --- | --- | --- | --- | --- |",
     ]
-    for scene in load("agreement.json")["scenes"]:
+    for scene in load("loop_consistency.json")["scenes"]:
         cells = [
             f"{count} | {100 * close / count:.1f}" if count else "0 |"
             for count, close in (scene["loops"]["right"], scene["loops"]["wrong"])
@@ -289,7 +299,7 @@ TABLES = {
     "unseen": unseen,
     "other_sensors": other_sensors,
     "mistakes": mistakes,
-    "agreement": agreement,
+    "loop_consistency": loop_consistency,
     "loop_consistency_fresh": loop_consistency_fresh,
     "closing_loops": closing_loops,
     "few_points": few_points,

@@ -21,7 +21,7 @@ def made_with(record):
 
 
 def peers():
-    """Both scenes side by side; only what places a cloud globally."""
+    """Both scenes side by side; only methods that place a cloud globally."""
     records = [load(name) for name in PEER_SCENES]
     rows = [
         "| method | "

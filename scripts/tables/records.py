@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What the tables read: the records in bench/results."""
+"""The records in bench/results, as the tables read them."""
 
 import json
 import pathlib

@@ -108,7 +108,7 @@ def pipeline():
 
 def pipeline_house():
     context, runs = benchmarks("pipeline_h200_house_a.json")
-    stages = ("match", "sample", "fit", "score", "refine", "judge")
+    stages = ("match", "propose", "rank", "refine", "verify")
     out = ["| | ms | " + " | ".join(stages) + " |", "| --- | --- |" + " --- |" * len(stages)]
     for text, name, key in (
         (
@@ -139,7 +139,7 @@ def pipeline_house():
             + " |"
         )
     out.append(
-        f"| a fragment prepared for `default`, in a batch of 50 | {runs['prepare_batch_of_fragments/cuda_default']['ms_per_fragment']:.2f} | | | | | | |"
+        f"| a fragment prepared for `default`, in a batch of 50 | {runs['prepare_batch_of_fragments/cuda_default']['ms_per_fragment']:.2f} |{' |' * len(stages)}"
     )
     return out + [
         "",
@@ -181,22 +181,22 @@ def devices():
 
 
 def scaling():
-    """Beside what was measured, what the number of operations predicts from the second row: feature
+    """Measured times beside those predicted from the second row by the number of operations: feature
     products, and tests of points.
     """
     context, runs = benchmarks()
     sizes = [runs[f"points_per_cloud/{n}"] for n in (1000, 5000, 20000, 100000)]
     base = sizes[1]
     out = [
-        "| points a cloud | hypotheses scored | match, ms | sample, ms | score, ms | a pair, ms | by the operations, ms |",
+        "| points a cloud | hypotheses scored | match, ms | propose, ms | rank, ms | a pair, ms | by the operations, ms |",
         "| --- | --- | --- | --- | --- | --- | --- |",
     ]
     for run in sizes:
         points, survivors = run["points"] / base["points"], run["survivors"] / base["survivors"]
-        rest = base["ms_per_pair"] - base["ms_match"] - base["ms_score"]
-        predicted = base["ms_match"] * points**2 + base["ms_score"] * survivors * points + rest
+        rest = base["ms_per_pair"] - base["ms_match"] - base["ms_rank"]
+        predicted = base["ms_match"] * points**2 + base["ms_rank"] * survivors * points + rest
         out.append(
-            f"| {run['points']:,.0f} | {run['survivors']:,.0f} | {run['ms_match']:.3f} | {run['ms_sample']:.3f} | {run['ms_score']:.2f} | "
+            f"| {run['points']:,.0f} | {run['survivors']:,.0f} | {run['ms_match']:.3f} | {run['ms_propose']:.3f} | {run['ms_rank']:.2f} | "
             f"{run['ms_per_pair']:.2f} | {predicted:.2f} |"
         )
     out += ["", "| raw points | prepared points | a fragment, ms |", "| --- | --- | --- |"]
@@ -220,13 +220,13 @@ def scaling():
 def pair_by_default():
     context, runs = benchmarks()
     out = [
-        "| points a cloud | a pair alone, ms | match, ms | refine, ms | judge, ms | memory of the device, GiB |",
+        "| points a cloud | a pair alone, ms | match, ms | refine, ms | verify, ms | memory of the device, GiB |",
         "| --- | --- | --- | --- | --- | --- |",
     ]
     for n in (1000, 5000, 20000, 100000):
         run = runs[f"pair_by_default/{n}"]
         out.append(
-            f"| {run['points']:,.0f} | {run['ms_per_pair']:.2f} | {run['ms_match']:.2f} | {run['ms_refine']:.2f} | {run['ms_judge']:.2f} | {run['GiB_per_device']:.2f} |"
+            f"| {run['points']:,.0f} | {run['ms_per_pair']:.2f} | {run['ms_match']:.2f} | {run['ms_refine']:.2f} | {run['ms_verify']:.2f} | {run['GiB_per_device']:.2f} |"
         )
     return out + ["", made_by(context)]
 
@@ -238,15 +238,13 @@ def floors():
     instructions = 29.6e12
     floor = {
         "match": 1.25 * points**2 * 32 * 2 / 990e12 * 1e3,
-        "sample": 4e6 * 100 / instructions * 1e3,
-        "fit": survivors * 2500 / instructions * 1e3,
-        "score": survivors * points * 0.75 * 36 / instructions * 1e3,
+        "propose": (4e6 * 100 + survivors * 2500) / instructions * 1e3,
+        "rank": survivors * points * 0.75 * 36 / instructions * 1e3,
     }
     what = {
         "match": "a product of 32 dimensions for every two features, and another for a fourth of them",
-        "sample": "100 instructions a hypothesis",
-        "fit": "2,500 instructions a survivor",
-        "score": "36 instructions for each of three quarters of the point tests",
+        "propose": "100 instructions a hypothesis, 2,500 a survivor",
+        "rank": "36 instructions for each of three quarters of the point tests",
     }
     out = [
         "| stage | ms a pair | floor, ms | ratio | the floor counts |",
@@ -256,7 +254,7 @@ def floors():
         out.append(
             f"| {stage} | {run['ms_' + stage]:.4f} | {floor[stage]:.4f} | {run['ms_' + stage] / floor[stage]:.1f} | {what[stage]} |"
         )
-    return out + [f"| judge, refine | {run['ms_judge'] + run['ms_refine']:.4f} | | | |"]
+    return out + [f"| verify, refine | {run['ms_verify'] + run['ms_refine']:.4f} | | | |"]
 
 
 TABLES = {

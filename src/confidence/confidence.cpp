@@ -9,9 +9,6 @@
 namespace gpureg::confidence {
 namespace {
 
-/// Bounds the log odds as features: beyond, modes are certain one way or the other.
-constexpr double kMaxLogOdds = 14;
-
 const ConfidenceModel& model_of(AvailableEvidence available) {
   if (available.free_space) return available.surface_sides ? kFreeSpaceAndSurfaceSides : kFreeSpace;
   return available.surface_sides ? kSurfaceSides : kOverlapAlone;
@@ -35,17 +32,17 @@ std::vector<double> shares_of(const std::vector<RankedMode>& modes) {
   return out;
 }
 
-/// Factor for small clouds. The regressions were fitted to clouds of thousands of points; some pose
-/// of any two clouds makes a few points overlap. Measured on rooms in voxels of 10 cm to 1 m
-/// (bench/accuracy/few_points.py): poses with 200 and more overlapping points are correct as often
-/// as the regression says, with 100 three times in four of that, with 20 hardly ever.
+}  // namespace
+
 double factor_of(OverlapCount overlap) {
+  // Some pose of any two clouds makes a few points overlap. Measured on rooms in voxels of 10 cm to
+  // 1 m (bench/results/few_points.json): poses with 200 and more overlapping points are correct as
+  // often as the regression says, with 100 three times in four of that, with 20 hardly ever. In
+  // larger clouds, where the fits know the worth of small shares, a point counts more.
   constexpr double kFewPoints = 80, kSmallCloud = 1500;
   const double n = overlap.points / kFewPoints * std::max(1.0, overlap.of / kSmallCloud);
   return 1.0 - std::exp(-n * n);
 }
-
-}  // namespace
 
 std::vector<double> rank_modes(const std::vector<PoseEvidence>& modes,
                                AvailableEvidence available) {
@@ -61,17 +58,12 @@ std::vector<ModeConfidence> confidences_of(const std::vector<RankedMode>& modes,
   std::vector<ModeConfidence> out;
   if (modes.empty()) return out;
   const ConfidenceModel& model = model_of(available);
-  const auto bounded = [&](std::size_t k) {
-    return std::clamp(modes[k].log_odds, -kMaxLogOdds, kMaxLogOdds);
-  };
   const std::vector<double> share = shares_of(modes);
-  const double distinct = static_cast<double>(modes.size()) / refined;
+  std::vector<double> log_odds;
+  for (const RankedMode& mode : modes) log_odds.push_back(mode.log_odds);
   for (std::size_t k = 0; k < modes.size(); ++k) {
-    const double alternative = k > 0 ? bounded(0) : modes.size() > 1 ? bounded(1) : -kMaxLogOdds;
     Features x = features_of(modes[k].evidence, available, Regressand::confidence);
-    x[static_cast<std::size_t>(Feature::log_odds)] = bounded(k);
-    x[static_cast<std::size_t>(Feature::margin)] = bounded(k) - alternative;
-    x[static_cast<std::size_t>(Feature::distinct_share)] = distinct;
+    add_rank(log_odds, k, refined, x);
     ModeConfidence mode{probability(model.confidence.log_odds(x)),
                         probability(model.overlap.log_odds(x))};
     mode.confidence = std::min(mode.confidence, share[k]) * factor_of(modes[k].overlap);

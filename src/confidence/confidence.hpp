@@ -18,6 +18,10 @@ struct OverlapCount {
   std::uint32_t points, of;
 };
 
+/// Factor on the confidence of poses under which few points overlap. The regressions were fitted to
+/// clouds of thousands of points.
+double factor_of(OverlapCount overlap);
+
 /// A mode that takes part in the verdict on its pair.
 struct RankedMode {
   PoseEvidence evidence;
@@ -33,8 +37,7 @@ struct ModeConfidence {
 /// Confidence of each mode in view of the others. Of distinct poses at most one is correct, so
 /// modes with equal evidence share the probability.
 /// @param modes distinct, in descending order of their log odds.
-/// @param refined largest number of modes that were refined, EvidenceOptions::modes: many distinct
-///   ends of the refinement mean that the clouds determine little.
+/// @param refined see add_rank().
 std::vector<ModeConfidence> confidences_of(const std::vector<RankedMode>& modes,
                                            AvailableEvidence available, std::uint32_t refined);
 

@@ -17,6 +17,8 @@ constexpr double kMinFrontViolation = 1e-3, kMinBehindSurface = 1e-3;
 constexpr double kMinVerifiedFrontViolation = 2e-2;
 /// Bounds the denominators of shares.
 constexpr double kMinDenominator = 1e-6;
+/// Bounds the log odds as features: beyond, modes are certain one way or the other.
+constexpr double kMaxLogOdds = 14;
 
 double log_at_least(double value, double least) { return std::log(std::max(value, least)); }
 
@@ -75,8 +77,7 @@ void add_free_space(const PoseEvidence& e, Setter& set) {
   set(Feature::log_violation_of_all, log_at_least(of_all.sum(), kMinViolationOfAll));
 }
 
-void add_surface_sides(const PoseEvidence& e, bool free_space, Regressand regressand,
-                       Setter& set) {
+void add_surface_sides(const PoseEvidence& e, bool free_space, Regressand regressand, Setter& set) {
   const Sides any_normal{e.source_overlap_any_normal, e.target_overlap_any_normal};
   // Share of the points within the distance whose normals agree: the same side of the surface.
   const Sides agreement{share(e.source_overlap, any_normal.source),
@@ -108,18 +109,37 @@ void add_surface_sides(const PoseEvidence& e, bool free_space, Regressand regres
   set(Feature::lower_behind_share, behind_share.lower());
 }
 
-constexpr const char* kNames[] = {
-    "log_match_support",       "log_match_inliers",       "log_lower_weighted_overlap",
-    "log_higher_weighted_overlap", "log_lower_overlap",   "log_first_eigenvalue",
-    "log_second_eigenvalue",   "information_volume",      "lower_observed",
-    "higher_observed",         "higher_violation_of_all", "lower_violation_of_all",
-    "higher_violation",        "lower_violation",         "log_higher_violation",
-    "lower_occluded",          "log_violation_of_all",    "log_front_violation_near",
-    "lower_normal_agreement",  "higher_normal_agreement", "higher_near_surface",
-    "lower_near_surface",      "log_front_violation_far", "higher_front_share",
-    "lower_front_share",       "log_behind_surface",      "higher_behind_share",
-    "lower_behind_share",      "log_odds",                "margin",
-    "distinct_share"};
+constexpr const char* kNames[] = {"log_match_support",
+                                  "log_match_inliers",
+                                  "log_lower_weighted_overlap",
+                                  "log_higher_weighted_overlap",
+                                  "log_lower_overlap",
+                                  "log_first_eigenvalue",
+                                  "log_second_eigenvalue",
+                                  "information_volume",
+                                  "lower_observed",
+                                  "higher_observed",
+                                  "higher_violation_of_all",
+                                  "lower_violation_of_all",
+                                  "higher_violation",
+                                  "lower_violation",
+                                  "log_higher_violation",
+                                  "lower_occluded",
+                                  "log_violation_of_all",
+                                  "log_front_violation_near",
+                                  "lower_normal_agreement",
+                                  "higher_normal_agreement",
+                                  "higher_near_surface",
+                                  "lower_near_surface",
+                                  "log_front_violation_far",
+                                  "higher_front_share",
+                                  "lower_front_share",
+                                  "log_behind_surface",
+                                  "higher_behind_share",
+                                  "lower_behind_share",
+                                  "log_odds",
+                                  "margin",
+                                  "distinct_share"};
 static_assert(std::size(kNames) == kFeatureCount, "a name for each feature");
 
 }  // namespace
@@ -142,9 +162,22 @@ Features features_of(const PoseEvidence& evidence, AvailableEvidence available,
   Setter set(features);
   add_overlap(evidence, set);
   if (available.free_space) add_free_space(evidence, set);
-  if (available.surface_sides)
-    add_surface_sides(evidence, available.free_space, regressand, set);
+  if (available.surface_sides) add_surface_sides(evidence, available.free_space, regressand, set);
   return features;
+}
+
+void add_rank(const std::vector<double>& log_odds, std::size_t mode, std::uint32_t refined,
+              Features& features) {
+  const auto bounded = [&](std::size_t k) {
+    return std::clamp(log_odds[k], -kMaxLogOdds, kMaxLogOdds);
+  };
+  double alternative = -kMaxLogOdds;
+  for (std::size_t k = 0; k < log_odds.size(); ++k)
+    if (k != mode) alternative = std::max(alternative, bounded(k));
+  Setter set(features);
+  set(Feature::log_odds, bounded(mode));
+  set(Feature::margin, bounded(mode) - alternative);
+  set(Feature::distinct_share, static_cast<double>(log_odds.size()) / refined);
 }
 
 }  // namespace gpureg::confidence

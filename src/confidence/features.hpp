@@ -8,11 +8,11 @@
 
 #include "gpureg/evidence.hpp"
 
-/// Features of the regressions that turn evidence into a confidence. Computed here and nowhere else:
-/// bench/accuracy/fit_confidence.py gets them from the library.
+/// Features of the regressions that turn evidence into a confidence. Computed here and nowhere
+/// else: bench/accuracy/fit_confidence.py gets them from the library.
 namespace gpureg::confidence {
 
-/// One number that a regression weighs. "Lower" and "higher" are over the two sides of a pair.
+/// An input of the regressions. "Lower" and "higher" are over the two sides of a pair.
 enum class Feature : std::uint8_t {
   // Overlap and geometry; of every pair.
   log_match_support,
@@ -77,5 +77,13 @@ enum class Regressand : std::uint8_t {
 /// Features of one mode by its own evidence: all but log_odds, margin and distinct_share.
 Features features_of(const PoseEvidence& evidence, AvailableEvidence available,
                      Regressand regressand);
+
+/// Sets log_odds, margin and distinct_share, the features of a mode among the others of its pair.
+/// @param log_odds of all modes of the pair, from rank_modes(), in any order.
+/// @param mode index into log_odds.
+/// @param refined largest number of modes that were refined, EvidenceOptions::modes: many distinct
+///   ends of the refinement mean that the clouds determine little.
+void add_rank(const std::vector<double>& log_odds, std::size_t mode, std::uint32_t refined,
+              Features& features);
 
 }  // namespace gpureg::confidence

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""What bench/redwood says about pairs and scenes, on cases counted by hand."""
+"""bench/redwood on pairs and scenes that were counted by hand."""
 
 import pathlib
 import sys

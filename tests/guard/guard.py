@@ -161,14 +161,12 @@ def main():
     parser.add_argument(
         "--work", type=pathlib.Path, required=True, help="folder for the scene and results"
     )
-    parser.add_argument(
-        "--compiler", default="", help="with version and what else decides about the code"
-    )
+    parser.add_argument("--compiler", default="", help="with version and flags")
     parser.add_argument(
         "--baseline", type=pathlib.Path, default=pathlib.Path(__file__).with_name("baseline.json")
     )
     parser.add_argument(
-        "--update", action="store_true", help="write what is measured as the new baseline"
+        "--update", action="store_true", help="write the measured figures as the new baseline"
     )
     arguments = parser.parse_args()
     if not arguments.gpureg.exists():

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""The guard must notice what is worse and let pass what is not: its rules, without a command."""
+"""Rules of the guard, without a command: worse figures are noticed, others pass."""
 
 import unittest
 

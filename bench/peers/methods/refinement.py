@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What polishes a pose: starts from loopsmart's, which is not refined, and keeps its score."""
+"""Refinements: they start from loopsmart's pose, which is not refined, and keep its score."""
 
 import importlib.metadata
 import os

@@ -1,0 +1,156 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Private: bench/accuracy/fit_confidence.py gets the features of its regressions from the library.
+#include "confidence/confidence.hpp"
+
+#include <pybind11/numpy.h>
+#include <pybind11/stl.h>
+
+#include <algorithm>
+#include <string>
+#include <vector>
+
+#include "bindings.hpp"
+#include "confidence/features.hpp"
+
+namespace gpureg::python {
+namespace {
+
+using Numbers = py::array_t<double, py::array::c_style | py::array::forcecast>;
+
+/// One key of the evidence in a result's JSON: an array with a row per mode.
+class Column {
+ public:
+  Column(const py::dict& evidence, const char* key, py::ssize_t width) : key_(key) {
+    if (!evidence.contains(key))
+      throw py::value_error("evidence has no '" + key_ + "', as the gpureg of today writes it");
+    values_ = Numbers::ensure(evidence[key]);
+    if (!values_) throw py::error_already_set();
+    const bool fits =
+        width == 1 ? values_.ndim() == 1 : values_.ndim() == 2 && values_.shape(1) == width;
+    if (!fits)
+      throw py::value_error("evidence['" + key_ + "']: expected " + std::to_string(width) +
+                            " numbers per mode");
+    width_ = width;
+  }
+  py::ssize_t size() const { return values_.shape(0); }
+  const std::string& key() const { return key_; }
+  const double* row(py::ssize_t mode) const { return values_.data() + mode * width_; }
+
+ private:
+  std::string key_;
+  Numbers values_;
+  py::ssize_t width_ = 1;
+};
+
+/// The evidence that features depend on.
+std::vector<PoseEvidence> evidence_from(const py::dict& evidence) {
+  struct Sides {
+    const char* key;
+    double PoseEvidence::* source;
+    double PoseEvidence::* target;
+  };
+  using E = PoseEvidence;
+  static constexpr Sides kSides[] = {
+      {"overlap", &E::source_overlap, &E::target_overlap},
+      {"overlap_any_normal", &E::source_overlap_any_normal, &E::target_overlap_any_normal},
+      {"normal_weighted_overlap", &E::source_normal_weighted_overlap,
+       &E::target_normal_weighted_overlap},
+      {"observed", &E::source_observed, &E::target_observed},
+      {"free_space_violation", &E::source_free_space_violation, &E::target_free_space_violation},
+      {"occluded", &E::source_occluded, &E::target_occluded},
+      {"near_surface", &E::source_near_surface, &E::target_near_surface},
+      {"front_violation_near", &E::source_front_violation_near, &E::target_front_violation_near},
+      {"front_violation_far", &E::source_front_violation_far, &E::target_front_violation_far},
+      {"behind_surface", &E::source_behind_surface, &E::target_behind_surface}};
+  const Column inliers(evidence, "match_inliers", 1), support(evidence, "match_support", 1);
+  std::vector<PoseEvidence> out(static_cast<std::size_t>(inliers.size()));
+  const auto each = [&](const Column& column, auto&& assign) {
+    if (column.size() != inliers.size())
+      throw py::value_error("evidence['" + column.key() + "']: expected as many rows as modes");
+    for (py::ssize_t k = 0; k < column.size(); ++k)
+      assign(out[static_cast<std::size_t>(k)], column.row(k));
+  };
+  each(inliers,
+       [](E& e, const double* row) { e.match_inliers = static_cast<std::uint32_t>(row[0]); });
+  each(support, [](E& e, const double* row) { e.match_support = row[0]; });
+  for (const Sides& sides : kSides)
+    each(Column(evidence, sides.key, 2), [&](E& e, const double* row) {
+      e.*sides.source = row[0];
+      e.*sides.target = row[1];
+    });
+  each(Column(evidence, "information_eigenvalues", 6),
+       [](E& e, const double* row) { std::copy_n(row, 6, e.information_eigenvalues.begin()); });
+  return out;
+}
+
+Numbers table(std::size_t rows) { return Numbers({rows, confidence::kFeatureCount}); }
+
+void write(const confidence::Features& features, std::size_t row, Numbers& out) {
+  std::copy(features.begin(), features.end(), out.mutable_data(row, 0));
+}
+
+std::vector<std::string> feature_names() {
+  std::vector<std::string> out;
+  for (std::size_t k = 0; k < confidence::kFeatureCount; ++k)
+    out.emplace_back(confidence::to_string(static_cast<confidence::Feature>(k)));
+  return out;
+}
+
+Numbers features(const py::dict& evidence, bool free_space, bool surface_sides,
+                 const std::string& regressand) {
+  if (regressand != "ranking" && regressand != "confidence")
+    throw py::value_error("regressand: expected 'ranking' or 'confidence', got '" + regressand +
+                          "'");
+  const std::vector<PoseEvidence> modes = evidence_from(evidence);
+  Numbers out = table(modes.size());
+  for (std::size_t k = 0; k < modes.size(); ++k)
+    write(confidence::features_of(modes[k], {free_space, surface_sides},
+                                  regressand == "ranking" ? confidence::Regressand::ranking
+                                                          : confidence::Regressand::confidence),
+          k, out);
+  return out;
+}
+
+Numbers rank_features(const std::vector<double>& log_odds,
+                      const std::vector<std::size_t>& modes_per_pair, std::uint32_t refined) {
+  Numbers out = table(log_odds.size());
+  std::size_t first = 0;
+  for (const std::size_t count : modes_per_pair) {
+    if (count > log_odds.size() - first)
+      throw py::value_error("modes_per_pair: more modes than log_odds");
+    const auto begin = log_odds.begin() + static_cast<std::ptrdiff_t>(first);
+    const std::vector<double> of_pair(begin, begin + static_cast<std::ptrdiff_t>(count));
+    for (std::size_t k = 0; k < count; ++k) {
+      confidence::Features row{};
+      confidence::add_rank(of_pair, k, refined, row);
+      write(row, first + k, out);
+    }
+    first += count;
+  }
+  if (first != log_odds.size()) throw py::value_error("modes_per_pair: fewer modes than log_odds");
+  return out;
+}
+
+}  // namespace
+
+void bind_confidence(py::module_& m) {
+  using namespace py::literals;
+  m.def("_confidence_feature_names", &feature_names,
+        "Names of the features of the confidence, in the order of the columns.");
+  m.def("_confidence_features", &features, "evidence"_a, "free_space"_a, "surface_sides"_a,
+        "regressand"_a,
+        "(modes, features): of modes by their own evidence. evidence: the keys of a result's JSON, "
+        "each an array with a row per mode.");
+  m.def("_confidence_rank_features", &rank_features, "log_odds"_a, "modes_per_pair"_a, "refined"_a,
+        "(modes, features): log_odds, margin and distinct_share of modes among the others of their "
+        "pair, 0 elsewhere. refined: options.evidence.modes.");
+  m.def(
+      "_confidence_factor", py::vectorize([](std::uint32_t points, std::uint32_t of) {
+        return confidence::factor_of({points, of});
+      }),
+      "points"_a, "of"_a,
+      "Factor on the confidence where few points overlap. points: of the side with fewer of them; "
+      "of: points of that side.");
+}
+
+}  // namespace gpureg::python

@@ -1,0 +1,129 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Features by name, and the regressions that the library applies to them.
+#include "confidence/features.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+#include <string>
+
+#include "confidence/confidence.hpp"
+#include "confidence/confidence_model.hpp"
+
+namespace gpureg::confidence {
+namespace {
+
+double value(const Features& features, Feature feature) {
+  return features[static_cast<std::size_t>(feature)];
+}
+
+/// Of a pose in a furnished room.
+PoseEvidence some_evidence() {
+  PoseEvidence e;
+  e.match_inliers = 60;
+  e.match_support = 0.02;
+  e.source_overlap = 0.5, e.target_overlap = 0.4;
+  e.source_overlap_any_normal = 0.55, e.target_overlap_any_normal = 0.45;
+  e.source_normal_weighted_overlap = 0.4, e.target_normal_weighted_overlap = 0.3;
+  e.source_observed = 0.6, e.target_observed = 0.5;
+  e.source_free_space_violation = 0.01, e.target_free_space_violation = 0.02;
+  e.source_occluded = 0.1, e.target_occluded = 0.2;
+  e.source_near_surface = 0.7, e.target_near_surface = 0.6;
+  e.source_front_violation_near = 0.004, e.target_front_violation_near = 0.003;
+  e.source_front_violation_far = 0.02, e.target_front_violation_far = 0.01;
+  e.source_behind_surface = 0.05, e.target_behind_surface = 0.06;
+  e.information_eigenvalues = {1, 2, 3, 4, 5, 6};
+  return e;
+}
+
+TEST(Features, NamesAreUnique) {
+  std::set<std::string> names;
+  for (std::size_t k = 0; k < kFeatureCount; ++k) names.insert(to_string(static_cast<Feature>(k)));
+  EXPECT_EQ(names.size(), kFeatureCount);
+  EXPECT_STREQ(to_string(Feature::log_match_support), "log_match_support");
+  EXPECT_STREQ(to_string(Feature::distinct_share), "distinct_share");
+}
+
+TEST(Features, OnlyOfAvailableEvidence) {
+  const Features all = features_of(some_evidence(), {true, true}, Regressand::ranking),
+                 sides = features_of(some_evidence(), {false, true}, Regressand::ranking),
+                 none = features_of(some_evidence(), {false, false}, Regressand::ranking);
+  EXPECT_EQ(value(all, Feature::higher_observed), 0.6);
+  EXPECT_EQ(value(all, Feature::higher_front_share), 0.0) << "free space stands for it";
+  EXPECT_EQ(value(sides, Feature::higher_observed), 0.0);
+  EXPECT_GT(value(sides, Feature::higher_front_share), 0.0);
+  EXPECT_EQ(value(none, Feature::higher_near_surface), 0.0);
+  EXPECT_EQ(value(none, Feature::log_lower_overlap), std::log(0.4));
+}
+
+// Where free space is known, small front violations rank modes and leave the confidence alone.
+TEST(Features, SmallFrontViolationsOnlyRank) {
+  const auto near_of = [](AvailableEvidence available, Regressand regressand) {
+    return value(features_of(some_evidence(), available, regressand),
+                 Feature::log_front_violation_near);
+  };
+  EXPECT_NEAR(near_of({true, true}, Regressand::ranking), std::log(0.007), 1e-12);
+  EXPECT_NEAR(near_of({true, true}, Regressand::confidence), std::log(0.02), 1e-12);
+  EXPECT_NEAR(near_of({false, true}, Regressand::confidence), std::log(0.007), 1e-12);
+}
+
+TEST(Features, RankAmongTheModes) {
+  Features features{};
+  add_rank({3, 20, -1}, 1, 12, features);
+  EXPECT_EQ(value(features, Feature::log_odds), 14) << "bounded";
+  EXPECT_EQ(value(features, Feature::margin), 11);
+  EXPECT_EQ(value(features, Feature::distinct_share), 0.25);
+  add_rank({3, 20, -1}, 2, 12, features);
+  EXPECT_EQ(value(features, Feature::margin), -15);
+  add_rank({3}, 0, 12, features);
+  EXPECT_EQ(value(features, Feature::margin), 17) << "no other mode";
+}
+
+// The library applies the numbers of confidence_model.hpp.
+TEST(Confidence, OfTheGeneratedModel) {
+  struct Kind {
+    AvailableEvidence available;
+    const ConfidenceModel& model;
+  };
+  const Kind kinds[] = {{{true, true}, kFreeSpaceAndSurfaceSides},
+                        {{false, true}, kSurfaceSides},
+                        {{true, false}, kFreeSpace},
+                        {{false, false}, kOverlapAlone}};
+  const PoseEvidence better = some_evidence();
+  PoseEvidence worse = better;
+  worse.match_inliers = 5;
+  worse.source_front_violation_near = 0.1;
+  constexpr std::uint32_t kRefined = 16;
+  const OverlapCount overlap{90, 2000};
+  const auto probability = [](double odds) { return 1 / (1 + std::exp(-odds)); };
+  for (const auto& [available, model] : kinds) {
+    const std::vector<double> log_odds = rank_modes({better, worse}, available);
+    ASSERT_EQ(log_odds.size(), 2u);
+    EXPECT_EQ(log_odds[0],
+              model.ranking.log_odds(features_of(better, available, Regressand::ranking)));
+    ASSERT_GT(log_odds[0], log_odds[1]);
+    Features x = features_of(better, available, Regressand::confidence);
+    add_rank(log_odds, 0, kRefined, x);
+    const double share = probability(log_odds[0] - log_odds[1]);
+    const double want =
+        std::min(probability(model.confidence.log_odds(x)), share) * factor_of(overlap);
+    const std::vector<ModeConfidence> found = confidences_of(
+        {{better, log_odds[0], overlap}, {worse, log_odds[1], overlap}}, available, kRefined);
+    ASSERT_EQ(found.size(), 2u);
+    EXPECT_NEAR(found[0].confidence, want, 1e-12);
+    EXPECT_NEAR(found[0].overlap_confidence, std::min(want, probability(model.overlap.log_odds(x))),
+                1e-12);
+    EXPECT_LE(found[1].confidence, found[0].confidence);
+  }
+}
+
+TEST(Confidence, FewOverlappingPoints) {
+  EXPECT_LT(factor_of({20, 1000}), 0.1);
+  EXPECT_GT(factor_of({200, 1000}), 0.99);
+  EXPECT_GT(factor_of({60, 6000}), factor_of({60, 1000}));
+}
+
+}  // namespace
+}  // namespace gpureg::confidence
