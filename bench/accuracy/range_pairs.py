@@ -180,7 +180,7 @@ def main():
             flush=True,
         )
     options = report["options"]
-    options["hypothesis"].pop("seed", None)
+    options.pop("seed", None)
     command = (
         f"bench/accuracy/range_pairs.py --voxel-size {arguments.voxel_size} --seeds {' '.join(map(str, arguments.seeds))} "
         f"--backend {report['environment']['backend']}"

@@ -76,7 +76,7 @@ def mean(*path):
 
 
 options = batch["options"]
-options["hypothesis"].pop("seed", None)
+options.pop("seed", None)
 command = (
     f"bench/accuracy/redkitchen.py --preset {arguments.preset} --seeds {' '.join(map(str, arguments.seeds))} "
     f"--backend {batch['environment']['backend']} --scene {arguments.scene}"
