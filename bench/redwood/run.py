@@ -91,8 +91,12 @@ def times(batch, processor):
     }
 
 
+def file_name(scene):
+    return scene.name.replace("/", "_")
+
+
 def run_once(arguments, scene, preset, backend, seed, temporary):
-    result = temporary / f"{scene.name}-{preset}-{backend}-{seed}.json"
+    result = temporary / f"{file_name(scene)}-{preset}-{backend}-{seed}.json"
     scores = temporary / "scores.json"
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
     record.gpureg(
@@ -350,7 +354,7 @@ def main():
 def add_peers(arguments, scenes, temporary, methods, results):
     found = {}
     for scene in scenes:
-        kept = temporary / f"peers-{scene.name}"
+        kept = temporary / f"peers-{file_name(scene)}"
         for name, entry in peers_of(arguments, scene, temporary, kept).items():
             run = {
                 **entry,
