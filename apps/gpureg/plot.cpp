@@ -137,7 +137,7 @@ std::string histogram_plot(const std::vector<Population>& populations, const std
   double y = py(1) + 28;
   for (const Population& population : populations) {
     svg += legend_entry(px(1) - 130, y, population.color,
-               population.name + " (" + std::to_string(population.values.size()) + ")");
+                        population.name + " (" + std::to_string(population.values.size()) + ")");
     y += 18;
   }
   return svg + titles(x_title, "pairs") + "</svg>\n";

@@ -77,7 +77,8 @@ std::string table(const std::vector<ReportEntry>& entries) {
   html += "</table></div>\n";
   if (evaluated)
     html +=
-        "<p class=\"sub\">Redwood's protocol. Strict: a pair that overlaps by less than 30 % counts "
+        "<p class=\"sub\">Redwood's protocol. Strict: a pair that overlaps by less than 30 % "
+        "counts "
         "as false; geometric: every pair counts by its pose. R@P95: recall at 95 % precision. AP: "
         "average precision.</p>\n";
   return html;

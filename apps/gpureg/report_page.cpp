@@ -25,11 +25,11 @@ constexpr const char* kHead = R"(<!DOCTYPE html>
 body { font: 15px/1.5 system-ui, sans-serif; color: #2b2b2b; background: #fafaf8; max-width: 1000px; margin: 2em auto; padding: 0 1em; }
 h1 { font-size: 1.5em; margin-bottom: 0; } h2 { font-size: 1.15em; margin: 1.8em 0 .4em; }
 h1.result { margin-top: 2em; padding-top: .8em; border-top: 2px solid #d8d8d0; }
-p.sub { color: #666; margin-top: .2em; } .wide { overflow-x: auto; } .wide td, .wide th { padding: .25em .55em; font-size: 13px; white-space: nowrap; } th[colspan] { text-align: center; }
+p.sub { color: #666; margin-top: .2em; } .wide { overflow-x: auto; } .wide td, .wide th { padding: .25em .55em; font-size: 13px; } .wide td { white-space: nowrap; } th[colspan] { text-align: center; }
 tr.scene td { font-weight: 600; padding-top: .7em; } table.options td, table.options th { text-align: left; } a { color: #1f6fb8; }
 table { border-collapse: collapse; } th, td { padding: .25em .8em; text-align: right; border-bottom: 1px solid #e4e4de; }
 th { font-weight: 600; color: #555; } th:first-child, td:first-child { text-align: left; }
-.row { display: flex; flex-wrap: wrap; gap: 24px; } figure { margin: 0 0 1.2em; } figcaption { color: #555; }
+.row { display: flex; flex-wrap: wrap; gap: 24px; } .row figure { max-width: 460px; } figure { margin: 0 0 1.2em; } figcaption { color: #555; }
 details { overflow-x: auto; } summary { cursor: pointer; color: #555; margin-bottom: .4em; } details td, details th { padding: .1em .6em; font-size: 13px; }
 svg { max-width: 100%; height: auto; } svg text { font: 12px system-ui, sans-serif; fill: #444; }
 img { max-width: 100%; border: 1px solid #e4e4de; } .correct { color: #2f9e5b; } .false { color: #d6453d; } .missed { color: #b97a00; }
@@ -59,7 +59,7 @@ std::string run_facts(const Json& document) {
   for (const std::string& text :
        {fact("gpureg ", "/environment/version", "") + fact(" on ", "/environment/description", ""),
         fact("voxel size ", "/options/prepare/voxel_size", " m"), effort_per_pair(document),
-        fact("seed ", "/options/seed", "")})
+        fact("random seed ", "/options/seed", "")})
     if (!text.empty()) facts += (facts.empty() ? "" : " &middot; ") + escaped(text);
   return facts.empty() ? "" : "<p class=\"sub\">" + facts + "</p>\n";
 }
@@ -160,7 +160,8 @@ std::string picture_list(const std::vector<Picture>& pictures) {
     html += "<figure><figcaption><b class=\"" +
             (found == classes.end() ? std::string() : found->second) + "\">" +
             escaped(picture.heading) + "</b> &middot; " + escaped(picture.caption) +
-            "</figcaption>\n<img alt=\"source and target before and after alignment\" src=\"data:image/png;base64," +
+            "</figcaption>\n<img alt=\"source and target before and after alignment\" "
+            "src=\"data:image/png;base64," +
             base64(picture.png) + "\"></figure>\n";
   }
   return html;
@@ -171,14 +172,13 @@ std::string body(const ReportEntry& entry, bool unfolded) {
   std::vector<EvaluatedPair> pairs;
   if (entry.truth) {
     pairs = evaluate_pairs(*entry.truth, entry.result);
-    html += score_table(*entry.evaluation) +
-            truth_plots(entry.result, *entry.truth, *entry.evaluation);
+    html +=
+        score_table(*entry.evaluation) + truth_plots(entry.result, *entry.truth, *entry.evaluation);
   } else {
     html += score_plot(entry.result);
   }
   return html + time_plots(entry.result) + picture_list(entry.pictures) +
-         pair_table(entry.result, pairs, unfolded) +
-         options_table(entry.result.document, unfolded);
+         pair_table(entry.result, pairs, unfolded) + options_table(entry.result.document, unfolded);
 }
 
 }  // namespace
@@ -186,8 +186,8 @@ std::string body(const ReportEntry& entry, bool unfolded) {
 std::string report_page(const std::vector<ReportEntry>& entries) {
   std::string html = kHead;
   if (entries.size() == 1) {
-    html += "<h1>gpureg: " + escaped(entries.front().scene) + "</h1>\n" +
-            body(entries.front(), true);
+    html +=
+        "<h1>gpureg: " + escaped(entries.front().scene) + "</h1>\n" + body(entries.front(), true);
   } else {
     html += comparison(entries);
     for (std::size_t k = 0; k < entries.size(); ++k)

@@ -98,7 +98,8 @@ std::vector<SamplePair> samples(const std::vector<EvaluatedPair>& evaluated, std
       missed.push_back(e.pair);
     candidate_correct[e.pair] = e.correct;
   }
-  for (auto* pairs : {&correct, &false_positive, &missed}) std::sort(pairs->begin(), pairs->end(), higher_score);
+  for (auto* pairs : {&correct, &false_positive, &missed})
+    std::sort(pairs->begin(), pairs->end(), higher_score);
   std::vector<SamplePair> chosen;
   take(chosen, median_and_lowest(correct), each, "Correct", no_remark);
   take(chosen, false_positive, each, "False positive", no_remark);

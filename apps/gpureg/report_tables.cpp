@@ -19,8 +19,8 @@ std::string outcome(const EvaluatedPair& pair) {
 }
 
 std::string folded(const std::string& summary, bool open, const std::string& table) {
-  return std::string("<details") + (open ? " open" : "") + "><summary>" + summary +
-         "</summary>\n" + table + "</details>\n";
+  return std::string("<details") + (open ? " open" : "") + "><summary>" + summary + "</summary>\n" +
+         table + "</details>\n";
 }
 
 std::string count_of(const Json& pair, const char* name) {
@@ -53,29 +53,31 @@ std::string table_row(const std::vector<std::string>& texts, const char* tag,
 }
 
 std::string score_table(const evaluation::Evaluation& e) {
-  std::string html = "<h2>Recall and precision</h2>\n<table>\n";
-  html += table_row({"rule", "correct", "true pairs", "reported", "recall", "precision", "raw recall",
-                 "R@P50", "R@P80", "R@P95", "R@P99", "AP"},
-                "th");
+  std::string html = "<h2>Recall and precision</h2>\n<div class=\"wide\"><table>\n";
+  html += table_row({"rule", "correct", "true pairs", "reported", "recall, %", "precision, %",
+                     "raw recall, %", "R@P50, %", "R@P80, %", "R@P95, %", "R@P99, %", "AP, %"},
+                    "th");
   const auto row = [&](const char* rule, const evaluation::Scores& s,
                        const std::optional<evaluation::RankedScores>& r) {
     std::vector<std::string> texts = {rule,
                                       std::to_string(s.good),
                                       std::to_string(s.ground_truth),
                                       std::to_string(s.reported),
-                                      percent(s.recall()) + " %",
-                                      percent(s.precision()) + " %"};
+                                      percent(s.recall()),
+                                      percent(s.precision())};
     if (r)
       for (const double value : {r->raw_recall, r->recall_at_50, r->recall_at_80, r->recall_at_95,
                                  r->recall_at_99, r->average_precision})
-        texts.push_back(percent(value) + " %");
+        texts.push_back(percent(value));
     html += table_row(texts, "td");
   };
   row("strict", e.strict, e.strict_ranked);
   if (e.geometric) row("geometric", *e.geometric, e.geometric_ranked);
   return html +
-         "</table>\n<p class=\"sub\">Redwood's protocol, pairs with j &minus; i &gt; 1. A pose is correct "
-         "within 0.2 m of the ground truth. The strict rule counts a pair that overlaps by less than "
+         "</table></div>\n<p class=\"sub\">Redwood's protocol, pairs with j &minus; i &gt; 1. A "
+         "pose is correct "
+         "within 0.2 m of the ground truth. The strict rule counts a pair that overlaps by less "
+         "than "
          "30 % as false; the geometric rule counts it by its pose. Raw recall: recall when every "
          "best candidate is reported. R@P80: recall at 80 % precision. AP: average "
          "precision.</p>\n";
@@ -128,7 +130,7 @@ std::string options_table(const Json& document, bool unfolded) {
       for (const auto& option : stage.value().items())
         stages += table_row({stage.key(), option.key(), text_of(option.value(), "")}, "td");
     else
-      general += table_row({"", stage.key(), text_of(stage.value(), "")}, "td");
+      general += table_row({"general", stage.key(), text_of(stage.value(), "")}, "td");
   return "<h2>Options</h2>\n" +
          folded("Every option of this run", unfolded,
                 "<table class=\"options\">\n" + table_row({"stage", "option", "value"}, "th") +

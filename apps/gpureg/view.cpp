@@ -54,7 +54,8 @@ Eigen::Matrix3d choose_view(const PointCloud& cloud) {
                                      .toRotationMatrix();
     return look(turn * Eigen::Vector3d::UnitZ(), -Eigen::Vector3d::UnitY());
   }
-  const Eigen::Vector3d side = points.empty() ? Eigen::Vector3d(1, 0, 0) : shortest_horizontal_axis(points);
+  const Eigen::Vector3d side =
+      points.empty() ? Eigen::Vector3d(1, 0, 0) : shortest_horizontal_axis(points);
   const Eigen::Vector3d forward =
       std::cos(45 * kDegree) * (Eigen::AngleAxisd(25 * kDegree, Eigen::Vector3d::UnitZ()) * side) -
       std::sin(45 * kDegree) * Eigen::Vector3d::UnitZ();

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The record of bench/redwood/run.py as Markdown, for the terminal and for a file."""
 
+import itertools
 import statistics
 
 import published
@@ -92,7 +93,7 @@ def overlap_table(methods, names):
         if not found:
             continue
         edges = found["edges"]
-        head = [f"{100 * a:.0f} to {100 * b:.0f} %" for a, b in zip(edges, edges[1:])]
+        head = [f"{100 * a:.0f} to {100 * b:.0f} %" for a, b in itertools.pairwise(edges)]
         cells = [
             f"{correct} of {pairs}" if pairs else ""
             for correct, pairs in zip(found["reported_right"], found["pairs"])
@@ -116,7 +117,7 @@ def rotation_table(methods, names):
     for method, name, _, runs in per_scene(methods, names):
         found = runs[0]["rotation_errors_of_wrong_candidates"]
         if sum(found["counts"]):
-            head = [f"{a} to {b}" for a, b in zip(found["edges"], found["edges"][1:])]
+            head = [f"{a} to {b}" for a, b in itertools.pairwise(found["edges"])]
             rows.append([method["label"], name, *found["counts"]])
     return rows and table(["method", "scene", *head], rows)
 

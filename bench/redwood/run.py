@@ -133,18 +133,22 @@ def run_once(arguments, scene, preset, backend, seed, temporary):
         ]
         for pair in batch["pairs"]
     ]
-    return {
-        "seed": seed,
-        "strict": analysis.rounded(verdict["strict"]),
-        "geometric": analysis.rounded(verdict.get("geometric")),
-        "registration_recall": recalls,
-        "ms": times(batch, processor),
-        "pairs": len(batch["pairs"]),
-        "peak_memory_mib": round(batch["peak_memory_mib"]),
-        "stages_ms": stages(batch),
-        "points_and_ms": cost[:: max(1, len(cost) // COST_SAMPLE)],
-        **analysis.all_of(verdict["pairs"], analysis.overlaps(scene.fragments)),
-    }, batch, result
+    return (
+        {
+            "seed": seed,
+            "strict": analysis.rounded(verdict["strict"]),
+            "geometric": analysis.rounded(verdict.get("geometric")),
+            "registration_recall": recalls,
+            "ms": times(batch, processor),
+            "pairs": len(batch["pairs"]),
+            "peak_memory_mib": round(batch["peak_memory_mib"]),
+            "stages_ms": stages(batch),
+            "points_and_ms": cost[:: max(1, len(cost) // COST_SAMPLE)],
+            **analysis.all_of(verdict["pairs"], analysis.overlaps(scene.fragments)),
+        },
+        batch,
+        result,
+    )
 
 
 def stages(batch):

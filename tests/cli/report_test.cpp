@@ -128,8 +128,8 @@ TEST_F(Report, ComparesSeveralResults) {
                                  "--clouds", "-", "--name", "all <pairs>", "--name", "fewer"});
   expect_self_contained(html);
   expect_holds(html, {"gpureg: 2 results", "Comparison", "R@P95", "ms per pair",
-                      "<a href=\"#result-1\">all &lt;pairs&gt;</a>", "<h1 class=\"result\" id=\"result-2\">fewer</h1>",
-                      "strict rule"});
+                      "<a href=\"#result-1\">all &lt;pairs&gt;</a>",
+                      "<h1 class=\"result\" id=\"result-2\">fewer</h1>", "strict rule"});
   EXPECT_EQ(occurrences(html, "data:image/png"), 3u) << "pictures of the first result alone";
   EXPECT_EQ(occurrences(html, "Every pair"), 2u);
   // Without ground truth: no scores, and the paths tell the results apart.
