@@ -11,7 +11,7 @@
 
 namespace gpureg::cli {
 
-/// What the right half shows: a pose with its title, or the title alone.
+/// Pose and title of the right panel. Without a pose the panel is empty.
 struct PosedTitle {
   std::optional<Eigen::Isometry3d> target_from_source;
   std::string title;
@@ -19,7 +19,8 @@ struct PosedTitle {
 
 PosedTitle pose_of(const RegistrationResult& result);
 
-/// Two panels side by side: source (yellow) and target (blue) as they came, and after the pose.
+/// Two panels side by side with source (yellow) and target (blue): in their input frames, and with
+/// the source transformed by the pose.
 Image before_after(const PointCloud& source, const PointCloud& target, const PosedTitle& after,
                    int panel_width = 640, int panel_height = 560);
 

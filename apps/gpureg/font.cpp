@@ -9,7 +9,7 @@ namespace {
 constexpr int kWidth = 5, kHeight = 7;
 
 struct Glyph {
-  char sign;
+  char character;
   std::uint8_t rows[kHeight];  // bit 4 is the leftmost dot
 };
 
@@ -64,18 +64,18 @@ constexpr Glyph kGlyphs[] = {
 };
 constexpr Glyph kUnknown = {'?', {0b11111, 0b10001, 0b10001, 0b10001, 0b10001, 0b10001, 0b11111}};
 
-const Glyph& glyph(char sign) {
-  const char capital = static_cast<char>(std::toupper(static_cast<unsigned char>(sign)));
+const Glyph& glyph(char character) {
+  const char capital = static_cast<char>(std::toupper(static_cast<unsigned char>(character)));
   for (const Glyph& g : kGlyphs)
-    if (g.sign == capital) return g;
+    if (g.character == capital) return g;
   return kUnknown;
 }
 
 }  // namespace
 
 void draw_text(Image& image, int x, int y, int scale, Color color, const std::string& text) {
-  for (const char sign : text) {
-    const Glyph& g = glyph(sign);
+  for (const char character : text) {
+    const Glyph& g = glyph(character);
     for (int row = 0; row < kHeight; ++row)
       for (int column = 0; column < kWidth; ++column)
         if (g.rows[row] >> (kWidth - 1 - column) & 1)

@@ -32,8 +32,8 @@ struct Image {
 void fill(Image& image, int x, int y, int width, int height, Color color);  ///< clipped
 void paste(Image& image, const Image& part, int x, int y);                  ///< must lie inside
 
-/// Capital letters of 5 x 7 dots, each scale pixels wide; small letters become capitals, other
-/// signs boxes. Clipped.
+/// Draws text in a font of 5 x 7 dots; a dot is scale x scale pixels. Lowercase letters become
+/// uppercase, characters without a glyph become boxes. Clipped to the image.
 void draw_text(Image& image, int x, int y, int scale, Color color, const std::string& text);
 int text_width(const std::string& text, int scale);
 

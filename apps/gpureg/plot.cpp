@@ -9,7 +9,7 @@
 namespace gpureg::cli {
 namespace {
 
-// The frame of the axes in the picture.
+// Size of a plot and its margins around the axes, in pixels.
 constexpr double kWidth = 460, kHeight = 320, kLeft = 52, kTop = 14, kRight = 14, kBottom = 46;
 constexpr double kSpanX = kWidth - kLeft - kRight, kSpanY = kHeight - kTop - kBottom;
 
@@ -46,7 +46,7 @@ std::string titles(const std::string& x_title, const std::string& y_title) {
          label(14, middle, "middle", y_title, "transform=\"rotate(-90 14 " + n(middle) + ")\"");
 }
 
-std::string key(double x, double y, const std::string& color, const std::string& name) {
+std::string legend_entry(double x, double y, const std::string& color, const std::string& name) {
   return rectangle(x, y - 9, 11, 11, color) + label(x + 17, y, "start", name);
 }
 
@@ -86,9 +86,9 @@ std::string curve_plot(const std::vector<Curve>& curves, const std::string& x_ti
   for (const Curve& curve : curves) {
     svg += "<polyline fill=\"none\" stroke-width=\"2\" stroke=\"" + curve.color + "\" points=\"";
     for (const auto& [a, b] : curve.points) svg += n(px(a)) + "," + n(py(b)) + " ";
-    svg += "\"/>\n<circle r=\"4.5\" cx=\"" + n(px(curve.working_point.first)) + "\" cy=\"" +
-           n(py(curve.working_point.second)) + "\" fill=\"" + curve.color + "\"/>\n";
-    svg += key(px(0) + 12, y, curve.color, curve.name);
+    svg += "\"/>\n<circle r=\"4.5\" cx=\"" + n(px(curve.operating_point.first)) + "\" cy=\"" +
+           n(py(curve.operating_point.second)) + "\" fill=\"" + curve.color + "\"/>\n";
+    svg += legend_entry(px(0) + 12, y, curve.color, curve.name);
     y += 18;
   }
   return svg + titles(x_title, y_title) + "</svg>\n";
@@ -109,11 +109,11 @@ std::string histogram_plot(const std::vector<Population>& populations, const std
   }
   const auto most =
       static_cast<double>(std::max<std::size_t>(1, *std::max_element(sums.begin(), sums.end())));
-  const double highest = 1.3 * most;  // room for the key and the threshold's label
+  const double highest = 1.3 * most;  // space for the legend and the threshold's label
   std::string svg = begin(kWidth, kHeight);
   for (int tick = 0; tick <= 5; ++tick)
     svg += label(px(tick / 5.0), py(0) + 17, "middle", fixed(tick / 5.0, 1));
-  // Whole numbers only, about four of them.
+  // About four ticks, at integers: the axis counts pairs.
   const double step = std::max(1.0, std::ceil(most / 4));
   for (double count = 0; count <= most; count += step)
     svg += line(px(0), py(count / highest), px(1), py(count / highest), kGrid) +
@@ -132,12 +132,12 @@ std::string histogram_plot(const std::vector<Population>& populations, const std
   if (threshold) {
     svg += line(px(*threshold), py(0), px(*threshold), py(1),
                 "stroke=\"#555\" stroke-dasharray=\"4 3\"");
-    svg += label(px(*threshold) + 5, py(1) + 10, "start", "reported from here on");
+    svg += label(px(*threshold) + 5, py(1) + 10, "start", "reporting threshold");
   }
   double y = py(1) + 28;
   for (const Population& population : populations) {
-    svg += key(px(1) - 130, y, population.color,
-               population.name + " (" + std::to_string(population.values.size()) + ")");
+    svg += legend_entry(px(1) - 130, y, population.color,
+                        population.name + " (" + std::to_string(population.values.size()) + ")");
     y += 18;
   }
   return svg + titles(x_title, "pairs") + "</svg>\n";

@@ -8,13 +8,13 @@
 
 namespace gpureg::cli {
 
-/// Text that is safe inside HTML and SVG.
+/// Replaces the characters that HTML and SVG reserve.
 std::string escaped(const std::string& text);
 
 struct Curve {
   std::string name, color;
   std::vector<std::pair<double, double>> points;  ///< both in [0, 1]
-  std::pair<double, double> working_point;        ///< drawn as a dot
+  std::pair<double, double> operating_point;      ///< drawn as a dot
 };
 
 /// Inline SVG: both axes from 0 to 100 %.
@@ -26,8 +26,8 @@ struct Population {
   std::vector<double> values;
 };
 
-/// Inline SVG: values in [0, 1] (others count at the ends), populations stacked; threshold: a
-/// vertical line.
+/// Inline SVG: stacked histograms of values in [0, 1]; other values count in the first or last bin.
+/// threshold: drawn as a vertical line.
 std::string histogram_plot(const std::vector<Population>& populations, const std::string& x_title,
                            const std::optional<double>& threshold);
 

@@ -10,7 +10,7 @@
 namespace gpureg::cli {
 namespace {
 
-constexpr int kSuper = 2;  // drawn larger and averaged down: smooth edges
+constexpr int kSuper = 2;  // supersampling per axis, against jagged edges
 constexpr Color kBackground = {250, 250, 248};
 constexpr float kFar = std::numeric_limits<float>::infinity();
 
@@ -31,14 +31,14 @@ double quantile(std::vector<double> values, double q) {
   return *at;
 }
 
-// A perspective that shows nearly all splats: single stray points may fall off the edge.
+// A perspective fitted to nearly all splats; outliers may lie outside the picture.
 struct Camera {
   double distance = 1, focal = 1, x0 = 0, y0 = 0;
 
   Camera(const std::vector<Splat>& splats, int width, int height) {
     std::vector<double> radii;
     for (const Splat& s : splats) radii.push_back(s.position.norm());
-    // Two and a half radii away the perspective is visible, but nothing gets huge.
+    // At 2.5 radii the nearest points are about 2.3 times as large as the farthest ones.
     distance = 2.5 * std::max(quantile(std::move(radii), 0.98), 1e-9);
     std::vector<double> xs, ys;
     for (const Splat& s : splats) {
@@ -63,7 +63,7 @@ class Canvas {
         height_(height),
         pixels_(static_cast<std::size_t>(width) * static_cast<std::size_t>(height)) {}
 
-  // A disc whose depth grows towards its edge, so that neighbouring discs meet halfway.
+  // The depth of a disc grows towards its edge, so that neighbouring discs meet halfway.
   void splat(double x, double y, double depth, double radius, double world_radius, int layer) {
     const int x_from = std::max(0, static_cast<int>(std::ceil(x - radius)));
     const int x_to = std::min(width_ - 1, static_cast<int>(std::floor(x + radius)));
@@ -79,7 +79,7 @@ class Canvas {
       }
   }
 
-  /// unit: the distance in depth that counts as a full step.
+  /// unit: the difference in depth that occludes fully.
   Image shaded(const std::vector<Layer>& layers, double unit, double near, double far) const {
     Image image(width_, height_, kBackground);
     for (int v = 0; v < height_; ++v)
@@ -104,8 +104,8 @@ class Canvas {
   }
   Pixel& at(int u, int v) { return pixels_[index(u, v)]; }
 
-  // How much of the surroundings stands nearer to the viewer, in [0, 1]: edges and corners get
-  // dark, as under a cloudy sky.
+  // Screen-space ambient occlusion in [0, 1]: the share of the neighbourhood that is nearer to the
+  // viewer. It darkens edges and corners.
   double occlusion(int u, int v, double unit) const {
     static constexpr int kRings[] = {2, 5, 11, 20};
     static constexpr int kDirections[8][2] = {{1, 0}, {-1, 0},  {0, 1},  {0, -1},
@@ -173,8 +173,8 @@ Image render(const std::vector<Layer>& layers, const Eigen::Matrix3d& view, int 
     if (depth < 0.2 * camera.distance) continue;
     depths.push_back(depth);
     const double scale = camera.focal / depth;
-    // The sixth neighbour on a surface is a diagonal of its grid away; discs of half of that just
-    // touch, and scans are uneven.
+    // The sixth neighbour on a regular grid is one diagonal away, so discs of half of that touch.
+    // Scans are sampled unevenly and need larger discs.
     const double world = 0.75 * spacings[static_cast<std::size_t>(s.layer)];
     const double radius = std::clamp(world * scale, 1.1, 24.0);
     canvas.splat(camera.x0 + s.position.x() * scale, camera.y0 + s.position.y() * scale, depth,

@@ -6,6 +6,7 @@
 
 #include "base64.hpp"
 #include "plot.hpp"
+#include "report_comparison.hpp"
 #include "report_pairs.hpp"
 #include "report_tables.hpp"
 #include "text.hpp"
@@ -23,13 +24,15 @@ constexpr const char* kHead = R"(<!DOCTYPE html>
 <title>gpureg report</title><style>
 body { font: 15px/1.5 system-ui, sans-serif; color: #2b2b2b; background: #fafaf8; max-width: 1000px; margin: 2em auto; padding: 0 1em; }
 h1 { font-size: 1.5em; margin-bottom: 0; } h2 { font-size: 1.15em; margin: 1.8em 0 .4em; }
-p.sub { color: #777; margin-top: .2em; }
+h1.result { margin-top: 2em; padding-top: .8em; border-top: 2px solid #d8d8d0; }
+p.sub { color: #666; margin-top: .2em; } .wide { overflow-x: auto; } .wide td, .wide th { padding: .25em .55em; font-size: 13px; } .wide td { white-space: nowrap; } th[colspan] { text-align: center; }
+tr.scene td { font-weight: 600; padding-top: .7em; } table.options td, table.options th { text-align: left; } a { color: #1f6fb8; }
 table { border-collapse: collapse; } th, td { padding: .25em .8em; text-align: right; border-bottom: 1px solid #e4e4de; }
 th { font-weight: 600; color: #555; } th:first-child, td:first-child { text-align: left; }
-.row { display: flex; flex-wrap: wrap; gap: 24px; } figure { margin: 0 0 1.2em; } figcaption { color: #555; }
+.row { display: flex; flex-wrap: wrap; gap: 24px; } .row figure { max-width: 460px; } figure { margin: 0 0 1.2em; } figcaption { color: #555; }
 details { overflow-x: auto; } summary { cursor: pointer; color: #555; margin-bottom: .4em; } details td, details th { padding: .1em .6em; font-size: 13px; }
 svg { max-width: 100%; height: auto; } svg text { font: 12px system-ui, sans-serif; fill: #444; }
-img { max-width: 100%; border: 1px solid #e4e4de; } .right { color: #2f9e5b; } .wrong { color: #d6453d; } .missed { color: #b97a00; }
+img { max-width: 100%; border: 1px solid #e4e4de; } .correct { color: #2f9e5b; } .false { color: #d6453d; } .missed { color: #b97a00; }
 </style></head><body>
 )";
 
@@ -39,26 +42,37 @@ std::optional<double> number_of(const Json& json, const char* pointer) {
   return json.at(at).get<double>();
 }
 
-std::string tries_per_pair(const Json& document) {
-  return text_of(document, "/options/hypothesis/proposal") == "compatibility"
-             ? text_of(document, "/options/compatibility/seeds") + " seeds per pair"
-             : text_of(document, "/options/hypothesis/count") + " hypotheses per pair";
+// Empty where the result does not tell, as with results of other programs.
+std::string effort_per_pair(const Json& document) {
+  const bool quadruples = text_of(document, "/options/method") == "quadruples";
+  const std::string count =
+      text_of(document, quadruples ? "/options/quadruples/count" : "/options/compatibility/seeds");
+  return count.empty() ? "" : count + (quadruples ? " hypotheses" : " seeds") + " per pair";
 }
 
-std::string opening(const ResultFile& result) {
+std::string run_facts(const Json& document) {
+  const auto fact = [&](const char* before, const char* pointer, const char* after) {
+    const std::string text = text_of(document, pointer);
+    return text.empty() ? "" : before + text + after;
+  };
+  std::string facts;
+  for (const std::string& text :
+       {fact("gpureg ", "/environment/version", "") + fact(" on ", "/environment/description", ""),
+        fact("voxel size ", "/options/prepare/voxel_size", " m"), effort_per_pair(document),
+        fact("random seed ", "/options/seed", "")})
+    if (!text.empty()) facts += (facts.empty() ? "" : " &middot; ") + escaped(text);
+  return facts.empty() ? "" : "<p class=\"sub\">" + facts + "</p>\n";
+}
+
+std::string summary(const ResultFile& result) {
   const Json& d = result.document;
-  std::string html = "<h1>gpureg: " + escaped(base_name(text_of(d, "/folder"))) + "</h1>\n";
-  html += "<p class=\"sub\">gpureg " + escaped(text_of(d, "/environment/version")) + " on " +
-          escaped(text_of(d, "/environment/description")) + " &middot; voxel size " +
-          escaped(text_of(d, "/options/prepare/voxel_size")) + " m &middot; " +
-          escaped(tries_per_pair(d)) + " &middot; seed " +
-          escaped(text_of(d, "/options/hypothesis/seed")) + "</p>\n";
   const auto aligned = std::count_if(result.pairs.begin(), result.pairs.end(),
                                      [](const PairRecord& pair) { return pair.aligned; });
   const std::size_t fragments =
       d.contains("fragments") && d["fragments"].is_array() ? d["fragments"].size() : 0;
-  html += "<p>" + std::to_string(result.pairs.size()) + " pairs of " + std::to_string(fragments) +
-          " fragments were tried, " + std::to_string(aligned) + " reported as aligned. ";
+  std::string html = run_facts(d) + "<p>" + std::to_string(result.pairs.size()) + " pairs of " +
+                     std::to_string(fragments) + " fragments were tried, " +
+                     std::to_string(aligned) + " reported as aligned. ";
   html += "A pair took " + significant(result.mean_milliseconds(), 3) +
           " ms on average, the preparation of a fragment " +
           significant(result.mean_prepare_milliseconds(), 3) + " ms";
@@ -71,11 +85,11 @@ std::string figure(const std::string& title, const std::string& content) {
   return "<figure><figcaption>" + escaped(title) + "</figcaption>\n" + content + "</figure>\n";
 }
 
-// From which score on pairs were reported.
+// The lowest score of a reported pair.
 auto threshold(const ResultFile& result) {
-  const bool quadruples = text_of(result.document, "/options/hypothesis/proposal") == "quadruples";
+  const bool quadruples = text_of(result.document, "/options/method") == "quadruples";
   return number_of(result.document,
-                   quadruples ? "/options/score/min_inlier_ratio" : "/options/min_confidence");
+                   quadruples ? "/options/quadruples/min_inlier_ratio" : "/options/min_confidence");
 }
 
 std::string truth_plots(const ResultFile& result, const evaluation::GroundTruth& truth,
@@ -88,14 +102,15 @@ std::string truth_plots(const ResultFile& result, const evaluation::GroundTruth&
   };
   if (e.geometric) add("geometric", kBlue, true, *e.geometric);
   add("strict", kAmber, false, e.strict);
-  Population right{"right", kGreen, {}}, wrong{"wrong", kRed, {}};
-  for (const EvaluatedPair& judged : judge(truth, result))
-    if (judged.pair->transform) (judged.right ? right : wrong).values.push_back(judged.pair->score);
+  Population correct{"correct", kGreen, {}}, incorrect{"false", kRed, {}};
+  for (const EvaluatedPair& pair : evaluate_pairs(truth, result))
+    if (pair.pair->transform)
+      (pair.correct ? correct : incorrect).values.push_back(pair.pair->score);
   return "<div class=\"row\">\n" +
-         figure("Recall and precision while the threshold falls; the dots are this run's",
+         figure("Recall and precision for a falling score threshold; the dot marks this run",
                 curve_plot(curves, "recall in %", "precision in %")) +
          figure("Scores of the best candidates",
-                histogram_plot({right, wrong}, "score", threshold(result))) +
+                histogram_plot({correct, incorrect}, "score", threshold(result))) +
          "</div>\n";
 }
 
@@ -107,7 +122,7 @@ std::string score_plot(const ResultFile& result) {
                 histogram_plot({aligned, rejected}, "score", threshold(result)));
 }
 
-// Means of the objects "ms" in a list, in the order of the stages.
+// records: objects "ms" of pairs or fragments. The bars keep the order of the stages.
 std::vector<Bar> stage_bars(const std::vector<const Json*>& records, const char* color) {
   std::vector<Bar> bars;
   for (const Json* ms : records)
@@ -134,38 +149,52 @@ std::string time_plots(const ResultFile& result) {
 
 std::string picture_list(const std::vector<Picture>& pictures) {
   if (pictures.empty()) return "";
-  const std::map<std::string, std::string> classes = {{"Right", "right"},
-                                                      {"Aligned", "right"},
-                                                      {"Wrong", "wrong"},
+  const std::map<std::string, std::string> classes = {{"Correct", "correct"},
+                                                      {"Aligned", "correct"},
+                                                      {"False positive", "false"},
                                                       {"Missed", "missed"},
                                                       {"Not aligned", "missed"}};
-  std::string html = "<h2>Pairs to look at</h2>\n";
+  std::string html = "<h2>Pictures of pairs</h2>\n";
   for (const Picture& picture : pictures) {
     const auto found = classes.find(picture.heading);
     html += "<figure><figcaption><b class=\"" +
             (found == classes.end() ? std::string() : found->second) + "\">" +
-            escaped(picture.heading) + "</b> &middot; " + escaped(picture.remark) +
-            "</figcaption>\n<img alt=\"before and after\" src=\"data:image/png;base64," +
+            escaped(picture.heading) + "</b> &middot; " + escaped(picture.caption) +
+            "</figcaption>\n<img alt=\"source and target before and after alignment\" "
+            "src=\"data:image/png;base64," +
             base64(picture.png) + "\"></figure>\n";
   }
   return html;
 }
 
+std::string body(const ReportEntry& entry, bool unfolded) {
+  std::string html = summary(entry.result);
+  std::vector<EvaluatedPair> pairs;
+  if (entry.truth) {
+    pairs = evaluate_pairs(*entry.truth, entry.result);
+    html +=
+        score_table(*entry.evaluation) + truth_plots(entry.result, *entry.truth, *entry.evaluation);
+  } else {
+    html += score_plot(entry.result);
+  }
+  return html + time_plots(entry.result) + picture_list(entry.pictures) +
+         pair_table(entry.result, pairs, unfolded) + options_table(entry.result.document, unfolded);
+}
+
 }  // namespace
 
-std::string report_page(const ResultFile& result,
-                        const std::optional<evaluation::GroundTruth>& truth,
-                        const std::vector<Picture>& pictures) {
-  std::string html = kHead + opening(result);
-  if (truth) {
-    const evaluation::Evaluation e = evaluation::evaluate(*truth, result.reports, true);
-    html += score_table(e) + truth_plots(result, *truth, e);
+std::string report_page(const std::vector<ReportEntry>& entries) {
+  std::string html = kHead;
+  if (entries.size() == 1) {
+    html +=
+        "<h1>gpureg: " + escaped(entries.front().scene) + "</h1>\n" + body(entries.front(), true);
   } else {
-    html += score_plot(result);
+    html += comparison(entries);
+    for (std::size_t k = 0; k < entries.size(); ++k)
+      html += "<h1 class=\"result\" id=\"" + result_anchor(k) + "\">" + escaped(entries[k].name) +
+              "</h1>\n" + body(entries[k], false);
   }
-  return html + time_plots(result) + picture_list(pictures) +
-         pair_table(result, truth ? judge(*truth, result) : std::vector<EvaluatedPair>()) +
-         options_table(result.document) + "</body></html>\n";
+  return html + "</body></html>\n";
 }
 
 }  // namespace gpureg::cli

@@ -12,10 +12,10 @@ namespace {
 
 using evaluation::GroundTruth;
 
-constexpr double kGoodDistance = 0.2;     // metres, Redwood's rule
-constexpr std::size_t kThresholds = 200;  // a curve needs no more corners
+constexpr double kCorrectDistance = 0.2;  // metres, Redwood's rule
+constexpr std::size_t kThresholds = 200;  // more points than a plot of 460 pixels can show
 
-bool farther(const PairRecord* a, const PairRecord* b) { return a->score > b->score; }
+bool higher_score(const PairRecord* a, const PairRecord* b) { return a->score > b->score; }
 
 std::string numbers(const PairRecord& pair) {
   return "fragment " + std::to_string(pair.j) + " onto " + std::to_string(pair.i) + ", score " +
@@ -29,8 +29,8 @@ void take(std::vector<SamplePair>& samples, const std::vector<const PairRecord*>
     samples.push_back({pairs[k], heading, numbers(*pairs[k]) + remark(*pairs[k])});
 }
 
-// The middle first, then the one that nearly failed: pairs come sorted, the best first.
-std::vector<const PairRecord*> typical_and_narrow(const std::vector<const PairRecord*>& pairs) {
+// The median score first, then the lowest one. pairs: sorted by falling score.
+std::vector<const PairRecord*> median_and_lowest(const std::vector<const PairRecord*>& pairs) {
   if (pairs.size() < 2) return pairs;
   return {pairs[(pairs.size() - 1) / 2], pairs.back()};
 }
@@ -39,29 +39,29 @@ std::string no_remark(const PairRecord&) { return ""; }
 
 }  // namespace
 
-std::vector<EvaluatedPair> judge(const GroundTruth& truth, const ResultFile& result) {
+std::vector<EvaluatedPair> evaluate_pairs(const GroundTruth& truth, const ResultFile& result) {
   using Key = std::pair<int, int>;
   std::map<Key, bool> in_truth;
   for (const evaluation::LogEntry& entry : truth.log) in_truth[{entry.i, entry.j}] = true;
-  const bool wide = !truth.all_log.empty();
-  const auto& log = wide ? truth.all_log : truth.log;
-  const auto& information = wide ? truth.all_information : truth.information;
+  const bool any_overlap = !truth.all_log.empty();
+  const auto& log = any_overlap ? truth.all_log : truth.log;
+  const auto& information = any_overlap ? truth.all_information : truth.information;
   std::map<Key, std::size_t> at;
   for (std::size_t k = 0; k < log.size(); ++k) at[{log[k].i, log[k].j}] = k;
 
-  std::vector<EvaluatedPair> judged;
+  std::vector<EvaluatedPair> evaluated;
   for (const PairRecord& pair : result.pairs) {
     if (pair.j - pair.i <= 1) continue;
     const Key key(pair.i, pair.j);
-    EvaluatedPair verdict{&pair, in_truth.count(key) > 0, false};
+    EvaluatedPair entry{&pair, in_truth.count(key) > 0, false};
     const auto found = at.find(key);
     if (found != at.end() && pair.transform)
-      verdict.right =
+      entry.correct =
           evaluation::redwood_error(log[found->second].transform, *pair.transform,
-                                    information[found->second].information) <= kGoodDistance;
-    judged.push_back(verdict);
+                                    information[found->second].information) <= kCorrectDistance;
+    evaluated.push_back(entry);
   }
-  return judged;
+  return evaluated;
 }
 
 std::vector<std::pair<double, double>> recall_precision(const GroundTruth& truth,
@@ -88,24 +88,25 @@ std::vector<std::pair<double, double>> recall_precision(const GroundTruth& truth
   return curve;
 }
 
-std::vector<SamplePair> samples(const std::vector<EvaluatedPair>& judged, std::size_t each) {
-  std::vector<const PairRecord*> right, wrong, missed;
-  std::map<const PairRecord*, bool> candidate_right;
-  for (const EvaluatedPair& j : judged) {
-    if (j.pair->aligned)
-      (j.right ? right : wrong).push_back(j.pair);
-    else if (j.in_truth)
-      missed.push_back(j.pair);
-    candidate_right[j.pair] = j.right;
+std::vector<SamplePair> samples(const std::vector<EvaluatedPair>& evaluated, std::size_t each) {
+  std::vector<const PairRecord*> correct, false_positive, missed;
+  std::map<const PairRecord*, bool> candidate_correct;
+  for (const EvaluatedPair& e : evaluated) {
+    if (e.pair->aligned)
+      (e.correct ? correct : false_positive).push_back(e.pair);
+    else if (e.in_truth)
+      missed.push_back(e.pair);
+    candidate_correct[e.pair] = e.correct;
   }
-  for (auto* pairs : {&right, &wrong, &missed}) std::sort(pairs->begin(), pairs->end(), farther);
+  for (auto* pairs : {&correct, &false_positive, &missed})
+    std::sort(pairs->begin(), pairs->end(), higher_score);
   std::vector<SamplePair> chosen;
-  take(chosen, typical_and_narrow(right), each, "Right", no_remark);
-  take(chosen, wrong, each, "Wrong", no_remark);
+  take(chosen, median_and_lowest(correct), each, "Correct", no_remark);
+  take(chosen, false_positive, each, "False positive", no_remark);
   take(chosen, missed, each, "Missed", [&](const PairRecord& pair) {
     if (!pair.transform) return ": " + pair.reason;
-    return ": " + pair.reason + "; the best candidate was " +
-           (candidate_right[&pair] ? "right" : "wrong");
+    return ": " + pair.reason + "; the best candidate is " +
+           (candidate_correct[&pair] ? "correct" : "false");
   });
   return chosen;
 }
@@ -113,9 +114,9 @@ std::vector<SamplePair> samples(const std::vector<EvaluatedPair>& judged, std::s
 std::vector<SamplePair> samples(const ResultFile& result, std::size_t each) {
   std::vector<const PairRecord*> aligned, rejected;
   for (const PairRecord& pair : result.pairs) (pair.aligned ? aligned : rejected).push_back(&pair);
-  for (auto* pairs : {&aligned, &rejected}) std::sort(pairs->begin(), pairs->end(), farther);
+  for (auto* pairs : {&aligned, &rejected}) std::sort(pairs->begin(), pairs->end(), higher_score);
   std::vector<SamplePair> chosen;
-  take(chosen, typical_and_narrow(aligned), each, "Aligned", no_remark);
+  take(chosen, median_and_lowest(aligned), each, "Aligned", no_remark);
   take(chosen, rejected, each, "Not aligned",
        [](const PairRecord& pair) { return ": " + pair.reason; });
   return chosen;

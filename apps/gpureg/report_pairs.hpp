@@ -9,30 +9,31 @@
 
 namespace gpureg::cli {
 
-/// A pair next to the truth. Only pairs with j - i > 1 are judged, as in the protocol.
+/// A pair compared with the ground truth. The protocol evaluates only pairs with j - i > 1.
 struct EvaluatedPair {
   const PairRecord* pair = nullptr;
-  bool in_truth = false;  ///< overlap >= 30 %: it ought to be found
-  /// its pose, reported or not, is within 0.2 m of the truth (of any overlap, where gt_all is
-  /// there)
-  bool right = false;
+  bool in_truth = false;  ///< listed in gt.log: overlap >= 30 %
+  /// Its pose, reported or not, is within 0.2 m of the ground truth. With gt_all.log this includes
+  /// pairs that overlap by less than 30 %.
+  bool correct = false;
 };
-std::vector<EvaluatedPair> judge(const evaluation::GroundTruth& truth, const ResultFile& result);
+std::vector<EvaluatedPair> evaluate_pairs(const evaluation::GroundTruth& truth,
+                                          const ResultFile& result);
 
-/// Recall and precision while the threshold falls; geometric: by the geometric rule, which the
-/// truth must allow.
+/// (recall, precision) for a falling score threshold. geometric: by the geometric rule, which needs
+/// gt_all.log.
 std::vector<std::pair<double, double>> recall_precision(const evaluation::GroundTruth& truth,
                                                         const ResultFile& result, bool geometric);
 
-/// A pair worth a picture, and why.
+/// A pair to draw, with its caption.
 struct SamplePair {
   const PairRecord* pair = nullptr;
-  std::string heading, remark;
+  std::string heading, caption;
 };
 
-/// With truth: right, wrong and missed pairs, the telling ones; without: sure, narrow and rejected
+/// With ground truth: correct, false positive and missed pairs. Without: aligned and not aligned
 /// ones. At most `each` of a kind.
-std::vector<SamplePair> samples(const std::vector<EvaluatedPair>& judged, std::size_t each);
+std::vector<SamplePair> samples(const std::vector<EvaluatedPair>& evaluated, std::size_t each);
 std::vector<SamplePair> samples(const ResultFile& result, std::size_t each);
 
 }  // namespace gpureg::cli

@@ -9,22 +9,18 @@
 namespace gpureg::cli {
 namespace {
 
-// Rows shown without a click; a scene of the benchmark has more than a thousand.
-constexpr std::size_t kOpenRows = 100;
+// Longer tables start folded: a scene of the benchmark has more than a thousand pairs.
+constexpr std::size_t kMaxUnfoldedRows = 100;
 
-std::string cells(const std::vector<std::string>& texts, const char* tag,
-                  const std::string& style = "") {
-  std::string html = style.empty() ? "<tr>" : "<tr class=\"" + style + "\">";
-  for (const std::string& text : texts)
-    html += std::string("<") + tag + ">" + escaped(text) + "</" + tag + ">";
-  return html + "</tr>\n";
+// Empty for pairs that were not reported and are not listed in gt.log.
+std::string outcome(const EvaluatedPair& pair) {
+  if (pair.pair->aligned) return pair.correct ? "correct" : "false positive";
+  return pair.in_truth ? "missed" : "";
 }
 
-// Empty where the truth says nothing: neighbours, and pairs that do not overlap and were not
-// reported.
-std::string verdict(const EvaluatedPair& judged) {
-  if (judged.pair->aligned) return judged.right ? "right" : "wrong";
-  return judged.in_truth ? "missed" : "";
+std::string folded(const std::string& summary, bool open, const std::string& table) {
+  return std::string("<details") + (open ? " open" : "") + "><summary>" + summary + "</summary>\n" +
+         table + "</details>\n";
 }
 
 std::string count_of(const Json& pair, const char* name) {
@@ -48,45 +44,54 @@ std::string text_of(const Json& json, const char* pointer) {
   return value.is_string() ? value.get<std::string>() : value.dump();
 }
 
+std::string table_row(const std::vector<std::string>& texts, const char* tag,
+                      const std::string& style) {
+  std::string html = style.empty() ? "<tr>" : "<tr class=\"" + style + "\">";
+  for (const std::string& text : texts)
+    html += std::string("<") + tag + ">" + escaped(text) + "</" + tag + ">";
+  return html + "</tr>\n";
+}
+
 std::string score_table(const evaluation::Evaluation& e) {
-  std::string html = "<h2>Recall and precision</h2>\n<table>\n";
-  html += cells({"rule", "right", "true pairs", "reported", "recall", "precision", "raw recall",
-                 "R@P50", "R@P80", "R@P95", "R@P99", "AP"},
-                "th");
+  std::string html = "<h2>Recall and precision</h2>\n<div class=\"wide\"><table>\n";
+  html += table_row({"rule", "correct", "true pairs", "reported", "recall, %", "precision, %",
+                     "raw recall, %", "R@P50, %", "R@P80, %", "R@P95, %", "R@P99, %", "AP, %"},
+                    "th");
   const auto row = [&](const char* rule, const evaluation::Scores& s,
                        const std::optional<evaluation::RankedScores>& r) {
     std::vector<std::string> texts = {rule,
                                       std::to_string(s.good),
                                       std::to_string(s.ground_truth),
                                       std::to_string(s.reported),
-                                      percent(s.recall()) + " %",
-                                      percent(s.precision()) + " %"};
+                                      percent(s.recall()),
+                                      percent(s.precision())};
     if (r)
       for (const double value : {r->raw_recall, r->recall_at_50, r->recall_at_80, r->recall_at_95,
                                  r->recall_at_99, r->average_precision})
-        texts.push_back(percent(value) + " %");
-    html += cells(texts, "td");
+        texts.push_back(percent(value));
+    html += table_row(texts, "td");
   };
   row("strict", e.strict, e.strict_ranked);
   if (e.geometric) row("geometric", *e.geometric, e.geometric_ranked);
   return html +
-         "</table>\n<p class=\"sub\">Redwood's protocol, pairs with j &minus; i &gt; 1. Strict: a "
-         "report that overlaps by less than 30 % is wrong; geometric: right where the pose is "
-         "within 0.2 m of the truth. Raw: every best candidate reported. R@P: recall at that "
-         "precision; AP: average precision.</p>\n";
+         "</table></div>\n<p class=\"sub\">Redwood's protocol, pairs with j &minus; i &gt; 1. A "
+         "pose is correct "
+         "within 0.2 m of the ground truth. The strict rule counts a pair that overlaps by less "
+         "than "
+         "30 % as false; the geometric rule counts it by its pose. Raw recall: recall when every "
+         "best candidate is reported. R@P80: recall at 80 % precision. AP: average "
+         "precision.</p>\n";
 }
 
-std::string pair_table(const ResultFile& result, const std::vector<EvaluatedPair>& judged) {
-  std::map<const PairRecord*, std::string> verdicts;
-  for (const EvaluatedPair& j : judged) verdicts[j.pair] = verdict(j);
+std::string pair_table(const ResultFile& result, const std::vector<EvaluatedPair>& evaluated,
+                       bool unfolded) {
+  std::map<const PairRecord*, std::string> outcomes;
+  for (const EvaluatedPair& e : evaluated) outcomes[e.pair] = outcome(e);
   std::vector<std::string> titles = {"target i", "source j", "status",  "reason",
                                      "score",    "rmse, m",  "matches", "survivors",
                                      "scored",   "inliers",  "ms"};
-  if (!judged.empty()) titles.push_back("verdict");
-  const bool open = result.pairs.size() <= kOpenRows;
-  std::string html = "<h2>Every pair</h2>\n<details" + std::string(open ? " open" : "") +
-                     "><summary>" + std::to_string(result.pairs.size()) +
-                     " pairs</summary>\n<table>\n" + cells(titles, "th");
+  if (!evaluated.empty()) titles.push_back("evaluation");
+  std::string html = "<table>\n" + table_row(titles, "th");
   for (const PairRecord& pair : result.pairs) {
     std::vector<std::string> texts = {std::to_string(pair.i),
                                       std::to_string(pair.j),
@@ -99,29 +104,38 @@ std::string pair_table(const ResultFile& result, const std::vector<EvaluatedPair
                                       count_of(pair.json, "scored"),
                                       count_of(pair.json, "inliers"),
                                       fixed(pair.milliseconds, 1)};
-    const auto found = verdicts.find(&pair);
-    const std::string said = found == verdicts.end() ? "" : found->second;
-    if (!judged.empty()) texts.push_back(said);
-    html += cells(texts, "td", said);
+    const auto found = outcomes.find(&pair);
+    const std::string text = found == outcomes.end() ? "" : found->second;
+    if (!evaluated.empty()) texts.push_back(text);
+    html += table_row(texts, "td", text);
   }
-  html += "</table></details>\n";
-  if (!judged.empty())
+  html += "</table>\n";
+  if (!evaluated.empty())
     html +=
-        "<p class=\"sub\">Verdicts: right, the reported pose is within 0.2 m of the truth; "
-        "wrong, it is not; missed, the pair overlaps by 30 % or more and was not reported. "
-        "Neighbours (j &minus; i = 1) are not judged.</p>\n";
-  return html;
+        "<p class=\"sub\">Correct: the reported pose is within 0.2 m of the ground truth. False "
+        "positive: the reported pose is farther away, or the pair does not overlap. Missed: the "
+        "pair overlaps by 30 % or more and was not reported. Neighbours (j &minus; i = 1) are not "
+        "evaluated.</p>\n";
+  return "<h2>Every pair</h2>\n" + folded(std::to_string(result.pairs.size()) + " pairs",
+                                          unfolded && result.pairs.size() <= kMaxUnfoldedRows,
+                                          html);
 }
 
-std::string options_table(const Json& document) {
+std::string options_table(const Json& document, bool unfolded) {
   const auto options = document.find("options");
   if (options == document.end() || !options->is_object()) return "";
-  std::string html = "<h2>Options</h2>\n<table>\n" + cells({"stage", "option", "value"}, "th");
+  std::string general, stages;
   for (const auto& stage : options->items())
     if (stage.value().is_object())
       for (const auto& option : stage.value().items())
-        html += cells({stage.key(), option.key(), option.value().dump()}, "td");
-  return html + "</table>\n<p class=\"sub\">Lengths in metres, angles in degrees.</p>\n";
+        stages += table_row({stage.key(), option.key(), text_of(option.value(), "")}, "td");
+    else
+      general += table_row({"general", stage.key(), text_of(stage.value(), "")}, "td");
+  return "<h2>Options</h2>\n" +
+         folded("Every option of this run", unfolded,
+                "<table class=\"options\">\n" + table_row({"stage", "option", "value"}, "th") +
+                    general + stages +
+                    "</table>\n<p class=\"sub\">Lengths in metres, angles in degrees.</p>\n");
 }
 
 }  // namespace gpureg::cli

@@ -13,7 +13,7 @@ namespace {
 
 constexpr double kDegree = 3.14159265358979323846 / 180;
 
-// The picture's axes for a look along forward, with the given up.
+// Rows: right, down and forward of a camera with the given viewing direction.
 Eigen::Matrix3d look(const Eigen::Vector3d& forward, const Eigen::Vector3d& up) {
   const Eigen::Vector3d ahead = forward.normalized();
   const Eigen::Vector3d right = ahead.cross(up).normalized();
@@ -22,14 +22,14 @@ Eigen::Matrix3d look(const Eigen::Vector3d& forward, const Eigen::Vector3d& up) 
   return rows;
 }
 
-bool seen_ahead(const std::vector<Eigen::Vector3f>& points) {
+bool in_camera_frame(const std::vector<Eigen::Vector3f>& points) {
   std::size_t ahead = 0;
   for (const Eigen::Vector3f& p : points) ahead += p.z() > 0;
   return static_cast<double>(ahead) > 0.95 * static_cast<double>(points.size());
 }
 
-// Horizontal direction of the smallest spread: to look along it shows the longest side.
-Eigen::Vector3d across(const std::vector<Eigen::Vector3f>& points) {
+// Horizontal direction of the smallest variance. A view along it shows the longest side.
+Eigen::Vector3d shortest_horizontal_axis(const std::vector<Eigen::Vector3f>& points) {
   Eigen::Vector2d mean = Eigen::Vector2d::Zero();
   for (const Eigen::Vector3f& p : points) mean += p.head<2>().cast<double>();
   mean /= static_cast<double>(points.size());
@@ -47,14 +47,15 @@ Eigen::Vector3d across(const std::vector<Eigen::Vector3f>& points) {
 
 Eigen::Matrix3d choose_view(const PointCloud& cloud) {
   const std::vector<Eigen::Vector3f> points = finite_points(cloud.points);
-  if (!points.empty() && seen_ahead(points)) {
-    // A little from above and from the left: walls, floor and things stand out against each other.
+  if (!points.empty() && in_camera_frame(points)) {
+    // From above and from the left, so that walls, floor and objects do not hide each other.
     const Eigen::Matrix3d turn = (Eigen::AngleAxisd(20 * kDegree, Eigen::Vector3d::UnitY()) *
                                   Eigen::AngleAxisd(-28 * kDegree, Eigen::Vector3d::UnitX()))
                                      .toRotationMatrix();
     return look(turn * Eigen::Vector3d::UnitZ(), -Eigen::Vector3d::UnitY());
   }
-  const Eigen::Vector3d side = points.empty() ? Eigen::Vector3d(1, 0, 0) : across(points);
+  const Eigen::Vector3d side =
+      points.empty() ? Eigen::Vector3d(1, 0, 0) : shortest_horizontal_axis(points);
   const Eigen::Vector3d forward =
       std::cos(45 * kDegree) * (Eigen::AngleAxisd(25 * kDegree, Eigen::Vector3d::UnitZ()) * side) -
       std::sin(45 * kDegree) * Eigen::Vector3d::UnitZ();

@@ -7,10 +7,10 @@
 
 namespace gpureg::cli {
 
-/// Rows are the picture's right, down and forward, in the frame of the cloud. A cloud that a sensor
-/// at its origin saw ahead of itself (z forward, y down, as depth cameras have it) is looked at
-/// over the sensor's shoulder; any other one, as from a turning scanner (z up), from above and
-/// aside.
+/// Rotation from the frame of the cloud to the axes of the picture; its rows are right, down and
+/// forward. A cloud in the frame of a depth camera (z forward, y down, points in front of the
+/// origin) is viewed from behind the camera. Any other cloud is taken as z up and viewed obliquely
+/// from above.
 Eigen::Matrix3d choose_view(const PointCloud& cloud);
 
 }  // namespace gpureg::cli

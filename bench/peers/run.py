@@ -6,7 +6,7 @@ Every method gets the same clouds (gpureg's 5 cm voxel centroids with normals; g
 with the raw points), the same threads and the parameters that its own documentation recommends,
 runs in a process of its own, prepares each fragment once and then aligns pair by pair. A peer that
 is not installed is skipped with a message; one that crashes or hangs on a pair loses that pair.
-`gpureg evaluate` evaluates them. Pairs: those with j - i > 1, as in Redwood's protocol; with --others N,
+`gpureg evaluate` scores the poses. Pairs: those with j - i > 1, as in Redwood's protocol; with --others N,
 all pairs of the ground truth and N others, drawn by --seed. Times of a pair are wall clock and
 processor seconds: the second say more where other programs run beside. usage: run.py [--scene
 redkitchen/fragments] [--methods open3d_ransac ...] [--others N] [--list] [-o FILE] Needs Python 3
@@ -171,6 +171,11 @@ def main():
         help="keep the entries of the record for methods that are not named",
     )
     parser.add_argument(
+        "--results",
+        type=pathlib.Path,
+        help="folder to keep each method's RESULT.json in, for `gpureg report`",
+    )
+    parser.add_argument(
         "--list", action="store_true", help="say which methods are installed, and end"
     )
     arguments = parser.parse_args()
@@ -230,7 +235,9 @@ def main():
                     line.update(score=start["score"], aligned=start["aligned"])
             if name == methods.REFINED:
                 initial = {(line["i"], line["j"]): line for line in results}
-            result, scores = temporary / f"{name}.json", temporary / f"{name}.scores.json"
+            kept = arguments.results or temporary
+            kept.mkdir(parents=True, exist_ok=True)
+            result, scores = kept / f"{name}.json", temporary / f"{name}.scores.json"
             result.write_text(json.dumps(document(name, said, results, prepared, lost)))
             record.gpureg(arguments, "evaluate", result, "--ground-truth", folder, "--json", scores)
             scene = json.loads(scores.read_text())["scenes"][0]

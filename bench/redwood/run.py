@@ -6,12 +6,13 @@ mean, published rows beside measured ones.
 SCENE: folders in Redwood's layout (the four scenes of scripts/fetch_redwood, 3DMatch's scenes,
 those of `gpureg generate`), as paths or as names under --data. Without one, scenes are generated,
 the same on every machine. Every preset runs with every seed through `gpureg batch` on every backend
-that is there, `gpureg evaluate` evaluates; peers that are installed run once, through bench/peers
-(--peers none: without). The record also holds recall/precision curves,
-recall against overlap, where the misses are, rotation errors of the wrong poses, registration
-recall by 3DMatch's rule where its logs are, and times with and without the preparation of clouds.
+that is there, `gpureg evaluate` scores them; peers that are installed run once, through bench/peers
+(--peers none: without). The record, and the same as Markdown tables, also hold recall by overlap,
+the kinds of missed pairs and false positives, rotation errors of false poses, registration recall
+by 3DMatch's rule where its logs are, and times with and without the preparation of clouds. The page
+is that of `gpureg report` for the first seed: curves, pictures, every pair.
 usage: run.py [SCENE ...] [--presets loopsmart default] [--seeds 1 2 3] [--peers all|none|NAME ...]
-[--report out/redwood/report.html] [-o FILE]"""
+[--report out/redwood/report.html] [--tables out/redwood/tables.md] [-o FILE]"""
 
 import json
 import pathlib
@@ -22,10 +23,11 @@ import sys
 import tempfile
 
 HERE = pathlib.Path(__file__).resolve().parent
-sys.path[1:1] = [str(HERE.parent / "accuracy"), str(HERE.parent / "report")]
+sys.path[1:1] = [str(HERE.parent / "accuracy")]
 import analysis
-import published
+import markdown_tables
 import record
+from markdown_tables import percent
 from scenes import Scene
 
 GENERATED = [(12, 1), (12, 2)]  # fragments, seed of `gpureg generate`
@@ -89,8 +91,13 @@ def times(batch, processor):
     }
 
 
-def run_once(arguments, scene, preset, backend, seed, temporary, pictures):
-    result, scores = temporary / "result.json", temporary / "scores.json"
+def file_name(scene):
+    return scene.name.replace("/", "_")
+
+
+def run_once(arguments, scene, preset, backend, seed, temporary):
+    result = temporary / f"{file_name(scene)}-{preset}-{backend}-{seed}.json"
+    scores = temporary / "scores.json"
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
     record.gpureg(
         arguments,
@@ -119,20 +126,6 @@ def run_once(arguments, scene, preset, backend, seed, temporary, pictures):
         {**entry, "log": pathlib.Path(entry["log"]).name}
         for entry in verdict.get("registration_recall", [])
     ]
-    if pictures is not None:
-        page = temporary / "page.html"
-        record.gpureg(
-            arguments,
-            "report",
-            result,
-            "--ground-truth",
-            scene.truth,
-            "--clouds",
-            scene.fragments,
-            "-o",
-            page,
-        )
-        pictures[scene.name, preset] = page.read_text()
     cost = [
         [
             pair["statistics"]["source_points"] + pair["statistics"]["target_points"],
@@ -140,18 +133,22 @@ def run_once(arguments, scene, preset, backend, seed, temporary, pictures):
         ]
         for pair in batch["pairs"]
     ]
-    return {
-        "seed": seed,
-        "strict": analysis.rounded(verdict["strict"]),
-        "geometric": analysis.rounded(verdict.get("geometric")),
-        "registration_recall": recalls,
-        "ms": times(batch, processor),
-        "pairs": len(batch["pairs"]),
-        "peak_memory_mib": round(batch["peak_memory_mib"]),
-        "stages_ms": stages(batch),
-        "points_and_ms": cost[:: max(1, len(cost) // COST_SAMPLE)],
-        **analysis.all_of(verdict["pairs"], analysis.overlaps(scene.fragments)),
-    }, batch
+    return (
+        {
+            "seed": seed,
+            "strict": analysis.rounded(verdict["strict"]),
+            "geometric": analysis.rounded(verdict.get("geometric")),
+            "registration_recall": recalls,
+            "ms": times(batch, processor),
+            "pairs": len(batch["pairs"]),
+            "peak_memory_mib": round(batch["peak_memory_mib"]),
+            "stages_ms": stages(batch),
+            "points_and_ms": cost[:: max(1, len(cost) // COST_SAMPLE)],
+            **analysis.all_of(verdict["pairs"], analysis.overlaps(scene.fragments)),
+        },
+        batch,
+        result,
+    )
 
 
 def stages(batch):
@@ -205,9 +202,9 @@ def over_seeds(runs):
     }
 
 
-def peers_of(arguments, scene, temporary):
-    """The methods of bench/peers on this scene: its record's entries, or none where that could not
-    run.
+def peers_of(arguments, scene, temporary, kept):
+    """Runs the methods of bench/peers on this scene. Their entries of its record; none where it could
+    not run. kept: folder for their RESULT.json.
     """
     output = temporary / "peers.json"
     command = [
@@ -219,6 +216,8 @@ def peers_of(arguments, scene, temporary):
         arguments.gpureg,
         "-o",
         output,
+        "--results",
+        kept,
     ]
     if arguments.peers != ["all"]:
         command += ["--methods", *arguments.peers]
@@ -243,130 +242,15 @@ def peers_of(arguments, scene, temporary):
     return json.loads(output.read_text())["methods"]
 
 
-def percent(value):
-    return f"{100 * value:.1f}"
-
-
-def print_table(entry_rows, names):
-    """entry_rows: label, ms text, [(recall, precision) per scene]."""
-    width = max(len(row[0]) for row in entry_rows) + 2
-    print(
-        f"{'':{width}}{'ms/pair':>10}"
-        + "".join(f"{name[-24:]:>26}" for name in names)
-        + (f"{'mean':>16}" if len(names) > 1 else "")
-    )
-    for label, ms, cells in entry_rows:
-        line = f"{label:{width}}{ms:>10}" + "".join(
-            f"{percent(r) + ' / ' + percent(p):>26}" for r, p in cells
-        )
-        if len(cells) > 1:
-            line += f"{percent(statistics.fmean(r for r, _ in cells)) + ' / ' + percent(statistics.fmean(p for _, p in cells)):>16}"
-        print(line)
-
-
-def print_all(document):
-    names = [scene["name"] for scene in document["scenes"]]
-    print(
-        "\nRecall / precision in %, strict Redwood rule"
-        + (f", mean of {len(document['seeds'])} seeds" if len(document["seeds"]) > 1 else "")
-    )
-    rows, wide, ranked = [], [], []
-    for method in document["methods"]:
-        scenes = [method["scenes"][name] for name in names if name in method["scenes"]]
-        if len(scenes) < len(names):
-            continue
-        ms = statistics.fmean(scene["mean"]["ms"]["pair"]["mean"] for scene in scenes)
-        rows.append(
-            (
-                method["label"],
-                f"{ms:.1f}",
-                [
-                    (
-                        s["mean"]["strict"]["recall"]["mean"],
-                        s["mean"]["strict"]["precision"]["mean"],
-                    )
-                    for s in scenes
-                ],
-            )
-        )
-        if all("geometric" in s["mean"] for s in scenes):
-            wide.append(
-                (
-                    method["label"],
-                    "",
-                    [
-                        (
-                            s["mean"]["geometric"]["recall"]["mean"],
-                            s["mean"]["geometric"]["precision"]["mean"],
-                        )
-                        for s in scenes
-                    ],
-                )
-            )
-        for rule in ("strict", "geometric"):
-            for name, s in zip(names, scenes):
-                if rule in s["mean"]:
-                    ranked.append((method["label"], name, rule, s["mean"][rule]))
-    print_table(rows, names)
-    print("  published, mean of Redwood's four scenes (not of those above):")
-    for label, recall, precision, ms, _ in published.ROWS:
-        print(f"  {label:34}{recall:5.1f} / {precision:4.1f}   {ms}")
-    if wide:
-        print("\nThe same by the geometric rule")
-        print_table(wide, names)
-    width = max(len(label) for label, *_ in ranked) + 2
-    print(
-        f"\n{'ranked by its confidence':{width}}{'scene':>26}{'rule':>11}{'raw':>14}{'R@P50':>8}{'R@P80':>8}{'R@P95':>14}{'R@P99':>8}{'AP':>8}"
-    )
-    for label, name, rule, m in ranked:
-
-        def pm(key, m=m):
-            return f"{percent(m[key]['mean'])} +- {100 * m[key]['stdev']:.1f}"
-
-        print(
-            f"{label:{width}}{name[-24:]:>26}{rule:>11}{pm('raw_recall'):>14}{percent(m['recall_at_50']['mean']):>8}{percent(m['recall_at_80']['mean']):>8}"
-            f"{pm('recall_at_95'):>14}{percent(m['recall_at_99']['mean']):>8}{percent(m['average_precision']['mean']):>8}"
-        )
-    print(
-        "\nmissed true pairs and false positives by kind (sums over seeds); registration recall (15 deg, 0.3 m)"
-    )
-    for method in document["methods"]:
-        for name in names:
-            runs = method["scenes"].get(name, {}).get("runs", [])
-            if runs:
-                missed = {key: sum(run["misses"][key] for run in runs) for key in runs[0]["misses"]}
-                false = {
-                    key: sum(run["wrong_reports"][key] for run in runs)
-                    for key in runs[0]["wrong_reports"]
-                }
-                recalls = method["scenes"][name]["mean"].get("registration_recall", {})
-                said = [
-                    f"{value} {key.replace('_', ' ')}"
-                    for key, value in {**missed, **false}.items()
-                    if value
-                ]
-                said += [f"{percent(value['mean'])} % of {log}" for log, value in recalls.items()]
-                print(f"  {method['label']}, {name}: {'; '.join(said) or 'nothing'}")
-    print(
-        f"\n{'ms':{width}}{'scene':>26}{'fragment':>11}{'prepared pair':>16}{'pair, amortised':>17}{'pair alone':>13}{'processor, a pair':>19}"
-    )
-    for method in document["methods"]:
-        for name in names:
-            if name in method["scenes"]:
-                ms = method["scenes"][name]["mean"]["ms"]
-                print(
-                    f"{method['label']:{width}}{name[-24:]:>26}"
-                    + "".join(
-                        f"{ms[key]['mean']:{w}.1f}"
-                        for key, w in (
-                            ("fragment", 11),
-                            ("pair", 16),
-                            ("pair_amortised", 17),
-                            ("pair_alone", 13),
-                            ("processor", 19),
-                        )
-                    )
-                )
+def write_page(arguments, results):
+    """results: (name, RESULT.json, scene, whether to draw pairs). One page, by `gpureg report`."""
+    arguments.report.parent.mkdir(parents=True, exist_ok=True)
+    words = ["report", *[path for _, path, _, _ in results], "-o", arguments.report]
+    for name, _, scene, pictures in results:
+        words += ["--name", name, "--ground-truth", scene.truth]
+        words += ["--clouds", scene.fragments if pictures else "-"]
+    record.gpureg(arguments, *words)
+    print(f"written: {arguments.report}")
 
 
 def main():
@@ -384,7 +268,13 @@ def main():
         "--report",
         type=pathlib.Path,
         default=record.ROOT / "out/redwood/report.html",
-        help="the page (needs matplotlib)",
+        help="the page of `gpureg report`",
+    )
+    parser.add_argument(
+        "--tables",
+        type=pathlib.Path,
+        default=record.ROOT / "out/redwood/tables.md",
+        help="the tables, as Markdown",
     )
     arguments = parser.parse_args()
     if not arguments.gpureg.exists():
@@ -393,7 +283,7 @@ def main():
         )
     scenes = [find(arguments, name) for name in arguments.scenes] or generated(arguments)
     used = backends(arguments)
-    methods, pictures, environment = [], {}, {}
+    methods, results, environment = [], [], {}
     with tempfile.TemporaryDirectory() as temporary:
         temporary = pathlib.Path(temporary)
         for preset in arguments.presets:
@@ -408,20 +298,22 @@ def main():
                 for scene in scenes:
                     runs = []
                     for seed in arguments.seeds:
-                        wanted = (
-                            pictures if seed == arguments.seeds[0] and backend == used[0] else None
+                        run, batch, path = run_once(
+                            arguments, scene, preset, backend, seed, temporary
                         )
-                        run, batch = run_once(
-                            arguments, scene, preset, backend, seed, temporary, wanted
-                        )
-                        if runs:  # of the first seed only
+                        if not runs:  # the page shows the first seed
+                            name = f"{method['label']}, {scene.name}"
+                            results.append((name, path, scene, backend == used[0]))
+                        else:  # the record keeps details of the first seed only
                             for detail in (run["strict"], run["geometric"] or {}):
                                 detail.pop("curve", None)
                             del run["points_and_ms"]
                         runs.append(run)
                         environment[backend] = batch["environment"]
                         method["options"] = {
-                            k: v for k, v in batch["options"].items() if k != "seed"
+                            name: value
+                            for name, value in batch["options"].items()
+                            if name != "seed"
                         }
                         print(
                             f"{method['label']}, {scene.name}, seed {seed}: {percent(run['strict']['recall'])} / {percent(run['strict']['precision'])}",
@@ -430,7 +322,8 @@ def main():
                     method["scenes"][scene.name] = {"mean": over_seeds(runs), "runs": runs}
                 methods.append(method)
         if arguments.peers != ["none"]:
-            add_peers(arguments, scenes, temporary, methods)
+            add_peers(arguments, scenes, temporary, methods, results)
+        write_page(arguments, results)
     sources = arguments.scenes or [scene.name for scene in scenes]
     words = [
         "bench/redwood/run.py",
@@ -453,20 +346,20 @@ def main():
         ],
         "methods": methods,
     }
-    print_all(document)
-    record.write(arguments, " ".join(map(str, words)), document)
-    try:
-        import page
-    except ImportError as error:
-        print(f"skipped: the report: {error} (bench/report needs matplotlib)")
-        return
-    page.write(arguments.report, [arguments.output], pictures)
+    command = " ".join(map(str, words))
+    tables = markdown_tables.text(document, command)
+    print("\n" + tables)
+    arguments.tables.parent.mkdir(parents=True, exist_ok=True)
+    arguments.tables.write_text(tables)
+    print(f"written: {arguments.tables}")
+    record.write(arguments, command, document)
 
 
-def add_peers(arguments, scenes, temporary, methods):
+def add_peers(arguments, scenes, temporary, methods, results):
     found = {}
     for scene in scenes:
-        for name, entry in peers_of(arguments, scene, temporary).items():
+        kept = temporary / f"peers-{file_name(scene)}"
+        for name, entry in peers_of(arguments, scene, temporary, kept).items():
             run = {
                 **entry,
                 "seed": 1,
@@ -490,6 +383,9 @@ def add_peers(arguments, scenes, temporary, methods):
                 },
             )
             method["scenes"][scene.name] = {"mean": over_seeds([run]), "runs": [run]}
+            results.append(
+                (f"{method['label']}, {scene.name}", kept / f"{name}.json", scene, False)
+            )
     methods += found.values()
 
 

@@ -87,7 +87,7 @@ TEST_F(Register, Json) {
   const std::string path = folder_ / "r.json";
   ASSERT_EQ(align({"--json", path, "--seed", "7"}).status, 0);
   const auto json = json_of(path);
-  EXPECT_EQ(json["options"]["hypothesis"]["seed"], 7);
+  EXPECT_EQ(json["options"]["seed"], 7);
   EXPECT_EQ(json["options"]["prepare"]["voxel_size"], 0.1);
   EXPECT_EQ(json["environment"]["backend"], "cpu");
   EXPECT_EQ(json["source"]["file"], source_);

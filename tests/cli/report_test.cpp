@@ -24,7 +24,7 @@ class Report : public ::testing::Test {
                    kSmall))
             .status,
         0);
-    // The truth: the scans of the room, each with each, and a lie about one pair.
+    // The ground truth: all pairs of the room, one of them with a false pose.
     std::vector<evaluation::LogEntry> log;
     std::vector<evaluation::InformationEntry> information;
     for (int i = 0; i < 5; ++i)
@@ -66,7 +66,8 @@ TEST_F(Report, NumbersAlone) {
       html,
       {"voxel size 0.1 m", "1024 seeds per pair", "21 pairs of 7 fragments were tried, 10 reported",
        "Preparation, mean per fragment", "Alignment, mean per pair", ">match<", ">features<",
-       "Every pair", "confidence_too_low", "Options", ">max_verification_normal_angle<"});
+       "Every pair", "confidence_too_low", "Options", ">max_verification_normal_angle<",
+       "<td>min_confidence</td><td>0.5</td>", "<td>method</td><td>compatibility</td>"});
   EXPECT_EQ(html.find("<img"), std::string::npos);
   EXPECT_EQ(html.find("Recall and precision"), std::string::npos);
 }
@@ -74,14 +75,14 @@ TEST_F(Report, NumbersAlone) {
 TEST_F(Report, WithTruthAndPictures) {
   const std::string html = page({"--ground-truth", scans_.path(), "--clouds", scans_.path()});
   expect_self_contained(html);
-  expect_holds(html, {"Recall and precision", "R@P95", "polyline", "Pairs to look at",
-                      "<b class=\"right\">Right</b>",
-                      "<b class=\"wrong\">Wrong</b> &middot; fragment 4 onto 1"});
+  expect_holds(html, {"Recall and precision", "R@P95", "polyline", "Pictures of pairs",
+                      "<b class=\"correct\">Correct</b>",
+                      "<b class=\"false\">False positive</b> &middot; fragment 4 onto 1"});
   EXPECT_EQ(occurrences(html, "data:image/png;base64,iVBORw0KGgo"),
-            3u);  // two right ones, one wrong
-  // j - i > 1: six pairs of the room are judged, one of them against a lie.
-  EXPECT_EQ(occurrences(html, "<td>right</td>"), 5u);
-  EXPECT_EQ(occurrences(html, "<td>wrong</td>"), 1u);
+            3u);  // two correct ones, one false positive
+  // j - i > 1: six pairs of the room are evaluated, one of them against a false ground truth.
+  EXPECT_EQ(occurrences(html, "<td>correct</td>"), 5u);
+  EXPECT_EQ(occurrences(html, "<td>false positive</td>"), 1u);
 }
 
 TEST_F(Report, MissedPairsAndPicturesWithoutTruth) {
@@ -95,7 +96,7 @@ TEST_F(Report, MissedPairsAndPicturesWithoutTruth) {
   const std::vector<std::string> clouds = {"--clouds", scans_.path()};
   expect_holds(page(joined(clouds, {"--ground-truth", scans_.path()})),
                {"<b class=\"missed\">Missed</b> &middot; fragment 2 onto 0",
-                "the best candidate was right", "<td>missed</td>"});
+                "the best candidate is correct", "<td>missed</td>"});
   expect_holds(page(clouds), {">Aligned</b>", ">Not aligned</b>"});
 }
 
@@ -117,6 +118,30 @@ TEST_F(Report, ResultsOfOtherProgramsMayTellLess) {
   expect_self_contained(page({"--ground-truth", scans_.path()}));
   out_.write("r.json", R"({"pairs": []})");
   expect_self_contained(page({"--ground-truth", scans_.path(), "--clouds", scans_.path()}));
+}
+
+TEST_F(Report, ComparesSeveralResults) {
+  auto json = json_of(result_);
+  json["pairs"].erase(json["pairs"].begin(), json["pairs"].begin() + 5);
+  const std::string fewer = out_.write("fewer.json", json.dump());
+  const std::string html = page({fewer, "--ground-truth", scans_.path(), "--clouds", scans_.path(),
+                                 "--clouds", "-", "--name", "all <pairs>", "--name", "fewer"});
+  expect_self_contained(html);
+  expect_holds(html, {"gpureg: 2 results", "Comparison", "R@P95", "ms per pair",
+                      "<a href=\"#result-1\">all &lt;pairs&gt;</a>",
+                      "<h1 class=\"result\" id=\"result-2\">fewer</h1>", "strict rule"});
+  EXPECT_EQ(occurrences(html, "data:image/png"), 3u) << "pictures of the first result alone";
+  EXPECT_EQ(occurrences(html, "Every pair"), 2u);
+  // Without ground truth: no scores, and the paths tell the results apart.
+  const std::string plain = page({fewer});
+  expect_self_contained(plain);
+  expect_holds(plain, {"Comparison", ">" + result_ + "</a>", ">" + fewer + "</a>"});
+  EXPECT_EQ(plain.find("R@P95"), std::string::npos);
+  expect_refused({"report", result_, fewer, "-o", out_ / "page.html", "--name", "one"},
+                 {"--name was given 1 times for 2 results"});
+  expect_refused({"report", result_, "-o", out_ / "page.html", "--ground-truth", scans_.path(),
+                  "--ground-truth", scans_.path()},
+                 {"--ground-truth was given 2 times for 1 results"});
 }
 
 TEST_F(Report, WhatCannotBe) {
