@@ -4,6 +4,16 @@
 from tables.records import benchmarks, load, made_by
 
 
+# Counters of records that were made before the stages had one set of names for both methods.
+OLD_COUNTERS = {"propose": ("sample", "fit"), "rank": ("score",), "verify": ("judge",)}
+
+
+def stage_ms(run, stage):
+    if f"ms_{stage}" in run:
+        return run[f"ms_{stage}"]
+    return sum(run[f"ms_{name}"] for name in OLD_COUNTERS[stage])
+
+
 def speed():
     context, runs = benchmarks()
     batch, cpu = (
@@ -22,7 +32,7 @@ def speed():
     return [
         f"| | GPU, ms | naive on the GPU, ms | CPU, {context['num_cpus']} cores, ms |",
         "| --- | --- | --- | --- |",
-        f"| a prepared pair, 4,000,000 hypotheses, in a batch | {batch:.2f} | {naive:.1f} ({naive / batch:.0f} x) | {cpu:.1f} ({cpu / batch:.0f} x) |",
+        f"| a prepared pair, `loopsmart`, in a batch | {batch:.2f} | {naive:.1f} ({naive / batch:.0f} x) | {cpu:.1f} ({cpu / batch:.0f} x) |",
         f"| a fragment prepared ({runs['prepare_batch_of_fragments/cuda']['raw_points'] / 1000:.0f}k raw points), in a batch | {fragment:.2f} | | {on_cpu:.1f} ({on_cpu / fragment:.0f} x) |",
         f"| one prepared pair alone, median | {one:.2f} | {runs['paper_mode']['ms_median']:.1f} | |",
         f"| one pair alone, from raw points in host memory to the pose, median | {whole:.2f} | | |",
@@ -108,7 +118,7 @@ def pipeline():
 
 def pipeline_house():
     context, runs = benchmarks("pipeline_h200_house_a.json")
-    stages = ("match", "sample", "fit", "score", "refine", "judge")
+    stages = ("match", "propose", "rank", "refine", "verify")
     out = ["| | ms | " + " | ".join(stages) + " |", "| --- | --- |" + " --- |" * len(stages)]
     for text, name, key in (
         (
@@ -135,11 +145,11 @@ def pipeline_house():
         run = runs[name]
         out.append(
             f"| {text} | {run[key]:.2f} | "
-            + " | ".join(f"{run['ms_' + stage]:.3f}" for stage in stages)
+            + " | ".join(f"{stage_ms(run, stage):.3f}" for stage in stages)
             + " |"
         )
     out.append(
-        f"| a fragment prepared for `default`, in a batch of 50 | {runs['prepare_batch_of_fragments/cuda_default']['ms_per_fragment']:.2f} | | | | | | |"
+        f"| a fragment prepared for `default`, in a batch of 50 | {runs['prepare_batch_of_fragments/cuda_default']['ms_per_fragment']:.2f} | | | | | |"
     )
     return out + [
         "",
@@ -165,7 +175,7 @@ def devices():
     context, runs = benchmarks()
     one = runs["redwood_sized/cuda"]
     out = [
-        "| devices | ms | faster by | preparation, ms | memory of each device, GiB |",
+        "| devices | ms | speed-up | preparation, ms | memory per device, GiB |",
         "| --- | --- | --- | --- | --- |",
     ]
     for run in [one] + (
@@ -188,25 +198,25 @@ def scaling():
     sizes = [runs[f"points_per_cloud/{n}"] for n in (1000, 5000, 20000, 100000)]
     base = sizes[1]
     out = [
-        "| points a cloud | hypotheses scored | match, ms | sample, ms | score, ms | a pair, ms | by the operations, ms |",
+        "| points per cloud | hypotheses scored | match, ms | propose, ms | rank, ms | pair, ms | pair by the operations, ms |",
         "| --- | --- | --- | --- | --- | --- | --- |",
     ]
     for run in sizes:
         points, survivors = run["points"] / base["points"], run["survivors"] / base["survivors"]
-        rest = base["ms_per_pair"] - base["ms_match"] - base["ms_score"]
-        predicted = base["ms_match"] * points**2 + base["ms_score"] * survivors * points + rest
+        rest = base["ms_per_pair"] - base["ms_match"] - stage_ms(base, "rank")
+        predicted = base["ms_match"] * points**2 + stage_ms(base, "rank") * survivors * points + rest
         out.append(
-            f"| {run['points']:,.0f} | {run['survivors']:,.0f} | {run['ms_match']:.3f} | {run['ms_sample']:.3f} | {run['ms_score']:.2f} | "
+            f"| {run['points']:,.0f} | {run['survivors']:,.0f} | {run['ms_match']:.3f} | {stage_ms(run, 'propose'):.3f} | {stage_ms(run, 'rank'):.2f} | "
             f"{run['ms_per_pair']:.2f} | {predicted:.2f} |"
         )
-    out += ["", "| raw points | prepared points | a fragment, ms |", "| --- | --- | --- |"]
+    out += ["", "| raw points | prepared points | fragment, ms |", "| --- | --- | --- |"]
     out += [
         f"| {n:,} | {runs[f'raw_points/{n}']['points']:,.0f} | {runs[f'raw_points/{n}']['ms_per_fragment']:.2f} |"
         for n in (100000, 300000, 1000000)
     ]
     out += [
         "",
-        "| fragments, each with four others | ms | ms a fragment | memory of the device, GiB |",
+        "| fragments, each with four others | ms | ms per fragment | device memory, GiB |",
         "| --- | --- | --- | --- |",
     ]
     for n in (10, 50, 200, 500, 2000):
@@ -220,13 +230,13 @@ def scaling():
 def pair_by_default():
     context, runs = benchmarks()
     out = [
-        "| points a cloud | a pair alone, ms | match, ms | refine, ms | judge, ms | memory of the device, GiB |",
+        "| points per cloud | one pair, ms | match, ms | refine, ms | verify, ms | device memory, GiB |",
         "| --- | --- | --- | --- | --- | --- |",
     ]
     for n in (1000, 5000, 20000, 100000):
         run = runs[f"pair_by_default/{n}"]
         out.append(
-            f"| {run['points']:,.0f} | {run['ms_per_pair']:.2f} | {run['ms_match']:.2f} | {run['ms_refine']:.2f} | {run['ms_judge']:.2f} | {run['GiB_per_device']:.2f} |"
+            f"| {run['points']:,.0f} | {run['ms_per_pair']:.2f} | {run['ms_match']:.2f} | {run['ms_refine']:.2f} | {stage_ms(run, 'verify'):.2f} | {run['GiB_per_device']:.2f} |"
         )
     return out + ["", made_by(context)]
 
@@ -238,25 +248,23 @@ def floors():
     instructions = 29.6e12
     floor = {
         "match": 1.25 * points**2 * 32 * 2 / 990e12 * 1e3,
-        "sample": 4e6 * 100 / instructions * 1e3,
-        "fit": survivors * 2500 / instructions * 1e3,
-        "score": survivors * points * 0.75 * 36 / instructions * 1e3,
+        "propose": (4e6 * 100 + survivors * 2500) / instructions * 1e3,
+        "rank": survivors * points * 0.75 * 36 / instructions * 1e3,
     }
-    what = {
-        "match": "a product of 32 dimensions for every two features, and another for a fourth of them",
-        "sample": "100 instructions a hypothesis",
-        "fit": "2,500 instructions a survivor",
-        "score": "36 instructions for each of three quarters of the point tests",
+    counted = {
+        "match": "32-dimensional products of all pairs of features, and of a fourth of them again",
+        "propose": "100 instructions per quadruple, 2,500 per survivor",
+        "rank": "36 instructions for each of three quarters of the point tests",
     }
     out = [
-        "| stage | ms a pair | floor, ms | ratio | the floor counts |",
+        "| stage | ms per pair | floor, ms | ratio | operations of the floor |",
         "| --- | --- | --- | --- | --- |",
     ]
-    for stage in floor:
-        out.append(
-            f"| {stage} | {run['ms_' + stage]:.4f} | {floor[stage]:.4f} | {run['ms_' + stage] / floor[stage]:.1f} | {what[stage]} |"
-        )
-    return out + [f"| judge, refine | {run['ms_judge'] + run['ms_refine']:.4f} | | | |"]
+    for stage, least in floor.items():
+        ms = stage_ms(run, stage)
+        out.append(f"| {stage} | {ms:.4f} | {least:.4f} | {ms / least:.1f} | {counted[stage]} |")
+    rest = stage_ms(run, "verify") + stage_ms(run, "refine")
+    return [*out, f"| refine, verify | {rest:.4f} | | | |"]
 
 
 TABLES = {
