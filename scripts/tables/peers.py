@@ -26,7 +26,7 @@ def peers():
     rows = [
         "| method | "
         + " | ".join(
-            f"{scene}: correct, % | R@P95, % | ms per pair" for scene in PEER_SCENES.values()
+            f"{scene}: correct, % | R@P95, % | ms" for scene in PEER_SCENES.values()
         )
         + " |",
         "| --- |" + " --- | --- | --- |" * len(records),
@@ -46,26 +46,34 @@ def peers():
                 f"{own['processor_ms_per_pair']:.0f}",
             ]
         rows.append(f"| {peer_label(entry)} | " + " | ".join(cells) + " |")
+    for preset, times in device_times():
+        cells = " | ".join(f"same | same | {ms:.2f}" for ms in times)
+        rows.append(f"| gpureg `{preset}`, NVIDIA H200 | {cells} |")
     return rows
+
+
+def device_times():
+    """Preset, and ms per pair in a batch on each scene."""
+    devices = [benchmarks(), benchmarks("pipeline_h200_house_a.json")]
+    return [
+        (preset, [runs[f"align_many/cuda_{preset}/11"]["ms_per_pair"] for _, runs in devices])
+        for preset in ("default", "loopsmart")
+    ]
 
 
 def peers_device():
     """Times of gpureg on a device, on the same scenes."""
     devices = [benchmarks(), benchmarks("pipeline_h200_house_a.json")]
+    scenes = list(PEER_SCENES.values())
     rows = [
-        "| method | "
-        + " | ".join(f"{scene}: ms per pair in a batch" for scene in PEER_SCENES.values())
-        + " |",
-        "| --- |" + " --- |" * len(devices),
+        f"| method | {' | '.join(f'{scene}: ms per pair in a batch' for scene in scenes)} |",
+        "| --- |" + " --- |" * len(scenes),
     ]
-    for preset in ("default", "loopsmart"):
-        times = [runs[f"align_many/cuda_{preset}/11"]["ms_per_pair"] for _, runs in devices]
-        rows.append(f"| gpureg `{preset}` | " + " | ".join(f"{ms:.2f}" for ms in times) + " |")
-    commits = sorted({context["commit"] for context, _ in devices})
-    return rows + [
-        "",
-        f"Made by `gpureg_pipeline_bench` on all pairs at commit {', '.join(commits)} on an {devices[0][0]['gpu']}.",
-    ]
+    for preset, times in device_times():
+        rows.append(f"| gpureg `{preset}` | {' | '.join(f'{ms:.2f}' for ms in times)} |")
+    commits = ", ".join(sorted({context["commit"] for context, _ in devices}))
+    gpu = devices[0][0]["gpu"]
+    return [*rows, "", f"Made by `gpureg_pipeline_bench` at commit {commits} on an {gpu}."]
 
 
 def peers_of(file):
