@@ -107,7 +107,8 @@ int run(const EvaluateOptions& o) {
 
 void add_evaluate(CLI::App& app, Action& chosen) {
   const auto o = std::make_shared<EvaluateOptions>();
-  CLI::App* verb = app.add_subcommand("evaluate", "Measure recall and precision by Redwood's protocol");
+  CLI::App* verb =
+      app.add_subcommand("evaluate", "Measure recall and precision by Redwood's protocol");
   verb->add_option("RESULT", o->results, "RESULT.log or RESULT.json; several make a scene mean")
       ->required();
   verb->add_option(
@@ -122,7 +123,8 @@ void add_evaluate(CLI::App& app, Action& chosen) {
   verb->footer(
       std::string(
           "Numbers in %. Only pairs with j - i > 1 count. strict: a report that is not in gt.log\n"
-          "counts as false; geometric: a report is correct if the pair is in gt_all.log and the pose\n"
+          "counts as false; geometric: a report is correct if the pair is in gt_all.log and the "
+          "pose\n"
           "within 0.2 m. raw: recall if every best candidate is reported; R@P: recall at that\n"
           "precision; AP: average precision. Rankings go by score; the strict one by\n"
           "overlap_confidence if RESULT.json has it.\n") +

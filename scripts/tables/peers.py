@@ -25,9 +25,7 @@ def peers():
     records = [load(name) for name in PEER_SCENES]
     rows = [
         "| method | "
-        + " | ".join(
-            f"{scene}: correct, % | R@P95, % | ms" for scene in PEER_SCENES.values()
-        )
+        + " | ".join(f"{scene}: correct, % | R@P95, % | ms" for scene in PEER_SCENES.values())
         + " |",
         "| --- |" + " --- | --- | --- |" * len(records),
     ]

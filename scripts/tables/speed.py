@@ -3,7 +3,6 @@
 
 from tables.records import benchmarks, load, made_by
 
-
 # Counters of records that were made before the stages had one set of names for both methods.
 OLD_COUNTERS = {"propose": ("sample", "fit"), "rank": ("score",), "verify": ("judge",)}
 
@@ -204,7 +203,9 @@ def scaling():
     for run in sizes:
         points, survivors = run["points"] / base["points"], run["survivors"] / base["survivors"]
         rest = base["ms_per_pair"] - base["ms_match"] - stage_ms(base, "rank")
-        predicted = base["ms_match"] * points**2 + stage_ms(base, "rank") * survivors * points + rest
+        predicted = (
+            base["ms_match"] * points**2 + stage_ms(base, "rank") * survivors * points + rest
+        )
         out.append(
             f"| {run['points']:,.0f} | {run['survivors']:,.0f} | {run['ms_match']:.3f} | {stage_ms(run, 'propose'):.3f} | {stage_ms(run, 'rank'):.2f} | "
             f"{run['ms_per_pair']:.2f} | {predicted:.2f} |"
