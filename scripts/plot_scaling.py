@@ -30,7 +30,7 @@ def main():
     )
     sizes = runs("points_per_cloud")
     points = [run["points"] for run in sizes]
-    for stage in ("match", "sample", "fit", "score"):
+    for stage in ("match", "propose", "rank"):
         pair.loglog(points, [run["ms_" + stage] for run in sizes], marker="o", label=stage)
     pair.loglog(
         points, [run["ms_per_pair"] for run in sizes], marker="o", color="black", label="all"
@@ -40,9 +40,9 @@ def main():
 
     scored.semilogx(
         points,
-        np.array([1e6 * run["ms_score"] / run["survivors"] / run["points"] for run in sizes]),
+        np.array([1e6 * run["ms_rank"] / run["survivors"] / run["points"] for run in sizes]),
         marker="o",
-        label="score: a point test",
+        label="rank: a point test",
     )
     scored.semilogx(
         points,

@@ -3,15 +3,6 @@
 
 from tables.records import benchmarks, load, made_by
 
-# Counters of records that were made before the stages had one set of names for both methods.
-OLD_COUNTERS = {"propose": ("sample", "fit"), "rank": ("score",), "verify": ("judge",)}
-
-
-def stage_ms(run, stage):
-    if f"ms_{stage}" in run:
-        return run[f"ms_{stage}"]
-    return sum(run[f"ms_{name}"] for name in OLD_COUNTERS[stage])
-
 
 def speed():
     context, runs = benchmarks()
@@ -144,7 +135,7 @@ def pipeline_house():
         run = runs[name]
         out.append(
             f"| {text} | {run[key]:.2f} | "
-            + " | ".join(f"{stage_ms(run, stage):.3f}" for stage in stages)
+            + " | ".join(f"{run['ms_' + stage]:.3f}" for stage in stages)
             + " |"
         )
     out.append(
@@ -202,12 +193,10 @@ def scaling():
     ]
     for run in sizes:
         points, survivors = run["points"] / base["points"], run["survivors"] / base["survivors"]
-        rest = base["ms_per_pair"] - base["ms_match"] - stage_ms(base, "rank")
-        predicted = (
-            base["ms_match"] * points**2 + stage_ms(base, "rank") * survivors * points + rest
-        )
+        rest = base["ms_per_pair"] - base["ms_match"] - base["ms_rank"]
+        predicted = base["ms_match"] * points**2 + base["ms_rank"] * survivors * points + rest
         out.append(
-            f"| {run['points']:,.0f} | {run['survivors']:,.0f} | {run['ms_match']:.3f} | {stage_ms(run, 'propose'):.3f} | {stage_ms(run, 'rank'):.2f} | "
+            f"| {run['points']:,.0f} | {run['survivors']:,.0f} | {run['ms_match']:.3f} | {run['ms_propose']:.3f} | {run['ms_rank']:.2f} | "
             f"{run['ms_per_pair']:.2f} | {predicted:.2f} |"
         )
     out += ["", "| raw points | prepared points | fragment, ms |", "| --- | --- | --- |"]
@@ -237,7 +226,7 @@ def pair_by_default():
     for n in (1000, 5000, 20000, 100000):
         run = runs[f"pair_by_default/{n}"]
         out.append(
-            f"| {run['points']:,.0f} | {run['ms_per_pair']:.2f} | {run['ms_match']:.2f} | {run['ms_refine']:.2f} | {stage_ms(run, 'verify'):.2f} | {run['GiB_per_device']:.2f} |"
+            f"| {run['points']:,.0f} | {run['ms_per_pair']:.2f} | {run['ms_match']:.2f} | {run['ms_refine']:.2f} | {run['ms_verify']:.2f} | {run['GiB_per_device']:.2f} |"
         )
     return out + ["", made_by(context)]
 
@@ -262,9 +251,9 @@ def floors():
         "| --- | --- | --- | --- | --- |",
     ]
     for stage, least in floor.items():
-        ms = stage_ms(run, stage)
+        ms = run["ms_" + stage]
         out.append(f"| {stage} | {ms:.4f} | {least:.4f} | {ms / least:.1f} | {counted[stage]} |")
-    rest = stage_ms(run, "verify") + stage_ms(run, "refine")
+    rest = run["ms_verify"] + run["ms_refine"]
     return [*out, f"| refine, verify | {rest:.4f} | | | |"]
 
 
