@@ -15,7 +15,8 @@ import sys
 from tables import accuracy, peers, speed
 
 ROOT = pathlib.Path(__file__).resolve().parents[1]
-FILES = ["README.md", "docs/accuracy.md", "docs/benchmarks.md", "docs/performance.md"]
+PAGES = ("accuracy", "experiments", "benchmarks", "performance")
+FILES = ["README.md", *(f"docs/{page}.md" for page in PAGES)]
 TABLES = {**accuracy.TABLES, **peers.TABLES, **speed.TABLES}
 
 

@@ -107,7 +107,8 @@ int run(const EvaluateOptions& o) {
 
 void add_evaluate(CLI::App& app, Action& chosen) {
   const auto o = std::make_shared<EvaluateOptions>();
-  CLI::App* verb = app.add_subcommand("evaluate", "Compare results with the truth, Redwood's way");
+  CLI::App* verb =
+      app.add_subcommand("evaluate", "Measure recall and precision by Redwood's protocol");
   verb->add_option("RESULT", o->results, "RESULT.log or RESULT.json; several make a scene mean")
       ->required();
   verb->add_option(
@@ -121,15 +122,12 @@ void add_evaluate(CLI::App& app, Action& chosen) {
   verb->add_option("--json", o->json, "Write the numbers, curves and the verdict on every pair");
   verb->footer(
       std::string(
-          "Numbers in %. Only pairs with j - i > 1 count. strict: a report that is not in gt.log "
-          "is "
-          "wrong;\n"
-          "geometric: right where the pair is in gt_all.log and within 0.2 m. raw: recall when "
-          "every "
-          "best\n"
-          "candidate is reported; R@P: recall at that precision; AP: average precision. Rankings "
-          "go by\n"
-          "score; the strict one by overlap_confidence where RESULT.json has it.\n") +
+          "Numbers in %. Only pairs with j - i > 1 count. strict: a report that is not in gt.log\n"
+          "counts as false; geometric: a report is correct if the pair is in gt_all.log and the "
+          "pose\n"
+          "within 0.2 m. raw: recall if every best candidate is reported; R@P: recall at that\n"
+          "precision; AP: average precision. Rankings go by score; the strict one by\n"
+          "overlap_confidence if RESULT.json has it.\n") +
       app.get_footer());
   verb->callback([o, &chosen] { chosen = [o] { return run(*o); }; });
 }

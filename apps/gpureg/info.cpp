@@ -56,8 +56,7 @@ int run(const std::vector<std::string>& clouds) {
 
 void add_info(CLI::App& app, Action& chosen) {
   const auto clouds = std::make_shared<std::vector<std::string>>();
-  CLI::App* verb =
-      app.add_subcommand("info", "Tell about clouds; without any, about version and devices");
+  CLI::App* verb = app.add_subcommand("info", "Describe clouds; without any, version and devices");
   verb->add_option("CLOUD", *clouds, "PLY or PCD files");
   verb->callback([clouds, &chosen] { chosen = [clouds] { return run(*clouds); }; });
 }

@@ -40,8 +40,8 @@ void MethodOptions::add_to(CLI::App& verb) {
       ->default_str(significant(static_cast<double>(voxel_size), 6))
       ->type_name("FLOAT or auto");
   verb.add_option("--preset", preset,
-                  "default: poses from compatible matches, judged by evidence; loopsmart: the "
-                  "paper's algorithm")
+                  "default: poses from compatible matches, verified by evidence; loopsmart: the "
+                  "paper's method")
       ->check(CLI::IsMember({"default", "loopsmart"}))
       ->capture_default_str();
   verb.add_option("--backend", backend, "auto: CUDA where there is a device, else the CPU")
@@ -55,7 +55,7 @@ void MethodOptions::add_to(CLI::App& verb) {
       ->check(natural_number())
       ->capture_default_str();
   verb.add_option("--quality", quality,
-                  "From 0, the fastest, to 10, which finds the most; of the preset default")
+                  "From 0, the fastest, to 10, the highest recall; of the preset default")
       ->check(CLI::Range(0u, kHighestQuality))
       ->capture_default_str();
   verb.add_option("--seed", seed, "Same seed, same result, on any machine")

@@ -236,7 +236,7 @@ def register(
         Edge of the downsampling voxel; every other length follows from it. Default:
         ``PrepareOptions().voxel_size``, 0.05. "auto": what `suggest_voxel_size` says.
     quality : int, optional
-        From 0, the fastest, to 10, which finds the most. Default: 5.
+        From 0, the fastest, to 10, the highest recall. Default: 5.
     seed : int, optional
         Same seed, same bits, on any machine.
     prior : RegistrationPrior, optional

@@ -5,10 +5,12 @@ import json
 
 from tables.records import RESULTS, load, mean, percent, source
 
+ALL_EVIDENCE = "free_space_and_surface_sides"  # the model where both are known
+
 
 def redkitchen():
     rows = [
-        "| preset | right when every best candidate is reported | reported: recall / precision | recall at precision >= 95 % | average precision |",
+        "| preset | correct best candidates | recall / precision of the reports | recall at precision >= 95 % | average precision |",
         "| --- | --- | --- | --- | --- |",
     ]
     sources = []
@@ -26,7 +28,7 @@ def redkitchen():
 
 def redkitchen_seeds():
     rows = [
-        "| preset | seed | right, best candidates | reported recall | precision | geometric precision |",
+        "| preset | seed | correct best candidates | recall | precision | geometric precision |",
         "| --- | --- | --- | --- | --- | --- |",
     ]
     for file in sorted(RESULTS.glob("redkitchen_*.json"), reverse=True):
@@ -62,7 +64,7 @@ def range_pairs():
 
 def other_pairs():
     record = load("other_pairs.json")
-    rows = ["| pair | seed | status | off by |", "| --- | --- | --- | --- |"]
+    rows = ["| pair | seed | status | error |", "| --- | --- | --- | --- |"]
     for run in record["lidar"]:
         what = "refined" if run["refined"] else "before refinement"
         rows.append(
@@ -76,24 +78,24 @@ def other_pairs():
 
 
 def tested():
-    """Runs of the scenes as they are, by fits that have not seen their building."""
+    """Runs of the scenes as they are, by fits without their building."""
     return [run for run in load("confidence.json")["runs"] if "label" not in run]
 
 
 def confidence():
-    """Fits that have not seen the building they are tested on; means over the runs (seeds) of each
+    """Fits without the building that they are tested on; means over the runs (seeds) of each
     scene.
     """
     groups = {}
     for run in tested():
         groups.setdefault((run["viewpoints"], run["model"], run["scene"]), []).append(run)
     out = [
-        "| viewpoints | looks at | scene | runs | found among the modes / best, % | geometric R@P95 / R@P99 / AP, % | strict R@P95 / AP, % | ECE | right above 0.9, % |",
+        "| viewpoints | evidence beside overlap | scene | runs | correct among the modes / first, % | geometric R@P95 / R@P99 / AP, % | strict R@P95 / AP, % | ECE | correct above 0.9, % |",
         "| --- | --- | --- | --- | --- | --- | --- | --- | --- |",
     ]
-    looks = {
-        "free_space_and_surface_sides": "free space, sides of surfaces",
-        "surface_sides": "sides of surfaces",
+    evidence = {
+        ALL_EVIDENCE: "free space, surface sides",
+        "surface_sides": "surface sides",
         "free_space": "free space",
         "overlap_alone": "neither",
     }
@@ -101,28 +103,23 @@ def confidence():
         groups.items(),
         key=lambda group: (
             ["known", "origin", "unknown"].index(group[0][0]),
-            list(looks).index(group[0][1]),
+            list(evidence).index(group[0][1]),
         ),
     ):
         of = lambda key: mean(run[key] for run in runs)  # noqa: B023,E731
         out.append(
-            f"| {'the origin' if viewpoints == 'origin' else viewpoints} | {looks[model]} | {scene} | {len(runs)} | {of('generated'):.1f} / {of('raw'):.1f} | {of('geo_R@P95'):.1f} / "
+            f"| {'the origin' if viewpoints == 'origin' else viewpoints} | {evidence[model]} | {scene} | {len(runs)} | {of('generated'):.1f} / {of('raw'):.1f} | {of('geo_R@P95'):.1f} / "
             f"{of('geo_R@P99'):.1f} / {of('geo_AP'):.1f} | {of('strict_R@P95'):.1f} / {of('strict_AP'):.1f} | {of('ECE'):.3f} | {of('right_above_0.9'):.1f} |"
         )
     return out
 
 
 def unseen():
-    """The same in short: the shipped models, in the simulated buildings."""
+    """The same in short: all evidence, in the simulated buildings."""
     groups = {}
     for run in tested():
         if (
-            run["model"]
-            == (
-                "surface_sides"
-                if run["viewpoints"] == "unknown"
-                else "free_space_and_surface_sides"
-            )
+            run["model"] == ("surface_sides" if run["viewpoints"] == "unknown" else ALL_EVIDENCE)
             and "kitchen" not in run["scene"]
         ):
             groups.setdefault(run["viewpoints"], {}).setdefault(run["scene"], []).append(run)
@@ -142,13 +139,13 @@ def unseen():
 
 
 def other_sensors():
-    """Other sensors, voxels and buildings; the model with all evidence."""
+    """Other sensors and voxels in the same buildings, and other buildings; all evidence."""
     groups = {}
     for run in load("confidence.json")["runs"]:
-        if run["model"] == "free_space_and_surface_sides" and run["viewpoints"] == "known":
+        if run["model"] == ALL_EVIDENCE and run["viewpoints"] == "known":
             groups.setdefault(run.get("label", "as they are"), []).append(run)
     out = [
-        "| | scenes | best right, % | geometric R@P95 / R@P99, % | ECE | above 0.5, wrong of them | right above 0.9, % |",
+        "| | scenes | first correct, % | geometric R@P95 / R@P99, % | ECE | reports above 0.5, false ones | correct above 0.9, % |",
         "| --- | --- | --- | --- | --- | --- | --- |",
     ]
     for label, runs in groups.items():
@@ -174,18 +171,16 @@ def other_sensors():
 
 
 def mistakes():
-    """Kinds of false positives by fits on other buildings; means over the runs of each scene."""
+    """Kinds of false reports, by fits without the building; means over the runs
+    of each scene.
+    """
     groups = {}
     for run in tested():
-        if (
-            run["model"] == "free_space_and_surface_sides"
-            and run["viewpoints"] == "known"
-            and "above_half" in run
-        ):
+        if run["model"] == ALL_EVIDENCE and run["viewpoints"] == "known" and "above_half" in run:
             groups.setdefault(run["scene"], []).append(run["above_half"])
     out = [
-        "| scene | reports above 0.5 | wrong by the 0.2 m rule | of them right by the trajectories, but not in gt_all | less than 5 deg and 0.3 m off | moved along a wall, less than 10 deg "
-        "| perceptual alias: another place that looks alike |",
+        "| scene | reports above 0.5 | false by the 0.2 m rule | correct by the trajectories, not in gt_all | less than 5 deg and 0.3 m off | degenerate: shifted, less than 10 deg "
+        "| perceptual alias: rotated |",
         "| --- | --- | --- | --- | --- | --- | --- |",
     ]
     for scene, runs in groups.items():
@@ -203,13 +198,13 @@ def mistakes():
 def loop_consistency():
     record = load("loop_consistency.json")
     out = [
-        "| scene | | best right, % | R@P95 / R@P99 / AP, % | ECE | above 0.9 | of them right, % |",
+        "| scene | | first correct, % | R@P95 / R@P99 / AP, % | ECE | above 0.9 | of them correct, % |",
         "| --- | --- | --- | --- | --- | --- | --- |",
     ]
     for scene in record["scenes"]:
         for text, of in (
             ("each pair alone", scene["before"]),
-            ("with loop consistency", scene["after"]),
+            ("loop consistency", scene["after"]),
         ):
             out.append(
                 f"| {scene['scene']} | {text} | {of['raw_recall']:.1f} | {of['R@P95']:.1f} / {of['R@P99']:.1f} / {of['AP']:.1f} | "
@@ -221,7 +216,7 @@ def loop_consistency():
 def few_points():
     record = load("few_points.json")
     out = [
-        "| overlapping points | poses | confidence before | right | confidence |",
+        "| overlapping points | poses | mean confidence without the factor | correct | mean confidence |",
         "| --- | --- | --- | --- | --- |",
     ]
     for b in record["bins"]:
@@ -234,7 +229,7 @@ def few_points():
 
 def closing_loops():
     out = [
-        "| scene | loops of three right poses | of them close, % | loops with a wrong pose | of them close, % |",
+        "| scene | loops of three correct poses | of them close, % | loops with a false pose | of them close, % |",
         "| --- | --- | --- | --- | --- |",
     ]
     for scene in load("loop_consistency.json")["scenes"]:
@@ -249,7 +244,7 @@ def closing_loops():
 def loop_consistency_fresh():
     record = load("loop_consistency_fresh.json")
     out = [
-        "| scene | best right, % | R@P95, % | R@P99, % | ECE | right above 0.9, % |",
+        "| scene | first correct, % | R@P95, % | R@P99, % | ECE | correct above 0.9, % |",
         "| --- | --- | --- | --- | --- | --- |",
     ]
     for scene in record["scenes"]:

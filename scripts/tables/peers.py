@@ -21,14 +21,11 @@ def made_with(record):
 
 
 def peers():
-    """Both scenes side by side; only methods that place a cloud globally."""
+    """Both scenes side by side; methods of global registration only."""
     records = [load(name) for name in PEER_SCENES]
     rows = [
         "| method | "
-        + " | ".join(
-            f"{scene}: right, % | recall at precision >= 95 %: strict, geometric | processor ms a pair"
-            for scene in PEER_SCENES.values()
-        )
+        + " | ".join(f"{scene}: correct, % | R@P95, % | ms" for scene in PEER_SCENES.values())
         + " |",
         "| --- |" + " --- | --- | --- |" * len(records),
     ]
@@ -43,38 +40,45 @@ def peers():
                 continue
             cells += [
                 percent(own["strict"]["raw_recall"]),
-                f"{percent(own['strict']['recall_at_precision']['95'])}, "
-                f"{percent(own['geometric']['recall_at_precision']['95'])}",
+                percent(own["geometric"]["recall_at_precision"]["95"]),
                 f"{own['processor_ms_per_pair']:.0f}",
             ]
         rows.append(f"| {peer_label(entry)} | " + " | ".join(cells) + " |")
+    for preset, times in device_times():
+        cells = " | ".join(f"same | same | {ms:.2f}" for ms in times)
+        rows.append(f"| gpureg `{preset}`, NVIDIA H200 | {cells} |")
+    return rows
+
+
+def device_times():
+    """Preset, and ms per pair in a batch on each scene."""
     devices = [benchmarks(), benchmarks("pipeline_h200_house_a.json")]
-    for preset in ("default", "loopsmart"):
-        cells = []
-        for _, runs in devices:
-            cells += [
-                "as above",
-                "as above",
-                f"{runs[f'align_many/cuda_{preset}/11']['ms_per_pair']:.2f} (device)",
-            ]
-        rows.append(
-            f"| gpureg `{preset}`, {devices[0][0]['gpu'].rsplit(' ', 1)[0]}, in a batch | "
-            + " | ".join(cells)
-            + " |"
-        )
-    commits = sorted({context["commit"] for context, _ in devices})
-    return rows + [
-        "",
-        *[made_with(record) for record in records],
-        f"The device's times: `gpureg_pipeline_bench` on all pairs at commit {', '.join(commits)}, on another machine, so no ratio is meant.",
+    return [
+        (preset, [runs[f"align_many/cuda_{preset}/11"]["ms_per_pair"] for _, runs in devices])
+        for preset in ("default", "loopsmart")
     ]
+
+
+def peers_device():
+    """Times of gpureg on a device, on the same scenes."""
+    devices = [benchmarks(), benchmarks("pipeline_h200_house_a.json")]
+    scenes = list(PEER_SCENES.values())
+    rows = [
+        f"| method | {' | '.join(f'{scene}: ms per pair in a batch' for scene in scenes)} |",
+        "| --- |" + " --- |" * len(scenes),
+    ]
+    for preset, times in device_times():
+        rows.append(f"| gpureg `{preset}` | {' | '.join(f'{ms:.2f}' for ms in times)} |")
+    commits = ", ".join(sorted({context["commit"] for context, _ in devices}))
+    gpu = devices[0][0]["gpu"]
+    return [*rows, "", f"Made by `gpureg_pipeline_bench` at commit {commits} on an {gpu}."]
 
 
 def peers_of(file):
     record = load(file)
     base = record["methods"]["gpureg_default"]["processor_ms_per_pair"]
     rows = [
-        "| method | right, % | recall / precision, % | R@P95, % | AP, % | geometric R@P95, % | ms a fragment | ms a pair | processor ms a pair | of gpureg's | peak MiB |",
+        "| method | correct, % | recall / precision, % | R@P95, % | AP, % | geometric R@P95, % | ms per fragment | ms per pair | CPU ms per pair | relative | peak MiB |",
         "| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |",
     ]
     for entry in record["methods"].values():
@@ -161,6 +165,7 @@ def redwood():
 
 TABLES = {
     "peers": peers,
+    "peers_device": peers_device,
     "peers_redkitchen": peers_redkitchen,
     "peers_house": peers_house,
     "peer_parameters": peer_parameters,

@@ -22,7 +22,7 @@ def speed():
     return [
         f"| | GPU, ms | naive on the GPU, ms | CPU, {context['num_cpus']} cores, ms |",
         "| --- | --- | --- | --- |",
-        f"| a prepared pair, 4,000,000 hypotheses, in a batch | {batch:.2f} | {naive:.1f} ({naive / batch:.0f} x) | {cpu:.1f} ({cpu / batch:.0f} x) |",
+        f"| a prepared pair, `loopsmart`, in a batch | {batch:.2f} | {naive:.1f} ({naive / batch:.0f} x) | {cpu:.1f} ({cpu / batch:.0f} x) |",
         f"| a fragment prepared ({runs['prepare_batch_of_fragments/cuda']['raw_points'] / 1000:.0f}k raw points), in a batch | {fragment:.2f} | | {on_cpu:.1f} ({on_cpu / fragment:.0f} x) |",
         f"| one prepared pair alone, median | {one:.2f} | {runs['paper_mode']['ms_median']:.1f} | |",
         f"| one pair alone, from raw points in host memory to the pose, median | {whole:.2f} | | |",
@@ -139,7 +139,7 @@ def pipeline_house():
             + " |"
         )
     out.append(
-        f"| a fragment prepared for `default`, in a batch of 50 | {runs['prepare_batch_of_fragments/cuda_default']['ms_per_fragment']:.2f} |{' |' * len(stages)}"
+        f"| a fragment prepared for `default`, in a batch of 50 | {runs['prepare_batch_of_fragments/cuda_default']['ms_per_fragment']:.2f} | | | | | |"
     )
     return out + [
         "",
@@ -165,7 +165,7 @@ def devices():
     context, runs = benchmarks()
     one = runs["redwood_sized/cuda"]
     out = [
-        "| devices | ms | faster by | preparation, ms | memory of each device, GiB |",
+        "| devices | ms | speed-up | preparation, ms | memory per device, GiB |",
         "| --- | --- | --- | --- | --- |",
     ]
     for run in [one] + (
@@ -188,7 +188,7 @@ def scaling():
     sizes = [runs[f"points_per_cloud/{n}"] for n in (1000, 5000, 20000, 100000)]
     base = sizes[1]
     out = [
-        "| points a cloud | hypotheses scored | match, ms | propose, ms | rank, ms | a pair, ms | by the operations, ms |",
+        "| points per cloud | hypotheses scored | match, ms | propose, ms | rank, ms | pair, ms | pair by the operations, ms |",
         "| --- | --- | --- | --- | --- | --- | --- |",
     ]
     for run in sizes:
@@ -199,14 +199,14 @@ def scaling():
             f"| {run['points']:,.0f} | {run['survivors']:,.0f} | {run['ms_match']:.3f} | {run['ms_propose']:.3f} | {run['ms_rank']:.2f} | "
             f"{run['ms_per_pair']:.2f} | {predicted:.2f} |"
         )
-    out += ["", "| raw points | prepared points | a fragment, ms |", "| --- | --- | --- |"]
+    out += ["", "| raw points | prepared points | fragment, ms |", "| --- | --- | --- |"]
     out += [
         f"| {n:,} | {runs[f'raw_points/{n}']['points']:,.0f} | {runs[f'raw_points/{n}']['ms_per_fragment']:.2f} |"
         for n in (100000, 300000, 1000000)
     ]
     out += [
         "",
-        "| fragments, each with four others | ms | ms a fragment | memory of the device, GiB |",
+        "| fragments, each with four others | ms | ms per fragment | device memory, GiB |",
         "| --- | --- | --- | --- |",
     ]
     for n in (10, 50, 200, 500, 2000):
@@ -220,7 +220,7 @@ def scaling():
 def pair_by_default():
     context, runs = benchmarks()
     out = [
-        "| points a cloud | a pair alone, ms | match, ms | refine, ms | verify, ms | memory of the device, GiB |",
+        "| points per cloud | one pair, ms | match, ms | refine, ms | verify, ms | device memory, GiB |",
         "| --- | --- | --- | --- | --- | --- |",
     ]
     for n in (1000, 5000, 20000, 100000):
@@ -241,20 +241,20 @@ def floors():
         "propose": (4e6 * 100 + survivors * 2500) / instructions * 1e3,
         "rank": survivors * points * 0.75 * 36 / instructions * 1e3,
     }
-    what = {
-        "match": "a product of 32 dimensions for every two features, and another for a fourth of them",
-        "propose": "100 instructions a hypothesis, 2,500 a survivor",
+    counted = {
+        "match": "32-dimensional products of all pairs of features, and of a fourth of them again",
+        "propose": "100 instructions per quadruple, 2,500 per survivor",
         "rank": "36 instructions for each of three quarters of the point tests",
     }
     out = [
-        "| stage | ms a pair | floor, ms | ratio | the floor counts |",
+        "| stage | ms per pair | floor, ms | ratio | operations of the floor |",
         "| --- | --- | --- | --- | --- |",
     ]
-    for stage in floor:
-        out.append(
-            f"| {stage} | {run['ms_' + stage]:.4f} | {floor[stage]:.4f} | {run['ms_' + stage] / floor[stage]:.1f} | {what[stage]} |"
-        )
-    return out + [f"| verify, refine | {run['ms_verify'] + run['ms_refine']:.4f} | | | |"]
+    for stage, least in floor.items():
+        ms = run["ms_" + stage]
+        out.append(f"| {stage} | {ms:.4f} | {least:.4f} | {ms / least:.1f} | {counted[stage]} |")
+    rest = run["ms_verify"] + run["ms_refine"]
+    return [*out, f"| refine, verify | {rest:.4f} | | | |"]
 
 
 TABLES = {
