@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include <algorithm>
 #include <iostream>
 #include <memory>
 #include <optional>
@@ -13,6 +14,7 @@
 #include "gpureg/registration.hpp"
 #include "gpureg/time_budget.hpp"
 #include "image.hpp"
+#include "initial_poses.hpp"
 #include "json_file.hpp"
 #include "method_options.hpp"
 #include "options_json.hpp"
@@ -30,6 +32,8 @@ struct RegisterOptions {
   MethodOptions method;
   std::optional<double> time_budget;  // milliseconds
   std::string json, overlay, image;
+  std::string initial;  // file of poses that are verified instead of a search
+  bool refine_initial = false, ignore_alternatives = false;
 };
 
 std::string describe(const PrepareStatistics& s) {
@@ -84,6 +88,28 @@ void print_report(const RegisterOptions& o, const Context& context, const Prepar
             << fixed(t.refine, 1) << ", verify " << fixed(t.verify, 1) << ")\n";
 }
 
+void print_verified(const RegisterOptions& o, const Context& context, const PreparedCloud& source,
+                    const PreparedCloud& target, const RegistrationResult& r) {
+  std::cout << "source   " << o.source << ": " << describe(source.statistics()) << "\n"
+            << "target   " << o.target << ": " << describe(target.statistics()) << "\n"
+            << "backend  " << context.description() << "\n"
+            << "status   " << to_string(r.status);
+  if (!r.aligned()) std::cout << ": " << to_string(r.reason) << ", " << explain(r.reason);
+  std::cout << "\ntarget_from_source" << (o.refine_initial ? ", refined" : "") << "\n"
+            << describe(r.target_from_source.matrix()) << "score    " << fixed(r.score, 3)
+            << ", inliers " << grouped(r.statistics.inliers) << " of "
+            << grouped(r.statistics.points_scored) << " (" << percent(r.inlier_ratio)
+            << " %), rmse " << significant(r.inlier_rmse, 3) << " m\n";
+  for (const RegistrationMode& mode : r.modes)
+    std::cout << "pose " << mode.rank_before_refinement + 1 << " of " << o.initial
+              << ": confidence " << fixed(mode.confidence, 3) << ", overlap "
+              << percent(mode.evidence.source_overlap) << " and "
+              << percent(mode.evidence.target_overlap) << " %, free-space violation "
+              << percent(std::max(mode.evidence.source_free_space_violation,
+                                  mode.evidence.target_free_space_violation))
+              << " %\n";
+}
+
 Json document(const RegisterOptions& o, const RegistrationOptions& options, const Context& context,
               const PreparedCloud& source, const PreparedCloud& target,
               const RegistrationResult& result) {
@@ -101,12 +127,42 @@ Json document(const RegisterOptions& o, const RegistrationOptions& options, cons
   return json;
 }
 
+/// Verifies the poses of --initial.
+RegistrationResult verify(const RegisterOptions& o, const Context& context,
+                          const PreparedCloud& source, const PreparedCloud& target,
+                          const RegistrationOptions& options) {
+  VerificationOptions verification;
+  verification.refine = o.refine_initial;
+  verification.search_alternatives = !o.ignore_alternatives;
+  RegistrationResult result = result_of(
+      verify_poses(context, source, target, read_initial_poses(o.initial), options, verification),
+      options.min_confidence);
+  result.statistics.source_points = static_cast<std::uint32_t>(source.size());
+  result.statistics.target_points = static_cast<std::uint32_t>(target.size());
+  return result;
+}
+
+void check_initial(const RegisterOptions& o) {
+  if (o.initial.empty()) {
+    if (o.refine_initial || o.ignore_alternatives)
+      throw InvalidArgument("--refine-initial and --ignore-alternatives need --initial");
+    return;
+  }
+  if (o.time_budget)
+    throw InvalidArgument("--initial verifies given poses, --time-budget is for a search");
+  if (o.method.registration().method != RegistrationMethod::compatibility)
+    throw InvalidArgument("--initial verifies poses by evidence, which preset " + o.method.preset +
+                          " does not have");
+}
+
 int run(RegisterOptions o) {
+  check_initial(o);
   o.method.registration();  // what is wrong with it shall be said before clouds are read
   if (o.time_budget && o.method.given("--quality"))
     throw InvalidArgument("--time-budget chooses the quality, give it or --quality");
-  check_outputs({{"--json", o.json}, {"--overlay", o.overlay}, {"--image", o.image}},
-                {{"SOURCE", o.source}, {"TARGET", o.target}});
+  std::vector<NamedPath> inputs{{"SOURCE", o.source}, {"TARGET", o.target}};
+  if (!o.initial.empty()) inputs.push_back({"--initial", o.initial});
+  check_outputs({{"--json", o.json}, {"--overlay", o.overlay}, {"--image", o.image}}, inputs);
   const Context context = o.method.context();
   const PointCloud source_cloud = io::read_point_cloud(o.source);
   const PointCloud target_cloud = io::read_point_cloud(o.target);
@@ -126,11 +182,17 @@ int run(RegisterOptions o) {
   };
   const PreparedCloud source = prepared(source_cloud, o.source);
   const PreparedCloud target = prepared(target_cloud, o.target);
-  const TimedResult timed = o.time_budget
-                                ? align_within(context, source, target, *o.time_budget, options)
-                                : TimedResult{align(context, source, target, options)};
+  TimedResult timed;
+  if (o.time_budget)
+    timed = align_within(context, source, target, *o.time_budget, options);
+  else
+    timed.result = o.initial.empty() ? align(context, source, target, options)
+                                     : verify(o, context, source, target, options);
   const RegistrationResult& result = timed.result;
-  print_report(o, context, source, target, result);
+  if (o.initial.empty())
+    print_report(o, context, source, target, result);
+  else
+    print_verified(o, context, source, target, result);
   if (o.time_budget)
     std::cout << "budget   " << fixed(*o.time_budget, 1) << " ms, " << fixed(timed.milliseconds, 1)
               << " used; " << timed.levels << " levels of quality up to " << timed.highest_quality
@@ -171,6 +233,12 @@ void add_register(CLI::App& app, Action& chosen) {
   verb->add_option("--time-budget", o->time_budget,
                    "Milliseconds for the alignment: instead of --quality, as much of it as they "
                    "allow; which is not the same on every run");
+  verb->add_option("--initial", o->initial,
+                   "Verify the poses of this file instead of a search: 4 x 4 matrices of "
+                   "target_from_source, row by row, or a Redwood log");
+  verb->add_flag("--refine-initial", o->refine_initial, "Refine these poses by ICP first");
+  verb->add_flag("--ignore-alternatives", o->ignore_alternatives,
+                 "Faster: do not search for other poses that compete with them");
   verb->add_option("--json", o->json, "Write options, result, counts and times");
   verb->add_option("--overlay", o->overlay, "Write both clouds in colour, aligned, as PLY");
   verb->add_option("--image", o->image, "Draw both clouds before and after, as PNG");

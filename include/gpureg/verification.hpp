@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <cstdint>
 #include <vector>
 
 #include "gpureg/registration.hpp"
@@ -26,8 +27,10 @@ struct PoseVerification {
   /// Probability that the pose is correct and the clouds overlap by 30 % or more.
   double overlap_confidence = 0;
   PoseEvidence evidence;
-  double inlier_ratio = 0;  ///< inliers / points of the moved cloud, [0, 1]
-  double inlier_rmse = 0;   ///< metres, over the inliers
+  std::uint32_t inliers = 0;  ///< points of the moved cloud that overlap
+  std::uint32_t points = 0;   ///< points of the moved cloud: the smaller one, see smaller_as_source
+  double inlier_ratio = 0;    ///< inliers / points, [0, 1]
+  double inlier_rmse = 0;     ///< metres, over the inliers
   /// Moments of all correspondences within max_correspondence_distance, from which information
   /// matrices follow; see RegistrationResult.
   CorrespondenceMoments source_moments;

@@ -41,9 +41,9 @@ struct VerifiedPair {
     const PreparedState& moved = swapped ? target : source;
     const PreparedState& fixed = swapped ? source : target;
     out.evidence = confidence::evidence_of(outcome, mode, moved, fixed, swapped);
-    out.inlier_ratio = mode.source.tested > 0
-                           ? static_cast<double>(mode.source.inliers) / mode.source.tested
-                           : 0.0;
+    out.inliers = mode.source.inliers;
+    out.points = mode.source.tested;
+    out.inlier_ratio = out.points > 0 ? static_cast<double>(out.inliers) / out.points : 0.0;
     const double distance = static_cast<double>(options.prepare.max_correspondence_distance);
     out.inlier_rmse =
         mode.source.inliers > 0

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <gtest/gtest.h>
 
+#include <fstream>
 #include <sstream>
 
 #include "cli/command.hpp"
@@ -108,6 +109,42 @@ TEST_F(Register, Json) {
   EXPECT_EQ(result["information_redwood"][0], result["information_open3d"][21]);
   EXPECT_GE(result["information_redwood"][0], result["statistics"]["inliers"]);
   EXPECT_LE(result["information_redwood"][0], result["statistics"]["source_points"]);
+}
+
+TEST_F(Register, VerifiesPosesOfAFile) {
+  const std::string path = folder_ / "r.json", poses = folder_ / "poses.txt";
+  ASSERT_EQ(align({"--json", path}).status, 0);
+  const auto found = json_of(path)["result"];
+  std::ostringstream text;
+  text.precision(17);
+  text << "# the pose of align, and the same a metre beside\n";
+  for (const double shift : {0.0, 1.0})
+    for (std::size_t k = 0; k < 16; ++k)
+      text << found["target_from_source"][k].get<double>() + (k == 3 ? shift : 0.0)
+           << (k % 4 == 3 ? "\n" : " ");
+  std::ofstream(poses) << text.str();
+  const Outcome outcome = align({"--initial", poses, "--json", path});
+  EXPECT_EQ(outcome.status, 0) << outcome.err;
+  expect_holds(outcome.out, {"status   aligned", "pose 1 of " + poses, "pose 2 of " + poses});
+  const auto verified = json_of(path)["result"];
+  EXPECT_EQ(verified["target_from_source"], found["target_from_source"]);
+  EXPECT_EQ(verified["score"], found["score"]);
+  EXPECT_EQ(verified["modes"].size(), 2u);
+  EXPECT_EQ(verified["modes"][0]["evidence"]["overlap"], found["modes"][0]["evidence"]["overlap"]);
+  EXPECT_LT(verified["modes"][1]["confidence"], 0.1);
+  EXPECT_EQ(align({"--initial", poses, "--refine-initial", "--ignore-alternatives"}).status, 0);
+
+  const auto refused = [&](const std::string& content, const std::vector<std::string>& words) {
+    std::ofstream(poses) << content;
+    expect_refused(joined({"register", source_, target_, "--initial", poses}, kSmall), words);
+  };
+  refused("", {poses, "no pose"});
+  refused("1 0 0 0\n0 1 0 0\n", {poses + ":2", "ends after row 2"});
+  refused("1 0 0 0\n0 1 0\n", {poses + ":2", "row 2", "3 numbers"});
+  refused("1 0 0 x\n", {poses + ":1", "'x'"});
+  refused("2 0 0 0\n0 2 0 0\n0 0 2 0\n0 0 0 1\n", {poses + ":4", "no rigid motion"});
+  expect_refused(joined({"register", source_, target_, "--refine-initial"}, kSmall),
+                 {"--initial"});
 }
 
 TEST_F(Register, SeedDecidesAndThreadsDoNot) {
