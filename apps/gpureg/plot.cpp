@@ -145,6 +145,7 @@ std::string histogram_plot(const std::vector<Population>& populations, const std
 
 std::string bar_plot(const std::vector<Bar>& bars, const std::string& unit) {
   constexpr double kRow = 24, kName = 150, kValue = 80;
+  constexpr double kLeastShown = 0.01;
   double longest = 1e-12;
   for (const Bar& bar : bars) longest = std::max(longest, bar.value);
   std::string svg = begin(kWidth, kRow * static_cast<double>(bars.size()) + 8);
@@ -153,7 +154,8 @@ std::string bar_plot(const std::vector<Bar>& bars, const std::string& unit) {
     const double length = (kWidth - kName - kValue) * std::max(0.0, bar.value) / longest;
     svg += label(kName - 8, y + 16, "end", bar.name) +
            rectangle(kName, y + 3, std::max(length, 1.0), kRow - 6, bar.color) +
-           label(kName + length + 6, y + 16, "start", significant(bar.value, 3) + " " + unit);
+           label(kName + length + 6, y + 16, "start",
+                 (bar.value < kLeastShown ? "< 0.01" : significant(bar.value, 3)) + " " + unit);
     y += kRow;
   }
   return svg + "</svg>\n";

@@ -46,10 +46,10 @@ std::string row(const ReportEntry& entry, std::size_t index, bool evaluated) {
     html += rule_cells(entry.evaluation ? std::optional(e.strict) : std::nullopt, e.strict_ranked) +
             rule_cells(e.geometric, e.geometric_ranked);
   }
-  const std::string memory = text_of(result.document, "/peak_memory_mib");
+  const auto memory = number_of(result.document, "/peak_memory_mib");
   return html + cell(fixed(result.mean_milliseconds(), 1)) +
          cell(fixed(result.mean_prepare_milliseconds(), 1)) +
-         cell(memory.substr(0, memory.find('.'))) + "</tr>\n";
+         cell(memory ? fixed(*memory, 0) : "") + "</tr>\n";
 }
 
 std::string table(const std::vector<ReportEntry>& entries) {

@@ -36,12 +36,6 @@ img { max-width: 100%; border: 1px solid #e4e4de; } .correct { color: #2f9e5b; }
 </style></head><body>
 )";
 
-std::optional<double> number_of(const Json& json, const char* pointer) {
-  const Json::json_pointer at(pointer);
-  if (!json.contains(at) || !json.at(at).is_number()) return std::nullopt;
-  return json.at(at).get<double>();
-}
-
 // Empty where the result does not tell, as with results of other programs.
 std::string effort_per_pair(const Json& document) {
   const bool quadruples = text_of(document, "/options/method") == "quadruples";
@@ -107,7 +101,7 @@ std::string truth_plots(const ResultFile& result, const evaluation::GroundTruth&
     if (pair.pair->transform)
       (pair.correct ? correct : incorrect).values.push_back(pair.pair->score);
   return "<div class=\"row\">\n" +
-         figure("Recall and precision for a falling score threshold; the dot marks this run",
+         figure("Recall and precision by score threshold; dot: this run",
                 curve_plot(curves, "recall in %", "precision in %")) +
          figure("Scores of the best candidates",
                 histogram_plot({correct, incorrect}, "score", threshold(result))) +

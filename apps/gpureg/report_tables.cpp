@@ -44,6 +44,12 @@ std::string text_of(const Json& json, const char* pointer) {
   return value.is_string() ? value.get<std::string>() : value.dump();
 }
 
+std::optional<double> number_of(const Json& json, const char* pointer) {
+  const Json::json_pointer at(pointer);
+  if (!json.contains(at) || !json.at(at).is_number()) return std::nullopt;
+  return json.at(at).get<double>();
+}
+
 std::string table_row(const std::vector<std::string>& texts, const char* tag,
                       const std::string& style) {
   std::string html = style.empty() ? "<tr>" : "<tr class=\"" + style + "\">";

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -11,6 +12,9 @@ namespace gpureg::cli {
 
 /// The value at a JSON pointer, strings without quotes; empty where there is none.
 std::string text_of(const Json& json, const char* pointer);
+
+/// The number at a JSON pointer; none where there is no number.
+std::optional<double> number_of(const Json& json, const char* pointer);
 
 /// A row of a table. tag: "td" or "th"; style: its class, empty for none. The texts are escaped.
 std::string table_row(const std::vector<std::string>& texts, const char* tag,

@@ -151,7 +151,7 @@ NaiveResult Naive::align(const PreparedState& source_state, const PreparedState&
   CloudView source = source_copy->view_on_device, target = target_copy->view_on_device;
   if (options_.smaller_as_source && target.size < source.size) std::swap(source, target);
   Arrays& a = *arrays_;
-  const HypothesisOptions& o = options_.hypothesis;
+  const QuadrupleOptions& o = options_.quadruples;
   std::uint32_t* match_count = a.counts.data();
   const auto blocks = [](std::size_t items) {
     return static_cast<unsigned>((items + kThreads - 1) / kThreads);
@@ -159,7 +159,7 @@ NaiveResult Naive::align(const PreparedState& source_state, const PreparedState&
   check(cudaMemset(match_count, 0, 2 * sizeof(std::uint32_t)), "cudaMemset");
   match<<<blocks(source.size), kThreads>>>(source, target, a.matches.data(), match_count);
   check_launch("match");
-  sample<<<blocks(o.count), kThreads>>>(a.matches.data(), match_count, o.count, o.seed,
+  sample<<<blocks(o.count), kThreads>>>(a.matches.data(), match_count, o.count, options_.seed,
                                         o.edge_similarity * o.edge_similarity, a.survivors.data(),
                                         match_count + 1);
   check_launch("sample");
@@ -169,7 +169,7 @@ NaiveResult Naive::align(const PreparedState& source_state, const PreparedState&
       "cudaMemcpy");
   if (result.survivors == 0) return result;
   fit<<<blocks(result.survivors), kThreads>>>(a.matches.data(), match_count, a.survivors.data(),
-                                              result.survivors, o.seed, a.poses.data(),
+                                              result.survivors, options_.seed, a.poses.data(),
                                               a.valid.data());
   check_launch("fit");
   score<<<result.survivors, kThreads>>>(source, target,

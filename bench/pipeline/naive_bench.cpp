@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <chrono>
 
+#include "api/access.hpp"
 #include "fragments.hpp"
 #include "naive.hpp"
 
@@ -20,13 +21,13 @@ void paper_mode(benchmark::State& state) {
   std::size_t most = 0;
   for (const PreparedCloud& cloud : clouds) most = std::max(most, cloud.size());
   Naive naive(most, options);
-  naive.align(*clouds[pairs[0].source].state(), *clouds[pairs[0].target].state());
+  naive.align(*Access::state(clouds[pairs[0].source]), *Access::state(clouds[pairs[0].target]));
   std::vector<double> ms;
   for (auto _ : state) {
     for (std::size_t p = 0; p < pairs.size(); ++p) {
       const auto begin = std::chrono::steady_clock::now();
       const NaiveResult found =
-          naive.align(*clouds[pairs[p].source].state(), *clouds[pairs[p].target].state());
+          naive.align(*Access::state(clouds[pairs[p].source]), *Access::state(clouds[pairs[p].target]));
       ms.push_back(
           std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - begin)
               .count());

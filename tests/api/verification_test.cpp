@@ -127,7 +127,7 @@ TEST(Verification, BadInputIsNamed) {
   const std::vector<PreparedCloud> clouds{scene.source, scene.target};
   const auto refused = [&](std::vector<Pair> pairs,
                            std::vector<std::vector<UnalignedIsometry3d>> poses,
-                           std::vector<std::string> words) {
+                           std::initializer_list<std::string> words) {
     test::expect_error<InvalidArgument>(
         [&] { verify_poses_batch(scene.context, clouds, pairs, poses); }, words);
   };

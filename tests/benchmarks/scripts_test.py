@@ -1,7 +1,8 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""bench/redwood on pairs and scenes that were counted by hand."""
+"""bench/redwood: counts of pairs on cases counted by hand, layouts of scenes, Markdown tables."""
 
+import json
 import pathlib
 import sys
 import tempfile
@@ -11,6 +12,7 @@ ROOT = pathlib.Path(__file__).resolve().parents[2]
 sys.dont_write_bytecode = True
 sys.path.insert(0, str(ROOT / "bench/redwood"))
 import analysis
+import markdown_tables
 from scenes import Scene
 
 UNIT = "1 0 0 0\n0 1 0 0\n0 0 1 0\n0 0 0 1\n"
@@ -81,6 +83,37 @@ class Analysis(unittest.TestCase):
         self.assertEqual(sum(table["reported_right"]), 1)
         self.assertEqual(sum(table["candidate_right"]), 2)
         self.assertIsNone(analysis.recall_by_overlap(self.pairs, {}))
+
+
+class Tables(unittest.TestCase):
+    def test_columns_have_one_width(self):
+        self.assertEqual(
+            markdown_tables.table(["a", "long"], [["wide cell", 1]]),
+            "| a         | long |\n| --------- | ---- |\n| wide cell | 1    |\n",
+        )
+
+    def test_every_committed_record_has_its_tables(self):
+        record = json.loads((ROOT / "bench/results/redwood.json").read_text())
+        text = markdown_tables.text(record, record["command"])
+        for method in record["methods"]:
+            self.assertIn(f"| {method['label']}", text)
+        for title in (
+            "strict rule",
+            "Recall by overlap",
+            "Missed pairs",
+            "False positives",
+            "Time",
+        ):
+            self.assertIn(title, text)
+        self.assertIn("*FGR (Zhou et al. 2016)*", text)
+        self.assertTrue(text.endswith(f"Made by `{record['command']}`.\n"))
+
+    def test_a_method_that_lacks_a_scene_is_no_row_of_the_mean(self):
+        record = json.loads((ROOT / "bench/results/redwood.json").read_text())
+        record["scenes"].append({"name": "another", "source": "another"})
+        text = markdown_tables.text(record)
+        self.assertNotIn("time per pair", text)
+        self.assertIn("prepared pair", text)
 
 
 class Scenes(unittest.TestCase):

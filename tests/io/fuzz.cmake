@@ -3,7 +3,7 @@
 # gpureg_libfuzzer_io -max_total_time=60 [CORPUS]: guided by coverage, clang only.
 # The readers are compiled once more, so that they are instrumented whatever the rest of the build is.
 set(_fuzz_sources fuzz_read_point_cloud.cpp)
-foreach(_target gpureg_io gpureg_evaluation)
+foreach(_target gpureg_files gpureg_io gpureg_evaluation)
   get_target_property(_folder ${_target} SOURCE_DIR)
   get_target_property(_files ${_target} SOURCES)
   list(TRANSFORM _files PREPEND ${_folder}/)
