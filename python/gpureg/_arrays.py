@@ -210,8 +210,8 @@ def core_cloud(
     views = None if viewpoints is None else matrix(viewpoints, prefix + "viewpoints", 3)
     if origin is not None:
         # With no viewpoint given, the sensor was where the caller's frame has its origin. Normals
-        # of the cloud's own need none: they would be turned, and free space be judged, from
-        # thousands of kilometres away.
+        # of the cloud's own need none: a viewpoint thousands of kilometres away would turn
+        # them and make up free space.
         if views is None and normals is None:
             views = np.zeros((1, 3))
         raw, views = raw - origin, None if views is None else views - origin

@@ -43,7 +43,7 @@ def prepare(
         Sensor positions in the cloud's frame, towards which normals are turned where none are
         given, and from which free space was seen. Given normals that face away from all of them are
         turned round, unless more than an eighth do: then a UserWarning says so, as the viewpoints
-        are most likely in another frame, and speak against right poses. Default: the origin, or
+        are most likely in another frame, and count as evidence against correct poses. Default: the origin, or
         none where normals are given.
     options : PrepareOptions, optional
         Must suit the options of the alignment: see ``RegistrationOptions.prepare``.

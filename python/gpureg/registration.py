@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The door: any pairs of prepared clouds, and the easy way for two."""
+"""Alignment: any pairs of prepared clouds, and the short way for two."""
 
 from __future__ import annotations
 
@@ -226,7 +226,7 @@ def register(
     time_budget_ms: float | None = None,
     context: Context | None = None,
 ) -> RegistrationResult:
-    """Prepare two clouds and align them: the easy door.
+    """Prepare two clouds and align them.
 
     Parameters
     ----------

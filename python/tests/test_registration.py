@@ -39,16 +39,16 @@ def test_register_finds_the_pose(source, target, truth):
     assert repr(result).startswith("<gpureg.RegistrationResult aligned, score ")
 
 
-def test_modes_say_what_speaks_for_them(source, target):
+def test_modes_carry_their_evidence(source, target):
     result = gpureg.register(source, target)
     assert len(result.modes) > 1
-    best, rival = result.modes[:2]
+    best, alternative = result.modes[:2]
     assert (
         np.array_equal(best.target_from_source, result.target_from_source)
         and best.confidence == result.score
     )
-    assert best.confidence >= rival.confidence and best.overlap_confidence <= best.confidence
-    assert best.evidence.match_support > rival.evidence.match_support
+    assert best.confidence >= alternative.confidence and best.overlap_confidence <= best.confidence
+    assert best.evidence.match_support > alternative.evidence.match_support
     assert len(
         best.evidence.information_eigenvalues
     ) == 6 and best.evidence.information_eigenvalues == sorted(
@@ -59,7 +59,7 @@ def test_modes_say_what_speaks_for_them(source, target):
         gpureg.prepare(source),
         gpureg.prepare(target),
         options=gpureg.RegistrationOptions(
-            hypothesis=gpureg.HypothesisOptions(proposal="quadruples", count=20000)
+            method="quadruples", quadruples=gpureg.QuadrupleOptions(count=20000)
         ),
     )
     assert paper.aligned and paper.modes == [] and paper.score == paper.inlier_ratio
@@ -129,9 +129,9 @@ def test_prepared_cloud_shows_what_it_holds(source):
 
 def test_results_travel(source, target):
     result = gpureg.register(source, target, quality=1)
-    for twin in (pickle.loads(pickle.dumps(result)), copy.deepcopy(result)):
-        assert bits(twin) == bits(result)
-        assert twin.timings == result.timings and twin.statistics == result.statistics
+    for other in (pickle.loads(pickle.dumps(result)), copy.deepcopy(result)):
+        assert bits(other) == bits(result)
+        assert other.timings == result.timings and other.statistics == result.statistics
     information = result.source_moments.information_redwood()
     assert information.shape == (6, 6) and np.array_equal(information, information.T)
     assert information[0, 0] == result.source_moments.count
@@ -198,7 +198,7 @@ def test_other_threads_run_during_a_call(source):
     assert sum(begin < t < end for t in ticks) >= min(5, (end - begin) / 0.1)
 
 
-def test_four_threads_get_right_results():
+def test_four_threads_get_correct_results():
     clouds = [room(seed, 3000) for seed in range(4)]
     poses = [pose(seed) for seed in range(4)]
     expected = [gpureg.register(c, moved(c, t), options=few(5000)) for c, t in zip(clouds, poses)]
@@ -233,6 +233,6 @@ def test_forked_child_works(source):
 
 
 def test_clouds_of_other_lengths_are_refused(source):
-    cloud = gpureg.prepare(source, options=gpureg.PrepareOptions(search_distance=0.05))
-    with pytest.raises(gpureg.InvalidArgument, match="search_distance"):
+    cloud = gpureg.prepare(source, options=gpureg.PrepareOptions(max_correspondence_distance=0.05))
+    with pytest.raises(gpureg.InvalidArgument, match="prepared with max_correspondence_distance"):
         gpureg.align(cloud, cloud)
