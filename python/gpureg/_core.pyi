@@ -595,6 +595,7 @@ def align_batch(
     options: RegistrationOptions,
     progress: Callable[[int], object] | None = None,
     priors: Sequence[RegistrationPrior] = ...,
+    on_result: Callable[[int, RegistrationResult], object] | None = None,
 ) -> tuple[list[RegistrationResult], BaseException | None]: ...
 def loop_consistency(
     pairs: npt.NDArray[np.uint32],

@@ -175,7 +175,7 @@ def align_batch(
     options : RegistrationOptions, optional
     context : Context, optional
     progress : bool or callable
-        True: a bar of tqdm, where installed. A callable gets (pairs done, pairs) between chunks.
+        True: a bar of tqdm, where installed. A callable gets (pairs done, pairs) every few pairs.
 
     Returns
     -------
@@ -204,7 +204,7 @@ def align_batch(
     for k, prior in enumerate(known):
         if not isinstance(prior, RegistrationPrior):
             raise TypeError(f"priors[{k}]: expected a RegistrationPrior, got {prior!r}")
-    clouds = prepared(fragments, options.prepare, context)
+    clouds = prepared(fragments, options.prepare, context, progress is True)
     with batch_progress(progress, "aligning", len(entries)) as report:
         results, error = _core.align_batch(context, clouds, entries, options, report, known)
     if isinstance(error, KeyboardInterrupt):

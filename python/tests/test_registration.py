@@ -151,6 +151,79 @@ def test_progress_counts_up(source):
     assert seen[0] == (0, 20) and seen[-1] == (20, 20) and seen == sorted(seen) and len(seen) > 3
 
 
+def test_results_arrive_while_others_are_under_way(source):
+    context = gpureg.Context.cpu(1)
+    cloud = gpureg.prepare(source, context=context)
+    events = []
+    pairs = np.array([(0, 1), (1, 0)] * 10, np.uint32)
+    results, error = gpureg._core.align_batch(
+        context,
+        [cloud, cloud],
+        pairs,
+        few(500),
+        lambda done: events.append(("progress", done)),
+        on_result=lambda k, result: events.append((k, bits(result))),
+    )
+    assert error is None
+    assert [e for e in events if e[0] != "progress"] == [
+        (k, bits(result)) for k, result in enumerate(results)
+    ]
+    arrived = 0
+    for name, value in events:
+        if name == "progress":
+            assert value == arrived
+        else:
+            arrived += 1
+    whole = gpureg.align_batch([cloud, cloud], pairs, options=few(500), context=context)
+    assert [bits(result) for result in results] == [bits(result) for result in whole]
+
+
+def test_an_error_keeps_what_has_arrived(source):
+    context = gpureg.Context.cpu(1)
+    cloud = gpureg.prepare(source, context=context)
+
+    def fail(k, result):
+        if k == 3:
+            raise RuntimeError("enough")
+
+    results, error = gpureg._core.align_batch(
+        context, [cloud], np.zeros((500, 2), np.uint32), few(500), on_result=fail
+    )
+    done = sum(result.status != "skipped" for result in results)
+    assert str(error) == "enough" and 3 < done < 500
+
+
+@pytest.mark.parametrize("watched", [False, True])
+def test_a_batch_is_checked_before_its_first_pair(source, watched):
+    cloud = gpureg.prepare(source)
+    other = gpureg.prepare(source, options=gpureg.PrepareOptions(max_correspondence_distance=0.05))
+    seen = []
+    with pytest.raises(gpureg.InvalidArgument, match=r"clouds\[1\] was prepared with"):
+        gpureg.align_batch(
+            [cloud, other],
+            [(0, 0), (0, 1)],
+            progress=(lambda *a: seen.append(a)) if watched else False,
+        )
+    assert not seen
+
+
+def test_preparation_shows_its_progress(source, capsys):
+    clouds = [source[k::12] for k in range(12)]
+    seen = []
+    prepared = gpureg.prepare_batch(clouds, progress=lambda *a: seen.append(a))
+    assert seen[0] == (0, 12) and seen[-1] == (12, 12) and seen == sorted(seen) and len(seen) > 2
+    for one, other in zip(prepared, gpureg.prepare_batch(clouds)):
+        assert np.array_equal(one.points, other.points)
+        assert np.array_equal(one.features, other.features)
+    assert gpureg.prepare_batch([], progress=True) == []
+    with pytest.raises(ValueError, match=r"^clouds\[1\]: expected shape"):
+        gpureg.prepare_batch([source, source[:, :2]], progress=lambda *a: None)
+    pytest.importorskip("tqdm")
+    gpureg.align_batch([*prepared[:2], clouds[2]], [(0, 2)], options=few(100), progress=True)
+    shown = capsys.readouterr().err
+    assert "preparing" in shown and "1/1" in shown and "aligning" in shown
+
+
 def test_error_in_progress_comes_out(source):
     def progress(done, total):
         if done:
