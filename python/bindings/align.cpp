@@ -14,7 +14,7 @@ namespace {
 
 using IndexArray = py::array_t<std::uint32_t, py::array::c_style>;
 
-/// (M, 2) indices as pairs or correspondences; the face has checked the numbers.
+/// (M, 2) indices as pairs or correspondences; the package has checked the numbers.
 template <typename Entry>
 std::vector<Entry> entries_of(const IndexArray& array, const char* name) {
   if (array.ndim() != 2 || array.shape(1) != 2)

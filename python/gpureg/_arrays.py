@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Whatever people hold their clouds in, as what the core takes: float32 rows on the host.
+"""Converts arrays, clouds and files to float32 rows, which the core takes.
 
 Errors name the argument and the shape or type that it has.
 """
