@@ -98,7 +98,7 @@ def main() -> None:
     )
     parser.add_argument("folder")
     parser.add_argument("--reference")
-    parser.add_argument("--hypotheses", type=int, default=gpureg.HypothesisOptions().count)
+    parser.add_argument("--hypotheses", type=int, default=gpureg.QuadrupleOptions().count)
     parser.add_argument("--rounds", type=int, default=7)
     parser.add_argument("--threads", type=int, default=4)
     arguments = parser.parse_args()

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <pybind11/stl.h>
 
+#include <algorithm>
+#include <chrono>
 #include <optional>
 
 #include "cloud.hpp"
@@ -12,7 +14,7 @@ namespace {
 
 using IndexArray = py::array_t<std::uint32_t, py::array::c_style>;
 
-/// (M, 2) indices as pairs or correspondences; the face has checked the numbers.
+/// (M, 2) indices as pairs or correspondences; the package has checked the numbers.
 template <typename Entry>
 std::vector<Entry> entries_of(const IndexArray& array, const char* name) {
   if (array.ndim() != 2 || array.shape(1) != 2)
@@ -44,53 +46,154 @@ RegistrationResult align_pair(const Context& context, const Cloud& source, const
   return result;
 }
 
-/// Returns (results, error): what was raised between two chunks, by Ctrl-C or by progress, does not
-/// take with it what is done.
-py::tuple align_pairs(const Context& context, const py::list& clouds, const IndexArray& pairs,
-                      const RegistrationOptions& options, const py::object& progress,
-                      const std::vector<RegistrationPrior>& priors) {
-  std::vector<Cloud> held;  // copies share the data
-  std::vector<PreparedCloud> prepared;
-  for (const py::handle cloud : clouds) {
-    held.push_back(cloud.cast<const Cloud&>());
-    prepared.push_back(held.back().prepared);
+/// One call of align_batch from Python. Results reach Python between pieces of the batch.
+class Batch {
+ public:
+  Batch(const Context& context, const py::list& clouds, const IndexArray& pairs,
+        const RegistrationOptions& options, py::object progress, py::object on_result)
+      : context_(context),
+        options_(options),
+        pairs_(entries_of<Pair>(pairs, "pairs")),
+        progress_(std::move(progress)),
+        on_result_(std::move(on_result)),
+        out_(pairs_.size()) {
+    for (const py::handle cloud : clouds) {
+      clouds_.push_back(cloud.cast<const Cloud&>());
+      prepared_.push_back(clouds_.back().prepared);
+    }
   }
-  const auto entries = entries_of<Pair>(pairs, "pairs");
-  std::size_t done = 0;
-  py::object error = py::none();
-  BatchCallbacks callbacks;
-  callbacks.on_result = [&](std::size_t, const RegistrationResult&) { ++done; };
-  callbacks.should_stop = [&] {
-    const py::gil_scoped_acquire acquire;
+
+  /// Returns (results, error). An exception raised between two pieces, by Ctrl-C or by a callback,
+  /// does not take the finished results with it.
+  py::tuple run(const std::vector<RegistrationPrior>& priors) {
+    {
+      const py::gil_scoped_release release;
+      move_priors(priors);
+      const bool watched = !progress_.is_none() || !on_result_.is_none();
+      if (watched && context_.backend() == Backend::cpu)
+        align_in_pieces();
+      else
+        align_at_once();
+    }
+    deliver();
+    if (error_.is_none()) report();
+    while (told_ < pairs_.size()) take();  // those never tried
+    return py::make_tuple(std::move(out_), std::move(error_));
+  }
+
+ private:
+  /// A wrong number of priors, or of clouds, is align_batch's to name.
+  void move_priors(const std::vector<RegistrationPrior>& priors) {
+    for (std::size_t k = 0; k < priors.size(); ++k) {
+      const bool known = k < pairs_.size() && pairs_[k].source < clouds_.size() &&
+                         pairs_[k].target < clouds_.size();
+      priors_.push_back(known ? in_prepared_frames(priors[k], clouds_[pairs_[k].source],
+                                                   clouds_[pairs_[k].target])
+                              : priors[k]);
+    }
+  }
+
+  /// The library splits the batch: a chunk of a device takes a fraction of a second.
+  void align_at_once() {
+    BatchCallbacks callbacks;
+    callbacks.on_result = [&](std::size_t, const RegistrationResult&) { ++done_; };
+    callbacks.should_stop = [&] {
+      const py::gil_scoped_acquire acquire;
+      return !report();
+    };
+    results_ = align_batch(context_, prepared_, pairs_, priors_, options_, callbacks);
+    for (std::size_t k = 0; k < results_.size(); ++k) move(k);
+  }
+
+  /// A chunk of the CPU may take seconds; pieces of about kPieceSeconds keep progress moving.
+  /// Results do not depend on the split.
+  void align_in_pieces() {
+    // Names whatever is wrong, before the first pair runs.
+    BatchCallbacks nothing;
+    nothing.should_stop = [] { return true; };
+    results_ = align_batch(context_, prepared_, pairs_, priors_, options_, nothing);
+    const std::size_t most = 2 * std::size_t{context_.threads()} + 2;  // a chunk of the CPU
+    std::size_t piece = 1;
+    while (done_ < pairs_.size()) {
+      {
+        const py::gil_scoped_acquire acquire;
+        deliver();
+        if (!error_.is_none() || !report()) return;
+      }
+      const std::size_t count = std::min(piece, pairs_.size() - done_);
+      const auto part = [&](const auto& all) {
+        const auto begin = all.begin() + static_cast<std::ptrdiff_t>(done_);
+        return std::vector(begin, begin + static_cast<std::ptrdiff_t>(count));
+      };
+      const auto begin = std::chrono::steady_clock::now();
+      auto results = align_batch(context_, prepared_, part(pairs_),
+                                 priors_.empty() ? priors_ : part(priors_), options_);
+      const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - begin;
+      for (RegistrationResult& result : results) {
+        results_[done_] = std::move(result);
+        move(done_++);
+      }
+      const double wanted = kPieceSeconds * static_cast<double>(count) / seconds.count();
+      piece = wanted < static_cast<double>(most)
+                  ? std::max<std::size_t>(1, static_cast<std::size_t>(wanted))
+                  : most;
+    }
+  }
+
+  void move(std::size_t k) {
+    move_to_origins(results_[k], clouds_[pairs_[k].source], clouds_[pairs_[k].target]);
+  }
+
+  py::object take() {
+    out_[told_] = py::cast(std::move(results_[told_]));
+    return out_[told_++];
+  }
+
+  /// Hands the new results to Python.
+  void deliver() {
+    while (told_ < done_) {
+      const std::size_t k = told_;
+      const py::object result = take();
+      if (on_result_.is_none()) continue;
+      try {
+        on_result_(k, result);
+      } catch (const py::error_already_set& raised) {
+        error_ = raised.value();
+        on_result_ = py::none();
+      }
+    }
+  }
+
+  /// False where somebody raised: Ctrl-C, or a callback.
+  bool report() {
     try {
       if (PyErr_CheckSignals() != 0) throw py::error_already_set();
-      if (!progress.is_none()) progress(done);
-      return false;
-    } catch (const py::error_already_set& raised) {
-      error = raised.value();
+      if (!progress_.is_none()) progress_(done_);
       return true;
+    } catch (const py::error_already_set& raised) {
+      error_ = raised.value();
+      return false;
     }
-  };
-  std::vector<RegistrationResult> results;
-  {
-    const py::gil_scoped_release release;
-    std::vector<RegistrationPrior>
-        moved;  // a wrong number of them, or of clouds, is align_batch's to name
-    for (std::size_t k = 0; k < priors.size(); ++k) {
-      const bool known =
-          k < entries.size() && entries[k].source < held.size() && entries[k].target < held.size();
-      moved.push_back(
-          known ? in_prepared_frames(priors[k], held[entries[k].source], held[entries[k].target])
-                : priors[k]);
-    }
-    results = align_batch(context, prepared, entries, moved, options, callbacks);
-    for (std::size_t k = 0; k < results.size(); ++k)
-      move_to_origins(results[k], held[entries[k].source], held[entries[k].target]);
   }
-  if (error.is_none() && !progress.is_none()) progress(done);
-  py::list out(results.size());
-  for (std::size_t k = 0; k < results.size(); ++k) out[k] = py::cast(std::move(results[k]));
-  return py::make_tuple(std::move(out), std::move(error));
+
+  static constexpr double kPieceSeconds = 0.4;
+
+  const Context& context_;
+  const RegistrationOptions& options_;
+  std::vector<Cloud> clouds_;  // copies share the data
+  std::vector<PreparedCloud> prepared_;
+  std::vector<Pair> pairs_;
+  std::vector<RegistrationPrior> priors_;  // between prepared clouds
+  py::object progress_, on_result_, error_ = py::none();
+  std::vector<RegistrationResult> results_;
+  py::list out_;
+  std::size_t done_ = 0, told_ = 0;
+};
+
+py::tuple align_pairs(const Context& context, const py::list& clouds, const IndexArray& pairs,
+                      const RegistrationOptions& options, const py::object& progress,
+                      const std::vector<RegistrationPrior>& priors, const py::object& on_result) {
+  return Batch(context, clouds, pairs, options, progress, on_result).run(priors);
 }
 
 }  // namespace
@@ -100,7 +203,7 @@ void bind_align(py::module_& m) {
         py::arg("options"), py::arg("correspondences") = py::none(), py::arg("prior") = py::none());
   m.def("align_batch", &align_pairs, py::arg("context"), py::arg("clouds"), py::arg("pairs"),
         py::arg("options"), py::arg("progress") = py::none(),
-        py::arg("priors") = std::vector<RegistrationPrior>());
+        py::arg("priors") = std::vector<RegistrationPrior>(), py::arg("on_result") = py::none());
 }
 
 }  // namespace gpureg::python

@@ -4,7 +4,7 @@
 #include <pybind11/pybind11.h>
 
 /// The private module gpureg._core: one file per subject. Arguments are strict here (float32
-/// arrays, no conversion); python/gpureg is the face that takes whatever people have.
+/// arrays, no conversion); python/gpureg converts what users pass.
 namespace gpureg::python {
 
 namespace py = pybind11;

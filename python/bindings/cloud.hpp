@@ -13,7 +13,7 @@
 namespace gpureg::python {
 
 /// A PreparedCloud and the point of the caller's frame that its own frame has as origin. Not zero
-/// only for float64 coordinates too large for float (a map's), which the face moves before it
+/// only for float64 coordinates too large for float (a map's), which the package moves before it
 /// casts.
 struct Cloud {
   PreparedCloud prepared;
@@ -23,7 +23,7 @@ struct Cloud {
 using FloatArray = py::array_t<float, 0>;
 
 /// Rows of an array in place, its distance between rows in floats. Raises TypeError for an array
-/// whose rows are not whole floats side by side: the face copies those.
+/// whose rows are not whole floats side by side: the package copies those.
 struct Rows {
   const float* data;
   std::size_t count, columns, stride;

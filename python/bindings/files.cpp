@@ -50,7 +50,7 @@ void bind_files(py::module_& m) {
   py::class_<PointCloud>(m, "PointCloud", "A cloud as a file holds it.")
       .def(py::init([](const py::object& points, const py::object& normals,
                        const py::object& viewpoints) {
-             // The face takes whatever people have, and names what it refuses.
+             // The package converts the arguments, and names those that it refuses.
              const py::tuple parts = py::module_::import("gpureg._arrays")
                                          .attr("stored_cloud")(points, normals, viewpoints);
              return PointCloud{vectors_of(parts[0], "points"), vectors_of(parts[1], "normals"),

@@ -15,37 +15,41 @@ std::vector<Field<LoopConsistencyOptions>> option_fields() {
   using O = LoopConsistencyOptions;
   return {
       field("closing_angle", &O::closing_angle,
-            "Degrees by which three right poses typically miss their beginning."),
-      field("closing_distance", &O::closing_distance, "The same in metres."),
-      field("chance", &O::chance, "How often a loop with a wrong pose closes all the same."),
-      field("miss", &O::miss, "How often a loop of three right poses does not close."),
-      field("max_factor", &O::max_factor,
-            "By which all loops together may raise or lower the odds of a pose."),
-      field("min_confidence", &O::min_confidence, "Pairs below take no part."),
-      field("min_rival", &O::min_rival,
+            "Standard deviation of the rotation error of a loop of three correct poses, degrees."),
+      field("closing_distance", &O::closing_distance,
+            "Standard deviation of its translation error, metres."),
+      field("false_closure_rate", &O::false_closure_rate,
+            "Probability that a loop with a false pose closes all the same."),
+      field("missed_closure_rate", &O::missed_closure_rate,
+            "Probability that a loop of three correct poses does not close."),
+      field("max_odds_factor", &O::max_odds_factor,
+            "Largest factor by which all loops together change the odds of a pose."),
+      field("min_confidence", &O::min_confidence,
+            "Pairs below take no part and keep their confidence."),
+      field("min_alternative_confidence", &O::min_alternative_confidence,
             "Confidence from which a mode that is not the first takes part."),
-      field("modes", &O::modes, "Of a pair, the first so many take part, 1 to 16."),
+      field("modes", &O::modes, "Number of modes of a pair that take part, 1 to 16."),
       field("neighbors", &O::neighbors,
-            "Of a cloud, so many pairs, the most confident, judge others, 2 to 1024."),
-      field("rounds", &O::rounds, "Damped updates, 1 to 100."),
+            "Number of pairs of a cloud that form loops, the most confident ones, 2 to 1024."),
+      field("iterations", &O::iterations, "Damped updates, 1 to 100."),
   };
 }
 
 std::vector<Field<PairConsistency>> result_fields() {
-  using A = PairConsistency;
+  using P = PairConsistency;
   return {
-      field("confidence", &A::confidence, "Probability that the mode is right, given all pairs."),
-      field("mode", &A::mode,
-            "Index into RegistrationResult.modes; 0 where there are none: target_from_source."),
-      field("loops", &A::loops, "Of three that were looked at."),
-      field("path", &A::path,
-            "Pairs on the trusted path that it was compared with; 0: none. Without loops or a path "
-            "the confidence is the result's score."),
+      field("confidence", &P::confidence, "Probability that the mode is correct, given all pairs."),
+      field("mode", &P::mode,
+            "Index into RegistrationResult.modes; 0, target_from_source, where there are none."),
+      field("loops", &P::loops, "Loops of three that the pair is in."),
+      field("path", &P::path,
+            "Number of pairs on the most confident path that the pair was compared with; 0: none. "
+            "Without loops and path the confidence is the result's score."),
   };
 }
 
-std::vector<PairConsistency> agree(const IndexArray& pairs, const py::list& results,
-                                   const LoopConsistencyOptions& options) {
+std::vector<PairConsistency> consistency_of(const IndexArray& pairs, const py::list& results,
+                                            const LoopConsistencyOptions& options) {
   if (pairs.ndim() != 2 || pairs.shape(1) != 2)
     throw py::type_error("pairs: not a matrix with two columns");
   std::vector<Pair> entries(static_cast<std::size_t>(pairs.shape(0)));
@@ -55,24 +59,25 @@ std::vector<PairConsistency> agree(const IndexArray& pairs, const py::list& resu
   for (const py::handle result : results)
     values.push_back(result.cast<const RegistrationResult&>());
   const py::gil_scoped_release release;
-  return agreement(entries, values, options);
+  return loop_consistency(entries, values, options);
 }
 
 }  // namespace
 
 void bind_loop_consistency(py::module_& m) {
-  auto cls = bind_options_class<LoopConsistencyOptions>(m, "LoopConsistencyOptions",
-                                                        "How loops are judged.", option_fields());
+  auto cls = bind_options_class<LoopConsistencyOptions>(
+      m, "LoopConsistencyOptions", "Model of closing errors.", option_fields());
   cls.def_static(
       "from_voxel_size",
       [](const py::object& voxel_size) {
         return LoopConsistencyOptions::from_voxel_size(argument<float>(voxel_size, "voxel_size"));
       },
       py::arg("voxel_size"),
-      "The distance is three voxels; the rest does not depend on the voxel.");
-  bind_record_class<PairConsistency>(m, "PairConsistency", "What the other pairs say of one pair.",
-                                     result_fields());
-  m.def("agreement", &agree, py::arg("pairs"), py::arg("results"), py::arg("options"));
+      "closing_distance of three voxels; the rest does not depend on the voxel.");
+  bind_record_class<PairConsistency>(
+      m, "PairConsistency", "Confidence of one pair in view of the others.", result_fields());
+  m.def("loop_consistency", &consistency_of, py::arg("pairs"), py::arg("results"),
+        py::arg("options"));
 }
 
 }  // namespace gpureg::python

@@ -13,7 +13,7 @@
 namespace gpureg::python {
 namespace {
 
-/// One cloud as the face hands it over: (points, normals, features, viewpoints, origin, stream);
+/// One cloud as the package hands it over: (points, normals, features, viewpoints, origin, stream);
 /// all but the points may be None. Points, normals and features are float32 arrays, or, where there
 /// is a stream, (address, rows, columns, stride, owner) of device memory. The caller's tuple keeps
 /// alive what the views point at.

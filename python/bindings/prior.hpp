@@ -7,7 +7,8 @@
 
 namespace gpureg::python {
 
-/// A prior in the frames of the prepared clouds, which the face may have moved: see Cloud::origin.
+/// A prior in the frames of the prepared clouds, which the package may have moved: see
+/// Cloud::origin.
 RegistrationPrior in_prepared_frames(RegistrationPrior prior, const Cloud& source,
                                      const Cloud& target);
 

@@ -17,24 +17,31 @@ std::vector<Field<RegistrationStatistics>> statistics_fields() {
   return {
       field("source_points", &S::source_points, "Prepared points of the source."),
       field("target_points", &S::target_points, "Prepared points of the target."),
-      field("correspondences", &S::correspondences,
-            "Feature matches that quadruples are drawn from."),
-      field("hypotheses", &S::hypotheses, "Quadruples drawn."),
-      field("survivors", &S::survivors, "Of these, passed the polygon test."),
-      field("scored", &S::scored, "Of these, with a well-defined rigid fit."),
+      field("correspondences", &S::correspondences, "Matches that hypotheses are made of."),
+      field("hypotheses", &S::hypotheses, "Quadruples drawn, or seeds tried."),
+      field("survivors", &S::survivors,
+            "Quadruples that passed the polygon test, or seeds that gave a pose."),
+      field("scored", &S::scored, "Of these, those with a well-defined rigid fit."),
       field("points_scored", &S::points_scored, "Points that the inlier ratio is relative to."),
-      field("consensus", &S::consensus, "Inliers that the pose won by."),
-      field("inliers", &S::inliers, "Inliers that the inlier ratio counts."),
-      field("refine_iterations", &S::refine_iterations, "Iterations of the refinement."),
-      field("swapped", &S::swapped, "The target, being smaller, was sampled and scored."),
+      field("consensus", &S::consensus, "Inliers by which the returned pose won."),
+      field("inliers", &S::inliers, "Inliers of the inlier ratio."),
+      field("refine_iterations", &S::refine_iterations,
+            "Iterations of the refinement of the returned pose."),
+      field("swapped", &S::swapped,
+            "The target was moved onto the source, being the smaller cloud (smaller_as_source)."),
   };
 }
 
 std::vector<Field<StageTimings>> timing_fields() {
   using T = StageTimings;
-  return {field("match", &T::match, "Feature matching."), field("sample", &T::sample, "Sampling."),
-          field("fit", &T::fit, "Rigid fits."),           field("score", &T::score, "Scoring."),
-          field("refine", &T::refine, "Refinement."),     field("judge", &T::judge, "Judging.")};
+  return {
+      field("match", &T::match, "Nearest features."),
+      field("propose", &T::propose, "Seeds and their poses, or quadruples and their poses."),
+      field("rank", &T::rank,
+            "Coarse scores and distinct modes, or inlier counts of all hypotheses."),
+      field("refine", &T::refine, "ICP."),
+      field("verify", &T::verify, "Evidence and degeneracy search, or the winner's support."),
+  };
 }
 
 std::vector<Field<PrepareStatistics>> prepare_fields() {
@@ -50,55 +57,63 @@ std::vector<Field<PrepareStatistics>> prepare_fields() {
       field("features", &P::features, "Milliseconds of the features."),
       field("grid", &P::grid, "Milliseconds of the search grid."),
       field("depth_maps", &P::depth_maps, "Milliseconds of the depth maps."),
-      field("surface_sides", &P::surface_sides, "Milliseconds of the surface_sides of surfaces."),
+      field("surface_sides", &P::surface_sides, "Milliseconds of the surfaces' sides."),
   };
 }
 
 std::vector<Field<PoseEvidence>> evidence_fields() {
   using E = PoseEvidence;
   return {
-      field("match_inliers", &E::match_inliers, "Matches that the pose brings together."),
-      field("match_support", &E::match_support, "The same as a balanced share of all matches."),
+      field("match_inliers", &E::match_inliers,
+            "Matches that the pose brings within consensus_distance."),
+      field("match_support", &E::match_support,
+            "The same as a normal-weighted share of all matches, the smaller one of both sides."),
       field("source_overlap", &E::source_overlap,
-            "Share of the source's points with a point of the target in reach, normals alike."),
+            "Share of the source's points with a point of the target within "
+            "max_correspondence_distance and a similar normal."),
       field("target_overlap", &E::target_overlap, "The other way round."),
       field("source_overlap_any_normal", &E::source_overlap_any_normal,
             "The same whatever the normals."),
       field("target_overlap_any_normal", &E::target_overlap_any_normal, "The other way round."),
       field("source_residual", &E::source_residual,
-            "RMS distance of the overlapping points over max_correspondence_distance."),
+            "RMS distance of the overlapping points over max_correspondence_distance; 1 where "
+            "there are none."),
       field("target_residual", &E::target_residual, "The other way round."),
       field("source_normal_weighted_overlap", &E::source_normal_weighted_overlap,
-            "Points weigh less where many normals point their way."),
+            "Overlap in which a point weighs less the more normals of its cloud share its "
+            "direction."),
       field("target_normal_weighted_overlap", &E::target_normal_weighted_overlap,
             "The other way round."),
       field("source_observed", &E::source_observed,
-            "Share of the source's points in directions that the target's viewpoints saw; 0: "
-            "no viewpoint is known."),
+            "Share of the source's points in directions that viewpoints of the target observed, "
+            "weighted by incidence; 0: no viewpoint known."),
       field("target_observed", &E::target_observed, "The other way round."),
       field("source_free_space_violation", &E::source_free_space_violation,
-            "Of these, the share in space that was seen to be free."),
+            "Of these, with the same weights, the share in observed free space."),
       field("target_free_space_violation", &E::target_free_space_violation, "The other way round."),
-      field("source_occluded", &E::source_occluded, "Of those seen, the share behind a surface."),
+      field("source_occluded", &E::source_occluded,
+            "Of the points in observed directions, the share behind the observed surface."),
       field("target_occluded", &E::target_occluded, "The other way round."),
       field("source_near_surface", &E::source_near_surface,
-            "Share of the source's points around the target's surfaces; 0: not known."),
+            "Share of the source's points within surface_side_distance of the target's surfaces; "
+            "0: not known."),
       field("target_near_surface", &E::target_near_surface, "The other way round."),
       field("source_front_violation_near", &E::source_front_violation_near,
-            "Share of the source's points that touch nothing and are close in front of a surface "
-            "of the target, by its normals."),
+            "Share of the source's points that are in front of a surface of the target without "
+            "touching any, within half of surface_side_distance."),
       field("target_front_violation_near", &E::target_front_violation_near, "The other way round."),
       field("source_front_violation_far", &E::source_front_violation_far,
-            "The same, farther in front."),
+            "The same, beyond half of surface_side_distance."),
       field("target_front_violation_far", &E::target_front_violation_far, "The other way round."),
       field("source_behind_surface", &E::source_behind_surface,
-            "The same, behind one and in front of none."),
+            "Share of the source's points behind a surface of the target and in front of none."),
       field("target_behind_surface", &E::target_behind_surface, "The other way round."),
       field("information_eigenvalues", &E::information_eigenvalues,
-            "6 eigenvalues, ascending, of the point-to-plane information: a small one is a "
-            "direction in which the pose slides."),
+            "6 eigenvalues, ascending, of the point-to-plane information. A small first one means "
+            "that the geometry hardly holds the pose in weakest_direction."),
       field("weakest_direction", &E::weakest_direction,
-            "That direction, in the target's frame: rotation, then translation."),
+            "Eigenvector of the first eigenvalue, in the target's frame: rotation, then "
+            "translation."),
   };
 }
 
@@ -166,12 +181,12 @@ void bind_mode(py::module_& m) {
       .def_property_readonly(
           "target_from_source", [](const M& o) { return array_of(o.target_from_source.matrix()); },
           "(4, 4) float64: maps points of the source into the target's frame.")
-      .def_readonly("confidence", &M::confidence, "Probability that the pose is right.")
+      .def_readonly("confidence", &M::confidence, "Probability that the pose is correct.")
       .def_readonly("overlap_confidence", &M::overlap_confidence,
-                    "Probability that it is right and that the clouds overlap by 30 % or more.")
-      .def_readonly("evidence", &M::evidence, "What speaks for and against it.")
+                    "Probability that the pose is correct and the clouds overlap by 30 % or more.")
+      .def_readonly("evidence", &M::evidence, "Evidence for and against the pose.")
       .def_readonly("rank_before_refinement", &M::rank_before_refinement,
-                    "SurfaceSide before refinement, the most promising first.")
+                    "Rank by the coarse score among the modes before refinement, from 0.")
       .def(
           "to_dict", [](const M& o) { return state_of(o); },
           "All values as plain Python and numpy objects.")
@@ -271,12 +286,11 @@ void bind_registration_result(py::module_& m) {
                              "(4, 4) float64: maps points of the source into the target's frame; "
                              "NaN where there is no candidate.")
       .def_readonly("score", &R::score,
-                    "What ranks results: the confidence; the inlier ratio where the proposal is "
-                    "'quadruples'.")
+                    "Ranks results: the confidence; with the method 'quadruples' the inlier ratio.")
       .def_property_readonly(
           "modes", [](const R& r) { return r.modes; },
-          "Distinct poses, the most confident first; the first is target_from_source. Empty where "
-          "the proposal is 'quadruples'.")
+          "Distinct poses, the most confident first; the first is target_from_source. Empty "
+          "with the method 'quadruples'.")
       .def_readonly("inlier_ratio", &R::inlier_ratio, "Inliers over points scored, [0, 1].")
       .def_readonly("inlier_rmse", &R::inlier_rmse, "Metres, over the inliers.")
       .def_readonly("source_moments", &R::source_moments,
@@ -296,17 +310,18 @@ void bind_registration_result(py::module_& m) {
 
 void bind_result(py::module_& m) {
   bind_record_class<RegistrationStatistics>(m, "RegistrationStatistics",
-                                            "What went in and was left after each stage.",
+                                            "What was left after each stage of one pair.",
                                             statistics_fields());
-  bind_record_class<StageTimings>(m, "StageTimings", "Milliseconds of each stage of one pair.",
-                                  timing_fields())
+  bind_record_class<StageTimings>(
+      m, "StageTimings", "Wall time of each stage of one pair, milliseconds.", timing_fields())
       .def_property_readonly("total", &StageTimings::total, "Milliseconds of all stages.");
-  bind_record_class<PrepareStatistics>(m, "PrepareStatistics",
-                                       "Counts and milliseconds of the preparation of one cloud.",
-                                       prepare_fields())
+  bind_record_class<PrepareStatistics>(
+      m, "PrepareStatistics",
+      "Counts and wall times (milliseconds) of the preparation of one cloud.", prepare_fields())
       .def_property_readonly("total", &PrepareStatistics::total, "Milliseconds of all stages.");
   bind_moments(m);
-  bind_record_class<PoseEvidence>(m, "PoseEvidence", "What speaks for and against a pose.",
+  bind_record_class<PoseEvidence>(m, "PoseEvidence",
+                                  "Evidence for and against a pose (method 'compatibility').",
                                   evidence_fields());
   bind_mode(m);
   bind_registration_result(m);

@@ -7,11 +7,12 @@ namespace gpureg::python {
 
 void bind_time_budget(py::module_& m) {
   using T = TimedResult;
-  py::class_<T>(m, "TimedResult", "What was found within a time budget.")
-      .def_readonly("result", &T::result, "Of all levels run, the one with the highest confidence.")
-      .def_readonly("quality", &T::quality, "The level that it is of.")
+  py::class_<T>(m, "TimedResult", "Result of an alignment within a time budget.")
+      .def_readonly("result", &T::result,
+                    "The result with the highest confidence of all levels that were run.")
+      .def_readonly("quality", &T::quality, "Level of quality of the result.")
       .def_readonly("highest_quality", &T::highest_quality, "The highest level that was run.")
-      .def_readonly("levels", &T::levels, "How many were run.")
+      .def_readonly("levels", &T::levels, "Number of levels that were run.")
       .def_readonly("milliseconds", &T::milliseconds, "Wall time of the call.");
   m.def(
       "align_within",

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Whatever people hold their clouds in, as what the core takes: float32 rows on the host.
+"""Converts arrays, clouds and files to float32 rows, which the core takes.
 
 Errors name the argument and the shape or type that it has.
 """
@@ -210,8 +210,8 @@ def core_cloud(
     views = None if viewpoints is None else matrix(viewpoints, prefix + "viewpoints", 3)
     if origin is not None:
         # With no viewpoint given, the sensor was where the caller's frame has its origin. Normals
-        # of the cloud's own need none: they would be turned, and free space be judged, from
-        # thousands of kilometres away.
+        # of the cloud's own need none: a viewpoint thousands of kilometres away would turn
+        # them and make up free space.
         if views is None and normals is None:
             views = np.zeros((1, 3))
         raw, views = raw - origin, None if views is None else views - origin

@@ -46,8 +46,8 @@ class PrepareOptions:
     voxel_size: float
     normal_radius: float
     feature_radius: float
-    search_distance: float
     wide_feature_radius: float
+    max_correspondence_distance: float
     depth_maps: int
     surface_side_distance: float
     def __init__(
@@ -56,8 +56,8 @@ class PrepareOptions:
         voxel_size: float = ...,
         normal_radius: float = ...,
         feature_radius: float = ...,
-        search_distance: float = ...,
         wide_feature_radius: float = ...,
+        max_correspondence_distance: float = ...,
         depth_maps: int = ...,
         surface_side_distance: float = ...,
     ) -> None: ...
@@ -67,49 +67,11 @@ class PrepareOptions:
         voxel_size: float = ...,
         normal_radius: float = ...,
         feature_radius: float = ...,
-        search_distance: float = ...,
         wide_feature_radius: float = ...,
+        max_correspondence_distance: float = ...,
         depth_maps: int = ...,
         surface_side_distance: float = ...,
     ) -> PrepareOptions: ...
-    def validate(self) -> None: ...
-    def __eq__(self, other: object, /) -> bool: ...
-    __hash__: None  # type: ignore[assignment]
-    _fields: tuple[str, ...]
-
-class HypothesisOptions:
-    proposal: Literal["compatibility", "quadruples"]
-    count: int
-    neighbors: int
-    mutual: bool
-    edge_similarity: float
-    max_survivors: int
-    smaller_as_source: bool
-    seed: int
-    def __init__(
-        self,
-        *,
-        proposal: Literal["compatibility", "quadruples"] = ...,
-        count: int = ...,
-        neighbors: int = ...,
-        mutual: bool = ...,
-        edge_similarity: float = ...,
-        max_survivors: int = ...,
-        smaller_as_source: bool = ...,
-        seed: int = ...,
-    ) -> None: ...
-    def replace(
-        self,
-        *,
-        proposal: Literal["compatibility", "quadruples"] = ...,
-        count: int = ...,
-        neighbors: int = ...,
-        mutual: bool = ...,
-        edge_similarity: float = ...,
-        max_survivors: int = ...,
-        smaller_as_source: bool = ...,
-        seed: int = ...,
-    ) -> HypothesisOptions: ...
     def validate(self) -> None: ...
     def __eq__(self, other: object, /) -> bool: ...
     __hash__: None  # type: ignore[assignment]
@@ -156,6 +118,64 @@ class CompatibilityOptions:
     __hash__: None  # type: ignore[assignment]
     _fields: tuple[str, ...]
 
+class QuadrupleOptions:
+    count: int
+    neighbors: int
+    mutual: bool
+    edge_similarity: float
+    max_survivors: int
+    max_normal_angle: float
+    max_verification_normal_angle: float
+    min_inlier_ratio: float
+    def __init__(
+        self,
+        *,
+        count: int = ...,
+        neighbors: int = ...,
+        mutual: bool = ...,
+        edge_similarity: float = ...,
+        max_survivors: int = ...,
+        max_normal_angle: float = ...,
+        max_verification_normal_angle: float = ...,
+        min_inlier_ratio: float = ...,
+    ) -> None: ...
+    def replace(
+        self,
+        *,
+        count: int = ...,
+        neighbors: int = ...,
+        mutual: bool = ...,
+        edge_similarity: float = ...,
+        max_survivors: int = ...,
+        max_normal_angle: float = ...,
+        max_verification_normal_angle: float = ...,
+        min_inlier_ratio: float = ...,
+    ) -> QuadrupleOptions: ...
+    def validate(self) -> None: ...
+    def __eq__(self, other: object, /) -> bool: ...
+    __hash__: None  # type: ignore[assignment]
+    _fields: tuple[str, ...]
+
+class RefineOptions:
+    max_iterations: int
+    kernel_width: float
+    def __init__(
+        self,
+        *,
+        max_iterations: int = ...,
+        kernel_width: float = ...,
+    ) -> None: ...
+    def replace(
+        self,
+        *,
+        max_iterations: int = ...,
+        kernel_width: float = ...,
+    ) -> RefineOptions: ...
+    def validate(self) -> None: ...
+    def __eq__(self, other: object, /) -> bool: ...
+    __hash__: None  # type: ignore[assignment]
+    _fields: tuple[str, ...]
+
 class EvidenceOptions:
     sample: int
     modes: int
@@ -194,84 +214,41 @@ class EvidenceOptions:
     __hash__: None  # type: ignore[assignment]
     _fields: tuple[str, ...]
 
-class ScoreOptions:
-    max_correspondence_distance: float
-    max_normal_angle: float
-    max_verification_normal_angle: float
-    min_inlier_ratio: float
-    def __init__(
-        self,
-        *,
-        max_correspondence_distance: float = ...,
-        max_normal_angle: float = ...,
-        max_verification_normal_angle: float = ...,
-        min_inlier_ratio: float = ...,
-    ) -> None: ...
-    def replace(
-        self,
-        *,
-        max_correspondence_distance: float = ...,
-        max_normal_angle: float = ...,
-        max_verification_normal_angle: float = ...,
-        min_inlier_ratio: float = ...,
-    ) -> ScoreOptions: ...
-    def validate(self) -> None: ...
-    def __eq__(self, other: object, /) -> bool: ...
-    __hash__: None  # type: ignore[assignment]
-    _fields: tuple[str, ...]
-
-class RefineOptions:
-    max_iterations: int
-    max_correspondence_distance: float
-    kernel_width: float
-    def __init__(
-        self,
-        *,
-        max_iterations: int = ...,
-        max_correspondence_distance: float = ...,
-        kernel_width: float = ...,
-    ) -> None: ...
-    def replace(
-        self,
-        *,
-        max_iterations: int = ...,
-        max_correspondence_distance: float = ...,
-        kernel_width: float = ...,
-    ) -> RefineOptions: ...
-    def validate(self) -> None: ...
-    def __eq__(self, other: object, /) -> bool: ...
-    __hash__: None  # type: ignore[assignment]
-    _fields: tuple[str, ...]
-
 class RegistrationOptions:
-    prepare: PrepareOptions
-    hypothesis: HypothesisOptions
-    compatibility: CompatibilityOptions
-    evidence: EvidenceOptions
-    score: ScoreOptions
-    refine: RefineOptions
+    seed: int
     min_confidence: float
+    method: Literal["compatibility", "quadruples"]
+    smaller_as_source: bool
+    prepare: PrepareOptions
+    compatibility: CompatibilityOptions
+    quadruples: QuadrupleOptions
+    refine: RefineOptions
+    evidence: EvidenceOptions
     def __init__(
         self,
         *,
-        prepare: PrepareOptions = ...,
-        hypothesis: HypothesisOptions = ...,
-        compatibility: CompatibilityOptions = ...,
-        evidence: EvidenceOptions = ...,
-        score: ScoreOptions = ...,
-        refine: RefineOptions = ...,
+        seed: int = ...,
         min_confidence: float = ...,
+        method: Literal["compatibility", "quadruples"] = ...,
+        smaller_as_source: bool = ...,
+        prepare: PrepareOptions = ...,
+        compatibility: CompatibilityOptions = ...,
+        quadruples: QuadrupleOptions = ...,
+        refine: RefineOptions = ...,
+        evidence: EvidenceOptions = ...,
     ) -> None: ...
     def replace(
         self,
         *,
-        prepare: PrepareOptions = ...,
-        hypothesis: HypothesisOptions = ...,
-        compatibility: CompatibilityOptions = ...,
-        evidence: EvidenceOptions = ...,
-        score: ScoreOptions = ...,
-        refine: RefineOptions = ...,
+        seed: int = ...,
         min_confidence: float = ...,
+        method: Literal["compatibility", "quadruples"] = ...,
+        smaller_as_source: bool = ...,
+        prepare: PrepareOptions = ...,
+        compatibility: CompatibilityOptions = ...,
+        quadruples: QuadrupleOptions = ...,
+        refine: RefineOptions = ...,
+        evidence: EvidenceOptions = ...,
     ) -> RegistrationOptions: ...
     @staticmethod
     def from_voxel_size(voxel_size: float, quality: int = 5) -> RegistrationOptions: ...
@@ -314,15 +291,13 @@ class StageTimings:
     @property
     def match(self) -> float: ...
     @property
-    def sample(self) -> float: ...
+    def propose(self) -> float: ...
     @property
-    def fit(self) -> float: ...
-    @property
-    def score(self) -> float: ...
+    def rank(self) -> float: ...
     @property
     def refine(self) -> float: ...
     @property
-    def judge(self) -> float: ...
+    def verify(self) -> float: ...
     @property
     def total(self) -> float: ...
     def __eq__(self, other: object, /) -> bool: ...
@@ -473,41 +448,41 @@ class RegistrationResult:
 class LoopConsistencyOptions:
     closing_angle: float
     closing_distance: float
-    chance: float
-    miss: float
-    max_factor: float
+    false_closure_rate: float
+    missed_closure_rate: float
+    max_odds_factor: float
     min_confidence: float
-    min_rival: float
+    min_alternative_confidence: float
     modes: int
     neighbors: int
-    rounds: int
+    iterations: int
     def __init__(
         self,
         *,
         closing_angle: float = ...,
         closing_distance: float = ...,
-        chance: float = ...,
-        miss: float = ...,
-        max_factor: float = ...,
+        false_closure_rate: float = ...,
+        missed_closure_rate: float = ...,
+        max_odds_factor: float = ...,
         min_confidence: float = ...,
-        min_rival: float = ...,
+        min_alternative_confidence: float = ...,
         modes: int = ...,
         neighbors: int = ...,
-        rounds: int = ...,
+        iterations: int = ...,
     ) -> None: ...
     def replace(
         self,
         *,
         closing_angle: float = ...,
         closing_distance: float = ...,
-        chance: float = ...,
-        miss: float = ...,
-        max_factor: float = ...,
+        false_closure_rate: float = ...,
+        missed_closure_rate: float = ...,
+        max_odds_factor: float = ...,
         min_confidence: float = ...,
-        min_rival: float = ...,
+        min_alternative_confidence: float = ...,
         modes: int = ...,
         neighbors: int = ...,
-        rounds: int = ...,
+        iterations: int = ...,
     ) -> LoopConsistencyOptions: ...
     @staticmethod
     def from_voxel_size(voxel_size: float) -> LoopConsistencyOptions: ...
@@ -620,8 +595,9 @@ def align_batch(
     options: RegistrationOptions,
     progress: Callable[[int], object] | None = None,
     priors: Sequence[RegistrationPrior] = ...,
+    on_result: Callable[[int, RegistrationResult], object] | None = None,
 ) -> tuple[list[RegistrationResult], BaseException | None]: ...
-def agreement(
+def loop_consistency(
     pairs: npt.NDArray[np.uint32],
     results: Sequence[RegistrationResult],
     options: LoopConsistencyOptions,

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Agreement among the pairs of one set of clouds."""
+"""Loop consistency among the pairs of one set of clouds."""
 
 from __future__ import annotations
 
@@ -11,13 +11,17 @@ from ._arrays import index_pairs
 from ._core import LoopConsistencyOptions, PairConsistency, RegistrationResult
 
 
-def agreement(
+def loop_consistency(
     pairs: Any,
     results: Sequence[RegistrationResult],
     *,
     options: LoopConsistencyOptions | None = None,
 ) -> list[PairConsistency]:
-    """Confidences of pairs in view of each other: the poses around a loop must lead back.
+    """Re-scores every pair by loops of three clouds and by the most confident path between its
+    clouds.
+
+    Correct poses around a loop of clouds compose to the identity. Perceptual aliases agree with each
+    other in loops of three, but not with the path from one place to the other.
 
     Parameters
     ----------
@@ -31,9 +35,9 @@ def agreement(
     Returns
     -------
     list of PairConsistency
-        ``confidence`` given all pairs, the index ``mode`` of the pose that the loops support (into
-        ``RegistrationResult.modes``), the number of ``loops`` of three, and how many trusted pairs
-        make the ``path`` between its clouds that it was compared with. Pairs in no loop keep their
+        ``confidence`` given all pairs; ``mode``, an index into ``RegistrationResult.modes``;
+        ``loops``, the number of loops of three that the pair is in; ``path``, the number of pairs on
+        the path that it was compared with. Without loops and path the confidence is the result's
         score.
 
     Raises
@@ -47,7 +51,7 @@ def agreement(
     >>> cloud = np.random.default_rng(1).random((2000, 3))
     >>> pairs = [(0, 1), (1, 2), (0, 2)]
     >>> results = gpureg.align_batch([cloud, cloud + [0.5, 0, 0], cloud - [0, 2, 0]], pairs)
-    >>> [(a.mode, a.loops) for a in gpureg.agreement(pairs, results)]
+    >>> [(p.mode, p.loops) for p in gpureg.loop_consistency(pairs, results)]
     [(0, 1), (0, 1), (0, 1)]
     """
     if options is not None and not isinstance(options, LoopConsistencyOptions):
@@ -57,7 +61,7 @@ def agreement(
         if not isinstance(result, RegistrationResult):
             raise TypeError(f"results[{k}]: expected a RegistrationResult, got {result!r}")
     entries = index_pairs(pairs, "pairs", None)
-    return _core.agreement(entries, results, options or LoopConsistencyOptions())
+    return _core.loop_consistency(entries, results, options or LoopConsistencyOptions())
 
 
-__all__ = ["agreement"]
+__all__ = ["loop_consistency"]

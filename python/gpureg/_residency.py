@@ -14,6 +14,7 @@ import numpy.typing as npt
 from . import _core
 from ._core import Context, PreparedCloud, RegistrationOptions, RegistrationResult
 from .fragments import FragmentSet
+from .preparation import pieces
 
 _READERS = 4  # reading a file leaves the interpreter free
 _TOGETHER = 32  # clouds per call of prepare: enough to fill a device
@@ -53,8 +54,8 @@ class Residency:
         on_result: Callable[[int, RegistrationResult], object],
         stop: threading.Event | None = None,
     ) -> None:
-        """Calls on_result(row, result) for each row (i, j) of pairs, in order: fragment j into
-        fragment i.
+        """Calls on_result(row, result) for each row (i, j) of pairs, in order and while others are
+        under way: fragment j into fragment i.
 
         Raises Stopped where stop was set; on_result has been called for what was done.
         """
@@ -69,7 +70,7 @@ class Residency:
                 group, held = [], {k: cloud for k, cloud in held.items() if k in pair}
             for k in missing:
                 if k not in held:
-                    held[k] = self._cloud(k, pairs[row:])
+                    held[k] = self._cloud(k, pairs[row:], stop)
             group.append(row)
         if group:
             self._align_group(pairs, group, held, on_result, stop)
@@ -91,16 +92,20 @@ class Residency:
             if stop is not None and stop.is_set():
                 raise Stopped
 
-        results, error = _core.align_batch(
-            self._context, list(held.values()), entries, self._options, check
+        _, error = _core.align_batch(
+            self._context,
+            list(held.values()),
+            entries,
+            self._options,
+            check,
+            on_result=lambda k, result: on_result(rows[k], result),
         )
-        for row, result in zip(rows, results):
-            if result.status != "skipped":
-                on_result(row, result)
         if error is not None:
             raise error
 
-    def _cloud(self, wanted: int, ahead: npt.NDArray[np.int64]) -> PreparedCloud:
+    def _cloud(
+        self, wanted: int, ahead: npt.NDArray[np.int64], stop: threading.Event | None
+    ) -> PreparedCloud:
         if wanted in self._clouds:
             self._clouds.move_to_end(wanted)
             return self._clouds[wanted]
@@ -114,18 +119,25 @@ class Residency:
             if k not in self._clouds and k != wanted:
                 chosen.append(k)
         device = self._context.backend == "cuda"
-        inputs = list(
-            self._readers.map(
-                lambda k: self._fragments.load(k, self._options.prepare, device), chosen
-            )
-        )
-        names = [f"fragments[{k}]" for k in chosen]
-        for k, cloud in zip(
-            chosen, _core.prepare_batch(self._context, inputs, self._options.prepare, names)
-        ):
-            self._clouds[k] = cloud
-            self._bytes += _bytes_of(cloud)
-        self.prepared += len(chosen)
+        loads = [
+            self._readers.submit(self._fragments.load, k, self._options.prepare, device)
+            for k in chosen
+        ]
+        try:
+            for piece in pieces(len(chosen), self._context):
+                if stop is not None and stop.is_set():
+                    raise Stopped
+                inputs = [loads[k].result() for k in piece]
+                names = [f"fragments[{chosen[k]}]" for k in piece]
+                for k, cloud in zip(
+                    piece, _core.prepare_batch(self._context, inputs, self._options.prepare, names)
+                ):
+                    self._clouds[chosen[k]] = cloud
+                    self._bytes += _bytes_of(cloud)
+                self.prepared += len(piece)
+        finally:
+            for load in loads:
+                load.cancel()
         found = self._clouds[wanted]
         while self._bytes > self._memory and len(self._clouds) > len(chosen):
             _, old = self._clouds.popitem(last=False)

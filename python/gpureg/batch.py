@@ -118,7 +118,7 @@ def register_all(
     contexts : sequence of Context, optional
         One thread each. Default: one per CUDA device, or the CPU.
     progress : bool or callable
-        True: a bar of tqdm. A callable gets (pairs done, pairs).
+        True: a bar of tqdm. A callable gets (pairs done, pairs) several times a second.
     resume : bool
         False: discard what an earlier run left in the folder.
     chunk_size : int
@@ -144,7 +144,7 @@ def register_all(
     >>> import numpy as np, gpureg, tempfile
     >>> cloud = np.random.default_rng(1).random((2000, 3))
     >>> fragments = [cloud, cloud + [0.5, 0, 0], cloud - [0, 2, 0]]
-    >>> few = gpureg.RegistrationOptions(hypothesis=gpureg.HypothesisOptions(count=1000))
+    >>> few = gpureg.RegistrationOptions.from_voxel_size(0.05, quality=0)
     >>> with tempfile.TemporaryDirectory() as folder:
     ...     run = gpureg.register_all(fragments, output=folder, options=few, progress=False)
     ...     table = run.table()
@@ -243,6 +243,7 @@ class _Workers:
         self._lock = threading.Lock()
         self._errors: list[BaseException] = []
         self._done = 0
+        self._residencies: list[Residency] = []
         self._partial = {chunk: store.partial(chunk) for chunk in chunks}
 
     def run(self, progress: Progress, before: int) -> int:
@@ -260,19 +261,24 @@ class _Workers:
                     for thread in threads:
                         thread.join(0.1 / len(threads))
                     if report is not None:
-                        report(self._done)
+                        report(self._done, self._note())
             finally:
                 self._stop.set()
                 for thread in threads:
                     thread.join()
             if report is not None:
-                report(self._done)
+                report(self._done, self._note())
         if self._errors:
             raise self._errors[0]
         return partial
 
+    def _note(self) -> str:
+        """Fragments are prepared before the first of their pairs."""
+        return f"{sum(residency.prepared for residency in self._residencies)} clouds prepared"
+
     def _work(self, context: Context) -> None:
         residency = Residency(context, self._plan.fragments, self._plan.options, self._memory)
+        self._residencies.append(residency)
         try:
             while not self._stop.is_set():
                 try:

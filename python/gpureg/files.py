@@ -4,12 +4,12 @@
 from __future__ import annotations
 
 import os
-from typing import Any, Union
+from typing import Any
 
 from . import _core
 from ._core import PointCloud
 
-Path = Union[str, "os.PathLike[str]"]
+Path = str | os.PathLike[str]
 
 
 def read_point_cloud(path: Path) -> PointCloud:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The fragments of a scene: found once, loaded when they are needed."""
+"""The fragments of a scene: listed once, loaded when they are needed."""
 
 from __future__ import annotations
 

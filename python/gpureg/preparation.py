@@ -5,13 +5,18 @@ in.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import time
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 from . import _core
-from ._arrays import core_cloud, several
+from ._arrays import CoreCloud, core_cloud, several
 from ._contexts import checked, context_of
 from ._core import Context, PreparedCloud, PrepareOptions
+from ._progress import Progress, Report, batch_progress
+
+_TOGETHER = 32  # clouds per call where progress is shown: enough to fill a device
+_PIECE_SECONDS = 0.4  # on the CPU
 
 
 def prepare(
@@ -43,7 +48,7 @@ def prepare(
         Sensor positions in the cloud's frame, towards which normals are turned where none are
         given, and from which free space was seen. Given normals that face away from all of them are
         turned round, unless more than an eighth do: then a UserWarning says so, as the viewpoints
-        are most likely in another frame, and speak against right poses. Default: the origin, or
+        are most likely in another frame, and count as evidence against correct poses. Default: the origin, or
         none where normals are given.
     options : PrepareOptions, optional
         Must suit the options of the alignment: see ``RegistrationOptions.prepare``.
@@ -81,6 +86,7 @@ def prepare_batch(
     *,
     options: PrepareOptions | None = None,
     context: Context | None = None,
+    progress: Progress = False,
 ) -> list[PreparedCloud]:
     """`prepare` for many clouds at once: the same results, and faster on a GPU.
 
@@ -90,6 +96,8 @@ def prepare_batch(
         Each whatever `prepare` takes as points.
     options, context
         As for `prepare`.
+    progress : bool or callable
+        True: a bar of tqdm, where installed. A callable gets (clouds done, clouds).
 
     Examples
     --------
@@ -100,14 +108,51 @@ def prepare_batch(
     """
     options = checked(options, PrepareOptions, "options") or PrepareOptions()
     context = context_of(context)
-    device = context.backend == "cuda"
-    inputs = [
-        core_cloud(cloud, None, None, None, options, f"clouds[{k}]", device)
-        for k, cloud in enumerate(several(clouds, "clouds"))
-    ]
-    return _core.prepare_batch(
-        context, inputs, options, [f"clouds[{k}]" for k in range(len(inputs))]
-    )
+    clouds = several(clouds, "clouds")
+    names = [f"clouds[{k}]" for k in range(len(clouds))]
+    with batch_progress(progress, "preparing", len(clouds), unit="cloud") as report:
+        return _prepare(clouds, names, options, context, report)
+
+
+def _prepare(
+    clouds: Sequence[Any],
+    names: Sequence[str],
+    options: PrepareOptions,
+    context: Context,
+    report: Report | None,
+) -> list[PreparedCloud]:
+    """At once, or where somebody looks on in pieces. Each cloud is read with its piece."""
+
+    def load(k: int) -> CoreCloud:
+        device = context.backend == "cuda"
+        return core_cloud(clouds[k], None, None, None, options, names[k], device)
+
+    if report is None:
+        return _core.prepare_batch(context, [load(k) for k in range(len(clouds))], options, names)
+    out: list[PreparedCloud] = []
+    report(0)
+    for piece in pieces(len(clouds), context):
+        out += _core.prepare_batch(
+            context, [load(k) for k in piece], options, [names[k] for k in piece]
+        )
+        report(len(out))
+    return out
+
+
+def pieces(count: int, context: Context, most: int = _TOGETHER) -> Iterator[range]:
+    """The numbers below count in pieces that take a fraction of a second each on the CPU; measures
+    the time between its pieces.
+    """
+    size = 1 if context.backend == "cpu" else most
+    begin = 0
+    while begin < count:
+        start = time.monotonic()
+        end = min(count, begin + size)
+        yield range(begin, end)
+        seconds = max(1e-6, time.monotonic() - start)
+        if context.backend == "cpu":
+            size = max(1, min(most, int(_PIECE_SECONDS * (end - begin) / seconds)))
+        begin = end
 
 
 def check_prepared(cloud: Any, name: str) -> None:
@@ -119,17 +164,14 @@ def check_prepared(cloud: Any, name: str) -> None:
 
 
 def prepared(
-    fragments: Sequence[Any], options: PrepareOptions, context: Context
+    fragments: Sequence[Any], options: PrepareOptions, context: Context, progress: bool
 ) -> list[PreparedCloud]:
     """Those that are not prepared yet, prepared together; a cloud's place stays its own."""
     raw = [k for k, cloud in enumerate(fragments) if not isinstance(cloud, PreparedCloud)]
-    device = context.backend == "cuda"
-    inputs = [
-        core_cloud(fragments[k], None, None, None, options, f"fragments[{k}]", device) for k in raw
-    ]
     clouds = list(fragments)
-    for k, cloud in zip(
-        raw, _core.prepare_batch(context, inputs, options, [f"fragments[{k}]" for k in raw])
-    ):
+    names = [f"fragments[{k}]" for k in raw]
+    with batch_progress(progress and bool(raw), "preparing", len(raw), unit="cloud") as report:
+        done = _prepare([fragments[k] for k in raw], names, options, context, report)
+    for k, cloud in zip(raw, done):
         clouds[k] = cloud
     return clouds

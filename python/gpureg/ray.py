@@ -23,7 +23,7 @@ except ImportError as error:
 
 from ._core import Context, RegistrationOptions
 from ._plan import Plan
-from ._progress import Progress, batch_progress
+from ._progress import Progress, Report, batch_progress
 from ._residency import Residency
 from ._store import Row, Store
 from .batch import CHUNK, MEMORY, BatchRun, conclude, make_plan, run_chunk
@@ -31,6 +31,20 @@ from .batch import CHUNK, MEMORY, BatchRun, conclude, make_plan, run_chunk
 # of one actor, before the run gives up: a chunk that kills whoever takes it shall not go on for
 # ever
 _DEATHS = 16
+_POLL = 0.2  # seconds between two looks at the progress of chunks under way
+
+
+class ProgressBoard:
+    """Where actors write how many pairs of their chunk are done."""
+
+    def __init__(self) -> None:
+        self._done: dict[int, int] = {}
+
+    def write(self, chunk: int, done: int) -> None:
+        self._done[chunk] = done
+
+    def read(self) -> dict[int, int]:
+        return self._done
 
 
 class ChunkWorker:
@@ -42,8 +56,18 @@ class ChunkWorker:
         )  # Ray shows an actor its own GPU as device 0
         self._plan, self._residency = plan, Residency(context, plan.fragments, plan.options, memory)
 
-    def run(self, chunk: int, known: dict[Any, Row]) -> tuple[int, list[Row]]:
-        return chunk, run_chunk(self._plan, chunk, self._residency, known)
+    def run(self, chunk: int, known: dict[Any, Row], board: Any = None) -> tuple[int, list[Row]]:
+        done, told = len(known), time.monotonic()
+
+        def add(row: Row) -> None:
+            nonlocal done, told
+            done += 1
+            now = time.monotonic()
+            if board is not None and now - told >= _POLL:
+                board.write.remote(chunk, done)
+                told = now
+
+        return chunk, run_chunk(self._plan, chunk, self._residency, known, add)
 
 
 def register_all(
@@ -69,7 +93,8 @@ def register_all(
     Parameters
     ----------
     fragments, pairs, output, options, progress, resume, chunk_size, memory
-        As for `gpureg.register_all`; memory is per actor. Folders must be where every machine finds
+        As for `gpureg.register_all`; memory is per actor. Progress counts pairs of unfinished chunks,
+        too; those are done again after the driver's death. Folders must be where every machine finds
         them under the same name; clouds in memory travel by Ray's object store.
     actors : int, optional
         Default: one per GPU of the cluster, or one per CPU.
@@ -99,21 +124,55 @@ def register_all(
         resumed = sum(len(plan.chunk(chunk)) for chunk in finished) + sum(map(len, known.values()))
         if known:
             workers = _start(plan, memory, actors, gpus)
-            done = sum(len(plan.chunk(chunk)) for chunk in finished)
-            with batch_progress(progress, "aligning", len(plan.pairs), done) as report:
-                pool = ActorPool(workers)
-                for chunk, rows in pool.map_unordered(
-                    lambda worker, task: worker.run.remote(*task), list(known.items())
-                ):
-                    store.write(chunk, rows)
-                    done += len(rows)
-                    if report is not None:
-                        report(done)
+            with batch_progress(progress, "aligning", len(plan.pairs), resumed) as report:
+                _run(plan, store, known, workers, report)
         return conclude(store, plan, resumed, begin)
     finally:
         for worker in workers:
             ray.kill(worker)
         store.close()
+
+
+def _run(
+    plan: Plan,
+    store: Store,
+    known: dict[int, dict[Any, Row]],
+    workers: list[Any],
+    report: Report | None,
+) -> None:
+    """All chunks that are left, each written as it comes back."""
+    board = None if report is None else ray.remote(ProgressBoard).options(num_cpus=0).remote()
+    pool = ActorPool(workers)
+    for task in known.items():
+        pool.submit(lambda worker, task: worker.run.remote(*task, board), task)
+    before = len(plan.pairs) - sum(len(plan.chunk(chunk)) for chunk in known)
+    done = {chunk: len(rows) for chunk, rows in known.items()}
+    try:
+        while pool.has_next():
+            try:
+                chunk, rows = pool.get_next_unordered(timeout=_POLL)
+                store.write(chunk, rows)
+                done[chunk] = len(rows)
+            except TimeoutError:
+                for chunk, count in _read(board).items():
+                    # A chunk that is tried again after its actor's death begins anew.
+                    done[chunk] = max(done[chunk], count)
+            if report is not None:
+                report(before + sum(done.values()))
+    finally:
+        if board is not None:
+            ray.kill(board)
+
+
+def _read(board: Any) -> dict[int, int]:
+    """Nothing where the board cannot be asked: a run does not fail for its progress."""
+    if board is None:
+        return {}
+    try:
+        found: dict[int, int] = ray.get(board.read.remote(), timeout=_POLL)
+        return found
+    except ray.exceptions.RayError:
+        return {}
 
 
 def _start(plan: Plan, memory: int, actors: int | None, gpus: bool | None) -> list[Any]:

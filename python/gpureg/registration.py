@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The door: any pairs of prepared clouds, and the easy way for two."""
+"""Alignment: any pairs of prepared clouds, and the short way for two."""
 
 from __future__ import annotations
 
@@ -175,7 +175,7 @@ def align_batch(
     options : RegistrationOptions, optional
     context : Context, optional
     progress : bool or callable
-        True: a bar of tqdm, where installed. A callable gets (pairs done, pairs) between chunks.
+        True: a bar of tqdm, where installed. A callable gets (pairs done, pairs) every few pairs.
 
     Returns
     -------
@@ -204,7 +204,7 @@ def align_batch(
     for k, prior in enumerate(known):
         if not isinstance(prior, RegistrationPrior):
             raise TypeError(f"priors[{k}]: expected a RegistrationPrior, got {prior!r}")
-    clouds = prepared(fragments, options.prepare, context)
+    clouds = prepared(fragments, options.prepare, context, progress is True)
     with batch_progress(progress, "aligning", len(entries)) as report:
         results, error = _core.align_batch(context, clouds, entries, options, report, known)
     if isinstance(error, KeyboardInterrupt):
@@ -226,7 +226,7 @@ def register(
     time_budget_ms: float | None = None,
     context: Context | None = None,
 ) -> RegistrationResult:
-    """Prepare two clouds and align them: the easy door.
+    """Prepare two clouds and align them.
 
     Parameters
     ----------

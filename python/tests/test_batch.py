@@ -198,6 +198,29 @@ def test_an_error_stops_the_run_and_keeps_the_rest(whole, tmp_path):
     assert list((tmp_path / "a" / "chunks").glob("*.parquet"))
 
 
+def test_progress_moves_within_a_chunk(tmp_path):
+    """One Parquet chunk holds all pairs."""
+    seen, begin = [], time.monotonic()
+    run = gpureg.register_all(
+        many.fragments()[:9],
+        output=tmp_path,
+        options=few(400_000, 0.08),
+        contexts=[gpureg.Context.cpu(1)],
+        progress=lambda done, total: seen.append(done),
+    )
+    seconds = time.monotonic() - begin
+    assert run.pairs == 36 and seen[0] == 0 and seen[-1] == 36 and seen == sorted(seen)
+    print(f"{len(set(seen))} distinct values in {seconds:.1f} s")
+    assert len(set(seen)) >= 5
+
+
+def test_a_bar_shows_what_is_under_way(tmp_path, capsys):
+    pytest.importorskip("tqdm")
+    gpureg.register_all(many.fragments()[:4], output=tmp_path, options=few(100, 0.08))
+    shown = capsys.readouterr().err
+    assert "6/6" in shown and "4 clouds prepared" in shown
+
+
 def test_another_run_is_refused(source, tmp_path):
     clouds = [source[:500], source[500:1000], source[1000:1500]]
     gpureg.register_all(clouds, output=tmp_path, options=few(100, 0.1), progress=False)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Agreement among pairs: what crosses into C++ and back."""
+"""Loop consistency among pairs: what crosses into C++ and back."""
 
 import pickle
 
@@ -28,30 +28,30 @@ def with_state(result, **changes):
     return copy
 
 
-def test_right_pairs_of_a_loop_rise_and_a_wrong_one_falls(loop):
+def test_correct_pairs_of_a_loop_rise_and_a_false_one_falls(loop):
     pairs, results = loop
     weak = [with_state(r, score=0.6, modes=[]) for r in results]
-    for before, after in zip(weak, gpureg.agreement(pairs, weak)):
+    for before, after in zip(weak, gpureg.loop_consistency(pairs, weak)):
         assert after.confidence > before.score and (after.mode, after.loops) == (0, 1)
-    wrong = weak[:2] + [with_state(weak[2], target_from_source=np.eye(4))]
-    assert gpureg.agreement(np.array(pairs), wrong)[2].confidence < 0.6
+    false = weak[:2] + [with_state(weak[2], target_from_source=np.eye(4))]
+    assert gpureg.loop_consistency(np.array(pairs), false)[2].confidence < 0.6
 
 
 def test_without_loops_scores_stay(loop):
     pairs, results = loop
-    agreed = gpureg.agreement(pairs[:2], results[:2])
-    assert [(a.confidence, a.loops) for a in agreed] == [(r.score, 0) for r in results[:2]]
-    assert gpureg.agreement([], []) == []
-    assert pickle.loads(pickle.dumps(agreed[0])) == agreed[0]
+    consistent = gpureg.loop_consistency(pairs[:2], results[:2])
+    assert [(p.confidence, p.loops) for p in consistent] == [(r.score, 0) for r in results[:2]]
+    assert gpureg.loop_consistency([], []) == []
+    assert pickle.loads(pickle.dumps(consistent[0])) == consistent[0]
 
 
 def test_options(loop):
     pairs, results = loop
     options = gpureg.LoopConsistencyOptions.from_voxel_size(0.1)
     assert options.closing_distance == pytest.approx(0.3)
-    assert len(gpureg.agreement(pairs, results, options=options)) == 3
-    with pytest.raises(gpureg.InvalidArgument, match="rounds is 0"):
-        gpureg.agreement(pairs, results, options=options.replace(rounds=0))
+    assert len(gpureg.loop_consistency(pairs, results, options=options)) == 3
+    with pytest.raises(gpureg.InvalidArgument, match="iterations is 0"):
+        gpureg.loop_consistency(pairs, results, options=options.replace(iterations=0))
     with pytest.raises(TypeError, match="LoopConsistencyOptions has no option 'shift'"):
         gpureg.LoopConsistencyOptions(shift=1)
 
@@ -59,10 +59,10 @@ def test_options(loop):
 def test_bad_input_is_named(loop):
     pairs, results = loop
     with pytest.raises(gpureg.InvalidArgument, match="results has 2 entries, but pairs has 3"):
-        gpureg.agreement(pairs, results[:2])
+        gpureg.loop_consistency(pairs, results[:2])
     with pytest.raises(gpureg.InvalidArgument, match=r"results\[1\].score is 2"):
-        gpureg.agreement(pairs, [results[0], with_state(results[1], score=2.0), results[2]])
+        gpureg.loop_consistency(pairs, [results[0], with_state(results[1], score=2.0), results[2]])
     with pytest.raises(TypeError, match=r"results\[0\]: expected a RegistrationResult, got 1"):
-        gpureg.agreement(pairs, [1, 2, 3])
+        gpureg.loop_consistency(pairs, [1, 2, 3])
     with pytest.raises(TypeError, match="options: expected LoopConsistencyOptions"):
-        gpureg.agreement(pairs, results, options=few())
+        gpureg.loop_consistency(pairs, results, options=few())

@@ -10,10 +10,12 @@ import pytest
 
 CLASSES = [
     gpureg.PrepareOptions,
-    gpureg.HypothesisOptions,
-    gpureg.ScoreOptions,
+    gpureg.CompatibilityOptions,
+    gpureg.QuadrupleOptions,
     gpureg.RefineOptions,
+    gpureg.EvidenceOptions,
     gpureg.RegistrationOptions,
+    gpureg.LoopConsistencyOptions,
 ]
 
 
@@ -22,8 +24,8 @@ def test_common_face(cls):
     options = cls()
     options.validate()
     assert eval(repr(options), vars(gpureg)) == options
-    for twin in (copy.copy(options), pickle.loads(pickle.dumps(options)), options.replace()):
-        assert twin == options and twin is not options
+    for other in (copy.copy(options), pickle.loads(pickle.dumps(options)), options.replace()):
+        assert other == options and other is not options
     with pytest.raises(TypeError, match=f"{cls.__name__} has no option 'voxel_sise'; it has "):
         cls(voxel_sise=1)
     with pytest.raises(TypeError, match="has no option 'x'"):
@@ -44,20 +46,20 @@ def test_common_face(cls):
         ),
         (gpureg.PrepareOptions, "voxel_size", True, "expected a number, got True"),
         (
-            gpureg.HypothesisOptions,
-            "proposal",
+            gpureg.RegistrationOptions,
+            "method",
             "luck",
-            "proposal: expected 'compatibility' or 'quadruples', got 'luck'",
+            "method: expected 'compatibility' or 'quadruples', got 'luck'",
         ),
         (
-            gpureg.HypothesisOptions,
+            gpureg.QuadrupleOptions,
             "count",
             -1,
             "count: expected a whole number from 0 to 4294967295, got -1",
         ),
-        (gpureg.HypothesisOptions, "count", 2.5, "whole number"),
-        (gpureg.HypothesisOptions, "seed", 2**64, "whole number from 0 to 18446744073709551615"),
-        (gpureg.HypothesisOptions, "mutual", "yes", "mutual: expected True or False, got 'yes'"),
+        (gpureg.QuadrupleOptions, "count", 2.5, "whole number"),
+        (gpureg.RegistrationOptions, "seed", 2**64, "whole number from 0 to 18446744073709551615"),
+        (gpureg.QuadrupleOptions, "mutual", "yes", "mutual: expected True or False, got 'yes'"),
         (
             gpureg.RegistrationOptions,
             "prepare",
@@ -218,19 +220,19 @@ def test_wrong_arguments_are_named_in_one_line(call, error, message):
 
 def test_numbers_are_as_written():
     assert gpureg.PrepareOptions(voxel_size=0.1).voxel_size == 0.1
-    assert gpureg.HypothesisOptions(seed=2**64 - 1).seed == 2**64 - 1
+    assert gpureg.RegistrationOptions(seed=2**64 - 1).seed == 2**64 - 1
     numpy = pytest.importorskip("numpy")
-    assert gpureg.HypothesisOptions(count=numpy.int32(7)).count == 7
+    assert gpureg.QuadrupleOptions(count=numpy.int32(7)).count == 7
     assert gpureg.PrepareOptions(voxel_size=numpy.float32(0.1)).voxel_size == 0.1
 
 
 def test_nested_options_are_the_same_object():
     options = gpureg.RegistrationOptions()
-    options.seed = 7
-    assert options.seed == 7
+    options.quadruples.count = 7
+    assert options.quadruples.count == 7
     assert options != gpureg.RegistrationOptions()
-    options.hypothesis = gpureg.HypothesisOptions(seed=9)
-    assert options.seed == 9
+    options.quadruples = gpureg.QuadrupleOptions(count=9)
+    assert options.quadruples.count == 9
 
 
 def test_presets():
@@ -239,6 +241,8 @@ def test_presets():
         options.prepare.normal_radius == 0.2 and options.prepare.max_correspondence_distance == 0.15
     )
     assert gpureg.RegistrationOptions.from_voxel_size(0.05) == gpureg.RegistrationOptions()
+    assert gpureg.RegistrationOptions().method == "compatibility"
+    assert gpureg.RegistrationOptions.loopsmart().method == "quadruples"
     assert gpureg.RegistrationOptions.loopsmart().refine.max_iterations == 0
     assert gpureg.RegistrationOptions.loopsmart(0.1).prepare.voxel_size == 0.1
 

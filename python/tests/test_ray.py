@@ -100,6 +100,18 @@ def test_either_goes_on_where_the_other_stopped(whole, tmp_path):
     assert run.resumed >= 50 and files_of(run) == files_of(whole)
 
 
+def test_progress_moves_within_a_chunk(tmp_path):
+    seen = []
+    gpureg.ray.register_all(
+        many.fragments()[:9],
+        output=tmp_path,
+        actors=1,
+        options=few(400_000, 0.08),
+        progress=lambda done, total: seen.append(done),
+    )
+    assert seen[-1] == 36 and seen == sorted(seen) and len(set(seen)) >= 4
+
+
 def test_errors_come_out(tmp_path):
     missing = gpureg.FragmentSet.from_clouds([[[0.0, 0, 0]], [[1.0, 2]]])
     with pytest.raises(ValueError, match=r"fragments\[1\]: expected shape \(N, 3\), got \(1, 2\)"):

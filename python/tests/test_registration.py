@@ -39,16 +39,16 @@ def test_register_finds_the_pose(source, target, truth):
     assert repr(result).startswith("<gpureg.RegistrationResult aligned, score ")
 
 
-def test_modes_say_what_speaks_for_them(source, target):
+def test_modes_carry_their_evidence(source, target):
     result = gpureg.register(source, target)
     assert len(result.modes) > 1
-    best, rival = result.modes[:2]
+    best, alternative = result.modes[:2]
     assert (
         np.array_equal(best.target_from_source, result.target_from_source)
         and best.confidence == result.score
     )
-    assert best.confidence >= rival.confidence and best.overlap_confidence <= best.confidence
-    assert best.evidence.match_support > rival.evidence.match_support
+    assert best.confidence >= alternative.confidence and best.overlap_confidence <= best.confidence
+    assert best.evidence.match_support > alternative.evidence.match_support
     assert len(
         best.evidence.information_eigenvalues
     ) == 6 and best.evidence.information_eigenvalues == sorted(
@@ -59,7 +59,7 @@ def test_modes_say_what_speaks_for_them(source, target):
         gpureg.prepare(source),
         gpureg.prepare(target),
         options=gpureg.RegistrationOptions(
-            hypothesis=gpureg.HypothesisOptions(proposal="quadruples", count=20000)
+            method="quadruples", quadruples=gpureg.QuadrupleOptions(count=20000)
         ),
     )
     assert paper.aligned and paper.modes == [] and paper.score == paper.inlier_ratio
@@ -129,9 +129,9 @@ def test_prepared_cloud_shows_what_it_holds(source):
 
 def test_results_travel(source, target):
     result = gpureg.register(source, target, quality=1)
-    for twin in (pickle.loads(pickle.dumps(result)), copy.deepcopy(result)):
-        assert bits(twin) == bits(result)
-        assert twin.timings == result.timings and twin.statistics == result.statistics
+    for other in (pickle.loads(pickle.dumps(result)), copy.deepcopy(result)):
+        assert bits(other) == bits(result)
+        assert other.timings == result.timings and other.statistics == result.statistics
     information = result.source_moments.information_redwood()
     assert information.shape == (6, 6) and np.array_equal(information, information.T)
     assert information[0, 0] == result.source_moments.count
@@ -149,6 +149,79 @@ def test_progress_counts_up(source):
         progress=lambda *a: seen.append(a),
     )
     assert seen[0] == (0, 20) and seen[-1] == (20, 20) and seen == sorted(seen) and len(seen) > 3
+
+
+def test_results_arrive_while_others_are_under_way(source):
+    context = gpureg.Context.cpu(1)
+    cloud = gpureg.prepare(source, context=context)
+    events = []
+    pairs = np.array([(0, 1), (1, 0)] * 10, np.uint32)
+    results, error = gpureg._core.align_batch(
+        context,
+        [cloud, cloud],
+        pairs,
+        few(500),
+        lambda done: events.append(("progress", done)),
+        on_result=lambda k, result: events.append((k, bits(result))),
+    )
+    assert error is None
+    assert [e for e in events if e[0] != "progress"] == [
+        (k, bits(result)) for k, result in enumerate(results)
+    ]
+    arrived = 0
+    for name, value in events:
+        if name == "progress":
+            assert value == arrived
+        else:
+            arrived += 1
+    whole = gpureg.align_batch([cloud, cloud], pairs, options=few(500), context=context)
+    assert [bits(result) for result in results] == [bits(result) for result in whole]
+
+
+def test_an_error_keeps_what_has_arrived(source):
+    context = gpureg.Context.cpu(1)
+    cloud = gpureg.prepare(source, context=context)
+
+    def fail(k, result):
+        if k == 3:
+            raise RuntimeError("enough")
+
+    results, error = gpureg._core.align_batch(
+        context, [cloud], np.zeros((500, 2), np.uint32), few(500), on_result=fail
+    )
+    done = sum(result.status != "skipped" for result in results)
+    assert str(error) == "enough" and 3 < done < 500
+
+
+@pytest.mark.parametrize("watched", [False, True])
+def test_a_batch_is_checked_before_its_first_pair(source, watched):
+    cloud = gpureg.prepare(source)
+    other = gpureg.prepare(source, options=gpureg.PrepareOptions(max_correspondence_distance=0.05))
+    seen = []
+    with pytest.raises(gpureg.InvalidArgument, match=r"clouds\[1\] was prepared with"):
+        gpureg.align_batch(
+            [cloud, other],
+            [(0, 0), (0, 1)],
+            progress=(lambda *a: seen.append(a)) if watched else False,
+        )
+    assert not seen
+
+
+def test_preparation_shows_its_progress(source, capsys):
+    clouds = [source[k::12] for k in range(12)]
+    seen = []
+    prepared = gpureg.prepare_batch(clouds, progress=lambda *a: seen.append(a))
+    assert seen[0] == (0, 12) and seen[-1] == (12, 12) and seen == sorted(seen) and len(seen) > 2
+    for one, other in zip(prepared, gpureg.prepare_batch(clouds)):
+        assert np.array_equal(one.points, other.points)
+        assert np.array_equal(one.features, other.features)
+    assert gpureg.prepare_batch([], progress=True) == []
+    with pytest.raises(ValueError, match=r"^clouds\[1\]: expected shape"):
+        gpureg.prepare_batch([source, source[:, :2]], progress=lambda *a: None)
+    pytest.importorskip("tqdm")
+    gpureg.align_batch([*prepared[:2], clouds[2]], [(0, 2)], options=few(100), progress=True)
+    shown = capsys.readouterr().err
+    assert "preparing" in shown and "1/1" in shown and "aligning" in shown
 
 
 def test_error_in_progress_comes_out(source):
@@ -198,7 +271,7 @@ def test_other_threads_run_during_a_call(source):
     assert sum(begin < t < end for t in ticks) >= min(5, (end - begin) / 0.1)
 
 
-def test_four_threads_get_right_results():
+def test_four_threads_get_correct_results():
     clouds = [room(seed, 3000) for seed in range(4)]
     poses = [pose(seed) for seed in range(4)]
     expected = [gpureg.register(c, moved(c, t), options=few(5000)) for c, t in zip(clouds, poses)]
@@ -233,6 +306,6 @@ def test_forked_child_works(source):
 
 
 def test_clouds_of_other_lengths_are_refused(source):
-    cloud = gpureg.prepare(source, options=gpureg.PrepareOptions(search_distance=0.05))
-    with pytest.raises(gpureg.InvalidArgument, match="search_distance"):
+    cloud = gpureg.prepare(source, options=gpureg.PrepareOptions(max_correspondence_distance=0.05))
+    with pytest.raises(gpureg.InvalidArgument, match="prepared with max_correspondence_distance"):
         gpureg.align(cloud, cloud)

@@ -115,7 +115,7 @@ def test_wrong_sequences_of_clouds_are_named(source):
     with pytest.raises(
         ValueError, match=r"^pairs\[0\] is \(-1, 0\), expected indices from 0 to 4294967295 \(shape"
     ):
-        gpureg.agreement([(-1, 0)], [])
+        gpureg.loop_consistency([(-1, 0)], [])
 
 
 def test_wrong_parts_of_a_cloud_are_named(source):
