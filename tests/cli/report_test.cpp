@@ -24,7 +24,7 @@ class Report : public ::testing::Test {
                    kSmall))
             .status,
         0);
-    // The truth: the scans of the room, each with each, and a lie about one pair.
+    // Ground truth: all pairs of the scans of the room, one of them false.
     std::vector<evaluation::LogEntry> log;
     std::vector<evaluation::InformationEntry> information;
     for (int i = 0; i < 5; ++i)
@@ -79,7 +79,7 @@ TEST_F(Report, WithTruthAndPictures) {
                       "<b class=\"wrong\">Wrong</b> &middot; fragment 4 onto 1"});
   EXPECT_EQ(occurrences(html, "data:image/png;base64,iVBORw0KGgo"),
             3u);  // two right ones, one wrong
-  // j - i > 1: six pairs of the room are judged, one of them against a lie.
+  // j - i > 1: six pairs of the room are evaluated, one of them against a false truth.
   EXPECT_EQ(occurrences(html, "<td>right</td>"), 5u);
   EXPECT_EQ(occurrences(html, "<td>wrong</td>"), 1u);
 }
