@@ -11,7 +11,7 @@
 
 namespace gpureg::cli {
 
-/// What the right half shows: a pose with its title, or the title alone.
+/// Right half of the picture: a pose with its title, or the title alone.
 struct PosedTitle {
   std::optional<Eigen::Isometry3d> target_from_source;
   std::string title;

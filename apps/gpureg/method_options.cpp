@@ -40,7 +40,7 @@ void MethodOptions::add_to(CLI::App& verb) {
       ->default_str(significant(static_cast<double>(voxel_size), 6))
       ->type_name("FLOAT or auto");
   verb.add_option("--preset", preset,
-                  "default: poses from compatible matches, judged by evidence; loopsmart: the "
+                  "default: poses from compatible matches, verified by evidence; loopsmart: the "
                   "paper's algorithm")
       ->check(CLI::IsMember({"default", "loopsmart"}))
       ->capture_default_str();

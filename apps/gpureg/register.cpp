@@ -101,7 +101,7 @@ Json document(const RegisterOptions& o, const RegistrationOptions& options, cons
 }
 
 int run(RegisterOptions o) {
-  o.method.registration();  // what is wrong with it shall be said before clouds are read
+  o.method.registration();  // reports bad options before the clouds are read
   if (o.time_budget && o.method.given("--quality"))
     throw InvalidArgument("--time-budget chooses the quality, give it or --quality");
   check_outputs({{"--json", o.json}, {"--overlay", o.overlay}, {"--image", o.image}},
