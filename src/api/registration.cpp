@@ -9,12 +9,13 @@
 #include "api/prior.hpp"
 #include "api/raw_cloud.hpp"
 #include "common/host_threads.hpp"
+#include "common/limits.hpp"
 #include "common/validate.hpp"
 
 namespace gpureg {
 namespace {
 
-/// A cloud that this context and these options can work with. name: for the message.
+/// Checks that context and options accept the cloud. name: for the message.
 const PreparedState* checked(const Context& context, const PreparedCloud& cloud,
                              const RegistrationOptions& options, const std::string& name) {
   if (!cloud.valid())
@@ -90,7 +91,7 @@ std::vector<PreparedCloud> prepare_batch(const Context& context,
     for (auto& state : Access::engine(context)->prepare(span_of(raw), options))
       out.push_back(Access::cloud(std::move(state)));
   } catch (const InvalidArgument&) {
-    // Stages see all clouds at once: alone the one that it is about says so again.
+    // Stages process all clouds at once; preparing each alone finds the one to name in the error.
     for (std::size_t k = 0; k < raw.size(); ++k)
       naming(k, [&] { return Access::engine(context)->prepare({&raw[k], 1}, options); });
     throw;
@@ -125,8 +126,8 @@ RegistrationResult align(const Context& context, const PreparedCloud& source,
   options.validate();
   const PreparedState& s = *checked(context, source, options, "source");
   const PreparedState& t = *checked(context, target, options, "target");
-  require(correspondences.size() <= 0x7fffffffu, "correspondences.size", correspondences.size(),
-          "at most 2^31 - 1");
+  require(correspondences.size() <= limits::kMaxPoints, "correspondences.size",
+          correspondences.size(), "at most 2^31 - 1");
   const bool swapped = swaps(s, t, options);
   std::vector<std::uint32_t> from, to;
   for (std::size_t k = 0; k < correspondences.size(); ++k) {
@@ -144,8 +145,8 @@ RegistrationResult align(const Context& context, const PreparedCloud& source,
   input.custom_target = span_of(to);
   PairOutcome outcome;
   if (correspondences.empty()) {
-    // Without any there is nothing to search, and the engine would take "none given" for "use the
-    // features".
+    // Without correspondences there is nothing to search, and the engine takes an empty list for
+    // "use the features".
     outcome.statistics.source_points = input.source->size;
     outcome.statistics.target_points = input.target->size;
     outcome.reason = RegistrationReason::no_usable_features;
@@ -178,8 +179,8 @@ std::vector<RegistrationResult> align_batch(const Context& context,
                                             const BatchCallbacks& callbacks) {
   options.validate();
   check_priors(priors, pairs.size(), options);
-  // Everything that can be wrong is looked at before the first pair runs: a long batch does not die
-  // of its last line.
+  // All arguments are checked before the first pair runs, so that no long batch fails at its last
+  // pair.
   std::vector<std::uint8_t> used(clouds.size(), 0);
   for (std::size_t p = 0; p < pairs.size(); ++p) {
     for (const std::uint32_t k : {pairs[p].source, pairs[p].target}) {
@@ -208,8 +209,8 @@ std::vector<RegistrationResult> align_batch(const Context& context,
       if (!priors.empty()) inputs.back().prior = prior_test(priors[p], s, t, swapped);
     }
     Access::engine(context)->align(span_of(inputs), options, {outcomes.data(), outcomes.size()});
-    // A result by evidence takes some 50 us, which counts where a device makes ten thousand in a
-    // second.
+    // A result by evidence takes about 50 us on the host, too much for one thread where a device
+    // makes ten thousand per second.
     const std::size_t workers =
         std::min<std::size_t>(Access::engine(context)->host_threads(), 1 + (end - begin) / 16);
     on_threads(workers, [&](std::size_t worker) {

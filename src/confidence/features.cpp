@@ -75,19 +75,18 @@ void add_free_space(const PoseEvidence& e, Setter& set) {
   set(Feature::log_violation_of_all, log_at_least(of_all.sum(), kMinViolationOfAll));
 }
 
-void add_surface_sides(const PoseEvidence& e, bool free_space, Regressand regressand,
-                       Setter& set) {
+void add_surface_sides(const PoseEvidence& e, bool free_space, Regressand regressand, Setter& set) {
   const Sides any_normal{e.source_overlap_any_normal, e.target_overlap_any_normal};
   // Share of the points within the distance whose normals agree: the same side of the surface.
-  const Sides agreement{share(e.source_overlap, any_normal.source),
-                        share(e.target_overlap, any_normal.target)};
+  const Sides normal_agreement{share(e.source_overlap, any_normal.source),
+                               share(e.target_overlap, any_normal.target)};
   const Sides near_surface{e.source_near_surface, e.target_near_surface};
   const Sides front_near{e.source_front_violation_near, e.target_front_violation_near};
   const bool verified = free_space && regressand == Regressand::confidence;
   set(Feature::log_front_violation_near,
       log_at_least(front_near.sum(), verified ? kMinVerifiedFrontViolation : kMinFrontViolation));
-  set(Feature::lower_normal_agreement, agreement.lower());
-  set(Feature::higher_normal_agreement, agreement.higher());
+  set(Feature::lower_normal_agreement, normal_agreement.lower());
+  set(Feature::higher_normal_agreement, normal_agreement.higher());
   set(Feature::higher_near_surface, near_surface.higher());
   set(Feature::lower_near_surface, near_surface.lower());
   if (free_space) return;  // it tells the rest
@@ -108,18 +107,37 @@ void add_surface_sides(const PoseEvidence& e, bool free_space, Regressand regres
   set(Feature::lower_behind_share, behind_share.lower());
 }
 
-constexpr const char* kNames[] = {
-    "log_match_support",       "log_match_inliers",       "log_lower_weighted_overlap",
-    "log_higher_weighted_overlap", "log_lower_overlap",   "log_first_eigenvalue",
-    "log_second_eigenvalue",   "information_volume",      "lower_observed",
-    "higher_observed",         "higher_violation_of_all", "lower_violation_of_all",
-    "higher_violation",        "lower_violation",         "log_higher_violation",
-    "lower_occluded",          "log_violation_of_all",    "log_front_violation_near",
-    "lower_normal_agreement",  "higher_normal_agreement", "higher_near_surface",
-    "lower_near_surface",      "log_front_violation_far", "higher_front_share",
-    "lower_front_share",       "log_behind_surface",      "higher_behind_share",
-    "lower_behind_share",      "log_odds",                "margin",
-    "distinct_share"};
+constexpr const char* kNames[] = {"log_match_support",
+                                  "log_match_inliers",
+                                  "log_lower_weighted_overlap",
+                                  "log_higher_weighted_overlap",
+                                  "log_lower_overlap",
+                                  "log_first_eigenvalue",
+                                  "log_second_eigenvalue",
+                                  "information_volume",
+                                  "lower_observed",
+                                  "higher_observed",
+                                  "higher_violation_of_all",
+                                  "lower_violation_of_all",
+                                  "higher_violation",
+                                  "lower_violation",
+                                  "log_higher_violation",
+                                  "lower_occluded",
+                                  "log_violation_of_all",
+                                  "log_front_violation_near",
+                                  "lower_normal_agreement",
+                                  "higher_normal_agreement",
+                                  "higher_near_surface",
+                                  "lower_near_surface",
+                                  "log_front_violation_far",
+                                  "higher_front_share",
+                                  "lower_front_share",
+                                  "log_behind_surface",
+                                  "higher_behind_share",
+                                  "lower_behind_share",
+                                  "log_odds",
+                                  "margin",
+                                  "distinct_share"};
 static_assert(std::size(kNames) == kFeatureCount, "a name for each feature");
 
 }  // namespace
@@ -142,8 +160,7 @@ Features features_of(const PoseEvidence& evidence, AvailableEvidence available,
   Setter set(features);
   add_overlap(evidence, set);
   if (available.free_space) add_free_space(evidence, set);
-  if (available.surface_sides)
-    add_surface_sides(evidence, available.free_space, regressand, set);
+  if (available.surface_sides) add_surface_sides(evidence, available.free_space, regressand, set);
   return features;
 }
 

@@ -8,11 +8,11 @@
 
 #include "gpureg/evidence.hpp"
 
-/// Features of the regressions that turn evidence into a confidence. Computed here and nowhere else:
-/// bench/accuracy/fit_confidence.py gets them from the library.
+/// Features of the regressions that turn evidence into a confidence. Computed here and nowhere
+/// else: bench/accuracy/fit_confidence.py gets them from the library.
 namespace gpureg::confidence {
 
-/// One number that a regression weighs. "Lower" and "higher" are over the two sides of a pair.
+/// Input of a regression. "Lower" and "higher" are over the two sides of a pair.
 enum class Feature : std::uint8_t {
   // Overlap and geometry; of every pair.
   log_match_support,

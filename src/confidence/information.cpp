@@ -9,11 +9,11 @@ namespace {
 /// Rotations count by the displacement that they cause at this distance: twenty voxels, a metre at
 /// the default voxel size.
 double unit_length(const PrepareOptions& options) {
-  const double voxel = options.voxel_size > 0 ? static_cast<double>(options.voxel_size)
-                                              : static_cast<double>(options.max_correspondence_distance) / 1.5;
+  const double voxel = options.voxel_size > 0
+                           ? static_cast<double>(options.voxel_size)
+                           : static_cast<double>(options.max_correspondence_distance) / 1.5;
   return 20.0 * voxel;
 }
-
 
 }  // namespace
 

@@ -7,12 +7,13 @@
 
 namespace gpureg::confidence {
 
-/// How well the inliers of a mode determine it: eigen-decomposition of the point-to-plane information
-/// about their centre, rotation before translation. Directions are in the fixed cloud's frame.
+/// How well the inliers of a mode determine it: eigen-decomposition of the point-to-plane
+/// information about their centre, rotation before translation. Directions are in the fixed cloud's
+/// frame.
 struct InformationSpectrum {
-  Eigen::Vector3d centre;                   ///< of the inliers, from the moved cloud's local origin
-  double unit;                              ///< length at which rotations count, see information.cpp
-  Eigen::Matrix<double, 6, 1> eigenvalues;  ///< ascending
+  Eigen::Vector3d centre;  ///< of the inliers, from the moved cloud's local origin
+  double unit;             ///< length at which rotations count, see information.cpp
+  Eigen::Matrix<double, 6, 1> eigenvalues;        ///< ascending
   Eigen::Matrix<double, 6, 1> weakest_direction;  ///< unit eigenvector of the first
 };
 
