@@ -18,13 +18,14 @@ int device_of(const void* pointer) {
 
 namespace {
 
-/// The cloud's own copy, rows tight: in memory that belongs to the engine, but written and given
-/// back in order of the caller's stream.
+/// Copy of a cloud with tight rows, in memory of the engine; written and freed in the order of the
+/// program's stream.
 class Adopted final : public AdoptedCloud {
  public:
   explicit Adopted(std::shared_ptr<DeviceMemory> memory) : memory_(std::move(memory)) {}
   ~Adopted() override {
-    // The rows go back in order of the engine's stream, which may never have come to read them.
+    // Frees the rows in the order of the engine's stream, after their event, as that stream may
+    // never have waited for them.
     if (event_) {
       cudaStreamWaitEvent(memory_->stream(), event_, 0);
       cudaEventDestroy(event_);
@@ -34,7 +35,7 @@ class Adopted final : public AdoptedCloud {
   void take(const RawCloud& cloud, cudaStream_t stream);
 
   int device() const { return memory_->device(); }
-  /// Tight rows on the device, complete once the event is past.
+  /// Tight rows on the device, complete once the event is reached.
   RawCloud raw{};
   cudaEvent_t event() const { return event_; }
 
@@ -100,8 +101,7 @@ void Adopted::take(const RawCloud& cloud, cudaStream_t stream) {
 
 }  // namespace
 
-// Not under the engine's lock: whoever hands a cloud over does not wait for the batch that is under
-// way.
+// Without the lock of the engine: the program must not wait for a running batch.
 std::shared_ptr<AdoptedCloud> CudaEngine::adopt(const RawCloud& cloud, void* stream) {
   const DeviceScope scope(device());
   check_place("cloud.points", cloud.points, device());
@@ -112,7 +112,7 @@ std::shared_ptr<AdoptedCloud> CudaEngine::adopt(const RawCloud& cloud, void* str
   return adopted;
 }
 
-// The stage finds the rows on the device and reads them where they are.
+// The preparation reads the rows on the device, without a copy.
 std::shared_ptr<PreparedState> CudaEngine::prepare_adopted(const AdoptedCloud& cloud,
                                                            const PrepareOptions& options) {
   const std::lock_guard<std::mutex> lock(mutex_);

@@ -8,7 +8,7 @@
 namespace gpureg::cuda {
 namespace {
 
-/// One array on its way into a cloud's own memory.
+/// One array to copy into the memory of a cloud.
 struct Part {
   const char* from;
   char* to;
@@ -29,7 +29,7 @@ __global__ void copy_parts(const Part* parts) {
   }
 }
 
-/// What is counted of a cloud.
+/// Counts of a cloud.
 struct Counts {
   std::uint32_t features;               // missing
   std::uint32_t extreme, extreme_wide;  // features that are too long for the tensor cores
@@ -58,7 +58,7 @@ __global__ void count(const std::uint32_t* offset, const Vec3* normals, const st
     atomicAdd(counts[c].normal_bin + threadIdx.x, bins[threadIdx.x]);
 }
 
-/// From bins to weights.
+/// Weights from the counts of the bins.
 __global__ void weight_by_normals(const std::uint32_t* offset, const Counts* counts,
                                   std::uint32_t* const* normal_weight) {
   __shared__ std::uint32_t weight[kNormalBins];
@@ -76,7 +76,7 @@ std::vector<T> copy_back(const CudaCloud& cloud, const T* device, std::size_t si
   std::vector<T> host(size);
   if (size > 0) {
     const DeviceScope scope(cloud.data.memory()->device());
-    // Finished data: any stream may read it, and this one waits for nobody else's work.
+    // Synchronised data: any stream may read it, and this stream waits for no other.
     cudaStream_t stream = nullptr;
     check(cudaStreamCreateWithFlags(&stream, cudaStreamNonBlocking), "cudaStreamCreateWithFlags");
     cudaError_t error =
@@ -127,7 +127,7 @@ std::vector<std::shared_ptr<CudaCloud>> assemble(
     cloud->block_count = closest.blocks.size(c);
     cloud->candidate_count = closest.candidate_offset[c + 1] - closest.candidate_offset[c];
 
-    // First the places, then the memory, then the pointers.
+    // First the offsets, then the memory, then the pointers.
     const std::size_t first_part = parts.size();
     std::size_t bytes = 0;
     const auto place = [&](const auto* from, std::size_t size) {
@@ -157,7 +157,7 @@ std::vector<std::shared_ptr<CudaCloud>> assemble(
     place(depth_maps.viewpoints.data() + map_begin, maps);
     const SurfaceSideGrid& box = surface_sides.boxes[c];
     place(surface_sides.words.data() + surface_sides.offset[c], box.words());
-    // And what is not copied but made there.
+    // Space for the arrays that are computed in place.
     const auto reserve = [&](std::size_t more) {
       const std::size_t at = bytes;
       bytes += (more + 255) / 256 * 256;
@@ -173,10 +173,10 @@ std::vector<std::shared_ptr<CudaCloud>> assemble(
     const auto aids = reserve_aids(cloud->feature_dimension, copy);
     const auto wide_aids =
         reserve_aids(has_wide ? wide_features.dimension[c] : 0, HalfCopy::turned);
-    const std::size_t balanced = reserve(n * sizeof(std::uint32_t));
+    const std::size_t weights = reserve(n * sizeof(std::uint32_t));
     const std::size_t copied = bytes;
     const ScoringLayout layout = scoring_layout(*cloud, closest.block_range[c]);
-    // Filled: tables begin empty, and what lies between the arrays is copied along with them.
+    // Filled: tables start empty, and gaps between the arrays are copied with them.
     cloud->data = exec.filled<char>(copied + layout.bytes, 0);
     for (std::size_t k = first_part; k < parts.size(); ++k)
       parts[k].to = cloud->data.data() + reinterpret_cast<std::size_t>(parts[k].to);
@@ -203,7 +203,7 @@ std::vector<std::shared_ptr<CudaCloud>> assemble(
     view.surface_sides = {
         box, box.words() > 0 ? reinterpret_cast<const std::uint32_t*>(part[12].to) : nullptr};
     char* const memory = cloud->data.data();
-    normal_weight.push_back(reinterpret_cast<std::uint32_t*>(memory + balanced));
+    normal_weight.push_back(reinterpret_cast<std::uint32_t*>(memory + weights));
     view.normal_weight = normal_weight.back();
     const auto measure = [&](FeatureAids& to, const FeatureAidsPlaces& at, HalfCopy copy_of,
                              const float* rows, const std::uint8_t* valid, std::uint32_t dimension,

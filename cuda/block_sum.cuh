@@ -5,8 +5,8 @@
 
 namespace gpureg::cuda {
 
-/// Sums of N integers over a thread block; the first warp has them afterwards in v. scratch:
-/// shared, N numbers per warp.
+/// Sums of N integers over a thread block; the first warp has them in v afterwards. scratch: shared
+/// memory, N integers per warp.
 template <int N>
 __device__ void block_sum(std::int64_t (&v)[N], std::int64_t* scratch) {
   const int warp = static_cast<int>(threadIdx.x / 32), warps = static_cast<int>(blockDim.x / 32);

@@ -6,22 +6,22 @@
 #include "packed_normal.cuh"
 #include "stage_data.hpp"
 
-/// What is known of a moved point before a single target point is looked at.
+/// Bounds on a moved point from the summary of its cell, without reading a target point.
 namespace gpureg::cuda {
 
-/// One pair as scoring reads it.
+/// One pair for scoring.
 struct ScorePair {
   CloudView source, target;
   ScoringOrder order;    ///< of the source
   CellSummaries cells;   ///< of the target
-  std::uint32_t limits;  ///< which of the two tables of limits holds
+  std::uint32_t limits;  ///< which of the two tables of limits applies
 };
 
 struct Limits {
   float none_below, all_above;
 };
 
-/// rotate() for bounds: fused, so its last bits are others.
+/// rotate() for bounds: fused, with other last bits.
 __device__ inline Vec3 rotate_fast(const Rigid& rigid, float4 n) {
   const auto row = [&](int k) {
     return fmaf(rigid.r[k + 2], n.z, fmaf(rigid.r[k + 1], n.y, rigid.r[k] * n.x));
@@ -29,12 +29,12 @@ __device__ inline Vec3 rotate_fast(const Rigid& rigid, float4 n) {
   return {row(0), row(3), row(6)};
 }
 
-/// Whether a source point may be an inlier, or certainly is one, by the summary of its cell. moved:
-/// its normal, zero where it has none.
+/// Tells, by the summary of its cell, whether a source point may be or definitely is an inlier.
+/// moved: its normal, zero without one.
 __device__ inline bool may_be_inlier(const Limits* limits, std::uint32_t word, Vec3 moved,
                                      bool has_normal, bool& certain) {
-  // Without a normal the cosine is 0, as normals_agree() has it for limits up to 90 degrees; beyond
-  // them nothing is certain.
+  // Without a normal the cosine is 0, as in normals_agree() for limits up to 90 degrees; for larger
+  // limits nothing is definite.
   const auto part = [&](int shift) {
     return static_cast<float>(static_cast<std::int32_t>(word << shift) >> 24);
   };
@@ -45,7 +45,7 @@ __device__ inline bool may_be_inlier(const Limits* limits, std::uint32_t word, V
   return word != 0 && cosine >= limit.none_below;
 }
 
-/// The same of a packed normal.
+/// The same for a packed normal.
 __device__ inline bool may_be_inlier(const Rigid& rigid, const Limits* limits, std::uint32_t word,
                                      std::uint32_t normal, bool& certain) {
   return may_be_inlier(limits, word,
@@ -59,10 +59,10 @@ struct ClosestCandidate {
   std::uint32_t normal, place;  ///< place: among the cloud's candidates
 };
 
-/// closest_candidate() on copies of the candidates that lie side by side. A list has at least one.
+/// closest_candidate() on contiguous copies of the candidates. A list has at least one.
 __device__ inline ClosestCandidate closest_in_list(const float4* candidate, std::uint32_t list,
                                                    Vec3 q) {
-  constexpr std::uint32_t kAtOnce = 4;  // each alone would wait for memory
+  constexpr std::uint32_t kAtOnce = 4;  // loads in flight hide the latency of memory
   ClosestCandidate best{3.402823466e38f, 0, kNoValue};
   std::uint32_t k = list >> 8;
   const std::uint32_t last = k + (list & 255u);
@@ -87,8 +87,8 @@ __device__ inline ClosestCandidate closest_in_list(const float4* candidate, std:
   return best;
 }
 
-/// Exact test of a moved source point whose closest target point is known. moved: its normal,
-/// error: how far off cosines with a packed one can be, index: where the point's index is.
+/// Exact test of a moved source point with a known closest target point. moved: its normal; error:
+/// largest error of cosines with a packed normal; index: where the index of the point is stored.
 __device__ inline bool agrees_with(const ScorePair& pair, const InlierTest& test,
                                    const Rigid& rigid, Vec3 moved, bool has_normal, float error,
                                    const std::uint32_t* index, const ClosestCandidate& closest) {
@@ -102,7 +102,7 @@ __device__ inline bool agrees_with(const ScorePair& pair, const InlierTest& test
                        test.min_cosine);
 }
 
-/// Exact test by search, for cells with more candidates than a list can tell.
+/// Exact test by search, for cells with more candidates than a list holds.
 static __device__ __noinline__ bool is_inlier_by_search(const ScorePair& pair,
                                                         const InlierTest& test, const Rigid& rigid,
                                                         Vec3 q, const std::uint32_t* index) {
@@ -112,7 +112,7 @@ static __device__ __noinline__ bool is_inlier_by_search(const ScorePair& pair,
                        test.min_cosine);
 }
 
-/// Exact test of a source point in a known cell. list: of the cell. A thread's work.
+/// Exact test of a source point in a known cell, by one thread. list: of the cell.
 __device__ inline bool is_inlier(const ScorePair& pair, const InlierTest& test, const Rigid& rigid,
                                  float4 p, std::uint32_t normal, const std::uint32_t* index,
                                  std::uint32_t list) {

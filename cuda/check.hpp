@@ -5,8 +5,8 @@
 
 namespace gpureg::cuda {
 
-/// Throws DeviceError that names what was tried, the device's answer and whether the context stays
-/// usable.
+/// Throws DeviceError with the failed operation, the message of the runtime, and whether the
+/// context stays usable.
 [[noreturn]] void throw_device_error(cudaError_t error, const char* what);
 
 inline void check(cudaError_t error, const char* what) {

@@ -10,8 +10,8 @@
 namespace gpureg::cuda {
 namespace {
 
-constexpr int kThreads = 128, kRows = 4;                // a thread's matches
-constexpr std::uint32_t kBlockRows = kThreads * kRows;  // a thread block's
+constexpr int kThreads = 128, kRows = 4;                // matches of a thread
+constexpr std::uint32_t kBlockRows = kThreads * kRows;  // matches of a thread block
 // matches in shared memory at a time
 constexpr std::uint32_t kTile = kThreads;
 // matches that a lane of find_slopes() holds
@@ -20,7 +20,10 @@ constexpr int kDegreeBits = 17;  // 0 to 2^16
 constexpr std::uint32_t kMaxDegree = (1u << kDegreeBits) - 1;
 constexpr int kStrengthBits = 24;  // 0 to 2^23, see seed_strength()
 constexpr std::uint32_t kMaxStrength = (1u << kStrengthBits) - 2;
-constexpr std::uint32_t kPadding = (2u << kStrengthBits) - 1;  // key after those of all matches
+constexpr std::uint32_t kPadding = (2u << kStrengthBits) - 1;  // greater than the key of any match
+static_assert(limits::kMaxMatches <= kMaxDegree, "keys hold every degree");
+static_assert(std::uint64_t(limits::kMaxMatches) << 17 >> kStrengthShift <= kMaxStrength,
+              "keys hold every strength, see seed_strength()");
 
 struct SeedBatch {
   MatchSetView matches;
@@ -32,9 +35,9 @@ struct SeedBatch {
   std::uint8_t* slope;
 };
 
-/// How many matches each is compatible with, itself included. Compatibility is mutual: a thread
-/// block compares one range of the matches (y) with another that does not come before (x), and
-/// counts for both. z: pair.
+/// Number of compatible matches of each match, itself included. Compatibility is symmetric: a
+/// thread block compares one range of the matches (y) with an equal or later range (x) and counts
+/// for both. z: pair.
 __global__ void __launch_bounds__(kThreads) count_compatible(SeedBatch b) {
   __shared__ PackedMatch tile[kTile];
   __shared__ std::uint32_t column_count[kTile];
@@ -87,7 +90,7 @@ __global__ void __launch_bounds__(kThreads) count_compatible(SeedBatch b) {
   }
 }
 
-/// Keys that sort by pair and then by degree, the greatest first.
+/// Keys that sort by pair, then by descending degree.
 __global__ void write_degree_keys(SeedBatch b, std::uint64_t* key, std::uint32_t* match) {
   const std::uint32_t p = blockIdx.y, n = b.count[p], room = b.room[p],
                       i = blockIdx.x * blockDim.x + threadIdx.x;
@@ -106,9 +109,9 @@ __global__ void rank_points(SeedBatch b, const std::uint32_t* match, float4* ran
                                  __uint_as_float(b.degree[at]));
 }
 
-/// Marks the matches that have one with more compatible matches near. Those with many are looked at
-/// first, and most matches have one of them near. A warp takes 32 matches of similar degree: each
-/// of its lanes holds others, all compare them with one of the 32 at a time.
+/// Marks the matches with a neighbour that has more compatible matches. Matches of high degree are
+/// compared first, as most matches have one of them near. A warp takes 32 matches of similar
+/// degree: each lane holds other matches, and all lanes compare them with one of the 32 at a time.
 __global__ void __launch_bounds__(kThreads)
     find_slopes(SeedBatch b, const float4* ranked, const std::uint32_t* match) {
   const std::uint32_t p = blockIdx.y, n = b.count[p], room = b.room[p], lane = threadIdx.x % 32;
@@ -116,7 +119,7 @@ __global__ void __launch_bounds__(kThreads)
   if (first >= n) return;
   const float4 own = ranked[room + min(k, n - 1)];
   unsigned open = __ballot_sync(~0u, k < n);
-  // Behind the warp's own no degree is greater.
+  // No degree is greater behind the matches of the warp.
   for (std::uint32_t base = 0; open != 0 && base < min(n, first + 32); base += 32 * kHeld) {
     float4 other[kHeld];
 #pragma unroll
@@ -139,8 +142,8 @@ __global__ void __launch_bounds__(kThreads)
   if (k < n && (open >> lane & 1) == 0) b.slope[room + match[room + k]] = 1;
 }
 
-/// Keys that sort by pair and then as seed_key() does, the best first; equals keep their order,
-/// which is that of the matches.
+/// Keys that sort by pair, then as seed_key() does, the best first; equal keys keep the order of
+/// the matches.
 __global__ void write_keys(SeedBatch b, std::uint64_t* key, std::uint32_t* match) {
   const std::uint32_t p = blockIdx.y, n = b.count[p], room = b.room[p],
                       i = blockIdx.x * blockDim.x + threadIdx.x;
@@ -176,14 +179,15 @@ Seeds choose_seeds(Exec& exec, const MatchSets& matches, const RegistrationOptio
   if (total == 0) return out;
   const auto degree = exec.filled<std::uint32_t>(total, 0);
   const auto slope = exec.filled<std::uint8_t>(total, 0);
-  const SeedBatch batch{
-      matches.view(),
-      matches.room.on_device.data(),
-      matches.count.data(),
-      test_of(options.compatibility),
-      options.compatibility.seed_separation * options.compatibility.seed_separation,
-      degree.data(),
-      slope.data()};
+  SeedBatch batch{};
+  batch.matches = matches.view();
+  batch.room = matches.room.on_device.data();
+  batch.count = matches.count.data();
+  batch.test = test_of(options.compatibility);
+  batch.squared_separation =
+      options.compatibility.seed_separation * options.compatibility.seed_separation;
+  batch.degree = degree.data();
+  batch.slope = slope.data();
   const unsigned ranges = blocks_for(largest, kBlockRows);
   count_compatible<<<dim3(ranges, ranges, pair_count), kThreads, 0, exec.stream()>>>(batch);
   check_launch("count_compatible");

@@ -9,7 +9,7 @@
 
 namespace gpureg::cuda {
 
-/// A pair with the tables by which both clouds are searched.
+/// A pair with the search tables of both clouds.
 struct SearchPair {
   CloudView source, target;
   CellSummaries source_cells, target_cells;
@@ -26,8 +26,8 @@ inline DeviceBuffer<SearchPair> upload_search_pairs(Exec& exec, Span<const PairV
   return exec.upload(out);
 }
 
-/// What find_closest() finds, with a table of bricks instead of a hash table, and on copies of the
-/// candidates that lie side by side.
+/// find_closest() with a table of bricks instead of a hash table, on contiguous copies of the
+/// candidates.
 __device__ inline Closest find_closest(const CloudView& cloud, const CellSummaries& cells, Vec3 q,
                                        float max_squared) {
   if (cells.nx == 0) return find_closest(cloud.closest, cloud.points, q, max_squared);

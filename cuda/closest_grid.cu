@@ -7,7 +7,7 @@
 namespace gpureg::cuda {
 namespace {
 
-/// Blocks that a query with this point in reach can fall into, numbered: corner k of `edge`^3.
+/// Blocks with a location within the search distance of a point: corner k of `edge`^3.
 __device__ bool reachable_block(const ClosestGeometry& g, Vec3 p, std::uint32_t corner,
                                 std::uint32_t edge, Cell& block) {
   const float inverse = 1.0f / block_edge(g), reach = point_reach(g);
@@ -54,8 +54,8 @@ ClosestGrids build_closest_grids(Exec& exec, const DownsampledClouds& clouds, co
   const Segments& points = clouds.segments;
   const std::size_t count = points.entries();
   ClosestGrids out;
-  // A reach is shorter than half a block unless the margin for rounding grows, in a cloud that is
-  // very wide for its search distance.
+  // The search distance is less than half a block unless the margin for rounding grows, in a cloud
+  // that is very wide for it.
   std::uint32_t edge = 2;
   for (const CloudFacts& facts : clouds.facts) {
     const ClosestGeometry g = closest_geometry(options.max_correspondence_distance, facts.radius);

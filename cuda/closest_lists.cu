@@ -23,7 +23,7 @@ struct Lists {
   const Vec3* points;
   std::uint32_t clouds;
   std::uint32_t* near_start;  // per block; first the counts
-  std::uint32_t* near;        // indices of the points that can matter to a block, ascending
+  std::uint32_t* near;  // indices of the points within the search distance of a block, ascending
   // per cell: place in the near list of the point nearest to its centre, or kNoValue
   std::uint32_t* nearest;
   std::uint32_t* cell_start;  // blocks x 513
@@ -64,7 +64,7 @@ __device__ void for_each_near(const GridView& grid, Vec3 center, float reach, Vi
   }
 }
 
-/// A warp per block counts the points that can matter to it.
+/// A warp per block counts the points within the search distance of the block.
 __global__ void count_near(Lists l, std::uint32_t blocks) {
   const std::uint32_t b = (blockIdx.x * blockDim.x + threadIdx.x) / 32;
   if (b >= blocks) return;
@@ -268,7 +268,8 @@ void fill_closest_lists(Exec& exec, const DownsampledClouds& clouds, const Grids
   exclusive_sum(exec, near_start.data(), near_start.data(), blocks + 1);
   const unsigned long long* near_total = exec.download(totals.data(), 1);
   exec.synchronize();
-  if (*near_total > 0x7fffffffu) pipeline::throw_too_dense(options.max_correspondence_distance);
+  if (*near_total > limits::kMaxPoints)
+    pipeline::throw_too_dense(options.max_correspondence_distance);
 
   const auto near = exec.buffer<std::uint32_t>(*near_total);
   const auto nearest = exec.buffer<std::uint32_t>(static_cast<std::size_t>(blocks) * kCells);
@@ -282,7 +283,7 @@ void fill_closest_lists(Exec& exec, const DownsampledClouds& clouds, const Grids
   const unsigned long long* sums = exec.download(totals.data(), 2 + count);
   exec.synchronize();
   for (std::size_t c = 0; c < count; ++c) {
-    if (sums[2 + c] > pipeline::kMaxCandidates || sums[1] > pipeline::kMaxBlockCandidates)
+    if (sums[2 + c] > limits::kMaxGridCandidates || sums[1] > limits::kMaxBlockCandidates)
       pipeline::throw_too_dense(options.max_correspondence_distance);
     out.candidate_offset[c + 1] = out.candidate_offset[c] + sums[2 + c];
   }

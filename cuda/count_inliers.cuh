@@ -4,14 +4,14 @@
 #include "bricks.cuh"
 #include "score_batch.cuh"
 
-/// How many inliers a hypothesis has: by one warp, which gives up as soon as it is not the best, or
-/// by a thread block.
+/// Counts the inliers of a hypothesis: by one warp, which stops once the hypothesis cannot be the
+/// best, or by a thread block.
 namespace gpureg::cuda {
 
 constexpr std::uint32_t kUnroll = 4;  ///< groups in flight per warp
 
-/// The source's points in groups of 32, the groups in the order in which hypotheses fail at them:
-/// in shared memory.
+/// Points of the source in groups of 32 in shared memory; groups at which hypotheses fail come
+/// first.
 struct PointsInShared {
   const float2* xy;
   const float* z;
@@ -23,7 +23,7 @@ struct PointsInShared {
   }
 };
 
-/// The same where they do not fit.
+/// The same in global memory, for clouds that exceed shared memory.
 struct PointsInGlobal {
   const float4* point;
   const std::uint32_t* order;
@@ -32,7 +32,7 @@ struct PointsInGlobal {
   }
 };
 
-/// What all hypotheses of a slice read.
+/// Data shared by the hypotheses of a slice.
 template <typename Points>
 struct Staged {
   Points points;
@@ -40,15 +40,15 @@ struct Staged {
   const std::uint32_t* bricks;
 };
 
-/// A warp's own shared memory.
+/// Shared memory of a warp.
 struct WarpMemory {
   std::uint32_t agreeing[64];  ///< codes that agree with each class of normals
   alignas(16) Rigid rigid;     ///< the hypothesis
   alignas(16) BrickMotion motion;
 };
 
-/// Groups [begin, begin + N): how many of this lane's points may be inliers, by the code of their
-/// cell.
+/// Groups [begin, begin + N): number of points of this lane that may be inliers, by the code of
+/// their cell.
 template <std::uint32_t N, typename Points>
 __device__ std::uint32_t count_possible(const BrickMotion& motion, const Staged<Points>& staged,
                                         const WarpMemory& memory, std::uint32_t begin) {
@@ -70,15 +70,15 @@ __device__ std::uint32_t count_possible(const BrickMotion& motion, const Staged<
   return possible;
 }
 
-/// A point to decide, and what is known of its cell.
+/// An undecided point and the summary of its cell.
 struct Look {
   float4 point, normal;
   uint2 summary;
-  bool counted;  ///< by its cell's code
+  bool counted;  ///< already, by the code of its cell
   __device__ bool has_normal() const { return normal.w != 0.0f; }
 };
 
-/// With the point there, asks for its cell's summary.
+/// Requests the summary of the cell of a loaded point.
 template <typename Points>
 __device__ void finish_look(const ScorePair& pair, const Staged<Points>& staged,
                             const WarpMemory& memory, Look& look) {
@@ -100,10 +100,10 @@ __device__ Look begin_look(const ScorePair& pair, const Staged<Points>& staged,
   return look;
 }
 
-/// Exact number of inliers, or 0 as soon as it cannot reach the most seen so far: such a hypothesis
-/// is not the best one. First every point is bounded by its cell's code; then those that may be
-/// inliers are looked at, where hypotheses are refuted most often first, by their cell's summary
-/// and then by their closest point. A warp's work.
+/// Exact number of inliers, or 0 as soon as it cannot reach the largest number so far; such a
+/// hypothesis is not the best one. By one warp. The codes of the cells bound every point first.
+/// Possible inliers are then tested in the order of how often they refute hypotheses, by the
+/// summary of their cell and then by their closest point.
 template <typename Points>
 __device__ std::uint32_t count_inliers(const ScoreBatch& b, const ScorePair& pair,
                                        const Limits* limits, const Staged<Points>& staged,
@@ -135,7 +135,7 @@ __device__ std::uint32_t count_inliers(const ScoreBatch& b, const ScorePair& pai
   }
   for (; g < groups; ++g) possible += warp_sum(count_possible<1>(motion, staged, memory, g));
 
-  // Loads of the next points are under way while these are decided.
+  // Loads the next points while these are decided.
   const std::uint32_t end = groups * 32;
   Look next = begin_look(pair, staged, memory, look, lane);
   for (std::uint32_t k = lane; k < end; k += 32) {
@@ -167,8 +167,8 @@ __device__ std::uint32_t count_inliers(const ScoreBatch& b, const ScorePair& pai
   return possible < needed ? 0 : possible;
 }
 
-/// How many points may be inliers, by the codes of their cells: by a whole thread block, all
-/// threads of which get it. agreeing: 64 words of shared memory.
+/// Number of possible inliers by the codes of their cells, by a thread block; all threads get it.
+/// agreeing: 64 words of shared memory.
 __device__ inline std::uint32_t count_possible_by_block(const ScoreBatch& b, const ScorePair& pair,
                                                         const Pose<float>& pose,
                                                         std::uint32_t* agreeing) {
@@ -197,7 +197,7 @@ __device__ inline std::uint32_t count_possible_by_block(const ScoreBatch& b, con
   return possible;
 }
 
-/// Exact number of inliers by a whole thread block: the paper's way, one block per hypothesis and a
+/// Exact number of inliers by a thread block, as in LoopSmart: one block per hypothesis and a
 /// parallel reduction. All threads get it.
 __device__ inline std::uint32_t count_by_block(const ScoreBatch& b, const ScorePair& pair,
                                                const Limits* limits, const Pose<float>& pose) {

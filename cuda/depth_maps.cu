@@ -8,8 +8,7 @@
 namespace gpureg::cuda {
 namespace {
 
-/// Maps that are made at a time: their 32-bit cells, which atomics need, take a quarter of a
-/// megabyte each.
+/// Maps per pass: the atomics need 32-bit cells, a quarter of a megabyte per map.
 constexpr std::uint32_t kMapsAtOnce = 1024;
 
 struct MapBatch {
@@ -35,7 +34,7 @@ __global__ void draw_points(MapBatch m) {
     if (!all_finite(d) || is_zero(d)) continue;
     const MapRay ray = map_ray(d);
     const std::uint32_t depth = map_depth(ray.depth, m.inverse_step);
-    // What is seen here is old at worst, and greater than what there is now.
+    // A stale value is only ever greater than the current one.
     if (depth < nearest[ray.cell]) atomicMin(nearest + ray.cell, depth);
   }
 }
@@ -76,16 +75,17 @@ DepthMaps build_depth_maps(Exec& exec, Span<const RawCloud> raw, const Downsampl
   const auto cloud_on_device = exec.upload(cloud_of_map);
   for (std::uint32_t first = 0; first < maps; first += kMapsAtOnce) {
     const std::uint32_t count = std::min(kMapsAtOnce, maps - first);
-    // All bits set: beyond every depth, and unknown once it is cut to 16 bits.
+    // All bits set: greater than every depth, and unknown when cut to 16 bits.
     const auto nearest = exec.filled<std::uint32_t>(std::size_t(count) * kMapCells, 0xff);
-    const MapBatch batch{clouds.raw.segments.on_device.data(),
-                         clouds.raw.slots.data(),
-                         cloud_on_device.data(),
-                         out.viewpoints.data(),
-                         first,
-                         1.0f / out.step,
-                         nearest.data(),
-                         out.depth.data()};
+    MapBatch batch{};
+    batch.offset = clouds.raw.segments.on_device.data();
+    batch.slots = clouds.raw.slots.data();
+    batch.cloud = cloud_on_device.data();
+    batch.viewpoints = out.viewpoints.data();
+    batch.first = first;
+    batch.inverse_step = 1.0f / out.step;
+    batch.nearest = nearest.data();
+    batch.depth = out.depth.data();
     draw_points<<<dim3(std::max(1u, std::min(blocks_for(clouds.raw.segments.largest, 256), 64u)),
                        count),
                   256, 0, exec.stream()>>>(batch);

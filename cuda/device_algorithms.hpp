@@ -3,7 +3,7 @@
 
 #include "exec.hpp"
 
-/// CUB's device-wide algorithms behind functions, so that they are compiled once.
+/// Wrappers of the device-wide algorithms of CUB, compiled once.
 namespace gpureg::cuda {
 
 /// Stable sort of (key, value) pairs by the lowest `bits` bits of the key. The buffers may be
@@ -12,7 +12,7 @@ void sort_pairs(Exec& exec, DeviceBuffer<std::uint32_t>& keys, DeviceBuffer<std:
                 int bits);
 void sort_pairs(Exec& exec, DeviceBuffer<std::uint64_t>& keys, DeviceBuffer<std::uint32_t>& values,
                 int bits);
-/// The same for the items [begin, end) only.
+/// The same for the elements [begin, end) only.
 void sort_pairs_in_place(Exec& exec, std::uint64_t* keys, std::uint32_t* values, std::size_t size,
                          int bits);
 

@@ -8,7 +8,7 @@
 namespace gpureg {
 namespace {
 
-/// Says what is there, or why nothing is.
+/// Describes the devices, or the reason why there is none.
 int device_count(std::string& why_none) {
   int count = 0;
   const cudaError_t error = cudaGetDeviceCount(&count);

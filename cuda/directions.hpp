@@ -8,18 +8,18 @@
 #include "algorithm/cell_summary.hpp"
 #include "math/rigid.hpp"
 
-/// A coarse alphabet of directions, so that "may a point with this normal agree with a cell?" is
-/// one bit. A normal belongs to one of 62 classes. A cell's code has four bits: 0 where it has no
-/// candidate, 1 to 14 for a direction that none of its candidates' normals strays from by more than
-/// kReachDegrees, 15 where there is no such direction. Per hypothesis and class a word says which
-/// codes may agree. Bounds only: no result depends on them.
+/// A coarse quantisation of directions: one bit tells whether a point with some normal may agree
+/// with a cell. A normal belongs to one of 62 classes. The code of a cell has four bits: 0 without
+/// candidates; 1 to 14 for a direction within kReachDegrees of the normals of all its candidates;
+/// 15 where there is no such direction. Per hypothesis and class a word holds the codes that may
+/// agree. Bounds only: no result depends on them.
 namespace gpureg::cuda {
 
 constexpr int kCellDirections = 14;
 constexpr std::uint32_t kClasses = 62;
-/// strays too far from every class: agrees with everything
+/// Too far from every class: agrees with every code.
 constexpr std::uint32_t kClassAny = 62;
-/// no normal: agrees with nothing, unless normals are not tested
+/// No normal: agrees with no code, unless normals are not tested.
 constexpr std::uint32_t kClassNone = 63;
 constexpr std::uint32_t kCodeAny = 15;
 constexpr float kReachDegrees = 40.0f;
@@ -33,7 +33,7 @@ struct DirectionTables {
   float reach_cosine;  ///< of kReachDegrees
 };
 
-/// When a class may agree with a direction.
+/// Condition for a class to agree with a direction.
 struct CodeTest {
   float min_cosine;  ///< between the two
   bool normals;      ///< false: normals are not tested
@@ -81,7 +81,7 @@ GPUREG_HD std::uint32_t class_of_normal(const DirectionTables& t, Vec3 n) {
 }
 
 /// Code of a cell with at least one candidate. Candidates without a normal never agree, so they do
-/// not widen the bound; where normals are not tested, every code but 0 passes.
+/// not widen the bound; without a normal test every code but 0 passes.
 GPUREG_HD std::uint32_t code_of_cell(const DirectionTables& t, Span<const std::uint32_t> candidates,
                                      const Vec3* normals) {
   Vec3 sum{0, 0, 0};
@@ -100,8 +100,8 @@ GPUREG_HD std::uint32_t code_of_cell(const DirectionTables& t, Span<const std::u
   return best + 1;
 }
 
-/// The codes that a class may agree with under one rotation: bit c for code c, and the same again
-/// above, as a funnel shift takes five bits.
+/// Codes that may agree with a class under one rotation: bit c for code c, repeated in the upper
+/// half, because a funnel shift takes five bits.
 GPUREG_HD std::uint32_t agreeing_codes(const DirectionTables& t, const CodeTest& test,
                                        const Rigid& rigid, std::uint32_t k) {
   std::uint32_t codes = 1u << kCodeAny;

@@ -11,8 +11,8 @@
 namespace gpureg::cuda {
 namespace {
 
-/// Floats as integers of the same order, for atomicMin and atomicMax. -0 comes before 0, which
-/// local_origin does not tell apart.
+/// Floats as integers of the same order, for atomicMin and atomicMax. -0 sorts before 0;
+/// local_origin treats them alike.
 __host__ __device__ std::int32_t ordered(std::int32_t bits) {
   return bits ^ ((bits >> 31) & 0x7fffffff);
 }
@@ -65,7 +65,7 @@ __global__ void measure_radius(const std::uint32_t* offset, const RawSlot* slots
   if (threadIdx.x % 32 == 0 && largest > 0) atomicMax(&extents[c].largest_squared_norm, largest);
 }
 
-/// Voxel of a raw point, or its number where nothing is downsampled.
+/// Voxel of a raw point, or its index without downsampling.
 struct VoxelOf {
   const RawSlot* slots;
   float inverse;  // 0: no downsampling
@@ -124,7 +124,7 @@ __global__ void average(Average a) {
       out[d] = mean * inverse_count;
     }
   }
-  // Threads without a voxel take part: the reduction is the whole warp's.
+  // Threads without a voxel take part in the reduction over the warp.
   largest = warp_max(largest);
   if (threadIdx.x % 32 == 0 && largest > 0) atomicMax(a.largest_squared_norm + c, largest);
 }
@@ -135,7 +135,7 @@ float from_bits(std::uint32_t bits) {
   return v;
 }
 
-/// Rows that an engine has taken out of device memory, see adopt.cu: tight already.
+/// Rows in device memory, see adopt.cu: already tight.
 bool on_device(const RawCloud& raw) {
   cudaPointerAttributes attributes{};
   const bool known = raw.points && cudaPointerGetAttributes(&attributes, raw.points) == cudaSuccess;
@@ -143,7 +143,7 @@ bool on_device(const RawCloud& raw) {
   return known && attributes.type == cudaMemoryTypeDevice;
 }
 
-/// All raw clouds of host memory in one buffer; those of device memory where they are.
+/// Uploads the raw clouds of host memory into one buffer; clouds in device memory stay in place.
 DeviceBuffer<float> upload_raw(Exec& exec, Span<const RawCloud> clouds,
                                std::vector<RawSlot>& slots) {
   const auto floats = [](const RawCloud& raw) {
@@ -205,12 +205,17 @@ CloudFacts facts_of(const RawCloud& raw, const Extent& extent, const PrepareOpti
   return facts;
 }
 
-/// Voxels of a box. Where it is too wide the radius check will say so; until then the range only
-/// must not overflow.
+/// Voxel range of a box. A box that is too wide fails the check of the radius later; until then the
+/// range only must not overflow.
 CellRange voxel_range(const CloudFacts& facts, std::size_t raw_size, float voxel_size) {
   if (!(voxel_size > 0))
-    return {{0, 0, 0}, {0xfffff, static_cast<std::int32_t>(raw_size >> 20), 0}};
-  const auto clamped = [](float v) { return std::max(-1048576.0f, std::min(1048575.0f, v)); };
+    return {
+        {0, 0, 0},
+        {limits::kMaxCells - 1, static_cast<std::int32_t>(raw_size >> (limits::kCellBits - 1)), 0}};
+  const auto clamped = [](float v) {
+    return std::max(-static_cast<float>(limits::kMaxCells),
+                    std::min(static_cast<float>(limits::kMaxCells - 1), v));
+  };
   const float inverse = 1.0f / voxel_size;
   const auto cell = [&](Vec3 p) {
     return Cell{floor_to_int(clamped(p.x * inverse)), floor_to_int(clamped(p.y * inverse)),
@@ -281,15 +286,24 @@ DownsampledClouds downsample(Exec& exec, Span<const RawCloud> clouds,
   const auto largest = exec.filled<std::uint32_t>(clouds.size, 0);
   const dim3 voxel_grid(std::max(1u, blocks_for(out.segments.largest, 128)),
                         static_cast<unsigned>(clouds.size));
-  average<<<voxel_grid, 128, 0, exec.stream()>>>(Average{
-      raw.on_device.data(), out.segments.on_device.data(), slots_on_device.data(), extents.data(),
-      voxels.item.data(), voxels.start.data(), feature_offset_on_device.data(), out.points.data(),
-      out.guides.data(), out.features.data(), largest.data()});
+  Average batch{};
+  batch.raw_offset = raw.on_device.data();
+  batch.offset = out.segments.on_device.data();
+  batch.slots = slots_on_device.data();
+  batch.extents = extents.data();
+  batch.item = voxels.item.data();
+  batch.start = voxels.start.data();
+  batch.feature_offset = feature_offset_on_device.data();
+  batch.points = out.points.data();
+  batch.guides = out.guides.data();
+  batch.features = out.features.data();
+  batch.largest_squared_norm = largest.data();
+  average<<<voxel_grid, 128, 0, exec.stream()>>>(batch);
   check_launch("average");
   const std::uint32_t* radii = exec.download(largest.data(), clouds.size);
   exec.synchronize();
   for (std::size_t c = 0; c < clouds.size; ++c)
-    out.facts[c].radius = radii[c] > 0 ? sqrtf(from_bits(radii[c])) * 1.0001f : 1.0f;
+    out.facts[c].radius = radii[c] > 0 ? sqrtf(from_bits(radii[c])) * kRadiusMargin : 1.0f;
   if (options.depth_maps > 0)
     out.raw = {std::move(raw_data), std::move(raw), std::move(slots_on_device)};
   return out;

@@ -16,21 +16,19 @@
 namespace gpureg::cuda {
 namespace {
 
-/// Raw points that are prepared together: enough to fill the device, few enough for its memory and
+/// Raw points per chunk of a preparation: enough to fill the device, few enough for its memory and
 /// for page-locked staging.
 constexpr std::size_t kRawPointsPerChunk = std::size_t(1) << 22;
 constexpr std::size_t kCloudsPerChunk = 256;
 constexpr std::size_t kPairsPerChunk = 512;
-/// For one bit per hypothesis of every pair of a chunk.
+/// Memory for one bit per hypothesis of every pair of a chunk.
 constexpr std::size_t kSampleBytes = std::size_t(256) << 20;
-/// For what every seed is compatible with, and for the matches, of every pair of a chunk.
+/// Memory for the neighbourhoods of the seeds, and for the matches, of every pair of a chunk.
 constexpr std::size_t kNeighborhoodBytes = std::size_t(1) << 30;
-/// What a fragment takes, about, for each raw point: with a budget no chunk is prepared that is far
-/// beyond it.
+/// Approximate memory of a prepared cloud per raw point: with a budget no chunk exceeds it by far.
 constexpr std::size_t kBytesPerRawPoint = 128;
 
-/// Clouds of one engine go with any other: the memory that they say they live in is that of all
-/// devices.
+/// Clouds of all CUDA engines are compatible: they share one owner, the memory of all devices.
 const char kDeviceMemory = 0;
 
 }  // namespace
@@ -53,12 +51,15 @@ std::vector<DeviceMemoryUse> CudaEngine::device_memory() const {
            residence_.evictions()}};
 }
 
+// Memory of a pair: a bit per hypothesis, rounded up to chunks; a bit per seed and match, a pose
+// and its evidence per seed, and the columns and keys of each match.
 std::size_t CudaEngine::pairs_per_chunk(const RegistrationOptions& options) const {
-  std::size_t fit = kSampleBytes / (options.quadruples.count / 8 + 4096);
+  constexpr std::size_t kChunkBytes = 4096, kSeedBytes = 128, kMatchBytes = 96;
+  std::size_t fit = kSampleBytes / (options.quadruples.count / 8 + kChunkBytes);
   if (options.method == RegistrationMethod::compatibility) {
     const CompatibilityOptions& c = options.compatibility;
-    fit = kNeighborhoodBytes /
-          (std::size_t(c.seeds) * (c.max_matches / 8 + 128) + std::size_t(c.max_matches) * 96);
+    fit = kNeighborhoodBytes / (std::size_t(c.seeds) * (c.max_matches / 8 + kSeedBytes) +
+                                std::size_t(c.max_matches) * kMatchBytes);
   }
   return fit < 1 ? 1 : (fit < kPairsPerChunk ? fit : kPairsPerChunk);
 }
@@ -105,7 +106,7 @@ void CudaEngine::for_resident_pairs(Span<const PairInput> pairs, const Work& wor
   const DeviceScope scope(device());
   const std::size_t budget = residence_.budget();
   for (std::size_t begin = 0, end; begin < pairs.size; begin = end) {
-    // As many pairs as have their clouds within the budget, but one at least.
+    // As many pairs as keep their clouds within the budget, but at least one.
     std::vector<const Fragment*> fragments;
     std::unordered_map<const PreparedState*, std::size_t> place;
     std::size_t bytes = 0;

@@ -6,7 +6,7 @@
 
 namespace gpureg::cuda {
 
-/// The backend on one device. Clouds of any CUDA engine go with any other.
+/// Backend on one device. Clouds of all CUDA engines are compatible.
 class CudaEngine final : public DeviceEngine {
  public:
   CudaEngine(int device, std::size_t memory_budget);
@@ -44,17 +44,17 @@ class CudaEngine final : public DeviceEngine {
   std::string description_;
 };
 
-/// Spreads batches over several devices, an engine and a thread for each. devices: two at least;
-/// one may be named twice.
+/// Distributes batches over several devices, with an engine and a thread for each. devices: at
+/// least two; one may be repeated.
 std::shared_ptr<Engine> make_engine_of_many(const std::vector<int>& devices,
                                             std::size_t memory_budget);
 
-/// Device that a pointer's memory is on; -1: not device memory.
+/// Device of the memory of a pointer; -1: not device memory.
 int device_of(const void* pointer);
-/// Device that prepares a cloud: that which has it.
+/// Device that prepares an adopted cloud: the one that holds it.
 int device_of(const AdoptedCloud& cloud);
 
-/// In words, from what the runtime and the driver answer.
+/// Describes the devices by the status of the runtime and the driver.
 std::string why_no_device(cudaError_t error, int driver, int runtime);
 
 }  // namespace gpureg::cuda

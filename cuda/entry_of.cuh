@@ -5,8 +5,7 @@
 
 namespace gpureg::cuda {
 
-/// The entry of a batch that item i belongs to; offset has entries + 1 numbers, i is below the
-/// last.
+/// Entry of a batch that element i belongs to; offset has entries + 1 numbers, i is below the last.
 __device__ inline std::uint32_t entry_of(const std::uint32_t* offset, std::uint32_t entries,
                                          std::uint32_t i) {
   std::uint32_t lo = 0, hi = entries;
@@ -17,9 +16,9 @@ __device__ inline std::uint32_t entry_of(const std::uint32_t* offset, std::uint3
   return lo;
 }
 
-/// The same for the items of a thread block in a row: one thread searches, the others walk on from
-/// there. All threads of the block call it; i is the thread's item, and may be beyond the last.
-/// first: of the block, below the last.
+/// The same for the consecutive elements of a thread block: one thread searches, the others step on
+/// from its result. All threads of the block call it; i is the element of the thread and may be
+/// beyond the last. first: first element of the block, below the last.
 __device__ inline std::uint32_t entry_in_block(const std::uint32_t* offset, std::uint32_t entries,
                                                std::uint32_t first, std::uint32_t i) {
   __shared__ std::uint32_t found;

@@ -14,8 +14,8 @@
 
 namespace gpureg::cuda {
 
-/// Stream, memory and clock of the CUDA backend. Stages enqueue work on the stream; nothing of
-/// theirs runs on the default stream.
+/// Stream, memory and clock of the CUDA backend. Stages enqueue work on this stream, never on the
+/// default stream.
 class Exec {
  public:
   explicit Exec(int device);
@@ -28,15 +28,15 @@ class Exec {
   const std::shared_ptr<DeviceMemory>& memory() const { return memory_; }
   int multiprocessors() const { return multiprocessors_; }
   int compute_capability() const { return compute_capability_; }  ///< 90 for 9.0
-  /// Host threads that may share the host's work on a batch. More than eight wait for memory.
+  /// Number of host threads for the work on a batch; more than eight saturate the memory.
   unsigned host_threads() const { return std::clamp(std::thread::hardware_concurrency(), 1u, 8u); }
   std::size_t shared_bytes_per_block() const { return shared_bytes_per_block_; }
 
-  /// Begins a call: what the last one staged is free again, its events too.
+  /// Begins a call: frees the staging memory and the events of the previous one.
   void begin();
   /// Waits for everything enqueued.
   void synchronize();
-  /// Keeps something alive until the next synchronize(): what the work enqueued reads.
+  /// Keeps data of enqueued work alive until the next synchronize().
   void hold(std::shared_ptr<const void> what) { held_.push_back(std::move(what)); }
 
   template <typename T>
@@ -51,12 +51,12 @@ class Exec {
       check(cudaMemsetAsync(out.data(), byte, size * sizeof(T), stream()), "cudaMemsetAsync");
     return out;
   }
-  /// Page-locked host memory, the caller's until the next begin().
+  /// Page-locked host memory, valid until the next begin().
   template <typename T>
   T* staging(std::size_t size) {
     return static_cast<T*>(staging_.take(size * sizeof(T)));
   }
-  /// For large arrays of the caller's.
+  /// Upload of large arrays from any host memory.
   Uploader& uploader() { return uploader_; }
   template <typename T>
   DeviceBuffer<T> upload(const T* host, std::size_t size) {
@@ -98,7 +98,7 @@ class Exec {
   std::size_t shared_bytes_per_block_ = 48 << 10;
 };
 
-/// Blocks of `threads` that cover `items`.
+/// Number of blocks of `threads` that cover `items` elements.
 inline unsigned blocks_for(std::size_t items, unsigned threads) {
   return static_cast<unsigned>((items + threads - 1) / threads);
 }

@@ -12,6 +12,10 @@ namespace gpureg::cuda {
 namespace {
 
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
+/// Scale of turned copies: the parts of FPFH are at most 100.
+constexpr float kTurnedScale = 8.0f;
+/// Longer features leave the range in which the error bounds hold.
+constexpr float kMaxSquare = 1e30f;
 
 struct FeatureSlot : FeaturesToMeasure {
   std::uint32_t half_width, padded_width;
@@ -25,10 +29,12 @@ __device__ float component(const FeatureSlot& s, const float* row, std::uint32_t
                          : 0.0f;
 }
 
-__device__ std::uint32_t surface_side_at(const FeatureSlot& s, const float* row) {
-  std::uint32_t hash = 2166136261u;
+/// Slot of a row in the table of hashes (FNV-1a by words, with a final mix per word).
+__device__ std::uint32_t hash_slot(const FeatureSlot& s, const float* row) {
+  constexpr std::uint32_t kBasis = 2166136261u, kPrime = 16777619u;
+  std::uint32_t hash = kBasis;
   for (std::uint32_t d = 0; d < s.dimension; ++d) {
-    hash = (hash ^ __float_as_uint(row[d])) * 16777619u;
+    hash = (hash ^ __float_as_uint(row[d])) * kPrime;
     hash ^= hash >> 15;
   }
   return hash % s.places;
@@ -47,18 +53,22 @@ __global__ void find_largest(const FeatureSlot* slots) {
   if (threadIdx.x % 32 == 0) atomicMax(s.largest, largest);
 }
 
-/// The power of two that brings the greatest value to between 512 and 1024, which binary16 can
-/// hold. Lengths stay within float32's range.
+/// The power of two that scales the largest value to between 512 and 1024, within the range of
+/// binary16. Lengths stay within the range of float32.
 __device__ float scale_to_half(std::uint32_t largest) {
-  const int exponent = 136 - static_cast<int>(largest >> 23);
-  return __uint_as_float(static_cast<std::uint32_t>(127 + max(-40, min(40, exponent))) << 23);
+  constexpr int kBias = 127;           // of the exponent of float32
+  constexpr int kLargestExponent = 9;  // of values from 512 to 1024
+  constexpr int kMostExponent = 40;    // squares of the scale stay in range
+  const int exponent = kBias + kLargestExponent - static_cast<int>(largest >> 23);
+  return __uint_as_float(
+      static_cast<std::uint32_t>(kBias + max(-kMostExponent, min(kMostExponent, exponent))) << 23);
 }
 
-/// What the feature search reads beside the features: copies for the tensor cores, and how far off
-/// their products may be.
+/// Search data beside the features: copies for the tensor cores, and error bounds of their
+/// products.
 __global__ void measure_features(const FeatureSlot* slots) {
   const FeatureSlot s = slots[blockIdx.y];
-  const float scale = s.aids.copy == HalfCopy::turned ? 8.0f : scale_to_half(*s.largest);
+  const float scale = s.aids.copy == HalfCopy::turned ? kTurnedScale : scale_to_half(*s.largest);
   std::uint32_t extreme = 0;
   for (std::uint32_t i = blockIdx.x * blockDim.x + threadIdx.x; i < s.size;
        i += gridDim.x * blockDim.x) {
@@ -67,7 +77,7 @@ __global__ void measure_features(const FeatureSlot* slots) {
     float square = 0.0f, rest = 0.0f, lost = 0.0f;
     std::uint16_t* const copy = s.aids.half + static_cast<std::size_t>(i) * s.half_width;
     const auto value = [&](std::uint32_t d) { return valid ? component(s, row, d) * scale : 0.0f; };
-    // Writes the first 11 bits and returns what comes after them.
+    // Writes the first 11 bits and returns the remainder.
     const auto put_half = [&](std::uint32_t d, float v) {
       const __half h = __float2half_rn(v);
       copy[d] = __half_as_ushort(h);
@@ -102,15 +112,15 @@ __global__ void measure_features(const FeatureSlot* slots) {
     s.aids.error[i] = error;
     s.aids.square[i] =
         valid ? make_float2(square - error, square + error) : make_float2(kInfinity, kInfinity);
-    if (valid) atomicMin(s.first + surface_side_at(s, row), i);
-    extreme += valid && !(square < 1e30f * (scale * scale));
+    if (valid) atomicMin(s.first + hash_slot(s, row), i);
+    extreme += valid && !(square < kMaxSquare * (scale * scale));
   }
   if (blockIdx.x == 0 && threadIdx.x == 0) *s.aids.scale = scale;
   if (extreme > 0) atomicAdd(s.extreme, extreme);
 }
 
-/// Of equal features only the first is ever an answer; the others are taken out of the search. On
-/// walls without noise thousands are equal.
+/// Only the first of equal features is ever found; this removes the others from the search.
+/// Noise-free walls have thousands of equal features.
 __global__ void find_repeated_features(const FeatureSlot* slots) {
   const FeatureSlot s = slots[blockIdx.y];
   for (std::uint32_t i = blockIdx.x * blockDim.x + threadIdx.x; i < s.size;
@@ -118,7 +128,7 @@ __global__ void find_repeated_features(const FeatureSlot* slots) {
     const float* row = s.features + static_cast<std::size_t>(i) * s.dimension;
     bool repeats = false;
     if (s.valid[i]) {
-      const std::uint32_t first = s.first[surface_side_at(s, row)];
+      const std::uint32_t first = s.first[hash_slot(s, row)];
       repeats = first < i;
       const float* other = s.features + static_cast<std::size_t>(first) * s.dimension;
       for (std::uint32_t d = 0; repeats && d < s.dimension; ++d) repeats = row[d] == other[d];

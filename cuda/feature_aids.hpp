@@ -6,8 +6,8 @@
 #include "nearest_feature.hpp"
 #include "stage_data.hpp"
 
-/// What the feature search reads beside the features: copies for the tensor cores, and how far off
-/// their products may be. Part of assemble().
+/// Search data beside the features: copies for the tensor cores, and error bounds of their
+/// products. Part of assemble().
 namespace gpureg::cuda {
 
 /// Where each array of a FeatureAids begins in a cloud's memory.
@@ -16,7 +16,7 @@ struct FeatureAidsPlaces {
   std::size_t begin[kArrays];
 };
 
-/// Bytes of array k for so many features; 0 where the dimension forbids it.
+/// Bytes of array k for a number of features; 0 where the dimension is unsupported.
 std::size_t feature_aids_bytes(int k, std::size_t size, std::uint32_t dimension, HalfCopy copy);
 FeatureAids feature_aids_at(char* memory, const FeatureAidsPlaces& places, HalfCopy copy);
 

@@ -6,50 +6,48 @@
 
 namespace gpureg::cuda {
 
-/// All features of one cloud asked for in another; out: where the answers begin.
-inline FeatureQuery narrow_query(const CloudView& from, const CloudView& in, std::uint32_t out) {
-  const FeatureAids& a = static_cast<const CudaCloud*>(from.executor_data)->narrow_aids;
-  const FeatureAids& b = static_cast<const CudaCloud*>(in.executor_data)->narrow_aids;
-  return {from.features,
-          from.has_feature,
-          from.size,
-          in.features,
-          in.has_feature,
-          in.size,
-          from.feature_dimension,
-          out,
-          a.copy == b.copy ? a.half : nullptr,
-          b.half,
-          b.copy,
-          a.padded,
-          b.padded,
-          a.error,
-          b.square,
-          a.scale,
-          b.scale};
+/// The members that features and wide features share. a, b: search data of queries and rows.
+inline FeatureQuery make_query(const CloudView& from, const FeatureAids& a, const CloudView& in,
+                               const FeatureAids& b, std::uint32_t out) {
+  FeatureQuery query{};
+  query.query_count = from.size;
+  query.row_count = in.size;
+  query.dimension = from.feature_dimension;
+  query.out = out;
+  query.query_half = a.copy == b.copy ? a.half : nullptr;
+  query.row_half = b.half;
+  query.copy = b.copy;
+  query.query_padded = a.padded;
+  query.row_padded = b.padded;
+  query.query_error = a.error;
+  query.row_square = b.square;
+  query.query_scale = a.scale;
+  query.row_scale = b.scale;
+  return query;
 }
 
-/// The same by the features of the wide radius, which both clouds must have.
+/// Query of all features of one cloud in another. out: first element of the results.
+inline FeatureQuery narrow_query(const CloudView& from, const CloudView& in, std::uint32_t out) {
+  FeatureQuery query =
+      make_query(from, static_cast<const CudaCloud*>(from.executor_data)->narrow_aids, in,
+                 static_cast<const CudaCloud*>(in.executor_data)->narrow_aids, out);
+  query.queries = from.features;
+  query.query_valid = from.has_feature;
+  query.rows = in.features;
+  query.row_valid = in.has_feature;
+  return query;
+}
+
+/// Query of all wide features of one cloud in another; both clouds must have them.
 inline FeatureQuery wide_query(const CloudView& from, const CloudView& in, std::uint32_t out) {
-  const FeatureAids& a = static_cast<const CudaCloud*>(from.executor_data)->wide_aids;
-  const FeatureAids& b = static_cast<const CudaCloud*>(in.executor_data)->wide_aids;
-  return {from.wide_features,
-          from.has_wide_feature,
-          from.size,
-          in.wide_features,
-          in.has_wide_feature,
-          in.size,
-          from.feature_dimension,
-          out,
-          a.copy == b.copy ? a.half : nullptr,
-          b.half,
-          b.copy,
-          a.padded,
-          b.padded,
-          a.error,
-          b.square,
-          a.scale,
-          b.scale};
+  FeatureQuery query =
+      make_query(from, static_cast<const CudaCloud*>(from.executor_data)->wide_aids, in,
+                 static_cast<const CudaCloud*>(in.executor_data)->wide_aids, out);
+  query.queries = from.wide_features;
+  query.query_valid = from.has_wide_feature;
+  query.rows = in.wide_features;
+  query.row_valid = in.has_wide_feature;
+  return query;
 }
 
 }  // namespace gpureg::cuda

@@ -18,7 +18,7 @@ struct FpfhBatch {
   float radius;
   float* values;
   std::uint8_t* valid;
-  // per cloud: 1 where the features are the caller's, and none are made
+  // per cloud: 1 where the features are given and none are computed
   const std::uint8_t* custom;
 };
 
@@ -98,7 +98,7 @@ __global__ void __launch_bounds__(32 * kWarps)
   if (lane == 0) f.valid[begin + at] = valid;
 }
 
-/// The caller's features: copied; rows that are not finite are never matched.
+/// Copies the given features; rows that are not finite are never matched.
 __global__ void take_features(const std::uint32_t* offset, const std::uint32_t* dimensions,
                               const std::uint8_t* custom, const float* in,
                               const std::size_t* in_offset, const std::size_t* out_offset,
@@ -115,7 +115,7 @@ __global__ void take_features(const std::uint32_t* offset, const std::uint32_t* 
   valid[begin + i] = finite;
 }
 
-/// FPFH of one radius for the clouds without features of the caller's, each at its offset in `out`.
+/// FPFH of one radius for the clouds without given features, each at its offset in `out`.
 void describe(Exec& exec, const Segments& segments, const DeviceBuffer<Vec3>& normals,
               const Grids& grids, float radius, const std::size_t* feature_offset,
               const std::uint8_t* custom, Features& out) {
@@ -126,15 +126,16 @@ void describe(Exec& exec, const Segments& segments, const DeviceBuffer<Vec3>& no
                                            normals.data(), sorted_normals.data());
   check_launch("normals_in_cell_order");
   auto spfh = exec.buffer<float>(static_cast<std::size_t>(segments.total()) * kFpfhSize);
-  const FpfhBatch batch{segments.on_device.data(),
-                        grids.views.data(),
-                        normals.data(),
-                        spfh.data(),
-                        feature_offset,
-                        radius,
-                        out.values.data(),
-                        out.valid.data(),
-                        custom};
+  FpfhBatch batch{};
+  batch.offset = segments.on_device.data();
+  batch.grids = grids.views.data();
+  batch.normals = normals.data();
+  batch.spfh = spfh.data();
+  batch.feature_offset = feature_offset;
+  batch.radius = radius;
+  batch.values = out.values.data();
+  batch.valid = out.valid.data();
+  batch.custom = custom;
   const dim3 grid(blocks_for(segments.largest, kWarps), clouds_on_grid);
   simplified_histograms<<<grid, 32 * kWarps, 0, exec.stream()>>>(batch, sorted_normals.data());
   check_launch("simplified_histograms");

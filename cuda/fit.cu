@@ -23,12 +23,12 @@ __global__ void __launch_bounds__(128)
       source[c] = m[q.match[c]].source;
       target[c] = m[q.match[c]].target;
     }
-    Pose<float> pose{1, 0, 0, 0, 0, 0, 0};
+    Pose<float> pose = identity_pose<float>();
     fits = fit_rigid(source, target, pose);
     poses[h] = pose;
     valid[h] = fits;
   }
-  // Neighbours mostly belong to one pair: a warp counts for all of them at once.
+  // Adjacent hypotheses mostly belong to one pair, so a warp counts for all of them at once.
   const std::uint32_t first = __shfl_sync(~0u, p, 0);
   if (__all_sync(~0u, p == first)) {
     const unsigned fitting = __ballot_sync(~0u, fits);

@@ -6,7 +6,7 @@
 namespace gpureg::cuda {
 namespace {
 
-/// Finished data: any stream may read it, and this one waits for nobody else's work.
+/// Synchronised data: any stream may read it, and this stream waits for no other.
 void copy_to_host(char* host, const CudaCloud& from, std::size_t bytes) {
   if (bytes == 0) return;
   const DeviceScope scope(from.data.memory()->device());
@@ -72,7 +72,7 @@ Fragment::Fragment(std::shared_ptr<const CudaCloud> made)
 std::shared_ptr<const CudaCloud> Fragment::on(int device) const {
   const std::lock_guard<std::mutex> lock(mutex_);
   for (const auto& copy : copies_)
-    // one without any array is everywhere
+    // A fragment without arrays is on every device.
     if (!copy->data.memory() || copy->data.memory()->device() == device) return copy;
   return nullptr;
 }
@@ -105,7 +105,7 @@ std::shared_ptr<const CudaCloud> Fragment::start_copy(Exec& exec) const {
   const char* from = nullptr;
   const std::shared_ptr<const CudaCloud> other = any();
   if (other) {
-    // From device to device, if only through the driver's own staging.
+    // Between devices, possibly through staging memory of the driver.
     const int other_device = other->data.memory() ? other->data.memory()->device() : exec.device();
     const cudaError_t error =
         bytes_ == 0 ? cudaSuccess
@@ -148,7 +148,7 @@ bool Fragment::evict(const DeviceMemory& memory) const {
   return false;
 }
 
-// Where no device has the arrays, the host has.
+// Without a copy on a device there is one on the host.
 std::vector<Vec3> Fragment::copy_points() const {
   const auto copy = any();
   return copy ? copy->copy_points() : copied(host_arrays_.view_on_device.points, size);

@@ -104,10 +104,18 @@ Grids build_grids(Exec& exec, const DownsampledClouds& clouds, const PrepareOpti
   out.views = exec.upload(views);
   const dim3 grid(std::max(1u, std::min(blocks_for(segments.largest, kThreads), 1024u)),
                   static_cast<unsigned>(count));
-  fill_grid<<<grid, kThreads, 0, exec.stream()>>>(
-      Fill{segments.on_device.data(), out.index.data(), cells.rank.data(), clouds.points.data(),
-           out.views.data(), inverse, out.table.data(), table_offset_on_device.data(),
-           out.cell_start.data(), out.points.data()});
+  Fill batch{};
+  batch.offset = segments.on_device.data();
+  batch.item = out.index.data();
+  batch.rank = cells.rank.data();
+  batch.points = clouds.points.data();
+  batch.views = out.views.data();
+  batch.inverse = inverse;
+  batch.table = out.table.data();
+  batch.table_offset = table_offset_on_device.data();
+  batch.cell_start = out.cell_start.data();
+  batch.sorted_points = out.points.data();
+  fill_grid<<<grid, kThreads, 0, exec.stream()>>>(batch);
   check_launch("fill_grid");
   const auto squares = exec.filled<unsigned long long>(count, 0);
   measure_density<<<grid, kThreads, 0, exec.stream()>>>(

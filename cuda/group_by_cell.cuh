@@ -6,12 +6,12 @@
 #include "device_algorithms.hpp"
 #include "stage_data.hpp"
 
-/// Brings the items of every entry of a batch together by cell: one sort for the whole batch, on
-/// keys with as many bits as the cells need.
+/// Groups the elements of every entry of a batch by cell, with one sort for the whole batch and
+/// keys of only as many bits as the cells need.
 namespace gpureg::cuda {
 
-/// How (entry, cell) becomes one word that sorts by entry, then z, y, x. Above the cell is one bit
-/// for items that belong to none.
+/// Packing of (entry, cell) into one word that sorts by entry, then z, y, x. One bit above the cell
+/// marks elements without a cell.
 struct KeyPacking {
   const Cell* lo = nullptr;
   int y_shift = 0, z_shift = 0, entry_shift = 0;
@@ -31,12 +31,13 @@ struct KeyPacking {
   __device__ bool is_none(std::uint64_t key) const { return (key >> (entry_shift - 1)) & 1; }
 };
 
-/// Groups of items that share a cell, in order of entry, z, y, x; the items of a group in their own
+/// Groups of elements that share a cell, in order of entry, z, y, x; elements of a group keep their
 /// order.
 struct Groups {
-  DeviceBuffer<std::uint32_t> item;   ///< number within the entry, one per sorted position
-  DeviceBuffer<std::uint32_t> rank;   ///< total + 1: groups that begin before a sorted position
-  DeviceBuffer<std::uint32_t> start;  ///< sorted position at which a group begins
+  DeviceBuffer<std::uint32_t> item;  ///< index within the entry, one per sorted position
+  DeviceBuffer<std::uint32_t>
+      rank;  ///< total + 1: number of groups that begin before a sorted position
+  DeviceBuffer<std::uint32_t> start;  ///< first sorted position of each group
 };
 
 inline int bits_for(std::uint64_t values) {
@@ -107,8 +108,8 @@ Groups group(Exec& exec, const Segments& segments, const KeyPacking& packing, bo
 
 }  // namespace detail
 
-/// cell_of_item(entry, item, cell&) on the device: the item's cell, or false where it belongs to
-/// none. ranges: cells that entries may use.
+/// cell_of_item(entry, item, cell&) on the device: sets the cell of an element, or returns false
+/// where it has none. ranges: cells that entries may use.
 template <typename CellOf>
 Groups group_by_cell(Exec& exec, const Segments& segments, const std::vector<CellRange>& ranges,
                      CellOf cell_of_item) {
@@ -131,7 +132,7 @@ Groups group_by_cell(Exec& exec, const Segments& segments, const std::vector<Cel
     return detail::group<std::uint32_t>(exec, segments, packing, true, cell_of_item);
   if (packing.bits <= 64)
     return detail::group<std::uint64_t>(exec, segments, packing, true, cell_of_item);
-  // No room for the entry: then each entry is sorted for itself.
+  // The key has no bits left for the entry, so each entry is sorted alone.
   packing.bits = packing.entry_shift;
   packing.entry_shift = packing.entry_shift < 64 ? packing.entry_shift : 64;
   return detail::group<std::uint64_t>(exec, segments, packing, false, cell_of_item);

@@ -5,7 +5,7 @@
 
 namespace gpureg::cuda {
 
-/// Entries for that many keys: a power of two with room to spare, as on the CPU.
+/// Table size for a number of keys: a power of two with spare entries, as on the CPU.
 inline std::size_t table_size(std::size_t keys) {
   std::size_t size = 8;
   while (size < 3 * keys) size *= 2;

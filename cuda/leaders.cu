@@ -7,8 +7,8 @@ namespace {
 
 constexpr std::uint32_t kProbes = 1024;  // hypotheses of a pair
 
-/// A warp per hypothesis looks at a few groups and proposes it as one of its pair's leaders. Of
-/// many hypotheses some are asked, at equal distances.
+/// A warp per hypothesis tests a few groups and proposes it as one of the leaders of its pair. Of
+/// many hypotheses it takes some at equal distances.
 __global__ void __launch_bounds__(kProbeThreads) probe(ScoreBatch b) {
   __shared__ Limits limits[512];
   load_limits(b.limits, limits);

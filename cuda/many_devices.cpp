@@ -10,8 +10,8 @@
 namespace gpureg::cuda {
 namespace {
 
-/// Hands out runs of items: large ones first, small ones at the end, so that all devices finish
-/// together.
+/// Distributes runs of elements: large ones first, small ones at the end, so that all devices
+/// finish together.
 class Runs {
  public:
   Runs(std::size_t items, std::size_t least, std::size_t most, std::size_t takers)
@@ -36,10 +36,10 @@ class Runs {
   std::size_t next_ = 0, items_, least_, most_, takers_;
 };
 
-constexpr std::size_t kMinPairs = 32;  ///< of a run: fewer do not fill a device
+constexpr std::size_t kMinPairs = 32;  ///< of a run: fewer pairs do not fill a device
 constexpr std::size_t kMinClouds = 4;
 constexpr std::size_t kMaxClouds = 32;
-/// that go into one call: the devices wait for each other at its end only
+/// Chunks per call: the devices wait for each other only at its end.
 constexpr std::size_t kChunksPerDevice = 16;
 
 class EngineOfMany final : public DeviceEngine {
@@ -89,8 +89,7 @@ class EngineOfMany final : public DeviceEngine {
 
   void align(Span<const PairInput> pairs, const RegistrationOptions& options,
              Span<PairOutcome> outcomes) override {
-    // Somewhat less than a device would take for itself: the first runs wait for clouds of other
-    // devices.
+    // Less than the share of a device: the first runs wait for clouds of other devices.
     Runs runs(pairs.size, kMinPairs, engines_[0]->pairs_per_chunk(options) * 3 / 4,
               engines_.size());
     on_all(runs, pairs.size > kMinPairs,
@@ -114,15 +113,15 @@ class EngineOfMany final : public DeviceEngine {
   }
 
  private:
-  /// The engine of a device, or the first one, which will say what is wrong.
+  /// The engine of a device, or the first one, which reports the error.
   CudaEngine& on(int device) const {
     for (const auto& engine : engines_)
       if (engine->device() == device) return *engine;
     return *engines_[0];
   }
 
-  /// Works off the runs with a thread for each engine, or with the first engine alone. What the
-  /// first engine that fails throws is thrown here.
+  /// Processes the runs with a thread per engine, or with the first engine alone. Rethrows the
+  /// exception of the first engine that fails.
   void on_all(Runs& runs, bool spread,
               const std::function<void(CudaEngine&, std::size_t, std::size_t)>& work) {
     on_threads(spread ? engines_.size() : 1, [&](std::size_t e) {

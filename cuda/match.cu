@@ -8,10 +8,10 @@ namespace {
 
 struct MatchBatch {
   const PairView* pairs;
-  const std::uint32_t* query_offset;  // of the pairs' forward answers, k per query
+  const std::uint32_t* query_offset;  // of the forward results of the pairs, k per query
   const std::uint32_t* forward;
   const std::uint32_t* backward_offset;
-  const std::uint32_t* backward;  // null: not mutual
+  const std::uint32_t* backward;  // null: without the mutual test
   std::uint32_t k;
   const std::uint32_t* room;
   MatchedPoints* out;
@@ -20,7 +20,7 @@ struct MatchBatch {
 
 constexpr std::uint32_t kTile = 1024;
 
-/// Answer `a` of a pair as a match: false where there is none.
+/// Result `a` of the search of a pair as a match; false where there is none.
 __device__ bool match_of(const MatchBatch& m, const PairView& pair, std::uint32_t p,
                          std::uint32_t a, std::uint32_t& source, std::uint32_t& target) {
   if (pair.custom_count > 0) {
@@ -42,8 +42,9 @@ __device__ std::uint32_t sum_of_block(std::uint32_t mine, std::uint32_t* warp_su
   return warp_sum(warp_sums[threadIdx.x % 32]);
 }
 
-/// A thread block per tile of a pair's answers (blockIdx.x) writes its matches in order. It counts
-/// for itself what comes before: quicker than waiting for the blocks of the tiles before.
+/// A thread block per tile of the search results of a pair (blockIdx.x) writes its matches in
+/// order. It counts the matches of earlier tiles itself, which is faster than waiting for their
+/// blocks.
 __global__ void __launch_bounds__(kTile) collect_matches(MatchBatch m) {
   __shared__ std::uint32_t warp_sums[32];
   const std::uint32_t p = blockIdx.y, tile = blockIdx.x;
@@ -107,7 +108,7 @@ Matches match_features(Exec& exec, Span<const PairView> pairs, const Registratio
   });
   out.pairs = exec.buffer<MatchedPoints>(out.room.total());
   out.count = exec.buffer<std::uint32_t>(pairs.size);
-  // The caller's own correspondences lie in host memory.
+  // Given correspondences are in host memory.
   std::vector<PairView> views(pairs.begin(), pairs.end());
   std::vector<DeviceBuffer<std::uint32_t>> custom;
   for (PairView& view : views) {

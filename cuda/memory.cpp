@@ -11,7 +11,7 @@
 namespace gpureg::cuda {
 
 void throw_device_error(cudaError_t error, const char* what) {
-  cudaGetLastError();  // an error that is not sticky would else be found by the next, innocent call
+  cudaGetLastError();  // clears a non-sticky error, which the next call would report
   const bool lost = cudaGetLastError() != cudaSuccess;
   throw DeviceError(
       std::string(what) + ": " + cudaGetErrorName(error) + ", " + cudaGetErrorString(error) +
@@ -42,13 +42,12 @@ DeviceMemory::DeviceMemory(int device) : device_(device) {
     if (error == cudaSuccess) error = cudaMemPoolCreate(pool, &properties);
     if (error == cudaSuccess)
       error = cudaMemPoolSetAttribute(*pool, cudaMemPoolAttrReleaseThreshold, &threshold);
-    // A caller's stream that takes memory here must not come to wait for ours.
+    // A stream of the program that allocates here must never wait for the engine's stream.
     if (error == cudaSuccess)
       error = cudaMemPoolSetAttribute(*pool, cudaMemPoolReuseAllowInternalDependencies, &never);
   }
-  // Our own stream reuses in its own order alone. What has happened to finish by now would cut the
-  // pool differently from run to run, and now and then a warm one would find no piece that is large
-  // enough.
+  // The engine's stream reuses memory in its own order only. Reuse by completion would fragment the
+  // pool differently from run to run, and a warm pool could lack a piece that is large enough.
   if (error == cudaSuccess)
     error = cudaMemPoolSetAttribute(pool_, cudaMemPoolReuseAllowOpportunistic, &never);
   if (error == cudaSuccess) return;
@@ -72,7 +71,7 @@ void* DeviceMemory::allocate(std::size_t bytes, cudaStream_t stream) {
   const cudaMemPool_t pool = stream == stream_ ? pool_ : lent_pool_;
   cudaError_t error = cudaMallocFromPoolAsync(&pointer, bytes, pool, stream);
   if (error == cudaErrorMemoryAllocation) {
-    // What the pool kept may be in pieces too small: hand it back and ask once more.
+    // The pool may hold only small pieces: release them and try once more.
     cudaGetLastError();
     cudaStreamSynchronize(stream_);
     for (cudaMemPool_t each : {pool_, lent_pool_}) cudaMemPoolTrimTo(each, 0);
@@ -109,7 +108,7 @@ std::size_t DeviceMemory::bytes_reserved() const {
 
 PinnedBuffer::PinnedBuffer(std::size_t bytes) {
   void* data = nullptr;
-  // Portable: a fragment that one device has driven out may come back to another.
+  // Portable: a fragment evicted from one device may return to another.
   if (bytes > 0) check(cudaHostAlloc(&data, bytes, cudaHostAllocPortable), "cudaHostAlloc");
   data_ = static_cast<char*>(data);
 }
@@ -143,7 +142,8 @@ void* PinnedArena::take(std::size_t bytes) {
 
 void PinnedArena::reset() {
   if (!chunks_) return;
-  // The newest chunk is the largest: keep it, so that the next call of this size finds room in one.
+  // The newest chunk is the largest; keeping it gives the next call of this size one contiguous
+  // chunk.
   while (Chunk* old = chunks_->next) {
     chunks_->next = old->next;
     cudaFreeHost(old->data);

@@ -10,7 +10,7 @@
 
 namespace gpureg::cuda {
 
-/// Makes a device the calling thread's current one and gives the caller's back at the end of the
+/// Makes a device current in the calling thread and restores the previous one at the end of the
 /// scope.
 class DeviceScope {
  public:
@@ -23,9 +23,8 @@ class DeviceScope {
   int previous_ = -1;
 };
 
-/// A stream and a pool of device memory that nobody else uses. The pool gives nothing back to the
-/// driver before its end, so a warm context allocates without asking it. Shared by the context and
-/// by every prepared cloud that lives in it.
+/// A private stream and pool of device memory. The pool keeps its memory until its end, so a warm
+/// context allocates without the driver. The context and its prepared clouds share it.
 class DeviceMemory {
  public:
   explicit DeviceMemory(int device);
@@ -35,13 +34,13 @@ class DeviceMemory {
 
   int device() const { return device_; }
   cudaStream_t stream() const { return stream_; }
-  /// In order with the stream. Throws DeviceError where the device has no more.
+  /// In stream order. Throws DeviceError where the device has no memory left.
   void* allocate(std::size_t bytes) { return allocate(bytes, stream_); }
-  /// In order with a stream of somebody else's.
+  /// In the order of a stream of the program.
   void* allocate(std::size_t bytes, cudaStream_t stream);
   void free(void* pointer, std::size_t bytes) noexcept;
   std::size_t bytes_in_use() const { return in_use_; }
-  std::size_t bytes_reserved() const;  ///< taken from the driver: what was in use at most
+  std::size_t bytes_reserved() const;  ///< allocated from the driver: the peak of the use
 
  private:
   void destroy() noexcept;
@@ -49,11 +48,11 @@ class DeviceMemory {
   int device_;
   cudaStream_t stream_ = nullptr;
   cudaMemPool_t pool_ = nullptr;
-  cudaMemPool_t lent_pool_ = nullptr;  ///< of what other streams take
+  cudaMemPool_t lent_pool_ = nullptr;  ///< for allocations on other streams
   std::atomic<std::size_t> in_use_{0};
 };
 
-/// Owns an array in device memory; what it holds is undefined until something writes it.
+/// Owns an array in device memory; its content is undefined until written.
 template <typename T>
 class DeviceBuffer {
  public:
@@ -114,7 +113,7 @@ class PinnedArena {
   PinnedArena& operator=(const PinnedArena&) = delete;
 
   void* take(std::size_t bytes);
-  /// Only when nothing reads or writes the pieces any more.
+  /// Requires that no work uses the pieces any more.
   void reset();
 
  private:

@@ -15,14 +15,14 @@ namespace {
 
 constexpr int kThreads = 256;
 
-/// The four searches of one pair: first answers of each, kNoValue where it was not asked. Or the
-/// caller's matches.
+/// The four searches of one pair: first result of each, kNoValue where there was no search. Or the
+/// given matches.
 struct MergePair {
   std::uint32_t sources, targets;           ///< sizes of the clouds
-  const std::uint32_t *forward, *backward;  ///< null: not asked
+  const std::uint32_t *forward, *backward;  ///< null: not searched
   const std::uint32_t *wide_forward, *wide_backward;
   const std::uint32_t *custom_source, *custom_target;
-  /// of all searches, one after the other, or of the caller
+  /// results of all searches one after another, or number of given matches
   std::uint32_t answers;
 };
 
@@ -33,7 +33,7 @@ struct MergeBatch {
   const std::uint32_t* answer_offset;
   std::uint64_t seed;
   std::uint32_t most;
-  std::uint64_t* key;  // pair, whether the answer is dropped, order of the match
+  std::uint64_t* key;  // pair, whether the result is dropped, order of the match
   std::uint32_t* answer;
   std::uint32_t* found;  // per pair
   std::uint32_t* bins;   // per pair: source, target
@@ -47,7 +47,7 @@ struct Match {
   std::uint32_t source, target;
 };
 
-/// Answer k of a pair. keep: it is a match that no search before has found.
+/// Result k of a pair. keep: it is a match that no earlier search has found.
 __device__ Match answer_of(const MergePair& u, std::uint32_t k, bool& keep) {
   keep = true;
   if (u.custom_source) return {u.custom_source[k], u.custom_target[k]};
@@ -104,8 +104,8 @@ __global__ void __launch_bounds__(kThreads) gather_matches(MergeBatch b) {
     const CloudView &s = b.views[p].source, &t = b.views[p].target;
     const std::uint64_t* key = b.key + b.answer_offset[p];
     const std::uint32_t* answer = b.answer + b.answer_offset[p];
-    // Matches of the same order, which are few, go by their indices: this place takes the one with
-    // as many before it.
+    // Matches of equal order, which are rare, sort by their indices: this position takes the one
+    // with as many before it.
     std::uint32_t begin = k, end = k + 1;
     while (begin > 0 && key[begin - 1] == key[k]) --begin;
     while (end < found && key[end] == key[k]) ++end;
@@ -142,7 +142,7 @@ __global__ void __launch_bounds__(kThreads) gather_matches(MergeBatch b) {
     atomicAdd(b.bins + p * 2 * kNormalBins + threadIdx.x, bins[threadIdx.x]);
 }
 
-/// From the directions of the normals to weights.
+/// Weights from the counts of directions.
 __global__ void __launch_bounds__(kThreads) weight_matches_by_normals(MergeBatch b) {
   __shared__ std::uint32_t weight[2 * kNormalBins];
   const std::uint32_t p = blockIdx.y, count = min(b.found[p], b.most);
@@ -166,7 +166,7 @@ __global__ void __launch_bounds__(kThreads) weight_matches_by_normals(MergeBatch
   }
 }
 
-/// The caller's matches, each once.
+/// The given matches, without duplicates.
 std::vector<std::uint64_t> distinct_matches(const PairView& pair) {
   std::vector<std::uint64_t> out;
   for (std::uint32_t k = 0; k < pair.custom_count; ++k)
@@ -176,17 +176,17 @@ std::vector<std::uint64_t> distinct_matches(const PairView& pair) {
   return out;
 }
 
-/// Answers of all searches of the batch; each pair's pointers are set.
+/// Runs all searches of the batch and sets the pointers of each pair.
 DeviceBuffer<std::uint32_t> search(Exec& exec, Span<const PairView> pairs,
-                                   std::vector<MergePair>& unite) {
+                                   std::vector<MergePair>& entries) {
   std::vector<FeatureQuery> queries;
   std::uint64_t at = 0;
   const auto ask = [&](FeatureQuery query) {
     query.out = static_cast<std::uint32_t>(at);
     at += query.query_count;
-    if (at > 0x7fffffffu)
+    if (at > limits::kMaxPoints)
       throw InvalidArgument("a batch of " + std::to_string(at) +
-                            " feature queries exceeds 2^31 - 1: hand it over in parts");
+                            " feature queries exceeds 2^31 - 1: split it");
     queries.push_back(query);
     return query.out;
   };
@@ -194,17 +194,17 @@ DeviceBuffer<std::uint32_t> search(Exec& exec, Span<const PairView> pairs,
   for (std::size_t p = 0; p < pairs.size; ++p) {
     const CloudView &s = pairs[p].source, &t = pairs[p].target;
     if (pairs[p].custom_count > 0 || s.size == 0 || t.size == 0) continue;
-    unite[p].answers = s.size + t.size;
+    entries[p].answers = s.size + t.size;
     place[p][0] = ask(narrow_query(s, t, 0));
     place[p][1] = ask(narrow_query(t, s, 0));
     if (!s.wide_features || !t.wide_features) continue;
-    unite[p].answers *= 2;
+    entries[p].answers *= 2;
     place[p][2] = ask(wide_query(s, t, 0));
     place[p][3] = ask(wide_query(t, s, 0));
   }
   auto answers = nearest_features(exec, queries, 1, static_cast<std::size_t>(at));
   for (std::size_t p = 0; p < pairs.size; ++p) {
-    MergePair& u = unite[p];
+    MergePair& u = entries[p];
     if (u.answers == 0) continue;
     u.forward = answers.data() + place[p][0];
     u.backward = answers.data() + place[p][1];
@@ -220,12 +220,12 @@ DeviceBuffer<std::uint32_t> search(Exec& exec, Span<const PairView> pairs,
 
 MatchSets merge_matches(Exec& exec, Span<const PairView> pairs,
                         const RegistrationOptions& options) {
-  std::vector<MergePair> unite(pairs.size);
+  std::vector<MergePair> entries(pairs.size);
   for (std::size_t p = 0; p < pairs.size; ++p) {
-    unite[p].sources = pairs[p].source.size;
-    unite[p].targets = pairs[p].target.size;
+    entries[p].sources = pairs[p].source.size;
+    entries[p].targets = pairs[p].target.size;
   }
-  const auto answers = search(exec, pairs, unite);
+  const auto answers = search(exec, pairs, entries);
   std::vector<DeviceBuffer<std::uint32_t>> custom;
   for (std::size_t p = 0; p < pairs.size; ++p) {
     if (pairs[p].custom_count == 0) continue;
@@ -235,23 +235,23 @@ MatchSets merge_matches(Exec& exec, Span<const PairView> pairs,
       target.push_back(static_cast<std::uint32_t>(match));
     }
     custom.push_back(exec.upload(source));
-    unite[p].custom_source = custom.back().data();
+    entries[p].custom_source = custom.back().data();
     custom.push_back(exec.upload(target));
-    unite[p].custom_target = custom.back().data();
-    unite[p].answers = static_cast<std::uint32_t>(source.size());
+    entries[p].custom_target = custom.back().data();
+    entries[p].answers = static_cast<std::uint32_t>(source.size());
   }
   const Segments answer_segments =
-      make_segments(exec, pairs.size, [&](std::size_t p) { return unite[p].answers; });
+      make_segments(exec, pairs.size, [&](std::size_t p) { return entries[p].answers; });
 
   MatchSets out;
   out.room = make_segments(exec, pairs.size, [&](std::size_t p) {
-    return std::min(unite[p].answers, options.compatibility.max_matches);
+    return std::min(entries[p].answers, options.compatibility.max_matches);
   });
   out.columns = exec.buffer<std::uint32_t>(std::size_t(out.room.total()) * MatchSets::kColumns);
   out.count = exec.filled<std::uint32_t>(pairs.size, 0);
   out.total = exec.filled<std::uint64_t>(2 * pairs.size, 0);
   if (answer_segments.total() == 0) return out;
-  const auto merge_on_device = exec.upload(unite);
+  const auto merge_on_device = exec.upload(entries);
   const auto views = exec.upload(pairs.data, pairs.size);
   auto key = exec.buffer<std::uint64_t>(answer_segments.total());
   auto answer = exec.buffer<std::uint32_t>(answer_segments.total());
@@ -277,7 +277,8 @@ MatchSets merge_matches(Exec& exec, Span<const PairView> pairs,
   order_matches<<<dim3(blocks_for(answer_segments.largest, kThreads), pair_count), kThreads, 0,
                   exec.stream()>>>(batch);
   check_launch("order_matches");
-  sort_pairs(exec, key, answer, 33 + bits_for(pairs.size));
+  constexpr int kOrderBits = 32 + 1;  // order of the match, whether it is dropped
+  sort_pairs(exec, key, answer, kOrderBits + bits_for(pairs.size));
   batch.key = key.data();
   batch.answer = answer.data();
   const dim3 grid(blocks_for(out.room.largest, kThreads), pair_count);

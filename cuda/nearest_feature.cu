@@ -9,12 +9,12 @@ namespace gpureg::cuda {
 namespace {
 
 constexpr int kThreads = 256;
-constexpr int kQueries = 64, kRows = 128;  // a thread block's tile
+constexpr int kQueries = 64, kRows = 128;  // tile of a thread block
 constexpr int kDims = 16;                  // dimensions in shared memory at a time
 constexpr int kPerThreadQ = 4, kPerThreadR = 8;
 constexpr unsigned long long kNone = ~0ull;
 
-/// Distance and index in one word: its order is that of the answers.
+/// Distance and index in one word, ordered by distance, then by index.
 __device__ unsigned long long packed(float distance, std::uint32_t index) {
   return static_cast<unsigned long long>(__float_as_uint(distance)) << 32 | index;
 }
@@ -98,15 +98,15 @@ __global__ void unpack_nearest(const FeatureQuery* batch, const unsigned long lo
     out[f.out + q] = f.query_valid[q] ? static_cast<std::uint32_t>(best[f.out + q]) : kNoValue;
 }
 
-/// Any k up to 16: a warp per query, every lane keeps the best of the rows it sees, then the lanes'
-/// lists are merged.
+/// Any k up to limits::kMaxNeighbors: a warp per query. Every lane keeps the best of its rows, then
+/// the lists of the lanes are merged.
 __global__ void __launch_bounds__(128)
     nearest_many(const FeatureQuery* batch, std::uint32_t k, std::uint32_t* out) {
   const FeatureQuery f = batch[blockIdx.y];
   const std::uint32_t q = blockIdx.x * 4 + threadIdx.x / 32, lane = threadIdx.x % 32;
   if (q >= f.query_count) return;
   const float* query = f.queries + static_cast<std::size_t>(q) * f.dimension;
-  unsigned long long best[16];
+  unsigned long long best[limits::kMaxNeighbors];
   for (auto& b : best) b = kNone;
   for (std::uint32_t r = lane; r < f.row_count; r += 32) {
     if (!f.row_valid[r]) continue;
@@ -120,7 +120,7 @@ __global__ void __launch_bounds__(128)
     unsigned long long moving = packed(sum, r);
     // Unrolled insertion keeps the list in registers.
 #pragma unroll
-    for (int t = 0; t < 16; ++t) {
+    for (std::uint32_t t = 0; t < limits::kMaxNeighbors; ++t) {
       const unsigned long long other = best[t];
       best[t] = min(other, moving);
       moving = max(other, moving);
@@ -128,11 +128,11 @@ __global__ void __launch_bounds__(128)
   }
   std::uint32_t taken = 0;
   for (std::uint32_t t = 0; t < k; ++t) {
-    // The smallest of the lanes' heads is the next answer; its lane moves on.
+    // The smallest head of the lists is the next result; its lane advances.
     unsigned long long head = kNone;
 #pragma unroll
-    for (int s = 0; s < 16; ++s)
-      if (static_cast<std::uint32_t>(s) == taken) head = best[s];
+    for (std::uint32_t s = 0; s < limits::kMaxNeighbors; ++s)
+      if (s == taken) head = best[s];
     unsigned long long least = head;
     for (int step = 16; step > 0; step /= 2) least = min(least, __shfl_xor_sync(~0u, least, step));
     if (head == least && head != kNone) ++taken;
@@ -169,7 +169,7 @@ DeviceBuffer<std::uint32_t> nearest_features(Exec& exec, const std::vector<Featu
     check_launch("nearest_many");
     return out;
   }
-  // All bits set is greater than every answer, and its index is kNoValue.
+  // All bits set is greater than every result, and its index is kNoValue.
   auto best = exec.filled<unsigned long long>(answers, 0xff);
   bool filterable = exec.compute_capability() >= 80;
   for (const FeatureQuery& f : queries)

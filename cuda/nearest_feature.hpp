@@ -9,7 +9,7 @@
 
 namespace gpureg::cuda {
 
-/// One cloud's features asked for in another's; all pointers on the device.
+/// Search of the features of one cloud in those of another; all pointers on the device.
 struct FeatureQuery {
   const float* queries;
   const std::uint8_t* query_valid;
@@ -18,7 +18,7 @@ struct FeatureQuery {
   const std::uint8_t* row_valid;
   std::uint32_t row_count;
   std::uint32_t dimension;
-  std::uint32_t out;                           ///< where its answers begin
+  std::uint32_t out;                           ///< first element of its results
   const std::uint16_t *query_half, *row_half;  ///< see FeatureAids; null: not made
   HalfCopy copy;                               ///< of both
   const float *query_padded, *row_padded;
@@ -33,23 +33,23 @@ struct FeatureQuery {
 DeviceBuffer<std::uint32_t> nearest_features(Exec& exec, const std::vector<FeatureQuery>& queries,
                                              std::uint32_t k, std::size_t answers);
 
-/// Rows are cut into parts only where the queries alone do not fill the device: rows per part, a
-/// multiple of the tile.
+/// Rows per part, a multiple of the tile. Rows are split only where the queries alone do not fill
+/// the device.
 std::uint32_t rows_of_part(const Exec& exec, std::size_t query_blocks, std::uint32_t most_rows,
                            std::uint32_t tile);
 
-/// Most features of rooms are near that of a plane. Distances do not change when it is taken off
-/// both features, but the lengths that the rounding of their product grows with do.
+/// Most features of rooms are near that of a plane. Subtracting it from both features changes no
+/// distance, but shortens the vectors, with which the rounding error of their product grows.
 GPUREG_HD float center_of_fpfh(std::uint32_t d) {
   return d < kFpfhSize && d % kFpfhBins == kFpfhBins / 2 ? 100.0f : 0.0f;
 }
 
-/// An orthonormal basis (Helmert's) for FPFH less its centre, of which only 30 dimensions are not
-/// zero, as each of the three histograms adds up to 100. What rooms' features differ in most is how
-/// much is left in the middle of all three: that is one dimension, which the copies for the tensor
-/// cores hold to 22 bits, in the room of the dimensions that need none. value(d): component d;
-/// put(k, v) for k = 0..28; put_axis(v): that one; leave_out(v): nearly zero. Roundings: below 1e-6
-/// of the length.
+/// An orthonormal basis (Helmert's) for centred FPFH. Only 30 of its dimensions are not zero, as
+/// each of the three histograms adds up to 100. Features of rooms differ most in the middle bins of
+/// all three histograms. That is one dimension; the copies for the tensor cores hold it to 22 bits,
+/// in the space of the unused dimensions. value(d): component d; put(k, v) for k = 0..28;
+/// put_axis(v): the middle dimension; leave_out(v): nearly zero. Rounding errors are below 1e-6 of
+/// the length.
 template <typename Value, typename Put, typename PutAxis, typename LeaveOut>
 GPUREG_HD void turn_fpfh(const Value& value, const Put& put, const PutAxis& put_axis,
                          const LeaveOut& leave_out) {
@@ -77,21 +77,21 @@ GPUREG_HD void turn_fpfh(const Value& value, const Put& put, const PutAxis& put_
   put_axis((middle[0] + middle[1] + middle[2]) / sqrtf(3.0f));
 }
 
-/// Let v be a feature, v' what binary16 makes of it, square = |v|^2, rest = what of it is not held
-/// to 22 bits, and lost = |v - v'|^2. Then for every two features
+/// Let v be a feature, v' its rounding to binary16, square = |v|^2, rest = the part of it beyond 22
+/// bits, and lost = |v - v'|^2. Then for every two features
 ///   | |a - b|^2 - (|a|^2 + |b|^2 - 2 a'.b') |  <=  product_error(a) + product_error(b),
 /// since 2 (a.b - a'.b') = 2 a.(b - b') + 2 (a - a').b - 2 (a - a').(b - b'), and 2 x.y <= s |x|^2
-/// + |y|^2 / s for every s > 0; this s makes it least for what rounding to 11 bits loses on
-/// average. The last term is for the roundings of float32: of the squares, of the turned copies, of
-/// the products' sums, of what 22 bits lose, and of the distance itself.
+/// + |y|^2 / s for every s > 0. This s minimises the bound for the average loss of rounding to 11
+/// bits. The last term covers the rounding of float32: of the squares, of the turned copies, of the
+/// sums of products, of the bits beyond 22, and of the distance itself.
 GPUREG_HD float product_error(float square, float rest, float lost) {
   constexpr float kSpread = 2e-4f, kRounding = 2.5e-5f;
   return kSpread * rest + kRounding * square + (1.0f / kSpread + 2.0f) * lost;
 }
 
-/// Where a turned copy holds the first eleven bits of its axis; next come the bits after those, and
-/// the first ones again. A query has them in the order first, first, next, so that the product of
-/// the three is that of 22 bits but for 2^-22 of it.
+/// Position of the first eleven bits of the axis in a turned copy; the next eleven bits follow,
+/// then the first ones again. A query has them in the order first, first, next, so the product of
+/// the three is that of 22 bits up to a relative error of 2^-22.
 constexpr std::uint32_t kAxisPlace = 29, kTurnedWidth = 32;
 
 /// Features for the tensor cores: rows padded with zeros to this width, zero where not valid. 0:
@@ -99,16 +99,17 @@ constexpr std::uint32_t kAxisPlace = 29, kTurnedWidth = 32;
 inline std::uint32_t half_width(std::uint32_t dimension, HalfCopy copy) {
   return copy == HalfCopy::turned ? kTurnedWidth : dimension <= 64 ? (dimension + 15) / 16 * 16 : 0;
 }
-/// The same for those that distances are measured of.
+/// The same for the rows of exact distances.
 inline std::uint32_t padded_width(std::uint32_t dimension) {
   return dimension > 64                      ? 0
          : dimension > 32 && dimension <= 36 ? 36
                                              : half_width(dimension, HalfCopy::plain);
 }
 
-/// For k = 1: the tensor cores tell which rows can be the nearest, and only those are measured
-/// exactly. Folds (distance, index) into `best` by atomicMin, as the plain search does. batch is on
-/// the device; all entries have these dimensions and copies. Needs compute capability 8.0.
+/// Search for k = 1: the tensor cores determine the rows that can be the nearest, and only those
+/// are measured exactly. Folds (distance, index) into `best` by atomicMin, as the plain search
+/// does. batch: on the device; all entries have equal dimensions and copies. Needs compute
+/// capability 8.0.
 void filter_nearest(Exec& exec, const FeatureQuery* batch, unsigned entries,
                     std::uint32_t most_queries, std::uint32_t most_rows, std::uint32_t dimensions,
                     HalfCopy copy, std::size_t answers, unsigned long long* best);

@@ -6,24 +6,26 @@
 
 #include "nearest_feature.hpp"
 
-// Exact nearest features at the speed of the tensor cores. |q - r|^2 = |q|^2 + |r|^2 - 2 q.r, and
-// what rounding q and r to binary16 does to that is bounded by a term of q and a term of r
-// (product_error()). So for each query an upper bound of its nearest distance comes out of a first
-// pass over every fourth row, and a second pass over all lists the rows whose lower bound is not
-// above it (4 of 5,000 for FPFH, 1.2 if the first pass saw all). Those are measured by the very
-// chain of fmaf that defines the distance, so the answer has the bits of an exhaustive search.
+// Exact nearest features at the speed of the tensor cores. |q - r|^2 = |q|^2 + |r|^2 - 2 q.r; a
+// term of q and a term of r bound the error of rounding q and r to binary16 (product_error()). A
+// first pass over every fourth row gives each query an upper bound of its nearest distance. A
+// second pass over all rows lists those whose lower bound is not above it (4 of 5,000 for FPFH; 1.2
+// if the first pass read all rows). The listed rows are measured by the chain of fmaf that defines
+// the distance, so the result has the bits of an exhaustive search.
 namespace gpureg::cuda {
 namespace {
 
 constexpr int kWarps = 8;
 constexpr int kThreads = 32 * kWarps;
+/// Keeps the bound of equal features above their rounded distance of zero.
+constexpr float kTinySquare = 1e-30f;
 constexpr int kTiles = 4;  // of 16 queries, of a warp
 constexpr int kQueriesPerWarp = 16 * kTiles;
 constexpr int kQueries = kWarps * kQueriesPerWarp;
 constexpr int kRows = 64;  // of a tile in shared memory
-// of the rows that the first pass looks at: rows near each other have features alike
+// of the rows in the first pass: adjacent rows have similar features
 constexpr std::uint32_t kStep = 4;
-// of a warp's queue: then there is work for every lane
+// of the queue of a warp: enough work for every lane
 constexpr std::uint32_t kFull = 32;
 
 constexpr int blocks_a_multiprocessor(int steps) { return steps <= 2 ? 3 : 2; }
@@ -31,8 +33,8 @@ constexpr int blocks_a_multiprocessor(int steps) { return steps <= 2 ? 3 : 2; }
 struct FilterBatch {
   const FeatureQuery* queries;
   std::uint32_t tiles_per_part;
-  std::uint32_t step;  // of the rows that a pass looks at
-  // per answer: smallest upper bound of |r|^2 - 2 q.r, as an ordered integer
+  std::uint32_t step;  // of the rows in a pass
+  // per result: smallest upper bound of |r|^2 - 2 q.r, as an ordered integer
   std::int32_t* bound;
   unsigned long long* best;
 };
@@ -82,7 +84,7 @@ __device__ void load_rows(std::uint32_t (&b)[2 * kSteps], const std::uint32_t* t
                  : "memory");
 }
 
-/// The distance that everything is about. The zeros at the end of a row change nothing.
+/// The distance that defines the result. The zeros at the end of a row change nothing.
 template <int kWidth>
 __device__ void measure(const FeatureQuery& f, std::uint32_t q, std::uint32_t r,
                         unsigned long long* best) {
@@ -108,8 +110,8 @@ __device__ void measure(const FeatureQuery& f, std::uint32_t q, std::uint32_t r,
   if (found < best[f.out + q]) atomicMin(best + f.out + q, found);
 }
 
-/// Rows within the bounds of a lane's queries, of one product of 64 queries and 8 rows: bit 2 m + j
-/// is query 8 m + lane / 4 and row first_row + 2 (lane % 4) + j.
+/// Rows within the bounds of the queries of a lane, from one product of 64 queries and 8 rows: bit
+/// 2 m + j is query 8 m + lane / 4 and row first_row + 2 (lane % 4) + j.
 struct Found {
   std::uint32_t which, lane, first_row;
 };
@@ -181,7 +183,7 @@ __global__ void __launch_bounds__(kThreads, blocks_a_multiprocessor(kSteps))
     limit[m] = kCollect ? -kInfinity : kInfinity;
     if (kCollect && asks)
       limit[m] = from_ordered(batch.bound[f.out + q]) + 2.0f * f.query_error[q] / unit +
-                 1e-30f * (*f.query_scale * *f.row_scale);
+                 kTinySquare * (*f.query_scale * *f.row_scale);
     const std::uint32_t* query = reinterpret_cast<const std::uint32_t*>(f.query_half) +
                                  static_cast<std::size_t>(q) * kWords + k_of_lane;
 #pragma unroll
@@ -209,8 +211,8 @@ __global__ void __launch_bounds__(kThreads, blocks_a_multiprocessor(kSteps))
     for (int n0 = 0; n0 < kRows; n0 += 8) {
       std::uint32_t b[2 * kSteps];
       load_rows<kSteps>(b, tile[buffer] + n0 * kStride, kStride, lane);
-      // Of each result this lane has the columns 2 k_of_lane and 2 k_of_lane + 1. Rows that are not
-      // to be found have infinite squares, which no comparison lets through.
+      // Of each product this lane has the columns 2 k_of_lane and 2 k_of_lane + 1. Rows outside the
+      // search have infinite squares, which fail every comparison.
       const float2 two = *reinterpret_cast<const float2*>(&square[buffer][n0 + 2 * k_of_lane]);
       const float start[4] = {two.x * unit, two.y * unit, two.x * unit, two.y * unit};
       float c[kTiles][4];
@@ -270,8 +272,8 @@ __global__ void __launch_bounds__(kThreads, blocks_a_multiprocessor(kSteps))
   }
 }
 
-/// How rows are cut into parts, so that the last wave of thread blocks wastes little, and no part
-/// is so small that reading the queries counts.
+/// Splits rows into parts so that the last wave of thread blocks wastes little, and no part is so
+/// small that reading the queries dominates.
 std::uint32_t tiles_of_part(const Exec& exec, int blocks, std::size_t query_blocks,
                             std::uint32_t rows) {
   constexpr std::size_t kWaves = 8, kLeast = 6;

@@ -5,15 +5,15 @@
 
 namespace gpureg::cuda {
 
-/// The neighbourhood of one point as a warp walks it: cells that follow each other along x follow
-/// each other in the sorted points too, so a neighbourhood is one run of points per (z, y). The
-/// order over all runs is that of for_each_neighbor.
+/// Walk of a warp over the neighbourhood of one point. Cells that are adjacent along x are adjacent
+/// in the sorted points too, so a neighbourhood is one run of points per (z, y). The order over all
+/// runs is that of for_each_neighbor.
 struct NeighborRows {
   Cell lo, hi;
   int rows, width;
 
   __device__ NeighborRows(const GridView& grid, Vec3 q, float radius) {
-    const float reach = radius * 1.0001f;  // as for_each_neighbor
+    const float reach = radius * kBallMargin;  // as for_each_neighbor
     lo = cell_of({q.x - reach, q.y - reach, q.z - reach}, grid.inverse_cell_size);
     hi = cell_of({q.x + reach, q.y + reach, q.z + reach}, grid.inverse_cell_size);
     width = hi.y - lo.y + 1;

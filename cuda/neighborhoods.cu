@@ -8,11 +8,11 @@ namespace gpureg::cuda {
 namespace {
 
 constexpr int kThreads = 128;
-constexpr int kColumns = 2;           // a thread's matches
-constexpr std::uint32_t kSeeds = 64;  // a thread block's
+constexpr int kColumns = 2;           // matches of a thread
+constexpr std::uint32_t kSeeds = 64;  // seeds of a thread block
 
-/// Thread blocks (x: matches, y: seeds, z: pair): each warp keeps its matches in registers and goes
-/// through the seeds.
+/// Thread blocks (x: matches, y: seeds, z: pair): each warp keeps its matches in registers and
+/// iterates over the seeds.
 __global__ void __launch_bounds__(kThreads)
     find_compatible(MatchSetView matches, const std::uint32_t* room,
                     const std::uint32_t* match_count, const std::uint32_t* seed,

@@ -6,7 +6,7 @@
 
 namespace gpureg::cuda {
 
-/// Which matches the seeds of a batch are compatible with, a bit each.
+/// Compatible matches of the seeds of a batch, one bit each.
 struct Neighborhoods {
   std::uint32_t words = 0;           ///< per seed
   DeviceBuffer<std::uint32_t> bits;  ///< pairs x seeds x words

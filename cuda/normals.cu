@@ -22,8 +22,7 @@ __global__ void orient_plane_normals(const std::uint32_t* offset, const GridView
   normals[at] = orient_normal(plane_normal(grid, p, radius), p, guide, viewpoints[c]);
 }
 
-/// Which normals of the clouds that ask for it face away from all viewpoints, and how many of a
-/// cloud.
+/// Marks the input normals that face away from all viewpoints, and counts them per cloud.
 __global__ void find_backs(const std::uint32_t* offset, const Vec3* points, const Vec3* normals,
                            const Span<const Vec3>* viewpoints, const std::uint8_t* asks,
                            std::uint8_t* away, std::uint32_t* count) {

@@ -4,14 +4,15 @@
 namespace gpureg::cuda {
 namespace {
 
-// hypotheses of a pair that tell where the others fail: its leaders, and some at equal distances
+// Hypotheses of a pair that sample the order of the points: its leaders, and some at equal
+// distances.
 constexpr std::uint32_t kSamples = 64;
-constexpr std::uint32_t kPoses = 8;  // that a thread moves its point by, at most
+constexpr std::uint32_t kPoses = 8;  // poses per thread, at most
 constexpr int kThreads = 256;
 constexpr int kOrderThreads = 1024;
 constexpr std::uint32_t kKeys = kSamples + 1;
 
-/// Number of a sample among all hypotheses of the batch.
+/// Index of a sample among all hypotheses of the batch.
 __device__ std::uint32_t hypothesis_of(const ScoreBatch& b, std::uint32_t pair,
                                        std::uint32_t sample) {
   const std::uint32_t begin = b.offset[pair], count = b.offset[pair + 1] - begin;
@@ -21,9 +22,9 @@ __device__ std::uint32_t hypothesis_of(const ScoreBatch& b, std::uint32_t pair,
                                                            count / kSamples));
 }
 
-/// A thread per point: how many of a few hypotheses leave it without a partner by its cell's code,
-/// and how many only by its closest point. x: points, y: hypotheses, z: pairs. inliers: of the
-/// samples.
+/// A thread per point counts the sampled hypotheses that leave it without a partner by the code of
+/// its cell, and those that do so only by its closest point. x: points, y: hypotheses, z: pairs.
+/// inliers: of the samples.
 __global__ void __launch_bounds__(kThreads)
     try_samples(ScoreBatch b, std::uint32_t poses_a_thread, std::uint32_t* inliers) {
   __shared__ std::uint32_t agreeing[kPoses][64];
@@ -78,9 +79,9 @@ __global__ void __launch_bounds__(kThreads)
   if (refuted > 0) atomicAdd(b.refuted + first * 32 + k, refuted);
 }
 
-/// A thread block per pair. Samples: their inliers are known now. Groups: each counts how many come
-/// before it. Points: counting sort, stable, so that neighbours stay together; a warp has a stretch
-/// of them.
+/// A thread block per pair sorts. Samples: their inliers are known now. Groups: each counts the
+/// groups before it. Points: counting sort, stable, so that neighbours stay together; each warp has
+/// a contiguous range.
 __global__ void __launch_bounds__(kOrderThreads)
     sort_by_failures(ScoreBatch b, const std::uint32_t* inliers) {
   constexpr std::uint32_t kWarps = kOrderThreads / 32;

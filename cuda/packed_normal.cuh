@@ -5,11 +5,11 @@
 
 namespace gpureg::cuda {
 
-/// A normal in 30 bits. A cosine between two of them is off by less than kPackedCosineError; a zero
-/// normal has its own word.
+/// A normal in 30 bits. The error of a cosine between two of them is below kPackedCosineError. A
+/// zero normal has a word of its own.
 constexpr float kPackedCosineError = 0.005f;
-/// Where only one of the two is packed. Each coordinate is off by up to 1/1022, so the cosine by
-/// sqrt(3)/1022 = 0.0017.
+/// Error of the cosine where only one of the two is packed. Each coordinate has an error of up to
+/// 1/1022, the cosine of up to sqrt(3)/1022 = 0.0017.
 constexpr float kHalfPackedCosineError = 0.0025f;
 constexpr std::uint32_t kPackedZero = ~std::uint32_t(0);
 

@@ -11,7 +11,11 @@ namespace gpureg::cuda {
 namespace {
 
 constexpr int kThreads = 128, kWarps = kThreads / 32;
-constexpr std::uint32_t kMatchesPerBlock = 2048, kTile = 128;
+constexpr std::uint32_t kTile = 128;  // matches in shared memory at a time
+/// Matches of a thread block of count_matches(): their weights, at most 2^16 each, sum up in 32
+/// bits.
+constexpr std::uint32_t kMatchesPerBlock = 2048;
+static_assert(kMatchesPerBlock << 16 >> 16 == kMatchesPerBlock, "weights sum up in 32 bits");
 
 /// A member of a seed's neighbourhood.
 struct Member {
@@ -21,6 +25,10 @@ struct Member {
   __device__ std::uint32_t weight() const { return __float_as_uint(b.z); }
   __device__ std::uint32_t match() const { return __float_as_uint(b.w); }
 };
+
+static_assert(limits::kMaxMembers <= 65536, "refit() lists members in 16 bits");
+static_assert(limits::kMaxMembers * (sizeof(Member) + sizeof(std::uint16_t)) <= 48 * 1024,
+              "all members of a seed fit the shared memory of every device");
 
 struct ProposeBatch {
   MatchSetView matches;
@@ -37,8 +45,7 @@ struct ProposeBatch {
   std::uint8_t* valid;
 };
 
-/// Numbers of the seed and of the first of its compatible matches, in their order. Returns how
-/// many.
+/// Collects the seed and the first of its compatible matches, in their order. Returns their number.
 __device__ std::uint32_t gather_members(const ProposeBatch& b, std::uint32_t p, std::uint32_t s,
                                         std::uint32_t seed, Member* members) {
   __shared__ std::uint32_t warp_count[kWarps];
@@ -88,7 +95,7 @@ __device__ TrianglePick triangle(const ProposeBatch& b, std::uint32_t seed_at, s
   return pick_triangle(b.matches.source[seed_at], b.matches.target[seed_at], trial, b.random, size);
 }
 
-/// The motion of a triangle; false where it is none.
+/// The motion of a triangle; false where it determines none.
 __device__ bool try_triangle(const ProposeBatch& b, std::uint32_t begin, std::uint32_t seed,
                              std::uint32_t trial, const Member* members, std::uint32_t size,
                              Rigid& rigid) {
@@ -101,8 +108,8 @@ __device__ bool try_triangle(const ProposeBatch& b, std::uint32_t begin, std::ui
          carry_triangle(m0.p(), m1.p(), m2.p(), m0.q(), m1.q(), m2.q(), rigid);
 }
 
-/// Number of the trial that most of the neighbourhood agrees with, the first of equals; all threads
-/// get it. kNoValue: none.
+/// Index of the trial with the largest consensus weight, the first of equals; all threads get it.
+/// kNoValue: none.
 __device__ std::uint32_t best_triangle(const ProposeBatch& b, std::uint32_t begin,
                                        std::uint32_t seed, const Member* members,
                                        std::uint32_t size) {
@@ -132,7 +139,7 @@ __device__ std::uint32_t best_triangle(const ProposeBatch& b, std::uint32_t begi
       number[slot] = trial;
     }
     __syncthreads();
-    // Warps that have no triangle of their own share the members with others.
+    // Warps without triangles of their own share the members with others.
     const std::uint32_t rows = (count + 31) / 32, parts = rows == 1 ? 4 : rows == 2 ? 2 : 1;
     const std::uint32_t mine = warp % max(rows, 1u) * 32 + lane, part = warp / max(rows, 1u);
     if (mine < count && part < parts) {
@@ -153,8 +160,8 @@ __device__ std::uint32_t best_triangle(const ProposeBatch& b, std::uint32_t begi
   return best == 0 ? kNoValue : ~static_cast<std::uint32_t>(best);
 }
 
-/// Least squares over the members that the pose brings together, by one warp: the lanes share the
-/// sums, each goes through the members in their order. All lanes have the pose. list: room for all
+/// Least-squares fit to the members that the pose aligns, by one warp: the lanes share the sums,
+/// and each iterates over the members in their order. All lanes get the pose. list: space for all
 /// members.
 __device__ bool refit(const Member* members, std::uint32_t size, float squared_distance,
                       std::uint16_t* list, Pose<float>& pose) {
@@ -192,7 +199,7 @@ __device__ bool refit(const Member* members, std::uint32_t size, float squared_d
   float s[3][3];
 #pragma unroll
   for (int k = 0; k < 9; ++k) s[k / 3][k % 3] = __shfl_sync(~0u, sum, k);
-  __syncwarp();  // the list is written again
+  __syncwarp();  // the next call overwrites the list
   return solve_rigid(s, cp, cq, pose);
 }
 
@@ -220,7 +227,7 @@ __global__ void __launch_bounds__(kThreads) fit_seeds(ProposeBatch b) {
   b.valid[place] = 1;
 }
 
-/// A thread block per pair brings the poses together, in the order of their seeds.
+/// A thread block per pair compacts the valid poses, in the order of their seeds.
 __global__ void __launch_bounds__(kThreads)
     keep_valid(ProposeBatch b, Pose<float>* pose, std::uint32_t* seed, MatchEvidence* matches,
                std::uint32_t* count) {
@@ -262,7 +269,7 @@ __global__ void __launch_bounds__(kThreads)
   if (first >= last || blockIdx.x * kThreads >= candidate_count[p]) return;
   const std::uint32_t c = blockIdx.x * kThreads + threadIdx.x;
   const Rigid rigid = to_rigid(pose[p * most + min(c, candidate_count[p] - 1)]);
-  std::uint32_t inliers = 0, source = 0, target = 0;  // of 2048 weights, each at most 2^16
+  std::uint32_t inliers = 0, source = 0, target = 0;
   for (std::uint32_t base = first; base < last; base += kTile) {
     const std::uint32_t size = min(kTile, last - base);
     __syncthreads();
@@ -312,24 +319,25 @@ Candidates propose_poses(Exec& exec, const MatchSets& matches, const Seeds& seed
   const auto valid = exec.filled<std::uint8_t>(places, 0);
   const float squared_distance =
       options.compatibility.consensus_distance * options.compatibility.consensus_distance;
-  const ProposeBatch batch{
-      matches.view(),
-      matches.room.on_device.data(),
-      matches.count.data(),
-      seeds.match.data(),
-      seeds.count.data(),
-      seeds.most,
-      neighborhoods.bits.data(),
-      neighborhoods.words,
-      test_of(options.compatibility),
-      options.compatibility.max_members,
-      options.compatibility.triangles,
-      options.compatibility.refits,
-      squared_distance,
-      options.compatibility.seed_separation * options.compatibility.seed_separation,
-      options.seed,
-      pose.data(),
-      valid.data()};
+  ProposeBatch batch{};
+  batch.matches = matches.view();
+  batch.room = matches.room.on_device.data();
+  batch.match_count = matches.count.data();
+  batch.seed = seeds.match.data();
+  batch.seed_count = seeds.count.data();
+  batch.most_seeds = seeds.most;
+  batch.bits = neighborhoods.bits.data();
+  batch.words = neighborhoods.words;
+  batch.test = test_of(options.compatibility);
+  batch.max_members = options.compatibility.max_members;
+  batch.triangles = options.compatibility.triangles;
+  batch.refits = options.compatibility.refits;
+  batch.squared_distance = squared_distance;
+  batch.squared_shortest =
+      options.compatibility.seed_separation * options.compatibility.seed_separation;
+  batch.random = options.seed;
+  batch.pose = pose.data();
+  batch.valid = valid.data();
   const std::size_t shared =
       options.compatibility.max_members * (sizeof(Member) + sizeof(std::uint16_t));
   const std::uint32_t most_seeds = std::min(seeds.most, largest);

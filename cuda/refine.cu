@@ -18,7 +18,7 @@ struct RefineBatch {
   BestPose* out;
 };
 
-/// Terms of one source point, if its closest target point is in reach and turned alike.
+/// Terms of one source point, if its closest target point is within distance and normal angle.
 __device__ void add_point(const PairView& pair, const RefineBatch& r, const Rigid& rigid,
                           float max_squared, float inverse_max, float inverse_radius,
                           std::uint32_t i, IcpSums& sums) {
@@ -68,7 +68,7 @@ __global__ void __launch_bounds__(kThreads) refine(RefineBatch r) {
     }
     __syncthreads();
   }
-  // Support of the refined pose under the test that hypotheses were ranked by.
+  // Support of the refined pose under the normal test of the ranking.
   const Rigid rigid = to_rigid(pose);
   std::int64_t support[2] = {0, 0};
   for (std::uint32_t i = threadIdx.x; i < pair.source.size; i += kThreads) {
@@ -87,7 +87,7 @@ __global__ void __launch_bounds__(kThreads) refine(RefineBatch r) {
   out.iterations = iterations;
   const Support refined{static_cast<std::uint32_t>(support[0]), best.support.hypothesis,
                         static_cast<std::uint64_t>(support[1])};
-  // A refinement that fits worse than what it began with is dropped.
+  // A refinement that fits worse than its start is dropped.
   if (truncated_cost(refined, pair.source.size) <= truncated_cost(best.support, pair.source.size)) {
     out.pose = pose;
     out.support = refined;
@@ -108,11 +108,16 @@ DeviceBuffer<BestPose> refine_poses(Exec& exec, Span<const PairView> pairs,
     return out;
   }
   const auto views = exec.upload(pairs.data, pairs.size);
-  refine<<<static_cast<unsigned>(pairs.size), kThreads, 0, exec.stream()>>>(RefineBatch{
-      views.data(), best.data(),
-      inlier_test(options.prepare.max_correspondence_distance, options.quadruples.max_normal_angle),
-      options.refine.max_iterations, options.prepare.max_correspondence_distance,
-      options.refine.kernel_width, out.data()});
+  RefineBatch batch{};
+  batch.pairs = views.data();
+  batch.best = best.data();
+  batch.test =
+      inlier_test(options.prepare.max_correspondence_distance, options.quadruples.max_normal_angle);
+  batch.max_iterations = options.refine.max_iterations;
+  batch.max_distance = options.prepare.max_correspondence_distance;
+  batch.kernel_width = options.refine.kernel_width;
+  batch.out = out.data();
+  refine<<<static_cast<unsigned>(pairs.size), kThreads, 0, exec.stream()>>>(batch);
   check_launch("refine");
   return out;
 }

@@ -11,7 +11,6 @@ namespace gpureg::cuda {
 namespace {
 
 constexpr int kSums = 27;  // of IcpSums
-constexpr std::uint32_t kMaxModes = 64;
 
 struct RefineModes {
   const SearchPair* pairs;
@@ -22,8 +21,8 @@ struct RefineModes {
   float max_distance, kernel_width, min_cosine;
 };
 
-/// What one source point adds: turn, normal, weight and residual, see add_icp_term(). False where
-/// it has no partner.
+/// Terms of one source point: turn, normal, weight and residual, see add_icp_term(). False where it
+/// has no partner.
 __device__ bool correspondence(const SearchPair& pair, const RefineModes& r, float kernel_width,
                                const Rigid& rigid, float inverse_radius, std::uint32_t i,
                                float (&row)[8]) {
@@ -47,10 +46,9 @@ __device__ bool correspondence(const SearchPair& pair, const RefineModes& r, flo
   return true;
 }
 
-/// The sums of a thread block that is number `first` of `blocks`, which take turns at kThreads
-/// points. A lane for each of the 27 sums goes through what the warp's points add: the terms of
-/// add_icp_term(), but one register per thread for them instead of 54. rows, partial: shared, for
-/// each warp.
+/// Sums of thread block `first` of `blocks`, which alternate in steps of kThreads points. Each of
+/// 27 lanes accumulates one sum over the points of the warp: the terms of add_icp_term() with one
+/// register per thread instead of 54. rows, partial: shared memory, for each warp.
 template <int kThreads>
 __device__ void add_up(const SearchPair& pair, const RefineModes& r, float kernel_width,
                        const Rigid& rigid, std::uint32_t stride, std::uint32_t first,
@@ -58,8 +56,8 @@ __device__ void add_up(const SearchPair& pair, const RefineModes& r, float kerne
                        IcpSums& sums) {
   const std::uint32_t lane = threadIdx.x % 32, warp = threadIdx.x / 32, size = pair.source.size;
   const float inverse_radius = 1.0f / pair.source.radius;
-  // Sum number k is the product of entries a and b: the lower triangle row by row, then all with
-  // the residual.
+  // Sum k is the product of entries a and b: the lower triangle row by row, then all with the
+  // residual.
   std::uint32_t a = 0, b = lane;
   while (b > a) b -= ++a;
   if (lane >= 21) {
@@ -99,15 +97,15 @@ __device__ void add_up(const SearchPair& pair, const RefineModes& r, float kerne
   __syncthreads();
 }
 
-/// What the blocks of a cluster have summed up, for each of them. Two buffers take turns, so that
-/// one meeting per iteration is enough.
+/// Adds up the sums of the blocks of a cluster, for each of them. Two alternating buffers make one
+/// synchronisation per iteration sufficient.
 template <int kBlocks>
 __device__ void add_over_cluster(IcpSums& mine, IcpSums& total) {
 #if defined(__CUDA_ARCH__) && __CUDA_ARCH__ >= 900
   const auto cluster = cooperative_groups::this_cluster();
   cluster.sync();
   if (threadIdx.x < kSums) {
-    // All are asked for before the first has come.
+    // Requests all values before it uses the first.
     std::int64_t sum = 0;
 #pragma unroll
     for (int b = 0; b < kBlocks; ++b)
@@ -118,7 +116,7 @@ __device__ void add_over_cluster(IcpSums& mine, IcpSums& total) {
 #endif
 }
 
-/// No block leaves while another may still read what it has summed up.
+/// No block exits while another may still read its sums.
 __device__ void leave_cluster() {
 #if defined(__CUDA_ARCH__) && __CUDA_ARCH__ >= 900
   cooperative_groups::this_cluster().sync();
@@ -151,7 +149,8 @@ __global__ void __launch_bounds__(kThreads, 1024 / kThreads) refine(RefineModes 
       add_up<kThreads>(pair, r, kernel_width, to_rigid(pose), stride, first, kBlocks, rows, partial,
                        mine);
       if constexpr (kBlocks > 1) add_over_cluster<kBlocks>(mine, total_of_all);
-      ++iterations, ++total;
+      ++iterations;
+      ++total;
       if (threadIdx.x == 0) {
         const IcpSums& sums = kBlocks > 1 ? total_of_all : mine;
         const IcpStep step = solve_icp(sums, pair.source.radius, r.max_distance);
@@ -161,7 +160,7 @@ __global__ void __launch_bounds__(kThreads, 1024 / kThreads) refine(RefineModes 
       }
       __syncthreads();
     }
-    __syncthreads();  // all have left the loop before it begins anew
+    __syncthreads();  // all threads leave the loop before it restarts
   }
   if constexpr (kBlocks > 1) leave_cluster();
   if (threadIdx.x == 0 && first == 0) {
@@ -170,9 +169,9 @@ __global__ void __launch_bounds__(kThreads, 1024 / kThreads) refine(RefineModes 
   }
 }
 
-/// Where there are so few modes that the device would wait for single blocks. Two of these blocks
-/// share a multiprocessor, so that the 24 modes of one pair are refined all at once: clusters of
-/// blocks twice as large would come in two waves.
+/// Clusters of blocks, for so few modes that the device would wait for single blocks. Two of these
+/// blocks share a multiprocessor, so that the 24 modes of one pair run at once; clusters of blocks
+/// twice as large would need two waves.
 constexpr int kClusterBlocks = 8, kClusterThreads = 512;
 
 void refine_by_clusters(Exec& exec, const RefineModes& batch, unsigned pairs) {
@@ -190,11 +189,11 @@ void refine_by_clusters(Exec& exec, const RefineModes& batch, unsigned pairs) {
         "refine by clusters");
 }
 
-/// Modes that have met: the first of them stays. A warp per pair.
+/// Merges modes that refinement moved to the same pose; keeps the first. A warp per pair.
 __global__ void __launch_bounds__(32)
     merge(std::uint32_t most, Mode* all_modes, std::uint32_t* counts, float min_trace,
           float squared_distance) {
-  __shared__ Rigid kept[kMaxModes];
+  __shared__ Rigid kept[limits::kMaxModes];
   const std::uint32_t size = counts[blockIdx.x], lane = threadIdx.x;
   Mode* modes = all_modes + static_cast<std::size_t>(blockIdx.x) * most;
   std::uint32_t count = 0;
@@ -220,20 +219,21 @@ __global__ void __launch_bounds__(32)
 void refine_modes(Exec& exec, Span<const PairView> pairs, Modes& modes,
                   const RegistrationOptions& options) {
   const auto views = upload_search_pairs(exec, pairs);
-  const RefineModes batch{
-      views.data(),
-      modes.most,
-      modes.mode.data(),
-      modes.count.data(),
-      options.evidence.sample,
-      options.refine.max_iterations,
-      options.prepare.max_correspondence_distance,
-      options.refine.kernel_width,
-      inlier_test(options.prepare.max_correspondence_distance, kRefineNormalAngle).min_cosine};
+  RefineModes batch{};
+  batch.pairs = views.data();
+  batch.most = modes.most;
+  batch.modes = modes.mode.data();
+  batch.count = modes.count.data();
+  batch.sample = options.evidence.sample;
+  batch.max_iterations = options.refine.max_iterations;
+  batch.max_distance = options.prepare.max_correspondence_distance;
+  batch.kernel_width = options.refine.kernel_width;
+  batch.min_cosine =
+      inlier_test(options.prepare.max_correspondence_distance, kRefineNormalAngle).min_cosine;
   const unsigned pair_count = static_cast<unsigned>(pairs.size);
   if (options.refine.max_iterations > 0) {
-    // Small blocks hide each other's solving; where there are too few to fill the device, large
-    // ones are done sooner, or several for each.
+    // Small blocks overlap each other's solving. With too few modes to fill the device, large
+    // blocks or clusters are faster.
     const std::size_t count = std::size_t(modes.most) * pairs.size,
                       processors = static_cast<std::size_t>(exec.multiprocessors());
     if (exec.compute_capability() >= 90 && count * kClusterBlocks <= processors * 3) {
@@ -249,7 +249,6 @@ void refine_modes(Exec& exec, Span<const PairView> pairs, Modes& modes,
 }
 
 void merge_modes(Exec& exec, Modes& modes, const RegistrationOptions& options) {
-  static_assert(kMaxModes >= 64, "as many as EvidenceOptions::modes may be");
   const unsigned pairs = static_cast<unsigned>(modes.count.size());
   merge<<<pairs, 32, 0, exec.stream()>>>(
       modes.most, modes.mode.data(), modes.count.data(), mode_trace(options.evidence.mode_angle),

@@ -7,8 +7,8 @@
 
 namespace gpureg::cuda {
 
-/// Which fragments are in the memory of one engine: brings them there, and drives the least
-/// recently used out beyond a budget. To be used by one thread at a time.
+/// Tracks the fragments in the memory of one engine: loads them, and evicts the least recently used
+/// ones beyond a budget. Not thread-safe.
 class Residence {
  public:
   /// budget: bytes; 0: no limit.
@@ -17,14 +17,14 @@ class Residence {
   std::size_t budget() const { return budget_; }
   std::size_t evictions() const { return evictions_; }
 
-  /// A fragment that was made here.
+  /// Registers a fragment made on this device.
   void add(const Fragment& fragment);
-  /// Copies of these fragments on the exec's device, one each and ready to be read; they stay there
-  /// while the caller holds them. Throws DeviceError where the budget or the device has no room for
-  /// all of them at once.
+  /// Copies of these fragments on the device of exec, one each and ready to read; they stay there
+  /// while referenced. Throws DeviceError where the budget or the device cannot hold all of them at
+  /// once.
   std::vector<std::shared_ptr<const CudaCloud>> bring(
       const std::vector<const Fragment*>& fragments);
-  /// Drives fragments out until what is left, but for `kept`, and `more` bytes are within the
+  /// Evicts fragments until the remaining ones, except `kept`, and `more` bytes are within the
   /// budget.
   void make_room(std::size_t more, const std::vector<const Fragment*>& kept);
 

@@ -7,8 +7,10 @@ namespace gpureg::cuda {
 namespace {
 
 constexpr std::uint32_t kThreads = 1024;
-// 32 hypotheses a word; chunks are counted, then expanded, one by one
+// Words per chunk, of 32 hypotheses each; chunks are counted, then expanded, one by one.
 constexpr std::uint32_t kWordsPerChunk = 1024;
+static_assert(limits::kMaxQuadruples <= 0x80000000u - 32 * kWordsPerChunk,
+              "numbers of hypotheses fit 32 bits in whole chunks");
 
 struct SampleBatch {
   const std::uint32_t* room;
@@ -21,7 +23,7 @@ struct SampleBatch {
   std::uint32_t* chunk_count;  // pairs x chunks
 };
 
-/// Where a match's two points come from: shared memory, or global where there are too many.
+/// Source of the points of a match: shared memory, or global memory where there are too many.
 struct SharedPoints {
   const float4* a;  // source x, y, z, target x
   const float2* b;  // target y, z
@@ -63,8 +65,7 @@ __device__ bool first_side_passes(const Points& points, const Quadruple& q, floa
   return similar(corner(points, q.match[0]), corner(points, q.match[1]), tau2);
 }
 
-/// The rest of it. Repeated source points are told by the matches themselves, which have the
-/// indices.
+/// The remaining sides. Global matches hold the indices that identify repeated source points.
 template <typename Points>
 __device__ bool other_sides_pass(const Points& points, const MatchedPoints* m, const Quadruple& q,
                                  float tau2) {
@@ -77,15 +78,16 @@ __device__ bool other_sides_pass(const Points& points, const MatchedPoints* m, c
   return a != b && a != c && a != d && b != c && b != d && c != d;
 }
 
-/// A warp's own shared memory.
+/// Shared memory of a warp.
 struct WarpQueue {
   std::uint32_t waiting[64];  ///< hypotheses whose first side passes
   std::uint32_t words[32];    ///< one bit per hypothesis: passes
 };
 
-/// A warp draws 1,024 hypotheses: which of its 32 words a lane has, one bit per hypothesis that
-/// passes. Those that pass the first side wait until there is one for every lane: one in eight
-/// passes, and the others would wait for it three times.
+/// A warp draws 1,024 hypotheses; each lane gets one of its 32 words, one bit per passing
+/// hypothesis. Hypotheses that pass the first side wait in a queue until there is one for every
+/// lane: one in eight passes, and without the queue the other lanes idle during three further
+/// sides.
 __device__ std::uint32_t draw_word(const SampleBatch& s, const SharedPoints& points,
                                    const MatchedPoints* m, std::uint32_t count, std::uint32_t first,
                                    WarpQueue& queue) {
@@ -124,7 +126,7 @@ __device__ std::uint32_t draw_word(const SampleBatch& s, const SharedPoints& poi
   return queue.words[lane];
 }
 
-/// From global memory a second look at the same corners would cost more than the lanes that wait.
+/// From global memory, reading the same corners again costs more than idle lanes.
 __device__ std::uint32_t draw_word(const SampleBatch& s, const GlobalPoints& points,
                                    const MatchedPoints* m, std::uint32_t count, std::uint32_t first,
                                    WarpQueue&) {
@@ -179,7 +181,7 @@ __global__ void __launch_bounds__(kThreads) sample(SampleBatch s, std::uint32_t 
   sample_chunks(s, SharedPoints{shared, rest}, m, count, queue);
 }
 
-/// Bits to numbers, in order. before: survivors in front of each chunk, over all pairs.
+/// Expands bits to indices, in order. before: survivors in earlier chunks, over all pairs.
 __global__ void __launch_bounds__(kWordsPerChunk)
     expand(const std::uint32_t* words, const std::uint32_t* before, std::uint32_t chunks,
            const std::uint32_t* offset, std::uint32_t* id) {
@@ -217,7 +219,8 @@ Quadruples sample_quadruples(Exec& exec, const Matches& matches,
   auto words = exec.buffer<std::uint32_t>(all_chunks * kWordsPerChunk);
   auto before = exec.filled<std::uint32_t>(all_chunks + 1, 0);
 
-  // As many matches as the largest pair can have, if they fit; the others read global memory.
+  // Shared memory for the matches of the largest pair, if they fit; larger pairs read global
+  // memory.
   constexpr std::size_t kBytesPerMatch = sizeof(float4) + sizeof(float2);
   const std::uint32_t fits = static_cast<std::uint32_t>(
       (exec.shared_bytes_per_block() - 1024 - kThreads / 32 * sizeof(WarpQueue)) / kBytesPerMatch);
@@ -231,15 +234,21 @@ Quadruples sample_quadruples(Exec& exec, const Matches& matches,
   const unsigned wanted = blocks_for(static_cast<std::size_t>(exec.multiprocessors()) * 8,
                                      static_cast<unsigned>(pairs));
   const unsigned blocks = std::max(1u, std::min(chunks, std::max(4u, wanted)));
+  SampleBatch batch{};
+  batch.room = matches.room.on_device.data();
+  batch.matches = matches.pairs.data();
+  batch.count = matches.count.data();
+  batch.hypotheses = options.quadruples.count;
+  batch.chunks = chunks;
+  batch.seed = options.seed;
+  batch.tau2 = options.quadruples.edge_similarity * options.quadruples.edge_similarity;
+  batch.words = words.data();
+  batch.chunk_count = before.data();
   sample<<<dim3(blocks, static_cast<unsigned>(pairs)), kThreads, shared_bytes, exec.stream()>>>(
-      SampleBatch{matches.room.on_device.data(), matches.pairs.data(), matches.count.data(),
-                  options.quadruples.count, chunks, options.seed,
-                  options.quadruples.edge_similarity * options.quadruples.edge_similarity,
-                  words.data(), before.data()},
-      capacity);
+      batch, capacity);
   check_launch("sample");
   exclusive_sum(exec, before.data(), before.data(), all_chunks + 1);
-  // One number per pair: the survivors in front of its first chunk.
+  // One number per pair: the survivors before its first chunk.
   std::uint32_t* starts = exec.staging<std::uint32_t>(pairs + 1);
   check(cudaMemcpy2DAsync(starts, sizeof(std::uint32_t), before.data(),
                           chunks * sizeof(std::uint32_t), sizeof(std::uint32_t), pairs,

@@ -6,11 +6,11 @@
 namespace gpureg::cuda {
 namespace {
 
-// hypotheses per multiprocessor up to which each gets a thread block of its own
+// Hypotheses per multiprocessor up to which each gets a thread block of its own.
 constexpr std::uint32_t kByBlock = 64;
 constexpr int kThreads = 896;
 constexpr std::size_t kPointBytes = sizeof(float2) + sizeof(float) + 1;
-// of shared memory beside what is staged
+// Shared memory besides the staged points.
 constexpr std::size_t kFixedBytes =
     kThreads / 32 * sizeof(WarpMemory) + 512 * sizeof(Limits) + 1024;
 
@@ -19,8 +19,8 @@ struct Slice {
   std::uint32_t pair, begin, end;
 };
 
-/// A thread block per hypothesis: the shortest way through a few of them, as no warp walks over a
-/// whole cloud.
+/// A thread block per hypothesis: the fastest way to score a few of them, as no warp iterates over
+/// a whole cloud.
 __global__ void __launch_bounds__(kProbeThreads) score_by_block(ScoreBatch b) {
   __shared__ Limits limits[512];
   __shared__ std::uint32_t agreeing[64];
@@ -45,7 +45,8 @@ __global__ void __launch_bounds__(kProbeThreads) score_by_block(ScoreBatch b) {
   }
 }
 
-/// next, most: of the thread block, in shared memory; most is what it knows of the pair's.
+/// next, most: of the thread block, in shared memory; most is its copy of the largest number of
+/// inliers of the pair.
 template <typename Points>
 __device__ void score_slice(const ScoreBatch& b, const Slice& slice, const Limits* limits,
                             const Staged<Points>& staged, WarpMemory& memory, std::uint32_t* next,
@@ -70,9 +71,9 @@ __device__ void score_slice(const ScoreBatch& b, const Slice& slice, const Limit
   }
 }
 
-/// Thread blocks take slices until none is left; in a slice the warps take hypotheses: how long one
-/// takes is not known before. The source's points and the target's table of bricks are in shared
-/// memory where they fit; the codes are left to the cache.
+/// Thread blocks take slices until none is left, and warps take hypotheses of a slice: the time of
+/// one is unpredictable. The points of the source and the target's table of bricks are in shared
+/// memory where they fit; the codes stay in the cache.
 __global__ void __launch_bounds__(kThreads, 1)
     score_slices(ScoreBatch b, const Slice* slices, std::uint32_t count, std::uint32_t bytes) {
   extern __shared__ float2 shared[];
@@ -131,8 +132,8 @@ std::vector<ScorePair> score_pairs(Span<const PairView> pairs, const Registratio
   for (const PairView& pair : pairs) {
     const auto& source = *static_cast<const CudaCloud*>(pair.source.executor_data);
     const auto& target = *static_cast<const CudaCloud*>(pair.target.executor_data);
-    // The cells know what is in reach of the distance that they were built for; of a shorter one
-    // they only know what is not.
+    // Covered cells refer to the distance that they were built for; for a shorter one they only
+    // refute.
     const float built = target.options.max_correspondence_distance;
     const bool exact = built * built == options.prepare.max_correspondence_distance *
                                             options.prepare.max_correspondence_distance;
@@ -151,11 +152,13 @@ std::vector<Limits> limit_tables(const RegistrationOptions& options) {
   return out;
 }
 
-/// Slices small enough to keep every multiprocessor busy to the end, large enough to be worth
-/// loading the points.
+/// Cuts slices small enough to keep every multiprocessor busy to the end, and large enough to
+/// amortise loading the points.
 std::vector<Slice> cut_slices(const Segments& segments, unsigned multiprocessors) {
+  // A warp's worth of hypotheses at least; eight slices per multiprocessor even out their times.
+  constexpr std::uint32_t kLeast = 32, kMost = 2048, kSlicesEach = 8;
   const std::uint32_t size =
-      std::max(32u, std::min(2048u, segments.total() / (multiprocessors * 8)));
+      std::max(kLeast, std::min(kMost, segments.total() / (multiprocessors * kSlicesEach)));
   std::vector<Slice> out;
   for (std::uint32_t p = 0; p < segments.entries(); ++p)
     for (std::uint32_t begin = segments.offset[p]; begin < segments.offset[p + 1]; begin += size)
@@ -188,26 +191,27 @@ DeviceBuffer<BestPose> score_hypotheses(Exec& exec, Span<const PairView> pairs,
   const auto by_misses = exec.buffer<std::uint32_t>(groups.total()),
              look_index = exec.buffer<std::uint32_t>(slots);
   const auto look_point = exec.buffer<float4>(slots), look_normal = exec.buffer<float4>(slots);
-  const ScoreBatch batch{
-      pairs_on_device.data(),
-      count,
-      hypotheses.segments->on_device.data(),
-      hypotheses.pose.data(),
-      hypotheses.valid.data(),
-      hypotheses.id,
-      inlier_test(options.prepare.max_correspondence_distance, options.quadruples.max_normal_angle),
-      limits.data(),
-      directions_on_device.data(),
-      code_test(options.quadruples.max_normal_angle),
-      inliers.data(),
-      leaders.data(),
-      most.data(),
-      next.data(),
-      groups.on_device.data(),
-      misses.data(),
-      refuted.data(),
-      by_misses.data(),
-      {look_point.data(), look_normal.data(), look_index.data()}};
+  ScoreBatch batch{};
+  batch.pairs = pairs_on_device.data();
+  batch.pair_count = count;
+  batch.offset = hypotheses.segments->on_device.data();
+  batch.poses = hypotheses.pose.data();
+  batch.valid = hypotheses.valid.data();
+  batch.id = hypotheses.id;
+  batch.test =
+      inlier_test(options.prepare.max_correspondence_distance, options.quadruples.max_normal_angle);
+  batch.limits = limits.data();
+  batch.directions = directions_on_device.data();
+  batch.code_test = code_test(options.quadruples.max_normal_angle);
+  batch.inliers = inliers.data();
+  batch.leaders = leaders.data();
+  batch.most = most.data();
+  batch.next = next.data();
+  batch.group_offset = groups.on_device.data();
+  batch.misses = misses.data();
+  batch.refuted = refuted.data();
+  batch.by_misses = by_misses.data();
+  batch.look = {look_point.data(), look_normal.data(), look_index.data()};
   if (total > 0) {
     const unsigned processors = static_cast<unsigned>(exec.multiprocessors());
     if (total <= processors * kByBlock) {
@@ -219,7 +223,7 @@ DeviceBuffer<BestPose> score_hypotheses(Exec& exec, Span<const PairView> pairs,
     score_samples(exec, batch, groups.largest);
     const std::vector<Slice> slices = cut_slices(*hypotheses.segments, processors);
     const auto slices_on_device = exec.upload(slices);
-    // What is not taken of the multiprocessor's memory is cache, which has the codes.
+    // The rest of the shared memory serves as cache, which holds the codes.
     const std::size_t room = exec.shared_bytes_per_block() > kFixedBytes
                                  ? exec.shared_bytes_per_block() - kFixedBytes
                                  : 0;

@@ -8,21 +8,21 @@
 
 namespace gpureg::cuda {
 
-/// groups of 32 points that tell promising hypotheses from others
+/// Groups of 32 points that rank hypotheses for the choice of leaders.
 constexpr std::uint32_t kProbeGroups = 4;
-/// promising hypotheses of a pair, which are scored first
+/// Leaders of a pair: likely hypotheses, scored first.
 constexpr std::uint32_t kLeaders = 32;
 constexpr int kProbeThreads = 256;
 
-/// Points with the class of their normal, normals (w: 0 where there is none), and their indices in
-/// the cloud.
+/// Points with the class of their normal, normals (w: 0 without one), and their indices in the
+/// cloud.
 struct LookOrder {
   float4* point;
   float4* normal;
   std::uint32_t* index;
 };
 
-/// What the kernels of scoring share.
+/// Arguments of the scoring kernels.
 struct ScoreBatch {
   const ScorePair* pairs;
   std::uint32_t pair_count;
@@ -34,17 +34,17 @@ struct ScoreBatch {
   const Limits* limits;  ///< 2 x 256
   const DirectionTables* directions;
   CodeTest code_test;
-  /// per hypothesis; kNoValue before it is scored, 0 where it was given up
+  /// per hypothesis; kNoValue before it is scored, 0 where it was abandoned
   std::uint32_t* inliers;
   /// pairs x kLeaders: (possible + 1, ~number), the largest of each residue class; 0: none
   unsigned long long* leaders;
   std::uint32_t* most;  ///< per pair: inliers of the best so far
-  std::uint32_t* next;  ///< slices handed out
-  /// per pair, of the arrays by group; 32 times that, of the arrays by point
+  std::uint32_t* next;  ///< number of slices taken
+  /// per pair: offset into the arrays by group, and 1/32 of that into the arrays by point
   const std::uint32_t* group_offset;
-  /// per group: points that a sample of the hypotheses leaves without a partner, by the codes
+  /// per group: points without a partner under the samples, by the codes
   std::uint32_t* misses;
-  /// per point of the scoring order: how often it looks like an inlier and is none
+  /// per point of the scoring order: how often its code passes although it is no inlier
   std::uint32_t* refuted;
   std::uint32_t* by_misses;  ///< groups of a pair, those with the most misses first
   LookOrder look;            ///< points of a pair, the most often refuted first
@@ -55,13 +55,13 @@ struct ScoreBatch {
   }
 };
 
-/// Both tables into shared memory, by all threads of the block.
+/// Loads both tables into shared memory, by all threads of the block.
 __device__ inline void load_limits(const Limits* from, Limits* to) {
   for (unsigned k = threadIdx.x; k < 512; k += blockDim.x) to[k] = from[k];
   __syncthreads();
 }
 
-/// Looks up every `step`th point of one pose from the first: how many are inliers, and the sum of
+/// Searches every `step`th point of one pose from the first on: number of inliers, and the sum of
 /// their residuals.
 __device__ inline unsigned long long support_by_search(const ScorePair& pair,
                                                        const InlierTest& test, const Rigid& rigid,
@@ -82,15 +82,15 @@ __device__ inline unsigned long long support_by_search(const ScorePair& pair,
   return residual;
 }
 
-/// Finds promising hypotheses of each pair.
+/// Finds the leaders of each pair: likely hypotheses.
 void find_leaders(Exec& exec, const ScoreBatch& batch);
 
-/// Scores the leaders and some others of each pair, and learns from them in which order to look at
-/// the points. What they reach the others must beat.
+/// Scores the leaders and some other hypotheses of each pair, and derives the order of the points
+/// from them. Their largest number of inliers is the bound for the other hypotheses.
 void score_samples(Exec& exec, const ScoreBatch& batch, std::uint32_t most_groups);
 
-/// Chooses the best of the hypotheses whose `inliers` are the pair's most: smallest residual, then
-/// lowest number.
+/// Selects among the hypotheses with the most inliers of their pair: smallest residual, then lowest
+/// index.
 DeviceBuffer<BestPose> select_best(Exec& exec, const ScoreBatch& batch, std::uint32_t total);
 
 }  // namespace gpureg::cuda

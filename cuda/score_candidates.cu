@@ -9,8 +9,8 @@ namespace {
 
 constexpr int kWarps = 4;  // candidates per thread block
 
-/// Weight of the points that the sample of each cloud looks at: a thread block per cloud (x: pair,
-/// y: source or target).
+/// Normal weight of the sampled points of each cloud: a thread block per cloud (x: pair, y: source
+/// or target).
 __global__ void __launch_bounds__(256)
     sampled_weight(const SearchPair* pairs, std::uint32_t sample, unsigned long long* out) {
   __shared__ unsigned long long sum;
@@ -26,7 +26,7 @@ __global__ void __launch_bounds__(256)
   if (threadIdx.x == 0) out[2 * blockIdx.x + blockIdx.y] = sum;
 }
 
-/// One side of one candidate, by a warp: what coarse_score() reads of it.
+/// Side evidence of one candidate for coarse_score(), by a warp.
 __device__ SideEvidence score_sample(const CloudView& moved, const CloudView& other,
                                      const CellSummaries& cells, const Rigid& pose,
                                      const EvidenceTest& test, std::uint32_t sample) {

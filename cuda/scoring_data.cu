@@ -14,13 +14,15 @@ namespace gpureg::cuda {
 namespace {
 
 constexpr int kCells = ClosestGridView::kBlockCells;
-/// Tables larger than this (a cloud with far stray points) are not worth their memory: then every
-/// point is looked at.
-constexpr std::uint64_t kMaxBlocks = std::uint64_t(1) << 22;
-/// BrickMotion counts cells, those of the empty blocks on both sides too, in 22 bits.
+using limits::kMaxSummaryBlocks;
+/// BrickMotion counts cells, including those of the empty blocks on both sides, in 22 bits.
 constexpr std::uint64_t kMaxBlocksAlong = (std::uint64_t(1) << 19) - 2;
 
 constexpr int kNumberThreads = 512;
+/// Steps of the golden section spread groups evenly, however many are read.
+constexpr double kGoldenSection = 0.6180339887;
+/// Bits of a Morton key: ten per coordinate.
+constexpr int kMortonBits = 30;
 
 struct Slot {
   CloudView view;
@@ -37,7 +39,7 @@ struct BrickPlace {
   std::uint32_t run, bit;
 };
 
-/// Where a quarter of a block is noted.
+/// Position of the bit of a quarter of a block.
 __device__ BrickPlace place_of_brick(const CellSummaries& v, Cell block, std::uint32_t upper_y,
                                      std::uint32_t upper_z) {
   const auto coordinate = [](std::int32_t c, float offset) {
@@ -70,7 +72,7 @@ __global__ void mark_bricks(const Slot* slots) {
   }
 }
 
-/// Numbers them in the order of the runs. A thread block per cloud.
+/// Numbers the bricks in the order of the runs. A thread block per cloud.
 __global__ void __launch_bounds__(kNumberThreads) number_bricks(const Slot* slots) {
   using Scan = cub::BlockScan<std::uint32_t, kNumberThreads>;
   __shared__ typename Scan::TempStorage storage;
@@ -107,7 +109,7 @@ __global__ void summarize(const Slot* slots, const DirectionTables* tables) {
                                                start[1] - start[0]};
     const bool empty = candidates.size == 0;
     const bool short_list = candidates.size < 256 && start[0] < (1u << 24);
-    // Eight lanes have the cells of a word.
+    // Eight lanes hold the cells of a word.
     std::uint32_t codes =
         empty ? 0u : code_of_cell(*tables, candidates, s.view.normals) << 4 * (cell & 7);
     for (int step = 1; step < 8; step *= 2) codes |= __shfl_xor_sync(~0u, codes, step);
@@ -198,8 +200,8 @@ ScoringLayout scoring_layout(const CudaCloud& cloud, const CellRange& blocks) {
   shape.ny = static_cast<std::int32_t>(ny);
   shape.nz = static_cast<std::int32_t>(nz);
   const bool fits = nx <= kMaxBlocksAlong && ny <= kMaxBlocksAlong && nz <= kMaxBlocksAlong &&
-                    nx * ny <= kMaxBlocks && nx * ny * nz <= kMaxBlocks &&
-                    shape.brick_runs() <= kMaxBlocks;
+                    nx * ny <= kMaxSummaryBlocks && nx * ny * nz <= kMaxSummaryBlocks &&
+                    shape.brick_runs() <= kMaxSummaryBlocks;
   if (fits) {
     l.nx = static_cast<std::int32_t>(nx);
     l.ny = static_cast<std::int32_t>(ny);
@@ -225,9 +227,9 @@ void place_scoring_data(const ScoringLayout& l, const ClosestGeometry& geometry,
                         CudaCloud& cloud) {
   CellSummaries& v = cloud.summaries;
   v.inverse_cell_size = 1.0f / geometry.cell_size;
-  v.offset = {-static_cast<float>(l.first_block.x) * 8.0f,
-              -static_cast<float>(l.first_block.y) * 8.0f,
-              -static_cast<float>(l.first_block.z) * 8.0f};
+  v.offset = {-static_cast<float>(l.first_block.x * ClosestGridView::kBlockEdge),
+              -static_cast<float>(l.first_block.y * ClosestGridView::kBlockEdge),
+              -static_cast<float>(l.first_block.z * ClosestGridView::kBlockEdge)};
   v.nx = l.nx;
   v.ny = l.ny;
   v.nz = l.nz;
@@ -248,12 +250,19 @@ void fill_scoring_data(Exec& exec, const std::vector<std::shared_ptr<CudaCloud>>
   std::uint32_t total = 0;
   for (std::size_t c = 0; c < clouds.size(); ++c) {
     CudaCloud& cloud = *clouds[c];
-    const CellSummaries& v = cloud.summaries;
     const std::uint32_t groups = cloud.order.groups;
-    std::uint32_t step = static_cast<std::uint32_t>(0.6180339887 * groups) | 1u;
+    std::uint32_t step = static_cast<std::uint32_t>(kGoldenSection * groups) | 1u;
     while (groups > 0 && std::gcd(step, groups) != 1) ++step;
-    slots.push_back({cloud.view_on_device, v, cloud.order, geometry[c], cloud.blocks,
-                     cloud.block_count, step, total});
+    Slot slot{};
+    slot.view = cloud.view_on_device;
+    slot.summaries = cloud.summaries;
+    slot.order = cloud.order;
+    slot.geometry = geometry[c];
+    slot.blocks = cloud.blocks;
+    slot.block_count = cloud.block_count;
+    slot.group_step = step;
+    slot.point_offset = total;
+    slots.push_back(slot);
     total += cloud.size;
   }
   if (total == 0) return;
@@ -274,8 +283,8 @@ void fill_scoring_data(Exec& exec, const std::vector<std::shared_ptr<CudaCloud>>
   write_morton_keys<<<dim3(16, count), 256, 0, exec.stream()>>>(on_device.data(), keys.data(),
                                                                 index.data());
   check_launch("write_morton_keys");
-  int bits = 30;
-  while ((std::size_t(1) << (bits - 30)) < clouds.size()) ++bits;
+  int bits = kMortonBits;
+  while ((std::size_t(1) << (bits - kMortonBits)) < clouds.size()) ++bits;
   sort_pairs(exec, keys, index, bits);
   write_order<<<dim3(16, count), 256, 0, exec.stream()>>>(on_device.data(), index.data(),
                                                           tables.data());

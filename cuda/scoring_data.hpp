@@ -4,8 +4,8 @@
 #include "exec.hpp"
 #include "stage_data.hpp"
 
-/// What scoring reads beside the cloud itself: cell summaries and the order of the points. Last
-/// step of assemble().
+/// Scoring data beside the cloud itself: cell summaries and the order of the points. Last step of
+/// assemble().
 namespace gpureg::cuda {
 
 struct ScoringLayout {

@@ -5,12 +5,14 @@
 #include <string>
 #include <vector>
 
+#include "common/limits.hpp"
 #include "exec.hpp"
 #include "gpureg/error.hpp"
 
 namespace gpureg::cuda {
 
-/// A batch laid end to end: the items of entry e are [offset[e], offset[e + 1]) of every array.
+/// A batch as one range per entry: the elements of entry e are [offset[e], offset[e + 1]) of every
+/// array.
 struct Segments {
   std::vector<std::uint32_t> offset;
   DeviceBuffer<std::uint32_t> on_device;
@@ -30,17 +32,17 @@ inline Segments segments_of(Exec& exec, std::vector<std::uint32_t> offset) {
   return s;
 }
 
-/// size(e): number of items of entry e. Throws InvalidArgument where the whole exceeds what 31 bits
-/// count.
+/// size(e): number of elements of entry e. Throws InvalidArgument where the total exceeds
+/// limits::kMaxPoints.
 template <typename Size>
 Segments make_segments(Exec& exec, std::size_t entries, Size&& size) {
   std::vector<std::uint32_t> offset{0};
   std::uint64_t sum = 0;
   for (std::size_t e = 0; e < entries; ++e) {
     sum += size(e);
-    if (sum > 0x7fffffffu)
+    if (sum > limits::kMaxPoints)
       throw InvalidArgument("a batch of " + std::to_string(sum) +
-                            " items exceeds 2^31 - 1: hand it over in parts");
+                            " elements exceeds 2^31 - 1: split it");
     offset.push_back(static_cast<std::uint32_t>(sum));
   }
   return segments_of(exec, std::move(offset));

@@ -6,7 +6,7 @@ namespace gpureg::cuda {
 namespace {
 
 constexpr int kThreads = 256;
-// thread blocks for a tie: mostly there is one a pair, and the walk over the cloud should be short
+// Thread blocks per tied hypothesis: there is mostly one per pair, so its cloud is split.
 constexpr std::uint32_t kParts = 8;
 constexpr int kRankThreads = 1024;
 
@@ -37,8 +37,8 @@ __global__ void __launch_bounds__(kThreads)
   }
 }
 
-/// The smallest residual of each pair, and the first drawn of those who have it. Hypotheses are in
-/// the order of their numbers, so the first is the lowest. One thread block: there are few ties.
+/// The smallest residual of each pair, and the first drawn of those with it. Hypotheses are in the
+/// order of their indices, so the first one is the lowest. One thread block: there are few ties.
 __global__ void __launch_bounds__(kRankThreads)
     write_best(ScoreBatch b, const std::uint32_t* ties, const std::uint32_t* count,
                const unsigned long long* residual, unsigned long long* least, std::uint32_t* winner,
@@ -53,7 +53,7 @@ __global__ void __launch_bounds__(kRankThreads)
   }
   __syncthreads();
   for (std::uint32_t p = threadIdx.x; p < b.pair_count; p += kRankThreads) {
-    BestPose out{0, 0, {0, 0, 0}, {1, 0, 0, 0, 0, 0, 0}};
+    BestPose out{0, 0, {0, 0, 0}, identity_pose<double>()};
     const std::uint32_t h = __ldcg(winner + p);
     if (h != kNoValue) {
       out.found = 1;

@@ -6,10 +6,11 @@ namespace gpureg::cuda {
 namespace {
 
 constexpr int kThreads = 256, kWarps = kThreads / 32;
-constexpr std::uint32_t kMaxCandidates = 32 * kThreads;  // a bit each in a thread's word
+static_assert(limits::kMaxSeeds <= 32 * kThreads, "a thread marks its candidates in one word");
 
-/// A thread block per pair takes the most promising candidate, the first of equals, drops all that
-/// are the same, and so on: what the CPU finds by going through them in order.
+/// A thread block per pair takes the candidate with the highest coarse score, the first of equals,
+/// drops all candidates of the same mode, and repeats: the result of the CPU, which processes them
+/// in order.
 __global__ void __launch_bounds__(kThreads)
     select(std::uint32_t most, const std::uint32_t* count, const Pose<float>* poses,
            const float* coarse_scores, const std::uint32_t* seeds, float min_trace,
@@ -26,7 +27,7 @@ __global__ void __launch_bounds__(kThreads)
     for (std::uint32_t bits = left; bits != 0; bits &= bits - 1) {
       const std::uint32_t k =
           (static_cast<std::uint32_t>(__ffs(static_cast<int>(bits))) - 1) * kThreads + threadIdx.x;
-      // Promises are not negative: their bits have their order.
+      // Scores are not negative, so their bits have their order.
       best = max(
           best,
           static_cast<unsigned long long>(__float_as_uint(coarse_scores[begin + k])) << 32 | ~k);
@@ -56,7 +57,6 @@ __global__ void __launch_bounds__(kThreads)
 }  // namespace
 
 Modes select_modes(Exec& exec, const Candidates& candidates, const RegistrationOptions& options) {
-  static_assert(kMaxCandidates >= 8192, "as many as there may be seeds");
   const std::size_t pairs = candidates.count.size();
   Modes out;
   out.most = options.evidence.modes;

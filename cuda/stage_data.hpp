@@ -12,22 +12,22 @@
 #include "pipeline/engine.hpp"
 #include "segments.hpp"
 
-/// What the CUDA stages hand on: arrays on the device, one for the whole batch, and what the host
-/// must know of them.
+/// Data between the CUDA stages: arrays on the device, one for the whole batch, and metadata on the
+/// host.
 namespace gpureg::cuda {
 
 struct CellRange {
   Cell lo, hi;
 };
 
-/// What the host knows of one cloud.
+/// Metadata of one cloud on the host.
 struct CloudFacts {
   float origin[3] = {0, 0, 0};
   float radius = 1;               ///< of the points about the origin, see CloudView
   Vec3 lo{0, 0, 0}, hi{0, 0, 0};  ///< corners of the raw points' box, local
   std::uint64_t input_points = 0, invalid_points = 0;
   std::vector<Vec3> viewpoints;         ///< local, at least one
-  bool turns_normals = false;           ///< the input's, by the viewpoints
+  bool turns_normals = false;           ///< input normals that face away are flipped
   std::uint32_t feature_dimension = 0;  ///< of the input; 0: none
   bool has_guides = false;
   std::size_t feature_offset = 0;  ///< floats before this cloud's input features
@@ -42,7 +42,7 @@ struct RawSlot {
   Vec3 origin;
 };
 
-/// The raw points, for those stages that still need them.
+/// Raw points, for the later stages that read them.
 struct RawClouds {
   DeviceBuffer<float> rows;  ///< of clouds that came from host memory
   Segments segments;
@@ -103,8 +103,8 @@ struct ClosestGrids {
   DeviceBuffer<CellEntry> table;
 };
 
-/// What is known of the cells of a closest-point grid, see algorithm/cell_summary.hpp and
-/// bricks.cuh. Arrays on the device.
+/// Summaries of the cells of a closest-point grid, see algorithm/cell_summary.hpp and bricks.cuh.
+/// Arrays on the device.
 struct CellSummaries {
   float inverse_cell_size = 1;
   Vec3 offset{0, 0, 0};                 ///< in cells: cell = p * inverse_cell_size + offset
@@ -130,8 +130,8 @@ struct CellSummaries {
   }
 };
 
-/// Points in groups of 32 neighbours; the groups spread over the cloud, so that the first few tell
-/// about the whole of it.
+/// Points in groups of 32 neighbours; the groups spread over the cloud, so the first few represent
+/// all of it.
 struct ScoringOrder {
   /// x, y, z, NaN where the last group has no more; w: the normal's class, see directions.hpp
   float4* point = nullptr;
@@ -140,23 +140,23 @@ struct ScoringOrder {
   std::uint32_t groups = 0;
 };
 
-/// What binary16 makes of features: the values themselves, or FPFH less its centre, turned, see
-/// nearest_feature.hpp.
+/// Content of the binary16 copies of features: the values themselves, or centred FPFH in the basis
+/// of nearest_feature.hpp.
 enum class HalfCopy : std::uint8_t { plain, turned };
 
-/// What the search reads beside features, see nearest_feature.hpp. Arrays on the device.
+/// Search data beside the features, see nearest_feature.hpp. Arrays on the device.
 struct FeatureAids {
   /// rounded to binary16, times *scale; null where the dimension or a length (over 1e15) forbids it
   std::uint16_t* half = nullptr;
   float* padded = nullptr;  ///< the rows filled up with zeros
-  /// bounds of the squared length; infinite where a row is not to be found
+  /// bounds of the squared length; infinite for rows outside the search
   float2* square = nullptr;
   float* error = nullptr;           ///< half of the distance of the bounds
   float* scale = nullptr;           ///< one for the cloud, a power of two
-  HalfCopy copy = HalfCopy::plain;  ///< what all but padded is of
+  HalfCopy copy = HalfCopy::plain;  ///< content of all arrays but padded
 };
 
-/// What the stages read of a fragment: pointers into one piece of memory, and what belongs to them.
+/// Arrays of a fragment: pointers into one piece of memory, and their metadata.
 struct CloudArrays {
   /// host struct of device pointers; executor_data is the CudaCloud
   CloudView view_on_device{};
@@ -167,8 +167,7 @@ struct CloudArrays {
   ScoringOrder order;
   FeatureAids narrow_aids, wide_aids;
 
-  /// The same arrays in a copy of the memory: every pointer from one piece to the other. A new
-  /// array has its line there.
+  /// The same arrays in a copy of the memory: moves every pointer. A new array needs a line there.
   CloudArrays moved(const char* from, char* to) const;
 };
 
@@ -212,12 +211,12 @@ struct Verification {
   Moments source, target;
 };
 
-/// The matches of a batch that candidates are made of, as kernels see them; see cpu::MatchSet.
+/// Matches of a batch for the candidates, in device memory; see cpu::MatchSet.
 struct MatchSetView {
   const float *px, *py, *pz, *qx, *qy, *qz;  ///< local points of source and target
   const float *mx, *my, *mz, *nx, *ny, *nz;  ///< their normals
   const std::uint32_t *source, *target;      ///< their indices
-  /// balanced over the normals of the pair's matches
+  /// Normal-space weights over the matches of the pair.
   const std::uint32_t *source_weight, *target_weight;
 };
 
@@ -237,23 +236,40 @@ struct MatchSets {
     const auto real = [&](int k) {
       return reinterpret_cast<const float*>(c + static_cast<std::size_t>(k) * n);
     };
-    return {real(0), real(1), real(2),  real(3),  real(4),    real(5),    real(6),    real(7),
-            real(8), real(9), real(10), real(11), c + 12 * n, c + 13 * n, c + 14 * n, c + 15 * n};
+    MatchSetView view{};
+    view.px = real(0);
+    view.py = real(1);
+    view.pz = real(2);
+    view.qx = real(3);
+    view.qy = real(4);
+    view.qz = real(5);
+    view.mx = real(6);
+    view.my = real(7);
+    view.mz = real(8);
+    view.nx = real(9);
+    view.ny = real(10);
+    view.nz = real(11);
+    view.source = c + 12 * n;
+    view.target = c + 13 * n;
+    view.source_weight = c + 14 * n;
+    view.target_weight = c + 15 * n;
+    return view;
   }
 };
 
-/// As many places per pair as there may be seeds.
+/// Seeds of a batch, with space for the largest possible number per pair.
 struct Seeds {
   std::uint32_t most = 0;             ///< per pair
   DeviceBuffer<std::uint32_t> match;  ///< pairs x most
   DeviceBuffer<std::uint32_t> count;  ///< per pair
 };
 
-/// Candidate poses, in the order of their seeds; as many places per pair as there may be seeds.
+/// Candidate poses in the order of their seeds, with space for the largest possible number per
+/// pair.
 struct Candidates {
   std::uint32_t most = 0;
   DeviceBuffer<Pose<float>> pose;
-  DeviceBuffer<std::uint32_t> seed;  ///< the match that it grew from
+  DeviceBuffer<std::uint32_t> seed;  ///< index of the seed match
   DeviceBuffer<MatchEvidence> matches;
   DeviceBuffer<float> coarse_score;
   DeviceBuffer<std::uint32_t> count;  ///< per pair

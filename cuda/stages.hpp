@@ -5,7 +5,7 @@
 #include "stage_data.hpp"
 
 /// The stages of the pipeline on the GPU: the names of src/cpu, on batches that stay on the device.
-/// What one item does is written once, in src/algorithm.
+/// The computation of one element is in src/algorithm.
 namespace gpureg::cuda {
 
 // Preparation, one entry per cloud.
@@ -16,7 +16,7 @@ DeviceBuffer<Vec3> estimate_normals(Exec& exec, const DownsampledClouds& clouds,
                                     float radius);
 Features compute_features(Exec& exec, DownsampledClouds& clouds, const DeviceBuffer<Vec3>& normals,
                           const Grids& grids, const PrepareOptions& options);
-/// FPFH of the second radius, of normals of a second radius, too; empty where there is none.
+/// FPFH of the wide radius, from normals of a wide radius; empty without one.
 Features compute_wide_features(Exec& exec, const DownsampledClouds& clouds, const Grids& grids,
                                const PrepareOptions& options);
 ClosestGrids build_closest_grids(Exec& exec, const DownsampledClouds& clouds, const Grids& grids,
@@ -47,22 +47,23 @@ DeviceBuffer<Verification> verify_poses(Exec& exec, Span<const PairView> pairs,
                                         const RegistrationOptions& options);
 
 // Alignment by compatibility and evidence, one entry per pair.
-/// Nearest features in both directions and of both radii, united; at most max_matches of them.
+/// Merges the nearest features in both directions and of both radii; keeps at most max_matches.
 MatchSets merge_matches(Exec& exec, Span<const PairView> pairs, const RegistrationOptions& options);
 /// Matches with the most compatible others, local maxima first.
 Seeds choose_seeds(Exec& exec, const MatchSets& matches, const RegistrationOptions& options);
-/// A pose for each seed whose neighbourhood determines one, in the order of the seeds, and the
-/// matches that it brings together.
+/// A pose for each seed with a determinate neighbourhood, in the order of the seeds, and the
+/// matches that it aligns.
 Candidates propose_poses(Exec& exec, const MatchSets& matches, const Seeds& seeds,
                          const RegistrationOptions& options);
 /// Adds the coarse_score: evidence from a sample of the points.
 void score_candidates(Exec& exec, Span<const PairView> pairs, const MatchSets& matches,
                       Candidates& candidates, const RegistrationOptions& options);
-/// The most promising distinct poses.
+/// Distinct poses with the highest coarse_score.
 Modes select_modes(Exec& exec, const Candidates& candidates, const RegistrationOptions& options);
 void refine_modes(Exec& exec, Span<const PairView> pairs, Modes& modes,
                   const RegistrationOptions& options);
-/// Modes that have met: the most promising of them stays.
+/// Merges modes that refinement moved to the same pose; keeps the one with the highest
+/// coarse_score.
 void merge_modes(Exec& exec, Modes& modes, const RegistrationOptions& options);
 /// Perturbed poses of the most likely mode of each pair; on the host.
 std::vector<PosesOfPair> search_degeneracies(Exec& exec, Span<const PairInput> inputs,

@@ -38,8 +38,8 @@ __global__ void march(SurfaceSideBatch f) {
        k += gridDim.x * blockDim.x)
     march_surface_side(box, words, f.points[begin + k / 2], f.normals[begin + k / 2], k % 2,
                        [&](std::uint32_t word, std::uint32_t bits) {
-                         // What is there already was marked by this step of others; bits only ever
-                         // come.
+                         // Bits already set come from other threads of this step; bits are only
+                         // ever added.
                          if ((words[word] & bits) != bits) atomicOr(words + word, bits);
                        });
 }

@@ -9,16 +9,16 @@
 
 namespace gpureg::cuda {
 
-/// Rows of the caller's, in any host memory, and where they are to lie tight on the device.
+/// Rows in any host memory, and their tight destination on the device.
 struct RowsToUpload {
   const float* rows;
   std::size_t count, width, stride;  ///< floats
   float* device;
 };
 
-/// Brings ordinary host memory to the device at the speed of the bus: some threads pack pieces into
-/// page-locked slots, which the device copies while the next are packed. The slots are few:
-/// page-locked memory is slow to come by.
+/// Uploads pageable host memory at the speed of the bus: several threads pack pieces into
+/// page-locked slots, which the device copies while they pack the next ones. The slots are few,
+/// because page-locked memory is slow to allocate.
 class Uploader {
  public:
   Uploader() = default;
@@ -26,7 +26,7 @@ class Uploader {
   Uploader(const Uploader&) = delete;
   Uploader& operator=(const Uploader&) = delete;
 
-  /// In order with the stream of that device. The rows may be changed when the call returns.
+  /// In the order of the stream. The rows may change when the call returns.
   void upload(Span<const RowsToUpload> parts, int device, cudaStream_t stream);
 
  private:

@@ -25,7 +25,7 @@ struct VerifyModes {
   ModeOutcome* out;
 };
 
-/// One of several blocks adds its part; a block alone writes.
+/// Adds the part of one of several blocks; a single block writes.
 template <typename T>
 __device__ void put(T& out, T value, bool alone) {
   using Atomic = std::conditional_t<sizeof(T) == 8, unsigned long long, unsigned>;
@@ -56,54 +56,57 @@ __device__ void put(Moments& out, const Moments& m, bool alone) {
   for (int k = 0; k < 6; ++k) put(out.outer[k], m.outer[k], alone);
 }
 
-/// Thread 0 has the whole block's.
+/// Sum over the block, in thread 0.
 __device__ SideEvidence of_block(const SideEvidence& e, std::int64_t* scratch) {
-  std::int64_t v[14] = {static_cast<std::int64_t>(e.normal_weighted),
-                        static_cast<std::int64_t>(e.residual),
-                        e.tested,
-                        e.inliers,
-                        e.hits,
-                        e.observed,
-                        e.violating,
-                        e.occluded,
-                        e.near_surface,
-                        e.front_violation_near,
-                        e.front_violation_far,
-                        e.behind_surface,
-                        static_cast<std::int64_t>(e.incidence_observed),
-                        static_cast<std::int64_t>(e.incidence_violating)};
+  std::int64_t v[14];
+  v[0] = static_cast<std::int64_t>(e.normal_weighted);
+  v[1] = static_cast<std::int64_t>(e.residual);
+  v[2] = static_cast<std::int64_t>(e.incidence_observed);
+  v[3] = static_cast<std::int64_t>(e.incidence_violating);
+  v[4] = e.tested;
+  v[5] = e.inliers;
+  v[6] = e.hits;
+  v[7] = e.observed;
+  v[8] = e.violating;
+  v[9] = e.occluded;
+  v[10] = e.near_surface;
+  v[11] = e.front_violation_near;
+  v[12] = e.front_violation_far;
+  v[13] = e.behind_surface;
   block_sum(v, scratch);
-  const auto count = [&](int k) { return static_cast<std::uint32_t>(v[k]); };
-  return {static_cast<std::uint64_t>(v[0]),
-          static_cast<std::uint64_t>(v[1]),
-          static_cast<std::uint64_t>(v[12]),
-          static_cast<std::uint64_t>(v[13]),
-          count(2),
-          count(3),
-          count(4),
-          count(5),
-          count(6),
-          count(7),
-          count(8),
-          count(9),
-          count(10),
-          count(11)};
+  SideEvidence sum{};
+  sum.normal_weighted = static_cast<std::uint64_t>(v[0]);
+  sum.residual = static_cast<std::uint64_t>(v[1]);
+  sum.incidence_observed = static_cast<std::uint64_t>(v[2]);
+  sum.incidence_violating = static_cast<std::uint64_t>(v[3]);
+  sum.tested = static_cast<std::uint32_t>(v[4]);
+  sum.inliers = static_cast<std::uint32_t>(v[5]);
+  sum.hits = static_cast<std::uint32_t>(v[6]);
+  sum.observed = static_cast<std::uint32_t>(v[7]);
+  sum.violating = static_cast<std::uint32_t>(v[8]);
+  sum.occluded = static_cast<std::uint32_t>(v[9]);
+  sum.near_surface = static_cast<std::uint32_t>(v[10]);
+  sum.front_violation_near = static_cast<std::uint32_t>(v[11]);
+  sum.front_violation_far = static_cast<std::uint32_t>(v[12]);
+  sum.behind_surface = static_cast<std::uint32_t>(v[13]);
+  return sum;
 }
 
 __device__ Moments of_block(const Moments& m, std::int64_t* scratch) {
-  std::int64_t v[10] = {static_cast<std::int64_t>(m.count),
-                        m.sum[0],
-                        m.sum[1],
-                        m.sum[2],
-                        m.outer[0],
-                        m.outer[1],
-                        m.outer[2],
-                        m.outer[3],
-                        m.outer[4],
-                        m.outer[5]};
+  std::int64_t v[10];
+  v[0] = static_cast<std::int64_t>(m.count);
+#pragma unroll
+  for (int k = 0; k < 3; ++k) v[1 + k] = m.sum[k];
+#pragma unroll
+  for (int k = 0; k < 6; ++k) v[4 + k] = m.outer[k];
   block_sum(v, scratch);
-  return {
-      static_cast<std::uint64_t>(v[0]), {v[1], v[2], v[3]}, {v[4], v[5], v[6], v[7], v[8], v[9]}};
+  Moments sum{};
+  sum.count = static_cast<std::uint64_t>(v[0]);
+#pragma unroll
+  for (int k = 0; k < 3; ++k) sum.sum[k] = v[1 + k];
+#pragma unroll
+  for (int k = 0; k < 6; ++k) sum.outer[k] = v[4 + k];
+  return sum;
 }
 
 __device__ MatchEvidence count_matches(const VerifyModes& w, std::uint32_t p, const Rigid& rigid,
@@ -125,8 +128,8 @@ __device__ MatchEvidence count_matches(const VerifyModes& w, std::uint32_t p, co
           static_cast<std::uint32_t>(v[0])};
 }
 
-/// A thread block per mode and side (z: even ones move the source, odd ones the target), or
-/// several.
+/// One or several thread blocks per mode and side (z: even ones move the source, odd ones the
+/// target).
 __global__ void __launch_bounds__(kThreads) verify(VerifyModes w) {
   __shared__ std::int64_t scratch[kThreads / 32 * 24];
   const std::uint32_t p = blockIdx.y;
@@ -194,23 +197,31 @@ void verify_modes(Exec& exec, Span<const PairView> pairs, const MatchSets& match
                   const Candidates& candidates, const Modes& modes,
                   const RegistrationOptions& options, Span<PairOutcome> outcomes) {
   const auto views = upload_search_pairs(exec, pairs);
-  // Filled: what no mode is written to is copied along, and parts are added up.
+  // Filled: unused modes are copied too, and parts are added up.
   const auto verified = exec.filled<ModeOutcome>(pairs.size * modes.most, 0);
   const auto& evidence = options.evidence;
   const EvidenceTest test{
       inlier_test(options.prepare.max_correspondence_distance, evidence.max_normal_angle),
       evidence.free_space_margin, evidence.min_range};
-  // Where there are too few blocks to fill the device, several share a mode.
+  // Several blocks share a mode where there are too few to fill the device.
   const std::size_t blocks = 2 * std::size_t(modes.most) * pairs.size,
                     processors = static_cast<std::size_t>(exec.multiprocessors());
   const unsigned parts =
       static_cast<unsigned>(std::clamp<std::size_t>(4 * processors / blocks, 1, 8));
+  VerifyModes batch{};
+  batch.pairs = views.data();
+  batch.matches = matches.view();
+  batch.room = matches.room.on_device.data();
+  batch.match_count = matches.count.data();
+  batch.most = modes.most;
+  batch.modes = modes.mode.data();
+  batch.count = modes.count.data();
+  batch.test = test;
+  batch.squared_distance =
+      options.compatibility.consensus_distance * options.compatibility.consensus_distance;
+  batch.out = verified.data();
   verify<<<dim3(modes.most, static_cast<unsigned>(pairs.size), 2 * parts), kThreads, 0,
-           exec.stream()>>>(VerifyModes{
-      views.data(), matches.view(), matches.room.on_device.data(), matches.count.data(), modes.most,
-      modes.mode.data(), modes.count.data(), test,
-      options.compatibility.consensus_distance * options.compatibility.consensus_distance,
-      verified.data()});
+           exec.stream()>>>(batch);
   check_launch("verify");
   const ModeOutcome* mode = exec.download(verified.data(), verified.size());
   const std::uint32_t* mode_count = exec.download(modes.count.data(), pairs.size);

@@ -17,10 +17,10 @@ __device__ void add(std::uint64_t* to, std::int64_t value) {
   atomicAdd(reinterpret_cast<unsigned long long*>(to), static_cast<unsigned long long>(value));
 }
 
-/// Thread blocks (y) of a pair (x) add up what their points say: whole numbers, so the order does
-/// not matter. out: zero before.
+/// Thread blocks (y) of a pair (x) add up integers over their points, independent of the order.
+/// out: zero before.
 __global__ void __launch_bounds__(kThreads)
-    judge(const SearchPair* pairs, const BestPose* poses, InlierTest test, Verification* out) {
+    verify(const SearchPair* pairs, const BestPose* poses, InlierTest test, Verification* out) {
   __shared__ std::int64_t scratch[kThreads / 32 * 12];
   const SearchPair& pair = pairs[blockIdx.x];
   const CloudView &source = pair.source, &target = pair.target;
@@ -85,12 +85,12 @@ DeviceBuffer<Verification> verify_poses(Exec& exec, Span<const PairView> pairs,
   const std::size_t parts = std::max<std::size_t>(
       2, std::min<std::size_t>(kMaxParts,
                                4 * exec.multiprocessors() / std::max<std::size_t>(1, pairs.size)));
-  judge<<<dim3(static_cast<unsigned>(pairs.size), static_cast<unsigned>(parts)), kThreads, 0,
-          exec.stream()>>>(views.data(), poses.data(),
-                           inlier_test(options.prepare.max_correspondence_distance,
-                                       options.quadruples.max_verification_normal_angle),
-                           out.data());
-  check_launch("judge");
+  verify<<<dim3(static_cast<unsigned>(pairs.size), static_cast<unsigned>(parts)), kThreads, 0,
+           exec.stream()>>>(views.data(), poses.data(),
+                            inlier_test(options.prepare.max_correspondence_distance,
+                                        options.quadruples.max_verification_normal_angle),
+                            out.data());
+  check_launch("verify");
   return out;
 }
 

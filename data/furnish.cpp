@@ -30,7 +30,7 @@ Rect footprint(const Affine3f& frame, const Piece& piece) {
   return r;
 }
 
-/// Fills one room: keeps what stands where, tries places until one is free.
+/// Furnishes one room: keeps the placed pieces, and tries locations until one is free.
 class Furnisher {
  public:
   Furnisher(House& house, const Room& room, std::uint64_t seed, Random random)

@@ -132,7 +132,7 @@ class Generator {
     report(++done_, total, stage);
   }
 
-  /// Where the odometry believes a fragment's cameras to be: the true motion plus an error that
+  /// Poses of a fragment's cameras by the odometry: the true motion plus an error that
   /// adds up frame by frame.
   std::vector<Eigen::Isometry3d> odometry(int first) const {
     std::vector<Eigen::Isometry3d> estimate(1, Eigen::Isometry3d::Identity());

@@ -45,7 +45,7 @@ struct Progress {
   /// done of total fragments in the named stage ("fragments", "ground truth"). Called from one
   /// thread at a time, not always the same.
   std::function<void(int done, int total, const char* stage)> report;
-  /// Asked before each frame and each row of pairs; any thread may ask, so it must be thread-safe.
+  /// Polled before each frame and each row of pairs by any thread, so it must be thread-safe.
   std::function<bool()> should_stop;
 };
 

@@ -14,7 +14,7 @@ struct Fragment {
 };
 
 /// Tells whether a cloud has a point within a fixed radius of a query. Read-only after
-/// construction: any thread may ask.
+/// construction: thread-safe.
 class NeighbourGrid {
  public:
   NeighbourGrid(const std::vector<Eigen::Vector3f>& points, float radius);

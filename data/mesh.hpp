@@ -46,7 +46,7 @@ class MeshBuilder {
   /// Where the following primitives go: world_from_object.
   void place(const Eigen::Affine3f& world_from_object) { frame_ = world_from_object; }
   const Eigen::Affine3f& frame() const { return frame_; }
-  /// What the following primitives are made of.
+  /// Material of the following primitives.
   void paint(const Material& material);
 
   void quad(const Eigen::Vector3f& a, const Eigen::Vector3f& b, const Eigen::Vector3f& c,

@@ -11,8 +11,8 @@ using Eigen::Vector2f;
 
 constexpr float kWall = 0.14f;  // thickness of the walls between rooms
 
-/// Rooms side by side from x = 0, all of one depth. Every second room repeats the width of its
-/// neighbour: twins alias.
+/// Rooms side by side from x = 0, all of one depth. Pairs of neighbours have the same width, which
+/// makes perceptual aliases.
 void add_row(House& house, Random& random, float bottom, float depth, int count, float height) {
   float x = 0, width = 0;
   for (int i = 0; i < count; ++i) {

@@ -17,7 +17,7 @@ inline std::uint64_t mix64(std::uint64_t x) {
   return x ^ (x >> 31);
 }
 
-/// What a random number is for: part of its key, so that no two uses share a stream.
+/// Purpose of a random number: part of its key, so that no two uses share a stream.
 enum class Purpose : std::uint64_t {
   house,
   furniture,

@@ -79,7 +79,7 @@ class Scatterer {
     }
   }
 
-  /// On a table, a shelf, a bed: what is between knee and breast.
+  /// On a table, a shelf, a bed: surfaces between knee and breast height.
   void put_small_thing() {
     for (int attempt = 0; attempt < 60; ++attempt) {
       const Vector2f at = any_place() + Vector2f(random_.normal(), random_.normal());

@@ -30,7 +30,7 @@ Vector2f place_in(const Room& room, const WalkMap& map, Random& random, const Ve
   return best;
 }
 
-/// A line that grows from place to place through what can be walked.
+/// A line that grows from place to place through walkable cells.
 class Line {
  public:
   Line(const WalkMap& map, const Vector2f& start) : map_(map), points_{start}, at_(start) {}

@@ -12,7 +12,7 @@ namespace gpureg::synthetic {
 
 constexpr float kTourSpacing = 0.02f;  ///< metres between the points of a tour
 
-/// Where somebody walks who sees everything and comes back to it, as long as wanted (metres): from
+/// Walk of a given length (metres) that observes everything and returns: from
 /// room to room, or, in a building that was read from a file, from place to place. A long tour
 /// begins with the short one. scene: the house's mesh. Throws InvalidArgument when there is no
 /// place to walk.

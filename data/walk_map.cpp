@@ -14,7 +14,7 @@ namespace {
 
 using Eigen::Vector2f;
 
-constexpr float kTall = 1.15f;  // metres; the camera is carried over what is lower
+constexpr float kTall = 1.15f;  // metres; the camera passes above lower things
 
 constexpr float kComfortable = 2;  // cost of a cell half a metre from walls, without furniture
 

@@ -13,9 +13,8 @@ namespace gpureg::synthetic {
 /// Where a person can walk: cells of 10 cm with the cost of a step, high near walls and furniture.
 class WalkMap {
  public:
-  static constexpr float kCell = 0.1f;  ///< metres
-  static constexpr float kHeadroom =
-      1.9f;  ///< metres that somebody needs, in a building from a file
+  static constexpr float kCell = 0.1f;      ///< metres
+  static constexpr float kHeadroom = 1.9f;  ///< metres of headroom, in a building from a file
 
   explicit WalkMap(const House& house);
   /// Of a mesh of which nothing is known: z up, floor at z = 0. The largest connected area that is
@@ -33,7 +32,7 @@ class WalkMap {
 
  private:
   void lay_out(const Eigen::Vector2f& low, const Eigen::Vector2f& high);
-  /// Costs from what is solid (a wall or tall furniture) and where low furniture stands, per cell.
+  /// Costs per cell from solid cells (walls, tall furniture) and low furniture.
   void price(const std::vector<std::uint8_t>& solid,
              const std::vector<std::uint8_t>& low_furniture);
   void keep_largest_area();

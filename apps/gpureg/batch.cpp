@@ -136,7 +136,7 @@ class Batch {
                 << " of an unfinished run is there; all pairs are aligned" << std::endl;
   }
 
-  /// Only a whole run replaces what another one left; what an interrupted one wrote is its own.
+  /// Only a complete run replaces the outputs of another run; an interrupted run keeps its own.
   void keep_outputs() {
     if (journal_ && journal_->wrote_outputs()) return;
     for (const std::string& path : {o_.log, o_.info, o_.json})
@@ -279,7 +279,7 @@ void add_batch(CLI::App& app, Action& chosen) {
   verb->add_flag("--quiet", o->quiet, "No progress, no summary");
   verb->callback([o, &chosen] {
     chosen = [o] {
-      o->method.registration();  // what is wrong with it shall be said before clouds are read
+      o->method.registration();  // reports bad options before the clouds are read
       check_outputs(*o);
       choose_voxel_size(*o);
       return Batch(*o).run();

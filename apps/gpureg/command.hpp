@@ -6,14 +6,13 @@
 
 namespace gpureg::cli {
 
-/// What the command tells its caller. Errors are exceptions up to main(), which turns them into
-/// bad_input.
+/// Exit status of the command. Errors are exceptions up to main(), which turns them into bad_input.
 enum ExitStatus { kOk = 0, kNoAlignment = 1, kBadInput = 2, kInterrupted = 130 };
 
-/// What main() runs once the command line is read; returns the exit status.
+/// Action that main() runs after parsing; returns the exit status.
 using Action = std::function<int()>;
 
-/// Each verb adds its subcommand and sets chosen when the user asks for it.
+/// Each verb adds its subcommand and sets chosen where the command line names it.
 void add_register(CLI::App& app, Action& chosen);
 void add_batch(CLI::App& app, Action& chosen);
 void add_consistency(CLI::App& app, Action& chosen);

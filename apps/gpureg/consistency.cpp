@@ -54,8 +54,8 @@ RegistrationResult result_of(const PairRecord& record) {
   return result;
 }
 
-/// The record with its confidence in view of all pairs, beside its own score. The chosen mode comes
-/// first, as readers of results expect.
+/// The record with its confidence from all pairs beside its own score. The chosen mode is first, as
+/// readers of results expect.
 Json consistent_record(const PairRecord& record, const PairConsistency& pair,
                        double min_confidence) {
   Json json = record.json;
@@ -76,7 +76,7 @@ Json consistent_record(const PairRecord& record, const PairConsistency& pair,
     const double alone = first["confidence"].get<double>();
     const double overlap = first.value("overlap_confidence", alone);
     first["confidence"] = pair.confidence;
-    // Loops tell whether the pose is correct, and nothing about the overlap.
+    // Loops determine the correctness of a pose, not its overlap.
     first["overlap_confidence"] =
         alone > 0 ? pair.confidence * std::min(1.0, overlap / alone) : 0.0;
     json["T_ij"] = first["T_ij"];
@@ -84,7 +84,7 @@ Json consistent_record(const PairRecord& record, const PairConsistency& pair,
   return json;
 }
 
-// The same loops would count as new evidence, and poses that were chosen by them as first choices.
+// A second run would count the same loops as new evidence.
 void refuse_consistent(const ResultFile& file) {
   bool done = file.document.contains("loop_consistency");
   for (const PairRecord& pair : file.pairs) done |= pair.json.contains("loop_consistency");

@@ -62,7 +62,7 @@ void print_table(const char* rule, const std::vector<SceneEvaluation>& scenes, s
   }
 }
 
-// What a reader would otherwise take for counted.
+// Notes on the numbers that are not counted.
 void print_notes(const SceneEvaluation& scene) {
   const ResultFile& result = scene.result;
   const auto note = [&](long long number, const char* what) {

@@ -16,7 +16,8 @@ struct SceneEvaluation {
   evaluation::Evaluation evaluation;
 };
 
-/// The tables of recall, precision and time, and what did not count, on standard output.
+/// Prints the tables of recall, precision and time, and notes on uncounted pairs, to standard
+/// output.
 void print_tables(const std::vector<SceneEvaluation>& scenes);
 
 }  // namespace gpureg::cli

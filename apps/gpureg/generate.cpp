@@ -32,7 +32,7 @@ std::string mark_of(const std::string& folder) {
 // Scans of another origin may have the same names.
 void check_folder(const std::string& folder) {
   namespace fs = std::filesystem;
-  std::error_code error;  // what else is wrong with the folder comes up when it is written
+  std::error_code error;  // other errors of the folder appear when it is written
   if (!fs::is_directory(folder, error) || fs::exists(mark_of(folder), error)) return;
   if (!fs::is_empty(folder, error) && !error)
     throw IoError(folder + " is not empty and, without a " + kMark +

@@ -12,7 +12,7 @@ class InterruptGuard {
   InterruptGuard(const InterruptGuard&) = delete;
   InterruptGuard& operator=(const InterruptGuard&) = delete;
 
-  static bool requested();  ///< any thread may ask
+  static bool requested();  ///< thread-safe
 };
 
 }  // namespace gpureg::cli

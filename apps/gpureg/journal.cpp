@@ -57,7 +57,7 @@ void refuse_unfinished(const std::string& path, const std::string& text) {
 
 void Journal::check(const std::string& path, Mode mode) {
   const int fd = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
-  if (fd < 0) return;  // none, or what the constructor complains about
+  if (fd < 0) return;  // no journal, or an error that the constructor reports
   try {
     lock(fd, path);
     if (mode == Mode::fresh) refuse_unfinished(path, read_text(path));
@@ -140,7 +140,7 @@ void Journal::flush() {
     const ssize_t n = ::write(fd_, pending_.data() + written, pending_.size() - written);
     if (n < 0 && errno == EINTR) continue;
     if (n < 0) {
-      // What did go out may end in the middle of a line; nothing must ever follow it.
+      // The written part may end in the middle of a line; nothing may follow it.
       const int error = errno;
       pending_.clear();
       fail(path_, "write", error);

@@ -10,12 +10,12 @@
 
 namespace gpureg::cli {
 
-/// What a batch has done so far, beside its output: a line that says what the run is, then one line
-/// per pair. A kill at any moment leaves whole lines and at most one torn line at the end, which is
-/// cut off when the run goes on.
+/// Journal of a batch beside its output: a line that identifies the run, then one line per pair. A
+/// kill at any moment leaves complete lines and at most one torn line at the end, which a resumed
+/// run truncates.
 class Journal {
  public:
-  /// What becomes of a journal that is there: fresh refuses one that holds pairs.
+  /// Treatment of an existing journal: fresh refuses one that holds pairs.
   enum class Mode { fresh, resume, restart };
 
   struct Entry {
@@ -24,16 +24,16 @@ class Journal {
   };
   using Entries = std::map<std::pair<int, int>, Entry>;
 
-  /// Opens or creates. header: what must be the same for a run to go on; resume: take up what is
-  /// there (refused where headers differ). Throws IoError, also where another process writes the
+  /// Opens or creates the journal. header: identity of the run; resume: continue an existing
+  /// journal, refused where headers differ. Throws IoError, also where another process writes the
   /// same journal.
   Journal(std::string path, const Json& header, Mode mode);
   ~Journal();
   Journal(const Journal&) = delete;
   Journal& operator=(const Journal&) = delete;
 
-  /// What can be refused before there is a header, and hours of work: a journal that another
-  /// process writes, and with fresh one that holds pairs. Changes nothing. Throws IoError.
+  /// Early check, before the header and hours of work: refuses a journal that another process
+  /// writes, and with fresh one that holds pairs. Changes nothing. Throws IoError.
   static void check(const std::string& path, Mode mode);
 
   const Entries& entries() const { return entries_; }

@@ -33,8 +33,8 @@ struct MethodOptions {
   /// Throws InvalidArgument naming field and value, or options that do not go together.
   RegistrationOptions registration() const;
 
-  /// Where the voxel size is automatic: makes it the one that the clouds suggest. what: for the
-  /// message. Throws InvalidArgument where they suggest none.
+  /// Sets an automatic voxel size to the suggestion of the clouds. what: for the message. Throws
+  /// InvalidArgument without a suggestion.
   void choose_voxel_size(const std::vector<PointCloudView>& clouds, const std::string& what);
 
   /// Throws BackendUnavailable, InvalidArgument.
@@ -44,7 +44,7 @@ struct MethodOptions {
   const CLI::App* verb_ = nullptr;
 };
 
-/// Refuses what is no number of 64 bits without a sign.
+/// Refuses texts that are not unsigned 64-bit numbers.
 CLI::Validator natural_number();
 
 }  // namespace gpureg::cli

@@ -4,7 +4,7 @@
 
 namespace gpureg::cli {
 
-// The verb exists everywhere, so that a script hears why it does not work here.
+// The verb exists in every build, so that a script gets the reason for its absence.
 void add_generate(CLI::App& app, Action& chosen) {
   CLI::App* verb = app.add_subcommand("generate", "Not in this build: it was made without Embree");
   verb->allow_extras();

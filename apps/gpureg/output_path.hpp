@@ -6,8 +6,8 @@
 
 namespace gpureg::cli {
 
-/// Throws IoError where path cannot become a file: found out before the work, not after hours of
-/// it. Empty paths are fine.
+/// Throws IoError where the path cannot become a file: checked before hours of work. Empty paths
+/// are accepted.
 void check_output(const std::string& path);
 
 /// A file as the command line names it.

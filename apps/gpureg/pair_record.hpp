@@ -18,7 +18,7 @@ struct PairRecord {
   bool aligned = false;
   std::string reason;
   double score = 0;
-  /// probability of a right pose and of 30 % overlap, where it was estimated
+  /// probability of a correct pose and of 30 % overlap, where estimated
   std::optional<double> strict_score;
   std::optional<Eigen::Matrix4d> transform;  ///< T_ij: fragment j into fragment i
   double milliseconds = 0;                   ///< all stages
@@ -26,7 +26,7 @@ struct PairRecord {
 
   static PairRecord from_result(int i, int j, const RegistrationResult& result);
 
-  /// Throws InvalidArgument saying what is wrong with the record.
+  /// Throws InvalidArgument with the reason.
   static PairRecord from_json(const Json& json);
 };
 

@@ -23,7 +23,7 @@ struct ResultFile {
   double mean_prepare_milliseconds() const;  ///< per fragment; 0 where not known
 };
 
-/// Told apart by content. Throws IoError naming the file and what is wrong.
+/// Recognises the format by content. Throws IoError naming the file and the reason.
 ResultFile read_result(const std::string& path);
 
 /// Throws IoError naming file and place where a result cannot be one of the scene that the truth is

@@ -21,7 +21,7 @@ Json to_json(const PrepareStatistics& prepare);  ///< counts, and "ms" per stage
 /// there is none), statistics, ms.
 Json to_json(const RegistrationResult& result, const char* pose_name);
 
-/// What ran where: version and backend.
+/// Version and backend of the run.
 Json environment(const Context& context);
 
 /// Peak resident memory of this process in MiB, as the system counts it.

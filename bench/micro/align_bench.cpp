@@ -5,7 +5,7 @@
 namespace gpureg::bench {
 namespace {
 
-/// The whole way through the public door, with the paper's preset.
+/// A complete alignment through the public API, with the preset of LoopSmart.
 void PrepareCloud(benchmark::State& state) {
   Scene& s = Scene::get();
   const Context context = Context::cpu(static_cast<unsigned>(state.range(0)));

@@ -12,7 +12,7 @@ void BuildDepthMaps(benchmark::State& state) {
 }
 BENCHMARK(BuildDepthMaps)->Unit(benchmark::kMillisecond);
 
-/// What stages after the normals start from.
+/// Input of the stages after the normals.
 struct WithNormals {
   explicit WithNormals(EvidenceScene& s)
       : points(cpu::downsample(s.exec, {s.raw, 1}, s.options.prepare)),

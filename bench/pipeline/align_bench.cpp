@@ -40,7 +40,10 @@ void align_many(benchmark::State& state, const std::string& backend,
     for (const Pair& pair : all_pairs()) pairs.push_back(pair);
   std::vector<RegistrationResult> results = align_batch(*on, clouds, all_pairs(), options);
   std::size_t runs = 0;
-  for (auto _ : state) results = align_batch(*on, clouds, pairs, options), ++runs;
+  for (auto _ : state) {
+    results = align_batch(*on, clouds, pairs, options);
+    ++runs;
+  }
   report(state, results, runs);
 }
 
@@ -98,7 +101,7 @@ void redwood_sized(benchmark::State& state, const std::string& backend) {
   for (std::uint32_t step = 1; pairs.size() < 5280; ++step)
     for (std::uint32_t i = 0; i + step < 207 && pairs.size() < 5280; ++i)
       if (step % scene.size() != 0) pairs.push_back({i + step, i});
-  // A context of its own: what others have made it keep would hide what this takes.
+  // A new context: memory reserved by other benchmarks would hide the use of this one.
   const Context on = new_context(backend);
   align_batch(on, prepare_batch(on, {raw.begin(), raw.begin() + 20}, options.prepare), all_pairs(),
               options);

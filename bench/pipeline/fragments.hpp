@@ -20,7 +20,7 @@ std::vector<Pair> all_pairs();
 /// Means over the results, and milliseconds per pair of that many runs.
 void report(benchmark::State& state, const std::vector<RegistrationResult>& results,
             std::size_t runs);
-/// What the context has taken of its devices' memory.
+/// Memory that the context has reserved on its devices.
 void report_memory(benchmark::State& state, const Context& context);
 
 /// Of a backend by name: "cpu", "cuda" (device 0), "cuda_all" (every device).

@@ -69,7 +69,7 @@ __global__ void fit(const MatchedPoints* m, const std::uint32_t* match_count,
     source[c] = m[q.match[c]].source;
     target[c] = m[q.match[c]].target;
   }
-  Pose<float> pose{1, 0, 0, 0, 0, 0, 0};
+  Pose<float> pose = identity_pose<float>();
   valid[k] = fit_rigid(source, target, pose);
   poses[k] = pose;
 }

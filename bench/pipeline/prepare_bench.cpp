@@ -46,7 +46,10 @@ void prepare_batch_of_fragments(benchmark::State& state, const std::string& back
   const RegistrationOptions options = preset(options_name);
   std::vector<PreparedCloud> clouds = prepare_batch(*on, views(), options.prepare);
   std::size_t runs = 0;
-  for (auto _ : state) clouds = prepare_batch(*on, views(), options.prepare), ++runs;
+  for (auto _ : state) {
+    clouds = prepare_batch(*on, views(), options.prepare);
+    ++runs;
+  }
   report(state, clouds, runs);
 }
 

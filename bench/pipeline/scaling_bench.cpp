@@ -113,7 +113,7 @@ void pair_by_default(benchmark::State& state) {
   const auto raw = scans(hall, 2, static_cast<std::size_t>(state.range(0)) * 10);
   const RegistrationOptions options =
       RegistrationOptions::from_voxel_size(voxel_for(hall, state.range(0)));
-  // A context of its own: what others have made it keep would hide what this takes.
+  // A new context: memory reserved by other benchmarks would hide the use of this one.
   const Context on = new_context("cuda");
   const auto clouds = prepare_batch(on, views_of(raw), options.prepare);
   std::vector<RegistrationResult> results{align(on, clouds[1], clouds[0], options)};

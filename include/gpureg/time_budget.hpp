@@ -15,7 +15,7 @@ struct TimedResult {
   std::uint32_t quality = 0;
   std::uint32_t highest_quality = 0;  ///< the highest level run
   std::uint32_t levels = 0;           ///< number of levels run; some in between may be left out
-  double milliseconds = 0;  ///< wall time of the whole call
+  double milliseconds = 0;            ///< wall time of the whole call
 };
 
 /// align() at the highest quality that a budget of wall time allows. Runs levels of quality upwards

@@ -1,19 +1,20 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include "common/limits.hpp"
 #include "math/span.hpp"
 #include "math/vec3.hpp"
 
 namespace gpureg {
 
-/// Integer cell of a regular grid, and its packing into one sortable word: z, y, x with 21 bits
+/// Integer cell of a regular grid. Keys pack it into one sortable word: z, y, x with kCellBits bits
 /// each.
 struct Cell {
   std::int32_t x, y, z;
 };
 
-/// cells reach from -2^20 to 2^20 - 1 along each axis
-constexpr std::int32_t kCellBias = 1 << 20;
+/// Added to coordinates in keys: cells reach from -kCellBias to kCellBias - 1 along each axis.
+constexpr std::int32_t kCellBias = limits::kMaxCells;
 constexpr std::uint64_t kEmptyKey = ~std::uint64_t(0);
 
 GPUREG_HD std::int32_t floor_to_int(float v) {
@@ -27,16 +28,18 @@ GPUREG_HD Cell cell_of(Vec3 p, float inverse_size) {
 }
 
 GPUREG_HD std::uint64_t cell_key(Cell c) {
-  return (static_cast<std::uint64_t>(static_cast<std::uint32_t>(c.z + kCellBias)) << 42) |
-         (static_cast<std::uint64_t>(static_cast<std::uint32_t>(c.y + kCellBias)) << 21) |
+  return (static_cast<std::uint64_t>(static_cast<std::uint32_t>(c.z + kCellBias))
+          << (2 * limits::kCellBits)) |
+         (static_cast<std::uint64_t>(static_cast<std::uint32_t>(c.y + kCellBias))
+          << limits::kCellBits) |
          static_cast<std::uint64_t>(static_cast<std::uint32_t>(c.x + kCellBias));
 }
 
 GPUREG_HD Cell cell_from_key(std::uint64_t key) {
-  const std::uint64_t mask = (1u << 21) - 1;
+  const std::uint64_t mask = (std::uint64_t(1) << limits::kCellBits) - 1;
   return {static_cast<std::int32_t>(key & mask) - kCellBias,
-          static_cast<std::int32_t>((key >> 21) & mask) - kCellBias,
-          static_cast<std::int32_t>((key >> 42) & mask) - kCellBias};
+          static_cast<std::int32_t>((key >> limits::kCellBits) & mask) - kCellBias,
+          static_cast<std::int32_t>((key >> (2 * limits::kCellBits)) & mask) - kCellBias};
 }
 
 /// True where the cell is inside the range that keys can hold.
@@ -45,8 +48,8 @@ GPUREG_HD bool in_key_range(Cell c) {
          c.z >= -kCellBias && c.z < kCellBias;
 }
 
-/// Entry of an open-addressing table from cell keys to indices. Which slot a key has depends on the
-/// order of insertion; what a look-up returns does not, so the table may be filled in parallel.
+/// Entry of an open-addressing table from cell keys to indices. The slot of a key depends on the
+/// order of insertion, the result of a look-up does not; the table may be filled in parallel.
 struct CellEntry {
   std::uint64_t key;
   std::uint32_t value;

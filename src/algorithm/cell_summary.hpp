@@ -5,16 +5,16 @@
 
 namespace gpureg {
 
-// What lets scoring decide most points without looking at a single target point: one word per cell
-// of the closest-point grid. Its low bytes are the mean normal of the cell's candidates, each
-// coordinate a signed byte; then comes a code: bit 7 = every place in the cell has a candidate in
-// reach, bits 0..6 = largest angle between the mean and a candidate's normal in steps of 1.5
-// degrees (127: no bound). Bounds only: no result depends on the last bit of a summary.
+// Summaries of the cells of a closest-point grid: bounds that decide most points without reading a
+// target point. One word per cell: three signed bytes of the mean normal of the candidates, then a
+// code. Bit 7 of the code: every location in the cell has a candidate within the search distance.
+// Bits 0 to 6: largest angle between the mean and the normal of a candidate, in steps of 1.5
+// degrees (127: no bound). No result depends on the last bit of a summary.
 
 constexpr double kSummaryAngleStep = 1.5;
 constexpr int kSummaryNoBound = 127;
-/// Rounding a unit vector to steps of 1/127 turns it by less than this many degrees, and changes
-/// its length by less than this part; a little more, for moved normals that are kept in 30 bits.
+/// Upper bounds of the rotation (degrees) and of the relative change of length of a unit vector
+/// when its coordinates are rounded to steps of 1/127. They also cover normals packed in 30 bits.
 constexpr double kSummaryQuantisation = 0.6;
 constexpr double kSummaryStretch = 0.009;
 constexpr double kDegrees = 3.14159265358979323846 / 180.0;
@@ -60,13 +60,16 @@ GPUREG_HD std::uint32_t summarize_cell(Span<const std::uint32_t> candidates, Vec
          static_cast<std::uint32_t>(step | (covered ? 128 : 0)) << 24;
 }
 
-/// Cosines between a moved normal and a cell's mean normal below which no candidate agrees, and
-/// from which on all agree and one is in reach; by code. On the host only.
+/// Limits of the cosine between a moved normal and the mean normal of a cell, by code. Below the
+/// first no candidate passes the normal test; above the second all pass, and one is within the
+/// distance. Host only.
 struct SummaryLimits {
+  /// Margin for the rounding of a cosine in float.
+  static constexpr float kCosineRounding = 1e-5f;
   float none_below[256];
   float all_above[256];
 
-  /// exact_distance: the correspondence distance asked for is the one that the grid was built for.
+  /// exact_distance: the correspondence distance is that of the grid.
   SummaryLimits(float max_normal_angle_degrees, bool exact_distance) {
     for (int code = 0; code < 256; ++code) {
       const int step = code & 127;
@@ -76,20 +79,20 @@ struct SummaryLimits {
       all_above[code] = 2.0f;
       const bool covered = (code & 128) != 0 && exact_distance;
       if (angle >= 180.0) {
-        // Without a normal test only reach decides.
+        // Without a normal test the distance alone decides.
         if (covered) all_above[code] = -2.0f;
       } else if (step != kSummaryNoBound) {
-        // The mean's length is not quite 1, which stretches the cosine either way.
+        // The length of the rounded mean differs from 1, which scales the cosine up or down.
         const double widest = std::cos((angle + spread) * kDegrees),
                      narrowest = std::cos((angle - spread) * kDegrees);
         if (angle + spread < 180.0)
           none_below[code] = static_cast<float>(widest * (widest > 0 ? 1 - kSummaryStretch
                                                                      : 1 + kSummaryStretch)) -
-                             1e-5f;
+                             kCosineRounding;
         if (covered && angle - spread > 0.0)
           all_above[code] = static_cast<float>(narrowest * (narrowest > 0 ? 1 + kSummaryStretch
                                                                           : 1 - kSummaryStretch)) +
-                            1e-5f;
+                            kCosineRounding;
       }
     }
     // Code 0 is a cell without candidates (a real one has a spread of at least one step): no

@@ -5,10 +5,10 @@
 
 namespace gpureg {
 
-/// View of a closest-point grid: space around a cloud cut into cells (a third of the search
-/// distance), and for each cell the short list of points that can be the closest one to some place
-/// in it (the paper's 3-D grid keeps one point a cell and loses neighbours; here none within the
-/// search distance is lost). Cells come in blocks of 8 x 8 x 8, only near the surface.
+/// View of a closest-point grid: cells of a third of the search distance, and for each cell the
+/// list of all points that are the nearest neighbour of some location in it. (LoopSmart keeps one
+/// point per cell, which loses neighbours.) Cells come in blocks of 8 x 8 x 8, only near the
+/// surface.
 struct ClosestGridView {
   static constexpr int kBlockEdge = 8;
   static constexpr int kBlockCells = kBlockEdge * kBlockEdge * kBlockEdge;
@@ -27,8 +27,8 @@ struct Closest {
 GPUREG_HD Closest closest_candidate(const std::uint32_t* candidates, std::uint32_t first,
                                     std::uint32_t last, const Vec3* points, Vec3 q,
                                     float max_squared) {
-  // No branch on the distance: which candidate wins is a coin toss that no processor predicts.
-  // Candidates ascend, so "less" keeps the lower index among equals.
+  // No branch on the distance: processors cannot predict the winner. Candidates ascend, so "less"
+  // keeps the lower index among equals.
   Closest best{kNoValue, 3.402823466e38f};
   for (std::uint32_t k = first; k < last; ++k) {
     const std::uint32_t i = candidates[k];

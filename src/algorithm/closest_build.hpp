@@ -5,19 +5,27 @@
 
 namespace gpureg {
 
-/// Geometry of a closest-point grid. All lengths are widened by margin, which covers the rounding
-/// of point coordinates and of the division into cells: a candidate too many costs a comparison,
-/// one too few a wrong answer.
+/// Geometry of a closest-point grid. margin widens all lengths and covers the rounding of
+/// coordinates and of the division into cells. A superfluous candidate costs a comparison, a
+/// missing one a wrong result.
 struct ClosestGeometry {
   float cell_size;
   float search_distance;
   float margin;
 };
 
+/// Cells per search distance, along each axis.
+constexpr float kCellsPerSearchDistance = 3.0f;
+/// Margins: a share of the cell, and the rounding of coordinates of this magnitude in float.
+constexpr float kCellMargin = 1e-3f, kCoordinateRounding = 2e-6f;
+/// Half the diagonal of a unit cube, rounded up.
+constexpr float kHalfDiagonal = 0.8660255f;
+
 GPUREG_HD ClosestGeometry closest_geometry(float search_distance, float cloud_radius) {
-  const float cell = search_distance / 3.0f;
-  // Queries that can still meet a point reach search_distance beyond the cloud.
-  return {cell, search_distance, 1e-3f * cell + (cloud_radius + search_distance) * 2e-6f};
+  const float cell = search_distance / kCellsPerSearchDistance;
+  // Queries within search_distance of the cloud can have a nearest neighbour.
+  return {cell, search_distance,
+          kCellMargin * cell + (cloud_radius + search_distance) * kCoordinateRounding};
 }
 
 GPUREG_HD Vec3 cell_center(Cell c, float size) {
@@ -25,15 +33,15 @@ GPUREG_HD Vec3 cell_center(Cell c, float size) {
           (static_cast<float>(c.z) + 0.5f) * size};
 }
 
-/// True where point p, at distance d from the cell's centre, can be within the search distance of
-/// some place in the cell.
+/// True where a point at this distance from the centre of a cell is within the search distance of
+/// some location in the cell.
 GPUREG_HD bool can_reach_cell(float distance, const ClosestGeometry& g) {
-  return distance <= g.search_distance + 0.8660255f * g.cell_size + g.margin;
+  return distance <= g.search_distance + kHalfDiagonal * g.cell_size + g.margin;
 }
 
-/// True where every place in the cell is closer to p (which is nearest to its centre) than to q,
-/// rounding included. The difference of the squared distances is linear over the cell, so its
-/// smallest value is at a corner.
+/// True where every location in the cell is closer to p (the point nearest to its centre) than to
+/// q, rounding included. The difference of the squared distances is linear over the cell, so its
+/// minimum is at a corner.
 GPUREG_HD bool dominated_in_cell(Vec3 center, Vec3 p, Vec3 q, const ClosestGeometry& g) {
   const Vec3 d = q - p;
   const float l1 = (d.x < 0 ? -d.x : d.x) + (d.y < 0 ? -d.y : d.y) + (d.z < 0 ? -d.z : d.z);
@@ -41,8 +49,8 @@ GPUREG_HD bool dominated_in_cell(Vec3 center, Vec3 p, Vec3 q, const ClosestGeome
   return at_center > l1 * (g.cell_size + 2.0f * g.margin) + 8.0f * g.margin * g.margin;
 }
 
-/// Edge of a block, how far a point's reach goes, and how far from a block's centre (along an axis)
-/// a point can matter to it.
+/// Edge of a block; search distance of a point with margins; largest distance from the centre of a
+/// block, along an axis, at which a point matters to it.
 GPUREG_HD float block_edge(const ClosestGeometry& g) {
   return static_cast<float>(ClosestGridView::kBlockEdge) * g.cell_size;
 }
@@ -53,21 +61,21 @@ GPUREG_HD float block_reach(const ClosestGeometry& g) {
   return 0.5f * block_edge(g) + g.search_distance + 2.0f * g.margin;
 }
 
-/// Who is farther from a cell's centre than this is never the closest: nearest is the distance of
-/// the point nearest to the centre.
+/// Upper bound on the distance from the centre of a cell at which a point can still be the nearest
+/// neighbour of a location in the cell. nearest: distance of the point nearest to the centre.
 GPUREG_HD float candidate_limit(float nearest, const ClosestGeometry& g) {
-  const float half_diagonal = 0.8660255f * g.cell_size;
+  const float half_diagonal = kHalfDiagonal * g.cell_size;
   const float by_nearest = nearest + 2.0f * half_diagonal,
               by_search = g.search_distance + half_diagonal;
   return (by_search < by_nearest ? by_search : by_nearest) + 2.0f * g.margin;
 }
 
-/// False where point p is never the answer in a cell whose centre is nearest to another point,
-/// best. after_best: p has the higher index.
+/// False where point p is the nearest neighbour of no location in a cell. best: the point nearest
+/// to the centre of the cell. after_best: p has the higher index.
 GPUREG_HD bool can_win_in_cell(Vec3 center, Vec3 best, Vec3 p, bool after_best,
                                const ClosestGeometry& g) {
   if (dominated_in_cell(center, best, p, g)) return false;
-  // Of points in the very same place only the first can win.
+  // Of coincident points only the first one is ever found.
   return !(after_best && p.x == best.x && p.y == best.y && p.z == best.z);
 }
 

@@ -7,13 +7,13 @@
 
 namespace gpureg {
 
-/// A prepared cloud as alignment reads it. Pointers are on the executor's side; points are relative
-/// to the cloud's local origin.
+/// View of a prepared cloud for alignment. Pointers are on the side of the executor; points are
+/// relative to the local origin of the cloud.
 struct CloudView {
   const Vec3* points;
   const Vec3* normals;
   const float* features;            ///< size x feature_dimension
-  const std::uint8_t* has_feature;  ///< 0: the row is not to be matched
+  const std::uint8_t* has_feature;  ///< 0: the row is never matched
   std::uint32_t size;
   std::uint32_t feature_dimension;
   float radius;  ///< largest distance of a point from the local origin, > 0

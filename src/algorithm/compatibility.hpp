@@ -6,20 +6,21 @@
 
 namespace gpureg {
 
-/// Philox counter word 3 of the order of matches
-constexpr std::uint32_t kTagMatch = 0x4d415443u;
-constexpr std::uint32_t kTagTriangle = 0x54524941u;  ///< and of the members of triangles
+/// Philox counter word 3, one constant per use of randomness: order of matches, members of
+/// triangles.
+constexpr std::uint32_t kTagMatch = 0x4d415443u;     ///< "MATC"
+constexpr std::uint32_t kTagTriangle = 0x54524941u;  ///< "TRIA"
 
-/// A match as the compatibility test sees it: its points and their normals.
+/// Points and normals of a match, for the compatibility test.
 struct OrientedMatch {
   Vec3 p, q;  ///< in the source, in the target
   Vec3 m, n;  ///< normals of p, of q
 };
 
-/// How far the distances and angles of compatible matches may differ.
+/// Tolerances of the compatibility test.
 struct CompatibilityTest {
-  float squared_tolerance;
-  float squared_turn;  ///< of the cosines
+  float squared_tolerance;  ///< of the distances
+  float squared_turn;       ///< of the cosines
 };
 
 /// Two lengths differ by less than the tolerance. a, b: their squares. Without roots: with x =
@@ -31,9 +32,8 @@ GPUREG_HD bool similar_lengths(float a, float b, float squared_tolerance) {
          (sum <= squared_tolerance);
 }
 
-/// Two matches are compatible where the motion that brings one together may bring the other
-/// together: a rigid motion keeps the distance of their points (SC2-PCR, Chen et al. 2022) and the
-/// angle of their normals.
+/// Two matches are compatible where one rigid motion may satisfy both: it keeps the distance of
+/// their points (SC2-PCR, Chen et al. 2022) and the angle of their normals.
 GPUREG_HD bool compatible(const OrientedMatch& a, const OrientedMatch& b,
                           const CompatibilityTest& test) {
   const float turn = dot(a.m, b.m) - dot(a.n, b.n);
@@ -41,9 +41,9 @@ GPUREG_HD bool compatible(const OrientedMatch& a, const OrientedMatch& b,
          (turn * turn <= test.squared_turn);
 }
 
-/// Rank of a match in the order that decides which are kept where there are too many, and which
-/// members of a crowded neighbourhood are looked at: random, but a function of the match and the
-/// seed alone. The match itself breaks ties.
+/// Random rank of a match, a function of the match and the seed alone. It decides which matches are
+/// kept where there are too many, and which members of a large neighbourhood take part. Indices
+/// break ties.
 GPUREG_HD std::uint32_t match_order(std::uint32_t source, std::uint32_t target,
                                     std::uint64_t seed) {
   return philox(source, target, 0, kTagMatch, static_cast<std::uint32_t>(seed),
@@ -51,7 +51,7 @@ GPUREG_HD std::uint32_t match_order(std::uint32_t source, std::uint32_t target,
       .v[0];
 }
 
-/// The two members that make triangle number `trial` with the seed (member 0) of a neighbourhood of
+/// The two members that form triangle number `trial` with the seed (member 0) of a neighbourhood of
 /// `members` >= 3.
 struct TrianglePick {
   std::uint32_t a, b;
@@ -65,17 +65,20 @@ GPUREG_HD TrianglePick pick_triangle(std::uint32_t source, std::uint32_t target,
   return {1 + scale_to(w.v[0], members - 1), 1 + scale_to(w.v[1], members - 1)};
 }
 
-/// No side of the triangle is too short to tell a direction.
+/// True where no side of the triangle is too short to determine a direction.
 GPUREG_HD bool wide_triangle(Vec3 p0, Vec3 p1, Vec3 p2, float squared_length) {
   return (squared_norm(p1 - p0) >= squared_length) & (squared_norm(p2 - p0) >= squared_length) &
          (squared_norm(p2 - p1) >= squared_length);
 }
 
-/// Strength of a match as a seed: the number of its compatible matches times its normal weight. By
-/// the number alone floors and walls, whose matches are many and alike, would take all seeds.
-/// degree <= 2^16, weight <= 2^17.
+/// Strength of a match as a seed: the number of its compatible matches times its normal weight.
+/// Without the weight, floors and walls with their many similar matches take all seeds. degree <=
+/// 2^16, weight <= 2^17.
+/// Bits that the strength drops, so that it fits 24 bits.
+constexpr int kStrengthShift = 10;
 GPUREG_HD std::uint32_t seed_strength(std::uint32_t degree, std::uint32_t weight) {
-  return static_cast<std::uint32_t>((static_cast<std::uint64_t>(degree) * weight) >> 10);
+  return static_cast<std::uint32_t>((static_cast<std::uint64_t>(degree) * weight) >>
+                                    kStrengthShift);
 }
 
 /// The total order of seeds: local maxima of the degree first, then the stronger, then the earlier

@@ -9,11 +9,12 @@
 namespace gpureg {
 
 /// Evidence of one side of a pose: counts over the points of one cloud moved into the other.
-/// Integers only, so that every order of summation gives the same bits.
+/// Integers, so that every order of summation gives the same bits.
 struct SideEvidence {
   std::uint64_t normal_weighted;  ///< sum of the normal weights of the inliers
   std::uint64_t residual;         ///< of the inliers, see fixed_residual
-  /// Sums of incidence(), the best of all viewpoints, over the points observed and violating.
+  /// Sums of incidence(), the maximum over the viewpoints, of the observed and of the violating
+  /// points.
   std::uint64_t incidence_observed, incidence_violating;
   std::uint32_t tested;        ///< points compared
   std::uint32_t inliers;       ///< closest point within the distance, normals within the angle
@@ -22,7 +23,7 @@ struct SideEvidence {
   std::uint32_t violating;     ///< in observed free space, without a point within the distance
   std::uint32_t occluded;      ///< behind every surface observed in their direction
   std::uint32_t near_surface;  ///< in a marked cell of the other cloud, see surface_sides.hpp
-  /// Points without a hit that lie on no surface, by the first side that holds.
+  /// Points without a hit outside surface cells, each counted at the first side that applies.
   std::uint32_t front_violation_near, front_violation_far, behind_surface;
 };
 
@@ -39,7 +40,7 @@ struct EvidenceTest {
   float margin, min_range;
 };
 
-/// Sums of the information matrix of the inliers: 21 entries of J'J and the sum of the arms, as in
+/// Sums for the information matrix of the inliers: 21 entries of J'J and the sum of the arms, as in
 /// IcpSums.
 struct InformationSums {
   std::int64_t v[21];
@@ -130,7 +131,8 @@ GPUREG_HD std::uint32_t sample_stride(std::uint32_t points, std::uint32_t most) 
   return points <= most ? 1u : (points + most - 1) / most;
 }
 
-/// Number of depth maps that the coarse score compares.
+/// Number of depth maps that the coarse score compares: one, as the others cost more time than they
+/// add to the ranking.
 GPUREG_HD std::uint32_t coarse_score_maps(const VisibilityView& maps) {
   return maps.count < 1 ? maps.count : 1;
 }
@@ -155,6 +157,10 @@ inline float mode_trace(float degrees) {
       1.0 + 2.0 * std::cos(static_cast<double>(degrees) * 3.14159265358979323846 / 180.0));
 }
 
+/// Exponent of the coarse score per unit of free-space violation: a violation of 17 % on one side
+/// halves the score.
+constexpr float kViolationPenalty = 4.0f;
+
 /// Coarse score of a candidate, which orders candidates before refinement: root of the match
 /// support times the normal-weighted overlap of both sides, reduced by free-space violations.
 /// match_share: in [0, 1]; weight_a, weight_b: normal weight of each side's whole sample.
@@ -166,8 +172,8 @@ GPUREG_HD float coarse_score(float match_share, const SideEvidence& a, float wei
       a.observed > 0 ? static_cast<float>(a.violating) / static_cast<float>(a.observed) : 0.0f;
   const float vb =
       b.observed > 0 ? static_cast<float>(b.violating) / static_cast<float>(b.observed) : 0.0f;
-  // 1 / (series of e^x): e^-x without a library's exp, whose last bit differs between machines.
-  const float x = 4.0f * (va + vb);
+  // 1 / (series of e^x): an exp of a library differs between machines in its last bit.
+  const float x = kViolationPenalty * (va + vb);
   const float growth =
       fmaf(x, fmaf(x, fmaf(x, fmaf(x, 1.0f / 24.0f, 1.0f / 6.0f), 0.5f), 1.0f), 1.0f);
   return sqrtf(match_share) * overlap / growth;

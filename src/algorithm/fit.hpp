@@ -18,8 +18,12 @@ GPUREG_HD void add_covariance(Vec3 a, Vec3 b, float (&s)[3][3]) {
   s[2][2] = fmaf(a.z, b.z, s[2][2]);
 }
 
-/// Rigid motion that turns the cross-covariance s of centred pairs best (Horn 1987: the largest
-/// eigenvector of a 4 x 4 matrix, by Jacobi with fixed sweeps); cp, cq: the centroids. False where
+/// Relative gap of the two largest eigenvalues below which a rotation is undetermined, well above
+/// the rounding of float.
+constexpr float kMinEigenvalueGap = 1e-4f;
+
+/// Least-squares rigid motion from the cross-covariance s of centred pairs (Horn 1987: the largest
+/// eigenvector of a 4 x 4 matrix, by Jacobi with fixed sweeps). cp, cq: the centroids. False where
 /// the points do not determine a rotation (collinear or coincident).
 GPUREG_HD bool solve_rigid(const float (&s)[3][3], Vec3 cp, Vec3 cq, Pose<float>& pose) {
   float n[4][4], v[4][4];
@@ -34,7 +38,7 @@ GPUREG_HD bool solve_rigid(const float (&s)[3][3], Vec3 cp, Vec3 cq, Pose<float>
   n[1][3] = n[3][1] = s[2][0] + s[0][2];
   n[2][3] = n[3][2] = s[1][2] + s[2][1];
   jacobi_eigen<4, 6>(n, v);
-  // By comparison, not by index: an array that is indexed at run time lives in memory on the GPU.
+  // Comparisons instead of an index: the GPU keeps arrays with a run-time index in memory.
   float largest = n[0][0], second = -3.402823466e38f;
   float w = v[0][0], x = v[1][0], y = v[2][0], z = v[3][0];
   for (int k = 1; k < 4; ++k) {
@@ -46,8 +50,9 @@ GPUREG_HD bool solve_rigid(const float (&s)[3][3], Vec3 cp, Vec3 cq, Pose<float>
     y = more ? v[2][k] : y;
     z = more ? v[3][k] : z;
   }
-  // Collinear points leave the turn about their line open: the two largest eigenvalues meet.
-  if (!(largest > 0.0f) || !(largest - second > 1e-4f * largest)) return false;
+  // For collinear points the two largest eigenvalues are equal: the rotation about their line is
+  // free.
+  if (!(largest > 0.0f) || !(largest - second > kMinEigenvalueGap * largest)) return false;
   const float length = sqrtf(fmaf(w, w, fmaf(x, x, fmaf(y, y, z * z))));
   pose.w = w / length;
   pose.x = x / length;

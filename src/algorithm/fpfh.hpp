@@ -6,15 +6,14 @@
 
 namespace gpureg {
 
-/// On the host only. The normals that the wide FPFH describes are those of a neighbourhood that is
-/// wider by as much: it looks at the cloud as if that were coarser, where noise has no say. With
-/// the normals of the narrow radius each of the two would err by the same. At most what
-/// prepare.normal_radius may be: cells are half a feature radius wide, and a neighbourhood of many
-/// thousands of them would take hours.
+/// Radius of the normals for the wide FPFH, wider in the same ratio as the features. At this
+/// coarser scale noise averages out; normals of the narrow radius would give both features the same
+/// errors. At most kMaxRadiusRatio feature radii: cells are half a feature radius wide, and a ball
+/// of many thousands of cells takes hours. Host only.
 inline float wide_normal_radius(float normal_radius, float feature_radius,
                                 float wide_feature_radius) {
   const float wide = normal_radius * (wide_feature_radius / feature_radius),
-              most = 4.0f * feature_radius;
+              most = limits::kMaxRadiusRatio * feature_radius;
   return wide < most ? wide : most;
 }
 
@@ -42,7 +41,7 @@ GPUREG_HD PairFeature pair_feature(Vec3 p1, Vec3 n1, Vec3 p2, Vec3 n2) {
   const float a2 = dot(n2, d) / length;
   float phi = a1;
   if ((a1 < 0.0f ? -a1 : a1) < (a2 < 0.0f ? -a2 : a2)) {
-    // The point whose normal is closer to the connecting line is the source, which makes the
+    // The point with the normal closer to the connecting line is the source, which makes the
     // feature symmetric.
     const Vec3 swap = n1;
     n1 = n2;
@@ -65,9 +64,9 @@ GPUREG_HD PairFeature pair_feature(Vec3 p1, Vec3 n1, Vec3 p2, Vec3 n2) {
   return f;
 }
 
-/// Simplified histogram of one point: integer counts over its neighbours with a normal, which makes
-/// their order irrelevant. Returns the number of neighbours that the counts are relative to (PCL:
-/// all neighbours but the point itself).
+/// Simplified histogram of one point: integer counts over its neighbours with a normal, independent
+/// of their order. Returns the number of neighbours for normalisation (PCL: all neighbours but the
+/// point itself).
 GPUREG_HD int spfh_counts(const GridView& grid, Span<const Vec3> normals, std::uint32_t self,
                           Vec3 p, float radius, std::uint32_t* counts) {
   for (int b = 0; b < kFpfhSize; ++b) counts[b] = 0;
@@ -93,8 +92,8 @@ GPUREG_HD float spfh_value(std::uint32_t count, int neighbors) {
                        : 0.0f;
 }
 
-/// Scales each of the three histograms to a sum of 100. False where one is empty: such a point has
-/// no feature.
+/// Scales each of the three histograms to a sum of 100. False where one is empty: the point has no
+/// feature.
 GPUREG_HD bool normalize_fpfh(float* histogram) {
   for (int part = 0; part < 3; ++part) {
     float sum = 0.0f;
@@ -107,9 +106,9 @@ GPUREG_HD bool normalize_fpfh(float* histogram) {
   return true;
 }
 
-/// FPFH of one point: the neighbours' simplified histograms weighted by 1 / squared distance (as
-/// PCL), each part scaled to 100. spfh: rows of kFpfhSize. False where there is none; the row is
-/// then zero.
+/// FPFH of one point: sum of the simplified histograms of the neighbours with weights 1 / squared
+/// distance (as PCL), each part scaled to 100. spfh: rows of kFpfhSize. False, and a zero row,
+/// where there is none.
 GPUREG_HD bool weighted_fpfh(const GridView& grid, Span<const Vec3> normals, const float* spfh,
                              std::uint32_t self, Vec3 p, float radius, float* out) {
   for (int b = 0; b < kFpfhSize; ++b) out[b] = 0.0f;

@@ -16,15 +16,18 @@ struct GridView {
   Span<const std::uint32_t> index;       ///< of the sorted points in the cloud
 };
 
+/// Factor that covers the rounding of a ball's corners into cells.
+constexpr float kBallMargin = 1.0001f;
+
 /// Calls visit(index, point, squared_distance) for every point within radius of q, q itself
 /// included, in cell order: z, y, x, then index. The order is part of the contract, because the
 /// sums over neighbours are floating point.
 template <typename Visit>
 GPUREG_HD void for_each_neighbor(const GridView& grid, Vec3 q, float radius, Visit&& visit) {
   const float r2 = radius * radius;
-  // A hair more than the radius: the rounding of p * inverse must not lose a neighbour on the
+  // Slightly more than the radius: the rounding of p * inverse must not lose a neighbour at the
   // border of a cell.
-  const float reach = radius * 1.0001f;
+  const float reach = radius * kBallMargin;
   const Cell lo = cell_of({q.x - reach, q.y - reach, q.z - reach}, grid.inverse_cell_size);
   const Cell hi = cell_of({q.x + reach, q.y + reach, q.z + reach}, grid.inverse_cell_size);
   for (std::int32_t z = lo.z; z <= hi.z; ++z)

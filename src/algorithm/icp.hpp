@@ -6,14 +6,14 @@
 
 namespace gpureg {
 
-/// Normal equations of point-to-plane ICP: 21 entries of J'WJ (lower triangle, row by row), 6 of
-/// J'Wr. Sums are 2^-40 fixed point in 64 bits: integer addition has no order, so threads and
-/// blocks may add in any.
+/// Normal equations of point-to-plane ICP: 21 entries of J'WJ (lower triangle, row by row) and 6 of
+/// J'Wr, in 2^-40 fixed point. Integer sums have the same bits in any order, so threads and blocks
+/// add concurrently.
 struct IcpSums {
   std::int64_t v[27];
 };
 
-/// 2^40; terms are at most 1, so 2^22 points fit
+/// 2^40: terms are at most 1, so the sums of 2^22 points fit 64 bits.
 constexpr float kIcpFixedScale = 1099511627776.0f;
 
 GPUREG_HD std::int64_t to_icp_fixed(float term) {
@@ -41,7 +41,10 @@ GPUREG_HD float robust_weight(float residual, float kernel_width) {
   return f * f;
 }
 
-constexpr double kSettled = 1e-3;  ///< of the max distance
+/// Step length that ends the iteration, as a share of the max distance.
+constexpr double kSettled = 1e-3;
+/// Damping: a share of the trace, and an absolute part for empty sums.
+constexpr double kRelativeDamping = 1e-6, kAbsoluteDamping = 1e-12;
 
 struct IcpStep {
   double omega[3];
@@ -49,11 +52,11 @@ struct IcpStep {
   bool valid;
 };
 
-/// Gauss-Newton step from the sums. radius: length of the arms' unit; max_distance: unit of the
-/// residual. A small damping keeps a sliding pair (a lone plane, a corridor) where it is instead of
-/// letting rounding push it along.
+/// Gauss-Newton step from the sums. radius: unit of the arms; max_distance: unit of the residual. A
+/// small damping keeps the pose in directions without information (a lone plane, a corridor);
+/// rounding would move it there.
 GPUREG_HD IcpStep solve_icp(const IcpSums& sums, float radius, float max_distance) {
-  const double unit = 1.0 / 1099511627776.0;
+  const double unit = 1.0 / static_cast<double>(kIcpFixedScale);
   double a[6][6], b[6], x[6];
   int k = 0;
   double trace = 0.0;
@@ -63,7 +66,7 @@ GPUREG_HD IcpStep solve_icp(const IcpSums& sums, float radius, float max_distanc
       if (i == j) trace += a[i][j];
     }
   for (int i = 0; i < 6; ++i) b[i] = -static_cast<double>(sums.v[k++]) * unit;
-  const double damping = 1e-6 * trace + 1e-12;
+  const double damping = kRelativeDamping * trace + kAbsoluteDamping;
   for (int i = 0; i < 6; ++i) a[i][i] += damping;
   IcpStep step;
   step.valid = solve_cholesky6(a, b, x);
@@ -75,8 +78,8 @@ GPUREG_HD IcpStep solve_icp(const IcpSums& sums, float radius, float max_distanc
   return step;
 }
 
-/// True where the step moves no point by more than that share of the max distance: the iteration
-/// has settled.
+/// True where the step moves no point by more than `share` of the max distance: the iteration has
+/// settled.
 GPUREG_HD bool icp_settled(const IcpStep& step, float radius, float max_distance, double share) {
   const double turn =
       step.omega[0] * step.omega[0] + step.omega[1] * step.omega[1] + step.omega[2] * step.omega[2];

@@ -5,14 +5,14 @@
 
 namespace gpureg {
 
-/// What makes a moved source point an inlier.
+/// Test of an inlier: closest point within the distance, normals within the angle.
 struct InlierTest {
   float max_squared;  ///< of the correspondence distance
   float inverse_max_squared;
   float min_cosine;  ///< between the normals; -1: no test
 };
 
-/// On the host only: the cosine is libm's, and both executors must be handed the same one.
+/// Host only: libm computes the cosine, and both executors must get the same bits.
 inline InlierTest inlier_test(float max_distance, float max_normal_angle_degrees) {
   const float max_squared = max_distance * max_distance;
   const double angle =

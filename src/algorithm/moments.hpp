@@ -6,15 +6,18 @@
 namespace gpureg {
 
 /// Count, sum and second moments (xx, xy, xz, yy, yz, zz) of points over a radius, in 2^-40 fixed
-/// point: no order of summation.
+/// point: every order of summation gives the same bits.
 struct Moments {
   std::uint64_t count;
   std::int64_t sum[3];
   std::int64_t outer[6];
 };
 
+/// 2^40: terms are at most 1, so the sums of 2^22 points fit 64 bits.
+constexpr float kMomentFixedScale = 1099511627776.0f;
+
 GPUREG_HD std::int64_t to_moment_fixed(float term) {
-  return static_cast<std::int64_t>(term * 1099511627776.0f);
+  return static_cast<std::int64_t>(term * kMomentFixedScale);
 }
 
 /// p: local point times 1 / radius, |p| <= 1.

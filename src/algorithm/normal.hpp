@@ -6,10 +6,14 @@
 
 namespace gpureg {
 
-/// Normal of the plane through the neighbours of q by PCA, sign undecided; zero with fewer than 3
-/// neighbours (q included) or where the neighbours have no plane (all in one place or on one line).
+/// Variances, in units of the squared radius, below which neighbours count as one location, and
+/// ratio of the two largest ones below which they count as one line: the rounding of float.
+constexpr float kMinVariance = 1e-12f, kMinPlaneRatio = 1e-5f;
+
+/// Normal of the plane through the neighbours of q by PCA, with arbitrary sign. Zero with fewer
+/// than 3 neighbours (q included), or where they lie in one location or on one line.
 GPUREG_HD Vec3 plane_normal(const GridView& grid, Vec3 q, float radius) {
-  // Offsets from q in units of the radius: sums stay near 1, so that float holds them whatever the
+  // Offsets from q in units of the radius: sums stay near 1, where float is accurate, whatever the
   // unit of the cloud.
   const float scale = 1.0f / radius;
   int n = 0;
@@ -43,8 +47,8 @@ GPUREG_HD Vec3 plane_normal(const GridView& grid, Vec3 q, float radius) {
   const int i = (lo + 1) % 3, j = (lo + 2) % 3;
   const float hi = a[i][i] > a[j][j] ? a[i][i] : a[j][j];
   const float mid = a[i][i] > a[j][j] ? a[j][j] : a[i][i];
-  // On a line the middle eigenvalue is rounding only: any normal would be an invention.
-  if (!(hi > 1e-12f) || !(mid > 1e-5f * hi)) return {0.0f, 0.0f, 0.0f};
+  // On a line the middle eigenvalue is pure rounding, and so would be the normal.
+  if (!(hi > kMinVariance) || !(mid > kMinPlaneRatio * hi)) return {0.0f, 0.0f, 0.0f};
   return normalized_or_zero({v[0][lo], v[1][lo], v[2][lo]});
 }
 
@@ -66,11 +70,10 @@ GPUREG_HD Vec3 orient_normal(Vec3 normal, Vec3 point, Vec3 guide, Span<const Vec
   return dot(normal, towards) < 0.0f ? -normal : normal;
 }
 
-/// True where the surface shows its back to every viewpoint, from where it cannot have been seen
-/// then. By ten degrees at least: what is seen from the side, as a floor far away, is tilted by the
-/// noise of its points.
+/// True where the surface faces away from every viewpoint, by ten degrees at least: noise tilts the
+/// normals of surfaces at grazing incidence, as of a distant floor.
 GPUREG_HD bool faces_away(Vec3 normal, Vec3 point, Span<const Vec3> viewpoints) {
-  constexpr float kSineSquared = 0.03f;
+  constexpr float kSineSquared = 0.03f;  // of ten degrees
   for (std::size_t k = 0; k < viewpoints.size; ++k) {
     const Vec3 d = viewpoints[k] - point;
     const float along = dot(normal, d);
@@ -79,16 +82,17 @@ GPUREG_HD bool faces_away(Vec3 normal, Vec3 point, Span<const Vec3> viewpoints) 
   return true;
 }
 
-/// The input's own normals are wrong here and there, mostly along the edges of a fused surface,
-/// where one in twenty of a real scan's shows all cameras its back: those are turned round. Where
-/// many do, it is not the normals: the viewpoints are those of another part of the scan, or of
-/// none.
+/// True where the input normals that face away are flipped. Some input normals are wrong, mostly
+/// along the edges of a fused surface (one in twenty of a real scan faces away from all cameras).
+/// Where many face away, the viewpoints are wrong: they belong to another part of the scan.
+/// PointCloudView::kMaxFacingAway as a divisor.
+constexpr std::uint32_t kMaxFacingAwayPart = 8;
 GPUREG_HD bool turns_back(std::uint32_t facing_away, std::uint32_t points) {
-  return facing_away <= points / 8;
+  return facing_away <= points / kMaxFacingAwayPart;
 }
 
-/// On the host only. Both have to be the caller's, and viewpoints asked for evidence
-/// (PrepareOptions::depth_maps).
+/// True where input normals may be flipped: normals and viewpoints are given, and the evidence uses
+/// viewpoints (PrepareOptions::depth_maps). Host only.
 inline bool turns_normals(bool has_normals, std::size_t viewpoints, std::uint32_t depth_maps) {
   return has_normals && viewpoints > 0 && depth_maps > 0;
 }

@@ -5,9 +5,9 @@
 
 namespace gpureg {
 
-// Normal-space weights (Rusinkiewicz and Levoy 2001, normal-space sampling): a point weighs less
-// the more normals of its cloud share its direction. A floor then does not outweigh the furniture
-// on it.
+// Normal-space weights (Rusinkiewicz and Levoy 2001, normal-space sampling): the weight of a point
+// decreases with the number of normals of its cloud in its direction. A floor then does not
+// dominate the furniture on it.
 
 /// The 26 directions to the neighbours of a cell, and one bin for unknown normals.
 constexpr int kNormalBins = 27;
@@ -33,8 +33,8 @@ GPUREG_HD std::uint32_t normal_bin(Vec3 n) {
   return best;
 }
 
-/// Weight of each point of a bin with `count` points: together they weigh the square root of their
-/// number.
+/// Weight of each point of a bin with `count` points: the sum over the bin is the square root of
+/// their number.
 GPUREG_HD std::uint32_t normal_weight_in_bin(std::uint32_t count) {
   return count == 0
              ? 0

@@ -6,8 +6,7 @@
 
 namespace gpureg {
 
-/// A feature match with both its points at hand: one cache line for the sampler instead of two
-/// scattered ones.
+/// A feature match with both its points: the sampler reads one cache line instead of two.
 struct MatchedPoints {
   Vec3 source;
   Vec3 target;
@@ -15,15 +14,15 @@ struct MatchedPoints {
   std::uint32_t target_index;
 };
 
-/// Philox counter word 3, one constant per use of randomness
-constexpr std::uint32_t kTagQuadruple = 0x51554144u;
+/// Philox counter word 3, one constant per use of randomness.
+constexpr std::uint32_t kTagQuadruple = 0x51554144u;  ///< "QUAD"
 
 struct Quadruple {
   std::uint32_t match[4];
 };
 
-/// The four matches of one hypothesis. A function of (seed, hypothesis, count) only: no pair number
-/// goes in, so that a pair's result is the same alone, in any batch, and in any order.
+/// The four matches of one hypothesis. A function of (seed, hypothesis, count) only: without the
+/// pair number a pair has the same result alone and in any batch.
 GPUREG_HD Quadruple draw_quadruple(std::uint32_t hypothesis, std::uint64_t seed,
                                    std::uint32_t count) {
   const PhiloxWords w = philox(hypothesis, 0, 0, kTagQuadruple, static_cast<std::uint32_t>(seed),

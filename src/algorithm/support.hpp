@@ -5,7 +5,7 @@
 
 namespace gpureg {
 
-/// What a hypothesis has behind it. Integers only, so that any order of summation gives the same.
+/// Support of a hypothesis. Integers, so that every order of summation gives the same bits.
 struct Support {
   std::uint32_t inliers;
   std::uint32_t hypothesis;  ///< its number among all drawn

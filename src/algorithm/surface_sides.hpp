@@ -7,17 +7,15 @@
 
 namespace gpureg {
 
-/// Which side of a surface a cell lies on: on it, in front of it (where its normals point, the side
-/// it was observed from; near or far), or behind it. A cell may have several of these bits.
-/// The space in front of an observed surface was empty, so points of another cloud there contradict
-/// a pose even where no viewpoint is known.
+/// Side of a surface that a cell lies on: on it, in front of it (where its normals point, the side
+/// that was observed; near or far), or behind it. A cell may have several of these bits. The space
+/// in front of an observed surface was empty, so points of another cloud there contradict a pose
+/// even without known viewpoints.
 enum SurfaceSide : std::uint32_t { kOnSurface = 1, kFrontNear = 2, kFrontFar = 4, kBehind = 8 };
 
 constexpr std::int32_t kSurfaceSideSteps = 10;  ///< cells marked along a normal, to either side
-constexpr std::int32_t kFrontNearSteps = 5;     ///< the first of them, which count as near
+constexpr std::int32_t kFrontNearSteps = 5;     ///< the first of them count as near
 constexpr std::uint32_t kCellsPerSurfaceSideWord = 8;
-/// A cloud whose box has more cells (32 MB) gets no grid.
-constexpr std::uint64_t kMaxSurfaceSideCells = std::uint64_t(1) << 26;
 
 /// The cells: rows along x of whole words, eight cells a word, four bits a cell.
 struct SurfaceSideGrid {
@@ -39,26 +37,31 @@ inline SurfaceSideGrid surface_side_grid(Vec3 lo, Vec3 hi, float distance, bool 
   if (!any_point || !(distance > 0.0f)) return box;
   box.cell_size = distance / static_cast<float>(kSurfaceSideSteps);
   box.inverse_cell_size = 1.0f / box.cell_size;
-  // In double: a box may be wider than cells can be counted.
+  constexpr std::int32_t kSpare = 2;
+  // Cells clamp far beyond the range in which differences of 32-bit cell numbers are exact.
+  constexpr double kFarCell = 1e9, kMaxCell = 8e8;
+  // In double: the box of a cloud may exceed the range of cell numbers.
   const float low[3] = {lo.x, lo.y, lo.z}, high[3] = {hi.x, hi.y, hi.z};
   double first[3], size[3], cells = 1;
   bool countable = true;
   for (int k = 0; k < 3; ++k) {
     const auto cell = [&](float v) {
       const double c = static_cast<double>(v) * static_cast<double>(box.inverse_cell_size);
-      return static_cast<double>(static_cast<std::int64_t>(c < -1e9 ? -1e9 : c > 1e9 ? 1e9 : c));
+      return static_cast<double>(static_cast<std::int64_t>(c < -kFarCell  ? -kFarCell
+                                                           : c > kFarCell ? kFarCell
+                                                                          : c));
     };
-    // A step to spare on either side for what rounding does.
-    first[k] = cell(low[k]) - (kSurfaceSideSteps + 2);
-    size[k] = cell(high[k]) + (kSurfaceSideSteps + 2) - first[k] + 1;
+    // Two spare steps on either side for rounding.
+    first[k] = cell(low[k]) - (kSurfaceSideSteps + kSpare);
+    size[k] = cell(high[k]) + (kSurfaceSideSteps + kSpare) - first[k] + 1;
     if (k == 0)
       size[k] =
           static_cast<double>(kCellsPerSurfaceSideWord) *
           static_cast<double>(static_cast<std::int64_t>(size[k] / kCellsPerSurfaceSideWord) + 1);
     cells *= size[k];
-    countable = countable && first[k] > -8e8 && first[k] + size[k] < 8e8;
+    countable = countable && first[k] > -kMaxCell && first[k] + size[k] < kMaxCell;
   }
-  if (!countable || cells > static_cast<double>(kMaxSurfaceSideCells)) return box;
+  if (!countable || cells > static_cast<double>(limits::kMaxSurfaceSideCells)) return box;
   box.first = {static_cast<std::int32_t>(first[0]), static_cast<std::int32_t>(first[1]),
                static_cast<std::int32_t>(first[2])};
   box.words_x = static_cast<std::uint32_t>(size[0]) / kCellsPerSurfaceSideWord;
@@ -75,7 +78,7 @@ struct SurfaceSideCell {
 GPUREG_HD SurfaceSideCell surface_side_cell(const SurfaceSideGrid& box, Vec3 q) {
   const float fx = q.x * box.inverse_cell_size, fy = q.y * box.inverse_cell_size,
               fz = q.z * box.inverse_cell_size;
-  constexpr float limit = 1e9f;
+  constexpr float limit = 1e9f;  // within int32, beyond every grid
   if (!(fx > -limit && fx < limit && fy > -limit && fy < limit && fz > -limit && fz < limit))
     return {kNoValue, 0};
   const std::uint32_t x = static_cast<std::uint32_t>(floor_to_int(fx) - box.first.x),
@@ -93,8 +96,8 @@ GPUREG_HD std::uint32_t surface_side_at(const SurfaceSideView& surface_sides, Ve
   return cell.word == kNoValue ? 0u : (surface_sides.words[cell.word] >> cell.shift) & 15u;
 }
 
-/// Calls mark(word, bits) for the cells along a normal (side 0, the front) or against it (side 1,
-/// the back), up to the next surface. The cells on surfaces must have been marked before.
+/// Calls mark(word, bits) for the cells along a normal (side 0, in front) or against it (side 1,
+/// behind), up to the next surface. Requires that the cells on surfaces are marked.
 template <typename Mark>
 GPUREG_HD void march_surface_side(const SurfaceSideGrid& box, const std::uint32_t* words,
                                   Vec3 point, Vec3 normal, std::uint32_t side, Mark&& mark) {

@@ -13,7 +13,7 @@ namespace gpureg {
 constexpr int kMapEdge = 96;
 constexpr std::uint32_t kMapFace = kMapEdge * kMapEdge;
 constexpr std::uint32_t kMapCells = 6 * kMapFace;
-constexpr std::uint16_t kUnknownDepth = 65535;
+constexpr std::uint16_t kMaxDepth = 65534, kUnknownDepth = 65535;
 
 /// Cell of a cube map, and the depth: the largest coordinate.
 struct MapRay {
@@ -38,14 +38,14 @@ GPUREG_HD MapRay map_ray(Vec3 d) {
   return {face * kMapFace + static_cast<std::uint32_t>(row * kMapEdge + column), depth};
 }
 
-/// Depth in the maps' steps; what is too far for them counts as their farthest.
+/// Depth in steps of the maps; greater depths clamp to the largest known one.
 GPUREG_HD std::uint16_t map_depth(float depth, float inverse_step) {
   const float steps = depth * inverse_step;
-  return steps < 65534.0f ? static_cast<std::uint16_t>(steps) : static_cast<std::uint16_t>(65534);
+  return steps < static_cast<float>(kMaxDepth) ? static_cast<std::uint16_t>(steps) : kMaxDepth;
 }
 
-/// Nearest depth among the 3 x 3 cells around a known cell of the same face: what hangs before that
-/// is in front of all of them. Depth: 16 bits, or wider, of which the lowest 16 count.
+/// Nearest depth among the 3 x 3 cells around a known cell of the same face: a point before it is
+/// in front of all their surfaces. Depth: 16 bits, or wider with the value in the lowest 16.
 template <typename Depth>
 GPUREG_HD std::uint16_t eroded_depth(const Depth* map, std::uint32_t cell) {
   std::uint16_t nearest = static_cast<std::uint16_t>(map[cell]);
@@ -61,21 +61,21 @@ GPUREG_HD std::uint16_t eroded_depth(const Depth* map, std::uint32_t cell) {
   return nearest;
 }
 
-/// How many maps a cloud gets. A cloud that brings normals but no viewpoint says nothing about
-/// where it was seen from: nothing is made up.
-GPUREG_HD std::size_t map_count(std::size_t viewpoints, std::size_t asked, bool viewpoints_given,
+/// Number of depth maps of a cloud. A cloud with input normals and without viewpoints gets none:
+/// its sensor position is unknown.
+GPUREG_HD std::size_t map_count(std::size_t viewpoints, std::size_t wanted, bool viewpoints_given,
                                 bool normals_given) {
   if (!viewpoints_given && normals_given) return 0;
-  return viewpoints < asked ? viewpoints : asked;
+  return viewpoints < wanted ? viewpoints : wanted;
 }
 
-/// Which of `known` viewpoints becomes map k of `count`: evenly spread over their order, the first
-/// and the last among them.
+/// Viewpoint, of `known` ones, of map k of `count`: evenly spread over their order, including the
+/// first and the last.
 GPUREG_HD std::size_t chosen_viewpoint(std::size_t k, std::size_t count, std::size_t known) {
   return count > 1 ? k * (known - 1) / (count - 1) : 0;
 }
 
-/// Length of a step of depth: 65,534 of them reach two thousand voxels.
+/// Length of a step of depth: 1/32 voxel, so the 65,534 steps cover two thousand voxels.
 GPUREG_HD float depth_step(float voxel_size) { return voxel_size * 0.03125f; }
 
 /// Maps of one cloud: viewpoints x kMapCells depths, each the nearest within its 3 x 3 cells of the
@@ -92,8 +92,8 @@ enum class Observation : std::uint32_t { unknown = 0, occluded = 1, surface = 2,
 
 /// Incidence weight of an observation: the squared cosine between the surface normal and the line
 /// of sight, in 16-bit fixed point. At a grazing angle an error of centimetres in pose or depth
-/// moves a surface in front of or behind another one, so grazing observations weigh less. d: along
-/// the line of sight, not zero.
+/// moves a surface in front of or behind another one, so grazing observations get a small weight.
+/// d: along the line of sight, not zero.
 constexpr float kIncidenceScale = 65536.0f;
 /// Incidence weight of a point without normal: the mean over all directions.
 constexpr float kUnknownIncidence = 1.0f / 3.0f;

@@ -10,7 +10,7 @@
 
 namespace gpureg {
 
-/// The private parts of public handles, for the library itself.
+/// Access of the library to the private parts of public handles.
 struct Access {
   static const std::shared_ptr<Engine>& engine(const Context& context) { return context.engine_; }
   static const std::shared_ptr<const PreparedState>& state(const PreparedCloud& cloud) {

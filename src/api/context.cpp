@@ -3,6 +3,7 @@
 
 #include <thread>
 
+#include "common/limits.hpp"
 #include "common/validate.hpp"
 #include "pipeline/device_engine.hpp"
 
@@ -11,7 +12,7 @@ namespace gpureg {
 const char* to_string(Backend backend) { return backend == Backend::cpu ? "cpu" : "cuda"; }
 
 Context Context::cpu(unsigned threads) {
-  require(threads <= 1024, "threads", threads, "at most 1024");
+  require(threads <= limits::kMaxThreads, "threads", threads, "at most 1024");
   if (threads == 0) threads = std::thread::hardware_concurrency();
   return Context(make_cpu_engine(threads == 0 ? 1 : threads));
 }

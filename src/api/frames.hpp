@@ -15,14 +15,14 @@ inline Eigen::Vector3d origin_of(const PreparedState& cloud) {
   return Eigen::Vector3f(cloud.origin[0], cloud.origin[1], cloud.origin[2]).cast<double>();
 }
 
-/// Middle of the source's points that take part in correspondences, or `otherwise` where there are
-/// none.
+/// Centre of the source points in correspondences, or `otherwise` where there are none.
 inline Eigen::Vector3d middle_of(const CorrespondenceMoments& m, const Eigen::Vector3d& otherwise) {
   return m.count > 0 ? Eigen::Vector3d(m.sum / static_cast<double>(m.count)) : otherwise;
 }
 
-/// The same mode, seen from the cloud's points: the stages compare modes at the local origin
-/// (same_mode()), which a stray point may draw far from the cloud. middle: in the source's frame.
+/// Comparison of two modes at the centre of the cloud. The stages compare modes at the local origin
+/// (same_mode()), which a stray point may place far from the cloud. middle: in the frame of the
+/// source.
 inline bool same_mode_at(const UnalignedIsometry3d& a, const UnalignedIsometry3d& b,
                          const Eigen::Vector3d& middle, const EvidenceOptions& options) {
   return (a.linear().transpose() * b.linear()).trace() >=

@@ -1,14 +1,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "gpureg/options.hpp"
 
+#include "common/limits.hpp"
 #include "common/validate.hpp"
 
 namespace gpureg {
 
 namespace {
-/// Lengths beyond this are a mistake of units, and their squares would overflow float.
-constexpr float kLongest = 1e6f;
-bool length(float v) { return positive(v) && v <= kLongest && v >= 1e-6f; }
+bool length(float v) { return positive(v) && v <= limits::kMaxLength && v >= limits::kMinLength; }
 constexpr const char* kLength = "a length in [1e-6, 1e6]";
 }  // namespace
 
@@ -25,16 +24,18 @@ void PrepareOptions::validate() const {
           max_correspondence_distance, kLength);
   require(wide_feature_radius == 0.0f || length(wide_feature_radius), "prepare.wide_feature_radius",
           wide_feature_radius, "0 or a length in [1e-6, 1e6]");
-  require(wide_feature_radius <= 4.0f * feature_radius, "prepare.wide_feature_radius",
-          wide_feature_radius, "at most 4 times prepare.feature_radius");
-  require(depth_maps <= 64, "prepare.depth_maps", depth_maps, "at most 64");
+  require(wide_feature_radius <= limits::kMaxRadiusRatio * feature_radius,
+          "prepare.wide_feature_radius", wide_feature_radius,
+          "at most 4 times prepare.feature_radius");
+  require(depth_maps <= limits::kMaxDepthMaps, "prepare.depth_maps", depth_maps, "at most 64");
   require(surface_side_distance == 0.0f || length(surface_side_distance),
           "prepare.surface_side_distance", surface_side_distance, "0 or a length in [1e-6, 1e6]");
-  require(voxel_size == 0.0f || feature_radius <= 100.0f * voxel_size, "prepare.feature_radius",
-          feature_radius, "at most 100 times prepare.voxel_size");
-  require(normal_radius <= 4.0f * feature_radius, "prepare.normal_radius", normal_radius,
-          "at most 4 times prepare.feature_radius");
-  require(voxel_size == 0.0f || max_correspondence_distance <= 20.0f * voxel_size,
+  require(voxel_size == 0.0f || feature_radius <= limits::kMaxFeatureRadiusInVoxels * voxel_size,
+          "prepare.feature_radius", feature_radius, "at most 100 times prepare.voxel_size");
+  require(normal_radius <= limits::kMaxRadiusRatio * feature_radius, "prepare.normal_radius",
+          normal_radius, "at most 4 times prepare.feature_radius");
+  require(voxel_size == 0.0f ||
+              max_correspondence_distance <= limits::kMaxCorrespondenceInVoxels * voxel_size,
           "prepare.max_correspondence_distance", max_correspondence_distance,
           "at most 20 times prepare.voxel_size");
 }
@@ -51,9 +52,9 @@ void require_range(std::uint32_t value, std::uint32_t low, std::uint32_t high, c
 }  // namespace
 
 void QuadrupleOptions::validate() const {
-  require(count >= 1 && count <= (1u << 30), "quadruples.count", count, "1 to 2^30");
-  require_range(neighbors, 1, 16, "quadruples.neighbors");
-  require(max_survivors >= 1 && max_survivors <= (1u << 22), "quadruples.max_survivors",
+  require(count >= 1 && count <= limits::kMaxQuadruples, "quadruples.count", count, "1 to 2^30");
+  require_range(neighbors, 1, limits::kMaxNeighbors, "quadruples.neighbors");
+  require(max_survivors >= 1 && max_survivors <= limits::kMaxSurvivors, "quadruples.max_survivors",
           max_survivors, "1 to 2^22");
   require(std::isfinite(edge_similarity) && edge_similarity > 0 && edge_similarity <= 1,
           "quadruples.edge_similarity", edge_similarity, "a ratio in (0, 1]");
@@ -64,11 +65,11 @@ void QuadrupleOptions::validate() const {
 }
 
 void CompatibilityOptions::validate() const {
-  require_range(max_matches, 4, 65536, "compatibility.max_matches");
-  require_range(seeds, 1, 8192, "compatibility.seeds");
-  require_range(max_members, 3, 1024, "compatibility.max_members");
-  require_range(triangles, 1, 4096, "compatibility.triangles");
-  require_range(refits, 1, 8, "compatibility.refits");
+  require_range(max_matches, limits::kMinMatches, limits::kMaxMatches, "compatibility.max_matches");
+  require_range(seeds, 1, limits::kMaxSeeds, "compatibility.seeds");
+  require_range(max_members, limits::kMinMembers, limits::kMaxMembers, "compatibility.max_members");
+  require_range(triangles, 1, limits::kMaxTriangles, "compatibility.triangles");
+  require_range(refits, 1, limits::kMaxRefits, "compatibility.refits");
   require(std::isfinite(max_turn) && max_turn > 0 && max_turn <= 2, "compatibility.max_turn",
           max_turn, "a difference of cosines in (0, 2]");
   require(length(tolerance), "compatibility.tolerance", tolerance, kLength);
@@ -78,8 +79,8 @@ void CompatibilityOptions::validate() const {
 }
 
 void EvidenceOptions::validate() const {
-  require_range(sample, 64, 65536, "evidence.sample");
-  require_range(modes, 1, 64, "evidence.modes");
+  require_range(sample, limits::kMinSample, limits::kMaxSample, "evidence.sample");
+  require_range(modes, 1, limits::kMaxModes, "evidence.modes");
   require_angle(max_normal_angle, "evidence.max_normal_angle");
   require_angle(mode_angle, "evidence.mode_angle");
   require(length(mode_distance), "evidence.mode_distance", mode_distance, kLength);
@@ -91,15 +92,16 @@ void EvidenceOptions::validate() const {
 }
 
 void RefineOptions::validate() const {
-  require(max_iterations <= 1000, "refine.max_iterations", max_iterations, "at most 1000");
+  require(max_iterations <= limits::kMaxIterations, "refine.max_iterations", max_iterations,
+          "at most 1000");
   require(length(kernel_width), "refine.kernel_width", kernel_width, kLength);
 }
 
 namespace {
 
-/// What more time buys: more seeds find more of the hard pairs, and more modes keep what they
-/// found. The matches and the evidence stay as they are, so that a confidence means the same at
-/// every quality.
+/// Numbers of candidates by quality. More seeds find more of the difficult pairs, and more modes
+/// keep their poses. Matches and evidence do not depend on the quality, so a confidence means the
+/// same at every quality.
 struct Effort {
   std::uint32_t seeds, triangles, modes;
 };
@@ -134,13 +136,15 @@ RegistrationOptions RegistrationOptions::from_voxel_size(float voxel_size, std::
   o.compatibility.seed_separation = 2.0f * voxel_size;
   o.evidence.mode_distance = 6.0f * voxel_size;
   o.evidence.degeneracy_search_distance = 8.0f * voxel_size;
-  // 2.4 v, and the default's bits at 0.05
+  // 2.4 v; this order of operations gives exactly the default at 0.05.
   o.evidence.free_space_margin = voxel_size / 5.0f * 12.0f;
   o.evidence.min_range = 6.0f * voxel_size;
   return o;
 }
 
-RegistrationOptions RegistrationOptions::loopsmart() { return loopsmart(0.05f); }
+RegistrationOptions RegistrationOptions::loopsmart() {
+  return loopsmart(PrepareOptions{}.voxel_size);
+}
 
 RegistrationOptions RegistrationOptions::loopsmart(float voxel_size) {
   RegistrationOptions o = from_voxel_size(voxel_size);

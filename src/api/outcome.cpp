@@ -23,17 +23,16 @@ double rmse(std::uint64_t residual, std::uint32_t inliers, double distance) {
 
 RegistrationReason evidence_reason(const RegistrationStatistics& s, double confidence,
                                    bool contradicted, const RegistrationOptions& options) {
-  if (s.source_points < 4) return RegistrationReason::too_few_source_points;
-  if (s.target_points < 4) return RegistrationReason::too_few_target_points;
-  if (s.correspondences < 4) return RegistrationReason::no_usable_features;
+  if (s.source_points < limits::kMinMatches) return RegistrationReason::too_few_source_points;
+  if (s.target_points < limits::kMinMatches) return RegistrationReason::too_few_target_points;
+  if (s.correspondences < limits::kMinMatches) return RegistrationReason::no_usable_features;
   if (s.scored == 0) return RegistrationReason::degenerate_geometry;
   if (contradicted) return RegistrationReason::contradicts_prior;
   return confidence < options.min_confidence ? RegistrationReason::confidence_too_low
                                              : RegistrationReason::none;
 }
 
-/// Root mean square distance between where two poses take the points that take part in
-/// correspondences.
+/// RMS distance between the positions that two poses give the source points in correspondences.
 double distance_between(const UnalignedIsometry3d& a, const UnalignedIsometry3d& b,
                         const CorrespondenceMoments& points) {
   if (points.count == 0) return std::numeric_limits<double>::infinity();
@@ -50,7 +49,7 @@ double distance_between(const UnalignedIsometry3d& a, const UnalignedIsometry3d&
 /// one of the two is kept.
 constexpr double kDistinctModeFraction = 5.0 / 6;
 
-/// The modes of one pair, in the caller's frames.
+/// The modes of one pair, in the frames of its clouds.
 class Modes {
  public:
   Modes(const PairOutcome& outcome, const PreparedState& source, const PreparedState& target,
@@ -95,7 +94,7 @@ class Modes {
   CorrespondenceMoments source_moments(const ModeOutcome& mode) const {
     return to_frame(swapped_ ? mode.target_moments : mode.source_moments, source_);
   }
-  /// Source points in correspondences under the mode that others were perturbed from.
+  /// Moments of the source points in correspondences under the origin mode.
   CorrespondenceMoments origin_moments(std::uint32_t origin_mode) const {
     return source_moments(outcome_.modes[origins_.at(origin_mode)]);
   }
@@ -104,8 +103,8 @@ class Modes {
     const ModeOutcome& mode = outcome_.modes[k];
     RegistrationMode out;
     out.target_from_source = to_transform(mode.pose, source_, target_, swapped_);
-    // A perturbed pose that came back is its origin, less well refined: evidence cannot tell poses
-    // apart that are closer than points are matched.
+    // A perturbed pose within the correspondence distance of its origin is that mode, less well
+    // refined; evidence cannot separate poses that close.
     const auto [origin, is_first] = origins_.emplace(mode.origin_mode, k);
     if (!is_first) {
       const UnalignedIsometry3d before =
@@ -145,9 +144,9 @@ class Modes {
   const PreparedState& target_;
   bool swapped_;
   const RegistrationOptions& options_;
-  std::map<std::uint32_t, std::size_t> origins_;  ///< of each origin mode its first mode
+  std::map<std::uint32_t, std::size_t> origins_;  ///< first mode of each origin mode
   std::vector<RegistrationMode> modes_;
-  Eigen::Vector3d middle_;  ///< of the source's points in correspondences
+  Eigen::Vector3d middle_;  ///< centre of the source points in correspondences
 };
 
 void add_modes(const PairOutcome& outcome, const PreparedState& source, const PreparedState& target,

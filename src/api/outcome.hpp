@@ -6,8 +6,8 @@
 
 namespace gpureg {
 
-/// What the caller gets: the outcome in the clouds' own frames. swapped: source and target changed
-/// places for the engine.
+/// Converts an outcome to the public result in the frames of the clouds. swapped: the engine moved
+/// the target of the pair.
 RegistrationResult to_result(const PairOutcome& outcome, const PreparedState& source,
                              const PreparedState& target, bool swapped,
                              const RegistrationOptions& options, const PriorTest& prior = {});

@@ -2,17 +2,19 @@
 #include "gpureg/point_cloud.hpp"
 
 #include "algorithm/normal.hpp"
+#include "common/limits.hpp"
 #include "common/validate.hpp"
 
 namespace gpureg {
 
 void PointCloudView::validate() const {
-  require(size <= 0x7fffffffu, "cloud.size", size, "at most 2^31 - 1 points");
+  require(size <= limits::kMaxPoints, "cloud.size", size, "at most 2^31 - 1 points");
   require(points != nullptr || size == 0, "cloud.points", "null", "a pointer, as size is not 0");
   require(point_stride >= 3, "cloud.point_stride", point_stride, "at least 3 floats");
   require(normals == nullptr || normal_stride >= 3, "cloud.normal_stride", normal_stride,
           "at least 3 floats");
-  require(features == nullptr || (feature_dimension >= 1 && feature_dimension <= 4096),
+  require(features == nullptr ||
+              (feature_dimension >= 1 && feature_dimension <= limits::kMaxFeatureDimension),
           "cloud.feature_dimension", feature_dimension, "1 to 4096, as features are given");
   require(features != nullptr || feature_dimension == 0, "cloud.features", "null",
           "a pointer, as feature_dimension is not 0");
@@ -36,7 +38,7 @@ double PointCloudView::share_facing_away() const {
   for (std::size_t i = 0; i < size; ++i) {
     const float *n = normals + i * normal_stride, *p = points + i * point_stride;
     const float length = std::sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
-    // Comparisons with NaN are false: unknown normals and points face nobody, which is not away.
+    // Comparisons with NaN are false: unknown normals and points do not count as facing away.
     if (length > 0)
       away +=
           faces_away(Vec3{n[0], n[1], n[2]} * (1.0f / length), {p[0], p[1], p[2]}, span_of(places));

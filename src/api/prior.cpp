@@ -10,13 +10,17 @@ namespace gpureg {
 namespace {
 
 constexpr double kRadians = 3.14159265358979323846 / 180.0;
-/// Directions and poses become floats: what is exactly at a limit must not fall to one side or the
-/// other by their rounding.
+/// Widens the limits by the rounding of directions and poses to float: poses exactly at a limit
+/// must pass.
 constexpr double kRounding = 1e-6;
+/// Shortest direction, far above the rounding of its components.
+constexpr double kMinNorm = 1e-9;
+/// Largest deviation of R R' from the identity: poses written with few digits pass.
+constexpr double kMaxSkew = 1e-3;
 
 void require_direction(const Eigen::Vector3d& v, const std::string& name) {
   const std::string field = name + ".norm";
-  require(v.allFinite() && v.norm() > 1e-9, field.c_str(), v.norm(),
+  require(v.allFinite() && v.norm() > kMinNorm, field.c_str(), v.norm(),
           "a direction: finite, and not of length 0");
 }
 
@@ -41,7 +45,7 @@ void RegistrationPrior::validate(const std::string& name) const {
   const Eigen::Matrix4d m = pose->target_from_source.matrix();
   const Eigen::Matrix3d r = m.topLeftCorner<3, 3>();
   if (!m.allFinite() ||
-      (r * r.transpose() - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff() > 1e-3 ||
+      (r * r.transpose() - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff() > kMaxSkew ||
       r.determinant() < 0)
     throw InvalidArgument(name + ".pose.target_from_source is no rigid motion");
   require_degrees(pose->max_rotation, name + ".pose.max_rotation");

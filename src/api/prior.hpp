@@ -7,7 +7,7 @@
 
 namespace gpureg {
 
-/// The prior as the stages ask it. swapped: the target is moved, being the smaller cloud.
+/// Converts the prior for the stages. swapped: the engine moves the target, the smaller cloud.
 PriorTest prior_test(const RegistrationPrior& prior, const PreparedState& source,
                      const PreparedState& target, bool swapped);
 

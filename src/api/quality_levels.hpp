@@ -7,17 +7,18 @@
 
 namespace gpureg {
 
-/// What runs one level, and what time it is in milliseconds: tests bring their own.
+/// Runs one level and tells the time in milliseconds; tests replace both.
 struct LevelRunner {
   std::function<RegistrationResult(std::uint32_t quality)> align;
   std::function<double()> now;
 };
 
-/// The loop of align_within(). options: what tells poses apart, and the efforts of the levels.
+/// Loop of align_within(). options: thresholds of equal poses, and the numbers of candidates per
+/// level.
 TimedResult run_levels(const LevelRunner& runner, double milliseconds,
                        const RegistrationOptions& options);
 
-/// Milliseconds that a level would take by those of another one's stages: matching stays the same,
+/// Predicted milliseconds of a level from the stages of another one: matching is constant,
 /// proposals grow with seeds and triangles, refinement and verification with the modes. overhead:
 /// milliseconds of the call outside its stages.
 double predicted_milliseconds(const StageTimings& measured, double overhead,

@@ -5,7 +5,7 @@
 
 namespace gpureg {
 
-/// A view, of host or of device memory, as the engines take it. Throws as View::validate() does.
+/// Converts a view of host or device memory for the engines. Throws as View::validate() does.
 template <typename View>
 RawCloud raw_cloud(const View& view) {
   view.validate();

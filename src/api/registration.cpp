@@ -10,6 +10,7 @@
 #include "api/prior.hpp"
 #include "api/raw_cloud.hpp"
 #include "common/host_threads.hpp"
+#include "common/limits.hpp"
 #include "common/validate.hpp"
 
 namespace gpureg {
@@ -63,7 +64,7 @@ std::vector<PreparedCloud> prepare_batch(const Context& context,
       out.push_back(Access::cloud(std::move(state)));
     }
   } catch (const InvalidArgument&) {
-    // Stages see all clouds at once: alone the one that it is about says so again.
+    // Stages process all clouds at once; preparing each alone finds the one to name in the error.
     for (std::size_t k = 0; k < raw.size(); ++k)
       naming(k, [&] { return Access::engine(context)->prepare({&raw[k], 1}, options); });
     throw;
@@ -98,7 +99,7 @@ RegistrationResult align(const Context& context, const PreparedCloud& source,
   options.validate();
   const PreparedState& s = *checked_state(context, source, options, "source");
   const PreparedState& t = *checked_state(context, target, options, "target");
-  require(correspondences.size() <= 0x7fffffffu, "correspondences.size", correspondences.size(),
+  require(correspondences.size() <= limits::kMaxPoints, "correspondences.size", correspondences.size(),
           "at most 2^31 - 1");
   const bool swapped = swaps(s, t, options);
   std::vector<std::uint32_t> from, to;
@@ -117,8 +118,8 @@ RegistrationResult align(const Context& context, const PreparedCloud& source,
   input.custom_target = span_of(to);
   PairOutcome outcome;
   if (correspondences.empty()) {
-    // Without any there is nothing to search, and the engine would take "none given" for "use the
-    // features".
+    // Without correspondences there is nothing to search, and the engine takes an empty list for
+    // "use the features".
     outcome.statistics.source_points = input.source->size;
     outcome.statistics.target_points = input.target->size;
     outcome.reason = RegistrationReason::no_usable_features;
@@ -168,8 +169,8 @@ std::vector<RegistrationResult> align_batch(const Context& context,
       if (!priors.empty()) inputs.back().prior = prior_test(priors[p], s, t, swapped);
     }
     Access::engine(context)->align(span_of(inputs), options, {outcomes.data(), outcomes.size()});
-    // A result by evidence takes some 50 us, which counts where a device makes ten thousand in a
-    // second.
+    // A result by evidence takes about 50 us on the host, too much for one thread where a device
+    // makes ten thousand per second.
     const std::size_t workers =
         std::min<std::size_t>(Access::engine(context)->host_threads(), 1 + (end - begin) / 16);
     on_threads(workers, [&](std::size_t worker) {

@@ -13,6 +13,8 @@ namespace gpureg {
 namespace {
 
 constexpr double kConfident = 0.99;
+/// Range of the measured growth over the predicted one: single measurements are noisy.
+constexpr double kMinGrowth = 0.2, kMaxGrowth = 1.25;
 
 bool same_pose(const RegistrationResult& a, const RegistrationResult& b,
                const EvidenceOptions& options) {
@@ -40,8 +42,8 @@ TimedResult run_levels(const LevelRunner& runner, double milliseconds,
   TimedResult best;
   RegistrationResult last;
   double last_ms = 0, predicted = 0, previous_ms = 0;
-  // Devices that are not full take less than in proportion: how much less, the growth from one
-  // level to the next has shown.
+  // Partly used devices take less time than in proportion; the growth from one level to the next
+  // calibrates the prediction.
   double growth = 1.0;
   const auto prediction = [&](std::uint32_t quality) {
     const double overhead = std::max(0.0, last_ms - last.timings.total());
@@ -63,7 +65,8 @@ TimedResult run_levels(const LevelRunner& runner, double milliseconds,
     previous_ms = last_ms;
     last_ms = ended - started;
     if (best.levels > 0 && predicted > previous_ms)
-      growth = std::clamp(growth * (last_ms - previous_ms) / (predicted - previous_ms), 0.2, 1.25);
+      growth = std::clamp(growth * (last_ms - previous_ms) / (predicted - previous_ms), kMinGrowth,
+                          kMaxGrowth);
     ++best.levels;
     best.highest_quality = quality;
     best.milliseconds = ended - begin;
@@ -72,8 +75,8 @@ TimedResult run_levels(const LevelRunner& runner, double milliseconds,
     const double left = milliseconds - best.milliseconds;
     std::uint32_t next = quality + 1;
     if (prediction(next) > left) return best;
-    // A confident result only needs to be confirmed; where there is none yet, the time goes into
-    // the highest level that it is enough for.
+    // A confident result needs only a confirmation by the next level; otherwise the time goes into
+    // the highest level that it allows.
     while (last.score < kConfident && next < kHighestQuality && prediction(next + 1) <= left)
       ++next;
     predicted = prediction(next);

@@ -12,12 +12,15 @@ namespace {
 
 constexpr std::size_t kClouds = 16;
 constexpr std::size_t kWantedPoints = 5000, kMinPoints = 3000;
-/// Of all clouds together: voxels of 5000 points are full enough to be found with them.
+/// Points that all samples together hold: voxels of 5000 points are full enough for an estimate.
 constexpr std::size_t kVoxelSample = 400'000, kMinVoxelSample = 50'000;
 constexpr std::size_t kSpacingSample = 1000,
-                      kNoiseSample = 200;  // medians of so many are good to a few percent
-constexpr double kNoiseRadius = 1.5;       // voxels around a point that its plane is made of
-constexpr double kMaxNoise = 1.0 / 3.0;    // of a voxel: what its centroid still averages out
+                      kNoiseSample =
+                          200;           // medians of samples this large are within a few per cent
+constexpr double kSizeTolerance = 1.02;  // of the bisection, below the rounding of the result
+constexpr double kNoiseRadius = 1.5;     // radius of the fitted plane, in voxels
+constexpr std::size_t kMinPlanePoints = 8;  // a plane fits fewer points however rough they are
+constexpr double kMaxNoise = 1.0 / 3.0;     // of a voxel: its centroid averages out less
 
 double median(std::vector<double> values) {
   if (values.empty()) return 0;
@@ -26,8 +29,8 @@ double median(std::vector<double> values) {
   return *middle;
 }
 
-/// The finite points of a cloud, sorted along its longest side: what is nearer than d is less than
-/// d away in the order, too.
+/// The finite points of a cloud, sorted along its longest side: neighbours within d are within d
+/// along the order.
 class SortedCloud {
  public:
   explicit SortedCloud(const PointCloudView& view) {
@@ -40,7 +43,7 @@ class SortedCloud {
     }
     if (points_.empty()) return;
     box_.sizes().maxCoeff(&axis_);
-    // A total order: equal coordinates of the axis must not leave the order to the library's sort.
+    // A total order: the order of equal coordinates must not depend on the sort of the library.
     std::sort(points_.begin(), points_.end(),
               [a = axis_](const Eigen::Vector3f& p, const Eigen::Vector3f& q) {
                 if (p[a] != q[a]) return p[a] < q[a];
@@ -68,7 +71,7 @@ class SortedCloud {
     return median(std::move(distances));
   }
 
-  /// Median over a sample of points of the RMS distance of their surroundings from a plane.
+  /// Median over a sample of points of the RMS distance between their neighbourhood and its plane.
   double noise(double radius) const {
     std::vector<double> distances;
     for_sample(kNoiseSample, [&](std::size_t at) {
@@ -78,12 +81,16 @@ class SortedCloud {
       const auto visit = [&](std::size_t k) {
         const Eigen::Vector3d d = (points_[k] - points_[at]).cast<double>();
         if (std::abs(d[axis_]) > radius) return false;
-        if (d.squaredNorm() <= radius * radius) sum += d, outer += d * d.transpose(), ++count;
+        if (d.squaredNorm() <= radius * radius) {
+          sum += d;
+          outer += d * d.transpose();
+          ++count;
+        }
         return true;
       };
       around(at, visit);
       visit(at);
-      if (count < 8) return;  // a plane fits few points however rough their surface is
+      if (count < kMinPlanePoints) return;
       const Eigen::Vector3d mean = sum / static_cast<double>(count);
       const Eigen::Matrix3d covariance =
           outer / static_cast<double>(count) - mean * mean.transpose();
@@ -94,8 +101,7 @@ class SortedCloud {
     return median(std::move(distances));
   }
 
-  /// Voxels of that size, those of prepare(), with a point of the sample in them; most: of points
-  /// in the sample.
+  /// Number of voxels of prepare() with a point of the sample. most: of points in the sample.
   std::size_t occupied(double size, std::size_t most, std::vector<std::uint64_t>& keys) const {
     keys.clear();
     const Eigen::Array3d first = (box_.min().array() / size).floor();
@@ -116,7 +122,7 @@ class SortedCloud {
     const std::size_t count = std::min(most, points_.size());
     for (std::size_t s = 0; s < count; ++s) visit(s * points_.size() / count);
   }
-  /// Points on both sides in the order, each way until visit says that none further on matters.
+  /// Visits points on both sides in the order, each way until visit returns false.
   template <typename Visit>
   void around(std::size_t at, Visit&& visit) const {
     for (std::size_t k = at + 1; k < points_.size() && visit(k); ++k) {
@@ -130,7 +136,7 @@ class SortedCloud {
   Eigen::Index axis_ = 0;
 };
 
-/// 0.0473 becomes 0.05, 0.0134 becomes 0.013: what a person would type.
+/// Rounds to a readable number: 0.0473 becomes 0.05, 0.0134 becomes 0.013.
 double rounded(double value) {
   const double unit = std::pow(10.0, std::floor(std::log10(value)));
   const double digits = value / unit;
@@ -173,7 +179,7 @@ VoxelSizeSuggestion suggest_voxel_size(const std::vector<PointCloudView>& views)
   out.spacing = median_of(clouds, [](const SortedCloud& cloud) { return cloud.spacing(); });
   const auto size_for = [&](std::size_t wanted) {
     double low = std::max(extent * 1e-5, out.spacing * 0.5), high = extent;
-    while (high > 1.02 * low) {
+    while (high > kSizeTolerance * low) {
       const double middle = std::sqrt(low * high);
       (points(middle) > static_cast<double>(wanted) ? low : high) = middle;
     }

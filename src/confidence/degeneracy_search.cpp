@@ -18,7 +18,7 @@ Pose<double> moved_along(const InformationSpectrum& spectrum, const Pose<double>
   const Eigen::Vector3d turn = spectrum.weakest_direction.head<3>() * (distance / spectrum.unit);
   const Eigen::Vector3d still = Eigen::Vector3d::Zero();
   double r[9];
-  rotation_matrix(compose_small(turn.data(), still.data(), Pose<double>{1, 0, 0, 0, 0, 0, 0}), r);
+  rotation_matrix(compose_small(turn.data(), still.data(), identity_pose<double>()), r);
   const Eigen::Vector3d turned =
       Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(r) * spectrum.centre;
   const Eigen::Vector3d shift =
@@ -36,7 +36,7 @@ constexpr double kHopelessLogOdds = -5, kConfidentLogOdds = 3;
 /// mode is only tested for another stable pose at the full distance.
 Span<const double> fractions_for(double log_odds) {
   static constexpr double kFractions[] = {1, 0.75, 0.5, 0.25};
-  static_assert(2 * std::size(kFractions) == kMaxPerturbedPoses, "both ways");
+  static_assert(2 * std::size(kFractions) == limits::kMaxPerturbedPoses, "both ways");
   const std::size_t count = log_odds < kHopelessLogOdds    ? 0
                             : log_odds < kConfidentLogOdds ? std::size(kFractions)
                                                            : 1;

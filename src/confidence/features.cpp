@@ -80,15 +80,15 @@ void add_free_space(const PoseEvidence& e, Setter& set) {
 void add_surface_sides(const PoseEvidence& e, bool free_space, Regressand regressand, Setter& set) {
   const Sides any_normal{e.source_overlap_any_normal, e.target_overlap_any_normal};
   // Share of the points within the distance whose normals agree: the same side of the surface.
-  const Sides agreement{share(e.source_overlap, any_normal.source),
-                        share(e.target_overlap, any_normal.target)};
+  const Sides normal_agreement{share(e.source_overlap, any_normal.source),
+                               share(e.target_overlap, any_normal.target)};
   const Sides near_surface{e.source_near_surface, e.target_near_surface};
   const Sides front_near{e.source_front_violation_near, e.target_front_violation_near};
   const bool verified = free_space && regressand == Regressand::confidence;
   set(Feature::log_front_violation_near,
       log_at_least(front_near.sum(), verified ? kMinVerifiedFrontViolation : kMinFrontViolation));
-  set(Feature::lower_normal_agreement, agreement.lower());
-  set(Feature::higher_normal_agreement, agreement.higher());
+  set(Feature::lower_normal_agreement, normal_agreement.lower());
+  set(Feature::higher_normal_agreement, normal_agreement.higher());
   set(Feature::higher_near_surface, near_surface.higher());
   set(Feature::lower_near_surface, near_surface.lower());
   if (free_space) return;  // it tells the rest

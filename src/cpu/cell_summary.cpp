@@ -17,9 +17,8 @@ namespace {
 
 constexpr int kEdge = ClosestGridView::kBlockEdge;
 constexpr int kCells = ClosestGridView::kBlockCells;
-/// Block tables larger than this (a cloud with far stray points) are not worth their memory: then
-/// every point is looked at.
-constexpr double kMaxBlocks = double(1 << 22);
+/// Steps of the golden section spread groups evenly, however many are read.
+constexpr double kGoldenSection = 0.6180339887;
 /// The low 21 bits of each coordinate, interleaved.
 std::uint64_t morton_key(Cell c) {
   const auto spread = [](std::int32_t v) {
@@ -40,14 +39,14 @@ ScoringOrder scoring_order(const std::vector<Vec3>& points, const std::vector<Ve
   ScoringOrder out;
   const std::size_t n = points.size();
   const std::size_t groups = (n + 63) / 64;
-  // Neighbours in space (Morton order) share a group of 64, so that a group's cells share cache
-  // lines; the groups themselves come in steps of the golden section, so that the first few tell
-  // about the whole cloud.
+  // Neighbours in space (Morton order) share a group of 64, so the cells of a group share cache
+  // lines. The groups themselves follow in steps of the golden section, so the first few represent
+  // the whole cloud.
   std::vector<KeyIndex> morton(n);
   for (std::size_t i = 0; i < n; ++i)
     morton[i] = {morton_key(cell_of(points[i], 1.0f / cell_size)), static_cast<std::uint32_t>(i)};
   radix_sort(morton);
-  std::size_t step = static_cast<std::size_t>(0.6180339887 * static_cast<double>(groups)) | 1;
+  std::size_t step = static_cast<std::size_t>(kGoldenSection * static_cast<double>(groups)) | 1;
   while (groups > 0 && std::gcd(step, groups) != 1) ++step;
   const float nan = std::numeric_limits<float>::quiet_NaN();
   for (auto* v : {&out.x, &out.y, &out.z}) v->assign(groups * 64, nan);
@@ -85,7 +84,7 @@ CellSummaries summarize_cells(const ClosestGrid& closest, float search_distance,
     hi = {std::max(hi.x, c.x), std::max(hi.y, c.y), std::max(hi.z, c.z)};
   }
   const double nx = hi.x - lo.x + 1.0, ny = hi.y - lo.y + 1.0, nz = hi.z - lo.z + 1.0;
-  if (nx * ny * nz > kMaxBlocks) return out;
+  if (nx * ny * nz > static_cast<double>(limits::kMaxSummaryBlocks)) return out;
   const ClosestGeometry g = closest_geometry(search_distance, cloud_radius);
   out.inverse_cell_size = 1.0f / closest.cell_size;
   out.offset = {-static_cast<float>(lo.x * kEdge), -static_cast<float>(lo.y * kEdge),
@@ -93,7 +92,7 @@ CellSummaries summarize_cells(const ClosestGrid& closest, float search_distance,
   out.nx = static_cast<std::int32_t>(nx);
   out.ny = static_cast<std::int32_t>(ny);
   out.nz = static_cast<std::int32_t>(nz);
-  // Block 0 is the empty one: places without a block read zeros from it instead of taking a branch.
+  // Block 0 is empty: locations without a block read zeros from it instead of branching.
   out.block.assign(static_cast<std::size_t>(nx * ny * nz), 0);
   out.summary.assign((closest.blocks.size() + 1) * kCells, 0);
   for (std::size_t b = 0; b < closest.blocks.size(); ++b) {
@@ -117,7 +116,7 @@ CellSummaries summarize_cells(const ClosestGrid& closest, float search_distance,
 
 void locate_cells(const ScoringOrder& order, std::size_t first, const Rigid& pose,
                   const CellSummaries& v, std::int32_t* cells) {
-  // The pose in cells of the table. Rounding here may differ from apply() by a small part of a
+  // The pose in cells of the table. Its rounding differs from that of apply() by a small part of a
   // cell, which the margin of the closest-point grid covers.
   const float s = v.inverse_cell_size;
   __m256 r[9], t[3];
@@ -160,8 +159,8 @@ void locate_cells(const ScoringOrder& order, std::size_t first, const Rigid& pos
                                         _mm256_and_si256(ix, seven)));
     _mm256_storeu_si256(reinterpret_cast<__m256i*>(cells + k), cell);
   }
-  // The summaries of this group are read after the next group's cells are known: time enough to
-  // fetch them.
+  // Reads the summaries of this group after the cells of the next group are known, so that the
+  // prefetch has time.
   for (int k = 0; k < 64; ++k)
     _mm_prefetch(reinterpret_cast<const char*>(v.summary.data() + cells[k]), _MM_HINT_T0);
 }
@@ -179,7 +178,7 @@ PointBounds bound_inliers(const ScoringOrder& order, std::size_t first, const Ri
     const __m256 mx = _mm256_cvtepi32_ps(_mm256_srai_epi32(_mm256_slli_epi32(word, 24), 24)),
                  my = _mm256_cvtepi32_ps(_mm256_srai_epi32(_mm256_slli_epi32(word, 16), 24)),
                  mz = _mm256_cvtepi32_ps(_mm256_srai_epi32(_mm256_slli_epi32(word, 8), 24));
-    // n' R' m: the mean normal is turned back, which the source's normals need not be.
+    // n' R' m: rotates the mean normal back instead of every source normal forth.
     const __m256 sx = _mm256_fmadd_ps(r[6], mz, _mm256_fmadd_ps(r[3], my, _mm256_mul_ps(r[0], mx)));
     const __m256 sy = _mm256_fmadd_ps(r[7], mz, _mm256_fmadd_ps(r[4], my, _mm256_mul_ps(r[1], mx)));
     const __m256 sz = _mm256_fmadd_ps(r[8], mz, _mm256_fmadd_ps(r[5], my, _mm256_mul_ps(r[2], mx)));

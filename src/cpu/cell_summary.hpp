@@ -7,13 +7,13 @@
 #include "algorithm/cell_summary.hpp"
 #include "cpu/stage_data.hpp"
 
-/// What lets the CPU decide most points of a hypothesis without looking at a single target point:
-/// per cell of the closest-point grid, a bound on the normals of all its candidates and whether
-/// every place in the cell has one of them in reach.
+/// Bounds that let the CPU decide most points of a hypothesis without reading a target point: per
+/// cell of the closest-point grid, a bound on the normals of all its candidates, and a bit for
+/// cells in which every location has a candidate within the distance.
 namespace gpureg::cpu {
 
-/// Points in groups of 64 that spread over the cloud, one array per coordinate, padded with NaN for
-/// the vector unit.
+/// Points in groups of 64 that spread over the cloud, one array per coordinate, padded with NaN to
+/// whole vectors.
 ScoringOrder scoring_order(const std::vector<Vec3>& points, const std::vector<Vec3>& normals,
                            float cell_size);
 
@@ -22,12 +22,12 @@ CellSummaries summarize_cells(const ClosestGrid& closest, float search_distance,
                               const std::vector<Vec3>& points, const std::vector<Vec3>& normals);
 
 struct PointBounds {
-  std::uint64_t possible;  ///< bit k is 0 only where point first + k is certainly no inlier
-  std::uint64_t certain;   ///< bit k is 1 only where it certainly is one
+  std::uint64_t possible;  ///< bit k is 0 only where point first + k is definitely no inlier
+  std::uint64_t certain;   ///< bit k is 1 only where it definitely is one
 };
 
-/// Index of the summary of the cell that each of 64 moved points falls into; 0, an empty one, where
-/// there is no block. first is a multiple of 64.
+/// Summary index of the cell of each of 64 moved points; 0, an empty summary, where there is no
+/// block. first: a multiple of 64.
 void locate_cells(const ScoringOrder& order, std::size_t first, const Rigid& pose,
                   const CellSummaries& summaries, std::int32_t* cells);
 

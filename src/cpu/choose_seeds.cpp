@@ -9,12 +9,12 @@
 namespace gpureg::cpu {
 namespace {
 
-constexpr std::uint32_t kRows = 4;     // side by side: the columns are loaded once for all of them
+constexpr std::uint32_t kRows = 4;     // rows per pass: the columns are loaded once for all of them
 constexpr std::uint32_t kTile = 1024;  // columns: they stay in the nearest cache
 
-/// Compatibility has no direction: each pair of matches is tested once, and counts for both. Adds
-/// what the rows [begin, end) have with themselves and with all later matches; out: one count per
-/// match.
+/// Compatibility is symmetric: each pair of matches is tested once and counts for both. Adds the
+/// compatible pairs of the rows [begin, end) with themselves and with all later matches. out: one
+/// count per match.
 void count_compatible(const MatchSet& matches, const CompatibilityTest& test, std::uint32_t begin,
                       std::uint32_t end, std::uint32_t* out) {
   const MatchColumns columns(matches);
@@ -68,8 +68,8 @@ void count_compatible(const MatchSet& matches, const CompatibilityTest& test, st
   }
 }
 
-/// Matches in the order of their source points along the axis of the cloud's largest extent, so
-/// that those near a point are together.
+/// Matches in the order of their source points along the longest axis of the cloud, so that
+/// neighbours are close in the order.
 struct Sorted {
   std::vector<float> px, py, pz;
   std::vector<std::uint32_t> match, degree;
@@ -99,15 +99,15 @@ struct Sorted {
   Sorted& operator=(const Sorted&) = delete;
 };
 
-/// 1 where no match with its source point within the separation is compatible with more.
+/// 1 where no match with its source point within the separation has more compatible matches.
 void find_peaks(const MatchSet& m, const std::vector<std::uint32_t>& degrees,
                 float squared_separation, std::uint8_t* out) {
   const Sorted s(m, degrees);
   const float *px = s.px.data(), *py = s.py.data(), *pz = s.pz.data(), *along = s.along->data();
   const std::uint32_t* degree = s.degree.data();
   const std::uint32_t n = m.size();
-  // Rounding is monotone: a squared norm is never below the square of one of its coordinates, so
-  // none of those outside is near.
+  // Rounding is monotone: a squared norm is never below the square of one of its coordinates, so no
+  // match outside the range is near.
   const auto apart = [&](std::uint32_t a, std::uint32_t b) {
     return !((along[b] - along[a]) * (along[b] - along[a]) < squared_separation);
   };
@@ -140,8 +140,9 @@ std::vector<std::vector<std::uint32_t>> choose_seeds(Exec& exec,
     peak[p].resize(matches[p].size());
   }
   std::vector<std::mutex> mutex(matches.size());
+  constexpr std::size_t kGrain = 512;  // rows per task: milliseconds of work
   exec.parallel_items(
-      matches.size(), [&](std::size_t p) { return degree[p].size(); }, 512,
+      matches.size(), [&](std::size_t p) { return degree[p].size(); }, kGrain,
       [&](std::size_t p, std::size_t begin, std::size_t end) {
         std::vector<std::uint32_t> part(degree[p].size(), 0);
         count_compatible(matches[p], test, static_cast<std::uint32_t>(begin),

@@ -10,7 +10,9 @@ namespace {
 
 constexpr int kEdge = ClosestGridView::kBlockEdge;
 constexpr int kCells = ClosestGridView::kBlockCells;
-/// Keys of all blocks that a query with a point in reach can fall into, ascending.
+/// Keys (32 MB) from which on duplicates are removed in between.
+constexpr std::size_t kMaxKeys = std::size_t(1) << 22;
+/// Keys of all blocks with a location within the search distance of a point, ascending.
 std::vector<std::uint64_t> reachable_blocks(const std::vector<Vec3>& points,
                                             const ClosestGeometry& g) {
   const float inverse = 1.0f / block_edge(g);
@@ -25,7 +27,7 @@ std::vector<std::uint64_t> reachable_blocks(const std::vector<Vec3>& points,
           const std::uint64_t key = cell_key({x, y, z});
           if (keys.empty() || keys.back() != key) keys.push_back(key);
         }
-    if (keys.size() > (std::size_t(1) << 22)) {
+    if (keys.size() > kMaxKeys) {
       std::sort(keys.begin(), keys.end());
       keys.erase(std::unique(keys.begin(), keys.end()), keys.end());
     }
@@ -40,7 +42,7 @@ struct BlockLists {
   std::vector<std::uint32_t> candidates;  // cells one after another
 };
 
-/// Points whose reach touches the block, ascending by index.
+/// Points within the search distance of the block, ascending by index.
 std::vector<std::uint32_t> points_near_block(const GridView& grid, Vec3 center,
                                              const ClosestGeometry& g) {
   const float reach = block_reach(g);
@@ -100,7 +102,7 @@ void build_block(const GridView& grid, const std::vector<Vec3>& points, Cell blo
       out.candidates.push_back(near[k]);
       ++out.counts[cell];
     }
-    if (out.candidates.size() > pipeline::kMaxBlockCandidates)
+    if (out.candidates.size() > limits::kMaxBlockCandidates)
       pipeline::throw_too_dense(g.search_distance);
   }
 }
@@ -136,7 +138,7 @@ std::vector<ClosestGrid> build_closest_grids(Exec& exec,
     grid.cell_size = geometry[c].cell_size;
     std::size_t total = 0;
     for (const BlockLists& l : lists[c]) total += l.candidates.size();
-    if (total > pipeline::kMaxCandidates)
+    if (total > limits::kMaxGridCandidates)
       pipeline::throw_too_dense(options.max_correspondence_distance);
     grid.table.reset(keys[c].size());
     grid.cell_start.reserve(keys[c].size() * (kCells + 1));

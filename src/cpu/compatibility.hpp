@@ -6,8 +6,7 @@
 
 namespace gpureg::cpu {
 
-/// Pointers to the coordinates of matches, one array each: loops over them are what the compiler
-/// turns into vectors.
+/// Pointers to the coordinates of matches, one array each: the compiler vectorises loops over them.
 struct MatchColumns {
   const float *px, *py, *pz, *qx, *qy, *qz, *mx, *my, *mz, *nx, *ny, *nz;
   explicit MatchColumns(const MatchSet& m, std::size_t from = 0)
@@ -33,8 +32,7 @@ inline CompatibilityTest test_of(const CompatibilityOptions& options) {
   return {options.tolerance * options.tolerance, options.max_turn * options.max_turn};
 }
 
-/// Calls take(k) for all matches that are compatible with one of them, in their order, until it
-/// returns false.
+/// Calls take(k) for all compatible matches of one match, in their order, until it returns false.
 template <typename Take>
 void for_each_compatible(const MatchSet& matches, std::uint32_t seed, const CompatibilityTest& test,
                          Take&& take) {

@@ -58,7 +58,8 @@ void downsample_one(const RawCloud& raw, const PrepareOptions& options, Downsamp
   }
   pipeline::check_extent(sqrtf(largest), options);
 
-  // Groups of points that become one: voxels in order of their key, or every point for itself.
+  // Groups of points that share a voxel, in order of its key; without downsampling every point is a
+  // group.
   std::vector<KeyIndex> order(finite.size());
   const float inverse = options.voxel_size > 0 ? 1.0f / options.voxel_size : 0.0f;
   for (std::size_t k = 0; k < finite.size(); ++k)
@@ -88,8 +89,8 @@ void downsample_one(const RawCloud& raw, const PrepareOptions& options, Downsamp
   }
   float radius2 = 0;
   for (const Vec3& p : out.points) radius2 = squared_norm(p) > radius2 ? squared_norm(p) : radius2;
-  // A hair longer, so that |point| / radius stays at most 1 in float; 1 for a cloud without extent.
-  out.radius = radius2 > 0 ? sqrtf(radius2) * 1.0001f : 1.0f;
+  // Slightly longer, so that |point| / radius is at most 1 in float; 1 for a cloud without extent.
+  out.radius = radius2 > 0 ? sqrtf(radius2) * kRadiusMargin : 1.0f;
 }
 
 }  // namespace

@@ -16,7 +16,7 @@
 namespace gpureg::cpu {
 namespace {
 
-/// Host memory has one owner: clouds of any CPU context go with any other.
+/// Host memory has one owner: clouds of all CPU contexts are compatible.
 const char kHostMemory = 0;
 
 class CpuEngine final : public Engine {
@@ -30,8 +30,8 @@ class CpuEngine final : public Engine {
            (exec_.threads() == 1 ? " thread" : " threads");
   }
   const void* memory() const override { return &kHostMemory; }
-  // Enough that no thread waits at the end of a stage, few enough that progress and cancelling stay
-  // lively.
+  // Enough pairs to keep all threads busy at the end of a stage, few enough for prompt progress and
+  // cancellation.
   std::size_t pairs_per_chunk(const RegistrationOptions&) const override {
     return 2 * exec_.threads() + 2;
   }
@@ -93,21 +93,23 @@ std::uint64_t weight_by_normals(const std::vector<Vec3>& normals,
 
 CloudView CpuCloud::view() const {
   const bool wide = !wide_features.values.empty();
-  return {points.data(),
-          normals.data(),
-          features.values.data(),
-          features.valid.data(),
-          size,
-          feature_dimension,
-          radius,
-          closest.view(),
-          this,
-          wide ? wide_features.values.data() : nullptr,
-          wide ? wide_features.valid.data() : nullptr,
-          normal_weight.data(),
-          normal_weight_total,
-          visibility.view(),
-          surface_sides.view()};
+  CloudView v{};
+  v.points = points.data();
+  v.normals = normals.data();
+  v.features = features.values.data();
+  v.has_feature = features.valid.data();
+  v.size = size;
+  v.feature_dimension = feature_dimension;
+  v.radius = radius;
+  v.closest = closest.view();
+  v.executor_data = this;
+  v.wide_features = wide ? wide_features.values.data() : nullptr;
+  v.has_wide_feature = wide ? wide_features.valid.data() : nullptr;
+  v.normal_weight = normal_weight.data();
+  v.normal_weight_total = normal_weight_total;
+  v.visibility = visibility.view();
+  v.surface_sides = surface_sides.view();
+  return v;
 }
 
 std::vector<std::shared_ptr<CpuCloud>> assemble(

@@ -17,8 +17,8 @@ Exec::~Exec() {
 }
 
 void Exec::run_tasks() {
-  // Entered with the lock held, left with it held. Blocks are coarse, so one lock per block costs
-  // nothing.
+  // Called with the lock held, returns with it held. Blocks are coarse, so one lock per block is
+  // cheap.
   std::unique_lock<std::mutex> lock(mutex_, std::adopt_lock);
   while (next_ < count_ && !error_) {
     const std::size_t k = next_++;

@@ -12,8 +12,8 @@
 
 namespace gpureg::cpu {
 
-/// Threads and clock of the CPU backend. Which thread runs which block is not determined; what a
-/// block writes must depend on the block only.
+/// Threads and clock of the CPU backend. The assignment of blocks to threads varies, so the output
+/// of a block must depend on the block only.
 class Exec {
  public:
   explicit Exec(unsigned threads);
@@ -27,8 +27,8 @@ class Exec {
   /// Rethrows the first exception.
   void parallel(std::size_t count, const std::function<void(std::size_t)>& task);
 
-  /// One batch entry's blocks after another's: calls work(entry, begin, end) for blocks of at most
-  /// grain items of every entry. counts[k] is the number of items of entry k.
+  /// Calls work(entry, begin, end) for the blocks of each batch entry in turn, at most grain
+  /// elements each. counts[k]: number of elements of entry k.
   template <typename Count, typename Work>
   void parallel_items(std::size_t entries, Count&& count, std::size_t grain, Work&& work) {
     struct Block {

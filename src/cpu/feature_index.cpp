@@ -15,8 +15,8 @@ constexpr std::uint32_t kLeaf = FeatureIndex::kLeaf, kNode = FeatureIndex::kNode
                         kNodeRows = FeatureIndex::kNodeRows;
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
 
-/// Orders rows so that halves, down to the leaves, are apart along the dimension in which they
-/// spread most.
+/// Orders rows so that halves, down to the leaves, are separated along the dimension of their
+/// largest spread.
 class Splitter {
  public:
   explicit Splitter(FeatureRows rows)
@@ -66,9 +66,9 @@ class Splitter {
   std::vector<float> sum_, squares_, key_;
 };
 
-/// The lower bound of each of 8 boxes: the chain that makes a distance, with the distance to the
-/// box in each dimension. Rounding is monotone, so no row in a box has a smaller distance than
-/// this, to the last bit.
+/// Lower bound of the distance to each of 8 boxes: the same chain of operations as a distance, with
+/// the distance to the box in each dimension. Rounding is monotone, so the bound holds to the last
+/// bit.
 void box_bounds(const float* query, const float* boxes, std::size_t dimension, float* out) {
 #if defined(__AVX2__) && defined(__FMA__)
   __m256 sum = _mm256_setzero_ps();
@@ -92,7 +92,7 @@ void box_bounds(const float* query, const float* boxes, std::size_t dimension, f
 #endif
 }
 
-/// Squared distances to the 16 rows of a leaf; false, and no distances, where half of the
+/// Squared distances to the 16 rows of a leaf. False, and no distances, where half of the
 /// dimensions already show that all exceed `most`.
 bool leaf_distances(const float* query, const float* leaf, std::size_t dimension, float most,
                     float* out) {
@@ -153,7 +153,7 @@ class Search {
     const std::size_t block = std::size_t(16) * index_.dimension;
     for (std::size_t b = 0; b * 8 < bound_.size(); ++b)
       box_bounds(query, index_.node_boxes.data() + b * block, index_.dimension, &bound_[b * 8]);
-    // The most promising node first: what it finds refutes most of the others.
+    // The nearest node first: its rows refute most of the other nodes.
     const std::size_t first =
         static_cast<std::size_t>(std::min_element(bound_.begin(), bound_.end()) - bound_.begin());
     visit(first);
@@ -181,8 +181,7 @@ class Search {
     for (std::uint32_t l = 0; l < kLeaf; ++l) {
       if (!(distances[l] <= best_)) continue;
       const std::uint32_t row = index_.row[leaf * kLeaf + l];
-      // Rows infinitely far away are not near: best_row_ is kNoValue as long as the best is
-      // infinite.
+      // best_row_ stays kNoValue while the best distance is infinite: such rows are not near.
       if (distances[l] == best_ && (best_row_ == kNoValue || row >= best_row_)) continue;
       best_ = distances[l];
       best_row_ = row;

@@ -8,14 +8,14 @@
 
 namespace gpureg::cpu {
 
-/// Feature rows for exact nearest-row searches that look at few of them: rows that lie together in
-/// leaves of 16, leaves in nodes of 8, and of each leaf and node the box around its rows.
+/// Index for exact nearest-row searches that read few rows: leaves of 16 similar rows, nodes of 8
+/// leaves, and the bounding box of each leaf and node.
 struct FeatureIndex {
   static constexpr std::uint32_t kLeaf = 16, kNode = 8, kNodeRows = kLeaf * kNode;
   std::uint32_t dimension = 0, nodes = 0;
   std::vector<std::uint32_t>
       row;                    ///< nodes x 128, valid rows in the order of the leaves, then kNoValue
-  std::uint32_t rows = 0;     ///< how many of them
+  std::uint32_t rows = 0;     ///< number of valid rows
   std::vector<float> values;  ///< leaf, dimension, row of the leaf; infinity where there is none
   std::vector<float>
       leaf_boxes;  ///< node, dimension, lower ends of its 8 leaves and then the upper ones
@@ -24,9 +24,9 @@ struct FeatureIndex {
 
 FeatureIndex index_features(FeatureRows rows);
 
-/// out[q] becomes what nearest_features() with k = 1 finds for row q, for the rows begin to end
-/// (exclusive) in the order of their own index. The rows of one leaf ask alike, so each begins with
-/// the answer of the one before.
+/// Searches the nearest row for the rows begin to end (exclusive) in the order of their own index.
+/// out[q]: result of nearest_features() with k = 1 for row q. The rows of one leaf are similar, so
+/// each search starts with the result of the previous one.
 void nearest_features(FeatureRows queries, const FeatureIndex& order, FeatureRows rows,
                       const FeatureIndex& index, std::size_t begin, std::size_t end,
                       std::uint32_t* out);

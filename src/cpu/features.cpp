@@ -50,7 +50,7 @@ class WeightedRows {
 #endif
 };
 
-/// weighted_fpfh() of the point at that place; spfh: rows of kRow, by place.
+/// weighted_fpfh() of the point at a position; spfh: rows of kRow, by position.
 bool weighted_fpfh(const NeighborRows& rows, const std::vector<float>& spfh, std::size_t self,
                    float radius, std::vector<std::uint32_t>& places, std::vector<float>& squared,
                    float* out) {
@@ -130,7 +130,7 @@ std::vector<Features> compute_features(Exec& exec, const std::vector<Downsampled
                                        const std::vector<Grid>& grids,
                                        const PrepareOptions& options) {
   std::vector<Features> features(clouds.size());
-  // Custom features come as they are; their rows with a NaN are never matched.
+  // Given features are copied; rows with a NaN are never matched.
   for (std::size_t c = 0; c < clouds.size(); ++c) {
     if (clouds[c].feature_dimension == 0) continue;
     const std::size_t n = clouds[c].points.size();

@@ -14,8 +14,9 @@ std::vector<Hypotheses> fit_hypotheses(Exec& exec, const std::vector<Matches>& m
     poses[p].resize(quadruples[p].size());
     valid[p].resize(quadruples[p].size());
   }
+  constexpr std::size_t kGrain = 512;  // hypotheses per task: milliseconds of work
   exec.parallel_items(
-      matches.size(), [&](std::size_t p) { return quadruples[p].size(); }, 512,
+      matches.size(), [&](std::size_t p) { return quadruples[p].size(); }, kGrain,
       [&](std::size_t p, std::size_t begin, std::size_t end) {
         const std::vector<MatchedPoints>& m = matches[p].pairs;
         for (std::size_t k = begin; k < end; ++k) {

@@ -42,8 +42,8 @@ std::vector<Grid> build_grids(Exec& exec, const std::vector<DownsampledCloud>& c
   exec.parallel(clouds.size(), [&](std::size_t c) {
     Grid& grid = grids[c];
     const std::vector<Vec3>& points = clouds[c].points;
-    // Half the feature radius: a ball touches about 5^3 cells, most of them empty, and few points
-    // outside the ball are visited.
+    // Half the feature radius: a ball overlaps about 5^3 cells, most of them empty, with few points
+    // outside the ball.
     grid.cell_size = options.feature_radius * 0.5f;
     const float inverse = 1.0f / grid.cell_size;
     std::vector<KeyIndex> order(points.size());

@@ -23,7 +23,7 @@ class IcpBatch {
     if (++size_ == kLanes) flush();
   }
   IcpSums sums() {
-    // What a full batch would lack weighs nothing.
+    // Missing correspondences of a partial batch get weight zero.
     for (; size_ > 0 && size_ < kLanes; ++size_)
       ax_[size_] = ay_[size_] = az_[size_] = nx_[size_] = ny_[size_] = nz_[size_] =
           residual_[size_] = weight_[size_] = 0.0f;

@@ -7,7 +7,8 @@
 
 namespace gpureg::cpu {
 
-/// Adds point i of the source, moved to q and with closest target point c, to s if it is an inlier.
+/// Adds point i of the source, at its moved position q with closest target point c, to s if it is
+/// an inlier.
 inline void count_inlier(const CloudView& source, const CloudView& target, const Rigid& pose,
                          const InlierTest& t, std::uint32_t i, Closest c, Support& s) {
   if (c.index == kNoValue) return;

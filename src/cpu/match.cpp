@@ -11,11 +11,11 @@
 namespace gpureg::cpu {
 namespace {
 
-constexpr int kLanes = 16;   // rows side by side
-constexpr int kQueries = 4;  // queries side by side: their sums stay in registers
+constexpr int kLanes = 16;   // rows per vector block
+constexpr int kQueries = 4;  // queries per pass: their sums stay in registers
 
-/// Rows transposed in blocks of kLanes: block, dimension, lane. Invalid and missing rows are so far
-/// away that no query meets them.
+/// Rows transposed in blocks of kLanes: block, dimension, lane. Invalid and missing rows are
+/// infinitely far.
 std::vector<float> transpose_blocks(FeatureRows rows) {
   const std::size_t blocks = (rows.size + kLanes - 1) / kLanes;
   std::vector<float> out(blocks * rows.dimension * kLanes, std::numeric_limits<float>::infinity());
@@ -65,14 +65,14 @@ void block_distances(const float* const* queries, const float* block, std::size_
 /// The k best (distance, index) of one query, ascending; ties keep the lower index because rows
 /// come in ascending order.
 struct TopK {
-  float distance[16];
-  std::uint32_t index[16];
+  float distance[limits::kMaxNeighbors];
+  std::uint32_t index[limits::kMaxNeighbors];
   std::uint32_t k;
 
   void clear(std::uint32_t count) {
     k = count;
-    std::fill_n(distance, 16, std::numeric_limits<float>::infinity());
-    std::fill_n(index, 16, kNoValue);
+    std::fill_n(distance, limits::kMaxNeighbors, std::numeric_limits<float>::infinity());
+    std::fill_n(index, limits::kMaxNeighbors, kNoValue);
   }
   void insert(float d, std::uint32_t i) {
     std::uint32_t at = k - 1;

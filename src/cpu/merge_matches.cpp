@@ -13,7 +13,7 @@ namespace {
 /// One search of all rows of one cloud in the other.
 struct Search {
   FeatureRows from, in;
-  bool forward;  ///< the source asks
+  bool forward;  ///< from source to target
   std::vector<std::uint32_t> nearest;
   const FeatureIndex *from_index = nullptr, *in_index = nullptr;
 };
@@ -37,7 +37,7 @@ std::vector<Search> searches_of(const PairView& pair) {
   return out;
 }
 
-/// One index for each set of rows, however many of the pairs and searches share it.
+/// One index for each set of rows, shared by all pairs and searches.
 std::map<const float*, FeatureIndex> index_rows(Exec& exec, const std::vector<Search*>& searches) {
   std::map<const float*, FeatureIndex> out;
   for (const Search* search : searches) {
@@ -64,7 +64,7 @@ std::uint64_t joined(std::uint32_t source, std::uint32_t target) {
   return static_cast<std::uint64_t>(source) << 32 | target;
 }
 
-/// Weights of the chosen points by how many of them share their normal's direction.
+/// Normal-space weights of the kept points.
 std::uint64_t normal_weight(const Vec3* normals, const std::vector<std::uint32_t>& index,
                             std::vector<std::uint32_t>& weight) {
   std::uint32_t count[kNormalBins] = {};
@@ -75,7 +75,7 @@ std::uint64_t normal_weight(const Vec3* normals, const std::vector<std::uint32_t
   return total;
 }
 
-MatchSet unite(const PairView& pair, const std::vector<Search>& searches, std::uint64_t seed,
+MatchSet merge(const PairView& pair, const std::vector<Search>& searches, std::uint64_t seed,
                std::uint32_t most) {
   std::vector<std::uint64_t> all;
   for (std::uint32_t c = 0; c < pair.custom_count; ++c)
@@ -133,8 +133,9 @@ std::vector<MatchSet> merge_matches(Exec& exec, Span<const PairView> pairs,
     for (Search& search : searches[p]) flat.push_back(&search);
   }
   const auto indices = index_rows(exec, flat);
+  constexpr std::size_t kGrain = 512;  // queries per task: milliseconds of work
   exec.parallel_items(
-      flat.size(), [&](std::size_t k) { return flat[k]->from_index->rows; }, 512,
+      flat.size(), [&](std::size_t k) { return flat[k]->from_index->rows; }, kGrain,
       [&](std::size_t k, std::size_t begin, std::size_t end) {
         const Search& s = *flat[k];
         nearest_features(s.from, *s.from_index, s.in, *s.in_index, begin, end,
@@ -142,7 +143,7 @@ std::vector<MatchSet> merge_matches(Exec& exec, Span<const PairView> pairs,
       });
   std::vector<MatchSet> out(pairs.size);
   exec.parallel(pairs.size, [&](std::size_t p) {
-    out[p] = unite(pairs[p], searches[p], options.seed, options.compatibility.max_matches);
+    out[p] = merge(pairs[p], searches[p], options.seed, options.compatibility.max_matches);
   });
   return out;
 }

@@ -9,7 +9,7 @@
 namespace gpureg::cpu {
 namespace {
 
-/// Normal equations from the points of the walk, weighed by their normals' direction.
+/// Normal equations from the points of the walk, with normal-space weights.
 IcpSums mode_sums(MovedPoints& moved, const PairView& pair, const Pose<double>& pose,
                   const RegistrationOptions& options, float kernel_width, float min_cosine) {
   const Rigid rigid = to_rigid(pose);

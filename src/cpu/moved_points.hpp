@@ -10,14 +10,13 @@ inline const CpuCloud& executor_data(const CloudView& cloud) {
   return *static_cast<const CpuCloud*>(cloud.executor_data);
 }
 
-/// The points of one cloud under poses, against the cells of another: a walk that leaves out what
-/// the cells' summaries refute, and waits for no look-up.
+/// The points of one cloud under poses, against the cells of another cloud: a walk that skips the
+/// points that the cell summaries refute, and prefetches all look-ups.
 class MovedPoints {
  public:
-  static constexpr std::size_t kGroup = 64;  ///< points side by side
+  static constexpr std::size_t kGroup = 64;  ///< points per group
 
-  /// order: of moved's points, or of some of them; limits: for the normal test that the walk is
-  /// about.
+  /// order: of all points of moved, or of some; limits: for the normal test of the walk.
   MovedPoints(const ScoringOrder& order, const CloudView& other, const SummaryLimits& limits)
       : order_(order),
         other_(other),
@@ -27,7 +26,7 @@ class MovedPoints {
 
   std::size_t groups() const { return order_.remaining.size(); }
   const ScoringOrder& order() const { return order_; }
-  /// Points of a group that are not padding.
+  /// Mask of the points of a group that are not padding.
   std::uint64_t present(std::size_t group) const {
     std::uint64_t mask = 0;
     for (std::size_t k = 0; k < kGroup; ++k)
@@ -37,12 +36,12 @@ class MovedPoints {
   Vec3 point(std::size_t k) const { return {order_.x[k], order_.y[k], order_.z[k]}; }
   Vec3 normal(std::size_t k) const { return {order_.nx[k], order_.ny[k], order_.nz[k]}; }
 
-  /// Calls visit(group, bounds) for every group; bounds: of its inliers. closest() then knows the
-  /// group.
+  /// Calls visit(group, bounds) for every group; bounds: of its inliers. closest() is valid for the
+  /// visited group.
   template <typename Visit>
   void for_each_group(const Rigid& pose, Visit&& visit) {
     if (groups() == 0) return;
-    if (cells_.block.empty()) {  // a cloud too wide for the table: nothing is known beforehand
+    if (cells_.block.empty()) {  // a cloud too wide for the table has no bounds
       for (std::size_t g = 0; g < groups(); ++g) visit(g, PointBounds{~std::uint64_t(0), 0});
       return;
     }
@@ -54,7 +53,7 @@ class MovedPoints {
     }
   }
 
-  /// Of the points that the mask names, those with any point of the other cloud near their cell.
+  /// Of the points in the mask, those with a point of the other cloud near their cell.
   std::uint64_t near_any(std::size_t group, std::uint64_t mask) const {
     if (cells_.block.empty()) return mask;
     std::uint64_t out = 0;
@@ -65,9 +64,8 @@ class MovedPoints {
     return out & mask;
   }
 
-  /// Calls visit(k, q, closest) for the points of a group that the mask names: k their place in the
-  /// order, q where they are moved to. Lists are fetched for all of them before the first is read,
-  /// because each alone would wait for memory.
+  /// Calls visit(k, q, closest) for the points of a group in the mask: k is their position in the
+  /// order, q their moved location. Prefetches the lists of all points before the first is read.
   template <typename Visit>
   void closest(const Rigid& pose, std::size_t group, std::uint64_t mask, float max_squared,
                Visit&& visit) const {
@@ -108,8 +106,7 @@ class MovedPoints {
   std::vector<std::int32_t> cell_;
 };
 
-/// Every stride-th point of a cloud, in an order for such a walk. Its index is that of the points
-/// in the cloud.
+/// Every stride-th point of a cloud, ordered for such a walk. index: of the points in the cloud.
 inline ScoringOrder sampled_order(const CpuCloud& cloud, std::uint32_t stride) {
   if (stride == 1) return cloud.order;
   std::vector<Vec3> points, normals;
@@ -122,8 +119,7 @@ inline ScoringOrder sampled_order(const CpuCloud& cloud, std::uint32_t stride) {
   return out;
 }
 
-/// Whether the summaries' "every place has a candidate in reach" speaks of this correspondence
-/// distance.
+/// True where the summaries' bit for covered cells applies to this correspondence distance.
 inline bool exact_distance(const CloudView& cloud, float max_squared) {
   const float built_for = executor_data(cloud).options.max_correspondence_distance;
   return built_for * built_for == max_squared;

@@ -8,9 +8,9 @@
 
 namespace gpureg::cpu {
 
-/// A grid's points one array per coordinate, and where each row of cells along x begins: a row's
-/// cells are neighbours in memory, so a ball is a few runs of points instead of many look-ups.
-/// "SurfaceSide" is a point's position in the grid's order.
+/// Points of a grid, one array per coordinate, and the first point of each row of cells along x.
+/// The cells of a row are adjacent in memory, so a ball is a few runs of points instead of many
+/// look-ups. A position is a point's index in the order of the grid.
 class NeighborRows {
  public:
   NeighborRows(const Grid& grid, const std::vector<Vec3>& normals)
@@ -45,11 +45,11 @@ class NeighborRows {
   Vec3 point(std::size_t place) const { return {x_[place], y_[place], z_[place]}; }
   Vec3 normal(std::size_t place) const { return {nx_[place], ny_[place], nz_[place]}; }
 
-  /// Calls run(first, last) for runs of places that together hold every point within the radius, in
-  /// the order of for_each_neighbor().
+  /// Calls run(first, last) for runs of positions that together contain every point within the
+  /// radius, in the order of for_each_neighbor().
   template <typename Run>
   void for_each_run(Vec3 q, float radius, Run&& run) const {
-    const float reach = radius * 1.0001f;
+    const float reach = radius * kBallMargin;
     const Cell lo = cell_of({q.x - reach, q.y - reach, q.z - reach}, inverse_),
                hi = cell_of({q.x + reach, q.y + reach, q.z + reach}, inverse_);
     auto plane = std::lower_bound(planes_.begin(), planes_.end() - 1, lo.z,
@@ -69,8 +69,9 @@ class NeighborRows {
     }
   }
 
-  /// Places within the radius of q that keep(place, squared distance), in the order of
-  /// for_each_neighbor(), and their squared distances. The vectors grow as needed and never shrink.
+  /// Positions within the radius of q for which keep(position, squared distance) is true, in the
+  /// order of for_each_neighbor(), and their squared distances. The vectors grow as needed and
+  /// never shrink.
   template <typename Keep>
   std::size_t within(Vec3 q, float radius, std::vector<std::uint32_t>& places,
                      std::vector<float>& squared, Keep&& keep) const {
@@ -83,8 +84,7 @@ class NeighborRows {
       }
       std::uint32_t* place = places.data();
       float* d2 = squared.data();
-      // Whether a point is near is a coin toss: it is written in any case, and the next one
-      // overwrites it where it is not.
+      // Writes every point and overwrites those outside: a branch on the distance is unpredictable.
       for (std::uint32_t k = first; k < last; ++k) {
         const float d = squared_norm(point(k) - q);
         place[n] = k;

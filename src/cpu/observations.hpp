@@ -6,12 +6,12 @@
 
 namespace gpureg::cpu {
 
-/// What depth maps say about 64 locations, one bit each; the union over several maps.
+/// Observations of 64 locations, one bit each; the union over several maps.
 struct Observations {
   std::uint64_t observed = 0, violating = 0, surface = 0;
 };
 
-/// Incidence weights of 64 locations, the best over several maps; see incidence().
+/// Incidence weights of 64 locations, the maximum over several maps; see incidence().
 struct Incidences {
   alignas(32) float observed[64] = {};
   alignas(32) float violating[64] = {};
@@ -40,8 +40,8 @@ struct MovedGroup {
   }
 };
 
-/// observe() of one map for all locations, added to s, in loops that the compiler vectorises.
-/// normals: moved like the locations; read only where incidences are wanted.
+/// observe() of one map for all locations, added to s, in vectorised loops. normals: moved like the
+/// locations; read only with incidences.
 inline void add_observations(const VisibilityView& maps, std::uint32_t map,
                              const MovedGroup& locations, float margin, float min_range,
                              Observations& s, const MovedGroup* normals = nullptr,
@@ -60,7 +60,7 @@ inline void add_observations(const VisibilityView& maps, std::uint32_t map,
   for (int k = 0; k < kSize; ++k) steps[k] = depths[cell[k]];
   for (int k = 0; k < kSize; ++k)
     depth[k] = static_cast<float>(static_cast<std::int32_t>(steps[k])) * maps.step;
-  // One byte for each location and comparison, then eight bytes at once become bits.
+  // One byte for each location and comparison, then eight bytes at a time become bits.
   alignas(32) std::uint8_t known[kSize], before[kSize], behind[kSize];
   for (int k = 0; k < kSize; ++k) {
     known[k] = (ray[k] > min_range) & (steps[k] != kUnknownDepth);

@@ -8,12 +8,11 @@
 
 namespace gpureg::cpu {
 
-/// spfh_counts() with the neighbours gathered first, and pair_feature() without a branch on all of
-/// them, which the compiler turns into vectors. The same operations on the same values, so the same
-/// bins.
+/// spfh_counts() with gathered neighbours and a branch-free pair_feature(), which the compiler
+/// vectorises. The same operations on the same values give the same bins.
 class PairBins {
  public:
-  /// Counts of the point at that place, and what they are relative to.
+  /// Counts of the point at a position, and the number of neighbours for normalisation.
   int spfh_counts(const NeighborRows& rows, std::size_t self, float radius, std::uint32_t* counts) {
     for (int b = 0; b < kFpfhSize; ++b) counts[b] = 0;
     const Vec3 p = rows.point(self), n = rows.normal(self);
@@ -53,8 +52,8 @@ class PairBins {
   using Lanes = float[kLanes];
   static float absolute(float v) { return v < 0.0f ? -v : v; }
 
-  /// exact_atan2() of each lane. One choice a loop: the compiler makes a branch of two, and no
-  /// vectors of a loop with a branch.
+  /// exact_atan2() of each lane, with one selection per loop: the compiler turns two into a branch,
+  /// which prevents vectors.
   static void angles(const Lanes& y, const Lanes& x, Lanes& out) {
     alignas(32) Lanes ax, ay, larger, smaller;
     for (int k = 0; k < kLanes; ++k) ax[k] = absolute(x[k]);
@@ -89,8 +88,8 @@ class PairBins {
     for (int k = 0; k < kLanes; ++k) out[k] = out[k] >= kFpfhBins ? kFpfhBins - 1 : out[k];
   }
 
-  /// pair_feature() of the lanes from `first` on; lanes beyond the neighbours hold older ones,
-  /// which nobody reads.
+  /// pair_feature() of the lanes from `first` on; lanes beyond the neighbours hold unused old
+  /// values.
   void bin(std::size_t first, Vec3 p, Vec3 n) {
     const float *x = &x_[first], *y = &y_[first], *z = &z_[first], *mx = &mx_[first],
                 *my = &my_[first], *mz = &mz_[first];
@@ -105,7 +104,7 @@ class PairBins {
       dy[k] = d.y;
       dz[k] = d.z;
     }
-    // Bits say whether the other point is the source: choices by bits are no branches.
+    // Masks select the source point of the feature without a branch.
     alignas(32) std::int32_t turned[kLanes];
     for (int k = 0; k < kLanes; ++k) {
       phi[k] = absolute(a1[k]);

@@ -8,7 +8,7 @@
 namespace gpureg::cpu {
 namespace {
 
-/// A seed's neighbourhood: the seed, then the first of its compatible matches.
+/// Neighbourhood of a seed: the seed, then the first of its compatible matches.
 struct Members {
   std::vector<float> px, py, pz, qx, qy, qz;
   static constexpr std::uint32_t kBlock = 64;
@@ -51,8 +51,8 @@ struct Members {
   Vec3 source(std::uint32_t k) const { return {px[k], py[k], pz[k]}; }
   Vec3 target(std::uint32_t k) const { return {qx[k], qy[k], qz[k]}; }
 
-  /// Weight of those that the motion brings together; something up to `best` as soon as no more
-  /// than that is possible.
+  /// Total weight of the members that the motion aligns. Stops, with a value up to `best`, as soon
+  /// as more is out of range.
   std::uint32_t support(const Rigid& pose, float squared_distance, std::uint32_t best) const {
     const float *ax = px.data(), *ay = py.data(), *az = pz.data(), *bx = qx.data(), *by = qy.data(),
                 *bz = qz.data();
@@ -71,20 +71,22 @@ struct Members {
   }
 };
 
-/// Least squares over the members that the pose brings together; false where they do not determine
-/// one.
+/// Least-squares fit to the members that the pose aligns; false where they do not determine a pose.
 bool refit(const Members& members, float squared_distance, Pose<float>& pose) {
   const Rigid rigid = to_rigid(pose);
-  Vec3 p[1024], q[1024];
+  Vec3 p[limits::kMaxMembers], q[limits::kMaxMembers];
   int n = 0;
   for (std::uint32_t k = 0; k < members.size; ++k)
-    if (squared_norm(apply(rigid, members.source(k)) - members.target(k)) < squared_distance)
-      p[n] = members.source(k), q[n] = members.target(k), ++n;
+    if (squared_norm(apply(rigid, members.source(k)) - members.target(k)) < squared_distance) {
+      p[n] = members.source(k);
+      q[n] = members.target(k);
+      ++n;
+    }
   return fit_rigid(p, q, n, pose);
 }
 
-/// The triangle of the seed and two compatible members that most of the neighbourhood agrees with,
-/// refitted to those that agree.
+/// The triangle of the seed and two compatible members with the largest consensus weight, refitted
+/// to its consensus set.
 bool fit_seed(const MatchSet& m, std::uint32_t seed, const CompatibilityOptions& options,
               std::uint64_t random, Members& members, Pose<float>& pose) {
   const CompatibilityTest test = test_of(options);
@@ -130,10 +132,12 @@ MatchEvidence count_matches(const MatchSet& m, const Rigid& pose, float squared_
               *qy = m.qy.data(), *qz = m.qz.data();
   const std::uint32_t *ws = m.source_weight.data(), *wt = m.target_weight.data();
   const std::uint32_t n = m.size();
-  // Weights are at most 2^16: 2^15 of them fit 32 bits, which the processor adds eight at a time.
+  // Weights are at most 2^16, so this many sum up in 32 bits, which the processor adds eight at a
+  // time.
+  constexpr std::uint32_t kExactSum = 1u << 15;
   MatchEvidence total{0, 0, 0};
-  for (std::uint32_t begin = 0; begin < n; begin += 1u << 15) {
-    const std::uint32_t end = std::min(n, begin + (1u << 15));
+  for (std::uint32_t begin = 0; begin < n; begin += kExactSum) {
+    const std::uint32_t end = std::min(n, begin + kExactSum);
     std::uint32_t inliers = 0, source = 0, target = 0;
     for (std::uint32_t k = begin; k < end; ++k) {
       const Vec3 d = apply(pose, {px[k], py[k], pz[k]}) - Vec3{qx[k], qy[k], qz[k]};

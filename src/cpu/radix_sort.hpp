@@ -12,8 +12,7 @@ struct KeyIndex {
   std::uint32_t index;
 };
 
-/// Stable least-significant-digit radix sort by key; digits that are the same everywhere cost
-/// nothing.
+/// Stable least-significant-digit radix sort by key; skips digits that are equal in all keys.
 inline void radix_sort(std::vector<KeyIndex>& items) {
   constexpr int kBits = 11;
   constexpr std::uint32_t kBuckets = 1u << kBits;

@@ -8,7 +8,8 @@
 namespace gpureg::cpu {
 namespace {
 
-/// Normal equations over all source points whose closest target point is in reach and turned alike.
+/// Normal equations over all source points with a closest target point within distance and normal
+/// angle.
 IcpSums icp_sums(Exec& exec, const PairView& pair, const Pose<double>& pose,
                  const RegistrationOptions& options, float min_cosine) {
   constexpr std::size_t kGrain = 1024;
@@ -50,8 +51,7 @@ std::vector<BestPose> refine_poses(Exec& exec, Span<const PairView> pairs,
   const float min_cosine =
       inlier_test(options.prepare.max_correspondence_distance, options.quadruples.max_normal_angle)
           .min_cosine;
-  // Pairs side by side would leave threads idle at the end of a small batch; points side by side
-  // never do.
+  // Parallel over points: parallel pairs would leave threads idle at the end of a small batch.
   for (std::size_t p = 0; p < pairs.size; ++p) {
     if (!best[p].found) continue;
     Pose<double> pose = best[p].pose;
@@ -70,7 +70,7 @@ std::vector<BestPose> refine_poses(Exec& exec, Span<const PairView> pairs,
     Support support = measure_support(pairs[p].source, pairs[p].target, to_rigid(pose), options);
     support.hypothesis = best[p].support.hypothesis;
     out[p].iterations = iteration;
-    // A refinement that fits worse than what it began with is dropped.
+    // A refinement that fits worse than its start is dropped.
     if (truncated_cost(support, pairs[p].source.size) <=
         truncated_cost(best[p].support, pairs[p].source.size)) {
       out[p].pose = pose;

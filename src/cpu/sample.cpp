@@ -14,7 +14,7 @@ static_assert(sizeof(MatchedPoints) == 8 * sizeof(float), "first_sides steps by 
 constexpr std::uint32_t kBlock = 1 << 16;  // hypotheses per task
 constexpr int kLanes = 8;
 
-/// The quadruples of kLanes hypotheses side by side, out[draw][lane]: the same integer steps as
+/// The quadruples of kLanes hypotheses at once, out[draw][lane]: the same integer steps as
 /// draw_quadruple.
 #if defined(__AVX2__)
 /// Low and high words of the products of eight words with a constant.
@@ -116,7 +116,7 @@ std::vector<std::vector<std::uint32_t>> sample_quadruples(Exec& exec,
         for (std::uint64_t first = begin; first < end; first += kLanes) {
           draw_lanes(static_cast<std::uint32_t>(first), options.seed, count, draw);
           const int lanes = end - first < kLanes ? static_cast<int>(end - first) : kLanes;
-          // Most fail at their first side: nothing else is fetched for them.
+          // Most hypotheses fail at their first side, so only its matches are fetched.
           for (unsigned mask = first_sides(m.data(), draw, tau2) & ((1u << lanes) - 1); mask != 0;
                mask &= mask - 1) {
             const int l = __builtin_ctz(mask);

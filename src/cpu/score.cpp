@@ -14,8 +14,8 @@ const CpuCloud& executor_data(const CloudView& cloud) {
   return *static_cast<const CpuCloud*>(cloud.executor_data);
 }
 
-/// Groups of points in the order of how often poses failed at them so far, the most frequent first.
-/// The order decides when a pose is given up, never whether.
+/// Groups of points in descending order of the poses that failed at them. The order decides how
+/// early a pose is abandoned, never the result.
 class GroupOrder {
  public:
   explicit GroupOrder(std::size_t groups)
@@ -40,11 +40,11 @@ class GroupOrder {
   std::vector<float> rate_;
 };
 
-/// Everything that the hypotheses of one pair share.
+/// Data shared by the hypotheses of one pair.
 class PairScorer {
  public:
   PairScorer(const PairView& pair, const InlierTest& test, const SummaryLimits& exact,
-             const SummaryLimits& reach)
+             const SummaryLimits& inexact)
       : source_(pair.source),
         target_(pair.target),
         test_(test),
@@ -54,17 +54,16 @@ class PairScorer {
                             executor_data(pair.target).options.max_correspondence_distance ==
                         test.max_squared
                     ? exact
-                    : reach),
+                    : inexact),
         bounds_(order_.remaining.size()),
         cell_(order_.x.size()),
         by_bound_(bounds_.size()),
         by_look_(bounds_.size()) {}
 
-  /// Support of one pose, given up (inliers 0) as soon as it cannot reach `needed` inliers: such a
-  /// hypothesis is not the best one, so giving it up changes no result. First every point is
-  /// bounded by its cell's summary, then only undecided ones are looked at, and only a pose that
-  /// reaches `needed` has its residual measured. The groups that poses of this pair fail at come
-  /// first.
+  /// Support of one pose. Abandons it (inliers 0) as soon as it cannot reach `needed` inliers; such
+  /// a hypothesis is not the best one, so this changes no result. The cell summaries bound every
+  /// point first, then the undecided points are searched, and the residual is measured only for a
+  /// pose that reaches `needed`. The groups at which poses of this pair fail come first.
   Support score(const Rigid& pose, std::uint32_t needed) {
     if (cells_.block.empty()) return all_points(pose);
     if (scored_++ % kRenewal == 0) {
@@ -100,7 +99,7 @@ class PairScorer {
   }
 
  private:
-  /// hypotheses between two renewals of the groups' order
+  /// Hypotheses between two updates of the order of the groups.
   static constexpr std::uint32_t kRenewal = 8;
 
   void locate(std::size_t g, const Rigid& pose) {
@@ -118,9 +117,8 @@ class PairScorer {
     return s;
   }
 
-  /// Looks at the points of one group that the mask names. Their cells are known from the bounds:
-  /// no search for the block. Lists are fetched for all points before the first is read, because
-  /// each alone would wait for memory.
+  /// Searches the points of one group in the mask. Their cells are known from the bounds, which
+  /// saves the look-up of the block. Prefetches the lists of all points before the first is read.
   void count_group(const Rigid& pose, std::size_t group, std::uint64_t mask, Support& s) const {
     constexpr std::uint32_t kCells = ClosestGridView::kBlockCells;
     const ClosestGridView& grid = target_.closest;

@@ -12,7 +12,7 @@
 #include "algorithm/surface_sides.hpp"
 #include "pipeline/engine.hpp"
 
-/// What the CPU stages hand on: values, one entry per cloud or pair of the batch.
+/// Data between the CPU stages: values, one entry per cloud or pair of the batch.
 namespace gpureg::cpu {
 
 struct DownsampledCloud {
@@ -20,14 +20,14 @@ struct DownsampledCloud {
   float radius = 1;               ///< of the points about the origin
   Vec3 lo{0, 0, 0}, hi{0, 0, 0};  ///< corners of the raw points' box, local
   std::uint64_t input_points = 0, invalid_points = 0;
-  /// local, in voxel order (z, y, x), or input order without downsampling
+  /// Local, in voxel order (z, y, x), or in input order without downsampling.
   std::vector<Vec3> points;
-  /// empty, or the mean input normal of each point, zero where unknown
+  /// Empty, or the mean input normal of each point, zero where unknown.
   std::vector<Vec3> guides;
   std::vector<float> features;  ///< empty, or the mean input feature of each point
   std::uint32_t feature_dimension = 0;
   std::vector<Vec3> viewpoints;  ///< local, at least one
-  bool turns_normals = false;    ///< the input's, by the viewpoints
+  bool turns_normals = false;    ///< input normals that face away are flipped
 };
 
 struct CellTable {
@@ -94,7 +94,7 @@ struct ClosestGrid {
   ClosestGridView view() const;
 };
 
-/// The fragment that a PreparedCloud holds.
+/// The data of a PreparedCloud.
 struct CpuCloud : PreparedState {
   std::vector<Vec3> points, normals;
   Features features, wide_features;
@@ -114,48 +114,47 @@ struct Matches {
   std::vector<MatchedPoints> pairs;
 };
 
-/// The matches of a pair that candidates are made of, each coordinate an array of its own; in an
-/// order that says nothing about them.
+/// Matches of a pair for the candidates, one array per coordinate, in pseudorandom order.
 struct MatchSet {
   std::vector<float> px, py, pz, qx, qy, qz;  ///< local points of source and target
   std::vector<float> mx, my, mz, nx, ny, nz;  ///< their normals
   std::vector<std::uint32_t> source, target;  ///< their indices
-  /// balanced over the normals of all matches
+  /// Normal-space weights over all matches of the set.
   std::vector<std::uint32_t> source_weight, target_weight;
   std::uint64_t source_total = 0, target_total = 0;
-  std::uint32_t found = 0;  ///< before the choice
+  std::uint32_t found = 0;  ///< number of distinct matches before the limit
   std::uint32_t size() const { return static_cast<std::uint32_t>(source.size()); }
 };
 
 /// Candidate poses of a pair, in the order of their seeds.
 struct Candidates {
   std::vector<Pose<float>> pose;
-  std::vector<std::uint32_t> seed;  ///< index of the match that it grew from
+  std::vector<std::uint32_t> seed;  ///< index of the seed match
   std::vector<MatchEvidence> matches;
   std::vector<float> coarse_score;
 };
 
-/// A distinct pose and what speaks for it.
+/// A distinct pose.
 struct Mode {
-  Pose<double> pose{1, 0, 0, 0, 0, 0, 0};
+  Pose<double> pose = identity_pose<double>();
   std::uint32_t seed = 0, iterations = 0;
 };
 
 struct Hypotheses {
-  std::vector<std::uint32_t> id;  ///< number among all drawn, ascending
+  std::vector<std::uint32_t> id;  ///< index among all drawn, ascending
   std::vector<Pose<float>> pose;
 };
 
 /// Best hypothesis of a pair, or none (found false).
 struct BestPose {
   bool found = false;
-  Pose<double> pose{1, 0, 0, 0, 0, 0, 0};
+  Pose<double> pose = identity_pose<double>();
   Support support{0, 0, 0};
   std::uint32_t iterations = 0;
 };
 
-/// What the final pose is judged and described by: its support under the judge's normal test, and
-/// the moments of all points in reach.
+/// Verification of the final pose: its support under the verification normal test, and the moments
+/// of all points within the distance.
 struct Verification {
   Support support{0, 0, 0};
   Moments source{0, {0, 0, 0}, {0, 0, 0, 0, 0, 0}};

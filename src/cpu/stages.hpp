@@ -4,9 +4,8 @@
 #include "cpu/exec.hpp"
 #include "cpu/stage_data.hpp"
 
-/// The stages of the pipeline on the CPU, each a free function without hidden state, each on a
-/// batch. The CUDA backend has the same names. What one item does is written once, in
-/// src/algorithm.
+/// The stages of the pipeline on the CPU: free functions without state of their own, each on a
+/// batch. The CUDA backend has the same names. The computation of one element is in src/algorithm.
 namespace gpureg::cpu {
 
 // Preparation, one entry per cloud.
@@ -25,7 +24,7 @@ std::vector<ClosestGrid> build_closest_grids(Exec& exec,
                                              const std::vector<DownsampledCloud>& clouds,
                                              const std::vector<Grid>& grids,
                                              const PrepareOptions& options);
-/// FPFH of the second radius, of normals of a second radius, too; empty where there is none.
+/// FPFH of the wide radius, from normals of a wide radius; empty without one.
 std::vector<Features> compute_wide_features(Exec& exec, const std::vector<DownsampledCloud>& clouds,
                                             const std::vector<Grid>& grids,
                                             const PrepareOptions& options);
@@ -45,7 +44,7 @@ std::vector<std::shared_ptr<CpuCloud>> assemble(
 // Alignment, one entry per pair.
 std::vector<Matches> match_features(Exec& exec, Span<const PairView> pairs,
                                     const RegistrationOptions& options);
-/// Numbers of the quadruples that pass the polygon test, ascending.
+/// Indices of the quadruples that pass the polygon test, ascending.
 std::vector<std::vector<std::uint32_t>> sample_quadruples(Exec& exec,
                                                           const std::vector<Matches>& matches,
                                                           const RegistrationOptions& options);
@@ -62,27 +61,28 @@ std::vector<Verification> verify_poses(Exec& exec, Span<const PairView> pairs,
                                        const std::vector<BestPose>& poses,
                                        const RegistrationOptions& options);
 // Alignment by compatibility and evidence, one entry per pair.
-/// Nearest features in both directions and of both radii, united; at most max_matches of them.
+/// Merges the nearest features in both directions and of both radii; keeps at most max_matches.
 std::vector<MatchSet> merge_matches(Exec& exec, Span<const PairView> pairs,
                                     const RegistrationOptions& options);
 /// Matches with the most compatible others, local maxima first.
 std::vector<std::vector<std::uint32_t>> choose_seeds(Exec& exec,
                                                      const std::vector<MatchSet>& matches,
                                                      const RegistrationOptions& options);
-/// A pose for each seed whose neighbourhood determines one, in the order of the seeds, and the
-/// matches that it brings together.
+/// A pose for each seed with a determinate neighbourhood, in the order of the seeds, and the
+/// matches that it aligns.
 std::vector<Candidates> propose_poses(Exec& exec, const std::vector<MatchSet>& matches,
                                       const std::vector<std::vector<std::uint32_t>>& seeds,
                                       const RegistrationOptions& options);
 /// Adds the coarse_score: evidence from a sample of the points.
 void score_candidates(Exec& exec, Span<const PairView> pairs, const std::vector<MatchSet>& matches,
                       std::vector<Candidates>& candidates, const RegistrationOptions& options);
-/// The most promising distinct poses.
+/// Distinct poses with the highest coarse_score.
 std::vector<std::vector<Mode>> select_modes(Exec& exec, const std::vector<Candidates>& candidates,
                                             const RegistrationOptions& options);
 void refine_modes(Exec& exec, Span<const PairView> pairs, std::vector<std::vector<Mode>>& modes,
                   const RegistrationOptions& options);
-/// Modes that have met: the most promising of them stays.
+/// Merges modes that refinement moved to the same pose; keeps the one with the highest
+/// coarse_score.
 void merge_modes(Exec& exec, std::vector<std::vector<Mode>>& modes,
                  const RegistrationOptions& options);
 /// Perturbed poses of the most likely mode of each pair; on the host.
@@ -106,7 +106,7 @@ void conclude(Exec& exec, Span<const PairView> pairs, const std::vector<Matches>
 
 /// Nearest features of every query row: k indices per query in order of distance (squared_norm of
 /// the difference as a chain of fmaf over the dimensions, then the lower index), kNoValue where
-/// fewer exist. Rows marked invalid neither ask nor answer.
+/// fewer exist. Invalid rows neither query nor match.
 struct FeatureRows {
   const float* values;
   const std::uint8_t* valid;
@@ -115,10 +115,10 @@ struct FeatureRows {
 void nearest_features(FeatureRows queries, FeatureRows rows, std::uint32_t k, std::size_t begin,
                       std::size_t end, std::uint32_t* out);
 
-/// Matches that the pose brings within the distance of each other.
+/// Matches that the pose brings within the distance.
 MatchEvidence count_matches(const MatchSet& matches, const Rigid& pose, float squared_distance);
 
-/// Exact support of one pose: the per-pose loop that scoring, refinement and tests share.
+/// Exact support of one pose, for scoring, refinement and tests.
 Support measure_support(const CloudView& source, const CloudView& target, const Rigid& pose,
                         const RegistrationOptions& options);
 

@@ -21,19 +21,19 @@ EvidenceTest test_of(const RegistrationOptions& options) {
       options.evidence.free_space_margin, options.evidence.min_range};
 }
 
-/// Where the summaries may decide about inliers by themselves; otherwise they only refute.
+/// True where the summaries may confirm inliers; otherwise they only refute.
 bool decides(const RegistrationOptions& options) {
   return options.evidence.max_normal_angle <= 90.0f;
 }
 
-/// What moves points of one side of a pair into the other side.
+/// One direction of a pair: points of `moved` against `other`.
 struct Side {
   const CloudView &moved, &other;
   const ScoringOrder& order;
   const SummaryLimits& limits;
 };
 
-/// The sample of a cloud that candidates are judged by.
+/// The points of a cloud in the coarse score.
 struct Sample {
   ScoringOrder order;
   std::vector<std::uint32_t> normal_weight;  ///< in that order, 0 for padding
@@ -50,8 +50,8 @@ Sample sample_of(const CloudView& cloud, std::uint32_t most) {
   return out;
 }
 
-/// Observations of a group by the first `maps` maps of the other cloud, and how incidence, where
-/// asked.
+/// Observations of a group by the first `maps` maps of the other cloud, with incidences if
+/// requested.
 Observations observations_of(const Side& side, const Rigid& pose, std::size_t group,
                              std::uint64_t present, const EvidenceTest& test, std::uint32_t maps,
                              Incidences* incidences = nullptr) {
@@ -77,8 +77,8 @@ std::uint32_t count(std::uint64_t mask) {
   return static_cast<std::uint32_t>(__builtin_popcountll(mask));
 }
 
-/// What coarse_score() asks of the sample: verify_point() of the points that the cells' summaries
-/// leave open.
+/// Side evidence for coarse_score(): verify_point() of the sampled points that the cell summaries
+/// leave undecided.
 SideEvidence score_sample(MovedPoints& points, const Side& side, const Sample& sample,
                           const Rigid& pose, const EvidenceTest& test, bool decide) {
   SideEvidence e{};
@@ -124,7 +124,7 @@ void add_surface_sides(const MovedPoints& points, std::size_t group, std::uint64
   }
 }
 
-/// verify_point() of all points of one side. visit(k, closest, inlier) is called for those with a
+/// verify_point() of all points of one side. Calls visit(k, closest, inlier) for the points with a
 /// closest point.
 template <typename Visit>
 SideEvidence verify_side(MovedPoints& points, const Side& side, const Rigid& pose,
@@ -168,7 +168,7 @@ void score_candidates(Exec& exec, Span<const PairView> pairs, const std::vector<
                       std::vector<Candidates>& candidates, const RegistrationOptions& options) {
   const EvidenceTest test = test_of(options);
   const SummaryLimits exact(options.evidence.max_normal_angle, true),
-      reach(options.evidence.max_normal_angle, false);
+      inexact(options.evidence.max_normal_angle, false);
   std::vector<Sample> source(pairs.size), target(pairs.size);
   exec.parallel(pairs.size, [&](std::size_t p) {
     source[p] = sample_of(pairs[p].source, options.evidence.sample);
@@ -180,9 +180,9 @@ void score_candidates(Exec& exec, Span<const PairView> pairs, const std::vector<
       [&](std::size_t p, std::size_t begin, std::size_t end) {
         const CloudView &s = pairs[p].source, &t = pairs[p].target;
         const Side forth{s, t, source[p].order,
-                         exact_distance(t, test.inlier.max_squared) ? exact : reach};
+                         exact_distance(t, test.inlier.max_squared) ? exact : inexact};
         const Side back{t, s, target[p].order,
-                        exact_distance(s, test.inlier.max_squared) ? exact : reach};
+                        exact_distance(s, test.inlier.max_squared) ? exact : inexact};
         MovedPoints source_points(forth.order, t, forth.limits),
             target_points(back.order, s, back.limits);
         for (std::size_t k = begin; k < end; ++k) {

@@ -21,8 +21,9 @@ std::map<int, std::vector<Eigen::Vector3f>> read_cameras(const std::string& path
       file.fail("the camera is farther away than a float can tell");
     const Eigen::Vector4d q(file.number(5, "qx"), file.number(6, "qy"), file.number(7, "qz"),
                             file.number(8, "qw"));
-    // Six digits leave 1e-6; the bound only notices columns that are no quaternion.
-    if (std::abs(q.norm() - 1) > 1e-3)
+    // Six digits leave 1e-6; the bound only detects columns that are no quaternion.
+    constexpr double kNormTolerance = 1e-3;
+    if (std::abs(q.norm() - 1) > kNormTolerance)
       file.fail("the quaternion has length " + std::to_string(q.norm()) + ", expected 1");
     cameras[fragment].push_back(position.cast<float>());
   }

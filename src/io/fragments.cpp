@@ -34,10 +34,10 @@ std::vector<std::pair<int, std::string>> list_fragments(const std::string& folde
     const auto number = fragment_number(entries->path().filename().string());
     std::error_code unreadable;  // a dangling link is not a fragment
     if (number && std::filesystem::is_regular_file(entries->path(), unreadable)) {
-      const auto [twin, is_new] = fragments.emplace(*number, entries->path().string());
+      const auto [first, is_new] = fragments.emplace(*number, entries->path().string());
       if (!is_new)
         throw IoError("fragment " + std::to_string(*number) + " is twice in the folder: " +
-                      twin->second + " and " + entries->path().string());
+                      first->second + " and " + entries->path().string());
     }
   }
   if (error) throw IoError("cannot list the folder " + folder + ": " + error.message());

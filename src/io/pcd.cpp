@@ -137,8 +137,9 @@ Table table_of(const Header& header, const Source& source) {
     Column column{std::string(header.names[k]),
                   scalar_type(header.types[k], header.sizes[k], header.names[k], source)};
     // The bound keeps every product of sizes below 2^63.
-    if (!header.counts.empty() &&
-        (!parse_count(header.counts[k], column.count) || column.count < 1 || column.count > 65536))
+    constexpr std::size_t kMaxCount = 65536;
+    if (!header.counts.empty() && (!parse_count(header.counts[k], column.count) ||
+                                   column.count < 1 || column.count > kMaxCount))
       source.fail("field " + quoted(column.name) + " has COUNT " + quoted(header.counts[k]) +
                   ", expected 1 to 65536");
     table.columns.push_back(std::move(column));

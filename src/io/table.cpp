@@ -3,6 +3,8 @@
 
 #include <initializer_list>
 
+#include "common/limits.hpp"
+
 namespace gpureg::io {
 
 std::size_t size_of(Scalar type) {
@@ -69,7 +71,7 @@ Axes find_axes(const Table& table, const Source& source) {
 }
 
 void check_rows(std::size_t rows, const Source& source) {
-  if (rows > 0x7fffffff)
+  if (rows > limits::kMaxPoints)
     source.fail("the header announces " + std::to_string(rows) +
                 " points, more than the limit of 2^31 - 1");
 }

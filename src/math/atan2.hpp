@@ -7,9 +7,9 @@ namespace gpureg {
 
 constexpr float kPi = 3.14159265358979f;
 
-/// atan2 by an odd polynomial (least-squares minimax on [0, 1], error below 3e-7 rad in float):
-/// libm's and CUDA's differ in the last bits, which would move a pair feature into another FPFH bin
-/// on one side only. atan2(0, 0) is 0.
+/// atan2 by an odd polynomial (least-squares minimax on [0, 1], error below 3e-7 rad in float). The
+/// library functions of the two sides differ in the last bits, which would move a pair feature into
+/// another FPFH bin. atan2(0, 0) is 0.
 GPUREG_HD float exact_atan2(float y, float x) {
   const float ax = x < 0.0f ? -x : x;
   const float ay = y < 0.0f ? -y : y;

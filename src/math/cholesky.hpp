@@ -5,9 +5,9 @@
 
 namespace gpureg {
 
-/// Solves A x = b for a symmetric positive definite 6 x 6 matrix (lower triangle is read) by L D
-/// L', whose only divisions are the six reciprocals of D: one thread solves while a thread block
-/// waits. False where A is not positive definite.
+/// Solves A x = b for a symmetric positive definite 6 x 6 matrix (reads the lower triangle) by L D
+/// L'. Its only divisions are the six reciprocals of D, because one thread solves while its thread
+/// block waits. False where A is not positive definite.
 GPUREG_HD bool solve_cholesky6(const double (&matrix)[6][6], const double (&b)[6], double (&x)[6]) {
   double l[6][6], inverse[6];
   for (int i = 0; i < 6; ++i) {

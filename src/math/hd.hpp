@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// What nvcc and the host compiler must agree on. Shared code uses + - * / sqrt and fmaf only: IEEE
-// defines each of them, so the same source gives the same bits on both sides (the build switches
-// contraction off, see cmake/gpureg_target.cmake).
+// Shared code of nvcc and the host compiler uses + - * / sqrt and fmaf only: IEEE defines each of
+// them, so the same source gives the same bits on both sides (the build disables contraction, see
+// cmake/gpureg_target.cmake).
 #include <cmath>
 #include <cstdint>
 

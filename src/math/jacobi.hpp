@@ -17,8 +17,8 @@ GPUREG_HD void jacobi_eigen(float (&a)[N][N], float (&v)[N][N]) {
       for (int q = p + 1; q < N; ++q) {
         const float apq = a[p][q];
         const float size = (apq < 0.0f ? -apq : apq) * 1e8f;
-        // Below the last bit of both eigenvalues a rotation changes nothing: late sweeps cost next
-        // to nothing.
+        // Below the last bit of both eigenvalues a rotation changes nothing; skipping it makes late
+        // sweeps cheap.
         if (apq == 0.0f || (size < (a[p][p] < 0.0f ? -a[p][p] : a[p][p]) &&
                             size < (a[q][q] < 0.0f ? -a[q][q] : a[q][q])))
           continue;

@@ -9,8 +9,8 @@ struct PhiloxWords {
   std::uint32_t v[4];
 };
 
-/// Philox4x32-10 (Salmon et al. 2011): randomness as a function of (counter, key), so that no draw
-/// depends on another.
+/// Philox4x32-10 (Salmon et al. 2011): random words as a function of (counter, key), so that draws
+/// are independent of their order.
 GPUREG_HD PhiloxWords philox(std::uint32_t c0, std::uint32_t c1, std::uint32_t c2, std::uint32_t c3,
                              std::uint32_t k0, std::uint32_t k1) {
   for (int round = 0; round < 10; ++round) {

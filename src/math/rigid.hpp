@@ -19,6 +19,14 @@ struct Pose {
   Scalar tx, ty, tz;
 };
 
+/// The pose that moves nothing.
+template <typename Scalar>
+GPUREG_HD Pose<Scalar> identity_pose() {
+  Pose<Scalar> pose{};
+  pose.w = Scalar(1);
+  return pose;
+}
+
 template <typename Scalar>
 GPUREG_HD void rotation_matrix(const Pose<Scalar>& p, Scalar* r) {
   const Scalar two = Scalar(2), one = Scalar(1);
@@ -66,9 +74,8 @@ GPUREG_HD Rigid inverse(const Rigid& m) {
   return out;
 }
 
-/// Motion that carries one triangle to another by their frames: exact for congruent triangles, and
-/// for others it keeps the first corner and the direction of the first side. False where one of
-/// them has no area.
+/// Motion between the frames of two triangles: exact for congruent triangles, otherwise it keeps
+/// the first corner and the direction of the first side. False where a triangle has no area.
 GPUREG_HD bool carry_triangle(Vec3 p0, Vec3 p1, Vec3 p2, Vec3 q0, Vec3 q1, Vec3 q2, Rigid& out) {
   const Vec3 a = p1 - p0, b = cross(a, p2 - p0), c = cross(b, a);
   const Vec3 d = q1 - q0, e = cross(d, q2 - q0), f = cross(e, d);

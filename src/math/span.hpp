@@ -7,7 +7,7 @@
 
 namespace gpureg {
 
-/// Non-owning array, on either side of the bus: what stages pass around. Buffers own.
+/// Non-owning array in host or device memory.
 template <typename T>
 struct Span {
   T* data = nullptr;

@@ -5,9 +5,9 @@
 
 namespace gpureg::pipeline {
 
-/// The paper's method: pairs of prepared clouds to outcomes (LoopSmart, Algorithm 1), one statement
-/// per stage. Exec brings the stages, found by its namespace; every stage takes all pairs at once.
-/// Only conclude() waits for the results.
+/// LoopSmart, Algorithm 1: pairs of prepared clouds to outcomes, one statement per stage.
+/// Argument-dependent look-up by Exec finds the stages of a backend; every stage takes all pairs at
+/// once. Only conclude() waits for the results.
 template <typename Exec>
 void align(Exec& exec, Span<const PairView> pairs, const RegistrationOptions& options,
            Span<PairOutcome> outcomes) {

@@ -6,12 +6,13 @@
 namespace gpureg::pipeline {
 
 /// The default method: pairs of prepared clouds to distinct poses with their evidence, one
-/// statement per stage. Exec brings the stages, found by its namespace; every stage takes all pairs
-/// at once.
+/// statement per stage. Argument-dependent look-up by Exec finds the stages of a backend; every
+/// stage takes all pairs at once.
 ///
-/// Refinement may stop anywhere along a surface without detail, a bare wall for example. Therefore
-/// the most likely mode is perturbed both ways along its weakest direction, refined from there and
-/// verified again (degeneracy search); the evidence tells which of the poses it is, and how sure.
+/// Refinement may stop anywhere along a surface without detail, a bare wall for example. The most
+/// likely mode is therefore perturbed both ways along its weakest direction, refined and verified
+/// again (degeneracy search). The evidence ranks the resulting poses and determines their
+/// confidence.
 template <typename Exec>
 void align_by_evidence(Exec& exec, Span<const PairInput> inputs, Span<const PairView> pairs,
                        const RegistrationOptions& options, Span<PairOutcome> outcomes) {

@@ -7,11 +7,11 @@
 #include "gpureg/error.hpp"
 #include "gpureg/options.hpp"
 
-/// What makes a cloud impossible to prepare: the same limits and words on every backend.
+/// Errors of clouds that cannot be prepared: the same limits and messages on every backend.
 namespace gpureg::pipeline {
 
-/// Cells of every structure that will be built must fit their keys; the smallest of them decides.
-/// radius: of the points about the local origin.
+/// Throws where the cells of a structure exceed the range of their keys; the structure with the
+/// smallest cells decides. radius: of the points about the local origin.
 inline void check_extent(float radius, const PrepareOptions& options) {
   float cell = options.feature_radius * 0.5f;
   if (options.voxel_size > 0 && options.voxel_size < cell) cell = options.voxel_size;
@@ -25,37 +25,32 @@ inline void check_extent(float radius, const PrepareOptions& options) {
                           " is too small for it, or it holds stray points");
 }
 
-/// Cells are half a radius wide, so a thousand points in one mean many thousands within the radius:
-/// such neighbourhoods make features meaningless and take hours. And where nearly all of very many
-/// points are alone in theirs, farther from each other than alignment will ever look, as
-/// millimetres are with a voxel in metres, there is nothing to align, but the closest-point grid
-/// would take some 20 KB a point. Better an error at once. squares: sum over the cells of their
-/// squared number of points.
+/// Throws for clouds that are too dense or too sparse for the radii. Cells are half a feature
+/// radius wide, so a thousand points in one mean many thousands within the radius; such
+/// neighbourhoods make features meaningless and take hours. A large cloud of isolated points
+/// (millimetres, and a voxel size in metres) has nothing to align, but its closest-point grid
+/// exhausts the memory. squares: sum over the cells of their squared number of points.
 inline void check_density(double squares, std::size_t points, const PrepareOptions& options) {
   const double per_cell = points == 0 ? 0 : squares / static_cast<double>(points);
-  if (per_cell > 1000)
+  if (per_cell > limits::kMaxPointsPerCell)
     throw InvalidArgument("on average more than " + std::to_string(static_cast<long>(per_cell)) +
                           " points lie within feature_radius " +
                           std::to_string(options.feature_radius) +
                           " of each other: use a larger voxel_size or a smaller radius");
-  constexpr std::size_t kMaxLonely = 20000;
-  if (points > kMaxLonely && per_cell < 1.1 &&
+  if (points > limits::kMaxIsolatedPoints && per_cell < limits::kIsolatedPointsPerCell &&
       options.max_correspondence_distance < 0.5f * options.feature_radius)
     throw InvalidArgument(
         "nearly all of " + std::to_string(points) +
-        " points are alone within half of feature_radius " +
+        " points are isolated within half of feature_radius " +
         std::to_string(options.feature_radius) + ": voxel_size " +
         std::to_string(options.voxel_size) +
         " or the radii are too small for the cloud; are they in the unit of the points?");
 }
 
-/// Lists this long mean millions of points within one search distance of each other; downsampling
-/// is the answer, not memory.
-constexpr std::size_t kMaxCandidates = std::size_t(1) << 28;
-constexpr std::size_t kMaxBlockCandidates = std::size_t(1) << 24;
-
+/// For a grid with more candidates than limits::kMaxGridCandidates or a block with more than
+/// limits::kMaxBlockCandidates: downsampling is the remedy, not memory.
 [[noreturn]] inline void throw_too_dense(float search_distance) {
-  throw InvalidArgument("point cloud is too dense for search_distance " +
+  throw InvalidArgument("point cloud is too dense for max_correspondence_distance " +
                         std::to_string(search_distance) + ": prepare it with voxel_size > 0");
 }
 

@@ -9,7 +9,8 @@ inline double inlier_ratio(const RegistrationStatistics& s) {
   return s.points_scored > 0 ? static_cast<double>(s.inliers) / s.points_scored : 0.0;
 }
 
-/// The first stage that left nothing is the reason; none where the pose passes the threshold.
+/// Reason for a missing alignment: the first stage without output; none where the pose passes the
+/// threshold.
 inline RegistrationReason reason_of(const RegistrationStatistics& s, bool has_pose,
                                     const RegistrationOptions& options) {
   if (s.source_points < 4) return RegistrationReason::too_few_source_points;
@@ -27,7 +28,7 @@ inline std::uint64_t quadruples_drawn(std::uint32_t matches, const RegistrationO
   return matches >= 4 ? options.quadruples.count : 0;
 }
 
-/// What the stages left of one pair.
+/// Counts of one pair after each stage.
 struct PairCounts {
   std::uint32_t source_points, target_points, correspondences;
   std::uint64_t hypotheses, survivors, scored;
@@ -51,7 +52,7 @@ inline void count_seeds(std::uint32_t source_points, std::uint32_t target_points
   count_stages({source_points, target_points, matches, seeds, candidates, candidates}, s);
 }
 
-/// The winner of the paper's method.
+/// Best hypothesis of LoopSmart.
 struct FinalPose {
   bool found;
   Pose<double> pose;

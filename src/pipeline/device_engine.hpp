@@ -8,18 +8,18 @@ namespace gpureg {
 struct CudaOptions;
 struct DeviceMemoryUse;
 
-/// A cloud out of device memory, copied in order of the caller's stream.
+/// A cloud copied from device memory in the order of a stream of the program.
 struct AdoptedCloud {
   virtual ~AdoptedCloud() = default;
 };
 
-/// What engines on devices can do beyond others.
+/// Additional operations of engines on devices.
 class DeviceEngine : public Engine {
  public:
   virtual std::vector<DeviceMemoryUse> device_memory() const = 0;
-  /// Takes a cloud out of device memory without waiting for anything: its pointers are device
-  /// pointers, but for the viewpoints. stream: a cudaStream_t. Throws InvalidArgument where none of
-  /// the engine's devices has that memory.
+  /// Copies a cloud from device memory without waiting: all pointers but the viewpoints are device
+  /// pointers. stream: a cudaStream_t. Throws InvalidArgument where the memory is on none of the
+  /// engine's devices.
   virtual std::shared_ptr<AdoptedCloud> adopt(const RawCloud& cloud, void* stream) = 0;
   virtual std::shared_ptr<PreparedState> prepare_adopted(const AdoptedCloud& cloud,
                                                          const PrepareOptions& options) = 0;

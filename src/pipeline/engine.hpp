@@ -11,14 +11,14 @@ namespace gpureg {
 
 enum class Backend;
 
-/// Private interface between the public API (src/api) and the backends (src/cpu, cuda). Calls are
-/// serialised inside.
+/// Private interface between the public API (src/api) and the backends (src/cpu, cuda).
+/// Thread-safe: calls run one after another.
 class Engine {
  public:
   virtual ~Engine() = default;
   virtual Backend backend() const = 0;
   virtual unsigned threads() const = 0;
-  /// Threads that may share the host's work on many results.
+  /// Number of threads that may share the host's work on many results.
   virtual unsigned host_threads() const { return threads(); }
   virtual std::string description() const = 0;
   virtual const void* memory() const = 0;  ///< owner of the clouds that this engine can align

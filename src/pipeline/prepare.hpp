@@ -5,8 +5,9 @@
 
 namespace gpureg::pipeline {
 
-/// Raw clouds to fragments, one statement per stage (LoopSmart, section III). Exec brings the
-/// stages, found by its namespace; assemble() waits for the results.
+/// Raw clouds to prepared clouds, one statement per stage (LoopSmart, section III).
+/// Argument-dependent look-up by Exec finds the stages of a backend; assemble() waits for the
+/// results.
 template <typename Exec>
 auto prepare(Exec& exec, Span<const RawCloud> clouds, const PrepareOptions& options) {
   const auto begin = exec.mark();

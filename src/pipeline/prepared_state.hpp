@@ -7,7 +7,7 @@
 
 namespace gpureg {
 
-/// Content of a PreparedCloud: facts on the host, data in the memory of its engine.
+/// Content of a PreparedCloud: metadata on the host, data in the memory of its engine.
 struct PreparedState {
   virtual ~PreparedState() = default;
   /// Host copies, relative to the local origin.
@@ -29,7 +29,7 @@ struct PreparedState {
   std::vector<Vec3> viewpoints;           ///< relative to the local origin
 };
 
-/// A pair of clouds for the engine, and optionally the caller's own correspondences.
+/// A pair of clouds for the engine, optionally with given correspondences.
 struct PairInput {
   const PreparedState* source;
   const PreparedState* target;

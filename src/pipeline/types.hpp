@@ -6,16 +6,17 @@
 #include "algorithm/moments.hpp"
 #include "algorithm/prior.hpp"
 #include "algorithm/support.hpp"
+#include "common/limits.hpp"
 #include "gpureg/options.hpp"
 #include "gpureg/statistics.hpp"
 
 #include <vector>
 
-/// What goes through the pipeline: plain data, no Eigen, so that stages may be compiled with flags
-/// of their own.
+/// Data of the pipeline: plain types without Eigen, so that stages may be compiled with flags of
+/// their own.
 namespace gpureg {
 
-/// A cloud as the caller has it (host memory): PointCloudView after validation.
+/// A validated PointCloudView (host memory).
 struct RawCloud {
   const float* points;
   std::size_t size, point_stride;
@@ -27,8 +28,8 @@ struct RawCloud {
   std::size_t viewpoint_count;
 };
 
-/// One pair as stages see it. matches: the caller's own correspondences instead of features; count
-/// 0 and null otherwise.
+/// One pair for the stages. custom_*: given correspondences instead of features; null and 0
+/// otherwise.
 struct PairView {
   CloudView source;
   CloudView target;
@@ -40,10 +41,10 @@ struct PairView {
 
 /// A refined pose with its evidence, in local coordinates of both clouds.
 struct ModeOutcome {
-  Pose<double> pose{1, 0, 0, 0, 0, 0, 0};
-  std::uint32_t hypothesis = 0;  ///< seed that it came from
+  Pose<double> pose = identity_pose<double>();
+  std::uint32_t hypothesis = 0;  ///< seed of the candidate
   std::uint32_t iterations = 0;
-  /// Index of the mode that it was perturbed from (degeneracy search), or its own.
+  /// Index of the mode that this one was perturbed from (degeneracy search), or its own index.
   std::uint32_t origin_mode = 0;
   MatchEvidence matches{0, 0, 0};
   SideEvidence source{}, target{};
@@ -56,12 +57,12 @@ struct ModeOutcome {
 struct PairOutcome {
   RegistrationReason reason = RegistrationReason::none;
   bool has_pose = false;
-  Pose<double> pose{1, 0, 0, 0, 0, 0, 0};
+  Pose<double> pose = identity_pose<double>();
   Support support{0, 0, 0};
   Moments source_moments{0, {0, 0, 0}, {0, 0, 0, 0, 0, 0}};
   Moments target_moments{0, {0, 0, 0}, {0, 0, 0, 0, 0, 0}};
   std::vector<ModeOutcome> modes;  ///< distinct poses, in order of their coarse_score
-  /// of all matches, what MatchEvidence is relative to
+  /// Normal weights of all matches; MatchEvidence is relative to them.
   std::uint64_t match_weight_source = 0, match_weight_target = 0;
   RegistrationStatistics statistics;
   StageTimings timings;
@@ -72,7 +73,5 @@ struct PosesOfPair {
   std::uint32_t origin_mode = 0;  ///< index of the mode that they were perturbed from, if any
   std::vector<Pose<double>> poses;
 };
-/// Perturbed poses of a pair at most (degeneracy search).
-constexpr std::uint32_t kMaxPerturbedPoses = 8;
 
 }  // namespace gpureg

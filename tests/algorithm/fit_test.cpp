@@ -61,7 +61,7 @@ TEST(Fit, ExactMotionIsFound) {
   }
 }
 
-TEST(Fit, RefusesWhatDoesNotDetermineARotation) {
+TEST(Fit, RefusesUndeterminedRotations) {
   Pose<float> pose;
   const Vec3 line[4] = {{0, 0, 0}, {1, 1, 1}, {2, 2, 2}, {3.5f, 3.5f, 3.5f}};
   const Vec3 spread[4] = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}};

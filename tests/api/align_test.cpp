@@ -78,7 +78,7 @@ TEST(Align, SourceAndTargetAreNotMixedUp) {
     EXPECT_EQ(back.statistics.swapped, smaller_as_source);
     EXPECT_FALSE(forth.statistics.swapped);
     EXPECT_EQ(forth.statistics.source_points, back.statistics.target_points);
-    // Moments of the source are in the source's frame, whoever was sampled.
+    // Moments of the source are in its frame, whichever cloud was sampled.
     const Eigen::Vector3d mean =
         back.source_moments.sum / static_cast<double>(back.source_moments.count);
     const Eigen::Vector3d expected =

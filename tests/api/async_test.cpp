@@ -9,7 +9,7 @@
 namespace gpureg {
 namespace {
 
-TEST(Async, FuturesHaveWhatTheCallsReturn) {
+TEST(Async, FuturesHoldTheResults) {
   std::mt19937 random(4);
   const auto a = test::scan_room(random),
              b = test::moved(test::random_pose(random), test::scan_room(random));

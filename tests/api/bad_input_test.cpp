@@ -205,8 +205,8 @@ TEST(BadInput, MillimetresWithAVoxelInMetres) {
       1000u);
   points.resize(3000);
   EXPECT_EQ(prepare(context, PointCloudView(points)).size(), 3000u);
-  // Who brings features and looks as far as the points are apart is not refused for a radius that
-  // nobody needs.
+  // Given features with a correspondence distance of the spacing of the points must not fail for an
+  // unused feature radius.
   std::vector<Eigen::Vector3f> wide;
   for (int x = 0; x < 150; ++x)
     for (int y = 0; y < 150; ++y)

@@ -114,7 +114,7 @@ TEST(Prior, GravityLeavesTheTurnsAboutTheVertical) {
   }
 }
 
-TEST(Prior, WhatCannotBeIsAReason) {
+TEST(Prior, ContradictionsAreAReason) {
   std::mt19937 random(3);
   const Points room = test::scan_room(random), again = test::scan_room(random);
   const Scene scene(again, room, test::random_pose(random));
@@ -134,7 +134,7 @@ TEST(Prior, WhatCannotBeIsAReason) {
   }
 }
 
-TEST(Prior, WhatIsNoRestrictionChangesNoBit) {
+TEST(Prior, EmptyPriorsChangeNoBit) {
   std::mt19937 random(3);
   const Points room = test::scan_room(random), again = test::scan_room(random);
   const Scene scene(again, room, test::random_pose(random));

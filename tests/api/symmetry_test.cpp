@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Where more than one pose is as good as the truth, the result says so: low confidence, the other
-// poses among the modes, and the direction in which a pose slides.
+// poses among the modes, and the weakest direction of a pose.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -67,7 +67,7 @@ RegistrationResult register_moved(const Points& scanned, const Points& target,
   return align(Context::cpu(), a, b, RegistrationOptions::from_voxel_size(0.1f));
 }
 
-/// What the pose does to the target beside the truth: the identity where it is the truth.
+/// Error of the pose in the frame of the target: the identity for the true pose.
 Eigen::Isometry3d beside(const Eigen::Isometry3d& truth, const RegistrationMode& mode) {
   return mode.target_from_source * truth.inverse();
 }
@@ -114,7 +114,7 @@ TEST(Symmetry, Pipe) {
   EXPECT_LT(e.information_eigenvalues[0], 1e-2 * e.information_eigenvalues[3]);
 }
 
-TEST(Symmetry, CorridorSlides) {
+TEST(Symmetry, CorridorHasAWeakDirection) {
   std::mt19937 random(13);
   for (const bool swap : {false, true}) {
     const Eigen::Isometry3d truth = test::random_pose(random);

@@ -65,7 +65,7 @@ TEST(TimeBudget, IsKeptAndUsed) {
       EXPECT_EQ(out.levels, levels.run.size());
       EXPECT_TRUE(std::is_sorted(levels.run.begin(), levels.run.end()));
       EXPECT_EQ(out.highest_quality, levels.run.back());
-      // What is left would not have been enough for a further level.
+      // The remaining time is too short for a further level.
       if (exponent == 1.0 && out.highest_quality < kHighestQuality)
         EXPECT_GT(out.milliseconds + levels.time_of(out.highest_quality + 1), budget);
     }
@@ -79,12 +79,12 @@ TEST(TimeBudget, TheLowestLevelIsAlwaysRun) {
   EXPECT_DOUBLE_EQ(out.milliseconds, levels.time_of(0));
 }
 
-TEST(TimeBudget, WhatIsSureAndStableEndsEarly) {
+TEST(TimeBudget, ConfidentAndStableResultsEndEarly) {
   FakeLevels levels;
   levels.confidence = [](std::uint32_t) { return 0.999; };
   EXPECT_EQ(levels.within(1e9).levels, 2u);
   EXPECT_EQ(levels.run, (std::vector<std::uint32_t>{0, 1}));
-  // Sure, but of another pose each time: it goes on.
+  // Confident, but of another pose each time: it continues.
   levels.shift = [](std::uint32_t quality) { return 1.0 * quality; };
   EXPECT_EQ(levels.within(1e9).highest_quality, kHighestQuality);
 }

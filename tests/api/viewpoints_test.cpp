@@ -38,7 +38,7 @@ TEST(ShareFacingAway, CountsPoints) {
   EXPECT_DOUBLE_EQ(cloud.view().share_facing_away(), 0.3);
 }
 
-TEST(ShareFacingAway, WhatIsNotKnownDoesNot) {
+TEST(ShareFacingAway, UnknownNormalsDoNotCount) {
   PointCloud cloud = floor_cloud();
   EXPECT_EQ(cloud.view().share_facing_away(), 0) << "no viewpoints";
   cloud.viewpoints = {{0, 0, -2}};
@@ -53,7 +53,8 @@ TEST(ShareFacingAway, WhatIsNotKnownDoesNot) {
   EXPECT_EQ(PointCloudView().share_facing_away(), 0);
 }
 
-// Where prepare() no longer believes that it is the normals that are wrong.
+// Share of facing-away normals above which prepare() takes the viewpoints for wrong instead of the
+// normals.
 TEST(ShareFacingAway, TheLineIsPreparations) {
   const auto most = static_cast<std::uint32_t>(PointCloudView::kMaxFacingAway * 1000);
   EXPECT_TRUE(turns_back(most, 1000));

@@ -169,7 +169,7 @@ TEST_F(Batch, CamerasThatDoNotMatchTheFragments) {
   EXPECT_EQ(said(most + camera(9), {"--quiet"}), "");
 }
 
-TEST_F(Batch, MinimalScoreDecidesWhatIsReported) {
+TEST_F(Batch, MinimalScoreIsTheThreshold) {
   ASSERT_EQ(batch("all", {"--min-score", "0"}).status, 0);
   // Every pair that has a pose is in the log now.
   EXPECT_EQ(evaluation::read_log(out_ / "all.log").size(), 6u + kScans);
@@ -225,7 +225,7 @@ TEST_F(Batch, CamerasOrientTheNormals) {
   EXPECT_NE(content_of(out_ / "with.log"), content_of(out_ / "without.log"));
 }
 
-TEST_F(Batch, SaysWhereViewpointsCannotBeWhatCloudsWereSeenFrom) {
+TEST_F(Batch, ReportsImplausibleViewpoints) {
   // A floor with its normals up, as three fragments.
   PointCloud floor;
   for (int x = 0; x < 40; ++x)

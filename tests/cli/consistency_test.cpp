@@ -11,7 +11,7 @@ namespace {
 using nlohmann::json;
 
 /// Results of four fragments in one place, written by hand.
-class Agree : public ::testing::Test {
+class ConsistencyVerb : public ::testing::Test {
  protected:
   static json pose(double x) { return {1, 0, 0, x, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1}; }
   static json mode(double x, double confidence) {
@@ -50,7 +50,7 @@ class Agree : public ::testing::Test {
   const TemporaryFolder folder_;
 };
 
-TEST_F(Agree, PairsJudgeEachOther) {
+TEST_F(ConsistencyVerb, ConsistentLoopsRaiseTheConfidence) {
   const std::string result = folder_.write("r.json", document(pairs()).dump());
   const Outcome outcome =
       run({"consistency", result, "--json", folder_ / "a.json", "-o", folder_ / "a.log"});
@@ -74,7 +74,7 @@ TEST_F(Agree, PairsJudgeEachOther) {
   EXPECT_EQ(log[0].transform, Eigen::Matrix4d::Identity());
 }
 
-TEST_F(Agree, TheResultOfABatch) {
+TEST_F(ConsistencyVerb, TheResultOfABatch) {
   write_scans(folder_, 3, true);
   ASSERT_EQ(run(joined({"batch", folder_.path(), "-o", folder_ / "r.log", "--json",
                         folder_ / "r.json", "--quiet"},
@@ -88,7 +88,7 @@ TEST_F(Agree, TheResultOfABatch) {
     EXPECT_EQ(after["pairs"][k]["loop_consistency"]["score_alone"], before["pairs"][k]["score"]);
 }
 
-TEST_F(Agree, TheSameEvidenceCountsOnce) {
+TEST_F(ConsistencyVerb, TheSameEvidenceCountsOnce) {
   const std::string result = folder_.write("r.json", document(pairs()).dump());
   ASSERT_EQ(run({"consistency", result, "--json", folder_ / "a.json"}).status, 0);
   const auto expect_refused_again = [&] {
@@ -105,7 +105,7 @@ TEST_F(Agree, TheSameEvidenceCountsOnce) {
   expect_refused_again();
 }
 
-TEST_F(Agree, VoxelSizesThatCannotBe) {
+TEST_F(ConsistencyVerb, RefusesBadVoxelSizes) {
   const std::string result = folder_.write("r.json", document(pairs()).dump());
   for (const std::string size : {"1e9", "0", "-1", "nan", "1e-9"})
     expect_refused({"consistency", result, "--json", folder_ / "a.json", "--voxel-size", size},
@@ -115,7 +115,7 @@ TEST_F(Agree, VoxelSizesThatCannotBe) {
       run({"consistency", result, "--json", folder_ / "a.json", "--voxel-size", "0.05"}).status, 0);
 }
 
-TEST_F(Agree, BadInputIsNamed) {
+TEST_F(ConsistencyVerb, BadInputIsNamed) {
   const auto refused = [&](const json& content, std::initializer_list<std::string> fragments) {
     const std::string path = folder_.write("bad.json", content.dump());
     expect_refused({"consistency", path, "--json", folder_ / "a.json"}, {path});

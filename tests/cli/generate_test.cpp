@@ -35,7 +35,7 @@ TEST(Generate, SameSeedSameBytes) {
   EXPECT_FALSE(content_of(out / "a/cloud_bin_0.ply") == content_of(out / "c/cloud_bin_0.ply"));
 }
 
-TEST(Generate, WhatItMakesGoesThroughTheOtherVerbs) {
+TEST(Generate, OtherVerbsReadItsOutput) {
   const TemporaryFolder out;
   const std::string scans = out / "scans", result = out / "r.json";
   ASSERT_EQ(

@@ -22,7 +22,7 @@ class Register : public ::testing::Test {
   const std::string target_ = write_cloud(folder_, "target.ply", room_scan(1));
 };
 
-TEST_F(Register, SaysWhatItFound) {
+TEST_F(Register, ReportsTheResult) {
   const Outcome outcome = align({});
   EXPECT_EQ(outcome.status, 0);
   EXPECT_EQ(outcome.err, "");
@@ -160,7 +160,7 @@ TEST_F(Register, SeedDecidesAndThreadsDoNot) {
   EXPECT_EQ(result(kLoopsmart)["statistics"]["refine_iterations"], 0);
 }
 
-TEST_F(Register, MinimalScoreDecidesWhatIsReported) {
+TEST_F(Register, MinimalScoreIsTheThreshold) {
   const std::string path = folder_ / "r.json";
   const Outcome none = align({"--min-score", "1", "--json", path});
   EXPECT_EQ(none.status, 1);
@@ -169,9 +169,9 @@ TEST_F(Register, MinimalScoreDecidesWhatIsReported) {
   align(joined(kLoopsmart, {"--min-score", "0.9", "--json", path}));
   EXPECT_FLOAT_EQ(json_of(path)["options"]["quadruples"]["min_inlier_ratio"].get<float>(), 0.9f);
   const std::string other = write_cloud(folder_, "sticks.ply", sticks());
-  const std::vector<std::string> hopeless = joined({"register", source_, other}, kSmall);
-  EXPECT_EQ(run(hopeless).status, 1);
-  EXPECT_EQ(run(joined(hopeless, {"--min-score", "0"})).status, 0);
+  const std::vector<std::string> without_overlap = joined({"register", source_, other}, kSmall);
+  EXPECT_EQ(run(without_overlap).status, 1);
+  EXPECT_EQ(run(joined(without_overlap, {"--min-score", "0"})).status, 0);
 }
 
 TEST_F(Register, Overlay) {

@@ -21,10 +21,10 @@ Eigen::Isometry3d scan_from_room(int number) {
 PointCloud room_scan(int number) {
   std::mt19937 random(static_cast<unsigned>(100 + number));
   const std::vector<Eigen::Vector3f> room = scan_room(random);
-  const float hidden = 0.4f * static_cast<float>(number % 7);
+  const float missing = 0.4f * static_cast<float>(number % 7);
   PointCloud cloud;
   for (std::size_t k = 0; k < room.size(); k += 6)
-    if (room[k].x() < hidden || room[k].x() > hidden + 0.3f) cloud.points.push_back(room[k]);
+    if (room[k].x() < missing || room[k].x() > missing + 0.3f) cloud.points.push_back(room[k]);
   cloud.points = moved(scan_from_room(number), std::move(cloud.points));
   return cloud;
 }

@@ -81,7 +81,8 @@ TEST(DegeneracySearch, BothWaysAlongTheWall) {
   EXPECT_TRUE(perturbed(*source, *target, PairOutcome{}, options).poses.empty());
 }
 
-// Modes that the evidence leaves open get all poses, confident ones two, hopeless ones none.
+// Undecided modes are perturbed by all steps, confident ones by two poses, modes with log odds
+// below -5 not at all.
 TEST(DegeneracySearch, MorePosesWhereTheEvidenceIsOpen) {
   std::mt19937 random(3);
   cpu::Exec exec(1);

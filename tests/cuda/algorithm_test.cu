@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// The contract of src/math and src/algorithm: one source, the same bits on the host and on the
-// device. Every per-item function runs over random inputs on both sides; outputs are compared as
-// bytes.
+// src/math and src/algorithm: the same bits from one source on the host and on the device. Every
+// function runs over random inputs on both sides; outputs are compared as bytes.
 #include <cuda_runtime.h>
 #include <gtest/gtest.h>
 
@@ -39,8 +38,8 @@ __global__ void run_items(Item item, const In* in, Out* out, int count) {
   if (k < count) out[k] = item(in[k]);
 }
 
-/// Item: a struct with Out operator()(In) const, host and device. Outputs are zeroed first, so that
-/// padding compares equal.
+/// Element: a struct with Out operator()(In) const, host and device. Outputs are zeroed first, so
+/// that padding compares equal.
 template <typename Item, typename Out, typename In>
 void expect_same_bits(const std::vector<In>& in) {
   const int count = static_cast<int>(in.size());
@@ -203,7 +202,7 @@ struct Icp {
       add_icp_term(v.arm[k], v.normal[k], v.residual[k], robust_weight(v.residual[k], 0.3f), sums);
     Stepped out;
     out.step = solve_icp(sums, 2.0f, 0.075f);
-    out.pose = compose_small(out.step.omega, out.step.shift, Pose<double>{1, 0, 0, 0, 0, 0, 0});
+    out.pose = compose_small(out.step.omega, out.step.shift, identity_pose<double>());
     return out;
   }
 };

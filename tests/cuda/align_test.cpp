@@ -26,7 +26,7 @@ struct PairOfClouds {
   std::vector<std::uint32_t> custom_source, custom_target;
 };
 
-/// Prepares the clouds and aligns the pairs on both backends; every product is compared.
+/// Prepares the clouds and aligns the pairs on both backends; every output is compared.
 void expect_same_alignment(const std::vector<RawCloud>& raw,
                            const std::vector<PairOfClouds>& wanted,
                            const RegistrationOptions& options) {
@@ -90,9 +90,9 @@ void expect_same_alignment(const std::vector<RawCloud>& raw,
   const auto cuda_verified = cuda::verify_poses(on_cuda, cuda_views, cuda_refined, options);
   const auto best = host(on_cuda, cuda_best.data(), count),
              refined = host(on_cuda, cuda_refined.data(), count);
-  const auto judged = host(on_cuda, cuda_verified.data(), count);
+  const auto verified = host(on_cuda, cuda_verified.data(), count);
   for (std::size_t p = 0; p < count; ++p) {
-    SCOPED_TRACE("score to judge, pair " + std::to_string(p));
+    SCOPED_TRACE("score to verify, pair " + std::to_string(p));
     ASSERT_EQ(cpu_best[p].found, best[p].found != 0);
     if (!cpu_best[p].found) continue;
     ASSERT_TRUE(same(cpu_best[p].support, best[p].support))
@@ -102,9 +102,9 @@ void expect_same_alignment(const std::vector<RawCloud>& raw,
     ASSERT_TRUE(same(cpu_refined[p].support, refined[p].support));
     ASSERT_TRUE(same(cpu_refined[p].pose, refined[p].pose));
     ASSERT_EQ(cpu_refined[p].iterations, refined[p].iterations);
-    ASSERT_TRUE(same(cpu_verified[p].support, judged[p].support));
-    ASSERT_EQ(std::memcmp(&cpu_verified[p].source, &judged[p].source, sizeof(Moments)), 0);
-    ASSERT_EQ(std::memcmp(&cpu_verified[p].target, &judged[p].target, sizeof(Moments)), 0);
+    ASSERT_TRUE(same(cpu_verified[p].support, verified[p].support));
+    ASSERT_EQ(std::memcmp(&cpu_verified[p].source, &verified[p].source, sizeof(Moments)), 0);
+    ASSERT_EQ(std::memcmp(&cpu_verified[p].target, &verified[p].target, sizeof(Moments)), 0);
   }
 }
 
@@ -181,7 +181,7 @@ TEST_F(AlignOnCuda, OddHypothesisCountsAndSurvivorLimit) {
   expect_same_alignment(raw(), pairs, options);
 }
 
-TEST_F(AlignOnCuda, CorrespondencesOfTheCaller) {
+TEST_F(AlignOnCuda, GivenCorrespondences) {
   const auto clouds =
       pipeline::prepare(*std::make_unique<cpu::Exec>(2), span_of(raw()), options.prepare);
   std::vector<PairOfClouds> custom;
@@ -199,7 +199,7 @@ TEST_F(AlignOnCuda, CorrespondencesOfTheCaller) {
 
 // The feature search bounds distances before it measures them: dimensions and magnitudes where the
 // bounds are loose, tight, or mean nothing.
-TEST_F(AlignOnCuda, FeaturesOfTheCaller) {
+TEST_F(AlignOnCuda, GivenFeatures) {
   std::normal_distribution<float> normal;
   options.quadruples.count = 5'000;
   for (const std::size_t dimension : {1u, 3u, 16u, 32u, 33u, 40u, 64u, 65u, 130u})
@@ -222,8 +222,8 @@ TEST_F(AlignOnCuda, FeaturesOfTheCaller) {
     }
 }
 
-// Features of the library and of the caller have bounds of different kinds, but may be as long.
-TEST_F(AlignOnCuda, FeaturesOfTheCallerAgainstThoseOfTheLibrary) {
+// Computed and given features have bounds of different kinds, but may have equal dimensions.
+TEST_F(AlignOnCuda, GivenFeaturesAgainstComputedOnes) {
   std::normal_distribution<float> normal(20, 15);
   std::vector<std::vector<float>> features;
   auto clouds = raw();
@@ -239,7 +239,7 @@ TEST_F(AlignOnCuda, FeaturesOfTheCallerAgainstThoseOfTheLibrary) {
                         options);
 }
 
-// Thousands of equal features, of which the first is the answer.
+// Thousands of equal features: the first one is the result.
 TEST_F(AlignOnCuda, WallsWithoutNoise) {
   std::vector<std::vector<Vec3>> rooms(2);
   std::uniform_real_distribution<float> along(0, 3);

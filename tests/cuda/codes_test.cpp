@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// The codes by which the device's scoring passes most points over. They are bounds: what agrees
-// must never be denied. No device needed.
+// Direction codes, by which scoring on the device skips most points. They are bounds: a code must
+// never exclude an agreeing normal. No device needed.
 #include <gtest/gtest.h>
 
 #include <random>
@@ -38,7 +38,7 @@ std::vector<Vec3> random_cell(std::mt19937& random) {
 
 class CellCodes : public testing::TestWithParam<float> {};
 
-TEST_P(CellCodes, NeverDenyWhatAgrees) {
+TEST_P(CellCodes, NeverExcludeAgreeingNormals) {
   std::mt19937 random(7);
   const DirectionTables tables = direction_tables();
   const CodeTest test = code_test(GetParam());

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// The public door on the GPU: same results as on the CPU, whatever the split; errors that leave the
+// The public API on the GPU: same results as on the CPU, whatever the split; errors that leave the
 // context usable; threads.
 #include <cuda_runtime_api.h>
 
@@ -82,7 +82,7 @@ TEST_F(CudaContext, ADeviceThatDoesNotExist) {
 TEST_F(CudaContext, OutOfMemoryIsAnErrorThatLeavesTheContextUsable) {
   const Context context = Context::cuda();
   const Results expected = run(context, pairs);
-  // Somebody else takes nearly everything.
+  // Another allocation takes nearly all memory.
   std::vector<void*> taken;
   for (std::size_t piece = std::size_t(1) << 36; piece >= (std::size_t(1) << 20); piece /= 2)
     for (void* p = nullptr; cudaMalloc(&p, piece) == cudaSuccess;) taken.push_back(p);
@@ -102,8 +102,8 @@ TEST_F(CudaContext, OutOfMemoryIsAnErrorThatLeavesTheContextUsable) {
 TEST_F(CudaContext, WarmRunsTakeNoMoreMemory) {
   const Context context = Context::cuda();
   const auto clouds = prepare_batch(context, views, options.prepare);
-  // The pool cuts its memory anew where calls of two kinds follow each other: warm is who has seen
-  // both in turn.
+  // The pool splits its memory anew where two kinds of calls alternate: it is warm after both kinds
+  // in turn.
   for (int k = 0; k < 2; ++k) {
     align_batch(context, clouds, pairs, options);
     prepare_batch(context, views, options.prepare);
@@ -135,7 +135,7 @@ TEST_F(CudaContext, ThreadsWithTheirOwnContextsAndThreadsThatShareOne) {
   for (const Results& g : got) EXPECT_EQ(g, expected);
 }
 
-// What the runtime answers on machines that a test cannot have.
+// Errors of the runtime on machines without a usable device.
 TEST(NoCudaDevice, EveryReasonHasItsWords) {
   EXPECT_EQ(cuda::why_no_device(cudaErrorInsufficientDriver, 0, 13000),
             "no NVIDIA driver on this machine");

@@ -42,8 +42,8 @@ class EvidenceOnCuda : public ::testing::Test {
   void SetUp() override { GPUREG_GPU_OR_SKIP(); }
 
   void keep(std::vector<Vec3> points) { kept.push_back(std::move(points)); }
-  /// Three scans of a room from two sides, a sheet, clutter, and what has no alignment; the odd
-  /// ones with viewpoints.
+  /// Three scans of a room from two sides, a sheet, clutter, and clouds without an alignment; the
+  /// odd ones have viewpoints.
   void keep_scene() {
     for (int k = 0; k < 3; ++k) {
       std::vector<Vec3> points;
@@ -83,7 +83,7 @@ class EvidenceOnCuda : public ::testing::Test {
   RegistrationOptions options = RegistrationOptions::from_voxel_size(0.05f);
 };
 
-/// Prepares the clouds and aligns the pairs on both backends; every product is compared.
+/// Prepares the clouds and aligns the pairs on both backends; every output is compared.
 void EvidenceOnCuda::expect_same(const std::vector<RawCloud>& clouds) {
   cpu::Exec on_cpu(std::max(2u, std::thread::hardware_concurrency()));
   cuda::Exec on_cuda(0);
@@ -251,7 +251,7 @@ TEST_F(EvidenceOnCuda, Priors) {
   keep_scene();
   all_pairs();
   for (std::size_t p = 0; p < pairs.size(); ++p) {
-    // Between what permits most and what permits next to nothing.
+    // Between a permissive and a restrictive prior.
     PriorTest& prior = pairs[p].prior;
     prior.gravity = p % 3 != 0;
     prior.pose = p % 3 != 1;
@@ -268,7 +268,7 @@ TEST_F(EvidenceOnCuda, Priors) {
 }
 
 TEST_F(EvidenceOnCuda, PointsWithoutNormals) {
-  // Too far apart for any neighbours: no normals, no features, no matches but the caller's.
+  // Too far apart for any neighbours: no normals, no features, only given matches.
   std::vector<Vec3> sparse;
   for (int k = 0; k < 400; ++k) sparse.push_back(test::random_unit(random) * 20.0f);
   keep(sparse);
@@ -281,7 +281,7 @@ TEST_F(EvidenceOnCuda, PointsWithoutNormals) {
   expect_same();
 }
 
-TEST_F(EvidenceOnCuda, CorrespondencesOfTheCaller) {
+TEST_F(EvidenceOnCuda, GivenCorrespondences) {
   keep_scene();
   all_pairs();
   const auto clouds =
@@ -304,7 +304,7 @@ TEST_F(EvidenceOnCuda, CorrespondencesOfTheCaller) {
   expect_same();
 }
 
-TEST_F(EvidenceOnCuda, FeaturesOfTheCaller) {
+TEST_F(EvidenceOnCuda, GivenFeatures) {
   keep_scene();
   std::normal_distribution<float> normal;
   for (const std::size_t dimension : {3u, 33u, 70u}) {

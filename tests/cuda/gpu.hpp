@@ -30,7 +30,10 @@ template <typename T>
     return ::testing::AssertionFailure() << "sizes " << cpu.size() << " and " << cuda.size();
   std::size_t different = 0, first = 0;
   for (std::size_t k = cpu.size(); k-- > 0;)
-    if (std::memcmp(&cpu[k], &cuda[k], sizeof(T)) != 0) ++different, first = k;
+    if (std::memcmp(&cpu[k], &cuda[k], sizeof(T)) != 0) {
+      ++different;
+      first = k;
+    }
   if (different == 0) return ::testing::AssertionSuccess();
   return ::testing::AssertionFailure()
          << different << " of " << cpu.size() << " differ, the first at " << first;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Clouds in device memory, streams of the caller, calls that return at once.
+// Clouds in device memory, streams of the program, asynchronous calls.
 #include "gpureg/cuda_interop.hpp"
 
 #include <cuda_runtime_api.h>
@@ -102,8 +102,8 @@ TEST_F(Interop, CloudsOnTheDeviceAreThoseOfTheHost) {
               prepare(context, PointCloudView{}, options.prepare));
 }
 
-// The caller's stream is held up before the cloud is written: the call returns all the same, and
-// once let go, what the stream does to the cloud later does no harm.
+// The stream of the program is blocked before it writes the cloud: the call returns all the same,
+// and later work in the stream does not affect the prepared cloud.
 TEST_F(Interop, TheCallWaitsForNothingAndTheStreamKeepsItsOrder) {
   const Context context = Context::cuda();
   const PreparedCloud expected = prepare(context, PointCloudView(scans[0]), options.prepare);
@@ -128,7 +128,7 @@ TEST_F(Interop, TheCallWaitsForNothingAndTheStreamKeepsItsOrder) {
   cudaFreeAsync(empty, stream);
 }
 
-TEST_F(Interop, FuturesHaveWhatTheCallsReturn) {
+TEST_F(Interop, FuturesHoldTheResults) {
   for (const Context& context : {Context::cuda(), Context::cpu(2)}) {
     const auto clouds = prepare_batch(context, views, options.prepare);
     const auto expected = test::all_bytes(align_batch(context, clouds, pairs, options));

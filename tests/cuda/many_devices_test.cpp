@@ -37,7 +37,7 @@ class ManyDevices : public test::RoomScans {
   int devices = 0;
 };
 
-TEST_F(ManyDevices, TogetherTheyGiveWhatOneGives) {
+TEST_F(ManyDevices, TogetherEqualOneDevice) {
   const auto many = repeated(30);
   const Results expected = run(Context::cuda(0), many);
   const Context together = Context::cuda(all());

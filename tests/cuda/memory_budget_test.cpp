@@ -17,7 +17,7 @@ class MemoryBudget : public test::RoomScans {
     options.memory_budget = bytes;
     return Context::cuda(options);
   }
-  /// What all clouds together take on the device.
+  /// Device memory of all clouds.
   std::size_t bytes_of_all() const {
     const Context context = Context::cuda();
     const auto clouds = prepare_batch(context, views, options.prepare);
@@ -34,7 +34,7 @@ TEST_F(MemoryBudget, ResultsAreTheSameHoweverSmallItIs) {
     const Context context = with_budget(budget);
     const auto clouds = prepare_batch(context, views, options.prepare);
     EXPECT_LE(context.device_memory()[0].bytes_in_use, budget);
-    // Twice: the second time those that were driven out first come back.
+    // Two rounds: the second one reloads the clouds evicted first.
     for (int k = 0; k < 2; ++k) {
       EXPECT_EQ(all_bytes(align_batch(context, clouds, pairs, options)), expected);
       EXPECT_LE(context.device_memory()[0].bytes_in_use, budget);
@@ -44,7 +44,7 @@ TEST_F(MemoryBudget, ResultsAreTheSameHoweverSmallItIs) {
   }
 }
 
-TEST_F(MemoryBudget, HostCopiesOfWhatWasDrivenOut) {
+TEST_F(MemoryBudget, HostCopiesOfEvictedClouds) {
   const Context free = Context::cuda(), tight = with_budget(1);
   const auto kept = prepare_batch(free, views, options.prepare),
              driven_out = prepare_batch(tight, views, options.prepare);

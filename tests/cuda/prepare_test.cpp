@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// The contract of the CUDA backend: every product of every stage of preparation has the CPU's bits.
+// The contract of the CUDA backend: the output of every stage of preparation has the CPU's bits.
 #include <filesystem>
 #include <limits>
 
@@ -17,7 +17,7 @@ namespace {
 using test::host;
 using test::same_bytes;
 
-/// The caller's features may hold NaNs, whose payload IEEE leaves open once they are averaged.
+/// Given features may hold NaNs, whose payload after averaging IEEE leaves open.
 std::vector<float> one_nan(std::vector<float> values) {
   for (float& v : values)
     if (v != v) v = std::numeric_limits<float>::quiet_NaN();
@@ -198,7 +198,7 @@ void expect_same_preparation(const std::vector<RawCloud>& raw, const PrepareOpti
               assembled[c]->statistics.points_without_normal);
     ASSERT_EQ(expected[c]->statistics.points_without_feature,
               assembled[c]->statistics.points_without_feature);
-    // The tables answer alike, wherever their entries lie.
+    // Look-ups in both tables agree, whatever the slots of their entries.
     for (std::size_t b = 0; b < cpu_closest[c].blocks.size(); b += 7) {
       const auto table = host(on_cuda, assembled[c]->view_on_device.closest.table.data,
                               assembled[c]->view_on_device.closest.table.size);
@@ -266,7 +266,7 @@ TEST_F(PrepareOnCuda, OtherRadii) {
   expect_same_preparation(raw, options);
 }
 
-TEST_F(PrepareOnCuda, NormalsViewpointsAndFeaturesOfTheCaller) {
+TEST_F(PrepareOnCuda, GivenNormalsViewpointsAndFeatures) {
   const std::size_t size = 8000, dimension = 5;
   const auto points = test::bumpy_sheet(random, size, 2.0f);
   std::vector<Vec3> normals(size), viewpoints;
@@ -286,7 +286,7 @@ TEST_F(PrepareOnCuda, NormalsViewpointsAndFeaturesOfTheCaller) {
   with_features.feature_dimension = dimension;
   with_features.feature_stride = dimension + 2;
   expect_same_preparation({plain, with_normals, with_views, with_features}, options);
-  // Normals and viewpoints: few that face away are turned, many are not.
+  // Normals and viewpoints: few that face away are flipped, many are not.
   RawCloud few = with_normals, many = with_normals;
   std::vector<Vec3> up(size);
   for (std::size_t k = 0; k < size; ++k)

@@ -39,7 +39,7 @@ TEST(CheckEntries, EntriesKnowTheirLine) {
   check_entries("a.info", information);
 }
 
-TEST(CheckEntries, NamesWhatOneBlockCannotShow) {
+TEST(CheckEntries, NamesInconsistentBlocks) {
   const TemporaryFolder folder;
   const auto expect_bad = [&](const std::vector<LogEntry>& entries,
                               std::initializer_list<std::string> fragments) {

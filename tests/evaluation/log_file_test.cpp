@@ -102,7 +102,7 @@ TEST(LogFile, MissingFilesAndFoldersAreNamed) {
   expect_error<IoError>([&] { read_log(folder.path()); }, {folder.path(), "folder"});
 }
 
-TEST(LogFile, RefusesToWriteWhatCannotBeReadBack) {
+TEST(LogFile, RefusesToWriteUnreadableEntries) {
   const TemporaryFolder folder;
   LogEntry entry{3, 7, 9, Eigen::Matrix4d::Identity()};
   entry.transform(0, 3) = std::nan("");

@@ -125,7 +125,10 @@ TEST(Ranked, EqualsExhaustiveThresholds) {
     for (int threshold = 11; threshold >= 0; --threshold) {
       int good = 0, reported = 0;
       for (const auto& [score, right] : scores)
-        if (score >= threshold) ++reported, good += right;
+        if (score >= threshold) {
+          ++reported;
+          good += right;
+        }
       if (reported == 0) continue;
       const double precision = static_cast<double>(good) / reported,
                    recall = static_cast<double>(good) / pairs;

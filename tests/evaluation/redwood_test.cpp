@@ -208,7 +208,7 @@ TEST(Evaluate, RefusesTruthsWithoutTheirInformation) {
                                       {"1 transforms", "0 information"});
 }
 
-TEST(SceneMean, WeighsScenesEqually) {
+TEST(SceneMean, IsUnweighted) {
   Scores small, large;
   small.good = small.good_recall = 1;
   small.ground_truth = 2;

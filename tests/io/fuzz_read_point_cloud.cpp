@@ -6,7 +6,8 @@
 
 #include "io/run_reader.hpp"
 
-// An allocation beyond the size of any input here means that a reader believed a header.
+// An allocation beyond the size of any input here means that a reader allocated by the count in a
+// header.
 extern "C" const char* __asan_default_options();
 extern "C" const char* __asan_default_options() { return "max_allocation_size_mb=256"; }
 

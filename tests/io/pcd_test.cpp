@@ -101,7 +101,7 @@ TEST(Lzf, KnownStreams) {
   EXPECT_EQ(out, std::string(265, 'a'));
 }
 
-TEST(Lzf, RefusesWhatIsNotSound) {
+TEST(Lzf, RefusesCorruptData) {
   std::string out;
   EXPECT_FALSE(lzf_decompress(std::string("\x02"
                                           "ab",

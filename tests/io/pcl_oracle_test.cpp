@@ -127,7 +127,7 @@ TYPED_TEST(PclOracle, ReadsWhatPclWrites) {
   }
 }
 
-TEST(PclOracleWriter, PclReadsWhatWeWrite) {
+TEST(PclOracleWriter, PclReadsOurFiles) {
   const test::TemporaryFolder folder;
   std::mt19937 random(18);
   pcl::console::setVerbosityLevel(pcl::console::L_ERROR);  // it misses a curvature

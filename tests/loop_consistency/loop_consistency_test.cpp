@@ -149,14 +149,14 @@ TEST(LoopConsistency, WithoutLoopsNothingChanges) {
 /// A walk of ten clouds, each of which knows the next two, that passes two places that look alike:
 /// what sees the first one (clouds 0 to 2) is found in the second one (7 to 9), always by the same
 /// mistake.
-Set walk_past_twins(double confidence_of_twins) {
+Set walk_past_aliases(double confidence_of_aliases) {
   Set set(10);
   for (std::uint32_t k = 0; k + 1 < 10; ++k) set.add(k, k + 1, 0.9999);
   for (std::uint32_t k = 0; k + 2 < 10; ++k) set.add(k, k + 2, 0.9);
   const Eigen::Isometry3d mistake = moved(0.1, {0, 0, 1}, {4.0, 1.0, 0});  // in the world
   for (std::uint32_t i = 0; i < 3; ++i)
     for (std::uint32_t j = 7; j < 10; ++j) {
-      const std::size_t p = set.add(i, j, confidence_of_twins);
+      const std::size_t p = set.add(i, j, confidence_of_aliases);
       set.results[p].target_from_source = set.results[p].modes[0].target_from_source =
           set.world_from_cloud[j].inverse() * mistake * set.world_from_cloud[i];
     }
@@ -164,7 +164,7 @@ Set walk_past_twins(double confidence_of_twins) {
 }
 
 TEST(LoopConsistency, AliasesThatCloseLoopsAreRejectedByPaths) {
-  const Set set = walk_past_twins(0.95);
+  const Set set = walk_past_aliases(0.95);
   const auto out = set.score();
   for (std::size_t p = 0; p < out.size(); ++p) {
     const bool alias = set.pairs[p].target >= 7 && set.pairs[p].source < 3;
@@ -175,7 +175,7 @@ TEST(LoopConsistency, AliasesThatCloseLoopsAreRejectedByPaths) {
     else
       EXPECT_GT(out[p].confidence, 0.85) << p;
   }
-  // They would be believed otherwise.
+  // They would raise the confidence otherwise.
   Set alone = set;
   alone.pairs.erase(alone.pairs.begin() + 4);  // the way is cut: clouds 4 and 5, ...
   alone.results.erase(alone.results.begin() + 4);

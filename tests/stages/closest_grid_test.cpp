@@ -43,7 +43,7 @@ void expect_exact(const CpuCloud& cloud, std::mt19937& random, int queries, floa
 
 // No neighbour within the distance may be missed, and the answer is the exhaustive search's to the
 // bit.
-TEST(ClosestGrid, FindsWhatExhaustiveSearchFinds) {
+TEST(ClosestGrid, EqualsExhaustiveSearch) {
   std::mt19937 random(1);
   Exec exec(2);
   PrepareOptions options;

@@ -31,12 +31,14 @@ TEST(Downsample, CentroidsAgreeWithDouble) {
     };
     std::map<std::tuple<int, int, int>, Sum> voxels;
     for (const Vec3& p : points) {
-      // The cell itself is decided in float, as in every implementation; what is averaged in it is
-      // checked in double.
+      // The cell is computed in float, as in every implementation; the mean is checked in double.
       const Vec3 local{p.x - cloud.origin[0], p.y - cloud.origin[1], p.z - cloud.origin[2]};
       const Cell c = cell_of(local, 1.0f / 0.05f);
       Sum& s = voxels[{c.z, c.y, c.x}];
-      s.x += p.x, s.y += p.y, s.z += p.z, ++s.n;
+      s.x += p.x;
+      s.y += p.y;
+      s.z += p.z;
+      ++s.n;
     }
     ASSERT_EQ(cloud.points.size(), voxels.size());
     std::size_t k = 0;

@@ -53,7 +53,7 @@ std::vector<std::uint32_t> exhaustive(const Rows& queries, const Rows& rows) {
   return out;
 }
 
-TEST(FeatureIndex, FindsWhatTheExhaustiveSearchFinds) {
+TEST(FeatureIndex, EqualsExhaustiveSearch) {
   std::mt19937 random(1);
   for (const std::uint32_t dimension : {1u, 2u, 33u, 352u})
     for (const std::size_t n : {0, 1, 16, 17, 127, 129, 1500})

@@ -122,7 +122,7 @@ TEST(Features, TheWideOnesSeeNormalsThatAreAsMuchWider) {
   options.wide_feature_radius = 0;
   EXPECT_TRUE(compute_wide_features(exec, clouds, grids, options)[0].values.empty());
   options.wide_feature_radius = 0.4f;
-  clouds[0].feature_dimension = 5;  // the caller's own: nothing to add to them
+  clouds[0].feature_dimension = 5;  // given features: nothing is added to them
   EXPECT_TRUE(compute_wide_features(exec, clouds, grids, options)[0].values.empty());
 }
 

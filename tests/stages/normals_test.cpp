@@ -96,14 +96,14 @@ int downward(std::size_t wrong_rows, const std::vector<Vec3>& viewpoints,
   return down;
 }
 
-TEST(Normals, ThoseOfTheInputThatNoViewpointCanHaveSeenAreTurned) {
+TEST(Normals, InputNormalsFacingAwayAreFlipped) {
   EXPECT_EQ(downward(5, {}), 200);                       // nothing is known
   EXPECT_EQ(downward(5, {{1, 1, 2}}), 0);                // an eighth of the floor
-  EXPECT_EQ(downward(5, {{1, 1, 2}, {0, 0, -1}}), 200);  // somebody was in the cellar
+  EXPECT_EQ(downward(5, {{1, 1, 2}, {0, 0, -1}}), 200);  // one viewpoint is below the floor
   // so many: the viewpoint is wrong
   EXPECT_EQ(downward(6, {{1, 1, 2}}), 240);
   EXPECT_EQ(downward(40, {{1, 1, 2}}), 1600);
-  // as the paper does: nobody asks the viewpoints
+  // as in LoopSmart: no viewpoints are used
   EXPECT_EQ(downward(5, {{1, 1, 2}}, 0), 200);
   // seen at six degrees: noise could have tilted them so far
   EXPECT_EQ(downward(5, {{-20, 1, 2}}), 200);

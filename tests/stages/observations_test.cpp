@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Free space: what hangs before a seen surface, and how incidence it would face who saw it.
+// Free space: points in front of an observed surface violate it, weighted by their incidence.
 #include <gtest/gtest.h>
 
 #include "algorithm/evidence.hpp"
@@ -22,7 +22,7 @@ std::vector<Vec3> panel(Vec3 middle, Vec3 along, Vec3 up) {
   return points;
 }
 
-SideEvidence weigh(Exec& exec, const CpuCloud& source, const CpuCloud& target) {
+SideEvidence source_evidence(Exec& exec, const CpuCloud& source, const CpuCloud& target) {
   return test::verified_in_place(exec, source, target).modes[0].source;
 }
 
@@ -30,7 +30,7 @@ double share(std::uint64_t incidence, std::uint32_t points) {
   return static_cast<double>(incidence) / static_cast<double>(kIncidenceScale) / points;
 }
 
-TEST(Observations, FacingIsTheSquaredCosine) {
+TEST(Observations, IncidenceIsTheSquaredCosine) {
   EXPECT_FLOAT_EQ(incidence({0, 0, 1}, {0, 0, -7}), 1.0f);
   EXPECT_FLOAT_EQ(incidence({0, 0, 1}, {0, 3, 3}), 0.5f);
   EXPECT_FLOAT_EQ(incidence({0, 1, 0}, {5, 0, 2}), 0.0f);
@@ -38,7 +38,7 @@ TEST(Observations, FacingIsTheSquaredCosine) {
   EXPECT_EQ(fixed_incidence(1.0f), 65536u);
 }
 
-TEST(Observations, WhatIsSeenEdgeOnHardlyCounts) {
+TEST(Observations, GrazingObservationsHardlyCount) {
   Exec exec(1);
   // A wall three metres away, and something a metre before it.
   std::vector<Vec3> wall;
@@ -48,19 +48,19 @@ TEST(Observations, WhatIsSeenEdgeOnHardlyCounts) {
       wall.insert(wall.end(), part.begin(), part.end());
     }
   const auto target = seen_from(exec, wall, {0, 0, 0});
-  const SideEvidence square =
-      weigh(exec, *seen_from(exec, panel({0, 0, 2}, {1, 0, 0}, {0, 1, 0}), {0, 0, 0}), *target);
+  const SideEvidence square = source_evidence(
+      exec, *seen_from(exec, panel({0, 0, 2}, {1, 0, 0}, {0, 1, 0}), {0, 0, 0}), *target);
   EXPECT_EQ(square.violating, square.tested);
   EXPECT_GT(share(square.incidence_violating, square.tested), 0.9);
   EXPECT_EQ(square.incidence_observed, square.incidence_violating);
-  // The same turned about: in the line of observe.
-  const SideEvidence edge =
-      weigh(exec, *seen_from(exec, panel({0, 0, 2}, {0, 0, 1}, {0, 1, 0}), {3, 0, 2}), *target);
+  // The same panel parallel to the line of sight.
+  const SideEvidence edge = source_evidence(
+      exec, *seen_from(exec, panel({0, 0, 2}, {0, 0, 1}, {0, 1, 0}), {3, 0, 2}), *target);
   EXPECT_GT(edge.violating, edge.tested / 2);
   EXPECT_LT(share(edge.incidence_violating, edge.tested), 0.05);
   // Where it touches a surface it is not before one.
-  const SideEvidence on =
-      weigh(exec, *seen_from(exec, panel({0, 0, 3}, {1, 0, 0}, {0, 1, 0}), {0, 0, 0}), *target);
+  const SideEvidence on = source_evidence(
+      exec, *seen_from(exec, panel({0, 0, 3}, {1, 0, 0}, {0, 1, 0}), {0, 0, 0}), *target);
   EXPECT_EQ(on.violating, 0u);
   EXPECT_EQ(on.incidence_violating, 0u);
   EXPECT_GT(share(on.incidence_observed, on.tested), 0.9);

@@ -22,7 +22,7 @@ TEST(Refine, FindsTheWayBackAndNeverGetsWorse) {
     // About 1 degree and 2 cm off.
     const double omega[3] = {0.01 * normal(random), 0.01 * normal(random), 0.01 * normal(random)};
     const double shift[3] = {0.01 * normal(random), 0.01 * normal(random), 0.01 * normal(random)};
-    start[0].pose = compose_small(omega, shift, Pose<double>{1, 0, 0, 0, 0, 0, 0});
+    start[0].pose = compose_small(omega, shift, identity_pose<double>());
     start[0].support =
         measure_support(pair.source, pair.target, to_rigid(start[0].pose), registration);
     const BestPose found = refine_poses(exec, {&pair, 1}, start, registration)[0];

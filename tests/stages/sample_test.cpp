@@ -22,7 +22,7 @@ std::vector<Matches> random_matches(std::mt19937& random, std::size_t n) {
   return out;
 }
 
-TEST(Sample, KeepsExactlyWhatThePolygonTestPasses) {
+TEST(Sample, KeepsExactlyThePassingQuadruples) {
   std::mt19937 random(1);
   for (const std::size_t n : {std::size_t(4), std::size_t(5), std::size_t(300)})
     for (const std::uint32_t count : {1u, 7u, 65536u, 100003u}) {

@@ -126,7 +126,7 @@ TEST_F(Score, BestIsTheBestOfAllByTheTotalOrder) {
       std::vector<Hypotheses> hypotheses(1);
       for (std::uint32_t k = 0; k < 700; ++k) {
         hypotheses[0].id.push_back(3 * k);
-        // Every pose twice: equal support, so that the lower number must win.
+        // Every pose twice: equal support, so the lower index must win.
         hypotheses[0].pose.push_back(k % 2 ? hypotheses[0].pose.back()
                                            : random_pose(random, k % 3 ? 0.03f : 1.0f, 0.03f));
       }

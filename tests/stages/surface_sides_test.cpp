@@ -44,7 +44,7 @@ TEST(SurfaceSides, AFloorHasAFrontAndABack) {
   EXPECT_EQ(place(*cloud, {1.5f, 0, 0.2f}), 0u);
 }
 
-TEST(SurfaceSides, AreThoseOfTheSideThatNormalsTell) {
+TEST(SurfaceSides, FollowTheOrientationOfNormals) {
   Exec exec(1);
   const std::vector<Vec3> points = floor_at(0.02f), down(points.size(), Vec3{0.3f, 0, -2});
   RawCloud raw = test::raw_cloud(points);
@@ -63,12 +63,12 @@ TEST(SurfaceSides, EndAtTheNextSurface) {
   RawCloud raw = test::raw_cloud(points);
   raw.normals = &up[0].x;
   const auto cloud = test::prepare_one(exec, raw, {});
-  // What is above the upper one is in its front alone: the lower one's ends there.
+  // Cells above the upper surface are in front of it alone: the front of the lower one ends there.
   EXPECT_EQ(place(*cloud, {0, 0, 0.47f}), kFrontNear);
   EXPECT_EQ(place(*cloud, {0, 0, 0.17f}), kFrontNear | kBehind);
 }
 
-TEST(SurfaceSides, AreWhatMarchingOverAMapOfCellsFinds) {
+TEST(SurfaceSides, EqualAMarchOverAMapOfCells) {
   std::mt19937 random(3);
   Exec exec(2);
   PrepareOptions options;
@@ -112,7 +112,7 @@ TEST(SurfaceSides, AreWhatMarchingOverAMapOfCellsFinds) {
   }
 }
 
-TEST(SurfaceSides, NoneWhereNotAskedForOrTooWide) {
+TEST(SurfaceSides, NoneWhereSwitchedOffOrTooWide) {
   Exec exec(1);
   PrepareOptions options;
   options.surface_side_distance = 0;
@@ -130,7 +130,7 @@ TEST(SurfaceSides, NoneWhereNotAskedForOrTooWide) {
   EXPECT_EQ(surface_side_grid({9e8f, 0, 0}, {9e8f, 1, 1}, 0.5f, true).words(), 0u);
 }
 
-TEST(SurfaceSides, TellOnWhichSidePointsHang) {
+TEST(SurfaceSides, ClassifyPointsByTheirSide) {
   Exec exec(1);
   const auto target = seen_from(exec, floor_at(0.02f), {0, 0, 2});
   const auto of = [&](float height) {

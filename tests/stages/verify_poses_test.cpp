@@ -11,7 +11,7 @@ namespace gpureg::cpu {
 namespace {
 
 // Both information matrices against their definitions, summed in double over the correspondences.
-TEST(Judge, InformationMatricesFollowTheirDefinitions) {
+TEST(VerifyPoses, InformationMatricesFollowTheirDefinitions) {
   std::mt19937 random(1);
   Exec exec(2);
   std::vector<Vec3> shape = test::bumpy_sheet(random, 8000, 2.0f), moved = shape;
@@ -22,13 +22,13 @@ TEST(Judge, InformationMatricesFollowTheirDefinitions) {
   const PairView pair = test::pair_view(*source, *target);
   std::vector<BestPose> pose(1);
   pose[0].found = true;
-  // Local frames: the clouds lie on each other up to the rounding of their origins to voxels.
+  // Local frames: the clouds overlap up to the rounding of their origins to voxels.
   pose[0].pose.tx = 0.011;
   pose[0].pose.ty = -0.007;
   pose[0].pose.z = 0.01;
   pose[0].pose.w = std::sqrt(1 - 1e-4);
   RegistrationOptions options;
-  const Verification judged = verify_poses(exec, {&pair, 1}, pose, options)[0];
+  const Verification verified = verify_poses(exec, {&pair, 1}, pose, options)[0];
 
   Eigen::Matrix<double, 6, 6> redwood = Eigen::Matrix<double, 6, 6>::Zero(), open3d = redwood;
   const Rigid rigid = to_rigid(pose[0].pose);
@@ -57,9 +57,9 @@ TEST(Judge, InformationMatricesFollowTheirDefinitions) {
   options.method = RegistrationMethod::quadruples;
   PairOutcome outcome;
   outcome.has_pose = true;
-  outcome.support = judged.support;
-  outcome.source_moments = judged.source;
-  outcome.target_moments = judged.target;
+  outcome.support = verified.support;
+  outcome.source_moments = verified.source;
+  outcome.target_moments = verified.target;
   const RegistrationResult result = to_result(outcome, *source, *target, false, options);
   ASSERT_GT(count, 500u);
   EXPECT_EQ(result.source_moments.count, count);

@@ -12,16 +12,12 @@
 namespace gpureg::test {
 
 inline RawCloud raw_cloud(const std::vector<Vec3>& points) {
-  return {points.empty() ? nullptr : &points[0].x,
-          points.size(),
-          3,
-          nullptr,
-          3,
-          nullptr,
-          0,
-          0,
-          nullptr,
-          0};
+  RawCloud raw{};
+  raw.points = points.empty() ? nullptr : &points[0].x;
+  raw.size = points.size();
+  raw.point_stride = 3;
+  raw.normal_stride = 3;
+  return raw;
 }
 
 inline std::shared_ptr<cpu::CpuCloud> prepare_one(cpu::Exec& exec, const RawCloud& raw,

@@ -35,7 +35,7 @@ TEST(Fusion, PointsLieOnTheSurface) {
   EXPECT_GT(points.size(), 2500u);
   EXPECT_LT(points.size(), 8000u);
   double squares = 0;
-  int incidence = 0;
+  int facing = 0;
   for (const Eigen::Vector3f& p : points) {
     const Eigen::Vector3f out = p - Eigen::Vector3f(0, 0, 1.5f);
     const double error = out.norm() - 0.5;
@@ -43,10 +43,10 @@ TEST(Fusion, PointsLieOnTheSurface) {
         << "towards the rim, distances along the ray are longer than those to the surface";
     if (-out.normalized().dot(p.normalized()) < 0.7f) continue;
     squares += error * error;
-    ++incidence;
+    ++facing;
   }
-  EXPECT_GT(incidence, 400);
-  EXPECT_LT(std::sqrt(squares / incidence), 0.003)
+  EXPECT_GT(facing, 400);
+  EXPECT_LT(std::sqrt(squares / facing), 0.003)
       << "a third of a voxel where the surface faces the camera";
 }
 
