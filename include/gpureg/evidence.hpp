@@ -19,15 +19,16 @@ struct PoseEvidence {
   double target_overlap = 0;
   double source_overlap_any_normal = 0;  ///< the same whatever the normals
   double target_overlap_any_normal = 0;
-  /// RMS distance of the overlapping points over max_correspondence_distance; 1 where there are none.
+  /// RMS distance of the overlapping points over max_correspondence_distance; 1 where there are
+  /// none.
   double source_residual = 1;
   double target_residual = 1;
   /// Overlap in which a point weighs less the more normals of its cloud share its direction
   /// (normal-space weights, after Rusinkiewicz and Levoy 2001): floors do not outweigh furniture.
   double source_normal_weighted_overlap = 0;
   double target_normal_weighted_overlap = 0;
-  /// Share of the points in directions that viewpoints of the other cloud observed, each weighted by
-  /// its incidence (squared cosine between normal and line of sight); 0: no viewpoint known.
+  /// Share of the points in directions that viewpoints of the other cloud observed, each weighted
+  /// by its incidence (squared cosine between normal and line of sight); 0: no viewpoint known.
   double source_observed = 0;
   double target_observed = 0;
   /// Of these, with the same weights, the share that lies in observed free space.
