@@ -150,7 +150,7 @@ def test_errors_say_which_cloud(source):
     lonely = (
         np.random.default_rng(1).random((30000, 3)) * 4000
     )  # millimetres with a voxel in metres
-    alone = "nearly all of 30000 points are alone"
+    alone = "nearly all of 30000 points are isolated"
     with pytest.raises(gpureg.InvalidArgument, match=f"^{alone}"):
         gpureg.prepare(lonely)
     with pytest.raises(gpureg.InvalidArgument, match=rf"^clouds\[1\]: {alone}"):

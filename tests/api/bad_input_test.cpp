@@ -174,7 +174,7 @@ TEST(BadInput, MillimetresWithAVoxelInMetres) {
   for (Eigen::Vector3f& p : points) p *= 1000;
   test::expect_error<InvalidArgument>(
       [&] { prepare(context, PointCloudView(points)); },
-      {"points are alone", "voxel_size 0.05", "unit of the points"});
+      {"points are isolated", "voxel_size 0.05", "unit of the points"});
   // Of several clouds it is said which one.
   const std::vector<Eigen::Vector3f> good = room();
   test::expect_error<InvalidArgument>(
