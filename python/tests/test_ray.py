@@ -106,7 +106,7 @@ def test_progress_moves_within_a_chunk(tmp_path):
         many.fragments()[:9],
         output=tmp_path,
         actors=1,
-        options=few(400_000, 0.08),
+        options=few(800_000, 0.08),
         progress=lambda done, total: seen.append(done),
     )
     assert seen[-1] == 36 and seen == sorted(seen) and len(set(seen)) >= 4
