@@ -6,8 +6,8 @@
 #include <optional>
 
 #include "cloud.hpp"
+#include "gpureg/prior.hpp"
 #include "gpureg/registration.hpp"
-#include "prior.hpp"
 
 namespace gpureg::python {
 namespace {
@@ -36,13 +36,11 @@ RegistrationResult align_pair(const Context& context, const Cloud& source, const
     result = align(context, source.prepared, target.prepared, entries, options);
   } else if (prior) {
     const py::gil_scoped_release release;
-    result = align(context, source.prepared, target.prepared,
-                   in_prepared_frames(*prior, source, target), options);
+    result = align(context, source.prepared, target.prepared, *prior, options);
   } else {
     const py::gil_scoped_release release;
     result = align(context, source.prepared, target.prepared, options);
   }
-  move_to_origins(result, source, target);
   return result;
 }
 
@@ -57,10 +55,7 @@ class Batch {
         progress_(std::move(progress)),
         on_result_(std::move(on_result)),
         out_(pairs_.size()) {
-    for (const py::handle cloud : clouds) {
-      clouds_.push_back(cloud.cast<const Cloud&>());
-      prepared_.push_back(clouds_.back().prepared);
-    }
+    for (const py::handle cloud : clouds) prepared_.push_back(cloud.cast<const Cloud&>().prepared);
   }
 
   /// Returns (results, error). An exception raised between two pieces, by Ctrl-C or by a callback,
@@ -68,7 +63,7 @@ class Batch {
   py::tuple run(const std::vector<RegistrationPrior>& priors) {
     {
       const py::gil_scoped_release release;
-      move_priors(priors);
+      priors_ = priors;
       const bool watched = !progress_.is_none() || !on_result_.is_none();
       if (watched && context_.backend() == Backend::cpu)
         align_in_pieces();
@@ -82,17 +77,6 @@ class Batch {
   }
 
  private:
-  /// A wrong number of priors, or of clouds, is align_batch's to name.
-  void move_priors(const std::vector<RegistrationPrior>& priors) {
-    for (std::size_t k = 0; k < priors.size(); ++k) {
-      const bool known = k < pairs_.size() && pairs_[k].source < clouds_.size() &&
-                         pairs_[k].target < clouds_.size();
-      priors_.push_back(known ? in_prepared_frames(priors[k], clouds_[pairs_[k].source],
-                                                   clouds_[pairs_[k].target])
-                              : priors[k]);
-    }
-  }
-
   /// The library splits the batch: a chunk of a device takes a fraction of a second.
   void align_at_once() {
     BatchCallbacks callbacks;
@@ -102,7 +86,6 @@ class Batch {
       return !report();
     };
     results_ = align_batch(context_, prepared_, pairs_, priors_, options_, callbacks);
-    for (std::size_t k = 0; k < results_.size(); ++k) move(k);
   }
 
   /// A chunk of the CPU may take seconds; pieces of about kPieceSeconds keep progress moving.
@@ -129,19 +112,12 @@ class Batch {
       auto results = align_batch(context_, prepared_, part(pairs_),
                                  priors_.empty() ? priors_ : part(priors_), options_);
       const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - begin;
-      for (RegistrationResult& result : results) {
-        results_[done_] = std::move(result);
-        move(done_++);
-      }
+      for (RegistrationResult& result : results) results_[done_++] = std::move(result);
       const double wanted = kPieceSeconds * static_cast<double>(count) / seconds.count();
       piece = wanted < static_cast<double>(most)
                   ? std::max<std::size_t>(1, static_cast<std::size_t>(wanted))
                   : most;
     }
-  }
-
-  void move(std::size_t k) {
-    move_to_origins(results_[k], clouds_[pairs_[k].source], clouds_[pairs_[k].target]);
   }
 
   py::object take() {
@@ -180,10 +156,9 @@ class Batch {
 
   const Context& context_;
   const RegistrationOptions& options_;
-  std::vector<Cloud> clouds_;  // copies share the data
-  std::vector<PreparedCloud> prepared_;
+  std::vector<PreparedCloud> prepared_;  // copies share the data
   std::vector<Pair> pairs_;
-  std::vector<RegistrationPrior> priors_;  // between prepared clouds
+  std::vector<RegistrationPrior> priors_;
   py::object progress_, on_result_, error_ = py::none();
   std::vector<RegistrationResult> results_;
   py::list out_;

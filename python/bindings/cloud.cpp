@@ -25,13 +25,6 @@ py::array_t<float> features_of(const Cloud& cloud) {
   return out;
 }
 
-void move(CorrespondenceMoments& moments, const Eigen::Vector3d& origin) {
-  const double n = static_cast<double>(moments.count);
-  moments.outer += origin * moments.sum.transpose() + moments.sum * origin.transpose() +
-                   n * origin * origin.transpose();
-  moments.sum += n * origin;
-}
-
 }  // namespace
 
 Rows rows_of(const FloatArray& array, const char* name) {
@@ -51,15 +44,6 @@ Rows rows_of(const FloatArray& array, const char* name) {
   return {array.data(), count, columns, static_cast<std::size_t>(array.strides(0) / size)};
 }
 
-void move_to_origins(RegistrationResult& result, const Cloud& source, const Cloud& target) {
-  if (source.origin.isZero(0) && target.origin.isZero(0)) return;
-  if (result.has_candidate)
-    result.target_from_source.translation() +=
-        target.origin - result.target_from_source.linear() * source.origin;
-  move(result.source_moments, source.origin);
-  move(result.target_moments, target.origin);
-}
-
 void bind_cloud(py::module_& m) {
   py::class_<Cloud>(m, "PreparedCloud",
                     "A fragment ready for alignment, in the memory of the context that made it. "
@@ -75,10 +59,11 @@ void bind_cloud(py::module_& m) {
           "options", [](const Cloud& c) { return c.prepared.options(); },
           "What it was prepared with.")
       .def_property_readonly(
-          "origin", [](const Cloud& c) { return array_of(c.origin); },
+          "origin", [](const Cloud& c) { return array_of(c.prepared.origin()); },
           "(3,) float64: taken off the coordinates before they became float32.")
       .def_property_readonly(
-          "points", [](const Cloud& c) { return in_frame(c.prepared.points(), c.origin); },
+          "points",
+          [](const Cloud& c) { return in_frame(c.prepared.points(), c.prepared.origin()); },
           "(N, 3) copy on the host, metres: float32, or float64 where origin is not zero.")
       .def_property_readonly(
           "normals", [](const Cloud& c) { return array_of(c.prepared.normals()); },
@@ -86,7 +71,8 @@ void bind_cloud(py::module_& m) {
       .def_property_readonly("features", &features_of,
                              "(N, feature_dimension) float32 copy on the host.")
       .def_property_readonly(
-          "viewpoints", [](const Cloud& c) { return in_frame(c.prepared.viewpoints(), c.origin); },
+          "viewpoints",
+          [](const Cloud& c) { return in_frame(c.prepared.viewpoints(), c.prepared.origin()); },
           "(V, 3) sensor positions, V >= 1.")
       .def("__repr__", [](const Cloud& c) {
         return "<gpureg.PreparedCloud, " + std::to_string(c.prepared.size()) + " points of " +

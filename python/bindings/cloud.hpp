@@ -12,12 +12,9 @@
 
 namespace gpureg::python {
 
-/// A PreparedCloud and the point of the caller's frame that its own frame has as origin. Not zero
-/// only for float64 coordinates too large for float (a map's), which the package moves before it
-/// casts.
+/// What Python calls a PreparedCloud.
 struct Cloud {
   PreparedCloud prepared;
-  Eigen::Vector3d origin = Eigen::Vector3d::Zero();
 };
 
 using FloatArray = py::array_t<float, 0>;
@@ -29,8 +26,5 @@ struct Rows {
   std::size_t count, columns, stride;
 };
 Rows rows_of(const FloatArray& array, const char* name);
-
-/// What the clouds' origins mean for a result between them: into the caller's frames.
-void move_to_origins(RegistrationResult& result, const Cloud& source, const Cloud& target);
 
 }  // namespace gpureg::python

@@ -13,6 +13,7 @@ PYBIND11_MODULE(_core, m) {
   bind_prepare(m);
   bind_prior(m);
   bind_align(m);
+  bind_verification(m);
   bind_loop_consistency(m);
   bind_time_budget(m);
   bind_voxel_size(m);

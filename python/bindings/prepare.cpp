@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <pybind11/stl.h>
 
+#include <algorithm>
 #include <cstdio>
 #include <future>
+#include <iterator>
 #include <optional>
 
 #include "cloud.hpp"
@@ -19,7 +21,6 @@ namespace {
 /// alive what the views point at.
 struct Input {
   PointCloudView view;
-  Eigen::Vector3d origin = Eigen::Vector3d::Zero();
   std::optional<std::uintptr_t> stream;
 
   explicit Input(const py::tuple& parts) {
@@ -48,8 +49,11 @@ struct Input {
       view.viewpoints = viewpoints.data;
       view.viewpoint_count = viewpoints.count;
     }
-    if (!parts[4].is_none())
-      origin = matrix_of<Eigen::Vector3d>(parts[4].cast<py::array_t<double>>(), "origin");
+    if (!parts[4].is_none()) {
+      const auto origin =
+          matrix_of<Eigen::Vector3d>(parts[4].cast<py::array_t<double>>(), "origin");
+      for (int k = 0; k < 3; ++k) view.origin[k] = origin[k];
+    }
   }
 
   Rows rows(const py::object& part, const char* name) const {
@@ -72,6 +76,7 @@ struct Input {
     v.feature_stride = view.feature_stride;
     v.viewpoints = view.viewpoints;
     v.viewpoint_count = view.viewpoint_count;
+    std::copy(std::begin(view.origin), std::end(view.origin), v.origin);
     return v;
   }
 };
@@ -112,8 +117,7 @@ std::vector<Cloud> prepare_clouds(const Context& context, const std::vector<Inpu
   std::vector<Cloud> out;
   std::size_t next = 0;
   for (std::size_t k = 0; k < inputs.size(); ++k)
-    out.push_back(
-        {inputs[k].stream ? futures[k].get() : std::move(hosted[next++]), inputs[k].origin});
+    out.push_back({inputs[k].stream ? futures[k].get() : std::move(hosted[next++])});
   return out;
 }
 

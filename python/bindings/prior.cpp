@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "prior.hpp"
 
 #include <pybind11/stl.h>
 
@@ -7,8 +6,10 @@
 #include <cstdio>
 #include <optional>
 
+#include "bindings.hpp"
 #include "fields.hpp"
 #include "gpureg/error.hpp"
+#include "gpureg/prior.hpp"
 #include "matrix.hpp"
 
 namespace gpureg::python {
@@ -119,14 +120,6 @@ RegistrationPrior prior_of(const PriorParts& parts) {
 }
 
 }  // namespace
-
-RegistrationPrior in_prepared_frames(RegistrationPrior prior, const Cloud& source,
-                                     const Cloud& target) {
-  if (prior.pose)
-    prior.pose->target_from_source.translation() =
-        prior.pose->target_from_source * source.origin - target.origin;
-  return prior;
-}
 
 void bind_prior(py::module_& m) {
   using P = RegistrationPrior;

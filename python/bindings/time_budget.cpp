@@ -20,7 +20,6 @@ void bind_time_budget(py::module_& m) {
          const RegistrationOptions& options) {
         const py::gil_scoped_release release;
         T out = align_within(context, source.prepared, target.prepared, milliseconds, options);
-        move_to_origins(out.result, source, target);
         return out;
       },
       py::arg("context"), py::arg("source"), py::arg("target"), py::arg("milliseconds"),

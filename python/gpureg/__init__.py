@@ -27,6 +27,7 @@ from ._core import (
     PairConsistency,
     PointCloud,
     PoseEvidence,
+    PoseVerification,
     PreparedCloud,
     PrepareOptions,
     PrepareStatistics,
@@ -55,6 +56,7 @@ from .registration import (
     register,
     suggest_voxel_size,
 )
+from .verification import verify
 
 if TYPE_CHECKING:
     from .batch import BatchRun, register_all
@@ -86,6 +88,7 @@ __all__ = [
     "PairConsistency",
     "PointCloud",
     "PoseEvidence",
+    "PoseVerification",
     "PrepareOptions",
     "PrepareStatistics",
     "PreparedCloud",
@@ -112,5 +115,6 @@ __all__ = [
     "register",
     "register_all",
     "suggest_voxel_size",
+    "verify",
     "write_point_cloud",
 ]

@@ -1,0 +1,79 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Evidence and confidence for poses that another method proposes."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from . import _core
+from ._contexts import checked, context_of
+from ._core import Context, PoseVerification, RegistrationOptions
+from .preparation import prepared
+
+
+def verify(
+    source: Any,
+    target: Any,
+    poses: Any,
+    *,
+    refine: bool = False,
+    search_alternatives: bool = True,
+    options: RegistrationOptions | None = None,
+    context: Context | None = None,
+) -> list[PoseVerification]:
+    """Verify poses of another method: ICP, a learned network, odometry, an image loop.
+
+    Parameters
+    ----------
+    source, target : PreparedCloud
+        Or whatever `prepare` takes as points; those are prepared with ``options.prepare``.
+    poses : (4, 4) or (K, 4, 4) array
+        ``target_from_source`` of each pose, in the frames of source and target.
+    refine : bool
+        Refine every pose by ICP before it is verified.
+    search_alternatives : bool
+        Also align the pair, so that the confidence takes the alternatives into account, as that of
+        `align` does. Without, the poses compete with each other only: faster, and too confident
+        where the clouds overlap well in several poses.
+    options : RegistrationOptions, optional
+    context : Context, optional
+
+    Returns
+    -------
+    list of PoseVerification
+        One for each pose, in their order. A pose that `align` returned gets the evidence that it
+        had there.
+
+    Raises
+    ------
+    ValueError
+        Naming the pose that is no rigid motion.
+
+    Examples
+    --------
+    >>> import numpy as np, gpureg
+    >>> cloud = gpureg.prepare(np.random.default_rng(1).random((2000, 3)))
+    >>> beside = np.eye(4)
+    >>> beside[0, 3] = 0.5
+    >>> [v.confidence > 0.5 for v in gpureg.verify(cloud, cloud, [np.eye(4), beside])]
+    [True, False]
+    """
+    options = checked(options, RegistrationOptions, "options") or RegistrationOptions()
+    context = context_of(context)
+    matrices = np.asarray(poses, np.float64)
+    if matrices.ndim == 2:
+        matrices = matrices[None]
+    if matrices.ndim != 3 or matrices.shape[1:] != (4, 4):
+        raise ValueError(f"poses: expected shape (4, 4) or (K, 4, 4), got {np.shape(poses)}")
+    rows = np.abs(matrices[:, 3] - [0, 0, 0, 1]).max(axis=1, initial=0)
+    for k in np.flatnonzero(~(rows <= 1e-6)):
+        raise ValueError(
+            f"poses[{k}]: its last row is {matrices[k, 3].tolist()}, expected [0, 0, 0, 1]"
+        )
+    clouds = prepared([source, target], options.prepare, context, False)
+    return _core.verify(context, *clouds, matrices, options, refine, search_alternatives)
+
+
+__all__ = ["verify"]
