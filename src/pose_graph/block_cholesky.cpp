@@ -128,10 +128,19 @@ bool BlockCholesky::factorise(const BlockMatrix& matrix) {
                             [&](int front) { return process(fronts_[front], matrix); });
 }
 
-void BlockCholesky::solve(std::vector<Vector6d>& rhs) const {
+std::vector<double> BlockCholesky::permuted(const std::vector<Vector6d>& blocks) const {
   std::vector<double> x(scalars(size_));
   for (int k = 0; k < size_; ++k)
-    for (int i = 0; i < kBlock; ++i) x[scalars(k) + i] = rhs[order_[k]][i];
+    for (int i = 0; i < kBlock; ++i) x[scalars(k) + i] = blocks[order_[k]][i];
+  return x;
+}
+
+void BlockCholesky::unpermute(const std::vector<double>& x, std::vector<Vector6d>& blocks) const {
+  for (int k = 0; k < size_; ++k)
+    for (int i = 0; i < kBlock; ++i) blocks[order_[k]][i] = x[scalars(k) + i];
+}
+
+void BlockCholesky::substitute_forward(std::vector<double>& x) const {
   std::vector<double> below;
   for (const Front& front : fronts_) {
     const std::size_t columns = scalars(front.columns), rest = scalars(front.rows.size());
@@ -147,6 +156,10 @@ void BlockCholesky::solve(std::vector<Vector6d>& rhs) const {
     for (std::size_t r = 0; r < front.rows.size(); ++r)
       for (int i = 0; i < kBlock; ++i) x[scalars(front.rows[r]) + i] -= below[scalars(r) + i];
   }
+}
+
+void BlockCholesky::substitute_backward(std::vector<double>& x) const {
+  std::vector<double> below;
   for (auto front = fronts_.rbegin(); front != fronts_.rend(); ++front) {
     const std::size_t columns = scalars(front->columns), rest = scalars(front->rows.size());
     const std::size_t size = columns + rest;
@@ -161,8 +174,19 @@ void BlockCholesky::solve(std::vector<Vector6d>& rhs) const {
       top[j] = (top[j] - sum) / column[j];
     }
   }
-  for (int k = 0; k < size_; ++k)
-    for (int i = 0; i < kBlock; ++i) rhs[order_[k]][i] = x[scalars(k) + i];
+}
+
+void BlockCholesky::solve(std::vector<Vector6d>& rhs) const {
+  std::vector<double> x = permuted(rhs);
+  substitute_forward(x);
+  substitute_backward(x);
+  unpermute(x, rhs);
+}
+
+void BlockCholesky::colour(std::vector<Vector6d>& noise) const {
+  std::vector<double> x = permuted(noise);
+  substitute_backward(x);
+  unpermute(x, noise);
 }
 
 }  // namespace gpureg::pose_graph

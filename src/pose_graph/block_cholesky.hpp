@@ -31,6 +31,10 @@ class BlockCholesky {
   /// Solves in place.
   void solve(std::vector<Vector6d>& rhs) const;
 
+  /// Turns independent standard normal numbers into a sample of the normal distribution whose
+  /// inverse covariance is the matrix.
+  void colour(std::vector<Vector6d>& noise) const;
+
   /// Multiplications and additions of one factorisation.
   double flops() const { return flops_; }
 
@@ -47,6 +51,10 @@ class BlockCholesky {
     std::vector<double> update;                ///< Schur complement, until the parent has taken it
   };
 
+  std::vector<double> permuted(const std::vector<Vector6d>& blocks) const;
+  void unpermute(const std::vector<double>& x, std::vector<Vector6d>& blocks) const;
+  void substitute_forward(std::vector<double>& x) const;
+  void substitute_backward(std::vector<double>& x) const;
   bool process(Front& front, const BlockMatrix& matrix);
 
   int size_;

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <numeric>
 
 #include "pose_graph/parallel.hpp"
@@ -30,6 +31,22 @@ double blocked_sum(int count, int threads, const Term& term) {
         sums[b] += term(k);
   });
   return std::accumulate(sums.begin(), sums.end(), 0.0);
+}
+
+/// SplitMix64 (Steele et al. 2014) of a counter: a number in (0, 1).
+double uniform(std::uint64_t counter) {
+  std::uint64_t z = (counter + 1) * 0x9E3779B97F4A7C15u;
+  z = (z ^ (z >> 30)) * 0xBF58476D1CE4E5B9u;
+  z = (z ^ (z >> 27)) * 0x94D049BB133111EBu;
+  z ^= z >> 31;
+  return (static_cast<double>(z >> 11) + 0.5) / 9007199254740992.0;
+}
+
+/// Box and Muller 1958.
+double standard_normal(int number, int index) {
+  const std::uint64_t counter = (std::uint64_t(number) << 40) + 2 * std::uint64_t(index);
+  constexpr double two_pi = 6.283185307179586;
+  return std::sqrt(-2 * std::log(uniform(counter))) * std::cos(two_pi * uniform(counter + 1));
 }
 
 const ModeTerm& chosen(const Problem& problem, const Selection& selection, int edge) {
@@ -220,10 +237,15 @@ Matrix6d NormalEquations::marginal(int node) const {
   return 0.5 * (covariance + covariance.transpose());
 }
 
-double NormalEquations::max_gradient() const {
-  double most = 0;
-  for (const Vector6d& g : gradient_) most = std::max(most, g.cwiseAbs().maxCoeff());
-  return most;
+std::vector<Vector6d> NormalEquations::sample(int number) const {
+  std::vector<Vector6d> x(columns_);
+  for (int c = 0; c < columns_; ++c)
+    for (int i = 0; i < 6; ++i) x[c][i] = standard_normal(number, 6 * c + i);
+  cholesky_->colour(x);
+  std::vector<Vector6d> out(problem_.ids.size(), Vector6d::Zero());
+  for (std::size_t node = 0; node < out.size(); ++node)
+    if (column_[node] >= 0) out[node] = x[column_[node]];
+  return out;
 }
 
 }  // namespace gpureg::pose_graph

@@ -46,7 +46,8 @@ class NormalEquations {
   /// Marginal covariance of a node that is not held, after a solve with that damping.
   Matrix6d marginal(int node) const;
 
-  double max_gradient() const;
+  /// Perturbations of all nodes drawn from the posterior, after a solve; a function of the number.
+  std::vector<Vector6d> sample(int number) const;
 
  private:
   struct Contribution {

@@ -38,6 +38,13 @@ void graduate(const Problem& problem, NormalEquations& equations,
               const std::vector<char>& candidates, bool least_squares_first, double quantile,
               Control& control, Estimate& estimate);
 
+/// Of the loops with a flag in `asked`, those whose misclosure at the estimate the uncertainty of
+/// the estimate itself explains: the covariance of the relative pose comes from samples of the
+/// posterior of the accepted edges.
+std::vector<char> explained_by_drift(const Problem& problem, NormalEquations& equations,
+                                     const std::vector<char>& asked, double quantile,
+                                     const Control& control, const Estimate& estimate);
+
 /// The whole robust optimisation by Robust::gnc.
 Estimate solve_gnc(const Problem& problem, const std::vector<char>& known, Control& control);
 
