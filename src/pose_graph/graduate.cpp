@@ -3,6 +3,7 @@
 #include <cmath>
 #include <limits>
 
+#include "pose_graph/bridges.hpp"
 #include "pose_graph/parallel.hpp"
 #include "pose_graph/robust.hpp"
 
@@ -97,36 +98,44 @@ double truncated_cost(const Problem& problem, const std::vector<Pose>& poses, do
   return 0.5 * sum + weighted_cost(problem, poses, nothing, threads);
 }
 
+namespace {
+
+/// Weights and modes of the candidates by a rule of their fit, 0 for other loops; returns whether a
+/// weight is neither 0 nor 1.
+template <typename Rule>
+bool weigh(const Problem& problem, const std::vector<char>& candidates,
+           const std::vector<Fit>& fits, Selection& selection, const Rule& rule) {
+  bool undecided = false;
+  for (int k = 0; k < problem.edge_count(); ++k) {
+    if (problem.edges[k].odometry) continue;
+    selection.weights[k] = candidates[k] ? rule(fits[k].ratio) : 0;
+    if (candidates[k]) selection.modes[k] = fits[k].mode;
+    undecided |= selection.weights[k] > kBinary && selection.weights[k] < 1 - kBinary;
+  }
+  return undecided;
+}
+
+double hard_weight(double ratio) { return ratio <= 1 ? 1 : 0; }
+
+}  // namespace
+
 void graduate(const Problem& problem, NormalEquations& equations,
               const std::vector<char>& candidates, bool least_squares_first, double quantile,
               Control& control, Estimate& estimate) {
   const Options& options = control.options;
-  Selection& selection = estimate.selection;
   const auto fits = [&] {
     return fits_of(problem, candidates, estimate.poses, quantile, control.threads);
   };
   const auto minimise_now = [&](int iterations, double tolerance) {
-    const MinimisationResult result = minimise(problem, equations, selection, iterations, tolerance,
-                                               control, estimate.poses);
+    const MinimisationResult result = minimise(problem, equations, estimate.selection, iterations,
+                                               tolerance, control, estimate.poses);
     estimate.failed = result.failed;
     estimate.converged = result.converged;
     return !result.failed && !control.cancelled;
   };
-  // Weight of every loop by a rule of its fit; returns whether a weight is neither 0 nor 1.
-  const auto weigh = [&](const std::vector<Fit>& now, const auto& rule) {
-    bool undecided = false;
-    for (int k = 0; k < problem.edge_count(); ++k) {
-      if (problem.edges[k].odometry) continue;
-      selection.weights[k] = candidates[k] ? rule(now[k].ratio) : 0;
-      if (candidates[k]) selection.modes[k] = now[k].mode;
-      undecided |= selection.weights[k] > kBinary && selection.weights[k] < 1 - kBinary;
-    }
-    return undecided;
-  };
-  const auto hard = [](double ratio) { return ratio <= 1 ? 1.0 : 0.0; };
-
   if (least_squares_first) {
-    weigh(fits(), [](double ratio) { return std::isfinite(ratio) ? 1.0 : 0.0; });
+    weigh(problem, candidates, fits(), estimate.selection,
+          [](double ratio) { return std::isfinite(ratio) ? 1.0 : 0.0; });
     if (!minimise_now(options.solver.max_iterations, kRoundTolerance)) return;
   }
   std::vector<Fit> now = fits();
@@ -136,19 +145,35 @@ void graduate(const Problem& problem, NormalEquations& equations,
   if (worst > 1) {
     double mu = 1 / (2 * worst - 1);
     for (int round = 0; round < options.gnc.max_rounds; ++round, mu *= options.gnc.mu_step) {
-      const bool undecided = weigh(now, [&](double ratio) { return truncated_weight(ratio, mu); });
+      const bool undecided = weigh(problem, candidates, now, estimate.selection,
+                                   [&](double ratio) { return truncated_weight(ratio, mu); });
       if (!undecided && mu > 1) break;
       if (!minimise_now(kStepsPerRound, kRoundTolerance)) return;
       now = fits();
     }
   }
-  weigh(now, hard);
-  // To the minimum, with the accepted set corrected until it stands.
+  weigh(problem, candidates, now, estimate.selection, hard_weight);
+  minimise_now(options.solver.max_iterations, kRoundTolerance);
+}
+
+void settle(const Problem& problem, NormalEquations& equations, double quantile, Control& control,
+            Estimate& estimate) {
+  const SolverOptions& solver = control.options.solver;
+  const std::vector<char> all(problem.edges.size(), 1);
   for (int round = 0; round < kMostCorrections; ++round) {
-    if (!minimise_now(options.solver.max_iterations, options.solver.relative_tolerance)) return;
-    const Selection before = selection;
-    weigh(fits(), hard);
-    if (selection.weights == before.weights && selection.modes == before.modes) break;
+    const Selection before = estimate.selection;
+    weigh(problem, all, fits_of(problem, all, estimate.poses, quantile, control.threads),
+          estimate.selection, hard_weight);
+    reject_unchecked(problem, control.options.gnc.min_bridge_confidence, estimate.selection);
+    const bool same =
+        estimate.selection.weights == before.weights && estimate.selection.modes == before.modes;
+    if (same && round > 0) break;
+    const MinimisationResult result =
+        minimise(problem, equations, estimate.selection, solver.max_iterations,
+                 solver.relative_tolerance, control, estimate.poses);
+    estimate.failed = result.failed;
+    estimate.converged = result.converged;
+    if (result.failed || control.cancelled) break;
   }
   estimate.cost = truncated_cost(problem, estimate.poses, quantile, control.threads);
 }

@@ -33,6 +33,8 @@ void GncOptions::validate() const {
           inlier_probability, "a probability in (0, 1)");
   require(std::isfinite(mu_step) && mu_step > 1, "gnc.mu_step", mu_step, "a finite number > 1");
   require_count("gnc.max_rounds", max_rounds);
+  require(min_bridge_confidence >= 0 && min_bridge_confidence <= 1, "gnc.min_bridge_confidence",
+          min_bridge_confidence, "a probability in [0, 1]");
 }
 
 void LineProcessOptions::validate() const {

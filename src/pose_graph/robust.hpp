@@ -32,11 +32,16 @@ double truncated_cost(const Problem& problem, const std::vector<Pose>& poses, do
                       int threads);
 
 /// Graduated non-convexity over odometry and the loops with a flag in `candidates`, from the
-/// estimate's poses. Other loops have weight 0. least_squares_first: minimise with all weights 1
-/// before the first round.
+/// estimate's poses; every weight is 0 or 1 in the end. Other loops have weight 0.
+/// least_squares_first: minimise with all weights 1 before the first round.
 void graduate(const Problem& problem, NormalEquations& equations,
               const std::vector<char>& candidates, bool least_squares_first, double quantile,
               Control& control, Estimate& estimate);
+
+/// Accepts exactly the loops below their threshold, of all, and minimises; until the set stands.
+/// Fills in the cost.
+void settle(const Problem& problem, NormalEquations& equations, double quantile, Control& control,
+            Estimate& estimate);
 
 /// Of the loops with a flag in `asked`, those whose misclosure at the estimate the uncertainty of
 /// the estimate itself explains: the covariance of the relative pose comes from samples of the

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <algorithm>
-#include <limits>
+#include <utility>
 
 #include "pose_graph/components.hpp"
 #include "pose_graph/consensus.hpp"
@@ -14,9 +14,6 @@ namespace {
 constexpr int kLevelFactor = 4;
 /// A loop takes part in the levels with at least this probability.
 constexpr double kLeastBelief = 0.5;
-/// When fewer than this share of the loops contradict the least-squares solution, it is a good
-/// start: no consensus is needed.
-constexpr double kFewContradictions = 0.1;
 
 bool any(const std::vector<char>& flags) {
   return std::find(flags.begin(), flags.end(), 1) != flags.end();
@@ -36,10 +33,10 @@ class GncSolver {
     Estimate start = from_paths(std::vector<char>(problem_.edges.size(), 0),
                                 all_edges(problem_).modes);
     start.initial_cost = truncated_cost(problem_, start.poses, quantile_, control_.threads);
-    if (!control_.options.gnc.consensus) return graduated(start, all, true);
+    if (!control_.options.gnc.consensus) return settled(graduated(start, all, true));
     const Consensus consensus = find_consensus(problem_, quantile_, control_.threads);
     if (consensus.largest_cluster < 2) return without_consensus(start);
-    return by_levels(start, consensus);
+    return settled(by_levels(start, consensus));
   }
 
  private:
@@ -59,13 +56,19 @@ class GncSolver {
     return estimate;
   }
 
+  Estimate settled(Estimate estimate) {
+    if (!estimate.failed && !control_.cancelled)
+      settle(problem_, equations_, quantile_, control_, estimate);
+    return estimate;
+  }
+
   /// No two loops agree: nothing is known beforehand. Of the graduation from all loops and the one
   /// from the initial poses the better by its cost.
   Estimate without_consensus(const Estimate& start) {
     const std::vector<char> all(problem_.edges.size(), 1);
-    Estimate first = graduated(start, all, true);
+    Estimate first = settled(graduated(start, all, true));
     if (first.failed || control_.cancelled) return first;
-    Estimate second = graduated(start, explained(start, all), false);
+    Estimate second = settled(graduated(start, explained(start, all), false));
     return second.failed || second.cost >= first.cost ? first : second;
   }
 
@@ -89,13 +92,8 @@ class GncSolver {
         seen[k] = fresh[k];
       }
       if (any(fresh) || last) {
-        const std::vector<char> wanted = fresh;
-        if (first) {
-          estimate = restarted(estimate, fresh, consensus.modes);
-        } else {
-          estimate = restarted(estimate, fresh, consensus.modes);
-          fresh = explained(estimate, fresh);
-        }
+        estimate = restarted(std::move(estimate), fresh, consensus.modes);
+        if (!first) fresh = explained(estimate, fresh);
         first = false;
         for (int k = 0; k < edges; ++k) admitted[k] = admitted[k] || fresh[k];
         estimate = graduated(std::move(estimate), admitted, false);

@@ -40,6 +40,9 @@ struct GncOptions {
   double inlier_probability = 0.99;
   double mu_step = 1.4;        ///< factor on mu per round, > 1 (Yang et al. 2020, Remark 5)
   int max_rounds = 200;        ///< >= 1
+  /// A loop that lies on no cycle is checked by nothing: it fits perfectly, correct or not. It is
+  /// accepted if its confidence is at least this, [0, 1]; otherwise the graph is split there.
+  double min_bridge_confidence = 0.5;
   /// Start from loops that agree with each other along short cycles. false: start from all loops,
   /// as the paper of GNC does.
   bool consensus = true;
