@@ -18,4 +18,5 @@ PYBIND11_MODULE(_core, m) {
   bind_voxel_size(m);
   bind_files(m);
   bind_evaluation(m);
+  bind_pose_graph(m);
 }

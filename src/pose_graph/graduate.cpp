@@ -15,6 +15,8 @@ constexpr int kStepsPerRound = 2;
 constexpr double kRoundTolerance = 1e-3;
 /// Weights closer than this to 0 or 1 are so.
 constexpr double kBinary = 1e-3;
+/// Beyond this mu only loops within 6 % of their threshold are undecided, which settle() decides.
+constexpr double kLastMu = 16;
 /// Corrections of the accepted set at the end.
 constexpr int kMostCorrections = 10;
 
@@ -147,7 +149,7 @@ void graduate(const Problem& problem, NormalEquations& equations,
     for (int round = 0; round < options.gnc.max_rounds; ++round, mu *= options.gnc.mu_step) {
       const bool undecided = weigh(problem, candidates, now, estimate.selection,
                                    [&](double ratio) { return truncated_weight(ratio, mu); });
-      if (!undecided && mu > 1) break;
+      if ((!undecided && mu > 1) || mu > kLastMu) break;
       if (!minimise_now(kStepsPerRound, kRoundTolerance)) return;
       now = fits();
     }

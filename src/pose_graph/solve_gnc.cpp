@@ -91,12 +91,12 @@ class GncSolver {
         fresh[k] = in || last;
         seen[k] = fresh[k];
       }
-      if (any(fresh) || last) {
+      if (any(fresh)) {
         estimate = restarted(std::move(estimate), fresh, consensus.modes);
         if (!first) fresh = explained(estimate, fresh);
-        first = false;
         for (int k = 0; k < edges; ++k) admitted[k] = admitted[k] || fresh[k];
-        estimate = graduated(std::move(estimate), admitted, false);
+        if (first || any(fresh)) estimate = graduated(std::move(estimate), admitted, true);
+        first = false;
         if (estimate.failed || control_.cancelled) return estimate;
       }
       if (last) break;
