@@ -15,6 +15,10 @@ constexpr int kLevelFactor = 4;
 /// A loop takes part in the levels with at least this probability.
 constexpr double kLeastBelief = 0.5;
 
+/// Where at least this share of the loops agrees with others, and is accepted by a graduation from
+/// all of them, there is nothing that levels could improve.
+constexpr double kNearlyAll = 0.9;
+
 bool any(const std::vector<char>& flags) {
   return std::find(flags.begin(), flags.end(), 1) != flags.end();
 }
@@ -36,6 +40,10 @@ class GncSolver {
     if (!control_.options.gnc.consensus) return settled(graduated(start, all, true));
     const Consensus consensus = find_consensus(problem_, quantile_, control_.threads);
     if (consensus.largest_cluster < 2) return without_consensus(start);
+    if (nearly_all_agree(consensus)) {
+      Estimate direct = settled(graduated(start, all, true));
+      if (direct.failed || control_.cancelled || keeps_nearly_all(direct)) return direct;
+    }
     return settled(by_levels(start, consensus));
   }
 
@@ -62,6 +70,30 @@ class GncSolver {
     return estimate;
   }
 
+  bool believed(const Consensus& consensus, int k) const {
+    return !problem_.edges[k].odometry && consensus.cluster_size[k] >= 2 &&
+           consensus.belief[k] >= kLeastBelief;
+  }
+
+  bool nearly_all_agree(const Consensus& consensus) const {
+    int loops = 0, agree = 0;
+    for (int k = 0; k < problem_.edge_count(); ++k) {
+      loops += !problem_.edges[k].odometry;
+      agree += believed(consensus, k);
+    }
+    return agree >= kNearlyAll * loops;
+  }
+
+  bool keeps_nearly_all(const Estimate& estimate) const {
+    int loops = 0, kept = 0;
+    for (int k = 0; k < problem_.edge_count(); ++k) {
+      if (problem_.edges[k].odometry) continue;
+      ++loops;
+      kept += estimate.selection.weights[k] > 0.5;
+    }
+    return kept >= kNearlyAll * loops;
+  }
+
   /// No two loops agree: nothing is known beforehand. Of the graduation from all loops and the one
   /// from the initial poses the better by its cost.
   Estimate without_consensus(const Estimate& start) {
@@ -86,8 +118,8 @@ class GncSolver {
       std::vector<char> fresh(edges, 0);
       for (int k = 0; k < edges; ++k) {
         if (problem_.edges[k].odometry || seen[k]) continue;
-        const bool in = consensus.cluster_size[k] >= std::max(2, size / kLevelFactor) &&
-                        consensus.belief[k] >= kLeastBelief;
+        const bool in = believed(consensus, k) &&
+                        consensus.cluster_size[k] >= size / kLevelFactor;
         fresh[k] = in || last;
         seen[k] = fresh[k];
       }
