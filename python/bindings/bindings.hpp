@@ -24,5 +24,6 @@ void bind_voxel_size(py::module_& m);
 void bind_files(py::module_& m);
 void bind_evaluation(py::module_& m);
 void bind_confidence(py::module_& m);
+void bind_pose_graph(py::module_& m);
 
 }  // namespace gpureg::python

@@ -20,4 +20,5 @@ PYBIND11_MODULE(_core, m) {
   bind_files(m);
   bind_evaluation(m);
   bind_confidence(m);
+  bind_pose_graph(m);
 }

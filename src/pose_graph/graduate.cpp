@@ -1,0 +1,183 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "pose_graph/bridges.hpp"
+#include "pose_graph/parallel.hpp"
+#include "pose_graph/robust.hpp"
+
+namespace gpureg::pose_graph {
+namespace {
+
+/// Steps per round: the weights of the next round matter more than the minimum of this one.
+constexpr int kStepsPerRound = 2;
+constexpr double kRoundTolerance = 1e-3;
+/// Weights closer than this to 0 or 1 are so.
+constexpr double kBinary = 1e-3;
+/// Beyond this mu only loops within 6 % of their threshold are undecided, which settle() decides.
+constexpr double kLastMu = 16;
+/// Corrections of the accepted set at the end.
+constexpr int kMostCorrections = 10;
+
+/// The mode that fits best: squared error over threshold, or infinity where no mode may be
+/// accepted.
+struct Fit {
+  int mode = 0;
+  double ratio = 0;
+};
+
+Fit fit_of(const Problem& problem, const EdgeTerm& edge, const std::vector<Pose>& poses,
+           double quantile) {
+  Fit best{0, std::numeric_limits<double>::infinity()};
+  double least = std::numeric_limits<double>::infinity();
+  for (int k = 0; k < edge.modes; ++k) {
+    const ModeTerm& mode = problem.modes[edge.first_mode + k];
+    const double limit = threshold(mode, quantile);
+    if (limit <= 0) continue;
+    const double error = squared_error(poses[edge.source], poses[edge.target], mode);
+    if (error - mode.prior < least) {
+      least = error - mode.prior;
+      best = {k, error / limit};
+    }
+  }
+  return best;
+}
+
+std::vector<Fit> fits_of(const Problem& problem, const std::vector<char>& candidates,
+                         const std::vector<Pose>& poses, double quantile, int threads) {
+  std::vector<Fit> fits(problem.edges.size());
+  for_ranges(problem.edge_count(), threads, [&](int begin, int end) {
+    for (int k = begin; k < end; ++k)
+      if (!problem.edges[k].odometry && candidates[k])
+        fits[k] = fit_of(problem, problem.edges[k], poses, quantile);
+  });
+  return fits;
+}
+
+/// Yang et al. 2020, equation 14, with the ratio of squared error and threshold.
+double truncated_weight(double ratio, double mu) {
+  if (ratio <= mu / (mu + 1)) return 1;
+  if (ratio >= (mu + 1) / mu) return 0;
+  return std::sqrt(mu * (mu + 1) / ratio) - mu;
+}
+
+}  // namespace
+
+double chi_square_quantile(double probability) {
+  // The distribution function with 6 degrees of freedom is 1 - exp(-x/2) (1 + x/2 + x^2/8).
+  double low = 0, high = 1e3;
+  for (int k = 0; k < 200; ++k) {
+    const double x = 0.5 * (low + high);
+    (1 - std::exp(-x / 2) * (1 + x / 2 + x * x / 8) < probability ? low : high) = x;
+  }
+  return high;
+}
+
+double threshold(const ModeTerm& mode, double quantile) { return quantile + mode.prior; }
+
+double truncated_cost(const Problem& problem, const std::vector<Pose>& poses, double quantile,
+                      int threads) {
+  std::vector<double> costs(problem.edges.size());
+  for_ranges(problem.edge_count(), threads, [&](int begin, int end) {
+    for (int k = begin; k < end; ++k) {
+      const EdgeTerm& edge = problem.edges[k];
+      double least = edge.odometry ? std::numeric_limits<double>::infinity() : quantile;
+      double best_prior = -quantile;
+      for (int m = 0; m < edge.modes; ++m) {
+        const ModeTerm& mode = problem.modes[edge.first_mode + m];
+        const double error = squared_error(poses[edge.source], poses[edge.target], mode);
+        least = std::min(least, error - mode.prior);
+        best_prior = std::max(best_prior, mode.prior);
+      }
+      costs[k] = least + best_prior;
+    }
+  });
+  Selection nothing{std::vector<double>(problem.edges.size(), 0.0),
+                    std::vector<int>(problem.edges.size(), 0)};
+  double sum = 0;
+  for (const double cost : costs) sum += cost;
+  return 0.5 * sum + weighted_cost(problem, poses, nothing, threads);
+}
+
+namespace {
+
+/// Weights and modes of the candidates by a rule of their fit, 0 for other loops; returns whether a
+/// weight is neither 0 nor 1.
+template <typename Rule>
+bool weigh(const Problem& problem, const std::vector<char>& candidates,
+           const std::vector<Fit>& fits, Selection& selection, const Rule& rule) {
+  bool undecided = false;
+  for (int k = 0; k < problem.edge_count(); ++k) {
+    if (problem.edges[k].odometry) continue;
+    selection.weights[k] = candidates[k] ? rule(fits[k].ratio) : 0;
+    if (candidates[k]) selection.modes[k] = fits[k].mode;
+    undecided |= selection.weights[k] > kBinary && selection.weights[k] < 1 - kBinary;
+  }
+  return undecided;
+}
+
+double hard_weight(double ratio) { return ratio <= 1 ? 1 : 0; }
+
+}  // namespace
+
+void graduate(const Problem& problem, NormalEquations& equations,
+              const std::vector<char>& candidates, bool least_squares_first, double quantile,
+              Control& control, Estimate& estimate) {
+  const Options& options = control.options;
+  const auto fits = [&] {
+    return fits_of(problem, candidates, estimate.poses, quantile, control.threads);
+  };
+  const auto minimise_now = [&](int iterations, double tolerance) {
+    const MinimisationResult result = minimise(problem, equations, estimate.selection, iterations,
+                                               tolerance, control, estimate.poses);
+    estimate.failed = result.failed;
+    estimate.converged = result.converged;
+    return !result.failed && !control.cancelled;
+  };
+  if (least_squares_first) {
+    weigh(problem, candidates, fits(), estimate.selection,
+          [](double ratio) { return std::isfinite(ratio) ? 1.0 : 0.0; });
+    if (!minimise_now(options.solver.max_iterations, kRoundTolerance)) return;
+  }
+  std::vector<Fit> now = fits();
+  double worst = 0;
+  for (int k = 0; k < problem.edge_count(); ++k)
+    if (std::isfinite(now[k].ratio)) worst = std::max(worst, now[k].ratio);
+  if (worst > 1) {
+    double mu = 1 / (2 * worst - 1);
+    for (int round = 0; round < options.gnc.max_rounds; ++round, mu *= options.gnc.mu_step) {
+      const bool undecided = weigh(problem, candidates, now, estimate.selection,
+                                   [&](double ratio) { return truncated_weight(ratio, mu); });
+      if ((!undecided && mu > 1) || mu > kLastMu) break;
+      if (!minimise_now(kStepsPerRound, kRoundTolerance)) return;
+      now = fits();
+    }
+  }
+  weigh(problem, candidates, now, estimate.selection, hard_weight);
+  minimise_now(options.solver.max_iterations, kRoundTolerance);
+}
+
+void settle(const Problem& problem, NormalEquations& equations, double quantile, Control& control,
+            Estimate& estimate) {
+  const SolverOptions& solver = control.options.solver;
+  const std::vector<char> all(problem.edges.size(), 1);
+  for (int round = 0; round < kMostCorrections; ++round) {
+    const Selection before = estimate.selection;
+    weigh(problem, all, fits_of(problem, all, estimate.poses, quantile, control.threads),
+          estimate.selection, hard_weight);
+    reject_unchecked(problem, control.options.gnc.min_bridge_confidence, estimate.selection);
+    const bool same =
+        estimate.selection.weights == before.weights && estimate.selection.modes == before.modes;
+    if (same && round > 0) break;
+    const MinimisationResult result =
+        minimise(problem, equations, estimate.selection, solver.max_iterations,
+                 solver.relative_tolerance, control, estimate.poses);
+    estimate.failed = result.failed;
+    estimate.converged = result.converged;
+    if (result.failed || control.cancelled) break;
+  }
+  estimate.cost = truncated_cost(problem, estimate.poses, quantile, control.threads);
+}
+
+}  // namespace gpureg::pose_graph

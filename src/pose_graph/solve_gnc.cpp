@@ -1,0 +1,175 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <algorithm>
+#include <utility>
+
+#include "pose_graph/components.hpp"
+#include "pose_graph/consensus.hpp"
+#include "pose_graph/initialise.hpp"
+#include "pose_graph/robust.hpp"
+
+namespace gpureg::pose_graph {
+namespace {
+
+/// From level to level, loops of sets smaller by this factor are admitted.
+constexpr int kLevelFactor = 4;
+/// A loop takes part in the levels with at least this probability.
+constexpr double kLeastBelief = 0.5;
+
+/// Where at least this share of the loops agrees with others, and is accepted by a graduation from
+/// all of them, there is nothing that levels could improve.
+constexpr double kNearlyAll = 0.9;
+
+bool any(const std::vector<char>& flags) {
+  return std::find(flags.begin(), flags.end(), 1) != flags.end();
+}
+
+class GncSolver {
+ public:
+  GncSolver(const Problem& problem, const std::vector<char>& known, Control& control)
+      : problem_(problem),
+        known_(known),
+        control_(control),
+        quantile_(chi_square_quantile(control.options.gnc.inlier_probability)),
+        equations_(problem, control.threads) {}
+
+  Estimate run() {
+    const std::vector<char> all(problem_.edges.size(), 1);
+    Estimate start = from_paths(std::vector<char>(problem_.edges.size(), 0),
+                                all_edges(problem_).modes);
+    start.initial_cost = truncated_cost(problem_, start.poses, quantile_, control_.threads);
+    if (!control_.options.gnc.consensus) return settled(graduated(start, all, true));
+    const Consensus consensus = find_consensus(problem_, quantile_, control_.threads);
+    if (consensus.largest_cluster < 2) return without_consensus(start);
+    if (nearly_all_agree(consensus)) {
+      Estimate direct = settled(graduated(start, all, true));
+      if (direct.failed || control_.cancelled || keeps_nearly_all(direct)) return direct;
+    }
+    return settled(by_levels(start, consensus));
+  }
+
+ private:
+  Estimate from_paths(const std::vector<char>& trusted, const std::vector<int>& modes) const {
+    Estimate out;
+    out.poses = problem_.poses;
+    out.selection = {std::vector<double>(problem_.edges.size(), 0.0), modes};
+    for (int k = 0; k < problem_.edge_count(); ++k)
+      if (problem_.edges[k].odometry) out.selection.weights[k] = 1;
+    poses_from_paths(problem_, known_, trusted, modes, out.poses);
+    return out;
+  }
+
+  Estimate graduated(Estimate estimate, const std::vector<char>& candidates,
+                     bool least_squares_first) {
+    graduate(problem_, equations_, candidates, least_squares_first, quantile_, control_, estimate);
+    return estimate;
+  }
+
+  Estimate settled(Estimate estimate) {
+    if (!estimate.failed && !control_.cancelled)
+      settle(problem_, equations_, quantile_, control_, estimate);
+    return estimate;
+  }
+
+  bool believed(const Consensus& consensus, int k) const {
+    return !problem_.edges[k].odometry && consensus.cluster_size[k] >= 2 &&
+           consensus.belief[k] >= kLeastBelief;
+  }
+
+  bool nearly_all_agree(const Consensus& consensus) const {
+    int loops = 0, agree = 0;
+    for (int k = 0; k < problem_.edge_count(); ++k) {
+      loops += !problem_.edges[k].odometry;
+      agree += believed(consensus, k);
+    }
+    return agree >= kNearlyAll * loops;
+  }
+
+  bool keeps_nearly_all(const Estimate& estimate) const {
+    int loops = 0, kept = 0;
+    for (int k = 0; k < problem_.edge_count(); ++k) {
+      if (problem_.edges[k].odometry) continue;
+      ++loops;
+      kept += estimate.selection.weights[k] > 0.5;
+    }
+    return kept >= kNearlyAll * loops;
+  }
+
+  /// No two loops agree: nothing is known beforehand. Of the graduation from all loops and the one
+  /// from the initial poses the better by its cost.
+  Estimate without_consensus(const Estimate& start) {
+    const std::vector<char> all(problem_.edges.size(), 1);
+    Estimate first = settled(graduated(start, all, true));
+    if (first.failed || control_.cancelled) return first;
+    Estimate second = settled(graduated(start, explained(start, all), false));
+    return second.failed || second.cost >= first.cost ? first : second;
+  }
+
+  std::vector<char> explained(const Estimate& estimate, const std::vector<char>& asked) {
+    return explained_by_drift(problem_, equations_, asked, quantile_, control_, estimate);
+  }
+
+  /// Loops of the largest sets first. Later ones must be explained by the drift of the estimate.
+  Estimate by_levels(Estimate estimate, const Consensus& consensus) {
+    const int edges = problem_.edge_count();
+    std::vector<char> admitted(edges, 0), seen(edges, 0);
+    bool first = true;
+    for (int size = consensus.largest_cluster;; size /= kLevelFactor) {
+      const bool last = size < 2 * kLevelFactor;
+      std::vector<char> fresh(edges, 0);
+      for (int k = 0; k < edges; ++k) {
+        if (problem_.edges[k].odometry || seen[k]) continue;
+        const bool in = believed(consensus, k) &&
+                        consensus.cluster_size[k] >= size / kLevelFactor;
+        fresh[k] = in || last;
+        seen[k] = fresh[k];
+      }
+      if (any(fresh)) {
+        estimate = restarted(std::move(estimate), fresh, consensus.modes);
+        if (!first) fresh = explained(estimate, fresh);
+        for (int k = 0; k < edges; ++k) admitted[k] = admitted[k] || fresh[k];
+        if (first || any(fresh)) estimate = graduated(std::move(estimate), admitted, true);
+        first = false;
+        if (estimate.failed || control_.cancelled) return estimate;
+      }
+      if (last) break;
+    }
+    return estimate;
+  }
+
+  /// Poses of what the accepted edges do not connect to the known nodes, from paths over trusted
+  /// loops.
+  Estimate restarted(Estimate estimate, const std::vector<char>& trusted,
+                     const std::vector<int>& modes) const {
+    const std::vector<int> component = components_of(problem_, [&](int k) {
+      return problem_.edges[k].odometry || estimate.selection.weights[k] > 0.5;
+    });
+    std::vector<char> held(known_);
+    const auto anchor = std::find(known_.begin(), known_.end(), 1) - known_.begin();
+    bool apart = false;
+    for (int node = 0; node < problem_.node_count(); ++node) {
+      if (component[node] == component[anchor]) held[node] = 1;
+      apart |= !held[node];
+    }
+    std::vector<char> sure = trusted;
+    for (int k = 0; k < problem_.edge_count(); ++k) {
+      if (estimate.selection.weights[k] > 0.5) sure[k] = 1;
+      if (trusted[k]) estimate.selection.modes[k] = modes[k];
+    }
+    if (apart) poses_from_paths(problem_, held, sure, estimate.selection.modes, estimate.poses);
+    return estimate;
+  }
+
+  const Problem& problem_;
+  const std::vector<char>& known_;
+  Control& control_;
+  double quantile_;
+  NormalEquations equations_;
+};
+
+}  // namespace
+
+Estimate solve_gnc(const Problem& problem, const std::vector<char>& known, Control& control) {
+  return GncSolver(problem, known, control).run();
+}
+
+}  // namespace gpureg::pose_graph
