@@ -143,8 +143,7 @@ TEST_F(Register, VerifiesPosesOfAFile) {
   refused("1 0 0 0\n0 1 0\n", {poses + ":2", "row 2", "3 numbers"});
   refused("1 0 0 x\n", {poses + ":1", "'x'"});
   refused("2 0 0 0\n0 2 0 0\n0 0 2 0\n0 0 0 1\n", {poses + ":4", "no rigid motion"});
-  expect_refused(joined({"register", source_, target_, "--refine-initial"}, kSmall),
-                 {"--initial"});
+  expect_refused(joined({"register", source_, target_, "--refine-initial"}, kSmall), {"--initial"});
 }
 
 TEST_F(Register, SeedDecidesAndThreadsDoNot) {
