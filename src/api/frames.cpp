@@ -1,6 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "api/frames.hpp"
 
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
 namespace gpureg {
 
 /// Moments of the local, scaled points to moments of the points in the cloud's frame.
@@ -73,6 +77,18 @@ void move_to_frames(RegistrationResult& result, const PreparedState& source,
     move_to_frame(mode.target_from_source, source, target);
   move_to_frame(result.source_moments, source);
   move_to_frame(result.target_moments, target);
+}
+
+/// RMS distance between the positions that two poses give the source points in correspondences.
+double distance_between(const UnalignedIsometry3d& a, const UnalignedIsometry3d& b,
+                        const CorrespondenceMoments& points) {
+  if (points.count == 0) return std::numeric_limits<double>::infinity();
+  const double n = static_cast<double>(points.count);
+  const Eigen::Matrix3d m = a.linear() - b.linear();
+  const Eigen::Vector3d t = a.translation() - b.translation();
+  return std::sqrt(
+      std::max(0.0, ((m * points.outer * m.transpose()).trace() + 2 * t.dot(m * points.sum)) / n +
+                        t.squaredNorm()));
 }
 
 }  // namespace gpureg

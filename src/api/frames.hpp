@@ -55,4 +55,14 @@ void move_to_frame(CorrespondenceMoments& moments, const PreparedState& cloud);
 void move_to_frames(RegistrationResult& result, const PreparedState& source,
                     const PreparedState& target);
 
+/// Minimum RMS displacement, as a fraction of mode_distance, for a perturbed pose to count as a
+/// mode of its own: a quarter of a metre at the default voxel size. Nearer, only the more likely
+/// one of the two is kept.
+constexpr double kDistinctModeFraction = 5.0 / 6;
+
+/// RMS distance between the positions to which two poses move the points of correspondences;
+/// infinite without points. points: relative to the frame that the poses move.
+double distance_between(const UnalignedIsometry3d& a, const UnalignedIsometry3d& b,
+                        const CorrespondenceMoments& points);
+
 }  // namespace gpureg

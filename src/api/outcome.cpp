@@ -32,23 +32,6 @@ RegistrationReason evidence_reason(const RegistrationStatistics& s, double confi
                                              : RegistrationReason::none;
 }
 
-/// RMS distance between the positions that two poses give the source points in correspondences.
-double distance_between(const UnalignedIsometry3d& a, const UnalignedIsometry3d& b,
-                        const CorrespondenceMoments& points) {
-  if (points.count == 0) return std::numeric_limits<double>::infinity();
-  const double n = static_cast<double>(points.count);
-  const Eigen::Matrix3d m = a.linear() - b.linear();
-  const Eigen::Vector3d t = a.translation() - b.translation();
-  return std::sqrt(
-      std::max(0.0, ((m * points.outer * m.transpose()).trace() + 2 * t.dot(m * points.sum)) / n +
-                        t.squaredNorm()));
-}
-
-/// Minimum RMS displacement, as a fraction of mode_distance, for a perturbed pose to count as a
-/// mode of its own: a quarter of a metre at the default voxel size. Nearer, only the more likely
-/// one of the two is kept.
-constexpr double kDistinctModeFraction = 5.0 / 6;
-
 /// The modes of one pair, in the frames of its clouds.
 class Modes {
  public:
@@ -166,7 +149,8 @@ void add_modes(const PairOutcome& outcome, const PreparedState& source, const Pr
   result.target_moments = to_frame(swapped ? best.source_moments : best.target_moments, target);
 }
 
-/// The result between the rows of both clouds.
+}  // namespace
+
 RegistrationResult to_row_result(const PairOutcome& all, const PreparedState& source,
                                  const PreparedState& target, bool swapped,
                                  const RegistrationOptions& options, const PriorTest& prior) {
@@ -220,8 +204,6 @@ RegistrationResult to_row_result(const PairOutcome& all, const PreparedState& so
       to_frame(swapped ? outcome.source_moments : outcome.target_moments, target);
   return result;
 }
-
-}  // namespace
 
 RegistrationResult to_result(const PairOutcome& outcome, const PreparedState& source,
                              const PreparedState& target, bool swapped,

@@ -12,4 +12,9 @@ RegistrationResult to_result(const PairOutcome& outcome, const PreparedState& so
                              const PreparedState& target, bool swapped,
                              const RegistrationOptions& options, const PriorTest& prior = {});
 
+/// The same between the rows of both clouds, without their origins (PointCloudView::origin).
+RegistrationResult to_row_result(const PairOutcome& outcome, const PreparedState& source,
+                                 const PreparedState& target, bool swapped,
+                                 const RegistrationOptions& options, const PriorTest& prior = {});
+
 }  // namespace gpureg

@@ -28,7 +28,8 @@ void check_pose(const UnalignedIsometry3d& pose, const std::string& name) {
     throw InvalidArgument(name + " is no rigid motion");
 }
 
-/// One pair whose poses are verified. All poses and moments are in the clouds' frames.
+/// One pair whose poses are verified. Poses and moments are between the rows of the clouds, as
+/// large origins would cost their differences the last digits.
 struct VerifiedPair {
   const PreparedState& source;
   const PreparedState& target;
@@ -52,9 +53,6 @@ struct VerifiedPair {
             : 0.0;
     out.source_moments = to_frame(swapped ? mode.target_moments : mode.source_moments, source);
     out.target_moments = to_frame(swapped ? mode.source_moments : mode.target_moments, target);
-    move_to_frame(out.target_from_source, source, target);
-    move_to_frame(out.source_moments, source);
-    move_to_frame(out.target_moments, target);
     return out;
   }
 
@@ -73,7 +71,8 @@ struct VerifiedPair {
   /// The distinct poses that align() finds for the pair.
   std::vector<Candidate> alternatives_of(const PairOutcome& found) const {
     std::vector<Candidate> out;
-    for (const RegistrationMode& mode : to_result(found, source, target, swapped, options).modes)
+    for (const RegistrationMode& mode :
+         to_row_result(found, source, target, swapped, options).modes)
       out.push_back({mode.target_from_source, mode.evidence, {0, 0}});
     return out;
   }
@@ -81,11 +80,15 @@ struct VerifiedPair {
   /// Confidence of a pose against the alternatives that are not the same mode.
   confidence::ModeConfidence confidence_of(const Candidate& pose,
                                            const std::vector<Candidate>& alternatives,
-                                           const Eigen::Vector3d& middle) const {
+                                           const CorrespondenceMoments& points) const {
+    const Eigen::Vector3d middle = middle_of(points, origin_of(source));
+    const double distance =
+        kDistinctModeFraction * static_cast<double>(options.evidence.mode_distance);
     std::vector<Candidate> all{pose};
     for (const Candidate& other : alternatives)
       if (!same_mode_at(pose.target_from_source, other.target_from_source, middle,
-                        options.evidence))
+                        options.evidence) ||
+          distance_between(pose.target_from_source, other.target_from_source, points) > distance)
         all.push_back(other);
     std::vector<PoseEvidence> evidence;
     for (const Candidate& c : all) evidence.push_back(c.evidence);
@@ -179,7 +182,6 @@ std::vector<std::vector<PoseVerification>> verify_poses_batch(
       for (std::size_t k = 0; k < outcome.modes.size(); ++k) {
         const ModeOutcome& mode = outcome.modes[k];
         poses_of_pair.push_back(pair.verification_of(outcome, mode));
-        if (!verification.refine) poses_of_pair.back().target_from_source = poses[p][k];
         given.push_back({poses_of_pair.back().target_from_source, poses_of_pair.back().evidence,
                          VerifiedPair::overlap_of(mode)});
       }
@@ -187,11 +189,16 @@ std::vector<std::vector<PoseVerification>> verify_poses_batch(
           verification.search_alternatives ? pair.alternatives_of(found[p - begin]) : given;
       for (std::size_t k = 0; k < poses_of_pair.size(); ++k) {
         PoseVerification& out = poses_of_pair[k];
-        const confidence::ModeConfidence confidence = pair.confidence_of(
-            given[k], alternatives,
-            middle_of(out.source_moments, origin_of(pair.source) + offset_of(pair.source)));
+        const confidence::ModeConfidence confidence =
+            pair.confidence_of(given[k], alternatives, out.source_moments);
         out.confidence = confidence.confidence;
         out.overlap_confidence = confidence.overlap_confidence;
+        if (verification.refine)
+          move_to_frame(out.target_from_source, pair.source, pair.target);
+        else
+          out.target_from_source = poses[p][k];
+        move_to_frame(out.source_moments, pair.source);
+        move_to_frame(out.target_moments, pair.target);
       }
       results[p] = std::move(poses_of_pair);
     }
