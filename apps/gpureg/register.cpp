@@ -168,8 +168,8 @@ void add_register(CLI::App& app, Action& chosen) {
   verb->add_option("TARGET", o->target, "Cloud that stays")->required();
   o->method.add_to(*verb);
   verb->add_option("--time-budget", o->time_budget,
-                   "Milliseconds for the alignment: instead of --quality, as much of it as they "
-                   "allow; which is not the same on every run");
+                   "Time budget of the alignment in milliseconds, instead of --quality; the quality "
+                   "then varies between runs");
   verb->add_option("--json", o->json, "Write options, result, counts and times");
   verb->add_option("--overlay", o->overlay, "Write both clouds in colour, aligned, as PLY");
   verb->add_option("--image", o->image, "Draw both clouds before and after, as PNG");
