@@ -167,9 +167,10 @@ void add_register(CLI::App& app, Action& chosen) {
   verb->add_option("SOURCE", o->source, "Cloud that is moved")->required();
   verb->add_option("TARGET", o->target, "Cloud that stays")->required();
   o->method.add_to(*verb);
-  verb->add_option("--time-budget", o->time_budget,
-                   "Time budget of the alignment in milliseconds, instead of --quality; the quality "
-                   "then varies between runs");
+  verb->add_option(
+      "--time-budget", o->time_budget,
+      "Time budget of the alignment in milliseconds, instead of --quality; the quality "
+      "then varies between runs");
   verb->add_option("--json", o->json, "Write options, result, counts and times");
   verb->add_option("--overlay", o->overlay, "Write both clouds in colour, aligned, as PLY");
   verb->add_option("--image", o->image, "Draw both clouds before and after, as PNG");
