@@ -29,7 +29,7 @@ struct FeatureQuery {
 
 /// Nearest rows of every query: k indices per query in order of distance (squared norm of the
 /// difference as a chain of fmaf over the dimensions, then the lower index), kNoValue where fewer
-/// exist. Exactly what cpu::nearest_features finds.
+/// exist. Equals cpu::nearest_features bit for bit.
 DeviceBuffer<std::uint32_t> nearest_features(Exec& exec, const std::vector<FeatureQuery>& queries,
                                              std::uint32_t k, std::size_t answers);
 

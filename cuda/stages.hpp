@@ -55,7 +55,7 @@ Seeds choose_seeds(Exec& exec, const MatchSets& matches, const RegistrationOptio
 /// matches that it aligns.
 Candidates propose_poses(Exec& exec, const MatchSets& matches, const Seeds& seeds,
                          const RegistrationOptions& options);
-/// Adds the coarse_score: evidence from a sample of the points.
+/// Adds the coarse_score, from a sample of the points.
 void score_candidates(Exec& exec, Span<const PairView> pairs, const MatchSets& matches,
                       Candidates& candidates, const RegistrationOptions& options);
 /// Distinct poses with the highest coarse_score.

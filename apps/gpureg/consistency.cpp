@@ -163,7 +163,7 @@ void add_consistency(CLI::App& app, Action& chosen) {
       ->required();
   verb->add_option("-o,--output", o->log, "Redwood log of the pairs that are aligned then");
   verb->add_option("--voxel-size", o->voxel_size,
-                   "That tolerances are derived from; default: the batch's");
+                   "Voxel size of the tolerances; default: that of the batch");
   verb->add_option("--min-score", o->min_confidence,
                    "Report a pair from this score on; default: the batch's")
       ->check(CLI::Range(0.0, 1.0));

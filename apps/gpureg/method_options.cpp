@@ -36,7 +36,7 @@ void MethodOptions::add_to(CLI::App& verb) {
               throw CLI::ConversionError(text, "--voxel-size");
           },
           "Edge of the downsampling voxel in metres; every other length follows from it. auto: "
-          "chosen by the clouds")
+          "suggested by the clouds")
       ->default_str(significant(static_cast<double>(voxel_size), 6))
       ->type_name("FLOAT or auto");
   verb.add_option("--preset", preset,

@@ -230,9 +230,10 @@ void add_register(CLI::App& app, Action& chosen) {
   verb->add_option("SOURCE", o->source, "Cloud that is moved")->required();
   verb->add_option("TARGET", o->target, "Cloud that stays")->required();
   o->method.add_to(*verb);
-  verb->add_option("--time-budget", o->time_budget,
-                   "Milliseconds for the alignment: instead of --quality, as much of it as they "
-                   "allow; which is not the same on every run");
+  verb->add_option(
+      "--time-budget", o->time_budget,
+      "Time budget of the alignment in milliseconds, instead of --quality; the quality "
+      "then varies between runs");
   verb->add_option("--initial", o->initial,
                    "Verify the poses of this file instead of a search: 4 x 4 matrices of "
                    "target_from_source, row by row, or a Redwood log");

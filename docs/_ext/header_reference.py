@@ -24,12 +24,12 @@ def signature(member: ElementTree.Element) -> str:
 
 
 def declared(folder: pathlib.Path, header: str) -> list[tuple[int, str, str]]:
-    """(line, kind, name) of what a header declares, members of classes left out."""
+    """(line, kind, name) of what a header of include/gpureg declares, members of classes left out."""
     found = []
 
     def add(node: ElementTree.Element, name: str) -> None:
         location = node.find("location")
-        if pathlib.PurePath(location.get("file")).name == header and node.get("kind") in KINDS:
+        if location.get("file").endswith(f"gpureg/{header}") and node.get("kind") in KINDS:
             found.append((int(location.get("line")), node.get("kind"), name))
 
     for kind in ("class", "struct"):

@@ -133,10 +133,11 @@ struct EvidenceOptions {
 /// The range of `quality`: 0 is the fastest, 10 finds the most.
 inline constexpr std::uint32_t kDefaultQuality = 5, kHighestQuality = 10;
 
-/// All options of one registration. An aggregate with in-class defaults: change what you need.
+/// All options of one registration. An aggregate with in-class defaults: set only the fields to
+/// change.
 ///
-/// What a user normally sets: the voxel size and the quality, through from_voxel_size(), then seed
-/// and min_confidence. Everything below those is for experts.
+/// Most users set the voxel size and the quality, through from_voxel_size(), then seed and
+/// min_confidence. The options below them are for experts.
 struct RegistrationOptions {
   std::uint64_t seed = 1;  ///< same seed, same bits: on any backend, thread count and batch split
   /// Confidence below which no alignment is reported, [0, 1] (RegistrationMethod::compatibility).

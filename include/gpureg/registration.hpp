@@ -37,7 +37,7 @@ PreparedCloud prepare(const Context& context, const PointCloudView& cloud,
 /// @param names names of the clouds in error messages, as many as clouds, or none (clouds[0],
 ///   clouds[1] ...).
 /// @return one handle per cloud, in order.
-/// @throws as prepare(), naming the cloud.
+/// @throws InvalidArgument as prepare() does, naming the cloud.
 std::vector<PreparedCloud> prepare_batch(const Context& context,
                                          const std::vector<PointCloudView>& clouds,
                                          const PrepareOptions& options = {},
@@ -66,7 +66,7 @@ RegistrationResult align(const Context& context, const PreparedCloud& source,
                          const RegistrationOptions& options = {});
 
 /// Prepares both clouds and aligns them. Prepare clouds of several pairs once instead.
-/// @throws as prepare() and align().
+/// @throws InvalidArgument as prepare() and align() do.
 RegistrationResult align(const Context& context, const PointCloudView& source,
                          const PointCloudView& target, const RegistrationOptions& options = {});
 

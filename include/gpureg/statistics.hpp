@@ -33,10 +33,10 @@ enum class RegistrationReason : std::uint8_t {
 
 const char* to_string(RegistrationStatus status);
 const char* to_string(RegistrationReason reason);
-/// One sentence for a person.
+/// @return one English sentence for messages.
 const char* explain(RegistrationReason reason);
 
-/// What was left after each stage of one pair, which answers "why did it fail?". A hypothesis is a
+/// Counts after each stage of one pair; they show at which stage a pair failed. A hypothesis is a
 /// quadruple of matches (RegistrationMethod::quadruples) or a seed
 /// (RegistrationMethod::compatibility).
 struct RegistrationStatistics {

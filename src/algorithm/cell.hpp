@@ -13,7 +13,7 @@ struct Cell {
   std::int32_t x, y, z;
 };
 
-/// Added to coordinates in keys: cells reach from -kCellBias to kCellBias - 1 along each axis.
+/// Added to coordinates in keys: cells range from -kCellBias to kCellBias - 1 along each axis.
 constexpr std::int32_t kCellBias = limits::kMaxCells;
 constexpr std::uint64_t kEmptyKey = ~std::uint64_t(0);
 

@@ -41,8 +41,8 @@ GPUREG_HD Closest closest_candidate(const std::uint32_t* candidates, std::uint32
 }
 
 /// Closest point of the cloud to q within max_squared (inclusive); the lower index wins a tie.
-/// Exactly what an exhaustive search over squared_norm(points[k] - q) finds, provided that
-/// max_squared is within the grid's search distance.
+/// Equals an exhaustive search over squared_norm(points[k] - q) as long as max_squared is within
+/// the search distance of the grid.
 GPUREG_HD Closest find_closest(const ClosestGridView& grid, const Vec3* points, Vec3 q,
                                float max_squared) {
   const Closest none{kNoValue, max_squared};

@@ -87,7 +87,7 @@ struct VisibilityView {
   float step;  ///< length of one step of depth
 };
 
-/// What one depth map says about a location.
+/// Result of comparing a location with one depth map.
 enum class Observation : std::uint32_t { unknown = 0, occluded = 1, surface = 2, free_space = 3 };
 
 /// Incidence weight of an observation: the squared cosine between the surface normal and the line

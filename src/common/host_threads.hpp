@@ -8,8 +8,8 @@
 
 namespace gpureg {
 
-/// work(thread) on that many threads, the caller's the first. When all are done, throws what the
-/// first of them that failed has thrown.
+/// Calls work(thread) on `threads` threads, the first of them the calling thread. Waits for all,
+/// then rethrows the exception of the first thread that failed.
 template <typename Work>
 void on_threads(std::size_t threads, const Work& work) {
   std::vector<std::exception_ptr> failed(threads);

@@ -5,14 +5,14 @@
 
 namespace gpureg::confidence {
 
-/// Perturbed poses of the most likely mode of each pair: moved both ways along the direction that
-/// its inliers determine least, as refinement may stop at several places along it. Where the
-/// evidence leaves open whether the mode is correct, by a quarter, half, three quarters and all of
-/// evidence.degeneracy_search_distance; where it is confident, by all of it; where the mode is
-/// hopeless, not at all. Takes some 50 us a pair, spread over at most that many threads.
+/// Perturbed poses of the most likely mode of each pair: moved both ways along its weakest
+/// direction, as refinement may stop at several locations along it. An undecided mode is perturbed
+/// by a quarter, half, three quarters and all of evidence.degeneracy_search_distance, a confident
+/// one by all of it, and one with log odds below -5 not at all. Takes about 50 us per pair,
+/// distributed over at most `threads` threads.
 std::vector<PosesOfPair> search_degeneracies(Span<const PairInput> pairs,
-                                             Span<const PairOutcome> outcomes,
-                                             const RegistrationOptions& options,
-                                             std::size_t threads);
+                                                Span<const PairOutcome> outcomes,
+                                                const RegistrationOptions& options,
+                                                std::size_t threads);
 
 }  // namespace gpureg::confidence

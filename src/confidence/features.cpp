@@ -147,7 +147,7 @@ static_assert(std::size(kNames) == kFeatureCount, "a name for each feature");
 const char* to_string(Feature feature) { return kNames[static_cast<std::size_t>(feature)]; }
 
 AvailableEvidence available_evidence(const std::vector<PoseEvidence>& modes) {
-  // A mode without any overlap says nothing about what the clouds have.
+  // A mode without overlap does not show which evidence the clouds have.
   AvailableEvidence available;
   for (const PoseEvidence& e : modes) {
     available.free_space |= e.source_observed > 0 || e.target_observed > 0;

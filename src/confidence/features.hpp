@@ -68,7 +68,7 @@ struct AvailableEvidence {
 /// surfaces where any mode has points near surfaces of both clouds.
 AvailableEvidence available_evidence(const std::vector<PoseEvidence>& modes);
 
-/// What the features are for.
+/// Purpose of a regression.
 enum class Regressand : std::uint8_t {
   ranking,    ///< which mode of a pair is the best
   confidence  ///< whether the best mode is correct

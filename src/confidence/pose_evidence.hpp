@@ -6,8 +6,8 @@
 
 namespace gpureg::confidence {
 
-/// The counts of a mode as shares. moved, fixed: the clouds as the engine had them; swapped: the
-/// moved cloud is the caller's target.
+/// Counts of a mode as shares. moved, fixed: the clouds in the engine; swapped: the moved cloud is
+/// the target of the pair.
 PoseEvidence evidence_of(const PairOutcome& outcome, const ModeOutcome& mode,
                          const PreparedState& moved, const PreparedState& fixed, bool swapped);
 

@@ -73,7 +73,7 @@ std::vector<std::vector<std::uint32_t>> choose_seeds(Exec& exec,
 std::vector<Candidates> propose_poses(Exec& exec, const std::vector<MatchSet>& matches,
                                       const std::vector<std::vector<std::uint32_t>>& seeds,
                                       const RegistrationOptions& options);
-/// Adds the coarse_score: evidence from a sample of the points.
+/// Adds the coarse_score, from a sample of the points.
 void score_candidates(Exec& exec, Span<const PairView> pairs, const std::vector<MatchSet>& matches,
                       std::vector<Candidates>& candidates, const RegistrationOptions& options);
 /// Distinct poses with the highest coarse_score.

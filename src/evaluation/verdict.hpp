@@ -5,10 +5,10 @@
 
 #include "gpureg/evaluation.hpp"
 
-/// What the strict and the geometric rule have in common. Private to the library.
+/// Shared parts of the strict and the geometric rule. Private to the library.
 namespace gpureg::evaluation {
 
-/// A pair that follows directly upon another is odometry's business: only these count.
+/// Only these pairs count: consecutive fragments are the task of odometry.
 inline bool counts(int i, int j) { return static_cast<long long>(j) - i > 1; }
 
 /// One report under one rule.

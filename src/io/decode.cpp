@@ -56,7 +56,7 @@ void fill_column(Scalar type, const char* first, std::size_t stride, bool swap, 
   }
 }
 
-// A coordinate in text. Numbers beyond the range of double mean what they round to.
+// Parses a coordinate. Numbers beyond the range of double round as usual, to infinity or zero.
 bool parse_coordinate(std::string_view text, float& value) {
   if (text.size() > 1 && text[0] == '+' && text[1] != '-') text.remove_prefix(1);
   const char* const end = text.data() + text.size();

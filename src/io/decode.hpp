@@ -29,8 +29,8 @@ PointCloud decode_binary(const Table& table, const Source& source, const char* b
 /// is malformed or missing.
 PointCloud decode_text(const Table& table, Source& source);
 
-/// Throws IoError unless so many rows can be in the rest of the source at all: it bounds what is
-/// allocated by the file's size.
+/// Throws IoError unless the rest of the source can hold `rows` rows: the size of the file bounds
+/// the allocation.
 void check_text_size(std::size_t rows, std::size_t values_per_row, const Source& source);
 
 }  // namespace gpureg::io

@@ -18,7 +18,7 @@ std::size_t finite_points(const PointCloud& cloud) {
 
 void write_overlay(const std::string& path, const PointCloud& source, const PointCloud& target,
                    const Eigen::Isometry3d& target_from_source) {
-  // An overlay is for the eye, and viewers stumble over NaN.
+  // Non-finite points are left out: viewers fail on NaN.
   PlyWriter ply(finite_points(source) + finite_points(target),
                 "property float x\nproperty float y\nproperty float z\n"
                 "property uchar red\nproperty uchar green\nproperty uchar blue\n",

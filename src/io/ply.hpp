@@ -16,7 +16,7 @@ enum class PlyFormat { ascii, binary_little_endian, binary_big_endian };
 
 struct PlyProperty {
   Column column;                     ///< of a list: name and type of its members
-  std::optional<Scalar> list_count;  ///< type of the count in front of a list; none: a plain number
+  std::optional<Scalar> list_count;  ///< type of the count before a list; none: a plain number
 };
 
 struct PlyElement {

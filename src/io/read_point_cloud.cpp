@@ -6,8 +6,8 @@
 
 namespace gpureg::io {
 
-// The body is decoded here and not by PCL: its readers trust the counts of a header, print to the
-// console, and link a client to VTK. PCL's readers and writers are the oracle of the tests.
+// The library decodes the body itself: the readers of PCL allocate by the counts of the header,
+// print to the console, and need VTK at link time. They are the oracle of the tests.
 PointCloud read_point_cloud(const std::string& path) {
   const std::string bytes = files::read_file(path, std::size_t{1} << 36);
   Source source(path, bytes);

@@ -8,7 +8,7 @@
 
 namespace gpureg::io {
 
-/// The bytes of a file, a position in them, and the way to complain about them.
+/// The bytes of a file, a position in them, and error messages with file and line.
 class Source {
  public:
   Source(std::string path, std::string_view bytes) : path_(std::move(path)), bytes_(bytes) {}

@@ -62,7 +62,7 @@ Axes find_axes(const Table& table, const Source& source) {
     if (!column) source.fail(std::string("the points have no coordinate ") + names[k]);
     axes.point[k] = *column;
   }
-  // PLY's habit and PCL's.
+  // Names of normals in PLY and in PCL.
   const auto nx = find(table, {"nx", "normal_x"}, source);
   const auto ny = find(table, {"ny", "normal_y"}, source);
   const auto nz = find(table, {"nz", "normal_z"}, source);

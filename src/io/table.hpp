@@ -15,8 +15,8 @@ enum class Scalar { int8, uint8, int16, uint16, int32, uint32, int64, uint64, fl
 
 std::size_t size_of(Scalar type);
 
-/// What both formats come down to: named columns of numbers. count: values per row (1, but for
-/// PCD's histograms).
+/// Content of both formats: named columns of numbers. count: values per row (1, except for
+/// histograms in PCD).
 struct Column {
   std::string name;
   Scalar type = Scalar::float32;

@@ -22,7 +22,7 @@ std::vector<ConsistencyCandidate> candidates_of(const RegistrationResult& result
     if (m == 0 || result.modes[m].confidence >= options.min_alternative_confidence)
       add(result.modes[m].target_from_source, m == 0 ? result.score : result.modes[m].confidence,
           m);
-  // At most one pose is correct: the alternatives share half of what the first one leaves.
+  // At most one pose is correct: the alternatives share half of the remaining probability.
   double alternatives = 0;
   for (std::size_t m = 1; m < out.size(); ++m) alternatives += out[m].prior;
   const double room = 0.5 * (1.0 - out.front().prior);
@@ -31,7 +31,7 @@ std::vector<ConsistencyCandidate> candidates_of(const RegistrationResult& result
   return out;
 }
 
-/// Pairs by their clouds: sums and searches do not depend on the caller's order.
+/// Pairs in the order of their clouds: sums and searches must not depend on the order of the input.
 std::vector<std::size_t> sorted(const std::vector<Pair>& pairs,
                                 const std::vector<RegistrationResult>& results) {
   std::vector<std::size_t> order(pairs.size());
@@ -66,7 +66,7 @@ ConsistencyGraph::ConsistencyGraph(const std::vector<Pair>& pairs,
   find_neighbors();
 }
 
-/// Dense numbers in the order of the caller's, so that memory does not depend on the numbers.
+/// Dense numbers by first occurrence, so that memory does not depend on the given indices.
 void ConsistencyGraph::number_clouds(const std::vector<Pair>& pairs) {
   for (const Pair& pair : pairs) {
     clouds_.push_back(pair.source);
