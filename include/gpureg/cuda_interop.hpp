@@ -62,7 +62,8 @@ std::future<PreparedCloud> prepare_async(const Context& context, const DevicePoi
                                          const PrepareOptions& options, CudaStream stream);
 
 /// prepare_async() that waits for the result.
-/// @throws InvalidArgument, DeviceError as prepare_async() and its future do.
+/// @throws InvalidArgument as prepare_async() does.
+/// @throws DeviceError as its future does.
 inline PreparedCloud prepare(const Context& context, const DevicePointCloudView& cloud,
                              const PrepareOptions& options, CudaStream stream) {
   return prepare_async(context, cloud, options, stream).get();
