@@ -37,6 +37,7 @@ Estimate solve_plain(const Problem& problem, const std::vector<char>& known, Con
   out.selection = all_edges(problem);
   poses_from_paths(problem, known, std::vector<char>(problem.edges.size(), 0), out.selection.modes,
                    out.poses);
+  out.initial_cost = weighted_cost(problem, out.poses, out.selection, control.threads);
   const SolverOptions& solver = control.options.solver;
   NormalEquations equations(problem, control.threads);
   const MinimisationResult result =
@@ -106,8 +107,7 @@ UnalignedIsometry3d to_isometry(const Pose& pose) {
 }
 
 /// Writes what one component's estimate says into the result.
-void report(const Problem& part, const Estimate& estimate, const Options& options,
-            Result& result) {
+void report(const Problem& part, const Estimate& estimate, const Options& options, Result& result) {
   const double reject_below =
       options.robust == Robust::line_process ? options.line_process.min_weight : 0.5;
   for (int node = 0; node < part.node_count(); ++node)

@@ -16,7 +16,7 @@ constexpr int kLevelFactor = 4;
 constexpr double kLeastBelief = 0.5;
 
 /// Where at least this share of the loops agrees with others, and is accepted by a graduation from
-/// all of them, there is nothing that levels could improve.
+/// those, there is nothing that levels could improve.
 constexpr double kNearlyAll = 0.9;
 
 bool any(const std::vector<char>& flags) {
@@ -34,14 +34,15 @@ class GncSolver {
 
   Estimate run() {
     const std::vector<char> all(problem_.edges.size(), 1);
-    Estimate start = from_paths(std::vector<char>(problem_.edges.size(), 0),
-                                all_edges(problem_).modes);
-    start.initial_cost = truncated_cost(problem_, start.poses, quantile_, control_.threads);
+    Estimate start = first_estimate(all_edges(problem_).modes);
     if (!control_.options.gnc.consensus) return settled(graduated(start, all, true));
     const Consensus consensus = find_consensus(problem_, quantile_, control_.threads);
     if (consensus.largest_cluster < 2) return without_consensus(start);
     if (nearly_all_agree(consensus)) {
-      Estimate direct = settled(graduated(start, all, true));
+      // Without the few others the system stays sparse; settle() takes those of them that fit.
+      std::vector<char> agreeing(problem_.edges.size(), 0);
+      for (int k = 0; k < problem_.edge_count(); ++k) agreeing[k] = believed(consensus, k);
+      Estimate direct = settled(graduated(start, agreeing, true));
       if (direct.failed || control_.cancelled || keeps_nearly_all(direct)) return direct;
     }
     return settled(by_levels(start, consensus));
@@ -56,6 +57,25 @@ class GncSolver {
       if (problem_.edges[k].odometry) out.selection.weights[k] = 1;
     poses_from_paths(problem_, known_, trusted, modes, out.poses);
     return out;
+  }
+
+  double cost_of(const Estimate& estimate) const {
+    return truncated_cost(problem_, estimate.poses, quantile_, control_.threads);
+  }
+
+  /// The given poses, unless paths from the anchor fit better: poses of a file may be placeholders.
+  Estimate first_estimate(const std::vector<int>& modes) {
+    const std::vector<char> none(problem_.edges.size(), 0);
+    Estimate given = from_paths(none, modes);
+    given.initial_cost = given.cost = cost_of(given);
+    if (!problem_.priors.empty() || !problem_.gravity.empty()) return given;
+    const std::vector<char> before = known_;
+    known_ = problem_.held;
+    Estimate paths = from_paths(none, modes);
+    paths.initial_cost = given.initial_cost;
+    if (cost_of(paths) < given.cost) return paths;
+    known_ = before;
+    return given;
   }
 
   Estimate graduated(Estimate estimate, const std::vector<char>& candidates,
@@ -118,8 +138,7 @@ class GncSolver {
       std::vector<char> fresh(edges, 0);
       for (int k = 0; k < edges; ++k) {
         if (problem_.edges[k].odometry || seen[k]) continue;
-        const bool in = believed(consensus, k) &&
-                        consensus.cluster_size[k] >= size / kLevelFactor;
+        const bool in = believed(consensus, k) && consensus.cluster_size[k] >= size / kLevelFactor;
         fresh[k] = in || last;
         seen[k] = fresh[k];
       }
@@ -160,7 +179,7 @@ class GncSolver {
   }
 
   const Problem& problem_;
-  const std::vector<char>& known_;
+  std::vector<char> known_;  ///< nodes whose pose is given
   Control& control_;
   double quantile_;
   NormalEquations equations_;

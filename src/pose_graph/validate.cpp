@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "pose_graph/validate.hpp"
 
+#include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 #include <algorithm>
@@ -57,10 +58,14 @@ void require_information(const UnalignedMatrix6d& information, const std::string
                               std::to_string(column) + ") is " + shown(information(row, column)) +
                               ", its mirror " + shown(information(column, row)));
   const Eigen::Matrix<double, 6, 6> m = 0.5 * (information + information.transpose());
+  // A Cholesky factorisation is ten times as fast as eigenvalues, and nearly all matrices pass.
+  const Eigen::Matrix<double, 6, 6> shifted =
+      m + kEigenvalueTolerance * largest * Eigen::Matrix<double, 6, 6>::Identity();
+  if (shifted.llt().info() == Eigen::Success) return;
   const double smallest =
       Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, 6, 6>>(m, Eigen::EigenvaluesOnly)
           .eigenvalues()[0];
-  require(smallest >= -kEigenvalueTolerance * largest, name + ".smallest_eigenvalue", smallest,
+  require(false, name + ".smallest_eigenvalue", smallest,
           "an information matrix that is positive semi-definite");
 }
 
@@ -79,8 +84,7 @@ void validate_edge(const Edge& edge, const Places& places, const std::string& na
   require_known(places, edge.source, name + ".source");
   require_known(places, edge.target, name + ".target");
   if (edge.source == edge.target)
-    throw InvalidArgument(name + " connects node " + std::to_string(edge.source) +
-                          " with itself");
+    throw InvalidArgument(name + " connects node " + std::to_string(edge.source) + " with itself");
   if (edge.kind != EdgeKind::odometry && edge.kind != EdgeKind::loop)
     throw InvalidArgument(name + ".kind is " + std::to_string(static_cast<int>(edge.kind)) +
                           ", expected odometry or loop");

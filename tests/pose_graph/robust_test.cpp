@@ -63,8 +63,7 @@ TEST(Gnc, RejectsLoopsThatAgreeWithEachOther) {
       const UnalignedIsometry3d twin =
           world.truth[b] * random_pose(random, 0.5, 0.5) * world.truth[a].inverse();
       for (int k = 0; k < 6; ++k)
-        add_false(world, a + k, b + k,
-                  world.truth[b + k].inverse() * twin * world.truth[a + k]);
+        add_false(world, a + k, b + k, world.truth[b + k].inverse() * twin * world.truth[a + k]);
     }
     const Result result = optimize(world.graph);
     expect_told_apart(world, result, true_edges);
@@ -74,8 +73,8 @@ TEST(Gnc, RejectsLoopsThatAgreeWithEachOther) {
 }
 
 TEST(Gnc, LongDriftDoesNotLoseATrueLoop) {
-  // A single round of 400 m with one loop at its end: the drift is a hundred times the loop's sigma,
-  // and the odometry's covariance explains it.
+  // A single round of 400 m with one loop at its end: the drift is a hundred times the loop's
+  // sigma, and the odometry's covariance explains it.
   World world = rounds(400, 1, 1, 11);
   std::mt19937_64 random(12);
   world.add(399, 0, EdgeKind::loop, random);
@@ -145,6 +144,19 @@ TEST(Gnc, ALoopThatNothingChecksIsTakenByItsConfidence) {
     EXPECT_EQ(result.edges.back().state == EdgeState::accepted, taken);
     EXPECT_EQ(result.components.size(), taken ? 1u : 2u);
   }
+}
+
+TEST(Gnc, PlaceholdersForPosesDoNoHarm) {
+  World world = scans(20, 5, 5);
+  const std::size_t true_edges = world.graph.edges.size();
+  for (Node& node : world.graph.nodes) node.world_from_node = UnalignedIsometry3d::Identity();
+  const Result result = optimize(world.graph);
+  EXPECT_EQ(result.status, Status::converged) << result.reason;
+  // Every loop contradicts the placeholders; half a squared error of six degrees of freedom is
+  // left.
+  EXPECT_GT(result.initial_cost, 3 * result.final_cost);
+  for (Node& node : world.graph.nodes) node.world_from_node.reset();
+  EXPECT_LE(worst_difference(world, true_edges, result), 0.05);
 }
 
 TEST(Gnc, EveryEdgeHasAWeightAndASquaredError) {
