@@ -64,16 +64,18 @@ def solve(method: str, graph: sphere.SphereGraph, folder: pathlib.Path, limit: f
         return {"failed": lines[-1] if lines else f"exit status {done.returncode}"}
     if method in OURS:
         lines = out.read_text().splitlines()
-        seconds = float(lines[0].split()[1])
+        seconds, cpu_seconds = (float(x) for x in lines[0].split()[1:3])
         poses = np.array([line.split() for line in lines[1:-1]], float).reshape(-1, 3, 4)
         accepted = np.array(lines[-1].split(), int) > 0
     else:
         data = np.load(out)
-        seconds, poses, accepted = float(data["seconds"]), data["poses"], data["accepted"]
+        seconds, cpu_seconds = float(data["seconds"]), float(data["cpu_seconds"])
+        poses, accepted = data["poses"], data["accepted"]
     loops = ~graph.odometry
     return {
         "ate": sphere.ate(poses[:, :3, 3], graph.truth[:, :3, 3]),
         "seconds": seconds,
+        "cpu_seconds": cpu_seconds,  # other programs on the machine change it little
         "true_accepted": int((accepted & loops & ~graph.false).sum()),
         "false_accepted": int((accepted & graph.false).sum()),
         "true_loops": int((loops & ~graph.false).sum()),

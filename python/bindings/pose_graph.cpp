@@ -6,7 +6,6 @@
 #include <algorithm>
 
 #include "bindings.hpp"
-#include "fields.hpp"
 #include "gpureg/error.hpp"
 #include "matrix.hpp"
 

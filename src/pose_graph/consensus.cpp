@@ -44,7 +44,7 @@ struct Neighbour {
   UncertainPose here_from_node;
 };
 
-struct Agreement {
+struct ClosedCycle {
   int others[2];  ///< candidates; the second is -1 for a cycle of two loops
   double evidence;
 };
@@ -88,8 +88,8 @@ class Cycles {
   const std::vector<Candidate>& candidates() const { return candidates_; }
 
   /// What agrees with one candidate. reach: scratch, -1 for every node.
-  std::vector<Agreement> agreements(int c, std::vector<int>& reach) const {
-    std::vector<Agreement> out;
+  std::vector<ClosedCycle> closed_cycles(int c, std::vector<int>& reach) const {
+    std::vector<ClosedCycle> out;
     const Candidate& mine = candidates_[c];
     const EdgeTerm& edge = problem_.edges[mine.edge];
     const std::vector<Neighbour> near_source = neighbours(edge.source);
@@ -163,7 +163,7 @@ class Cycles {
     return std::clamp(log_density + log_volume_, 0.0, kMostEvidence);
   }
 
-  void triangles(const Candidate& mine, const EdgeTerm& edge, std::vector<Agreement>& out) const {
+  void triangles(const Candidate& mine, const EdgeTerm& edge, std::vector<ClosedCycle>& out) const {
     int tried = 0;
     std::size_t next = 0;
     std::vector<Link> to_target = links_[edge.target];
@@ -190,18 +190,19 @@ class Cycles {
   std::vector<std::vector<Neighbour>> odometry_;
 };
 
-/// Beliefs of the modes given those of the modes that they agree with; the modes of an edge and
-/// "none of them" share one unit.
-std::vector<double> beliefs(const std::vector<Candidate>& candidates,
-                            const std::vector<std::vector<Agreement>>& agreements) {
-  std::vector<double> belief(candidates.size()), odds(candidates.size());
+/// Probabilities of the modes given those of the modes that they agree with; the modes of an edge
+/// and "none of them" share one unit.
+std::vector<double> mode_probabilities(const std::vector<Candidate>& candidates,
+                                       const std::vector<std::vector<ClosedCycle>>& closed_cycles) {
+  std::vector<double> probability(candidates.size()), odds(candidates.size());
   for (std::size_t c = 0; c < candidates.size(); ++c)
-    belief[c] = 1 / (1 + std::exp(-candidates[c].prior));
+    probability[c] = 1 / (1 + std::exp(-candidates[c].prior));
   for (int round = 0; round < kBeliefRounds; ++round) {
     for (std::size_t c = 0; c < candidates.size(); ++c) {
       double sum = candidates[c].prior;
-      for (const Agreement& a : agreements[c])
-        sum += a.evidence * belief[a.others[0]] * (a.others[1] < 0 ? 1 : belief[a.others[1]]);
+      for (const ClosedCycle& a : closed_cycles[c])
+        sum += a.evidence * probability[a.others[0]] *
+               (a.others[1] < 0 ? 1 : probability[a.others[1]]);
       odds[c] = std::exp(std::min(sum, 50.0));
     }
     for (std::size_t begin = 0; begin < candidates.size();) {
@@ -209,10 +210,10 @@ std::vector<double> beliefs(const std::vector<Candidate>& candidates,
       double total = 1;
       for (; end < candidates.size() && candidates[end].edge == candidates[begin].edge; ++end)
         total += odds[end];
-      for (; begin < end; ++begin) belief[begin] = odds[begin] / total;
+      for (; begin < end; ++begin) probability[begin] = odds[begin] / total;
     }
   }
-  return belief;
+  return probability;
 }
 
 }  // namespace
@@ -226,29 +227,29 @@ Matrix6d covariance_of(const Matrix6d& information) {
 Consensus find_consensus(const Problem& problem, double quantile, int threads) {
   const Cycles cycles(problem, quantile);
   const std::vector<Candidate>& candidates = cycles.candidates();
-  std::vector<std::vector<Agreement>> agreements(candidates.size());
+  std::vector<std::vector<ClosedCycle>> closed_cycles(candidates.size());
   for_ranges(static_cast<int>(candidates.size()), threads, [&](int begin, int end) {
     std::vector<int> reach(problem.ids.size(), -1);
-    for (int c = begin; c < end; ++c) agreements[c] = cycles.agreements(c, reach);
+    for (int c = begin; c < end; ++c) closed_cycles[c] = cycles.closed_cycles(c, reach);
   });
-  const std::vector<double> belief = beliefs(candidates, agreements);
+  const std::vector<double> probability = mode_probabilities(candidates, closed_cycles);
 
   Consensus out;
   out.modes.assign(problem.edges.size(), 0);
-  out.belief.assign(problem.edges.size(), 0);
+  out.probability.assign(problem.edges.size(), 0);
   out.cluster_size.assign(problem.edges.size(), 1);
   std::vector<int> best(problem.edges.size(), -1);
   for (std::size_t c = 0; c < candidates.size(); ++c) {
     const int edge = candidates[c].edge;
-    if (best[edge] >= 0 && belief[c] <= out.belief[edge]) continue;
+    if (best[edge] >= 0 && probability[c] <= out.probability[edge]) continue;
     best[edge] = static_cast<int>(c);
-    out.belief[edge] = belief[c];
+    out.probability[edge] = probability[c];
     out.modes[edge] = candidates[c].mode;
   }
   UnionFind sets(problem.edge_count());
   for (std::size_t c = 0; c < candidates.size(); ++c) {
     if (best[candidates[c].edge] != static_cast<int>(c)) continue;
-    for (const Agreement& a : agreements[c])
+    for (const ClosedCycle& a : closed_cycles[c])
       for (const int other : a.others)
         if (other >= 0 && best[candidates[other].edge] == other &&
             (a.others[1] < 0 || best[candidates[a.others[0]].edge] == a.others[0]))

@@ -12,7 +12,7 @@ struct Consensus {
   /// Per edge: the mode that most others agree with.
   std::vector<int> modes;
   /// Per edge: probability that this mode is correct, from its confidence and the agreement.
-  std::vector<double> belief;
+  std::vector<double> probability;
   /// Per edge: number of loops in the set that it belongs to, where two loops are in one set if
   /// they agree. 1: it agrees with none.
   std::vector<int> cluster_size;

@@ -105,8 +105,8 @@ namespace {
 /// Weights and modes of the candidates by a rule of their fit, 0 for other loops; returns whether a
 /// weight is neither 0 nor 1.
 template <typename Rule>
-bool weigh(const Problem& problem, const std::vector<char>& candidates,
-           const std::vector<Fit>& fits, Selection& selection, const Rule& rule) {
+bool update_weights(const Problem& problem, const std::vector<char>& candidates,
+                    const std::vector<Fit>& fits, Selection& selection, const Rule& rule) {
   bool undecided = false;
   for (int k = 0; k < problem.edge_count(); ++k) {
     if (problem.edges[k].odometry) continue;
@@ -136,8 +136,8 @@ void graduate(const Problem& problem, NormalEquations& equations,
     return !result.failed && !control.cancelled;
   };
   if (least_squares_first) {
-    weigh(problem, candidates, fits(), estimate.selection,
-          [](double ratio) { return std::isfinite(ratio) ? 1.0 : 0.0; });
+    update_weights(problem, candidates, fits(), estimate.selection,
+                   [](double ratio) { return std::isfinite(ratio) ? 1.0 : 0.0; });
     if (!minimise_now(options.solver.max_iterations, kRoundTolerance)) return;
   }
   std::vector<Fit> now = fits();
@@ -147,14 +147,15 @@ void graduate(const Problem& problem, NormalEquations& equations,
   if (worst > 1) {
     double mu = 1 / (2 * worst - 1);
     for (int round = 0; round < options.gnc.max_rounds; ++round, mu *= options.gnc.mu_step) {
-      const bool undecided = weigh(problem, candidates, now, estimate.selection,
-                                   [&](double ratio) { return truncated_weight(ratio, mu); });
+      const bool undecided =
+          update_weights(problem, candidates, now, estimate.selection,
+                         [&](double ratio) { return truncated_weight(ratio, mu); });
       if ((!undecided && mu > 1) || mu > kLastMu) break;
       if (!minimise_now(kStepsPerRound, kRoundTolerance)) return;
       now = fits();
     }
   }
-  weigh(problem, candidates, now, estimate.selection, hard_weight);
+  update_weights(problem, candidates, now, estimate.selection, hard_weight);
   minimise_now(options.solver.max_iterations, kRoundTolerance);
 }
 
@@ -164,8 +165,8 @@ void settle(const Problem& problem, NormalEquations& equations, double quantile,
   const std::vector<char> all(problem.edges.size(), 1);
   for (int round = 0; round < kMostCorrections; ++round) {
     const Selection before = estimate.selection;
-    weigh(problem, all, fits_of(problem, all, estimate.poses, quantile, control.threads),
-          estimate.selection, hard_weight);
+    update_weights(problem, all, fits_of(problem, all, estimate.poses, quantile, control.threads),
+                   estimate.selection, hard_weight);
     reject_unchecked(problem, control.options.gnc.min_bridge_confidence, estimate.selection);
     const bool same =
         estimate.selection.weights == before.weights && estimate.selection.modes == before.modes;

@@ -37,6 +37,7 @@ Estimate solve_plain(const Problem& problem, const std::vector<char>& known, Con
   out.selection = all_edges(problem);
   poses_from_paths(problem, known, std::vector<char>(problem.edges.size(), 0), out.selection.modes,
                    out.poses);
+  out.initial_cost = weighted_cost(problem, out.poses, out.selection, control.threads);
   const SolverOptions& solver = control.options.solver;
   NormalEquations equations(problem, control.threads);
   const MinimisationResult result =

@@ -13,10 +13,10 @@ namespace {
 /// From level to level, loops of sets smaller by this factor are admitted.
 constexpr int kLevelFactor = 4;
 /// A loop takes part in the levels with at least this probability.
-constexpr double kLeastBelief = 0.5;
+constexpr double kMinProbability = 0.5;
 
 /// Where at least this share of the loops agrees with others, and is accepted by a graduation from
-/// all of them, there is nothing that levels could improve.
+/// those, there is nothing that levels could improve.
 constexpr double kNearlyAll = 0.9;
 
 bool any(const std::vector<char>& flags) {
@@ -34,14 +34,15 @@ class GncSolver {
 
   Estimate run() {
     const std::vector<char> all(problem_.edges.size(), 1);
-    Estimate start =
-        from_paths(std::vector<char>(problem_.edges.size(), 0), all_edges(problem_).modes);
-    start.initial_cost = truncated_cost(problem_, start.poses, quantile_, control_.threads);
+    Estimate start = first_estimate(all_edges(problem_).modes);
     if (!control_.options.gnc.consensus) return settled(graduated(start, all, true));
     const Consensus consensus = find_consensus(problem_, quantile_, control_.threads);
     if (consensus.largest_cluster < 2) return without_consensus(start);
     if (nearly_all_agree(consensus)) {
-      Estimate direct = settled(graduated(start, all, true));
+      // Without the few others the system stays sparse; settle() takes those of them that fit.
+      std::vector<char> agreeing(problem_.edges.size(), 0);
+      for (int k = 0; k < problem_.edge_count(); ++k) agreeing[k] = consistent(consensus, k);
+      Estimate direct = settled(graduated(start, agreeing, true));
       if (direct.failed || control_.cancelled || keeps_nearly_all(direct)) return direct;
     }
     return settled(by_levels(start, consensus));
@@ -58,6 +59,25 @@ class GncSolver {
     return out;
   }
 
+  double cost_of(const Estimate& estimate) const {
+    return truncated_cost(problem_, estimate.poses, quantile_, control_.threads);
+  }
+
+  /// The given poses, unless paths from the anchor fit better: poses of a file may be placeholders.
+  Estimate first_estimate(const std::vector<int>& modes) {
+    const std::vector<char> none(problem_.edges.size(), 0);
+    Estimate given = from_paths(none, modes);
+    given.initial_cost = given.cost = cost_of(given);
+    if (!problem_.priors.empty() || !problem_.gravity.empty()) return given;
+    const std::vector<char> before = known_;
+    known_ = problem_.held;
+    Estimate paths = from_paths(none, modes);
+    paths.initial_cost = given.initial_cost;
+    if (cost_of(paths) < given.cost) return paths;
+    known_ = before;
+    return given;
+  }
+
   Estimate graduated(Estimate estimate, const std::vector<char>& candidates,
                      bool least_squares_first) {
     graduate(problem_, equations_, candidates, least_squares_first, quantile_, control_, estimate);
@@ -70,16 +90,16 @@ class GncSolver {
     return estimate;
   }
 
-  bool believed(const Consensus& consensus, int k) const {
+  bool consistent(const Consensus& consensus, int k) const {
     return !problem_.edges[k].odometry && consensus.cluster_size[k] >= 2 &&
-           consensus.belief[k] >= kLeastBelief;
+           consensus.probability[k] >= kMinProbability;
   }
 
   bool nearly_all_agree(const Consensus& consensus) const {
     int loops = 0, agree = 0;
     for (int k = 0; k < problem_.edge_count(); ++k) {
       loops += !problem_.edges[k].odometry;
-      agree += believed(consensus, k);
+      agree += consistent(consensus, k);
     }
     return agree >= kNearlyAll * loops;
   }
@@ -118,7 +138,8 @@ class GncSolver {
       std::vector<char> fresh(edges, 0);
       for (int k = 0; k < edges; ++k) {
         if (problem_.edges[k].odometry || seen[k]) continue;
-        const bool in = believed(consensus, k) && consensus.cluster_size[k] >= size / kLevelFactor;
+        const bool in =
+            consistent(consensus, k) && consensus.cluster_size[k] >= size / kLevelFactor;
         fresh[k] = in || last;
         seen[k] = fresh[k];
       }
@@ -159,7 +180,7 @@ class GncSolver {
   }
 
   const Problem& problem_;
-  const std::vector<char>& known_;
+  std::vector<char> known_;  ///< nodes whose pose is given
   Control& control_;
   double quantile_;
   NormalEquations equations_;

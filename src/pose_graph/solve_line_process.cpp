@@ -41,6 +41,7 @@ Estimate solve_line_process(const Problem& problem, const std::vector<char>& kno
   Selection& selection = out.selection;
   for (int k = 0; k < problem.edge_count(); ++k)
     if (problem.edges[k].odometry) selection.weights[k] = options.odometry_weight;
+  out.initial_cost = weighted_cost(problem, out.poses, selection, control.threads);
   const double mu =
       options.tau * (options.tau_not_squared ? 1 : options.tau) * mean_correspondences(problem);
   const auto minimise_now = [&](int iterations, double tolerance) {

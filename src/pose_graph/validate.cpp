@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "pose_graph/validate.hpp"
 
+#include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 #include <algorithm>
@@ -57,10 +58,14 @@ void require_information(const UnalignedMatrix6d& information, const std::string
                               std::to_string(column) + ") is " + shown(information(row, column)) +
                               ", its mirror " + shown(information(column, row)));
   const Eigen::Matrix<double, 6, 6> m = 0.5 * (information + information.transpose());
+  // A Cholesky factorisation is ten times as fast as eigenvalues, and nearly all matrices pass.
+  const Eigen::Matrix<double, 6, 6> shifted =
+      m + kEigenvalueTolerance * largest * Eigen::Matrix<double, 6, 6>::Identity();
+  if (shifted.llt().info() == Eigen::Success) return;
   const double smallest =
       Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, 6, 6>>(m, Eigen::EigenvaluesOnly)
           .eigenvalues()[0];
-  require(smallest >= -kEigenvalueTolerance * largest, name + ".smallest_eigenvalue", smallest,
+  require(false, name + ".smallest_eigenvalue", smallest,
           "an information matrix that is positive semi-definite");
 }
 

@@ -146,6 +146,19 @@ TEST(Gnc, ALoopThatNothingChecksIsTakenByItsConfidence) {
   }
 }
 
+TEST(Gnc, PlaceholdersForPosesDoNoHarm) {
+  World world = scans(20, 5, 5);
+  const std::size_t true_edges = world.graph.edges.size();
+  for (Node& node : world.graph.nodes) node.world_from_node = UnalignedIsometry3d::Identity();
+  const Result result = optimize(world.graph);
+  EXPECT_EQ(result.status, Status::converged) << result.reason;
+  // Every loop contradicts the placeholders; half a squared error of six degrees of freedom is
+  // left.
+  EXPECT_GT(result.initial_cost, 3 * result.final_cost);
+  for (Node& node : world.graph.nodes) node.world_from_node.reset();
+  EXPECT_LE(worst_difference(world, true_edges, result), 0.05);
+}
+
 TEST(Gnc, EveryEdgeHasAWeightAndASquaredError) {
   const World world = rounds(20, 2, 1, 9);
   const Result result = optimize(world.graph);
