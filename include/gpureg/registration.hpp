@@ -17,18 +17,18 @@
 /// The API of gpureg: prepare each cloud once, then align any pairs of them.
 namespace gpureg {
 
-/// Prepares a cloud for alignment: downsamples, estimates and orients normals, computes features
-/// (FPFH of one or two radii, or the features of the view), builds the search grid and draws depth
-/// maps from the viewpoints. Empty or degenerate data is no error: an empty cloud gives an empty
-/// PreparedCloud, and its alignments report too_few_source_points or too_few_target_points.
+/// Prepares a cloud for alignment: downsamples, builds search grids, estimates and orients normals,
+/// computes features, draws depth maps from the viewpoints and marks the sides of surfaces. The
+/// features are FPFH, optionally also of a second, wide radius, or those of the view. An empty
+/// cloud is no error: its alignments report too_few_source_points or too_few_target_points.
 /// Thread-safe.
 /// @param context backend that prepares and holds the cloud.
 /// @param cloud host memory, lengths in metres (or the unit of the options).
 /// @param options radii and voxel size.
 /// @return handle to the prepared cloud.
-/// @throws InvalidArgument for options or views out of range, for a cloud wider than 2^20 voxels or
-///   too dense for the radii, and for more than 20,000 points of which nearly all are isolated
-///   (millimetres with a voxel size in metres).
+/// @throws InvalidArgument for options or views out of range, and for points that do not fit the
+///   options: a cloud wider than 2^20 voxels or too dense for the radii, or more than 20,000 points
+///   of which nearly all are isolated (millimetres with a voxel size in metres).
 /// @throws DeviceError where the device fails.
 PreparedCloud prepare(const Context& context, const PointCloudView& cloud,
                       const PrepareOptions& options = {});
@@ -43,9 +43,15 @@ std::vector<PreparedCloud> prepare_batch(const Context& context,
                                          const PrepareOptions& options = {},
                                          const std::vector<std::string>& names = {});
 
-/// Finds target_from_source of two prepared clouds by options.method: second-order compatibility of
-/// matches, verified by evidence (modes then holds every distinct pose), or LoopSmart (Algorithm
-/// 1). Deterministic in clouds, options and seed. Thread-safe.
+/// Finds target_from_source of two prepared clouds by options.method. Thread-safe.
+///
+/// RegistrationMethod::compatibility returns modes, the distinct poses: those of the evidence.modes
+/// refined ones, and perturbed poses of the degeneracy search. RegistrationMethod::quadruples
+/// (LoopSmart, Algorithm 1) returns one pose and no modes.
+///
+/// The same clouds, options and seed give the same poses and evidence, bit for bit, on every
+/// backend and for any number of threads. Between machines the last digit of a confidence can
+/// differ with the C library.
 /// @param source cloud that the pose moves.
 /// @param target cloud that stays.
 /// @param options options.prepare is validated but not applied; each cloud keeps the options that
@@ -65,7 +71,8 @@ RegistrationResult align(const Context& context, const PreparedCloud& source,
                          const PreparedCloud& target, const RegistrationPrior& prior,
                          const RegistrationOptions& options = {});
 
-/// Prepares both clouds and aligns them. Prepare clouds of several pairs once instead.
+/// Prepares both clouds with options.prepare and aligns them. Prepare clouds of several pairs once
+/// instead.
 /// @throws InvalidArgument as prepare() and align() do.
 RegistrationResult align(const Context& context, const PointCloudView& source,
                          const PointCloudView& target, const RegistrationOptions& options = {});

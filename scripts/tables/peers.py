@@ -7,11 +7,16 @@ PEER_SCENES = {"peers_redkitchen.json": "red kitchen", "peers_house_a.json": "ho
 
 
 def peer_label(entry):
-    return (
-        f"{entry['label']} {entry['version']}"
-        if not entry["label"].startswith("gpureg")
-        else entry["label"]
-    )
+    """Name and version; a record names KISS-Matcher with its voxel size."""
+    label, version = entry["label"], entry["version"]
+    if label.startswith("gpureg"):
+        return label
+    if label == "SC2-PCR's scheme":
+        return "SC2-PCR, our NumPy version"
+    if label.startswith("KISS-Matcher, "):
+        program, voxel = label.split(", ")
+        return f"{program} {version}, voxel {voxel}"
+    return f"{label} {version}"
 
 
 def made_with(record):
