@@ -45,7 +45,7 @@ std::vector<PreparedCloud> prepare_batch(const Context& context,
 
 /// Finds target_from_source of two prepared clouds by options.method. Thread-safe.
 ///
-/// RegistrationMethod::compatibility returns modes, the distinct poses: those of the evidence.modes
+/// RegistrationMethod::compatibility returns the distinct poses in modes: up to evidence.modes
 /// refined ones, and perturbed poses of the degeneracy search. RegistrationMethod::quadruples
 /// (LoopSmart, Algorithm 1) returns one pose and no modes.
 ///
