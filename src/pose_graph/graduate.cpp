@@ -11,14 +11,14 @@ namespace gpureg::pose_graph {
 namespace {
 
 /// Steps per round: the weights of the next round matter more than the minimum of this one.
-constexpr int kStepsPerRound = 2;
+constexpr int kStepsPerRound = 1;
 constexpr double kRoundTolerance = 1e-3;
 /// Weights closer than this to 0 or 1 are so.
 constexpr double kBinary = 1e-3;
-/// Beyond this mu only loops within 6 % of their threshold are undecided, which settle() decides.
-constexpr double kLastMu = 16;
+/// Beyond this mu only loops within 12 % of their threshold are undecided, which settle() decides.
+constexpr double kLastMu = 8;
 /// Corrections of the accepted set at the end.
-constexpr int kMostCorrections = 10;
+constexpr int kMostCorrections = 6;
 
 /// The mode that fits best: squared error over threshold, or infinity where no mode may be
 /// accepted.

@@ -15,6 +15,8 @@ constexpr int kLevelFactor = 4;
 /// A loop takes part in the levels with at least this probability.
 constexpr double kMinProbability = 0.5;
 
+/// Sets of so many loops are hardly ever an alias of one place: they may enter all at once.
+constexpr int kLargeSet = 16;
 /// Where at least this share of the loops agrees with others, and is accepted by a graduation from
 /// those, there is nothing that levels could improve.
 constexpr double kNearlyAll = 0.9;
@@ -39,10 +41,12 @@ class GncSolver {
     const Consensus consensus = find_consensus(problem_, quantile_, control_.threads);
     if (consensus.largest_cluster < 2) return without_consensus(start);
     if (nearly_all_agree(consensus)) {
-      // Without the few others the system stays sparse; settle() takes those of them that fit.
+      // Without the few others the system stays sparse; then those that drift explains enter.
       std::vector<char> agreeing(problem_.edges.size(), 0);
-      for (int k = 0; k < problem_.edge_count(); ++k) agreeing[k] = consistent(consensus, k);
-      Estimate direct = settled(graduated(start, agreeing, true));
+      for (int k = 0; k < problem_.edge_count(); ++k) agreeing[k] = in_large_set(consensus, k);
+      Estimate direct = graduated(start, agreeing, true);
+      if (!direct.failed && !control_.cancelled)
+        direct = settled(graduated(direct, explained(direct, all), false));
       if (direct.failed || control_.cancelled || keeps_nearly_all(direct)) return direct;
     }
     return settled(by_levels(start, consensus));
@@ -95,11 +99,15 @@ class GncSolver {
            consensus.probability[k] >= kMinProbability;
   }
 
+  bool in_large_set(const Consensus& consensus, int k) const {
+    return consistent(consensus, k) && consensus.cluster_size[k] >= kLargeSet;
+  }
+
   bool nearly_all_agree(const Consensus& consensus) const {
     int loops = 0, agree = 0;
     for (int k = 0; k < problem_.edge_count(); ++k) {
       loops += !problem_.edges[k].odometry;
-      agree += consistent(consensus, k);
+      agree += in_large_set(consensus, k);
     }
     return agree >= kNearlyAll * loops;
   }
@@ -147,7 +155,9 @@ class GncSolver {
         estimate = restarted(std::move(estimate), fresh, consensus.modes);
         if (!first) fresh = explained(estimate, fresh);
         for (int k = 0; k < edges; ++k) admitted[k] = admitted[k] || fresh[k];
-        if (first || any(fresh)) estimate = graduated(std::move(estimate), admitted, true);
+        // Least squares is a good start while nearly all loops are correct. Among later ones may be
+        // false ones that agree with each other, and the estimate is a better start.
+        if (first || any(fresh)) estimate = graduated(std::move(estimate), admitted, first);
         first = false;
         if (estimate.failed || control_.cancelled) return estimate;
       }
