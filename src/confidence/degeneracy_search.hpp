@@ -11,8 +11,8 @@ namespace gpureg::confidence {
 /// one by all of it, and one with log odds below -5 not at all. Takes about 50 us per pair,
 /// distributed over at most `threads` threads.
 std::vector<PosesOfPair> search_degeneracies(Span<const PairInput> pairs,
-                                                Span<const PairOutcome> outcomes,
-                                                const RegistrationOptions& options,
-                                                std::size_t threads);
+                                             Span<const PairOutcome> outcomes,
+                                             const RegistrationOptions& options,
+                                             std::size_t threads);
 
 }  // namespace gpureg::confidence

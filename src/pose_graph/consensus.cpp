@@ -15,10 +15,10 @@ namespace {
 
 /// Odometry edges at either side of a cycle. Drift makes longer cycles say less.
 constexpr int kSteps = 4;
-/// Agreements after which a mode is not compared any more, and triangles tried per edge: bounds the
-/// work on dense graphs.
-constexpr int kMostAgreements = 8;
-constexpr int kMostTriangles = 64;
+/// Closed cycles after which a mode is not compared any more, and triangles tried per edge: bounds
+/// the work on dense graphs.
+constexpr int kMaxClosedCycles = 8;
+constexpr int kMaxTriangles = 64;
 /// Log of the largest density ratio that one cycle may contribute: covariances are never as exact
 /// as small ones pretend.
 constexpr double kMostEvidence = 5;
@@ -97,7 +97,7 @@ class Cycles {
     for (std::size_t k = 0; k < near_target.size(); ++k)
       reach[near_target[k].node] = static_cast<int>(k);
     for (const Neighbour& at : near_source) {
-      if (static_cast<int>(out.size()) >= kMostAgreements) break;
+      if (static_cast<int>(out.size()) >= kMaxClosedCycles) break;
       for (const Link& link : links_[at.node]) {
         if (reach[link.other] < 0 || candidates_[link.candidate].edge == mine.edge) continue;
         const Neighbour& to = near_target[reach[link.other]];
@@ -106,7 +106,7 @@ class Cycles {
       }
     }
     for (const Neighbour& at : near_target) reach[at.node] = -1;
-    if (static_cast<int>(out.size()) < kMostAgreements) triangles(mine, edge, out);
+    if (static_cast<int>(out.size()) < kMaxClosedCycles) triangles(mine, edge, out);
     return out;
   }
 
@@ -174,7 +174,7 @@ class Cycles {
     for (const Link& first : to_source) {
       while (next < to_target.size() && to_target[next].other < first.other) ++next;
       for (std::size_t k = next; k < to_target.size() && to_target[k].other == first.other; ++k) {
-        if (++tried > kMostTriangles || static_cast<int>(out.size()) >= kMostAgreements) return;
+        if (++tried > kMaxTriangles || static_cast<int>(out.size()) >= kMaxClosedCycles) return;
         const UncertainPose third_from_target = seen(to_target[k]);
         if (const double e = evidence(mine, third_from_target.inverse(), seen(first), {}))
           out.push_back({{first.candidate, to_target[k].candidate}, e});
