@@ -70,15 +70,15 @@ class Score : public ::testing::Test {
 TEST_F(Score, SupportIsTheExhaustiveOne) {
   for (const float angle : {30.0f, 90.0f, 180.0f})
     for (const float distance : {0.075f, 0.04f}) {
-      RegistrationOptions options;
-      options.quadruples.max_normal_angle = angle;
-      options.prepare.max_correspondence_distance = distance;
+      RegistrationOptions registration;
+      registration.quadruples.max_normal_angle = angle;
+      registration.prepare.max_correspondence_distance = distance;
       const InlierTest test = inlier_test(distance, angle);
       for (int k = 0; k < 40; ++k) {
         const Rigid pose =
             to_rigid(random_pose(random, k % 2 ? 0.02f : 1.0f, k % 2 ? 0.02f : 0.3f));
         const Support expected = exhaustive_support(*a, *b, pose, test);
-        const Support found = measure_support(a->view(), b->view(), pose, options);
+        const Support found = measure_support(a->view(), b->view(), pose, registration);
         EXPECT_EQ(found.inliers, expected.inliers);
         EXPECT_EQ(found.residual, expected.residual);
       }
@@ -120,9 +120,9 @@ TEST_F(Score, BoundsNeverLie) {
 TEST_F(Score, BestIsTheBestOfAllByTheTotalOrder) {
   for (const float angle : {30.0f, 180.0f})
     for (const float distance : {0.075f, 0.05f}) {
-      RegistrationOptions options;
-      options.quadruples.max_normal_angle = angle;
-      options.prepare.max_correspondence_distance = distance;
+      RegistrationOptions registration;
+      registration.quadruples.max_normal_angle = angle;
+      registration.prepare.max_correspondence_distance = distance;
       std::vector<Hypotheses> hypotheses(1);
       for (std::uint32_t k = 0; k < 700; ++k) {
         hypotheses[0].id.push_back(3 * k);
@@ -133,14 +133,14 @@ TEST_F(Score, BestIsTheBestOfAllByTheTotalOrder) {
       const PairView pair = test::pair_view(*a, *b);
       Support best{0, 0, 0};
       for (std::size_t k = 0; k < 700; ++k) {
-        Support s =
-            measure_support(pair.source, pair.target, to_rigid(hypotheses[0].pose[k]), options);
+        Support s = measure_support(pair.source, pair.target, to_rigid(hypotheses[0].pose[k]),
+                                    registration);
         s.hypothesis = hypotheses[0].id[k];
         if (k == 0 || better(s, best)) best = s;
       }
       for (const unsigned threads : {1u, 2u, 7u}) {
         Exec pool(threads);
-        const BestPose found = score_hypotheses(pool, {&pair, 1}, hypotheses, options)[0];
+        const BestPose found = score_hypotheses(pool, {&pair, 1}, hypotheses, registration)[0];
         ASSERT_TRUE(found.found);
         EXPECT_EQ(found.support.inliers, best.inliers);
         EXPECT_EQ(found.support.residual, best.residual);
