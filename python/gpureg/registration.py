@@ -238,7 +238,7 @@ def register(
     quality : int, optional
         From 0, the fastest, to 10, the highest recall. Default: 5.
     seed : int, optional
-        Same seed, same bits, on any machine.
+        Same seed, same bits, for any threads and backend.
     prior : RegistrationPrior, optional
         What is known of the pose, in the frames of source and target; see `align`.
     options : RegistrationOptions, optional

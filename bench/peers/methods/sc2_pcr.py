@@ -71,7 +71,7 @@ class SecondOrder:
             voxel_size=0.0,
             normal_radius=2 * VOXEL,
             feature_radius=5 * VOXEL,
-            search_distance=1.5 * VOXEL,
+            max_correspondence_distance=1.5 * VOXEL,
             wide_feature_radius=0.0,
             depth_maps=0,
         )
