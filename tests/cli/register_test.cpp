@@ -134,7 +134,7 @@ TEST_F(Register, VerifiesPosesOfAFile) {
   EXPECT_LT(verified["modes"][1]["confidence"], 0.1);
   EXPECT_EQ(align({"--initial", poses, "--refine-initial", "--ignore-alternatives"}).status, 0);
 
-  const auto refused = [&](const std::string& content, const std::vector<std::string>& words) {
+  const auto refused = [&](const std::string& content, std::initializer_list<std::string> words) {
     std::ofstream(poses) << content;
     expect_refused(joined({"register", source_, target_, "--initial", poses}, kSmall), words);
   };
