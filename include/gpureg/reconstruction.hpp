@@ -5,7 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <functional>
-#include <optional>
+#include <unordered_map>
 #include <vector>
 
 #include "gpureg/loop_consistency.hpp"
@@ -195,5 +195,43 @@ struct RefineReport {
 /// Sources: Chen and Medioni 1992 (point-to-plane); Neugebauer 1997 (all scans together).
 RefineReport refine(const std::vector<Surface>& surfaces, Reconstruction& map,
                     const RefineOptions& options = {});
+
+/// Averages the points of scans per voxel, one scan at a time: memory grows with the surface of the
+/// map, not with the number of points. Not thread-safe.
+class VoxelMap {
+ public:
+  /// @throws InvalidArgument unless voxel_size is finite and > 0.
+  explicit VoxelMap(float voxel_size);
+
+  /// Adds the finite points of a scan, moved by map_from_scan; normals where the view has them.
+  /// @throws InvalidArgument as PointCloudView::validate(), and for a pose that is not finite.
+  void add(const PointCloudView& scan, const UnalignedIsometry3d& map_from_scan);
+
+  std::size_t size() const { return cells_.size(); }  ///< number of voxels
+
+  /// @return the mean of each voxel, ordered by voxel, with mean normals where any scan had some
+  ///   ((0,0,0) where they cancel out). The order of the scans changes rounding only.
+  PointCloud cloud() const;
+
+ private:
+  struct Cell {
+    Eigen::Vector3d point = Eigen::Vector3d::Zero(), normal = Eigen::Vector3d::Zero();
+    std::uint64_t count = 0;
+  };
+  struct Key {
+    std::int64_t x, y, z;
+    bool operator==(const Key& o) const { return x == o.x && y == o.y && z == o.z; }
+    bool operator<(const Key& o) const {
+      return x != o.x ? x < o.x : y != o.y ? y < o.y : z < o.z;
+    }
+  };
+  struct Hash {
+    std::size_t operator()(const Key& key) const;
+  };
+
+  double voxel_size_;
+  bool has_normals_ = false;
+  std::unordered_map<Key, Cell, Hash> cells_;
+};
 
 }  // namespace gpureg::reconstruction
