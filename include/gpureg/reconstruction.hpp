@@ -153,9 +153,9 @@ struct RefineOptions {
   /// Width of the Geman-McClure kernel on the point-to-plane distance in the last iterations,
   /// metres, > 0; it shrinks with the distance.
   double kernel_width = 0.02;
-  int iterations = 16;  ///< >= 1
+  int iterations = 10;  ///< >= 1
   /// Points of a scan that look for correspondences in one other scan, evenly chosen, >= 16.
-  std::uint32_t max_points = 4000;
+  std::uint32_t max_points = 1500;
   /// Points within initial_distance of the other scan from which two scans overlap, >= 1.
   std::uint32_t min_overlap = 100;
   /// Standard deviation of a point-to-plane distance, metres, > 0, and the number of neighbouring

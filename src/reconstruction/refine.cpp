@@ -25,7 +25,7 @@ constexpr double kShrinkingShare = 0.6;
 /// Levenberg-Marquardt damping, relative to the diagonal: enough for directions that nothing holds.
 constexpr double kDamping = 1e-6;
 /// Steps below this, in radians and metres, end the refinement.
-constexpr double kSmallestStep = 1e-5;
+constexpr double kSmallestStep = 1e-4;
 /// Squared error of an edge at which it counts half: the mean of the chi-square distribution with 6
 /// degrees of freedom.
 constexpr double kEdgeKernel = 6;
