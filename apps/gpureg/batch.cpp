@@ -140,8 +140,7 @@ class Batch {
   int say_interrupted() const {
     std::string kept;
     for (const std::string& path : kept_) kept += (kept.empty() ? "" : ", ") + path;
-    std::cerr << "gpureg: interrupted, " << run_->done().size() << " of "
-              << run_->pairs().size()
+    std::cerr << "gpureg: interrupted, " << run_->done().size() << " of " << run_->pairs().size()
               << " pairs are done and written"
               << (kept.empty() ? "" : " to the journal, " + kept + " left as before")
               << "; go on with the same command and --resume" << std::endl;
@@ -155,8 +154,9 @@ class Batch {
                   << "\n";
       std::cout << "fragments  " << scene_.numbers.size() << ", prepared in "
                 << fixed(scene_.seconds, 2) << " s\n"
-                << "pairs      " << run_->pairs().size() << ", in " << fixed(run_->seconds(), 2) << " s ("
-                << significant(run_->rate(), 3) << " pairs/s, " << context_.description() << ")\n"
+                << "pairs      " << run_->pairs().size() << ", in " << fixed(run_->seconds(), 2)
+                << " s (" << significant(run_->rate(), 3) << " pairs/s, " << context_.description()
+                << ")\n"
                 << "aligned    " << aligned_ << ", written to " << o_.log << "\n";
       for (const auto& [reason, count] : reasons_)
         std::cout << "not        " << count << ", " << reason << "\n";

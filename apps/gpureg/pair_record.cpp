@@ -113,7 +113,8 @@ std::vector<RegistrationMode> modes_from_json(const Json& pair) {
     RegistrationMode mode;
     mode.target_from_source.matrix() = square<4>(member(json, "T_ij"), "T_ij");
     mode.confidence = number(member(json, "confidence"), "confidence");
-    if (const auto evidence = json.find("evidence"); evidence != json.end() && evidence->is_object()) {
+    if (const auto evidence = json.find("evidence");
+        evidence != json.end() && evidence->is_object()) {
       mode.evidence.information_eigenvalues = six(*evidence, "information_eigenvalues");
       mode.evidence.weakest_direction = six(*evidence, "weakest_direction");
     }
@@ -133,7 +134,8 @@ RegistrationResult result_from_record(const PairRecord& record, const Json& info
   if (result.has_candidate) result.target_from_source.matrix() = *record.transform;
   result.score = record.score;
   result.modes = modes_from_json(record.json);
-  if (!information.is_null()) result.source_moments = moments_of(information_from_json(information));
+  if (!information.is_null())
+    result.source_moments = moments_of(information_from_json(information));
   return result;
 }
 

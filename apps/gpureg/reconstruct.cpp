@@ -4,6 +4,7 @@
 #include <chrono>
 #include <filesystem>
 #include <iostream>
+#include <map>
 #include <memory>
 #include <optional>
 #include <string>
@@ -31,8 +32,8 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr const char* kJournal = "pairs.journal";
-constexpr const char* kOutputs[] = {"poses.txt",  "trajectory.txt", "edges.log",
-                                    "graph.g2o",  "map.ply",        "pairs.json",
+constexpr const char* kOutputs[] = {"poses.txt",          "trajectory.txt", "edges.log",
+                                    "graph.g2o",          "map.ply",        "pairs.json",
                                     "reconstruction.json"};
 
 struct ReconstructOptions {
@@ -108,15 +109,13 @@ class Reconstruct {
     check_voxel_size(options_.prepare.voxel_size, scene_.extent, "the largest fragment");
     Pairs pairs = choose_pairs(scene_, o_.pairs, o_.quiet);
     if (pairs.empty())
-      throw InvalidArgument(o_.pairs == "all"
-                                ? o_.folder + " holds one fragment; a map needs two"
-                                : o_.pairs + " lists no pair");
+      throw InvalidArgument(o_.pairs == "all" ? o_.folder + " holds one fragment; a map needs two"
+                                              : o_.pairs + " lists no pair");
     run_.emplace(scene_, std::move(pairs), options_, o_.journal(), o_.journal_mode(), o_.quiet);
     run_->align(context_);
     if (!run_->complete()) return false;
     for (const auto& [i, j] : run_->pairs()) {
-      const Journal::Entry& entry =
-          run_->done().at({scene_.numbers[i], scene_.numbers[j]});
+      const Journal::Entry& entry = run_->done().at({scene_.numbers[i], scene_.numbers[j]});
       records_.push_back(entry.pair);
       information_.push_back(entry.information);
     }
@@ -189,8 +188,9 @@ class Reconstruct {
 
   /// Points of half the voxel size, with normals. Features are of no use here: one constant per
   /// point takes their place.
-  reconstruction::Surface surface_of(const std::string& file) const {
-    const PointCloud cloud = io::read_point_cloud(file);
+  reconstruction::Surface surface_of(int number, const std::string& file) const {
+    PointCloud cloud = io::read_point_cloud(file);
+    cloud.viewpoints = viewpoints_of(number);
     const std::vector<float> no_features(cloud.points.size(), 0);
     PointCloudView view = cloud.view();
     view.features = no_features.data();
@@ -199,24 +199,30 @@ class Reconstruct {
     prepare.voxel_size /= 2;
     prepare.depth_maps = 0;
     prepare.surface_side_distance = 0;
-    const PreparedCloud prepared = prepare_cloud(view, prepare);
-    return {prepared.points(), prepared.normals()};
+    const PreparedCloud prepared = gpureg::prepare(context_, view, prepare);
+    return {prepared.points(), prepared.normals(), viewpoints_of(number)};
   }
-  PreparedCloud prepare_cloud(const PointCloudView& view, const PrepareOptions& prepare) const {
-    return gpureg::prepare(context_, view, prepare);
+  std::vector<Eigen::Vector3f> viewpoints_of(int number) const {
+    const auto found = cameras_.find(number);
+    return found == cameras_.end() ? std::vector<Eigen::Vector3f>() : found->second;
   }
 
   /// false: interrupted.
   bool refine() {
     const Clock::time_point start = Clock::now();
     std::vector<reconstruction::Surface> surfaces(scene_.numbers.size());
+    const std::string cameras = (fs::path(o_.folder) / "cameras.txt").string();
+    if (fs::exists(cameras)) cameras_ = io::read_cameras(cameras);
     Progress progress("preparing finer", "fragments", surfaces.size(), o_.quiet);
     for (std::size_t k = 0; k < surfaces.size(); ++k) {
       if (InterruptGuard::requested()) return false;
-      if (map_.scans[k].placed) surfaces[k] = surface_of(scene_.files[k]);
+      if (map_.scans[k].placed) surfaces[k] = surface_of(scene_.numbers[k], scene_.files[k]);
       progress.update(k + 1);
     }
     auto options = reconstruction::RefineOptions::from_voxel_size(options_.prepare.voxel_size);
+    // Depth cameras: beyond, their noise grows with the square of the range.
+    constexpr double kNoiseRangeVoxels = 30;
+    options.noise_range = kNoiseRangeVoxels * o_.method.voxel_size;
     options.threads = static_cast<int>(o_.method.threads);
     Progress iterations("refining", "iterations", static_cast<std::size_t>(options.iterations),
                         o_.quiet);
@@ -350,6 +356,7 @@ class Reconstruct {
       json["refinement"] = {{"pairs", refined_->pairs},
                             {"correspondences", refined_->correspondences},
                             {"iterations", refined_->iterations},
+                            {"rejected_edges", refined_->rejected_edges},
                             {"initial_rmse", refined_->initial_rmse},
                             {"final_rmse", refined_->final_rmse}};
     json["islands"] = Json::array();
@@ -429,7 +436,8 @@ class Reconstruct {
   RegistrationOptions options_;
   Context context_;
   Scene scene_;
-  std::optional<PairRun> run_;  // none: the results come from a file
+  std::optional<PairRun> run_;                           // none: the results come from a file
+  std::map<int, std::vector<Eigen::Vector3f>> cameras_;  // of each fragment
   std::vector<PairRecord> records_;
   std::vector<Json> information_;  // of each record; null: not known
   reconstruction::Reconstruction map_;
@@ -452,17 +460,18 @@ void add_reconstruct(CLI::App& app, Action& chosen) {
       ->required();
   verb->add_option("--pairs", o->pairs, "all, or a file with one pair `i j` a line")
       ->capture_default_str();
-  CLI::Option* results = verb->add_option(
-      "--results", o->results, "JSON of `gpureg batch`, or pairs.json of a map, instead of aligning");
+  CLI::Option* results =
+      verb->add_option("--results", o->results,
+                       "JSON of `gpureg batch`, or pairs.json of a map, instead of aligning");
   o->method.add_to(*verb);
   verb->add_flag("--no-refine", o->no_refine, "Without the joint refinement of all poses");
   verb->add_flag("--no-map", o->no_map, "Without map.ply");
   verb->add_option("--map-voxel-size", o->map_voxel_size,
                    "Voxel size of map.ply; default: half the voxel size")
       ->check(CLI::PositiveNumber);
-  CLI::Option* resume = verb->add_flag("--resume", o->resume,
-                                       "Go on where an interrupted run of this output stopped")
-                            ->excludes(results);
+  CLI::Option* resume =
+      verb->add_flag("--resume", o->resume, "Go on where an interrupted run of this output stopped")
+          ->excludes(results);
   verb->add_flag("--restart", o->restart, "Discard what an interrupted run of this output did")
       ->excludes(resume)
       ->excludes(results);

@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <limits>
 #include <unordered_map>
 #include <vector>
 
@@ -42,7 +43,7 @@ struct Options {
   /// Probability from which the connection between two parts of the map counts, (0, 1]: that one of
   /// the accepted edges between them is correct, in view of the rejected ones.
   double min_connection_confidence = 0.9;
-  std::uint32_t modes = 4;  ///< number of modes of a pair that take part, 1..16
+  std::uint32_t modes = 4;       ///< number of modes of a pair that take part, 1..16
   std::uint32_t min_island = 2;  ///< scans of an island, >= 2; smaller ones are left out
   int threads = 0;               ///< 0: one per core. Results do not depend on it.
 
@@ -70,9 +71,9 @@ const char* describe(ScanReason reason);
 
 /// Why an edge is rejected.
 enum class EdgeReason {
-  none,         ///< accepted
-  inconsistent, ///< contradicts the map that the other edges make
-  unconfirmed   ///< the only connections between two parts, and not confident enough together
+  none,          ///< accepted
+  inconsistent,  ///< contradicts the map that the other edges make
+  unconfirmed    ///< the only connections between two parts, and not confident enough together
 };
 const char* to_string(EdgeReason reason);
 
@@ -97,6 +98,8 @@ struct Edge {
   std::size_t pair = 0;                  ///< index into the pairs given
   std::uint32_t mode = 0;                ///< index into RegistrationResult::modes
   UnalignedIsometry3d target_from_source = UnalignedIsometry3d::Identity();
+  /// Centre of the overlap in the source's frame; the origin where it is not known.
+  Eigen::Vector3d overlap_centre = Eigen::Vector3d::Zero();
   double confidence = 0;  ///< of this mode, after loop consistency
   double weight = 0;      ///< in the pose graph, [0, 1]
   bool accepted = false;
@@ -113,8 +116,8 @@ struct Island {
 /// A map: a plain value.
 struct Reconstruction {
   pose_graph::Status status = pose_graph::Status::no_nodes;  ///< of the last optimisation
-  std::vector<Scan> scans;      ///< in their order
-  std::vector<Edge> edges;      ///< in the order of the pairs
+  std::vector<Scan> scans;                                   ///< in their order
+  std::vector<Edge> edges;                                   ///< in the order of the pairs
   std::vector<Island> islands;  ///< the largest first, then by smallest scan
 
   std::size_t placed() const;  ///< number of placed scans
@@ -142,6 +145,8 @@ pose_graph::Graph graph_of(const Reconstruction& map, const std::vector<std::int
 struct Surface {
   std::vector<Eigen::Vector3f> points;
   std::vector<Eigen::Vector3f> normals;  ///< one per point, unit length; (0,0,0): not used
+  /// Sensor positions in the scan's frame, for RefineOptions::noise_range; may be empty.
+  std::vector<Eigen::Vector3f> viewpoints = {};
 };
 
 /// Options of refine(). The lengths are for voxels of 5 cm.
@@ -154,6 +159,9 @@ struct RefineOptions {
   /// metres, > 0; it shrinks with the distance.
   double kernel_width = 0.02;
   int iterations = 10;  ///< >= 1
+  /// Distance between the measured and the refined pose at the centre of the overlap from which an
+  /// edge is rejected in the end, metres, > 0; edges that alone connect two parts stay.
+  double max_edge_error = 0.2;
   /// Points of a scan that look for correspondences in one other scan, evenly chosen, >= 16.
   std::uint32_t max_points = 1500;
   /// Points within initial_distance of the other scan from which two scans overlap, >= 1.
@@ -162,6 +170,9 @@ struct RefineOptions {
   /// points whose errors count as one, >= 1: how much surfaces weigh beside the edges.
   double point_noise = 0.01;
   double correlated_points = 20;
+  /// Range from which the noise of a point grows with the square of its distance to the closest
+  /// viewpoint, as that of depth cameras, metres, > 0; infinity: it does not grow.
+  double noise_range = std::numeric_limits<double>::infinity();
   int threads = 0;  ///< 0: one per core. Results do not depend on it.
   /// Called before every iteration with its number; true ends the refinement. May be empty.
   std::function<bool(int)> should_stop;
@@ -181,6 +192,7 @@ struct RefineReport {
   /// RMS point-to-plane distance of correspondences within final_distance, metres.
   double initial_rmse = 0, final_rmse = 0;
   int iterations = 0;
+  std::size_t rejected_edges = 0;  ///< by max_edge_error
   bool solved = true;  ///< false: a linear system could not be solved; poses stay as they were
 };
 
@@ -221,9 +233,7 @@ class VoxelMap {
   struct Key {
     std::int64_t x, y, z;
     bool operator==(const Key& o) const { return x == o.x && y == o.y && z == o.z; }
-    bool operator<(const Key& o) const {
-      return x != o.x ? x < o.x : y != o.y ? y < o.y : z < o.z;
-    }
+    bool operator<(const Key& o) const { return x != o.x ? x < o.x : y != o.y ? y < o.y : z < o.z; }
   };
   struct Hash {
     std::size_t operator()(const Key& key) const;

@@ -59,6 +59,35 @@ std::vector<std::uint32_t> certain_parts(std::size_t scans, const std::vector<Ed
   return part;
 }
 
+std::size_t reject_deviating(Reconstruction& map, double max_error) {
+  std::vector<std::pair<double, std::size_t>> deviating;
+  for (std::size_t k = 0; k < map.edges.size(); ++k) {
+    const Edge& edge = map.edges[k];
+    if (!edge.accepted || !map.scans[edge.source].placed) continue;
+    const Eigen::Vector3d measured =
+        map.scans[edge.target].island_from_scan * (edge.target_from_source * edge.overlap_centre);
+    const Eigen::Vector3d refined = map.scans[edge.source].island_from_scan * edge.overlap_centre;
+    const double error = (measured - refined).norm();
+    if (error > max_error) deviating.emplace_back(-error, k);
+  }
+  std::sort(deviating.begin(), deviating.end());
+  std::size_t rejected = 0;
+  for (const auto& [minus_error, candidate] : deviating) {
+    std::vector<std::uint32_t> parent(map.scans.size());
+    std::iota(parent.begin(), parent.end(), 0u);
+    for (std::size_t k = 0; k < map.edges.size(); ++k)
+      if (map.edges[k].accepted && k != candidate)
+        parent[find(parent, map.edges[k].source)] = find(parent, map.edges[k].target);
+    Edge& edge = map.edges[candidate];
+    if (find(parent, edge.source) != find(parent, edge.target)) continue;
+    edge.accepted = false;
+    edge.weight = 0;
+    edge.reason = EdgeReason::inconsistent;
+    ++rejected;
+  }
+  return rejected;
+}
+
 void set_confidence(Reconstruction& map) {
   struct Neighbor {
     std::uint32_t scan;

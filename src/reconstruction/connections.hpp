@@ -14,6 +14,11 @@ namespace gpureg::reconstruction {
 std::vector<std::uint32_t> certain_parts(std::size_t scans, const std::vector<Edge>& edges,
                                          double min_confidence);
 
+/// Rejects accepted edges whose pose is farther from that of the map than max_error at the centre
+/// of the overlap, the farthest first, as long as other accepted edges connect their scans.
+/// @return number of edges rejected.
+std::size_t reject_deviating(Reconstruction& map, double max_error);
+
 /// Scan::confidence of the placed scans.
 void set_confidence(Reconstruction& map);
 

@@ -34,7 +34,8 @@ Matrix6d covariance_at_centre(const PoseEvidence& evidence, const EdgeNoiseOptio
   // Only one direction is known: where a second one is weak as well, all directions count less.
   covariance *= inflation(eigenvalues[1], typical, most);
   Vector6d direction;
-  for (int k = 0; k < 6; ++k) direction[k] = evidence.weakest_direction[static_cast<std::size_t>(k)];
+  for (int k = 0; k < 6; ++k)
+    direction[k] = evidence.weakest_direction[static_cast<std::size_t>(k)];
   direction.tail<3>() *= unit;
   // The eigenvector is of unit length in radians and units; the noise refers to metres of it.
   const double extra =

@@ -56,6 +56,7 @@ RefineOptions RefineOptions::from_voxel_size(float voxel_size) {
   options.final_distance *= scale;
   options.kernel_width *= scale;
   options.point_noise *= scale;
+  options.max_edge_error *= scale;
   return options;
 }
 
@@ -67,11 +68,13 @@ void RefineOptions::validate() const {
           "(0, 90]");
   require(positive(kernel_width), "kernel_width", kernel_width, "a finite number > 0");
   require(iterations >= 1, "iterations", iterations, "1 or more");
+  require(positive(max_edge_error), "max_edge_error", max_edge_error, "a finite number > 0");
   require(max_points >= 16, "max_points", max_points, "16 or more");
   require(min_overlap >= 1, "min_overlap", min_overlap, "1 or more");
   require(positive(point_noise), "point_noise", point_noise, "a finite number > 0");
   require(std::isfinite(correlated_points) && correlated_points >= 1, "correlated_points",
           correlated_points, "a finite number >= 1");
+  require(noise_range > 0, "noise_range", noise_range, "a number > 0");
   require(threads >= 0, "threads", threads, "0 or more");
 }
 

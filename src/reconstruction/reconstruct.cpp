@@ -73,16 +73,16 @@ std::vector<Candidate> candidates_of(const std::vector<RegistrationMode>& modes,
 /// The graph of the pairs that are confident enough.
 struct PairGraph {
   pose_graph::Graph graph;
-  std::vector<std::size_t> pairs;                   ///< of each edge
-  std::vector<std::vector<Candidate>> candidates;   ///< of each edge
+  std::vector<std::size_t> pairs;                  ///< of each edge
+  std::vector<Eigen::Vector3d> centres;            ///< of the overlap of each edge
+  std::vector<std::vector<Candidate>> candidates;  ///< of each edge
 };
 
 PairGraph graph_of_pairs(std::size_t scans, const std::vector<Pair>& pairs,
                          const std::vector<RegistrationResult>& results,
                          const std::vector<PairConsistency>& consistency, const Options& options) {
   PairGraph out;
-  for (std::size_t k = 0; k < scans; ++k)
-    out.graph.nodes.push_back({static_cast<std::int64_t>(k)});
+  for (std::size_t k = 0; k < scans; ++k) out.graph.nodes.push_back({static_cast<std::int64_t>(k)});
   for (std::size_t k = 0; k < pairs.size(); ++k) {
     if (!results[k].has_candidate || consistency[k].confidence < options.min_edge_confidence)
       continue;
@@ -104,6 +104,7 @@ PairGraph graph_of_pairs(std::size_t scans, const std::vector<Pair>& pairs,
                                    information(candidates[m]), candidates[m].confidence});
     out.graph.edges.push_back(std::move(edge));
     out.pairs.push_back(k);
+    out.centres.push_back(centre);
     out.candidates.push_back(candidates);
   }
   return out;
@@ -116,6 +117,7 @@ Edge edge_of(const PairGraph& pairs, std::size_t k, const pose_graph::EdgeResult
   edge.source = static_cast<std::uint32_t>(given.source);
   edge.target = static_cast<std::uint32_t>(given.target);
   edge.pair = pairs.pairs[k];
+  edge.overlap_centre = pairs.centres[k];
   edge.mode = pairs.candidates[k][result.mode].mode;
   edge.confidence = pairs.candidates[k][result.mode].confidence;
   const bool first = result.mode == 0;
@@ -219,8 +221,8 @@ void explain(const std::vector<Pair>& pairs, const std::vector<RegistrationResul
       ++tried[scan];
       too_few[scan] += too_few_points(results[k].reason, source);
       if (!map.scans[scan].placed)
-        map.scans[scan].confidence = std::max(map.scans[scan].confidence,
-                                              consistency[k].confidence);
+        map.scans[scan].confidence =
+            std::max(map.scans[scan].confidence, consistency[k].confidence);
     }
   }
   std::vector<char> accepted(map.scans.size(), 0), rejected(accepted), unconfirmed(accepted);

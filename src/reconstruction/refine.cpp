@@ -11,6 +11,7 @@
 #include "pose_graph/block_cholesky.hpp"
 #include "pose_graph/normal_equations.hpp"
 #include "pose_graph/parallel.hpp"
+#include "reconstruction/connections.hpp"
 #include "reconstruction/surface_pairs.hpp"
 
 namespace gpureg::reconstruction {
@@ -82,11 +83,13 @@ class Refiner {
         threads_(pose_graph::thread_count(options.threads)),
         system_(surfaces.size(), map),
         poses_(surfaces.size()),
-        spheres_(surfaces.size()) {
+        spheres_(surfaces.size()),
+        variances_(surfaces.size()) {
     for (std::size_t k = 0; k < surfaces.size(); ++k) {
       if (!map.scans[k].placed) continue;
       poses_[k] = pose_of(map.scans[k].island_from_scan);
       spheres_[k] = sphere_of(surfaces[k]);
+      variances_[k] = relative_variances(surfaces[k], options.noise_range);
     }
   }
 
@@ -156,8 +159,8 @@ class Refiner {
       for (int k = begin; k < end; ++k) {
         const auto [i, j] = pairs_[static_cast<std::size_t>(k)];
         SurfaceSums& sums = sums_[static_cast<std::size_t>(k)];
-        sums = surface_sums(surfaces_[i], *grids[j], surfaces_[j], poses_[j].inverse() * poses_[i],
-                            association);
+        sums = surface_sums(surfaces_[i], variances_[i], *grids[j], surfaces_[j], variances_[j],
+                            poses_[j].inverse() * poses_[i], association);
         if (sums.count < options_.min_overlap) sums = {};
       }
     });
@@ -171,8 +174,8 @@ class Refiner {
       squared += sums_[k].squared_distance;
     }
     std::sort(overlapping.begin(), overlapping.end());
-    report.pairs = static_cast<std::size_t>(
-        std::unique(overlapping.begin(), overlapping.end()) - overlapping.begin());
+    report.pairs = static_cast<std::size_t>(std::unique(overlapping.begin(), overlapping.end()) -
+                                            overlapping.begin());
     return report.correspondences > 0
                ? std::sqrt(squared / static_cast<double>(report.correspondences))
                : 0;
@@ -217,8 +220,7 @@ class Refiner {
     term.target_from_source = pose_of(edge.target_from_source);
     term.inverse = term.target_from_source.inverse();
     term.information = edge.information;
-    const auto linear =
-        pose_graph::linearise_edge(poses_[edge.source], poses_[edge.target], term);
+    const auto linear = pose_graph::linearise_edge(poses_[edge.source], poses_[edge.target], term);
     const Vector6d weighted = edge.information * linear.residual;
     // Surfaces may correct an edge by more than its noise: it then counts less.
     const double weight = 1 / (1 + linear.residual.dot(weighted) / kEdgeKernel);
@@ -280,6 +282,7 @@ class Refiner {
   System system_;
   std::vector<Pose> poses_;
   std::vector<Sphere> spheres_;
+  std::vector<std::vector<float>> variances_;
   std::vector<OrderedPair> pairs_;
   std::vector<SurfaceSums> sums_;  ///< of each pair
   pose_graph::BlockMatrix matrix_;
@@ -299,7 +302,11 @@ RefineReport refine(const std::vector<Surface>& surfaces, Reconstruction& map,
       throw InvalidArgument("surfaces[" + std::to_string(k) + "] has " +
                             std::to_string(surfaces[k].points.size()) + " points and " +
                             std::to_string(surfaces[k].normals.size()) + " normals");
-  return Refiner(surfaces, map, options).run();
+  RefineReport report = Refiner(surfaces, map, options).run();
+  if (!report.solved) return report;
+  report.rejected_edges = reject_deviating(map, options.max_edge_error);
+  set_confidence(map);
+  return report;
 }
 
 }  // namespace gpureg::reconstruction

@@ -38,8 +38,7 @@ SurfaceGrid::SurfaceGrid(const Surface& surface, float distance)
   low_.array() -= distance;
   high_.array() += distance;
   std::vector<std::pair<std::uint64_t, std::uint32_t>> keyed;
-  for (const std::uint32_t k : indices_)
-    keyed.emplace_back(key_of(cell_of(surface.points[k])), k);
+  for (const std::uint32_t k : indices_) keyed.emplace_back(key_of(cell_of(surface.points[k])), k);
   std::sort(keyed.begin(), keyed.end());
   std::size_t size = 16;
   while (size < 2 * keyed.size()) size *= 2;

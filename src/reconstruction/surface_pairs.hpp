@@ -16,7 +16,7 @@ namespace gpureg::reconstruction {
 struct SurfaceSums {
   pose_graph::Matrix6d information = pose_graph::Matrix6d::Zero();
   pose_graph::Vector6d gradient = pose_graph::Vector6d::Zero();
-  std::size_t count = 0;      ///< correspondences
+  std::size_t count = 0;        ///< correspondences
   double squared_distance = 0;  ///< sum over them, point to plane, metres^2
 };
 
@@ -28,8 +28,14 @@ struct Association {
   std::uint32_t max_points = 0;
 };
 
+/// Variance of every point relative to one within the range, see RefineOptions::noise_range.
+std::vector<float> relative_variances(const Surface& surface, double noise_range);
+
 /// Closest points of every chosen source point; robust point-to-plane sums in a fixed order.
-SurfaceSums surface_sums(const Surface& source, const SurfaceGrid& grid, const Surface& target,
+/// @param source_variances, target_variances as relative_variances().
+SurfaceSums surface_sums(const Surface& source, const std::vector<float>& source_variances,
+                         const SurfaceGrid& grid, const Surface& target,
+                         const std::vector<float>& target_variances,
                          const pose_graph::Pose& target_from_source,
                          const Association& association);
 

@@ -134,7 +134,7 @@ TEST_F(Register, VerifiesPosesOfAFile) {
   EXPECT_LT(verified["modes"][1]["confidence"], 0.1);
   EXPECT_EQ(align({"--initial", poses, "--refine-initial", "--ignore-alternatives"}).status, 0);
 
-  const auto refused = [&](const std::string& content, const std::vector<std::string>& words) {
+  const auto refused = [&](const std::string& content, std::initializer_list<std::string> words) {
     std::ofstream(poses) << content;
     expect_refused(joined({"register", source_, target_, "--initial", poses}, kSmall), words);
   };
@@ -143,8 +143,7 @@ TEST_F(Register, VerifiesPosesOfAFile) {
   refused("1 0 0 0\n0 1 0\n", {poses + ":2", "row 2", "3 numbers"});
   refused("1 0 0 x\n", {poses + ":1", "'x'"});
   refused("2 0 0 0\n0 2 0 0\n0 0 2 0\n0 0 0 1\n", {poses + ":4", "no rigid motion"});
-  expect_refused(joined({"register", source_, target_, "--refine-initial"}, kSmall),
-                 {"--initial"});
+  expect_refused(joined({"register", source_, target_, "--refine-initial"}, kSmall), {"--initial"});
 }
 
 TEST_F(Register, SeedDecidesAndThreadsDoNot) {

@@ -2,8 +2,8 @@
 #include <functional>
 #include <limits>
 
-#include "graphs.hpp"
 #include "gpureg/error.hpp"
+#include "graphs.hpp"
 #include "support/expect_error.hpp"
 
 namespace gpureg::pose_graph {
@@ -29,11 +29,8 @@ TEST(Faults, GraphsNamePlaceAndValue) {
   expect_refused([](Graph& g) { g.edges[2].target = g.edges[2].source; },
                  {"edges[2]", "node 3 with itself"});
   expect_refused([](Graph& g) { g.nodes[1].fixed = true; }, {"nodes[1] (id 1)", "fixed"});
-  expect_refused(
-      [](Graph& g) {
-        g.nodes[1].world_from_node = no_pose();
-      },
-      {"nodes[1].world_from_node(0, 0) is nan"});
+  expect_refused([](Graph& g) { g.nodes[1].world_from_node = no_pose(); },
+                 {"nodes[1].world_from_node(0, 0) is nan"});
   expect_refused([](Graph& g) { g.edges[5].target_from_source.matrix()(1, 3) = kInfinity; },
                  {"edges[5].target_from_source(1, 3) is inf"});
   expect_refused([](Graph& g) { g.edges[5].target_from_source.matrix()(1, 3) = 1e200; },
@@ -62,7 +59,8 @@ TEST(Faults, GraphsNamePlaceAndValue) {
       {".alternatives[0].confidence is -1"});
   expect_refused([](Graph& g) { g.edges[1].kind = static_cast<EdgeKind>(9); }, {"kind is 9"});
   expect_refused([](Graph& g) { g.gravity.push_back({99}); }, {"gravity[0].node is 99"});
-  expect_refused([](Graph& g) { g.gravity.push_back({1, {0, 0, 0}}); }, {"gravity[0].up.norm is 0"});
+  expect_refused([](Graph& g) { g.gravity.push_back({1, {0, 0, 0}}); },
+                 {"gravity[0].up.norm is 0"});
   expect_refused([](Graph& g) { g.gravity.push_back({1, {0, 0, 1}, 0}); },
                  {"gravity[0].sigma_degrees is 0"});
   expect_refused([](Graph& g) { g.priors.push_back({99}); }, {"priors[0].node is 99"});
@@ -91,7 +89,8 @@ TEST(Faults, OptionsNameFieldAndValue) {
              "line_process.odometry_weight is inf");
   expect_bad([](Options& o) { o.line_process.min_weight = 1; }, "line_process.min_weight is 1");
   expect_bad([](Options& o) { o.drift.min_translation = 0; }, "drift.min_translation is 0");
-  expect_bad([](Options& o) { o.drift.rotation_per_degree = -1; }, "drift.rotation_per_degree is -1");
+  expect_bad([](Options& o) { o.drift.rotation_per_degree = -1; },
+             "drift.rotation_per_degree is -1");
   expect_bad([](Options& o) { o.loop_noise.rotation = 0; }, "loop_noise.rotation is 0");
   expect_bad([](Options& o) { o.solver.max_iterations = -5; }, "solver.max_iterations is -5");
   expect_bad([](Options& o) { o.solver.relative_tolerance = kNan; },
@@ -102,8 +101,7 @@ TEST(Faults, OptionsNameFieldAndValue) {
   World world = rounds(5, 1, 1, 1);
   Options options;
   options.marginals = {0, 50};
-  expect_error<InvalidArgument>([&] { optimize(world.graph, options); },
-                                {"marginals[1] is 50"});
+  expect_error<InvalidArgument>([&] { optimize(world.graph, options); }, {"marginals[1] is 50"});
   Options::loopsmart().validate();
 }
 

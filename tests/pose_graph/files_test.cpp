@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "graphs.hpp"
 #include "gpureg/error.hpp"
+#include "graphs.hpp"
 #include "support/expect_error.hpp"
 #include "support/temporary_folder.hpp"
 
@@ -39,8 +39,7 @@ void expect_same(const Graph& a, const Graph& b) {
     EXPECT_EQ(a.edges[k].source, b.edges[k].source);
     EXPECT_EQ(a.edges[k].target, b.edges[k].target);
     EXPECT_EQ(a.edges[k].kind, b.edges[k].kind);
-    EXPECT_TRUE(
-        a.edges[k].target_from_source.isApprox(b.edges[k].target_from_source, rounding));
+    EXPECT_TRUE(a.edges[k].target_from_source.isApprox(b.edges[k].target_from_source, rounding));
     EXPECT_EQ(*a.edges[k].information, *b.edges[k].information);
   }
 }
@@ -108,8 +107,9 @@ TEST(G2oFile, NamesFileAndLineOfMistakes) {
   expect_bad("VERTEX_SE3:QUAT 0 nan 0 0 0 0 0 1\n", "1", "x is 'nan'");
   expect_bad("VERTEX_SE3:QUAT -1 0 0 0 0 0 0 1\n", "1", "the id is '-1'");
   expect_bad(kVertices + "EDGE_SE3:QUAT 1 1 1 2 3 0 0 0 1" + kUpper, "3", "with itself");
-  expect_bad(kVertices + "EDGE_SE3:QUAT 0 1 1 2 3 0 0 0 1 -1 0 0 0 0 0 2 0 0 0 0 3 0 0 0 4 0 0 5 0 6\n",
-             "3", "smallest_eigenvalue is -1");
+  expect_bad(
+      kVertices + "EDGE_SE3:QUAT 0 1 1 2 3 0 0 0 1 -1 0 0 0 0 0 2 0 0 0 0 3 0 0 0 4 0 0 5 0 6\n",
+      "3", "smallest_eigenvalue is -1");
   expect_bad(kVertices + kEdge.substr(0, kEdge.size() / 2), "3", "expected 30");
   expect_error<IoError>([&] { read_g2o(folder / "none.g2o"); }, {"none.g2o"});
 }
@@ -147,12 +147,15 @@ const std::string kOpen3d =
     "{\n\"class_name\" : \"PoseGraph\",\n\"edges\" : \n[\n{\n\"class_name\" : \"PoseGraphEdge\",\n"
     "\"confidence\" : 0.7,\n\"information\" : \n[\n1.0,0,0,0,0,0, 0,2.0,0,0,0,0, 0,0,3.0,0,0,0,\n"
     "0,0,0,4.0,0,0, 0,0,0,0,5.0,0, 0,0,0,0,0,6.0\n],\n\"source_node_id\" : 1,\n"
-    "\"target_node_id\" : 0,\n\"transformation\" : \n[\n1.0,0,0,0,0,1.0,0,0,0,0,1.0,0,1.0,2.0,3.0,1.0\n"
-    "],\n\"uncertain\" : true,\n\"version_major\" : 1,\n\"version_minor\" : 0\n}\n],\n\"nodes\" : \n[\n"
+    "\"target_node_id\" : 0,\n\"transformation\" : "
+    "\n[\n1.0,0,0,0,0,1.0,0,0,0,0,1.0,0,1.0,2.0,3.0,1.0\n"
+    "],\n\"uncertain\" : true,\n\"version_major\" : 1,\n\"version_minor\" : 0\n}\n],\n\"nodes\" : "
+    "\n[\n"
     "{\"class_name\" : \"PoseGraphNode\",\"pose\" : [1,0,0,0,0,1,0,0,0,0,1,0,0,0,0,1],"
     "\"version_major\" : 1,\"version_minor\" : 0},\n"
     "{\"class_name\" : \"PoseGraphNode\",\"pose\" : [1,0,0,0,0,1,0,0,0,0,1,0,1,2,3,1],"
-    "\"version_major\" : 1,\"version_minor\" : 0}\n],\n\"version_major\" : 1,\n\"version_minor\" : 0\n}\n";
+    "\"version_major\" : 1,\"version_minor\" : 0}\n],\n\"version_major\" : 1,\n\"version_minor\" : "
+    "0\n}\n";
 
 TEST(Open3dFile, ReadsWhatOpen3dWrites) {
   const TemporaryFolder folder;

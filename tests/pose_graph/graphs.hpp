@@ -54,8 +54,8 @@ struct World {
     edge.source = source;
     edge.target = target;
     edge.kind = kind;
-    edge.target_from_source = truth[target].inverse() * truth[source] *
-                              random_pose(random, radians, metres);
+    edge.target_from_source =
+        truth[target].inverse() * truth[source] * random_pose(random, radians, metres);
     edge.information = information_of(radians, metres);
     graph.edges.push_back(edge);
     return graph.edges.back();
@@ -70,8 +70,8 @@ inline World rounds(int per_round, int round_count, int loop_every, unsigned see
   const double pi = 3.14159265358979323846, radius = per_round / (2 * pi);
   for (int k = 0; k < per_round * round_count; ++k) {
     const double angle = 2 * pi * k / per_round;
-    world.truth.push_back(pose_of({0, 0, angle}, {radius * std::cos(angle),
-                                                  radius * std::sin(angle), 0.1 * std::sin(k)}));
+    world.truth.push_back(pose_of(
+        {0, 0, angle}, {radius * std::cos(angle), radius * std::sin(angle), 0.1 * std::sin(k)}));
   }
   for (int k = 0; k < static_cast<int>(world.truth.size()); ++k) {
     Node node;
@@ -99,8 +99,7 @@ inline World scans(int count, int nearest, unsigned seed) {
     std::vector<std::pair<double, int>> others;
     for (int b = 0; b < count; ++b)
       if (b != a)
-        others.push_back(
-            {(world.truth[a].translation() - world.truth[b].translation()).norm(), b});
+        others.push_back({(world.truth[a].translation() - world.truth[b].translation()).norm(), b});
     std::sort(others.begin(), others.end());
     for (int k = 0; k < nearest && k < static_cast<int>(others.size()); ++k)
       pairs.insert(std::minmax(a, others[k].second));
@@ -114,9 +113,9 @@ inline double worst_error(const World& world, const Result& result) {
   double worst = 0;
   const UnalignedIsometry3d moved = world.truth[0] * result.world_from_node[0].inverse();
   for (std::size_t k = 0; k < world.truth.size(); ++k)
-    worst = std::max(worst, ((moved * result.world_from_node[k]).translation() -
-                             world.truth[k].translation())
-                                .norm());
+    worst = std::max(
+        worst,
+        ((moved * result.world_from_node[k]).translation() - world.truth[k].translation()).norm());
   return worst;
 }
 
@@ -130,9 +129,9 @@ inline double worst_difference(const World& world, std::size_t true_edges, const
   const Result best = optimize(clean, options);
   double worst = 0;
   for (std::size_t k = 0; k < world.truth.size(); ++k)
-    worst = std::max(worst, (best.world_from_node[k].translation() -
-                             result.world_from_node[k].translation())
-                                .norm());
+    worst = std::max(
+        worst,
+        (best.world_from_node[k].translation() - result.world_from_node[k].translation()).norm());
   return worst;
 }
 

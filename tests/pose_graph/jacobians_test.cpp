@@ -44,8 +44,9 @@ TEST(Se3, AdjointMovesPerturbations) {
     const Pose pose = exp(random_vector(random, 0.8));
     const Vector6d xi = random_vector(random, 0.3);
     const Pose left = exp(adjoint(pose) * xi) * pose, right = pose * exp(xi);
-    EXPECT_LE((left.rotation - right.rotation).norm() + (left.translation - right.translation).norm(),
-              1e-12);
+    EXPECT_LE(
+        (left.rotation - right.rotation).norm() + (left.translation - right.translation).norm(),
+        1e-12);
   }
 }
 
@@ -75,13 +76,11 @@ TEST(Jacobians, OfGravityEqualCentralDifferences) {
   for (int k = 0; k < 20; ++k) {
     const GravityTerm term{0, normal3(random).normalized(), 1};
     const Pose pose = exp(random_vector(random, 1));
-    const Eigen::MatrixXd differences = numerical(pose, [&](const Pose& p) {
-      return Eigen::VectorXd(linearise_gravity(p, term).residual);
-    });
-    EXPECT_LE((linearise_gravity(pose, term).rotation - differences.leftCols(3))
-                  .cwiseAbs()
-                  .maxCoeff(),
-              1e-8);
+    const Eigen::MatrixXd differences = numerical(
+        pose, [&](const Pose& p) { return Eigen::VectorXd(linearise_gravity(p, term).residual); });
+    EXPECT_LE(
+        (linearise_gravity(pose, term).rotation - differences.leftCols(3)).cwiseAbs().maxCoeff(),
+        1e-8);
     EXPECT_LE(differences.rightCols(3).cwiseAbs().maxCoeff(), 1e-12);
   }
 }

@@ -80,9 +80,10 @@ TEST(Optimize, PriorsPlaceAGraphInTheWorld) {
   ASSERT_TRUE(result.converged()) << result.reason;
   EXPECT_FALSE(result.components[0].own_frame);
   for (const int node : {0, 4, 9})
-    EXPECT_LE((result.world_from_node[node].translation() - (place * world.truth[node]).translation())
-                  .norm(),
-              1e-3);
+    EXPECT_LE(
+        (result.world_from_node[node].translation() - (place * world.truth[node]).translation())
+            .norm(),
+        1e-3);
 }
 
 TEST(Optimize, GravityRemovesRollAndPitchDrift) {
@@ -95,7 +96,8 @@ TEST(Optimize, GravityRemovesRollAndPitchDrift) {
     double worst = 0;
     for (std::size_t k = 0; k < world.truth.size(); ++k) {
       const Eigen::Vector3d up = world.truth[k].linear().transpose() * Eigen::Vector3d::UnitZ();
-      worst = std::max(worst, (result.world_from_node[k].linear() * up - Eigen::Vector3d::UnitZ()).norm());
+      worst = std::max(worst,
+                       (result.world_from_node[k].linear() * up - Eigen::Vector3d::UnitZ()).norm());
     }
     return worst;
   };
@@ -115,9 +117,8 @@ TEST(Optimize, OdometryWithoutInformationDriftsByTheMetre) {
   // Two odometry edges of 1 m and 9 m between fixed ends that are 11 m apart: by default the sigma
   // is 2 % of the length, so the missing metre is shared 1 : 81.
   Graph graph;
-  graph.nodes = {{0, UnalignedIsometry3d::Identity(), true},
-                 {1},
-                 {2, pose_of({0, 0, 0}, {11, 0, 0}), true}};
+  graph.nodes = {
+      {0, UnalignedIsometry3d::Identity(), true}, {1}, {2, pose_of({0, 0, 0}, {11, 0, 0}), true}};
   graph.edges.resize(2);
   graph.edges[0].source = 1;
   graph.edges[0].target = 0;

@@ -63,8 +63,7 @@ TEST(Gnc, RejectsLoopsThatAgreeWithEachOther) {
       const UnalignedIsometry3d twin =
           world.truth[b] * random_pose(random, 0.5, 0.5) * world.truth[a].inverse();
       for (int k = 0; k < 6; ++k)
-        add_false(world, a + k, b + k,
-                  world.truth[b + k].inverse() * twin * world.truth[a + k]);
+        add_false(world, a + k, b + k, world.truth[b + k].inverse() * twin * world.truth[a + k]);
     }
     const Result result = optimize(world.graph);
     expect_told_apart(world, result, true_edges);
@@ -74,8 +73,8 @@ TEST(Gnc, RejectsLoopsThatAgreeWithEachOther) {
 }
 
 TEST(Gnc, LongDriftDoesNotLoseATrueLoop) {
-  // A single round of 400 m with one loop at its end: the drift is a hundred times the loop's sigma,
-  // and the odometry's covariance explains it.
+  // A single round of 400 m with one loop at its end: the drift is a hundred times the loop's
+  // sigma, and the odometry's covariance explains it.
   World world = rounds(400, 1, 1, 11);
   std::mt19937_64 random(12);
   world.add(399, 0, EdgeKind::loop, random);

@@ -56,7 +56,8 @@ struct PairResults {
   /// A pose that is metres away from the correct one.
   void add_false(std::uint32_t source, std::uint32_t target, double confidence) {
     std::mt19937 random(1000 * source + target);
-    add(source, target, confidence, truth(source, target) * UnalignedIsometry3d(random_pose(random)));
+    add(source, target, confidence,
+        truth(source, target) * UnalignedIsometry3d(random_pose(random)));
   }
 
   void add_too_few_points(std::uint32_t source, std::uint32_t target, bool in_source) {
@@ -89,9 +90,8 @@ inline double largest_error(const reconstruction::Reconstruction& map,
   double largest = 0;
   for (const std::uint32_t scan : scans) {
     const UnalignedIsometry3d truth = world_from_scan[scans[0]].inverse() * world_from_scan[scan];
-    largest = std::max(largest, (map.scans[scan].island_from_scan.translation() -
-                                 truth.translation())
-                                    .norm());
+    largest = std::max(
+        largest, (map.scans[scan].island_from_scan.translation() - truth.translation()).norm());
   }
   return largest;
 }
@@ -108,7 +108,8 @@ inline std::string bytes_of(const reconstruction::Reconstruction& map) {
     add(scan.placed);
     add(scan.island);
     add(scan.confidence);
-    for (int k = 0; k < 16; ++k) add(scan.placed ? scan.island_from_scan.matrix()(k / 4, k % 4) : 0);
+    for (int k = 0; k < 16; ++k)
+      add(scan.placed ? scan.island_from_scan.matrix()(k / 4, k % 4) : 0);
   }
   for (const reconstruction::Edge& edge : map.edges) {
     add(edge.accepted);

@@ -56,10 +56,10 @@ TEST(Reconstruct, TwoHousesStayTwoIslands) {
 TEST(Reconstruct, LeavesOutForeignScansWithAReason) {
   PairResults data(11);
   data.add_chain(0, 7, 3);
-  data.add_false(7, 1, 0.01);                 // fits nothing
-  data.add_false(8, 3, 0.6);                  // one doubtful pair
-  data.add_too_few_points(9, 0, true);        // hardly any point
-  const auto map = data.map();                // and 10 has no pair
+  data.add_false(7, 1, 0.01);           // fits nothing
+  data.add_false(8, 3, 0.6);            // one doubtful pair
+  data.add_too_few_points(9, 0, true);  // hardly any point
+  const auto map = data.map();          // and 10 has no pair
   EXPECT_EQ(map.placed(), 7u);
   EXPECT_EQ(map.scans[0].reason, ScanReason::none);
   EXPECT_EQ(map.scans[7].reason, ScanReason::no_confident_pair);

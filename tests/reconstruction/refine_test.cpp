@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <gtest/gtest.h>
 
-#include <map>
+#include <algorithm>
+#include <cmath>
 
 #include "reconstruction/pair_results.hpp"
 #include "reconstruction/surface_grid.hpp"
+#include "reconstruction/surface_pairs.hpp"
 
 namespace gpureg::test {
 namespace {
@@ -94,6 +96,32 @@ TEST(Refine, WithoutPointsTheEdgesHold) {
   EXPECT_TRUE(report.solved);
   // A tree of edges is a minimum already.
   EXPECT_NEAR(largest_error(map, rooms.data.world_from_scan, 0), before, 1e-6);
+}
+
+TEST(Refine, RejectsEdgesThatSurfacesContradict) {
+  Rooms rooms;
+  UnalignedIsometry3d off = rooms.data.truth(4, 0);
+  off.translation().x() += 0.1;
+  rooms.data.add(4, 0, 0.95, off);
+  auto map = rooms.data.map();
+  RefineOptions options;
+  options.max_edge_error = 0.05;
+  const auto report = reconstruction::refine(rooms.surfaces, map, options);
+  EXPECT_EQ(report.rejected_edges, 1u);
+  EXPECT_FALSE(map.edges.back().accepted);
+  EXPECT_EQ(map.edges.back().reason, reconstruction::EdgeReason::inconsistent);
+  for (const auto& scan : map.scans) EXPECT_GT(scan.confidence, 0.5);
+}
+
+TEST(Refine, FarPointsWeighLess) {
+  Surface surface = room(1);
+  surface.viewpoints = {{0, 0, 0}};
+  const std::vector<float> variances = reconstruction::relative_variances(surface, 1.0);
+  for (std::size_t k = 0; k < surface.points.size(); k += 50)
+    // Rounding of float.
+    EXPECT_NEAR(variances[k], std::max(1.0, std::pow(surface.points[k].norm(), 4)), 1e-3);
+  surface.viewpoints.clear();
+  EXPECT_EQ(reconstruction::relative_variances(surface, 1.0)[0], 1.0f);
 }
 
 TEST(Refine, RefusesBadInput) {
