@@ -26,8 +26,8 @@ void paper_mode(benchmark::State& state) {
   for (auto _ : state) {
     for (std::size_t p = 0; p < pairs.size(); ++p) {
       const auto begin = std::chrono::steady_clock::now();
-      const NaiveResult found =
-          naive.align(*Access::state(clouds[pairs[p].source]), *Access::state(clouds[pairs[p].target]));
+      const NaiveResult found = naive.align(*Access::state(clouds[pairs[p].source]),
+                                            *Access::state(clouds[pairs[p].target]));
       ms.push_back(
           std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - begin)
               .count());

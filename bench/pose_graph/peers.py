@@ -16,9 +16,7 @@ def gtsam_graph(data):
 
     graph, initial = gtsam.NonlinearFactorGraph(), gtsam.Values()
     noise = gtsam.noiseModel.Gaussian.Information(data["information"])
-    graph.add(
-        gtsam.PriorFactorPose3(0, gtsam.Pose3(), gtsam.noiseModel.Isotropic.Sigma(6, 1e-4))
-    )
+    graph.add(gtsam.PriorFactorPose3(0, gtsam.Pose3(), gtsam.noiseModel.Isotropic.Sigma(6, 1e-4)))
     for (i, j), pose in zip(data["ends"], data["poses"]):
         graph.add(gtsam.BetweenFactorPose3(int(i), int(j), gtsam.Pose3(pose), noise))
     for k, pose in enumerate(data["initial"]):

@@ -84,7 +84,10 @@ def solve(method: str, graph: sphere.SphereGraph, folder: pathlib.Path, limit: f
 def table(runs: dict) -> str:
     """Mean ATE per kind, share of false loops and method."""
     methods = sorted({r["method"] for r in runs.values()})
-    lines = ["| nodes | kind | false | " + " | ".join(methods) + " |", "|---" * (3 + len(methods)) + "|"]
+    lines = [
+        "| nodes | kind | false | " + " | ".join(methods) + " |",
+        "|---" * (3 + len(methods)) + "|",
+    ]
     rows = sorted({(r["nodes"], r["kind"], r["percent"]) for r in runs.values()})
     for row in rows:
         cells = []
@@ -105,7 +108,9 @@ def table(runs: dict) -> str:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--methods", nargs="+", default=["gpureg", "gtsam_lm", "gtsam_gnc", "open3d"])
+    parser.add_argument(
+        "--methods", nargs="+", default=["gpureg", "gtsam_lm", "gtsam_gnc", "open3d"]
+    )
     parser.add_argument("--percent", nargs="+", type=int, default=list(range(0, 100, 10)))
     parser.add_argument("--seeds", nargs="+", type=int, default=[1, 2, 3])
     parser.add_argument("--kinds", nargs="+", default=["random", "consistent"])

@@ -13,7 +13,8 @@
 int main(int argc, char** argv) {
   using namespace gpureg::pose_graph;
   if (argc < 4) {
-    std::fprintf(stderr, "usage: %s IN.g2o OUT.txt none|gnc|gnc_plain|line_process|loopsmart [THREADS]\n",
+    std::fprintf(stderr,
+                 "usage: %s IN.g2o OUT.txt none|gnc|gnc_plain|line_process|loopsmart [THREADS]\n",
                  argv[0]);
     return 2;
   }

@@ -41,8 +41,8 @@ inline Graph city(int nodes, int edges, unsigned seed) {
       if (ahead.cwiseAbs().maxCoeff() > size) heading = (heading + 2) % 4;
     }
     UnalignedIsometry3d pose = UnalignedIsometry3d::Identity();
-    pose.linear() =
-        Eigen::AngleAxisd(heading * 1.5707963267948966, Eigen::Vector3d::UnitZ()).toRotationMatrix();
+    pose.linear() = Eigen::AngleAxisd(heading * 1.5707963267948966, Eigen::Vector3d::UnitZ())
+                        .toRotationMatrix();
     pose.translation() = place;
     truth.push_back(pose);
     place += pose.linear().col(0);

@@ -138,21 +138,21 @@ void bind_pose_graph_result(py::module_& m) {
                                  return e.state == EdgeState::accepted;
                                });
                              })
-      .def_property_readonly(
-          "weights",
-          [](const Result& r) {
-            return edge_array<double>(r, [](const EdgeResult& e) { return e.weight; });
-          })
+      .def_property_readonly("weights",
+                             [](const Result& r) {
+                               return edge_array<double>(
+                                   r, [](const EdgeResult& e) { return e.weight; });
+                             })
       .def_property_readonly("modes",
                              [](const Result& r) {
                                return edge_array<std::int64_t>(
                                    r, [](const EdgeResult& e) { return std::int64_t(e.mode); });
                              })
-      .def_property_readonly(
-          "squared_errors",
-          [](const Result& r) {
-            return edge_array<double>(r, [](const EdgeResult& e) { return e.squared_error; });
-          })
+      .def_property_readonly("squared_errors",
+                             [](const Result& r) {
+                               return edge_array<double>(
+                                   r, [](const EdgeResult& e) { return e.squared_error; });
+                             })
       .def_property_readonly("components",
                              [](const Result& r) {
                                std::vector<std::vector<std::int64_t>> out;
@@ -187,7 +187,9 @@ void bind_pose_graph(py::module_& m) {
   };
   m.def(
       "read_g2o",
-      [rotation](const std::string& path, bool radians) { return read_g2o(path, rotation(radians)); },
+      [rotation](const std::string& path, bool radians) {
+        return read_g2o(path, rotation(radians));
+      },
       py::arg("path"), py::arg("radians"));
   m.def(
       "write_g2o",

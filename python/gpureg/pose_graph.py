@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Robust SE(3) pose graphs: which loops are correct, and where the scans are.
 
-    from gpureg import pose_graph
-    graph = pose_graph.read_g2o("graph.g2o")
-    result = pose_graph.optimize(graph)
-    result.world_from_node, result.accepted        # (N, 4, 4), (M,)
+from gpureg import pose_graph
+graph = pose_graph.read_g2o("graph.g2o")
+result = pose_graph.optimize(graph)
+result.world_from_node, result.accepted        # (N, 4, 4), (M,)
 """
 
 from __future__ import annotations
@@ -20,7 +20,9 @@ from ._core import PoseGraph, PoseGraphResult
 Path = Union[str, "os.PathLike[str]"]
 
 
-def add_node(graph: PoseGraph, id: int, world_from_node: Any = None, *, fixed: bool = False) -> None:
+def add_node(
+    graph: PoseGraph, id: int, world_from_node: Any = None, *, fixed: bool = False
+) -> None:
     """Add a node.
 
     Parameters

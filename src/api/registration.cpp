@@ -99,8 +99,8 @@ RegistrationResult align(const Context& context, const PreparedCloud& source,
   options.validate();
   const PreparedState& s = *checked_state(context, source, options, "source");
   const PreparedState& t = *checked_state(context, target, options, "target");
-  require(correspondences.size() <= limits::kMaxPoints, "correspondences.size", correspondences.size(),
-          "at most 2^31 - 1");
+  require(correspondences.size() <= limits::kMaxPoints, "correspondences.size",
+          correspondences.size(), "at most 2^31 - 1");
   const bool swapped = swaps(s, t, options);
   std::vector<std::uint32_t> from, to;
   for (std::size_t k = 0; k < correspondences.size(); ++k) {

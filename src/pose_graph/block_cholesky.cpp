@@ -48,8 +48,7 @@ double dot(const double* a, const double* b, std::size_t size) {
 
 }  // namespace
 
-BlockCholesky::BlockCholesky(int size, const std::vector<std::pair<int, int>>& pattern,
-                             int threads)
+BlockCholesky::BlockCholesky(int size, const std::vector<std::pair<int, int>>& pattern, int threads)
     : size_(size), threads_(threads) {
   Elimination elimination = eliminate(size, pattern);
   order_ = std::move(elimination.order);
@@ -62,8 +61,7 @@ BlockCholesky::BlockCholesky(int size, const std::vector<std::pair<int, int>>& p
     fronts_[s].first = supernode.first;
     fronts_[s].columns = supernode.columns;
     fronts_[s].rows = std::move(supernode.rows);
-    for (int k = 0; k < supernode.columns; ++k)
-      front_of[supernode.first + k] = static_cast<int>(s);
+    for (int k = 0; k < supernode.columns; ++k) front_of[supernode.first + k] = static_cast<int>(s);
     flops_ += flops_of(fronts_[s].columns, static_cast<double>(fronts_[s].rows.size()));
   }
   const auto slot_of = [](const Front& front, int position) {

@@ -47,8 +47,8 @@ class BlockCholesky {
     std::vector<int> parent_slot;  ///< per row: its block row in the parent's front
     /// Blocks of the matrix in its columns: index into the pattern, and block row in the front.
     std::vector<std::pair<int, int>> scatter;
-    std::vector<double> factor;                ///< (columns + rows) x columns, column by column
-    std::vector<double> update;                ///< Schur complement, until the parent has taken it
+    std::vector<double> factor;  ///< (columns + rows) x columns, column by column
+    std::vector<double> update;  ///< Schur complement, until the parent has taken it
   };
 
   std::vector<double> permuted(const std::vector<Vector6d>& blocks) const;
@@ -60,8 +60,8 @@ class BlockCholesky {
   int size_;
   int threads_;
   double flops_ = 0;
-  std::vector<int> order_;    ///< elimination position -> block
-  std::vector<int> inverse_;  ///< block -> elimination position
+  std::vector<int> order_;                    ///< elimination position -> block
+  std::vector<int> inverse_;                  ///< block -> elimination position
   std::vector<std::pair<int, int>> pattern_;  ///< of the matrix, in elimination positions
   std::vector<Front> fronts_;                 ///< children before parents
 };

@@ -34,7 +34,7 @@ struct Candidate {
 
 /// One mode seen from one of its ends.
 struct Link {
-  int other;      ///< node at the other end
+  int other;  ///< node at the other end
   int candidate;
   bool from_source;
 };
@@ -150,9 +150,9 @@ class Cycles {
     const double most = turn(target_from_there) + turn(there_from_here) + turn(source_from_here) +
                         turn(mine.target_from_source);
     if (e.head<3>().squaredNorm() > quantile_ * most) return 0;
-    Matrix6d covariance = (target_from_there * there_from_here * source_from_here.inverse())
-                              .covariance +
-                          mine.target_from_source.covariance;
+    Matrix6d covariance =
+        (target_from_there * there_from_here * source_from_here.inverse()).covariance +
+        mine.target_from_source.covariance;
     const Eigen::LDLT<Matrix6d> factor(covariance);
     if (factor.info() != Eigen::Success || !(factor.vectorD().minCoeff() > 0)) return 0;
     const double squared = e.dot(factor.solve(e));

@@ -15,7 +15,7 @@ struct Supernode {
 
 /// Order and structure of a sparse Cholesky factor, in blocks.
 struct Elimination {
-  std::vector<int> order;  ///< position -> block
+  std::vector<int> order;             ///< position -> block
   std::vector<Supernode> supernodes;  ///< children before parents
 };
 

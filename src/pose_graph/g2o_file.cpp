@@ -107,13 +107,15 @@ Graph read_g2o(const std::string& path, G2oRotation rotation) {
   }
   for (const auto& [id, line] : fixed) {
     const auto at = places.find(id);
-    if (at == places.end()) fail(path, line, "FIX of node " + std::to_string(id) + ", which has no VERTEX_SE3:QUAT");
+    if (at == places.end())
+      fail(path, line, "FIX of node " + std::to_string(id) + ", which has no VERTEX_SE3:QUAT");
     graph.nodes[at->second].fixed = true;
   }
   for (std::size_t k = 0; k < graph.edges.size(); ++k)
     for (const std::int64_t id : {graph.edges[k].target, graph.edges[k].source})
       if (places.find(id) == places.end())
-        fail(path, edge_lines[k], "an edge of node " + std::to_string(id) + ", which has no VERTEX_SE3:QUAT");
+        fail(path, edge_lines[k],
+             "an edge of node " + std::to_string(id) + ", which has no VERTEX_SE3:QUAT");
   return graph;
 }
 

@@ -76,7 +76,8 @@ class Parser {
   }
 
   Value parse(int depth) {
-    if (depth > kDeepest) fail("the JSON is nested more than " + std::to_string(kDeepest) + " deep");
+    if (depth > kDeepest)
+      fail("the JSON is nested more than " + std::to_string(kDeepest) + " deep");
     Value value;
     const char c = peek();
     value.line = line_;
@@ -183,8 +184,8 @@ const Value& Document::member(const Value& object, const char* name, Kind kind) 
   for (const auto& [key, value] : object.members) {
     if (key != name) continue;
     if (value.kind != kind)
-      fail(value.line, std::string(name) + " is " + name_of(value.kind) + ", expected " +
-                           name_of(kind));
+      fail(value.line,
+           std::string(name) + " is " + name_of(value.kind) + ", expected " + name_of(kind));
     return value;
   }
   fail(object.line, std::string("the object that begins here has no ") + name);

@@ -18,7 +18,7 @@ struct Value {
   bool boolean = false;
   double number = 0;
   std::string text;
-  std::vector<Value> items;                             ///< of an array
+  std::vector<Value> items;                            ///< of an array
   std::vector<std::pair<std::string, Value>> members;  ///< of an object
 };
 

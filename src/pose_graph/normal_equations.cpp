@@ -213,8 +213,7 @@ bool NormalEquations::solve(double damping, std::vector<Vector6d>& step) {
   return finite;
 }
 
-double NormalEquations::expected_decrease(double damping,
-                                          const std::vector<Vector6d>& step) const {
+double NormalEquations::expected_decrease(double damping, const std::vector<Vector6d>& step) const {
   // With (H + damping D) s = -g: -g's - s'Hs / 2 = (damping s'Ds - g's) / 2.
   double sum = 0;
   for (std::size_t node = 0; node < step.size(); ++node) {

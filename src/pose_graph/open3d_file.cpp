@@ -25,10 +25,11 @@ UnalignedIsometry3d read_pose(const Document& document, const Value& object, con
   pose.matrix() = Eigen::Map<const Eigen::Matrix4d>(v.data());
   const Eigen::Matrix3d r = pose.linear();
   const double off = (r * r.transpose() - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff();
-  const double last =
-      (pose.matrix().row(3) - Eigen::RowVector4d(0, 0, 0, 1)).cwiseAbs().maxCoeff();
+  const double last = (pose.matrix().row(3) - Eigen::RowVector4d(0, 0, 0, 1)).cwiseAbs().maxCoeff();
   if (!(off <= kRigidTolerance) || !(last <= 1e-6) || r.determinant() < 0)
-    document.fail(object.line, std::string(name) + " of the object that begins here is not a rotation and a translation");
+    document.fail(
+        object.line,
+        std::string(name) + " of the object that begins here is not a rotation and a translation");
   pose.matrix().row(3) << 0, 0, 0, 1;
   return pose;
 }
@@ -91,7 +92,8 @@ Graph read_open3d(const std::string& path) {
   const Value& root = document.root();
   const Value& name = document.member(root, "class_name", Kind::text);
   if (name.text != "PoseGraph")
-    document.fail(name.line, "class_name is '" + name.text.substr(0, 40) + "', expected 'PoseGraph'");
+    document.fail(name.line,
+                  "class_name is '" + name.text.substr(0, 40) + "', expected 'PoseGraph'");
   Graph graph;
   for (const Value& value : document.member(root, "nodes", Kind::array).items) {
     Node node;
@@ -125,7 +127,8 @@ void write_open3d(const std::string& path, const Graph& graph, const Result* res
     text += ", \"source_node_id\": " + std::to_string(edge.source) +
             ", \"target_node_id\": " + std::to_string(edge.target) + ", ";
     append_matrix(text, "transformation", edge.target_from_source.matrix());
-    text += std::string(", \"uncertain\": ") + (edge.loop ? "true" : "false") + ", " + kVersion + "}";
+    text +=
+        std::string(", \"uncertain\": ") + (edge.loop ? "true" : "false") + ", " + kVersion + "}";
   }
   text += "\n],\n\"nodes\": [";
   for (std::size_t k = 0; k < written.poses.size(); ++k) {

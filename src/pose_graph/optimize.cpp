@@ -106,8 +106,7 @@ UnalignedIsometry3d to_isometry(const Pose& pose) {
 }
 
 /// Writes what one component's estimate says into the result.
-void report(const Problem& part, const Estimate& estimate, const Options& options,
-            Result& result) {
+void report(const Problem& part, const Estimate& estimate, const Options& options, Result& result) {
   const double reject_below =
       options.robust == Robust::line_process ? options.line_process.min_weight : 0.5;
   for (int node = 0; node < part.node_count(); ++node)

@@ -79,17 +79,16 @@ void sort_edges(Problem& problem) {
     return std::make_tuple(std::min(e.source, e.target), std::max(e.source, e.target), e.source,
                            !e.odometry, e.modes);
   };
-  std::stable_sort(problem.edges.begin(), problem.edges.end(),
-                   [&](const EdgeTerm& a, const EdgeTerm& b) {
-                     if (key(a) != key(b)) return key(a) < key(b);
-                     for (int k = 0; k < a.modes; ++k) {
-                       const ModeTerm &m = problem.modes[a.first_mode + k],
-                                      &n = problem.modes[b.first_mode + k];
-                       if (lexicographic_less(m, n)) return true;
-                       if (lexicographic_less(n, m)) return false;
-                     }
-                     return false;
-                   });
+  std::stable_sort(
+      problem.edges.begin(), problem.edges.end(), [&](const EdgeTerm& a, const EdgeTerm& b) {
+        if (key(a) != key(b)) return key(a) < key(b);
+        for (int k = 0; k < a.modes; ++k) {
+          const ModeTerm &m = problem.modes[a.first_mode + k], &n = problem.modes[b.first_mode + k];
+          if (lexicographic_less(m, n)) return true;
+          if (lexicographic_less(n, m)) return false;
+        }
+        return false;
+      });
 }
 
 }  // namespace
@@ -124,8 +123,7 @@ Problem compile(const Graph& graph, const Options& options) {
     out.held.push_back(node.fixed);
   }
   const auto position = [&](std::int64_t id) {
-    return static_cast<int>(std::lower_bound(out.ids.begin(), out.ids.end(), id) -
-                            out.ids.begin());
+    return static_cast<int>(std::lower_bound(out.ids.begin(), out.ids.end(), id) - out.ids.begin());
   };
   for (std::size_t k = 0; k < graph.edges.size(); ++k) {
     const Edge& edge = graph.edges[k];
@@ -137,8 +135,8 @@ Problem compile(const Graph& graph, const Options& options) {
     term.modes = 1 + static_cast<int>(edge.alternatives.size());
     term.original = static_cast<int>(k);
     out.edges.push_back(term);
-    out.modes.push_back(mode_term(edge.target_from_source, edge.information, edge.confidence,
-                                  edge.kind, options));
+    out.modes.push_back(
+        mode_term(edge.target_from_source, edge.information, edge.confidence, edge.kind, options));
     for (const EdgeMode& mode : edge.alternatives)
       out.modes.push_back(mode_term(mode.target_from_source, mode.information, mode.confidence,
                                     edge.kind, options));
@@ -146,8 +144,8 @@ Problem compile(const Graph& graph, const Options& options) {
   sort_edges(out);
   for (const GravityFactor& factor : graph.gravity) {
     const Eigen::Vector3d up = factor.up;
-    out.gravity.push_back({position(factor.node), up.normalized(),
-                           1 / std::pow(factor.sigma_degrees * kRadians, 2)});
+    out.gravity.push_back(
+        {position(factor.node), up.normalized(), 1 / std::pow(factor.sigma_degrees * kRadians, 2)});
   }
   for (const PoseFactor& factor : graph.priors)
     out.priors.push_back({position(factor.node), to_pose(factor.world_from_node).inverse(),
@@ -180,8 +178,7 @@ std::vector<Problem> split(const Problem& problem) {
     copy.target = local[edge.target];
     copy.first_mode = static_cast<int>(part.modes.size());
     part.edges.push_back(copy);
-    for (int k = 0; k < edge.modes; ++k)
-      part.modes.push_back(problem.modes[edge.first_mode + k]);
+    for (int k = 0; k < edge.modes; ++k) part.modes.push_back(problem.modes[edge.first_mode + k]);
   }
   for (GravityTerm term : problem.gravity) {
     Problem& part = parts[component[term.node]];

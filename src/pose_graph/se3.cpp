@@ -56,8 +56,7 @@ Eigen::Matrix3d left_jacobian_coupling(const Eigen::Vector3d& w, const Eigen::Ve
   }
   const Eigen::Matrix3d p = skew(w), r = skew(v);
   const Eigen::Matrix3d pr = p * r, rp = r * p, prp = pr * p;
-  return 0.5 * r + b * (pr + rp + prp) + c * (p * pr + rp * p - 3 * prp) +
-         d * (prp * p + p * prp);
+  return 0.5 * r + b * (pr + rp + prp) + c * (p * pr + rp * p - 3 * prp) + d * (prp * p + p * prp);
 }
 
 }  // namespace

@@ -19,9 +19,7 @@ struct Pose {
   Pose operator*(const Pose& other) const {
     return {rotation * other.rotation, rotation * other.translation + translation};
   }
-  Pose inverse() const {
-    return {rotation.transpose(), -(rotation.transpose() * translation)};
-  }
+  Pose inverse() const { return {rotation.transpose(), -(rotation.transpose() * translation)}; }
 };
 
 Eigen::Matrix3d skew(const Eigen::Vector3d& v);

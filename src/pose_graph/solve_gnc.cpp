@@ -34,8 +34,8 @@ class GncSolver {
 
   Estimate run() {
     const std::vector<char> all(problem_.edges.size(), 1);
-    Estimate start = from_paths(std::vector<char>(problem_.edges.size(), 0),
-                                all_edges(problem_).modes);
+    Estimate start =
+        from_paths(std::vector<char>(problem_.edges.size(), 0), all_edges(problem_).modes);
     start.initial_cost = truncated_cost(problem_, start.poses, quantile_, control_.threads);
     if (!control_.options.gnc.consensus) return settled(graduated(start, all, true));
     const Consensus consensus = find_consensus(problem_, quantile_, control_.threads);
@@ -118,8 +118,7 @@ class GncSolver {
       std::vector<char> fresh(edges, 0);
       for (int k = 0; k < edges; ++k) {
         if (problem_.edges[k].odometry || seen[k]) continue;
-        const bool in = believed(consensus, k) &&
-                        consensus.cluster_size[k] >= size / kLevelFactor;
+        const bool in = believed(consensus, k) && consensus.cluster_size[k] >= size / kLevelFactor;
         fresh[k] = in || last;
         seen[k] = fresh[k];
       }

@@ -81,8 +81,7 @@ Estimate solve_line_process(const Problem& problem, const std::vector<char>& kno
   minimise_now(solver.max_iterations, solver.relative_tolerance);
   for (int k = 0; k < problem.edge_count(); ++k) {
     const double l = weights.weights[k];
-    if (!problem.edges[k].odometry)
-      out.cost += 0.5 * mu * std::pow(std::sqrt(l) - 1, 2);
+    if (!problem.edges[k].odometry) out.cost += 0.5 * mu * std::pow(std::sqrt(l) - 1, 2);
   }
   selection = weights;
   return out;

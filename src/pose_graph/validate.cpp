@@ -79,8 +79,7 @@ void validate_edge(const Edge& edge, const Places& places, const std::string& na
   require_known(places, edge.source, name + ".source");
   require_known(places, edge.target, name + ".target");
   if (edge.source == edge.target)
-    throw InvalidArgument(name + " connects node " + std::to_string(edge.source) +
-                          " with itself");
+    throw InvalidArgument(name + " connects node " + std::to_string(edge.source) + " with itself");
   if (edge.kind != EdgeKind::odometry && edge.kind != EdgeKind::loop)
     throw InvalidArgument(name + ".kind is " + std::to_string(static_cast<int>(edge.kind)) +
                           ", expected odometry or loop");

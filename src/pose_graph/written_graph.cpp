@@ -21,8 +21,7 @@ WrittenEdge written_edge(const Edge& edge, std::uint32_t mode, const std::string
   out.target = edge.target;
   out.loop = edge.kind == EdgeKind::loop;
   out.confidence = mode == 0 ? edge.confidence : edge.alternatives[mode - 1].confidence;
-  const auto& information =
-      mode == 0 ? edge.information : edge.alternatives[mode - 1].information;
+  const auto& information = mode == 0 ? edge.information : edge.alternatives[mode - 1].information;
   if (!information) refuse(name + " has no information", format);
   out.information = *information;
   out.target_from_source =

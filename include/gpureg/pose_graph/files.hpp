@@ -35,8 +35,8 @@ void write_g2o(const std::string& path, const Graph& graph, const Result* result
 /// @throws IoError naming file, line and reason.
 Graph read_open3d(const std::string& path);
 
-/// Writes an Open3D PoseGraph (JSON). Nodes must have the ids 0, 1, ..., as Open3D refers to nodes by
-/// position.
+/// Writes an Open3D PoseGraph (JSON). Nodes must have the ids 0, 1, ..., as Open3D refers to nodes
+/// by position.
 /// @param result  as for write_g2o.
 /// @throws IoError; InvalidArgument as write_g2o's.
 void write_open3d(const std::string& path, const Graph& graph, const Result* result = nullptr);

@@ -16,8 +16,8 @@ namespace gpureg::pose_graph {
 /// @throws InvalidArgument naming field, place and value (Graph::validate, Options::validate, or a
 ///   marginal of an unknown node).
 /// Thread-safe.
-/// Sources: Yang et al., "Graduated Non-Convexity for Robust Spatial Perception", RA-L 2020; Choi et
-/// al., "Robust Reconstruction of Indoor Scenes", CVPR 2015, section 4; Olson and Agarwal,
+/// Sources: Yang et al., "Graduated Non-Convexity for Robust Spatial Perception", RA-L 2020; Choi
+/// et al., "Robust Reconstruction of Indoor Scenes", CVPR 2015, section 4; Olson and Agarwal,
 /// "Inference on Networks of Mixtures", RSS 2012 (several modes).
 Result optimize(const Graph& graph, const Options& options = {});
 

@@ -17,12 +17,12 @@ enum class Robust {
 
 /// Noise of odometry edges without an information matrix: it grows with the motion.
 struct DriftOptions {
-  double translation_per_metre = 0.02;       ///< metres of sigma per metre travelled, >= 0
-  double rotation_per_metre = 0.2;           ///< degrees of sigma per metre travelled, >= 0
-  double rotation_per_degree = 0.02;         ///< degrees of sigma per degree turned, >= 0
-  double min_translation = 0.01;             ///< metres, > 0
-  double min_rotation = 0.2;                 ///< degrees, > 0
-  void validate() const;                     ///< throws InvalidArgument
+  double translation_per_metre = 0.02;  ///< metres of sigma per metre travelled, >= 0
+  double rotation_per_metre = 0.2;      ///< degrees of sigma per metre travelled, >= 0
+  double rotation_per_degree = 0.02;    ///< degrees of sigma per degree turned, >= 0
+  double min_translation = 0.01;        ///< metres, > 0
+  double min_rotation = 0.2;            ///< degrees, > 0
+  void validate() const;                ///< throws InvalidArgument
 };
 
 /// Noise of loop edges without an information matrix.
@@ -38,15 +38,15 @@ struct GncOptions {
   /// squared-error threshold is the quantile of the chi-square distribution with 6 degrees of
   /// freedom, plus 2 log(p / (1 - p)) for a loop of confidence p.
   double inlier_probability = 0.99;
-  double mu_step = 1.4;        ///< factor on mu per round, > 1 (Yang et al. 2020, Remark 5)
-  int max_rounds = 200;        ///< >= 1
+  double mu_step = 1.4;  ///< factor on mu per round, > 1 (Yang et al. 2020, Remark 5)
+  int max_rounds = 200;  ///< >= 1
   /// A loop that lies on no cycle is checked by nothing: it fits perfectly, correct or not. It is
   /// accepted if its confidence is at least this, [0, 1]; otherwise the graph is split there.
   double min_bridge_confidence = 0.5;
   /// Start from loops that agree with each other along short cycles. false: start from all loops,
   /// as the paper of GNC does.
   bool consensus = true;
-  void validate() const;       ///< throws InvalidArgument
+  void validate() const;  ///< throws InvalidArgument
 };
 
 /// The line process: E = lambda * sum odometry + sum l f + mu * (sqrt(l) - 1)^2.
@@ -57,8 +57,8 @@ struct LineProcessOptions {
   /// = tau * kappa as LoopSmart prints it. kappa is the mean number of correspondences, read from
   /// the translation block of the loops' information (Edge::information = sum G'G).
   bool tau_not_squared = false;
-  double min_weight = 0.25;    ///< a loop with a smaller l is rejected, (0, 1)
-  int max_rounds = 100;        ///< >= 1
+  double min_weight = 0.25;  ///< a loop with a smaller l is rejected, (0, 1)
+  int max_rounds = 100;      ///< >= 1
   /// The two below concern whoever computes the information matrices; optimize() does not use them.
   double correspondence_distance = 0.05;  ///< epsilon: correspondences are closer than this, metres
   int refresh_interval = 50;              ///< fragments after which they are computed again
@@ -67,16 +67,16 @@ struct LineProcessOptions {
 
 /// Levenberg-Marquardt.
 struct SolverOptions {
-  int max_iterations = 100;            ///< of one minimisation, >= 1
-  double relative_tolerance = 1e-7;    ///< stop when the cost falls by less than this share, >= 0
-  double initial_damping = 1e-6;       ///< > 0
-  void validate() const;               ///< throws InvalidArgument
+  int max_iterations = 100;          ///< of one minimisation, >= 1
+  double relative_tolerance = 1e-7;  ///< stop when the cost falls by less than this share, >= 0
+  double initial_damping = 1e-6;     ///< > 0
+  void validate() const;             ///< throws InvalidArgument
 };
 
 /// How far optimize() has come.
 struct Progress {
-  int iteration = 0;       ///< linear systems solved
-  double cost = 0;         ///< of the objective that is being minimised now
+  int iteration = 0;  ///< linear systems solved
+  double cost = 0;    ///< of the objective that is being minimised now
 };
 
 /// Options of optimize(). The defaults take the noise from the edges' information matrices.
