@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <sys/stat.h>
 
-#include <algorithm>
-#include <chrono>
 #include <filesystem>
 #include <iostream>
 #include <map>
@@ -20,7 +18,7 @@
 #include "method_options.hpp"
 #include "options_json.hpp"
 #include "output_path.hpp"
-#include "progress.hpp"
+#include "pair_run.hpp"
 #include "result_json.hpp"
 #include "scene.hpp"
 #include "spacing.hpp"
@@ -56,38 +54,6 @@ void check_outputs(const BatchOptions& o) {
   check_outputs(outputs, inputs);
 }
 
-using Pairs = std::vector<std::pair<std::uint32_t, std::uint32_t>>;  // indices i < j into the scene
-
-// Backend and threads may change between runs: they do not change results.
-Json header_of(const BatchOptions& o, const Scene& scene, const Pairs& pairs) {
-  std::uint64_t hash = pairs.size();
-  for (const auto& [i, j] : pairs)
-    hash = (hash ^ (static_cast<std::uint64_t>(i) << 32 | j)) * 0x9E3779B97F4A7C15ull;
-  Json fragments = Json::array();
-  for (std::size_t k = 0; k < scene.numbers.size(); ++k)
-    fragments.push_back({{"number", scene.numbers[k]}, {"hash", scene.hashes[k]}});
-  return {{"gpureg_journal", 1},
-          {"version", GPUREG_VERSION},
-          {"options", to_json(o.method.registration())},
-          {"pairs", {{"count", pairs.size()}, {"hash", hash}}},
-          {"fragments", fragments}};
-}
-
-/// The voxel size of a folder is that of some of its fragments, evenly chosen: it is the same for a
-/// run that is resumed.
-void choose_voxel_size(BatchOptions& o) {
-  if (!o.method.automatic_voxel_size) return;
-  constexpr std::size_t kMost = 8;
-  const auto files = io::list_fragments(o.folder);
-  const std::size_t count = std::min(files.size(), kMost);
-  std::vector<PointCloud> clouds;
-  for (std::size_t k = 0; k < count; ++k)
-    clouds.push_back(io::read_point_cloud(files[k * files.size() / count].second));
-  std::vector<PointCloudView> views;
-  for (const PointCloud& cloud : clouds) views.push_back(cloud.view());
-  o.method.choose_voxel_size(views, o.folder);
-}
-
 /// One run, from the folder to the files.
 class Batch {
  public:
@@ -105,77 +71,40 @@ class Batch {
       return kInterrupted;
     }
     check_voxel_size(options_.prepare.voxel_size, scene_.extent, "the largest fragment");
-    pairs_ = choose_pairs(scene_, o_.pairs, o_.quiet);
-    if (pairs_.empty())
+    Pairs pairs = choose_pairs(scene_, o_.pairs, o_.quiet);
+    if (pairs.empty())
       throw InvalidArgument(o_.pairs == "all" ? o_.folder + " holds one fragment; a batch needs two"
                                               : o_.pairs + " lists no pair");
-    open_journal();
+    std::optional<std::string> journal;
+    if (can_have_journal(o_.log)) journal = o_.journal();
+    run_.emplace(scene_, std::move(pairs), options_, journal, o_.journal_mode(), o_.quiet);
     keep_outputs();
-    align_all();
-    const bool complete = done_.size() == pairs_.size();
-    if (!complete && journal_ && kept_.empty()) journal_->note_outputs();
+    run_->align(context_);
+    if (!run_->complete() && run_->journal() && kept_.empty()) run_->journal()->note_outputs();
     write_outputs();
-    if (!complete) return say_interrupted();
-    if (journal_) journal_->remove();
+    if (!run_->complete()) return say_interrupted();
+    if (run_->journal()) run_->journal()->remove();
     return summarise();
   }
 
  private:
-  void open_journal() {
-    if (!can_have_journal(o_.log)) return;
-    const bool found = std::filesystem::exists(o_.journal());
-    journal_.emplace(o_.journal(), header_of(o_, scene_, pairs_), o_.journal_mode());
-    done_ = journal_->entries();
-    resumed_ = done_.size();
-    if (!o_.resume || o_.quiet) return;
-    if (found)
-      std::cerr << "gpureg: " << resumed_ << " of " << pairs_.size() << " pairs are done already"
-                << std::endl;
-    else
-      std::cerr << "gpureg: there is nothing to resume, as no " << o_.journal()
-                << " of an unfinished run is there; all pairs are aligned" << std::endl;
-  }
-
   /// Only a complete run replaces the outputs of another run; an interrupted run keeps its own.
   void keep_outputs() {
-    if (journal_ && journal_->wrote_outputs()) return;
+    if (run_->journal() && run_->journal()->wrote_outputs()) return;
     for (const std::string& path : {o_.log, o_.info, o_.json})
       if (std::filesystem::is_regular_file(path)) kept_.insert(path);
   }
   bool may_write(const std::string& path) const {
-    return !path.empty() && (done_.size() == pairs_.size() || kept_.count(path) == 0);
-  }
-
-  void align_all() {
-    std::vector<Pair> left;
-    for (const auto& [i, j] : pairs_)
-      if (done_.count({scene_.numbers[i], scene_.numbers[j]}) == 0) left.push_back({j, i});
-    Progress progress("aligning", "pairs", pairs_.size(), o_.quiet, done_.size());
-    BatchCallbacks callbacks;
-    callbacks.on_result = [&](std::size_t k, const RegistrationResult& result) {
-      const int i = scene_.numbers[left[k].target], j = scene_.numbers[left[k].source];
-      const PairRecord record = PairRecord::from_result(i, j, result);
-      const Json information = to_json(result.source_moments.information_redwood());
-      if (journal_) journal_->add(record, information);
-      done_.emplace(std::make_pair(i, j), Journal::Entry{record, information});
-      progress.update(done_.size());
-    };
-    callbacks.should_stop = [&] {
-      if (journal_) journal_->flush();
-      return InterruptGuard::requested();
-    };
-    align_batch(context_, scene_.clouds, left, options_, callbacks);
-    if (journal_) journal_->flush();
-    seconds_ = progress.seconds();
+    return !path.empty() && (run_->complete() || kept_.count(path) == 0);
   }
 
   void write_outputs() {
     std::vector<evaluation::LogEntry> log;
     std::vector<evaluation::InformationEntry> information;
     Json records = Json::array();
-    for (const auto& [a, b] : pairs_) {
-      const auto found = done_.find({scene_.numbers[a], scene_.numbers[b]});
-      if (found == done_.end()) continue;
+    for (const auto& [a, b] : run_->pairs()) {
+      const auto found = run_->done().find({scene_.numbers[a], scene_.numbers[b]});
+      if (found == run_->done().end()) continue;
       const auto& [pair, matrix] = found->second;
       records.push_back(pair.json);
       if (!pair.aligned) {
@@ -197,31 +126,21 @@ class Batch {
     json["environment"] = environment(context_);
     json["options"] = to_json(options_);
     json["folder"] = o_.folder;
-    json["complete"] = done_.size() == pairs_.size();
+    json["complete"] = run_->complete();
     json["seconds"] = {{"prepare", scene_.seconds},
-                       {"align", seconds_},
-                       {"pairs_per_second", rate()},
-                       {"pairs_in_this_run", done_.size() - resumed_}};
+                       {"align", run_->seconds()},
+                       {"pairs_per_second", run_->rate()},
+                       {"pairs_in_this_run", run_->in_this_run()}};
     json["peak_memory_mib"] = peak_memory_mib();
-    Json fragments = Json::array();
-    for (std::size_t k = 0; k < scene_.numbers.size(); ++k) {
-      Json fragment = {{"number", scene_.numbers[k]}, {"file", base_name(scene_.files[k])}};
-      fragment.update(to_json(scene_.clouds[k].statistics()));
-      fragments.push_back(std::move(fragment));
-    }
-    json["fragments"] = std::move(fragments);
+    json["fragments"] = fragments_json(scene_);
     json["pairs"] = std::move(records);
     return json;
-  }
-
-  double rate() const {
-    return seconds_ > 0 ? static_cast<double>(done_.size() - resumed_) / seconds_ : 0;
   }
 
   int say_interrupted() const {
     std::string kept;
     for (const std::string& path : kept_) kept += (kept.empty() ? "" : ", ") + path;
-    std::cerr << "gpureg: interrupted, " << done_.size() << " of " << pairs_.size()
+    std::cerr << "gpureg: interrupted, " << run_->done().size() << " of " << run_->pairs().size()
               << " pairs are done and written"
               << (kept.empty() ? "" : " to the journal, " + kept + " left as before")
               << "; go on with the same command and --resume" << std::endl;
@@ -235,8 +154,9 @@ class Batch {
                   << "\n";
       std::cout << "fragments  " << scene_.numbers.size() << ", prepared in "
                 << fixed(scene_.seconds, 2) << " s\n"
-                << "pairs      " << pairs_.size() << ", in " << fixed(seconds_, 2) << " s ("
-                << significant(rate(), 3) << " pairs/s, " << context_.description() << ")\n"
+                << "pairs      " << run_->pairs().size() << ", in " << fixed(run_->seconds(), 2)
+                << " s (" << significant(run_->rate(), 3) << " pairs/s, " << context_.description()
+                << ")\n"
                 << "aligned    " << aligned_ << ", written to " << o_.log << "\n";
       for (const auto& [reason, count] : reasons_)
         std::cout << "not        " << count << ", " << reason << "\n";
@@ -249,13 +169,10 @@ class Batch {
   RegistrationOptions options_;
   Context context_;
   Scene scene_;
-  Pairs pairs_;
-  std::optional<Journal> journal_;
-  Journal::Entries done_;
+  std::optional<PairRun> run_;
   std::set<std::string> kept_;  // outputs of another run
-  std::size_t resumed_ = 0, aligned_ = 0;
+  std::size_t aligned_ = 0;
   std::map<std::string, std::size_t> reasons_;
-  double seconds_ = 0;
 };
 
 }  // namespace
@@ -281,7 +198,7 @@ void add_batch(CLI::App& app, Action& chosen) {
     chosen = [o] {
       o->method.registration();  // reports bad options before the clouds are read
       check_outputs(*o);
-      choose_voxel_size(*o);
+      choose_voxel_size(o->method, o->folder);
       return Batch(*o).run();
     };
   });

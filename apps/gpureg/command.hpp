@@ -16,6 +16,7 @@ using Action = std::function<int()>;
 void add_register(CLI::App& app, Action& chosen);
 void add_batch(CLI::App& app, Action& chosen);
 void add_consistency(CLI::App& app, Action& chosen);
+void add_reconstruct(CLI::App& app, Action& chosen);
 void add_evaluate(CLI::App& app, Action& chosen);
 void add_report(CLI::App& app, Action& chosen);
 void add_generate(CLI::App& app, Action& chosen);

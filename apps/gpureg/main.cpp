@@ -64,6 +64,7 @@ int run(int argc, char** argv) {
   add_register(app, action);
   add_batch(app, action);
   add_consistency(app, action);
+  add_reconstruct(app, action);
   add_evaluate(app, action);
   add_report(app, action);
   add_generate(app, action);

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "pair_record.hpp"
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "gpureg/error.hpp"
@@ -52,6 +54,26 @@ Eigen::Matrix<double, Size, Size> square(const Json& json, const char* name) {
   return matrix;
 }
 
+std::array<double, 6> six(const Json& json, const char* name) {
+  const Json& value = member(json, name);
+  if (!value.is_array() || value.size() != 6)
+    throw InvalidArgument(std::string("\"") + name + "\" is not an array of 6 numbers");
+  std::array<double, 6> out;
+  for (std::size_t k = 0; k < 6; ++k) out[k] = number(value[k], name);
+  return out;
+}
+
+/// The inverse of CorrespondenceMoments::information_redwood().
+CorrespondenceMoments moments_of(const Eigen::Matrix<double, 6, 6>& information) {
+  CorrespondenceMoments moments;
+  moments.count = static_cast<std::uint64_t>(std::max(0.0, std::round(information(0, 0))));
+  const Eigen::Matrix3d cross = information.topRightCorner<3, 3>() / -2;
+  moments.sum = {cross(2, 1), cross(0, 2), cross(1, 0)};
+  const Eigen::Matrix3d turn = information.bottomRightCorner<3, 3>() / 4;
+  moments.outer = 0.5 * turn.trace() * Eigen::Matrix3d::Identity() - turn;
+  return moments;
+}
+
 }  // namespace
 
 PairRecord PairRecord::from_result(int i, int j, const RegistrationResult& result) {
@@ -91,9 +113,30 @@ std::vector<RegistrationMode> modes_from_json(const Json& pair) {
     RegistrationMode mode;
     mode.target_from_source.matrix() = square<4>(member(json, "T_ij"), "T_ij");
     mode.confidence = number(member(json, "confidence"), "confidence");
+    if (const auto evidence = json.find("evidence");
+        evidence != json.end() && evidence->is_object()) {
+      mode.evidence.information_eigenvalues = six(*evidence, "information_eigenvalues");
+      mode.evidence.weakest_direction = six(*evidence, "weakest_direction");
+    }
     modes.push_back(mode);
   }
   return modes;
+}
+
+RegistrationResult result_from_record(const PairRecord& record, const Json& information) {
+  RegistrationResult result;
+  result.status = record.aligned ? RegistrationStatus::aligned : RegistrationStatus::not_aligned;
+  result.reason = RegistrationReason::none;
+  for (int k = 0; k <= static_cast<int>(RegistrationReason::cancelled); ++k)
+    if (record.reason == to_string(static_cast<RegistrationReason>(k)))
+      result.reason = static_cast<RegistrationReason>(k);
+  result.has_candidate = record.transform.has_value();
+  if (result.has_candidate) result.target_from_source.matrix() = *record.transform;
+  result.score = record.score;
+  result.modes = modes_from_json(record.json);
+  if (!information.is_null())
+    result.source_moments = moments_of(information_from_json(information));
+  return result;
 }
 
 Eigen::Matrix<double, 6, 6> information_from_json(const Json& json) {

@@ -30,9 +30,13 @@ struct PairRecord {
   static PairRecord from_json(const Json& json);
 };
 
-/// The modes of a pair's record: poses and confidences, without their evidence. Throws
-/// InvalidArgument.
+/// The modes of a pair's record: poses, confidences and, of their evidence, the information of the
+/// geometry. Throws InvalidArgument.
 std::vector<RegistrationMode> modes_from_json(const Json& pair);
+
+/// The result that a record was made of, as far as loop consistency and reconstruction need it.
+/// information: of the journal; null: not known. Throws InvalidArgument.
+RegistrationResult result_from_record(const PairRecord& record, const Json& information);
 
 /// 6x6, row by row. Throws InvalidArgument.
 Eigen::Matrix<double, 6, 6> information_from_json(const Json& json);

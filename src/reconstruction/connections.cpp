@@ -1,0 +1,127 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "reconstruction/connections.hpp"
+
+#include <algorithm>
+#include <map>
+#include <numeric>
+#include <queue>
+#include <utility>
+
+namespace gpureg::reconstruction {
+namespace {
+
+/// No edge is certain: keeps odds finite.
+constexpr double kMostConfidence = 1 - 1e-9;
+
+/// Probabilities that all accepted and that all rejected edges between two parts are wrong.
+struct Connection {
+  double accepted_wrong = 1, rejected_wrong = 1;
+
+  /// Odds of: one of the accepted edges is correct, one of the rejected ones is, none is.
+  double confidence() const {
+    const double accepted = 1 / accepted_wrong - 1, rejected = 1 / rejected_wrong - 1;
+    return accepted / (1 + accepted + rejected);
+  }
+};
+
+std::uint32_t find(std::vector<std::uint32_t>& parent, std::uint32_t k) {
+  while (parent[k] != k) k = parent[k] = parent[parent[k]];
+  return k;
+}
+
+}  // namespace
+
+std::vector<std::uint32_t> certain_parts(std::size_t scans, const std::vector<Edge>& edges,
+                                         double min_confidence) {
+  std::vector<std::uint32_t> parent(scans);
+  std::iota(parent.begin(), parent.end(), 0u);
+  // Log odds and back: a confidence of exactly the minimum counts.
+  constexpr double kRounding = 1e-9;
+  for (bool merged = true; merged;) {
+    merged = false;
+    std::map<std::pair<std::uint32_t, std::uint32_t>, Connection> connections;
+    for (const Edge& edge : edges) {
+      const auto [a, b] = std::minmax({find(parent, edge.source), find(parent, edge.target)});
+      if (a == b) continue;
+      Connection& connection = connections[{a, b}];
+      (edge.accepted ? connection.accepted_wrong : connection.rejected_wrong) *=
+          1 - std::min(edge.confidence, kMostConfidence);
+    }
+    for (const auto& [between, connection] : connections) {
+      if (connection.confidence() < min_confidence - kRounding) continue;
+      const auto [a, b] = std::minmax({find(parent, between.first), find(parent, between.second)});
+      parent[b] = a;
+      merged = true;
+    }
+  }
+  std::vector<std::uint32_t> part(scans);
+  for (std::size_t k = 0; k < scans; ++k) part[k] = find(parent, static_cast<std::uint32_t>(k));
+  return part;
+}
+
+std::size_t reject_deviating(Reconstruction& map, double max_error) {
+  std::vector<std::pair<double, std::size_t>> deviating;
+  for (std::size_t k = 0; k < map.edges.size(); ++k) {
+    const Edge& edge = map.edges[k];
+    if (!edge.accepted || !map.scans[edge.source].placed) continue;
+    const Eigen::Vector3d measured =
+        map.scans[edge.target].island_from_scan * (edge.target_from_source * edge.overlap_centre);
+    const Eigen::Vector3d refined = map.scans[edge.source].island_from_scan * edge.overlap_centre;
+    const double error = (measured - refined).norm();
+    if (error > max_error) deviating.emplace_back(-error, k);
+  }
+  std::sort(deviating.begin(), deviating.end());
+  std::size_t rejected = 0;
+  for (const auto& [minus_error, candidate] : deviating) {
+    std::vector<std::uint32_t> parent(map.scans.size());
+    std::iota(parent.begin(), parent.end(), 0u);
+    for (std::size_t k = 0; k < map.edges.size(); ++k)
+      if (map.edges[k].accepted && k != candidate)
+        parent[find(parent, map.edges[k].source)] = find(parent, map.edges[k].target);
+    Edge& edge = map.edges[candidate];
+    if (find(parent, edge.source) != find(parent, edge.target)) continue;
+    edge.accepted = false;
+    edge.weight = 0;
+    edge.reason = EdgeReason::inconsistent;
+    ++rejected;
+  }
+  return rejected;
+}
+
+void set_confidence(Reconstruction& map) {
+  struct Neighbor {
+    std::uint32_t scan;
+    double confidence;
+  };
+  std::vector<std::vector<Neighbor>> neighbors(map.scans.size());
+  std::vector<double> sum(map.scans.size(), 0);
+  for (const Edge& edge : map.edges) {
+    if (!edge.accepted || !map.scans[edge.source].placed) continue;
+    neighbors[edge.source].push_back({edge.target, edge.confidence});
+    neighbors[edge.target].push_back({edge.source, edge.confidence});
+    sum[edge.source] += edge.confidence;
+    sum[edge.target] += edge.confidence;
+  }
+  for (const Island& island : map.islands) {
+    const std::uint32_t root =
+        *std::max_element(island.scans.begin(), island.scans.end(),
+                          [&](std::uint32_t a, std::uint32_t b) { return sum[a] < sum[b]; });
+    for (const std::uint32_t scan : island.scans) map.scans[scan].confidence = 0;
+    std::priority_queue<std::pair<double, std::uint32_t>> queue;  // Dijkstra 1959, by products
+    map.scans[root].confidence = 1;
+    queue.emplace(1.0, root);
+    while (!queue.empty()) {
+      const auto [confidence, scan] = queue.top();
+      queue.pop();
+      if (confidence < map.scans[scan].confidence) continue;
+      for (const Neighbor& next : neighbors[scan]) {
+        const double reached = confidence * next.confidence;
+        if (reached <= map.scans[next.scan].confidence) continue;
+        map.scans[next.scan].confidence = reached;
+        queue.emplace(reached, next.scan);
+      }
+    }
+  }
+}
+
+}  // namespace gpureg::reconstruction

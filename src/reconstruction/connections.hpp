@@ -1,0 +1,25 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <vector>
+
+#include "gpureg/reconstruction.hpp"
+
+namespace gpureg::reconstruction {
+
+/// Parts of the map whose connections are certain: sets of scans, merged as long as the accepted
+/// edges between two sets reach the confidence together. Rejected edges between them count against
+/// it.
+/// @return number of the part of each scan.
+std::vector<std::uint32_t> certain_parts(std::size_t scans, const std::vector<Edge>& edges,
+                                         double min_confidence);
+
+/// Rejects accepted edges whose pose is farther from that of the map than max_error at the centre
+/// of the overlap, the farthest first, as long as other accepted edges connect their scans.
+/// @return number of edges rejected.
+std::size_t reject_deviating(Reconstruction& map, double max_error);
+
+/// Scan::confidence of the placed scans.
+void set_confidence(Reconstruction& map);
+
+}  // namespace gpureg::reconstruction

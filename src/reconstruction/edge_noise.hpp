@@ -1,0 +1,17 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include "gpureg/reconstruction.hpp"
+
+namespace gpureg::reconstruction {
+
+/// Information of a registered pose in the convention of pose_graph::Edge: EdgeNoiseOptions at the
+/// centre of the overlap, less along the direction that the geometry holds weakly.
+/// @param mode pose and evidence; without eigenvalues the noise is isotropic.
+/// @param source_centre of the overlap, in the source's frame.
+/// @param unit Options::information_unit.
+pose_graph::UnalignedMatrix6d edge_information(const RegistrationMode& mode,
+                                               const Eigen::Vector3d& source_centre,
+                                               const EdgeNoiseOptions& noise, double unit);
+
+}  // namespace gpureg::reconstruction
