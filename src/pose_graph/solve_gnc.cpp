@@ -152,12 +152,15 @@ class GncSolver {
         seen[k] = fresh[k];
       }
       if (any(fresh)) {
-        estimate = restarted(std::move(estimate), fresh, consensus.modes);
+        bool apart = false;
+        estimate = restarted(std::move(estimate), fresh, consensus.modes, apart);
         if (!first) fresh = explained(estimate, fresh);
         for (int k = 0; k < edges; ++k) admitted[k] = admitted[k] || fresh[k];
-        // Least squares is a good start while nearly all loops are correct. Among later ones may be
-        // false ones that agree with each other, and the estimate is a better start.
-        if (first || any(fresh)) estimate = graduated(std::move(estimate), admitted, first);
+        // Least squares is a good start while nearly all loops are correct, and where new poses of a
+        // part came from single paths. Among later loops may be false ones that agree with each
+        // other; then the estimate is a better start.
+        if (first || any(fresh))
+          estimate = graduated(std::move(estimate), admitted, first || apart);
         first = false;
         if (estimate.failed || control_.cancelled) return estimate;
       }
@@ -166,16 +169,16 @@ class GncSolver {
     return estimate;
   }
 
-  /// Poses of what the accepted edges do not connect to the known nodes, from paths over trusted
-  /// loops.
+  /// Poses of nodes that the accepted edges do not connect to the known nodes, from paths over
+  /// trusted loops. apart: out, there are such nodes.
   Estimate restarted(Estimate estimate, const std::vector<char>& trusted,
-                     const std::vector<int>& modes) const {
+                     const std::vector<int>& modes, bool& apart) const {
     const std::vector<int> component = components_of(problem_, [&](int k) {
       return problem_.edges[k].odometry || estimate.selection.weights[k] > 0.5;
     });
     std::vector<char> held(known_);
     const auto anchor = std::find(known_.begin(), known_.end(), 1) - known_.begin();
-    bool apart = false;
+    apart = false;
     for (int node = 0; node < problem_.node_count(); ++node) {
       if (component[node] == component[anchor]) held[node] = 1;
       apart |= !held[node];
