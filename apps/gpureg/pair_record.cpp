@@ -54,8 +54,11 @@ Eigen::Matrix<double, Size, Size> square(const Json& json, const char* name) {
   return matrix;
 }
 
+/// Zeros where the member is absent: results of older versions lack some of the evidence.
 std::array<double, 6> six(const Json& json, const char* name) {
-  const Json& value = member(json, name);
+  const auto found = json.find(name);
+  if (found == json.end()) return {};
+  const Json& value = *found;
   if (!value.is_array() || value.size() != 6)
     throw InvalidArgument(std::string("\"") + name + "\" is not an array of 6 numbers");
   std::array<double, 6> out;
