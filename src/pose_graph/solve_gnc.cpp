@@ -156,8 +156,8 @@ class GncSolver {
         estimate = restarted(std::move(estimate), fresh, consensus.modes, apart);
         if (!first) fresh = explained(estimate, fresh);
         for (int k = 0; k < edges; ++k) admitted[k] = admitted[k] || fresh[k];
-        // Least squares is a good start while nearly all loops are correct, and where new poses of a
-        // part came from single paths. Among later loops may be false ones that agree with each
+        // Least squares is a good start while nearly all loops are correct, and where new poses of
+        // a part came from single paths. Among later loops may be false ones that agree with each
         // other; then the estimate is a better start.
         if (first || any(fresh))
           estimate = graduated(std::move(estimate), admitted, first || apart);
