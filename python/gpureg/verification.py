@@ -72,8 +72,8 @@ def verify(
         raise ValueError(
             f"poses[{k}]: its last row is {matrices[k, 3].tolist()}, expected [0, 0, 0, 1]"
         )
-    clouds = prepared([source, target], options.prepare, context, False)
-    return _core.verify(context, *clouds, matrices, options, refine, search_alternatives)
+    first, second = prepared([source, target], options.prepare, context, False)
+    return _core.verify(context, first, second, matrices, options, refine, search_alternatives)
 
 
 __all__ = ["verify"]

@@ -109,7 +109,8 @@ def test_progress_moves_within_a_chunk(tmp_path):
         options=few(800_000, 0.08),
         progress=lambda done, total: seen.append(done),
     )
-    assert seen[-1] == 36 and seen == sorted(seen) and len(set(seen)) >= 4
+    # How many of the pieces are seen depends on the machine; the chunk is all 36 pairs.
+    assert seen[-1] == 36 and seen == sorted(seen) and any(0 < done < 36 for done in seen)
 
 
 def test_errors_come_out(tmp_path):
