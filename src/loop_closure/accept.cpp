@@ -13,27 +13,12 @@
 namespace gpureg::loop_closure {
 namespace {
 
-/// Odometry edges between the ends of two loops that are compared.
-constexpr int kMostHops = 40;
-/// Loops agree by chance unless their prediction is this much better than that of odometry.
-constexpr double kInformative = 0.5;
 /// Registrations of neighbouring fragments fail together: a confirming loop is never less likely to
 /// be wrong than this.
 constexpr double kLeastWrong = 0.2;
 /// Loops that confirm one loop; more add nothing.
 constexpr std::size_t kMostConfirming = 4;
 constexpr double kNever = std::numeric_limits<double>::infinity();
-
-UncertainPose uncertain(const Mode& mode) {
-  return {to_pose(mode.target_from_source), pose_graph::covariance_of(mode.information)};
-}
-
-/// Squared Mahalanobis distance of two estimates of one pose.
-double distance(const UncertainPose& a, const UncertainPose& b) {
-  const Vector6d e = pose_graph::log(a.pose.inverse() * b.pose);
-  const Matrix6d covariance = a.covariance + b.covariance;
-  return e.dot(covariance.llt().solve(e));
-}
 
 class Acceptance {
  public:
@@ -42,8 +27,7 @@ class Acceptance {
       : state_(state),
         odometry_(odometry),
         fits_(fits),
-        options_(options.acceptance),
-        quantile_(pose_graph::chi_square_quantile(options_.drift_probability)) {
+        options_(options.acceptance) {
     for (std::size_t k = 0; k < state.loops.size(); ++k)
       if (fits[k]) order_.push_back(k);
     std::stable_sort(order_.begin(), order_.end(), [&](std::size_t a, std::size_t b) {
@@ -94,15 +78,18 @@ class Acceptance {
   /// Probability that the loop and all that confirm it are wrong; 1: nothing confirms it.
   double wrong_together(std::size_t k) {
     const LoopRecord& own = record(k);
-    by_source_ = odometry_.tree(odometry_.position(own.source), kMostHops);
-    by_target_ = odometry_.tree(odometry_.position(own.target), kMostHops);
+    const auto relations = state_.relations.find(own.key(own.mode));
+    if (relations == state_.relations.end()) return 1;
+    std::set<std::uint64_t> agreeing;
+    for (const Relation& relation : relations->second)
+      if (relation.agrees) agreeing.insert(relation.other);
     std::set<FragmentId> used{own.loop.source, own.loop.target};
     double wrong = 1 - mode(k).confidence;
     std::size_t count = 0;
     for (const std::size_t other : order_) {
       const Loop& loop = record(other).loop;
       if (other == k || used.count(loop.source) || used.count(loop.target)) continue;
-      if (!agrees(k, other)) continue;
+      if (agreeing.count(record(other).key(record(other).mode)) == 0) continue;
       used.insert({loop.source, loop.target});
       wrong *= std::max(kLeastWrong, 1 - mode(other).confidence);
       if (++count == kMostConfirming) break;
@@ -110,37 +97,25 @@ class Acceptance {
     return count == 0 ? 1 : wrong;
   }
 
-  bool agrees(std::size_t k, std::size_t other) {
-    const LoopRecord& theirs = record(other);
-    const int a = odometry_.position(theirs.source), b = odometry_.position(theirs.target);
-    const double straight = by_source_.cost(a) + by_target_.cost(b);
-    const double crossed = by_source_.cost(b) + by_target_.cost(a);
-    if (straight == kNever && crossed == kNever) return false;
-    const UncertainPose across = uncertain(mode(other));
-    const UncertainPose predicted =
-        straight <= crossed
-            ? by_target_.root_from(b) * across * by_source_.root_from(a).inverse()
-            : by_target_.root_from(a) * across.inverse() * by_source_.root_from(b).inverse();
-    const int source = odometry_.position(record(k).source);
-    if (by_target_.reaches(source)) {
-      const Eigen::Vector3d centre = state_.nodes.at(record(k).source).coarse.centre;
-      const double drift = sigma_at(by_target_.root_from(source).covariance, centre);
-      if (sigma_at(predicted.covariance, centre) > kInformative * drift) return false;
-    }
-    return distance(uncertain(mode(k)), predicted) <= quantile_;
-  }
-
   const State& state_;
   const Paths& odometry_;
   const std::vector<char>& fits_;
   const AcceptanceOptions& options_;
-  double quantile_;
   std::vector<std::size_t> order_;  ///< of the loops that fit, the most confident first
   std::map<std::pair<int, int>, double> rejected_wrong_;
-  PathTree by_source_, by_target_;
 };
 
 }  // namespace
+
+UncertainPose uncertain(const Mode& mode) {
+  return {to_pose(mode.target_from_source), pose_graph::covariance_of(mode.information)};
+}
+
+double squared_distance(const UncertainPose& a, const UncertainPose& b) {
+  const Vector6d e = pose_graph::log(a.pose.inverse() * b.pose);
+  const Matrix6d covariance = a.covariance + b.covariance;
+  return e.dot(covariance.llt().solve(e));
+}
 
 void compute_drift_ratios(State& state, const Paths& odometry, const Options& options) {
   const double quantile = pose_graph::chi_square_quantile(options.acceptance.drift_probability);
@@ -157,7 +132,7 @@ void compute_drift_ratios(State& state, const Paths& odometry, const Options& op
     PathTree tree = odometry.tree(target);
     for (Mode& mode : record.modes)
       mode.drift_ratio =
-          std::sqrt(distance(uncertain(mode), tree.root_from(source)) / quantile);
+          std::sqrt(squared_distance(uncertain(mode), tree.root_from(source)) / quantile);
   }
 }
 

@@ -30,6 +30,7 @@ void add_odometry(State& state, const Odometry& odometry) {
     // Two parts of the map, or a second path: loops mean something else now.
     state.graph_changed = true;
     for (LoopRecord& record : state.loops) record.gated = false;
+    state.relations.clear();
   } else if (target.placed || (!source.placed && target.order < source.order)) {
     source.estimate = target.estimate * odometry.target_from_source;
   } else {
@@ -59,6 +60,7 @@ void add_proposal(State& state, Proposal proposal) {
 void add_record(State& state, LoopRecord record) {
   state.known.insert(pair_of(record.source, record.target));
   state.graph_changed |= !record.modes.empty();
+  record.number = state.arrivals++;
   state.loops.push_back(std::move(record));
 }
 

@@ -152,6 +152,7 @@ class Marginaliser {
     drop(state_.queue, gone);
     for (auto pair = state_.known.begin(); pair != state_.known.end();)
       pair = touches(pair->first, pair->second) ? state_.known.erase(pair) : std::next(pair);
+    state_.relations.clear();
     state_.nodes.erase(id_);
     state_.poses_changed = true;
   }

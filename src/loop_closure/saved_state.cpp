@@ -172,6 +172,7 @@ void record(File& file, LoopRecord& r) {
   });
   file.value(r.mode);
   maybe(file, r.reported, [&](Loop& l) { loop(file, l); });
+  file.value(r.number);
   flag(file, r.gated);
   flag(file, r.expanded);
 }

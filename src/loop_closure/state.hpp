@@ -57,8 +57,17 @@ struct LoopRecord {
   std::vector<Mode> modes;  ///< none: not aligned
   std::uint32_t mode = 0;   ///< that takes part, or would
   std::optional<Loop> reported;  ///< what the host knows
+  std::uint64_t number = 0;      ///< of arrival
+  /// Of one mode among all loops, for State::relations.
+  std::uint64_t key(std::uint32_t m) const { return number * 16 + m; }
   bool gated = false;     ///< drift_ratio is computed
   bool expanded = false;  ///< proposals that would confirm it were made
+};
+
+/// What one mode of a loop says about one of another.
+struct Relation {
+  std::uint64_t other = 0;  ///< LoopRecord::key
+  bool agrees = false;      ///< false: it contradicts
 };
 
 /// Proposals of a smaller value go first.
@@ -78,7 +87,9 @@ struct State {
   std::vector<LoopRecord> loops;
   std::vector<Proposal> queue;   ///< sorted, the first one last
   std::set<FragmentPair> known;  ///< registered, queued or co-visible: not proposed
-  std::uint64_t arrivals = 0;    ///< fragments and host proposals so far
+  std::uint64_t arrivals = 0;    ///< fragments, loops and host proposals so far
+  /// By LoopRecord::key. Follows from the rest: not saved.
+  std::map<std::uint64_t, std::vector<Relation>> relations;
   bool graph_changed = false;    ///< loops, or odometry between loops, since the last optimisation
   bool poses_changed = false;    ///< since the last report
 };

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "loop_closure/accept.hpp"
+#include "loop_closure/relations.hpp"
 
 namespace gpureg::loop_closure {
 namespace {
@@ -63,7 +64,9 @@ class Verifier {
         odometry_(state, false),
         excluded_(state.loops.size(), 0),
         fitted_(state.loops.size(), 0) {
+    if (options.accept_by_graph_alone) return;
     compute_drift_ratios(state, odometry_, options);
+    update_relations(state, odometry_, options);
   }
 
   Verification run() {
@@ -74,8 +77,8 @@ class Verifier {
       if (result.status == pose_graph::Status::failed ||
           result.status == pose_graph::Status::cancelled)
         return {result.status, result.reason};
+      bool refused = drop_contradicted();
       verdicts = accept_loops(state_, odometry_, fits_, options_);
-      bool refused = false;
       for (std::size_t k = 0; k < fits_.size(); ++k) {
         if (!fits_[k]) continue;
         fitted_[k] = 1;
@@ -91,6 +94,20 @@ class Verifier {
   }
 
  private:
+  /// Odometry of little certainty bends to loops that contradict each other: the graph alone keeps
+  /// them.
+  bool drop_contradicted() {
+    if (options_.accept_by_graph_alone) return false;
+    const std::vector<char> dropped = contradicted(state_, fits_);
+    bool any = false;
+    for (std::size_t k = 0; k < dropped.size(); ++k) {
+      if (!dropped[k]) continue;
+      fits_[k] = fitted_[k] = 0;
+      excluded_[k] = any = true;
+    }
+    return any;
+  }
+
   pose_graph::Result optimise() {
     pose_graph::Graph graph = graph_without_loops(state_, options_);
     const std::size_t first = graph.edges.size();
