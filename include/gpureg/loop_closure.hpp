@@ -66,6 +66,8 @@ struct AcceptanceOptions {
   double min_confidence = 0.1;
   /// Confidence from which one loop within the drift of odometry suffices, (0, 1].
   double alone = 0.9;
+  /// Least confidence of a loop that others confirm, [0, 1].
+  double confirmed = 0.5;
   /// Probability that one of several independent loops that agree is correct, in view of those that
   /// contradict them, from which they suffice, (0, 1].
   double together = 0.9;

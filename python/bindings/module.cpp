@@ -21,4 +21,5 @@ PYBIND11_MODULE(_core, m) {
   bind_evaluation(m);
   bind_confidence(m);
   bind_pose_graph(m);
+  bind_loop_closure(m);
 }

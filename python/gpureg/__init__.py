@@ -23,7 +23,9 @@ from ._core import (
     EvidenceOptions,
     InvalidArgument,
     IoError,
+    Loop,
     LoopConsistencyOptions,
+    LoopUpdate,
     PairConsistency,
     PointCloud,
     PoseEvidence,
@@ -47,6 +49,7 @@ from ._core import (
 from ._loop_consistency import loop_consistency
 from .files import read_point_cloud, write_point_cloud
 from .fragments import FragmentSet
+from .loop_closure import LoopCloser
 from .preparation import prepare, prepare_batch
 from .registration import (
     BatchInterrupted,
@@ -84,7 +87,10 @@ __all__ = [
     "FragmentSet",
     "InvalidArgument",
     "IoError",
+    "Loop",
+    "LoopCloser",
     "LoopConsistencyOptions",
+    "LoopUpdate",
     "PairConsistency",
     "PointCloud",
     "PoseEvidence",

@@ -42,6 +42,7 @@ class Acceptance {
     const bool connected = std::isfinite(own.drift_ratio);
     if (connected && own.confidence >= options_.alone && own.drift_ratio <= 1)
       return {true, LoopReason::confident};
+    if (own.confidence < options_.confirmed) return {false, LoopReason::unconfirmed};
     const double wrong = wrong_together(k);
     if (wrong >= 1) return {false, LoopReason::unconfirmed};
     const double correct = 1 / wrong - 1;
