@@ -53,9 +53,7 @@ def main() -> int:
         )
         closer.add(here, cloud, world_from_fragments[-1], time=float(number))
         if here > 0:
-            previous_from_here = (
-                np.linalg.inv(world_from_fragments[-2]) @ world_from_fragments[-1]
-            )
+            previous_from_here = np.linalg.inv(world_from_fragments[-2]) @ world_from_fragments[-1]
             closer.add_odometry(here, here - 1, previous_from_here)
         for loop in closer.process(milliseconds=50).changed:
             print(f"scan {number}: {loop.source} -> {loop.target} {loop.state} ({loop.reason})")

@@ -76,9 +76,8 @@ void bind_loop(py::module_& m) {
       .def_property_readonly("state", [](const Loop& l) { return to_string(l.state); })
       .def_property_readonly("reason", [](const Loop& l) { return to_string(l.reason); })
       .def_property_readonly("explanation", [](const Loop& l) { return describe(l.reason); })
-      .def_property_readonly(
-          "target_from_source",
-          [](const Loop& l) { return array_of(l.target_from_source.matrix()); })
+      .def_property_readonly("target_from_source",
+                             [](const Loop& l) { return array_of(l.target_from_source.matrix()); })
       .def_property_readonly("information", [](const Loop& l) { return array_of(l.information); })
       .def_readonly("confidence", &Loop::confidence)
       .def_readonly("weight", &Loop::weight)
@@ -117,9 +116,8 @@ void bind_loop_closure(py::module_& m) {
              options.graph.drift.rotation_per_metre = rotation_per_metre;
              return std::make_unique<LoopCloser>(context, options);
            }),
-           py::arg("context"), py::arg("registration"), py::arg("voxel_size"),
-           py::arg("loopsmart"), py::arg("optimize"), py::arg("drift_per_metre"),
-           py::arg("rotation_per_metre"))
+           py::arg("context"), py::arg("registration"), py::arg("voxel_size"), py::arg("loopsmart"),
+           py::arg("optimize"), py::arg("drift_per_metre"), py::arg("rotation_per_metre"))
       .def("add", &add, py::arg("id"), py::arg("cloud"), py::arg("world_from_fragment"),
            py::arg("session"), py::arg("time"), py::arg("up"))
       .def(
@@ -153,10 +151,10 @@ void bind_loop_closure(py::module_& m) {
           [](LoopCloser& c, const py::dict& poses) {
             std::vector<FragmentPose> list;
             for (const auto& [id, pose] : poses)
-              list.push_back({id.cast<FragmentId>(),
-                              pose_of(py::reinterpret_borrow<py::object>(pose).cast<DoubleArray>(),
-                                      "poses"),
-                              0});
+              list.push_back(
+                  {id.cast<FragmentId>(),
+                   pose_of(py::reinterpret_borrow<py::object>(pose).cast<DoubleArray>(), "poses"),
+                   0});
             c.set_poses(list);
           },
           py::arg("poses"))
@@ -171,9 +169,11 @@ void bind_loop_closure(py::module_& m) {
                                return out;
                              })
       .def_property_readonly("loops", [](const LoopCloser& c) { return c.loops(); })
-      .def("graph", [](const LoopCloser& c) { return c.graph(); }, Release())
-      .def("save", [](const LoopCloser& c, const std::string& path) { c.save(path); },
-           py::arg("path"), Release())
+      .def(
+          "graph", [](const LoopCloser& c) { return c.graph(); }, Release())
+      .def(
+          "save", [](const LoopCloser& c, const std::string& path) { c.save(path); },
+          py::arg("path"), Release())
       .def(
           "load",
           [](LoopCloser& c, const std::string& path, const py::object& clouds) {

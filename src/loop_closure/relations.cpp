@@ -16,13 +16,13 @@ namespace {
 constexpr int kMostHops = 40;
 /// Loops agree by chance unless their prediction is this much better than that of odometry.
 constexpr double kInformative = 0.5;
-/// Misclosure, in units of the quantile, from which loops contradict each other; in between they say
-/// nothing. Registrations have heavier tails than their covariances.
+/// Misclosure, in units of the quantile, from which loops contradict each other; in between they
+/// say nothing. Registrations have heavier tails than their covariances.
 constexpr double kContradiction = 1.5 * 1.5;
 
 /// Share of the agreements under the largest drift that the chosen one has to explain. Some false
-/// loops agree under any large drift. bench/loop_closure: 0.5 loses true loops after 2 m of drift, 0.8
-/// keeps more false ones after 0.2 m.
+/// loops agree under any large drift. bench/loop_closure: 0.5 loses true loops after 2 m of drift,
+/// 0.8 keeps more false ones after 0.2 m.
 constexpr double kMostAgreements = 0.65;
 
 class Comparison {
@@ -119,8 +119,8 @@ class Comparison {
     if (relation.agrees_from == kDriftScaleCount && relation.contradicts_below == 0)
       return std::nullopt;
     const Loop &l = state_.loops[k].loop, &o = state_.loops[other].loop;
-    relation.independent = l.source != o.source && l.source != o.target &&
-                           l.target != o.source && l.target != o.target;
+    relation.independent = l.source != o.source && l.source != o.target && l.target != o.source &&
+                           l.target != o.target;
     return relation;
   }
 
