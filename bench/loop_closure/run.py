@@ -105,12 +105,39 @@ def summary(runs: list[dict]) -> list[dict]:
     return rows
 
 
+NAMES = {
+    "default": "default",
+    "loopsmart": "`loopsmart()`",
+    "kiss_slam_rule": "KISS-SLAM's rule",
+    "none": "none",
+}
+
+
+def table(rows: list[dict]) -> str:
+    """Markdown for docs/loops.md: half of the loops false, confidences as registered."""
+    lines = ["| scene | drift, m | method | precision | recall | RMSE, m |", "| --- | " + "--- | " * 5]
+    for row in rows:
+        if row["false_share"] == 0.5 and row["confidences"] == "registered":
+            lines.append(
+                f"| {row['scene'].replace('_', ' ')} | {row['drift']:g} | {NAMES[row['method']]} | "
+                f"{100 * row['precision']:.1f} % | {100 * row['recall']:.1f} % | {row['rmse']:.2f} |"
+            )
+    return "\n".join(lines).replace("--- | \n", "--- |\n")
+
+
+def write_table(path: Path, rows: list[dict]) -> None:
+    begin, end = "<!-- loops table -->\n", "<!-- end of loops table -->"
+    head, rest = path.read_text().split(begin)
+    path.write_text(head + begin + table(rows) + "\n" + end + rest.split(end)[1])
+
+
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("build", type=Path)
     parser.add_argument("--data", type=Path, required=True)
     parser.add_argument("--results", type=Path)
     parser.add_argument("-o", "--output", type=Path)
+    parser.add_argument("--table", type=Path, help="the page to write the table into")
     arguments = parser.parse_args()
     runs = []
     with tempfile.TemporaryDirectory() as temporary:
@@ -133,6 +160,8 @@ def main() -> int:
                 f"{row['false_share']:3} {row['method']:14} precision {row['precision']:.3f} "
                 f"recall {row['recall']:.3f} rmse {row['rmse']:.3f} of {row['odometry_rmse']:.3f}"
             )
+    if arguments.table:
+        write_table(arguments.table, rows)
     if arguments.output:
         record = {"program": "bench/loop_closure/run.py", "seeds": 3, "rows": rows}
         arguments.output.write_text(json.dumps(record, indent=1) + "\n")
