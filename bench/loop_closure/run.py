@@ -115,7 +115,10 @@ NAMES = {
 
 def table(rows: list[dict]) -> str:
     """Markdown for docs/loops.md: half of the loops false, confidences as registered."""
-    lines = ["| scene | drift, m | method | precision | recall | RMSE, m |", "| --- | " + "--- | " * 5]
+    lines = [
+        "| scene | drift, m | method | precision | recall | RMSE, m |",
+        "| --- | " + "--- | " * 5,
+    ]
     for row in rows:
         if row["false_share"] == 0.5 and row["confidences"] == "registered":
             lines.append(
