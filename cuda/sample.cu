@@ -222,13 +222,10 @@ Quadruples sample_quadruples(Exec& exec, const Matches& matches,
   // Shared memory for the matches of the largest pair, if they fit; larger pairs read global
   // memory.
   constexpr std::size_t kBytesPerMatch = sizeof(float4) + sizeof(float2);
-  const std::uint32_t fits = static_cast<std::uint32_t>(
-      (exec.shared_bytes_per_block() - 1024 - kThreads / 32 * sizeof(WarpQueue)) / kBytesPerMatch);
+  const std::uint32_t fits =
+      static_cast<std::uint32_t>(exec.allow_shared_memory(sample) / kBytesPerMatch);
   const std::uint32_t capacity = std::min(matches.room.largest, fits);
   const std::size_t shared_bytes = capacity * kBytesPerMatch;
-  check(cudaFuncSetAttribute(sample, cudaFuncAttributeMaxDynamicSharedMemorySize,
-                             static_cast<int>(shared_bytes)),
-        "cudaFuncSetAttribute");
   // A thread block stages the matches once and then draws for many chunks: few blocks per pair, but
   // all processors busy.
   const unsigned wanted = blocks_for(static_cast<std::size_t>(exec.multiprocessors()) * 8,
