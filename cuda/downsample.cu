@@ -135,26 +135,15 @@ float from_bits(std::uint32_t bits) {
   return v;
 }
 
-/// Rows in device memory, see adopt.cu: already tight.
-bool on_device(const RawCloud& raw) {
-  cudaPointerAttributes attributes{};
-  const bool known = raw.points && cudaPointerGetAttributes(&attributes, raw.points) == cudaSuccess;
-  if (raw.points && !known) cudaGetLastError();
-  return known && attributes.type == cudaMemoryTypeDevice;
-}
-
 /// Uploads the raw clouds of host memory into one buffer; clouds in device memory stay in place.
 DeviceBuffer<float> upload_raw(Exec& exec, Span<const RawCloud> clouds,
                                std::vector<RawSlot>& slots) {
   const auto floats = [](const RawCloud& raw) {
     return raw.size * (3 + (raw.normals ? 3 : 0) + (raw.features ? raw.feature_dimension : 0));
   };
-  std::vector<std::uint8_t> there;
   std::size_t total = 0;
-  for (const RawCloud& raw : clouds) {
-    there.push_back(on_device(raw));
-    if (!there.back()) total += floats(raw);
-  }
+  for (const RawCloud& raw : clouds)
+    if (!raw.on_device) total += floats(raw);
   auto device = exec.buffer<float>(total);
   std::vector<RowsToUpload> parts;
   float* at = device.data();
@@ -169,11 +158,11 @@ DeviceBuffer<float> upload_raw(Exec& exec, Span<const RawCloud> clouds,
     const RawCloud& raw = clouds[c];
     RawSlot slot{};
     slot.points =
-        reinterpret_cast<const Vec3*>(place(raw.points, raw.size, 3, raw.point_stride, there[c]));
+        reinterpret_cast<const Vec3*>(place(raw.points, raw.size, 3, raw.point_stride, raw.on_device));
     slot.normals =
-        reinterpret_cast<const Vec3*>(place(raw.normals, raw.size, 3, raw.normal_stride, there[c]));
+        reinterpret_cast<const Vec3*>(place(raw.normals, raw.size, 3, raw.normal_stride, raw.on_device));
     slot.features =
-        place(raw.features, raw.size, raw.feature_dimension, raw.feature_stride, there[c]);
+        place(raw.features, raw.size, raw.feature_dimension, raw.feature_stride, raw.on_device);
     slot.dimension = slot.features ? static_cast<std::uint32_t>(raw.feature_dimension) : 0;
     slots.push_back(slot);
   }

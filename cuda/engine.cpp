@@ -78,8 +78,9 @@ void CudaEngine::prepare_chunk(Span<const RawCloud> clouds, const PrepareOptions
 
 std::vector<std::shared_ptr<PreparedState>> CudaEngine::prepare(Span<const RawCloud> clouds,
                                                                 const PrepareOptions& options) {
-  const std::lock_guard<std::mutex> lock(mutex_);
   const DeviceScope scope(device());
+  for (const RawCloud& cloud : clouds) check_on_host(cloud);
+  const std::lock_guard<std::mutex> lock(mutex_);
   return prepare_on_stream(clouds, options);
 }
 

@@ -79,12 +79,29 @@ class EngineOfMany final : public DeviceEngine {
     return out;
   }
 
-  std::shared_ptr<AdoptedCloud> adopt(const RawCloud& cloud, void* stream) override {
-    return on(device_of(cloud.points)).adopt(cloud, stream);
+  std::shared_ptr<AdoptedCloud> adopt(const RawCloud& cloud, const RowStreams& streams) override {
+    return on(device_of(cloud.points)).adopt(cloud, streams);
   }
-  std::shared_ptr<PreparedState> prepare_adopted(const AdoptedCloud& cloud,
-                                                 const PrepareOptions& options) override {
-    return on(device_of(cloud)).prepare_adopted(cloud, options);
+  // Each device prepares the clouds that it holds.
+  std::vector<std::shared_ptr<PreparedState>> prepare_adopted(
+      Span<const std::shared_ptr<AdoptedCloud>> clouds, const PrepareOptions& options) override {
+    std::vector<std::vector<std::shared_ptr<AdoptedCloud>>> share(engines_.size());
+    std::vector<std::vector<std::size_t>> place(engines_.size());
+    for (std::size_t k = 0; k < clouds.size; ++k) {
+      const std::size_t e = index_of(device_of(*clouds[k]));
+      share[e].push_back(clouds[k]);
+      place[e].push_back(k);
+    }
+    std::vector<std::size_t> used;
+    for (std::size_t e = 0; e < share.size(); ++e)
+      if (!share[e].empty()) used.push_back(e);
+    std::vector<std::shared_ptr<PreparedState>> out(clouds.size);
+    on_threads(used.size(), [&](std::size_t worker) {
+      const std::size_t e = used[worker];
+      auto made = engines_[e]->prepare_adopted(span_of(share[e]), options);
+      for (std::size_t k = 0; k < made.size(); ++k) out[place[e][k]] = std::move(made[k]);
+    });
+    return out;
   }
 
   void align(Span<const PairInput> pairs, const RegistrationOptions& options,
@@ -114,11 +131,12 @@ class EngineOfMany final : public DeviceEngine {
 
  private:
   /// The engine of a device, or the first one, which reports the error.
-  CudaEngine& on(int device) const {
-    for (const auto& engine : engines_)
-      if (engine->device() == device) return *engine;
-    return *engines_[0];
+  std::size_t index_of(int device) const {
+    for (std::size_t e = 0; e < engines_.size(); ++e)
+      if (engines_[e]->device() == device) return e;
+    return 0;
   }
+  CudaEngine& on(int device) const { return *engines_[index_of(device)]; }
 
   /// Processes the runs with a thread per engine, or with the first engine alone. Rethrows the
   /// exception of the first engine that fails.

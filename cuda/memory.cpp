@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <new>
 #include <string>
 
 #include "check.hpp"
@@ -62,6 +63,11 @@ void DeviceMemory::destroy() noexcept {
 }
 
 DeviceMemory::~DeviceMemory() {
+  for (const Late& late : late_) {
+    cudaStreamWaitEvent(stream_, late.event, 0);
+    cudaEventDestroy(late.event);
+    free(late.pointer, late.bytes);
+  }
   cudaStreamSynchronize(stream_);
   destroy();
 }
@@ -94,6 +100,30 @@ void* DeviceMemory::allocate(std::size_t bytes, cudaStream_t stream) {
 void DeviceMemory::free(void* pointer, std::size_t bytes) noexcept {
   cudaFreeAsync(pointer, stream_);
   in_use_ -= bytes;
+}
+
+void DeviceMemory::free_after(void* pointer, std::size_t bytes, cudaEvent_t event) noexcept {
+  try {
+    const std::lock_guard<std::mutex> lock(late_mutex_);
+    late_.push_back({pointer, bytes, event});
+  } catch (const std::bad_alloc&) {
+    // Without memory for the list, the stream waits after all.
+    cudaStreamWaitEvent(stream_, event, 0);
+    cudaEventDestroy(event);
+    return free(pointer, bytes);
+  }
+  free_reached();
+}
+
+void DeviceMemory::free_reached() noexcept {
+  const std::lock_guard<std::mutex> lock(late_mutex_);
+  const auto reached = [&](const Late& late) {
+    if (cudaEventQuery(late.event) == cudaErrorNotReady) return false;
+    cudaEventDestroy(late.event);
+    free(late.pointer, late.bytes);
+    return true;
+  };
+  late_.erase(std::remove_if(late_.begin(), late_.end(), reached), late_.end());
 }
 
 std::size_t DeviceMemory::bytes_reserved() const {

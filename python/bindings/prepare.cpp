@@ -2,10 +2,10 @@
 #include <pybind11/stl.h>
 
 #include <algorithm>
+#include <array>
 #include <cstdio>
 #include <future>
 #include <iterator>
-#include <optional>
 
 #include "cloud.hpp"
 #include "gpureg/cuda_interop.hpp"
@@ -15,17 +15,23 @@
 namespace gpureg::python {
 namespace {
 
-/// One cloud as the package hands it over: (points, normals, features, viewpoints, origin, stream);
+/// One cloud as the package hands it over: (points, normals, features, viewpoints, origin, streams);
 /// all but the points may be None. Points, normals and features are float32 arrays, or, where there
-/// is a stream, (address, rows, columns, stride, owner) of device memory. The caller's tuple keeps
-/// alive what the views point at.
+/// are streams, (address, rows, columns, stride, owner) of device memory; the streams are those that
+/// wrote points, normals and features. The caller's tuple keeps alive what the views point at.
 struct Input {
   PointCloudView view;
-  std::optional<std::uintptr_t> stream;
+  bool on_device = false;
+  CudaStream streams[3] = {};
 
   explicit Input(const py::tuple& parts) {
     if (parts.size() != 6) throw py::type_error("a cloud is a tuple of six");
-    if (!parts[5].is_none()) stream = parts[5].cast<std::uintptr_t>();
+    if (!parts[5].is_none()) {
+      on_device = true;
+      const auto given = parts[5].cast<std::array<std::uintptr_t, 3>>();
+      for (std::size_t k = 0; k < given.size(); ++k)
+        streams[k] = reinterpret_cast<CudaStream>(given[k]);
+    }
     const Rows points = rows(parts[0], "points");
     view.points = points.data;
     view.size = points.count;
@@ -57,7 +63,7 @@ struct Input {
   }
 
   Rows rows(const py::object& part, const char* name) const {
-    if (!stream) return rows_of(part.cast<FloatArray>(), name);
+    if (!on_device) return rows_of(part.cast<FloatArray>(), name);
     const auto parts = part.cast<py::tuple>();
     const auto count = parts[1].cast<std::size_t>();
     return {count ? reinterpret_cast<const float*>(parts[0].cast<std::uintptr_t>()) : nullptr,
@@ -77,6 +83,8 @@ struct Input {
     v.viewpoints = view.viewpoints;
     v.viewpoint_count = view.viewpoint_count;
     std::copy(std::begin(view.origin), std::end(view.origin), v.origin);
+    v.normal_stream = streams[1];
+    v.feature_stream = streams[2];
     return v;
   }
 };
@@ -85,7 +93,7 @@ struct Input {
 /// would.
 void warn_of_viewpoints(const std::vector<Input>& inputs, const std::vector<std::string>& names) {
   for (std::size_t k = 0; k < inputs.size(); ++k) {
-    if (inputs[k].stream) continue;
+    if (inputs[k].on_device) continue;
     const double share = inputs[k].view.share_facing_away();
     if (share <= PointCloudView::kMaxFacingAway) continue;
     char percent[16];
@@ -97,27 +105,32 @@ void warn_of_viewpoints(const std::vector<Input>& inputs, const std::vector<std:
   }
 }
 
-/// Clouds on a device start at once, those of the host follow as one batch.
+/// Clouds on a device start at once as one batch, those of the host follow as another.
 std::vector<Cloud> prepare_clouds(const Context& context, const std::vector<Input>& inputs,
                                   const PrepareOptions& options,
                                   const std::vector<std::string>& names) {
-  std::vector<std::future<PreparedCloud>> futures(inputs.size());
   std::vector<PointCloudView> views;
-  std::vector<std::string> hosted_names;
+  std::vector<DevicePointCloudView> device_views;
+  std::vector<CudaStream> streams;
+  std::vector<std::string> view_names, device_names;
   for (std::size_t k = 0; k < inputs.size(); ++k) {
-    if (inputs[k].stream)
-      futures[k] = prepare_async(context, inputs[k].device_view(), options,
-                                 reinterpret_cast<CudaStream>(*inputs[k].stream));
-    else {
+    if (inputs[k].on_device) {
+      device_views.push_back(inputs[k].device_view());
+      streams.push_back(inputs[k].streams[0]);
+    } else {
       views.push_back(inputs[k].view);
-      if (!names.empty()) hosted_names.push_back(names[k]);
     }
+    if (!names.empty()) (inputs[k].on_device ? device_names : view_names).push_back(names[k]);
   }
-  std::vector<PreparedCloud> hosted = prepare_batch(context, views, options, hosted_names);
+  std::future<std::vector<PreparedCloud>> adopted;
+  if (!device_views.empty())
+    adopted = prepare_batch_async(context, device_views, options, streams, device_names);
+  std::vector<PreparedCloud> hosted = prepare_batch(context, views, options, view_names), on_device;
+  if (adopted.valid()) on_device = adopted.get();
   std::vector<Cloud> out;
-  std::size_t next = 0;
-  for (std::size_t k = 0; k < inputs.size(); ++k)
-    out.push_back({inputs[k].stream ? futures[k].get() : std::move(hosted[next++])});
+  std::size_t next[2] = {0, 0};
+  for (const Input& input : inputs)
+    out.push_back({std::move(input.on_device ? on_device[next[1]++] : hosted[next[0]++])});
   return out;
 }
 

@@ -5,6 +5,7 @@
 #include <string>
 
 #include "api/access.hpp"
+#include "api/name_cloud.hpp"
 #include "api/outcome.hpp"
 #include "api/pair_input.hpp"
 #include "api/prior.hpp"
@@ -37,17 +38,9 @@ std::vector<PreparedCloud> prepare_batch(const Context& context,
                                          const PrepareOptions& options,
                                          const std::vector<std::string>& names) {
   options.validate();
-  if (!names.empty() && names.size() != clouds.size())
-    throw InvalidArgument("names has " + std::to_string(names.size()) +
-                          " entries, but clouds has " + std::to_string(clouds.size()));
+  check_names(names, clouds.size());
   const auto naming = [&](std::size_t k, auto&& action) {
-    try {
-      return action();
-    } catch (const InvalidArgument& error) {
-      if (names.empty() && clouds.size() == 1) throw;
-      throw InvalidArgument((names.empty() ? "clouds[" + std::to_string(k) + "]" : names[k]) +
-                            ": " + error.what());
-    }
+    return naming_cloud(names, clouds.size(), k, action);
   };
   std::vector<RawCloud> raw;
   raw.reserve(clouds.size());
