@@ -18,6 +18,7 @@ class CudaEngine final : public DeviceEngine {
   std::string description() const override { return description_; }
   const void* memory() const override;
   std::vector<DeviceMemoryUse> device_memory() const override;
+  void trim() override;
   std::size_t pairs_per_chunk(const RegistrationOptions& options) const override;
   std::vector<std::shared_ptr<PreparedState>> prepare(Span<const RawCloud> clouds,
                                                       const PrepareOptions& options) override;
@@ -35,8 +36,9 @@ class CudaEngine final : public DeviceEngine {
   void for_resident_pairs(Span<const PairInput> pairs, const Work& work);
   std::vector<std::shared_ptr<PreparedState>> prepare_on_stream(Span<const RawCloud> clouds,
                                                                 const PrepareOptions& options);
-  void prepare_chunk(Span<const RawCloud> clouds, const PrepareOptions& options,
-                     std::vector<std::shared_ptr<PreparedState>>& out);
+  /// Returns the memory of the prepared clouds.
+  std::size_t prepare_chunk(Span<const RawCloud> clouds, const PrepareOptions& options,
+                            std::vector<std::shared_ptr<PreparedState>>& out);
 
   std::mutex mutex_;
   Exec exec_;

@@ -46,6 +46,16 @@ void Exec::begin() {
   events_used_ = 0;
 }
 
+void Exec::trim() {
+  synchronize();
+  staging_.clear();
+  uploader_.clear();
+  memory_->free_reached();
+  // What the line before freed is free on the device from here on.
+  synchronize();
+  memory_->trim();
+}
+
 void Exec::synchronize() {
   check(cudaStreamSynchronize(stream()), "the work on the device");
   held_.clear();

@@ -50,6 +50,8 @@ class Exec {
 
   /// Begins a call: frees the staging memory and the events of the previous one.
   void begin();
+  /// Waits for everything enqueued, then frees all memory that nothing uses.
+  void trim();
   /// Waits for everything enqueued.
   void synchronize();
   /// Keeps data of enqueued work alive until the next synchronize().

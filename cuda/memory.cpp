@@ -7,6 +7,7 @@
 #include <string>
 
 #include "check.hpp"
+#include "common/in_halves.hpp"
 #include "gpureg/error.hpp"
 
 namespace gpureg::cuda {
@@ -80,7 +81,7 @@ void* DeviceMemory::allocate(std::size_t bytes, cudaStream_t stream) {
     // The pool may hold only small pieces: release them and try once more.
     cudaGetLastError();
     cudaStreamSynchronize(stream_);
-    for (cudaMemPool_t each : {pool_, lent_pool_}) cudaMemPoolTrimTo(each, 0);
+    trim();
     error = cudaMallocFromPoolAsync(&pointer, bytes, pool, stream);
   }
   if (error == cudaSuccess) {
@@ -90,7 +91,7 @@ void* DeviceMemory::allocate(std::size_t bytes, cudaStream_t stream) {
   std::size_t free = 0, total = 0;
   if (error == cudaErrorMemoryAllocation &&
       (cudaGetLastError(), cudaMemGetInfo(&free, &total) == cudaSuccess))
-    throw DeviceError("device " + std::to_string(device_) +
+    throw OutOfDeviceMemory("device " + std::to_string(device_) +
                       " is out of memory: " + std::to_string(bytes >> 20) + " MiB asked for, " +
                       std::to_string(free >> 20) + " of " + std::to_string(total >> 20) +
                       " MiB free; the context stays usable");
@@ -126,6 +127,10 @@ void DeviceMemory::free_reached() noexcept {
   late_.erase(std::remove_if(late_.begin(), late_.end(), reached), late_.end());
 }
 
+void DeviceMemory::trim() noexcept {
+  for (cudaMemPool_t pool : {pool_, lent_pool_}) cudaMemPoolTrimTo(pool, 0);
+}
+
 std::size_t DeviceMemory::bytes_reserved() const {
   std::uint64_t sum = 0;
   for (cudaMemPool_t pool : {pool_, lent_pool_}) {
@@ -147,7 +152,9 @@ PinnedBuffer::~PinnedBuffer() {
   if (data_) cudaFreeHost(data_);
 }
 
-PinnedArena::~PinnedArena() {
+PinnedArena::~PinnedArena() { clear(); }
+
+void PinnedArena::clear() noexcept {
   while (chunks_) {
     Chunk* next = chunks_->next;
     cudaFreeHost(chunks_->data);

@@ -25,7 +25,7 @@ class DeviceScope {
   int previous_ = -1;
 };
 
-/// A private stream and pool of device memory. The pool keeps its memory until its end, so a warm
+/// A private stream and pool of device memory. The pool keeps its memory until trim(), so a warm
 /// context allocates without the driver. The context and its prepared clouds share it.
 class DeviceMemory {
  public:
@@ -45,6 +45,7 @@ class DeviceMemory {
   /// is not reached yet, a later free_reached() frees.
   void free_after(void* pointer, std::size_t bytes, cudaEvent_t event) noexcept;
   void free_reached() noexcept;
+  void trim() noexcept;  ///< returns the pools' free memory to the driver
   std::size_t bytes_in_use() const { return in_use_; }
   std::size_t bytes_reserved() const;  ///< allocated from the driver: the peak of the use
 
@@ -128,6 +129,8 @@ class PinnedArena {
   void* take(std::size_t bytes);
   /// Requires that no work uses the pieces any more.
   void reset();
+  /// reset() that keeps no memory.
+  void clear() noexcept;
 
  private:
   struct Chunk {

@@ -7,6 +7,7 @@
 #include "api/access.hpp"
 #include "api/name_cloud.hpp"
 #include "api/raw_cloud.hpp"
+#include "common/in_halves.hpp"
 #include "pipeline/device_engine.hpp"
 
 namespace gpureg {
@@ -54,21 +55,18 @@ AdoptedBatch adopt(const Context& context, const std::vector<DevicePointCloudVie
 
 std::vector<PreparedCloud> prepared(const AdoptedBatch& batch) {
   std::vector<PreparedCloud> out;
-  if (batch.clouds.empty()) return out;
-  try {
-    for (auto& state : batch.engine->prepare_adopted(span_of(batch.clouds), batch.options)) {
+  in_halves(0, batch.clouds.size(), [&](std::size_t begin, std::size_t end) {
+    const auto work = [&] {
+      return batch.engine->prepare_adopted({batch.clouds.data() + begin, end - begin},
+                                           batch.options);
+    };
+    const std::size_t all = batch.clouds.size();
+    for (auto& state : end - begin == 1 ? naming_cloud(batch.names, all, begin, work) : work()) {
       const std::array<double, 3>& origin = batch.origins[out.size()];
       std::copy(origin.begin(), origin.end(), state->frame_offset);
       out.push_back(Access::cloud(std::move(state)));
     }
-  } catch (const InvalidArgument&) {
-    // Stages process all clouds at once; preparing each alone finds the one to name in the error.
-    for (std::size_t k = 0; k < batch.clouds.size(); ++k)
-      naming_cloud(batch.names, batch.clouds.size(), k, [&] {
-        return batch.engine->prepare_adopted({&batch.clouds[k], 1}, batch.options);
-      });
-    throw;
-  }
+  });
   return out;
 }
 

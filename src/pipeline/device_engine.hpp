@@ -22,6 +22,8 @@ struct RowStreams {
 class DeviceEngine : public Engine {
  public:
   virtual std::vector<DeviceMemoryUse> device_memory() const = 0;
+  /// Returns memory without a use to the driver.
+  virtual void trim() = 0;
   /// Copies a cloud from device memory without waiting: all pointers but the viewpoints are device
   /// pointers. Throws InvalidArgument where the memory is on none of the engine's devices.
   virtual std::shared_ptr<AdoptedCloud> adopt(const RawCloud& cloud, const RowStreams& streams) = 0;
