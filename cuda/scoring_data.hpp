@@ -11,7 +11,8 @@ namespace gpureg::cuda {
 struct ScoringLayout {
   Cell first_block;                                                     ///< of the table
   std::int32_t nx, ny, nz;                                              ///< 0: too wide for a table
-  std::size_t runs, bricks, cells, candidates, points, normals, index;  ///< where each array begins
+  /// where each array begins
+  std::size_t runs, bricks, blocks, cells, candidates, points, normals, index;
   std::size_t bytes;
 };
 

@@ -12,12 +12,18 @@ constexpr int kEdge = ClosestGridView::kBlockEdge;
 constexpr int kCells = ClosestGridView::kBlockCells;
 /// Keys (32 MB) from which on duplicates are removed in between.
 constexpr std::size_t kMaxKeys = std::size_t(1) << 22;
+
 /// Keys of all blocks with a location within the search distance of a point, ascending.
 std::vector<std::uint64_t> reachable_blocks(const std::vector<Vec3>& points,
                                             const ClosestGeometry& g) {
   const float inverse = 1.0f / block_edge(g);
   const float reach = point_reach(g);
   std::vector<std::uint64_t> keys;
+  std::size_t most_keys = kMaxKeys;
+  const auto remove_duplicates = [&] {
+    std::sort(keys.begin(), keys.end());
+    keys.erase(std::unique(keys.begin(), keys.end()), keys.end());
+  };
   for (const Vec3& p : points) {
     const Cell lo = cell_of({p.x - reach, p.y - reach, p.z - reach}, inverse);
     const Cell hi = cell_of({p.x + reach, p.y + reach, p.z + reach}, inverse);
@@ -27,13 +33,14 @@ std::vector<std::uint64_t> reachable_blocks(const std::vector<Vec3>& points,
           const std::uint64_t key = cell_key({x, y, z});
           if (keys.empty() || keys.back() != key) keys.push_back(key);
         }
-    if (keys.size() > kMaxKeys) {
-      std::sort(keys.begin(), keys.end());
-      keys.erase(std::unique(keys.begin(), keys.end()), keys.end());
+    if (keys.size() > most_keys) {
+      remove_duplicates();
+      // A large map has more blocks than the limit: sorting them all for every few points would
+      // never end.
+      most_keys = std::max(kMaxKeys, 2 * keys.size());
     }
   }
-  std::sort(keys.begin(), keys.end());
-  keys.erase(std::unique(keys.begin(), keys.end()), keys.end());
+  remove_duplicates();
   return keys;
 }
 
@@ -138,7 +145,7 @@ std::vector<ClosestGrid> build_closest_grids(Exec& exec,
     grid.cell_size = geometry[c].cell_size;
     std::size_t total = 0;
     for (const BlockLists& l : lists[c]) total += l.candidates.size();
-    if (total > limits::kMaxGridCandidates)
+    if (pipeline::too_many_candidates(total, clouds[c].points.size()))
       pipeline::throw_too_dense(options.max_correspondence_distance);
     grid.table.reset(keys[c].size());
     grid.cell_start.reserve(keys[c].size() * (kCells + 1));
@@ -154,6 +161,7 @@ std::vector<ClosestGrid> build_closest_grids(Exec& exec,
       grid.cell_start.push_back(offset);
       grid.candidates.insert(grid.candidates.end(), lists[c][b].candidates.begin(),
                              lists[c][b].candidates.end());
+      lists[c][b] = BlockLists();  // a map's lists take as much memory as its grid
     }
   });
   return out;

@@ -58,7 +58,9 @@ void expect_same_alignment(const std::vector<RawCloud>& raw,
         host(on_cuda, cuda_matches.pairs.data() + cuda_matches.room.offset[p], match_count[p])));
   }
   const auto cpu_quadruples = cpu::sample_quadruples(on_cpu, cpu_matches, options);
-  const auto cuda_quadruples = cuda::sample_quadruples(on_cuda, cuda_matches, options);
+  const auto cuda_samples = cuda::sample_quadruples(on_cuda, cuda_matches, options);
+  const auto cuda_quadruples =
+      cuda::survivors_of(on_cuda, cuda_samples, {0, cuda_samples.survivors.size()});
   for (std::size_t p = 0; p < count; ++p) {
     SCOPED_TRACE("sample, pair " + std::to_string(p));
     ASSERT_TRUE(

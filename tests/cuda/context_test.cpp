@@ -157,6 +157,27 @@ TEST_F(CudaContext, ContextsOfOneDeviceNeedDifferentSharedMemory) {
   for (const auto& result : others.get()) EXPECT_EQ(result, small[0]);
 }
 
+TEST_F(CudaContext, TrimReturnsWhatNothingUses) {
+  const Context context = Context::cuda();
+  Context::cpu(1).trim();
+  context.trim();
+  const Results expected = run(context, pairs);
+  auto clouds = prepare_batch(context, views, options.prepare);
+  const DeviceMemoryUse warm = context.device_memory()[0];
+  EXPECT_GT(warm.bytes_reserved, warm.bytes_in_use);
+  context.trim();
+  const DeviceMemoryUse trimmed = context.device_memory()[0];
+  EXPECT_EQ(trimmed.bytes_in_use, warm.bytes_in_use) << "the prepared clouds stay";
+  EXPECT_LT(trimmed.bytes_reserved, warm.bytes_reserved);
+  EXPECT_GE(trimmed.bytes_reserved, trimmed.bytes_in_use);
+  EXPECT_EQ(all_bytes(align_batch(context, clouds, pairs, options)), expected);
+  clouds.clear();
+  context.trim();
+  EXPECT_EQ(context.device_memory()[0].bytes_in_use, 0u);
+  EXPECT_EQ(context.device_memory()[0].bytes_reserved, 0u);
+  EXPECT_EQ(run(context, pairs), expected);
+}
+
 // Errors of the runtime on machines without a usable device.
 TEST(NoCudaDevice, EveryReasonHasItsWords) {
   EXPECT_EQ(cuda::why_no_device(cudaErrorInsufficientDriver, 0, 13000),
