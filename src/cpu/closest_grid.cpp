@@ -2,6 +2,7 @@
 #include <algorithm>
 
 #include "algorithm/closest_build.hpp"
+#include "cpu/reachable_blocks.hpp"
 #include "cpu/stages.hpp"
 #include "pipeline/checks.hpp"
 
@@ -11,38 +12,7 @@ namespace {
 constexpr int kEdge = ClosestGridView::kBlockEdge;
 constexpr int kCells = ClosestGridView::kBlockCells;
 /// Keys (32 MB) from which on duplicates are removed in between.
-constexpr std::size_t kMaxKeys = std::size_t(1) << 22;
-
-/// Keys of all blocks with a location within the search distance of a point, ascending.
-std::vector<std::uint64_t> reachable_blocks(const std::vector<Vec3>& points,
-                                            const ClosestGeometry& g) {
-  const float inverse = 1.0f / block_edge(g);
-  const float reach = point_reach(g);
-  std::vector<std::uint64_t> keys;
-  std::size_t most_keys = kMaxKeys;
-  const auto remove_duplicates = [&] {
-    std::sort(keys.begin(), keys.end());
-    keys.erase(std::unique(keys.begin(), keys.end()), keys.end());
-  };
-  for (const Vec3& p : points) {
-    const Cell lo = cell_of({p.x - reach, p.y - reach, p.z - reach}, inverse);
-    const Cell hi = cell_of({p.x + reach, p.y + reach, p.z + reach}, inverse);
-    for (std::int32_t z = lo.z; z <= hi.z; ++z)
-      for (std::int32_t y = lo.y; y <= hi.y; ++y)
-        for (std::int32_t x = lo.x; x <= hi.x; ++x) {
-          const std::uint64_t key = cell_key({x, y, z});
-          if (keys.empty() || keys.back() != key) keys.push_back(key);
-        }
-    if (keys.size() > most_keys) {
-      remove_duplicates();
-      // A large map has more blocks than the limit: sorting them all for every few points would
-      // never end.
-      most_keys = std::max(kMaxKeys, 2 * keys.size());
-    }
-  }
-  remove_duplicates();
-  return keys;
-}
+constexpr std::size_t kLeastKeys = std::size_t(1) << 22;
 
 struct BlockLists {
   std::vector<std::uint32_t> counts;      // per cell
@@ -116,6 +86,36 @@ void build_block(const GridView& grid, const std::vector<Vec3>& points, Cell blo
 
 }  // namespace
 
+std::vector<std::uint64_t> reachable_blocks(const std::vector<Vec3>& points,
+                                            const ClosestGeometry& g, std::size_t least_keys) {
+  const float inverse = 1.0f / block_edge(g);
+  const float reach = point_reach(g);
+  std::vector<std::uint64_t> keys;
+  std::size_t most_keys = least_keys;
+  const auto remove_duplicates = [&] {
+    std::sort(keys.begin(), keys.end());
+    keys.erase(std::unique(keys.begin(), keys.end()), keys.end());
+  };
+  for (const Vec3& p : points) {
+    const Cell lo = cell_of({p.x - reach, p.y - reach, p.z - reach}, inverse);
+    const Cell hi = cell_of({p.x + reach, p.y + reach, p.z + reach}, inverse);
+    for (std::int32_t z = lo.z; z <= hi.z; ++z)
+      for (std::int32_t y = lo.y; y <= hi.y; ++y)
+        for (std::int32_t x = lo.x; x <= hi.x; ++x) {
+          const std::uint64_t key = cell_key({x, y, z});
+          if (keys.empty() || keys.back() != key) keys.push_back(key);
+        }
+    if (keys.size() > most_keys) {
+      remove_duplicates();
+      // A large map has more blocks than the first limit: sorting them all for every few points
+      // would never end.
+      most_keys = std::max(least_keys, 2 * keys.size());
+    }
+  }
+  remove_duplicates();
+  return keys;
+}
+
 ClosestGridView ClosestGrid::view() const {
   return {1.0f / cell_size, span_of(table.entries), span_of(cell_start), span_of(candidates)};
 }
@@ -130,7 +130,7 @@ std::vector<ClosestGrid> build_closest_grids(Exec& exec,
   std::vector<std::vector<BlockLists>> lists(clouds.size());
   exec.parallel(clouds.size(), [&](std::size_t c) {
     geometry[c] = closest_geometry(options.max_correspondence_distance, clouds[c].radius);
-    keys[c] = reachable_blocks(clouds[c].points, geometry[c]);
+    keys[c] = reachable_blocks(clouds[c].points, geometry[c], kLeastKeys);
     lists[c].resize(keys[c].size());
   });
   exec.parallel_items(
