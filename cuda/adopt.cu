@@ -112,7 +112,7 @@ void Adopted::take() {
     part.bytes = floats * sizeof(float);
     part.to = static_cast<float*>(memory_->allocate(part.bytes, part.stream));
     pack_rows<<<blocks_for(floats, 256), 256, 0, part.stream>>>(part.from, part.stride, part.width,
-                                                               raw.size, part.to);
+                                                                raw.size, part.to);
     check_launch("pack_rows");
     // A thread that waits for it sleeps.
     check(cudaEventCreateWithFlags(&part.written, cudaEventDisableTiming | cudaEventBlockingSync),
@@ -138,8 +138,8 @@ std::shared_ptr<AdoptedCloud> CudaEngine::adopt(const RawCloud& cloud, const Row
 }
 
 // Waits for the program's streams on this thread alone: neither the lock nor the stream of the
-// engine may depend on them, as other calls need both. The preparation reads the rows on the device,
-// without a copy.
+// engine may depend on them, as other calls need both. The preparation reads the rows on the
+// device, without a copy.
 std::vector<std::shared_ptr<PreparedState>> CudaEngine::prepare_adopted(
     Span<const std::shared_ptr<AdoptedCloud>> clouds, const PrepareOptions& options) {
   const DeviceScope scope(device());

@@ -53,11 +53,10 @@ __device__ inline Closest find_closest(const CloudView& cloud, const CellSummari
   if (list == kNoValue) {
     // The block gives the ends of any list. The table begins at a block, so the low bits of a cell
     // are those of the closest-point grid.
-    const std::uint32_t* start =
-        cloud.closest.cell_start.data +
-        static_cast<std::size_t>(__ldg(cells.block + word.number / 16)) *
-            (ClosestGridView::kBlockCells + 1) +
-        ((c.z & 7) << 6 | (c.y & 7) << 3 | (c.x & 7));
+    const std::uint32_t* start = cloud.closest.cell_start.data +
+                                 static_cast<std::size_t>(__ldg(cells.block + word.number / 16)) *
+                                     (ClosestGridView::kBlockCells + 1) +
+                                 ((c.z & 7) << 6 | (c.y & 7) << 3 | (c.x & 7));
     first = __ldg(start);
     last = __ldg(start + 1);
   }

@@ -24,12 +24,12 @@ template <typename Key>
 void sort(Exec& exec, cub::DoubleBuffer<Key>& keys, cub::DoubleBuffer<std::uint32_t>& values,
           std::size_t size, int bits) {
   std::size_t bytes = 0;
-  check(cub::DeviceRadixSort::SortPairs(nullptr, bytes, keys, values, cub_size(size), 0,
-                                        bits, exec.stream()),
+  check(cub::DeviceRadixSort::SortPairs(nullptr, bytes, keys, values, cub_size(size), 0, bits,
+                                        exec.stream()),
         "radix sort");
   const auto scratch = exec.buffer<char>(bytes);
-  check(cub::DeviceRadixSort::SortPairs(scratch.data(), bytes, keys, values, cub_size(size),
-                                        0, bits, exec.stream()),
+  check(cub::DeviceRadixSort::SortPairs(scratch.data(), bytes, keys, values, cub_size(size), 0,
+                                        bits, exec.stream()),
         "radix sort");
 }
 
@@ -79,13 +79,12 @@ void sort_pairs_in_place(Exec& exec, std::uint64_t* keys, std::uint32_t* values,
 void exclusive_sum(Exec& exec, const std::uint32_t* in, std::uint32_t* out, std::size_t size) {
   if (size == 0) return;
   std::size_t bytes = 0;
-  check(
-      cub::DeviceScan::ExclusiveSum(nullptr, bytes, in, out, cub_size(size), exec.stream()),
-      "scan");
-  const auto scratch = exec.buffer<char>(bytes);
-  check(cub::DeviceScan::ExclusiveSum(scratch.data(), bytes, in, out, cub_size(size),
-                                      exec.stream()),
+  check(cub::DeviceScan::ExclusiveSum(nullptr, bytes, in, out, cub_size(size), exec.stream()),
         "scan");
+  const auto scratch = exec.buffer<char>(bytes);
+  check(
+      cub::DeviceScan::ExclusiveSum(scratch.data(), bytes, in, out, cub_size(size), exec.stream()),
+      "scan");
 }
 
 }  // namespace gpureg::cuda

@@ -242,10 +242,10 @@ DeviceBuffer<float> upload_raw(Exec& exec, Span<const RawCloud> clouds,
   for (std::size_t c = 0; c < clouds.size; ++c) {
     const RawCloud& raw = clouds[c];
     RawSlot slot{};
-    slot.points =
-        reinterpret_cast<const Vec3*>(place(raw.points, raw.size, 3, raw.point_stride, raw.on_device));
-    slot.normals =
-        reinterpret_cast<const Vec3*>(place(raw.normals, raw.size, 3, raw.normal_stride, raw.on_device));
+    slot.points = reinterpret_cast<const Vec3*>(
+        place(raw.points, raw.size, 3, raw.point_stride, raw.on_device));
+    slot.normals = reinterpret_cast<const Vec3*>(
+        place(raw.normals, raw.size, 3, raw.normal_stride, raw.on_device));
     slot.features =
         place(raw.features, raw.size, raw.feature_dimension, raw.feature_stride, raw.on_device);
     slot.dimension = slot.features ? static_cast<std::uint32_t>(raw.feature_dimension) : 0;
@@ -381,7 +381,8 @@ DownsampledClouds downsample(Exec& exec, Span<const RawCloud> clouds,
   average<<<voxel_grid, 128, 0, exec.stream()>>>(batch);
   check_launch("average");
   if (most_crowded > 0) {
-    const auto blocks = std::min<std::size_t>(most_crowded, std::size_t(exec.multiprocessors()) * 4);
+    const auto blocks =
+        std::min<std::size_t>(most_crowded, std::size_t(exec.multiprocessors()) * 4);
     average_crowded<<<static_cast<unsigned>(blocks), kCrowdedThreads, 0, exec.stream()>>>(batch);
     check_launch("average_crowded");
   }

@@ -39,9 +39,9 @@ class Exec {
   /// Number of host threads for the work on a batch; more than eight saturate the memory.
   unsigned host_threads() const { return std::clamp(std::thread::hardware_concurrency(), 1u, 8u); }
   /// Lets a kernel use all the shared memory that a thread block may have, and returns the bytes
-  /// that a launch may ask for beside the kernel's own arrays. The permission belongs to the device:
-  /// all contexts and threads set the same value, so none takes it from another between the setting
-  /// and the launch.
+  /// that a launch may ask for beside the kernel's own arrays. The permission belongs to the
+  /// device: all contexts and threads set the same value, so none takes it from another between the
+  /// setting and the launch.
   std::size_t allow_shared_memory(const void* kernel);
   template <typename... Arguments>
   std::size_t allow_shared_memory(void (*kernel)(Arguments...)) {

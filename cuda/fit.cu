@@ -55,8 +55,8 @@ Hypotheses fit_hypotheses(Exec& exec, const Matches& matches, const Quadruples& 
   fit<<<blocks_for(total, 128), 128, 0, exec.stream()>>>(
       quadruples.segments.on_device.data(), pairs, quadruples.id.data(),
       matches.room.on_device.data() + quadruples.first_pair, matches.pairs.data(),
-      matches.count.data() + quadruples.first_pair, options.seed,
-      out.pose.data(), out.valid.data(), out.count.data());
+      matches.count.data() + quadruples.first_pair, options.seed, out.pose.data(), out.valid.data(),
+      out.count.data());
   check_launch("fit");
   return out;
 }

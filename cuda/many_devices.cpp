@@ -88,7 +88,7 @@ class EngineOfMany final : public DeviceEngine {
              Span<PairOutcome> outcomes) override {
     // Less than the share of a device: the first runs wait for clouds of other devices.
     SharedRuns runs(pairs.size, kMinPairs, engines_[0]->pairs_per_chunk(options) * 3 / 4,
-              engines_.size());
+                    engines_.size());
     on_all(runs, pairs.size > kMinPairs,
            [&](CudaEngine& engine, std::size_t begin, std::size_t end) {
              engine.align({pairs.data + begin, end - begin}, options,

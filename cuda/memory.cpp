@@ -92,9 +92,9 @@ void* DeviceMemory::allocate(std::size_t bytes, cudaStream_t stream) {
   if (error == cudaErrorMemoryAllocation &&
       (cudaGetLastError(), cudaMemGetInfo(&free, &total) == cudaSuccess))
     throw OutOfDeviceMemory("device " + std::to_string(device_) +
-                      " is out of memory: " + std::to_string(bytes >> 20) + " MiB asked for, " +
-                      std::to_string(free >> 20) + " of " + std::to_string(total >> 20) +
-                      " MiB free; the context stays usable");
+                            " is out of memory: " + std::to_string(bytes >> 20) +
+                            " MiB asked for, " + std::to_string(free >> 20) + " of " +
+                            std::to_string(total >> 20) + " MiB free; the context stays usable");
   throw_device_error(error, "cudaMallocFromPoolAsync");
 }
 

@@ -41,8 +41,8 @@ class DeviceMemory {
   /// In the order of a stream of the program.
   void* allocate(std::size_t bytes, cudaStream_t stream);
   void free(void* pointer, std::size_t bytes) noexcept;
-  /// Frees once an event is reached, and destroys the event. The stream never waits for it: where it
-  /// is not reached yet, a later free_reached() frees.
+  /// Frees once an event is reached, and destroys the event. The stream never waits for it: where
+  /// it is not reached yet, a later free_reached() frees.
   void free_after(void* pointer, std::size_t bytes, cudaEvent_t event) noexcept;
   void free_reached() noexcept;
   void trim() noexcept;  ///< returns the pools' free memory to the driver

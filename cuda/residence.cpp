@@ -58,8 +58,7 @@ std::vector<std::shared_ptr<const CudaCloud>> Residence::bring(
       bytes += fragments[k]->bytes();
     }
     const auto entry = entries_.find(fragments[k]);
-    if (entry != entries_.end() && !entry->second.fragment.expired())
-      entry->second.used = ++clock_;
+    if (entry != entries_.end() && !entry->second.fragment.expired()) entry->second.used = ++clock_;
   }
   if (missing.empty()) return out;
   make_room(bytes, fragments);

@@ -261,8 +261,7 @@ Samples sample_quadruples(Exec& exec, const Matches& matches, const Registration
   Samples out;
   out.chunks = chunks;
   for (std::size_t p = 0; p < pairs; ++p)
-    out.survivors.push_back(
-        std::min(starts[p + 1] - starts[p], options.quadruples.max_survivors));
+    out.survivors.push_back(std::min(starts[p + 1] - starts[p], options.quadruples.max_survivors));
   out.words = std::move(words);
   out.before = std::move(before);
   return out;
@@ -279,9 +278,8 @@ std::vector<pipeline::Run> runs_of(Exec&, const Samples& samples) {
 Quadruples survivors_of(Exec& exec, const Samples& samples, pipeline::Run pairs) {
   Quadruples out;
   out.first_pair = pairs.begin;
-  out.segments = make_segments(exec, pairs.size(), [&](std::size_t p) {
-    return samples.survivors[pairs.begin + p];
-  });
+  out.segments = make_segments(exec, pairs.size(),
+                               [&](std::size_t p) { return samples.survivors[pairs.begin + p]; });
   out.id = exec.buffer<std::uint32_t>(out.segments.total());
   if (out.segments.total() == 0) return out;
   const std::size_t first_chunk = pairs.begin * samples.chunks;

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Large maps: time and memory to prepare a building of so many points, and to find the place of one
 // room's scan in it.
-//   gpureg_map_bench cpu|cuda [prepared points ...]    1,000,000, 4,000,000 and 16,000,000 by default
+//   gpureg_map_bench cpu|cuda [prepared points ...]    1,000,000, 4,000,000 and 16,000,000 by
+//   default
 #include <sys/resource.h>
 
 #include <Eigen/Geometry>
@@ -98,11 +99,11 @@ void run(const gpureg::Context& context, std::size_t wanted) {
   const double aligned = seconds_since(begin);
   const Eigen::Isometry3d truth = motion.cast<double>().inverse();
   const Eigen::Vector3d middle = scan[scan.size() / 2].cast<double>();
-  std::printf("{\"raw_points\": %zu, \"points\": %zu, \"prepare_s\": %.2f, \"align_s\": %.2f, "
-              "\"match_ms\": %.1f, \"confidence\": %.3f, \"error_m\": %.3f, \"host_gib\": %.1f",
-              map.size(), static_cast<std::size_t>(target.size()), prepared, aligned,
-              result.timings.match, result.score,
-              (result.target_from_source * middle - truth * middle).norm(), peak_gib());
+  std::printf(
+      "{\"raw_points\": %zu, \"points\": %zu, \"prepare_s\": %.2f, \"align_s\": %.2f, "
+      "\"match_ms\": %.1f, \"confidence\": %.3f, \"error_m\": %.3f, \"host_gib\": %.1f",
+      map.size(), static_cast<std::size_t>(target.size()), prepared, aligned, result.timings.match,
+      result.score, (result.target_from_source * middle - truth * middle).norm(), peak_gib());
   for (const gpureg::DeviceMemoryUse& use : context.device_memory())
     std::printf(", \"device_in_use_gib\": %.1f, \"device_reserved_gib\": %.1f",
                 static_cast<double>(use.bytes_in_use) / (1 << 30),

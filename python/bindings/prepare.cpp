@@ -15,10 +15,11 @@
 namespace gpureg::python {
 namespace {
 
-/// One cloud as the package hands it over: (points, normals, features, viewpoints, origin, streams);
-/// all but the points may be None. Points, normals and features are float32 arrays, or, where there
-/// are streams, (address, rows, columns, stride, owner) of device memory; the streams are those that
-/// wrote points, normals and features. The caller's tuple keeps alive what the views point at.
+/// One cloud as the package hands it over: (points, normals, features, viewpoints, origin,
+/// streams); all but the points may be None. Points, normals and features are float32 arrays, or,
+/// where there are streams, (address, rows, columns, stride, owner) of device memory; the streams
+/// are those that wrote points, normals and features. The caller's tuple keeps alive what the views
+/// point at.
 struct Input {
   PointCloudView view;
   bool on_device = false;

@@ -74,20 +74,18 @@ std::vector<PreparedCloud> prepared(const AdoptedBatch& batch) {
 
 std::future<PreparedCloud> prepare_async(const Context& context, const DevicePointCloudView& cloud,
                                          const PrepareOptions& options, CudaStream stream) {
-  return std::async(std::launch::async,
-                    [batch = adopt(context, {cloud}, options, {stream}, {})] {
-                      return prepared(batch).front();
-                    });
+  return std::async(std::launch::async, [batch = adopt(context, {cloud}, options, {stream}, {})] {
+    return prepared(batch).front();
+  });
 }
 
 std::future<std::vector<PreparedCloud>> prepare_batch_async(
     const Context& context, const std::vector<DevicePointCloudView>& clouds,
     const PrepareOptions& options, const std::vector<CudaStream>& streams,
     const std::vector<std::string>& names) {
-  return std::async(std::launch::async,
-                    [batch = adopt(context, clouds, options, streams, names)] {
-                      return prepared(batch);
-                    });
+  return std::async(std::launch::async, [batch = adopt(context, clouds, options, streams, names)] {
+    return prepared(batch);
+  });
 }
 
 }  // namespace gpureg

@@ -179,8 +179,7 @@ std::vector<std::vector<PoseVerification>> verify_poses_batch(
     const std::vector<PairOutcome> outcomes =
         verify_all(engine, inputs, local, by_evidence, verification.refine);
     std::vector<PairOutcome> found(inputs.size());
-    if (verification.search_alternatives)
-      align_all(engine, inputs, by_evidence, found);
+    if (verification.search_alternatives) align_all(engine, inputs, by_evidence, found);
     for (std::size_t p = begin; p < end; ++p) {
       const VerifiedPair& pair = verified[p - begin];
       const PairOutcome& outcome = outcomes[p - begin];

@@ -6,9 +6,8 @@
 namespace gpureg::cpu {
 
 Exec::Exec(unsigned threads)
-    : workers_(start_threads(threads > 0 ? threads - 1 : 0, [this](std::size_t) {
-        return std::thread([this] { worker(); });
-      })) {}
+    : workers_(start_threads(threads > 0 ? threads - 1 : 0,
+                             [this](std::size_t) { return std::thread([this] { worker(); }); })) {}
 
 Exec::~Exec() {
   {

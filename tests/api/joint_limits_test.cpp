@@ -126,8 +126,8 @@ TEST(InHalves, NamesTheElementThatFailsAlone) {
     if (begin <= 5 && 5 < end) throw InvalidArgument("element 5");
   };
   test::expect_error<InvalidArgument>([&] { in_halves(0, 8, work); }, {"element 5"});
-  const std::vector<std::pair<std::size_t, std::size_t>> expected{
-      {0, 8}, {0, 4}, {4, 8}, {4, 6}, {4, 5}, {5, 6}};
+  const std::vector<std::pair<std::size_t, std::size_t>> expected{{0, 8}, {0, 4}, {4, 8},
+                                                                  {4, 6}, {4, 5}, {5, 6}};
   EXPECT_EQ(calls, expected);
   calls.clear();
   in_halves(3, 3, work);

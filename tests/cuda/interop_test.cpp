@@ -206,8 +206,7 @@ TEST_F(Interop, ABatchIsThatOfTheHost) {
     device[k].size = scans[k].size();
     if (k % 2 == 1) streams[k] = other;
   }
-  const auto prepared =
-      prepare_batch_async(context, device, options.prepare, streams).get();
+  const auto prepared = prepare_batch_async(context, device, options.prepare, streams).get();
   ASSERT_EQ(prepared.size(), expected.size());
   for (std::size_t k = 0; k < prepared.size(); ++k) expect_same(prepared[k], expected[k]);
   const auto by_one_stream = prepare_batch_async(context, device, options.prepare, {stream}).get();
@@ -251,27 +250,26 @@ TEST_F(Interop, NormalsAndFeaturesOfOtherStreamsAreAwaited) {
     ASSERT_EQ(cudaMemset(late[k], 0xff, size), cudaSuccess);
   }
   ASSERT_EQ(cudaDeviceSynchronize(), cudaSuccess);
-  std::future<PreparedCloud> prepared;
-  {
-    Gate first(others[0]), second(others[1]);
-    ASSERT_EQ(cudaMemcpyAsync(late[0], normals, size, cudaMemcpyDeviceToDevice, others[0]),
-              cudaSuccess);
-    ASSERT_EQ(cudaMemcpyAsync(late[1], features, size, cudaMemcpyDeviceToDevice, others[1]),
-              cudaSuccess);
-    DevicePointCloudView view;
-    view.points = points;
-    view.size = scans[0].size();
-    view.normals = late[0];
-    view.normal_stream = others[0];
-    view.features = late[1];
-    view.feature_dimension = 3;
-    view.feature_stream = others[1];
-    prepared = prepare_async(context, view, options.prepare, stream);
-    // What comes later in these streams changes nothing.
-    for (int k = 0; k < 2; ++k)
-      ASSERT_EQ(cudaMemsetAsync(late[k], 0xff, size, others[k]), cudaSuccess);
-    EXPECT_EQ(prepared.wait_for(std::chrono::milliseconds(200)), std::future_status::timeout);
-  }
+  Gate first(others[0]), second(others[1]);
+  ASSERT_EQ(cudaMemcpyAsync(late[0], normals, size, cudaMemcpyDeviceToDevice, others[0]),
+            cudaSuccess);
+  ASSERT_EQ(cudaMemcpyAsync(late[1], features, size, cudaMemcpyDeviceToDevice, others[1]),
+            cudaSuccess);
+  DevicePointCloudView view;
+  view.points = points;
+  view.size = scans[0].size();
+  view.normals = late[0];
+  view.normal_stream = others[0];
+  view.features = late[1];
+  view.feature_dimension = 3;
+  view.feature_stream = others[1];
+  std::future<PreparedCloud> prepared = prepare_async(context, view, options.prepare, stream);
+  // What comes later in these streams changes nothing.
+  for (int k = 0; k < 2; ++k)
+    ASSERT_EQ(cudaMemsetAsync(late[k], 0xff, size, others[k]), cudaSuccess);
+  EXPECT_EQ(prepared.wait_for(std::chrono::milliseconds(200)), std::future_status::timeout);
+  first.open();
+  second.open();
   expect_same(prepared.get(), expected);
   for (float* p : {points, normals, features}) cudaFreeAsync(p, stream);
   for (int k = 0; k < 2; ++k) {

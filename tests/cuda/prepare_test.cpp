@@ -353,7 +353,8 @@ TEST_F(PrepareOnCuda, CrowdedVoxels) {
   std::normal_distribution<float> normal;
   for (RawCloud& cloud : raw) {
     normals.emplace_back(cloud.size);
-    for (Vec3& n : normals.back()) n = random() % 50 == 0 ? Vec3{0, 0, 0} : test::random_unit(random);
+    for (Vec3& n : normals.back())
+      n = random() % 50 == 0 ? Vec3{0, 0, 0} : test::random_unit(random);
     features.emplace_back(cloud.size * dimension);
     for (float& f : features.back()) f = normal(random);
     cloud.normals = &normals.back()[0].x;

@@ -19,8 +19,7 @@ TEST(RunsWithin, FillsTheLimitInOrder) {
   using Ends = std::vector<std::pair<std::size_t, std::size_t>>;
   const std::vector<std::uint64_t> weight{3, 4, 3, 0, 11, 0, 10, 1};
   const auto of = [&](std::size_t k) { return weight[k]; };
-  EXPECT_EQ(ends(runs_within(weight.size(), 10, of)),
-            (Ends{{0, 4}, {4, 5}, {5, 7}, {7, 8}}));
+  EXPECT_EQ(ends(runs_within(weight.size(), 10, of)), (Ends{{0, 4}, {4, 5}, {5, 7}, {7, 8}}));
   EXPECT_EQ(ends(runs_within(weight.size(), 1000, of)), (Ends{{0, 8}}));
   EXPECT_EQ(ends(runs_within(weight.size(), 0, of)),
             (Ends{{0, 1}, {1, 2}, {2, 4}, {4, 5}, {5, 6}, {6, 7}, {7, 8}}));
@@ -29,8 +28,8 @@ TEST(RunsWithin, FillsTheLimitInOrder) {
 
 // 512 pairs of 2^22 survivors: 2^31 of them in all.
 TEST(RunsWithin, CountsBeyond32Bits) {
-  const auto runs = runs_within(4096, std::uint64_t(1) << 33,
-                                [](std::size_t) { return std::uint64_t(1) << 22; });
+  const auto runs =
+      runs_within(4096, std::uint64_t(1) << 33, [](std::size_t) { return std::uint64_t(1) << 22; });
   ASSERT_EQ(runs.size(), 2u);
   EXPECT_EQ(runs[0].size(), 2048u);
 }
@@ -45,8 +44,7 @@ TEST(SharedRuns, CoverEverythingWithinTheLimitOfMemory) {
     for (auto run = runs.take(); run.size() > 0; run = runs.take()) {
       ASSERT_EQ(run.begin, next);
       ASSERT_LE(run.size(), std::max<std::size_t>(1, most)) << "more than the memory holds";
-      if (run.end < items)
-        ASSERT_GE(run.size(), std::max<std::size_t>(1, std::min(least, most)));
+      if (run.end < items) ASSERT_GE(run.size(), std::max<std::size_t>(1, std::min(least, most)));
       next = run.end;
     }
     EXPECT_EQ(next, items);
