@@ -106,28 +106,53 @@ void warn_of_viewpoints(const std::vector<Input>& inputs, const std::vector<std:
   }
 }
 
-/// Clouds on a device start at once as one batch, those of the host follow as another.
+/// Raw points and clouds on a device that are copied at a time: copies of all clouds of a long list
+/// would take as much memory as the clouds.
+constexpr std::size_t kDevicePoints = std::size_t(1) << 25, kDeviceClouds = 256;
+
+/// Prepares clouds that are on a device.
+std::vector<PreparedCloud> prepare_on_device(const Context& context,
+                                             const std::vector<const Input*>& inputs,
+                                             const PrepareOptions& options,
+                                             const std::vector<std::string>& names) {
+  std::vector<PreparedCloud> out;
+  for (std::size_t begin = 0, end; begin < inputs.size(); begin = end) {
+    std::vector<DevicePointCloudView> views;
+    std::vector<CudaStream> streams;
+    std::vector<std::string> some_names;
+    std::size_t points = 0;
+    for (end = begin; end < inputs.size() && end - begin < kDeviceClouds &&
+                      (end == begin || points + inputs[end]->view.size <= kDevicePoints);
+         ++end) {
+      points += inputs[end]->view.size;
+      views.push_back(inputs[end]->device_view());
+      streams.push_back(inputs[end]->streams[0]);
+      if (!names.empty()) some_names.push_back(names[end]);
+    }
+    for (PreparedCloud& cloud :
+         prepare_batch_async(context, views, options, streams, some_names).get())
+      out.push_back(std::move(cloud));
+  }
+  return out;
+}
+
+/// Clouds on a device in batches, those of the host as one batch.
 std::vector<Cloud> prepare_clouds(const Context& context, const std::vector<Input>& inputs,
                                   const PrepareOptions& options,
                                   const std::vector<std::string>& names) {
   std::vector<PointCloudView> views;
-  std::vector<DevicePointCloudView> device_views;
-  std::vector<CudaStream> streams;
+  std::vector<const Input*> device_inputs;
   std::vector<std::string> view_names, device_names;
   for (std::size_t k = 0; k < inputs.size(); ++k) {
-    if (inputs[k].on_device) {
-      device_views.push_back(inputs[k].device_view());
-      streams.push_back(inputs[k].streams[0]);
-    } else {
+    if (inputs[k].on_device)
+      device_inputs.push_back(&inputs[k]);
+    else
       views.push_back(inputs[k].view);
-    }
     if (!names.empty()) (inputs[k].on_device ? device_names : view_names).push_back(names[k]);
   }
-  std::future<std::vector<PreparedCloud>> adopted;
-  if (!device_views.empty())
-    adopted = prepare_batch_async(context, device_views, options, streams, device_names);
-  std::vector<PreparedCloud> hosted = prepare_batch(context, views, options, view_names), on_device;
-  if (adopted.valid()) on_device = adopted.get();
+  std::vector<PreparedCloud> on_device =
+                                 prepare_on_device(context, device_inputs, options, device_names),
+                             hosted = prepare_batch(context, views, options, view_names);
   std::vector<Cloud> out;
   std::size_t next[2] = {0, 0};
   for (const Input& input : inputs)
