@@ -22,7 +22,7 @@ TEST(RunsWithin, FillsTheLimitInOrder) {
   EXPECT_EQ(ends(runs_within(weight.size(), 10, of)), (Ends{{0, 4}, {4, 5}, {5, 7}, {7, 8}}));
   EXPECT_EQ(ends(runs_within(weight.size(), 1000, of)), (Ends{{0, 8}}));
   EXPECT_EQ(ends(runs_within(weight.size(), 0, of)),
-            (Ends{{0, 1}, {1, 2}, {2, 4}, {4, 5}, {5, 6}, {6, 7}, {7, 8}}));
+            (Ends{{0, 1}, {1, 2}, {2, 3}, {3, 4}, {4, 5}, {5, 6}, {6, 7}, {7, 8}}));
   EXPECT_TRUE(runs_within(0, 10, of).empty());
 }
 
