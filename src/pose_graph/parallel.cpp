@@ -16,10 +16,9 @@ int thread_count(int option) {
   return std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
 }
 
-void for_ranges(int count, int threads, const std::function<void(int, int)>& body) {
-  // Shorter ranges take less time than starting a thread.
-  constexpr int kShortestRange = 512;
-  threads = std::min(threads, count / kShortestRange);
+void for_ranges(int count, int threads, const std::function<void(int, int)>& body,
+                int shortest_range) {
+  threads = std::min(threads, count / shortest_range);
   if (threads <= 1) return body(0, count);
   on_threads(static_cast<std::size_t>(threads), [&](std::size_t thread) {
     const int mine = static_cast<int>(thread);
