@@ -8,6 +8,7 @@
 #include "gpureg/reconstruction.hpp"
 #include "reconstruction/connections.hpp"
 #include "reconstruction/edge_noise.hpp"
+#include "reconstruction/odometry.hpp"
 
 namespace gpureg::reconstruction {
 namespace {
@@ -72,7 +73,7 @@ std::vector<Candidate> candidates_of(const std::vector<RegistrationMode>& modes,
 
 /// The graph of the pairs that are confident enough.
 struct PairGraph {
-  pose_graph::Graph graph;
+  pose_graph::Graph graph;                         ///< without the odometry
   std::vector<std::size_t> pairs;                  ///< of each edge
   std::vector<Eigen::Vector3d> centres;            ///< of the overlap of each edge
   std::vector<std::vector<Candidate>> candidates;  ///< of each edge
@@ -139,7 +140,8 @@ struct Round {
   bool dropped = false;
 };
 
-Round optimise_round(std::size_t scans, const PairGraph& pairs, const Options& options,
+Round optimise_round(std::size_t scans, const PairGraph& pairs,
+                     const std::vector<Odometry>& odometry, const Options& options,
                      std::vector<char>& unconfirmed) {
   pose_graph::Graph graph = pairs.graph;
   std::vector<std::size_t> kept;
@@ -149,6 +151,7 @@ Round optimise_round(std::size_t scans, const PairGraph& pairs, const Options& o
       graph.edges.push_back(pairs.graph.edges[k]);
       kept.push_back(k);
     }
+  for (const Odometry& edge : odometry) graph.edges.push_back(edge_of(edge));
   pose_graph::Options graph_options;
   graph_options.threads = options.threads;
   graph_options.gnc.min_bridge_confidence = options.min_connection_confidence;
@@ -164,7 +167,7 @@ Round optimise_round(std::size_t scans, const PairGraph& pairs, const Options& o
     if (result.state == pose_graph::EdgeState::rejected) result.mode = 0;
     round.edges[kept[k]] = edge_of(pairs, kept[k], result);
   }
-  round.parts = certain_parts(scans, round.edges, options.min_connection_confidence);
+  round.parts = certain_parts(scans, round.edges, odometry, options.min_connection_confidence);
   for (std::size_t k = 0; k < round.edges.size(); ++k) {
     Edge& edge = round.edges[k];
     if (!edge.accepted || round.parts[edge.source] == round.parts[edge.target]) continue;
@@ -253,19 +256,21 @@ void explain(const std::vector<Pair>& pairs, const std::vector<RegistrationResul
 }  // namespace
 
 Reconstruction reconstruct(std::size_t scans, const std::vector<Pair>& pairs,
-                           const std::vector<RegistrationResult>& results, const Options& options) {
+                           const std::vector<RegistrationResult>& results, const Options& options,
+                           const std::vector<Odometry>& odometry) {
   options.validate();
   check_pairs(scans, pairs);
+  Reconstruction map;
+  map.odometry = checked_odometry(scans, odometry, options.drift);
   const std::vector<PairConsistency> consistency =
       loop_consistency(pairs, results, options.consistency);
   const PairGraph graph = graph_of_pairs(scans, pairs, results, consistency, options);
 
   std::vector<char> unconfirmed(graph.graph.edges.size(), 0);
-  Round round = optimise_round(scans, graph, options, unconfirmed);
+  Round round = optimise_round(scans, graph, map.odometry, options, unconfirmed);
   for (int k = 1; round.dropped && k < kMostRounds; ++k)
-    round = optimise_round(scans, graph, options, unconfirmed);
+    round = optimise_round(scans, graph, map.odometry, options, unconfirmed);
 
-  Reconstruction map;
   map.status = round.result.status;
   map.scans.resize(scans);
   map.edges = std::move(round.edges);
