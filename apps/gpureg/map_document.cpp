@@ -24,7 +24,7 @@ Json pairs_document(const MapRun& run, const Context& context) {
                      {"align", run.seconds.align},
                      {"pairs_per_second", rate},
                      {"pairs_in_this_run", run.pairs_in_this_run}};
-  json["fragments"] = fragments_json(scene_);
+  json["fragments"] = fragments_json(run.scene);
   Json records = Json::array();
   for (std::size_t k = 0; k < run.records.size(); ++k) {
     records.push_back(run.records[k].json);

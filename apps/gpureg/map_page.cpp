@@ -21,8 +21,8 @@ namespace {
 using reconstruction::Edge;
 using reconstruction::Surface;
 
-/// Points of the page, 10 bytes each: 2.7 MB of text.
-constexpr std::size_t kPagePoints = 200'000;
+/// Points of the page, 10 bytes each: 3.3 MB of text.
+constexpr std::size_t kPagePoints = 250'000;
 /// A scan of a large set still shows its shape.
 constexpr std::size_t kLeastScanPoints = 150;
 

@@ -3,9 +3,9 @@
 // The page of a map: figures, a WebGL view of points and graph, lists that highlight. No network.
 const data = JSON.parse(document.getElementById('data').textContent);
 const element = (id) => document.getElementById(id);
-const state = {island: 0, colour: 'scan', yaw: 0.7, pitch: 0.9, distance: 5, target: [0, 0, 0],
+const state = {island: 0, colour: 'confidence', yaw: 0.7, pitch: 0.95, distance: 5, target: [0, 0, 0],
   chosen: null, upAxis: 0};
-const kLow = [0.84, 0.27, 0.24], kMiddle = [0.93, 0.72, 0.2], kHigh = [0.25, 0.72, 0.45];
+const kLow = [0.84, 0.27, 0.24], kMiddle = [0.93, 0.72, 0.2], kHigh = [0.36, 0.74, 0.55];
 
 // ---- small linear algebra: column-major 4x4, as WebGL wants it
 const sub = (a, b) => [a[0] - b[0], a[1] - b[1], a[2] - b[2]];
@@ -142,8 +142,8 @@ void main() {
 const kPointFragment = 'precision mediump float; varying vec3 shade; void main() { gl_FragColor = vec4(shade, 1.0); }';
 const kLineVertex = `attribute vec3 position; attribute vec3 tint; uniform mat4 camera; uniform float dots; varying vec3 shade;
 void main() { gl_Position = camera * vec4(position, 1.0); gl_PointSize = dots; shade = tint; }`;
-const kLineFragment = `precision mediump float; varying vec3 shade; uniform float round;
-void main() { if (round > 0.5 && length(gl_PointCoord - 0.5) > 0.5) discard; gl_FragColor = vec4(shade, 1.0); }`;
+const kLineFragment = `precision mediump float; varying vec3 shade; uniform float round, opacity;
+void main() { if (round > 0.5 && length(gl_PointCoord - 0.5) > 0.5) discard; gl_FragColor = vec4(shade, opacity); }`;
 
 let points, lines, pointBuffer, lineBuffer;
 const up = () => state.ups[state.upAxis % state.ups.length];
@@ -190,7 +190,7 @@ function drawPoints(camera, eye, box) {
     gl.uniformMatrix4fv(points.uniform('move'), false, move);
     gl.uniform3fv(points.uniform('colour'), colour);
     gl.uniform1f(points.uniform('byHeight'), state.colour === 'height' && !chosen ? 1 : 0);
-    gl.uniform1f(points.uniform('spacing'), 1.5 * data.scans[k].spacing);
+    gl.uniform1f(points.uniform('spacing'), 1.3 * data.scans[k].spacing);
     gl.drawArrays(gl.POINTS, data.scans[k].first, data.scans[k].count);
   };
   data.scans.forEach((s, k) => {
@@ -221,7 +221,10 @@ function drawGraph(camera) {
   gl.enableVertexAttribArray(position);
   gl.enableVertexAttribArray(tint);
   gl.uniformMatrix4fv(lines.uniform('camera'), false, camera);
-  for (const [list, mode, dots] of [[segments, gl.LINES, 1], [knots, gl.POINTS, 9]]) {
+  gl.enable(gl.BLEND);
+  gl.blendFunc(gl.SRC_ALPHA, gl.ONE_MINUS_SRC_ALPHA);
+  for (const [list, mode, dots] of [[segments, gl.LINES, 1], [knots, gl.POINTS, 8]]) {
+    gl.uniform1f(lines.uniform('opacity'), mode === gl.LINES && !chosen ? 0.55 : 1);
     gl.bufferData(gl.ARRAY_BUFFER, new Float32Array(list), gl.DYNAMIC_DRAW);
     gl.vertexAttribPointer(position, 3, gl.FLOAT, false, 24, 0);
     gl.vertexAttribPointer(tint, 3, gl.FLOAT, false, 24, 12);
@@ -229,6 +232,7 @@ function drawGraph(camera) {
     gl.uniform1f(lines.uniform('round'), mode === gl.POINTS ? 1 : 0);
     gl.drawArrays(mode, 0, list.length / 6);
   }
+  gl.disable(gl.BLEND);
 }
 function draw() {
   if (!gl || data.islands.length === 0) return;
@@ -260,13 +264,23 @@ function fit() {
       for (let k = s.first; k < s.first + s.count; k += 31) corners.push(pointAt(k, box));
   const middle = (axis) => {
     const d = corners.map((p) => dot(p, axis)).sort((a, c) => a - c);
-    const low = d[Math.floor(0.005 * d.length)] || 0, high = d[Math.floor(0.995 * (d.length - 1))] || 0;
-    return {at: (low + high) / 2, half: (high - low) / 2};
+    return ((d[Math.floor(0.005 * d.length)] || 0) + (d[Math.floor(0.995 * (d.length - 1))] || 0)) / 2;
   };
-  const x = middle(b.right), y = middle(b.up), z = middle(b.back);
-  state.target = sum(sum(scaled(b.right, x.at), scaled(b.up, y.at)), scaled(b.back, z.at));
-  const aspect = canvas.clientWidth / Math.max(1, canvas.clientHeight);
-  state.distance = 1.08 * Math.max(y.half, x.half / aspect) / Math.tan(0.35) + z.half || 1;
+  const axes = [b.right, b.up, b.back];
+  const aspect = canvas.clientWidth / Math.max(1, canvas.clientHeight), slope = Math.tan(0.35) * 0.9;
+  state.target = axes.reduce((at, axis) => sum(at, scaled(axis, middle(axis))), [0, 0, 0]);
+  // Twice: the near side takes more of the picture than the far side, so the middle moves.
+  for (let round = 0; round < 2; ++round) {
+    const seen = corners.map((p) => axes.map((axis) => dot(sub(p, state.target), axis)));
+    const needed = seen.map(([x, y, z]) => Math.max(Math.abs(x) / aspect, Math.abs(y)) / slope + z).sort((p, q) => p - q);
+    state.distance = needed[Math.floor(0.995 * (needed.length - 1))] || 1;
+    if (round > 0) break;
+    for (const k of [0, 1]) {
+      const shares = seen.map((p) => p[k] / (state.distance - p[2])).sort((p, q) => p - q);
+      const shift = (shares[Math.floor(0.005 * shares.length)] + shares[Math.floor(0.995 * (shares.length - 1))]) / 2 || 0;
+      state.target = sum(state.target, scaled(axes[k], shift * state.distance));
+    }
+  }
   redraw();
 }
 function chooseIsland(k) {

@@ -3,7 +3,6 @@
 
 #include <cmath>
 #include <fstream>
-#include <optional>
 #include <sstream>
 
 #include "gpureg/error.hpp"
@@ -52,29 +51,17 @@ std::vector<reconstruction::Odometry> from_log(const std::string& path, const Ma
 }
 
 std::vector<reconstruction::Odometry> from_trajectory(const std::string& path, const MapRun& run) {
-  std::vector<reconstruction::Odometry> odometry;
-  std::optional<std::uint32_t> before;
-  UnalignedIsometry3d world_from_before = UnalignedIsometry3d::Identity();
+  std::vector<UnalignedIsometry3d> world_from_scan(run.scene.numbers.size(), no_pose());
   for (const evaluation::StampedPose& pose : evaluation::read_trajectory(path)) {
     constexpr double kMost = 2147483647;
     if (!(pose.time >= 0 && pose.time <= kMost && pose.time == std::floor(pose.time)))
-      fail(path, "has the time " + std::to_string(pose.time) + ", expected the number of a fragment");
+      fail(path,
+           "has the time " + std::to_string(pose.time) + ", expected the number of a fragment");
+    const auto number = static_cast<int>(pose.time);
     // The odometry of a longer run serves a folder with some of its scans.
-    if (!run.has(static_cast<int>(pose.time))) continue;
-    const std::uint32_t scan = run.index_of(static_cast<int>(pose.time));
-    UnalignedIsometry3d world_from_scan;
-    world_from_scan.matrix() = pose.world_from_body;
-    if (before) {
-      reconstruction::Odometry edge;
-      edge.source = scan;
-      edge.target = *before;
-      edge.target_from_source = world_from_before.inverse() * world_from_scan;
-      odometry.push_back(edge);
-    }
-    before = scan;
-    world_from_before = world_from_scan;
+    if (run.has(number)) world_from_scan[run.index_of(number)].matrix() = pose.world_from_body;
   }
-  return odometry;
+  return reconstruction::odometry_of_poses(world_from_scan);
 }
 
 }  // namespace

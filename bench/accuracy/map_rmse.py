@@ -64,26 +64,38 @@ def rms(values):
     return np.sqrt((values**2).mean())
 
 
-def main():
-    out, folder = pathlib.Path(sys.argv[1]), pathlib.Path(sys.argv[2])
-    truth = read_poses(folder / "poses.txt")
-    poses, document = (
-        read_poses(out / "poses.txt"),
-        json.loads((out / "reconstruction.json").read_text()),
-    )
-    print(
-        f"placed {len(poses)} of {len(document['scans'])}, islands {[len(i) for i in document['islands']]}"
-    )
-    for island in document["islands"]:
-        metres, degrees, own = errors(poses, truth, island)
-        print(
-            f"island of {len(island)}: RMSE {100 * rms(metres):.2f} cm, {rms(degrees):.2f} degrees by positions, "
-            f"{rms(own):.2f} by rotations; worst {100 * metres.max():.2f} cm (scan {island[metres.argmax()]})"
-        )
-    truth_log, truth_info = (
+def read_truth(folder):
+    """Poses, and of all pairs with overlap their poses and information matrices."""
+    folder = pathlib.Path(folder)
+    return (
+        read_poses(folder / "poses.txt"),
         read_blocks(folder / "gt_all.log", 4),
         read_blocks(folder / "gt_all.info", 6),
     )
+
+
+def measure(out, truth):
+    """Figures of a map; truth as read_truth() returns it. Positions in centimetres."""
+    truth_poses, truth_log, truth_info = truth
+    poses = read_poses(out / "poses.txt")
+    document = json.loads((out / "reconstruction.json").read_text())
+    islands = []
+    for island in document["islands"]:
+        known = [k for k in island if k in truth_poses]
+        if len(known) < 3:
+            islands.append({"scans": island})
+            continue
+        metres, degrees, own = errors(poses, truth_poses, known)
+        islands.append(
+            {
+                "scans": island,
+                "rmse_cm": 100 * rms(metres),
+                "rmse_degrees": rms(degrees),
+                "rmse_degrees_own": rms(own),
+                "worst_cm": 100 * metres.max(),
+                "worst_scan": known[metres.argmax()],
+            }
+        )
     wrong, accepted = [], [e for e in document["edges"] if e["state"] == "accepted"]
     for edge in accepted:
         pair = (edge["i"], edge["j"])
@@ -92,8 +104,37 @@ def main():
             redwood_error(truth_log[pair], pose, truth_info[pair]) if pair in truth_log else np.inf
         )
         if error > MAX_EDGE_METRES:
-            wrong.append((*pair, round(float(error), 3), round(edge["confidence"], 3)))
-    print(f"edges: {len(accepted)} accepted, {len(wrong)} wrong {wrong}")
+            wrong.append(
+                {
+                    "pair": pair,
+                    "metres": float(error) if np.isfinite(error) else None,
+                    "confidence": edge["confidence"],
+                }
+            )
+    return {
+        "scans": len(document["scans"]),
+        "placed": len(poses),
+        "islands": islands,
+        "accepted": len(accepted),
+        "wrong": wrong,
+    }
+
+
+def main():
+    figures = measure(pathlib.Path(sys.argv[1]), read_truth(sys.argv[2]))
+    sizes = [len(island["scans"]) for island in figures["islands"]]
+    print(f"placed {figures['placed']} of {figures['scans']}, islands {sizes}")
+    for island in figures["islands"]:
+        if "rmse_cm" in island:
+            print(
+                f"island of {len(island['scans'])}: RMSE {island['rmse_cm']:.2f} cm, {island['rmse_degrees']:.2f} degrees "
+                f"by positions, {island['rmse_degrees_own']:.2f} by rotations; "
+                f"worst {island['worst_cm']:.2f} cm (scan {island['worst_scan']})"
+            )
+    print(f"edges: {figures['accepted']} accepted, {len(figures['wrong'])} wrong")
+    for edge in figures["wrong"]:
+        far = "no overlap" if edge["metres"] is None else f"{edge['metres']:.3f} m"
+        print(f"    {edge['pair']}: {far}, confidence {edge['confidence']:.3f}")
 
 
 if __name__ == "__main__":

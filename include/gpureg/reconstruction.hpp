@@ -94,6 +94,10 @@ struct Odometry {
   double confidence = 0.99;
 };
 
+/// Odometry between consecutive scans of those whose pose is known.
+/// @param world_from_scan one per scan; not finite: not known.
+std::vector<Odometry> odometry_of_poses(const std::vector<UnalignedIsometry3d>& world_from_scan);
+
 /// One scan of the map.
 struct Scan {
   bool placed = false;
@@ -156,6 +160,10 @@ struct Reconstruction {
 Reconstruction reconstruct(std::size_t scans, const std::vector<Pair>& pairs,
                            const std::vector<RegistrationResult>& results,
                            const Options& options = {}, const std::vector<Odometry>& odometry = {});
+
+/// The inverse of CorrespondenceMoments::information_redwood(), for results that were read from a
+/// file.
+CorrespondenceMoments moments_of_information(const Eigen::Matrix<double, 6, 6>& redwood);
 
 /// The placed scans with their poses, the odometry between them, and the accepted edges. Node ids are indices of scans, or
 /// `ids` of them where given.

@@ -37,6 +37,23 @@ std::vector<Odometry> checked_odometry(std::size_t scans, std::vector<Odometry> 
   return odometry;
 }
 
+std::vector<Odometry> odometry_of_poses(const std::vector<UnalignedIsometry3d>& world_from_scan) {
+  std::vector<Odometry> out;
+  const UnalignedIsometry3d* before = nullptr;
+  for (std::size_t k = 0; k < world_from_scan.size(); ++k) {
+    if (!world_from_scan[k].matrix().allFinite()) continue;
+    if (before != nullptr) {
+      Odometry edge;
+      edge.source = static_cast<std::uint32_t>(k);
+      edge.target = static_cast<std::uint32_t>(before - world_from_scan.data());
+      edge.target_from_source = before->inverse() * world_from_scan[k];
+      out.push_back(edge);
+    }
+    before = &world_from_scan[k];
+  }
+  return out;
+}
+
 pose_graph::Edge edge_of(const Odometry& odometry) {
   pose_graph::Edge edge;
   edge.source = odometry.source;

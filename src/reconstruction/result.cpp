@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <algorithm>
+#include <cmath>
 #include <string>
 
 #include "gpureg/error.hpp"
@@ -79,6 +80,16 @@ const char* describe(EdgeReason reason) {
 std::size_t Reconstruction::placed() const {
   return static_cast<std::size_t>(
       std::count_if(scans.begin(), scans.end(), [](const Scan& scan) { return scan.placed; }));
+}
+
+CorrespondenceMoments moments_of_information(const Eigen::Matrix<double, 6, 6>& redwood) {
+  CorrespondenceMoments moments;
+  moments.count = static_cast<std::uint64_t>(std::max(0.0, std::round(redwood(0, 0))));
+  const Eigen::Matrix3d cross = redwood.topRightCorner<3, 3>() / -2;
+  moments.sum = {cross(2, 1), cross(0, 2), cross(1, 0)};
+  const Eigen::Matrix3d turn = redwood.bottomRightCorner<3, 3>() / 4;
+  moments.outer = 0.5 * turn.trace() * Eigen::Matrix3d::Identity() - turn;
+  return moments;
 }
 
 pose_graph::Graph graph_of(const Reconstruction& map, const std::vector<std::int64_t>& ids) {
