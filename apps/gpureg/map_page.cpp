@@ -207,7 +207,7 @@ Json figures_json(const MapRun& run, const std::vector<reconstruction::Link>& li
 }
 
 Json links_json(std::vector<reconstruction::Link> links) {
-  constexpr std::size_t kMost = 12;
+  constexpr std::size_t kMost = 6;
   std::stable_sort(links.begin(), links.end(), [](const auto& a, const auto& b) {
     return a.confidence < b.confidence;
   });

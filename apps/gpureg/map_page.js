@@ -273,7 +273,7 @@ function fit() {
   for (let round = 0; round < 2; ++round) {
     const seen = corners.map((p) => axes.map((axis) => dot(sub(p, state.target), axis)));
     const needed = seen.map(([x, y, z]) => Math.max(Math.abs(x) / aspect, Math.abs(y)) / slope + z).sort((p, q) => p - q);
-    state.distance = needed[Math.floor(0.995 * (needed.length - 1))] || 1;
+    state.distance = needed[Math.floor(0.999 * (needed.length - 1))] || 1;
     if (round > 0) break;
     for (const k of [0, 1]) {
       const shares = seen.map((p) => p[k] / (state.distance - p[2])).sort((p, q) => p - q);
@@ -373,8 +373,8 @@ function showLists() {
   const noted = data.scans.flatMap((s, k) => s.island !== null && s.reason ? [{name: s.id, text: s.reason,
     value: '', choice: {kind: 'scan', scan: k}, tip: s.reason}] : []);
   if (noted.length) list('Scans without confirmation', noted);
-  list('Weakest connections', data.links.map((l) => ({name: l.scans.slice(0, 6).map(name).join(', ') + (l.scans.length > 6 ? ' ...' : ''),
-    text: `with the rest: ${l.accepted} accepted, ${l.rejected} rejected`, ...value(l.confidence), choice: {kind: 'scans', scans: l.scans},
+  list('Weakest connections', data.links.map((l) => ({name: l.scans.length > 4 ? `${l.scans.slice(0, 2).map(name).join(', ')} and ${l.scans.length - 2} more` : l.scans.map(name).join(', '),
+    text: `${l.accepted} edge${l.accepted === 1 ? '' : 's'}` + (l.rejected ? `, ${l.rejected} rejected` : ''), ...value(l.confidence), choice: {kind: 'scans', scans: l.scans},
     tip: 'yellow: the part that this connection holds'})), 'None.');
   const edges = (accepted) => data.edges.filter((e) => e.accepted === accepted).sort((a, b) => accepted ? a.confidence - b.confidence : b.confidence - a.confidence)
     .map((e) => ({name: `${name(e.i)} \u2013 ${name(e.j)}`, text: e.reason, ...value(e.confidence), choice: {kind: 'edge', edge: e},

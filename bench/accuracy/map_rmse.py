@@ -2,10 +2,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Errors of a map against the truth: for each island, RMSE of positions and rotations after alignment (Horn 1987).
 
-    map_rmse.py OUT TRUTH      OUT of `gpureg reconstruct`; TRUTH/poses.txt, gt_all.log, gt_all.info
+    map_rmse.py OUT TRUTH [PAIRS.json]     OUT of `gpureg reconstruct`; TRUTH/poses.txt, gt_all.log, gt_all.info
 
 Rotations are aligned by positions, and by themselves (the chordal mean): positions hardly determine a rotation where scans are close.
-An accepted edge is wrong where its pair is not in gt_all or its error by Redwood's measure is above 0.2 m.
+An accepted edge is wrong where its error by Redwood's measure is above 0.2 m. Pairs with an overlap below 5 % are not in
+gt_all: their truth is that of the poses, their information that of the result, or else of points 2 m around the source.
 """
 
 import json
@@ -74,9 +75,35 @@ def read_truth(folder):
     )
 
 
-def measure(out, truth):
-    """Figures of a map; truth as read_truth() returns it. Positions in centimetres."""
-    truth_poses, truth_log, truth_info = truth
+# Without information of a pair: points on a sphere of 2 m around the source's origin.
+NO_INFORMATION = np.diag([1, 1, 1, *(3 * [8 / 3 * 2**2])])
+
+
+def edge_error(pair, pose, truth, information):
+    """Metres; infinite where the truth has no such scan or the scans are of different scenes."""
+    poses, log, info = truth
+    if pair in log:
+        return redwood_error(log[pair], pose, info[pair])
+    if pair[0] not in poses or pair[1] not in poses or pair[0] // 100 != pair[1] // 100:
+        return np.inf
+    relative = np.linalg.inv(poses[pair[0]]) @ poses[pair[1]]
+    return redwood_error(relative, pose, information.get(pair, NO_INFORMATION))
+
+
+def information_of(pairs):
+    """Of the pairs of a result."""
+    return {
+        (p["i"], p["j"]): np.reshape(p["information"], (6, 6))
+        for p in pairs
+        if p.get("information")
+    }
+
+
+def measure(out, truth, information):
+    """Figures of a map; truth as read_truth() returns it, information as information_of().
+    Positions in centimetres.
+    """
+    truth_poses = truth[0]
     poses = read_poses(out / "poses.txt")
     document = json.loads((out / "reconstruction.json").read_text())
     islands = []
@@ -100,9 +127,7 @@ def measure(out, truth):
     for edge in accepted:
         pair = (edge["i"], edge["j"])
         pose = np.array(edge["T_ij"]).reshape(4, 4)
-        error = (
-            redwood_error(truth_log[pair], pose, truth_info[pair]) if pair in truth_log else np.inf
-        )
+        error = edge_error(pair, pose, truth, information)
         if error > MAX_EDGE_METRES:
             wrong.append(
                 {
@@ -121,7 +146,10 @@ def measure(out, truth):
 
 
 def main():
-    figures = measure(pathlib.Path(sys.argv[1]), read_truth(sys.argv[2]))
+    out = pathlib.Path(sys.argv[1])
+    results = pathlib.Path(sys.argv[3]) if len(sys.argv) > 3 else out / "pairs.json"
+    pairs = json.loads(results.read_text())["pairs"] if results.exists() else []
+    figures = measure(out, read_truth(sys.argv[2]), information_of(pairs))
     sizes = [len(island["scans"]) for island in figures["islands"]]
     print(f"placed {figures['placed']} of {figures['scans']}, islands {sizes}")
     for island in figures["islands"]:

@@ -14,7 +14,7 @@ import pathlib
 import shutil
 import subprocess
 
-from map_rmse import measure, read_blocks, read_truth
+from map_rmse import information_of, measure, read_blocks, read_truth
 from record import parser, write
 
 SCENES = {
@@ -138,7 +138,7 @@ def run(command, folder, chosen, arguments, out, more):
         check=False,
     )
     document = json.loads((out / "reconstruction.json").read_text())
-    figures = measure(out, chosen.truth(arguments.data))
+    figures = measure(out, chosen.truth(arguments.data), information_of(records.values()))
     figures["seconds"] = document["seconds"]
     figures["peak_memory_mib"] = document["peak_memory_mib"]
     figures["weakest"] = min((link["confidence"] for link in document["weakest_links"]), default=None)
@@ -206,7 +206,7 @@ def main():
     for peer in ("open3d",):
         for out in sorted((arguments.work / peer).glob("*/reconstruction.json")):
             name = out.parent.name
-            figures = measure(out.parent, known[name].truth(arguments.data))
+            figures = measure(out.parent, known[name].truth(arguments.data), {})
             figures["seconds"] = json.loads(out.read_text())["seconds"]
             figures["peak_memory_mib"] = json.loads(out.read_text())["peak_memory_mib"]
             peers.setdefault(peer, {})[name] = figures

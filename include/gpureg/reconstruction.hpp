@@ -121,6 +121,9 @@ struct Edge {
   UnalignedIsometry3d target_from_source = UnalignedIsometry3d::Identity();
   /// Centre of the overlap in the source's frame; the origin where it is not known.
   Eigen::Vector3d overlap_centre = Eigen::Vector3d::Zero();
+  /// Covariance of the overlap's points in the source's frame, metres^2; 0 where it is not known.
+  Eigen::Matrix<double, 3, 3, Eigen::DontAlign> overlap_spread =
+      Eigen::Matrix<double, 3, 3, Eigen::DontAlign>::Zero();
   double confidence = 0;  ///< of this mode, after loop consistency
   double weight = 0;      ///< in the pose graph, [0, 1]
   bool accepted = false;
@@ -216,8 +219,8 @@ struct RefineOptions {
   /// metres, > 0; it shrinks with the distance.
   double kernel_width = 0.02;
   int iterations = 10;  ///< >= 1
-  /// Distance between the measured and the refined pose at the centre of the overlap from which an
-  /// edge is rejected in the end, metres, > 0; edges that alone connect two parts stay.
+  /// RMS distance between the measured and the refined pose over the overlap from which an edge is
+  /// rejected in the end, metres, > 0; edges that alone connect two parts stay.
   double max_edge_error = 0.2;
   /// Points of a scan that look for correspondences in one other scan, evenly chosen, >= 16.
   std::uint32_t max_points = 1500;

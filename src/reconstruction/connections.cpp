@@ -2,6 +2,7 @@
 #include "reconstruction/connections.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <map>
 #include <numeric>
 #include <queue>
@@ -65,10 +66,13 @@ std::size_t reject_deviating(Reconstruction& map, double max_error) {
   for (std::size_t k = 0; k < map.edges.size(); ++k) {
     const Edge& edge = map.edges[k];
     if (!edge.accepted || !map.scans[edge.source].placed) continue;
-    const Eigen::Vector3d measured =
-        map.scans[edge.target].island_from_scan * (edge.target_from_source * edge.overlap_centre);
-    const Eigen::Vector3d refined = map.scans[edge.source].island_from_scan * edge.overlap_centre;
-    const double error = (measured - refined).norm();
+    const UnalignedIsometry3d measured =
+        map.scans[edge.target].island_from_scan * edge.target_from_source;
+    const UnalignedIsometry3d& refined = map.scans[edge.source].island_from_scan;
+    const Eigen::Matrix3d turn = measured.linear() - refined.linear();
+    const double error = std::sqrt(
+        (measured * edge.overlap_centre - refined * edge.overlap_centre).squaredNorm() +
+        std::max(0.0, (turn * edge.overlap_spread * turn.transpose()).trace()));
     if (error > max_error) deviating.emplace_back(-error, k);
   }
   std::sort(deviating.begin(), deviating.end());

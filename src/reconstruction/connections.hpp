@@ -24,8 +24,8 @@ std::vector<std::uint32_t> certain_parts(std::size_t scans, const std::vector<Ed
                                          const std::vector<Odometry>& odometry,
                                          double min_confidence);
 
-/// Rejects accepted edges whose pose is farther from that of the map than max_error at the centre
-/// of the overlap, the farthest first, as long as other accepted edges or odometry connect their scans.
+/// Rejects accepted edges whose pose is farther from that of the map than max_error, RMS over the
+/// overlap, the farthest first, as long as other accepted edges or odometry connect their scans.
 /// @return number of edges rejected.
 std::size_t reject_deviating(Reconstruction& map, double max_error);
 

@@ -41,6 +41,15 @@ Eigen::Vector3d overlap_centre(const RegistrationResult& result) {
   return moments.sum / static_cast<double>(moments.count);
 }
 
+/// Covariance of its points; 0 where it is not known.
+Eigen::Matrix3d overlap_spread(const RegistrationResult& result) {
+  const CorrespondenceMoments& moments = result.source_moments;
+  if (moments.count == 0) return Eigen::Matrix3d::Zero();
+  const auto count = static_cast<double>(moments.count);
+  const Eigen::Vector3d mean = moments.sum / count;
+  return moments.outer / count - mean * mean.transpose();
+}
+
 /// The modes of a result, of which methods without modes have one.
 std::vector<RegistrationMode> modes_of(const RegistrationResult& result) {
   if (!result.modes.empty()) return result.modes;
@@ -76,6 +85,7 @@ struct PairGraph {
   pose_graph::Graph graph;                         ///< without the odometry
   std::vector<std::size_t> pairs;                  ///< of each edge
   std::vector<Eigen::Vector3d> centres;            ///< of the overlap of each edge
+  std::vector<Eigen::Matrix3d> spreads;            ///< the same
   std::vector<std::vector<Candidate>> candidates;  ///< of each edge
 };
 
@@ -106,6 +116,7 @@ PairGraph graph_of_pairs(std::size_t scans, const std::vector<Pair>& pairs,
     out.graph.edges.push_back(std::move(edge));
     out.pairs.push_back(k);
     out.centres.push_back(centre);
+    out.spreads.push_back(overlap_spread(results[k]));
     out.candidates.push_back(candidates);
   }
   return out;
@@ -119,6 +130,7 @@ Edge edge_of(const PairGraph& pairs, std::size_t k, const pose_graph::EdgeResult
   edge.target = static_cast<std::uint32_t>(given.target);
   edge.pair = pairs.pairs[k];
   edge.overlap_centre = pairs.centres[k];
+  edge.overlap_spread = pairs.spreads[k];
   edge.mode = pairs.candidates[k][result.mode].mode;
   edge.confidence = pairs.candidates[k][result.mode].confidence;
   const bool first = result.mode == 0;
