@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <exception>
 #include <mutex>
+#include <system_error>
 #include <thread>
 
 namespace gpureg::pose_graph {
@@ -24,7 +25,11 @@ void on_threads(int threads, const std::function<void()>& body) {
     }
   };
   std::vector<std::thread> others;
-  for (int k = 1; k < threads; ++k) others.emplace_back(guarded);
+  try {
+    for (int k = 1; k < threads; ++k) others.emplace_back(guarded);
+  } catch (const std::system_error&) {
+    // The system allows no further thread: those that there are do the work.
+  }
   guarded();
   for (std::thread& thread : others) thread.join();
   if (error) std::rethrow_exception(error);
@@ -37,21 +42,23 @@ int thread_count(int option) {
   return std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
 }
 
-void for_ranges(int count, int threads, const std::function<void(int, int)>& body) {
-  // Shorter ranges take less time than starting a thread.
-  constexpr int kShortestRange = 512;
-  threads = std::min(threads, count / kShortestRange);
+void for_ranges(int count, int threads, const std::function<void(int, int)>& body,
+                int shortest_range) {
+  threads = std::min(threads, count / shortest_range);
   if (threads <= 1) return body(0, count);
   std::mutex mutex;
   int next = 0;
+  const auto bound = [&](int k) { return static_cast<int>(std::int64_t(count) * k / threads); };
   on_threads(threads, [&] {
-    int mine;
-    {
-      const std::lock_guard<std::mutex> lock(mutex);
-      mine = next++;
+    for (;;) {
+      int mine;
+      {
+        const std::lock_guard<std::mutex> lock(mutex);
+        if (next == threads) return;
+        mine = next++;
+      }
+      body(bound(mine), bound(mine + 1));
     }
-    const auto bound = [&](int k) { return static_cast<int>(std::int64_t(count) * k / threads); };
-    body(bound(mine), bound(mine + 1));
   });
 }
 
