@@ -71,6 +71,16 @@ std::vector<RelativePose> KeyframeGraph::loop_edges() const {
   return result;
 }
 
+std::vector<Eigen::Isometry3d> KeyframeGraph::odometry_poses(const Map& map) const {
+  std::vector<Eigen::Isometry3d> poses;
+  for (std::size_t k = 0; k < map.keyframes.size(); ++k) {
+    const auto edge = odometry_.find({static_cast<int>(k) - 1, static_cast<int>(k)});
+    poses.push_back(edge == odometry_.end() ? map.keyframes[k].world_from_camera
+                                            : poses.back() * edge->second);
+  }
+  return poses;
+}
+
 std::vector<int> KeyframeGraph::world_of_session(const Map& map) const {
   int sessions = 0;
   for (const Keyframe& keyframe : map.keyframes)

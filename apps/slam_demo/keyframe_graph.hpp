@@ -30,6 +30,9 @@ class KeyframeGraph {
 
   std::vector<RelativePose> loop_edges() const;
 
+  /// Poses of all keyframes by tracking alone, each session from its first keyframe.
+  std::vector<Eigen::Isometry3d> odometry_poses(const Map& map) const;
+
   /// The sessions that loops connect have the smallest of them as their world.
   std::vector<int> world_of_session(const Map& map) const;
 

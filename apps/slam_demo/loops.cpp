@@ -46,25 +46,25 @@ std::vector<int> LoopClosing::with_neighbours(int keyframe) const {
 }
 
 /// A new session that nothing connects to an earlier one looks for it by its images.
-void LoopClosing::add_keyframe(int index) {
+bool LoopClosing::add_keyframe(int index) {
   graph_.record(map_);
   const std::vector<int> world = graph_.world_of_session(map_);
   const int session = map_.keyframes[at(index)].session;
-  if (world[at(session)] != session || session == 0) return;
+  if (world[at(session)] != session || session == 0) return false;
   std::vector<int> candidates;
   for (int k = 0; k < index; ++k) {
     if (map_.keyframes[at(k)].session != session) candidates.push_back(k);
   }
   const Stopwatch watch(time_.image);
   const auto found = image_loop_anywhere(map_, camera_, index, candidates, kBetweenSessions);
-  if (!found) return;
+  if (!found) return false;
   const int number = kImageLoops + image_loops_++;
   graph_.add(number, {found->edge});
   image_records_.push_back({index, found->edge.a, found->inliers});
   // Poses first: an observation of a point of another world would not fit.
   optimize();
   for (const auto& [key, point] : found->matches) map_.add_observation(point, {index, key, number});
-  moved_ = true;
+  return true;
 }
 
 void LoopClosing::add_fragment(const BuiltFragment& built) {
@@ -159,42 +159,40 @@ void LoopClosing::optimize() {
 }
 
 bool LoopClosing::process() {
-  if (options_.dense && !fragments_.empty()) {
-    lc::Update update;
-    {
-      const Stopwatch watch(time_.registration);
-      update = closer_.process();
-    }
-    bool changed = false;
-    for (const lc::Loop& loop : update.changed) {
-      const int number = number_of(static_cast<int>(loop.source), static_cast<int>(loop.target));
-      LoopRecord& record = records_[at(number)];
-      const bool was_accepted = record.state == "accepted";
-      record.state = lc::to_string(loop.state);
-      record.reason = lc::to_string(loop.reason);
-      record.confidence = loop.confidence;
-      record.drift_ratio = loop.drift_ratio;
-      const bool accepted = loop.state == lc::LoopState::accepted;
-      if (was_accepted) {  // retracted, or accepted with another pose
-        map_.remove_loop(number);
-        graph_.remove(number);
-        record.image_loops = 0;
-        changed = true;
-      }
-      if (!accepted) continue;
-      changed = true;
-      graph_.add(number, {{record.target_keyframe, record.source_keyframe,
-                           Eigen::Isometry3d(loop.target_from_source.matrix()),
-                           Eigen::Matrix<double, 6, 6>(kDenseCertainty * loop.information)}});
-      connect_image_loops(number, loop, record);
-    }
-    if (changed) {
-      optimize();
-      if (options_.bundle) bundle_all(options_.bundle_iterations);
-      moved_ = true;
-    }
+  if (!options_.dense || fragments_.empty()) return false;
+  lc::Update update;
+  {
+    const Stopwatch watch(time_.registration);
+    update = closer_.process();
   }
-  return std::exchange(moved_, false);
+  bool changed = false;
+  for (const lc::Loop& loop : update.changed) {
+    const int number = number_of(static_cast<int>(loop.source), static_cast<int>(loop.target));
+    LoopRecord& record = records_[at(number)];
+    const bool was_accepted = record.state == "accepted";
+    record.state = lc::to_string(loop.state);
+    record.reason = lc::to_string(loop.reason);
+    record.confidence = loop.confidence;
+    record.drift_ratio = loop.drift_ratio;
+    const bool accepted = loop.state == lc::LoopState::accepted;
+    if (was_accepted) {  // retracted, or accepted with another pose
+      map_.remove_loop(number);
+      graph_.remove(number);
+      record.image_loops = 0;
+      changed = true;
+    }
+    if (!accepted) continue;
+    changed = true;
+    graph_.add(number, {{record.target_keyframe, record.source_keyframe,
+                         Eigen::Isometry3d(loop.target_from_source.matrix()),
+                         Eigen::Matrix<double, 6, 6>(kDenseCertainty * loop.information)}});
+    connect_image_loops(number, loop, record);
+  }
+  if (changed) {
+    optimize();
+    if (options_.bundle) bundle_all(options_.bundle_iterations);
+  }
+  return changed;
 }
 
 void LoopClosing::bundle_all(int iterations) {

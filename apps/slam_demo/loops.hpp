@@ -3,7 +3,6 @@
 
 #include <gpureg/loop_closure.hpp>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include "fragment.hpp"
@@ -42,8 +41,8 @@ class LoopClosing {
   LoopClosing(const gpureg::Context& context, Map& map, const Pinhole& camera,
               const LoopOptions& options);
 
-  /// After every new keyframe.
-  void add_keyframe(int keyframe);
+  /// After every new keyframe. Returns whether keyframes moved.
+  bool add_keyframe(int keyframe);
   void add_fragment(const BuiltFragment& fragment);
   /// Registers what is due. Returns whether keyframes moved.
   bool process();
@@ -80,7 +79,6 @@ class LoopClosing {
   std::vector<LoopRecord> records_;  // by number of the loop
   std::vector<ImageLoopRecord> image_records_;
   int image_loops_ = 0;
-  bool moved_ = false;
   Milliseconds time_;
 };
 
