@@ -132,15 +132,15 @@ enum class LoopState {
 };
 
 enum class LoopReason {
-  confident,           ///< accepted: confident, and odometry's drift explains it
-  confirmed,           ///< accepted: independent loops agree
-  by_graph,            ///< accepted: Options::accept_by_graph_alone
-  unconfirmed,         ///< candidate: neither confident enough nor confirmed
-  exceeds_drift,       ///< candidate: farther from odometry than drift explains
-  not_aligned,         ///< rejected: no pose of the pair reaches min_confidence
-  inconsistent,        ///< rejected or retracted: contradicts odometry and other loops
-  lost_confirmation,   ///< retracted: the loops that confirmed it are gone
-  fragment_removed     ///< final: one of its fragments was removed before it was accepted
+  confident,          ///< accepted: confident, and odometry's drift explains it
+  confirmed,          ///< accepted: independent loops agree
+  by_graph,           ///< accepted: Options::accept_by_graph_alone
+  unconfirmed,        ///< candidate: neither confident enough nor confirmed
+  exceeds_drift,      ///< candidate: farther from odometry than drift explains
+  not_aligned,        ///< rejected: no pose of the pair reaches min_confidence
+  inconsistent,       ///< rejected or retracted: contradicts odometry and other loops
+  lost_confirmation,  ///< retracted: the loops that confirmed it are gone
+  fragment_removed    ///< final: one of its fragments was removed before it was accepted
 };
 
 const char* to_string(LoopState state);    ///< "candidate", ...
@@ -207,8 +207,8 @@ using CloudProvider = std::function<PreparedCloud(FragmentId)>;
 /// Finds, verifies and, where wanted, optimises the loops of a SLAM system.
 ///
 /// The host adds fragments and odometry; process() registers pairs and returns loops. Owns no
-/// thread. The same calls give the same bits for any number of threads and on every backend, as long
-/// as ProcessLimits has no clock.
+/// thread. The same calls give the same bits for any number of threads and on every backend, as
+/// long as ProcessLimits has no clock.
 ///
 /// Thread-safe. Every function but process(), save() and load() returns at once, also while another
 /// thread is in process(): what it adds takes effect in the next process().
@@ -227,7 +227,8 @@ class LoopCloser {
   /// Relative pose by tracking: p_target = target_from_source * p_source.
   /// @param covariance of Log(target_from_source^-1 * truth): rotation (radians) first, then
   ///   translation (metres), in the source's frame. None: Options::graph.drift.
-  /// @throws InvalidArgument for an unknown id, a fragment with itself, a repeated pair, a pose that
+  /// @throws InvalidArgument for an unknown id, a fragment with itself, a repeated pair, a pose
+  /// that
   ///   is not rigid, a covariance that is not finite, symmetric and positive definite.
   void add_odometry(FragmentId source, FragmentId target,
                     const UnalignedIsometry3d& target_from_source,
@@ -239,7 +240,8 @@ class LoopCloser {
 
   /// Registers a pair at the next process(), before all others: the host's place recognition.
   /// @param prior in addition to the gravity of both fragments.
-  /// @throws InvalidArgument for an unknown id, a fragment with itself or without cloud, a prior out
+  /// @throws InvalidArgument for an unknown id, a fragment with itself or without cloud, a prior
+  /// out
   ///   of range.
   void propose(FragmentId source, FragmentId target,
                const std::optional<RegistrationPrior>& prior = std::nullopt);
@@ -248,8 +250,7 @@ class LoopCloser {
   /// @param information as Loop::information; none: Options::graph.loop_noise.
   /// @param confidence prior probability that it is correct, [0, 1].
   /// @throws InvalidArgument as add_odometry(), and for a confidence outside [0, 1].
-  void add_loop(FragmentId source, FragmentId target,
-                const UnalignedIsometry3d& target_from_source,
+  void add_loop(FragmentId source, FragmentId target, const UnalignedIsometry3d& target_from_source,
                 const std::optional<UnalignedMatrix6d>& information = std::nullopt,
                 double confidence = 0.5);
 

@@ -15,7 +15,7 @@ struct FeatureIndex {
   std::uint32_t dimension = 0, nodes = 0;
   std::vector<std::uint32_t> row;  ///< nodes x 128, different valid rows in the order of the
                                    ///< leaves, then kNoValue
-  std::uint32_t rows = 0;  ///< number of different valid rows
+  std::uint32_t rows = 0;          ///< number of different valid rows
   /// Per row the next equal one; kNoValue: none. Noise-free walls have thousands of equal features.
   /// Only the first of them is in the index: no other is ever found, and all find the same.
   std::vector<std::uint32_t> next_equal;

@@ -24,10 +24,7 @@ class Acceptance {
  public:
   Acceptance(const State& state, const Paths& odometry, const std::vector<char>& fits,
              const Options& options)
-      : state_(state),
-        odometry_(odometry),
-        fits_(fits),
-        options_(options.acceptance) {
+      : state_(state), odometry_(odometry), fits_(fits), options_(options.acceptance) {
     for (std::size_t k = 0; k < state.loops.size(); ++k)
       if (fits[k]) order_.push_back(k);
     std::stable_sort(order_.begin(), order_.end(), [&](std::size_t a, std::size_t b) {

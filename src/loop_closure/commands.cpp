@@ -51,9 +51,8 @@ void add_proposal(State& state, Proposal proposal) {
   state.known.insert(pair_of(proposal.source, proposal.target));
   state.queue.push_back(std::move(proposal));
   // The queue ends with its first element: behind other proposals of the host, before all others.
-  const auto behind =
-      std::find_if(state.queue.begin(), state.queue.end() - 1,
-                   [](const Proposal& p) { return p.kind == ProposalKind::host; });
+  const auto behind = std::find_if(state.queue.begin(), state.queue.end() - 1,
+                                   [](const Proposal& p) { return p.kind == ProposalKind::host; });
   std::rotate(behind, state.queue.end() - 1, state.queue.end());
 }
 

@@ -148,8 +148,7 @@ void LoopCloser::add_odometry(FragmentId source, FragmentId target,
   const std::lock_guard<std::mutex> lock(impl_->inbox);
   impl_->registry.require_pair(source, target);
   impl_->registry.connect(source, target);
-  impl_->commands.push_back(
-      [edge](State& state) { loop_closure::add_odometry(state, edge); });
+  impl_->commands.push_back([edge](State& state) { loop_closure::add_odometry(state, edge); });
 }
 
 void LoopCloser::set_covisible(FragmentId id, const std::vector<FragmentId>& others) {
@@ -178,8 +177,8 @@ void LoopCloser::add_loop(FragmentId source, FragmentId target,
   check_pose(target_from_source, "target_from_source");
   require(confidence >= 0 && confidence <= 1, "confidence", confidence, "[0, 1]");
   if (information) check_information(*information);
-  LoopRecord record = host_record(source, target, target_from_source, information, confidence,
-                                  impl_->options);
+  LoopRecord record =
+      host_record(source, target, target_from_source, information, confidence, impl_->options);
   const std::lock_guard<std::mutex> lock(impl_->inbox);
   impl_->registry.require_pair(source, target);
   impl_->commands.push_back([record](State& state) { add_record(state, record); });
@@ -197,8 +196,8 @@ void LoopCloser::add_result(FragmentId source, FragmentId target,
 void LoopCloser::set_poses(const std::vector<FragmentPose>& poses) {
   std::set<FragmentId> seen;
   for (const FragmentPose& pose : poses) {
-    check_pose(pose.world_from_fragment, "world_from_fragment of fragment " +
-                                             std::to_string(pose.id));
+    check_pose(pose.world_from_fragment,
+               "world_from_fragment of fragment " + std::to_string(pose.id));
     if (!seen.insert(pose.id).second)
       throw InvalidArgument("poses name fragment " + std::to_string(pose.id) + " twice");
   }

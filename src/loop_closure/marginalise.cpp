@@ -22,8 +22,7 @@ UncertainPose uncertain(const UnalignedIsometry3d& pose, const UnalignedMatrix6d
 UncertainPose fused(const UncertainPose& a, const UncertainPose& b) {
   const Matrix6d weight = inverse_of(a.covariance), other = inverse_of(b.covariance);
   const Matrix6d covariance = inverse_of(weight + other);
-  const Vector6d step =
-      covariance * (other * pose_graph::log(a.pose.inverse() * b.pose));
+  const Vector6d step = covariance * (other * pose_graph::log(a.pose.inverse() * b.pose));
   return {pose_graph::retract(a.pose, step), covariance};
 }
 
@@ -145,8 +144,8 @@ class Marginaliser {
     drop(state_.odometry, gone);
     drop(state_.loops, [&](const LoopRecord& record) {
       const bool mine = record.loop.source == id_ || record.loop.target == id_;
-      const bool alive = record.loop.state == LoopState::accepted ||
-                         record.loop.state == LoopState::candidate;
+      const bool alive =
+          record.loop.state == LoopState::accepted || record.loop.state == LoopState::candidate;
       return gone(record) || (mine && !alive);
     });
     drop(state_.queue, gone);

@@ -65,8 +65,7 @@ int Paths::position(FragmentId id) const {
   return static_cast<int>(std::lower_bound(ids_.begin(), ids_.end(), id) - ids_.begin());
 }
 
-void Paths::connect(FragmentId source, FragmentId target,
-                    const UncertainPose& target_from_source) {
+void Paths::connect(FragmentId source, FragmentId target, const UncertainPose& target_from_source) {
   const int s = position(source), t = position(target);
   const UncertainPose source_from_target = target_from_source.inverse();
   const double cost =

@@ -102,8 +102,7 @@ class Proposer {
       const UncertainPose& here_from_there = tree.root_from(position);
       const double sigma = sigma_at(here_from_there.covariance, there.coarse.centre);
       if (sigma < options_.min_uncertainty) continue;
-      const pose_graph::Pose relative =
-          to_pose(node.estimate).inverse() * to_pose(there.estimate);
+      const pose_graph::Pose relative = to_pose(node.estimate).inverse() * to_pose(there.estimate);
       const double overlap =
           expected_overlap(there.coarse, node.coarse, relative, sigma, options_.max_dilation);
       if (overlap < options_.min_overlap) continue;
@@ -148,8 +147,7 @@ class Proposer {
       const Loop& loop = record.loop;
       if (loop.state != LoopState::candidate || record.expanded || record.modes.empty()) continue;
       record.expanded = true;
-      if (loop.confidence < kMinExpandedConfidence ||
-          loop.reason == LoopReason::exceeds_drift)
+      if (loop.confidence < kMinExpandedConfidence || loop.reason == LoopReason::exceeds_drift)
         continue;
       confirm(odometry, record);
     }

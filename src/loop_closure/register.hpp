@@ -11,7 +11,8 @@ namespace gpureg::loop_closure {
 LoopRecord record_of(FragmentId source, FragmentId target, const RegistrationResult& result,
                      const Options& options);
 
-/// Registers the proposals; one result each. Throws what align_batch() throws; state is not touched.
+/// Registers the proposals; one result each. Throws what align_batch() throws; state is not
+/// touched.
 std::vector<RegistrationResult> register_all(const Context& context, const State& state,
                                              const std::vector<Proposal>& proposals,
                                              const Options& options);

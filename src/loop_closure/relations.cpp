@@ -15,8 +15,8 @@ namespace {
 constexpr int kMostHops = 40;
 /// Loops agree by chance unless their prediction is this much better than that of odometry.
 constexpr double kInformative = 0.5;
-/// Misclosure, in units of the quantile, from which loops contradict each other; in between they say
-/// nothing. Registrations have heavier tails than their covariances.
+/// Misclosure, in units of the quantile, from which loops contradict each other; in between they
+/// say nothing. Registrations have heavier tails than their covariances.
 constexpr double kContradiction = 1.5 * 1.5;
 
 class Comparison {

@@ -271,8 +271,7 @@ State from_bytes(const std::string& content, const std::string& path) {
     throw IoError(path + " has version " + std::to_string(version) + ", this library reads " +
                   std::to_string(kVersion));
   const auto size = number_at<std::uint64_t>(content, sizeof kMagic + sizeof kVersion);
-  const auto sum =
-      number_at<std::uint64_t>(content, sizeof kMagic + sizeof kVersion + sizeof size);
+  const auto sum = number_at<std::uint64_t>(content, sizeof kMagic + sizeof kVersion + sizeof size);
   if (size > content.size() - kHeader) throw IoError(path + " is truncated");
   if (size < content.size() - kHeader) throw IoError(path + " is longer than its header says");
   if (sum != checksum(content.data() + kHeader, static_cast<std::size_t>(size)))

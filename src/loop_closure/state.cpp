@@ -36,9 +36,8 @@ UnalignedMatrix6d drift_information(const UnalignedIsometry3d& motion, const Opt
       metres > 0 ? std::sqrt(std::max(1.0, options.drift_correlation / metres)) : 1;
   const double translation =
       std::max(drift.min_translation, share * drift.translation_per_metre * metres);
-  const double rotation =
-      std::max(drift.min_rotation, share * drift.rotation_per_metre * metres +
-                                       drift.rotation_per_degree * degrees);
+  const double rotation = std::max(drift.min_rotation, share * drift.rotation_per_metre * metres +
+                                                           drift.rotation_per_degree * degrees);
   Vector6d information;
   information.head<3>().setConstant(1 / std::pow(rotation * kRadians, 2));
   information.tail<3>().setConstant(1 / std::pow(translation, 2));

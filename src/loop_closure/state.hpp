@@ -31,7 +31,7 @@ struct Node {
   std::uint64_t order = 0;  ///< of arrival
   /// Proposals made so far; later fragments propose earlier ones.
   std::uint32_t within_frame = 0, between_frames = 0;
-  bool placed = false;           ///< odometry connects it
+  bool placed = false;       ///< odometry connects it
   bool look_within = true;   ///< proposals within the frame are due
   bool look_between = true;  ///< proposals to other frames are due
 };
@@ -54,8 +54,8 @@ struct LoopRecord {
   Loop loop;  ///< as reported
   /// Ends of the edge: after a fragment was removed, of a neighbour of it.
   FragmentId source = 0, target = 0;
-  std::vector<Mode> modes;  ///< none: not aligned
-  std::uint32_t mode = 0;   ///< that takes part, or would
+  std::vector<Mode> modes;       ///< none: not aligned
+  std::uint32_t mode = 0;        ///< that takes part, or would
   std::optional<Loop> reported;  ///< what the host knows
   std::uint64_t number = 0;      ///< of arrival
   /// Of one mode among all loops, for State::relations.
@@ -76,8 +76,8 @@ enum class ProposalKind : std::uint8_t { host, confirming, within_frame, between
 struct Proposal {
   FragmentId source = 0, target = 0;
   ProposalKind kind = ProposalKind::host;
-  double value = 0;         ///< larger ones first
-  std::uint64_t order = 0;  ///< of host proposals
+  double value = 0;                                ///< larger ones first
+  std::uint64_t order = 0;                         ///< of host proposals
   std::shared_ptr<const RegistrationPrior> prior;  ///< may be empty
 };
 
@@ -90,8 +90,8 @@ struct State {
   std::uint64_t arrivals = 0;    ///< fragments, loops and host proposals so far
   /// By LoopRecord::key. Follows from the rest: not saved.
   std::map<std::uint64_t, std::vector<Relation>> relations;
-  bool graph_changed = false;    ///< loops, or odometry between loops, since the last optimisation
-  bool poses_changed = false;    ///< since the last report
+  bool graph_changed = false;  ///< loops, or odometry between loops, since the last optimisation
+  bool poses_changed = false;  ///< since the last report
 };
 
 inline FragmentPair pair_of(FragmentId a, FragmentId b) {

@@ -196,9 +196,7 @@ Verification verify_loops(State& state, const Options& options) {
   state.graph_changed = false;
   const bool any = std::any_of(state.loops.begin(), state.loops.end(),
                                [](const LoopRecord& record) { return !record.modes.empty(); });
-  if (!any && options.gravity_sigma == 0 &&
-      state.odometry.size() < state.nodes.size())
-    return {};
+  if (!any && options.gravity_sigma == 0 && state.odometry.size() < state.nodes.size()) return {};
   const Verification out = Verifier(state, options).run();
   if (out.status == pose_graph::Status::failed || out.status == pose_graph::Status::cancelled)
     state.graph_changed = true;  // nothing was decided

@@ -3,9 +3,9 @@
 #include <gtest/gtest.h>
 
 #include "gpureg/cuda_interop.hpp"
+#include "support/expect_error.hpp"
 #include "support/result_bytes.hpp"
 #include "support/scan.hpp"
-#include "support/expect_error.hpp"
 
 namespace gpureg {
 namespace {

@@ -73,8 +73,7 @@ struct Sequence {
       fragment.time = k;
       fragment.world_from_fragment = odometry[at];
       closer.add(fragment);
-      if (k > 0)
-        closer.add_odometry(id(k), id(k - 1), odometry[at - 1].inverse() * odometry[at]);
+      if (k > 0) closer.add_odometry(id(k), id(k - 1), odometry[at - 1].inverse() * odometry[at]);
     }
   }
 };
@@ -158,8 +157,8 @@ inline double relative_error(const std::vector<loop_closure::FragmentPose>& pose
     if (pose.id == s.id(a)) found_a = pose.world_from_fragment;
     if (pose.id == s.id(b)) found_b = pose.world_from_fragment;
   }
-  const Pose truth = s.truth[static_cast<std::size_t>(a)].inverse() *
-                     s.truth[static_cast<std::size_t>(b)];
+  const Pose truth =
+      s.truth[static_cast<std::size_t>(a)].inverse() * s.truth[static_cast<std::size_t>(b)];
   return ((found_a.inverse() * found_b).translation() - truth.translation()).norm();
 }
 

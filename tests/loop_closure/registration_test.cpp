@@ -36,8 +36,7 @@ struct Scans {
     for (int k = begin; k < end; ++k) {
       const auto at = static_cast<std::size_t>(k);
       closer.add({k, 0, double(k), cloud(context, k), s.odometry[at], Eigen::Vector3d(0, 0, 1)});
-      if (k > 0)
-        closer.add_odometry(k, k - 1, s.odometry[at - 1].inverse() * s.odometry[at]);
+      if (k > 0) closer.add_odometry(k, k - 1, s.odometry[at - 1].inverse() * s.odometry[at]);
     }
   }
 
@@ -145,8 +144,8 @@ TEST(Registrations, WithoutOdometryPairsAreProposedAndConfirmEachOther) {
   const Update update = closer.process();
   EXPECT_GE(update.registered, 2u);
   for (const loop_closure::FragmentPose& pose : update.poses) EXPECT_EQ(pose.frame, 0);
-  EXPECT_LT(largest_error(closer.poses(), Sequence{{all.s.truth.begin(), all.s.truth.begin() + 4},
-                                                   {}, 0, 0}),
+  EXPECT_LT(largest_error(closer.poses(),
+                          Sequence{{all.s.truth.begin(), all.s.truth.begin() + 4}, {}, 0, 0}),
             0.05);
 }
 

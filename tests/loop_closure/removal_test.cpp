@@ -74,9 +74,9 @@ TEST(Removal, LoopsMoveToANeighbourAndAddNoCertainty) {
   for (const loop_closure::FragmentPose& pose : closer.poses())
     for (const loop_closure::FragmentPose& old : before)
       if (old.id == pose.id)
-        EXPECT_LT((old.world_from_fragment.translation() - pose.world_from_fragment.translation())
-                      .norm(),
-                  0.02);
+        EXPECT_LT(
+            (old.world_from_fragment.translation() - pose.world_from_fragment.translation()).norm(),
+            0.02);
   // A loop whose fragments are gone can still be retracted: it contradicts those that follow.
   EXPECT_GT(closer.graph().edges.size(), 0u);
 }
@@ -107,7 +107,8 @@ TEST(Removal, KeepsAWindowOfFragmentsAtOneSize) {
   std::size_t loops = 0, edges = 0;
   for (int k = 0; k < kFragments; ++k) {
     closer.add({k, 0, double(k)});
-    const auto at = static_cast<std::size_t>(k % 20), last = static_cast<std::size_t>((k + 19) % 20);
+    const auto at = static_cast<std::size_t>(k % 20),
+               last = static_cast<std::size_t>((k + 19) % 20);
     if (k > 0) closer.add_odometry(k, k - 1, lap[last].inverse() * lap[at]);
     if (k >= 20 && k % 5 == 0) closer.add_result(k, k - 20, correct(lap[at], lap[at], 0.95));
     if (k >= kWindow) closer.remove(k - kWindow);

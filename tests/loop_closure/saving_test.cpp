@@ -62,7 +62,8 @@ TEST_F(Saving, DamagedFilesAreNamedAndTheStateStays) {
   };
   refused("", "no saved state");
   refused("some other file that is long enough to have a header", "no saved state");
-  for (const std::size_t size : {std::size_t(12), std::size_t(28), good.size() / 2, good.size() - 1})
+  for (const std::size_t size :
+       {std::size_t(12), std::size_t(28), good.size() / 2, good.size() - 1})
     refused(good.substr(0, size), "truncated");
   refused(good + "x", "longer");
   std::string later = good;

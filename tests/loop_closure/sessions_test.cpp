@@ -86,7 +86,8 @@ TEST(Sessions, AMergeByAliasesIsRetracted) {
   EXPECT_EQ(frames(closer), 1u);
   EXPECT_EQ(loop_of(closer.loops(), 102, 2).state, LoopState::accepted);
   second.add_to(closer, 6);
-  for (int k = 6; k < 13; ++k) closer.add_result(100 + k, k + 7, between(second, k, first, k + 7, 0.95));
+  for (int k = 6; k < 13; ++k)
+    closer.add_result(100 + k, k + 7, between(second, k, first, k + 7, 0.95));
   const Update update = closer.process();
   EXPECT_EQ(loop_of(update.changed, 102, 2).state, LoopState::retracted);
   EXPECT_EQ(loop_of(update.changed, 104, 4).state, LoopState::retracted);
