@@ -7,6 +7,7 @@
 #include <tuple>
 
 #include "pose_graph/components.hpp"
+#include "math/exponential.hpp"
 
 namespace gpureg::pose_graph {
 namespace {
@@ -24,13 +25,13 @@ Pose to_pose(const UnalignedIsometry3d& t) {
 
 double log_odds(double confidence) {
   const double p = std::clamp(confidence, kLeastDoubt, 1 - kLeastDoubt);
-  return std::log(p / (1 - p));
+  return portable::log(p / (1 - p));
 }
 
 Matrix6d diagonal_information(double rotation_degrees, double translation) {
   Vector6d d;
-  d.head<3>().setConstant(1 / std::pow(rotation_degrees * kRadians, 2));
-  d.tail<3>().setConstant(1 / std::pow(translation, 2));
+  d.head<3>().setConstant(1 / square(rotation_degrees * kRadians));
+  d.tail<3>().setConstant(1 / square(translation));
   return d.asDiagonal();
 }
 
@@ -145,7 +146,7 @@ Problem compile(const Graph& graph, const Options& options) {
   for (const GravityFactor& factor : graph.gravity) {
     const Eigen::Vector3d up = factor.up;
     out.gravity.push_back(
-        {position(factor.node), up.normalized(), 1 / std::pow(factor.sigma_degrees * kRadians, 2)});
+        {position(factor.node), up.normalized(), 1 / square(factor.sigma_degrees * kRadians)});
   }
   for (const PoseFactor& factor : graph.priors)
     out.priors.push_back({position(factor.node), to_pose(factor.world_from_node).inverse(),

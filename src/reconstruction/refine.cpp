@@ -13,6 +13,7 @@
 #include "pose_graph/parallel.hpp"
 #include "reconstruction/connections.hpp"
 #include "reconstruction/surface_pairs.hpp"
+#include "math/trigonometry.hpp"
 
 namespace gpureg::reconstruction {
 namespace {
@@ -120,7 +121,8 @@ class Refiner {
     const double shrinking = std::floor(kShrinkingShare * options_.iterations);
     if (iteration >= shrinking) return options_.final_distance;
     return options_.initial_distance *
-           std::pow(options_.final_distance / options_.initial_distance, iteration / shrinking);
+           portable::exp(portable::log(options_.final_distance / options_.initial_distance) *
+                         (iteration / shrinking));
   }
 
   std::vector<OrderedPair> near_pairs(double distance) const {
@@ -151,7 +153,7 @@ class Refiner {
     });
     Association association;
     association.kernel_width = options_.kernel_width * distance / options_.final_distance;
-    association.min_cosine = static_cast<float>(std::cos(options_.max_normal_angle * M_PI / 180));
+    association.min_cosine = static_cast<float>(portable::cos(options_.max_normal_angle * M_PI / 180));
     association.point_information =
         1 / (options_.point_noise * options_.point_noise * options_.correlated_points);
     association.max_points = options_.max_points;
