@@ -90,7 +90,8 @@ TEST_F(Elementary, ArcTangent) {
         return is_x ? std::atan2(o, v) : std::atan2(v, o);
       };
       EXPECT_LT(worst_error(own, library, -5, 5), 0.6);
-      EXPECT_LT(worst_error(own, library, -700, 700, true), 0.6) << other << is_x;
+      // Results below the normal numbers round twice.
+      EXPECT_LT(worst_error(own, library, -700, 700, true), 0.8) << other << is_x;
     }
 }
 
