@@ -135,6 +135,7 @@ class Reconstruct {
     } catch (const Json::exception& error) {
       fail(error.what());
     }
+    check_format(o_.results, document);
     if (!document.is_object() || !document.contains("pairs") || !document["pairs"].is_array())
       fail("is not the JSON of `gpureg batch` or of `gpureg reconstruct`");
     if (document.contains("loop_consistency"))
