@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Prints the bytes of results of 20 generated pairs, one fact per line; with a file it compares
 // them with its lines. No test library, so that it builds for any processor.
-//   gpureg_golden            prints
-//   gpureg_golden FILE       compares; exits with 1 at the first line that differs
+//   gpureg_golden [--cuda]         prints; --cuda: of the first device
+//   gpureg_golden [--cuda] FILE    compares; exits with 1 where a line differs
 #include <cstdio>
 #include <cstring>
 #include <fstream>
@@ -138,7 +138,7 @@ void add_map(const std::vector<PreparedCloud>& clouds, const std::vector<Pair>& 
   poses("refined map");
 }
 
-Report results_here() {
+Report results_of(const Context& context) {
   Report report;
   const std::vector<PointCloud> scans = test::portable_scans();
   std::vector<PointCloudView> views;
@@ -152,7 +152,6 @@ Report results_here() {
               hex(suggested.spacing) + " noise " + hex(suggested.noise));
 
   constexpr float kVoxelSize = 0.1f;
-  const Context context = Context::cpu(2);
   RegistrationOptions options = RegistrationOptions::from_voxel_size(kVoxelSize);
   const std::vector<PreparedCloud> clouds = prepare_batch(context, views, options.prepare);
   report.clouds(clouds);
@@ -209,8 +208,11 @@ int compare(const std::vector<std::string>& here, const std::string& path) {
 }  // namespace gpureg
 
 int main(int count, char** arguments) {
-  const gpureg::Report report = gpureg::results_here();
-  if (count == 2) return gpureg::compare(report.lines(), arguments[1]);
+  const bool cuda = count > 1 && std::strcmp(arguments[1], "--cuda") == 0;
+  const gpureg::Report report =
+      gpureg::results_of(cuda ? gpureg::Context::cuda() : gpureg::Context::cpu(2));
+  const int file = cuda ? 2 : 1;
+  if (file < count) return gpureg::compare(report.lines(), arguments[file]);
   for (const std::string& line : report.lines()) std::cout << line << "\n";
   return 0;
 }
