@@ -45,8 +45,8 @@ inline void spiral(Vec3* out, int count) {
   for (int k = 0; k < count; ++k) {
     const double z = 1.0 - (2.0 * k + 1.0) / count, r = std::sqrt(1.0 - z * z),
                  turn = 2.399963229728653 * k;
-    out[k] = {static_cast<float>(r * portable::cos(turn)), static_cast<float>(r * portable::sin(turn)),
-              static_cast<float>(z)};
+    out[k] = {static_cast<float>(r * portable::cos(turn)),
+              static_cast<float>(r * portable::sin(turn)), static_cast<float>(z)};
   }
 }
 

@@ -2,9 +2,9 @@
 #include "initial_poses.hpp"
 
 #include <algorithm>
-#include <locale>
 #include <cmath>
 #include <fstream>
+#include <locale>
 #include <numeric>
 #include <sstream>
 

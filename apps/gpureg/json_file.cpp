@@ -41,8 +41,9 @@ void check_format(const std::string& path, const Json& document) {
     throw IoError(path + ": \"format_version\" is " + dump(version).substr(0, 40) +
                   ", expected an integer >= 1");
   if (version > kFormatVersion)
-    throw IoError(path + ": format version " + dump(version) + ", this gpureg reads versions up to " +
-                  std::to_string(kFormatVersion) + "; a newer gpureg wrote it");
+    throw IoError(path + ": format version " + dump(version) +
+                  ", this gpureg reads versions up to " + std::to_string(kFormatVersion) +
+                  "; a newer gpureg wrote it");
 }
 
 std::string format_document(const Json& document) {

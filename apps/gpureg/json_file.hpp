@@ -7,8 +7,9 @@
 
 namespace gpureg::cli {
 
-/// Version of the JSON documents and journals that the command writes, as "format_version". It grows
-/// when a reader of the version before would misread a document; documents without it are version 1.
+/// Version of the JSON documents and journals that the command writes, as "format_version". It
+/// grows when a reader of the version before would misread a document; documents without it are
+/// version 1.
 inline constexpr int kFormatVersion = 1;
 
 /// Throws IoError naming the file where a newer gpureg wrote the document.

@@ -52,8 +52,9 @@ GPUREG_HD std::uint32_t summarize_cell(Span<const std::uint32_t> candidates, Vec
       const float c = dot(mean, normals[i]);
       cosine = c < cosine ? c : cosine;
     }
-    const double angle = portable::acos(static_cast<double>(cosine < -1.0f ? -1.0f : cosine)) / kDegrees +
-                         kSummaryQuantisation;
+    const double angle =
+        portable::acos(static_cast<double>(cosine < -1.0f ? -1.0f : cosine)) / kDegrees +
+        kSummaryQuantisation;
     const int steps = static_cast<int>(ceil(angle / kSummaryAngleStep));
     step = steps < kSummaryNoBound ? steps : kSummaryNoBound;
   }

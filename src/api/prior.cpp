@@ -82,8 +82,8 @@ PriorTest prior_test(const RegistrationPrior& prior, const PreparedState& source
         out.expected.r[3 * row + column] = static_cast<float>(local.linear()(row, column));
       out.expected.t[row] = static_cast<float>(local.translation()[row]);
     }
-    out.min_trace =
-        static_cast<float>(1.0 + 2.0 * portable::cos(prior.pose->max_rotation * kRadians) - kRounding);
+    out.min_trace = static_cast<float>(
+        1.0 + 2.0 * portable::cos(prior.pose->max_rotation * kRadians) - kRounding);
     out.max_squared_distance = static_cast<float>(prior.pose->max_translation *
                                                   prior.pose->max_translation * (1.0 + kRounding));
   }

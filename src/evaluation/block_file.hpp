@@ -2,13 +2,13 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <charconv>
 #include <cmath>
 #include <string>
 #include <vector>
 
 #include "files/text_file.hpp"
 #include "gpureg/error.hpp"
-#include "files/numbers.hpp"
 
 /// Redwood's .log and .info share one layout: a line `i j n`, then a square matrix row by row.
 /// Private to the library.
@@ -61,7 +61,7 @@ void append_block(std::string& text, int i, int j, int n,
                               std::to_string(value) + ", expected a finite number");
       char digits[400];  // the largest double has 309 digits before the point
       const auto end =
-          files::to_chars(digits, digits + sizeof digits, value, std::chars_format::fixed, decimals)
+          std::to_chars(digits, digits + sizeof digits, value, std::chars_format::fixed, decimals)
               .ptr;
       text.append(digits, end);
       text += column + 1 < Size ? '\t' : '\n';

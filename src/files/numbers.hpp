@@ -9,16 +9,15 @@
 #include <system_error>
 #include <type_traits>
 
-/// std::from_chars and std::to_chars of double also where the C++ library lacks them (libc++ reads
-/// no floating-point numbers before LLVM 20). Private to the library.
+/// std::from_chars of double also where the C++ library lacks it: libc++ before LLVM 20. Private to
+/// the library.
 namespace gpureg::files {
 
 #if defined(__cpp_lib_to_chars) && !defined(GPUREG_OWN_NUMBERS)
 using std::from_chars;
-using std::to_chars;
 #else
 
-/// The decimal point of the current locale, which strtod and snprintf use.
+/// The decimal point of the current locale, which strtod uses.
 inline char decimal_point() {
   char text[8];
   std::snprintf(text, sizeof text, "%.1f", 0.5);
@@ -76,31 +75,6 @@ inline std::from_chars_result from_chars(const char* first, const char* last, do
 template <typename Integer, typename = std::enable_if_t<std::is_integral_v<Integer>>>
 std::from_chars_result from_chars(const char* first, const char* last, Integer& value) {
   return std::from_chars(first, last, value);
-}
-
-inline std::to_chars_result copied(char* first, char* last, const std::string& printed) {
-  if (static_cast<std::size_t>(last - first) < printed.size())
-    return {last, std::errc::value_too_large};
-  for (const char c : printed) *first++ = c == decimal_point() ? '.' : c;
-  return {first, std::errc()};
-}
-
-/// The shortest text that reads back as the same number.
-inline std::to_chars_result to_chars(char* first, char* last, double value) {
-  char text[64];
-  for (int digits = 1; digits <= 17; ++digits) {
-    std::snprintf(text, sizeof text, "%.*g", digits, value);
-    if (std::strtod(text, nullptr) == value) break;
-  }
-  return copied(first, last, text);
-}
-
-inline std::to_chars_result to_chars(char* first, char* last, double value, std::chars_format,
-                                     int decimals) {
-  std::string text(512, '\0');
-  text.resize(static_cast<std::size_t>(
-      std::snprintf(text.data(), text.size(), "%.*f", decimals, value)));
-  return copied(first, last, text);
 }
 
 #endif

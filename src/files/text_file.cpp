@@ -9,8 +9,8 @@
 #include <cmath>
 #include <system_error>
 
-#include "gpureg/error.hpp"
 #include "files/numbers.hpp"
+#include "gpureg/error.hpp"
 
 namespace gpureg::files {
 namespace {

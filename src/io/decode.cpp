@@ -5,8 +5,8 @@
 #include <cstring>
 #include <limits>
 
-#include "files/text_file.hpp"
 #include "files/numbers.hpp"
+#include "files/text_file.hpp"
 
 namespace gpureg::io {
 namespace {

@@ -4,11 +4,11 @@
 #include <cmath>
 #include <optional>
 
+#include "files/numbers.hpp"
 #include "files/text_file.hpp"
 #include "io/decode.hpp"
 #include "io/lzf.hpp"
 #include "io/table.hpp"
-#include "files/numbers.hpp"
 
 namespace gpureg::io {
 namespace {

@@ -80,8 +80,7 @@ GPUREG_HD Sum log_of_positive(double x) {
   double p = 0.0;
   for (int n = 25; n >= 3; n -= 2) p = (p + 2.0 / n) * z;
   const Sum sum = two_sum(k * kLogTwoHigh, 2.0 * s.high);
-  return fast_two_sum(sum.high,
-                      sum.low + (2.0 * s.low + (s.high * p + k * kLogTwoLow)));
+  return fast_two_sum(sum.high, sum.low + (2.0 * s.low + (s.high * p + k * kLogTwoLow)));
 }
 
 /// Natural logarithm; minus infinity of 0, NaN of negative numbers.

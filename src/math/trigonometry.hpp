@@ -24,7 +24,8 @@ GPUREG_HD Quadrant quadrant_of(double angle) {
   // pi / 2 in three parts; products of the first two with integers below 2^20 are exact.
   constexpr double kFirst = 0x1.921fb544p+0, kSecond = 0x1.0b4611a6p-34,
                    kThird = 0x1.3198a2e037073p-69;
-  if (angle > kLargestExactAngle || angle < -kLargestExactAngle) angle = remainder(angle, 2.0 * kPi);
+  if (angle > kLargestExactAngle || angle < -kLargestExactAngle)
+    angle = remainder(angle, 2.0 * kPi);
   const double k = nearest_integer(angle * 0x1.45f306dc9c883p-1);
   const Sum r = two_sum(angle - k * kFirst, -(k * kSecond));
   return {static_cast<int>(k) & 3, fast_two_sum(r.high, r.low - k * kThird)};

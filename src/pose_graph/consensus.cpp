@@ -6,10 +6,10 @@
 #include <cmath>
 #include <map>
 
+#include "math/exponential.hpp"
 #include "pose_graph/components.hpp"
 #include "pose_graph/parallel.hpp"
 #include "pose_graph/uncertain_pose.hpp"
-#include "math/exponential.hpp"
 
 namespace gpureg::pose_graph {
 namespace {

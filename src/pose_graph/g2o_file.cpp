@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include <charconv>
 #include <cmath>
 #include <limits>
 #include <unordered_map>
@@ -8,7 +9,6 @@
 #include "gpureg/files.hpp"
 #include "gpureg/pose_graph/files.hpp"
 #include "pose_graph/written_graph.hpp"
-#include "files/numbers.hpp"
 
 namespace gpureg::pose_graph {
 namespace {
@@ -124,7 +124,7 @@ namespace {
 void append(std::string& text, double value) {
   char buffer[40];
   // The shortest text that reads back as the same number.
-  const auto end = files::to_chars(buffer, buffer + sizeof buffer, value).ptr;
+  const auto end = std::to_chars(buffer, buffer + sizeof buffer, value).ptr;
   text += ' ';
   text.append(buffer, end);
 }

@@ -3,10 +3,10 @@
 #include <cmath>
 #include <limits>
 
+#include "math/exponential.hpp"
 #include "pose_graph/bridges.hpp"
 #include "pose_graph/parallel.hpp"
 #include "pose_graph/robust.hpp"
-#include "math/exponential.hpp"
 
 namespace gpureg::pose_graph {
 namespace {

@@ -5,9 +5,9 @@
 #include <string_view>
 #include <system_error>
 
+#include "files/numbers.hpp"
 #include "files/text_file.hpp"
 #include "gpureg/error.hpp"
-#include "files/numbers.hpp"
 
 namespace gpureg::pose_graph::json {
 namespace {

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <Eigen/LU>
+#include <charconv>
 #include <cmath>
 
 #include "gpureg/error.hpp"
@@ -7,7 +8,6 @@
 #include "gpureg/pose_graph/files.hpp"
 #include "pose_graph/json.hpp"
 #include "pose_graph/written_graph.hpp"
-#include "files/numbers.hpp"
 
 namespace gpureg::pose_graph {
 namespace {
@@ -40,7 +40,7 @@ std::int64_t read_id(const Document& document, const Value& edge, const char* na
   if (value.number != std::floor(value.number) || value.number < 0 ||
       value.number >= static_cast<double>(nodes)) {
     char text[40];
-    const auto end = files::to_chars(text, text + sizeof text, value.number).ptr;
+    const auto end = std::to_chars(text, text + sizeof text, value.number).ptr;
     document.fail(value.line, std::string(name) + " is " + std::string(text, end) +
                                   ", but the file has " + std::to_string(nodes) + " nodes");
   }
@@ -76,7 +76,7 @@ void append_matrix(std::string& text, const char* name, const Matrix& matrix) {
   text += std::string("\"") + name + "\": [";
   for (Eigen::Index k = 0; k < matrix.size(); ++k) {
     char buffer[40];
-    const auto end = files::to_chars(buffer, buffer + sizeof buffer, matrix.data()[k]).ptr;
+    const auto end = std::to_chars(buffer, buffer + sizeof buffer, matrix.data()[k]).ptr;
     if (k > 0) text += ", ";
     text.append(buffer, end);
   }
@@ -119,7 +119,7 @@ void write_open3d(const std::string& path, const Graph& graph, const Result* res
     text += k ? ",\n" : "\n";
     char confidence[40];
     const auto end =
-        files::to_chars(confidence, confidence + sizeof confidence, edge.loop ? edge.confidence : 1.0)
+        std::to_chars(confidence, confidence + sizeof confidence, edge.loop ? edge.confidence : 1.0)
             .ptr;
     text += "{\"class_name\": \"PoseGraphEdge\", \"confidence\": " + std::string(confidence, end) +
             ", ";

@@ -6,8 +6,8 @@
 #include <numeric>
 #include <tuple>
 
-#include "pose_graph/components.hpp"
 #include "math/exponential.hpp"
+#include "pose_graph/components.hpp"
 
 namespace gpureg::pose_graph {
 namespace {

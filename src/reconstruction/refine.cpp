@@ -8,12 +8,12 @@
 
 #include "common/validate.hpp"
 #include "gpureg/reconstruction.hpp"
+#include "math/trigonometry.hpp"
 #include "pose_graph/block_cholesky.hpp"
 #include "pose_graph/normal_equations.hpp"
 #include "pose_graph/parallel.hpp"
 #include "reconstruction/connections.hpp"
 #include "reconstruction/surface_pairs.hpp"
-#include "math/trigonometry.hpp"
 
 namespace gpureg::reconstruction {
 namespace {
@@ -153,7 +153,8 @@ class Refiner {
     });
     Association association;
     association.kernel_width = options_.kernel_width * distance / options_.final_distance;
-    association.min_cosine = static_cast<float>(portable::cos(options_.max_normal_angle * M_PI / 180));
+    association.min_cosine =
+        static_cast<float>(portable::cos(options_.max_normal_angle * M_PI / 180));
     association.point_information =
         1 / (options_.point_noise * options_.point_noise * options_.correlated_points);
     association.max_points = options_.max_points;

@@ -187,7 +187,8 @@ void run_pose_graph(std::string_view input) {
       edge.alternatives.push_back({pose(), std::nullopt, 0.1});
     graph.edges.push_back(edge);
   }
-  if (bytes.flag()) graph.gravity.push_back({static_cast<std::int64_t>(bytes.below(9)), {0, 0, 1}, 1});
+  if (bytes.flag())
+    graph.gravity.push_back({static_cast<std::int64_t>(bytes.below(9)), {0, 0, 1}, 1});
   pose_graph::Options options;
   options.threads = 1;
   options.robust = bytes.flag() ? pose_graph::Robust::gnc : pose_graph::Robust::line_process;

@@ -46,7 +46,8 @@ void read_initial_poses(std::string_view bytes) {
 }  // namespace
 
 std::vector<Target> command_targets() {
-  return {{"result", read_result}, {"journal", read_journal}, {"initial_poses", read_initial_poses}};
+  return {
+      {"result", read_result}, {"journal", read_journal}, {"initial_poses", read_initial_poses}};
 }
 
 }  // namespace gpureg::fuzz

@@ -46,7 +46,7 @@ TEST_P(Corpus, AFewHundredMutationsAreReadOrRefused) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Fuzz, Corpus, ::testing::ValuesIn(all_targets()),
-                         [](const auto& info) { return std::string(info.param.name); });
+                         [](const auto& target) { return std::string(target.param.name); });
 
 }  // namespace
 }  // namespace gpureg::fuzz

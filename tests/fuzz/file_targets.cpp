@@ -53,9 +53,12 @@ void read_open3d(std::string_view bytes) {
 
 std::vector<Target> file_targets() {
   using test::Reader;
-  return {{"point_cloud", read<Reader::point_cloud>}, {"log", read<Reader::log>},
-          {"information", read<Reader::information>}, {"cameras", read<Reader::cameras>},
-          {"pairs", read<Reader::pairs>},             {"g2o", read_g2o},
+  return {{"point_cloud", read<Reader::point_cloud>},
+          {"log", read<Reader::log>},
+          {"information", read<Reader::information>},
+          {"cameras", read<Reader::cameras>},
+          {"pairs", read<Reader::pairs>},
+          {"g2o", read_g2o},
           {"open3d", read_open3d}};
 }
 

@@ -31,8 +31,7 @@ double worst_error(const Own& own, const Library& library, double low, double hi
   for (int k = 0; k < 200000; ++k) {
     const double x = logarithmic ? std::exp(place(random)) : place(random);
     const long double expected = library(static_cast<long double>(x));
-    const double error =
-        std::fabs(static_cast<double>((own(x) - expected) / last_place(expected)));
+    const double error = std::fabs(static_cast<double>((own(x) - expected) / last_place(expected)));
     if (!(error <= worst)) worst = error;
   }
   return worst;

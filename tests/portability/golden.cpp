@@ -62,14 +62,27 @@ std::string pose_text(const UnalignedIsometry3d& pose) {
 
 std::string evidence_text(const PoseEvidence& e) {
   std::string out = " " + std::to_string(e.match_inliers);
-  for (const double v :
-       {e.match_support, e.source_overlap, e.target_overlap, e.source_residual, e.target_residual,
-        e.source_normal_weighted_overlap, e.target_normal_weighted_overlap, e.source_observed,
-        e.target_observed, e.source_free_space_violation, e.target_free_space_violation,
-        e.source_occluded, e.target_occluded, e.source_near_surface, e.target_near_surface,
-        e.source_front_violation_near, e.target_front_violation_near,
-        e.source_front_violation_far, e.target_front_violation_far, e.source_behind_surface,
-        e.target_behind_surface})
+  for (const double v : {e.match_support,
+                         e.source_overlap,
+                         e.target_overlap,
+                         e.source_residual,
+                         e.target_residual,
+                         e.source_normal_weighted_overlap,
+                         e.target_normal_weighted_overlap,
+                         e.source_observed,
+                         e.target_observed,
+                         e.source_free_space_violation,
+                         e.target_free_space_violation,
+                         e.source_occluded,
+                         e.target_occluded,
+                         e.source_near_surface,
+                         e.target_near_surface,
+                         e.source_front_violation_near,
+                         e.target_front_violation_near,
+                         e.source_front_violation_far,
+                         e.target_front_violation_far,
+                         e.source_behind_surface,
+                         e.target_behind_surface})
     out += " " + hex(v);
   for (const double v : e.information_eigenvalues) out += " " + hex(v);
   for (const double v : e.weakest_direction) out += " " + hex(v);

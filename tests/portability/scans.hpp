@@ -78,8 +78,7 @@ inline PointCloud scan_of_room(const ScanOfRoom& scan, std::uint64_t seed) {
     for (int k = static_cast<int>(area * kPointsPerSquareMetre); k > 0; --k) {
       const double u = random.unit(), v = random.unit(), h = u * (1 - u) * v * (1 - v) * 16;
       Point p;
-      for (std::size_t i = 0; i < 3; ++i)
-        p[i] = ((corner[i] + u * a[i]) + v * b[i]) + h * bulge[i];
+      for (std::size_t i = 0; i < 3; ++i) p[i] = ((corner[i] + u * a[i]) + v * b[i]) + h * bulge[i];
       add(p);
     }
   };
