@@ -11,8 +11,15 @@ _Float64 = npt.NDArray[np.float64]
 # On a device: address, rows, columns, floats from row to row, and what keeps the memory alive.
 _DeviceRows = tuple[int, int, int, int, Any]
 _Rows = _Float32 | _DeviceRows
-# Points, normals, features, viewpoints, origin; and the stream that made what is on a device, or None for clouds of the host.
-_Cloud = tuple[_Rows, _Rows | None, _Rows | None, _Float32 | None, _Float64 | None, int | None]
+# Points, normals, features, viewpoints, origin; and the streams that wrote the first three, or None for clouds of the host.
+_Cloud = tuple[
+    _Rows,
+    _Rows | None,
+    _Rows | None,
+    _Float32 | None,
+    _Float64 | None,
+    tuple[int, int, int] | None,
+]
 
 __version__: str
 
@@ -41,6 +48,7 @@ class Context:
     def description(self) -> str: ...
     @property
     def device_memory(self) -> list[dict[str, int]]: ...
+    def trim(self) -> None: ...
 
 class PrepareOptions:
     voxel_size: float

@@ -15,6 +15,8 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 /// log 2 in two parts; products of the first one with integers below 2^21 are exact.
 constexpr double kLogTwoHigh = 0x1.62e42ffp-1, kLogTwoLow = -0x1.718432a1b0e26p-35;
 
+constexpr double square(double x) { return x * x; }
+
 /// Nearest integer of |x| < 2^51.
 GPUREG_HD double nearest_integer(double x) {
   constexpr double kShift = 6755399441055744.0;  // 1.5 * 2^52: no digit is left behind the point

@@ -30,8 +30,8 @@ double log_odds(double confidence) {
 
 Matrix6d diagonal_information(double rotation_degrees, double translation) {
   Vector6d d;
-  d.head<3>().setConstant(1 / square(rotation_degrees * kRadians));
-  d.tail<3>().setConstant(1 / square(translation));
+  d.head<3>().setConstant(1 / portable::square(rotation_degrees * kRadians));
+  d.tail<3>().setConstant(1 / portable::square(translation));
   return d.asDiagonal();
 }
 
@@ -145,8 +145,8 @@ Problem compile(const Graph& graph, const Options& options) {
   sort_edges(out);
   for (const GravityFactor& factor : graph.gravity) {
     const Eigen::Vector3d up = factor.up;
-    out.gravity.push_back(
-        {position(factor.node), up.normalized(), 1 / square(factor.sigma_degrees * kRadians)});
+    out.gravity.push_back({position(factor.node), up.normalized(),
+                           1 / portable::square(factor.sigma_degrees * kRadians)});
   }
   for (const PoseFactor& factor : graph.priors)
     out.priors.push_back({position(factor.node), to_pose(factor.world_from_node).inverse(),

@@ -12,8 +12,6 @@
 /// does not influence, every information matrix filled in.
 namespace gpureg::pose_graph {
 
-constexpr double square(double x) { return x * x; }
-
 struct ModeTerm {
   Pose target_from_source;
   Pose inverse;

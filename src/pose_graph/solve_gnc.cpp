@@ -46,7 +46,7 @@ class GncSolver {
       for (int k = 0; k < problem_.edge_count(); ++k) agreeing[k] = in_large_set(consensus, k);
       Estimate direct = graduated(start, agreeing, true);
       if (!direct.failed && !control_.cancelled)
-        direct = settled(graduated(direct, explained(direct, all), false));
+        direct = settled(joined(direct, explained(direct, all)));
       if (direct.failed || control_.cancelled || keeps_nearly_all(direct)) return direct;
     }
     return settled(by_levels(start, consensus));
@@ -86,6 +86,15 @@ class GncSolver {
                      bool least_squares_first) {
     graduate(problem_, equations_, candidates, least_squares_first, quantile_, control_, estimate);
     return estimate;
+  }
+
+  /// The estimate with nearly all loops: least squares where noise explains all that is left.
+  Estimate joined(Estimate estimate, const std::vector<char>& candidates) {
+    Estimate together = estimate;
+    if (fit_all(problem_, equations_, candidates, quantile_, control_, together) ||
+        together.failed || control_.cancelled)
+      return together;
+    return graduated(std::move(estimate), candidates, false);
   }
 
   Estimate settled(Estimate estimate) {

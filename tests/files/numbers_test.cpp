@@ -29,10 +29,15 @@ void expect_same(const std::string& text) {
 }
 
 TEST(Numbers, ReadsAsTheLibrary) {
-  for (const char* text :
-       {"0", "-0", "1", "1.5", "-2.25e3", "1e5x", ".5", "5.", "-.5e-1", "1e", "1e+", "1e+7", "+1",
-        "", "-", ".", "e5", "0x10", " 1", "nan", "-nan", "NaN", "inf", "-Infinity", "infi", "1e400",
-        "-1e400", "1e-400", "0e-400", "0.0e400", "4.9e-324", "1.7976931348623157e308", "1,5"})
+  for (const char* text : {"0",       "-0",      "1",        "1.5",
+                           "-2.25e3", "1e5x",    ".5",       "5.",
+                           "-.5e-1",  "1e",      "1e+",      "1e+7",
+                           "+1",      "",        "-",        ".",
+                           "e5",      "0x10",    " 1",       "nan",
+                           "-nan",    "NaN",     "inf",      "-Infinity",
+                           "infi",    "1e400",   "-1e400",   "1e-400",
+                           "0e-400",  "0.0e400", "4.9e-324", "1.7976931348623157e308",
+                           "1,5"})
     expect_same(text);
 }
 
@@ -41,7 +46,8 @@ TEST(Numbers, ReadsRandomTextsAsTheLibrary) {
   const std::string letters = "0123456789.-+eEinfa x,";
   for (int k = 0; k < 100000; ++k) {
     std::string text;
-    for (std::size_t size = random() % 9; size > 0; --size) text += letters[random() % letters.size()];
+    for (std::size_t size = random() % 9; size > 0; --size)
+      text += letters[random() % letters.size()];
     expect_same(text);
   }
 }

@@ -1,0 +1,148 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "loop_closure/relations.hpp"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <limits>
+
+#include "loop_closure/accept.hpp"
+#include "pose_graph/robust.hpp"
+
+namespace gpureg::loop_closure {
+namespace {
+
+/// Odometry edges between the ends of two loops that are compared.
+constexpr int kMostHops = 40;
+/// Loops agree by chance unless their prediction is this much better than that of odometry.
+constexpr double kInformative = 0.5;
+/// Misclosure, in units of the quantile, from which loops contradict each other; in between they
+/// say nothing. Registrations have heavier tails than their covariances.
+constexpr double kContradiction = 1.5 * 1.5;
+
+class Comparison {
+ public:
+  Comparison(State& state, const Paths& odometry, const Options& options)
+      : state_(state),
+        odometry_(odometry),
+        options_(options),
+        quantile_(pose_graph::chi_square_quantile(options.acceptance.drift_probability)) {
+    for (const LoopRecord& record : state.loops)
+      ends_.emplace_back(odometry.position(record.source), odometry.position(record.target));
+  }
+
+  void run() {
+    for (std::size_t k = 0; k < state_.loops.size(); ++k) {
+      const LoopRecord& record = state_.loops[k];
+      bool missing = false;
+      for (std::uint32_t m = 0; m < record.modes.size(); ++m)
+        missing |= state_.relations.count(record.key(m)) == 0;
+      if (missing) compare(k);
+    }
+  }
+
+ private:
+  void compare(std::size_t k) {
+    const LoopRecord& own = state_.loops[k];
+    by_source_ = odometry_.tree(ends_[k].first, kMostHops);
+    by_target_ = odometry_.tree(ends_[k].second, kMostHops);
+    for (std::uint32_t m = 0; m < own.modes.size(); ++m) {
+      const auto [list, fresh] = state_.relations.try_emplace(own.key(m));
+      if (!fresh || !within_drift(own.modes[m], options_)) continue;
+      for (std::size_t other = 0; other < state_.loops.size(); ++other) {
+        const LoopRecord& theirs = state_.loops[other];
+        if (other == k || !near(other)) continue;
+        for (std::uint32_t n = 0; n < theirs.modes.size(); ++n) {
+          const auto found = state_.relations.find(theirs.key(n));
+          if (found == state_.relations.end() || !within_drift(theirs.modes[n], options_)) continue;
+          const int relation = relate(k, own.modes[m], other, theirs.modes[n]);
+          if (relation == 0) continue;
+          list->second.push_back({theirs.key(n), relation > 0});
+          found->second.push_back({own.key(m), relation > 0});
+        }
+      }
+    }
+  }
+
+  bool near(std::size_t other) const {
+    const auto [a, b] = ends_[other];
+    return (by_source_.reaches(a) && by_target_.reaches(b)) ||
+           (by_source_.reaches(b) && by_target_.reaches(a));
+  }
+
+  /// 1: they agree, -1: they contradict each other, 0: neither.
+  int relate(std::size_t k, const Mode& mine, std::size_t other, const Mode& theirs) {
+    const auto [a, b] = ends_[other];
+    const bool straight =
+        by_source_.cost(a) + by_target_.cost(b) <= by_source_.cost(b) + by_target_.cost(a);
+    const UncertainPose across = uncertain(theirs);
+    const UncertainPose predicted =
+        straight ? by_target_.root_from(b) * across * by_source_.root_from(a).inverse()
+                 : by_target_.root_from(a) * across.inverse() * by_source_.root_from(b).inverse();
+    const double misclosure = squared_distance(uncertain(mine), predicted);
+    if (misclosure > kContradiction * quantile_) return -1;
+    if (misclosure > quantile_) return 0;
+    const int source = ends_[k].first;
+    if (by_target_.reaches(source)) {
+      const Eigen::Vector3d centre = state_.nodes.at(state_.loops[k].source).coarse.centre;
+      const double drift = sigma_at(by_target_.root_from(source).covariance, centre);
+      if (sigma_at(predicted.covariance, centre) > kInformative * drift) return 0;
+    }
+    return 1;
+  }
+
+  State& state_;
+  const Paths& odometry_;
+  const Options& options_;
+  double quantile_;
+  std::vector<std::pair<int, int>> ends_;  ///< positions of source and target of each loop
+  PathTree by_source_, by_target_;
+};
+
+}  // namespace
+
+void update_relations(State& state, const Paths& odometry, const Options& options) {
+  Comparison(state, odometry, options).run();
+}
+
+std::vector<char> contradicted(const State& state, const std::vector<char>& fits) {
+  const std::size_t count = state.loops.size();
+  std::vector<char> out(count, 0);
+  std::map<std::uint64_t, std::size_t> place;
+  for (std::size_t k = 0; k < count; ++k)
+    if (fits[k]) place[state.loops[k].key(state.loops[k].mode)] = k;
+  std::vector<double> against(count, 0), balance(count, 0);
+  const auto confidence = [&](std::size_t k) {
+    const LoopRecord& record = state.loops[k];
+    return record.modes[record.mode].confidence;
+  };
+  const auto each = [&](std::size_t k, const auto& call) {
+    const LoopRecord& record = state.loops[k];
+    const auto list = state.relations.find(record.key(record.mode));
+    if (list == state.relations.end()) return;
+    for (const Relation& relation : list->second) {
+      const auto other = place.find(relation.other);
+      if (other != place.end()) call(other->second, relation.agrees);
+    }
+  };
+  for (const auto& [key, k] : place)
+    each(k, [&, me = k](std::size_t other, bool agrees) {
+      balance[me] += agrees ? -confidence(other) : confidence(other);
+      against[me] += agrees ? 0 : 1;
+    });
+  for (;;) {
+    std::size_t worst = count;
+    for (std::size_t k = 0; k < count; ++k) {
+      if (!fits[k] || out[k] || against[k] == 0) continue;
+      if (worst == count || balance[k] - confidence(k) > balance[worst] - confidence(worst))
+        worst = k;
+    }
+    if (worst == count) return out;
+    out[worst] = 1;
+    each(worst, [&](std::size_t other, bool agrees) {
+      balance[other] -= agrees ? -confidence(worst) : confidence(worst);
+      against[other] -= agrees ? 0 : 1;
+    });
+  }
+}
+
+}  // namespace gpureg::loop_closure
