@@ -20,6 +20,7 @@ from ._core import (
     CorrespondenceMoments,
     DeviceError,
     Error,
+    ErrorStatistics,
     EvidenceOptions,
     InvalidArgument,
     IoError,
@@ -42,11 +43,14 @@ from ._core import (
     RegistrationStatistics,
     StageTimings,
     TimedResult,
+    TrajectoryEvaluation,
     VoxelSizeSuggestion,
     __version__,
     describe_backends,
 )
 from ._loop_consistency import loop_consistency
+from ._reconstruction import Map, MapEdge, MapLink, MapScan, reconstruct
+from ._trajectory import evaluate_trajectory, read_trajectory
 from .files import read_point_cloud, write_point_cloud
 from .fragments import FragmentSet
 from .loop_closure import LoopCloser
@@ -83,6 +87,7 @@ __all__ = [
     "CorrespondenceMoments",
     "DeviceError",
     "Error",
+    "ErrorStatistics",
     "EvidenceOptions",
     "FragmentSet",
     "InvalidArgument",
@@ -91,6 +96,10 @@ __all__ = [
     "LoopCloser",
     "LoopConsistencyOptions",
     "LoopUpdate",
+    "Map",
+    "MapEdge",
+    "MapLink",
+    "MapScan",
     "PairConsistency",
     "PointCloud",
     "PoseEvidence",
@@ -107,6 +116,7 @@ __all__ = [
     "RegistrationStatistics",
     "StageTimings",
     "TimedResult",
+    "TrajectoryEvaluation",
     "VoxelSizeSuggestion",
     "__version__",
     "align",
@@ -114,10 +124,13 @@ __all__ = [
     "align_within",
     "default_context",
     "describe_backends",
+    "evaluate_trajectory",
     "loop_consistency",
     "prepare",
     "prepare_batch",
     "read_point_cloud",
+    "read_trajectory",
+    "reconstruct",
     "register",
     "register_all",
     "suggest_voxel_size",

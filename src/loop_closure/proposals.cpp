@@ -6,6 +6,7 @@
 #include <tuple>
 
 #include "loop_closure/paths.hpp"
+#include "math/exponential.hpp"
 
 namespace gpureg::loop_closure {
 namespace {
@@ -109,7 +110,7 @@ class Proposer {
       const double overlap =
           expected_overlap(there.coarse, node.coarse, relative, sigma, options_.max_dilation);
       if (overlap < options_.min_overlap) continue;
-      found.push_back({overlap * std::log1p(sigma * sigma / (noise_ * noise_)), id, other});
+      found.push_back({overlap * portable::log1p(sigma * sigma / (noise_ * noise_)), id, other});
     }
     const std::size_t room = options_.per_fragment - node.within_frame;
     std::sort(found.begin(), found.end(), better);

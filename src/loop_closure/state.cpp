@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "math/exponential.hpp"
+
 namespace gpureg::loop_closure {
 namespace {
 
@@ -41,8 +43,8 @@ Odometry modelled_odometry(FragmentId source, FragmentId target,
   const double rotation = std::max(drift.min_rotation, drift.rotation_per_metre * edge.length +
                                                            drift.rotation_per_degree * degrees);
   Vector6d information;
-  information.head<3>().setConstant(1 / std::pow(rotation * kRadians, 2));
-  information.tail<3>().setConstant(1 / std::pow(translation, 2));
+  information.head<3>().setConstant(1 / portable::square(rotation * kRadians));
+  information.tail<3>().setConstant(1 / portable::square(translation));
   edge.information = UnalignedMatrix6d(information.asDiagonal());
   return edge;
 }

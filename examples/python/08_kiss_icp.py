@@ -2,7 +2,7 @@
 """Close the loops of KISS-ICP.
 
     pip install kiss-icp
-    python 07_kiss_icp.py FOLDER [--voxel-size 0.5] [--scans-per-fragment 20] [-o poses.txt]
+    python 08_kiss_icp.py FOLDER [--voxel-size 0.5] [--scans-per-fragment 20] [-o poses.txt]
 
 FOLDER has the scans in order, as PLY or PCD files in the frame of the sensor. KISS-ICP tracks them;
 every few metres its scans become a fragment, and the closer says where the fragments really are.
