@@ -26,10 +26,15 @@ struct Sequence {
 /// Reads what run.py writes. Throws std::runtime_error.
 Sequence read_sequence(const std::string& path);
 
-/// Odometry whose first revisit is off by `metres`: a bias of yaw and scale, and noise of the same
-/// size, both drawn by the seed.
-std::vector<UnalignedIsometry3d> drifted(const Sequence& sequence, double metres,
-                                         std::uint64_t seed);
+/// Simulated odometry.
+struct SimulatedOdometry {
+  std::vector<UnalignedIsometry3d> poses;  ///< world_from_fragment
+  double per_metre = 0;  ///< metres of error per metre travelled; degrees of yaw: ten times
+};
+
+/// Odometry whose first revisit is off by `metres`: a bias of yaw and scale, and noise of half the
+/// size, both drawn by the seed. Of several draws the one of median size.
+SimulatedOdometry drifted(const Sequence& sequence, double metres, std::uint64_t seed);
 
 bool correct(const UnalignedIsometry3d& truth, const UnalignedIsometry3d& pose);
 
@@ -42,7 +47,7 @@ struct Trial {
 };
 
 /// At most `most` true loops, and wrong poses that align() returned, so that `false_share` of all
-/// are false. shuffled: wrong poses get the confidences of true ones, so that only geometry tells.
+/// are false; none where the sequence has too few wrong poses. shuffled: wrong poses get the confidences of true ones, so that only geometry tells.
 std::vector<Trial> trials(const Sequence& sequence, std::size_t most, double false_share,
                           bool shuffled, std::uint64_t seed);
 

@@ -49,7 +49,7 @@ struct ProposalOptions {
   double max_dilation = 3;
   /// Pairs whose relative pose the graph knows better than this are not proposed: standard
   /// deviation of the translation, metres, >= 0.
-  double min_uncertainty = 0.06;
+  double min_uncertainty = 0.03;
   /// Pairs of one session closer in time are not proposed, seconds, >= 0.
   double min_time = 0;
   std::uint32_t per_fragment = 6;          ///< with earlier fragments of its frame

@@ -3,6 +3,7 @@
 
 #include <Eigen/Cholesky>
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <optional>
 
@@ -24,6 +25,9 @@ constexpr double kContradiction = 1.5 * 1.5;
 /// loops agree under any large drift. bench/loop_closure: 0.5 loses true loops after 2 m of drift,
 /// 0.8 keeps more false ones after 0.2 m.
 constexpr double kMostAgreements = 0.65;
+/// Multiple of the stated drift beyond which the rotation of odometry is never thought to be worse:
+/// otherwise the estimate explains perceptual aliases that are turned by a right angle.
+constexpr double kMostRotationScale = 4;
 
 class Comparison {
  public:
@@ -104,7 +108,14 @@ class Comparison {
       const double factor = scales ? kDriftScales[scale] : 1;
       const Matrix6d covariance =
           factor * factor * by_odometry.covariance + by_loop.covariance + own.covariance;
-      const double misclosure = e.dot(covariance.llt().solve(e));
+      double misclosure = e.dot(covariance.llt().solve(e));
+      if (factor > kMostRotationScale) {
+        const Eigen::Matrix3d turn =
+            (kMostRotationScale * kMostRotationScale * by_odometry.covariance +
+             by_loop.covariance + own.covariance)
+                .topLeftCorner<3, 3>();
+        misclosure = std::max(misclosure, e.head<3>().dot(turn.llt().solve(e.head<3>())));
+      }
       if (misclosure > kContradiction * quantile_) break;
       relation.contradicts_below = scale;
       if (misclosure <= quantile_) relation.agrees_from = scale;
@@ -144,9 +155,18 @@ std::uint8_t drift_scale(const State& state) {
     for (const Relation& relation : list)
       for (std::uint8_t scale = relation.agrees_from; scale < kDriftScaleCount; ++scale)
         agreeing[scale] += relation.independent;
-  const auto enough = kMostAgreements * static_cast<double>(agreeing[kDriftScaleCount - 1]);
+  const auto explained = [&](std::uint8_t scale) {
+    for (auto larger = static_cast<std::uint8_t>(scale + 1); larger < kDriftScaleCount; ++larger) {
+      // The prior of the drift: agreements that need an n times larger drift count n^(-1/4).
+      const double prior = std::sqrt(std::sqrt(kDriftScales[scale] / kDriftScales[larger]));
+      if (static_cast<double>(agreeing[scale]) <
+          kMostAgreements * prior * static_cast<double>(agreeing[larger]))
+        return false;
+    }
+    return true;
+  };
   std::uint8_t scale = 0;
-  while (static_cast<double>(agreeing[scale]) < enough) ++scale;
+  while (!explained(scale)) ++scale;
   return scale;
 }
 

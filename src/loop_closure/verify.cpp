@@ -7,12 +7,25 @@
 
 #include "loop_closure/accept.hpp"
 #include "loop_closure/relations.hpp"
+#include "math/exponential.hpp"
+#include "pose_graph/robust.hpp"
 
 namespace gpureg::loop_closure {
 namespace {
 
 /// Loops that the acceptance refuses are left out and the rest optimised again at most so often.
-constexpr int kMostRounds = 6;
+constexpr int kMostRounds = 12;
+/// Quantile of the chi-square distribution that bounds the residuals of accepted loops.
+constexpr double kResidualProbability = 0.99;
+/// A loop's residual exceeds the noise that the accepted loops show together from so many times
+/// their upper quartile on. bench/loop_closure: 3 loses more true loops, 4 keeps more false ones.
+constexpr double kFence = 3.5;
+/// Loops from whose residuals the noise is estimated; fewer are held to the stated noise.
+constexpr std::size_t kLeastResiduals = 8;
+/// The estimated standard deviation is at least this share of the stated one.
+constexpr double kLeastNoise = 1.0 / 3;
+/// Log odds that no confidence exceeds: 0.999, as of registrations.
+constexpr double kCertainLogOdds = 6.9;
 
 /// @param drift_scale on the standard deviations of modelled odometry.
 pose_graph::Graph graph_without_loops(const State& state, const Options& options,
@@ -95,7 +108,7 @@ class Verifier {
         excluded_[k] = 1;
         refused = true;
       }
-      if (!refused) break;
+      if (!refused && !drop_residuals()) break;
     }
     conclude(verdicts);
     if (options_.optimize) move(result);
@@ -117,6 +130,41 @@ class Verifier {
     return any;
   }
 
+  /// Leaves out accepted loops whose residual in the joint solution exceeds the noise that the
+  /// others show: near misses, which odometry bends to. The worst go first, since they move others.
+  bool drop_residuals() {
+    if (options_.accept_by_graph_alone) return false;
+    std::vector<double> errors;
+    for (std::size_t k = 0; k < fits_.size(); ++k)
+      if (fits_[k]) errors.push_back(squared_errors_[k]);
+    if (errors.empty()) return false;
+    const double stated = pose_graph::chi_square_quantile(kResidualProbability);
+    double bound = stated;
+    if (errors.size() >= kLeastResiduals) {
+      const auto upper = errors.begin() + static_cast<std::ptrdiff_t>(3 * errors.size() / 4);
+      std::nth_element(errors.begin(), upper, errors.end());
+      bound = std::clamp(kFence * *upper, portable::square(kLeastNoise) * stated, stated);
+    }
+    // As in the objective of the graph, confidence is worth squared error.
+    const auto excess = [&](std::size_t k) {
+      const double p = state_.loops[k].modes[state_.loops[k].mode].confidence;
+      const double odds = p < 1 ? portable::log(p / (1 - p)) : kCertainLogOdds;
+      return squared_errors_[k] /
+             (bound * (1 + 2 * std::clamp(odds, 0.0, kCertainLogOdds) / stated));
+    };
+    double worst = 1;
+    for (std::size_t k = 0; k < fits_.size(); ++k)
+      if (fits_[k]) worst = std::max(worst, excess(k));
+    if (worst <= 1) return false;
+    const double limit = std::max(1.0, 0.5 * worst);
+    for (std::size_t k = 0; k < fits_.size(); ++k) {
+      if (!fits_[k] || excess(k) <= limit) continue;
+      fits_[k] = fitted_[k] = 0;
+      excluded_[k] = 1;
+    }
+    return true;
+  }
+
   pose_graph::Result optimise() {
     pose_graph::Graph graph = graph_without_loops(state_, options_, kDriftScales[scale_]);
     const std::size_t first = graph.edges.size();
@@ -133,6 +181,7 @@ class Verifier {
     graph_options.marginals.clear();
     const pose_graph::Result result = pose_graph::optimize(graph, graph_options);
     fits_.assign(state_.loops.size(), 0);
+    squared_errors_.assign(state_.loops.size(), 0);
     if (result.edges.size() != graph.edges.size()) return result;
     for (std::size_t k = 0; k < loops.size(); ++k) {
       const pose_graph::EdgeResult& edge = result.edges[first + k];
@@ -140,6 +189,7 @@ class Verifier {
       record.loop.weight = edge.weight;
       if (edge.state != pose_graph::EdgeState::accepted) continue;
       fits_[loops[k]] = 1;
+      squared_errors_[loops[k]] = edge.squared_error;
       choose_mode(record, modes[k][edge.mode]);
     }
     return result;
@@ -196,6 +246,7 @@ class Verifier {
   const Options& options_;
   Paths odometry_;
   std::vector<char> excluded_, fitted_, fits_;
+  std::vector<double> squared_errors_;  ///< of the loops that fit
   std::uint8_t scale_ = 0;  ///< place in kDriftScales
   bool merged_ = false;
 };

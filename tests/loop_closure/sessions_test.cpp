@@ -72,10 +72,7 @@ TEST(Sessions, LoopsThatContradictEachOtherDoNotMergeThem) {
 }
 
 TEST(Sessions, AMergeByAliasesIsRetracted) {
-  // Odometry that knows its turns: otherwise the drift explains a quarter turn after three corners.
-  loop_closure::Options options;
-  options.graph.drift.rotation_per_degree = 0.002;
-  LoopCloser closer = closer_of(options);
+  LoopCloser closer = closer_of();
   Sequence first = sequence(square(20)), second = second_session();
   first.odometry = first.truth;
   second.odometry = second.truth;
