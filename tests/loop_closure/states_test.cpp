@@ -75,6 +75,47 @@ TEST(LoopStates, WhatContradictsIsRejectedWithReason) {
   EXPECT_EQ(loop_of(closer.loops(), 33, 13).reason, LoopReason::not_aligned);
 }
 
+TEST(LoopStates, ANearMissWithinItsStatedNoiseIsRejectedByTheResidualsOfTheOthers) {
+  const Sequence s = sequence(square(40));
+  const Pose near_miss = s.truth[11].inverse() * s.truth[31] * planar(0, 0.15, 2.5);
+  // Alone with one other, within the noise of both, it is accepted.
+  LoopCloser few = closer_of();
+  s.add_to(few);
+  add_correct(few, s, 30, 10, 0.95);
+  few.add_result(31, 11, result_of(near_miss, 0.95));
+  few.process();
+  EXPECT_EQ(loop_of(few.loops(), 31, 11).state, LoopState::accepted);
+  // Ten that agree within millimetres say that it is wrong.
+  LoopCloser many = closer_of();
+  s.add_to(many);
+  for (int k = 20; k < 40; k += 2) add_correct(many, s, k, k - 20, 0.95);
+  many.add_result(31, 11, result_of(near_miss, 0.95));
+  many.process();
+  EXPECT_EQ(loop_of(many.loops(), 31, 11).state, LoopState::rejected);
+  EXPECT_EQ(loop_of(many.loops(), 31, 11).reason, LoopReason::inconsistent);
+  for (int k = 20; k < 40; k += 2)
+    EXPECT_EQ(loop_of(many.loops(), k, k - 20).state, LoopState::accepted) << k;
+}
+
+TEST(LoopStates, CovariancesOfTheHostAreNotScaled) {
+  Sequence s = sequence(square(40, 5, 7.5));
+  s.odometry = drifted(s.truth, 0.9, 1.02);  // as where modelled odometry accepts them
+  LoopCloser closer = closer_of();
+  UnalignedMatrix6d covariance = UnalignedMatrix6d::Identity() * 1e-8;
+  for (int k = 0; k < 40; ++k) {
+    const auto at = static_cast<std::size_t>(k);
+    closer.add({k, 0, double(k), {}, s.odometry[at]});
+    if (k > 0)
+      closer.add_odometry(k, k - 1, s.odometry[at - 1].inverse() * s.odometry[at], covariance);
+  }
+  for (int k = 20; k < 40; k += 2) add_correct(closer, s, k, k - 20, 0.8);
+  closer.process();
+  for (const Loop& loop : closer.loops()) {
+    EXPECT_EQ(loop.state, LoopState::candidate);
+    EXPECT_EQ(loop.reason, LoopReason::exceeds_drift);
+  }
+}
+
 TEST(LoopStates, OfSeveralModesTheOneThatFitsTakesPart) {
   LoopCloser closer = closer_of();
   const Sequence s = sequence(square(40));
