@@ -132,7 +132,9 @@ def summary(runs: list[dict]) -> list[dict]:
         rows.append(
             {
                 **dict(zip(KEYS, key)),
-                "used_for": "nothing" if group[0]["scene"] in KEPT_ASIDE else "choices of constants",
+                "used_for": "nothing"
+                if group[0]["scene"] in KEPT_ASIDE
+                else "choices of constants",
                 "precision": true / (true + false) if true + false else 1.0,
                 "recall": true / sum(r["true_loops"] for r in group),
                 "rmse": sum(r["rmse"] for r in group) / len(group),
@@ -155,8 +157,8 @@ NAMES = {
 def table(rows: list[dict]) -> str:
     """Markdown for docs/loops.md: half of the loops false, confidences as registered."""
     lines = [
-        "| scene | loops | drift, m | method | precision | recall | RMSE, m | true loops alone, m |",
-        "| --- | --- | " + "--- | " * 6,
+        "| scene | loops | drift, m | per metre | method | precision | recall | RMSE, m | true loops alone, m |",
+        "| --- | --- | " + "--- | " * 7,
     ]
     for row in rows:
         if row["false_share"] != 0.5 or row["confidences"] != "registered":
@@ -165,7 +167,7 @@ def table(rows: list[dict]) -> str:
             continue
         lines.append(
             f"| {row['scene'].replace('_', ' ')} | {row['loops']} | {row['drift']:g} | "
-            f"{NAMES[row['method']]} | {100 * row['precision']:.1f} % | "
+            f"{100 * row['per_metre']:.0f} % | {NAMES[row['method']]} | {100 * row['precision']:.1f} % | "
             f"{100 * row['recall']:.1f} % | {row['rmse']:.2f} | {row['rmse_true_loops']:.2f} |"
         )
     return "\n".join(lines).replace("--- | \n", "--- |\n")

@@ -47,7 +47,8 @@ struct Trial {
 };
 
 /// At most `most` true loops, and wrong poses that align() returned, so that `false_share` of all
-/// are false; none where the sequence has too few wrong poses. shuffled: wrong poses get the confidences of true ones, so that only geometry tells.
+/// are false; none where the sequence has too few wrong poses. shuffled: wrong poses get the
+/// confidences of true ones, so that only geometry tells.
 std::vector<Trial> trials(const Sequence& sequence, std::size_t most, double false_share,
                           bool shuffled, std::uint64_t seed);
 

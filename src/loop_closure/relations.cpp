@@ -111,8 +111,8 @@ class Comparison {
       double misclosure = e.dot(covariance.llt().solve(e));
       if (factor > kMostRotationScale) {
         const Eigen::Matrix3d turn =
-            (kMostRotationScale * kMostRotationScale * by_odometry.covariance +
-             by_loop.covariance + own.covariance)
+            (kMostRotationScale * kMostRotationScale * by_odometry.covariance + by_loop.covariance +
+             own.covariance)
                 .topLeftCorner<3, 3>();
         misclosure = std::max(misclosure, e.head<3>().dot(turn.llt().solve(e.head<3>())));
       }

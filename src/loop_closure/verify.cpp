@@ -247,7 +247,7 @@ class Verifier {
   Paths odometry_;
   std::vector<char> excluded_, fitted_, fits_;
   std::vector<double> squared_errors_;  ///< of the loops that fit
-  std::uint8_t scale_ = 0;  ///< place in kDriftScales
+  std::uint8_t scale_ = 0;              ///< place in kDriftScales
   bool merged_ = false;
 };
 

@@ -65,7 +65,8 @@ TEST(LoopStates, WhatContradictsIsRejectedWithReason) {
   s.add_to(closer);
   for (int k = 20; k < 40; k += 2) add_correct(closer, s, k, k - 20, 0.8);
   // Within the drift of odometry, but not where the others say: half a metre aside.
-  closer.add_result(31, 11, result_of(s.truth[11].inverse() * s.truth[31] * planar(0, 0.5, 5), 0.8));
+  closer.add_result(31, 11,
+                    result_of(s.truth[11].inverse() * s.truth[31] * planar(0, 0.5, 5), 0.8));
   closer.add_result(33, 13, {});
   closer.process();
   EXPECT_EQ(loop_of(closer.loops(), 30, 10).state, LoopState::accepted);
