@@ -114,11 +114,10 @@ class Map:
             MapScan(number, *scan) for number, scan in zip(numbers, graph.scans, strict=True)
         )
         self._edges = tuple(
-            MapEdge(numbers[source], numbers[target], *rest)
-            for source, target, *rest in graph.edges
+            MapEdge(numbers[edge[0]], numbers[edge[1]], *edge[2:]) for edge in graph.edges
         )
         self._links = tuple(
-            MapLink(tuple(numbers[k] for k in scans), *rest) for scans, *rest in graph.links
+            MapLink(tuple(numbers[k] for k in link[0]), *link[1:]) for link in graph.links
         )
 
     @property
