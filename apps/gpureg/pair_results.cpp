@@ -24,6 +24,7 @@ Json result_document(const std::string& path) {
   } catch (const Json::exception& error) {
     fail(path, error.what());
   }
+  check_format(path, document);
   if (!document.is_object() || !document.contains("pairs") || !document["pairs"].is_array())
     fail(path, "is not the JSON of `gpureg batch` or of `gpureg reconstruct`");
   if (document.contains("loop_consistency"))

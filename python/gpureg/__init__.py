@@ -24,7 +24,9 @@ from ._core import (
     EvidenceOptions,
     InvalidArgument,
     IoError,
+    Loop,
     LoopConsistencyOptions,
+    LoopUpdate,
     PairConsistency,
     PointCloud,
     PoseEvidence,
@@ -52,6 +54,7 @@ from ._reconstruction import reconstruct
 from ._trajectory import evaluate_trajectory, read_trajectory
 from .files import read_point_cloud, write_point_cloud
 from .fragments import FragmentSet
+from .loop_closure import LoopCloser
 from .preparation import prepare, prepare_batch
 from .registration import (
     BatchInterrupted,
@@ -90,7 +93,10 @@ __all__ = [
     "FragmentSet",
     "InvalidArgument",
     "IoError",
+    "Loop",
+    "LoopCloser",
     "LoopConsistencyOptions",
+    "LoopUpdate",
     "Map",
     "MapEdge",
     "MapLink",

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The examples run, and are typed."""
 
+import json
 import pathlib
 import re
 import subprocess
@@ -44,6 +45,18 @@ def test_two_clouds(scans, tmp_path):
         picture,
     )
     assert "aligned" in shown and picture.read_bytes().startswith(b"\x89PNG")
+
+
+def test_notebook(capsys):
+    notebook = json.loads((FOLDER.parent / "notebooks" / "first_pair.ipynb").read_text())
+    names = {}
+    for cell in notebook["cells"]:
+        if cell["cell_type"] == "code":
+            exec("".join(cell["source"]), names)
+    shown = capsys.readouterr().out
+    assert float(re.match(r"True ([0-9.]+) ", shown).group(1)) > 0.9
+    # A tenth of a voxel: the noise of 60,000 points averages out.
+    assert float(re.search(r"off by ([0-9.]+) mm", shown).group(1)) < 5
 
 
 def test_batch(scans, tmp_path):

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <limits>
 
+#include "math/exponential.hpp"
 #include "pose_graph/bridges.hpp"
 #include "pose_graph/parallel.hpp"
 #include "pose_graph/robust.hpp"
@@ -72,7 +73,7 @@ double chi_square_quantile(double probability) {
   double low = 0, high = 1e3;
   for (int k = 0; k < 200; ++k) {
     const double x = 0.5 * (low + high);
-    (1 - std::exp(-x / 2) * (1 + x / 2 + x * x / 8) < probability ? low : high) = x;
+    (1 - portable::exp(-x / 2) * (1 + x / 2 + x * x / 8) < probability ? low : high) = x;
   }
   return high;
 }

@@ -6,6 +6,7 @@
 #include <numeric>
 #include <tuple>
 
+#include "math/exponential.hpp"
 #include "pose_graph/components.hpp"
 
 namespace gpureg::pose_graph {
@@ -24,13 +25,13 @@ Pose to_pose(const UnalignedIsometry3d& t) {
 
 double log_odds(double confidence) {
   const double p = std::clamp(confidence, kLeastDoubt, 1 - kLeastDoubt);
-  return std::log(p / (1 - p));
+  return portable::log(p / (1 - p));
 }
 
 Matrix6d diagonal_information(double rotation_degrees, double translation) {
   Vector6d d;
-  d.head<3>().setConstant(1 / std::pow(rotation_degrees * kRadians, 2));
-  d.tail<3>().setConstant(1 / std::pow(translation, 2));
+  d.head<3>().setConstant(1 / portable::square(rotation_degrees * kRadians));
+  d.tail<3>().setConstant(1 / portable::square(translation));
   return d.asDiagonal();
 }
 
@@ -144,8 +145,8 @@ Problem compile(const Graph& graph, const Options& options) {
   sort_edges(out);
   for (const GravityFactor& factor : graph.gravity) {
     const Eigen::Vector3d up = factor.up;
-    out.gravity.push_back(
-        {position(factor.node), up.normalized(), 1 / std::pow(factor.sigma_degrees * kRadians, 2)});
+    out.gravity.push_back({position(factor.node), up.normalized(),
+                           1 / portable::square(factor.sigma_degrees * kRadians)});
   }
   for (const PoseFactor& factor : graph.priors)
     out.priors.push_back({position(factor.node), to_pose(factor.world_from_node).inverse(),

@@ -8,6 +8,7 @@
 
 #include "common/validate.hpp"
 #include "gpureg/reconstruction.hpp"
+#include "math/trigonometry.hpp"
 #include "pose_graph/block_cholesky.hpp"
 #include "pose_graph/normal_equations.hpp"
 #include "pose_graph/parallel.hpp"
@@ -120,7 +121,8 @@ class Refiner {
     const double shrinking = std::floor(kShrinkingShare * options_.iterations);
     if (iteration >= shrinking) return options_.final_distance;
     return options_.initial_distance *
-           std::pow(options_.final_distance / options_.initial_distance, iteration / shrinking);
+           portable::exp(portable::log(options_.final_distance / options_.initial_distance) *
+                         (iteration / shrinking));
   }
 
   std::vector<OrderedPair> near_pairs(double distance) const {
@@ -151,7 +153,8 @@ class Refiner {
     });
     Association association;
     association.kernel_width = options_.kernel_width * distance / options_.final_distance;
-    association.min_cosine = static_cast<float>(std::cos(options_.max_normal_angle * M_PI / 180));
+    association.min_cosine =
+        static_cast<float>(portable::cos(options_.max_normal_angle * M_PI / 180));
     association.point_information =
         1 / (options_.point_noise * options_.point_noise * options_.correlated_points);
     association.max_points = options_.max_points;
