@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 option(GPUREG_BUILD_TESTS "Build the tests (needs GoogleTest)" ${PROJECT_IS_TOP_LEVEL})
+option(GPUREG_BUILD_GOLDEN "Build the test of results byte for byte (needs no test library)" ${GPUREG_BUILD_TESTS})
 option(GPUREG_BUILD_BENCHMARKS "Build the benchmarks (needs Google Benchmark)" ${PROJECT_IS_TOP_LEVEL})
 option(GPUREG_BUILD_APPS "Build the command gpureg (needs CLI11 and nlohmann-json)" ${PROJECT_IS_TOP_LEVEL})
 option(GPUREG_SLAM_DEMO "Build slam_demo with the apps (needs OpenCV and Ceres)" ON)

@@ -21,4 +21,7 @@ PYBIND11_MODULE(_core, m) {
   bind_evaluation(m);
   bind_confidence(m);
   bind_pose_graph(m);
+  bind_reconstruction(m);
+  bind_pruning(m);
+  bind_trajectory(m);
 }

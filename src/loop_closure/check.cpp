@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "gpureg/error.hpp"
+#include "math/exponential.hpp"
 
 namespace gpureg::loop_closure {
 namespace {
@@ -132,8 +133,8 @@ LoopRecord host_record(FragmentId source, FragmentId target, const UnalignedIsom
   } else {
     const pose_graph::LoopNoiseOptions& noise = options.graph.loop_noise;
     Vector6d diagonal;
-    diagonal.head<3>().setConstant(1 / std::pow(noise.rotation * kRadians, 2));
-    diagonal.tail<3>().setConstant(1 / std::pow(noise.translation, 2));
+    diagonal.head<3>().setConstant(1 / portable::square(noise.rotation * kRadians));
+    diagonal.tail<3>().setConstant(1 / portable::square(noise.translation));
     mode.information = UnalignedMatrix6d(diagonal.asDiagonal());
   }
   LoopRecord record;

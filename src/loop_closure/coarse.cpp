@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "loop_closure/coarse.hpp"
+#include "math/exponential.hpp"
 
 #include <algorithm>
 #include <array>
@@ -57,7 +58,7 @@ double covered(const Coarse& a, const Coarse& b, const pose_graph::Pose& b_from_
       sum += 1;
     } else if (sigma > 0 && least < static_cast<float>(far * far)) {
       const double beyond = (std::sqrt(static_cast<double>(least)) - near) / sigma;
-      sum += std::exp(-0.5 * beyond * beyond);
+      sum += portable::exp(-0.5 * beyond * beyond);
     }
   }
   return sum;

@@ -57,8 +57,8 @@ MinimisationResult minimise(const Problem& problem, NormalEquations& equations,
       poses.swap(candidate);
       out.cost = cost;
       moved = true;
-      damping = std::max(kMinDamping,
-                         damping * std::max(1.0 / 3, 1 - std::pow(2 * std::min(gain, 1.0) - 1, 3)));
+      const double fit = 2 * std::min(gain, 1.0) - 1;
+      damping = std::max(kMinDamping, damping * std::max(1.0 / 3, 1 - fit * fit * fit));
       growth = 2;
       // A short step because of much damping is no sign of a minimum.
       if (little && damping < 1) {
