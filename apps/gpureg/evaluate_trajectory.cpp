@@ -34,9 +34,8 @@ const std::map<std::string, DeltaUnit> kUnits = {{"frames", DeltaUnit::frames},
 
 Json statistics_json(const ErrorStatistics& s) {
   if (s.count == 0) return nullptr;
-  return {{"count", s.count},   {"rmse", s.rmse},           {"mean", s.mean},
-          {"median", s.median}, {"deviation", s.deviation}, {"min", s.min},
-          {"max", s.max}};
+  return {{"count", s.count},         {"rmse", s.rmse}, {"mean", s.mean}, {"median", s.median},
+          {"deviation", s.deviation}, {"min", s.min},   {"max", s.max}};
 }
 
 Json trajectory_document(const TrajectoryRun& o, const evaluation::TrajectoryEvaluation& e) {
@@ -97,8 +96,8 @@ int run(const TrajectoryRun& o) {
 
 void add_evaluate_trajectory(CLI::App& app, Action& chosen) {
   const auto o = std::make_shared<TrajectoryRun>();
-  CLI::App* verb = app.add_subcommand("evaluate-trajectory",
-                                      "Measure the errors of a trajectory: ATE and RPE");
+  CLI::App* verb =
+      app.add_subcommand("evaluate-trajectory", "Measure the errors of a trajectory: ATE and RPE");
   verb->add_option("ESTIMATE", o->estimate,
                    "Trajectory: TUM, KITTI, or poses.txt of `gpureg reconstruct`")
       ->required();

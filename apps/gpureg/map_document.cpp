@@ -17,9 +17,8 @@ Json pairs_document(const MapRun& run, const Context& context) {
   json["options"] = to_json(run.options);
   json["folder"] = run.folder;
   json["complete"] = true;
-  const double rate = run.seconds.align > 0
-                          ? static_cast<double>(run.pairs_in_this_run) / run.seconds.align
-                          : 0;
+  const double rate =
+      run.seconds.align > 0 ? static_cast<double>(run.pairs_in_this_run) / run.seconds.align : 0;
   json["seconds"] = {{"prepare", run.seconds.prepare},
                      {"align", run.seconds.align},
                      {"pairs_per_second", rate},
@@ -40,12 +39,9 @@ Json map_document(const MapRun& run, const Context& context) {
   json["environment"] = environment(context);
   json["options"] = to_json(run.options);
   json["folder"] = run.folder;
-  json["seconds"] = {{"prepare", run.seconds.prepare},
-                     {"prune", run.seconds.prune},
-                     {"align", run.seconds.align},
-                     {"graph", run.seconds.graph},
-                     {"surfaces", run.seconds.surfaces},
-                     {"refine", run.seconds.refine},
+  json["seconds"] = {{"prepare", run.seconds.prepare},   {"prune", run.seconds.prune},
+                     {"align", run.seconds.align},       {"graph", run.seconds.graph},
+                     {"surfaces", run.seconds.surfaces}, {"refine", run.seconds.refine},
                      {"write", run.seconds.write}};
   json["peak_memory_mib"] = peak_memory_mib();
   json["graph"] = pose_graph::to_string(run.map.status);

@@ -56,7 +56,8 @@ void write_edges(const MapRun& run) {
   std::vector<evaluation::LogEntry> log;
   for (const reconstruction::Edge& edge : run.map.edges)
     if (edge.accepted && run.map.scans[edge.source].placed)
-      log.push_back({run.scene.numbers[edge.target], run.scene.numbers[edge.source], run.scene.count(),
+      log.push_back({run.scene.numbers[edge.target], run.scene.numbers[edge.source],
+                     run.scene.count(),
                      (run.map.scans[edge.target].island_from_scan.inverse() *
                       run.map.scans[edge.source].island_from_scan)
                          .matrix()});

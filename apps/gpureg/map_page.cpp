@@ -55,8 +55,7 @@ std::vector<std::size_t> thinned(const Surface& surface, std::size_t most, float
 }
 
 void append16(std::string& bytes, float share) {
-  const auto value =
-      static_cast<std::uint16_t>(std::lround(65535 * std::clamp(share, 0.0f, 1.0f)));
+  const auto value = static_cast<std::uint16_t>(std::lround(65535 * std::clamp(share, 0.0f, 1.0f)));
   bytes += static_cast<char>(value & 0xff);
   bytes += static_cast<char>(value >> 8);
 }
@@ -66,8 +65,8 @@ class PagePoints {
  public:
   PagePoints(const MapRun& run, const std::vector<Surface>& surfaces)
       : boxes_(run.map.islands.size()) {
-    const std::size_t share = std::max(
-        kLeastScanPoints, kPagePoints / std::max<std::size_t>(1, run.map.placed()));
+    const std::size_t share =
+        std::max(kLeastScanPoints, kPagePoints / std::max<std::size_t>(1, run.map.placed()));
     std::vector<std::vector<std::size_t>> kept(surfaces.size());
     spacing_.assign(surfaces.size(), run.options.prepare.voxel_size / 2);
     for (std::size_t k = 0; k < surfaces.size(); ++k) {
@@ -107,11 +106,10 @@ class PagePoints {
     for (const std::size_t k : kept) {
       const Eigen::Vector3f p = pose * surface.points[k],
                             normal = pose.linear() * surface.normals[k];
+      for (int axis = 0; axis < 3; ++axis) append16(bytes_, (p[axis] - box.low[axis]) / box.size());
       for (int axis = 0; axis < 3; ++axis)
-        append16(bytes_, (p[axis] - box.low[axis]) / box.size());
-      for (int axis = 0; axis < 3; ++axis)
-        bytes_ += static_cast<char>(static_cast<std::int8_t>(
-            std::lround(127 * std::clamp(normal[axis], -1.0f, 1.0f))));
+        bytes_ += static_cast<char>(
+            static_cast<std::int8_t>(std::lround(127 * std::clamp(normal[axis], -1.0f, 1.0f))));
       bytes_ += '\0';
       sum += p;
     }
@@ -196,7 +194,9 @@ Json figures_json(const MapRun& run, const std::vector<reconstruction::Link>& li
   const std::size_t placed = run.map.placed();
   const bool whole = placed == run.map.scans.size() && run.map.islands.size() == 1;
   return {{"sentence", sentence_of(run)},
-          {"grade", placed == 0 ? "bad" : whole ? "good" : "fair"},
+          {"grade", placed == 0 ? "bad"
+                    : whole     ? "good"
+                                : "fair"},
           {"scans", run.map.scans.size()},
           {"placed", placed},
           {"islands", run.map.islands.size()},
@@ -208,9 +208,8 @@ Json figures_json(const MapRun& run, const std::vector<reconstruction::Link>& li
 
 Json links_json(std::vector<reconstruction::Link> links) {
   constexpr std::size_t kMost = 6;
-  std::stable_sort(links.begin(), links.end(), [](const auto& a, const auto& b) {
-    return a.confidence < b.confidence;
-  });
+  std::stable_sort(links.begin(), links.end(),
+                   [](const auto& a, const auto& b) { return a.confidence < b.confidence; });
   if (links.size() > kMost) links.resize(kMost);
   Json out = Json::array();
   for (const reconstruction::Link& link : links)
@@ -236,9 +235,12 @@ void write_map_page(const MapRun& run, const std::vector<Surface>& surfaces) {
     islands.push_back({{"scans", run.map.islands[k].scans.size()},
                        {"low", json_of(points.box(k).low)},
                        {"size", points.box(k).size()}});
-  const Json data = {{"figures", figures_json(run, links)}, {"scans", scans_json(run, points)},
-                     {"edges", edges_json(run)},            {"links", links_json(links)},
-                     {"islands", std::move(islands)},       {"points", base64(points.bytes())}};
+  const Json data = {{"figures", figures_json(run, links)},
+                     {"scans", scans_json(run, points)},
+                     {"edges", edges_json(run)},
+                     {"links", links_json(links)},
+                     {"islands", std::move(islands)},
+                     {"points", base64(points.bytes())}};
   std::string text = data.dump();
   // Nothing in the data may end the element that holds it.
   for (std::size_t at = 0; (at = text.find('<', at)) != std::string::npos;)

@@ -69,8 +69,7 @@ std::vector<reconstruction::Odometry> from_trajectory(const std::string& path, c
 std::vector<reconstruction::Odometry> read_odometry(const std::string& path, const MapRun& run) {
   std::vector<reconstruction::Odometry> odometry =
       is_log(path) ? from_log(path, run) : from_trajectory(path, run);
-  if (odometry.empty())
-    fail(path, "holds no pose of two scans of " + run.folder);
+  if (odometry.empty()) fail(path, "holds no pose of two scans of " + run.folder);
   return odometry;
 }
 

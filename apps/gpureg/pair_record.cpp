@@ -128,7 +128,8 @@ RegistrationResult result_from_record(const PairRecord& record, const Json& info
   result.score = record.score;
   result.modes = modes_from_json(record.json);
   if (!information.is_null())
-    result.source_moments = reconstruction::moments_of_information(information_from_json(information));
+    result.source_moments =
+        reconstruction::moments_of_information(information_from_json(information));
   return result;
 }
 

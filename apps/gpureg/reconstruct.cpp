@@ -33,9 +33,9 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr const char* kJournal = "pairs.journal";
-constexpr const char* kOutputs[] = {"poses.txt", "trajectory.txt",      "edges.log",
-                                    "graph.g2o", "map.ply",             "map.html",
-                                    "pairs.json", "reconstruction.json"};
+constexpr const char* kOutputs[] = {
+    "poses.txt", "trajectory.txt", "edges.log",  "graph.g2o",
+    "map.ply",   "map.html",       "pairs.json", "reconstruction.json"};
 
 struct ReconstructOptions {
   std::string folder, output, pairs = "all", results, odometry;
@@ -178,8 +178,8 @@ class Reconstruct {
     auto options = reconstruction::Options::from_voxel_size(run_.options.prepare.voxel_size);
     options.threads = static_cast<int>(o_.method.threads);
     options.drift = o_.drift;
-    run_.map = reconstruction::reconstruct(run_.scene.numbers.size(), pairs, results, options,
-                                           odometry_);
+    run_.map =
+        reconstruction::reconstruct(run_.scene.numbers.size(), pairs, results, options, odometry_);
     run_.seconds.graph = since(start);
   }
 
@@ -196,8 +196,7 @@ class Reconstruct {
       if (run_.map.scans[k].placed) {
         PointCloud cloud = io::read_point_cloud(scene.files[k]);
         cloud.viewpoints = cameras[scene.numbers[k]];
-        surfaces_[k] =
-            reconstruction::surface_of(context_, cloud.view(), run_.options.prepare);
+        surfaces_[k] = reconstruction::surface_of(context_, cloud.view(), run_.options.prepare);
       }
       progress.update(k + 1);
     }

@@ -56,9 +56,7 @@ class Set:
             for known, more in zip((poses, log, info), read_truth(data / SCENES[scene])):
                 for key, value in more.items():
                     moved = (
-                        key + offset
-                        if isinstance(key, int)
-                        else (key[0] + offset, key[1] + offset)
+                        key + offset if isinstance(key, int) else (key[0] + offset, key[1] + offset)
                     )
                     known[moved] = value
         return poses, log, info
@@ -141,7 +139,9 @@ def run(command, folder, chosen, arguments, out, more):
     figures = measure(out, chosen.truth(arguments.data), information_of(records.values()))
     figures["seconds"] = document["seconds"]
     figures["peak_memory_mib"] = document["peak_memory_mib"]
-    figures["weakest"] = min((link["confidence"] for link in document["weakest_links"]), default=None)
+    figures["weakest"] = min(
+        (link["confidence"] for link in document["weakest_links"]), default=None
+    )
     figures["left_out"] = {s["id"]: s["reason"] for s in document["scans"] if not s["placed"]}
     return figures
 
@@ -169,7 +169,8 @@ def short(name, figures):
     if figures is None:
         return f"{name}: pairs are missing"
     islands = ", ".join(
-        f"{len(i['scans'])} scans" + (f" {i['rmse_cm']:.2f} cm {i['rmse_degrees_own']:.2f} deg" if "rmse_cm" in i else "")
+        f"{len(i['scans'])} scans"
+        + (f" {i['rmse_cm']:.2f} cm {i['rmse_degrees_own']:.2f} deg" if "rmse_cm" in i else "")
         for i in figures["islands"]
     )
     return f"{name}: {figures['placed']}/{figures['scans']} placed; {islands}; {figures['accepted']} edges, {len(figures['wrong'])} wrong"

@@ -37,8 +37,7 @@ std::map<int, UnalignedMatrix6d> correspondence_covariances(const Sequence& sequ
   std::map<int, UnalignedMatrix6d> out;
   for (const RegisteredPair& pair : sequence.pairs) {
     if (pair.source != pair.target + 1 || pair.result.source_moments.count == 0) continue;
-    const Eigen::Matrix<double, 6, 6> information =
-        pair.result.source_moments.information_open3d();
+    const Eigen::Matrix<double, 6, 6> information = pair.result.source_moments.information_open3d();
     out[pair.source] = information.inverse();
   }
   return out;
@@ -78,15 +77,20 @@ Outcome by_least_squares(const std::vector<UnalignedIsometry3d>& odometry,
   for (int k = 0; k < static_cast<int>(odometry.size()); ++k) {
     graph.nodes.push_back({k, odometry[at(k)], false});
     if (k > 0)
-      graph.edges.push_back({k, k - 1, step(odometry, k), information,
-                             pose_graph::EdgeKind::odometry, 0.5, {}});
+      graph.edges.push_back(
+          {k, k - 1, step(odometry, k), information, pose_graph::EdgeKind::odometry, 0.5, {}});
   }
   Outcome out;
   for (const Trial& loop : loops) {
     out.accepted.push_back(!kiss || loop.overlap > kKissOverlap);
     if (out.accepted.back())
-      graph.edges.push_back({loop.source, loop.target, loop.result.target_from_source, information,
-                             pose_graph::EdgeKind::loop, 0.5, {}});
+      graph.edges.push_back({loop.source,
+                             loop.target,
+                             loop.result.target_from_source,
+                             information,
+                             pose_graph::EdgeKind::loop,
+                             0.5,
+                             {}});
   }
   pose_graph::Options options;
   options.robust = pose_graph::Robust::none;
@@ -102,8 +106,7 @@ void run(const std::string& path, const std::string& scene) {
       for (int tenths = 0; tenths <= 9; ++tenths)
         for (std::uint64_t seed = 1; seed <= 3; ++seed) {
           const std::vector<UnalignedIsometry3d> odometry = drifted(sequence, metres, seed);
-          const std::vector<Trial> loops =
-              trials(sequence, kLoops, 0.1 * tenths, shuffled, seed);
+          const std::vector<Trial> loops = trials(sequence, kLoops, 0.1 * tenths, shuffled, seed);
           loop_closure::Options options;
           options.graph.threads = 1;
           loop_closure::Options paper = loop_closure::Options::loopsmart();

@@ -144,8 +144,8 @@ std::vector<Trial> trials(const Sequence& sequence, std::size_t most, double fal
       trial.result.modes = {pair.result.modes[m]};
       trial.result.target_from_source = trial.result.modes[0].target_from_source;
       trial.result.score = trial.result.modes[0].confidence;
-      trial.is_true = correct(truth_of(sequence, pair.source, pair.target),
-                              trial.result.target_from_source);
+      trial.is_true =
+          correct(truth_of(sequence, pair.source, pair.target), trial.result.target_from_source);
       if (m == 0 && trial.is_true && trial.result.score >= 0.5) good.push_back(trial);
       if (m == 0 && !trial.is_true) wrong.push_back(trial);
     }
@@ -159,9 +159,8 @@ std::vector<Trial> trials(const Sequence& sequence, std::size_t most, double fal
     throw std::runtime_error("only " + std::to_string(wrong.size()) + " wrong poses, not " +
                              std::to_string(count));
   // The most confident wrong poses are the hard ones.
-  std::stable_sort(wrong.begin(), wrong.end(), [](const Trial& a, const Trial& b) {
-    return a.result.score > b.result.score;
-  });
+  std::stable_sort(wrong.begin(), wrong.end(),
+                   [](const Trial& a, const Trial& b) { return a.result.score > b.result.score; });
   wrong.resize(count);
   std::vector<Trial> out = good;
   for (Trial& trial : wrong) {

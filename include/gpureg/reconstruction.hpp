@@ -168,8 +168,8 @@ Reconstruction reconstruct(std::size_t scans, const std::vector<Pair>& pairs,
 /// file.
 CorrespondenceMoments moments_of_information(const Eigen::Matrix<double, 6, 6>& redwood);
 
-/// The placed scans with their poses, the odometry between them, and the accepted edges. Node ids are indices of scans, or
-/// `ids` of them where given.
+/// The placed scans with their poses, the odometry between them, and the accepted edges. Node ids
+/// are indices of scans, or `ids` of them where given.
 /// @throws InvalidArgument where ids are neither none nor one per scan.
 pose_graph::Graph graph_of(const Reconstruction& map, const std::vector<std::int64_t>& ids = {});
 

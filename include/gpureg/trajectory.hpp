@@ -23,13 +23,14 @@ using Trajectory = std::vector<StampedPose>;
 enum class TrajectoryFormat {
   automatic,  ///< by the number of fields of the first line
   tum,        ///< lines `time tx ty tz qx qy qz qw`
-  kitti,      ///< lines of 12 numbers, the first three rows of the pose; the time is the line's place
-  blocks      ///< `number`, then four rows of four: poses.txt of gpureg, the number is the time
+  kitti,  ///< lines of 12 numbers, the first three rows of the pose; the time is the line's place
+  blocks  ///< `number`, then four rows of four: poses.txt of gpureg, the number is the time
 };
 
 /// @return the poses in ascending order of their times.
 /// @throws IoError naming file, line and reason: missing, another number of fields than the format
-///   has, a number that is not finite, a pose that is not rigid, a time that is there twice, no pose.
+///   has, a number that is not finite, a pose that is not rigid, a time that is there twice, no
+///   pose.
 Trajectory read_trajectory(const std::string& path,
                            TrajectoryFormat format = TrajectoryFormat::automatic);
 
@@ -62,16 +63,17 @@ struct TrajectoryEvaluation {
   /// Moves the estimate onto the truth; the identity where align is false.
   Eigen::Matrix<double, 4, 4, Eigen::DontAlign> truth_from_estimate =
       Eigen::Matrix<double, 4, 4, Eigen::DontAlign>::Identity();
-  double path_length = 0;                 ///< of the matched true poses, metres
-  ErrorStatistics absolute_translation;   ///< ATE, metres
-  ErrorStatistics absolute_rotation;      ///< degrees
-  ErrorStatistics relative_translation;   ///< RPE, metres; none where no step is long enough
-  ErrorStatistics relative_rotation;      ///< degrees
+  double path_length = 0;                ///< of the matched true poses, metres
+  ErrorStatistics absolute_translation;  ///< ATE, metres
+  ErrorStatistics absolute_rotation;     ///< degrees
+  ErrorStatistics relative_translation;  ///< RPE, metres; none where no step is long enough
+  ErrorStatistics relative_rotation;     ///< degrees
 };
 
 /// Matches every pose to the true one with the nearest time (a true pose only once, to the nearer),
 /// aligns, and measures.
-/// @throws InvalidArgument for options out of range, fewer than 2 matches, or fewer than 3 where the
+/// @throws InvalidArgument for options out of range, fewer than 2 matches, or fewer than 3 where
+/// the
 ///   trajectories are to be aligned.
 /// Sources: Umeyama 1991, Horn 1987 (alignment); Sturm et al. 2012 (ATE, RPE).
 TrajectoryEvaluation evaluate_trajectory(const Trajectory& estimate, const Trajectory& truth,

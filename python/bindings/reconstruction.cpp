@@ -57,8 +57,7 @@ std::vector<Odometry> odometry_of(const py::object& given) {
 Reconstruction reconstruct_of(std::size_t scans, const IndexArray& rows, const py::list& results,
                               double voxel_size, double min_edge_confidence,
                               double min_connection_confidence, std::uint32_t min_island,
-                              const DoubleArray& drift, const py::object& odometry,
-                              int threads) {
+                              const DoubleArray& drift, const py::object& odometry, int threads) {
   const std::vector<Pair> pairs = pairs_of(rows);
   std::vector<RegistrationResult> values;
   for (const py::handle result : results)
@@ -227,9 +226,8 @@ void bind_reconstruction(py::module_& m) {
         return out;
       });
   m.def("reconstruct_map", &reconstruct_of, py::arg("scans"), py::arg("pairs"), py::arg("results"),
-        py::arg("voxel_size"), py::arg("min_edge_confidence"),
-        py::arg("min_connection_confidence"), py::arg("min_island"), py::arg("drift"),
-        py::arg("odometry"), py::arg("threads"));
+        py::arg("voxel_size"), py::arg("min_edge_confidence"), py::arg("min_connection_confidence"),
+        py::arg("min_island"), py::arg("drift"), py::arg("odometry"), py::arg("threads"));
   m.def("refine_map", &refine_map, py::arg("map"), py::arg("clouds"), py::arg("seen"),
         py::arg("voxel_size"), py::arg("threads"), py::arg("tell"));
   m.def("surface_options", &surface_options, py::arg("registration"));

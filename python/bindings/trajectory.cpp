@@ -3,8 +3,8 @@
 
 #include <pybind11/stl.h>
 
-#include "gpureg/error.hpp"
 #include "fields.hpp"
+#include "gpureg/error.hpp"
 #include "matrix.hpp"
 
 namespace gpureg::python {

@@ -47,7 +47,8 @@ Paths::Paths(const State& state, bool with_loops, const Options& options)
       // The mode that was accepted is the one that was reported.
       const Mode& mode = record.modes[record.mode];
       connect(record.source, record.target,
-              {to_pose(mode.target_from_source), pose_graph::covariance_of(mode.information)}, 0, 0);
+              {to_pose(mode.target_from_source), pose_graph::covariance_of(mode.information)}, 0,
+              0);
     }
   component_.assign(ids_.size(), -1);
   for (int root = 0; root < size(); ++root) {
@@ -70,8 +71,8 @@ int Paths::position(FragmentId id) const {
   return static_cast<int>(std::lower_bound(ids_.begin(), ids_.end(), id) - ids_.begin());
 }
 
-void Paths::connect(FragmentId source, FragmentId target,
-                    const UncertainPose& target_from_source, double length, double steps) {
+void Paths::connect(FragmentId source, FragmentId target, const UncertainPose& target_from_source,
+                    double length, double steps) {
   const int s = position(source), t = position(target);
   const UncertainPose source_from_target = target_from_source.inverse();
   const double cost =

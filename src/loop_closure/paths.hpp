@@ -31,7 +31,7 @@ class PathTree {
     double cost = kNever;
     int hops = 0;
     int parent = -1;
-    double length = 0, steps = 0;  ///< of modelled odometry
+    double length = 0, steps = 0;         ///< of modelled odometry
     const UncertainPose* edge = nullptr;  ///< parent_from_node
   };
   std::vector<Step> steps_;

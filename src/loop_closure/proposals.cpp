@@ -31,7 +31,10 @@ bool better(const Scored& a, const Scored& b) {
 class Proposer {
  public:
   Proposer(State& state, const Options& options)
-      : state_(state), all_(options), options_(options.proposals), noise_(options.noise.translation) {}
+      : state_(state),
+        all_(options),
+        options_(options.proposals),
+        noise_(options.noise.translation) {}
 
   void run() {
     const bool due = std::any_of(state_.nodes.begin(), state_.nodes.end(), [](const auto& entry) {

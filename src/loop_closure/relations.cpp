@@ -118,8 +118,8 @@ class Comparison {
     if (relation.agrees_from == kDriftScaleCount && relation.contradicts_below == 0)
       return std::nullopt;
     const Loop &l = state_.loops[k].loop, &o = state_.loops[other].loop;
-    relation.independent = l.source != o.source && l.source != o.target &&
-                           l.target != o.source && l.target != o.target;
+    relation.independent = l.source != o.source && l.source != o.target && l.target != o.source &&
+                           l.target != o.target;
     return relation;
   }
 

@@ -38,9 +38,8 @@ Odometry modelled_odometry(FragmentId source, FragmentId target,
       pose_graph::log_rotation(Eigen::Matrix3d(target_from_source.linear())).norm() / kRadians;
   const double translation =
       std::max(drift.min_translation, drift.translation_per_metre * edge.length);
-  const double rotation =
-      std::max(drift.min_rotation,
-               drift.rotation_per_metre * edge.length + drift.rotation_per_degree * degrees);
+  const double rotation = std::max(drift.min_rotation, drift.rotation_per_metre * edge.length +
+                                                           drift.rotation_per_degree * degrees);
   Vector6d information;
   information.head<3>().setConstant(1 / std::pow(rotation * kRadians, 2));
   information.tail<3>().setConstant(1 / std::pow(translation, 2));

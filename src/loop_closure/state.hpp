@@ -43,7 +43,7 @@ struct Odometry {
   /// true: the information is that of Options::graph.drift for an edge alone. Errors of such edges
   /// have one sign over Options::drift_correlation.
   bool modelled = false;
-  double length = 0;       ///< metres travelled
+  double length = 0;        ///< metres travelled
   std::uint32_t steps = 1;  ///< edges of the host that it is made of
 };
 
@@ -71,7 +71,7 @@ struct LoopRecord {
 
 /// What one mode of a loop says about one of another, by how much odometry drifts.
 struct Relation {
-  std::uint64_t other = 0;  ///< LoopRecord::key
+  std::uint64_t other = 0;   ///< LoopRecord::key
   bool independent = false;  ///< no fragment in common
   /// Places in kDriftScales from which they agree, and below which they contradict each other.
   std::uint8_t agrees_from = 0, contradicts_below = 0;

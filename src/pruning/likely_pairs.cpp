@@ -128,7 +128,8 @@ std::vector<Pair> likely_pairs(const std::vector<PreparedCloud>& clouds, const O
   on_threads(thread_count(options.threads, clouds.size()), [&](std::size_t) {
     for (std::size_t k; (k = next++) < clouds.size();) {
       const std::vector<float> features = clouds[k].features();
-      const std::vector<float> one = describe(view_of(features, clouds[k].feature_dimension()), words);
+      const std::vector<float> one =
+          describe(view_of(features, clouds[k].feature_dimension()), words);
       std::copy(one.begin(), one.end(),
                 descriptors.data.begin() + static_cast<std::ptrdiff_t>(k * descriptors.columns));
     }

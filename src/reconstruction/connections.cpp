@@ -70,9 +70,9 @@ std::size_t reject_deviating(Reconstruction& map, double max_error) {
         map.scans[edge.target].island_from_scan * edge.target_from_source;
     const UnalignedIsometry3d& refined = map.scans[edge.source].island_from_scan;
     const Eigen::Matrix3d turn = measured.linear() - refined.linear();
-    const double error = std::sqrt(
-        (measured * edge.overlap_centre - refined * edge.overlap_centre).squaredNorm() +
-        std::max(0.0, (turn * edge.overlap_spread * turn.transpose()).trace()));
+    const double error =
+        std::sqrt((measured * edge.overlap_centre - refined * edge.overlap_centre).squaredNorm() +
+                  std::max(0.0, (turn * edge.overlap_spread * turn.transpose()).trace()));
     if (error > max_error) deviating.emplace_back(-error, k);
   }
   std::sort(deviating.begin(), deviating.end());

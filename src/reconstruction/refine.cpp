@@ -230,9 +230,8 @@ class Refiner {
     const double weight = 1 / (1 + linear.residual.dot(weighted) / kEdgeKernel);
     const Matrix6d source = weight * information * linear.source,
                    target = weight * information * linear.target;
-    add(from, to, linear.source.transpose() * source,
-        linear.target.transpose() * target, linear.target.transpose() * source,
-        weight * linear.source.transpose() * weighted,
+    add(from, to, linear.source.transpose() * source, linear.target.transpose() * target,
+        linear.target.transpose() * source, weight * linear.source.transpose() * weighted,
         weight * linear.target.transpose() * weighted);
   }
 

@@ -198,8 +198,7 @@ TEST_F(ReconstructCommand, AFullDiskIsNamedAndTheJournalStays) {
   write_scans(scans_, kScans, false);
   Surroundings around;
   around.file_bytes = 200'000;  // enough for the journal, too little for the map's files
-  const Outcome outcome =
-      Command(reconstruct("map", {"--map-voxel-size", "0.01"}), around).wait();
+  const Outcome outcome = Command(reconstruct("map", {"--map-voxel-size", "0.01"}), around).wait();
   EXPECT_EQ(outcome.status, 2);
   expect_holds(outcome.err, {"cannot write", file("map", "")});
   EXPECT_TRUE(std::filesystem::exists(file("map", "pairs.journal")));

@@ -31,8 +31,8 @@ Trajectory square() {
 }
 
 Trajectory moved(Trajectory poses) {
-  Eigen::Isometry3d motion =
-      Eigen::Translation3d(3, -2, 5) * Eigen::AngleAxisd(1.1, Eigen::Vector3d(1, 2, 3).normalized());
+  Eigen::Isometry3d motion = Eigen::Translation3d(3, -2, 5) *
+                             Eigen::AngleAxisd(1.1, Eigen::Vector3d(1, 2, 3).normalized());
   for (StampedPose& p : poses) p.world_from_body = (motion.matrix() * p.world_from_body).eval();
   return poses;
 }
@@ -89,9 +89,9 @@ TEST(Trajectory, StepsByLength) {
 
 TEST(Trajectory, MatchesNearestTimesOnce) {
   Trajectory estimate = square();
-  estimate[1].time = 1.008;                       // nearer than the next one
+  estimate[1].time = 1.008;  // nearer than the next one
   estimate.insert(estimate.begin() + 2, pose(1.009, {7, 7, 7}));
-  estimate.push_back(pose(9, {7, 7, 7}));         // nothing near
+  estimate.push_back(pose(9, {7, 7, 7}));  // nothing near
   TrajectoryOptions options;
   options.max_difference = 0.02;
   const TrajectoryEvaluation e = evaluate_trajectory(estimate, square(), options);
@@ -107,13 +107,17 @@ TEST(Trajectory, MatchesNearestTimesOnce) {
 
 TEST(Trajectory, ReadsTheThreeFormats) {
   const TemporaryFolder folder;
-  const std::string tum = folder.write(
-      "a.tum", "# time tx ty tz qx qy qz qw\n1.5 1 2 3 0 0 0.70710678118654752 "
-               "0.70710678118654752\n0.5 0 0 0 0 0 0 1\n");
-  const std::string kitti = folder.write("a.txt", "1 0 0 0 0 1 0 0 0 0 1 0\n0 -1 0 1 1 0 0 2 0 0 1 3\n");
+  const std::string tum =
+      folder.write("a.tum",
+                   "# time tx ty tz qx qy qz qw\n1.5 1 2 3 0 0 0.70710678118654752 "
+                   "0.70710678118654752\n0.5 0 0 0 0 0 0 1\n");
+  const std::string kitti =
+      folder.write("a.txt", "1 0 0 0 0 1 0 0 0 0 1 0\n0 -1 0 1 1 0 0 2 0 0 1 3\n");
   const std::string blocks = folder.write(
-      "poses.txt", "0\n1 0 0 0\n0 1 0 0\n0 0 1 0\n0 0 0 1\n7\n0 -1 0 1\n1 0 0 2\n0 0 1 3\n0 0 0 1\n");
-  const Trajectory a = read_trajectory(tum), b = read_trajectory(kitti), c = read_trajectory(blocks);
+      "poses.txt",
+      "0\n1 0 0 0\n0 1 0 0\n0 0 1 0\n0 0 0 1\n7\n0 -1 0 1\n1 0 0 2\n0 0 1 3\n0 0 0 1\n");
+  const Trajectory a = read_trajectory(tum), b = read_trajectory(kitti),
+                   c = read_trajectory(blocks);
   ASSERT_EQ(a.size(), 2u);
   EXPECT_EQ(a[0].time, 0.5);  // sorted
   EXPECT_EQ(b[1].time, 1);

@@ -114,9 +114,8 @@ TEST(Pruning, NearestPairsAgreeWithTheirDefinition) {
 TEST(Pruning, ErrorsNameTheField) {
   const std::vector<float> cloud = place(1, 1, 10, 5);
   expect_error<InvalidArgument>([&] { pruning::learn_words({view(cloud, 5)}, 0); }, {"words", "0"});
-  expect_error<InvalidArgument>(
-      [&] { pruning::learn_words({view(cloud, 5), view(cloud, 10)}, 2); },
-      {"clouds[1]", "10", "5"});
+  expect_error<InvalidArgument>([&] { pruning::learn_words({view(cloud, 5), view(cloud, 10)}, 2); },
+                                {"clouds[1]", "10", "5"});
   const Matrix words = pruning::learn_words({view(cloud, 5)}, 2);
   expect_error<InvalidArgument>([&] { pruning::describe(view(cloud, 10), words); }, {"10", "5"});
   expect_error<InvalidArgument>([&] { pruning::nearest_pairs(words, 0); }, {"k", "0"});

@@ -122,9 +122,9 @@ TEST(WeakestLinks, FindsTheBridge) {
   ASSERT_EQ(map.islands.size(), 1u);
   const auto links = reconstruction::weakest_links(map);
   ASSERT_EQ(links.size(), 7u);
-  const auto weakest = std::min_element(
-      links.begin(), links.end(),
-      [](const auto& a, const auto& b) { return a.confidence < b.confidence; });
+  const auto weakest =
+      std::min_element(links.begin(), links.end(),
+                       [](const auto& a, const auto& b) { return a.confidence < b.confidence; });
   EXPECT_EQ(weakest->scans, (std::vector<std::uint32_t>{4, 5, 6, 7}));
   EXPECT_EQ(weakest->accepted, 1u);
   EXPECT_EQ(weakest->rejected, 0u);
