@@ -184,6 +184,7 @@ bool LoopClosing::process() {
     record.reason = lc::to_string(loop.reason);
     record.confidence = loop.confidence;
     record.drift_ratio = loop.drift_ratio;
+    record.target_from_source = Eigen::Isometry3d(loop.target_from_source.matrix());
     const bool accepted = loop.state == lc::LoopState::accepted;
     if (was_accepted) {  // retracted, or accepted with another pose
       map_.remove_loop(number);

@@ -26,6 +26,7 @@ struct LoopRecord {
   double source_time = 0, target_time = 0;  ///< seconds
   std::string state, reason;
   double confidence = 0, drift_ratio = 0;
+  Eigen::Isometry3d target_from_source = Eigen::Isometry3d::Identity();  ///< of the keyframes
   int image_loops = 0;  ///< keyframes that image loops connected as a consequence
 };
 
