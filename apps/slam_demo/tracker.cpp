@@ -17,9 +17,9 @@ constexpr int kWellLinked = 60;  // shared points that hold two keyframes togeth
 // Noise of the pose of a keyframe with few points, relative to its reference.
 constexpr double kLinkMetres = 0.01, kLinkRadians = 0.005;
 // What the motion may differ from that of the last frame, for each frame in between.
-constexpr double kFrameRate = 30, kSurpriseMetres = 0.06, kSurpriseRadians = 0.12;
-constexpr double kFastMetres = 0.1;  // a frame: 3 m/s, faster than anybody walks
-constexpr int kMinRelocalised = 40;  // inliers that prove a place without a prediction
+constexpr double kFrameRate = 30, kSurpriseMetres = 0.03, kSurpriseRadians = 0.08;
+constexpr double kFastMetres = 0.06;  // a frame: 1.8 m/s, faster than anybody walks with a camera
+constexpr int kMinRelocalised = 40;   // inliers that prove a place without a prediction
 
 }  // namespace
 
