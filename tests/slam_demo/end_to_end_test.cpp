@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include <gpureg/io.hpp>
 #include <gtest/gtest.h>
+#include <gpureg/io.hpp>
 
 #include <cstdlib>
 #include <filesystem>
@@ -117,8 +117,7 @@ TEST(EndToEnd, SequentialRunsGiveTheSameBits) {
 // pose of a session jumps, and what is called one world fits the truth.
 TEST(EndToEnd, SixtyBlackFrames) {
   const Sequence sequence = open_sequence(frames_folder());
-  const auto slam =
-      run(sequence, sequential(), [](int k) { return k >= 50 && k < 110; });
+  const auto slam = run(sequence, sequential(), [](int k) { return k >= 50 && k < 110; });
   EXPECT_GE(slam->lost(), 60);
   EXPECT_LT(slam->lost(), 70) << "tracking starts again soon";
   const std::vector<FramePose>& frames = slam->frames();
@@ -126,8 +125,10 @@ TEST(EndToEnd, SixtyBlackFrames) {
     if (frames[k].session != frames[k - 1].session || frames[k].time - frames[k - 1].time > 0.05)
       continue;
     const double step = (world_from_camera(slam->map(), frames[k]).translation() -
-                         world_from_camera(slam->map(), frames[k - 1]).translation()).norm();
-    EXPECT_LT(step, 0.08) << "at " << frames[k].time << " s; the camera makes 2.5 cm a frame at most";
+                         world_from_camera(slam->map(), frames[k - 1]).translation())
+                            .norm();
+    EXPECT_LT(step, 0.08) << "at " << frames[k].time
+                          << " s; the camera makes 2.5 cm a frame at most";
   }
   const AteResult ate = absolute_error(sequence.truth, slam->trajectory());
   EXPECT_GE(ate.poses, 40u);

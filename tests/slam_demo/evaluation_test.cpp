@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include <gpureg/error.hpp>
 #include <gtest/gtest.h>
+#include <gpureg/error.hpp>
 
 #include <cmath>
 
@@ -90,7 +90,8 @@ gpureg::PointCloud wall() {
 TEST(SurfaceError, ShiftedPlane) {
   std::vector<Eigen::Vector3f> map;
   for (int k = 0; k < 1000; ++k)
-    map.emplace_back(0.8f * std::sin(static_cast<float>(k)), 0.8f * std::cos(2.0f * static_cast<float>(k)), 0.012f);
+    map.emplace_back(0.8f * std::sin(static_cast<float>(k)),
+                     0.8f * std::cos(2.0f * static_cast<float>(k)), 0.012f);
   const SurfaceError error = surface_error(wall(), map, Eigen::Isometry3d::Identity());
   EXPECT_NEAR(error.mean, 0.012, 1e-6);
   EXPECT_NEAR(error.median, 0.012, 1e-6);
@@ -105,8 +106,8 @@ TEST(SurfaceError, LargerBall) {
   std::vector<Eigen::Vector3f> map;
   for (int k = 0; k < 60000; ++k) {  // Fibonacci: about 0.7 cm apart on a ball of 0.5 m
     const double z = 1 - (2 * k + 1) / 60000.0, r = std::sqrt(1 - z * z), a = 2.39996323 * k;
-    const Eigen::Vector3f n(static_cast<float>(r * std::cos(a)), static_cast<float>(r * std::sin(a)),
-                            static_cast<float>(z));
+    const Eigen::Vector3f n(static_cast<float>(r * std::cos(a)),
+                            static_cast<float>(r * std::sin(a)), static_cast<float>(z));
     truth.points.push_back(0.5f * n);
     truth.normals.push_back(n);
     if (k % 7 == 0) map.push_back(0.52f * n);

@@ -80,7 +80,8 @@ TEST(Map, PointsSeenOnceAreRemovedAfterATrial) {
   EXPECT_FALSE(map.points[static_cast<std::size_t>(young)].bad);
 }
 
-/// Twelve keyframes around a circle that tracking does not close: 1 % of the way is missing.
+/// Twelve keyframes around a circle that tracking does not close: it turns 0.01 too far at each
+/// step.
 struct Drift {
   Map map;
   KeyframeGraph graph;
@@ -92,7 +93,7 @@ struct Drift {
       Eigen::Isometry3d pose = truth.back();
       if (k > 0) {
         Eigen::Isometry3d motion = truth[static_cast<std::size_t>(k) - 1].inverse() * truth.back();
-        motion.translation() *= 0.98;
+        motion.linear() = motion.linear() * Eigen::AngleAxisd(0.01, Eigen::Vector3d::UnitY());
         pose = tracked.back() * motion;
       }
       tracked.push_back(pose);
@@ -109,17 +110,18 @@ struct Drift {
 TEST(KeyframeGraph, ALoopSpreadsTheDriftAndMovesThePoints) {
   Drift d;
   const double before = (d.tracked.back().translation() - d.truth.back().translation()).norm();
-  ASSERT_GT(before, 0.03);
+  ASSERT_GT(before, 0.1);
   d.graph.add(0, {d.closing()});
   EXPECT_EQ(d.graph.optimize(d.map), "");
   for (std::size_t k = 0; k < 12; ++k) {
     const Eigen::Isometry3d& pose = d.map.keyframes[k].world_from_camera;
-    EXPECT_LT((pose.translation() - d.truth[k].translation()).norm(), 0.8 * before) << k;
+    EXPECT_LT((pose.translation() - d.truth[k].translation()).norm(), 0.3 * before) << k;
     EXPECT_LT((d.map.points[k].position - pose * Eigen::Vector3d(0, 0, 1)).norm(), 1e-9)
         << "the point follows its keyframe";
   }
-  EXPECT_LT((d.map.keyframes[11].world_from_camera.translation() - d.truth[11].translation()).norm(),
-            0.1 * before);
+  EXPECT_LT(
+      (d.map.keyframes[11].world_from_camera.translation() - d.truth[11].translation()).norm(),
+      0.1 * before);
 }
 
 TEST(KeyframeGraph, ARetractionIsUndone) {
@@ -127,8 +129,10 @@ TEST(KeyframeGraph, ARetractionIsUndone) {
   Drift wrong;
   wrong.graph.add(0, {{2, 9, at(0, 0, 0), information_of(0.01, 0.01)}});
   wrong.graph.optimize(wrong.map);
-  ASSERT_GT((wrong.map.keyframes[9].world_from_camera.translation() -
-             d.tracked[9].translation()).norm(), 0.1) << "a false loop bends the map";
+  ASSERT_GT(
+      (wrong.map.keyframes[9].world_from_camera.translation() - d.tracked[9].translation()).norm(),
+      0.1)
+      << "a false loop bends the map";
   wrong.graph.remove(0);
   wrong.graph.optimize(wrong.map);
   for (std::size_t k = 0; k < 12; ++k) {
@@ -153,7 +157,8 @@ TEST(KeyframeGraph, SessionsKeepTheirWorldsUntilALoopMergesThem) {
   EXPECT_EQ(graph.world_of_session(map), (std::vector<int>{0, 0}));
   graph.optimize(map);
   for (int k = 0; k < 3; ++k)
-    EXPECT_TRUE(map.keyframes[static_cast<std::size_t>(3 + k)].world_from_camera.isApprox(at(k, 5, 0), 1e-5));
+    EXPECT_TRUE(map.keyframes[static_cast<std::size_t>(3 + k)].world_from_camera.isApprox(
+        at(k, 5, 0), 1e-5));
   graph.remove(0);
   EXPECT_EQ(graph.world_of_session(map), (std::vector<int>{0, 1}));
 }
@@ -162,7 +167,8 @@ TEST(Bundle, RecoversPosesAndPoints) {
   // Three cameras before twelve points; the measurements are exact, the start is not.
   const Pinhole camera;
   Map map;
-  const std::vector<Eigen::Isometry3d> truth = {at(0, 0, 0), at(0.3, 0, 0, -0.05), at(0.6, 0.05, 0.1, -0.1)};
+  const std::vector<Eigen::Isometry3d> truth = {at(0, 0, 0), at(0.3, 0, 0, -0.05),
+                                                at(0.6, 0.05, 0.1, -0.1)};
   std::vector<Eigen::Vector3d> points;
   for (int k = 0; k < 12; ++k)
     points.emplace_back(0.3 + 0.5 * std::sin(2.0 * k), 0.4 * std::cos(3.0 * k), 2 + 0.3 * (k % 4));

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "sequence.hpp"
 
-#include <gpureg/error.hpp>
 #include <gtest/gtest.h>
+#include <gpureg/error.hpp>
 
 #include <filesystem>
 #include <fstream>
@@ -123,7 +123,8 @@ TEST(Sequence, SevenScenesPutsDepthIntoTheColourCamera) {
   const double u = 32 + 30 * (13 / 60.0 - 0.1);  // 35.5
   for (int y = 0; y < 48; ++y) {
     for (int x = 0; x < 64; ++x) {
-      const bool hit = (y == 24 || y == 25) && (x == static_cast<int>(u) || x == static_cast<int>(u) + 1);
+      const bool hit =
+          (y == 24 || y == 25) && (x == static_cast<int>(u) || x == static_cast<int>(u) + 1);
       ASSERT_FLOAT_EQ(depth(y, x), hit ? 1.0f : 0.0f) << x << " " << y;
     }
   }

@@ -38,8 +38,9 @@ TEST(SurfelsOnCuda, SameBytesAsOnTheCpu) {
   std::vector<Correction> moves;
   for (int frame = 0; frame < 70; ++frame) {
     const float turn = 0.004f * static_cast<float>(frame);
-    Pose pose = shifted(0.01f * static_cast<float>(frame % 30), 0, 0.002f * static_cast<float>(frame));
-    const float rotation[9] = {std::cos(turn), 0, std::sin(turn),  0, 1, 0,
+    Pose pose =
+        shifted(0.01f * static_cast<float>(frame % 30), 0, 0.002f * static_cast<float>(frame));
+    const float rotation[9] = {std::cos(turn),  0, std::sin(turn), 0, 1, 0,
                                -std::sin(turn), 0, std::cos(turn)};
     for (int k = 0; k < 9; ++k) pose.r[k] = rotation[k];
     const std::vector<float> depth =
@@ -62,9 +63,15 @@ TEST(SurfelsOnCuda, TimesOfALargeMap) {
   constexpr std::size_t kSurfels = 2000000;
   Cloud surfels;
   for (std::size_t k = 0; k < kSurfels; ++k) {
-    const float x = static_cast<float>(k % 2000) * 0.004f - 4, y = static_cast<float>(k / 2000) * 0.004f - 2;
-    surfels.push_back({{x, y, 3}, {0, 0, -1}, 0.004f, 5, static_cast<int>(k % 4000),
-                       static_cast<int>(k % 4000) + 60, 0x808080u});
+    const float x = static_cast<float>(k % 2000) * 0.004f - 4,
+                y = static_cast<float>(k / 2000) * 0.004f - 2;
+    surfels.push_back({{x, y, 3},
+                       {0, 0, -1},
+                       0.004f,
+                       5,
+                       static_cast<int>(k % 4000),
+                       static_cast<int>(k % 4000) + 60,
+                       0x808080u});
   }
   std::vector<Correction> moves;
   for (int k = 0; k < 200; ++k) moves.push_back({20 * k, shifted(0.001f)});
@@ -86,7 +93,9 @@ TEST(SurfelsOnCuda, TimesOfALargeMap) {
   const double correction = milliseconds([&](int) { map->correct(moves); }, 20);
   map->fuse({width, height, depth.data(), nullptr}, camera, Pose{}, 5000, 0);
   const double fusion = milliseconds(
-      [&](int k) { map->fuse({width, height, depth.data(), nullptr}, camera, Pose{}, 5001 + k, 0); },
+      [&](int k) {
+        map->fuse({width, height, depth.data(), nullptr}, camera, Pose{}, 5001 + k, 0);
+      },
       15);
   std::cout << "correction of 2 million surfels by 200 keyframes: " << correction
             << " ms; fusion of a 640 x 480 frame: " << fusion << " ms, with copies" << std::endl;

@@ -39,7 +39,8 @@ TEST(SurfelFusion, BallHasItsRadiusAndNormals) {
   const auto map = make_cpu_map({}, 1);
   const Shape shape = ball(0.1, 0, 2, 0.5);
   for (int frame = 0; frame < 20; ++frame) {
-    const Pose pose = shifted(0.01f * static_cast<float>(frame), 0.005f * static_cast<float>(frame));
+    const Pose pose =
+        shifted(0.01f * static_cast<float>(frame), 0.005f * static_cast<float>(frame));
     fuse(*map, depth_of(shape, pose), pose, frame);
   }
   const Cloud surfels = map->download();

@@ -27,11 +27,11 @@ using Shape = std::function<std::optional<double>(const double (&)[3], const dou
 
 /// The wall z = distance.
 inline Shape wall(double distance) {
-  return [=](const double (&o)[3], const double (&)[3]) { return distance - o[2]; };
+  return [=](const double(&o)[3], const double(&)[3]) { return distance - o[2]; };
 }
 
 inline Shape ball(double x, double y, double z, double radius) {
-  return [=](const double (&o)[3], const double (&d)[3]) -> std::optional<double> {
+  return [=](const double(&o)[3], const double(&d)[3]) -> std::optional<double> {
     const double p[3] = {o[0] - x, o[1] - y, o[2] - z};
     const double a = d[0] * d[0] + d[1] * d[1] + d[2] * d[2],
                  b = p[0] * d[0] + p[1] * d[1] + p[2] * d[2],
@@ -49,9 +49,9 @@ inline std::vector<float> depth_of(const Shape& shape, const Pose& pose) {
                             static_cast<double>(pose.t[2])};
   for (int v = 0; v < kHeight; ++v) {
     for (int u = 0; u < kWidth; ++u) {
-      const double ray[3] = {(u - static_cast<double>(kCamera.cx)) / static_cast<double>(kCamera.fx),
-                             (v - static_cast<double>(kCamera.cy)) / static_cast<double>(kCamera.fy),
-                             1};
+      const double ray[3] = {
+          (u - static_cast<double>(kCamera.cx)) / static_cast<double>(kCamera.fx),
+          (v - static_cast<double>(kCamera.cy)) / static_cast<double>(kCamera.fy), 1};
       if (const auto z = shape(origin, ray))
         depth[static_cast<std::size_t>(v * kWidth + u)] = static_cast<float>(*z);
     }
