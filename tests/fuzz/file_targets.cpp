@@ -82,7 +82,8 @@ std::vector<Target> file_targets() {
           {"cameras", read<Reader::cameras>},
           {"pairs", read<Reader::pairs>},
           {"g2o", read_g2o},
-          {"open3d", read_open3d},                    {"saved_state", read_saved_state}};
+          {"open3d", read_open3d},
+          {"saved_state", read_saved_state}};
 }
 
 }  // namespace gpureg::fuzz
