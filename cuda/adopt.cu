@@ -122,6 +122,20 @@ std::shared_ptr<PreparedState> CudaEngine::prepare_adopted(const AdoptedCloud& c
   return prepare_on_stream({&adopted.raw, 1}, options).front();
 }
 
+std::vector<float> CudaEngine::copy_points(const AdoptedCloud& cloud) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  const DeviceScope scope(device());
+  const Adopted& adopted = static_cast<const Adopted&>(cloud);
+  std::vector<float> rows(3 * adopted.raw.size);
+  if (rows.empty()) return rows;
+  check(cudaStreamWaitEvent(exec_.stream(), adopted.event(), 0), "cudaStreamWaitEvent");
+  check(cudaMemcpyAsync(rows.data(), adopted.raw.points, rows.size() * sizeof(float),
+                        cudaMemcpyDeviceToHost, exec_.stream()),
+        "cudaMemcpyAsync");
+  check(cudaStreamSynchronize(exec_.stream()), "cudaStreamSynchronize");
+  return rows;
+}
+
 int device_of(const AdoptedCloud& cloud) { return static_cast<const Adopted&>(cloud).device(); }
 
 }  // namespace gpureg::cuda

@@ -22,6 +22,7 @@ class CudaEngine final : public DeviceEngine {
   std::vector<std::shared_ptr<PreparedState>> prepare(Span<const RawCloud> clouds,
                                                       const PrepareOptions& options) override;
   std::shared_ptr<AdoptedCloud> adopt(const RawCloud& cloud, void* stream) override;
+  std::vector<float> copy_points(const AdoptedCloud& cloud) override;
   std::shared_ptr<PreparedState> prepare_adopted(const AdoptedCloud& cloud,
                                                  const PrepareOptions& options) override;
   void align(Span<const PairInput> pairs, const RegistrationOptions& options,

@@ -82,6 +82,9 @@ class EngineOfMany final : public DeviceEngine {
   std::shared_ptr<AdoptedCloud> adopt(const RawCloud& cloud, void* stream) override {
     return on(device_of(cloud.points)).adopt(cloud, stream);
   }
+  std::vector<float> copy_points(const AdoptedCloud& cloud) override {
+    return on(device_of(cloud)).copy_points(cloud);
+  }
   std::shared_ptr<PreparedState> prepare_adopted(const AdoptedCloud& cloud,
                                                  const PrepareOptions& options) override {
     return on(device_of(cloud)).prepare_adopted(cloud, options);

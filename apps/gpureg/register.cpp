@@ -16,6 +16,7 @@
 #include "image.hpp"
 #include "initial_poses.hpp"
 #include "json_file.hpp"
+#include "knowledge_options.hpp"
 #include "method_options.hpp"
 #include "options_json.hpp"
 #include "output_path.hpp"
@@ -34,6 +35,8 @@ struct RegisterOptions {
   std::string json, overlay, image;
   std::string initial;  // file of poses that are verified instead of a search
   bool refine_initial = false, ignore_alternatives = false;
+  ViewpointChoice source_viewpoint, target_viewpoint;
+  std::string up;
 };
 
 std::string describe(const PrepareStatistics& s) {
@@ -42,7 +45,10 @@ std::string describe(const PrepareStatistics& s) {
   text += ", " + grouped(s.points) + " prepared";
   if (s.points_without_feature > 0)
     text += " (" + grouped(s.points_without_feature) + " without a feature)";
-  return text;
+  return text + "; viewpoint " + to_string(s.viewpoint) +
+         (s.repaired_normals > 0 ? ", " + grouped(s.repaired_normals) +
+                                       " normals contradicted their neighbours and were flipped"
+                                 : "");
 }
 
 std::string describe(const Eigen::Matrix4d& pose) {
@@ -148,6 +154,8 @@ void check_initial(const RegisterOptions& o) {
       throw InvalidArgument("--refine-initial and --ignore-alternatives need --initial");
     return;
   }
+  if (!o.up.empty())
+    throw InvalidArgument("--initial verifies given poses, --up is for a search");
   if (o.time_budget)
     throw InvalidArgument("--initial verifies given poses, --time-budget is for a search");
   if (o.method.registration().method != RegistrationMethod::compatibility)
@@ -160,12 +168,20 @@ int run(RegisterOptions o) {
   o.method.registration();  // what is wrong with it shall be said before clouds are read
   if (o.time_budget && o.method.given("--quality"))
     throw InvalidArgument("--time-budget chooses the quality, give it or --quality");
+  o.source_viewpoint.check("--source-viewpoint");
+  o.target_viewpoint.check("--target-viewpoint");
+  RegistrationPrior prior;
+  prior.gravity = up_prior(o.up);
+  if (o.time_budget && !prior.empty())
+    throw InvalidArgument("--up and --time-budget do not go together");
   std::vector<NamedPath> inputs{{"SOURCE", o.source}, {"TARGET", o.target}};
   if (!o.initial.empty()) inputs.push_back({"--initial", o.initial});
   check_outputs({{"--json", o.json}, {"--overlay", o.overlay}, {"--image", o.image}}, inputs);
   const Context context = o.method.context();
-  const PointCloud source_cloud = io::read_point_cloud(o.source);
-  const PointCloud target_cloud = io::read_point_cloud(o.target);
+  PointCloud source_cloud = io::read_point_cloud(o.source);
+  PointCloud target_cloud = io::read_point_cloud(o.target);
+  o.source_viewpoint.apply(source_cloud);
+  o.target_viewpoint.apply(target_cloud);
   o.method.choose_voxel_size({source_cloud.view(), target_cloud.view()},
                              o.source + " and " + o.target);
   const RegistrationOptions options = o.method.registration();
@@ -177,16 +193,16 @@ int run(RegisterOptions o) {
     viewpoints.see(target_cloud, o.target);
   }
   viewpoints.print();
-  const auto prepared = [&](const PointCloud& cloud, const std::string& file) {
-    return prepare_batch(context, {cloud.view()}, options.prepare, {file}).front();
+  const auto prepared = [&](const PointCloudView& cloud, const std::string& file) {
+    return prepare_batch(context, {cloud}, options.prepare, {file}).front();
   };
-  const PreparedCloud source = prepared(source_cloud, o.source);
-  const PreparedCloud target = prepared(target_cloud, o.target);
+  const PreparedCloud source = prepared(o.source_viewpoint.view(source_cloud), o.source);
+  const PreparedCloud target = prepared(o.target_viewpoint.view(target_cloud), o.target);
   TimedResult timed;
   if (o.time_budget)
     timed = align_within(context, source, target, *o.time_budget, options);
   else
-    timed.result = o.initial.empty() ? align(context, source, target, options)
+    timed.result = o.initial.empty() ? align(context, source, target, prior, options)
                                      : verify(o, context, source, target, options);
   const RegistrationResult& result = timed.result;
   if (o.initial.empty())
@@ -240,6 +256,15 @@ void add_register(CLI::App& app, Action& chosen) {
   verb->add_flag("--refine-initial", o->refine_initial, "Refine these poses by ICP first");
   verb->add_flag("--ignore-alternatives", o->ignore_alternatives,
                  "Faster: do not search for other poses that compete with them");
+  verb->add_option("--source-viewpoint", o->source_viewpoint.text,
+                   "Where SOURCE was seen from: x,y,z in its frame; none: not known; auto: the file, "
+                   "or the origin if the surfaces agree with it")
+      ->capture_default_str();
+  verb->add_option("--target-viewpoint", o->target_viewpoint.text, "The same of TARGET")
+      ->capture_default_str();
+  verb->add_option("--up", o->up,
+                   "Vertical direction x,y,z in both clouds, and perhaps how many degrees it may be "
+                   "off (without: 10): 0,0,1,5");
   verb->add_option("--json", o->json, "Write options, result, counts and times");
   verb->add_option("--overlay", o->overlay, "Write both clouds in colour, aligned, as PLY");
   verb->add_option("--image", o->image, "Draw both clouds before and after, as PNG");

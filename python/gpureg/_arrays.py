@@ -7,7 +7,7 @@ Errors name the argument and the shape or type that it has.
 from __future__ import annotations
 
 import os
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -19,11 +19,12 @@ from ._device import DeviceRows, device_rows, on_device, stream_of
 FloatArray = npt.NDArray[np.float32]
 Rows = FloatArray | DeviceRows
 #: (points, normals, features, viewpoints, origin, stream), all but the points may be None. With a stream, the first three are on a device.
+#: viewpoints False: the viewpoint is unknown, and not to be inferred.
 CoreCloud = tuple[
     Rows,
     Rows | None,
     Rows | None,
-    FloatArray | None,
+    FloatArray | Literal[False] | None,
     npt.NDArray[np.float64] | None,
     int | None,
 ]
@@ -199,21 +200,19 @@ def core_cloud(
     device: what is on a GPU stays there, where that is possible.
     """
     prefix = "" if name == "points" else f"{name}."
-    points, normals, viewpoints = _unpack(points, normals, viewpoints)
+    known = _viewpoints(viewpoints, prefix + "viewpoints")
+    points, normals, viewpoints = _unpack(points, normals, None if known is False else known)
+    if known is False:
+        viewpoints = None
     if device and on_device(points):
         stay = _stay_on_device(points, normals, features, viewpoints, prefix)
         if stay is not None:
-            return stay
+            return (*stay[:3], False, *stay[4:]) if known is False else stay
     raw = matrix(points, name, 3)
     count = raw.shape[0]
     origin = origin_of(raw, options.voxel_size)
     views = None if viewpoints is None else matrix(viewpoints, prefix + "viewpoints", 3)
     if origin is not None:
-        # With no viewpoint given, the sensor was where the caller's frame has its origin. Normals
-        # of the cloud's own need none: a viewpoint thousands of kilometres away would turn
-        # them and make up free space.
-        if views is None and normals is None:
-            views = np.zeros((1, 3))
         raw, views = raw - origin, None if views is None else views - origin
     return (
         float_rows(raw, name),
@@ -223,10 +222,26 @@ def core_cloud(
         None
         if features is None
         else float_rows(matrix(features, prefix + "features", None, count), prefix + "features"),
-        None if views is None else np.ascontiguousarray(float_rows(views, prefix + "viewpoints")),
+        False
+        if known is False
+        else None
+        if views is None
+        else np.ascontiguousarray(float_rows(views, prefix + "viewpoints")),
         origin,
         None,
     )
+
+
+def _viewpoints(value: Any, name: str) -> Any:
+    """None: to be inferred; False: unknown; else rows."""
+    if value is None or (isinstance(value, str) and value == "auto"):
+        return None
+    if isinstance(value, str):
+        if value == "none":
+            return False
+        raise ValueError(f"{name}: expected (V, 3) positions, 'none' or 'auto', got {value!r}")
+    rows = to_numpy(value, name)
+    return rows.reshape(1, 3) if rows.shape == (3,) else rows
 
 
 def host_points(cloud: Any, name: str) -> FloatArray:

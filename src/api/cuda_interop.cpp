@@ -6,6 +6,7 @@
 
 #include "api/access.hpp"
 #include "api/raw_cloud.hpp"
+#include "api/unknown_viewpoint.hpp"
 #include "pipeline/device_engine.hpp"
 
 namespace gpureg {
@@ -14,6 +15,7 @@ std::future<PreparedCloud> prepare_async(const Context& context, const DevicePoi
                                          const PrepareOptions& options, CudaStream stream) {
   options.validate();
   RawCloud raw = raw_cloud(cloud);
+  const CloudKnowledge known = knowledge_of(cloud);
   FrameOrigin frame_origin;
   view_from_frame_origin(cloud.origin, frame_origin, raw);
   const std::shared_ptr<DeviceEngine> engine =
@@ -23,10 +25,19 @@ std::future<PreparedCloud> prepare_async(const Context& context, const DevicePoi
                           context.description());
   const std::shared_ptr<AdoptedCloud> adopted = engine->adopt(raw, stream);
   const std::array<double, 3> origin{cloud.origin[0], cloud.origin[1], cloud.origin[2]};
-  return std::async(std::launch::async, [engine, adopted, options, origin] {
-    const std::shared_ptr<PreparedState> state = engine->prepare_adopted(*adopted, options);
-    std::copy(origin.begin(), origin.end(), state->frame_offset);
-    return Access::cloud(state);
+  raw.points = nullptr;  // only its form may be read from now on
+  return std::async(std::launch::async, [engine, adopted, options, origin, known, raw] {
+    std::vector<std::shared_ptr<PreparedState>> states{engine->prepare_adopted(*adopted, options)};
+    std::copy(origin.begin(), origin.end(), states[0]->frame_offset);
+    RawCloud hosted = raw;
+    std::vector<float> rows;
+    if (!known.viewpoints && !known.normals && options.depth_maps > 0)
+      rows = engine->copy_points(*adopted);
+    hosted.points = rows.data();
+    hosted.size = rows.size() / 3;
+    hosted.point_stride = 3;
+    resolve_viewpoints(*engine, {&hosted, 1}, {known}, options, states);
+    return Access::cloud(std::move(states[0]));
   });
 }
 

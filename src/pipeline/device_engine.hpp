@@ -23,6 +23,8 @@ class DeviceEngine : public Engine {
   virtual std::shared_ptr<AdoptedCloud> adopt(const RawCloud& cloud, void* stream) = 0;
   virtual std::shared_ptr<PreparedState> prepare_adopted(const AdoptedCloud& cloud,
                                                          const PrepareOptions& options) = 0;
+  /// @return host copy of the points of an adopted cloud, rows of x, y, z.
+  virtual std::vector<float> copy_points(const AdoptedCloud& cloud) = 0;
 };
 
 /// CUDA engine on the devices of the options. Throws BackendUnavailable.
