@@ -15,6 +15,7 @@ import numpy.typing as npt
 from . import _core
 from ._core import PointCloud, PreparedCloud, PrepareOptions
 from ._device import DeviceRows, device_rows, on_device, stream_of
+from ._las import is_las, read_las
 
 FloatArray = npt.NDArray[np.float32]
 Rows = FloatArray | DeviceRows
@@ -285,6 +286,8 @@ def _stay_on_device(
 
 def _unpack(points: Any, normals: Any, viewpoints: Any) -> tuple[Any, Any, Any]:
     """Clouds that carry their normals along."""
+    if isinstance(points, str | os.PathLike) and is_las(points):
+        return read_las(points), normals, viewpoints
     if isinstance(points, str | os.PathLike):
         points = _core.read_point_cloud(os.fspath(points))
     if isinstance(points, PointCloud):

@@ -17,9 +17,15 @@ constexpr double kAsGood = 1.5, kContradictionNoise = 4e-4;
 constexpr double kMostPlaces = 0.25;
 /// Largest radial spread about a scanner, and largest ratio of it to the plain spread.
 constexpr double kScannerSpread = 1.6, kSpreadRatio = 0.6;
-/// A closed surface: mean normal, contradictions beside those of the best viewpoint, and the least
-/// of these.
-constexpr double kClosedFlux = 0.12, kClosedRatio = 0.3, kHiddenBack = 4e-3;
+/// Largest ratio of radial to plain irregularity (spread above 1) at which the spacing speaks for a
+/// viewpoint that the surfaces allow.
+constexpr double kIrregularityRatio = 0.5;
+/// A closed surface: its mean normal and the contradictions along it.
+constexpr double kClosedFlux = 0.05, kClosedContradiction = 2e-3;
+/// No viewpoint sees all of a surface: least contradictions from the best one, and largest ratio of
+/// those along the surface to them. In scans of rooms the ratio is above 0.1: sides that are
+/// propagated through clutter contradict little and are wrong for whole objects.
+constexpr double kHiddenBack = 1e-2, kAlongRatio = 0.08;
 /// Input normals contradict each other: share of the edges, and ratio to that of better sides.
 constexpr double kContradictory = 0.04, kBetterSides = 3;
 /// Fewer edges tell nothing.
@@ -30,7 +36,11 @@ constexpr std::size_t kSpacingSample = 1000;
 struct SearchedViewpoint {
   Vec3 place{0, 0, 0};
   double contradiction = 1;
-  std::vector<double> tried;  ///< contradictions of all places tried
+  struct Tried {
+    Vec3 place;
+    double contradiction;
+  };
+  std::vector<Tried> tried;  ///< the first places
 };
 
 /// Distances of the first places from the points, in radii of neighbours; half the diagonal of the
@@ -70,9 +80,9 @@ SearchedViewpoint search_viewpoint(const SurfaceGraph& graph, float radius) {
   const float half = 0.5f * norm(hi - lo);
   SearchedViewpoint best;
   for (const Vec3& place : start_places(graph, radius, (lo + hi) * 0.5f, half)) {
-    best.tried.push_back(graph.contradiction(place));
-    if (best.tried.back() >= best.contradiction) continue;
-    best.contradiction = best.tried.back();
+    best.tried.push_back({place, graph.contradiction(place)});
+    if (best.tried.back().contradiction >= best.contradiction) continue;
+    best.contradiction = best.tried.back().contradiction;
     best.place = place;
   }
   for (float step = 0.2f * half; step > 0.5f * radius;) {
@@ -91,16 +101,47 @@ SearchedViewpoint search_viewpoint(const SurfaceGraph& graph, float radius) {
   return best;
 }
 
-bool explains(const SearchedViewpoint& best, double contradiction) {
+/// True where most points show two viewpoints different sides.
+bool opposite(const SurfaceGraph& graph, Vec3 a, Vec3 b) {
+  const SurfaceGraph::Signs from_a = graph.signs_towards(a), from_b = graph.signs_towards(b);
+  std::size_t different = 0;
+  for (std::size_t i = 0; i < from_a.size(); ++i) different += from_a[i] != from_b[i];
+  return 2 * different > from_a.size();
+}
+
+/// True where a viewpoint explains the surfaces, and either the points are spaced as from there, or
+/// hardly any other place explains them, least of all one behind them: a range image of a single
+/// object looks as plausible from its back.
+bool explains(const SurfaceGraph& graph, const SearchedViewpoint& best, Vec3 viewpoint,
+              const SpacingSpread& spread) {
   const double limit = kAsGood * best.contradiction + kContradictionNoise;
-  if (contradiction > limit) return false;
-  const auto as_good = std::count_if(best.tried.begin(), best.tried.end(),
-                                     [&](double tried) { return tried <= limit; });
+  if (graph.contradiction(viewpoint) > limit) return false;
+  if (spread.radial - 1 <= kIrregularityRatio * (spread.plain - 1)) return true;
+  if (opposite(graph, viewpoint, best.place)) return false;
+  std::size_t as_good = 0;
+  for (const SearchedViewpoint::Tried& tried : best.tried) {
+    if (tried.contradiction > limit) continue;
+    if (opposite(graph, viewpoint, tried.place)) return false;
+    ++as_good;
+  }
   return static_cast<double>(as_good) <= kMostPlaces * static_cast<double>(best.tried.size());
 }
 
-bool is_scanner(const RawCloud& rows, Vec3 viewpoint) {
-  const SpacingSpread spread = spacing_spread(rows, viewpoint);
+bool is_closed(const SurfaceGraph& graph, const SurfaceGraph::Signs& along) {
+  return graph.flux(along) <= kClosedFlux && graph.contradiction(along) <= kClosedContradiction;
+}
+
+/// Sides from the best viewpoint, or along the surface where no viewpoint sees all of it.
+SurfaceGraph::Signs best_sides(const SurfaceGraph& graph, Vec3 best_place,
+                               SurfaceGraph::Signs along) {
+  SurfaceGraph::Signs seen = graph.signs_towards(best_place);
+  const double contradiction = graph.contradiction(seen);
+  if (contradiction >= kHiddenBack && graph.contradiction(along) <= kAlongRatio * contradiction)
+    return along;
+  return seen;
+}
+
+bool is_scanner(const SpacingSpread& spread) {
   return spread.radial <= kScannerSpread && spread.radial <= kSpreadRatio * spread.plain;
 }
 
@@ -150,20 +191,24 @@ InferredSides infer_sides(const SurfaceGraph& graph, Vec3 origin, const RawCloud
     if (infer) out.source = ViewpointSource::origin;
     return out;
   }
-  const SearchedViewpoint best = search_viewpoint(graph, graph.radius());
-  if (infer && (explains(best, graph.contradiction(origin)) || is_scanner(rows, origin_of_rows))) {
+  const SpacingSpread spread = infer ? spacing_spread(rows, origin_of_rows) : SpacingSpread{};
+  if (infer && is_scanner(spread)) {
     out.source = ViewpointSource::origin;
     return out;
   }
-  out.signs = graph.signs_towards(best.place);
-  out.sign_known = false;
-  if (best.contradiction < kHiddenBack) return out;
+  const SearchedViewpoint best = search_viewpoint(graph, graph.radius());
   SurfaceGraph::Signs along = graph.consistent_signs();
-  if (graph.flux(along) > kClosedFlux ||
-      graph.contradiction(along) > kClosedRatio * graph.contradiction(out.signs))
+  if (is_closed(graph, along)) {
+    graph.turn_outwards(along);
+    return {ViewpointSource::model, std::move(along), true};
+  }
+  if (infer && explains(graph, best, origin, spread)) {
+    out.source = ViewpointSource::origin;
     return out;
-  graph.turn_outwards(along);
-  return {ViewpointSource::model, std::move(along), true};
+  }
+  out.signs = best_sides(graph, best.place, std::move(along));
+  out.sign_known = false;
+  return out;
 }
 
 InferredSides check_given_sides(const SurfaceGraph& graph) {
@@ -172,9 +217,7 @@ InferredSides check_given_sides(const SurfaceGraph& graph) {
   const double contradiction = graph.contradiction(given);
   if (graph.edges() < kMinEdges || contradiction < kContradictory) return out;
   const SearchedViewpoint best = search_viewpoint(graph, graph.radius());
-  SurfaceGraph::Signs better = graph.signs_towards(best.place), along = graph.consistent_signs();
-  if (best.contradiction > kHiddenBack && graph.contradiction(along) < graph.contradiction(better))
-    better = std::move(along);
+  SurfaceGraph::Signs better = best_sides(graph, best.place, graph.consistent_signs());
   if (contradiction < kBetterSides * graph.contradiction(better)) return out;
   std::ptrdiff_t sum = 0;
   for (const std::int8_t sign : better) sum += sign;
