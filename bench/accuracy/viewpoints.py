@@ -116,7 +116,7 @@ def kitchen(data, count, rng):
 def dragon(data, count, rng):
     folder = data / "dragon"
     view = np.array([[float(x) for x in (folder / "viewpoint.txt").read_text().split()]])
-    world = {head[0]: pose for head, pose in matrices(folder / "poses.txt")}
+    world = np.loadtxt(folder / "poses.txt").reshape(-1, 4, 4)
     # The sensor becomes the origin, as of a scanner.
     clouds = [
         Cloud(rows_of(folder / f"cloud_bin_{k}.ply") - view, np.zeros((1, 3)), 0.4)
@@ -193,7 +193,7 @@ def kitti(data, count, rng):
         for p in pairs
         if p["kind"] == "negative"
     ]
-    return [Set(clouds, listed, "auto", right)]
+    return [Set(clouds, chosen(listed, count, rng), "auto", right)]
 
 
 def lidar(data, count, rng):
