@@ -17,6 +17,7 @@
 #include "initial_poses.hpp"
 #include "json_file.hpp"
 #include "knowledge_options.hpp"
+#include "mesh.hpp"
 #include "method_options.hpp"
 #include "options_json.hpp"
 #include "output_path.hpp"
@@ -148,6 +149,31 @@ RegistrationResult verify(const RegisterOptions& o, const Context& context,
   return result;
 }
 
+PointCloud sampled(const std::string& path, double spacing) {
+  const SurfaceMesh mesh = read_mesh(path);
+  PointCloud cloud = sample_mesh(mesh, spacing);
+  const std::string notes = notes_of(mesh);
+  std::cerr << "gpureg: note: " << path << ": " << grouped(mesh.faces.size())
+            << " faces were sampled by " << grouped(cloud.points.size()) << " points"
+            << (mesh.closed() ? ", normals outwards" : "; the surface is not closed")
+            << (notes.empty() ? "" : "; " + notes) << std::endl;
+  return cloud;
+}
+
+/// Both clouds. A mesh is sampled at the spacing of the other cloud.
+std::pair<PointCloud, PointCloud> read_clouds(const RegisterOptions& o) {
+  const bool source = is_mesh(o.source), target = is_mesh(o.target);
+  std::pair<PointCloud, PointCloud> clouds;
+  if (!source) clouds.first = io::read_point_cloud(o.source);
+  if (!target) clouds.second = io::read_point_cloud(o.target);
+  const auto spacing = [](const PointCloud& other) {
+    return median_spacing(finite_points(other.points), 1);
+  };
+  if (source) clouds.first = sampled(o.source, target ? 0 : spacing(clouds.second));
+  if (target) clouds.second = sampled(o.target, source ? 0 : spacing(clouds.first));
+  return clouds;
+}
+
 void check_initial(const RegisterOptions& o) {
   if (o.initial.empty()) {
     if (o.refine_initial || o.ignore_alternatives)
@@ -178,8 +204,7 @@ int run(RegisterOptions o) {
   if (!o.initial.empty()) inputs.push_back({"--initial", o.initial});
   check_outputs({{"--json", o.json}, {"--overlay", o.overlay}, {"--image", o.image}}, inputs);
   const Context context = o.method.context();
-  PointCloud source_cloud = io::read_point_cloud(o.source);
-  PointCloud target_cloud = io::read_point_cloud(o.target);
+  auto [source_cloud, target_cloud] = read_clouds(o);
   o.source_viewpoint.apply(source_cloud);
   o.target_viewpoint.apply(target_cloud);
   o.method.choose_voxel_size({source_cloud.view(), target_cloud.view()},
@@ -198,6 +223,14 @@ int run(RegisterOptions o) {
   };
   const PreparedCloud source = prepared(o.source_viewpoint.view(source_cloud), o.source);
   const PreparedCloud target = prepared(o.target_viewpoint.view(target_cloud), o.target);
+  // Below, features describe hardly anything.
+  constexpr std::size_t kFewPoints = 1000;
+  const std::size_t fewest = std::min(source.size(), target.size());
+  if (o.method.automatic_voxel_size && fewest < kFewPoints)
+    std::cerr << "gpureg: note: --voxel-size auto leaves " << fewest << " points of "
+              << (source.size() == fewest ? o.source : o.target)
+              << "; too few for a reliable result, give a smaller size if the cloud has more"
+              << std::endl;
   TimedResult timed;
   if (o.time_budget)
     timed = align_within(context, source, target, *o.time_budget, options);
@@ -242,7 +275,7 @@ int run(RegisterOptions o) {
 
 void add_register(CLI::App& app, Action& chosen) {
   const auto o = std::make_shared<RegisterOptions>();
-  CLI::App* verb = app.add_subcommand("register", "Align two clouds (PLY or PCD)");
+  CLI::App* verb = app.add_subcommand("register", "Align two clouds (PLY, PCD, KITTI .bin) or meshes (STL, OBJ, PLY)");
   verb->add_option("SOURCE", o->source, "Cloud that is moved")->required();
   verb->add_option("TARGET", o->target, "Cloud that stays")->required();
   o->method.add_to(*verb);
