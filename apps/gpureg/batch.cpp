@@ -68,7 +68,8 @@ class Batch {
       throw InvalidArgument("--resume needs a file for -o, but " + o_.log + " is none");
     if (can_have_journal(o_.log)) Journal::check(o_.journal(), o_.journal_mode());
     const InterruptGuard guard;
-    scene_ = prepare_scene(context_, o_.folder, options_.prepare, o_.quiet, o_.viewpoint.text != "none");
+    scene_ =
+        prepare_scene(context_, o_.folder, options_.prepare, o_.quiet, o_.viewpoint.text != "none");
     if (scene_.interrupted) {
       std::cerr << "gpureg: interrupted before the first pair, nothing written" << std::endl;
       return kInterrupted;

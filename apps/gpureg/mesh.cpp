@@ -145,8 +145,7 @@ PointCloud sample_mesh(const SurfaceMesh& mesh, double spacing) {
     const auto& face = mesh.faces[f];
     const double s = std::sqrt(unit()), u = unit();
     const Eigen::Vector3d p = (1 - s) * mesh.vertices[face[0]] +
-                              s * (1 - u) * mesh.vertices[face[1]] +
-                              s * u * mesh.vertices[face[2]];
+                              s * (1 - u) * mesh.vertices[face[1]] + s * u * mesh.vertices[face[2]];
     cloud.points.push_back(p.cast<float>());
     cloud.normals.push_back(doubled_area(mesh, face).normalized().cast<float>());
   }

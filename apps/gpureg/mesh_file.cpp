@@ -16,13 +16,13 @@ SurfaceMesh read_mesh(const std::string& path) {
   importer.SetPropertyInteger(AI_CONFIG_PP_SBP_REMOVE,
                               aiPrimitiveType_POINT | aiPrimitiveType_LINE);
   // Vertices of an STL are shared by position alone.
-  importer.SetPropertyInteger(AI_CONFIG_PP_RVC_FLAGS,
-                              aiComponent_NORMALS | aiComponent_TEXCOORDS | aiComponent_COLORS |
-                                  aiComponent_TANGENTS_AND_BITANGENTS);
+  importer.SetPropertyInteger(AI_CONFIG_PP_RVC_FLAGS, aiComponent_NORMALS | aiComponent_TEXCOORDS |
+                                                          aiComponent_COLORS |
+                                                          aiComponent_TANGENTS_AND_BITANGENTS);
   const aiScene* file = importer.ReadFile(
       path, aiProcess_Triangulate | aiProcess_SortByPType | aiProcess_PreTransformVertices |
                 aiProcess_RemoveComponent | aiProcess_JoinIdenticalVertices);
-  if (file == nullptr) throw IoError(path + ": " + importer.GetErrorString());
+  if (file == nullptr) throw IoError(path + ": holds no readable face: " + importer.GetErrorString());
   SurfaceMesh mesh;
   for (unsigned m = 0; m < file->mNumMeshes; ++m) {
     const aiMesh& part = *file->mMeshes[m];

@@ -111,7 +111,8 @@ class Reconstruct {
     if (pairs.empty())
       throw InvalidArgument(o_.pairs == "all" ? o_.folder + " holds one fragment; a map needs two"
                                               : o_.pairs + " lists no pair");
-    run_.emplace(scene_, std::move(pairs), options_, std::nullopt, o_.journal(), o_.journal_mode(), o_.quiet);
+    run_.emplace(scene_, std::move(pairs), options_, std::nullopt, o_.journal(), o_.journal_mode(),
+                 o_.quiet);
     run_->align(context_);
     if (!run_->complete()) return false;
     for (const auto& [i, j] : run_->pairs()) {

@@ -180,8 +180,7 @@ void check_initial(const RegisterOptions& o) {
       throw InvalidArgument("--refine-initial and --ignore-alternatives need --initial");
     return;
   }
-  if (!o.up.empty())
-    throw InvalidArgument("--initial verifies given poses, --up is for a search");
+  if (!o.up.empty()) throw InvalidArgument("--initial verifies given poses, --up is for a search");
   if (o.time_budget)
     throw InvalidArgument("--initial verifies given poses, --time-budget is for a search");
   if (o.method.registration().method != RegistrationMethod::compatibility)
@@ -275,7 +274,8 @@ int run(RegisterOptions o) {
 
 void add_register(CLI::App& app, Action& chosen) {
   const auto o = std::make_shared<RegisterOptions>();
-  CLI::App* verb = app.add_subcommand("register", "Align two clouds (PLY, PCD, KITTI .bin) or meshes (STL, OBJ, PLY)");
+  CLI::App* verb = app.add_subcommand(
+      "register", "Align two clouds (PLY, PCD, KITTI .bin) or meshes (STL, OBJ, PLY)");
   verb->add_option("SOURCE", o->source, "Cloud that is moved")->required();
   verb->add_option("TARGET", o->target, "Cloud that stays")->required();
   o->method.add_to(*verb);
@@ -289,15 +289,17 @@ void add_register(CLI::App& app, Action& chosen) {
   verb->add_flag("--refine-initial", o->refine_initial, "Refine these poses by ICP first");
   verb->add_flag("--ignore-alternatives", o->ignore_alternatives,
                  "Faster: do not search for other poses that compete with them");
-  verb->add_option("--source-viewpoint", o->source_viewpoint.text,
-                   "Where SOURCE was seen from: x,y,z in its frame; none: not known; auto: the file, "
-                   "or the origin if the surfaces agree with it")
+  verb->add_option(
+          "--source-viewpoint", o->source_viewpoint.text,
+          "Where SOURCE was seen from: x,y,z in its frame; none: not known; auto: the file, "
+          "or the origin if the surfaces agree with it")
       ->capture_default_str();
   verb->add_option("--target-viewpoint", o->target_viewpoint.text, "The same of TARGET")
       ->capture_default_str();
-  verb->add_option("--up", o->up,
-                   "Vertical direction x,y,z in both clouds, and perhaps how many degrees it may be "
-                   "off (without: 10): 0,0,1,5");
+  verb->add_option(
+      "--up", o->up,
+      "Vertical direction x,y,z in both clouds, and perhaps how many degrees it may be "
+      "off (without: 10): 0,0,1,5");
   verb->add_option("--json", o->json, "Write options, result, counts and times");
   verb->add_option("--overlay", o->overlay, "Write both clouds in colour, aligned, as PLY");
   verb->add_option("--image", o->image, "Draw both clouds before and after, as PNG");

@@ -34,9 +34,10 @@ struct PointCloudView {
   /// see infer_viewpoint.
   std::size_t viewpoint_count = 0;
   /// For a cloud without viewpoints and normals. true: the surfaces decide whether the origin of
-  /// the frame is the viewpoint. false: the viewpoint is unknown. Where it is unknown, no free space
-  /// is known, and alignments try both sides of the surfaces. PrepareStatistics::viewpoint has the
-  /// decision. No effect where PrepareOptions::depth_maps is 0: the origin then orients the normals.
+  /// the frame is the viewpoint. false: the viewpoint is unknown. Where it is unknown, no free
+  /// space is known, and alignments try both sides of the surfaces. PrepareStatistics::viewpoint
+  /// has the decision. No effect where PrepareOptions::depth_maps is 0: the origin then orients the
+  /// normals.
   bool infer_viewpoint = true;
   /// Added to every point and viewpoint: coordinates in the cloud's frame = origin + row. For large
   /// coordinates (UTM, maps), which float rows cannot hold. Poses and moments of results are in the

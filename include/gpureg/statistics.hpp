@@ -34,13 +34,13 @@ enum class RegistrationReason : std::uint8_t {
 /// What is known of the place that a cloud was seen from. It decides about free space and about the
 /// sides of surfaces.
 enum class ViewpointSource : std::uint8_t {
-  said,    ///< viewpoints were given
-  origin,  ///< the origin of the cloud's frame; nothing given, and the surfaces agree with it
-  normals, ///< no viewpoint; the input normals tell the sides of surfaces
+  said,     ///< viewpoints were given
+  origin,   ///< the origin of the cloud's frame; nothing given, and the surfaces agree with it
+  normals,  ///< no viewpoint; the input normals tell the sides of surfaces
   /// No viewpoint: neither free space nor the sides of surfaces are known. Alignments try both
   /// sides.
   none,
-  model    ///< no viewpoint; a closed surface with normals that point outwards
+  model  ///< no viewpoint; a closed surface with normals that point outwards
 };
 
 const char* to_string(ViewpointSource source);

@@ -45,7 +45,8 @@ inline bool is_bool(py::handle value) {
 
 /// Enumerations that are strings in Python.
 template <typename M>
-constexpr bool is_named = std::is_same_v<M, RegistrationMethod> || std::is_same_v<M, ViewpointSource>;
+constexpr bool is_named =
+    std::is_same_v<M, RegistrationMethod> || std::is_same_v<M, ViewpointSource>;
 
 template <typename M>
 M convert(py::handle value) {

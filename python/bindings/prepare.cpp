@@ -16,9 +16,9 @@ namespace gpureg::python {
 namespace {
 
 /// One cloud as the package hands it over: (points, normals, features, viewpoints, origin, stream);
-/// all but the points may be None, and viewpoints False: not to be inferred. Points, normals and features are float32 arrays, or, where there
-/// is a stream, (address, rows, columns, stride, owner) of device memory. The caller's tuple keeps
-/// alive what the views point at.
+/// all but the points may be None, and viewpoints False: not to be inferred. Points, normals and
+/// features are float32 arrays, or, where there is a stream, (address, rows, columns, stride,
+/// owner) of device memory. The caller's tuple keeps alive what the views point at.
 struct Input {
   PointCloudView view;
   std::optional<std::uintptr_t> stream;

@@ -32,7 +32,9 @@ def read_las(path: str | os.PathLike[str]) -> npt.NDArray[np.float64]:
     try:
         import laspy
     except ImportError:
-        raise ImportError(f"{name}: LAS and LAZ files need laspy: pip install 'gpureg[las]'") from None
+        raise ImportError(
+            f"{name}: LAS and LAZ files need laspy: pip install 'gpureg[las]'"
+        ) from None
     try:
         file = laspy.read(name)
     except (OSError, ValueError, laspy.errors.LaspyException) as error:

@@ -64,8 +64,7 @@ std::vector<PreparedCloud> prepare_batch(const Context& context,
   if (raw.empty()) return out;
   try {
     auto states = Access::engine(context)->prepare(span_of(raw), options);
-    for (std::size_t k = 0; k < states.size(); ++k)
-      set_frame_offset(clouds[k].origin, *states[k]);
+    for (std::size_t k = 0; k < states.size(); ++k) set_frame_offset(clouds[k].origin, *states[k]);
     resolve_viewpoints(*Access::engine(context), span_of(raw), knowledge, options, states);
     for (auto& state : states) out.push_back(Access::cloud(std::move(state)));
   } catch (const InvalidArgument&) {

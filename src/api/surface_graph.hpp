@@ -34,8 +34,8 @@ class SurfaceGraph {
   /// The side of every point that a viewpoint sees.
   Signs signs_towards(Vec3 viewpoint) const;
   /// Sides that agree along the surface: propagated over the minimum spanning forest of the angles
-  /// between neighbouring normals (Hoppe et al. 1992, section 3.3). The normal of the first point of
-  /// each connected part keeps its sign.
+  /// between neighbouring normals (Hoppe et al. 1992, section 3.3). The normal of the first point
+  /// of each connected part keeps its sign.
   Signs consistent_signs() const;
   /// Length of the mean of the normals with these signs: 0 for a closed surface.
   double flux(const Signs& signs) const;

@@ -20,8 +20,8 @@ CloudKnowledge knowledge_of(const View& view) {
 }
 
 /// Sets PrepareStatistics::viewpoint of prepared clouds. Clouds whose sides turn out to be others
-/// than the preparation took are replaced: prepared again from their prepared points, with the right
-/// sides as input normals and no viewpoint, and once more with the other sides where both are
+/// than the preparation took are replaced: prepared again from their prepared points, with the
+/// right sides as input normals and no viewpoint, and once more with the other sides where both are
 /// likely. The choice is made on the host, so that backends agree bit for bit.
 /// @param raw rows of the points in host memory.
 void resolve_viewpoints(Engine& engine, Span<const RawCloud> raw,

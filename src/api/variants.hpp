@@ -25,8 +25,10 @@ inline std::vector<PairVariant> variants_of(const std::vector<PreparedCloud>& cl
   for (std::size_t p = 0; p < pairs.size(); ++p) {
     const PreparedState* source = Access::state(clouds[pairs[p].source]).get();
     const PreparedState* target = Access::state(clouds[pairs[p].target]).get();
-    for (const PreparedState* s : {source, static_cast<const PreparedState*>(source->other_sides.get())})
-      for (const PreparedState* t : {target, static_cast<const PreparedState*>(target->other_sides.get())})
+    for (const PreparedState* s :
+         {source, static_cast<const PreparedState*>(source->other_sides.get())})
+      for (const PreparedState* t :
+           {target, static_cast<const PreparedState*>(target->other_sides.get())})
         if (s && t) out.push_back({p, s, t});
   }
   return out;
@@ -38,8 +40,8 @@ inline void keep_better(RegistrationResult&& candidate, RegistrationResult& kept
   StageTimings& t = first ? candidate.timings : kept.timings;
   if (!first) {
     const StageTimings& more = candidate.timings;
-    t = {t.match + more.match, t.propose + more.propose, t.rank + more.rank,
-         t.refine + more.refine, t.verify + more.verify};
+    t = {t.match + more.match, t.propose + more.propose, t.rank + more.rank, t.refine + more.refine,
+         t.verify + more.verify};
   }
   const StageTimings sum = t;
   const auto better = [&] {

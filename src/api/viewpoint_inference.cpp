@@ -62,10 +62,10 @@ std::vector<Vec3> start_places(const SurfaceGraph& graph, float radius, Vec3 cen
       for (int y = -1; y <= 1; ++y)
         for (int x = -1; x <= 1; ++x)
           if (x || y || z)
-            places.push_back(centre + normalized_or_zero({static_cast<float>(x),
-                                                          static_cast<float>(y),
-                                                          static_cast<float>(z)}) *
-                                          (half * factor));
+            places.push_back(centre +
+                             normalized_or_zero({static_cast<float>(x), static_cast<float>(y),
+                                                 static_cast<float>(z)}) *
+                                 (half * factor));
   return places;
 }
 

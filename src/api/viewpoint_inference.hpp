@@ -21,8 +21,9 @@ struct SpacingSpread {
   double radial = 1;  ///< of the distances divided by the range from a viewpoint
 };
 
-/// Spread of the spacing about a viewpoint, from a sample of the rows. A scanner samples directions:
-/// about its position, and nowhere else, the distance of neighbours grows with the range.
+/// Spread of the spacing about a viewpoint, from a sample of the rows. A scanner samples
+/// directions: about its position, and nowhere else, the distance of neighbours grows with the
+/// range.
 /// @param viewpoint relative to the rows.
 SpacingSpread spacing_spread(const RawCloud& rows, Vec3 viewpoint);
 

@@ -34,9 +34,8 @@ PointCloud read_kitti(Source& source) {
   for (std::size_t at = 0; at < bytes.size(); at += kRow) {
     Eigen::Vector3f p;
     for (int k = 0; k < 3; ++k)
-      p[k] = static_cast<float>(
-          load(Scalar::float32, bytes.data() + at + sizeof(float) * static_cast<std::size_t>(k),
-               swap));
+      p[k] = static_cast<float>(load(
+          Scalar::float32, bytes.data() + at + sizeof(float) * static_cast<std::size_t>(k), swap));
     strange += !(p.cwiseAbs().maxCoeff() <= kMostDistant);
     cloud.points.push_back(p);
   }

@@ -49,7 +49,8 @@ std::vector<Eigen::Vector3f> potato(unsigned seed) {
   for (int k = 0; k < 40000; ++k) {
     const Eigen::Vector3f d =
         Eigen::Vector3f(normal(random), normal(random), normal(random)).normalized();
-    points.emplace_back(d * (0.8f + 0.25f * std::sin(3 * d.x() + 1) * d.y() + 0.2f * d.z() * d.x()));
+    points.emplace_back(d *
+                        (0.8f + 0.25f * std::sin(3 * d.x() + 1) * d.y() + 0.2f * d.z() * d.x()));
   }
   return points;
 }
@@ -71,8 +72,8 @@ TEST(UnknownViewpoint, AMovedScanHasNone) {
   std::mt19937 random(3);
   int none = 0;
   for (int k = 0; k < 5; ++k)
-    none += decision(PointCloudView(moved(random_pose(random), room_scan(1)))) ==
-            ViewpointSource::none;
+    none +=
+        decision(PointCloudView(moved(random_pose(random), room_scan(1)))) == ViewpointSource::none;
   // A place may look as good as the sensor's by chance.
   EXPECT_GE(none, 4);
 }
@@ -113,8 +114,7 @@ TEST(UnknownViewpoint, MovedScansAlign) {
   for (int k = 0; k < 3; ++k) {
     const Eigen::Isometry3d a = random_pose(random), b = random_pose(random);
     const auto source = moved(a, room_scan(1)), target = moved(b, room_scan(2));
-    const RegistrationResult result =
-        align(cpu(), PointCloudView(source), PointCloudView(target));
+    const RegistrationResult result = align(cpu(), PointCloudView(source), PointCloudView(target));
     ASSERT_TRUE(result.aligned()) << to_string(result.source_viewpoint) << " "
                                   << to_string(result.target_viewpoint) << " " << result.score;
     EXPECT_LT(test::rotation_error_degrees(b * a.inverse(), result.target_from_source), 1);
