@@ -7,10 +7,15 @@ if(NOT DEFINED CMAKE_INSTALL_RPATH AND NOT APPLE)
   set(CMAKE_INSTALL_RPATH "$ORIGIN;$ORIGIN/${_gpureg_lib_from_bin}")
 endif()
 
+# Eigen adds up in an order that depends on the width of the registers, and fuses on ARM: its scalar code does neither.
+# The alignment stays that of Eigen's default, so that programs which vectorise can pass its types.
+set(GPUREG_EIGEN_DEFINITIONS EIGEN_DONT_VECTORIZE EIGEN_MAX_ALIGN_BYTES=16 EIGEN_MAX_STATIC_ALIGN_BYTES=16)
+
 # The contract "same bits on the CPU and on the GPU" needs the compiler to contract nothing by itself: where a fused
 # multiply-add is wanted, the shared code says fmaf.
 function(gpureg_target target)
   target_compile_features(${target} PUBLIC cxx_std_17)
+  target_compile_definitions(${target} PRIVATE ${GPUREG_EIGEN_DEFINITIONS})
   target_compile_options(${target} PRIVATE
     $<$<COMPILE_LANGUAGE:CXX>:-ffp-contract=off -fno-fast-math -Wall -Wextra -Wpedantic -Wshadow -Wno-psabi>
     $<$<COMPILE_LANGUAGE:CUDA>:-fmad=false -prec-div=true -prec-sqrt=true -ftz=false --expt-relaxed-constexpr

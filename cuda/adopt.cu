@@ -16,119 +16,150 @@ int device_of(const void* pointer) {
              : -1;
 }
 
+void check_on_host(const RawCloud& cloud) {
+  const std::pair<const char*, const float*> fields[] = {{"cloud.points", cloud.points},
+                                                         {"cloud.normals", cloud.normals},
+                                                         {"cloud.features", cloud.features}};
+  for (const auto& [field, pointer] : fields) {
+    cudaPointerAttributes attributes{};
+    const bool known = pointer && cudaPointerGetAttributes(&attributes, pointer) == cudaSuccess;
+    if (pointer && !known) cudaGetLastError();
+    // The host can read managed memory.
+    if (known && attributes.type == cudaMemoryTypeDevice)
+      throw InvalidArgument(std::string(field) + " is memory of device " +
+                            std::to_string(attributes.device) +
+                            ", expected host memory: give a DevicePointCloudView and the stream "
+                            "that wrote it");
+  }
+}
+
 namespace {
 
-/// Copy of a cloud with tight rows, in memory of the engine; written and freed in the order of the
-/// program's stream.
+/// Rows of a cloud with tight copies in memory of the engine.
+struct Part {
+  const char* field;
+  const float* from;
+  std::size_t stride;
+  unsigned width;
+  cudaStream_t stream;
+  float* to = nullptr;
+  std::size_t bytes = 0;
+  cudaEvent_t written = nullptr;
+};
+
+/// Copies of a cloud's rows, each written in the order of its stream of the program.
 class Adopted final : public AdoptedCloud {
  public:
-  explicit Adopted(std::shared_ptr<DeviceMemory> memory) : memory_(std::move(memory)) {}
+  Adopted(std::shared_ptr<DeviceMemory> memory, const RawCloud& cloud, const RowStreams& streams);
   ~Adopted() override {
-    // Frees the rows in the order of the engine's stream, after their event, as that stream may
-    // never have waited for them.
-    if (event_) {
-      cudaStreamWaitEvent(memory_->stream(), event_, 0);
-      cudaEventDestroy(event_);
-    }
-    if (rows_) memory_->free(rows_, bytes_);
+    for (const Part& part : parts_)
+      if (part.written)
+        memory_->free_after(part.to, part.bytes, part.written);
+      else if (part.to)
+        memory_->free(part.to, part.bytes);
   }
-  void take(const RawCloud& cloud, cudaStream_t stream);
+  void take();
 
   int device() const { return memory_->device(); }
-  /// Tight rows on the device, complete once the event is reached.
-  RawCloud raw{};
-  cudaEvent_t event() const { return event_; }
+  void wait() const {
+    for (const Part& part : parts_)
+      if (part.written) check(cudaEventSynchronize(part.written), "the copy of the cloud");
+  }
+  /// Tight rows on the device, complete after wait().
+  RawCloud raw;
 
  private:
   std::vector<float> viewpoints_;
   std::shared_ptr<DeviceMemory> memory_;
-  float* rows_ = nullptr;
-  std::size_t bytes_ = 0;
-  cudaEvent_t event_ = nullptr;
+  Part parts_[3];
 };
 
-struct Rows {
-  const float* from;
-  std::size_t stride;
-  unsigned width;
-  float* to;
-};
-
-__global__ void pack_rows(Rows rows, std::size_t size) {
+__global__ void pack_rows(const float* from, std::size_t stride, unsigned width, std::size_t size,
+                          float* to) {
   const std::size_t k = static_cast<std::size_t>(blockIdx.x) * blockDim.x + threadIdx.x;
-  if (k < size * rows.width) rows.to[k] = rows.from[k / rows.width * rows.stride + k % rows.width];
+  if (k < size * width) to[k] = from[k / width * stride + k % width];
 }
 
-void check_place(const char* field, const float* pointer, int device) {
-  if (!pointer) return;
-  const int found = device_of(pointer);
-  if (found < 0) throw InvalidArgument(std::string(field) + " is not device memory");
-  if (found != device)
-    throw InvalidArgument(std::string(field) + " lies on device " + std::to_string(found) +
-                          ", but the context works on device " + std::to_string(device));
-}
-
-void Adopted::take(const RawCloud& cloud, cudaStream_t stream) {
-  raw = cloud;
+Adopted::Adopted(std::shared_ptr<DeviceMemory> memory, const RawCloud& cloud,
+                 const RowStreams& streams)
+    : raw(cloud),
+      memory_(std::move(memory)),
+      parts_{{"cloud.points", cloud.points, cloud.point_stride, 3,
+              static_cast<cudaStream_t>(streams.points)},
+             {"cloud.normals", cloud.normals, cloud.normal_stride, 3,
+              static_cast<cudaStream_t>(streams.normals)},
+             {"cloud.features", cloud.features, cloud.feature_stride,
+              static_cast<unsigned>(cloud.feature_dimension),
+              static_cast<cudaStream_t>(streams.features)}} {
   if (cloud.viewpoint_count > 0)
     viewpoints_.assign(cloud.viewpoints, cloud.viewpoints + 3 * cloud.viewpoint_count);
   raw.viewpoints = viewpoints_.data();
-  Rows parts[3] = {{cloud.points, cloud.point_stride, 3, nullptr},
-                   {cloud.normals, cloud.normal_stride, 3, nullptr},
-                   {cloud.features, cloud.feature_stride,
-                    static_cast<unsigned>(cloud.feature_dimension), nullptr}};
-  std::size_t floats = 0;
-  for (const Rows& part : parts) floats += part.from ? cloud.size * part.width : 0;
-  if (floats > 0) rows_ = static_cast<float*>(memory_->allocate(floats * sizeof(float), stream));
-  bytes_ = floats * sizeof(float);
-  float* at = rows_;
-  for (Rows& part : parts) {
-    if (!part.from || cloud.size == 0) continue;
-    part.to = at;
-    at += cloud.size * part.width;
-    pack_rows<<<blocks_for(cloud.size * part.width, 256), 256, 0, stream>>>(part, cloud.size);
-    check_launch("pack_rows");
+  raw.on_device = true;
+  for (const Part& part : parts_) {
+    if (!part.from) continue;
+    const int found = device_of(part.from);
+    if (found < 0) throw InvalidArgument(std::string(part.field) + " is not device memory");
+    if (found != device())
+      throw InvalidArgument(std::string(part.field) + " lies on device " + std::to_string(found) +
+                            ", but the context works on device " + std::to_string(device()));
   }
-  raw.points = parts[0].to;
+}
+
+void Adopted::take() {
+  for (Part& part : parts_) {
+    const std::size_t floats = part.from ? raw.size * part.width : 0;
+    if (floats == 0) continue;
+    part.bytes = floats * sizeof(float);
+    part.to = static_cast<float*>(memory_->allocate(part.bytes, part.stream));
+    pack_rows<<<blocks_for(floats, 256), 256, 0, part.stream>>>(part.from, part.stride, part.width,
+                                                                raw.size, part.to);
+    check_launch("pack_rows");
+    // A thread that waits for it sleeps.
+    check(cudaEventCreateWithFlags(&part.written, cudaEventDisableTiming | cudaEventBlockingSync),
+          "cudaEventCreateWithFlags");
+    check(cudaEventRecord(part.written, part.stream), "cudaEventRecord");
+  }
+  raw.points = parts_[0].to;
   raw.point_stride = 3;
-  raw.normals = parts[1].to;
+  raw.normals = parts_[1].to;
   raw.normal_stride = 3;
-  raw.features = parts[2].to;
-  raw.feature_stride = cloud.feature_dimension;
-  check(cudaEventCreateWithFlags(&event_, cudaEventDisableTiming), "cudaEventCreateWithFlags");
-  check(cudaEventRecord(event_, stream), "cudaEventRecord");
+  raw.features = parts_[2].to;
+  raw.feature_stride = raw.feature_dimension;
 }
 
 }  // namespace
 
 // Without the lock of the engine: the program must not wait for a running batch.
-std::shared_ptr<AdoptedCloud> CudaEngine::adopt(const RawCloud& cloud, void* stream) {
+std::shared_ptr<AdoptedCloud> CudaEngine::adopt(const RawCloud& cloud, const RowStreams& streams) {
   const DeviceScope scope(device());
-  check_place("cloud.points", cloud.points, device());
-  check_place("cloud.normals", cloud.normals, device());
-  check_place("cloud.features", cloud.features, device());
-  const auto adopted = std::make_shared<Adopted>(exec_.memory());
-  adopted->take(cloud, static_cast<cudaStream_t>(stream));
+  const auto adopted = std::make_shared<Adopted>(exec_.memory(), cloud, streams);
+  adopted->take();
   return adopted;
 }
 
-// The preparation reads the rows on the device, without a copy.
-std::shared_ptr<PreparedState> CudaEngine::prepare_adopted(const AdoptedCloud& cloud,
-                                                           const PrepareOptions& options) {
-  const std::lock_guard<std::mutex> lock(mutex_);
+// Waits for the program's streams on this thread alone: neither the lock nor the stream of the
+// engine may depend on them, as other calls need both. The preparation reads the rows on the
+// device, without a copy.
+std::vector<std::shared_ptr<PreparedState>> CudaEngine::prepare_adopted(
+    Span<const std::shared_ptr<AdoptedCloud>> clouds, const PrepareOptions& options) {
   const DeviceScope scope(device());
-  const Adopted& adopted = static_cast<const Adopted&>(cloud);
-  check(cudaStreamWaitEvent(exec_.stream(), adopted.event(), 0), "cudaStreamWaitEvent");
-  return prepare_on_stream({&adopted.raw, 1}, options).front();
+  std::vector<RawCloud> raw;
+  for (const std::shared_ptr<AdoptedCloud>& cloud : clouds) {
+    const Adopted& adopted = static_cast<const Adopted&>(*cloud);
+    adopted.wait();
+    raw.push_back(adopted.raw);
+  }
+  const std::lock_guard<std::mutex> lock(mutex_);
+  return prepare_on_stream(span_of(raw), options);
 }
 
 std::vector<float> CudaEngine::copy_points(const AdoptedCloud& cloud) {
-  const std::lock_guard<std::mutex> lock(mutex_);
   const DeviceScope scope(device());
   const Adopted& adopted = static_cast<const Adopted&>(cloud);
   std::vector<float> rows(3 * adopted.raw.size);
   if (rows.empty()) return rows;
-  check(cudaStreamWaitEvent(exec_.stream(), adopted.event(), 0), "cudaStreamWaitEvent");
+  adopted.wait();
+  const std::lock_guard<std::mutex> lock(mutex_);
   check(cudaMemcpyAsync(rows.data(), adopted.raw.points, rows.size() * sizeof(float),
                         cudaMemcpyDeviceToHost, exec_.stream()),
         "cudaMemcpyAsync");

@@ -27,7 +27,7 @@ inline DeviceBuffer<SearchPair> upload_search_pairs(Exec& exec, Span<const PairV
 }
 
 /// find_closest() with a table of bricks instead of a hash table, on contiguous copies of the
-/// candidates.
+/// candidates. Lists of any length, anywhere in the array.
 __device__ inline Closest find_closest(const CloudView& cloud, const CellSummaries& cells, Vec3 q,
                                        float max_squared) {
   if (cells.nx == 0) return find_closest(cloud.closest, cloud.points, q, max_squared);
@@ -48,9 +48,18 @@ __device__ inline Closest find_closest(const CloudView& cloud, const CellSummari
   if (!inside(c.x, cells.nx) || !inside(c.y, cells.ny) || !inside(c.z, cells.nz)) return none;
   const BrickWord word = BrickTable(cells, 0).find(c, cells.run);
   if (!word.there) return none;
-  const std::uint32_t list = __ldg(&cells.cell[cell_in_bricks(word, c)].y), first = list >> 8,
-                      last = first + (list & 255u);
-  if (list == kNoValue) return find_closest(cloud.closest, cloud.points, q, max_squared);
+  const std::uint32_t list = __ldg(&cells.cell[cell_in_bricks(word, c)].y);
+  std::uint32_t first = list >> 8, last = first + (list & 255u);
+  if (list == kNoValue) {
+    // The block gives the ends of any list. The table begins at a block, so the low bits of a cell
+    // are those of the closest-point grid.
+    const std::uint32_t* start = cloud.closest.cell_start.data +
+                                 static_cast<std::size_t>(__ldg(cells.block + word.number / 16)) *
+                                     (ClosestGridView::kBlockCells + 1) +
+                                 ((c.z & 7) << 6 | (c.y & 7) << 3 | (c.x & 7));
+    first = __ldg(start);
+    last = __ldg(start + 1);
+  }
   std::uint32_t best = kNoValue;
   float best_squared = 3.402823466e38f;
   for (std::uint32_t k = first; k < last; ++k) {

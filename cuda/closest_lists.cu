@@ -283,7 +283,8 @@ void fill_closest_lists(Exec& exec, const DownsampledClouds& clouds, const Grids
   const unsigned long long* sums = exec.download(totals.data(), 2 + count);
   exec.synchronize();
   for (std::size_t c = 0; c < count; ++c) {
-    if (sums[2 + c] > limits::kMaxGridCandidates || sums[1] > limits::kMaxBlockCandidates)
+    if (pipeline::too_many_candidates(sums[2 + c], clouds.segments.size(c)) ||
+        sums[1] > limits::kMaxBlockCandidates)
       pipeline::throw_too_dense(options.max_correspondence_distance);
     out.candidate_offset[c + 1] = out.candidate_offset[c] + sums[2 + c];
   }

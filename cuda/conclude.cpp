@@ -9,7 +9,8 @@ void conclude(Exec& exec, Span<const PairView> pairs, const Matches& matches,
               const Quadruples& quadruples, const Hypotheses& hypotheses,
               const DeviceBuffer<BestPose>& poses, const DeviceBuffer<Verification>& verifications,
               const RegistrationOptions& options, Span<PairOutcome> outcomes) {
-  const std::uint32_t* match_count = exec.download(matches.count.data(), pairs.size);
+  const std::uint32_t* match_count =
+      exec.download(matches.count.data() + quadruples.first_pair, pairs.size);
   const std::uint32_t* hypothesis_count = exec.download(hypotheses.count.data(), pairs.size);
   const BestPose* best = exec.download(poses.data(), pairs.size);
   const Verification* verified = exec.download(verifications.data(), pairs.size);

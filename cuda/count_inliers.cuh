@@ -100,6 +100,12 @@ __device__ Look begin_look(const ScorePair& pair, const Staged<Points>& staged,
   return look;
 }
 
+/// A number that other warps raise meanwhile: all lanes get the value that lane 0 reads. Lanes that
+/// read it one after another could see different values and part before the next full-warp step.
+__device__ inline std::uint32_t read_by_warp(const volatile std::uint32_t* number) {
+  return __shfl_sync(~0u, *number, 0);
+}
+
 /// Exact number of inliers, or 0 as soon as it cannot reach the largest number so far; such a
 /// hypothesis is not the best one. By one warp. The codes of the cells bound every point first.
 /// Possible inliers are then tested in the order of how often they refute hypotheses, by the
@@ -127,11 +133,11 @@ __device__ std::uint32_t count_inliers(const ScoreBatch& b, const ScorePair& pai
   }
   __syncwarp();
   const std::uint32_t groups = pair.order.groups;
-  std::uint32_t needed = *most, possible = 0, g = 0;
+  std::uint32_t needed = read_by_warp(most), possible = 0, g = 0;
   for (; g + kUnroll <= groups; g += kUnroll) {
     if (possible + (groups - g) * 32 < needed) return 0;
     possible += warp_sum(count_possible<kUnroll>(motion, staged, memory, g));
-    if (g % 32 < kUnroll) needed = *most;
+    if (g % 32 < kUnroll) needed = read_by_warp(most);
   }
   for (; g < groups; ++g) possible += warp_sum(count_possible<1>(motion, staged, memory, g));
 
@@ -162,7 +168,7 @@ __device__ std::uint32_t count_inliers(const ScoreBatch& b, const ScorePair& pai
     if (k + 32 < end) finish_look(pair, staged, memory, next);
     __syncwarp();
     possible -= static_cast<std::uint32_t>(__popc(static_cast<int>(__ballot_sync(~0u, refuted))));
-    needed = *most;
+    needed = read_by_warp(most);
   }
   return possible < needed ? 0 : possible;
 }

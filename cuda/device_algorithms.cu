@@ -4,19 +4,32 @@
 #include <cub/device/device_radix_sort.cuh>
 #include <cub/device/device_scan.cuh>
 
+#include <limits>
+#include <string>
+
+#include "gpureg/error.hpp"
+
 namespace gpureg::cuda {
+
+int cub_size(std::size_t size) {
+  if (size > static_cast<std::size_t>(std::numeric_limits<int>::max()))
+    throw InvalidArgument("a batch of " + std::to_string(size) +
+                          " elements exceeds 2^31 - 1: split it");
+  return static_cast<int>(size);
+}
+
 namespace {
 
 template <typename Key>
 void sort(Exec& exec, cub::DoubleBuffer<Key>& keys, cub::DoubleBuffer<std::uint32_t>& values,
           std::size_t size, int bits) {
   std::size_t bytes = 0;
-  check(cub::DeviceRadixSort::SortPairs(nullptr, bytes, keys, values, static_cast<int>(size), 0,
-                                        bits, exec.stream()),
+  check(cub::DeviceRadixSort::SortPairs(nullptr, bytes, keys, values, cub_size(size), 0, bits,
+                                        exec.stream()),
         "radix sort");
   const auto scratch = exec.buffer<char>(bytes);
-  check(cub::DeviceRadixSort::SortPairs(scratch.data(), bytes, keys, values, static_cast<int>(size),
-                                        0, bits, exec.stream()),
+  check(cub::DeviceRadixSort::SortPairs(scratch.data(), bytes, keys, values, cub_size(size), 0,
+                                        bits, exec.stream()),
         "radix sort");
 }
 
@@ -66,13 +79,12 @@ void sort_pairs_in_place(Exec& exec, std::uint64_t* keys, std::uint32_t* values,
 void exclusive_sum(Exec& exec, const std::uint32_t* in, std::uint32_t* out, std::size_t size) {
   if (size == 0) return;
   std::size_t bytes = 0;
-  check(
-      cub::DeviceScan::ExclusiveSum(nullptr, bytes, in, out, static_cast<int>(size), exec.stream()),
-      "scan");
-  const auto scratch = exec.buffer<char>(bytes);
-  check(cub::DeviceScan::ExclusiveSum(scratch.data(), bytes, in, out, static_cast<int>(size),
-                                      exec.stream()),
+  check(cub::DeviceScan::ExclusiveSum(nullptr, bytes, in, out, cub_size(size), exec.stream()),
         "scan");
+  const auto scratch = exec.buffer<char>(bytes);
+  check(
+      cub::DeviceScan::ExclusiveSum(scratch.data(), bytes, in, out, cub_size(size), exec.stream()),
+      "scan");
 }
 
 }  // namespace gpureg::cuda

@@ -6,6 +6,9 @@
 /// Wrappers of the device-wide algorithms of CUB, compiled once.
 namespace gpureg::cuda {
 
+/// A number of elements as CUB takes it. Throws InvalidArgument where it does not fit.
+int cub_size(std::size_t size);
+
 /// Stable sort of (key, value) pairs by the lowest `bits` bits of the key. The buffers may be
 /// swapped for others.
 void sort_pairs(Exec& exec, DeviceBuffer<std::uint32_t>& keys, DeviceBuffer<std::uint32_t>& values,

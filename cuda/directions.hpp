@@ -7,6 +7,7 @@
 #include "algorithm/cell.hpp"
 #include "algorithm/cell_summary.hpp"
 #include "math/rigid.hpp"
+#include "math/trigonometry.hpp"
 
 /// A coarse quantisation of directions: one bit tells whether a point with some normal may agree
 /// with a cell. A normal belongs to one of 62 classes. The code of a cell has four bits: 0 without
@@ -44,8 +45,8 @@ inline void spiral(Vec3* out, int count) {
   for (int k = 0; k < count; ++k) {
     const double z = 1.0 - (2.0 * k + 1.0) / count, r = std::sqrt(1.0 - z * z),
                  turn = 2.399963229728653 * k;
-    out[k] = {static_cast<float>(r * std::cos(turn)), static_cast<float>(r * std::sin(turn)),
-              static_cast<float>(z)};
+    out[k] = {static_cast<float>(r * portable::cos(turn)),
+              static_cast<float>(r * portable::sin(turn)), static_cast<float>(z)};
   }
 }
 
@@ -54,15 +55,15 @@ inline DirectionTables direction_tables() {
   spiral(t.cell, kCellDirections);
   spiral(t.classes, static_cast<int>(kClasses));
   t.class_cosine =
-      static_cast<float>(std::cos(static_cast<double>(kClassRadiusDegrees) * kDegrees));
-  t.reach_cosine = static_cast<float>(std::cos(static_cast<double>(kReachDegrees) * kDegrees));
+      static_cast<float>(portable::cos(static_cast<double>(kClassRadiusDegrees) * kDegrees));
+  t.reach_cosine = static_cast<float>(portable::cos(static_cast<double>(kReachDegrees) * kDegrees));
   return t;
 }
 
 inline CodeTest code_test(float max_normal_angle) {
   const double apart = static_cast<double>(max_normal_angle) +
                        static_cast<double>(kClassRadiusDegrees + kReachDegrees + kSlackDegrees);
-  return {apart >= 180.0 ? -2.0f : static_cast<float>(std::cos(apart * kDegrees)),
+  return {apart >= 180.0 ? -2.0f : static_cast<float>(portable::cos(apart * kDegrees)),
           max_normal_angle < 180.0f};
 }
 

@@ -91,19 +91,38 @@ struct Average {
   Vec3* guides;  // null: no cloud has any
   float* features;
   std::uint32_t* largest_squared_norm;
+  std::uint32_t* crowded_count;
+  uint2* crowded;  // (cloud, voxel)
 };
+
+/// Points of a voxel from which on a thread block adds them up instead of a thread: a thread waits
+/// for every point in turn.
+constexpr std::uint32_t kCrowded = 512;
+constexpr int kCrowdedThreads = 256;
+
+/// Sorted positions of the points of a voxel.
+struct VoxelRange {
+  std::uint32_t begin, end;
+};
+__device__ VoxelRange range_of_voxel(const Average& a, std::uint32_t c, std::uint32_t v) {
+  const std::uint32_t first = a.offset[c];
+  return {a.start[first + v], first + v + 1 < a.offset[c + 1]
+                                  ? a.start[first + v + 1]
+                                  : a.raw_offset[c] + a.extents[c].finite};
+}
 
 /// One thread per voxel adds up its points in input order.
 __global__ void average(Average a) {
   const std::uint32_t c = blockIdx.y, first = a.offset[c], size = a.offset[c + 1] - first;
   const RawSlot slot = a.slots[c];
-  const std::uint32_t raw_begin = a.raw_offset[c];
   std::uint32_t largest = 0;
   for (std::uint32_t v = blockIdx.x * blockDim.x + threadIdx.x; v < size;
        v += gridDim.x * blockDim.x) {
-    const std::uint32_t begin = a.start[first + v];
-    const std::uint32_t end =
-        v + 1 < size ? a.start[first + v + 1] : raw_begin + a.extents[c].finite;
+    const auto [begin, end] = range_of_voxel(a, c, v);
+    if (end - begin >= kCrowded) {
+      a.crowded[atomicAdd(a.crowded_count, 1u)] = make_uint2(c, v);
+      continue;
+    }
     const float inverse_count = 1.0f / static_cast<float>(end - begin);
     Vec3 sum{0, 0, 0}, guide{0, 0, 0};
     for (std::uint32_t k = begin; k < end; ++k) {
@@ -129,18 +148,76 @@ __global__ void average(Average a) {
   if (threadIdx.x % 32 == 0 && largest > 0) atomicMax(a.largest_squared_norm + c, largest);
 }
 
+/// A thread block per crowded voxel. All threads fetch points; one thread per coordinate adds them
+/// up in input order, which gives the bits of average().
+__global__ void __launch_bounds__(kCrowdedThreads) average_crowded(Average a) {
+  __shared__ float rows[kCrowdedThreads][7];  // point, guide; seven words avoid bank conflicts
+  __shared__ std::uint32_t items[kCrowdedThreads];
+  __shared__ float sums[6];
+  const std::uint32_t count = *a.crowded_count;
+  for (std::uint32_t k = blockIdx.x; k < count; k += gridDim.x) {
+    const std::uint32_t c = a.crowded[k].x, v = a.crowded[k].y, out_place = a.offset[c] + v;
+    const RawSlot slot = a.slots[c];
+    const auto [begin, end] = range_of_voxel(a, c, v);
+    const float inverse_count = 1.0f / static_cast<float>(end - begin);
+    const int coordinates = slot.normals ? 6 : 3;
+    float sum = 0.0f;
+    for (std::uint32_t base = begin; base < end; base += kCrowdedThreads) {
+      const int size = static_cast<int>(min(end - base, std::uint32_t(kCrowdedThreads)));
+      if (static_cast<int>(threadIdx.x) < size) {
+        const std::uint32_t i = a.item[base + threadIdx.x];
+        const Vec3 p = slot.points[i] - slot.origin;
+        float* row = rows[threadIdx.x];
+        row[0] = p.x;
+        row[1] = p.y;
+        row[2] = p.z;
+        if (slot.normals) {
+          const Vec3 n = normalized_or_zero(slot.normals[i]);
+          row[3] = n.x;
+          row[4] = n.y;
+          row[5] = n.z;
+        }
+      }
+      __syncthreads();
+      if (static_cast<int>(threadIdx.x) < coordinates) {
+#pragma unroll 16
+        for (int j = 0; j < size; ++j) sum = sum + rows[j][threadIdx.x];
+      }
+      __syncthreads();
+    }
+    if (threadIdx.x < 6) sums[threadIdx.x] = sum;
+    __syncthreads();
+    if (threadIdx.x == 0) {
+      const Vec3 p = Vec3{sums[0], sums[1], sums[2]} * inverse_count;
+      a.points[out_place] = p;
+      if (a.guides) a.guides[out_place] = {sums[3], sums[4], sums[5]};
+      atomicMax(a.largest_squared_norm + c, __float_as_uint(squared_norm(p)));
+    }
+    float* out = a.features + a.feature_offset[c] + static_cast<std::size_t>(v) * slot.dimension;
+    for (std::uint32_t first = 0; first < slot.dimension; first += kCrowdedThreads) {
+      const std::uint32_t d = first + threadIdx.x;
+      float mean = 0.0f;
+      for (std::uint32_t base = begin; base < end; base += kCrowdedThreads) {
+        const int size = static_cast<int>(min(end - base, std::uint32_t(kCrowdedThreads)));
+        __syncthreads();
+        if (static_cast<int>(threadIdx.x) < size) items[threadIdx.x] = a.item[base + threadIdx.x];
+        __syncthreads();
+        if (d < slot.dimension) {
+#pragma unroll 8
+          for (int j = 0; j < size; ++j)
+            mean += slot.features[static_cast<std::size_t>(items[j]) * slot.dimension + d];
+        }
+      }
+      if (d < slot.dimension) out[d] = mean * inverse_count;
+    }
+    __syncthreads();
+  }
+}
+
 float from_bits(std::uint32_t bits) {
   float v;
   std::memcpy(&v, &bits, sizeof v);
   return v;
-}
-
-/// Rows in device memory, see adopt.cu: already tight.
-bool on_device(const RawCloud& raw) {
-  cudaPointerAttributes attributes{};
-  const bool known = raw.points && cudaPointerGetAttributes(&attributes, raw.points) == cudaSuccess;
-  if (raw.points && !known) cudaGetLastError();
-  return known && attributes.type == cudaMemoryTypeDevice;
 }
 
 /// Uploads the raw clouds of host memory into one buffer; clouds in device memory stay in place.
@@ -149,12 +226,9 @@ DeviceBuffer<float> upload_raw(Exec& exec, Span<const RawCloud> clouds,
   const auto floats = [](const RawCloud& raw) {
     return raw.size * (3 + (raw.normals ? 3 : 0) + (raw.features ? raw.feature_dimension : 0));
   };
-  std::vector<std::uint8_t> there;
   std::size_t total = 0;
-  for (const RawCloud& raw : clouds) {
-    there.push_back(on_device(raw));
-    if (!there.back()) total += floats(raw);
-  }
+  for (const RawCloud& raw : clouds)
+    if (!raw.on_device) total += floats(raw);
   auto device = exec.buffer<float>(total);
   std::vector<RowsToUpload> parts;
   float* at = device.data();
@@ -168,12 +242,12 @@ DeviceBuffer<float> upload_raw(Exec& exec, Span<const RawCloud> clouds,
   for (std::size_t c = 0; c < clouds.size; ++c) {
     const RawCloud& raw = clouds[c];
     RawSlot slot{};
-    slot.points =
-        reinterpret_cast<const Vec3*>(place(raw.points, raw.size, 3, raw.point_stride, there[c]));
-    slot.normals =
-        reinterpret_cast<const Vec3*>(place(raw.normals, raw.size, 3, raw.normal_stride, there[c]));
+    slot.points = reinterpret_cast<const Vec3*>(
+        place(raw.points, raw.size, 3, raw.point_stride, raw.on_device));
+    slot.normals = reinterpret_cast<const Vec3*>(
+        place(raw.normals, raw.size, 3, raw.normal_stride, raw.on_device));
     slot.features =
-        place(raw.features, raw.size, raw.feature_dimension, raw.feature_stride, there[c]);
+        place(raw.features, raw.size, raw.feature_dimension, raw.feature_stride, raw.on_device);
     slot.dimension = slot.features ? static_cast<std::uint32_t>(raw.feature_dimension) : 0;
     slots.push_back(slot);
   }
@@ -298,8 +372,20 @@ DownsampledClouds downsample(Exec& exec, Span<const RawCloud> clouds,
   batch.guides = out.guides.data();
   batch.features = out.features.data();
   batch.largest_squared_norm = largest.data();
+  // A crowded voxel takes as many points as no other voxel has.
+  const std::size_t most_crowded = raw.total() / kCrowded;
+  const auto crowded_count = exec.filled<std::uint32_t>(1, 0);
+  const auto crowded = exec.buffer<uint2>(most_crowded);
+  batch.crowded_count = crowded_count.data();
+  batch.crowded = crowded.data();
   average<<<voxel_grid, 128, 0, exec.stream()>>>(batch);
   check_launch("average");
+  if (most_crowded > 0) {
+    const auto blocks =
+        std::min<std::size_t>(most_crowded, std::size_t(exec.multiprocessors()) * 4);
+    average_crowded<<<static_cast<unsigned>(blocks), kCrowdedThreads, 0, exec.stream()>>>(batch);
+    check_launch("average_crowded");
+  }
   const std::uint32_t* radii = exec.download(largest.data(), clouds.size);
   exec.synchronize();
   for (std::size_t c = 0; c < clouds.size; ++c)

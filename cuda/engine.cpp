@@ -10,6 +10,7 @@
 #include "pipeline/align.hpp"
 #include "pipeline/align_by_evidence.hpp"
 #include "pipeline/prepare.hpp"
+#include "pipeline/runs.hpp"
 #include "pipeline/verify.hpp"
 #include "stages.hpp"
 
@@ -25,8 +26,6 @@ constexpr std::size_t kPairsPerChunk = 512;
 constexpr std::size_t kSampleBytes = std::size_t(256) << 20;
 /// Memory for the neighbourhoods of the seeds, and for the matches, of every pair of a chunk.
 constexpr std::size_t kNeighborhoodBytes = std::size_t(1) << 30;
-/// Approximate memory of a prepared cloud per raw point: with a budget no chunk exceeds it by far.
-constexpr std::size_t kBytesPerRawPoint = 128;
 
 /// Clouds of all CUDA engines are compatible: they share one owner, the memory of all devices.
 const char kDeviceMemory = 0;
@@ -51,6 +50,12 @@ std::vector<DeviceMemoryUse> CudaEngine::device_memory() const {
            residence_.evictions()}};
 }
 
+void CudaEngine::trim() {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  const DeviceScope scope(device());
+  exec_.trim();
+}
+
 // Memory of a pair: a bit per hypothesis, rounded up to chunks; a bit per seed and match, a pose
 // and its evidence per seed, and the columns and keys of each match.
 std::size_t CudaEngine::pairs_per_chunk(const RegistrationOptions& options) const {
@@ -64,38 +69,40 @@ std::size_t CudaEngine::pairs_per_chunk(const RegistrationOptions& options) cons
   return fit < 1 ? 1 : (fit < kPairsPerChunk ? fit : kPairsPerChunk);
 }
 
-void CudaEngine::prepare_chunk(Span<const RawCloud> clouds, const PrepareOptions& options,
-                               std::vector<std::shared_ptr<PreparedState>>& out) {
+std::size_t CudaEngine::prepare_chunk(Span<const RawCloud> clouds, const PrepareOptions& options,
+                                      std::vector<std::shared_ptr<PreparedState>>& out) {
   exec_.begin();
+  std::size_t bytes = 0;
   for (auto& cloud : pipeline::prepare(exec_, clouds, options)) {
     cloud->owner = memory();
     auto fragment = std::make_shared<Fragment>(std::move(cloud));
+    bytes += fragment->bytes();
     residence_.add(*fragment);
     out.push_back(std::move(fragment));
   }
   residence_.make_room(0, {});
+  return bytes;
 }
 
 std::vector<std::shared_ptr<PreparedState>> CudaEngine::prepare(Span<const RawCloud> clouds,
                                                                 const PrepareOptions& options) {
-  const std::lock_guard<std::mutex> lock(mutex_);
   const DeviceScope scope(device());
+  for (const RawCloud& cloud : clouds) check_on_host(cloud);
+  const std::lock_guard<std::mutex> lock(mutex_);
   return prepare_on_stream(clouds, options);
 }
 
 std::vector<std::shared_ptr<PreparedState>> CudaEngine::prepare_on_stream(
     Span<const RawCloud> clouds, const PrepareOptions& options) {
-  const std::size_t budget = residence_.budget();
-  const std::size_t most_points =
-      budget > 0 ? std::min(kRawPointsPerChunk, budget / kBytesPerRawPoint) : kRawPointsPerChunk;
+  pipeline::RawPointBudget budget(residence_.budget(), kRawPointsPerChunk);
   std::vector<std::shared_ptr<PreparedState>> out;
   for (std::size_t begin = 0, end; begin < clouds.size; begin = end) {
     std::size_t points = clouds[begin].size;
     for (end = begin + 1; end < clouds.size && end - begin < kCloudsPerChunk &&
-                          points + clouds[end].size <= most_points;
+                          points + clouds[end].size <= budget.most_points();
          ++end)
       points += clouds[end].size;
-    prepare_chunk({clouds.data + begin, end - begin}, options, out);
+    budget.measured(points, prepare_chunk({clouds.data + begin, end - begin}, options, out));
   }
   return out;
 }

@@ -18,13 +18,14 @@ class CudaEngine final : public DeviceEngine {
   std::string description() const override { return description_; }
   const void* memory() const override;
   std::vector<DeviceMemoryUse> device_memory() const override;
+  void trim() override;
   std::size_t pairs_per_chunk(const RegistrationOptions& options) const override;
   std::vector<std::shared_ptr<PreparedState>> prepare(Span<const RawCloud> clouds,
                                                       const PrepareOptions& options) override;
-  std::shared_ptr<AdoptedCloud> adopt(const RawCloud& cloud, void* stream) override;
+  std::shared_ptr<AdoptedCloud> adopt(const RawCloud& cloud, const RowStreams& streams) override;
+  std::vector<std::shared_ptr<PreparedState>> prepare_adopted(
+      Span<const std::shared_ptr<AdoptedCloud>> clouds, const PrepareOptions& options) override;
   std::vector<float> copy_points(const AdoptedCloud& cloud) override;
-  std::shared_ptr<PreparedState> prepare_adopted(const AdoptedCloud& cloud,
-                                                 const PrepareOptions& options) override;
   void align(Span<const PairInput> pairs, const RegistrationOptions& options,
              Span<PairOutcome> outcomes) override;
   void verify(Span<const PairInput> pairs, const std::vector<PosesOfPair>& poses,
@@ -36,8 +37,9 @@ class CudaEngine final : public DeviceEngine {
   void for_resident_pairs(Span<const PairInput> pairs, const Work& work);
   std::vector<std::shared_ptr<PreparedState>> prepare_on_stream(Span<const RawCloud> clouds,
                                                                 const PrepareOptions& options);
-  void prepare_chunk(Span<const RawCloud> clouds, const PrepareOptions& options,
-                     std::vector<std::shared_ptr<PreparedState>>& out);
+  /// Returns the memory of the prepared clouds.
+  std::size_t prepare_chunk(Span<const RawCloud> clouds, const PrepareOptions& options,
+                            std::vector<std::shared_ptr<PreparedState>>& out);
 
   std::mutex mutex_;
   Exec exec_;
@@ -52,6 +54,8 @@ std::shared_ptr<Engine> make_engine_of_many(const std::vector<int>& devices,
 
 /// Device of the memory of a pointer; -1: not device memory.
 int device_of(const void* pointer);
+/// Throws InvalidArgument naming the field where a cloud's rows are not in host memory.
+void check_on_host(const RawCloud& cloud);
 /// Device that prepares an adopted cloud: the one that holds it.
 int device_of(const AdoptedCloud& cloud);
 

@@ -10,12 +10,6 @@ Exec::Exec(int device) : memory_(std::make_shared<DeviceMemory>(device)) {
   check(cudaDeviceGetAttribute(&shared, cudaDevAttrMaxSharedMemoryPerBlockOptin, device),
         "cudaDeviceGetAttribute");
   shared_bytes_per_block_ = static_cast<std::size_t>(shared);
-  int major = 0, minor = 0;
-  check(cudaDeviceGetAttribute(&major, cudaDevAttrComputeCapabilityMajor, device),
-        "cudaDeviceGetAttribute");
-  check(cudaDeviceGetAttribute(&minor, cudaDevAttrComputeCapabilityMinor, device),
-        "cudaDeviceGetAttribute");
-  compute_capability_ = 10 * major + minor;
 }
 
 Exec::~Exec() {
@@ -23,10 +17,43 @@ Exec::~Exec() {
   for (cudaEvent_t event : events_) cudaEventDestroy(event);
 }
 
+int Exec::compiled_for(const void* kernel) const {
+  cudaFuncAttributes attributes{};
+  check(cudaFuncGetAttributes(&attributes, kernel), "cudaFuncGetAttributes");
+  // binaryVersion is that of the translation, which has the device's architecture.
+  return attributes.ptxVersion;
+}
+
+std::size_t Exec::allow_shared_memory(const void* kernel) {
+  for (const auto& [known, bytes] : allowed_)
+    if (known == kernel) return bytes;
+  cudaFuncAttributes attributes{};
+  check(cudaFuncGetAttributes(&attributes, kernel), "cudaFuncGetAttributes");
+  const std::size_t bytes = shared_bytes_per_block_ > attributes.sharedSizeBytes
+                                ? shared_bytes_per_block_ - attributes.sharedSizeBytes
+                                : 0;
+  check(cudaFuncSetAttribute(kernel, cudaFuncAttributeMaxDynamicSharedMemorySize,
+                             static_cast<int>(bytes)),
+        "cudaFuncSetAttribute");
+  allowed_.emplace_back(kernel, bytes);
+  return bytes;
+}
+
 void Exec::begin() {
   synchronize();
+  memory_->free_reached();
   staging_.reset();
   events_used_ = 0;
+}
+
+void Exec::trim() {
+  synchronize();
+  staging_.clear();
+  uploader_.clear();
+  memory_->free_reached();
+  // What the line before freed is free on the device from here on.
+  synchronize();
+  memory_->trim();
 }
 
 void Exec::synchronize() {

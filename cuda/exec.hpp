@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <cstring>
 #include <thread>
+#include <utility>
 #include <vector>
 
 #include "check.hpp"
@@ -27,13 +28,30 @@ class Exec {
   cudaStream_t stream() const { return memory_->stream(); }
   const std::shared_ptr<DeviceMemory>& memory() const { return memory_; }
   int multiprocessors() const { return multiprocessors_; }
-  int compute_capability() const { return compute_capability_; }  ///< 90 for 9.0
+  /// Architecture that the code of a kernel was compiled for, 90 for 9.0. Lower than that of the
+  /// device where the driver translates older PTX. The code contains the instructions of this
+  /// architecture only, so the choice of a kernel depends on it, not on the device.
+  int compiled_for(const void* kernel) const;
+  template <typename... Arguments>
+  int compiled_for(void (*kernel)(Arguments...)) const {
+    return compiled_for(reinterpret_cast<const void*>(kernel));
+  }
   /// Number of host threads for the work on a batch; more than eight saturate the memory.
   unsigned host_threads() const { return std::clamp(std::thread::hardware_concurrency(), 1u, 8u); }
-  std::size_t shared_bytes_per_block() const { return shared_bytes_per_block_; }
+  /// Lets a kernel use all the shared memory that a thread block may have, and returns the bytes
+  /// that a launch may ask for beside the kernel's own arrays. The permission belongs to the
+  /// device: all contexts and threads set the same value, so none takes it from another between the
+  /// setting and the launch.
+  std::size_t allow_shared_memory(const void* kernel);
+  template <typename... Arguments>
+  std::size_t allow_shared_memory(void (*kernel)(Arguments...)) {
+    return allow_shared_memory(reinterpret_cast<const void*>(kernel));
+  }
 
   /// Begins a call: frees the staging memory and the events of the previous one.
   void begin();
+  /// Waits for everything enqueued, then frees all memory that nothing uses.
+  void trim();
   /// Waits for everything enqueued.
   void synchronize();
   /// Keeps data of enqueued work alive until the next synchronize().
@@ -94,8 +112,10 @@ class Exec {
   std::vector<std::shared_ptr<const void>> held_;
   std::vector<cudaEvent_t> events_;
   std::size_t events_used_ = 0;
-  int multiprocessors_ = 1, compute_capability_ = 0;
+  int multiprocessors_ = 1;
   std::size_t shared_bytes_per_block_ = 48 << 10;
+  /// Kernels that have the permission, with its bytes.
+  std::vector<std::pair<const void*, std::size_t>> allowed_;
 };
 
 /// Number of blocks of `threads` that cover `items` elements.

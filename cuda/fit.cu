@@ -54,8 +54,9 @@ Hypotheses fit_hypotheses(Exec& exec, const Matches& matches, const Quadruples& 
   if (total == 0) return out;
   fit<<<blocks_for(total, 128), 128, 0, exec.stream()>>>(
       quadruples.segments.on_device.data(), pairs, quadruples.id.data(),
-      matches.room.on_device.data(), matches.pairs.data(), matches.count.data(), options.seed,
-      out.pose.data(), out.valid.data(), out.count.data());
+      matches.room.on_device.data() + quadruples.first_pair, matches.pairs.data(),
+      matches.count.data() + quadruples.first_pair, options.seed, out.pose.data(), out.valid.data(),
+      out.count.data());
   check_launch("fit");
   return out;
 }

@@ -46,6 +46,7 @@ CloudArrays CloudArrays::moved(const char* from, char* to) const {
   move(s.run);
   move(s.brick);
   move(s.cell);
+  move(s.block);
   move(s.candidate);
   move(out.order.point);
   move(out.order.normal);

@@ -1,40 +1,17 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <algorithm>
 #include <functional>
-#include <tuple>
 
 #include "common/host_threads.hpp"
 #include "engine.hpp"
 #include "gpureg/context.hpp"
+#include "pipeline/runs.hpp"
 
 namespace gpureg::cuda {
 namespace {
 
-/// Distributes runs of elements: large ones first, small ones at the end, so that all devices
-/// finish together.
-class Runs {
- public:
-  Runs(std::size_t items, std::size_t least, std::size_t most, std::size_t takers)
-      : items_(items), least_(least), most_(most), takers_(takers) {}
-
-  /// [begin, end), empty where nothing is left.
-  std::pair<std::size_t, std::size_t> take() {
-    const std::lock_guard<std::mutex> lock(mutex_);
-    const std::size_t left = items_ - next_;
-    const std::size_t size =
-        std::min(left, std::max(least_, std::min(most_, left / (2 * takers_))));
-    next_ += size;
-    return {next_ - size, next_};
-  }
-  void stop() {
-    const std::lock_guard<std::mutex> lock(mutex_);
-    next_ = items_;
-  }
-
- private:
-  std::mutex mutex_;
-  std::size_t next_ = 0, items_, least_, most_, takers_;
-};
+using pipeline::Run;
+using pipeline::SharedRuns;
 
 constexpr std::size_t kMinPairs = 32;  ///< of a run: fewer pairs do not fill a device
 constexpr std::size_t kMinClouds = 4;
@@ -63,6 +40,9 @@ class EngineOfMany final : public DeviceEngine {
     for (const auto& engine : engines_) out.push_back(engine->device_memory()[0]);
     return out;
   }
+  void trim() override {
+    for (const auto& engine : engines_) engine->trim();
+  }
   std::size_t pairs_per_chunk(const RegistrationOptions& options) const override {
     return engines_[0]->pairs_per_chunk(options) * kChunksPerDevice * engines_.size();
   }
@@ -70,7 +50,7 @@ class EngineOfMany final : public DeviceEngine {
   std::vector<std::shared_ptr<PreparedState>> prepare(Span<const RawCloud> clouds,
                                                       const PrepareOptions& options) override {
     std::vector<std::shared_ptr<PreparedState>> out(clouds.size);
-    Runs runs(clouds.size, kMinClouds, kMaxClouds, engines_.size());
+    SharedRuns runs(clouds.size, kMinClouds, kMaxClouds, engines_.size());
     on_all(runs, clouds.size > kMinClouds,
            [&](CudaEngine& engine, std::size_t begin, std::size_t end) {
              auto made = engine.prepare({clouds.data + begin, end - begin}, options);
@@ -79,22 +59,39 @@ class EngineOfMany final : public DeviceEngine {
     return out;
   }
 
-  std::shared_ptr<AdoptedCloud> adopt(const RawCloud& cloud, void* stream) override {
-    return on(device_of(cloud.points)).adopt(cloud, stream);
+  std::shared_ptr<AdoptedCloud> adopt(const RawCloud& cloud, const RowStreams& streams) override {
+    return on(device_of(cloud.points)).adopt(cloud, streams);
   }
   std::vector<float> copy_points(const AdoptedCloud& cloud) override {
-    return on(device_of(cloud)).copy_points(cloud);
+    return engines_[index_of(device_of(cloud))]->copy_points(cloud);
   }
-  std::shared_ptr<PreparedState> prepare_adopted(const AdoptedCloud& cloud,
-                                                 const PrepareOptions& options) override {
-    return on(device_of(cloud)).prepare_adopted(cloud, options);
+  // Each device prepares the clouds that it holds.
+  std::vector<std::shared_ptr<PreparedState>> prepare_adopted(
+      Span<const std::shared_ptr<AdoptedCloud>> clouds, const PrepareOptions& options) override {
+    std::vector<std::vector<std::shared_ptr<AdoptedCloud>>> share(engines_.size());
+    std::vector<std::vector<std::size_t>> place(engines_.size());
+    for (std::size_t k = 0; k < clouds.size; ++k) {
+      const std::size_t e = index_of(device_of(*clouds[k]));
+      share[e].push_back(clouds[k]);
+      place[e].push_back(k);
+    }
+    std::vector<std::size_t> used;
+    for (std::size_t e = 0; e < share.size(); ++e)
+      if (!share[e].empty()) used.push_back(e);
+    std::vector<std::shared_ptr<PreparedState>> out(clouds.size);
+    on_threads(used.size(), [&](std::size_t worker) {
+      const std::size_t e = used[worker];
+      auto made = engines_[e]->prepare_adopted(span_of(share[e]), options);
+      for (std::size_t k = 0; k < made.size(); ++k) out[place[e][k]] = std::move(made[k]);
+    });
+    return out;
   }
 
   void align(Span<const PairInput> pairs, const RegistrationOptions& options,
              Span<PairOutcome> outcomes) override {
     // Less than the share of a device: the first runs wait for clouds of other devices.
-    Runs runs(pairs.size, kMinPairs, engines_[0]->pairs_per_chunk(options) * 3 / 4,
-              engines_.size());
+    SharedRuns runs(pairs.size, kMinPairs, engines_[0]->pairs_per_chunk(options) * 3 / 4,
+                    engines_.size());
     on_all(runs, pairs.size > kMinPairs,
            [&](CudaEngine& engine, std::size_t begin, std::size_t end) {
              engine.align({pairs.data + begin, end - begin}, options,
@@ -105,7 +102,7 @@ class EngineOfMany final : public DeviceEngine {
   void verify(Span<const PairInput> pairs, const std::vector<PosesOfPair>& poses,
               const RegistrationOptions& options, bool refine,
               Span<PairOutcome> outcomes) override {
-    Runs runs(pairs.size, kMinPairs, engines_[0]->pairs_per_chunk(options), engines_.size());
+    SharedRuns runs(pairs.size, kMinPairs, engines_[0]->pairs_per_chunk(options), engines_.size());
     on_all(runs, pairs.size > kMinPairs,
            [&](CudaEngine& engine, std::size_t begin, std::size_t end) {
              const std::vector<PosesOfPair> part(poses.begin() + static_cast<std::ptrdiff_t>(begin),
@@ -117,20 +114,21 @@ class EngineOfMany final : public DeviceEngine {
 
  private:
   /// The engine of a device, or the first one, which reports the error.
-  CudaEngine& on(int device) const {
-    for (const auto& engine : engines_)
-      if (engine->device() == device) return *engine;
-    return *engines_[0];
+  std::size_t index_of(int device) const {
+    for (std::size_t e = 0; e < engines_.size(); ++e)
+      if (engines_[e]->device() == device) return e;
+    return 0;
   }
+  CudaEngine& on(int device) const { return *engines_[index_of(device)]; }
 
   /// Processes the runs with a thread per engine, or with the first engine alone. Rethrows the
   /// exception of the first engine that fails.
-  void on_all(Runs& runs, bool spread,
+  void on_all(SharedRuns& runs, bool spread,
               const std::function<void(CudaEngine&, std::size_t, std::size_t)>& work) {
     on_threads(spread ? engines_.size() : 1, [&](std::size_t e) {
       try {
-        for (auto [begin, end] = runs.take(); begin < end; std::tie(begin, end) = runs.take())
-          work(*engines_[e], begin, end);
+        for (Run run = runs.take(); run.size() > 0; run = runs.take())
+          work(*engines_[e], run.begin, run.end);
       } catch (...) {
         runs.stop();
         throw;

@@ -3,9 +3,11 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <new>
 #include <string>
 
 #include "check.hpp"
+#include "common/in_halves.hpp"
 #include "gpureg/error.hpp"
 
 namespace gpureg::cuda {
@@ -62,6 +64,11 @@ void DeviceMemory::destroy() noexcept {
 }
 
 DeviceMemory::~DeviceMemory() {
+  for (const Late& late : late_) {
+    cudaStreamWaitEvent(stream_, late.event, 0);
+    cudaEventDestroy(late.event);
+    free(late.pointer, late.bytes);
+  }
   cudaStreamSynchronize(stream_);
   destroy();
 }
@@ -74,7 +81,7 @@ void* DeviceMemory::allocate(std::size_t bytes, cudaStream_t stream) {
     // The pool may hold only small pieces: release them and try once more.
     cudaGetLastError();
     cudaStreamSynchronize(stream_);
-    for (cudaMemPool_t each : {pool_, lent_pool_}) cudaMemPoolTrimTo(each, 0);
+    trim();
     error = cudaMallocFromPoolAsync(&pointer, bytes, pool, stream);
   }
   if (error == cudaSuccess) {
@@ -84,16 +91,44 @@ void* DeviceMemory::allocate(std::size_t bytes, cudaStream_t stream) {
   std::size_t free = 0, total = 0;
   if (error == cudaErrorMemoryAllocation &&
       (cudaGetLastError(), cudaMemGetInfo(&free, &total) == cudaSuccess))
-    throw DeviceError("device " + std::to_string(device_) +
-                      " is out of memory: " + std::to_string(bytes >> 20) + " MiB asked for, " +
-                      std::to_string(free >> 20) + " of " + std::to_string(total >> 20) +
-                      " MiB free; the context stays usable");
+    throw OutOfDeviceMemory("device " + std::to_string(device_) +
+                            " is out of memory: " + std::to_string(bytes >> 20) +
+                            " MiB asked for, " + std::to_string(free >> 20) + " of " +
+                            std::to_string(total >> 20) + " MiB free; the context stays usable");
   throw_device_error(error, "cudaMallocFromPoolAsync");
 }
 
 void DeviceMemory::free(void* pointer, std::size_t bytes) noexcept {
   cudaFreeAsync(pointer, stream_);
   in_use_ -= bytes;
+}
+
+void DeviceMemory::free_after(void* pointer, std::size_t bytes, cudaEvent_t event) noexcept {
+  try {
+    const std::lock_guard<std::mutex> lock(late_mutex_);
+    late_.push_back({pointer, bytes, event});
+  } catch (const std::bad_alloc&) {
+    // Without memory for the list, the stream waits after all.
+    cudaStreamWaitEvent(stream_, event, 0);
+    cudaEventDestroy(event);
+    return free(pointer, bytes);
+  }
+  free_reached();
+}
+
+void DeviceMemory::free_reached() noexcept {
+  const std::lock_guard<std::mutex> lock(late_mutex_);
+  const auto reached = [&](const Late& late) {
+    if (cudaEventQuery(late.event) == cudaErrorNotReady) return false;
+    cudaEventDestroy(late.event);
+    free(late.pointer, late.bytes);
+    return true;
+  };
+  late_.erase(std::remove_if(late_.begin(), late_.end(), reached), late_.end());
+}
+
+void DeviceMemory::trim() noexcept {
+  for (cudaMemPool_t pool : {pool_, lent_pool_}) cudaMemPoolTrimTo(pool, 0);
 }
 
 std::size_t DeviceMemory::bytes_reserved() const {
@@ -117,7 +152,9 @@ PinnedBuffer::~PinnedBuffer() {
   if (data_) cudaFreeHost(data_);
 }
 
-PinnedArena::~PinnedArena() {
+PinnedArena::~PinnedArena() { clear(); }
+
+void PinnedArena::clear() noexcept {
   while (chunks_) {
     Chunk* next = chunks_->next;
     cudaFreeHost(chunks_->data);

@@ -6,7 +6,9 @@
 #include <atomic>
 #include <cstddef>
 #include <memory>
+#include <mutex>
 #include <utility>
+#include <vector>
 
 namespace gpureg::cuda {
 
@@ -23,7 +25,7 @@ class DeviceScope {
   int previous_ = -1;
 };
 
-/// A private stream and pool of device memory. The pool keeps its memory until its end, so a warm
+/// A private stream and pool of device memory. The pool keeps its memory until trim(), so a warm
 /// context allocates without the driver. The context and its prepared clouds share it.
 class DeviceMemory {
  public:
@@ -39,6 +41,11 @@ class DeviceMemory {
   /// In the order of a stream of the program.
   void* allocate(std::size_t bytes, cudaStream_t stream);
   void free(void* pointer, std::size_t bytes) noexcept;
+  /// Frees once an event is reached, and destroys the event. The stream never waits for it: where
+  /// it is not reached yet, a later free_reached() frees.
+  void free_after(void* pointer, std::size_t bytes, cudaEvent_t event) noexcept;
+  void free_reached() noexcept;
+  void trim() noexcept;  ///< returns the pools' free memory to the driver
   std::size_t bytes_in_use() const { return in_use_; }
   std::size_t bytes_reserved() const;  ///< allocated from the driver: the peak of the use
 
@@ -50,6 +57,13 @@ class DeviceMemory {
   cudaMemPool_t pool_ = nullptr;
   cudaMemPool_t lent_pool_ = nullptr;  ///< for allocations on other streams
   std::atomic<std::size_t> in_use_{0};
+  struct Late {
+    void* pointer;
+    std::size_t bytes;
+    cudaEvent_t event;
+  };
+  std::mutex late_mutex_;
+  std::vector<Late> late_;  ///< to be freed after their events
 };
 
 /// Owns an array in device memory; its content is undefined until written.
@@ -115,6 +129,8 @@ class PinnedArena {
   void* take(std::size_t bytes);
   /// Requires that no work uses the pieces any more.
   void reset();
+  /// reset() that keeps no memory.
+  void clear() noexcept;
 
  private:
   struct Chunk {

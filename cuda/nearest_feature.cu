@@ -171,7 +171,7 @@ DeviceBuffer<std::uint32_t> nearest_features(Exec& exec, const std::vector<Featu
   }
   // All bits set is greater than every result, and its index is kNoValue.
   auto best = exec.filled<unsigned long long>(answers, 0xff);
-  bool filterable = exec.compute_capability() >= 80;
+  bool filterable = has_filter(exec);
   for (const FeatureQuery& f : queries)
     filterable = filterable && f.query_half && f.row_half && f.dimension == queries[0].dimension &&
                  f.copy == queries[0].copy;

@@ -106,10 +106,12 @@ inline std::uint32_t padded_width(std::uint32_t dimension) {
                                              : half_width(dimension, HalfCopy::plain);
 }
 
+/// True where filter_nearest() was compiled for tensor cores with float32 sums: architecture 8.0.
+bool has_filter(const Exec& exec);
+
 /// Search for k = 1: the tensor cores determine the rows that can be the nearest, and only those
 /// are measured exactly. Folds (distance, index) into `best` by atomicMin, as the plain search
-/// does. batch: on the device; all entries have equal dimensions and copies. Needs compute
-/// capability 8.0.
+/// does. batch: on the device; all entries have equal dimensions and copies. Needs has_filter().
 void filter_nearest(Exec& exec, const FeatureQuery* batch, unsigned entries,
                     std::uint32_t most_queries, std::uint32_t most_rows, std::uint32_t dimensions,
                     HalfCopy copy, std::size_t answers, unsigned long long* best);

@@ -47,6 +47,9 @@ __device__ float from_ordered(std::int32_t v) {
   return __int_as_float(v ^ ((v >> 31) & 0x7fffffff));
 }
 
+/// The first architecture with the products below, as Exec::compiled_for() counts.
+constexpr int kTensorArchitecture = 80;
+
 #if !defined(__CUDA_ARCH__) || __CUDA_ARCH__ >= 800
 /// d = c + a b
 __device__ void multiply_add(float (&d)[4], const std::uint32_t (&a)[4], const std::uint32_t* b,
@@ -58,7 +61,7 @@ __device__ void multiply_add(float (&d)[4], const std::uint32_t (&a)[4], const s
         "f"(c[2]), "f"(c[3]));
 }
 #else
-// Never launched there.
+// Never launched there, see has_filter().
 __device__ void multiply_add(float (&)[4], const std::uint32_t (&)[4], const std::uint32_t*,
                              const float (&)[4]) {}
 #endif
@@ -304,6 +307,10 @@ void run(Exec& exec, unsigned entries, std::uint32_t most_queries, std::uint32_t
 }
 
 }  // namespace
+
+bool has_filter(const Exec& exec) {
+  return exec.compiled_for(filter<1, 16, HalfCopy::plain, false>) >= kTensorArchitecture;
+}
 
 void filter_nearest(Exec& exec, const FeatureQuery* batch, unsigned entries,
                     std::uint32_t most_queries, std::uint32_t most_rows, std::uint32_t dimensions,

@@ -174,6 +174,11 @@ __global__ void __launch_bounds__(kThreads, 1024 / kThreads) refine(RefineModes 
 /// twice as large would need two waves.
 constexpr int kClusterBlocks = 8, kClusterThreads = 512;
 
+/// True where the clusters were compiled: their code is empty below architecture 9.0.
+bool has_clusters(const Exec& exec) {
+  return exec.compiled_for(refine<kClusterThreads, kClusterBlocks>) >= 90;
+}
+
 void refine_by_clusters(Exec& exec, const RefineModes& batch, unsigned pairs) {
   cudaLaunchAttribute cluster{};
   cluster.id = cudaLaunchAttributeClusterDimension;
@@ -236,7 +241,7 @@ void refine_modes(Exec& exec, Span<const PairView> pairs, Modes& modes,
     // blocks or clusters are faster.
     const std::size_t count = std::size_t(modes.most) * pairs.size,
                       processors = static_cast<std::size_t>(exec.multiprocessors());
-    if (exec.compute_capability() >= 90 && count * kClusterBlocks <= processors * 3) {
+    if (count * kClusterBlocks <= processors * 3 && has_clusters(exec)) {
       refine_by_clusters(exec, batch, pair_count);
     } else {
       const bool few = count < processors * 2;

@@ -2,43 +2,44 @@
 #include "residence.hpp"
 
 #include <algorithm>
+#include <iterator>
 #include <string>
+#include <unordered_set>
+#include <utility>
 
 #include "gpureg/error.hpp"
 
 namespace gpureg::cuda {
 
-Residence::Entry* Residence::find(const Fragment& fragment) {
-  for (Entry& entry : entries_)
-    if (!entry.fragment.expired() && entry.fragment.lock().get() == &fragment) return &entry;
-  return nullptr;
+void Residence::add(const Fragment& fragment) {
+  if (budget_ > 0) entries_[&fragment] = {fragment.weak_from_this(), ++clock_};
 }
 
-void Residence::add(const Fragment& fragment) {
-  if (budget_ > 0) entries_.push_back({fragment.weak_from_this(), ++clock_});
+void Residence::forget_expired() {
+  for (auto entry = entries_.begin(); entry != entries_.end();)
+    entry = entry->second.fragment.expired() ? entries_.erase(entry) : std::next(entry);
 }
 
 void Residence::make_room(std::size_t more, const std::vector<const Fragment*>& kept) {
   if (budget_ == 0) return;
-  entries_.erase(std::remove_if(entries_.begin(), entries_.end(),
-                                [](const Entry& e) { return e.fragment.expired(); }),
-                 entries_.end());
-  std::sort(entries_.begin(), entries_.end(),
-            [](const Entry& a, const Entry& b) { return a.used < b.used; });
+  forget_expired();
+  const std::unordered_set<const Fragment*> keep(kept.begin(), kept.end());
+  std::vector<std::pair<std::uint64_t, std::shared_ptr<const Fragment>>> by_use;
   std::size_t bytes = more;
-  for (const Entry& entry : entries_)
-    if (const auto fragment = entry.fragment.lock()) bytes += fragment->bytes();
-  for (Entry& entry : entries_) {
+  for (const auto& [address, entry] : entries_)
+    if (auto fragment = entry.fragment.lock()) {
+      bytes += fragment->bytes();
+      by_use.emplace_back(entry.used, std::move(fragment));
+    }
+  // Times of use differ: the least recently used goes first.
+  std::sort(by_use.begin(), by_use.end());
+  for (const auto& [used, fragment] : by_use) {
     if (bytes <= budget_) break;
-    const auto fragment = entry.fragment.lock();
-    if (!fragment || std::find(kept.begin(), kept.end(), fragment.get()) != kept.end()) continue;
+    if (keep.count(fragment.get()) > 0) continue;
     evictions_ += fragment->evict(*exec_.memory());
     bytes -= std::min(bytes, fragment->bytes());
-    entry.fragment.reset();
+    entries_.erase(fragment.get());
   }
-  entries_.erase(std::remove_if(entries_.begin(), entries_.end(),
-                                [](const Entry& e) { return e.fragment.expired(); }),
-                 entries_.end());
   if (bytes > budget_ && more > 0)
     throw DeviceError("memory_budget is " + std::to_string(budget_) +
                       " bytes, but the prepared clouds that are needed at once take " +
@@ -56,7 +57,8 @@ std::vector<std::shared_ptr<const CudaCloud>> Residence::bring(
       missing.push_back(k);
       bytes += fragments[k]->bytes();
     }
-    if (Entry* entry = budget_ > 0 ? find(*fragments[k]) : nullptr) entry->used = ++clock_;
+    const auto entry = entries_.find(fragments[k]);
+    if (entry != entries_.end() && !entry->second.fragment.expired()) entry->second.used = ++clock_;
   }
   if (missing.empty()) return out;
   make_room(bytes, fragments);

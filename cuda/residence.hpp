@@ -2,6 +2,7 @@
 #pragma once
 
 #include <atomic>
+#include <unordered_map>
 
 #include "fragment.hpp"
 
@@ -30,14 +31,15 @@ class Residence {
 
  private:
   struct Entry {
+    /// Expired: a later fragment may have the address that the entry is filed under.
     std::weak_ptr<const Fragment> fragment;
     std::uint64_t used;
   };
-  Entry* find(const Fragment& fragment);
+  void forget_expired();
 
   Exec& exec_;
   std::size_t budget_;
-  std::vector<Entry> entries_;
+  std::unordered_map<const Fragment*, Entry> entries_;
   std::uint64_t clock_ = 0;
   std::atomic<std::size_t> evictions_{0};
 };

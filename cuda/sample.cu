@@ -9,6 +9,8 @@ namespace {
 constexpr std::uint32_t kThreads = 1024;
 // Words per chunk, of 32 hypotheses each; chunks are counted, then expanded, one by one.
 constexpr std::uint32_t kWordsPerChunk = 1024;
+/// Memory for the survivors of the pairs that go on together.
+constexpr std::uint64_t kSurvivorMemory = std::uint64_t(2) << 30;
 static_assert(limits::kMaxQuadruples <= 0x80000000u - 32 * kWordsPerChunk,
               "numbers of hypotheses fit 32 bits in whole chunks");
 
@@ -181,7 +183,8 @@ __global__ void __launch_bounds__(kThreads) sample(SampleBatch s, std::uint32_t 
   sample_chunks(s, SharedPoints{shared, rest}, m, count, queue);
 }
 
-/// Expands bits to indices, in order. before: survivors in earlier chunks, over all pairs.
+/// Expands bits to indices, in order. before: survivors in earlier chunks, over all pairs of the
+/// batch.
 __global__ void __launch_bounds__(kWordsPerChunk)
     expand(const std::uint32_t* words, const std::uint32_t* before, std::uint32_t chunks,
            const std::uint32_t* offset, std::uint32_t* id) {
@@ -211,8 +214,7 @@ __global__ void __launch_bounds__(kWordsPerChunk)
 
 }  // namespace
 
-Quadruples sample_quadruples(Exec& exec, const Matches& matches,
-                             const RegistrationOptions& options) {
+Samples sample_quadruples(Exec& exec, const Matches& matches, const RegistrationOptions& options) {
   const std::size_t pairs = matches.room.entries();
   const std::uint32_t chunks = blocks_for(options.quadruples.count, 32 * kWordsPerChunk);
   const std::size_t all_chunks = pairs * chunks;
@@ -222,13 +224,10 @@ Quadruples sample_quadruples(Exec& exec, const Matches& matches,
   // Shared memory for the matches of the largest pair, if they fit; larger pairs read global
   // memory.
   constexpr std::size_t kBytesPerMatch = sizeof(float4) + sizeof(float2);
-  const std::uint32_t fits = static_cast<std::uint32_t>(
-      (exec.shared_bytes_per_block() - 1024 - kThreads / 32 * sizeof(WarpQueue)) / kBytesPerMatch);
+  const std::uint32_t fits =
+      static_cast<std::uint32_t>(exec.allow_shared_memory(sample) / kBytesPerMatch);
   const std::uint32_t capacity = std::min(matches.room.largest, fits);
   const std::size_t shared_bytes = capacity * kBytesPerMatch;
-  check(cudaFuncSetAttribute(sample, cudaFuncAttributeMaxDynamicSharedMemorySize,
-                             static_cast<int>(shared_bytes)),
-        "cudaFuncSetAttribute");
   // A thread block stages the matches once and then draws for many chunks: few blocks per pair, but
   // all processors busy.
   const unsigned wanted = blocks_for(static_cast<std::size_t>(exec.multiprocessors()) * 8,
@@ -259,14 +258,35 @@ Quadruples sample_quadruples(Exec& exec, const Matches& matches,
         "cudaMemcpyAsync");
   exec.synchronize();
 
+  Samples out;
+  out.chunks = chunks;
+  for (std::size_t p = 0; p < pairs; ++p)
+    out.survivors.push_back(std::min(starts[p + 1] - starts[p], options.quadruples.max_survivors));
+  out.words = std::move(words);
+  out.before = std::move(before);
+  return out;
+}
+
+std::vector<pipeline::Run> runs_of(Exec&, const Samples& samples) {
+  // A survivor's index, pose, validity, inliers, tie and residual.
+  constexpr std::uint64_t kSurvivorBytes =
+      sizeof(std::uint32_t) + sizeof(Pose<float>) + 1 + 2 * sizeof(std::uint32_t) + 8;
+  return pipeline::runs_within(samples.survivors.size(), kSurvivorMemory / kSurvivorBytes,
+                               [&](std::size_t p) { return samples.survivors[p]; });
+}
+
+Quadruples survivors_of(Exec& exec, const Samples& samples, pipeline::Run pairs) {
   Quadruples out;
-  out.segments = make_segments(exec, pairs, [&](std::size_t p) {
-    return std::min(starts[p + 1] - starts[p], options.quadruples.max_survivors);
-  });
+  out.first_pair = pairs.begin;
+  out.segments = make_segments(exec, pairs.size(),
+                               [&](std::size_t p) { return samples.survivors[pairs.begin + p]; });
   out.id = exec.buffer<std::uint32_t>(out.segments.total());
   if (out.segments.total() == 0) return out;
-  expand<<<dim3(chunks, static_cast<unsigned>(pairs)), kWordsPerChunk, 0, exec.stream()>>>(
-      words.data(), before.data(), chunks, out.segments.on_device.data(), out.id.data());
+  const std::size_t first_chunk = pairs.begin * samples.chunks;
+  expand<<<dim3(samples.chunks, static_cast<unsigned>(pairs.size())), kWordsPerChunk, 0,
+           exec.stream()>>>(samples.words.data() + first_chunk * kWordsPerChunk,
+                            samples.before.data() + first_chunk, samples.chunks,
+                            out.segments.on_device.data(), out.id.data());
   check_launch("expand");
   return out;
 }

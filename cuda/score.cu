@@ -10,9 +10,6 @@ namespace {
 constexpr std::uint32_t kByBlock = 64;
 constexpr int kThreads = 896;
 constexpr std::size_t kPointBytes = sizeof(float2) + sizeof(float) + 1;
-// Shared memory besides the staged points.
-constexpr std::size_t kFixedBytes =
-    kThreads / 32 * sizeof(WarpMemory) + 512 * sizeof(Limits) + 1024;
 
 /// Hypotheses [begin, end) of one pair.
 struct Slice {
@@ -224,18 +221,13 @@ DeviceBuffer<BestPose> score_hypotheses(Exec& exec, Span<const PairView> pairs,
     const std::vector<Slice> slices = cut_slices(*hypotheses.segments, processors);
     const auto slices_on_device = exec.upload(slices);
     // The rest of the shared memory serves as cache, which holds the codes.
-    const std::size_t room = exec.shared_bytes_per_block() > kFixedBytes
-                                 ? exec.shared_bytes_per_block() - kFixedBytes
-                                 : 0;
+    const std::size_t room = exec.allow_shared_memory(score_slices);
     std::size_t bytes = 0;
     for (const ScorePair& pair : host_pairs) {
       const std::size_t wanted = std::size_t(pair.order.groups) * 32 * kPointBytes +
                                  pair.cells.brick_runs() * sizeof(uint2);
       if (pair.cells.nx > 0 && wanted <= room) bytes = std::max(bytes, wanted);
     }
-    check(cudaFuncSetAttribute(score_slices, cudaFuncAttributeMaxDynamicSharedMemorySize,
-                               static_cast<int>(bytes)),
-          "cudaFuncSetAttribute");
     score_slices<<<std::min(static_cast<unsigned>(slices.size()), processors), kThreads, bytes,
                    exec.stream()>>>(batch, slices_on_device.data(),
                                     static_cast<std::uint32_t>(slices.size()),

@@ -18,6 +18,16 @@ using limits::kMaxSummaryBlocks;
 /// BrickMotion counts cells, including those of the empty blocks on both sides, in 22 bits.
 constexpr std::uint64_t kMaxBlocksAlong = (std::uint64_t(1) << 19) - 2;
 
+/// A word of a brick is numbered in 32 bits.
+constexpr std::uint64_t kMaxNumberedBlocks = std::uint64_t(1) << 25;
+/// Size of the table of a large map; its other arrays take 4 KB a block.
+constexpr std::uint64_t kPlacesPerBlock = 64, kRunsPerBlock = 8;
+
+/// CellSummaries::brick_runs() without overflow.
+std::uint64_t runs_of(std::uint64_t nx, std::uint64_t ny, std::uint64_t nz) {
+  return (nx + 2 + 31) / 32 * (2 * (ny + 2)) * (2 * (nz + 2));
+}
+
 constexpr int kNumberThreads = 512;
 /// Steps of the golden section spread groups evenly, however many are read.
 constexpr double kGoldenSection = 0.6180339887;
@@ -120,6 +130,8 @@ __global__ void summarize(const Slot* slots, const DirectionTables* tables) {
         static_cast<std::uint32_t>(__popc(static_cast<int>(run.x & (place.bit * 2 - 1))));
     const std::uint32_t word = run.y - 16 * from_here + ((cell >> 6) & 3) * 4 + ((cell >> 3) & 3);
     if ((cell & 7) == 0) s.summaries.brick[word] = codes;
+    if ((cell & 7) == 0 && word % 16 == 0)
+      s.summaries.block[word / 16] = static_cast<std::uint32_t>(b);
     s.summaries.cell[std::size_t(word) * 8 + (cell & 7)] = make_uint2(
         empty ? 0u
               : summarize_cell(candidates, cell_center(c, s.geometry.cell_size), s.geometry,
@@ -199,9 +211,13 @@ ScoringLayout scoring_layout(const CudaCloud& cloud, const CellRange& blocks) {
   shape.nx = static_cast<std::int32_t>(nx);
   shape.ny = static_cast<std::int32_t>(ny);
   shape.nz = static_cast<std::int32_t>(nz);
+  // A large map may have a large table: up to 64 places for each of its blocks.
+  const std::uint64_t most_blocks =
+                          std::max(kMaxSummaryBlocks, kPlacesPerBlock * cloud.block_count),
+                      most_runs = std::max(kMaxSummaryBlocks, kRunsPerBlock * cloud.block_count);
   const bool fits = nx <= kMaxBlocksAlong && ny <= kMaxBlocksAlong && nz <= kMaxBlocksAlong &&
-                    nx * ny <= kMaxSummaryBlocks && nx * ny * nz <= kMaxSummaryBlocks &&
-                    shape.brick_runs() <= kMaxSummaryBlocks;
+                    cloud.block_count <= kMaxNumberedBlocks && nx * ny <= most_blocks &&
+                    nx * ny * nz <= most_blocks && runs_of(nx, ny, nz) <= most_runs;
   if (fits) {
     l.nx = static_cast<std::int32_t>(nx);
     l.ny = static_cast<std::int32_t>(ny);
@@ -220,6 +236,7 @@ ScoringLayout scoring_layout(const CudaCloud& cloud, const CellRange& blocks) {
   l.cells = take(fits ? std::size_t(cloud.block_count) * kCells * sizeof(uint2) : 0);
   l.runs = take(fits ? (std::size_t(shape.brick_runs()) + 1) * sizeof(uint2) : 0);
   l.bricks = take(fits ? std::size_t(cloud.block_count) * 4 * 16 * sizeof(std::uint32_t) : 0);
+  l.blocks = take(fits ? std::size_t(cloud.block_count) * 4 * sizeof(std::uint32_t) : 0);
   return l;
 }
 
@@ -242,6 +259,7 @@ void place_scoring_data(const ScoringLayout& l, const ClosestGeometry& geometry,
   v.cell = reinterpret_cast<uint2*>(memory + l.cells);
   v.run = reinterpret_cast<uint2*>(memory + l.runs);
   v.brick = reinterpret_cast<std::uint32_t*>(memory + l.bricks);
+  v.block = reinterpret_cast<std::uint32_t*>(memory + l.blocks);
 }
 
 void fill_scoring_data(Exec& exec, const std::vector<std::shared_ptr<CudaCloud>>& clouds,

@@ -9,9 +9,10 @@
 namespace gpureg::cuda {
 
 struct ScoringLayout {
-  Cell first_block;                                                     ///< of the table
-  std::int32_t nx, ny, nz;                                              ///< 0: too wide for a table
-  std::size_t runs, bricks, cells, candidates, points, normals, index;  ///< where each array begins
+  Cell first_block;         ///< of the table
+  std::int32_t nx, ny, nz;  ///< 0: too wide for a table
+  /// where each array begins
+  std::size_t runs, bricks, blocks, cells, candidates, points, normals, index;
   std::size_t bytes;
 };
 

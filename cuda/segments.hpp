@@ -5,7 +5,6 @@
 #include <string>
 #include <vector>
 
-#include "common/limits.hpp"
 #include "exec.hpp"
 #include "gpureg/error.hpp"
 
@@ -32,20 +31,28 @@ inline Segments segments_of(Exec& exec, std::vector<std::uint32_t> offset) {
   return s;
 }
 
-/// size(e): number of elements of entry e. Throws InvalidArgument where the total exceeds
-/// limits::kMaxPoints.
+/// Elements of a batch. CUB counts by int, and arrays of ranks have one element more.
+constexpr std::uint64_t kMaxElements = 0x7ffffffe;
+
+/// Offsets of entries of size(e) elements. Throws InvalidArgument where the total exceeds
+/// kMaxElements.
 template <typename Size>
-Segments make_segments(Exec& exec, std::size_t entries, Size&& size) {
+std::vector<std::uint32_t> batch_offsets(std::size_t entries, Size&& size) {
   std::vector<std::uint32_t> offset{0};
   std::uint64_t sum = 0;
   for (std::size_t e = 0; e < entries; ++e) {
     sum += size(e);
-    if (sum > limits::kMaxPoints)
+    if (sum > kMaxElements)
       throw InvalidArgument("a batch of " + std::to_string(sum) +
-                            " elements exceeds 2^31 - 1: split it");
+                            " elements exceeds 2^31 - 2: split it");
     offset.push_back(static_cast<std::uint32_t>(sum));
   }
-  return segments_of(exec, std::move(offset));
+  return offset;
+}
+
+template <typename Size>
+Segments make_segments(Exec& exec, std::size_t entries, Size&& size) {
+  return segments_of(exec, batch_offsets(entries, size));
 }
 
 }  // namespace gpureg::cuda

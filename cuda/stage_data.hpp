@@ -10,6 +10,7 @@
 #include "algorithm/moments.hpp"
 #include "algorithm/quadruple.hpp"
 #include "pipeline/engine.hpp"
+#include "pipeline/runs.hpp"
 #include "segments.hpp"
 
 /// Data between the CUDA stages: arrays on the device, one for the whole batch, and metadata on the
@@ -113,8 +114,11 @@ struct CellSummaries {
   /// number of bricks up to the last of them; then (0, all bricks)
   uint2* run = nullptr;
   std::uint32_t* brick = nullptr;  ///< bricks x 16 (z, y): codes of eight cells along x
-  /// bricks x 128 (z, y, x): the summary; the candidates, first << 8 | number, or kNoValue
+  /// bricks x 128 (z, y, x): the summary; the candidates, first << 8 | number, or kNoValue where
+  /// that does not hold them: lists of 256 and more, and those beyond 2^24 candidates of a map of a
+  /// few hundred thousand points. Their ends are in cell_start of the closest-point grid.
   uint2* cell = nullptr;
+  std::uint32_t* block = nullptr;  ///< bricks: index of the block of each
   /// the candidates of all cells: x, y, z, packed normal
   float4* candidate = nullptr;
   std::uint32_t block_count = 0;
@@ -186,7 +190,17 @@ struct Matches {
   DeviceBuffer<std::uint32_t> count;  ///< per pair
 };
 
+/// Quadruples drawn for all pairs, as bits; survivors_of() lists those that passed.
+struct Samples {
+  std::uint32_t chunks = 0;              ///< of quadruples, per pair
+  DeviceBuffer<std::uint32_t> words;     ///< pairs x chunks x words: one bit per quadruple
+  DeviceBuffer<std::uint32_t> before;    ///< pairs x chunks + 1: survivors in earlier chunks
+  std::vector<std::uint32_t> survivors;  ///< per pair, at most max_survivors
+};
+
+/// Survivors of a run of pairs.
 struct Quadruples {
+  std::size_t first_pair = 0;      ///< of the run, in the batch of the matches
   Segments segments;               ///< survivors of each pair
   DeviceBuffer<std::uint32_t> id;  ///< ascending within a pair
 };

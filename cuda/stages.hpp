@@ -32,8 +32,10 @@ std::vector<std::shared_ptr<CudaCloud>> assemble(
 
 // Alignment, one entry per pair.
 Matches match_features(Exec& exec, Span<const PairView> pairs, const RegistrationOptions& options);
-Quadruples sample_quadruples(Exec& exec, const Matches& matches,
-                             const RegistrationOptions& options);
+Samples sample_quadruples(Exec& exec, const Matches& matches, const RegistrationOptions& options);
+/// As many pairs each as the memory of their survivors allows.
+std::vector<pipeline::Run> runs_of(Exec& exec, const Samples& samples);
+Quadruples survivors_of(Exec& exec, const Samples& samples, pipeline::Run pairs);
 Hypotheses fit_hypotheses(Exec& exec, const Matches& matches, const Quadruples& quadruples,
                           const RegistrationOptions& options);
 DeviceBuffer<BestPose> score_hypotheses(Exec& exec, Span<const PairView> pairs,

@@ -28,6 +28,8 @@ class Uploader {
 
   /// In the order of the stream. The rows may change when the call returns.
   void upload(Span<const RowsToUpload> parts, int device, cudaStream_t stream);
+  /// Frees the slots until the next upload. Requires that the streams of all uploads were awaited.
+  void clear() noexcept { slots_ = PinnedBuffer(); }
 
  private:
   static constexpr std::size_t kThreads = 4, kSlots = 4;  // slots of each thread

@@ -24,4 +24,14 @@ std::future<PreparedCloud> prepare_async(const Context& context, const DevicePoi
                         context.description());
 }
 
+std::future<std::vector<PreparedCloud>> prepare_batch_async(
+    const Context& context, const std::vector<DevicePointCloudView>& clouds,
+    const PrepareOptions& options, const std::vector<CudaStream>&,
+    const std::vector<std::string>&) {
+  options.validate();
+  for (const DevicePointCloudView& cloud : clouds) cloud.validate();
+  throw InvalidArgument("clouds in device memory need a CUDA context, this one is " +
+                        context.description());
+}
+
 }  // namespace gpureg

@@ -2,9 +2,9 @@
 #include "initial_poses.hpp"
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 #include <fstream>
+#include <locale>
 #include <numeric>
 #include <sstream>
 
@@ -19,10 +19,10 @@ namespace {
 
 double number(const std::string& word, const std::string& path, std::size_t line) {
   double value = 0;
-  const char* begin = word.data();
-  const char* end = begin + word.size();
-  const auto [stop, error] = std::from_chars(begin + (*begin == '+' ? 1 : 0), end, value);
-  if (error != std::errc() || stop != end || !std::isfinite(value))
+  std::istringstream stream(word);
+  stream.imbue(std::locale::classic());
+  if (!(stream >> value) || stream.peek() != std::istringstream::traits_type::eof() ||
+      !std::isfinite(value))
     fail(path, line, "'" + word.substr(0, 40) + "' is no finite number");
   return value;
 }

@@ -30,15 +30,29 @@ void append_value(std::string& text, const Json& value) {
   text += " ]";
 }
 
+constexpr const char* kVersionKey = "format_version";
+
 }  // namespace
 
+void check_format(const std::string& path, const Json& document) {
+  if (!document.is_object() || !document.contains(kVersionKey)) return;
+  const Json& version = document[kVersionKey];
+  if (!version.is_number_integer() || version < 1)
+    throw IoError(path + ": \"format_version\" is " + dump(version).substr(0, 40) +
+                  ", expected an integer >= 1");
+  if (version > kFormatVersion)
+    throw IoError(path + ": format version " + dump(version) +
+                  ", this gpureg reads versions up to " + std::to_string(kFormatVersion) +
+                  "; a newer gpureg wrote it");
+}
+
 std::string format_document(const Json& document) {
-  std::string text = "{";
-  const char* separator = "\n ";
+  std::string text = "{\n \"" + std::string(kVersionKey) + "\": " + std::to_string(kFormatVersion);
+  const char* separator = ",\n ";
   for (const auto& item : document.items()) {
+    if (item.key() == kVersionKey) continue;  // of a document that was read
     text += separator + dump(Json(item.key())) + ": ";
     append_value(text, item.value());
-    separator = ",\n ";
   }
   return text + "\n}\n";
 }

@@ -22,7 +22,8 @@ SurfaceMesh read_mesh(const std::string& path) {
   const aiScene* file = importer.ReadFile(
       path, aiProcess_Triangulate | aiProcess_SortByPType | aiProcess_PreTransformVertices |
                 aiProcess_RemoveComponent | aiProcess_JoinIdenticalVertices);
-  if (file == nullptr) throw IoError(path + ": holds no readable face: " + importer.GetErrorString());
+  if (file == nullptr)
+    throw IoError(path + ": holds no readable face: " + importer.GetErrorString());
   SurfaceMesh mesh;
   for (unsigned m = 0; m < file->mNumMeshes; ++m) {
     const aiMesh& part = *file->mMeshes[m];

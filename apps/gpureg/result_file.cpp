@@ -113,6 +113,7 @@ ResultFile read_result(const std::string& path) {
     } catch (const Json::exception& error) {
       throw IoError(path + ": " + plain(error.what()));
     }
+    check_format(path, document);
     read_pairs(file, std::move(document));
   } else {
     file.log = evaluation::read_log(path);

@@ -36,8 +36,11 @@ double median_spacing(const std::vector<Eigen::Vector3f>& points, int rank) {
   Eigen::Index axis = 0;
   box_of(points).sizes().maxCoeff(&axis);
   std::vector<Eigen::Vector3f> sorted = points;
-  std::sort(sorted.begin(), sorted.end(),
-            [axis](const auto& a, const auto& b) { return a[axis] < b[axis]; });
+  std::sort(sorted.begin(), sorted.end(), [axis](const auto& a, const auto& b) {
+    // A total order: the order of equal coordinates must not depend on the sort.
+    if (a[axis] != b[axis]) return a[axis] < b[axis];
+    return std::lexicographical_compare(a.data(), a.data() + 3, b.data(), b.data() + 3);
+  });
   std::vector<double> distances;
   const std::size_t count = std::min(kSample, sorted.size());
   for (std::size_t s = 0; s < count; ++s) {

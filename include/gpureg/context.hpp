@@ -72,6 +72,12 @@ class Context {
   /// @return one entry per device of a CUDA context, none on the CPU.
   std::vector<DeviceMemoryUse> device_memory() const;
 
+  /// Returns the memory that the context keeps for later calls, on its devices and page-locked on
+  /// the host, to the driver: for programs that share a device. Prepared clouds stay; the next call
+  /// allocates anew. Waits for running calls. Does nothing on the CPU. Thread-safe.
+  /// @throws DeviceError where running work failed.
+  void trim() const;
+
  private:
   friend struct Access;
   explicit Context(std::shared_ptr<Engine> engine) : engine_(std::move(engine)) {}

@@ -3,6 +3,8 @@
 
 #include <cstddef>
 #include <future>
+#include <optional>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -31,6 +33,9 @@ struct DevicePointCloudView {
   std::size_t viewpoint_count = 0;
   bool infer_viewpoint = true;
   double origin[3] = {0, 0, 0};  ///< as that of PointCloudView
+  /// Streams that order the reading of normals and features, where another stream than that of the
+  /// points wrote them.
+  std::optional<CudaStream> normal_stream, feature_stream;
 
   /// @throws InvalidArgument as PointCloudView::validate() does.
   void validate() const {
@@ -53,7 +58,8 @@ struct DevicePointCloudView {
 ///
 /// Work in `stream` reads the rows, after everything enqueued there before; work enqueued there
 /// later may change or free them. The call waits neither for the stream nor for other work of the
-/// context. Preparation runs on the stream of the context. Thread-safe.
+/// context, and other calls of the context do not wait for the stream. Preparation runs on the
+/// stream of the context. Thread-safe.
 /// @param cloud device memory on a device of the context; viewpoints in host memory.
 /// @param stream stream that orders the reading of the rows; null: the default stream.
 /// @return future of the prepared cloud; it rethrows errors of the data.
@@ -62,6 +68,19 @@ struct DevicePointCloudView {
 /// @throws DeviceError where the device has no memory.
 std::future<PreparedCloud> prepare_async(const Context& context, const DevicePointCloudView& cloud,
                                          const PrepareOptions& options, CudaStream stream);
+
+/// prepare_batch() for clouds in device memory: prepare_async() with one thread for all clouds,
+/// which are prepared together. Thread-safe.
+/// @param streams for each cloud the stream that orders the reading of its rows, or one for all.
+/// @param names of the clouds in error messages, or none.
+/// @return future of the prepared clouds in order; it rethrows errors of the data.
+/// @throws InvalidArgument as prepare_async() does, naming the cloud, and for a wrong number of
+///   streams or names.
+/// @throws DeviceError where the device has no memory.
+std::future<std::vector<PreparedCloud>> prepare_batch_async(
+    const Context& context, const std::vector<DevicePointCloudView>& clouds,
+    const PrepareOptions& options, const std::vector<CudaStream>& streams,
+    const std::vector<std::string>& names = {});
 
 /// prepare_async() that waits for the result.
 /// @throws InvalidArgument as prepare_async() does.

@@ -78,6 +78,9 @@ void bind_context(py::module_& m) {
             return out;
           },
           "One dictionary per CUDA device: bytes in use and reserved, clouds evicted.")
+      .def("trim", &Context::trim, release(),
+           "Returns memory that the context keeps for later calls to the driver; prepared clouds "
+           "stay. Nothing on the CPU.")
       .def("__repr__", [](const Context& c) { return "<gpureg.Context " + c.description() + ">"; });
   m.def("describe_backends", &describe_backends, release(),
         "One line per backend of this build, with its devices or why it cannot be used.");

@@ -2,10 +2,10 @@
 #include <pybind11/stl.h>
 
 #include <algorithm>
+#include <array>
 #include <cstdio>
 #include <future>
 #include <iterator>
-#include <optional>
 
 #include "cloud.hpp"
 #include "gpureg/cuda_interop.hpp"
@@ -15,17 +15,25 @@
 namespace gpureg::python {
 namespace {
 
-/// One cloud as the package hands it over: (points, normals, features, viewpoints, origin, stream);
-/// all but the points may be None, and viewpoints False: not to be inferred. Points, normals and
-/// features are float32 arrays, or, where there is a stream, (address, rows, columns, stride,
-/// owner) of device memory. The caller's tuple keeps alive what the views point at.
+/// One cloud as the package hands it over: (points, normals, features, viewpoints, origin,
+/// streams); all but the points may be None, and viewpoints False: unknown, not to be inferred.
+/// Points, normals and features are float32 arrays, or,
+/// where there are streams, (address, rows, columns, stride, owner) of device memory; the streams
+/// are those that wrote points, normals and features. The caller's tuple keeps alive what the views
+/// point at.
 struct Input {
   PointCloudView view;
-  std::optional<std::uintptr_t> stream;
+  bool on_device = false;
+  CudaStream streams[3] = {};
 
   explicit Input(const py::tuple& parts) {
     if (parts.size() != 6) throw py::type_error("a cloud is a tuple of six");
-    if (!parts[5].is_none()) stream = parts[5].cast<std::uintptr_t>();
+    if (!parts[5].is_none()) {
+      on_device = true;
+      const auto given = parts[5].cast<std::array<std::uintptr_t, 3>>();
+      for (std::size_t k = 0; k < given.size(); ++k)
+        streams[k] = reinterpret_cast<CudaStream>(given[k]);
+    }
     const Rows points = rows(parts[0], "points");
     view.points = points.data;
     view.size = points.count;
@@ -42,7 +50,7 @@ struct Input {
       view.feature_stride = features.data ? features.stride : 0;
       view.feature_dimension = features.data ? features.columns : 0;
     }
-    if (parts[3].is(py::bool_(false))) {
+    if (parts[3].ptr() == Py_False) {
       view.infer_viewpoint = false;
     } else if (!parts[3].is_none()) {
       const Rows viewpoints = rows_of(parts[3].cast<FloatArray>(), "viewpoints");
@@ -59,7 +67,7 @@ struct Input {
   }
 
   Rows rows(const py::object& part, const char* name) const {
-    if (!stream) return rows_of(part.cast<FloatArray>(), name);
+    if (!on_device) return rows_of(part.cast<FloatArray>(), name);
     const auto parts = part.cast<py::tuple>();
     const auto count = parts[1].cast<std::size_t>();
     return {count ? reinterpret_cast<const float*>(parts[0].cast<std::uintptr_t>()) : nullptr,
@@ -80,6 +88,8 @@ struct Input {
     v.viewpoint_count = view.viewpoint_count;
     v.infer_viewpoint = view.infer_viewpoint;
     std::copy(std::begin(view.origin), std::end(view.origin), v.origin);
+    v.normal_stream = streams[1];
+    v.feature_stream = streams[2];
     return v;
   }
 };
@@ -88,7 +98,7 @@ struct Input {
 /// would.
 void warn_of_viewpoints(const std::vector<Input>& inputs, const std::vector<std::string>& names) {
   for (std::size_t k = 0; k < inputs.size(); ++k) {
-    if (inputs[k].stream) continue;
+    if (inputs[k].on_device) continue;
     const double share = inputs[k].view.share_facing_away();
     if (share <= PointCloudView::kMaxFacingAway) continue;
     char percent[16];
@@ -100,27 +110,57 @@ void warn_of_viewpoints(const std::vector<Input>& inputs, const std::vector<std:
   }
 }
 
-/// Clouds on a device start at once, those of the host follow as one batch.
+/// Raw points and clouds on a device that are copied at a time: copies of all clouds of a long list
+/// would take as much memory as the clouds.
+constexpr std::size_t kDevicePoints = std::size_t(1) << 25, kDeviceClouds = 256;
+
+/// Prepares clouds that are on a device.
+std::vector<PreparedCloud> prepare_on_device(const Context& context,
+                                             const std::vector<const Input*>& inputs,
+                                             const PrepareOptions& options,
+                                             const std::vector<std::string>& names) {
+  std::vector<PreparedCloud> out;
+  for (std::size_t begin = 0, end; begin < inputs.size(); begin = end) {
+    std::vector<DevicePointCloudView> views;
+    std::vector<CudaStream> streams;
+    std::vector<std::string> some_names;
+    std::size_t points = 0;
+    for (end = begin; end < inputs.size() && end - begin < kDeviceClouds &&
+                      (end == begin || points + inputs[end]->view.size <= kDevicePoints);
+         ++end) {
+      points += inputs[end]->view.size;
+      views.push_back(inputs[end]->device_view());
+      streams.push_back(inputs[end]->streams[0]);
+      if (!names.empty()) some_names.push_back(names[end]);
+    }
+    for (PreparedCloud& cloud :
+         prepare_batch_async(context, views, options, streams, some_names).get())
+      out.push_back(std::move(cloud));
+  }
+  return out;
+}
+
+/// Clouds on a device in batches, those of the host as one batch.
 std::vector<Cloud> prepare_clouds(const Context& context, const std::vector<Input>& inputs,
                                   const PrepareOptions& options,
                                   const std::vector<std::string>& names) {
-  std::vector<std::future<PreparedCloud>> futures(inputs.size());
   std::vector<PointCloudView> views;
-  std::vector<std::string> hosted_names;
+  std::vector<const Input*> device_inputs;
+  std::vector<std::string> view_names, device_names;
   for (std::size_t k = 0; k < inputs.size(); ++k) {
-    if (inputs[k].stream)
-      futures[k] = prepare_async(context, inputs[k].device_view(), options,
-                                 reinterpret_cast<CudaStream>(*inputs[k].stream));
-    else {
+    if (inputs[k].on_device)
+      device_inputs.push_back(&inputs[k]);
+    else
       views.push_back(inputs[k].view);
-      if (!names.empty()) hosted_names.push_back(names[k]);
-    }
+    if (!names.empty()) (inputs[k].on_device ? device_names : view_names).push_back(names[k]);
   }
-  std::vector<PreparedCloud> hosted = prepare_batch(context, views, options, hosted_names);
+  std::vector<PreparedCloud> on_device =
+                                 prepare_on_device(context, device_inputs, options, device_names),
+                             hosted = prepare_batch(context, views, options, view_names);
   std::vector<Cloud> out;
-  std::size_t next = 0;
-  for (std::size_t k = 0; k < inputs.size(); ++k)
-    out.push_back({inputs[k].stream ? futures[k].get() : std::move(hosted[next++])});
+  std::size_t next[2] = {0, 0};
+  for (const Input& input : inputs)
+    out.push_back({std::move(input.on_device ? on_device[next[1]++] : hosted[next[0]++])});
   return out;
 }
 

@@ -19,7 +19,8 @@ from ._las import is_las, read_las
 
 FloatArray = npt.NDArray[np.float32]
 Rows = FloatArray | DeviceRows
-#: (points, normals, features, viewpoints, origin, stream), all but the points may be None. With a stream, the first three are on a device.
+#: (points, normals, features, viewpoints, origin, streams), all but the points may be None. With
+#: streams, the first three are on a device, each written by the stream of its place.
 #: viewpoints False: the viewpoint is unknown, and not to be inferred.
 CoreCloud = tuple[
     Rows,
@@ -27,7 +28,7 @@ CoreCloud = tuple[
     Rows | None,
     FloatArray | Literal[False] | None,
     npt.NDArray[np.float64] | None,
-    int | None,
+    tuple[int, int, int] | None,
 ]
 
 _HOST_DEVICES = (1, 3)  # DLPack's kDLCPU and kDLCUDAHost
@@ -274,13 +275,20 @@ def _stay_on_device(
         if viewpoints is None
         else float_rows(matrix(viewpoints, prefix + "viewpoints", 3), prefix + "viewpoints")
     )
+    # Each array may be the work of another stream; a part that is missing waits for none.
+    of_points = stream_of(rows.owner)
+    streams = (
+        of_points,
+        of_points if normal_rows is None else stream_of(normal_rows.owner),
+        of_points if feature_rows is None else stream_of(feature_rows.owner),
+    )
     return (
         rows,
         normal_rows,
         feature_rows,
         None if views is None else np.ascontiguousarray(views),
         None,
-        stream_of(rows.owner),
+        streams,
     )
 
 

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The examples run, and are typed."""
 
+import json
 import pathlib
 import re
 import subprocess
@@ -46,6 +47,18 @@ def test_two_clouds(scans, tmp_path):
     assert "aligned" in shown and picture.read_bytes().startswith(b"\x89PNG")
 
 
+def test_notebook(capsys):
+    notebook = json.loads((FOLDER.parent / "notebooks" / "first_pair.ipynb").read_text())
+    names = {}
+    for cell in notebook["cells"]:
+        if cell["cell_type"] == "code":
+            exec("".join(cell["source"]), names)
+    shown = capsys.readouterr().out
+    assert float(re.match(r"True ([0-9.]+) ", shown).group(1)) > 0.9
+    # A tenth of a voxel: the noise of 60,000 points averages out.
+    assert float(re.search(r"off by ([0-9.]+) mm", shown).group(1)) < 5
+
+
 def test_batch(scans, tmp_path):
     pytest.importorskip("pyarrow")
     shown = run("02_batch.py", scans, "--output", tmp_path / "run", "--quality", 2)
@@ -54,7 +67,6 @@ def test_batch(scans, tmp_path):
 
 def test_many_fragments(tmp_path):
     pytest.importorskip("pyarrow")
-    pytest.importorskip("faiss")
     scans = tmp_path / "scans"
     scans.mkdir()
     for k, cloud in enumerate(make_fragments(24, seed=1)[0]):
@@ -65,6 +77,12 @@ def test_many_fragments(tmp_path):
         *("--voxel-size", 0.12, "--quality", 0),
     )
     assert "of the recall lost" in shown and "of 66 pairs tried" in shown
+
+
+def test_map(scans, tmp_path):
+    shown = run("07_map.py", scans, "--output", tmp_path / "map.ply")
+    assert "island 0: scans [0, 1" in shown and "weakest connection" in shown
+    assert len(gpureg.read_point_cloud(tmp_path / "map.ply").points) > 500
 
 
 def test_own_features():

@@ -12,7 +12,7 @@ import warnings
 import gpureg
 import numpy as np
 import pytest
-from gpureg._arrays import float_rows, to_numpy
+from gpureg._arrays import core_cloud, float_rows, to_numpy
 from scenes import few, moved, room
 
 
@@ -331,3 +331,32 @@ def test_viewpoints_that_cannot_be_what_a_cloud_was_seen_from():
         gpureg.prepare_batch(
             [gpureg.PointCloud(floor, normals=up, viewpoints=[[2, 2, side]]) for side in (2, -2)]
         )
+
+
+class OnDevice:
+    """An array as cupy has it: its interface names the stream that wrote it."""
+
+    def __init__(self, shape, stream, address=4096):
+        self.shape, self.dtype = shape, np.dtype("float32")
+        self._stream, self._address = stream, address
+
+    @property
+    def __cuda_array_interface__(self):
+        interface = {
+            "shape": self.shape,
+            "typestr": "<f4",
+            "data": (self._address, False),
+            "version": 3,
+        }
+        return interface if self._stream is None else {**interface, "stream": self._stream}
+
+
+def test_every_array_on_the_device_has_its_own_stream():
+    points, normals = OnDevice((5, 3), 11), OnDevice((5, 3), 22, 8192)
+    features = OnDevice((5, 7), None, 16384)
+    options = gpureg.PrepareOptions()
+    whole = core_cloud(points, normals, features, None, options, device=True)
+    assert [rows[0] for rows in whole[:3]] == [4096, 8192, 16384]
+    assert whole[5] == (11, 22, 0), "without a stream it is the default stream"
+    alone = core_cloud(points, None, None, None, options, device=True)
+    assert alone[5] == (11, 11, 11)

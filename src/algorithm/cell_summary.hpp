@@ -2,6 +2,7 @@
 #pragma once
 
 #include "algorithm/closest_build.hpp"
+#include "math/trigonometry.hpp"
 
 namespace gpureg {
 
@@ -51,8 +52,9 @@ GPUREG_HD std::uint32_t summarize_cell(Span<const std::uint32_t> candidates, Vec
       const float c = dot(mean, normals[i]);
       cosine = c < cosine ? c : cosine;
     }
-    const double angle = acos(static_cast<double>(cosine < -1.0f ? -1.0f : cosine)) / kDegrees +
-                         kSummaryQuantisation;
+    const double angle =
+        portable::acos(static_cast<double>(cosine < -1.0f ? -1.0f : cosine)) / kDegrees +
+        kSummaryQuantisation;
     const int steps = static_cast<int>(ceil(angle / kSummaryAngleStep));
     step = steps < kSummaryNoBound ? steps : kSummaryNoBound;
   }
@@ -83,8 +85,8 @@ struct SummaryLimits {
         if (covered) all_above[code] = -2.0f;
       } else if (step != kSummaryNoBound) {
         // The length of the rounded mean differs from 1, which scales the cosine up or down.
-        const double widest = std::cos((angle + spread) * kDegrees),
-                     narrowest = std::cos((angle - spread) * kDegrees);
+        const double widest = portable::cos((angle + spread) * kDegrees),
+                     narrowest = portable::cos((angle - spread) * kDegrees);
         if (angle + spread < 180.0)
           none_below[code] = static_cast<float>(widest * (widest > 0 ? 1 - kSummaryStretch
                                                                      : 1 + kSummaryStretch)) -

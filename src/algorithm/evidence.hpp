@@ -5,6 +5,7 @@
 #include "algorithm/icp.hpp"
 #include "algorithm/inlier.hpp"
 #include "algorithm/normal_weight.hpp"
+#include "math/trigonometry.hpp"
 
 namespace gpureg {
 
@@ -154,7 +155,7 @@ constexpr float kRefineNormalAngle = 45.0f;
 /// Host only: trace of a rotation by that angle.
 inline float mode_trace(float degrees) {
   return static_cast<float>(
-      1.0 + 2.0 * std::cos(static_cast<double>(degrees) * 3.14159265358979323846 / 180.0));
+      1.0 + 2.0 * portable::cos(static_cast<double>(degrees) * 3.14159265358979323846 / 180.0));
 }
 
 /// Exponent of the coarse score per unit of free-space violation: a violation of 17 % on one side
@@ -172,7 +173,7 @@ GPUREG_HD float coarse_score(float match_share, const SideEvidence& a, float wei
       a.observed > 0 ? static_cast<float>(a.violating) / static_cast<float>(a.observed) : 0.0f;
   const float vb =
       b.observed > 0 ? static_cast<float>(b.violating) / static_cast<float>(b.observed) : 0.0f;
-  // 1 / (series of e^x): an exp of a library differs between machines in its last bit.
+  // 1 / (series of e^x), in float for speed.
   const float x = kViolationPenalty * (va + vb);
   const float growth =
       fmaf(x, fmaf(x, fmaf(x, fmaf(x, 1.0f / 24.0f, 1.0f / 6.0f), 0.5f), 1.0f), 1.0f);

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "algorithm/support.hpp"
+#include "math/trigonometry.hpp"
 
 namespace gpureg {
 
@@ -12,13 +13,13 @@ struct InlierTest {
   float min_cosine;  ///< between the normals; -1: no test
 };
 
-/// Host only: libm computes the cosine, and both executors must get the same bits.
+/// Host only: once per call.
 inline InlierTest inlier_test(float max_distance, float max_normal_angle_degrees) {
   const float max_squared = max_distance * max_distance;
   const double angle =
       static_cast<double>(max_normal_angle_degrees) * 3.14159265358979323846 / 180.0;
   return {max_squared, 1.0f / max_squared,
-          max_normal_angle_degrees >= 180.0f ? -1.0f : static_cast<float>(std::cos(angle))};
+          max_normal_angle_degrees >= 180.0f ? -1.0f : static_cast<float>(portable::cos(angle))};
 }
 
 }  // namespace gpureg

@@ -12,6 +12,8 @@ namespace gpureg {
 
 /// Access of the library to the private parts of public handles.
 struct Access {
+  /// A context of any engine; tests give their own.
+  static Context context(std::shared_ptr<Engine> engine) { return Context(std::move(engine)); }
   static const std::shared_ptr<Engine>& engine(const Context& context) { return context.engine_; }
   static const std::shared_ptr<const PreparedState>& state(const PreparedCloud& cloud) {
     return cloud.state_;

@@ -45,6 +45,10 @@ std::vector<DeviceMemoryUse> Context::device_memory() const {
   return engine ? engine->device_memory() : std::vector<DeviceMemoryUse>{};
 }
 
+void Context::trim() const {
+  if (auto* engine = dynamic_cast<DeviceEngine*>(engine_.get())) engine->trim();
+}
+
 std::vector<std::string> describe_backends() {
   std::vector<std::string> lines;
   try {

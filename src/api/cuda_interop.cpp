@@ -5,39 +5,107 @@
 #include <array>
 
 #include "api/access.hpp"
+#include "api/name_cloud.hpp"
 #include "api/raw_cloud.hpp"
 #include "api/unknown_viewpoint.hpp"
+#include "common/in_halves.hpp"
 #include "pipeline/device_engine.hpp"
 
 namespace gpureg {
+namespace {
+
+/// Clouds whose rows are on their way into the memory of the engine.
+struct AdoptedBatch {
+  std::shared_ptr<DeviceEngine> engine;
+  std::vector<std::shared_ptr<AdoptedCloud>> clouds;
+  std::vector<std::array<double, 3>> origins;
+  std::vector<CloudKnowledge> knowledge;
+  PrepareOptions options;
+  std::vector<std::string> names;
+};
+
+AdoptedBatch adopt(const Context& context, const std::vector<DevicePointCloudView>& clouds,
+                   const PrepareOptions& options, const std::vector<CudaStream>& streams,
+                   const std::vector<std::string>& names) {
+  options.validate();
+  check_names(names, clouds.size());
+  if (streams.size() != 1 && streams.size() != clouds.size())
+    throw InvalidArgument("streams has " + std::to_string(streams.size()) +
+                          " entries, expected 1 or one for each of " +
+                          std::to_string(clouds.size()) + " clouds");
+  AdoptedBatch out;
+  out.engine = std::dynamic_pointer_cast<DeviceEngine>(Access::engine(context));
+  out.options = options;
+  out.names = names;
+  for (std::size_t k = 0; k < clouds.size(); ++k) {
+    const DevicePointCloudView& cloud = clouds[k];
+    naming_cloud(names, clouds.size(), k, [&] {
+      RawCloud raw = raw_cloud(cloud);
+      FrameOrigin frame_origin;
+      view_from_frame_origin(cloud.origin, frame_origin, raw);
+      if (!out.engine)
+        throw InvalidArgument("clouds in device memory need a CUDA context, this one is " +
+                              context.description());
+      const CudaStream stream = streams[streams.size() == 1 ? 0 : k];
+      out.clouds.push_back(out.engine->adopt(raw, {stream, cloud.normal_stream.value_or(stream),
+                                                   cloud.feature_stream.value_or(stream)}));
+    });
+    out.knowledge.push_back(knowledge_of(cloud));
+    out.origins.push_back({cloud.origin[0], cloud.origin[1], cloud.origin[2]});
+  }
+  return out;
+}
+
+/// Decides about unknown viewpoints, from host copies of the points where they are asked for.
+void resolve(const AdoptedBatch& batch, std::vector<std::shared_ptr<PreparedState>>& states) {
+  std::vector<std::vector<float>> rows(states.size());
+  std::vector<RawCloud> raw(states.size());
+  for (std::size_t k = 0; k < states.size(); ++k) {
+    const CloudKnowledge& known = batch.knowledge[k];
+    if (!known.viewpoints && !known.normals && batch.options.depth_maps > 0)
+      rows[k] = batch.engine->copy_points(*batch.clouds[k]);
+    raw[k].points = rows[k].data();
+    raw[k].size = rows[k].size() / 3;
+    raw[k].point_stride = 3;
+  }
+  resolve_viewpoints(*batch.engine, span_of(raw), batch.knowledge, batch.options, states);
+}
+
+std::vector<PreparedCloud> prepared(const AdoptedBatch& batch) {
+  std::vector<std::shared_ptr<PreparedState>> states;
+  in_halves(0, batch.clouds.size(), [&](std::size_t begin, std::size_t end) {
+    const auto work = [&] {
+      return batch.engine->prepare_adopted({batch.clouds.data() + begin, end - begin},
+                                           batch.options);
+    };
+    const std::size_t all = batch.clouds.size();
+    for (auto& state : end - begin == 1 ? naming_cloud(batch.names, all, begin, work) : work()) {
+      const std::array<double, 3>& origin = batch.origins[states.size()];
+      std::copy(origin.begin(), origin.end(), state->frame_offset);
+      states.push_back(std::move(state));
+    }
+  });
+  resolve(batch, states);
+  std::vector<PreparedCloud> out;
+  for (auto& state : states) out.push_back(Access::cloud(std::move(state)));
+  return out;
+}
+
+}  // namespace
 
 std::future<PreparedCloud> prepare_async(const Context& context, const DevicePointCloudView& cloud,
                                          const PrepareOptions& options, CudaStream stream) {
-  options.validate();
-  RawCloud raw = raw_cloud(cloud);
-  const CloudKnowledge known = knowledge_of(cloud);
-  FrameOrigin frame_origin;
-  view_from_frame_origin(cloud.origin, frame_origin, raw);
-  const std::shared_ptr<DeviceEngine> engine =
-      std::dynamic_pointer_cast<DeviceEngine>(Access::engine(context));
-  if (!engine)
-    throw InvalidArgument("clouds in device memory need a CUDA context, this one is " +
-                          context.description());
-  const std::shared_ptr<AdoptedCloud> adopted = engine->adopt(raw, stream);
-  const std::array<double, 3> origin{cloud.origin[0], cloud.origin[1], cloud.origin[2]};
-  raw.points = nullptr;  // only its form may be read from now on
-  return std::async(std::launch::async, [engine, adopted, options, origin, known, raw] {
-    std::vector<std::shared_ptr<PreparedState>> states{engine->prepare_adopted(*adopted, options)};
-    std::copy(origin.begin(), origin.end(), states[0]->frame_offset);
-    RawCloud hosted = raw;
-    std::vector<float> rows;
-    if (!known.viewpoints && !known.normals && options.depth_maps > 0)
-      rows = engine->copy_points(*adopted);
-    hosted.points = rows.data();
-    hosted.size = rows.size() / 3;
-    hosted.point_stride = 3;
-    resolve_viewpoints(*engine, {&hosted, 1}, {known}, options, states);
-    return Access::cloud(std::move(states[0]));
+  return std::async(std::launch::async, [batch = adopt(context, {cloud}, options, {stream}, {})] {
+    return prepared(batch).front();
+  });
+}
+
+std::future<std::vector<PreparedCloud>> prepare_batch_async(
+    const Context& context, const std::vector<DevicePointCloudView>& clouds,
+    const PrepareOptions& options, const std::vector<CudaStream>& streams,
+    const std::vector<std::string>& names) {
+  return std::async(std::launch::async, [batch = adopt(context, clouds, options, streams, names)] {
+    return prepared(batch);
   });
 }
 

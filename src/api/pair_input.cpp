@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "api/pair_input.hpp"
 
+#include "common/in_halves.hpp"
+
 namespace gpureg {
 namespace {
 
@@ -52,6 +54,16 @@ bool swaps(const PreparedState& source, const PreparedState& target,
 
 PairInput input_of(const PreparedState& source, const PreparedState& target, bool swapped) {
   return swapped ? PairInput{&target, &source, {}, {}} : PairInput{&source, &target, {}, {}};
+}
+
+void align_all(Engine& engine, const std::vector<PairInput>& pairs,
+               const RegistrationOptions& options, std::vector<PairOutcome>& outcomes) {
+  in_halves(0, pairs.size(), [&](std::size_t begin, std::size_t end) {
+    // A larger part that failed may have left some of its outcomes.
+    for (std::size_t p = begin; p < end; ++p) outcomes[p] = PairOutcome();
+    engine.align({pairs.data() + begin, end - begin}, options,
+                 {outcomes.data() + begin, end - begin});
+  });
 }
 
 }  // namespace gpureg

@@ -5,6 +5,7 @@
 
 #include "api/frames.hpp"
 #include "common/validate.hpp"
+#include "math/trigonometry.hpp"
 
 namespace gpureg {
 namespace {
@@ -65,7 +66,7 @@ PriorTest prior_test(const RegistrationPrior& prior, const PreparedState& source
     out.moved_up = to_vec3(swapped ? t : s);
     out.fixed_up = to_vec3(swapped ? s : t);
     out.min_up_cosine =
-        static_cast<float>(std::cos(prior.gravity->max_angle * kRadians) - kRounding);
+        static_cast<float>(portable::cos(prior.gravity->max_angle * kRadians) - kRounding);
   }
   if (prior.pose) {
     out.pose = true;
@@ -81,8 +82,8 @@ PriorTest prior_test(const RegistrationPrior& prior, const PreparedState& source
         out.expected.r[3 * row + column] = static_cast<float>(local.linear()(row, column));
       out.expected.t[row] = static_cast<float>(local.translation()[row]);
     }
-    out.min_trace =
-        static_cast<float>(1.0 + 2.0 * std::cos(prior.pose->max_rotation * kRadians) - kRounding);
+    out.min_trace = static_cast<float>(
+        1.0 + 2.0 * portable::cos(prior.pose->max_rotation * kRadians) - kRounding);
     out.max_squared_distance = static_cast<float>(prior.pose->max_translation *
                                                   prior.pose->max_translation * (1.0 + kRounding));
   }

@@ -5,6 +5,7 @@
 #include <string>
 
 #include "api/access.hpp"
+#include "api/name_cloud.hpp"
 #include "api/outcome.hpp"
 #include "api/pair_input.hpp"
 #include "api/prior.hpp"
@@ -12,6 +13,7 @@
 #include "api/unknown_viewpoint.hpp"
 #include "api/variants.hpp"
 #include "common/host_threads.hpp"
+#include "common/in_halves.hpp"
 #include "common/limits.hpp"
 #include "common/validate.hpp"
 
@@ -39,17 +41,9 @@ std::vector<PreparedCloud> prepare_batch(const Context& context,
                                          const PrepareOptions& options,
                                          const std::vector<std::string>& names) {
   options.validate();
-  if (!names.empty() && names.size() != clouds.size())
-    throw InvalidArgument("names has " + std::to_string(names.size()) +
-                          " entries, but clouds has " + std::to_string(clouds.size()));
+  check_names(names, clouds.size());
   const auto naming = [&](std::size_t k, auto&& action) {
-    try {
-      return action();
-    } catch (const InvalidArgument& error) {
-      if (names.empty() && clouds.size() == 1) throw;
-      throw InvalidArgument((names.empty() ? "clouds[" + std::to_string(k) + "]" : names[k]) +
-                            ": " + error.what());
-    }
+    return naming_cloud(names, clouds.size(), k, action);
   };
   std::vector<RawCloud> raw;
   raw.reserve(clouds.size());
@@ -62,17 +56,18 @@ std::vector<PreparedCloud> prepare_batch(const Context& context,
   }
   std::vector<PreparedCloud> out;
   if (raw.empty()) return out;
-  try {
-    auto states = Access::engine(context)->prepare(span_of(raw), options);
-    for (std::size_t k = 0; k < states.size(); ++k) set_frame_offset(clouds[k].origin, *states[k]);
-    resolve_viewpoints(*Access::engine(context), span_of(raw), knowledge, options, states);
-    for (auto& state : states) out.push_back(Access::cloud(std::move(state)));
-  } catch (const InvalidArgument&) {
-    // Stages process all clouds at once; preparing each alone finds the one to name in the error.
-    for (std::size_t k = 0; k < raw.size(); ++k)
-      naming(k, [&] { return Access::engine(context)->prepare({&raw[k], 1}, options); });
-    throw;
-  }
+  std::vector<std::shared_ptr<PreparedState>> states;
+  in_halves(0, raw.size(), [&](std::size_t begin, std::size_t end) {
+    const auto work = [&] {
+      return Access::engine(context)->prepare({raw.data() + begin, end - begin}, options);
+    };
+    for (auto& state : end - begin == 1 ? naming(begin, work) : work()) {
+      set_frame_offset(clouds[states.size()].origin, *state);
+      states.push_back(std::move(state));
+    }
+  });
+  resolve_viewpoints(*Access::engine(context), span_of(raw), knowledge, options, states);
+  for (auto& state : states) out.push_back(Access::cloud(std::move(state)));
   return out;
 }
 
@@ -179,7 +174,7 @@ std::vector<RegistrationResult> align_batch(const Context& context,
       if (!priors.empty())
         inputs.back().prior = prior_test(priors[variants[v].pair], s, t, swapped);
     }
-    Access::engine(context)->align(span_of(inputs), options, {outcomes.data(), outcomes.size()});
+    align_all(*Access::engine(context), inputs, options, outcomes);
     // A result by evidence takes about 50 us on the host, too much for one thread where a device
     // makes ten thousand per second.
     const std::size_t workers =

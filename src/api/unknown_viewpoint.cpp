@@ -6,6 +6,7 @@
 
 #include "api/viewpoint_inference.hpp"
 #include "common/host_threads.hpp"
+#include "common/in_halves.hpp"
 
 namespace gpureg {
 namespace {
@@ -124,7 +125,7 @@ void resolve_viewpoints(Engine& engine, Span<const RawCloud> raw,
   std::vector<RawCloud> inputs;
   for (const OpenCloud& cloud : open) {
     if (cloud.sides.signs.empty()) continue;
-    const bool own_features = raw.data[cloud.index].features != nullptr;
+    const bool own_features = knowledge[cloud.index].features;
     replacements.emplace_back(cloud, *states[cloud.index], own_features, 1.0f);
     if (!cloud.sides.sign_known)
       replacements.emplace_back(cloud, *states[cloud.index], own_features, -1.0f);
@@ -133,8 +134,11 @@ void resolve_viewpoints(Engine& engine, Span<const RawCloud> raw,
   for (const Replacement& replacement : replacements) inputs.push_back(replacement.raw());
   PrepareOptions as_they_are = options;
   as_they_are.voxel_size = 0;
-  std::vector<std::shared_ptr<PreparedState>> prepared =
-      engine.prepare(span_of(inputs), as_they_are);
+  std::vector<std::shared_ptr<PreparedState>> prepared;
+  in_halves(0, inputs.size(), [&](std::size_t begin, std::size_t end) {
+    for (auto& state : engine.prepare({inputs.data() + begin, end - begin}, as_they_are))
+      prepared.push_back(std::move(state));
+  });
   auto next = prepared.begin();
   for (const OpenCloud& cloud : open) {
     if (cloud.sides.signs.empty()) continue;

@@ -10,13 +10,14 @@ namespace gpureg {
 
 /// What the caller said about the viewpoints of a cloud.
 struct CloudKnowledge {
-  bool viewpoints, normals;  ///< given
-  bool infer_viewpoint;      ///< PointCloudView::infer_viewpoint
+  bool viewpoints, normals, features;  ///< given
+  bool infer_viewpoint;                ///< PointCloudView::infer_viewpoint
 };
 
 template <typename View>
 CloudKnowledge knowledge_of(const View& view) {
-  return {view.viewpoint_count > 0, view.normals != nullptr, view.infer_viewpoint};
+  return {view.viewpoint_count > 0, view.normals != nullptr, view.features != nullptr,
+          view.infer_viewpoint};
 }
 
 /// Sets PrepareStatistics::viewpoint of prepared clouds. Clouds whose sides turn out to be others

@@ -8,6 +8,7 @@
 #include "api/frames.hpp"
 #include "api/outcome.hpp"
 #include "api/pair_input.hpp"
+#include "common/in_halves.hpp"
 #include "confidence/confidence.hpp"
 #include "confidence/pose_evidence.hpp"
 
@@ -124,7 +125,13 @@ std::vector<PairOutcome> verify_all(Engine& engine, const std::vector<PairInput>
                            poses[p].begin() + static_cast<std::ptrdiff_t>(last));
     }
     std::vector<PairOutcome> more(inputs.size());
-    engine.verify(span_of(inputs), part, options, refine, {more.data(), more.size()});
+    in_halves(0, inputs.size(), [&](std::size_t first, std::size_t last) {
+      for (std::size_t p = first; p < last; ++p) more[p] = PairOutcome();
+      engine.verify({inputs.data() + first, last - first},
+                    {part.begin() + static_cast<std::ptrdiff_t>(first),
+                     part.begin() + static_cast<std::ptrdiff_t>(last)},
+                    options, refine, {more.data() + first, last - first});
+    });
     for (std::size_t p = 0; p < inputs.size(); ++p) {
       std::vector<ModeOutcome> modes = std::move(out[p].modes);
       modes.insert(modes.end(), more[p].modes.begin(), more[p].modes.end());
@@ -172,8 +179,7 @@ std::vector<std::vector<PoseVerification>> verify_poses_batch(
     const std::vector<PairOutcome> outcomes =
         verify_all(engine, inputs, local, by_evidence, verification.refine);
     std::vector<PairOutcome> found(inputs.size());
-    if (verification.search_alternatives)
-      engine.align(span_of(inputs), by_evidence, {found.data(), found.size()});
+    if (verification.search_alternatives) align_all(engine, inputs, by_evidence, found);
     for (std::size_t p = begin; p < end; ++p) {
       const VerifiedPair& pair = verified[p - begin];
       const PairOutcome& outcome = outcomes[p - begin];

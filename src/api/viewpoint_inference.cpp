@@ -28,6 +28,9 @@ constexpr double kClosedFlux = 0.05, kClosedContradiction = 2e-3;
 constexpr double kHiddenBack = 1e-2, kAlongRatio = 0.08;
 /// Input normals contradict each other: share of the edges, and ratio to that of better sides.
 constexpr double kContradictory = 0.04, kBetterSides = 3;
+/// Largest share of input normals that are repaired; where more disagree, they may mean something
+/// else than sides.
+constexpr double kMostRepaired = 1.0 / 3;
 /// Fewer edges tell nothing.
 constexpr std::size_t kMinEdges = 200;
 /// Rows whose spacing is measured.
@@ -223,6 +226,8 @@ InferredSides check_given_sides(const SurfaceGraph& graph) {
   for (const std::int8_t sign : better) sum += sign;
   if (sum < 0)
     for (std::int8_t& sign : better) sign = static_cast<std::int8_t>(-sign);
+  const auto flipped = std::count(better.begin(), better.end(), std::int8_t(-1));
+  if (static_cast<double>(flipped) > kMostRepaired * static_cast<double>(better.size())) return out;
   out.signs = std::move(better);
   return out;
 }

@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "gpureg/voxel_size.hpp"
 
-#include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <limits>
+
+#include "math/jacobi.hpp"
 
 namespace gpureg {
 namespace {
@@ -94,9 +95,12 @@ class SortedCloud {
       const Eigen::Vector3d mean = sum / static_cast<double>(count);
       const Eigen::Matrix3d covariance =
           outer / static_cast<double>(count) - mean * mean.transpose();
-      const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(covariance,
-                                                                  Eigen::EigenvaluesOnly);
-      distances.push_back(std::sqrt(std::max(0.0, solver.eigenvalues()[0])));
+      double values[3][3], vectors[3][3];
+      for (int i = 0; i < 3; ++i)
+        for (int j = 0; j < 3; ++j) values[i][j] = covariance(i, j);
+      jacobi_eigen<3, 8>(values, vectors);
+      const double smallest = std::min({values[0][0], values[1][1], values[2][2]});
+      distances.push_back(std::sqrt(std::max(0.0, smallest)));
     });
     return median(std::move(distances));
   }
@@ -136,9 +140,21 @@ class SortedCloud {
   Eigen::Index axis_ = 0;
 };
 
+/// Largest power of ten up to a positive finite value. Powers up to 10^22 are exact, so negative
+/// ones round once.
+double power_of_ten_below(double value) {
+  double power = 1;
+  if (value >= 1) {
+    while (power * 10 <= value) power *= 10;
+    return power;
+  }
+  while (1 / power > value) power *= 10;
+  return 1 / power;
+}
+
 /// Rounds to a readable number: 0.0473 becomes 0.05, 0.0134 becomes 0.013.
 double rounded(double value) {
-  const double unit = std::pow(10.0, std::floor(std::log10(value)));
+  const double unit = power_of_ten_below(value);
   const double digits = value / unit;
   return unit * (digits < 2 ? std::round(digits * 10) / 10 : std::round(digits * 2) / 2);
 }

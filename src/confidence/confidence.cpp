@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "confidence/confidence_model.hpp"
+#include "math/exponential.hpp"
 
 namespace gpureg::confidence {
 namespace {
@@ -13,8 +14,6 @@ const ConfidenceModel& model_of(AvailableEvidence available) {
   if (available.free_space) return available.surface_sides ? kFreeSpaceAndSurfaceSides : kFreeSpace;
   return available.surface_sides ? kSurfaceSides : kOverlapAlone;
 }
-
-double probability(double log_odds) { return 1.0 / (1.0 + std::exp(-log_odds)); }
 
 /// Probabilities of modes of which exactly one is correct, by their odds alone.
 std::vector<double> shares_of(const std::vector<RankedMode>& modes) {
@@ -25,7 +24,7 @@ std::vector<double> shares_of(const std::vector<RankedMode>& modes) {
   double sum = 0;
   std::vector<double> out;
   for (const RankedMode& mode : modes) {
-    out.push_back(std::exp(mode.log_odds - most));
+    out.push_back(portable::exp(mode.log_odds - most));
     sum += out.back();
   }
   for (double& share : out) share /= sum;
@@ -41,7 +40,7 @@ double factor_of(OverlapCount overlap) {
   // larger clouds, where the fits know the worth of small shares, a point counts more.
   constexpr double kFewPoints = 80, kSmallCloud = 1500;
   const double n = overlap.points / kFewPoints * std::max(1.0, overlap.of / kSmallCloud);
-  return 1.0 - std::exp(-n * n);
+  return 1.0 - portable::exp(-n * n);
 }
 
 std::vector<double> rank_modes(const std::vector<PoseEvidence>& modes,
@@ -64,8 +63,8 @@ std::vector<ModeConfidence> confidences_of(const std::vector<RankedMode>& modes,
   for (std::size_t k = 0; k < modes.size(); ++k) {
     Features x = features_of(modes[k].evidence, available, Regressand::confidence);
     add_rank(log_odds, k, refined, x);
-    ModeConfidence mode{probability(model.confidence.log_odds(x)),
-                        probability(model.overlap.log_odds(x))};
+    ModeConfidence mode{portable::logistic(model.confidence.log_odds(x)),
+                        portable::logistic(model.overlap.log_odds(x))};
     mode.confidence = std::min(mode.confidence, share[k]) * factor_of(modes[k].overlap);
     if (k > 0) mode.confidence = std::min(mode.confidence, out.front().confidence);
     mode.overlap_confidence = std::min(mode.overlap_confidence, mode.confidence);

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "confidence/features.hpp"
+#include "math/exponential.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -20,7 +21,7 @@ constexpr double kMinDenominator = 1e-6;
 /// Bounds the log odds as features: beyond, modes are certain one way or the other.
 constexpr double kMaxLogOdds = 14;
 
-double log_at_least(double value, double least) { return std::log(std::max(value, least)); }
+double log_at_least(double value, double least) { return portable::log(std::max(value, least)); }
 
 double share(double part, double whole) { return part / std::max(whole, kMinDenominator); }
 
@@ -47,7 +48,7 @@ void add_overlap(const PoseEvidence& e, Setter& set) {
   const Sides overlap{e.source_overlap, e.target_overlap};
   const Sides weighted{e.source_normal_weighted_overlap, e.target_normal_weighted_overlap};
   double volume = 0;
-  for (const double value : e.information_eigenvalues) volume += std::log1p(value);
+  for (const double value : e.information_eigenvalues) volume += portable::log1p(value);
   set(Feature::log_match_support, log_at_least(e.match_support, kMinMatchSupport));
   set(Feature::log_match_inliers, log_at_least(e.match_inliers, kMinMatchInliers));
   set(Feature::log_lower_weighted_overlap, log_at_least(weighted.lower(), kMinOverlap));

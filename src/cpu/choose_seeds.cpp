@@ -85,7 +85,9 @@ struct Sorted {
     for (int k = 1; k < 3; ++k) axis = extent(*axes[k]) > extent(*axes[axis]) ? k : axis;
     std::iota(match.begin(), match.end(), 0u);
     std::sort(match.begin(), match.end(), [&](std::uint32_t a, std::uint32_t b) {
-      return (*axes[axis])[a] < (*axes[axis])[b];
+      // A total order: the order of equal coordinates must not depend on the library's sort.
+      const float first = (*axes[axis])[a], second = (*axes[axis])[b];
+      return first != second ? first < second : a < b;
     });
     for (const std::uint32_t k : match) {
       px.push_back(m.px[k]);

@@ -2,6 +2,7 @@
 #include <algorithm>
 
 #include "algorithm/closest_build.hpp"
+#include "cpu/reachable_blocks.hpp"
 #include "cpu/stages.hpp"
 #include "pipeline/checks.hpp"
 
@@ -11,31 +12,7 @@ namespace {
 constexpr int kEdge = ClosestGridView::kBlockEdge;
 constexpr int kCells = ClosestGridView::kBlockCells;
 /// Keys (32 MB) from which on duplicates are removed in between.
-constexpr std::size_t kMaxKeys = std::size_t(1) << 22;
-/// Keys of all blocks with a location within the search distance of a point, ascending.
-std::vector<std::uint64_t> reachable_blocks(const std::vector<Vec3>& points,
-                                            const ClosestGeometry& g) {
-  const float inverse = 1.0f / block_edge(g);
-  const float reach = point_reach(g);
-  std::vector<std::uint64_t> keys;
-  for (const Vec3& p : points) {
-    const Cell lo = cell_of({p.x - reach, p.y - reach, p.z - reach}, inverse);
-    const Cell hi = cell_of({p.x + reach, p.y + reach, p.z + reach}, inverse);
-    for (std::int32_t z = lo.z; z <= hi.z; ++z)
-      for (std::int32_t y = lo.y; y <= hi.y; ++y)
-        for (std::int32_t x = lo.x; x <= hi.x; ++x) {
-          const std::uint64_t key = cell_key({x, y, z});
-          if (keys.empty() || keys.back() != key) keys.push_back(key);
-        }
-    if (keys.size() > kMaxKeys) {
-      std::sort(keys.begin(), keys.end());
-      keys.erase(std::unique(keys.begin(), keys.end()), keys.end());
-    }
-  }
-  std::sort(keys.begin(), keys.end());
-  keys.erase(std::unique(keys.begin(), keys.end()), keys.end());
-  return keys;
-}
+constexpr std::size_t kLeastKeys = std::size_t(1) << 22;
 
 struct BlockLists {
   std::vector<std::uint32_t> counts;      // per cell
@@ -109,6 +86,36 @@ void build_block(const GridView& grid, const std::vector<Vec3>& points, Cell blo
 
 }  // namespace
 
+std::vector<std::uint64_t> reachable_blocks(const std::vector<Vec3>& points,
+                                            const ClosestGeometry& g, std::size_t least_keys) {
+  const float inverse = 1.0f / block_edge(g);
+  const float reach = point_reach(g);
+  std::vector<std::uint64_t> keys;
+  std::size_t most_keys = least_keys;
+  const auto remove_duplicates = [&] {
+    std::sort(keys.begin(), keys.end());
+    keys.erase(std::unique(keys.begin(), keys.end()), keys.end());
+  };
+  for (const Vec3& p : points) {
+    const Cell lo = cell_of({p.x - reach, p.y - reach, p.z - reach}, inverse);
+    const Cell hi = cell_of({p.x + reach, p.y + reach, p.z + reach}, inverse);
+    for (std::int32_t z = lo.z; z <= hi.z; ++z)
+      for (std::int32_t y = lo.y; y <= hi.y; ++y)
+        for (std::int32_t x = lo.x; x <= hi.x; ++x) {
+          const std::uint64_t key = cell_key({x, y, z});
+          if (keys.empty() || keys.back() != key) keys.push_back(key);
+        }
+    if (keys.size() > most_keys) {
+      remove_duplicates();
+      // A large map has more blocks than the first limit: sorting them all for every few points
+      // would never end.
+      most_keys = std::max(least_keys, 2 * keys.size());
+    }
+  }
+  remove_duplicates();
+  return keys;
+}
+
 ClosestGridView ClosestGrid::view() const {
   return {1.0f / cell_size, span_of(table.entries), span_of(cell_start), span_of(candidates)};
 }
@@ -123,7 +130,7 @@ std::vector<ClosestGrid> build_closest_grids(Exec& exec,
   std::vector<std::vector<BlockLists>> lists(clouds.size());
   exec.parallel(clouds.size(), [&](std::size_t c) {
     geometry[c] = closest_geometry(options.max_correspondence_distance, clouds[c].radius);
-    keys[c] = reachable_blocks(clouds[c].points, geometry[c]);
+    keys[c] = reachable_blocks(clouds[c].points, geometry[c], kLeastKeys);
     lists[c].resize(keys[c].size());
   });
   exec.parallel_items(
@@ -138,7 +145,7 @@ std::vector<ClosestGrid> build_closest_grids(Exec& exec,
     grid.cell_size = geometry[c].cell_size;
     std::size_t total = 0;
     for (const BlockLists& l : lists[c]) total += l.candidates.size();
-    if (total > limits::kMaxGridCandidates)
+    if (pipeline::too_many_candidates(total, clouds[c].points.size()))
       pipeline::throw_too_dense(options.max_correspondence_distance);
     grid.table.reset(keys[c].size());
     grid.cell_start.reserve(keys[c].size() * (kCells + 1));
@@ -154,6 +161,7 @@ std::vector<ClosestGrid> build_closest_grids(Exec& exec,
       grid.cell_start.push_back(offset);
       grid.candidates.insert(grid.candidates.end(), lists[c][b].candidates.begin(),
                              lists[c][b].candidates.end());
+      lists[c][b] = BlockLists();  // a map's lists take as much memory as its grid
     }
   });
   return out;

@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "cpu/exec.hpp"
 
+#include "common/host_threads.hpp"
+
 namespace gpureg::cpu {
 
-Exec::Exec(unsigned threads) {
-  for (unsigned k = 1; k < threads; ++k) workers_.emplace_back([this] { worker(); });
-}
+Exec::Exec(unsigned threads)
+    : workers_(start_threads(threads > 0 ? threads - 1 : 0,
+                             [this](std::size_t) { return std::thread([this] { worker(); }); })) {}
 
 Exec::~Exec() {
   {

@@ -16,6 +16,7 @@ namespace gpureg::cpu {
 /// of a block must depend on the block only.
 class Exec {
  public:
+  /// Fewer threads where the system starts no more.
   explicit Exec(unsigned threads);
   ~Exec();
   Exec(const Exec&) = delete;
@@ -55,7 +56,6 @@ class Exec {
   void run_tasks();
   void worker();
 
-  std::vector<std::thread> workers_;
   std::mutex mutex_;
   std::condition_variable wake_, done_;
   const std::function<void(std::size_t)>* task_ = nullptr;
@@ -63,6 +63,7 @@ class Exec {
   unsigned long generation_ = 0;
   bool stop_ = false;
   std::exception_ptr error_;
+  std::vector<std::thread> workers_;  ///< last: they use the other members from their start
 };
 
 }  // namespace gpureg::cpu

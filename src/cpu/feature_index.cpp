@@ -2,6 +2,7 @@
 #include "cpu/feature_index.hpp"
 
 #include <algorithm>
+#include <cstring>
 #include <limits>
 
 #if defined(__AVX2__) && defined(__FMA__)
@@ -195,13 +196,62 @@ class Search {
   std::uint32_t best_row_ = kNoValue;
 };
 
+/// Equal rows by a hash table of the first of each.
+class EqualRows {
+ public:
+  explicit EqualRows(FeatureRows rows) : rows_(rows) {
+    std::size_t places = 8;
+    while (places < 2 * std::size_t(rows.size)) places *= 2;
+    first_.assign(places, kNoValue);
+  }
+  /// The first row that equals row i; i itself where there is none before.
+  std::uint32_t first(std::uint32_t i) {
+    const float* row = values(i);
+    for (std::size_t place = hash(row);; ++place) {
+      std::uint32_t& there = first_[place & (first_.size() - 1)];
+      if (there == kNoValue) there = i;
+      // As distances see it: 0 equals -0.
+      if (there == i || std::equal(row, row + rows_.dimension, values(there))) return there;
+    }
+  }
+
+ private:
+  const float* values(std::uint32_t i) const {
+    return rows_.values + static_cast<std::size_t>(i) * rows_.dimension;
+  }
+  std::size_t hash(const float* row) const {
+    std::uint64_t h = 0;
+    for (std::uint32_t d = 0; d < rows_.dimension; ++d) {
+      const float v = row[d] + 0.0f;  // 0 for -0
+      std::uint32_t bits;
+      std::memcpy(&bits, &v, sizeof bits);
+      h = (h ^ bits) * 0x9e3779b97f4a7c15u;
+      h ^= h >> 29;
+    }
+    return static_cast<std::size_t>(h);
+  }
+
+  FeatureRows rows_;
+  std::vector<std::uint32_t> first_;
+};
+
 }  // namespace
 
 FeatureIndex index_features(FeatureRows rows) {
   FeatureIndex out;
   out.dimension = rows.dimension;
-  for (std::uint32_t i = 0; i < rows.size; ++i)
-    if (rows.valid[i]) out.row.push_back(i);
+  out.next_equal.assign(rows.size, kNoValue);
+  EqualRows equal(rows);
+  for (std::uint32_t i = 0; i < rows.size; ++i) {
+    if (!rows.valid[i]) continue;
+    const std::uint32_t first = equal.first(i);
+    if (first == i) {
+      out.row.push_back(i);
+    } else {
+      out.next_equal[i] = out.next_equal[first];
+      out.next_equal[first] = i;
+    }
+  }
   out.rows = static_cast<std::uint32_t>(out.row.size());
   Splitter(rows).split(out.row.data(), out.row.data() + out.rows);
   out.nodes = (out.rows + kNodeRows - 1) / kNodeRows;
@@ -242,7 +292,8 @@ void nearest_features(FeatureRows queries, const FeatureIndex& order, FeatureRow
             ? kInfinity
             : distance(query, rows.values + static_cast<std::size_t>(guess) * rows.dimension,
                        rows.dimension);
-    out[order.row[k]] = guess = index.nodes == 0 ? kNoValue : search.nearest(query, guess, far);
+    guess = index.nodes == 0 ? kNoValue : search.nearest(query, guess, far);
+    for (std::uint32_t q = order.row[k]; q != kNoValue; q = order.next_equal[q]) out[q] = guess;
   }
 }
 

@@ -13,9 +13,12 @@ namespace gpureg::cpu {
 struct FeatureIndex {
   static constexpr std::uint32_t kLeaf = 16, kNode = 8, kNodeRows = kLeaf * kNode;
   std::uint32_t dimension = 0, nodes = 0;
-  std::vector<std::uint32_t>
-      row;                    ///< nodes x 128, valid rows in the order of the leaves, then kNoValue
-  std::uint32_t rows = 0;     ///< number of valid rows
+  std::vector<std::uint32_t> row;  ///< nodes x 128, different valid rows in the order of the
+                                   ///< leaves, then kNoValue
+  std::uint32_t rows = 0;          ///< number of different valid rows
+  /// Per row the next equal one; kNoValue: none. Noise-free walls have thousands of equal features.
+  /// Only the first of them is in the index: no other is ever found, and all find the same.
+  std::vector<std::uint32_t> next_equal;
   std::vector<float> values;  ///< leaf, dimension, row of the leaf; infinity where there is none
   std::vector<float>
       leaf_boxes;  ///< node, dimension, lower ends of its 8 leaves and then the upper ones
@@ -24,7 +27,8 @@ struct FeatureIndex {
 
 FeatureIndex index_features(FeatureRows rows);
 
-/// Searches the nearest row for the rows begin to end (exclusive) in the order of their own index.
+/// Searches the nearest row for the rows begin to end (exclusive) in the order of their own index,
+/// and for the rows that equal them.
 /// out[q]: result of nearest_features() with k = 1 for row q. The rows of one leaf are similar, so
 /// each search starts with the result of the previous one.
 void nearest_features(FeatureRows queries, const FeatureIndex& order, FeatureRows rows,

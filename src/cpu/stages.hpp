@@ -3,6 +3,7 @@
 
 #include "cpu/exec.hpp"
 #include "cpu/stage_data.hpp"
+#include "pipeline/runs.hpp"
 
 /// The stages of the pipeline on the CPU: free functions without state of their own, each on a
 /// batch. The CUDA backend has the same names. The computation of one element is in src/algorithm.
@@ -48,6 +49,15 @@ std::vector<Matches> match_features(Exec& exec, Span<const PairView> pairs,
 std::vector<std::vector<std::uint32_t>> sample_quadruples(Exec& exec,
                                                           const std::vector<Matches>& matches,
                                                           const RegistrationOptions& options);
+/// All pairs are one run: the engine takes few at a time.
+inline std::vector<pipeline::Run> runs_of(Exec&,
+                                          const std::vector<std::vector<std::uint32_t>>& samples) {
+  return {{0, samples.size()}};
+}
+inline const std::vector<std::vector<std::uint32_t>>& survivors_of(
+    Exec&, const std::vector<std::vector<std::uint32_t>>& samples, pipeline::Run) {
+  return samples;
+}
 std::vector<Hypotheses> fit_hypotheses(Exec& exec, const std::vector<Matches>& matches,
                                        const std::vector<std::vector<std::uint32_t>>& quadruples,
                                        const RegistrationOptions& options);

@@ -6,10 +6,10 @@
 #include <unistd.h>
 
 #include <cerrno>
-#include <charconv>
 #include <cmath>
 #include <system_error>
 
+#include "files/numbers.hpp"
 #include "gpureg/error.hpp"
 
 namespace gpureg::files {
@@ -34,7 +34,7 @@ template <typename T>
 bool parse(std::string_view text, T& value) {
   if (text.size() > 1 && text[0] == '+' && text[1] != '-') text.remove_prefix(1);
   const char* end = text.data() + text.size();
-  const auto [stop, error] = std::from_chars(text.data(), end, value);
+  const auto [stop, error] = files::from_chars(text.data(), end, value);
   return error == std::errc() && stop == end;
 }
 

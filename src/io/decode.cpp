@@ -2,10 +2,10 @@
 #include "io/decode.hpp"
 
 #include <algorithm>
-#include <charconv>
 #include <cstring>
 #include <limits>
 
+#include "files/numbers.hpp"
 #include "files/text_file.hpp"
 
 namespace gpureg::io {
@@ -61,7 +61,7 @@ bool parse_coordinate(std::string_view text, float& value) {
   if (text.size() > 1 && text[0] == '+' && text[1] != '-') text.remove_prefix(1);
   const char* const end = text.data() + text.size();
   double parsed = 0;
-  const auto [stop, error] = std::from_chars(text.data(), end, parsed);
+  const auto [stop, error] = files::from_chars(text.data(), end, parsed);
   if (stop != end || error == std::errc::invalid_argument) return false;
   if (error == std::errc::result_out_of_range) {
     const bool tiny = text.find("e-") != text.npos || text.find("E-") != text.npos;

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "io/pcd.hpp"
 
-#include <charconv>
 #include <cmath>
 #include <optional>
 
+#include "files/numbers.hpp"
 #include "files/text_file.hpp"
 #include "io/decode.hpp"
 #include "io/lzf.hpp"
@@ -40,7 +40,7 @@ Eigen::Vector3f viewpoint_of(const Fields& fields, const Source& source) {
   for (std::size_t k = 0; k < 3; ++k) {
     const std::string_view text = fields[k + 1];
     double value = 0;
-    const auto [stop, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+    const auto [stop, error] = files::from_chars(text.data(), text.data() + text.size(), value);
     if (error != std::errc() || stop != text.data() + text.size() ||
         !std::isfinite(static_cast<float>(value)))
       source.fail_line("VIEWPOINT has " + quoted(text) + ", expected a finite number");

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "loop_consistency/consistency_graph.hpp"
+#include "math/trigonometry.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -150,14 +151,14 @@ void ConsistencyGraph::find_neighbors() {
 double ConsistencyGraph::closing_ratio(const UnalignedIsometry3d& loop, double tolerance,
                                        std::initializer_list<Eigen::Vector3d> points) const {
   const double angle =
-      kDegrees * std::acos(std::clamp((loop.linear().trace() - 1.0) / 2.0, -1.0, 1.0));
+      kDegrees * portable::acos(std::clamp((loop.linear().trace() - 1.0) / 2.0, -1.0, 1.0));
   double squared = 0;
   for (const Eigen::Vector3d& p : points) squared = std::max(squared, (loop * p - p).squaredNorm());
   const double turn = angle / (tolerance * static_cast<double>(options_.closing_angle));
   const double distance = tolerance * static_cast<double>(options_.closing_distance);
   const double shift = squared / (distance * distance);
   return std::max(options_.missed_closure_rate,
-                  std::exp(-0.5 * (turn * turn + shift)) / options_.false_closure_rate);
+                  portable::exp(-0.5 * (turn * turn + shift)) / options_.false_closure_rate);
 }
 
 }  // namespace gpureg

@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "loop_consistency/consistency_graph.hpp"
+#include "math/exponential.hpp"
 
 namespace gpureg {
 namespace {
@@ -33,12 +34,12 @@ void update_from_loop(const ConsistencyGraph& graph, const ConsistencyEdge& edge
                       ratio(graph, edge.first, edge.second, third, first_from_second,
                             from_second.pose(g, edge.second), first_from_third);
     }
-    log_odds[m] += std::log(likelihood);
+    log_odds[m] += portable::log(likelihood);
   }
 }
 
 std::vector<double> updated(const ConsistencyGraph& graph, ConsistencyEdge& edge) {
-  const double most = std::log(graph.options().max_odds_factor);
+  const double most = portable::log(graph.options().max_odds_factor);
   std::vector<double> log_odds(edge.candidates.size(), 0.0);
   const std::vector<ConsistencyNeighbor>&first = graph.neighbors(edge.first),
         &second = graph.neighbors(edge.second);
@@ -61,7 +62,7 @@ std::vector<double> updated(const ConsistencyGraph& graph, ConsistencyEdge& edge
   double none = 1.0, sum = 0;
   for (std::size_t m = 0; m < out.size(); ++m) {
     none -= edge.candidates[m].prior;
-    sum += out[m] = edge.candidates[m].prior * std::exp(std::clamp(log_odds[m], -most, most));
+    sum += out[m] = edge.candidates[m].prior * portable::exp(std::clamp(log_odds[m], -most, most));
   }
   sum += std::max(none, kMinNoneProbability);
   for (std::size_t m = 0; m < out.size(); ++m)

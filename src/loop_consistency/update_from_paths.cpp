@@ -4,6 +4,7 @@
 #include <numeric>
 
 #include "loop_consistency/consistency_graph.hpp"
+#include "math/exponential.hpp"
 
 namespace gpureg {
 namespace {
@@ -31,7 +32,7 @@ class SpanningForest {
     if (a.root != b.root) return {0, 0.0, UnalignedIsometry3d::Identity()};
     const Node& top = nodes_[common_ancestor(first, second)];
     return {a.depth + b.depth - 2 * top.depth,
-            std::exp(a.log_confidence + b.log_confidence - 2 * top.log_confidence),
+            portable::exp(a.log_confidence + b.log_confidence - 2 * top.log_confidence),
             a.root_from_here.inverse() * b.root_from_here};
   }
 
@@ -89,7 +90,7 @@ class SpanningForest {
         next.depth = up.depth + 1;
         next.jump = up.depth - far.depth == far.depth - nodes_[far.jump].depth ? far.jump : here;
         next.log_confidence =
-            up.log_confidence + std::log(std::max(kMinPathConfidence, edge.confidence()));
+            up.log_confidence + portable::log(std::max(kMinPathConfidence, edge.confidence()));
         next.root_from_here = up.root_from_here * edge.pose(edge.most_likely(), here);
         open.push_back(n.cloud);
       }

@@ -4,6 +4,7 @@
 #include <string>
 
 #include "algorithm/closest.hpp"
+#include "common/limits.hpp"
 #include "gpureg/error.hpp"
 #include "gpureg/options.hpp"
 
@@ -47,8 +48,15 @@ inline void check_density(double squares, std::size_t points, const PrepareOptio
         " or the radii are too small for the cloud; are they in the unit of the points?");
 }
 
-/// For a grid with more candidates than limits::kMaxGridCandidates or a block with more than
-/// limits::kMaxBlockCandidates: downsampling is the remedy, not memory.
+/// True where a closest-point grid has more candidates than a cloud of so many points may need.
+inline bool too_many_candidates(std::uint64_t candidates, std::uint64_t points) {
+  return candidates > limits::kMaxGridCandidates &&
+         (candidates > limits::kMaxCandidatesPerPoint * points ||
+          candidates >= limits::kMaxMapCandidates);
+}
+
+/// For a grid with too_many_candidates() or a block with more than limits::kMaxBlockCandidates:
+/// downsampling is the remedy, not memory.
 [[noreturn]] inline void throw_too_dense(float search_distance) {
   throw InvalidArgument("point cloud is too dense for max_correspondence_distance " +
                         std::to_string(search_distance) + ": prepare it with voxel_size > 0");

@@ -26,6 +26,9 @@ struct RawCloud {
   std::size_t feature_dimension, feature_stride;
   const float* viewpoints;
   std::size_t viewpoint_count;
+  /// Points, normals and features are tight rows in memory of the engine's device, see
+  /// DeviceEngine::adopt().
+  bool on_device;
 };
 
 /// One pair for the stages. custom_*: given correspondences instead of features; null and 0

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "pose_graph/bridges.hpp"
+#include "math/exponential.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -67,7 +68,7 @@ void reject_unchecked(const Problem& problem, double min_confidence, Selection& 
     const EdgeTerm& edge = problem.edges[k];
     if (edge.odometry) continue;
     const double prior = problem.modes[edge.first_mode + selection.modes[k]].prior;
-    const double confidence = 1 / (1 + std::exp(-0.5 * prior));
+    const double confidence = portable::logistic(0.5 * prior);
     // Log odds and back: a confidence of exactly the minimum stays.
     constexpr double rounding = 1e-12;
     if (confidence < min_confidence - rounding) selection.weights[k] = 0;

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <map>
 
+#include "math/exponential.hpp"
 #include "pose_graph/components.hpp"
 #include "pose_graph/parallel.hpp"
 #include "pose_graph/uncertain_pose.hpp"
@@ -82,7 +83,7 @@ class Cycles {
       reach = std::max(1e-3, 2 * *high);
     }
     constexpr double pi = 3.14159265358979323846;
-    log_volume_ = std::log(8 * pi * pi) + std::log(4.0 / 3 * pi * reach * reach * reach);
+    log_volume_ = portable::log(8 * pi * pi) + portable::log(4.0 / 3 * pi * reach * reach * reach);
   }
 
   const std::vector<Candidate>& candidates() const { return candidates_; }
@@ -158,8 +159,9 @@ class Cycles {
     const double squared = e.dot(factor.solve(e));
     if (!(squared <= quantile_)) return 0;
     constexpr double log_two_pi = 1.8378770664093453;
-    const double log_density =
-        -0.5 * (squared + 6 * log_two_pi + factor.vectorD().array().log().sum());
+    double log_determinant = 0;
+    for (const double d : factor.vectorD()) log_determinant += portable::log(d);
+    const double log_density = -0.5 * (squared + 6 * log_two_pi + log_determinant);
     return std::clamp(log_density + log_volume_, 0.0, kMostEvidence);
   }
 
@@ -196,14 +198,14 @@ std::vector<double> mode_probabilities(const std::vector<Candidate>& candidates,
                                        const std::vector<std::vector<ClosedCycle>>& closed_cycles) {
   std::vector<double> probability(candidates.size()), odds(candidates.size());
   for (std::size_t c = 0; c < candidates.size(); ++c)
-    probability[c] = 1 / (1 + std::exp(-candidates[c].prior));
+    probability[c] = portable::logistic(candidates[c].prior);
   for (int round = 0; round < kBeliefRounds; ++round) {
     for (std::size_t c = 0; c < candidates.size(); ++c) {
       double sum = candidates[c].prior;
       for (const ClosedCycle& a : closed_cycles[c])
         sum += a.evidence * probability[a.others[0]] *
                (a.others[1] < 0 ? 1 : probability[a.others[1]]);
-      odds[c] = std::exp(std::min(sum, 50.0));
+      odds[c] = portable::exp(std::min(sum, 50.0));
     }
     for (std::size_t begin = 0; begin < candidates.size();) {
       std::size_t end = begin;

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <limits>
 
+#include "math/exponential.hpp"
 #include "pose_graph/bridges.hpp"
 #include "pose_graph/parallel.hpp"
 #include "pose_graph/robust.hpp"
@@ -17,6 +18,9 @@ constexpr double kRoundTolerance = 1e-3;
 constexpr double kBinary = 1e-3;
 /// Beyond this mu only loops within 12 % of their threshold are undecided, which settle() decides.
 constexpr double kLastMu = 8;
+/// Where no loop is further from its threshold than this, as a ratio of squared errors, least
+/// squares over all is right up to noise: the tail of correct loops needs no graduation.
+constexpr double kWithinNoise = 2;
 /// Corrections of the accepted set at the end.
 constexpr int kMostCorrections = 6;
 
@@ -69,7 +73,7 @@ double chi_square_quantile(double probability) {
   double low = 0, high = 1e3;
   for (int k = 0; k < 200; ++k) {
     const double x = 0.5 * (low + high);
-    (1 - std::exp(-x / 2) * (1 + x / 2 + x * x / 8) < probability ? low : high) = x;
+    (1 - portable::exp(-x / 2) * (1 + x / 2 + x * x / 8) < probability ? low : high) = x;
   }
   return high;
 }
@@ -119,31 +123,55 @@ bool update_weights(const Problem& problem, const std::vector<char>& candidates,
 
 double hard_weight(double ratio) { return ratio <= 1 ? 1 : 0; }
 
+bool minimised(const Problem& problem, NormalEquations& equations, int iterations, Control& control,
+               Estimate& estimate) {
+  const MinimisationResult result = minimise(problem, equations, estimate.selection, iterations,
+                                             kRoundTolerance, control, estimate.poses);
+  estimate.failed = result.failed;
+  estimate.converged = result.converged;
+  estimate.last_decrease = result.last_decrease;
+  return !result.failed && !control.cancelled;
+}
+
+double worst_of(const std::vector<Fit>& fits) {
+  double worst = 0;
+  for (const Fit& fit : fits)
+    if (std::isfinite(fit.ratio)) worst = std::max(worst, fit.ratio);
+  return worst;
+}
+
+/// Least squares over odometry and all candidates that may be accepted.
+bool fit_candidates(const Problem& problem, NormalEquations& equations,
+                    const std::vector<char>& candidates, double quantile, Control& control,
+                    Estimate& estimate) {
+  update_weights(problem, candidates,
+                 fits_of(problem, candidates, estimate.poses, quantile, control.threads),
+                 estimate.selection, [](double ratio) { return std::isfinite(ratio) ? 1.0 : 0.0; });
+  return minimised(problem, equations, control.options.solver.max_iterations, control, estimate);
+}
+
 }  // namespace
+
+bool fit_all(const Problem& problem, NormalEquations& equations,
+             const std::vector<char>& candidates, double quantile, Control& control,
+             Estimate& estimate) {
+  if (!fit_candidates(problem, equations, candidates, quantile, control, estimate)) return false;
+  const std::vector<Fit> now =
+      fits_of(problem, candidates, estimate.poses, quantile, control.threads);
+  if (worst_of(now) > kWithinNoise) return false;
+  update_weights(problem, candidates, now, estimate.selection, hard_weight);
+  return minimised(problem, equations, control.options.solver.max_iterations, control, estimate);
+}
 
 void graduate(const Problem& problem, NormalEquations& equations,
               const std::vector<char>& candidates, bool least_squares_first, double quantile,
               Control& control, Estimate& estimate) {
   const Options& options = control.options;
-  const auto fits = [&] {
-    return fits_of(problem, candidates, estimate.poses, quantile, control.threads);
-  };
-  const auto minimise_now = [&](int iterations, double tolerance) {
-    const MinimisationResult result = minimise(problem, equations, estimate.selection, iterations,
-                                               tolerance, control, estimate.poses);
-    estimate.failed = result.failed;
-    estimate.converged = result.converged;
-    return !result.failed && !control.cancelled;
-  };
-  if (least_squares_first) {
-    update_weights(problem, candidates, fits(), estimate.selection,
-                   [](double ratio) { return std::isfinite(ratio) ? 1.0 : 0.0; });
-    if (!minimise_now(options.solver.max_iterations, kRoundTolerance)) return;
-  }
-  std::vector<Fit> now = fits();
-  double worst = 0;
-  for (int k = 0; k < problem.edge_count(); ++k)
-    if (std::isfinite(now[k].ratio)) worst = std::max(worst, now[k].ratio);
+  if (least_squares_first &&
+      !fit_candidates(problem, equations, candidates, quantile, control, estimate))
+    return;
+  std::vector<Fit> now = fits_of(problem, candidates, estimate.poses, quantile, control.threads);
+  const double worst = worst_of(now);
   if (worst > 1) {
     double mu = 1 / (2 * worst - 1);
     for (int round = 0; round < options.gnc.max_rounds; ++round, mu *= options.gnc.mu_step) {
@@ -151,12 +179,12 @@ void graduate(const Problem& problem, NormalEquations& equations,
           update_weights(problem, candidates, now, estimate.selection,
                          [&](double ratio) { return truncated_weight(ratio, mu); });
       if ((!undecided && mu > 1) || mu > kLastMu) break;
-      if (!minimise_now(kStepsPerRound, kRoundTolerance)) return;
-      now = fits();
+      if (!minimised(problem, equations, kStepsPerRound, control, estimate)) return;
+      now = fits_of(problem, candidates, estimate.poses, quantile, control.threads);
     }
   }
   update_weights(problem, candidates, now, estimate.selection, hard_weight);
-  minimise_now(options.solver.max_iterations, kRoundTolerance);
+  minimised(problem, equations, options.solver.max_iterations, control, estimate);
 }
 
 void settle(const Problem& problem, NormalEquations& equations, double quantile, Control& control,
@@ -170,12 +198,14 @@ void settle(const Problem& problem, NormalEquations& equations, double quantile,
     reject_unchecked(problem, control.options.gnc.min_bridge_confidence, estimate.selection);
     const bool same =
         estimate.selection.weights == before.weights && estimate.selection.modes == before.modes;
-    if (same && round > 0) break;
+    const bool exact = estimate.converged && estimate.last_decrease <= solver.relative_tolerance;
+    if (same && (round > 0 || exact)) break;
     const MinimisationResult result =
         minimise(problem, equations, estimate.selection, solver.max_iterations,
                  solver.relative_tolerance, control, estimate.poses);
     estimate.failed = result.failed;
     estimate.converged = result.converged;
+    estimate.last_decrease = result.last_decrease;
     if (result.failed || control.cancelled) break;
   }
   estimate.cost = truncated_cost(problem, estimate.poses, quantile, control.threads);

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "pose_graph/initialise.hpp"
+#include "math/exponential.hpp"
 
 #include <cmath>
 #include <functional>
@@ -11,7 +12,7 @@ namespace gpureg::pose_graph {
 namespace {
 
 /// A mode of small confidence is no better than this many sure ones in a row.
-double doubt(const ModeTerm& mode) { return std::exp(-0.5 * mode.prior); }
+double doubt(const ModeTerm& mode) { return portable::exp(-0.5 * mode.prior); }
 
 /// Variance of a mode in squared metres and squared radians, for comparing paths. An inverse of the
 /// diagonal: it exists where the matrix has no inverse.

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "pose_graph/json.hpp"
 
-#include <charconv>
 #include <cmath>
 #include <string_view>
 #include <system_error>
 
+#include "files/numbers.hpp"
 #include "files/text_file.hpp"
 #include "gpureg/error.hpp"
 
@@ -151,7 +151,7 @@ class Parser {
   double number() {
     double value = 0;
     const char* begin = text_.data() + at_;
-    const auto [end, error] = std::from_chars(begin, text_.data() + text_.size(), value);
+    const auto [end, error] = files::from_chars(begin, text_.data() + text_.size(), value);
     const bool starts = *begin == '-' || (*begin >= '0' && *begin <= '9');
     if (!starts || error != std::errc() || !std::isfinite(value)) {
       const std::size_t stop = text_.find_first_of(" \t\r\n,]}", at_);

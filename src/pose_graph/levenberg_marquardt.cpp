@@ -25,7 +25,7 @@ MinimisationResult minimise(const Problem& problem, NormalEquations& equations,
                             double relative_tolerance, Control& control, std::vector<Pose>& poses) {
   MinimisationResult out;
   out.cost = weighted_cost(problem, poses, selection, control.threads);
-  double damping = control.options.solver.initial_damping, growth = 2;
+  double damping = std::min(control.options.solver.initial_damping, control.damping), growth = 2;
   bool moved = true;
   std::vector<Vector6d> step;
   std::vector<Pose> candidate(poses.size());
@@ -52,12 +52,13 @@ MinimisationResult minimise(const Problem& problem, NormalEquations& equations,
       break;
     }
     if (gain > 0 && std::isfinite(cost)) {
-      const bool little = out.cost - cost <= relative_tolerance * out.cost;
+      out.last_decrease = (out.cost - cost) / out.cost;
+      const bool little = out.last_decrease <= relative_tolerance;
       poses.swap(candidate);
       out.cost = cost;
       moved = true;
-      damping = std::max(kMinDamping,
-                         damping * std::max(1.0 / 3, 1 - std::pow(2 * std::min(gain, 1.0) - 1, 3)));
+      const double fit = 2 * std::min(gain, 1.0) - 1;
+      damping = std::max(kMinDamping, damping * std::max(1.0 / 3, 1 - fit * fit * fit));
       growth = 2;
       // A short step because of much damping is no sign of a minimum.
       if (little && damping < 1) {
@@ -74,6 +75,7 @@ MinimisationResult minimise(const Problem& problem, NormalEquations& equations,
       }
     }
   }
+  control.damping = damping;
   return out;
 }
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <functional>
+#include <limits>
 #include <vector>
 
 #include "pose_graph/normal_equations.hpp"
@@ -14,6 +14,8 @@ struct Control {
   int threads = 1;
   int iterations = 0;  ///< linear systems solved so far
   bool cancelled = false;
+  /// Of the last step of this component: the next minimisation starts from nearly the same poses.
+  double damping = std::numeric_limits<double>::infinity();
 
   /// Asks should_stop, once per linear system.
   bool stop(double cost);
@@ -21,6 +23,8 @@ struct Control {
 
 struct MinimisationResult {
   double cost = 0;
+  /// Share of the cost that the last step took away.
+  double last_decrease = std::numeric_limits<double>::infinity();
   bool converged = false;
   bool failed = false;  ///< no damping made the system positive definite
 };

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <numeric>
 
+#include "math/trigonometry.hpp"
 #include "pose_graph/parallel.hpp"
 
 namespace gpureg::pose_graph {
@@ -46,7 +47,8 @@ double uniform(std::uint64_t counter) {
 double standard_normal(int number, int index) {
   const std::uint64_t counter = (std::uint64_t(number) << 40) + 2 * std::uint64_t(index);
   constexpr double two_pi = 6.283185307179586;
-  return std::sqrt(-2 * std::log(uniform(counter))) * std::cos(two_pi * uniform(counter + 1));
+  return std::sqrt(-2 * portable::log(uniform(counter))) *
+         portable::cos(two_pi * uniform(counter + 1));
 }
 
 const ModeTerm& chosen(const Problem& problem, const Selection& selection, int edge) {

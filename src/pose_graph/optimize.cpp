@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <memory>
 #include <string>
 
@@ -57,6 +58,7 @@ Estimate solve(const Problem& problem, const std::vector<char>& known, Control& 
     given.converged = true;
     return given;
   }
+  control.damping = std::numeric_limits<double>::infinity();
   switch (control.options.robust) {
     case Robust::gnc:
       return solve_gnc(problem, known, control);

@@ -4,52 +4,24 @@
 #include <algorithm>
 #include <condition_variable>
 #include <cstdint>
-#include <exception>
 #include <mutex>
 #include <thread>
 
+#include "common/host_threads.hpp"
+
 namespace gpureg::pose_graph {
-namespace {
-
-/// Runs body on so many threads, the calling one among them; rethrows the first exception.
-void on_threads(int threads, const std::function<void()>& body) {
-  std::exception_ptr error;
-  std::mutex mutex;
-  const auto guarded = [&] {
-    try {
-      body();
-    } catch (...) {
-      const std::lock_guard<std::mutex> lock(mutex);
-      if (!error) error = std::current_exception();
-    }
-  };
-  std::vector<std::thread> others;
-  for (int k = 1; k < threads; ++k) others.emplace_back(guarded);
-  guarded();
-  for (std::thread& thread : others) thread.join();
-  if (error) std::rethrow_exception(error);
-}
-
-}  // namespace
 
 int thread_count(int option) {
   if (option > 0) return option;
   return std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
 }
 
-void for_ranges(int count, int threads, const std::function<void(int, int)>& body) {
-  // Shorter ranges take less time than starting a thread.
-  constexpr int kShortestRange = 512;
-  threads = std::min(threads, count / kShortestRange);
+void for_ranges(int count, int threads, const std::function<void(int, int)>& body,
+                int shortest_range) {
+  threads = std::min(threads, count / shortest_range);
   if (threads <= 1) return body(0, count);
-  std::mutex mutex;
-  int next = 0;
-  on_threads(threads, [&] {
-    int mine;
-    {
-      const std::lock_guard<std::mutex> lock(mutex);
-      mine = next++;
-    }
+  on_threads(static_cast<std::size_t>(threads), [&](std::size_t thread) {
+    const int mine = static_cast<int>(thread);
     const auto bound = [&](int k) { return static_cast<int>(std::int64_t(count) * k / threads); };
     body(bound(mine), bound(mine + 1));
   });
@@ -72,7 +44,7 @@ bool for_each_bottom_up(const std::vector<int>& parent, int threads,
   std::condition_variable changed;
   int left = count;
   bool good = true;
-  on_threads(threads, [&] {
+  on_threads(static_cast<std::size_t>(threads), [&](std::size_t) {
     std::unique_lock<std::mutex> lock(mutex);
     for (;;) {
       changed.wait(lock, [&] { return !good || left == 0 || !ready.empty(); });

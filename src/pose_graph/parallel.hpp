@@ -10,8 +10,10 @@ namespace gpureg::pose_graph {
 /// The number of threads that an option asks for; 0: one per core.
 int thread_count(int option);
 
-/// Calls body(begin, end) for consecutive ranges that cover [0, count).
-void for_ranges(int count, int threads, const std::function<void(int, int)>& body);
+/// Calls body(begin, end) for consecutive ranges that cover [0, count). Ranges of fewer edges or
+/// nodes than the default of shortest_range take less time than starting a thread.
+void for_ranges(int count, int threads, const std::function<void(int, int)>& body,
+                int shortest_range = 512);
 
 /// Calls body(node) for every node of a forest, children before parents; parent[node] > node or -1.
 /// Returns false, and leaves nodes out, once a body has returned false.

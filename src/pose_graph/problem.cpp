@@ -6,6 +6,7 @@
 #include <numeric>
 #include <tuple>
 
+#include "math/exponential.hpp"
 #include "pose_graph/components.hpp"
 
 namespace gpureg::pose_graph {
@@ -24,23 +25,14 @@ Pose to_pose(const UnalignedIsometry3d& t) {
 
 double log_odds(double confidence) {
   const double p = std::clamp(confidence, kLeastDoubt, 1 - kLeastDoubt);
-  return std::log(p / (1 - p));
+  return portable::log(p / (1 - p));
 }
 
 Matrix6d diagonal_information(double rotation_degrees, double translation) {
   Vector6d d;
-  d.head<3>().setConstant(1 / std::pow(rotation_degrees * kRadians, 2));
-  d.tail<3>().setConstant(1 / std::pow(translation, 2));
+  d.head<3>().setConstant(1 / portable::square(rotation_degrees * kRadians));
+  d.tail<3>().setConstant(1 / portable::square(translation));
   return d.asDiagonal();
-}
-
-Matrix6d odometry_information(const Pose& motion, const DriftOptions& drift) {
-  const double metres = motion.translation.norm();
-  const double degrees = log_rotation(motion.rotation).norm() / kRadians;
-  return diagonal_information(
-      std::max(drift.min_rotation,
-               drift.rotation_per_metre * metres + drift.rotation_per_degree * degrees),
-      std::max(drift.min_translation, drift.translation_per_metre * metres));
 }
 
 ModeTerm mode_term(const UnalignedIsometry3d& pose,
@@ -93,6 +85,15 @@ void sort_edges(Problem& problem) {
 
 }  // namespace
 
+Matrix6d odometry_information(const Pose& motion, const DriftOptions& drift) {
+  const double metres = motion.translation.norm();
+  const double degrees = log_rotation(motion.rotation).norm() / kRadians;
+  return diagonal_information(
+      std::max(drift.min_rotation,
+               drift.rotation_per_metre * metres + drift.rotation_per_degree * degrees),
+      std::max(drift.min_translation, drift.translation_per_metre * metres));
+}
+
 Selection all_edges(const Problem& problem) {
   return {std::vector<double>(problem.edges.size(), 1.0),
           std::vector<int>(problem.edges.size(), 0)};
@@ -144,8 +145,8 @@ Problem compile(const Graph& graph, const Options& options) {
   sort_edges(out);
   for (const GravityFactor& factor : graph.gravity) {
     const Eigen::Vector3d up = factor.up;
-    out.gravity.push_back(
-        {position(factor.node), up.normalized(), 1 / std::pow(factor.sigma_degrees * kRadians, 2)});
+    out.gravity.push_back({position(factor.node), up.normalized(),
+                           1 / portable::square(factor.sigma_degrees * kRadians)});
   }
   for (const PoseFactor& factor : graph.priors)
     out.priors.push_back({position(factor.node), to_pose(factor.world_from_node).inverse(),

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <limits>
 #include <vector>
 
 #include "pose_graph/levenberg_marquardt.hpp"
@@ -14,6 +15,8 @@ struct Estimate {
   Selection selection;
   double initial_cost = 0;
   double cost = 0;  ///< of the robust objective
+  /// Share of the cost that the last step of the last minimisation took away.
+  double last_decrease = std::numeric_limits<double>::infinity();
   bool converged = false;
   bool failed = false;
 };
@@ -30,6 +33,14 @@ double threshold(const ModeTerm& mode, double quantile);
 /// so that a perfect graph costs 0.
 double truncated_cost(const Problem& problem, const std::vector<Pose>& poses, double quantile,
                       int threads);
+
+/// Least squares over odometry and the loops with a flag in `candidates`, from the estimate's
+/// poses; false, and weights that mean nothing, where a loop is further from its threshold than
+/// noise explains, and where the minimisation failed or was cancelled. true: every weight is 0 or
+/// 1, as after graduate().
+bool fit_all(const Problem& problem, NormalEquations& equations,
+             const std::vector<char>& candidates, double quantile, Control& control,
+             Estimate& estimate);
 
 /// Graduated non-convexity over odometry and the loops with a flag in `candidates`, from the
 /// estimate's poses; every weight is 0 or 1 in the end. Other loops have weight 0.

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "pose_graph/se3.hpp"
+#include "math/trigonometry.hpp"
 
 #include <cmath>
 
@@ -19,8 +20,8 @@ Eigen::Matrix3d left_jacobian(const Eigen::Vector3d& w) {
     b = 1.0 / 6 - t2 / 120;
   } else {
     const double t = std::sqrt(t2);
-    a = (1 - std::cos(t)) / t2;
-    b = (t - std::sin(t)) / (t2 * t);
+    a = (1 - portable::cos(t)) / t2;
+    b = (t - portable::sin(t)) / (t2 * t);
   }
   const Eigen::Matrix3d s = skew(w);
   return Eigen::Matrix3d::Identity() + a * s + b * s * s;
@@ -34,7 +35,7 @@ Eigen::Matrix3d left_jacobian_inverse(const Eigen::Vector3d& w) {
   } else {
     const double t = std::sqrt(t2);
     // (t / 2) cot(t / 2) by the half angle, which is finite at pi.
-    c = (1 - 0.5 * t * std::cos(0.5 * t) / std::sin(0.5 * t)) / t2;
+    c = (1 - 0.5 * t * portable::cos(0.5 * t) / portable::sin(0.5 * t)) / t2;
   }
   const Eigen::Matrix3d s = skew(w);
   return Eigen::Matrix3d::Identity() - 0.5 * s + c * s * s;
@@ -49,7 +50,7 @@ Eigen::Matrix3d left_jacobian_coupling(const Eigen::Vector3d& w, const Eigen::Ve
     c = 1.0 / 24 - t2 / 720;
     d = 1.0 / 120 - t2 / 2520;
   } else {
-    const double t = std::sqrt(t2), sine = std::sin(t), cosine = std::cos(t);
+    const double t = std::sqrt(t2), sine = portable::sin(t), cosine = portable::cos(t);
     b = (t - sine) / (t2 * t);
     c = (0.5 * t2 + cosine - 1) / (t2 * t2);
     d = 0.5 * (c + 3 * (t - sine - t2 * t / 6) / (t2 * t2 * t));
@@ -72,15 +73,15 @@ Eigen::Vector3d log_rotation(const Eigen::Matrix3d& rotation) {
   if (q.w() < 0) q.coeffs() = -q.coeffs();
   const double sine = q.vec().norm();
   // atan2 keeps all digits near 0 and near pi, where acos of the trace keeps half of them.
-  const double scale = sine < 1e-12 ? 2.0 : 2.0 * std::atan2(sine, q.w()) / sine;
+  const double scale = sine < 1e-12 ? 2.0 : 2.0 * portable::atan2(sine, q.w()) / sine;
   return scale * q.vec();
 }
 
 Eigen::Matrix3d exp_rotation(const Eigen::Vector3d& omega) {
   const double angle = omega.norm(), half = 0.5 * angle;
-  const double scale = angle < 1e-12 ? 0.5 : std::sin(half) / angle;
+  const double scale = angle < 1e-12 ? 0.5 : portable::sin(half) / angle;
   Eigen::Quaterniond q;
-  q.w() = std::cos(half);
+  q.w() = portable::cos(half);
   q.vec() = scale * omega;
   return q.normalized().toRotationMatrix();
 }

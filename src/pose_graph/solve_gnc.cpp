@@ -44,9 +44,9 @@ class GncSolver {
       // Without the few others the system stays sparse; then those that drift explains enter.
       std::vector<char> agreeing(problem_.edges.size(), 0);
       for (int k = 0; k < problem_.edge_count(); ++k) agreeing[k] = in_large_set(consensus, k);
-      Estimate direct = graduated(start, agreeing, true);
+      Estimate direct = joined(start, agreeing, true);
       if (!direct.failed && !control_.cancelled)
-        direct = settled(graduated(direct, explained(direct, all), false));
+        direct = settled(joined(direct, explained(direct, all), false));
       if (direct.failed || control_.cancelled || keeps_nearly_all(direct)) return direct;
     }
     return settled(by_levels(start, consensus));
@@ -86,6 +86,16 @@ class GncSolver {
                      bool least_squares_first) {
     graduate(problem_, equations_, candidates, least_squares_first, quantile_, control_, estimate);
     return estimate;
+  }
+
+  /// The estimate with nearly all loops: least squares where noise explains all that is left.
+  Estimate joined(const Estimate& estimate, const std::vector<char>& candidates,
+                  bool least_squares_first) {
+    Estimate together = estimate;
+    if (fit_all(problem_, equations_, candidates, quantile_, control_, together) ||
+        together.failed || control_.cancelled)
+      return together;
+    return graduated(least_squares_first ? std::move(together) : estimate, candidates, false);
   }
 
   Estimate settled(Estimate estimate) {

@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "math/exponential.hpp"
 #include "pose_graph/initialise.hpp"
 #include "pose_graph/robust.hpp"
 
@@ -67,7 +68,7 @@ Estimate solve_line_process(const Problem& problem, const std::vector<char>& kno
       }
       // The minimum of l f + mu (sqrt(l) - 1)^2 over l. At first every loop counts in full, as in
       // Choi et al. 2015.
-      const double l = round == 0 ? 1 : std::pow(mu / (mu + least), 2);
+      const double l = round == 0 ? 1 : portable::square(mu / (mu + least));
       moved = std::max(moved, std::abs(l - selection.weights[k]));
       selection.weights[k] = l;
     }
@@ -82,7 +83,7 @@ Estimate solve_line_process(const Problem& problem, const std::vector<char>& kno
   minimise_now(solver.max_iterations, solver.relative_tolerance);
   for (int k = 0; k < problem.edge_count(); ++k) {
     const double l = weights.weights[k];
-    if (!problem.edges[k].odometry) out.cost += 0.5 * mu * std::pow(std::sqrt(l) - 1, 2);
+    if (!problem.edges[k].odometry) out.cost += 0.5 * mu * portable::square(std::sqrt(l) - 1);
   }
   selection = weights;
   return out;

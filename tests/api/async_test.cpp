@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "gpureg/cuda_interop.hpp"
+#include "support/expect_error.hpp"
 #include "support/result_bytes.hpp"
 #include "support/scan.hpp"
 
@@ -42,6 +43,19 @@ TEST(Async, DeviceMemoryNeedsACudaContext) {
         << error.what();
   }
   EXPECT_TRUE(Context::cpu(1).device_memory().empty());
+}
+
+TEST(Async, ABatchInDeviceMemoryNeedsACudaContext) {
+  const float row[3] = {0, 0, 0};
+  DevicePointCloudView view;
+  view.points = row;
+  view.size = 1;
+  const Context cpu = Context::cpu(1);
+  test::expect_error<InvalidArgument>(
+      [&] { prepare_batch_async(cpu, {view, view}, {}, {nullptr}).get(); }, {"CUDA", "cpu"});
+  view.point_stride = 2;
+  test::expect_error<InvalidArgument>(
+      [&] { prepare_batch_async(cpu, {view}, {}, {nullptr}).get(); }, {"point_stride"});
 }
 
 }  // namespace

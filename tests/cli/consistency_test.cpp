@@ -137,5 +137,23 @@ TEST_F(ConsistencyVerb, BadInputIsNamed) {
   expect_refused({"consistency", log}, {"--json"});
 }
 
+TEST_F(ConsistencyVerb, ADocumentOfANewerFormatIsRefused) {
+  json newer = document(pairs());
+  newer["format_version"] = 2;
+  const std::string result = folder_.write("newer.json", newer.dump());
+  expect_refused({"consistency", result, "--json", folder_ / "a.json"},
+                 {result, "format version 2", "up to 1"});
+  newer["format_version"] = "one";
+  const std::string damaged = folder_.write("damaged.json", newer.dump());
+  expect_refused({"consistency", damaged, "--json", folder_ / "a.json"},
+                 {damaged, "\"format_version\" is \"one\""});
+}
+
+TEST_F(ConsistencyVerb, DocumentsSayTheirFormat) {
+  const std::string result = folder_.write("r.json", document(pairs()).dump());
+  ASSERT_EQ(run({"consistency", result, "--json", folder_ / "a.json"}).status, 0);
+  EXPECT_EQ(json_of(folder_ / "a.json")["format_version"], 1);
+}
+
 }  // namespace
 }  // namespace gpureg::test

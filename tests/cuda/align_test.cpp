@@ -58,7 +58,9 @@ void expect_same_alignment(const std::vector<RawCloud>& raw,
         host(on_cuda, cuda_matches.pairs.data() + cuda_matches.room.offset[p], match_count[p])));
   }
   const auto cpu_quadruples = cpu::sample_quadruples(on_cpu, cpu_matches, options);
-  const auto cuda_quadruples = cuda::sample_quadruples(on_cuda, cuda_matches, options);
+  const auto cuda_samples = cuda::sample_quadruples(on_cuda, cuda_matches, options);
+  const auto cuda_quadruples =
+      cuda::survivors_of(on_cuda, cuda_samples, {0, cuda_samples.survivors.size()});
   for (std::size_t p = 0; p < count; ++p) {
     SCOPED_TRACE("sample, pair " + std::to_string(p));
     ASSERT_TRUE(
@@ -91,6 +93,31 @@ void expect_same_alignment(const std::vector<RawCloud>& raw,
   const auto best = host(on_cuda, cuda_best.data(), count),
              refined = host(on_cuda, cuda_refined.data(), count);
   const auto verified = host(on_cuda, cuda_verified.data(), count);
+  // Runs of pairs give what the whole batch gives.
+  for (const pipeline::Run run : {pipeline::Run{0, count / 3}, pipeline::Run{count / 3, count}}) {
+    if (run.size() == 0) continue;
+    const auto part = cuda::survivors_of(on_cuda, cuda_samples, run);
+    const auto hypotheses = cuda::fit_hypotheses(on_cuda, cuda_matches, part, options);
+    const auto part_best =
+        host(on_cuda,
+             cuda::score_hypotheses(on_cuda, {cuda_pairs.data() + run.begin, run.size()},
+                                    hypotheses, options)
+                 .data(),
+             run.size());
+    const auto& whole = cuda_quadruples.segments;
+    const std::size_t begin = whole.offset[run.begin], size = part.segments.total();
+    ASSERT_EQ(whole.offset[run.end] - begin, size);
+    ASSERT_TRUE(same_bytes(host(on_cuda, cuda_quadruples.id.data() + begin, size),
+                           host(on_cuda, part.id.data(), size)));
+    ASSERT_TRUE(same_bytes(host(on_cuda, cuda_hypotheses.pose.data() + begin, size),
+                           host(on_cuda, hypotheses.pose.data(), size)));
+    for (std::size_t p = 0; p < run.size(); ++p) {
+      const auto& expected = best[run.begin + p];
+      ASSERT_EQ(expected.found, part_best[p].found);
+      ASSERT_TRUE(same(expected.support, part_best[p].support)) << "pair " << run.begin + p;
+      ASSERT_TRUE(same(expected.pose, part_best[p].pose));
+    }
+  }
   for (std::size_t p = 0; p < count; ++p) {
     SCOPED_TRACE("score to verify, pair " + std::to_string(p));
     ASSERT_EQ(cpu_best[p].found, best[p].found != 0);
@@ -263,6 +290,29 @@ TEST_F(AlignOnCuda, MoreMatchesThanSharedMemoryHolds) {
   kept = dense;
   pairs = {{0, 1, {}, {}}, {1, 0, {}, {}}};
   expect_same_alignment(raw(), pairs, options);
+}
+
+// Lists of hundreds of candidates do not fit the word of their cell.
+TEST_F(AlignOnCuda, LongLists) {
+  options.prepare.max_correspondence_distance = 0.4f;
+  options.quadruples.count = 20'000;
+  pairs = {{0, 1, {}, {}}, {3, 0, {}, {}}, {4, 0, {}, {}}};
+  expect_same_alignment(raw(), pairs, options);
+}
+
+// A map with more candidates than 24 bits number, and a piece of it.
+TEST_F(AlignOnCuda, AMapOfManyCandidates) {
+  std::vector<Vec3> map = test::bumpy_sheet(random, 300'000, 22.0f), piece;
+  for (const Vec3& p : map)
+    if (std::fabs(p.x - 3) < 1.2f && std::fabs(p.y + 2) < 1.2f) piece.push_back(p);
+  kept = {map, piece};
+  options = RegistrationOptions::from_voxel_size(0.05f);
+  options.prepare.voxel_size = 0;
+  options.quadruples.count = 50'000;
+  cpu::Exec exec(2);
+  ASSERT_GT(test::prepare_one(exec, raw()[0], options.prepare)->closest.candidates.size(),
+            std::size_t(1) << 24);
+  expect_same_alignment(raw(), {{1, 0, {}, {}}}, options);
 }
 
 TEST_F(AlignOnCuda, StrayPointsMakeTheCloudTooWideForATable) {

@@ -135,6 +135,49 @@ TEST_F(CudaContext, ThreadsWithTheirOwnContextsAndThreadsThatShareOne) {
   for (const Results& g : got) EXPECT_EQ(g, expected);
 }
 
+// One context needs more shared memory per block than the other: the permission is the device's.
+TEST_F(CudaContext, ContextsOfOneDeviceNeedDifferentSharedMemory) {
+  options = RegistrationOptions::loopsmart(0.05f);
+  options.quadruples.count = 200000;
+  const std::vector<Eigen::Vector3f> few(scans[1].begin(), scans[1].begin() + 300);
+  const auto align_many = [&](std::size_t first, int rounds) {
+    const Context context = Context::cuda();
+    std::vector<PointCloudView> two(views.begin() + static_cast<std::ptrdiff_t>(first),
+                                    views.begin() + static_cast<std::ptrdiff_t>(first) + 2);
+    if (first == 0) two[1] = PointCloudView(few);
+    const auto clouds = prepare_batch(context, two, options.prepare);
+    Results out;
+    for (int k = 0; k < rounds; ++k)
+      out.push_back(bytes(align(context, clouds[0], clouds[1], options)));
+    return out;
+  };
+  const Results small = align_many(0, 1), large = align_many(2, 1);
+  auto others = std::async(std::launch::async, [&] { return align_many(0, 300); });
+  for (const auto& result : align_many(2, 300)) EXPECT_EQ(result, large[0]);
+  for (const auto& result : others.get()) EXPECT_EQ(result, small[0]);
+}
+
+TEST_F(CudaContext, TrimReturnsWhatNothingUses) {
+  const Context context = Context::cuda();
+  Context::cpu(1).trim();
+  context.trim();
+  const Results expected = run(context, pairs);
+  auto clouds = prepare_batch(context, views, options.prepare);
+  const DeviceMemoryUse warm = context.device_memory()[0];
+  EXPECT_GT(warm.bytes_reserved, warm.bytes_in_use);
+  context.trim();
+  const DeviceMemoryUse trimmed = context.device_memory()[0];
+  EXPECT_EQ(trimmed.bytes_in_use, warm.bytes_in_use) << "the prepared clouds stay";
+  EXPECT_LE(trimmed.bytes_reserved, warm.bytes_reserved) << "in blocks: clouds may hold them all";
+  EXPECT_GE(trimmed.bytes_reserved, trimmed.bytes_in_use);
+  EXPECT_EQ(all_bytes(align_batch(context, clouds, pairs, options)), expected);
+  clouds.clear();
+  context.trim();
+  EXPECT_EQ(context.device_memory()[0].bytes_in_use, 0u);
+  EXPECT_EQ(context.device_memory()[0].bytes_reserved, 0u);
+  EXPECT_EQ(run(context, pairs), expected);
+}
+
 // Errors of the runtime on machines without a usable device.
 TEST(NoCudaDevice, EveryReasonHasItsWords) {
   EXPECT_EQ(cuda::why_no_device(cudaErrorInsufficientDriver, 0, 13000),

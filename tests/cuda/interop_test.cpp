@@ -171,6 +171,144 @@ TEST_F(Interop, ContextsOfSeveralDevicesFindTheCloudsDevice) {
   cudaSetDevice(0);
 }
 
+// A stream of the program that waits for the context itself must not hold the context up.
+TEST_F(Interop, OtherCallsDoNotWaitForTheStreamOfACloud) {
+  const Context context = Context::cuda();
+  const auto clouds = prepare_batch(context, views, options.prepare);
+  const auto expected = test::all_bytes(align_batch(context, clouds, pairs, options));
+  float* points = on_device(scans[0], 3);
+  DevicePointCloudView view;
+  view.points = points;
+  view.size = scans[0].size();
+  Gate gate(stream);
+  std::future<PreparedCloud> prepared = prepare_async(context, view, options.prepare, stream);
+  // Its thread is in the engine by now.
+  EXPECT_EQ(prepared.wait_for(std::chrono::milliseconds(200)), std::future_status::timeout);
+  auto aligned = align_batch_async(context, clouds, pairs, options);
+  const bool finished = aligned.wait_for(std::chrono::seconds(60)) == std::future_status::ready;
+  EXPECT_EQ(cudaStreamQuery(stream), cudaErrorNotReady) << "the stream was not held up";
+  gate.open();
+  EXPECT_TRUE(finished) << "the alignment waited for the stream of the program";
+  EXPECT_EQ(test::all_bytes(aligned.get()), expected);
+  expect_same(prepared.get(), clouds[0]);
+  cudaFreeAsync(points, stream);
+}
+
+TEST_F(Interop, ABatchIsThatOfTheHost) {
+  const Context context = Context::cuda();
+  const auto expected = prepare_batch(context, views, options.prepare);
+  cudaStream_t other = nullptr;
+  ASSERT_EQ(cudaStreamCreateWithFlags(&other, cudaStreamNonBlocking), cudaSuccess);
+  std::vector<DevicePointCloudView> device(views.size());
+  std::vector<CudaStream> streams(views.size(), stream);
+  for (std::size_t k = 0; k < views.size(); ++k) {
+    device[k].points = scans[k].empty() ? nullptr : on_device(scans[k], 3);
+    device[k].size = scans[k].size();
+    if (k % 2 == 1) streams[k] = other;
+  }
+  const auto prepared = prepare_batch_async(context, device, options.prepare, streams).get();
+  ASSERT_EQ(prepared.size(), expected.size());
+  for (std::size_t k = 0; k < prepared.size(); ++k) expect_same(prepared[k], expected[k]);
+  const auto by_one_stream = prepare_batch_async(context, device, options.prepare, {stream}).get();
+  for (std::size_t k = 0; k < prepared.size(); ++k) expect_same(by_one_stream[k], expected[k]);
+  EXPECT_TRUE(prepare_batch_async(context, {}, options.prepare, {stream}).get().empty());
+  EXPECT_THROW(prepare_batch_async(context, device, options.prepare, {stream, other}),
+               InvalidArgument);
+  // A cloud more than 2^20 voxels wide is named.
+  const std::vector<Eigen::Vector3f> wide{{0, 0, 0}, {1e9f, 0, 0}};
+  device[2].points = on_device(wide, 3);
+  device[2].size = wide.size();
+  try {
+    prepare_batch_async(context, device, options.prepare, streams).get();
+    ADD_FAILURE() << "a cloud too wide was prepared";
+  } catch (const InvalidArgument& error) {
+    EXPECT_EQ(std::string(error.what()).rfind("clouds[2]: ", 0), 0u) << error.what();
+  }
+  for (const DevicePointCloudView& view : device)
+    if (view.points) cudaFreeAsync(const_cast<float*>(view.points), stream);
+  cudaStreamDestroy(other);
+}
+
+// Points, normals and features come from three streams, two of which are late.
+TEST_F(Interop, NormalsAndFeaturesOfOtherStreamsAreAwaited) {
+  const Context context = Context::cuda();
+  scans[1].resize(scans[0].size(), {1, 0, 0});
+  scans[2].resize(scans[0].size(), {0, 1, 0});
+  PointCloudView host(scans[0]);
+  host.normals = scans[1][0].data();
+  host.features = scans[2][0].data();
+  host.feature_dimension = 3;
+  const PreparedCloud expected = prepare(context, host, options.prepare);
+  const std::size_t size = scans[0].size() * 3 * sizeof(float);
+  float *points = on_device(scans[0], 3), *normals = on_device(scans[1], 3),
+        *features = on_device(scans[2], 3);
+  float* late[2] = {nullptr, nullptr};
+  cudaStream_t others[2];
+  for (int k = 0; k < 2; ++k) {
+    ASSERT_EQ(cudaStreamCreateWithFlags(&others[k], cudaStreamNonBlocking), cudaSuccess);
+    ASSERT_EQ(cudaMalloc(reinterpret_cast<void**>(&late[k]), size), cudaSuccess);
+    ASSERT_EQ(cudaMemset(late[k], 0xff, size), cudaSuccess);
+  }
+  ASSERT_EQ(cudaDeviceSynchronize(), cudaSuccess);
+  Gate first(others[0]), second(others[1]);
+  ASSERT_EQ(cudaMemcpyAsync(late[0], normals, size, cudaMemcpyDeviceToDevice, others[0]),
+            cudaSuccess);
+  ASSERT_EQ(cudaMemcpyAsync(late[1], features, size, cudaMemcpyDeviceToDevice, others[1]),
+            cudaSuccess);
+  DevicePointCloudView view;
+  view.points = points;
+  view.size = scans[0].size();
+  view.normals = late[0];
+  view.normal_stream = others[0];
+  view.features = late[1];
+  view.feature_dimension = 3;
+  view.feature_stream = others[1];
+  std::future<PreparedCloud> prepared = prepare_async(context, view, options.prepare, stream);
+  // What comes later in these streams changes nothing.
+  for (int k = 0; k < 2; ++k)
+    ASSERT_EQ(cudaMemsetAsync(late[k], 0xff, size, others[k]), cudaSuccess);
+  EXPECT_EQ(prepared.wait_for(std::chrono::milliseconds(200)), std::future_status::timeout);
+  first.open();
+  second.open();
+  expect_same(prepared.get(), expected);
+  for (float* p : {points, normals, features}) cudaFreeAsync(p, stream);
+  for (int k = 0; k < 2; ++k) {
+    cudaFree(late[k]);
+    cudaStreamDestroy(others[k]);
+  }
+}
+
+TEST_F(Interop, DeviceMemoryIsNoHostCloud) {
+  const Context context = Context::cuda();
+  float* points = on_device(scans[0], 3);
+  PointCloudView view(scans[0]), bad_points = view, bad_normals = view, bad_features = view;
+  bad_points.points = points;
+  bad_normals.normals = points;
+  bad_features.features = points;
+  bad_features.feature_dimension = 3;
+  const std::pair<const char*, PointCloudView> cases[] = {{"cloud.points", bad_points},
+                                                          {"cloud.normals", bad_normals},
+                                                          {"cloud.features", bad_features}};
+  for (const auto& [field, bad] : cases) try {
+      prepare(context, bad, options.prepare);
+      ADD_FAILURE() << field << " in device memory was taken for host memory";
+    } catch (const InvalidArgument& error) {
+      EXPECT_NE(std::string(error.what()).find(std::string(field) + " is memory of device"),
+                std::string::npos)
+          << error.what();
+    }
+  // The host can read managed memory.
+  void* managed = nullptr;
+  const std::size_t size = scans[0].size() * 3 * sizeof(float);
+  ASSERT_EQ(cudaMallocManaged(&managed, size), cudaSuccess);
+  std::memcpy(managed, scans[0][0].data(), size);
+  view.points = static_cast<const float*>(managed);
+  expect_same(prepare(context, view, options.prepare),
+              prepare(context, PointCloudView(scans[0]), options.prepare));
+  cudaFree(managed);
+  cudaFreeAsync(points, stream);
+}
+
 TEST_F(Interop, WrongMemoryIsAnError) {
   const Context context = Context::cuda();
   DevicePointCloudView view;

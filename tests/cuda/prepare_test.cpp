@@ -330,6 +330,40 @@ TEST_F(PrepareOnCuda, WideFeaturesAndDepthMaps) {
   expect_same_preparation(raw, options);
 }
 
+// Thousands of points in one voxel, at and around the number from which on a thread block adds them
+// up; their normals and features too, of more dimensions than the block has threads.
+TEST_F(PrepareOnCuda, CrowdedVoxels) {
+  const auto crowded = [&](std::size_t in_a_voxel, std::size_t others) {
+    std::vector<Vec3> points = test::cube(random, others, 1.5f);
+    for (std::size_t k = 0; k < in_a_voxel; ++k) {
+      const Vec3 p = test::cube(random, 1, 0.02f)[0];
+      points.push_back({p.x + 0.525f, p.y + 0.325f, p.z + 0.125f});
+    }
+    std::shuffle(points.begin(), points.end(), random);
+    return points;
+  };
+  for (const std::size_t in_a_voxel : {511u, 512u, 513u, 768u, 50000u})
+    keep(crowded(in_a_voxel, 3000));
+  keep(std::vector<Vec3>(70000, Vec3{1, 2, 3}));
+  options = RegistrationOptions::from_voxel_size(0.05f).prepare;
+  expect_same_preparation(raw, options);
+  const std::size_t dimension = 300;
+  std::vector<std::vector<Vec3>> normals;
+  std::vector<std::vector<float>> features;
+  std::normal_distribution<float> normal;
+  for (RawCloud& cloud : raw) {
+    normals.emplace_back(cloud.size);
+    for (Vec3& n : normals.back())
+      n = random() % 50 == 0 ? Vec3{0, 0, 0} : test::random_unit(random);
+    features.emplace_back(cloud.size * dimension);
+    for (float& f : features.back()) f = normal(random);
+    cloud.normals = &normals.back()[0].x;
+    cloud.features = features.back().data();
+    cloud.feature_dimension = cloud.feature_stride = dimension;
+  }
+  expect_same_preparation(raw, options);
+}
+
 TEST_F(PrepareOnCuda, ErrorsAreTheCpus) {
   keep({{0, 0, 0}, {3e6f, 0, 0}});
   const auto message = [&](auto&& prepare) {

@@ -37,6 +37,17 @@ TEST(ScoringLayout, CountsCellsIn22BitsAlongEveryAxis) {
     EXPECT_EQ(l.nx, 0) << "axis " << axis;
     EXPECT_EQ(l.runs, l.bricks) << "no table, no memory for it";
   }
+  // A large map may have a table of as many places per block; a cloud with stray points may not.
+  const CellRange building{{0, 0, 0}, {999, 499, 49}};
+  CudaCloud map;
+  map.size = 16'000'000;
+  map.block_count = 3'000'000;
+  map.candidate_count = std::size_t(84) * map.size;
+  EXPECT_EQ(scoring_layout(map, building).nx, 1000);
+  EXPECT_GT(scoring_layout(map, building).bytes, map.candidate_count * 16);
+  EXPECT_EQ(layout_of(building.lo, building.hi).nx, 0);
+  map.block_count = (1 << 25) + 1;
+  EXPECT_EQ(scoring_layout(map, building).nx, 0) << "its words are not numbered in 32 bits";
   const Cell far{1 << 20, 1 << 20, 1 << 20};
   EXPECT_EQ(layout_of({-(1 << 20), -(1 << 20), -(1 << 20)}, far).nx, 0);
 }

@@ -3,6 +3,8 @@
 
 #include <array>
 
+#include "cpu/reachable_blocks.hpp"
+#include "pipeline/checks.hpp"
 #include "support/prepared.hpp"
 #include "support/random_clouds.hpp"
 
@@ -122,6 +124,30 @@ TEST(ClosestGrid, QueriesFarAwayOrNotANumberFindNothing) {
   const float nan = std::nanf("");
   for (const Vec3 q : {Vec3{1e30f, 0, 0}, Vec3{nan, 0, 0}, Vec3{0, -1e9f, 0}, Vec3{0, 0, INFINITY}})
     EXPECT_EQ(find_closest(cloud->view().closest, cloud->points.data(), q, 0.005f).index, kNoValue);
+}
+
+// More blocks than the number from which on duplicates are removed: the work stays that of a few
+// sorts. With one for every point, this test takes minutes.
+TEST(ReachableBlocks, AreTheSameHoweverOftenDuplicatesAreRemoved) {
+  std::mt19937 random(9);
+  const std::vector<Vec3> points = test::cube(random, 30'000, 40.0f);
+  const ClosestGeometry g = closest_geometry(0.075f, 35.0f);
+  const auto expected = reachable_blocks(points, g, std::size_t(1) << 30);
+  EXPECT_GT(expected.size(), points.size());
+  for (const std::size_t least : {std::size_t(1), std::size_t(1000), expected.size() / 2})
+    EXPECT_EQ(reachable_blocks(points, g, least), expected) << least;
+}
+
+// Maps have more candidates than a dense cloud may have, but not more per point.
+TEST(ClosestGrid, LimitOfCandidatesGrowsWithThePoints) {
+  using pipeline::too_many_candidates;
+  constexpr std::uint64_t kMillion = 1'000'000;
+  EXPECT_FALSE(too_many_candidates(limits::kMaxGridCandidates, 1));
+  EXPECT_TRUE(too_many_candidates(limits::kMaxGridCandidates + 1, kMillion));
+  EXPECT_FALSE(too_many_candidates(120 * 4 * kMillion, 4 * kMillion));
+  EXPECT_FALSE(too_many_candidates(120 * 16 * kMillion, 16 * kMillion));
+  EXPECT_TRUE(too_many_candidates(300 * 16 * kMillion, 16 * kMillion));
+  EXPECT_TRUE(too_many_candidates(std::uint64_t(1) << 32, 1000 * kMillion));
 }
 
 }  // namespace

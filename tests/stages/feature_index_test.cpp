@@ -77,6 +77,28 @@ TEST(FeatureIndex, EqualRowsGoToTheLowestIndex) {
     EXPECT_EQ(found[i], rows.valid[i] ? i % 40 : kNoValue);
 }
 
+// A plane has thousands of equal features. They are searched once, and only the first is searched
+// in; 0 and -0 are at the same distance from everything.
+TEST(FeatureIndex, KeepsEqualRowsOnce) {
+  std::mt19937 random(5);
+  Rows rows = random_rows(random, 100, 7, 1, 1);
+  const std::size_t size = rows.values.size();
+  for (std::size_t k = 0; k < size; ++k) rows.values.push_back(-0.0f);
+  for (std::size_t k = 0; k < size; ++k) rows.values.push_back(0.0f);
+  rows.valid.resize(300, 1);
+  const FeatureIndex index = index_features(rows.view());
+  std::vector<int> listed(300, 0);
+  for (std::uint32_t k = 0; k < index.rows; ++k)
+    for (std::uint32_t i = index.row[k]; i != kNoValue; i = index.next_equal[i]) {
+      ++listed[i];
+      for (std::size_t d = 0; d < 7; ++d)
+        EXPECT_EQ(rows.values[i * 7 + d], rows.values[index.row[k] * 7 + d]);
+    }
+  for (std::size_t i = 0; i < 300; ++i) EXPECT_EQ(listed[i], rows.valid[i]) << i;
+  EXPECT_LE(index.rows, 101u);
+  EXPECT_EQ(by_index(rows, rows, 30), exhaustive(rows, rows));
+}
+
 TEST(FeatureIndex, DistancesThatOverflowAreNoDistances) {
   std::mt19937 random(3);
   for (const float scale : {1e-30f, 1e18f, 1e30f}) {

@@ -1,0 +1,161 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "loop_closure/check.hpp"
+
+#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+
+#include "gpureg/error.hpp"
+#include "math/exponential.hpp"
+
+namespace gpureg::loop_closure {
+namespace {
+
+constexpr double kRadians = 3.14159265358979323846 / 180;
+/// Rotations of single precision are orthonormal to this.
+constexpr double kOrthonormal = 1e-4;
+constexpr double kSymmetric = 1e-6;  ///< relative to the largest element
+/// Eigenvalues of a semi-definite matrix may be negative by rounding, relative to the largest one.
+constexpr double kRounding = 1e-9;
+
+std::string fragment_name(FragmentId id) { return "fragment " + std::to_string(id); }
+
+void require_symmetric(const UnalignedMatrix6d& m, const std::string& name) {
+  if (!m.allFinite()) throw InvalidArgument(name + " has an element that is not finite");
+  const double largest = m.cwiseAbs().maxCoeff();
+  if ((m - m.transpose()).cwiseAbs().maxCoeff() > kSymmetric * largest)
+    throw InvalidArgument(name + " is not symmetric");
+}
+
+double least_eigenvalue(const UnalignedMatrix6d& m) {
+  const Matrix6d symmetric = 0.5 * (m + m.transpose());
+  return Eigen::SelfAdjointEigenSolver<Matrix6d>(symmetric, Eigen::EigenvaluesOnly)
+      .eigenvalues()[0];
+}
+
+}  // namespace
+
+Registry::Registry(const State& state) {
+  for (const auto& [id, node] : state.nodes) has_cloud_[id] = node.has_cloud;
+  for (const Odometry& edge : state.odometry) odometry_.insert(pair_of(edge.source, edge.target));
+}
+
+void Registry::add(FragmentId id, bool has_cloud) {
+  if (!has_cloud_.emplace(id, has_cloud).second)
+    throw InvalidArgument(fragment_name(id) + " was added before");
+}
+
+void Registry::remove(FragmentId id) {
+  require_known(id);
+  has_cloud_.erase(id);
+  for (auto pair = odometry_.begin(); pair != odometry_.end();)
+    pair = pair->first == id || pair->second == id ? odometry_.erase(pair) : std::next(pair);
+}
+
+void Registry::connect(FragmentId source, FragmentId target) {
+  if (!odometry_.insert(pair_of(source, target)).second)
+    throw InvalidArgument("odometry between fragments " + std::to_string(source) + " and " +
+                          std::to_string(target) + " was added before");
+}
+
+void Registry::require_known(FragmentId id) const {
+  if (has_cloud_.count(id) == 0)
+    throw InvalidArgument("no " + fragment_name(id) + " was added, or it was removed");
+}
+
+void Registry::require_pair(FragmentId source, FragmentId target) const {
+  require_known(source);
+  require_known(target);
+  if (source == target)
+    throw InvalidArgument("source and target are the same " + fragment_name(source));
+}
+
+void Registry::require_clouds(FragmentId source, FragmentId target) const {
+  for (const FragmentId id : {source, target})
+    if (!has_cloud_.at(id)) throw InvalidArgument(fragment_name(id) + " has no cloud");
+}
+
+void check_fragment(const Fragment& fragment) {
+  const std::string name = fragment_name(fragment.id);
+  check_pose(fragment.world_from_fragment, "world_from_fragment of " + name);
+  if (!std::isfinite(fragment.time)) throw InvalidArgument("time of " + name + " is not finite");
+  if (fragment.up && !(fragment.up->allFinite() && fragment.up->norm() > 0))
+    throw InvalidArgument("up of " + name + " is not a finite vector of a length > 0");
+}
+
+void check_pose(const UnalignedIsometry3d& pose, const std::string& name) {
+  if (!pose.matrix().allFinite())
+    throw InvalidArgument(name + " has an element that is not finite");
+  const Eigen::Matrix3d rotation = pose.linear();
+  const double error =
+      (rotation * rotation.transpose() - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff();
+  if (error > kOrthonormal || rotation.determinant() < 0)
+    throw InvalidArgument(name + " is not rigid: its rotation is off by " + std::to_string(error));
+}
+
+void check_information(const UnalignedMatrix6d& information) {
+  require_symmetric(information, "information");
+  const double least = least_eigenvalue(information);
+  if (least < -kRounding * information.cwiseAbs().maxCoeff() || information.isZero(0))
+    throw InvalidArgument(
+        "information is not positive semi-definite, or zero: its smallest eigenvalue is " +
+        std::to_string(least));
+}
+
+void check_result(const RegistrationResult& result) {
+  if (!result.has_candidate) return;
+  check_pose(result.target_from_source, "result.target_from_source");
+  for (std::size_t k = 0; k < result.modes.size(); ++k)
+    check_pose(result.modes[k].target_from_source,
+               "result.modes[" + std::to_string(k) + "].target_from_source");
+}
+
+UnalignedMatrix6d information_of_covariance(const UnalignedMatrix6d& covariance) {
+  require_symmetric(covariance, "covariance");
+  const double least = least_eigenvalue(covariance);
+  if (!(least > 0))
+    throw InvalidArgument("covariance is not positive definite: its smallest eigenvalue is " +
+                          std::to_string(least));
+  const Matrix6d symmetric = 0.5 * (covariance + covariance.transpose());
+  const Matrix6d information = symmetric.llt().solve(Matrix6d::Identity());
+  return UnalignedMatrix6d(0.5 * (information + information.transpose()));
+}
+
+LoopRecord host_record(FragmentId source, FragmentId target, const UnalignedIsometry3d& pose,
+                       const std::optional<UnalignedMatrix6d>& information, double confidence,
+                       const Options& options) {
+  Mode mode;
+  mode.target_from_source = pose;
+  mode.confidence = confidence;
+  if (information) {
+    mode.information = *information;
+  } else {
+    const pose_graph::LoopNoiseOptions& noise = options.graph.loop_noise;
+    Vector6d diagonal;
+    diagonal.head<3>().setConstant(1 / portable::square(noise.rotation * kRadians));
+    diagonal.tail<3>().setConstant(1 / portable::square(noise.translation));
+    mode.information = UnalignedMatrix6d(diagonal.asDiagonal());
+  }
+  LoopRecord record;
+  record.source = record.loop.source = source;
+  record.target = record.loop.target = target;
+  record.loop.from_host = true;
+  record.modes = {mode};
+  choose_mode(record, 0);
+  return record;
+}
+
+void give_clouds(State& state, const CloudProvider& clouds, const Options& options) {
+  for (auto& [id, node] : state.nodes) {
+    if (!node.has_cloud) continue;
+    if (clouds) node.cloud = clouds(id);
+    if (!node.cloud.valid()) throw InvalidArgument("no cloud was given for " + fragment_name(id));
+    if (fingerprint_of(node.cloud) != node.fingerprint)
+      throw InvalidArgument("the cloud of " + fragment_name(id) +
+                            " is another than when the state was saved");
+    node.coarse = coarse_of(node.cloud, options.proposals.coarse_voxel_size);
+  }
+}
+
+}  // namespace gpureg::loop_closure

@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <map>
+#include <set>
+#include <string>
+
+#include "loop_closure/state.hpp"
+
+/// Checks of what the host passes. All throw InvalidArgument naming field and value.
+namespace gpureg::loop_closure {
+
+/// The ids and odometry edges that calls may name, up to date before process() sees them.
+class Registry {
+ public:
+  Registry() = default;
+  explicit Registry(const State& state);
+
+  void add(FragmentId id, bool has_cloud);
+  void remove(FragmentId id);
+  void connect(FragmentId source, FragmentId target);
+  void require_known(FragmentId id) const;
+  void require_pair(FragmentId source, FragmentId target) const;
+  void require_clouds(FragmentId source, FragmentId target) const;
+  std::size_t size() const { return has_cloud_.size(); }
+
+ private:
+  std::map<FragmentId, bool> has_cloud_;
+  std::set<FragmentPair> odometry_;
+};
+
+void check_fragment(const Fragment& fragment);
+void check_pose(const UnalignedIsometry3d& pose, const std::string& name);
+void check_information(const UnalignedMatrix6d& information);
+void check_result(const RegistrationResult& result);
+UnalignedMatrix6d information_of_covariance(const UnalignedMatrix6d& covariance);
+
+/// A loop of add_loop().
+LoopRecord host_record(FragmentId source, FragmentId target, const UnalignedIsometry3d& pose,
+                       const std::optional<UnalignedMatrix6d>& information, double confidence,
+                       const Options& options);
+
+/// Asks for the clouds of a loaded state.
+void give_clouds(State& state, const CloudProvider& clouds, const Options& options);
+
+}  // namespace gpureg::loop_closure

@@ -1,0 +1,74 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "loop_closure/commands.hpp"
+
+#include <algorithm>
+#include <utility>
+
+namespace gpureg::loop_closure {
+
+void add_fragment(State& state, const Fragment& fragment, const Options& options) {
+  Node node;
+  node.session = fragment.session;
+  node.time = fragment.time;
+  node.cloud = fragment.cloud;
+  node.has_cloud = fragment.cloud.valid();
+  node.up = fragment.up;
+  node.estimate = fragment.world_from_fragment;
+  node.order = state.arrivals++;
+  if (node.has_cloud) {
+    node.fingerprint = fingerprint_of(node.cloud);
+    node.coarse = coarse_of(node.cloud, options.proposals.coarse_voxel_size);
+  }
+  state.nodes.emplace(fragment.id, std::move(node));
+  state.poses_changed = true;
+}
+
+void add_odometry(State& state, const Odometry& odometry) {
+  Node& source = state.nodes.at(odometry.source);
+  Node& target = state.nodes.at(odometry.target);
+  if (source.placed && target.placed) {
+    // Two parts of the map, or a second path: loops mean something else now.
+    state.graph_changed = true;
+    for (LoopRecord& record : state.loops) record.gated = false;
+    state.relations.clear();
+  } else if (target.placed || (!source.placed && target.order < source.order)) {
+    source.estimate = target.estimate * odometry.target_from_source;
+  } else {
+    target.estimate = source.estimate * odometry.target_from_source.inverse();
+  }
+  source.placed = target.placed = true;
+  state.odometry.push_back(odometry);
+  state.known.insert(pair_of(odometry.source, odometry.target));
+}
+
+void add_covisible(State& state, FragmentId id, const std::vector<FragmentId>& others) {
+  for (const FragmentId other : others)
+    if (other != id) state.known.insert(pair_of(id, other));
+}
+
+void add_proposal(State& state, Proposal proposal) {
+  proposal.order = state.arrivals++;
+  state.known.insert(pair_of(proposal.source, proposal.target));
+  state.queue.push_back(std::move(proposal));
+  // The queue ends with its first element: behind other proposals of the host, before all others.
+  const auto behind = std::find_if(state.queue.begin(), state.queue.end() - 1,
+                                   [](const Proposal& p) { return p.kind == ProposalKind::host; });
+  std::rotate(behind, state.queue.end() - 1, state.queue.end());
+}
+
+void add_record(State& state, LoopRecord record) {
+  state.known.insert(pair_of(record.source, record.target));
+  state.graph_changed |= !record.modes.empty();
+  record.number = state.arrivals++;
+  state.loops.push_back(std::move(record));
+}
+
+void set_estimates(State& state, const std::vector<FragmentPose>& poses) {
+  for (const FragmentPose& pose : poses) {
+    Node& node = state.nodes.at(pose.id);
+    node.estimate = pose.world_from_fragment;
+    node.look_within = true;
+  }
+}
+
+}  // namespace gpureg::loop_closure

@@ -1,0 +1,232 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "loop_closure/verify.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "loop_closure/accept.hpp"
+#include "loop_closure/relations.hpp"
+
+namespace gpureg::loop_closure {
+namespace {
+
+/// Loops that the acceptance refuses are left out and the rest optimised again at most so often.
+constexpr int kMostRounds = 6;
+
+/// @param drift_scale on the standard deviations of modelled odometry.
+pose_graph::Graph graph_without_loops(const State& state, const Options& options,
+                                      double drift_scale) {
+  pose_graph::Graph graph;
+  for (const auto& [id, node] : state.nodes) {
+    graph.nodes.push_back({id, node.estimate, false});
+    if (options.gravity_sigma > 0 && node.up)
+      graph.gravity.push_back({id, *node.up, options.gravity_sigma});
+  }
+  for (const Odometry& odometry : state.odometry) {
+    pose_graph::Edge edge;
+    edge.source = odometry.source;
+    edge.target = odometry.target;
+    edge.target_from_source = odometry.target_from_source;
+    edge.information = odometry.information;
+    if (odometry.modelled && odometry.length > 0) {
+      // Edges of a graph are independent: each takes its share of the errors of one sign.
+      const double factor =
+          std::max(1.0, options.drift_correlation * odometry.steps / odometry.length);
+      *edge.information /= factor * drift_scale * drift_scale;
+    }
+    edge.kind = pose_graph::EdgeKind::odometry;
+    graph.edges.push_back(edge);
+  }
+  return graph;
+}
+
+/// Adds the loop with the modes that may take part. @return which they are.
+std::vector<std::uint32_t> add_loop(const LoopRecord& record, const Options& options,
+                                    pose_graph::Graph& graph) {
+  std::vector<std::uint32_t> modes;
+  pose_graph::Edge edge;
+  edge.source = record.source;
+  edge.target = record.target;
+  for (std::uint32_t k = 0; k < record.modes.size(); ++k) {
+    const Mode& mode = record.modes[k];
+    if (!within_drift(mode, options)) continue;
+    modes.push_back(k);
+    if (modes.size() == 1) {
+      edge.target_from_source = mode.target_from_source;
+      edge.information = mode.information;
+      edge.confidence = mode.confidence;
+    } else {
+      edge.alternatives.push_back({mode.target_from_source, mode.information, mode.confidence});
+    }
+  }
+  if (!modes.empty()) graph.edges.push_back(std::move(edge));
+  return modes;
+}
+
+class Verifier {
+ public:
+  Verifier(State& state, const Options& options)
+      : state_(state),
+        options_(options),
+        odometry_(state, false, options),
+        excluded_(state.loops.size(), 0),
+        fitted_(state.loops.size(), 0) {
+    if (options.accept_by_graph_alone) return;
+    compute_drift_ratios(state, odometry_, options);
+    update_relations(state, odometry_, options);
+    scale_ = drift_scale(state);
+  }
+
+  Verification run() {
+    std::vector<Verdict> verdicts;
+    pose_graph::Result result;
+    for (int round = 0; round < kMostRounds; ++round) {
+      result = optimise();
+      if (result.status == pose_graph::Status::failed ||
+          result.status == pose_graph::Status::cancelled)
+        return {result.status, result.reason};
+      bool refused = drop_contradicted();
+      verdicts = accept_loops(state_, odometry_, fits_, scale_, options_);
+      for (std::size_t k = 0; k < fits_.size(); ++k) {
+        if (!fits_[k]) continue;
+        fitted_[k] = 1;
+        if (verdicts[k].accepted) continue;
+        excluded_[k] = 1;
+        refused = true;
+      }
+      if (!refused) break;
+    }
+    conclude(verdicts);
+    if (options_.optimize) move(result);
+    return {result.status, result.reason};
+  }
+
+ private:
+  /// Odometry of little certainty bends to loops that contradict each other: the graph alone keeps
+  /// them.
+  bool drop_contradicted() {
+    if (options_.accept_by_graph_alone) return false;
+    const std::vector<char> dropped = contradicted(state_, fits_, scale_);
+    bool any = false;
+    for (std::size_t k = 0; k < dropped.size(); ++k) {
+      if (!dropped[k]) continue;
+      fits_[k] = fitted_[k] = 0;
+      excluded_[k] = any = true;
+    }
+    return any;
+  }
+
+  pose_graph::Result optimise() {
+    pose_graph::Graph graph = graph_without_loops(state_, options_, kDriftScales[scale_]);
+    const std::size_t first = graph.edges.size();
+    std::vector<std::size_t> loops;
+    std::vector<std::vector<std::uint32_t>> modes;
+    for (std::size_t k = 0; k < state_.loops.size(); ++k) {
+      if (excluded_[k]) continue;
+      std::vector<std::uint32_t> used = add_loop(state_.loops[k], options_, graph);
+      if (used.empty()) continue;
+      loops.push_back(k);
+      modes.push_back(std::move(used));
+    }
+    pose_graph::Options graph_options = options_.graph;
+    graph_options.marginals.clear();
+    const pose_graph::Result result = pose_graph::optimize(graph, graph_options);
+    fits_.assign(state_.loops.size(), 0);
+    if (result.edges.size() != graph.edges.size()) return result;
+    for (std::size_t k = 0; k < loops.size(); ++k) {
+      const pose_graph::EdgeResult& edge = result.edges[first + k];
+      LoopRecord& record = state_.loops[loops[k]];
+      record.loop.weight = edge.weight;
+      if (edge.state != pose_graph::EdgeState::accepted) continue;
+      fits_[loops[k]] = 1;
+      choose_mode(record, modes[k][edge.mode]);
+    }
+    return result;
+  }
+
+  void conclude(const std::vector<Verdict>& verdicts) {
+    for (std::size_t k = 0; k < state_.loops.size(); ++k) {
+      LoopRecord& record = state_.loops[k];
+      if (record.modes.empty()) continue;
+      Loop& loop = record.loop;
+      const bool was_accepted =
+          loop.state == LoopState::accepted || loop.state == LoopState::retracted;
+      if (fits_[k] && verdicts[k].accepted) {
+        // Frames that become one have new overlaps, wherever their poses were.
+        merged_ |= loop.state != LoopState::accepted && std::isinf(loop.drift_ratio);
+        loop.state = LoopState::accepted;
+        loop.reason = verdicts[k].reason;
+        continue;
+      }
+      if (!options_.accept_by_graph_alone) loop.weight = 0;
+      const bool possible =
+          std::any_of(record.modes.begin(), record.modes.end(),
+                      [&](const Mode& mode) { return within_drift(mode, options_); });
+      if (!possible) {
+        choose_mode(record, 0);
+        loop.state = was_accepted ? LoopState::retracted : LoopState::candidate;
+        loop.reason = LoopReason::exceeds_drift;
+      } else if (fitted_[k]) {
+        loop.state = was_accepted ? LoopState::retracted : LoopState::candidate;
+        loop.reason = was_accepted ? LoopReason::lost_confirmation : LoopReason::unconfirmed;
+      } else {
+        loop.state = was_accepted ? LoopState::retracted : LoopState::rejected;
+        loop.reason = LoopReason::inconsistent;
+      }
+    }
+  }
+
+  /// Takes over the poses; where they moved far, other pairs overlap than before.
+  void move(const pose_graph::Result& result) {
+    const double far = 0.5 * options_.proposals.coarse_voxel_size;
+    bool look = merged_;
+    std::size_t k = 0;
+    for (auto& [id, node] : state_.nodes) {
+      const UnalignedIsometry3d& pose = result.world_from_node[k++];
+      look |= (pose.translation() - node.estimate.translation()).norm() > far;
+      node.estimate = pose;
+    }
+    state_.poses_changed = true;
+    if (look)
+      for (auto& [id, node] : state_.nodes) node.look_within = true;
+  }
+
+  State& state_;
+  const Options& options_;
+  Paths odometry_;
+  std::vector<char> excluded_, fitted_, fits_;
+  std::uint8_t scale_ = 0;  ///< place in kDriftScales
+  bool merged_ = false;
+};
+
+}  // namespace
+
+Verification verify_loops(State& state, const Options& options) {
+  state.graph_changed = false;
+  const bool any = std::any_of(state.loops.begin(), state.loops.end(),
+                               [](const LoopRecord& record) { return !record.modes.empty(); });
+  if (!any && options.gravity_sigma == 0 && state.odometry.size() < state.nodes.size()) return {};
+  const Verification out = Verifier(state, options).run();
+  if (out.status == pose_graph::Status::failed || out.status == pose_graph::Status::cancelled)
+    state.graph_changed = true;  // nothing was decided
+  return out;
+}
+
+pose_graph::Graph accepted_graph(const State& state, const Options& options) {
+  pose_graph::Graph graph = graph_without_loops(state, options, 1);
+  for (const LoopRecord& record : state.loops) {
+    if (record.loop.state != LoopState::accepted) continue;
+    const Mode& mode = record.modes[record.mode];
+    pose_graph::Edge edge;
+    edge.source = record.source;
+    edge.target = record.target;
+    edge.target_from_source = mode.target_from_source;
+    edge.information = mode.information;
+    edge.confidence = mode.confidence;
+    graph.edges.push_back(edge);
+  }
+  return graph;
+}
+
+}  // namespace gpureg::loop_closure

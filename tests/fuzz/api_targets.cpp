@@ -1,0 +1,242 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <Eigen/LU>
+#include <cmath>
+
+#include "fuzz/bytes.hpp"
+#include "fuzz/targets.hpp"
+#include "gpureg/loop_consistency.hpp"
+#include "gpureg/pose_graph/optimize.hpp"
+#include "gpureg/registration.hpp"
+#include "gpureg/verification.hpp"
+#include "gpureg/voxel_size.hpp"
+#include "support/result_bytes.hpp"
+
+namespace gpureg::fuzz {
+namespace {
+
+/// Up to 96 points on a bent sheet, which give features and poses, or anywhere.
+PointCloud cloud_of(Bytes& bytes) {
+  PointCloud cloud;
+  const std::uint32_t size = bytes.below(97), shape = bytes.below(3);
+  const float scale = bytes.flag() ? 0.5f : bytes.number(3.0f);
+  for (std::uint32_t k = 0; k < size; ++k) {
+    Eigen::Vector3f p(static_cast<float>(k % 10) * 0.1f, static_cast<float>(k / 10) * 0.1f, 0);
+    p.z() = p.x() * p.y() - 0.3f * p.x();
+    if (shape > 0)
+      for (int axis = 0; axis < 3; ++axis) p[axis] += bytes.number(shape == 1 ? 0.02f : 2.0f);
+    cloud.points.push_back(p * (scale * 2));
+  }
+  if (bytes.flag())
+    for (std::uint32_t k = 0; k < size; ++k)
+      cloud.normals.emplace_back(bytes.number(1), bytes.number(1), 1);
+  for (std::uint32_t k = bytes.below(3); k > 0; --k)
+    cloud.viewpoints.emplace_back(bytes.number(2), bytes.number(2), bytes.number(4));
+  return cloud;
+}
+
+RegistrationOptions options_of(Bytes& bytes) {
+  RegistrationOptions o = bytes.flag() ? RegistrationOptions::loopsmart(0.1f)
+                                       : RegistrationOptions::from_voxel_size(0.1f);
+  o.quadruples.count = 256;
+  o.seed = bytes.take<std::uint8_t>();
+  const auto set = [&](float& value, float most) {
+    if (bytes.below(8) == 0) value = bytes.number(most);
+  };
+  const auto count = [&](std::uint32_t& value, std::uint32_t most) {
+    if (bytes.below(8) == 0) value = bytes.below(most);
+  };
+  set(o.prepare.voxel_size, 1);
+  set(o.prepare.normal_radius, 1);
+  set(o.prepare.feature_radius, 2);
+  set(o.prepare.wide_feature_radius, 2);
+  set(o.prepare.max_correspondence_distance, 1);
+  set(o.prepare.surface_side_distance, 2);
+  count(o.prepare.depth_maps, 4);
+  count(o.compatibility.max_matches, 300);
+  count(o.compatibility.seeds, 100);
+  count(o.compatibility.max_members, 100);
+  count(o.compatibility.triangles, 100);
+  count(o.compatibility.refits, 10);
+  set(o.compatibility.tolerance, 1);
+  set(o.compatibility.max_turn, 4);
+  set(o.compatibility.consensus_distance, 1);
+  set(o.compatibility.seed_separation, 1);
+  count(o.quadruples.count, 2000);
+  count(o.quadruples.neighbors, 20);
+  o.quadruples.mutual = bytes.flag();
+  set(o.quadruples.edge_similarity, 1);
+  set(o.quadruples.max_normal_angle, 200);
+  set(o.quadruples.max_verification_normal_angle, 200);
+  count(o.refine.max_iterations, 20);
+  set(o.refine.kernel_width, 1);
+  count(o.evidence.sample, 200);
+  count(o.evidence.modes, 70);
+  set(o.evidence.max_normal_angle, 200);
+  set(o.evidence.mode_angle, 200);
+  set(o.evidence.mode_distance, 1);
+  set(o.evidence.degeneracy_search_distance, 2);
+  set(o.evidence.free_space_margin, 1);
+  set(o.evidence.min_range, 1);
+  o.smaller_as_source = bytes.flag();
+  return o;
+}
+
+void check_result(const RegistrationResult& r) {
+  if (!(r.score >= 0 && r.score <= 1)) broken("the score is a probability or a ratio");
+  for (const RegistrationMode& mode : r.modes) {
+    if (!(mode.confidence >= 0 && mode.confidence <= 1)) broken("a confidence is a probability");
+    if (!(mode.overlap_confidence <= mode.confidence)) broken("overlap only lowers the confidence");
+  }
+  if (!r.has_candidate) {
+    if (r.aligned()) broken("an aligned pair has a pose");
+    return;
+  }
+  const Eigen::Matrix3d rotation = r.target_from_source.linear();
+  if (!r.target_from_source.matrix().allFinite() ||
+      (rotation * rotation.transpose() - Eigen::Matrix3d::Identity()).norm() > 1e-9 ||
+      !(rotation.determinant() > 0))
+    broken("a pose is a rigid motion");
+}
+
+/// Refusals are InvalidArgument; whatever is accepted gives the same bytes on any threads.
+void run_align(std::string_view input) {
+  Bytes bytes(input);
+  const RegistrationOptions options = options_of(bytes);
+  const PointCloud a = cloud_of(bytes), b = cloud_of(bytes);
+  static const Context one = Context::cpu(1), two = Context::cpu(2);
+  try {
+    const RegistrationResult first = align(one, a.view(), b.view(), options);
+    check_result(first);
+    if (test::bytes(align(two, a.view(), b.view(), options)) != test::bytes(first))
+      broken("threads change nothing");
+  } catch (const InvalidArgument&) {
+  }
+}
+
+void run_verify(std::string_view input) {
+  Bytes bytes(input);
+  const RegistrationOptions options = options_of(bytes);
+  const PointCloud a = cloud_of(bytes), b = cloud_of(bytes);
+  static const Context context = Context::cpu(1);
+  std::vector<UnalignedIsometry3d> poses(bytes.below(4), UnalignedIsometry3d::Identity());
+  for (UnalignedIsometry3d& pose : poses) {
+    const Eigen::Quaterniond q(1, static_cast<double>(bytes.number(2)),
+                               static_cast<double>(bytes.number(2)),
+                               static_cast<double>(bytes.number(2)));
+    pose.linear() = q.normalized().toRotationMatrix();
+    for (int k = 0; k < 3; ++k) pose.translation()[k] = static_cast<double>(bytes.number(3));
+  }
+  VerificationOptions verification;
+  verification.refine = bytes.flag();
+  verification.search_alternatives = bytes.flag();
+  RegistrationPrior prior;
+  if (bytes.flag()) {
+    prior.gravity = GravityPrior{};
+    prior.gravity->max_angle = static_cast<double>(bytes.number(200));
+  }
+  if (bytes.flag() && !poses.empty())
+    prior.pose = PosePrior{poses[0], static_cast<double>(bytes.number(200)),
+                           static_cast<double>(bytes.number(4))};
+  try {
+    const PreparedCloud source = prepare(context, a.view(), options.prepare),
+                        target = prepare(context, b.view(), options.prepare);
+    for (const PoseVerification& v :
+         verify_poses(context, source, target, poses, options, verification))
+      if (!(v.confidence >= 0 && v.confidence <= 1)) broken("a confidence is a probability");
+    check_result(align(context, source, target, prior, options));
+    suggest_voxel_size({a.view(), b.view()});
+  } catch (const InvalidArgument&) {
+  }
+}
+
+/// Small graphs of any shape, robustly optimised.
+void run_pose_graph(std::string_view input) {
+  Bytes bytes(input);
+  pose_graph::Graph graph;
+  const auto pose = [&] {
+    UnalignedIsometry3d out = UnalignedIsometry3d::Identity();
+    out.linear() = Eigen::Quaterniond(1, static_cast<double>(bytes.number(2)),
+                                      static_cast<double>(bytes.number(2)),
+                                      static_cast<double>(bytes.number(2)))
+                       .normalized()
+                       .toRotationMatrix();
+    for (int k = 0; k < 3; ++k) out.translation()[k] = static_cast<double>(bytes.number(5));
+    return out;
+  };
+  const std::uint32_t nodes = bytes.below(9);
+  for (std::uint32_t k = 0; k < nodes; ++k) {
+    pose_graph::Node node;
+    node.id = bytes.below(4) == 0 ? bytes.take<std::int16_t>() : k;
+    if (bytes.flag()) node.world_from_node = pose();
+    node.fixed = bytes.below(8) == 0;
+    graph.nodes.push_back(node);
+  }
+  for (std::uint32_t k = bytes.below(16); k > 0; --k) {
+    pose_graph::Edge edge;
+    edge.source = bytes.below(9);
+    edge.target = bytes.below(9);
+    edge.target_from_source = pose();
+    edge.kind = bytes.flag() ? pose_graph::EdgeKind::loop : pose_graph::EdgeKind::odometry;
+    edge.confidence = static_cast<double>(bytes.take<std::uint8_t>()) / 255;
+    if (bytes.flag()) {
+      edge.information = pose_graph::UnalignedMatrix6d::Identity();
+      for (int i = 0; i < 6; ++i)
+        (*edge.information)(i, i) = static_cast<double>(bytes.number(1000));
+    }
+    for (std::uint32_t m = bytes.below(3); m > 0; --m)
+      edge.alternatives.push_back({pose(), std::nullopt, 0.1});
+    graph.edges.push_back(edge);
+  }
+  if (bytes.flag())
+    graph.gravity.push_back({static_cast<std::int64_t>(bytes.below(9)), {0, 0, 1}, 1});
+  pose_graph::Options options;
+  options.threads = 1;
+  options.robust = bytes.flag() ? pose_graph::Robust::gnc : pose_graph::Robust::line_process;
+  try {
+    const pose_graph::Result result = pose_graph::optimize(graph, options);
+    for (const UnalignedIsometry3d& p : result.world_from_node)
+      if (!p.matrix().allFinite()) broken("poses are finite");
+  } catch (const InvalidArgument&) {
+  }
+}
+
+/// Pairs with modes of any pose and confidence.
+void run_consistency(std::string_view input) {
+  Bytes bytes(input);
+  std::vector<Pair> pairs;
+  std::vector<RegistrationResult> results;
+  for (std::uint32_t k = bytes.below(13); k > 0; --k) {
+    pairs.push_back({bytes.below(6), bytes.below(6)});
+    RegistrationResult result;
+    result.status = bytes.flag() ? RegistrationStatus::aligned : RegistrationStatus::not_aligned;
+    for (std::uint32_t m = bytes.below(4); m > 0; --m) {
+      RegistrationMode mode;
+      mode.confidence = static_cast<double>(bytes.take<std::uint8_t>()) / 255;
+      mode.target_from_source.translation() << static_cast<double>(bytes.number(3)),
+          static_cast<double>(bytes.number(3)), static_cast<double>(bytes.number(3));
+      result.modes.push_back(mode);
+    }
+    result.has_candidate = !result.modes.empty();
+    if (result.has_candidate) {
+      result.target_from_source = result.modes[0].target_from_source;
+      result.score = result.modes[0].confidence;
+    }
+    results.push_back(result);
+  }
+  try {
+    for (const PairConsistency& c : loop_consistency(pairs, results))
+      if (!(c.confidence >= 0 && c.confidence <= 1)) broken("a confidence is a probability");
+  } catch (const InvalidArgument&) {
+  }
+}
+
+}  // namespace
+
+std::vector<Target> api_targets() {
+  return {{"align", run_align},
+          {"verify", run_verify},
+          {"pose_graph", run_pose_graph},
+          {"consistency", run_consistency}};
+}
+
+}  // namespace gpureg::fuzz

@@ -1,0 +1,104 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <gtest/gtest.h>
+
+#include <set>
+
+#include "loop_closure/drive.hpp"
+
+namespace gpureg::test {
+namespace {
+
+/// The same building, walked again from another place; the frame has nothing to do with the first.
+Sequence second_session() {
+  const std::vector<Pose> lap = square(20);
+  std::vector<Pose> truth(lap.begin() + 7, lap.end());
+  Sequence s = sequence(truth, 100, 1);
+  const Pose elsewhere = planar(40, -7, 130);
+  for (Pose& pose : s.odometry) pose = elsewhere * pose;
+  return s;
+}
+
+std::size_t frames(const LoopCloser& closer) {
+  std::set<FragmentId> found;
+  for (const loop_closure::FragmentPose& pose : closer.poses()) found.insert(pose.frame);
+  return found.size();
+}
+
+RegistrationResult between(const Sequence& a, int source, const Sequence& b, int target,
+                           double confidence) {
+  return correct(a.truth[static_cast<std::size_t>(source)],
+                 b.truth[static_cast<std::size_t>(target)], confidence);
+}
+
+TEST(Sessions, TwoLoopsThatAgreeMergeThem) {
+  LoopCloser closer = closer_of();
+  const Sequence first = sequence(square(20)), second = second_session();
+  first.add_to(closer);
+  second.add_to(closer);
+  closer.process();
+  EXPECT_EQ(frames(closer), 2u);
+  closer.add_result(102, 9, between(second, 2, first, 9, 0.97));
+  closer.process();
+  EXPECT_EQ(frames(closer), 2u) << "one is not enough";
+  EXPECT_EQ(loop_of(closer.loops(), 102, 9).state, LoopState::candidate);
+  closer.add_result(106, 13, between(second, 6, first, 13, 0.97));
+  const Update update = closer.process();
+  EXPECT_EQ(frames(closer), 1u);
+  EXPECT_EQ(loop_of(update.changed, 102, 9).state, LoopState::accepted);
+  EXPECT_EQ(loop_of(update.changed, 106, 13).reason, LoopReason::confirmed);
+  // The second session came into the frame of the first.
+  for (const loop_closure::FragmentPose& pose : closer.poses()) EXPECT_EQ(pose.frame, 0);
+  const auto poses = closer.poses();
+  EXPECT_EQ(poses[0].world_from_fragment.matrix(), first.odometry[0].matrix());
+  const Pose found = poses[9].world_from_fragment.inverse() * poses[22].world_from_fragment;
+  EXPECT_EQ(poses[22].id, 102);
+  EXPECT_LT(found.translation().norm(), 0.05);
+}
+
+TEST(Sessions, LoopsThatContradictEachOtherDoNotMergeThem) {
+  LoopCloser closer = closer_of();
+  const Sequence first = sequence(square(20)), second = second_session();
+  first.add_to(closer);
+  second.add_to(closer);
+  std::mt19937 random(3);
+  std::uniform_real_distribution<double> place(-5, 5), turn(-180, 180);
+  for (int k = 0; k < 12; ++k) {
+    const Pose wrong = planar(place(random), place(random), turn(random));
+    closer.add_result(100 + k, (5 * k) % 20, result_of(wrong, 0.6));
+  }
+  closer.process();
+  EXPECT_EQ(frames(closer), 2u);
+  for (const Loop& loop : closer.loops()) EXPECT_NE(loop.state, LoopState::accepted);
+}
+
+TEST(Sessions, AMergeByAliasesIsRetracted) {
+  // Odometry that knows its turns: otherwise the drift explains a quarter turn after three corners.
+  loop_closure::Options options;
+  options.graph.drift.rotation_per_degree = 0.002;
+  LoopCloser closer = closer_of(options);
+  Sequence first = sequence(square(20)), second = second_session();
+  first.odometry = first.truth;
+  second.odometry = second.truth;
+  first.add_to(closer);
+  second.add_to(closer, 0, 6);
+  // Fragments 102 and 104 look as if they were five metres farther on.
+  const Pose aside = planar(5, 0, 90);
+  for (const int k : {2, 4}) {
+    const Pose seems = aside * second.truth[static_cast<std::size_t>(k)];
+    closer.add_result(100 + k, k, correct(seems, first.truth[static_cast<std::size_t>(k)], 0.95));
+  }
+  closer.process();
+  EXPECT_EQ(frames(closer), 1u);
+  EXPECT_EQ(loop_of(closer.loops(), 102, 2).state, LoopState::accepted);
+  second.add_to(closer, 6);
+  for (int k = 6; k < 13; ++k)
+    closer.add_result(100 + k, k + 7, between(second, k, first, k + 7, 0.95));
+  const Update update = closer.process();
+  EXPECT_EQ(loop_of(update.changed, 102, 2).state, LoopState::retracted);
+  EXPECT_EQ(loop_of(update.changed, 104, 4).state, LoopState::retracted);
+  EXPECT_EQ(loop_of(update.changed, 108, 15).state, LoopState::accepted);
+  EXPECT_EQ(frames(closer), 1u);
+}
+
+}  // namespace
+}  // namespace gpureg::test

@@ -1,0 +1,162 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <gtest/gtest.h>
+
+#include "loop_closure/drive.hpp"
+#include "support/expect_error.hpp"
+
+namespace gpureg::test {
+namespace {
+
+TEST(LoopStates, AConfidentLoopWithinTheDriftIsAcceptedAndMovesTheMap) {
+  LoopCloser closer = closer_of();
+  const Sequence s = sequence(square(20));
+  s.add_to(closer);
+  const Update before = closer.process();
+  ASSERT_EQ(before.poses.size(), 20u);
+  EXPECT_TRUE(before.changed.empty());
+  EXPECT_GT(relative_error(before.poses, s, 19, 0), 0.2);
+  add_correct(closer, s, 19, 0, 0.95);
+  add_correct(closer, s, 18, 0, 0.95);
+  const Update after = closer.process();
+  ASSERT_EQ(after.changed.size(), 2u);
+  for (const Loop& loop : after.changed) {
+    EXPECT_EQ(loop.state, LoopState::accepted);
+    EXPECT_EQ(loop.reason, LoopReason::confident);
+    EXPECT_EQ(loop.weight, 1);
+    EXPECT_LE(loop.drift_ratio, 1);
+    EXPECT_GT(loop.information(5, 5), 0);
+  }
+  // The results are 4 mm off; odometry pulls a little.
+  EXPECT_LT(relative_error(after.poses, s, 19, 0), 0.02);
+  EXPECT_TRUE(closer.process().changed.empty());
+}
+
+TEST(LoopStates, ALoopOfLittleConfidenceWaitsForAnIndependentOne) {
+  LoopCloser closer = closer_of();
+  const Sequence s = sequence(square(40));
+  s.add_to(closer);
+  closer.process();
+  const double drift = relative_error(closer.poses(), s, 30, 10);
+  add_correct(closer, s, 30, 10, 0.7);
+  Update update = closer.process();
+  ASSERT_EQ(update.changed.size(), 1u);
+  EXPECT_EQ(update.changed[0].state, LoopState::candidate);
+  EXPECT_EQ(update.changed[0].reason, LoopReason::unconfirmed);
+  // The graph without loops is solved again: rounding.
+  EXPECT_NEAR(relative_error(closer.poses(), s, 30, 10), drift, 1e-9);
+  // One that shares a fragment with it is no confirmation.
+  add_correct(closer, s, 30, 11, 0.7);
+  update = closer.process();
+  EXPECT_EQ(update.changed.size(), 1u);
+  EXPECT_EQ(loop_of(closer.loops(), 30, 10).state, LoopState::candidate);
+  add_correct(closer, s, 32, 12, 0.7);
+  update = closer.process();
+  EXPECT_EQ(update.changed.size(), 3u);
+  for (const Loop& loop : update.changed) {
+    EXPECT_EQ(loop.state, LoopState::accepted);
+    EXPECT_EQ(loop.reason, LoopReason::confirmed);
+  }
+  EXPECT_LT(relative_error(closer.poses(), s, 30, 10), 0.1 * drift);
+}
+
+TEST(LoopStates, WhatContradictsIsRejectedWithReason) {
+  LoopCloser closer = closer_of();
+  const Sequence s = sequence(square(40));
+  s.add_to(closer);
+  for (int k = 20; k < 40; k += 2) add_correct(closer, s, k, k - 20, 0.8);
+  // Within the drift of odometry, but not where the others say: a metre aside.
+  closer.add_result(31, 11, result_of(s.truth[11].inverse() * s.truth[31] * planar(0, 1, 10), 0.8));
+  closer.add_result(33, 13, {});
+  closer.process();
+  EXPECT_EQ(loop_of(closer.loops(), 30, 10).state, LoopState::accepted);
+  EXPECT_EQ(loop_of(closer.loops(), 31, 11).state, LoopState::rejected);
+  EXPECT_EQ(loop_of(closer.loops(), 31, 11).reason, LoopReason::inconsistent);
+  EXPECT_EQ(loop_of(closer.loops(), 33, 13).state, LoopState::rejected);
+  EXPECT_EQ(loop_of(closer.loops(), 33, 13).reason, LoopReason::not_aligned);
+}
+
+TEST(LoopStates, OfSeveralModesTheOneThatFitsTakesPart) {
+  LoopCloser closer = closer_of();
+  const Sequence s = sequence(square(40));
+  s.add_to(closer);
+  for (int k = 20; k < 40; k += 4) add_correct(closer, s, k, k - 20, 0.9);
+  RegistrationResult two = result_of(s.truth[2].inverse() * s.truth[22] * planar(2, 0, 90), 0.53);
+  two.modes.push_back(correct(s.truth[22], s.truth[2], 0.52).modes[0]);
+  closer.add_result(22, 2, two);
+  closer.process();
+  const Loop loop = loop_of(closer.loops(), 22, 2);
+  EXPECT_EQ(loop.state, LoopState::accepted);
+  EXPECT_EQ(loop.confidence, 0.52);
+  EXPECT_LT((loop.target_from_source.matrix() - two.modes[1].target_from_source.matrix()).norm(),
+            1e-12);
+}
+
+TEST(LoopStates, LoopsOfTheHostAreVerifiedLikeOthers) {
+  LoopCloser closer = closer_of();
+  const Sequence s = sequence(square(40));
+  s.add_to(closer);
+  closer.add_loop(30, 10, s.truth[10].inverse() * s.truth[30], std::nullopt, 0.95);
+  closer.add_loop(35, 2, s.truth[10].inverse() * s.truth[30], std::nullopt, 0.95);
+  closer.process();
+  const Loop good = loop_of(closer.loops(), 30, 10), wrong = loop_of(closer.loops(), 35, 2);
+  EXPECT_TRUE(good.from_host);
+  EXPECT_EQ(good.state, LoopState::accepted);
+  EXPECT_NE(wrong.state, LoopState::accepted);
+}
+
+TEST(LoopStates, AHostWithABackEndOfItsOwnGetsTheSameStatesAndNoPoses) {
+  loop_closure::Options options;
+  LoopCloser own = closer_of(options);
+  options.optimize = false;
+  LoopCloser theirs = closer_of(options);
+  const Sequence s = sequence(square(40));
+  for (LoopCloser* closer : {&own, &theirs}) {
+    s.add_to(*closer);
+    for (int k = 20; k < 40; k += 3) add_correct(*closer, s, k, k - 20, 0.8);
+  }
+  own.process();
+  const Update update = theirs.process();
+  EXPECT_TRUE(update.poses.empty());
+  ASSERT_EQ(own.loops().size(), theirs.loops().size());
+  for (std::size_t k = 0; k < own.loops().size(); ++k)
+    EXPECT_EQ(own.loops()[k].state, theirs.loops()[k].state);
+  // Its poses come back.
+  theirs.set_poses(own.poses());
+  theirs.process();
+  EXPECT_EQ(largest_error(own.poses(), s), largest_error(theirs.poses(), s));
+  EXPECT_EQ(theirs.graph().edges.size(), own.graph().edges.size());
+}
+
+TEST(LoopStates, TheFactorIsThatOfThePoseGraph) {
+  LoopCloser closer = closer_of();
+  const Sequence s = sequence(square(20));
+  s.add_to(closer);
+  add_correct(closer, s, 19, 0, 0.95);
+  closer.process();
+  const Loop loop = loop_of(closer.loops(), 19, 0);
+  const pose_graph::Graph graph = closer.graph();
+  const pose_graph::Edge& edge = graph.edges.back();
+  EXPECT_EQ(edge.source, loop.source);
+  EXPECT_EQ(edge.target, loop.target);
+  EXPECT_EQ(edge.target_from_source.matrix(), loop.target_from_source.matrix());
+  EXPECT_EQ(*edge.information, loop.information);
+  graph.validate();
+}
+
+TEST(LoopStates, LoopsmartAcceptsByTheLineProcessAlone) {
+  loop_closure::Options options = loop_closure::Options::loopsmart();
+  EXPECT_EQ(options.graph.robust, pose_graph::Robust::line_process);
+  EXPECT_EQ(options.graph.line_process.odometry_weight, 1000);
+  LoopCloser closer = closer_of(options);
+  Sequence s = sequence(square(20));
+  s.odometry = s.truth;
+  s.add_to(closer);
+  add_correct(closer, s, 19, 0, 0.6);
+  closer.add_result(18, 2, result_of(planar(0, 0, 0), 0.95));
+  closer.process();
+  EXPECT_EQ(loop_of(closer.loops(), 19, 0).reason, LoopReason::by_graph);
+  EXPECT_EQ(loop_of(closer.loops(), 18, 2).state, LoopState::rejected);
+}
+
+}  // namespace
+}  // namespace gpureg::test

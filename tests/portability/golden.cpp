@@ -1,0 +1,231 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Prints the bytes of results of 20 generated pairs, one fact per line; with a file it compares
+// them with its lines. No test library, so that it builds for any processor.
+//   gpureg_golden [--cuda]         prints; --cuda: of the first device
+//   gpureg_golden [--cuda] FILE    compares; exits with 1 where a line differs
+#include <cstdio>
+#include <cstring>
+#include <fstream>
+#include <iostream>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include "gpureg/reconstruction.hpp"
+#include "gpureg/registration.hpp"
+#include "gpureg/verification.hpp"
+#include "gpureg/voxel_size.hpp"
+#include "portability/scans.hpp"
+#include "support/result_bytes.hpp"
+
+namespace gpureg {
+namespace {
+
+std::string hex(std::uint64_t bits, int digits = 16) {
+  char text[20];
+  std::snprintf(text, sizeof text, "%0*llx", digits, static_cast<unsigned long long>(bits));
+  return text;
+}
+
+std::string hex(double value) {
+  std::uint64_t bits;
+  std::memcpy(&bits, &value, sizeof bits);
+  return hex(bits);
+}
+
+/// FNV-1a.
+class Hash {
+ public:
+  void add(const void* data, std::size_t size) {
+    for (std::size_t k = 0; k < size; ++k)
+      value_ = (value_ ^ static_cast<const unsigned char*>(data)[k]) * 0x100000001B3u;
+  }
+  std::string text() const { return hex(value_); }
+
+ private:
+  std::uint64_t value_ = 0xCBF29CE484222325u;
+};
+
+template <typename Rows>
+std::string hash_of(const Rows& rows) {
+  Hash hash;
+  for (const auto& row : rows) hash.add(&row, sizeof row);
+  return hash.text();
+}
+
+std::string pose_text(const UnalignedIsometry3d& pose) {
+  std::string out;
+  for (int row = 0; row < 3; ++row)
+    for (int column = 0; column < 4; ++column) out += " " + hex(pose.matrix()(row, column));
+  return out;
+}
+
+std::string evidence_text(const PoseEvidence& e) {
+  std::string out = " " + std::to_string(e.match_inliers);
+  for (const double v : {e.match_support,
+                         e.source_overlap,
+                         e.target_overlap,
+                         e.source_residual,
+                         e.target_residual,
+                         e.source_normal_weighted_overlap,
+                         e.target_normal_weighted_overlap,
+                         e.source_observed,
+                         e.target_observed,
+                         e.source_free_space_violation,
+                         e.target_free_space_violation,
+                         e.source_occluded,
+                         e.target_occluded,
+                         e.source_near_surface,
+                         e.target_near_surface,
+                         e.source_front_violation_near,
+                         e.target_front_violation_near,
+                         e.source_front_violation_far,
+                         e.target_front_violation_far,
+                         e.source_behind_surface,
+                         e.target_behind_surface})
+    out += " " + hex(v);
+  for (const double v : e.information_eigenvalues) out += " " + hex(v);
+  for (const double v : e.weakest_direction) out += " " + hex(v);
+  return out;
+}
+
+class Report {
+ public:
+  void line(const std::string& text) { lines_.push_back(text); }
+
+  void clouds(const std::vector<PreparedCloud>& clouds) {
+    for (std::size_t k = 0; k < clouds.size(); ++k) {
+      const PreparedCloud& c = clouds[k];
+      line("cloud " + std::to_string(k) + " points " + hash_of(c.points()) + " normals " +
+           hash_of(c.normals()) + " features " + hash_of(c.features()));
+    }
+  }
+
+  void pairs(const std::string& name, const std::vector<Pair>& pairs,
+             const std::vector<RegistrationResult>& results) {
+    for (std::size_t k = 0; k < pairs.size(); ++k) {
+      const RegistrationResult& r = results[k];
+      const std::string pair =
+          name + " " + std::to_string(pairs[k].source) + " " + std::to_string(pairs[k].target);
+      line(pair + " status " + to_string(r.status) + " " + to_string(r.reason) + " score " +
+           hex(r.score));
+      if (r.has_candidate) line(pair + " pose" + pose_text(r.target_from_source));
+      for (std::size_t m = 0; m < r.modes.size() && m < 3; ++m)
+        line(pair + " mode " + std::to_string(m) + " confidence " + hex(r.modes[m].confidence) +
+             " " + hex(r.modes[m].overlap_confidence) + " evidence" +
+             evidence_text(r.modes[m].evidence));
+      const std::vector<char> all = test::bytes(r);
+      Hash hash;
+      hash.add(all.data(), all.size());
+      line(pair + " all " + hash.text());
+    }
+  }
+
+  const std::vector<std::string>& lines() const { return lines_; }
+
+ private:
+  std::vector<std::string> lines_;
+};
+
+void add_map(const std::vector<PreparedCloud>& clouds, const std::vector<Pair>& pairs,
+             const std::vector<RegistrationResult>& results, float voxel_size, Report& report) {
+  reconstruction::Options options = reconstruction::Options::from_voxel_size(voxel_size);
+  reconstruction::Reconstruction map =
+      reconstruction::reconstruct(clouds.size(), pairs, results, options);
+  const auto poses = [&](const std::string& name) {
+    for (std::size_t k = 0; k < map.scans.size(); ++k)
+      report.line(name + " scan " + std::to_string(k) + " confidence " +
+                  hex(map.scans[k].confidence) +
+                  (map.scans[k].placed ? pose_text(map.scans[k].island_from_scan) : " left out"));
+  };
+  poses("map");
+  for (const reconstruction::Edge& edge : map.edges)
+    report.line("map edge " + std::to_string(edge.source) + " " + std::to_string(edge.target) +
+                " confidence " + hex(edge.confidence) + " weight " + hex(edge.weight));
+  std::vector<reconstruction::Surface> surfaces;
+  for (const PreparedCloud& cloud : clouds)
+    surfaces.push_back({cloud.points(), cloud.normals(), {}});
+  const reconstruction::RefineReport refined = reconstruction::refine(
+      surfaces, map, reconstruction::RefineOptions::from_voxel_size(voxel_size));
+  report.line("map rmse " + hex(refined.initial_rmse) + " " + hex(refined.final_rmse));
+  poses("refined map");
+}
+
+Report results_of(const Context& context) {
+  Report report;
+  const std::vector<PointCloud> scans = test::portable_scans();
+  std::vector<PointCloudView> views;
+  for (std::size_t k = 0; k < scans.size(); ++k) {
+    report.line("scan " + std::to_string(k) + " " + std::to_string(scans[k].points.size()) + " " +
+                hash_of(scans[k].points));
+    views.push_back(scans[k].view());
+  }
+  const VoxelSizeSuggestion suggested = suggest_voxel_size(views);
+  report.line("voxel size " + hex(static_cast<double>(suggested.voxel_size)) + " spacing " +
+              hex(suggested.spacing) + " noise " + hex(suggested.noise));
+
+  constexpr float kVoxelSize = 0.1f;
+  RegistrationOptions options = RegistrationOptions::from_voxel_size(kVoxelSize);
+  const std::vector<PreparedCloud> clouds = prepare_batch(context, views, options.prepare);
+  report.clouds(clouds);
+  std::vector<Pair> pairs;
+  for (std::uint32_t i = 0; i < clouds.size(); ++i)
+    for (std::uint32_t j = i + 1; j < clouds.size(); ++j)
+      if (i != 5) pairs.push_back({j, i});
+  const std::vector<RegistrationResult> results = align_batch(context, clouds, pairs, options);
+  report.pairs("pair", pairs, results);
+
+  RegistrationPrior prior;
+  prior.pose = PosePrior{results[0].target_from_source, 17, 0.7};
+  const RegistrationResult guided =
+      align(context, clouds[pairs[0].source], clouds[pairs[0].target], prior, options);
+  report.pairs("with prior", {pairs[0]}, {guided});
+
+  VerificationOptions verification;
+  verification.refine = true;
+  for (const PoseVerification& v :
+       verify_poses(context, clouds[pairs[0].source], clouds[pairs[0].target],
+                    {results[0].target_from_source}, options, verification))
+    report.line("verified confidence " + hex(v.confidence) + pose_text(v.target_from_source) +
+                " evidence" + evidence_text(v.evidence));
+
+  RegistrationOptions quadruples = RegistrationOptions::loopsmart(kVoxelSize);
+  quadruples.quadruples.count = 20'000;
+  const std::vector<Pair> two{pairs[0], pairs[1]};
+  report.pairs("quadruples", two, align_batch(context, clouds, two, quadruples));
+
+  add_map(clouds, pairs, results, kVoxelSize, report);
+  return report;
+}
+
+int compare(const std::vector<std::string>& here, const std::string& path) {
+  std::ifstream file(path);
+  if (!file) {
+    std::cerr << "error: cannot read " << path << "\n";
+    return 2;
+  }
+  std::size_t differing = 0, k = 0;
+  std::string expected;
+  for (; std::getline(file, expected); ++k) {
+    if (k < here.size() && here[k] == expected) continue;
+    if (differing++ == 0)
+      std::cerr << path << ":" << k + 1 << " differs\n  expected " << expected << "\n  here     "
+                << (k < here.size() ? here[k] : "nothing") << "\n";
+  }
+  if (here.size() > k) differing += here.size() - k;
+  std::cout << here.size() << " lines, " << differing << " differ\n";
+  return differing == 0 && k > 0 ? 0 : 1;
+}
+
+}  // namespace
+}  // namespace gpureg
+
+int main(int count, char** arguments) {
+  const bool cuda = count > 1 && std::strcmp(arguments[1], "--cuda") == 0;
+  const gpureg::Report report =
+      gpureg::results_of(cuda ? gpureg::Context::cuda() : gpureg::Context::cpu(2));
+  const int file = cuda ? 2 : 1;
+  if (file < count) return gpureg::compare(report.lines(), arguments[file]);
+  for (const std::string& line : report.lines()) std::cout << line << "\n";
+  return 0;
+}
