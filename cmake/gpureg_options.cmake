@@ -3,6 +3,7 @@ option(GPUREG_BUILD_TESTS "Build the tests (needs GoogleTest)" ${PROJECT_IS_TOP_
 option(GPUREG_BUILD_GOLDEN "Build the test of results byte for byte (needs no test library)" ${GPUREG_BUILD_TESTS})
 option(GPUREG_BUILD_BENCHMARKS "Build the benchmarks (needs Google Benchmark)" ${PROJECT_IS_TOP_LEVEL})
 option(GPUREG_BUILD_APPS "Build the command gpureg (needs CLI11 and nlohmann-json)" ${PROJECT_IS_TOP_LEVEL})
+option(GPUREG_SLAM_DEMO "Build slam_demo with the apps (needs OpenCV and Ceres)" ON)
 option(GPUREG_BUILD_PYTHON "Build the Python module (needs pybind11; pip does this)" OFF)
 option(GPUREG_WERROR "Treat warnings as errors (for the tests of the project itself)" OFF)
 set(GPUREG_CUDA "AUTO" CACHE STRING "CUDA backend: AUTO (when nvcc is found), ON or OFF")

@@ -103,10 +103,12 @@ __device__ inline bool agrees_with(const ScorePair& pair, const InlierTest& test
                        test.min_cosine);
 }
 
-/// Exact test by search, for cells whose list does not fit their word.
-static __device__ __noinline__ bool is_inlier_by_search(const ScorePair& pair,
-                                                        const InlierTest& test, const Rigid& rigid,
-                                                        Vec3 q, const std::uint32_t* index) {
+/// Exact test by search, for cells whose list does not fit their word. test: by value, as the
+/// address of a part of the arguments of a kernel makes the compiler copy all of them to local
+/// memory.
+static __device__ __noinline__ bool is_inlier_by_search(const ScorePair& pair, InlierTest test,
+                                                        const Rigid& rigid, Vec3 q,
+                                                        const std::uint32_t* index) {
   const Closest found = find_closest(pair.target, pair.cells, q, test.max_squared);
   return found.index != kNoValue &&
          normals_agree(rotate(rigid, pair.source.normals[*index]), pair.target.normals[found.index],

@@ -18,6 +18,7 @@
 #include "data/rgbd.hpp"
 #include "data/scatter.hpp"
 #include "data/scene_files.hpp"
+#include "data/surface.hpp"
 #include "data/trajectory.hpp"
 #include "gpureg/error.hpp"
 
@@ -25,6 +26,7 @@ namespace gpureg::synthetic {
 namespace {
 
 constexpr float kPointSpacing = 0.02f;  // metres: cells in which zero crossings are averaged
+constexpr int kSurfaceStep = 5;         // of so many frames one looks for true surfaces
 
 void require(bool fine, const std::string& field, const std::string& value, const char* rule) {
   if (!fine) throw InvalidArgument(field + " is " + value + ", but must be " + rule);
@@ -41,6 +43,8 @@ void validate(const GenerateOptions& o) {
           "0 to 2 a square metre");
   require(o.clutter == 0 || !o.building.empty(), "clutter", std::to_string(o.clutter),
           "0 without a building: generated houses are furnished");
+  require(o.no_return >= 0 && o.no_return <= 1000, "no_return", std::to_string(o.no_return),
+          "0 to 1000 m");
   const SensorOptions& s = o.sensor;
   const auto in = [&](const char* name, double value, double low, double high, const char* rule) {
     require(value >= low && value <= high, std::string("sensor.") + name, std::to_string(value),
@@ -98,10 +102,12 @@ class Generator {
         house_(options.building.empty() ? build_house(options.seed) : furnished_building(options)),
         scene_(house_.mesh),
         sensor_(scene_, options.sensor, options.seed),
-        world_from_camera_(
-            walk(house_, scene_, options.seed, options.fragments * options.frames_per_fragment)),
+        world_from_camera_(walk(house_, scene_, options.seed,
+                                options.fragments * options.frames_per_fragment,
+                                static_cast<float>(options.no_return))),
         fragments_(static_cast<std::size_t>(options.fragments)),
-        cameras_(fragments_.size()) {}
+        cameras_(fragments_.size()),
+        surfaces_(fragments_.size()) {}
 
   void run() {
     open_folder(folder_, options_.fragments, options_.rgbd);
@@ -112,7 +118,10 @@ class Generator {
     if (stopped()) return;
     std::vector<Eigen::Isometry3d> poses;
     for (const Fragment& fragment : fragments_) poses.push_back(fragment.world_from_fragment);
-    if (options_.rgbd) write_sequence_lists(folder_, world_from_camera_);
+    if (options_.rgbd) {
+      write_sequence_lists(folder_, world_from_camera_);
+      write_surface(folder_ + "/surface.ply", surfaces_);
+    }
     write_poses(folder_ + "/poses.txt", poses);
     write_cameras(folder_ + "/cameras.txt", cameras_);
     write_ground_truth(folder_, options_.fragments, truths);
@@ -167,6 +176,8 @@ class Generator {
       const DepthQuarter quarter = sensor_.capture(pose, first + k, 0, 0);
       volume.integrate(quarter, cameras_[at][static_cast<std::size_t>(k)]);
       if (!options_.rgbd) continue;
+      if (k % kSurfaceStep == 0)
+        surfaces_[at].look(scene_, pose, options_.sensor.min_depth, options_.sensor.max_depth);
       write_frame(folder_, first + k, render_colour(scene_, pose, options_.seed, first + k),
                   depth_image({quarter, sensor_.capture(pose, first + k, 1, 0),
                                sensor_.capture(pose, first + k, 0, 1),
@@ -214,6 +225,7 @@ class Generator {
   const std::vector<Eigen::Isometry3d> world_from_camera_;
   std::vector<Fragment> fragments_;
   std::vector<std::vector<Eigen::Isometry3d>> cameras_;  // fragment_from_camera
+  std::vector<VisibleSurface> surfaces_;                 // empty without rgbd
   std::atomic<bool> stop_{false};
   std::mutex report_guard_;
   int done_ = 0;

@@ -35,6 +35,9 @@ struct GenerateOptions {
   /// 0 .. 2, with building: pieces of furniture per square metre that are put into it, so that what
   /// was copied in it differs
   double clutter = 0;
+  /// 0 .. 1000 metres: the path does not come back to a place before this length; of some random
+  /// paths the first that does so is taken
+  double no_return = 0;
   /// also write the frames as a TUM sequence (about 0.6 MB and several times the work per frame)
   bool rgbd = false;
   int threads = 0;  ///< 0: all cores; each holds one fragment's volume (about 100 MB)
@@ -57,7 +60,8 @@ struct Progress {
 ///   number and world_from_fragment (exact);  world: z up, floor at z = 0 cameras.txt `fragment
 ///   frame tx ty tz qx qy qz qw`: fragment_from_camera as the (drifting) odometry has it
 /// and with rgbd: rgb/, depth/ (16 bit, 5000 per metre), rgb.txt, depth.txt, associations.txt,
-/// groundtruth.txt (world_from_camera, exact). Overlap of A with B is the share of A's points with
+/// groundtruth.txt (world_from_camera, exact), surface.ply (the surfaces in view, exact points and
+/// normals about 1 cm apart, world). Overlap of A with B is the share of A's points with
 /// a point of B within 7.5 cm, under the exact poses.
 ///
 /// The same seed and options give the same bytes for any number of threads, and the scene of N

@@ -55,7 +55,7 @@ void open_folder(const std::string& folder, int fragments, bool rgbd) {
   }
   if (error) throw IoError(folder + ": cannot read this folder: " + error.message());
   for (const char* name : {"gt.log", "gt.info", "gt_all.log", "gt_all.info", "gt_overlap.txt",
-                           "poses.txt", "cameras.txt"}) {
+                           "poses.txt", "cameras.txt", "surface.ply"}) {
     fs::remove(fs::path(folder) / name, error);
     if (error)
       throw IoError(folder + "/" + name + ": cannot replace this file: " + error.message());
@@ -65,13 +65,17 @@ void open_folder(const std::string& folder, int fragments, bool rgbd) {
   make_folder(fs::path(folder) / "depth");
 }
 
-void write_cloud(const std::string& path, const std::vector<Eigen::Vector3f>& points) {
+void write_cloud(const std::string& path, const std::vector<Eigen::Vector3f>& points,
+                 const std::vector<Eigen::Vector3f>& normals) {
   std::string bytes = "ply\nformat binary_little_endian 1.0\nelement vertex " +
                       std::to_string(points.size()) +
-                      "\nproperty float x\nproperty float y\nproperty float z\nend_header\n";
-  bytes.reserve(bytes.size() + 12 * points.size());
-  for (const Eigen::Vector3f& p : points) {
-    for (int axis = 0; axis < 3; ++axis) append(bytes, p[axis]);
+                      "\nproperty float x\nproperty float y\nproperty float z\n";
+  if (!normals.empty()) bytes += "property float nx\nproperty float ny\nproperty float nz\n";
+  bytes += "end_header\n";
+  bytes.reserve(bytes.size() + 12 * (points.size() + normals.size()));
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    for (int axis = 0; axis < 3; ++axis) append(bytes, points[i][axis]);
+    for (int axis = 0; axis < 3 && !normals.empty(); ++axis) append(bytes, normals[i][axis]);
   }
   files::write_atomically(path, bytes);
 }

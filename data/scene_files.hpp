@@ -13,8 +13,9 @@ namespace gpureg::synthetic {
 /// that no longer belongs to the clouds.
 void open_folder(const std::string& folder, int fragments, bool rgbd);
 
-/// Binary little-endian PLY, float32 x y z.
-void write_cloud(const std::string& path, const std::vector<Eigen::Vector3f>& points);
+/// Binary little-endian PLY, float32 x y z, and nx ny nz where there are normals.
+void write_cloud(const std::string& path, const std::vector<Eigen::Vector3f>& points,
+                 const std::vector<Eigen::Vector3f>& normals = {});
 
 /// poses.txt: blocks of five lines, the number and world_from_fragment.
 void write_poses(const std::string& path,

@@ -4,9 +4,11 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <string>
 
 #include "data/random.hpp"
 #include "data/walk_map.hpp"
+#include "gpureg/error.hpp"
 
 namespace gpureg::synthetic {
 namespace {
@@ -60,19 +62,23 @@ class Line {
 };
 
 /// Round each room, then through a door, mostly to where it was least.
-std::vector<Vector2f> tour_of_rooms(const House& house, std::uint64_t seed, float length) {
-  const WalkMap map(house);
-  Random random(hash_key(seed, Purpose::path));
+std::vector<Vector2f> tour_of_rooms(const House& house, const WalkMap& map, std::uint64_t seed,
+                                    std::uint64_t variant, float length, float no_return) {
+  Random random(hash_key(seed, Purpose::path, variant));
   std::vector<int> visits(house.rooms.size(), 0);
   std::size_t room = 0;
+  if (variant > 0)
+    room = static_cast<std::size_t>(random.below(static_cast<int>(house.rooms.size())));
   while (house.rooms[room].floor.size().minCoeff() < 2.2f)
-    ++room;  // start in a room, not in the corridor
+    room = (room + 1) % house.rooms.size();  // start in a room, not in the corridor
   Line line(map, place_in(house.rooms[room], map, random, house.rooms[room].floor.low));
   // A room that cannot be walked in would keep the tour from growing: it is bounded by its number
   // of legs too.
   for (int leg = 0; line.length() < length && leg < 1000 + static_cast<int>(length); ++leg) {
     ++visits[room];
-    const int places = house.rooms[room].floor.size().minCoeff() < 2.2f ? 1 : random.between(2, 4);
+    const bool away = line.length() < no_return;
+    const int places =
+        away || house.rooms[room].floor.size().minCoeff() < 2.2f ? 1 : random.between(2, 4);
     for (int i = 0; i < places; ++i)
       line.go_to(place_in(house.rooms[room], map, random, line.at()));
     std::vector<const Doorway*> ways;
@@ -87,7 +93,7 @@ std::vector<Vector2f> tour_of_rooms(const House& house, std::uint64_t seed, floa
     };
     const Doorway* next =
         ways[static_cast<std::size_t>(random.below(static_cast<int>(ways.size())))];
-    if (random.chance(0.6f)) {
+    if (away || random.chance(0.6f)) {
       for (const Doorway* door : ways) {
         if (visits[beyond(door)] < visits[beyond(next)]) next = door;
       }
@@ -101,11 +107,11 @@ std::vector<Vector2f> tour_of_rooms(const House& house, std::uint64_t seed, floa
 }
 
 /// Of a few places near by, mostly to where it was least.
-std::vector<Vector2f> tour_of_places(const RayScene& scene, std::uint64_t seed, float length) {
+std::vector<Vector2f> tour_of_places(const WalkMap& map, std::uint64_t seed, std::uint64_t variant,
+                                     float length) {
   constexpr float kSquare = 1.5f, kLeg = 8;  // metres
-  const WalkMap map(scene);
   const std::vector<Vector2f> places = map.free_places();
-  Random random(hash_key(seed, Purpose::path));
+  Random random(hash_key(seed, Purpose::path, variant));
   const auto any = [&] {
     return places[static_cast<std::size_t>(random.below(static_cast<int>(places.size())))];
   };
@@ -141,10 +147,36 @@ std::vector<Vector2f> tour_of_places(const RayScene& scene, std::uint64_t seed, 
 
 }  // namespace
 
+float first_return(const std::vector<Vector2f>& tour) {
+  constexpr float kNear = 1.2f, kLeft = 6;  // metres
+  constexpr std::size_t kStep = 5;          // points between those compared
+  const auto gap = static_cast<std::size_t>(kLeft / kTourSpacing);
+  for (std::size_t now = gap; now < tour.size(); now += kStep) {
+    for (std::size_t before = 0; before + gap <= now; before += kStep) {
+      if ((tour[now] - tour[before]).norm() < kNear) return static_cast<float>(now) * kTourSpacing;
+    }
+  }
+  return static_cast<float>(tour.size()) * kTourSpacing;
+}
+
 std::vector<Vector2f> tour(const House& house, const RayScene& scene, std::uint64_t seed,
-                           float length) {
-  return house.rooms.empty() ? tour_of_places(scene, seed, length)
-                             : tour_of_rooms(house, seed, length);
+                           float length, float no_return) {
+  constexpr std::uint64_t kVariants = 200;  // walks that are tried
+  const WalkMap map = house.rooms.empty() ? WalkMap(scene) : WalkMap(house);
+  const auto walk = [&](std::uint64_t variant, float metres) {
+    return house.rooms.empty() ? tour_of_places(map, seed, variant, metres)
+                               : tour_of_rooms(house, map, seed, variant, metres, no_return);
+  };
+  if (no_return <= 0) return walk(0, length);
+  float longest = 0;
+  for (std::uint64_t variant = 0; variant < kVariants; ++variant) {
+    const float metres = first_return(walk(variant, no_return + 0.5f));
+    if (metres >= no_return) return walk(variant, length);
+    longest = std::max(longest, metres);
+  }
+  throw InvalidArgument("no_return is " + std::to_string(no_return) +
+                        " m, but every walk tried in this building comes back after at most " +
+                        std::to_string(longest) + " m");
 }
 
 }  // namespace gpureg::synthetic

@@ -86,12 +86,12 @@ float choose_gaze(const RayScene& scene, const Vector2f& at, float heading, std:
 }  // namespace
 
 std::vector<Eigen::Isometry3d> walk(const House& house, const RayScene& scene, std::uint64_t seed,
-                                    int frames) {
+                                    int frames, float no_return) {
   // Frames beyond the last one, so that smoothing treats a short walk like the beginning of a long
   // one.
   const int total = frames + 6 * kTurnFrames + 2 * kGazeFrames;
-  const std::vector<Vector2f> line =
-      smoothed(tour(house, scene, seed, kMaximumSpeed * static_cast<float>(total) + 4), 12);
+  const std::vector<Vector2f> line = smoothed(
+      tour(house, scene, seed, kMaximumSpeed * static_cast<float>(total) + 4, no_return), 12);
   const auto sample = [&](float s) {
     const float u = std::clamp(s / kTourSpacing, 0.0f, static_cast<float>(line.size() - 2));
     const auto i = static_cast<std::size_t>(u);

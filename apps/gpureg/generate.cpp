@@ -92,7 +92,11 @@ void add_generate(CLI::App& app, Action& chosen) {
   verb->add_option("--clutter", o->scene.clutter,
                    "Pieces of furniture per square metre to put into it; copied rooms then differ")
       ->capture_default_str();
-  verb->add_flag("--rgbd", o->scene.rgbd, "Also write the frames as a sequence in TUM's layout");
+  verb->add_option("--no-return", o->scene.no_return,
+                   "Metres that the path goes before it comes back to a place")
+      ->capture_default_str();
+  verb->add_flag("--rgbd", o->scene.rgbd,
+                 "Also write the frames as a sequence in TUM's layout, and the true surfaces");
   verb->add_flag("--quiet", o->quiet, "No progress, no summary");
   verb->callback([o, &chosen] { chosen = [o] { return run(*o); }; });
 }

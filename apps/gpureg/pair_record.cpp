@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "gpureg/error.hpp"
+#include "gpureg/reconstruction.hpp"
 #include "result_json.hpp"
 
 namespace gpureg::cli {
@@ -64,17 +65,6 @@ std::array<double, 6> six(const Json& json, const char* name) {
   std::array<double, 6> out;
   for (std::size_t k = 0; k < 6; ++k) out[k] = number(value[k], name);
   return out;
-}
-
-/// The inverse of CorrespondenceMoments::information_redwood().
-CorrespondenceMoments moments_of(const Eigen::Matrix<double, 6, 6>& information) {
-  CorrespondenceMoments moments;
-  moments.count = static_cast<std::uint64_t>(std::max(0.0, std::round(information(0, 0))));
-  const Eigen::Matrix3d cross = information.topRightCorner<3, 3>() / -2;
-  moments.sum = {cross(2, 1), cross(0, 2), cross(1, 0)};
-  const Eigen::Matrix3d turn = information.bottomRightCorner<3, 3>() / 4;
-  moments.outer = 0.5 * turn.trace() * Eigen::Matrix3d::Identity() - turn;
-  return moments;
 }
 
 }  // namespace
@@ -138,7 +128,8 @@ RegistrationResult result_from_record(const PairRecord& record, const Json& info
   result.score = record.score;
   result.modes = modes_from_json(record.json);
   if (!information.is_null())
-    result.source_moments = moments_of(information_from_json(information));
+    result.source_moments =
+        reconstruction::moments_of_information(information_from_json(information));
   return result;
 }
 

@@ -2,10 +2,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Errors of a map against the truth: for each island, RMSE of positions and rotations after alignment (Horn 1987).
 
-    map_rmse.py OUT TRUTH      OUT of `gpureg reconstruct`; TRUTH/poses.txt, gt_all.log, gt_all.info
+    map_rmse.py OUT TRUTH [PAIRS.json]     OUT of `gpureg reconstruct`; TRUTH/poses.txt, gt_all.log, gt_all.info
 
 Rotations are aligned by positions, and by themselves (the chordal mean): positions hardly determine a rotation where scans are close.
-An accepted edge is wrong where its pair is not in gt_all or its error by Redwood's measure is above 0.2 m.
+An accepted edge is wrong where its error by Redwood's measure is above 0.2 m. Pairs with an overlap below 5 % are not in
+gt_all: their truth is that of the poses, their information that of the result, or else of points 2 m around the source.
 """
 
 import json
@@ -64,36 +65,104 @@ def rms(values):
     return np.sqrt((values**2).mean())
 
 
-def main():
-    out, folder = pathlib.Path(sys.argv[1]), pathlib.Path(sys.argv[2])
-    truth = read_poses(folder / "poses.txt")
-    poses, document = (
-        read_poses(out / "poses.txt"),
-        json.loads((out / "reconstruction.json").read_text()),
-    )
-    print(
-        f"placed {len(poses)} of {len(document['scans'])}, islands {[len(i) for i in document['islands']]}"
-    )
-    for island in document["islands"]:
-        metres, degrees, own = errors(poses, truth, island)
-        print(
-            f"island of {len(island)}: RMSE {100 * rms(metres):.2f} cm, {rms(degrees):.2f} degrees by positions, "
-            f"{rms(own):.2f} by rotations; worst {100 * metres.max():.2f} cm (scan {island[metres.argmax()]})"
-        )
-    truth_log, truth_info = (
+def read_truth(folder):
+    """Poses, and of all pairs with overlap their poses and information matrices."""
+    folder = pathlib.Path(folder)
+    return (
+        read_poses(folder / "poses.txt"),
         read_blocks(folder / "gt_all.log", 4),
         read_blocks(folder / "gt_all.info", 6),
     )
+
+
+# Without information of a pair: points on a sphere of 2 m around the source's origin.
+NO_INFORMATION = np.diag([1, 1, 1, *(3 * [8 / 3 * 2**2])])
+
+
+def edge_error(pair, pose, truth, information):
+    """Metres; infinite where the truth has no such scan or the scans are of different scenes."""
+    poses, log, info = truth
+    if pair in log:
+        return redwood_error(log[pair], pose, info[pair])
+    if pair[0] not in poses or pair[1] not in poses or pair[0] // 100 != pair[1] // 100:
+        return np.inf
+    relative = np.linalg.inv(poses[pair[0]]) @ poses[pair[1]]
+    return redwood_error(relative, pose, information.get(pair, NO_INFORMATION))
+
+
+def information_of(pairs):
+    """Of the pairs of a result."""
+    return {
+        (p["i"], p["j"]): np.reshape(p["information"], (6, 6))
+        for p in pairs
+        if p.get("information")
+    }
+
+
+def measure(out, truth, information):
+    """Figures of a map; truth as read_truth() returns it, information as information_of().
+    Positions in centimetres.
+    """
+    truth_poses = truth[0]
+    poses = read_poses(out / "poses.txt")
+    document = json.loads((out / "reconstruction.json").read_text())
+    islands = []
+    for island in document["islands"]:
+        known = [k for k in island if k in truth_poses]
+        if len(known) < 3:
+            islands.append({"scans": island})
+            continue
+        metres, degrees, own = errors(poses, truth_poses, known)
+        islands.append(
+            {
+                "scans": island,
+                "rmse_cm": 100 * rms(metres),
+                "rmse_degrees": rms(degrees),
+                "rmse_degrees_own": rms(own),
+                "worst_cm": 100 * metres.max(),
+                "worst_scan": known[metres.argmax()],
+            }
+        )
     wrong, accepted = [], [e for e in document["edges"] if e["state"] == "accepted"]
     for edge in accepted:
         pair = (edge["i"], edge["j"])
         pose = np.array(edge["T_ij"]).reshape(4, 4)
-        error = (
-            redwood_error(truth_log[pair], pose, truth_info[pair]) if pair in truth_log else np.inf
-        )
+        error = edge_error(pair, pose, truth, information)
         if error > MAX_EDGE_METRES:
-            wrong.append((*pair, round(float(error), 3), round(edge["confidence"], 3)))
-    print(f"edges: {len(accepted)} accepted, {len(wrong)} wrong {wrong}")
+            wrong.append(
+                {
+                    "pair": pair,
+                    "metres": float(error) if np.isfinite(error) else None,
+                    "confidence": edge["confidence"],
+                }
+            )
+    return {
+        "scans": len(document["scans"]),
+        "placed": len(poses),
+        "islands": islands,
+        "accepted": len(accepted),
+        "wrong": wrong,
+    }
+
+
+def main():
+    out = pathlib.Path(sys.argv[1])
+    results = pathlib.Path(sys.argv[3]) if len(sys.argv) > 3 else out / "pairs.json"
+    pairs = json.loads(results.read_text())["pairs"] if results.exists() else []
+    figures = measure(out, read_truth(sys.argv[2]), information_of(pairs))
+    sizes = [len(island["scans"]) for island in figures["islands"]]
+    print(f"placed {figures['placed']} of {figures['scans']}, islands {sizes}")
+    for island in figures["islands"]:
+        if "rmse_cm" in island:
+            print(
+                f"island of {len(island['scans'])}: RMSE {island['rmse_cm']:.2f} cm, {island['rmse_degrees']:.2f} degrees "
+                f"by positions, {island['rmse_degrees_own']:.2f} by rotations; "
+                f"worst {island['worst_cm']:.2f} cm (scan {island['worst_scan']})"
+            )
+    print(f"edges: {figures['accepted']} accepted, {len(figures['wrong'])} wrong")
+    for edge in figures["wrong"]:
+        far = "no overlap" if edge["metres"] is None else f"{edge['metres']:.3f} m"
+        print(f"    {edge['pair']}: {far}, confidence {edge['confidence']:.3f}")
 
 
 if __name__ == "__main__":

@@ -4,7 +4,7 @@
     python 06_many_fragments.py scans/ --output run/ --neighbors 20 --check 100
 
 The folder holds cloud_bin_<i>.ply. All pairs of the first --check fragments are aligned as well, and
-those that are aligned stand for the pairs that overlap. Needs pyarrow and faiss-cpu.
+those that are aligned stand for the pairs that overlap. Needs pyarrow.
 """
 
 from __future__ import annotations

@@ -66,6 +66,8 @@ struct AcceptanceOptions {
   double min_confidence = 0.1;
   /// Confidence from which one loop within the drift of odometry suffices, (0, 1].
   double alone = 0.9;
+  /// Least confidence of a loop that others confirm, [0, 1].
+  double confirmed = 0.5;
   /// Probability that one of several independent loops that agree is correct, in view of those that
   /// contradict them, from which they suffice, (0, 1].
   double together = 0.9;
@@ -74,9 +76,9 @@ struct AcceptanceOptions {
   /// Quantile of the misclosure under odometry's uncertainty within which a loop may stand alone,
   /// (0, 1).
   double drift_probability = 0.99;
-  /// Largest ratio of the misclosure to that quantile at which a loop may be accepted at all, in
-  /// standard deviations, >= 1.
-  double max_drift_ratio = 2;
+  /// Largest Loop::drift_ratio at which a loop may be accepted at all, if others confirm it, >= 1:
+  /// by so much odometry may be worse than Options::graph.drift says.
+  double max_drift_ratio = 6;
 
   /// @throws InvalidArgument naming field and value.
   void validate() const;

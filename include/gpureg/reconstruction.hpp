@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <functional>
 #include <limits>
+#include <optional>
 #include <unordered_map>
 #include <vector>
 
@@ -35,6 +36,8 @@ struct EdgeNoiseOptions {
 struct Options {
   LoopConsistencyOptions consistency;
   EdgeNoiseOptions noise;
+  /// Noise of odometry without an information matrix.
+  pose_graph::DriftOptions drift;
   /// Length in which PoseEvidence::information_eigenvalues count rotations, metres, > 0: twenty
   /// voxels.
   double information_unit = 1.0;
@@ -58,6 +61,7 @@ struct Options {
 /// Why a scan is left out.
 enum class ScanReason {
   none,               ///< placed
+  odometry_only,      ///< placed by odometry; no accepted edge confirms it
   not_tried,          ///< no pair of the scan was aligned
   too_few_points,     ///< every alignment found too few points in the scan
   no_confident_pair,  ///< no pair of the scan reaches min_edge_confidence
@@ -76,6 +80,23 @@ enum class EdgeReason {
   unconfirmed    ///< the only connections between two parts, and not confident enough together
 };
 const char* to_string(EdgeReason reason);
+/// The reason as one sentence for people.
+const char* describe(EdgeReason reason);
+
+/// A relative pose of two scans that is trusted: of wheels, a tracker or scan matching.
+struct Odometry {
+  std::uint32_t source = 0, target = 0;  ///< scans
+  /// p_target = target_from_source * p_source, metres.
+  UnalignedIsometry3d target_from_source = UnalignedIsometry3d::Identity();
+  /// As pose_graph::Edge::information. None: Options::drift.
+  std::optional<pose_graph::UnalignedMatrix6d> information = std::nullopt;
+  /// Probability that the pose is correct up to its noise, (0, 1]: enters Scan::confidence only.
+  double confidence = 0.99;
+};
+
+/// Odometry between consecutive scans of those whose pose is known.
+/// @param world_from_scan one per scan; not finite: not known.
+std::vector<Odometry> odometry_of_poses(const std::vector<UnalignedIsometry3d>& world_from_scan);
 
 /// One scan of the map.
 struct Scan {
@@ -100,6 +121,9 @@ struct Edge {
   UnalignedIsometry3d target_from_source = UnalignedIsometry3d::Identity();
   /// Centre of the overlap in the source's frame; the origin where it is not known.
   Eigen::Vector3d overlap_centre = Eigen::Vector3d::Zero();
+  /// Covariance of the overlap's points in the source's frame, metres^2; 0 where it is not known.
+  Eigen::Matrix<double, 3, 3, Eigen::DontAlign> overlap_spread =
+      Eigen::Matrix<double, 3, 3, Eigen::DontAlign>::Zero();
   double confidence = 0;  ///< of this mode, after loop consistency
   double weight = 0;      ///< in the pose graph, [0, 1]
   bool accepted = false;
@@ -119,6 +143,8 @@ struct Reconstruction {
   std::vector<Scan> scans;                                   ///< in their order
   std::vector<Edge> edges;                                   ///< in the order of the pairs
   std::vector<Island> islands;  ///< the largest first, then by smallest scan
+  /// As given, each with its information matrix.
+  std::vector<Odometry> odometry;
 
   std::size_t placed() const;  ///< number of placed scans
 };
@@ -129,17 +155,38 @@ struct Reconstruction {
 /// @param scans number of scans.
 /// @param pairs indices below scans, as for align_batch().
 /// @param results results[k] belongs to pairs[k], as align_batch() returns them.
+/// @param odometry relative poses that are known. They connect scans whatever the pairs say; pairs
+///   that contradict them by more than their drift are rejected.
 /// @return the map. Scans that cannot be placed are no error. Independent of the number of threads.
 /// @throws InvalidArgument for options out of range, an index out of range, a pair of a scan with
-///   itself, a repeated pair, and as loop_consistency().
+///   itself, a repeated pair, as loop_consistency(), and as pose_graph::Graph::validate().
 Reconstruction reconstruct(std::size_t scans, const std::vector<Pair>& pairs,
                            const std::vector<RegistrationResult>& results,
-                           const Options& options = {});
+                           const Options& options = {}, const std::vector<Odometry>& odometry = {});
 
-/// The placed scans with their poses, and the accepted edges. Node ids are indices of scans, or
-/// `ids` of them where given.
+/// The inverse of CorrespondenceMoments::information_redwood(), for results that were read from a
+/// file.
+CorrespondenceMoments moments_of_information(const Eigen::Matrix<double, 6, 6>& redwood);
+
+/// The placed scans with their poses, the odometry between them, and the accepted edges. Node ids
+/// are indices of scans, or `ids` of them where given.
 /// @throws InvalidArgument where ids are neither none nor one per scan.
 pose_graph::Graph graph_of(const Reconstruction& map, const std::vector<std::int64_t>& ids = {});
+
+/// A place where an island would fall into two parts if fewer edges were correct.
+struct Link {
+  std::vector<std::uint32_t> scans;  ///< the smaller part, ascending
+  /// Probability that one of the accepted edges between the parts is correct, in view of the
+  /// rejected ones.
+  double confidence = 0;
+  std::size_t accepted = 0, rejected = 0;  ///< edges between the parts
+};
+
+/// The connections along the most confident spanning tree of each island: where a map is weakest.
+/// Odometry counts as accepted edges of its confidence.
+/// @return scans - 1 links for each island, in the order of the islands; within one, by the first
+///   scan of the part that the tree's root is not in.
+std::vector<Link> weakest_links(const Reconstruction& map);
 
 /// Points of a scan with their normals, in the scan's frame.
 struct Surface {
@@ -148,6 +195,19 @@ struct Surface {
   /// Sensor positions in the scan's frame, for RefineOptions::noise_range; may be empty.
   std::vector<Eigen::Vector3f> viewpoints = {};
 };
+
+/// Options of prepare() for the points of a Surface: half the voxel size, and nothing that only
+/// registration needs.
+PrepareOptions surface_options(PrepareOptions registration);
+
+/// The points of a cloud that prepare() made with surface_options().
+Surface surface_of(const PreparedCloud& cloud);
+
+/// The same from a raw cloud. Features of the cloud are not used, and none are computed.
+/// @param registration options of the registration of the pairs.
+/// @throws as prepare().
+Surface surface_of(const Context& context, PointCloudView cloud,
+                   const PrepareOptions& registration);
 
 /// Options of refine(). The lengths are for voxels of 5 cm.
 struct RefineOptions {
@@ -159,8 +219,8 @@ struct RefineOptions {
   /// metres, > 0; it shrinks with the distance.
   double kernel_width = 0.02;
   int iterations = 10;  ///< >= 1
-  /// Distance between the measured and the refined pose at the centre of the overlap from which an
-  /// edge is rejected in the end, metres, > 0; edges that alone connect two parts stay.
+  /// RMS distance between the measured and the refined pose over the overlap from which an edge is
+  /// rejected in the end, metres, > 0; edges that alone connect two parts stay.
   double max_edge_error = 0.2;
   /// Points of a scan that look for correspondences in one other scan, evenly chosen, >= 16.
   std::uint32_t max_points = 1500;
@@ -181,6 +241,9 @@ struct RefineOptions {
   /// @throws InvalidArgument unless voxel_size is finite and > 0.
   static RefineOptions from_voxel_size(float voxel_size);
 
+  /// The same for depth cameras: noise_range is thirty voxels.
+  static RefineOptions for_depth_cameras(float voxel_size);
+
   /// @throws InvalidArgument naming field and value.
   void validate() const;
 };
@@ -197,7 +260,8 @@ struct RefineReport {
 };
 
 /// Refines all poses of a map together: point-to-plane distances over every overlapping pair of
-/// scans of an island, also of pairs that no edge connects, beside the accepted edges. Sparse
+/// scans of an island, also of pairs that no edge connects, beside the accepted edges and the
+/// odometry. Sparse
 /// normal equations over all poses; the smallest scan of each island stays.
 ///
 /// @param surfaces one per scan; those of scans that are left out may be empty.

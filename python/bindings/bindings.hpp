@@ -25,5 +25,9 @@ void bind_files(py::module_& m);
 void bind_evaluation(py::module_& m);
 void bind_confidence(py::module_& m);
 void bind_pose_graph(py::module_& m);
+void bind_loop_closure(py::module_& m);
+void bind_reconstruction(py::module_& m);
+void bind_pruning(py::module_& m);
+void bind_trajectory(py::module_& m);
 
 }  // namespace gpureg::python

@@ -21,4 +21,8 @@ PYBIND11_MODULE(_core, m) {
   bind_evaluation(m);
   bind_confidence(m);
   bind_pose_graph(m);
+  bind_loop_closure(m);
+  bind_reconstruction(m);
+  bind_pruning(m);
+  bind_trajectory(m);
 }

@@ -20,10 +20,13 @@ from ._core import (
     CorrespondenceMoments,
     DeviceError,
     Error,
+    ErrorStatistics,
     EvidenceOptions,
     InvalidArgument,
     IoError,
+    Loop,
     LoopConsistencyOptions,
+    LoopUpdate,
     PairConsistency,
     PointCloud,
     PoseEvidence,
@@ -40,13 +43,18 @@ from ._core import (
     RegistrationStatistics,
     StageTimings,
     TimedResult,
+    TrajectoryEvaluation,
     VoxelSizeSuggestion,
     __version__,
     describe_backends,
 )
 from ._loop_consistency import loop_consistency
+from ._map import Map, MapEdge, MapLink, MapScan
+from ._reconstruction import reconstruct
+from ._trajectory import evaluate_trajectory, read_trajectory
 from .files import read_point_cloud, write_point_cloud
 from .fragments import FragmentSet
+from .loop_closure import LoopCloser
 from .preparation import prepare, prepare_batch
 from .registration import (
     BatchInterrupted,
@@ -80,11 +88,19 @@ __all__ = [
     "CorrespondenceMoments",
     "DeviceError",
     "Error",
+    "ErrorStatistics",
     "EvidenceOptions",
     "FragmentSet",
     "InvalidArgument",
     "IoError",
+    "Loop",
+    "LoopCloser",
     "LoopConsistencyOptions",
+    "LoopUpdate",
+    "Map",
+    "MapEdge",
+    "MapLink",
+    "MapScan",
     "PairConsistency",
     "PointCloud",
     "PoseEvidence",
@@ -101,6 +117,7 @@ __all__ = [
     "RegistrationStatistics",
     "StageTimings",
     "TimedResult",
+    "TrajectoryEvaluation",
     "VoxelSizeSuggestion",
     "__version__",
     "align",
@@ -108,10 +125,13 @@ __all__ = [
     "align_within",
     "default_context",
     "describe_backends",
+    "evaluate_trajectory",
     "loop_consistency",
     "prepare",
     "prepare_batch",
     "read_point_cloud",
+    "read_trajectory",
+    "reconstruct",
     "register",
     "register_all",
     "suggest_voxel_size",

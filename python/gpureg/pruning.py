@@ -2,7 +2,7 @@
 """Which pairs of a large set are worth trying: those whose fragments look alike.
 
 A fragment's global descriptor is an aggregate of its local features that needs no training;
-candidates are the k nearest neighbours (FAISS). The cost of a run then grows as n * k, not as n *
+candidates are the k nearest neighbours. The cost of a run then grows as n * k, not as n *
 n."""
 
 from __future__ import annotations
@@ -15,20 +15,12 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-try:
-    import faiss
-except ImportError as error:
-    raise ImportError(
-        "gpureg.pruning needs FAISS: pip install 'gpureg[pruning]', or '.[pruning]' from a checkout"
-    ) from error
-
 from . import _core
 from ._contexts import default_context
 from ._core import Context, PrepareOptions
 from .fragments import FragmentSet, fragment_set
 
 _TOGETHER = 32  # clouds in memory at once
-_FLAT = 20_000  # fragments up to which the exact search is fast
 _WORDS = 64
 _SAMPLED, _SAMPLE = 256, 400  # fragments that words are learnt from, and features of each
 
@@ -37,26 +29,11 @@ Pairs = npt.NDArray[np.int64]
 
 
 def learn_words(features: Sequence[FloatArray], words: int = _WORDS) -> FloatArray:
-    """Centres of k-means (FAISS, fixed seed) over features of some fragments: (words, D) float32.
+    """Centres of k-means over features of some fragments: (words, D) float32.
 
     No labels and no training set: the words are those of the scene itself.
     """
-    some = np.concatenate([_unit(rows) for rows in features] or [np.zeros((0, 1), np.float32)])
-    step = max(1, len(some) // (256 * words))  # what FAISS's k-means would use of them
-    some = np.ascontiguousarray(some[::step])
-    words = min(words, len(some))
-    if words == 0:
-        return np.zeros((0, some.shape[1]), np.float32)
-    means = faiss.Kmeans(some.shape[1], words, niter=20, seed=1, min_points_per_centroid=1)
-    threads = faiss.omp_get_max_threads()
-    faiss.omp_set_num_threads(
-        1
-    )  # sums in one order: the words, and so the pairs, do not depend on the number of cores
-    try:
-        means.train(some)
-    finally:
-        faiss.omp_set_num_threads(threads)
-    return np.asarray(means.centroids, np.float32)
+    return _core.learn_words([_rows(rows) for rows in features], words)
 
 
 def describe(features: FloatArray, words: FloatArray) -> FloatArray:
@@ -87,24 +64,11 @@ def describe(features: FloatArray, words: FloatArray) -> FloatArray:
     >>> descriptor.shape, round(float(np.linalg.norm(descriptor)), 3)
     ((132,), 1.0)
     """
-    rows = _unit(features)
-    left: npt.NDArray[np.float64] = np.zeros(words.shape)
-    if len(rows) and len(words):
-        nearest = np.argmax(rows @ words.T - 0.5 * np.einsum("wd,wd->w", words, words), axis=1)
-        np.add.at(left, nearest, rows - words[nearest])
-    lengths = np.linalg.norm(left, axis=1, keepdims=True)
-    flat = (left / np.where(lengths > 0, lengths, 1)).ravel()
-    length = float(np.linalg.norm(flat))
-    return np.asarray(flat / (length or 1.0), np.float32)
+    return _core.describe_features(_rows(features), _rows(words))
 
 
-def _unit(features: FloatArray) -> FloatArray:
-    """Signed roots at unit length (FPFH is a set of histograms); points without a feature, all
-    zeros, are left out.
-    """
-    rows = features[np.abs(features).sum(axis=1) > 0]
-    rows = np.sign(rows) * np.sqrt(np.abs(rows))
-    return np.asarray(rows / np.linalg.norm(rows, axis=1, keepdims=True), np.float32)
+def _rows(features: FloatArray) -> FloatArray:
+    return np.ascontiguousarray(features, np.float32)
 
 
 def describe_all(
@@ -201,21 +165,8 @@ class Nearest:
 
 
 def nearest_pairs(descriptors: FloatArray, k: int) -> Pairs:
-    """(M, 2) positions i < j where either has the other among its k nearest. Exact for sets of up
-    to 20,000.
-    """
-    n, dimension = descriptors.shape
-    k = min(k + 1, n)  # the nearest of each is itself
-    index = (
-        faiss.IndexFlatIP(dimension)
-        if n <= _FLAT
-        else faiss.IndexHNSWFlat(dimension, 32, faiss.METRIC_INNER_PRODUCT)
-    )
-    index.add(descriptors)
-    _, neighbours = index.search(descriptors, k)
-    pairs = np.stack([np.repeat(np.arange(n), k), neighbours.ravel()], axis=1)
-    pairs = np.sort(pairs[(pairs[:, 0] != pairs[:, 1]) & (pairs[:, 1] >= 0)], axis=1)
-    return np.asarray(np.unique(pairs, axis=0), np.int64)
+    """(M, 2) positions i < j where either has the other among its k nearest; exact."""
+    return _core.nearest_descriptors(_rows(descriptors), k)
 
 
 @dataclasses.dataclass(frozen=True)

@@ -352,7 +352,6 @@ class TestCommand:
     ("library", "code", "extra"),
     [
         ("pyarrow", "import gpureg; gpureg.register_all", "batch"),
-        ("faiss", "import gpureg.pruning", "pruning"),
         ("ray", "import gpureg.ray", "ray"),
     ],
 )

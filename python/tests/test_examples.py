@@ -67,7 +67,6 @@ def test_batch(scans, tmp_path):
 
 def test_many_fragments(tmp_path):
     pytest.importorskip("pyarrow")
-    pytest.importorskip("faiss")
     scans = tmp_path / "scans"
     scans.mkdir()
     for k, cloud in enumerate(make_fragments(24, seed=1)[0]):
@@ -78,6 +77,12 @@ def test_many_fragments(tmp_path):
         *("--voxel-size", 0.12, "--quality", 0),
     )
     assert "of the recall lost" in shown and "of 66 pairs tried" in shown
+
+
+def test_map(scans, tmp_path):
+    shown = run("07_map.py", scans, "--output", tmp_path / "map.ply")
+    assert "island 0: scans [0, 1" in shown and "weakest connection" in shown
+    assert len(gpureg.read_point_cloud(tmp_path / "map.ply").points) > 500
 
 
 def test_own_features():

@@ -8,7 +8,6 @@ from country import make_fragments
 from scenes import few, moved, pose, room
 
 pytest.importorskip("pyarrow")
-pytest.importorskip("faiss")
 from gpureg import pruning
 
 

@@ -17,7 +17,7 @@ from gpureg import _core
 
 ROOT = pathlib.Path(__file__).parents[2]
 PACKAGE = pathlib.Path(gpureg.__file__).parent
-OPTIONAL = {"gpureg.ray": "ray", "gpureg.batch": "pyarrow", "gpureg.pruning": "faiss"}
+OPTIONAL = {"gpureg.ray": "ray", "gpureg.batch": "pyarrow"}
 
 
 def modules():

@@ -38,8 +38,8 @@ constexpr double kIsolatedPointsPerCell = 1.1;
 /// Candidates of a closest-point grid, and of one of its blocks: longer lists mean millions of
 /// points within one correspondence distance of each other.
 constexpr std::uint64_t kMaxGridCandidates = std::uint64_t(1) << 28;
-/// A map of many points may have more: so many per point (84 at the default radii), and as many as
-/// 32 bits number.
+/// A map of many points may have more: so many per point (about 120 at the default radii), and as
+/// many as 32 bits number.
 constexpr std::uint64_t kMaxCandidatesPerPoint = 256, kMaxMapCandidates = std::uint64_t(1) << 32;
 constexpr std::uint64_t kMaxBlockCandidates = std::uint64_t(1) << 24;
 /// Blocks in the dense table of cell summaries. The table of a wider cloud, one with far stray

@@ -23,8 +23,12 @@ constexpr double kNever = std::numeric_limits<double>::infinity();
 class Acceptance {
  public:
   Acceptance(const State& state, const Paths& odometry, const std::vector<char>& fits,
-             const Options& options)
-      : state_(state), odometry_(odometry), fits_(fits), options_(options.acceptance) {
+             std::uint8_t scale, const Options& options)
+      : state_(state),
+        odometry_(odometry),
+        fits_(fits),
+        scale_(scale),
+        options_(options.acceptance) {
     for (std::size_t k = 0; k < state.loops.size(); ++k)
       if (fits[k]) order_.push_back(k);
     std::stable_sort(order_.begin(), order_.end(), [&](std::size_t a, std::size_t b) {
@@ -38,6 +42,7 @@ class Acceptance {
     const bool connected = std::isfinite(own.drift_ratio);
     if (connected && own.confidence >= options_.alone && own.drift_ratio <= 1)
       return {true, LoopReason::confident};
+    if (own.confidence < options_.confirmed) return {false, LoopReason::unconfirmed};
     const double wrong = wrong_together(k);
     if (wrong >= 1) return {false, LoopReason::unconfirmed};
     const double correct = 1 / wrong - 1;
@@ -79,7 +84,7 @@ class Acceptance {
     if (relations == state_.relations.end()) return 1;
     std::set<std::uint64_t> agreeing;
     for (const Relation& relation : relations->second)
-      if (relation.agrees) agreeing.insert(relation.other);
+      if (relation.agrees_from <= scale_) agreeing.insert(relation.other);
     std::set<FragmentId> used{own.loop.source, own.loop.target};
     double wrong = 1 - mode(k).confidence;
     std::size_t count = 0;
@@ -97,6 +102,7 @@ class Acceptance {
   const State& state_;
   const Paths& odometry_;
   const std::vector<char>& fits_;
+  std::uint8_t scale_;
   const AcceptanceOptions& options_;
   std::vector<std::size_t> order_;  ///< of the loops that fit, the most confident first
   std::map<std::pair<int, int>, double> rejected_wrong_;
@@ -139,14 +145,15 @@ bool within_drift(const Mode& mode, const Options& options) {
 }
 
 std::vector<Verdict> accept_loops(const State& state, const Paths& odometry,
-                                  const std::vector<char>& fits, const Options& options) {
+                                  const std::vector<char>& fits, std::uint8_t scale,
+                                  const Options& options) {
   std::vector<Verdict> verdicts(state.loops.size());
   if (options.accept_by_graph_alone) {
     for (std::size_t k = 0; k < fits.size(); ++k)
       if (fits[k]) verdicts[k] = {true, LoopReason::by_graph};
     return verdicts;
   }
-  Acceptance acceptance(state, odometry, fits, options);
+  Acceptance acceptance(state, odometry, fits, scale, options);
   for (std::size_t k = 0; k < fits.size(); ++k)
     if (fits[k]) verdicts[k] = acceptance.verdict(k);
   return verdicts;

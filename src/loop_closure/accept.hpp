@@ -29,7 +29,9 @@ struct Verdict {
 /// same relative pose, much better than odometry alone does.
 /// Needs State::relations.
 /// @param fits one per loop of the state: the robust graph accepts it.
+/// @param scale place in kDriftScales.
 std::vector<Verdict> accept_loops(const State& state, const Paths& odometry,
-                                  const std::vector<char>& fits, const Options& options);
+                                  const std::vector<char>& fits, std::uint8_t scale,
+                                  const Options& options);
 
 }  // namespace gpureg::loop_closure

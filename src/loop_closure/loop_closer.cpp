@@ -78,7 +78,7 @@ struct LoopCloser::Impl {
   }
 
   std::vector<FragmentPose> current_poses() const {
-    const Paths graph(state, true);
+    const Paths graph(state, true, options);
     std::vector<FragmentPose> out;
     int position = 0;
     for (const auto& [id, node] : state.nodes)
@@ -139,12 +139,11 @@ void LoopCloser::add_odometry(FragmentId source, FragmentId target,
                               const UnalignedIsometry3d& target_from_source,
                               const std::optional<UnalignedMatrix6d>& covariance) {
   check_pose(target_from_source, "target_from_source");
-  Odometry edge;
-  edge.source = source;
-  edge.target = target;
-  edge.target_from_source = target_from_source;
-  edge.information = covariance ? information_of_covariance(*covariance)
-                                : drift_information(target_from_source, impl_->options);
+  Odometry edge = modelled_odometry(source, target, target_from_source, impl_->options);
+  if (covariance) {
+    edge.information = information_of_covariance(*covariance);
+    edge.modelled = false;
+  }
   const std::lock_guard<std::mutex> lock(impl_->inbox);
   impl_->registry.require_pair(source, target);
   impl_->registry.connect(source, target);

@@ -30,12 +30,17 @@ UncertainPose fused(const UncertainPose& a, const UncertainPose& b) {
 struct Spoke {
   FragmentId other = 0;
   UncertainPose other_from_node;
+  bool modelled = false;
+  double length = 0;
+  std::uint32_t steps = 0;
 };
 
 Spoke spoke_of(FragmentId node, FragmentId source, FragmentId target,
                const UncertainPose& target_from_source) {
-  if (source == node) return {target, target_from_source};
-  return {source, target_from_source.inverse()};
+  Spoke spoke;
+  spoke.other = source == node ? target : source;
+  spoke.other_from_node = source == node ? target_from_source : target_from_source.inverse();
+  return spoke;
 }
 
 class Marginaliser {
@@ -59,9 +64,13 @@ class Marginaliser {
 
   void gather() {
     for (const Odometry& edge : state_.odometry)
-      if (touches(edge.source, edge.target))
+      if (touches(edge.source, edge.target)) {
         odometry_.push_back(spoke_of(id_, edge.source, edge.target,
                                      uncertain(edge.target_from_source, edge.information)));
+        odometry_.back().modelled = edge.modelled;
+        odometry_.back().length = edge.length;
+        odometry_.back().steps = edge.steps;
+      }
   }
 
   /// The best-known neighbour; accepted loops where there is no odometry.
@@ -116,6 +125,9 @@ class Marginaliser {
       (edge.source == id_ ? edge.source : edge.target) = hub_->other;
       edge.target_from_source = to_isometry(pose.pose);
       edge.information = inverse_of(pose.covariance);
+      edge.modelled = edge.modelled && hub_->modelled;
+      edge.length += hub_->length;
+      edge.steps += hub_->steps;
     }
   }
 

@@ -30,6 +30,7 @@ void AcceptanceOptions::validate() const {
   require(min_confidence > 0 && min_confidence < 1, "acceptance.min_confidence", min_confidence,
           "(0, 1)");
   require(alone > 0 && alone <= 1, "acceptance.alone", alone, "(0, 1]");
+  require(confirmed >= 0 && confirmed <= 1, "acceptance.confirmed", confirmed, "[0, 1]");
   require(together > 0 && together <= 1, "acceptance.together", together, "(0, 1]");
   require(between_frames > 0 && between_frames <= 1, "acceptance.between_frames", between_frames,
           "(0, 1]");

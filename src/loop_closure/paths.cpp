@@ -18,7 +18,7 @@ double cost_of(const Matrix6d& covariance) {
 
 }  // namespace
 
-const UncertainPose& PathTree::root_from(int node) {
+UncertainPose PathTree::root_from(int node) {
   std::vector<int> missing;
   int at = node;
   for (; known_.count(at) == 0; at = steps_[index(at)].parent) missing.push_back(at);
@@ -26,23 +26,29 @@ const UncertainPose& PathTree::root_from(int node) {
     const Step& step = steps_[index(*k)];
     known_[*k] = known_.at(step.parent) * *step.edge;
   }
-  return known_.at(node);
+  UncertainPose out = known_.at(node);
+  const Step& step = steps_[index(node)];
+  out.covariance *= correlation_factor(step.length, step.steps, correlation_);
+  return out;
 }
 
-Paths::Paths(const State& state, bool with_loops) {
+Paths::Paths(const State& state, bool with_loops, const Options& options)
+    : correlation_(options.drift_correlation) {
   ids_.reserve(state.nodes.size());
   for (const auto& [id, node] : state.nodes) ids_.push_back(id);
   links_.resize(ids_.size());
   for (const Odometry& edge : state.odometry)
     connect(edge.source, edge.target,
-            {to_pose(edge.target_from_source), pose_graph::covariance_of(edge.information)});
+            {to_pose(edge.target_from_source), pose_graph::covariance_of(edge.information)},
+            edge.modelled ? edge.length : 0, edge.modelled ? edge.steps : 0);
   if (with_loops)
     for (const LoopRecord& record : state.loops) {
       if (record.loop.state != LoopState::accepted) continue;
       // The mode that was accepted is the one that was reported.
       const Mode& mode = record.modes[record.mode];
       connect(record.source, record.target,
-              {to_pose(mode.target_from_source), pose_graph::covariance_of(mode.information)});
+              {to_pose(mode.target_from_source), pose_graph::covariance_of(mode.information)}, 0,
+              0);
     }
   component_.assign(ids_.size(), -1);
   for (int root = 0; root < size(); ++root) {
@@ -65,17 +71,19 @@ int Paths::position(FragmentId id) const {
   return static_cast<int>(std::lower_bound(ids_.begin(), ids_.end(), id) - ids_.begin());
 }
 
-void Paths::connect(FragmentId source, FragmentId target, const UncertainPose& target_from_source) {
+void Paths::connect(FragmentId source, FragmentId target, const UncertainPose& target_from_source,
+                    double length, double steps) {
   const int s = position(source), t = position(target);
   const UncertainPose source_from_target = target_from_source.inverse();
   const double cost =
       std::max(cost_of(target_from_source.covariance), cost_of(source_from_target.covariance));
-  links_[static_cast<std::size_t>(t)].push_back({s, cost, target_from_source});
-  links_[static_cast<std::size_t>(s)].push_back({t, cost, source_from_target});
+  links_[static_cast<std::size_t>(t)].push_back({s, cost, length, steps, target_from_source});
+  links_[static_cast<std::size_t>(s)].push_back({t, cost, length, steps, source_from_target});
 }
 
 PathTree Paths::tree(int root, int max_hops) const {
   PathTree tree;
+  tree.correlation_ = correlation_;
   tree.steps_.resize(ids_.size());
   tree.steps_[PathTree::index(root)].cost = 0;
   tree.known_[root] = UncertainPose{};
@@ -95,6 +103,8 @@ PathTree Paths::tree(int root, int max_hops) const {
       there.cost = reached;
       there.hops = hops;
       there.parent = node;
+      there.length = here.length + link.length;
+      there.steps = here.steps + link.steps;
       there.edge = &link.here_from_there;
       queue.emplace(reached, link.to);
     }

@@ -17,8 +17,11 @@ class PathTree {
   double cost(int node) const { return steps_[index(node)].cost; }
   int hops(int node) const { return steps_[index(node)].hops; }
   /// root_from_node with the covariance of its right perturbation, in the node's frame. First-order
-  /// composition along the path: other paths would only lower it.
-  const UncertainPose& root_from(int node);
+  /// composition along the path: other paths would only lower it. Errors of modelled odometry have
+  /// one sign over Options::drift_correlation.
+  UncertainPose root_from(int node);
+  /// false: the host has given the covariance of the whole path.
+  bool modelled(int node) const { return steps_[index(node)].steps > 0; }
 
  private:
   friend class Paths;
@@ -28,16 +31,18 @@ class PathTree {
     double cost = kNever;
     int hops = 0;
     int parent = -1;
+    double length = 0, steps = 0;         ///< of modelled odometry
     const UncertainPose* edge = nullptr;  ///< parent_from_node
   };
   std::vector<Step> steps_;
-  std::map<int, UncertainPose> known_;  ///< root_from_node of the nodes asked for so far
+  std::map<int, UncertainPose> known_;  ///< of independent errors, of the nodes asked for so far
+  double correlation_ = 0;
 };
 
 /// The graph of odometry, and of accepted loops where wanted. Nodes are positions in State::nodes.
 class Paths {
  public:
-  Paths(const State& state, bool with_loops);
+  Paths(const State& state, bool with_loops, const Options& options);
 
   int size() const { return static_cast<int>(ids_.size()); }
   int position(FragmentId id) const;
@@ -52,10 +57,13 @@ class Paths {
   struct Link {
     int to;
     double cost;
+    double length, steps;
     UncertainPose here_from_there;
   };
-  void connect(FragmentId source, FragmentId target, const UncertainPose& target_from_source);
+  void connect(FragmentId source, FragmentId target, const UncertainPose& target_from_source,
+               double length, double steps);
 
+  double correlation_;
   std::vector<FragmentId> ids_;
   std::vector<std::vector<Link>> links_;
   std::vector<int> component_;

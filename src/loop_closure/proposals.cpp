@@ -31,7 +31,10 @@ bool better(const Scored& a, const Scored& b) {
 class Proposer {
  public:
   Proposer(State& state, const Options& options)
-      : state_(state), options_(options.proposals), noise_(options.noise.translation) {}
+      : state_(state),
+        all_(options),
+        options_(options.proposals),
+        noise_(options.noise.translation) {}
 
   void run() {
     const bool due = std::any_of(state_.nodes.begin(), state_.nodes.end(), [](const auto& entry) {
@@ -42,7 +45,7 @@ class Proposer {
           return record.loop.state == LoopState::candidate && !record.expanded;
         });
     if (!due && !expand) return;
-    const Paths graph(state_, true);
+    const Paths graph(state_, true, all_);
     drop_superfluous(graph);
     for (auto& [id, node] : state_.nodes) {
       if (node.look_within) within_frame(graph, id, node);
@@ -100,7 +103,7 @@ class Proposer {
         continue;
       if (node.session == there.session && std::abs(node.time - there.time) < options_.min_time)
         continue;
-      const UncertainPose& here_from_there = tree.root_from(position);
+      const UncertainPose here_from_there = tree.root_from(position);
       const double sigma = sigma_at(here_from_there.covariance, there.coarse.centre);
       if (sigma < options_.min_uncertainty) continue;
       const pose_graph::Pose relative = to_pose(node.estimate).inverse() * to_pose(there.estimate);
@@ -143,7 +146,7 @@ class Proposer {
   /// Pairs beside a candidate that overlap if it is correct. If it is an alias of one place, they
   /// do not align, or elsewhere.
   void confirm_candidates() {
-    const Paths odometry(state_, false);
+    const Paths odometry(state_, false, all_);
     for (LoopRecord& record : state_.loops) {
       const Loop& loop = record.loop;
       if (loop.state != LoopState::candidate || record.expanded || record.modes.empty()) continue;
@@ -172,8 +175,8 @@ class Proposer {
         if (!by_target.reaches(b) || !to.has_cloud || target == record.source ||
             target == record.target || target == source || known(source, target))
           continue;
-        const UncertainPose& target_from_b = by_target.root_from(b);
-        const UncertainPose& source_from_a = by_source.root_from(a);
+        const UncertainPose target_from_b = by_target.root_from(b);
+        const UncertainPose source_from_a = by_source.root_from(a);
         const pose_graph::Pose b_from_a =
             target_from_b.pose.inverse() * (target_from_source * source_from_a.pose);
         const double overlap = expected_overlap(from.coarse, to.coarse, b_from_a, 0, 0);
@@ -195,6 +198,7 @@ class Proposer {
   }
 
   State& state_;
+  const Options& all_;
   const ProposalOptions& options_;
   double noise_;
 };

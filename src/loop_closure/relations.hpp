@@ -12,8 +12,14 @@ namespace gpureg::loop_closure {
 /// are a cycle; its misclosure is compared with its covariance (compare Mangelson et al. 2018).
 void update_relations(State& state, const Paths& odometry, const Options& options);
 
+/// By how much odometry drifts more than its options say: the smallest of kDriftScales, as its
+/// place, under which nearly as many independent loops agree as under the largest. Loops near each
+/// other agree whatever the misclosure that they close.
+std::uint8_t drift_scale(const State& state);
+
 /// Of the loops in `fits`, those that contradict more than agrees with them, weighted by
 /// confidence: removed until no two of the rest contradict each other.
-std::vector<char> contradicted(const State& state, const std::vector<char>& fits);
+std::vector<char> contradicted(const State& state, const std::vector<char>& fits,
+                               std::uint8_t scale);
 
 }  // namespace gpureg::loop_closure

@@ -211,6 +211,9 @@ void all(File& file, State& state) {
     file.value(edge.target);
     pose(file, edge.target_from_source);
     matrix(file, edge.information);
+    flag(file, edge.modelled);
+    file.value(edge.length);
+    file.value(edge.steps);
   });
   list(file, state.loops, [&](LoopRecord& r) { record(file, r); });
   list(file, state.queue, [&](Proposal& p) {

@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "loop_closure/state.hpp"
-#include "math/exponential.hpp"
 
 #include <algorithm>
 #include <cmath>
+
+#include "math/exponential.hpp"
 
 namespace gpureg::loop_closure {
 namespace {
@@ -26,23 +27,33 @@ double sigma_at(const Matrix6d& covariance, const Eigen::Vector3d& point) {
   return std::sqrt(std::max(0.0, (moved * covariance * moved.transpose()).trace() / 3));
 }
 
-UnalignedMatrix6d drift_information(const UnalignedIsometry3d& motion, const Options& options) {
+Odometry modelled_odometry(FragmentId source, FragmentId target,
+                           const UnalignedIsometry3d& target_from_source, const Options& options) {
   const pose_graph::DriftOptions& drift = options.graph.drift;
-  const double metres = motion.translation().norm();
+  Odometry edge;
+  edge.source = source;
+  edge.target = target;
+  edge.target_from_source = target_from_source;
+  edge.modelled = true;
+  edge.length = target_from_source.translation().norm();
   const double degrees =
-      pose_graph::log_rotation(Eigen::Matrix3d(motion.linear())).norm() / kRadians;
-  // Errors of one sign over a length c make the variance of n edges of length l grow as (n l) c
-  // rather than as n l^2: each edge carries the part l c of it.
-  const double share =
-      metres > 0 ? std::sqrt(std::max(1.0, options.drift_correlation / metres)) : 1;
+      pose_graph::log_rotation(Eigen::Matrix3d(target_from_source.linear())).norm() / kRadians;
   const double translation =
-      std::max(drift.min_translation, share * drift.translation_per_metre * metres);
-  const double rotation = std::max(drift.min_rotation, share * drift.rotation_per_metre * metres +
+      std::max(drift.min_translation, drift.translation_per_metre * edge.length);
+  const double rotation = std::max(drift.min_rotation, drift.rotation_per_metre * edge.length +
                                                            drift.rotation_per_degree * degrees);
   Vector6d information;
   information.head<3>().setConstant(1 / portable::square(rotation * kRadians));
   information.tail<3>().setConstant(1 / portable::square(translation));
-  return UnalignedMatrix6d(information.asDiagonal());
+  edge.information = UnalignedMatrix6d(information.asDiagonal());
+  return edge;
+}
+
+// Independent errors of n edges of length l have the variance n e^2; errors of one sign n^2 e^2
+// while n l is within the correlation length c, and n e^2 c / l beyond.
+double correlation_factor(double length, double steps, double correlation) {
+  if (!(length > 0)) return 1;
+  return std::max(1.0, std::min(length, correlation) * steps / length);
 }
 
 void choose_mode(LoopRecord& record, std::size_t mode) {

@@ -40,6 +40,11 @@ struct Odometry {
   FragmentId source = 0, target = 0;
   UnalignedIsometry3d target_from_source = UnalignedIsometry3d::Identity();
   UnalignedMatrix6d information = UnalignedMatrix6d::Identity();
+  /// true: the information is that of Options::graph.drift for an edge alone. Errors of such edges
+  /// have one sign over Options::drift_correlation.
+  bool modelled = false;
+  double length = 0;        ///< metres travelled
+  std::uint32_t steps = 1;  ///< edges of the host that it is made of
 };
 
 /// One pose of a loop.
@@ -64,11 +69,17 @@ struct LoopRecord {
   bool expanded = false;  ///< proposals that would confirm it were made
 };
 
-/// What one mode of a loop says about one of another.
+/// What one mode of a loop says about one of another, by how much odometry drifts.
 struct Relation {
-  std::uint64_t other = 0;  ///< LoopRecord::key
-  bool agrees = false;      ///< false: it contradicts
+  std::uint64_t other = 0;   ///< LoopRecord::key
+  bool independent = false;  ///< no fragment in common
+  /// Places in kDriftScales from which they agree, and below which they contradict each other.
+  std::uint8_t agrees_from = 0, contradicts_below = 0;
 };
+
+/// Multiples of the drift in Options::graph.drift under which loops are compared.
+inline constexpr double kDriftScales[] = {1, 1.5, 2, 3, 4, 6, 8};
+inline constexpr std::uint8_t kDriftScaleCount = 7;
 
 /// Proposals of a smaller value go first.
 enum class ProposalKind : std::uint8_t { host, confirming, within_frame, between_frames };
@@ -106,8 +117,13 @@ UnalignedIsometry3d to_isometry(const pose_graph::Pose& pose);
 /// Standard deviation of a translation, metres, at a point of the frame that the covariance is in.
 double sigma_at(const Matrix6d& covariance, const Eigen::Vector3d& point);
 
-/// Information of odometry without covariance: Options::graph.drift with drift_correlation.
-UnalignedMatrix6d drift_information(const UnalignedIsometry3d& motion, const Options& options);
+/// An edge without covariance: Options::graph.drift.
+Odometry modelled_odometry(FragmentId source, FragmentId target,
+                           const UnalignedIsometry3d& target_from_source, const Options& options);
+
+/// Factor on the covariance of a path whose edges, taken as independent, have errors of one sign
+/// over `correlation` metres.
+double correlation_factor(double length, double steps, double correlation);
 
 /// The loop as a host sees it, with the mode that takes part.
 void choose_mode(LoopRecord& record, std::size_t mode);

@@ -14,7 +14,9 @@ namespace {
 /// Loops that the acceptance refuses are left out and the rest optimised again at most so often.
 constexpr int kMostRounds = 6;
 
-pose_graph::Graph graph_without_loops(const State& state, const Options& options) {
+/// @param drift_scale on the standard deviations of modelled odometry.
+pose_graph::Graph graph_without_loops(const State& state, const Options& options,
+                                      double drift_scale) {
   pose_graph::Graph graph;
   for (const auto& [id, node] : state.nodes) {
     graph.nodes.push_back({id, node.estimate, false});
@@ -27,6 +29,12 @@ pose_graph::Graph graph_without_loops(const State& state, const Options& options
     edge.target = odometry.target;
     edge.target_from_source = odometry.target_from_source;
     edge.information = odometry.information;
+    if (odometry.modelled && odometry.length > 0) {
+      // Edges of a graph are independent: each takes its share of the errors of one sign.
+      const double factor =
+          std::max(1.0, options.drift_correlation * odometry.steps / odometry.length);
+      *edge.information /= factor * drift_scale * drift_scale;
+    }
     edge.kind = pose_graph::EdgeKind::odometry;
     graph.edges.push_back(edge);
   }
@@ -61,12 +69,13 @@ class Verifier {
   Verifier(State& state, const Options& options)
       : state_(state),
         options_(options),
-        odometry_(state, false),
+        odometry_(state, false, options),
         excluded_(state.loops.size(), 0),
         fitted_(state.loops.size(), 0) {
     if (options.accept_by_graph_alone) return;
     compute_drift_ratios(state, odometry_, options);
     update_relations(state, odometry_, options);
+    scale_ = drift_scale(state);
   }
 
   Verification run() {
@@ -78,7 +87,7 @@ class Verifier {
           result.status == pose_graph::Status::cancelled)
         return {result.status, result.reason};
       bool refused = drop_contradicted();
-      verdicts = accept_loops(state_, odometry_, fits_, options_);
+      verdicts = accept_loops(state_, odometry_, fits_, scale_, options_);
       for (std::size_t k = 0; k < fits_.size(); ++k) {
         if (!fits_[k]) continue;
         fitted_[k] = 1;
@@ -98,7 +107,7 @@ class Verifier {
   /// them.
   bool drop_contradicted() {
     if (options_.accept_by_graph_alone) return false;
-    const std::vector<char> dropped = contradicted(state_, fits_);
+    const std::vector<char> dropped = contradicted(state_, fits_, scale_);
     bool any = false;
     for (std::size_t k = 0; k < dropped.size(); ++k) {
       if (!dropped[k]) continue;
@@ -109,7 +118,7 @@ class Verifier {
   }
 
   pose_graph::Result optimise() {
-    pose_graph::Graph graph = graph_without_loops(state_, options_);
+    pose_graph::Graph graph = graph_without_loops(state_, options_, kDriftScales[scale_]);
     const std::size_t first = graph.edges.size();
     std::vector<std::size_t> loops;
     std::vector<std::vector<std::uint32_t>> modes;
@@ -187,6 +196,7 @@ class Verifier {
   const Options& options_;
   Paths odometry_;
   std::vector<char> excluded_, fitted_, fits_;
+  std::uint8_t scale_ = 0;  ///< place in kDriftScales
   bool merged_ = false;
 };
 
@@ -204,7 +214,7 @@ Verification verify_loops(State& state, const Options& options) {
 }
 
 pose_graph::Graph accepted_graph(const State& state, const Options& options) {
-  pose_graph::Graph graph = graph_without_loops(state, options);
+  pose_graph::Graph graph = graph_without_loops(state, options, 1);
   for (const LoopRecord& record : state.loops) {
     if (record.loop.state != LoopState::accepted) continue;
     const Mode& mode = record.modes[record.mode];

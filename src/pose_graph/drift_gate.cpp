@@ -26,10 +26,10 @@ std::vector<char> explained_by_drift(const Problem& problem, NormalEquations& eq
   std::vector<Vector6d> step;
   if (!equations.solve(kDamping, step)) return explained;
   std::vector<std::vector<Vector6d>> samples(kSamples);
-  const auto sample = [&](int begin, int end) {
+  const auto draw = [&](int begin, int end) {
     for (int k = begin; k < end; ++k) samples[k] = equations.sample(k);
   };
-  for_ranges(kSamples, control.threads, sample, 1);
+  for_ranges(kSamples, control.threads, draw, 1);
   for_ranges(problem.edge_count(), control.threads, [&](int begin, int end) {
     for (int k = begin; k < end; ++k) {
       const EdgeTerm& edge = problem.edges[k];

@@ -140,31 +140,36 @@ double worst_of(const std::vector<Fit>& fits) {
   return worst;
 }
 
+/// Least squares over odometry and all candidates that may be accepted.
+bool fit_candidates(const Problem& problem, NormalEquations& equations,
+                    const std::vector<char>& candidates, double quantile, Control& control,
+                    Estimate& estimate) {
+  update_weights(problem, candidates,
+                 fits_of(problem, candidates, estimate.poses, quantile, control.threads),
+                 estimate.selection, [](double ratio) { return std::isfinite(ratio) ? 1.0 : 0.0; });
+  return minimised(problem, equations, control.options.solver.max_iterations, control, estimate);
+}
+
 }  // namespace
 
 bool fit_all(const Problem& problem, NormalEquations& equations,
              const std::vector<char>& candidates, double quantile, Control& control,
              Estimate& estimate) {
-  const int iterations = control.options.solver.max_iterations;
-  const auto fits = [&] {
-    return fits_of(problem, candidates, estimate.poses, quantile, control.threads);
-  };
-  update_weights(problem, candidates, fits(), estimate.selection,
-                 [](double ratio) { return std::isfinite(ratio) ? 1.0 : 0.0; });
-  if (!minimised(problem, equations, iterations, control, estimate)) return false;
-  const std::vector<Fit> now = fits();
+  if (!fit_candidates(problem, equations, candidates, quantile, control, estimate)) return false;
+  const std::vector<Fit> now =
+      fits_of(problem, candidates, estimate.poses, quantile, control.threads);
   if (worst_of(now) > kWithinNoise) return false;
   update_weights(problem, candidates, now, estimate.selection, hard_weight);
-  return minimised(problem, equations, iterations, control, estimate);
+  return minimised(problem, equations, control.options.solver.max_iterations, control, estimate);
 }
 
 void graduate(const Problem& problem, NormalEquations& equations,
               const std::vector<char>& candidates, bool least_squares_first, double quantile,
               Control& control, Estimate& estimate) {
   const Options& options = control.options;
-  if (least_squares_first && fit_all(problem, equations, candidates, quantile, control, estimate))
+  if (least_squares_first &&
+      !fit_candidates(problem, equations, candidates, quantile, control, estimate))
     return;
-  if (estimate.failed || control.cancelled) return;
   std::vector<Fit> now = fits_of(problem, candidates, estimate.poses, quantile, control.threads);
   const double worst = worst_of(now);
   if (worst > 1) {

@@ -35,15 +35,6 @@ Matrix6d diagonal_information(double rotation_degrees, double translation) {
   return d.asDiagonal();
 }
 
-Matrix6d odometry_information(const Pose& motion, const DriftOptions& drift) {
-  const double metres = motion.translation.norm();
-  const double degrees = log_rotation(motion.rotation).norm() / kRadians;
-  return diagonal_information(
-      std::max(drift.min_rotation,
-               drift.rotation_per_metre * metres + drift.rotation_per_degree * degrees),
-      std::max(drift.min_translation, drift.translation_per_metre * metres));
-}
-
 ModeTerm mode_term(const UnalignedIsometry3d& pose,
                    const std::optional<UnalignedMatrix6d>& information, double confidence,
                    EdgeKind kind, const Options& options) {
@@ -93,6 +84,15 @@ void sort_edges(Problem& problem) {
 }
 
 }  // namespace
+
+Matrix6d odometry_information(const Pose& motion, const DriftOptions& drift) {
+  const double metres = motion.translation.norm();
+  const double degrees = log_rotation(motion.rotation).norm() / kRadians;
+  return diagonal_information(
+      std::max(drift.min_rotation,
+               drift.rotation_per_metre * metres + drift.rotation_per_degree * degrees),
+      std::max(drift.min_translation, drift.translation_per_metre * metres));
+}
 
 Selection all_edges(const Problem& problem) {
   return {std::vector<double>(problem.edges.size(), 1.0),

@@ -55,6 +55,9 @@ struct Problem {
   int edge_count() const { return static_cast<int>(edges.size()); }
 };
 
+/// Information of odometry without a matrix of its own: it falls with the motion.
+Matrix6d odometry_information(const Pose& motion, const DriftOptions& drift);
+
 /// The weight of each edge, and which of its modes (relative to first_mode) takes part.
 struct Selection {
   std::vector<double> weights;

@@ -44,9 +44,9 @@ class GncSolver {
       // Without the few others the system stays sparse; then those that drift explains enter.
       std::vector<char> agreeing(problem_.edges.size(), 0);
       for (int k = 0; k < problem_.edge_count(); ++k) agreeing[k] = in_large_set(consensus, k);
-      Estimate direct = graduated(start, agreeing, true);
+      Estimate direct = joined(start, agreeing, true);
       if (!direct.failed && !control_.cancelled)
-        direct = settled(joined(direct, explained(direct, all)));
+        direct = settled(joined(direct, explained(direct, all), false));
       if (direct.failed || control_.cancelled || keeps_nearly_all(direct)) return direct;
     }
     return settled(by_levels(start, consensus));
@@ -89,12 +89,13 @@ class GncSolver {
   }
 
   /// The estimate with nearly all loops: least squares where noise explains all that is left.
-  Estimate joined(Estimate estimate, const std::vector<char>& candidates) {
+  Estimate joined(const Estimate& estimate, const std::vector<char>& candidates,
+                  bool least_squares_first) {
     Estimate together = estimate;
     if (fit_all(problem_, equations_, candidates, quantile_, control_, together) ||
         together.failed || control_.cancelled)
       return together;
-    return graduated(std::move(estimate), candidates, false);
+    return graduated(least_squares_first ? std::move(together) : estimate, candidates, false);
   }
 
   Estimate settled(Estimate estimate) {

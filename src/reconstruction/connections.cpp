@@ -2,6 +2,7 @@
 #include "reconstruction/connections.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <map>
 #include <numeric>
 #include <queue>
@@ -10,31 +11,34 @@
 namespace gpureg::reconstruction {
 namespace {
 
-/// No edge is certain: keeps odds finite.
-constexpr double kMostConfidence = 1 - 1e-9;
-
-/// Probabilities that all accepted and that all rejected edges between two parts are wrong.
-struct Connection {
-  double accepted_wrong = 1, rejected_wrong = 1;
-
-  /// Odds of: one of the accepted edges is correct, one of the rejected ones is, none is.
-  double confidence() const {
-    const double accepted = 1 / accepted_wrong - 1, rejected = 1 / rejected_wrong - 1;
-    return accepted / (1 + accepted + rejected);
-  }
-};
-
 std::uint32_t find(std::vector<std::uint32_t>& parent, std::uint32_t k) {
   while (parent[k] != k) k = parent[k] = parent[parent[k]];
   return k;
 }
 
+/// No edge is certain: keeps odds finite.
+constexpr double kMostConfidence = 1 - 1e-9;
+
 }  // namespace
 
+void Connection::add(double confidence, bool accepted) {
+  (accepted ? accepted_wrong : rejected_wrong) *= 1 - std::min(confidence, kMostConfidence);
+}
+
+double Connection::confidence() const {
+  const double accepted = 1 / accepted_wrong - 1, rejected = 1 / rejected_wrong - 1;
+  return accepted / (1 + accepted + rejected);
+}
+
 std::vector<std::uint32_t> certain_parts(std::size_t scans, const std::vector<Edge>& edges,
+                                         const std::vector<Odometry>& odometry,
                                          double min_confidence) {
   std::vector<std::uint32_t> parent(scans);
   std::iota(parent.begin(), parent.end(), 0u);
+  for (const Odometry& edge : odometry) {
+    const auto [a, b] = std::minmax({find(parent, edge.source), find(parent, edge.target)});
+    parent[b] = a;
+  }
   // Log odds and back: a confidence of exactly the minimum counts.
   constexpr double kRounding = 1e-9;
   for (bool merged = true; merged;) {
@@ -43,9 +47,7 @@ std::vector<std::uint32_t> certain_parts(std::size_t scans, const std::vector<Ed
     for (const Edge& edge : edges) {
       const auto [a, b] = std::minmax({find(parent, edge.source), find(parent, edge.target)});
       if (a == b) continue;
-      Connection& connection = connections[{a, b}];
-      (edge.accepted ? connection.accepted_wrong : connection.rejected_wrong) *=
-          1 - std::min(edge.confidence, kMostConfidence);
+      connections[{a, b}].add(edge.confidence, edge.accepted);
     }
     for (const auto& [between, connection] : connections) {
       if (connection.confidence() < min_confidence - kRounding) continue;
@@ -64,10 +66,13 @@ std::size_t reject_deviating(Reconstruction& map, double max_error) {
   for (std::size_t k = 0; k < map.edges.size(); ++k) {
     const Edge& edge = map.edges[k];
     if (!edge.accepted || !map.scans[edge.source].placed) continue;
-    const Eigen::Vector3d measured =
-        map.scans[edge.target].island_from_scan * (edge.target_from_source * edge.overlap_centre);
-    const Eigen::Vector3d refined = map.scans[edge.source].island_from_scan * edge.overlap_centre;
-    const double error = (measured - refined).norm();
+    const UnalignedIsometry3d measured =
+        map.scans[edge.target].island_from_scan * edge.target_from_source;
+    const UnalignedIsometry3d& refined = map.scans[edge.source].island_from_scan;
+    const Eigen::Matrix3d turn = measured.linear() - refined.linear();
+    const double error =
+        std::sqrt((measured * edge.overlap_centre - refined * edge.overlap_centre).squaredNorm() +
+                  std::max(0.0, (turn * edge.overlap_spread * turn.transpose()).trace()));
     if (error > max_error) deviating.emplace_back(-error, k);
   }
   std::sort(deviating.begin(), deviating.end());
@@ -75,6 +80,8 @@ std::size_t reject_deviating(Reconstruction& map, double max_error) {
   for (const auto& [minus_error, candidate] : deviating) {
     std::vector<std::uint32_t> parent(map.scans.size());
     std::iota(parent.begin(), parent.end(), 0u);
+    for (const Odometry& odometry : map.odometry)
+      parent[find(parent, odometry.source)] = find(parent, odometry.target);
     for (std::size_t k = 0; k < map.edges.size(); ++k)
       if (map.edges[k].accepted && k != candidate)
         parent[find(parent, map.edges[k].source)] = find(parent, map.edges[k].target);
@@ -102,11 +109,19 @@ void set_confidence(Reconstruction& map) {
     sum[edge.source] += edge.confidence;
     sum[edge.target] += edge.confidence;
   }
+  for (const Odometry& odometry : map.odometry) {
+    neighbors[odometry.source].push_back({odometry.target, odometry.confidence});
+    neighbors[odometry.target].push_back({odometry.source, odometry.confidence});
+  }
   for (const Island& island : map.islands) {
     const std::uint32_t root =
         *std::max_element(island.scans.begin(), island.scans.end(),
                           [&](std::uint32_t a, std::uint32_t b) { return sum[a] < sum[b]; });
-    for (const std::uint32_t scan : island.scans) map.scans[scan].confidence = 0;
+    for (const std::uint32_t scan : island.scans) {
+      map.scans[scan].confidence = 0;
+      // A placed scan without an accepted edge has odometry.
+      map.scans[scan].reason = sum[scan] > 0 ? ScanReason::none : ScanReason::odometry_only;
+    }
     std::priority_queue<std::pair<double, std::uint32_t>> queue;  // Dijkstra 1959, by products
     map.scans[root].confidence = 1;
     queue.emplace(1.0, root);

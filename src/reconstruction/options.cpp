@@ -12,6 +12,8 @@ bool probability(double v) { return v > 0 && v <= 1; }
 
 /// The voxel size that the defaults are for.
 constexpr double kDefaultVoxel = 0.05;
+/// Depth cameras: beyond, their noise grows with the square of the range.
+constexpr float kNoiseRangeVoxels = 30;
 
 double scale_of(float voxel_size) {
   require(gpureg::positive(voxel_size), "voxel_size", voxel_size, "a finite number > 0");
@@ -40,6 +42,7 @@ Options Options::from_voxel_size(float voxel_size) {
 void Options::validate() const {
   consistency.validate();
   noise.validate();
+  drift.validate();
   require(positive(information_unit), "information_unit", information_unit, "a finite number > 0");
   require(probability(min_edge_confidence), "min_edge_confidence", min_edge_confidence, "(0, 1]");
   require(probability(min_connection_confidence), "min_connection_confidence",
@@ -57,6 +60,12 @@ RefineOptions RefineOptions::from_voxel_size(float voxel_size) {
   options.kernel_width *= scale;
   options.point_noise *= scale;
   options.max_edge_error *= scale;
+  return options;
+}
+
+RefineOptions RefineOptions::for_depth_cameras(float voxel_size) {
+  RefineOptions options = from_voxel_size(voxel_size);
+  options.noise_range = static_cast<double>(kNoiseRangeVoxels * voxel_size);
   return options;
 }
 

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <algorithm>
+#include <map>
 #include <set>
 #include <string>
 #include <utility>
@@ -8,6 +9,7 @@
 #include "gpureg/reconstruction.hpp"
 #include "reconstruction/connections.hpp"
 #include "reconstruction/edge_noise.hpp"
+#include "reconstruction/odometry.hpp"
 
 namespace gpureg::reconstruction {
 namespace {
@@ -38,6 +40,15 @@ Eigen::Vector3d overlap_centre(const RegistrationResult& result) {
   const CorrespondenceMoments& moments = result.source_moments;
   if (moments.count == 0) return Eigen::Vector3d::Zero();
   return moments.sum / static_cast<double>(moments.count);
+}
+
+/// Covariance of its points; 0 where it is not known.
+Eigen::Matrix3d overlap_spread(const RegistrationResult& result) {
+  const CorrespondenceMoments& moments = result.source_moments;
+  if (moments.count == 0) return Eigen::Matrix3d::Zero();
+  const auto count = static_cast<double>(moments.count);
+  const Eigen::Vector3d mean = moments.sum / count;
+  return moments.outer / count - mean * mean.transpose();
 }
 
 /// The modes of a result, of which methods without modes have one.
@@ -72,9 +83,10 @@ std::vector<Candidate> candidates_of(const std::vector<RegistrationMode>& modes,
 
 /// The graph of the pairs that are confident enough.
 struct PairGraph {
-  pose_graph::Graph graph;
+  pose_graph::Graph graph;                         ///< without the odometry
   std::vector<std::size_t> pairs;                  ///< of each edge
   std::vector<Eigen::Vector3d> centres;            ///< of the overlap of each edge
+  std::vector<Eigen::Matrix3d> spreads;            ///< the same
   std::vector<std::vector<Candidate>> candidates;  ///< of each edge
 };
 
@@ -105,6 +117,7 @@ PairGraph graph_of_pairs(std::size_t scans, const std::vector<Pair>& pairs,
     out.graph.edges.push_back(std::move(edge));
     out.pairs.push_back(k);
     out.centres.push_back(centre);
+    out.spreads.push_back(overlap_spread(results[k]));
     out.candidates.push_back(candidates);
   }
   return out;
@@ -118,6 +131,7 @@ Edge edge_of(const PairGraph& pairs, std::size_t k, const pose_graph::EdgeResult
   edge.target = static_cast<std::uint32_t>(given.target);
   edge.pair = pairs.pairs[k];
   edge.overlap_centre = pairs.centres[k];
+  edge.overlap_spread = pairs.spreads[k];
   edge.mode = pairs.candidates[k][result.mode].mode;
   edge.confidence = pairs.candidates[k][result.mode].confidence;
   const bool first = result.mode == 0;
@@ -139,7 +153,22 @@ struct Round {
   bool dropped = false;
 };
 
-Round optimise_round(std::size_t scans, const PairGraph& pairs, const Options& options,
+/// A rejected edge that is alone between two parts contradicts nothing: it is not confident enough
+/// to connect them.
+void name_lone_edges(const std::vector<std::uint32_t>& parts, std::vector<Edge>& edges) {
+  std::map<std::pair<std::uint32_t, std::uint32_t>, std::size_t> between;
+  const auto parts_of = [&](const Edge& edge) {
+    const auto [low, high] = std::minmax(parts[edge.source], parts[edge.target]);
+    return std::pair(low, high);
+  };
+  for (const Edge& edge : edges) ++between[parts_of(edge)];
+  for (Edge& edge : edges)
+    if (!edge.accepted && parts[edge.source] != parts[edge.target] && between[parts_of(edge)] == 1)
+      edge.reason = EdgeReason::unconfirmed;
+}
+
+Round optimise_round(std::size_t scans, const PairGraph& pairs,
+                     const std::vector<Odometry>& odometry, const Options& options,
                      std::vector<char>& unconfirmed) {
   pose_graph::Graph graph = pairs.graph;
   std::vector<std::size_t> kept;
@@ -149,6 +178,7 @@ Round optimise_round(std::size_t scans, const PairGraph& pairs, const Options& o
       graph.edges.push_back(pairs.graph.edges[k]);
       kept.push_back(k);
     }
+  for (const Odometry& edge : odometry) graph.edges.push_back(edge_of(edge));
   pose_graph::Options graph_options;
   graph_options.threads = options.threads;
   graph_options.gnc.min_bridge_confidence = options.min_connection_confidence;
@@ -164,7 +194,7 @@ Round optimise_round(std::size_t scans, const PairGraph& pairs, const Options& o
     if (result.state == pose_graph::EdgeState::rejected) result.mode = 0;
     round.edges[kept[k]] = edge_of(pairs, kept[k], result);
   }
-  round.parts = certain_parts(scans, round.edges, options.min_connection_confidence);
+  round.parts = certain_parts(scans, round.edges, odometry, options.min_connection_confidence);
   for (std::size_t k = 0; k < round.edges.size(); ++k) {
     Edge& edge = round.edges[k];
     if (!edge.accepted || round.parts[edge.source] == round.parts[edge.target]) continue;
@@ -174,6 +204,7 @@ Round optimise_round(std::size_t scans, const PairGraph& pairs, const Options& o
     unconfirmed[k] = 1;
     round.dropped = true;
   }
+  name_lone_edges(round.parts, round.edges);
   return round;
 }
 
@@ -253,19 +284,21 @@ void explain(const std::vector<Pair>& pairs, const std::vector<RegistrationResul
 }  // namespace
 
 Reconstruction reconstruct(std::size_t scans, const std::vector<Pair>& pairs,
-                           const std::vector<RegistrationResult>& results, const Options& options) {
+                           const std::vector<RegistrationResult>& results, const Options& options,
+                           const std::vector<Odometry>& odometry) {
   options.validate();
   check_pairs(scans, pairs);
+  Reconstruction map;
+  map.odometry = checked_odometry(scans, odometry, options.drift);
   const std::vector<PairConsistency> consistency =
       loop_consistency(pairs, results, options.consistency);
   const PairGraph graph = graph_of_pairs(scans, pairs, results, consistency, options);
 
   std::vector<char> unconfirmed(graph.graph.edges.size(), 0);
-  Round round = optimise_round(scans, graph, options, unconfirmed);
+  Round round = optimise_round(scans, graph, map.odometry, options, unconfirmed);
   for (int k = 1; round.dropped && k < kMostRounds; ++k)
-    round = optimise_round(scans, graph, options, unconfirmed);
+    round = optimise_round(scans, graph, map.odometry, options, unconfirmed);
 
-  Reconstruction map;
   map.status = round.result.status;
   map.scans.resize(scans);
   map.edges = std::move(round.edges);

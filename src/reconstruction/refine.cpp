@@ -218,20 +218,20 @@ class Refiner {
         by_source.transpose() * sums.gradient, -sums.gradient);
   }
 
-  void add_edge(const Edge& edge) {
+  void add_edge(std::uint32_t from, std::uint32_t to, const UnalignedIsometry3d& to_from,
+                const Matrix6d& information) {
     pose_graph::ModeTerm term;
-    term.target_from_source = pose_of(edge.target_from_source);
+    term.target_from_source = pose_of(to_from);
     term.inverse = term.target_from_source.inverse();
-    term.information = edge.information;
-    const auto linear = pose_graph::linearise_edge(poses_[edge.source], poses_[edge.target], term);
-    const Vector6d weighted = edge.information * linear.residual;
+    term.information = information;
+    const auto linear = pose_graph::linearise_edge(poses_[from], poses_[to], term);
+    const Vector6d weighted = information * linear.residual;
     // Surfaces may correct an edge by more than its noise: it then counts less.
     const double weight = 1 / (1 + linear.residual.dot(weighted) / kEdgeKernel);
-    const Matrix6d source = weight * edge.information * linear.source,
-                   target = weight * edge.information * linear.target;
-    add(edge.source, edge.target, linear.source.transpose() * source,
-        linear.target.transpose() * target, linear.target.transpose() * source,
-        weight * linear.source.transpose() * weighted,
+    const Matrix6d source = weight * information * linear.source,
+                   target = weight * information * linear.target;
+    add(from, to, linear.source.transpose() * source, linear.target.transpose() * target,
+        linear.target.transpose() * source, weight * linear.source.transpose() * weighted,
         weight * linear.target.transpose() * weighted);
   }
 
@@ -246,6 +246,8 @@ class Refiner {
       if (sums_[k].count > 0) note(pairs_[k].source, pairs_[k].target);
     for (const Edge& edge : map_.edges)
       if (in_map(edge)) note(edge.source, edge.target);
+    for (const Odometry& odometry : map_.odometry)
+      if (in_map(odometry)) note(odometry.source, odometry.target);
     std::sort(pattern.begin(), pattern.end());
     pattern.erase(std::unique(pattern.begin(), pattern.end()), pattern.end());
     const auto columns = static_cast<std::size_t>(system_.columns);
@@ -256,13 +258,22 @@ class Refiner {
 
   bool in_map(const Edge& edge) const { return edge.accepted && map_.scans[edge.source].placed; }
 
+  bool in_map(const Odometry& odometry) const {
+    return odometry.information && map_.scans[odometry.source].placed;
+  }
+
   /// One Gauss-Newton step. Returns the largest component of it; -1 where it cannot be solved.
   double solve() {
     build_pattern();
     for (std::size_t k = 0; k < pairs_.size(); ++k)
       if (sums_[k].count > 0) add_surfaces(pairs_[k], sums_[k]);
     for (const Edge& edge : map_.edges)
-      if (in_map(edge)) add_edge(edge);
+      if (in_map(edge))
+        add_edge(edge.source, edge.target, edge.target_from_source, edge.information);
+    for (const Odometry& odometry : map_.odometry)
+      if (in_map(odometry))
+        add_edge(odometry.source, odometry.target, odometry.target_from_source,
+                 *odometry.information);
     for (Matrix6d& block : matrix_.diagonal) block.diagonal() *= 1 + kDamping;
     pose_graph::BlockCholesky cholesky(system_.columns, matrix_.pattern, threads_);
     if (!cholesky.factorise(matrix_)) return -1;

@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <algorithm>
+#include <cmath>
 #include <string>
 
 #include "gpureg/error.hpp"
 #include "gpureg/reconstruction.hpp"
+#include "reconstruction/odometry.hpp"
 
 namespace gpureg::reconstruction {
 
@@ -11,6 +13,8 @@ const char* to_string(ScanReason reason) {
   switch (reason) {
     case ScanReason::none:
       return "none";
+    case ScanReason::odometry_only:
+      return "odometry_only";
     case ScanReason::not_tried:
       return "not_tried";
     case ScanReason::too_few_points:
@@ -31,6 +35,8 @@ const char* describe(ScanReason reason) {
   switch (reason) {
     case ScanReason::none:
       return "placed";
+    case ScanReason::odometry_only:
+      return "placed by odometry alone; no pair confirms it";
     case ScanReason::not_tried:
       return "no pair of the scan was aligned";
     case ScanReason::too_few_points:
@@ -59,9 +65,31 @@ const char* to_string(EdgeReason reason) {
   return "unknown";
 }
 
+const char* describe(EdgeReason reason) {
+  switch (reason) {
+    case EdgeReason::none:
+      return "accepted";
+    case EdgeReason::inconsistent:
+      return "contradicts the map that the other edges make";
+    case EdgeReason::unconfirmed:
+      return "not confident enough to connect two parts of the map";
+  }
+  return "unknown";
+}
+
 std::size_t Reconstruction::placed() const {
   return static_cast<std::size_t>(
       std::count_if(scans.begin(), scans.end(), [](const Scan& scan) { return scan.placed; }));
+}
+
+CorrespondenceMoments moments_of_information(const Eigen::Matrix<double, 6, 6>& redwood) {
+  CorrespondenceMoments moments;
+  moments.count = static_cast<std::uint64_t>(std::max(0.0, std::round(redwood(0, 0))));
+  const Eigen::Matrix3d cross = redwood.topRightCorner<3, 3>() / -2;
+  moments.sum = {cross(2, 1), cross(0, 2), cross(1, 0)};
+  const Eigen::Matrix3d turn = redwood.bottomRightCorner<3, 3>() / 4;
+  moments.outer = 0.5 * turn.trace() * Eigen::Matrix3d::Identity() - turn;
+  return moments;
 }
 
 pose_graph::Graph graph_of(const Reconstruction& map, const std::vector<std::int64_t>& ids) {
@@ -75,6 +103,12 @@ pose_graph::Graph graph_of(const Reconstruction& map, const std::vector<std::int
   pose_graph::Graph graph;
   for (std::size_t k = 0; k < map.scans.size(); ++k)
     if (map.scans[k].placed) graph.nodes.push_back({id(k), map.scans[k].island_from_scan});
+  for (const Odometry& odometry : map.odometry) {
+    if (!map.scans[odometry.source].placed) continue;
+    graph.edges.push_back(edge_of(odometry));
+    graph.edges.back().source = id(odometry.source);
+    graph.edges.back().target = id(odometry.target);
+  }
   for (const Edge& edge : map.edges) {
     if (!edge.accepted || !map.scans[edge.source].placed) continue;
     pose_graph::Edge out;

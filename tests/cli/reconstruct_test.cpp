@@ -102,6 +102,112 @@ TEST_F(ReconstructCommand, GoesOnAfterAnInterruption) {
   expect_same_map("whole", "parts");
 }
 
+TEST_F(ReconstructCommand, OdometryPlacesWhatPairsCannot) {
+  write_scans(scans_, kScans, true);
+  std::string odometry;
+  for (int k = 0; k < kScans + 2; ++k) {
+    const Eigen::Isometry3d room_from_scan = scan_from_room(k).inverse();
+    const Eigen::Quaterniond q(Eigen::Matrix3d(room_from_scan.linear()));
+    std::ostringstream line;
+    line.precision(12);
+    line << k << " " << room_from_scan.translation().transpose() << " " << q.x() << " " << q.y()
+         << " " << q.z() << " " << q.w() << "\n";
+    odometry += line.str();
+  }
+  std::ofstream(out_ / "odometry.txt") << odometry;
+  const Outcome outcome = run(reconstruct("map", {"--odometry", out_ / "odometry.txt"}));
+  ASSERT_EQ(outcome.status, 0) << outcome.err;
+  expect_holds(outcome.out, {"odometry   6 poses", "placed     7 of 7", "note       6"});
+  const auto document = json_of(file("map", "reconstruction.json"));
+  EXPECT_EQ(document.at("scans").at(6).at("reason"), "odometry_only");
+  EXPECT_EQ(document.at("scans").at(1).at("reason"), "none");
+  std::ofstream(out_ / "odometry.txt") << "0.5 0 0 0 0 0 0 1\n1 0 0 0 0 0 0 1\n";
+  expect_refused(reconstruct("other", {"--odometry", out_ / "odometry.txt"}),
+                 {"odometry.txt", "0.5"});
+  std::ofstream(out_ / "odometry.log") << "0 99 7\n1 0 0 0\n0 1 0 0\n0 0 1 0\n0 0 0 1\n";
+  expect_refused(reconstruct("other", {"--odometry", out_ / "odometry.log"}),
+                 {"odometry.log", "fragment 99"});
+  expect_refused(reconstruct("other", {"--drift", "0.1"}), {"--odometry"});
+}
+
+TEST_F(ReconstructCommand, PruningTriesFewerPairs) {
+  constexpr int kMore = 8;
+  write_scans(scans_, kMore, false);
+  ASSERT_EQ(run(reconstruct("map", {"--prune", "2"})).status, 0);
+  const auto pairs = json_of(file("map", "pairs.json")).at("pairs").size();
+  EXPECT_GE(pairs, 8u);  // every scan has two
+  EXPECT_LE(pairs, 16u);
+  expect_refused(reconstruct("other", {"--prune", "0"}), {"--prune"});
+}
+
+TEST_F(ReconstructCommand, ThePageIsSelfContained) {
+  write_scans(scans_, kScans, true);
+  ASSERT_EQ(run(reconstruct("map")).status, 0);
+  const std::string page = content_of(file("map", "map.html"));
+  expect_holds(page, {"5 scans are placed in one map; 2 scans are left out.", "getContext('webgl'",
+                      "the scan has too few points"});
+  for (const char* link : {"http://", "https://", " src=", "<link", "@import", "fetch("})
+    EXPECT_EQ(page.find(link), std::string::npos) << link;
+  EXPECT_EQ(page.find("{{"), std::string::npos);
+  const std::size_t begin = page.find(R"(id="data">)") + 10;
+  const auto data =
+      nlohmann::json::parse(page.substr(begin, page.find("</script>", begin) - begin));
+  EXPECT_EQ(data.at("figures").at("placed"), 5);
+  std::size_t points = 0;
+  for (const auto& scan : data.at("scans")) points += scan.at("count").get<std::size_t>();
+  constexpr std::size_t kBytesPerPoint = 10;
+  EXPECT_EQ(data.at("points").get<std::string>().size(), (kBytesPerPoint * points + 2) / 3 * 4);
+  EXPECT_GT(points, 1000u);
+  ASSERT_EQ(run(reconstruct("plain", {"--no-map"})).status, 0);
+  EXPECT_FALSE(std::filesystem::exists(file("plain", "map.html")));
+}
+
+TEST_F(ReconstructCommand, DamagedResultsAreNamed) {
+  write_scans(scans_, kScans, false);
+  ASSERT_EQ(run(reconstruct("map", {"--no-refine", "--no-map"})).status, 0);
+  const auto whole = json_of(file("map", "pairs.json"));
+  const std::string path = out_ / "damaged.json";
+  const auto refused = [&](const nlohmann::json& document, const std::string& place,
+                           const std::string& what) {
+    std::ofstream(path) << document;
+    expect_refused(reconstruct("other", {"--results", path}), {"damaged.json", place, what});
+  };
+  const std::string text = whole.dump();
+  std::ofstream(path) << text.substr(0, text.size() / 2);
+  expect_refused(reconstruct("other", {"--results", path}), {"damaged.json"});
+  auto document = whole;
+  document["pairs"][3]["T_ij"] = {1, 2, 3};
+  refused(document, "pairs[3]", "T_ij");
+  document = whole;
+  document["pairs"][2]["information"] = "lost";
+  refused(document, "pairs[2]", "information");
+  document = whole;
+  document["pairs"][1]["modes"] = 7;
+  refused(document, "pairs[1]", "modes");
+  document = whole;
+  document["pairs"][4]["j"] = 77;
+  refused(document, "pairs[4]", "fragment 77");
+  document = whole;
+  document["pairs"][4] = document["pairs"][0];
+  refused(document, "pairs[4]", "repeats");
+  document = whole;
+  document["pairs"][0]["score"] = "high";
+  refused(document, "pairs[0]", "score");
+}
+
+TEST_F(ReconstructCommand, AFullDiskIsNamedAndTheJournalStays) {
+  write_scans(scans_, kScans, false);
+  Surroundings around;
+  around.file_bytes = 200'000;  // enough for the journal, too little for the map's files
+  const Outcome outcome = Command(reconstruct("map", {"--map-voxel-size", "0.01"}), around).wait();
+  EXPECT_EQ(outcome.status, 2);
+  expect_holds(outcome.err, {"cannot write", file("map", "")});
+  EXPECT_TRUE(std::filesystem::exists(file("map", "pairs.journal")));
+  ASSERT_EQ(run(reconstruct("map", {"--resume"})).status, 0);
+  ASSERT_EQ(run(reconstruct("whole")).status, 0);
+  expect_same_map("whole", "map");
+}
+
 TEST_F(ReconstructCommand, RefusesFoldersThatCannotWork) {
   expect_refused(reconstruct("map"), {"no fragments"});
   write_scans(scans_, 1, false);
@@ -111,6 +217,8 @@ TEST_F(ReconstructCommand, RefusesFoldersThatCannotWork) {
                  {"different folders"});
   std::ofstream(scans_ / "cloud_bin_2.ply") << "ply\nnothing";
   expect_refused(reconstruct("map"), {"cloud_bin_2.ply"});
+  std::ofstream(scans_ / "cloud_bin_1.pcd") << "the same number again";
+  expect_refused(reconstruct("map"), {"cloud_bin_1"});
 }
 
 }  // namespace

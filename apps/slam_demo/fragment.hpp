@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <gpureg/point_cloud.hpp>
+#include <opencv2/core.hpp>
+#include <vector>
+
+#include "camera.hpp"
+#include "tracker.hpp"
+
+namespace slam_demo {
+
+/// Points and normals of a depth image in the camera, one per stride x stride pixels. Pixels at
+/// depth edges have no normal and are left out. Metres.
+void back_project(const Pinhole& camera, const cv::Mat1f& depth, int stride,
+                  std::vector<Eigen::Vector3f>& points, std::vector<Eigen::Vector3f>& normals);
+
+/// The surfaces of some seconds in the frame of the keyframe nearest to their middle.
+struct BuiltFragment {
+  int keyframe = kNone;
+  int first_frame = 0, last_frame = 0;
+  double time = 0;           ///< of the keyframe
+  gpureg::PointCloud cloud;  ///< with normals and camera positions
+};
+
+/// Collects the frames of one session and fuses them when there are enough: by the poses that
+/// the map has then.
+class FragmentBuilder {
+ public:
+  /// voxel_size: metres; the cloud has one point per voxel.
+  FragmentBuilder(const Pinhole& camera, int frames, float voxel_size);
+
+  void add(int frame, const FramePose& pose, const cv::Mat1f& depth);
+  bool full() const { return static_cast<int>(scans_.size()) >= frames_; }
+  std::size_t size() const { return scans_.size(); }
+  /// Fuses and forgets the frames.
+  BuiltFragment build(const Map& map);
+  void clear() { scans_.clear(); }
+
+ private:
+  struct Scan {
+    int frame;
+    FramePose pose;
+    std::vector<Eigen::Vector3f> points, normals;
+  };
+  const Pinhole camera_;
+  const int frames_;
+  const float voxel_size_;
+  std::vector<Scan> scans_;
+};
+
+}  // namespace slam_demo

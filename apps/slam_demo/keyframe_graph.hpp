@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <gpureg/pose_graph.hpp>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "bundle.hpp"
+
+namespace slam_demo {
+
+/// The pose graph of the keyframes: what tracking measured between neighbours, and loops. Loops are
+/// kept by number, so that a retraction takes them out again.
+class KeyframeGraph {
+ public:
+  /// Takes the relative poses of the newest keyframes from the map: their local adjustment is
+  /// still going on.
+  void record(const Map& map);
+
+  /// Edges of a loop. Trusted: whoever adds them has verified them.
+  void add(int loop, const std::vector<RelativePose>& edges);
+  void remove(int loop) { loops_.erase(loop); }
+  const std::map<int, std::vector<RelativePose>>& loops() const { return loops_; }
+
+  /// Optimises the poses of all keyframes and moves the points along. Returns the reason where it
+  /// did not converge. Worlds of different sessions that loops connect become that of the earlier
+  /// one.
+  std::string optimize(Map& map) const;
+
+  std::vector<RelativePose> loop_edges() const;
+
+  /// Poses of all keyframes by tracking alone, each session from its first keyframe.
+  std::vector<Eigen::Isometry3d> odometry_poses(const Map& map) const;
+
+  /// The sessions that loops connect have the smallest of them as their world.
+  std::vector<int> world_of_session(const Map& map) const;
+
+ private:
+  struct Key {
+    int a, b;
+    bool operator<(const Key& o) const { return a != o.a ? a < o.a : b < o.b; }
+  };
+  std::map<Key, Eigen::Isometry3d> odometry_;  // a_from_b as tracking had it
+  std::map<int, std::vector<RelativePose>> loops_;
+};
+
+/// Moves keyframes, and with each the points that it saw first.
+void move_keyframes(const std::vector<Eigen::Isometry3d>& world_from_camera, Map& map);
+
+}  // namespace slam_demo

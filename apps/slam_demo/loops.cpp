@@ -1,0 +1,237 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "loops.hpp"
+
+#include <algorithm>
+#include <gpureg/registration.hpp>
+
+#include "stopwatch.hpp"
+
+namespace slam_demo {
+namespace {
+
+namespace lc = gpureg::loop_closure;
+std::size_t at(int index) { return static_cast<std::size_t>(index); }
+
+constexpr int kCovisible = 30;          // shared points that connect two fragments
+constexpr std::size_t kNeighbours = 6;  // keyframes on each side that look for image loops
+// Metres that a loop must move a keyframe for a full adjustment; the last one is made anyway.
+constexpr double kWorthBundle = 0.02;
+constexpr int kBetweenSessions = 50;  // inliers that connect two sessions without registration
+constexpr int kImageLoops = 1 << 20;  // numbers of loops between sessions begin here
+// Surfaces over many frames hold a registered pair better than LoopCloser states, which speaks of
+// single registrations with correlated points: a third of its standard deviation.
+constexpr double kDenseCertainty = 9;
+
+gpureg::UnalignedIsometry3d unaligned(const Eigen::Isometry3d& pose) {
+  return gpureg::UnalignedIsometry3d(pose.matrix());
+}
+
+}  // namespace
+
+LoopClosing::LoopClosing(const gpureg::Context& context, Map& map, const Pinhole& camera,
+                         const LoopOptions& options)
+    : context_(context),
+      map_(map),
+      camera_(camera),
+      options_(options),
+      closer_options_([&] {
+        auto o = lc::Options::from_voxel_size(options.voxel_size);
+        o.optimize = false;  // the keyframes are optimised here
+        return o;
+      }()),
+      closer_(context, closer_options_) {}
+
+std::vector<int> LoopClosing::with_neighbours(int keyframe) const {
+  std::vector<int> result = map_.covisible(keyframe, kNeighbours);
+  result.insert(result.begin(), keyframe);
+  return result;
+}
+
+/// A new session that nothing connects to an earlier one looks for it by its images.
+bool LoopClosing::add_keyframe(int index) {
+  graph_.record(map_);
+  const std::vector<int> world = graph_.world_of_session(map_);
+  const int session = map_.keyframes[at(index)].session;
+  if (world[at(session)] != session || session == 0) return false;
+  std::vector<int> candidates;
+  for (int k = 0; k < index; ++k) {
+    if (map_.keyframes[at(k)].session != session) candidates.push_back(k);
+  }
+  const Stopwatch watch(time_.image);
+  const auto found = image_loop_anywhere(map_, camera_, index, candidates, kBetweenSessions);
+  if (!found) return false;
+  const int number = kImageLoops + image_loops_++;
+  graph_.add(number, {found->edge});
+  image_records_.push_back({index, found->edge.a, found->inliers});
+  // Poses first: an observation of a point of another world would not fit.
+  optimize();
+  for (const auto& [key, point] : found->matches) map_.add_observation(point, {index, key, number});
+  return true;
+}
+
+void LoopClosing::add_fragment(const BuiltFragment& built) {
+  if (!options_.dense) return;
+  gpureg::PreparedCloud cloud;
+  {
+    const Stopwatch watch(time_.prepare);
+    cloud = gpureg::prepare(context_, built.cloud.view(), closer_options_.registration.prepare);
+  }
+  const int id = static_cast<int>(fragments_.size());
+  const Keyframe& keyframe = map_.keyframes[at(built.keyframe)];
+  lc::Fragment fragment;
+  fragment.id = id;
+  fragment.session = keyframe.session;
+  fragment.time = built.time;
+  fragment.cloud = cloud;
+  fragment.world_from_fragment = unaligned(keyframe.world_from_camera);
+  closer_.add(fragment);
+  fragments_.push_back({built.keyframe, built.first_frame, built.last_frame, built.time});
+  if (id > 0) {
+    const Keyframe& before = map_.keyframes[at(fragments_[at(id - 1)].keyframe)];
+    if (before.session == keyframe.session && fragments_[at(id - 1)].keyframe != built.keyframe)
+      closer_.add_odometry(
+          id, id - 1, unaligned(before.world_from_camera.inverse() * keyframe.world_from_camera));
+  }
+  std::vector<lc::FragmentId> covisible;
+  for (int other = 0; other < id; ++other) {
+    if (shares_points(built.keyframe, fragments_[at(other)])) covisible.push_back(other);
+  }
+  if (!covisible.empty()) closer_.set_covisible(id, covisible);
+}
+
+/// Tracking connects a keyframe with one of a fragment.
+bool LoopClosing::shares_points(int keyframe, const Fragment& fragment) const {
+  for (const auto& [other, shared] : map_.keyframes[at(keyframe)].covisible) {
+    const int frame = map_.keyframes[at(other)].frame;
+    if (shared >= kCovisible && frame >= fragment.first_frame && frame <= fragment.last_frame)
+      return true;
+  }
+  return false;
+}
+
+int LoopClosing::number_of(int source, int target) {
+  for (std::size_t k = 0; k < records_.size(); ++k) {
+    if (records_[k].source == source && records_[k].target == target) return static_cast<int>(k);
+  }
+  LoopRecord record;
+  record.source = source;
+  record.target = target;
+  record.source_keyframe = fragments_[at(source)].keyframe;
+  record.target_keyframe = fragments_[at(target)].keyframe;
+  record.source_time = fragments_[at(source)].time;
+  record.target_time = fragments_[at(target)].time;
+  records_.push_back(record);
+  return static_cast<int>(records_.size()) - 1;
+}
+
+/// The later keyframe and those that share points with it, put to where the loop says, look for
+/// the points that the earlier ones see.
+void LoopClosing::connect_image_loops(int number, const lc::Loop& loop, LoopRecord& record) {
+  const Stopwatch watch(time_.image);
+  Eigen::Isometry3d target_from_source(loop.target_from_source.matrix());
+  int moved = record.source_keyframe, still = record.target_keyframe;
+  if (map_.keyframes[at(moved)].time < map_.keyframes[at(still)].time) {
+    std::swap(moved, still);
+    target_from_source = target_from_source.inverse();
+  }
+  const std::vector<int> targets = with_neighbours(still);
+  const Eigen::Isometry3d correction = map_.keyframes[at(still)].world_from_camera *
+                                       target_from_source *
+                                       map_.keyframes[at(moved)].world_from_camera.inverse();
+  std::vector<RelativePose> edges;
+  for (const int k : with_neighbours(moved)) {
+    if (std::find(targets.begin(), targets.end(), k) != targets.end()) continue;
+    const auto found = image_loop_near(
+        map_, camera_, k, correction * map_.keyframes[at(k)].world_from_camera, targets);
+    if (!found) continue;
+    edges.push_back(found->edge);
+    for (const auto& [key, point] : found->matches) map_.add_observation(point, {k, key, number});
+    ++record.image_loops;
+  }
+  graph_.add(number, edges);
+}
+
+void LoopClosing::optimize() {
+  {
+    const Stopwatch watch(time_.graph);
+    const std::string reason = graph_.optimize(map_);
+    if (!reason.empty()) notes.push_back("pose graph: " + reason);
+  }
+  std::vector<lc::FragmentPose> poses;
+  for (std::size_t k = 0; k < fragments_.size(); ++k) {
+    lc::FragmentPose pose;
+    pose.id = static_cast<lc::FragmentId>(k);
+    pose.world_from_fragment =
+        unaligned(map_.keyframes[at(fragments_[k].keyframe)].world_from_camera);
+    poses.push_back(pose);
+  }
+  if (!poses.empty()) closer_.set_poses(poses);
+}
+
+bool LoopClosing::process() {
+  if (!options_.dense || fragments_.empty()) return false;
+  lc::Update update;
+  {
+    const Stopwatch watch(time_.registration);
+    update = closer_.process();
+  }
+  bool changed = false;
+  for (const lc::Loop& loop : update.changed) {
+    const int number = number_of(static_cast<int>(loop.source), static_cast<int>(loop.target));
+    LoopRecord& record = records_[at(number)];
+    const bool was_accepted = record.state == "accepted";
+    record.state = lc::to_string(loop.state);
+    record.reason = lc::to_string(loop.reason);
+    record.confidence = loop.confidence;
+    record.drift_ratio = loop.drift_ratio;
+    record.target_from_source = Eigen::Isometry3d(loop.target_from_source.matrix());
+    const bool accepted = loop.state == lc::LoopState::accepted;
+    if (was_accepted) {  // retracted, or accepted with another pose
+      map_.remove_loop(number);
+      graph_.remove(number);
+      record.image_loops = 0;
+      changed = true;
+    }
+    if (!accepted) continue;
+    changed = true;
+    graph_.add(number, {{record.target_keyframe, record.source_keyframe,
+                         Eigen::Isometry3d(loop.target_from_source.matrix()),
+                         Eigen::Matrix<double, 6, 6>(kDenseCertainty * loop.information)}});
+    connect_image_loops(number, loop, record);
+  }
+  if (changed) {
+    optimize();
+    if (options_.bundle && moved_since_bundle()) bundle_all(options_.bundle_iterations);
+  }
+  return changed;
+}
+
+bool LoopClosing::moved_since_bundle() const {
+  for (std::size_t k = 0; k < adjusted_.size(); ++k) {
+    if ((map_.keyframes[k].world_from_camera.translation() - adjusted_[k].translation()).norm() >
+        kWorthBundle)
+      return true;
+  }
+  return adjusted_.empty();
+}
+
+void LoopClosing::bundle_all(int iterations) {
+  if (map_.keyframes.size() < 2) return;
+  const Stopwatch watch(time_.bundle);
+  std::vector<int> free, fixed;
+  std::vector<bool> anchored;
+  const std::vector<int> world = graph_.world_of_session(map_);
+  anchored.assign(world.size(), false);
+  for (std::size_t k = 0; k < map_.keyframes.size(); ++k) {
+    const std::size_t w = at(world[at(map_.keyframes[k].session)]);
+    (anchored[w] ? free : fixed).push_back(static_cast<int>(k));
+    anchored[w] = true;
+  }
+  BundleProblem problem = bundle_of(map_, free, fixed, graph_.loop_edges());
+  adjust(camera_, problem, iterations, options_.threads > 0 ? options_.threads : 2);
+  apply(camera_, problem, map_);
+  adjusted_.clear();
+  for (const Keyframe& keyframe : map_.keyframes) adjusted_.push_back(keyframe.world_from_camera);
+}
+
+}  // namespace slam_demo

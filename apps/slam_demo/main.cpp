@@ -1,0 +1,177 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <CLI/CLI.hpp>
+#include <atomic>
+#include <chrono>
+#include <csignal>
+#include <cstdio>
+#include <filesystem>
+#include <gpureg/error.hpp>
+#include <gpureg/io.hpp>
+#include <iostream>
+
+#include "output.hpp"
+#include "stopwatch.hpp"
+
+namespace slam_demo {
+namespace {
+
+std::atomic<bool> interrupted{false};
+void interrupt(int) { interrupted = true; }
+
+struct Arguments {
+  std::string sequence, backend = "auto", truth, surface, output = "slam_demo_output";
+  std::vector<double> colour, depth;
+  double depth_units = 0, baseline = 0;
+  int first = 0, frames = 0;
+  bool sequential = false, no_dense_loops = false, no_bundle = false, no_map = false, quiet = false;
+  SlamOptions slam;
+};
+
+gpureg::Context context_of(const Arguments& a) {
+  if (a.backend == "cpu") return gpureg::Context::cpu();
+  if (a.backend == "cuda") return gpureg::Context::cuda();
+  return gpureg::Context::best();
+}
+
+Pinhole pinhole_of(const std::vector<double>& k) { return {k[0], k[1], k[2], k[3]}; }
+
+void set_rig(const Arguments& a, Rig& rig) {
+  if (!a.colour.empty()) rig.colour = pinhole_of(a.colour);
+  if (!a.depth.empty()) {
+    rig.depth = pinhole_of(a.depth);
+    rig.registered = false;
+  }
+  if (a.depth_units > 0) rig.depth_units = a.depth_units;
+  if (a.baseline != 0) {
+    rig.colour_from_depth.translation().x() = a.baseline;
+    rig.registered = false;
+  }
+}
+
+int run(const Arguments& a) {
+  Sequence sequence = open_sequence(a.sequence);
+  set_rig(a, sequence.rig);
+  RunResult result;
+  result.sequence = a.sequence;
+  result.rig = sequence.rig;
+  result.truth = a.truth.empty() ? sequence.truth : read_tum(a.truth);
+  result.out_of_order = sequence.out_of_order;
+  SlamOptions options = a.slam;
+  options.tracker.sequential = a.sequential;
+  options.loops.threads = a.sequential ? 1 : 0;
+  options.loops.dense = !a.no_dense_loops;
+  options.loops.bundle = !a.no_bundle;
+  options.map = !a.no_map;
+  Slam slam(context_of(a), sequence.rig, options);
+  std::signal(SIGINT, interrupt);
+  std::signal(SIGTERM, interrupt);
+
+  const auto first = std::min(static_cast<std::size_t>(a.first), sequence.frames.size());
+  const std::size_t last =
+      a.frames > 0 ? std::min(sequence.frames.size(), first + static_cast<std::size_t>(a.frames))
+                   : sequence.frames.size();
+  result.frames = last - first;
+  double total = 0;
+  {
+    const Stopwatch watch(total);
+    double since = 0;
+    for (std::size_t k = first; k < last && !interrupted; ++k) {
+      Images images;
+      {
+        const Stopwatch reading(result.load_milliseconds);
+        images = load(sequence.frames[k], sequence.rig);
+      }
+      if (!images.problem.empty()) {
+        if (++result.problems <= 5) std::cerr << "slam_demo: " << images.problem << "\n";
+      }
+      Tracker::Outcome outcome;
+      {
+        const Stopwatch working(since);
+        outcome = slam.frame(static_cast<int>(k), sequence.frames[k].time, images);
+      }
+      ++result.frames_done;
+      if (!a.quiet && result.frames_done % 25 == 0) {
+        std::fprintf(stderr,
+                     "frame %zu of %zu, %.1f frames/s, %d points, %zu keyframes, %zu loops\n",
+                     result.frames_done, result.frames, 25e3 / since, outcome.inliers,
+                     slam.map().keyframes.size(), slam.loops().graph().loops().size());
+        since = 0;
+      }
+    }
+    slam.finish();
+  }
+  result.seconds = total / 1000;
+  result.odometry = absolute_error(result.truth, slam.odometry());
+  result.final = absolute_error(result.truth, slam.trajectory());
+  std::string surface = a.surface;
+  if (surface.empty() && std::filesystem::exists(a.sequence + "/surface.ply"))
+    surface = a.sequence + "/surface.ply";
+  if (!surface.empty() && result.final.poses >= 3 && !a.no_map) {
+    std::vector<Eigen::Vector3f> points;
+    for (const surfel::Surfel& s : slam.surfels())
+      points.emplace_back(s.position.x, s.position.y, s.position.z);
+    // The map is in the world of the colour camera; so is the alignment where depth is registered.
+    result.surface = surface_error(gpureg::io::read_point_cloud(surface), points,
+                                   result.final.truth_from_estimate);
+  }
+  write_results(a.output, slam, result);
+  std::printf(
+      "%zu frames, %d lost, %zu keyframes, %d fragments, %zu loops, %zu worlds, %.1f s, %.1f "
+      "frames/s\n",
+      result.frames_done, slam.lost(), slam.map().keyframes.size(), slam.fragments(),
+      slam.loops().graph().loops().size(), slam.worlds(), result.seconds,
+      static_cast<double>(result.frames_done) / std::max(1e-9, result.seconds));
+  if (result.final.poses >= 3)
+    std::printf("ATE RMSE: tracking alone %.4f m, final %.4f m (%zu poses)\n", result.odometry.rmse,
+                result.final.rmse, result.final.poses);
+  if (result.surface.points > 0)
+    std::printf("surface error: mean %.4f m, median %.4f m (%zu surfels)\n", result.surface.mean,
+                result.surface.median, result.surface.points);
+  std::printf("written to %s\n", a.output.c_str());
+  return interrupted ? 130 : 0;
+}
+
+}  // namespace
+}  // namespace slam_demo
+
+int main(int count, char** values) {
+  slam_demo::Arguments a;
+  CLI::App app("RGB-D SLAM with dense loop closure by gpureg", "slam_demo");
+  app.add_option("SEQUENCE", a.sequence,
+                 "Folder in the layout of TUM, ICL-NUIM, Redwood or 7-Scenes")
+      ->required();
+  app.add_option("--output", a.output, "Folder to write")->capture_default_str();
+  app.add_option("--groundtruth", a.truth,
+                 "True trajectory in TUM's format; otherwise the sequence's");
+  app.add_option("--surface", a.surface,
+                 "True surface, a PLY with normals; otherwise the sequence's surface.ply");
+  app.add_option("--backend", a.backend, "Where fragments are registered and surfels fused")
+      ->check(CLI::IsMember({"auto", "cpu", "cuda"}))
+      ->capture_default_str();
+  app.add_flag("--no-dense-loops", a.no_dense_loops, "Tracking alone; sessions are still merged");
+  app.add_flag("--no-bundle", a.no_bundle, "Loops end with the pose graph");
+  app.add_flag("--no-map", a.no_map, "Do not fuse surfels");
+  app.add_flag("--sequential", a.sequential, "One thread at a time: the same bits every time");
+  app.add_option("--first", a.first, "Frame to begin with")->check(CLI::NonNegativeNumber);
+  app.add_option("--frames", a.frames, "Frames to process; 0: all")->check(CLI::NonNegativeNumber);
+  app.add_option("--features", a.slam.features, "ORB features of a frame")
+      ->check(CLI::Range(100, 10000))
+      ->capture_default_str();
+  app.add_option("--voxel-size", a.slam.loops.voxel_size, "Of the registration, metres")
+      ->check(CLI::Range(0.005, 1.0))
+      ->capture_default_str();
+  app.add_option("--camera", a.colour, "Colour camera, pixels: fx fy cx cy")->expected(4);
+  app.add_option("--depth-camera", a.depth, "Depth camera, where depth is not registered")
+      ->expected(4);
+  app.add_option("--depth-baseline", a.baseline,
+                 "x of the depth camera in the colour camera, metres");
+  app.add_option("--depth-units", a.depth_units, "Values of a depth image per metre");
+  app.add_flag("--quiet", a.quiet, "No progress");
+  CLI11_PARSE(app, count, values);
+  try {
+    return slam_demo::run(a);
+  } catch (const std::exception& error) {
+    std::cerr << "slam_demo: " << error.what() << std::endl;
+    return 1;
+  }
+}

@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <opencv2/core.hpp>
+#include <string>
+#include <vector>
+
+#include "camera.hpp"
+#include "trajectory.hpp"
+
+namespace slam_demo {
+
+/// One frame of a sequence on disk.
+struct FrameFiles {
+  double time = 0;            ///< seconds
+  std::string colour, depth;  ///< paths
+};
+
+/// An RGB-D sequence: what is on disk, nothing loaded.
+struct Sequence {
+  std::string layout;              ///< "TUM", "Redwood" or "7-Scenes"
+  std::vector<FrameFiles> frames;  ///< ascending times
+  std::size_t out_of_order = 0;    ///< frames dropped: not later than the one before
+  Rig rig;                         ///< defaults of the layout
+  Trajectory truth;                ///< empty where the folder has none
+};
+
+/// Recognises the layout of a folder:
+///   TUM, ICL-NUIM  associations.txt, or rgb.txt and depth.txt; groundtruth.txt or *.gt.freiburg
+///   Redwood        depth/ and color/, image/ or rgb/ with numbered files; trajectory*.log
+///   7-Scenes       frame-NNNNNN.color.*, .depth.png, .pose.txt; depth not registered to colour
+/// @throws gpureg::IoError naming the file: no such folder, no known layout, a line that cannot be
+///   read, no frames.
+Sequence open_sequence(const std::string& folder);
+
+/// What a frame holds. Empty images where a file is missing or damaged.
+struct Images {
+  cv::Mat3b colour;
+  cv::Mat1b grey;
+  cv::Mat1f depth;      ///< metres in the colour camera; 0: none
+  std::string problem;  ///< empty, or what is wrong with which file
+};
+
+Images load(const FrameFiles& files, const Rig& rig);
+
+}  // namespace slam_demo

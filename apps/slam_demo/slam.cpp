@@ -1,0 +1,196 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "slam.hpp"
+
+#include <algorithm>
+#include <set>
+
+#include "stopwatch.hpp"
+
+namespace slam_demo {
+namespace {
+
+std::size_t at(int index) { return static_cast<std::size_t>(index); }
+constexpr std::size_t kMinFragment = 20;  // frames of a fragment that a session ends with
+constexpr float kFragmentVoxel = 0.4f;    // of the voxel size of the registration
+
+surfel::Camera surfel_camera(const Pinhole& camera) {
+  return {static_cast<float>(camera.fx), static_cast<float>(camera.fy),
+          static_cast<float>(camera.cx), static_cast<float>(camera.cy)};
+}
+
+surfel::Pose surfel_pose(const Eigen::Isometry3d& pose) {
+  surfel::Pose result;
+  for (int row = 0; row < 3; ++row) {
+    for (int column = 0; column < 3; ++column)
+      result.r[3 * row + column] = static_cast<float>(pose.linear()(row, column));
+    result.t[row] = static_cast<float>(pose.translation()[row]);
+  }
+  return result;
+}
+
+}  // namespace
+
+Slam::Slam(const gpureg::Context& context, const Rig& rig, const SlamOptions& options)
+    : rig_(rig),
+      options_(options),
+      extractor_(options.features),
+      tracker_(map_, rig.colour, options.tracker),
+      loops_(context, map_, rig.colour, options.loops),
+      fragment_(rig.colour, options.fragment_frames, kFragmentVoxel * options.loops.voxel_size),
+      surfels_(context.backend() == gpureg::Backend::cuda && surfel::cuda_available()
+                   ? surfel::make_cuda_map(options.surfels)
+                   : surfel::make_cpu_map(options.surfels)) {}
+
+Tracker::Outcome Slam::frame(int index, double time, const Images& images) {
+  Features features;
+  {
+    const Stopwatch watch(extract_ms_);
+    features = extractor_(images.grey, images.depth);
+  }
+  Tracker::Outcome outcome;
+  {
+    const Stopwatch watch(track_ms_);
+    outcome = tracker_.track(index, time, std::move(features), images.grey, images.depth);
+  }
+  if (outcome.pose.session == kNone) {
+    ++lost_;
+    return outcome;
+  }
+  dense_ += outcome.dense;
+  if (outcome.pose.session != session_) {
+    end_fragment();
+    session_start_ = index;
+  }
+  session_ = outcome.pose.session;
+  frames_.push_back(outcome.pose);
+  if (outcome.new_keyframe != kNone) {
+    tracker_.settle();
+    with_correction([&] { return loops_.add_keyframe(outcome.new_keyframe); });
+  }
+  {
+    const Stopwatch watch(fragment_ms_);
+    fragment_.add(index, outcome.pose, images.depth);
+  }
+  if (options_.map && index % options_.surfel_every == 0) {
+    const Stopwatch watch(fuse_ms_);
+    surfels_->fuse({images.depth.cols, images.depth.rows, images.depth.ptr<float>(),
+                    images.colour.ptr<std::uint8_t>()},
+                   surfel_camera(rig_.colour), surfel_pose(world_from_camera(map_, outcome.pose)),
+                   index, session_start_);
+  }
+  if (fragment_.full()) end_fragment();
+  return outcome;
+}
+
+/// Runs what may move keyframes; the surfels follow.
+void Slam::with_correction(const std::function<bool()>& work) {
+  std::vector<Eigen::Isometry3d> before;
+  for (const Keyframe& keyframe : map_.keyframes) before.push_back(keyframe.world_from_camera);
+  if (!work() || !options_.map) return;
+  const Stopwatch watch(correct_ms_);
+  std::vector<surfel::Correction> corrections;
+  for (std::size_t k = 0; k < before.size(); ++k) {
+    const Keyframe& keyframe = map_.keyframes[k];
+    corrections.push_back({keyframe.frame,
+                           surfel_pose(keyframe.world_from_camera * before[k].inverse()),
+                           keyframe.session});
+  }
+  surfels_->correct(corrections);
+}
+
+void Slam::end_fragment() {
+  if (fragment_.size() < kMinFragment) {
+    fragment_.clear();
+    return;
+  }
+  tracker_.settle();
+  BuiltFragment built;
+  {
+    const Stopwatch watch(fragment_ms_);
+    built = fragment_.build(map_);
+  }
+  ++fragments_;
+  loops_.add_fragment(built);
+  with_correction([&] { return loops_.process(); });
+}
+
+void Slam::finish() {
+  end_fragment();
+  tracker_.settle();
+  if (!options_.loops.bundle) return;
+  with_correction([&] {
+    loops_.bundle_all(options_.final_iterations);
+    return true;
+  });
+}
+
+surfel::Cloud Slam::surfels() const {
+  surfel::Cloud result;
+  const std::vector<int> world = loops_.graph().world_of_session(map_);
+  const int largest = largest_world();
+  for (const surfel::Surfel& s : surfels_->download()) {
+    if (s.confidence < options_.surfels.min_confidence) continue;
+    // The session of a surfel is that of the frame that made it.
+    const auto after = std::upper_bound(
+        map_.keyframes.begin(), map_.keyframes.end(), s.first,
+        [](int frame, const Keyframe& keyframe) { return frame < keyframe.frame; });
+    if (after != map_.keyframes.begin() && world[at(std::prev(after)->session)] == largest)
+      result.push_back(s);
+  }
+  return result;
+}
+
+std::size_t Slam::worlds() const {
+  const std::vector<int> world = loops_.graph().world_of_session(map_);
+  return std::set<int>(world.begin(), world.end()).size();
+}
+
+int Slam::largest_world() const {
+  const std::vector<int> world = loops_.graph().world_of_session(map_);
+  std::map<int, int> frames;
+  for (const FramePose& frame : frames_) ++frames[world[at(frame.session)]];
+  int best = 0;
+  for (const auto& [w, count] : frames) {
+    if (count > frames[best]) best = w;
+  }
+  return best;
+}
+
+Trajectory Slam::poses_of(const std::function<Eigen::Isometry3d(int)>& world_from_keyframe) const {
+  const std::vector<int> world = loops_.graph().world_of_session(map_);
+  const int largest = largest_world();
+  Trajectory result;
+  for (const FramePose& frame : frames_) {
+    if (world[at(frame.session)] != largest) continue;
+    Eigen::Isometry3d pose = world_from_keyframe(frame.reference) * frame.reference_from_camera;
+    if (rig_.truth_of_depth) pose = pose * rig_.colour_from_depth;
+    result.push_back({frame.time, pose});
+  }
+  return result;
+}
+
+Trajectory Slam::trajectory() const {
+  return poses_of([&](int k) { return map_.keyframes[at(k)].world_from_camera; });
+}
+
+Trajectory Slam::odometry() const {
+  const std::vector<Eigen::Isometry3d> poses = loops_.graph().odometry_poses(map_);
+  return poses_of([&](int k) { return poses[at(k)]; });
+}
+
+std::map<std::string, double> Slam::milliseconds() const {
+  const LoopClosing::Milliseconds& l = loops_.milliseconds();
+  return {{"features", extract_ms_},
+          {"tracking", track_ms_},
+          {"local bundle adjustment", tracker_.bundle_milliseconds()},
+          {"fragments", fragment_ms_},
+          {"preparation", l.prepare},
+          {"registration and verification", l.registration},
+          {"image loops", l.image},
+          {"pose graph", l.graph},
+          {"full bundle adjustment", l.bundle},
+          {"surfel fusion", fuse_ms_},
+          {"surfel correction", correct_ms_}};
+}
+
+}  // namespace slam_demo

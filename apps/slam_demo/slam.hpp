@@ -1,0 +1,73 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <functional>
+#include <map>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "loops.hpp"
+#include "sequence.hpp"
+#include "surfel/surfel_map.hpp"
+
+namespace slam_demo {
+
+struct SlamOptions {
+  TrackerOptions tracker;
+  LoopOptions loops;
+  surfel::Options surfels;
+  bool map = true;       ///< fuse surfels
+  int surfel_every = 2;  ///< frames between two that are fused
+  int features = 1000;
+  int fragment_frames = 50;
+  int final_iterations = 20;  ///< of the last bundle adjustment
+};
+
+/// The whole system: frames in, trajectory and map out. Not thread-safe.
+class Slam {
+ public:
+  Slam(const gpureg::Context& context, const Rig& rig, const SlamOptions& options);
+
+  Tracker::Outcome frame(int index, double time, const Images& images);
+  /// After the last frame: the last fragment, its loops, the last bundle adjustment.
+  void finish();
+
+  /// Poses of the tracked frames in the largest world, of the camera that the truth speaks of.
+  Trajectory trajectory() const;
+  /// The same by tracking alone: without any loop.
+  Trajectory odometry() const;
+
+  const Map& map() const { return map_; }
+  const LoopClosing& loops() const { return loops_; }
+  /// The confirmed surfels of the largest world.
+  surfel::Cloud surfels() const;
+  std::size_t all_surfels() const { return surfels_->size(); }
+  const std::vector<FramePose>& frames() const { return frames_; }
+  int lost() const { return lost_; }
+  int dense() const { return dense_; }
+  int fragments() const { return fragments_; }
+  /// Milliseconds of each part, all frames together.
+  std::map<std::string, double> milliseconds() const;
+  std::size_t worlds() const;  ///< parts of the trajectory that nothing connects
+
+ private:
+  void end_fragment();
+  void with_correction(const std::function<bool()>& work);
+  Trajectory poses_of(const std::function<Eigen::Isometry3d(int)>& world_from_keyframe) const;
+  int largest_world() const;
+
+  const Rig rig_;
+  const SlamOptions options_;
+  Map map_;
+  Extractor extractor_;
+  Tracker tracker_;
+  LoopClosing loops_;
+  FragmentBuilder fragment_;
+  std::unique_ptr<surfel::SurfelMap> surfels_;
+  std::vector<FramePose> frames_;
+  int lost_ = 0, dense_ = 0, fragments_ = 0, session_ = kNone, session_start_ = 0;
+  double extract_ms_ = 0, track_ms_ = 0, fragment_ms_ = 0, fuse_ms_ = 0, correct_ms_ = 0;
+};
+
+}  // namespace slam_demo

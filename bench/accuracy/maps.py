@@ -1,0 +1,232 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: BSD-3-Clause
+"""Maps of real and simulated scenes: complete, thinned, with foreign scans, of two houses at once, without cameras.
+
+    maps.py --data DATA --work WORK [CASE ...]
+
+Pairs are the costly part: each case looks for WORK/pairs/<set>.json, a pairs.json of `gpureg reconstruct` or a result of
+`gpureg batch`, and aligns what no such file has. Figures of a peer that left its poses.txt and reconstruction.json in
+WORK/<peer>/<scene> (bench/peers/open3d_multiway.py) enter the same record.
+"""
+
+import json
+import pathlib
+import shutil
+import subprocess
+
+from map_rmse import information_of, measure, read_blocks, read_truth
+from record import parser, write
+
+SCENES = {
+    "redkitchen": "redkitchen/fragments",
+    "house_A": "house/A",
+    "house_B": "house/B",
+    "hospital_E": "hospital/E",
+}
+OFFSET = 100  # of the numbers of a second scene in the same folder
+FOREIGN = (3, 13, 23, 33, 43)
+
+
+class Set:
+    """A folder of scans of one or two scenes, and the truth of all of them."""
+
+    def __init__(self, name, parts, cameras=True, known_only=None):
+        """known_only: name of a set whose pairs serve, too; pairs that no file has are not tried."""
+        self.name, self.parts, self.cameras = name, parts, cameras
+        self.known_only = known_only
+
+    def write(self, data, folder):
+        shutil.rmtree(folder, ignore_errors=True)
+        folder.mkdir(parents=True)
+        cameras = []
+        for scene, numbers, offset in self.parts:
+            source = data / SCENES[scene]
+            for number in numbers:
+                (folder / f"cloud_bin_{number + offset}.ply").symlink_to(
+                    source / f"cloud_bin_{number}.ply"
+                )
+            for line in (source / "cameras.txt").read_text().splitlines():
+                words = line.split()
+                if words and words[0] != "#" and int(words[0]) in numbers:
+                    cameras.append(" ".join([str(int(words[0]) + offset), *words[1:]]))
+        if self.cameras:
+            (folder / "cameras.txt").write_text("\n".join(cameras) + "\n")
+
+    def truth(self, data):
+        poses, log, info = {}, {}, {}
+        for scene, _, offset in self.parts:
+            for known, more in zip((poses, log, info), read_truth(data / SCENES[scene])):
+                for key, value in more.items():
+                    moved = (
+                        key + offset if isinstance(key, int) else (key[0] + offset, key[1] + offset)
+                    )
+                    known[moved] = value
+        return poses, log, info
+
+    def sources(self):
+        """Sets whose pairs serve this one, with the offset of their numbers."""
+        suffix = "" if self.cameras else "_nocam"
+        own = self.known_only or self.name
+        return [(own, 0), *((scene + suffix, offset) for scene, _, offset in self.parts)]
+
+
+def count_of(scene, data):
+    return len(list((data / SCENES[scene]).glob("cloud_bin_*.ply")))
+
+
+def cases(data):
+    out = {}
+    for scene in SCENES:
+        every = range(count_of(scene, data))
+        out[scene] = Set(scene, [(scene, every, 0)])
+        out[scene + "_half"] = Set(scene + "_half", [(scene, every[::2], 0)])
+        out[scene + "_third"] = Set(scene + "_third", [(scene, every[::3], 0)])
+        out[scene + "_nocam"] = Set(scene + "_nocam", [(scene, every, 0)], cameras=False)
+    out["foreign"] = Set(
+        "foreign",
+        [("house_A", range(count_of("house_A", data)), 0), ("hospital_E", FOREIGN, OFFSET)],
+    )
+    out["two_buildings"] = Set(
+        "two_buildings",
+        [
+            ("house_A", range(count_of("house_A", data)), 0),
+            ("hospital_E", range(count_of("hospital_E", data)), OFFSET),
+        ],
+        known_only="foreign",
+    )
+    return out
+
+
+def known_pairs(chosen, pairs):
+    """Records of pairs that are there already, by numbers of this set."""
+    records, options = {}, None
+    for name, offset in chosen.sources():
+        path = pairs / f"{name}.json"
+        if not path.exists():
+            continue
+        document = json.loads(path.read_text())
+        options = document.get("options", options)
+        for pair in document["pairs"]:
+            key = (pair["i"] + offset, pair["j"] + offset)
+            records.setdefault(key, {**pair, "i": key[0], "j": key[1]})
+    return records, options
+
+
+def run(command, folder, chosen, arguments, out, more):
+    """The record of one map; aligns the pairs that no file has."""
+    numbers = sorted(int(path.stem.split("_")[-1]) for path in folder.glob("cloud_bin_*.ply"))
+    wanted = [(i, j) for i in numbers for j in numbers if i < j]
+    pairs = arguments.work / "pairs"
+    pairs.mkdir(exist_ok=True)
+    records, options = known_pairs(chosen, pairs)
+    if chosen.known_only:
+        wanted = [pair for pair in wanted if pair in records]
+    missing = [pair for pair in wanted if pair not in records]
+    if missing:
+        if arguments.no_align:
+            return None
+        listed = folder.parent / f"{chosen.name}_missing.txt"
+        listed.write_text("".join(f"{i} {j}\n" for i, j in missing))
+        aligned = folder.parent / f"{chosen.name}_aligned"
+        base = [command, "reconstruct", folder, "--pairs", listed, "--no-refine", "--no-map"]
+        done = subprocess.run([*map(str, base), "-o", str(aligned), "--resume", "--quiet"])
+        if done.returncode not in (0, 1):
+            raise SystemExit(f"{chosen.name}: the alignment failed")
+        new = json.loads((aligned / "pairs.json").read_text())
+        options = new["options"]
+        merged = {**new, "pairs": [*new["pairs"]]}
+        (pairs / f"{chosen.name}.json").write_text(json.dumps(merged))
+        records.update({(p["i"], p["j"]): p for p in new["pairs"]})
+    results = folder.parent / f"{chosen.name}_results.json"
+    results.write_text(
+        json.dumps({"options": options, "pairs": [records[pair] for pair in wanted]})
+    )
+    subprocess.run(
+        [str(command), "reconstruct", str(folder), "--results", str(results), "-o", str(out)]
+        + ["--quiet", "--no-map", *more],
+        check=False,
+    )
+    document = json.loads((out / "reconstruction.json").read_text())
+    figures = measure(out, chosen.truth(arguments.data), information_of(records.values()))
+    figures["seconds"] = document["seconds"]
+    figures["peak_memory_mib"] = document["peak_memory_mib"]
+    figures["weakest"] = min(
+        (link["confidence"] for link in document["weakest_links"]), default=None
+    )
+    figures["pairs"] = len(wanted)
+    figures["left_out"] = {s["id"]: s["reason"] for s in document["scans"] if not s["placed"]}
+    return figures
+
+
+def overlapping_islands(chosen, truth, figures):
+    """Scans of the largest set that pairs of the truth with overlap of 30 % connect."""
+    parent = {}
+
+    def find(k):
+        while parent.setdefault(k, k) != k:
+            k = parent[k]
+        return k
+
+    numbers = {n + offset for _, part, offset in chosen.parts for n in part}
+    for i, j in truth:
+        if i in numbers and j in numbers:
+            parent[find(i)] = find(j)
+    sizes = {}
+    for k in numbers:
+        sizes[find(k)] = sizes.get(find(k), 0) + 1
+    figures["connected_by_truth"] = max(sizes.values())
+
+
+def short(name, figures):
+    if figures is None:
+        return f"{name}: pairs are missing"
+    islands = ", ".join(
+        f"{len(i['scans'])} scans"
+        + (f" {i['rmse_cm']:.2f} cm {i['rmse_degrees_own']:.2f} deg" if "rmse_cm" in i else "")
+        for i in figures["islands"]
+    )
+    return f"{name}: {figures['placed']}/{figures['scans']} placed; {islands}; {figures['accepted']} edges, {len(figures['wrong'])} wrong"
+
+
+def main():
+    options = parser(__doc__, "maps.json")
+    options.add_argument("cases", nargs="*", help="default: all; others of the record stay")
+    options.add_argument("--work", type=pathlib.Path, required=True)
+    options.add_argument("--no-align", action="store_true", help="skip cases with missing pairs")
+    arguments = options.parse_args()
+    arguments.data = pathlib.Path(arguments.data)
+    known = cases(arguments.data)
+    old = json.loads(arguments.output.read_text()) if arguments.output.exists() else {}
+    maps, peers = old.get("maps", {}), old.get("peers", {})
+    for name in arguments.cases or known:
+        chosen = known[name]
+        folder = arguments.work / "sets" / name
+        chosen.write(arguments.data, folder)
+        out = arguments.work / "maps" / name
+        before = run(arguments.gpureg, folder, chosen, arguments, out / "before", ["--no-refine"])
+        if before is None:
+            print(short(name, None))
+            continue
+        after = run(arguments.gpureg, folder, chosen, arguments, out / "after", [])
+        strong = [
+            (i + offset, j + offset)
+            for scene, _, offset in chosen.parts
+            for i, j in read_blocks(arguments.data / SCENES[scene] / "gt.log", 4)
+        ]
+        overlapping_islands(chosen, strong, after)
+        maps[name] = {"before_refinement": before, "after_refinement": after}
+        print(short(name, before), "|", short("refined", after), flush=True)
+    for peer in ("open3d",):
+        for out in sorted((arguments.work / peer).glob("*/reconstruction.json")):
+            name = out.parent.name
+            figures = measure(out.parent, known[name].truth(arguments.data), {})
+            figures["seconds"] = json.loads(out.read_text())["seconds"]
+            figures["peak_memory_mib"] = json.loads(out.read_text())["peak_memory_mib"]
+            peers.setdefault(peer, {})[name] = figures
+            print(short(f"{peer} {name}", figures))
+    command = "python3 bench/accuracy/maps.py --data DATA --work WORK"
+    write(arguments, command, {"maps": maps, "peers": peers})
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,64 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "gpureg/prepared_cloud.hpp"
+#include "gpureg/registration.hpp"
+
+/// Which pairs of a large set are worth aligning: those of clouds that look alike. The cost of a
+/// set then grows with n * k, not with n * n. Every function is deterministic and thread-safe.
+namespace gpureg::pruning {
+
+/// Features of one cloud: size rows of dimension floats without gaps. Rows of zeros are not used.
+struct FeatureView {
+  const float* data = nullptr;
+  std::size_t size = 0, dimension = 0;
+};
+
+/// Rows of floats.
+struct Matrix {
+  std::vector<float> data;  ///< row by row
+  std::size_t rows = 0, columns = 0;
+};
+
+/// Options of likely_pairs().
+struct Options {
+  std::uint32_t neighbors = 20;   ///< a pair is kept where either is among so many nearest, >= 1
+  std::uint32_t consecutive = 0;  ///< also the so many that follow each cloud in their order
+  std::uint32_t words = 64;       ///< >= 1
+  int threads = 0;                ///< 0: one per core. Results do not depend on it.
+
+  /// @throws InvalidArgument naming field and value.
+  void validate() const;
+};
+
+/// Centres of k-means over features of some clouds. No labels and no training set: the words are
+/// those of the scene itself.
+/// @param most number of words, >= 1; fewer come back where there are fewer features.
+/// @return words x dimension.
+/// @throws InvalidArgument for clouds of different dimensions.
+Matrix learn_words(const std::vector<FeatureView>& clouds, std::uint32_t most);
+
+/// Global descriptor of a cloud: the residuals of its features from their nearest words, summed per
+/// word. Rigid motions change it as little as they change the features.
+/// @return words.rows * words.columns floats of unit length; zeros for a cloud without features.
+/// @throws InvalidArgument where the dimensions differ.
+/// Sources: Jegou et al. 2010 (VLAD); Arandjelovic and Zisserman 2013 (intra-normalisation).
+std::vector<float> describe(const FeatureView& cloud, const Matrix& words);
+
+/// Pairs source > target of rows where either has the other among its k nearest by inner product.
+/// Exact. @return ascending by target, then source.
+/// @throws InvalidArgument unless k >= 1.
+std::vector<Pair> nearest_pairs(const Matrix& descriptors, std::uint32_t k, int threads = 0);
+
+/// All of the above for clouds in memory.
+/// @return pairs source > target, ascending by target, then source.
+/// @throws InvalidArgument for options out of range, an empty handle, features of different
+///   dimensions.
+std::vector<Pair> likely_pairs(const std::vector<PreparedCloud>& clouds,
+                               const Options& options = {});
+
+}  // namespace gpureg::pruning

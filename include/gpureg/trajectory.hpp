@@ -1,0 +1,82 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <Eigen/Core>
+#include <cstddef>
+#include <optional>
+#include <string>
+#include <vector>
+
+/// Trajectories and their errors (component `evaluation`). Every function is thread-safe.
+namespace gpureg::evaluation {
+
+/// A pose at a time.
+struct StampedPose {
+  double time = 0;  ///< seconds, or whatever counts the poses
+  /// p_world = world_from_body * p_body, metres.
+  Eigen::Matrix<double, 4, 4, Eigen::DontAlign> world_from_body =
+      Eigen::Matrix<double, 4, 4, Eigen::DontAlign>::Identity();
+};
+using Trajectory = std::vector<StampedPose>;
+
+/// Formats of trajectory files. '#' starts a comment.
+enum class TrajectoryFormat {
+  automatic,  ///< by the number of fields of the first line
+  tum,        ///< lines `time tx ty tz qx qy qz qw`
+  kitti,  ///< lines of 12 numbers, the first three rows of the pose; the time is the line's place
+  blocks  ///< `number`, then four rows of four: poses.txt of gpureg, the number is the time
+};
+
+/// @return the poses in ascending order of their times.
+/// @throws IoError naming file, line and reason: missing, another number of fields than the format
+///   has, a number that is not finite, a pose that is not rigid, a time that is there twice, no
+///   pose.
+Trajectory read_trajectory(const std::string& path,
+                           TrajectoryFormat format = TrajectoryFormat::automatic);
+
+/// How the steps of the relative error are counted.
+enum class DeltaUnit {
+  frames,  ///< every pose and the one so many matched poses later
+  metres   ///< consecutive steps of at least such a length along the true path
+};
+
+/// Options of evaluate_trajectory().
+struct TrajectoryOptions {
+  double max_difference = 0.01;  ///< largest difference of times of a match, >= 0
+  bool align = true;  ///< moves the estimate rigidly onto the truth, by positions, without scale
+  double delta = 1;   ///< of the relative error, > 0; whole where it counts frames
+  DeltaUnit delta_unit = DeltaUnit::frames;
+
+  /// @throws InvalidArgument naming field and value.
+  void validate() const;
+};
+
+/// Figures of a list of errors.
+struct ErrorStatistics {
+  std::size_t count = 0;
+  double rmse = 0, mean = 0, median = 0, deviation = 0, min = 0, max = 0;
+};
+
+/// Errors of a trajectory.
+struct TrajectoryEvaluation {
+  std::size_t estimated = 0, true_poses = 0, matched = 0;
+  /// Moves the estimate onto the truth; the identity where align is false.
+  Eigen::Matrix<double, 4, 4, Eigen::DontAlign> truth_from_estimate =
+      Eigen::Matrix<double, 4, 4, Eigen::DontAlign>::Identity();
+  double path_length = 0;                ///< of the matched true poses, metres
+  ErrorStatistics absolute_translation;  ///< ATE, metres
+  ErrorStatistics absolute_rotation;     ///< degrees
+  ErrorStatistics relative_translation;  ///< RPE, metres; none where no step is long enough
+  ErrorStatistics relative_rotation;     ///< degrees
+};
+
+/// Matches every pose to the true one with the nearest time (a true pose only once, to the nearer),
+/// aligns, and measures.
+/// @throws InvalidArgument for options out of range, fewer than 2 matches, or fewer than 3 where
+/// the
+///   trajectories are to be aligned.
+/// Sources: Umeyama 1991, Horn 1987 (alignment); Sturm et al. 2012 (ATE, RPE).
+TrajectoryEvaluation evaluate_trajectory(const Trajectory& estimate, const Trajectory& truth,
+                                         const TrajectoryOptions& options = {});
+
+}  // namespace gpureg::evaluation

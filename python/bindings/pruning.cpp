@@ -1,0 +1,72 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "gpureg/pruning.hpp"
+
+#include <pybind11/numpy.h>
+
+#include "bindings.hpp"
+
+namespace gpureg::python {
+namespace {
+
+using FloatArray = py::array_t<float, py::array::c_style>;
+
+pruning::FeatureView view_of(const FloatArray& rows, const char* name) {
+  if (rows.ndim() != 2) throw py::type_error(std::string(name) + ": not a matrix");
+  return {rows.data(), static_cast<std::size_t>(rows.shape(0)),
+          static_cast<std::size_t>(rows.shape(1))};
+}
+
+pruning::Matrix matrix_from(const FloatArray& rows, const char* name) {
+  const pruning::FeatureView view = view_of(rows, name);
+  return {std::vector<float>(view.data, view.data + view.size * view.dimension), view.size,
+          view.dimension};
+}
+
+FloatArray learn(const py::list& clouds, std::uint32_t most) {
+  std::vector<FloatArray> kept;
+  std::vector<pruning::FeatureView> views;
+  for (const py::handle cloud : clouds) {
+    kept.push_back(cloud.cast<FloatArray>());
+    views.push_back(view_of(kept.back(), "features"));
+  }
+  pruning::Matrix words;
+  {
+    const py::gil_scoped_release release;
+    words = pruning::learn_words(views, most);
+  }
+  FloatArray out({static_cast<py::ssize_t>(words.rows), static_cast<py::ssize_t>(words.columns)});
+  std::copy(words.data.begin(), words.data.end(), out.mutable_data());
+  return out;
+}
+
+FloatArray descriptor(const FloatArray& features, const FloatArray& words) {
+  const std::vector<float> out =
+      pruning::describe(view_of(features, "features"), matrix_from(words, "words"));
+  return FloatArray(static_cast<py::ssize_t>(out.size()), out.data());
+}
+
+py::array_t<std::int64_t> nearest(const FloatArray& descriptors, std::uint32_t k) {
+  const pruning::Matrix rows = matrix_from(descriptors, "descriptors");
+  std::vector<Pair> pairs;
+  {
+    const py::gil_scoped_release release;
+    pairs = pruning::nearest_pairs(rows, k);
+  }
+  py::array_t<std::int64_t> out({static_cast<py::ssize_t>(pairs.size()), py::ssize_t(2)});
+  std::int64_t* next = out.mutable_data();
+  for (const Pair& pair : pairs) {
+    *next++ = pair.target;
+    *next++ = pair.source;
+  }
+  return out;
+}
+
+}  // namespace
+
+void bind_pruning(py::module_& m) {
+  m.def("learn_words", &learn, py::arg("clouds"), py::arg("most"));
+  m.def("describe_features", &descriptor, py::arg("features"), py::arg("words"));
+  m.def("nearest_descriptors", &nearest, py::arg("descriptors"), py::arg("k"));
+}
+
+}  // namespace gpureg::python

@@ -1,0 +1,241 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "gpureg/reconstruction.hpp"
+
+#include <pybind11/stl.h>
+
+#include <cmath>
+#include <limits>
+#include <string>
+
+#include "cloud.hpp"
+#include "gpureg/error.hpp"
+#include "matrix.hpp"
+
+namespace gpureg::python {
+namespace {
+
+using namespace reconstruction;
+using IndexArray = py::array_t<std::uint32_t, py::array::c_style>;
+using DoubleArray = py::array_t<double, py::array::c_style | py::array::forcecast>;
+
+std::vector<Pair> pairs_of(const IndexArray& rows) {
+  if (rows.ndim() != 2 || rows.shape(1) != 2)
+    throw py::type_error("pairs: not a matrix with two columns");
+  std::vector<Pair> pairs(static_cast<std::size_t>(rows.shape(0)));
+  for (std::size_t k = 0; k < pairs.size(); ++k)
+    pairs[k] = {rows.data()[2 * k], rows.data()[2 * k + 1]};
+  return pairs;
+}
+
+/// (N, 4, 4) poses, NaN where not known, or (source, target, pose, information or None) of each.
+std::vector<Odometry> odometry_of(const py::object& given) {
+  std::vector<Odometry> out;
+  if (py::isinstance<py::array>(given)) {
+    const auto array = given.cast<DoubleArray>();
+    std::vector<UnalignedIsometry3d> poses(static_cast<std::size_t>(array.shape(0)));
+    for (std::size_t k = 0; k < poses.size(); ++k)
+      for (int n = 0; n < 16; ++n)
+        poses[k].matrix()(n / 4, n % 4) = array.data()[16 * k + static_cast<std::size_t>(n)];
+    return odometry_of_poses(poses);
+  }
+  const auto items = given.cast<py::list>();
+  for (const py::handle item : items) {
+    const auto parts = item.cast<py::tuple>();
+    Odometry edge;
+    edge.source = parts[0].cast<std::uint32_t>();
+    edge.target = parts[1].cast<std::uint32_t>();
+    edge.target_from_source.matrix() =
+        matrix_of<Eigen::Matrix4d>(parts[2].cast<DoubleArray>(), "odometry");
+    if (!parts[3].is_none())
+      edge.information = matrix_of<Eigen::Matrix<double, 6, 6>>(parts[3].cast<DoubleArray>(),
+                                                                "odometry information");
+    out.push_back(edge);
+  }
+  return out;
+}
+
+Reconstruction reconstruct_of(std::size_t scans, const IndexArray& rows, const py::list& results,
+                              double voxel_size, double min_edge_confidence,
+                              double min_connection_confidence, std::uint32_t min_island,
+                              const DoubleArray& drift, const py::object& odometry, int threads) {
+  const std::vector<Pair> pairs = pairs_of(rows);
+  std::vector<RegistrationResult> values;
+  for (const py::handle result : results)
+    values.push_back(result.cast<const RegistrationResult&>());
+  Options options = Options::from_voxel_size(static_cast<float>(voxel_size));
+  options.min_edge_confidence = min_edge_confidence;
+  options.min_connection_confidence = min_connection_confidence;
+  options.min_island = min_island;
+  const auto drifts = matrix_of<Eigen::Vector3d>(drift, "drift");
+  options.drift.translation_per_metre = drifts[0];
+  options.drift.rotation_per_metre = drifts[1];
+  options.drift.rotation_per_degree = drifts[2];
+  options.threads = threads;
+  const std::vector<Odometry> known = odometry_of(odometry);
+  const py::gil_scoped_release release;
+  return reconstruct(scans, pairs, values, options, known);
+}
+
+py::dict report_of(const RefineReport& report) {
+  py::dict out;
+  out["pairs"] = report.pairs;
+  out["correspondences"] = report.correspondences;
+  out["iterations"] = report.iterations;
+  out["rejected_edges"] = report.rejected_edges;
+  out["initial_rmse"] = report.initial_rmse;
+  out["final_rmse"] = report.final_rmse;
+  out["solved"] = report.solved;
+  return out;
+}
+
+/// clouds: prepared with surface_options, None for scans that are left out. seen: whether their
+/// viewpoints are known. tell: called with the number of each iteration.
+py::dict refine_map(Reconstruction& map, const py::list& clouds, const std::vector<bool>& seen,
+                    double voxel_size, int threads, const py::object& tell) {
+  std::vector<Surface> surfaces;
+  for (const py::handle cloud : clouds) {
+    surfaces.emplace_back();
+    if (cloud.is_none()) continue;
+    surfaces.back() = surface_of(cloud.cast<const Cloud&>().prepared);
+    if (!seen.at(surfaces.size() - 1)) surfaces.back().viewpoints.clear();
+  }
+  reconstruction::RefineOptions options =
+      reconstruction::RefineOptions::for_depth_cameras(static_cast<float>(voxel_size));
+  options.threads = threads;
+  std::exception_ptr failed;
+  options.should_stop = [&](int iteration) {
+    const py::gil_scoped_acquire acquire;
+    try {
+      if (PyErr_CheckSignals() != 0) throw py::error_already_set();
+      if (!tell.is_none()) tell(iteration + 1);
+    } catch (...) {
+      failed = std::current_exception();
+    }
+    return failed != nullptr;
+  };
+  RefineReport report;
+  {
+    const py::gil_scoped_release release;
+    report = refine(surfaces, map, options);
+  }
+  if (failed) std::rethrow_exception(failed);
+  return report_of(report);
+}
+
+py::array_t<double> poses_array(const Reconstruction& map) {
+  py::array_t<double> out(
+      {static_cast<py::ssize_t>(map.scans.size()), py::ssize_t(4), py::ssize_t(4)});
+  double* next = out.mutable_data();
+  for (const Scan& scan : map.scans)
+    for (int k = 0; k < 16; ++k)
+      *next++ = scan.placed ? scan.island_from_scan.matrix()(k / 4, k % 4)
+                            : std::numeric_limits<double>::quiet_NaN();
+  return out;
+}
+
+py::list scans_list(const Reconstruction& map) {
+  py::list out;
+  for (const Scan& scan : map.scans) {
+    const py::object island = scan.placed ? py::object(py::int_(scan.island)) : py::none();
+    out.append(py::make_tuple(scan.placed, island, scan.confidence, to_string(scan.reason),
+                              describe(scan.reason)));
+  }
+  return out;
+}
+
+py::list edges_list(const Reconstruction& map) {
+  py::list out;
+  for (const Edge& edge : map.edges)
+    out.append(py::make_tuple(edge.source, edge.target, array_of(edge.target_from_source.matrix()),
+                              edge.confidence, edge.weight, edge.accepted, to_string(edge.reason),
+                              edge.mode, array_of(edge.information)));
+  return out;
+}
+
+py::list links_list(const Reconstruction& map) {
+  py::list out;
+  for (const Link& link : weakest_links(map))
+    out.append(py::make_tuple(link.scans, link.confidence, link.accepted, link.rejected));
+  return out;
+}
+
+/// The result of a pair of which a table holds the pose, the score and the information only.
+RegistrationResult result_of_row(bool aligned, const py::object& pose, double score,
+                                 const py::object& information) {
+  RegistrationResult result;
+  result.status = aligned ? RegistrationStatus::aligned : RegistrationStatus::not_aligned;
+  result.reason = aligned ? RegistrationReason::none : RegistrationReason::confidence_too_low;
+  result.score = score;
+  if (pose.is_none()) return result;
+  result.has_candidate = true;
+  result.target_from_source.matrix() =
+      matrix_of<Eigen::Matrix4d>(pose.cast<DoubleArray>(), "target_from_source");
+  if (!information.is_none())
+    result.source_moments = moments_of_information(
+        matrix_of<Eigen::Matrix<double, 6, 6>>(information.cast<DoubleArray>(), "information"));
+  return result;
+}
+
+void bind_voxel_map(py::module_& m) {
+  py::class_<VoxelMap>(m, "VoxelMap", "Points of scans averaged per voxel.")
+      .def(py::init<float>(), py::arg("voxel_size"))
+      .def(
+          "add",
+          [](VoxelMap& map, const py::array_t<float, py::array::c_style>& points,
+             const py::object& normals, const DoubleArray& origin, const DoubleArray& pose) {
+            PointCloudView view;
+            const auto rows = [](const py::array_t<float, py::array::c_style>& array) {
+              if (array.ndim() != 2 || array.shape(1) != 3)
+                throw py::type_error("not a matrix with three columns");
+              return static_cast<std::size_t>(array.shape(0));
+            };
+            view.size = rows(points);
+            view.points = points.data();
+            py::array_t<float, py::array::c_style> directions;
+            if (!normals.is_none()) {
+              directions = normals.cast<py::array_t<float, py::array::c_style>>();
+              if (rows(directions) != view.size) throw py::type_error("normals: another number");
+              view.normals = directions.data();
+            }
+            const auto shift = matrix_of<Eigen::Vector3d>(origin, "origin");
+            for (int k = 0; k < 3; ++k) view.origin[k] = shift[k];
+            UnalignedIsometry3d map_from_scan;
+            map_from_scan.matrix() = matrix_of<Eigen::Matrix4d>(pose, "map_from_scan");
+            const py::gil_scoped_release release;
+            map.add(view, map_from_scan);
+          },
+          py::arg("points"), py::arg("normals"), py::arg("origin"), py::arg("map_from_scan"))
+      .def("cloud", [](const VoxelMap& map) {
+        const PointCloud cloud = map.cloud();
+        const py::object normals =
+            cloud.normals.empty() ? py::object(py::none()) : py::object(array_of(cloud.normals));
+        return py::make_tuple(array_of(cloud.points), normals);
+      });
+}
+
+}  // namespace
+
+void bind_reconstruction(py::module_& m) {
+  py::class_<Reconstruction>(m, "MapGraph", "Scans, edges and islands of a map.")
+      .def_property_readonly("poses", &poses_array)
+      .def_property_readonly("scans", &scans_list)
+      .def_property_readonly("edges", &edges_list)
+      .def_property_readonly("links", &links_list)
+      .def_property_readonly("islands", [](const Reconstruction& map) {
+        std::vector<std::vector<std::uint32_t>> out;
+        for (const Island& island : map.islands) out.push_back(island.scans);
+        return out;
+      });
+  m.def("reconstruct_map", &reconstruct_of, py::arg("scans"), py::arg("pairs"), py::arg("results"),
+        py::arg("voxel_size"), py::arg("min_edge_confidence"), py::arg("min_connection_confidence"),
+        py::arg("min_island"), py::arg("drift"), py::arg("odometry"), py::arg("threads"));
+  m.def("refine_map", &refine_map, py::arg("map"), py::arg("clouds"), py::arg("seen"),
+        py::arg("voxel_size"), py::arg("threads"), py::arg("tell"));
+  m.def("surface_options", &surface_options, py::arg("registration"));
+  m.def("result_of_row", &result_of_row, py::arg("aligned"), py::arg("target_from_source"),
+        py::arg("score"), py::arg("information"));
+  m.attr("REFINE_ITERATIONS") = reconstruction::RefineOptions{}.iterations;
+  bind_voxel_map(m);
+}
+
+}  // namespace gpureg::python

@@ -1,0 +1,265 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""From unordered scans to one map."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from . import _core
+from ._arrays import CoreCloud, index_pairs
+from ._contexts import checked, context_of
+from ._core import Context, MapGraph, RegistrationOptions, RegistrationResult
+from ._map import Map, Poses
+from ._progress import Progress, batch_progress
+from .fragments import FragmentSet, fragment_set
+from .preparation import pieces
+from .registration import align_batch
+
+_DRIFT = (0.02, 0.2, 0.02)
+
+
+def reconstruct(
+    fragments: Any,
+    pairs: Any = None,
+    *,
+    results: Any = None,
+    odometry: Any = None,
+    drift: tuple[float, float, float] = _DRIFT,
+    refine: bool = True,
+    min_edge_confidence: float = 0.1,
+    min_connection_confidence: float = 0.9,
+    min_island: int = 2,
+    options: RegistrationOptions | None = None,
+    context: Context | None = None,
+    progress: Progress = False,
+) -> Map:
+    """Make one map of unordered scans. No pose needs to be known.
+
+    Parameters
+    ----------
+    fragments : FragmentSet, folder, or sequence of clouds
+    pairs : "all", list of pairs, (M, 2) array, or callable, optional
+        Pairs of fragment numbers that are aligned, see `FragmentSet.choose_pairs`; default "all",
+        and `gpureg.pruning.Nearest` for large sets. With a sequence as results: rows (source,
+        target) of fragment numbers, as given to `align_batch`.
+    results : sequence of RegistrationResult, or BatchRun, optional
+        Instead of aligning: one result per pair, or what `register_all` returned. The table of a
+        `register_all` keeps the best pose of a pair only, so that other modes take no part.
+    odometry : path, (N, 4, 4) array, or sequence, optional
+        Known poses: a trajectory file (TUM with fragment numbers as times, or poses.txt),
+        ``world_from_scan`` of each fragment (NaN: not known), of both of which consecutive ones
+        count, or tuples (source, target, target_from_source) of fragment numbers, with a 6x6
+        information matrix as a fourth entry where it is known.
+    drift : (float, float, float)
+        Error of the odometry: metres per metre travelled, degrees per metre, degrees per degree.
+    refine : bool
+        Refine all poses together at half the voxel size.
+    min_edge_confidence, min_connection_confidence : float
+        Confidence from which a pair takes part, and from which a connection between two parts
+        counts.
+    min_island : int
+        Scans of an island; smaller ones are left out.
+    options : RegistrationOptions, optional
+        Of the alignment; its voxel size scales every tolerance.
+    context : Context, optional
+    progress : bool or callable
+        True: bars of tqdm. A callable gets (done, total) of each step: fragments, pairs, fragments
+        again, iterations.
+
+    Returns
+    -------
+    Map
+
+    Raises
+    ------
+    ValueError
+        Naming the argument: a repeated pair, an unknown fragment, results of another number.
+    BatchInterrupted
+        After Ctrl-C during the alignment; its ``results`` hold what is done.
+
+    Examples
+    --------
+    >>> import numpy as np, gpureg
+    >>> cloud = np.random.default_rng(1).random((2000, 3))
+    >>> map = gpureg.reconstruct([cloud, cloud + [0.5, 0, 0], cloud - [0, 2, 0]])
+    >>> map.islands, map.poses[1, :3, 3].round(2).tolist()
+    ([[0, 1, 2]], [-0.5, 0.0, 0.0])
+    """
+    options = checked(options, RegistrationOptions, "options") or RegistrationOptions()
+    options.validate()
+    context = context_of(context)
+    fragments = fragment_set(fragments)
+    rows, values = _pair_results(fragments, pairs, results, options, context, progress)
+    graph = _core.reconstruct_map(
+        len(fragments),
+        rows,
+        values,
+        options.prepare.voxel_size,
+        min_edge_confidence,
+        min_connection_confidence,
+        min_island,
+        np.asarray(drift, np.float64),
+        _odometry(odometry, fragments),
+        0,
+    )
+    refinement = _refine(graph, fragments, options, context, progress) if refine else None
+    return Map(graph, fragments, options, refinement)
+
+
+def _positions(fragments: FragmentSet, numbers: npt.NDArray[np.int64], name: str) -> Any:
+    known = np.asarray(fragments.numbers, np.int64)
+    if len(numbers) == 0:
+        return np.zeros((0, 2), np.uint32)
+    positions = np.minimum(np.searchsorted(known, numbers), len(known) - 1)
+    unknown = known[positions] != numbers
+    if unknown.any():
+        raise ValueError(f"{name}: there is no fragment {numbers[unknown][0]}")
+    return positions.astype(np.uint32)
+
+
+def _pair_results(
+    fragments: FragmentSet,
+    pairs: Any,
+    results: Any,
+    options: RegistrationOptions,
+    context: Context,
+    progress: Progress,
+) -> tuple[npt.NDArray[np.uint32], list[RegistrationResult]]:
+    if results is None:
+        chosen = fragments.choose_pairs("all" if pairs is None else pairs)
+        rows = np.ascontiguousarray(chosen[:, ::-1], np.uint32)  # the later one into the earlier
+        clouds = _prepared(fragments, range(len(fragments)), options.prepare, context, progress)
+        return rows, align_batch(clouds, rows, options=options, context=context, progress=progress)
+    if hasattr(results, "table"):  # a BatchRun
+        if pairs is not None:
+            raise TypeError("pairs: those of a BatchRun come with its results")
+        return _from_table(fragments, results.table())
+    if pairs is None:
+        raise TypeError("pairs: needed with results, one per result")
+    values = list(results)
+    for k, value in enumerate(values):
+        if not isinstance(value, RegistrationResult):
+            raise TypeError(f"results[{k}]: expected a RegistrationResult, got {value!r}")
+    entries = index_pairs(pairs, "pairs", None)
+    if len(entries) != len(values):
+        raise ValueError(f"results: {len(values)} for {len(entries)} pairs")
+    return _positions(fragments, entries.astype(np.int64), "pairs"), values
+
+
+def _from_table(
+    fragments: FragmentSet, table: Any
+) -> tuple[npt.NDArray[np.uint32], list[RegistrationResult]]:
+    columns = {
+        name: table[name].to_pylist()
+        for name in ("i", "j", "status", "score", "target_from_source", "information")
+    }
+    numbers = np.stack([columns["j"], columns["i"]], axis=1).astype(np.int64)
+    values = []
+    for status, score, pose, information in zip(
+        columns["status"],
+        columns["score"],
+        columns["target_from_source"],
+        columns["information"],
+        strict=True,
+    ):
+        values.append(
+            _core.result_of_row(
+                status == "aligned",
+                None if pose is None else np.reshape(pose, (4, 4)),
+                score,
+                None if information is None else np.reshape(information, (6, 6)),
+            )
+        )
+    return _positions(fragments, numbers, "results"), values
+
+
+def _odometry(odometry: Any, fragments: FragmentSet) -> Any:
+    if odometry is None:
+        return []
+    if isinstance(odometry, str | os.PathLike):
+        return _from_trajectory(os.fspath(odometry), fragments)
+    if hasattr(odometry, "shape"):
+        poses = np.ascontiguousarray(odometry, np.float64)
+        if poses.shape != (len(fragments), 4, 4):
+            raise ValueError(
+                f"odometry: expected shape ({len(fragments)}, 4, 4), got {poses.shape}"
+            )
+        return poses
+    out = []
+    for k, entry in enumerate(odometry):
+        if not isinstance(entry, Sequence) or len(entry) not in (3, 4):
+            raise TypeError(f"odometry[{k}]: expected (source, target, pose), got {entry!r}")
+        numbers = np.asarray([[entry[0], entry[1]]], np.int64)
+        source, target = _positions(fragments, numbers, f"odometry[{k}]")[0].tolist()
+        information = entry[3] if len(entry) == 4 else None
+        out.append((source, target, np.asarray(entry[2], np.float64), information))
+    return out
+
+
+def _from_trajectory(path: str, fragments: FragmentSet) -> Poses:
+    poses = np.full((len(fragments), 4, 4), np.nan)
+    places = {number: k for k, number in enumerate(fragments.numbers)}
+    for time, pose in zip(*_core.read_trajectory(path, "auto"), strict=True):
+        if time != int(time):
+            raise ValueError(f"odometry: {path} has the time {time}, expected a fragment's number")
+        if int(time) in places:
+            poses[places[int(time)]] = pose
+    return poses
+
+
+def _prepared(
+    fragments: FragmentSet,
+    positions: Sequence[int],
+    options: _core.PrepareOptions,
+    context: Context,
+    progress: Progress,
+    seen: list[bool] | None = None,
+) -> list[_core.PreparedCloud]:
+    """seen: gets whether the viewpoints of each cloud are known; then without features."""
+    out: list[_core.PreparedCloud] = []
+    device = context.backend == "cuda" and seen is None
+    with batch_progress(progress, "preparing", len(positions), unit="cloud") as report:
+        for piece in pieces(len(positions), context):
+            inputs = [fragments.load(positions[k], options, device) for k in piece]
+            if seen is not None:
+                seen += [cloud[3] is not None for cloud in inputs]
+                inputs = [_featureless(cloud) for cloud in inputs]
+            names = [f"fragments[{positions[k]}]" for k in piece]
+            out += _core.prepare_batch(context, inputs, options, names)
+            if report is not None:
+                report(len(out))
+    return out
+
+
+def _featureless(cloud: CoreCloud) -> CoreCloud:
+    """A constant takes the place of features that nobody needs."""
+    points, normals, _, viewpoints, origin, stream = cloud
+    return (points, normals, np.zeros((len(points), 1), np.float32), viewpoints, origin, stream)
+
+
+def _refine(
+    graph: MapGraph,
+    fragments: FragmentSet,
+    options: RegistrationOptions,
+    context: Context,
+    progress: Progress,
+) -> dict[str, Any]:
+    placed = [k for k, scan in enumerate(graph.scans) if scan[0]]
+    clouds: list[_core.PreparedCloud | None] = [None] * len(fragments)
+    seen = [False] * len(fragments)
+    known: list[bool] = []
+    finer = _core.surface_options(options.prepare)
+    surfaces = _prepared(fragments, placed, finer, context, progress, known)
+    for k, cloud, flag in zip(placed, surfaces, known, strict=True):
+        clouds[k], seen[k] = cloud, flag
+    with batch_progress(progress, "refining", _core.REFINE_ITERATIONS, unit="step") as report:
+        tell = None if report is None else report
+        return _core.refine_map(graph, clouds, seen, options.prepare.voxel_size, 0, tell)
+
+
+__all__ = ["reconstruct"]

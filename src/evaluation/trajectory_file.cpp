@@ -1,0 +1,106 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <sstream>
+
+#include "evaluation/rigid.hpp"
+#include "files/text_file.hpp"
+#include "gpureg/error.hpp"
+#include "gpureg/trajectory.hpp"
+
+namespace gpureg::evaluation {
+namespace {
+
+constexpr std::size_t kTumFields = 8, kKittiFields = 12, kBlockFields = 1;
+/// Files carry six digits, which leaves 1e-6; the bound only detects columns that are no
+/// quaternion.
+constexpr double kNormTolerance = 1e-3;
+
+void expect_fields(const files::TextFile& file, std::size_t fields, const char* what) {
+  if (file.fields().size() != fields)
+    file.fail("the line has " + std::to_string(file.fields().size()) + " fields, expected " + what);
+}
+
+TrajectoryFormat format_of(const files::TextFile& file) {
+  switch (file.fields().size()) {
+    case kTumFields:
+      return TrajectoryFormat::tum;
+    case kKittiFields:
+      return TrajectoryFormat::kitti;
+    case kBlockFields:
+      return TrajectoryFormat::blocks;
+    default:
+      expect_fields(file, kTumFields,
+                    "8 (TUM: time tx ty tz qx qy qz qw), 12 (KITTI: rows of a pose) or 1 (number "
+                    "of a 4 x 4 block)");
+      return TrajectoryFormat::automatic;
+  }
+}
+
+StampedPose tum_pose(const files::TextFile& file) {
+  expect_fields(file, kTumFields, "8: time tx ty tz qx qy qz qw");
+  StampedPose pose;
+  pose.time = file.number(0, "time");
+  const Eigen::Quaterniond q(file.number(7, "qw"), file.number(4, "qx"), file.number(5, "qy"),
+                             file.number(6, "qz"));
+  if (std::abs(q.norm() - 1) > kNormTolerance)
+    file.fail("the quaternion has length " + std::to_string(q.norm()) + ", expected 1");
+  pose.world_from_body.topLeftCorner<3, 3>() = q.normalized().toRotationMatrix();
+  pose.world_from_body.topRightCorner<3, 1>() =
+      Eigen::Vector3d(file.number(1, "tx"), file.number(2, "ty"), file.number(3, "tz"));
+  return pose;
+}
+
+StampedPose kitti_pose(const files::TextFile& file, std::size_t place) {
+  expect_fields(file, kKittiFields, "12: the first three rows of a pose");
+  StampedPose pose;
+  pose.time = static_cast<double>(place);
+  for (int k = 0; k < 12; ++k)
+    pose.world_from_body(k / 4, k % 4) = file.number(static_cast<std::size_t>(k), "pose");
+  check_rigid(file, pose.world_from_body);
+  return pose;
+}
+
+StampedPose block_pose(files::TextFile& file) {
+  expect_fields(file, kBlockFields, "1: the number of a 4 x 4 block");
+  StampedPose pose;
+  pose.time = file.number(0, "number");
+  for (int row = 0; row < 4; ++row) {
+    if (!file.next()) file.fail("the file ends within a 4 x 4 block");
+    expect_fields(file, 4, "4: a row of a pose");
+    for (int column = 0; column < 4; ++column)
+      pose.world_from_body(row, column) = file.number(static_cast<std::size_t>(column), "pose");
+  }
+  check_rigid(file, pose.world_from_body);
+  return pose;
+}
+
+}  // namespace
+
+Trajectory read_trajectory(const std::string& path, TrajectoryFormat format) {
+  Trajectory poses;
+  files::TextFile file(path, '#');
+  while (file.next()) {
+    if (format == TrajectoryFormat::automatic) format = format_of(file);
+    if (format == TrajectoryFormat::tum)
+      poses.push_back(tum_pose(file));
+    else if (format == TrajectoryFormat::kitti)
+      poses.push_back(kitti_pose(file, poses.size()));
+    else
+      poses.push_back(block_pose(file));
+  }
+  if (poses.empty()) throw IoError(path + ": holds no pose");
+  std::stable_sort(poses.begin(), poses.end(),
+                   [](const StampedPose& a, const StampedPose& b) { return a.time < b.time; });
+  for (std::size_t k = 1; k < poses.size(); ++k)
+    if (poses[k].time == poses[k - 1].time) {
+      std::ostringstream time;
+      time.precision(17);
+      time << poses[k].time;
+      throw IoError(path + ": the time " + time.str() + " is there twice");
+    }
+  return poses;
+}
+
+}  // namespace gpureg::evaluation

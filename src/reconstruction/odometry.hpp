@@ -1,0 +1,19 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <vector>
+
+#include "gpureg/reconstruction.hpp"
+
+namespace gpureg::reconstruction {
+
+/// Odometry with the information that drift leaves where none is given.
+/// @throws InvalidArgument naming the entry: an index out of range, a scan with itself, a pose that
+///   is not rigid, a matrix that is no information, a confidence out of range.
+std::vector<Odometry> checked_odometry(std::size_t scans, std::vector<Odometry> odometry,
+                                       const pose_graph::DriftOptions& drift);
+
+/// Nodes are indices of scans.
+pose_graph::Edge edge_of(const Odometry& odometry);
+
+}  // namespace gpureg::reconstruction

@@ -1,0 +1,185 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "sequence.hpp"
+
+#include <gtest/gtest.h>
+#include <gpureg/error.hpp>
+
+#include <filesystem>
+#include <fstream>
+#include <opencv2/imgcodecs.hpp>
+
+#include "support/temporary_folder.hpp"
+
+namespace slam_demo {
+namespace {
+
+namespace fs = std::filesystem;
+using gpureg::test::TemporaryFolder;
+
+void write(const fs::path& path, const std::string& text) {
+  fs::create_directories(path.parent_path());
+  std::ofstream(path) << text;
+}
+
+/// A grey image and a wall at depth `value`.
+void write_images(const fs::path& colour, const fs::path& depth, int value) {
+  fs::create_directories(colour.parent_path());
+  fs::create_directories(depth.parent_path());
+  cv::imwrite(colour.string(), cv::Mat3b(48, 64, cv::Vec3b(10, 20, 30)));
+  cv::imwrite(depth.string(), cv::Mat1w(48, 64, static_cast<std::uint16_t>(value)));
+}
+
+std::string message_of(const std::string& folder) {
+  try {
+    open_sequence(folder);
+  } catch (const gpureg::IoError& error) {
+    return error.what();
+  }
+  return "";
+}
+
+TEST(Sequence, TumWithAssociations) {
+  const TemporaryFolder folder;
+  write_images(folder / "rgb/1.png", folder / "depth/1.png", 10000);
+  write(folder / "associations.txt",
+        "# time rgb time depth\n1.0 rgb/1.png 1.01 depth/1.png\n2.0 rgb/2.png 2.0 depth/2.png\n");
+  write(folder / "groundtruth.txt", "# comment\n1.0 1 2 3 0 0 0 1\n");
+  const Sequence sequence = open_sequence(folder.path());
+  EXPECT_EQ(sequence.layout, "TUM");
+  ASSERT_EQ(sequence.frames.size(), 2u);
+  EXPECT_EQ(sequence.frames[0].time, 1.0);
+  ASSERT_EQ(sequence.truth.size(), 1u);
+  EXPECT_EQ(sequence.truth[0].world_from_camera.translation(), Eigen::Vector3d(1, 2, 3));
+  const Images first = load(sequence.frames[0], sequence.rig);
+  EXPECT_EQ(first.problem, "");
+  EXPECT_FLOAT_EQ(first.depth(20, 30), 2.0f) << "10000 / 5000";
+  EXPECT_EQ(first.grey.size(), cv::Size(64, 48));
+  EXPECT_NE(load(sequence.frames[1], sequence.rig).problem.find("2.png"), std::string::npos);
+}
+
+TEST(Sequence, IclNamesTheDepthFirst) {
+  const TemporaryFolder folder;
+  write(folder / "associations.txt", "1 depth/1.png 1 rgb/1.png\n");
+  write(folder / "living.gt.freiburg", "1 0 0 5 0 0 0 1\n");
+  const Sequence sequence = open_sequence(folder.path());
+  EXPECT_NE(sequence.frames.front().colour.find("rgb/1.png"), std::string::npos);
+  EXPECT_NE(sequence.frames.front().depth.find("depth/1.png"), std::string::npos);
+  EXPECT_EQ(sequence.truth.size(), 1u);
+}
+
+TEST(Sequence, TumWithTwoListsPairsByTime) {
+  const TemporaryFolder folder;
+  write(folder / "rgb.txt", "1.00 rgb/a.png\n1.50 rgb/b.png\n2.00 rgb/c.png\n");
+  write(folder / "depth.txt", "2.015 depth/c.png\n0.99 depth/a.png\n1.40 depth/x.png\n");
+  const Sequence sequence = open_sequence(folder.path());
+  ASSERT_EQ(sequence.frames.size(), 2u) << "nothing within 20 ms of 1.50";
+  EXPECT_NE(sequence.frames[0].depth.find("a.png"), std::string::npos);
+  EXPECT_NE(sequence.frames[1].depth.find("c.png"), std::string::npos);
+}
+
+TEST(Sequence, TimesOutOfOrderAreLeftOut) {
+  const TemporaryFolder folder;
+  write(folder / "associations.txt",
+        "1 rgb/1.png 1 depth/1.png\n3 rgb/3.png 3 depth/3.png\n2 rgb/2.png 2 depth/2.png\n"
+        "3 rgb/3.png 3 depth/3.png\n4 rgb/4.png 4 depth/4.png\n");
+  const Sequence sequence = open_sequence(folder.path());
+  EXPECT_EQ(sequence.frames.size(), 3u);
+  EXPECT_EQ(sequence.out_of_order, 2u);
+}
+
+TEST(Sequence, Redwood) {
+  const TemporaryFolder folder;
+  write_images(folder / "color/00001.jpg", folder / "depth/00001.png", 1500);
+  write_images(folder / "color/00000.jpg", folder / "depth/00000.png", 1500);
+  write_images(folder / "color/00007.jpg", folder / "elsewhere/7.png", 1);
+  write(folder / "trajectory.log", "0 0 1\n1 0 0 4\n0 1 0 5\n0 0 1 6\n0 0 0 1\n");
+  const Sequence sequence = open_sequence(folder.path());
+  EXPECT_EQ(sequence.layout, "Redwood");
+  ASSERT_EQ(sequence.frames.size(), 2u) << "7 has no depth";
+  EXPECT_NEAR(sequence.frames[1].time, 1 / 30.0, 1e-12);
+  EXPECT_FLOAT_EQ(load(sequence.frames[0], sequence.rig).depth(5, 5), 1.5f);
+  ASSERT_EQ(sequence.truth.size(), 1u);
+  EXPECT_EQ(sequence.truth[0].world_from_camera.translation(), Eigen::Vector3d(4, 5, 6));
+}
+
+TEST(Sequence, SevenScenesPutsDepthIntoTheColourCamera) {
+  const TemporaryFolder folder;
+  write_images(folder / "frame-000003.color.png", folder / "frame-000003.depth.png", 1000);
+  write(folder / "frame-000003.pose.txt", "1 0 0 1\n0 1 0 0\n0 0 1 0\n0 0 0 1\n");
+  write(folder / "camera-intrinsics.txt", "60 0 32\n0 60 24\n0 0 1\n");
+  Sequence sequence = open_sequence(folder.path());
+  EXPECT_EQ(sequence.layout, "7-Scenes");
+  EXPECT_FALSE(sequence.rig.registered);
+  EXPECT_EQ(sequence.rig.depth.fx, 60);
+  ASSERT_EQ(sequence.truth.size(), 1u);
+
+  // One depth pixel in front of a known colour pixel: 32 + (45 - 32) / 60 m right of the axis,
+  // 10 cm to the left by the baseline, times 30 px.
+  cv::Mat1w raw(48, 64, static_cast<std::uint16_t>(0));
+  raw(24, 45) = 1000;
+  sequence.rig.colour = {30, 30, 32, 24};
+  sequence.rig.colour_from_depth.translation() = Eigen::Vector3d(-0.1, 0, 0);
+  const cv::Mat1f depth = depth_in_colour(raw, sequence.rig);
+  const double u = 32 + 30 * (13 / 60.0 - 0.1);  // 35.5
+  for (int y = 0; y < 48; ++y) {
+    for (int x = 0; x < 64; ++x) {
+      const bool hit =
+          (y == 24 || y == 25) && (x == static_cast<int>(u) || x == static_cast<int>(u) + 1);
+      ASSERT_FLOAT_EQ(depth(y, x), hit ? 1.0f : 0.0f) << x << " " << y;
+    }
+  }
+}
+
+TEST(Sequence, NearSurfacesHideFarOnes) {
+  Rig rig;
+  rig.registered = false;
+  rig.depth_units = 1000;
+  rig.colour = rig.depth = {60, 60, 32, 24};
+  cv::Mat1w raw(48, 64, static_cast<std::uint16_t>(2000));
+  raw(10, 11) = 1000;
+  const cv::Mat1f depth = depth_in_colour(raw, rig);
+  EXPECT_FLOAT_EQ(depth(10, 11), 1.0f);
+  EXPECT_FLOAT_EQ(depth(30, 30), 2.0f);
+}
+
+TEST(Sequence, DepthsOutOfRangeAndMarksAreDropped) {
+  Rig rig;
+  rig.depth_units = 1000;
+  cv::Mat1w raw(1, 4);
+  raw << 0, 65535, 200, 3000;
+  const cv::Mat1f depth = depth_in_colour(raw, rig);
+  EXPECT_EQ(depth(0, 0), 0);
+  EXPECT_EQ(depth(0, 1), 0);
+  EXPECT_EQ(depth(0, 2), 0) << "nearer than 0.3 m";
+  EXPECT_FLOAT_EQ(depth(0, 3), 3);
+}
+
+TEST(Sequence, DamagedFilesAreNamed) {
+  const TemporaryFolder folder;
+  write_images(folder / "rgb/1.png", folder / "depth/1.png", 5000);
+  fs::resize_file(folder / "depth/1.png", fs::file_size(folder / "depth/1.png") / 2);
+  const FrameFiles files{1, folder / "rgb/1.png", folder / "depth/1.png"};
+  const Images images = load(files, Rig{});
+  EXPECT_NE(images.problem.find("depth/1.png"), std::string::npos);
+  EXPECT_TRUE(images.grey.empty()) << "a frame without depth is no frame";
+  cv::imwrite(folder / "depth/1.png", cv::Mat1b(48, 64, std::uint8_t{9}));
+  EXPECT_NE(load(files, Rig{}).problem.find("16 bit"), std::string::npos);
+  cv::imwrite(folder / "depth/1.png", cv::Mat1w(40, 64, std::uint16_t{900}));
+  EXPECT_NE(load(files, Rig{}).problem.find("size"), std::string::npos);
+}
+
+TEST(Sequence, ErrorsNameTheFile) {
+  const TemporaryFolder folder;
+  EXPECT_NE(message_of(folder / "nowhere").find("nowhere"), std::string::npos);
+  EXPECT_NE(message_of(folder.path()).find("no frames"), std::string::npos);
+  write(folder / "associations.txt", "1 rgb/1.png 1\n");
+  EXPECT_NE(message_of(folder.path()).find("associations.txt:1"), std::string::npos);
+  write(folder / "associations.txt", "one rgb/1.png 1 depth/1.png\n");
+  EXPECT_NE(message_of(folder.path()).find("'one'"), std::string::npos);
+  write(folder / "associations.txt", "1 rgb/1.png 1 depth/1.png\n");
+  write(folder / "groundtruth.txt", "1 2 3\n");
+  EXPECT_NE(message_of(folder.path()).find("groundtruth.txt:1"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace slam_demo
