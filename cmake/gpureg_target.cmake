@@ -18,6 +18,9 @@ function(gpureg_target target)
   target_compile_definitions(${target} PRIVATE ${GPUREG_EIGEN_DEFINITIONS})
   target_compile_options(${target} PRIVATE
     $<$<COMPILE_LANGUAGE:CXX>:-ffp-contract=off -fno-fast-math -Wall -Wextra -Wpedantic -Wshadow -Wno-psabi>
+    # Branches cost more than the comparisons: & of conditions is meant.
+    $<$<COMPILE_LANG_AND_ID:CXX,Clang,AppleClang>:-Wno-unknown-warning-option -Wno-bitwise-instead-of-logical
+      -Wno-bitwise-conditional-parentheses>
     $<$<COMPILE_LANGUAGE:CUDA>:-fmad=false -prec-div=true -prec-sqrt=true -ftz=false --expt-relaxed-constexpr
       -Xcompiler=-ffp-contract=off,-Wall,-Wextra,-Wno-dangling-else>)
   if(GPUREG_WERROR)

@@ -153,6 +153,20 @@ std::vector<std::shared_ptr<PreparedState>> CudaEngine::prepare_adopted(
   return prepare_on_stream(span_of(raw), options);
 }
 
+std::vector<float> CudaEngine::copy_points(const AdoptedCloud& cloud) {
+  const DeviceScope scope(device());
+  const Adopted& adopted = static_cast<const Adopted&>(cloud);
+  std::vector<float> rows(3 * adopted.raw.size);
+  if (rows.empty()) return rows;
+  adopted.wait();
+  const std::lock_guard<std::mutex> lock(mutex_);
+  check(cudaMemcpyAsync(rows.data(), adopted.raw.points, rows.size() * sizeof(float),
+                        cudaMemcpyDeviceToHost, exec_.stream()),
+        "cudaMemcpyAsync");
+  check(cudaStreamSynchronize(exec_.stream()), "cudaStreamSynchronize");
+  return rows;
+}
+
 int device_of(const AdoptedCloud& cloud) { return static_cast<const Adopted&>(cloud).device(); }
 
 }  // namespace gpureg::cuda

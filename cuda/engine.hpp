@@ -25,6 +25,7 @@ class CudaEngine final : public DeviceEngine {
   std::shared_ptr<AdoptedCloud> adopt(const RawCloud& cloud, const RowStreams& streams) override;
   std::vector<std::shared_ptr<PreparedState>> prepare_adopted(
       Span<const std::shared_ptr<AdoptedCloud>> clouds, const PrepareOptions& options) override;
+  std::vector<float> copy_points(const AdoptedCloud& cloud) override;
   void align(Span<const PairInput> pairs, const RegistrationOptions& options,
              Span<PairOutcome> outcomes) override;
   void verify(Span<const PairInput> pairs, const std::vector<PosesOfPair>& poses,

@@ -62,6 +62,9 @@ class EngineOfMany final : public DeviceEngine {
   std::shared_ptr<AdoptedCloud> adopt(const RawCloud& cloud, const RowStreams& streams) override {
     return on(device_of(cloud.points)).adopt(cloud, streams);
   }
+  std::vector<float> copy_points(const AdoptedCloud& cloud) override {
+    return engines_[index_of(device_of(cloud))]->copy_points(cloud);
+  }
   // Each device prepares the clouds that it holds.
   std::vector<std::shared_ptr<PreparedState>> prepare_adopted(
       Span<const std::shared_ptr<AdoptedCloud>> clouds, const PrepareOptions& options) override {

@@ -34,7 +34,8 @@ install_packages() {
 # What the library, its io component and the command are built with.
 build_packages=(build-essential cmake ninja-build libeigen3-dev libembree-dev libcli11-dev nlohmann-json3-dev libpng-dev libassimp-dev)
 # What the tests and benchmarks need besides; PCL and FLANN are oracles, valgrind counts instructions.
-test_packages=(libgtest-dev libbenchmark-dev libpcl-dev libflann-dev liblz4-dev ccache python3 valgrind assimp-utils)
+# libopencv-dev and libceres-dev are what slam_demo needs.
+test_packages=(libopencv-dev libceres-dev libgtest-dev libbenchmark-dev libpcl-dev libflann-dev liblz4-dev ccache python3 valgrind assimp-utils)
 
 # Configure arguments that make rebuilds cheap where ccache is installed.
 launcher_arguments() {

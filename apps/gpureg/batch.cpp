@@ -15,6 +15,7 @@
 #include "interrupt.hpp"
 #include "journal.hpp"
 #include "json_file.hpp"
+#include "knowledge_options.hpp"
 #include "method_options.hpp"
 #include "options_json.hpp"
 #include "output_path.hpp"
@@ -30,6 +31,8 @@ namespace {
 struct BatchOptions {
   std::string folder, pairs = "all";
   MethodOptions method;
+  ViewpointChoice viewpoint;  // of clouds without cameras: auto or none
+  std::string up;
   std::string log, info, json;
   bool resume = false, restart = false, quiet = false;
 
@@ -65,7 +68,8 @@ class Batch {
       throw InvalidArgument("--resume needs a file for -o, but " + o_.log + " is none");
     if (can_have_journal(o_.log)) Journal::check(o_.journal(), o_.journal_mode());
     const InterruptGuard guard;
-    scene_ = prepare_scene(context_, o_.folder, options_.prepare, o_.quiet);
+    scene_ =
+        prepare_scene(context_, o_.folder, options_.prepare, o_.quiet, o_.viewpoint.text != "none");
     if (scene_.interrupted) {
       std::cerr << "gpureg: interrupted before the first pair, nothing written" << std::endl;
       return kInterrupted;
@@ -77,7 +81,8 @@ class Batch {
                                               : o_.pairs + " lists no pair");
     std::optional<std::string> journal;
     if (can_have_journal(o_.log)) journal = o_.journal();
-    run_.emplace(scene_, std::move(pairs), options_, journal, o_.journal_mode(), o_.quiet);
+    run_.emplace(scene_, std::move(pairs), options_, up_prior(o_.up), journal, o_.journal_mode(),
+                 o_.quiet);
     keep_outputs();
     run_->align(context_);
     if (!run_->complete() && run_->journal() && kept_.empty()) run_->journal()->note_outputs();
@@ -185,6 +190,14 @@ void add_batch(CLI::App& app, Action& chosen) {
   verb->add_option("--pairs", o->pairs, "all, or a file with one pair `i j` a line")
       ->capture_default_str();
   o->method.add_to(*verb);
+  verb->add_option("--viewpoint", o->viewpoint.text,
+                   "Of fragments without a camera. auto: the file, or the origin if the surfaces "
+                   "agree with it; none: not known")
+      ->check(CLI::IsMember({"auto", "none"}))
+      ->capture_default_str();
+  verb->add_option("--up", o->up,
+                   "Vertical direction x,y,z in all fragments, and perhaps how many degrees it may "
+                   "be off (without: 10): 0,0,1,5");
   verb->add_option("-o,--output", o->log, "Redwood log of the aligned pairs: T_ij, j into i")
       ->required();
   verb->add_option("--info", o->info, "Redwood information matrices of the same pairs");
@@ -197,6 +210,7 @@ void add_batch(CLI::App& app, Action& chosen) {
   verb->callback([o, &chosen] {
     chosen = [o] {
       o->method.registration();  // reports bad options before the clouds are read
+      up_prior(o->up);
       check_outputs(*o);
       choose_voxel_size(o->method, o->folder);
       return Batch(*o).run();

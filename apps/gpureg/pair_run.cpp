@@ -16,18 +16,25 @@ namespace gpureg::cli {
 namespace {
 
 // Backend and threads may change between runs: they do not change results.
-Json header_of(const RegistrationOptions& options, const Scene& scene, const Pairs& pairs) {
+Json header_of(const RegistrationOptions& options, const std::optional<GravityPrior>& gravity,
+               const Scene& scene, const Pairs& pairs) {
   std::uint64_t hash = pairs.size();
   for (const auto& [i, j] : pairs)
     hash = (hash ^ (static_cast<std::uint64_t>(i) << 32 | j)) * 0x9E3779B97F4A7C15ull;
   Json fragments = Json::array();
   for (std::size_t k = 0; k < scene.numbers.size(); ++k)
-    fragments.push_back({{"number", scene.numbers[k]}, {"hash", scene.hashes[k]}});
-  return {{"gpureg_journal", 1},
-          {"version", GPUREG_VERSION},
-          {"options", to_json(options)},
-          {"pairs", {{"count", pairs.size()}, {"hash", hash}}},
-          {"fragments", fragments}};
+    fragments.push_back({{"number", scene.numbers[k]},
+                         {"hash", scene.hashes[k]},
+                         {"viewpoint", to_string(scene.clouds[k].statistics().viewpoint)}});
+  Json header = {{"gpureg_journal", 1},
+                 {"version", GPUREG_VERSION},
+                 {"options", to_json(options)},
+                 {"pairs", {{"count", pairs.size()}, {"hash", hash}}},
+                 {"fragments", fragments}};
+  if (gravity)
+    header["up"] = {gravity->target_up.x(), gravity->target_up.y(), gravity->target_up.z(),
+                    gravity->max_angle};
+  return header;
 }
 
 }  // namespace
@@ -46,11 +53,12 @@ void choose_voxel_size(MethodOptions& method, const std::string& folder) {
 }
 
 PairRun::PairRun(const Scene& scene, Pairs pairs, const RegistrationOptions& options,
+                 const std::optional<GravityPrior>& gravity,
                  const std::optional<std::string>& journal, Journal::Mode mode, bool quiet)
-    : scene_(scene), pairs_(std::move(pairs)), options_(options), quiet_(quiet) {
+    : scene_(scene), pairs_(std::move(pairs)), options_(options), gravity_(gravity), quiet_(quiet) {
   if (!journal) return;
   const bool found = std::filesystem::exists(*journal);
-  journal_.emplace(*journal, header_of(options, scene, pairs_), mode);
+  journal_.emplace(*journal, header_of(options, gravity, scene, pairs_), mode);
   done_ = journal_->entries();
   resumed_ = done_.size();
   if (mode != Journal::Mode::resume || quiet) return;
@@ -80,7 +88,9 @@ void PairRun::align(const Context& context) {
     if (journal_) journal_->flush();
     return InterruptGuard::requested();
   };
-  align_batch(context, scene_.clouds, left, options_, callbacks);
+  std::vector<RegistrationPrior> priors;
+  if (gravity_) priors.assign(left.size(), RegistrationPrior{gravity_, std::nullopt});
+  align_batch(context, scene_.clouds, left, priors, options_, callbacks);
   if (journal_) journal_->flush();
   seconds_ = progress.seconds();
 }

@@ -9,6 +9,7 @@
 
 #include "gpureg/context.hpp"
 #include "gpureg/options.hpp"
+#include "gpureg/prior.hpp"
 #include "journal.hpp"
 #include "method_options.hpp"
 #include "scene.hpp"
@@ -25,9 +26,11 @@ void choose_voxel_size(MethodOptions& method, const std::string& folder);
 /// Aligns the pairs of a scene, with a journal from which an interrupted run goes on.
 class PairRun {
  public:
-  /// Opens the journal; without one, nothing can be resumed. Throws IoError.
+  /// gravity: a prior for all pairs. Opens the journal; without one, nothing can be resumed. Throws
+  /// IoError.
   PairRun(const Scene& scene, Pairs pairs, const RegistrationOptions& options,
-          const std::optional<std::string>& journal, Journal::Mode mode, bool quiet);
+          const std::optional<GravityPrior>& gravity, const std::optional<std::string>& journal,
+          Journal::Mode mode, bool quiet);
 
   /// Aligns what is left, until it is done or interrupted.
   void align(const Context& context);
@@ -45,6 +48,7 @@ class PairRun {
   const Scene& scene_;
   Pairs pairs_;
   const RegistrationOptions& options_;
+  std::optional<GravityPrior> gravity_;
   std::optional<Journal> journal_;
   bool quiet_;
   Journal::Entries done_;

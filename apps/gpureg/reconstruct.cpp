@@ -133,8 +133,8 @@ class Reconstruct {
     if (pairs.empty())
       throw InvalidArgument(o_.pairs == "all" ? o_.folder + " holds one fragment; a map needs two"
                                               : o_.pairs + " lists no pair");
-    pairs_.emplace(scene, std::move(pairs), run_.options, o_.journal(), o_.journal_mode(),
-                   o_.quiet);
+    pairs_.emplace(scene, std::move(pairs), run_.options, std::nullopt, o_.journal(),
+                   o_.journal_mode(), o_.quiet);
     pairs_->align(context_);
     if (!pairs_->complete()) return false;
     for (const auto& [i, j] : pairs_->pairs()) {

@@ -16,6 +16,8 @@
 #include "image.hpp"
 #include "initial_poses.hpp"
 #include "json_file.hpp"
+#include "knowledge_options.hpp"
+#include "mesh.hpp"
 #include "method_options.hpp"
 #include "options_json.hpp"
 #include "output_path.hpp"
@@ -34,6 +36,8 @@ struct RegisterOptions {
   std::string json, overlay, image;
   std::string initial;  // file of poses that are verified instead of a search
   bool refine_initial = false, ignore_alternatives = false;
+  ViewpointChoice source_viewpoint, target_viewpoint;
+  std::string up;
 };
 
 std::string describe(const PrepareStatistics& s) {
@@ -42,7 +46,10 @@ std::string describe(const PrepareStatistics& s) {
   text += ", " + grouped(s.points) + " prepared";
   if (s.points_without_feature > 0)
     text += " (" + grouped(s.points_without_feature) + " without a feature)";
-  return text;
+  return text + "; viewpoint " + to_string(s.viewpoint) +
+         (s.repaired_normals > 0 ? ", " + grouped(s.repaired_normals) +
+                                       " normals contradicted their neighbours and were flipped"
+                                 : "");
 }
 
 std::string describe(const Eigen::Matrix4d& pose) {
@@ -142,12 +149,38 @@ RegistrationResult verify(const RegisterOptions& o, const Context& context,
   return result;
 }
 
+PointCloud sampled(const std::string& path, double spacing) {
+  const SurfaceMesh mesh = read_mesh(path);
+  PointCloud cloud = sample_mesh(mesh, spacing);
+  const std::string notes = notes_of(mesh);
+  std::cerr << "gpureg: note: " << path << ": " << grouped(mesh.faces.size())
+            << " faces were sampled by " << grouped(cloud.points.size()) << " points"
+            << (mesh.closed() ? ", normals outwards" : "; the surface is not closed")
+            << (notes.empty() ? "" : "; " + notes) << std::endl;
+  return cloud;
+}
+
+/// Both clouds. A mesh is sampled at the spacing of the other cloud.
+std::pair<PointCloud, PointCloud> read_clouds(const RegisterOptions& o) {
+  const bool source = is_mesh(o.source), target = is_mesh(o.target);
+  std::pair<PointCloud, PointCloud> clouds;
+  if (!source) clouds.first = io::read_point_cloud(o.source);
+  if (!target) clouds.second = io::read_point_cloud(o.target);
+  const auto spacing = [](const PointCloud& other) {
+    return median_spacing(finite_points(other.points), 1);
+  };
+  if (source) clouds.first = sampled(o.source, target ? 0 : spacing(clouds.second));
+  if (target) clouds.second = sampled(o.target, source ? 0 : spacing(clouds.first));
+  return clouds;
+}
+
 void check_initial(const RegisterOptions& o) {
   if (o.initial.empty()) {
     if (o.refine_initial || o.ignore_alternatives)
       throw InvalidArgument("--refine-initial and --ignore-alternatives need --initial");
     return;
   }
+  if (!o.up.empty()) throw InvalidArgument("--initial verifies given poses, --up is for a search");
   if (o.time_budget)
     throw InvalidArgument("--initial verifies given poses, --time-budget is for a search");
   if (o.method.registration().method != RegistrationMethod::compatibility)
@@ -160,12 +193,19 @@ int run(RegisterOptions o) {
   o.method.registration();  // what is wrong with it shall be said before clouds are read
   if (o.time_budget && o.method.given("--quality"))
     throw InvalidArgument("--time-budget chooses the quality, give it or --quality");
+  o.source_viewpoint.check("--source-viewpoint");
+  o.target_viewpoint.check("--target-viewpoint");
+  RegistrationPrior prior;
+  prior.gravity = up_prior(o.up);
+  if (o.time_budget && !prior.empty())
+    throw InvalidArgument("--up and --time-budget do not go together");
   std::vector<NamedPath> inputs{{"SOURCE", o.source}, {"TARGET", o.target}};
   if (!o.initial.empty()) inputs.push_back({"--initial", o.initial});
   check_outputs({{"--json", o.json}, {"--overlay", o.overlay}, {"--image", o.image}}, inputs);
   const Context context = o.method.context();
-  const PointCloud source_cloud = io::read_point_cloud(o.source);
-  const PointCloud target_cloud = io::read_point_cloud(o.target);
+  auto [source_cloud, target_cloud] = read_clouds(o);
+  o.source_viewpoint.apply(source_cloud);
+  o.target_viewpoint.apply(target_cloud);
   o.method.choose_voxel_size({source_cloud.view(), target_cloud.view()},
                              o.source + " and " + o.target);
   const RegistrationOptions options = o.method.registration();
@@ -177,16 +217,24 @@ int run(RegisterOptions o) {
     viewpoints.see(target_cloud, o.target);
   }
   viewpoints.print();
-  const auto prepared = [&](const PointCloud& cloud, const std::string& file) {
-    return prepare_batch(context, {cloud.view()}, options.prepare, {file}).front();
+  const auto prepared = [&](const PointCloudView& cloud, const std::string& file) {
+    return prepare_batch(context, {cloud}, options.prepare, {file}).front();
   };
-  const PreparedCloud source = prepared(source_cloud, o.source);
-  const PreparedCloud target = prepared(target_cloud, o.target);
+  const PreparedCloud source = prepared(o.source_viewpoint.view(source_cloud), o.source);
+  const PreparedCloud target = prepared(o.target_viewpoint.view(target_cloud), o.target);
+  // Below, features describe hardly anything.
+  constexpr std::size_t kFewPoints = 1000;
+  const std::size_t fewest = std::min(source.size(), target.size());
+  if (o.method.automatic_voxel_size && fewest < kFewPoints)
+    std::cerr << "gpureg: note: --voxel-size auto leaves " << fewest << " points of "
+              << (source.size() == fewest ? o.source : o.target)
+              << "; too few for a reliable result, give a smaller size if the cloud has more"
+              << std::endl;
   TimedResult timed;
   if (o.time_budget)
     timed = align_within(context, source, target, *o.time_budget, options);
   else
-    timed.result = o.initial.empty() ? align(context, source, target, options)
+    timed.result = o.initial.empty() ? align(context, source, target, prior, options)
                                      : verify(o, context, source, target, options);
   const RegistrationResult& result = timed.result;
   if (o.initial.empty())
@@ -226,7 +274,8 @@ int run(RegisterOptions o) {
 
 void add_register(CLI::App& app, Action& chosen) {
   const auto o = std::make_shared<RegisterOptions>();
-  CLI::App* verb = app.add_subcommand("register", "Align two clouds (PLY or PCD)");
+  CLI::App* verb = app.add_subcommand(
+      "register", "Align two clouds (PLY, PCD, KITTI .bin) or meshes (STL, OBJ, PLY)");
   verb->add_option("SOURCE", o->source, "Cloud that is moved")->required();
   verb->add_option("TARGET", o->target, "Cloud that stays")->required();
   o->method.add_to(*verb);
@@ -240,6 +289,17 @@ void add_register(CLI::App& app, Action& chosen) {
   verb->add_flag("--refine-initial", o->refine_initial, "Refine these poses by ICP first");
   verb->add_flag("--ignore-alternatives", o->ignore_alternatives,
                  "Faster: do not search for other poses that compete with them");
+  verb->add_option(
+          "--source-viewpoint", o->source_viewpoint.text,
+          "Where SOURCE was seen from: x,y,z in its frame; none: not known; auto: the file, "
+          "or the origin if the surfaces agree with it")
+      ->capture_default_str();
+  verb->add_option("--target-viewpoint", o->target_viewpoint.text, "The same of TARGET")
+      ->capture_default_str();
+  verb->add_option(
+      "--up", o->up,
+      "Vertical direction x,y,z in both clouds, and perhaps how many degrees it may be "
+      "off (without: 10): 0,0,1,5");
   verb->add_option("--json", o->json, "Write options, result, counts and times");
   verb->add_option("--overlay", o->overlay, "Write both clouds in colour, aligned, as PLY");
   verb->add_option("--image", o->image, "Draw both clouds before and after, as PNG");

@@ -41,6 +41,8 @@ Json to_json(const PrepareStatistics& p) {
           {"points", p.points},
           {"points_without_normal", p.points_without_normal},
           {"points_without_feature", p.points_without_feature},
+          {"viewpoint", to_string(p.viewpoint)},
+          {"repaired_normals", p.repaired_normals},
           {"ms",
            {{"downsample", p.downsample},
             {"normals", p.normals},

@@ -80,7 +80,7 @@ std::uint64_t hash_of(const PointCloud& cloud) {
 }  // namespace
 
 Scene prepare_scene(const Context& context, const std::string& folder,
-                    const PrepareOptions& options, bool quiet) {
+                    const PrepareOptions& options, bool quiet, bool infer_viewpoint) {
   const auto fragments = io::list_fragments(folder);
   Cameras cameras;
   const std::string cameras_file = (std::filesystem::path(folder) / "cameras.txt").string();
@@ -112,7 +112,10 @@ Scene prepare_scene(const Context& context, const std::string& folder,
       scene.extent = std::max(scene.extent, extent_of(chunk.back().points));
     }
     std::vector<PointCloudView> views;
-    for (const PointCloud& cloud : chunk) views.push_back(cloud.view());
+    for (const PointCloud& cloud : chunk) {
+      views.push_back(cloud.view());
+      views.back().infer_viewpoint = infer_viewpoint || !cloud.viewpoints.empty();
+    }
     const std::vector<std::string> files(
         scene.files.end() - static_cast<std::ptrdiff_t>(chunk.size()), scene.files.end());
     for (PreparedCloud& cloud : prepare_batch(context, views, options, files))

@@ -27,9 +27,10 @@ struct Scene {
 };
 
 /// Reads and prepares all fragments, with their sensor positions from cameras.txt where that is
-/// there. Unless quiet, says where that and the fragments do not match. Throws IoError.
+/// there. Unless quiet, says where that and the fragments do not match. infer_viewpoint: of
+/// fragments without a sensor position, see PointCloudView. Throws IoError.
 Scene prepare_scene(const Context& context, const std::string& folder,
-                    const PrepareOptions& options, bool quiet);
+                    const PrepareOptions& options, bool quiet, bool infer_viewpoint = true);
 
 /// Pairs i < j as indices into numbers, in the file's order without repetitions, or all of them for
 /// "all". Unless quiet, says how many are repetitions. Throws IoError for a number that no fragment

@@ -7,7 +7,7 @@ namespace slam_demo {
 namespace {
 
 constexpr double kMaxShift = 0.15, kMaxTurn = 0.25;  // metres, radians a frame: 4.5 m/s, 430 deg/s
-constexpr double kMaxSurprise = 0.06;                // metres between the motion and the guess
+constexpr double kMaxSurprise = 0.03;                // metres between the motion and the guess
 constexpr double kMinDepths = 0.2;                   // share of the pixels
 
 /// Every second pixel: four times as fast, and as good, as the noise of neighbours is alike.

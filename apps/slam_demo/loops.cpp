@@ -14,8 +14,10 @@ std::size_t at(int index) { return static_cast<std::size_t>(index); }
 
 constexpr int kCovisible = 30;          // shared points that connect two fragments
 constexpr std::size_t kNeighbours = 6;  // keyframes on each side that look for image loops
-constexpr int kBetweenSessions = 50;    // inliers that connect two sessions without registration
-constexpr int kImageLoops = 1 << 20;    // numbers of loops between sessions begin here
+// Metres that a loop must move a keyframe for a full adjustment; the last one is made anyway.
+constexpr double kWorthBundle = 0.02;
+constexpr int kBetweenSessions = 50;  // inliers that connect two sessions without registration
+constexpr int kImageLoops = 1 << 20;  // numbers of loops between sessions begin here
 // Surfaces over many frames hold a registered pair better than LoopCloser states, which speaks of
 // single registrations with correlated points: a third of its standard deviation.
 constexpr double kDenseCertainty = 9;
@@ -83,7 +85,7 @@ void LoopClosing::add_fragment(const BuiltFragment& built) {
   fragment.cloud = cloud;
   fragment.world_from_fragment = unaligned(keyframe.world_from_camera);
   closer_.add(fragment);
-  fragments_.push_back({built.keyframe, built.time});
+  fragments_.push_back({built.keyframe, built.first_frame, built.last_frame, built.time});
   if (id > 0) {
     const Keyframe& before = map_.keyframes[at(fragments_[at(id - 1)].keyframe)];
     if (before.session == keyframe.session && fragments_[at(id - 1)].keyframe != built.keyframe)
@@ -92,11 +94,19 @@ void LoopClosing::add_fragment(const BuiltFragment& built) {
   }
   std::vector<lc::FragmentId> covisible;
   for (int other = 0; other < id; ++other) {
-    const auto shared = keyframe.covisible.find(fragments_[at(other)].keyframe);
-    if (shared != keyframe.covisible.end() && shared->second >= kCovisible)
-      covisible.push_back(other);
+    if (shares_points(built.keyframe, fragments_[at(other)])) covisible.push_back(other);
   }
   if (!covisible.empty()) closer_.set_covisible(id, covisible);
+}
+
+/// Tracking connects a keyframe with one of a fragment.
+bool LoopClosing::shares_points(int keyframe, const Fragment& fragment) const {
+  for (const auto& [other, shared] : map_.keyframes[at(keyframe)].covisible) {
+    const int frame = map_.keyframes[at(other)].frame;
+    if (shared >= kCovisible && frame >= fragment.first_frame && frame <= fragment.last_frame)
+      return true;
+  }
+  return false;
 }
 
 int LoopClosing::number_of(int source, int target) {
@@ -174,6 +184,7 @@ bool LoopClosing::process() {
     record.reason = lc::to_string(loop.reason);
     record.confidence = loop.confidence;
     record.drift_ratio = loop.drift_ratio;
+    record.target_from_source = Eigen::Isometry3d(loop.target_from_source.matrix());
     const bool accepted = loop.state == lc::LoopState::accepted;
     if (was_accepted) {  // retracted, or accepted with another pose
       map_.remove_loop(number);
@@ -190,9 +201,18 @@ bool LoopClosing::process() {
   }
   if (changed) {
     optimize();
-    if (options_.bundle) bundle_all(options_.bundle_iterations);
+    if (options_.bundle && moved_since_bundle()) bundle_all(options_.bundle_iterations);
   }
   return changed;
+}
+
+bool LoopClosing::moved_since_bundle() const {
+  for (std::size_t k = 0; k < adjusted_.size(); ++k) {
+    if ((map_.keyframes[k].world_from_camera.translation() - adjusted_[k].translation()).norm() >
+        kWorthBundle)
+      return true;
+  }
+  return adjusted_.empty();
 }
 
 void LoopClosing::bundle_all(int iterations) {
@@ -210,6 +230,8 @@ void LoopClosing::bundle_all(int iterations) {
   BundleProblem problem = bundle_of(map_, free, fixed, graph_.loop_edges());
   adjust(camera_, problem, iterations, options_.threads > 0 ? options_.threads : 2);
   apply(camera_, problem, map_);
+  adjusted_.clear();
+  for (const Keyframe& keyframe : map_.keyframes) adjusted_.push_back(keyframe.world_from_camera);
 }
 
 }  // namespace slam_demo

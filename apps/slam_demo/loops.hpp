@@ -26,6 +26,7 @@ struct LoopRecord {
   double source_time = 0, target_time = 0;  ///< seconds
   std::string state, reason;
   double confidence = 0, drift_ratio = 0;
+  Eigen::Isometry3d target_from_source = Eigen::Isometry3d::Identity();  ///< of the keyframes
   int image_loops = 0;  ///< keyframes that image loops connected as a consequence
 };
 
@@ -60,13 +61,15 @@ class LoopClosing {
 
  private:
   struct Fragment {
-    int keyframe;
+    int keyframe, first_frame, last_frame;
     double time;
   };
   void connect_image_loops(int number, const gpureg::loop_closure::Loop& loop, LoopRecord& record);
   void optimize();
+  bool moved_since_bundle() const;
   int number_of(int source, int target);
   std::vector<int> with_neighbours(int keyframe) const;
+  bool shares_points(int keyframe, const Fragment& fragment) const;
 
   const gpureg::Context context_;
   Map& map_;
@@ -79,6 +82,7 @@ class LoopClosing {
   std::vector<LoopRecord> records_;  // by number of the loop
   std::vector<ImageLoopRecord> image_records_;
   int image_loops_ = 0;
+  std::vector<Eigen::Isometry3d> adjusted_;  // poses after the last full adjustment
   Milliseconds time_;
 };
 

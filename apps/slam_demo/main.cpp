@@ -53,6 +53,7 @@ int run(const Arguments& a) {
   set_rig(a, sequence.rig);
   RunResult result;
   result.sequence = a.sequence;
+  result.rig = sequence.rig;
   result.truth = a.truth.empty() ? sequence.truth : read_tum(a.truth);
   result.out_of_order = sequence.out_of_order;
   SlamOptions options = a.slam;

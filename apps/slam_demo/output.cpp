@@ -48,6 +48,27 @@ json error_json(const AteResult& ate) {
           {"max_m", ate.max}};
 }
 
+/// How far a loop is from the truth at its keyframes; null without truth or pose.
+json loop_error(const LoopRecord& loop, const RunResult& result) {
+  if (loop.state == "rejected") return nullptr;
+  Eigen::Isometry3d world_from_camera[2];
+  int place = 0;
+  for (const double time : {loop.target_time, loop.source_time}) {
+    const auto after =
+        std::lower_bound(result.truth.begin(), result.truth.end(), time - 1e-3,
+                         [](const StampedPose& pose, double t) { return pose.time < t; });
+    if (after == result.truth.end() || after->time > time + 0.02) return nullptr;
+    world_from_camera[place] = after->world_from_camera;
+    if (result.rig.truth_of_depth)
+      world_from_camera[place] = world_from_camera[place] * result.rig.colour_from_depth.inverse();
+    ++place;
+  }
+  const Eigen::Isometry3d truth = world_from_camera[0].inverse() * world_from_camera[1],
+                          error = truth.inverse() * loop.target_from_source;
+  return {{"translation_m", error.translation().norm()},
+          {"rotation_degrees", Eigen::AngleAxisd(error.linear()).angle() * 57.29577951308232}};
+}
+
 json loops_json(const Slam& slam, const RunResult& result) {
   json loops = json::array(), image = json::array();
   for (const LoopRecord& r : slam.loops().records()) {
@@ -60,6 +81,7 @@ json loops_json(const Slam& slam, const RunResult& result) {
                      {"state", r.state},
                      {"reason", r.reason},
                      {"confidence", r.confidence},
+                     {"error", loop_error(r, result)},
                      {"image_loops", r.image_loops}});
     loops.back()["drift_ratio"] =
         std::isfinite(r.drift_ratio) ? json(r.drift_ratio) : json(nullptr);

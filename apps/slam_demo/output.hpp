@@ -25,6 +25,7 @@ struct RunResult {
   std::size_t frames = 0, frames_done = 0;  ///< of the sequence; processed
   double seconds = 0, load_milliseconds = 0;
   std::size_t problems = 0, out_of_order = 0;  ///< frames with damaged files; frames left out
+  Rig rig;
   Trajectory truth;
   AteResult odometry, final;  ///< without poses where there is no truth
   SurfaceError surface;       ///< without points where there is no true surface

@@ -16,7 +16,10 @@ constexpr int kFewInliers = 150, kManyFresh = 100;  // a new keyframe makes the 
 constexpr int kWellLinked = 60;  // shared points that hold two keyframes together
 // Noise of the pose of a keyframe with few points, relative to its reference.
 constexpr double kLinkMetres = 0.01, kLinkRadians = 0.005;
-constexpr int kMinRelocalised = 40;  // inliers that prove a place without a prediction
+// What the motion may differ from that of the last frame, for each frame in between.
+constexpr double kFrameRate = 30, kSurpriseMetres = 0.03, kSurpriseRadians = 0.08;
+constexpr double kFastMetres = 0.06;  // a frame: 1.8 m/s, faster than anybody walks with a camera
+constexpr int kMinRelocalised = 40;   // inliers that prove a place without a prediction
 
 }  // namespace
 
@@ -157,6 +160,16 @@ void Tracker::finish_bundle(bool wait) {
 
 void Tracker::settle() { finish_bundle(true); }
 
+/// Repeated texture can match with a shift: a pose that no motion from the last one explains is
+/// none. last_from_now: the motion to expect.
+bool Tracker::plausible(const Eigen::Isometry3d& pose, const Eigen::Isometry3d& last_from_now,
+                        double metres, double radians) const {
+  const Eigen::Isometry3d surprise =
+      (world_from_camera(map_, last_) * last_from_now).inverse() * pose;
+  return surprise.translation().norm() <= metres &&
+         Eigen::AngleAxisd(surprise.linear()).angle() <= radians;
+}
+
 /// All pixels and depths, where the features do not suffice.
 bool Tracker::track_dense(View& view, const cv::Mat1b& grey, const cv::Mat1f& depth) {
   const auto motion = dense_.motion(last_grey_, last_depth_, grey, depth, velocity_);
@@ -181,10 +194,13 @@ Tracker::Outcome Tracker::track(int frame, double time, Features features, const
   ++since_keyframe_;
   bool found = false;
   if (last_.session != kNone) {
-    found = !lost_ && track_last(view) && track_local_map(view);
+    const double frames = std::max(1.0, kFrameRate * (time - last_.time));
+    found = !lost_ && track_last(view) && track_local_map(view) &&
+            plausible(view.pose, velocity_, frames * kSurpriseMetres, frames * kSurpriseRadians);
     if (!found && !lost_) found = outcome.dense = track_dense(view, grey, depth);
     if (!found && view.features->size() >= at(options_.min_inliers))
-      found = relocalise(view) && track_local_map(view) && view.inliers >= kMinRelocalised;
+      found = relocalise(view) && track_local_map(view) && view.inliers >= kMinRelocalised &&
+              plausible(view.pose, Eigen::Isometry3d::Identity(), frames * kFastMetres, M_PI);
   }
   int session = last_.session;
   if (!found) {

@@ -56,6 +56,8 @@ class Tracker {
  private:
   bool track_last(View& view) const;
   bool relocalise(View& view) const;
+  bool plausible(const Eigen::Isometry3d& pose, const Eigen::Isometry3d& last_from_now,
+                 double metres, double radians) const;
   bool track_dense(View& view, const cv::Mat1b& grey, const cv::Mat1f& depth);
   bool track_local_map(View& view);
   bool needs_keyframe(const View& view) const;

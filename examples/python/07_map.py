@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """One map of unordered scans: a folder of fragments cloud_bin_<i>.ply, no pose known.
 
-    python 07_map.py scans/ --output map.ply
+python 07_map.py scans/ --output map.ply
 """
 
 from __future__ import annotations

@@ -31,6 +31,7 @@ struct DevicePointCloudView {
   std::size_t feature_stride = 0;     ///< 0: feature_dimension
   const float* viewpoints = nullptr;  ///< HOST memory, optional: viewpoint_count rows of x, y, z
   std::size_t viewpoint_count = 0;
+  bool infer_viewpoint = true;
   double origin[3] = {0, 0, 0};  ///< as that of PointCloudView
   /// Streams that order the reading of normals and features, where another stream than that of the
   /// points wrote them.
@@ -47,6 +48,7 @@ struct DevicePointCloudView {
     v.feature_stride = feature_stride;
     v.viewpoints = viewpoints;
     v.viewpoint_count = viewpoint_count;
+    v.infer_viewpoint = infer_viewpoint;
     v.validate();
   }
 };

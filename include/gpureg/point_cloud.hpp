@@ -30,9 +30,15 @@ struct PointCloudView {
   /// observes the back of a surface. None is flipped where more than one eighth of the points face
   /// away (the viewpoints then belong to another frame), nor with PrepareOptions::depth_maps 0.
   const float* viewpoints = nullptr;
-  /// 0: the origin serves as the viewpoint where the cloud has no input normals. With input normals
-  /// and without viewpoints free space is unknown, and no pose is verified by it.
+  /// 0: with input normals free space is unknown, and no pose is verified by it. Without normals
+  /// see infer_viewpoint.
   std::size_t viewpoint_count = 0;
+  /// For a cloud without viewpoints and normals. true: the surfaces decide whether the origin of
+  /// the frame is the viewpoint. false: the viewpoint is unknown. Where it is unknown, no free
+  /// space is known, and alignments try both sides of the surfaces. PrepareStatistics::viewpoint
+  /// has the decision. No effect where PrepareOptions::depth_maps is 0: the origin then orients the
+  /// normals.
+  bool infer_viewpoint = true;
   /// Added to every point and viewpoint: coordinates in the cloud's frame = origin + row. For large
   /// coordinates (UTM, maps), which float rows cannot hold. Poses and moments of results are in the
   /// cloud's frame; PreparedCloud::points() are rows, relative to this.

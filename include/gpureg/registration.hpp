@@ -49,9 +49,9 @@ std::vector<PreparedCloud> prepare_batch(const Context& context,
 /// refined ones, and perturbed poses of the degeneracy search. RegistrationMethod::quadruples
 /// (LoopSmart, Algorithm 1) returns one pose and no modes.
 ///
-/// The same clouds, options and seed give the same poses and evidence, bit for bit, on every
-/// backend and for any number of threads. Between machines the last digit of a confidence can
-/// differ with the C library.
+/// The same clouds, options and seed give the same poses, evidence and confidences, bit for bit, on
+/// every backend, processor and C library and for any number of threads (docs/versioning.md has the
+/// conditions).
 /// @param source cloud that the pose moves.
 /// @param target cloud that stays.
 /// @param options options.prepare is validated but not applied; each cloud keeps the options that

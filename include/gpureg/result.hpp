@@ -70,6 +70,9 @@ struct RegistrationResult {
   /// RegistrationMethod::quadruples.
   std::vector<RegistrationMode> modes;
   RegistrationStatistics statistics;
+  /// What was known of the places that the clouds were seen from.
+  ViewpointSource source_viewpoint = ViewpointSource::said;
+  ViewpointSource target_viewpoint = ViewpointSource::said;
   StageTimings timings;
 
   bool aligned() const { return status == RegistrationStatus::aligned; }

@@ -31,6 +31,22 @@ enum class RegistrationReason : std::uint8_t {
   cancelled
 };
 
+/// What is known of the place that a cloud was seen from. It decides about free space and about the
+/// sides of surfaces.
+enum class ViewpointSource : std::uint8_t {
+  said,     ///< viewpoints were given
+  origin,   ///< the origin of the cloud's frame; nothing given, and the surfaces agree with it
+  normals,  ///< no viewpoint; the input normals tell the sides of surfaces
+  /// No viewpoint: neither free space nor the sides of surfaces are known. Alignments try both
+  /// sides.
+  none,
+  model  ///< no viewpoint; a closed surface with normals that point outwards
+};
+
+const char* to_string(ViewpointSource source);
+/// @return one English phrase for messages.
+const char* explain(ViewpointSource source);
+
 const char* to_string(RegistrationStatus status);
 const char* to_string(RegistrationReason reason);
 /// @return one English sentence for messages.
@@ -80,6 +96,9 @@ struct PrepareStatistics {
   std::uint32_t points_without_normal = 0;  ///< fewer than 3 neighbours
   /// No neighbour within the feature radius, or no normal: never matched.
   std::uint32_t points_without_feature = 0;
+  ViewpointSource viewpoint = ViewpointSource::said;
+  /// Prepared points whose input normal contradicted the normals around it and was flipped.
+  std::uint32_t repaired_normals = 0;
   double downsample = 0, normals = 0, features = 0, grid = 0, depth_maps = 0, surface_sides = 0;
   double total() const {
     return downsample + normals + features + grid + depth_maps + surface_sides;

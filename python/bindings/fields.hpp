@@ -15,6 +15,7 @@
 
 #include "bindings.hpp"
 #include "gpureg/options.hpp"
+#include "gpureg/statistics.hpp"
 
 /// Plain structs of the library as Python classes, made from one list of fields each: constructor,
 /// attributes, repr, equality, pickle. A new field of the struct is one new line in its list.
@@ -42,6 +43,11 @@ inline bool is_bool(py::handle value) {
          std::string_view(Py_TYPE(value.ptr())->tp_name).substr(0, 10) == "numpy.bool";
 }
 
+/// Enumerations that are strings in Python.
+template <typename M>
+constexpr bool is_named =
+    std::is_same_v<M, RegistrationMethod> || std::is_same_v<M, ViewpointSource>;
+
 template <typename M>
 M convert(py::handle value) {
   if constexpr (std::is_same_v<M, RegistrationMethod>) {
@@ -49,6 +55,13 @@ M convert(py::handle value) {
     for (const RegistrationMethod p :
          {RegistrationMethod::compatibility, RegistrationMethod::quadruples})
       if (text == to_string(p)) return p;
+    throw py::cast_error();
+  } else if constexpr (std::is_same_v<M, ViewpointSource>) {
+    const auto text = value.cast<std::string>();
+    for (const ViewpointSource s :
+         {ViewpointSource::said, ViewpointSource::origin, ViewpointSource::normals,
+          ViewpointSource::none, ViewpointSource::model})
+      if (text == to_string(s)) return s;
     throw py::cast_error();
   } else {
     // A bool is an int in Python; as a length or a count it is a mistake.
@@ -64,6 +77,8 @@ std::string expected() {
     return "True or False";
   else if constexpr (std::is_same_v<M, RegistrationMethod>)
     return "'compatibility' or 'quadruples'";
+  else if constexpr (std::is_same_v<M, ViewpointSource>)
+    return "'said', 'origin', 'normals', 'none' or 'model'";
   else if constexpr (std::is_floating_point_v<M>)
     return "a number";
   else if constexpr (std::is_same_v<M, std::array<double, 6>>)
@@ -112,7 +127,7 @@ Field<T> field(std::string name, M T::* member, std::string doc) {
   f.get = [member](const T& t) -> py::object {
     if constexpr (std::is_same_v<M, float>)
       return py::float_(shortest(t.*member));
-    else if constexpr (std::is_same_v<M, RegistrationMethod>)
+    else if constexpr (is_named<M>)
       return py::str(to_string(t.*member));
     else
       return py::cast(t.*member);

@@ -16,7 +16,8 @@ namespace gpureg::python {
 namespace {
 
 /// One cloud as the package hands it over: (points, normals, features, viewpoints, origin,
-/// streams); all but the points may be None. Points, normals and features are float32 arrays, or,
+/// streams); all but the points may be None, and viewpoints False: unknown, not to be inferred.
+/// Points, normals and features are float32 arrays, or,
 /// where there are streams, (address, rows, columns, stride, owner) of device memory; the streams
 /// are those that wrote points, normals and features. The caller's tuple keeps alive what the views
 /// point at.
@@ -49,7 +50,9 @@ struct Input {
       view.feature_stride = features.data ? features.stride : 0;
       view.feature_dimension = features.data ? features.columns : 0;
     }
-    if (!parts[3].is_none()) {
+    if (parts[3].ptr() == Py_False) {
+      view.infer_viewpoint = false;
+    } else if (!parts[3].is_none()) {
       const Rows viewpoints = rows_of(parts[3].cast<FloatArray>(), "viewpoints");
       if (viewpoints.count > 0 && viewpoints.stride != 3)
         throw py::type_error("viewpoints: rows are not side by side");
@@ -83,6 +86,7 @@ struct Input {
     v.feature_stride = view.feature_stride;
     v.viewpoints = view.viewpoints;
     v.viewpoint_count = view.viewpoint_count;
+    v.infer_viewpoint = view.infer_viewpoint;
     std::copy(std::begin(view.origin), std::end(view.origin), v.origin);
     v.normal_stream = streams[1];
     v.feature_stream = streams[2];

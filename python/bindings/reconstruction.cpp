@@ -99,7 +99,8 @@ py::dict refine_map(Reconstruction& map, const py::list& clouds, const std::vect
     surfaces.back() = surface_of(cloud.cast<const Cloud&>().prepared);
     if (!seen.at(surfaces.size() - 1)) surfaces.back().viewpoints.clear();
   }
-  RefineOptions options = RefineOptions::for_depth_cameras(static_cast<float>(voxel_size));
+  reconstruction::RefineOptions options =
+      reconstruction::RefineOptions::for_depth_cameras(static_cast<float>(voxel_size));
   options.threads = threads;
   std::exception_ptr failed;
   options.should_stop = [&](int iteration) {
@@ -233,7 +234,7 @@ void bind_reconstruction(py::module_& m) {
   m.def("surface_options", &surface_options, py::arg("registration"));
   m.def("result_of_row", &result_of_row, py::arg("aligned"), py::arg("target_from_source"),
         py::arg("score"), py::arg("information"));
-  m.attr("REFINE_ITERATIONS") = RefineOptions{}.iterations;
+  m.attr("REFINE_ITERATIONS") = reconstruction::RefineOptions{}.iterations;
   bind_voxel_map(m);
 }
 

@@ -52,6 +52,11 @@ std::vector<Field<PrepareStatistics>> prepare_fields() {
       field("points", &P::points, "After downsampling."),
       field("points_without_normal", &P::points_without_normal, "Fewer than 3 neighbours."),
       field("points_without_feature", &P::points_without_feature, "Never matched."),
+      field("viewpoint", &P::viewpoint,
+            "What is known of the place that the cloud was seen from: 'said', 'origin', 'normals', "
+            "'none' or 'model'."),
+      field("repaired_normals", &P::repaired_normals,
+            "Prepared points whose input normal contradicted the normals around it."),
       field("downsample", &P::downsample, "Milliseconds of downsampling."),
       field("normals", &P::normals, "Milliseconds of the normals."),
       field("features", &P::features, "Milliseconds of the features."),
@@ -244,6 +249,8 @@ py::dict result_state(const RegistrationResult& r) {
   py::list modes;
   for (const RegistrationMode& mode : r.modes) modes.append(state_of(mode));
   state["modes"] = modes;
+  state["source_viewpoint"] = to_string(r.source_viewpoint);
+  state["target_viewpoint"] = to_string(r.target_viewpoint);
   state["statistics"] = to_dict(r.statistics, statistics_fields());
   state["timings"] = to_dict(r.timings, timing_fields());
   return state;
@@ -263,6 +270,8 @@ RegistrationResult result_from(const py::dict& state) {
   r.target_moments = moments_from(state["target_moments"]);
   for (const auto mode : state["modes"].cast<py::list>())
     r.modes.push_back(mode_from(mode.cast<py::dict>()));
+  r.source_viewpoint = convert<ViewpointSource>(state["source_viewpoint"]);
+  r.target_viewpoint = convert<ViewpointSource>(state["target_viewpoint"]);
   assign(r.statistics, statistics_fields(), state["statistics"], "RegistrationStatistics");
   assign(r.timings, timing_fields(), state["timings"], "StageTimings");
   return r;
@@ -297,6 +306,12 @@ void bind_registration_result(py::module_& m) {
                     "Of all correspondences: points of the source, in its frame.")
       .def_readonly("target_moments", &R::target_moments,
                     "Of all correspondences: points of the target, in its frame.")
+      .def_property_readonly(
+          "source_viewpoint", [](const R& r) { return to_string(r.source_viewpoint); },
+          "What was known of the place that the source was seen from; see PrepareStatistics.")
+      .def_property_readonly(
+          "target_viewpoint", [](const R& r) { return to_string(r.target_viewpoint); },
+          "The same of the target.")
       .def_readonly("statistics", &R::statistics, "What was left after each stage.")
       .def_readonly("timings", &R::timings, "Milliseconds per stage.")
       .def("to_dict", &result_state, "All values as plain Python and numpy objects.")

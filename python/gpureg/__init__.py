@@ -49,7 +49,8 @@ from ._core import (
     describe_backends,
 )
 from ._loop_consistency import loop_consistency
-from ._reconstruction import Map, MapEdge, MapLink, MapScan, reconstruct
+from ._map import Map, MapEdge, MapLink, MapScan
+from ._reconstruction import reconstruct
 from ._trajectory import evaluate_trajectory, read_trajectory
 from .files import read_point_cloud, write_point_cloud
 from .fragments import FragmentSet

@@ -7,7 +7,7 @@ Errors name the argument and the shape or type that it has.
 from __future__ import annotations
 
 import os
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -15,16 +15,18 @@ import numpy.typing as npt
 from . import _core
 from ._core import PointCloud, PreparedCloud, PrepareOptions
 from ._device import DeviceRows, device_rows, on_device, stream_of
+from ._las import is_las, read_las
 
 FloatArray = npt.NDArray[np.float32]
 Rows = FloatArray | DeviceRows
 #: (points, normals, features, viewpoints, origin, streams), all but the points may be None. With
 #: streams, the first three are on a device, each written by the stream of its place.
+#: viewpoints False: the viewpoint is unknown, and not to be inferred.
 CoreCloud = tuple[
     Rows,
     Rows | None,
     Rows | None,
-    FloatArray | None,
+    FloatArray | Literal[False] | None,
     npt.NDArray[np.float64] | None,
     tuple[int, int, int] | None,
 ]
@@ -200,21 +202,19 @@ def core_cloud(
     device: what is on a GPU stays there, where that is possible.
     """
     prefix = "" if name == "points" else f"{name}."
-    points, normals, viewpoints = _unpack(points, normals, viewpoints)
+    known = _viewpoints(viewpoints, prefix + "viewpoints")
+    points, normals, viewpoints = _unpack(points, normals, None if known is False else known)
+    if known is False:
+        viewpoints = None
     if device and on_device(points):
         stay = _stay_on_device(points, normals, features, viewpoints, prefix)
         if stay is not None:
-            return stay
+            return (*stay[:3], False, *stay[4:]) if known is False else stay
     raw = matrix(points, name, 3)
     count = raw.shape[0]
     origin = origin_of(raw, options.voxel_size)
     views = None if viewpoints is None else matrix(viewpoints, prefix + "viewpoints", 3)
     if origin is not None:
-        # With no viewpoint given, the sensor was where the caller's frame has its origin. Normals
-        # of the cloud's own need none: a viewpoint thousands of kilometres away would turn
-        # them and make up free space.
-        if views is None and normals is None:
-            views = np.zeros((1, 3))
         raw, views = raw - origin, None if views is None else views - origin
     return (
         float_rows(raw, name),
@@ -224,10 +224,26 @@ def core_cloud(
         None
         if features is None
         else float_rows(matrix(features, prefix + "features", None, count), prefix + "features"),
-        None if views is None else np.ascontiguousarray(float_rows(views, prefix + "viewpoints")),
+        False
+        if known is False
+        else None
+        if views is None
+        else np.ascontiguousarray(float_rows(views, prefix + "viewpoints")),
         origin,
         None,
     )
+
+
+def _viewpoints(value: Any, name: str) -> Any:
+    """None: to be inferred; False: unknown; else rows."""
+    if value is None or (isinstance(value, str) and value == "auto"):
+        return None
+    if isinstance(value, str):
+        if value == "none":
+            return False
+        raise ValueError(f"{name}: expected (V, 3) positions, 'none' or 'auto', got {value!r}")
+    rows = to_numpy(value, name)
+    return rows.reshape(1, 3) if rows.shape == (3,) else rows
 
 
 def host_points(cloud: Any, name: str) -> FloatArray:
@@ -278,6 +294,8 @@ def _stay_on_device(
 
 def _unpack(points: Any, normals: Any, viewpoints: Any) -> tuple[Any, Any, Any]:
     """Clouds that carry their normals along."""
+    if isinstance(points, str | os.PathLike) and is_las(points):
+        return read_las(points), normals, viewpoints
     if isinstance(points, str | os.PathLike):
         points = _core.read_point_cloud(os.fspath(points))
     if isinstance(points, PointCloud):

@@ -222,6 +222,8 @@ def register(
     quality: int | None = None,
     seed: int | None = None,
     prior: RegistrationPrior | None = None,
+    source_viewpoint: Any = None,
+    target_viewpoint: Any = None,
     options: RegistrationOptions | None = None,
     time_budget_ms: float | None = None,
     context: Context | None = None,
@@ -241,6 +243,8 @@ def register(
         Same seed, same bits, for any threads and backend.
     prior : RegistrationPrior, optional
         What is known of the pose, in the frames of source and target; see `align`.
+    source_viewpoint, target_viewpoint : (3,) or (V, 3) array, "auto" or "none", optional
+        Where the clouds were seen from: viewpoints of `prepare`.
     options : RegistrationOptions, optional
         Instead of voxel_size, quality and seed.
     time_budget_ms : float, optional
@@ -292,10 +296,12 @@ def register(
             options.seed = seed
     context = context_of(context)
     clouds = []
-    for cloud, name in ((source, "source"), (target, "target")):
-        clouds.append(
-            core_cloud(cloud, None, None, None, options.prepare, name, context.backend == "cuda")
-        )
+    device = context.backend == "cuda"
+    for cloud, viewpoint, name in (
+        (source, source_viewpoint, "source"),
+        (target, target_viewpoint, "target"),
+    ):
+        clouds.append(core_cloud(cloud, None, None, viewpoint, options.prepare, name, device))
     options.validate()
     a, b = _core.prepare_batch(context, clouds, options.prepare, ["source", "target"])
     if time_budget_ms is not None:

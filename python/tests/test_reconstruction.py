@@ -131,7 +131,9 @@ def test_trajectories(tmp_path):
     assert e.relative_translation.max == pytest.approx(0.4)
     assert e.truth_from_estimate.tolist() == np.eye(4).tolist()
     path = tmp_path / "tum.txt"
-    path.write_text("".join(f"{t} {x} {y} {z} 0 0 0 1\n" for t, (x, y, z) in zip(times, poses[:, :3, 3])))
+    path.write_text(
+        "".join(f"{t} {x} {y} {z} 0 0 0 1\n" for t, (x, y, z) in zip(times, poses[:, :3, 3]))
+    )
     read = gpureg.read_trajectory(path)
     assert np.array_equal(read[0], times) and np.array_equal(read[1], poses)
     same = gpureg.evaluate_trajectory(path, path, delta=1.5, delta_unit="metres")

@@ -7,6 +7,7 @@
 #include "api/access.hpp"
 #include "api/name_cloud.hpp"
 #include "api/raw_cloud.hpp"
+#include "api/unknown_viewpoint.hpp"
 #include "common/in_halves.hpp"
 #include "pipeline/device_engine.hpp"
 
@@ -18,6 +19,7 @@ struct AdoptedBatch {
   std::shared_ptr<DeviceEngine> engine;
   std::vector<std::shared_ptr<AdoptedCloud>> clouds;
   std::vector<std::array<double, 3>> origins;
+  std::vector<CloudKnowledge> knowledge;
   PrepareOptions options;
   std::vector<std::string> names;
 };
@@ -48,13 +50,29 @@ AdoptedBatch adopt(const Context& context, const std::vector<DevicePointCloudVie
       out.clouds.push_back(out.engine->adopt(raw, {stream, cloud.normal_stream.value_or(stream),
                                                    cloud.feature_stream.value_or(stream)}));
     });
+    out.knowledge.push_back(knowledge_of(cloud));
     out.origins.push_back({cloud.origin[0], cloud.origin[1], cloud.origin[2]});
   }
   return out;
 }
 
+/// Decides about unknown viewpoints, from host copies of the points where they are asked for.
+void resolve(const AdoptedBatch& batch, std::vector<std::shared_ptr<PreparedState>>& states) {
+  std::vector<std::vector<float>> rows(states.size());
+  std::vector<RawCloud> raw(states.size());
+  for (std::size_t k = 0; k < states.size(); ++k) {
+    const CloudKnowledge& known = batch.knowledge[k];
+    if (!known.viewpoints && !known.normals && batch.options.depth_maps > 0)
+      rows[k] = batch.engine->copy_points(*batch.clouds[k]);
+    raw[k].points = rows[k].data();
+    raw[k].size = rows[k].size() / 3;
+    raw[k].point_stride = 3;
+  }
+  resolve_viewpoints(*batch.engine, span_of(raw), batch.knowledge, batch.options, states);
+}
+
 std::vector<PreparedCloud> prepared(const AdoptedBatch& batch) {
-  std::vector<PreparedCloud> out;
+  std::vector<std::shared_ptr<PreparedState>> states;
   in_halves(0, batch.clouds.size(), [&](std::size_t begin, std::size_t end) {
     const auto work = [&] {
       return batch.engine->prepare_adopted({batch.clouds.data() + begin, end - begin},
@@ -62,11 +80,14 @@ std::vector<PreparedCloud> prepared(const AdoptedBatch& batch) {
     };
     const std::size_t all = batch.clouds.size();
     for (auto& state : end - begin == 1 ? naming_cloud(batch.names, all, begin, work) : work()) {
-      const std::array<double, 3>& origin = batch.origins[out.size()];
+      const std::array<double, 3>& origin = batch.origins[states.size()];
       std::copy(origin.begin(), origin.end(), state->frame_offset);
-      out.push_back(Access::cloud(std::move(state)));
+      states.push_back(std::move(state));
     }
   });
+  resolve(batch, states);
+  std::vector<PreparedCloud> out;
+  for (auto& state : states) out.push_back(Access::cloud(std::move(state)));
   return out;
 }
 

@@ -174,6 +174,8 @@ RegistrationResult to_row_result(const PairOutcome& all, const PreparedState& so
   result.has_candidate = outcome.has_pose;
   result.statistics = outcome.statistics;
   result.timings = outcome.timings;
+  result.source_viewpoint = source.statistics.viewpoint;
+  result.target_viewpoint = target.statistics.viewpoint;
   result.statistics.swapped = swapped;
   if (swapped) {
     std::swap(result.statistics.source_points, result.statistics.target_points);

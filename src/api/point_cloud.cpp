@@ -24,6 +24,8 @@ void PointCloudView::validate() const {
           "a pointer, as viewpoint_count is not 0");
   for (std::size_t k = 0; k < 3 * viewpoint_count; ++k)
     require(std::isfinite(viewpoints[k]), "cloud.viewpoints", viewpoints[k], "finite coordinates");
+  require(viewpoint_count == 0 || infer_viewpoint, "cloud.infer_viewpoint", "false",
+          "true, as viewpoints are given");
   for (const double coordinate : origin)
     require(std::isfinite(coordinate), "cloud.origin", coordinate, "finite coordinates");
 }

@@ -10,6 +10,8 @@
 #include "api/pair_input.hpp"
 #include "api/prior.hpp"
 #include "api/raw_cloud.hpp"
+#include "api/unknown_viewpoint.hpp"
+#include "api/variants.hpp"
 #include "common/host_threads.hpp"
 #include "common/in_halves.hpp"
 #include "common/limits.hpp"
@@ -46,21 +48,26 @@ std::vector<PreparedCloud> prepare_batch(const Context& context,
   std::vector<RawCloud> raw;
   raw.reserve(clouds.size());
   std::vector<FrameOrigin> frame_origins(clouds.size());
+  std::vector<CloudKnowledge> knowledge;
   for (std::size_t k = 0; k < clouds.size(); ++k) {
     raw.push_back(naming(k, [&] { return raw_cloud(clouds[k]); }));
+    knowledge.push_back(knowledge_of(clouds[k]));
     view_from_frame_origin(clouds[k].origin, frame_origins[k], raw.back());
   }
   std::vector<PreparedCloud> out;
   if (raw.empty()) return out;
+  std::vector<std::shared_ptr<PreparedState>> states;
   in_halves(0, raw.size(), [&](std::size_t begin, std::size_t end) {
     const auto work = [&] {
       return Access::engine(context)->prepare({raw.data() + begin, end - begin}, options);
     };
     for (auto& state : end - begin == 1 ? naming(begin, work) : work()) {
-      set_frame_offset(clouds[out.size()].origin, *state);
-      out.push_back(Access::cloud(std::move(state)));
+      set_frame_offset(clouds[states.size()].origin, *state);
+      states.push_back(std::move(state));
     }
   });
+  resolve_viewpoints(*Access::engine(context), span_of(raw), knowledge, options, states);
+  for (auto& state : states) out.push_back(Access::cloud(std::move(state)));
   return out;
 }
 
@@ -147,18 +154,25 @@ std::vector<RegistrationResult> align_batch(const Context& context,
   check_pairs(context, clouds, pairs, options);
 
   std::vector<RegistrationResult> results(pairs.size());
+  const std::vector<PairVariant> variants = variants_of(clouds, pairs);
   const std::size_t chunk = Access::engine(context)->pairs_per_chunk(options);
-  for (std::size_t begin = 0; begin < pairs.size(); begin += chunk) {
-    if (callbacks.should_stop && callbacks.should_stop()) break;
-    const std::size_t end = std::min(pairs.size(), begin + chunk);
+  for (std::size_t begin = 0; begin < variants.size(); begin += chunk) {
+    if (callbacks.should_stop && callbacks.should_stop()) {
+      // A pair of which only some variants were aligned counts as never tried.
+      if (begin > 0 && variants[begin].pair == variants[begin - 1].pair)
+        results[variants[begin].pair] = {};
+      break;
+    }
+    const std::size_t end = std::min(variants.size(), begin + chunk);
     std::vector<PairInput> inputs;
     std::vector<PairOutcome> outcomes(end - begin);
-    for (std::size_t p = begin; p < end; ++p) {
-      const PreparedState &s = *Access::state(clouds[pairs[p].source]),
-                          &t = *Access::state(clouds[pairs[p].target]);
+    std::vector<RegistrationResult> found(end - begin);
+    for (std::size_t v = begin; v < end; ++v) {
+      const PreparedState &s = *variants[v].source, &t = *variants[v].target;
       const bool swapped = swaps(s, t, options);
       inputs.push_back(input_of(s, t, swapped));
-      if (!priors.empty()) inputs.back().prior = prior_test(priors[p], s, t, swapped);
+      if (!priors.empty())
+        inputs.back().prior = prior_test(priors[variants[v].pair], s, t, swapped);
     }
     align_all(*Access::engine(context), inputs, options, outcomes);
     // A result by evidence takes about 50 us on the host, too much for one thread where a device
@@ -166,15 +180,18 @@ std::vector<RegistrationResult> align_batch(const Context& context,
     const std::size_t workers =
         std::min<std::size_t>(Access::engine(context)->host_threads(), 1 + (end - begin) / 16);
     on_threads(workers, [&](std::size_t worker) {
-      for (std::size_t p = begin + worker; p < end; p += workers) {
-        const PreparedState &s = *Access::state(clouds[pairs[p].source]),
-                            &t = *Access::state(clouds[pairs[p].target]);
-        results[p] = to_result(outcomes[p - begin], s, t, swaps(s, t, options), options,
-                               inputs[p - begin].prior);
+      for (std::size_t v = begin + worker; v < end; v += workers) {
+        const PreparedState &s = *variants[v].source, &t = *variants[v].target;
+        found[v - begin] = to_result(outcomes[v - begin], s, t, swaps(s, t, options), options,
+                                     inputs[v - begin].prior);
       }
     });
-    for (std::size_t p = begin; p < end && callbacks.on_result; ++p)
-      callbacks.on_result(p, results[p]);
+    for (std::size_t v = begin; v < end; ++v) {
+      const std::size_t p = variants[v].pair;
+      keep_better(std::move(found[v - begin]), results[p]);
+      const bool last = v + 1 == variants.size() || variants[v + 1].pair != p;
+      if (last && callbacks.on_result) callbacks.on_result(p, results[p]);
+    }
   }
   return results;
 }

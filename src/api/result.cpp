@@ -41,6 +41,38 @@ const char* to_string(RegistrationReason reason) {
   return "unknown";
 }
 
+const char* to_string(ViewpointSource source) {
+  switch (source) {
+    case ViewpointSource::said:
+      return "said";
+    case ViewpointSource::origin:
+      return "origin";
+    case ViewpointSource::normals:
+      return "normals";
+    case ViewpointSource::none:
+      return "none";
+    case ViewpointSource::model:
+      return "model";
+  }
+  return "unknown";
+}
+
+const char* explain(ViewpointSource source) {
+  switch (source) {
+    case ViewpointSource::said:
+      return "given";
+    case ViewpointSource::origin:
+      return "the origin, which the surfaces agree with";
+    case ViewpointSource::normals:
+      return "unknown; the normals tell the sides of surfaces";
+    case ViewpointSource::none:
+      return "unknown; both sides of surfaces are tried, free space is not used";
+    case ViewpointSource::model:
+      return "none; a closed surface, whose normals point outwards";
+  }
+  return "unknown";
+}
+
 const char* explain(RegistrationReason reason) {
   switch (reason) {
     case RegistrationReason::none:

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "files/text_file.hpp"
 #include "gpureg/io.hpp"
+#include "io/kitti.hpp"
 #include "io/pcd.hpp"
 #include "io/ply.hpp"
 
@@ -14,7 +15,8 @@ PointCloud read_point_cloud(const std::string& path) {
   if (bytes.empty()) source.fail("the file is empty");
   if (bytes.compare(0, 3, "ply") == 0) return read_ply(source);
   if (looks_like_pcd(bytes)) return read_pcd(source);
-  source.fail("neither a PLY nor a PCD file");
+  if (looks_like_kitti(path)) return read_kitti(source);
+  source.fail("neither a PLY nor a PCD file, nor a scan of KITTI (.bin)");
 }
 
 }  // namespace gpureg::io

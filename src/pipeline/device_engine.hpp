@@ -30,6 +30,8 @@ class DeviceEngine : public Engine {
   /// Waits for the copies, then prepares them as one batch. Other calls do not wait for the copies.
   virtual std::vector<std::shared_ptr<PreparedState>> prepare_adopted(
       Span<const std::shared_ptr<AdoptedCloud>> clouds, const PrepareOptions& options) = 0;
+  /// Waits for the copy. @return host copy of the points of an adopted cloud, rows of x, y, z.
+  virtual std::vector<float> copy_points(const AdoptedCloud& cloud) = 0;
 };
 
 /// CUDA engine on the devices of the options. Throws BackendUnavailable.

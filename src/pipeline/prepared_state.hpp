@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <memory>
 #include <vector>
 
 #include "pipeline/types.hpp"
@@ -27,6 +28,8 @@ struct PreparedState {
   std::uint64_t normal_weight_total = 0;  ///< see CloudView
   float radius = 1;                       ///< see CloudView
   std::vector<Vec3> viewpoints;           ///< relative to the local origin
+  /// The same cloud with the other sides of its surfaces, where nobody knows them; else null.
+  std::shared_ptr<PreparedState> other_sides;
 };
 
 /// A pair of clouds for the engine, optionally with given correspondences.

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <algorithm>
+#include <map>
 #include <set>
 #include <string>
 #include <utility>
@@ -152,6 +153,20 @@ struct Round {
   bool dropped = false;
 };
 
+/// A rejected edge that is alone between two parts contradicts nothing: it is not confident enough
+/// to connect them.
+void name_lone_edges(const std::vector<std::uint32_t>& parts, std::vector<Edge>& edges) {
+  std::map<std::pair<std::uint32_t, std::uint32_t>, std::size_t> between;
+  const auto parts_of = [&](const Edge& edge) {
+    const auto [low, high] = std::minmax(parts[edge.source], parts[edge.target]);
+    return std::pair(low, high);
+  };
+  for (const Edge& edge : edges) ++between[parts_of(edge)];
+  for (Edge& edge : edges)
+    if (!edge.accepted && parts[edge.source] != parts[edge.target] && between[parts_of(edge)] == 1)
+      edge.reason = EdgeReason::unconfirmed;
+}
+
 Round optimise_round(std::size_t scans, const PairGraph& pairs,
                      const std::vector<Odometry>& odometry, const Options& options,
                      std::vector<char>& unconfirmed) {
@@ -189,6 +204,7 @@ Round optimise_round(std::size_t scans, const PairGraph& pairs,
     unconfirmed[k] = 1;
     round.dropped = true;
   }
+  name_lone_edges(round.parts, round.edges);
   return round;
 }
 

@@ -167,31 +167,32 @@ TEST_F(ReconstructCommand, DamagedResultsAreNamed) {
   ASSERT_EQ(run(reconstruct("map", {"--no-refine", "--no-map"})).status, 0);
   const auto whole = json_of(file("map", "pairs.json"));
   const std::string path = out_ / "damaged.json";
-  const auto refused = [&](const nlohmann::json& document, const std::vector<std::string>& parts) {
+  const auto refused = [&](const nlohmann::json& document, const std::string& place,
+                           const std::string& what) {
     std::ofstream(path) << document;
-    expect_refused(reconstruct("other", {"--results", path}), joined({"damaged.json"}, parts));
+    expect_refused(reconstruct("other", {"--results", path}), {"damaged.json", place, what});
   };
   const std::string text = whole.dump();
   std::ofstream(path) << text.substr(0, text.size() / 2);
   expect_refused(reconstruct("other", {"--results", path}), {"damaged.json"});
   auto document = whole;
   document["pairs"][3]["T_ij"] = {1, 2, 3};
-  refused(document, {"pairs[3]", "T_ij"});
+  refused(document, "pairs[3]", "T_ij");
   document = whole;
   document["pairs"][2]["information"] = "lost";
-  refused(document, {"pairs[2]", "information"});
+  refused(document, "pairs[2]", "information");
   document = whole;
   document["pairs"][1]["modes"] = 7;
-  refused(document, {"pairs[1]", "modes"});
+  refused(document, "pairs[1]", "modes");
   document = whole;
   document["pairs"][4]["j"] = 77;
-  refused(document, {"pairs[4]", "fragment 77"});
+  refused(document, "pairs[4]", "fragment 77");
   document = whole;
   document["pairs"][4] = document["pairs"][0];
-  refused(document, {"pairs[4]", "repeats"});
+  refused(document, "pairs[4]", "repeats");
   document = whole;
   document["pairs"][0]["score"] = "high";
-  refused(document, {"pairs[0]", "score"});
+  refused(document, "pairs[0]", "score");
 }
 
 TEST_F(ReconstructCommand, AFullDiskIsNamedAndTheJournalStays) {

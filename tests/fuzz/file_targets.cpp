@@ -2,6 +2,7 @@
 #include "fuzz/targets.hpp"
 #include "gpureg/pose_graph/files.hpp"
 #include "io/run_reader.hpp"
+#include "loop_closure/saved_state.hpp"
 
 namespace gpureg::fuzz {
 namespace {
@@ -25,14 +26,36 @@ void check_graph(std::string_view bytes, const Read& read_graph, const Write& wr
     return;
   }
   graph.validate();
-  const test::MemoryFile copy("");
+  static const std::string copy = "/dev/shm/gpureg-fuzz-" + std::to_string(::getpid());
   try {
-    write_graph(copy.path(), graph);
+    write_graph(copy, graph);
   } catch (const InvalidArgument&) {
     return;  // the format cannot hold every graph
   }
-  if (read_graph(copy.path()).edges.size() != graph.edges.size())
-    broken("a written graph reads back");
+  const std::size_t edges = read_graph(copy).edges.size();
+  ::unlink(copy.c_str());
+  if (edges != graph.edges.size()) broken("a written graph reads back");
+}
+
+/// The input is what follows the header: no mutation finds a checksum.
+std::string with_header(std::string_view payload) {
+  std::uint64_t sum = 14695981039346656037ull;  // FNV-1a
+  for (const char c : payload) sum = (sum ^ static_cast<unsigned char>(c)) * 1099511628211ull;
+  return "gpuregLC" + test::raw(std::uint32_t{1}) + test::raw(std::uint64_t{payload.size()}) +
+         test::raw(sum) + std::string(payload);
+}
+
+void read_saved_state(std::string_view bytes) {
+  const std::string path = "saved", content = with_header(bytes);
+  try {
+    const loop_closure::State state = loop_closure::from_bytes(content, path);
+    const std::string again = loop_closure::to_bytes(state);
+    if (loop_closure::to_bytes(loop_closure::from_bytes(again, path)) != again)
+      broken("a state reads back");
+  } catch (const IoError& error) {
+    if (std::string_view(error.what()).find(path) == std::string_view::npos)
+      broken("an error names its file");
+  }
 }
 
 void read_g2o(std::string_view bytes) {
@@ -59,7 +82,8 @@ std::vector<Target> file_targets() {
           {"cameras", read<Reader::cameras>},
           {"pairs", read<Reader::pairs>},
           {"g2o", read_g2o},
-          {"open3d", read_open3d}};
+          {"open3d", read_open3d},
+          {"saved_state", read_saved_state}};
 }
 
 }  // namespace gpureg::fuzz

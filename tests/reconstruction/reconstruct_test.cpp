@@ -71,6 +71,16 @@ TEST(Reconstruct, LeavesOutForeignScansWithAReason) {
   EXPECT_TRUE(map.scans[8].island_from_scan.matrix().hasNaN());
 }
 
+TEST(Reconstruct, ALoneDoubtfulPairContradictsNothing) {
+  PairResults data(6);
+  data.add_chain(0, 5, 3);
+  data.add_correct(5, 4, 0.8);
+  const auto map = data.map();
+  EXPECT_FALSE(map.scans[5].placed);
+  EXPECT_EQ(map.scans[5].reason, ScanReason::unconfirmed);
+  EXPECT_EQ(map.edges.back().reason, EdgeReason::unconfirmed);
+}
+
 TEST(Reconstruct, FurtherModesConnectAScan) {
   PairResults data(8);
   data.add_chain(0, 7, 3);

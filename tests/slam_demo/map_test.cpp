@@ -80,7 +80,8 @@ TEST(Map, PointsSeenOnceAreRemovedAfterATrial) {
   EXPECT_FALSE(map.points[static_cast<std::size_t>(young)].bad);
 }
 
-/// Twelve keyframes around a circle that tracking does not close: 1 % of the way is missing.
+/// Twelve keyframes around a circle that tracking does not close: it turns 0.01 too far at each
+/// step.
 struct Drift {
   Map map;
   KeyframeGraph graph;
@@ -92,7 +93,7 @@ struct Drift {
       Eigen::Isometry3d pose = truth.back();
       if (k > 0) {
         Eigen::Isometry3d motion = truth[static_cast<std::size_t>(k) - 1].inverse() * truth.back();
-        motion.translation() *= 0.98;
+        motion.linear() = motion.linear() * Eigen::AngleAxisd(0.01, Eigen::Vector3d::UnitY());
         pose = tracked.back() * motion;
       }
       tracked.push_back(pose);
@@ -109,12 +110,12 @@ struct Drift {
 TEST(KeyframeGraph, ALoopSpreadsTheDriftAndMovesThePoints) {
   Drift d;
   const double before = (d.tracked.back().translation() - d.truth.back().translation()).norm();
-  ASSERT_GT(before, 0.03);
+  ASSERT_GT(before, 0.1);
   d.graph.add(0, {d.closing()});
   EXPECT_EQ(d.graph.optimize(d.map), "");
   for (std::size_t k = 0; k < 12; ++k) {
     const Eigen::Isometry3d& pose = d.map.keyframes[k].world_from_camera;
-    EXPECT_LT((pose.translation() - d.truth[k].translation()).norm(), 0.8 * before) << k;
+    EXPECT_LT((pose.translation() - d.truth[k].translation()).norm(), 0.3 * before) << k;
     EXPECT_LT((d.map.points[k].position - pose * Eigen::Vector3d(0, 0, 1)).norm(), 1e-9)
         << "the point follows its keyframe";
   }

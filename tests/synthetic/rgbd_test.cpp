@@ -109,6 +109,25 @@ TEST(Rgbd, SequenceInTumLayout) {
     }
   }
   EXPECT_GT(near, 0.9 * tried) << "of " << tried;
+
+  // The true surface has a point within its spacing of whatever depth measures well, and unit
+  // normals.
+  const std::string bytes = content_of(folder / "surface.ply");
+  const std::size_t body = bytes.find("end_header\n") + 11;
+  const std::size_t count = std::stoul(bytes.substr(bytes.find("vertex ") + 7));
+  ASSERT_EQ(bytes.size(), body + 24 * count);
+  std::vector<Eigen::Matrix<float, 6, 1>> surface(count);
+  std::memcpy(static_cast<void*>(surface.data()), bytes.data() + body, 24 * count);
+  EXPECT_GT(count, 5000u);
+  for (const auto& s : surface) ASSERT_NEAR(s.tail<3>().norm(), 1, 1e-5);
+  near = tried = 0;
+  for (std::size_t k = 0; k < cloud.size(); k += 50, ++tried) {
+    const Eigen::Vector3f p = (first * cloud[k].cast<double>()).cast<float>();
+    float best = 1e9f;
+    for (const auto& s : surface) best = std::min(best, (s.head<3>() - p).squaredNorm());
+    near += best < 0.05f * 0.05f ? 1 : 0;
+  }
+  EXPECT_GT(near, 0.9 * tried) << "of " << tried;
 }
 
 }  // namespace

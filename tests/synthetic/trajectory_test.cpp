@@ -5,6 +5,9 @@
 
 #include <cmath>
 
+#include "data/tour.hpp"
+#include "gpureg/error.hpp"
+
 namespace gpureg::test {
 namespace {
 
@@ -50,6 +53,29 @@ TEST(Trajectory, ComesBackToOtherRoomsAndPlaces) {
   }
   EXPECT_GE(std::count(seen.begin(), seen.end(), true), 3);
   EXPECT_GT(returns, 5);
+}
+
+TEST(Trajectory, StaysAwayForAsLongAsAsked) {
+  const synthetic::House house = synthetic::build_house(11);
+  const synthetic::RayScene scene(house.mesh);
+  const auto usual = synthetic::tour(house, scene, 11, 60),
+             away = synthetic::tour(house, scene, 11, 60, 30);
+  EXPECT_LT(synthetic::first_return(usual), 30) << "otherwise this tests nothing";
+  EXPECT_GE(synthetic::first_return(away), 30);
+  EXPECT_LT(synthetic::first_return(away), 60) << "it does come back";
+  EXPECT_THROW(synthetic::tour(house, scene, 11, 60, 900), InvalidArgument);
+}
+
+TEST(Trajectory, FirstReturn) {
+  std::vector<Eigen::Vector2f> line;  // 10 m there, 1 m aside, and back
+  for (int k = 0; k < 500; ++k) line.emplace_back(0.02f * static_cast<float>(k), 0);
+  for (int k = 0; k < 50; ++k) line.emplace_back(10, 0.02f * static_cast<float>(k));
+  for (int k = 0; k < 500; ++k) line.emplace_back(10 - 0.02f * static_cast<float>(k), 1);
+  // At x on the way back it has walked 21 - x, and is within sqrt(1.2^2 - 1) = 0.66 m of the places
+  // that it left 21 - 2 x - 0.66 m earlier: 6 m at x = 7.17, after 13.83 m.
+  EXPECT_NEAR(synthetic::first_return(line), 13.83, 0.2);
+  line.resize(600);
+  EXPECT_NEAR(synthetic::first_return(line), 12, 1e-3) << "never: the whole length";
 }
 
 TEST(Trajectory, ShortWalksBeginLongOnes) {

@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "gpureg/point_cloud.hpp"
+#include "gpureg/prior.hpp"
+
+namespace gpureg::cli {
+
+/// What the user knows about the viewpoints of a cloud: "x,y,z", "none" or "auto".
+struct ViewpointChoice {
+  std::string text = "auto";
+
+  /// @throws InvalidArgument naming option and text.
+  void check(const char* option) const;
+  /// Puts a given viewpoint into the cloud; "none" removes those of the file.
+  void apply(PointCloud& cloud) const;
+  /// View of a cloud that apply() has seen.
+  PointCloudView view(const PointCloud& cloud) const;
+};
+
+/// Gravity prior of `--up x,y,z[,degrees]`, for both clouds.
+/// @param text of the option; empty: no prior.
+/// @throws InvalidArgument naming option and text.
+std::optional<GravityPrior> up_prior(const std::string& text);
+
+}  // namespace gpureg::cli

@@ -1,0 +1,155 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "mesh.hpp"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <map>
+#include <random>
+#include <utility>
+
+#include "mesh_repair.hpp"
+#include "text.hpp"
+
+namespace gpureg::cli {
+namespace {
+
+constexpr double kFewestPoints = 2e4, kMostPoints = 2e6;
+
+std::string extension_of(const std::string& path) {
+  std::string extension = std::filesystem::path(path).extension().string();
+  for (char& c : extension)
+    if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
+  return extension;
+}
+
+bool ply_has_faces(const std::string& path) {
+  std::ifstream file(path, std::ios::binary);
+  std::string line;
+  if (!std::getline(file, line) || line.rfind("ply", 0) != 0) return false;
+  // No header is longer; a text file without end_header must not be read as a whole.
+  for (int k = 0; k < 1000 && std::getline(file, line); ++k) {
+    if (line.rfind("end_header", 0) == 0) return false;
+    if (line.rfind("element face ", 0) == 0) return std::atoll(line.c_str() + 13) > 0;
+  }
+  return false;
+}
+
+Eigen::Vector3d doubled_area(const SurfaceMesh& mesh, const std::array<std::uint32_t, 3>& face) {
+  const Eigen::Vector3d& a = mesh.vertices[face[0]];
+  return (mesh.vertices[face[1]] - a).cross(mesh.vertices[face[2]] - a);
+}
+
+}  // namespace
+
+double SurfaceMesh::area() const {
+  double sum = 0;
+  for (const auto& face : faces) sum += 0.5 * doubled_area(*this, face).norm();
+  return sum;
+}
+
+bool is_mesh(const std::string& path) {
+  const std::string extension = extension_of(path);
+  return extension == ".stl" || extension == ".obj" || ply_has_faces(path);
+}
+
+void repair_mesh(SurfaceMesh& mesh) {
+  const auto flat = [&](const std::array<std::uint32_t, 3>& face) {
+    return !(doubled_area(mesh, face).norm() > 0);
+  };
+  const std::size_t before = mesh.faces.size();
+  mesh.faces.erase(std::remove_if(mesh.faces.begin(), mesh.faces.end(), flat), mesh.faces.end());
+  mesh.flat_faces = before - mesh.faces.size();
+
+  using Edge = std::pair<std::uint32_t, std::uint32_t>;
+  struct Use {
+    std::size_t face;
+    bool ascending;  ///< the face runs from the lower to the higher vertex
+  };
+  std::map<Edge, std::vector<Use>> edges;
+  for (std::size_t f = 0; f < mesh.faces.size(); ++f)
+    for (std::size_t k = 0; k < 3; ++k) {
+      const std::uint32_t a = mesh.faces[f][k], b = mesh.faces[f][(k + 1) % 3];
+      edges[{std::min(a, b), std::max(a, b)}].push_back({f, a < b});
+    }
+  std::vector<std::vector<std::pair<std::size_t, bool>>> neighbors(mesh.faces.size());
+  for (const auto& [edge, uses] : edges) {
+    mesh.open_edges += uses.size() == 1;
+    mesh.non_manifold_edges += uses.size() > 2;
+    if (uses.size() != 2) continue;
+    // Neighbours that agree run along their edge in opposite directions.
+    const bool disagree = uses[0].ascending == uses[1].ascending;
+    neighbors[uses[0].face].emplace_back(uses[1].face, disagree);
+    neighbors[uses[1].face].emplace_back(uses[0].face, disagree);
+  }
+  std::vector<signed char> turned(mesh.faces.size(), -1);
+  for (std::size_t start = 0; start < mesh.faces.size(); ++start) {
+    if (turned[start] >= 0) continue;
+    turned[start] = 0;
+    std::vector<std::size_t> part{start};
+    for (std::size_t next = 0; next < part.size(); ++next)
+      for (const auto& [face, disagree] : neighbors[part[next]])
+        if (turned[face] < 0) {
+          turned[face] = static_cast<signed char>((turned[part[next]] != 0) != disagree);
+          part.push_back(face);
+        }
+    std::size_t flips = 0;
+    for (const std::size_t face : part) flips += turned[face] != 0;
+    // The fewer ones are wrong.
+    const bool others = 2 * flips > part.size();
+    for (const std::size_t face : part) {
+      if ((turned[face] != 0) == others) continue;
+      std::swap(mesh.faces[face][1], mesh.faces[face][2]);
+      ++mesh.flipped_faces;
+    }
+  }
+  if (!mesh.closed()) return;
+  double volume = 0;
+  for (const auto& face : mesh.faces)
+    volume += mesh.vertices[face[0]].dot(doubled_area(mesh, face));
+  if (volume >= 0) return;
+  for (auto& face : mesh.faces) std::swap(face[1], face[2]);
+  mesh.flipped_faces = mesh.faces.size() - mesh.flipped_faces;
+}
+
+std::string notes_of(const SurfaceMesh& mesh) {
+  std::string text;
+  const auto add = [&](std::size_t count, const char* what) {
+    if (count > 0) text += (text.empty() ? "" : ", ") + grouped(count) + " " + what;
+  };
+  add(mesh.flat_faces, "faces without area were dropped");
+  add(mesh.flipped_faces, "faces pointed the wrong way and were turned");
+  add(mesh.non_manifold_edges, "edges belong to more than two faces");
+  return text;
+}
+
+PointCloud sample_mesh(const SurfaceMesh& mesh, double spacing) {
+  std::vector<double> until;  // area up to and including each face
+  for (const auto& face : mesh.faces)
+    until.push_back((until.empty() ? 0 : until.back()) + 0.5 * doubled_area(mesh, face).norm());
+  const double wanted = spacing > 0 ? until.back() / (spacing * spacing) : kFewestPoints;
+  const auto count = static_cast<std::size_t>(std::clamp(wanted, kFewestPoints, kMostPoints));
+  std::mt19937 random(1);
+  const auto unit = [&] { return static_cast<double>(random()) / 4294967296.0; };
+  PointCloud cloud;
+  cloud.points.reserve(count);
+  cloud.normals.reserve(count);
+  std::size_t f = 0;
+  for (std::size_t k = 0; k < count; ++k) {
+    // Stratified by area: one point in each of `count` equal parts.
+    const double at = (static_cast<double>(k) + unit()) / static_cast<double>(count) * until.back();
+    while (f + 1 < until.size() && until[f] < at) ++f;
+    const auto& face = mesh.faces[f];
+    const double s = std::sqrt(unit()), u = unit();
+    const Eigen::Vector3d p = (1 - s) * mesh.vertices[face[0]] +
+                              s * (1 - u) * mesh.vertices[face[1]] + s * u * mesh.vertices[face[2]];
+    cloud.points.push_back(p.cast<float>());
+    cloud.normals.push_back(doubled_area(mesh, face).normalized().cast<float>());
+  }
+  return cloud;
+}
+
+}  // namespace gpureg::cli

@@ -1,0 +1,206 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""A map: scans with their poses, edges and islands."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from . import _core
+from ._core import MapGraph, RegistrationOptions
+from .fragments import FragmentSet
+
+Poses = npt.NDArray[np.float64]
+Points = npt.NDArray[np.float32]
+
+
+@dataclasses.dataclass(frozen=True)
+class MapScan:
+    """One scan of a map.
+
+    Attributes
+    ----------
+    number : int
+        Of the fragment.
+    placed : bool
+    island : int or None
+        Index into ``Map.islands``; None where the scan is left out.
+    confidence : float
+        A lower bound of the probability that the pose is correct; of a scan that is left out, the
+        confidence of its best pair.
+    reason : str
+        "none" where the scan is placed and confirmed; see ``docs/maps.md``.
+    explanation : str
+        The reason as a sentence.
+    """
+
+    number: int
+    placed: bool
+    island: int | None
+    confidence: float
+    reason: str
+    explanation: str
+
+
+@dataclasses.dataclass(frozen=True)
+class MapEdge:
+    """One pair that took part in the pose graph.
+
+    Attributes
+    ----------
+    source, target : int
+        Numbers of fragments.
+    target_from_source : (4, 4) float64
+        As registered.
+    confidence, weight : float
+        After loop consistency; in the pose graph.
+    accepted : bool
+    reason : str
+        "none", "inconsistent" or "unconfirmed".
+    mode : int
+        Index into ``RegistrationResult.modes``.
+    information : (6, 6) float64
+        As for `gpureg.pose_graph.add_edge`.
+    """
+
+    source: int
+    target: int
+    target_from_source: Poses
+    confidence: float
+    weight: float
+    accepted: bool
+    reason: str
+    mode: int
+    information: Poses
+
+
+@dataclasses.dataclass(frozen=True)
+class MapLink:
+    """A place where an island would fall into two parts if fewer edges were correct.
+
+    Attributes
+    ----------
+    scans : tuple of int
+        Numbers of the fragments of the smaller part.
+    confidence : float
+        That one of the accepted edges between the parts is correct.
+    accepted, rejected : int
+        Edges between the parts.
+    """
+
+    scans: tuple[int, ...]
+    confidence: float
+    accepted: int
+    rejected: int
+
+
+class Map:
+    """Scans with their poses. Made by `reconstruct`; holds no points."""
+
+    def __init__(
+        self,
+        graph: MapGraph,
+        fragments: FragmentSet,
+        options: RegistrationOptions,
+        refinement: dict[str, Any] | None,
+    ) -> None:
+        self._graph, self._fragments, self._options = graph, fragments, options
+        self._refinement = refinement
+        numbers = fragments.numbers
+        self._scans = tuple(
+            MapScan(number, *scan) for number, scan in zip(numbers, graph.scans, strict=True)
+        )
+        self._edges = tuple(
+            MapEdge(numbers[edge[0]], numbers[edge[1]], *edge[2:]) for edge in graph.edges
+        )
+        self._links = tuple(
+            MapLink(tuple(numbers[k] for k in link[0]), *link[1:]) for link in graph.links
+        )
+
+    @property
+    def islands(self) -> list[list[int]]:
+        """Numbers of the fragments of each island, the largest first."""
+        return [[self._fragments.numbers[k] for k in island] for island in self._graph.islands]
+
+    @property
+    def poses(self) -> Poses:
+        """(N, 4, 4) ``island_from_scan`` in the order of the fragments; NaN where a scan is left
+        out. The smallest scan of an island has the identity.
+        """
+        return self._graph.poses
+
+    @property
+    def numbers(self) -> tuple[int, ...]:
+        """Numbers of the fragments, in the order of ``poses`` and ``scans``."""
+        return self._fragments.numbers
+
+    @property
+    def scans(self) -> tuple[MapScan, ...]:
+        """One per fragment, with the reason where it is left out."""
+        return self._scans
+
+    @property
+    def edges(self) -> tuple[MapEdge, ...]:
+        """Accepted and rejected edges."""
+        return self._edges
+
+    @property
+    def weakest_links(self) -> tuple[MapLink, ...]:
+        """Where the islands are held least, in no order."""
+        return self._links
+
+    @property
+    def refinement(self) -> dict[str, Any] | None:
+        """Figures of the joint refinement: pairs, correspondences, iterations, rejected_edges,
+        initial_rmse and final_rmse in metres, solved. None without.
+        """
+        return self._refinement
+
+    def points(
+        self, island: int = 0, *, voxel_size: float | None = None
+    ) -> tuple[Points, Points | None]:
+        """Points of an island, averaged per voxel, and their normals where the scans have some.
+
+        Reads the fragments again, one at a time.
+
+        Parameters
+        ----------
+        voxel_size : float, optional
+            Default: half the voxel size of the registration.
+
+        Returns
+        -------
+        points : (M, 3) float32
+        normals : (M, 3) float32 or None
+
+        Raises
+        ------
+        IndexError
+            Where there is no such island.
+        """
+        islands = self._graph.islands
+        if not 0 <= island < len(islands):
+            raise IndexError(f"island is {island}, but the map has {len(islands)}")
+        merged = _core.VoxelMap(
+            self._options.prepare.voxel_size / 2 if voxel_size is None else voxel_size
+        )
+        poses = self.poses
+        for k in islands[island]:
+            rows, normals, _, _, origin, _ = self._fragments.load(k, self._options.prepare)
+            merged.add(
+                np.ascontiguousarray(rows),
+                None if normals is None else np.ascontiguousarray(normals),
+                np.zeros(3) if origin is None else origin,
+                poses[k],
+            )
+        return merged.cloud()
+
+    def __repr__(self) -> str:
+        placed = sum(scan.placed for scan in self._scans)
+        return f"<gpureg.Map: {placed} of {len(self._scans)} scans placed, islands of {[len(i) for i in self._graph.islands]}>"
+
+
+__all__ = ["Map", "MapEdge", "MapLink", "MapScan"]

@@ -1,0 +1,75 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Tables of maps."""
+
+from tables.records import load, source
+
+SCENES = {
+    "redkitchen": "red kitchen",
+    "house_A": "house A",
+    "house_B": "house B",
+    "hospital_E": "hospital E",
+}
+VARIANTS = {
+    "": "complete",
+    "_half": "every second scan",
+    "_third": "every third scan",
+    "_nocam": "complete, without cameras.txt",
+}
+
+
+def rows_of(maps):
+    for scene, shown in SCENES.items():
+        for suffix, variant in VARIANTS.items():
+            if scene + suffix in maps:
+                yield f"{shown}, {variant}", maps[scene + suffix]
+    if "foreign" in maps:
+        yield "house A and 5 scans of hospital E", maps["foreign"]
+    if "two_buildings" in maps:
+        figures = maps["two_buildings"]
+        yield (
+            f"house A and hospital E in one folder, {figures['after_refinement']['pairs']} pairs",
+            figures,
+        )
+
+
+def errors(figures):
+    known = [island for island in figures["islands"] if "rmse_cm" in island]
+    return ", ".join(f"{i['rmse_cm']:.1f} cm {i['rmse_degrees_own']:.1f}°" for i in known) or "-"
+
+
+def maps():
+    record = load("maps.json")
+    rows = [
+        "| scans | placed | islands of | edges: accepted / wrong | RMSE before the joint refinement | after | graph, refinement in s | MiB |",
+        "| --- | --- | --- | --- | --- | --- | --- | --- |",
+    ]
+    for name, both in rows_of(record["maps"]):
+        before, after = both["before_refinement"], both["after_refinement"]
+        seconds = after["seconds"]
+        rows.append(
+            f"| {name} | {after['placed']} of {after['scans']} | {', '.join(str(len(i['scans'])) for i in after['islands'])} "
+            f"| {after['accepted']} / {len(after['wrong'])} | {errors(before)} | {errors(after)} "
+            f"| {seconds['graph']:.1f}, {seconds['refine']:.0f} | {after['peak_memory_mib']:.0f} |"
+        )
+    return [*rows, "", source(record) + "."]
+
+
+def peers():
+    record = load("maps.json")
+    rows = [
+        "| scans | method | placed | edges: accepted / wrong | RMSE |",
+        "| --- | --- | --- | --- | --- |",
+    ]
+    for name, theirs in record["peers"]["open3d"].items():
+        scene, _, variant = name.partition("_third")
+        shown = SCENES[scene] + (", every third scan" if variant or "_third" in name else "")
+        ours = record["maps"][name]["after_refinement"]
+        for method, figures in (("gpureg", ours), ("Open3D multiway registration", theirs)):
+            rows.append(
+                f"| {shown} | {method} | {figures['placed']} of {figures['scans']} "
+                f"| {figures['accepted']} / {len(figures['wrong'])} | {errors(figures)} |"
+            )
+    return rows
+
+
+TABLES = {"maps": maps, "map_peers": peers}
