@@ -62,12 +62,12 @@ cpp_maximum_signature_line_length = 88
 nitpick_ignore_regex = [
     (
         r"cpp:.*",
-        r"(std|Eigen|pcl|Unaligned\w+)::.*|gpureg(::(io|evaluation|files|pose_graph|reconstruction))?|std|Eigen|pcl|pose_graph(::.*)?",
+        r"(std|Eigen|pcl|Unaligned\w+)::.*|reconstruction|UnalignedMatrix6d|gpureg(::(io|evaluation|files|pose_graph|reconstruction|loop_closure|pruning))?|std|Eigen|pcl|pose_graph(::.*)?",
     ),
     (r"cpp:.*", r"u?int\d+_t|size_t|CUstream_st|PreparedState|Engine|Base|Point\w+|SignatureT"),
     (r"py:.*", r"(np|numpy|npt|pa|pyarrow|ray|collections|os|pathlib)\..*|Path|Any"),
     (r"py:.*", r"(gpureg\.)?_.*|results"),
-    (r"py:class", r".* .*|fragments|pairs|tried|kept"),
+    (r"py:class", r".* .*|fragments|pairs|tried|kept|source|confidence|accepted|float64|\d"),
 ]
 
 html_theme = "furo"

@@ -205,7 +205,7 @@ Surface surface_of(const PreparedCloud& cloud);
 
 /// The same from a raw cloud. Features of the cloud are not used, and none are computed.
 /// @param registration options of the registration of the pairs.
-/// @throws as prepare().
+/// @throws InvalidArgument as prepare().
 Surface surface_of(const Context& context, PointCloudView cloud,
                    const PrepareOptions& registration);
 

@@ -63,7 +63,7 @@ class MapEdge:
     mode : int
         Index into ``RegistrationResult.modes``.
     information : (6, 6) float64
-        As for `gpureg.pose_graph.add_edge`.
+        As for ``gpureg.pose_graph.add_edge``.
     """
 
     source: int
@@ -154,8 +154,10 @@ class Map:
 
     @property
     def refinement(self) -> dict[str, Any] | None:
-        """Figures of the joint refinement: pairs, correspondences, iterations, rejected_edges,
-        initial_rmse and final_rmse in metres, solved. None without.
+        """What the joint refinement did; None without one.
+
+        Keys: pairs, correspondences, iterations, rejected_edges, initial_rmse and final_rmse in
+        metres, solved.
         """
         return self._refinement
 

@@ -189,7 +189,7 @@ class LoopCloser:
         return self._core.loops
 
     def graph(self) -> PoseGraph:
-        """Odometry and accepted loops, for `pose_graph`."""
+        """Odometry and accepted loops, for ``pose_graph``."""
         return self._core.graph()
 
     def save(self, path: Path) -> None:
@@ -197,7 +197,7 @@ class LoopCloser:
         self._core.save(os.fspath(path))
 
     def load(self, path: Path, clouds: Callable[[int], PreparedCloud]) -> None:
-        """Replace the state by a saved one; `clouds(id)` returns the fragments' clouds again."""
+        """Replace the state by a saved one; ``clouds(id)`` returns the fragments' clouds again."""
         self._core.load(os.fspath(path), clouds)
 
     def __len__(self) -> int:

@@ -158,7 +158,10 @@ TEST(DegeneracySearch, APoseThatStaysAwayIsAnAlternative) {
   std::mt19937 random(3);
   std::vector<Eigen::Vector3f> points;
   for (const Vec3& p : bare_corner(random, 40000)) points.emplace_back(p.x, p.y, p.z);
-  const PointCloudView cloud(points);
+  PointCloudView cloud(points);
+  const float eye[3] = {0, 0, 0};
+  cloud.viewpoints = eye;
+  cloud.viewpoint_count = 1;
   RegistrationOptions searched, still;
   still.evidence.degeneracy_search_distance = 0;
   const RegistrationResult a = align(Context::cpu(), cloud, cloud, searched),

@@ -132,6 +132,10 @@ def measure_instructions(arguments):
             "1",
             "--voxel-size",
             str(COUNTED_VOXEL),
+            "--source-viewpoint",
+            "0,0,0",
+            "--target-viewpoint",
+            "0,0,0",
             *map(str, words),
         ]
         done = subprocess.run(command, capture_output=True, text=True)
