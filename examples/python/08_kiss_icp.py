@@ -32,7 +32,9 @@ def main() -> int:
     tracker = KissICP(config)
     closer = gpureg.LoopCloser(voxel_size=arguments.voxel_size)
 
-    points, sensors, world_from_fragments = [], [], []
+    points: list[np.ndarray] = []
+    sensors: list[np.ndarray] = []
+    world_from_fragments: list[np.ndarray] = []
     files = sorted(p for p in arguments.folder.iterdir() if p.suffix in (".ply", ".pcd"))
     for number, file in enumerate(files):
         scan = np.asarray(gpureg.read_point_cloud(file).points, np.float64)

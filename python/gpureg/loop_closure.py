@@ -60,7 +60,7 @@ class LoopCloser:
     >>> update = closer.process(milliseconds=50)
     >>> [loop.state for loop in update.changed]
     []
-    >>> update.poses[1][0, 3]
+    >>> float(update.poses[1][0, 3])
     1.0
     """
 

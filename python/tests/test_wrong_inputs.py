@@ -11,7 +11,7 @@ from scenes import few
     ("value", "error", "message"),
     [
         (np.zeros((3, 100)), ValueError, r"points: expected shape \(N, 3\), got \(3, 100\)"),
-        (np.zeros(3), ValueError, r"points: expected shape \(N, 3\), got \(3,\)"),
+        (np.zeros(3), ValueError, r"points: expected shape \(N, 3\), got \(4,\)"),
         (np.zeros((2, 3, 3)), ValueError, r"got \(2, 3, 3\)"),
         (np.zeros(()), ValueError, r"got \(\)"),
         ([], ValueError, r"points: expected shape \(N, 3\), got \(0,\)"),
@@ -53,8 +53,8 @@ def test_wrong_companions_are_named(source):
         gpureg.prepare(source, features=np.zeros(len(source)))
     with pytest.raises(gpureg.InvalidArgument, match="feature_dimension is 0"):
         gpureg.prepare(source, features=np.zeros((len(source), 0)))
-    with pytest.raises(ValueError, match=r"viewpoints: expected shape \(N, 3\), got \(3,\)"):
-        gpureg.prepare(source, viewpoints=[0, 0, 0])
+    with pytest.raises(ValueError, match=r"viewpoints: expected shape \(N, 3\), got \(4,\)"):
+        gpureg.prepare(source, viewpoints=[0, 0, 0, 0])
     with pytest.raises(gpureg.InvalidArgument, match="viewpoints is nan"):
         gpureg.prepare(source, viewpoints=[[0, np.nan, 0]])
     with pytest.raises(ValueError, match=r"target: expected shape \(N, 3\), got \(5, 2\)"):
