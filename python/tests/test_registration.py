@@ -68,10 +68,11 @@ def test_modes_carry_their_evidence(source, target):
 
 def test_register_equals_prepare_and_align(source, target):
     options = few()
-    a, b = gpureg.prepare(source), gpureg.prepare(target)
-    assert bits(gpureg.register(source, target, options=options)) == bits(
-        gpureg.align(a, b, options=options)
-    )
+    eye = [0, 0, 0]
+    a, b = gpureg.prepare(source, viewpoints=eye), gpureg.prepare(target, viewpoints=eye)
+    assert bits(
+        gpureg.register(source, target, options=options, source_viewpoint=eye, target_viewpoint=eye)
+    ) == bits(gpureg.align(a, b, options=options))
     both = gpureg.align_batch([a, b], [(0, 1), (1, 0)], options=options)
     assert bits(both[0]) == bits(gpureg.align(a, b, options=options))
     assert bits(both[1]) == bits(gpureg.align(b, a, options=options))
