@@ -23,7 +23,7 @@ def bits(result):
     state = result.to_dict()
     del state["timings"]
     # One by one: pickle notes which equal strings are one object.
-    return [pickle.dumps(value) for value in state.values()]
+    return tuple(pickle.dumps(value) for value in state.values())
 
 
 def test_register_finds_the_pose(source, target, truth):
@@ -66,13 +66,15 @@ def test_modes_carry_their_evidence(source, target):
     assert paper.aligned and paper.modes == [] and paper.score == paper.inlier_ratio
 
 
-def test_register_equals_prepare_and_align(source, target):
-    options = few()
-    eye = [0, 0, 0]
-    a, b = gpureg.prepare(source, viewpoints=eye), gpureg.prepare(target, viewpoints=eye)
-    assert bits(
-        gpureg.register(source, target, options=options, source_viewpoint=eye, target_viewpoint=eye)
-    ) == bits(gpureg.align(a, b, options=options))
+@pytest.mark.parametrize("method", ["loopsmart", "default"])
+def test_register_equals_prepare_and_align(source, target, method):
+    options = few() if method == "loopsmart" else gpureg.RegistrationOptions()
+    a, b = (gpureg.prepare(cloud, options=options.prepare) for cloud in (source, target))
+    if method == "default":
+        assert a.statistics.viewpoint == "none"  # two preparations and four alignments
+    assert bits(gpureg.register(source, target, options=options)) == bits(
+        gpureg.align(a, b, options=options)
+    )
     both = gpureg.align_batch([a, b], [(0, 1), (1, 0)], options=options)
     assert bits(both[0]) == bits(gpureg.align(a, b, options=options))
     assert bits(both[1]) == bits(gpureg.align(b, a, options=options))
