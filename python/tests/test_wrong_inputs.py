@@ -11,7 +11,7 @@ from scenes import few
     ("value", "error", "message"),
     [
         (np.zeros((3, 100)), ValueError, r"points: expected shape \(N, 3\), got \(3, 100\)"),
-        (np.zeros(3), ValueError, r"points: expected shape \(N, 3\), got \(4,\)"),
+        (np.zeros(3), ValueError, r"points: expected shape \(N, 3\), got \(3,\)"),
         (np.zeros((2, 3, 3)), ValueError, r"got \(2, 3, 3\)"),
         (np.zeros(()), ValueError, r"got \(\)"),
         ([], ValueError, r"points: expected shape \(N, 3\), got \(0,\)"),
