@@ -30,10 +30,9 @@ FOREIGN = (3, 13, 23, 33, 43)
 class Set:
     """A folder of scans of one or two scenes, and the truth of all of them."""
 
-    def __init__(self, name, parts, cameras=True, known_only=None):
-        """known_only: name of a set whose pairs serve, too; pairs that no file has are not tried."""
-        self.name, self.parts, self.cameras = name, parts, cameras
-        self.known_only = known_only
+    def __init__(self, name, parts, cameras=True, also=None):
+        """also: name of a set whose pairs serve, too."""
+        self.name, self.parts, self.cameras, self.also = name, parts, cameras, also
 
     def write(self, data, folder):
         shutil.rmtree(folder, ignore_errors=True)
@@ -66,8 +65,11 @@ class Set:
     def sources(self):
         """Sets whose pairs serve this one, with the offset of their numbers."""
         suffix = "" if self.cameras else "_nocam"
-        own = self.known_only or self.name
-        return [(own, 0), *((scene + suffix, offset) for scene, _, offset in self.parts)]
+        own = [self.name, *([self.also] if self.also else [])]
+        return [
+            *((name, 0) for name in own),
+            *((scene + suffix, offset) for scene, _, offset in self.parts),
+        ]
 
 
 def count_of(scene, data):
@@ -92,7 +94,7 @@ def cases(data):
             ("house_A", range(count_of("house_A", data)), 0),
             ("hospital_E", range(count_of("hospital_E", data)), OFFSET),
         ],
-        known_only="foreign",
+        also="foreign",
     )
     return out
 
@@ -119,8 +121,6 @@ def run(command, folder, chosen, arguments, out, more):
     pairs = arguments.work / "pairs"
     pairs.mkdir(exist_ok=True)
     records, options = known_pairs(chosen, pairs)
-    if chosen.known_only:
-        wanted = [pair for pair in wanted if pair in records]
     missing = [pair for pair in wanted if pair not in records]
     if missing:
         if arguments.no_align:
