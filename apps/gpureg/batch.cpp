@@ -75,6 +75,7 @@ class Batch {
       return kInterrupted;
     }
     check_voxel_size(options_.prepare.voxel_size, scene_.extent, "the largest fragment");
+    if (o_.method.automatic_voxel_size && !o_.quiet) note_few_points(scene_.prepared_sizes());
     Pairs pairs = choose_pairs(scene_, o_.pairs, o_.quiet);
     if (pairs.empty())
       throw InvalidArgument(o_.pairs == "all" ? o_.folder + " holds one fragment; a batch needs two"
@@ -185,7 +186,7 @@ class Batch {
 void add_batch(CLI::App& app, Action& chosen) {
   const auto o = std::make_shared<BatchOptions>();
   CLI::App* verb = app.add_subcommand("batch", "Align the fragments cloud_bin_<i> of a folder");
-  verb->add_option("DIR", o->folder, "Folder with cloud_bin_<i>.ply|pcd, and perhaps cameras.txt")
+  verb->add_option("DIR", o->folder, "Folder with cloud_bin_<i>.ply|pcd|bin, or meshes .stl|obj|ply, and perhaps cameras.txt")
       ->required();
   verb->add_option("--pairs", o->pairs, "all, or a file with one pair `i j` a line")
       ->capture_default_str();

@@ -3,13 +3,15 @@
 #include <assimp/postprocess.h>
 #include <assimp/scene.h>
 
+#include <array>
 #include <assimp/Importer.hpp>
+#include <utility>
+#include <vector>
 
 #include "gpureg/error.hpp"
-#include "mesh.hpp"
-#include "mesh_repair.hpp"
+#include "gpureg/mesh.hpp"
 
-namespace gpureg::cli {
+namespace gpureg::io {
 
 SurfaceMesh read_mesh(const std::string& path) {
   Assimp::Importer importer;
@@ -24,27 +26,27 @@ SurfaceMesh read_mesh(const std::string& path) {
                 aiProcess_RemoveComponent | aiProcess_JoinIdenticalVertices);
   if (file == nullptr)
     throw IoError(path + ": holds no readable face: " + importer.GetErrorString());
-  SurfaceMesh mesh;
+  std::vector<Eigen::Vector3d> vertices;
+  std::vector<std::array<std::uint32_t, 3>> faces;
   for (unsigned m = 0; m < file->mNumMeshes; ++m) {
     const aiMesh& part = *file->mMeshes[m];
-    const auto first = static_cast<std::uint32_t>(mesh.vertices.size());
+    const auto first = static_cast<std::uint32_t>(vertices.size());
     for (unsigned k = 0; k < part.mNumVertices; ++k) {
       const aiVector3D& v = part.mVertices[k];
-      mesh.vertices.emplace_back(v.x, v.y, v.z);
-      if (!mesh.vertices.back().allFinite())
-        throw IoError(path + ": vertex " + std::to_string(mesh.vertices.size() - 1) +
-                      " is not finite");
+      vertices.emplace_back(v.x, v.y, v.z);
     }
     for (unsigned k = 0; k < part.mNumFaces; ++k) {
       const aiFace& face = part.mFaces[k];
       if (face.mNumIndices == 3)
-        mesh.faces.push_back(
+        faces.push_back(
             {first + face.mIndices[0], first + face.mIndices[1], first + face.mIndices[2]});
     }
   }
-  repair_mesh(mesh);
-  if (mesh.faces.empty()) throw IoError(path + ": holds no face with an area");
-  return mesh;
+  try {
+    return make_mesh(std::move(vertices), std::move(faces));
+  } catch (const InvalidArgument& error) {
+    throw IoError(path + ": " + error.what());
+  }
 }
 
-}  // namespace gpureg::cli
+}  // namespace gpureg::io
