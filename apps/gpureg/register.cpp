@@ -80,6 +80,9 @@ void print_report(const RegisterOptions& o, const Context& context, const Prepar
               << describe(r.target_from_source.matrix()) << "score    " << fixed(r.score, 3)
               << ", inliers " << grouped(s.inliers) << " of " << grouped(s.points_scored) << " ("
               << percent(r.inlier_ratio) << " %), rmse " << significant(r.inlier_rmse, 3) << " m\n";
+    if (r.equivalent_poses() > 1)
+      std::cout << "symmetry " << r.equivalent_poses() << " equivalent poses, confidence "
+                << fixed(r.symmetry_confidence(), 3) << " together\n";
   }
   std::cout << "counts   correspondences " << grouped(s.correspondences) << ", hypotheses "
             << grouped(s.hypotheses) << ", survivors " << grouped(s.survivors) << ", scored "
@@ -214,6 +217,8 @@ int run(RegisterOptions o) {
   };
   const PreparedCloud source = prepared(o.source_viewpoint.view(source_cloud), o.source);
   const PreparedCloud target = prepared(o.target_viewpoint.view(target_cloud), o.target);
+  o.source_viewpoint.note_place("--source-viewpoint", source, o.source);
+  o.target_viewpoint.note_place("--target-viewpoint", target, o.target);
   if (o.method.automatic_voxel_size)
     note_few_points({{o.source, source.size()}, {o.target, target.size()}});
   TimedResult timed;
@@ -286,6 +291,8 @@ void add_register(CLI::App& app, Action& chosen) {
       "--up", o->up,
       "Vertical direction x,y,z in both clouds, and perhaps how many degrees it may be "
       "off (without: 10): 0,0,1,5");
+  verb->add_flag("--accept-symmetry", o->method.accept_symmetry,
+                 "Also report a pose that a symmetry makes one of several equivalent ones");
   verb->add_option("--json", o->json, "Write options, result, counts and times");
   verb->add_option("--overlay", o->overlay, "Write both clouds in colour, aligned, as PLY");
   verb->add_option("--image", o->image, "Draw both clouds before and after, as PNG");

@@ -225,6 +225,7 @@ class EvidenceOptions:
 class RegistrationOptions:
     seed: int
     min_confidence: float
+    accept_symmetry: bool
     method: Literal["compatibility", "quadruples"]
     smaller_as_source: bool
     prepare: PrepareOptions
@@ -237,6 +238,7 @@ class RegistrationOptions:
         *,
         seed: int = ...,
         min_confidence: float = ...,
+        accept_symmetry: bool = ...,
         method: Literal["compatibility", "quadruples"] = ...,
         smaller_as_source: bool = ...,
         prepare: PrepareOptions = ...,
@@ -250,6 +252,7 @@ class RegistrationOptions:
         *,
         seed: int = ...,
         min_confidence: float = ...,
+        accept_symmetry: bool = ...,
         method: Literal["compatibility", "quadruples"] = ...,
         smaller_as_source: bool = ...,
         prepare: PrepareOptions = ...,
@@ -420,6 +423,8 @@ class RegistrationMode:
     @property
     def overlap_confidence(self) -> float: ...
     @property
+    def equivalent(self) -> bool: ...
+    @property
     def evidence(self) -> PoseEvidence: ...
     @property
     def rank_before_refinement(self) -> int: ...
@@ -449,7 +454,9 @@ class PoseVerification:
 
 class RegistrationResult:
     @property
-    def status(self) -> Literal["aligned", "not_aligned", "skipped"]: ...
+    def status(
+        self,
+    ) -> Literal["aligned", "not_aligned", "skipped", "aligned_up_to_symmetry"]: ...
     @property
     def reason(self) -> str: ...
     @property
@@ -462,6 +469,10 @@ class RegistrationResult:
     def target_from_source(self) -> _Float64: ...
     @property
     def score(self) -> float: ...
+    @property
+    def symmetry_confidence(self) -> float: ...
+    @property
+    def equivalent_poses(self) -> int: ...
     @property
     def modes(self) -> list[RegistrationMode]: ...
     @property

@@ -285,7 +285,52 @@ def accuracy_attempts():
     return rows
 
 
+SENSORS = {
+    "kitchen": "rooms: red kitchen, depth camera",
+    "dragon": "objects: Stanford dragon, range scanner",
+    "cad": "CAD: scans on points of the models",
+    "cad_mesh": "CAD: scans on the models as meshes",
+    "kitti": "LiDAR: KITTI, 64 beams",
+    "lidar": "LiDAR: sample of small_gicp",
+    "fgr": "objects: range pairs of FGR",
+}
+CONDITIONS = {
+    "said": "moved, viewpoints given",
+    "nothing": "moved, nothing given",
+    "still": "not moved, nothing given",
+}
+
+
+def viewpoints():
+    record = load("viewpoints.json")
+    out = [
+        "| data | clouds | pairs | first correct | reported | with `--accept-symmetry` | false reports | decisions about scans | about models |",
+        "| --- | --- | --- | --- | --- | --- | --- | --- | --- |",
+    ]
+    for name, text in SENSORS.items():
+        if name not in record["sets"]:
+            continue
+        for condition, of in record["sets"][name]["conditions"].items():
+
+            def decisions(kind):
+                found = {key.split(": ")[1]: n for key, n in of.items() if key.startswith(f"{kind}: ")}  # noqa: B023
+                return ", ".join(f"{n} {key}" for key, n in sorted(found.items()))
+
+            wrong = of["reported_up_to_symmetry_wrong"]
+            out.append(
+                f"| {text} | {CONDITIONS[condition]} | {of['pairs']}"
+                + (f" and {of['negatives']} negative" if of.get("negatives") else "")
+                + f" | {of['right']} | {of['reported']} | {of['reported_up_to_symmetry']} | {wrong} | {decisions('scan')} | {decisions('model')} |"
+            )
+    commands = [
+        f"`{entry['command']}` at commit {entry['commit'].rstrip('+')}."
+        for name, entry in record["sets"].items()
+    ]
+    return [*out, "", "Made by", *[f"* {command}" for command in commands]]
+
+
 TABLES = {
+    "viewpoints": viewpoints,
     "redkitchen": redkitchen,
     "redkitchen_seeds": redkitchen_seeds,
     "range_pairs": range_pairs,

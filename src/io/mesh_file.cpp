@@ -5,15 +5,30 @@
 
 #include <array>
 #include <assimp/Importer.hpp>
+#include <fstream>
+#include <string_view>
 #include <utility>
 #include <vector>
 
 #include "gpureg/error.hpp"
+#include "gpureg/io.hpp"
 #include "gpureg/mesh.hpp"
 
 namespace gpureg::io {
 
+namespace {
+
+bool starts_as_ply(const std::string& path) {
+  char start[3] = {};
+  return std::ifstream(path, std::ios::binary).read(start, sizeof(start)) &&
+         std::string_view(start, sizeof(start)) == "ply";
+}
+
+}  // namespace
+
 SurfaceMesh read_mesh(const std::string& path) {
+  // Assimp takes a truncated PLY file for one of fewer faces; the reader of points refuses it.
+  if (starts_as_ply(path)) read_point_cloud(path);
   Assimp::Importer importer;
   importer.SetPropertyInteger(AI_CONFIG_PP_SBP_REMOVE,
                               aiPrimitiveType_POINT | aiPrimitiveType_LINE);
