@@ -186,7 +186,9 @@ class Batch {
 void add_batch(CLI::App& app, Action& chosen) {
   const auto o = std::make_shared<BatchOptions>();
   CLI::App* verb = app.add_subcommand("batch", "Align the fragments cloud_bin_<i> of a folder");
-  verb->add_option("DIR", o->folder, "Folder with cloud_bin_<i>.ply|pcd|bin, or meshes .stl|obj|ply, and perhaps cameras.txt")
+  verb->add_option(
+          "DIR", o->folder,
+          "Folder with cloud_bin_<i>.ply|pcd|bin, or meshes .stl|obj|ply, and perhaps cameras.txt")
       ->required();
   verb->add_option("--pairs", o->pairs, "all, or a file with one pair `i j` a line")
       ->capture_default_str();

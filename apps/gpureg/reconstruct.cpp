@@ -196,9 +196,8 @@ class Reconstruct {
     for (std::size_t k = 0; k < surfaces_.size(); ++k) {
       if (InterruptGuard::requested()) return false;
       if (run_.map.scans[k].placed) {
-        PointCloud cloud = 
-            read_cloud(scene.files[k], mesh_spacing(run_.options.prepare.voxel_size),
-                       MeshNote::none);
+        PointCloud cloud = read_cloud(scene.files[k], mesh_spacing(run_.options.prepare.voxel_size),
+                                      MeshNote::none);
         cloud.viewpoints = cameras[scene.numbers[k]];
         surfaces_[k] = reconstruction::surface_of(context_, cloud.view(), run_.options.prepare);
       }
@@ -262,7 +261,9 @@ void add_reconstruct(CLI::App& app, Action& chosen) {
   const auto o = std::make_shared<ReconstructOptions>();
   CLI::App* verb = app.add_subcommand(
       "reconstruct", "Make one map of the unordered fragments cloud_bin_<i> of a folder");
-  verb->add_option("DIR", o->folder, "Folder with cloud_bin_<i>.ply|pcd|bin, or meshes .stl|obj|ply, and perhaps cameras.txt")
+  verb->add_option(
+          "DIR", o->folder,
+          "Folder with cloud_bin_<i>.ply|pcd|bin, or meshes .stl|obj|ply, and perhaps cameras.txt")
       ->required();
   verb->add_option("-o,--output", o->output,
                    "Folder for poses.txt, reconstruction.json, trajectory.txt (TUM), edges.log "

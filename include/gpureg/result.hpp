@@ -83,7 +83,8 @@ struct RegistrationResult {
     return status == RegistrationStatus::aligned ||
            status == RegistrationStatus::aligned_up_to_symmetry;
   }
-  /// Number of modes that the clouds cannot tell from the first one, with that one; 0 without modes.
+  /// Number of modes that the clouds cannot tell from the first one, with that one; 0 without
+  /// modes.
   std::size_t equivalent_poses() const;
   /// Probability that the first mode or one of its equivalents is correct: the sum of their
   /// confidences. The score without modes.

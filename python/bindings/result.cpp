@@ -228,9 +228,8 @@ std::string text_of(const RegistrationResult& r) {
 }
 
 RegistrationStatus status_from(const std::string& name) {
-  for (const auto s :
-       {RegistrationStatus::aligned, RegistrationStatus::not_aligned, RegistrationStatus::skipped,
-        RegistrationStatus::aligned_up_to_symmetry})
+  for (const auto s : {RegistrationStatus::aligned, RegistrationStatus::not_aligned,
+                       RegistrationStatus::skipped, RegistrationStatus::aligned_up_to_symmetry})
     if (name == to_string(s)) return s;
   throw py::value_error("status: '" + name + "' is none");
 }
@@ -295,7 +294,9 @@ void bind_registration_result(py::module_& m) {
           "Why the pair is not aligned; \"none\" where it is.")
       .def_property_readonly(
           "explanation", [](const R& r) { return explain(r.reason); }, "The reason as a sentence.")
-      .def_property_readonly("aligned", &R::aligned, "A pose is reported: status \"aligned\" or \"aligned_up_to_symmetry\".")
+      .def_property_readonly(
+          "aligned", &R::aligned,
+          "A pose is reported: status \"aligned\" or \"aligned_up_to_symmetry\".")
       .def_readonly("has_candidate", &R::has_candidate,
                     "target_from_source holds a pose, reported or not.")
       .def_property_readonly("target_from_source", &pose_of,

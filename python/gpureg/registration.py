@@ -22,7 +22,6 @@ from ._core import (
 from ._progress import batch_progress
 from .preparation import check_prepared, prepared
 
-
 #: Values of ``RegistrationResult.status`` where a pose is reported.
 ALIGNED = ("aligned", "aligned_up_to_symmetry")
 

@@ -21,7 +21,9 @@ def mesh(vertices=VERTICES, faces=FACES):
 
 
 def obj(path, vertices=VERTICES, faces=FACES):
-    lines = ["v {} {} {}".format(*v) for v in vertices] + ["f {} {} {}".format(*f + 1) for f in faces]
+    lines = ["v {} {} {}".format(*v) for v in vertices] + [
+        "f {} {} {}".format(*f + 1) for f in faces
+    ]
     path.write_text("\n".join(lines) + "\n")
     return path
 
@@ -141,9 +143,7 @@ class TestMesh:
         assert len(cloud) == 20000 and len(cloud.normals) == 20000
         assert len(gpureg.read_point_cloud(path, spacing=0.01)) == 60000
         assert gpureg.prepare(path).statistics.input_points == 20000
-        fragments = gpureg.FragmentSet.from_directory(
-            obj(tmp_path / "cloud_bin_0.obj").parent
-        )
+        fragments = gpureg.FragmentSet.from_directory(obj(tmp_path / "cloud_bin_0.obj").parent)
         assert fragments.numbers == (0,)
 
     def test_wrong_files_are_named(self, tmp_path):

@@ -313,7 +313,9 @@ def viewpoints():
         for condition, of in record["sets"][name]["conditions"].items():
 
             def decisions(kind):
-                found = {key.split(": ")[1]: n for key, n in of.items() if key.startswith(f"{kind}: ")}  # noqa: B023
+                found = {
+                    key.split(": ")[1]: n for key, n in of.items() if key.startswith(f"{kind}: ")
+                }  # noqa: B023
                 return ", ".join(f"{n} {key}" for key, n in sorted(found.items()))
 
             wrong = of["reported_up_to_symmetry_wrong"]

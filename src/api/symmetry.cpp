@@ -119,8 +119,7 @@ bool CloudSymmetry::refine(Eigen::Isometry3d& motion) const {
     const Eigen::Vector3d centre = motion * middle_;
     for (const std::uint32_t index : sample_) {
       const Eigen::Vector3d p = motion * to_eigen(points_[index]);
-      const std::size_t n =
-          nearest(p, motion.linear() * to_eigen(normals_[index]), kRefineCosine);
+      const std::size_t n = nearest(p, motion.linear() * to_eigen(normals_[index]), kRefineCosine);
       if (n == points_.size()) continue;
       const Eigen::Vector3d normal = to_eigen(normals_[n]);
       Eigen::Matrix<double, 6, 1> row;
@@ -143,8 +142,8 @@ bool CloudSymmetry::refine(Eigen::Isometry3d& motion) const {
 
 double CloudSymmetry::displacement(const Eigen::Isometry3d& a, const Eigen::Isometry3d& b) const {
   const Eigen::Matrix3d m = a.linear() - b.linear();
-  return std::sqrt(std::max(0.0, (m * spread_ * m.transpose()).trace() +
-                                     (a * middle_ - b * middle_).squaredNorm()));
+  return std::sqrt(std::max(
+      0.0, (m * spread_ * m.transpose()).trace() + (a * middle_ - b * middle_).squaredNorm()));
 }
 
 bool CloudSymmetry::has(const Eigen::Isometry3d& motion, double slack) const {

@@ -34,7 +34,8 @@ inline std::vector<PairVariant> variants_of(const std::vector<PreparedCloud>& cl
   return out;
 }
 
-/// Keeps the result with the higher confidence, up to a symmetry, the first one of equals, and the time of both.
+/// Keeps the result with the higher confidence, up to a symmetry, the first one of equals, and the
+/// time of both.
 inline void keep_better(RegistrationResult&& candidate, RegistrationResult& kept) {
   const bool first = kept.status == RegistrationStatus::skipped;
   StageTimings& t = first ? candidate.timings : kept.timings;

@@ -46,7 +46,8 @@ std::vector<std::pair<int, std::string>> list_fragments(const std::string& folde
   }
   if (error) throw IoError("cannot list the folder " + folder + ": " + error.message());
   if (fragments.empty())
-    throw IoError("no fragments cloud_bin_<i>.ply, .pcd, .bin, .stl or .obj in the folder " + folder);
+    throw IoError("no fragments cloud_bin_<i>.ply, .pcd, .bin, .stl or .obj in the folder " +
+                  folder);
   return {fragments.begin(), fragments.end()};
 }
 

@@ -102,15 +102,15 @@ TEST(EquivalentPoses, HalfATurnIsFoundAndCounted) {
     ASSERT_EQ(result.equivalent_poses(), 2u);
     EXPECT_FALSE(result.modes.front().equivalent);
     EXPECT_LE(result.score, 0.5) << "one of two poses that nothing tells apart";
-    EXPECT_GT(result.symmetry_confidence, result.score + 0.1);
-    EXPECT_LE(result.symmetry_confidence, 1);
+    EXPECT_GT(result.symmetry_confidence(), result.score + 0.1);
+    EXPECT_LE(result.symmetry_confidence(), 1);
     // One of the two is the truth, the other half a turn away.
     std::vector<double> errors;
     for (const RegistrationMode& mode : result.modes)
       if (&mode == &result.modes.front() || mode.equivalent)
-        errors.push_back(std::min(test::rotation_error_degrees(truth, mode.target_from_source),
-                                  test::rotation_error_degrees(turn * truth,
-                                                               mode.target_from_source)));
+        errors.push_back(
+            std::min(test::rotation_error_degrees(truth, mode.target_from_source),
+                     test::rotation_error_degrees(turn * truth, mode.target_from_source)));
     for (const double error : errors) EXPECT_LT(error, 2);
   }
 }
@@ -120,7 +120,7 @@ TEST(EquivalentPoses, APartWithoutSymmetryHasNone) {
   const RegistrationResult result =
       registered(false, random_pose(random), RegistrationOptions::from_voxel_size(0.02f));
   EXPECT_EQ(result.equivalent_poses(), 1u);
-  EXPECT_EQ(result.symmetry_confidence, result.score);
+  EXPECT_EQ(result.symmetry_confidence(), result.score);
   EXPECT_NE(result.reason, RegistrationReason::symmetric);
 }
 
@@ -128,7 +128,7 @@ TEST(EquivalentPoses, UsersSayWhetherTheyAcceptThem) {
   std::mt19937 random(5);
   const Eigen::Isometry3d truth = random_pose(random);
   auto options = RegistrationOptions::from_voxel_size(0.02f);
-  const double together = registered(true, truth, options).symmetry_confidence;
+  const double together = registered(true, truth, options).symmetry_confidence();
   ASSERT_GT(together, 0);
   // Between the confidence of one pose and that of both.
   options.min_confidence = 0.9 * together;
@@ -158,7 +158,8 @@ TEST(CloudSymmetry, KnowsTheMotionsOfAPlate) {
     return CloudSymmetry(to_vec3(part.points), to_vec3(part.normals), 0.03f);
   };
   const CloudSymmetry symmetric = cloud(true), other = cloud(false);
-  const auto turned = [](double degrees, const Eigen::Vector3d& axis, const Eigen::Vector3d& shift) {
+  const auto turned = [](double degrees, const Eigen::Vector3d& axis,
+                         const Eigen::Vector3d& shift) {
     Eigen::Isometry3d motion(Eigen::AngleAxisd(degrees * M_PI / 180, axis.normalized()));
     motion.translation() = shift;
     return motion;

@@ -20,8 +20,8 @@ class Knowledge : public ::testing::Test {
   }
   nlohmann::json aligned(const std::vector<std::string>& more) {
     const std::string path = folder_ / "r.json";
-    const Outcome outcome = run(joined(
-        joined({"register", source_, target_, "--json", path}, kSmall), more));
+    const Outcome outcome =
+        run(joined(joined({"register", source_, target_, "--json", path}, kSmall), more));
     EXPECT_EQ(outcome.status, 0) << outcome.out << outcome.err;
     return json_of(path);
   }
@@ -45,9 +45,10 @@ TEST_F(Knowledge, ViewpointsAreSaidOrNot) {
 
 TEST_F(Knowledge, WrongViewpointsAreNamed) {
   for (const char* option : {"--source-viewpoint", "--target-viewpoint"})
-    for (const char* value : {"0,0", "0,0,0,0", "0,0,nan", "inf,0,0", "0,0,1e999", "here", "", ",,",
-                              "1;2;3", "0,0,x"})
-      refused({option, value}, {option, std::string(" is ") + value, "x,y,z (finite), none or auto"});
+    for (const char* value :
+         {"0,0", "0,0,0,0", "0,0,nan", "inf,0,0", "0,0,1e999", "here", "", ",,", "1;2;3", "0,0,x"})
+      refused({option, value},
+              {option, std::string(" is ") + value, "x,y,z (finite), none or auto"});
 }
 
 TEST_F(Knowledge, AViewpointInAWallIsSaid) {
@@ -68,8 +69,8 @@ TEST_F(Knowledge, ViewpointsOfABatch) {
   expect_refused({"batch", scans.path(), "-o", scans / "r.log", "--viewpoint", "0,0,0"},
                  {"--viewpoint", "0,0,0"});
   const std::string json = scans / "r.json";
-  ASSERT_EQ(run(joined({"batch", scans.path(), "-o", scans / "r.log", "--json", json,
-                        "--viewpoint", "none"},
+  ASSERT_EQ(run(joined({"batch", scans.path(), "-o", scans / "r.log", "--json", json, "--viewpoint",
+                        "none"},
                        kSmall))
                 .status,
             0);
@@ -109,9 +110,8 @@ TEST_F(Knowledge, TheVerticalDirectionExcludesPoses) {
   EXPECT_EQ(aligned({"--up", text(axis, 5)})["result"]["status"], "aligned");
   const double turned = Eigen::AngleAxisd(truth.linear()).angle() * 180 / M_PI;
   ASSERT_GT(turned, 20);
-  const Outcome wrong = run(joined({"register", source_, target_, "--up",
-                                    text(axis.unitOrthogonal(), 5)},
-                                   kSmall));
+  const Outcome wrong =
+      run(joined({"register", source_, target_, "--up", text(axis.unitOrthogonal(), 5)}, kSmall));
   EXPECT_EQ(wrong.status, 1) << wrong.out;
 }
 
@@ -148,11 +148,11 @@ TEST(MeshInput, WrongMeshesAreNamed) {
   const std::string good = folder.write("cloud_bin_0.obj", bracket());
   const auto refused = [&](const std::string& content, std::initializer_list<std::string> words) {
     const std::string bad = folder.write("cloud_bin_1.obj", content);
-    for (const auto& arguments : std::vector<std::vector<std::string>>{
-             {"register", bad, good},
-             {"register", good, bad},
-             {"info", bad},
-             {"batch", folder.path(), "-o", folder / "r.log"}}) {
+    for (const auto& arguments :
+         std::vector<std::vector<std::string>>{{"register", bad, good},
+                                               {"register", good, bad},
+                                               {"info", bad},
+                                               {"batch", folder.path(), "-o", folder / "r.log"}}) {
       expect_refused(arguments, {bad});
       expect_refused(arguments, words);
     }
@@ -162,8 +162,7 @@ TEST(MeshInput, WrongMeshesAreNamed) {
   auto vertices = cube_vertices();
   vertices[2].x() = std::nan("");
   std::filesystem::remove(folder / "cloud_bin_1.obj");
-  const std::string bad =
-      folder.write("cloud_bin_1.ply", ply_text(vertices, cube_faces()));
+  const std::string bad = folder.write("cloud_bin_1.ply", ply_text(vertices, cube_faces()));
   expect_refused({"register", good, bad}, {bad, "nan", "finite"});
   expect_refused({"batch", folder.path(), "-o", folder / "r.log"}, {bad, "nan", "finite"});
 }

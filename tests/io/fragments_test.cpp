@@ -16,9 +16,9 @@ using test::TemporaryFolder;
 
 TEST(Fragments, AreOrderedByNumberNotByName) {
   const TemporaryFolder folder;
-  for (const char* name : {"cloud_bin_10.ply", "cloud_bin_2.ply", "cloud_bin_0.pcd",
-                           "cloud_bin_007.ply", "cloud_bin_100.ply", "cloud_bin_11.bin",
-                           "cloud_bin_12.stl", "cloud_bin_13.obj"})
+  for (const char* name :
+       {"cloud_bin_10.ply", "cloud_bin_2.ply", "cloud_bin_0.pcd", "cloud_bin_007.ply",
+        "cloud_bin_100.ply", "cloud_bin_11.bin", "cloud_bin_12.stl", "cloud_bin_13.obj"})
     folder.write(name, "");
   for (const char* name :
        {"gt.log", "cloud_bin_.ply", "cloud_bin_3.txt", "cloud_bin_x.ply", "cloud_bin_1.ply.bak",

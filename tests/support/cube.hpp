@@ -27,7 +27,8 @@ inline Triangles cube_faces() {
 inline std::string obj_text(const std::vector<Eigen::Vector3d>& vertices, const Triangles& faces) {
   std::ostringstream text;
   for (const auto& v : vertices) text << "v " << v.x() << ' ' << v.y() << ' ' << v.z() << '\n';
-  for (const auto& f : faces) text << "f " << f[0] + 1 << ' ' << f[1] + 1 << ' ' << f[2] + 1 << '\n';
+  for (const auto& f : faces)
+    text << "f " << f[0] + 1 << ' ' << f[1] + 1 << ' ' << f[2] + 1 << '\n';
   return text.str();
 }
 
