@@ -19,6 +19,8 @@ namespace {
 
 /// Largest difference of the log odds of poses that the clouds cannot tell apart: a factor of ten.
 constexpr double kSimilarLogOdds = 2.302585;
+/// Poses whose confidences add up to less are hopeless, symmetric or not.
+constexpr double kWorthTesting = 0.05;
 /// Prepared points of the largest cloud whose symmetry is tested; parts have some thousand.
 constexpr std::uint32_t kLargestSymmetric = 200'000;
 
@@ -100,9 +102,11 @@ class Modes {
     const PreparedState& larger = source_.size > target_.size ? source_ : target_;
     std::size_t last = 1;
     while (last < modes.size() && close(last)) ++last;
-    if (last == 1 || larger.size > kLargestSymmetric) return;
-    const CloudSymmetry symmetry(larger.copy_points(), larger.copy_normals(),
-                                 options_.prepare.max_correspondence_distance);
+    double together = 0;
+    for (std::size_t k = 0; k < last; ++k) together += modes[k].confidence;
+    if (last == 1 || together < kWorthTesting || larger.size > kLargestSymmetric) return;
+    CloudSymmetry symmetry(larger.copy_points(), larger.copy_normals(),
+                           options_.prepare.max_correspondence_distance);
     const double slack =
         kDistinctModeFraction * static_cast<double>(options_.evidence.mode_distance);
     const Eigen::Vector3d origin = origin_of(larger);

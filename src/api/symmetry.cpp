@@ -44,18 +44,6 @@ Eigen::Isometry3d small_motion(const Eigen::Matrix<double, 6, 1>& x,
 
 CloudSymmetry::CloudSymmetry(std::vector<Vec3> points, std::vector<Vec3> normals, float distance)
     : points_(std::move(points)), normals_(std::move(normals)), distance_(distance) {
-  const float inverse = 1.0f / (kSearch * distance_);
-  std::vector<std::uint64_t> keys;
-  for (const Vec3 p : points_) keys.push_back(cell_key(cell_of(p, inverse)));
-  order_.resize(points_.size());
-  std::iota(order_.begin(), order_.end(), std::uint32_t(0));
-  std::stable_sort(order_.begin(), order_.end(),
-                   [&](std::uint32_t a, std::uint32_t b) { return keys[a] < keys[b]; });
-  for (std::uint32_t k = 0; k < order_.size(); ++k) {
-    const std::uint64_t key = keys[order_[k]];
-    if (cells_.empty() || cells_.back().key != key) cells_.push_back({key, k, k});
-    cells_.back().end = k + 1;
-  }
   const std::size_t count = points_.size();
   for (const Vec3 p : points_) middle_ += to_eigen(p);
   middle_ /= static_cast<double>(std::max<std::size_t>(count, 1));
@@ -68,6 +56,21 @@ CloudSymmetry::CloudSymmetry(std::vector<Vec3> points, std::vector<Vec3> normals
   for (std::size_t k = 0; k < taken; ++k) {
     const auto at = static_cast<std::uint32_t>(k * count / taken);
     if (to_eigen(normals_[at]).squaredNorm() > 0) sample_.push_back(at);
+  }
+}
+
+void CloudSymmetry::build_index() {
+  const float inverse = 1.0f / (kSearch * distance_);
+  std::vector<std::uint64_t> keys;
+  for (const Vec3 p : points_) keys.push_back(cell_key(cell_of(p, inverse)));
+  order_.resize(points_.size());
+  std::iota(order_.begin(), order_.end(), std::uint32_t(0));
+  std::stable_sort(order_.begin(), order_.end(),
+                   [&](std::uint32_t a, std::uint32_t b) { return keys[a] < keys[b]; });
+  for (std::uint32_t k = 0; k < order_.size(); ++k) {
+    const std::uint64_t key = keys[order_[k]];
+    if (cells_.empty() || cells_.back().key != key) cells_.push_back({key, k, k});
+    cells_.back().end = k + 1;
   }
 }
 
@@ -146,9 +149,11 @@ double CloudSymmetry::displacement(const Eigen::Isometry3d& a, const Eigen::Isom
       0.0, (m * spread_ * m.transpose()).trace() + (a * middle_ - b * middle_).squaredNorm()));
 }
 
-bool CloudSymmetry::has(const Eigen::Isometry3d& motion, double slack) const {
-  // A symmetry keeps the middle.
-  if ((motion * middle_ - middle_).norm() > slack || share(motion) < kWorthRefining) return false;
+bool CloudSymmetry::has(const Eigen::Isometry3d& motion, double slack) {
+  // A symmetry keeps the middle. Few other motions do, so the index is hardly ever built in vain.
+  if (points_.empty() || (motion * middle_ - middle_).norm() > slack) return false;
+  if (order_.empty()) build_index();
+  if (share(motion) < kWorthRefining) return false;
   Eigen::Isometry3d symmetry = motion;
   return refine(symmetry) && displacement(symmetry, motion) <= slack &&
          displacement(symmetry, Eigen::Isometry3d::Identity()) > slack &&

@@ -21,7 +21,7 @@ class CloudSymmetry {
   /// @param motion of the points.
   /// @param slack largest RMS displacement between the motion and the symmetry that it stands for,
   ///   and the smallest one between a symmetry and the identity.
-  bool has(const Eigen::Isometry3d& motion, double slack) const;
+  bool has(const Eigen::Isometry3d& motion, double slack);
 
  private:
   struct Bucket {
@@ -31,6 +31,7 @@ class CloudSymmetry {
   /// Index of the nearest point with a similar normal within the search radius; size() for none.
   std::size_t nearest(const Eigen::Vector3d& point, const Eigen::Vector3d& normal,
                       float min_cosine) const;
+  void build_index();
   bool refine(Eigen::Isometry3d& motion) const;
   double share(const Eigen::Isometry3d& motion) const;
   double displacement(const Eigen::Isometry3d& a, const Eigen::Isometry3d& b) const;

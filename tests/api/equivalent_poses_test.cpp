@@ -157,7 +157,7 @@ TEST(CloudSymmetry, KnowsTheMotionsOfAPlate) {
     const Part part = plate(1, symmetric);
     return CloudSymmetry(to_vec3(part.points), to_vec3(part.normals), 0.03f);
   };
-  const CloudSymmetry symmetric = cloud(true), other = cloud(false);
+  CloudSymmetry symmetric = cloud(true), other = cloud(false);
   const auto turned = [](double degrees, const Eigen::Vector3d& axis,
                          const Eigen::Vector3d& shift) {
     Eigen::Isometry3d motion(Eigen::AngleAxisd(degrees * M_PI / 180, axis.normalized()));
