@@ -315,7 +315,8 @@ def main():
     makers = {f.__name__: f for f in (kitchen, dragon, cad, cad_mesh, kitti, lidar, fgr)}
     record = {"sets": {}}
     if arguments.json and arguments.json.exists():
-        record = json.loads(arguments.json.read_text())
+        known = json.loads(arguments.json.read_text())["sets"]
+        record["sets"] = {name: entry for name, entry in known.items() if "command" in entry}
     for name in arguments.sets.split(","):
         scenes = makers[name](arguments.data, arguments.pairs, np.random.default_rng(0))
         entry = {

@@ -301,34 +301,38 @@ CONDITIONS = {
 }
 
 
+DECISIONS = ("said", "origin", "normals", "none", "model")
+
+
 def viewpoints():
+    """Sets of records before the script wrote them alone have no `conditions` and no kinds."""
     record = load("viewpoints.json")
     out = [
-        "| data | clouds | pairs | first correct | reported | with `--accept-symmetry` | false reports | decisions about scans | about models |",
-        "| --- | --- | --- | --- | --- | --- | --- | --- | --- |",
+        "| data | clouds | pairs | first correct | reported | with `--accept-symmetry` | false reports | decisions about the clouds |",
+        "| --- | --- | --- | --- | --- | --- | --- | --- |",
     ]
     for name, text in SENSORS.items():
-        if name not in record["sets"]:
-            continue
-        for condition, of in record["sets"][name]["conditions"].items():
-
-            def decisions(kind):
-                found = {
-                    key.split(": ")[1]: n for key, n in of.items() if key.startswith(f"{kind}: ")
-                }  # noqa: B023
-                return ", ".join(f"{n} {key}" for key, n in sorted(found.items()))
-
-            wrong = of["reported_up_to_symmetry_wrong"]
-            out.append(
-                f"| {text} | {CONDITIONS[condition]} | {of['pairs']}"
-                + (f" and {of['negatives']} negative" if of.get("negatives") else "")
-                + f" | {of['right']} | {of['reported']} | {of['reported_up_to_symmetry']} | {wrong} | {decisions('scan')} | {decisions('model')} |"
+        found = record["sets"].get(name, {})
+        for condition, of in found.get("conditions", found).items():
+            pairs = f"{of['pairs']}" + (
+                f" and {of['negatives']} negative" if of.get("negatives") else ""
             )
-    commands = [
-        f"`{entry['command']}` at commit {entry['commit'].rstrip('+')}."
-        for name, entry in record["sets"].items()
+            accepted = of.get("reported_up_to_symmetry", "")
+            wrong = of.get("reported_up_to_symmetry_wrong", of["reported_wrong"])
+            decided = ", ".join(
+                f"{count} {key}" for key, count in of.items() if key.split(": ")[-1] in DECISIONS
+            )
+            out.append(
+                f"| {text} | {CONDITIONS[condition]} | {pairs} | {of['right']} | {of['reported']} | {accepted} | {wrong} | {decided} |"
+            )
+    made = [
+        f"* `{entry['command']}` at commit {entry['commit'].rstrip('+')}."
+        for entry in record["sets"].values()
+        if "command" in entry
     ]
-    return [*out, "", "Made by", *[f"* {command}" for command in commands]]
+    if "made_by" in record:
+        made.append(f"* {record['made_by']}; commit {record['commit']}.")
+    return [*out, "", "Made by", "", *made]
 
 
 TABLES = {
