@@ -13,8 +13,8 @@ namespace {
 
 /// Points that are moved: a share of so many is good to 1 %.
 constexpr std::size_t kSample = 1000;
-/// Share of the sample that must lie on the cloud. Noise and edges of the sampling miss a few points
-/// of a hundred; a feature of more than a twentieth of the surface breaks the symmetry.
+/// Share of the sample that must lie on the cloud. Noise and edges of the sampling miss a few
+/// points of a hundred; a feature of more than a twentieth of the surface breaks the symmetry.
 constexpr double kSymmetricShare = 0.95;
 /// Below this share before the refinement, the motion is not close to a symmetry.
 constexpr double kWorthRefining = 0.15;
