@@ -118,8 +118,8 @@ TEST_F(Knowledge, TheVerticalDirectionExcludesPoses) {
 #ifdef GPUREG_HAVE_ASSIMP
 /// An L-shaped prism: closed, and without symmetry but for a mirror.
 std::string bracket() {
-  return "v 0 0 0\nv 1 0 0\nv 1 .3 0\nv .25 .3 0\nv .25 .7 0\nv 0 .7 0\n"
-         "v 0 0 .4\nv 1 0 .4\nv 1 .3 .4\nv .25 .3 .5\nv .25 .7 .5\nv 0 .7 .5\n"
+  return "v 0 0 0\nv 1 0 0\nv 1 0.3 0\nv 0.25 0.3 0\nv 0.25 0.7 0\nv 0 0.7 0\n"
+         "v 0 0 0.4\nv 1 0 0.4\nv 1 0.3 0.4\nv 0.25 0.3 0.5\nv 0.25 0.7 0.5\nv 0 0.7 0.5\n"
          "f 6 5 4 1\nf 4 3 2 1\nf 7 10 11 12\nf 7 8 9 10\nf 1 2 8 7\nf 2 3 9 8\nf 3 4 10 9\n"
          "f 4 5 11 10\nf 5 6 12 11\nf 6 1 7 12\n";
 }
