@@ -15,7 +15,7 @@ import sys
 from tables import accuracy, loops, maps, peers, speed
 
 ROOT = pathlib.Path(__file__).resolve().parents[1]
-PAGES = ("accuracy", "experiments", "benchmarks", "performance", "maps", "loops")
+PAGES = ("accuracy", "experiments", "benchmarks", "performance", "maps", "loops", "sensors")
 FILES = ["README.md", *(f"docs/{page}.md" for page in PAGES)]
 TABLES = {**accuracy.TABLES, **peers.TABLES, **speed.TABLES, **maps.TABLES, **loops.TABLES}
 
