@@ -12,12 +12,12 @@ import pathlib
 import re
 import sys
 
-from tables import accuracy, maps, peers, speed
+from tables import accuracy, loops, maps, peers, speed
 
 ROOT = pathlib.Path(__file__).resolve().parents[1]
-PAGES = ("accuracy", "experiments", "benchmarks", "performance", "maps")
+PAGES = ("accuracy", "experiments", "benchmarks", "performance", "maps", "loops")
 FILES = ["README.md", *(f"docs/{page}.md" for page in PAGES)]
-TABLES = {**accuracy.TABLES, **peers.TABLES, **speed.TABLES, **maps.TABLES}
+TABLES = {**accuracy.TABLES, **peers.TABLES, **speed.TABLES, **maps.TABLES, **loops.TABLES}
 
 
 def rewritten(text):
