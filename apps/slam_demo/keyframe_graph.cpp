@@ -10,7 +10,6 @@ namespace {
 
 std::size_t at(int index) { return static_cast<std::size_t>(index); }
 
-constexpr int kUnsettled = 8;   // keyframes that local adjustment still moves
 constexpr int kNeighbours = 3;  // of a keyframe, beside the one before
 constexpr int kMinShared = 60;  // points that two keyframes share
 
@@ -41,9 +40,9 @@ void move_keyframes(const std::vector<Eigen::Isometry3d>& poses, Map& map) {
   }
 }
 
-void KeyframeGraph::record(const Map& map) {
+void KeyframeGraph::record(const Map& map, int first) {
   const int count = static_cast<int>(map.keyframes.size());
-  for (int b = std::max(0, count - kUnsettled); b < count; ++b) {
+  for (int b = std::max(0, first); b < count; ++b) {
     const Keyframe& keyframe = map.keyframes[at(b)];
     std::vector<int> others;
     for (const int a : map.covisible(b, 20, kMinShared)) {

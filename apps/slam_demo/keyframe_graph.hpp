@@ -16,7 +16,9 @@ class KeyframeGraph {
  public:
   /// Takes the relative poses of the newest keyframes from the map: their local adjustment is
   /// still going on.
-  void record(const Map& map);
+  void record(const Map& map) { record(map, static_cast<int>(map.keyframes.size()) - kUnsettled); }
+  /// The same from a keyframe on.
+  void record(const Map& map, int first);
 
   /// Edges of a loop. Trusted: whoever adds them has verified them.
   void add(int loop, const std::vector<RelativePose>& edges);
@@ -37,6 +39,7 @@ class KeyframeGraph {
   std::vector<int> world_of_session(const Map& map) const;
 
  private:
+  static constexpr int kUnsettled = 8;  // keyframes that local adjustment still moves
   struct Key {
     int a, b;
     bool operator<(const Key& o) const { return a != o.a ? a < o.a : b < o.b; }

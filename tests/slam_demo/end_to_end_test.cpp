@@ -16,6 +16,8 @@
 namespace slam_demo {
 namespace {
 
+using gpureg::evaluation::ErrorStatistics;
+
 const std::string& frames_folder() {
   static const gpureg::test::TemporaryFolder folder;
   static const std::string path = [] {
@@ -61,6 +63,10 @@ std::unique_ptr<Slam> run(const Sequence& sequence, const SlamOptions& options,
   return slam;
 }
 
+ErrorStatistics ate(const Trajectory& estimate, const Trajectory& truth) {
+  return gpureg::evaluation::evaluate_trajectory(estimate, truth).absolute_translation;
+}
+
 TEST(EndToEnd, TrajectoryMapAndFiles) {
   const Sequence sequence = open_sequence(frames_folder());
   ASSERT_EQ(sequence.frames.size(), 150u);
@@ -71,32 +77,28 @@ TEST(EndToEnd, TrajectoryMapAndFiles) {
   RunResult result;
   result.sequence = frames_folder();
   result.truth = sequence.truth;
-  result.odometry = absolute_error(sequence.truth, slam->odometry());
-  result.final = absolute_error(sequence.truth, slam->trajectory());
-  ASSERT_EQ(result.final.poses, 150u);
+  evaluate(*slam, frames_folder() + "/surface.ply", result);
+  ASSERT_EQ(result.final.matched, 150u);
   // 5 mm when this was written; five seconds of walking, 2.5 m.
-  EXPECT_LT(result.final.rmse, 0.015);
-  EXPECT_LT(result.odometry.rmse, 0.02);
-  std::vector<Eigen::Vector3f> points;
-  for (const surfel::Surfel& s : slam->surfels())
-    points.emplace_back(s.position.x, s.position.y, s.position.z);
-  result.surface = surface_error(gpureg::io::read_point_cloud(frames_folder() + "/surface.ply"),
-                                 points, result.final.truth_from_estimate);
-  EXPECT_GT(result.surface.points, 50000u);
-  EXPECT_LT(result.surface.mean, 0.012) << "3.7 mm when this was written";
-  EXPECT_GT(result.surface.within, 0.999);
+  EXPECT_LT(result.final.absolute_translation.rmse, 0.015);
+  EXPECT_LT(result.odometry.absolute_translation.rmse, 0.02);
+  EXPECT_GT(result.surface.distance.count, 50000u);
+  EXPECT_LT(result.surface.distance.mean, 0.012) << "3.7 mm when this was written";
+  EXPECT_LT(result.surface.beyond, result.surface.distance.count / 1000);
 
   const gpureg::test::TemporaryFolder output;
   write_results(output.path(), *slam, result);
-  const Trajectory read = read_tum(output / "trajectory.txt");
+  const Trajectory read = gpureg::evaluation::read_trajectory(output / "trajectory.txt");
   ASSERT_EQ(read.size(), 150u);
-  EXPECT_NEAR(absolute_error(sequence.truth, read).rmse, result.final.rmse, 1e-6);
-  EXPECT_EQ(gpureg::io::read_point_cloud(output / "map.ply").points.size(), points.size());
+  EXPECT_NEAR(ate(read, sequence.truth).rmse, result.final.absolute_translation.rmse, 1e-9);
+  EXPECT_EQ(gpureg::io::read_point_cloud(output / "map.ply").points.size(),
+            result.surface.distance.count);
   const auto json = nlohmann::json::parse(text_of(output / "loops.json"));
   EXPECT_EQ(json.at("fragments"), 3);
-  EXPECT_NEAR(json.at("ate").at("rmse_m").get<double>(), result.final.rmse, 1e-12);
+  EXPECT_NEAR(json.at("ate").at("rmse_m").get<double>(), result.final.absolute_translation.rmse,
+              1e-12);
   const std::string page = text_of(output / "report.html");
-  EXPECT_NE(page.find("<polyline"), std::string::npos);
+  EXPECT_NE(page.find("const data = {"), std::string::npos);
   EXPECT_EQ(page.find("http"), std::string::npos) << "nothing is loaded from elsewhere";
 }
 
@@ -106,7 +108,7 @@ TEST(EndToEnd, SequentialRunsGiveTheSameBits) {
   std::string text[2];
   for (std::string& t : text) {
     const gpureg::test::TemporaryFolder output;
-    write_tum(output / "t.txt",
+    gpureg::evaluation::write_trajectory(output / "t.txt",
               run(sequence, sequential(), [](int) { return false; })->trajectory());
     t = text_of(output / "t.txt");
   }
@@ -130,9 +132,9 @@ TEST(EndToEnd, SixtyBlackFrames) {
     EXPECT_LT(step, 0.08) << "at " << frames[k].time
                           << " s; the camera makes 2.5 cm a frame at most";
   }
-  const AteResult ate = absolute_error(sequence.truth, slam->trajectory());
-  EXPECT_GE(ate.poses, 40u);
-  EXPECT_LT(ate.rmse, 0.03);
+  const ErrorStatistics error = ate(slam->trajectory(), sequence.truth);
+  EXPECT_GE(error.count, 40u);
+  EXPECT_LT(error.rmse, 0.03);
 }
 
 // Both halves see the same places: the second session must come back into the first one's world.
@@ -145,7 +147,7 @@ TEST(EndToEnd, ASessionThatComesBackIsMerged) {
   const auto append = [&](std::size_t from) {
     FrameFiles frame = frames[from];
     frame.time = sequence.frames.back().time + 1 / 30.0;
-    StampedPose pose = truth[from];
+    gpureg::evaluation::StampedPose pose = truth[from];
     pose.time = frame.time;
     sequence.frames.push_back(frame);
     sequence.truth.push_back(pose);
@@ -154,9 +156,9 @@ TEST(EndToEnd, ASessionThatComesBackIsMerged) {
   for (std::size_t k = 0; k < 40; ++k) append(39 - k);
   const auto slam = run(sequence, sequential(), [](int k) { return k >= 60 && k < 100; });
   EXPECT_EQ(slam->worlds(), 1u);
-  const AteResult ate = absolute_error(sequence.truth, slam->trajectory());
-  EXPECT_GE(ate.poses, 98u);
-  EXPECT_LT(ate.rmse, 0.02);
+  const ErrorStatistics error = ate(slam->trajectory(), sequence.truth);
+  EXPECT_GE(error.count, 98u);
+  EXPECT_LT(error.rmse, 0.02);
 }
 
 }  // namespace
