@@ -100,8 +100,9 @@ void add_generate(CLI::App& app, Action& chosen) {
   verb->add_option("--no-return", o->scene.no_return,
                    "Metres that the path goes before it comes back to a place")
       ->capture_default_str();
-  verb->add_option("--depth-noise", o->depth_noise,
-                   "Factor of all errors of the depth camera: shift, noise of disparities, distortion")
+  verb->add_option(
+          "--depth-noise", o->depth_noise,
+          "Factor of all errors of the depth camera: shift, noise of disparities, distortion")
       ->check(CLI::Range(0.0, 10.0))
       ->capture_default_str();
   verb->add_flag("--rgbd", o->scene.rgbd,

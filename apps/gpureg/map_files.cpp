@@ -38,8 +38,8 @@ evaluation::Trajectory trajectory_of(const MapRun& run) {
   evaluation::Trajectory result;
   for (std::size_t k = 0; k < run.map.scans.size(); ++k)
     if (run.map.scans[k].placed)
-      result.push_back({static_cast<double>(run.scene.numbers[k]),
-                        run.map.scans[k].island_from_scan.matrix()});
+      result.push_back(
+          {static_cast<double>(run.scene.numbers[k]), run.map.scans[k].island_from_scan.matrix()});
   return result;
 }
 

@@ -8,8 +8,6 @@
 namespace slam_demo {
 namespace {
 
-std::size_t at(int index) { return static_cast<std::size_t>(index); }
-
 constexpr int kNeighbours = 3;  // of a keyframe, beside the one before
 constexpr int kMinShared = 60;  // points that two keyframes share
 
@@ -20,10 +18,6 @@ Eigen::Matrix<double, 6, 6> odometry_information(const Eigen::Isometry3d& motion
   const double angle = Eigen::AngleAxisd(motion.linear()).angle();
   return information_of(kBaseRadians + kPerRadian * angle,
                         kBaseMetres + kPerMetre * motion.translation().norm());
-}
-
-gpureg::UnalignedIsometry3d unaligned(const Eigen::Isometry3d& pose) {
-  return gpureg::UnalignedIsometry3d(pose.matrix());
 }
 
 }  // namespace

@@ -10,6 +10,10 @@
 
 namespace slam_demo {
 
+inline gpureg::UnalignedIsometry3d unaligned(const Eigen::Isometry3d& pose) {
+  return gpureg::UnalignedIsometry3d(pose.matrix());
+}
+
 /// The pose graph of the keyframes: what tracking measured between neighbours, and loops. Loops are
 /// kept by number, so that a retraction takes them out again.
 class KeyframeGraph {

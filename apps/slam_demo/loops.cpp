@@ -10,7 +10,6 @@ namespace slam_demo {
 namespace {
 
 namespace lc = gpureg::loop_closure;
-std::size_t at(int index) { return static_cast<std::size_t>(index); }
 
 constexpr int kCovisible = 30;          // shared points that connect two fragments
 constexpr std::size_t kNeighbours = 6;  // keyframes on each side that look for image loops
@@ -26,10 +25,6 @@ constexpr double kDriftMetres = 0.2, kDriftShare = 0.02, kDriftRadians = 0.2;
 // Surfaces over many frames hold a registered pair better than LoopCloser states, which speaks of
 // single registrations with correlated points: a third of its standard deviation.
 constexpr double kDenseCertainty = 9;
-
-gpureg::UnalignedIsometry3d unaligned(const Eigen::Isometry3d& pose) {
-  return gpureg::UnalignedIsometry3d(pose.matrix());
-}
 
 }  // namespace
 
@@ -58,8 +53,8 @@ std::vector<int> LoopClosing::with_neighbours(int keyframe) const {
 std::vector<int> LoopClosing::image_candidates(int index) const {
   const std::vector<int> world = graph_.world_of_session(map_);
   const Keyframe& keyframe = map_.keyframes[at(index)];
-  const bool alone = options_.sessions && keyframe.session > 0 &&
-                     world[at(keyframe.session)] == keyframe.session;
+  const bool alone =
+      options_.sessions && keyframe.session > 0 && world[at(keyframe.session)] == keyframe.session;
   std::vector<int> result;
   for (int k = 0; k < index; ++k) {
     const Keyframe& other = map_.keyframes[at(k)];

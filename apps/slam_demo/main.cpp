@@ -5,6 +5,7 @@
 #include <csignal>
 #include <cstdio>
 #include <filesystem>
+#include <future>
 #include <gpureg/error.hpp>
 #include <iostream>
 
@@ -67,7 +68,8 @@ int run(const Arguments& a) {
              only_tracks = !a.tracking.empty() && !replays;
   if (only_tracks) {
     options.keep_fragments = true;
-    options.loops.dense = options.loops.bundle = options.loops.images = options.loops.sessions = false;
+    options.loops.dense = options.loops.bundle = options.loops.images = options.loops.sessions =
+        false;
   }
   Slam slam(context_of(a), sequence.rig, options);
   std::signal(SIGINT, interrupt);
@@ -83,12 +85,20 @@ int run(const Arguments& a) {
     const Stopwatch watch(total);
     double since = 0;
     if (replays) slam.replay(read_tracking(a.tracking));
+    std::future<Images> ahead;  // the next frame is read while this one is tracked
+    const auto read_ahead = [&](std::size_t k) {
+      if (k < last)
+        ahead = std::async(std::launch::async,
+                           [&sequence, k] { return load(sequence.frames[k], sequence.rig); });
+    };
+    if (!replays) read_ahead(first);
     for (std::size_t k = first; k < last && !interrupted && !replays; ++k) {
       Images images;
       {
         const Stopwatch reading(result.load_milliseconds);
-        images = load(sequence.frames[k], sequence.rig);
+        images = ahead.get();
       }
+      read_ahead(k + 1);
       if (!images.problem.empty()) {
         if (++result.problems <= 5) std::cerr << "slam_demo: " << images.problem << "\n";
       }
@@ -156,12 +166,14 @@ int main(int count, char** values) {
   app.add_flag("--no-dense-loops", a.no_dense_loops, "Tracking alone; sessions are still merged");
   app.add_flag("--no-bundle", a.no_bundle, "Loops end with the pose graph");
   app.add_flag("--image-loops", a.slam.loops.images, "Also look for loops by images alone");
-  app.add_option("--tracking", a.tracking,
-                 "File with what tracking found. Where there is none the run only tracks, and writes "
-                 "it; runs with it close the loops only");
+  app.add_option(
+      "--tracking", a.tracking,
+      "File with what tracking found. Where there is none the run only tracks, and writes "
+      "it; runs with it close the loops only");
   app.add_option("--seed", a.slam.loops.seed, "Of the registration")->capture_default_str();
   app.add_flag("--no-map", a.no_map, "Do not fuse surfels");
-  app.add_flag("--sequential", a.sequential, "One thread at a time: the same bits every time");
+  app.add_flag("--sequential", a.sequential,
+               "No result depends on threads: the same bits every time");
   app.add_option("--first", a.first, "Frame to begin with")->check(CLI::NonNegativeNumber);
   app.add_option("--frames", a.frames, "Frames to process; 0: all")->check(CLI::NonNegativeNumber);
   app.add_option("--features", a.slam.features, "ORB features of a frame")

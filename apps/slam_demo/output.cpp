@@ -13,7 +13,6 @@ namespace {
 
 namespace ev = gpureg::evaluation;
 using nlohmann::json;
-std::size_t at(int index) { return static_cast<std::size_t>(index); }
 
 void append(std::string& bytes, float value) {
   std::uint32_t bits;
@@ -43,6 +42,7 @@ std::string ply_of(const surfel::Cloud& surfels) {
 json error_json(const ev::TrajectoryEvaluation& e) {
   if (e.matched == 0) return nullptr;
   return {{"poses", e.matched},
+          {"path_m", e.path_length},
           {"rmse_m", e.absolute_translation.rmse},
           {"mean_m", e.absolute_translation.mean},
           {"median_m", e.absolute_translation.median},
@@ -82,10 +82,9 @@ json loops_json(const Slam& slam, const RunResult& result) {
                      {"state", r.state},
                      {"reason", r.reason},
                      {"confidence", r.confidence},
-                     {"error", r.state == "rejected"
-                                   ? json(nullptr)
-                                   : loop_error(r.target_time, r.source_time, r.target_from_source,
-                                                result)},
+                     {"error", r.state == "rejected" ? json(nullptr)
+                                                     : loop_error(r.target_time, r.source_time,
+                                                                  r.target_from_source, result)},
                      {"image_loops", r.image_loops}});
     loops.back()["drift_ratio"] =
         std::isfinite(r.drift_ratio) ? json(r.drift_ratio) : json(nullptr);
@@ -144,8 +143,7 @@ void evaluate(const Slam& slam, const std::string& true_surface, RunResult& resu
   const Eigen::Matrix4f move = result.final.truth_from_estimate.cast<float>();
   std::vector<Eigen::Vector3f> map;
   for (const surfel::Surfel& s : surfels)
-    map.push_back(
-        (move * Eigen::Vector4f(s.position.x, s.position.y, s.position.z, 1)).head<3>());
+    map.push_back((move * Eigen::Vector4f(s.position.x, s.position.y, s.position.z, 1)).head<3>());
   result.surface = ev::evaluate_surface(map, truth.points, truth.normals);
 }
 

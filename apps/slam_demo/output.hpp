@@ -18,7 +18,7 @@ struct RunResult {
   Rig rig;
   Trajectory truth;
   gpureg::evaluation::TrajectoryEvaluation odometry, final;  ///< see evaluate()
-  gpureg::evaluation::SurfaceEvaluation surface;  ///< without points: no true surface
+  gpureg::evaluation::SurfaceEvaluation surface;             ///< without points: no true surface
 };
 
 /// Errors of what the system has by now. true_surface: a PLY, or empty. Without a true trajectory,

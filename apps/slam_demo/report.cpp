@@ -18,8 +18,7 @@ constexpr std::size_t kMapPoints = 40000;  // drawn of the map
 Eigen::Matrix3d principal_axes(const Trajectory& trajectory) {
   Eigen::Matrix3Xd points(3, static_cast<Eigen::Index>(trajectory.size()));
   for (Eigen::Index k = 0; k < points.cols(); ++k)
-    points.col(k) =
-        trajectory[static_cast<std::size_t>(k)].world_from_body.topRightCorner<3, 1>();
+    points.col(k) = trajectory[static_cast<std::size_t>(k)].world_from_body.topRightCorner<3, 1>();
   if (points.cols() < 2) return Eigen::Matrix3d::Identity();
   points.colwise() -= points.rowwise().mean().eval();
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(points * points.transpose());

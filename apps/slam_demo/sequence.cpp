@@ -188,8 +188,7 @@ Sequence open_seven_scenes(const fs::path& folder) {
     result.frames.push_back(frame);
     char name[32];
     std::snprintf(name, sizeof(name), "frame-%06ld.pose.txt", index);
-    if (fs::exists(folder / name))
-      result.truth.push_back({frame.time, read_pose(folder / name)});
+    if (fs::exists(folder / name)) result.truth.push_back({frame.time, read_pose(folder / name)});
   }
   return result;
 }

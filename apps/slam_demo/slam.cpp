@@ -9,7 +9,6 @@
 namespace slam_demo {
 namespace {
 
-std::size_t at(int index) { return static_cast<std::size_t>(index); }
 constexpr std::size_t kMinFragment = 20;  // frames of a fragment that a session ends with
 constexpr float kFragmentVoxel = 0.4f;    // of the voxel size of the registration
 
@@ -133,7 +132,8 @@ void Slam::replay(const Tracking& tracking) {
   loops_.record_all_odometry();
   std::size_t next = 0;
   for (const BuiltFragment& fragment : tracking.fragments) {
-    for (; next < map_.keyframes.size() && map_.keyframes[next].frame <= fragment.last_frame; ++next)
+    for (; next < map_.keyframes.size() && map_.keyframes[next].frame <= fragment.last_frame;
+         ++next)
       with_correction([&] { return loops_.search_images(static_cast<int>(next)); });
     add_fragment(fragment);
   }

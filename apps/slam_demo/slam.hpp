@@ -17,9 +17,9 @@ struct SlamOptions {
   TrackerOptions tracker;
   LoopOptions loops;
   surfel::Options surfels;
-  bool map = true;       ///< fuse surfels
+  bool map = true;              ///< fuse surfels
   bool keep_fragments = false;  ///< for tracking()
-  int surfel_every = 2;  ///< frames between two that are fused
+  int surfel_every = 2;         ///< frames between two that are fused
   int features = 1000;
   int fragment_frames = 50;
   int final_iterations = 20;  ///< of the last bundle adjustment

@@ -65,8 +65,8 @@ void pass(Archive& file, Features& f) {
 void pass(Archive& file, Keyframe& k) {
   file.values(k.frame, k.time, k.session, k.world_from_camera);
   file.lists(k.points);
-  auto features = file.writing ? std::make_shared<Features>(*k.features)
-                               : std::make_shared<Features>();
+  auto features =
+      file.writing ? std::make_shared<Features>(*k.features) : std::make_shared<Features>();
   pass(file, *features);
   k.features = features;
   std::vector<std::pair<int, int>> shared(k.covisible.begin(), k.covisible.end());

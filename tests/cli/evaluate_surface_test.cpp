@@ -43,9 +43,9 @@ TEST(EvaluateSurfaceCommand, TrajectoriesAlignTheMap) {
       "estimate.txt", "0 0 0 4 0 0 0 1\n1 1 0 4 0 0 0 1\n2 1 1 4 0 0 0 1\n3 0 1 4 0 0 0 1\n");
   const std::string truth = folder.write(
       "truth.txt", "0 0 0 1 0 0 0 1\n1 1 0 1 0 0 0 1\n2 1 1 1 0 0 0 1\n3 0 1 1 0 0 0 1\n");
-  const Outcome outcome = run({"evaluate-surface", folder / "map.ply", "--surface",
-                               folder / "truth.ply", "--trajectory", estimate, "--ground-truth",
-                               truth, "--json", folder / "out.json"});
+  const Outcome outcome =
+      run({"evaluate-surface", folder / "map.ply", "--surface", folder / "truth.ply",
+           "--trajectory", estimate, "--ground-truth", truth, "--json", folder / "out.json"});
   ASSERT_EQ(outcome.status, 0) << outcome.err;
   // The map moves by floats of 3 m.
   EXPECT_LT(json_of(folder / "out.json").at("metres").at("max").get<double>(), 1e-6);

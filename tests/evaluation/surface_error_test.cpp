@@ -80,8 +80,7 @@ TEST(SurfaceError, WithoutNormalsDistancesAreThoseToPoints) {
 
 TEST(SurfaceError, LargerBall) {
   const Surface truth = ball(0.5f);
-  const SurfaceEvaluation e =
-      evaluate_surface(ball(0.52f).points, truth.points, truth.normals);
+  const SurfaceEvaluation e = evaluate_surface(ball(0.52f).points, truth.points, truth.normals);
   // A tangent plane leaves the ball by 0.05 mm within 0.7 cm.
   EXPECT_NEAR(e.distance.mean, 0.02, 1e-4);
   EXPECT_NEAR(e.distance.median, 0.02, 1e-4);
