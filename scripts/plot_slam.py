@@ -15,7 +15,7 @@ import matplotlib
 import numpy
 
 matplotlib.use("Agg")
-from matplotlib import pyplot  # noqa: E402
+from matplotlib import pyplot
 
 ROOT = pathlib.Path(__file__).resolve().parents[1]
 LOW, HIGH = 0.1, 1.9  # metres over the floor: neither floor nor ceiling

@@ -65,7 +65,8 @@ TEST(EndToEnd, SequentialRunsGiveTheSameBitsAndSoDoesTheFileOfTracking) {
   EXPECT_EQ(replayed.all_surfels(), once->all_surfels());
   const Trajectory expected = once->trajectory();
   ASSERT_EQ(expected.size(), 60u);
-  for (const Slam* other : {again.get(), static_cast<const Slam*>(&replayed)}) {
+  for (const Slam* other :
+       {static_cast<const Slam*>(again.get()), static_cast<const Slam*>(&replayed)}) {
     const Trajectory found = other->trajectory();
     ASSERT_EQ(found.size(), expected.size());
     for (std::size_t k = 0; k < found.size(); ++k)
