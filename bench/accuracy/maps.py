@@ -23,6 +23,9 @@ SCENES = {
     "house_B": "house/B",
     "hospital_E": "hospital/E",
 }
+# Houses of 120 fragments by `gpureg generate --fragments 120 --seed SEED`, in WORK/generated.
+GENERATED = {"generated_8101": 8101, "generated_8102": 8102}
+PRUNE = 20  # partners that a scan of a generated house is aligned with
 OFFSET = 100  # of the numbers of a second scene in the same folder
 FOREIGN = (3, 13, 23, 33, 43)
 
@@ -30,17 +33,17 @@ FOREIGN = (3, 13, 23, 33, 43)
 class Set:
     """A folder of scans of one or two scenes, and the truth of all of them."""
 
-    def __init__(self, name, parts, cameras=True, known_only=None):
-        """known_only: name of a set whose pairs serve, too; pairs that no file has are not tried."""
-        self.name, self.parts, self.cameras = name, parts, cameras
-        self.known_only = known_only
+    def __init__(self, name, parts, cameras=True, also=None, prune=None):
+        """also: name of a set whose pairs serve, too. prune: as the option of `gpureg reconstruct`."""
+        self.name, self.parts, self.cameras, self.also = name, parts, cameras, also
+        self.prune = prune
 
-    def write(self, data, folder):
+    def write(self, arguments, folder):
         shutil.rmtree(folder, ignore_errors=True)
         folder.mkdir(parents=True)
         cameras = []
         for scene, numbers, offset in self.parts:
-            source = data / SCENES[scene]
+            source = folder_of(scene, arguments)
             for number in numbers:
                 (folder / f"cloud_bin_{number + offset}.ply").symlink_to(
                     source / f"cloud_bin_{number}.ply"
@@ -52,10 +55,11 @@ class Set:
         if self.cameras:
             (folder / "cameras.txt").write_text("\n".join(cameras) + "\n")
 
-    def truth(self, data):
+    def truth(self, arguments):
         poses, log, info = {}, {}, {}
         for scene, _, offset in self.parts:
-            for known, more in zip((poses, log, info), read_truth(data / SCENES[scene])):
+            folder = folder_of(scene, arguments)
+            for known, more in zip((poses, log, info), read_truth(folder)):
                 for key, value in more.items():
                     moved = (
                         key + offset if isinstance(key, int) else (key[0] + offset, key[1] + offset)
@@ -66,8 +70,21 @@ class Set:
     def sources(self):
         """Sets whose pairs serve this one, with the offset of their numbers."""
         suffix = "" if self.cameras else "_nocam"
-        own = self.known_only or self.name
-        return [(own, 0), *((scene + suffix, offset) for scene, _, offset in self.parts)]
+        own = [self.name, *([self.also] if self.also else [])]
+        return [
+            *((name, 0) for name in own),
+            *((scene + suffix, offset) for scene, _, offset in self.parts),
+        ]
+
+
+def folder_of(scene, arguments):
+    if scene in SCENES:
+        return arguments.data / SCENES[scene]
+    folder = arguments.work / "generated" / scene
+    if not (folder / "poses.txt").exists():
+        command = [arguments.gpureg, "generate", folder, "--fragments", "120", "--quiet"]
+        subprocess.run([*command, "--seed", str(GENERATED[scene])], check=True)
+    return folder
 
 
 def count_of(scene, data):
@@ -75,7 +92,7 @@ def count_of(scene, data):
 
 
 def cases(data):
-    out = {}
+    out = {scene: Set(scene, [(scene, range(120), 0)], prune=PRUNE) for scene in GENERATED}
     for scene in SCENES:
         every = range(count_of(scene, data))
         out[scene] = Set(scene, [(scene, every, 0)])
@@ -92,7 +109,7 @@ def cases(data):
             ("house_A", range(count_of("house_A", data)), 0),
             ("hospital_E", range(count_of("hospital_E", data)), OFFSET),
         ],
-        known_only="foreign",
+        also="foreign",
     )
     return out
 
@@ -119,16 +136,16 @@ def run(command, folder, chosen, arguments, out, more):
     pairs = arguments.work / "pairs"
     pairs.mkdir(exist_ok=True)
     records, options = known_pairs(chosen, pairs)
-    if chosen.known_only:
-        wanted = [pair for pair in wanted if pair in records]
-    missing = [pair for pair in wanted if pair not in records]
+    # Which pairs pruning chooses is known afterwards.
+    missing = [] if chosen.prune and records else [pair for pair in wanted if pair not in records]
     if missing:
         if arguments.no_align:
             return None
         listed = folder.parent / f"{chosen.name}_missing.txt"
         listed.write_text("".join(f"{i} {j}\n" for i, j in missing))
         aligned = folder.parent / f"{chosen.name}_aligned"
-        base = [command, "reconstruct", folder, "--pairs", listed, "--no-refine", "--no-map"]
+        limits = ["--prune", chosen.prune] if chosen.prune else ["--pairs", listed]
+        base = [command, "reconstruct", folder, *limits, "--no-refine", "--no-map"]
         done = subprocess.run([*map(str, base), "-o", str(aligned), "--resume", "--quiet"])
         if done.returncode not in (0, 1):
             raise SystemExit(f"{chosen.name}: the alignment failed")
@@ -137,6 +154,8 @@ def run(command, folder, chosen, arguments, out, more):
         merged = {**new, "pairs": [*new["pairs"]]}
         (pairs / f"{chosen.name}.json").write_text(json.dumps(merged))
         records.update({(p["i"], p["j"]): p for p in new["pairs"]})
+    if chosen.prune:
+        wanted = sorted(records)
     results = folder.parent / f"{chosen.name}_results.json"
     results.write_text(
         json.dumps({"options": options, "pairs": [records[pair] for pair in wanted]})
@@ -147,7 +166,7 @@ def run(command, folder, chosen, arguments, out, more):
         check=False,
     )
     document = json.loads((out / "reconstruction.json").read_text())
-    figures = measure(out, chosen.truth(arguments.data), information_of(records.values()))
+    figures = measure(out, chosen.truth(arguments), information_of(records.values()))
     figures["seconds"] = document["seconds"]
     figures["peak_memory_mib"] = document["peak_memory_mib"]
     figures["weakest"] = min(
@@ -201,7 +220,7 @@ def main():
     for name in arguments.cases or known:
         chosen = known[name]
         folder = arguments.work / "sets" / name
-        chosen.write(arguments.data, folder)
+        chosen.write(arguments, folder)
         out = arguments.work / "maps" / name
         before = run(arguments.gpureg, folder, chosen, arguments, out / "before", ["--no-refine"])
         if before is None:
@@ -211,7 +230,7 @@ def main():
         strong = [
             (i + offset, j + offset)
             for scene, _, offset in chosen.parts
-            for i, j in read_blocks(arguments.data / SCENES[scene] / "gt.log", 4)
+            for i, j in read_blocks(folder_of(scene, arguments) / "gt.log", 4)
         ]
         overlapping_islands(chosen, strong, after)
         maps[name] = {"before_refinement": before, "after_refinement": after}
@@ -219,7 +238,7 @@ def main():
     for peer in ("open3d",):
         for out in sorted((arguments.work / peer).glob("*/reconstruction.json")):
             name = out.parent.name
-            figures = measure(out.parent, known[name].truth(arguments.data), {})
+            figures = measure(out.parent, known[name].truth(arguments), {})
             figures["seconds"] = json.loads(out.read_text())["seconds"]
             figures["peak_memory_mib"] = json.loads(out.read_text())["peak_memory_mib"]
             peers.setdefault(peer, {})[name] = figures

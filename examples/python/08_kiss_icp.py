@@ -28,6 +28,7 @@ def main() -> int:
 
     config = KISSConfig()
     config.data.max_range = arguments.max_range
+    config.data.deskew = False  # the files have no time stamps of points
     config.mapping.voxel_size = arguments.max_range / 100
     tracker = KissICP(config)
     closer = gpureg.LoopCloser(voxel_size=arguments.voxel_size)
@@ -38,7 +39,7 @@ def main() -> int:
     files = sorted(p for p in arguments.folder.iterdir() if p.suffix in (".ply", ".pcd"))
     for number, file in enumerate(files):
         scan = np.asarray(gpureg.read_point_cloud(file).points, np.float64)
-        tracker.register_frame(scan, np.zeros(len(scan)))
+        tracker.register_frame(scan, np.array([]))
         world_from_scan = np.array(tracker.last_pose)
         if not points:
             world_from_fragments.append(world_from_scan)

@@ -285,7 +285,22 @@ def accuracy_attempts():
     return rows
 
 
+def verification():
+    record = load("verification.json")
+    rows = [
+        "| scene | pairs | area under the ROC curve | confidence above 0.5: true poses | wrong poses |",
+        "| --- | --- | --- | --- | --- |",
+    ]
+    rows += [
+        f"| {row['scene']} | {row['pairs']} | {row['area_under_curve']:.4f} | {percent(row['true_above_half'])} % | "
+        f"{percent(row['moved_above_half'])} % |"
+        for row in record["scenes"]
+    ]
+    return [*rows, "", source(record) + "."]
+
+
 TABLES = {
+    "verification": verification,
     "redkitchen": redkitchen,
     "redkitchen_seeds": redkitchen_seeds,
     "range_pairs": range_pairs,

@@ -30,11 +30,11 @@ class Acceptance {
         scale_(scale),
         options_(options.acceptance) {
     for (std::size_t k = 0; k < state.loops.size(); ++k)
-      if (fits[k]) order_.push_back(k);
+      if (!record(k).modes.empty()) order_.push_back(k);
     std::stable_sort(order_.begin(), order_.end(), [&](std::size_t a, std::size_t b) {
       return mode(a).confidence > mode(b).confidence;
     });
-    count_rejections();
+    find_alternatives();
   }
 
   Verdict verdict(std::size_t k) {
@@ -43,10 +43,10 @@ class Acceptance {
     if (connected && own.confidence >= options_.alone && own.drift_ratio <= 1)
       return {true, LoopReason::confident};
     if (own.confidence < options_.confirmed) return {false, LoopReason::unconfirmed};
-    const double wrong = wrong_together(k);
-    if (wrong >= 1) return {false, LoopReason::unconfirmed};
-    const double correct = 1 / wrong - 1;
-    const double against = connected ? 0 : rejected_odds(k);
+    const Support support = support_of(k);
+    if (support.confirming == 0) return {false, LoopReason::unconfirmed};
+    const double correct = 1 / support.wrong - 1;
+    const double against = connected ? 0 : alternative_odds(k);
     const double together = correct / (1 + correct + against);
     const bool enough = together >= (connected ? options_.together : options_.between_frames);
     return {enough, enough ? LoopReason::confirmed : LoopReason::unconfirmed};
@@ -61,42 +61,58 @@ class Acceptance {
                        odometry_.component(odometry_.position(record(k).target)));
   }
 
-  /// Odds that one of the loops that the graph rejects between two frames is correct.
-  void count_rejections() {
-    for (std::size_t k = 0; k < state_.loops.size(); ++k) {
-      if (fits_[k] || record(k).modes.empty()) continue;
-      const auto between = frames(k);
-      if (between.first == between.second) continue;
-      auto [wrong, first] = rejected_wrong_.try_emplace(between, 1.0);
-      wrong->second *= std::max(kLeastWrong, 1 - record(k).modes.front().confidence);
-    }
-  }
+  /// A loop and the independent ones that agree with it.
+  struct Support {
+    double wrong = 1;  ///< probability that all of them are
+    std::size_t confirming = 0;
+    bool with_graph = false;  ///< a loop that fits the graph agrees with it
+  };
 
-  double rejected_odds(std::size_t k) const {
-    const auto at = rejected_wrong_.find(frames(k));
-    return at == rejected_wrong_.end() ? 0 : 1 / at->second - 1;
-  }
-
-  /// Probability that the loop and all that confirm it are wrong; 1: nothing confirms it.
-  double wrong_together(std::size_t k) {
+  /// Confirming loops are on the same side as the loop: they fit the graph, or do not.
+  Support support_of(std::size_t k) const {
     const LoopRecord& own = record(k);
+    Support out;
+    out.wrong = 1 - mode(k).confidence;
     const auto relations = state_.relations.find(own.key(own.mode));
-    if (relations == state_.relations.end()) return 1;
+    if (relations == state_.relations.end()) return out;
     std::set<std::uint64_t> agreeing;
     for (const Relation& relation : relations->second)
       if (relation.agrees_from <= scale_) agreeing.insert(relation.other);
     std::set<FragmentId> used{own.loop.source, own.loop.target};
-    double wrong = 1 - mode(k).confidence;
-    std::size_t count = 0;
     for (const std::size_t other : order_) {
+      if (other == k || agreeing.count(record(other).key(record(other).mode)) == 0) continue;
+      out.with_graph |= fits_[other] != 0;
       const Loop& loop = record(other).loop;
-      if (other == k || used.count(loop.source) || used.count(loop.target)) continue;
-      if (agreeing.count(record(other).key(record(other).mode)) == 0) continue;
+      if (fits_[other] != fits_[k] || out.confirming == kMostConfirming ||
+          used.count(loop.source) || used.count(loop.target))
+        continue;
       used.insert({loop.source, loop.target});
-      wrong *= std::max(kLeastWrong, 1 - mode(other).confidence);
-      if (++count == kMostConfirming) break;
+      out.wrong *= std::max(kLeastWrong, 1 - mode(other).confidence);
+      ++out.confirming;
     }
-    return count == 0 ? 1 : wrong;
+    return out;
+  }
+
+  /// Loops that do not fit the graph may say where else one frame lies in the other. Near misses,
+  /// which agree with loops that fit, do not.
+  void find_alternatives() {
+    for (const std::size_t k : order_) {
+      if (fits_[k]) continue;
+      const auto between = frames(k);
+      if (between.first == between.second) continue;
+      const Support support = support_of(k);
+      if (support.with_graph) continue;
+      const double wrong =
+          support.confirming > 0 ? support.wrong : std::max(kLeastWrong, support.wrong);
+      double& odds = alternatives_[between];
+      odds = std::max(odds, 1 / wrong - 1);
+    }
+  }
+
+  /// Odds of the most likely alternative between the frames of a loop.
+  double alternative_odds(std::size_t k) const {
+    const auto at = alternatives_.find(frames(k));
+    return at == alternatives_.end() ? 0 : at->second;
   }
 
   const State& state_;
@@ -104,8 +120,8 @@ class Acceptance {
   const std::vector<char>& fits_;
   std::uint8_t scale_;
   const AcceptanceOptions& options_;
-  std::vector<std::size_t> order_;  ///< of the loops that fit, the most confident first
-  std::map<std::pair<int, int>, double> rejected_wrong_;
+  std::vector<std::size_t> order_;  ///< of the loops with poses, the most confident first
+  std::map<std::pair<int, int>, double> alternatives_;  ///< odds, by frames
 };
 
 }  // namespace

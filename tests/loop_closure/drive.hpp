@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "gpureg/loop_closure.hpp"
+#include "support/registration_result.hpp"
 
 namespace gpureg::test {
 
@@ -85,21 +86,6 @@ inline Sequence sequence(std::vector<Pose> truth, FragmentId first = 0, std::int
   out.first = first;
   out.session = session;
   return out;
-}
-
-/// As align() would return it.
-inline RegistrationResult result_of(const Pose& target_from_source, double confidence) {
-  RegistrationResult result;
-  result.status = RegistrationStatus::aligned;
-  result.reason = RegistrationReason::none;
-  result.has_candidate = true;
-  result.target_from_source = target_from_source;
-  result.score = confidence;
-  RegistrationMode mode;
-  mode.target_from_source = target_from_source;
-  mode.confidence = confidence;
-  result.modes = {mode};
-  return result;
 }
 
 /// A correct result with an error of some millimetres.

@@ -3,63 +3,20 @@
 
 #include <chrono>
 
-#include "loop_closure/drive.hpp"
-#include "support/scan.hpp"
+#include "loop_closure/scans.hpp"
 #include "support/temporary_folder.hpp"
 
 namespace gpureg::test {
 namespace {
 
-/// Scans of one room, each in a frame of its own, with the odometry of a sensor that drifts.
-struct Scans {
-  explicit Scans(int count) {
-    std::mt19937 random(5);
-    std::vector<Pose> truth;
-    for (int k = 0; k < count; ++k) {
-      truth.push_back(planar(0.8 * k, 0.3 * k, 25.0 * k));
-      const Eigen::Isometry3d fragment_from_world(truth.back().inverse());
-      points.push_back(moved(fragment_from_world, scan_room(random)));
-      const Eigen::Vector3d seen_from = fragment_from_world * kRoomSensor.cast<double>();
-      sensors.emplace_back(seen_from.cast<float>());
-    }
-    s = sequence(truth);
-  }
-
-  PreparedCloud cloud(const Context& context, int k) const {
-    PointCloudView view(points[static_cast<std::size_t>(k)]);
-    view.viewpoints = sensors[static_cast<std::size_t>(k)].data();
-    view.viewpoint_count = 1;
-    return prepare(context, view);
-  }
-
-  void add_to(LoopCloser& closer, const Context& context, int begin, int end) const {
-    for (int k = begin; k < end; ++k) {
-      const auto at = static_cast<std::size_t>(k);
-      closer.add({k, 0, double(k), cloud(context, k), s.odometry[at], Eigen::Vector3d(0, 0, 1)});
-      if (k > 0) closer.add_odometry(k, k - 1, s.odometry[at - 1].inverse() * s.odometry[at]);
-    }
-  }
-
-  std::vector<std::vector<Eigen::Vector3f>> points;
-  std::vector<Eigen::Vector3f> sensors;
-  Sequence s;
-};
-
 const Scans& scans() {
-  static const Scans all(5);
+  static const Scans all = scans_of_one_room(5);
   return all;
-}
-
-loop_closure::Options quick() {
-  loop_closure::Options options;
-  options.registration = options.registration.with_quality(1);
-  options.chunk = 1;
-  return options;
 }
 
 TEST(Registrations, WhatOverlapsIsProposedRegisteredAndAccepted) {
   const Context context = Context::cpu(2);
-  LoopCloser closer(context, quick());
+  LoopCloser closer(context, quick_options());
   scans().add_to(closer, context, 0, 5);
   closer.set_covisible(4, {2});
   const Update update = closer.process();
@@ -80,7 +37,7 @@ TEST(Registrations, WhatOverlapsIsProposedRegisteredAndAccepted) {
 
 TEST(Registrations, TheHostsProposalsComeFirstAndLimitsHold) {
   const Context context = Context::cpu(2);
-  LoopCloser closer(context, quick());
+  LoopCloser closer(context, quick_options());
   scans().add_to(closer, context, 0, 5);
   closer.propose(4, 3);
   loop_closure::ProcessLimits limits;
@@ -102,7 +59,7 @@ TEST(Registrations, TheHostsProposalsComeFirstAndLimitsHold) {
 TEST(Registrations, TheBitsDependNeitherOnThreadsNorOnSaving) {
   TemporaryFolder folder;
   const Context one = Context::cpu(1), two = Context::cpu(2);
-  loop_closure::Options options = quick();
+  loop_closure::Options options = quick_options();
   options.chunk = 2;
   LoopCloser a(one, options), b(two, options), c(two, options);
   loop_closure::ProcessLimits half;
@@ -131,7 +88,7 @@ TEST(Registrations, TheBitsDependNeitherOnThreadsNorOnSaving) {
 
 TEST(Registrations, WithoutOdometryPairsAreProposedAndConfirmEachOther) {
   const Context context = Context::cpu(2);
-  LoopCloser closer(context, quick());
+  LoopCloser closer(context, quick_options());
   const Scans& all = scans();
   // Two sessions of two fragments that odometry connects, far from each other in the host's frames.
   for (int k = 0; k < 4; ++k) {

@@ -71,6 +71,33 @@ TEST(Sessions, LoopsThatContradictEachOtherDoNotMergeThem) {
   for (const Loop& loop : closer.loops()) EXPECT_NE(loop.state, LoopState::accepted);
 }
 
+TEST(Sessions, NearMissesAndScatteredRejectionsDoNotKeepThemApart) {
+  LoopCloser closer = closer_of();
+  const Sequence first = sequence(square(20)), second = second_session();
+  first.add_to(closer);
+  second.add_to(closer);
+  for (int k = 0; k < 12; k += 2)
+    closer.add_result(100 + k, k + 7, between(second, k, first, k + 7, 0.97));
+  // A third of a metre off, each to another side, as registrations along a wall are.
+  for (int k = 1; k < 12; k += 2) {
+    const auto at = static_cast<std::size_t>(k);
+    const Pose aside = planar(0.33 * std::cos(k), 0.33 * std::sin(k), 0);
+    closer.add_result(100 + k, k + 7,
+                      correct(aside * second.truth[at], first.truth[at + 7], 0.95));
+  }
+  std::mt19937 random(3);
+  std::uniform_real_distribution<double> place(-5, 5), turn(-180, 180);
+  for (int k = 0; k < 12; ++k)
+    closer.add_result(
+        100 + k, k, result_of(planar(place(random), place(random), turn(random)), 0.6));
+  closer.process();
+  EXPECT_EQ(frames(closer), 1u);
+  for (int k = 0; k < 12; k += 2) {
+    EXPECT_EQ(loop_of(closer.loops(), 100 + k, k + 7).state, LoopState::accepted) << k;
+    EXPECT_NE(loop_of(closer.loops(), 100 + k, k).state, LoopState::accepted) << k;
+  }
+}
+
 TEST(Sessions, AMergeByAliasesIsRetracted) {
   LoopCloser closer = closer_of();
   Sequence first = sequence(square(20)), second = second_session();

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "gpureg/reconstruction.hpp"
+#include "support/registration_result.hpp"
 #include "support/scan.hpp"
 
 namespace gpureg::test {
@@ -29,20 +30,8 @@ struct PairResults {
 
   void add(std::uint32_t source, std::uint32_t target, double confidence,
            const UnalignedIsometry3d& target_from_source) {
-    RegistrationResult result;
-    result.status =
-        confidence >= 0.5 ? RegistrationStatus::aligned : RegistrationStatus::not_aligned;
-    result.reason =
-        confidence >= 0.5 ? RegistrationReason::none : RegistrationReason::confidence_too_low;
-    result.has_candidate = true;
-    result.target_from_source = target_from_source;
-    result.score = confidence;
-    RegistrationMode mode;
-    mode.target_from_source = target_from_source;
-    mode.confidence = confidence;
-    result.modes = {mode};
     pairs.push_back({source, target});
-    results.push_back(result);
+    results.push_back(result_of(target_from_source, confidence));
   }
 
   /// A correct pose with an error of a few millimetres.
