@@ -4,8 +4,9 @@
 
     scripts/plot_slam.py SEQUENCE BEFORE AFTER [-o FILE]
 
-BEFORE and AFTER are two outputs of slam_demo that share their tracking (--tracking), so that their
-surfels are the same: the first without loops, the second with them."""
+BEFORE and AFTER are two outputs of slam_demo that share their tracking (--tracking): the first
+without loops, the second with them. Where their surfels are the same, the detail is where the loops
+moved most; otherwise --detail says."""
 
 import argparse
 import json
@@ -82,6 +83,7 @@ def main():
     for name in ("sequence", "before", "after"):
         parser.add_argument(name, type=pathlib.Path)
     parser.add_argument("-o", "--output", type=pathlib.Path, default=ROOT / "docs/images/slam.png")
+    parser.add_argument("--detail", type=float, nargs=2, help="centre of the detail, true x and y")
     args = parser.parse_args()
     truth = numpy.loadtxt(args.sequence / "groundtruth.txt")
     maps = []
@@ -92,7 +94,12 @@ def main():
         maps.append((points @ rotation.T + shift, colours, error))
     after = maps[1][0]
     whole = [(after[:, axis].min() - 0.2, after[:, axis].max() + 0.2) for axis in (0, 1)]
-    detail = most_moved(maps[0][0], after)
+    if args.detail:
+        detail = [(c - WINDOW / 2, c + WINDOW / 2) for c in args.detail]
+    elif len(maps[0][0]) == len(after):
+        detail = most_moved(maps[0][0], after)
+    else:
+        parser.error("the maps have different surfels: --detail X Y")
     figure, axes = pyplot.subplots(2, 2, figsize=(9, 8.4), dpi=90)
     titles = ("by tracking alone", "with loops")
     for column, ((points, colours, error), title) in enumerate(zip(maps, titles, strict=True)):

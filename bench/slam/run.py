@@ -15,12 +15,13 @@ from __future__ import annotations
 
 import argparse
 import json
+import math
 import re
 import subprocess
 from pathlib import Path
 
 ROWS = {
-    "odometry": ["--no-dense-loops", "--no-bundle"],
+    "odometry": None,  # the run that tracks: no loop of any kind
     "+ image loops": ["--image-loops", "--no-dense-loops", "--no-bundle"],
     "+ dense loops": ["--image-loops", "--no-bundle"],
     "+ bundle adjustment": ["--image-loops"],
@@ -38,6 +39,15 @@ def run_demo(program: str, sequence: str, tracking: Path, output: Path, options:
     return json.loads((output / "loops.json").read_text())
 
 
+def path_of(truth: Path) -> float | None:
+    """Length of the true trajectory, metres."""
+    if not truth.exists():
+        return None
+    lines = [line.split() for line in truth.read_text().splitlines() if not line.startswith("#")]
+    places = [[float(word) for word in words[1:4]] for words in lines]
+    return sum(math.dist(a, b) for a, b in zip(places, places[1:], strict=False))
+
+
 def is_false(loop: dict) -> bool:
     error = loop["error"]
     return error["translation_m"] > FALSE_METRES or error["rotation_degrees"] > FALSE_DEGREES
@@ -49,7 +59,7 @@ def row_of(name: str, seed: int, figures: dict) -> dict:
     return {
         "row": name,
         "seed": seed,
-        "path_m": figures["ate"]["path_m"],
+        "poses": figures["ate"]["poses"],
         "ate_m": figures["ate"]["rmse_m"],
         "surface_mean_m": surface and surface["mean_m"],
         "surface_median_m": surface and surface["median_m"],
@@ -80,9 +90,12 @@ def measure(args, sequence: str, name: str, seeds: int) -> dict:
         options = ROWS[row]
         for seed in range(1, (seeds if row in SEEDED else 1) + 1):
             output = work / f"{list(ROWS).index(row)}_{seed}"
-            figures = run_demo(
-                args.program, sequence, tracking, output, [*options, "--seed", str(seed)]
-            )
+            if options is None:
+                output, figures = work / "tracked", tracked
+            else:
+                figures = run_demo(
+                    args.program, sequence, tracking, output, [*options, "--seed", str(seed)]
+                )
             rows.append(row_of(row, seed, figures))
             truth = Path(sequence) / "groundtruth.txt"
             if args.evo and truth.exists():
@@ -96,7 +109,7 @@ def measure(args, sequence: str, name: str, seeds: int) -> dict:
         "frames_by_all_pixels": tracked["frames_tracked_densely"],
         "worlds": tracked["worlds"],
         "keyframes": tracked["keyframes"],
-        "path_m": rows[0]["path_m"],
+        "path_m": path_of(Path(sequence) / "groundtruth.txt"),
         "generated_by": args.generated.get(name),
         "tracking_seconds": tracked["seconds"],
         "rows": rows,

@@ -23,8 +23,8 @@ def loops(rows, kind):
 
 def slam():
     table = [
-        "| sequence | row | ATE RMSE in mm | surface: mean, median in mm | dense loops: accepted / false | image loops: accepted / false |",
-        "| --- | --- | --- | --- | --- | --- |",
+        "| sequence | row | frames in one world | ATE RMSE in mm | surface: mean, median in mm | dense loops: accepted / false | image loops: accepted / false |",
+        "| --- | --- | --- | --- | --- | --- | --- |",
     ]
     for sequence in load("slam_demo.json")["sequences"]:
         for name in ROWS:
@@ -35,9 +35,11 @@ def slam():
             surface = ", ".join(
                 millimetres(row[f"surface_{kind}_m"] for row in rows) for kind in ("mean", "median")
             )
-            about = f"{sequence['name']}: {sequence['frames']} frames, {sequence['path_m']:.0f} m"
+            about = f"{sequence['name']}: {sequence['frames']} frames"
+            if sequence["path_m"]:
+                about += f", {sequence['path_m']:.0f} m"
             table.append(
-                f"| {about} | {name}{seeds} | {millimetres(row['ate_m'] for row in rows)} | {surface} "
+                f"| {about} | {name}{seeds} | {rows[0]['poses']} | {millimetres(row['ate_m'] for row in rows)} | {surface} "
                 f"| {loops(rows, 'dense')} | {loops(rows, 'image')} |"
             )
     return table
