@@ -14,6 +14,7 @@ and not named stay there.
 from __future__ import annotations
 
 import argparse
+import itertools
 import json
 import math
 import re
@@ -45,7 +46,7 @@ def path_of(truth: Path) -> float | None:
         return None
     lines = [line.split() for line in truth.read_text().splitlines() if not line.startswith("#")]
     places = [[float(word) for word in words[1:4]] for words in lines]
-    return sum(math.dist(a, b) for a, b in zip(places, places[1:], strict=False))
+    return sum(math.dist(a, b) for a, b in itertools.pairwise(places))
 
 
 def is_false(loop: dict) -> bool:
