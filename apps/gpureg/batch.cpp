@@ -75,6 +75,7 @@ class Batch {
       return kInterrupted;
     }
     check_voxel_size(options_.prepare.voxel_size, scene_.extent, "the largest fragment");
+    if (o_.method.automatic_voxel_size && !o_.quiet) note_few_points(scene_.prepared_sizes());
     Pairs pairs = choose_pairs(scene_, o_.pairs, o_.quiet);
     if (pairs.empty())
       throw InvalidArgument(o_.pairs == "all" ? o_.folder + " holds one fragment; a batch needs two"
@@ -185,7 +186,9 @@ class Batch {
 void add_batch(CLI::App& app, Action& chosen) {
   const auto o = std::make_shared<BatchOptions>();
   CLI::App* verb = app.add_subcommand("batch", "Align the fragments cloud_bin_<i> of a folder");
-  verb->add_option("DIR", o->folder, "Folder with cloud_bin_<i>.ply|pcd, and perhaps cameras.txt")
+  verb->add_option(
+          "DIR", o->folder,
+          "Folder with cloud_bin_<i>.ply|pcd|bin, or meshes .stl|obj|ply, and perhaps cameras.txt")
       ->required();
   verb->add_option("--pairs", o->pairs, "all, or a file with one pair `i j` a line")
       ->capture_default_str();
@@ -198,6 +201,8 @@ void add_batch(CLI::App& app, Action& chosen) {
   verb->add_option("--up", o->up,
                    "Vertical direction x,y,z in all fragments, and perhaps how many degrees it may "
                    "be off (without: 10): 0,0,1,5");
+  verb->add_flag("--accept-symmetry", o->method.accept_symmetry,
+                 "Also report a pose that a symmetry makes one of several equivalent ones");
   verb->add_option("-o,--output", o->log, "Redwood log of the aligned pairs: T_ij, j into i")
       ->required();
   verb->add_option("--info", o->info, "Redwood information matrices of the same pairs");

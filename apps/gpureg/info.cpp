@@ -5,9 +5,9 @@
 #include <string>
 #include <vector>
 
+#include "cloud_file.hpp"
 #include "command.hpp"
 #include "gpureg/context.hpp"
-#include "gpureg/io.hpp"
 #include "gpureg/voxel_size.hpp"
 #include "spacing.hpp"
 #include "text.hpp"
@@ -20,7 +20,7 @@ std::string describe(const Eigen::Vector3f& v) {
 }
 
 void print_cloud(const std::string& path) {
-  const PointCloud cloud = io::read_point_cloud(path);
+  const PointCloud cloud = read_cloud(path, 0, MeshNote::print);
   const std::vector<Eigen::Vector3f> points = finite_points(cloud.points);
   std::cout << path << "\n  points           " << grouped(cloud.points.size())
             << (cloud.normals.empty() ? ", without normals" : ", with normals") << "\n"
@@ -57,7 +57,7 @@ int run(const std::vector<std::string>& clouds) {
 void add_info(CLI::App& app, Action& chosen) {
   const auto clouds = std::make_shared<std::vector<std::string>>();
   CLI::App* verb = app.add_subcommand("info", "Describe clouds; without any, version and devices");
-  verb->add_option("CLOUD", *clouds, "PLY or PCD files");
+  verb->add_option("CLOUD", *clouds, "Clouds (PLY, PCD, KITTI .bin) or meshes (STL, OBJ, PLY)");
   verb->callback([clouds, &chosen] { chosen = [clouds] { return run(*clouds); }; });
 }
 

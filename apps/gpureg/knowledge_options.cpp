@@ -2,7 +2,10 @@
 #include "knowledge_options.hpp"
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <cmath>
+#include <cstddef>
+#include <iostream>
 #include <sstream>
 
 #include "gpureg/error.hpp"
@@ -41,6 +44,23 @@ void ViewpointChoice::apply(PointCloud& cloud) const {
   if (text == "auto") return;
   cloud.viewpoints.clear();
   if (text != "none") cloud.viewpoints.push_back(direction(numbers_of(text)).cast<float>());
+}
+
+void ViewpointChoice::note_place(const char* option, const PreparedCloud& cloud,
+                                 const std::string& file) const {
+  if (text == "auto" || text == "none") return;
+  const Eigen::Vector3f place = direction(numbers_of(text)).cast<float>();
+  // One point within a voxel may be a return of the sensor itself, a surface has about three.
+  constexpr std::ptrdiff_t kSurface = 2;
+  const float voxel = cloud.options().voxel_size;
+  const std::vector<Eigen::Vector3f> points = cloud.points();
+  const std::ptrdiff_t near =
+      std::count_if(points.begin(), points.end(),
+                    [&](const Eigen::Vector3f& p) { return (p - place).norm() <= voxel; });
+  if (near < kSurface) return;
+  std::cerr << "gpureg: note: " << option << " " << text << " lies on a surface of " << file << ", "
+            << near << " prepared points are within a voxel of it: is it in the frame of the cloud?"
+            << std::endl;
 }
 
 PointCloudView ViewpointChoice::view(const PointCloud& cloud) const {

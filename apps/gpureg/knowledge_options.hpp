@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "gpureg/point_cloud.hpp"
+#include "gpureg/prepared_cloud.hpp"
 #include "gpureg/prior.hpp"
 
 namespace gpureg::cli {
@@ -18,6 +19,8 @@ struct ViewpointChoice {
   void check(const char* option) const;
   /// Puts a given viewpoint into the cloud; "none" removes those of the file.
   void apply(PointCloud& cloud) const;
+  /// Says on stderr where a given viewpoint lies on a surface of the cloud, as no sensor does.
+  void note_place(const char* option, const PreparedCloud& cloud, const std::string& file) const;
   /// View of a cloud that apply() has seen.
   PointCloudView view(const PointCloud& cloud) const;
 };

@@ -4,6 +4,7 @@
 #include <charconv>
 #include <vector>
 
+#include "cloud_file.hpp"
 #include "gpureg/evaluation.hpp"
 #include "gpureg/files.hpp"
 #include "gpureg/io.hpp"
@@ -77,7 +78,8 @@ void write_merged_maps(MapRun& run, float voxel_size, bool quiet) {
   for (std::size_t k = 0; k < run.map.islands.size(); ++k) {
     reconstruction::VoxelMap map(voxel_size);
     for (const std::uint32_t scan : run.map.islands[k].scans) {
-      const PointCloud cloud = io::read_point_cloud(run.scene.files[scan]);
+      const PointCloud cloud =
+          read_cloud(run.scene.files[scan], mesh_spacing(voxel_size), MeshNote::none);
       map.add(cloud.view(), run.map.scans[scan].island_from_scan);
       progress.update(++merged);
     }

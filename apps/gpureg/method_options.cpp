@@ -76,6 +76,7 @@ RegistrationOptions MethodOptions::registration() const {
                                     : RegistrationOptions::from_voxel_size(voxel_size, quality);
   options.quadruples.count = hypotheses;
   options.seed = seed;
+  options.accept_symmetry = accept_symmetry;
   if (min_score && !(*min_score >= 0 && *min_score <= 1))
     throw InvalidArgument("--min-score is " + significant(*min_score, 6) +
                           ", expected a number from 0 to 1");

@@ -17,6 +17,7 @@ namespace gpureg::cli {
 struct MethodOptions {
   float voxel_size = PrepareOptions{}.voxel_size;
   bool automatic_voxel_size = false;  ///< to be chosen by the clouds, see choose_voxel_size
+  bool accept_symmetry = false;
   std::string preset = "default";
   std::string backend = "auto";
   unsigned threads = 0;

@@ -79,7 +79,9 @@ PairRecord PairRecord::from_json(const Json& json) {
   PairRecord record;
   record.i = index(json, "i");
   record.j = index(json, "j");
-  record.aligned = text(json, "status") == to_string(RegistrationStatus::aligned);
+  const std::string status = text(json, "status");
+  record.aligned = status == to_string(RegistrationStatus::aligned) ||
+                   status == to_string(RegistrationStatus::aligned_up_to_symmetry);
   record.reason = text(json, "reason");
   record.score = number(member(json, "score"), "score");
   const Json& pose = member(json, "T_ij");
@@ -106,6 +108,7 @@ std::vector<RegistrationMode> modes_from_json(const Json& pair) {
     RegistrationMode mode;
     mode.target_from_source.matrix() = square<4>(member(json, "T_ij"), "T_ij");
     mode.confidence = number(member(json, "confidence"), "confidence");
+    mode.equivalent = json.value("equivalent", false);
     if (const auto evidence = json.find("evidence");
         evidence != json.end() && evidence->is_object()) {
       mode.evidence.information_eigenvalues = six(*evidence, "information_eigenvalues");

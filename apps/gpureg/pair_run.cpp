@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <iostream>
 
+#include "cloud_file.hpp"
 #include "gpureg/io.hpp"
 #include "interrupt.hpp"
 #include "options_json.hpp"
@@ -46,7 +47,7 @@ void choose_voxel_size(MethodOptions& method, const std::string& folder) {
   const std::size_t count = std::min(files.size(), kMost);
   std::vector<PointCloud> clouds;
   for (std::size_t k = 0; k < count; ++k)
-    clouds.push_back(io::read_point_cloud(files[k * files.size() / count].second));
+    clouds.push_back(read_cloud(files[k * files.size() / count].second, 0, MeshNote::none));
   std::vector<PointCloudView> views;
   for (const PointCloud& cloud : clouds) views.push_back(cloud.view());
   method.choose_voxel_size(views, folder);

@@ -10,6 +10,7 @@
 #include <utility>
 #include <vector>
 
+#include "cloud_file.hpp"
 #include "command.hpp"
 #include "gpureg/error.hpp"
 #include "gpureg/io.hpp"
@@ -127,6 +128,7 @@ class Reconstruct {
     if (scene.interrupted) return false;
     run_.seconds.prepare = scene.seconds;
     check_voxel_size(run_.options.prepare.voxel_size, scene.extent, "the largest fragment");
+    if (o_.method.automatic_voxel_size && !o_.quiet) note_few_points(scene.prepared_sizes());
     // A bad file shall show before hours of work.
     if (!o_.odometry.empty()) odometry_ = read_odometry(o_.odometry, run_);
     Pairs pairs = o_.prune > 0 ? likely_pairs() : choose_pairs(scene, o_.pairs, o_.quiet);
@@ -194,7 +196,8 @@ class Reconstruct {
     for (std::size_t k = 0; k < surfaces_.size(); ++k) {
       if (InterruptGuard::requested()) return false;
       if (run_.map.scans[k].placed) {
-        PointCloud cloud = io::read_point_cloud(scene.files[k]);
+        PointCloud cloud = read_cloud(scene.files[k], mesh_spacing(run_.options.prepare.voxel_size),
+                                      MeshNote::none);
         cloud.viewpoints = cameras[scene.numbers[k]];
         surfaces_[k] = reconstruction::surface_of(context_, cloud.view(), run_.options.prepare);
       }
@@ -258,7 +261,9 @@ void add_reconstruct(CLI::App& app, Action& chosen) {
   const auto o = std::make_shared<ReconstructOptions>();
   CLI::App* verb = app.add_subcommand(
       "reconstruct", "Make one map of the unordered fragments cloud_bin_<i> of a folder");
-  verb->add_option("DIR", o->folder, "Folder with cloud_bin_<i>.ply|pcd, and perhaps cameras.txt")
+  verb->add_option(
+          "DIR", o->folder,
+          "Folder with cloud_bin_<i>.ply|pcd|bin, or meshes .stl|obj|ply, and perhaps cameras.txt")
       ->required();
   verb->add_option("-o,--output", o->output,
                    "Folder for poses.txt, reconstruction.json, trajectory.txt (TUM), edges.log "

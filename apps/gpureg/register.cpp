@@ -6,18 +6,19 @@
 #include <string>
 
 #include "before_after.hpp"
+#include "cloud_file.hpp"
 #include "command.hpp"
 #include "gpureg/error.hpp"
 #include "gpureg/evaluation.hpp"
 #include "gpureg/files.hpp"
 #include "gpureg/io.hpp"
+#include "gpureg/mesh.hpp"
 #include "gpureg/registration.hpp"
 #include "gpureg/time_budget.hpp"
 #include "image.hpp"
 #include "initial_poses.hpp"
 #include "json_file.hpp"
 #include "knowledge_options.hpp"
-#include "mesh.hpp"
 #include "method_options.hpp"
 #include "options_json.hpp"
 #include "output_path.hpp"
@@ -79,6 +80,9 @@ void print_report(const RegisterOptions& o, const Context& context, const Prepar
               << describe(r.target_from_source.matrix()) << "score    " << fixed(r.score, 3)
               << ", inliers " << grouped(s.inliers) << " of " << grouped(s.points_scored) << " ("
               << percent(r.inlier_ratio) << " %), rmse " << significant(r.inlier_rmse, 3) << " m\n";
+    if (r.equivalent_poses() > 1)
+      std::cout << "symmetry " << r.equivalent_poses() << " equivalent poses, confidence "
+                << fixed(r.symmetry_confidence(), 3) << " together\n";
   }
   std::cout << "counts   correspondences " << grouped(s.correspondences) << ", hypotheses "
             << grouped(s.hypotheses) << ", survivors " << grouped(s.survivors) << ", scored "
@@ -149,28 +153,19 @@ RegistrationResult verify(const RegisterOptions& o, const Context& context,
   return result;
 }
 
-PointCloud sampled(const std::string& path, double spacing) {
-  const SurfaceMesh mesh = read_mesh(path);
-  PointCloud cloud = sample_mesh(mesh, spacing);
-  const std::string notes = notes_of(mesh);
-  std::cerr << "gpureg: note: " << path << ": " << grouped(mesh.faces.size())
-            << " faces were sampled by " << grouped(cloud.points.size()) << " points"
-            << (mesh.closed() ? ", normals outwards" : "; the surface is not closed")
-            << (notes.empty() ? "" : "; " + notes) << std::endl;
-  return cloud;
-}
-
 /// Both clouds. A mesh is sampled at the spacing of the other cloud.
 std::pair<PointCloud, PointCloud> read_clouds(const RegisterOptions& o) {
-  const bool source = is_mesh(o.source), target = is_mesh(o.target);
+  const bool source = io::is_mesh(o.source), target = io::is_mesh(o.target);
   std::pair<PointCloud, PointCloud> clouds;
   if (!source) clouds.first = io::read_point_cloud(o.source);
   if (!target) clouds.second = io::read_point_cloud(o.target);
   const auto spacing = [](const PointCloud& other) {
     return median_spacing(finite_points(other.points), 1);
   };
-  if (source) clouds.first = sampled(o.source, target ? 0 : spacing(clouds.second));
-  if (target) clouds.second = sampled(o.target, source ? 0 : spacing(clouds.first));
+  if (source)
+    clouds.first = read_cloud(o.source, target ? 0 : spacing(clouds.second), MeshNote::print);
+  if (target)
+    clouds.second = read_cloud(o.target, source ? 0 : spacing(clouds.first), MeshNote::print);
   return clouds;
 }
 
@@ -222,14 +217,10 @@ int run(RegisterOptions o) {
   };
   const PreparedCloud source = prepared(o.source_viewpoint.view(source_cloud), o.source);
   const PreparedCloud target = prepared(o.target_viewpoint.view(target_cloud), o.target);
-  // Below, features describe hardly anything.
-  constexpr std::size_t kFewPoints = 1000;
-  const std::size_t fewest = std::min(source.size(), target.size());
-  if (o.method.automatic_voxel_size && fewest < kFewPoints)
-    std::cerr << "gpureg: note: --voxel-size auto leaves " << fewest << " points of "
-              << (source.size() == fewest ? o.source : o.target)
-              << "; too few for a reliable result, give a smaller size if the cloud has more"
-              << std::endl;
+  o.source_viewpoint.note_place("--source-viewpoint", source, o.source);
+  o.target_viewpoint.note_place("--target-viewpoint", target, o.target);
+  if (o.method.automatic_voxel_size)
+    note_few_points({{o.source, source.size()}, {o.target, target.size()}});
   TimedResult timed;
   if (o.time_budget)
     timed = align_within(context, source, target, *o.time_budget, options);
@@ -300,6 +291,8 @@ void add_register(CLI::App& app, Action& chosen) {
       "--up", o->up,
       "Vertical direction x,y,z in both clouds, and perhaps how many degrees it may be "
       "off (without: 10): 0,0,1,5");
+  verb->add_flag("--accept-symmetry", o->method.accept_symmetry,
+                 "Also report a pose that a symmetry makes one of several equivalent ones");
   verb->add_option("--json", o->json, "Write options, result, counts and times");
   verb->add_option("--overlay", o->overlay, "Write both clouds in colour, aligned, as PLY");
   verb->add_option("--image", o->image, "Draw both clouds before and after, as PNG");

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "before_after.hpp"
+#include "cloud_file.hpp"
 #include "command.hpp"
 #include "gpureg/error.hpp"
 #include "gpureg/files.hpp"
@@ -50,7 +51,7 @@ std::vector<Picture> draw(const std::vector<SamplePair>& samples, const std::str
     const auto found = files.find(number);
     if (found == files.end())
       throw IoError(folder + ": there is no fragment " + std::to_string(number));
-    return io::read_point_cloud(found->second);
+    return read_cloud(found->second, 0, MeshNote::none);
   };
   std::vector<Picture> pictures;
   for (const SamplePair& sample : samples) {

@@ -76,6 +76,7 @@ Json to_json(const RegistrationMode& mode, const char* pose_name) {
   return {{pose_name, to_json(mode.target_from_source.matrix())},
           {"confidence", mode.confidence},
           {"overlap_confidence", mode.overlap_confidence},
+          {"equivalent", mode.equivalent},
           {"evidence", to_json(mode.evidence)}};
 }
 
@@ -89,6 +90,8 @@ Json to_json(const RegistrationResult& result, const char* pose_name) {
   json[pose_name] =
       result.has_candidate ? to_json(result.target_from_source.matrix()) : Json(nullptr);
   if (!result.modes.empty()) {
+    json["symmetry"] = {{"equivalent_poses", result.equivalent_poses()},
+                        {"confidence", result.symmetry_confidence()}};
     json["modes"] = Json::array();
     for (const RegistrationMode& mode : result.modes)
       json["modes"].push_back(to_json(mode, pose_name));

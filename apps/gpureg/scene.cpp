@@ -9,6 +9,7 @@
 #include <map>
 #include <set>
 
+#include "cloud_file.hpp"
 #include "gpureg/io.hpp"
 #include "interrupt.hpp"
 #include "progress.hpp"
@@ -79,6 +80,12 @@ std::uint64_t hash_of(const PointCloud& cloud) {
 
 }  // namespace
 
+std::vector<std::pair<std::string, std::size_t>> Scene::prepared_sizes() const {
+  std::vector<std::pair<std::string, std::size_t>> out;
+  for (std::size_t k = 0; k < files.size(); ++k) out.emplace_back(files[k], clouds[k].size());
+  return out;
+}
+
 Scene prepare_scene(const Context& context, const std::string& folder,
                     const PrepareOptions& options, bool quiet, bool infer_viewpoint) {
   const auto fragments = io::list_fragments(folder);
@@ -101,7 +108,8 @@ Scene prepare_scene(const Context& context, const std::string& folder,
     for (std::size_t points = 0;
          next < fragments.size() && chunk.size() < kChunkClouds && points < kChunkPoints; ++next) {
       const auto& [number, file] = fragments[next];
-      chunk.push_back(io::read_point_cloud(file));
+      chunk.push_back(read_cloud(file, mesh_spacing(options.voxel_size),
+                                 quiet ? MeshNote::none : MeshNote::print));
       if (const auto found = cameras.find(number); found != cameras.end())
         chunk.back().viewpoints = found->second;
       if (!quiet && options.depth_maps > 0) viewpoints.see(chunk.back(), file);

@@ -24,6 +24,8 @@ struct Scene {
   /// What Redwood's files give as the number of fragments; larger than the number of files where
   /// numbers are missing.
   int count() const { return numbers.empty() ? 0 : numbers.back() + 1; }
+  /// File and number of prepared points of each fragment.
+  std::vector<std::pair<std::string, std::size_t>> prepared_sizes() const;
 };
 
 /// Reads and prepares all fragments, with their sensor positions from cameras.txt where that is

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <iostream>
 #include <limits>
 
 #include "gpureg/error.hpp"
@@ -82,6 +83,20 @@ void check_voxel_size(float voxel_size, double extent, const std::string& what) 
     throw InvalidArgument("voxel_size is " + significant(static_cast<double>(voxel_size), 6) +
                           ", but " + what + " extends over " + significant(extent, 3) +
                           " only; `gpureg info` suggests a size");
+}
+
+void note_few_points(const std::vector<std::pair<std::string, std::size_t>>& prepared) {
+  constexpr std::size_t kFewPoints = 1000;
+  const auto less = [](const auto& a, const auto& b) { return a.second < b.second; };
+  const auto fewest = std::min_element(prepared.begin(), prepared.end(), less);
+  if (fewest == prepared.end() || fewest->second >= kFewPoints) return;
+  const auto few = std::count_if(prepared.begin(), prepared.end(),
+                                 [](const auto& cloud) { return cloud.second < kFewPoints; });
+  std::cerr << "gpureg: note: --voxel-size auto leaves " << fewest->second << " points of "
+            << fewest->first
+            << (few > 1 ? ", and fewer than 1,000 of " + std::to_string(few - 1) + " more" : "")
+            << "; too few for a reliable result, give a smaller size if the cloud has more"
+            << std::endl;
 }
 
 }  // namespace gpureg::cli

@@ -3,6 +3,7 @@
 
 #include <Eigen/Core>
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace gpureg::cli {
@@ -21,5 +22,10 @@ double extent_of(const std::vector<Eigen::Vector3f>& points);
 /// InvalidArgument naming the size and what is smaller; an extent of 0 passes, as alignment itself
 /// says why such a cloud is of no use.
 void check_voxel_size(float voxel_size, double extent, const std::string& what);
+
+/// Says on stderr which clouds an automatic voxel size leaves too few points: below 1,000, features
+/// describe hardly anything.
+/// @param prepared file and number of prepared points of each cloud.
+void note_few_points(const std::vector<std::pair<std::string, std::size_t>>& prepared);
 
 }  // namespace gpureg::cli

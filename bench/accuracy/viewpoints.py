@@ -5,11 +5,16 @@
 Every cloud is moved by a random pose. `said`: its true viewpoints move along and are given.
 `nothing`: points alone. `still`: points alone of clouds that were not moved, whose sensor is at the
 origin (red kitchen: each fragment in the frame of its middle camera). One line for each set and
-condition: pairs, right, reported at 0.5, reported and wrong, and the decisions about the clouds.
+condition: pairs, right, reported at 0.5, reported and wrong; the same of reports up to a symmetry
+(--accept-symmetry); and the decisions about the clouds, models apart.
 
-Sets: kitchen, dragon, cad, kitti, lidar, fgr of DATA (its README.md has origins and licences).
+Sets: kitchen, dragon, cad, cad_mesh, kitti, lidar, fgr of DATA (its README.md has origins and
+licences). cad: scans on points of their models; cad_mesh: on the models as STL files.
 
-usage: viewpoints.py DATA [--gpureg COMMAND] [--sets kitchen,cad] [--pairs 40] [--seed 1] [--json OUT]
+The record keeps what other runs wrote about other sets; each set has the command and the commit that
+made it.
+
+usage: viewpoints.py DATA [--gpureg COMMAND] [--sets kitchen,cad] [--pairs 40] [--seeds 1 2 3] [--json OUT]
 Needs numpy and the Python package gpureg, which reads and writes the clouds."""
 
 import argparse
@@ -23,9 +28,12 @@ import tempfile
 import gpureg
 import numpy as np
 from cameras import cameras
+from record import commit
 
-Cloud = collections.namedtuple("Cloud", "points viewpoints reach")
+# triangles: of a model that is written as an STL file, or None.
+Cloud = collections.namedtuple("Cloud", "points viewpoints reach triangles", defaults=(None,))
 Set = collections.namedtuple("Set", "clouds pairs voxel right")
+FGR_REACH = 2.0
 
 
 def rotation(rng):
@@ -142,14 +150,14 @@ def stl(path):
 
 
 def sampled(triangles, rng, count=20000):
-    """Points of the faces by area, about the centroid of the area."""
+    """Points of the faces by area, and the centroid of the area."""
     cross = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
     area = np.linalg.norm(cross, axis=1)
     centre = (triangles.mean(1) * area[:, None]).sum(0) / area.sum()
     face = rng.choice(len(area), count, p=area / area.sum())
     s, u = np.sqrt(rng.random((count, 1))), rng.random((count, 1))
     t = triangles[face]
-    return t[:, 0] * (1 - s) + t[:, 1] * s * (1 - u) + t[:, 2] * s * u - centre
+    return t[:, 0] * (1 - s) + t[:, 1] * s * (1 - u) + t[:, 2] * s * u, centre
 
 
 def on_model(points, pose, truths):
@@ -159,18 +167,25 @@ def on_model(points, pose, truths):
     )
 
 
-def cad(data, count, rng):
+def cad(data, count, rng, as_mesh=False):
     sets = []
     for path in sorted((data / "cad/model").glob("*.stl")):
         scans = sorted((data / "cad/filtered").glob(f"{path.stem}_*.ply"))
         facts = [json.loads(scan.with_suffix(".json").read_text()) for scan in scans]
-        model = sampled(stl(path), rng) / facts[0]["scale"]
+        triangles = stl(path)
+        points, centre = sampled(triangles, rng)
+        model = (points - centre) / facts[0]["scale"]
+        triangles = (triangles - centre) / facts[0]["scale"]
         reach = 3 * float(np.ptp(model, axis=0).max())
-        clouds = [Cloud(model, None, reach)]
+        clouds = [Cloud(model, None, reach, triangles if as_mesh else None)]
         clouds += [Cloud(rows_of(scan), np.zeros((1, 3)), reach) for scan in scans]
         pairs = [(0, k + 1, [np.array(t) for t in f["truths"]]) for k, f in enumerate(facts)]
         sets.append(Set(clouds, pairs, "auto", on_model))
     return sets
+
+
+def cad_mesh(data, count, rng):
+    return cad(data, count, rng, as_mesh=True)
 
 
 def kitti(data, count, rng):
@@ -210,15 +225,24 @@ def fgr(data, count, rng):
     for k in chosen(range(1, 26), count // 4, rng):
         folder = data / f"fgr/{k:02d}"
         # The sensor is not known: `said` says nothing.
-        clouds = [Cloud(rows_of(folder / f"Depth_000{i}.ply"), None, 2.0) for i in (0, 1)]
+        clouds = [Cloud(rows_of(folder / f"Depth_000{i}.ply"), None, FGR_REACH) for i in (0, 1)]
         _, truth = next(iter(matrices(folder / "gt.log")))
         sets.append(Set(clouds, [(1, 0, [truth])], "auto", near(0.05)))
     return sets
 
 
+def write_stl(path, vertices):
+    faces = np.zeros(len(vertices) // 3, np.dtype([("f", "<f4", 12), ("a", "<u2")]))
+    faces["f"][:, 3:] = vertices.reshape(-1, 9)
+    path.write_bytes(bytes(80) + np.uint32(len(faces)).tobytes() + faces.tobytes())
+
+
 def write(folder, clouds, poses, say):
     lines = []
     for k, (cloud, pose) in enumerate(zip(clouds, poses)):
+        if cloud.triangles is not None:
+            write_stl(folder / f"cloud_bin_{k}.stl", moved(pose, cloud.triangles.reshape(-1, 3)))
+            continue
         points = moved(pose, cloud.points).astype(np.float32)
         gpureg.write_point_cloud(folder / f"cloud_bin_{k}.ply", points)
         if say and cloud.viewpoints is not None:
@@ -249,13 +273,15 @@ def run(command, scene, rng, condition, total, extra):
         if result.returncode not in (0, 1) or not out.exists():
             sys.exit(f"error: {command}: {result.stderr}")
         document = json.loads(out.read_text())
-    for fragment in document["fragments"]:
-        total[fragment.get("viewpoint", "?")] += 1
+    for fragment, cloud in zip(document["fragments"], scene.clouds):
+        kind = "scan" if cloud.reach == FGR_REACH or cloud.viewpoints is not None else "model"
+        total[f"{kind}: {fragment['viewpoint']}"] += 1
     found = {(p["i"], p["j"]): p for p in document["pairs"]}
     for source, target, truths in scene.pairs:
         i, j = min(source, target), max(source, target)
         record = found[i, j]
         reported = record["status"] == "aligned"
+        up_to_symmetry = reported or record["reason"] == "symmetric"
         flat = record.get("T_ij") or record.get("transform")
         good = False
         if flat is not None and truths:
@@ -269,6 +295,8 @@ def run(command, scene, rng, condition, total, extra):
         total["right"] += good
         total["reported"] += reported and good
         total["reported_wrong"] += reported and not good
+        total["reported_up_to_symmetry"] += up_to_symmetry and good
+        total["reported_up_to_symmetry_wrong"] += up_to_symmetry and not good
 
 
 def main():
@@ -280,23 +308,36 @@ def main():
     parser.add_argument("--sets", default="kitchen,dragon,cad,kitti,lidar,fgr")
     parser.add_argument("--conditions", default="said,nothing,still")
     parser.add_argument("--pairs", type=int, default=40, help="at most so many pairs of a set")
-    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--seeds", type=int, nargs="+", default=[1])
     parser.add_argument("--json", type=pathlib.Path)
     parser.add_argument("--extra", default="", help="more options of gpureg batch")
     arguments = parser.parse_args()
-    makers = {f.__name__: f for f in (kitchen, dragon, cad, kitti, lidar, fgr)}
-    record = {"seed": arguments.seed, "sets": {}}
+    makers = {f.__name__: f for f in (kitchen, dragon, cad, cad_mesh, kitti, lidar, fgr)}
+    record = {"sets": {}}
+    if arguments.json and arguments.json.exists():
+        known = json.loads(arguments.json.read_text())["sets"]
+        record["sets"] = {name: entry for name, entry in known.items() if "command" in entry}
     for name in arguments.sets.split(","):
         scenes = makers[name](arguments.data, arguments.pairs, np.random.default_rng(0))
+        entry = {
+            "command": f"bench/accuracy/viewpoints.py --sets {name} --conditions {arguments.conditions} "
+            f"--pairs {arguments.pairs} --seeds {' '.join(map(str, arguments.seeds))}"
+            + (f" --extra '{arguments.extra}'" if arguments.extra else ""),
+            "commit": commit(),
+            "seeds": arguments.seeds,
+            "conditions": {},
+        }
         for condition in arguments.conditions.split(","):
-            rng = np.random.default_rng(arguments.seed)
             total = collections.Counter()
-            for scene in scenes:
-                run(arguments.gpureg, scene, rng, condition, total, arguments.extra.split())
+            for seed in arguments.seeds:
+                rng = np.random.default_rng(seed)
+                for scene in scenes:
+                    run(arguments.gpureg, scene, rng, condition, total, arguments.extra.split())
             print(name, condition, dict(total), flush=True)
-            record["sets"].setdefault(name, {})[condition] = dict(total)
-    if arguments.json:
-        arguments.json.write_text(json.dumps(record, indent=1) + "\n")
+            entry["conditions"][condition] = dict(total)
+        record["sets"][name] = entry
+        if arguments.json:
+            arguments.json.write_text(json.dumps(record, indent=1) + "\n")
 
 
 main()

@@ -16,57 +16,33 @@ import time
 
 import gpureg
 import numpy as np
+from walk import SCENES, about_up, drifting_steps, prepare, read_poses, rmse
 
-SCENES = {"house_A": "house/A", "house_B": "house/B", "hospital_E": "hospital/E"}
 CASES = [
     ("house_A", "house_A"),
     ("hospital_E", "hospital_E"),
     ("house_A", "hospital_E"),
     ("house_B", "hospital_E"),
 ]
-SCALE, DEGREES_PER_METRE = 1.01, 0.1
+DRIFT = 0.01
 FIRST_ID = 1000  # of the second session
-
-
-def read_poses(path):
-    rows = [line.split() for line in path.read_text().splitlines() if line.strip()]
-    return {
-        int(rows[k][0]): np.array(rows[k + 1 : k + 5], float) for k in range(0, len(rows), 5)
-    }
-
-
-def yaw(degrees):
-    turn = np.eye(4)
-    c, s = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
-    turn[:2, :2] = [[c, -s], [s, c]]
-    return turn
 
 
 def add_session(context, closer, folder, numbers, session, random):
     """Fragments with drifting odometry; ids FIRST_ID * session + k. Returns the true poses by id."""
-    fragments = gpureg.FragmentSet.from_directory(folder)
-    options = gpureg.RegistrationOptions()
     truth = read_poses(folder / "poses.txt")
-    loaded = [
-        fragments.load(fragments.numbers.index(number), options.prepare) for number in numbers
-    ]
-    clouds = gpureg._core.prepare_batch(context, loaded, options.prepare)
-    frame = yaw(random.uniform(0, 360))
-    frame[:3, 3] = random.uniform(-50, 50, 3) * [1, 1, 0]
-    pose, poses = frame @ truth[numbers[0]], {}
-    for k, (number, cloud) in enumerate(zip(numbers, clouds, strict=True)):
-        here = FIRST_ID * session + k
+    clouds = prepare(context, folder, numbers)
+    steps = drifting_steps(truth, numbers, DRIFT)
+    pose = about_up(np.eye(4), random.uniform(0, 360)) @ truth[numbers[0]]
+    pose[:2, 3] += random.uniform(-50, 50, 2)
+    ids = [FIRST_ID * session + k for k in range(len(numbers))]
+    for k, here in enumerate(ids):
         if k > 0:
-            step = np.linalg.inv(truth[numbers[k - 1]]) @ truth[number]
-            length = np.linalg.norm(step[:3, 3])
-            step[:3, 3] *= SCALE
-            step = step @ yaw(DEGREES_PER_METRE * length)
-            pose = pose @ step
-        closer.add(here, cloud, pose, session=session, time=float(k))
+            pose = pose @ steps[k - 1]
+        closer.add(here, clouds[k], pose, session=session, time=float(k))
         if k > 0:
-            closer.add_odometry(here, here - 1, step)
-        poses[here] = truth[number]
-    return poses
+            closer.add_odometry(here, here - 1, steps[k - 1])
+    return {here: truth[number] for here, number in zip(ids, numbers, strict=True)}
 
 
 def run(context, first, second, data, every):
@@ -100,14 +76,7 @@ def run(context, first, second, data, every):
     }
     if same:
         truth = {**poses[0], **poses[1]}
-        found = closer.poses
-        ids = sorted(truth)
-        a = np.array([found[k][:3, 3] for k in ids])
-        b = np.array([truth[k][:3, 3] for k in ids])
-        u, _, vt = np.linalg.svd((b - b.mean(0)).T @ (a - a.mean(0)))
-        turn = u @ np.diag([1, 1, np.linalg.det(u @ vt)]) @ vt
-        error = np.linalg.norm((a - a.mean(0)) @ turn.T + b.mean(0) - b, axis=1)
-        row["rmse"] = float(np.sqrt(np.mean(error**2)))
+        row["rmse"] = rmse([closer.poses[k] for k in truth], list(truth.values()))
     print(row, flush=True)
     return row
 

@@ -13,7 +13,8 @@
 /// library; every function is thread-safe.
 namespace gpureg::io {
 
-/// Reads a PLY (text or binary of either byte order; of a mesh the vertices) or PCD file (text,
+/// Reads a PLY (text or binary of either byte order; of a mesh the vertices; see
+/// mesh.hpp for its faces) or PCD file (text,
 /// binary, compressed); of these two the content decides, not the extension. Coordinates of any
 /// numeric type become float. Normals are read where the file has them. Points with a NaN or
 /// infinite coordinate stay; prepare() drops them. A file that is neither and ends in .bin is a
@@ -34,7 +35,7 @@ void write_point_cloud(const std::string& path, const PointCloud& cloud);
 void write_overlay(const std::string& path, const PointCloud& source, const PointCloud& target,
                    const Eigen::Isometry3d& target_from_source);
 
-/// Lists cloud_bin_<i>.ply|pcd of a folder.
+/// Lists cloud_bin_<i>.ply|pcd|bin|stl|obj of a folder.
 /// @return number and path, ascending by number.
 /// @throws IoError where the folder has none, or a number twice.
 std::vector<std::pair<int, std::string>> list_fragments(const std::string& folder);

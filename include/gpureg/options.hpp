@@ -146,6 +146,10 @@ struct RegistrationOptions {
   /// Move the cloud with fewer points (Choi et al. 2015). The result refers to the given source and
   /// target either way.
   bool smaller_as_source = true;
+  /// Report one of several poses that a symmetry of the larger cloud makes equivalent if their
+  /// common confidence reaches min_confidence: status aligned_up_to_symmetry. Otherwise such a pair
+  /// is not aligned, for the reason symmetric (RegistrationMethod::compatibility).
+  bool accept_symmetry = false;
   PrepareOptions prepare;
   CompatibilityOptions compatibility;
   QuadrupleOptions quadruples;

@@ -44,7 +44,8 @@ struct Options {
   /// Confidence, after loop consistency, from which a pair takes part, (0, 1].
   double min_edge_confidence = 0.1;
   /// Probability from which the connection between two parts of the map counts, (0, 1]: that one of
-  /// the accepted edges between them is correct, in view of the rejected ones.
+  /// the accepted edges between them is correct, in view of the rejected ones. Edges that share a
+  /// scan count once, unless that scan is one of the parts.
   double min_connection_confidence = 0.9;
   std::uint32_t modes = 4;       ///< number of modes of a pair that take part, 1..16
   std::uint32_t min_island = 2;  ///< scans of an island, >= 2; smaller ones are left out
@@ -124,8 +125,9 @@ struct Edge {
   /// Covariance of the overlap's points in the source's frame, metres^2; 0 where it is not known.
   Eigen::Matrix<double, 3, 3, Eigen::DontAlign> overlap_spread =
       Eigen::Matrix<double, 3, 3, Eigen::DontAlign>::Zero();
-  double confidence = 0;  ///< of this mode, after loop consistency
-  double weight = 0;      ///< in the pose graph, [0, 1]
+  double confidence = 0;       ///< of this mode, after loop consistency
+  double pair_confidence = 0;  ///< of this mode, by the pair alone
+  double weight = 0;           ///< in the pose graph, [0, 1]
   bool accepted = false;
   EdgeReason reason = EdgeReason::inconsistent;
   /// As pose_graph::Edge::information.

@@ -47,6 +47,9 @@ struct RegistrationMode {
   PoseEvidence evidence;
   /// Rank by the coarse score among the modes before refinement, from 0.
   std::uint32_t rank_before_refinement = 0;
+  /// The clouds cannot tell this pose from the first one: a symmetry of the larger cloud lies
+  /// between them, and the odds of both are similar. False for the first pose itself.
+  bool equivalent = false;
 };
 
 /// Result of one pair. A plain value.
@@ -75,7 +78,17 @@ struct RegistrationResult {
   ViewpointSource target_viewpoint = ViewpointSource::said;
   StageTimings timings;
 
-  bool aligned() const { return status == RegistrationStatus::aligned; }
+  /// True for aligned_up_to_symmetry, too.
+  bool aligned() const {
+    return status == RegistrationStatus::aligned ||
+           status == RegistrationStatus::aligned_up_to_symmetry;
+  }
+  /// Number of modes that the clouds cannot tell from the first one, with that one; 0 without
+  /// modes.
+  std::size_t equivalent_poses() const;
+  /// Probability that the first mode or one of its equivalents is correct: the sum of their
+  /// confidences. The score without modes.
+  double symmetry_confidence() const;
 };
 
 }  // namespace gpureg

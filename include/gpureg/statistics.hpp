@@ -9,10 +9,13 @@ enum class RegistrationStatus : std::uint8_t {
   aligned,  ///< target_from_source passed every threshold
   /// No pose passed. reason says why; target_from_source is the best candidate where has_candidate.
   not_aligned,
-  skipped  ///< never tried, because the batch was cancelled before
+  skipped,  ///< never tried, because the batch was cancelled before
+  /// target_from_source is one of several poses that a symmetry makes equivalent, and only their
+  /// common confidence passed (RegistrationOptions::accept_symmetry).
+  aligned_up_to_symmetry
 };
 
-/// Why a pair is not aligned. none means aligned.
+/// Why a pair is not aligned. none means aligned, or aligned up to a symmetry.
 enum class RegistrationReason : std::uint8_t {
   none,
   too_few_source_points,  ///< fewer than 4 usable points after downsampling
@@ -28,6 +31,9 @@ enum class RegistrationReason : std::uint8_t {
   /// The best candidate is below min_confidence (RegistrationMethod::compatibility).
   confidence_too_low,
   contradicts_prior,  ///< every pose found contradicts the RegistrationPrior of the pair
+  /// The best candidate is below min_confidence because it shares its probability with poses that
+  /// a symmetry makes equivalent. Together they pass: RegistrationOptions::accept_symmetry.
+  symmetric,
   cancelled
 };
 

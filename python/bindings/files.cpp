@@ -1,17 +1,25 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <pybind11/stl.h>
 
+#include <array>
 #include <cmath>
+#include <cstdint>
 #include <cstdio>
 #include <limits>
+#include <utility>
+#include <vector>
 
 #include "cloud.hpp"
 #include "fields.hpp"
 #include "gpureg/io.hpp"
+#include "gpureg/mesh.hpp"
 #include "matrix.hpp"
 
 namespace gpureg::python {
 namespace {
+
+using DoubleRows = py::array_t<double, py::array::c_style | py::array::forcecast>;
+using FaceRows = py::array_t<std::uint32_t, py::array::c_style | py::array::forcecast>;
 
 std::vector<Eigen::Vector3f> vectors_of(const py::object& array, const char* name) {
   std::vector<Eigen::Vector3f> out;
@@ -82,6 +90,29 @@ void bind_files(py::module_& m) {
         return cloud;
       },
       py::arg("path"));
+  m.def("is_mesh", &io::is_mesh, py::arg("path"), release());
+  m.def(
+      "sample_mesh_file",
+      [](const std::string& path, double spacing) {
+        const io::SurfaceMesh mesh = io::read_mesh(path);
+        return std::make_pair(io::sample_mesh(mesh, spacing), mesh.notes());
+      },
+      py::arg("path"), py::arg("spacing"), release());
+  m.def(
+      "sample_mesh",
+      [](const DoubleRows& vertices, const FaceRows& faces, double spacing) {
+        // The package checks the shapes.
+        std::vector<Eigen::Vector3d> points;
+        for (py::ssize_t k = 0; k < vertices.shape(0); ++k)
+          points.emplace_back(vertices.at(k, 0), vertices.at(k, 1), vertices.at(k, 2));
+        std::vector<std::array<std::uint32_t, 3>> triangles;
+        for (py::ssize_t k = 0; k < faces.shape(0); ++k)
+          triangles.push_back({faces.at(k, 0), faces.at(k, 1), faces.at(k, 2)});
+        const py::gil_scoped_release unlocked;
+        const io::SurfaceMesh mesh = io::make_mesh(std::move(points), std::move(triangles));
+        return std::make_pair(io::sample_mesh(mesh, spacing), mesh.notes());
+      },
+      py::arg("vertices"), py::arg("faces"), py::arg("spacing"));
   m.def("write_point_cloud", &io::write_point_cloud, py::arg("path"), py::arg("cloud"), release());
   m.def("list_fragments", &io::list_fragments, py::arg("folder"), release());
   m.def(

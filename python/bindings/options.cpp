@@ -108,6 +108,9 @@ std::vector<Field<RegistrationOptions>> registration_fields() {
       field("seed", &O::seed, "Same seed, same bits, on any backend and number of threads."),
       field("min_confidence", &O::min_confidence,
             "Confidence below which no alignment is reported, [0, 1] (method 'compatibility')."),
+      field("accept_symmetry", &O::accept_symmetry,
+            "Report one of several poses that a symmetry of the larger cloud makes equivalent if "
+            "their common confidence reaches min_confidence (method 'compatibility')."),
       field("method", &O::method,
             "How candidate poses are found: 'compatibility' (SC2-PCR) or 'quadruples' "
             "(LoopSmart)."),

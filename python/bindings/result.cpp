@@ -164,6 +164,7 @@ py::dict state_of(const RegistrationMode& mode) {
   state["target_from_source"] = array_of(mode.target_from_source.matrix());
   state["confidence"] = mode.confidence;
   state["overlap_confidence"] = mode.overlap_confidence;
+  state["equivalent"] = mode.equivalent;
   state["evidence"] = to_dict(mode.evidence, evidence_fields());
   state["rank_before_refinement"] = mode.rank_before_refinement;
   return state;
@@ -175,6 +176,7 @@ RegistrationMode mode_from(const py::dict& state) {
       state["target_from_source"].cast<py::array_t<double>>(), "target_from_source");
   mode.confidence = state["confidence"].cast<double>();
   mode.overlap_confidence = state["overlap_confidence"].cast<double>();
+  mode.equivalent = state["equivalent"].cast<bool>();
   assign(mode.evidence, evidence_fields(), state["evidence"], "PoseEvidence");
   mode.rank_before_refinement = state["rank_before_refinement"].cast<std::uint32_t>();
   return mode;
@@ -189,6 +191,9 @@ void bind_mode(py::module_& m) {
       .def_readonly("confidence", &M::confidence, "Probability that the pose is correct.")
       .def_readonly("overlap_confidence", &M::overlap_confidence,
                     "Probability that the pose is correct and the clouds overlap by 30 % or more.")
+      .def_readonly("equivalent", &M::equivalent,
+                    "The clouds cannot tell this pose from the first one: a symmetry of the larger "
+                    "cloud lies between them.")
       .def_readonly("evidence", &M::evidence, "Evidence for and against the pose.")
       .def_readonly("rank_before_refinement", &M::rank_before_refinement,
                     "Rank by the coarse score among the modes before refinement, from 0.")
@@ -223,8 +228,8 @@ std::string text_of(const RegistrationResult& r) {
 }
 
 RegistrationStatus status_from(const std::string& name) {
-  for (const auto s :
-       {RegistrationStatus::aligned, RegistrationStatus::not_aligned, RegistrationStatus::skipped})
+  for (const auto s : {RegistrationStatus::aligned, RegistrationStatus::not_aligned,
+                       RegistrationStatus::skipped, RegistrationStatus::aligned_up_to_symmetry})
     if (name == to_string(s)) return s;
   throw py::value_error("status: '" + name + "' is none");
 }
@@ -282,13 +287,16 @@ void bind_registration_result(py::module_& m) {
   py::class_<R>(m, "RegistrationResult", "Result of one pair.")
       .def_property_readonly(
           "status", [](const R& r) { return to_string(r.status); },
-          "\"aligned\", \"not_aligned\", or \"skipped\" (never tried).")
+          "\"aligned\", \"aligned_up_to_symmetry\" (with accept_symmetry), \"not_aligned\", or "
+          "\"skipped\" (never tried).")
       .def_property_readonly(
           "reason", [](const R& r) { return to_string(r.reason); },
           "Why the pair is not aligned; \"none\" where it is.")
       .def_property_readonly(
           "explanation", [](const R& r) { return explain(r.reason); }, "The reason as a sentence.")
-      .def_property_readonly("aligned", &R::aligned, "status == \"aligned\".")
+      .def_property_readonly(
+          "aligned", &R::aligned,
+          "A pose is reported: status \"aligned\" or \"aligned_up_to_symmetry\".")
       .def_readonly("has_candidate", &R::has_candidate,
                     "target_from_source holds a pose, reported or not.")
       .def_property_readonly("target_from_source", &pose_of,
@@ -296,6 +304,12 @@ void bind_registration_result(py::module_& m) {
                              "NaN where there is no candidate.")
       .def_readonly("score", &R::score,
                     "Ranks results: the confidence; with the method 'quadruples' the inlier ratio.")
+      .def_property_readonly("symmetry_confidence", &R::symmetry_confidence,
+                             "Probability that the pose or one of its equivalent modes is correct: "
+                             "the sum of their confidences.")
+      .def_property_readonly("equivalent_poses", &R::equivalent_poses,
+                             "Number of modes that the clouds cannot tell from the first one, with "
+                             "that one; 0 without modes.")
       .def_property_readonly(
           "modes", [](const R& r) { return r.modes; },
           "Distinct poses, the most confident first; the first is target_from_source. Empty "

@@ -16,6 +16,7 @@ from . import _core
 from ._core import PointCloud, PreparedCloud, PrepareOptions
 from ._device import DeviceRows, device_rows, on_device, stream_of
 from ._las import is_las, read_las
+from ._mesh import mesh_as_cloud
 
 FloatArray = npt.NDArray[np.float32]
 Rows = FloatArray | DeviceRows
@@ -197,13 +198,16 @@ def core_cloud(
     name: str = "points",
     device: bool = False,
 ) -> CoreCloud:
-    """One cloud for the core. points may also be a PointCloud, a path, or look like Open3D's cloud.
+    """One cloud for the core. points may also be a PointCloud, a path, a mesh, or look like Open3D's
+    cloud.
 
     device: what is on a GPU stays there, where that is possible.
     """
     prefix = "" if name == "points" else f"{name}."
     known = _viewpoints(viewpoints, prefix + "viewpoints")
-    points, normals, viewpoints = _unpack(points, normals, None if known is False else known)
+    points, normals, viewpoints = _unpack(
+        points, normals, None if known is False else known, name, 0.5 * options.voxel_size
+    )
     if known is False:
         viewpoints = None
     if device and on_device(points):
@@ -248,7 +252,7 @@ def _viewpoints(value: Any, name: str) -> Any:
 
 def host_points(cloud: Any, name: str) -> FloatArray:
     """float32 rows of the points alone, on the host. Large coordinates lose their origin."""
-    raw = matrix(_unpack(cloud, None, None)[0], name, 3)
+    raw = matrix(_unpack(cloud, None, None, name, 0.0)[0], name, 3)
     origin = origin_of(raw, 0.0)
     return float_rows(raw if origin is None else raw - origin, name)
 
@@ -292,10 +296,15 @@ def _stay_on_device(
     )
 
 
-def _unpack(points: Any, normals: Any, viewpoints: Any) -> tuple[Any, Any, Any]:
-    """Clouds that carry their normals along."""
+def _unpack(
+    points: Any, normals: Any, viewpoints: Any, name: str, spacing: float
+) -> tuple[Any, Any, Any]:
+    """Clouds that carry their normals along. spacing: of the samples of a mesh."""
     if isinstance(points, str | os.PathLike) and is_las(points):
         return read_las(points), normals, viewpoints
+    mesh = mesh_as_cloud(points, name, spacing)
+    if mesh is not None:
+        points = mesh
     if isinstance(points, str | os.PathLike):
         points = _core.read_point_cloud(os.fspath(points))
     if isinstance(points, PointCloud):

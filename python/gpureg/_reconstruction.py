@@ -18,7 +18,7 @@ from ._map import Map, Poses
 from ._progress import Progress, batch_progress
 from .fragments import FragmentSet, fragment_set
 from .preparation import pieces
-from .registration import align_batch
+from .registration import ALIGNED, align_batch
 
 _DRIFT = (0.02, 0.2, 0.02)
 
@@ -169,7 +169,7 @@ def _from_table(
     ):
         values.append(
             _core.result_of_row(
-                status == "aligned",
+                status in ALIGNED,
                 None if pose is None else np.reshape(pose, (4, 4)),
                 score,
                 None if information is None else np.reshape(information, (6, 6)),

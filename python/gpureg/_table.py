@@ -11,6 +11,7 @@ import numpy.typing as npt
 import pyarrow as pa
 
 from ._core import RegistrationResult
+from .registration import ALIGNED
 
 Key = tuple[int, int]
 
@@ -59,7 +60,7 @@ def entries_of(
     table: pa.Table, column: str, size: int, count: int
 ) -> list[tuple[int, int, int, npt.NDArray[np.float64]]]:
     """Blocks of a Redwood file: the matrices of the aligned pairs."""
-    aligned = table.filter(pa.compute.equal(table["status"], "aligned"))
+    aligned = table.filter(pa.compute.is_in(table["status"], pa.array(ALIGNED)))
     i, j = aligned["i"].to_pylist(), aligned["j"].to_pylist()
     matrices = [
         np.asarray(values, np.float64).reshape(size, size) for values in aligned[column].to_pylist()

@@ -27,6 +27,7 @@ from ._residency import Residency, Stopped
 from ._store import Row, Store, read_table
 from ._table import row_of
 from .fragments import fragment_set
+from .registration import ALIGNED
 
 CHUNK = 256  # pairs: what a kill can cost, and what a cluster hands out
 MEMORY = 4 << 30
@@ -192,7 +193,7 @@ def conclude(store: Store, plan: Plan, resumed: int, begin: float) -> BatchRun:
     """The final files of a run whose chunks are all there."""
     store.conclude()
     status = read_table(store.table_path, ["status"])["status"]
-    aligned = status.to_pylist().count("aligned")
+    aligned = sum(name in ALIGNED for name in status.to_pylist())
     return BatchRun(store.folder, len(plan.pairs), aligned, resumed, time.monotonic() - begin)
 
 

@@ -8,20 +8,34 @@ from typing import Any
 
 from . import _core
 from ._core import PointCloud
+from ._mesh import mesh_as_cloud
 
 Path = str | os.PathLike[str]
 
 
-def read_point_cloud(path: Path) -> PointCloud:
-    """Read a PLY or PCD file, told apart by content, as float32.
+def read_point_cloud(path: Path, *, spacing: float = 0.0) -> PointCloud:
+    """Read a PLY or PCD file, told apart by content, a scan of KITTI (.bin), or sample a mesh.
 
-    Warns (UserWarning) of coordinates that float32 is too coarse for: a map's.
+    As float32. Warns (UserWarning) of coordinates that float32 is too coarse for: a map's. Files
+    with faces (STL, OBJ, PLY) become points of the faces, uniform by area, with the normals of the
+    faces, which point outwards where the mesh is closed. Warns of faces that were dropped or turned.
+    LAS and LAZ files hold float64: give their paths to `prepare` or `register`.
+
+    Parameters
+    ----------
+    path : str or PathLike
+    spacing : float
+        Mean distance of the samples of a mesh, in its unit; between 20,000 and 2,000,000 are made.
+        0: 20,000. `prepare` and `register` take half of their voxel size.
 
     Raises
     ------
     IoError
         An OSError, naming the file (and the line, in text) and the reason.
     """
+    cloud = mesh_as_cloud(path, "path", spacing)
+    if cloud is not None:
+        return cloud
     return _core.read_point_cloud(os.fspath(path))
 
 

@@ -47,7 +47,7 @@ class FragmentSet:
 
     @classmethod
     def from_directory(cls, directory: str | os.PathLike[str]) -> FragmentSet:
-        """The files ``cloud_bin_<i>.ply|pcd`` of a folder, with sensor positions from its
+        """The files ``cloud_bin_<i>.ply|pcd|bin|stl|obj`` of a folder, with sensor positions from its
         cameras.txt if it has one.
 
         Raises

@@ -32,8 +32,10 @@ def prepare(
 
     Parameters
     ----------
-    points : (N, 3) array, path, PointCloud or Open3D point cloud
-        Metres, any real dtype and layout: numpy, DLPack (torch, jax, ...),
+    points : (N, 3) array, path, PointCloud, mesh or Open3D point cloud
+        A path: PLY, PCD, KITTI (.bin), LAS or LAZ (with ``gpureg[las]``), or a mesh (STL, OBJ, PLY
+        with faces). Of these meshes, of trimesh's and of Open3D's, points of the faces are taken,
+        half a voxel apart, with the normals of the faces. Metres, any real dtype and layout: numpy, DLPack (torch, jax, ...),
         ``__cuda_array_interface__`` (cupy, ...) or nested lists. float32 rows are read in place;
         everything else is copied once, to float32. Rows with NaN or infinity are dropped and
         counted. What is on the context's GPU as float32, float16 or bfloat16 never leaves it.

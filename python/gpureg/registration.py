@@ -22,6 +22,9 @@ from ._core import (
 from ._progress import batch_progress
 from .preparation import check_prepared, prepared
 
+#: Values of ``RegistrationResult.status`` where a pose is reported.
+ALIGNED = ("aligned", "aligned_up_to_symmetry")
+
 
 class BatchInterrupted(KeyboardInterrupt):
     """Ctrl-C in the middle of a batch. What was done by then is in `results`.

@@ -285,6 +285,56 @@ def accuracy_attempts():
     return rows
 
 
+SENSORS = {
+    "kitchen": "rooms: red kitchen, depth camera",
+    "dragon": "objects: Stanford dragon, range scanner",
+    "cad": "CAD: scans on points of the models",
+    "cad_mesh": "CAD: scans on the models as meshes",
+    "kitti": "LiDAR: KITTI, 64 beams",
+    "lidar": "LiDAR: sample of small_gicp",
+    "fgr": "objects: range pairs of FGR",
+}
+CONDITIONS = {
+    "said": "moved, viewpoints given",
+    "nothing": "moved, nothing given",
+    "still": "not moved, nothing given",
+}
+
+
+DECISIONS = ("said", "origin", "normals", "none", "model")
+
+
+def viewpoints():
+    """Sets of records before the script wrote them alone have no `conditions` and no kinds."""
+    record = load("viewpoints.json")
+    out = [
+        "| data | clouds | pairs | first correct | reported | with `--accept-symmetry` | false reports | decisions about the clouds |",
+        "| --- | --- | --- | --- | --- | --- | --- | --- |",
+    ]
+    for name, text in SENSORS.items():
+        found = record["sets"].get(name, {})
+        for condition, of in found.get("conditions", found).items():
+            pairs = f"{of['pairs']}" + (
+                f" and {of['negatives']} negative" if of.get("negatives") else ""
+            )
+            accepted = of.get("reported_up_to_symmetry", "")
+            wrong = of.get("reported_up_to_symmetry_wrong", of["reported_wrong"])
+            decided = ", ".join(
+                f"{count} {key}" for key, count in of.items() if key.split(": ")[-1] in DECISIONS
+            )
+            out.append(
+                f"| {text} | {CONDITIONS[condition]} | {pairs} | {of['right']} | {of['reported']} | {accepted} | {wrong} | {decided} |"
+            )
+    made = [
+        f"* `{entry['command']}` at commit {entry['commit'].rstrip('+')}."
+        for entry in record["sets"].values()
+        if "command" in entry
+    ]
+    if "made_by" in record:
+        made.append(f"* {record['made_by']}; commit {record['commit']}.")
+    return [*out, "", "Made by", "", *made]
+
+
 def verification():
     record = load("verification.json")
     rows = [
@@ -300,6 +350,7 @@ def verification():
 
 
 TABLES = {
+    "viewpoints": viewpoints,
     "verification": verification,
     "redkitchen": redkitchen,
     "redkitchen_seeds": redkitchen_seeds,

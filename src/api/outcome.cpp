@@ -6,8 +6,10 @@
 #include <limits>
 #include <map>
 #include <numeric>
+#include <utility>
 
 #include "api/frames.hpp"
+#include "api/symmetry.hpp"
 #include "confidence/confidence.hpp"
 #include "confidence/pose_evidence.hpp"
 #include "pipeline/conclude.hpp"
@@ -15,21 +17,37 @@
 namespace gpureg {
 namespace {
 
+/// Largest difference of the log odds of poses that the clouds cannot tell apart: a factor of ten.
+constexpr double kSimilarLogOdds = 2.302585;
+/// Poses whose confidences add up to less are hopeless, symmetric or not.
+constexpr double kWorthTesting = 0.05;
+/// Prepared points of the largest cloud whose symmetry is tested; parts have some thousand.
+constexpr std::uint32_t kLargestSymmetric = 200'000;
+
 double rmse(std::uint64_t residual, std::uint32_t inliers, double distance) {
   return inliers > 0 ? distance * std::sqrt(static_cast<double>(residual) /
                                             static_cast<double>(kResidualScale) / inliers)
                      : 0.0;
 }
 
-RegistrationReason evidence_reason(const RegistrationStatistics& s, double confidence,
-                                   bool contradicted, const RegistrationOptions& options) {
+RegistrationReason evidence_reason(const RegistrationResult& result, bool contradicted,
+                                   const RegistrationOptions& options) {
+  const RegistrationStatistics& s = result.statistics;
   if (s.source_points < limits::kMinMatches) return RegistrationReason::too_few_source_points;
   if (s.target_points < limits::kMinMatches) return RegistrationReason::too_few_target_points;
   if (s.correspondences < limits::kMinMatches) return RegistrationReason::no_usable_features;
   if (s.scored == 0) return RegistrationReason::degenerate_geometry;
   if (contradicted) return RegistrationReason::contradicts_prior;
-  return confidence < options.min_confidence ? RegistrationReason::confidence_too_low
-                                             : RegistrationReason::none;
+  if (result.score >= options.min_confidence) return RegistrationReason::none;
+  if (result.symmetry_confidence() < options.min_confidence)
+    return RegistrationReason::confidence_too_low;
+  return options.accept_symmetry ? RegistrationReason::none : RegistrationReason::symmetric;
+}
+
+RegistrationStatus status_of(const RegistrationResult& result, const RegistrationOptions& options) {
+  if (result.reason != RegistrationReason::none) return RegistrationStatus::not_aligned;
+  return result.score >= options.min_confidence ? RegistrationStatus::aligned
+                                                : RegistrationStatus::aligned_up_to_symmetry;
 }
 
 /// The modes of one pair, in the frames of its clouds.
@@ -70,10 +88,38 @@ class Modes {
       out[k].confidence = confidences[k].confidence;
       out[k].overlap_confidence = confidences[k].overlap_confidence;
     }
+    mark_equivalents(distinct, out);
     return out;
   }
 
  private:
+  /// Marks the modes that a symmetry of the larger cloud carries into the first one.
+  void mark_equivalents(const std::vector<confidence::RankedMode>& ranked,
+                        std::vector<RegistrationMode>& modes) const {
+    const auto close = [&](std::size_t k) {
+      return ranked[k].log_odds >= ranked.front().log_odds - kSimilarLogOdds;
+    };
+    const PreparedState& larger = source_.size > target_.size ? source_ : target_;
+    std::size_t last = 1;
+    while (last < modes.size() && close(last)) ++last;
+    double together = 0;
+    for (std::size_t k = 0; k < last; ++k) together += modes[k].confidence;
+    if (last == 1 || together < kWorthTesting || larger.size > kLargestSymmetric) return;
+    CloudSymmetry symmetry(larger.copy_points(), larger.copy_normals(),
+                           options_.prepare.max_correspondence_distance);
+    const double slack =
+        kDistinctModeFraction * static_cast<double>(options_.evidence.mode_distance);
+    const Eigen::Vector3d origin = origin_of(larger);
+    for (std::size_t k = 1; k < last; ++k) {
+      const Eigen::Isometry3d first(modes.front().target_from_source.matrix());
+      const Eigen::Isometry3d other(modes[k].target_from_source.matrix());
+      Eigen::Isometry3d motion =
+          &larger == &source_ ? first.inverse() * other : other * first.inverse();
+      motion.translation() += motion.linear() * origin - origin;
+      modes[k].equivalent = symmetry.has(motion, slack);
+    }
+  }
+
   CorrespondenceMoments source_moments(const ModeOutcome& mode) const {
     return to_frame(swapped_ ? mode.target_moments : mode.source_moments, source_);
   }
@@ -186,11 +232,8 @@ RegistrationResult to_row_result(const PairOutcome& all, const PreparedState& so
   }
   if (options.method == RegistrationMethod::compatibility) {
     if (!outcome.modes.empty()) add_modes(outcome, source, target, swapped, options, result);
-    const RegistrationStatistics& s = result.statistics;
-    result.reason =
-        evidence_reason(s, result.score, some_contradict && outcome.modes.empty(), options);
-    result.status = result.reason == RegistrationReason::none ? RegistrationStatus::aligned
-                                                              : RegistrationStatus::not_aligned;
+    result.reason = evidence_reason(result, some_contradict && outcome.modes.empty(), options);
+    result.status = status_of(result, options);
     return result;
   }
   if (!outcome.has_pose) return result;

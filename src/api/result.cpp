@@ -7,6 +7,8 @@ const char* to_string(RegistrationStatus status) {
   switch (status) {
     case RegistrationStatus::aligned:
       return "aligned";
+    case RegistrationStatus::aligned_up_to_symmetry:
+      return "aligned_up_to_symmetry";
     case RegistrationStatus::not_aligned:
       return "not_aligned";
     case RegistrationStatus::skipped:
@@ -33,6 +35,8 @@ const char* to_string(RegistrationReason reason) {
       return "inlier_ratio_too_low";
     case RegistrationReason::confidence_too_low:
       return "confidence_too_low";
+    case RegistrationReason::symmetric:
+      return "symmetric";
     case RegistrationReason::contradicts_prior:
       return "contradicts_prior";
     case RegistrationReason::cancelled:
@@ -91,12 +95,28 @@ const char* explain(RegistrationReason reason) {
       return "the best pose found brings too few points together";
     case RegistrationReason::confidence_too_low:
       return "what speaks for the best pose found is too little, or too much speaks against it";
+    case RegistrationReason::symmetric:
+      return "a symmetry makes several poses equivalent; one of them is most likely correct";
     case RegistrationReason::contradicts_prior:
       return "every pose found contradicts what is known of gravity or of the pose";
     case RegistrationReason::cancelled:
       return "the batch was cancelled before this pair";
   }
   return "unknown";
+}
+
+std::size_t RegistrationResult::equivalent_poses() const {
+  std::size_t count = modes.empty() ? 0 : 1;
+  for (const RegistrationMode& mode : modes) count += mode.equivalent;
+  return count;
+}
+
+double RegistrationResult::symmetry_confidence() const {
+  if (modes.empty()) return score;
+  double sum = modes.front().confidence;
+  for (const RegistrationMode& mode : modes)
+    if (mode.equivalent) sum += mode.confidence;
+  return sum;
 }
 
 namespace {

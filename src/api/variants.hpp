@@ -34,7 +34,8 @@ inline std::vector<PairVariant> variants_of(const std::vector<PreparedCloud>& cl
   return out;
 }
 
-/// Keeps the result with the higher score, the first one of equals, and the time of both.
+/// Keeps the result with the higher confidence, up to a symmetry, the first one of equals, and the
+/// time of both.
 inline void keep_better(RegistrationResult&& candidate, RegistrationResult& kept) {
   const bool first = kept.status == RegistrationStatus::skipped;
   StageTimings& t = first ? candidate.timings : kept.timings;
@@ -46,6 +47,8 @@ inline void keep_better(RegistrationResult&& candidate, RegistrationResult& kept
   const StageTimings sum = t;
   const auto better = [&] {
     if (candidate.has_candidate != kept.has_candidate) return candidate.has_candidate;
+    const double together = candidate.symmetry_confidence(), before = kept.symmetry_confidence();
+    if (together != before) return together > before;
     return candidate.score > kept.score;
   };
   if (first || better()) kept = std::move(candidate);

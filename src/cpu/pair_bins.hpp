@@ -78,14 +78,15 @@ class PairBins {
     for (int k = 0; k < kLanes; ++k) out[k] = larger[k] > 0.0f ? out[k] : 0.0f;
   }
 
-  /// fpfh_bin() of each lane.
+  /// fpfh_bin() of each lane. Limited before the conversion, which is undefined for the NaN of
+  /// lanes that are not used.
   static void bins_of(const Lanes& unit, std::int32_t* out) {
+    constexpr auto kLast = static_cast<float>(kFpfhBins - 1);
     alignas(32) Lanes scaled;
     for (int k = 0; k < kLanes; ++k) scaled[k] = static_cast<float>(kFpfhBins) * unit[k];
+    for (int k = 0; k < kLanes; ++k) scaled[k] = scaled[k] > 0.0f ? scaled[k] : 0.0f;
+    for (int k = 0; k < kLanes; ++k) scaled[k] = scaled[k] < kLast ? scaled[k] : kLast;
     for (int k = 0; k < kLanes; ++k) out[k] = static_cast<std::int32_t>(scaled[k]);
-    for (int k = 0; k < kLanes; ++k) out[k] -= static_cast<float>(out[k]) > scaled[k] ? 1 : 0;
-    for (int k = 0; k < kLanes; ++k) out[k] = out[k] < 0 ? 0 : out[k];
-    for (int k = 0; k < kLanes; ++k) out[k] = out[k] >= kFpfhBins ? kFpfhBins - 1 : out[k];
   }
 
   /// pair_feature() of the lanes from `first` on; lanes beyond the neighbours hold unused old

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include <algorithm>
 #include <charconv>
 #include <filesystem>
+#include <iterator>
 #include <optional>
 
 #include "gpureg/error.hpp"
@@ -10,12 +12,14 @@ namespace gpureg::io {
 namespace {
 
 constexpr std::string_view kPrefix = "cloud_bin_";
+constexpr std::string_view kExtensions[] = {".ply", ".pcd", ".bin", ".stl", ".obj"};
 
 // Number of a name like cloud_bin_12.ply; none for other names.
 std::optional<int> fragment_number(std::string_view name) {
   if (name.size() < kPrefix.size() + 5 || name.substr(0, kPrefix.size()) != kPrefix) return {};
   const std::string_view extension = name.substr(name.size() - 4);
-  if (extension != ".ply" && extension != ".pcd") return {};
+  if (std::find(std::begin(kExtensions), std::end(kExtensions), extension) == std::end(kExtensions))
+    return {};
   const std::string_view digits = name.substr(kPrefix.size(), name.size() - kPrefix.size() - 4);
   int number = 0;
   const auto [stop, error] = std::from_chars(digits.data(), digits.data() + digits.size(), number);
@@ -42,7 +46,8 @@ std::vector<std::pair<int, std::string>> list_fragments(const std::string& folde
   }
   if (error) throw IoError("cannot list the folder " + folder + ": " + error.message());
   if (fragments.empty())
-    throw IoError("no fragments cloud_bin_<i>.ply or .pcd in the folder " + folder);
+    throw IoError("no fragments cloud_bin_<i>.ply, .pcd, .bin, .stl or .obj in the folder " +
+                  folder);
   return {fragments.begin(), fragments.end()};
 }
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "files/text_file.hpp"
 #include "gpureg/io.hpp"
+#include "gpureg/mesh.hpp"
 #include "io/kitti.hpp"
 #include "io/pcd.hpp"
 #include "io/ply.hpp"
@@ -16,6 +17,7 @@ PointCloud read_point_cloud(const std::string& path) {
   if (bytes.compare(0, 3, "ply") == 0) return read_ply(source);
   if (looks_like_pcd(bytes)) return read_pcd(source);
   if (looks_like_kitti(path)) return read_kitti(source);
+  if (is_mesh(path)) source.fail("a mesh, which read_mesh reads");
   source.fail("neither a PLY nor a PCD file, nor a scan of KITTI (.bin)");
 }
 

@@ -18,16 +18,43 @@ std::uint32_t find(std::vector<std::uint32_t>& parent, std::uint32_t k) {
 
 /// No edge is certain: keeps odds finite.
 constexpr double kMostConfidence = 1 - 1e-9;
+/// A confirming edge is never less likely to be wrong: registrations of one map fail together.
+constexpr double kLeastWrong = 0.2;
+/// Confidences down to which connections are made, one after the other, before the least one.
+constexpr double kLevels[] = {0.9999, 0.999, 0.99, 0.97, 0.95, 0.92, 0};
 
 }  // namespace
 
-void Connection::add(double confidence, bool accepted) {
-  (accepted ? accepted_wrong : rejected_wrong) *= 1 - std::min(confidence, kMostConfidence);
+void Connection::add(const Edge& edge, bool lone) {
+  if (!edge.accepted) {
+    rejected_wrong_ *= 1 - std::min(edge.confidence, kMostConfidence);
+    return;
+  }
+  if (lone) {
+    accepted_wrong_ *= 1 - std::min(edge.confidence, kMostConfidence);
+    return;
+  }
+  const auto counted = [&](std::uint32_t scan) {
+    return std::find(used_.begin(), used_.end(), scan) != used_.end();
+  };
+  if (counted(edge.source) || counted(edge.target)) return;
+  const double wrong = 1 - std::min({edge.confidence, edge.pair_confidence, kMostConfidence});
+  accepted_wrong_ *= used_.empty() ? wrong : std::max(kLeastWrong, wrong);
+  used_.insert(used_.end(), {edge.source, edge.target});
 }
 
 double Connection::confidence() const {
-  const double accepted = 1 / accepted_wrong - 1, rejected = 1 / rejected_wrong - 1;
+  const double accepted = 1 / accepted_wrong_ - 1, rejected = 1 / rejected_wrong_ - 1;
   return accepted / (1 + accepted + rejected);
+}
+
+std::vector<std::size_t> by_confidence(const std::vector<Edge>& edges) {
+  std::vector<std::size_t> order(edges.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
+    return edges[a].confidence > edges[b].confidence;
+  });
+  return order;
 }
 
 std::vector<std::uint32_t> certain_parts(std::size_t scans, const std::vector<Edge>& edges,
@@ -41,19 +68,27 @@ std::vector<std::uint32_t> certain_parts(std::size_t scans, const std::vector<Ed
   }
   // Log odds and back: a confidence of exactly the minimum counts.
   constexpr double kRounding = 1e-9;
-  for (bool merged = true; merged;) {
-    merged = false;
-    std::map<std::pair<std::uint32_t, std::uint32_t>, Connection> connections;
-    for (const Edge& edge : edges) {
-      const auto [a, b] = std::minmax({find(parent, edge.source), find(parent, edge.target)});
-      if (a == b) continue;
-      connections[{a, b}].add(edge.confidence, edge.accepted);
-    }
-    for (const auto& [between, connection] : connections) {
-      if (connection.confidence() < min_confidence - kRounding) continue;
-      const auto [a, b] = std::minmax({find(parent, between.first), find(parent, between.second)});
-      parent[b] = a;
-      merged = true;
+  const std::vector<std::size_t> order = by_confidence(edges);
+  std::vector<std::uint32_t> size(scans);
+  for (const double level : kLevels) {
+    const double least = std::max(level, min_confidence) - kRounding;
+    for (bool merged = true; merged;) {
+      merged = false;
+      std::fill(size.begin(), size.end(), 0u);
+      for (std::uint32_t k = 0; k < scans; ++k) ++size[find(parent, k)];
+      std::map<std::pair<std::uint32_t, std::uint32_t>, Connection> connections;
+      for (const std::size_t k : order) {
+        const auto [a, b] =
+            std::minmax({find(parent, edges[k].source), find(parent, edges[k].target)});
+        if (a != b) connections[{a, b}].add(edges[k], std::min(size[a], size[b]) == 1);
+      }
+      for (const auto& [between, connection] : connections) {
+        if (connection.confidence() < least) continue;
+        const auto [a, b] =
+            std::minmax({find(parent, between.first), find(parent, between.second)});
+        parent[b] = a;
+        merged = true;
+      }
     }
   }
   std::vector<std::uint32_t> part(scans);

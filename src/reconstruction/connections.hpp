@@ -7,18 +7,30 @@
 
 namespace gpureg::reconstruction {
 
-/// The edges between two parts of a map.
-struct Connection {
-  double accepted_wrong = 1, rejected_wrong = 1;  ///< probabilities that all of them are wrong
-
-  void add(double confidence, bool accepted);
+/// The edges between two parts of a map, added in descending order of confidence.
+///
+/// Scans that see the same place fail together, and loop consistency raises what fails together. Between
+/// parts of several scans only edges that share no scan count therefore, by the pair alone. A part of
+/// one scan has no others: there every edge counts.
+class Connection {
+ public:
+  /// @param lone one of the parts is a single scan.
+  void add(const Edge& edge, bool lone);
   /// Odds of: one of the accepted edges is correct, one of the rejected ones is, none is.
   double confidence() const;
+
+ private:
+  double accepted_wrong_ = 1, rejected_wrong_ = 1;  ///< probabilities that all of them are wrong
+  std::vector<std::uint32_t> used_;                 ///< scans of accepted edges that counted
 };
+
+/// Indices of the edges, the most confident first.
+std::vector<std::size_t> by_confidence(const std::vector<Edge>& edges);
 
 /// Parts of the map whose connections are certain: sets of scans, merged as long as the accepted
 /// edges between two sets reach the confidence together. Rejected edges between them count against
-/// it. Odometry is certain.
+/// it. The most certain connections are made first, so that the others are judged by all edges
+/// between the parts. Odometry is certain.
 /// @return number of the part of each scan.
 std::vector<std::uint32_t> certain_parts(std::size_t scans, const std::vector<Edge>& edges,
                                          const std::vector<Odometry>& odometry,

@@ -64,19 +64,21 @@ std::vector<RegistrationMode> modes_of(const RegistrationResult& result) {
 struct Candidate {
   std::uint32_t mode = 0;
   double confidence = 0;
+  double alone = 0;  ///< before loop consistency
 };
 
 /// The mode that loop consistency chose, then the others by confidence. What the chosen one gains
 /// or loses by loops, the others lose or gain.
 std::vector<Candidate> candidates_of(const std::vector<RegistrationMode>& modes,
                                      const PairConsistency& pair, const Options& options) {
-  std::vector<Candidate> out = {{pair.mode, std::min(pair.confidence, kCertain)}};
+  std::vector<Candidate> out = {{pair.mode, std::min(pair.confidence, kCertain),
+                                 std::min(modes[pair.mode].confidence, kCertain)}};
   const double alone = modes[pair.mode].confidence;
   const double share = alone < 1 ? std::min(1.0, (1 - pair.confidence) / (1 - alone)) : 0;
   for (std::uint32_t k = 0; k < modes.size() && out.size() < options.modes; ++k) {
     const double confidence = modes[k].confidence * share;
     if (k != pair.mode && confidence >= kMinAlternative)
-      out.push_back({k, std::min(confidence, kCertain)});
+      out.push_back({k, std::min(confidence, kCertain), std::min(modes[k].confidence, kCertain)});
   }
   return out;
 }
@@ -134,6 +136,7 @@ Edge edge_of(const PairGraph& pairs, std::size_t k, const pose_graph::EdgeResult
   edge.overlap_spread = pairs.spreads[k];
   edge.mode = pairs.candidates[k][result.mode].mode;
   edge.confidence = pairs.candidates[k][result.mode].confidence;
+  edge.pair_confidence = pairs.candidates[k][result.mode].alone;
   const bool first = result.mode == 0;
   edge.target_from_source =
       first ? given.target_from_source : given.alternatives[result.mode - 1].target_from_source;

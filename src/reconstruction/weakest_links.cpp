@@ -8,30 +8,27 @@
 namespace gpureg::reconstruction {
 namespace {
 
-struct Known {
-  std::uint32_t a, b;
-  double confidence;
-  bool accepted;
-};
-
-std::vector<Known> known_edges(const Reconstruction& map) {
-  std::vector<Known> out;
-  const auto add = [&](std::uint32_t a, std::uint32_t b, double confidence, bool accepted) {
-    const Scan &first = map.scans[a], &second = map.scans[b];
-    if (first.placed && second.placed && first.island == second.island)
-      out.push_back({a, b, confidence, accepted});
-  };
-  for (const Edge& edge : map.edges) add(edge.source, edge.target, edge.confidence, edge.accepted);
-  for (const Odometry& edge : map.odometry) add(edge.source, edge.target, edge.confidence, true);
-  // Stable: of equally confident edges the first.
-  std::stable_sort(out.begin(), out.end(),
-                   [](const Known& x, const Known& y) { return x.confidence > y.confidence; });
+/// Edges and odometry within the islands, as edges, the most confident first.
+std::vector<Edge> known_edges(const Reconstruction& map) {
+  std::vector<Edge> all = map.edges, out;
+  for (const Odometry& odometry : map.odometry) {
+    Edge edge;
+    edge.source = odometry.source;
+    edge.target = odometry.target;
+    edge.confidence = edge.pair_confidence = odometry.confidence;
+    edge.accepted = true;
+    all.push_back(edge);
+  }
+  for (const std::size_t k : by_confidence(all)) {
+    const Scan &first = map.scans[all[k].source], &second = map.scans[all[k].target];
+    if (first.placed && second.placed && first.island == second.island) out.push_back(all[k]);
+  }
   return out;
 }
 
 /// Kruskal 1956: neighbours of each scan in the most confident spanning forest.
 std::vector<std::vector<std::uint32_t>> spanning_forest(std::size_t scans,
-                                                        const std::vector<Known>& edges) {
+                                                        const std::vector<Edge>& edges) {
   std::vector<std::uint32_t> parent(scans);
   std::iota(parent.begin(), parent.end(), 0u);
   const auto find = [&](std::uint32_t k) {
@@ -39,11 +36,11 @@ std::vector<std::vector<std::uint32_t>> spanning_forest(std::size_t scans,
     return k;
   };
   std::vector<std::vector<std::uint32_t>> tree(scans);
-  for (const Known& edge : edges) {
-    if (!edge.accepted || find(edge.a) == find(edge.b)) continue;
-    parent[find(edge.a)] = find(edge.b);
-    tree[edge.a].push_back(edge.b);
-    tree[edge.b].push_back(edge.a);
+  for (const Edge& edge : edges) {
+    if (!edge.accepted || find(edge.source) == find(edge.target)) continue;
+    parent[find(edge.source)] = find(edge.target);
+    tree[edge.source].push_back(edge.target);
+    tree[edge.target].push_back(edge.source);
   }
   return tree;
 }
@@ -81,7 +78,7 @@ void walk(std::uint32_t root, const std::vector<std::vector<std::uint32_t>>& tre
 }  // namespace
 
 std::vector<Link> weakest_links(const Reconstruction& map) {
-  const std::vector<Known> edges = known_edges(map);
+  const std::vector<Edge> edges = known_edges(map);
   const auto tree = spanning_forest(map.scans.size(), edges);
   std::vector<Link> links;
   for (const Island& island : map.islands) {
@@ -92,16 +89,19 @@ std::vector<Link> weakest_links(const Reconstruction& map) {
       const auto below = [&](std::uint32_t scan) {
         return order.begin[scan] >= order.begin[top] && order.begin[scan] < order.end[top];
       };
+      const std::size_t size = order.end[top] - order.begin[top];
+      const bool lone = size == 1 || size + 1 == island.scans.size();
       Link link;
       Connection connection;
-      for (const Known& edge : edges) {
-        if (map.scans[edge.a].island != map.scans[top].island || below(edge.a) == below(edge.b))
+      for (const Edge& edge : edges) {
+        if (map.scans[edge.source].island != map.scans[top].island ||
+            below(edge.source) == below(edge.target))
           continue;
-        connection.add(edge.confidence, edge.accepted);
+        connection.add(edge, lone);
         ++(edge.accepted ? link.accepted : link.rejected);
       }
       link.confidence = connection.confidence();
-      const bool smaller = 2 * (order.end[top] - order.begin[top]) <= island.scans.size();
+      const bool smaller = 2 * size <= island.scans.size();
       for (const std::uint32_t scan : island.scans)
         if (below(scan) == smaller) link.scans.push_back(scan);
       links.push_back(std::move(link));

@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include <fstream>
+
 #include "fuzz/targets.hpp"
 #include "gpureg/pose_graph/files.hpp"
+#include "gpureg/trajectory.hpp"
 #include "io/run_reader.hpp"
 #include "loop_closure/saved_state.hpp"
 
@@ -35,6 +38,40 @@ void check_graph(std::string_view bytes, const Read& read_graph, const Write& wr
   const std::size_t edges = read_graph(copy).edges.size();
   ::unlink(copy.c_str());
   if (edges != graph.edges.size()) broken("a written graph reads back");
+}
+
+/// In every format, and against itself.
+void read_trajectory(std::string_view bytes) {
+  using evaluation::TrajectoryFormat;
+  const test::MemoryFile file(bytes);
+  for (const TrajectoryFormat format : {TrajectoryFormat::automatic, TrajectoryFormat::tum,
+                                        TrajectoryFormat::kitti, TrajectoryFormat::blocks}) {
+    try {
+      const evaluation::Trajectory poses = evaluation::read_trajectory(file.path(), format);
+      if (poses.empty()) broken("a trajectory has a pose");
+      for (std::size_t k = 1; k < poses.size(); ++k)
+        if (!(poses[k - 1].time < poses[k].time)) broken("times ascend");
+      evaluation::evaluate_trajectory(poses, poses);
+    } catch (const IoError& error) {
+      if (std::string_view(error.what()).find(file.path()) == std::string_view::npos)
+        broken("an error names its file");
+    } catch (const InvalidArgument&) {
+      // Too few poses.
+    }
+  }
+}
+
+/// Scans of KITTI are known by their name alone.
+void read_kitti(std::string_view bytes) {
+  static const std::string path = "/dev/shm/gpureg-fuzz-" + std::to_string(::getpid()) + ".bin";
+  std::ofstream(path, std::ios::binary).write(bytes.data(), static_cast<long>(bytes.size()));
+  try {
+    if (io::read_point_cloud(path).points.size() * 16 != bytes.size()) broken("a row is a point");
+  } catch (const IoError& error) {
+    if (std::string_view(error.what()).find(path) == std::string_view::npos)
+      broken("an error names its file");
+  }
+  ::unlink(path.c_str());
 }
 
 /// The input is what follows the header: no mutation finds a checksum.
@@ -81,6 +118,8 @@ std::vector<Target> file_targets() {
           {"information", read<Reader::information>},
           {"cameras", read<Reader::cameras>},
           {"pairs", read<Reader::pairs>},
+          {"trajectory", read_trajectory},
+          {"kitti", read_kitti},
           {"g2o", read_g2o},
           {"open3d", read_open3d},
           {"saved_state", read_saved_state}};

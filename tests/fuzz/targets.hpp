@@ -14,7 +14,7 @@ struct Target {
   void (*run)(std::string_view bytes);
 };
 
-/// PLY and PCD, Redwood's files, cameras.txt, pairs, g2o, Open3D.
+/// Point clouds, Redwood's files, cameras.txt, pairs, trajectories, pose graphs, saved states.
 std::vector<Target> file_targets();
 /// What the command reads: results, journals, initial poses.
 std::vector<Target> command_targets();

@@ -16,11 +16,12 @@ using test::TemporaryFolder;
 
 TEST(Fragments, AreOrderedByNumberNotByName) {
   const TemporaryFolder folder;
-  for (const char* name : {"cloud_bin_10.ply", "cloud_bin_2.ply", "cloud_bin_0.pcd",
-                           "cloud_bin_007.ply", "cloud_bin_100.ply"})
+  for (const char* name :
+       {"cloud_bin_10.ply", "cloud_bin_2.ply", "cloud_bin_0.pcd", "cloud_bin_007.ply",
+        "cloud_bin_100.ply", "cloud_bin_11.bin", "cloud_bin_12.stl", "cloud_bin_13.obj"})
     folder.write(name, "");
   for (const char* name :
-       {"gt.log", "cloud_bin_.ply", "cloud_bin_3.obj", "cloud_bin_x.ply", "cloud_bin_1.ply.bak",
+       {"gt.log", "cloud_bin_.ply", "cloud_bin_3.txt", "cloud_bin_x.ply", "cloud_bin_1.ply.bak",
         "cloud_bin_-4.ply", "cloud_bin_5a.ply", "xcloud_bin_6.ply", "cloud_bin_99999999999.ply"})
     folder.write(name, "");
   std::filesystem::create_directory(folder / "cloud_bin_8.ply");
@@ -31,7 +32,7 @@ TEST(Fragments, AreOrderedByNumberNotByName) {
     numbers.push_back(number);
     EXPECT_TRUE(std::filesystem::is_regular_file(path));
   }
-  EXPECT_EQ(numbers, (std::vector<int>{0, 2, 7, 10, 100}));
+  EXPECT_EQ(numbers, (std::vector<int>{0, 2, 7, 10, 11, 12, 13, 100}));
   EXPECT_EQ(fragments[0].second, folder / "cloud_bin_0.pcd");
 }
 

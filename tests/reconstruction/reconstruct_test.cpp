@@ -53,6 +53,29 @@ TEST(Reconstruct, TwoHousesStayTwoIslands) {
   EXPECT_LT(largest_error(map, data.world_from_scan, 1), kTolerance);
 }
 
+TEST(Reconstruct, OneAliasSeenByNeighboursDoesNotJoinTwoHouses) {
+  // Scans 4, 5 and 6 see a place that looks like one that scan 12 sees; their wrong poses agree.
+  PairResults data(16);
+  data.add_chain(0, 8, 3);
+  data.add_chain(8, 16, 3);
+  for (const std::uint32_t k : {4u, 5u, 6u}) data.add_correct(12, k, 0.72);
+  auto map = data.map();
+  ASSERT_EQ(map.islands.size(), 2u);
+  EXPECT_EQ(map.islands[0].scans.size(), 8u);
+  for (std::size_t k = map.edges.size() - 3; k < map.edges.size(); ++k) {
+    EXPECT_GT(map.edges[k].confidence, 0.8);  // loop consistency believes them
+    EXPECT_NEAR(map.edges[k].pair_confidence, 0.72, 1e-12);
+    EXPECT_FALSE(map.edges[k].accepted);
+    EXPECT_EQ(map.edges[k].reason, EdgeReason::unconfirmed);
+  }
+  // Other scans of both houses that agree with them do.
+  data.add_correct(11, 3, 0.72);
+  data.add_correct(13, 7, 0.72);
+  map = data.map();
+  EXPECT_EQ(map.islands.size(), 1u);
+  EXPECT_EQ(map.placed(), 16u);
+}
+
 TEST(Reconstruct, LeavesOutForeignScansWithAReason) {
   PairResults data(11);
   data.add_chain(0, 7, 3);

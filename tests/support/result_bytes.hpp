@@ -32,6 +32,7 @@ inline std::vector<char> bytes(const RegistrationResult& r) {
   for (const RegistrationMode& mode : r.modes) {
     add(mode.target_from_source.matrix().data(), 16 * sizeof(double));
     add(&mode.confidence, sizeof mode.confidence);
+    add(&mode.equivalent, sizeof mode.equivalent);
     const PoseEvidence& e = mode.evidence;
     add(&e.match_inliers, sizeof e.match_inliers);
     for (const double v :

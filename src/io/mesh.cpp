@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "mesh.hpp"
+#include "gpureg/mesh.hpp"
 
 #include <Eigen/Geometry>
 #include <algorithm>
@@ -9,12 +9,12 @@
 #include <fstream>
 #include <map>
 #include <random>
+#include <sstream>
 #include <utility>
 
-#include "mesh_repair.hpp"
-#include "text.hpp"
+#include "gpureg/error.hpp"
 
-namespace gpureg::cli {
+namespace gpureg::io {
 namespace {
 
 constexpr double kFewestPoints = 2e4, kMostPoints = 2e6;
@@ -43,20 +43,7 @@ Eigen::Vector3d doubled_area(const SurfaceMesh& mesh, const std::array<std::uint
   return (mesh.vertices[face[1]] - a).cross(mesh.vertices[face[2]] - a);
 }
 
-}  // namespace
-
-double SurfaceMesh::area() const {
-  double sum = 0;
-  for (const auto& face : faces) sum += 0.5 * doubled_area(*this, face).norm();
-  return sum;
-}
-
-bool is_mesh(const std::string& path) {
-  const std::string extension = extension_of(path);
-  return extension == ".stl" || extension == ".obj" || ply_has_faces(path);
-}
-
-void repair_mesh(SurfaceMesh& mesh) {
+void repair(SurfaceMesh& mesh) {
   const auto flat = [&](const std::array<std::uint32_t, 3>& face) {
     return !(doubled_area(mesh, face).norm() > 0);
   };
@@ -115,18 +102,61 @@ void repair_mesh(SurfaceMesh& mesh) {
   mesh.flipped_faces = mesh.faces.size() - mesh.flipped_faces;
 }
 
-std::string notes_of(const SurfaceMesh& mesh) {
+std::string number(const std::vector<Eigen::Vector3d>& vertices, std::size_t k) {
+  std::ostringstream text;
+  text << "vertices[" << k << "] is " << vertices[k].transpose();
+  return text.str();
+}
+
+}  // namespace
+
+double SurfaceMesh::area() const {
+  double sum = 0;
+  for (const auto& face : faces) sum += 0.5 * doubled_area(*this, face).norm();
+  return sum;
+}
+
+bool is_mesh(const std::string& path) {
+  const std::string extension = extension_of(path);
+  return extension == ".stl" || extension == ".obj" || ply_has_faces(path);
+}
+
+std::string SurfaceMesh::notes() const {
   std::string text;
   const auto add = [&](std::size_t count, const char* what) {
-    if (count > 0) text += (text.empty() ? "" : ", ") + grouped(count) + " " + what;
+    if (count > 0) text += (text.empty() ? "" : ", ") + std::to_string(count) + " " + what;
   };
-  add(mesh.flat_faces, "faces without area were dropped");
-  add(mesh.flipped_faces, "faces pointed the wrong way and were turned");
-  add(mesh.non_manifold_edges, "edges belong to more than two faces");
+  add(flat_faces, "faces without area were dropped");
+  add(flipped_faces, "faces pointed the wrong way and were turned");
+  add(non_manifold_edges, "edges belong to more than two faces");
   return text;
 }
 
+SurfaceMesh make_mesh(std::vector<Eigen::Vector3d> vertices,
+                      std::vector<std::array<std::uint32_t, 3>> faces) {
+  for (std::size_t k = 0; k < vertices.size(); ++k)
+    if (!vertices[k].allFinite())
+      throw InvalidArgument(number(vertices, k) + ", expected finite coordinates");
+  for (std::size_t f = 0; f < faces.size(); ++f)
+    for (const std::uint32_t vertex : faces[f])
+      if (vertex >= vertices.size())
+        throw InvalidArgument("faces[" + std::to_string(f) + "] refers to vertex " +
+                              std::to_string(vertex) + ", but there are " +
+                              std::to_string(vertices.size()));
+  SurfaceMesh mesh;
+  mesh.vertices = std::move(vertices);
+  mesh.faces = std::move(faces);
+  repair(mesh);
+  if (mesh.faces.empty())
+    throw InvalidArgument("faces: none of " + std::to_string(mesh.flat_faces) + " has an area");
+  return mesh;
+}
+
 PointCloud sample_mesh(const SurfaceMesh& mesh, double spacing) {
+  if (!(spacing >= 0 && std::isfinite(spacing)))
+    throw InvalidArgument("spacing is " + std::to_string(spacing) +
+                          ", expected a finite distance, or 0");
+  if (mesh.faces.empty()) throw InvalidArgument("mesh.faces is empty");
   std::vector<double> until;  // area up to and including each face
   for (const auto& face : mesh.faces)
     until.push_back((until.empty() ? 0 : until.back()) + 0.5 * doubled_area(mesh, face).norm());
@@ -152,4 +182,4 @@ PointCloud sample_mesh(const SurfaceMesh& mesh, double spacing) {
   return cloud;
 }
 
-}  // namespace gpureg::cli
+}  // namespace gpureg::io

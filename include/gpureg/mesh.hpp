@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "gpureg/point_cloud.hpp"
+
+namespace gpureg::io {
+
+/// Triangles with consistent winding, and what was wrong with them. Every function of this header
+/// is thread-safe.
+struct SurfaceMesh {
+  std::vector<Eigen::Vector3d> vertices;            ///< finite
+  std::vector<std::array<std::uint32_t, 3>> faces;  ///< indices into vertices; each has an area
+  std::size_t flat_faces = 0;                       ///< without area, dropped
+  std::size_t flipped_faces = 0;                    ///< turned to agree with their neighbours
+  std::size_t non_manifold_edges = 0;               ///< of more than two faces
+  std::size_t open_edges = 0;                       ///< of one face
+
+  bool closed() const { return open_edges == 0 && non_manifold_edges == 0; }
+  double area() const;
+  /// The counts above that are not 0, as one English phrase; empty where nothing is wrong. Open
+  /// edges are not wrong.
+  std::string notes() const;
+};
+
+/// True for STL and OBJ by their extension, and for PLY files with faces. False where path cannot
+/// be read.
+bool is_mesh(const std::string& path);
+
+/// Reads STL, OBJ or PLY through Assimp. Polygons become triangles, and make_mesh repairs them.
+/// @throws IoError naming the file: unreadable, a vertex that is not finite (with its number), no
+///   face with an area, or gpureg was built without Assimp.
+SurfaceMesh read_mesh(const std::string& path);
+
+/// Drops faces without area, turns faces that are wound against most of their neighbours, and turns
+/// a closed mesh outwards.
+/// @throws InvalidArgument naming the vertex that is not finite, or the face that refers to a
+/// vertex
+///   that is not there; or where no face has an area.
+SurfaceMesh make_mesh(std::vector<Eigen::Vector3d> vertices,
+                      std::vector<std::array<std::uint32_t, 3>> faces);
+
+/// Points of the faces, uniform by area, with the normals of the faces. Same mesh, same bits.
+/// @param spacing wanted mean distance of neighbours, in the unit of the vertices; between 20,000
+///   and 2,000,000 points are made. 0: 20,000 points.
+/// @throws InvalidArgument where spacing is negative or not finite, or the mesh has no face.
+PointCloud sample_mesh(const SurfaceMesh& mesh, double spacing = 0);
+
+}  // namespace gpureg::io
