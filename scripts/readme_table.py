@@ -12,12 +12,28 @@ import pathlib
 import re
 import sys
 
-from tables import accuracy, loops, maps, peers, speed
+from tables import accuracy, loops, maps, peers, slam, speed
 
 ROOT = pathlib.Path(__file__).resolve().parents[1]
-PAGES = ("accuracy", "experiments", "benchmarks", "performance", "maps", "loops", "sensors")
+PAGES = (
+    "accuracy",
+    "experiments",
+    "benchmarks",
+    "performance",
+    "maps",
+    "loops",
+    "sensors",
+    "slam_demo",
+)
 FILES = ["README.md", *(f"docs/{page}.md" for page in PAGES)]
-TABLES = {**accuracy.TABLES, **peers.TABLES, **speed.TABLES, **maps.TABLES, **loops.TABLES}
+TABLES = {
+    **accuracy.TABLES,
+    **peers.TABLES,
+    **speed.TABLES,
+    **maps.TABLES,
+    **loops.TABLES,
+    **slam.TABLES,
+}
 
 
 def rewritten(text):

@@ -19,6 +19,7 @@ void add_consistency(CLI::App& app, Action& chosen);
 void add_reconstruct(CLI::App& app, Action& chosen);
 void add_evaluate(CLI::App& app, Action& chosen);
 void add_evaluate_trajectory(CLI::App& app, Action& chosen);
+void add_evaluate_surface(CLI::App& app, Action& chosen);
 void add_report(CLI::App& app, Action& chosen);
 void add_generate(CLI::App& app, Action& chosen);
 void add_info(CLI::App& app, Action& chosen);

@@ -20,6 +20,7 @@ namespace {
 struct GenerateOptions {
   std::string folder;
   synthetic::GenerateOptions scene;
+  double depth_noise = 1;
   bool quiet = false;
 };
 
@@ -58,7 +59,11 @@ int run(const GenerateOptions& o) {
     progress->update(static_cast<std::size_t>(done));
   };
   hooks.should_stop = [] { return InterruptGuard::requested(); };
-  synthetic::generate(o.folder, o.scene, hooks);
+  synthetic::GenerateOptions scene = o.scene;
+  for (double* error :
+       {&scene.sensor.pixel_shift, &scene.sensor.disparity_noise, &scene.sensor.distortion})
+    *error *= o.depth_noise;
+  synthetic::generate(o.folder, scene, hooks);
   progress.reset();
   if (InterruptGuard::requested()) {
     std::cerr << "gpureg: interrupted, " << o.folder << " holds an unfinished scene" << std::endl;
@@ -94,6 +99,11 @@ void add_generate(CLI::App& app, Action& chosen) {
       ->capture_default_str();
   verb->add_option("--no-return", o->scene.no_return,
                    "Metres that the path goes before it comes back to a place")
+      ->capture_default_str();
+  verb->add_option(
+          "--depth-noise", o->depth_noise,
+          "Factor of all errors of the depth camera: shift, noise of disparities, distortion")
+      ->check(CLI::Range(0.0, 10.0))
       ->capture_default_str();
   verb->add_flag("--rgbd", o->scene.rgbd,
                  "Also write the frames as a sequence in TUM's layout, and the true surfaces");

@@ -67,6 +67,7 @@ int run(int argc, char** argv) {
   add_reconstruct(app, action);
   add_evaluate(app, action);
   add_evaluate_trajectory(app, action);
+  add_evaluate_surface(app, action);
   add_report(app, action);
   add_generate(app, action);
   add_info(app, action);

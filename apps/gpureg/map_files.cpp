@@ -8,6 +8,7 @@
 #include "gpureg/evaluation.hpp"
 #include "gpureg/files.hpp"
 #include "gpureg/io.hpp"
+#include "gpureg/trajectory.hpp"
 #include "progress.hpp"
 
 namespace gpureg::cli {
@@ -33,23 +34,14 @@ std::string poses_text(const MapRun& run) {
   return text;
 }
 
-/// TUM: time stamp, position, quaternion (x, y, z, w). The number stands for the time.
-std::string trajectory_text(const MapRun& run) {
-  std::string text;
-  for (std::size_t k = 0; k < run.map.scans.size(); ++k) {
-    if (!run.map.scans[k].placed) continue;
-    text += std::to_string(run.scene.numbers[k]);
-    const UnalignedIsometry3d& pose = run.map.scans[k].island_from_scan;
-    const Eigen::Matrix3d turn = pose.linear();
-    const Eigen::Quaterniond q = Eigen::Quaterniond(turn).normalized();
-    for (const double value : {pose.translation().x(), pose.translation().y(),
-                               pose.translation().z(), q.x(), q.y(), q.z(), q.w()}) {
-      text += ' ';
-      append(text, value);
-    }
-    text += '\n';
-  }
-  return text;
+/// The number stands for the time.
+evaluation::Trajectory trajectory_of(const MapRun& run) {
+  evaluation::Trajectory result;
+  for (std::size_t k = 0; k < run.map.scans.size(); ++k)
+    if (run.map.scans[k].placed)
+      result.push_back(
+          {static_cast<double>(run.scene.numbers[k]), run.map.scans[k].island_from_scan.matrix()});
+  return result;
 }
 
 /// Accepted edges with the poses of the map.
@@ -69,7 +61,7 @@ void write_edges(const MapRun& run) {
 
 void write_poses(const MapRun& run) {
   files::write_atomically(run.file("poses.txt"), poses_text(run));
-  files::write_atomically(run.file("trajectory.txt"), trajectory_text(run));
+  evaluation::write_trajectory(run.file("trajectory.txt"), trajectory_of(run));
   write_edges(run);
   const std::vector<std::int64_t> ids(run.scene.numbers.begin(), run.scene.numbers.end());
   pose_graph::write_g2o(run.file("graph.g2o"), reconstruction::graph_of(run.map, ids));

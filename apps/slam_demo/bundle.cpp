@@ -12,7 +12,6 @@ namespace slam_demo {
 namespace {
 
 using Pose = BundleProblem::Pose;
-std::size_t at(int index) { return static_cast<std::size_t>(index); }
 
 // Standard deviation of inverse depths, 1/m. Structured light measures disparities, so their noise
 // is that of inverse depth; this is 1/6 px of a Kinect (focal length times baseline: 43 m px).
@@ -51,22 +50,14 @@ void residual_of(const Pinhole& camera, const Measurement& m, const T* pose, con
   if (depth) residual[2] = (inverse - T(1 / m.depth)) / T(kInverseDepthSigma);
 }
 
-struct PixelCost {
+/// kSize: 3 with depth, 2 without.
+template <int kSize>
+struct SightCost {
   const Pinhole camera;
   const Measurement m;
   template <class T>
   bool operator()(const T* pose, const T* point, T* residual) const {
-    residual_of(camera, m, pose, point, residual, false);
-    return true;
-  }
-};
-
-struct DepthCost {
-  const Pinhole camera;
-  const Measurement m;
-  template <class T>
-  bool operator()(const T* pose, const T* point, T* residual) const {
-    residual_of(camera, m, pose, point, residual, true);
+    residual_of(camera, m, pose, point, residual, kSize == 3);
     return true;
   }
 };
@@ -83,6 +74,18 @@ struct PoseCost {
     return true;
   }
 };
+
+ceres::CostFunction* pose_cost(const Pinhole& camera, const PointMatch& match) {
+  if (match.seen.depth > 0)
+    return new ceres::AutoDiffCostFunction<PoseCost<3>, 3, 7>(new PoseCost<3>{camera, match});
+  return new ceres::AutoDiffCostFunction<PoseCost<2>, 2, 7>(new PoseCost<2>{camera, match});
+}
+
+ceres::CostFunction* sight_cost(const Pinhole& camera, const Measurement& m) {
+  if (m.depth > 0)
+    return new ceres::AutoDiffCostFunction<SightCost<3>, 3, 7, 3>(new SightCost<3>{camera, m});
+  return new ceres::AutoDiffCostFunction<SightCost<2>, 2, 7, 3>(new SightCost<2>{camera, m});
+}
 
 struct RelativeCost {
   const Eigen::Quaterniond a_from_b_rotation;
@@ -142,15 +145,7 @@ Eigen::Isometry3d refine_pose(const Pinhole& camera, const std::vector<PointMatc
       if (!inliers[k]) continue;
       ++used;
       ceres::LossFunction* loss = round + 1 < kRounds ? new ceres::HuberLoss(kHuber) : nullptr;
-      if (matches[k].seen.depth > 0) {
-        problem.AddResidualBlock(
-            new ceres::AutoDiffCostFunction<PoseCost<3>, 3, 7>(new PoseCost<3>{camera, matches[k]}),
-            loss, pose.data());
-      } else {
-        problem.AddResidualBlock(
-            new ceres::AutoDiffCostFunction<PoseCost<2>, 2, 7>(new PoseCost<2>{camera, matches[k]}),
-            loss, pose.data());
-      }
+      problem.AddResidualBlock(pose_cost(camera, matches[k]), loss, pose.data());
     }
     if (used < 6) break;
     ceres::Solver::Options options;
@@ -224,12 +219,8 @@ BundleProblem local_bundle(const Map& map, int keyframe, std::size_t size) {
       if (!std::binary_search(local.begin(), local.end(), other)) others[other] += shared;
     }
   }
-  std::vector<std::pair<int, int>> order;
-  for (const auto& [other, shared] : others) order.emplace_back(-shared, other);
-  std::sort(order.begin(), order.end());
-  std::vector<int> fixed;
-  for (std::size_t k = 0; k < std::min(order.size(), kMaxFixed); ++k)
-    fixed.push_back(order[k].second);
+  std::vector<int> fixed = by_count(others);
+  fixed.resize(std::min(fixed.size(), kMaxFixed));
   if (fixed.empty()) {  // the first keyframes: the oldest holds the map in place
     fixed.push_back(local.front());
     local.erase(local.begin());
@@ -237,10 +228,8 @@ BundleProblem local_bundle(const Map& map, int keyframe, std::size_t size) {
   return bundle_of(map, local, fixed, {});
 }
 
-BundleReport adjust(const Pinhole& camera, BundleProblem& problem, int iterations, int threads,
-                    const std::function<bool()>& should_stop) {
-  BundleReport report;
-  if (problem.sights.empty()) return report;
+BundleReport adjust(const Pinhole& camera, BundleProblem& problem, int iterations, int threads) {
+  if (problem.sights.empty()) return {};
   ceres::Problem ceres_problem;
   auto* order = new ceres::ParameterBlockOrdering;
   for (std::size_t k = 0; k < problem.poses.size(); ++k) {
@@ -252,15 +241,8 @@ BundleReport adjust(const Pinhole& camera, BundleProblem& problem, int iteration
     double* point = problem.points[at(s.point)].data();
     double* pose = problem.poses[at(s.pose)].data();
     order->AddElementToGroup(point, 0);
-    if (s.seen.depth > 0) {
-      ceres_problem.AddResidualBlock(
-          new ceres::AutoDiffCostFunction<DepthCost, 3, 7, 3>(new DepthCost{camera, s.seen}),
-          new ceres::HuberLoss(kHuber), pose, point);
-    } else {
-      ceres_problem.AddResidualBlock(
-          new ceres::AutoDiffCostFunction<PixelCost, 2, 7, 3>(new PixelCost{camera, s.seen}),
-          new ceres::HuberLoss(kHuber), pose, point);
-    }
+    ceres_problem.AddResidualBlock(sight_cost(camera, s.seen), new ceres::HuberLoss(kHuber), pose,
+                                   point);
   }
   for (const RelativePose& r : problem.relatives) {
     const Eigen::Matrix<double, 6, 6> root = r.information.llt().matrixU();
@@ -269,14 +251,6 @@ BundleReport adjust(const Pinhole& camera, BundleProblem& problem, int iteration
             Eigen::Quaterniond(r.a_from_b.linear()), r.a_from_b.translation(), root}),
         nullptr, problem.poses[at(r.a)].data(), problem.poses[at(r.b)].data());
   }
-  struct Stop : ceres::IterationCallback {
-    const std::function<bool()>& should_stop;
-    explicit Stop(const std::function<bool()>& f) : should_stop(f) {}
-    ceres::CallbackReturnType operator()(const ceres::IterationSummary&) override {
-      return should_stop && should_stop() ? ceres::SOLVER_TERMINATE_SUCCESSFULLY
-                                          : ceres::SOLVER_CONTINUE;
-    }
-  } stop(should_stop);
   ceres::Solver::Options options;
   options.linear_solver_type = ceres::SPARSE_SCHUR;
   options.linear_solver_ordering.reset(order);
@@ -284,11 +258,9 @@ BundleReport adjust(const Pinhole& camera, BundleProblem& problem, int iteration
   options.function_tolerance = 1e-4;
   options.num_threads = threads;
   options.logging_type = ceres::SILENT;
-  options.callbacks.push_back(&stop);
   ceres::Solver::Summary summary;
   ceres::Solve(options, &ceres_problem, &summary);
-  report = {summary.initial_cost, summary.final_cost, static_cast<int>(summary.iterations.size())};
-  return report;
+  return {summary.initial_cost, summary.final_cost};
 }
 
 void apply(const Pinhole& camera, const BundleProblem& problem, Map& map) {

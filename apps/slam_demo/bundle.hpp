@@ -3,7 +3,6 @@
 
 #include <Eigen/Geometry>
 #include <array>
-#include <functional>
 #include <vector>
 
 #include "camera.hpp"
@@ -64,12 +63,9 @@ BundleProblem local_bundle(const Map& map, int keyframe, std::size_t size);
 
 struct BundleReport {
   double initial_cost = 0, final_cost = 0;
-  int iterations = 0;
 };
 
-/// should_stop ends the adjustment between iterations; poses are then those reached.
-BundleReport adjust(const Pinhole& camera, BundleProblem& problem, int iterations, int threads,
-                    const std::function<bool()>& should_stop = {});
+BundleReport adjust(const Pinhole& camera, BundleProblem& problem, int iterations, int threads);
 
 /// Writes poses and points back, and drops the observations that do not fit.
 void apply(const Pinhole& camera, const BundleProblem& problem, Map& map);

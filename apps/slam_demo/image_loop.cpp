@@ -10,8 +10,6 @@
 namespace slam_demo {
 namespace {
 
-std::size_t at(int index) { return static_cast<std::size_t>(index); }
-
 constexpr int kMinInliers = 25;
 // A registered fragment is good to some centimetres; a pose beyond is another match.
 constexpr double kMaxShift = 0.25, kMaxTurn = 0.1;  // metres, radians

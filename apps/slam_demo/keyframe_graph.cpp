@@ -8,9 +8,6 @@
 namespace slam_demo {
 namespace {
 
-std::size_t at(int index) { return static_cast<std::size_t>(index); }
-
-constexpr int kUnsettled = 8;   // keyframes that local adjustment still moves
 constexpr int kNeighbours = 3;  // of a keyframe, beside the one before
 constexpr int kMinShared = 60;  // points that two keyframes share
 
@@ -21,10 +18,6 @@ Eigen::Matrix<double, 6, 6> odometry_information(const Eigen::Isometry3d& motion
   const double angle = Eigen::AngleAxisd(motion.linear()).angle();
   return information_of(kBaseRadians + kPerRadian * angle,
                         kBaseMetres + kPerMetre * motion.translation().norm());
-}
-
-gpureg::UnalignedIsometry3d unaligned(const Eigen::Isometry3d& pose) {
-  return gpureg::UnalignedIsometry3d(pose.matrix());
 }
 
 }  // namespace
@@ -41,9 +34,9 @@ void move_keyframes(const std::vector<Eigen::Isometry3d>& poses, Map& map) {
   }
 }
 
-void KeyframeGraph::record(const Map& map) {
+void KeyframeGraph::record(const Map& map, int first) {
   const int count = static_cast<int>(map.keyframes.size());
-  for (int b = std::max(0, count - kUnsettled); b < count; ++b) {
+  for (int b = std::max(0, first); b < count; ++b) {
     const Keyframe& keyframe = map.keyframes[at(b)];
     std::vector<int> others;
     for (const int a : map.covisible(b, 20, kMinShared)) {

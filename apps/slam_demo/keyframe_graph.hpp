@@ -10,13 +10,19 @@
 
 namespace slam_demo {
 
+inline gpureg::UnalignedIsometry3d unaligned(const Eigen::Isometry3d& pose) {
+  return gpureg::UnalignedIsometry3d(pose.matrix());
+}
+
 /// The pose graph of the keyframes: what tracking measured between neighbours, and loops. Loops are
 /// kept by number, so that a retraction takes them out again.
 class KeyframeGraph {
  public:
   /// Takes the relative poses of the newest keyframes from the map: their local adjustment is
   /// still going on.
-  void record(const Map& map);
+  void record(const Map& map) { record(map, static_cast<int>(map.keyframes.size()) - kUnsettled); }
+  /// The same from a keyframe on.
+  void record(const Map& map, int first);
 
   /// Edges of a loop. Trusted: whoever adds them has verified them.
   void add(int loop, const std::vector<RelativePose>& edges);
@@ -37,6 +43,7 @@ class KeyframeGraph {
   std::vector<int> world_of_session(const Map& map) const;
 
  private:
+  static constexpr int kUnsettled = 8;  // keyframes that local adjustment still moves
   struct Key {
     int a, b;
     bool operator<(const Key& o) const { return a != o.a ? a < o.a : b < o.b; }

@@ -10,21 +10,21 @@ namespace slam_demo {
 namespace {
 
 namespace lc = gpureg::loop_closure;
-std::size_t at(int index) { return static_cast<std::size_t>(index); }
 
 constexpr int kCovisible = 30;          // shared points that connect two fragments
 constexpr std::size_t kNeighbours = 6;  // keyframes on each side that look for image loops
 // Metres that a loop must move a keyframe for a full adjustment; the last one is made anyway.
 constexpr double kWorthBundle = 0.02;
-constexpr int kBetweenSessions = 50;  // inliers that connect two sessions without registration
-constexpr int kImageLoops = 1 << 20;  // numbers of loops between sessions begin here
+constexpr int kLoneInliers = 50;      // that make a loop without registration
+constexpr int kImageLoops = 1 << 20;  // numbers of loops by images alone begin here
+// Where images look for loops in their own session: frames ago, metres, cosine between the views.
+constexpr int kLoopFrames = 150;
+constexpr double kImageMetres = 3, kImageCosine = 0.5;
+// Bounds of the drift of tracking: metres, metres of each metre, radians.
+constexpr double kDriftMetres = 0.2, kDriftShare = 0.02, kDriftRadians = 0.2;
 // Surfaces over many frames hold a registered pair better than LoopCloser states, which speaks of
 // single registrations with correlated points: a third of its standard deviation.
 constexpr double kDenseCertainty = 9;
-
-gpureg::UnalignedIsometry3d unaligned(const Eigen::Isometry3d& pose) {
-  return gpureg::UnalignedIsometry3d(pose.matrix());
-}
 
 }  // namespace
 
@@ -37,6 +37,7 @@ LoopClosing::LoopClosing(const gpureg::Context& context, Map& map, const Pinhole
       closer_options_([&] {
         auto o = lc::Options::from_voxel_size(options.voxel_size);
         o.optimize = false;  // the keyframes are optimised here
+        o.registration.seed = options.seed;
         return o;
       }()),
       closer_(context, closer_options_) {}
@@ -47,25 +48,62 @@ std::vector<int> LoopClosing::with_neighbours(int keyframe) const {
   return result;
 }
 
-/// A new session that nothing connects to an earlier one looks for it by its images.
-bool LoopClosing::add_keyframe(int index) {
-  graph_.record(map_);
+/// Keyframes that may show the place of this one: of other sessions while nothing connects its own
+/// to an earlier one, and, where the options say so, of its session's past near by.
+std::vector<int> LoopClosing::image_candidates(int index) const {
   const std::vector<int> world = graph_.world_of_session(map_);
-  const int session = map_.keyframes[at(index)].session;
-  if (world[at(session)] != session || session == 0) return false;
-  std::vector<int> candidates;
+  const Keyframe& keyframe = map_.keyframes[at(index)];
+  const bool alone =
+      options_.sessions && keyframe.session > 0 && world[at(keyframe.session)] == keyframe.session;
+  std::vector<int> result;
   for (int k = 0; k < index; ++k) {
-    if (map_.keyframes[at(k)].session != session) candidates.push_back(k);
+    const Keyframe& other = map_.keyframes[at(k)];
+    if (world[at(other.session)] != world[at(keyframe.session)]) {
+      if (alone) result.push_back(k);
+      continue;
+    }
+    if (!options_.images || other.frame > keyframe.frame - kLoopFrames ||
+        keyframe.covisible.count(k) != 0)
+      continue;
+    const Eigen::Isometry3d motion = keyframe.world_from_camera.inverse() * other.world_from_camera;
+    if (motion.translation().norm() < kImageMetres && motion.linear()(2, 2) > kImageCosine)
+      result.push_back(k);
   }
-  const Stopwatch watch(time_.image);
-  const auto found = image_loop_anywhere(map_, camera_, index, candidates, kBetweenSessions);
-  if (!found) return false;
+  return result;
+}
+
+/// Repeated furniture looks alike: no tracking drifts as far as to the next chair.
+bool LoopClosing::plausible(const RelativePose& loop) const {
+  const Keyframe &a = map_.keyframes[at(loop.a)], &b = map_.keyframes[at(loop.b)];
+  const std::vector<int> world = graph_.world_of_session(map_);
+  if (world[at(a.session)] != world[at(b.session)]) return true;
+  double path = 0;
+  for (std::size_t k = at(std::min(loop.a, loop.b)); k < at(std::max(loop.a, loop.b)); ++k)
+    path += (map_.keyframes[k + 1].world_from_camera.translation() -
+             map_.keyframes[k].world_from_camera.translation())
+                .norm();
+  const Eigen::Isometry3d change =
+      loop.a_from_b.inverse() * a.world_from_camera.inverse() * b.world_from_camera;
+  return change.translation().norm() < kDriftMetres + kDriftShare * path &&
+         Eigen::AngleAxisd(change.linear()).angle() < kDriftRadians;
+}
+
+bool LoopClosing::search_images(int index) {
+  const std::vector<int> candidates = image_candidates(index);
+  if (candidates.empty()) return false;
+  std::optional<ImageLoop> found;
+  {
+    const Stopwatch watch(time_.image);
+    found = image_loop_anywhere(map_, camera_, index, candidates, kLoneInliers);
+  }
+  if (!found || !plausible(found->edge)) return false;
   const int number = kImageLoops + image_loops_++;
   graph_.add(number, {found->edge});
-  image_records_.push_back({index, found->edge.a, found->inliers});
+  image_records_.push_back({index, found->edge.a, found->inliers, found->edge.a_from_b});
   // Poses first: an observation of a point of another world would not fit.
   optimize();
   for (const auto& [key, point] : found->matches) map_.add_observation(point, {index, key, number});
+  adjust_if_moved();
   return true;
 }
 
@@ -201,9 +239,13 @@ bool LoopClosing::process() {
   }
   if (changed) {
     optimize();
-    if (options_.bundle && moved_since_bundle()) bundle_all(options_.bundle_iterations);
+    adjust_if_moved();
   }
   return changed;
+}
+
+void LoopClosing::adjust_if_moved() {
+  if (options_.bundle && moved_since_bundle()) bundle_all(options_.bundle_iterations);
 }
 
 bool LoopClosing::moved_since_bundle() const {

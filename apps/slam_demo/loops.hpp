@@ -13,10 +13,13 @@ namespace slam_demo {
 
 struct LoopOptions {
   bool dense = true;         ///< register fragments
+  bool images = false;       ///< also look for loops by images alone
+  bool sessions = true;      ///< connect sessions by images
   bool bundle = true;        ///< full bundle adjustment after loops
   float voxel_size = 0.05f;  ///< metres, of the registration
   int bundle_iterations = 6;
   int threads = 0;
+  std::uint64_t seed = 1;  ///< of the registration
 };
 
 /// What became of a pair of fragments, for the report.
@@ -30,9 +33,10 @@ struct LoopRecord {
   int image_loops = 0;  ///< keyframes that image loops connected as a consequence
 };
 
-/// A loop of one keyframe with another session, found by its image alone.
+/// A loop that was found by an image alone.
 struct ImageLoopRecord {
   int keyframe = 0, target = 0, inliers = 0;
+  Eigen::Isometry3d target_from_source = Eigen::Isometry3d::Identity();  ///< of the keyframes
 };
 
 /// Closes loops: fragments go to gpureg's LoopCloser; what it accepts moves keyframes, starts the
@@ -42,8 +46,12 @@ class LoopClosing {
   LoopClosing(const gpureg::Context& context, Map& map, const Pinhole& camera,
               const LoopOptions& options);
 
-  /// After every new keyframe. Returns whether keyframes moved.
-  bool add_keyframe(int keyframe);
+  /// After every new keyframe: its odometry.
+  void record_odometry() { graph_.record(map_); }
+  /// The odometry of all keyframes at once.
+  void record_all_odometry() { graph_.record(map_, 0); }
+  /// Looks for loops of a keyframe by its image. Returns whether keyframes moved.
+  bool search_images(int keyframe);
   void add_fragment(const BuiltFragment& fragment);
   /// Registers what is due. Returns whether keyframes moved.
   bool process();
@@ -65,7 +73,10 @@ class LoopClosing {
     double time;
   };
   void connect_image_loops(int number, const gpureg::loop_closure::Loop& loop, LoopRecord& record);
+  std::vector<int> image_candidates(int keyframe) const;
+  bool plausible(const RelativePose& loop) const;
   void optimize();
+  void adjust_if_moved();
   bool moved_since_bundle() const;
   int number_of(int source, int target);
   std::vector<int> with_neighbours(int keyframe) const;

@@ -5,12 +5,13 @@
 #include <csignal>
 #include <cstdio>
 #include <filesystem>
+#include <future>
 #include <gpureg/error.hpp>
-#include <gpureg/io.hpp>
 #include <iostream>
 
 #include "output.hpp"
 #include "stopwatch.hpp"
+#include "tracking_file.hpp"
 
 namespace slam_demo {
 namespace {
@@ -19,7 +20,7 @@ std::atomic<bool> interrupted{false};
 void interrupt(int) { interrupted = true; }
 
 struct Arguments {
-  std::string sequence, backend = "auto", truth, surface, output = "slam_demo_output";
+  std::string sequence, backend = "auto", truth, surface, tracking, output = "slam_demo_output";
   std::vector<double> colour, depth;
   double depth_units = 0, baseline = 0;
   int first = 0, frames = 0;
@@ -54,7 +55,7 @@ int run(const Arguments& a) {
   RunResult result;
   result.sequence = a.sequence;
   result.rig = sequence.rig;
-  result.truth = a.truth.empty() ? sequence.truth : read_tum(a.truth);
+  result.truth = a.truth.empty() ? sequence.truth : gpureg::evaluation::read_trajectory(a.truth);
   result.out_of_order = sequence.out_of_order;
   SlamOptions options = a.slam;
   options.tracker.sequential = a.sequential;
@@ -62,6 +63,14 @@ int run(const Arguments& a) {
   options.loops.dense = !a.no_dense_loops;
   options.loops.bundle = !a.no_bundle;
   options.map = !a.no_map;
+  // Without the file this run only tracks, and writes it; with it, this run closes the loops.
+  const bool replays = !a.tracking.empty() && std::filesystem::exists(a.tracking),
+             only_tracks = !a.tracking.empty() && !replays;
+  if (only_tracks) {
+    options.keep_fragments = true;
+    options.loops.dense = options.loops.bundle = options.loops.images = options.loops.sessions =
+        false;
+  }
   Slam slam(context_of(a), sequence.rig, options);
   std::signal(SIGINT, interrupt);
   std::signal(SIGTERM, interrupt);
@@ -75,12 +84,21 @@ int run(const Arguments& a) {
   {
     const Stopwatch watch(total);
     double since = 0;
-    for (std::size_t k = first; k < last && !interrupted; ++k) {
+    if (replays) slam.replay(read_tracking(a.tracking));
+    std::future<Images> ahead;  // the next frame is read while this one is tracked
+    const auto read_ahead = [&](std::size_t k) {
+      if (k < last)
+        ahead = std::async(std::launch::async,
+                           [&sequence, k] { return load(sequence.frames[k], sequence.rig); });
+    };
+    if (!replays) read_ahead(first);
+    for (std::size_t k = first; k < last && !interrupted && !replays; ++k) {
       Images images;
       {
         const Stopwatch reading(result.load_milliseconds);
-        images = load(sequence.frames[k], sequence.rig);
+        images = ahead.get();
       }
+      read_ahead(k + 1);
       if (!images.problem.empty()) {
         if (++result.problems <= 5) std::cerr << "slam_demo: " << images.problem << "\n";
       }
@@ -100,20 +118,15 @@ int run(const Arguments& a) {
     }
     slam.finish();
   }
+  if (only_tracks && !interrupted) {
+    Tracking tracking = slam.tracking();
+    write_tracking(a.tracking, tracking);
+  }
   result.seconds = total / 1000;
-  result.odometry = absolute_error(result.truth, slam.odometry());
-  result.final = absolute_error(result.truth, slam.trajectory());
   std::string surface = a.surface;
   if (surface.empty() && std::filesystem::exists(a.sequence + "/surface.ply"))
     surface = a.sequence + "/surface.ply";
-  if (!surface.empty() && result.final.poses >= 3 && !a.no_map) {
-    std::vector<Eigen::Vector3f> points;
-    for (const surfel::Surfel& s : slam.surfels())
-      points.emplace_back(s.position.x, s.position.y, s.position.z);
-    // The map is in the world of the colour camera; so is the alignment where depth is registered.
-    result.surface = surface_error(gpureg::io::read_point_cloud(surface), points,
-                                   result.final.truth_from_estimate);
-  }
+  evaluate(slam, surface, result);
   write_results(a.output, slam, result);
   std::printf(
       "%zu frames, %d lost, %zu keyframes, %d fragments, %zu loops, %zu worlds, %.1f s, %.1f "
@@ -121,12 +134,14 @@ int run(const Arguments& a) {
       result.frames_done, slam.lost(), slam.map().keyframes.size(), slam.fragments(),
       slam.loops().graph().loops().size(), slam.worlds(), result.seconds,
       static_cast<double>(result.frames_done) / std::max(1e-9, result.seconds));
-  if (result.final.poses >= 3)
-    std::printf("ATE RMSE: tracking alone %.4f m, final %.4f m (%zu poses)\n", result.odometry.rmse,
-                result.final.rmse, result.final.poses);
-  if (result.surface.points > 0)
-    std::printf("surface error: mean %.4f m, median %.4f m (%zu surfels)\n", result.surface.mean,
-                result.surface.median, result.surface.points);
+  if (result.final.matched > 0)
+    std::printf("ATE RMSE: tracking alone %.4f m, final %.4f m (%zu poses)\n",
+                result.odometry.absolute_translation.rmse, result.final.absolute_translation.rmse,
+                result.final.matched);
+  if (result.surface.distance.count > 0)
+    std::printf("surface error: mean %.4f m, median %.4f m (%zu surfels)\n",
+                result.surface.distance.mean, result.surface.distance.median,
+                result.surface.distance.count);
   std::printf("written to %s\n", a.output.c_str());
   return interrupted ? 130 : 0;
 }
@@ -150,8 +165,15 @@ int main(int count, char** values) {
       ->capture_default_str();
   app.add_flag("--no-dense-loops", a.no_dense_loops, "Tracking alone; sessions are still merged");
   app.add_flag("--no-bundle", a.no_bundle, "Loops end with the pose graph");
+  app.add_flag("--image-loops", a.slam.loops.images, "Also look for loops by images alone");
+  app.add_option(
+      "--tracking", a.tracking,
+      "File with what tracking found. Where there is none the run only tracks, and writes "
+      "it; runs with it close the loops only");
+  app.add_option("--seed", a.slam.loops.seed, "Of the registration")->capture_default_str();
   app.add_flag("--no-map", a.no_map, "Do not fuse surfels");
-  app.add_flag("--sequential", a.sequential, "One thread at a time: the same bits every time");
+  app.add_flag("--sequential", a.sequential,
+               "No result depends on threads: the same bits every time");
   app.add_option("--first", a.first, "Frame to begin with")->check(CLI::NonNegativeNumber);
   app.add_option("--frames", a.frames, "Frames to process; 0: all")->check(CLI::NonNegativeNumber);
   app.add_option("--features", a.slam.features, "ORB features of a frame")

@@ -5,10 +5,6 @@
 #include <stdexcept>
 
 namespace slam_demo {
-namespace {
-std::size_t at(int index) { return static_cast<std::size_t>(index); }
-}  // namespace
-
 int Map::add_keyframe(Keyframe keyframe) {
   keyframe.points.assign(keyframe.features->size(), kNone);
   keyframe.covisible.clear();
@@ -97,16 +93,19 @@ void Map::cull(int newest) {
 }
 
 std::vector<int> Map::covisible(int keyframe, std::size_t count, int min_shared) const {
+  std::vector<int> result = by_count(keyframes[at(keyframe)].covisible, min_shared);
+  result.resize(std::min(result.size(), count));
+  return result;
+}
+
+std::vector<int> by_count(const std::map<int, int>& counts, int min_count) {
   std::vector<std::pair<int, int>> order;
-  for (const auto& [other, shared] : keyframes[at(keyframe)].covisible) {
-    if (shared >= min_shared) order.emplace_back(-shared, other);
+  for (const auto& [key, count] : counts) {
+    if (count >= min_count) order.emplace_back(-count, key);
   }
   std::sort(order.begin(), order.end());
   std::vector<int> result;
-  for (const auto& [shared, other] : order) {
-    if (result.size() == count) break;
-    result.push_back(other);
-  }
+  for (const auto& [count, key] : order) result.push_back(key);
   return result;
 }
 

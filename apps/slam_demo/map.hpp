@@ -12,6 +12,9 @@ namespace slam_demo {
 
 constexpr int kNone = -1;
 
+/// Place in a vector of what is counted by int, as -1 means none.
+inline std::size_t at(int index) { return static_cast<std::size_t>(index); }
+
 /// A keyframe sees a point at one of its features.
 struct Observation {
   int keyframe, key;
@@ -25,6 +28,9 @@ struct RelativePose {
   /// Inverse covariance of (rotation in radians, translation in metres) in b's frame.
   Eigen::Matrix<double, 6, 6> information;
 };
+
+/// The keys with at least min_count, those with the highest counts first.
+std::vector<int> by_count(const std::map<int, int>& counts, int min_count = 1);
 
 /// Independent noise, as the inverse covariance of (rotation, translation).
 Eigen::Matrix<double, 6, 6> information_of(double radians, double metres);

@@ -9,9 +9,19 @@
 
 namespace slam_demo {
 namespace {
-std::size_t at(int index) { return static_cast<std::size_t>(index); }
-}  // namespace
 
+/// The most similar of the features offered, and how similar the second one is.
+struct Similar {
+  int key = kNone, first = 257, second = 257;
+  void offer(int candidate, int distance) {
+    second = std::min(second, std::max(first, distance));
+    if (distance >= first) return;
+    first = distance;
+    key = candidate;
+  }
+};
+
+}  // namespace
 void match_by_projection(const Map& map, const Pinhole& camera, const std::vector<int>& points,
                          double radius, int max_distance, double ratio, View& view) {
   const Eigen::Isometry3d camera_from_world = view.pose.inverse();
@@ -34,22 +44,16 @@ void match_by_projection(const Map& map, const Pinhole& camera, const std::vecto
       continue;
     const double level = std::log(point.octave_zero_distance / p.norm()) / std::log(kScaleFactor);
     const int octave = std::clamp(static_cast<int>(std::lround(level)), 0, kLevels - 1);
-    int best = kNone, first = 257, second = 257;
+    Similar best;
     for (const int k : features.near(pixel.x(), pixel.y(), radius * scale_of(octave))) {
       if (distance[at(k)] < 0 || std::abs(features.keys[at(k)].octave - octave) > 1) continue;
-      const int d = hamming(point.descriptor, features.descriptors[at(k)]);
-      if (d < first) {
-        second = first;
-        first = d;
-        best = k;
-      } else if (d < second) {
-        second = d;
-      }
+      best.offer(k, hamming(point.descriptor, features.descriptors[at(k)]));
     }
-    if (best == kNone || first > max_distance || first > ratio * second) continue;
-    if (first >= distance[at(best)]) continue;  // another point is more similar
-    distance[at(best)] = first;
-    view.points[at(best)] = index;
+    if (best.key == kNone || best.first > max_distance || best.first > ratio * best.second)
+      continue;
+    if (best.first >= distance[at(best.key)]) continue;  // another point is more similar
+    distance[at(best.key)] = best.first;
+    view.points[at(best.key)] = index;
   }
 }
 
@@ -118,22 +122,15 @@ void match_by_descriptor(const Map& map, const Keyframe& keyframe, View& view) {
   for (std::size_t i = 0; i < keyframe.points.size(); ++i) {
     const int point = keyframe.points[i];
     if (point == kNone || map.points[at(point)].bad) continue;
-    int best = kNone, first = 257, second = 257;
-    for (std::size_t j = 0; j < view.features->size(); ++j) {
-      const int d = hamming(keyframe.features->descriptors[i], view.features->descriptors[j]);
-      if (d < first) {
-        second = first;
-        first = d;
-        best = static_cast<int>(j);
-      } else if (d < second) {
-        second = d;
-      }
-    }
-    if (best == kNone || first >= kMaxDistance || first >= 0.75 * second ||
-        first >= distance[at(best)])
+    Similar best;
+    for (std::size_t j = 0; j < view.features->size(); ++j)
+      best.offer(static_cast<int>(j),
+                 hamming(keyframe.features->descriptors[i], view.features->descriptors[j]));
+    if (best.key == kNone || best.first >= kMaxDistance || best.first >= 0.75 * best.second ||
+        best.first >= distance[at(best.key)])
       continue;
-    distance[at(best)] = first;
-    view.points[at(best)] = point;
+    distance[at(best.key)] = best.first;
+    view.points[at(best.key)] = point;
   }
 }
 

@@ -6,12 +6,12 @@
 #include <filesystem>
 #include <gpureg/error.hpp>
 #include <gpureg/files.hpp>
-#include <nlohmann/json.hpp>
-#include <opencv2/flann.hpp>
+#include <gpureg/io.hpp>
 
 namespace slam_demo {
 namespace {
 
+namespace ev = gpureg::evaluation;
 using nlohmann::json;
 
 void append(std::string& bytes, float value) {
@@ -39,32 +39,33 @@ std::string ply_of(const surfel::Cloud& surfels) {
   return bytes;
 }
 
-json error_json(const AteResult& ate) {
-  if (ate.poses < 3) return nullptr;
-  return {{"poses", ate.poses},
-          {"rmse_m", ate.rmse},
-          {"mean_m", ate.mean},
-          {"median_m", ate.median},
-          {"max_m", ate.max}};
+json error_json(const ev::TrajectoryEvaluation& e) {
+  if (e.matched == 0) return nullptr;
+  return {{"poses", e.matched},
+          {"path_m", e.path_length},
+          {"rmse_m", e.absolute_translation.rmse},
+          {"mean_m", e.absolute_translation.mean},
+          {"median_m", e.absolute_translation.median},
+          {"max_m", e.absolute_translation.max}};
 }
 
 /// How far a loop is from the truth at its keyframes; null without truth or pose.
-json loop_error(const LoopRecord& loop, const RunResult& result) {
-  if (loop.state == "rejected") return nullptr;
+json loop_error(double target_time, double source_time, const Eigen::Isometry3d& target_from_source,
+                const RunResult& result) {
   Eigen::Isometry3d world_from_camera[2];
   int place = 0;
-  for (const double time : {loop.target_time, loop.source_time}) {
+  for (const double time : {target_time, source_time}) {
     const auto after =
         std::lower_bound(result.truth.begin(), result.truth.end(), time - 1e-3,
-                         [](const StampedPose& pose, double t) { return pose.time < t; });
+                         [](const ev::StampedPose& pose, double t) { return pose.time < t; });
     if (after == result.truth.end() || after->time > time + 0.02) return nullptr;
-    world_from_camera[place] = after->world_from_camera;
+    world_from_camera[place].matrix() = after->world_from_body;
     if (result.rig.truth_of_depth)
       world_from_camera[place] = world_from_camera[place] * result.rig.colour_from_depth.inverse();
     ++place;
   }
   const Eigen::Isometry3d truth = world_from_camera[0].inverse() * world_from_camera[1],
-                          error = truth.inverse() * loop.target_from_source;
+                          error = truth.inverse() * target_from_source;
   return {{"translation_m", error.translation().norm()},
           {"rotation_degrees", Eigen::AngleAxisd(error.linear()).angle() * 57.29577951308232}};
 }
@@ -81,16 +82,21 @@ json loops_json(const Slam& slam, const RunResult& result) {
                      {"state", r.state},
                      {"reason", r.reason},
                      {"confidence", r.confidence},
-                     {"error", loop_error(r, result)},
+                     {"error", r.state == "rejected" ? json(nullptr)
+                                                     : loop_error(r.target_time, r.source_time,
+                                                                  r.target_from_source, result)},
                      {"image_loops", r.image_loops}});
     loops.back()["drift_ratio"] =
         std::isfinite(r.drift_ratio) ? json(r.drift_ratio) : json(nullptr);
   }
   for (const ImageLoopRecord& r : slam.loops().image_records())
-    image.push_back(
-        {{"keyframe", r.keyframe}, {"target_keyframe", r.target}, {"inliers", r.inliers}});
+    image.push_back({{"keyframe", r.keyframe},
+                     {"target_keyframe", r.target},
+                     {"inliers", r.inliers},
+                     {"error", loop_error(slam.map().keyframes[at(r.target)].time,
+                                          slam.map().keyframes[at(r.keyframe)].time,
+                                          r.target_from_source, result)}});
   json page = {{"sequence", result.sequence},
-               {"command", result.command},
                {"frames", result.frames},
                {"frames_done", result.frames_done},
                {"frames_lost", slam.lost()},
@@ -107,72 +113,56 @@ json loops_json(const Slam& slam, const RunResult& result) {
                {"ate", error_json(result.final)},
                {"notes", slam.loops().notes},
                {"loops", loops},
-               {"session_loops", image}};
+               {"image_loops", image}};
   page["milliseconds"]["reading images"] = result.load_milliseconds;
-  page["surface"] = result.surface.points == 0 ? json(nullptr)
-                                               : json{{"points", result.surface.points},
-                                                      {"mean_m", result.surface.mean},
-                                                      {"median_m", result.surface.median},
-                                                      {"share_within_20cm", result.surface.within}};
+  const ev::ErrorStatistics& d = result.surface.distance;
+  page["surface"] = d.count == 0 ? json(nullptr)
+                                 : json{{"points", d.count},
+                                        {"mean_m", d.mean},
+                                        {"median_m", d.median},
+                                        {"points_beyond_20cm", result.surface.beyond}};
   return page;
 }
 
 }  // namespace
 
-SurfaceError surface_error(const gpureg::PointCloud& truth, const std::vector<Eigen::Vector3f>& map,
-                           const Eigen::Isometry3d& truth_from_map) {
-  SurfaceError result;
-  if (truth.points.empty() || map.empty()) return result;
-  if (truth.normals.size() != truth.points.size())
-    throw gpureg::InvalidArgument("the true surface has no normals");
-  const cv::Mat1f points(static_cast<int>(truth.points.size()), 3,
-                         const_cast<float*>(truth.points.front().data()));
-  cv::flann::GenericIndex<cvflann::L2_Simple<float>> tree(points,
-                                                          cvflann::KDTreeSingleIndexParams(16));
-  const cvflann::SearchParams exact(-1, 0.0f);
-  const Eigen::Isometry3f move = truth_from_map.cast<float>();
-  std::vector<double> distances;
-  std::size_t within = 0;
-  for (const Eigen::Vector3f& q : map) {
-    const Eigen::Vector3f p = move * q;
-    const std::vector<float> query{p.x(), p.y(), p.z()};
-    std::vector<int> index(1);
-    std::vector<float> squared(1);
-    tree.knnSearch(query, index, squared, 1, exact);
-    const auto nearest = static_cast<std::size_t>(index[0]);
-    double distance = std::sqrt(squared[0]);
-    if (distance < kSurfaceReach) {
-      ++within;
-      // Beside the samples the surface goes on in their tangent planes.
-      if (distance < 0.03)
-        distance = std::abs(truth.normals[nearest].dot(p - truth.points[nearest]));
-    }
-    distances.push_back(std::min(distance, kSurfaceReach));
-    result.mean += distances.back();
+void evaluate(const Slam& slam, const std::string& true_surface, RunResult& result) {
+  constexpr std::size_t kNeeded = 3;  // poses that hold an alignment
+  const Trajectory final = slam.trajectory(), odometry = slam.odometry();
+  if (result.truth.empty() || final.size() < kNeeded) return;
+  try {
+    result.final = ev::evaluate_trajectory(final, result.truth);
+    result.odometry = ev::evaluate_trajectory(odometry, result.truth);
+  } catch (const gpureg::InvalidArgument&) {
+    return;  // times without a true pose
   }
-  result.points = map.size();
-  result.mean /= static_cast<double>(map.size());
-  result.within = static_cast<double>(within) / static_cast<double>(map.size());
-  std::nth_element(distances.begin(), distances.begin() + static_cast<long>(map.size() / 2),
-                   distances.end());
-  result.median = distances[map.size() / 2];
-  return result;
+  const surfel::Cloud surfels = slam.surfels();
+  if (true_surface.empty() || surfels.empty()) return;
+  const gpureg::PointCloud truth = gpureg::io::read_point_cloud(true_surface);
+  // The map is in the world of the colour camera; so is the alignment where depth is registered.
+  const Eigen::Matrix4f move = result.final.truth_from_estimate.cast<float>();
+  std::vector<Eigen::Vector3f> map;
+  for (const surfel::Surfel& s : surfels)
+    map.push_back((move * Eigen::Vector4f(s.position.x, s.position.y, s.position.z, 1)).head<3>());
+  result.surface = ev::evaluate_surface(map, truth.points, truth.normals);
 }
 
 void write_results(const std::string& folder, const Slam& slam, const RunResult& result) {
   std::error_code error;
   std::filesystem::create_directories(folder, error);
   if (error) throw gpureg::IoError(folder + ": cannot make this folder: " + error.message());
-  write_tum(folder + "/trajectory.txt", slam.trajectory());
-  write_tum(folder + "/odometry.txt", slam.odometry());
+  ev::write_trajectory(folder + "/trajectory.txt", slam.trajectory());
+  ev::write_trajectory(folder + "/odometry.txt", slam.odometry());
   Trajectory keyframes;
   for (const Keyframe& keyframe : slam.map().keyframes)
-    keyframes.push_back({keyframe.time, keyframe.world_from_camera});
-  write_tum(folder + "/keyframes.txt", keyframes);
+    keyframes.push_back({keyframe.time, keyframe.world_from_camera.matrix()});
+  ev::write_trajectory(folder + "/keyframes.txt", keyframes);
   const surfel::Cloud surfels = slam.surfels();
   gpureg::files::write_atomically(folder + "/map.ply", ply_of(surfels));
-  gpureg::files::write_atomically(folder + "/loops.json", loops_json(slam, result).dump(1) + "\n");
-  gpureg::files::write_atomically(folder + "/report.html", report_page(slam, result, surfels));
+  const json figures = loops_json(slam, result);
+  gpureg::files::write_atomically(folder + "/loops.json", figures.dump(1) + "\n");
+  gpureg::files::write_atomically(folder + "/report.html",
+                                  report_page(slam, result, surfels, figures));
 }
 
 }  // namespace slam_demo

@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <fstream>
 #include <gpureg/error.hpp>
+#include <gpureg/evaluation.hpp>
 #include <map>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
@@ -101,12 +102,12 @@ Sequence open_tum(const fs::path& folder) {
     }
   }
   if (fs::exists(folder / "groundtruth.txt")) {
-    result.truth = read_tum((folder / "groundtruth.txt").string());
+    result.truth = gpureg::evaluation::read_trajectory((folder / "groundtruth.txt").string());
   } else {
     for (const auto& entry : fs::directory_iterator(folder)) {
       const std::string name = entry.path().filename().string();
       if (name.size() > 12 && name.substr(name.size() - 12) == ".gt.freiburg")
-        result.truth = read_tum(entry.path().string());
+        result.truth = gpureg::evaluation::read_trajectory(entry.path().string());
     }
   }
   return result;
@@ -121,16 +122,22 @@ std::map<long, std::string> numbered(const fs::path& folder) {
   return result;
 }
 
-/// A rigid pose of 16 numbers, row by row.
-Eigen::Isometry3d read_pose(std::istream& in, const fs::path& path) {
-  Eigen::Matrix4d matrix;
-  for (int k = 0; k < 16; ++k) {
-    if (!(in >> matrix(k / 4, k % 4)))
-      throw IoError(path.string() + ": a pose needs 16 numbers, one is missing");
+/// `count` numbers, row by row.
+std::vector<double> read_numbers(const fs::path& path, std::size_t count) {
+  std::ifstream file(path);
+  std::vector<double> numbers(count);
+  for (double& value : numbers) {
+    if (!(file >> value))
+      throw IoError(path.string() + ": needs " + std::to_string(count) + " numbers");
   }
-  Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
-  pose.linear() = Eigen::Quaterniond(matrix.topLeftCorner<3, 3>()).normalized().toRotationMatrix();
-  pose.translation() = matrix.topRightCorner<3, 1>();
+  return numbers;
+}
+
+Eigen::Matrix4d read_pose(const fs::path& path) {
+  const std::vector<double> numbers = read_numbers(path, 16);
+  Eigen::Matrix4d pose = Eigen::Matrix<double, 4, 4, Eigen::RowMajor>(numbers.data());
+  const Eigen::Quaterniond turn(Eigen::Matrix3d(pose.topLeftCorner<3, 3>()));
+  pose.topLeftCorner<3, 3>() = turn.normalized().toRotationMatrix();  // files have few digits
   return pose;
 }
 
@@ -146,9 +153,8 @@ Sequence open_redwood(const fs::path& folder, const fs::path& colour) {
   }
   for (const auto& entry : fs::directory_iterator(folder)) {
     if (entry.path().extension() != ".log") continue;
-    std::ifstream file(entry.path());
-    for (long a, b, index; file >> a >> b >> index;)
-      result.truth.push_back({static_cast<double>(a) / kFrameRate, read_pose(file, entry.path())});
+    for (const auto& pose : gpureg::evaluation::read_log(entry.path().string()))
+      result.truth.push_back({pose.i / kFrameRate, pose.transform});
     break;
   }
   return result;
@@ -166,12 +172,7 @@ Sequence open_seven_scenes(const fs::path& folder) {
   rig.colour = {525, 525, 320, 240};
   rig.colour_from_depth.translation() = Eigen::Vector3d(-0.025, 0, 0);
   if (fs::exists(folder / "camera-intrinsics.txt")) {
-    std::ifstream file(folder / "camera-intrinsics.txt");
-    double k[9];
-    for (double& value : k) {
-      if (!(file >> value))
-        throw IoError((folder / "camera-intrinsics.txt").string() + ": needs nine numbers");
-    }
+    const std::vector<double> k = read_numbers(folder / "camera-intrinsics.txt", 9);
     rig.depth = {k[0], k[4], k[2], k[5]};
   }
   std::map<long, FrameFiles> frames;
@@ -187,8 +188,7 @@ Sequence open_seven_scenes(const fs::path& folder) {
     result.frames.push_back(frame);
     char name[32];
     std::snprintf(name, sizeof(name), "frame-%06ld.pose.txt", index);
-    std::ifstream file(folder / name);
-    if (file) result.truth.push_back({frame.time, read_pose(file, folder / name)});
+    if (fs::exists(folder / name)) result.truth.push_back({frame.time, read_pose(folder / name)});
   }
   return result;
 }

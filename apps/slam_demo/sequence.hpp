@@ -1,14 +1,16 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <gpureg/trajectory.hpp>
 #include <opencv2/core.hpp>
 #include <string>
 #include <vector>
 
 #include "camera.hpp"
-#include "trajectory.hpp"
 
 namespace slam_demo {
+
+using gpureg::evaluation::Trajectory;
 
 /// One frame of a sequence on disk.
 struct FrameFiles {

@@ -9,7 +9,6 @@
 namespace slam_demo {
 namespace {
 
-std::size_t at(int index) { return static_cast<std::size_t>(index); }
 constexpr std::size_t kMinFragment = 20;  // frames of a fragment that a session ends with
 constexpr float kFragmentVoxel = 0.4f;    // of the voxel size of the registration
 
@@ -65,7 +64,8 @@ Tracker::Outcome Slam::frame(int index, double time, const Images& images) {
   frames_.push_back(outcome.pose);
   if (outcome.new_keyframe != kNone) {
     tracker_.settle();
-    with_correction([&] { return loops_.add_keyframe(outcome.new_keyframe); });
+    loops_.record_odometry();
+    with_correction([&] { return loops_.search_images(outcome.new_keyframe); });
   }
   {
     const Stopwatch watch(fragment_ms_);
@@ -109,9 +109,34 @@ void Slam::end_fragment() {
     const Stopwatch watch(fragment_ms_);
     built = fragment_.build(map_);
   }
+  add_fragment(built);
+  if (options_.keep_fragments) kept_.push_back(std::move(built));
+}
+
+void Slam::add_fragment(const BuiltFragment& fragment) {
   ++fragments_;
-  loops_.add_fragment(built);
+  loops_.add_fragment(fragment);
   with_correction([&] { return loops_.process(); });
+}
+
+Tracking Slam::tracking() const {
+  return {map_, frames_, kept_, surfels_->download(), lost_, dense_};
+}
+
+void Slam::replay(const Tracking& tracking) {
+  map_ = tracking.map;
+  frames_ = tracking.frames;
+  lost_ = tracking.lost;
+  dense_ = tracking.dense;
+  surfels_->upload(tracking.surfels);
+  loops_.record_all_odometry();
+  std::size_t next = 0;
+  for (const BuiltFragment& fragment : tracking.fragments) {
+    for (; next < map_.keyframes.size() && map_.keyframes[next].frame <= fragment.last_frame;
+         ++next)
+      with_correction([&] { return loops_.search_images(static_cast<int>(next)); });
+    add_fragment(fragment);
+  }
 }
 
 void Slam::finish() {
@@ -164,7 +189,7 @@ Trajectory Slam::poses_of(const std::function<Eigen::Isometry3d(int)>& world_fro
     if (world[at(frame.session)] != largest) continue;
     Eigen::Isometry3d pose = world_from_keyframe(frame.reference) * frame.reference_from_camera;
     if (rig_.truth_of_depth) pose = pose * rig_.colour_from_depth;
-    result.push_back({frame.time, pose});
+    result.push_back({frame.time, pose.matrix()});
   }
   return result;
 }

@@ -17,11 +17,21 @@ struct SlamOptions {
   TrackerOptions tracker;
   LoopOptions loops;
   surfel::Options surfels;
-  bool map = true;       ///< fuse surfels
-  int surfel_every = 2;  ///< frames between two that are fused
+  bool map = true;              ///< fuse surfels
+  bool keep_fragments = false;  ///< for tracking()
+  int surfel_every = 2;         ///< frames between two that are fused
   int features = 1000;
   int fragment_frames = 50;
   int final_iterations = 20;  ///< of the last bundle adjustment
+};
+
+/// What tracking found, before any loop.
+struct Tracking {
+  Map map;
+  std::vector<FramePose> frames;
+  std::vector<BuiltFragment> fragments;
+  surfel::Cloud surfels;
+  int lost = 0, dense = 0;
 };
 
 /// The whole system: frames in, trajectory and map out. Not thread-safe.
@@ -32,6 +42,11 @@ class Slam {
   Tracker::Outcome frame(int index, double time, const Images& images);
   /// After the last frame: the last fragment, its loops, the last bundle adjustment.
   void finish();
+
+  /// What was tracked so far; fragments only where the options keep them.
+  Tracking tracking() const;
+  /// Instead of the frames: closes the loops of what another run tracked without loops.
+  void replay(const Tracking& tracking);
 
   /// Poses of the tracked frames in the largest world, of the camera that the truth speaks of.
   Trajectory trajectory() const;
@@ -53,6 +68,7 @@ class Slam {
 
  private:
   void end_fragment();
+  void add_fragment(const BuiltFragment& fragment);
   void with_correction(const std::function<bool()>& work);
   Trajectory poses_of(const std::function<Eigen::Isometry3d(int)>& world_from_keyframe) const;
   int largest_world() const;
@@ -66,6 +82,7 @@ class Slam {
   FragmentBuilder fragment_;
   std::unique_ptr<surfel::SurfelMap> surfels_;
   std::vector<FramePose> frames_;
+  std::vector<BuiltFragment> kept_;
   int lost_ = 0, dense_ = 0, fragments_ = 0, session_ = kNone, session_start_ = 0;
   double extract_ms_ = 0, track_ms_ = 0, fragment_ms_ = 0, fuse_ms_ = 0, correct_ms_ = 0;
 };

@@ -9,8 +9,6 @@
 namespace slam_demo {
 namespace {
 
-std::size_t at(int index) { return static_cast<std::size_t>(index); }
-
 constexpr int kMinStart = 150;                      // features with depth that start a session
 constexpr int kFewInliers = 150, kManyFresh = 100;  // a new keyframe makes the track stronger
 constexpr int kWellLinked = 60;  // shared points that hold two keyframes together
@@ -65,15 +63,11 @@ bool Tracker::track_local_map(View& view) {
     if (p == kNone) continue;
     for (const Observation& o : map_.points[at(p)].observations) ++votes[o.keyframe];
   }
-  std::vector<std::pair<int, int>> order;
-  for (const auto& [keyframe, count] : votes) order.emplace_back(-count, keyframe);
-  std::sort(order.begin(), order.end());
+  std::vector<int> order = by_count(votes);
   if (order.empty()) return false;
-  reference_ = order.front().second;
-  std::set<int> local;
-  for (const auto& [count, keyframe] : order) {
-    if (local.size() < options_.local_keyframes) local.insert(keyframe);
-  }
+  reference_ = order.front();
+  order.resize(std::min(order.size(), options_.local_keyframes));
+  std::set<int> local(order.begin(), order.end());
   for (const int k : map_.covisible(reference_, 5)) local.insert(k);
   std::set<int> points;
   for (const int k : local) {

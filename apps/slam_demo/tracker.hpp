@@ -50,7 +50,6 @@ class Tracker {
   /// Waits for the adjustment in the other thread and applies it; before anyone else changes the
   /// map.
   void settle();
-  int sessions() const { return sessions_; }
   double bundle_milliseconds() const { return bundle_milliseconds_; }
 
  private:

@@ -34,6 +34,12 @@ enum class TrajectoryFormat {
 Trajectory read_trajectory(const std::string& path,
                            TrajectoryFormat format = TrajectoryFormat::automatic);
 
+/// Writes lines `time tx ty tz qx qy qz qw` (TUM), with the digits that give the same numbers when
+/// they are read, all or nothing.
+/// @throws IoError where writing fails.
+/// @throws InvalidArgument for a time that is not finite and a pose that is not rigid.
+void write_trajectory(const std::string& path, const Trajectory& trajectory);
+
 /// How the steps of the relative error are counted.
 enum class DeltaUnit {
   frames,  ///< every pose and the one so many matched poses later
@@ -57,6 +63,12 @@ struct ErrorStatistics {
   double rmse = 0, mean = 0, median = 0, deviation = 0, min = 0, max = 0;
 };
 
+/// Error of one pose.
+struct PoseError {
+  double time = 0;  ///< of the estimated pose
+  double metres = 0, degrees = 0;
+};
+
 /// Errors of a trajectory.
 struct TrajectoryEvaluation {
   std::size_t estimated = 0, true_poses = 0, matched = 0;
@@ -68,6 +80,7 @@ struct TrajectoryEvaluation {
   ErrorStatistics absolute_rotation;     ///< degrees
   ErrorStatistics relative_translation;  ///< RPE, metres; none where no step is long enough
   ErrorStatistics relative_rotation;     ///< degrees
+  std::vector<PoseError> poses;          ///< absolute errors of the matched poses, ascending times
 };
 
 /// Matches every pose to the true one with the nearest time (a true pose only once, to the nearer),

@@ -5,6 +5,7 @@
 #include <string>
 #include <utility>
 
+#include "evaluation/statistics.hpp"
 #include "gpureg/error.hpp"
 #include "gpureg/trajectory.hpp"
 
@@ -15,6 +16,7 @@ constexpr double kDegrees = 180 / 3.14159265358979323846;
 
 struct Match {
   Eigen::Isometry3d estimate, truth;
+  double time;  // of the estimate
 };
 
 Eigen::Isometry3d isometry(const StampedPose& pose) {
@@ -50,7 +52,8 @@ std::vector<Match> matches_of(const Trajectory& estimate, const Trajectory& trut
   std::vector<Match> matches;
   for (std::size_t k = 0; k < truth.size(); ++k)
     if (by_truth[k] != kNone)
-      matches.push_back({isometry(estimate[by_truth[k]]), isometry(truth[k])});
+      matches.push_back(
+          {isometry(estimate[by_truth[k]]), isometry(truth[k]), estimate[by_truth[k]].time});
   return matches;
 }
 
@@ -93,29 +96,6 @@ std::vector<std::pair<std::size_t, std::size_t>> steps_of(const std::vector<Matc
   return steps;
 }
 
-ErrorStatistics statistics_of(std::vector<double> errors) {
-  ErrorStatistics out;
-  out.count = errors.size();
-  if (errors.empty()) return out;
-  std::sort(errors.begin(), errors.end());
-  const auto count = static_cast<double>(errors.size());
-  double sum = 0, squares = 0;
-  for (const double error : errors) {
-    sum += error;
-    squares += error * error;
-  }
-  out.rmse = std::sqrt(squares / count);
-  out.mean = sum / count;
-  double deviations = 0;
-  for (const double error : errors) deviations += (error - out.mean) * (error - out.mean);
-  out.deviation = std::sqrt(deviations / count);
-  const std::size_t half = errors.size() / 2;
-  out.median = errors.size() % 2 ? errors[half] : 0.5 * (errors[half - 1] + errors[half]);
-  out.min = errors.front();
-  out.max = errors.back();
-  return out;
-}
-
 }  // namespace
 
 void TrajectoryOptions::validate() const {
@@ -149,11 +129,12 @@ TrajectoryEvaluation evaluate_trajectory(const Trajectory& estimate, const Traje
   }
   std::vector<double> metres, degrees;
   for (std::size_t k = 0; k < matches.size(); ++k) {
-    const auto& [estimated, true_pose] = matches[k];
+    const Eigen::Isometry3d &estimated = matches[k].estimate, &true_pose = matches[k].truth;
     if (k > 0)
       out.path_length += (true_pose.translation() - matches[k - 1].truth.translation()).norm();
     metres.push_back((estimated.translation() - true_pose.translation()).norm());
     degrees.push_back(degrees_of(true_pose.inverse() * estimated));
+    out.poses.push_back({matches[k].time, metres.back(), degrees.back()});
   }
   out.absolute_translation = statistics_of(std::move(metres));
   out.absolute_rotation = statistics_of(std::move(degrees));

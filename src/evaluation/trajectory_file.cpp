@@ -1,12 +1,14 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <charconv>
 #include <cmath>
 #include <sstream>
 
 #include "evaluation/rigid.hpp"
 #include "files/text_file.hpp"
 #include "gpureg/error.hpp"
+#include "gpureg/files.hpp"
 #include "gpureg/trajectory.hpp"
 
 namespace gpureg::evaluation {
@@ -76,6 +78,11 @@ StampedPose block_pose(files::TextFile& file) {
   return pose;
 }
 
+void append(std::string& text, double value, char end) {
+  char digits[40];
+  text.append(digits, std::to_chars(digits, digits + sizeof digits, value).ptr) += end;
+}
+
 }  // namespace
 
 Trajectory read_trajectory(const std::string& path, TrajectoryFormat format) {
@@ -101,6 +108,23 @@ Trajectory read_trajectory(const std::string& path, TrajectoryFormat format) {
       throw IoError(path + ": the time " + time.str() + " is there twice");
     }
   return poses;
+}
+
+void write_trajectory(const std::string& path, const Trajectory& trajectory) {
+  std::string text = "# time tx ty tz qx qy qz qw\n";
+  for (const StampedPose& pose : trajectory) {
+    const Eigen::Matrix3d turn = pose.world_from_body.topLeftCorner<3, 3>();
+    if (!std::isfinite(pose.time) || !pose.world_from_body.allFinite() ||
+        !(turn.transpose() * turn).isIdentity(kNormTolerance) || turn.determinant() < 0)
+      throw InvalidArgument("the pose at time " + std::to_string(pose.time) + " is not rigid");
+    Eigen::Quaterniond q = Eigen::Quaterniond(turn).normalized();
+    if (q.w() < 0) q.coeffs() *= -1;  // one sign of the two
+    const Eigen::Vector3d t = pose.world_from_body.topRightCorner<3, 1>();
+    append(text, pose.time, ' ');
+    for (const double value : {t.x(), t.y(), t.z(), q.x(), q.y(), q.z()}) append(text, value, ' ');
+    append(text, q.w(), '\n');
+  }
+  files::write_atomically(path, text);
 }
 
 }  // namespace gpureg::evaluation

@@ -68,6 +68,26 @@ TEST(Generate, WritesIntoNoFolderOfOthers) {
   EXPECT_EQ(run(generate(out / "new", "5")).status, 0);
 }
 
+TEST(Generate, DepthNoiseIsAFactor) {
+  const TemporaryFolder out;
+  const auto cloud = [&](const std::string& noise) {
+    const std::string folder = out / noise;
+    EXPECT_EQ(run({"generate", folder, "--fragments", "1", "--frames-per-fragment", "2", "--quiet",
+                   "--depth-noise", noise})
+                  .status,
+              0);
+    return content_of(folder + "/cloud_bin_0.ply");
+  };
+  const std::string once = cloud("1");
+  EXPECT_EQ(run({"generate", out / "default", "--fragments", "1", "--frames-per-fragment", "2",
+                 "--quiet"})
+                .status,
+            0);
+  EXPECT_EQ(content_of(out / "default/cloud_bin_0.ply"), once);
+  EXPECT_NE(cloud("3"), once);
+  expect_refused({"generate", out / "b", "--depth-noise", "11"}, {"--depth-noise", "11"});
+}
+
 TEST(Generate, BadValues) {
   const TemporaryFolder out;
   expect_refused({"generate", out / "a", "--fragments", "0"}, {"fragments", "0"});

@@ -2,6 +2,7 @@
 // What somebody does who uses the installed package: install, find_package, build, run.
 #include <gtest/gtest.h>
 
+#include <filesystem>
 #include <fstream>
 #include <random>
 #include <sstream>
@@ -191,6 +192,32 @@ TEST_F(Consumer, Examples) {
     EXPECT_EQ(usage.status, 2) << name;
     EXPECT_EQ(usage.output.rfind("usage: ", 0), 0u) << usage.output;
   }
+}
+
+// slam_demo is a project of its own: it finds the installed targets, and their headers are all that
+// it includes. Building all of it takes minutes (gpureg's own build compiles it), so only
+// its surfels are built here.
+TEST_F(Consumer, SlamDemo) {
+  if (!CONSUMER_HAVE_SLAM_DEMO) GTEST_SKIP() << "this build has no slam_demo";
+  const std::string project = CONSUMER_SOURCE "/apps/slam_demo";
+  const Outcome configured = configure(project, "-O0");
+  ASSERT_EQ(configured.status, 0) << configured.output;
+  std::size_t headers = 0;
+  for (const auto& entry : std::filesystem::directory_iterator(project)) {
+    std::ifstream file(entry.path());
+    for (std::string line; std::getline(file, line);) {
+      const std::string start = "#include <gpureg/";
+      if (line.rfind(start, 0) != 0) continue;
+      const std::string name = line.substr(start.size(), line.find('>') - start.size());
+      EXPECT_TRUE(std::filesystem::exists(prefix_ + "/include/gpureg/" + name))
+          << entry.path() << " includes " << name;
+      ++headers;
+    }
+  }
+  EXPECT_GT(headers, 10u);
+  const Outcome built = run_command(
+      {CONSUMER_CMAKE, "--build", build_, "--config", CONSUMER_CONFIG, "--target", "slam_surfel"});
+  EXPECT_EQ(built.status, 0) << built.output;
 }
 
 // A component that this build does not have.

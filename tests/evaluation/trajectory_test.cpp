@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <cmath>
 #include <random>
 
@@ -126,6 +127,40 @@ TEST(Trajectory, ReadsTheThreeFormats) {
   EXPECT_EQ(b[1].world_from_body, c[1].world_from_body);
   expect_error<IoError>([&] { read_trajectory(kitti, TrajectoryFormat::tum); },
                         {"a.txt:1", "12 fields", "8"});
+}
+
+TEST(Trajectory, WrittenAndReadAgain) {
+  const TemporaryFolder folder;
+  Trajectory written = square();
+  written[2].time = 1311868164.3633751;
+  written[2].world_from_body.topLeftCorner<3, 3>() =
+      Eigen::AngleAxisd(3.0, Eigen::Vector3d(0, 1, 1).normalized()).toRotationMatrix();
+  std::sort(written.begin(), written.end(),
+            [](const StampedPose& a, const StampedPose& b) { return a.time < b.time; });
+  write_trajectory(folder / "t.txt", written);
+  const Trajectory read = read_trajectory(folder / "t.txt");
+  ASSERT_EQ(read.size(), written.size());
+  for (std::size_t k = 0; k < read.size(); ++k) {
+    EXPECT_EQ(read[k].time, written[k].time);
+    EXPECT_LT((read[k].world_from_body - written[k].world_from_body).cwiseAbs().maxCoeff(),
+              kRounding);
+  }
+  written[1].world_from_body(0, 0) = 2;
+  expect_error<InvalidArgument>([&] { write_trajectory(folder / "t.txt", written); },
+                                {"time 1", "not rigid"});
+}
+
+TEST(Trajectory, ErrorsOfThePoses) {
+  Trajectory estimate = square();
+  estimate[2].world_from_body(2, 3) += 0.25;
+  TrajectoryOptions options;
+  options.align = false;
+  const TrajectoryEvaluation e = evaluate_trajectory(estimate, square(), options);
+  ASSERT_EQ(e.poses.size(), 4u);
+  for (std::size_t k = 0; k < 4; ++k) {
+    EXPECT_EQ(e.poses[k].time, estimate[k].time);
+    EXPECT_NEAR(e.poses[k].metres, k == 2 ? 0.25 : 0, kRounding);
+  }
 }
 
 TEST(Trajectory, ErrorsNameFileAndLine) {

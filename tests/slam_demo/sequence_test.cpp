@@ -49,7 +49,8 @@ TEST(Sequence, TumWithAssociations) {
   ASSERT_EQ(sequence.frames.size(), 2u);
   EXPECT_EQ(sequence.frames[0].time, 1.0);
   ASSERT_EQ(sequence.truth.size(), 1u);
-  EXPECT_EQ(sequence.truth[0].world_from_camera.translation(), Eigen::Vector3d(1, 2, 3));
+  EXPECT_EQ(Eigen::Vector3d(sequence.truth[0].world_from_body.topRightCorner<3, 1>()),
+            Eigen::Vector3d(1, 2, 3));
   const Images first = load(sequence.frames[0], sequence.rig);
   EXPECT_EQ(first.problem, "");
   EXPECT_FLOAT_EQ(first.depth(20, 30), 2.0f) << "10000 / 5000";
@@ -99,7 +100,8 @@ TEST(Sequence, Redwood) {
   EXPECT_NEAR(sequence.frames[1].time, 1 / 30.0, 1e-12);
   EXPECT_FLOAT_EQ(load(sequence.frames[0], sequence.rig).depth(5, 5), 1.5f);
   ASSERT_EQ(sequence.truth.size(), 1u);
-  EXPECT_EQ(sequence.truth[0].world_from_camera.translation(), Eigen::Vector3d(4, 5, 6));
+  EXPECT_EQ(Eigen::Vector3d(sequence.truth[0].world_from_body.topRightCorner<3, 1>()),
+            Eigen::Vector3d(4, 5, 6));
 }
 
 TEST(Sequence, SevenScenesPutsDepthIntoTheColourCamera) {
