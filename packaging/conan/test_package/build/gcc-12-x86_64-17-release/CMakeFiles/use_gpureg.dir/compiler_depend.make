@@ -1,2 +1,0 @@
-# Empty compiler generated dependencies file for use_gpureg.
-# This may be replaced when dependencies are built.
