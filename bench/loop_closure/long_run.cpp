@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // A run without an end: memory and time of process() while a window of fragments moves on.
 //   gpureg_loop_closure_long_run FOLDER FRAGMENTS WINDOW VOXEL MILLISECONDS
-// The fragments of FOLDER (cloud_bin_<i>.ply, poses.txt) are walked there and back again, each time prepared anew. One JSON object a
-// line.
+// The fragments of FOLDER (cloud_bin_<i>.ply, poses.txt) are walked there and back again, each time
+// prepared anew. One JSON object a line.
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <chrono>

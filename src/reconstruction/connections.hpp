@@ -9,9 +9,9 @@ namespace gpureg::reconstruction {
 
 /// The edges between two parts of a map, added in descending order of confidence.
 ///
-/// Scans that see the same place fail together, and loop consistency raises what fails together. Between
-/// parts of several scans only edges that share no scan count therefore, by the pair alone. A part of
-/// one scan has no others: there every edge counts.
+/// Scans that see the same place fail together, and loop consistency raises what fails together.
+/// Between parts of several scans only edges that share no scan count therefore, by the pair alone.
+/// A part of one scan has no others: there every edge counts.
 class Connection {
  public:
   /// @param lone one of the parts is a single scan.

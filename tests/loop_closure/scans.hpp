@@ -67,7 +67,8 @@ struct Scans {
 /// `count` scans of one room along a curve.
 inline Scans scans_of_one_room(int count) {
   std::vector<Place> places;
-  for (int k = 0; k < count; ++k) places.push_back({planar(0.8 * k, 0.3 * k, 25.0 * k), Pose::Identity(), false});
+  for (int k = 0; k < count; ++k)
+    places.push_back({planar(0.8 * k, 0.3 * k, 25.0 * k), Pose::Identity(), false});
   return Scans(places);
 }
 

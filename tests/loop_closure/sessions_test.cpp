@@ -82,14 +82,13 @@ TEST(Sessions, NearMissesAndScatteredRejectionsDoNotKeepThemApart) {
   for (int k = 1; k < 12; k += 2) {
     const auto at = static_cast<std::size_t>(k);
     const Pose aside = planar(0.33 * std::cos(k), 0.33 * std::sin(k), 0);
-    closer.add_result(100 + k, k + 7,
-                      correct(aside * second.truth[at], first.truth[at + 7], 0.95));
+    closer.add_result(100 + k, k + 7, correct(aside * second.truth[at], first.truth[at + 7], 0.95));
   }
   std::mt19937 random(3);
   std::uniform_real_distribution<double> place(-5, 5), turn(-180, 180);
   for (int k = 0; k < 12; ++k)
-    closer.add_result(
-        100 + k, k, result_of(planar(place(random), place(random), turn(random)), 0.6));
+    closer.add_result(100 + k, k,
+                      result_of(planar(place(random), place(random), turn(random)), 0.6));
   closer.process();
   EXPECT_EQ(frames(closer), 1u);
   for (int k = 0; k < 12; k += 2) {

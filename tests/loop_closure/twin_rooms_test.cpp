@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Perceptual aliases by real registrations: a room, a hall that looks different, a twin of the room.
+// Perceptual aliases by real registrations: a room, a hall that looks different, a twin of the
+// room.
 #include <gtest/gtest.h>
 
 #include "loop_closure/scans.hpp"
