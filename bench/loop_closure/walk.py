@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Scenes as a SLAM system walks through them: prepared fragments, true poses, odometry that drifts."""
 
+import itertools
+
 import gpureg
 import numpy as np
 
@@ -31,7 +33,7 @@ def about_up(pose, degrees):
 def drifting_steps(truth, numbers, drift):
     """previous_from_here of consecutive fragments, too long by `drift` and turned by ten times as many degrees per metre."""
     steps = []
-    for last, number in zip(numbers, numbers[1:], strict=False):
+    for last, number in itertools.pairwise(numbers):
         step = np.linalg.inv(truth[last]) @ truth[number]
         length = np.linalg.norm(step[:3, 3])
         step[:3, 3] *= 1 + drift
