@@ -30,6 +30,10 @@ def rows_of(maps):
             f"house A and hospital E in one folder, {figures['after_refinement']['pairs']} pairs",
             figures,
         )
+    for name, figures in maps.items():
+        if name.startswith("generated_"):
+            seed = name.removeprefix("generated_")
+            yield f"generated house {seed}, `--prune 20`", figures
 
 
 def errors(figures):
