@@ -180,13 +180,19 @@ def stored_cloud(
             float_rows(matrix(normals, "normals", 3, len(raw)), "normals") if len(normals) else None
         )
     if viewpoints is not None:
-        viewpoints = float_rows(matrix(viewpoints, "viewpoints", 3), "viewpoints")
-        if not np.isfinite(viewpoints).all():
-            row = int(np.argwhere(~np.isfinite(viewpoints))[0][0])
-            raise ValueError(
-                f"viewpoints: row {row} is {viewpoints[row].tolist()}, expected finite coordinates (shape {viewpoints.shape})"
-            )
+        viewpoints = float_rows(_finite_viewpoints(viewpoints, "viewpoints"), "viewpoints")
     return rows, normals, viewpoints
+
+
+def _finite_viewpoints(value: Any, name: str) -> Any:
+    rows = matrix(value, name, 3)
+    finite = np.isfinite(rows)
+    if not finite.all():
+        row = int(np.argwhere(~finite)[0][0])
+        raise ValueError(
+            f"{name}: row {row} is {rows[row].tolist()}, expected finite coordinates (shape {rows.shape})"
+        )
+    return rows
 
 
 def core_cloud(
@@ -217,7 +223,7 @@ def core_cloud(
     raw = matrix(points, name, 3)
     count = raw.shape[0]
     origin = origin_of(raw, options.voxel_size)
-    views = None if viewpoints is None else matrix(viewpoints, prefix + "viewpoints", 3)
+    views = None if viewpoints is None else _finite_viewpoints(viewpoints, prefix + "viewpoints")
     if origin is not None:
         raw, views = raw - origin, None if views is None else views - origin
     return (

@@ -55,7 +55,7 @@ def test_wrong_companions_are_named(source):
         gpureg.prepare(source, features=np.zeros((len(source), 0)))
     with pytest.raises(ValueError, match=r"viewpoints: expected shape \(N, 3\), got \(4,\)"):
         gpureg.prepare(source, viewpoints=[0, 0, 0, 0])
-    with pytest.raises(gpureg.InvalidArgument, match="viewpoints is nan"):
+    with pytest.raises(ValueError, match=r"viewpoints: row 0 is \[.*nan.*\], expected finite"):
         gpureg.prepare(source, viewpoints=[[0, np.nan, 0]])
     with pytest.raises(ValueError, match=r"target: expected shape \(N, 3\), got \(5, 2\)"):
         gpureg.register(source, np.zeros((5, 2)))
