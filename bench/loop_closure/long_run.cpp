@@ -23,7 +23,7 @@ namespace {
 
 using loop_closure::LoopCloser;
 
-/// Error of odometry for each step: a metre of a hundred, and a degree of a hundred.
+/// Error of odometry in each step: a turn in radians, and a factor on the way.
 constexpr double kTurn = 0.002, kScale = 1.005;
 
 double resident_mib() {

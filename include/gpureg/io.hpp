@@ -13,13 +13,12 @@
 /// library; every function is thread-safe.
 namespace gpureg::io {
 
-/// Reads a PLY (text or binary of either byte order; of a mesh the vertices; see
-/// mesh.hpp for its faces) or PCD file (text,
-/// binary, compressed); of these two the content decides, not the extension. Coordinates of any
-/// numeric type become float. Normals are read where the file has them. Points with a NaN or
-/// infinite coordinate stay; prepare() drops them. A file that is neither and ends in .bin is a
-/// scan of KITTI: rows of float32 x y z reflectance. The VIEWPOINT of a PCD becomes the viewpoint
-/// unless it is the origin. Memory is bounded by the size of the file.
+/// Reads a PLY (text or binary of either byte order; of a mesh the vertices, see mesh.hpp for its
+/// faces) or PCD file (text, binary, compressed); of these two the content decides, not the
+/// extension. Coordinates of any numeric type become float. Normals are read where the file has
+/// them. Points with a NaN or infinite coordinate stay; prepare() drops them. A file that is
+/// neither and ends in .bin is a scan of KITTI: rows of float32 x y z reflectance. The VIEWPOINT of
+/// a PCD becomes the viewpoint unless it is the origin. Memory is bounded by the size of the file.
 /// @throws IoError naming file (and line, in text) and reason: missing, empty, truncated, a false
 ///   count in the header, no x y z.
 PointCloud read_point_cloud(const std::string& path);

@@ -40,9 +40,8 @@ SurfaceMesh read_mesh(const std::string& path);
 
 /// Drops faces without area, turns faces that are wound against most of their neighbours, and turns
 /// a closed mesh outwards.
-/// @throws InvalidArgument naming the vertex that is not finite, or the face that refers to a
-/// vertex
-///   that is not there; or where no face has an area.
+/// @throws InvalidArgument naming the vertex that is not finite, or the face with a vertex that is
+///   not there; or where no face has an area.
 SurfaceMesh make_mesh(std::vector<Eigen::Vector3d> vertices,
                       std::vector<std::array<std::uint32_t, 3>> faces);
 

@@ -101,7 +101,8 @@ TEST(EquivalentPoses, HalfATurnIsFoundAndCounted) {
     const RegistrationResult result = registered(true, truth, options);
     ASSERT_EQ(result.equivalent_poses(), 2u);
     EXPECT_FALSE(result.modes.front().equivalent);
-    // The odds of the two differ by the noise of the scan alone.
+    // Equivalent poses have odds within a factor of ten. Their sum is at most 1, so the first one
+    // has at most 0.76: the root of ten to one.
     EXPECT_LE(result.score, 0.75);
     EXPECT_GT(result.symmetry_confidence(), result.score + 0.1);
     EXPECT_LE(result.symmetry_confidence(), 1);
