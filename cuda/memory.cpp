@@ -155,38 +155,32 @@ PinnedBuffer::~PinnedBuffer() {
 PinnedArena::~PinnedArena() { clear(); }
 
 void PinnedArena::clear() noexcept {
-  while (chunks_) {
-    Chunk* next = chunks_->next;
-    cudaFreeHost(chunks_->data);
-    delete chunks_;
-    chunks_ = next;
-  }
+  for (const Chunk& chunk : chunks_) cudaFreeHost(chunk.data);
+  chunks_.clear();
+  current_ = 0;
 }
 
 void* PinnedArena::take(std::size_t bytes) {
   bytes = (bytes + 255) / 256 * 256;
-  if (!chunks_ || chunks_->size - chunks_->used < bytes) {
-    const std::size_t size = std::max<std::size_t>(
-        bytes, std::max<std::size_t>(std::size_t(1) << 20, chunks_ ? 2 * chunks_->size : 0));
+  const auto full = [&](const Chunk& chunk) { return chunk.size - chunk.used < bytes; };
+  while (current_ < chunks_.size() && full(chunks_[current_])) ++current_;
+  if (current_ == chunks_.size()) {
+    std::size_t size = std::max<std::size_t>(bytes, std::size_t(1) << 20);
+    if (!chunks_.empty()) size = std::max(size, 2 * chunks_.back().size);
+    chunks_.reserve(chunks_.size() + 1);
     void* data = nullptr;
     check(cudaHostAlloc(&data, size, cudaHostAllocDefault), "cudaHostAlloc");
-    chunks_ = new Chunk{static_cast<char*>(data), size, 0, chunks_};
+    chunks_.push_back({static_cast<char*>(data), size, 0});
   }
-  void* piece = chunks_->data + chunks_->used;
-  chunks_->used += bytes;
+  Chunk& chunk = chunks_[current_];
+  void* piece = chunk.data + chunk.used;
+  chunk.used += bytes;
   return piece;
 }
 
 void PinnedArena::reset() {
-  if (!chunks_) return;
-  // The newest chunk is the largest; keeping it gives the next call of this size one contiguous
-  // chunk.
-  while (Chunk* old = chunks_->next) {
-    chunks_->next = old->next;
-    cudaFreeHost(old->data);
-    delete old;
-  }
-  chunks_->used = 0;
+  for (Chunk& chunk : chunks_) chunk.used = 0;
+  current_ = 0;
 }
 
 }  // namespace gpureg::cuda

@@ -118,7 +118,8 @@ class PinnedBuffer {
 };
 
 /// Page-locked host memory handed out piece by piece for one call and taken back as a whole. Grows
-/// to what the largest call needs.
+/// to what the largest call needs. A call like one made before neither allocates nor frees, because
+/// freeing waits for all work on the device, that of other streams too.
 class PinnedArena {
  public:
   PinnedArena() = default;
@@ -136,9 +137,9 @@ class PinnedArena {
   struct Chunk {
     char* data;
     std::size_t size, used;
-    Chunk* next;
   };
-  Chunk* chunks_ = nullptr;
+  std::vector<Chunk> chunks_;
+  std::size_t current_ = 0;  ///< the chunk that the next piece is looked for in
 };
 
 }  // namespace gpureg::cuda
