@@ -99,10 +99,11 @@ struct Pair {
 
 /// Callbacks of align_batch(). Both run on the calling thread, and either may be empty.
 struct BatchCallbacks {
-  /// Receives each finished pair once, in pair order: index into pairs, result.
+  /// Receives each finished pair once, in pair order, in the calling thread: index into pairs,
+  /// result. On a device the next chunk of pairs is already under way.
   std::function<void(std::size_t, const RegistrationResult&)> on_result;
-  /// Polled between chunks of pairs. true ends the batch; the remaining pairs return
-  /// RegistrationStatus::skipped.
+  /// Polled before each chunk of pairs. true ends the batch: pairs of chunks that began still get
+  /// their results, the remaining ones return RegistrationStatus::skipped.
   std::function<bool()> should_stop;
 };
 

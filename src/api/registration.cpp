@@ -5,14 +5,13 @@
 #include <string>
 
 #include "api/access.hpp"
+#include "api/batch.hpp"
 #include "api/name_cloud.hpp"
 #include "api/outcome.hpp"
 #include "api/pair_input.hpp"
-#include "api/prior.hpp"
 #include "api/raw_cloud.hpp"
 #include "api/unknown_viewpoint.hpp"
 #include "api/variants.hpp"
-#include "common/host_threads.hpp"
 #include "common/in_halves.hpp"
 #include "common/limits.hpp"
 #include "common/validate.hpp"
@@ -153,47 +152,9 @@ std::vector<RegistrationResult> align_batch(const Context& context,
   check_priors(priors, pairs.size(), options);
   check_pairs(context, clouds, pairs, options);
 
-  std::vector<RegistrationResult> results(pairs.size());
   const std::vector<PairVariant> variants = variants_of(clouds, pairs);
-  const std::size_t chunk = Access::engine(context)->pairs_per_chunk(options);
-  for (std::size_t begin = 0; begin < variants.size(); begin += chunk) {
-    if (callbacks.should_stop && callbacks.should_stop()) {
-      // A pair of which only some variants were aligned counts as never tried.
-      if (begin > 0 && variants[begin].pair == variants[begin - 1].pair)
-        results[variants[begin].pair] = {};
-      break;
-    }
-    const std::size_t end = std::min(variants.size(), begin + chunk);
-    std::vector<PairInput> inputs;
-    std::vector<PairOutcome> outcomes(end - begin);
-    std::vector<RegistrationResult> found(end - begin);
-    for (std::size_t v = begin; v < end; ++v) {
-      const PreparedState &s = *variants[v].source, &t = *variants[v].target;
-      const bool swapped = swaps(s, t, options);
-      inputs.push_back(input_of(s, t, swapped));
-      if (!priors.empty())
-        inputs.back().prior = prior_test(priors[variants[v].pair], s, t, swapped);
-    }
-    align_all(*Access::engine(context), inputs, options, outcomes);
-    // A result by evidence takes about 50 us on the host, too much for one thread where a device
-    // makes ten thousand per second.
-    const std::size_t workers =
-        std::min<std::size_t>(Access::engine(context)->host_threads(), 1 + (end - begin) / 16);
-    on_threads(workers, [&](std::size_t worker) {
-      for (std::size_t v = begin + worker; v < end; v += workers) {
-        const PreparedState &s = *variants[v].source, &t = *variants[v].target;
-        found[v - begin] = to_result(outcomes[v - begin], s, t, swaps(s, t, options), options,
-                                     inputs[v - begin].prior);
-      }
-    });
-    for (std::size_t v = begin; v < end; ++v) {
-      const std::size_t p = variants[v].pair;
-      keep_better(std::move(found[v - begin]), results[p]);
-      const bool last = v + 1 == variants.size() || variants[v + 1].pair != p;
-      if (last && callbacks.on_result) callbacks.on_result(p, results[p]);
-    }
-  }
-  return results;
+  Batch batch(*Access::engine(context), variants, priors, options, callbacks, pairs.size());
+  return batch.run();
 }
 
 }  // namespace gpureg

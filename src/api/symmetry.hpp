@@ -26,9 +26,13 @@ class CloudSymmetry {
  private:
   struct Bucket {
     std::uint64_t key;
-    std::uint32_t begin, end;  ///< places in order_
+    std::uint32_t begin, end;  ///< places in indexed_
   };
-  /// Index of the nearest point with a similar normal within the search radius; size() for none.
+  struct OrientedPoint {
+    Eigen::Vector3d point, normal;
+  };
+  /// Place in indexed_ of the nearest point with a similar normal within the search radius, the
+  /// first one of equals; its size for none.
   std::size_t nearest(const Eigen::Vector3d& point, const Eigen::Vector3d& normal,
                       float min_cosine) const;
   void build_index();
@@ -38,8 +42,8 @@ class CloudSymmetry {
 
   std::vector<Vec3> points_, normals_;
   float distance_;
-  std::vector<Bucket> cells_;         ///< ascending keys
-  std::vector<std::uint32_t> order_;  ///< points by cell
+  std::vector<Bucket> cells_;           ///< ascending keys
+  std::vector<OrientedPoint> indexed_;  ///< by cell, then in the order of the cloud
   std::vector<std::uint32_t> sample_;
   Eigen::Vector3d middle_ = Eigen::Vector3d::Zero();
   Eigen::Matrix3d spread_ = Eigen::Matrix3d::Zero();  ///< covariance about middle_

@@ -21,6 +21,7 @@ struct RowStreams {
 /// Additional operations of engines on devices.
 class DeviceEngine : public Engine {
  public:
+  bool leaves_host_idle() const override { return true; }
   virtual std::vector<DeviceMemoryUse> device_memory() const = 0;
   /// Returns memory without a use to the driver.
   virtual void trim() = 0;

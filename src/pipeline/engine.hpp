@@ -20,6 +20,8 @@ class Engine {
   virtual unsigned threads() const = 0;
   /// Number of threads that may share the host's work on many results.
   virtual unsigned host_threads() const { return threads(); }
+  /// True where align() leaves host_threads() idle while a device works.
+  virtual bool leaves_host_idle() const { return false; }
   virtual std::string description() const = 0;
   virtual const void* memory() const = 0;  ///< owner of the clouds that this engine can align
   /// Number of pairs that go through the stages together.
