@@ -56,10 +56,10 @@ void CudaEngine::trim() {
   exec_.trim();
 }
 
-// Memory of a pair: a bit per hypothesis, rounded up to chunks; a bit per seed and match, a pose
-// and its evidence per seed, and the columns and keys of each match.
+// Memory of a pair: a bit per hypothesis, rounded up to chunks; a bit per seed and match, the sums
+// of a fit, a pose and its evidence per seed, and the columns and keys of each match.
 std::size_t CudaEngine::pairs_per_chunk(const RegistrationOptions& options) const {
-  constexpr std::size_t kChunkBytes = 4096, kSeedBytes = 128, kMatchBytes = 96;
+  constexpr std::size_t kChunkBytes = 4096, kSeedBytes = 192, kMatchBytes = 96;
   std::size_t fit = kSampleBytes / (options.quadruples.count / 8 + kChunkBytes);
   if (options.method == RegistrationMethod::compatibility) {
     const CompatibilityOptions& c = options.compatibility;

@@ -35,7 +35,9 @@ Batch::Chunk Batch::chunk_of(std::size_t begin, std::size_t end) const {
   return out;
 }
 
-void Batch::align(Chunk& chunk) const { align_all(engine_, chunk.inputs, options_, chunk.outcomes); }
+void Batch::align(Chunk& chunk) const {
+  align_all(engine_, chunk.inputs, options_, chunk.outcomes);
+}
 
 RegistrationResult Batch::result_of(const Chunk& chunk, std::size_t variant) const {
   const PreparedState &s = *variants_[variant].source, &t = *variants_[variant].target;
@@ -49,8 +51,7 @@ void Batch::conclude(const Chunk& chunk) {
   // A result by evidence takes about 100 us on the host, too much for one thread where a device
   // makes thousands per second. A pair whose symmetry is tested takes milliseconds, so the threads
   // take one pair after the other.
-  const std::size_t workers =
-      std::min<std::size_t>(engine_.host_threads(), 1 + chunk.size() / 16);
+  const std::size_t workers = std::min<std::size_t>(engine_.host_threads(), 1 + chunk.size() / 16);
   std::atomic<std::size_t> next{chunk.begin};
   on_threads(workers, [&](std::size_t) {
     for (std::size_t v = next++; v < chunk.end; v = next++)

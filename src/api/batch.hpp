@@ -9,8 +9,8 @@
 namespace gpureg {
 
 /// One call of align_batch() with checked arguments. The variants go through the engine in chunks.
-/// Where the engine leaves the host idle, the host concludes a chunk (evidence to results) while the
-/// engine aligns the next one; two chunks at most are in memory. References must outlive it.
+/// Where the engine leaves the host idle, the host concludes a chunk (evidence to results) while
+/// the engine aligns the next one; two chunks at most are in memory. References must outlive it.
 class Batch {
  public:
   /// @param priors of the pairs, or none.
