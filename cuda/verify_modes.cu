@@ -11,7 +11,11 @@
 namespace gpureg::cuda {
 namespace {
 
-constexpr int kThreads = 256;
+constexpr int kThreads = 128, kWarps = kThreads / 32;
+/// Thread blocks of verify_source() that a multiprocessor holds at least: its 58 sums take most of
+/// the registers.
+constexpr int kSourceBlocks = 3;
+constexpr int kSideSums = 14, kInformationSums = 24;
 
 struct VerifyModes {
   const SearchPair* pairs;
@@ -58,7 +62,7 @@ __device__ void put(Moments& out, const Moments& m, bool alone) {
 
 /// Sum over the block, in thread 0.
 __device__ SideEvidence of_block(const SideEvidence& e, std::int64_t* scratch) {
-  std::int64_t v[14];
+  std::int64_t v[kSideSums];
   v[0] = static_cast<std::int64_t>(e.normal_weighted);
   v[1] = static_cast<std::int64_t>(e.residual);
   v[2] = static_cast<std::int64_t>(e.incidence_observed);
@@ -128,67 +132,85 @@ __device__ MatchEvidence count_matches(const VerifyModes& w, std::uint32_t p, co
           static_cast<std::uint32_t>(v[0])};
 }
 
-/// One or several thread blocks per mode and side (z: even ones move the source, odd ones the
-/// target).
-__global__ void __launch_bounds__(kThreads) verify(VerifyModes w) {
-  __shared__ std::int64_t scratch[kThreads / 32 * 24];
-  const std::uint32_t p = blockIdx.y;
-  if (blockIdx.x >= w.count[p]) return;
-  const CloudView &s = w.pairs[p].source, &t = w.pairs[p].target;
-  const std::size_t at = static_cast<std::size_t>(p) * w.most + blockIdx.x;
-  const Mode& mode = w.modes[at];
-  ModeOutcome& out = w.out[at];
-  const Rigid there = to_rigid(mode.pose);
-  const std::uint32_t parts = gridDim.z / 2, part = blockIdx.z / 2,
-                      first = part * kThreads + threadIdx.x, step = parts * kThreads;
-  const bool alone = parts == 1;
+/// Part of a mode that a thread block verifies: points first, first + step, ...
+struct Share {
+  std::uint32_t p, part, first, step;
+  bool alone;
+  std::size_t mode;
+  __device__ explicit Share(const VerifyModes& w)
+      : p(blockIdx.y),
+        part(blockIdx.z),
+        first(blockIdx.z * kThreads + threadIdx.x),
+        step(gridDim.z * kThreads),
+        alone(gridDim.z == 1),
+        mode(static_cast<std::size_t>(blockIdx.y) * w.most + blockIdx.x) {}
+};
+
+/// One or several thread blocks per mode: the points of the target in the source.
+__global__ void __launch_bounds__(kThreads) verify_target(VerifyModes w) {
+  __shared__ std::int64_t scratch[kWarps * kSideSums];
+  const Share share(w);
+  if (blockIdx.x >= w.count[share.p]) return;
+  const CloudView &s = w.pairs[share.p].source, &t = w.pairs[share.p].target;
+  const Rigid back = inverse(to_rigid(w.modes[share.mode].pose));
   SideEvidence side{};
-  if (blockIdx.z % 2 == 1) {
-    const Rigid back = inverse(there);
-    for (std::uint32_t i = first; i < t.size; i += step) {
-      const Vec3 q = apply(back, t.points[i]);
-      verify_found(t, s, back, w.test, s.visibility.count, i, q,
-                   find_closest(s, w.pairs[p].source_cells, q, w.test.inlier.max_squared), side);
-    }
-    side = of_block(side, scratch);
-    if (threadIdx.x == 0) put(out.target, side, alone);
-    return;
+  for (std::uint32_t i = share.first; i < t.size; i += share.step) {
+    const Vec3 q = apply(back, t.points[i]);
+    verify_found(t, s, back, w.test, s.visibility.count, i, q,
+                 find_closest(s, w.pairs[share.p].source_cells, q, w.test.inlier.max_squared),
+                 side);
   }
+  side = of_block(side, scratch);
+  if (threadIdx.x == 0) put(w.out[share.mode].target, side, share.alone);
+}
+
+/// One or several thread blocks per mode: the points of the source in the target, the information
+/// of the inliers, the moments of the correspondences, and the matches.
+__global__ void __launch_bounds__(kThreads, kSourceBlocks) verify_source(VerifyModes w) {
+  __shared__ std::int64_t scratch[kWarps * kInformationSums];
+  const Share share(w);
+  if (blockIdx.x >= w.count[share.p]) return;
+  const CloudView &s = w.pairs[share.p].source, &t = w.pairs[share.p].target;
+  const Mode& mode = w.modes[share.mode];
+  const Rigid there = to_rigid(mode.pose);
+  SideEvidence side{};
   InformationSums information{};
   Moments source{}, target{};
-  for (std::uint32_t i = first; i < s.size; i += step) {
+  for (std::uint32_t i = share.first; i < s.size; i += share.step) {
     const Vec3 q = apply(there, s.points[i]);
-    const VerifiedPoint found =
-        verify_found(s, t, there, w.test, t.visibility.count, i, q,
-                     find_closest(t, w.pairs[p].target_cells, q, w.test.inlier.max_squared), side);
+    const VerifiedPoint found = verify_found(
+        s, t, there, w.test, t.visibility.count, i, q,
+        find_closest(t, w.pairs[share.p].target_cells, q, w.test.inlier.max_squared), side);
     if (found.inlier) add_information(s, there, i, information);
     if (found.closest == kNoValue) continue;
     add_moment(s.points[i] * (1.0f / s.radius), source);
     add_moment(t.points[found.closest] * (1.0f / t.radius), target);
   }
   side = of_block(side, scratch);
-  std::int64_t sums[24];
+  std::int64_t sums[kInformationSums];
 #pragma unroll
-  for (int k = 0; k < 24; ++k) sums[k] = k < 21 ? information.v[k] : information.arm[k - 21];
+  for (int k = 0; k < kInformationSums; ++k)
+    sums[k] = k < 21 ? information.v[k] : information.arm[k - 21];
   block_sum(sums, scratch);
   source = of_block(source, scratch);
   target = of_block(target, scratch);
-  const MatchEvidence matches = count_matches(w, p, there, first, step, scratch);
+  const MatchEvidence matches = count_matches(w, share.p, there, share.first, share.step, scratch);
   if (threadIdx.x != 0) return;
-  if (part == 0) {
+  ModeOutcome& out = w.out[share.mode];
+  if (share.part == 0) {
     out.pose = mode.pose;
     out.hypothesis = mode.seed;
     out.iterations = mode.iterations;
   }
-  put(out.matches.source_weight, matches.source_weight, alone);
-  put(out.matches.target_weight, matches.target_weight, alone);
-  put(out.matches.inliers, matches.inliers, alone);
-  put(out.source, side, alone);
+  put(out.matches.source_weight, matches.source_weight, share.alone);
+  put(out.matches.target_weight, matches.target_weight, share.alone);
+  put(out.matches.inliers, matches.inliers, share.alone);
+  put(out.source, side, share.alone);
 #pragma unroll
-  for (int k = 0; k < 24; ++k)
-    put(k < 21 ? out.information.v[k] : out.information.arm[k - 21], sums[k], alone);
-  put(out.source_moments, source, alone);
-  put(out.target_moments, target, alone);
+  for (int k = 0; k < kInformationSums; ++k)
+    put(k < 21 ? out.information.v[k] : out.information.arm[k - 21], sums[k], share.alone);
+  put(out.source_moments, source, share.alone);
+  put(out.target_moments, target, share.alone);
 }
 
 }  // namespace
@@ -204,10 +226,10 @@ void verify_modes(Exec& exec, Span<const PairView> pairs, const MatchSets& match
       inlier_test(options.prepare.max_correspondence_distance, evidence.max_normal_angle),
       evidence.free_space_margin, evidence.min_range};
   // Several blocks share a mode where there are too few to fill the device.
-  const std::size_t blocks = 2 * std::size_t(modes.most) * pairs.size,
+  const std::size_t blocks = std::size_t(modes.most) * pairs.size,
                     processors = static_cast<std::size_t>(exec.multiprocessors());
   const unsigned parts =
-      static_cast<unsigned>(std::clamp<std::size_t>(4 * processors / blocks, 1, 8));
+      static_cast<unsigned>(std::clamp<std::size_t>(8 * processors / blocks, 1, 16));
   VerifyModes batch{};
   batch.pairs = views.data();
   batch.matches = matches.view();
@@ -220,9 +242,11 @@ void verify_modes(Exec& exec, Span<const PairView> pairs, const MatchSets& match
   batch.squared_distance =
       options.compatibility.consensus_distance * options.compatibility.consensus_distance;
   batch.out = verified.data();
-  verify<<<dim3(modes.most, static_cast<unsigned>(pairs.size), 2 * parts), kThreads, 0,
-           exec.stream()>>>(batch);
-  check_launch("verify");
+  const dim3 grid(modes.most, static_cast<unsigned>(pairs.size), parts);
+  verify_target<<<grid, kThreads, 0, exec.stream()>>>(batch);
+  check_launch("verify_target");
+  verify_source<<<grid, kThreads, 0, exec.stream()>>>(batch);
+  check_launch("verify_source");
   const ModeOutcome* mode = exec.download(verified.data(), verified.size());
   const std::uint32_t* mode_count = exec.download(modes.count.data(), pairs.size);
   const std::uint32_t* match_count = exec.download(matches.count.data(), pairs.size);
