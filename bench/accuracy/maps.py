@@ -24,7 +24,7 @@ SCENES = {
     "hospital_E": "hospital/E",
 }
 # Houses of 120 fragments by `gpureg generate --fragments 120 --seed SEED`, in WORK/generated.
-GENERATED = {"generated_8101": 8101, "generated_8102": 8102}
+GENERATED = {f"generated_{seed}": seed for seed in (8101, 8102, 8103, 8104, 8105)}
 PRUNE = 20  # partners that a scan of a generated house is aligned with
 OFFSET = 100  # of the numbers of a second scene in the same folder
 FOREIGN = (3, 13, 23, 33, 43)

@@ -21,14 +21,17 @@ struct MapRay {
   float depth;
 };
 
-/// d: from the viewpoint to the point, not zero.
+/// d: from the viewpoint to the point, finite. A point nearer than kLeastDepth counts as that far
+/// away, because its scale would overflow.
 GPUREG_HD MapRay map_ray(Vec3 d) {
+  constexpr float kLeastDepth = 1e-30f;
   const float ax = d.x < 0 ? -d.x : d.x, ay = d.y < 0 ? -d.y : d.y, az = d.z < 0 ? -d.z : d.z;
   const bool is_x = (ax >= ay) & (ax >= az), is_y = !is_x & (ay >= az);
   const float depth = is_x ? ax : is_y ? ay : az;
   const float along = is_x ? d.x : is_y ? d.y : d.z;
   const float u = is_x ? d.y : d.x, v = is_x | is_y ? d.z : d.y;
-  const float scale = 0.5f * static_cast<float>(kMapEdge) / depth;
+  const float scale =
+      0.5f * static_cast<float>(kMapEdge) / (depth > kLeastDepth ? depth : kLeastDepth);
   const float half = 0.5f * static_cast<float>(kMapEdge);
   std::int32_t column = static_cast<std::int32_t>(fmaf(u, scale, half)),
                row = static_cast<std::int32_t>(fmaf(v, scale, half));

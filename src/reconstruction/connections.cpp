@@ -16,8 +16,6 @@ std::uint32_t find(std::vector<std::uint32_t>& parent, std::uint32_t k) {
   return k;
 }
 
-/// No edge is certain: keeps odds finite.
-constexpr double kMostConfidence = 1 - 1e-9;
 /// A confirming edge is never less likely to be wrong: registrations of one map fail together.
 constexpr double kLeastWrong = 0.2;
 /// Confidences down to which connections are made, one after the other, before the least one.

@@ -7,6 +7,9 @@
 
 namespace gpureg::reconstruction {
 
+/// No edge is certain: keeps odds finite.
+constexpr double kMostConfidence = 1 - 1e-9;
+
 /// The edges between two parts of a map, added in descending order of confidence.
 ///
 /// Scans that see the same place fail together, and loop consistency raises what fails together.
@@ -35,6 +38,12 @@ std::vector<std::size_t> by_confidence(const std::vector<Edge>& edges);
 std::vector<std::uint32_t> certain_parts(std::size_t scans, const std::vector<Edge>& edges,
                                          const std::vector<Odometry>& odometry,
                                          double min_confidence);
+
+/// Splits parts at the connections of weakest_links() that do not reach the confidence, the most
+/// contradicted first. Two small parts can be joined by certain edges while many edges between all
+/// that grew around them say otherwise: only the whole part shows it. Odometry is never split.
+void split_at_weak_links(const std::vector<Edge>& edges, const std::vector<Odometry>& odometry,
+                         double min_confidence, std::vector<std::uint32_t>& parts);
 
 /// Rejects accepted edges whose pose is farther from that of the map than max_error, RMS over the
 /// overlap, the farthest first, as long as other accepted edges or odometry connect their scans.

@@ -198,6 +198,7 @@ Round optimise_round(std::size_t scans, const PairGraph& pairs,
     round.edges[kept[k]] = edge_of(pairs, kept[k], result);
   }
   round.parts = certain_parts(scans, round.edges, odometry, options.min_connection_confidence);
+  split_at_weak_links(round.edges, odometry, options.min_connection_confidence, round.parts);
   for (std::size_t k = 0; k < round.edges.size(); ++k) {
     Edge& edge = round.edges[k];
     if (!edge.accepted || round.parts[edge.source] == round.parts[edge.target]) continue;

@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <algorithm>
+#include <cmath>
+#include <iterator>
 #include <numeric>
 
 #include "gpureg/reconstruction.hpp"
@@ -108,6 +110,73 @@ std::vector<Link> weakest_links(const Reconstruction& map) {
     }
   }
   return links;
+}
+
+void split_at_weak_links(const std::vector<Edge>& edges, const std::vector<Odometry>& odometry,
+                         double min_confidence, std::vector<std::uint32_t>& parts) {
+  constexpr double kRounding = 1e-9;  // as in certain_parts()
+  Reconstruction map;
+  map.edges = edges;
+  map.odometry = odometry;
+  map.scans.resize(parts.size());
+  for (Scan& scan : map.scans) scan.placed = true;
+  std::vector<std::vector<std::uint32_t>> scans_of(parts.size());
+  for (std::uint32_t k = 0; k < parts.size(); ++k) scans_of[parts[k]].push_back(k);
+  const auto divides = [](const Link& link, const auto& edge) {
+    const auto within = [&](std::uint32_t scan) {
+      return std::binary_search(link.scans.begin(), link.scans.end(), scan);
+    };
+    return within(edge.source) != within(edge.target);
+  };
+  const auto held_by_odometry = [&](const Link& link) {
+    return std::any_of(odometry.begin(), odometry.end(),
+                       [&](const Odometry& step) { return divides(link, step); });
+  };
+  // How much more the rejected edges say than the accepted ones, each taken for itself. A wrong
+  // edge at one scan makes all connections of that scan weak; this finds the edge.
+  const auto contradiction = [&](const Link& link) {
+    double sum = 0;
+    const std::uint32_t island = map.scans[link.scans.front()].island;
+    for (const Edge& edge : edges) {
+      if (map.scans[edge.source].island != island || map.scans[edge.target].island != island ||
+          !divides(link, edge))
+        continue;
+      const double evidence = -std::log(1 - std::min(edge.pair_confidence, kMostConfidence));
+      sum += edge.accepted ? -evidence : evidence;
+    }
+    return sum;
+  };
+  while (true) {
+    map.islands.clear();
+    for (std::vector<std::uint32_t>& scans : scans_of) {
+      if (scans.empty()) continue;
+      for (const std::uint32_t scan : scans)
+        map.scans[scan].island = static_cast<std::uint32_t>(map.islands.size());
+      map.islands.push_back({});
+      map.islands.back().scans = scans;
+    }
+    const std::vector<Link> links = weakest_links(map);
+    const Link* split = nullptr;
+    double most = 0;
+    for (const Link& link : links) {
+      if (link.confidence >= min_confidence - kRounding || held_by_odometry(link)) continue;
+      const double against = contradiction(link);
+      if (split && against <= most) continue;
+      split = &link;
+      most = against;
+    }
+    if (!split) return;
+    const std::vector<std::uint32_t> all = scans_of[parts[split->scans.front()]];
+    std::vector<std::uint32_t> rest;
+    std::set_difference(all.begin(), all.end(), split->scans.begin(), split->scans.end(),
+                        std::back_inserter(rest));
+    scans_of[all.front()].clear();
+    // A part has the number of its smallest scan.
+    for (const std::vector<std::uint32_t>& part : {split->scans, rest}) {
+      for (const std::uint32_t scan : part) parts[scan] = part.front();
+      scans_of[part.front()] = part;
+    }
+  }
 }
 
 }  // namespace gpureg::reconstruction

@@ -98,5 +98,16 @@ TEST(Observations, EvidenceInGroupsIsThatOfEachPoint) {
   }
 }
 
+TEST(Observations, RaysOfHardlyAnyLengthStayInTheirFace) {
+  constexpr std::uint32_t kCentre = kMapEdge / 2 * kMapEdge + kMapEdge / 2;
+  const Vec3 far = {0.3f, 0.7f, -1.0f};
+  for (const float length : {1e-20f, 1e-29f, 1.0f, 1e20f})
+    EXPECT_EQ(map_ray(far * length).cell, map_ray(far).cell) << length;
+  for (const float length : {0.0f, 1e-45f, 1e-38f, 1e-37f}) {
+    EXPECT_EQ(map_ray({length, 0, 0}).cell % kMapFace, kCentre) << length;
+    EXPECT_EQ(map_ray({0, 0, -length}).depth, length);
+  }
+}
+
 }  // namespace
 }  // namespace gpureg::cpu
