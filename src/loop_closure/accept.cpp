@@ -37,7 +37,9 @@ class Acceptance {
     find_alternatives();
   }
 
-  Verdict verdict(std::size_t k) {
+  /// @param joined other loops have shown where the frames of the loop lie: it is held to the bound
+  ///   of loops within one frame.
+  Verdict verdict(std::size_t k, bool joined) const {
     const Mode& own = mode(k);
     const bool connected = std::isfinite(own.drift_ratio);
     if (connected && own.confidence >= options_.alone && own.drift_ratio <= 1)
@@ -48,18 +50,20 @@ class Acceptance {
     const double correct = 1 / support.wrong - 1;
     const double against = connected ? 0 : alternative_odds(k);
     const double together = correct / (1 + correct + against);
-    const bool enough = together >= (connected ? options_.together : options_.between_frames);
+    const bool within = connected || joined;
+    const bool enough = together >= (within ? options_.together : options_.between_frames);
     return {enough, enough ? LoopReason::confirmed : LoopReason::unconfirmed};
+  }
+
+  /// The frames that odometry gives the ends of a loop.
+  std::pair<int, int> frames(std::size_t k) const {
+    return std::minmax(odometry_.component(odometry_.position(record(k).source)),
+                       odometry_.component(odometry_.position(record(k).target)));
   }
 
  private:
   const LoopRecord& record(std::size_t k) const { return state_.loops[k]; }
   const Mode& mode(std::size_t k) const { return record(k).modes[record(k).mode]; }
-
-  std::pair<int, int> frames(std::size_t k) const {
-    return std::minmax(odometry_.component(odometry_.position(record(k).source)),
-                       odometry_.component(odometry_.position(record(k).target)));
-  }
 
   /// A loop and the independent ones that agree with it.
   struct Support {
@@ -77,7 +81,7 @@ class Acceptance {
     if (relations == state_.relations.end()) return out;
     std::set<std::uint64_t> agreeing;
     for (const Relation& relation : relations->second)
-      if (relation.agrees_from <= scale_) agreeing.insert(relation.other);
+      if (relation.confirms && relation.agrees_from <= scale_) agreeing.insert(relation.other);
     std::set<FragmentId> used{own.loop.source, own.loop.target};
     for (const std::size_t other : order_) {
       if (other == k || agreeing.count(record(other).key(record(other).mode)) == 0) continue;
@@ -169,9 +173,18 @@ std::vector<Verdict> accept_loops(const State& state, const Paths& odometry,
       if (fits[k]) verdicts[k] = {true, LoopReason::by_graph};
     return verdicts;
   }
-  Acceptance acceptance(state, odometry, fits, scale, options);
+  const Acceptance acceptance(state, odometry, fits, scale, options);
+  std::set<std::pair<int, int>> joined;
+  for (std::size_t k = 0; k < fits.size(); ++k) {
+    if (!fits[k]) continue;
+    verdicts[k] = acceptance.verdict(k, false);
+    if (verdicts[k].accepted) joined.insert(acceptance.frames(k));
+  }
+  // All of these fit one graph. Refusing those that are a little less certain would also take the
+  // certain ones what confirms them.
   for (std::size_t k = 0; k < fits.size(); ++k)
-    if (fits[k]) verdicts[k] = acceptance.verdict(k);
+    if (fits[k] && !verdicts[k].accepted && joined.count(acceptance.frames(k)) > 0)
+      verdicts[k] = acceptance.verdict(k, true);
   return verdicts;
 }
 

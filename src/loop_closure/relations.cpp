@@ -17,6 +17,11 @@ namespace {
 constexpr int kMostHops = 40;
 /// Loops agree by chance unless their prediction is this much better than that of odometry.
 constexpr double kInformative = 0.5;
+/// The same between fragments that odometry does not connect: in radii of a fragment, as places
+/// that look alike are hardly nearer to each other than fragments are large; and metres, for
+/// fragments without points. What says how much odometry drifts is held to it under the stated
+/// drift, what confirms a loop under the drift from which they agree.
+constexpr double kNarrowShare = 0.4, kNarrowMetres = 1;
 /// Misclosure, in units of the quantile, from which loops contradict each other; in between they
 /// say nothing. Registrations have heavier tails than their covariances.
 constexpr double kContradiction = 1.5 * 1.5;
@@ -121,11 +126,19 @@ class Comparison {
       if (misclosure <= quantile_) relation.agrees_from = scale;
     }
     const int source = ends_[k].first;
-    if (relation.agrees_from < kDriftScaleCount && by_target_.reaches(source)) {
-      const Eigen::Vector3d centre = state_.nodes.at(state_.loops[k].source).coarse.centre;
-      const double drift = sigma_at(by_target_.root_from(source).covariance, centre);
-      if (sigma_at(by_odometry.covariance, centre) > kInformative * drift)
-        relation.agrees_from = kDriftScaleCount;
+    if (relation.agrees_from < kDriftScaleCount) {
+      const Coarse& coarse = state_.nodes.at(state_.loops[k].source).coarse;
+      const double sigma = sigma_at(by_odometry.covariance, coarse.centre);
+      double most = 0;
+      if (by_target_.reaches(source)) {
+        most = kInformative * sigma_at(by_target_.root_from(source).covariance, coarse.centre);
+        relation.confirms = true;
+      } else {
+        most = std::max(kNarrowShare * coarse.radius, kNarrowMetres);
+        const double factor = scales ? kDriftScales[relation.agrees_from] : 1;
+        relation.confirms = factor * sigma <= most;
+      }
+      if (sigma > most) relation.agrees_from = kDriftScaleCount;
     }
     if (relation.agrees_from == kDriftScaleCount && relation.contradicts_below == 0)
       return std::nullopt;
