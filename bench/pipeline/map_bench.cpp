@@ -104,6 +104,12 @@ void run(const gpureg::Context& context, std::size_t wanted) {
       "\"match_ms\": %.1f, \"confidence\": %.3f, \"error_m\": %.3f, \"host_gib\": %.1f",
       map.size(), static_cast<std::size_t>(target.size()), prepared, aligned, result.timings.match,
       result.score, (result.target_from_source * middle - truth * middle).norm(), peak_gib());
+  const gpureg::PrepareStatistics& stages = target.statistics();
+  std::printf(
+      ", \"prepare_ms\": {\"downsample\": %.1f, \"normals\": %.1f, \"features\": %.1f, "
+      "\"grid\": %.1f, \"depth_maps\": %.1f, \"surface_sides\": %.1f}",
+      stages.downsample, stages.normals, stages.features, stages.grid, stages.depth_maps,
+      stages.surface_sides);
   for (const gpureg::DeviceMemoryUse& use : context.device_memory())
     std::printf(", \"device_in_use_gib\": %.1f, \"device_reserved_gib\": %.1f",
                 static_cast<double>(use.bytes_in_use) / (1 << 30),

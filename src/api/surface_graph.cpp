@@ -4,9 +4,11 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <thread>
 #include <utility>
 
 #include "algorithm/cell.hpp"
+#include "common/host_threads.hpp"
 
 namespace gpureg {
 namespace {
@@ -15,6 +17,8 @@ namespace {
 constexpr std::size_t kNeighbors = 12;
 /// Largest number of edges that contradiction() reads; a share of so many is good to 0.1 %.
 constexpr std::size_t kCountedEdges = 40'000;
+/// Points from which another thread is worth its start, and the most threads.
+constexpr std::size_t kPointsPerThread = 50'000, kMostThreads = 8;
 /// Below this cosine two neighbours lie on different surfaces and tell nothing about each other.
 constexpr float kSameSurface = 0.5f;
 
@@ -65,7 +69,24 @@ class SignedSets {
 SurfaceGraph::SurfaceGraph(std::vector<Vec3> points, std::vector<Vec3> normals, float radius)
     : points_(std::move(points)), normals_(std::move(normals)), radius_(radius) {
   add_edges(radius);
-  stride_ = std::max<std::size_t>(1, edges_.size() / kCountedEdges);
+  choose_counted();
+}
+
+void SurfaceGraph::choose_counted() {
+  const std::size_t stride = std::max<std::size_t>(1, edges_.size() / kCountedEdges);
+  for (std::size_t k = 0; k < edges_.size(); k += stride) counted_.push_back(edges_[k]);
+  // A viewpoint is compared with the ends of these edges alone: in a large map hardly any points.
+  std::vector<std::uint32_t> place(points_.size(), 0);
+  for (const Edge& e : counted_) place[e.a] = place[e.b] = 1;
+  for (std::uint32_t i = 0; i < points_.size(); ++i) {
+    if (place[i] == 0) continue;
+    place[i] = static_cast<std::uint32_t>(counted_ends_.size());
+    counted_ends_.push_back(i);
+  }
+  for (Edge& e : counted_) {
+    e.a = place[e.a];
+    e.b = place[e.b];
+  }
 }
 
 void SurfaceGraph::add_edges(float radius) {
@@ -74,27 +95,40 @@ void SurfaceGraph::add_edges(float radius) {
   for (std::uint32_t i = 0; i < points_.size(); ++i)
     if (!is_zero(normals_[i])) cells.emplace_back(cell_key(cell_of(points_[i], inverse)), i);
   std::sort(cells.begin(), cells.end());
-  std::vector<std::pair<float, std::uint32_t>> nearest;
-  for (const auto& [key, i] : cells) {
-    nearest.clear();
-    const Cell cell = cell_from_key(key);
-    for (std::int32_t z = cell.z - 1; z <= cell.z + 1; ++z)
-      for (std::int32_t y = cell.y - 1; y <= cell.y + 1; ++y) {
-        // Cells of one row have consecutive keys.
-        const std::uint64_t first = cell_key({cell.x - 1, y, z});
-        for (auto at = std::lower_bound(cells.begin(), cells.end(),
-                                        std::make_pair(first, std::uint32_t(0)));
-             at != cells.end() && at->first <= first + 2; ++at) {
-          const float d2 = squared_norm(points_[at->second] - points_[i]);
-          if (at->second != i && d2 <= radius * radius) nearest.emplace_back(d2, at->second);
+  // The edges are sorted below: their order does not depend on the number of threads.
+  const std::size_t threads = std::clamp<std::size_t>(
+      std::min<std::size_t>(std::thread::hardware_concurrency(), cells.size() / kPointsPerThread),
+      1, kMostThreads);
+  std::vector<std::vector<Edge>> found(threads);
+  on_threads(threads, [&](std::size_t thread) {
+    std::vector<std::pair<float, std::uint32_t>> nearest;
+    const std::size_t end = (thread + 1) * cells.size() / threads;
+    for (std::size_t at = thread * cells.size() / threads; at < end; ++at) {
+      const auto& [key, i] = cells[at];
+      nearest.clear();
+      const Cell cell = cell_from_key(key);
+      for (std::int32_t z = cell.z - 1; z <= cell.z + 1; ++z)
+        for (std::int32_t y = cell.y - 1; y <= cell.y + 1; ++y) {
+          // Cells of one row have consecutive keys.
+          const std::uint64_t first = cell_key({cell.x - 1, y, z});
+          for (auto other = std::lower_bound(cells.begin(), cells.end(),
+                                             std::make_pair(first, std::uint32_t(0)));
+               other != cells.end() && other->first <= first + 2; ++other) {
+            const float d2 = squared_norm(points_[other->second] - points_[i]);
+            if (other->second != i && d2 <= radius * radius)
+              nearest.emplace_back(d2, other->second);
+          }
         }
+      const std::size_t kept = std::min(kNeighbors, nearest.size());
+      std::partial_sort(nearest.begin(), nearest.begin() + static_cast<std::ptrdiff_t>(kept),
+                        nearest.end());
+      for (std::size_t k = 0; k < kept; ++k) {
+        const std::uint32_t j = nearest[k].second;
+        found[thread].push_back({std::min(i, j), std::max(i, j), dot(normals_[i], normals_[j])});
       }
-    std::sort(nearest.begin(), nearest.end());
-    for (std::size_t k = 0; k < std::min(kNeighbors, nearest.size()); ++k) {
-      const std::uint32_t j = nearest[k].second;
-      edges_.push_back({std::min(i, j), std::max(i, j), dot(normals_[i], normals_[j])});
     }
-  }
+  });
+  for (const std::vector<Edge>& part : found) edges_.insert(edges_.end(), part.begin(), part.end());
   const auto before = [](const Edge& a, const Edge& b) {
     return a.a != b.a ? a.a < b.a : a.b < b.b;
   };
@@ -105,12 +139,13 @@ void SurfaceGraph::add_edges(float radius) {
 }
 
 double SurfaceGraph::contradiction(Vec3 viewpoint) const {
-  std::vector<float> towards(points_.size());
-  for (std::size_t i = 0; i < points_.size(); ++i)
-    towards[i] = dot(normals_[i], normalized_or_zero(viewpoint - points_[i]));
+  std::vector<float> towards(counted_ends_.size());
+  for (std::size_t k = 0; k < counted_ends_.size(); ++k) {
+    const std::uint32_t i = counted_ends_[k];
+    towards[k] = dot(normals_[i], normalized_or_zero(viewpoint - points_[i]));
+  }
   double bad = 0, all = 0;
-  for (std::size_t k = 0; k < edges_.size(); k += stride_) {
-    const Edge& e = edges_[k];
+  for (const Edge& e : counted_) {
     const float a = towards[e.a], b = towards[e.b];
     const double weight =
         weight_of(e.cosine) * static_cast<double>(std::min(std::fabs(a), std::fabs(b)));
@@ -122,10 +157,10 @@ double SurfaceGraph::contradiction(Vec3 viewpoint) const {
 
 double SurfaceGraph::contradiction(const Signs& signs) const {
   double bad = 0, all = 0;
-  for (std::size_t k = 0; k < edges_.size(); k += stride_) {
-    const Edge& e = edges_[k];
+  for (const Edge& e : counted_) {
+    const bool opposite = signs[counted_ends_[e.a]] != signs[counted_ends_[e.b]];
     all += weight_of(e.cosine);
-    if ((signs[e.a] != signs[e.b]) != (e.cosine < 0)) bad += weight_of(e.cosine);
+    if (opposite != (e.cosine < 0)) bad += weight_of(e.cosine);
   }
   return share(bad, all);
 }

@@ -48,11 +48,14 @@ class SurfaceGraph {
     float cosine;  ///< of the angle between the normals
   };
   void add_edges(float radius);
+  void choose_counted();
 
   std::vector<Vec3> points_, normals_;
   std::vector<Edge> edges_;
   float radius_;
-  std::size_t stride_ = 1;  ///< every so many edges are counted
+  /// The edges that contradiction() reads, and their ends: places in points_.
+  std::vector<Edge> counted_;
+  std::vector<std::uint32_t> counted_ends_;
 };
 
 }  // namespace gpureg
