@@ -3,6 +3,7 @@
 
 #include <benchmark/benchmark.h>
 
+#include <cstdint>
 #include <string>
 #include <vector>
 
@@ -16,6 +17,9 @@ const std::vector<PointCloud>& fragments();
 std::vector<PointCloudView> views();
 /// Every pair once.
 std::vector<Pair> all_pairs();
+
+/// QuadrupleOptions::max_survivors that real pairs stay below.
+constexpr std::uint32_t kAllSurvivors = 1u << 18;
 
 /// Means over the results, and milliseconds per pair of that many runs.
 void report(benchmark::State& state, const std::vector<RegistrationResult>& results,

@@ -14,7 +14,8 @@ namespace {
 void paper_mode(benchmark::State& state) {
   const Context* on = context(state, "cuda");
   if (!on) return;
-  const RegistrationOptions options = RegistrationOptions::loopsmart();
+  RegistrationOptions options = RegistrationOptions::loopsmart();
+  options.quadruples.max_survivors = kAllSurvivors;
   const auto clouds = prepare_batch(*on, views(), options.prepare);
   const auto pairs = all_pairs();
   const auto expected = align_batch(*on, clouds, pairs, options);

@@ -40,6 +40,12 @@ def pipeline():
             "ms_per_pair",
             0.10,
         ),
+        (
+            "the same, every quadruple scored that passes the polygon test",
+            "align_many/cuda_loopsmart_all/11",
+            "ms_per_pair",
+            None,
+        ),
         ("a pair in the naive mode, one after the other", "paper_mode", "ms_per_pair", None),
         (
             "a prepared pair on the CPU of the host, in a batch of 190",
