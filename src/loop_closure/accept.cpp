@@ -23,10 +23,10 @@ constexpr double kNever = std::numeric_limits<double>::infinity();
 class Acceptance {
  public:
   Acceptance(const State& state, const Paths& odometry, const std::vector<char>& fits,
-             std::uint8_t scale, const Options& options)
+             const std::vector<char>& joined, std::uint8_t scale, const Options& options)
       : state_(state),
         odometry_(odometry),
-        fits_(fits),
+        agrees_(fits),
         scale_(scale),
         options_(options.acceptance) {
     for (std::size_t k = 0; k < state.loops.size(); ++k)
@@ -34,6 +34,8 @@ class Acceptance {
     std::stable_sort(order_.begin(), order_.end(), [&](std::size_t a, std::size_t b) {
       return mode(a).confidence > mode(b).confidence;
     });
+    for (const std::size_t k : order_)
+      if (joined[k] && !fits[k] && agrees_with_any(k, fits)) agrees_[k] = 1;
     find_alternatives();
   }
 
@@ -72,22 +74,35 @@ class Acceptance {
     bool with_graph = false;  ///< a loop that fits the graph agrees with it
   };
 
-  /// Confirming loops are on the same side as the loop: they fit the graph, or do not.
-  Support support_of(std::size_t k) const {
-    const LoopRecord& own = record(k);
-    Support out;
-    out.wrong = 1 - mode(k).confidence;
-    const auto relations = state_.relations.find(own.key(own.mode));
-    if (relations == state_.relations.end()) return out;
+  /// Keys of the modes that confirm the one of a loop.
+  std::set<std::uint64_t> agreeing_with(std::size_t k) const {
     std::set<std::uint64_t> agreeing;
+    const auto relations = state_.relations.find(record(k).key(record(k).mode));
+    if (relations == state_.relations.end()) return agreeing;
     for (const Relation& relation : relations->second)
       if (relation.confirms && relation.agrees_from <= scale_) agreeing.insert(relation.other);
+    return agreeing;
+  }
+
+  bool agrees_with_any(std::size_t k, const std::vector<char>& fits) const {
+    const std::set<std::uint64_t> agreeing = agreeing_with(k);
+    return std::any_of(order_.begin(), order_.end(), [&](std::size_t other) {
+      return fits[other] && agreeing.count(record(other).key(record(other).mode)) > 0;
+    });
+  }
+
+  /// Confirming loops are on the same side as the loop: they fit the graph, or do not.
+  Support support_of(std::size_t k) const {
+    Support out;
+    out.wrong = 1 - mode(k).confidence;
+    const std::set<std::uint64_t> agreeing = agreeing_with(k);
+    const LoopRecord& own = record(k);
     std::set<FragmentId> used{own.loop.source, own.loop.target};
     for (const std::size_t other : order_) {
       if (other == k || agreeing.count(record(other).key(record(other).mode)) == 0) continue;
-      out.with_graph |= fits_[other] != 0;
+      out.with_graph |= agrees_[other] != 0;
       const Loop& loop = record(other).loop;
-      if (fits_[other] != fits_[k] || out.confirming == kMostConfirming ||
+      if (agrees_[other] != agrees_[k] || out.confirming == kMostConfirming ||
           used.count(loop.source) || used.count(loop.target))
         continue;
       used.insert({loop.source, loop.target});
@@ -101,7 +116,7 @@ class Acceptance {
   /// which agree with loops that fit, do not.
   void find_alternatives() {
     for (const std::size_t k : order_) {
-      if (fits_[k]) continue;
+      if (agrees_[k]) continue;
       const auto between = frames(k);
       if (between.first == between.second) continue;
       const Support support = support_of(k);
@@ -121,7 +136,7 @@ class Acceptance {
 
   const State& state_;
   const Paths& odometry_;
-  const std::vector<char>& fits_;
+  std::vector<char> agrees_;  ///< fits the graph, or did with loops that do
   std::uint8_t scale_;
   const AcceptanceOptions& options_;
   std::vector<std::size_t> order_;  ///< of the loops with poses, the most confident first
@@ -166,25 +181,28 @@ bool within_drift(const Mode& mode, const Options& options) {
 
 std::vector<Verdict> accept_loops(const State& state, const Paths& odometry,
                                   const std::vector<char>& fits, std::uint8_t scale,
-                                  const Options& options) {
+                                  const Options& options, std::vector<char>& joined) {
   std::vector<Verdict> verdicts(state.loops.size());
   if (options.accept_by_graph_alone) {
     for (std::size_t k = 0; k < fits.size(); ++k)
       if (fits[k]) verdicts[k] = {true, LoopReason::by_graph};
     return verdicts;
   }
-  const Acceptance acceptance(state, odometry, fits, scale, options);
-  std::set<std::pair<int, int>> joined;
+  const Acceptance acceptance(state, odometry, fits, joined, scale, options);
+  std::set<std::pair<int, int>> connected;
   for (std::size_t k = 0; k < fits.size(); ++k) {
     if (!fits[k]) continue;
     verdicts[k] = acceptance.verdict(k, false);
-    if (verdicts[k].accepted) joined.insert(acceptance.frames(k));
+    const auto frames = acceptance.frames(k);
+    if (verdicts[k].accepted && frames.first != frames.second) connected.insert(frames);
   }
   // All of these fit one graph. Refusing those that are a little less certain would also take the
   // certain ones what confirms them.
-  for (std::size_t k = 0; k < fits.size(); ++k)
-    if (fits[k] && !verdicts[k].accepted && joined.count(acceptance.frames(k)) > 0)
-      verdicts[k] = acceptance.verdict(k, true);
+  for (std::size_t k = 0; k < fits.size(); ++k) {
+    if (!fits[k] || verdicts[k].accepted || connected.count(acceptance.frames(k)) == 0) continue;
+    verdicts[k] = acceptance.verdict(k, true);
+    joined[k] = !verdicts[k].accepted;
+  }
   return verdicts;
 }
 

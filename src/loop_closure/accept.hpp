@@ -29,9 +29,12 @@ struct Verdict {
 /// same relative pose, much better than odometry alone does.
 /// Needs State::relations.
 /// @param fits one per loop of the state: the robust graph accepts it.
+/// @param joined in and out, one per loop: it fitted the graph together with loops that join its
+///   frames, and is not confident enough itself. As long as loops that it agrees with fit, it
+///   confirms them.
 /// @param scale place in kDriftScales.
 std::vector<Verdict> accept_loops(const State& state, const Paths& odometry,
                                   const std::vector<char>& fits, std::uint8_t scale,
-                                  const Options& options);
+                                  const Options& options, std::vector<char>& joined);
 
 }  // namespace gpureg::loop_closure

@@ -4,6 +4,7 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <limits>
 #include <optional>
 
@@ -30,6 +31,9 @@ constexpr double kContradiction = 1.5 * 1.5;
 /// loops agree under any large drift. bench/loop_closure: 0.5 loses true loops after 2 m of drift,
 /// 0.8 keeps more false ones after 0.2 m.
 constexpr double kMostAgreements = 0.65;
+/// Agreements of loops within a session from which those between sessions do not count; each pair
+/// of loops is two.
+constexpr std::size_t kEnoughAgreements = 20;
 /// Multiple of the stated drift beyond which the rotation of odometry is never thought to be worse:
 /// otherwise the estimate explains perceptual aliases that are turned by a right angle.
 constexpr double kMostRotationScale = 4;
@@ -132,7 +136,7 @@ class Comparison {
       double most = 0;
       if (by_target_.reaches(source)) {
         most = kInformative * sigma_at(by_target_.root_from(source).covariance, coarse.centre);
-        relation.confirms = true;
+        relation.confirms = relation.connected = true;
       } else {
         most = std::max(kNarrowShare * coarse.radius, kNarrowMetres);
         const double factor = scales ? kDriftScales[relation.agrees_from] : 1;
@@ -163,11 +167,17 @@ void update_relations(State& state, const Paths& odometry, const Options& option
 }
 
 std::uint8_t drift_scale(const State& state) {
-  std::size_t agreeing[kDriftScaleCount] = {};
+  std::size_t agreeing[kDriftScaleCount] = {}, connected[kDriftScaleCount] = {};
   for (const auto& [key, list] : state.relations)
     for (const Relation& relation : list)
-      for (std::uint8_t scale = relation.agrees_from; scale < kDriftScaleCount; ++scale)
+      for (std::uint8_t scale = relation.agrees_from; scale < kDriftScaleCount; ++scale) {
         agreeing[scale] += relation.independent;
+        connected[scale] += relation.independent && relation.connected;
+      }
+  // Between sessions any place may look like any other: what they say counts where nothing else
+  // does.
+  if (connected[kDriftScaleCount - 1] >= kEnoughAgreements)
+    std::copy(std::begin(connected), std::end(connected), std::begin(agreeing));
   const auto explained = [&](std::uint8_t scale) {
     for (auto larger = static_cast<std::uint8_t>(scale + 1); larger < kDriftScaleCount; ++larger) {
       // The prior of the drift: agreements that need an n times larger drift count n^(-1/4).

@@ -74,6 +74,7 @@ struct Relation {
   std::uint64_t other = 0;   ///< LoopRecord::key
   bool independent = false;  ///< no fragment in common
   bool confirms = false;     ///< hardly agrees by chance
+  bool connected = false;    ///< by odometry, beside the loops
   /// Places in kDriftScales from which they agree, and below which they contradict each other.
   std::uint8_t agrees_from = 0, contradicts_below = 0;
 };

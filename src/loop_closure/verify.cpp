@@ -84,7 +84,8 @@ class Verifier {
         options_(options),
         odometry_(state, false, options),
         excluded_(state.loops.size(), 0),
-        fitted_(state.loops.size(), 0) {
+        fitted_(state.loops.size(), 0),
+        joined_(state.loops.size(), 0) {
     if (options.accept_by_graph_alone) return;
     compute_drift_ratios(state, odometry_, options);
     update_relations(state, odometry_, options);
@@ -100,7 +101,7 @@ class Verifier {
           result.status == pose_graph::Status::cancelled)
         return {result.status, result.reason};
       bool refused = drop_contradicted();
-      verdicts = accept_loops(state_, odometry_, fits_, scale_, options_);
+      verdicts = accept_loops(state_, odometry_, fits_, scale_, options_, joined_);
       for (std::size_t k = 0; k < fits_.size(); ++k) {
         if (!fits_[k]) continue;
         fitted_[k] = 1;
@@ -246,6 +247,7 @@ class Verifier {
   const Options& options_;
   Paths odometry_;
   std::vector<char> excluded_, fitted_, fits_;
+  std::vector<char> joined_;            ///< see accept_loops()
   std::vector<double> squared_errors_;  ///< of the loops that fit
   std::uint8_t scale_ = 0;              ///< place in kDriftScales
   bool merged_ = false;
