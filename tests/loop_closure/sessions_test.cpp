@@ -123,5 +123,30 @@ TEST(Sessions, AMergeByAliasesIsRetracted) {
   EXPECT_EQ(frames(closer), 1u);
 }
 
+TEST(Sessions, LoopsOfLittleConfidenceKeepConfirmingTheMerge) {
+  LoopCloser closer = closer_of();
+  Sequence first = sequence(square(20)), second = second_session();
+  first.odometry = first.truth;
+  second.odometry = second.truth;
+  first.add_to(closer);
+  second.add_to(closer);
+  // Two confident loops decide only with the others, which are not accepted themselves.
+  for (int k = 3; k < 10; ++k)
+    closer.add_result(100 + k, k + 7,
+                      between(second, k, first, k + 7, k == 4 || k == 8 ? 0.97 : 0.3));
+  // Three places that look as if they were five metres farther on.
+  const Pose aside = planar(5, 0, 90);
+  for (const int k : {0, 1, 2}) {
+    const Pose seems = aside * second.truth[static_cast<std::size_t>(k)];
+    closer.add_result(100 + k, k, correct(seems, first.truth[static_cast<std::size_t>(k)], 0.5));
+  }
+  closer.process();
+  EXPECT_EQ(frames(closer), 1u);
+  EXPECT_EQ(loop_of(closer.loops(), 104, 11).state, LoopState::accepted);
+  EXPECT_EQ(loop_of(closer.loops(), 108, 15).state, LoopState::accepted);
+  EXPECT_EQ(loop_of(closer.loops(), 106, 13).state, LoopState::candidate);
+  EXPECT_NE(loop_of(closer.loops(), 101, 1).state, LoopState::accepted);
+}
+
 }  // namespace
 }  // namespace gpureg::test
