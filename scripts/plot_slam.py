@@ -5,8 +5,8 @@
     scripts/plot_slam.py SEQUENCE BEFORE AFTER [-o FILE]
 
 BEFORE and AFTER are two outputs of slam_demo that share their tracking (--tracking): the first
-without loops, the second with them. Where their surfels are the same, the detail is where the loops
-moved most; otherwise --detail says."""
+without loops, the second with them. Where their surfels are the same, a detail shows where the loops
+moved most. Where loops joined worlds they are not: then --detail says what to enlarge, if anything."""
 
 import argparse
 import json
@@ -52,7 +52,7 @@ def draw(axes, points, colours, window, size):
         shown &= (points[:, axis] > window[axis][0]) & (points[:, axis] < window[axis][1])
     order = numpy.argsort(points[shown, 2])
     axes.scatter(
-        *points[shown][order, :2].T, s=size, c=colours[shown][order], marker=",", linewidths=0
+        *points[shown][order, :2].T, s=size, c=colours[shown][order], marker="s", linewidths=0
     )
     axes.set_xlim(window[0])
     axes.set_ylim(window[1])
@@ -90,8 +90,8 @@ def main():
     for folder in (args.before, args.after):
         points, colours = surfels_of(folder)
         rotation, shift = alignment(folder, truth)
-        error = json.loads((folder / "loops.json").read_text())["ate"]["rmse_m"]
-        maps.append((points @ rotation.T + shift, colours, error))
+        figures = json.loads((folder / "loops.json").read_text())
+        maps.append((points @ rotation.T + shift, colours, figures))
     after = maps[1][0]
     whole = [(after[:, axis].min() - 0.2, after[:, axis].max() + 0.2) for axis in (0, 1)]
     if args.detail:
@@ -99,17 +99,26 @@ def main():
     elif len(maps[0][0]) == len(after):
         detail = most_moved(maps[0][0], after)
     else:
-        parser.error("the maps have different surfels: --detail X Y")
-    figure, axes = pyplot.subplots(2, 2, figsize=(9, 8.4), dpi=90)
+        detail = None
+    rows = 2 if detail else 1
+    height = (whole[1][1] - whole[1][0]) / (whole[0][1] - whole[0][0])
+    figure, axes = pyplot.subplots(
+        rows, 2, figsize=(9, 4.5 * height + 0.5 + 4.2 * (rows - 1)), dpi=90, squeeze=False
+    )
     titles = ("by tracking alone", "with loops")
-    for column, ((points, colours, error), title) in enumerate(zip(maps, titles, strict=True)):
-        draw(axes[0][column], points, colours, whole, 0.25)
-        draw(axes[1][column], points, colours, detail, 1.0)
-        axes[0][column].set_title(f"{title}: ATE {100 * error:.1f} cm")
-        corner = [low for low, _ in detail]
-        axes[0][column].add_patch(
-            pyplot.Rectangle(corner, WINDOW, WINDOW, fill=False, edgecolor="red", linewidth=1.2)
+    for column, ((points, colours, figures), title) in enumerate(zip(maps, titles, strict=True)):
+        draw(axes[0][column], points, colours, whole, 0.5)
+        ate = figures["ate"]
+        axes[0][column].set_title(
+            f"{title}: {ate['poses']:,} of {figures['frames']:,} frames, ATE {100 * ate['rmse_m']:.1f} cm",
+            fontsize=10,
         )
+        if detail:
+            draw(axes[1][column], points, colours, detail, 1.0)
+            corner = [low for low, _ in detail]
+            axes[0][column].add_patch(
+                pyplot.Rectangle(corner, WINDOW, WINDOW, fill=False, edgecolor="red", linewidth=1.2)
+            )
     figure.tight_layout()
     args.output.parent.mkdir(exist_ok=True)
     figure.savefig(args.output, pil_kwargs={"optimize": True})
