@@ -17,11 +17,17 @@ VARIANTS = {
 }
 
 
-def rows_of(maps):
+def names():
+    """Name in the record and in the tables of every scene and variant."""
     for scene, shown in SCENES.items():
         for suffix, variant in VARIANTS.items():
-            if scene + suffix in maps:
-                yield f"{shown}, {variant}", maps[scene + suffix]
+            yield scene + suffix, f"{shown}, {variant}"
+
+
+def rows_of(maps):
+    for name, shown in names():
+        if name in maps:
+            yield shown, maps[name]
     if "foreign" in maps:
         yield "house A and 5 scans of hospital E", maps["foreign"]
     if "two_buildings" in maps:
@@ -65,8 +71,7 @@ def peers():
         "| --- | --- | --- | --- | --- |",
     ]
     for name, theirs in record["peers"]["open3d"].items():
-        scene, _, variant = name.partition("_third")
-        shown = SCENES[scene] + (", every third scan" if variant or "_third" in name else "")
+        shown = dict(names())[name]
         ours = record["maps"][name]["after_refinement"]
         for method, figures in (("gpureg", ours), ("Open3D multiway registration", theirs)):
             rows.append(
