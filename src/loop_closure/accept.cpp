@@ -39,9 +39,10 @@ class Acceptance {
     find_alternatives();
   }
 
-  /// @param joined other loops have shown where the frames of the loop lie: it is held to the bound
+  /// @param frames_joined other loops have shown where the frames of the loop lie: it is held to
+  /// the bound
   ///   of loops within one frame.
-  Verdict verdict(std::size_t k, bool joined) const {
+  Verdict verdict(std::size_t k, bool frames_joined) const {
     const Mode& own = mode(k);
     const bool connected = std::isfinite(own.drift_ratio);
     if (connected && own.confidence >= options_.alone && own.drift_ratio <= 1)
@@ -52,7 +53,7 @@ class Acceptance {
     const double correct = 1 / support.wrong - 1;
     const double against = connected ? 0 : alternative_odds(k);
     const double together = correct / (1 + correct + against);
-    const bool within = connected || joined;
+    const bool within = connected || frames_joined;
     const bool enough = together >= (within ? options_.together : options_.between_frames);
     return {enough, enough ? LoopReason::confirmed : LoopReason::unconfirmed};
   }

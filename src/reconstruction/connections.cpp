@@ -64,8 +64,6 @@ std::vector<std::uint32_t> certain_parts(std::size_t scans, const std::vector<Ed
     const auto [a, b] = std::minmax({find(parent, edge.source), find(parent, edge.target)});
     parent[b] = a;
   }
-  // Log odds and back: a confidence of exactly the minimum counts.
-  constexpr double kRounding = 1e-9;
   const std::vector<std::size_t> order = by_confidence(edges);
   std::vector<std::uint32_t> size(scans);
   for (const double level : kLevels) {

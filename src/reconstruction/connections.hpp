@@ -10,6 +10,9 @@ namespace gpureg::reconstruction {
 /// No edge is certain: keeps odds finite.
 constexpr double kMostConfidence = 1 - 1e-9;
 
+/// Log odds and back: a confidence of exactly the minimum counts.
+constexpr double kRounding = 1e-9;
+
 /// The edges between two parts of a map, added in descending order of confidence.
 ///
 /// Scans that see the same place fail together, and loop consistency raises what fails together.

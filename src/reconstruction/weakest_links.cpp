@@ -114,7 +114,6 @@ std::vector<Link> weakest_links(const Reconstruction& map) {
 
 void split_at_weak_links(const std::vector<Edge>& edges, const std::vector<Odometry>& odometry,
                          double min_confidence, std::vector<std::uint32_t>& parts) {
-  constexpr double kRounding = 1e-9;  // as in certain_parts()
   Reconstruction map;
   map.edges = edges;
   map.odometry = odometry;

@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <set>
+#include <utility>
 
 #include "loop_closure/drive.hpp"
 
@@ -16,6 +17,14 @@ Sequence second_session() {
   const Pose elsewhere = planar(40, -7, 130);
   for (Pose& pose : s.odometry) pose = elsewhere * pose;
   return s;
+}
+
+/// Both sessions by odometry without drift, in the frame of the truth.
+std::pair<Sequence, Sequence> exact_sessions() {
+  Sequence first = sequence(square(20)), second = second_session();
+  first.odometry = first.truth;
+  second.odometry = second.truth;
+  return {first, second};
 }
 
 std::size_t frames(const LoopCloser& closer) {
@@ -99,9 +108,7 @@ TEST(Sessions, NearMissesAndScatteredRejectionsDoNotKeepThemApart) {
 
 TEST(Sessions, AMergeByAliasesIsRetracted) {
   LoopCloser closer = closer_of();
-  Sequence first = sequence(square(20)), second = second_session();
-  first.odometry = first.truth;
-  second.odometry = second.truth;
+  const auto [first, second] = exact_sessions();
   first.add_to(closer);
   second.add_to(closer, 0, 6);
   // Fragments 102 and 104 look as if they were five metres farther on.
@@ -125,9 +132,7 @@ TEST(Sessions, AMergeByAliasesIsRetracted) {
 
 TEST(Sessions, LoopsOfLittleConfidenceKeepConfirmingTheMerge) {
   LoopCloser closer = closer_of();
-  Sequence first = sequence(square(20)), second = second_session();
-  first.odometry = first.truth;
-  second.odometry = second.truth;
+  const auto [first, second] = exact_sessions();
   first.add_to(closer);
   second.add_to(closer);
   // Two confident loops decide only with the others, which are not accepted themselves.
