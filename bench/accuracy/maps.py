@@ -67,6 +67,9 @@ class Set:
                     known[moved] = value
         return poses, log, info
 
+    def scene_of(self, scan):
+        return max(offset for _, _, offset in self.parts if offset <= scan)
+
     def sources(self):
         """Sets whose pairs serve this one, with the offset of their numbers."""
         suffix = "" if self.cameras else "_nocam"
@@ -166,7 +169,8 @@ def run(command, folder, chosen, arguments, out, more):
         check=False,
     )
     document = json.loads((out / "reconstruction.json").read_text())
-    figures = measure(out, chosen.truth(arguments), information_of(records.values()))
+    truth, information = chosen.truth(arguments), information_of(records.values())
+    figures = measure(out, truth, information, chosen.scene_of)
     figures["seconds"] = document["seconds"]
     figures["peak_memory_mib"] = document["peak_memory_mib"]
     figures["weakest"] = min(
@@ -238,7 +242,7 @@ def main():
     for peer in ("open3d",):
         for out in sorted((arguments.work / peer).glob("*/reconstruction.json")):
             name = out.parent.name
-            figures = measure(out.parent, known[name].truth(arguments), {})
+            figures = measure(out.parent, known[name].truth(arguments), {}, known[name].scene_of)
             figures["seconds"] = json.loads(out.read_text())["seconds"]
             figures["peak_memory_mib"] = json.loads(out.read_text())["peak_memory_mib"]
             peers.setdefault(peer, {})[name] = figures
