@@ -73,6 +73,10 @@ struct AcceptanceOptions {
   double together = 0.9;
   /// The same between sessions, or parts of one, that odometry does not connect; never by one loop.
   double between_frames = 0.98;
+  /// Two fragments of one frame with a larger overlap are at one place: loops between frames that
+  /// compare one place with one other do not confirm each other, because places that look alike do
+  /// so from everywhere. [0, 1]; 1: only a fragment itself is at its place.
+  double same_place_overlap = 0.5;
   /// Quantile of the misclosure under odometry's uncertainty within which a loop may stand alone,
   /// (0, 1).
   double drift_probability = 0.99;

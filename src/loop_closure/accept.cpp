@@ -48,12 +48,12 @@ class Acceptance {
     if (connected && own.confidence >= options_.alone && own.drift_ratio <= 1)
       return {true, LoopReason::confident};
     if (own.confidence < options_.confirmed) return {false, LoopReason::unconfirmed};
-    const Support support = support_of(k);
+    const bool within = connected || frames_joined;
+    const Support support = support_of(k, !within);
     if (support.confirming == 0) return {false, LoopReason::unconfirmed};
     const double correct = 1 / support.wrong - 1;
     const double against = connected ? 0 : alternative_odds(k);
     const double together = correct / (1 + correct + against);
-    const bool within = connected || frames_joined;
     const bool enough = together >= (within ? options_.together : options_.between_frames);
     return {enough, enough ? LoopReason::confirmed : LoopReason::unconfirmed};
   }
@@ -92,8 +92,32 @@ class Acceptance {
     });
   }
 
+  /// Whether the second of two fragments in one frame saw little that the first did not.
+  bool at_one_place(FragmentId a, FragmentId b) const {
+    const auto [found, fresh] = at_one_place_.try_emplace(pair_of(a, b), false);
+    if (fresh) {
+      const Node &first = state_.nodes.at(a), &second = state_.nodes.at(b);
+      const auto second_from_first =
+          to_pose(UnalignedIsometry3d(second.estimate.inverse() * first.estimate));
+      found->second = expected_overlap(first.coarse, second.coarse, second_from_first, 0, 0) >
+                      options_.same_place_overlap;
+    }
+    return found->second;
+  }
+
+  /// Whether two loops between the same frames compare the same place with the same place.
+  bool at_one_place(std::size_t k, std::size_t other) const {
+    const LoopRecord &own = record(k), &theirs = record(other);
+    const auto frame = [&](FragmentId id) { return odometry_.component(odometry_.position(id)); };
+    const bool straight = frame(own.source) == frame(theirs.source);
+    return at_one_place(own.source, straight ? theirs.source : theirs.target) &&
+           at_one_place(own.target, straight ? theirs.target : theirs.source);
+  }
+
   /// Confirming loops are on the same side as the loop: they fit the graph, or do not.
-  Support support_of(std::size_t k) const {
+  /// @param elsewhere loops of the same place confirm nothing: what looks alike there does so from
+  /// everywhere.
+  Support support_of(std::size_t k, bool elsewhere = false) const {
     Support out;
     out.wrong = 1 - mode(k).confidence;
     const std::set<std::uint64_t> agreeing = agreeing_with(k);
@@ -104,7 +128,8 @@ class Acceptance {
       out.with_graph |= agrees_[other] != 0;
       const Loop& loop = record(other).loop;
       if (agrees_[other] != agrees_[k] || out.confirming == kMostConfirming ||
-          used.count(loop.source) || used.count(loop.target))
+          used.count(loop.source) || used.count(loop.target) ||
+          (elsewhere && at_one_place(k, other)))
         continue;
       used.insert({loop.source, loop.target});
       out.wrong *= std::max(kLeastWrong, 1 - mode(other).confidence);
@@ -142,6 +167,7 @@ class Acceptance {
   const AcceptanceOptions& options_;
   std::vector<std::size_t> order_;  ///< of the loops with poses, the most confident first
   std::map<std::pair<int, int>, double> alternatives_;  ///< odds, by frames
+  mutable std::map<FragmentPair, bool> at_one_place_;    ///< of the pairs asked for so far
 };
 
 }  // namespace
@@ -193,8 +219,9 @@ std::vector<Verdict> accept_loops(const State& state, const Paths& odometry,
   std::set<std::pair<int, int>> connected;
   for (std::size_t k = 0; k < fits.size(); ++k) {
     if (!fits[k]) continue;
-    verdicts[k] = acceptance.verdict(k, false);
     const auto frames = acceptance.frames(k);
+    if (connected.count(frames)) continue;  // judged below
+    verdicts[k] = acceptance.verdict(k, false);
     if (verdicts[k].accepted && frames.first != frames.second) connected.insert(frames);
   }
   // All of these fit one graph. Refusing those that are a little less certain would also take the

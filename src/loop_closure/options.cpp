@@ -34,6 +34,8 @@ void AcceptanceOptions::validate() const {
   require(together > 0 && together <= 1, "acceptance.together", together, "(0, 1]");
   require(between_frames > 0 && between_frames <= 1, "acceptance.between_frames", between_frames,
           "(0, 1]");
+  require(same_place_overlap >= 0 && same_place_overlap <= 1, "acceptance.same_place_overlap",
+          same_place_overlap, "[0, 1]");
   require(drift_probability > 0 && drift_probability < 1, "acceptance.drift_probability",
           drift_probability, "(0, 1)");
   require(std::isfinite(max_drift_ratio) && max_drift_ratio >= 1, "acceptance.max_drift_ratio",

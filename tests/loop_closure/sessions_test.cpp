@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "loop_closure/drive.hpp"
+#include "loop_closure/scans.hpp"
 
 namespace gpureg::test {
 namespace {
@@ -128,6 +129,43 @@ TEST(Sessions, AMergeByAliasesIsRetracted) {
   EXPECT_EQ(loop_of(update.changed, 104, 4).state, LoopState::retracted);
   EXPECT_EQ(loop_of(update.changed, 108, 15).state, LoopState::accepted);
   EXPECT_EQ(frames(closer), 1u);
+}
+
+TEST(Sessions, LoopsOfOnePlaceDoNotMergeThem) {
+  // Two rooms, 20 m apart, each seen twice by each session.
+  std::vector<Place> places;
+  for (const double room : {0.0, 20.0})
+    for (const double step : {0.0, 0.4})
+      places.push_back({planar(room + step, 0, 10 * step), planar(room, 0, 0), false});
+  const Scans first(places), second(places);
+  const Context context = Context::cpu(1);
+  for (const double overlap : {0.5, 1.0}) {
+    loop_closure::Options options = quick_options();
+    options.acceptance.same_place_overlap = overlap;
+    LoopCloser closer = closer_of(options);
+    for (int k = 0; k < 4; ++k) {
+      const auto at = static_cast<std::size_t>(k);
+      const Pose step = k > 0 ? first.s.odometry[at - 1].inverse() * first.s.odometry[at] : Pose::Identity();
+      for (const FragmentId session : {0, 100}) {
+        const Scans& scans = session == 0 ? first : second;
+        closer.add({session + k, session, double(k), scans.cloud(context, k),
+                    scans.s.odometry[at], std::nullopt});
+        if (k > 0) closer.add_odometry(session + k, session + k - 1, step);
+      }
+    }
+    const auto add = [&](int k) {
+      closer.add_result(100 + k, k, between(second.s, k, first.s, k, 0.97));
+      closer.process(0);  // no registrations
+    };
+    add(0);
+    add(1);
+    EXPECT_EQ(frames(closer), overlap < 1 ? 2u : 1u);
+    if (overlap < 1) EXPECT_EQ(loop_of(closer.loops(), 101, 1).reason, LoopReason::unconfirmed);
+    add(2);
+    EXPECT_EQ(frames(closer), 1u);
+    for (const int k : {0, 1, 2})
+      EXPECT_EQ(loop_of(closer.loops(), 100 + k, k).state, LoopState::accepted) << k;
+  }
 }
 
 TEST(Sessions, LoopsOfLittleConfidenceKeepConfirmingTheMerge) {
