@@ -21,7 +21,14 @@ struct MapRay {
   float depth;
 };
 
-/// d: from the viewpoint to the point, finite. A point nearer than kLeastDepth counts as that far
+/// Row or column of a face. Clamped before the conversion, which not every float survives: the
+/// difference of two finite points may be infinite.
+GPUREG_HD std::int32_t map_row(float v) {
+  constexpr float kLast = static_cast<float>(kMapEdge - 1);
+  return static_cast<std::int32_t>(v > 0.0f ? (v < kLast ? v : kLast) : 0.0f);
+}
+
+/// d: from the viewpoint to the point. A point nearer than kLeastDepth counts as that far
 /// away, because its scale would overflow.
 GPUREG_HD MapRay map_ray(Vec3 d) {
   constexpr float kLeastDepth = 1e-30f;
@@ -33,10 +40,7 @@ GPUREG_HD MapRay map_ray(Vec3 d) {
   const float scale =
       0.5f * static_cast<float>(kMapEdge) / (depth > kLeastDepth ? depth : kLeastDepth);
   const float half = 0.5f * static_cast<float>(kMapEdge);
-  std::int32_t column = static_cast<std::int32_t>(fmaf(u, scale, half)),
-               row = static_cast<std::int32_t>(fmaf(v, scale, half));
-  column = column < 0 ? 0 : column >= kMapEdge ? kMapEdge - 1 : column;
-  row = row < 0 ? 0 : row >= kMapEdge ? kMapEdge - 1 : row;
+  const std::int32_t column = map_row(fmaf(u, scale, half)), row = map_row(fmaf(v, scale, half));
   const std::uint32_t face = (is_x ? 0u : is_y ? 2u : 4u) + (along < 0 ? 1u : 0u);
   return {face * kMapFace + static_cast<std::uint32_t>(row * kMapEdge + column), depth};
 }

@@ -13,6 +13,8 @@ GPUREG_HD float local_origin(float lo, float hi, float voxel_size) {
   // + 0: a box with an edge at -0 must have the same origin as one at 0.
   if (!(voxel_size > 0.0f)) return static_cast<float>(mid) + 0.0f;
   const double steps = mid / static_cast<double>(voxel_size);
+  // From 2^53 on every double is an integer; from 2^63 on it has no std::int64_t.
+  if (!(steps > -9e18 && steps < 9e18)) return static_cast<float>(mid) + 0.0f;
   const double whole =
       static_cast<double>(static_cast<std::int64_t>(steps + (steps < 0.0 ? -0.5 : 0.5)));
   // + 0 here too: compilers differ in the sign of a zero converted from an integer.

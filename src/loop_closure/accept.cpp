@@ -167,7 +167,7 @@ class Acceptance {
   const AcceptanceOptions& options_;
   std::vector<std::size_t> order_;  ///< of the loops with poses, the most confident first
   std::map<std::pair<int, int>, double> alternatives_;  ///< odds, by frames
-  mutable std::map<FragmentPair, bool> at_one_place_;    ///< of the pairs asked for so far
+  mutable std::map<FragmentPair, bool> at_one_place_;   ///< of the pairs asked for so far
 };
 
 }  // namespace

@@ -30,6 +30,7 @@ UnalignedIsometry3d read_pose(const TextFile& file, std::size_t first) {
   UnalignedIsometry3d pose = UnalignedIsometry3d::Identity();
   pose.linear() = q.normalized().toRotationMatrix();
   pose.translation() = Eigen::Vector3d(v[0], v[1], v[2]);
+  check_pose(pose, [&](const std::string& reason) { file.fail(reason); });
   return pose;
 }
 

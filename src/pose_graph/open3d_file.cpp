@@ -31,6 +31,9 @@ UnalignedIsometry3d read_pose(const Document& document, const Value& object, con
         object.line,
         std::string(name) + " of the object that begins here is not a rotation and a translation");
   pose.matrix().row(3) << 0, 0, 0, 1;
+  check_pose(pose, [&](const std::string& reason) {
+    document.fail(object.line, "of the object that begins here, " + reason);
+  });
   return pose;
 }
 

@@ -62,6 +62,29 @@ WrittenGraph::WrittenGraph(const Graph& graph, const Result* result, const char*
   }
 }
 
+namespace {
+
+/// Calls fail(reason) if the graph is not valid; the reason leaves out where in the graph.
+void check(const Graph& graph, const std::string& where,
+           const std::function<void(const std::string&)>& fail) {
+  try {
+    graph.validate();
+  } catch (const InvalidArgument& error) {
+    const std::string message = error.what();
+    fail(message.compare(0, where.size(), where) == 0 ? message.substr(where.size()) : message);
+  }
+}
+
+}  // namespace
+
+void check_pose(const UnalignedIsometry3d& pose,
+                const std::function<void(const std::string&)>& fail) {
+  Graph graph;
+  graph.nodes.resize(1);
+  graph.nodes[0].world_from_node = pose;
+  check(graph, "nodes[0].", fail);
+}
+
 void check_information(const UnalignedMatrix6d& information,
                        const std::function<void(const std::string&)>& fail) {
   Graph graph;
@@ -70,13 +93,7 @@ void check_information(const UnalignedMatrix6d& information,
   graph.edges.resize(1);
   graph.edges[0].source = 1;
   graph.edges[0].information = information;
-  try {
-    graph.validate();
-  } catch (const InvalidArgument& error) {
-    const std::string message = error.what();
-    const std::string prefix = "edges[0].";
-    fail(message.compare(0, prefix.size(), prefix) == 0 ? message.substr(prefix.size()) : message);
-  }
+  check(graph, "edges[0].", fail);
 }
 
 }  // namespace gpureg::pose_graph

@@ -27,6 +27,9 @@ struct WrittenGraph {
   std::vector<WrittenEdge> edges;
 };
 
+/// Calls fail(reason) for a pose that Graph::validate would refuse.
+void check_pose(const UnalignedIsometry3d& pose,
+                const std::function<void(const std::string&)>& fail);
 /// Calls fail(reason) for an information matrix that Graph::validate would refuse.
 void check_information(const UnalignedMatrix6d& information,
                        const std::function<void(const std::string&)>& fail);

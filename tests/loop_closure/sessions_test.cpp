@@ -145,11 +145,12 @@ TEST(Sessions, LoopsOfOnePlaceDoNotMergeThem) {
     LoopCloser closer = closer_of(options);
     for (int k = 0; k < 4; ++k) {
       const auto at = static_cast<std::size_t>(k);
-      const Pose step = k > 0 ? first.s.odometry[at - 1].inverse() * first.s.odometry[at] : Pose::Identity();
+      const Pose step =
+          k > 0 ? first.s.odometry[at - 1].inverse() * first.s.odometry[at] : Pose::Identity();
       for (const FragmentId session : {0, 100}) {
         const Scans& scans = session == 0 ? first : second;
-        closer.add({session + k, session, double(k), scans.cloud(context, k),
-                    scans.s.odometry[at], std::nullopt});
+        closer.add({session + k, session, double(k), scans.cloud(context, k), scans.s.odometry[at],
+                    std::nullopt});
         if (k > 0) closer.add_odometry(session + k, session + k - 1, step);
       }
     }
