@@ -38,6 +38,8 @@ def slam():
             about = f"{sequence['name']}: {sequence['frames']} frames"
             if sequence["path_m"]:
                 about += f", {sequence['path_m']:.0f} m"
+            if "--depth-noise" in (sequence["generated_by"] or ""):
+                about += f", depth noise x {sequence['generated_by'].split('--depth-noise ')[1].split()[0]}"
             table.append(
                 f"| {about} | {name}{seeds} | {rows[0]['poses']} | {millimetres(row['ate_m'] for row in rows)} | {surface} "
                 f"| {loops(rows, 'dense')} | {loops(rows, 'image')} |"
