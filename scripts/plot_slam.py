@@ -19,7 +19,7 @@ matplotlib.use("Agg")
 from matplotlib import pyplot
 
 ROOT = pathlib.Path(__file__).resolve().parents[1]
-LOW, HIGH = 0.1, 1.9  # metres over the floor: neither floor nor ceiling
+LOW, HIGH = 0.5, 1.9  # metres over the floor: neither floor nor ceiling
 WINDOW = 3.0  # metres that the detail shows
 SURFEL = numpy.dtype(
     [(name, "<f4") for name in ("x", "y", "z", "nx", "ny", "nz", "radius", "confidence")]
