@@ -92,7 +92,7 @@ class Acceptance {
     });
   }
 
-  /// Whether the second of two fragments in one frame saw little that the first did not.
+  /// Whether one of two fragments of one frame saw little that the other did not.
   bool at_one_place(FragmentId a, FragmentId b) const {
     const auto [found, fresh] = at_one_place_.try_emplace(pair_of(a, b), false);
     if (fresh) {
