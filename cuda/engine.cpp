@@ -13,6 +13,7 @@
 #include "pipeline/runs.hpp"
 #include "pipeline/verify.hpp"
 #include "stages.hpp"
+#include "surface_matcher.hpp"
 
 namespace gpureg::cuda {
 namespace {
@@ -160,6 +161,13 @@ void CudaEngine::verify(Span<const PairInput> pairs, const std::vector<PosesOfPa
                                         poses.begin() + static_cast<std::ptrdiff_t>(end));
     pipeline::verify(exec_, views, part, options, refine, {outcomes.data + begin, end - begin});
   });
+}
+
+std::unique_ptr<SurfaceMatcher> CudaEngine::match_surfaces(Span<const SurfaceArrays> surfaces) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  const DeviceScope scope(device());
+  exec_.begin();
+  return std::make_unique<CudaSurfaces>(exec_, mutex_, surfaces);
 }
 
 }  // namespace gpureg::cuda

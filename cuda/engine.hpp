@@ -30,6 +30,7 @@ class CudaEngine final : public DeviceEngine {
              Span<PairOutcome> outcomes) override;
   void verify(Span<const PairInput> pairs, const std::vector<PosesOfPair>& poses,
               const RegistrationOptions& options, bool refine, Span<PairOutcome> outcomes) override;
+  std::unique_ptr<SurfaceMatcher> match_surfaces(Span<const SurfaceArrays> surfaces) override;
 
  private:
   /// Calls work(views, begin, end) for runs of pairs whose clouds fit the memory budget together.

@@ -19,6 +19,27 @@ constexpr std::size_t kMaxClouds = 32;
 /// Chunks per call: the devices wait for each other only at its end.
 constexpr std::size_t kChunksPerDevice = 16;
 
+/// The surfaces on every device; each adds up runs of the pairs.
+class SurfacesOfMany final : public SurfaceMatcher {
+ public:
+  explicit SurfacesOfMany(std::vector<std::unique_ptr<SurfaceMatcher>> parts)
+      : parts_(std::move(parts)) {}
+
+  void add_up(Span<const SurfacePairInput> pairs, const SurfaceTerms& terms,
+              Span<SurfaceSums> sums) override {
+    const std::size_t share = (pairs.size + parts_.size() - 1) / parts_.size();
+    on_threads(parts_.size(), [&](std::size_t part) {
+      const std::size_t begin = std::min(part * share, pairs.size),
+                        end = std::min(begin + share, pairs.size);
+      parts_[part]->add_up({pairs.data + begin, end - begin}, terms,
+                           {sums.data + begin, end - begin});
+    });
+  }
+
+ private:
+  std::vector<std::unique_ptr<SurfaceMatcher>> parts_;
+};
+
 class EngineOfMany final : public DeviceEngine {
  public:
   EngineOfMany(const std::vector<int>& devices, std::size_t memory_budget) {
@@ -110,6 +131,13 @@ class EngineOfMany final : public DeviceEngine {
              engine.verify({pairs.data + begin, end - begin}, part, options, refine,
                            {outcomes.data + begin, end - begin});
            });
+  }
+
+  std::unique_ptr<SurfaceMatcher> match_surfaces(Span<const SurfaceArrays> surfaces) override {
+    std::vector<std::unique_ptr<SurfaceMatcher>> parts(engines_.size());
+    on_threads(parts.size(),
+               [&](std::size_t e) { parts[e] = engines_[e]->match_surfaces(surfaces); });
+    return std::make_unique<SurfacesOfMany>(std::move(parts));
   }
 
  private:

@@ -218,7 +218,7 @@ class Reconstruct {
       iterations.update(static_cast<std::size_t>(k));
       return InterruptGuard::requested();
     };
-    run_.refined = reconstruction::refine(surfaces_, run_.map, options);
+    run_.refined = reconstruction::refine(context_, surfaces_, run_.map, options);
     run_.seconds.refine = since(start);
     return !InterruptGuard::requested();
   }

@@ -266,11 +266,17 @@ struct RefineReport {
 /// odometry. Sparse
 /// normal equations over all poses; the smallest scan of each island stays.
 ///
+/// @param context finds the correspondences and adds them up; the poses do not depend on it.
 /// @param surfaces one per scan; those of scans that are left out may be empty.
 /// @param map poses are replaced.
 /// @throws InvalidArgument for options out of range, another number of surfaces than scans, and a
 ///   surface whose points and normals differ in number.
+/// @throws DeviceError where the device has no memory left; the map stays as it was.
 /// Sources: Chen and Medioni 1992 (point-to-plane); Neugebauer 1997 (all scans together).
+RefineReport refine(const Context& context, const std::vector<Surface>& surfaces,
+                    Reconstruction& map, const RefineOptions& options = {});
+
+/// The same on a CPU context of options.threads.
 RefineReport refine(const std::vector<Surface>& surfaces, Reconstruction& map,
                     const RefineOptions& options = {});
 

@@ -88,10 +88,10 @@ py::dict report_of(const RefineReport& report) {
   return out;
 }
 
-/// clouds: prepared with surface_options, None for scans that are left out. seen: whether their
-/// viewpoints are known. tell: called with the number of each iteration.
-py::dict refine_map(Reconstruction& map, const py::list& clouds, const std::vector<bool>& seen,
-                    double voxel_size, int threads, const py::object& tell) {
+/// context: of the clouds. clouds: prepared with surface_options, None for scans that are left out.
+/// seen: whether their viewpoints are known. tell: called with the number of each iteration.
+py::dict refine_map(const Context& context, Reconstruction& map, const py::list& clouds,
+                    const std::vector<bool>& seen, double voxel_size, const py::object& tell) {
   std::vector<Surface> surfaces;
   for (const py::handle cloud : clouds) {
     surfaces.emplace_back();
@@ -101,7 +101,7 @@ py::dict refine_map(Reconstruction& map, const py::list& clouds, const std::vect
   }
   reconstruction::RefineOptions options =
       reconstruction::RefineOptions::for_depth_cameras(static_cast<float>(voxel_size));
-  options.threads = threads;
+  options.threads = static_cast<int>(context.backend() == Backend::cpu ? context.threads() : 0);
   std::exception_ptr failed;
   options.should_stop = [&](int iteration) {
     const py::gil_scoped_acquire acquire;
@@ -116,7 +116,7 @@ py::dict refine_map(Reconstruction& map, const py::list& clouds, const std::vect
   RefineReport report;
   {
     const py::gil_scoped_release release;
-    report = refine(surfaces, map, options);
+    report = refine(context, surfaces, map, options);
   }
   if (failed) std::rethrow_exception(failed);
   return report_of(report);
@@ -229,8 +229,8 @@ void bind_reconstruction(py::module_& m) {
   m.def("reconstruct_map", &reconstruct_of, py::arg("scans"), py::arg("pairs"), py::arg("results"),
         py::arg("voxel_size"), py::arg("min_edge_confidence"), py::arg("min_connection_confidence"),
         py::arg("min_island"), py::arg("drift"), py::arg("odometry"), py::arg("threads"));
-  m.def("refine_map", &refine_map, py::arg("map"), py::arg("clouds"), py::arg("seen"),
-        py::arg("voxel_size"), py::arg("threads"), py::arg("tell"));
+  m.def("refine_map", &refine_map, py::arg("context"), py::arg("map"), py::arg("clouds"),
+        py::arg("seen"), py::arg("voxel_size"), py::arg("tell"));
   m.def("surface_options", &surface_options, py::arg("registration"));
   m.def("result_of_row", &result_of_row, py::arg("aligned"), py::arg("target_from_source"),
         py::arg("score"), py::arg("information"));

@@ -888,11 +888,11 @@ def reconstruct_map(
     threads: int,
 ) -> MapGraph: ...
 def refine_map(
+    context: Context,
     map: MapGraph,
     clouds: list[PreparedCloud | None],
     seen: list[bool],
     voxel_size: float,
-    threads: int,
     tell: Callable[[int], object] | None,
 ) -> dict[str, Any]: ...
 def surface_options(registration: PrepareOptions) -> PrepareOptions: ...

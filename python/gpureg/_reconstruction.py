@@ -259,7 +259,7 @@ def _refine(
         clouds[k], seen[k] = cloud, flag
     with batch_progress(progress, "refining", _core.REFINE_ITERATIONS, unit="step") as report:
         tell = None if report is None else report
-        return _core.refine_map(graph, clouds, seen, options.prepare.voxel_size, 0, tell)
+        return _core.refine_map(context, graph, clouds, seen, options.prepare.voxel_size, tell)
 
 
 __all__ = ["reconstruct"]

@@ -5,6 +5,7 @@
 #include "algorithm/normal_weight.hpp"
 #include "cpu/cell_summary.hpp"
 #include "cpu/stages.hpp"
+#include "cpu/surface_matcher.hpp"
 #include "gpureg/context.hpp"
 #include "gpureg/error.hpp"
 #include "pipeline/align.hpp"
@@ -60,6 +61,10 @@ class CpuEngine final : public Engine {
     std::lock_guard<std::mutex> lock(mutex_);
     const std::vector<PairView> views = views_of(pairs);
     pipeline::verify(exec_, span_of(views), poses, options, refine, outcomes);
+  }
+
+  std::unique_ptr<SurfaceMatcher> match_surfaces(Span<const SurfaceArrays> surfaces) override {
+    return std::make_unique<CpuSurfaces>(exec_, mutex_, surfaces);
   }
 
  private:

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "pipeline/prepared_state.hpp"
+#include "pipeline/surface_matcher.hpp"
 
 namespace gpureg {
 
@@ -34,6 +35,8 @@ class Engine {
   virtual void verify(Span<const PairInput> pairs, const std::vector<PosesOfPair>& poses,
                       const RegistrationOptions& options, bool refine,
                       Span<PairOutcome> outcomes) = 0;
+  /// Surfaces for comparisons in pairs. The arrays, in host memory, have to outlive the result.
+  virtual std::unique_ptr<SurfaceMatcher> match_surfaces(Span<const SurfaceArrays> surfaces) = 0;
 };
 
 /// threads > 0. Throws BackendUnavailable where this processor lacks instructions that the stages

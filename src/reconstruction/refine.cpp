@@ -2,18 +2,18 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <memory>
 #include <string>
 #include <utility>
 
 #include "common/validate.hpp"
 #include "gpureg/reconstruction.hpp"
+#include "gpureg/surface_set.hpp"
 #include "math/trigonometry.hpp"
 #include "pose_graph/block_cholesky.hpp"
 #include "pose_graph/normal_equations.hpp"
 #include "pose_graph/parallel.hpp"
 #include "reconstruction/connections.hpp"
-#include "reconstruction/surface_pairs.hpp"
+#include "reconstruction/relative_variances.hpp"
 
 namespace gpureg::reconstruction {
 namespace {
@@ -59,10 +59,25 @@ Sphere sphere_of(const Surface& surface) {
   return {0.5 * (low + high).cast<double>(), 0.5 * (high - low).cast<double>().norm()};
 }
 
-/// An ordered pair of scans: points of source against the surface of target.
-struct OrderedPair {
-  std::uint32_t source, target;
-};
+/// The arrays of the scans that are placed; the others have no points.
+std::vector<SurfaceView> views_of(const std::vector<Surface>& surfaces,
+                                  const std::vector<std::vector<float>>& variances,
+                                  const Reconstruction& map) {
+  std::vector<SurfaceView> out(surfaces.size());
+  for (std::size_t k = 0; k < surfaces.size(); ++k)
+    if (map.scans[k].placed && !surfaces[k].points.empty())
+      out[k] = {surfaces[k].points[0].data(), surfaces[k].normals[0].data(), variances[k].data(),
+                surfaces[k].points.size()};
+  return out;
+}
+
+std::vector<std::vector<float>> variances_of(const std::vector<Surface>& surfaces,
+                                             const Reconstruction& map, double noise_range) {
+  std::vector<std::vector<float>> out(surfaces.size());
+  for (std::size_t k = 0; k < surfaces.size(); ++k)
+    if (map.scans[k].placed) out[k] = relative_variances(surfaces[k], noise_range);
+  return out;
+}
 
 /// The normal equations over the poses of the placed scans.
 struct System {
@@ -77,20 +92,20 @@ struct System {
 
 class Refiner {
  public:
-  Refiner(const std::vector<Surface>& surfaces, Reconstruction& map, const RefineOptions& options)
-      : surfaces_(surfaces),
-        map_(map),
+  Refiner(const Context& context, const std::vector<Surface>& surfaces, Reconstruction& map,
+          const RefineOptions& options)
+      : map_(map),
         options_(options),
         threads_(pose_graph::thread_count(options.threads)),
         system_(surfaces.size(), map),
         poses_(surfaces.size()),
         spheres_(surfaces.size()),
-        variances_(surfaces.size()) {
+        variances_(variances_of(surfaces, map, options.noise_range)),
+        surfaces_(context, views_of(surfaces, variances_, map)) {
     for (std::size_t k = 0; k < surfaces.size(); ++k) {
       if (!map.scans[k].placed) continue;
       poses_[k] = pose_of(map.scans[k].island_from_scan);
       spheres_[k] = sphere_of(surfaces[k]);
-      variances_[k] = relative_variances(surfaces[k], options.noise_range);
     }
   }
 
@@ -125,8 +140,8 @@ class Refiner {
                          (iteration / shrinking));
   }
 
-  std::vector<OrderedPair> near_pairs(double distance) const {
-    std::vector<OrderedPair> out;
+  std::vector<SurfacePair> near_pairs(double distance) const {
+    std::vector<SurfacePair> out;
     for (const Island& island : map_.islands)
       for (const std::uint32_t i : island.scans)
         for (const std::uint32_t j : island.scans) {
@@ -134,43 +149,25 @@ class Refiner {
           const Eigen::Vector3d a = poses_[i].rotation * spheres_[i].centre + poses_[i].translation,
                                 b = poses_[j].rotation * spheres_[j].centre + poses_[j].translation;
           if ((a - b).norm() <= spheres_[i].radius + spheres_[j].radius + distance)
-            out.push_back({i, j});
+            out.push_back({i, j, isometry_of(poses_[j].inverse() * poses_[i])});
         }
     return out;
   }
 
   /// Finds all correspondences within the distance. Returns their RMS distance.
   double associate(double distance, RefineReport& report) {
+    PointToPlaneOptions options;
+    options.max_distance = distance;
+    options.kernel_width = options_.kernel_width * distance / options_.final_distance;
+    options.max_normal_angle = options_.max_normal_angle;
+    options.max_points = options_.max_points;
     pairs_ = near_pairs(distance);
-    sums_.assign(pairs_.size(), {});
-    std::vector<std::unique_ptr<SurfaceGrid>> grids(surfaces_.size());
-    const int scans = static_cast<int>(surfaces_.size());
-    pose_graph::for_ranges(scans, std::min(threads_, scans), [&](int begin, int end) {
-      for (int k = begin; k < end; ++k)
-        if (map_.scans[static_cast<std::size_t>(k)].placed)
-          grids[static_cast<std::size_t>(k)] = std::make_unique<SurfaceGrid>(
-              surfaces_[static_cast<std::size_t>(k)], static_cast<float>(distance));
-    });
-    Association association;
-    association.kernel_width = options_.kernel_width * distance / options_.final_distance;
-    association.min_cosine =
-        static_cast<float>(portable::cos(options_.max_normal_angle * M_PI / 180));
-    association.point_information =
-        1 / (options_.point_noise * options_.point_noise * options_.correlated_points);
-    association.max_points = options_.max_points;
-    pose_graph::for_ranges(static_cast<int>(pairs_.size()), threads_, [&](int begin, int end) {
-      for (int k = begin; k < end; ++k) {
-        const auto [i, j] = pairs_[static_cast<std::size_t>(k)];
-        SurfaceSums& sums = sums_[static_cast<std::size_t>(k)];
-        sums = surface_sums(surfaces_[i], variances_[i], *grids[j], surfaces_[j], variances_[j],
-                            poses_[j].inverse() * poses_[i], association);
-        if (sums.count < options_.min_overlap) sums = {};
-      }
-    });
+    sums_ = surfaces_.linearise(pairs_, options);
     report.pairs = report.correspondences = 0;
     double squared = 0;
     std::vector<std::pair<std::uint32_t, std::uint32_t>> overlapping;
     for (std::size_t k = 0; k < pairs_.size(); ++k) {
+      if (sums_[k].count < options_.min_overlap) sums_[k] = {};
       if (sums_[k].count == 0) continue;
       overlapping.push_back(std::minmax({pairs_[k].source, pairs_[k].target}));
       report.correspondences += sums_[k].count;
@@ -208,14 +205,16 @@ class Refiner {
       block += ts.transpose();
   }
 
-  void add_surfaces(const OrderedPair& pair, const SurfaceSums& sums) {
+  void add_surfaces(const SurfacePair& pair, const PointToPlaneSums& sums) {
     // The relative pose becomes Exp(Ad(target_from_source) x_source) and Exp(-x_target) of itself.
     const Matrix6d by_source =
         pose_graph::adjoint(poses_[pair.target].inverse() * poses_[pair.source]);
-    const Matrix6d& a = sums.information;
-    const Matrix6d as = a * by_source;
+    const double point_information =
+        1 / (options_.point_noise * options_.point_noise * options_.correlated_points);
+    const Matrix6d a = point_information * sums.information, as = a * by_source;
+    const Vector6d gradient = point_information * sums.gradient;
     add(pair.source, pair.target, by_source.transpose() * as, a, -as,
-        by_source.transpose() * sums.gradient, -sums.gradient);
+        by_source.transpose() * gradient, -gradient);
   }
 
   void add_edge(std::uint32_t from, std::uint32_t to, const UnalignedIsometry3d& to_from,
@@ -289,7 +288,6 @@ class Refiner {
     return largest;
   }
 
-  const std::vector<Surface>& surfaces_;
   Reconstruction& map_;
   const RefineOptions& options_;
   int threads_;
@@ -297,16 +295,17 @@ class Refiner {
   std::vector<Pose> poses_;
   std::vector<Sphere> spheres_;
   std::vector<std::vector<float>> variances_;
-  std::vector<OrderedPair> pairs_;
-  std::vector<SurfaceSums> sums_;  ///< of each pair
+  SurfaceSet surfaces_;
+  std::vector<SurfacePair> pairs_;
+  std::vector<PointToPlaneSums> sums_;  ///< of each pair
   pose_graph::BlockMatrix matrix_;
   std::vector<Vector6d> rhs_;
 };
 
 }  // namespace
 
-RefineReport refine(const std::vector<Surface>& surfaces, Reconstruction& map,
-                    const RefineOptions& options) {
+RefineReport refine(const Context& context, const std::vector<Surface>& surfaces,
+                    Reconstruction& map, const RefineOptions& options) {
   options.validate();
   if (surfaces.size() != map.scans.size())
     throw InvalidArgument("surfaces has " + std::to_string(surfaces.size()) +
@@ -316,11 +315,17 @@ RefineReport refine(const std::vector<Surface>& surfaces, Reconstruction& map,
       throw InvalidArgument("surfaces[" + std::to_string(k) + "] has " +
                             std::to_string(surfaces[k].points.size()) + " points and " +
                             std::to_string(surfaces[k].normals.size()) + " normals");
-  RefineReport report = Refiner(surfaces, map, options).run();
+  RefineReport report = Refiner(context, surfaces, map, options).run();
   if (!report.solved) return report;
   report.rejected_edges = reject_deviating(map, options.max_edge_error);
   set_confidence(map);
   return report;
+}
+
+RefineReport refine(const std::vector<Surface>& surfaces, Reconstruction& map,
+                    const RefineOptions& options) {
+  options.validate();
+  return refine(Context::cpu(static_cast<unsigned>(options.threads)), surfaces, map, options);
 }
 
 }  // namespace gpureg::reconstruction

@@ -48,6 +48,9 @@ class IdleHostEngine final : public Engine {
               Span<PairOutcome> outcomes) override {
     cpu_->verify(pairs, poses, options, refine, outcomes);
   }
+  std::unique_ptr<SurfaceMatcher> match_surfaces(Span<const SurfaceArrays> surfaces) override {
+    return cpu_->match_surfaces(surfaces);
+  }
 
   std::function<void(std::size_t)> before_align;  ///< gets the number of the call
   std::atomic<std::size_t> calls{0};

@@ -46,6 +46,9 @@ class LimitedEngine final : public Engine {
     for (PairOutcome& outcome : outcomes) outcome = PairOutcome();
     cpu_->verify(pairs, poses, options, refine, outcomes);
   }
+  std::unique_ptr<SurfaceMatcher> match_surfaces(Span<const SurfaceArrays> surfaces) override {
+    return cpu_->match_surfaces(surfaces);
+  }
 
   std::size_t refused = 0;
 

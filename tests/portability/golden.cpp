@@ -24,8 +24,9 @@ using test::hex;
 using test::pose_text;
 using test::Report;
 
-void add_map(const std::vector<PreparedCloud>& clouds, const std::vector<Pair>& pairs,
-             const std::vector<RegistrationResult>& results, float voxel_size, Report& report) {
+void add_map(const Context& context, const std::vector<PreparedCloud>& clouds,
+             const std::vector<Pair>& pairs, const std::vector<RegistrationResult>& results,
+             float voxel_size, Report& report) {
   reconstruction::Options options = reconstruction::Options::from_voxel_size(voxel_size);
   reconstruction::Reconstruction map =
       reconstruction::reconstruct(clouds.size(), pairs, results, options);
@@ -43,7 +44,7 @@ void add_map(const std::vector<PreparedCloud>& clouds, const std::vector<Pair>& 
   for (const PreparedCloud& cloud : clouds)
     surfaces.push_back({cloud.points(), cloud.normals(), {}});
   const reconstruction::RefineReport refined = reconstruction::refine(
-      surfaces, map, reconstruction::RefineOptions::from_voxel_size(voxel_size));
+      context, surfaces, map, reconstruction::RefineOptions::from_voxel_size(voxel_size));
   report.line("map rmse " + hex(refined.initial_rmse) + " " + hex(refined.final_rmse));
   poses("refined map");
 }
@@ -91,7 +92,7 @@ Report results_of(const Context& context) {
   const std::vector<Pair> two{pairs[0], pairs[1]};
   report.pairs("quadruples", two, align_batch(context, clouds, two, quadruples));
 
-  add_map(clouds, pairs, results, kVoxelSize, report);
+  add_map(context, clouds, pairs, results, kVoxelSize, report);
   return report;
 }
 
