@@ -38,7 +38,8 @@ def prepare(
         half a voxel apart, with the normals of the faces. Metres, any real dtype and layout: numpy, DLPack (torch, jax, ...),
         ``__cuda_array_interface__`` (cupy, ...) or nested lists. float32 rows are read in place;
         everything else is copied once, to float32. Rows with NaN or infinity are dropped and
-        counted. What is on the context's GPU as float32, float16 or bfloat16 never leaves it.
+        counted. What is on the context's GPU as float32, float16 or bfloat16 stays there; only to
+        infer viewpoints that are neither given nor said to be unknown are points copied to the host.
         float64 coordinates too large for float32 (those of a map) lose nothing: their
         centre is taken off first and put back into results.
     normals : (N, 3) array, optional
