@@ -67,8 +67,8 @@ SurfaceGrids build_surface_grids(Exec& exec, Span<const SurfaceArrays> on_host,
   std::vector<CellRange> ranges;
   for (const SurfaceArrays& surface : on_host) {
     views.push_back(surface_grid_of(surface, distance));
-    ranges.push_back({surface_cell(views.back(), surface.low),
-                      surface_cell(views.back(), surface.high)});
+    ranges.push_back(
+        {surface_cell(views.back(), surface.low), surface_cell(views.back(), surface.high)});
   }
   const auto bounds = exec.upload(views);
   const Groups cells =
@@ -91,11 +91,16 @@ SurfaceGrids build_surface_grids(Exec& exec, Span<const SurfaceArrays> on_host,
   }
   out.views = exec.upload(views);
   if (segments.total() == 0) return out;
-  const Fill batch{segments.on_device.data(), cells.item.data(),
-                   cells.rank.data(),         cells.start.data(),
-                   on_device,                 out.views.data(),
-                   out.table.data(),          table_offset_on_device.data(),
-                   out.points.data(),         out.normals.data()};
+  const Fill batch{segments.on_device.data(),
+                   cells.item.data(),
+                   cells.rank.data(),
+                   cells.start.data(),
+                   on_device,
+                   out.views.data(),
+                   out.table.data(),
+                   table_offset_on_device.data(),
+                   out.points.data(),
+                   out.normals.data()};
   fill_surface_grids<<<dim3(std::max(1u, std::min(blocks_for(segments.largest, kThreads), 1024u)),
                             static_cast<unsigned>(count)),
                        kThreads, 0, exec.stream()>>>(batch);

@@ -6,8 +6,8 @@
 namespace gpureg::cuda {
 namespace {
 
-/// Points and surfaces whose search tables exist together. A point takes 32 bytes, and as much again
-/// while the tables are built; a cell takes up to 96.
+/// Points and surfaces whose search tables exist together. A point takes 32 bytes, and as much
+/// again while the tables are built; a cell takes up to 96.
 constexpr std::uint64_t kPointsPerRun = std::uint64_t(1) << 24;
 constexpr std::uint32_t kSurfacesPerRun = 4096;
 
@@ -70,8 +70,8 @@ void CudaSurfaces::add_up(Span<const SurfacePairInput> pairs, const SurfaceTerms
     std::uint32_t most_points = 0;
     for (std::size_t p = 0; p < pairs.size; ++p) {
       const SurfacePairInput& pair = pairs[p];
-      if (pair.target < run.begin || pair.target >= run.end ||
-          surfaces_[pair.target].usable == 0 || surfaces_[pair.source].usable == 0)
+      if (pair.target < run.begin || pair.target >= run.end || surfaces_[pair.target].usable == 0 ||
+          surfaces_[pair.source].usable == 0)
         continue;
       place.push_back(p);
       some.push_back(pair);

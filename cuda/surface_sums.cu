@@ -61,8 +61,8 @@ void add_up_surfaces(Exec& exec, const SurfaceArrays* surfaces, const SurfaceGri
   const std::size_t points = most_points / surface_step(most_points, terms.max_points) + 1;
   for (std::size_t begin = 0; begin < count; begin += kMaxPairsPerLaunch) {
     const std::size_t size = std::min(kMaxPairsPerLaunch, count - begin);
-    const AddUp batch{surfaces, grids.views.data(), first_target, pairs + begin, terms,
-                      sums + begin};
+    const AddUp batch{surfaces, grids.views.data(), first_target, pairs + begin,
+                      terms,    sums + begin};
     add_up<<<dim3(blocks_for(points, kThreads * kPointsPerThread), static_cast<unsigned>(size)),
              kThreads, 0, exec.stream()>>>(batch);
     check_launch("add_up");

@@ -28,8 +28,7 @@ void refine_map(benchmark::State& state, const std::string& backend, std::uint32
   const Context* on = context(state, backend);
   if (!on) return;
   static const Scene scene;
-  auto options =
-      reconstruction::RefineOptions::for_depth_cameras(scene.options.prepare.voxel_size);
+  auto options = reconstruction::RefineOptions::for_depth_cameras(scene.options.prepare.voxel_size);
   options.max_points = max_points;
   reconstruction::RefineReport report;
   for (auto _ : state) {

@@ -14,6 +14,9 @@
 /// refinement, for programs that have a solver of their own.
 namespace gpureg {
 
+using UnalignedMatrix6d = Eigen::Matrix<double, 6, 6, Eigen::DontAlign>;
+using UnalignedVector6d = Eigen::Matrix<double, 6, 1, Eigen::DontAlign>;
+
 /// Points and unit normals of a scan in host memory: tight rows of three floats. A point that is
 /// not finite, or has no normal of unit length, takes no part.
 struct SurfaceView {
@@ -47,10 +50,8 @@ struct PointToPlaneOptions {
 /// one point of variance 1; divide by the variance of such a point for information in statistical
 /// units.
 struct PointToPlaneSums {
-  using Matrix = Eigen::Matrix<double, 6, 6, Eigen::DontAlign>;
-  using Vector = Eigen::Matrix<double, 6, 1, Eigen::DontAlign>;
-  Matrix information = Matrix::Zero();
-  Vector gradient = Vector::Zero();
+  UnalignedMatrix6d information = UnalignedMatrix6d::Zero();
+  UnalignedVector6d gradient = UnalignedVector6d::Zero();
   std::size_t count = 0;        ///< correspondences
   double squared_distance = 0;  ///< sum over them, point to plane, metres^2
 };

@@ -37,7 +37,7 @@ struct SurfaceCell {
 
 struct SurfaceGridView {
   float inverse_cell_size;
-  Vec3 corner;  ///< cells are counted from here
+  Vec3 corner;     ///< cells are counted from here
   Vec3 low, high;  ///< box of the points that may have a neighbour
   Span<const SurfaceCell> table;
   const SurfacePoint* points;
@@ -127,8 +127,8 @@ GPUREG_HD std::uint32_t closest_on_surface(const SurfaceGridView& grid, Vec3 p, 
         const std::int32_t dx = neighbor_step(kx);
         const float gx = gap_to(dx, share.x);
         if ((gyz + gx * gx) * squared_width > least) continue;
-        const SurfaceCell cell = find_surface_cell(
-            grid.table, cell_key({centre.x + dx, centre.y + dy, centre.z + dz}));
+        const SurfaceCell cell =
+            find_surface_cell(grid.table, cell_key({centre.x + dx, centre.y + dy, centre.z + dz}));
         for (std::uint32_t k = cell.first; k < cell.last; ++k) {
           const SurfacePoint point = grid.points[k];
           const float squared = squared_norm(point.position - p);

@@ -74,8 +74,7 @@ PointToPlaneSums in_metres(const SurfaceSums& sums, const SurfaceArrays& source,
   int k = 0;
   for (int i = 0; i < 6; ++i)
     for (int j = 0; j <= i; ++j)
-      a(i, j) = a(j, i) =
-          static_cast<double>(sums.equations.v[k++]) * unit * scale(i) * scale(j);
+      a(i, j) = a(j, i) = static_cast<double>(sums.equations.v[k++]) * unit * scale(i) * scale(j);
   for (int i = 0; i < 6; ++i)
     g[i] = static_cast<double>(sums.equations.v[k++]) * unit * scale(i) * distance;
   const Vec3 c = apply(pose, source.centre);
@@ -86,8 +85,8 @@ PointToPlaneSums in_metres(const SurfaceSums& sums, const SurfaceArrays& source,
   out.information = about_origin.transpose() * a * about_origin;
   out.gradient = about_origin.transpose() * g;
   out.count = static_cast<std::size_t>(sums.count);
-  out.squared_distance = static_cast<double>(sums.squared) /
-                         static_cast<double>(kIcpFixedScale) * distance * distance;
+  out.squared_distance =
+      static_cast<double>(sums.squared) / static_cast<double>(kIcpFixedScale) * distance * distance;
   return out;
 }
 
@@ -122,8 +121,8 @@ SurfaceSet::SurfaceSet(const Context& context, const std::vector<SurfaceView>& s
   }
   state_->equal_variances.assign(longest, 1.0f);
   for (const SurfaceView& surface : surfaces)
-    state_->surfaces.push_back(arrays_of(
-        surface, surface.variances ? surface.variances : state_->equal_variances.data()));
+    state_->surfaces.push_back(
+        arrays_of(surface, surface.variances ? surface.variances : state_->equal_variances.data()));
   state_->matcher = state_->engine->match_surfaces(span_of(state_->surfaces));
 }
 
@@ -153,8 +152,7 @@ std::vector<PointToPlaneSums> SurfaceSet::linearise(const std::vector<SurfacePai
   }
   const SurfaceTerms terms{
       static_cast<float>(options.max_distance), static_cast<float>(options.kernel_width),
-      static_cast<float>(portable::cos(options.max_normal_angle * M_PI / 180)),
-      options.max_points};
+      static_cast<float>(portable::cos(options.max_normal_angle * M_PI / 180)), options.max_points};
   std::vector<SurfaceSums> sums(pairs.size());
   state_->matcher->add_up(span_of(inputs), terms, {sums.data(), sums.size()});
   std::vector<PointToPlaneSums> out(pairs.size());

@@ -150,8 +150,8 @@ TEST(SurfaceSet, RefusesBadInput) {
   view.size = std::size_t(1) << 31;
   expect_error<InvalidArgument>([&] { make(); }, {"surfaces[1].size is 2147483648"});
   view = surface.view();
-  for (const float bad : {0.5f, std::numeric_limits<float>::quiet_NaN(),
-                          std::numeric_limits<float>::infinity()}) {
+  for (const float bad :
+       {0.5f, std::numeric_limits<float>::quiet_NaN(), std::numeric_limits<float>::infinity()}) {
     view.variances = &bad;
     expect_error<InvalidArgument>([&] { make(); }, {"surfaces[1].variances[0] is "});
   }
@@ -160,7 +160,8 @@ TEST(SurfaceSet, RefusesBadInput) {
   expect_error<InvalidArgument>([&] { set.linearise({{7, 0}}); }, {"pairs[0].source is 7"});
   SurfacePair pair;
   pair.target_from_source.translation().x() = std::nan("");
-  expect_error<InvalidArgument>([&] { set.linearise({pair}); }, {"pairs[0].target_from_source is not finite"});
+  expect_error<InvalidArgument>([&] { set.linearise({pair}); },
+                                {"pairs[0].target_from_source is not finite"});
   PointToPlaneOptions options;
   options.max_distance = 0;
   expect_error<InvalidArgument>([&] { set.linearise({}, options); }, {"max_distance is 0"});

@@ -36,8 +36,7 @@ TEST(SurfaceSetOnCuda, DevicesShareThePairs) {
   twice.devices = {0, 0};
   const SurfaceSet one(Context::cuda(), scene.views()), two(Context::cuda(twice), scene.views());
   const auto expected = one.linearise(scene.pairs), sums = two.linearise(scene.pairs);
-  for (std::size_t p = 0; p < scene.pairs.size(); ++p)
-    EXPECT_TRUE(same_bits(expected[p], sums[p]));
+  for (std::size_t p = 0; p < scene.pairs.size(); ++p) EXPECT_TRUE(same_bits(expected[p], sums[p]));
   EXPECT_TRUE(two.linearise({}).empty());
 }
 

@@ -51,7 +51,8 @@ struct SurfaceScene {
         p += noise(random) * n;
         const Eigen::Isometry3d to = frame.back().inverse();
         surfaces.back().add((to * p.cast<double>()).cast<float>(),
-                            (to.linear() * n.cast<double>()).cast<float>(), 1.5f + unit(random) / 2);
+                            (to.linear() * n.cast<double>()).cast<float>(),
+                            1.5f + unit(random) / 2);
       }
     }
     for (std::uint32_t i = 0; i < count; ++i)
