@@ -72,10 +72,14 @@ std::vector<SurfaceView> views_of(const std::vector<Surface>& surfaces,
 }
 
 std::vector<std::vector<float>> variances_of(const std::vector<Surface>& surfaces,
-                                             const Reconstruction& map, double noise_range) {
+                                             const Reconstruction& map, double noise_range,
+                                             int threads) {
   std::vector<std::vector<float>> out(surfaces.size());
-  for (std::size_t k = 0; k < surfaces.size(); ++k)
-    if (map.scans[k].placed) out[k] = relative_variances(surfaces[k], noise_range);
+  const auto work = [&](int begin, int end) {
+    for (auto k = static_cast<std::size_t>(begin); k < static_cast<std::size_t>(end); ++k)
+      if (map.scans[k].placed) out[k] = relative_variances(surfaces[k], noise_range);
+  };
+  pose_graph::for_ranges(static_cast<int>(surfaces.size()), threads, work, 1);
   return out;
 }
 
@@ -100,7 +104,7 @@ class Refiner {
         system_(surfaces.size(), map),
         poses_(surfaces.size()),
         spheres_(surfaces.size()),
-        variances_(variances_of(surfaces, map, options.noise_range)),
+        variances_(variances_of(surfaces, map, options.noise_range, threads_)),
         surfaces_(context, views_of(surfaces, variances_, map)) {
     for (std::size_t k = 0; k < surfaces.size(); ++k) {
       if (!map.scans[k].placed) continue;
