@@ -263,10 +263,10 @@ struct RefineReport {
 
 /// Refines all poses of a map together: point-to-plane distances over every overlapping pair of
 /// scans of an island, also of pairs that no edge connects, beside the accepted edges and the
-/// odometry. Sparse
-/// normal equations over all poses; the smallest scan of each island stays.
+/// odometry. Sparse normal equations over all poses; the smallest scan of each island stays.
 ///
-/// @param context finds the correspondences and adds them up; the poses do not depend on it.
+/// @param context finds the correspondences and adds them up, options.threads solve for the poses.
+///   The bits of the poses depend on neither.
 /// @param surfaces one per scan; those of scans that are left out may be empty.
 /// @param map poses are replaced.
 /// @throws InvalidArgument for options out of range, another number of surfaces than scans, and a
