@@ -219,6 +219,9 @@ def main():
     arguments = options.parse_args()
     arguments.data = pathlib.Path(arguments.data)
     known = cases(arguments.data)
+    for name in arguments.cases:
+        if name not in known:
+            options.error(f"no case {name}, the cases are {', '.join(known)}")
     old = json.loads(arguments.output.read_text()) if arguments.output.exists() else {}
     maps, peers = old.get("maps", {}), old.get("peers", {})
     for name in arguments.cases or known:
