@@ -16,13 +16,16 @@ struct SearchPair {
   PriorTest prior;
 };
 
+inline SearchPair search_pair(const PairView& pair) {
+  return {pair.source, pair.target,
+          static_cast<const CudaCloud*>(pair.source.executor_data)->summaries,
+          static_cast<const CudaCloud*>(pair.target.executor_data)->summaries, pair.prior};
+}
+
 inline DeviceBuffer<SearchPair> upload_search_pairs(Exec& exec, Span<const PairView> pairs) {
   std::vector<SearchPair> out;
-  for (const PairView& pair : pairs)
-    out.push_back({pair.source, pair.target,
-                   static_cast<const CudaCloud*>(pair.source.executor_data)->summaries,
-                   static_cast<const CudaCloud*>(pair.target.executor_data)->summaries,
-                   pair.prior});
+  out.reserve(pairs.size);
+  for (const PairView& pair : pairs) out.push_back(search_pair(pair));
   return exec.upload(out);
 }
 

@@ -4,7 +4,7 @@
 #include <cooperative_groups.h>
 
 #include "algorithm/evidence.hpp"
-#include "closest_cells.cuh"
+#include "sampled_pairs.hpp"
 #include "stages.hpp"
 
 namespace gpureg::cuda {
@@ -13,22 +13,22 @@ namespace {
 constexpr int kSums = 27;  // of IcpSums
 
 struct RefineModes {
-  const SearchPair* pairs;
+  const SampledPair* pairs;
   std::uint32_t most;
   Mode* modes;
   std::uint32_t* count;
-  std::uint32_t sample, max_iterations;
+  std::uint32_t max_iterations;
   float max_distance, kernel_width, min_cosine;
+  double settled;
 };
 
 /// Terms of one source point: turn, normal, weight and residual, see add_icp_term(). False where it
 /// has no partner.
-__device__ bool correspondence(const SearchPair& pair, const RefineModes& r, float kernel_width,
-                               const Rigid& rigid, float inverse_radius, std::uint32_t i,
-                               float (&row)[8]) {
-  const CloudView &s = pair.source, &t = pair.target;
+__device__ bool correspondence(const SampledPair& pair, const RefineModes& r, const Rigid& rigid,
+                               float inverse_radius, std::uint32_t i, float (&row)[8]) {
+  const CloudView &s = pair.source, &t = pair.pair.target;
   const Vec3 p = s.points[i], q = apply(rigid, p);
-  const Closest c = find_closest(t, pair.target_cells, q, r.max_distance * r.max_distance);
+  const Closest c = find_closest(t, pair.pair.target_cells, q, r.max_distance * r.max_distance);
   if (c.index == kNoValue) return false;
   const Vec3 normal = t.normals[c.index];
   if (is_zero(normal) || !normals_agree(rotate(rigid, s.normals[i]), normal, r.min_cosine))
@@ -41,7 +41,7 @@ __device__ bool correspondence(const SearchPair& pair, const RefineModes& r, flo
   row[3] = normal.x;
   row[4] = normal.y;
   row[5] = normal.z;
-  row[6] = robust_weight(distance, kernel_width) * normal_weight_share(s.normal_weight[i]);
+  row[6] = robust_weight(distance, r.kernel_width) * normal_weight_share(s.normal_weight[i]);
   row[7] = distance * (1.0f / r.max_distance);
   return true;
 }
@@ -50,10 +50,9 @@ __device__ bool correspondence(const SearchPair& pair, const RefineModes& r, flo
 /// 27 lanes accumulates one sum over the points of the warp: the terms of add_icp_term() with one
 /// register per thread instead of 54. rows, partial: shared memory, for each warp.
 template <int kThreads>
-__device__ void add_up(const SearchPair& pair, const RefineModes& r, float kernel_width,
-                       const Rigid& rigid, std::uint32_t stride, std::uint32_t first,
-                       std::uint32_t blocks, float (*rows)[32][8], std::int64_t (*partial)[kSums],
-                       IcpSums& sums) {
+__device__ void add_up(const SampledPair& pair, const RefineModes& r, const Rigid& rigid,
+                       std::uint32_t first, std::uint32_t blocks, float (*rows)[32][8],
+                       std::int64_t (*partial)[kSums], IcpSums& sums) {
   const std::uint32_t lane = threadIdx.x % 32, warp = threadIdx.x / 32, size = pair.source.size;
   const float inverse_radius = 1.0f / pair.source.radius;
   // Sum k is the product of entries a and b: the lower triangle row by row, then all with the
@@ -65,12 +64,11 @@ __device__ void add_up(const SearchPair& pair, const RefineModes& r, float kerne
     b = 7;
   }
   std::int64_t sum = 0;
-  for (std::uint64_t base = first * kThreads + threadIdx.x - lane; base * stride < size;
+  for (std::uint32_t base = first * kThreads + threadIdx.x - lane; base < size;
        base += blocks * kThreads) {
-    const std::uint64_t i = (base + lane) * stride;
+    const std::uint32_t i = base + lane;
     float row[8];
-    const bool has = i < size && correspondence(pair, r, kernel_width, rigid, inverse_radius,
-                                                static_cast<std::uint32_t>(i), row);
+    const bool has = i < size && correspondence(pair, r, rigid, inverse_radius, i, row);
     const unsigned mask = __ballot_sync(~0u, has);
     if (has) {
       float4* out = reinterpret_cast<float4*>(
@@ -123,8 +121,7 @@ __device__ void leave_cluster() {
 #endif
 }
 
-/// A thread block per mode, or a cluster of kBlocks, runs all its iterations: on a sample, then on
-/// all points with a narrower kernel.
+/// A thread block per mode, or a cluster of kBlocks, runs all iterations of one refinement.
 template <int kThreads, int kBlocks>
 __global__ void __launch_bounds__(kThreads, 1024 / kThreads) refine(RefineModes r) {
   __shared__ float rows[kThreads / 32][32][8];
@@ -134,38 +131,32 @@ __global__ void __launch_bounds__(kThreads, 1024 / kThreads) refine(RefineModes 
   __shared__ bool done;
   const std::uint32_t number = blockIdx.x / kBlocks, first = blockIdx.x % kBlocks;
   if (number >= r.count[blockIdx.y]) return;
-  const SearchPair& pair = r.pairs[blockIdx.y];
+  const SampledPair& pair = r.pairs[blockIdx.y];
   Mode& mode = r.modes[static_cast<std::size_t>(blockIdx.y) * r.most + number];
-  if (threadIdx.x == 0) pose = mode.pose;
-  std::uint32_t total = 0;
-  for (int round = 0; round < 2; ++round) {
-    const std::uint32_t stride = round == 0 ? sample_stride(pair.source.size, 2 * r.sample) : 1;
-    const float kernel_width = round == 0 ? r.kernel_width : kPolishKernel * r.kernel_width;
-    const double settled = round == 0 ? kRoughSettled : kPolishSettled;
-    if (threadIdx.x == 0) done = false;
-    __syncthreads();
-    for (std::uint32_t iterations = 0; !done;) {
-      IcpSums& mine = own[total % 2];
-      add_up<kThreads>(pair, r, kernel_width, to_rigid(pose), stride, first, kBlocks, rows, partial,
-                       mine);
-      if constexpr (kBlocks > 1) add_over_cluster<kBlocks>(mine, total_of_all);
-      ++iterations;
-      ++total;
-      if (threadIdx.x == 0) {
-        const IcpSums& sums = kBlocks > 1 ? total_of_all : mine;
-        const IcpStep step = solve_icp(sums, pair.source.radius, r.max_distance);
-        if (step.valid) pose = compose_small(step.omega, step.shift, pose);
-        done = !step.valid || icp_settled(step, pair.source.radius, r.max_distance, settled) ||
-               iterations >= r.max_iterations;
-      }
-      __syncthreads();
+  if (threadIdx.x == 0) {
+    pose = mode.pose;
+    done = false;
+  }
+  std::uint32_t iterations = 0;
+  __syncthreads();
+  while (!done) {
+    IcpSums& mine = own[iterations % 2];
+    add_up<kThreads>(pair, r, to_rigid(pose), first, kBlocks, rows, partial, mine);
+    if constexpr (kBlocks > 1) add_over_cluster<kBlocks>(mine, total_of_all);
+    ++iterations;
+    if (threadIdx.x == 0) {
+      const IcpSums& sums = kBlocks > 1 ? total_of_all : mine;
+      const IcpStep step = solve_icp(sums, pair.source.radius, r.max_distance);
+      if (step.valid) pose = compose_small(step.omega, step.shift, pose);
+      done = !step.valid || icp_settled(step, pair.source.radius, r.max_distance, r.settled) ||
+             iterations >= r.max_iterations;
     }
-    __syncthreads();  // all threads leave the loop before it restarts
+    __syncthreads();
   }
   if constexpr (kBlocks > 1) leave_cluster();
   if (threadIdx.x == 0 && first == 0) {
     mode.pose = pose;
-    mode.iterations = total;
+    mode.iterations += iterations;
   }
 }
 
@@ -196,8 +187,7 @@ void refine_by_clusters(Exec& exec, const RefineModes& batch, unsigned pairs) {
 
 /// Merges modes that refinement moved to the same pose; keeps the first. A warp per pair.
 __global__ void __launch_bounds__(32)
-    merge(std::uint32_t most, Mode* all_modes, std::uint32_t* counts, float min_trace,
-          float squared_distance) {
+    merge(std::uint32_t most, Mode* all_modes, std::uint32_t* counts, ModeLimits within) {
   __shared__ Rigid kept[limits::kMaxModes];
   const std::uint32_t size = counts[blockIdx.x], lane = threadIdx.x;
   Mode* modes = all_modes + static_cast<std::size_t>(blockIdx.x) * most;
@@ -206,8 +196,7 @@ __global__ void __launch_bounds__(32)
     const Mode mode = modes[k];
     const Rigid rigid = to_rigid(mode.pose);
     bool known = false;
-    for (std::uint32_t o = lane; o < count; o += 32)
-      known |= same_mode(rigid, kept[o], min_trace, squared_distance);
+    for (std::uint32_t o = lane; o < count; o += 32) known |= same_mode(rigid, kept[o], within);
     if (__any_sync(~0u, known)) continue;
     if (lane == 0) {
       kept[count] = rigid;
@@ -219,46 +208,95 @@ __global__ void __launch_bounds__(32)
   if (lane == 0) counts[blockIdx.x] = count;
 }
 
-}  // namespace
+/// A warp per pair. Lane 0 compares with the origin mode, the others with the poses kept so far.
+__global__ void __launch_bounds__(32)
+    drop(std::uint32_t most, const ReturnTest* tests, Mode* all_modes, std::uint32_t* counts) {
+  static_assert(limits::kMaxPerturbedPoses < 32, "a lane compares with each pose kept");
+  __shared__ ReturnTest test;
+  __shared__ Pose<double> kept[32];
+  const std::uint32_t size = counts[blockIdx.x], lane = threadIdx.x;
+  Mode* modes = all_modes + static_cast<std::size_t>(blockIdx.x) * most;
+  if (lane == 0) {
+    test = tests[blockIdx.x];
+    kept[0] = test.origin;
+  }
+  __syncwarp();
+  std::uint32_t count = 0;
+  for (std::uint32_t k = 0; k < size; ++k) {
+    const Mode mode = modes[k];
+    const bool near =
+        lane <= count && squared_displacement(mode.pose, kept[lane], test) <= test.squared_distance;
+    if (__any_sync(~0u, near)) continue;
+    if (lane == 0) {
+      modes[count] = mode;
+      kept[count + 1] = mode.pose;
+    }
+    __syncwarp();
+    ++count;
+  }
+  if (lane == 0) counts[blockIdx.x] = count;
+}
 
-void refine_modes(Exec& exec, Span<const PairView> pairs, Modes& modes,
-                  const RegistrationOptions& options) {
-  const auto views = upload_search_pairs(exec, pairs);
+void refine_all(Exec& exec, const SampledPairs& pairs, Modes& modes,
+                const RegistrationOptions& options, float kernel_width, double settled) {
   RefineModes batch{};
-  batch.pairs = views.data();
+  batch.pairs = pairs.pairs.data();
   batch.most = modes.most;
   batch.modes = modes.mode.data();
   batch.count = modes.count.data();
-  batch.sample = options.evidence.sample;
   batch.max_iterations = options.refine.max_iterations;
   batch.max_distance = options.prepare.max_correspondence_distance;
-  batch.kernel_width = options.refine.kernel_width;
+  batch.kernel_width = kernel_width;
   batch.min_cosine =
       inlier_test(options.prepare.max_correspondence_distance, kRefineNormalAngle).min_cosine;
-  const unsigned pair_count = static_cast<unsigned>(pairs.size);
-  if (options.refine.max_iterations > 0) {
-    // Small blocks overlap each other's solving. With too few modes to fill the device, large
-    // blocks or clusters are faster.
-    const std::size_t count = std::size_t(modes.most) * pairs.size,
-                      processors = static_cast<std::size_t>(exec.multiprocessors());
-    if (count * kClusterBlocks <= processors * 3 && has_clusters(exec)) {
-      refine_by_clusters(exec, batch, pair_count);
-    } else {
-      const bool few = count < processors * 2;
-      (few ? refine<1024, 1>
-           : refine<256, 1>)<<<dim3(modes.most, pair_count), few ? 1024 : 256, 0, exec.stream()>>>(
-          batch);
-      check_launch("refine");
-    }
+  batch.settled = settled;
+  const unsigned pair_count = static_cast<unsigned>(pairs.pairs.size());
+  // Small blocks overlap each other's solving. With too few modes to fill the device, large blocks
+  // or clusters are faster.
+  const std::size_t count = std::size_t(modes.most) * pair_count,
+                    processors = static_cast<std::size_t>(exec.multiprocessors());
+  if (count * kClusterBlocks <= processors * 3 && has_clusters(exec)) {
+    refine_by_clusters(exec, batch, pair_count);
+  } else {
+    const bool few = count < processors * 2;
+    (few ? refine<1024, 1>
+         : refine<256, 1>)<<<dim3(modes.most, pair_count), few ? 1024 : 256, 0, exec.stream()>>>(
+        batch);
+    check_launch("refine");
   }
 }
 
-void merge_modes(Exec& exec, Modes& modes, const RegistrationOptions& options) {
+}  // namespace
+
+void refine_roughly(Exec& exec, Span<const PairView> pairs, Modes& modes,
+                    const RegistrationOptions& options) {
+  if (options.refine.max_iterations == 0) return;
+  refine_all(exec, sample_pairs(exec, pairs, 2 * options.evidence.sample, false), modes, options,
+             options.refine.kernel_width, kRoughSettled);
+}
+
+void polish_modes(Exec& exec, Span<const PairView> pairs, Modes& modes,
+                  const RegistrationOptions& options) {
+  if (options.refine.max_iterations == 0) return;
+  refine_all(exec, whole_pairs(exec, pairs), modes, options,
+             kPolishKernel * options.refine.kernel_width, kPolishSettled);
+}
+
+void merge_modes(Exec& exec, Modes& modes, const RegistrationOptions& options, float share) {
   const unsigned pairs = static_cast<unsigned>(modes.count.size());
   merge<<<pairs, 32, 0, exec.stream()>>>(
-      modes.most, modes.mode.data(), modes.count.data(), mode_trace(options.evidence.mode_angle),
-      options.evidence.mode_distance * options.evidence.mode_distance);
+      modes.most, modes.mode.data(), modes.count.data(),
+      mode_limits(options.evidence.mode_angle, options.evidence.mode_distance, share));
   check_launch("merge");
+}
+
+void drop_returned(Exec& exec, Modes& perturbed, const std::vector<PosesOfPair>& perturbations) {
+  std::vector<ReturnTest> tests(perturbations.size());
+  for (std::size_t p = 0; p < tests.size(); ++p) tests[p] = perturbations[p].returned;
+  const auto on_device = exec.upload(tests);
+  drop<<<static_cast<unsigned>(tests.size()), 32, 0, exec.stream()>>>(
+      perturbed.most, on_device.data(), perturbed.mode.data(), perturbed.count.data());
+  check_launch("drop");
 }
 
 Modes modes_from_poses(Exec& exec, const std::vector<PosesOfPair>& poses) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "algorithm/evidence.hpp"
-#include "closest_cells.cuh"
+#include "sampled_pairs.hpp"
 #include "stages.hpp"
 #include "warp.cuh"
 
@@ -12,31 +12,27 @@ constexpr int kWarps = 4;  // candidates per thread block
 /// Normal weight of the sampled points of each cloud: a thread block per cloud (x: pair, y: source
 /// or target).
 __global__ void __launch_bounds__(256)
-    sampled_weight(const SearchPair* pairs, std::uint32_t sample, unsigned long long* out) {
+    sampled_weight(const SampledPair* pairs, unsigned long long* out) {
   __shared__ unsigned long long sum;
   const CloudView& cloud = blockIdx.y == 0 ? pairs[blockIdx.x].source : pairs[blockIdx.x].target;
-  const std::uint32_t stride = sample_stride(cloud.size, sample);
   if (threadIdx.x == 0) sum = 0;
   __syncthreads();
   unsigned long long mine = 0;
-  for (std::uint64_t i = std::uint64_t(threadIdx.x) * stride; i < cloud.size; i += 256ull * stride)
-    mine += cloud.normal_weight[i];
+  for (std::uint32_t i = threadIdx.x; i < cloud.size; i += 256) mine += cloud.normal_weight[i];
   atomicAdd(&sum, mine);
   __syncthreads();
   if (threadIdx.x == 0) out[2 * blockIdx.x + blockIdx.y] = sum;
 }
 
-/// Side evidence of one candidate for coarse_score(), by a warp.
+/// Side evidence of one candidate for coarse_score(), by a warp. moved: the sample of a cloud.
 __device__ SideEvidence score_sample(const CloudView& moved, const CloudView& other,
                                      const CellSummaries& cells, const Rigid& pose,
-                                     const EvidenceTest& test, std::uint32_t sample) {
+                                     const EvidenceTest& test) {
   SideEvidence e{};
-  const std::uint32_t stride = sample_stride(moved.size, sample),
-                      maps = coarse_score_maps(other.visibility);
-  for (std::uint64_t i = std::uint64_t(threadIdx.x % 32) * stride; i < moved.size;
-       i += 32ull * stride) {
+  const std::uint32_t maps = coarse_score_maps(other.visibility);
+  for (std::uint32_t i = threadIdx.x % 32; i < moved.size; i += 32) {
     const Vec3 q = apply(pose, moved.points[i]);
-    verify_found(moved, other, pose, test, maps, static_cast<std::uint32_t>(i), q,
+    verify_found(moved, other, pose, test, maps, i, q,
                  find_closest(other, cells, q, test.inlier.max_squared), e);
   }
   e.normal_weighted =
@@ -54,21 +50,21 @@ __device__ float smaller_share(const MatchEvidence& m, const std::uint64_t* tota
 
 /// A warp per candidate.
 __global__ void __launch_bounds__(32 * kWarps)
-    score(const SearchPair* pairs, const std::uint64_t* match_total,
+    score(const SampledPair* pairs, const std::uint64_t* match_total,
           const unsigned long long* weight, std::uint32_t most, const std::uint32_t* count,
-          const Pose<float>* pose, const MatchEvidence* matches, EvidenceTest test,
-          std::uint32_t sample, float* out) {
+          const Pose<float>* pose, const MatchEvidence* matches, EvidenceTest test, float* out) {
   const std::uint32_t p = blockIdx.y, c = blockIdx.x * kWarps + threadIdx.x / 32;
   if (c >= count[p]) return;
   const std::size_t at = static_cast<std::size_t>(p) * most + c;
-  const CloudView &s = pairs[p].source, &t = pairs[p].target;
+  const SampledPair& sampled = pairs[p];
+  const SearchPair& pair = sampled.pair;
   const Rigid there = to_rigid(pose[at]), back = inverse(there);
-  if (!permitted(pairs[p].prior, there)) {
+  if (!permitted(pair.prior, there)) {
     if (threadIdx.x % 32 == 0) out[at] = 0.0f;
     return;
   }
-  const SideEvidence a = score_sample(s, t, pairs[p].target_cells, there, test, sample),
-                     b = score_sample(t, s, pairs[p].source_cells, back, test, sample);
+  const SideEvidence a = score_sample(sampled.source, pair.target, pair.target_cells, there, test),
+                     b = score_sample(sampled.target, pair.source, pair.source_cells, back, test);
   if (threadIdx.x % 32 == 0)
     out[at] =
         coarse_score(smaller_share(matches[at], match_total + 2 * p), a,
@@ -81,18 +77,18 @@ void score_candidates(Exec& exec, Span<const PairView> pairs, const MatchSets& m
                       Candidates& candidates, const RegistrationOptions& options) {
   const std::uint32_t most = std::min(candidates.most, matches.room.largest);
   if (most == 0) return;
-  const auto views = upload_search_pairs(exec, pairs);
+  const SampledPairs sampled = sample_pairs(exec, pairs, options.evidence.sample, true);
   const auto weight = exec.buffer<unsigned long long>(2 * pairs.size);
   const unsigned pair_count = static_cast<unsigned>(pairs.size);
-  sampled_weight<<<dim3(pair_count, 2), 256, 0, exec.stream()>>>(
-      views.data(), options.evidence.sample, weight.data());
+  sampled_weight<<<dim3(pair_count, 2), 256, 0, exec.stream()>>>(sampled.pairs.data(),
+                                                                 weight.data());
   check_launch("sampled_weight");
   const EvidenceTest test{
       inlier_test(options.prepare.max_correspondence_distance, options.evidence.max_normal_angle),
       options.evidence.free_space_margin, options.evidence.min_range};
   score<<<dim3(blocks_for(most, kWarps), pair_count), 32 * kWarps, 0, exec.stream()>>>(
-      views.data(), matches.total.data(), weight.data(), candidates.most, candidates.count.data(),
-      candidates.pose.data(), candidates.matches.data(), test, options.evidence.sample,
+      sampled.pairs.data(), matches.total.data(), weight.data(), candidates.most,
+      candidates.count.data(), candidates.pose.data(), candidates.matches.data(), test,
       candidates.coarse_score.data());
   check_launch("score");
 }

@@ -13,9 +13,8 @@ static_assert(limits::kMaxSeeds <= 32 * kThreads, "a thread marks its candidates
 /// in order.
 __global__ void __launch_bounds__(kThreads)
     select(std::uint32_t most, const std::uint32_t* count, const Pose<float>* poses,
-           const float* coarse_scores, const std::uint32_t* seeds, float min_trace,
-           float squared_distance, std::uint32_t most_modes, Mode* modes,
-           std::uint32_t* mode_count) {
+           const float* coarse_scores, const std::uint32_t* seeds, ModeLimits within,
+           std::uint32_t most_modes, Mode* modes, std::uint32_t* mode_count) {
   __shared__ unsigned long long warp_best[kWarps];
   const std::uint32_t p = blockIdx.x, size = count[p];
   const std::size_t begin = static_cast<std::size_t>(p) * most;
@@ -47,8 +46,7 @@ __global__ void __launch_bounds__(kThreads)
     for (std::uint32_t bits = left; bits != 0; bits &= bits - 1) {
       const int r = __ffs(static_cast<int>(bits)) - 1;
       const std::uint32_t k = static_cast<std::uint32_t>(r) * kThreads + threadIdx.x;
-      if (k == winner || same_mode(to_rigid(poses[begin + k]), one, min_trace, squared_distance))
-        left &= ~(1u << r);
+      if (k == winner || same_mode(to_rigid(poses[begin + k]), one, within)) left &= ~(1u << r);
     }
   }
   if (threadIdx.x == 0) mode_count[p] = taken;
@@ -65,9 +63,8 @@ Modes select_modes(Exec& exec, const Candidates& candidates, const RegistrationO
   select<<<static_cast<unsigned>(pairs), kThreads, 0, exec.stream()>>>(
       candidates.most, candidates.count.data(), candidates.pose.data(),
       candidates.coarse_score.data(), candidates.seed.data(),
-      mode_trace(options.evidence.mode_angle),
-      options.evidence.mode_distance * options.evidence.mode_distance, out.most, out.mode.data(),
-      out.count.data());
+      mode_limits(options.evidence.mode_angle, options.evidence.mode_distance, 1.0f), out.most,
+      out.mode.data(), out.count.data());
   check_launch("select");
   return out;
 }

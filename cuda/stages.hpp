@@ -62,11 +62,17 @@ void score_candidates(Exec& exec, Span<const PairView> pairs, const MatchSets& m
                       Candidates& candidates, const RegistrationOptions& options);
 /// Distinct poses with the highest coarse_score.
 Modes select_modes(Exec& exec, const Candidates& candidates, const RegistrationOptions& options);
-void refine_modes(Exec& exec, Span<const PairView> pairs, Modes& modes,
+/// The first refinement: on a sample, with the wide kernel.
+void refine_roughly(Exec& exec, Span<const PairView> pairs, Modes& modes,
+                    const RegistrationOptions& options);
+/// The second refinement: on all points, with a narrower kernel.
+void polish_modes(Exec& exec, Span<const PairView> pairs, Modes& modes,
                   const RegistrationOptions& options);
-/// Merges modes that refinement moved to the same pose; keeps the one with the highest
-/// coarse_score.
-void merge_modes(Exec& exec, Modes& modes, const RegistrationOptions& options);
+/// Merges modes that refinement moved to the same pose, within a share of the limits of a mode;
+/// keeps the one with the highest coarse_score.
+void merge_modes(Exec& exec, Modes& modes, const RegistrationOptions& options, float share);
+/// Drops perturbed poses that have returned to their origin mode or to an earlier one of them.
+void drop_returned(Exec& exec, Modes& perturbed, const std::vector<PosesOfPair>& perturbations);
 /// Perturbed poses of the most likely mode of each pair; on the host.
 std::vector<PosesOfPair> search_degeneracies(Exec& exec, Span<const PairInput> inputs,
                                              Span<const PairOutcome> outcomes,

@@ -9,7 +9,9 @@ void RefineModes(benchmark::State& state) {
   std::vector<std::vector<cpu::Mode>> modes;
   for (auto _ : state) {
     modes = s.modes;
-    cpu::refine_modes(s.exec, {&s.pair, 1}, modes, s.options);
+    cpu::refine_roughly(s.exec, {&s.pair, 1}, modes, s.options);
+    cpu::merge_modes(s.exec, modes, s.options, kRoughMerge);
+    cpu::polish_modes(s.exec, {&s.pair, 1}, modes, s.options);
   }
   state.counters["modes"] = static_cast<double>(s.modes[0].size());
 }

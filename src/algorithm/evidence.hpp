@@ -149,6 +149,13 @@ GPUREG_HD float normal_weight_share(std::uint32_t weight) {
 constexpr float kPolishKernel = 0.5f;
 /// Step length that ends the first and the second refinement, as a share of the distance limit.
 constexpr double kRoughSettled = 1e-2, kPolishSettled = 2e-3;
+/// Modes that are this close after the first refinement, as a share of the limits of a mode, become
+/// one before the second. The second refinement moves them little, and together.
+constexpr float kRoughMerge = 0.5f;
+/// RMS displacement below which a perturbed pose has returned to its origin mode, or to another
+/// perturbed pose, after the first refinement, as a share of the distance limit. Results drop poses
+/// that end within the whole of it.
+constexpr float kReturned = 0.5f;
 /// Largest angle between the normals of a correspondence of the refinement, degrees.
 constexpr float kRefineNormalAngle = 45.0f;
 
@@ -180,13 +187,49 @@ GPUREG_HD float coarse_score(float match_share, const SideEvidence& a, float wei
   return sqrtf(match_share) * overlap / growth;
 }
 
+/// Limits within which two poses are one mode.
+struct ModeLimits {
+  float min_trace, squared_distance;
+};
+
+/// Host only. share: of the limits of the options.
+inline ModeLimits mode_limits(float angle, float distance, float share) {
+  return {mode_trace(share * angle), (share * distance) * (share * distance)};
+}
+
+/// Mean and mean outer product (xx, xy, xz, yy, yz, zz) of points, and an origin pose of them.
+struct ReturnTest {
+  Pose<double> origin;
+  double mean[3], outer[6];
+  double squared_distance;  ///< negative: no pose returns
+};
+
+/// Mean squared displacement of the points from one pose to the other.
+GPUREG_HD double squared_displacement(const Pose<double>& a, const Pose<double>& b,
+                                      const ReturnTest& points) {
+  double ra[9], rb[9];
+  rotation_matrix(a, ra);
+  rotation_matrix(b, rb);
+  const double shift[3] = {a.tx - b.tx, a.ty - b.ty, a.tz - b.tz};
+  const double* m = points.mean;
+  const double* o = points.outer;
+  double sum = 0.0;
+  for (int k = 0; k < 3; ++k) {
+    const double x = ra[3 * k] - rb[3 * k], y = ra[3 * k + 1] - rb[3 * k + 1],
+                 z = ra[3 * k + 2] - rb[3 * k + 2];
+    sum += x * (x * o[0] + 2.0 * (y * o[1] + z * o[2])) + y * (y * o[3] + 2.0 * z * o[4]) +
+           z * z * o[5] + 2.0 * shift[k] * (x * m[0] + y * m[1] + z * m[2]) + shift[k] * shift[k];
+  }
+  return sum;
+}
+
 /// True where two poses belong to one mode: rotations within the angle (as a bound on the trace)
 /// and the cloud's local origin within the distance.
-GPUREG_HD bool same_mode(const Rigid& a, const Rigid& b, float min_trace, float squared_distance) {
+GPUREG_HD bool same_mode(const Rigid& a, const Rigid& b, const ModeLimits& within) {
   float trace = 0.0f;
   for (int k = 0; k < 9; ++k) trace = fmaf(a.r[k], b.r[k], trace);
   const Vec3 shift{a.t[0] - b.t[0], a.t[1] - b.t[1], a.t[2] - b.t[2]};
-  return (trace >= min_trace) & (squared_norm(shift) <= squared_distance);
+  return (trace >= within.min_trace) & (squared_norm(shift) <= within.squared_distance);
 }
 
 }  // namespace gpureg

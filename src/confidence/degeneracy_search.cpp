@@ -43,8 +43,29 @@ Span<const double> fractions_for(double log_odds) {
   return {kFractions, count};
 }
 
-PosesOfPair perturb(const PairInput& pair, const PairOutcome& outcome, double distance) {
-  PosesOfPair out{0, {}};
+/// Whether a pose has returned to the mode, by the source points in correspondences under it.
+ReturnTest return_test(const ModeOutcome& mode, const PreparedState& source,
+                       const RegistrationOptions& options) {
+  ReturnTest test{};
+  test.origin = mode.pose;
+  test.squared_distance = -1.0;
+  const Moments& m = mode.source_moments;
+  if (m.count == 0) return test;
+  const double radius = static_cast<double>(source.radius),
+               unit =
+                   radius / (static_cast<double>(kMomentFixedScale) * static_cast<double>(m.count)),
+               limit = static_cast<double>(kReturned) *
+                       static_cast<double>(options.prepare.max_correspondence_distance);
+  for (int k = 0; k < 3; ++k) test.mean[k] = static_cast<double>(m.sum[k]) * unit;
+  for (int k = 0; k < 6; ++k) test.outer[k] = static_cast<double>(m.outer[k]) * (unit * radius);
+  test.squared_distance = limit * limit;
+  return test;
+}
+
+PosesOfPair perturb(const PairInput& pair, const PairOutcome& outcome,
+                    const RegistrationOptions& options) {
+  const double distance = static_cast<double>(options.evidence.degeneracy_search_distance);
+  PosesOfPair out;
   std::vector<PoseEvidence> evidence;
   std::vector<const ModeOutcome*> modes;
   for (const ModeOutcome& mode : outcome.modes) {
@@ -59,6 +80,7 @@ PosesOfPair perturb(const PairInput& pair, const PairOutcome& outcome, double di
   const ModeOutcome& mode = *modes[static_cast<std::size_t>(best - log_odds.begin())];
   const InformationSpectrum spectrum = spectrum_of(mode, *pair.source);
   out.origin_mode = mode.origin_mode;
+  out.returned = return_test(mode, *pair.source, options);
   for (const double fraction : fractions_for(*best))
     for (const double step : {fraction * distance, -fraction * distance})
       out.poses.push_back(moved_along(spectrum, mode.pose, step));
@@ -71,15 +93,14 @@ std::vector<PosesOfPair> search_degeneracies(Span<const PairInput> pairs,
                                              Span<const PairOutcome> outcomes,
                                              const RegistrationOptions& options,
                                              std::size_t threads) {
-  std::vector<PosesOfPair> out(pairs.size, PosesOfPair{0, {}});
-  const double distance = static_cast<double>(options.evidence.degeneracy_search_distance);
-  if (distance == 0.0) return out;
+  std::vector<PosesOfPair> out(pairs.size);
+  if (options.evidence.degeneracy_search_distance == 0.0f) return out;
   // A thread for fewer pairs costs more than it saves.
   constexpr std::size_t kPairsPerThread = 16;
   const std::size_t workers = std::min(threads, 1 + pairs.size / kPairsPerThread);
   on_threads(workers, [&](std::size_t worker) {
     for (std::size_t p = worker; p < pairs.size; p += workers)
-      out[p] = perturb(pairs.data[p], outcomes.data[p], distance);
+      out[p] = perturb(pairs.data[p], outcomes.data[p], options);
   });
   return out;
 }

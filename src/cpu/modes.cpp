@@ -50,12 +50,28 @@ void refine_mode(MovedPoints& moved, const PairView& pair, const RegistrationOpt
   }
 }
 
+/// One refinement of all modes. order_of(p): the points of pair p that take part.
+template <typename OrderOf>
+void refine_each(Exec& exec, Span<const PairView> pairs, std::vector<std::vector<Mode>>& modes,
+                 const RegistrationOptions& options, float kernel_width, double settled,
+                 const OrderOf& order_of) {
+  const float min_cosine =
+      inlier_test(options.prepare.max_correspondence_distance, kRefineNormalAngle).min_cosine;
+  const SummaryLimits limits(kRefineNormalAngle, false);
+  exec.parallel_items(
+      pairs.size, [&](std::size_t p) { return modes[p].size(); }, 1,
+      [&](std::size_t p, std::size_t k, std::size_t) {
+        MovedPoints moved(order_of(p), pairs[p].target, limits);
+        refine_mode(moved, pairs[p], options, kernel_width, settled, min_cosine, modes[p][k]);
+      });
+}
+
 }  // namespace
 
 std::vector<std::vector<Mode>> select_modes(Exec& exec, const std::vector<Candidates>& candidates,
                                             const RegistrationOptions& options) {
-  const float min_trace = mode_trace(options.evidence.mode_angle),
-              squared_distance = options.evidence.mode_distance * options.evidence.mode_distance;
+  const ModeLimits within =
+      mode_limits(options.evidence.mode_angle, options.evidence.mode_distance, 1.0f);
   std::vector<std::vector<Mode>> out(candidates.size());
   exec.parallel(candidates.size(), [&](std::size_t p) {
     const Candidates& c = candidates[p];
@@ -68,9 +84,8 @@ std::vector<std::vector<Mode>> select_modes(Exec& exec, const std::vector<Candid
     for (const std::uint32_t k : order) {
       if (taken.size() == options.evidence.modes) break;
       const Rigid rigid = to_rigid(c.pose[k]);
-      if (std::any_of(taken.begin(), taken.end(), [&](const Rigid& other) {
-            return same_mode(rigid, other, min_trace, squared_distance);
-          }))
+      if (std::any_of(taken.begin(), taken.end(),
+                      [&](const Rigid& other) { return same_mode(rigid, other, within); }))
         continue;
       taken.push_back(rigid);
       out[p].push_back({widen(c.pose[k]), c.seed[k], 0});
@@ -79,42 +94,55 @@ std::vector<std::vector<Mode>> select_modes(Exec& exec, const std::vector<Candid
   return out;
 }
 
-void refine_modes(Exec& exec, Span<const PairView> pairs, std::vector<std::vector<Mode>>& modes,
-                  const RegistrationOptions& options) {
-  const float min_cosine =
-      inlier_test(options.prepare.max_correspondence_distance, kRefineNormalAngle).min_cosine;
-  const SummaryLimits limits(kRefineNormalAngle, false);
+void refine_roughly(Exec& exec, Span<const PairView> pairs, std::vector<std::vector<Mode>>& modes,
+                    const RegistrationOptions& options) {
   std::vector<ScoringOrder> sample(pairs.size);
   exec.parallel(pairs.size, [&](std::size_t p) {
     sample[p] = sampled_order(executor_data(pairs[p].source),
                               sample_stride(pairs[p].source.size, 2 * options.evidence.sample));
   });
-  exec.parallel_items(
-      pairs.size, [&](std::size_t p) { return modes[p].size(); }, 1,
-      [&](std::size_t p, std::size_t k, std::size_t) {
-        MovedPoints some(sample[p], pairs[p].target, limits),
-            all(executor_data(pairs[p].source).order, pairs[p].target, limits);
-        refine_mode(some, pairs[p], options, options.refine.kernel_width, kRoughSettled, min_cosine,
-                    modes[p][k]);
-        refine_mode(all, pairs[p], options, kPolishKernel * options.refine.kernel_width,
-                    kPolishSettled, min_cosine, modes[p][k]);
-      });
+  refine_each(exec, pairs, modes, options, options.refine.kernel_width, kRoughSettled,
+              [&](std::size_t p) -> const ScoringOrder& { return sample[p]; });
+}
+
+void polish_modes(Exec& exec, Span<const PairView> pairs, std::vector<std::vector<Mode>>& modes,
+                  const RegistrationOptions& options) {
+  refine_each(
+      exec, pairs, modes, options, kPolishKernel * options.refine.kernel_width, kPolishSettled,
+      [&](std::size_t p) -> const ScoringOrder& { return executor_data(pairs[p].source).order; });
 }
 
 void merge_modes(Exec& exec, std::vector<std::vector<Mode>>& modes,
-                 const RegistrationOptions& options) {
-  const float min_trace = mode_trace(options.evidence.mode_angle),
-              squared_distance = options.evidence.mode_distance * options.evidence.mode_distance;
+                 const RegistrationOptions& options, float share) {
+  const ModeLimits within =
+      mode_limits(options.evidence.mode_angle, options.evidence.mode_distance, share);
   exec.parallel(modes.size(), [&](std::size_t p) {
     std::vector<Mode> distinct;
     for (const Mode& mode : modes[p]) {
       const Rigid rigid = to_rigid(mode.pose);
       if (std::none_of(distinct.begin(), distinct.end(), [&](const Mode& other) {
-            return same_mode(rigid, to_rigid(other.pose), min_trace, squared_distance);
+            return same_mode(rigid, to_rigid(other.pose), within);
           }))
         distinct.push_back(mode);
     }
     modes[p] = std::move(distinct);
+  });
+}
+
+void drop_returned(Exec& exec, std::vector<std::vector<Mode>>& perturbed,
+                   const std::vector<PosesOfPair>& perturbations) {
+  exec.parallel(perturbed.size(), [&](std::size_t p) {
+    const ReturnTest& test = perturbations[p].returned;
+    std::vector<Mode> kept;
+    for (const Mode& mode : perturbed[p]) {
+      const auto near = [&](const Pose<double>& other) {
+        return squared_displacement(mode.pose, other, test) <= test.squared_distance;
+      };
+      if (!near(test.origin) &&
+          std::none_of(kept.begin(), kept.end(), [&](const Mode& m) { return near(m.pose); }))
+        kept.push_back(mode);
+    }
+    perturbed[p] = std::move(kept);
   });
 }
 

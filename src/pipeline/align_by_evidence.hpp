@@ -25,8 +25,10 @@ void align_by_evidence(Exec& exec, Span<const PairInput> inputs, Span<const Pair
   score_candidates(exec, pairs, matches, candidates, options);
   auto modes = select_modes(exec, candidates, options);
   const auto ranked = exec.mark();
-  refine_modes(exec, pairs, modes, options);
-  merge_modes(exec, modes, options);
+  refine_roughly(exec, pairs, modes, options);
+  merge_modes(exec, modes, options, kRoughMerge);
+  polish_modes(exec, pairs, modes, options);
+  merge_modes(exec, modes, options, 1.0f);
   const auto refined = exec.mark();
   verify_modes(exec, pairs, matches, candidates, modes, options, outcomes);
   for (PairOutcome& outcome : outcomes)
@@ -36,7 +38,9 @@ void align_by_evidence(Exec& exec, Span<const PairInput> inputs, Span<const Pair
       search_degeneracies(exec, inputs, {outcomes.data, outcomes.size}, options);
   const auto verified = exec.mark();
   auto perturbed = modes_from_poses(exec, perturbations);
-  refine_modes(exec, pairs, perturbed, options);
+  refine_roughly(exec, pairs, perturbed, options);
+  drop_returned(exec, perturbed, perturbations);
+  polish_modes(exec, pairs, perturbed, options);
   const auto perturbed_refined = exec.mark();
   std::vector<PairOutcome> more(pairs.size);
   verify_modes(exec, pairs, matches, candidates, perturbed, options, {more.data(), more.size()});

@@ -75,6 +75,7 @@ struct PairOutcome {
 struct PosesOfPair {
   std::uint32_t origin_mode = 0;  ///< index of the mode that they were perturbed from, if any
   std::vector<Pose<double>> poses;
+  ReturnTest returned{};  ///< of perturbed poses
 };
 
 }  // namespace gpureg

@@ -11,7 +11,10 @@ void verify(Exec& exec, Span<const PairView> pairs, const std::vector<PosesOfPai
             const RegistrationOptions& options, bool refine, Span<PairOutcome> outcomes) {
   auto matches = merge_matches(exec, pairs, options);
   auto modes = modes_from_poses(exec, poses);
-  if (refine) refine_modes(exec, pairs, modes, options);
+  if (refine) {
+    refine_roughly(exec, pairs, modes, options);
+    polish_modes(exec, pairs, modes, options);
+  }
   auto candidates = no_candidates(exec, pairs);
   verify_modes(exec, pairs, matches, candidates, modes, options, outcomes);
 }

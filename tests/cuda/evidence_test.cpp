@@ -169,12 +169,42 @@ void EvidenceOnCuda::expect_same(const std::vector<RawCloud>& clouds) {
     }
   };
   ASSERT_NO_FATAL_FAILURE(expect_same_modes("selected modes"));
-  cpu::refine_modes(on_cpu, cpu_views, modes, options);
-  cuda::refine_modes(on_cuda, cuda_views, cuda_modes, options);
+  cpu::refine_roughly(on_cpu, cpu_views, modes, options);
+  cuda::refine_roughly(on_cuda, cuda_views, cuda_modes, options);
+  ASSERT_NO_FATAL_FAILURE(expect_same_modes("roughly refined modes"));
+  cpu::merge_modes(on_cpu, modes, options, kRoughMerge);
+  cuda::merge_modes(on_cuda, cuda_modes, options, kRoughMerge);
+  ASSERT_NO_FATAL_FAILURE(expect_same_modes("modes merged before the second refinement"));
+  cpu::polish_modes(on_cpu, cpu_views, modes, options);
+  cuda::polish_modes(on_cuda, cuda_views, cuda_modes, options);
   ASSERT_NO_FATAL_FAILURE(expect_same_modes("refined modes"));
-  cpu::merge_modes(on_cpu, modes, options);
-  cuda::merge_modes(on_cuda, cuda_modes, options);
+  cpu::merge_modes(on_cpu, modes, options, 1.0f);
+  cuda::merge_modes(on_cuda, cuda_modes, options, 1.0f);
   ASSERT_NO_FATAL_FAILURE(expect_same_modes("merged modes"));
+
+  // Perturbed poses: the first mode of each pair is the origin, the others have left it or not.
+  std::vector<PosesOfPair> perturbations(count);
+  for (std::size_t p = 0; p < count; ++p) {
+    ReturnTest& returned = perturbations[p].returned;
+    returned.squared_distance = p % 3 == 0 ? 0.5 : p % 3 == 1 ? 0.02 : -1.0;
+    for (int k = 0; k < 3; ++k) returned.mean[k] = 0.1 * k - 0.2;
+    for (int k = 0; k < 6; ++k) returned.outer[k] = k == 0 || k == 3 || k == 5 ? 0.7 : 0.05 * k;
+    if (modes[p].empty()) continue;
+    returned.origin = modes[p][0].pose;
+    for (std::size_t k = 0; k < limits::kMaxPerturbedPoses; ++k)
+      perturbations[p].poses.push_back(modes[p][(k / 2) % modes[p].size()].pose);
+  }
+  auto perturbed = cpu::modes_from_poses(on_cpu, perturbations);
+  auto cuda_perturbed = cuda::modes_from_poses(on_cuda, perturbations);
+  cpu::drop_returned(on_cpu, perturbed, perturbations);
+  cuda::drop_returned(on_cuda, cuda_perturbed, perturbations);
+  const auto kept = host(on_cuda, cuda_perturbed.count.data(), count);
+  for (std::size_t p = 0; p < count; ++p) {
+    ASSERT_EQ(perturbed[p].size(), kept[p]) << "perturbed poses, pair " << p;
+    ASSERT_EQ(
+        mode_bytes(perturbed[p]),
+        mode_bytes(host(on_cuda, cuda_perturbed.mode.data() + p * cuda_perturbed.most, kept[p])));
+  }
 
   std::vector<PairOutcome> outcomes(count), cuda_outcomes(count);
   cpu::verify_modes(on_cpu, cpu_views, matches, candidates, modes, options,
