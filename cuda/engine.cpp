@@ -6,6 +6,7 @@
 #include <thread>
 #include <unordered_map>
 
+#include "common/host_threads.hpp"
 #include "gpureg/context.hpp"
 #include "pipeline/align.hpp"
 #include "pipeline/align_by_evidence.hpp"
@@ -26,15 +27,25 @@ constexpr std::size_t kPairsPerChunk = 512;
 /// Memory for one bit per hypothesis of every pair of a chunk.
 constexpr std::size_t kSampleBytes = std::size_t(256) << 20;
 /// Memory for the neighbourhoods of the seeds, and for the matches, of every pair of a chunk.
-constexpr std::size_t kNeighborhoodBytes = std::size_t(1) << 30;
+constexpr std::size_t kNeighborhoodBytes = std::size_t(5) << 28;
+
+/// Items of each lane at least: fewer do not fill the device.
+constexpr std::size_t kPairsPerLane = 64, kCloudsPerLane = 4;
 
 /// Clouds of all CUDA engines are compatible: they share one owner, the memory of all devices.
 const char kDeviceMemory = 0;
 
+/// Lanes that run at the same time take the device for a share of their time each.
+void share_time(StageTimings& ms, double share) {
+  for (double* stage : {&ms.match, &ms.propose, &ms.rank, &ms.refine, &ms.verify}) *stage *= share;
+}
+
 }  // namespace
 
 CudaEngine::CudaEngine(int device, std::size_t memory_budget)
-    : exec_(device), residence_(exec_, memory_budget) {
+    : exec_(device), second_(device), residence_(exec_, memory_budget) {
+  exec_.memory()->take_from(second_.memory().get());
+  second_.memory()->take_from(exec_.memory().get());
   cudaDeviceProp properties{};
   check(cudaGetDeviceProperties(&properties, device), "cudaGetDeviceProperties");
   description_ = "cuda:" + std::to_string(device) + ", " + properties.name;
@@ -47,34 +58,60 @@ unsigned CudaEngine::host_threads() const { return exec_.host_threads(); }
 const void* CudaEngine::memory() const { return &kDeviceMemory; }
 
 std::vector<DeviceMemoryUse> CudaEngine::device_memory() const {
-  return {{device(), exec_.memory()->bytes_in_use(), exec_.memory()->bytes_reserved(),
-           residence_.evictions()}};
+  const DeviceMemory &first = *exec_.memory(), &second = *second_.memory();
+  return {{device(), first.bytes_in_use() + second.bytes_in_use(),
+           first.bytes_reserved() + second.bytes_reserved(), residence_.evictions()}};
 }
 
 void CudaEngine::trim() {
   const std::lock_guard<std::mutex> lock(mutex_);
   const DeviceScope scope(device());
   exec_.trim();
+  second_.trim();
 }
 
 // Memory of a pair: a bit per hypothesis, rounded up to chunks; a bit per seed and match, the sums
-// of a fit, a pose and its evidence per seed, and the columns and keys of each match.
+// of a fit, a pose and its evidence per seed, the columns, the row and the keys of each match, and
+// the sampled points.
 std::size_t CudaEngine::pairs_per_chunk(const RegistrationOptions& options) const {
-  constexpr std::size_t kChunkBytes = 4096, kSeedBytes = 192, kMatchBytes = 96;
+  constexpr std::size_t kChunkBytes = 4096, kSeedBytes = 192, kMatchBytes = 160,
+                        kSampleBytesPerPoint = 112;
   std::size_t fit = kSampleBytes / (options.quadruples.count / 8 + kChunkBytes);
   if (options.method == RegistrationMethod::compatibility) {
     const CompatibilityOptions& c = options.compatibility;
     fit = kNeighborhoodBytes / (std::size_t(c.seeds) * (c.max_matches / 8 + kSeedBytes) +
-                                std::size_t(c.max_matches) * kMatchBytes);
+                                std::size_t(c.max_matches) * kMatchBytes +
+                                std::size_t(options.evidence.sample) * kSampleBytesPerPoint);
   }
   return fit < 1 ? 1 : (fit < kPairsPerChunk ? fit : kPairsPerChunk);
+}
+
+template <typename Work>
+std::size_t CudaEngine::on_lanes(std::size_t count, std::size_t least, const Work& work) {
+  const std::size_t lanes = count < 2 * least ? 1 : 2;
+  if (lanes == 2) second_.begin();
+  on_threads(lanes, [&](std::size_t lane) {
+    const DeviceScope scope(device());
+    work(lane == 0 ? exec_ : second_, lane * count / lanes, (lane + 1) * count / lanes);
+  });
+  return lanes;
 }
 
 std::size_t CudaEngine::prepare_chunk(Span<const RawCloud> clouds, const PrepareOptions& options,
                                       std::vector<std::shared_ptr<PreparedState>>& out) {
   exec_.begin();
   std::size_t bytes = 0;
-  for (auto& cloud : pipeline::prepare(exec_, clouds, options)) {
+  std::vector<std::shared_ptr<CudaCloud>> made(clouds.size);
+  // Residence evicts what the memory of the first lane holds, and adopted rows are in its order.
+  const bool together =
+      residence_.budget() > 0 || std::any_of(clouds.begin(), clouds.end(),
+                                             [](const RawCloud& cloud) { return cloud.on_device; });
+  on_lanes(clouds.size, together ? clouds.size : kCloudsPerLane,
+           [&](Exec& exec, std::size_t begin, std::size_t end) {
+             auto part = pipeline::prepare(exec, {clouds.data + begin, end - begin}, options);
+             std::move(part.begin(), part.end(), made.begin() + static_cast<std::ptrdiff_t>(begin));
+           });
+  for (auto& cloud : made) {
     cloud->owner = memory();
     auto fragment = std::make_shared<Fragment>(std::move(cloud));
     bytes += fragment->bytes();
@@ -145,11 +182,19 @@ void CudaEngine::for_resident_pairs(Span<const PairInput> pairs, const Work& wor
 void CudaEngine::align(Span<const PairInput> pairs, const RegistrationOptions& options,
                        Span<PairOutcome> outcomes) {
   for_resident_pairs(pairs, [&](Span<const PairView> views, std::size_t begin, std::size_t end) {
-    const Span<PairOutcome> part{outcomes.data + begin, end - begin};
-    if (options.method == RegistrationMethod::compatibility)
-      pipeline::align_by_evidence(exec_, {pairs.data + begin, end - begin}, views, options, part);
-    else
-      pipeline::align(exec_, views, options, part);
+    const std::size_t count = end - begin;
+    const std::size_t lanes =
+        on_lanes(count, kPairsPerLane, [&](Exec& exec, std::size_t from, std::size_t to) {
+          const Span<const PairView> part{views.data + from, to - from};
+          const Span<PairOutcome> out{outcomes.data + begin + from, to - from};
+          if (options.method == RegistrationMethod::compatibility)
+            pipeline::align_by_evidence(exec, {pairs.data + begin + from, to - from}, part, options,
+                                        out);
+          else
+            pipeline::align(exec, part, options, out);
+        });
+    for (std::size_t p = begin; p < end; ++p)
+      share_time(outcomes[p].timings, 1.0 / static_cast<double>(lanes));
   });
 }
 

@@ -60,14 +60,18 @@ struct SeedFits {
   FitSums* sums;
   Pose<float>* pose;
   std::uint8_t* state;
-
-  __device__ Vec3 source(std::uint32_t at) const {
-    return {matches.px[at], matches.py[at], matches.pz[at]};
-  }
-  __device__ Vec3 target(std::uint32_t at) const {
-    return {matches.qx[at], matches.qy[at], matches.qz[at]};
-  }
 };
+
+/// The points of a match of the whole batch, and the sum of its weights.
+__device__ Member member_at(const MatchSetView& m, std::uint32_t at) {
+  return {__ldg(&m.rows[at].points[0]), __ldg(&m.rows[at].points[1])};
+}
+
+/// The match of a member, with its normals.
+__device__ OrientedMatch oriented(const Member& member, const MatchSetView& m, std::uint32_t at) {
+  const float4 a = __ldg(&m.rows[at].normals[0]), b = __ldg(&m.rows[at].normals[1]);
+  return {member.p(), member.q(), {a.x, a.y, a.z}, {a.w, b.x, b.y}};
+}
 
 /// Position of a thread among those of its block that keep something; count: how many keep.
 /// scratch: shared memory, free again after the next __syncthreads().
@@ -129,12 +133,9 @@ __device__ std::uint32_t gather_members(const SeedFits& b, std::uint32_t p, std:
         members[place].b.w = __uint_as_float(match);
       });
   for (std::uint32_t k = threadIdx.x; k < size; k += kThreads) {
-    const std::uint32_t match = members[k].match(), at = b.room[p] + match;
-    const MatchSetView& m = b.matches;
-    members[k] = {
-        make_float4(m.px[at], m.py[at], m.pz[at], m.qx[at]),
-        make_float4(m.qy[at], m.qz[at], __uint_as_float(m.source_weight[at] + m.target_weight[at]),
-                    __uint_as_float(match))};
+    const float match = members[k].b.w;
+    members[k] = member_at(b.matches, b.room[p] + __float_as_uint(match));
+    members[k].b.w = match;
   }
   __syncthreads();
   return size;
@@ -151,8 +152,8 @@ __device__ bool try_triangle(const SeedFits& b, std::uint32_t begin, std::uint32
                              Rigid& rigid) {
   const TrianglePick pick = triangle(b, begin + seed, trial, size);
   const Member m0 = members[0], m1 = members[pick.a], m2 = members[pick.b];
-  if (!compatible(match_at(b.matches, begin + m1.match()), match_at(b.matches, begin + m2.match()),
-                  b.test))
+  if (!compatible(oriented(m1, b.matches, begin + m1.match()),
+                  oriented(m2, b.matches, begin + m2.match()), b.test))
     return false;
   return wide_triangle(m0.p(), m1.p(), m2.p(), b.squared_shortest) &&
          carry_triangle(m0.p(), m1.p(), m2.p(), m0.q(), m1.q(), m2.q(), rigid);
@@ -227,9 +228,11 @@ __global__ void __launch_bounds__(kThreads) fit_triangles(SeedFits b) {
   const uint2 corner = b.corners[place];
   std::uint8_t state = kNoPose;
   if (corner.x != kNoValue) {
-    const std::uint32_t at[3] = {begin + b.seed[place], begin + corner.x, begin + corner.y};
-    const Vec3 source[3] = {b.source(at[0]), b.source(at[1]), b.source(at[2])};
-    const Vec3 target[3] = {b.target(at[0]), b.target(at[1]), b.target(at[2])};
+    const Member m[3] = {member_at(b.matches, begin + b.seed[place]),
+                         member_at(b.matches, begin + corner.x),
+                         member_at(b.matches, begin + corner.y)};
+    const Vec3 source[3] = {m[0].p(), m[1].p(), m[2].p()},
+               target[3] = {m[0].q(), m[1].q(), m[2].q()};
     Pose<float> pose;
     if (fit_rigid(source, target, 3, pose)) {
       b.pose[place] = pose;
@@ -256,7 +259,8 @@ __global__ void __launch_bounds__(kThreads) sum_consensus(SeedFits b) {
   std::uint32_t n = 0;
   for (std::uint32_t base = 0, turn = 0; base < size; base += kThreads, turn ^= 1) {
     const std::uint32_t k = base + threadIdx.x, at = begin + match[min(k, size - 1)];
-    const Vec3 source = b.source(at), target = b.target(at);
+    const Member member = member_at(b.matches, at);
+    const Vec3 source = member.p(), target = member.q();
     const bool take = k < size && squared_norm(apply(rigid, source) - target) < b.squared_distance;
     std::uint32_t count = 0;
     float* to = value + kCentroids * (n + place_in_block(take, warp_count[turn], count));

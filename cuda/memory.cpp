@@ -80,8 +80,11 @@ void* DeviceMemory::allocate(std::size_t bytes, cudaStream_t stream) {
   if (error == cudaErrorMemoryAllocation) {
     // The pool may hold only small pieces: release them and try once more.
     cudaGetLastError();
-    cudaStreamSynchronize(stream_);
-    trim();
+    for (DeviceMemory* memory : {this, other_}) {
+      if (!memory) continue;
+      cudaStreamSynchronize(memory->stream_);
+      memory->trim();
+    }
     error = cudaMallocFromPoolAsync(&pointer, bytes, pool, stream);
   }
   if (error == cudaSuccess) {

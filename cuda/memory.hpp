@@ -46,6 +46,8 @@ class DeviceMemory {
   void free_after(void* pointer, std::size_t bytes, cudaEvent_t event) noexcept;
   void free_reached() noexcept;
   void trim() noexcept;  ///< returns the pools' free memory to the driver
+  /// Where the device has no memory left, allocate() also takes the free memory of another pool.
+  void take_from(DeviceMemory* other) { other_ = other; }
   std::size_t bytes_in_use() const { return in_use_; }
   std::size_t bytes_reserved() const;  ///< allocated from the driver: the peak of the use
 
@@ -56,6 +58,7 @@ class DeviceMemory {
   cudaStream_t stream_ = nullptr;
   cudaMemPool_t pool_ = nullptr;
   cudaMemPool_t lent_pool_ = nullptr;  ///< for allocations on other streams
+  DeviceMemory* other_ = nullptr;
   std::atomic<std::size_t> in_use_{0};
   struct Late {
     void* pointer;

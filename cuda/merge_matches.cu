@@ -39,6 +39,7 @@ struct MergeBatch {
   std::uint32_t* bins;   // per pair: source, target
   const std::uint32_t* room;
   std::uint32_t* column[MatchSets::kColumns];
+  MatchRow* rows;
   std::uint32_t* count;
   std::uint64_t* total;
 };
@@ -142,7 +143,7 @@ __global__ void __launch_bounds__(kThreads) gather_matches(MergeBatch b) {
     atomicAdd(b.bins + p * 2 * kNormalBins + threadIdx.x, bins[threadIdx.x]);
 }
 
-/// Weights from the counts of directions.
+/// Weights from the counts of directions; rows.
 __global__ void __launch_bounds__(kThreads) weight_matches_by_normals(MergeBatch b) {
   __shared__ std::uint32_t weight[2 * kNormalBins];
   const std::uint32_t p = blockIdx.y, count = min(b.found[p], b.most);
@@ -155,6 +156,12 @@ __global__ void __launch_bounds__(kThreads) weight_matches_by_normals(MergeBatch
     std::uint32_t& target = b.column[15][b.room[p] + k];
     source = weight[source];
     target = weight[kNormalBins + target];
+    const auto real = [&](int c) { return __uint_as_float(b.column[c][b.room[p] + k]); };
+    MatchRow& row = b.rows[b.room[p] + k];
+    row.points[0] = make_float4(real(0), real(1), real(2), real(3));
+    row.points[1] = make_float4(real(4), real(5), __uint_as_float(source + target), 0.0f);
+    row.normals[0] = make_float4(real(6), real(7), real(8), real(9));
+    row.normals[1] = make_float4(real(10), real(11), 0.0f, 0.0f);
   }
   if (k != 0) return;
   b.count[p] = count;
@@ -248,6 +255,7 @@ MatchSets merge_matches(Exec& exec, Span<const PairView> pairs,
     return std::min(entries[p].answers, options.compatibility.max_matches);
   });
   out.columns = exec.buffer<std::uint32_t>(std::size_t(out.room.total()) * MatchSets::kColumns);
+  out.rows = exec.buffer<MatchRow>(out.room.total());
   out.count = exec.filled<std::uint32_t>(pairs.size, 0);
   out.total = exec.filled<std::uint64_t>(2 * pairs.size, 0);
   if (answer_segments.total() == 0) return out;
@@ -271,6 +279,7 @@ MatchSets merge_matches(Exec& exec, Span<const PairView> pairs,
   batch.room = out.room.on_device.data();
   for (int c = 0; c < MatchSets::kColumns; ++c)
     batch.column[c] = out.columns.data() + std::size_t(c) * out.room.total();
+  batch.rows = out.rows.data();
   batch.count = out.count.data();
   batch.total = out.total.data();
   const unsigned pair_count = static_cast<unsigned>(pairs.size);

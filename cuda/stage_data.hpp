@@ -225,6 +225,13 @@ struct Verification {
   Moments source, target;
 };
 
+/// A match side by side: two sectors of memory instead of one for each value. Points, sum of the
+/// weights; normals.
+struct MatchRow {
+  float4 points[2];   ///< p.xyz q.x, q.yz, bits of the sum of both weights, unused
+  float4 normals[2];  ///< m.xyz n.x, n.yz, unused
+};
+
 /// Matches of a batch for the candidates, in device memory; see cpu::MatchSet.
 struct MatchSetView {
   const float *px, *py, *pz, *qx, *qy, *qz;  ///< local points of source and target
@@ -232,6 +239,7 @@ struct MatchSetView {
   const std::uint32_t *source, *target;      ///< their indices
   /// Normal-space weights over the matches of the pair.
   const std::uint32_t *source_weight, *target_weight;
+  const MatchRow* rows;  ///< the same for access in any order
 };
 
 struct MatchSets {
@@ -240,6 +248,7 @@ struct MatchSets {
   Segments room;
   /// the arrays of a MatchSetView one after the other, each as long as the room for all pairs
   DeviceBuffer<std::uint32_t> columns;
+  DeviceBuffer<MatchRow> rows;
   DeviceBuffer<std::uint32_t> count;  ///< per pair
   /// per pair: weight of all source points, of all target points
   DeviceBuffer<std::uint64_t> total;
@@ -267,6 +276,7 @@ struct MatchSets {
     view.target = c + 13 * n;
     view.source_weight = c + 14 * n;
     view.target_weight = c + 15 * n;
+    view.rows = rows.data();
     return view;
   }
 };
