@@ -5,6 +5,7 @@
 
 #include "bricks.cuh"
 #include "exec.hpp"
+#include "packed_normal.cuh"
 #include "stage_data.hpp"
 
 namespace gpureg::cuda {
@@ -29,12 +30,45 @@ inline DeviceBuffer<SearchPair> upload_search_pairs(Exec& exec, Span<const PairV
   return exec.upload(out);
 }
 
+/// The closest point of a cloud within a distance, with the cloud's copies of its values.
+struct FoundPoint {
+  float squared_distance;
+  Vec3 point;
+  std::uint32_t normal;  ///< packed
+  std::uint32_t place;   ///< among the candidates of all cells; kNoValue: no point
+  std::uint32_t index;   ///< of the point, where there is no place
+
+  __device__ bool found() const { return (place & index) != kNoValue; }
+  __device__ std::uint32_t index_in(const CloudView& cloud) const {
+    return place == kNoValue ? index : __ldg(cloud.closest.candidates.data + place);
+  }
+  /// normals_agree() of a moved normal and that of the point. The packed normal decides unless the
+  /// cosine is near the limit.
+  __device__ bool agrees(const CloudView& cloud, Vec3 moved, float min_cosine) const {
+    if (min_cosine <= -1.0f) return true;
+    if (normal == kPackedZero || is_zero(moved)) return false;
+    const float off = dot(moved, unpack_normal(normal)) - min_cosine;
+    return fabsf(off) > kHalfPackedCosineError
+               ? off > 0.0f
+               : normals_agree(moved, cloud.normals[index_in(cloud)], min_cosine);
+  }
+};
+
+/// find_closest() by the hash table, for clouds without a table of bricks.
+static __device__ __noinline__ FoundPoint found_by_hash(const CloudView& cloud, Vec3 q,
+                                                        float max_squared) {
+  const Closest c = find_closest(cloud.closest, cloud.points, q, max_squared);
+  if (c.index == kNoValue) return {max_squared, {0, 0, 0}, kPackedZero, kNoValue, kNoValue};
+  return {c.squared_distance, cloud.points[c.index], pack_normal(cloud.normals[c.index]), kNoValue,
+          c.index};
+}
+
 /// find_closest() with a table of bricks instead of a hash table, on contiguous copies of the
 /// candidates. Lists of any length, anywhere in the array.
-__device__ inline Closest find_closest(const CloudView& cloud, const CellSummaries& cells, Vec3 q,
-                                       float max_squared) {
-  if (cells.nx == 0) return find_closest(cloud.closest, cloud.points, q, max_squared);
-  const Closest none{kNoValue, max_squared};
+__device__ inline FoundPoint find_point(const CloudView& cloud, const CellSummaries& cells, Vec3 q,
+                                        float max_squared) {
+  if (cells.nx == 0) return found_by_hash(cloud, q, max_squared);
+  FoundPoint none{max_squared, {0, 0, 0}, kPackedZero, kNoValue, kNoValue};
   const float fx = q.x * cloud.closest.inverse_cell_size,
               fy = q.y * cloud.closest.inverse_cell_size,
               fz = q.z * cloud.closest.inverse_cell_size;
@@ -63,17 +97,36 @@ __device__ inline Closest find_closest(const CloudView& cloud, const CellSummari
     first = __ldg(start);
     last = __ldg(start + 1);
   }
+  constexpr std::uint32_t kAtOnce = 4;  // loads in flight hide the latency of memory
   std::uint32_t best = kNoValue;
   float best_squared = 3.402823466e38f;
-  for (std::uint32_t k = first; k < last; ++k) {
-    const float4 c = __ldg(cells.candidate + k);
-    const float d2 = squared_norm(Vec3{c.x, c.y, c.z} - q);
-    const bool less = d2 < best_squared;
-    best = less ? k : best;
-    best_squared = less ? d2 : best_squared;
+#pragma unroll 1
+  for (std::uint32_t k = first; k < last; k += kAtOnce) {
+    Vec3 c[kAtOnce];
+#pragma unroll
+    for (std::uint32_t i = 0; i < kAtOnce; ++i) {
+      const float4 one = __ldg(cells.candidate + min(k + i, last - 1));
+      c[i] = {one.x, one.y, one.z};
+    }
+#pragma unroll
+    for (std::uint32_t i = 0; i < kAtOnce; ++i) {
+      // The last one repeats, which changes nothing.
+      const float d2 = squared_norm(c[i] - q);
+      const bool less = d2 < best_squared;
+      best = less ? k + i : best;
+      best_squared = less ? d2 : best_squared;
+    }
   }
   if (best == kNoValue || !(best_squared <= max_squared)) return none;
-  return {__ldg(cloud.closest.candidates.data + best), best_squared};
+  const float4 c4 = __ldg(cells.candidate + best);  // read a moment ago
+  return {best_squared, {c4.x, c4.y, c4.z}, __float_as_uint(c4.w), best, kNoValue};
+}
+
+__device__ inline Closest find_closest(const CloudView& cloud, const CellSummaries& cells, Vec3 q,
+                                       float max_squared) {
+  const FoundPoint best = find_point(cloud, cells, q, max_squared);
+  return best.found() ? Closest{best.index_in(cloud), best.squared_distance}
+                      : Closest{kNoValue, max_squared};
 }
 
 }  // namespace gpureg::cuda

@@ -29,8 +29,8 @@ constexpr std::size_t kSampleBytes = std::size_t(256) << 20;
 /// Memory for the neighbourhoods of the seeds, and for the matches, of every pair of a chunk.
 constexpr std::size_t kNeighborhoodBytes = std::size_t(5) << 28;
 
-/// Items of each lane at least: fewer do not fill the device.
-constexpr std::size_t kPairsPerLane = 64, kCloudsPerLane = 4;
+/// Fewer pairs are not divided: their parts would not fill the device.
+constexpr std::size_t kPairsOfLanes = 128;
 
 /// Clouds of all CUDA engines are compatible: they share one owner, the memory of all devices.
 const char kDeviceMemory = 0;
@@ -87,31 +87,30 @@ std::size_t CudaEngine::pairs_per_chunk(const RegistrationOptions& options) cons
 }
 
 template <typename Work>
-std::size_t CudaEngine::on_lanes(std::size_t count, std::size_t least, const Work& work) {
-  const std::size_t lanes = count < 2 * least ? 1 : 2;
-  if (lanes == 2) second_.begin();
-  on_threads(lanes, [&](std::size_t lane) {
+std::size_t CudaEngine::on_lanes(std::size_t count, bool both, const Work& work) {
+  if (!both) {
+    work(exec_, 0, count);
+    return 1;
+  }
+  // The lanes take the parts alternately. Parts of two sizes keep them from waiting for the host
+  // at the same time.
+  const std::size_t ends[] = {0, count / 6, count / 2, count * 5 / 6, count};
+  on_threads(2, [&](std::size_t lane) {
     const DeviceScope scope(device());
-    work(lane == 0 ? exec_ : second_, lane * count / lanes, (lane + 1) * count / lanes);
+    Exec& exec = lane == 0 ? exec_ : second_;
+    for (std::size_t part = lane; part < 4; part += 2) {
+      exec.begin();
+      work(exec, ends[part], ends[part + 1]);
+    }
   });
-  return lanes;
+  return 2;
 }
 
 std::size_t CudaEngine::prepare_chunk(Span<const RawCloud> clouds, const PrepareOptions& options,
                                       std::vector<std::shared_ptr<PreparedState>>& out) {
   exec_.begin();
   std::size_t bytes = 0;
-  std::vector<std::shared_ptr<CudaCloud>> made(clouds.size);
-  // Residence evicts what the memory of the first lane holds, and adopted rows are in its order.
-  const bool together =
-      residence_.budget() > 0 || std::any_of(clouds.begin(), clouds.end(),
-                                             [](const RawCloud& cloud) { return cloud.on_device; });
-  on_lanes(clouds.size, together ? clouds.size : kCloudsPerLane,
-           [&](Exec& exec, std::size_t begin, std::size_t end) {
-             auto part = pipeline::prepare(exec, {clouds.data + begin, end - begin}, options);
-             std::move(part.begin(), part.end(), made.begin() + static_cast<std::ptrdiff_t>(begin));
-           });
-  for (auto& cloud : made) {
+  for (auto& cloud : pipeline::prepare(exec_, clouds, options)) {
     cloud->owner = memory();
     auto fragment = std::make_shared<Fragment>(std::move(cloud));
     bytes += fragment->bytes();
@@ -184,7 +183,7 @@ void CudaEngine::align(Span<const PairInput> pairs, const RegistrationOptions& o
   for_resident_pairs(pairs, [&](Span<const PairView> views, std::size_t begin, std::size_t end) {
     const std::size_t count = end - begin;
     const std::size_t lanes =
-        on_lanes(count, kPairsPerLane, [&](Exec& exec, std::size_t from, std::size_t to) {
+        on_lanes(count, count >= kPairsOfLanes, [&](Exec& exec, std::size_t from, std::size_t to) {
           const Span<const PairView> part{views.data + from, to - from};
           const Span<PairOutcome> out{outcomes.data + begin + from, to - from};
           if (options.method == RegistrationMethod::compatibility)

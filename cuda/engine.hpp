@@ -36,10 +36,10 @@ class CudaEngine final : public DeviceEngine {
   /// Calls work(views, begin, end) for runs of pairs whose clouds fit the memory budget together.
   template <typename Work>
   void for_resident_pairs(Span<const PairInput> pairs, const Work& work);
-  /// Calls work(exec, begin, end) for ranges of equal size, one per lane, if there are at least
-  /// `least` items for each. Returns the number of lanes.
+  /// Calls work(exec, begin, end) for all items at once, or for parts of them on both lanes.
+  /// Returns the number of lanes at work.
   template <typename Work>
-  std::size_t on_lanes(std::size_t count, std::size_t least, const Work& work);
+  std::size_t on_lanes(std::size_t count, bool both, const Work& work);
   std::vector<std::shared_ptr<PreparedState>> prepare_on_stream(Span<const RawCloud> clouds,
                                                                 const PrepareOptions& options);
   /// Returns the memory of the prepared clouds.

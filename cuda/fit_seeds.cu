@@ -132,10 +132,14 @@ __device__ std::uint32_t gather_members(const SeedFits& b, std::uint32_t p, std:
       list_members(b, p, s, seed, [&](std::uint32_t place, std::uint32_t match) {
         members[place].b.w = __uint_as_float(match);
       });
-  for (std::uint32_t k = threadIdx.x; k < size; k += kThreads) {
-    const float match = members[k].b.w;
-    members[k] = member_at(b.matches, b.room[p] + __float_as_uint(match));
-    members[k].b.w = match;
+  // Two lanes read the halves of a member, which lie in one sector.
+  for (std::uint32_t t = threadIdx.x; t < 2 * size; t += kThreads) {
+    Member& member = members[t / 2];
+    const float match = member.b.w;
+    const MatchRow& row = b.matches.rows[b.room[p] + __float_as_uint(match)];
+    float4 half = __ldg(row.points + t % 2);
+    if (t % 2 == 1) half.w = match;
+    (t % 2 == 0 ? member.a : member.b) = half;
   }
   __syncthreads();
   return size;
@@ -166,7 +170,6 @@ __device__ std::uint32_t best_triangle(const SeedFits& b, std::uint32_t begin, s
   __shared__ Rigid motion[kThreads];
   __shared__ std::uint32_t number[kThreads], support[kThreads], warp_count[kWarps];
   __shared__ unsigned long long best;
-  const std::uint32_t lane = threadIdx.x % 32, warp = threadIdx.x / 32;
   if (threadIdx.x == 0) best = 0;
   for (std::uint32_t base = 0; base < b.triangles; base += kThreads) {
     const std::uint32_t trial = base + threadIdx.x;
@@ -181,10 +184,11 @@ __device__ std::uint32_t best_triangle(const SeedFits& b, std::uint32_t begin, s
       number[slot] = trial;
     }
     __syncthreads();
-    // Warps without triangles of their own share the members with others.
-    const std::uint32_t rows = (count + 31) / 32, parts = rows == 1 ? 4 : rows == 2 ? 2 : 1;
-    const std::uint32_t mine = warp % max(rows, 1u) * 32 + lane, part = warp / max(rows, 1u);
-    if (mine < count && part < parts) {
+    // Threads without triangles of their own share the members with others.
+    const std::uint32_t parts = count == 0 ? 0 : kThreads / count;
+    const std::uint32_t part = count == 0 ? 0 : threadIdx.x / count,
+                        mine = threadIdx.x - part * count;
+    if (part < parts) {
       const Rigid own = motion[mine];
       std::uint32_t sum = 0;
       for (std::uint32_t k = part * size / parts, end = (part + 1) * size / parts; k < end; ++k) {

@@ -26,7 +26,7 @@ __device__ inline PackedMatch packed(const OrientedMatch& o) {
 }
 
 inline CompatibilityTest test_of(const CompatibilityOptions& options) {
-  return {options.tolerance * options.tolerance, options.max_turn * options.max_turn};
+  return compatibility_test(options.tolerance, options.max_turn);
 }
 
 }  // namespace gpureg::cuda

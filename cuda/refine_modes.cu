@@ -28,12 +28,12 @@ __device__ bool correspondence(const SampledPair& pair, const RefineModes& r, co
                                float inverse_radius, std::uint32_t i, float (&row)[8]) {
   const CloudView &s = pair.source, &t = pair.pair.target;
   const Vec3 p = s.points[i], q = apply(rigid, p);
-  const Closest c = find_closest(t, pair.pair.target_cells, q, r.max_distance * r.max_distance);
-  if (c.index == kNoValue) return false;
-  const Vec3 normal = t.normals[c.index];
-  if (is_zero(normal) || !normals_agree(rotate(rigid, s.normals[i]), normal, r.min_cosine))
+  const FoundPoint c = find_point(t, pair.pair.target_cells, q, r.max_distance * r.max_distance);
+  if (!c.found() || c.normal == kPackedZero ||
+      !c.agrees(t, rotate(rigid, s.normals[i]), r.min_cosine))
     return false;
-  const float distance = dot(q - t.points[c.index], normal);
+  const Vec3 normal = t.normals[c.index_in(t)];
+  const float distance = dot(q - c.point, normal);
   const Vec3 turn = cross(rotate(rigid, p) * inverse_radius, normal);
   row[0] = turn.x;
   row[1] = turn.y;
@@ -122,8 +122,8 @@ __device__ void leave_cluster() {
 }
 
 /// A thread block per mode, or a cluster of kBlocks, runs all iterations of one refinement.
-template <int kThreads, int kBlocks>
-__global__ void __launch_bounds__(kThreads, 1024 / kThreads) refine(RefineModes r) {
+template <int kThreads, int kBlocks, int kResident = 1024>
+__global__ void __launch_bounds__(kThreads, kResident / kThreads) refine(RefineModes r) {
   __shared__ float rows[kThreads / 32][32][8];
   __shared__ std::int64_t partial[kThreads / 32][kSums];
   __shared__ IcpSums own[2], total_of_all;
@@ -164,6 +164,10 @@ __global__ void __launch_bounds__(kThreads, 1024 / kThreads) refine(RefineModes 
 /// blocks share a multiprocessor, so that the 24 modes of one pair run at once; clusters of blocks
 /// twice as large would need two waves.
 constexpr int kClusterBlocks = 8, kClusterThreads = 512;
+
+/// Threads of small blocks on a multiprocessor: more hide the latency of the search, though they
+/// leave few registers.
+constexpr int kSmallResident = 1280;
 
 /// True where the clusters were compiled: their code is empty below architecture 9.0.
 bool has_clusters(const Exec& exec) {
@@ -260,8 +264,8 @@ void refine_all(Exec& exec, const SampledPairs& pairs, Modes& modes,
   } else {
     const bool few = count < processors * 2;
     (few ? refine<1024, 1>
-         : refine<256, 1>)<<<dim3(modes.most, pair_count), few ? 1024 : 256, 0, exec.stream()>>>(
-        batch);
+         : refine<256, 1, kSmallResident>)<<<dim3(modes.most, pair_count), few ? 1024 : 256, 0,
+                                             exec.stream()>>>(batch);
     check_launch("refine");
   }
 }

@@ -13,8 +13,7 @@ constexpr int kThreads = 256;
 std::vector<SampledPair> with_all_points(Span<const PairView> pairs) {
   std::vector<SampledPair> out;
   out.reserve(pairs.size);
-  for (const PairView& pair : pairs)
-    out.push_back({search_pair(pair), pair.source, pair.target});
+  for (const PairView& pair : pairs) out.push_back({search_pair(pair), pair.source, pair.target});
   return out;
 }
 

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "algorithm/evidence.hpp"
+#include "compare_point.cuh"
 #include "sampled_pairs.hpp"
 #include "stages.hpp"
 #include "warp.cuh"
@@ -8,6 +9,8 @@ namespace gpureg::cuda {
 namespace {
 
 constexpr int kWarps = 4;  // candidates per thread block
+constexpr int kBlocks =
+    10;  // of a multiprocessor at least: more warps hide the latency of the search
 
 /// Normal weight of the sampled points of each cloud: a thread block per cloud (x: pair, y: source
 /// or target).
@@ -31,9 +34,7 @@ __device__ SideEvidence score_sample(const CloudView& moved, const CloudView& ot
   SideEvidence e{};
   const std::uint32_t maps = coarse_score_maps(other.visibility);
   for (std::uint32_t i = threadIdx.x % 32; i < moved.size; i += 32) {
-    const Vec3 q = apply(pose, moved.points[i]);
-    verify_found(moved, other, pose, test, maps, i, q,
-                 find_closest(other, cells, q, test.inlier.max_squared), e);
+    compare_point(moved, other, cells, pose, test, maps, i, e);
   }
   e.normal_weighted =
       static_cast<std::uint64_t>(warp_sum(static_cast<std::int64_t>(e.normal_weighted)));
@@ -49,7 +50,7 @@ __device__ float smaller_share(const MatchEvidence& m, const std::uint64_t* tota
 }
 
 /// A warp per candidate.
-__global__ void __launch_bounds__(32 * kWarps)
+__global__ void __launch_bounds__(32 * kWarps, kBlocks)
     score(const SampledPair* pairs, const std::uint64_t* match_total,
           const unsigned long long* weight, std::uint32_t most, const std::uint32_t* count,
           const Pose<float>* pose, const MatchEvidence* matches, EvidenceTest test, float* out) {

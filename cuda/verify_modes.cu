@@ -4,7 +4,7 @@
 
 #include "algorithm/evidence.hpp"
 #include "block_sum.cuh"
-#include "closest_cells.cuh"
+#include "compare_point.cuh"
 #include "pipeline/conclude.hpp"
 #include "stages.hpp"
 
@@ -12,10 +12,8 @@ namespace gpureg::cuda {
 namespace {
 
 constexpr int kThreads = 128, kWarps = kThreads / 32;
-/// Thread blocks of verify_source() that a multiprocessor holds at least: its 58 sums take most of
-/// the registers.
-constexpr int kSourceBlocks = 3;
-constexpr int kSideSums = 14, kInformationSums = 24;
+constexpr int kSideSums = 14;
+constexpr std::uint32_t kInformationSums = 24;
 
 struct VerifyModes {
   const SearchPair* pairs;
@@ -54,12 +52,6 @@ __device__ void put(SideEvidence& out, const SideEvidence& e, bool alone) {
   put(out.front_violation_far, e.front_violation_far, alone);
   put(out.behind_surface, e.behind_surface, alone);
 }
-__device__ void put(Moments& out, const Moments& m, bool alone) {
-  put(out.count, m.count, alone);
-  for (int k = 0; k < 3; ++k) put(out.sum[k], m.sum[k], alone);
-  for (int k = 0; k < 6; ++k) put(out.outer[k], m.outer[k], alone);
-}
-
 /// Sum over the block, in thread 0.
 __device__ SideEvidence of_block(const SideEvidence& e, std::int64_t* scratch) {
   std::int64_t v[kSideSums];
@@ -93,23 +85,6 @@ __device__ SideEvidence of_block(const SideEvidence& e, std::int64_t* scratch) {
   sum.front_violation_near = static_cast<std::uint32_t>(v[11]);
   sum.front_violation_far = static_cast<std::uint32_t>(v[12]);
   sum.behind_surface = static_cast<std::uint32_t>(v[13]);
-  return sum;
-}
-
-__device__ Moments of_block(const Moments& m, std::int64_t* scratch) {
-  std::int64_t v[10];
-  v[0] = static_cast<std::int64_t>(m.count);
-#pragma unroll
-  for (int k = 0; k < 3; ++k) v[1 + k] = m.sum[k];
-#pragma unroll
-  for (int k = 0; k < 6; ++k) v[4 + k] = m.outer[k];
-  block_sum(v, scratch);
-  Moments sum{};
-  sum.count = static_cast<std::uint64_t>(v[0]);
-#pragma unroll
-  for (int k = 0; k < 3; ++k) sum.sum[k] = v[1 + k];
-#pragma unroll
-  for (int k = 0; k < 6; ++k) sum.outer[k] = v[4 + k];
   return sum;
 }
 
@@ -155,48 +130,114 @@ __global__ void __launch_bounds__(kThreads) verify_target(VerifyModes w) {
   const Rigid back = inverse(to_rigid(w.modes[share.mode].pose));
   SideEvidence side{};
   for (std::uint32_t i = share.first; i < t.size; i += share.step) {
-    const Vec3 q = apply(back, t.points[i]);
-    verify_found(t, s, back, w.test, s.visibility.count, i, q,
-                 find_closest(s, w.pairs[share.p].source_cells, q, w.test.inlier.max_squared),
-                 side);
+    compare_point(t, s, w.pairs[share.p].source_cells, back, w.test, s.visibility.count, i, side);
   }
   side = of_block(side, scratch);
   if (threadIdx.x == 0) put(w.out[share.mode].target, side, share.alone);
 }
 
+/// Values of a source point with a closest point, side by side: what the sums of a mode multiply.
+/// The gaps keep the banks of shared memory apart.
+struct SumRow {
+  static constexpr std::uint32_t kInformation = 0, kArm = 6, kSource = 9, kTarget = 12, kOne = 15;
+  float4 values[5];
+};
+
+/// The lane's sum in a list of sums of products of two values of a row. value, other: their places.
+struct LaneSum {
+  std::uint32_t value, other;
+  std::int64_t total;
+  __device__ void add(const float* row) { total += to_icp_fixed(row[value] * row[other]); }
+};
+
+/// Places of entry k of the lower triangle of a symmetric matrix, row by row.
+__device__ LaneSum triangle_sum(std::uint32_t k, std::uint32_t first) {
+  std::uint32_t row = 0;
+  while (k > row) k -= ++row;
+  return {first + row, first + k, 0};
+}
+
+/// Sums of InformationSums: the lower triangle, then the arms.
+__device__ LaneSum information_sum(std::uint32_t lane) {
+  return lane < 21
+             ? triangle_sum(lane, SumRow::kInformation)
+             : LaneSum{SumRow::kArm + (lane < kInformationSums ? lane - 21 : 0), SumRow::kOne, 0};
+}
+
+/// Sums of Moments of one cloud: x, y, z, then xx, xy, xz, yy, yz, zz.
+__device__ LaneSum moment_sum(std::uint32_t k, std::uint32_t first) {
+  if (k < 3) return {first + k, SumRow::kOne, 0};
+  const std::uint32_t row = k < 6 ? 0 : k < 8 ? 1 : 2;
+  return {first + row, first + (row == 0 ? k - 3 : row == 1 ? k - 5 : 2), 0};
+}
+
 /// One or several thread blocks per mode: the points of the source in the target, the information
-/// of the inliers, the moments of the correspondences, and the matches.
-__global__ void __launch_bounds__(kThreads, kSourceBlocks) verify_source(VerifyModes w) {
-  __shared__ std::int64_t scratch[kWarps * kInformationSums];
+/// of the inliers, the moments of the correspondences, and the matches. Each lane adds up one sum
+/// of the information and one of the moments over the points of its warp: two registers instead of
+/// one for each of 42 sums.
+__global__ void __launch_bounds__(kThreads) verify_source(VerifyModes w) {
+  __shared__ SumRow rows[kWarps][32];
+  __shared__ std::int64_t scratch[kWarps * kSideSums], partial[kWarps][2 * 32];
+  static_assert(kIcpFixedScale == kMomentFixedScale, "one conversion for all sums");
   const Share share(w);
   if (blockIdx.x >= w.count[share.p]) return;
-  const CloudView &s = w.pairs[share.p].source, &t = w.pairs[share.p].target;
+  const SearchPair& pair = w.pairs[share.p];
+  const CloudView &s = pair.source, &t = pair.target;
   const Mode& mode = w.modes[share.mode];
   const Rigid there = to_rigid(mode.pose);
+  const std::uint32_t lane = threadIdx.x % 32, warp = threadIdx.x / 32;
+  const unsigned before = (1u << lane) - 1;
+  const float inverse_source = 1.0f / s.radius, inverse_target = 1.0f / t.radius;
+  LaneSum information = information_sum(lane),
+          moment = lane < 9 ? moment_sum(lane, SumRow::kSource)
+                            : moment_sum(lane < 18 ? lane - 9 : 0, SumRow::kTarget);
   SideEvidence side{};
-  InformationSums information{};
-  Moments source{}, target{};
-  for (std::uint32_t i = share.first; i < s.size; i += share.step) {
-    const Vec3 q = apply(there, s.points[i]);
-    const VerifiedPoint found = verify_found(
-        s, t, there, w.test, t.visibility.count, i, q,
-        find_closest(t, w.pairs[share.p].target_cells, q, w.test.inlier.max_squared), side);
-    if (found.inlier) add_information(s, there, i, information);
-    if (found.closest == kNoValue) continue;
-    add_moment(s.points[i] * (1.0f / s.radius), source);
-    add_moment(t.points[found.closest] * (1.0f / t.radius), target);
+  for (std::uint32_t base = share.first - lane; base < s.size; base += share.step) {
+    const std::uint32_t i = base + lane;
+    ComparedWith found{{0, {0, 0, 0}, kPackedZero, kNoValue, kNoValue}, false};
+    if (i < s.size)
+      found = compare_point(s, t, pair.target_cells, there, w.test, t.visibility.count, i, side);
+    const bool hit = found.closest.found();
+    const unsigned hits = __ballot_sync(~0u, hit), inliers = __ballot_sync(~0u, found.inlier);
+    const int inlier_count = __popc(static_cast<int>(inliers)),
+              count = __popc(static_cast<int>(hits));
+    if (hit) {  // inliers first
+      const int place = found.inlier
+                            ? __popc(static_cast<int>(inliers & before))
+                            : inlier_count + __popc(static_cast<int>(hits & ~inliers & before));
+      const Vec3 p = s.points[i], arm = rotate(there, p) * inverse_source,
+                 normal = rotate(there, s.normals[i]), turn = cross(arm, normal),
+                 a = p * inverse_source, b = found.closest.point * inverse_target;
+      float4* out = rows[warp][place].values;
+      out[0] = make_float4(turn.x, turn.y, turn.z, normal.x);
+      out[1] = make_float4(normal.y, normal.z, arm.x, arm.y);
+      out[2] = make_float4(arm.z, a.x, a.y, a.z);
+      out[3] = make_float4(b.x, b.y, b.z, 1.0f);
+    }
+    __syncwarp();
+    const auto row = [&](int k) { return reinterpret_cast<const float*>(rows[warp][k].values); };
+#pragma unroll 4
+    for (int k = 0; k < count; ++k) moment.add(row(k));
+#pragma unroll 4
+    for (int k = 0; k < inlier_count; ++k) information.add(row(k));
+    __syncwarp();
   }
   side = of_block(side, scratch);
-  std::int64_t sums[kInformationSums];
-#pragma unroll
-  for (int k = 0; k < kInformationSums; ++k)
-    sums[k] = k < 21 ? information.v[k] : information.arm[k - 21];
-  block_sum(sums, scratch);
-  source = of_block(source, scratch);
-  target = of_block(target, scratch);
+  partial[warp][lane] = information.total;
+  partial[warp][32 + lane] = moment.total;
+  __syncthreads();
+  ModeOutcome& out = w.out[share.mode];
+  if (threadIdx.x < 64 && lane < (warp == 0 ? kInformationSums : 18)) {
+    std::int64_t total = 0;
+    for (int k = 0; k < kWarps; ++k) total += partial[k][threadIdx.x];
+    Moments& moments = lane < 9 ? out.source_moments : out.target_moments;
+    const std::uint32_t k = lane % 9;
+    put(warp == 0 ? (lane < 21 ? out.information.v[lane] : out.information.arm[lane - 21])
+                  : (k < 3 ? moments.sum[k] : moments.outer[k - 3]),
+        total, share.alone);
+  }
   const MatchEvidence matches = count_matches(w, share.p, there, share.first, share.step, scratch);
   if (threadIdx.x != 0) return;
-  ModeOutcome& out = w.out[share.mode];
   if (share.part == 0) {
     out.pose = mode.pose;
     out.hypothesis = mode.seed;
@@ -206,11 +247,8 @@ __global__ void __launch_bounds__(kThreads, kSourceBlocks) verify_source(VerifyM
   put(out.matches.target_weight, matches.target_weight, share.alone);
   put(out.matches.inliers, matches.inliers, share.alone);
   put(out.source, side, share.alone);
-#pragma unroll
-  for (int k = 0; k < kInformationSums; ++k)
-    put(k < 21 ? out.information.v[k] : out.information.arm[k - 21], sums[k], share.alone);
-  put(out.source_moments, source, share.alone);
-  put(out.target_moments, target, share.alone);
+  put(out.source_moments.count, std::uint64_t(side.hits), share.alone);
+  put(out.target_moments.count, std::uint64_t(side.hits), share.alone);
 }
 
 }  // namespace

@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <cmath>
+#include <limits>
+
 #include "math/philox.hpp"
 #include "math/vec3.hpp"
 
@@ -20,8 +23,20 @@ struct OrientedMatch {
 /// Tolerances of the compatibility test.
 struct CompatibilityTest {
   float squared_tolerance;  ///< of the distances
-  float squared_turn;       ///< of the cosines
+  float largest_turn;       ///< of the cosines; its square is the largest within the limit
 };
+
+/// Host only. The limit of the cosines is one of their rounded squares, so that the test without
+/// squares has the same result.
+inline CompatibilityTest compatibility_test(float tolerance, float max_turn) {
+  constexpr float kInfinity = std::numeric_limits<float>::infinity();
+  const float squared_turn = max_turn * max_turn;
+  float largest = max_turn;
+  while (largest * largest > squared_turn) largest = std::nextafter(largest, 0.0f);
+  for (float next = largest; next * next <= squared_turn; next = std::nextafter(next, kInfinity))
+    largest = next;
+  return {tolerance * tolerance, largest};
+}
 
 /// Two lengths differ by less than the tolerance. a, b: their squares. Without roots: with x =
 /// (sqrt(a) - sqrt(b))^2 it is (a - b)^2 = x (2 (a + b) - x), which grows with x.
@@ -38,7 +53,7 @@ GPUREG_HD bool compatible(const OrientedMatch& a, const OrientedMatch& b,
                           const CompatibilityTest& test) {
   const float turn = dot(a.m, b.m) - dot(a.n, b.n);
   return similar_lengths(squared_norm(a.p - b.p), squared_norm(a.q - b.q), test.squared_tolerance) &
-         (turn * turn <= test.squared_turn);
+         (fabsf(turn) <= test.largest_turn);
 }
 
 /// Random rank of a match, a function of the match and the seed alone. It decides which matches are

@@ -48,12 +48,6 @@ struct InformationSums {
   std::int64_t arm[3];
 };
 
-/// Result of comparing one point.
-struct VerifiedPoint {
-  std::uint32_t closest;  ///< kNoValue: none within the distance
-  bool inlier;
-};
-
 /// Counts a point by its side of the surfaces. side: bits of SurfaceSide; hit: it has a closest
 /// point.
 GPUREG_HD void add_surface_side(std::uint32_t side, bool hit, SideEvidence& e) {
@@ -65,21 +59,24 @@ GPUREG_HD void add_surface_side(std::uint32_t side, bool hit, SideEvidence& e) {
   e.behind_surface += open & !near & !far & (side != 0) ? 1u : 0u;
 }
 
-/// Evidence of point i of `moved` under the pose. maps: number of depth maps of the other cloud
-/// that are compared; q: the moved point; c: its closest point in the other cloud.
-GPUREG_HD VerifiedPoint verify_found(const CloudView& moved, const CloudView& other,
-                                     const Rigid& pose, const EvidenceTest& test,
-                                     std::uint32_t maps, std::uint32_t i, Vec3 q, Closest c,
-                                     SideEvidence& e) {
-  const Vec3 normal = rotate(pose, moved.normals[i]);
-  const bool hit = c.index != kNoValue;
-  const bool inlier = hit && normals_agree(normal, other.normals[c.index], test.inlier.min_cosine);
+/// A moved point and its closest point in the other cloud.
+struct ComparedPoint {
+  Vec3 moved, normal;      ///< under the pose
+  bool hit, inlier;        ///< a closest point within the distance; with an agreeing normal
+  float squared_distance;  ///< of a hit
+  std::uint32_t weight;    ///< normal weight of the moved point
+};
+
+/// Adds the evidence of one point. maps: number of depth maps of the other cloud that are compared.
+GPUREG_HD void add_evidence(const ComparedPoint& p, const CloudView& other,
+                            const EvidenceTest& test, std::uint32_t maps, SideEvidence& e) {
+  const bool hit = p.hit, inlier = p.inlier;
   bool observed = false, violating = false, surface = false;
   float incidence_observed = 0.0f, incidence_violating = 0.0f;
   for (std::uint32_t m = 0; m < maps; ++m) {
-    const Observation s = observe(other.visibility, m, q, test.margin, test.min_range);
+    const Observation s = observe(other.visibility, m, p.moved, test.margin, test.min_range);
     if (s == Observation::unknown) continue;
-    const float weight = incidence(normal, q - other.visibility.viewpoints[m]);
+    const float weight = incidence(p.normal, p.moved - other.visibility.viewpoints[m]);
     observed = true;
     incidence_observed = weight > incidence_observed ? weight : incidence_observed;
     surface |= s == Observation::surface;
@@ -91,25 +88,28 @@ GPUREG_HD VerifiedPoint verify_found(const CloudView& moved, const CloudView& ot
   e.tested += 1;
   e.hits += hit ? 1u : 0u;
   e.inliers += inlier ? 1u : 0u;
-  e.normal_weighted += inlier ? moved.normal_weight[i] : 0u;
-  e.residual += inlier ? fixed_residual(c.squared_distance, test.inlier.inverse_max_squared) : 0u;
+  e.normal_weighted += inlier ? p.weight : 0u;
+  e.residual += inlier ? fixed_residual(p.squared_distance, test.inlier.inverse_max_squared) : 0u;
   e.observed += observed ? 1u : 0u;
   e.violating += violating ? 1u : 0u;
   e.incidence_observed += fixed_incidence(incidence_observed);
   e.incidence_violating += violating ? fixed_incidence(incidence_violating) : 0u;
   e.occluded += (observed & !violating & !surface & !hit) ? 1u : 0u;
-  add_surface_side(other.surface_sides.words ? surface_side_at(other.surface_sides, q) : 0u, hit,
-                   e);
-  return {c.index, inlier};
+  add_surface_side(other.surface_sides.words ? surface_side_at(other.surface_sides, p.moved) : 0u,
+                   hit, e);
 }
 
-/// verify_found() with the exact closest point.
-GPUREG_HD VerifiedPoint verify_point(const CloudView& moved, const CloudView& other,
-                                     const Rigid& pose, const EvidenceTest& test,
-                                     std::uint32_t maps, std::uint32_t i, SideEvidence& e) {
-  const Vec3 q = apply(pose, moved.points[i]);
-  return verify_found(moved, other, pose, test, maps, i, q,
-                      find_closest(other.closest, other.points, q, test.inlier.max_squared), e);
+/// Adds the evidence of point i of `moved` under the pose.
+GPUREG_HD void verify_point(const CloudView& moved, const CloudView& other, const Rigid& pose,
+                            const EvidenceTest& test, std::uint32_t maps, std::uint32_t i,
+                            SideEvidence& e) {
+  const Vec3 q = apply(pose, moved.points[i]), normal = rotate(pose, moved.normals[i]);
+  const Closest c = find_closest(other.closest, other.points, q, test.inlier.max_squared);
+  const bool hit = c.index != kNoValue;
+  add_evidence(
+      {q, normal, hit, hit && normals_agree(normal, other.normals[c.index], test.inlier.min_cosine),
+       c.squared_distance, moved.normal_weight[i]},
+      other, test, maps, e);
 }
 
 /// Adds one inlier to the point-to-plane information.

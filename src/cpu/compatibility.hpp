@@ -29,7 +29,7 @@ struct MatchColumns {
 };
 
 inline CompatibilityTest test_of(const CompatibilityOptions& options) {
-  return {options.tolerance * options.tolerance, options.max_turn * options.max_turn};
+  return compatibility_test(options.tolerance, options.max_turn);
 }
 
 /// Calls take(k) for all compatible matches of one match, in their order, until it returns false.

@@ -28,8 +28,8 @@ TEST(MergeModes, WithinAShareOfTheLimits) {
   RegistrationOptions options;
   options.evidence.mode_angle = 10;
   options.evidence.mode_distance = 0.4f;
-  const std::vector<Mode> all{mode_at(0, 0, 0), mode_at(0, 0.19, 1), mode_at(4.9, 0, 2),
-                              mode_at(0, 0.21, 3), mode_at(5.1, 0, 4), mode_at(0, 0.6, 5)};
+  const std::vector<Mode> all{mode_at(0, 0, 0),    mode_at(0, 0.19, 1), mode_at(4.9, 0, 2),
+                              mode_at(0, 0.21, 3), mode_at(5.1, 0, 4),  mode_at(0, 0.6, 5)};
   for (const auto& [share, kept] :
        {std::pair<float, std::vector<std::uint32_t>>{0.5f, {0, 3, 4, 5}}, {1.0f, {0, 5}}}) {
     std::vector<std::vector<Mode>> modes{all, {}};
@@ -46,7 +46,7 @@ TEST(DropReturned, NearTheOriginOrAnEarlierPose) {
   // Points two metres from the axis: a degree moves them by 3.5 cm.
   perturbations.returned.outer[0] = perturbations.returned.outer[3] = 2;
   perturbations.returned.squared_distance = 0.03 * 0.03;
-  const std::vector<Mode> all{mode_at(0, 0.02, 0), mode_at(1, 0, 1),    mode_at(0, 0.05, 2),
+  const std::vector<Mode> all{mode_at(0, 0.02, 0), mode_at(1, 0, 1),   mode_at(0, 0.05, 2),
                               mode_at(0, 0.07, 3), mode_at(0.5, 0, 4), mode_at(0, 0.09, 5)};
   std::vector<std::vector<Mode>> modes{all, all, {}};
   PosesOfPair nothing = perturbations;
@@ -69,8 +69,7 @@ TEST(DropReturned, DisplacementOfThePointsInCorrespondences) {
   RegistrationOptions options;
   const ReturnTest test =
       confidence::search_degeneracies({&pair, 1}, {&outcome, 1}, options, 1).at(0).returned;
-  const double limit =
-      static_cast<double>(kReturned * options.prepare.max_correspondence_distance);
+  const double limit = static_cast<double>(kReturned * options.prepare.max_correspondence_distance);
   EXPECT_NEAR(test.squared_distance, limit * limit, 1e-9);
   const Pose<double> moved = mode_at(3, 0.1, 0).pose;
   double sum = 0;
