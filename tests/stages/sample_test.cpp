@@ -29,6 +29,7 @@ TEST(Sample, KeepsExactlyThePassingQuadruples) {
       const std::vector<Matches> matches = random_matches(random, n);
       RegistrationOptions options;
       options.quadruples.count = count;
+      options.quadruples.max_survivors = count;
       options.seed = 0x123456789abcdefull + n;
       const float tau2 = options.quadruples.edge_similarity * options.quadruples.edge_similarity;
       std::vector<std::uint32_t> expected;
