@@ -51,6 +51,7 @@ class Model(NamedTuple):
 
     free_space: bool
     surface_sides: bool
+    model: bool = False  # one of the clouds is a closed surface
 
     @property
     def overlap_alone(self):
@@ -62,6 +63,8 @@ MODELS = {
     "surface_sides": Model(False, True),
     "free_space": Model(True, False),
     "overlap_alone": Model(False, False),
+    "model_and_free_space": Model(True, True, True),
+    "model": Model(False, True, True),
 }
 REGRESSIONS = ("ranking", "confidence", "overlap")
 
@@ -161,6 +164,7 @@ class Run:
     """Modes of all pairs of a scene, in one array each; `pair` tells the pair of a mode."""
 
     weight = 1.0
+    model = False
 
     def __init__(self, building, folder, result, label=None, viewpoints="known"):
         folder = pathlib.Path(folder)
@@ -206,10 +210,44 @@ class Run:
         return correct, set(truth)
 
     def has(self, model):
-        return self.free_space or not model.free_space
+        return (self.free_space or not model.free_space) and self.model == model.model
 
     def features(self, model, regressand, modes=...):
         return library()._confidence_features(rows(self.evidence, modes), *model, regressand)
+
+
+class DomainRun(Run):
+    """The pairs of a domain (domains.py) that have the same kinds of evidence. A pose is correct by the rule of the
+    domain.
+    """
+
+    def __init__(self, domain, pairs, free_space, model, weight=1.0):
+        self.building, self.label, self.viewpoints = domain, domain, "mixed"
+        kinds = [text for text, has in (("free space", free_space), ("model", model)) if has]
+        self.name = ", ".join([domain, *kinds])
+        self.free_space, self.model, self.weight = free_space, model, weight
+        self.refined = pairs[0]["refined"]
+        self.keys = [(k, k) for k in range(len(pairs))]
+        self.modes_per_pair = np.array([len(p["modes"]) for p in pairs])
+        self.pair = np.repeat(np.arange(len(pairs)), self.modes_per_pair)
+        self.evidence = columns([m["evidence"] for p in pairs for m in p["modes"]])
+        i, j = np.array([p["points"] for p in pairs])[self.pair].T
+        self.factor = overlap_factor(self.evidence["overlap"], j, i)
+        self.correct = np.concatenate([np.array(p["correct"], bool) for p in pairs])
+        self.in_truth = np.array([p["positive"] for p in pairs])
+        self.strict, self.listed, self.fragments = self.correct, set(), {}
+
+
+def domain_runs(path, total_weight=None):
+    """The runs of a file of domains.py, one for each kind of evidence. total_weight: of all pairs together."""
+    pairs = [p for p in json.loads(pathlib.Path(path).read_text())["pairs"] if p["modes"]]
+    kinds = {}
+    for p in pairs:
+        observed = any(max(m["evidence"]["observed"]) > 0 for m in p["modes"])
+        kinds.setdefault((observed, "model" in p["viewpoints"]), []).append(p)
+    weight = total_weight / len(pairs) if total_weight else 1.0
+    name = pathlib.Path(path).stem
+    return [DomainRun(name, of, *kind, weight) for kind, of in sorted(kinds.items())]
 
 
 class ChangedRun(Run):
@@ -217,10 +255,9 @@ class ChangedRun(Run):
     other one, where this has any.
     """
 
-    weight = CHANGED_WEIGHT
-
     def __init__(self, run):
         vars(self).update(vars(run))
+        self.weight = CHANGED_WEIGHT * run.weight
         random = np.random.default_rng(CHANGED_SEED)
         draws = [
             (random.integers(2), random.uniform(0, MAX_CHANGED), random.uniform(*CHANGED_NEAR))

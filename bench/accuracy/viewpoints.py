@@ -340,4 +340,5 @@ def main():
             arguments.json.write_text(json.dumps(record, indent=1) + "\n")
 
 
-main()
+if __name__ == "__main__":
+    main()

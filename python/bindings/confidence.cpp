@@ -96,7 +96,7 @@ std::vector<std::string> feature_names() {
   return out;
 }
 
-Numbers features(const py::dict& evidence, bool free_space, bool surface_sides,
+Numbers features(const py::dict& evidence, bool free_space, bool surface_sides, bool model,
                  const std::string& regressand) {
   if (regressand != "ranking" && regressand != "confidence")
     throw py::value_error("regressand: expected 'ranking' or 'confidence', got '" + regressand +
@@ -104,7 +104,7 @@ Numbers features(const py::dict& evidence, bool free_space, bool surface_sides,
   const std::vector<PoseEvidence> modes = evidence_from(evidence);
   Numbers out = table(modes.size());
   for (std::size_t k = 0; k < modes.size(); ++k)
-    write(confidence::features_of(modes[k], {free_space, surface_sides},
+    write(confidence::features_of(modes[k], {free_space, surface_sides, model},
                                   regressand == "ranking" ? confidence::Regressand::ranking
                                                           : confidence::Regressand::confidence),
           k, out);
@@ -137,7 +137,7 @@ void bind_confidence(py::module_& m) {
   using namespace py::literals;
   m.def("_confidence_feature_names", &feature_names,
         "Names of the features of the confidence, in the order of the columns.");
-  m.def("_confidence_features", &features, "evidence"_a, "free_space"_a, "surface_sides"_a,
+  m.def("_confidence_features", &features, "evidence"_a, "free_space"_a, "surface_sides"_a, "model"_a,
         "regressand"_a,
         "(modes, features): of modes by their own evidence. evidence: the keys of a result's JSON, "
         "each an array with a row per mode.");

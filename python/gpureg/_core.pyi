@@ -686,7 +686,11 @@ def evaluate(
 ) -> dict[str, float]: ...
 def _confidence_feature_names() -> list[str]: ...
 def _confidence_features(
-    evidence: dict[str, _Float64], free_space: bool, surface_sides: bool, regressand: str
+    evidence: dict[str, _Float64],
+    free_space: bool,
+    surface_sides: bool,
+    model: bool,
+    regressand: str,
 ) -> _Float64: ...
 def _confidence_rank_features(
     log_odds: Sequence[float], modes_per_pair: Sequence[int], refined: int

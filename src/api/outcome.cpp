@@ -66,7 +66,8 @@ class Modes {
   std::vector<RegistrationMode> ranked() const {
     std::vector<PoseEvidence> evidence;
     for (const RegistrationMode& mode : modes_) evidence.push_back(mode.evidence);
-    const confidence::AvailableEvidence available = confidence::available_evidence(evidence);
+    const confidence::AvailableEvidence available = confidence::available_evidence(
+        evidence, source_.statistics.viewpoint, target_.statistics.viewpoint);
     const std::vector<double> log_odds = confidence::rank_modes(evidence, available);
     std::vector<std::size_t> order(modes_.size());
     std::iota(order.begin(), order.end(), std::size_t(0));

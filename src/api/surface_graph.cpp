@@ -198,13 +198,12 @@ double SurfaceGraph::flux(const Signs& signs) const {
   return share(std::sqrt(sum[0] * sum[0] + sum[1] * sum[1] + sum[2] * sum[2]), count);
 }
 
-void SurfaceGraph::turn_outwards(Signs& signs) const {
+bool SurfaceGraph::outwards(const Signs& signs) const {
   // The points lie about their local origin, near the centre of the cloud.
   double volume = 0;
   for (std::size_t i = 0; i < points_.size(); ++i)
     volume += signs[i] * static_cast<double>(dot(points_[i], normals_[i]));
-  if (volume >= 0) return;
-  for (std::int8_t& sign : signs) sign = static_cast<std::int8_t>(-sign);
+  return volume >= 0;
 }
 
 }  // namespace gpureg

@@ -39,8 +39,8 @@ class SurfaceGraph {
   Signs consistent_signs() const;
   /// Length of the mean of the normals with these signs: 0 for a closed surface.
   double flux(const Signs& signs) const;
-  /// Makes the normals of a closed surface point outwards: its enclosed volume is positive then.
-  void turn_outwards(Signs& signs) const;
+  /// True where the normals of a closed surface point outwards: its enclosed volume is positive.
+  bool outwards(const Signs& signs) const;
 
  private:
   struct Edge {

@@ -93,7 +93,8 @@ struct VerifiedPair {
         all.push_back(other);
     std::vector<PoseEvidence> evidence;
     for (const Candidate& c : all) evidence.push_back(c.evidence);
-    const confidence::AvailableEvidence available = confidence::available_evidence(evidence);
+    const confidence::AvailableEvidence available = confidence::available_evidence(
+        evidence, source.statistics.viewpoint, target.statistics.viewpoint);
     const std::vector<double> log_odds = confidence::rank_modes(evidence, available);
     std::vector<std::size_t> order(all.size());
     for (std::size_t k = 0; k < order.size(); ++k) order[k] = k;

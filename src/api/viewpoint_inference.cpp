@@ -22,6 +22,9 @@ constexpr double kScannerSpread = 1.6, kSpreadRatio = 0.6;
 constexpr double kIrregularityRatio = 0.5;
 /// A closed surface: its mean normal and the contradictions along it.
 constexpr double kClosedFlux = 0.05, kClosedContradiction = 2e-3;
+/// Input normals of a closed surface: those of faces turn at once along its edges, so that thin
+/// walls contradict each other a little.
+constexpr double kModelContradiction = 0.03;
 /// No viewpoint sees all of a surface: least contradictions from the best one, and largest ratio of
 /// those along the surface to them. In scans of rooms the ratio is above 0.1: sides that are
 /// propagated through clutter contradict little and are wrong for whole objects.
@@ -130,6 +133,10 @@ bool explains(const SurfaceGraph& graph, const SearchedViewpoint& best, Vec3 vie
   return static_cast<double>(as_good) <= kMostPlaces * static_cast<double>(best.tried.size());
 }
 
+void flip(SurfaceGraph::Signs& signs) {
+  for (std::int8_t& sign : signs) sign = static_cast<std::int8_t>(-sign);
+}
+
 bool is_closed(const SurfaceGraph& graph, const SurfaceGraph::Signs& along) {
   return graph.flux(along) <= kClosedFlux && graph.contradiction(along) <= kClosedContradiction;
 }
@@ -202,7 +209,7 @@ InferredSides infer_sides(const SurfaceGraph& graph, Vec3 origin, const RawCloud
   const SearchedViewpoint best = search_viewpoint(graph, graph.radius());
   SurfaceGraph::Signs along = graph.consistent_signs();
   if (is_closed(graph, along)) {
-    graph.turn_outwards(along);
+    if (!graph.outwards(along)) flip(along);
     return {ViewpointSource::model, std::move(along), true};
   }
   if (infer && explains(graph, best, origin, spread)) {
@@ -218,6 +225,9 @@ InferredSides check_given_sides(const SurfaceGraph& graph) {
   InferredSides out{ViewpointSource::normals, {}, true};
   const SurfaceGraph::Signs given(graph.points().size(), 1);
   const double contradiction = graph.contradiction(given);
+  if (graph.edges() >= kMinEdges && contradiction <= kModelContradiction &&
+      graph.flux(given) <= kClosedFlux && graph.outwards(given))
+    out.source = ViewpointSource::model;
   if (graph.edges() < kMinEdges || contradiction < kContradictory) return out;
   const SearchedViewpoint best = search_viewpoint(graph, graph.radius());
   SurfaceGraph::Signs better = best_sides(graph, best.place, graph.consistent_signs());
@@ -225,7 +235,7 @@ InferredSides check_given_sides(const SurfaceGraph& graph) {
   std::ptrdiff_t sum = 0;
   for (const std::int8_t sign : better) sum += sign;
   if (sum < 0)
-    for (std::int8_t& sign : better) sign = static_cast<std::int8_t>(-sign);
+    flip(better);
   const auto flipped = std::count(better.begin(), better.end(), std::int8_t(-1));
   if (static_cast<double>(flipped) > kMostRepaired * static_cast<double>(better.size())) return out;
   out.signs = std::move(better);

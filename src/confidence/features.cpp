@@ -12,6 +12,8 @@ namespace {
 constexpr double kMinMatchSupport = 1e-5, kMinMatchInliers = 1, kMinOverlap = 1e-3;
 constexpr double kMinEigenvalue = 1e-2, kMinViolation = 3e-3, kMinViolationOfAll = 1e-3;
 constexpr double kMinFrontViolation = 1e-3, kMinBehindSurface = 1e-3;
+/// Noise and edges leave a few points of a hundred uncovered in any scan.
+constexpr double kMinUncovered = 2e-2;
 /// Real rooms are full of things that one cloud observed and the other one did not look at. Where
 /// free space is known, a sum of front violations of both sides below this tells which mode is the
 /// better one, and not whether it is correct.
@@ -138,6 +140,7 @@ constexpr const char* kNames[] = {"log_match_support",
                                   "log_behind_surface",
                                   "higher_behind_share",
                                   "lower_behind_share",
+                                  "log_uncovered",
                                   "log_odds",
                                   "margin",
                                   "distinct_share"};
@@ -147,13 +150,16 @@ static_assert(std::size(kNames) == kFeatureCount, "a name for each feature");
 
 const char* to_string(Feature feature) { return kNames[static_cast<std::size_t>(feature)]; }
 
-AvailableEvidence available_evidence(const std::vector<PoseEvidence>& modes) {
+AvailableEvidence available_evidence(const std::vector<PoseEvidence>& modes, ViewpointSource source,
+                                     ViewpointSource target) {
   // A mode without overlap does not show which evidence the clouds have.
   AvailableEvidence available;
   for (const PoseEvidence& e : modes) {
     available.free_space |= e.source_observed > 0 || e.target_observed > 0;
     available.surface_sides |= e.source_near_surface > 0 && e.target_near_surface > 0;
   }
+  available.model = available.surface_sides &&
+                    (source == ViewpointSource::model || target == ViewpointSource::model);
   return available;
 }
 
@@ -164,6 +170,11 @@ Features features_of(const PoseEvidence& evidence, AvailableEvidence available,
   add_overlap(evidence, set);
   if (available.free_space) add_free_space(evidence, set);
   if (available.surface_sides) add_surface_sides(evidence, available.free_space, regressand, set);
+  if (available.model) {
+    // The scan is the better covered side: the model has a back, and more of everything.
+    const Sides covered{evidence.source_overlap_any_normal, evidence.target_overlap_any_normal};
+    set(Feature::log_uncovered, log_at_least(1 - covered.higher(), kMinUncovered));
+  }
   return features;
 }
 

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "gpureg/evidence.hpp"
+#include "gpureg/statistics.hpp"
 
 /// Features of the regressions that turn evidence into a confidence. Computed here and nowhere
 /// else: bench/accuracy/fit_confidence.py gets them from the library.
@@ -46,6 +47,8 @@ enum class Feature : std::uint8_t {
   log_behind_surface,
   higher_behind_share,
   lower_behind_share,
+  // Containment; where one cloud is a model.
+  log_uncovered,
   // The mode among the others of its pair; not for the ranking.
   log_odds,
   margin,
@@ -62,11 +65,16 @@ const char* to_string(Feature feature);
 struct AvailableEvidence {
   bool free_space = false;
   bool surface_sides = false;
+  /// One of the clouds is a model: a closed surface, so that all of the other cloud should lie on
+  /// it. Asks for surface sides.
+  bool model = false;
 };
 
 /// modes: of one pair. Free space is available where any mode has an observed point, the sides of
 /// surfaces where any mode has points near surfaces of both clouds.
-AvailableEvidence available_evidence(const std::vector<PoseEvidence>& modes);
+/// @param source, target what was known of the viewpoints of the clouds.
+AvailableEvidence available_evidence(const std::vector<PoseEvidence>& modes, ViewpointSource source,
+                                     ViewpointSource target);
 
 /// Purpose of a regression.
 enum class Regressand : std::uint8_t {
