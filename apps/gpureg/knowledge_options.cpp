@@ -32,23 +32,27 @@ Eigen::Vector3d direction(const std::vector<double>& numbers) {
 
 }  // namespace
 
+bool ViewpointChoice::is_word() const {
+  return text == "auto" || text == "none" || text == "model";
+}
+
 void ViewpointChoice::check(const char* option) const {
-  if (text == "auto" || text == "none") return;
+  if (is_word()) return;
   const std::vector<double> numbers = numbers_of(text);
   if (numbers.size() != 3 || !direction(numbers).allFinite())
     throw InvalidArgument(std::string(option) + " is " + text +
-                          ", expected x,y,z (finite), none or auto");
+                          ", expected x,y,z (finite), model, none or auto");
 }
 
 void ViewpointChoice::apply(PointCloud& cloud) const {
   if (text == "auto") return;
   cloud.viewpoints.clear();
-  if (text != "none") cloud.viewpoints.push_back(direction(numbers_of(text)).cast<float>());
+  if (!is_word()) cloud.viewpoints.push_back(direction(numbers_of(text)).cast<float>());
 }
 
 void ViewpointChoice::note_place(const char* option, const PreparedCloud& cloud,
                                  const std::string& file) const {
-  if (text == "auto" || text == "none") return;
+  if (is_word()) return;
   const Eigen::Vector3f place = direction(numbers_of(text)).cast<float>();
   // One point within a voxel may be a return of the sensor itself, a surface has about three.
   constexpr std::ptrdiff_t kSurface = 2;
@@ -66,6 +70,8 @@ void ViewpointChoice::note_place(const char* option, const PreparedCloud& cloud,
 PointCloudView ViewpointChoice::view(const PointCloud& cloud) const {
   PointCloudView view = cloud.view();
   view.infer_viewpoint = text != "none";
+  if (text == "none") view.model = false;
+  if (text == "model") view.model = true;
   return view;
 }
 

@@ -17,12 +17,15 @@ struct ViewpointChoice {
 
   /// @throws InvalidArgument naming option and text.
   void check(const char* option) const;
-  /// Puts a given viewpoint into the cloud; "none" removes those of the file.
+  /// Puts a given viewpoint into the cloud; "none" and "model" remove those of the file.
   void apply(PointCloud& cloud) const;
   /// Says on stderr where a given viewpoint lies on a surface of the cloud, as no sensor does.
   void note_place(const char* option, const PreparedCloud& cloud, const std::string& file) const;
   /// View of a cloud that apply() has seen.
   PointCloudView view(const PointCloud& cloud) const;
+
+ private:
+  bool is_word() const;  ///< text is no place
 };
 
 /// Gravity prior of `--up x,y,z[,degrees]`, for both clouds.

@@ -3,6 +3,7 @@
 that see them by ray casting. Every scene is a list of clouds with their poses and of pairs to try.
 
 * `parts`: machined parts (boxes, cylinders, holes), range scans of them, and their models.
+* `figures`: rounded shapes, range scans of them, and their models.
 * `objects`: rounded shapes, scanned from around them; pairs of scans.
 * `street`: a spinning LiDAR of 16 to 128 rings on a vehicle: ground, buildings, cars, trees, poles.
 * `hall`: the same sensor, or a terrestrial scanner, in halls with columns, shelves and machines.
@@ -144,12 +145,9 @@ def part(rng, size, symmetric):
     return solid, (np.eye(4),)
 
 
-def parts(seed):
-    """Three parts with their models, scanned from around them: each scan against each model."""
-    rng = np.random.default_rng(seed)
-    size, scans, pairs = rng.uniform(0.05, 0.4), [], []
-    kinds = rng.random(3) < 0.25
-    solids = [part(rng, size, kind) for kind in kinds]
+def scans_and_models(rng, size, solids):
+    """Models, and scans from around them: each scan against each model."""
+    scans, pairs = [], []
     noise = size * 10 ** rng.uniform(-3.0, -1.8)
     for k, (solid, symmetries) in enumerate(solids):
         scans.append(Scan(None, np.eye(4), solid, k, symmetries))
@@ -165,8 +163,16 @@ def parts(seed):
             points = range_scan(seen, pose, rng, noise, 0.5)
             if len(points) > 400:
                 scans.append(Scan(points, pose, None, k, symmetries))
-                pairs += [(len(scans) - 1, model) for model in range(3)]
+                pairs += [(len(scans) - 1, model) for model in range(len(solids))]
     return Scene(scans, pairs, "auto", 10.0, 0.07 * size)
+
+
+def parts(seed):
+    """Three parts and their models."""
+    rng = np.random.default_rng(seed)
+    size = rng.uniform(0.05, 0.4)
+    kinds = rng.random(3) < 0.25
+    return scans_and_models(rng, size, [part(rng, size, kind) for kind in kinds])
 
 
 def blob(rng, size):
@@ -183,6 +189,13 @@ def blob(rng, size):
     body.vertices *= size / np.ptp(body.vertices, axis=0).max()
     body.apply_translation(-body.bounds.mean(0))
     return body
+
+
+def figures(seed):
+    """Three rounded shapes and their models."""
+    rng = np.random.default_rng(seed)
+    size = rng.uniform(0.05, 0.4)
+    return scans_and_models(rng, size, [(blob(rng, size), (np.eye(4),)) for _ in range(3)])
 
 
 def objects(seed):
@@ -435,4 +448,4 @@ def hall(seed):
     return Scene(scans, spread_pairs(scans, rng, 16, 8, 20), "auto", 5.0, 0.5)
 
 
-SCENES = {"parts": parts, "objects": objects, "street": street, "hall": hall}
+SCENES = {"parts": parts, "figures": figures, "objects": objects, "street": street, "hall": hall}

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Evidence of pairs of many kinds of data: what fit_domains.py fits and tests the confidence with.
 
-A domain is a kind of sensor in a kind of place. Simulated ones: parts, objects, street, hall
+A domain is a kind of sensor in a kind of place. Simulated ones: parts, figures, objects, street, hall
 (domain_scenes.py). Real ones, in DATA (its README.md has origins and licences): kitchen, dragon, cad,
 cad_mesh, kitti, lidar, fgr (viewpoints.py). One file DOMAIN.json each: every pair with the evidence of
 its modes and which of them are correct, under one of the conditions of viewpoints.py (`said`,
@@ -22,7 +22,7 @@ import numpy as np
 import viewpoints
 from viewpoints import Cloud, Set
 
-SIMULATED = ("parts", "objects", "street", "hall")
+SIMULATED = ("parts", "figures", "objects", "street", "hall")
 REAL = ("kitchen", "dragon", "cad", "cad_mesh", "kitti", "lidar", "fgr")
 MODEL_POINTS = 20000
 

@@ -26,6 +26,8 @@ is fitted a second time, with little weight, as if up to a tenth of one of its c
 
 usage: fit_confidence.py RUN... [--beside RUN=LABEL...] [--others RUN=LABEL...] [--origin RUN...]
 [--unknown RUN...] [--header src/confidence/confidence_model.hpp] [-o bench/results/confidence.json]
+--models: evidence of scans on models (domains.py: parts, figures, cad, cad_mesh). The regressions for models are fitted
+to it alone, each domain with the same weight, and tested by fits on the other domains.
 --others: tested only. LABEL: the row of the table that the run belongs to. --origin, --unknown:
 tested only; runs of the same scenes with the origin as the only viewpoint, or with none. Where a
 scene has poses.txt (fragment number, world_from_fragment), the record also counts the kinds of
@@ -63,7 +65,6 @@ MODELS = {
     "surface_sides": Model(False, True),
     "free_space": Model(True, False),
     "overlap_alone": Model(False, False),
-    "model_and_free_space": Model(True, True, True),
     "model": Model(False, True, True),
 }
 REGRESSIONS = ("ranking", "confidence", "overlap")
@@ -74,6 +75,8 @@ MIN_SEPARATION = 2  # j - i: neighbours in the sequence do not count in Redwood'
 # Inverse strengths of the L2 penalty. Chosen among 38 settings by the tables of docs/accuracy.md
 # and by a correct pose in a changed place.
 STRENGTHS = {"ranking": 0.15, "confidence": 0.00025, "overlap": 1.0}
+MODEL_STRENGTH = 1.0  # of the regressions for models, which have two features and the rank
+DOMAIN_WEIGHT = 1000.0  # of all pairs of a domain together
 NO_PENALTY = 1e6  # for slope and intercept, which two numbers cannot overfit
 MAX_ITERATIONS = 5000  # of the solver, which warns where they are too few
 MIN_SCALE = 1e-9  # bounds the standard deviation of a constant feature
@@ -341,17 +344,19 @@ def best_modes(run, model, ranking):
 
 def fit(runs, beside, model):
     """The three regressions by name; the second also from the runs beside."""
-    runs, beside = ([*of, *map(ChangedRun, of)] for of in (runs, beside))
+    if not model.model:
+        runs, beside = ([*of, *map(ChangedRun, of)] for of in (runs, beside))
+    strengths = dict.fromkeys(STRENGTHS, MODEL_STRENGTH) if model.model else STRENGTHS
     x, y, weight = [], [], []
     for run in runs:
         # Pairs without a correct mode do not teach which mode is correct. Without free space so
         # little tells modes apart that their wrong ones help all the same.
         known = np.bincount(run.pair[run.correct], minlength=len(run.keys)) > 0
-        chosen = known[run.pair] | (not model.free_space)
+        chosen = known[run.pair] | (not model.free_space and not model.model)
         x.append(run.features(model, "ranking", chosen))
         y.append(run.correct[chosen])
         weight.append(np.full(chosen.sum(), run.weight))
-    ranking = logistic(*map(np.concatenate, (x, y, weight)), STRENGTHS["ranking"])
+    ranking = logistic(*map(np.concatenate, (x, y, weight)), strengths["ranking"])
 
     def of_best(of, regression, label):
         views = [best_modes(run, model, ranking) for run in of]
@@ -359,7 +364,7 @@ def fit(runs, beside, model):
             np.concatenate([x for x, _, _ in views]),
             np.concatenate([getattr(run, label)[best] for run, (_, best, _) in zip(of, views)]),
             np.concatenate([np.full(len(x), run.weight) for run, (x, _, _) in zip(of, views)]),
-            STRENGTHS[regression],
+            strengths[regression],
         )
 
     return {
@@ -502,6 +507,9 @@ def clang_format():
 
 
 def write_header(path, models):
+    """Regressions that were not fitted stay as the header has them."""
+    shipped = read_header((ROOT / "src/confidence/confidence_model.hpp").read_text())
+    models = {name: models.get(name, shipped.get(name)) for name in MODELS}
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_text(header(models))
     tool = clang_format()
@@ -530,6 +538,8 @@ def test_and_fit(runs, beside, others):
 
     tested = []
     for name, model in MODELS.items():
+        if model.model:
+            continue  # see fit_models()
         fits = {}
         for run in [*runs, *beside, *others]:
             left = allowed(runs, model, run.building)
@@ -551,8 +561,59 @@ def test_and_fit(runs, beside, others):
     models = {
         name: fit(allowed(runs, model), allowed(beside, model), model)
         for name, model in MODELS.items()
+        if not model.model
     }
     return tested, models
+
+
+def fit_models(files):
+    """Figures of all domains by fits on other domains, and the regressions of the fit on all of them. Files of one
+    domain begin with its name: cad.json, cad_mesh.json.
+    """
+    model = MODELS["model"]
+    runs = []
+    for path in files:
+        domain = pathlib.Path(path).stem.split("_")[0]
+        for run in domain_runs(path, DOMAIN_WEIGHT):
+            if run.has(model):
+                run.building = domain
+                runs.append(run)
+    tested = []
+    for run in runs:
+        left = [other for other in runs if other.building != run.building]
+        if not left:
+            continue
+        regressions = fit(left, [], model)
+        out = {"scene": run.name, "model": "model", **figures_of_domain(run, model, regressions)}
+        tested.append(out)
+        print(text_of(out), flush=True)
+    return tested, fit(runs, [], model)
+
+
+def figures_of_domain(run, model, regressions):
+    """Counts of pairs of a domain by their most confident pose."""
+    best, confidence, _ = confidences(run, model, regressions)
+    correct, positive = run.correct[best], int(run.in_truth.sum())
+    found = np.bincount(run.pair[run.correct], minlength=len(run.keys)) > 0
+    sure, reported = confidence > SURE, confidence >= REPORTED
+    bins = np.minimum((confidence * CALIBRATION_BINS).astype(int), CALIBRATION_BINS - 1)
+    return {
+        "pairs": len(run.keys),
+        "true_pairs": positive,
+        "among_modes": int(found.sum()),
+        "first": int(correct.sum()),
+        "reported": int((reported & correct).sum()),
+        "reported_wrong": int((reported & ~correct).sum()),
+        "sure": int(sure.sum()),
+        "sure_wrong": int((sure & ~correct).sum()),
+        "ECE": float(
+            sum(
+                (bins == b).mean() * abs(confidence[bins == b].mean() - correct[bins == b].mean())
+                for b in range(CALIBRATION_BINS)
+                if (bins == b).any()
+            )
+        ),
+    }
 
 
 def parse_run(text, viewpoints="known"):
@@ -564,7 +625,7 @@ def main():
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("runs", nargs="+", metavar="RUN", help="BUILDING=SCENE_FOLDER=RESULT.json")
+    parser.add_argument("runs", nargs="*", metavar="RUN", help="BUILDING=SCENE_FOLDER=RESULT.json")
     for name, meta, text in (
         ("--beside", "RUN=LABEL", "the second regression alone is fitted to them"),
         ("--others", "RUN=LABEL", "tested only"),
@@ -572,16 +633,22 @@ def main():
         ("--unknown", "RUN", "tested only: no viewpoint was known"),
     ):
         parser.add_argument(name, nargs="+", default=[], metavar=meta, help=text)
+    parser.add_argument("--models", nargs="+", default=[], metavar="FILE", help="of domains.py")
     parser.add_argument("--header", type=pathlib.Path)
     parser.add_argument("-o", "--output", type=pathlib.Path)
     arguments = parser.parse_args()
-    tested, models = test_and_fit(
+    if not arguments.runs and not arguments.models:
+        parser.error("nothing to fit: neither RUN nor --models")
+    tested, models = ([], {}) if not arguments.runs else test_and_fit(
         [parse_run(text) for text in arguments.runs],
         [parse_run(text) for text in arguments.beside],
         [parse_run(text) for text in arguments.others]
         + [parse_run(text, "origin") for text in arguments.origin]
         + [parse_run(text, "unknown") for text in arguments.unknown],
     )
+    if arguments.models:
+        of_models, models["model"] = fit_models(arguments.models)
+        tested += of_models
     if arguments.header:
         write_header(arguments.header, models)
     if arguments.output:

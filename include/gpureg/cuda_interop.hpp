@@ -32,6 +32,7 @@ struct DevicePointCloudView {
   const float* viewpoints = nullptr;  ///< HOST memory, optional: viewpoint_count rows of x, y, z
   std::size_t viewpoint_count = 0;
   bool infer_viewpoint = true;
+  bool model = false;
   double origin[3] = {0, 0, 0};  ///< as that of PointCloudView
   /// Streams that order the reading of normals and features, where another stream than that of the
   /// points wrote them.
@@ -49,6 +50,7 @@ struct DevicePointCloudView {
     v.viewpoints = viewpoints;
     v.viewpoint_count = viewpoint_count;
     v.infer_viewpoint = infer_viewpoint;
+    v.model = model;
     v.validate();
   }
 };

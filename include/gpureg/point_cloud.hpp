@@ -39,6 +39,10 @@ struct PointCloudView {
   /// has the decision. No effect where PrepareOptions::depth_maps is 0: the origin then orients the
   /// normals.
   bool infer_viewpoint = true;
+  /// The cloud is a model: seen from everywhere, with normals that point outwards, as of a sampled
+  /// mesh. A scan should lie on it as a whole. Asks for normals and for no viewpoint. Clouds with
+  /// closed surfaces are recognised as models without it.
+  bool model = false;
   /// Added to every point and viewpoint: coordinates in the cloud's frame = origin + row. For large
   /// coordinates (UTM, maps), which float rows cannot hold. Poses and moments of results are in the
   /// cloud's frame; PreparedCloud::points() are rows, relative to this.
@@ -71,6 +75,7 @@ struct PointCloud {
   std::vector<Eigen::Vector3f> points;      ///< metres
   std::vector<Eigen::Vector3f> normals;     ///< empty, or one per point
   std::vector<Eigen::Vector3f> viewpoints;  ///< sensor positions in the cloud's frame, may be empty
+  bool model = false;                       ///< see PointCloudView::model
 
   /// @return a view, valid as long as the vectors do not change.
   /// @throws InvalidArgument where the number of normals is neither 0 nor that of the points.

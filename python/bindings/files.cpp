@@ -62,7 +62,7 @@ void bind_files(py::module_& m) {
              const py::tuple parts = py::module_::import("gpureg._arrays")
                                          .attr("stored_cloud")(points, normals, viewpoints);
              return PointCloud{vectors_of(parts[0], "points"), vectors_of(parts[1], "normals"),
-                               vectors_of(parts[2], "viewpoints")};
+                               vectors_of(parts[2], "viewpoints"), false};
            }),
            py::arg("points"), py::arg("normals") = py::none(), py::arg("viewpoints") = py::none())
       .def("__len__", [](const PointCloud& c) { return c.points.size(); })
@@ -75,6 +75,7 @@ void bind_files(py::module_& m) {
       .def_property_readonly(
           "viewpoints", [](const PointCloud& c) { return array_of(c.viewpoints); },
           "(V, 3) float32 copy: sensor positions in the cloud's frame.")
+      .def_readonly("model", &PointCloud::model, "Sampled from a mesh, with normals outwards.")
       .def("__repr__", [](const PointCloud& c) {
         return "<gpureg.PointCloud, " + std::to_string(c.points.size()) + " points>";
       });

@@ -52,6 +52,8 @@ struct Input {
     }
     if (parts[3].ptr() == Py_False) {
       view.infer_viewpoint = false;
+    } else if (parts[3].ptr() == Py_True) {
+      view.model = true;
     } else if (!parts[3].is_none()) {
       const Rows viewpoints = rows_of(parts[3].cast<FloatArray>(), "viewpoints");
       if (viewpoints.count > 0 && viewpoints.stride != 3)
@@ -87,6 +89,7 @@ struct Input {
     v.viewpoints = view.viewpoints;
     v.viewpoint_count = view.viewpoint_count;
     v.infer_viewpoint = view.infer_viewpoint;
+    v.model = view.model;
     std::copy(std::begin(view.origin), std::end(view.origin), v.origin);
     v.normal_stream = streams[1];
     v.feature_stream = streams[2];

@@ -7,7 +7,7 @@ Errors name the argument and the shape or type that it has.
 from __future__ import annotations
 
 import os
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -22,12 +22,12 @@ FloatArray = npt.NDArray[np.float32]
 Rows = FloatArray | DeviceRows
 #: (points, normals, features, viewpoints, origin, streams), all but the points may be None. With
 #: streams, the first three are on a device, each written by the stream of its place.
-#: viewpoints False: the viewpoint is unknown, and not to be inferred.
+#: viewpoints False: the viewpoint is unknown, and not to be inferred; True: the cloud is a model.
 CoreCloud = tuple[
     Rows,
     Rows | None,
     Rows | None,
-    FloatArray | Literal[False] | None,
+    FloatArray | bool | None,
     npt.NDArray[np.float64] | None,
     tuple[int, int, int] | None,
 ]
@@ -214,12 +214,15 @@ def core_cloud(
     points, normals, viewpoints = _unpack(
         points, normals, None if known is False else known, name, 0.5 * options.voxel_size
     )
-    if known is False:
-        viewpoints = None
+    word = known if isinstance(known, bool) else None
+    if isinstance(viewpoints, bool):  # a mesh, or one of the words
+        word, viewpoints = (viewpoints if word is None else word), None
+    if word and normals is None:
+        raise ValueError(f"{prefix}normals: None, expected those of the model, outwards")
     if device and on_device(points):
         stay = _stay_on_device(points, normals, features, viewpoints, prefix)
         if stay is not None:
-            return (*stay[:3], False, *stay[4:]) if known is False else stay
+            return stay if word is None else (*stay[:3], word, *stay[4:])
     raw = matrix(points, name, 3)
     count = raw.shape[0]
     origin = origin_of(raw, options.voxel_size)
@@ -234,8 +237,8 @@ def core_cloud(
         None
         if features is None
         else float_rows(matrix(features, prefix + "features", None, count), prefix + "features"),
-        False
-        if known is False
+        word
+        if word is not None
         else None
         if views is None
         else np.ascontiguousarray(float_rows(views, prefix + "viewpoints")),
@@ -245,13 +248,15 @@ def core_cloud(
 
 
 def _viewpoints(value: Any, name: str) -> Any:
-    """None: to be inferred; False: unknown; else rows."""
+    """None: to be inferred; False: unknown; True: a model; else rows."""
     if value is None or (isinstance(value, str) and value == "auto"):
         return None
     if isinstance(value, str):
-        if value == "none":
-            return False
-        raise ValueError(f"{name}: expected (V, 3) positions, 'none' or 'auto', got {value!r}")
+        if value in ("none", "model"):
+            return value == "model"
+        raise ValueError(
+            f"{name}: expected (V, 3) positions, 'none', 'model' or 'auto', got {value!r}"
+        )
     rows = to_numpy(value, name)
     return rows.reshape(1, 3) if rows.shape == (3,) else rows
 
@@ -314,10 +319,13 @@ def _unpack(
     if isinstance(points, str | os.PathLike):
         points = _core.read_point_cloud(os.fspath(points))
     if isinstance(points, PointCloud):
-        if normals is None and len(points.normals):
+        own = normals is None and len(points.normals) > 0
+        if own:
             normals = points.normals
         if viewpoints is None and len(points.viewpoints):
             viewpoints = points.viewpoints
+        if viewpoints is None and points.model and own:
+            viewpoints = True
         return points.points, normals, viewpoints
     if hasattr(points, "points") and hasattr(points, "has_normals"):  # open3d.geometry.PointCloud
         if normals is None and points.has_normals():

@@ -47,13 +47,14 @@ def prepare(
         and NaN mean unknown.
     features : (N, D) array, optional
         Features of your own instead of FPFH, 1 <= D <= 4096.
-    viewpoints : (V, 3) or (3,) array, "auto" or "none", optional
+    viewpoints : (V, 3) or (3,) array, "auto", "none" or "model", optional
         Sensor positions in the cloud's frame, towards which normals are turned where none are
         given, and from which free space was seen. Given normals that face away from all of them are
         turned round, unless more than an eighth do: then a UserWarning says so, as the viewpoints
         are most likely in another frame, and count as evidence against correct poses. "auto", the
         default: the origin if the surfaces agree with it, else unknown; none where normals are
-        given. "none": unknown. ``statistics.viewpoint`` of the cloud has the decision. With an
+        given. "none": unknown. "model": seen from everywhere, with given normals that point outwards,
+        as of a sampled mesh, which needs no word. ``statistics.viewpoint`` of the cloud has the decision. With an
         unknown viewpoint there is no free space, and alignments try both sides of the surfaces.
     options : PrepareOptions, optional
         Must suit the options of the alignment: see ``RegistrationOptions.prepare``.

@@ -246,7 +246,7 @@ def register(
         Same seed, same bits, for any threads and backend.
     prior : RegistrationPrior, optional
         What is known of the pose, in the frames of source and target; see `align`.
-    source_viewpoint, target_viewpoint : (3,) or (V, 3) array, "auto" or "none", optional
+    source_viewpoint, target_viewpoint : (3,) or (V, 3) array, "auto", "none" or "model", optional
         Where the clouds were seen from: viewpoints of `prepare`.
     options : RegistrationOptions, optional
         Instead of voxel_size, quality and seed.

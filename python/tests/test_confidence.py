@@ -97,7 +97,13 @@ def test_the_shipped_coefficients_make_the_confidences(name):
         a, b = corner(seed, boxes, points), moved(corner(seed + 50, boxes, points), pose(seed))
         eye = np.array([[1.3, 1.4, 1.5]])
         source = gpureg.prepare(a, viewpoints=eye, options=options.prepare)
-        target = gpureg.prepare(b, viewpoints=moved(eye, pose(seed)), options=options.prepare)
+        there = moved(eye, pose(seed))
+        if model.model:  # the normals say which side is outside
+            target = gpureg.prepare(
+                b, normals=there - b, viewpoints="model", options=options.prepare
+            )
+        else:
+            target = gpureg.prepare(b, viewpoints=there, options=options.prepare)
         result = gpureg.align(source, target, options=options)
         assert result.modes
         run = run_of(result, options, source, target)
@@ -114,8 +120,12 @@ def test_the_shipped_coefficients_make_the_confidences(name):
         )
         names = np.array(_core._confidence_feature_names())
         differs.update(names[(ranking != verified).any(0)])
-    # Small front violations rank modes alone, where free space is known.
-    assert differs == ({"log_front_violation_near"} if all(model) else set())
+    # Small front violations rank modes alone, where free space is known, and so do the normals of scans on models.
+    ranking_alone = {
+        (True, True, False): {"log_front_violation_near"},
+        (False, True, True): {"log_higher_weighted_overlap"},
+    }
+    assert differs == ranking_alone.get(tuple(model), set())
 
 
 def test_the_header_is_of_todays_format():
@@ -163,9 +173,9 @@ def test_wrong_evidence_is_named():
         if values is not None:
             wrong[key] = values
         with pytest.raises(ValueError, match=message):
-            _core._confidence_features(wrong, True, True, "ranking")
+            _core._confidence_features(wrong, True, True, False, "ranking")
     with pytest.raises(ValueError, match="regressand"):
-        _core._confidence_features(evidence, True, True, "pose")
+        _core._confidence_features(evidence, True, True, False, "pose")
 
 
 def test_changed_evidence_is_of_one_side():

@@ -26,6 +26,9 @@ void PointCloudView::validate() const {
     require(std::isfinite(viewpoints[k]), "cloud.viewpoints", viewpoints[k], "finite coordinates");
   require(viewpoint_count == 0 || infer_viewpoint, "cloud.infer_viewpoint", "false",
           "true, as viewpoints are given");
+  require(!model || normals != nullptr, "cloud.model", "true",
+          "false, or normals that point outwards");
+  require(!model || viewpoint_count == 0, "cloud.model", "true", "false, as viewpoints are given");
   for (const double coordinate : origin)
     require(std::isfinite(coordinate), "cloud.origin", coordinate, "finite coordinates");
 }
@@ -57,6 +60,7 @@ PointCloudView PointCloud::view() const {
     v.viewpoints = viewpoints.front().data();
     v.viewpoint_count = viewpoints.size();
   }
+  v.model = model && v.normals && v.viewpoint_count == 0;
   return v;
 }
 

@@ -111,9 +111,10 @@ void resolve_viewpoints(Engine& engine, Span<const RawCloud> raw,
     PreparedState& state = *states[k];
     const CloudKnowledge& known = knowledge[k];
     state.statistics.viewpoint = known.viewpoints ? ViewpointSource::said
+                                 : known.model    ? ViewpointSource::model
                                  : known.normals  ? ViewpointSource::normals
                                                   : ViewpointSource::origin;
-    if (known.viewpoints || options.depth_maps == 0 || state.size == 0) continue;
+    if (known.viewpoints || known.model || options.depth_maps == 0 || state.size == 0) continue;
     open.push_back({k,
                     SurfaceGraph(state.copy_points(), state.copy_normals(),
                                  kGraphRadius * options.normal_radius),

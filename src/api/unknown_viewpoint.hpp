@@ -12,12 +12,13 @@ namespace gpureg {
 struct CloudKnowledge {
   bool viewpoints, normals, features;  ///< given
   bool infer_viewpoint;                ///< PointCloudView::infer_viewpoint
+  bool model;                          ///< PointCloudView::model
 };
 
 template <typename View>
 CloudKnowledge knowledge_of(const View& view) {
   return {view.viewpoint_count > 0, view.normals != nullptr, view.features != nullptr,
-          view.infer_viewpoint};
+          view.infer_viewpoint, view.model};
 }
 
 /// Sets PrepareStatistics::viewpoint of prepared clouds. Clouds whose sides turn out to be others

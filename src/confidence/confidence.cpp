@@ -11,7 +11,7 @@ namespace gpureg::confidence {
 namespace {
 
 const ConfidenceModel& model_of(AvailableEvidence available) {
-  if (available.model) return available.free_space ? kModelAndFreeSpace : kModel;
+  if (available.model) return kModel;
   if (available.free_space) return available.surface_sides ? kFreeSpaceAndSurfaceSides : kFreeSpace;
   return available.surface_sides ? kSurfaceSides : kOverlapAlone;
 }

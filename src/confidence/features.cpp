@@ -112,6 +112,19 @@ void add_surface_sides(const PoseEvidence& e, bool free_space, Regressand regres
   set(Feature::lower_behind_share, behind_share.lower());
 }
 
+/// A scan lies on its model as a whole, and is the better covered side: the model has a back, and
+/// more of everything. Matches of features tell little: those of machined parts are few, and many
+/// by chance.
+void add_containment(const PoseEvidence& e, Regressand regressand, Setter& set) {
+  const Sides covered{e.source_overlap_any_normal, e.target_overlap_any_normal};
+  set(Feature::log_uncovered, log_at_least(1 - covered.higher(), kMinUncovered));
+  // How well normals agree depends on the noise of the scan, and tells which pose is the better
+  // one, not whether it is correct.
+  if (regressand == Regressand::confidence) return;
+  const Sides weighted{e.source_normal_weighted_overlap, e.target_normal_weighted_overlap};
+  set(Feature::log_higher_weighted_overlap, log_at_least(weighted.higher(), kMinOverlap));
+}
+
 constexpr const char* kNames[] = {"log_match_support",
                                   "log_match_inliers",
                                   "log_lower_weighted_overlap",
@@ -158,8 +171,7 @@ AvailableEvidence available_evidence(const std::vector<PoseEvidence>& modes, Vie
     available.free_space |= e.source_observed > 0 || e.target_observed > 0;
     available.surface_sides |= e.source_near_surface > 0 && e.target_near_surface > 0;
   }
-  available.model = available.surface_sides &&
-                    (source == ViewpointSource::model || target == ViewpointSource::model);
+  available.model = source == ViewpointSource::model || target == ViewpointSource::model;
   return available;
 }
 
@@ -167,14 +179,13 @@ Features features_of(const PoseEvidence& evidence, AvailableEvidence available,
                      Regressand regressand) {
   Features features{};
   Setter set(features);
+  if (available.model) {
+    add_containment(evidence, regressand, set);
+    return features;
+  }
   add_overlap(evidence, set);
   if (available.free_space) add_free_space(evidence, set);
   if (available.surface_sides) add_surface_sides(evidence, available.free_space, regressand, set);
-  if (available.model) {
-    // The scan is the better covered side: the model has a back, and more of everything.
-    const Sides covered{evidence.source_overlap_any_normal, evidence.target_overlap_any_normal};
-    set(Feature::log_uncovered, log_at_least(1 - covered.higher(), kMinUncovered));
-  }
   return features;
 }
 

@@ -66,7 +66,7 @@ struct AvailableEvidence {
   bool free_space = false;
   bool surface_sides = false;
   /// One of the clouds is a model: a closed surface, so that all of the other cloud should lie on
-  /// it. Asks for surface sides.
+  /// it. Other features than containment and the rank do not apply then.
   bool model = false;
 };
 

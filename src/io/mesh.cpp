@@ -165,6 +165,7 @@ PointCloud sample_mesh(const SurfaceMesh& mesh, double spacing) {
   std::mt19937 random(1);
   const auto unit = [&] { return static_cast<double>(random()) / 4294967296.0; };
   PointCloud cloud;
+  cloud.model = true;
   cloud.points.reserve(count);
   cloud.normals.reserve(count);
   std::size_t f = 0;

@@ -48,7 +48,7 @@ TEST_F(Knowledge, WrongViewpointsAreNamed) {
     for (const char* value :
          {"0,0", "0,0,0,0", "0,0,nan", "inf,0,0", "0,0,1e999", "here", "", ",,", "1;2;3", "0,0,x"})
       refused({option, value},
-              {option, std::string(" is ") + value, "x,y,z (finite), none or auto"});
+              {option, std::string(" is ") + value, "x,y,z (finite), model, none or auto"});
 }
 
 TEST_F(Knowledge, AViewpointInAWallIsSaid) {

@@ -58,6 +58,22 @@ TEST(Features, OnlyOfAvailableEvidence) {
   EXPECT_EQ(value(none, Feature::log_lower_overlap), std::log(0.4));
 }
 
+// Of a scan on a model, containment and the rank tell alone.
+TEST(Features, ContainmentInModels) {
+  const Features x = features_of(some_evidence(), {true, true, true}, Regressand::confidence);
+  EXPECT_EQ(value(x, Feature::log_uncovered), std::log(1 - 0.55));
+  EXPECT_EQ(std::count(x.begin(), x.end(), 0.0), static_cast<std::ptrdiff_t>(kFeatureCount - 1));
+  const Features rank = features_of(some_evidence(), {true, true, true}, Regressand::ranking);
+  EXPECT_EQ(value(rank, Feature::log_higher_weighted_overlap), std::log(0.4));
+  EXPECT_EQ(std::count(rank.begin(), rank.end(), 0.0),
+            static_cast<std::ptrdiff_t>(kFeatureCount - 2));
+  const std::vector<PoseEvidence> modes{some_evidence()};
+  using V = ViewpointSource;
+  EXPECT_TRUE(available_evidence(modes, V::model, V::said).model);
+  EXPECT_TRUE(available_evidence(modes, V::none, V::model).model);
+  EXPECT_FALSE(available_evidence(modes, V::normals, V::said).model);
+}
+
 // Where free space is known, small front violations rank modes and leave the confidence alone.
 TEST(Features, SmallFrontViolationsOnlyRank) {
   const auto near_of = [](AvailableEvidence available, Regressand regressand) {
@@ -90,11 +106,14 @@ TEST(Confidence, OfTheGeneratedModel) {
   const Kind kinds[] = {{{true, true}, kFreeSpaceAndSurfaceSides},
                         {{false, true}, kSurfaceSides},
                         {{true, false}, kFreeSpace},
-                        {{false, false}, kOverlapAlone}};
+                        {{false, false}, kOverlapAlone},
+                        {{true, true, true}, kModel},
+                        {{false, true, true}, kModel}};
   const PoseEvidence better = some_evidence();
   PoseEvidence worse = better;
   worse.match_inliers = 5;
   worse.source_front_violation_near = 0.1;
+  worse.source_normal_weighted_overlap = 0.3;
   constexpr std::uint32_t kRefined = 16;
   const OverlapCount overlap{90, 2000};
   const auto probability = [](double odds) { return 1 / (1 + std::exp(-odds)); };
