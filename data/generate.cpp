@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "data/building_file.hpp"
+#include "data/building_texture.hpp"
 #include "data/depth_sensor.hpp"
 #include "data/fusion.hpp"
 #include "data/ground_truth.hpp"
@@ -85,6 +86,7 @@ void parallel(int threads, int count, const Work& work) {
 
 House furnished_building(const GenerateOptions& options) {
   House house{{}, {}, {}, read_building(options.building)};
+  texture_building(house.mesh, options.seed);
   scatter(house, options.seed, options.clutter);
   return house;
 }

@@ -30,7 +30,8 @@ struct GenerateOptions {
   int frames_per_fragment = 50;  ///< 1 .. 1000; the camera moves about 1.5 cm per frame
   std::uint64_t seed = 1;        ///< building, furniture, path and noise all follow from it
   /// A mesh to scan instead of a building of its own: metres, z up (glTF and COLLADA: as the file
-  /// has it), floor at z = 0, one storey. Any format that Assimp reads.
+  /// has it), floor at z = 0, one storey. Any format that Assimp reads. In the colour images every
+  /// connected part has a texture of its own, from the seed, in the colours of the file.
   std::string building;
   /// 0 .. 2, with building: pieces of furniture per square metre that are put into it, so that what
   /// was copied in it differs

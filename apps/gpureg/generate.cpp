@@ -92,8 +92,10 @@ void add_generate(CLI::App& app, Action& chosen) {
       ->check(natural_number())
       ->capture_default_str();
   verb->add_option("--threads", o->scene.threads, "0: all")->capture_default_str();
-  verb->add_option("--building", o->scene.building,
-                   "Mesh to scan instead of a building of its own: metres, z up, floor at z = 0");
+  verb->add_option(
+      "--building", o->scene.building,
+      "Mesh to scan instead of a building of its own: metres, z up, floor at z = 0. Its parts "
+      "get textures, in the colours of the file");
   verb->add_option("--clutter", o->scene.clutter,
                    "Pieces of furniture per square metre to put into it; copied rooms then differ")
       ->capture_default_str();

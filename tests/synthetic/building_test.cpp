@@ -6,6 +6,8 @@
 #include <cmath>
 #include <sstream>
 
+#include "data/building_texture.hpp"
+#include "data/rgbd.hpp"
 #include "gpureg/error.hpp"
 #include "scene.hpp"
 #include "support/expect_error.hpp"
@@ -84,6 +86,52 @@ TEST(Building, SameSeedSameBytes) {
   options.threads = 1;
   generate(b.path(), options);
   EXPECT_TRUE(all_files(a.path()) == all_files(b.path()));
+}
+
+/// Standard deviation of the green channel before a wall of the room.
+double contrast(const synthetic::Mesh& mesh) {
+  const synthetic::RayScene scene(mesh);
+  Eigen::Isometry3d camera = Eigen::Isometry3d::Identity();
+  camera.linear() << 1, 0, 0, 0, 0, 1, 0, -1, 0;  // looks along y
+  camera.translation() = Eigen::Vector3d(3, 2.5, 1.2);
+  const std::vector<std::uint8_t> image = synthetic::render_colour(scene, camera, 1, 0);
+  double sum = 0, squares = 0;
+  for (std::size_t k = 1; k < image.size(); k += 3) {
+    sum += image[k];
+    squares += static_cast<double>(image[k]) * image[k];
+  }
+  const double count = static_cast<double>(image.size()) / 3;
+  return std::sqrt(squares / count - sum / count * sum / count);
+}
+
+TEST(Building, HasTexture) {
+  const TemporaryFolder folder;
+  const synthetic::Mesh bare = read_building(folder.write("room.obj", room()));
+  synthetic::Mesh a = bare, same = bare, other = bare;
+  texture_building(a, 1);
+  texture_building(same, 1);
+  texture_building(other, 2);
+  ASSERT_EQ(a.materials.size(), bare.materials.size());
+  for (const synthetic::Material& material : a.palette)
+    EXPECT_EQ(material.base, bare.palette[0].base) << "the file's colour stays";
+  EXPECT_LT(contrast(bare), 3) << "the camera's noise";
+  EXPECT_GT(contrast(a), 6);
+  EXPECT_EQ(contrast(a), contrast(same));
+  EXPECT_NE(contrast(a), contrast(other));
+}
+
+// Parts that touch nowhere have materials of their own.
+TEST(Building, EachPartHasItsTexture) {
+  const TemporaryFolder folder;
+  std::string two = room();
+  two += "v 2 1 0\nv 3 1 0\nv 2 1 1\nf 9 10 11\n";
+  synthetic::Mesh mesh = read_building(folder.write("two.obj", two));
+  ASSERT_EQ(mesh.palette.size(), 1u);
+  texture_building(mesh, 1);
+  ASSERT_EQ(mesh.palette.size(), 2u);
+  EXPECT_EQ(mesh.materials.front(), 0);
+  EXPECT_EQ(mesh.materials.back(), 1);
+  EXPECT_NE(mesh.palette[0].second, mesh.palette[1].second);
 }
 
 TEST(Building, WhereNobodyCanWalk) {
