@@ -22,6 +22,13 @@ Eigen::Matrix<double, 6, 6> odometry_information(const Eigen::Isometry3d& motion
 
 }  // namespace
 
+Misfit misfit_of(const Map& map, int a, int b, const Eigen::Isometry3d& a_from_b) {
+  const Eigen::Isometry3d error = a_from_b.inverse() *
+                                  map.keyframes[at(a)].world_from_camera.inverse() *
+                                  map.keyframes[at(b)].world_from_camera;
+  return {error.translation().norm(), Eigen::AngleAxisd(error.linear()).angle()};
+}
+
 void move_keyframes(const std::vector<Eigen::Isometry3d>& poses, Map& map) {
   std::vector<Eigen::Isometry3d> correction;
   for (std::size_t k = 0; k < poses.size(); ++k) {
@@ -61,6 +68,18 @@ void KeyframeGraph::add(int loop, const std::vector<RelativePose>& edges) {
 std::vector<RelativePose> KeyframeGraph::loop_edges() const {
   std::vector<RelativePose> result;
   for (const auto& [loop, edges] : loops_) result.insert(result.end(), edges.begin(), edges.end());
+  return result;
+}
+
+std::vector<int> KeyframeGraph::misfits(const Map& map, double metres, double radians) const {
+  std::vector<int> result;
+  for (const auto& [loop, edges] : loops_) {
+    if (std::any_of(edges.begin(), edges.end(), [&](const RelativePose& edge) {
+          const Misfit misfit = misfit_of(map, edge.a, edge.b, edge.a_from_b);
+          return misfit.metres > metres || misfit.radians > radians;
+        }))
+      result.push_back(loop);
+  }
   return result;
 }
 

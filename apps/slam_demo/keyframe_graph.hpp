@@ -14,6 +14,12 @@ inline gpureg::UnalignedIsometry3d unaligned(const Eigen::Isometry3d& pose) {
   return gpureg::UnalignedIsometry3d(pose.matrix());
 }
 
+/// How far a measured relative pose is from the poses of its keyframes.
+struct Misfit {
+  double metres = 0, radians = 0;
+};
+Misfit misfit_of(const Map& map, int a, int b, const Eigen::Isometry3d& a_from_b);
+
 /// The pose graph of the keyframes: what tracking measured between neighbours, and loops. Loops are
 /// kept by number, so that a retraction takes them out again.
 class KeyframeGraph {
@@ -35,6 +41,9 @@ class KeyframeGraph {
   std::string optimize(Map& map) const;
 
   std::vector<RelativePose> loop_edges() const;
+
+  /// Numbers of the loops with an edge that is farther from the poses of the map.
+  std::vector<int> misfits(const Map& map, double metres, double radians) const;
 
   /// Poses of all keyframes by tracking alone, each session from its first keyframe.
   std::vector<Eigen::Isometry3d> odometry_poses(const Map& map) const;

@@ -25,6 +25,9 @@ constexpr double kDriftMetres = 0.2, kDriftShare = 0.02, kDriftRadians = 0.2;
 // Surfaces over many frames hold a registered pair better than LoopCloser states, which speaks of
 // single registrations with correlated points: a third of its standard deviation.
 constexpr double kDenseCertainty = 9;
+// What a registered loop may differ from the adjusted poses of its keyframes: beyond, something is
+// wrong with the fragments, and the pose that all else agrees on is the better one.
+constexpr double kMisfitMetres = 0.1, kMisfitRadians = 0.05;
 
 }  // namespace
 
@@ -99,7 +102,7 @@ bool LoopClosing::search_images(int index) {
   if (!found || !plausible(found->edge)) return false;
   const int number = kImageLoops + image_loops_++;
   graph_.add(number, {found->edge});
-  image_records_.push_back({index, found->edge.a, found->inliers, found->edge.a_from_b});
+  image_records_.push_back({index, found->edge.a, found->inliers, found->edge.a_from_b, false});
   // Poses first: an observation of a point of another world would not fit.
   optimize();
   for (const auto& [key, point] : found->matches) map_.add_observation(point, {index, key, number});
@@ -255,6 +258,34 @@ bool LoopClosing::moved_since_bundle() const {
       return true;
   }
   return adjusted_.empty();
+}
+
+bool LoopClosing::retract_misfits() {
+  const std::vector<int> misfits = graph_.misfits(map_, kMisfitMetres, kMisfitRadians);
+  for (const int number : misfits) {
+    map_.remove_loop(number);
+    graph_.remove(number);
+    if (number >= kImageLoops) {
+      image_records_[at(number - kImageLoops)].retracted = true;
+      continue;
+    }
+    LoopRecord& record = records_[at(number)];
+    record.state = lc::to_string(lc::LoopState::retracted);
+    record.reason = "misfit";
+    record.image_loops = 0;
+  }
+  return !misfits.empty();
+}
+
+bool LoopClosing::conclude(int iterations) {
+  if (options_.bundle) bundle_all(iterations);
+  bool moved = options_.bundle;
+  while (retract_misfits()) {
+    optimize();
+    if (options_.bundle) bundle_all(iterations);
+    moved = true;
+  }
+  return moved;
 }
 
 void LoopClosing::bundle_all(int iterations) {

@@ -37,6 +37,7 @@ struct LoopRecord {
 struct ImageLoopRecord {
   int keyframe = 0, target = 0, inliers = 0;
   Eigen::Isometry3d target_from_source = Eigen::Isometry3d::Identity();  ///< of the keyframes
+  bool retracted = false;
 };
 
 /// Closes loops: fragments go to gpureg's LoopCloser; what it accepts moves keyframes, starts the
@@ -55,8 +56,9 @@ class LoopClosing {
   void add_fragment(const BuiltFragment& fragment);
   /// Registers what is due. Returns whether keyframes moved.
   bool process();
-  /// Adjusts all keyframes and points; the last word.
-  void bundle_all(int iterations);
+  /// The last word: adjusts all keyframes and points, and takes back the loops that do not fit the
+  /// result. Returns whether keyframes moved.
+  bool conclude(int iterations);
 
   const std::vector<LoopRecord>& records() const { return records_; }
   const std::vector<ImageLoopRecord>& image_records() const { return image_records_; }
@@ -76,6 +78,8 @@ class LoopClosing {
   std::vector<int> image_candidates(int keyframe) const;
   bool plausible(const RelativePose& loop) const;
   void optimize();
+  void bundle_all(int iterations);
+  bool retract_misfits();
   void adjust_if_moved();
   bool moved_since_bundle() const;
   int number_of(int source, int target);

@@ -10,6 +10,7 @@
 #include <iostream>
 
 #include "output.hpp"
+#include "rerun.hpp"
 #include "stopwatch.hpp"
 #include "tracking_file.hpp"
 
@@ -20,7 +21,8 @@ std::atomic<bool> interrupted{false};
 void interrupt(int) { interrupted = true; }
 
 struct Arguments {
-  std::string sequence, backend = "auto", truth, surface, tracking, output = "slam_demo_output";
+  std::string sequence, backend = "auto", truth, surface, tracking, rerun,
+                        output = "slam_demo_output";
   std::vector<double> colour, depth;
   double depth_units = 0, baseline = 0;
   int first = 0, frames = 0;
@@ -50,6 +52,7 @@ void set_rig(const Arguments& a, Rig& rig) {
 }
 
 int run(const Arguments& a) {
+  if (!a.rerun.empty()) require_rerun();  // not after an hour of frames
   Sequence sequence = open_sequence(a.sequence);
   set_rig(a, sequence.rig);
   RunResult result;
@@ -84,7 +87,7 @@ int run(const Arguments& a) {
   {
     const Stopwatch watch(total);
     double since = 0;
-    if (replays) slam.replay(read_tracking(a.tracking));
+    if (replays) slam.replay(read_tracking(a.tracking), [] { return interrupted.load(); });
     std::future<Images> ahead;  // the next frame is read while this one is tracked
     const auto read_ahead = [&](std::size_t k) {
       if (k < last)
@@ -128,6 +131,7 @@ int run(const Arguments& a) {
     surface = a.sequence + "/surface.ply";
   evaluate(slam, surface, result);
   write_results(a.output, slam, result);
+  if (!a.rerun.empty()) write_rerun(a.output, a.rerun);
   std::printf(
       "%zu frames, %d lost, %zu keyframes, %d fragments, %zu loops, %zu worlds, %.1f s, %.1f "
       "frames/s\n",
@@ -170,6 +174,9 @@ int main(int count, char** values) {
       "--tracking", a.tracking,
       "File with what tracking found. Where there is none the run only tracks, and writes "
       "it; runs with it close the loops only");
+  app.add_option(
+      "--rerun", a.rerun,
+      "Also write a recording for the viewer of rerun.io (needs python3 with rerun-sdk)");
   app.add_option("--seed", a.slam.loops.seed, "Of the registration")->capture_default_str();
   app.add_flag("--no-map", a.no_map, "Do not fuse surfels");
   app.add_flag("--sequential", a.sequential,

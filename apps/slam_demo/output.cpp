@@ -14,6 +14,8 @@ namespace {
 namespace ev = gpureg::evaluation;
 using nlohmann::json;
 
+constexpr double kDegrees = 57.29577951308232;  // of a radian
+
 void append(std::string& bytes, float value) {
   std::uint32_t bits;
   std::memcpy(&bits, &value, sizeof(bits));
@@ -67,7 +69,7 @@ json loop_error(double target_time, double source_time, const Eigen::Isometry3d&
   const Eigen::Isometry3d truth = world_from_camera[0].inverse() * world_from_camera[1],
                           error = truth.inverse() * target_from_source;
   return {{"translation_m", error.translation().norm()},
-          {"rotation_degrees", Eigen::AngleAxisd(error.linear()).angle() * 57.29577951308232}};
+          {"rotation_degrees", Eigen::AngleAxisd(error.linear()).angle() * kDegrees}};
 }
 
 json loops_json(const Slam& slam, const RunResult& result) {
@@ -86,6 +88,12 @@ json loops_json(const Slam& slam, const RunResult& result) {
                                                      : loop_error(r.target_time, r.source_time,
                                                                   r.target_from_source, result)},
                      {"image_loops", r.image_loops}});
+    if (r.state == "accepted") {
+      const Misfit misfit =
+          misfit_of(slam.map(), r.target_keyframe, r.source_keyframe, r.target_from_source);
+      loops.back()["misfit"] = {{"translation_m", misfit.metres},
+                                {"rotation_degrees", misfit.radians * kDegrees}};
+    }
     loops.back()["drift_ratio"] =
         std::isfinite(r.drift_ratio) ? json(r.drift_ratio) : json(nullptr);
   }
@@ -93,6 +101,7 @@ json loops_json(const Slam& slam, const RunResult& result) {
     image.push_back({{"keyframe", r.keyframe},
                      {"target_keyframe", r.target},
                      {"inliers", r.inliers},
+                     {"state", r.retracted ? "retracted" : "accepted"},
                      {"error", loop_error(slam.map().keyframes[at(r.target)].time,
                                           slam.map().keyframes[at(r.keyframe)].time,
                                           r.target_from_source, result)}});

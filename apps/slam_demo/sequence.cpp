@@ -169,8 +169,8 @@ Sequence open_seven_scenes(const fs::path& folder) {
   rig.truth_of_depth = true;
   rig.depth = {585, 585, 320, 240};
   // Measured on depth and colour edges of the red kitchen; the data set publishes neither.
-  rig.colour = {525, 525, 320, 240};
-  rig.colour_from_depth.translation() = Eigen::Vector3d(-0.025, 0, 0);
+  rig.colour = {525.5, 525.5, 322.2, 235.8};
+  rig.colour_from_depth.translation() = Eigen::Vector3d(-0.031, 0.007, 0);
   if (fs::exists(folder / "camera-intrinsics.txt")) {
     const std::vector<double> k = read_numbers(folder / "camera-intrinsics.txt", 9);
     rig.depth = {k[0], k[4], k[2], k[5]};

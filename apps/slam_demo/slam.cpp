@@ -123,7 +123,7 @@ Tracking Slam::tracking() const {
   return {map_, frames_, kept_, surfels_->download(), lost_, dense_};
 }
 
-void Slam::replay(const Tracking& tracking) {
+void Slam::replay(const Tracking& tracking, const std::function<bool()>& stop) {
   map_ = tracking.map;
   frames_ = tracking.frames;
   lost_ = tracking.lost;
@@ -132,6 +132,7 @@ void Slam::replay(const Tracking& tracking) {
   loops_.record_all_odometry();
   std::size_t next = 0;
   for (const BuiltFragment& fragment : tracking.fragments) {
+    if (stop && stop()) return;
     for (; next < map_.keyframes.size() && map_.keyframes[next].frame <= fragment.last_frame;
          ++next)
       with_correction([&] { return loops_.search_images(static_cast<int>(next)); });
@@ -142,11 +143,7 @@ void Slam::replay(const Tracking& tracking) {
 void Slam::finish() {
   end_fragment();
   tracker_.settle();
-  if (!options_.loops.bundle) return;
-  with_correction([&] {
-    loops_.bundle_all(options_.final_iterations);
-    return true;
-  });
+  with_correction([&] { return loops_.conclude(options_.final_iterations); });
 }
 
 surfel::Cloud Slam::surfels() const {

@@ -45,8 +45,9 @@ class Slam {
 
   /// What was tracked so far; fragments only where the options keep them.
   Tracking tracking() const;
-  /// Instead of the frames: closes the loops of what another run tracked without loops.
-  void replay(const Tracking& tracking);
+  /// Instead of the frames: closes the loops of what another run tracked without loops, until stop
+  /// says so.
+  void replay(const Tracking& tracking, const std::function<bool()>& stop = nullptr);
 
   /// Poses of the tracked frames in the largest world, of the camera that the truth speaks of.
   Trajectory trajectory() const;

@@ -56,6 +56,7 @@ def is_false(loop: dict) -> bool:
 
 def row_of(name: str, seed: int, figures: dict) -> dict:
     accepted = [loop for loop in figures["loops"] if loop["state"] == "accepted"]
+    images = [loop for loop in figures["image_loops"] if loop["state"] == "accepted"]
     surface = figures["surface"]
     return {
         "row": name,
@@ -66,8 +67,8 @@ def row_of(name: str, seed: int, figures: dict) -> dict:
         "surface_median_m": surface and surface["median_m"],
         "dense_loops": len(accepted),
         "false_dense_loops": sum(map(is_false, accepted)),
-        "image_loops": len(figures["image_loops"]),
-        "false_image_loops": sum(map(is_false, figures["image_loops"])),
+        "image_loops": len(images),
+        "false_image_loops": sum(map(is_false, images)),
         "seconds": figures["seconds"],
     }
 

@@ -5,8 +5,10 @@
 #include <gpureg/error.hpp>
 #include <gpureg/io.hpp>
 
+#include <cstdlib>
 #include <nlohmann/json.hpp>
 
+#include "rerun.hpp"
 #include "tracking_file.hpp"
 
 namespace slam_demo {
@@ -77,6 +79,42 @@ TEST(EndToEnd, SequentialRunsGiveTheSameBitsAndSoDoesTheFileOfTracking) {
   EXPECT_THROW(read_tracking(folder / "cut"), gpureg::IoError);
   folder.write("other", "slam_demo tracking 0\n");
   EXPECT_THROW(read_tracking(folder / "other"), gpureg::IoError);
+}
+
+/// The folder of an output with three poses and two surfels.
+void write_small_output(const gpureg::test::TemporaryFolder& folder) {
+  for (const char* name : {"trajectory.txt", "odometry.txt", "keyframes.txt"})
+    folder.write(name, "0.0 0 0 0 0 0 0 1\n0.1 0.1 0 0 0 0 0 1\n0.2 0.2 0 0 0 0 0 1\n");
+  folder.write("map.ply", "ply\nend_header\n" + std::string(2 * 35, '\0'));
+}
+
+TEST(Rerun, WritesARecording) {
+  if (std::system("python3 -c 'import rerun' 2> /dev/null") != 0)
+    GTEST_SKIP() << "python3 has no rerun-sdk";
+  const gpureg::test::TemporaryFolder folder;
+  write_small_output(folder);
+  write_rerun(folder.path(), folder / "map.rrd");
+  const std::string bytes = gpureg::test::content_of(folder / "map.rrd");
+  EXPECT_EQ(bytes.substr(0, 3), "RRF") << "the format's magic number";
+  for (const char* entity :
+       {"/world/map", "/world/trajectory", "/world/odometry", "/world/keyframes", "/world/camera"})
+    EXPECT_NE(bytes.find(entity), std::string::npos) << entity;
+  folder.write("map.ply", "no cloud");
+  EXPECT_THROW(write_rerun(folder.path(), folder / "other.rrd"), gpureg::Error);
+}
+
+TEST(Rerun, SaysWhatIsMissing) {
+  const gpureg::test::TemporaryFolder empty;
+  const std::string path = std::getenv("PATH");
+  setenv("PATH", empty.path().c_str(), 1);
+  std::string message;
+  try {
+    require_rerun();
+  } catch (const gpureg::Error& error) {
+    message = error.what();
+  }
+  setenv("PATH", path.c_str(), 1);
+  EXPECT_NE(message.find("python3"), std::string::npos) << message;
 }
 
 }  // namespace

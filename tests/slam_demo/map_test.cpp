@@ -141,6 +141,22 @@ TEST(KeyframeGraph, ARetractionIsUndone) {
   }
 }
 
+TEST(KeyframeGraph, ALoopThatOthersContradictIsAMisfit) {
+  Drift d;
+  d.graph.add(3, {d.closing()});
+  const Eigen::Isometry3d true_pose = d.truth[2].inverse() * d.truth[9];
+  d.graph.add(4, {{2, 9, true_pose * at(0.3, 0, 0), information_of(0.05, 0.05)}});
+  d.graph.optimize(d.map);
+  EXPECT_EQ(d.graph.misfits(d.map, 0.1, 0.05), (std::vector<int>{4}));
+  EXPECT_EQ(d.graph.misfits(d.map, 0.5, 0.5), (std::vector<int>{}));
+  d.graph.remove(4);
+  d.graph.add(
+      5, {{2, 9, true_pose, information_of(0.05, 0.05)},
+          {3, 8, d.truth[3].inverse() * d.truth[8] * at(0, 0, 0, 0.2), information_of(0.5, 0.05)}});
+  d.graph.optimize(d.map);
+  EXPECT_EQ(d.graph.misfits(d.map, 0.1, 0.05), (std::vector<int>{5})) << "one edge suffices";
+}
+
 TEST(KeyframeGraph, SessionsKeepTheirWorldsUntilALoopMergesThem) {
   Map map;
   KeyframeGraph graph;
