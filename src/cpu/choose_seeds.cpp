@@ -5,6 +5,7 @@
 
 #include "cpu/compatibility.hpp"
 #include "cpu/stages.hpp"
+#include "cpu/wide_vectors.hpp"
 
 namespace gpureg::cpu {
 namespace {
@@ -15,8 +16,10 @@ constexpr std::uint32_t kTile = 1024;  // columns: they stay in the nearest cach
 /// Compatibility is symmetric: each pair of matches is tested once and counts for both. Adds the
 /// compatible pairs of the rows [begin, end) with themselves and with all later matches. out: one
 /// count per match.
-void count_compatible(const MatchSet& matches, const CompatibilityTest& test, std::uint32_t begin,
-                      std::uint32_t end, std::uint32_t* out) {
+GPUREG_ALWAYS_INLINE void count_compatible_in_vectors(const MatchSet& matches,
+                                                      const CompatibilityTest& test,
+                                                      std::uint32_t begin, std::uint32_t end,
+                                                      std::uint32_t* out) {
   const MatchColumns columns(matches);
   const std::uint32_t n = matches.size();
   for (std::uint32_t i = begin; i < end; ++i) {
@@ -66,6 +69,22 @@ void count_compatible(const MatchSet& matches, const CompatibilityTest& test, st
       out[i] += count;
     }
   }
+}
+
+#ifdef GPUREG_WIDE_TARGET
+GPUREG_WIDE_TARGET void count_compatible_wide(const MatchSet& matches,
+                                              const CompatibilityTest& test, std::uint32_t begin,
+                                              std::uint32_t end, std::uint32_t* out) {
+  count_compatible_in_vectors(matches, test, begin, end, out);
+}
+#endif
+
+void count_compatible(const MatchSet& matches, const CompatibilityTest& test, std::uint32_t begin,
+                      std::uint32_t end, std::uint32_t* out) {
+#ifdef GPUREG_WIDE_TARGET
+  if (has_wide_vectors()) return count_compatible_wide(matches, test, begin, end, out);
+#endif
+  count_compatible_in_vectors(matches, test, begin, end, out);
 }
 
 /// Matches in the order of their source points along the longest axis of the cloud, so that

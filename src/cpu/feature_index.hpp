@@ -30,9 +30,10 @@ FeatureIndex index_features(FeatureRows rows);
 /// Searches the nearest row for the rows begin to end (exclusive) in the order of their own index,
 /// and for the rows that equal them.
 /// out[q]: result of nearest_features() with k = 1 for row q. The rows of one leaf are similar, so
-/// each search starts with the result of the previous one.
+/// each search starts with the result of the previous one. wide_vectors: use those of
+/// AVX-512 where there are some; the result is the same.
 void nearest_features(FeatureRows queries, const FeatureIndex& order, FeatureRows rows,
                       const FeatureIndex& index, std::size_t begin, std::size_t end,
-                      std::uint32_t* out);
+                      std::uint32_t* out, bool wide_vectors = true);
 
 }  // namespace gpureg::cpu

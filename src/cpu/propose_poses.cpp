@@ -4,6 +4,7 @@
 #include "algorithm/fit.hpp"
 #include "cpu/compatibility.hpp"
 #include "cpu/stages.hpp"
+#include "cpu/wide_vectors.hpp"
 
 namespace gpureg::cpu {
 namespace {
@@ -54,6 +55,21 @@ struct Members {
   /// Total weight of the members that the motion aligns. Stops, with a value up to `best`, as soon
   /// as more is out of range.
   std::uint32_t support(const Rigid& pose, float squared_distance, std::uint32_t best) const {
+#ifdef GPUREG_WIDE_TARGET
+    if (has_wide_vectors()) return support_wide(pose, squared_distance, best);
+#endif
+    return support_in_vectors(pose, squared_distance, best);
+  }
+
+ private:
+#ifdef GPUREG_WIDE_TARGET
+  GPUREG_WIDE_TARGET std::uint32_t support_wide(const Rigid& pose, float squared_distance,
+                                                std::uint32_t best) const {
+    return support_in_vectors(pose, squared_distance, best);
+  }
+#endif
+  GPUREG_ALWAYS_INLINE std::uint32_t support_in_vectors(const Rigid& pose, float squared_distance,
+                                                        std::uint32_t best) const {
     const float *ax = px.data(), *ay = py.data(), *az = pz.data(), *bx = qx.data(), *by = qy.data(),
                 *bz = qz.data();
     const std::uint32_t* w = weight.data();
@@ -125,9 +141,8 @@ bool fit_seed(const MatchSet& m, std::uint32_t seed, const CompatibilityOptions&
   return true;
 }
 
-}  // namespace
-
-MatchEvidence count_matches(const MatchSet& m, const Rigid& pose, float squared_distance) {
+GPUREG_ALWAYS_INLINE MatchEvidence count_in_vectors(const MatchSet& m, const Rigid& pose,
+                                                    float squared_distance) {
   const float *px = m.px.data(), *py = m.py.data(), *pz = m.pz.data(), *qx = m.qx.data(),
               *qy = m.qy.data(), *qz = m.qz.data();
   const std::uint32_t *ws = m.source_weight.data(), *wt = m.target_weight.data();
@@ -151,6 +166,22 @@ MatchEvidence count_matches(const MatchSet& m, const Rigid& pose, float squared_
     total.target_weight += target;
   }
   return total;
+}
+
+#ifdef GPUREG_WIDE_TARGET
+GPUREG_WIDE_TARGET MatchEvidence count_wide(const MatchSet& m, const Rigid& pose,
+                                            float squared_distance) {
+  return count_in_vectors(m, pose, squared_distance);
+}
+#endif
+
+}  // namespace
+
+MatchEvidence count_matches(const MatchSet& m, const Rigid& pose, float squared_distance) {
+#ifdef GPUREG_WIDE_TARGET
+  if (has_wide_vectors()) return count_wide(m, pose, squared_distance);
+#endif
+  return count_in_vectors(m, pose, squared_distance);
 }
 
 std::vector<Candidates> propose_poses(Exec& exec, const std::vector<MatchSet>& matches,

@@ -38,12 +38,13 @@ Rows random_rows(std::mt19937& random, std::size_t n, std::uint32_t dimension, i
   return rows;
 }
 
-std::vector<std::uint32_t> by_index(const Rows& queries, const Rows& rows, std::size_t grain) {
+std::vector<std::uint32_t> by_index(const Rows& queries, const Rows& rows, std::size_t grain,
+                                    bool wide_vectors = true) {
   const FeatureIndex order = index_features(queries.view()), index = index_features(rows.view());
   std::vector<std::uint32_t> out(queries.valid.size(), kNoValue);
   for (std::size_t begin = 0; begin < order.rows; begin += grain)
     nearest_features(queries.view(), order, rows.view(), index, begin,
-                     std::min<std::size_t>(begin + grain, order.rows), out.data());
+                     std::min<std::size_t>(begin + grain, order.rows), out.data(), wide_vectors);
   return out;
 }
 
@@ -60,8 +61,10 @@ TEST(FeatureIndex, EqualsExhaustiveSearch) {
       for (const int levels : {0, 1, 2}) {
         const Rows queries = random_rows(random, 211, dimension, levels, 1),
                    rows = random_rows(random, n, dimension, levels, 1);
-        EXPECT_EQ(by_index(queries, rows, 50), exhaustive(queries, rows))
-            << dimension << " " << n << " " << levels;
+        const std::vector<std::uint32_t> expected = exhaustive(queries, rows);
+        for (const bool wide_vectors : {false, true})
+          EXPECT_EQ(by_index(queries, rows, 50, wide_vectors), expected)
+              << dimension << " " << n << " " << levels << " " << wide_vectors;
       }
 }
 
@@ -104,7 +107,8 @@ TEST(FeatureIndex, DistancesThatOverflowAreNoDistances) {
   for (const float scale : {1e-30f, 1e18f, 1e30f}) {
     const Rows queries = random_rows(random, 90, 33, 0, scale),
                rows = random_rows(random, 300, 33, 0, scale);
-    EXPECT_EQ(by_index(queries, rows, 90), exhaustive(queries, rows)) << scale;
+    for (const bool wide_vectors : {false, true})
+      EXPECT_EQ(by_index(queries, rows, 90, wide_vectors), exhaustive(queries, rows)) << scale;
   }
 }
 

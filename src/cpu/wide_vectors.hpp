@@ -1,0 +1,33 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#if defined(__AVX2__) && defined(__FMA__) && defined(__GNUC__)
+/// A function for processors with vectors of 16 floats. Each lane does the operations of the scalar
+/// code in the same order, so the result is the same.
+#ifdef __clang__
+#define GPUREG_WIDE_TARGET __attribute__((target("avx512f,avx512vl,avx512bw,avx512dq")))
+#else
+#define GPUREG_WIDE_TARGET \
+  __attribute__((target("avx512f,avx512vl,avx512bw,avx512dq,prefer-vector-width=512")))
+#endif
+#endif
+#ifdef __GNUC__
+#define GPUREG_ALWAYS_INLINE inline __attribute__((always_inline))
+#else
+#define GPUREG_ALWAYS_INLINE inline
+#endif
+
+namespace gpureg::cpu {
+
+/// Whether the build has functions for vectors of 16 floats (AVX-512), and the processor runs them.
+inline bool has_wide_vectors() {
+#ifdef GPUREG_WIDE_TARGET
+  static const bool has = __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512vl") &&
+                          __builtin_cpu_supports("avx512bw") && __builtin_cpu_supports("avx512dq");
+  return has;
+#else
+  return false;
+#endif
+}
+
+}  // namespace gpureg::cpu
