@@ -52,6 +52,7 @@ bool can_have_journal(const std::string& path) {
 void check_outputs(const BatchOptions& o) {
   std::vector<NamedPath> inputs = scene_files("DIR", o.folder);
   if (o.pairs != "all") inputs.push_back({"--pairs", o.pairs});
+  if (!o.method.calibration.empty()) inputs.push_back({"--calibration", o.method.calibration});
   std::vector<NamedPath> outputs = {{"-o", o.log}, {"--info", o.info}, {"--json", o.json}};
   if (can_have_journal(o.log)) outputs.push_back({"the journal of -o", o.journal()});
   check_outputs(outputs, inputs);
@@ -193,6 +194,7 @@ void add_batch(CLI::App& app, Action& chosen) {
   verb->add_option("--pairs", o->pairs, "all, or a file with one pair `i j` a line")
       ->capture_default_str();
   o->method.add_to(*verb);
+  o->method.add_calibration_to(*verb);
   verb->add_option("--viewpoint", o->viewpoint.text,
                    "Of fragments without a camera. auto: the file, or the origin if the surfaces "
                    "agree with it; none: not known")
@@ -218,6 +220,7 @@ void add_batch(CLI::App& app, Action& chosen) {
       up_prior(o->up);
       check_outputs(*o);
       choose_voxel_size(o->method, o->folder);
+      if (!o->quiet) o->method.note_calibration();
       return Batch(*o).run();
     };
   });

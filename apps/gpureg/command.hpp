@@ -22,6 +22,7 @@ void add_evaluate_trajectory(CLI::App& app, Action& chosen);
 void add_evaluate_surface(CLI::App& app, Action& chosen);
 void add_report(CLI::App& app, Action& chosen);
 void add_generate(CLI::App& app, Action& chosen);
+void add_calibrate(CLI::App& app, Action& chosen);
 void add_info(CLI::App& app, Action& chosen);
 
 }  // namespace gpureg::cli

@@ -65,6 +65,7 @@ int run(int argc, char** argv) {
   add_batch(app, action);
   add_consistency(app, action);
   add_reconstruct(app, action);
+  add_calibrate(app, action);
   add_evaluate(app, action);
   add_evaluate_trajectory(app, action);
   add_evaluate_surface(app, action);

@@ -2,8 +2,11 @@
 #include "method_options.hpp"
 
 #include <cerrno>
+#include <cmath>
 #include <cstdlib>
+#include <iostream>
 
+#include "calibration_file.hpp"
 #include "gpureg/error.hpp"
 #include "gpureg/voxel_size.hpp"
 #include "text.hpp"
@@ -66,6 +69,22 @@ void MethodOptions::add_to(CLI::App& verb) {
                   "from this inlier ratio on (0.3). 0: every best candidate");
 }
 
+void MethodOptions::add_calibration_to(CLI::App& verb) {
+  verb.add_option("--calibration", calibration,
+                  "File of `gpureg calibrate`: scales the confidence to a sensor");
+}
+
+void MethodOptions::note_calibration() const {
+  if (calibration.empty()) return;
+  const double of_file = read_calibration(calibration).voxel_size;
+  const double of_run = static_cast<double>(voxel_size);
+  constexpr double kSimilar = 1.5;
+  if (of_run <= kSimilar * of_file && of_file <= kSimilar * of_run) return;
+  std::cerr << "gpureg: note: " << calibration << " was made with a voxel size of "
+            << significant(of_file, 3) << ", this run has " << significant(of_run, 3)
+            << "; the confidence may be off" << std::endl;
+}
+
 RegistrationOptions MethodOptions::registration() const {
   const char* idle = preset == "loopsmart" ? "--quality" : "--hypotheses";
   if (given(idle))
@@ -77,6 +96,12 @@ RegistrationOptions MethodOptions::registration() const {
   options.quadruples.count = hypotheses;
   options.seed = seed;
   options.accept_symmetry = accept_symmetry;
+  if (!calibration.empty()) {
+    if (options.method == RegistrationMethod::quadruples)
+      throw InvalidArgument(
+          "--calibration scales the confidence, which preset loopsmart does not have");
+    options.calibration = read_calibration(calibration).calibration;
+  }
   if (min_score && !(*min_score >= 0 && *min_score <= 1))
     throw InvalidArgument("--min-score is " + significant(*min_score, 6) +
                           ", expected a number from 0 to 1");

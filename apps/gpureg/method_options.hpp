@@ -25,14 +25,19 @@ struct MethodOptions {
   std::uint32_t quality = kDefaultQuality;
   std::uint64_t seed = RegistrationOptions{}.seed;
   std::optional<double> min_score;  ///< none: the preset's own
+  std::string calibration;          ///< file of `gpureg calibrate`; empty: none
 
   void add_to(CLI::App& verb);
+  void add_calibration_to(CLI::App& verb);
 
   /// Whether the user gave the option, as "--quality"; add_to() was called.
   bool given(const std::string& option) const { return verb_->count(option) > 0; }
 
   /// Throws InvalidArgument naming field and value, or options that do not go together.
   RegistrationOptions registration() const;
+
+  /// Says on stderr where the calibration was made with another voxel size, once that is chosen.
+  void note_calibration() const;
 
   /// Sets an automatic voxel size to the suggestion of the clouds. what: for the message. Throws
   /// InvalidArgument without a suggestion.

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "odometry_file.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <fstream>
 #include <sstream>
@@ -50,8 +51,9 @@ std::vector<reconstruction::Odometry> from_log(const std::string& path, const Ma
   return odometry;
 }
 
-std::vector<reconstruction::Odometry> from_trajectory(const std::string& path, const MapRun& run) {
-  std::vector<UnalignedIsometry3d> world_from_scan(run.scene.numbers.size(), no_pose());
+std::vector<UnalignedIsometry3d> poses_of(const std::string& path,
+                                          const std::vector<int>& numbers) {
+  std::vector<UnalignedIsometry3d> world_from_scan(numbers.size(), no_pose());
   for (const evaluation::StampedPose& pose : evaluation::read_trajectory(path)) {
     constexpr double kMost = 2147483647;
     if (!(pose.time >= 0 && pose.time <= kMost && pose.time == std::floor(pose.time)))
@@ -59,18 +61,34 @@ std::vector<reconstruction::Odometry> from_trajectory(const std::string& path, c
            "has the time " + std::to_string(pose.time) + ", expected the number of a fragment");
     const auto number = static_cast<int>(pose.time);
     // The odometry of a longer run serves a folder with some of its scans.
-    if (run.has(number)) world_from_scan[run.index_of(number)].matrix() = pose.world_from_body;
+    const auto at = std::lower_bound(numbers.begin(), numbers.end(), number);
+    if (at != numbers.end() && *at == number)
+      world_from_scan[static_cast<std::size_t>(at - numbers.begin())].matrix() =
+          pose.world_from_body;
   }
-  return reconstruction::odometry_of_poses(world_from_scan);
+  return world_from_scan;
 }
 
 }  // namespace
 
 std::vector<reconstruction::Odometry> read_odometry(const std::string& path, const MapRun& run) {
   std::vector<reconstruction::Odometry> odometry =
-      is_log(path) ? from_log(path, run) : from_trajectory(path, run);
+      is_log(path)
+          ? from_log(path, run)
+          : reconstruction::odometry_of_poses(poses_of(path, run.scene.numbers));
   if (odometry.empty()) fail(path, "holds no pose of two scans of " + run.folder);
   return odometry;
+}
+
+std::vector<UnalignedIsometry3d> read_scan_poses(const std::string& path,
+                                                 const std::vector<int>& numbers,
+                                                 const std::string& folder) {
+  std::vector<UnalignedIsometry3d> poses = poses_of(path, numbers);
+  const auto known = std::count_if(poses.begin(), poses.end(), [](const UnalignedIsometry3d& p) {
+    return p.matrix().allFinite();
+  });
+  if (known < 2) fail(path, "holds no poses of two fragments of " + folder);
+  return poses;
 }
 
 }  // namespace gpureg::cli

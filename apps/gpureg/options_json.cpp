@@ -23,6 +23,8 @@ Json to_json(const RegistrationOptions& options) {
   json["seed"] = options.seed;
   json["min_confidence"] = options.min_confidence;
   json["accept_symmetry"] = options.accept_symmetry;
+  json["calibration"] = {{"slope", options.calibration.slope},
+                         {"offset", options.calibration.offset}};
   json["method"] = to_string(options.method);
   json["smaller_as_source"] = options.smaller_as_source;
   json["prepare"] = {{"voxel_size", shortest(p.voxel_size)},

@@ -62,6 +62,7 @@ void check_output_folder(const ReconstructOptions& o) {
     files.push_back({"--results", o.results});
     files.push_back({"--odometry", o.odometry});
     if (o.pairs != "all") files.push_back({"--pairs", o.pairs});
+    if (!o.method.calibration.empty()) files.push_back({"--calibration", o.method.calibration});
     return files;
   }();
   std::error_code error;
@@ -301,6 +302,7 @@ void add_reconstruct(CLI::App& app, Action& chosen) {
       ->check(CLI::NonNegativeNumber)
       ->needs(odometry);
   o->method.add_to(*verb);
+  o->method.add_calibration_to(*verb);
   verb->add_flag("--no-refine", o->no_refine, "Without the joint refinement of all poses");
   verb->add_flag("--no-map", o->no_map, "Without map.ply and map.html");
   verb->add_option("--map-voxel-size", o->map_voxel_size,
@@ -316,8 +318,12 @@ void add_reconstruct(CLI::App& app, Action& chosen) {
   verb->callback([o, &chosen] {
     chosen = [o] {
       o->method.registration();  // reports bad options before the clouds are read
+      if (!o->results.empty() && !o->method.calibration.empty())
+        throw InvalidArgument("--calibration scales confidences that are made here, --results has "
+                              "its own");
       check_output_folder(*o);
       choose_voxel_size(o->method, o->folder);
+      if (!o->quiet) o->method.note_calibration();
       return Reconstruct(*o).run();
     };
   });

@@ -196,6 +196,7 @@ int run(RegisterOptions o) {
     throw InvalidArgument("--up and --time-budget do not go together");
   std::vector<NamedPath> inputs{{"SOURCE", o.source}, {"TARGET", o.target}};
   if (!o.initial.empty()) inputs.push_back({"--initial", o.initial});
+  if (!o.method.calibration.empty()) inputs.push_back({"--calibration", o.method.calibration});
   check_outputs({{"--json", o.json}, {"--overlay", o.overlay}, {"--image", o.image}}, inputs);
   const Context context = o.method.context();
   auto [source_cloud, target_cloud] = read_clouds(o);
@@ -204,6 +205,7 @@ int run(RegisterOptions o) {
   o.method.choose_voxel_size({source_cloud.view(), target_cloud.view()},
                              o.source + " and " + o.target);
   const RegistrationOptions options = o.method.registration();
+  o.method.note_calibration();
   check_voxel_size(options.prepare.voxel_size, extent_of(source_cloud.points), o.source);
   check_voxel_size(options.prepare.voxel_size, extent_of(target_cloud.points), o.target);
   ViewpointNote viewpoints;
@@ -270,6 +272,7 @@ void add_register(CLI::App& app, Action& chosen) {
   verb->add_option("SOURCE", o->source, "Cloud that is moved")->required();
   verb->add_option("TARGET", o->target, "Cloud that stays")->required();
   o->method.add_to(*verb);
+  o->method.add_calibration_to(*verb);
   verb->add_option(
       "--time-budget", o->time_budget,
       "Time budget of the alignment in milliseconds, instead of --quality; the quality "

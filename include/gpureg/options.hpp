@@ -132,6 +132,23 @@ struct EvidenceOptions {
   void validate() const;
 };
 
+/// Confidence of another sensor from the confidence that was fitted here:
+/// logit(calibrated) = offset + slope * logit(confidence). calibrate() makes it
+/// (gpureg/calibration.hpp); the default is the identity.
+struct ConfidenceCalibration {
+  double slope = 1;  ///< > 0
+  double offset = 0;
+
+  bool is_identity() const { return slope == 1 && offset == 0; }
+
+  /// The calibrated probability. 0 and 1 stay what they are, and so does every confidence under the
+  /// identity, bit for bit.
+  double operator()(double confidence) const;
+
+  /// @throws InvalidArgument naming field and value.
+  void validate() const;
+};
+
 /// The range of `quality`: 0 is the fastest, 10 finds the most.
 inline constexpr std::uint32_t kDefaultQuality = 5, kHighestQuality = 10;
 
@@ -152,6 +169,8 @@ struct RegistrationOptions {
   /// common confidence reaches min_confidence: status aligned_up_to_symmetry. Otherwise such a pair
   /// is not aligned, for the reason symmetric (RegistrationMethod::compatibility).
   bool accept_symmetry = false;
+  /// Applied to every confidence (RegistrationMethod::compatibility).
+  ConfidenceCalibration calibration;
   PrepareOptions prepare;
   CompatibilityOptions compatibility;
   QuadrupleOptions quadruples;

@@ -3,6 +3,7 @@
 
 #include "common/limits.hpp"
 #include "common/validate.hpp"
+#include "math/exponential.hpp"
 
 namespace gpureg {
 
@@ -97,6 +98,17 @@ void RefineOptions::validate() const {
   require(length(kernel_width), "refine.kernel_width", kernel_width, kLength);
 }
 
+double ConfidenceCalibration::operator()(double confidence) const {
+  if (is_identity() || confidence <= 0 || confidence >= 1) return confidence;
+  const double log_odds = portable::log(confidence) - portable::log1p(-confidence);
+  return portable::logistic(offset + slope * log_odds);
+}
+
+void ConfidenceCalibration::validate() const {
+  require(std::isfinite(slope) && slope > 0, "calibration.slope", slope, "a number > 0");
+  require(std::isfinite(offset), "calibration.offset", offset, "a finite number");
+}
+
 namespace {
 
 /// Numbers of candidates by quality. More seeds find more of the difficult pairs, and more modes
@@ -164,6 +176,7 @@ void RegistrationOptions::validate() const {
   evidence.validate();
   require(std::isfinite(min_confidence) && min_confidence >= 0 && min_confidence <= 1,
           "min_confidence", min_confidence, "a probability in [0, 1]");
+  calibration.validate();
 }
 
 }  // namespace gpureg

@@ -10,6 +10,7 @@
 
 #include "api/frames.hpp"
 #include "api/symmetry.hpp"
+#include "confidence/calibrate_modes.hpp"
 #include "confidence/confidence.hpp"
 #include "confidence/pose_evidence.hpp"
 #include "pipeline/conclude.hpp"
@@ -83,17 +84,25 @@ class Modes {
       out.push_back(mode);
       distinct.push_back({mode.evidence, log_odds[k], overlap_of(mode)});
     }
-    const auto confidences =
-        confidence::confidences_of(distinct, available, options_.evidence.modes);
-    for (std::size_t k = 0; k < out.size(); ++k) {
-      out[k].confidence = confidences[k].confidence;
-      out[k].overlap_confidence = confidences[k].overlap_confidence;
-    }
+    auto confidences = confidence::confidences_of(distinct, available, options_.evidence.modes);
+    set_confidences(confidences, out);
     mark_equivalents(distinct, out);
+    std::vector<bool> equivalent;
+    for (const RegistrationMode& mode : out) equivalent.push_back(mode.equivalent);
+    confidence::calibrate_modes(options_.calibration, equivalent, confidences);
+    set_confidences(confidences, out);
     return out;
   }
 
  private:
+  static void set_confidences(const std::vector<confidence::ModeConfidence>& from,
+                              std::vector<RegistrationMode>& modes) {
+    for (std::size_t k = 0; k < modes.size(); ++k) {
+      modes[k].confidence = from[k].confidence;
+      modes[k].overlap_confidence = from[k].overlap_confidence;
+    }
+  }
+
   /// Marks the modes that a symmetry of the larger cloud carries into the first one.
   void mark_equivalents(const std::vector<confidence::RankedMode>& ranked,
                         std::vector<RegistrationMode>& modes) const {

@@ -9,6 +9,7 @@
 #include "api/outcome.hpp"
 #include "api/pair_input.hpp"
 #include "common/in_halves.hpp"
+#include "confidence/calibrate_modes.hpp"
 #include "confidence/confidence.hpp"
 #include "confidence/pose_evidence.hpp"
 
@@ -106,7 +107,10 @@ struct VerifiedPair {
       if (k == 0) place = ranked.size();
       ranked.push_back({all[k].evidence, log_odds[k], all[k].overlap});
     }
-    return confidence::confidences_of(ranked, available, options.evidence.modes)[place];
+    std::vector<confidence::ModeConfidence> confidences =
+        confidence::confidences_of(ranked, available, options.evidence.modes);
+    confidence::calibrate_modes(options.calibration, std::vector<bool>(ranked.size()), confidences);
+    return confidences[place];
   }
 };
 

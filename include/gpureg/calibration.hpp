@@ -1,0 +1,125 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <vector>
+
+#include "gpureg/registration.hpp"
+
+/// Scale of the confidence for one sensor, from its clouds alone: no truth is needed.
+namespace gpureg {
+
+/// Where the label of a sample comes from.
+enum class CalibrationKind : std::uint8_t {
+  one_scan,          ///< pairs made of one scan: the pose is known
+  loop_consistency,  ///< pairs of different scans that loops decide
+  trajectory         ///< pairs of different scans whose poses are given
+};
+
+/// @return the name of the enumerator.
+const char* to_string(CalibrationKind kind);
+
+/// One pose with a known verdict.
+struct CalibrationSample {
+  double confidence = 0;  ///< before any calibration, [0, 1]
+  bool correct = false;
+  double weight = 1;  ///< finite, >= 0
+  CalibrationKind kind = CalibrationKind::one_scan;
+};
+
+/// Result of fit_calibration().
+struct CalibrationFit {
+  ConfidenceCalibration calibration;  ///< the identity where the samples are too few
+  bool enough_samples = false;
+  /// Expected calibration error of the samples with the identity and with the calibration.
+  double error_before = 0, error_after = 0;
+};
+
+/// Fewest correct and fewest false samples, by weight, of a fit.
+inline constexpr double kMinCalibrationSamples = 10;
+/// Range of the fitted slope.
+inline constexpr double kMinCalibrationSlope = 0.2, kMaxCalibrationSlope = 3.0;
+
+/// Fits slope and offset: maximum a posteriori of a logistic regression of the verdicts on the log
+/// odds, with a prior about the identity. Deterministic: the same bits on every machine.
+/// @param samples in any number; their order may change the last bits.
+/// @throws InvalidArgument naming the sample: confidences outside [0, 1], bad weights.
+CalibrationFit fit_calibration(const std::vector<CalibrationSample>& samples);
+
+/// Expected calibration error: mean over ten equal bins of the confidence of the distance between
+/// mean confidence and share of correct poses, weighted by the samples in each bin. 0 without
+/// samples.
+double calibration_error(const std::vector<CalibrationSample>& samples,
+                         const ConfidenceCalibration& calibration = {});
+
+/// Options of calibrate().
+struct CalibrationOptions {
+  /// Pairs made of one scan, spread over the clouds; 0: none.
+  std::uint32_t self_pairs = 200;
+  /// Largest number of pairs of different scans. Where there are more, groups of consecutive clouds
+  /// are taken, evenly spread; 0: none.
+  std::uint32_t scan_pairs = 600;
+  /// A pose is correct within this RMS distance over the source points, in voxels.
+  double max_error = 4;
+
+  /// @throws InvalidArgument naming field and value.
+  void validate() const;
+};
+
+/// Callbacks of calibrate(). Both run on the calling thread, and either may be empty.
+struct CalibrationCallbacks {
+  std::function<void(std::size_t done, std::size_t total)> on_progress;  ///< in pairs
+  /// Polled between chunks of pairs. true: calibrate() returns the identity at once.
+  std::function<bool()> should_stop;
+};
+
+/// What one kind of pairs gave.
+struct CalibrationCount {
+  std::size_t pairs = 0;    ///< aligned
+  std::size_t samples = 0;  ///< with a candidate and a verdict
+  std::size_t correct = 0;  ///< of these
+};
+
+/// Result of calibrate().
+struct CalibrationResult {
+  ConfidenceCalibration calibration;  ///< for RegistrationOptions::calibration
+  bool enough_samples = false;        ///< false: the calibration is the identity
+  bool stopped = false;               ///< by the callback; the calibration is the identity
+  /// Expected calibration error of the samples with the identity and with the calibration.
+  double error_before = 0, error_after = 0;
+  CalibrationCount one_scan, loop_consistency, trajectory;
+  std::vector<CalibrationSample> samples;
+
+  const CalibrationCount& count(CalibrationKind kind) const {
+    return kind == CalibrationKind::one_scan           ? one_scan
+           : kind == CalibrationKind::loop_consistency ? loop_consistency
+                                                       : trajectory;
+  }
+};
+
+/// Makes the calibration of a sensor from its clouds.
+///
+/// Pairs made of one scan: two disjoint halves of its points, cropped by planes so that they
+/// overlap by 0 to 90 %, with noise of the size that the scan shows, the second one moved by a
+/// random pose together with its viewpoints. They are easier than pairs of two scans, so they weigh
+/// less. Pairs of different scans: loop_consistency() decides them from at least even odds, or the
+/// poses of the clouds where these are given.
+///
+/// @param clouds host memory; a dozen or more, some of which overlap.
+/// @param options as for align(); its own calibration is not used. The samples hold for its voxel
+///   size and quality.
+/// @param world_from_cloud pose of each cloud, accurate to about a voxel, no_pose() where it is not
+///   known; empty: none is known.
+/// @return the calibration; the same bits for any number of threads and on every backend.
+/// @throws InvalidArgument as prepare_batch() and align(), for another method than compatibility,
+///   for another number of poses than clouds, and for poses that are not rigid.
+/// Thread-safe.
+CalibrationResult calibrate(const Context& context, const std::vector<PointCloudView>& clouds,
+                            const RegistrationOptions& options = {},
+                            const CalibrationOptions& calibration = {},
+                            const std::vector<UnalignedIsometry3d>& world_from_cloud = {},
+                            const CalibrationCallbacks& callbacks = {});
+
+}  // namespace gpureg
