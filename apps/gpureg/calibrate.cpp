@@ -101,9 +101,9 @@ int run(CalibrateOptions o) {
   }
   write_document(o.output, calibration_document(result, options, o.method.quality));
   if (!result.enough_samples)
-    std::cerr << "gpureg: note: too few samples, at least " << kMinCalibrationSamples
-              << " correct and as many false ones are needed (a pair of one scan counts as a "
-                 "quarter); the calibration changes nothing"
+    std::cerr << "gpureg: note: too few samples: " << kMinDecidedPairs
+              << " decided pairs of different scans are needed, and " << kMinCalibrationSamples
+              << " correct and as many false samples in all; the calibration changes nothing"
               << std::endl;
   if (o.quiet) return kOk;
   if (o.method.automatic_voxel_size)

@@ -20,7 +20,7 @@ import record
 ROOM_SEEDS = {"first": [21], "second": [22]}
 SCENES = {  # numbers of scenes in each folder, and the seed of the first one
     "street": (4, 1001, 2001),
-    "hall": (4, 1001, 2001),
+    "hall": (8, 1001, 2001),
     "parts": (5, 1001, 2001),
 }
 PART_SIZE = 0.3  # metres: parts of one folder have one size, as one sensor sees

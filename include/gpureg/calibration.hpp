@@ -37,8 +37,11 @@ struct CalibrationFit {
   double error_before = 0, error_after = 0;
 };
 
-/// Fewest correct and fewest false samples, by weight, of a fit.
-inline constexpr double kMinCalibrationSamples = 10;
+/// Fewest correct and fewest false samples of a fit.
+inline constexpr std::size_t kMinCalibrationSamples = 10;
+/// Fewest decided pairs of different scans of calibrate(). Pairs made of one scan alone do not tell
+/// what pairs of two scans are like.
+inline constexpr std::size_t kMinDecidedPairs = 20;
 /// Range of the fitted slope.
 inline constexpr double kMinCalibrationSlope = 0.2, kMaxCalibrationSlope = 3.0;
 
@@ -103,9 +106,10 @@ struct CalibrationResult {
 ///
 /// Pairs made of one scan: two disjoint halves of its points, cropped by planes so that they
 /// overlap by 0 to 90 %, with noise of the size that the scan shows, the second one moved by a
-/// random pose together with its viewpoints. They are easier than pairs of two scans, so they weigh
-/// less. Pairs of different scans: loop_consistency() decides them from at least even odds, or the
-/// poses of the clouds where these are given.
+/// random pose together with its viewpoints. They are easier than pairs of two scans, so each weighs
+/// a twentieth, and the calibration is the identity without kMinDecidedPairs pairs of different
+/// scans. These are decided by the poses of the clouds where they are given, otherwise by
+/// loop_consistency() where it is sure from even odds.
 ///
 /// @param clouds host memory; a dozen or more, some of which overlap.
 /// @param options as for align(); its own calibration is not used. The samples hold for its voxel

@@ -10,14 +10,14 @@
 namespace gpureg {
 namespace {
 
-/// Standard deviations of the prior. Sensors that were never trained on were off by a factor of two
-/// to eight in their odds, and their slopes between a half and one and a half.
+/// Standard deviations of the prior. Fits to the true verdicts of sensors and places that were never
+/// trained on gave offsets from -1.8 to 2.2 and slopes from 0.4 to 2.
 constexpr double kOffsetDeviation = 1.5, kSlopeDeviation = 0.5;
 /// Log odds of a sample, at most so far from even: the odds of hopeless poses go down to 10^-30, and
 /// one of them would decide the slope.
 constexpr double kMostLogOdds = 7.0;
-constexpr int kIterations = 100, kHalvings = 40;
-constexpr double kConverged = 1e-12;
+constexpr int kIterations = 100, kHalvings = 20;
+constexpr double kConverged = 1e-9;
 constexpr std::size_t kBins = 10;
 
 double log_odds_of(double confidence) {
@@ -99,7 +99,7 @@ ConfidenceCalibration minimum(const std::vector<Point>& points, const double* fi
     }
     double scale = 1;
     int halvings = 0;
-    while (value_at(points, offset - scale * step[0], slope - scale * step[1]) > p.value &&
+    while (value_at(points, offset - scale * step[0], slope - scale * step[1]) >= p.value &&
            ++halvings < kHalvings)
       scale *= 0.5;
     if (halvings == kHalvings) break;
@@ -127,11 +127,11 @@ const char* to_string(CalibrationKind kind) {
 CalibrationFit fit_calibration(const std::vector<CalibrationSample>& samples) {
   check(samples);
   std::vector<Point> points;
-  double correct = 0, wrong = 0;
+  std::size_t correct = 0, wrong = 0;
   for (const CalibrationSample& sample : samples) {
     if (sample.weight == 0) continue;
     points.push_back({log_odds_of(sample.confidence), sample.weight, sample.correct});
-    (sample.correct ? correct : wrong) += sample.weight;
+    ++(sample.correct ? correct : wrong);
   }
   CalibrationFit out;
   out.enough_samples = correct >= kMinCalibrationSamples && wrong >= kMinCalibrationSamples;

@@ -18,10 +18,8 @@ bool is_correct(const RegistrationResult& result, const Eigen::Isometry3d& truth
                 const std::vector<Eigen::Vector3f>& source_points, double max_rms);
 
 /// Verdicts of loop consistency on pairs of different scans; none where it is not sure.
-/// @param calibration of the confidences.
 std::vector<std::optional<bool>> verdicts_of_loops(const std::vector<Pair>& pairs,
                                                    const std::vector<RegistrationResult>& results,
-                                                   const ConfidenceCalibration& calibration,
                                                    float voxel_size);
 
 }  // namespace gpureg::calibration
