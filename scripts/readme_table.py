@@ -17,6 +17,7 @@ from tables import accuracy, loops, maps, peers, slam, speed
 ROOT = pathlib.Path(__file__).resolve().parents[1]
 PAGES = (
     "accuracy",
+    "usage",
     "experiments",
     "benchmarks",
     "performance",

@@ -20,8 +20,7 @@ double number(const std::string& path, const Json& document, const char* field,
               const char* expected, bool positive) {
   const auto found = document.find(field);
   const bool fine = found != document.end() && found->is_number() &&
-                    std::isfinite(found->get<double>()) &&
-                    (!positive || found->get<double>() > 0);
+                    std::isfinite(found->get<double>()) && (!positive || found->get<double>() > 0);
   if (!fine)
     throw IoError(
         path + ": \"" + field + "\" is " +

@@ -73,9 +73,8 @@ std::vector<UnalignedIsometry3d> poses_of(const std::string& path,
 
 std::vector<reconstruction::Odometry> read_odometry(const std::string& path, const MapRun& run) {
   std::vector<reconstruction::Odometry> odometry =
-      is_log(path)
-          ? from_log(path, run)
-          : reconstruction::odometry_of_poses(poses_of(path, run.scene.numbers));
+      is_log(path) ? from_log(path, run)
+                   : reconstruction::odometry_of_poses(poses_of(path, run.scene.numbers));
   if (odometry.empty()) fail(path, "holds no pose of two scans of " + run.folder);
   return odometry;
 }

@@ -319,8 +319,9 @@ void add_reconstruct(CLI::App& app, Action& chosen) {
     chosen = [o] {
       o->method.registration();  // reports bad options before the clouds are read
       if (!o->results.empty() && !o->method.calibration.empty())
-        throw InvalidArgument("--calibration scales confidences that are made here, --results has "
-                              "its own");
+        throw InvalidArgument(
+            "--calibration scales confidences that are made here, --results has "
+            "its own");
       check_output_folder(*o);
       choose_voxel_size(o->method, o->folder);
       if (!o->quiet) o->method.note_calibration();

@@ -96,7 +96,9 @@ def make(arguments, kind, which):
         simulated(kind, which, folder)
     else:
         (seed,) = ROOM_SEEDS[which]
-        record.gpureg(arguments, "generate", folder, "--seed", seed, "--depth-noise", NOISE, "--quiet")
+        record.gpureg(
+            arguments, "generate", folder, "--seed", seed, "--depth-noise", NOISE, "--quiet"
+        )
     return folder
 
 

@@ -106,9 +106,9 @@ struct CalibrationResult {
 ///
 /// Pairs made of one scan: two disjoint halves of its points, cropped by planes so that they
 /// overlap by 0 to 90 %, with noise of the size that the scan shows, the second one moved by a
-/// random pose together with its viewpoints. They are easier than pairs of two scans, so each weighs
-/// a twentieth, and the calibration is the identity without kMinDecidedPairs pairs of different
-/// scans. These are decided by the poses of the clouds where they are given, otherwise by
+/// random pose together with its viewpoints. They are easier than pairs of two scans, so each
+/// weighs a twentieth, and the calibration is the identity without kMinDecidedPairs pairs of
+/// different scans. These are decided by the poses of the clouds where they are given, otherwise by
 /// loop_consistency() where it is sure from even odds.
 ///
 /// @param clouds host memory; a dozen or more, some of which overlap.

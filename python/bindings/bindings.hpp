@@ -29,5 +29,6 @@ void bind_loop_closure(py::module_& m);
 void bind_reconstruction(py::module_& m);
 void bind_pruning(py::module_& m);
 void bind_trajectory(py::module_& m);
+void bind_calibration(py::module_& m);
 
 }  // namespace gpureg::python

@@ -25,4 +25,5 @@ PYBIND11_MODULE(_core, m) {
   bind_reconstruction(m);
   bind_pruning(m);
   bind_trajectory(m);
+  bind_calibration(m);
 }

@@ -102,6 +102,14 @@ std::vector<Field<EvidenceOptions>> evidence_fields() {
   };
 }
 
+std::vector<Field<ConfidenceCalibration>> calibration_fields() {
+  using C = ConfidenceCalibration;
+  return {
+      field("slope", &C::slope, "Factor of the log odds, > 0."),
+      field("offset", &C::offset, "Added to the log odds."),
+  };
+}
+
 std::vector<Field<RegistrationOptions>> registration_fields() {
   using O = RegistrationOptions;
   return {
@@ -111,6 +119,8 @@ std::vector<Field<RegistrationOptions>> registration_fields() {
       field("accept_symmetry", &O::accept_symmetry,
             "Report one of several poses that a symmetry of the larger cloud makes equivalent if "
             "their common confidence reaches min_confidence (method 'compatibility')."),
+      field("calibration", &O::calibration,
+            "Scales every confidence to a sensor, see gpureg.calibrate (method 'compatibility')."),
       field("method", &O::method,
             "How candidate poses are found: 'compatibility' (SC2-PCR) or 'quadruples' "
             "(LoopSmart)."),
@@ -155,6 +165,17 @@ void bind_options(py::module_& m) {
       "How candidates are scored and verified (method 'compatibility'): support by matches, "
       "overlap of both clouds, free space.",
       evidence_fields());
+  bind_options_class<ConfidenceCalibration>(
+      m, "ConfidenceCalibration",
+      "Confidence of another sensor: log odds = offset + slope * log odds. The default changes "
+      "nothing.",
+      calibration_fields())
+      .def(
+          "__call__",
+          [](const ConfidenceCalibration& c, double confidence) { return c(confidence); },
+          py::arg("confidence"), "The calibrated probability.")
+      .def_property_readonly("is_identity", &ConfidenceCalibration::is_identity,
+                             "Whether it changes nothing.");
   auto cls = bind_options_class<RegistrationOptions>(
       m, "RegistrationOptions", "All options of one registration.", registration_fields());
   cls.def_static(

@@ -12,10 +12,12 @@ and `register_all`.
 
 from typing import TYPE_CHECKING, Any
 
+from ._calibration import CalibrationRun, calibrate, fit_calibration, read_calibration
 from ._contexts import default_context
 from ._core import (
     BackendUnavailable,
     CompatibilityOptions,
+    ConfidenceCalibration,
     Context,
     CorrespondenceMoments,
     DeviceError,
@@ -83,7 +85,9 @@ __all__ = [
     "BackendUnavailable",
     "BatchInterrupted",
     "BatchRun",
+    "CalibrationRun",
     "CompatibilityOptions",
+    "ConfidenceCalibration",
     "Context",
     "CorrespondenceMoments",
     "DeviceError",
@@ -123,12 +127,15 @@ __all__ = [
     "align",
     "align_batch",
     "align_within",
+    "calibrate",
     "default_context",
     "describe_backends",
     "evaluate_trajectory",
+    "fit_calibration",
     "loop_consistency",
     "prepare",
     "prepare_batch",
+    "read_calibration",
     "read_point_cloud",
     "read_trajectory",
     "reconstruct",

@@ -222,10 +222,24 @@ class EvidenceOptions:
     __hash__: None  # type: ignore[assignment]
     _fields: tuple[str, ...]
 
+class ConfidenceCalibration:
+    slope: float
+    offset: float
+    @property
+    def is_identity(self) -> bool: ...
+    def __init__(self, *, slope: float = ..., offset: float = ...) -> None: ...
+    def __call__(self, confidence: float) -> float: ...
+    def replace(self, *, slope: float = ..., offset: float = ...) -> ConfidenceCalibration: ...
+    def validate(self) -> None: ...
+    def __eq__(self, other: object, /) -> bool: ...
+    __hash__: None  # type: ignore[assignment]
+    _fields: tuple[str, ...]
+
 class RegistrationOptions:
     seed: int
     min_confidence: float
     accept_symmetry: bool
+    calibration: ConfidenceCalibration
     method: Literal["compatibility", "quadruples"]
     smaller_as_source: bool
     prepare: PrepareOptions
@@ -239,6 +253,7 @@ class RegistrationOptions:
         seed: int = ...,
         min_confidence: float = ...,
         accept_symmetry: bool = ...,
+        calibration: ConfidenceCalibration = ...,
         method: Literal["compatibility", "quadruples"] = ...,
         smaller_as_source: bool = ...,
         prepare: PrepareOptions = ...,
@@ -253,6 +268,7 @@ class RegistrationOptions:
         seed: int = ...,
         min_confidence: float = ...,
         accept_symmetry: bool = ...,
+        calibration: ConfidenceCalibration = ...,
         method: Literal["compatibility", "quadruples"] = ...,
         smaller_as_source: bool = ...,
         prepare: PrepareOptions = ...,
@@ -670,6 +686,18 @@ def align_within(
     options: RegistrationOptions,
 ) -> TimedResult: ...
 def suggest_voxel_size(clouds: list[_Float32]) -> VoxelSizeSuggestion: ...
+def calibrate(
+    context: Context,
+    clouds: Sequence[Any],
+    options: RegistrationOptions,
+    self_pairs: int,
+    scan_pairs: int,
+    poses: npt.NDArray[np.float64] | None,
+    progress: Callable[[int, int], object] | None,
+) -> dict[str, Any]: ...
+def fit_calibration(
+    confidences: Sequence[float], correct: Sequence[bool], weights: Sequence[float]
+) -> tuple[ConfidenceCalibration, bool]: ...
 def read_point_cloud(path: str) -> PointCloud: ...
 def is_mesh(path: str) -> bool: ...
 def sample_mesh_file(path: str, spacing: float) -> tuple[PointCloud, str]: ...

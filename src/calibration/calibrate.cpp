@@ -81,9 +81,9 @@ class Calibration {
     else
       judge_by_trajectory();
     const CalibrationFit fit = fit_calibration(out_.samples);
-    out_.enough_samples = fit.enough_samples && out_.loop_consistency.samples +
-                                                        out_.trajectory.samples >=
-                                                    kMinDecidedPairs;
+    out_.enough_samples =
+        fit.enough_samples &&
+        out_.loop_consistency.samples + out_.trajectory.samples >= kMinDecidedPairs;
     out_.error_before = out_.error_after = fit.error_before;
     if (out_.enough_samples) {
       out_.calibration = fit.calibration;
@@ -150,16 +150,15 @@ class Calibration {
         views.push_back(pair.source.view());
         views.push_back(pair.target.view());
       }
-      const std::vector<PreparedCloud> prepared =
-          prepare_batch(context_, views, options_.prepare);
+      const std::vector<PreparedCloud> prepared = prepare_batch(context_, views, options_.prepare);
       const std::vector<RegistrationResult> results =
           align_batch(context_, prepared, pairs, options_);
       for (std::size_t k = 0; k < results.size(); ++k) {
         ++out_.one_scan.pairs;
         if (!results[k].has_candidate) continue;
         add(CalibrationKind::one_scan, results[k],
-            is_correct(results[k], halves[k].target_from_source,
-                       prepared[pairs[k].source].points(), o_.max_error * voxel),
+            is_correct(results[k], halves[k].target_from_source, prepared[pairs[k].source].points(),
+                       o_.max_error * voxel),
             kOneScanWeight);
       }
       advance(end - begin);
@@ -198,8 +197,7 @@ class Calibration {
 
   void judge_by_loops() {
     out_.loop_consistency.pairs = pairs_.size();
-    const auto verdicts =
-        calibration::verdicts_of_loops(pairs_, results_, voxel_of(options_));
+    const auto verdicts = calibration::verdicts_of_loops(pairs_, results_, voxel_of(options_));
     for (std::size_t p = 0; p < pairs_.size(); ++p)
       if (verdicts[p]) add(CalibrationKind::loop_consistency, results_[p], *verdicts[p], 1.0);
   }

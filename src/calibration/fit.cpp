@@ -10,11 +10,11 @@
 namespace gpureg {
 namespace {
 
-/// Standard deviations of the prior. Fits to the true verdicts of sensors and places that were never
-/// trained on gave offsets from -1.8 to 2.2 and slopes from 0.4 to 2.
+/// Standard deviations of the prior. Fits to the true verdicts of sensors and places that were
+/// never trained on gave offsets from -1.8 to 2.2 and slopes from 0.4 to 2.
 constexpr double kOffsetDeviation = 1.5, kSlopeDeviation = 0.5;
-/// Log odds of a sample, at most so far from even: the odds of hopeless poses go down to 10^-30, and
-/// one of them would decide the slope.
+/// Log odds of a sample, at most so far from even: the odds of hopeless poses go down to 10^-30,
+/// and one of them would decide the slope.
 constexpr double kMostLogOdds = 7.0;
 constexpr int kIterations = 100, kHalvings = 20;
 constexpr double kConverged = 1e-9;
@@ -92,8 +92,7 @@ ConfidenceCalibration minimum(const std::vector<Point>& points, const double* fi
       step[0] = p.gradient[0] / p.curvature[0];
       step[1] = 0;
     } else {
-      const double determinant =
-          p.curvature[0] * p.curvature[2] - p.curvature[1] * p.curvature[1];
+      const double determinant = p.curvature[0] * p.curvature[2] - p.curvature[1] * p.curvature[1];
       step[0] = (p.curvature[2] * p.gradient[0] - p.curvature[1] * p.gradient[1]) / determinant;
       step[1] = (p.curvature[0] * p.gradient[1] - p.curvature[1] * p.gradient[0]) / determinant;
     }

@@ -130,8 +130,7 @@ Eigen::Vector3d row(const float* rows, std::size_t stride, std::size_t k) {
 
 Eigen::Vector3d turned(const Eigen::Isometry3d& pose, const Eigen::Vector3d& v) {
   Eigen::Vector3d out;
-  for (int i = 0; i < 3; ++i)
-    out[i] = pose(i, 0) * v.x() + pose(i, 1) * v.y() + pose(i, 2) * v.z();
+  for (int i = 0; i < 3; ++i) out[i] = pose(i, 0) * v.x() + pose(i, 1) * v.y() + pose(i, 2) * v.z();
   return out;
 }
 
@@ -182,22 +181,20 @@ Halves halves_of(const PointCloudView& scan, const PreparedCloud& prepared, doub
     planes[1] = holding(surface, across, 1.0 - numbers.between(0, 0.15));
   }
   const Noise noise_of[2] = {Noise(numbers, noise, wavelength), Noise(numbers, noise, wavelength)};
-  const auto key_low = static_cast<std::uint32_t>(seed), key_high = static_cast<std::uint32_t>(
-                                                              seed >> 32);
+  const auto key_low = static_cast<std::uint32_t>(seed),
+             key_high = static_cast<std::uint32_t>(seed >> 32);
   Part* parts[2] = {&out.source, &out.target};
   for (std::size_t k = 0; k < scan.size; ++k) {
     const Eigen::Vector3d p = row(scan.points, scan.point_stride, k);
     if (!p.allFinite()) continue;
     const auto point = static_cast<std::uint32_t>(k);
-    const std::size_t half =
-        philox(point, number, 0, kOfPoint, key_low, key_high).v[0] >> 31;
+    const std::size_t half = philox(point, number, 0, kOfPoint, key_low, key_high).v[0] >> 31;
     const HalfSpace(&planes)[2] = of_part[half];
     if (!planes[0].holds(p) || !planes[1].holds(p)) continue;
     Part& part = *parts[half];
     const Eigen::Vector3d noisy = p + noise_of[half].at(p, point);
     const bool target = half == 1;
-    part.points.push_back(
-        (target ? moved(out.target_from_source, noisy) : noisy).cast<float>());
+    part.points.push_back((target ? moved(out.target_from_source, noisy) : noisy).cast<float>());
     if (scan.normals != nullptr) {
       const Eigen::Vector3d n = row(scan.normals, scan.normal_stride, k);
       part.normals.push_back((target ? turned(out.target_from_source, n) : n).cast<float>());

@@ -33,9 +33,9 @@ bool is_correct(const RegistrationResult& result, const Eigen::Isometry3d& truth
     return std::sqrt(sum / static_cast<double>(source_points.size())) <= max_rms;
   };
   if (near(result.target_from_source)) return true;
-  return std::any_of(
-      result.modes.begin(), result.modes.end(),
-      [&](const RegistrationMode& mode) { return mode.equivalent && near(mode.target_from_source); });
+  return std::any_of(result.modes.begin(), result.modes.end(), [&](const RegistrationMode& mode) {
+    return mode.equivalent && near(mode.target_from_source);
+  });
 }
 
 std::vector<std::optional<bool>> verdicts_of_loops(const std::vector<Pair>& pairs,

@@ -145,8 +145,7 @@ TEST(Calibrate, TooFewDecidedPairsGiveTheIdentity) {
   CalibrationOptions options;
   options.self_pairs = 8;
   options.scan_pairs = 0;
-  const CalibrationResult result =
-      calibrate(Context::cpu(2), scans().views(), fast(), options);
+  const CalibrationResult result = calibrate(Context::cpu(2), scans().views(), fast(), options);
   EXPECT_GT(result.one_scan.samples, 0u);
   EXPECT_FALSE(result.enough_samples);
   EXPECT_TRUE(result.calibration.is_identity());
@@ -154,8 +153,7 @@ TEST(Calibrate, TooFewDecidedPairsGiveTheIdentity) {
   for (const std::size_t count : {0u, 1u}) {
     std::vector<PointCloudView> views = scans().views();
     views.resize(count);
-    EXPECT_TRUE(
-        calibrate(Context::cpu(1), views, fast(), options).calibration.is_identity());
+    EXPECT_TRUE(calibrate(Context::cpu(1), views, fast(), options).calibration.is_identity());
   }
   // Empty clouds are left out.
   std::vector<PointCloudView> views = scans().views();

@@ -190,8 +190,7 @@ TEST(Calibration, VerifyPoses) {
   }
   // A mode gets the confidence that align() gives it.
   const RegistrationOptions options = options_with({0.5, -1});
-  const RegistrationResult found =
-      align(scene().context, scene().source, scene().target, options);
+  const RegistrationResult found = align(scene().context, scene().source, scene().target, options);
   EXPECT_EQ(verify_poses(scene().context, scene().source, scene().target,
                          {found.target_from_source}, options)[0]
                 .confidence,

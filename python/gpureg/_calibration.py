@@ -1,0 +1,238 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Scale of the confidence for one sensor."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import math
+import os
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from . import _core
+from ._arrays import several
+from ._contexts import checked, context_of
+from ._core import ConfidenceCalibration, Context, IoError, RegistrationOptions, __version__
+from ._progress import Progress, batch_progress
+from .fragments import fragment_set
+
+_KIND = "calibration"
+_FORMAT_VERSION = 1
+
+
+@dataclasses.dataclass(frozen=True)
+class CalibrationRun:
+    """Result of `calibrate`.
+
+    Attributes
+    ----------
+    calibration : ConfidenceCalibration
+        For ``RegistrationOptions.calibration``.
+    enough_samples : bool
+        False: the calibration changes nothing.
+    error_before, error_after : float
+        Expected calibration error of the samples, without and with the calibration.
+    counts : dict
+        ``pairs``, ``samples`` and ``correct`` of ``one_scan``, ``loop_consistency`` and
+        ``trajectory``.
+    voxel_size : float
+        That it was made with.
+    """
+
+    calibration: ConfidenceCalibration
+    enough_samples: bool
+    error_before: float
+    error_after: float
+    counts: dict[str, dict[str, int]]
+    voxel_size: float
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write the file that ``--calibration`` of the command and `read_calibration` read."""
+        document = {
+            "format_version": _FORMAT_VERSION,
+            "gpureg": _KIND,
+            "version": __version__,
+            "slope": self.calibration.slope,
+            "offset": self.calibration.offset,
+            "enough_samples": self.enough_samples,
+            "samples": self.counts,
+            "calibration_error": {"before": self.error_before, "after": self.error_after},
+            "voxel_size": self.voxel_size,
+            "preset": "default",
+        }
+        Path(path).write_text(json.dumps(document, indent=1) + "\n")
+
+
+def calibrate(
+    clouds: Any,
+    *,
+    poses: Any = None,
+    self_pairs: int = 200,
+    scan_pairs: int = 600,
+    options: RegistrationOptions | None = None,
+    context: Context | None = None,
+    progress: Progress = False,
+) -> CalibrationRun:
+    """Scale the confidence to the sensor that made these clouds. No truth is needed.
+
+    Parameters
+    ----------
+    clouds : path, FragmentSet, or sequence
+        A folder of fragments; or clouds, each whatever `prepare` takes as points. A dozen or more,
+        some of which overlap.
+    poses : (N, 4, 4) array, optional
+        ``world_from_cloud``, accurate to about a voxel; NaN where it is not known. They decide
+        which poses are correct. Default: loops decide.
+    self_pairs : int
+        Pairs made of one scan.
+    scan_pairs : int
+        Largest number of pairs of different scans; where there are more, those within groups of
+        consecutive scans.
+    options : RegistrationOptions, optional
+        The calibration holds for its voxel size.
+    context : Context, optional
+    progress : bool or callable
+        True: a bar of tqdm, where installed. A callable gets (pairs done, pairs).
+
+    Returns
+    -------
+    CalibrationRun
+
+    Raises
+    ------
+    TypeError, ValueError
+        Naming the argument.
+
+    Examples
+    --------
+    >>> import numpy as np, gpureg
+    >>> rng = np.random.default_rng(1)
+    >>> run = gpureg.calibrate([rng.random((1000, 3)) for _ in range(2)], self_pairs=2)
+    >>> run.enough_samples, run.calibration
+    (False, ConfidenceCalibration(slope=1.0, offset=0.0))
+    """
+    options = checked(options, RegistrationOptions, "options") or RegistrationOptions()
+    context = context_of(context)
+    numbers = {"self_pairs": self_pairs, "scan_pairs": scan_pairs}
+    for name, value in numbers.items():
+        if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < 0:
+            raise TypeError(f"{name}: expected a whole number >= 0, got {value!r}")
+        numbers[name] = min(int(value), 2**32 - 1)  # the library refuses large ones by name
+    if not isinstance(clouds, str | os.PathLike) and not hasattr(clouds, "numbers"):
+        clouds = several(clouds, "clouds")
+    fragments = fragment_set(clouds)
+    known = None
+    if poses is not None:
+        known = np.ascontiguousarray(poses, np.float64)
+        if known.shape != (len(fragments), 4, 4):
+            raise ValueError(
+                f"poses: expected shape ({len(fragments)}, 4, 4), got {np.shape(poses)}"
+            )
+    inputs = [fragments.load(k, options.prepare) for k in range(len(fragments))]
+    with _told(progress) as tell:
+        found = _core.calibrate(
+            context, inputs, options, numbers["self_pairs"], numbers["scan_pairs"], known, tell
+        )
+    return CalibrationRun(voxel_size=options.prepare.voxel_size, **found)
+
+
+class _told:
+    """Progress of a call that knows its total only once it runs."""
+
+    def __init__(self, progress: Progress) -> None:
+        self._progress, self._bar, self._report = progress, None, None
+
+    def __enter__(self) -> Any:
+        return self._tell if self._progress else None
+
+    def _tell(self, done: int, total: int) -> None:
+        if self._bar is None:
+            self._bar = batch_progress(self._progress, "aligning", total)
+            self._report = self._bar.__enter__()
+        if self._report is not None:
+            self._report(done)
+
+    def __exit__(self, *error: Any) -> None:
+        if self._bar is not None:
+            self._bar.__exit__(None, None, None)
+
+
+def fit_calibration(
+    confidences: Any, correct: Any, weights: Any = None
+) -> tuple[ConfidenceCalibration, bool]:
+    """Fit a calibration to poses whose truth you know.
+
+    Parameters
+    ----------
+    confidences : (N,) floats
+        Before any calibration.
+    correct : (N,) bools
+    weights : (N,) floats, optional
+
+    Returns
+    -------
+    calibration : ConfidenceCalibration
+    enough_samples : bool
+        False: fewer than ten correct or ten false poses; the calibration changes nothing.
+
+    Examples
+    --------
+    >>> import gpureg
+    >>> calibration, enough = gpureg.fit_calibration([0.9, 0.6] * 50, [True, False] * 50)
+    >>> enough, calibration.slope > 1, calibration(0.6) < 0.3
+    (True, True, True)
+    """
+    values = np.asarray(confidences, np.float64)
+    verdicts = np.asarray(correct)
+    weight = np.ones(values.shape) if weights is None else np.asarray(weights, np.float64)
+    if values.ndim != 1:
+        raise ValueError(f"confidences: expected shape (N,), got {values.shape}")
+    if verdicts.dtype != np.bool_:
+        raise TypeError(f"correct: expected bools, got {verdicts.dtype}")
+    for name, array in (("correct", verdicts), ("weights", weight)):
+        if array.shape != values.shape:
+            raise ValueError(f"{name}: expected shape {values.shape}, got {array.shape}")
+    return _core.fit_calibration(values.tolist(), verdicts.tolist(), weight.tolist())
+
+
+def read_calibration(path: str | os.PathLike[str]) -> ConfidenceCalibration:
+    """Read the file of `gpureg calibrate` or `CalibrationRun.save`.
+
+    Raises
+    ------
+    IoError
+        Naming file and field.
+    """
+    name = os.fspath(path)
+    try:
+        document = json.loads(Path(path).read_text())
+    except OSError as error:
+        raise IoError(f"cannot read {name}: {error.strerror}") from None
+    except ValueError as error:
+        raise IoError(f"{name}: {error}") from None
+    kind = document.get("gpureg") if isinstance(document, dict) else None
+    if kind != _KIND:
+        raise IoError(f'{name}: no calibration of `gpureg calibrate`, "gpureg" is not "{_KIND}"')
+    version = document.get("format_version", 1)
+    if isinstance(version, bool) or not isinstance(version, int) or version < 1:
+        raise IoError(f'{name}: "format_version" is {version!r}, expected an integer >= 1')
+    if version > _FORMAT_VERSION:
+        raise IoError(
+            f"{name}: format version {version}, this gpureg reads versions up to "
+            f"{_FORMAT_VERSION}; a newer gpureg wrote it"
+        )
+    values = {}
+    for field in ("slope", "offset"):
+        value = document.get(field)
+        fine = isinstance(value, int | float) and not isinstance(value, bool)
+        if not fine or not math.isfinite(value) or (field == "slope" and value <= 0):
+            expected = "a number > 0" if field == "slope" else "a number"
+            raise IoError(f'{name}: "{field}" is {value!r}, expected {expected}')
+        values[field] = float(value)
+    return ConfidenceCalibration(**values)
+
+
+__all__ = ["CalibrationRun", "calibrate", "fit_calibration", "read_calibration"]
