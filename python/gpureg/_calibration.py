@@ -3,10 +3,12 @@
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import json
 import math
 import os
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +18,7 @@ from . import _core
 from ._arrays import several
 from ._contexts import checked, context_of
 from ._core import ConfidenceCalibration, Context, IoError, RegistrationOptions, __version__
-from ._progress import Progress, batch_progress
+from ._progress import Progress, Report, batch_progress
 from .fragments import fragment_set
 
 _KIND = "calibration"
@@ -139,25 +141,19 @@ def calibrate(
     return CalibrationRun(voxel_size=options.prepare.voxel_size, **found)
 
 
-class _told:
+@contextlib.contextmanager
+def _told(progress: Progress) -> Iterator[Callable[[int, int], None] | None]:
     """Progress of a call that knows its total only once it runs."""
+    with contextlib.ExitStack() as stack:
+        reports: list[Report | None] = []
 
-    def __init__(self, progress: Progress) -> None:
-        self._progress, self._bar, self._report = progress, None, None
+        def tell(done: int, total: int) -> None:
+            if not reports:
+                reports.append(stack.enter_context(batch_progress(progress, "aligning", total)))
+            if reports[0] is not None:
+                reports[0](done)
 
-    def __enter__(self) -> Any:
-        return self._tell if self._progress else None
-
-    def _tell(self, done: int, total: int) -> None:
-        if self._bar is None:
-            self._bar = batch_progress(self._progress, "aligning", total)
-            self._report = self._bar.__enter__()
-        if self._report is not None:
-            self._report(done)
-
-    def __exit__(self, *error: Any) -> None:
-        if self._bar is not None:
-            self._bar.__exit__(None, None, None)
+        yield tell if progress else None
 
 
 def fit_calibration(

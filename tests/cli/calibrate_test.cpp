@@ -21,8 +21,11 @@ constexpr int kScans = 8;
 class CalibrateVerb : public ::testing::Test {
  protected:
   static json good() {
-    return {{"format_version", 1}, {"gpureg", "calibration"}, {"slope", 0.5},
-            {"offset", -1.0},      {"voxel_size", 0.1}};
+    return {{"format_version", 1},
+            {"gpureg", "calibration"},
+            {"slope", 0.5},
+            {"offset", -1.0},
+            {"voxel_size", 0.1}};
   }
   std::string file_with(const char* field, const json& value) const {
     json document = good();
@@ -156,18 +159,18 @@ TEST_F(CalibrateVerb, EveryVerbMapsItsConfidences) {
   EXPECT_NEAR(score_of(registered(file, verify), "r.json"),
               mapped(score_of(registered("", verify), "r.json")), 1e-9);
 
-  std::vector<std::string> batch = joined({"batch", folder_.path(), "-o", folder_ / "b.log",
-                                           "--json", folder_ / "b.json", "--quiet"},
-                                          kSmall);
+  std::vector<std::string> batch = joined(
+      {"batch", folder_.path(), "-o", folder_ / "b.log", "--json", folder_ / "b.json", "--quiet"},
+      kSmall);
   const double of_batch = score_of(batch, "b.json");
   batch = joined(batch, {"--calibration", file, "--min-score", "0"});
   EXPECT_NEAR(score_of(batch, "b.json"), mapped(of_batch), 1e-12);
   EXPECT_EQ(json_of(folder_ / "b.json")["options"]["calibration"]["offset"], -1.0);
 
-  std::vector<std::string> map = joined({"reconstruct", folder_.path(), "-o", folder_ / "map",
-                                         "--no-map", "--no-refine", "--quiet", "--calibration",
-                                         file, "--min-score", "0"},
-                                        kSmall);
+  std::vector<std::string> map =
+      joined({"reconstruct", folder_.path(), "-o", folder_ / "map", "--no-map", "--no-refine",
+              "--quiet", "--calibration", file, "--min-score", "0"},
+             kSmall);
   EXPECT_NEAR(score_of(map, "map/pairs.json"), mapped(of_batch), 1e-12);
   expect_refused(joined(map, {"--results", folder_ / "b.json"}), {"--calibration", "--results"});
 }
