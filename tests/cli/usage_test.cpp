@@ -32,7 +32,7 @@ TEST_F(Usage, HelpAndVersionAreNoErrors) {
 
 TEST_F(Usage, VerbsAndOptionsThatDoNotExist) {
   expect_refused({}, {"no verb",
-                      "register, batch, consistency, reconstruct, evaluate, evaluate-trajectory, "
+                      "register, batch, consistency, reconstruct, calibrate, evaluate, evaluate-trajectory, "
                       "evaluate-surface, "
                       "report, generate, info"});
   expect_refused({"regsiter", "a", "b"}, {"regsiter", "register, batch"});
