@@ -172,7 +172,7 @@ class TestViewpoints:
     @pytest.mark.parametrize(
         ("value", "message"),
         [
-            ("here", r"source\.viewpoints: expected .*'none' or 'auto', got 'here'"),
+            ("here", r"source\.viewpoints: expected .*'none', 'model' or 'auto', got 'here'"),
             ([0, 0], r"source\.viewpoints: expected shape \(N, 3\), got \(2,\)"),
             ([[0, 0]], r"source\.viewpoints: expected shape \(N, 3\), got \(1, 2\)"),
             ([0, 0, np.nan], r"source.*viewpoint.*nan"),
