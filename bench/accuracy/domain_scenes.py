@@ -45,9 +45,7 @@ def translation(x, y, z):
 
 
 def random_rotation(rng):
-    return trimesh.transformations.quaternion_matrix(
-        (q := rng.normal(size=4)) / np.linalg.norm(q)
-    )
+    return trimesh.transformations.quaternion_matrix((q := rng.normal(size=4)) / np.linalg.norm(q))
 
 
 def cast(mesh, origin, directions):
@@ -440,9 +438,7 @@ def hall(seed):
                 rng.uniform(1.2, 1.9),
             )
             pose = pose @ rotation_about([0, 0, 1], rng.uniform(0, 2 * np.pi))
-            points = (
-                panorama(mesh, pose, rng) if scanner else spin(mesh, pose, rings, rng, most=60)
-            )
+            points = panorama(mesh, pose, rng) if scanner else spin(mesh, pose, rings, rng, most=60)
             if len(points) > 3000:
                 scans.append(Scan(points, pose, None, place, (np.eye(4),)))
     return Scene(scans, spread_pairs(scans, rng, 16, 8, 20), "auto", 5.0, 0.5)

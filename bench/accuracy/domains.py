@@ -171,9 +171,7 @@ def main():
             if name in SIMULATED:  # one after the other
                 conditions = [conditions[number % len(conditions)]]
             for condition in conditions:
-                new = evidence_of(
-                    arguments.gpureg, scene, condition, seed, arguments.extra.split()
-                )
+                new = evidence_of(arguments.gpureg, scene, condition, seed, arguments.extra.split())
                 for pair in new:
                     pair["scene"] = number
                 pairs += new

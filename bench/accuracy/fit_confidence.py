@@ -639,12 +639,16 @@ def main():
     arguments = parser.parse_args()
     if not arguments.runs and not arguments.models:
         parser.error("nothing to fit: neither RUN nor --models")
-    tested, models = ([], {}) if not arguments.runs else test_and_fit(
-        [parse_run(text) for text in arguments.runs],
-        [parse_run(text) for text in arguments.beside],
-        [parse_run(text) for text in arguments.others]
-        + [parse_run(text, "origin") for text in arguments.origin]
-        + [parse_run(text, "unknown") for text in arguments.unknown],
+    tested, models = (
+        ([], {})
+        if not arguments.runs
+        else test_and_fit(
+            [parse_run(text) for text in arguments.runs],
+            [parse_run(text) for text in arguments.beside],
+            [parse_run(text) for text in arguments.others]
+            + [parse_run(text, "origin") for text in arguments.origin]
+            + [parse_run(text, "unknown") for text in arguments.unknown],
+        )
     )
     if arguments.models:
         of_models, models["model"] = fit_models(arguments.models)
