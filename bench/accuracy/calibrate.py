@@ -5,7 +5,8 @@
 For each kind of data two folders of the same sensor: the calibration is made from the first one,
 without truth, and its error is measured by truth on the pairs of both. Kinds: rooms3 (generated
 rooms, three times the errors of the depth camera), street, hall, parts (domain_scenes.py). Error:
-expected calibration error of the most confident pose of each pair, ten equal bins.
+expected calibration error of the most confident pose of each pair, ten equal bins. expected_error: what
+it would be if every confidence were the true probability.
 
 usage: calibrate.py WORK [--kinds rooms3,street,hall,parts] [--gpureg COMMAND] [-o RECORD]
 Folders and results in WORK are used again. Needs numpy, and what domain_scenes.py needs."""
@@ -189,6 +190,16 @@ def calibration_error(results):
     return sum(abs((confidence - correct)[bins == b].sum()) for b in range(10)) / len(results)
 
 
+def expected_error(results):
+    """Mean error that the same confidences would have if each were the true probability: so few
+    pairs have an error even then.
+    """
+    rng = np.random.default_rng(1)
+    confidence = results[:, 0]
+    draws = (rng.random(len(confidence)) < confidence for _ in range(1000))
+    return np.mean([calibration_error(np.column_stack([confidence, d])) for d in draws])
+
+
 def measured(results):
     reported = results[:, 0] >= 0.5
     correct = results[:, 1] > 0
@@ -198,6 +209,7 @@ def measured(results):
         "reported": int((reported & correct).sum()),
         "reported_false": int((reported & ~correct).sum()),
         "error": round(float(calibration_error(results)), 4),
+        "expected_error": round(float(expected_error(results)), 4),
     }
 
 

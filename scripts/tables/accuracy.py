@@ -360,8 +360,8 @@ CALIBRATED = {
 def calibration():
     record = load("calibration.json")
     rows = [
-        "| data | folder | pairs | correct | error before | after | correct reported before | after | false reported before | after | slope | offset |",
-        "| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |",
+        "| data | folder | pairs | correct | error before | after | if every confidence were true | correct reported before | after | false reported before | after | slope | offset |",
+        "| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |",
     ]
     for name, text in CALIBRATED.items():
         if name not in record["kinds"]:
@@ -371,7 +371,7 @@ def calibration():
         for which in ("first", "second"):
             before, after = kind[which]["before"], kind[which]["after"]
             rows.append(
-                f"| {text} | {which} | {before['pairs']} | {before['correct']} | {before['error']:.3f} | {after['error']:.3f} | "
+                f"| {text} | {which} | {before['pairs']} | {before['correct']} | {before['error']:.3f} | {after['error']:.3f} | {after['expected_error']:.3f} | "
                 f"{before['reported']} | {after['reported']} | {before['reported_false']} | {after['reported_false']} | "
                 f"{made['slope']:.2f} | {made['offset']:.2f} |"
             )
