@@ -285,7 +285,8 @@ void add_register(CLI::App& app, Action& chosen) {
                  "Faster: do not search for other poses that compete with them");
   verb->add_option(
           "--source-viewpoint", o->source_viewpoint.text,
-          "Where SOURCE was seen from: x,y,z in its frame; none: not known; model: from everywhere, "
+          "Where SOURCE was seen from: x,y,z in its frame; none: not known; model: from "
+          "everywhere, "
           "its normals point outwards; auto: the file, or the origin if the surfaces agree with it")
       ->capture_default_str();
   verb->add_option("--target-viewpoint", o->target_viewpoint.text, "The same of TARGET")

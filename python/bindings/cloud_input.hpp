@@ -14,11 +14,10 @@
 namespace gpureg::python {
 
 /// One cloud as the package hands it over: (points, normals, features, viewpoints, origin,
-/// streams); all but the points may be None, and viewpoints False: unknown, not to be inferred; True: a model.
-/// Points, normals and features are float32 arrays, or,
-/// where there are streams, (address, rows, columns, stride, owner) of device memory; the streams
-/// are those that wrote points, normals and features. The caller's tuple keeps alive what the views
-/// point at.
+/// streams); all but the points may be None, and viewpoints False: unknown, not to be inferred;
+/// True: a model. Points, normals and features are float32 arrays, or, where there are streams,
+/// (address, rows, columns, stride, owner) of device memory; the streams are those that wrote
+/// points, normals and features. The caller's tuple keeps alive what the views point at.
 struct Input {
   PointCloudView view;
   bool on_device = false;

@@ -137,8 +137,8 @@ void bind_confidence(py::module_& m) {
   using namespace py::literals;
   m.def("_confidence_feature_names", &feature_names,
         "Names of the features of the confidence, in the order of the columns.");
-  m.def("_confidence_features", &features, "evidence"_a, "free_space"_a, "surface_sides"_a, "model"_a,
-        "regressand"_a,
+  m.def("_confidence_features", &features, "evidence"_a, "free_space"_a, "surface_sides"_a,
+        "model"_a, "regressand"_a,
         "(modes, features): of modes by their own evidence. evidence: the keys of a result's JSON, "
         "each an array with a row per mode.");
   m.def("_confidence_rank_features", &rank_features, "log_odds"_a, "modes_per_pair"_a, "refined"_a,

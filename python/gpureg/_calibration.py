@@ -35,8 +35,10 @@ class CalibrationRun:
         For ``RegistrationOptions.calibration``.
     enough_samples : bool
         False: the calibration changes nothing.
-    error_before, error_after : float
-        Expected calibration error of the samples, without and with the calibration.
+    error_before : float
+        Expected calibration error of the samples, without the calibration.
+    error_after : float
+        The same with it.
     counts : dict
         ``pairs``, ``samples`` and ``correct`` of ``one_scan``, ``loop_consistency`` and
         ``trajectory``.
@@ -195,7 +197,7 @@ def fit_calibration(
 
 
 def read_calibration(path: str | os.PathLike[str]) -> ConfidenceCalibration:
-    """Read the file of `gpureg calibrate` or `CalibrationRun.save`.
+    """Read the file of ``gpureg calibrate`` or `CalibrationRun.save`.
 
     Raises
     ------

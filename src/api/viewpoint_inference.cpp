@@ -234,8 +234,7 @@ InferredSides check_given_sides(const SurfaceGraph& graph) {
   if (contradiction < kBetterSides * graph.contradiction(better)) return out;
   std::ptrdiff_t sum = 0;
   for (const std::int8_t sign : better) sum += sign;
-  if (sum < 0)
-    flip(better);
+  if (sum < 0) flip(better);
   const auto flipped = std::count(better.begin(), better.end(), std::int8_t(-1));
   if (static_cast<double>(flipped) > kMostRepaired * static_cast<double>(better.size())) return out;
   out.signs = std::move(better);

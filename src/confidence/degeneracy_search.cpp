@@ -75,9 +75,9 @@ PosesOfPair perturb(const PairInput& pair, const PairOutcome& outcome,
     modes.push_back(&mode);
   }
   if (modes.empty()) return out;
-  const std::vector<double> log_odds = rank_modes(
-      evidence, available_evidence(evidence, pair.source->statistics.viewpoint,
-                                   pair.target->statistics.viewpoint));
+  const std::vector<double> log_odds =
+      rank_modes(evidence, available_evidence(evidence, pair.source->statistics.viewpoint,
+                                              pair.target->statistics.viewpoint));
   const auto best = std::max_element(log_odds.begin(), log_odds.end());
   const ModeOutcome& mode = *modes[static_cast<std::size_t>(best - log_odds.begin())];
   const InformationSpectrum spectrum = spectrum_of(mode, *pair.source);

@@ -35,8 +35,9 @@ void match(PairOutcome& outcome, const PreparedState& source, const PreparedStat
     mode.matches.inliers = inliers;
     const std::vector<PoseEvidence> evidence{
         confidence::evidence_of(outcome, mode, source, target, false)};
-    return confidence::rank_modes(evidence, confidence::available_evidence(
-                                                evidence, ViewpointSource::said, ViewpointSource::said))
+    return confidence::rank_modes(evidence,
+                                  confidence::available_evidence(evidence, ViewpointSource::said,
+                                                                 ViewpointSource::said))
         .front();
   };
   std::uint32_t inliers = 0;
