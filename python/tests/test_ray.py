@@ -102,11 +102,13 @@ def test_either_goes_on_where_the_other_stopped(whole, tmp_path):
 
 def test_progress_moves_within_a_chunk(tmp_path):
     seen = []
+    long = few(4_000_000, 0.08)
+    long.quadruples.max_survivors = 2**18
     gpureg.ray.register_all(
         many.fragments()[:9],
         output=tmp_path,
         actors=1,
-        options=few(800_000, 0.08),
+        options=long,
         progress=lambda done, total: seen.append(done),
     )
     # How many of the pieces are seen depends on the machine; the chunk is all 36 pairs.
