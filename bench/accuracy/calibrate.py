@@ -65,13 +65,10 @@ def simulated(kind, which, folder):
                 model.export(name.with_suffix(".stl"))
         for source, target in scene.pairs:
             s, t = scene.scans[source], scene.scans[target]
-            truths = []
-            if s.place == t.place:
-                own = t if t.model is not None else s
-                for symmetry in own.symmetries or (np.eye(4),):
-                    before, after = (symmetry, np.eye(4)) if own is t else (np.eye(4), symmetry)
-                    motion = np.linalg.inv(t.world_from_scan) @ s.world_from_scan
-                    truths.append(scaled(before @ motion @ after).ravel().tolist())
+            truths = [
+                scaled(pose).ravel().tolist()
+                for pose in domain_scenes.truths(scene, source, target)
+            ]
             cloud = s if s.model is None else t
             middle = (cloud.points if cloud is s else s.model.vertices).mean(0) * scale
             listed.append(

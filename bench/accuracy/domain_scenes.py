@@ -34,6 +34,19 @@ class Scene(NamedTuple):
     distance: float  # ... and this distance of the middle of the source
 
 
+def truths(scene, source, target):
+    """Every correct pose of the source in the frame of the target, by the symmetries of the model; none for different
+    places.
+    """
+    s, t = scene.scans[source], scene.scans[target]
+    if s.place != t.place:
+        return []
+    motion = np.linalg.inv(t.world_from_scan) @ s.world_from_scan
+    if t.model is not None:
+        return [symmetry @ motion for symmetry in t.symmetries or (np.eye(4),)]
+    return [motion @ symmetry for symmetry in s.symmetries or (np.eye(4),)]
+
+
 def rotation_about(axis, angle):
     return trimesh.transformations.rotation_matrix(angle, axis)
 

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""Evidence of pairs of many kinds of data: what fit_domains.py fits and tests the confidence with.
+"""Evidence of pairs of many kinds of data: what fit_models.py fits and domains_record.py tests the confidence with.
 
 A domain is a kind of sensor in a kind of place. Simulated ones: parts, figures, objects, street, hall
 (domain_scenes.py). Real ones, in DATA (its README.md has origins and licences): kitchen, dragon, cad,
@@ -46,17 +46,7 @@ def simulated(name, seed):
         triangles = np.asarray(scan.model.triangles)
         points, _ = viewpoints.sampled(triangles, rng, MODEL_POINTS)
         clouds.append(Cloud(points, None, extent, triangles if as_mesh else None))
-    pairs = []
-    for source, target in scene.pairs:
-        s, t = scene.scans[source], scene.scans[target]
-        truths = []
-        if s.place == t.place:
-            own = t if t.model is not None else s
-            for symmetry in own.symmetries or (np.eye(4),):
-                before, after = (symmetry, np.eye(4)) if own is t else (np.eye(4), symmetry)
-                motion = np.linalg.inv(t.world_from_scan) @ s.world_from_scan
-                truths.append(before @ motion @ after)
-        pairs.append((source, target, truths))
+    pairs = [(s, t, domain_scenes.truths(scene, s, t)) for s, t in scene.pairs]
 
     def right(points, pose, truths):
         middle = points.mean(0)

@@ -26,8 +26,6 @@ is fitted a second time, with little weight, as if up to a tenth of one of its c
 
 usage: fit_confidence.py RUN... [--beside RUN=LABEL...] [--others RUN=LABEL...] [--origin RUN...]
 [--unknown RUN...] [--header src/confidence/confidence_model.hpp] [-o bench/results/confidence.json]
---models: evidence of scans on models (domains.py: parts, figures, cad, cad_mesh). The regressions for models are fitted
-to it alone, each domain with the same weight, and tested by fits on the other domains.
 --others: tested only. LABEL: the row of the table that the run belongs to. --origin, --unknown:
 tested only; runs of the same scenes with the origin as the only viewpoint, or with none. Where a
 scene has poses.txt (fragment number, world_from_fragment), the record also counts the kinds of
@@ -76,7 +74,6 @@ MIN_SEPARATION = 2  # j - i: neighbours in the sequence do not count in Redwood'
 # and by a correct pose in a changed place.
 STRENGTHS = {"ranking": 0.15, "confidence": 0.00025, "overlap": 1.0}
 MODEL_STRENGTH = 1.0  # of the regressions for models, which have two features and the rank
-DOMAIN_WEIGHT = 1000.0  # of all pairs of a domain together
 NO_PENALTY = 1e6  # for slope and intercept, which two numbers cannot overfit
 MAX_ITERATIONS = 5000  # of the solver, which warns where they are too few
 MIN_SCALE = 1e-9  # bounds the standard deviation of a constant feature
@@ -217,40 +214,6 @@ class Run:
 
     def features(self, model, regressand, modes=...):
         return library()._confidence_features(rows(self.evidence, modes), *model, regressand)
-
-
-class DomainRun(Run):
-    """The pairs of a domain (domains.py) that have the same kinds of evidence. A pose is correct by the rule of the
-    domain.
-    """
-
-    def __init__(self, domain, pairs, free_space, model, weight=1.0):
-        self.building, self.label, self.viewpoints = domain, domain, "mixed"
-        kinds = [text for text, has in (("free space", free_space), ("model", model)) if has]
-        self.name = ", ".join([domain, *kinds])
-        self.free_space, self.model, self.weight = free_space, model, weight
-        self.refined = pairs[0]["refined"]
-        self.keys = [(k, k) for k in range(len(pairs))]
-        self.modes_per_pair = np.array([len(p["modes"]) for p in pairs])
-        self.pair = np.repeat(np.arange(len(pairs)), self.modes_per_pair)
-        self.evidence = columns([m["evidence"] for p in pairs for m in p["modes"]])
-        i, j = np.array([p["points"] for p in pairs])[self.pair].T
-        self.factor = overlap_factor(self.evidence["overlap"], j, i)
-        self.correct = np.concatenate([np.array(p["correct"], bool) for p in pairs])
-        self.in_truth = np.array([p["positive"] for p in pairs])
-        self.strict, self.listed, self.fragments = self.correct, set(), {}
-
-
-def domain_runs(path, total_weight=None):
-    """The runs of a file of domains.py, one for each kind of evidence. total_weight: of all pairs together."""
-    pairs = [p for p in json.loads(pathlib.Path(path).read_text())["pairs"] if p["modes"]]
-    kinds = {}
-    for p in pairs:
-        observed = any(max(m["evidence"]["observed"]) > 0 for m in p["modes"])
-        kinds.setdefault((observed, "model" in p["viewpoints"]), []).append(p)
-    weight = total_weight / len(pairs) if total_weight else 1.0
-    name = pathlib.Path(path).stem
-    return [DomainRun(name, of, *kind, weight) for kind, of in sorted(kinds.items())]
 
 
 class ChangedRun(Run):
@@ -539,7 +502,7 @@ def test_and_fit(runs, beside, others):
     tested = []
     for name, model in MODELS.items():
         if model.model:
-            continue  # see fit_models()
+            continue  # see fit_models.py
         fits = {}
         for run in [*runs, *beside, *others]:
             left = allowed(runs, model, run.building)
@@ -566,56 +529,6 @@ def test_and_fit(runs, beside, others):
     return tested, models
 
 
-def fit_models(files):
-    """Figures of all domains by fits on other domains, and the regressions of the fit on all of them. Files of one
-    domain begin with its name: cad.json, cad_mesh.json.
-    """
-    model = MODELS["model"]
-    runs = []
-    for path in files:
-        domain = pathlib.Path(path).stem.split("_")[0]
-        for run in domain_runs(path, DOMAIN_WEIGHT):
-            if run.has(model):
-                run.building = domain
-                runs.append(run)
-    tested = []
-    for run in runs:
-        left = [other for other in runs if other.building != run.building]
-        if not left:
-            continue
-        regressions = fit(left, [], model)
-        out = {"scene": run.name, "model": "model", **figures_of_domain(run, model, regressions)}
-        tested.append(out)
-        print(text_of(out), flush=True)
-    return tested, fit(runs, [], model)
-
-
-def figures_of_domain(run, model, regressions):
-    """Counts of pairs of a domain by their most confident pose."""
-    best, confidence, _ = confidences(run, model, regressions)
-    correct, positive = run.correct[best], int(run.in_truth.sum())
-    found = np.bincount(run.pair[run.correct], minlength=len(run.keys)) > 0
-    sure, reported = confidence > SURE, confidence >= REPORTED
-    bins = np.minimum((confidence * CALIBRATION_BINS).astype(int), CALIBRATION_BINS - 1)
-    return {
-        "pairs": len(run.keys),
-        "true_pairs": positive,
-        "among_modes": int(found.sum()),
-        "first": int(correct.sum()),
-        "reported": int((reported & correct).sum()),
-        "reported_wrong": int((reported & ~correct).sum()),
-        "sure": int(sure.sum()),
-        "sure_wrong": int((sure & ~correct).sum()),
-        "ECE": float(
-            sum(
-                (bins == b).mean() * abs(confidence[bins == b].mean() - correct[bins == b].mean())
-                for b in range(CALIBRATION_BINS)
-                if (bins == b).any()
-            )
-        ),
-    }
-
-
 def parse_run(text, viewpoints="known"):
     building, folder, result, *label = text.split("=")
     return Run(building, folder, result, label[0] if label else None, viewpoints)
@@ -625,7 +538,7 @@ def main():
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("runs", nargs="*", metavar="RUN", help="BUILDING=SCENE_FOLDER=RESULT.json")
+    parser.add_argument("runs", nargs="+", metavar="RUN", help="BUILDING=SCENE_FOLDER=RESULT.json")
     for name, meta, text in (
         ("--beside", "RUN=LABEL", "the second regression alone is fitted to them"),
         ("--others", "RUN=LABEL", "tested only"),
@@ -633,26 +546,16 @@ def main():
         ("--unknown", "RUN", "tested only: no viewpoint was known"),
     ):
         parser.add_argument(name, nargs="+", default=[], metavar=meta, help=text)
-    parser.add_argument("--models", nargs="+", default=[], metavar="FILE", help="of domains.py")
     parser.add_argument("--header", type=pathlib.Path)
     parser.add_argument("-o", "--output", type=pathlib.Path)
     arguments = parser.parse_args()
-    if not arguments.runs and not arguments.models:
-        parser.error("nothing to fit: neither RUN nor --models")
-    tested, models = (
-        ([], {})
-        if not arguments.runs
-        else test_and_fit(
-            [parse_run(text) for text in arguments.runs],
-            [parse_run(text) for text in arguments.beside],
-            [parse_run(text) for text in arguments.others]
-            + [parse_run(text, "origin") for text in arguments.origin]
-            + [parse_run(text, "unknown") for text in arguments.unknown],
-        )
+    tested, models = test_and_fit(
+        [parse_run(text) for text in arguments.runs],
+        [parse_run(text) for text in arguments.beside],
+        [parse_run(text) for text in arguments.others]
+        + [parse_run(text, "origin") for text in arguments.origin]
+        + [parse_run(text, "unknown") for text in arguments.unknown],
     )
-    if arguments.models:
-        of_models, models["model"] = fit_models(arguments.models)
-        tested += of_models
     if arguments.header:
         write_header(arguments.header, models)
     if arguments.output:
