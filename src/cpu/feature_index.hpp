@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "cpu/byte_rows.hpp"
 #include "cpu/stages.hpp"
 
 namespace gpureg::cpu {
@@ -23,17 +24,20 @@ struct FeatureIndex {
   std::vector<float>
       leaf_boxes;  ///< node, dimension, lower ends of its 8 leaves and then the upper ones
   std::vector<float> node_boxes;  ///< the same, 8 nodes to a block
+  ByteRows bytes;  ///< of the values
 };
 
 FeatureIndex index_features(FeatureRows rows);
 
+/// Which vectors a search uses, at most; the result is the same.
+enum class SearchVectors { kNarrow, kWide, kBytes };
+
 /// Searches the nearest row for the rows begin to end (exclusive) in the order of their own index,
 /// and for the rows that equal them.
 /// out[q]: result of nearest_features() with k = 1 for row q. The rows of one leaf are similar, so
-/// each search starts with the result of the previous one. wide_vectors: use those of
-/// AVX-512 where there are some; the result is the same.
+/// each search starts with the result of the previous one.
 void nearest_features(FeatureRows queries, const FeatureIndex& order, FeatureRows rows,
                       const FeatureIndex& index, std::size_t begin, std::size_t end,
-                      std::uint32_t* out, bool wide_vectors = true);
+                      std::uint32_t* out, SearchVectors most = SearchVectors::kBytes);
 
 }  // namespace gpureg::cpu

@@ -10,6 +10,15 @@
 #define GPUREG_WIDE_TARGET \
   __attribute__((target("avx512f,avx512vl,avx512bw,avx512dq,prefer-vector-width=512")))
 #endif
+/// The same with products of bytes.
+#ifdef __clang__
+#define GPUREG_BYTE_TARGET \
+  __attribute__((target("avx512f,avx512vl,avx512bw,avx512dq,avx512vnni")))
+#else
+#define GPUREG_BYTE_TARGET     \
+  __attribute__((               \
+      target("avx512f,avx512vl,avx512bw,avx512dq,avx512vnni,prefer-vector-width=512")))
+#endif
 #endif
 #ifdef __GNUC__
 #define GPUREG_ALWAYS_INLINE inline __attribute__((always_inline))
@@ -24,6 +33,16 @@ inline bool has_wide_vectors() {
 #ifdef GPUREG_WIDE_TARGET
   static const bool has = __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512vl") &&
                           __builtin_cpu_supports("avx512bw") && __builtin_cpu_supports("avx512dq");
+  return has;
+#else
+  return false;
+#endif
+}
+
+/// Whether it also has functions with products of bytes (AVX-512 VNNI).
+inline bool has_byte_products() {
+#ifdef GPUREG_WIDE_TARGET
+  static const bool has = has_wide_vectors() && __builtin_cpu_supports("avx512vnni");
   return has;
 #else
   return false;

@@ -38,13 +38,16 @@ Rows random_rows(std::mt19937& random, std::size_t n, std::uint32_t dimension, i
   return rows;
 }
 
+constexpr SearchVectors kVectors[] = {SearchVectors::kNarrow, SearchVectors::kWide,
+                                      SearchVectors::kBytes};
+
 std::vector<std::uint32_t> by_index(const Rows& queries, const Rows& rows, std::size_t grain,
-                                    bool wide_vectors = true) {
+                                    SearchVectors most = SearchVectors::kBytes) {
   const FeatureIndex order = index_features(queries.view()), index = index_features(rows.view());
   std::vector<std::uint32_t> out(queries.valid.size(), kNoValue);
   for (std::size_t begin = 0; begin < order.rows; begin += grain)
     nearest_features(queries.view(), order, rows.view(), index, begin,
-                     std::min<std::size_t>(begin + grain, order.rows), out.data(), wide_vectors);
+                     std::min<std::size_t>(begin + grain, order.rows), out.data(), most);
   return out;
 }
 
@@ -62,9 +65,9 @@ TEST(FeatureIndex, EqualsExhaustiveSearch) {
         const Rows queries = random_rows(random, 211, dimension, levels, 1),
                    rows = random_rows(random, n, dimension, levels, 1);
         const std::vector<std::uint32_t> expected = exhaustive(queries, rows);
-        for (const bool wide_vectors : {false, true})
-          EXPECT_EQ(by_index(queries, rows, 50, wide_vectors), expected)
-              << dimension << " " << n << " " << levels << " " << wide_vectors;
+        for (const SearchVectors most : kVectors)
+          EXPECT_EQ(by_index(queries, rows, 50, most), expected)
+              << dimension << " " << n << " " << levels << " " << static_cast<int>(most);
       }
 }
 
@@ -107,8 +110,8 @@ TEST(FeatureIndex, DistancesThatOverflowAreNoDistances) {
   for (const float scale : {1e-30f, 1e18f, 1e30f}) {
     const Rows queries = random_rows(random, 90, 33, 0, scale),
                rows = random_rows(random, 300, 33, 0, scale);
-    for (const bool wide_vectors : {false, true})
-      EXPECT_EQ(by_index(queries, rows, 90, wide_vectors), exhaustive(queries, rows)) << scale;
+    for (const SearchVectors most : kVectors)
+      EXPECT_EQ(by_index(queries, rows, 90, most), exhaustive(queries, rows)) << scale;
   }
 }
 
