@@ -27,7 +27,7 @@ constexpr float kRounding = 1e-4f;
 /// Some rows minus the middle, for the axes.
 std::vector<float> sample(const std::vector<float>& leaves, std::size_t dimension,
                           const std::vector<float>& middle) {
-  constexpr std::size_t kMost = 512;
+  constexpr std::size_t kMost = 256;
   const std::size_t leaf_values = dimension * kRows, rows = leaves.size() / dimension,
                     stride = std::max<std::size_t>(1, rows / kMost);
   std::vector<float> out;
@@ -72,7 +72,7 @@ std::vector<float> principal_axes(const std::vector<float>& rows, std::size_t di
                    [&](std::size_t a, std::size_t b) { return variance[a] > variance[b]; });
   std::vector<float> axes(dimension * kLanes, 0.0f), next(axes.size());
   for (std::size_t a = 0; a < std::min(kAxes, dimension); ++a) axes[order[a] * kLanes + a] = 1.0f;
-  constexpr int kIterations = 4;
+  constexpr int kIterations = 3;
   for (int k = 0; k < kIterations && dimension > kAxes; ++k) {
     std::fill(next.begin(), next.end(), 0.0f);
     for (const float* row = rows.data(); row != rows.data() + rows.size(); row += dimension) {

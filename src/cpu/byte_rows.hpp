@@ -17,7 +17,7 @@ struct ByteRows {
   static constexpr std::size_t kLanes = 16;   ///< leaves side by side
   static constexpr std::size_t kRows = 16;    ///< rows of a leaf
   static constexpr std::size_t kQueries = 8;  ///< queries of a scan
-  static constexpr std::size_t kWords = 3;    ///< of four coordinates, per row
+  static constexpr std::size_t kWords = 4;    ///< of four coordinates, per row
   static constexpr std::size_t kAxes = 4 * kWords - 1;
 
   bool valid = false;  ///< false: values that do not fit, or no byte products

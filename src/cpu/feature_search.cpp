@@ -50,9 +50,9 @@ void box_bounds(const float* query, const float* const* boxes, std::size_t dimen
 }
 
 /// Squared distances to the 16 rows of each of two leaves, each a chain of fmaf in ascending order
-/// of the dimensions. False, and no distances, where all exceed `most`; half of the dimensions may
-/// show that already.
-bool leaf_distances(const float* query, const float* const* leaf, std::size_t dimension, float most,
+/// of the dimensions. Returns a mask of the rows within `most`. No distances where there are none;
+/// half of the dimensions may show that already.
+std::uint64_t leaf_distances(const float* query, const float* const* leaf, std::size_t dimension, float most,
                     float (*out)[kLeaf]) {
   const std::size_t half = dimension / 2;
 #if defined(__AVX2__) && defined(__FMA__)
@@ -67,16 +67,19 @@ bool leaf_distances(const float* query, const float* const* leaf, std::size_t di
       }
     }
   };
-  const auto all_exceed = [&] {
-    const __m256 least =
-        _mm256_min_ps(_mm256_min_ps(sum[0], sum[1]), _mm256_min_ps(sum[2], sum[3]));
-    return _mm256_movemask_ps(_mm256_cmp_ps(least, _mm256_set1_ps(most), _CMP_LE_OQ)) == 0;
+  const auto within = [&] {
+    std::uint64_t mask = 0;
+    for (int k = 0; k < 4; ++k)
+      mask |= static_cast<std::uint64_t>(_mm256_movemask_ps(
+                  _mm256_cmp_ps(sum[k], _mm256_set1_ps(most), _CMP_LE_OQ)))
+              << 8 * k;
+    return mask;
   };
   add(0, half);
-  if (all_exceed()) return false;
+  if (within() == 0) return 0;
   add(half, dimension);
-  if (all_exceed()) return false;
   for (int k = 0; k < 4; ++k) _mm256_storeu_ps(out[k / 2] + k % 2 * 8, sum[k]);
+  return within();
 #else
   const auto add = [&](std::size_t from, std::size_t to) {
     for (std::size_t d = from; d < to; ++d)
@@ -88,19 +91,24 @@ bool leaf_distances(const float* query, const float* const* leaf, std::size_t di
   };
   for (int k = 0; k < 2; ++k) std::fill_n(out[k], kLeaf, 0.0f);
   add(0, half);
-  if (!(*std::min_element(out[0], out[0] + 2 * kLeaf) <= most)) return false;
+  if (!(*std::min_element(out[0], out[0] + 2 * kLeaf) <= most)) return 0;
   add(half, dimension);
+  std::uint64_t mask = 0;
+  for (std::uint32_t l = 0; l < 2 * kLeaf; ++l)
+    mask |= static_cast<std::uint64_t>(out[l / kLeaf][l % kLeaf] <= most) << l;
+  return mask;
 #endif
-  return true;
 }
 
 #ifdef GPUREG_WIDE_TARGET
 /// The same for four leaves.
-GPUREG_WIDE_TARGET bool leaf_distances_wide(const float* query, const float* const* leaf,
-                                            std::size_t dimension, float most,
-                                            float (*out)[kLeaf]) {
+GPUREG_WIDE_TARGET std::uint64_t leaf_distances_wide(const float* query, const float* const* leaf,
+                                                     std::size_t dimension, float most,
+                                                     float (*out)[kLeaf]) {
   __m512 a = _mm512_setzero_ps(), b = a, c = a, e = a;
+  const __m512 limit = _mm512_set1_ps(most);
   const std::size_t half = dimension / 2;
+  std::uint64_t within = 0;
   for (std::size_t d = 0; d < dimension; ++d) {
     const __m512 value = _mm512_set1_ps(query[d]);
     const __m512 x = _mm512_sub_ps(value, _mm512_loadu_ps(leaf[0] + d * kLeaf)),
@@ -112,16 +120,17 @@ GPUREG_WIDE_TARGET bool leaf_distances_wide(const float* query, const float* con
     c = _mm512_fmadd_ps(z, z, c);
     e = _mm512_fmadd_ps(w, w, e);
     if (d + 1 != half && d + 1 != dimension) continue;
-    const __m512 limit = _mm512_set1_ps(most);
-    if ((_mm512_cmp_ps_mask(a, limit, _CMP_LE_OQ) | _mm512_cmp_ps_mask(b, limit, _CMP_LE_OQ) |
-         _mm512_cmp_ps_mask(c, limit, _CMP_LE_OQ) | _mm512_cmp_ps_mask(e, limit, _CMP_LE_OQ)) == 0)
-      return false;
+    within = static_cast<std::uint64_t>(_mm512_cmp_ps_mask(a, limit, _CMP_LE_OQ)) |
+             static_cast<std::uint64_t>(_mm512_cmp_ps_mask(b, limit, _CMP_LE_OQ)) << 16 |
+             static_cast<std::uint64_t>(_mm512_cmp_ps_mask(c, limit, _CMP_LE_OQ)) << 32 |
+             static_cast<std::uint64_t>(_mm512_cmp_ps_mask(e, limit, _CMP_LE_OQ)) << 48;
+    if (within == 0) return 0;
   }
   _mm512_storeu_ps(out[0], a);
   _mm512_storeu_ps(out[1], b);
   _mm512_storeu_ps(out[2], c);
   _mm512_storeu_ps(out[3], e);
-  return true;
+  return within;
 }
 #endif
 
@@ -174,11 +183,10 @@ class Search {
   }
 
   /// The same for up to ByteRows::kQueries queries; the index has valid bytes.
-  void nearest_by_bytes(const float* const* queries, std::size_t count, std::uint32_t guess,
-                        const float* guess_distances, std::uint32_t* out) {
+  void nearest_by_bytes(const float* const* queries, std::size_t count, std::uint32_t* out) {
     leaves_.find(index_.bytes, queries, count);
     for (std::size_t q = 0; q < count; ++q) {
-      begin_query(queries[q], guess, guess_distances[q]);
+      begin_query(queries[q], kNoValue, kInfinity);
       const std::size_t first = leaves_.nearest_leaf(q);
       look(&first, 1);
       std::size_t leaf[kTogether];
@@ -245,22 +253,20 @@ class Search {
     for (int k = 0; k < kTogether; ++k)
       values[k] = index_.values.data() + leaf[std::min(k, count - 1)] * kLeaf * index_.dimension;
 #ifdef GPUREG_WIDE_TARGET
-    const bool near = wide_
-                          ? leaf_distances_wide(query_, values, index_.dimension, best_, distances)
-                          : leaf_distances(query_, values, index_.dimension, best_, distances);
+    std::uint64_t near = wide_
+                             ? leaf_distances_wide(query_, values, index_.dimension, best_, distances)
+                             : leaf_distances(query_, values, index_.dimension, best_, distances);
 #else
-    const bool near = leaf_distances(query_, values, index_.dimension, best_, distances);
+    std::uint64_t near = leaf_distances(query_, values, index_.dimension, best_, distances);
 #endif
-    if (!near) return;
-    for (int k = 0; k < count; ++k) take(leaf[k], distances[k]);
-  }
-  void take(std::size_t leaf, const float* distances) {
-    for (std::uint32_t l = 0; l < kLeaf; ++l) {
-      if (!(distances[l] <= best_)) continue;
-      const std::uint32_t row = index_.row[leaf * kLeaf + l];
+    if (count < kTogether) near &= (std::uint64_t(1) << count * kLeaf) - 1;
+    for (; near != 0; near &= near - 1) {
+      const auto place = static_cast<std::size_t>(__builtin_ctzll(near));
+      const float d = distances[place / kLeaf][place % kLeaf];
+      const std::uint32_t row = index_.row[leaf[place / kLeaf] * kLeaf + place % kLeaf];
       // best_row_ stays kNoValue while the best distance is infinite: such rows are not near.
-      if (distances[l] == best_ && (best_row_ == kNoValue || row >= best_row_)) continue;
-      best_ = distances[l];
+      if (!(d <= best_) || (d == best_ && (best_row_ == kNoValue || row >= best_row_))) continue;
+      best_ = d;
       best_row_ = row;
     }
   }
@@ -280,33 +286,30 @@ void nearest_features(FeatureRows queries, const FeatureIndex& order, FeatureRow
                       const FeatureIndex& index, std::size_t begin, std::size_t end,
                       std::uint32_t* out, SearchVectors most) {
   Search search(index, most >= SearchVectors::kWide && has_wide_vectors());
-  const bool bytes =
-      most == SearchVectors::kBytes && index.bytes.valid;
-  const std::size_t together = bytes ? ByteRows::kQueries : 1;
-  std::uint32_t guess = kNoValue;
-  for (std::size_t k = begin; k < end; k += together) {
-    const std::size_t count = std::min(together, end - k);
-    const float* query[ByteRows::kQueries];
-    float far[ByteRows::kQueries];
+  const bool bytes = most == SearchVectors::kBytes && index.bytes.valid;
+  const auto query = [&](std::size_t k) {
+    return queries.values + static_cast<std::size_t>(order.row[k]) * queries.dimension;
+  };
+  const auto answer = [&](std::size_t k, std::uint32_t row) {
+    for (std::uint32_t q = order.row[k]; q != kNoValue; q = order.next_equal[q]) out[q] = row;
+  };
+  for (std::size_t k = begin; bytes && k < end; k += ByteRows::kQueries) {
+    const std::size_t count = std::min(ByteRows::kQueries, end - k);
+    const float* some[ByteRows::kQueries];
     std::uint32_t found[ByteRows::kQueries];
-    for (std::size_t q = 0; q < count; ++q) {
-      query[q] = queries.values + static_cast<std::size_t>(order.row[k + q]) * queries.dimension;
-      far[q] =
-          guess == kNoValue
-              ? kInfinity
-              : distance(query[q], rows.values + static_cast<std::size_t>(guess) * rows.dimension,
-                         rows.dimension);
-    }
-    if (index.nodes == 0)
-      std::fill_n(found, count, kNoValue);
-    else if (bytes)
-      search.nearest_by_bytes(query, count, guess, far, found);
-    else
-      found[0] = search.nearest(query[0], guess, far[0]);
-    guess = found[count - 1];
-    for (std::size_t q = 0; q < count; ++q)
-      for (std::uint32_t r = order.row[k + q]; r != kNoValue; r = order.next_equal[r])
-        out[r] = found[q];
+    for (std::size_t q = 0; q < count; ++q) some[q] = query(k + q);
+    search.nearest_by_bytes(some, count, found);
+    for (std::size_t q = 0; q < count; ++q) answer(k + q, found[q]);
+  }
+  std::uint32_t guess = kNoValue;
+  for (std::size_t k = begin; !bytes && k < end; ++k) {
+    const float far =
+        guess == kNoValue
+            ? kInfinity
+            : distance(query(k), rows.values + static_cast<std::size_t>(guess) * rows.dimension,
+                       rows.dimension);
+    guess = index.nodes == 0 ? kNoValue : search.nearest(query(k), guess, far);
+    answer(k, guess);
   }
 }
 
