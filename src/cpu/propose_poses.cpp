@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <algorithm>
+#include <cstring>
 
 #include "algorithm/fit.hpp"
 #include "cpu/compatibility.hpp"
@@ -9,11 +10,22 @@
 namespace gpureg::cpu {
 namespace {
 
+constexpr std::uint32_t kBlock = 64;  // bits of a mask
+
+/// Bits of 64 flags, each 0 or 1.
+GPUREG_ALWAYS_INLINE std::uint64_t mask_of(const std::uint8_t* flags) {
+  std::uint64_t mask = 0;
+  for (std::uint32_t k = 0; k < kBlock / 8; ++k) {
+    std::uint64_t eight;
+    std::memcpy(&eight, flags + 8 * k, 8);
+    mask |= (eight * 0x0102040810204080u >> 56) << 8 * k;
+  }
+  return mask;
+}
+
 /// Neighbourhood of a seed: the seed, then the first of its compatible matches.
 struct Members {
   std::vector<float> px, py, pz, qx, qy, qz;
-  static constexpr std::uint32_t kBlock = 64;
-
   std::vector<std::uint32_t> weight, match;
   std::vector<std::uint32_t> remaining;  ///< weight of each block of members and of all after it
   std::uint32_t size = 0;
@@ -24,25 +36,24 @@ struct Members {
     match.resize(most);
     remaining.resize(most / kBlock + 1);
   }
-  void add(const MatchSet& m, std::uint32_t k) {
-    px[size] = m.px[k];
-    py[size] = m.py[k];
-    pz[size] = m.pz[k];
-    qx[size] = m.qx[k];
-    qy[size] = m.qy[k];
-    qz[size] = m.qz[k];
-    weight[size] = m.source_weight[k] + m.target_weight[k];
-    match[size] = k;
-    ++size;
-  }
-  void gather(const MatchSet& m, std::uint32_t seed, const CompatibilityTest& test,
-              std::uint32_t most) {
+  GPUREG_ALWAYS_INLINE void gather(const MatchSet& m, std::uint32_t seed,
+                                   const CompatibilityTest& test, std::uint32_t most) {
     size = 0;
     add(m, seed);
-    for_each_compatible(m, seed, test, [&](std::uint32_t k) {
-      if (k != seed && size < most) add(m, k);
-      return size < most;
-    });
+    const MatchColumns columns(m);
+    const OrientedMatch own = columns[seed];
+    const std::uint32_t n = m.size();
+    std::uint8_t flag[kBlock] = {};
+    for (std::uint32_t from = 0; from < n && size < most; from += kBlock) {
+      const std::uint32_t count = std::min(n - from, kBlock);
+      const MatchColumns block(m, from);
+      for (std::uint32_t k = 0; k < count; ++k) flag[k] = compatible(block[k], own, test);
+      for (std::uint32_t k = count; k < kBlock; ++k) flag[k] = 0;
+      std::uint64_t mask = mask_of(flag);
+      if (seed - from < kBlock) mask &= ~(std::uint64_t(1) << (seed - from));
+      for (; mask != 0 && size < most; mask &= mask - 1)
+        add(m, from + static_cast<std::uint32_t>(__builtin_ctzll(mask)));
+    }
     std::uint32_t after = 0;
     for (std::uint32_t k = size; k-- > 0;) {
       after += weight[k];
@@ -54,22 +65,8 @@ struct Members {
 
   /// Total weight of the members that the motion aligns. Stops, with a value up to `best`, as soon
   /// as more is out of range.
-  std::uint32_t support(const Rigid& pose, float squared_distance, std::uint32_t best) const {
-#ifdef GPUREG_WIDE_TARGET
-    if (has_wide_vectors()) return support_wide(pose, squared_distance, best);
-#endif
-    return support_in_vectors(pose, squared_distance, best);
-  }
-
- private:
-#ifdef GPUREG_WIDE_TARGET
-  GPUREG_WIDE_TARGET std::uint32_t support_wide(const Rigid& pose, float squared_distance,
-                                                std::uint32_t best) const {
-    return support_in_vectors(pose, squared_distance, best);
-  }
-#endif
-  GPUREG_ALWAYS_INLINE std::uint32_t support_in_vectors(const Rigid& pose, float squared_distance,
-                                                        std::uint32_t best) const {
+  GPUREG_ALWAYS_INLINE std::uint32_t support(const Rigid& pose, float squared_distance,
+                                             std::uint32_t best) const {
     const float *ax = px.data(), *ay = py.data(), *az = pz.data(), *bx = qx.data(), *by = qy.data(),
                 *bz = qz.data();
     const std::uint32_t* w = weight.data();
@@ -85,52 +82,92 @@ struct Members {
     }
     return total;
   }
+
+ private:
+  void add(const MatchSet& m, std::uint32_t k) {
+    px[size] = m.px[k];
+    py[size] = m.py[k];
+    pz[size] = m.pz[k];
+    qx[size] = m.qx[k];
+    qy[size] = m.qy[k];
+    qz[size] = m.qz[k];
+    weight[size] = m.source_weight[k] + m.target_weight[k];
+    match[size] = k;
+    ++size;
+  }
 };
 
 /// Least-squares fit to the members that the pose aligns; false where they do not determine a pose.
-bool refit(const Members& members, float squared_distance, Pose<float>& pose) {
+GPUREG_ALWAYS_INLINE bool refit(const Members& members, float squared_distance,
+                                Pose<float>& pose) {
   const Rigid rigid = to_rigid(pose);
   Vec3 p[limits::kMaxMembers], q[limits::kMaxMembers];
+  std::uint8_t flag[kBlock] = {};
   int n = 0;
-  for (std::uint32_t k = 0; k < members.size; ++k)
-    if (squared_norm(apply(rigid, members.source(k)) - members.target(k)) < squared_distance) {
-      p[n] = members.source(k);
-      q[n] = members.target(k);
+  for (std::uint32_t begin = 0; begin < members.size; begin += kBlock) {
+    const std::uint32_t count = std::min(members.size - begin, kBlock);
+    const float *px = &members.px[begin], *py = &members.py[begin], *pz = &members.pz[begin],
+                *qx = &members.qx[begin], *qy = &members.qy[begin], *qz = &members.qz[begin];
+    for (std::uint32_t k = 0; k < count; ++k)
+      flag[k] = squared_norm(apply(rigid, {px[k], py[k], pz[k]}) - Vec3{qx[k], qy[k], qz[k]}) <
+                squared_distance;
+    for (std::uint32_t k = count; k < kBlock; ++k) flag[k] = 0;
+    for (std::uint64_t mask = mask_of(flag); mask != 0; mask &= mask - 1) {
+      const int k = __builtin_ctzll(mask);
+      p[n] = {px[k], py[k], pz[k]};
+      q[n] = {qx[k], qy[k], qz[k]};
       ++n;
     }
+  }
   return fit_rigid(p, q, n, pose);
 }
 
 /// The triangle of the seed and two compatible members with the largest consensus weight, refitted
 /// to its consensus set.
-bool fit_seed(const MatchSet& m, std::uint32_t seed, const CompatibilityOptions& options,
-              std::uint64_t random, Members& members, Pose<float>& pose) {
+GPUREG_ALWAYS_INLINE bool fit_seed_in_vectors(const MatchSet& m, std::uint32_t seed,
+                                              const CompatibilityOptions& options,
+                                              std::uint64_t random, Members& members,
+                                              Pose<float>& pose) {
   const CompatibilityTest test = test_of(options);
   const float squared_distance = options.consensus_distance * options.consensus_distance;
   const float shortest = options.seed_separation * options.seed_separation;
   members.gather(m, seed, test, options.max_members);
   if (members.size < 3) return false;
   const MatchColumns columns(m);
+  const std::uint32_t *match = members.match.data(), size = members.size;
+  const std::uint32_t source = m.source[seed], target = m.target[seed];
+  const Vec3 p0 = members.source(0), q0 = members.target(0);
   std::uint32_t best = 0;
   Vec3 p[3], q[3];
-  for (std::uint32_t trial = 0; trial < options.triangles; ++trial) {
-    const TrianglePick pick =
-        pick_triangle(m.source[seed], m.target[seed], trial, random, members.size);
-    if (!compatible(columns[members.match[pick.a]], columns[members.match[pick.b]], test)) continue;
-    const Vec3 p0 = members.source(0), p1 = members.source(pick.a), p2 = members.source(pick.b);
-    const Vec3 q0 = members.target(0), q1 = members.target(pick.a), q2 = members.target(pick.b);
-    Rigid rigid;
-    if (!wide_triangle(p0, p1, p2, shortest) || !carry_triangle(p0, p1, p2, q0, q1, q2, rigid))
-      continue;
-    const std::uint32_t support = members.support(rigid, squared_distance, best);
-    if (support <= best) continue;
-    best = support;
-    p[0] = p0;
-    p[1] = p1;
-    p[2] = p2;
-    q[0] = q0;
-    q[1] = q1;
-    q[2] = q2;
+  for (std::uint32_t begin = 0; begin < options.triangles; begin += kBlock) {
+    const std::uint32_t count = std::min(options.triangles - begin, kBlock);
+    std::uint32_t first[kBlock], second[kBlock], kept[kBlock], keep = 0;
+    for (std::uint32_t k = 0; k < kBlock; ++k) {
+      const TrianglePick pick = pick_triangle(source, target, begin + k, random, size);
+      first[k] = pick.a;
+      second[k] = pick.b;
+    }
+    for (std::uint32_t k = 0; k < count; ++k) {
+      const OrientedMatch a = columns[match[first[k]]], b = columns[match[second[k]]];
+      kept[keep] = k;
+      keep += compatible(a, b, test) & wide_triangle(p0, a.p, b.p, shortest);
+    }
+    for (std::uint32_t t = 0; t < keep; ++t) {
+      const std::uint32_t k = kept[t];
+      const Vec3 p1 = members.source(first[k]), p2 = members.source(second[k]);
+      const Vec3 q1 = members.target(first[k]), q2 = members.target(second[k]);
+      Rigid rigid;
+      if (!carry_triangle(p0, p1, p2, q0, q1, q2, rigid)) continue;
+      const std::uint32_t support = members.support(rigid, squared_distance, best);
+      if (support <= best) continue;
+      best = support;
+      p[0] = p0;
+      p[1] = p1;
+      p[2] = p2;
+      q[0] = q0;
+      q[1] = q1;
+      q[2] = q2;
+    }
   }
   if (best == 0 || !fit_rigid(p, q, 3, pose)) return false;
   for (std::uint32_t k = 0; k < options.refits; ++k) {
@@ -139,6 +176,22 @@ bool fit_seed(const MatchSet& m, std::uint32_t seed, const CompatibilityOptions&
     pose = better;
   }
   return true;
+}
+
+#ifdef GPUREG_WIDE_TARGET
+GPUREG_WIDE_TARGET bool fit_seed_wide(const MatchSet& m, std::uint32_t seed,
+                                      const CompatibilityOptions& options, std::uint64_t random,
+                                      Members& members, Pose<float>& pose) {
+  return fit_seed_in_vectors(m, seed, options, random, members, pose);
+}
+#endif
+
+bool fit_seed(const MatchSet& m, std::uint32_t seed, const CompatibilityOptions& options,
+              std::uint64_t random, Members& members, Pose<float>& pose) {
+#ifdef GPUREG_WIDE_TARGET
+  if (has_wide_vectors()) return fit_seed_wide(m, seed, options, random, members, pose);
+#endif
+  return fit_seed_in_vectors(m, seed, options, random, members, pose);
 }
 
 GPUREG_ALWAYS_INLINE MatchEvidence count_in_vectors(const MatchSet& m, const Rigid& pose,
