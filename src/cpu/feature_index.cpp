@@ -148,4 +148,10 @@ FeatureIndex index_features(FeatureRows rows) {
   return out;
 }
 
+const FeatureIndex& KeptIndex::of(FeatureRows rows) const {
+  std::lock_guard<std::mutex> lock(mutex_);
+  if (!index_) index_ = std::make_shared<const FeatureIndex>(index_features(rows));
+  return *index_;
+}
+
 }  // namespace gpureg::cpu

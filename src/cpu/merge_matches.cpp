@@ -13,51 +13,51 @@ namespace {
 /// One search of all rows of one cloud in the other.
 struct Search {
   FeatureRows from, in;
+  const KeptIndex *from_kept, *in_kept;
   bool forward;  ///< from source to target
   std::vector<std::uint32_t> nearest;
   const FeatureIndex *from_index = nullptr, *in_index = nullptr;
 };
 
-FeatureRows narrow(const CloudView& c) {
-  return {c.features, c.has_feature, c.size, c.feature_dimension};
-}
-FeatureRows wide(const CloudView& c) {
-  return {c.wide_features, c.has_wide_feature, c.size, c.feature_dimension};
+void add_searches(FeatureRows s, FeatureRows t, const KeptIndex& of_s, const KeptIndex& of_t,
+                  std::vector<Search>& out) {
+  out.push_back({s, t, &of_s, &of_t, true, std::vector<std::uint32_t>(s.size, kNoValue)});
+  out.push_back({t, s, &of_t, &of_s, false, std::vector<std::uint32_t>(t.size, kNoValue)});
 }
 
 std::vector<Search> searches_of(const PairView& pair) {
   std::vector<Search> out;
   const CloudView &s = pair.source, &t = pair.target;
   if (pair.custom_count > 0 || s.size == 0 || t.size == 0) return out;
-  out.push_back({narrow(s), narrow(t), true, std::vector<std::uint32_t>(s.size, kNoValue)});
-  out.push_back({narrow(t), narrow(s), false, std::vector<std::uint32_t>(t.size, kNoValue)});
-  if (s.wide_features == nullptr || t.wide_features == nullptr) return out;
-  out.push_back({wide(s), wide(t), true, std::vector<std::uint32_t>(s.size, kNoValue)});
-  out.push_back({wide(t), wide(s), false, std::vector<std::uint32_t>(t.size, kNoValue)});
+  const auto narrow = [](const CloudView& c) {
+    return FeatureRows{c.features, c.has_feature, c.size, c.feature_dimension};
+  };
+  const auto wide = [](const CloudView& c) {
+    return FeatureRows{c.wide_features, c.has_wide_feature, c.size, c.feature_dimension};
+  };
+  const CpuCloud &kept_s = executor_data(s), &kept_t = executor_data(t);
+  add_searches(narrow(s), narrow(t), kept_s.index, kept_t.index, out);
+  if (s.wide_features != nullptr && t.wide_features != nullptr)
+    add_searches(wide(s), wide(t), kept_s.wide_index, kept_t.wide_index, out);
   return out;
 }
 
-/// One index for each set of rows, shared by all pairs and searches.
-std::map<const float*, FeatureIndex> index_rows(Exec& exec, const std::vector<Search*>& searches) {
-  std::map<const float*, FeatureIndex> out;
+/// Finds or makes the indices of all searches, each set of rows once.
+void index_rows(Exec& exec, const std::vector<Search*>& searches) {
+  std::map<const KeptIndex*, std::pair<FeatureRows, const FeatureIndex*>> kept;
   for (const Search* search : searches) {
-    out[search->from.values] = {};
-    out[search->in.values] = {};
+    kept[search->from_kept] = {search->from, nullptr};
+    kept[search->in_kept] = {search->in, nullptr};
   }
-  std::map<const float*, FeatureRows> rows;
-  for (const Search* search : searches) {
-    rows[search->from.values] = search->from;
-    rows[search->in.values] = search->in;
-  }
-  std::vector<std::pair<FeatureRows, FeatureIndex*>> tasks;
-  for (auto& entry : out) tasks.push_back({rows[entry.first], &entry.second});
-  exec.parallel(tasks.size(),
-                [&](std::size_t k) { *tasks[k].second = index_features(tasks[k].first); });
+  std::vector<decltype(kept)::value_type*> tasks;
+  for (auto& entry : kept) tasks.push_back(&entry);
+  exec.parallel(tasks.size(), [&](std::size_t k) {
+    tasks[k]->second.second = &tasks[k]->first->of(tasks[k]->second.first);
+  });
   for (Search* search : searches) {
-    search->from_index = &out[search->from.values];
-    search->in_index = &out[search->in.values];
+    search->from_index = kept[search->from_kept].second;
+    search->in_index = kept[search->in_kept].second;
   }
-  return out;
 }
 
 std::uint64_t joined(std::uint32_t source, std::uint32_t target) {
@@ -132,7 +132,7 @@ std::vector<MatchSet> merge_matches(Exec& exec, Span<const PairView> pairs,
     searches[p] = searches_of(pairs[p]);
     for (Search& search : searches[p]) flat.push_back(&search);
   }
-  const auto indices = index_rows(exec, flat);
+  index_rows(exec, flat);
   constexpr std::size_t kGrain = 512;  // queries per task: milliseconds of work
   exec.parallel_items(
       flat.size(), [&](std::size_t k) { return flat[k]->from_index->rows; }, kGrain,

@@ -6,10 +6,6 @@
 
 namespace gpureg::cpu {
 
-inline const CpuCloud& executor_data(const CloudView& cloud) {
-  return *static_cast<const CpuCloud*>(cloud.executor_data);
-}
-
 /// The points of one cloud under poses, against the cells of another cloud: a walk that skips the
 /// points that the cell summaries refute, and prefetches all look-ups.
 class MovedPoints {

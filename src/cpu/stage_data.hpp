@@ -2,6 +2,7 @@
 #pragma once
 
 #include <memory>
+#include <mutex>
 #include <vector>
 
 #include "algorithm/closest.hpp"
@@ -94,10 +95,29 @@ struct ClosestGrid {
   ClosestGridView view() const;
 };
 
+struct FeatureRows {
+  const float* values;
+  const std::uint8_t* valid;
+  std::uint32_t size, dimension;
+};
+struct FeatureIndex;
+
+/// Index of a cloud's features. The first search makes it, and later ones use it: it takes about as
+/// long as a search. Thread-safe.
+class KeptIndex {
+ public:
+  const FeatureIndex& of(FeatureRows rows) const;
+
+ private:
+  mutable std::mutex mutex_;
+  mutable std::shared_ptr<const FeatureIndex> index_;
+};
+
 /// The data of a PreparedCloud.
 struct CpuCloud : PreparedState {
   std::vector<Vec3> points, normals;
   Features features, wide_features;
+  KeptIndex index, wide_index;  ///< of the features
   std::vector<std::uint32_t> normal_weight;
   Visibility visibility;
   SurfaceSides surface_sides;
@@ -109,6 +129,10 @@ struct CpuCloud : PreparedState {
   std::vector<float> copy_features() const override { return features.values; }
   CloudView view() const;
 };
+
+inline const CpuCloud& executor_data(const CloudView& cloud) {
+  return *static_cast<const CpuCloud*>(cloud.executor_data);
+}
 
 struct Matches {
   std::vector<MatchedPoints> pairs;

@@ -124,11 +124,6 @@ void conclude(Exec& exec, Span<const PairView> pairs, const std::vector<Matches>
 /// Nearest features of every query row: k indices per query in order of distance (squared_norm of
 /// the difference as a chain of fmaf over the dimensions, then the lower index), kNoValue where
 /// fewer exist. Invalid rows neither query nor match.
-struct FeatureRows {
-  const float* values;
-  const std::uint8_t* valid;
-  std::uint32_t size, dimension;
-};
 void nearest_features(FeatureRows queries, FeatureRows rows, std::uint32_t k, std::size_t begin,
                       std::size_t end, std::uint32_t* out);
 
