@@ -50,8 +50,8 @@ void box_bounds(const float* query, const float* const* boxes, std::size_t dimen
 }
 
 /// Squared distances to the 16 rows of each of two leaves, each a chain of fmaf in ascending order
-/// of the dimensions. Returns a mask of the rows within `most`. No distances where there are none;
-/// half of the dimensions may show that already.
+/// of the dimensions. Returns a mask of the nearest rows, all at the same distance. 0, and no
+/// distances, where that exceeds `most`; half of the dimensions may show it already.
 std::uint64_t leaf_distances(const float* query, const float* const* leaf, std::size_t dimension, float most,
                     float (*out)[kLeaf]) {
   const std::size_t half = dimension / 2;
@@ -67,19 +67,25 @@ std::uint64_t leaf_distances(const float* query, const float* const* leaf, std::
       }
     }
   };
-  const auto within = [&] {
-    std::uint64_t mask = 0;
-    for (int k = 0; k < 4; ++k)
-      mask |= static_cast<std::uint64_t>(_mm256_movemask_ps(
-                  _mm256_cmp_ps(sum[k], _mm256_set1_ps(most), _CMP_LE_OQ)))
-              << 8 * k;
-    return mask;
+  const auto least = [&] {
+    const __m256 four = _mm256_min_ps(_mm256_min_ps(sum[0], sum[1]), _mm256_min_ps(sum[2], sum[3]));
+    const __m128 two = _mm_min_ps(_mm256_castps256_ps128(four), _mm256_extractf128_ps(four, 1));
+    const __m128 one = _mm_min_ps(two, _mm_movehl_ps(two, two));
+    return _mm_cvtss_f32(_mm_min_ss(one, _mm_shuffle_ps(one, one, 1)));
   };
   add(0, half);
-  if (within() == 0) return 0;
+  if (!(least() <= most)) return 0;
   add(half, dimension);
-  for (int k = 0; k < 4; ++k) _mm256_storeu_ps(out[k / 2] + k % 2 * 8, sum[k]);
-  return within();
+  const float nearest = least();
+  if (!(nearest <= most)) return 0;
+  std::uint64_t mask = 0;
+  for (int k = 0; k < 4; ++k) {
+    _mm256_storeu_ps(out[k / 2] + k % 2 * 8, sum[k]);
+    mask |= static_cast<std::uint64_t>(_mm256_movemask_ps(
+                _mm256_cmp_ps(sum[k], _mm256_set1_ps(nearest), _CMP_EQ_OQ)))
+            << 8 * k;
+  }
+  return mask;
 #else
   const auto add = [&](std::size_t from, std::size_t to) {
     for (std::size_t d = from; d < to; ++d)
@@ -93,9 +99,11 @@ std::uint64_t leaf_distances(const float* query, const float* const* leaf, std::
   add(0, half);
   if (!(*std::min_element(out[0], out[0] + 2 * kLeaf) <= most)) return 0;
   add(half, dimension);
+  const float nearest = *std::min_element(out[0], out[0] + 2 * kLeaf);
+  if (!(nearest <= most)) return 0;
   std::uint64_t mask = 0;
   for (std::uint32_t l = 0; l < 2 * kLeaf; ++l)
-    mask |= static_cast<std::uint64_t>(out[l / kLeaf][l % kLeaf] <= most) << l;
+    mask |= static_cast<std::uint64_t>(out[l / kLeaf][l % kLeaf] == nearest) << l;
   return mask;
 #endif
 }
@@ -106,9 +114,8 @@ GPUREG_WIDE_TARGET std::uint64_t leaf_distances_wide(const float* query, const f
                                                      std::size_t dimension, float most,
                                                      float (*out)[kLeaf]) {
   __m512 a = _mm512_setzero_ps(), b = a, c = a, e = a;
-  const __m512 limit = _mm512_set1_ps(most);
   const std::size_t half = dimension / 2;
-  std::uint64_t within = 0;
+  float nearest = most;
   for (std::size_t d = 0; d < dimension; ++d) {
     const __m512 value = _mm512_set1_ps(query[d]);
     const __m512 x = _mm512_sub_ps(value, _mm512_loadu_ps(leaf[0] + d * kLeaf)),
@@ -120,17 +127,18 @@ GPUREG_WIDE_TARGET std::uint64_t leaf_distances_wide(const float* query, const f
     c = _mm512_fmadd_ps(z, z, c);
     e = _mm512_fmadd_ps(w, w, e);
     if (d + 1 != half && d + 1 != dimension) continue;
-    within = static_cast<std::uint64_t>(_mm512_cmp_ps_mask(a, limit, _CMP_LE_OQ)) |
-             static_cast<std::uint64_t>(_mm512_cmp_ps_mask(b, limit, _CMP_LE_OQ)) << 16 |
-             static_cast<std::uint64_t>(_mm512_cmp_ps_mask(c, limit, _CMP_LE_OQ)) << 32 |
-             static_cast<std::uint64_t>(_mm512_cmp_ps_mask(e, limit, _CMP_LE_OQ)) << 48;
-    if (within == 0) return 0;
+    nearest = _mm512_reduce_min_ps(_mm512_min_ps(_mm512_min_ps(a, b), _mm512_min_ps(c, e)));
+    if (!(nearest <= most)) return 0;
   }
   _mm512_storeu_ps(out[0], a);
   _mm512_storeu_ps(out[1], b);
   _mm512_storeu_ps(out[2], c);
   _mm512_storeu_ps(out[3], e);
-  return within;
+  const __m512 least = _mm512_set1_ps(nearest);
+  return static_cast<std::uint64_t>(_mm512_cmp_ps_mask(a, least, _CMP_EQ_OQ)) |
+         static_cast<std::uint64_t>(_mm512_cmp_ps_mask(b, least, _CMP_EQ_OQ)) << 16 |
+         static_cast<std::uint64_t>(_mm512_cmp_ps_mask(c, least, _CMP_EQ_OQ)) << 32 |
+         static_cast<std::uint64_t>(_mm512_cmp_ps_mask(e, least, _CMP_EQ_OQ)) << 48;
 }
 #endif
 
@@ -187,13 +195,15 @@ class Search {
     leaves_.find(index_.bytes, queries, count);
     for (std::size_t q = 0; q < count; ++q) {
       begin_query(queries[q], kNoValue, kInfinity);
-      const std::size_t first = leaves_.nearest_leaf(q);
-      look(&first, 1);
+      // The neighbours of the nearest leaf are similar, and seen at no cost.
+      const std::size_t near = leaves_.nearest_leaf(q) / kTogether * kTogether;
       std::size_t leaf[kTogether];
+      for (int k = 0; k < kTogether; ++k) leaf[k] = near + static_cast<std::size_t>(k);
+      look(leaf, kTogether);
       int waiting = 0;
-      for (const std::uint32_t near : leaves_.leaves_within(q, std::sqrt(best_))) {
-        if (near == first) continue;
-        leaf[waiting++] = near;
+      for (const std::uint32_t l : leaves_.leaves_within(q, std::sqrt(best_))) {
+        if (l - near < kTogether) continue;
+        leaf[waiting++] = l;
         if (waiting < kTogether) continue;
         look(leaf, waiting);
         waiting = 0;
