@@ -5,6 +5,7 @@
 #include "algorithm/compatibility.hpp"
 #include "algorithm/normal_weight.hpp"
 #include "cpu/feature_index.hpp"
+#include "cpu/radix_sort.hpp"
 #include "cpu/stages.hpp"
 
 namespace gpureg::cpu {
@@ -77,29 +78,35 @@ std::uint64_t normal_weight(const Vec3* normals, const std::vector<std::uint32_t
 
 MatchSet merge(const PairView& pair, const std::vector<Search>& searches, std::uint64_t seed,
                std::uint32_t most) {
-  std::vector<std::uint64_t> all;
+  std::vector<KeyIndex> all;
+  all.reserve(pair.custom_count + 2 * (std::size_t(pair.source.size) + pair.target.size));
   for (std::uint32_t c = 0; c < pair.custom_count; ++c)
-    all.push_back(joined(pair.custom_source[c], pair.custom_target[c]));
+    all.push_back({joined(pair.custom_source[c], pair.custom_target[c]), 0});
   for (const Search& search : searches)
     for (std::uint32_t k = 0; k < search.nearest.size(); ++k)
       if (search.nearest[k] != kNoValue)
-        all.push_back(search.forward ? joined(k, search.nearest[k]) : joined(search.nearest[k], k));
-  std::sort(all.begin(), all.end());
-  all.erase(std::unique(all.begin(), all.end()), all.end());
+        all.push_back(
+            {search.forward ? joined(k, search.nearest[k]) : joined(search.nearest[k], k), 0});
+  radix_sort(all);
+  all.erase(std::unique(all.begin(), all.end(),
+                        [](const KeyIndex& a, const KeyIndex& b) { return a.key == b.key; }),
+            all.end());
 
-  std::vector<std::pair<std::uint32_t, std::uint64_t>> order(all.size());
+  // Stable: equal ranks stay in the order of the indices.
+  std::vector<KeyIndex> order(all.size());
   for (std::size_t k = 0; k < all.size(); ++k)
-    order[k] = {match_order(static_cast<std::uint32_t>(all[k] >> 32),
-                            static_cast<std::uint32_t>(all[k]), seed),
-                all[k]};
-  std::sort(order.begin(), order.end());
+    order[k] = {match_order(static_cast<std::uint32_t>(all[k].key >> 32),
+                            static_cast<std::uint32_t>(all[k].key), seed),
+                static_cast<std::uint32_t>(k)};
+  radix_sort(order);
   if (order.size() > most) order.resize(most);
 
   MatchSet m;
   m.found = static_cast<std::uint32_t>(all.size());
-  for (const auto& entry : order) {
-    const std::uint32_t s = static_cast<std::uint32_t>(entry.second >> 32),
-                        t = static_cast<std::uint32_t>(entry.second);
+  for (const KeyIndex& entry : order) {
+    const std::uint64_t both = all[entry.index].key;
+    const std::uint32_t s = static_cast<std::uint32_t>(both >> 32),
+                        t = static_cast<std::uint32_t>(both);
     const Vec3 p = pair.source.points[s], q = pair.target.points[t];
     m.source.push_back(s);
     m.target.push_back(t);
