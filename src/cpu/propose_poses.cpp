@@ -7,21 +7,35 @@
 #include "cpu/stages.hpp"
 #include "cpu/wide_vectors.hpp"
 
+#ifdef GPUREG_WIDE_TARGET
+#include <immintrin.h>
+#endif
+
 namespace gpureg::cpu {
 namespace {
 
 constexpr std::uint32_t kBlock = 64;  // bits of a mask
 
 /// Bits of 64 flags, each 0 or 1.
-GPUREG_ALWAYS_INLINE std::uint64_t mask_of(const std::uint8_t* flags) {
-  std::uint64_t mask = 0;
-  for (std::uint32_t k = 0; k < kBlock / 8; ++k) {
-    std::uint64_t eight;
-    std::memcpy(&eight, flags + 8 * k, 8);
-    mask |= (eight * 0x0102040810204080u >> 56) << 8 * k;
+struct NarrowMask {
+  GPUREG_ALWAYS_INLINE static std::uint64_t of(const std::uint8_t* flags) {
+    std::uint64_t mask = 0;
+    for (std::uint32_t k = 0; k < kBlock / 8; ++k) {
+      std::uint64_t eight;
+      std::memcpy(&eight, flags + 8 * k, 8);
+      mask |= (eight * 0x0102040810204080u >> 56) << 8 * k;
+    }
+    return mask;
   }
-  return mask;
-}
+};
+#ifdef GPUREG_WIDE_TARGET
+struct WideMask {
+  GPUREG_WIDE_TARGET static std::uint64_t of(const std::uint8_t* flags) {
+    const __m512i all = _mm512_loadu_si512(flags);
+    return _mm512_test_epi8_mask(all, all);
+  }
+};
+#endif
 
 /// Neighbourhood of a seed: the seed, then the first of its compatible matches.
 struct Members {
@@ -36,6 +50,7 @@ struct Members {
     match.resize(most);
     remaining.resize(most / kBlock + 1);
   }
+  template <typename Mask>
   GPUREG_ALWAYS_INLINE void gather(const MatchSet& m, std::uint32_t seed,
                                    const CompatibilityTest& test, std::uint32_t most) {
     size = 0;
@@ -49,7 +64,7 @@ struct Members {
       const MatchColumns block(m, from);
       for (std::uint32_t k = 0; k < count; ++k) flag[k] = compatible(block[k], own, test);
       for (std::uint32_t k = count; k < kBlock; ++k) flag[k] = 0;
-      std::uint64_t mask = mask_of(flag);
+      std::uint64_t mask = Mask::of(flag);
       if (seed - from < kBlock) mask &= ~(std::uint64_t(1) << (seed - from));
       for (; mask != 0 && size < most; mask &= mask - 1)
         add(m, from + static_cast<std::uint32_t>(__builtin_ctzll(mask)));
@@ -98,6 +113,7 @@ struct Members {
 };
 
 /// Least-squares fit to the members that the pose aligns; false where they do not determine a pose.
+template <typename Mask>
 GPUREG_ALWAYS_INLINE bool refit(const Members& members, float squared_distance,
                                 Pose<float>& pose) {
   const Rigid rigid = to_rigid(pose);
@@ -112,7 +128,7 @@ GPUREG_ALWAYS_INLINE bool refit(const Members& members, float squared_distance,
       flag[k] = squared_norm(apply(rigid, {px[k], py[k], pz[k]}) - Vec3{qx[k], qy[k], qz[k]}) <
                 squared_distance;
     for (std::uint32_t k = count; k < kBlock; ++k) flag[k] = 0;
-    for (std::uint64_t mask = mask_of(flag); mask != 0; mask &= mask - 1) {
+    for (std::uint64_t mask = Mask::of(flag); mask != 0; mask &= mask - 1) {
       const int k = __builtin_ctzll(mask);
       p[n] = {px[k], py[k], pz[k]};
       q[n] = {qx[k], qy[k], qz[k]};
@@ -124,6 +140,7 @@ GPUREG_ALWAYS_INLINE bool refit(const Members& members, float squared_distance,
 
 /// The triangle of the seed and two compatible members with the largest consensus weight, refitted
 /// to its consensus set.
+template <typename Mask>
 GPUREG_ALWAYS_INLINE bool fit_seed_in_vectors(const MatchSet& m, std::uint32_t seed,
                                               const CompatibilityOptions& options,
                                               std::uint64_t random, Members& members,
@@ -131,7 +148,7 @@ GPUREG_ALWAYS_INLINE bool fit_seed_in_vectors(const MatchSet& m, std::uint32_t s
   const CompatibilityTest test = test_of(options);
   const float squared_distance = options.consensus_distance * options.consensus_distance;
   const float shortest = options.seed_separation * options.seed_separation;
-  members.gather(m, seed, test, options.max_members);
+  members.template gather<Mask>(m, seed, test, options.max_members);
   if (members.size < 3) return false;
   const MatchColumns columns(m);
   const std::uint32_t *match = members.match.data(), size = members.size;
@@ -172,7 +189,7 @@ GPUREG_ALWAYS_INLINE bool fit_seed_in_vectors(const MatchSet& m, std::uint32_t s
   if (best == 0 || !fit_rigid(p, q, 3, pose)) return false;
   for (std::uint32_t k = 0; k < options.refits; ++k) {
     Pose<float> better = pose;
-    if (!refit(members, squared_distance, better)) break;
+    if (!refit<Mask>(members, squared_distance, better)) break;
     pose = better;
   }
   return true;
@@ -182,7 +199,7 @@ GPUREG_ALWAYS_INLINE bool fit_seed_in_vectors(const MatchSet& m, std::uint32_t s
 GPUREG_WIDE_TARGET bool fit_seed_wide(const MatchSet& m, std::uint32_t seed,
                                       const CompatibilityOptions& options, std::uint64_t random,
                                       Members& members, Pose<float>& pose) {
-  return fit_seed_in_vectors(m, seed, options, random, members, pose);
+  return fit_seed_in_vectors<WideMask>(m, seed, options, random, members, pose);
 }
 #endif
 
@@ -191,7 +208,7 @@ bool fit_seed(const MatchSet& m, std::uint32_t seed, const CompatibilityOptions&
 #ifdef GPUREG_WIDE_TARGET
   if (has_wide_vectors()) return fit_seed_wide(m, seed, options, random, members, pose);
 #endif
-  return fit_seed_in_vectors(m, seed, options, random, members, pose);
+  return fit_seed_in_vectors<NarrowMask>(m, seed, options, random, members, pose);
 }
 
 GPUREG_ALWAYS_INLINE MatchEvidence count_in_vectors(const MatchSet& m, const Rigid& pose,
