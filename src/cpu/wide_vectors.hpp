@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <cstdlib>
+#include <cstring>
+
 #if defined(__AVX2__) && defined(__FMA__) && defined(__GNUC__)
 /// A function for processors with vectors of 16 floats. Each lane does the operations of the scalar
 /// code in the same order, so the result is the same.
@@ -28,10 +31,17 @@
 
 namespace gpureg::cpu {
 
+/// The environment variable GPUREG_VECTORS=narrow keeps to the vectors that the build requires, for
+/// tests and comparisons. The results are the same.
+inline bool narrow_vectors_only() {
+  const char* asked = std::getenv("GPUREG_VECTORS");
+  return asked != nullptr && std::strcmp(asked, "narrow") == 0;
+}
+
 /// Whether the build has functions for vectors of 16 floats (AVX-512), and the processor runs them.
 inline bool has_wide_vectors() {
 #ifdef GPUREG_WIDE_TARGET
-  static const bool has = __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512vl") &&
+  static const bool has = !narrow_vectors_only() && __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512vl") &&
                           __builtin_cpu_supports("avx512bw") && __builtin_cpu_supports("avx512dq");
   return has;
 #else
