@@ -33,6 +33,25 @@ GPUREG_HD std::uint32_t signed_byte(float unit) {
   return static_cast<std::uint32_t>(floor_to_int(unit * 127.0f + 0.5f)) & 0xffu;
 }
 
+/// Steps of the spread of a cell, from the least cosine. The exact arc cosine is slow and decides
+/// only near a whole step.
+GPUREG_HD int summary_step(float cosine) {
+  constexpr float kNearStep = 1e-2f;
+  const float about =
+      (acosf(cosine < -1.0f ? -1.0f : (cosine > 1.0f ? 1.0f : cosine)) / static_cast<float>(kDegrees) +
+       static_cast<float>(kSummaryQuantisation)) /
+      static_cast<float>(kSummaryAngleStep);
+  const float up = ceilf(about);
+  int steps = static_cast<int>(up);
+  if (!(up - about > kNearStep && up - about < 1.0f - kNearStep)) {
+    const double angle =
+        portable::acos(static_cast<double>(cosine < -1.0f ? -1.0f : cosine)) / kDegrees +
+        kSummaryQuantisation;
+    steps = static_cast<int>(ceil(angle / kSummaryAngleStep));
+  }
+  return steps < kSummaryNoBound ? steps : kSummaryNoBound;
+}
+
 /// Summary of a cell with at least one candidate.
 GPUREG_HD std::uint32_t summarize_cell(Span<const std::uint32_t> candidates, Vec3 center,
                                        const ClosestGeometry& g, const Vec3* points,
@@ -52,11 +71,7 @@ GPUREG_HD std::uint32_t summarize_cell(Span<const std::uint32_t> candidates, Vec
       const float c = dot(mean, normals[i]);
       cosine = c < cosine ? c : cosine;
     }
-    const double angle =
-        portable::acos(static_cast<double>(cosine < -1.0f ? -1.0f : cosine)) / kDegrees +
-        kSummaryQuantisation;
-    const int steps = static_cast<int>(ceil(angle / kSummaryAngleStep));
-    step = steps < kSummaryNoBound ? steps : kSummaryNoBound;
+    step = summary_step(cosine);
   }
   return signed_byte(mean.x) | signed_byte(mean.y) << 8 | signed_byte(mean.z) << 16 |
          static_cast<std::uint32_t>(step | (covered ? 128 : 0)) << 24;

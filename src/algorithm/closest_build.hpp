@@ -39,14 +39,23 @@ GPUREG_HD bool can_reach_cell(float distance, const ClosestGeometry& g) {
   return distance <= g.search_distance + kHalfDiagonal * g.cell_size + g.margin;
 }
 
-/// True where every location in the cell is closer to p (the point nearest to its centre) than to
-/// q, rounding included. The difference of the squared distances is linear over the cell, so its
-/// minimum is at a corner.
-GPUREG_HD bool dominated_in_cell(Vec3 center, Vec3 p, Vec3 q, const ClosestGeometry& g) {
-  const Vec3 d = q - p;
+/// Constants of the test below.
+struct DominanceTest {
+  float edge, rest;
+};
+GPUREG_HD DominanceTest dominance_test(const ClosestGeometry& g) {
+  return {g.cell_size + 2.0f * g.margin, 8.0f * g.margin * g.margin};
+}
+
+/// True where every location in a cell is closer to p (the point nearest to its centre) than to q,
+/// rounding included. The difference of the squared distances is linear over the cell, so its
+/// minimum is at a corner. d: q - p; at_center: this difference at the centre.
+GPUREG_HD bool dominated(Vec3 d, float at_center, const DominanceTest& test) {
   const float l1 = (d.x < 0 ? -d.x : d.x) + (d.y < 0 ? -d.y : d.y) + (d.z < 0 ? -d.z : d.z);
-  const float at_center = squared_norm(q - center) - squared_norm(p - center);
-  return at_center > l1 * (g.cell_size + 2.0f * g.margin) + 8.0f * g.margin * g.margin;
+  return at_center > l1 * test.edge + test.rest;
+}
+GPUREG_HD bool dominated_in_cell(Vec3 center, Vec3 p, Vec3 q, const ClosestGeometry& g) {
+  return dominated(q - p, squared_norm(q - center) - squared_norm(p - center), dominance_test(g));
 }
 
 /// Edge of a block; search distance of a point with margins; largest distance from the centre of a
@@ -70,13 +79,15 @@ GPUREG_HD float candidate_limit(float nearest, const ClosestGeometry& g) {
   return (by_search < by_nearest ? by_search : by_nearest) + 2.0f * g.margin;
 }
 
+GPUREG_HD bool coincide(Vec3 a, Vec3 b) { return a.x == b.x && a.y == b.y && a.z == b.z; }
+
 /// False where point p is the nearest neighbour of no location in a cell. best: the point nearest
 /// to the centre of the cell. after_best: p has the higher index.
 GPUREG_HD bool can_win_in_cell(Vec3 center, Vec3 best, Vec3 p, bool after_best,
                                const ClosestGeometry& g) {
   if (dominated_in_cell(center, best, p, g)) return false;
   // Of coincident points only the first one is ever found.
-  return !(after_best && p.x == best.x && p.y == best.y && p.z == best.z);
+  return !(after_best && coincide(p, best));
 }
 
 }  // namespace gpureg

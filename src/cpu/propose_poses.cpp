@@ -1,41 +1,15 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <algorithm>
-#include <cstring>
 
 #include "algorithm/fit.hpp"
 #include "cpu/compatibility.hpp"
 #include "cpu/stages.hpp"
 #include "cpu/wide_vectors.hpp"
 
-#ifdef GPUREG_WIDE_TARGET
-#include <immintrin.h>
-#endif
-
 namespace gpureg::cpu {
 namespace {
 
-constexpr std::uint32_t kBlock = 64;  // bits of a mask
-
-/// Bits of 64 flags, each 0 or 1.
-struct NarrowMask {
-  GPUREG_ALWAYS_INLINE static std::uint64_t of(const std::uint8_t* flags) {
-    std::uint64_t mask = 0;
-    for (std::uint32_t k = 0; k < kBlock / 8; ++k) {
-      std::uint64_t eight;
-      std::memcpy(&eight, flags + 8 * k, 8);
-      mask |= (eight * 0x0102040810204080u >> 56) << 8 * k;
-    }
-    return mask;
-  }
-};
-#ifdef GPUREG_WIDE_TARGET
-struct WideMask {
-  GPUREG_WIDE_TARGET static std::uint64_t of(const std::uint8_t* flags) {
-    const __m512i all = _mm512_loadu_si512(flags);
-    return _mm512_test_epi8_mask(all, all);
-  }
-};
-#endif
+constexpr std::uint32_t kBlock = kMaskBits;
 
 /// Neighbourhood of a seed: the seed, then the first of its compatible matches.
 struct Members {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <cstdint>
 #include <cstdlib>
 #include <cstring>
 
@@ -23,6 +24,9 @@
       target("avx512f,avx512vl,avx512bw,avx512dq,avx512vnni,prefer-vector-width=512")))
 #endif
 #endif
+#ifdef GPUREG_WIDE_TARGET
+#include <immintrin.h>
+#endif
 #ifdef __GNUC__
 #define GPUREG_ALWAYS_INLINE inline __attribute__((always_inline))
 #else
@@ -30,6 +34,29 @@
 #endif
 
 namespace gpureg::cpu {
+
+constexpr std::uint32_t kMaskBits = 64;
+
+/// Bits of 64 flags, each 0 or 1.
+struct NarrowMask {
+  GPUREG_ALWAYS_INLINE static std::uint64_t of(const std::uint8_t* flags) {
+    std::uint64_t mask = 0;
+    for (std::uint32_t k = 0; k < kMaskBits / 8; ++k) {
+      std::uint64_t eight;
+      std::memcpy(&eight, flags + 8 * k, 8);
+      mask |= (eight * 0x0102040810204080u >> 56) << 8 * k;
+    }
+    return mask;
+  }
+};
+#ifdef GPUREG_WIDE_TARGET
+struct WideMask {
+  GPUREG_WIDE_TARGET static std::uint64_t of(const std::uint8_t* flags) {
+    const __m512i all = _mm512_loadu_si512(flags);
+    return _mm512_test_epi8_mask(all, all);
+  }
+};
+#endif
 
 /// The environment variable GPUREG_VECTORS=narrow keeps to the vectors that the build requires, for
 /// tests and comparisons. The results are the same.
