@@ -36,12 +36,16 @@ class Splitter {
   }
 
  private:
+  /// Dimension of the largest variance, of some of the rows if there are many.
   std::uint32_t widest(const std::uint32_t* first, const std::uint32_t* last) {
+    constexpr std::ptrdiff_t kSome = 128;
+    const std::ptrdiff_t step = std::max<std::ptrdiff_t>(1, (last - first) / kSome),
+                         count = (last - first + step - 1) / step;
     std::fill(sum_.begin(), sum_.end(), 0.0f);
     std::fill(squares_.begin(), squares_.end(), 0.0f);
     const float* origin = rows_.values + static_cast<std::size_t>(*first) * rows_.dimension;
-    for (const std::uint32_t* i = first; i < last; ++i) {
-      const float* row = rows_.values + static_cast<std::size_t>(*i) * rows_.dimension;
+    for (std::ptrdiff_t k = 0; k < count; ++k) {
+      const float* row = rows_.values + static_cast<std::size_t>(first[k * step]) * rows_.dimension;
       for (std::uint32_t d = 0; d < rows_.dimension; ++d) {
         const float v = row[d] - origin[d];
         sum_[d] += v;
@@ -51,7 +55,7 @@ class Splitter {
     std::uint32_t best = 0;
     float most = -1;
     for (std::uint32_t d = 0; d < rows_.dimension; ++d) {
-      const float spread = squares_[d] - sum_[d] * sum_[d] / static_cast<float>(last - first);
+      const float spread = squares_[d] - sum_[d] * sum_[d] / static_cast<float>(count);
       if (spread > most) {
         most = spread;
         best = d;
