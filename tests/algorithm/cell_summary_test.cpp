@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 #include <random>
 #include <vector>
 
@@ -57,6 +59,27 @@ TEST(CellSummary, LimitsNeverLie) {
       decided += !possible || certain;
     }
     EXPECT_GT(decided, 20000u) << angle;
+  }
+}
+
+// The step of the exact arc cosine for every cosine, also next to a whole step.
+TEST(CellSummary, StepsAreThoseOfTheExactArcCosine) {
+  const auto exact = [](float cosine) {
+    const double angle =
+        portable::acos(static_cast<double>(cosine < -1.0f ? -1.0f : cosine)) / kDegrees +
+        kSummaryQuantisation;
+    const int steps = static_cast<int>(std::ceil(angle / kSummaryAngleStep));
+    return steps < kSummaryNoBound ? steps : kSummaryNoBound;
+  };
+  for (int k = -1200; k <= 1100; ++k)
+    ASSERT_EQ(summary_step(static_cast<float>(k) / 1100.0f), exact(static_cast<float>(k) / 1100.0f))
+        << k;
+  for (int step = 1; step < kSummaryNoBound; ++step) {
+    float cosine = static_cast<float>(
+        std::cos((step * kSummaryAngleStep - kSummaryQuantisation) * kDegrees));
+    for (int k = 0; k < 40; ++k) cosine = std::nextafter(cosine, -2.0f);
+    for (int k = 0; k < 80; ++k, cosine = std::nextafter(cosine, 2.0f))
+      ASSERT_EQ(summary_step(cosine), exact(cosine)) << step << " " << cosine;
   }
 }
 

@@ -71,6 +71,21 @@ TEST(FeatureIndex, EqualsExhaustiveSearch) {
       }
 }
 
+// Bounds of products of bytes are wide where the values are far from zero, or on few axes.
+TEST(FeatureIndex, EqualsExhaustiveSearchFarFromZero) {
+  std::mt19937 random(6);
+  for (const float shift : {0.0f, 1e3f, 1e6f})
+    for (const std::uint32_t axes : {1u, 5u, 40u}) {
+      Rows queries = random_rows(random, 150, 40, 0, 1), rows = random_rows(random, 900, 40, 0, 1);
+      for (Rows* some : {&queries, &rows})
+        for (std::size_t k = 0; k < some->values.size(); ++k)
+          some->values[k] = (k % 40 < axes ? some->values[k] : 0.0f) + shift;
+      for (const SearchVectors most : kVectors)
+        EXPECT_EQ(by_index(queries, rows, 70, most), exhaustive(queries, rows))
+            << shift << " " << axes << " " << static_cast<int>(most);
+    }
+}
+
 TEST(FeatureIndex, EqualRowsGoToTheLowestIndex) {
   std::mt19937 random(2);
   Rows rows = random_rows(random, 40, 33, 0, 50);
