@@ -33,6 +33,7 @@ __global__ void normals_in_cell_order(const std::uint32_t* offset, const GridVie
 __global__ void __launch_bounds__(32 * kWarps)
     simplified_histograms(FpfhBatch f, const Vec3* sorted_normals) {
   __shared__ std::uint32_t counts[kWarps][kFpfhSize];
+  __shared__ std::uint32_t queue[kWarps][64];  // less than half of the points of the cells are near
   const std::uint32_t c = blockIdx.y, begin = f.offset[c], size = f.offset[c + 1] - begin;
   const int warp = static_cast<int>(threadIdx.x / 32), lane = static_cast<int>(threadIdx.x % 32);
   const std::uint32_t i = blockIdx.x * kWarps + static_cast<std::uint32_t>(warp);
@@ -43,15 +44,29 @@ __global__ void __launch_bounds__(32 * kWarps)
   const Vec3 p = grid.points[i], n = sorted_normals[begin + i];
   int neighbors = 0;
   if (!is_zero(n)) {
-    for_each_neighbor_warp(grid, p, f.radius, [&](std::uint32_t k, float, bool inside) {
-      if (!inside || k == i) return;
+    const auto measure = [&](std::uint32_t k) {
       const Vec3 m = sorted_normals[begin + k];
       if (is_zero(m)) return;
       ++neighbors;
       const PairFeature pair = pair_feature(p, n, grid.points[k], m);
       if (!pair.valid) return;
       for (int h = 0; h < 3; ++h) atomicAdd(&counts[warp][h * kFpfhBins + pair.bins[h]], 1u);
+    };
+    int queued = 0;
+    for_each_neighbor_warp(grid, p, f.radius, [&](std::uint32_t k, float, bool inside) {
+      const bool near = inside && k != i;
+      const unsigned lanes = __ballot_sync(~0u, near);
+      if (near) queue[warp][queued + __popc(lanes & ((1u << lane) - 1))] = k;
+      queued += __popc(lanes);
+      if (queued < 32) return;
+      __syncwarp();
+      queued -= 32;
+      measure(queue[warp][queued + lane]);
+      __syncwarp();
     });
+    __syncwarp();
+    if (lane < queued) measure(queue[warp][lane]);
+    __syncwarp();
     for (int step = 16; step > 0; step /= 2) neighbors += __shfl_xor_sync(~0u, neighbors, step);
   }
   __syncwarp();
@@ -59,10 +74,17 @@ __global__ void __launch_bounds__(32 * kWarps)
   for (int b = lane; b < kFpfhSize; b += 32) row[b] = spfh_value(counts[warp][b], neighbors);
 }
 
+/// A neighbour and its weight.
+struct Neighbor {
+  std::uint32_t place;
+  float weight;
+};
+
 /// FPFH: a warp per point, a lane per bin (lane 0 has the 33rd too), neighbours in order.
 __global__ void __launch_bounds__(32 * kWarps)
     weighted_histograms(FpfhBatch f, const Vec3* sorted_normals) {
   __shared__ float histogram[kWarps][kFpfhSize];
+  __shared__ Neighbor queue[kWarps][64];
   const std::uint32_t c = blockIdx.y, begin = f.offset[c], size = f.offset[c + 1] - begin;
   const int warp = static_cast<int>(threadIdx.x / 32), lane = static_cast<int>(threadIdx.x % 32);
   const std::uint32_t i = blockIdx.x * kWarps + static_cast<std::uint32_t>(warp);
@@ -72,18 +94,31 @@ __global__ void __launch_bounds__(32 * kWarps)
   float sum = 0.0f, last = 0.0f;
   const bool has_normal = !is_zero(sorted_normals[begin + i]);
   if (has_normal) {
+    const float* rows = f.spfh + static_cast<std::size_t>(begin) * kFpfhSize;
+    const auto add = [&](Neighbor neighbor) {
+      const float* row = rows + static_cast<std::size_t>(neighbor.place) * kFpfhSize;
+      sum = fmaf(neighbor.weight, row[lane], sum);
+      last = fmaf(neighbor.weight, row[32], last);  // of all lanes, which is one read
+    };
+    int queued = 0;
     for_each_neighbor_warp(grid, p, f.radius, [&](std::uint32_t k, float d2, bool inside) {
       const bool counts = inside && d2 > 0.0f;
-      const float weight = counts ? 1.0f / d2 : 0.0f;
-      for (unsigned left = __ballot_sync(~0u, counts); left != 0; left &= left - 1) {
-        const int from = __ffs(static_cast<int>(left)) - 1;
-        const float w = __shfl_sync(~0u, weight, from);
-        const float* row =
-            f.spfh + static_cast<std::size_t>(begin + __shfl_sync(~0u, k, from)) * kFpfhSize;
-        sum = fmaf(w, row[lane], sum);
-        if (lane == 0) last = fmaf(w, row[32], last);
-      }
+      const unsigned lanes = __ballot_sync(~0u, counts);
+      if (counts) queue[warp][queued + __popc(lanes & ((1u << lane) - 1))] = {k, 1.0f / d2};
+      queued += __popc(lanes);
+      if (queued < 32) return;
+      __syncwarp();
+      // A known number of rows: the reads of several are under way at a time.
+#pragma unroll 4
+      for (int j = 0; j < 32; ++j) add(queue[warp][j]);
+      queued -= 32;
+      const Neighbor rest = queue[warp][32 + lane];
+      __syncwarp();
+      if (lane < queued) queue[warp][lane] = rest;
     });
+    __syncwarp();
+#pragma unroll 4
+    for (int j = 0; j < queued; ++j) add(queue[warp][j]);
   }
   histogram[warp][lane] = sum;
   if (lane == 0) histogram[warp][32] = last;
