@@ -330,7 +330,9 @@ void LoopClosing::bundle_all(int iterations) {
     (anchored[w] ? free : fixed).push_back(static_cast<int>(k));
     anchored[w] = true;
   }
-  BundleProblem problem = bundle_of(map_, free, fixed, graph_.loop_edges());
+  std::vector<RelativePose> relatives = graph_.loop_edges();
+  for (const RelativePose& edge : graph_.weak_odometry(map_)) relatives.push_back(edge);
+  BundleProblem problem = bundle_of(map_, free, fixed, relatives);
   adjust(camera_, problem, iterations, options_.threads > 0 ? options_.threads : 2);
   apply(camera_, problem, map_);
   adjusted_.clear();
