@@ -71,6 +71,18 @@ std::vector<RelativePose> KeyframeGraph::loop_edges() const {
   return result;
 }
 
+std::vector<RelativePose> KeyframeGraph::weak_odometry(const Map& map) const {
+  std::vector<RelativePose> result;
+  for (const auto& [key, a_from_b] : odometry_) {
+    if (key.b != key.a + 1) continue;
+    const std::map<int, int>& shared = map.keyframes[at(key.b)].covisible;
+    const auto found = shared.find(key.a);
+    if (found == shared.end() || found->second < kMinShared)
+      result.push_back({key.a, key.b, a_from_b, odometry_information(a_from_b)});
+  }
+  return result;
+}
+
 std::vector<int> KeyframeGraph::misfits(const Map& map, double metres, double radians) const {
   std::vector<int> result;
   for (const auto& [loop, edges] : loops_) {

@@ -41,6 +41,9 @@ class KeyframeGraph {
   std::string optimize(Map& map) const;
 
   std::vector<RelativePose> loop_edges() const;
+  /// What tracking measured between successive keyframes that share few points by now: points alone
+  /// do not hold them together in an adjustment.
+  std::vector<RelativePose> weak_odometry(const Map& map) const;
 
   /// Numbers of the loops with an edge that is farther from the poses of the map.
   std::vector<int> misfits(const Map& map, double metres, double radians) const;

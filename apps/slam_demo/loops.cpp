@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <gpureg/registration.hpp>
+#include <limits>
 
 #include "stopwatch.hpp"
 
@@ -25,6 +26,7 @@ constexpr double kDriftMetres = 0.2, kDriftShare = 0.02, kDriftRadians = 0.2;
 // Surfaces over many frames hold a registered pair better than LoopCloser states, which speaks of
 // single registrations with correlated points: a third of its standard deviation.
 constexpr double kDenseCertainty = 9;
+constexpr double kViewDistance = 2;  // metres of the surfaces: what a turn moves in a view
 // What a registered loop may differ from the adjusted poses of its keyframes: beyond, something is
 // wrong with the fragments, and the pose that all else agrees on is the better one.
 constexpr double kMisfitMetres = 0.1, kMisfitRadians = 0.05;
@@ -135,7 +137,8 @@ void LoopClosing::add_fragment(const BuiltFragment& built) {
   }
   std::vector<lc::FragmentId> covisible;
   for (int other = 0; other < id; ++other) {
-    if (shares_points(built.keyframe, fragments_[at(other)])) covisible.push_back(other);
+    if (fragments_[at(other)].kept && shares_points(built.keyframe, fragments_[at(other)]))
+      covisible.push_back(other);
   }
   if (!covisible.empty()) closer_.set_covisible(id, covisible);
 }
@@ -200,6 +203,7 @@ void LoopClosing::optimize() {
   }
   std::vector<lc::FragmentPose> poses;
   for (std::size_t k = 0; k < fragments_.size(); ++k) {
+    if (!fragments_[k].kept) continue;
     lc::FragmentPose pose;
     pose.id = static_cast<lc::FragmentId>(k);
     pose.world_from_fragment =
@@ -244,7 +248,33 @@ bool LoopClosing::process() {
     optimize();
     adjust_if_moved();
   }
+  limit_fragments();
   return changed;
+}
+
+/// Of the two fragments with the most similar views the later one goes, but never the newest.
+void LoopClosing::limit_fragments() {
+  const std::vector<int> world = graph_.world_of_session(map_);
+  while (closer_.size() > options_.max_fragments) {
+    double nearest = std::numeric_limits<double>::infinity();
+    std::size_t superfluous = 0;  // where every world has one fragment: the oldest
+    while (!fragments_[superfluous].kept) ++superfluous;
+    for (std::size_t b = 1; b < fragments_.size(); ++b) {
+      const Keyframe& kb = map_.keyframes[at(fragments_[b].keyframe)];
+      for (std::size_t a = 0; a < b && fragments_[b].kept; ++a) {
+        const Keyframe& ka = map_.keyframes[at(fragments_[a].keyframe)];
+        if (!fragments_[a].kept || world[at(ka.session)] != world[at(kb.session)]) continue;
+        const Eigen::Isometry3d motion = ka.world_from_camera.inverse() * kb.world_from_camera;
+        const double distance = motion.translation().norm() +
+                                kViewDistance * Eigen::AngleAxisd(motion.linear()).angle();
+        if (distance >= nearest) continue;
+        nearest = distance;
+        superfluous = b + 1 < fragments_.size() ? b : a;
+      }
+    }
+    fragments_[superfluous].kept = false;
+    closer_.remove(static_cast<lc::FragmentId>(superfluous));
+  }
 }
 
 void LoopClosing::adjust_if_moved() {
@@ -300,7 +330,9 @@ void LoopClosing::bundle_all(int iterations) {
     (anchored[w] ? free : fixed).push_back(static_cast<int>(k));
     anchored[w] = true;
   }
-  BundleProblem problem = bundle_of(map_, free, fixed, graph_.loop_edges());
+  std::vector<RelativePose> relatives = graph_.loop_edges();
+  for (const RelativePose& edge : graph_.weak_odometry(map_)) relatives.push_back(edge);
+  BundleProblem problem = bundle_of(map_, free, fixed, relatives);
   adjust(camera_, problem, iterations, options_.threads > 0 ? options_.threads : 2);
   apply(camera_, problem, map_);
   adjusted_.clear();

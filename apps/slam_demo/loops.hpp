@@ -19,6 +19,8 @@ struct LoopOptions {
   float voxel_size = 0.05f;  ///< metres, of the registration
   int bundle_iterations = 6;
   int threads = 0;
+  std::size_t max_fragments =
+      100;                 ///< kept for loops, >= 2; beyond, one of a place seen twice goes
   std::uint64_t seed = 1;  ///< of the registration
 };
 
@@ -63,6 +65,8 @@ class LoopClosing {
   const std::vector<LoopRecord>& records() const { return records_; }
   const std::vector<ImageLoopRecord>& image_records() const { return image_records_; }
   const KeyframeGraph& graph() const { return graph_; }
+  /// Fragments that may still get loops.
+  std::size_t fragments_kept() const { return closer_.size(); }
   std::vector<std::string> notes;  ///< what did not converge
   struct Milliseconds {
     double prepare = 0, registration = 0, image = 0, graph = 0, bundle = 0;
@@ -73,10 +77,12 @@ class LoopClosing {
   struct Fragment {
     int keyframe, first_frame, last_frame;
     double time;
+    bool kept = true;  ///< closer_ has it
   };
   void connect_image_loops(int number, const gpureg::loop_closure::Loop& loop, LoopRecord& record);
   std::vector<int> image_candidates(int keyframe) const;
   bool plausible(const RelativePose& loop) const;
+  void limit_fragments();
   void optimize();
   void bundle_all(int iterations);
   bool retract_misfits();

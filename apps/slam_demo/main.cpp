@@ -87,7 +87,16 @@ int run(const Arguments& a) {
   {
     const Stopwatch watch(total);
     double since = 0;
-    if (replays) slam.replay(read_tracking(a.tracking), [] { return interrupted.load(); });
+    if (replays) {
+      const Tracking tracking = read_tracking(a.tracking);
+      result.frames_done = tracking.frames.size() + static_cast<std::size_t>(tracking.lost);
+      slam.replay(tracking, [&] {
+        if (!a.quiet && slam.fragments() > 0)
+          std::fprintf(stderr, "fragment %d of %zu, %zu loops\n", slam.fragments(),
+                       tracking.fragments.size(), slam.loops().graph().loops().size());
+        return interrupted.load();
+      });
+    }
     std::future<Images> ahead;  // the next frame is read while this one is tracked
     const auto read_ahead = [&](std::size_t k) {
       if (k < last)
@@ -183,6 +192,13 @@ int main(int count, char** values) {
                "No result depends on threads: the same bits every time");
   app.add_option("--first", a.first, "Frame to begin with")->check(CLI::NonNegativeNumber);
   app.add_option("--frames", a.frames, "Frames to process; 0: all")->check(CLI::NonNegativeNumber);
+  app.add_option("--max-fragments", a.slam.loops.max_fragments,
+                 "Fragments kept for loops, about 8 MB each")
+      ->check(CLI::Range(2, 1000000))
+      ->capture_default_str();
+  app.add_option("--max-surfels", a.slam.max_surfels, "Of the map; beyond, it is thinned to half")
+      ->check(CLI::Range(1000, 1000000000))
+      ->capture_default_str();
   app.add_option("--features", a.slam.features, "ORB features of a frame")
       ->check(CLI::Range(100, 10000))
       ->capture_default_str();

@@ -71,15 +71,19 @@ Tracker::Outcome Slam::frame(int index, double time, const Images& images) {
     const Stopwatch watch(fragment_ms_);
     fragment_.add(index, outcome.pose, images.depth);
   }
-  if (options_.map && index % options_.surfel_every == 0) {
-    const Stopwatch watch(fuse_ms_);
-    surfels_->fuse({images.depth.cols, images.depth.rows, images.depth.ptr<float>(),
-                    images.colour.ptr<std::uint8_t>()},
-                   surfel_camera(rig_.colour), surfel_pose(world_from_camera(map_, outcome.pose)),
-                   index, session_start_);
-  }
+  if (options_.map && index % options_.surfel_every == 0) fuse(index, outcome.pose, images);
   if (fragment_.full()) end_fragment();
   return outcome;
+}
+
+void Slam::fuse(int index, const FramePose& pose, const Images& images) {
+  const Stopwatch watch(fuse_ms_);
+  surfels_->fuse({images.depth.cols, images.depth.rows, images.depth.ptr<float>(),
+                  images.colour.ptr<std::uint8_t>()},
+                 surfel_camera(rig_.colour), surfel_pose(world_from_camera(map_, pose)), index,
+                 session_start_);
+  if (surfels_->size() > options_.max_surfels)
+    surfels_->upload(surfel::thinned(surfels_->download(), options_.max_surfels / 2));
 }
 
 /// Runs what may move keyframes; the surfels follow.

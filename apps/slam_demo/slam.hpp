@@ -17,9 +17,10 @@ struct SlamOptions {
   TrackerOptions tracker;
   LoopOptions loops;
   surfel::Options surfels;
-  bool map = true;              ///< fuse surfels
-  bool keep_fragments = false;  ///< for tracking()
-  int surfel_every = 2;         ///< frames between two that are fused
+  bool map = true;                    ///< fuse surfels
+  bool keep_fragments = false;        ///< for tracking()
+  int surfel_every = 2;               ///< frames between two that are fused
+  std::size_t max_surfels = 5000000;  ///< >= 2; beyond, the map is thinned to half of them
   int features = 1000;
   int fragment_frames = 50;
   int final_iterations = 20;  ///< of the last bundle adjustment
@@ -70,6 +71,7 @@ class Slam {
  private:
   void end_fragment();
   void add_fragment(const BuiltFragment& fragment);
+  void fuse(int frame, const FramePose& pose, const Images& images);
   void with_correction(const std::function<bool()>& work);
   Trajectory poses_of(const std::function<Eigen::Isometry3d(int)>& world_from_keyframe) const;
   int largest_world() const;

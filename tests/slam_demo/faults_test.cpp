@@ -1,13 +1,18 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include <fcntl.h>
 #include <gtest/gtest.h>
+#include <poll.h>
 #include <signal.h>
+#include <sys/ioctl.h>
 #include <sys/wait.h>
 #include <unistd.h>
+#include <gpureg/io.hpp>
 
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
 #include "generated_sequence.hpp"
+#include "tracking_file.hpp"
 
 /// What goes wrong on the way: frames that are missing, black or of elsewhere, and Ctrl-C.
 namespace slam_demo {
@@ -121,36 +126,139 @@ TEST(Faults, DamagedFramesAreLeftOut) {
   EXPECT_LT(ate(slam->trajectory(), whole.truth).rmse, 0.015);
 }
 
-// The program, interrupted after its first report of progress.
+/// The program in a process of its own. It cannot run away: the pipe of its progress has room for
+/// one line and not for two, so that it waits until somebody reads.
+class Interrupted {
+ public:
+  /// room: bytes, between the lengths of one and of two lines.
+  Interrupted(std::vector<std::string> arguments, std::size_t room) {
+    EXPECT_EQ(pipe(progress_), 0);
+    const int size = fcntl(progress_[1], F_SETPIPE_SZ, 4096);
+    EXPECT_EQ(size, 4096);
+    const std::string filling(static_cast<std::size_t>(size) - room, '-');
+    filled_ = static_cast<int>(filling.size());
+    EXPECT_EQ(write(progress_[1], filling.data(), filling.size()), filled_);
+    arguments.insert(arguments.begin(), SLAM_DEMO);
+    std::vector<char*> words;
+    for (std::string& argument : arguments) words.push_back(argument.data());
+    words.push_back(nullptr);
+    child_ = fork();
+    if (child_ == 0) {
+      dup2(progress_[1], STDERR_FILENO);
+      close(progress_[0]);
+      execv(SLAM_DEMO, words.data());
+      _exit(127);
+    }
+    close(progress_[1]);
+  }
+  ~Interrupted() { close(progress_[0]); }
+  Interrupted(const Interrupted&) = delete;
+  Interrupted& operator=(const Interrupted&) = delete;
+
+  /// Waits for the first line, interrupts the program, and reads what it still says. Returns its
+  /// exit status.
+  int after_the_first_line() {
+    pollfd end{progress_[0], 0, 0};  // POLLHUP: the program has ended
+    int bytes = 0;
+    while (ioctl(progress_[0], FIONREAD, &bytes) == 0 && bytes == filled_ &&
+           (poll(&end, 1, 10) == 0 || (end.revents & POLLHUP) == 0)) {
+    }
+    kill(child_, SIGINT);
+    char part[512];
+    for (ssize_t count; (count = read(progress_[0], part, sizeof(part))) > 0;)
+      text.append(part, static_cast<std::size_t>(count));
+    text.erase(0, static_cast<std::size_t>(filled_));
+    int status = 0;
+    EXPECT_EQ(waitpid(child_, &status, 0), child_);
+    return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+  }
+
+  std::string text;  ///< what the program reported
+
+ private:
+  int progress_[2] = {-1, -1}, filled_ = 0;
+  pid_t child_ = -1;
+};
+
+/// Every file of the output is there and can be read. Returns loops.json.
+nlohmann::json read_output(const gpureg::test::TemporaryFolder& output, std::size_t poses) {
+  for (const char* name : {"trajectory.txt", "odometry.txt"})
+    EXPECT_EQ(gpureg::evaluation::read_trajectory(output / name).size(), poses) << name;
+  EXPECT_GT(gpureg::io::read_point_cloud(output / "map.ply").points.size(), 10000u);
+  const std::string page = gpureg::test::content_of(output / "report.html");
+  EXPECT_NE(page.find("</script></html>"), std::string::npos);
+  auto figures = nlohmann::json::parse(gpureg::test::content_of(output / "loops.json"));
+  EXPECT_EQ(gpureg::evaluation::read_trajectory(output / "keyframes.txt").size(),
+            figures.at("keyframes").get<std::size_t>());
+  EXPECT_EQ(figures.at("frames_done"), poses);
+  return figures;
+}
+
 TEST(Faults, AnInterruptedRunWritesWhatItHas) {
   const gpureg::test::TemporaryFolder output;
-  int progress[2];
-  ASSERT_EQ(pipe(progress), 0);
-  const pid_t child = fork();
-  ASSERT_GE(child, 0);
-  if (child == 0) {
-    dup2(progress[1], STDERR_FILENO);
-    close(progress[0]);
-    execl(SLAM_DEMO, SLAM_DEMO, frames_folder().c_str(), "--output", output.path().c_str(),
-          "--backend", "cpu", static_cast<char*>(nullptr));
-    _exit(127);
-  }
-  close(progress[1]);
-  std::string text;
-  for (char c; text.find("frame 25 of 150") == std::string::npos && read(progress[0], &c, 1) == 1;)
-    text += c;
-  kill(child, SIGINT);
-  int status = 0;
-  ASSERT_EQ(waitpid(child, &status, 0), child);
-  close(progress[0]);
-  EXPECT_EQ(WIFEXITED(status) ? WEXITSTATUS(status) : -1, 130) << text;
+  Interrupted program({frames_folder(), "--output", output.path(), "--backend", "cpu"}, 100);
+  EXPECT_EQ(program.after_the_first_line(), 130) << program.text;
+  EXPECT_EQ(program.text.rfind("frame 25 of 150, ", 0), 0u) << program.text;
+  // The second line, which it waits to write, comes after frame 50.
   const auto figures = nlohmann::json::parse(gpureg::test::content_of(output / "loops.json"));
   const std::size_t done = figures.at("frames_done");
   EXPECT_GE(done, 25u);
-  EXPECT_LT(done, 150u);
-  EXPECT_EQ(gpureg::evaluation::read_trajectory(output / "trajectory.txt").size(), done);
-  for (const char* name : {"odometry.txt", "keyframes.txt", "map.ply", "report.html"})
-    EXPECT_GT(fs::file_size(output / name), 0u) << name;
+  EXPECT_LE(done, 50u);
+  read_output(output, done);
+}
+
+TEST(Faults, AnInterruptedReplayWritesWhatItHas) {
+  const gpureg::test::TemporaryFolder output;
+  const Sequence sequence = open_sequence(frames_folder());
+  SlamOptions options = sequential();
+  options.loops.dense = options.loops.bundle = false;
+  options.keep_fragments = true;
+  Tracking tracking = run(sequence, options, [](int) { return false; })->tracking();
+  ASSERT_EQ(tracking.fragments.size(), 3u);
+  write_tracking(output / "tracking", tracking);
+  Interrupted program({frames_folder(), "--output", output.path(), "--backend", "cpu", "--tracking",
+                       output / "tracking"},
+                      40);
+  EXPECT_EQ(program.after_the_first_line(), 130) << program.text;
+  EXPECT_EQ(program.text.rfind("fragment 1 of 3, ", 0), 0u) << program.text;
+  EXPECT_EQ(program.text.find("fragment 3"), std::string::npos) << program.text;
+  const auto figures = read_output(output, 150);
+  EXPECT_GE(figures.at("fragments"), 1);
+  EXPECT_LT(figures.at("fragments"), 3) << "the rest is left out";
+}
+
+// The camera goes to and fro over one place. Fragments and surfels stay within their limits, and
+// the map stays good.
+TEST(Faults, APlaceThatIsSeenAgainAndAgainFillsNoMemory) {
+  constexpr std::size_t kTurn = 75, kFrames = 300;
+  const Sequence sequence = open_sequence(frames_folder());
+  SlamOptions options = sequential();
+  options.fragment_frames = 25;
+  options.loops.max_fragments = 4;
+  options.max_surfels = 130000;
+  Slam slam(gpureg::Context::cpu(), sequence.rig, options);
+  RunResult result;
+  std::size_t before = 0;
+  int thinned = 0;
+  for (std::size_t k = 0; k < kFrames; ++k) {
+    const std::size_t step = k % (2 * kTurn - 2), from = std::min(step, 2 * kTurn - 2 - step);
+    const double time = static_cast<double>(k) / 30;
+    slam.frame(static_cast<int>(k), time, load(sequence.frames[from], sequence.rig));
+    result.truth.push_back({time, sequence.truth[from].world_from_body});
+    ASSERT_LE(slam.all_surfels(), options.max_surfels);
+    ASSERT_LE(slam.loops().fragments_kept(), 5u) << "the newest one is registered first";
+    thinned += slam.all_surfels() < 2 * before / 3;
+    before = slam.all_surfels();
+  }
+  slam.finish();
+  EXPECT_EQ(slam.lost(), 0);
+  EXPECT_EQ(slam.fragments(), 12);
+  EXPECT_EQ(slam.loops().fragments_kept(), 4u);
+  EXPECT_GE(thinned, 2) << "without the limit there are more surfels";
+  evaluate(slam, frames_folder() + "/surface.ply", result);
+  EXPECT_LT(result.final.absolute_translation.rmse, 0.02);
+  EXPECT_GT(result.surface.distance.count, 20000u);
+  EXPECT_LT(result.surface.distance.mean, 0.012);
 }
 
 }  // namespace

@@ -157,6 +157,27 @@ TEST(KeyframeGraph, ALoopThatOthersContradictIsAMisfit) {
   EXPECT_EQ(d.graph.misfits(d.map, 0.1, 0.05), (std::vector<int>{5})) << "one edge suffices";
 }
 
+// A keyframe that lost the points it shared with its neighbours would follow one loop alone.
+TEST(KeyframeGraph, OdometryHoldsSuccessiveKeyframesThatShareFewPoints) {
+  Map map;
+  KeyframeGraph graph;
+  const Eigen::Isometry3d motion = at(0.1, 0, 0, 0.02);
+  for (const auto& [pose, session] : {std::pair{at(0, 0, 0), 0}, std::pair{motion, 0},
+                                      std::pair{motion * motion, 0}, std::pair{at(5, 0, 0), 1}}) {
+    add(map, pose, session, 100);
+    graph.record(map);
+  }
+  for (int k = 0; k < 60; ++k) map.add_observation(map.add_point(0, k, {0, 0, 2}), {1, k});
+  map.keyframes[2].world_from_camera = at(1, 0, 0);  // a loop moved it
+  const auto weak = graph.weak_odometry(map);
+  ASSERT_EQ(weak.size(), 1u) << "60 points hold 0 and 1; 2 and 3 are of two sessions";
+  EXPECT_EQ(weak[0].a, 1);
+  EXPECT_EQ(weak[0].b, 2);
+  EXPECT_TRUE(weak[0].a_from_b.isApprox(motion, 1e-12)) << "as tracking measured it";
+  map.remove_point(0);
+  EXPECT_EQ(graph.weak_odometry(map).size(), 2u) << "59 points do not";
+}
+
 TEST(KeyframeGraph, SessionsKeepTheirWorldsUntilALoopMergesThem) {
   Map map;
   KeyframeGraph graph;

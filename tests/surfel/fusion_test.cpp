@@ -56,6 +56,37 @@ TEST(SurfelFusion, BallHasItsRadiusAndNormals) {
   }
 }
 
+TEST(SurfelFusion, ThinningKeepsBothSidesAndTheMostConfident) {
+  // A board of 1 x 1 m, seen from both sides, in two layers each: 1 mm apart, as two passages
+  // leave them.
+  Cloud surfels;
+  for (const float side : {-1.0f, 1.0f}) {
+    for (const float confidence : {1.0f, 2.0f}) {
+      for (int k = 0; k < 10000; ++k) {
+        const float x = 0.01f * static_cast<float>(k % 100),
+                    y = 0.01f * static_cast<float>(k / 100);
+        surfels.push_back({{x, y, 2 + 0.001f * confidence},
+                           {0.1f, 0.1f, side},
+                           0.005f,
+                           confidence,
+                           1,
+                           2,
+                           0x808080u});
+      }
+    }
+  }
+  const Cloud same = thinned(surfels, surfels.size());
+  EXPECT_EQ(same.size(), surfels.size());
+  const Cloud one = thinned(surfels, 20000);
+  ASSERT_EQ(one.size(), 20000u) << "one layer for each side";
+  for (const Surfel& s : one) ASSERT_EQ(s.confidence, 2);
+  const Cloud few = thinned(surfels, 3000);
+  EXPECT_LE(few.size(), 3000u);
+  EXPECT_GT(few.size(), 1000u)
+      << "cells grow by a factor of 1.6 in area, two layers may become one";
+  for (const Surfel& s : few) EXPECT_GT(s.radius, 0.01f) << "no gaps between cells of 2 to 4 cm";
+}
+
 TEST(SurfelFusion, OldSurfelsTakeNoPartUntilTheyAreSeenAgain) {
   Options options;
   options.active_frames = 50;

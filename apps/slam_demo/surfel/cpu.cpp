@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <algorithm>
 #include <thread>
+#include <unordered_map>
 
 #include "surfel_map.hpp"
 
@@ -113,6 +114,29 @@ class CpuMap : public SurfelMap {
 };
 
 }  // namespace
+
+Cloud thinned(const Cloud& surfels, std::size_t count) {
+  constexpr float kFirstCell = 0.005f, kGrowth = 1.26f;  // metres; half as many cells of a surface
+  Cloud result = surfels;
+  for (float cell = kFirstCell; result.size() > count; cell *= kGrowth) {
+    std::unordered_map<std::uint64_t, std::size_t> place;  // of a cell and side in kept
+    Cloud kept;
+    for (const Surfel& s : result) {
+      std::uint64_t key = 0;
+      for (const float x : {s.position.x, s.position.y, s.position.z})
+        key = key << 20 | (static_cast<std::uint64_t>(std::llround(x / cell)) & 0xFFFFFu);
+      for (const float x : {s.normal.x, s.normal.y, s.normal.z}) key = key << 1 | (x > 0 ? 1u : 0u);
+      const auto [found, first] = place.emplace(key, kept.size());
+      if (first)
+        kept.push_back(s);
+      else if (s.confidence > kept[found->second].confidence)
+        kept[found->second] = s;
+    }
+    for (Surfel& s : kept) s.radius = std::max(s.radius, 0.7f * cell);  // no gaps
+    result.swap(kept);
+  }
+  return result;
+}
 
 Motions::Motions(const std::vector<Correction>& corrections) : sums(1, MotionSum{}) {
   for (const Correction& c : corrections) {

@@ -47,6 +47,10 @@ std::unique_ptr<SurfelMap> make_cpu_map(const Options& options, unsigned threads
 std::unique_ptr<SurfelMap> make_cuda_map(const Options& options);
 bool cuda_available();
 
+/// At most count surfels, > 0, that cover the same surfaces: of those in one cell that face the
+/// same way the most confident one. The cells are as small as the count allows.
+Cloud thinned(const Cloud& surfels, std::size_t count);
+
 /// The corrections as correct() of surfel.hpp takes them.
 struct Motions {
   explicit Motions(const std::vector<Correction>& corrections);
