@@ -8,12 +8,12 @@ LiDAR of so many rings; hall: a simulated terrestrial scanner (domain_scenes.py)
 random rotation and has points alone, a model its faces.
 
 gpureg runs as it is, with `--voxel-size auto`; on LiDAR also with `--up`, on clouds that are turned about
-the vertical, and with voxels of 0.8 m; on objects and models also with the viewpoints given. The peers run
+the vertical, and with voxels of 0.8 m; on the other sets also with the viewpoints given. The peers run
 by bench/peers with the parameters that their own documentation recommends, at the voxel size that gpureg
-chose and at other ones: for LiDAR and scanners 0.3 m, KISS-Matcher's own, and 0.8 m, else twice that of
-gpureg. Their clouds are downsampled by gpureg and have normals turned to the sensor, of models outward
-ones. Times are processor time of preparation and alignment, for each pair; gpureg's includes the reading
-of files. `_thinned` sets have no runs at 0.3 m.
+chose and at other ones: for LiDAR 0.8 m and, KISS-Matcher's own, 0.3 m, else twice that of gpureg. Their
+clouds are downsampled by gpureg and have normals turned to the sensor, of models outward ones. `_thinned`
+sets have no runs at 0.3 m. Times are processor time of preparation and alignment, for each pair; gpureg's
+includes the reading of files.
 
 The record keeps the sets that are not named.
 usage: sensor_peers.py [--sets kitti,street16,...] [--seeds 1 2 3] [--scenes 2] [-o FILE]
@@ -148,6 +148,9 @@ def main():
     parser = record.parser(__doc__, "sensor_peers.json")
     parser.add_argument("--sets", default=SETS)
     parser.add_argument("--seeds", type=int, nargs="+", default=[1, 2, 3], help="of gpureg")
+    parser.add_argument(
+        "--no-fine", action="store_true", help="skip Open3D at 0.3 m, its slowest run"
+    )
     parser.add_argument("--scenes", type=int, default=2, help="of each simulated set")
     arguments = parser.parse_args()
     from runner import check
@@ -159,14 +162,13 @@ def main():
     seeds = " ".join(map(str, arguments.seeds))
     for name in arguments.sets.split(","):
         scenes = scenes_of(name, data, arguments.scenes)
-        objects = name.startswith(("dragon", "cad"))
+        lidar = not name.startswith(("dragon", "cad", "hall"))
         runs = {"gpureg": ("turned", [], "auto")}
-        if objects:
-            runs["gpureg_viewpoints"] = ("turned_said", [], "auto")
-        else:
-            if name != "hall":
-                runs["gpureg_up"] = ("upright", ["--up", "0,0,1"], "auto")
+        if lidar:
+            runs["gpureg_up"] = ("upright", ["--up", "0,0,1"], "auto")
             runs["gpureg_coarse"] = ("turned", [], repr(LIDAR_VOXELS["coarse"]))
+        else:
+            runs["gpureg_viewpoints"] = ("turned_said", [], "auto")
         methods, sizes = {}, {}
         for label, (condition, extra, size) in runs.items():
             chosen = [scene._replace(voxel=size) for scene in scenes]
@@ -177,10 +179,10 @@ def main():
                 print(name, label, counts, voxels, flush=True)
                 if label == "gpureg":
                     sizes["auto"] = voxels
-        if objects:
-            sizes["double"] = [2 * v for v in sizes["auto"]]
-        else:
+        if lidar:
             sizes |= {which: [size] * len(scenes) for which, size in LIDAR_VOXELS.items()}
+        else:
+            sizes["double"] = [2 * v for v in sizes["auto"]]
         if name.endswith("_thinned"):
             del sizes["fine"]
         versions = {}
@@ -190,11 +192,14 @@ def main():
                 sys.exit(f"error: {method}: {why}")
             versions[method] = about["version"]
             for which, voxels in sizes.items():
+                if arguments.no_fine and (method, which) == ("open3d_ransac", "fine"):
+                    continue
                 counts = of_peer(method, about["threshold"], scenes, voxels, arguments.seeds[0])
                 methods[f"{method}_{which}"] = [counts]
                 print(name, method, which, counts, voxels, flush=True)
         content["sets"][name] = {
-            "command": f"bench/accuracy/sensor_peers.py --sets {name} --seeds {seeds} --scenes {arguments.scenes}",
+            "command": f"bench/accuracy/sensor_peers.py --sets {name} --seeds {seeds} --scenes {arguments.scenes}"
+            + (" --no-fine" if arguments.no_fine else ""),
             "commit": record.commit(),
             "voxel_sizes": sizes,
             "versions": versions,
