@@ -149,6 +149,9 @@ def main():
     parser.add_argument("--sets", default=SETS)
     parser.add_argument("--seeds", type=int, nargs="+", default=[1, 2, 3], help="of gpureg")
     parser.add_argument(
+        "--peers", nargs="*", choices=PEERS, default=list(PEERS), help="methods of bench/peers"
+    )
+    parser.add_argument(
         "--no-fine", action="store_true", help="skip Open3D at 0.3 m, its slowest run"
     )
     parser.add_argument("--scenes", type=int, default=2, help="of each simulated set")
@@ -186,7 +189,7 @@ def main():
         if name.endswith("_thinned"):
             del sizes["fine"]
         versions = {}
-        for method in PEERS:
+        for method in arguments.peers:
             about, why = check(method)
             if about is None:
                 sys.exit(f"error: {method}: {why}")
@@ -199,7 +202,8 @@ def main():
                 print(name, method, which, counts, voxels, flush=True)
         content["sets"][name] = {
             "command": f"bench/accuracy/sensor_peers.py --sets {name} --seeds {seeds} --scenes {arguments.scenes}"
-            + (" --no-fine" if arguments.no_fine else ""),
+            + (" --no-fine" if arguments.no_fine else "")
+            + ("" if arguments.peers == list(PEERS) else f" --peers {' '.join(arguments.peers)}"),
             "commit": record.commit(),
             "voxel_sizes": sizes,
             "versions": versions,
