@@ -218,12 +218,14 @@ def reported_of(run):
     )
 
 
-def beside_peers(wanted):
+def beside_peers(wanted, flips):
     """A row for each set and method; ranges are of the seeds."""
     record = load("sensor_peers.json")
     rows = [
-        "| data | true pairs, others | method | voxel size | correct | upside down | reported | false reports | reported before a false one | ms |",
-        "| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |",
+        f"| data | true pairs, others | method | voxel size | correct |{' upside down |' if flips else ''} reported | false reports | reported before a false one | ms |",
+        "| --- | --- | --- | --- | --- |"
+        + (" --- |" if flips else "")
+        + " --- | --- | --- | --- |",
     ]
     for name, text in SENSOR_SETS.items():
         of = record["sets"].get(name)
@@ -244,14 +246,15 @@ def beside_peers(wanted):
                 cells[1] = f"{runs[0]['pairs']}, {runs[0].get('negatives', 0)}"
             cells += [label, low if low == high else f"{low} to {high}"]
             cells.append(span([run["right"] for run in runs]))
-            cells.append(span([run["flips"] for run in runs]) if "flips" in runs[0] else "")
+            if flips:
+                cells.append(span([run["flips"] for run in runs]) if "flips" in runs[0] else "")
             cells += [span([reported_of(run)[k] for run in runs]) for k in (0, 1)]
             cells.append(span([run["before_false"] for run in runs]))
             cells.append(f"{mean(run['ms'] for run in runs):.0f}")
             rows.append("| " + " | ".join(cells) + " |")
             first = False
     made = sorted({of["commit"].rstrip("+") for of in record["sets"].values()})
-    versions = next(iter(record["sets"].values()))["versions"]
+    versions = next(of["versions"] for of in record["sets"].values() if of["versions"])
     return [
         *rows,
         "",
@@ -261,11 +264,11 @@ def beside_peers(wanted):
 
 
 def lidar_peers():
-    return beside_peers(lambda name: name.startswith(("street", "kitti", "lidar")))
+    return beside_peers(lambda name: name.startswith(("street", "kitti", "lidar")), True)
 
 
 def object_peers():
-    return beside_peers(lambda name: name in ("hall", "dragon", "cad_mesh"))
+    return beside_peers(lambda name: name in ("hall", "dragon", "cad_mesh"), False)
 
 
 # kind of data: (sets, gpureg's recommended run, the recipe)
