@@ -3,7 +3,8 @@
 """gpureg beside KISS-Matcher and Open3D's RANSAC on data of other sensors than a depth camera in rooms.
 
 Sets: kitti, lidar, dragon, cad_mesh of DATA (viewpoints.py); street16, street32, street64: simulated
-LiDAR of so many rings; hall: a simulated terrestrial scanner (domain_scenes.py). A name that ends in
+LiDAR of so many rings; hall: a simulated terrestrial scanner (domain_scenes.py), without the true pairs
+whose clouds do not overlap. A name that ends in
 `_thinned`: of every cloud a random quarter of the points. Every cloud is turned about its sensor by a
 random rotation and has points alone, a model its faces.
 
@@ -44,6 +45,26 @@ SMALL_VOXEL, SMALL_UNIT = 0.02, 100.0
 LIDAR_VOXELS = {"fine": 0.3, "coarse": 0.8}  # metres
 FIRST_SEED = 101  # of the simulated scenes; no figure of the docs had chosen anything by them
 THINNED = 0.25
+MIN_OVERLAP, NEAR = 0.1, 0.5  # share of the points of both clouds, metres
+
+
+def overlapping(scene):
+    """Without the true pairs whose clouds have no place in common, as of a sensor inside a machine."""
+    from scipy.spatial import cKDTree
+
+    trees = [cKDTree(cloud.points) for cloud in scene.clouds]
+
+    def share(source, target, pose):
+        points = viewpoints.moved(pose, scene.clouds[source].points[::3])
+        return np.isfinite(trees[target].query(points, distance_upper_bound=NEAR)[0]).mean()
+
+    kept = [
+        (s, t, truths)
+        for s, t, truths in scene.pairs
+        if not truths
+        or min(share(s, t, truths[0]), share(t, s, np.linalg.inv(truths[0]))) >= MIN_OVERLAP
+    ]
+    return scene._replace(pairs=kept)
 
 
 def scenes_of(name, data, count):
@@ -54,7 +75,8 @@ def scenes_of(name, data, count):
         kind = "hall" if base == "hall" else "street"
         fixed = {"scanner": True} if base == "hall" else {"rings": int(base.removeprefix("street"))}
         count, first = (1, FIRST_SEED + 50) if thinned else (count, FIRST_SEED)
-        scenes = [domains.simulated(kind, seed, **fixed) for seed in range(first, first + count)]
+        seeds = range(first, first + count)
+        scenes = [overlapping(domains.simulated(kind, seed, **fixed)) for seed in seeds]
     else:
         scenes = getattr(viewpoints, base)(data, 100, np.random.default_rng(0))
     if thinned:
