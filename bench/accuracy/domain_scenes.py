@@ -383,9 +383,11 @@ def spread_pairs(scans, rng, positives, negatives, most):
     return [tuple(map(int, p)) for p in near[:positives] + far[:negatives]]
 
 
-def street(seed):
+def street(seed, rings=None):
+    """rings: of the LiDAR; drawn where it is not given."""
     rng = np.random.default_rng(seed)
-    rings = int(rng.choice([16, 16, 32, 64, 128]))
+    drawn = int(rng.choice([16, 16, 32, 64, 128]))
+    rings = rings or drawn
     scans = []
     for place in range(2):
         mesh, width = town(rng)
@@ -437,9 +439,11 @@ def hall_mesh(rng):
     return trimesh.util.concatenate(pieces), length, width
 
 
-def hall(seed):
+def hall(seed, scanner=None):
+    """scanner: a terrestrial scanner, not a spinning LiDAR; drawn where it is not given."""
     rng = np.random.default_rng(seed)
-    scanner = rng.random() < 0.5
+    drawn = rng.random() < 0.5
+    scanner = drawn if scanner is None else scanner
     rings = int(rng.choice([16, 32, 64]))
     scans = []
     for place in range(2):

@@ -27,11 +27,11 @@ REAL = ("kitchen", "dragon", "cad", "cad_mesh", "kitti", "lidar", "fgr")
 MODEL_POINTS = 20000
 
 
-def simulated(name, seed):
-    """A Set of viewpoints.py from a scene of domain_scenes.py."""
+def simulated(name, seed, **fixed):
+    """A Set of viewpoints.py from a scene of domain_scenes.py; fixed: parameters of the scene."""
     import domain_scenes
 
-    scene = domain_scenes.SCENES[name](seed)
+    scene = domain_scenes.SCENES[name](seed, **fixed)
     rng = np.random.default_rng([seed, 1])
     as_mesh = rng.random() < 0.5
     extent = max(

@@ -4,9 +4,10 @@
 
 Every cloud is moved by a random pose. `said`: its true viewpoints move along and are given.
 `nothing`: points alone. `still`: points alone of clouds that were not moved, whose sensor is at the
-origin (red kitchen: each fragment in the frame of its middle camera). One line for each set and
-condition: pairs, right, reported at 0.5, reported and wrong; the same of reports up to a symmetry
-(--accept-symmetry); and the decisions about the clouds, models apart.
+origin (red kitchen: each fragment in the frame of its middle camera). A seed is that of the random
+poses and of gpureg. One line for each set, condition and seed: pairs, right, reported at 0.5, reported
+and wrong; the same of reports up to a symmetry (--accept-symmetry); and the decisions about the clouds,
+models apart.
 
 Sets: kitchen, dragon, cad, cad_mesh, kitti, lidar, fgr of DATA (its README.md has origins and
 licences). cad: scans on points of their models; cad_mesh: on the models as STL files.
@@ -252,21 +253,44 @@ def write(folder, clouds, poses, say):
         (folder / "cameras.txt").write_text("".join(lines))
 
 
-def run(command, scene, rng, condition, total, extra):
-    poses = [
-        np.eye(4) if condition == "still" else random_pose(rng, cloud.reach)
-        for cloud in scene.clouds
-    ]
+def turned(rng, axis=None):
+    """A pose that turns a cloud about its sensor, by any rotation or about an axis."""
+    pose = np.eye(4)
+    pose[:3, :3] = rotation(rng)
+    if axis is not None:
+        x, y, z = axis
+        cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+        angle = rng.uniform(-np.pi, np.pi)
+        pose[:3, :3] = np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * cross @ cross
+    return pose
+
+
+def poses_of(condition, clouds, rng):
+    """What every cloud is moved by; `turned` and `upright` keep the sensor at the origin."""
+    if condition == "still":
+        return [np.eye(4) for _ in clouds]
+    if condition in ("turned", "turned_said"):
+        return [turned(rng) for _ in clouds]
+    if condition == "upright":
+        return [turned(rng, (0, 0, 1)) for _ in clouds]
+    return [random_pose(rng, cloud.reach) for cloud in clouds]
+
+
+def run(command, scene, seed, rng, condition, total, extra):
+    """Adds the counts of a set to total. Returns the voxel size and, for each pair, the pose as of clouds that were not
+    moved, whether it is correct, and its score.
+    """
+    poses = poses_of(condition, scene.clouds, rng)
     with tempfile.TemporaryDirectory() as name:
         folder = pathlib.Path(name)
-        write(folder, scene.clouds, poses, condition == "said")
+        write(folder, scene.clouds, poses, condition in ("said", "turned_said"))
         listed = "".join(f"{t} {s}\n" for s, t, _ in scene.pairs)
         (folder / "pairs.txt").write_text(listed)
         out = folder / "out.json"
         result = subprocess.run(
             [command, "batch", name, "--pairs", folder / "pairs.txt", "-o", folder / "out.log"]
             + ["--json", out, "--voxel-size", scene.voxel, "--backend", "cpu", "--threads", "1"]
-            + ["--quiet", *extra],
+            + ["--seed", str(seed), "--quiet", *extra],
             capture_output=True,
             text=True,
         )
@@ -277,26 +301,29 @@ def run(command, scene, rng, condition, total, extra):
         kind = "scan" if cloud.reach == FGR_REACH or cloud.viewpoints is not None else "model"
         total[f"{kind}: {fragment['viewpoint']}"] += 1
     found = {(p["i"], p["j"]): p for p in document["pairs"]}
+    outcomes = []
     for source, target, truths in scene.pairs:
         i, j = min(source, target), max(source, target)
         record = found[i, j]
         reported = record["status"] == "aligned"
         up_to_symmetry = reported or record["reason"] == "symmetric"
         flat = record.get("T_ij") or record.get("transform")
-        good = False
-        if flat is not None and truths:
+        good, pose = False, None
+        if flat is not None:
             pose = np.array(flat, np.float64).reshape(4, 4)  # j into i
             if source < target:
                 pose = np.linalg.inv(pose)
             pose = np.linalg.inv(poses[target]) @ pose @ poses[source]
             points = scene.clouds[source].points[::50]
-            good = scene.right(points, pose, truths)
+            good = bool(truths) and bool(scene.right(points, pose, truths))
         total["negatives" if not truths else "pairs"] += 1
         total["right"] += good
         total["reported"] += reported and good
         total["reported_wrong"] += reported and not good
         total["reported_up_to_symmetry"] += up_to_symmetry and good
         total["reported_up_to_symmetry_wrong"] += up_to_symmetry and not good
+        outcomes.append((pose, good, record["score"]))
+    return document["options"]["prepare"]["voxel_size"], outcomes
 
 
 def main():
@@ -328,13 +355,21 @@ def main():
             "conditions": {},
         }
         for condition in arguments.conditions.split(","):
-            total = collections.Counter()
+            entry["conditions"][condition] = []
             for seed in arguments.seeds:
-                rng = np.random.default_rng(seed)
+                total, rng = collections.Counter(), np.random.default_rng(seed)
                 for scene in scenes:
-                    run(arguments.gpureg, scene, rng, condition, total, arguments.extra.split())
-            print(name, condition, dict(total), flush=True)
-            entry["conditions"][condition] = dict(total)
+                    run(
+                        arguments.gpureg,
+                        scene,
+                        seed,
+                        rng,
+                        condition,
+                        total,
+                        arguments.extra.split(),
+                    )
+                print(name, condition, seed, dict(total), flush=True)
+                entry["conditions"][condition].append({"seed": seed, **total})
         record["sets"][name] = entry
         if arguments.json:
             arguments.json.write_text(json.dumps(record, indent=1) + "\n")

@@ -19,11 +19,11 @@ class Cloud:
     viewpoints: np.ndarray | None
 
 
-def write_one(output, number, points, normals, viewpoints):
+def write_one(output, number, points, normals, viewpoints, voxel=VOXEL):
     """One fragment from arrays into a folder; normals, viewpoints: perhaps None."""
     import gpureg
 
-    options = gpureg.RegistrationOptions.from_voxel_size(VOXEL).prepare
+    options = gpureg.RegistrationOptions.from_voxel_size(voxel).prepare
     options.wide_feature_radius, options.depth_maps = 0.0, 0
     prepared = gpureg.prepare(
         points, normals, viewpoints=viewpoints, options=options, context=gpureg.Context.cpu()

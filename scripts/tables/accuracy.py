@@ -304,34 +304,38 @@ CONDITIONS = {
 DECISIONS = ("said", "origin", "normals", "none", "model")
 
 
+def span(runs, key):
+    """The value of all runs, or its range."""
+    values = [run.get(key, 0) for run in runs]
+    low, high = min(values), max(values)
+    return f"{low}" if low == high else f"{low} to {high}"
+
+
 def viewpoints():
-    """Sets of records before the script wrote them alone have no `conditions` and no kinds."""
+    """Of each condition the runs with several seeds; records of one seed have the counts alone."""
     record = load("viewpoints.json")
     out = [
-        "| data | clouds | pairs | first correct | reported | with `--accept-symmetry` | false reports | decisions about the clouds |",
-        "| --- | --- | --- | --- | --- | --- | --- | --- |",
+        "| data | clouds | seeds | pairs | first correct | reported | with `--accept-symmetry` | false reports | decisions about the clouds |",
+        "| --- | --- | --- | --- | --- | --- | --- | --- | --- |",
     ]
     for name, text in SENSORS.items():
         found = record["sets"].get(name, {})
-        for condition, of in found.get("conditions", found).items():
-            pairs = f"{of['pairs']}" + (
-                f" and {of['negatives']} negative" if of.get("negatives") else ""
+        for condition, runs in found.get("conditions", {}).items():
+            runs = runs if isinstance(runs, list) else [runs]
+            pairs = f"{runs[0]['pairs']}" + (
+                f" and {runs[0]['negatives']} negative" if runs[0].get("negatives") else ""
             )
-            accepted = of.get("reported_up_to_symmetry", "")
-            wrong = of.get("reported_up_to_symmetry_wrong", of["reported_wrong"])
-            decided = ", ".join(
-                f"{count} {key}" for key, count in of.items() if key.split(": ")[-1] in DECISIONS
-            )
-            out.append(
-                f"| {text} | {CONDITIONS[condition]} | {pairs} | {of['right']} | {of['reported']} | {accepted} | {wrong} | {decided} |"
-            )
+            keys = {key: None for run in runs for key in run if key.split(": ")[-1] in DECISIONS}
+            decided = ", ".join(f"{span(runs, key)} {key}" for key in keys)
+            cells = [text, CONDITIONS[condition], len(found["seeds"]), pairs]
+            cells += [span(runs, key) for key in ("right", "reported", "reported_up_to_symmetry")]
+            cells += [span(runs, "reported_up_to_symmetry_wrong"), decided]
+            out.append(f"| {' | '.join(map(str, cells))} |")
     made = [
         f"* `{entry['command']}` at commit {entry['commit'].rstrip('+')}."
         for entry in record["sets"].values()
         if "command" in entry
     ]
-    if "made_by" in record:
-        made.append(f"* {record['made_by']}; commit {record['commit']}.")
     return [*out, "", "Made by", "", *made]
 
 

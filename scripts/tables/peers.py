@@ -25,8 +25,12 @@ def made_with(record):
     return f"Made by `{record['command']}` at commit {', '.join(commits)} on {record['processor']}."
 
 
+# Global registration; benchmarks.md has the others, too.
+SHORT = ("gpureg_default", "gpureg_loopsmart", "open3d_ransac", "kiss_matcher_005", "sc2_pcr")
+
+
 def peers():
-    """Both scenes side by side; methods of global registration only."""
+    """Both scenes side by side, a selection of methods."""
     records = [load(name) for name in PEER_SCENES]
     rows = [
         "| method | "
@@ -35,7 +39,7 @@ def peers():
         "| --- |" + " --- | --- | --- |" * len(records),
     ]
     for name, entry in records[0]["methods"].items():
-        if entry["refines"]:
+        if name not in SHORT:
             continue
         cells = []
         for record in records:
@@ -50,6 +54,8 @@ def peers():
             ]
         rows.append(f"| {peer_label(entry)} | " + " | ".join(cells) + " |")
     for preset, times in device_times():
+        if preset != "default":
+            continue
         cells = " | ".join(f"same | same | {ms:.2f}" for ms in times)
         rows.append(f"| gpureg `{preset}`, NVIDIA H200 | {cells} |")
     return rows
@@ -168,8 +174,165 @@ def redwood():
     return rows + ["", source(record) + f"; seeds {', '.join(map(str, record['seeds']))}."]
 
 
+SENSOR_SETS = {
+    "street16": "LiDAR of 16 rings, streets, simulated",
+    "street32": "LiDAR of 32 rings, streets, simulated",
+    "street64": "LiDAR of 64 rings, streets, simulated",
+    "kitti": "LiDAR of 64 rings, KITTI",
+    "lidar": "LiDAR, sample of small_gicp",
+    "street16_thinned": "16 rings, a quarter of the points",
+    "street32_thinned": "32 rings, a quarter of the points",
+    "street64_thinned": "64 rings, a quarter of the points",
+    "kitti_thinned": "KITTI, a quarter of the points",
+    "hall": "terrestrial scanner in halls, simulated",
+    "dragon": "range scans, Stanford dragon",
+    "cad_mesh": "CAD: scans on the models as meshes",
+}
+SENSOR_METHODS = {
+    "gpureg": "gpureg, `auto`",
+    "gpureg_up": "gpureg, `auto`, `--up`",
+    "gpureg_viewpoints": "gpureg, `auto`, viewpoints given",
+    "gpureg_coarse": "gpureg, 0.8 m",
+    "kiss_matcher_005_auto": "KISS-Matcher, gpureg's size",
+    "kiss_matcher_005_fine": "KISS-Matcher, 0.3 m",
+    "kiss_matcher_005_coarse": "KISS-Matcher, 0.8 m",
+    "kiss_matcher_005_double": "KISS-Matcher, twice that size",
+    "open3d_ransac_auto": "Open3D RANSAC, gpureg's size",
+    "open3d_ransac_fine": "Open3D RANSAC, 0.3 m",
+    "open3d_ransac_coarse": "Open3D RANSAC, 0.8 m",
+    "open3d_ransac_double": "Open3D RANSAC, twice that size",
+}
+
+
+def span(values, digits=0):
+    """A value, or the range of several."""
+    low, high = (f"{pick(values):.{digits}f}" for pick in (min, max))
+    return low if low == high else f"{low} to {high}"
+
+
+def reported_of(run):
+    """Correct and false reports; symmetric poses count as with --accept-symmetry."""
+    return (
+        run.get("reported_up_to_symmetry", run["reported"]),
+        run.get("reported_up_to_symmetry_wrong", run["reported_wrong"]),
+    )
+
+
+def beside_peers(wanted, flips):
+    """A row for each set and method; ranges are of the seeds."""
+    record = load("sensor_peers.json")
+    rows = [
+        f"| data | true pairs, others | method | voxel size | correct |{' upside down |' if flips else ''} reported | false reports | reported before a false one | ms |",
+        "| --- | --- | --- | --- | --- |"
+        + (" --- |" if flips else "")
+        + " --- | --- | --- | --- |",
+    ]
+    for name, text in SENSOR_SETS.items():
+        of = record["sets"].get(name)
+        if of is None or wanted(name) is False:
+            continue
+        first = True
+        for method, label in SENSOR_METHODS.items():
+            runs = of["methods"].get(method)
+            if runs is None:
+                continue
+            which = method.rsplit("_", 1)[-1]
+            sizes = of["voxel_sizes"].get(which, of["voxel_sizes"]["auto"])
+            if method == "gpureg_coarse":
+                sizes = [0.8]
+            low, high = f"{min(sizes):g}", f"{max(sizes):g}"
+            cells = [text if first else "", ""]
+            if first:
+                cells[1] = f"{runs[0]['pairs']}, {runs[0].get('negatives', 0)}"
+            cells += [label, low if low == high else f"{low} to {high}"]
+            cells.append(span([run["right"] for run in runs]))
+            if flips:
+                cells.append(span([run["flips"] for run in runs]) if "flips" in runs[0] else "")
+            cells += [span([reported_of(run)[k] for run in runs]) for k in (0, 1)]
+            cells.append(span([run["before_false"] for run in runs]))
+            cells.append(f"{mean(run['ms'] for run in runs):.0f}")
+            rows.append("| " + " | ".join(cells) + " |")
+            first = False
+    made = sorted({of["commit"].rstrip("+") for of in record["sets"].values()})
+    versions = next(of["versions"] for of in record["sets"].values() if of["versions"])
+    return [
+        *rows,
+        "",
+        f"Made by `{record['command']}` at commit {', '.join(made)} on {record['processor']}; KISS-Matcher {versions['kiss_matcher_005']}, "
+        f"Open3D {versions['open3d_ransac']}.",
+    ]
+
+
+def lidar_peers():
+    return beside_peers(lambda name: name.startswith(("street", "kitti", "lidar")), True)
+
+
+def object_peers():
+    return beside_peers(lambda name: name in ("hall", "dragon", "cad_mesh"), False)
+
+
+# kind of data: (sets, gpureg's recommended run, the recipe)
+KINDS = {
+    "LiDAR": (
+        ("street16", "street32", "street64", "kitti", "lidar"),
+        "gpureg_coarse",
+        "`--voxel-size 0.8`",
+    ),
+    "terrestrial scanner": (("hall",), "gpureg", "`--voxel-size auto`"),
+    "objects, range scanner": (
+        ("dragon",),
+        "gpureg_viewpoints",
+        "`--voxel-size auto`, the viewpoints",
+    ),
+    "CAD parts and scans": (
+        ("cad_mesh",),
+        "gpureg_viewpoints",
+        "the mesh as TARGET, `--voxel-size auto --accept-symmetry`",
+    ),
+}
+
+
+def kinds():
+    """One row for each kind of data: shares of correct poses, of the peers at the voxel size that is better for them."""
+    rooms, record = load("peers_redkitchen.json")["methods"], load("sensor_peers.json")["sets"]
+    alone = load("viewpoints.json")["sets"]["kitchen"]["conditions"]["nothing"]
+    alone = alone if isinstance(alone, list) else [alone]
+    share = 100 * mean(run["right"] / run["pairs"] for run in alone)
+    cells = [f"{share:.0f}"] + [
+        f"{100 * rooms[name]['strict']['raw_recall']:.0f}"
+        for name in ("gpureg_default", "kiss_matcher_005", "open3d_ransac")
+    ]
+    rows = [
+        "| data | true pairs | gpureg, points alone: correct, % | gpureg, by the recipe | KISS-Matcher | Open3D RANSAC | recipe |",
+        "| --- | --- | --- | --- | --- | --- | --- |",
+        f"| rooms, depth camera | {alone[0]['pairs']} | {' | '.join(cells)} | `--voxel-size 0.05`, the camera positions |",
+    ]
+    for kind, (sets, recipe, words) in KINDS.items():
+        known = [record[name] for name in sets if name in record]
+        if len(known) < len(sets):
+            continue
+        pairs = sum(of["methods"]["gpureg"][0]["pairs"] for of in known)
+
+        def correct(method, known=known, pairs=pairs):
+            return (
+                100 * sum(mean(r["right"] for r in of["methods"][method]) for of in known) / pairs
+            )
+
+        cells = [correct("gpureg"), correct(recipe)]
+        for peer in ("kiss_matcher_005", "open3d_ransac"):
+            every = set.intersection(*(set(of["methods"]) for of in known))
+            cells.append(max(correct(m) for m in every if m.startswith(peer)))
+        rows.append(
+            f"| {kind} | {pairs} | " + " | ".join(f"{c:.0f}" for c in cells) + f" | {words} |"
+        )
+    return rows
+
+
 TABLES = {
     "peers": peers,
+    "kinds": kinds,
+    "lidar_peers": lidar_peers,
+    "object_peers": object_peers,
     "peers_device": peers_device,
     "peers_redkitchen": peers_redkitchen,
     "peers_house": peers_house,
