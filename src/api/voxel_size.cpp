@@ -22,12 +22,29 @@ constexpr double kSizeTolerance = 1.02;  // of the bisection, below the rounding
 constexpr double kNoiseRadius = 1.5;     // radius of the fitted plane, in voxels
 constexpr std::size_t kMinPlanePoints = 8;  // a plane fits fewer points however rough they are
 constexpr double kMaxNoise = 1.0 / 3.0;     // of a voxel: its centroid averages out less
+// Neighbourhoods of the normals, in voxels. They have an area if the second axis is not far shorter
+// than the first, in squared lengths: those of a LiDAR with few rings lie on one ring.
+constexpr double kNormalRadius = 2, kLeastWidth = 0.2, kLeastShare = 0.6;
+constexpr std::size_t kMinAreaPoints = 4, kAreaSample = 400;
+constexpr double kGrowth = 1.1, kMostGrowth = 3;
+constexpr std::size_t kFewestPoints = 1000;
 
 double median(std::vector<double> values) {
   if (values.empty()) return 0;
   const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
   std::nth_element(values.begin(), middle, values.end());
   return *middle;
+}
+
+/// Ascending eigenvalues of a symmetric matrix.
+Eigen::Vector3d eigenvalues(const Eigen::Matrix3d& matrix) {
+  double values[3][3], vectors[3][3];
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < 3; ++j) values[i][j] = matrix(i, j);
+  jacobi_eigen<3, 8>(values, vectors);
+  Eigen::Vector3d out(values[0][0], values[1][1], values[2][2]);
+  std::sort(out.data(), out.data() + 3);
+  return out;
 }
 
 /// The finite points of a cloud, sorted along its longest side: neighbours within d are within d
@@ -38,19 +55,11 @@ class SortedCloud {
     for (std::size_t k = 0; k < view.size; ++k) {
       const Eigen::Vector3f p =
           Eigen::Map<const Eigen::Vector3f>(view.points + k * view.point_stride);
-      if (!p.allFinite()) continue;
-      points_.push_back(p);
-      box_.extend(p.cast<double>());
+      if (p.allFinite()) points_.push_back(p);
     }
-    if (points_.empty()) return;
-    box_.sizes().maxCoeff(&axis_);
-    // A total order: the order of equal coordinates must not depend on the sort of the library.
-    std::sort(points_.begin(), points_.end(),
-              [a = axis_](const Eigen::Vector3f& p, const Eigen::Vector3f& q) {
-                if (p[a] != q[a]) return p[a] < q[a];
-                return std::lexicographical_compare(p.data(), p.data() + 3, q.data(), q.data() + 3);
-              });
+    sort();
   }
+  explicit SortedCloud(std::vector<Eigen::Vector3f> points) : points_(std::move(points)) { sort(); }
 
   std::size_t size() const { return points_.size(); }
   double extent() const { return points_.empty() ? 0 : box_.sizes().maxCoeff(); }
@@ -76,51 +85,89 @@ class SortedCloud {
   double noise(double radius) const {
     std::vector<double> distances;
     for_sample(kNoiseSample, [&](std::size_t at) {
-      Eigen::Vector3d sum = Eigen::Vector3d::Zero();
-      Eigen::Matrix3d outer = Eigen::Matrix3d::Zero();
-      std::size_t count = 0;
-      const auto visit = [&](std::size_t k) {
-        const Eigen::Vector3d d = (points_[k] - points_[at]).cast<double>();
-        if (std::abs(d[axis_]) > radius) return false;
-        if (d.squaredNorm() <= radius * radius) {
-          sum += d;
-          outer += d * d.transpose();
-          ++count;
-        }
-        return true;
-      };
-      around(at, visit);
-      visit(at);
-      if (count < kMinPlanePoints) return;
-      const Eigen::Vector3d mean = sum / static_cast<double>(count);
-      const Eigen::Matrix3d covariance =
-          outer / static_cast<double>(count) - mean * mean.transpose();
-      double values[3][3], vectors[3][3];
-      for (int i = 0; i < 3; ++i)
-        for (int j = 0; j < 3; ++j) values[i][j] = covariance(i, j);
-      jacobi_eigen<3, 8>(values, vectors);
-      const double smallest = std::min({values[0][0], values[1][1], values[2][2]});
-      distances.push_back(std::sqrt(std::max(0.0, smallest)));
+      Eigen::Matrix3d covariance;
+      if (neighborhood(at, radius, covariance) < kMinPlanePoints) return;
+      distances.push_back(std::sqrt(std::max(0.0, eigenvalues(covariance)[0])));
     });
     return median(std::move(distances));
+  }
+
+  /// Share of a sample of points whose neighbourhood has an area.
+  double share_with_area(double radius) const {
+    std::size_t with = 0;
+    for_sample(kAreaSample, [&](std::size_t at) {
+      Eigen::Matrix3d covariance;
+      if (neighborhood(at, radius, covariance) < kMinAreaPoints) return;
+      const Eigen::Vector3d values = eigenvalues(covariance);
+      with += values[1] > kLeastWidth * values[2];
+    });
+    return static_cast<double>(with) /
+           static_cast<double>(std::max<std::size_t>(1, std::min(kAreaSample, points_.size())));
+  }
+
+  /// The centroids of the voxels.
+  SortedCloud downsampled(double size) const {
+    std::vector<std::pair<std::uint64_t, std::size_t>> order;
+    for (std::size_t k = 0; k < points_.size(); ++k) order.push_back({key_of(k, size), k});
+    std::sort(order.begin(), order.end());
+    std::vector<Eigen::Vector3f> out;
+    for (std::size_t first = 0, last = 0; first < order.size(); first = last) {
+      Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+      for (; last < order.size() && order[last].first == order[first].first; ++last)
+        sum += points_[order[last].second].cast<double>();
+      out.push_back((sum / static_cast<double>(last - first)).cast<float>());
+    }
+    return SortedCloud(std::move(out));
   }
 
   /// Number of voxels of prepare() with a point of the sample. most: of points in the sample.
   std::size_t occupied(double size, std::size_t most, std::vector<std::uint64_t>& keys) const {
     keys.clear();
-    const Eigen::Array3d first = (box_.min().array() / size).floor();
     const std::size_t step = points_.size() / most + 1;
-    for (std::size_t k = 0; k < points_.size(); k += step) {
-      const Eigen::Array3d cell = (points_[k].cast<double>().array() / size).floor() - first;
-      keys.push_back(static_cast<std::uint64_t>(cell.x()) << 42 |
-                     static_cast<std::uint64_t>(cell.y()) << 21 |
-                     static_cast<std::uint64_t>(cell.z()));
-    }
+    for (std::size_t k = 0; k < points_.size(); k += step) keys.push_back(key_of(k, size));
     std::sort(keys.begin(), keys.end());
     return static_cast<std::size_t>(std::unique(keys.begin(), keys.end()) - keys.begin());
   }
 
  private:
+  void sort() {
+    for (const Eigen::Vector3f& p : points_) box_.extend(p.cast<double>());
+    if (points_.empty()) return;
+    box_.sizes().maxCoeff(&axis_);
+    // A total order: the order of equal coordinates must not depend on the sort of the library.
+    std::sort(points_.begin(), points_.end(),
+              [a = axis_](const Eigen::Vector3f& p, const Eigen::Vector3f& q) {
+                if (p[a] != q[a]) return p[a] < q[a];
+                return std::lexicographical_compare(p.data(), p.data() + 3, q.data(), q.data() + 3);
+              });
+  }
+  std::uint64_t key_of(std::size_t k, double size) const {
+    const Eigen::Array3d first = (box_.min().array() / size).floor(),
+                         cell = (points_[k].cast<double>().array() / size).floor() - first;
+    return static_cast<std::uint64_t>(cell.x()) << 42 | static_cast<std::uint64_t>(cell.y()) << 21 |
+           static_cast<std::uint64_t>(cell.z());
+  }
+  /// Covariance of the points within the radius of a point, and their number.
+  std::size_t neighborhood(std::size_t at, double radius, Eigen::Matrix3d& covariance) const {
+    Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+    Eigen::Matrix3d outer = Eigen::Matrix3d::Zero();
+    std::size_t count = 0;
+    const auto visit = [&](std::size_t k) {
+      const Eigen::Vector3d d = (points_[k] - points_[at]).cast<double>();
+      if (std::abs(d[axis_]) > radius) return false;
+      if (d.squaredNorm() <= radius * radius) {
+        sum += d;
+        outer += d * d.transpose();
+        ++count;
+      }
+      return true;
+    };
+    around(at, visit);
+    visit(at);
+    const Eigen::Vector3d mean = sum / static_cast<double>(count);
+    covariance = outer / static_cast<double>(count) - mean * mean.transpose();
+    return count;
+  }
   template <typename Visit>
   void for_sample(std::size_t most, Visit&& visit) const {
     const std::size_t count = std::min(most, points_.size());
@@ -209,6 +256,15 @@ VoxelSizeSuggestion suggest_voxel_size(const std::vector<PointCloudView>& views)
   out.noise = noise_at(size);
   if (out.noise > kMaxNoise * size && points(size) > kMinPoints)
     size = std::min(out.noise / kMaxNoise, size_for(kMinPoints));
+  const auto share_with_area = [&](double s) {
+    return median_of(clouds, [&](const SortedCloud& cloud) {
+      return cloud.downsampled(s).share_with_area(kNormalRadius * s);
+    });
+  };
+  for (const double most = kMostGrowth * size;
+       size * kGrowth <= most && share_with_area(size) < kLeastShare &&
+       points(size * kGrowth) >= kFewestPoints;)
+    size *= kGrowth;
   size = rounded(size);
   out.voxel_size = static_cast<float>(size);
   out.points = static_cast<std::size_t>(points(size));
