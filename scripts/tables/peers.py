@@ -275,8 +275,8 @@ def object_peers():
 KINDS = {
     "LiDAR": (
         ("street16", "street32", "street64", "kitti", "lidar"),
-        "gpureg_coarse",
-        "`--voxel-size 0.8`",
+        "gpureg_up",
+        "`--voxel-size auto --up 0,0,1`",
     ),
     "terrestrial scanner": (("hall",), "gpureg", "`--voxel-size auto`"),
     "objects, range scanner": (
