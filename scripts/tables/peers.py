@@ -26,7 +26,13 @@ def made_with(record):
 
 
 # Global registration; benchmarks.md has the others, too.
-SHORT = ("gpureg_default", "gpureg_loopsmart", "open3d_ransac", "kiss_matcher_005", "kiss_matcher_010")
+SHORT = (
+    "gpureg_default",
+    "gpureg_loopsmart",
+    "open3d_ransac",
+    "kiss_matcher_005",
+    "kiss_matcher_010",
+)
 
 
 def peers():

@@ -33,14 +33,13 @@ GPUREG_HD std::uint32_t signed_byte(float unit) {
   return static_cast<std::uint32_t>(floor_to_int(unit * 127.0f + 0.5f)) & 0xffu;
 }
 
-/// Steps of the spread of a cell, from the least cosine, at most 1. The exact arc cosine is slow and decides
-/// only near a whole step.
+/// Steps of the spread of a cell, from the least cosine, at most 1. The exact arc cosine is slow
+/// and decides only near a whole step.
 GPUREG_HD int summary_step(float cosine) {
   constexpr float kNearStep = 1e-2f;
-  const float about =
-      (acosf(cosine < -1.0f ? -1.0f : cosine) / static_cast<float>(kDegrees) +
-       static_cast<float>(kSummaryQuantisation)) /
-      static_cast<float>(kSummaryAngleStep);
+  const float about = (acosf(cosine < -1.0f ? -1.0f : cosine) / static_cast<float>(kDegrees) +
+                       static_cast<float>(kSummaryQuantisation)) /
+                      static_cast<float>(kSummaryAngleStep);
   const float up = ceilf(about);
   int steps = static_cast<int>(up);
   if (!(up - about > kNearStep && up - about < 1.0f - kNearStep)) {

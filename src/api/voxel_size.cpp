@@ -261,9 +261,9 @@ VoxelSizeSuggestion suggest_voxel_size(const std::vector<PointCloudView>& views)
       return cloud.downsampled(s).share_with_area(kNormalRadius * s);
     });
   };
-  for (const double most = kMostGrowth * size;
-       size * kGrowth <= most && share_with_area(size) < kLeastShare &&
-       points(size * kGrowth) >= kFewestPoints;)
+  for (const double most = kMostGrowth * size; size * kGrowth <= most &&
+                                               share_with_area(size) < kLeastShare &&
+                                               points(size * kGrowth) >= kFewestPoints;)
     size *= kGrowth;
   size = rounded(size);
   out.voxel_size = static_cast<float>(size);

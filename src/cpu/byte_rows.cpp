@@ -88,8 +88,8 @@ std::vector<float> principal_axes(const std::vector<float>& rows, std::size_t di
   return axes;
 }
 
-/// A row as its coordinates along the axes, and at kAxes the length of the rest. Returns the largest
-/// error of this vector.
+/// A row as its coordinates along the axes, and at kAxes the length of the rest. Returns the
+/// largest error of this vector.
 GPUREG_BYTE_TARGET float shorten(const ByteRows& rows, const float* row, std::size_t stride,
                                  float* out) {
   const std::size_t dimension = rows.middle.size();
@@ -103,8 +103,7 @@ GPUREG_BYTE_TARGET float shorten(const ByteRows& rows, const float* row, std::si
   _mm512_storeu_ps(out, sum);
   double rest = squares;
   for (std::size_t a = 0; a < kAxes; ++a) rest -= static_cast<double>(out[a]) * out[a];
-  const double within = kRounding * 0.1 * squares,
-               high = std::sqrt(std::max(rest + within, 0.0)),
+  const double within = kRounding * 0.1 * squares, high = std::sqrt(std::max(rest + within, 0.0)),
                low = std::sqrt(std::max(rest - within, 0.0));
   out[kAxes] = static_cast<float>((high + low) / 2);
   return static_cast<float>((high - low) / 2 + kRounding * 0.1 * std::sqrt(squares));
@@ -147,8 +146,8 @@ GPUREG_BYTE_TARGET std::size_t place_of_largest(const std::int32_t* values, std:
   __m512i block = _mm512_setzero_si512();
   for (std::size_t k = 0; k < count; k += kLanes) {
     const __m512i value = _mm512_loadu_si512(values + k);
-    block = _mm512_mask_set1_epi32(block, _mm512_cmpgt_epi32_mask(value, most),
-                                   static_cast<int>(k));
+    block =
+        _mm512_mask_set1_epi32(block, _mm512_cmpgt_epi32_mask(value, most), static_cast<int>(k));
     most = _mm512_max_epi32(value, most);
   }
   const int largest = _mm512_reduce_max_epi32(most);
@@ -188,7 +187,8 @@ ByteRows byte_rows(const std::vector<float>& leaves, std::size_t dimension) {
       sum[k % leaf_values / kRows] += leaves[k + r];
       rows += k % leaf_values == 0;
     }
-  for (const double s : sum) out.middle.push_back(static_cast<float>(s / static_cast<double>(rows)));
+  for (const double s : sum)
+    out.middle.push_back(static_cast<float>(s / static_cast<double>(rows)));
   double length = 0;
   for (const float m : out.middle) length += static_cast<double>(m) * m;
   out.axes = principal_axes(sample(leaves, dimension, out.middle), dimension);
@@ -270,8 +270,7 @@ const std::vector<std::uint32_t>& LeafBounds::leaves_within(std::size_t query, f
   constexpr std::int32_t kAll = kMissing / 2;
   found_.resize(leaves_);
   found_.resize(places_from(bounds_.data() + query * leaves_, leaves_,
-                            least > kAll ? static_cast<std::int32_t>(least) : kAll,
-                            found_.data()));
+                            least > kAll ? static_cast<std::int32_t>(least) : kAll, found_.data()));
   return found_;
 }
 

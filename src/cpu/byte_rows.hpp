@@ -22,10 +22,10 @@ struct ByteRows {
 
   bool valid = false;  ///< false: values that do not fit, or no byte products
   float scale = 0;
-  float error = 0;            ///< largest error of a row, in units of the values
-  std::vector<float> middle;  ///< of the rows, per dimension
-  std::vector<float> axes;    ///< dimension, axis; 16 floats to a dimension
-  float lowest[16] = {};      ///< of the coordinates
+  float error = 0;                   ///< largest error of a row, in units of the values
+  std::vector<float> middle;         ///< of the rows, per dimension
+  std::vector<float> axes;           ///< dimension, axis; 16 floats to a dimension
+  float lowest[16] = {};             ///< of the coordinates
   std::vector<std::uint8_t> values;  ///< per 16 leaves: row of the leaf, word, leaf, coordinate
   std::vector<std::int32_t> start;   ///< per 16 leaves: row of the leaf, leaf
 };

@@ -117,7 +117,7 @@ CellSummaries summarize_cells(const ClosestGrid& closest, float search_distance,
 namespace {
 
 void locate_cells_narrow(const ScoringOrder& order, std::size_t first, const Rigid& pose,
-                  const CellSummaries& v, std::int32_t* cells) {
+                         const CellSummaries& v, std::int32_t* cells) {
   // The pose in cells of the table. Its rounding differs from that of apply() by a small part of a
   // cell, which the margin of the closest-point grid covers.
   const float s = v.inverse_cell_size;
@@ -274,8 +274,7 @@ GPUREG_WIDE_TARGET PointBounds bound_inliers_wide(const ScoringOrder& order, std
     const __m512 far = _mm512_set1_ps(3.0f);
     const __m512 below = _mm512_mask_i32gather_ps(far, some, code, limits.none_below, 4),
                  above = _mm512_mask_i32gather_ps(far, some, code, limits.all_above, 4);
-    out.possible |=
-        static_cast<std::uint64_t>(_mm512_cmp_ps_mask(cosine, below, _CMP_GE_OQ)) << k;
+    out.possible |= static_cast<std::uint64_t>(_mm512_cmp_ps_mask(cosine, below, _CMP_GE_OQ)) << k;
     out.certain |= static_cast<std::uint64_t>(_mm512_cmp_ps_mask(cosine, above, _CMP_GE_OQ)) << k;
   }
   return out;
@@ -296,8 +295,7 @@ PointBounds bound_inliers(const ScoringOrder& order, std::size_t first, const Ri
                           const CellSummaries& summaries, const SummaryLimits& limits,
                           const std::int32_t* cells) {
 #ifdef GPUREG_WIDE_TARGET
-  if (has_wide_vectors())
-    return bound_inliers_wide(order, first, pose, summaries, limits, cells);
+  if (has_wide_vectors()) return bound_inliers_wide(order, first, pose, summaries, limits, cells);
 #endif
   return bound_inliers_narrow(order, first, pose, summaries, limits, cells);
 }

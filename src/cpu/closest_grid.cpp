@@ -54,8 +54,8 @@ constexpr std::size_t kLanes = 16;
 /// Squared distances of points to a location, 16 at a time. Both kinds round alike.
 struct NarrowLanes {
   /// Writes d2 and returns the least; size: a multiple of 16.
-  static float measure(const float* x, const float* y, const float* z, std::size_t size, Vec3 center,
-                       float* d2) {
+  static float measure(const float* x, const float* y, const float* z, std::size_t size,
+                       Vec3 center, float* d2) {
     float least[kLanes];
     for (float& l : least) l = std::numeric_limits<float>::max();
     for (std::size_t k = 0; k < size; k += kLanes)
@@ -70,7 +70,8 @@ struct NarrowLanes {
   /// Bits of the 16 values that are at most `most`.
   static std::uint32_t within(const float* d2, float most) {
     std::uint32_t mask = 0;
-    for (std::uint32_t l = 0; l < kLanes; ++l) mask |= static_cast<std::uint32_t>(d2[l] <= most) << l;
+    for (std::uint32_t l = 0; l < kLanes; ++l)
+      mask |= static_cast<std::uint32_t>(d2[l] <= most) << l;
     return mask;
   }
   /// Bits of the 16 points that dominated_in_cell() does not rule out. nearest2: of best.
@@ -199,8 +200,8 @@ GPUREG_ALWAYS_INLINE void fill_block(NearPoints& near, Cell block, const Closest
     const int x = part % kParts * kPart, y = part / kParts % kParts * kPart,
               z = part / (kParts * kParts) * kPart;
     const Cell corner{block.x * kEdge + x, block.y * kEdge + y, block.z * kEdge + z};
-    const Vec3 middle = cell_center(corner, g.cell_size) +
-                        Vec3{0.5f, 0.5f, 0.5f} * (part_edge - g.cell_size);
+    const Vec3 middle =
+        cell_center(corner, g.cell_size) + Vec3{0.5f, 0.5f, 0.5f} * (part_edge - g.cell_size);
     const float nearest = std::sqrt(near.measure<Lanes>(middle));
     if (!can_reach_cell((nearest - offset) / slack - g.margin, g)) continue;
     // A candidate of a cell is within candidate_limit() of the centre of the cell, whose nearest

@@ -24,7 +24,7 @@ struct FeatureIndex {
   std::vector<float>
       leaf_boxes;  ///< node, dimension, lower ends of its 8 leaves and then the upper ones
   std::vector<float> node_boxes;  ///< the same, 8 nodes to a block
-  ByteRows bytes;  ///< of the values
+  ByteRows bytes;                 ///< of the values
 };
 
 FeatureIndex index_features(FeatureRows rows);

@@ -52,8 +52,8 @@ void box_bounds(const float* query, const float* const* boxes, std::size_t dimen
 /// Squared distances to the 16 rows of each of two leaves, each a chain of fmaf in ascending order
 /// of the dimensions. Returns a mask of the nearest rows, all at the same distance. 0, and no
 /// distances, where that exceeds `most`; half of the dimensions may show it already.
-std::uint64_t leaf_distances(const float* query, const float* const* leaf, std::size_t dimension, float most,
-                    float (*out)[kLeaf]) {
+std::uint64_t leaf_distances(const float* query, const float* const* leaf, std::size_t dimension,
+                             float most, float (*out)[kLeaf]) {
   const std::size_t half = dimension / 2;
 #if defined(__AVX2__) && defined(__FMA__)
   __m256 sum[4];
@@ -81,8 +81,8 @@ std::uint64_t leaf_distances(const float* query, const float* const* leaf, std::
   std::uint64_t mask = 0;
   for (int k = 0; k < 4; ++k) {
     _mm256_storeu_ps(out[k / 2] + k % 2 * 8, sum[k]);
-    mask |= static_cast<std::uint64_t>(_mm256_movemask_ps(
-                _mm256_cmp_ps(sum[k], _mm256_set1_ps(nearest), _CMP_EQ_OQ)))
+    mask |= static_cast<std::uint64_t>(
+                _mm256_movemask_ps(_mm256_cmp_ps(sum[k], _mm256_set1_ps(nearest), _CMP_EQ_OQ)))
             << 8 * k;
   }
   return mask;
@@ -263,9 +263,9 @@ class Search {
     for (int k = 0; k < kTogether; ++k)
       values[k] = index_.values.data() + leaf[std::min(k, count - 1)] * kLeaf * index_.dimension;
 #ifdef GPUREG_WIDE_TARGET
-    std::uint64_t near = wide_
-                             ? leaf_distances_wide(query_, values, index_.dimension, best_, distances)
-                             : leaf_distances(query_, values, index_.dimension, best_, distances);
+    std::uint64_t near =
+        wide_ ? leaf_distances_wide(query_, values, index_.dimension, best_, distances)
+              : leaf_distances(query_, values, index_.dimension, best_, distances);
 #else
     std::uint64_t near = leaf_distances(query_, values, index_.dimension, best_, distances);
 #endif

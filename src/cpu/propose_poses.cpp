@@ -88,8 +88,7 @@ struct Members {
 
 /// Least-squares fit to the members that the pose aligns; false where they do not determine a pose.
 template <typename Mask>
-GPUREG_ALWAYS_INLINE bool refit(const Members& members, float squared_distance,
-                                Pose<float>& pose) {
+GPUREG_ALWAYS_INLINE bool refit(const Members& members, float squared_distance, Pose<float>& pose) {
   const Rigid rigid = to_rigid(pose);
   Vec3 p[limits::kMaxMembers], q[limits::kMaxMembers];
   std::uint8_t flag[kBlock] = {};

@@ -16,12 +16,10 @@
 #endif
 /// The same with products of bytes.
 #ifdef __clang__
-#define GPUREG_BYTE_TARGET \
-  __attribute__((target("avx512f,avx512vl,avx512bw,avx512dq,avx512vnni")))
+#define GPUREG_BYTE_TARGET __attribute__((target("avx512f,avx512vl,avx512bw,avx512dq,avx512vnni")))
 #else
-#define GPUREG_BYTE_TARGET     \
-  __attribute__((               \
-      target("avx512f,avx512vl,avx512bw,avx512dq,avx512vnni,prefer-vector-width=512")))
+#define GPUREG_BYTE_TARGET \
+  __attribute__((target("avx512f,avx512vl,avx512bw,avx512dq,avx512vnni,prefer-vector-width=512")))
 #endif
 #endif
 #ifdef GPUREG_WIDE_TARGET
@@ -68,7 +66,8 @@ inline bool narrow_vectors_only() {
 /// Whether the build has functions for vectors of 16 floats (AVX-512), and the processor runs them.
 inline bool has_wide_vectors() {
 #ifdef GPUREG_WIDE_TARGET
-  static const bool has = !narrow_vectors_only() && __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512vl") &&
+  static const bool has = !narrow_vectors_only() && __builtin_cpu_supports("avx512f") &&
+                          __builtin_cpu_supports("avx512vl") &&
                           __builtin_cpu_supports("avx512bw") && __builtin_cpu_supports("avx512dq");
   return has;
 #else

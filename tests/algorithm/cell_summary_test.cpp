@@ -75,8 +75,8 @@ TEST(CellSummary, StepsAreThoseOfTheExactArcCosine) {
     ASSERT_EQ(summary_step(static_cast<float>(k) / 1100.0f), exact(static_cast<float>(k) / 1100.0f))
         << k;
   for (int step = 1; step < kSummaryNoBound; ++step) {
-    float cosine = static_cast<float>(
-        std::cos((step * kSummaryAngleStep - kSummaryQuantisation) * kDegrees));
+    float cosine =
+        static_cast<float>(std::cos((step * kSummaryAngleStep - kSummaryQuantisation) * kDegrees));
     for (int k = 0; k < 40; ++k) cosine = std::nextafter(cosine, -2.0f);
     for (int k = 0; k < 80; ++k, cosine = std::nextafter(cosine, 2.0f))
       ASSERT_EQ(summary_step(cosine), exact(cosine)) << step << " " << cosine;

@@ -85,8 +85,8 @@ TEST(VoxelSize, ExceedsTheGapsBetweenRings) {
   // Of the points on the nearest quarter of the ground, which has rings up to 2 m apart.
   const Context context = Context::cpu(2);
   const auto share = [&](float size) {
-    const PreparedCloud cloud = prepare(context, PointCloudView(few),
-                                        RegistrationOptions::from_voxel_size(size).prepare);
+    const PreparedCloud cloud =
+        prepare(context, PointCloudView(few), RegistrationOptions::from_voxel_size(size).prepare);
     std::size_t upright = 0, near = 0;
     const auto points = cloud.points(), normals = cloud.normals();
     for (std::size_t k = 0; k < points.size(); ++k) {
