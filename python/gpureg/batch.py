@@ -255,6 +255,8 @@ class _Workers:
             threading.Thread(target=self._work, args=(context,)) for context in self._contexts
         ]
         with batch_progress(progress, "aligning", len(self._plan.pairs), self._done) as report:
+            if report is not None:
+                report(self._done, self._note())
             for thread in threads:
                 thread.start()
             try:

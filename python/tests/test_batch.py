@@ -204,7 +204,7 @@ def test_progress_moves_within_a_chunk(tmp_path):
     run = gpureg.register_all(
         many.fragments()[:9],
         output=tmp_path,
-        options=few(800_000, 0.08),
+        options=few(4_000_000, 0.08),
         contexts=[gpureg.Context.cpu(1)],
         progress=lambda done, total: seen.append(done),
     )

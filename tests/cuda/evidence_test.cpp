@@ -198,12 +198,12 @@ void EvidenceOnCuda::expect_same(const std::vector<RawCloud>& clouds) {
   auto cuda_perturbed = cuda::modes_from_poses(on_cuda, perturbations);
   cpu::drop_returned(on_cpu, perturbed, perturbations);
   cuda::drop_returned(on_cuda, cuda_perturbed, perturbations);
-  const auto kept = host(on_cuda, cuda_perturbed.count.data(), count);
+  const auto left = host(on_cuda, cuda_perturbed.count.data(), count);
   for (std::size_t p = 0; p < count; ++p) {
-    ASSERT_EQ(perturbed[p].size(), kept[p]) << "perturbed poses, pair " << p;
+    ASSERT_EQ(perturbed[p].size(), left[p]) << "perturbed poses, pair " << p;
     ASSERT_EQ(
         mode_bytes(perturbed[p]),
-        mode_bytes(host(on_cuda, cuda_perturbed.mode.data() + p * cuda_perturbed.most, kept[p])));
+        mode_bytes(host(on_cuda, cuda_perturbed.mode.data() + p * cuda_perturbed.most, left[p])));
   }
 
   std::vector<PairOutcome> outcomes(count), cuda_outcomes(count);
