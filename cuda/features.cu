@@ -29,11 +29,12 @@ __global__ void normals_in_cell_order(const std::uint32_t* offset, const GridVie
 }
 
 /// Simplified histograms: a warp per point, a lane per neighbour; the counts are integers, so their
-/// order is free.
+/// order is free. Neighbours wait in a queue until there is one for every lane: less than half of the
+/// points of the cells are near.
 __global__ void __launch_bounds__(32 * kWarps)
     simplified_histograms(FpfhBatch f, const Vec3* sorted_normals) {
   __shared__ std::uint32_t counts[kWarps][kFpfhSize];
-  __shared__ std::uint32_t queue[kWarps][64];  // less than half of the points of the cells are near
+  __shared__ std::uint32_t queue[kWarps][64];
   const std::uint32_t c = blockIdx.y, begin = f.offset[c], size = f.offset[c + 1] - begin;
   const int warp = static_cast<int>(threadIdx.x / 32), lane = static_cast<int>(threadIdx.x % 32);
   const std::uint32_t i = blockIdx.x * kWarps + static_cast<std::uint32_t>(warp);
@@ -80,7 +81,7 @@ struct Neighbor {
   float weight;
 };
 
-/// FPFH: a warp per point, a lane per bin (lane 0 has the 33rd too), neighbours in order.
+/// FPFH: a warp per point, a lane per bin (all lanes have the 33rd too), neighbours in order.
 __global__ void __launch_bounds__(32 * kWarps)
     weighted_histograms(FpfhBatch f, const Vec3* sorted_normals) {
   __shared__ float histogram[kWarps][kFpfhSize];
@@ -98,7 +99,7 @@ __global__ void __launch_bounds__(32 * kWarps)
     const auto add = [&](Neighbor neighbor) {
       const float* row = rows + static_cast<std::size_t>(neighbor.place) * kFpfhSize;
       sum = fmaf(neighbor.weight, row[lane], sum);
-      last = fmaf(neighbor.weight, row[32], last);  // of all lanes, which is one read
+      last = fmaf(neighbor.weight, row[32], last);  // the same for all lanes: one read
     };
     int queued = 0;
     for_each_neighbor_warp(grid, p, f.radius, [&](std::uint32_t k, float d2, bool inside) {

@@ -7,7 +7,6 @@
 #include <numeric>
 
 #include "cpu/radix_sort.hpp"
-#include "cpu/wide_vectors.hpp"
 
 #if defined(__AVX2__) && defined(__FMA__)
 #include <immintrin.h>
@@ -114,10 +113,9 @@ CellSummaries summarize_cells(const ClosestGrid& closest, float search_distance,
 }
 
 #if defined(__AVX2__) && defined(__FMA__)
-namespace {
 
-void locate_cells_narrow(const ScoringOrder& order, std::size_t first, const Rigid& pose,
-                         const CellSummaries& v, std::int32_t* cells) {
+void locate_cells(const ScoringOrder& order, std::size_t first, const Rigid& pose,
+                  const CellSummaries& v, std::int32_t* cells) {
   // The pose in cells of the table. Its rounding differs from that of apply() by a small part of a
   // cell, which the margin of the closest-point grid covers.
   const float s = v.inverse_cell_size;
@@ -167,9 +165,9 @@ void locate_cells_narrow(const ScoringOrder& order, std::size_t first, const Rig
     _mm_prefetch(reinterpret_cast<const char*>(v.summary.data() + cells[k]), _MM_HINT_T0);
 }
 
-PointBounds bound_inliers_narrow(const ScoringOrder& order, std::size_t first, const Rigid& pose,
-                                 const CellSummaries& v, const SummaryLimits& limits,
-                                 const std::int32_t* cells) {
+PointBounds bound_inliers(const ScoringOrder& order, std::size_t first, const Rigid& pose,
+                          const CellSummaries& v, const SummaryLimits& limits,
+                          const std::int32_t* cells) {
   PointBounds out{0, 0};
   __m256 r[9];
   for (int k = 0; k < 9; ++k) r[k] = _mm256_set1_ps(pose.r[k] * (1.0f / 127.0f));
@@ -199,105 +197,6 @@ PointBounds bound_inliers_narrow(const ScoringOrder& order, std::size_t first, c
     out.certain |= static_cast<std::uint64_t>(certain) << k;
   }
   return out;
-}
-
-#ifdef GPUREG_WIDE_TARGET
-/// The same operations on 16 points at a time.
-GPUREG_WIDE_TARGET void locate_cells_wide(const ScoringOrder& order, std::size_t first,
-                                          const Rigid& pose, const CellSummaries& v,
-                                          std::int32_t* cells) {
-  const float s = v.inverse_cell_size;
-  __m512 r[9], t[3];
-  const float offset[3] = {v.offset.x, v.offset.y, v.offset.z};
-  for (int k = 0; k < 9; ++k) r[k] = _mm512_set1_ps(pose.r[k] * s);
-  for (int k = 0; k < 3; ++k) t[k] = _mm512_set1_ps(pose.t[k] * s + offset[k]);
-  const __m512i nx = _mm512_set1_epi32(v.nx), ny = _mm512_set1_epi32(v.ny),
-                nz = _mm512_set1_epi32(v.nz);
-  const __m512i seven = _mm512_set1_epi32(7);
-  for (int k = 0; k < 64; k += 16) {
-    const __m512 x = _mm512_loadu_ps(order.x.data() + first + k),
-                 y = _mm512_loadu_ps(order.y.data() + first + k),
-                 z = _mm512_loadu_ps(order.z.data() + first + k);
-    const __m512 fx =
-        _mm512_fmadd_ps(r[2], z, _mm512_fmadd_ps(r[1], y, _mm512_fmadd_ps(r[0], x, t[0])));
-    const __m512 fy =
-        _mm512_fmadd_ps(r[5], z, _mm512_fmadd_ps(r[4], y, _mm512_fmadd_ps(r[3], x, t[1])));
-    const __m512 fz =
-        _mm512_fmadd_ps(r[8], z, _mm512_fmadd_ps(r[7], y, _mm512_fmadd_ps(r[6], x, t[2])));
-    const __m512i ix = _mm512_cvt_roundps_epi32(fx, _MM_FROUND_TO_NEG_INF | _MM_FROUND_NO_EXC),
-                  iy = _mm512_cvt_roundps_epi32(fy, _MM_FROUND_TO_NEG_INF | _MM_FROUND_NO_EXC),
-                  iz = _mm512_cvt_roundps_epi32(fz, _MM_FROUND_TO_NEG_INF | _MM_FROUND_NO_EXC);
-    const __m512i bx = _mm512_srai_epi32(ix, 3), by = _mm512_srai_epi32(iy, 3),
-                  bz = _mm512_srai_epi32(iz, 3);
-    // Negative coordinates are large without a sign.
-    const __mmask16 inside = _mm512_cmplt_epu32_mask(bx, nx) & _mm512_cmplt_epu32_mask(by, ny) &
-                             _mm512_cmplt_epu32_mask(bz, nz);
-    const __m512i at = _mm512_add_epi32(
-        _mm512_mullo_epi32(_mm512_add_epi32(_mm512_mullo_epi32(bz, ny), by), nx), bx);
-    const __m512i block =
-        _mm512_mask_i32gather_epi32(_mm512_setzero_si512(), inside, at, v.block.data(), 4);
-    const __m512i cell =
-        _mm512_or_si512(_mm512_or_si512(_mm512_slli_epi32(block, 9),
-                                        _mm512_slli_epi32(_mm512_and_si512(iz, seven), 6)),
-                        _mm512_or_si512(_mm512_slli_epi32(_mm512_and_si512(iy, seven), 3),
-                                        _mm512_and_si512(ix, seven)));
-    _mm512_storeu_si512(cells + k, cell);
-  }
-  for (int k = 0; k < 64; ++k)
-    _mm_prefetch(reinterpret_cast<const char*>(v.summary.data() + cells[k]), _MM_HINT_T0);
-}
-
-GPUREG_WIDE_TARGET PointBounds bound_inliers_wide(const ScoringOrder& order, std::size_t first,
-                                                  const Rigid& pose, const CellSummaries& v,
-                                                  const SummaryLimits& limits,
-                                                  const std::int32_t* cells) {
-  PointBounds out{0, 0};
-  __m512 r[9];
-  for (int k = 0; k < 9; ++k) r[k] = _mm512_set1_ps(pose.r[k] * (1.0f / 127.0f));
-  for (int k = 0; k < 64; k += 16) {
-    const __m512i cell = _mm512_loadu_si512(cells + k);
-    const __m512i word = _mm512_i32gather_epi32(cell, v.summary.data(), 4);
-    const __m512 mx = _mm512_cvtepi32_ps(_mm512_srai_epi32(_mm512_slli_epi32(word, 24), 24)),
-                 my = _mm512_cvtepi32_ps(_mm512_srai_epi32(_mm512_slli_epi32(word, 16), 24)),
-                 mz = _mm512_cvtepi32_ps(_mm512_srai_epi32(_mm512_slli_epi32(word, 8), 24));
-    const __m512 sx = _mm512_fmadd_ps(r[6], mz, _mm512_fmadd_ps(r[3], my, _mm512_mul_ps(r[0], mx)));
-    const __m512 sy = _mm512_fmadd_ps(r[7], mz, _mm512_fmadd_ps(r[4], my, _mm512_mul_ps(r[1], mx)));
-    const __m512 sz = _mm512_fmadd_ps(r[8], mz, _mm512_fmadd_ps(r[5], my, _mm512_mul_ps(r[2], mx)));
-    const __m512 cosine = _mm512_fmadd_ps(
-        _mm512_loadu_ps(order.nz.data() + first + k), sz,
-        _mm512_fmadd_ps(_mm512_loadu_ps(order.ny.data() + first + k), sy,
-                        _mm512_mul_ps(_mm512_loadu_ps(order.nx.data() + first + k), sx)));
-    // Most cells are empty (code 0), and their limits are above all cosines.
-    const __m512i code = _mm512_srli_epi32(word, 24);
-    const __mmask16 some = _mm512_test_epi32_mask(word, word);
-    if (some == 0) continue;
-    const __m512 far = _mm512_set1_ps(3.0f);
-    const __m512 below = _mm512_mask_i32gather_ps(far, some, code, limits.none_below, 4),
-                 above = _mm512_mask_i32gather_ps(far, some, code, limits.all_above, 4);
-    out.possible |= static_cast<std::uint64_t>(_mm512_cmp_ps_mask(cosine, below, _CMP_GE_OQ)) << k;
-    out.certain |= static_cast<std::uint64_t>(_mm512_cmp_ps_mask(cosine, above, _CMP_GE_OQ)) << k;
-  }
-  return out;
-}
-#endif
-
-}  // namespace
-
-void locate_cells(const ScoringOrder& order, std::size_t first, const Rigid& pose,
-                  const CellSummaries& summaries, std::int32_t* cells) {
-#ifdef GPUREG_WIDE_TARGET
-  if (has_wide_vectors()) return locate_cells_wide(order, first, pose, summaries, cells);
-#endif
-  locate_cells_narrow(order, first, pose, summaries, cells);
-}
-
-PointBounds bound_inliers(const ScoringOrder& order, std::size_t first, const Rigid& pose,
-                          const CellSummaries& summaries, const SummaryLimits& limits,
-                          const std::int32_t* cells) {
-#ifdef GPUREG_WIDE_TARGET
-  if (has_wide_vectors()) return bound_inliers_wide(order, first, pose, summaries, limits, cells);
-#endif
-  return bound_inliers_narrow(order, first, pose, summaries, limits, cells);
 }
 
 #else
