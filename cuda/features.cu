@@ -29,8 +29,8 @@ __global__ void normals_in_cell_order(const std::uint32_t* offset, const GridVie
 }
 
 /// Simplified histograms: a warp per point, a lane per neighbour; the counts are integers, so their
-/// order is free. Neighbours wait in a queue until there is one for every lane: less than half of the
-/// points of the cells are near.
+/// order is free. Neighbours wait in a queue until there is one for every lane: less than half of
+/// the points of the cells are near.
 __global__ void __launch_bounds__(32 * kWarps)
     simplified_histograms(FpfhBatch f, const Vec3* sorted_normals) {
   __shared__ std::uint32_t counts[kWarps][kFpfhSize];
