@@ -3,27 +3,57 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
+#include <limits>
 #include <numeric>
-#include <thread>
 #include <utility>
 
-#include "algorithm/cell.hpp"
-#include "common/host_threads.hpp"
+#include "common/radix_sort.hpp"
 
 namespace gpureg {
 namespace {
 
-/// Nearest neighbours of each point that become edges.
-constexpr std::size_t kNeighbors = 12;
 /// Largest number of edges that contradiction() reads; a share of so many is good to 0.1 %.
 constexpr std::size_t kCountedEdges = 40'000;
-/// Points from which another thread is worth its start, and the most threads.
-constexpr std::size_t kPointsPerThread = 50'000, kMostThreads = 8;
+/// Viewpoints that are compared with an edge at once, and edges whose weights are summed as float.
+constexpr std::size_t kLanes = 8, kFloatSums = 64;
 /// Below this cosine two neighbours lie on different surfaces and tell nothing about each other.
 constexpr float kSameSurface = 0.5f;
 
-double weight_of(float cosine) {
-  return std::fabs(cosine) < kSameSurface ? 0.0 : static_cast<double>(cosine) * cosine;
+float weight_of(float cosine) { return std::fabs(cosine) < kSameSurface ? 0.0f : cosine * cosine; }
+
+std::uint32_t bits_of(float value) {
+  std::uint32_t bits;
+  std::memcpy(&bits, &value, sizeof bits);
+  return bits;
+}
+
+/// One number for each of several viewpoints. The loops over them become vector instructions.
+struct alignas(32) Lanes {
+  float of[kLanes];
+};
+
+/// Cosines of the angles between a normal and the directions to the viewpoints; 0 at the point.
+Lanes cosines_towards(Vec3 point, Vec3 normal, const Lanes& x, const Lanes& y, const Lanes& z) {
+  Lanes out;
+#pragma omp simd
+  for (std::size_t l = 0; l < kLanes; ++l) {
+    const float dx = x.of[l] - point.x, dy = y.of[l] - point.y, dz = z.of[l] - point.z;
+    const float squared = std::max(dx * dx + dy * dy + dz * dz, std::numeric_limits<float>::min());
+    out.of[l] = (normal.x * dx + normal.y * dy + normal.z * dz) / std::sqrt(squared);
+  }
+  return out;
+}
+
+/// Adds the weight of an edge, and the same, negative where its ends show different sides.
+void add_edge(const Lanes& a, const Lanes& b, float weight, Lanes& all, Lanes& signed_sum) {
+  const float size = std::fabs(weight);
+#pragma omp simd
+  for (std::size_t l = 0; l < kLanes; ++l) {
+    const float here = size * std::min(std::fabs(a.of[l]), std::fabs(b.of[l]));
+    all.of[l] += here;
+    signed_sum.of[l] += std::copysign(here, a.of[l] * b.of[l] * weight);
+  }
 }
 
 double share(double part, double whole) { return whole > 0 ? part / whole : 0.0; }
@@ -66,101 +96,71 @@ class SignedSets {
 
 }  // namespace
 
-SurfaceGraph::SurfaceGraph(std::vector<Vec3> points, std::vector<Vec3> normals, float radius)
+SurfaceGraph::SurfaceGraph(std::vector<Vec3> points, std::vector<Vec3> normals, float radius,
+                           std::size_t threads)
     : points_(std::move(points)), normals_(std::move(normals)), radius_(radius) {
-  add_edges(radius);
+  edges_ = surface_edges(points_, normals_, radius, threads);
   choose_counted();
 }
 
 void SurfaceGraph::choose_counted() {
   const std::size_t stride = std::max<std::size_t>(1, edges_.size() / kCountedEdges);
-  for (std::size_t k = 0; k < edges_.size(); k += stride) counted_.push_back(edges_[k]);
+  for (std::size_t k = 0; k < edges_.size(); k += stride) {
+    const SurfaceEdge& e = edges_[k];
+    const float weight = weight_of(e.cosine);
+    if (weight > 0) counted_.push_back({e.a, e.b, std::copysign(weight, e.cosine)});
+  }
   // A viewpoint is compared with the ends of these edges alone: in a large map hardly any points.
   std::vector<std::uint32_t> place(points_.size(), 0);
-  for (const Edge& e : counted_) place[e.a] = place[e.b] = 1;
+  for (const CountedEdge& e : counted_) place[e.a] = place[e.b] = 1;
   for (std::uint32_t i = 0; i < points_.size(); ++i) {
     if (place[i] == 0) continue;
     place[i] = static_cast<std::uint32_t>(counted_ends_.size());
     counted_ends_.push_back(i);
   }
-  for (Edge& e : counted_) {
+  for (CountedEdge& e : counted_) {
     e.a = place[e.a];
     e.b = place[e.b];
   }
 }
 
-void SurfaceGraph::add_edges(float radius) {
-  const float inverse = 1.0f / radius;
-  std::vector<std::pair<std::uint64_t, std::uint32_t>> cells;
-  for (std::uint32_t i = 0; i < points_.size(); ++i)
-    if (!is_zero(normals_[i])) cells.emplace_back(cell_key(cell_of(points_[i], inverse)), i);
-  std::sort(cells.begin(), cells.end());
-  // The edges are sorted below: their order does not depend on the number of threads.
-  const std::size_t threads = std::clamp<std::size_t>(
-      std::min<std::size_t>(std::thread::hardware_concurrency(), cells.size() / kPointsPerThread),
-      1, kMostThreads);
-  std::vector<std::vector<Edge>> found(threads);
-  on_threads(threads, [&](std::size_t thread) {
-    std::vector<std::pair<float, std::uint32_t>> nearest;
-    const std::size_t end = (thread + 1) * cells.size() / threads;
-    for (std::size_t at = thread * cells.size() / threads; at < end; ++at) {
-      const auto& [key, i] = cells[at];
-      nearest.clear();
-      const Cell cell = cell_from_key(key);
-      for (std::int32_t z = cell.z - 1; z <= cell.z + 1; ++z)
-        for (std::int32_t y = cell.y - 1; y <= cell.y + 1; ++y) {
-          // Cells of one row have consecutive keys.
-          const std::uint64_t first = cell_key({cell.x - 1, y, z});
-          for (auto other = std::lower_bound(cells.begin(), cells.end(),
-                                             std::make_pair(first, std::uint32_t(0)));
-               other != cells.end() && other->first <= first + 2; ++other) {
-            const float d2 = squared_norm(points_[other->second] - points_[i]);
-            if (other->second != i && d2 <= radius * radius)
-              nearest.emplace_back(d2, other->second);
-          }
-        }
-      const std::size_t kept = std::min(kNeighbors, nearest.size());
-      std::partial_sort(nearest.begin(), nearest.begin() + static_cast<std::ptrdiff_t>(kept),
-                        nearest.end());
-      for (std::size_t k = 0; k < kept; ++k) {
-        const std::uint32_t j = nearest[k].second;
-        found[thread].push_back({std::min(i, j), std::max(i, j), dot(normals_[i], normals_[j])});
+std::vector<double> SurfaceGraph::contradictions(const std::vector<Vec3>& viewpoints) const {
+  std::vector<double> shares;
+  std::vector<Lanes> towards(counted_ends_.size());
+  for (std::size_t first = 0; first < viewpoints.size(); first += kLanes) {
+    const std::size_t count = std::min(kLanes, viewpoints.size() - first);
+    Lanes x, y, z;
+    for (std::size_t l = 0; l < kLanes; ++l) {
+      const Vec3& viewpoint = viewpoints[first + std::min(l, count - 1)];
+      x.of[l] = viewpoint.x;
+      y.of[l] = viewpoint.y;
+      z.of[l] = viewpoint.z;
+    }
+    for (std::size_t k = 0; k < counted_ends_.size(); ++k)
+      towards[k] = cosines_towards(points_[counted_ends_[k]], normals_[counted_ends_[k]], x, y, z);
+    double bad[kLanes] = {0}, all[kLanes] = {0};
+    for (std::size_t begin = 0; begin < counted_.size(); begin += kFloatSums) {
+      Lanes all_here{}, signed_here{};
+      for (std::size_t k = begin; k < std::min(begin + kFloatSums, counted_.size()); ++k)
+        add_edge(towards[counted_[k].a], towards[counted_[k].b], counted_[k].weight, all_here,
+                 signed_here);
+      for (std::size_t l = 0; l < kLanes; ++l) {
+        bad[l] += 0.5 * static_cast<double>(all_here.of[l] - signed_here.of[l]);
+        all[l] += static_cast<double>(all_here.of[l]);
       }
     }
-  });
-  for (const std::vector<Edge>& part : found) edges_.insert(edges_.end(), part.begin(), part.end());
-  const auto before = [](const Edge& a, const Edge& b) {
-    return a.a != b.a ? a.a < b.a : a.b < b.b;
-  };
-  std::sort(edges_.begin(), edges_.end(), before);
-  edges_.erase(std::unique(edges_.begin(), edges_.end(),
-                           [](const Edge& a, const Edge& b) { return a.a == b.a && a.b == b.b; }),
-               edges_.end());
-}
-
-double SurfaceGraph::contradiction(Vec3 viewpoint) const {
-  std::vector<float> towards(counted_ends_.size());
-  for (std::size_t k = 0; k < counted_ends_.size(); ++k) {
-    const std::uint32_t i = counted_ends_[k];
-    towards[k] = dot(normals_[i], normalized_or_zero(viewpoint - points_[i]));
+    for (std::size_t l = 0; l < count; ++l) shares.push_back(share(bad[l], all[l]));
   }
-  double bad = 0, all = 0;
-  for (const Edge& e : counted_) {
-    const float a = towards[e.a], b = towards[e.b];
-    const double weight =
-        weight_of(e.cosine) * static_cast<double>(std::min(std::fabs(a), std::fabs(b)));
-    all += weight;
-    if ((a < 0) != ((b < 0) != (e.cosine < 0))) bad += weight;
-  }
-  return share(bad, all);
+  return shares;
 }
 
 double SurfaceGraph::contradiction(const Signs& signs) const {
   double bad = 0, all = 0;
-  for (const Edge& e : counted_) {
+  for (const CountedEdge& e : counted_) {
     const bool opposite = signs[counted_ends_[e.a]] != signs[counted_ends_[e.b]];
-    all += weight_of(e.cosine);
-    if (opposite != (e.cosine < 0)) bad += weight_of(e.cosine);
+    const auto weight = static_cast<double>(std::fabs(e.weight));
+    all += weight;
+    if (opposite != (e.weight < 0)) bad += weight;
   }
   return share(bad, all);
 }
@@ -173,12 +173,16 @@ SurfaceGraph::Signs SurfaceGraph::signs_towards(Vec3 viewpoint) const {
 }
 
 SurfaceGraph::Signs SurfaceGraph::consistent_signs() const {
-  std::vector<Edge> sorted = edges_;
-  std::stable_sort(sorted.begin(), sorted.end(), [](const Edge& a, const Edge& b) {
-    return std::fabs(a.cosine) > std::fabs(b.cosine);
-  });
+  // The bits of a number that is not negative sort like the number.
+  std::vector<std::uint64_t> order(edges_.size());
+  for (std::uint32_t k = 0; k < edges_.size(); ++k)
+    order[k] = std::uint64_t(~bits_of(std::fabs(edges_[k].cosine))) << 32 | k;
+  radix_sort(order, [](std::uint64_t item) { return item >> 32; });
   SignedSets sets(points_.size());
-  for (const Edge& e : sorted) sets.join(e.a, e.b, e.cosine < 0);
+  for (const std::uint64_t item : order) {
+    const SurfaceEdge& e = edges_[static_cast<std::uint32_t>(item)];
+    sets.join(e.a, e.b, e.cosine < 0);
+  }
   Signs signs(points_.size());
   for (std::uint32_t i = 0; i < points_.size(); ++i) signs[i] = sets.find(i).second ? -1 : 1;
   return signs;

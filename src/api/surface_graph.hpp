@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "api/surface_edges.hpp"
 #include "math/vec3.hpp"
 
 namespace gpureg {
@@ -18,7 +19,9 @@ class SurfaceGraph {
 
   /// @param normals unit vectors of any sign; zero where unknown, such points have no neighbours.
   /// @param radius largest distance of neighbours, in the unit of the points.
-  SurfaceGraph(std::vector<Vec3> points, std::vector<Vec3> normals, float radius);
+  /// @param threads that build the graph; it does not depend on their number.
+  SurfaceGraph(std::vector<Vec3> points, std::vector<Vec3> normals, float radius,
+               std::size_t threads);
 
   const std::vector<Vec3>& points() const { return points_; }
   const std::vector<Vec3>& normals() const { return normals_; }
@@ -27,7 +30,9 @@ class SurfaceGraph {
 
   /// Normal-weighted share of the edges whose ends show a viewpoint different sides, [0, 1]. Edges
   /// at grazing incidence weigh less: noise turns their normals to either side.
-  double contradiction(Vec3 viewpoint) const;
+  double contradiction(Vec3 viewpoint) const { return contradictions({viewpoint})[0]; }
+  /// The same for each of several viewpoints, which takes little more time than for one.
+  std::vector<double> contradictions(const std::vector<Vec3>& viewpoints) const;
   /// The same share for a choice of sides, without incidence.
   double contradiction(const Signs& signs) const;
 
@@ -43,19 +48,18 @@ class SurfaceGraph {
   bool outwards(const Signs& signs) const;
 
  private:
-  struct Edge {
-    std::uint32_t a, b;
-    float cosine;  ///< of the angle between the normals
+  /// Edge that contradictions() reads.
+  struct CountedEdge {
+    std::uint32_t a, b;  ///< places in counted_ends_
+    float weight;        ///< with the sign of the cosine
   };
-  void add_edges(float radius);
   void choose_counted();
 
   std::vector<Vec3> points_, normals_;
-  std::vector<Edge> edges_;
+  std::vector<SurfaceEdge> edges_;
   float radius_;
-  /// The edges that contradiction() reads, and their ends: places in points_.
-  std::vector<Edge> counted_;
-  std::vector<std::uint32_t> counted_ends_;
+  std::vector<CountedEdge> counted_;
+  std::vector<std::uint32_t> counted_ends_;  ///< places in points_
 };
 
 }  // namespace gpureg

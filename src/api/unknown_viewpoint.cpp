@@ -15,21 +15,24 @@ namespace {
 /// prepared points.
 constexpr float kGraphRadius = 1.25f;
 
+/// Points from which another thread is worth its start.
+constexpr std::size_t kPointsPerThread = 50'000;
+
 /// A cloud whose sides are to be decided.
 struct OpenCloud {
   std::size_t index;
-  SurfaceGraph graph;
+  std::vector<Vec3> points, normals;
   InferredSides sides;
 };
 
-InferredSides sides_of(const OpenCloud& cloud, const RawCloud& raw, const CloudKnowledge& known,
+InferredSides sides_of(const SurfaceGraph& graph, const RawCloud& raw, const CloudKnowledge& known,
                        const PreparedState& state) {
-  if (known.normals) return check_given_sides(cloud.graph);
+  if (known.normals) return check_given_sides(graph);
   const double* offset = state.frame_offset;
   const Vec3 of_rows{static_cast<float>(-offset[0]), static_cast<float>(-offset[1]),
                      static_cast<float>(-offset[2])};
   const Vec3 local = of_rows - Vec3{state.origin[0], state.origin[1], state.origin[2]};
-  return infer_sides(cloud.graph, local, raw, of_rows, known.infer_viewpoint);
+  return infer_sides(graph, local, raw, of_rows, known.infer_viewpoint);
 }
 
 /// Points of a prepared cloud with other sides, as input of a preparation that keeps them.
@@ -39,7 +42,7 @@ struct Replacement {
   std::uint32_t feature_dimension = 0;
 
   Replacement(const OpenCloud& cloud, const PreparedState& state, bool own_features, float sign)
-      : points(cloud.graph.points()), normals(cloud.graph.normals()) {
+      : points(cloud.points), normals(cloud.normals) {
     for (std::size_t i = 0; i < normals.size(); ++i)
       normals[i] = normals[i] * (sign * static_cast<float>(cloud.sides.signs[i]));
     if (!own_features) return;
@@ -85,14 +88,19 @@ void inherit(const PreparedState& from, PreparedState& to) {
 }
 
 void decide(Engine& engine, Span<const RawCloud> raw, const std::vector<CloudKnowledge>& knowledge,
+            const PrepareOptions& options,
             const std::vector<std::shared_ptr<PreparedState>>& states,
             std::vector<OpenCloud>& open) {
-  const std::size_t workers = std::min<std::size_t>(engine.host_threads(), open.size());
-  on_threads(std::max<std::size_t>(workers, 1), [&](std::size_t worker) {
-    for (std::size_t k = worker; k < open.size(); k += std::max<std::size_t>(workers, 1)) {
+  const std::size_t threads = std::max(1u, engine.host_threads());
+  const std::size_t workers = std::max<std::size_t>(1, std::min(threads, open.size()));
+  on_threads(workers, [&](std::size_t worker) {
+    for (std::size_t k = worker; k < open.size(); k += workers) {
       OpenCloud& cloud = open[k];
       PreparedState& state = *states[cloud.index];
-      cloud.sides = sides_of(cloud, raw.data[cloud.index], knowledge[cloud.index], state);
+      const SurfaceGraph graph(
+          cloud.points, cloud.normals, kGraphRadius * options.normal_radius,
+          std::min(threads / workers, 1 + cloud.points.size() / kPointsPerThread));
+      cloud.sides = sides_of(graph, raw.data[cloud.index], knowledge[cloud.index], state);
       state.statistics.viewpoint = cloud.sides.source;
       if (knowledge[cloud.index].normals)
         state.statistics.repaired_normals = static_cast<std::uint32_t>(
@@ -115,12 +123,9 @@ void resolve_viewpoints(Engine& engine, Span<const RawCloud> raw,
                                  : known.normals  ? ViewpointSource::normals
                                                   : ViewpointSource::origin;
     if (known.viewpoints || known.model || options.depth_maps == 0 || state.size == 0) continue;
-    open.push_back({k,
-                    SurfaceGraph(state.copy_points(), state.copy_normals(),
-                                 kGraphRadius * options.normal_radius),
-                    {}});
+    open.push_back({k, state.copy_points(), state.copy_normals(), {}});
   }
-  decide(engine, raw, knowledge, states, open);
+  decide(engine, raw, knowledge, options, states, open);
 
   std::vector<Replacement> replacements;
   std::vector<RawCloud> inputs;

@@ -3,7 +3,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
+#include <utility>
+
+#include "api/spacing_spread.hpp"
 
 namespace gpureg {
 namespace {
@@ -36,8 +38,6 @@ constexpr double kContradictory = 0.04, kBetterSides = 3;
 constexpr double kMostRepaired = 1.0 / 3;
 /// Fewer edges tell nothing.
 constexpr std::size_t kMinEdges = 200;
-/// Rows whose spacing is measured.
-constexpr std::size_t kSpacingSample = 1000;
 
 struct SearchedViewpoint {
   Vec3 place{0, 0, 0};
@@ -47,6 +47,12 @@ struct SearchedViewpoint {
     double contradiction;
   };
   std::vector<Tried> tried;  ///< the first places
+
+  void take(Vec3 other, double its_contradiction) {
+    if (its_contradiction >= contradiction) return;
+    contradiction = its_contradiction;
+    place = other;
+  }
 };
 
 /// Distances of the first places from the points, in radii of neighbours; half the diagonal of the
@@ -85,23 +91,21 @@ SearchedViewpoint search_viewpoint(const SurfaceGraph& graph, float radius) {
   }
   const float half = 0.5f * norm(hi - lo);
   SearchedViewpoint best;
-  for (const Vec3& place : start_places(graph, radius, (lo + hi) * 0.5f, half)) {
-    best.tried.push_back({place, graph.contradiction(place)});
-    if (best.tried.back().contradiction >= best.contradiction) continue;
-    best.contradiction = best.tried.back().contradiction;
-    best.place = place;
+  std::vector<Vec3> places = start_places(graph, radius, (lo + hi) * 0.5f, half);
+  std::vector<double> contradictions = graph.contradictions(places);
+  for (std::size_t k = 0; k < places.size(); ++k) {
+    best.tried.push_back({places[k], contradictions[k]});
+    best.take(places[k], contradictions[k]);
   }
   for (float step = 0.2f * half; step > 0.5f * radius;) {
     const Vec3 from = best.place;
-    for (int axis = 0; axis < 3; ++axis)
-      for (const float sign : {-1.0f, 1.0f}) {
-        const float d = step * sign;
-        const Vec3 place = from + Vec3{axis == 0 ? d : 0, axis == 1 ? d : 0, axis == 2 ? d : 0};
-        const double contradiction = graph.contradiction(place);
-        if (contradiction >= best.contradiction) continue;
-        best.contradiction = contradiction;
-        best.place = place;
-      }
+    places.clear();
+    for (const Vec3 along : {Vec3{step, 0, 0}, Vec3{0, step, 0}, Vec3{0, 0, step}}) {
+      places.push_back(from - along);
+      places.push_back(from + along);
+    }
+    contradictions = graph.contradictions(places);
+    for (std::size_t k = 0; k < places.size(); ++k) best.take(places[k], contradictions[k]);
     if (best.place.x == from.x && best.place.y == from.y && best.place.z == from.z) step *= 0.5f;
   }
   return best;
@@ -155,44 +159,7 @@ bool is_scanner(const SpacingSpread& spread) {
   return spread.radial <= kScannerSpread && spread.radial <= kSpreadRatio * spread.plain;
 }
 
-double quartile_ratio(std::vector<double> values) {
-  if (values.size() < 4) return 1;
-  std::sort(values.begin(), values.end());
-  return values[values.size() * 3 / 4] / values[values.size() / 4];
-}
-
 }  // namespace
-
-SpacingSpread spacing_spread(const RawCloud& rows, Vec3 viewpoint) {
-  std::vector<Vec3> sorted;
-  for (std::size_t i = 0; i < rows.size; ++i) {
-    const float* p = rows.points + i * rows.point_stride;
-    if (all_finite({p[0], p[1], p[2]})) sorted.push_back({p[0], p[1], p[2]});
-  }
-  // Sorted along one axis, a neighbour nearer than d is less than d away in the order, too.
-  std::sort(sorted.begin(), sorted.end(), [](const Vec3& a, const Vec3& b) {
-    return a.x != b.x ? a.x < b.x : a.y != b.y ? a.y < b.y : a.z < b.z;
-  });
-  std::vector<double> plain, radial;
-  for (std::size_t s = 0; s < std::min(kSpacingSample, sorted.size()); ++s) {
-    const std::size_t at = s * sorted.size() / std::min(kSpacingSample, sorted.size());
-    float nearest = std::numeric_limits<float>::infinity();  // squared
-    const auto visit = [&](std::size_t k) {
-      const Vec3 d = sorted[k] - sorted[at];
-      if (d.x * d.x >= nearest) return false;
-      const float squared = squared_norm(d);
-      if (squared > 0) nearest = std::min(nearest, squared);
-      return true;
-    };
-    for (std::size_t k = at + 1; k < sorted.size() && visit(k);) ++k;
-    for (std::size_t k = at; k > 0 && visit(k - 1);) --k;
-    const float range = norm(sorted[at] - viewpoint);
-    if (!(range > 0) || nearest == std::numeric_limits<float>::infinity()) continue;
-    plain.push_back(static_cast<double>(sqrtf(nearest)));
-    radial.push_back(plain.back() / static_cast<double>(range));
-  }
-  return {quartile_ratio(std::move(plain)), quartile_ratio(std::move(radial))};
-}
 
 InferredSides infer_sides(const SurfaceGraph& graph, Vec3 origin, const RawCloud& rows,
                           Vec3 origin_of_rows, bool infer) {

@@ -14,19 +14,6 @@ struct InferredSides {
   bool sign_known = true;     ///< false: the opposite of all signs is as likely
 };
 
-/// Ratio of the upper to the lower quartile of the distances from points to their nearest
-/// neighbours; 1 for a regular grid.
-struct SpacingSpread {
-  double plain = 1;   ///< of the distances
-  double radial = 1;  ///< of the distances divided by the range from a viewpoint
-};
-
-/// Spread of the spacing about a viewpoint, from a sample of the rows. A scanner samples
-/// directions: about its position, and nowhere else, the distance of neighbours grows with the
-/// range.
-/// @param viewpoint relative to the rows.
-SpacingSpread spacing_spread(const RawCloud& rows, Vec3 viewpoint);
-
 /// Sides of a cloud without input normals. The surfaces of a scan show one side to its sensor. The
 /// viewpoint that sees the fewest neighbours from different sides is searched; the origin is one if
 /// it does nearly as well and other places do not, or if the points are spaced as a scanner there

@@ -6,7 +6,7 @@
 #include <limits>
 #include <numeric>
 
-#include "cpu/radix_sort.hpp"
+#include "common/radix_sort.hpp"
 
 #if defined(__AVX2__) && defined(__FMA__)
 #include <immintrin.h>

@@ -3,7 +3,7 @@
 
 #include "algorithm/normal.hpp"
 #include "algorithm/voxel.hpp"
-#include "cpu/radix_sort.hpp"
+#include "common/radix_sort.hpp"
 #include "cpu/stages.hpp"
 #include "pipeline/checks.hpp"
 

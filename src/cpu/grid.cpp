@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "cpu/radix_sort.hpp"
+#include "common/radix_sort.hpp"
 #include "cpu/stages.hpp"
 #include "pipeline/checks.hpp"
 

@@ -4,8 +4,8 @@
 
 #include "algorithm/compatibility.hpp"
 #include "algorithm/normal_weight.hpp"
+#include "common/radix_sort.hpp"
 #include "cpu/feature_index.hpp"
-#include "cpu/radix_sort.hpp"
 #include "cpu/stages.hpp"
 
 namespace gpureg::cpu {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "cpu/surface_matcher.hpp"
 
-#include "cpu/radix_sort.hpp"
+#include "common/radix_sort.hpp"
 
 namespace gpureg::cpu {
 

@@ -8,7 +8,7 @@
 #include <random>
 #include <stdexcept>
 
-#include "cpu/radix_sort.hpp"
+#include "common/radix_sort.hpp"
 
 namespace gpureg::cpu {
 namespace {
