@@ -170,12 +170,12 @@ def pipeline_steps():
 def large_maps():
     record = load("large_maps.json")
     rows = [
-        "| points of the map | preparation, s | of it its stages on the device, s | alignment, s | of it the match of features, s | device memory, GiB | confidence | error, m |",
-        "| --- | --- | --- | --- | --- | --- | --- | --- |",
+        "| points of the map | viewpoints given | preparation, s | of it its stages on the device, s | alignment, s | of it the match of features, s | device memory, GiB | confidence | error, m |",
+        "| --- | --- | --- | --- | --- | --- | --- | --- | --- |",
     ]
     for run in record["maps"]:
         rows.append(
-            f"| {run['points']:,} | {run['prepare_s']:.1f} | {sum(run['prepare_ms'].values()) / 1e3:.2f} | {run['align_s']:.2f} "
+            f"| {run['points']:,} | {run['viewpoints'] or 'none'} | {run['prepare_s']:.1f} | {sum(run['prepare_ms'].values()) / 1e3:.2f} | {run['align_s']:.2f} "
             f"| {run['match_ms'] / 1e3:.2f} | {run['device_in_use_gib']:.1f} | {run['confidence']:.3f} | {run['error_m']:.2f} |"
         )
     return [
