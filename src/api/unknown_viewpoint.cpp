@@ -2,6 +2,7 @@
 #include "api/unknown_viewpoint.hpp"
 
 #include <algorithm>
+#include <thread>
 #include <utility>
 
 #include "api/viewpoint_inference.hpp"
@@ -16,7 +17,7 @@ namespace {
 constexpr float kGraphRadius = 1.25f;
 
 /// Points from which another thread is worth its start.
-constexpr std::size_t kPointsPerThread = 50'000;
+constexpr std::size_t kPointsPerThread = 2'000;
 
 /// A cloud whose sides are to be decided.
 struct OpenCloud {
@@ -91,7 +92,10 @@ void decide(Engine& engine, Span<const RawCloud> raw, const std::vector<CloudKno
             const PrepareOptions& options,
             const std::vector<std::shared_ptr<PreparedState>>& states,
             std::vector<OpenCloud>& open) {
-  const std::size_t threads = std::max(1u, engine.host_threads());
+  // It computes much and reads little, so with a device it is worth all processors.
+  const std::size_t threads =
+      std::max({1u, engine.host_threads(),
+                engine.leaves_host_idle() ? std::thread::hardware_concurrency() : 1u});
   const std::size_t workers = std::max<std::size_t>(1, std::min(threads, open.size()));
   on_threads(workers, [&](std::size_t worker) {
     for (std::size_t k = worker; k < open.size(); k += workers) {
