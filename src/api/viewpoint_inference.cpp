@@ -38,6 +38,16 @@ constexpr double kMostRepaired = 1.0 / 3;
 constexpr std::size_t kMinEdges = 200;
 /// Rows whose spacing is measured.
 constexpr std::size_t kSpacingSample = 1000;
+/// Rows of which directions are compared, and those of them whose neighbours are searched.
+constexpr std::size_t kDirections = 8000, kDirectionSample = 1500;
+/// Neighbours in direction are on different surfaces from this ratio of their ranges on.
+constexpr float kOtherSurface = 1.16f;
+/// Distance of the places that a viewpoint is compared with, in median ranges.
+constexpr float kBeside = 0.3f;
+/// Least share of neighbours on different surfaces as seen from those places (fewer tell nothing),
+/// and the largest ratio of the viewpoint's share to it. Measured on LiDAR, thinned or not, rooms,
+/// objects and parts: no cloud that was moved is below both.
+constexpr double kLeastBehind = 0.05, kBehindRatio = 0.55;
 
 struct SearchedViewpoint {
   Vec3 place{0, 0, 0};
@@ -155,20 +165,90 @@ bool is_scanner(const SpacingSpread& spread) {
   return spread.radial <= kScannerSpread && spread.radial <= kSpreadRatio * spread.plain;
 }
 
+std::vector<Vec3> finite_rows(const RawCloud& rows) {
+  std::vector<Vec3> out;
+  for (std::size_t i = 0; i < rows.size; ++i) {
+    const float* p = rows.points + i * rows.point_stride;
+    if (all_finite({p[0], p[1], p[2]})) out.push_back({p[0], p[1], p[2]});
+  }
+  return out;
+}
+
 double quartile_ratio(std::vector<double> values) {
   if (values.size() < 4) return 1;
   std::sort(values.begin(), values.end());
   return values[values.size() * 3 / 4] / values[values.size() / 4];
 }
 
+/// Share of neighbours in direction that are on different surfaces, as seen from a place.
+double share_behind(const std::vector<Vec3>& points, Vec3 place) {
+  struct Ray {
+    Vec3 direction;
+    float range;
+  };
+  std::vector<Ray> rays;
+  for (const Vec3& p : points)
+    if (const float range = norm(p - place); range > 0)
+      rays.push_back({(p - place) * (1 / range), range});
+  std::sort(rays.begin(), rays.end(), [](const Ray& a, const Ray& b) {
+    const Vec3 &p = a.direction, &q = b.direction;
+    if (p.x != q.x) return p.x < q.x;
+    if (p.y != q.y) return p.y < q.y;
+    return p.z != q.z ? p.z < q.z : a.range < b.range;
+  });
+  const std::size_t count = std::min(kDirectionSample, rays.size());
+  std::size_t behind = 0;
+  for (std::size_t s = 0; s < count; ++s) {
+    const std::size_t at = s * rays.size() / count;
+    float nearest = std::numeric_limits<float>::infinity();  // squared
+    std::size_t neighbor = at;
+    const auto visit = [&](std::size_t k) {
+      const Vec3 d = rays[k].direction - rays[at].direction;
+      if (d.x * d.x >= nearest) return false;
+      if (squared_norm(d) < nearest) {
+        nearest = squared_norm(d);
+        neighbor = k;
+      }
+      return true;
+    };
+    for (std::size_t k = at + 1; k < rays.size() && visit(k);) ++k;
+    for (std::size_t k = at; k > 0 && visit(k - 1);) --k;
+    const float a = rays[at].range, b = rays[neighbor].range;
+    behind += std::max(a, b) > kOtherSurface * std::min(a, b);
+  }
+  return static_cast<double>(behind) / static_cast<double>(std::max<std::size_t>(count, 1));
+}
+
+/// A scanner has one return in each direction: neighbours in direction are on one surface more
+/// often about its position than about places beside it. Holds for thinned scans, too.
+bool has_one_return_per_direction(const RawCloud& rows, Vec3 viewpoint) {
+  const std::vector<Vec3> all = finite_rows(rows);
+  std::vector<Vec3> points;
+  const std::size_t count = std::min(kDirections, all.size());
+  for (std::size_t s = 0; s < count; ++s) points.push_back(all[s * all.size() / count]);
+  if (points.empty()) return false;
+  std::vector<float> ranges;
+  for (const Vec3& p : points) ranges.push_back(norm(p - viewpoint));
+  const auto middle = ranges.begin() + static_cast<std::ptrdiff_t>(ranges.size() / 2);
+  std::nth_element(ranges.begin(), middle, ranges.end());
+  std::vector<double> beside;
+  for (int z = -1; z <= 1; ++z)
+    for (int y = -1; y <= 1; ++y)
+      for (int x = -1; x <= 1; ++x)
+        if (const int length = x * x + y * y + z * z; length == 1 || length == 3) {
+          const Vec3 side = normalized_or_zero(
+              {static_cast<float>(x), static_cast<float>(y), static_cast<float>(z)});
+          beside.push_back(share_behind(points, viewpoint + side * (kBeside * *middle)));
+        }
+  const auto typical = beside.begin() + static_cast<std::ptrdiff_t>(beside.size() / 2);
+  std::nth_element(beside.begin(), typical, beside.end());
+  return *typical >= kLeastBehind && share_behind(points, viewpoint) <= kBehindRatio * *typical;
+}
+
 }  // namespace
 
 SpacingSpread spacing_spread(const RawCloud& rows, Vec3 viewpoint) {
-  std::vector<Vec3> sorted;
-  for (std::size_t i = 0; i < rows.size; ++i) {
-    const float* p = rows.points + i * rows.point_stride;
-    if (all_finite({p[0], p[1], p[2]})) sorted.push_back({p[0], p[1], p[2]});
-  }
+  std::vector<Vec3> sorted = finite_rows(rows);
   // Sorted along one axis, a neighbour nearer than d is less than d away in the order, too.
   std::sort(sorted.begin(), sorted.end(), [](const Vec3& a, const Vec3& b) {
     return a.x != b.x ? a.x < b.x : a.y != b.y ? a.y < b.y : a.z < b.z;
@@ -212,7 +292,8 @@ InferredSides infer_sides(const SurfaceGraph& graph, Vec3 origin, const RawCloud
     if (!graph.outwards(along)) flip(along);
     return {ViewpointSource::model, std::move(along), true};
   }
-  if (infer && explains(graph, best, origin, spread)) {
+  if (infer && (explains(graph, best, origin, spread) ||
+                has_one_return_per_direction(rows, origin_of_rows))) {
     out.source = ViewpointSource::origin;
     return out;
   }
