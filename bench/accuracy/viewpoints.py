@@ -7,7 +7,10 @@ Every cloud is moved by a random pose. `said`: its true viewpoints move along an
 origin (red kitchen: each fragment in the frame of its middle camera). A seed is that of the random
 poses and of gpureg. One line for each set, condition and seed: pairs, right, reported at 0.5, reported
 and wrong; the same of reports up to a symmetry (--accept-symmetry); and the decisions about the clouds,
-models apart.
+models apart. Where nobody says a viewpoint, `decided` counts the clouds whose sensor is known, and
+`decided_right` those of them with the right decision: `none` for a moved scan, `origin` for a scan that
+was not moved, `model` for a model. `decided_none` counts scans that were not moved and got `none`: no
+free space is invented, but it is not the right decision. The last line has the shares over all sets.
 
 Sets: kitchen, dragon, cad, cad_mesh, kitti, lidar, fgr of DATA (its README.md has origins and
 licences). cad: scans on points of their models; cad_mesh: on the models as STL files.
@@ -276,6 +279,19 @@ def poses_of(condition, clouds, rng):
     return [random_pose(rng, cloud.reach) for cloud in clouds]
 
 
+def count_decision(condition, kind, sensor_is_known, decision, total):
+    """Counts a decision about a cloud whose viewpoint nobody said."""
+    if condition.endswith("said") and kind == "scan":
+        return
+    stays = condition in ("still", "turned", "upright")
+    if kind == "scan" and stays and not sensor_is_known:
+        return
+    right = "model" if kind == "model" else "origin" if stays else "none"
+    total["decided"] += 1
+    total["decided_right"] += decision == right
+    total["decided_none"] += decision == "none" and right == "origin"
+
+
 def run(command, scene, seed, rng, condition, total, extra):
     """Adds the counts of a set to total. Returns the voxel size and, for each pair, the pose as of clouds that were not
     moved, whether it is correct, and its score.
@@ -299,7 +315,9 @@ def run(command, scene, seed, rng, condition, total, extra):
         document = json.loads(out.read_text())
     for fragment, cloud in zip(document["fragments"], scene.clouds):
         kind = "scan" if cloud.reach == FGR_REACH or cloud.viewpoints is not None else "model"
-        total[f"{kind}: {fragment['viewpoint']}"] += 1
+        decision = fragment["viewpoint"]
+        total[f"{kind}: {decision}"] += 1
+        count_decision(condition, kind, cloud.viewpoints is not None, decision, total)
     found = {(p["i"], p["j"]): p for p in document["pairs"]}
     outcomes = []
     for source, target, truths in scene.pairs:
@@ -344,6 +362,7 @@ def main():
     if arguments.json and arguments.json.exists():
         known = json.loads(arguments.json.read_text())["sets"]
         record["sets"] = {name: entry for name, entry in known.items() if "command" in entry}
+    every = collections.Counter()
     for name in arguments.sets.split(","):
         scenes = makers[name](arguments.data, arguments.pairs, np.random.default_rng(0))
         entry = {
@@ -369,10 +388,14 @@ def main():
                         arguments.extra.split(),
                     )
                 print(name, condition, seed, dict(total), flush=True)
+                every += total
                 entry["conditions"][condition].append({"seed": seed, **total})
         record["sets"][name] = entry
         if arguments.json:
             arguments.json.write_text(json.dumps(record, indent=1) + "\n")
+    if every["decided"]:
+        share = 100 * every["decided_right"] / every["decided"]
+        print(f"decided right: {every['decided_right']} of {every['decided']} clouds, {share:.1f} %")
 
 
 if __name__ == "__main__":

@@ -29,6 +29,8 @@ struct PointCloudView {
   /// cloud. Input normals that face away from all viewpoints are flipped, because no sensor
   /// observes the back of a surface. None is flipped where more than one eighth of the points face
   /// away (the viewpoints then belong to another frame), nor with PrepareOptions::depth_maps 0.
+  /// prepare() refuses viewpoints whose coordinates are more than 2^23 normal radii from the
+  /// cloud's.
   const float* viewpoints = nullptr;
   /// 0: with input normals free space is unknown, and no pose is verified by it. Without normals
   /// see infer_viewpoint.

@@ -57,6 +57,8 @@ def test_wrong_companions_are_named(source):
         gpureg.prepare(source, viewpoints=[0, 0, 0, 0])
     with pytest.raises(ValueError, match=r"viewpoints: row 0 is \[.*nan.*\], expected finite"):
         gpureg.prepare(source, viewpoints=[[0, np.nan, 0]])
+    with pytest.raises(gpureg.InvalidArgument, match=r"viewpoints is 1e\+30, expected coordinates"):
+        gpureg.prepare(source, viewpoints=[[1e30, 0, 0]])
     with pytest.raises(ValueError, match=r"target: expected shape \(N, 3\), got \(5, 2\)"):
         gpureg.register(source, np.zeros((5, 2)))
     with pytest.raises(ValueError, match=r"clouds\[1\]: expected shape"):

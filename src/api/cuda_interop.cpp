@@ -80,6 +80,7 @@ std::vector<PreparedCloud> prepared(const AdoptedBatch& batch) {
     };
     const std::size_t all = batch.clouds.size();
     for (auto& state : end - begin == 1 ? naming_cloud(batch.names, all, begin, work) : work()) {
+      naming_cloud(batch.names, all, states.size(), [&] { check_viewpoints(*state); });
       const std::array<double, 3>& origin = batch.origins[states.size()];
       std::copy(origin.begin(), origin.end(), state->frame_offset);
       states.push_back(std::move(state));

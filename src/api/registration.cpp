@@ -61,6 +61,7 @@ std::vector<PreparedCloud> prepare_batch(const Context& context,
       return Access::engine(context)->prepare({raw.data() + begin, end - begin}, options);
     };
     for (auto& state : end - begin == 1 ? naming(begin, work) : work()) {
+      naming(states.size(), [&] { check_viewpoints(*state); });
       set_frame_offset(clouds[states.size()].origin, *state);
       states.push_back(std::move(state));
     }

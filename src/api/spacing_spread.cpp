@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "api/finite_rows.hpp"
 #include "common/radix_sort.hpp"
 
 namespace gpureg {
@@ -25,18 +26,14 @@ std::uint32_t sortable(float value) {
 }
 
 std::vector<Vec3> finite_rows_by_x(const RawCloud& rows) {
-  const auto row = [&](std::size_t i) {
-    const float* p = rows.points + i * rows.point_stride;
-    return Vec3{p[0], p[1], p[2]};
-  };
+  const std::vector<Vec3> all = finite_rows(rows);
   std::vector<KeyIndex> order;
-  order.reserve(rows.size);
-  for (std::uint32_t i = 0; i < rows.size; ++i)
-    if (all_finite(row(i))) order.push_back({sortable(row(i).x), i});
+  order.reserve(all.size());
+  for (std::uint32_t i = 0; i < all.size(); ++i) order.push_back({sortable(all[i].x), i});
   radix_sort(order);
   std::vector<Vec3> sorted;
   sorted.reserve(order.size());
-  for (const KeyIndex& item : order) sorted.push_back(row(item.index));
+  for (const KeyIndex& item : order) sorted.push_back(all[item.index]);
   return sorted;
 }
 

@@ -2,12 +2,15 @@
 #include "api/unknown_viewpoint.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <thread>
 #include <utility>
 
 #include "api/viewpoint_inference.hpp"
 #include "common/host_threads.hpp"
 #include "common/in_halves.hpp"
+#include "common/limits.hpp"
+#include "common/validate.hpp"
 
 namespace gpureg {
 namespace {
@@ -114,6 +117,15 @@ void decide(Engine& engine, Span<const RawCloud> raw, const std::vector<CloudKno
 }
 
 }  // namespace
+
+void check_viewpoints(const PreparedState& state) {
+  const float most = limits::kMaxViewpointDistance * state.options.normal_radius;
+  for (const Vec3& place : state.viewpoints)
+    for (const float coordinate : {place.x, place.y, place.z})
+      require(std::abs(coordinate) <= most, "cloud.viewpoints", coordinate,
+              "coordinates within 2^23 times prepare.normal_radius of the cloud: float cannot tell "
+              "the rays of a farther viewpoint apart");
+}
 
 void resolve_viewpoints(Engine& engine, Span<const RawCloud> raw,
                         const std::vector<CloudKnowledge>& knowledge, const PrepareOptions& options,

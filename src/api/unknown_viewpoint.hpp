@@ -21,6 +21,10 @@ CloudKnowledge knowledge_of(const View& view) {
           view.infer_viewpoint, view.model};
 }
 
+/// @throws InvalidArgument for a given viewpoint that is so far from the cloud that its rays mean
+///   nothing.
+void check_viewpoints(const PreparedState& state);
+
 /// Sets PrepareStatistics::viewpoint of prepared clouds. Clouds whose sides turn out to be others
 /// than the preparation took are replaced: prepared again from their prepared points, with the
 /// right sides as input normals and no viewpoint, and once more with the other sides where both are

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <utility>
 
+#include "api/one_return.hpp"
 #include "api/spacing_spread.hpp"
 
 namespace gpureg {
@@ -179,7 +180,8 @@ InferredSides infer_sides(const SurfaceGraph& graph, Vec3 origin, const RawCloud
     if (!graph.outwards(along)) flip(along);
     return {ViewpointSource::model, std::move(along), true};
   }
-  if (infer && explains(graph, best, origin, spread)) {
+  if (infer && (explains(graph, best, origin, spread) ||
+                has_one_return_per_direction(rows, origin_of_rows))) {
     out.source = ViewpointSource::origin;
     return out;
   }

@@ -16,8 +16,8 @@ struct InferredSides {
 
 /// Sides of a cloud without input normals. The surfaces of a scan show one side to its sensor. The
 /// viewpoint that sees the fewest neighbours from different sides is searched; the origin is one if
-/// it does nearly as well and other places do not, or if the points are spaced as a scanner there
-/// spaces them. A closed surface is a model.
+/// it does nearly as well and other places do not, if the points are spaced as a scanner there
+/// spaces them, or if the directions from there have one return each. A closed surface is a model.
 /// @param origin of the cloud's frame, relative to the points.
 /// @param rows of the input, for the spacing.
 /// @param infer false: the origin is known not to be a viewpoint.

@@ -18,6 +18,9 @@ constexpr std::uint32_t kMaxPoints = 0x7fffffffu;
 constexpr std::uint32_t kMaxFeatureDimension = 4096;
 /// Depth maps of a cloud; a map takes 110 KB.
 constexpr std::uint32_t kMaxDepthMaps = 64;
+/// Distance of a viewpoint from the cloud, in radii of the normals. Coordinates beyond it have
+/// steps of a whole radius in float: rays from there to neighbouring points are the same.
+constexpr float kMaxViewpointDistance = 1 << 23;
 /// Bits of a cell's coordinate in a key: three of them fit one 64-bit word.
 constexpr int kCellBits = 21;
 /// Cells on each side of the local origin, along each axis.

@@ -141,6 +141,21 @@ TEST(BadInput, LyingViews) {
         v.viewpoint_count = 1;
       },
       "cloud.viewpoints");
+  // Finite, but so far away that all rays are one.
+  const float far[3] = {0, -1e30f, 0}, satellite[3] = {0, 0, 5e5f};
+  expect(
+      [&](auto& v) {
+        v.viewpoints = far;
+        v.viewpoint_count = 1;
+      },
+      "cloud.viewpoints is -1e+30, expected coordinates within 2^23 times prepare.normal_radius");
+  PointCloudView high(points), lost(points);
+  high.viewpoints = satellite;
+  lost.viewpoints = far;
+  high.viewpoint_count = lost.viewpoint_count = 1;
+  EXPECT_EQ(prepare(context, high).statistics().viewpoint, ViewpointSource::said);
+  test::expect_error<InvalidArgument>([&] { prepare_batch(context, {high, lost}); },
+                                      {"clouds[1]: cloud.viewpoints is -1e+30"});
   PointCloud uneven;
   uneven.points.resize(3);
   uneven.normals.resize(2);

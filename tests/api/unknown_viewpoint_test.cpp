@@ -85,6 +85,58 @@ TEST(UnknownViewpoint, ATurnedScanKeepsItsOrigin) {
   EXPECT_EQ(decision(PointCloudView(moved(turn, room_scan(1)))), ViewpointSource::origin);
 }
 
+/// A street seen by a LiDAR of 32 rings at the origin; a share of the points is kept at random.
+std::vector<Eigen::Vector3f> street_scan(unsigned seed, double kept) {
+  std::mt19937 random(7), drop(seed);  // one street
+  std::uniform_real_distribution<float> unit;
+  std::vector<Eigen::AlignedBox3f> boxes;
+  for (int k = 0; k < 60; ++k) {
+    const float side = k % 2 ? 1.f : -1.f, x = 100 * unit(random) - 50;
+    const Eigen::Vector3f low(x, side * (4 + 8 * unit(random)), -2);
+    boxes.emplace_back(low, low + Eigen::Vector3f(1 + 5 * unit(random), 1 + 3 * unit(random),
+                                                  1 + 5 * unit(random)));
+  }
+  std::bernoulli_distribution keep(kept);
+  std::vector<Eigen::Vector3f> points;
+  for (int ring = 0; ring < 32; ++ring)
+    for (int column = 0; column < 1200; ++column) {
+      const float up = -0.45f + 0.02f * static_cast<float>(ring);
+      const float turn = static_cast<float>(column) * static_cast<float>(2 * M_PI) / 1200;
+      const Eigen::Vector3f ray(std::cos(up) * std::cos(turn), std::cos(up) * std::sin(turn),
+                                std::sin(up));
+      float range = ray.z() < 0 ? -2 / ray.z() : 1e9f;
+      for (const Eigen::AlignedBox3f& box : boxes) {
+        const Eigen::Array3f a = box.min().array() / ray.array(),
+                             b = box.max().array() / ray.array();
+        const float enter = a.min(b).maxCoeff(), leave = a.max(b).minCoeff();
+        if (enter > 0 && enter < leave) range = std::min(range, enter);
+      }
+      if (range < 80 && keep(drop)) points.push_back(ray * range);
+    }
+  return points;
+}
+
+// Neighbours in a thinned scan have distances by chance: its spacing does not tell the viewpoint.
+TEST(UnknownViewpoint, AThinnedScanHasOneReturnPerDirection) {
+  PrepareOptions options = RegistrationOptions::from_voxel_size(0.8f).prepare;
+  const auto decisions = [&](bool move) {
+    std::mt19937 random(6);
+    std::map<ViewpointSource, int> out;
+    for (unsigned k = 0; k < 6; ++k) {
+      Eigen::Isometry3d pose = random_pose(random);
+      if (move)
+        pose.translation() = Eigen::Vector3d::Unit(k % 3) * (k < 3 ? 8 : -12);
+      else
+        pose.translation().setZero();
+      const auto points = moved(pose, street_scan(k, 0.25));
+      ++out[prepare(cpu(), PointCloudView(points), options).statistics().viewpoint];
+    }
+    return out;
+  };
+  EXPECT_EQ(decisions(false)[ViewpointSource::origin], 6);
+  EXPECT_EQ(decisions(true)[ViewpointSource::none], 6);
+}
+
 TEST(UnknownViewpoint, WhatIsSaidIsTaken) {
   const auto points = room_scan(1);
   PointCloudView view(points);

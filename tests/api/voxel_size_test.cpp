@@ -99,6 +99,20 @@ TEST(VoxelSize, ExceedsTheGapsBetweenRings) {
   EXPECT_GT(share(s.voxel_size), 0.9);
 }
 
+// Points that are missing at random leave gaps, which features must span.
+TEST(VoxelSize, ThinnedScansNeedLargerVoxels) {
+  std::mt19937 random(3);
+  std::bernoulli_distribution keep(0.25);
+  Points thinned, room_thinned;
+  for (const Eigen::Vector3f& p : lidar(64))
+    if (keep(random)) thinned.push_back(p);
+  for (const Eigen::Vector3f& p : room(1))
+    if (keep(random)) room_thinned.push_back(p);
+  EXPECT_GT(suggest({thinned}).voxel_size, suggest({lidar(64)}).voxel_size);
+  EXPECT_GE(prepared_points(thinned, suggest({thinned}).voxel_size), 1000u);
+  EXPECT_LE(suggest({room_thinned}).voxel_size, 1.1f * suggest({room(1)}).voxel_size);
+}
+
 TEST(VoxelSize, FollowsTheUnit) {
   const double metres = static_cast<double>(suggest({object(0.15f, 40000)}).voxel_size);
   const double millimetres = static_cast<double>(suggest({object(150, 40000)}).voxel_size);

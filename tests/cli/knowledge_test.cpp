@@ -51,6 +51,10 @@ TEST_F(Knowledge, WrongViewpointsAreNamed) {
               {option, std::string(" is ") + value, "x,y,z (finite), model, none or auto"});
 }
 
+TEST_F(Knowledge, AViewpointThatIsTooFarIsNamed) {
+  refused({"--source-viewpoint", "1e30,0,0"}, {"source", "viewpoint", "1e+30", "normal_radius"});
+}
+
 TEST_F(Knowledge, AViewpointInAWallIsSaid) {
   const PointCloud scan = room_scan(0);
   std::ostringstream point;  // on a surface that the scan has densely
