@@ -8,7 +8,11 @@ cad_mesh, kitti, lidar, fgr (viewpoints.py). One file DOMAIN.json each: every pa
 its modes and which of them are correct, under one of the conditions of viewpoints.py (`said`,
 `nothing`, `still`).
 
-usage: domains.py DATA OUT [--domains parts,street] [--scenes 12] [--conditions said,nothing] [--gpureg COMMAND]
+A seed is that of the random poses and of gpureg; the file has the pairs of all seeds, and is written after
+each of them.
+
+usage: domains.py DATA OUT [--domains parts,street] [--scenes 12] [--conditions said,nothing] [--seeds 1 2 3]
+       [--gpureg COMMAND]
 Needs numpy, the Python package gpureg and what domain_scenes.py needs."""
 
 import argparse
@@ -25,6 +29,7 @@ from viewpoints import Cloud, Set
 SIMULATED = ("parts", "figures", "objects", "street", "hall")
 REAL = ("kitchen", "dragon", "cad", "cad_mesh", "kitti", "lidar", "fgr")
 MODEL_POINTS = 20000
+SCENE_STEP = 1000
 
 
 def simulated(name, seed, **fixed):
@@ -141,32 +146,36 @@ def main():
     parser.add_argument("--scenes", type=int, default=12, help="of each simulated domain")
     parser.add_argument("--first", type=int, default=1, help="seed of the first simulated scene")
     parser.add_argument("--pairs", type=int, default=100, help="at most so many of a real domain")
-    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--seeds", type=int, nargs="+", default=[1])
     parser.add_argument("--gpureg", default="gpureg", help="the command")
     parser.add_argument("--extra", default="", help="more options of gpureg batch")
     arguments = parser.parse_args()
     arguments.out.mkdir(parents=True, exist_ok=True)
     for name in arguments.domains.split(","):
         if name in SIMULATED:
-            seeds = range(arguments.first, arguments.first + arguments.scenes)
-            scenes = ((seed, simulated(name, seed)) for seed in seeds)
+            places = range(arguments.first, arguments.first + arguments.scenes)
+            # Poses differ between scenes, too.
+            scenes = [(SCENE_STEP * place, simulated(name, place)) for place in places]
         else:
             made = getattr(viewpoints, name)(
                 arguments.data, arguments.pairs, np.random.default_rng(0)
             )
-            scenes = ((arguments.seed, scene) for scene in made)
+            scenes = [(0, scene) for scene in made]
         pairs = []
-        for number, (seed, scene) in enumerate(scenes):
-            conditions = arguments.conditions.split(",")
-            if name in SIMULATED:  # one after the other
-                conditions = [conditions[number % len(conditions)]]
-            for condition in conditions:
-                new = evidence_of(arguments.gpureg, scene, condition, seed, arguments.extra.split())
-                for pair in new:
-                    pair["scene"] = number
-                pairs += new
-            print(name, number, summary(pairs), flush=True)
-        (arguments.out / f"{name}.json").write_text(json.dumps({"pairs": pairs}) + "\n")
+        for seed in arguments.seeds:
+            for number, (step, scene) in enumerate(scenes):
+                conditions = arguments.conditions.split(",")
+                if name in SIMULATED:  # one after the other
+                    conditions = [conditions[number % len(conditions)]]
+                for condition in conditions:
+                    new = evidence_of(
+                        arguments.gpureg, scene, condition, step + seed, arguments.extra.split()
+                    )
+                    for pair in new:
+                        pair["scene"] = number
+                    pairs += new
+                print(name, seed, number, summary(pairs), flush=True)
+            (arguments.out / f"{name}.json").write_text(json.dumps({"pairs": pairs}) + "\n")
 
 
 if __name__ == "__main__":

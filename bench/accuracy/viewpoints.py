@@ -395,7 +395,9 @@ def main():
             arguments.json.write_text(json.dumps(record, indent=1) + "\n")
     if every["decided"]:
         share = 100 * every["decided_right"] / every["decided"]
-        print(f"decided right: {every['decided_right']} of {every['decided']} clouds, {share:.1f} %")
+        print(
+            f"decided right: {every['decided_right']} of {every['decided']} clouds, {share:.1f} %"
+        )
 
 
 if __name__ == "__main__":

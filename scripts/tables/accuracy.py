@@ -339,6 +339,41 @@ def viewpoints():
     return [*out, "", "Made by", "", *made]
 
 
+SENSOR_UNKNOWN = ("fgr",)  # whether the origin is the viewpoint of an unmoved scan
+
+
+def decisions():
+    """Right decisions about clouds whose viewpoint nobody said, over all seeds."""
+    record = load("viewpoints.json")
+    groups = {
+        "moved scans: `none`": ("nothing", "scan", "none"),
+        "scans not moved: `origin`": ("still", "scan", "origin"),
+        "models: `model`": (None, "model", "model"),
+    }
+    out = [f"| data | {' | '.join(groups)} | all, % |", "| --- |" + " --- |" * (len(groups) + 1)]
+    every = [0, 0]
+    for name, text in SENSORS.items():
+        cells, both = [text], [0, 0]
+        for condition, kind, right in groups.values():
+            counts = [0, 0]
+            for at, runs in record["sets"].get(name, {}).get("conditions", {}).items():
+                if at not in ([condition] if condition else ["nothing", "still"]):
+                    continue
+                if at == "still" and kind == "scan" and name in SENSOR_UNKNOWN:
+                    continue
+                for key, count in ((k, v) for run in runs for k, v in run.items()):
+                    if key.startswith(f"{kind}: "):
+                        counts[0] += count * (key == f"{kind}: {right}")
+                        counts[1] += count
+            cells.append(f"{counts[0]} of {counts[1]}" if counts[1] else "")
+            both = [a + b for a, b in zip(both, counts)]
+        every = [a + b for a, b in zip(every, both)]
+        if both[1]:
+            out.append(f"| {' | '.join(cells)} | {100 * both[0] / both[1]:.0f} |")
+    share = f"{100 * every[0] / every[1]:.1f}"
+    return [*out, f"| all: {every[0]} of {every[1]} | | | | {share} |"]
+
+
 def verification():
     record = load("verification.json")
     rows = [
@@ -400,22 +435,29 @@ DOMAINS = {
 def domains():
     record = load("domains.json")
     rows = [
-        "| data | pairs | true pairs | correct among the modes | first correct | reported | false reports | above 0.9 | of these false | ECE |",
-        "| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |",
+        "| data | seeds | pairs | true pairs | correct among the modes | first correct | reported | false reports | above 0.9 | of these false | ECE |",
+        "| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |",
     ]
     for name, text in DOMAINS.items():
         of = record["domains"][name]
         rows.append(
-            f"| {text} | {of['pairs']} | {of['true_pairs']} | {of['among_modes']} | {of['first']} | {of['reported']} | "
+            f"| {text} | {len(of.get('seeds', [1]))} | {of['pairs']} | {of['true_pairs']} | {of['among_modes']} | {of['first']} | {of['reported']} | "
             f"{of['reported_wrong']} | {of['sure']} | {of['sure_wrong']} | {of['ECE']:.3f} |"
         )
-    return [*rows, "", source(record) + "."]
+    newer = {}
+    for name in DOMAINS:
+        commit = record["domains"][name].get("commit", record["commit"])
+        if commit != record["commit"]:
+            newer.setdefault(commit, []).append(DOMAINS[name])
+    also = [f"At commit {commit}: {'; '.join(names)}." for commit, names in newer.items()]
+    return [*rows, "", " ".join([source(record) + ".", *also])]
 
 
 TABLES = {
     "domains": domains,
     "calibration": calibration,
     "viewpoints": viewpoints,
+    "decisions": decisions,
     "verification": verification,
     "redkitchen": redkitchen,
     "redkitchen_seeds": redkitchen_seeds,

@@ -80,12 +80,13 @@ std::vector<PreparedCloud> prepared(const AdoptedBatch& batch) {
     };
     const std::size_t all = batch.clouds.size();
     for (auto& state : end - begin == 1 ? naming_cloud(batch.names, all, begin, work) : work()) {
-      naming_cloud(batch.names, all, states.size(), [&] { check_viewpoints(*state); });
       const std::array<double, 3>& origin = batch.origins[states.size()];
       std::copy(origin.begin(), origin.end(), state->frame_offset);
       states.push_back(std::move(state));
     }
   });
+  for (std::size_t k = 0; k < states.size(); ++k)
+    naming_cloud(batch.names, states.size(), k, [&] { check_viewpoints(*states[k]); });
   resolve(batch, states);
   std::vector<PreparedCloud> out;
   for (auto& state : states) out.push_back(Access::cloud(std::move(state)));

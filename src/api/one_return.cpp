@@ -17,6 +17,9 @@ constexpr std::size_t kDirections = 8000, kSample = 1500;
 constexpr float kOtherSurface = 1.16f;
 /// Distance of the places that a viewpoint is compared with, in median ranges.
 constexpr float kBeside = 0.3f;
+/// Largest mean of the directions of the points: they surround a spinning scanner. From a place far
+/// outside of a cloud all ranges are alike.
+constexpr float kLargestMeanDirection = 0.5f;
 /// Least share of neighbours on different surfaces as seen from those places (fewer tell nothing),
 /// and the largest ratio of the viewpoint's share to it. Measured on LiDAR, thinned or not, rooms,
 /// objects and parts: no cloud that was moved is below both.
@@ -124,7 +127,12 @@ bool has_one_return_per_direction(const RawCloud& rows, Vec3 viewpoint) {
   for (std::size_t s = 0; s < count; ++s) points.push_back(all[s * all.size() / count]);
   if (points.empty()) return false;
   std::vector<float> ranges;
-  for (const Vec3& p : points) ranges.push_back(norm(p - viewpoint));
+  Vec3 sum{0, 0, 0};
+  for (const Vec3& p : points) {
+    ranges.push_back(norm(p - viewpoint));
+    sum = sum + normalized_or_zero(p - viewpoint);
+  }
+  if (!(norm(sum) <= kLargestMeanDirection * static_cast<float>(points.size()))) return false;
   const auto middle = ranges.begin() + static_cast<std::ptrdiff_t>(ranges.size() / 2);
   std::nth_element(ranges.begin(), middle, ranges.end());
   std::vector<double> beside;

@@ -61,11 +61,11 @@ std::vector<PreparedCloud> prepare_batch(const Context& context,
       return Access::engine(context)->prepare({raw.data() + begin, end - begin}, options);
     };
     for (auto& state : end - begin == 1 ? naming(begin, work) : work()) {
-      naming(states.size(), [&] { check_viewpoints(*state); });
       set_frame_offset(clouds[states.size()].origin, *state);
       states.push_back(std::move(state));
     }
   });
+  for (std::size_t k = 0; k < states.size(); ++k) naming(k, [&] { check_viewpoints(*states[k]); });
   resolve_viewpoints(*Access::engine(context), span_of(raw), knowledge, options, states);
   for (auto& state : states) out.push_back(Access::cloud(std::move(state)));
   return out;
