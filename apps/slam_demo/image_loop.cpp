@@ -23,7 +23,10 @@ ImageLoop loop_of(const Map& map, int keyframe, int target, const View& view) {
   for (std::size_t k = 0; k < view.points.size(); ++k) {
     if (view.points[k] == kNone) continue;
     loop.matches.emplace_back(static_cast<int>(k), view.points[k]);
-    for (const Observation& o : map.points[at(view.points[k])].observations) ++votes[o.keyframe];
+    // The pose of a keyframe that sees the point by another loop need not agree with the point.
+    for (const Observation& o : map.points[at(view.points[k])].observations) {
+      if (o.loop == kNone) ++votes[o.keyframe];
+    }
   }
   votes.erase(keyframe);
   for (const auto& [other, count] : votes) {

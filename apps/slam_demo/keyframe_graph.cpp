@@ -84,14 +84,18 @@ std::vector<RelativePose> KeyframeGraph::weak_odometry(const Map& map) const {
 }
 
 std::vector<int> KeyframeGraph::misfits(const Map& map, double metres, double radians) const {
-  std::vector<int> result;
+  std::vector<std::pair<double, int>> order;  // minus the worst share of a bound, loop
   for (const auto& [loop, edges] : loops_) {
-    if (std::any_of(edges.begin(), edges.end(), [&](const RelativePose& edge) {
-          const Misfit misfit = misfit_of(map, edge.a, edge.b, edge.a_from_b);
-          return misfit.metres > metres || misfit.radians > radians;
-        }))
-      result.push_back(loop);
+    double worst = 0;
+    for (const RelativePose& edge : edges) {
+      const Misfit misfit = misfit_of(map, edge.a, edge.b, edge.a_from_b);
+      worst = std::max({worst, misfit.metres / metres, misfit.radians / radians});
+    }
+    if (worst > 1) order.emplace_back(-worst, loop);
   }
+  std::sort(order.begin(), order.end());
+  std::vector<int> result;
+  for (const auto& [worst, loop] : order) result.push_back(loop);
   return result;
 }
 

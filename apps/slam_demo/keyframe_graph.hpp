@@ -45,7 +45,7 @@ class KeyframeGraph {
   /// do not hold them together in an adjustment.
   std::vector<RelativePose> weak_odometry(const Map& map) const;
 
-  /// Numbers of the loops with an edge that is farther from the poses of the map.
+  /// Numbers of the loops with an edge that is farther from the poses of the map, the worst first.
   std::vector<int> misfits(const Map& map, double metres, double radians) const;
 
   /// Poses of all keyframes by tracking alone, each session from its first keyframe.

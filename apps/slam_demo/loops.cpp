@@ -47,8 +47,11 @@ LoopClosing::LoopClosing(const gpureg::Context& context, Map& map, const Pinhole
       }()),
       closer_(context, closer_options_) {}
 
+/// A keyframe and those that share points with it by tracking: what another loop connects goes
+/// with that loop.
 std::vector<int> LoopClosing::with_neighbours(int keyframe) const {
-  std::vector<int> result = map_.covisible(keyframe, kNeighbours);
+  std::vector<int> result = by_count(map_.tracked_covisible(keyframe));
+  result.resize(std::min(result.size(), kNeighbours));
   result.insert(result.begin(), keyframe);
   return result;
 }
@@ -290,28 +293,29 @@ bool LoopClosing::moved_since_bundle() const {
   return adjusted_.empty();
 }
 
-bool LoopClosing::retract_misfits() {
-  const std::vector<int> misfits = graph_.misfits(map_, kMisfitMetres, kMisfitRadians);
-  for (const int number : misfits) {
-    map_.remove_loop(number);
-    graph_.remove(number);
-    if (number >= kImageLoops) {
-      image_records_[at(number - kImageLoops)].retracted = true;
-      continue;
-    }
-    LoopRecord& record = records_[at(number)];
-    record.state = lc::to_string(lc::LoopState::retracted);
-    record.reason = "misfit";
-    record.image_loops = 0;
+void LoopClosing::retract(int number) {
+  map_.remove_loop(number);
+  graph_.remove(number);
+  if (number >= kImageLoops) {
+    image_records_[at(number - kImageLoops)].retracted = true;
+    return;
   }
-  return !misfits.empty();
+  LoopRecord& record = records_[at(number)];
+  record.state = lc::to_string(lc::LoopState::retracted);
+  record.reason = "misfit";
+  record.image_loops = 0;
 }
 
 bool LoopClosing::conclude(int iterations) {
+  const auto misfits = [&] { return graph_.misfits(map_, kMisfitMetres, kMisfitRadians); };
   if (options_.bundle) bundle_all(iterations);
   bool moved = options_.bundle;
-  while (retract_misfits()) {
-    optimize();
+  for (std::vector<int> all = misfits(); !all.empty(); all = misfits()) {
+    // One at a time: a wrong loop bends the map, and then correct ones do not fit either.
+    for (; !all.empty(); all = misfits()) {
+      retract(all.front());
+      optimize();
+    }
     if (options_.bundle) bundle_all(iterations);
     moved = true;
   }

@@ -85,7 +85,7 @@ class LoopClosing {
   void limit_fragments();
   void optimize();
   void bundle_all(int iterations);
-  bool retract_misfits();
+  void retract(int number);
   void adjust_if_moved();
   bool moved_since_bundle() const;
   int number_of(int source, int target);

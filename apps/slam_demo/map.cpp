@@ -98,6 +98,17 @@ std::vector<int> Map::covisible(int keyframe, std::size_t count, int min_shared)
   return result;
 }
 
+std::map<int, int> Map::tracked_covisible(int keyframe) const {
+  std::map<int, int> shared;
+  for (const int p : keyframes[at(keyframe)].points) {
+    if (p == kNone) continue;
+    for (const Observation& o : points[at(p)].observations) {
+      if (o.loop == kNone && o.keyframe != keyframe) ++shared[o.keyframe];
+    }
+  }
+  return shared;
+}
+
 std::vector<int> by_count(const std::map<int, int>& counts, int min_count) {
   std::vector<std::pair<int, int>> order;
   for (const auto& [key, count] : counts) {

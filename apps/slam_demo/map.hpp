@@ -77,6 +77,9 @@ class Map {
   /// At most count keyframes that share at least min_shared points, most first.
   std::vector<int> covisible(int keyframe, std::size_t count, int min_shared = 1) const;
 
+  /// Keyframes and the number of points that they share without loops.
+  std::map<int, int> tracked_covisible(int keyframe) const;
+
   const Observation* find(int point, int keyframe) const;
 
  private:

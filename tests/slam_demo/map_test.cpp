@@ -68,6 +68,18 @@ TEST(Map, ARetractionTakesTheObservationsBack) {
   EXPECT_EQ(map.keyframes[1].points[3], own);
 }
 
+TEST(Map, WhatALoopConnectsIsNotTracked) {
+  Map map;
+  const int a = add(map, at(0, 0, 0)), b = add(map, at(1, 0, 0)), c = add(map, at(2, 0, 0));
+  const int p = map.add_point(a, 0, {0, 0, 2}), q = map.add_point(a, 1, {1, 0, 2});
+  map.add_observation(p, {b, 4});
+  map.add_observation(q, {c, 5, /*loop=*/7});
+  EXPECT_EQ(map.keyframes[0].covisible, (std::map<int, int>{{b, 1}, {c, 1}}));
+  EXPECT_EQ(map.tracked_covisible(a), (std::map<int, int>{{b, 1}}));
+  EXPECT_EQ(map.tracked_covisible(b), (std::map<int, int>{{a, 1}}));
+  EXPECT_EQ(map.tracked_covisible(c), (std::map<int, int>{}));
+}
+
 TEST(Map, PointsSeenOnceAreRemovedAfterATrial) {
   Map map;
   for (int k = 0; k < 5; ++k) add(map, at(k, 0, 0));
@@ -155,6 +167,40 @@ TEST(KeyframeGraph, ALoopThatOthersContradictIsAMisfit) {
           {3, 8, d.truth[3].inverse() * d.truth[8] * at(0, 0, 0, 0.2), information_of(0.5, 0.05)}});
   d.graph.optimize(d.map);
   EXPECT_EQ(d.graph.misfits(d.map, 0.1, 0.05), (std::vector<int>{5})) << "one edge suffices";
+}
+
+TEST(KeyframeGraph, TheWorstMisfitComesFirst) {
+  Drift d;
+  const auto loop = [&](int a, int b, const Eigen::Isometry3d& error) {
+    return std::vector<RelativePose>{
+        {a, b,
+         d.map.keyframes[static_cast<std::size_t>(a)].world_from_camera.inverse() *
+             d.map.keyframes[static_cast<std::size_t>(b)].world_from_camera * error,
+         information_of(0.01, 0.01)}};
+  };
+  d.graph.add(1, loop(0, 5, at(0.15, 0, 0)));        // 1.5 bounds
+  d.graph.add(2, loop(1, 6, at(0, 0, 0, 0.2)));      // 4 bounds
+  d.graph.add(3, loop(2, 7, at(0.09, 0, 0, 0.04)));  // fits
+  d.graph.add(4, loop(3, 8, at(0.2, 0, 0, 0.01)));   // 2 bounds
+  EXPECT_EQ(d.graph.misfits(d.map, 0.1, 0.05), (std::vector<int>{2, 4, 1}));
+}
+
+// Loops that a wrong one bends the map away from fit again without it.
+TEST(KeyframeGraph, WithoutTheWorstMisfitCorrectLoopsFit) {
+  Drift d;
+  const auto loop = [&](std::size_t a, std::size_t b, const Eigen::Isometry3d& error) {
+    return std::vector<RelativePose>{{static_cast<int>(a), static_cast<int>(b),
+                                      d.truth[a].inverse() * d.truth[b] * error,
+                                      information_of(0.01, 0.01)}};
+  };
+  d.graph.add(1, loop(0, 11, at(0, 0, 0)));
+  d.graph.add(2, loop(1, 10, at(0, 0, 0)));
+  d.graph.add(3, loop(2, 9, at(2, 0, 0)));
+  d.graph.optimize(d.map);
+  EXPECT_EQ(d.graph.misfits(d.map, 0.1, 0.05), (std::vector<int>{3, 2}));
+  d.graph.remove(3);
+  d.graph.optimize(d.map);
+  EXPECT_EQ(d.graph.misfits(d.map, 0.1, 0.05), (std::vector<int>{}));
 }
 
 // A keyframe that lost the points it shared with its neighbours would follow one loop alone.
