@@ -86,7 +86,8 @@ std::vector<PreparedCloud> prepared(const AdoptedBatch& batch) {
     }
   });
   for (std::size_t k = 0; k < states.size(); ++k)
-    naming_cloud(batch.names, states.size(), k, [&] { check_viewpoints(*states[k]); });
+    naming_cloud(batch.names, states.size(), k,
+                 [&] { check_viewpoints(batch.knowledge[k], *states[k]); });
   resolve(batch, states);
   std::vector<PreparedCloud> out;
   for (auto& state : states) out.push_back(Access::cloud(std::move(state)));

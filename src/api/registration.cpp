@@ -65,7 +65,8 @@ std::vector<PreparedCloud> prepare_batch(const Context& context,
       states.push_back(std::move(state));
     }
   });
-  for (std::size_t k = 0; k < states.size(); ++k) naming(k, [&] { check_viewpoints(*states[k]); });
+  for (std::size_t k = 0; k < states.size(); ++k)
+    naming(k, [&] { check_viewpoints(knowledge[k], *states[k]); });
   resolve_viewpoints(*Access::engine(context), span_of(raw), knowledge, options, states);
   for (auto& state : states) out.push_back(Access::cloud(std::move(state)));
   return out;

@@ -118,7 +118,8 @@ void decide(Engine& engine, Span<const RawCloud> raw, const std::vector<CloudKno
 
 }  // namespace
 
-void check_viewpoints(const PreparedState& state) {
+void check_viewpoints(const CloudKnowledge& knowledge, const PreparedState& state) {
+  if (!knowledge.viewpoints) return;
   const float most = limits::kMaxViewpointDistance * state.options.normal_radius;
   for (const Vec3& place : state.viewpoints)
     for (const float coordinate : {place.x, place.y, place.z})

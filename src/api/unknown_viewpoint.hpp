@@ -22,8 +22,8 @@ CloudKnowledge knowledge_of(const View& view) {
 }
 
 /// @throws InvalidArgument for a given viewpoint that is so far from the cloud that its rays mean
-///   nothing.
-void check_viewpoints(const PreparedState& state);
+///   nothing. The origin of a cloud in map coordinates may be that far, as long as nobody gives it.
+void check_viewpoints(const CloudKnowledge& knowledge, const PreparedState& state);
 
 /// Sets PrepareStatistics::viewpoint of prepared clouds. Clouds whose sides turn out to be others
 /// than the preparation took are replaced: prepared again from their prepared points, with the
