@@ -205,7 +205,7 @@ def survivors():
 
 
 def devices():
-    context, runs = benchmarks("pipeline_h200_two_devices.json")
+    context, runs = benchmarks("pipeline_two_devices.json")
     one = runs["redwood_sized/cuda"]
     out = [
         "| devices | ms | speed-up | preparation, ms | memory per device, GiB |",
