@@ -132,7 +132,7 @@ void Adopted::take() {
 // Without the lock of the engine: the program must not wait for a running batch.
 std::shared_ptr<AdoptedCloud> CudaEngine::adopt(const RawCloud& cloud, const RowStreams& streams) {
   const DeviceScope scope(device());
-  const auto adopted = std::make_shared<Adopted>(exec_.memory(), cloud, streams);
+  const auto adopted = std::make_shared<Adopted>(lanes_.exec(0).memory(), cloud, streams);
   adopted->take();
   return adopted;
 }
@@ -142,15 +142,13 @@ std::shared_ptr<AdoptedCloud> CudaEngine::adopt(const RawCloud& cloud, const Row
 // device, without a copy.
 std::vector<std::shared_ptr<PreparedState>> CudaEngine::prepare_adopted(
     Span<const std::shared_ptr<AdoptedCloud>> clouds, const PrepareOptions& options) {
-  const DeviceScope scope(device());
   std::vector<RawCloud> raw;
   for (const std::shared_ptr<AdoptedCloud>& cloud : clouds) {
     const Adopted& adopted = static_cast<const Adopted&>(*cloud);
     adopted.wait();
     raw.push_back(adopted.raw);
   }
-  const std::lock_guard<std::mutex> lock(mutex_);
-  return prepare_on_stream(span_of(raw), options);
+  return prepare_anywhere(span_of(raw), options);
 }
 
 std::vector<float> CudaEngine::copy_points(const AdoptedCloud& cloud) {
@@ -159,11 +157,12 @@ std::vector<float> CudaEngine::copy_points(const AdoptedCloud& cloud) {
   std::vector<float> rows(3 * adopted.raw.size);
   if (rows.empty()) return rows;
   adopted.wait();
-  const std::lock_guard<std::mutex> lock(mutex_);
+  const Lanes::Held held = lanes_.any();
+  cudaStream_t stream = held.exec().stream();
   check(cudaMemcpyAsync(rows.data(), adopted.raw.points, rows.size() * sizeof(float),
-                        cudaMemcpyDeviceToHost, exec_.stream()),
+                        cudaMemcpyDeviceToHost, stream),
         "cudaMemcpyAsync");
-  check(cudaStreamSynchronize(exec_.stream()), "cudaStreamSynchronize");
+  check(cudaStreamSynchronize(stream), "cudaStreamSynchronize");
   return rows;
 }
 

@@ -3,7 +3,8 @@
 
 namespace gpureg::cuda {
 
-Exec::Exec(int device) : memory_(std::make_shared<DeviceMemory>(device)) {
+Exec::Exec(int device, std::shared_ptr<Uploader> uploader)
+    : memory_(std::make_shared<DeviceMemory>(device)), uploader_(std::move(uploader)) {
   int shared = 0;
   check(cudaDeviceGetAttribute(&multiprocessors_, cudaDevAttrMultiProcessorCount, device),
         "cudaDeviceGetAttribute");
@@ -49,7 +50,6 @@ void Exec::begin() {
 void Exec::trim() {
   synchronize();
   staging_.clear();
-  uploader_.clear();
   memory_->free_reached();
   // What the line before freed is free on the device from here on.
   synchronize();

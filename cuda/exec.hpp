@@ -19,7 +19,7 @@ namespace gpureg::cuda {
 /// default stream.
 class Exec {
  public:
-  explicit Exec(int device);
+  explicit Exec(int device, std::shared_ptr<Uploader> uploader = std::make_shared<Uploader>());
   ~Exec();
   Exec(const Exec&) = delete;
   Exec& operator=(const Exec&) = delete;
@@ -50,7 +50,8 @@ class Exec {
 
   /// Begins a call: frees the staging memory and the events of the previous one.
   void begin();
-  /// Waits for everything enqueued, then frees all memory that nothing uses.
+  /// Waits for everything enqueued, then frees all memory that nothing uses, apart from the
+  /// uploader's.
   void trim();
   /// Waits for everything enqueued.
   void synchronize();
@@ -75,7 +76,7 @@ class Exec {
     return static_cast<T*>(staging_.take(size * sizeof(T)));
   }
   /// Upload of large arrays from any host memory.
-  Uploader& uploader() { return uploader_; }
+  Uploader& uploader() { return *uploader_; }
   template <typename T>
   DeviceBuffer<T> upload(const T* host, std::size_t size) {
     DeviceBuffer<T> out(memory_, size);
@@ -108,7 +109,7 @@ class Exec {
  private:
   std::shared_ptr<DeviceMemory> memory_;
   PinnedArena staging_;
-  Uploader uploader_;
+  std::shared_ptr<Uploader> uploader_;
   std::vector<std::shared_ptr<const void>> held_;
   std::vector<cudaEvent_t> events_;
   std::size_t events_used_ = 0;

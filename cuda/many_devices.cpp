@@ -14,8 +14,11 @@ using pipeline::Run;
 using pipeline::SharedRuns;
 
 constexpr std::size_t kMinPairs = 32;  ///< of a run: fewer pairs do not fill a device
-constexpr std::size_t kMinClouds = 4;
-constexpr std::size_t kMaxClouds = 32;
+/// Runs of a lane in the pairs that a device aligns at once: they are short enough for all lanes to
+/// end together.
+constexpr std::size_t kRunsPerChunk = 4;
+/// Clouds of a run: fewer than the first do not pay, the second are enough where there are many.
+constexpr std::size_t kMinClouds = 4, kMostMinClouds = 32, kMaxClouds = 128;
 /// Chunks per call: the devices wait for each other only at its end.
 constexpr std::size_t kChunksPerDevice = 16;
 
@@ -42,9 +45,12 @@ class SurfacesOfMany final : public SurfaceMatcher {
 
 class EngineOfMany final : public DeviceEngine {
  public:
-  EngineOfMany(const std::vector<int>& devices, std::size_t memory_budget) {
+  EngineOfMany(const std::vector<int>& devices, std::size_t memory_budget)
+      : bounded_(memory_budget > 0) {
     for (const int device : devices)
       engines_.push_back(std::make_unique<CudaEngine>(device, memory_budget));
+    for (const auto& from : engines_)
+      for (const auto& to : engines_) from->allow_copies_to(*to);
   }
 
   Backend backend() const override { return Backend::cuda; }
@@ -71,7 +77,9 @@ class EngineOfMany final : public DeviceEngine {
   std::vector<std::shared_ptr<PreparedState>> prepare(Span<const RawCloud> clouds,
                                                       const PrepareOptions& options) override {
     std::vector<std::shared_ptr<PreparedState>> out(clouds.size);
-    SharedRuns runs(clouds.size, kMinClouds, kMaxClouds, engines_.size());
+    const std::size_t share = clouds.size / engines_.size();
+    SharedRuns runs(clouds.size, std::clamp(share, kMinClouds, kMostMinClouds), kMaxClouds,
+                    engines_.size());
     on_all(runs, clouds.size > kMinClouds,
            [&](CudaEngine& engine, std::size_t begin, std::size_t end) {
              auto made = engine.prepare({clouds.data + begin, end - begin}, options);
@@ -110,14 +118,24 @@ class EngineOfMany final : public DeviceEngine {
 
   void align(Span<const PairInput> pairs, const RegistrationOptions& options,
              Span<PairOutcome> outcomes) override {
-    // Less than the share of a device: the first runs wait for clouds of other devices.
-    SharedRuns runs(pairs.size, kMinPairs, engines_[0]->pairs_per_chunk(options) * 3 / 4,
-                    engines_.size());
-    on_all(runs, pairs.size > kMinPairs,
-           [&](CudaEngine& engine, std::size_t begin, std::size_t end) {
-             engine.align({pairs.data + begin, end - begin}, options,
-                          {outcomes.data + begin, end - begin});
-           });
+    const std::size_t most = engines_[0]->pairs_per_chunk(options);
+    if (bounded_) {
+      SharedRuns runs(pairs.size, kMinPairs, most, engines_.size());
+      return on_all(runs, pairs.size > kMinPairs,
+                    [&](CudaEngine& engine, std::size_t begin, std::size_t end) {
+                      engine.align({pairs.data + begin, end - begin}, options,
+                                   {outcomes.data + begin, end - begin});
+                    });
+    }
+    if (pairs.size <= kMinPairs) return engines_[0]->align(pairs, options, outcomes);
+    // Every lane of every device takes runs: none waits for another one but at the end.
+    const std::size_t lanes = engines_.size() * Lanes::kTogether;
+    SharedRuns runs(pairs.size, kMinPairs, most / kRunsPerChunk, lanes);
+    take_all(runs, lanes, [&](std::size_t k, std::size_t begin, std::size_t end) {
+      engines_[k % engines_.size()]->align_on_lane(k / engines_.size(),
+                                                   {pairs.data + begin, end - begin}, options,
+                                                   {outcomes.data + begin, end - begin});
+    });
   }
 
   void verify(Span<const PairInput> pairs, const std::vector<PosesOfPair>& poses,
@@ -149,14 +167,22 @@ class EngineOfMany final : public DeviceEngine {
   }
   CudaEngine& on(int device) const { return *engines_[index_of(device)]; }
 
-  /// Processes the runs with a thread per engine, or with the first engine alone. Rethrows the
-  /// exception of the first engine that fails.
+  /// Processes the runs with a thread per engine, or with the first engine alone.
   void on_all(SharedRuns& runs, bool spread,
               const std::function<void(CudaEngine&, std::size_t, std::size_t)>& work) {
-    on_threads(spread ? engines_.size() : 1, [&](std::size_t e) {
+    take_all(
+        runs, spread ? engines_.size() : 1,
+        [&](std::size_t e, std::size_t begin, std::size_t end) { work(*engines_[e], begin, end); });
+  }
+
+  /// Calls work(taker, begin, end) for the runs, with a thread for each of the takers. Rethrows the
+  /// exception of the first taker that fails.
+  template <typename Work>
+  static void take_all(SharedRuns& runs, std::size_t takers, const Work& work) {
+    on_threads(takers, [&](std::size_t taker) {
       try {
         for (Run run = runs.take(); run.size() > 0; run = runs.take())
-          work(*engines_[e], run.begin, run.end);
+          work(taker, run.begin, run.end);
       } catch (...) {
         runs.stop();
         throw;
@@ -164,6 +190,7 @@ class EngineOfMany final : public DeviceEngine {
     });
   }
 
+  bool bounded_;  ///< a memory budget
   std::vector<std::unique_ptr<CudaEngine>> engines_;
 };
 

@@ -57,6 +57,17 @@ DeviceMemory::DeviceMemory(int device) : device_(device) {
   throw_device_error(error, "cudaMemPoolCreate");
 }
 
+void DeviceMemory::allow_reading(int other_device) noexcept {
+  int possible = 0;
+  cudaMemAccessDesc access{};
+  access.location.type = cudaMemLocationTypeDevice;
+  access.location.id = other_device;
+  access.flags = cudaMemAccessFlagsProtReadWrite;
+  if (cudaDeviceCanAccessPeer(&possible, other_device, device_) != cudaSuccess || !possible ||
+      cudaMemPoolSetAccess(pool_, &access, 1) != cudaSuccess)
+    cudaGetLastError();
+}
+
 void DeviceMemory::destroy() noexcept {
   for (cudaMemPool_t pool : {pool_, lent_pool_})
     if (pool) cudaMemPoolDestroy(pool);
@@ -80,11 +91,13 @@ void* DeviceMemory::allocate(std::size_t bytes, cudaStream_t stream) {
   if (error == cudaErrorMemoryAllocation) {
     // The pool may hold only small pieces: release them and try once more.
     cudaGetLastError();
-    for (DeviceMemory* memory : {this, other_}) {
-      if (!memory) continue;
-      cudaStreamSynchronize(memory->stream_);
-      memory->trim();
-    }
+    cudaStreamSynchronize(stream_);
+    trim();
+    for (const auto& other : others_)
+      if (const auto memory = other.lock()) {
+        cudaStreamSynchronize(memory->stream_);
+        memory->trim();
+      }
     error = cudaMallocFromPoolAsync(&pointer, bytes, pool, stream);
   }
   if (error == cudaSuccess) {

@@ -46,8 +46,11 @@ class DeviceMemory {
   void free_after(void* pointer, std::size_t bytes, cudaEvent_t event) noexcept;
   void free_reached() noexcept;
   void trim() noexcept;  ///< returns the pools' free memory to the driver
-  /// Where the device has no memory left, allocate() also takes the free memory of another pool.
-  void take_from(DeviceMemory* other) { other_ = other; }
+  /// Lets another device read the memory where the hardware can: copies to it then take the direct
+  /// link instead of the host's memory.
+  void allow_reading(int other_device) noexcept;
+  /// Where the device has no memory left, allocate() also takes the free memory of others.
+  void take_from(const std::shared_ptr<DeviceMemory>& other) { others_.push_back(other); }
   std::size_t bytes_in_use() const { return in_use_; }
   std::size_t bytes_reserved() const;  ///< allocated from the driver: the peak of the use
 
@@ -58,7 +61,7 @@ class DeviceMemory {
   cudaStream_t stream_ = nullptr;
   cudaMemPool_t pool_ = nullptr;
   cudaMemPool_t lent_pool_ = nullptr;  ///< for allocations on other streams
-  DeviceMemory* other_ = nullptr;
+  std::vector<std::weak_ptr<DeviceMemory>> others_;
   std::atomic<std::size_t> in_use_{0};
   struct Late {
     void* pointer;

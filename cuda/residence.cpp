@@ -12,6 +12,16 @@
 namespace gpureg::cuda {
 
 void Residence::add(const Fragment& fragment) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  add_locked(fragment);
+}
+
+void Residence::make_room(std::size_t more, const std::vector<const Fragment*>& kept) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  make_room_locked(more, kept);
+}
+
+void Residence::add_locked(const Fragment& fragment) {
   if (budget_ > 0) entries_[&fragment] = {fragment.weak_from_this(), ++clock_};
 }
 
@@ -20,7 +30,7 @@ void Residence::forget_expired() {
     entry = entry->second.fragment.expired() ? entries_.erase(entry) : std::next(entry);
 }
 
-void Residence::make_room(std::size_t more, const std::vector<const Fragment*>& kept) {
+void Residence::make_room_locked(std::size_t more, const std::vector<const Fragment*>& kept) {
   if (budget_ == 0) return;
   forget_expired();
   const std::unordered_set<const Fragment*> keep(kept.begin(), kept.end());
@@ -36,7 +46,7 @@ void Residence::make_room(std::size_t more, const std::vector<const Fragment*>& 
   for (const auto& [used, fragment] : by_use) {
     if (bytes <= budget_) break;
     if (keep.count(fragment.get()) > 0) continue;
-    evictions_ += fragment->evict(*exec_.memory());
+    evictions_ += fragment->evict(*memory_);
     bytes -= std::min(bytes, fragment->bytes());
     entries_.erase(fragment.get());
   }
@@ -47,12 +57,14 @@ void Residence::make_room(std::size_t more, const std::vector<const Fragment*>& 
 }
 
 std::vector<std::shared_ptr<const CudaCloud>> Residence::bring(
-    const std::vector<const Fragment*>& fragments) {
+    Exec& exec, const std::vector<const Fragment*>& fragments) {
+  // A lane that needs what the other one copies waits for it.
+  const std::lock_guard<std::mutex> lock(mutex_);
   std::vector<std::shared_ptr<const CudaCloud>> out;
   std::vector<std::size_t> missing;
   std::size_t bytes = 0;
   for (std::size_t k = 0; k < fragments.size(); ++k) {
-    out.push_back(fragments[k]->on(exec_.device()));
+    out.push_back(fragments[k]->on(device()));
     if (!out.back()) {
       missing.push_back(k);
       bytes += fragments[k]->bytes();
@@ -61,12 +73,12 @@ std::vector<std::shared_ptr<const CudaCloud>> Residence::bring(
     if (entry != entries_.end() && !entry->second.fragment.expired()) entry->second.used = ++clock_;
   }
   if (missing.empty()) return out;
-  make_room(bytes, fragments);
-  for (const std::size_t k : missing) out[k] = fragments[k]->start_copy(exec_);
-  exec_.synchronize();
+  make_room_locked(bytes, fragments);
+  for (const std::size_t k : missing) out[k] = fragments[k]->start_copy(exec);
+  exec.synchronize();
   for (const std::size_t k : missing) {
     fragments[k]->keep(out[k]);
-    add(*fragments[k]);
+    add_locked(*fragments[k]);
   }
   return out;
 }

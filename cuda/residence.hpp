@@ -9,22 +9,23 @@
 namespace gpureg::cuda {
 
 /// Tracks the fragments in the memory of one engine: loads them, and evicts the least recently used
-/// ones beyond a budget. Not thread-safe.
+/// ones beyond a budget. Both lanes of the engine may use it at the same time.
 class Residence {
  public:
   /// budget: bytes; 0: no limit.
-  Residence(Exec& exec, std::size_t budget) : exec_(exec), budget_(budget) {}
+  Residence(const Exec& exec, std::size_t budget) : memory_(exec.memory()), budget_(budget) {}
 
+  int device() const { return memory_->device(); }
   std::size_t budget() const { return budget_; }
   std::size_t evictions() const { return evictions_; }
 
   /// Registers a fragment made on this device.
   void add(const Fragment& fragment);
-  /// Copies of these fragments on the device of exec, one each and ready to read; they stay there
-  /// while referenced. Throws DeviceError where the budget or the device cannot hold all of them at
-  /// once.
+  /// Copies of these fragments on the device, one each and ready to read; exec copies those that
+  /// are missing. They stay there while referenced. Throws DeviceError where the budget or the
+  /// device cannot hold all of them at once.
   std::vector<std::shared_ptr<const CudaCloud>> bring(
-      const std::vector<const Fragment*>& fragments);
+      Exec& exec, const std::vector<const Fragment*>& fragments);
   /// Evicts fragments until the remaining ones, except `kept`, and `more` bytes are within the
   /// budget.
   void make_room(std::size_t more, const std::vector<const Fragment*>& kept);
@@ -35,9 +36,12 @@ class Residence {
     std::weak_ptr<const Fragment> fragment;
     std::uint64_t used;
   };
+  void add_locked(const Fragment& fragment);
+  void make_room_locked(std::size_t more, const std::vector<const Fragment*>& kept);
   void forget_expired();
 
-  Exec& exec_;
+  std::mutex mutex_;
+  std::shared_ptr<DeviceMemory> memory_;
   std::size_t budget_;
   std::unordered_map<const Fragment*, Entry> entries_;
   std::uint64_t clock_ = 0;

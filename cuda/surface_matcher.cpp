@@ -13,11 +13,15 @@ constexpr std::uint32_t kSurfacesPerRun = 4096;
 
 }  // namespace
 
-CudaSurfaces::CudaSurfaces(Exec& exec, std::mutex& mutex, Span<const SurfaceArrays> surfaces)
-    : exec_(exec), mutex_(mutex), surfaces_(surfaces.begin(), surfaces.end()) {
+CudaSurfaces::CudaSurfaces(Lanes& lanes, Span<const SurfaceArrays> surfaces)
+    : lanes_(lanes), surfaces_(surfaces.begin(), surfaces.end()) {
+  const Lanes::Held held = lanes_.one(kLane);
+  Exec& exec = held.exec();
+  const DeviceScope scope(exec.device());
+  exec.begin();
   std::size_t total = 0;
   for (const SurfaceArrays& surface : surfaces_) total += surface.size;
-  rows_ = exec_.buffer<float>(7 * total);
+  rows_ = exec.buffer<float>(7 * total);
   std::vector<RowsToUpload> parts;
   float* next = rows_.data();
   const auto move = [&](const float*& rows, std::size_t count, std::size_t width) {
@@ -30,9 +34,9 @@ CudaSurfaces::CudaSurfaces(Exec& exec, std::mutex& mutex, Span<const SurfaceArra
     move(surface.normals, surface.size, 3);
     move(surface.variances, surface.size, 1);
   }
-  exec_.uploader().upload(span_of(parts), exec_.device(), exec_.stream());
-  on_device_ = exec_.upload(surfaces_);
-  exec_.synchronize();
+  exec.uploader().upload(span_of(parts), exec.device(), exec.stream());
+  on_device_ = exec.upload(surfaces_);
+  exec.synchronize();
   make_runs();
 }
 
@@ -49,11 +53,11 @@ void CudaSurfaces::make_runs() {
   }
 }
 
-void CudaSurfaces::bring_grids(const Run& run, float distance) {
+void CudaSurfaces::bring_grids(Exec& exec, const Run& run, float distance) {
   if (first_in_grids_ == run.begin && distance_ == distance) return;
   first_in_grids_ = ~0u;
   grids_ = {};
-  grids_ = build_surface_grids(exec_, {surfaces_.data() + run.begin, run.end - run.begin},
+  grids_ = build_surface_grids(exec, {surfaces_.data() + run.begin, run.end - run.begin},
                                on_device_.data() + run.begin, distance);
   first_in_grids_ = run.begin;
   distance_ = distance;
@@ -61,8 +65,9 @@ void CudaSurfaces::bring_grids(const Run& run, float distance) {
 
 void CudaSurfaces::add_up(Span<const SurfacePairInput> pairs, const SurfaceTerms& terms,
                           Span<SurfaceSums> sums) {
-  const std::lock_guard<std::mutex> lock(mutex_);
-  const DeviceScope scope(exec_.device());
+  const Lanes::Held held = lanes_.one(kLane);
+  Exec& exec = held.exec();
+  const DeviceScope scope(exec.device());
   std::fill(sums.begin(), sums.end(), SurfaceSums{});
   for (const Run& run : runs_) {
     std::vector<std::size_t> place;
@@ -78,14 +83,14 @@ void CudaSurfaces::add_up(Span<const SurfacePairInput> pairs, const SurfaceTerms
       most_points = std::max(most_points, surfaces_[pair.source].size);
     }
     if (some.empty()) continue;
-    exec_.begin();
-    bring_grids(run, terms.max_distance);
-    const auto on_device = exec_.upload(some);
-    const auto results = exec_.filled<SurfaceSums>(some.size(), 0);
-    add_up_surfaces(exec_, on_device_.data(), grids_, run.begin, on_device.data(), some.size(),
+    exec.begin();
+    bring_grids(exec, run, terms.max_distance);
+    const auto on_device = exec.upload(some);
+    const auto results = exec.filled<SurfaceSums>(some.size(), 0);
+    add_up_surfaces(exec, on_device_.data(), grids_, run.begin, on_device.data(), some.size(),
                     most_points, terms, results.data());
-    const SurfaceSums* added = exec_.download(results.data(), some.size());
-    exec_.synchronize();
+    const SurfaceSums* added = exec.download(results.data(), some.size());
+    exec.synchronize();
     for (std::size_t k = 0; k < place.size(); ++k) sums[place[k]] = added[k];
   }
 }

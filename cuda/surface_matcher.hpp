@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <mutex>
 #include <vector>
 
+#include "lanes.hpp"
 #include "pipeline/surface_matcher.hpp"
 #include "surface_grids.hpp"
 
@@ -13,8 +13,8 @@ namespace gpureg::cuda {
 /// time.
 class CudaSurfaces final : public SurfaceMatcher {
  public:
-  /// Uploads the surfaces. The caller holds the mutex and has called Exec::begin().
-  CudaSurfaces(Exec& exec, std::mutex& mutex, Span<const SurfaceArrays> surfaces);
+  /// Uploads the surfaces. The lanes must outlive them.
+  CudaSurfaces(Lanes& lanes, Span<const SurfaceArrays> surfaces);
 
   void add_up(Span<const SurfacePairInput> pairs, const SurfaceTerms& terms,
               Span<SurfaceSums> sums) override;
@@ -25,10 +25,10 @@ class CudaSurfaces final : public SurfaceMatcher {
     std::uint32_t begin, end;
   };
   void make_runs();
-  void bring_grids(const Run& run, float distance);
+  void bring_grids(Exec& exec, const Run& run, float distance);
 
-  Exec& exec_;
-  std::mutex& mutex_;
+  static constexpr std::size_t kLane = 0;
+  Lanes& lanes_;
   std::vector<SurfaceArrays> surfaces_;  ///< arrays on the device
   std::vector<Run> runs_;
   DeviceBuffer<float> rows_;

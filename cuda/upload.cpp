@@ -28,6 +28,11 @@ Uploader::~Uploader() {
     if (event) cudaEventDestroy(event);
 }
 
+void Uploader::clear() noexcept {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  slots_ = PinnedBuffer();
+}
+
 void Uploader::prepare_slots() {
   if (!slots_.data()) slots_ = PinnedBuffer(kThreads * kSlots * kSlotBytes);
   for (cudaEvent_t& event : free_)
@@ -44,6 +49,7 @@ void Uploader::upload(Span<const RowsToUpload> parts, int device, cudaStream_t s
                         part.width, part.stride, part.device + first * part.width});
   }
   if (pieces.empty()) return;
+  const std::lock_guard<std::mutex> lock(mutex_);
   prepare_slots();
   // One core packs slower than the bus transfers; few pieces do not amortise the start of a thread.
   const std::size_t threads = std::min<std::size_t>(

@@ -40,8 +40,9 @@ struct DeviceMemoryUse {
 /// Owns the resources of a backend: threads (CPU), or device, streams and memory (CUDA). Copies
 /// share the same resources.
 ///
-/// Thread-safe: threads may share one Context; their calls run one after another. Two contexts are
-/// independent, nothing is global.
+/// Thread-safe: threads may share one Context. On the CPU their calls run one after another. On
+/// CUDA two small calls (fewer than 128 pairs, no memory budget) run at the same time, others one
+/// after another. Two contexts are independent, nothing is global.
 class Context {
  public:
   /// CPU backend.

@@ -93,8 +93,8 @@ inline PreparedCloud prepare(const Context& context, const DevicePointCloudView&
 }
 
 /// align() that returns at once, on any backend. Each pending call has a thread of its own; calls
-/// of one context run one after another. Destroying the future waits for the result, as with
-/// std::async. Thread-safe.
+/// of one context share it or wait for each other (Context). Destroying the future waits for the
+/// result, as with std::async. Thread-safe.
 /// @return future of the result; it rethrows all errors of align().
 inline std::future<RegistrationResult> align_async(const Context& context,
                                                    const PreparedCloud& source,

@@ -61,7 +61,7 @@ struct PointToPlaneSums {
 /// Scans in the memory of a context. The bits of the sums do not depend on the backend, on the
 /// number of threads, or on the other pairs of a call.
 ///
-/// Thread-safe: calls run one after another, as those of the context.
+/// Thread-safe: calls run one after another.
 class SurfaceSet {
  public:
   /// @param surfaces their arrays have to outlive the set.

@@ -13,7 +13,7 @@ namespace gpureg {
 enum class Backend;
 
 /// Private interface between the public API (src/api) and the backends (src/cpu, cuda).
-/// Thread-safe: calls run one after another.
+/// Thread-safe: calls of several threads share the backend or wait for it.
 class Engine {
  public:
   virtual ~Engine() = default;
