@@ -1,32 +1,57 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <cmath>
+
 #include "algorithm/evidence.hpp"
+#include "cpu/wide_vectors.hpp"
 
 namespace gpureg::cpu {
 
-/// add_icp_term() for eight correspondences at a time, to the same bits. Truncated terms are
-/// integers of at most 2^40, so doubles add thousands of them exactly.
+/// A point of the moved cloud beside its closest point.
+struct IcpCorrespondence {
+  Vec3 point, normal;  ///< of the moved cloud, in its own frame
+  Vec3 moved;          ///< the point under the pose
+  Vec3 other, other_normal;
+  std::uint32_t weight;  ///< of the moved cloud's normal
+};
+
+/// What turns correspondences into terms.
+struct IcpTerms {
+  Rigid pose;
+  float min_cosine, kernel_width, inverse_radius, inverse_max;
+};
+
+/// add_icp_term() for sixteen correspondences at a time, to the same bits; those whose normals
+/// disagree have no terms. Truncated terms are integers of at most 2^40, so doubles add thousands
+/// of them exactly.
 class IcpBatch {
  public:
-  static constexpr int kLanes = 8;
+  static constexpr int kLanes = 16;
 
-  void add(Vec3 arm, Vec3 normal, float residual, float weight) {
-    ax_[size_] = arm.x;
-    ay_[size_] = arm.y;
-    az_[size_] = arm.z;
-    nx_[size_] = normal.x;
-    ny_[size_] = normal.y;
-    nz_[size_] = normal.z;
-    residual_[size_] = residual;
-    weight_[size_] = weight;
+  explicit IcpBatch(const IcpTerms& terms) : terms_(terms) {}
+
+  void add(const IcpCorrespondence& c) {
+    px_[size_] = c.point.x;
+    py_[size_] = c.point.y;
+    pz_[size_] = c.point.z;
+    mx_[size_] = c.normal.x;
+    my_[size_] = c.normal.y;
+    mz_[size_] = c.normal.z;
+    // The difference is all that counts.
+    const Vec3 d = c.moved - c.other;
+    dx_[size_] = d.x;
+    dy_[size_] = d.y;
+    dz_[size_] = d.z;
+    nx_[size_] = c.other_normal.x;
+    ny_[size_] = c.other_normal.y;
+    nz_[size_] = c.other_normal.z;
+    weight_[size_] = c.weight;
     if (++size_ == kLanes) flush();
   }
   IcpSums sums() {
-    // Missing correspondences of a partial batch get weight zero.
-    for (; size_ > 0 && size_ < kLanes; ++size_)
-      ax_[size_] = ay_[size_] = az_[size_] = nx_[size_] = ny_[size_] = nz_[size_] =
-          residual_[size_] = weight_[size_] = 0.0f;
+    // The rest of a partial batch gets weight zero.
+    for (int l = size_; l < kLanes; ++l) weight_[l] = 0;
     if (size_ > 0) flush();
     settle();
     return total_;
@@ -36,28 +61,45 @@ class IcpBatch {
   static constexpr int kFlushes = 4096;  ///< 2^12 terms of up to 2^40 in each lane: below 2^53
 
   void flush() {
-    alignas(32) float j[6][kLanes], weighted[6][kLanes];
-    for (int l = 0; l < kLanes; ++l) {
-      const Vec3 turn = cross({ax_[l], ay_[l], az_[l]}, {nx_[l], ny_[l], nz_[l]});
-      j[0][l] = turn.x;
-      j[1][l] = turn.y;
-      j[2][l] = turn.z;
-      j[3][l] = nx_[l];
-      j[4][l] = ny_[l];
-      j[5][l] = nz_[l];
-    }
-    for (int a = 0; a < 6; ++a)
-      for (int l = 0; l < kLanes; ++l) weighted[a][l] = weight_[l] * j[a][l];
-    int k = 0;
-    for (int a = 0; a < 6; ++a)
-      for (int b = 0; b <= a; ++b) add_terms(weighted[a], j[b], sum_[k++]);
-    for (int a = 0; a < 6; ++a) add_terms(weighted[a], residual_, sum_[k++]);
+#ifdef GPUREG_WIDE_TARGET
+    if (has_wide_vectors())
+      flush_wide();
+    else
+#endif
+      flush_in_vectors();
     size_ = 0;
     if (++flushes_ == kFlushes) settle();
   }
-  static void add_terms(const float* a, const float* b, double* sum) {
+#ifdef GPUREG_WIDE_TARGET
+  GPUREG_WIDE_TARGET void flush_wide() { flush_in_vectors(); }
+#endif
+  GPUREG_ALWAYS_INLINE void flush_in_vectors() {
+    alignas(64) float j[6][kLanes], weighted[6][kLanes], residual[kLanes], weight[kLanes];
+    const IcpTerms t = terms_;
+    for (int l = 0; l < kLanes; ++l) {
+      const Vec3 n{nx_[l], ny_[l], nz_[l]}, m = rotate(t.pose, {mx_[l], my_[l], mz_[l]});
+      const float distance = dot(Vec3{dx_[l], dy_[l], dz_[l]}, n);
+      const float w = robust_weight(distance, t.kernel_width) * normal_weight_share(weight_[l]);
+      weight[l] = normals_agree(m, n, t.min_cosine) ? w : 0.0f;
+      residual[l] = distance * t.inverse_max;
+      const Vec3 turn = cross(rotate(t.pose, {px_[l], py_[l], pz_[l]}) * t.inverse_radius, n);
+      j[0][l] = turn.x;
+      j[1][l] = turn.y;
+      j[2][l] = turn.z;
+      j[3][l] = n.x;
+      j[4][l] = n.y;
+      j[5][l] = n.z;
+    }
+    for (int a = 0; a < 6; ++a)
+      for (int l = 0; l < kLanes; ++l) weighted[a][l] = weight[l] * j[a][l];
+    int k = 0;
+    for (int a = 0; a < 6; ++a)
+      for (int b = 0; b <= a; ++b) add_terms(weighted[a], j[b], sum_[k++]);
+    for (int a = 0; a < 6; ++a) add_terms(weighted[a], residual, sum_[k++]);
+  }
+  GPUREG_ALWAYS_INLINE static void add_terms(const float* a, const float* b, double* sum) {
     for (int l = 0; l < kLanes; ++l)
-      sum[l] += std::trunc(static_cast<double>(a[l] * b[l] * kIcpFixedScale));
+      sum[l] += static_cast<double>(std::trunc(a[l] * b[l] * kIcpFixedScale));
   }
   void settle() {
     for (int k = 0; k < 27; ++k)
@@ -68,9 +110,12 @@ class IcpBatch {
     flushes_ = 0;
   }
 
-  alignas(32) float ax_[kLanes], ay_[kLanes], az_[kLanes], nx_[kLanes], ny_[kLanes], nz_[kLanes],
-      residual_[kLanes], weight_[kLanes];
-  alignas(32) double sum_[27][kLanes] = {};
+  const IcpTerms terms_;
+  alignas(64) float px_[kLanes] = {}, py_[kLanes] = {}, pz_[kLanes] = {}, mx_[kLanes] = {},
+                    my_[kLanes] = {}, mz_[kLanes] = {}, dx_[kLanes] = {}, dy_[kLanes] = {},
+                    dz_[kLanes] = {}, nx_[kLanes] = {}, ny_[kLanes] = {}, nz_[kLanes] = {};
+  alignas(64) std::uint32_t weight_[kLanes] = {};
+  alignas(64) double sum_[27][kLanes] = {};
   IcpSums total_{{0}};
   int size_ = 0, flushes_ = 0;
 };

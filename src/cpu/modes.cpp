@@ -16,21 +16,15 @@ IcpSums mode_sums(MovedPoints& moved, const PairView& pair, const Pose<double>& 
   const CloudView &s = pair.source, &t = pair.target;
   const float max_squared =
       options.prepare.max_correspondence_distance * options.prepare.max_correspondence_distance;
-  const float inverse_max = 1.0f / options.prepare.max_correspondence_distance,
-              inverse_radius = 1.0f / s.radius;
-  IcpBatch batch;
+  IcpBatch batch({rigid, min_cosine, kernel_width, 1.0f / s.radius,
+                  1.0f / options.prepare.max_correspondence_distance});
   moved.for_each_group(rigid, [&](std::size_t group, const PointBounds& bounds) {
-    moved.closest(
-        rigid, group, bounds.possible, max_squared, [&](std::size_t k, Vec3 q, Closest c) {
-          if (c.index == kNoValue || is_zero(t.normals[c.index])) return;
-          if (!normals_agree(rotate(rigid, moved.normal(k)), t.normals[c.index], min_cosine))
-            return;
-          const float distance = dot(q - t.points[c.index], t.normals[c.index]);
-          batch.add(rotate(rigid, moved.point(k)) * inverse_radius, t.normals[c.index],
-                    distance * inverse_max,
-                    robust_weight(distance, kernel_width) *
-                        normal_weight_share(s.normal_weight[moved.order().index[k]]));
-        });
+    moved.closest(rigid, group, bounds.possible, max_squared,
+                  [&](std::size_t k, Vec3 q, Closest c) {
+                    if (c.index == kNoValue || is_zero(t.normals[c.index])) return;
+                    batch.add({moved.point(k), moved.normal(k), q, t.points[c.index],
+                               t.normals[c.index], s.normal_weight[moved.order().index[k]]});
+                  });
   });
   return batch.sums();
 }

@@ -62,8 +62,7 @@ TEST_F(LanesOnCuda, SmallAndLargeCallsAtTheSameTimeGiveTheSame) {
       }
       const auto clouds = prepare_batch(context, views, options.prepare);
       for (const Pair& p : many)
-        got[t].push_back(
-            test::bytes(align(context, clouds[p.source], clouds[p.target], options)));
+        got[t].push_back(test::bytes(align(context, clouds[p.source], clouds[p.target], options)));
     });
   for (std::thread& t : threads) t.join();
   for (const Results& results : got) EXPECT_EQ(results, expected);
