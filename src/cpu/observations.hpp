@@ -2,6 +2,7 @@
 #pragma once
 
 #include "algorithm/visibility.hpp"
+#include "cpu/wide_vectors.hpp"
 #include "math/rigid.hpp"
 
 namespace gpureg::cpu {
@@ -40,12 +41,14 @@ struct MovedGroup {
   }
 };
 
-/// observe() of one map for all locations, added to s, in vectorised loops. normals: moved like the
-/// locations; read only with incidences.
-inline void add_observations(const VisibilityView& maps, std::uint32_t map,
-                             const MovedGroup& locations, float margin, float min_range,
-                             Observations& s, const MovedGroup* normals = nullptr,
-                             Incidences* incidences = nullptr) {
+/// add_observations() with the vectors of the caller's target.
+template <typename Mask>
+GPUREG_ALWAYS_INLINE void add_observations_in_vectors(const VisibilityView& maps,
+                                                      std::uint32_t map,
+                                                      const MovedGroup& locations, float margin,
+                                                      float min_range, Observations& s,
+                                                      const MovedGroup* normals,
+                                                      Incidences* incidences) {
   constexpr int kSize = MovedGroup::kSize;
   alignas(32) float ray[kSize], depth[kSize];
   alignas(32) std::uint32_t cell[kSize];
@@ -60,19 +63,15 @@ inline void add_observations(const VisibilityView& maps, std::uint32_t map,
   for (int k = 0; k < kSize; ++k) steps[k] = depths[cell[k]];
   for (int k = 0; k < kSize; ++k)
     depth[k] = static_cast<float>(static_cast<std::int32_t>(steps[k])) * maps.step;
-  // One byte for each location and comparison, then eight bytes at a time become bits.
-  alignas(32) std::uint8_t known[kSize], before[kSize], behind[kSize];
+  // One byte for each location and comparison.
+  alignas(64) std::uint8_t known[kSize], before[kSize], behind[kSize];
   for (int k = 0; k < kSize; ++k) {
     known[k] = (ray[k] > min_range) & (steps[k] != kUnknownDepth);
     before[k] = ray[k] < depth[k] - margin;
     behind[k] = ray[k] > depth[k] + margin;
   }
-  std::uint64_t is_known = 0, is_before = 0, is_behind = 0;
-  for (int k = 0; k < kSize; ++k) {
-    is_known |= static_cast<std::uint64_t>(known[k]) << k;
-    is_before |= static_cast<std::uint64_t>(before[k]) << k;
-    is_behind |= static_cast<std::uint64_t>(behind[k]) << k;
-  }
+  const std::uint64_t is_known = Mask::of(known), is_before = Mask::of(before),
+                      is_behind = Mask::of(behind);
   if (incidences) {
     alignas(32) float weight[kSize];
     for (int k = 0; k < kSize; ++k)
@@ -90,6 +89,31 @@ inline void add_observations(const VisibilityView& maps, std::uint32_t map,
   s.observed |= is_known;
   s.violating |= is_known & is_before;
   s.surface |= is_known & ~is_before & ~is_behind;
+}
+
+#ifdef GPUREG_WIDE_TARGET
+GPUREG_WIDE_TARGET inline void add_observations_wide(const VisibilityView& maps, std::uint32_t map,
+                                                     const MovedGroup& locations, float margin,
+                                                     float min_range, Observations& s,
+                                                     const MovedGroup* normals,
+                                                     Incidences* incidences) {
+  add_observations_in_vectors<WideMask>(maps, map, locations, margin, min_range, s, normals,
+                                        incidences);
+}
+#endif
+
+/// observe() of one map for all locations, added to s, in vectorised loops. normals: moved like the
+/// locations; read only with incidences.
+inline void add_observations(const VisibilityView& maps, std::uint32_t map,
+                             const MovedGroup& locations, float margin, float min_range,
+                             Observations& s, const MovedGroup* normals = nullptr,
+                             Incidences* incidences = nullptr) {
+#ifdef GPUREG_WIDE_TARGET
+  if (has_wide_vectors())
+    return add_observations_wide(maps, map, locations, margin, min_range, s, normals, incidences);
+#endif
+  add_observations_in_vectors<NarrowMask>(maps, map, locations, margin, min_range, s, normals,
+                                          incidences);
 }
 
 }  // namespace gpureg::cpu
