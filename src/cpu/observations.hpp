@@ -43,8 +43,7 @@ struct MovedGroup {
 
 /// add_observations() with the vectors of the caller's target.
 template <typename Mask>
-GPUREG_ALWAYS_INLINE void add_observations_in_vectors(const VisibilityView& maps,
-                                                      std::uint32_t map,
+GPUREG_ALWAYS_INLINE void add_observations_in_vectors(const VisibilityView& maps, std::uint32_t map,
                                                       const MovedGroup& locations, float margin,
                                                       float min_range, Observations& s,
                                                       const MovedGroup* normals,
