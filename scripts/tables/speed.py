@@ -208,18 +208,35 @@ def devices():
     context, runs = benchmarks("pipeline_two_devices.json")
     one = runs["redwood_sized/cuda"]
     out = [
-        "| devices | ms | speed-up | preparation, ms | memory per device, GiB |",
-        "| --- | --- | --- | --- | --- |",
+        "| devices | cold, ms | speed-up | of it preparation, ms | warm, ms | speed-up | memory per device, GiB |",
+        "| --- | --- | --- | --- | --- | --- | --- |",
     ]
     for run in [one] + (
         [runs["redwood_sized/cuda_all"]] if int(context.get("gpus", 1)) > 1 else []
     ):
         out.append(
-            f"| {run['devices']:.0f} | {run['real_time']:.0f} | {one['real_time'] / run['real_time']:.2f} x | {run['ms_prepare']:.0f} | {run['GiB_per_device']:.1f} |"
+            f"| {run['devices']:.0f} | {run['real_time']:.0f} | {one['real_time'] / run['real_time']:.2f} x | {run['ms_prepare']:.0f} | "
+            f"{run['ms_warm']:.0f} | {one['ms_warm'] / run['ms_warm']:.2f} x | {run['GiB_per_device']:.1f} |"
         )
     return out + [
         "",
         f"Made by `scripts/gpu_check` at commit {context['commit']} on {context['gpu']}.",
+    ]
+
+
+def threads():
+    """Single calls of several threads that share a context."""
+    context, runs = benchmarks()
+    rows = [runs[f"align_from_threads/cuda_default/{n}"] for n in (1, 2, 4, 8)]
+    return [
+        "| threads | ms per pair | gain |",
+        "| --- | --- | --- |",
+        *[
+            f"| {n} | {run['ms_per_pair']:.2f} | {rows[0]['ms_per_pair'] / run['ms_per_pair']:.2f} x |"
+            for n, run in zip((1, 2, 4, 8), rows, strict=True)
+        ],
+        "",
+        made_by(context),
     ]
 
 
@@ -306,6 +323,7 @@ TABLES = {
     "pipeline_house": pipeline_house,
     "pipeline_steps": pipeline_steps,
     "devices": devices,
+    "threads": threads,
     "survivors": survivors,
     "large_maps": large_maps,
     "scaling": scaling,
