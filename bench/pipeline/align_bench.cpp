@@ -192,12 +192,12 @@ BENCHMARK_CAPTURE(raw_to_pose, cuda_loopsmart, "cuda", "loopsmart")
     ->UseRealTime();
 BENCHMARK_CAPTURE(redwood_sized, cuda, "cuda")
     ->Iterations(1)
-    ->Repetitions(3)
+    ->Repetitions(7)
     ->Unit(benchmark::kMillisecond)
     ->UseRealTime();
 BENCHMARK_CAPTURE(redwood_sized, cuda_all, "cuda_all")
     ->Iterations(1)
-    ->Repetitions(3)
+    ->Repetitions(7)
     ->Unit(benchmark::kMillisecond)
     ->UseRealTime();
 BENCHMARK_CAPTURE(align_many, cpu_loopsmart, "cpu", "loopsmart")
