@@ -4,7 +4,6 @@
 #include <array>
 #include <condition_variable>
 #include <cstddef>
-#include <exception>
 #include <memory>
 #include <mutex>
 
@@ -29,7 +28,7 @@ class Lanes {
    public:
     Held(Lanes& lanes, std::size_t first, std::size_t count)
         : lanes_(lanes), first_(first), count_(count) {}
-    ~Held();
+    ~Held() { lanes_.release(first_, count_); }
     Held(const Held&) = delete;
     Held& operator=(const Held&) = delete;
     Exec& exec(std::size_t k = 0) const { return *lanes_.execs_[first_ + k]; }
@@ -37,7 +36,6 @@ class Lanes {
    private:
     Lanes& lanes_;
     std::size_t first_, count_;
-    int exceptions_before_ = std::uncaught_exceptions();
   };
   /// The first free lane that no other call waits for; waits where there is none.
   Held any();
