@@ -38,9 +38,6 @@ Lanes::Held Lanes::take(std::size_t first, std::size_t count) {
 }
 
 void Lanes::release(std::size_t first, std::size_t count) {
-  // A call that failed may leave work behind that reads clouds in the memory of other lanes, and
-  // their owner may free these from here on. The work of other calls is done: this costs nothing.
-  for (std::size_t k = first; k < first + count; ++k) cudaStreamSynchronize(execs_[k]->stream());
   {
     const std::lock_guard<std::mutex> lock(mutex_);
     for (std::size_t k = first; k < first + count; ++k) busy_[k] = false;
