@@ -36,7 +36,7 @@ class CudaEngine final : public DeviceEngine {
   std::vector<float> copy_points(const AdoptedCloud& cloud) override;
   void align(Span<const PairInput> pairs, const RegistrationOptions& options,
              Span<PairOutcome> outcomes) override;
-  /// On one lane; other threads may use the other one at the same time. Requires !has_budget().
+  /// On one lane; other threads may use the others at the same time. Requires !has_budget().
   void align_on_lane(std::size_t lane, Span<const PairInput> pairs,
                      const RegistrationOptions& options, Span<PairOutcome> outcomes);
   void verify(Span<const PairInput> pairs, const std::vector<PosesOfPair>& poses,

@@ -45,7 +45,7 @@ class Lanes {
 
   /// Waits for all work, then returns memory without a use to the driver.
   void trim();
-  /// To read what has a lock of its own, without holding the lane.
+  /// Without holding the lane: only for what never changes or is thread-safe, as its memory.
   const Exec& exec(std::size_t lane) const { return *execs_[lane]; }
 
  private:
@@ -57,7 +57,7 @@ class Lanes {
   std::mutex mutex_;
   std::condition_variable freed_;
   std::array<bool, kLanes> busy_{};
-  std::array<std::size_t, kLanes> wanted_{};  ///< calls that wait for this lane and no other
+  std::array<std::size_t, kLanes> wanted_{};  ///< calls that wait for this lane in particular
 };
 
 }  // namespace gpureg::cuda

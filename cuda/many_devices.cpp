@@ -17,7 +17,7 @@ constexpr std::size_t kMinPairs = 32;  ///< of a run: fewer pairs do not fill a 
 /// Runs of a lane in the pairs that a device aligns at once: they are short enough for all lanes to
 /// end together.
 constexpr std::size_t kRunsPerChunk = 4;
-/// Clouds of a run: fewer than the first do not pay, the second are enough where there are many.
+/// A run has at least kMinClouds clouds, in large batches kMostMinClouds, and at most kMaxClouds.
 constexpr std::size_t kMinClouds = 4, kMostMinClouds = 32, kMaxClouds = 128;
 /// Chunks per call: the devices wait for each other only at its end.
 constexpr std::size_t kChunksPerDevice = 16;

@@ -58,7 +58,7 @@ void Residence::make_room_locked(std::size_t more, const std::vector<const Fragm
 
 std::vector<std::shared_ptr<const CudaCloud>> Residence::bring(
     Exec& exec, const std::vector<const Fragment*>& fragments) {
-  // A lane that needs what the other one copies waits for it.
+  // A lane that needs what another one copies waits for it.
   const std::lock_guard<std::mutex> lock(mutex_);
   std::vector<std::shared_ptr<const CudaCloud>> out;
   std::vector<std::size_t> missing;

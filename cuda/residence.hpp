@@ -9,7 +9,7 @@
 namespace gpureg::cuda {
 
 /// Tracks the fragments in the memory of one engine: loads them, and evicts the least recently used
-/// ones beyond a budget. Both lanes of the engine may use it at the same time.
+/// ones beyond a budget. Thread-safe: the lanes of an engine share it.
 class Residence {
  public:
   /// budget: bytes; 0: no limit.

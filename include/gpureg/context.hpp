@@ -41,8 +41,9 @@ struct DeviceMemoryUse {
 /// share the same resources.
 ///
 /// Thread-safe: threads may share one Context. On the CPU their calls run one after another. On
-/// CUDA two small calls (fewer than 128 pairs, no memory budget) run at the same time, others one
-/// after another. Two contexts are independent, nothing is global.
+/// CUDA up to four small calls (fewer than 128 pairs) run at the same time, two of them beside a
+/// large one; large calls, and all calls under a memory budget, run one after another. Two contexts
+/// are independent, nothing is global.
 class Context {
  public:
   /// CPU backend.

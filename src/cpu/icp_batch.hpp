@@ -38,7 +38,7 @@ class IcpBatch {
     mx_[size_] = c.normal.x;
     my_[size_] = c.normal.y;
     mz_[size_] = c.normal.z;
-    // The difference is all that counts.
+    // The terms need the difference only.
     const Vec3 d = c.moved - c.other;
     dx_[size_] = d.x;
     dy_[size_] = d.y;
