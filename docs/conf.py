@@ -24,6 +24,7 @@ extensions = [
     "breathe",
     "sphinx.ext.autodoc",
     "sphinx.ext.napoleon",
+    "generated_reference",
     "header_reference",
     "python_package",
     "repository_files",

@@ -65,7 +65,7 @@ def main():
     for name, of in new.items():
         content["domains"][name] = {**of, "commit": arguments.commit}
         print(name, of)
-    arguments.output.write_text(json.dumps(content, indent=1) + "\n")
+    record.save(arguments.output, content)
 
 
 if __name__ == "__main__":

@@ -18,7 +18,7 @@ import pathlib
 
 import numpy as np
 from fit_confidence import MAX_ERROR, MIN_SEPARATION, REPORTED, blocks, errors, overlap_factor
-from record import commit
+from record import commit, save
 
 EDGES = (1, 10, 20, 30, 50, 75, 100, 150, 200, 300, 500)  # overlapping points, of the table's rows
 
@@ -89,7 +89,7 @@ def main():
                 )
             )
     if arguments.output:
-        arguments.output.write_text(json.dumps(record, indent=1) + "\n")
+        save(arguments.output, record)
 
 
 if __name__ == "__main__":

@@ -42,6 +42,7 @@ import sys
 from typing import NamedTuple
 
 import numpy as np
+from record import save
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 
@@ -559,7 +560,7 @@ def main():
     if arguments.header:
         write_header(arguments.header, models)
     if arguments.output:
-        arguments.output.write_text(json.dumps({"runs": tested}, indent=1) + "\n")
+        save(arguments.output, {"runs": tested})
 
 
 if __name__ == "__main__":

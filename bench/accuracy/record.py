@@ -4,7 +4,6 @@ the commit that made it.
 """
 
 import argparse
-import json
 import os
 import pathlib
 import platform
@@ -12,6 +11,10 @@ import subprocess
 import sys
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
+sys.path.append(str(ROOT / "bench"))
+import rows
+
+RAW = ("curve",)  # a row for each threshold: too much for a record
 
 
 def parser(description, output):
@@ -96,9 +99,21 @@ def processor():
     return f"{names[0]}, {len(names)} threads" if names else platform.processor()
 
 
+def aggregates(value):
+    """The value without its raw parts."""
+    if isinstance(value, dict):
+        return {key: aggregates(item) for key, item in value.items() if key not in RAW}
+    return [aggregates(item) for item in value] if isinstance(value, list) else value
+
+
+def save(path, content):
+    """One row a line."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(rows.dumps(aggregates(content)) + "\n")
+
+
 def write(arguments, command, content):
     """`command` is the line that makes this record again, free of this machine's paths."""
     record = {"command": command, "commit": commit(), "processor": processor(), **content}
-    arguments.output.parent.mkdir(parents=True, exist_ok=True)
-    arguments.output.write_text(json.dumps(record, indent=1) + "\n")
+    save(arguments.output, record)
     print(f"written: {arguments.output}")

@@ -32,7 +32,7 @@ import tempfile
 import gpureg
 import numpy as np
 from cameras import cameras
-from record import commit
+from record import commit, save
 
 # triangles: of a model that is written as an STL file, or None.
 Cloud = collections.namedtuple("Cloud", "points viewpoints reach triangles", defaults=(None,))
@@ -392,7 +392,7 @@ def main():
                 entry["conditions"][condition].append({"seed": seed, **total})
         record["sets"][name] = entry
         if arguments.json:
-            arguments.json.write_text(json.dumps(record, indent=1) + "\n")
+            save(arguments.json, record)
     if every["decided"]:
         share = 100 * every["decided_right"] / every["decided"]
         print(

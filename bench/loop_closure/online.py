@@ -10,13 +10,16 @@ Odometry drifts by 2 % and 0.2 degrees per metre, as the options say by default,
 """
 
 import argparse
-import json
 import pathlib
+import sys
 import time
 
 import gpureg
 import numpy as np
 from walk import SCENES, correct, drifting_steps, prepare, read_poses, rmse
+
+sys.path.append(str(pathlib.Path(__file__).resolve().parents[1]))
+from rows import dumps
 
 DRIFTS = (0.02, 0.1)
 
@@ -75,7 +78,7 @@ def main():
     context = gpureg.Context.best()
     rows = [run(context, scene, arguments.data, drift) for scene in SCENES for drift in DRIFTS]
     if arguments.output:
-        arguments.output.write_text(json.dumps({"rows": rows}, indent=1) + "\n")
+        arguments.output.write_text(dumps({"rows": rows}) + "\n")
 
 
 if __name__ == "__main__":

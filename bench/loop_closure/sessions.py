@@ -10,13 +10,16 @@ itself. Needs the package gpureg.
 """
 
 import argparse
-import json
 import pathlib
+import sys
 import time
 
 import gpureg
 import numpy as np
 from walk import SCENES, about_up, drifting_steps, prepare, read_poses, rmse
+
+sys.path.append(str(pathlib.Path(__file__).resolve().parents[1]))
+from rows import dumps
 
 CASES = [
     ("house_A", "house_A"),
@@ -92,7 +95,7 @@ def main():
     context = gpureg.Context.best()
     rows = [run(context, *case, arguments.data, arguments.every) for case in CASES]
     if arguments.output:
-        arguments.output.write_text(json.dumps({"rows": rows}, indent=1) + "\n")
+        arguments.output.write_text(dumps({"rows": rows}) + "\n")
 
 
 if __name__ == "__main__":

@@ -7,7 +7,7 @@
     build/pose-graph-peers/bin/pip install numpy gtsam==4.3.0 open3d==0.20.0
     build/pose-graph-peers/bin/python bench/pose_graph/run.py
 
-Writes bench/results/pose_graph.json and prints the table. --methods, --percent, --seeds, --nodes
+Writes bench/results/pose_graph.json; bench/readme_table.py makes the table. --methods, --percent, --seeds, --nodes
 and --limit choose a part; runs that are in the record already are kept unless --fresh. The graph
 comes from GTSAM's wheel. The peers are no dependency of the library.
 """
@@ -25,6 +25,9 @@ import numpy as np
 import sphere
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
+sys.path.append(str(ROOT / "bench"))
+from rows import dumps
+
 OURS = {
     "gpureg": "gnc",
     "gpureg_without_consensus": "gnc_plain",
@@ -83,33 +86,6 @@ def solve(method: str, graph: sphere.SphereGraph, folder: pathlib.Path, limit: f
     }
 
 
-def table(runs: dict) -> str:
-    """Largest ATE of the seeds, metres, per kind, share of false loops and method."""
-    methods = sorted({r["method"] for r in runs.values()})
-    lines = [
-        "| nodes | kind | false | " + " | ".join(methods) + " |",
-        "|---" * (3 + len(methods)) + "|",
-    ]
-    rows = sorted({(r["nodes"], r["kind"], r["percent"]) for r in runs.values()})
-    for row in rows:
-        cells = []
-        for method in methods:
-            of = [
-                r
-                for r in runs.values()
-                if (r["nodes"], r["kind"], r["percent"], r["method"]) == (*row, method)
-            ]
-            good = [r["ate"] for r in of if "ate" in r]
-            cell = f"{np.max(good):.3f}" if good else "-"
-            wrong = sum(r["false_accepted"] for r in of if "ate" in r)
-            cell += f", {wrong} false" if wrong else ""
-            if of and len(good) < len(of):
-                cell += f" ({len(of) - len(good)} of {len(of)} failed)"
-            cells.append(cell)
-        lines.append(f"| {row[0]} | {row[1]} | {row[2]} % | " + " | ".join(cells) + " |")
-    return "\n".join(lines)
-
-
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument(
@@ -121,13 +97,9 @@ def main() -> None:
     parser.add_argument("--nodes", nargs="+", type=int, default=[2500])
     parser.add_argument("--limit", type=float, default=300, help="seconds per run")
     parser.add_argument("--fresh", action="store_true", help="run again what is recorded")
-    parser.add_argument("--table", action="store_true", help="print the record's table only")
     parser.add_argument("--data", type=pathlib.Path, help="folder of sphere2500.txt")
     parser.add_argument("--out", type=pathlib.Path, default=ROOT / "bench/results/pose_graph.json")
     arguments = parser.parse_args()
-    if arguments.table:
-        print(table(json.loads(arguments.out.read_text())["runs"]))
-        return
     data = arguments.data
     if data is None:
         import gtsam
@@ -158,8 +130,7 @@ def main() -> None:
                             **run,
                         }
                         print(key, run, flush=True)
-                        arguments.out.write_text(json.dumps(record, indent=1) + "\n")
-    print(table(runs))
+                        arguments.out.write_text(dumps(record) + "\n")
 
 
 if __name__ == "__main__":

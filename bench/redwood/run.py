@@ -3,7 +3,7 @@
 """The paper's table: time of a pair, recall and precision by Redwood's protocol, per scene and
 mean, published rows beside measured ones.
 
-SCENE: folders in Redwood's layout (the four scenes of scripts/fetch_redwood, 3DMatch's scenes,
+SCENE: folders in Redwood's layout (the four scenes of bench/redwood/fetch, 3DMatch's scenes,
 those of `gpureg generate`), as paths or as names under --data. Without one, scenes are generated,
 the same on every machine. Every preset runs with every seed through `gpureg batch` on every backend
 that is there, `gpureg evaluate` scores them; peers that are installed run once, through bench/peers
@@ -31,7 +31,6 @@ from markdown_tables import percent
 from scenes import Scene
 
 GENERATED = [(12, 1), (12, 2)]  # fragments, seed of `gpureg generate`
-COST_SAMPLE = 300  # pairs of a scene whose size and time the record keeps
 
 
 def generated(arguments):
@@ -126,13 +125,6 @@ def run_once(arguments, scene, preset, backend, seed, temporary):
         {**entry, "log": pathlib.Path(entry["log"]).name}
         for entry in verdict.get("registration_recall", [])
     ]
-    cost = [
-        [
-            pair["statistics"]["source_points"] + pair["statistics"]["target_points"],
-            round(pair["ms"]["total"], 4),
-        ]
-        for pair in batch["pairs"]
-    ]
     return (
         {
             "seed": seed,
@@ -143,7 +135,6 @@ def run_once(arguments, scene, preset, backend, seed, temporary):
             "pairs": len(batch["pairs"]),
             "peak_memory_mib": round(batch["peak_memory_mib"]),
             "stages_ms": stages(batch),
-            "points_and_ms": cost[:: max(1, len(cost) // COST_SAMPLE)],
             **analysis.all_of(verdict["pairs"], analysis.overlaps(scene.fragments)),
         },
         batch,
@@ -307,7 +298,6 @@ def main():
                         else:  # the record keeps details of the first seed only
                             for detail in (run["strict"], run["geometric"] or {}):
                                 detail.pop("curve", None)
-                            del run["points_and_ms"]
                         runs.append(run)
                         environment[backend] = batch["environment"]
                         method["options"] = {

@@ -19,7 +19,11 @@ import json
 import math
 import re
 import subprocess
+import sys
 from pathlib import Path
+
+sys.path.append(str(Path(__file__).resolve().parents[1]))
+from rows import dumps
 
 ROWS = {
     "odometry": None,  # the run that tracks: no loop of any kind
@@ -148,7 +152,7 @@ def main() -> None:
                 result["rows"].sort(key=lambda row: (list(ROWS).index(row["row"]), row["seed"]))
         kept = [s for s in record["sequences"] if s["name"] != name]
         record = {"program": "bench/slam/run.py", "sequences": [*kept, result]}
-        path.write_text(json.dumps(record, indent=1) + "\n")
+        path.write_text(dumps(record) + "\n")
 
 
 if __name__ == "__main__":

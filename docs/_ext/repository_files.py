@@ -74,18 +74,8 @@ def resolve(app: Sphinx, tree: nodes.document) -> None:
             link.replace_self(text)
 
 
-def every_header_has_a_page(app: Sphinx) -> None:
-    headers = {path.stem for path in (ROOT / "include" / "gpureg").glob("*.hpp")} - {"gpureg"}
-    pages = {path.stem for path in (DOCS / "reference" / "cpp").glob("*.md")}
-    for name in sorted(headers - pages):
-        logger.warning("include/gpureg/%s.hpp has no page in docs/reference/cpp", name)
-    for name in sorted(pages - headers):
-        logger.warning("docs/reference/cpp/%s.md has no header in include/gpureg", name)
-
-
 def setup(app: Sphinx) -> dict[str, bool]:
     app.add_config_value("repository_url", "", "html")
-    app.connect("builder-inited", every_header_has_a_page)
     app.connect("source-read", read_page)
     app.connect("include-read", read_included)
     app.connect("doctree-read", resolve)

@@ -35,7 +35,7 @@ TEST(Readme, ShowsTheFiguresOfTheRecords) {
   if (test::run_command({"sh", "-c", "command -v python3"}).status != 0)
     GTEST_SKIP() << "python3 is not installed";
   const test::Outcome outcome =
-      test::run_command({"python3", CONSUMER_SOURCE "/scripts/readme_table.py", "--check"});
+      test::run_command({"python3", CONSUMER_SOURCE "/bench/readme_table.py", "--check"});
   EXPECT_EQ(outcome.status, 0) << outcome.output;
 }
 

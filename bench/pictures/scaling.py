@@ -13,7 +13,7 @@ matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 import numpy as np
 
-ROOT = pathlib.Path(__file__).resolve().parents[1]
+ROOT = pathlib.Path(__file__).resolve().parents[2]
 RECORD = json.loads((ROOT / "bench/results/pipeline_h200.json").read_text())
 RUNS = {
     run["name"].split("/real_time")[0].split("/iterations")[0]: run for run in RECORD["benchmarks"]

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Draws docs/images/slam.png: the map of a generated sequence before and after its loops.
 
-    scripts/plot_slam.py SEQUENCE BEFORE AFTER [-o FILE]
+    bench/pictures/slam.py SEQUENCE BEFORE AFTER [-o FILE]
 
 BEFORE and AFTER are two outputs of slam_demo that share their tracking (--tracking): the first
 without loops, the second with them. Where their surfels are the same, a detail shows where the loops
@@ -18,7 +18,7 @@ import numpy
 matplotlib.use("Agg")
 from matplotlib import pyplot
 
-ROOT = pathlib.Path(__file__).resolve().parents[1]
+ROOT = pathlib.Path(__file__).resolve().parents[2]
 LOW, HIGH = 0.5, 1.9  # metres over the floor: neither floor nor ceiling
 WINDOW = 3.0  # metres that the detail shows
 SURFEL = numpy.dtype(

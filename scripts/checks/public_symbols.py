@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Prints a suppression for abidiff that keeps a library's public functions only.
 
-    python3 scripts/public_symbols.py LIBRARY.so HEADERS
+    python3 scripts/checks/public_symbols.py LIBRARY.so HEADERS
 
 Tests and components use functions of private headers, and the compiler adds instances of
 templates: a release may drop all of these. A function is public if its name and the names of its

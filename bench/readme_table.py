@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""Writes the tables of measured figures in README.md and docs from the records in bench/results;
-scripts/tables says how.
+"""Writes the tables of measured figures in README.md, docs and bench/notes from the records in bench/results;
+bench/tables says how.
 
 A table stands between <!-- table NAME --> and <!-- end -->; no figure in it is typed by hand.
 usage: readme_table.py          rewrite the tables
@@ -15,18 +15,7 @@ import sys
 from tables import accuracy, loops, maps, peers, slam, speed
 
 ROOT = pathlib.Path(__file__).resolve().parents[1]
-PAGES = (
-    "accuracy",
-    "usage",
-    "experiments",
-    "benchmarks",
-    "performance",
-    "maps",
-    "loops",
-    "sensors",
-    "slam_demo",
-)
-FILES = ["README.md", *(f"docs/{page}.md" for page in PAGES)]
+FILES = ("README.md", "docs/*.md", "bench/notes/*.md")
 TABLES = {
     **accuracy.TABLES,
     **peers.TABLES,
@@ -51,15 +40,15 @@ def main():
     parser.add_argument("--check", action="store_true")
     check = parser.parse_args().check
     stale = []
-    for name in FILES:
-        text = (ROOT / name).read_text()
+    for path in sorted(path for pattern in FILES for path in ROOT.glob(pattern)):
+        text = path.read_text()
         new = rewritten(text)
         if new != text:
-            stale.append(name)
+            stale.append(str(path.relative_to(ROOT)))
             if not check:
-                (ROOT / name).write_text(new)
+                path.write_text(new)
     if check and stale:
-        sys.exit(f"error: {', '.join(stale)}: run scripts/readme_table.py")
+        sys.exit(f"error: {', '.join(stale)}: run bench/readme_table.py")
 
 
 main()

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Checks the links inside a built site and inside the Markdown files of the repository.
 
-    scripts/check_links.py build/docs/html
+    docs/_ext/check_links.py build/docs/html
 
 Of a site every local link, image and anchor must exist. Of Markdown files every relative link must
 be a file, and every anchor a heading. Links to other hosts are not followed. Exit status 1 where a
@@ -17,7 +17,7 @@ import subprocess
 import sys
 import urllib.parse
 
-ROOT = pathlib.Path(__file__).resolve().parents[1]
+ROOT = pathlib.Path(__file__).resolve().parents[2]
 MARKDOWN_LINK = re.compile(r"\]\(([^()\s]+)\)")
 CODE = re.compile(r"^```.*?^```|^    [^\n]*$|`[^`\n]*`", re.DOTALL | re.MULTILINE)
 HEADING = re.compile(r"^#+ +(.*)$", re.MULTILINE)
