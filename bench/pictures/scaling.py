@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""Draws docs/images/scaling.png, cost as the work grows, from bench/results/pipeline_h200.json.
+"""Draws bench/notes/images/scaling.png, cost as the work grows, from bench/results/pipeline_h200.json.
 Needs matplotlib.
 """
 
@@ -69,7 +69,7 @@ def main():
         axes.set_ylim(0, 1.15 * max(line.get_ydata().max() for line in axes.get_lines()))
     for axes in (pair, scored, fragments):
         axes.grid(True, alpha=0.3)
-    figure.savefig(ROOT / "docs/images/scaling.png", dpi=110)
+    figure.savefig(ROOT / "bench/notes/images/scaling.png", dpi=110)
 
 
 main()

@@ -13,12 +13,12 @@ ROWS = (
 
 
 def millimetres(values):
-    shown = sorted({f"{1000 * value:.1f}" for value in values if value is not None}, key=float)
-    return " to ".join(shown if len(shown) < 2 else [shown[0], shown[-1]]) or "-"
+    """One value for each seed."""
+    return "; ".join(f"{1000 * value:.1f}" for value in values if value is not None) or "-"
 
 
 def loops(rows, kind):
-    return ", ".join(sorted({f"{r[f'{kind}_loops']} / {r[f'false_{kind}_loops']}" for r in rows}))
+    return "; ".join(f"{r[f'{kind}_loops']} / {r[f'false_{kind}_loops']}" for r in rows)
 
 
 def slam():
@@ -31,7 +31,7 @@ def slam():
             rows = [row for row in sequence["rows"] if row["row"] == name]
             if not rows:
                 continue
-            seeds = f" ({len(rows)} seeds)" if len(rows) > 1 else ""
+            seeds = f" (seeds {', '.join(str(r['seed']) for r in rows)})" if len(rows) > 1 else ""
             surface = ", ".join(
                 millimetres(row[f"surface_{kind}_m"] for row in rows) for kind in ("mean", "median")
             )
@@ -47,4 +47,26 @@ def slam():
     return table
 
 
-TABLES = {"slam": slam}
+def slam_short():
+    """Tracking alone beside everything; frames differ, so both are shown."""
+    table = [
+        "| sequence | tracking alone: frames, ATE RMSE | with loops and adjustment: frames, ATE RMSE | surface, mean: before, after |",
+        "| --- | --- | --- | --- |",
+    ]
+    for sequence in load("slam_demo.json")["sequences"]:
+        alone, everything = (
+            [row for row in sequence["rows"] if row["row"] == name]
+            for name in ("odometry", "+ bundle adjustment")
+        )
+        cells = [
+            f"{rows[0]['poses']} of {sequence['frames']}, {millimetres(r['ate_m'] for r in rows)} mm"
+            for rows in (alone, everything)
+        ]
+        surface = [millimetres(r["surface_mean_m"] for r in rows) for rows in (alone, everything)]
+        table.append(
+            f"| {sequence['name']}, {sequence['path_m']:.0f} m | {cells[0]} | {cells[1]} | {surface[0]} mm, {surface[1]} mm |"
+        )
+    return table
+
+
+TABLES = {"slam": slam, "slam_short": slam_short}
