@@ -8,7 +8,7 @@
 #include "algorithm/fit.hpp"
 #include "algorithm/inlier.hpp"
 #include "algorithm/quadruple.hpp"
-#include "fragment.hpp"
+#include "cuda/common/prepared_cloud.hpp"
 #include "gpureg/error.hpp"
 
 namespace gpureg::bench {
@@ -144,8 +144,8 @@ Naive::Naive(std::size_t most_points, const RegistrationOptions& options)
 Naive::~Naive() = default;
 
 NaiveResult Naive::align(const PreparedState& source_state, const PreparedState& target_state) {
-  const auto source_copy = static_cast<const cuda::Fragment&>(source_state).on(0),
-             target_copy = static_cast<const cuda::Fragment&>(target_state).on(0);
+  const auto source_copy = static_cast<const cuda::PreparedCloud&>(source_state).on(0),
+             target_copy = static_cast<const cuda::PreparedCloud&>(target_state).on(0);
   if (!source_copy || !target_copy)
     throw InvalidArgument("the naive mode wants both clouds on device 0");
   CloudView source = source_copy->view_on_device, target = target_copy->view_on_device;

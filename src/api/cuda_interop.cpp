@@ -7,9 +7,9 @@
 #include "api/access.hpp"
 #include "api/name_cloud.hpp"
 #include "api/raw_cloud.hpp"
-#include "api/unknown_viewpoint.hpp"
 #include "common/in_halves.hpp"
 #include "pipeline/device_engine.hpp"
+#include "viewpoint/unknown_viewpoint.hpp"
 
 namespace gpureg {
 namespace {

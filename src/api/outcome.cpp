@@ -9,11 +9,11 @@
 #include <utility>
 
 #include "api/frames.hpp"
-#include "api/symmetry.hpp"
 #include "confidence/calibrate_modes.hpp"
 #include "confidence/confidence.hpp"
 #include "confidence/pose_evidence.hpp"
 #include "pipeline/conclude.hpp"
+#include "symmetry/symmetry.hpp"
 
 namespace gpureg {
 namespace {

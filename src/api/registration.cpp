@@ -10,11 +10,11 @@
 #include "api/outcome.hpp"
 #include "api/pair_input.hpp"
 #include "api/raw_cloud.hpp"
-#include "api/unknown_viewpoint.hpp"
 #include "api/variants.hpp"
 #include "common/in_halves.hpp"
 #include "common/limits.hpp"
 #include "common/validate.hpp"
+#include "viewpoint/unknown_viewpoint.hpp"
 
 namespace gpureg {
 namespace {

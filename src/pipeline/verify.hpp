@@ -5,7 +5,8 @@
 
 namespace gpureg::pipeline {
 
-/// Given poses of pairs to their evidence, one statement per stage: the end of align_by_evidence().
+/// Given poses of pairs to their evidence, one statement per stage: the end of
+/// align_by_compatibility().
 template <typename Exec>
 void verify(Exec& exec, Span<const PairView> pairs, const std::vector<PosesOfPair>& poses,
             const RegistrationOptions& options, bool refine, Span<PairOutcome> outcomes) {

@@ -5,9 +5,9 @@
 #include <algorithm>
 #include <cmath>
 
-#include "api/symmetry.hpp"
 #include "gpureg/registration.hpp"
 #include "support/scan.hpp"
+#include "symmetry/symmetry.hpp"
 
 namespace gpureg {
 namespace {

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Alignment on both backends, stage by stage: the same bits after each.
 #include "algorithm/fpfh.hpp"
-#include "cpu/stages.hpp"
+#include "cpu/common/stages.hpp"
+#include "cuda/common/stages.hpp"
 #include "cuda/gpu.hpp"
-#include "stages.hpp"
 #include "support/prepared.hpp"
 #include "support/random_clouds.hpp"
 

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "algorithm/inlier.hpp"
-#include "directions.hpp"
+#include "cuda/prepare/directions.hpp"
 
 namespace gpureg::cuda {
 namespace {

@@ -7,8 +7,8 @@
 #include <future>
 #include <thread>
 
+#include "cuda/common/engine.hpp"
 #include "cuda/room_scans.hpp"
-#include "engine.hpp"
 #include "gpureg/error.hpp"
 
 namespace gpureg {

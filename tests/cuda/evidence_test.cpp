@@ -2,10 +2,10 @@
 // Registration by evidence on both backends, stage by stage: the same bits after each.
 #include <thread>
 
-#include "cpu/stages.hpp"
+#include "cpu/common/stages.hpp"
+#include "cuda/common/stages.hpp"
 #include "cuda/gpu.hpp"
-#include "pipeline/align_by_evidence.hpp"
-#include "stages.hpp"
+#include "pipeline/align_by_compatibility.hpp"
 #include "support/outcome_bytes.hpp"
 #include "support/prepared.hpp"
 #include "support/random_clouds.hpp"

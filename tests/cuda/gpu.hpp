@@ -4,7 +4,7 @@
 #include <cuda_runtime_api.h>
 #include <gtest/gtest.h>
 
-#include "exec.hpp"
+#include "cuda/device/exec.hpp"
 
 namespace gpureg::test {
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Which call gets which lane of a device.
-#include "lanes.hpp"
+#include "cuda/device/lanes.hpp"
 
 #include <chrono>
 #include <thread>

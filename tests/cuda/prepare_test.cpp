@@ -3,9 +3,9 @@
 #include <filesystem>
 #include <limits>
 
-#include "cpu/stages.hpp"
+#include "cpu/common/stages.hpp"
+#include "cuda/common/stages.hpp"
 #include "cuda/gpu.hpp"
-#include "stages.hpp"
 #include "support/data_folder.hpp"
 #include "support/plain_ply.hpp"
 #include "support/prepared.hpp"

@@ -3,7 +3,7 @@
 // needed.
 #include <gtest/gtest.h>
 
-#include "scoring_data.hpp"
+#include "cuda/prepare/scoring_data.hpp"
 
 namespace gpureg::cuda {
 namespace {

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Sizes of batches up to the limit of CUB. No device needed.
-#include "segments.hpp"
+#include "cuda/device/segments.hpp"
 
 #include <gtest/gtest.h>
 
-#include "device_algorithms.hpp"
+#include "cuda/device/device_algorithms.hpp"
 
 namespace gpureg::cuda {
 namespace {

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "fuzz/targets.hpp"
-#include "initial_poses.hpp"
 #include "io/run_reader.hpp"
-#include "journal.hpp"
-#include "result_file.hpp"
+#include "records/initial_poses.hpp"
+#include "records/journal.hpp"
+#include "records/result_file.hpp"
 
 namespace gpureg::fuzz {
 namespace {

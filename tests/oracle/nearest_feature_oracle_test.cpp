@@ -5,7 +5,7 @@
 #include <random>
 #include <set>
 
-#include "cpu/stages.hpp"
+#include "cpu/common/stages.hpp"
 
 namespace gpureg::cpu {
 namespace {

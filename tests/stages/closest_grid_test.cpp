@@ -3,7 +3,7 @@
 
 #include <array>
 
-#include "cpu/reachable_blocks.hpp"
+#include "cpu/prepare/reachable_blocks.hpp"
 #include "pipeline/checks.hpp"
 #include "support/prepared.hpp"
 #include "support/random_clouds.hpp"

@@ -5,7 +5,7 @@
 #include <map>
 #include <tuple>
 
-#include "cpu/stages.hpp"
+#include "cpu/common/stages.hpp"
 #include "gpureg/error.hpp"
 #include "support/prepared.hpp"
 #include "support/random_clouds.hpp"

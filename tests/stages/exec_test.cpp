@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "cpu/exec.hpp"
+#include "cpu/common/exec.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "cpu/feature_index.hpp"
+#include "cpu/common/feature_index.hpp"
 
 #include <gtest/gtest.h>
 

@@ -10,7 +10,7 @@
 #include <stdexcept>
 #include <system_error>
 
-#include "cpu/exec.hpp"
+#include "cpu/common/exec.hpp"
 
 namespace gpureg {
 namespace {

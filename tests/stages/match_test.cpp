@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <random>
 
-#include "cpu/stages.hpp"
+#include "cpu/common/stages.hpp"
 
 namespace gpureg::cpu {
 namespace {

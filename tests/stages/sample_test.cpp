@@ -3,7 +3,7 @@
 
 #include <random>
 
-#include "cpu/stages.hpp"
+#include "cpu/common/stages.hpp"
 
 namespace gpureg::cpu {
 namespace {

@@ -2,7 +2,7 @@
 #include <gtest/gtest.h>
 
 #include "algorithm/inlier.hpp"
-#include "cpu/cell_summary.hpp"
+#include "cpu/common/cell_summary.hpp"
 #include "support/prepared.hpp"
 #include "support/random_clouds.hpp"
 

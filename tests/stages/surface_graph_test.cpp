@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "api/surface_graph.hpp"
+#include "viewpoint/surface_graph.hpp"
 
 #include <gtest/gtest.h>
 
@@ -7,7 +7,7 @@
 #include <cmath>
 #include <random>
 
-#include "api/spacing_spread.hpp"
+#include "spacing/spacing_spread.hpp"
 #include "support/prepared.hpp"
 #include "support/random_clouds.hpp"
 

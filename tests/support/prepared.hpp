@@ -4,8 +4,8 @@
 #include <memory>
 #include <vector>
 
-#include "cpu/stages.hpp"
-#include "pipeline/align.hpp"
+#include "cpu/common/stages.hpp"
+#include "pipeline/align_by_quadruples.hpp"
 #include "pipeline/prepare.hpp"
 
 /// The CPU's stages for tests that look inside: one cloud prepared, with everything public.

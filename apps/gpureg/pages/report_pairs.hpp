@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "records/result_file.hpp"
+
+namespace gpureg::cli {
+
+/// A pair compared with the ground truth. The protocol evaluates only pairs with j - i > 1.
+struct EvaluatedPair {
+  const PairRecord* pair = nullptr;
+  bool in_truth = false;  ///< listed in gt.log: overlap >= 30 %
+  /// Its pose, reported or not, is within 0.2 m of the ground truth. With gt_all.log this includes
+  /// pairs that overlap by less than 30 %.
+  bool correct = false;
+};
+std::vector<EvaluatedPair> evaluate_pairs(const evaluation::GroundTruth& truth,
+                                          const ResultFile& result);
+
+/// (recall, precision) for a falling score threshold. geometric: by the geometric rule, which needs
+/// gt_all.log.
+std::vector<std::pair<double, double>> recall_precision(const evaluation::GroundTruth& truth,
+                                                        const ResultFile& result, bool geometric);
+
+/// A pair to draw, with its caption.
+struct SamplePair {
+  const PairRecord* pair = nullptr;
+  std::string heading, caption;
+};
+
+/// With ground truth: correct, false positive and missed pairs. Without: aligned and not aligned
+/// ones. At most `each` of a kind.
+std::vector<SamplePair> samples(const std::vector<EvaluatedPair>& evaluated, std::size_t each);
+std::vector<SamplePair> samples(const ResultFile& result, std::size_t each);
+
+}  // namespace gpureg::cli

@@ -1,0 +1,75 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "records/calibration_file.hpp"
+
+#include <cmath>
+
+#include "gpureg/error.hpp"
+#include "records/json_file.hpp"
+#include "records/options_json.hpp"
+
+namespace gpureg::cli {
+namespace {
+
+constexpr const char* kKind = "calibration";
+
+Json to_json(const CalibrationCount& count) {
+  return {{"pairs", count.pairs}, {"samples", count.samples}, {"correct", count.correct}};
+}
+
+double number(const std::string& path, const Json& document, const char* field,
+              const char* expected, bool positive) {
+  const auto found = document.find(field);
+  const bool fine = found != document.end() && found->is_number() &&
+                    std::isfinite(found->get<double>()) && (!positive || found->get<double>() > 0);
+  if (!fine)
+    throw IoError(
+        path + ": \"" + field + "\" is " +
+        (found == document.end()
+             ? "missing"
+             : found->dump(-1, ' ', false, Json::error_handler_t::replace).substr(0, 40)) +
+        ", expected " + expected);
+  return found->get<double>();
+}
+
+}  // namespace
+
+Json calibration_document(const CalibrationResult& result, const RegistrationOptions& options,
+                          unsigned quality) {
+  Json json;
+  json["gpureg"] = kKind;
+  json["version"] = GPUREG_VERSION;
+  json["slope"] = result.calibration.slope;
+  json["offset"] = result.calibration.offset;
+  json["enough_samples"] = result.enough_samples;
+  json["samples"] = {{"one_scan", to_json(result.one_scan)},
+                     {"loop_consistency", to_json(result.loop_consistency)},
+                     {"trajectory", to_json(result.trajectory)}};
+  json["calibration_error"] = {{"before", result.error_before}, {"after", result.error_after}};
+  json["voxel_size"] = to_json(options)["prepare"]["voxel_size"];
+  json["preset"] = "default";  // the only one with a confidence
+  json["quality"] = quality;
+  return json;
+}
+
+CalibrationFile read_calibration(const std::string& path) {
+  Json document;
+  try {
+    document = Json::parse(read_text(path));
+  } catch (const Json::exception& error) {
+    const std::string message = error.what();
+    const std::size_t end = message.find("] ");
+    throw IoError(path + ": " + (end == std::string::npos ? message : message.substr(end + 2)));
+  }
+  check_format(path, document);
+  const auto kind = document.is_object() ? document.find("gpureg") : document.end();
+  if (!document.is_object() || kind == document.end() || *kind != kKind)
+    throw IoError(path + ": no calibration of `gpureg calibrate`, \"gpureg\" is not \"" +
+                  std::string(kKind) + "\"");
+  CalibrationFile out;
+  out.calibration.slope = number(path, document, "slope", "a number > 0", true);
+  out.calibration.offset = number(path, document, "offset", "a number", false);
+  out.voxel_size = number(path, document, "voxel_size", "a length > 0", true);
+  return out;
+}
+
+}  // namespace gpureg::cli

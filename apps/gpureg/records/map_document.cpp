@@ -1,0 +1,123 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "records/map_document.hpp"
+
+#include <sstream>
+
+#include "records/options_json.hpp"
+#include "records/result_json.hpp"
+#include "text.hpp"
+#include "verbs/pair_run.hpp"
+
+namespace gpureg::cli {
+
+Json pairs_document(const MapRun& run, const Context& context) {
+  Json json;
+  json["gpureg"] = "batch";
+  json["environment"] = environment(context);
+  json["options"] = to_json(run.options);
+  json["folder"] = run.folder;
+  json["complete"] = true;
+  const double rate =
+      run.seconds.align > 0 ? static_cast<double>(run.pairs_in_this_run) / run.seconds.align : 0;
+  json["seconds"] = {{"prepare", run.seconds.prepare},
+                     {"align", run.seconds.align},
+                     {"pairs_per_second", rate},
+                     {"pairs_in_this_run", run.pairs_in_this_run}};
+  json["fragments"] = fragments_json(run.scene);
+  Json records = Json::array();
+  for (std::size_t k = 0; k < run.records.size(); ++k) {
+    records.push_back(run.records[k].json);
+    if (run.records[k].transform) records.back()["information"] = run.information[k];
+  }
+  json["pairs"] = std::move(records);
+  return json;
+}
+
+Json map_document(const MapRun& run, const Context& context) {
+  Json json;
+  json["gpureg"] = "reconstruct";
+  json["environment"] = environment(context);
+  json["options"] = to_json(run.options);
+  json["folder"] = run.folder;
+  json["seconds"] = {{"prepare", run.seconds.prepare},   {"prune", run.seconds.prune},
+                     {"align", run.seconds.align},       {"graph", run.seconds.graph},
+                     {"surfaces", run.seconds.surfaces}, {"refine", run.seconds.refine},
+                     {"write", run.seconds.write}};
+  json["peak_memory_mib"] = peak_memory_mib();
+  json["graph"] = pose_graph::to_string(run.map.status);
+  json["refinement"] = nullptr;
+  if (run.refined)
+    json["refinement"] = {{"pairs", run.refined->pairs},
+                          {"correspondences", run.refined->correspondences},
+                          {"iterations", run.refined->iterations},
+                          {"rejected_edges", run.refined->rejected_edges},
+                          {"initial_rmse", run.refined->initial_rmse},
+                          {"final_rmse", run.refined->final_rmse}};
+  json["islands"] = Json::array();
+  for (const reconstruction::Island& island : run.map.islands) {
+    Json numbers = Json::array();
+    for (const std::uint32_t scan : island.scans) numbers.push_back(run.scene.numbers[scan]);
+    json["islands"].push_back(std::move(numbers));
+  }
+  json["scans"] = Json::array();
+  for (std::size_t k = 0; k < run.map.scans.size(); ++k) {
+    const reconstruction::Scan& scan = run.map.scans[k];
+    json["scans"].push_back({{"id", run.scene.numbers[k]},
+                             {"placed", scan.placed},
+                             {"island", scan.placed ? Json(scan.island) : Json(nullptr)},
+                             {"confidence", scan.confidence},
+                             {"reason", reconstruction::to_string(scan.reason)}});
+  }
+  json["weakest_links"] = Json::array();
+  for (const reconstruction::Link& link : reconstruction::weakest_links(run.map)) {
+    Json numbers = Json::array();
+    for (const std::uint32_t scan : link.scans) numbers.push_back(run.scene.numbers[scan]);
+    json["weakest_links"].push_back({{"scans", std::move(numbers)},
+                                     {"confidence", link.confidence},
+                                     {"accepted", link.accepted},
+                                     {"rejected", link.rejected}});
+  }
+  json["edges"] = Json::array();
+  for (const reconstruction::Edge& edge : run.map.edges)
+    json["edges"].push_back({{"i", run.scene.numbers[edge.target]},
+                             {"j", run.scene.numbers[edge.source]},
+                             {"T_ij", to_json(edge.target_from_source.matrix())},
+                             {"confidence", edge.confidence},
+                             {"pair_confidence", edge.pair_confidence},
+                             {"weight", edge.weight},
+                             {"state", edge.accepted ? "accepted" : "rejected"},
+                             {"reason", reconstruction::to_string(edge.reason)},
+                             {"mode", edge.mode}});
+  return json;
+}
+
+std::string map_summary(const MapRun& run, const Context& context) {
+  std::ostringstream out;
+  if (run.aligned_here)
+    out << "fragments  " << run.scene.numbers.size() << ", prepared in "
+        << fixed(run.seconds.prepare, 2) << " s\n"
+        << "pairs      " << run.records.size() << ", in " << fixed(run.seconds.align, 2) << " s ("
+        << context.description() << ")\n";
+  if (!run.map.odometry.empty()) out << "odometry   " << run.map.odometry.size() << " poses\n";
+  const std::size_t accepted = run.accepted_edges();
+  out << "edges      " << accepted << " accepted, " << run.map.edges.size() - accepted
+      << " rejected, in " << fixed(run.seconds.graph, 2) << " s\n"
+      << "placed     " << run.map.placed() << " of " << run.map.scans.size() << ", islands of";
+  for (const reconstruction::Island& island : run.map.islands) out << " " << island.scans.size();
+  out << (run.map.islands.empty() ? " no scan\n" : " scans\n");
+  for (std::size_t k = 0; k < run.map.scans.size(); ++k)
+    if (run.map.scans[k].reason != reconstruction::ScanReason::none)
+      out << (run.map.scans[k].placed ? "note       " : "left out   ") << run.scene.numbers[k]
+          << ": " << reconstruction::describe(run.map.scans[k].reason) << "\n";
+  if (run.refined)
+    out << "refined    " << run.refined->pairs << " overlapping pairs, RMS distance "
+        << fixed(1000 * run.refined->initial_rmse, 1) << " mm before, "
+        << fixed(1000 * run.refined->final_rmse, 1) << " mm after, in "
+        << fixed(run.seconds.refine, 2) << " s\n";
+  if (run.map_points > 0) out << "map        " << grouped(run.map_points) << " points\n";
+  out << "memory     " << fixed(peak_memory_mib(), 0) << " MiB at most\n"
+      << "written    to " << run.output << "\n";
+  return out.str();
+}
+
+}  // namespace gpureg::cli

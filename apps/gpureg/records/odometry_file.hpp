@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "verbs/map_run.hpp"
+
+namespace gpureg::cli {
+
+/// Relative poses of scans from a file. A trajectory (TUM, whose times are numbers of fragments, or
+/// poses.txt) gives those of consecutive scans of the folder; a Redwood log gives its pairs.
+/// @throws IoError naming the file: no such file, numbers that the folder lacks, nothing in it.
+std::vector<reconstruction::Odometry> read_odometry(const std::string& path, const MapRun& run);
+
+/// Poses of fragments from a trajectory (TUM, whose times are numbers of fragments, or poses.txt);
+/// no_pose() of fragments that it lacks.
+/// @param numbers of the fragments, ascending.
+/// @param folder for messages.
+/// @throws IoError naming the file: no such file, times that are no numbers of fragments, fewer
+/// than two poses of fragments.
+std::vector<UnalignedIsometry3d> read_scan_poses(const std::string& path,
+                                                 const std::vector<int>& numbers,
+                                                 const std::string& folder);
+
+}  // namespace gpureg::cli

@@ -1,0 +1,119 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "records/pair_verdicts.hpp"
+
+#include <Eigen/Geometry>
+#include <Eigen/LU>
+#include <cmath>
+#include <map>
+#include <set>
+
+namespace gpureg::cli {
+namespace {
+
+constexpr double kGoodDistance = 0.2;                        // metres, Redwood's rule
+constexpr double kGoodDegrees = 15, kGoodTranslation = 0.3;  // 3DMatch's registration recall
+
+using Pair = std::pair<int, int>;
+
+struct Known {
+  Eigen::Matrix4d transform;
+  Eigen::Matrix<double, 6, 6> information;
+};
+
+double degrees_between(const Eigen::Matrix4d& a, const Eigen::Matrix4d& b) {
+  const Eigen::Matrix3d r = a.topLeftCorner<3, 3>().transpose() * b.topLeftCorner<3, 3>();
+  const Eigen::Quaterniond q = Eigen::Quaterniond(r).normalized();
+  return 2 * std::atan2(q.vec().norm(), std::abs(q.w())) * 180 / M_PI;
+}
+
+double metres_between(const Eigen::Matrix4d& a, const Eigen::Matrix4d& b) {
+  return (a.topRightCorner<3, 1>() - b.topRightCorner<3, 1>()).norm();
+}
+
+void add(std::map<Pair, Known>& known, const std::vector<evaluation::LogEntry>& log,
+         const std::vector<evaluation::InformationEntry>& information) {
+  for (std::size_t k = 0; k < log.size(); ++k)
+    if (log[k].j - log[k].i > 1)
+      known[{log[k].i, log[k].j}] = {log[k].transform, information[k].information};
+}
+
+}  // namespace
+
+Json pair_verdicts(const evaluation::GroundTruth& truth, const ResultFile& result) {
+  std::map<Pair, Known> listed;
+  add(listed, truth.log, truth.information);
+  std::map<Pair, Known> known = listed;
+  add(known, truth.all_log, truth.all_information);
+  std::map<Pair, const evaluation::Report*> reports;
+  std::set<Pair> tried, all;
+  for (const evaluation::Report& report : result.reports) reports[{report.i, report.j}] = &report;
+  for (const auto& [pair, unused] : reports) tried.insert(pair);
+  for (const PairRecord& pair : result.pairs) tried.insert({pair.i, pair.j});
+  for (const auto& [pair, unused] : listed) all.insert(pair);
+  for (const Pair& pair : tried)
+    if (pair.second - pair.first > 1) all.insert(pair);
+
+  Json verdicts = Json::array();
+  for (const Pair& pair : all) {
+    const auto at = known.find(pair);
+    const auto found = reports.find(pair);
+    const bool is_listed = listed.count(pair) != 0;
+    Json json = {{"i", pair.first},
+                 {"j", pair.second},
+                 {"listed", is_listed},
+                 {"known", at != known.end()},
+                 {"tried", tried.count(pair) != 0},
+                 {"reported", false},
+                 {"score", nullptr},
+                 {"strict_score", nullptr},
+                 {"error", nullptr},
+                 {"degrees", nullptr},
+                 {"metres", nullptr},
+                 {"strict", false},
+                 {"geometric", false}};
+    if (found != reports.end()) {
+      const evaluation::Report& report = *found->second;
+      json["reported"] = report.reported;
+      if (result.has_scores) {
+        json["score"] = report.score;
+        json["strict_score"] = report.strict_score.value_or(report.score);
+      }
+      if (at != known.end()) {
+        const Known& right = at->second;
+        const double error =
+            evaluation::redwood_error(right.transform, report.transform, right.information);
+        json["error"] = error;
+        json["degrees"] = degrees_between(right.transform, report.transform);
+        json["metres"] = metres_between(right.transform, report.transform);
+        json["geometric"] = error <= kGoodDistance;
+        if (is_listed) {
+          const Known& wanted = listed.at(pair);
+          json["strict"] = evaluation::redwood_error(wanted.transform, report.transform,
+                                                     wanted.information) <= kGoodDistance;
+        }
+      }
+    }
+    verdicts.push_back(std::move(json));
+  }
+  return verdicts;
+}
+
+RegistrationRecall registration_recall(const std::string& truth_log, const ResultFile& result) {
+  const std::vector<evaluation::LogEntry> truth = evaluation::read_log(truth_log);
+  evaluation::check_entries(truth_log, truth);
+  std::map<Pair, const evaluation::Report*> reports;
+  for (const evaluation::Report& report : result.reports) reports[{report.i, report.j}] = &report;
+  RegistrationRecall recall;
+  for (const evaluation::LogEntry& entry : truth) {
+    ++recall.pairs;
+    const auto found = reports.find({entry.i, entry.j});
+    if (found == reports.end()) continue;
+    ++recall.tried;
+    const Eigen::Matrix4d pose = found->second->transform;
+    recall.right += degrees_between(entry.transform, pose) <= kGoodDegrees &&
+                    metres_between(entry.transform, pose) <= kGoodTranslation;
+  }
+  return recall;
+}
+
+}  // namespace gpureg::cli

@@ -1,0 +1,170 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "records/scene.hpp"
+
+#include <algorithm>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <iostream>
+#include <map>
+#include <set>
+
+#include "gpureg/io.hpp"
+#include "records/cloud_file.hpp"
+#include "verbs/interrupt.hpp"
+#include "verbs/progress.hpp"
+#include "verbs/spacing.hpp"
+#include "verbs/viewpoint_note.hpp"
+
+namespace gpureg::cli {
+namespace {
+
+// One batch for prepare(): enough to fill a device, little beside the 1 GiB that a long run may
+// take.
+constexpr std::size_t kChunkClouds = 32, kChunkPoints = 4'000'000;
+
+void mix(std::uint64_t& hash, const std::vector<Eigen::Vector3f>& rows) {
+  const auto add = [&](std::uint64_t word) {
+    hash = (hash ^ word) * 0x9E3779B97F4A7C15ull;
+    hash ^= hash >> 32;
+  };
+  add(rows.size());
+  for (const Eigen::Vector3f& row : rows) {
+    std::uint32_t bits[3];
+    std::memcpy(bits, row.data(), sizeof(bits));
+    add(bits[0] | static_cast<std::uint64_t>(bits[1]) << 32);
+    add(bits[2]);
+  }
+}
+
+using Fragments = std::vector<std::pair<int, std::string>>;
+using Cameras = std::map<int, std::vector<Eigen::Vector3f>>;
+
+// A file that covers half of the scene works, but hardly as meant.
+void note_gaps(const Fragments& fragments, const Cameras& cameras, const std::string& file) {
+  std::size_t covered = 0;
+  for (const auto& [number, path] : fragments) covered += cameras.count(number);
+  const std::size_t lacking = fragments.size() - covered, strangers = cameras.size() - covered;
+  if (lacking > 0)
+    std::cerr << "gpureg: note: " << lacking << " of " << fragments.size()
+              << " fragments have no camera in " << file << std::endl;
+  for (auto at = cameras.begin(); strangers > 0 && at != cameras.end(); ++at)
+    if (std::none_of(fragments.begin(), fragments.end(),
+                     [&](const auto& fragment) { return fragment.first == at->first; })) {
+      std::cerr << "gpureg: note: " << file << " has cameras of fragment " << at->first
+                << (strangers > 1 ? " and " + std::to_string(strangers - 1) + " more" : "")
+                << ", which the folder lacks" << std::endl;
+      return;
+    }
+}
+
+// Of the pair that was read as the k-th from 0: lines without fields do not count.
+std::size_t line_of_pair(const std::string& path, std::size_t k) {
+  std::ifstream file(path);
+  std::size_t number = 0;
+  for (std::string line; std::getline(file, line);) {
+    ++number;
+    const std::size_t field = line.find_first_not_of(" \t\r");
+    if (field != std::string::npos && line[field] != '#' && k-- == 0) break;
+  }
+  return number;
+}
+
+std::uint64_t hash_of(const PointCloud& cloud) {
+  std::uint64_t hash = 0x67707572ull;
+  mix(hash, cloud.points);
+  mix(hash, cloud.normals);
+  mix(hash, cloud.viewpoints);
+  return hash;
+}
+
+}  // namespace
+
+std::vector<std::pair<std::string, std::size_t>> Scene::prepared_sizes() const {
+  std::vector<std::pair<std::string, std::size_t>> out;
+  for (std::size_t k = 0; k < files.size(); ++k) out.emplace_back(files[k], clouds[k].size());
+  return out;
+}
+
+Scene prepare_scene(const Context& context, const std::string& folder,
+                    const PrepareOptions& options, bool quiet, bool infer_viewpoint) {
+  const auto fragments = io::list_fragments(folder);
+  Cameras cameras;
+  const std::string cameras_file = (std::filesystem::path(folder) / "cameras.txt").string();
+  if (std::filesystem::exists(cameras_file)) {
+    cameras = io::read_cameras(cameras_file);
+    if (!quiet) note_gaps(fragments, cameras, cameras_file);
+  }
+
+  Scene scene;
+  ViewpointNote viewpoints;
+  Progress progress("preparing", "fragments", fragments.size(), quiet);
+  for (std::size_t next = 0; next < fragments.size();) {
+    if (InterruptGuard::requested()) {
+      scene.interrupted = true;
+      break;
+    }
+    std::vector<PointCloud> chunk;
+    for (std::size_t points = 0;
+         next < fragments.size() && chunk.size() < kChunkClouds && points < kChunkPoints; ++next) {
+      const auto& [number, file] = fragments[next];
+      chunk.push_back(read_cloud(file, mesh_spacing(options.voxel_size),
+                                 quiet ? MeshNote::none : MeshNote::print));
+      if (const auto found = cameras.find(number); found != cameras.end())
+        chunk.back().viewpoints = found->second;
+      if (!quiet && options.depth_maps > 0) viewpoints.see(chunk.back(), file);
+      points += chunk.back().points.size();
+      scene.numbers.push_back(number);
+      scene.files.push_back(file);
+      scene.hashes.push_back(hash_of(chunk.back()));
+      scene.extent = std::max(scene.extent, extent_of(chunk.back().points));
+    }
+    std::vector<PointCloudView> views;
+    for (const PointCloud& cloud : chunk) {
+      views.push_back(cloud.view());
+      views.back().infer_viewpoint = infer_viewpoint || !cloud.viewpoints.empty();
+    }
+    const std::vector<std::string> files(
+        scene.files.end() - static_cast<std::ptrdiff_t>(chunk.size()), scene.files.end());
+    for (PreparedCloud& cloud : prepare_batch(context, views, options, files))
+      scene.clouds.push_back(std::move(cloud));
+    progress.update(next);
+  }
+  scene.seconds = progress.seconds();
+  viewpoints.print();
+  return scene;
+}
+
+std::vector<std::pair<std::uint32_t, std::uint32_t>> choose_pairs(const Scene& scene,
+                                                                  const std::string& pairs,
+                                                                  bool quiet) {
+  std::vector<std::pair<std::uint32_t, std::uint32_t>> chosen;
+  const auto size = static_cast<std::uint32_t>(scene.numbers.size());
+  if (pairs == "all") {
+    for (std::uint32_t i = 0; i < size; ++i)
+      for (std::uint32_t j = i + 1; j < size; ++j) chosen.emplace_back(i, j);
+    return chosen;
+  }
+  const auto listed = io::read_pairs(pairs);
+  std::size_t k = 0;
+  const auto index_of = [&](int number) {
+    const auto at = std::lower_bound(scene.numbers.begin(), scene.numbers.end(), number);
+    if (at == scene.numbers.end() || *at != number)
+      throw IoError(pairs + ":" + std::to_string(line_of_pair(pairs, k)) +
+                    ": there is no fragment " + std::to_string(number));
+    return static_cast<std::uint32_t>(at - scene.numbers.begin());
+  };
+  std::set<std::pair<std::uint32_t, std::uint32_t>> seen;
+  for (; k < listed.size(); ++k) {
+    const std::uint32_t i = index_of(listed[k].first), j = index_of(listed[k].second);
+    const std::pair<std::uint32_t, std::uint32_t> pair(std::min(i, j), std::max(i, j));
+    if (seen.insert(pair).second) chosen.push_back(pair);
+  }
+  const std::size_t repeated = listed.size() - chosen.size();
+  if (repeated > 0 && !quiet)
+    std::cerr << "gpureg: note: " << repeated << " of " << listed.size() << " pairs in " << pairs
+              << " repeat another one" << std::endl;
+  return chosen;
+}
+
+}  // namespace gpureg::cli

@@ -1,0 +1,229 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <sys/stat.h>
+
+#include <filesystem>
+#include <iostream>
+#include <map>
+#include <memory>
+#include <optional>
+#include <set>
+#include <string>
+
+#include "command.hpp"
+#include "gpureg/evaluation.hpp"
+#include "gpureg/io.hpp"
+#include "records/journal.hpp"
+#include "records/json_file.hpp"
+#include "records/options_json.hpp"
+#include "records/result_json.hpp"
+#include "records/scene.hpp"
+#include "text.hpp"
+#include "verbs/interrupt.hpp"
+#include "verbs/knowledge_options.hpp"
+#include "verbs/method_options.hpp"
+#include "verbs/output_path.hpp"
+#include "verbs/pair_run.hpp"
+#include "verbs/spacing.hpp"
+
+namespace gpureg::cli {
+namespace {
+
+struct BatchOptions {
+  std::string folder, pairs = "all";
+  MethodOptions method;
+  ViewpointChoice viewpoint;  // of clouds without cameras: auto or none
+  std::string up;
+  std::string log, info, json;
+  bool resume = false, restart = false, quiet = false;
+
+  std::string journal() const { return log + ".journal"; }
+  Journal::Mode journal_mode() const {
+    if (resume) return Journal::Mode::resume;
+    return restart ? Journal::Mode::restart : Journal::Mode::fresh;
+  }
+};
+
+// A device or pipe (/dev/stdout, say) has no place beside it.
+bool can_have_journal(const std::string& path) {
+  struct stat status{};
+  return ::stat(path.c_str(), &status) != 0 || S_ISREG(status.st_mode);
+}
+
+void check_outputs(const BatchOptions& o) {
+  std::vector<NamedPath> inputs = scene_files("DIR", o.folder);
+  if (o.pairs != "all") inputs.push_back({"--pairs", o.pairs});
+  if (!o.method.calibration.empty()) inputs.push_back({"--calibration", o.method.calibration});
+  std::vector<NamedPath> outputs = {{"-o", o.log}, {"--info", o.info}, {"--json", o.json}};
+  if (can_have_journal(o.log)) outputs.push_back({"the journal of -o", o.journal()});
+  check_outputs(outputs, inputs);
+}
+
+/// One run, from the folder to the files.
+class Batch {
+ public:
+  explicit Batch(const BatchOptions& o)
+      : o_(o), options_(o.method.registration()), context_(o.method.context()) {}
+
+  int run() {
+    if (o_.resume && !can_have_journal(o_.log))
+      throw InvalidArgument("--resume needs a file for -o, but " + o_.log + " is none");
+    if (can_have_journal(o_.log)) Journal::check(o_.journal(), o_.journal_mode());
+    const InterruptGuard guard;
+    scene_ =
+        prepare_scene(context_, o_.folder, options_.prepare, o_.quiet, o_.viewpoint.text != "none");
+    if (scene_.interrupted) {
+      std::cerr << "gpureg: interrupted before the first pair, nothing written" << std::endl;
+      return kInterrupted;
+    }
+    check_voxel_size(options_.prepare.voxel_size, scene_.extent, "the largest fragment");
+    if (o_.method.automatic_voxel_size && !o_.quiet) note_few_points(scene_.prepared_sizes());
+    Pairs pairs = choose_pairs(scene_, o_.pairs, o_.quiet);
+    if (pairs.empty())
+      throw InvalidArgument(o_.pairs == "all" ? o_.folder + " holds one fragment; a batch needs two"
+                                              : o_.pairs + " lists no pair");
+    std::optional<std::string> journal;
+    if (can_have_journal(o_.log)) journal = o_.journal();
+    run_.emplace(scene_, std::move(pairs), options_, up_prior(o_.up), journal, o_.journal_mode(),
+                 o_.quiet);
+    keep_outputs();
+    run_->align(context_);
+    if (!run_->complete() && run_->journal() && kept_.empty()) run_->journal()->note_outputs();
+    write_outputs();
+    if (!run_->complete()) return say_interrupted();
+    if (run_->journal()) run_->journal()->remove();
+    return summarise();
+  }
+
+ private:
+  /// Only a complete run replaces the outputs of another run; an interrupted run keeps its own.
+  void keep_outputs() {
+    if (run_->journal() && run_->journal()->wrote_outputs()) return;
+    for (const std::string& path : {o_.log, o_.info, o_.json})
+      if (std::filesystem::is_regular_file(path)) kept_.insert(path);
+  }
+  bool may_write(const std::string& path) const {
+    return !path.empty() && (run_->complete() || kept_.count(path) == 0);
+  }
+
+  void write_outputs() {
+    std::vector<evaluation::LogEntry> log;
+    std::vector<evaluation::InformationEntry> information;
+    Json records = Json::array();
+    for (const auto& [a, b] : run_->pairs()) {
+      const auto found = run_->done().find({scene_.numbers[a], scene_.numbers[b]});
+      if (found == run_->done().end()) continue;
+      const auto& [pair, matrix] = found->second;
+      records.push_back(pair.json);
+      if (!pair.aligned) {
+        ++reasons_[pair.reason];
+        continue;
+      }
+      log.push_back({pair.i, pair.j, scene_.count(), *pair.transform});
+      information.push_back({pair.i, pair.j, scene_.count(), information_from_json(matrix)});
+    }
+    aligned_ = log.size();
+    if (may_write(o_.log)) evaluation::write_log(o_.log, log);
+    if (may_write(o_.info)) evaluation::write_information(o_.info, information);
+    if (may_write(o_.json)) write_document(o_.json, document(std::move(records)));
+  }
+
+  Json document(Json records) const {
+    Json json;
+    json["gpureg"] = "batch";
+    json["environment"] = environment(context_);
+    json["options"] = to_json(options_);
+    json["folder"] = o_.folder;
+    json["complete"] = run_->complete();
+    json["seconds"] = {{"prepare", scene_.seconds},
+                       {"align", run_->seconds()},
+                       {"pairs_per_second", run_->rate()},
+                       {"pairs_in_this_run", run_->in_this_run()}};
+    json["peak_memory_mib"] = peak_memory_mib();
+    json["fragments"] = fragments_json(scene_);
+    json["pairs"] = std::move(records);
+    return json;
+  }
+
+  int say_interrupted() const {
+    std::string kept;
+    for (const std::string& path : kept_) kept += (kept.empty() ? "" : ", ") + path;
+    std::cerr << "gpureg: interrupted, " << run_->done().size() << " of " << run_->pairs().size()
+              << " pairs are done and written"
+              << (kept.empty() ? "" : " to the journal, " + kept + " left as before")
+              << "; go on with the same command and --resume" << std::endl;
+    return kInterrupted;
+  }
+
+  int summarise() const {
+    if (!o_.quiet) {
+      if (o_.method.automatic_voxel_size)
+        std::cout << "voxel size " << significant(static_cast<double>(o_.method.voxel_size), 3)
+                  << "\n";
+      std::cout << "fragments  " << scene_.numbers.size() << ", prepared in "
+                << fixed(scene_.seconds, 2) << " s\n"
+                << "pairs      " << run_->pairs().size() << ", in " << fixed(run_->seconds(), 2)
+                << " s (" << significant(run_->rate(), 3) << " pairs/s, " << context_.description()
+                << ")\n"
+                << "aligned    " << aligned_ << ", written to " << o_.log << "\n";
+      for (const auto& [reason, count] : reasons_)
+        std::cout << "not        " << count << ", " << reason << "\n";
+      std::cout << "memory     " << fixed(peak_memory_mib(), 0) << " MiB at most\n";
+    }
+    return aligned_ > 0 ? kOk : kNoAlignment;
+  }
+
+  const BatchOptions& o_;
+  RegistrationOptions options_;
+  Context context_;
+  Scene scene_;
+  std::optional<PairRun> run_;
+  std::set<std::string> kept_;  // outputs of another run
+  std::size_t aligned_ = 0;
+  std::map<std::string, std::size_t> reasons_;
+};
+
+}  // namespace
+
+void add_batch(CLI::App& app, Action& chosen) {
+  const auto o = std::make_shared<BatchOptions>();
+  CLI::App* verb = app.add_subcommand("batch", "Align the fragments cloud_bin_<i> of a folder");
+  verb->add_option(
+          "DIR", o->folder,
+          "Folder with cloud_bin_<i>.ply|pcd|bin, or meshes .stl|obj|ply, and perhaps cameras.txt")
+      ->required();
+  verb->add_option("--pairs", o->pairs, "all, or a file with one pair `i j` a line")
+      ->capture_default_str();
+  o->method.add_to(*verb);
+  o->method.add_calibration_to(*verb);
+  verb->add_option("--viewpoint", o->viewpoint.text,
+                   "Of fragments without a camera. auto: the file, or the origin if the surfaces "
+                   "agree with it; none: not known")
+      ->check(CLI::IsMember({"auto", "none"}))
+      ->capture_default_str();
+  verb->add_option("--up", o->up,
+                   "Vertical direction x,y,z in all fragments, and perhaps how many degrees it may "
+                   "be off (without: 10): 0,0,1,5");
+  verb->add_flag("--accept-symmetry", o->method.accept_symmetry,
+                 "Also report a pose that a symmetry makes one of several equivalent ones");
+  verb->add_option("-o,--output", o->log, "Redwood log of the aligned pairs: T_ij, j into i")
+      ->required();
+  verb->add_option("--info", o->info, "Redwood information matrices of the same pairs");
+  verb->add_option("--json", o->json, "Everything about every pair tried");
+  CLI::Option* resume = verb->add_flag("--resume", o->resume,
+                                       "Go on where an interrupted run of this output stopped");
+  verb->add_flag("--restart", o->restart, "Discard what an interrupted run of this output did")
+      ->excludes(resume);
+  verb->add_flag("--quiet", o->quiet, "No progress, no summary");
+  verb->callback([o, &chosen] {
+    chosen = [o] {
+      o->method.registration();  // reports bad options before the clouds are read
+      up_prior(o->up);
+      check_outputs(*o);
+      choose_voxel_size(o->method, o->folder);
+      if (!o->quiet) o->method.note_calibration();
+      return Batch(*o).run();
+    };
+  });
+}
+
+}  // namespace gpureg::cli

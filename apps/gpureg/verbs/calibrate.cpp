@@ -1,0 +1,152 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <filesystem>
+#include <iostream>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "command.hpp"
+#include "gpureg/error.hpp"
+#include "gpureg/io.hpp"
+#include "records/calibration_file.hpp"
+#include "records/cloud_file.hpp"
+#include "records/json_file.hpp"
+#include "records/odometry_file.hpp"
+#include "text.hpp"
+#include "verbs/interrupt.hpp"
+#include "verbs/method_options.hpp"
+#include "verbs/output_path.hpp"
+#include "verbs/pair_run.hpp"
+#include "verbs/progress.hpp"
+#include "verbs/spacing.hpp"
+#include "verbs/viewpoint_note.hpp"
+
+namespace gpureg::cli {
+namespace {
+
+struct CalibrateOptions {
+  std::string folder, output, trajectory;
+  MethodOptions method;
+  CalibrationOptions calibration;
+  bool quiet = false;
+};
+
+/// The fragments of the folder, with their cameras.
+struct Clouds {
+  std::vector<int> numbers;
+  std::vector<PointCloud> clouds;
+
+  std::vector<PointCloudView> views() const {
+    std::vector<PointCloudView> out;
+    for (const PointCloud& cloud : clouds) out.push_back(cloud.view());
+    return out;
+  }
+};
+
+Clouds read_clouds(const CalibrateOptions& o) {
+  const std::string cameras_file = (std::filesystem::path(o.folder) / "cameras.txt").string();
+  std::map<int, std::vector<Eigen::Vector3f>> cameras;
+  if (std::filesystem::exists(cameras_file)) cameras = io::read_cameras(cameras_file);
+  Clouds out;
+  ViewpointNote viewpoints;
+  for (const auto& [number, file] : io::list_fragments(o.folder)) {
+    out.numbers.push_back(number);
+    out.clouds.push_back(read_cloud(file, mesh_spacing(o.method.voxel_size),
+                                    o.quiet ? MeshNote::none : MeshNote::print));
+    if (const auto found = cameras.find(number); found != cameras.end())
+      out.clouds.back().viewpoints = found->second;
+    if (!o.quiet) viewpoints.see(out.clouds.back(), file);
+    check_voxel_size(o.method.voxel_size, extent_of(out.clouds.back().points), file);
+  }
+  viewpoints.print();
+  return out;
+}
+
+void print_count(const char* name, const CalibrationCount& count) {
+  if (count.pairs == 0) return;
+  std::cout << name << grouped(count.pairs) << " pairs, " << grouped(count.samples)
+            << " of them decided, " << grouped(count.correct) << " correct\n";
+}
+
+int run(CalibrateOptions o) {
+  o.method.registration();  // what is wrong with it shall be said before clouds are read
+  if (o.method.preset == "loopsmart")
+    throw InvalidArgument("--preset loopsmart has no confidence to calibrate");
+  std::vector<NamedPath> inputs = scene_files("DIR", o.folder);
+  if (!o.trajectory.empty()) inputs.push_back({"--trajectory", o.trajectory});
+  check_outputs({{"-o", o.output}}, inputs);
+  choose_voxel_size(o.method, o.folder);
+  const RegistrationOptions options = o.method.registration();
+  const InterruptGuard guard;
+  const Clouds clouds = read_clouds(o);
+  std::vector<UnalignedIsometry3d> poses;
+  if (!o.trajectory.empty()) poses = read_scan_poses(o.trajectory, clouds.numbers, o.folder);
+  const Context context = o.method.context();
+
+  std::optional<Progress> progress;
+  CalibrationCallbacks callbacks;
+  callbacks.on_progress = [&](std::size_t done, std::size_t total) {
+    if (!progress) progress.emplace("aligning", "pairs", total, o.quiet);
+    progress->update(done);
+  };
+  callbacks.should_stop = [] { return InterruptGuard::requested(); };
+  const CalibrationResult result =
+      calibrate(context, clouds.views(), options, o.calibration, poses, callbacks);
+  progress.reset();
+  if (result.stopped) {
+    std::cerr << "gpureg: interrupted, nothing written" << std::endl;
+    return kInterrupted;
+  }
+  write_document(o.output, calibration_document(result, options, o.method.quality));
+  if (!result.enough_samples)
+    std::cerr << "gpureg: note: too few samples: " << kMinDecidedPairs
+              << " decided pairs of different scans are needed, and " << kMinCalibrationSamples
+              << " correct and as many false samples in all; the calibration changes nothing"
+              << std::endl;
+  if (o.quiet) return kOk;
+  if (o.method.automatic_voxel_size)
+    std::cout << "voxel size   " << significant(static_cast<double>(o.method.voxel_size), 3)
+              << "\n";
+  std::cout << "fragments    " << clouds.numbers.size() << "\n";
+  print_count("of one scan  ", result.one_scan);
+  print_count("by loops     ", result.loop_consistency);
+  print_count("by poses     ", result.trajectory);
+  std::cout << "slope        " << fixed(result.calibration.slope, 3) << "\n"
+            << "offset       " << fixed(result.calibration.offset, 3) << "\n"
+            << "error        " << fixed(result.error_before, 3) << " before, "
+            << fixed(result.error_after, 3) << " after, of the same samples\n"
+            << "written to   " << o.output << "\n";
+  return kOk;
+}
+
+}  // namespace
+
+void add_calibrate(CLI::App& app, Action& chosen) {
+  const auto o = std::make_shared<CalibrateOptions>();
+  CLI::App* verb = app.add_subcommand(
+      "calibrate", "Fit the scale of the confidence to the clouds of a folder, without truth");
+  verb->add_option(
+          "DIR", o->folder,
+          "Folder with cloud_bin_<i>.ply|pcd|bin, or meshes .stl|obj|ply, and perhaps cameras.txt")
+      ->required();
+  verb->add_option("-o,--output", o->output,
+                   "JSON file for --calibration of register, batch and reconstruct")
+      ->required();
+  verb->add_option("--trajectory", o->trajectory,
+                   "Poses of the fragments, which decide instead of loops: TUM with fragment "
+                   "numbers as times, or poses.txt");
+  verb->add_option("--self-pairs", o->calibration.self_pairs, "Pairs made of one scan")
+      ->check(natural_number())
+      ->capture_default_str();
+  verb->add_option("--scan-pairs", o->calibration.scan_pairs,
+                   "Largest number of pairs of different scans")
+      ->check(natural_number())
+      ->capture_default_str();
+  o->method.add_to(*verb);
+  verb->add_flag("--quiet", o->quiet, "No progress, no summary");
+  verb->callback([o, &chosen] { chosen = [o] { return run(*o); }; });
+}
+
+}  // namespace gpureg::cli

@@ -1,0 +1,173 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <algorithm>
+#include <iostream>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "command.hpp"
+#include "gpureg/error.hpp"
+#include "gpureg/loop_consistency.hpp"
+#include "gpureg/options.hpp"
+#include "records/json_file.hpp"
+#include "records/result_file.hpp"
+#include "records/result_json.hpp"
+#include "verbs/output_path.hpp"
+
+namespace gpureg::cli {
+namespace {
+
+struct ConsistencyOptions {
+  std::string result, json, log;
+  std::optional<float> voxel_size;  // none: the result's own
+  std::optional<double> min_confidence;
+};
+
+double option_of(const Json& document, const char* group, const char* name, double otherwise) {
+  const auto options = document.find("options");
+  if (options == document.end() || !options->is_object()) return otherwise;
+  const Json& holder = group == nullptr ? *options : options->value(group, Json::object());
+  const auto found = holder.find(name);
+  return found != holder.end() && found->is_number() ? found->get<double>() : otherwise;
+}
+
+LoopConsistencyOptions loop_consistency_options(const ConsistencyOptions& o, const Json& document) {
+  if (o.voxel_size) {
+    // The batch would have taken no other one either.
+    RegistrationOptions::from_voxel_size(*o.voxel_size).validate();
+    return LoopConsistencyOptions::from_voxel_size(*o.voxel_size);
+  }
+  double voxel_size = option_of(document, "prepare", "voxel_size", 0);
+  if (voxel_size == 0)
+    voxel_size = option_of(document, "prepare", "max_correspondence_distance", 0) / 1.5;
+  if (voxel_size == 0) throw IoError(o.result + ": does not say the voxel size; give --voxel-size");
+  return LoopConsistencyOptions::from_voxel_size(static_cast<float>(voxel_size));
+}
+
+RegistrationResult result_of(const PairRecord& record) {
+  RegistrationResult result;
+  result.has_candidate = record.transform.has_value();
+  if (result.has_candidate) result.target_from_source.matrix() = *record.transform;
+  result.score = record.score;
+  result.modes = modes_from_json(record.json);
+  return result;
+}
+
+/// The record with its confidence from all pairs beside its own score. The chosen mode is first, as
+/// readers of results expect.
+Json consistent_record(const PairRecord& record, const PairConsistency& pair,
+                       double min_confidence) {
+  Json json = record.json;
+  json["loop_consistency"] = {{"score_alone", record.score},
+                              {"mode", pair.mode},
+                              {"loops", pair.loops},
+                              {"path", pair.path}};
+  if (!record.transform) return json;
+  const bool aligned = pair.confidence >= min_confidence;
+  json["score"] = pair.confidence;
+  json["status"] =
+      to_string(aligned ? RegistrationStatus::aligned : RegistrationStatus::not_aligned);
+  json["reason"] =
+      to_string(aligned ? RegistrationReason::none : RegistrationReason::confidence_too_low);
+  if (const auto modes = json.find("modes"); modes != json.end() && !modes->empty()) {
+    std::rotate(modes->begin(), modes->begin() + pair.mode, modes->begin() + pair.mode + 1);
+    Json& first = modes->front();
+    const double alone = first["confidence"].get<double>();
+    const double overlap = first.value("overlap_confidence", alone);
+    first["confidence"] = pair.confidence;
+    // Loops determine the correctness of a pose, not its overlap.
+    first["overlap_confidence"] =
+        alone > 0 ? pair.confidence * std::min(1.0, overlap / alone) : 0.0;
+    json["T_ij"] = first["T_ij"];
+  }
+  return json;
+}
+
+// A second run would count the same loops as new evidence.
+void refuse_consistent(const ResultFile& file) {
+  bool done = file.document.contains("loop_consistency");
+  for (const PairRecord& pair : file.pairs) done |= pair.json.contains("loop_consistency");
+  if (done)
+    throw IoError(file.path +
+                  ": its scores are those of `gpureg consistency` already; give the RESULT.json of "
+                  "the batch");
+}
+
+int run(const ConsistencyOptions& o) {
+  check_outputs({{"--json", o.json}, {"-o", o.log}}, {{"RESULT", o.result}});
+  ResultFile file = read_result(o.result);
+  if (!file.has_scores) throw IoError(o.result + ": is a log; loops need RESULT.json of a batch");
+  refuse_consistent(file);
+  const LoopConsistencyOptions options = loop_consistency_options(o, file.document);
+  const double min_confidence =
+      o.min_confidence.value_or(option_of(file.document, nullptr, "min_confidence", 0.5));
+
+  std::vector<Pair> pairs;
+  std::vector<RegistrationResult> results;
+  for (std::size_t k = 0; k < file.pairs.size(); ++k) try {
+      const PairRecord& record = file.pairs[k];
+      pairs.push_back({static_cast<std::uint32_t>(record.j), static_cast<std::uint32_t>(record.i)});
+      results.push_back(result_of(record));
+    } catch (const InvalidArgument& error) {
+      throw IoError(o.result + ": pairs[" + std::to_string(k) + "]: " + error.what());
+    }
+  std::vector<PairConsistency> consistency;
+  try {
+    consistency = loop_consistency(pairs, results, options);
+  } catch (const InvalidArgument& error) {
+    throw IoError(o.result + ": " + error.what());
+  }
+
+  int count = 0;
+  std::size_t raised = 0, lowered = 0, changed = 0, before = 0;
+  Json records = Json::array();
+  std::vector<evaluation::LogEntry> log;
+  for (std::size_t k = 0; k < file.pairs.size(); ++k) {
+    const PairRecord& record = file.pairs[k];
+    records.push_back(consistent_record(record, consistency[k], min_confidence));
+    const PairRecord after = PairRecord::from_json(records.back());
+    count = std::max({count, record.i + 1, record.j + 1});
+    raised += consistency[k].confidence > record.score;
+    lowered += consistency[k].confidence < record.score;
+    changed += consistency[k].mode != 0;
+    before += record.aligned;
+    if (after.aligned) log.push_back({after.i, after.j, 0, *after.transform});
+  }
+  for (const Json& fragment : file.document.value("fragments", Json::array()))
+    if (fragment.is_object()) count = std::max(count, fragment.value("number", 0) + 1);
+  for (evaluation::LogEntry& entry : log) entry.count = count;
+
+  Json document = std::move(file.document);
+  document["loop_consistency"] = {{"closing_angle", options.closing_angle},
+                                  {"closing_distance", options.closing_distance},
+                                  {"min_confidence", min_confidence}};
+  document["pairs"] = std::move(records);
+  write_document(o.json, document);
+  if (!o.log.empty()) evaluation::write_log(o.log, log);
+  std::cout << "pairs      " << file.pairs.size() << ", " << raised << " raised, " << lowered
+            << " lowered, " << changed << " with another pose\n"
+            << "aligned    " << log.size() << ", " << before << " before\n";
+  return kOk;
+}
+
+}  // namespace
+
+void add_consistency(CLI::App& app, Action& chosen) {
+  const auto o = std::make_shared<ConsistencyOptions>();
+  CLI::App* verb = app.add_subcommand(
+      "consistency",
+      "Re-score the pairs of a batch by loops of three clouds and by paths between clouds");
+  verb->add_option("RESULT", o->result, "RESULT.json of a batch")->required();
+  verb->add_option("--json", o->json, "The same with scores and poses in view of all pairs")
+      ->required();
+  verb->add_option("-o,--output", o->log, "Redwood log of the pairs that are aligned then");
+  verb->add_option("--voxel-size", o->voxel_size,
+                   "Voxel size of the tolerances; default: that of the batch");
+  verb->add_option("--min-score", o->min_confidence,
+                   "Report a pair from this score on; default: the batch's")
+      ->check(CLI::Range(0.0, 1.0));
+  verb->callback([o, &chosen] { chosen = [o] { return run(*o); }; });
+}
+
+}  // namespace gpureg::cli

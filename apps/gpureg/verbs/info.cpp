@@ -1,0 +1,64 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <Eigen/Geometry>
+#include <iostream>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "command.hpp"
+#include "gpureg/context.hpp"
+#include "gpureg/voxel_size.hpp"
+#include "records/cloud_file.hpp"
+#include "text.hpp"
+#include "verbs/spacing.hpp"
+
+namespace gpureg::cli {
+namespace {
+
+std::string describe(const Eigen::Vector3f& v) {
+  return significant(v.x(), 4) + " " + significant(v.y(), 4) + " " + significant(v.z(), 4);
+}
+
+void print_cloud(const std::string& path) {
+  const PointCloud cloud = read_cloud(path, 0, MeshNote::print);
+  const std::vector<Eigen::Vector3f> points = finite_points(cloud.points);
+  std::cout << path << "\n  points           " << grouped(cloud.points.size())
+            << (cloud.normals.empty() ? ", without normals" : ", with normals") << "\n"
+            << "  not finite       " << grouped(cloud.points.size() - points.size()) << "\n";
+  if (points.empty()) return;
+  Eigen::AlignedBox3f box;
+  for (const Eigen::Vector3f& p : points) box.extend(p);
+  const VoxelSizeSuggestion suggestion = suggest_voxel_size({cloud.view()});
+  std::cout << "  extent           " << describe(box.sizes()) << ", from " << describe(box.min())
+            << " to " << describe(box.max()) << "\n  spacing          "
+            << (suggestion.valid() ? significant(suggestion.spacing, 3) +
+                                         " (median distance to the nearest neighbour)"
+                                   : std::string("none, ") + explain(suggestion.reason))
+            << "\n";
+  if (!suggestion.valid()) return;
+  std::cout << "  noise            " << significant(suggestion.noise, 2)
+            << " (median distance from the plane of the surroundings)\n"
+            << "  suggested        --voxel-size "
+            << significant(static_cast<double>(suggestion.voxel_size), 3) << " (leaves about "
+            << grouped(suggestion.points) << " points)\n";
+}
+
+int run(const std::vector<std::string>& clouds) {
+  if (clouds.empty()) {
+    std::cout << "gpureg " GPUREG_VERSION "\n";
+    for (const std::string& line : describe_backends()) std::cout << line << "\n";
+  }
+  for (const std::string& path : clouds) print_cloud(path);
+  return kOk;
+}
+
+}  // namespace
+
+void add_info(CLI::App& app, Action& chosen) {
+  const auto clouds = std::make_shared<std::vector<std::string>>();
+  CLI::App* verb = app.add_subcommand("info", "Describe clouds; without any, version and devices");
+  verb->add_option("CLOUD", *clouds, "Clouds (PLY, PCD, KITTI .bin) or meshes (STL, OBJ, PLY)");
+  verb->callback([clouds, &chosen] { chosen = [clouds] { return run(*clouds); }; });
+}
+
+}  // namespace gpureg::cli

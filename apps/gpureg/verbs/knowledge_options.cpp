@@ -1,0 +1,94 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "verbs/knowledge_options.hpp"
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <iostream>
+#include <sstream>
+
+#include "gpureg/error.hpp"
+#include "text.hpp"
+
+namespace gpureg::cli {
+namespace {
+
+/// Numbers between commas; empty where one of them is none.
+std::vector<double> numbers_of(const std::string& text) {
+  std::vector<double> out;
+  std::istringstream fields(text + ",");
+  for (std::string field; std::getline(fields, field, ',');) {
+    double number = 0;
+    if (!CLI::detail::lexical_cast(field, number)) return {};
+    out.push_back(number);
+  }
+  return out;
+}
+
+Eigen::Vector3d direction(const std::vector<double>& numbers) {
+  return {numbers[0], numbers[1], numbers[2]};
+}
+
+}  // namespace
+
+bool ViewpointChoice::is_word() const {
+  return text == "auto" || text == "none" || text == "model";
+}
+
+void ViewpointChoice::check(const char* option) const {
+  if (is_word()) return;
+  const std::vector<double> numbers = numbers_of(text);
+  if (numbers.size() != 3 || !direction(numbers).allFinite())
+    throw InvalidArgument(std::string(option) + " is " + text +
+                          ", expected x,y,z (finite), model, none or auto");
+}
+
+void ViewpointChoice::apply(PointCloud& cloud) const {
+  if (text == "auto") return;
+  cloud.viewpoints.clear();
+  if (!is_word()) cloud.viewpoints.push_back(direction(numbers_of(text)).cast<float>());
+}
+
+void ViewpointChoice::note_place(const char* option, const PreparedCloud& cloud,
+                                 const std::string& file) const {
+  if (is_word()) return;
+  const Eigen::Vector3f place = direction(numbers_of(text)).cast<float>();
+  // One point within a voxel may be a return of the sensor itself, a surface has about three.
+  constexpr std::ptrdiff_t kSurface = 2;
+  const float voxel = cloud.options().voxel_size;
+  const std::vector<Eigen::Vector3f> points = cloud.points();
+  const std::ptrdiff_t near =
+      std::count_if(points.begin(), points.end(),
+                    [&](const Eigen::Vector3f& p) { return (p - place).norm() <= voxel; });
+  if (near < kSurface) return;
+  std::cerr << "gpureg: note: " << option << " " << text << " lies on a surface of " << file << ", "
+            << near << " prepared points are within a voxel of it: is it in the frame of the cloud?"
+            << std::endl;
+}
+
+PointCloudView ViewpointChoice::view(const PointCloud& cloud) const {
+  PointCloudView view = cloud.view();
+  view.infer_viewpoint = text != "none";
+  if (text == "none") view.model = false;
+  if (text == "model") view.model = true;
+  return view;
+}
+
+std::optional<GravityPrior> up_prior(const std::string& text) {
+  if (text.empty()) return std::nullopt;
+  const std::vector<double> numbers = numbers_of(text);
+  const auto refuse = [&](const char* expected) {
+    throw InvalidArgument("--up is " + text + ", expected " + expected);
+  };
+  if (numbers.size() != 3 && numbers.size() != 4) refuse("x,y,z or x,y,z,degrees");
+  GravityPrior prior;
+  prior.source_up = prior.target_up = direction(numbers);
+  if (!prior.source_up.allFinite() || !(prior.source_up.norm() > 1e-9))
+    refuse("a direction x,y,z, finite and not 0");
+  if (numbers.size() == 4) prior.max_angle = numbers[3];
+  if (!(prior.max_angle > 0 && prior.max_angle <= 180)) refuse("degrees in (0, 180]");
+  return prior;
+}
+
+}  // namespace gpureg::cli

@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "gpureg/context.hpp"
+#include "gpureg/options.hpp"
+#include "gpureg/reconstruction.hpp"
+#include "records/json.hpp"
+#include "records/pair_record.hpp"
+#include "records/scene.hpp"
+
+namespace gpureg::cli {
+
+/// Everything that `gpureg reconstruct` knows at its end, for the files that it writes.
+struct MapRun {
+  std::string folder, output;
+  RegistrationOptions options;
+  Scene scene;  ///< without prepared clouds where the pairs come from a file
+  std::vector<PairRecord> records;
+  std::vector<Json> information;  ///< of each record; null: not known
+  reconstruction::Reconstruction map;
+  std::optional<reconstruction::RefineReport> refined;
+  bool aligned_here = false;  ///< the pairs were aligned by this run
+  std::size_t pairs_in_this_run = 0;
+  std::size_t map_points = 0;
+  struct {
+    double prepare = 0, prune = 0, align = 0, graph = 0, surfaces = 0, refine = 0, write = 0;
+  } seconds;
+
+  std::string file(const std::string& name) const;  ///< path in the output folder
+  std::uint32_t index_of(int number) const;         ///< of a scan that is there
+  bool has(int number) const;
+  std::size_t accepted_edges() const;
+};
+
+}  // namespace gpureg::cli

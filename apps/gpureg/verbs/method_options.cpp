@@ -1,0 +1,132 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "verbs/method_options.hpp"
+
+#include <cerrno>
+#include <cmath>
+#include <cstdlib>
+#include <iostream>
+
+#include "gpureg/error.hpp"
+#include "gpureg/voxel_size.hpp"
+#include "records/calibration_file.hpp"
+#include "text.hpp"
+
+namespace gpureg::cli {
+
+namespace {
+
+// CLI11 takes -4 for an unsigned number and wraps it around.
+std::string check_natural(const std::string& text) {
+  const bool digits = !text.empty() && text.find_first_not_of("0123456789") == std::string::npos;
+  errno = 0;
+  if (digits) std::strtoull(text.c_str(), nullptr, 10);
+  return digits && errno == 0 ? "" : text + " is no whole number from 0 to 2^64 - 1";
+}
+
+}  // namespace
+
+CLI::Validator natural_number() { return CLI::Validator(&check_natural, "", "natural number"); }
+
+void MethodOptions::add_to(CLI::App& verb) {
+  verb_ = &verb;
+  verb.add_option_function<std::string>(
+          "--voxel-size",
+          [this](const std::string& text) {
+            automatic_voxel_size = text == "auto";
+            if (text.empty())
+              voxel_size = 0;  // refused by name, later
+            else if (!automatic_voxel_size && !CLI::detail::lexical_cast(text, voxel_size))
+              throw CLI::ConversionError(text, "--voxel-size");
+          },
+          "Edge of the downsampling voxel in metres; every other length follows from it. auto: "
+          "suggested by the clouds")
+      ->default_str(significant(static_cast<double>(voxel_size), 6))
+      ->type_name("FLOAT or auto");
+  verb.add_option("--preset", preset,
+                  "default: poses from compatible matches, verified by evidence; loopsmart: the "
+                  "paper's method")
+      ->check(CLI::IsMember({"default", "loopsmart"}))
+      ->capture_default_str();
+  verb.add_option("--backend", backend, "auto: CUDA where there is a device, else the CPU")
+      ->check(CLI::IsMember({"auto", "cpu", "cuda"}))
+      ->capture_default_str();
+  verb.add_option("--threads", threads, "Threads of the CPU backend; 0: all")
+      ->check(natural_number())
+      ->capture_default_str();
+  verb.add_option("--hypotheses", hypotheses,
+                  "Quadruples of matches that the preset loopsmart tries per pair")
+      ->check(natural_number())
+      ->capture_default_str();
+  verb.add_option("--quality", quality,
+                  "From 0, the fastest, to 10, the highest recall; of the preset default")
+      ->check(CLI::Range(0u, kHighestQuality))
+      ->capture_default_str();
+  verb.add_option("--seed", seed, "Same seed, same result, on any machine")
+      ->check(natural_number())
+      ->capture_default_str();
+  verb.add_option("--min-score", min_score,
+                  "Report a pair from this confidence on (without: 0.5); with --preset loopsmart, "
+                  "from this inlier ratio on (0.3). 0: every best candidate");
+}
+
+void MethodOptions::add_calibration_to(CLI::App& verb) {
+  verb.add_option("--calibration", calibration,
+                  "File of `gpureg calibrate`: scales the confidence to a sensor");
+}
+
+void MethodOptions::note_calibration() const {
+  if (calibration.empty()) return;
+  const double of_file = read_calibration(calibration).voxel_size;
+  const double of_run = static_cast<double>(voxel_size);
+  constexpr double kSimilar = 1.5;
+  if (of_run <= kSimilar * of_file && of_file <= kSimilar * of_run) return;
+  std::cerr << "gpureg: note: " << calibration << " was made with a voxel size of "
+            << significant(of_file, 3) << ", this run has " << significant(of_run, 3)
+            << "; the confidence may be off" << std::endl;
+}
+
+RegistrationOptions MethodOptions::registration() const {
+  const char* idle = preset == "loopsmart" ? "--quality" : "--hypotheses";
+  if (given(idle))
+    throw InvalidArgument(std::string(idle) + " does nothing with --preset " + preset +
+                          (given("--preset") ? "" : ", which is the default"));
+  RegistrationOptions options = preset == "loopsmart"
+                                    ? RegistrationOptions::loopsmart(voxel_size)
+                                    : RegistrationOptions::from_voxel_size(voxel_size, quality);
+  options.quadruples.count = hypotheses;
+  options.seed = seed;
+  options.accept_symmetry = accept_symmetry;
+  if (!calibration.empty()) {
+    if (options.method == RegistrationMethod::quadruples)
+      throw InvalidArgument(
+          "--calibration scales the confidence, which preset loopsmart does not have");
+    options.calibration = read_calibration(calibration).calibration;
+  }
+  if (min_score && !(*min_score >= 0 && *min_score <= 1))
+    throw InvalidArgument("--min-score is " + significant(*min_score, 6) +
+                          ", expected a number from 0 to 1");
+  if (min_score && options.method == RegistrationMethod::quadruples)
+    options.quadruples.min_inlier_ratio = static_cast<float>(*min_score);
+  else if (min_score)
+    options.min_confidence = *min_score;
+  options.validate();
+  return options;
+}
+
+void MethodOptions::choose_voxel_size(const std::vector<PointCloudView>& clouds,
+                                      const std::string& what) {
+  if (!automatic_voxel_size) return;
+  const VoxelSizeSuggestion suggestion = suggest_voxel_size(clouds);
+  if (!suggestion.valid())
+    throw InvalidArgument("--voxel-size auto: " + what + ": " + explain(suggestion.reason));
+  voxel_size = suggestion.voxel_size;
+}
+
+Context MethodOptions::context() const {
+  if (backend == "cpu") return Context::cpu(threads);
+  if (backend == "cuda") return Context::cuda();
+  const Context best = Context::best();
+  return best.backend() == Backend::cpu && threads > 0 ? Context::cpu(threads) : best;
+}
+
+}  // namespace gpureg::cli

@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "gpureg/context.hpp"
+#include "gpureg/options.hpp"
+#include "gpureg/prior.hpp"
+#include "records/journal.hpp"
+#include "records/scene.hpp"
+#include "verbs/method_options.hpp"
+
+namespace gpureg::cli {
+
+/// Indices i < j into the numbers of a scene.
+using Pairs = std::vector<std::pair<std::uint32_t, std::uint32_t>>;
+
+/// Sets an automatic voxel size to that of some fragments of a folder, evenly chosen: it is the
+/// same for a run that is resumed.
+void choose_voxel_size(MethodOptions& method, const std::string& folder);
+
+/// Aligns the pairs of a scene, with a journal from which an interrupted run goes on.
+class PairRun {
+ public:
+  /// gravity: a prior for all pairs. Opens the journal; without one, nothing can be resumed. Throws
+  /// IoError.
+  PairRun(const Scene& scene, Pairs pairs, const RegistrationOptions& options,
+          const std::optional<GravityPrior>& gravity, const std::optional<std::string>& journal,
+          Journal::Mode mode, bool quiet);
+
+  /// Aligns what is left, until it is done or interrupted.
+  void align(const Context& context);
+
+  bool complete() const { return done_.size() == pairs_.size(); }
+  const Pairs& pairs() const { return pairs_; }
+  const Journal::Entries& done() const { return done_; }
+  Journal* journal() { return journal_ ? &*journal_ : nullptr; }
+
+  std::size_t in_this_run() const { return done_.size() - resumed_; }
+  double seconds() const { return seconds_; }
+  double rate() const;  ///< pairs per second of this run
+
+ private:
+  const Scene& scene_;
+  Pairs pairs_;
+  const RegistrationOptions& options_;
+  std::optional<GravityPrior> gravity_;
+  std::optional<Journal> journal_;
+  bool quiet_;
+  Journal::Entries done_;
+  std::size_t resumed_ = 0;
+  double seconds_ = 0;
+};
+
+/// The fragments of a scene as results list them.
+Json fragments_json(const Scene& scene);
+
+}  // namespace gpureg::cli

@@ -1,0 +1,333 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <algorithm>
+#include <chrono>
+#include <filesystem>
+#include <iostream>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "command.hpp"
+#include "gpureg/error.hpp"
+#include "gpureg/io.hpp"
+#include "gpureg/pruning.hpp"
+#include "pages/map_page.hpp"
+#include "records/cloud_file.hpp"
+#include "records/json_file.hpp"
+#include "records/map_document.hpp"
+#include "records/map_files.hpp"
+#include "records/odometry_file.hpp"
+#include "records/pair_results.hpp"
+#include "text.hpp"
+#include "verbs/interrupt.hpp"
+#include "verbs/output_path.hpp"
+#include "verbs/pair_run.hpp"
+#include "verbs/progress.hpp"
+#include "verbs/spacing.hpp"
+
+namespace gpureg::cli {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr const char* kJournal = "pairs.journal";
+constexpr const char* kOutputs[] = {
+    "poses.txt", "trajectory.txt", "edges.log",  "graph.g2o",
+    "map.ply",   "map.html",       "pairs.json", "reconstruction.json"};
+
+struct ReconstructOptions {
+  std::string folder, output, pairs = "all", results, odometry;
+  MethodOptions method;
+  std::uint32_t prune = 0;
+  pose_graph::DriftOptions drift;
+  std::optional<float> map_voxel_size;
+  bool no_refine = false, no_map = false;
+  bool resume = false, restart = false, quiet = false;
+
+  std::string file(const std::string& name) const { return (fs::path(output) / name).string(); }
+  std::string journal() const { return file(kJournal); }
+  Journal::Mode journal_mode() const {
+    if (resume) return Journal::Mode::resume;
+    return restart ? Journal::Mode::restart : Journal::Mode::fresh;
+  }
+};
+
+/// Makes the output folder, and refuses one whose files could be inputs.
+void check_output_folder(const ReconstructOptions& o) {
+  const std::vector<NamedPath> inputs = [&] {
+    std::vector<NamedPath> files = scene_files("DIR", o.folder);
+    files.push_back({"--results", o.results});
+    files.push_back({"--odometry", o.odometry});
+    if (o.pairs != "all") files.push_back({"--pairs", o.pairs});
+    if (!o.method.calibration.empty()) files.push_back({"--calibration", o.method.calibration});
+    return files;
+  }();
+  std::error_code error;
+  if (fs::exists(o.output, error) && !fs::is_directory(o.output, error))
+    throw IoError("cannot write " + o.output + ": it is no folder");
+  // The poses.txt of a data set is its truth.
+  if (fs::equivalent(o.output, o.folder, error))
+    throw InvalidArgument("-o and DIR must be different folders, not both " + o.output);
+  fs::create_directories(o.output, error);
+  if (error) throw IoError("cannot make the folder " + o.output + ": " + error.message());
+  std::vector<NamedPath> outputs = {{"the journal of -o", o.journal()}};
+  for (const char* name : kOutputs)
+    if (o.results.empty() || std::string(name) != "pairs.json")
+      outputs.push_back({"a file of -o", o.file(name)});
+  check_outputs(outputs, inputs);
+}
+
+/// One run, from the folder to the map.
+class Reconstruct {
+ public:
+  explicit Reconstruct(const ReconstructOptions& o) : o_(o), context_(o.method.context()) {
+    run_.folder = o.folder;
+    run_.output = o.output;
+    run_.options = o.method.registration();
+  }
+
+  int run() {
+    if (o_.results.empty()) Journal::check(o_.journal(), o_.journal_mode());
+    const InterruptGuard guard;
+    if (o_.results.empty()) {
+      if (!align_pairs()) return say_interrupted();
+    } else {
+      read_pair_results(o_.results, run_);
+    }
+    if (!o_.odometry.empty() && odometry_.empty()) odometry_ = read_odometry(o_.odometry, run_);
+    reconstruct();
+    if (!(o_.no_refine && o_.no_map)) {
+      const Clock::time_point start = Clock::now();
+      if (!make_surfaces()) return say_interrupted();
+      run_.seconds.surfaces = since(start);
+    }
+    if (!o_.no_refine && !refine()) return say_interrupted();
+    write_outputs();
+    if (pairs_) pairs_->journal()->remove();
+    if (!o_.quiet) {
+      if (o_.method.automatic_voxel_size)
+        std::cout << "voxel size " << significant(static_cast<double>(o_.method.voxel_size), 3)
+                  << "\n";
+      std::cout << map_summary(run_, context_);
+    }
+    return run_.map.islands.empty() ? kNoAlignment : kOk;
+  }
+
+ private:
+  using Clock = std::chrono::steady_clock;
+  static double since(Clock::time_point start) {
+    return std::chrono::duration<double>(Clock::now() - start).count();
+  }
+
+  /// Prepares and aligns. false: interrupted.
+  bool align_pairs() {
+    Scene& scene = run_.scene;
+    scene = prepare_scene(context_, o_.folder, run_.options.prepare, o_.quiet);
+    if (scene.interrupted) return false;
+    run_.seconds.prepare = scene.seconds;
+    check_voxel_size(run_.options.prepare.voxel_size, scene.extent, "the largest fragment");
+    if (o_.method.automatic_voxel_size && !o_.quiet) note_few_points(scene.prepared_sizes());
+    // A bad file shall show before hours of work.
+    if (!o_.odometry.empty()) odometry_ = read_odometry(o_.odometry, run_);
+    Pairs pairs = o_.prune > 0 ? likely_pairs() : choose_pairs(scene, o_.pairs, o_.quiet);
+    if (pairs.empty())
+      throw InvalidArgument(o_.pairs == "all" ? o_.folder + " holds one fragment; a map needs two"
+                                              : o_.pairs + " lists no pair");
+    pairs_.emplace(scene, std::move(pairs), run_.options, std::nullopt, o_.journal(),
+                   o_.journal_mode(), o_.quiet);
+    pairs_->align(context_);
+    if (!pairs_->complete()) return false;
+    for (const auto& [i, j] : pairs_->pairs()) {
+      const Journal::Entry& entry = pairs_->done().at({scene.numbers[i], scene.numbers[j]});
+      run_.records.push_back(entry.pair);
+      run_.information.push_back(entry.information);
+    }
+    run_.aligned_here = true;
+    run_.seconds.align = pairs_->seconds();
+    run_.pairs_in_this_run = pairs_->in_this_run();
+    // The work of hours is safe from here on, whatever becomes of the map.
+    write_document(o_.file("pairs.json"), pairs_document(run_, context_));
+    return true;
+  }
+
+  /// The pairs of --prune, and of consecutive scans where odometry knows them.
+  Pairs likely_pairs() {
+    const Clock::time_point start = Clock::now();
+    pruning::Options options;
+    options.neighbors = o_.prune;
+    options.threads = static_cast<int>(o_.method.threads);
+    Pairs pairs;
+    for (const Pair& pair : pruning::likely_pairs(run_.scene.clouds, options))
+      pairs.emplace_back(pair.target, pair.source);
+    for (const reconstruction::Odometry& edge : odometry_)
+      pairs.push_back(std::minmax(edge.source, edge.target));
+    std::sort(pairs.begin(), pairs.end());
+    pairs.erase(std::unique(pairs.begin(), pairs.end()), pairs.end());
+    run_.seconds.prune = since(start);
+    return pairs;
+  }
+
+  void reconstruct() {
+    const Clock::time_point start = Clock::now();
+    std::vector<Pair> pairs;
+    std::vector<RegistrationResult> results;
+    for (std::size_t k = 0; k < run_.records.size(); ++k) {
+      pairs.push_back({run_.index_of(run_.records[k].j), run_.index_of(run_.records[k].i)});
+      results.push_back(result_from_record(run_.records[k], run_.information[k]));
+    }
+    auto options = reconstruction::Options::from_voxel_size(run_.options.prepare.voxel_size);
+    options.threads = static_cast<int>(o_.method.threads);
+    options.drift = o_.drift;
+    run_.map =
+        reconstruction::reconstruct(run_.scene.numbers.size(), pairs, results, options, odometry_);
+    run_.seconds.graph = since(start);
+  }
+
+  /// Points and normals of the placed scans. false: interrupted.
+  bool make_surfaces() {
+    const Scene& scene = run_.scene;
+    surfaces_.resize(scene.numbers.size());
+    const std::string cameras_file = (fs::path(o_.folder) / "cameras.txt").string();
+    std::map<int, std::vector<Eigen::Vector3f>> cameras;
+    if (fs::exists(cameras_file)) cameras = io::read_cameras(cameras_file);
+    Progress progress("preparing finer", "fragments", surfaces_.size(), o_.quiet);
+    for (std::size_t k = 0; k < surfaces_.size(); ++k) {
+      if (InterruptGuard::requested()) return false;
+      if (run_.map.scans[k].placed) {
+        PointCloud cloud = read_cloud(scene.files[k], mesh_spacing(run_.options.prepare.voxel_size),
+                                      MeshNote::none);
+        cloud.viewpoints = cameras[scene.numbers[k]];
+        surfaces_[k] = reconstruction::surface_of(context_, cloud.view(), run_.options.prepare);
+      }
+      progress.update(k + 1);
+    }
+    return true;
+  }
+
+  /// false: interrupted.
+  bool refine() {
+    const Clock::time_point start = Clock::now();
+    auto options =
+        reconstruction::RefineOptions::for_depth_cameras(run_.options.prepare.voxel_size);
+    options.threads = static_cast<int>(o_.method.threads);
+    Progress iterations("refining", "iterations", static_cast<std::size_t>(options.iterations),
+                        o_.quiet);
+    options.should_stop = [&](int k) {
+      iterations.update(static_cast<std::size_t>(k));
+      return InterruptGuard::requested();
+    };
+    run_.refined = reconstruction::refine(context_, surfaces_, run_.map, options);
+    run_.seconds.refine = since(start);
+    return !InterruptGuard::requested();
+  }
+
+  void write_outputs() {
+    const Clock::time_point start = Clock::now();
+    write_poses(run_);
+    if (!o_.no_map) {
+      const float voxel_size =
+          o_.map_voxel_size.value_or(static_cast<float>(o_.method.voxel_size / 2));
+      write_merged_maps(run_, voxel_size, o_.quiet);
+      write_map_page(run_, surfaces_);
+    }
+    run_.seconds.write = since(start);
+    write_document(o_.file("reconstruction.json"), map_document(run_, context_));
+  }
+
+  int say_interrupted() const {
+    std::cerr << "gpureg: interrupted";
+    if (pairs_)
+      std::cerr << ", " << pairs_->done().size() << " of " << pairs_->pairs().size()
+                << " pairs are in the journal; go on with the same command and --resume";
+    else
+      std::cerr << ", nothing written";
+    std::cerr << std::endl;
+    return kInterrupted;
+  }
+
+  const ReconstructOptions& o_;
+  Context context_;
+  MapRun run_;
+  std::optional<PairRun> pairs_;  // none: the results come from a file
+  std::vector<reconstruction::Odometry> odometry_;
+  std::vector<reconstruction::Surface> surfaces_;
+};
+
+}  // namespace
+
+void add_reconstruct(CLI::App& app, Action& chosen) {
+  const auto o = std::make_shared<ReconstructOptions>();
+  CLI::App* verb = app.add_subcommand(
+      "reconstruct", "Make one map of the unordered fragments cloud_bin_<i> of a folder");
+  verb->add_option(
+          "DIR", o->folder,
+          "Folder with cloud_bin_<i>.ply|pcd|bin, or meshes .stl|obj|ply, and perhaps cameras.txt")
+      ->required();
+  verb->add_option("-o,--output", o->output,
+                   "Folder for poses.txt, reconstruction.json, trajectory.txt (TUM), edges.log "
+                   "(Redwood), graph.g2o, map.ply, map.html and pairs.json")
+      ->required();
+  CLI::Option* pairs =
+      verb->add_option("--pairs", o->pairs, "all, or a file with one pair `i j` a line")
+          ->capture_default_str();
+  CLI::Option* results =
+      verb->add_option("--results", o->results,
+                       "JSON of `gpureg batch`, or pairs.json of a map, instead of aligning");
+  verb->add_option("--prune", o->prune,
+                   "For large sets: align each fragment with the so many that look most like it "
+                   "only; without: all pairs")
+      ->check(CLI::Range(1u, 1000000u))
+      ->excludes(pairs)
+      ->excludes(results);
+  CLI::Option* odometry = verb->add_option(
+      "--odometry", o->odometry,
+      "Known relative poses: a trajectory (TUM with fragment numbers as times, or poses.txt), of "
+      "which those of consecutive fragments count, or a Redwood log of pairs");
+  verb->add_option("--drift", o->drift.translation_per_metre,
+                   "Odometry: metres of error per metre travelled")
+      ->capture_default_str()
+      ->check(CLI::NonNegativeNumber)
+      ->needs(odometry);
+  verb->add_option("--drift-rotation", o->drift.rotation_per_metre,
+                   "Odometry: degrees of error per metre travelled")
+      ->capture_default_str()
+      ->check(CLI::NonNegativeNumber)
+      ->needs(odometry);
+  verb->add_option("--drift-turn", o->drift.rotation_per_degree,
+                   "Odometry: degrees of error per degree turned")
+      ->capture_default_str()
+      ->check(CLI::NonNegativeNumber)
+      ->needs(odometry);
+  o->method.add_to(*verb);
+  o->method.add_calibration_to(*verb);
+  verb->add_flag("--no-refine", o->no_refine, "Without the joint refinement of all poses");
+  verb->add_flag("--no-map", o->no_map, "Without map.ply and map.html");
+  verb->add_option("--map-voxel-size", o->map_voxel_size,
+                   "Voxel size of map.ply; default: half the voxel size")
+      ->check(CLI::PositiveNumber);
+  CLI::Option* resume =
+      verb->add_flag("--resume", o->resume, "Go on where an interrupted run of this output stopped")
+          ->excludes(results);
+  verb->add_flag("--restart", o->restart, "Discard what an interrupted run of this output did")
+      ->excludes(resume)
+      ->excludes(results);
+  verb->add_flag("--quiet", o->quiet, "No progress, no summary");
+  verb->callback([o, &chosen] {
+    chosen = [o] {
+      o->method.registration();  // reports bad options before the clouds are read
+      if (!o->results.empty() && !o->method.calibration.empty())
+        throw InvalidArgument(
+            "--calibration scales confidences that are made here, --results has "
+            "its own");
+      check_output_folder(*o);
+      choose_voxel_size(o->method, o->folder);
+      if (!o->quiet) o->method.note_calibration();
+      return Reconstruct(*o).run();
+    };
+  });
+}
+
+}  // namespace gpureg::cli

@@ -1,0 +1,306 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <algorithm>
+#include <iostream>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "command.hpp"
+#include "gpureg/error.hpp"
+#include "gpureg/evaluation.hpp"
+#include "gpureg/files.hpp"
+#include "gpureg/io.hpp"
+#include "gpureg/mesh.hpp"
+#include "gpureg/registration.hpp"
+#include "gpureg/time_budget.hpp"
+#include "pictures/before_after.hpp"
+#include "pictures/image.hpp"
+#include "records/cloud_file.hpp"
+#include "records/initial_poses.hpp"
+#include "records/json_file.hpp"
+#include "records/options_json.hpp"
+#include "records/result_json.hpp"
+#include "text.hpp"
+#include "verbs/knowledge_options.hpp"
+#include "verbs/method_options.hpp"
+#include "verbs/output_path.hpp"
+#include "verbs/spacing.hpp"
+#include "verbs/viewpoint_note.hpp"
+
+namespace gpureg::cli {
+namespace {
+
+struct RegisterOptions {
+  std::string source, target;
+  MethodOptions method;
+  std::optional<double> time_budget;  // milliseconds
+  std::string json, overlay, image;
+  std::string initial;  // file of poses that are verified instead of a search
+  bool refine_initial = false, ignore_alternatives = false;
+  ViewpointChoice source_viewpoint, target_viewpoint;
+  std::string up;
+};
+
+std::string describe(const PrepareStatistics& s) {
+  std::string text = grouped(s.input_points) + " points";
+  if (s.invalid_points > 0) text += " (" + grouped(s.invalid_points) + " not finite, dropped)";
+  text += ", " + grouped(s.points) + " prepared";
+  if (s.points_without_feature > 0)
+    text += " (" + grouped(s.points_without_feature) + " without a feature)";
+  return text + "; viewpoint " + to_string(s.viewpoint) +
+         (s.repaired_normals > 0 ? ", " + grouped(s.repaired_normals) +
+                                       " normals contradicted their neighbours and were flipped"
+                                 : "");
+}
+
+std::string describe(const Eigen::Matrix4d& pose) {
+  std::string text;
+  for (int row = 0; row < 4; ++row) {
+    text += "   ";
+    for (int column = 0; column < 4; ++column)
+      text += " " + pad_left(fixed(pose(row, column), 6), column < 3 ? 10 : 13);
+    text += "\n";
+  }
+  return text;
+}
+
+void print_report(const RegisterOptions& o, const Context& context, const PreparedCloud& source,
+                  const PreparedCloud& target, const RegistrationResult& r) {
+  const RegistrationStatistics& s = r.statistics;
+  const StageTimings& t = r.timings;
+  const PrepareStatistics &a = source.statistics(), &b = target.statistics();
+  std::cout << "source   " << o.source << ": " << describe(a) << "\n"
+            << "target   " << o.target << ": " << describe(b) << "\n"
+            << "backend  " << context.description() << "\n"
+            << "status   " << to_string(r.status);
+  if (!r.aligned()) std::cout << ": " << to_string(r.reason) << ", " << explain(r.reason);
+  std::cout << "\n";
+  if (r.has_candidate) {
+    std::cout << (r.aligned() ? "target_from_source\n" : "best candidate, target_from_source\n")
+              << describe(r.target_from_source.matrix()) << "score    " << fixed(r.score, 3)
+              << ", inliers " << grouped(s.inliers) << " of " << grouped(s.points_scored) << " ("
+              << percent(r.inlier_ratio) << " %), rmse " << significant(r.inlier_rmse, 3) << " m\n";
+    if (r.equivalent_poses() > 1)
+      std::cout << "symmetry " << r.equivalent_poses() << " equivalent poses, confidence "
+                << fixed(r.symmetry_confidence(), 3) << " together\n";
+  }
+  std::cout << "counts   correspondences " << grouped(s.correspondences) << ", hypotheses "
+            << grouped(s.hypotheses) << ", survivors " << grouped(s.survivors) << ", scored "
+            << grouped(s.scored) << ", consensus " << grouped(s.consensus) << ", refine iterations "
+            << s.refine_iterations << "\n"
+            << "ms       prepare " << fixed(a.total() + b.total(), 1) << " (downsample "
+            << fixed(a.downsample + b.downsample, 1) << ", normals "
+            << fixed(a.normals + b.normals, 1) << ", features " << fixed(a.features + b.features, 1)
+            << ", grid " << fixed(a.grid + b.grid, 1) << ", depth maps "
+            << fixed(a.depth_maps + b.depth_maps, 1) << ", surface sides "
+            << fixed(a.surface_sides + b.surface_sides, 1) << ")\n         align "
+            << fixed(t.total(), 1) << " (match " << fixed(t.match, 1) << ", propose "
+            << fixed(t.propose, 1) << ", rank " << fixed(t.rank, 1) << ", refine "
+            << fixed(t.refine, 1) << ", verify " << fixed(t.verify, 1) << ")\n";
+}
+
+void print_verified(const RegisterOptions& o, const Context& context, const PreparedCloud& source,
+                    const PreparedCloud& target, const RegistrationResult& r) {
+  std::cout << "source   " << o.source << ": " << describe(source.statistics()) << "\n"
+            << "target   " << o.target << ": " << describe(target.statistics()) << "\n"
+            << "backend  " << context.description() << "\n"
+            << "status   " << to_string(r.status);
+  if (!r.aligned()) std::cout << ": " << to_string(r.reason) << ", " << explain(r.reason);
+  std::cout << "\ntarget_from_source" << (o.refine_initial ? ", refined" : "") << "\n"
+            << describe(r.target_from_source.matrix()) << "score    " << fixed(r.score, 3)
+            << ", inliers " << grouped(r.statistics.inliers) << " of "
+            << grouped(r.statistics.points_scored) << " (" << percent(r.inlier_ratio)
+            << " %), rmse " << significant(r.inlier_rmse, 3) << " m\n";
+  for (const RegistrationMode& mode : r.modes)
+    std::cout << "pose " << mode.rank_before_refinement + 1 << " of " << o.initial
+              << ": confidence " << fixed(mode.confidence, 3) << ", overlap "
+              << percent(mode.evidence.source_overlap) << " and "
+              << percent(mode.evidence.target_overlap) << " %, free-space violation "
+              << percent(std::max(mode.evidence.source_free_space_violation,
+                                  mode.evidence.target_free_space_violation))
+              << " %\n";
+}
+
+Json document(const RegisterOptions& o, const RegistrationOptions& options, const Context& context,
+              const PreparedCloud& source, const PreparedCloud& target,
+              const RegistrationResult& result) {
+  Json json;
+  json["gpureg"] = "register";
+  json["environment"] = environment(context);
+  json["options"] = to_json(options);
+  json["source"] = {{"file", o.source}, {"prepare", to_json(source.statistics())}};
+  json["target"] = {{"file", o.target}, {"prepare", to_json(target.statistics())}};
+  json["result"] = to_json(result, "target_from_source");
+  json["result"]["explanation"] = explain(result.reason);
+  json["result"]["information_redwood"] = to_json(result.source_moments.information_redwood());
+  json["result"]["information_open3d"] = to_json(result.target_moments.information_open3d());
+  json["peak_memory_mib"] = peak_memory_mib();
+  return json;
+}
+
+/// Verifies the poses of --initial.
+RegistrationResult verify(const RegisterOptions& o, const Context& context,
+                          const PreparedCloud& source, const PreparedCloud& target,
+                          const RegistrationOptions& options) {
+  VerificationOptions verification;
+  verification.refine = o.refine_initial;
+  verification.search_alternatives = !o.ignore_alternatives;
+  RegistrationResult result = result_of(
+      verify_poses(context, source, target, read_initial_poses(o.initial), options, verification),
+      options.min_confidence);
+  result.statistics.source_points = static_cast<std::uint32_t>(source.size());
+  result.statistics.target_points = static_cast<std::uint32_t>(target.size());
+  return result;
+}
+
+/// Both clouds. A mesh is sampled at the spacing of the other cloud.
+std::pair<PointCloud, PointCloud> read_clouds(const RegisterOptions& o) {
+  const bool source = io::is_mesh(o.source), target = io::is_mesh(o.target);
+  std::pair<PointCloud, PointCloud> clouds;
+  if (!source) clouds.first = io::read_point_cloud(o.source);
+  if (!target) clouds.second = io::read_point_cloud(o.target);
+  const auto spacing = [](const PointCloud& other) {
+    return median_spacing(finite_points(other.points), 1);
+  };
+  if (source)
+    clouds.first = read_cloud(o.source, target ? 0 : spacing(clouds.second), MeshNote::print);
+  if (target)
+    clouds.second = read_cloud(o.target, source ? 0 : spacing(clouds.first), MeshNote::print);
+  return clouds;
+}
+
+void check_initial(const RegisterOptions& o) {
+  if (o.initial.empty()) {
+    if (o.refine_initial || o.ignore_alternatives)
+      throw InvalidArgument("--refine-initial and --ignore-alternatives need --initial");
+    return;
+  }
+  if (!o.up.empty()) throw InvalidArgument("--initial verifies given poses, --up is for a search");
+  if (o.time_budget)
+    throw InvalidArgument("--initial verifies given poses, --time-budget is for a search");
+  if (o.method.registration().method != RegistrationMethod::compatibility)
+    throw InvalidArgument("--initial verifies poses by evidence, which preset " + o.method.preset +
+                          " does not have");
+}
+
+int run(RegisterOptions o) {
+  check_initial(o);
+  o.method.registration();  // what is wrong with it shall be said before clouds are read
+  if (o.time_budget && o.method.given("--quality"))
+    throw InvalidArgument("--time-budget chooses the quality, give it or --quality");
+  o.source_viewpoint.check("--source-viewpoint");
+  o.target_viewpoint.check("--target-viewpoint");
+  RegistrationPrior prior;
+  prior.gravity = up_prior(o.up);
+  if (o.time_budget && !prior.empty())
+    throw InvalidArgument("--up and --time-budget do not go together");
+  std::vector<NamedPath> inputs{{"SOURCE", o.source}, {"TARGET", o.target}};
+  if (!o.initial.empty()) inputs.push_back({"--initial", o.initial});
+  if (!o.method.calibration.empty()) inputs.push_back({"--calibration", o.method.calibration});
+  check_outputs({{"--json", o.json}, {"--overlay", o.overlay}, {"--image", o.image}}, inputs);
+  const Context context = o.method.context();
+  auto [source_cloud, target_cloud] = read_clouds(o);
+  o.source_viewpoint.apply(source_cloud);
+  o.target_viewpoint.apply(target_cloud);
+  o.method.choose_voxel_size({source_cloud.view(), target_cloud.view()},
+                             o.source + " and " + o.target);
+  const RegistrationOptions options = o.method.registration();
+  o.method.note_calibration();
+  check_voxel_size(options.prepare.voxel_size, extent_of(source_cloud.points), o.source);
+  check_voxel_size(options.prepare.voxel_size, extent_of(target_cloud.points), o.target);
+  ViewpointNote viewpoints;
+  if (options.prepare.depth_maps > 0) {
+    viewpoints.see(source_cloud, o.source);
+    viewpoints.see(target_cloud, o.target);
+  }
+  viewpoints.print();
+  const auto prepared = [&](const PointCloudView& cloud, const std::string& file) {
+    return prepare_batch(context, {cloud}, options.prepare, {file}).front();
+  };
+  const PreparedCloud source = prepared(o.source_viewpoint.view(source_cloud), o.source);
+  const PreparedCloud target = prepared(o.target_viewpoint.view(target_cloud), o.target);
+  o.source_viewpoint.note_place("--source-viewpoint", source, o.source);
+  o.target_viewpoint.note_place("--target-viewpoint", target, o.target);
+  if (o.method.automatic_voxel_size)
+    note_few_points({{o.source, source.size()}, {o.target, target.size()}});
+  TimedResult timed;
+  if (o.time_budget)
+    timed = align_within(context, source, target, *o.time_budget, options);
+  else
+    timed.result = o.initial.empty() ? align(context, source, target, prior, options)
+                                     : verify(o, context, source, target, options);
+  const RegistrationResult& result = timed.result;
+  if (o.initial.empty())
+    print_report(o, context, source, target, result);
+  else
+    print_verified(o, context, source, target, result);
+  if (o.time_budget)
+    std::cout << "budget   " << fixed(*o.time_budget, 1) << " ms, " << fixed(timed.milliseconds, 1)
+              << " used; " << timed.levels << " levels of quality up to " << timed.highest_quality
+              << ", the result is of " << timed.quality << "\n";
+
+  if (!o.json.empty()) {
+    Json json = document(o, o.time_budget ? options.with_quality(timed.quality) : options, context,
+                         source, target, result);
+    if (o.time_budget)
+      json["time_budget"] = {{"ms", *o.time_budget},
+                             {"used_ms", timed.milliseconds},
+                             {"quality", timed.quality},
+                             {"highest_quality", timed.highest_quality},
+                             {"levels", timed.levels}};
+    write_document(o.json, json);
+  }
+  if (!o.overlay.empty()) {
+    if (result.has_candidate)
+      io::write_overlay(o.overlay, source_cloud, target_cloud, result.target_from_source);
+    else
+      std::cerr << "gpureg: no overlay written, as there is no pose to show" << std::endl;
+  }
+  if (!o.image.empty()) {
+    const Image picture = before_after(source_cloud, target_cloud, pose_of(result));
+    files::write_atomically(o.image, encode_png(picture));
+  }
+  return result.aligned() ? kOk : kNoAlignment;
+}
+
+}  // namespace
+
+void add_register(CLI::App& app, Action& chosen) {
+  const auto o = std::make_shared<RegisterOptions>();
+  CLI::App* verb = app.add_subcommand(
+      "register", "Align two clouds (PLY, PCD, KITTI .bin) or meshes (STL, OBJ, PLY)");
+  verb->add_option("SOURCE", o->source, "Cloud that is moved")->required();
+  verb->add_option("TARGET", o->target, "Cloud that stays")->required();
+  o->method.add_to(*verb);
+  o->method.add_calibration_to(*verb);
+  verb->add_option(
+      "--time-budget", o->time_budget,
+      "Time budget of the alignment in milliseconds, instead of --quality; the quality "
+      "then varies between runs");
+  verb->add_option("--initial", o->initial,
+                   "Verify the poses of this file instead of a search: 4 x 4 matrices of "
+                   "target_from_source, row by row, or a Redwood log");
+  verb->add_flag("--refine-initial", o->refine_initial, "Refine these poses by ICP first");
+  verb->add_flag("--ignore-alternatives", o->ignore_alternatives,
+                 "Faster: do not search for other poses that compete with them");
+  verb->add_option(
+          "--source-viewpoint", o->source_viewpoint.text,
+          "Where SOURCE was seen from: x,y,z in its frame; none: not known; model: from "
+          "everywhere, "
+          "its normals point outwards; auto: the file, or the origin if the surfaces agree with it")
+      ->capture_default_str();
+  verb->add_option("--target-viewpoint", o->target_viewpoint.text, "The same of TARGET")
+      ->capture_default_str();
+  verb->add_option(
+      "--up", o->up,
+      "Vertical direction x,y,z in both clouds, and perhaps how many degrees it may be "
+      "off (without: 10): 0,0,1,5");
+  verb->add_flag("--accept-symmetry", o->method.accept_symmetry,
+                 "Also report a pose that a symmetry makes one of several equivalent ones");
+  verb->add_option("--json", o->json, "Write options, result, counts and times");
+  verb->add_option("--overlay", o->overlay, "Write both clouds in colour, aligned, as PLY");
+  verb->add_option("--image", o->image, "Draw both clouds before and after, as PNG");
+  verb->callback([o, &chosen] { chosen = [o] { return run(*o); }; });
+}
+
+}  // namespace gpureg::cli

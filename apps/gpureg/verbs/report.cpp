@@ -1,0 +1,134 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <iostream>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "command.hpp"
+#include "gpureg/error.hpp"
+#include "gpureg/files.hpp"
+#include "gpureg/io.hpp"
+#include "pages/report_page.hpp"
+#include "pages/report_pairs.hpp"
+#include "pages/report_tables.hpp"
+#include "pictures/before_after.hpp"
+#include "records/cloud_file.hpp"
+#include "text.hpp"
+#include "verbs/output_path.hpp"
+
+namespace gpureg::cli {
+namespace {
+
+constexpr std::size_t kPicturesOfAKind = 2;
+constexpr const char* kNoPictures = "-";
+constexpr int kPanelWidth = 480, kPanelHeight = 400;
+
+struct ReportOptions {
+  std::vector<std::string> results, names, truths, clouds;
+  std::string output;
+};
+
+// The value for result k: one value holds for all results. Empty where the option was not given.
+std::string value_for(std::size_t k, const std::vector<std::string>& values) {
+  if (values.empty()) return "";
+  return values.size() == 1 ? values.front() : values[k];
+}
+
+void check_count(const char* option, const std::vector<std::string>& values, std::size_t results) {
+  if (values.size() > 1 && values.size() != results)
+    throw InvalidArgument(std::string(option) + " was given " + std::to_string(values.size()) +
+                          " times for " + std::to_string(results) +
+                          " results; give it once for all or once for each, in the same order");
+}
+
+std::vector<Picture> draw(const std::vector<SamplePair>& samples, const std::string& folder) {
+  std::map<int, std::string> files;
+  for (const auto& [number, file] : io::list_fragments(folder)) files[number] = file;
+  const auto read = [&](int number) {
+    const auto found = files.find(number);
+    if (found == files.end())
+      throw IoError(folder + ": there is no fragment " + std::to_string(number));
+    return read_cloud(found->second, 0, MeshNote::none);
+  };
+  std::vector<Picture> pictures;
+  for (const SamplePair& sample : samples) {
+    const PairRecord& pair = *sample.pair;
+    PosedTitle after{std::nullopt, "after: no pose found"};
+    if (pair.transform)
+      after = {Eigen::Isometry3d(*pair.transform), pair.aligned ? "after" : "best candidate"};
+    pictures.push_back(
+        {sample.heading, sample.caption,
+         encode_png(before_after(read(pair.j), read(pair.i), after, kPanelWidth, kPanelHeight))});
+  }
+  return pictures;
+}
+
+ReportEntry read_entry(const ReportOptions& o, std::size_t k) {
+  ReportEntry entry;
+  entry.name = o.names.empty() ? o.results[k] : o.names[k];
+  entry.result = read_result(o.results[k]);
+  if (!entry.result.has_scores)
+    throw IoError(o.results[k] +
+                  ": a report needs RESULT.json of `gpureg batch --json`, this is a log");
+  entry.scene = base_name(text_of(entry.result.document, "/folder"));
+  if (const std::string folder = value_for(k, o.truths); !folder.empty()) {
+    entry.truth = evaluation::read_ground_truth(folder);
+    check_belongs(entry.result, folder, *entry.truth);
+    entry.evaluation = evaluation::evaluate(*entry.truth, entry.result.reports, true);
+    if (o.results.size() > 1) entry.scene = base_name(folder);
+  }
+  if (const std::string folder = value_for(k, o.clouds); !folder.empty() && folder != kNoPictures)
+    entry.pictures =
+        draw(entry.truth ? samples(evaluate_pairs(*entry.truth, entry.result), kPicturesOfAKind)
+                         : samples(entry.result, kPicturesOfAKind),
+             folder);
+  return entry;
+}
+
+int run(const ReportOptions& o) {
+  check_count("--ground-truth", o.truths, o.results.size());
+  check_count("--clouds", o.clouds, o.results.size());
+  if (!o.names.empty() && o.names.size() != o.results.size())
+    throw InvalidArgument("--name was given " + std::to_string(o.names.size()) + " times for " +
+                          std::to_string(o.results.size()) + " results");
+  std::vector<NamedPath> inputs;
+  for (const std::string& folder : o.truths)
+    for (NamedPath& file : truth_files("--ground-truth", folder)) inputs.push_back(std::move(file));
+  for (const std::string& folder : o.clouds)
+    if (folder != kNoPictures)
+      for (NamedPath& file : scene_files("--clouds", folder)) inputs.push_back(std::move(file));
+  for (const std::string& result : o.results) inputs.push_back({"RESULT", result});
+  check_outputs({{"-o", o.output}}, inputs);
+  std::vector<ReportEntry> entries;
+  for (std::size_t k = 0; k < o.results.size(); ++k) entries.push_back(read_entry(o, k));
+  files::write_atomically(o.output, report_page(entries));
+  std::cout << "written " << o.output << "\n";
+  return kOk;
+}
+
+}  // namespace
+
+void add_report(CLI::App& app, Action& chosen) {
+  const auto o = std::make_shared<ReportOptions>();
+  CLI::App* verb = app.add_subcommand(
+      "report", "Make one HTML page of batches: numbers, plots, pictures, a comparison");
+  verb->add_option("RESULT", o->results, "RESULT.json of a batch; several are compared")
+      ->required();
+  // One value at a time, so that a RESULT may follow an option.
+  const auto add = [&](const char* name, std::vector<std::string>& values, const char* text) {
+    verb->add_option(name, values, text)->allow_extra_args(false);
+  };
+  add("--ground-truth", o->truths,
+      "Folder with gt.log and gt.info; of several results: once for all or once for each");
+  add("--clouds", o->clouds,
+      "Folder with the fragments, for pictures of some pairs; once for all or once for each, - for "
+      "none");
+  add("--name", o->names, "Name of a result in a comparison, once for each; default: its path");
+  verb->add_option("-o,--output", o->output, "HTML file to write")->required();
+  verb->callback([o, &chosen] { chosen = [o] { return run(*o); }; });
+}
+
+}  // namespace gpureg::cli

@@ -1,0 +1,215 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <algorithm>
+
+#include "cuda/common/stages.hpp"
+#include "cuda/compatibility/match_set.cuh"
+#include "cuda/device/device_algorithms.hpp"
+#include "cuda/device/group_by_cell.cuh"
+#include "cuda/device/warp.cuh"
+
+namespace gpureg::cuda {
+namespace {
+
+constexpr int kThreads = 128, kRows = 4;                // matches of a thread
+constexpr std::uint32_t kBlockRows = kThreads * kRows;  // matches of a thread block
+// matches in shared memory at a time
+constexpr std::uint32_t kTile = kThreads;
+// matches that a lane of find_slopes() holds
+constexpr std::uint32_t kHeld = 8;
+constexpr int kDegreeBits = 17;  // 0 to 2^16
+constexpr std::uint32_t kMaxDegree = (1u << kDegreeBits) - 1;
+constexpr int kStrengthBits = 24;  // 0 to 2^23, see seed_strength()
+constexpr std::uint32_t kMaxStrength = (1u << kStrengthBits) - 2;
+constexpr std::uint32_t kPadding = (2u << kStrengthBits) - 1;  // greater than the key of any match
+static_assert(limits::kMaxMatches <= kMaxDegree, "keys hold every degree");
+static_assert(std::uint64_t(limits::kMaxMatches) << 17 >> kStrengthShift <= kMaxStrength,
+              "keys hold every strength, see seed_strength()");
+
+struct SeedBatch {
+  MatchSetView matches;
+  const std::uint32_t* room;
+  const std::uint32_t* count;
+  CompatibilityTest test;
+  float squared_separation;
+  std::uint32_t* degree;
+  std::uint8_t* slope;
+};
+
+/// Number of compatible matches of each match, itself included. Compatibility is symmetric: a
+/// thread block compares one range of the matches (y) with an equal or later range (x) and counts
+/// for both. z: pair.
+__global__ void __launch_bounds__(kThreads) count_compatible(SeedBatch b) {
+  __shared__ PackedMatch tile[kTile];
+  __shared__ std::uint32_t column_count[kTile];
+  const std::uint32_t p = blockIdx.z, n = b.count[p], room = b.room[p],
+                      row = blockIdx.y * kBlockRows, column = blockIdx.x * kBlockRows;
+  if (blockIdx.x < blockIdx.y || column >= n) return;
+  const std::uint32_t lane = threadIdx.x % 32, last = min(n, column + kBlockRows);
+  const bool mutual = blockIdx.x > blockIdx.y;
+  OrientedMatch own[kRows];
+  std::uint32_t count[kRows];
+#pragma unroll
+  for (int r = 0; r < kRows; ++r) {
+    const std::uint32_t i = row + static_cast<std::uint32_t>(r) * kThreads + threadIdx.x;
+    own[r] = match_at(b.matches, room + min(i, n - 1));
+    if (i >= n) own[r].p.x = __uint_as_float(0x7fffffffu);  // NaN: compatible with nothing
+    count[r] = 0;
+  }
+  for (std::uint32_t base = column; base < last; base += kTile) {
+    const std::uint32_t size = min(kTile, last - base);
+    __syncthreads();
+    if (threadIdx.x < size)
+      tile[threadIdx.x] = packed(match_at(b.matches, room + base + threadIdx.x));
+    column_count[threadIdx.x] = 0;
+    __syncthreads();
+    for (std::uint32_t first = 0; first < size; first += 32) {
+      std::uint32_t kept = 0;  // of the column that has the lane's number
+      for (std::uint32_t k = first; k < min(first + 32, size); ++k) {
+        const OrientedMatch other = tile[k].unpacked();
+        std::uint32_t both = 0;
+#pragma unroll
+        for (int r = 0; r < kRows; ++r) {
+          const std::uint32_t one = compatible(other, own[r], b.test) ? 1u : 0u;
+          count[r] += one;
+          both += one;
+        }
+        if (!mutual) continue;
+        both = warp_sum(both);
+        kept = lane == k - first ? both : kept;
+      }
+      if (kept > 0) atomicAdd(column_count + first + lane, kept);
+    }
+    __syncthreads();
+    if (mutual && threadIdx.x < size && column_count[threadIdx.x] > 0)
+      atomicAdd(b.degree + room + base + threadIdx.x, column_count[threadIdx.x]);
+  }
+#pragma unroll
+  for (int r = 0; r < kRows; ++r) {
+    const std::uint32_t i = row + static_cast<std::uint32_t>(r) * kThreads + threadIdx.x;
+    if (i < n && count[r] > 0) atomicAdd(b.degree + room + i, count[r]);
+  }
+}
+
+/// Keys that sort by pair, then by descending degree.
+__global__ void write_degree_keys(SeedBatch b, std::uint64_t* key, std::uint32_t* match) {
+  const std::uint32_t p = blockIdx.y, n = b.count[p], room = b.room[p],
+                      i = blockIdx.x * blockDim.x + threadIdx.x;
+  if (i >= b.room[p + 1] - room) return;
+  const std::uint32_t before = i < n ? kMaxDegree - b.degree[room + i] : kMaxDegree;
+  key[room + i] = static_cast<std::uint64_t>(p) << kDegreeBits | before;
+  match[room + i] = i;
+}
+
+/// Source points and degrees in that order.
+__global__ void rank_points(SeedBatch b, const std::uint32_t* match, float4* ranked) {
+  const std::uint32_t p = blockIdx.y, room = b.room[p], k = blockIdx.x * blockDim.x + threadIdx.x;
+  if (k >= b.count[p]) return;
+  const std::uint32_t at = room + match[room + k];
+  ranked[room + k] = make_float4(b.matches.px[at], b.matches.py[at], b.matches.pz[at],
+                                 __uint_as_float(b.degree[at]));
+}
+
+/// Marks the matches with a neighbour that has more compatible matches. Matches of high degree are
+/// compared first, as most matches have one of them near. A warp takes 32 matches of similar
+/// degree: each lane holds other matches, and all lanes compare them with one of the 32 at a time.
+__global__ void __launch_bounds__(kThreads)
+    find_slopes(SeedBatch b, const float4* ranked, const std::uint32_t* match) {
+  const std::uint32_t p = blockIdx.y, n = b.count[p], room = b.room[p], lane = threadIdx.x % 32;
+  const std::uint32_t k = blockIdx.x * kThreads + threadIdx.x, first = k - lane;
+  if (first >= n) return;
+  const float4 own = ranked[room + min(k, n - 1)];
+  unsigned open = __ballot_sync(~0u, k < n);
+  // No degree is greater behind the matches of the warp.
+  for (std::uint32_t base = 0; open != 0 && base < min(n, first + 32); base += 32 * kHeld) {
+    float4 other[kHeld];
+#pragma unroll
+    for (std::uint32_t h = 0; h < kHeld; ++h)
+      other[h] = ranked[room + min(base + h * 32 + lane, n - 1)];
+    for (unsigned left = open; left != 0; left &= left - 1) {
+      const int l = __ffs(static_cast<int>(left)) - 1;
+      const Vec3 point{__shfl_sync(~0u, own.x, l), __shfl_sync(~0u, own.y, l),
+                       __shfl_sync(~0u, own.z, l)};
+      const std::uint32_t degree = __float_as_uint(__shfl_sync(~0u, own.w, l));
+      bool greater = false;
+#pragma unroll
+      for (std::uint32_t h = 0; h < kHeld; ++h)
+        greater |=
+            (__float_as_uint(other[h].w) > degree) &
+            (squared_norm(Vec3{other[h].x, other[h].y, other[h].z} - point) < b.squared_separation);
+      if (__any_sync(~0u, greater)) open &= ~(1u << l);
+    }
+  }
+  if (k < n && (open >> lane & 1) == 0) b.slope[room + match[room + k]] = 1;
+}
+
+/// Keys that sort by pair, then as seed_key() does, the best first; equal keys keep the order of
+/// the matches.
+__global__ void write_keys(SeedBatch b, std::uint64_t* key, std::uint32_t* match) {
+  const std::uint32_t p = blockIdx.y, n = b.count[p], room = b.room[p],
+                      i = blockIdx.x * blockDim.x + threadIdx.x;
+  if (i >= b.room[p + 1] - room) return;
+  std::uint32_t order = kPadding;
+  if (i < n) {
+    const std::uint32_t strength = seed_strength(
+        b.degree[room + i], b.matches.source_weight[room + i] + b.matches.target_weight[room + i]);
+    order = (b.slope[room + i] ? 1u << kStrengthBits : 0u) + (kMaxStrength - strength);
+  }
+  key[room + i] = static_cast<std::uint64_t>(p) << (kStrengthBits + 1) | order;
+  match[room + i] = i;
+}
+
+__global__ void take_seeds(SeedBatch b, const std::uint32_t* ranked, std::uint32_t most,
+                           std::uint32_t* match, std::uint32_t* count) {
+  const std::uint32_t p = blockIdx.y, k = blockIdx.x * blockDim.x + threadIdx.x,
+                      size = min(most, b.count[p]);
+  if (k < size) match[p * most + k] = ranked[b.room[p] + k];
+  if (k == 0) count[p] = size;
+}
+
+}  // namespace
+
+Seeds choose_seeds(Exec& exec, const MatchSets& matches, const RegistrationOptions& options) {
+  const std::size_t pairs = matches.room.entries();
+  const unsigned pair_count = static_cast<unsigned>(pairs);
+  Seeds out;
+  out.most = options.compatibility.seeds;
+  out.match = exec.buffer<std::uint32_t>(pairs * out.most);
+  out.count = exec.filled<std::uint32_t>(pairs, 0);
+  const std::uint32_t total = matches.room.total(), largest = matches.room.largest;
+  if (total == 0) return out;
+  const auto degree = exec.filled<std::uint32_t>(total, 0);
+  const auto slope = exec.filled<std::uint8_t>(total, 0);
+  SeedBatch batch{};
+  batch.matches = matches.view();
+  batch.room = matches.room.on_device.data();
+  batch.count = matches.count.data();
+  batch.test = test_of(options.compatibility);
+  batch.squared_separation =
+      options.compatibility.seed_separation * options.compatibility.seed_separation;
+  batch.degree = degree.data();
+  batch.slope = slope.data();
+  const unsigned ranges = blocks_for(largest, kBlockRows);
+  count_compatible<<<dim3(ranges, ranges, pair_count), kThreads, 0, exec.stream()>>>(batch);
+  check_launch("count_compatible");
+  auto key = exec.buffer<std::uint64_t>(total);
+  auto match = exec.buffer<std::uint32_t>(total);
+  const auto ranked = exec.buffer<float4>(total);
+  const dim3 grid(blocks_for(largest, 256), pair_count);
+  write_degree_keys<<<grid, 256, 0, exec.stream()>>>(batch, key.data(), match.data());
+  check_launch("write_degree_keys");
+  sort_pairs(exec, key, match, kDegreeBits + bits_for(pairs));
+  rank_points<<<grid, 256, 0, exec.stream()>>>(batch, match.data(), ranked.data());
+  check_launch("rank_points");
+  find_slopes<<<dim3(blocks_for(largest, kThreads), pair_count), kThreads, 0, exec.stream()>>>(
+      batch, ranked.data(), match.data());
+  check_launch("find_slopes");
+  write_keys<<<grid, 256, 0, exec.stream()>>>(batch, key.data(), match.data());
+  check_launch("write_keys");
+  sort_pairs(exec, key, match, kStrengthBits + 1 + bits_for(pairs));
+  take_seeds<<<dim3(blocks_for(out.most, 256), pair_count), 256, 0, exec.stream()>>>(
+      batch, match.data(), out.most, out.match.data(), out.count.data());
+  check_launch("take_seeds");
+  return out;
+}
+
+}  // namespace gpureg::cuda

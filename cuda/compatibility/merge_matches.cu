@@ -1,0 +1,301 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <algorithm>
+#include <array>
+#include <string>
+
+#include "algorithm/compatibility.hpp"
+#include "algorithm/normal_weight.hpp"
+#include "cuda/common/feature_query.hpp"
+#include "cuda/common/stages.hpp"
+#include "cuda/device/entry_of.cuh"
+#include "cuda/device/group_by_cell.cuh"
+
+namespace gpureg::cuda {
+namespace {
+
+constexpr int kThreads = 256;
+
+/// The four searches of one pair: first result of each, kNoValue where there was no search. Or the
+/// given matches.
+struct MergePair {
+  std::uint32_t sources, targets;           ///< sizes of the clouds
+  const std::uint32_t *forward, *backward;  ///< null: not searched
+  const std::uint32_t *wide_forward, *wide_backward;
+  const std::uint32_t *custom_source, *custom_target;
+  /// results of all searches one after another, or number of given matches
+  std::uint32_t answers;
+};
+
+struct MergeBatch {
+  const MergePair* pairs;
+  const PairView* views;
+  std::uint32_t pair_count;
+  const std::uint32_t* answer_offset;
+  std::uint64_t seed;
+  std::uint32_t most;
+  std::uint64_t* key;  // pair, whether the result is dropped, order of the match
+  std::uint32_t* answer;
+  std::uint32_t* found;  // per pair
+  std::uint32_t* bins;   // per pair: source, target
+  const std::uint32_t* room;
+  std::uint32_t* column[MatchSets::kColumns];
+  MatchRow* rows;
+  std::uint32_t* count;
+  std::uint64_t* total;
+};
+
+struct Match {
+  std::uint32_t source, target;
+};
+
+/// Result k of a pair. keep: it is a match that no earlier search has found.
+__device__ Match answer_of(const MergePair& u, std::uint32_t k, bool& keep) {
+  keep = true;
+  if (u.custom_source) return {u.custom_source[k], u.custom_target[k]};
+  Match m;
+  const std::uint32_t round = u.sources + u.targets;
+  const bool wide = k >= round, asks_source = k - (wide ? round : 0) < u.sources;
+  if (wide) k -= round;
+  if (asks_source) {
+    m = {k, (wide ? u.wide_forward : u.forward)[k]};
+    keep = m.target != kNoValue;
+  } else {
+    m = {(wide ? u.wide_backward : u.backward)[k - u.sources], k - u.sources};
+    keep = m.source != kNoValue;
+  }
+  if (!keep) return m;
+  if (wide || !asks_source) keep = u.forward[m.source] != m.target;
+  if (wide) keep = keep && u.backward[m.target] != m.source;
+  if (wide && !asks_source) keep = keep && u.wide_forward[m.source] != m.target;
+  return m;
+}
+
+__global__ void __launch_bounds__(kThreads) order_matches(MergeBatch b) {
+  __shared__ std::uint32_t kept;
+  const std::uint32_t p = blockIdx.y, k = blockIdx.x * kThreads + threadIdx.x;
+  const MergePair u = b.pairs[p];
+  if (threadIdx.x == 0) kept = 0;
+  __syncthreads();
+  bool keep = false;
+  if (k < u.answers) {
+    const Match m = answer_of(u, k, keep);
+    const std::uint64_t order = keep ? match_order(m.source, m.target, b.seed) : 0xffffffffu;
+    const std::size_t at = b.answer_offset[p] + k;
+    b.key[at] =
+        static_cast<std::uint64_t>(p) << 33 | static_cast<std::uint64_t>(!keep) << 32 | order;
+    b.answer[at] = k;
+  }
+  const unsigned mask = __ballot_sync(~0u, keep);
+  if (threadIdx.x % 32 == 0 && mask != 0)
+    atomicAdd(&kept, static_cast<std::uint32_t>(__popc(static_cast<int>(mask))));
+  __syncthreads();
+  if (threadIdx.x == 0 && kept > 0) atomicAdd(b.found + p, kept);
+}
+
+/// Writes the first matches of every pair, and counts the directions of their normals.
+__global__ void __launch_bounds__(kThreads) gather_matches(MergeBatch b) {
+  __shared__ std::uint32_t bins[2 * kNormalBins];
+  const std::uint32_t p = blockIdx.y, k = blockIdx.x * kThreads + threadIdx.x;
+  const std::uint32_t found = b.found[p], count = min(found, b.most);
+  if (blockIdx.x * kThreads >= count) return;
+  if (threadIdx.x < 2 * kNormalBins) bins[threadIdx.x] = 0;
+  __syncthreads();
+  if (k < count) {
+    const MergePair u = b.pairs[p];
+    const CloudView &s = b.views[p].source, &t = b.views[p].target;
+    const std::uint64_t* key = b.key + b.answer_offset[p];
+    const std::uint32_t* answer = b.answer + b.answer_offset[p];
+    // Matches of equal order, which are rare, sort by their indices: this position takes the one
+    // with as many before it.
+    std::uint32_t begin = k, end = k + 1;
+    while (begin > 0 && key[begin - 1] == key[k]) --begin;
+    while (end < found && key[end] == key[k]) ++end;
+    bool keep;
+    Match m = answer_of(u, answer[k], keep);
+    for (std::uint32_t a = begin; a < end && end - begin > 1; ++a) {
+      const Match one = answer_of(u, answer[a], keep);
+      std::uint32_t before = 0;
+      for (std::uint32_t o = begin; o < end; ++o) {
+        const Match other = answer_of(u, answer[o], keep);
+        before +=
+            other.source < one.source || (other.source == one.source && other.target < one.target);
+      }
+      if (before == k - begin) m = one;
+    }
+    const Vec3 v[4] = {s.points[m.source], t.points[m.target], s.normals[m.source],
+                       t.normals[m.target]};
+    const std::size_t at = b.room[p] + k;
+    for (int c = 0; c < 4; ++c) {
+      b.column[3 * c][at] = __float_as_uint(v[c].x);
+      b.column[3 * c + 1][at] = __float_as_uint(v[c].y);
+      b.column[3 * c + 2][at] = __float_as_uint(v[c].z);
+    }
+    const std::uint32_t source_bin = normal_bin(v[2]), target_bin = normal_bin(v[3]);
+    b.column[12][at] = m.source;
+    b.column[13][at] = m.target;
+    b.column[14][at] = source_bin;
+    b.column[15][at] = target_bin;
+    atomicAdd(bins + source_bin, 1u);
+    atomicAdd(bins + kNormalBins + target_bin, 1u);
+  }
+  __syncthreads();
+  if (threadIdx.x < 2 * kNormalBins && bins[threadIdx.x] > 0)
+    atomicAdd(b.bins + p * 2 * kNormalBins + threadIdx.x, bins[threadIdx.x]);
+}
+
+/// Weights from the counts of directions; rows.
+__global__ void __launch_bounds__(kThreads) weight_matches_by_normals(MergeBatch b) {
+  __shared__ std::uint32_t weight[2 * kNormalBins];
+  const std::uint32_t p = blockIdx.y, count = min(b.found[p], b.most);
+  const std::uint32_t* bins = b.bins + p * 2 * kNormalBins;
+  if (threadIdx.x < 2 * kNormalBins) weight[threadIdx.x] = normal_weight_in_bin(bins[threadIdx.x]);
+  __syncthreads();
+  const std::uint32_t k = blockIdx.x * kThreads + threadIdx.x;
+  if (k < count) {
+    std::uint32_t& source = b.column[14][b.room[p] + k];
+    std::uint32_t& target = b.column[15][b.room[p] + k];
+    source = weight[source];
+    target = weight[kNormalBins + target];
+    const auto real = [&](int c) { return __uint_as_float(b.column[c][b.room[p] + k]); };
+    MatchRow& row = b.rows[b.room[p] + k];
+    row.points[0] = make_float4(real(0), real(1), real(2), real(3));
+    row.points[1] = make_float4(real(4), real(5), __uint_as_float(source + target), 0.0f);
+    row.normals[0] = make_float4(real(6), real(7), real(8), real(9));
+    row.normals[1] = make_float4(real(10), real(11), 0.0f, 0.0f);
+  }
+  if (k != 0) return;
+  b.count[p] = count;
+  for (int side = 0; side < 2; ++side) {
+    std::uint64_t total = 0;
+    for (int bin = side * kNormalBins; bin < (side + 1) * kNormalBins; ++bin)
+      total += static_cast<std::uint64_t>(bins[bin]) * weight[bin];
+    b.total[2 * p + static_cast<std::uint32_t>(side)] = total;
+  }
+}
+
+/// The given matches, without duplicates.
+std::vector<std::uint64_t> distinct_matches(const PairView& pair) {
+  std::vector<std::uint64_t> out;
+  for (std::uint32_t k = 0; k < pair.custom_count; ++k)
+    out.push_back(static_cast<std::uint64_t>(pair.custom_source[k]) << 32 | pair.custom_target[k]);
+  std::sort(out.begin(), out.end());
+  out.erase(std::unique(out.begin(), out.end()), out.end());
+  return out;
+}
+
+/// Runs all searches of the batch and sets the pointers of each pair.
+DeviceBuffer<std::uint32_t> search(Exec& exec, Span<const PairView> pairs,
+                                   std::vector<MergePair>& entries) {
+  std::vector<FeatureQuery> queries;
+  std::uint64_t at = 0;
+  const auto ask = [&](FeatureQuery query) {
+    query.out = static_cast<std::uint32_t>(at);
+    at += query.query_count;
+    if (at > limits::kMaxPoints)
+      throw InvalidArgument("a batch of " + std::to_string(at) +
+                            " feature queries exceeds 2^31 - 1: split it");
+    queries.push_back(query);
+    return query.out;
+  };
+  std::vector<std::array<std::uint32_t, 4>> place(pairs.size);
+  for (std::size_t p = 0; p < pairs.size; ++p) {
+    const CloudView &s = pairs[p].source, &t = pairs[p].target;
+    if (pairs[p].custom_count > 0 || s.size == 0 || t.size == 0) continue;
+    entries[p].answers = s.size + t.size;
+    place[p][0] = ask(narrow_query(s, t, 0));
+    place[p][1] = ask(narrow_query(t, s, 0));
+    if (!s.wide_features || !t.wide_features) continue;
+    entries[p].answers *= 2;
+    place[p][2] = ask(wide_query(s, t, 0));
+    place[p][3] = ask(wide_query(t, s, 0));
+  }
+  auto answers = nearest_features(exec, queries, 1, static_cast<std::size_t>(at));
+  for (std::size_t p = 0; p < pairs.size; ++p) {
+    MergePair& u = entries[p];
+    if (u.answers == 0) continue;
+    u.forward = answers.data() + place[p][0];
+    u.backward = answers.data() + place[p][1];
+    if (u.answers > u.sources + u.targets) {
+      u.wide_forward = answers.data() + place[p][2];
+      u.wide_backward = answers.data() + place[p][3];
+    }
+  }
+  return answers;
+}
+
+}  // namespace
+
+MatchSets merge_matches(Exec& exec, Span<const PairView> pairs,
+                        const RegistrationOptions& options) {
+  std::vector<MergePair> entries(pairs.size);
+  for (std::size_t p = 0; p < pairs.size; ++p) {
+    entries[p].sources = pairs[p].source.size;
+    entries[p].targets = pairs[p].target.size;
+  }
+  const auto answers = search(exec, pairs, entries);
+  std::vector<DeviceBuffer<std::uint32_t>> custom;
+  for (std::size_t p = 0; p < pairs.size; ++p) {
+    if (pairs[p].custom_count == 0) continue;
+    std::vector<std::uint32_t> source, target;
+    for (const std::uint64_t match : distinct_matches(pairs[p])) {
+      source.push_back(static_cast<std::uint32_t>(match >> 32));
+      target.push_back(static_cast<std::uint32_t>(match));
+    }
+    custom.push_back(exec.upload(source));
+    entries[p].custom_source = custom.back().data();
+    custom.push_back(exec.upload(target));
+    entries[p].custom_target = custom.back().data();
+    entries[p].answers = static_cast<std::uint32_t>(source.size());
+  }
+  const Segments answer_segments =
+      make_segments(exec, pairs.size, [&](std::size_t p) { return entries[p].answers; });
+
+  MatchSets out;
+  out.room = make_segments(exec, pairs.size, [&](std::size_t p) {
+    return std::min(entries[p].answers, options.compatibility.max_matches);
+  });
+  out.columns = exec.buffer<std::uint32_t>(std::size_t(out.room.total()) * MatchSets::kColumns);
+  out.rows = exec.buffer<MatchRow>(out.room.total());
+  out.count = exec.filled<std::uint32_t>(pairs.size, 0);
+  out.total = exec.filled<std::uint64_t>(2 * pairs.size, 0);
+  if (answer_segments.total() == 0) return out;
+  const auto merge_on_device = exec.upload(entries);
+  const auto views = exec.upload(pairs.data, pairs.size);
+  auto key = exec.buffer<std::uint64_t>(answer_segments.total());
+  auto answer = exec.buffer<std::uint32_t>(answer_segments.total());
+  const auto found = exec.filled<std::uint32_t>(pairs.size, 0);
+  const auto bins = exec.filled<std::uint32_t>(pairs.size * 2 * kNormalBins, 0);
+  MergeBatch batch{};
+  batch.pairs = merge_on_device.data();
+  batch.views = views.data();
+  batch.pair_count = static_cast<std::uint32_t>(pairs.size);
+  batch.answer_offset = answer_segments.on_device.data();
+  batch.seed = options.seed;
+  batch.most = options.compatibility.max_matches;
+  batch.key = key.data();
+  batch.answer = answer.data();
+  batch.found = found.data();
+  batch.bins = bins.data();
+  batch.room = out.room.on_device.data();
+  for (int c = 0; c < MatchSets::kColumns; ++c)
+    batch.column[c] = out.columns.data() + std::size_t(c) * out.room.total();
+  batch.rows = out.rows.data();
+  batch.count = out.count.data();
+  batch.total = out.total.data();
+  const unsigned pair_count = static_cast<unsigned>(pairs.size);
+  order_matches<<<dim3(blocks_for(answer_segments.largest, kThreads), pair_count), kThreads, 0,
+                  exec.stream()>>>(batch);
+  check_launch("order_matches");
+  constexpr int kOrderBits = 32 + 1;  // order of the match, whether it is dropped
+  sort_pairs(exec, key, answer, kOrderBits + bits_for(pairs.size));
+  batch.key = key.data();
+  batch.answer = answer.data();
+  const dim3 grid(blocks_for(out.room.largest, kThreads), pair_count);
+  gather_matches<<<grid, kThreads, 0, exec.stream()>>>(batch);
+  check_launch("gather_matches");
+  weight_matches_by_normals<<<grid, kThreads, 0, exec.stream()>>>(batch);
+  check_launch("weight_matches_by_normals");
+  return out;
+}
+
+}  // namespace gpureg::cuda

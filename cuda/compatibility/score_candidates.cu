@@ -1,0 +1,97 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "algorithm/evidence.hpp"
+#include "cuda/common/stages.hpp"
+#include "cuda/compatibility/compare_point.cuh"
+#include "cuda/compatibility/sampled_pairs.hpp"
+#include "cuda/device/warp.cuh"
+
+namespace gpureg::cuda {
+namespace {
+
+constexpr int kWarps = 4;  // candidates per thread block
+constexpr int kBlocks =
+    10;  // of a multiprocessor at least: more warps hide the latency of the search
+
+/// Normal weight of the sampled points of each cloud: a thread block per cloud (x: pair, y: source
+/// or target).
+__global__ void __launch_bounds__(256)
+    sampled_weight(const SampledPair* pairs, unsigned long long* out) {
+  __shared__ unsigned long long sum;
+  const CloudView& cloud = blockIdx.y == 0 ? pairs[blockIdx.x].source : pairs[blockIdx.x].target;
+  if (threadIdx.x == 0) sum = 0;
+  __syncthreads();
+  unsigned long long mine = 0;
+  for (std::uint32_t i = threadIdx.x; i < cloud.size; i += 256) mine += cloud.normal_weight[i];
+  atomicAdd(&sum, mine);
+  __syncthreads();
+  if (threadIdx.x == 0) out[2 * blockIdx.x + blockIdx.y] = sum;
+}
+
+/// Side evidence of one candidate for coarse_score(), by a warp. moved: the sample of a cloud.
+__device__ SideEvidence score_sample(const CloudView& moved, const CloudView& other,
+                                     const CellSummaries& cells, const Rigid& pose,
+                                     const EvidenceTest& test) {
+  SideEvidence e{};
+  const std::uint32_t maps = coarse_score_maps(other.visibility);
+  for (std::uint32_t i = threadIdx.x % 32; i < moved.size; i += 32) {
+    compare_point(moved, other, cells, pose, test, maps, i, e);
+  }
+  e.normal_weighted =
+      static_cast<std::uint64_t>(warp_sum(static_cast<std::int64_t>(e.normal_weighted)));
+  e.observed = warp_sum(e.observed);
+  e.violating = warp_sum(e.violating);
+  return e;
+}
+
+__device__ float smaller_share(const MatchEvidence& m, const std::uint64_t* total) {
+  const float s = static_cast<float>(m.source_weight) / static_cast<float>(total[0]);
+  const float t = static_cast<float>(m.target_weight) / static_cast<float>(total[1]);
+  return s < t ? s : t;
+}
+
+/// A warp per candidate.
+__global__ void __launch_bounds__(32 * kWarps, kBlocks)
+    score(const SampledPair* pairs, const std::uint64_t* match_total,
+          const unsigned long long* weight, std::uint32_t most, const std::uint32_t* count,
+          const Pose<float>* pose, const MatchEvidence* matches, EvidenceTest test, float* out) {
+  const std::uint32_t p = blockIdx.y, c = blockIdx.x * kWarps + threadIdx.x / 32;
+  if (c >= count[p]) return;
+  const std::size_t at = static_cast<std::size_t>(p) * most + c;
+  const SampledPair& sampled = pairs[p];
+  const SearchPair& pair = sampled.pair;
+  const Rigid there = to_rigid(pose[at]), back = inverse(there);
+  if (!permitted(pair.prior, there)) {
+    if (threadIdx.x % 32 == 0) out[at] = 0.0f;
+    return;
+  }
+  const SideEvidence a = score_sample(sampled.source, pair.target, pair.target_cells, there, test),
+                     b = score_sample(sampled.target, pair.source, pair.source_cells, back, test);
+  if (threadIdx.x % 32 == 0)
+    out[at] =
+        coarse_score(smaller_share(matches[at], match_total + 2 * p), a,
+                     static_cast<float>(weight[2 * p]), b, static_cast<float>(weight[2 * p + 1]));
+}
+
+}  // namespace
+
+void score_candidates(Exec& exec, Span<const PairView> pairs, const MatchSets& matches,
+                      Candidates& candidates, const RegistrationOptions& options) {
+  const std::uint32_t most = std::min(candidates.most, matches.room.largest);
+  if (most == 0) return;
+  const SampledPairs sampled = sample_pairs(exec, pairs, options.evidence.sample, true);
+  const auto weight = exec.buffer<unsigned long long>(2 * pairs.size);
+  const unsigned pair_count = static_cast<unsigned>(pairs.size);
+  sampled_weight<<<dim3(pair_count, 2), 256, 0, exec.stream()>>>(sampled.pairs.data(),
+                                                                 weight.data());
+  check_launch("sampled_weight");
+  const EvidenceTest test{
+      inlier_test(options.prepare.max_correspondence_distance, options.evidence.max_normal_angle),
+      options.evidence.free_space_margin, options.evidence.min_range};
+  score<<<dim3(blocks_for(most, kWarps), pair_count), 32 * kWarps, 0, exec.stream()>>>(
+      sampled.pairs.data(), matches.total.data(), weight.data(), candidates.most,
+      candidates.count.data(), candidates.pose.data(), candidates.matches.data(), test,
+      candidates.coarse_score.data());
+  check_launch("score");
+}
+
+}  // namespace gpureg::cuda

@@ -1,0 +1,90 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "cuda/device/device_algorithms.hpp"
+
+#include <cub/device/device_radix_sort.cuh>
+#include <cub/device/device_scan.cuh>
+
+#include <limits>
+#include <string>
+
+#include "gpureg/error.hpp"
+
+namespace gpureg::cuda {
+
+int cub_size(std::size_t size) {
+  if (size > static_cast<std::size_t>(std::numeric_limits<int>::max()))
+    throw InvalidArgument("a batch of " + std::to_string(size) +
+                          " elements exceeds 2^31 - 1: split it");
+  return static_cast<int>(size);
+}
+
+namespace {
+
+template <typename Key>
+void sort(Exec& exec, cub::DoubleBuffer<Key>& keys, cub::DoubleBuffer<std::uint32_t>& values,
+          std::size_t size, int bits) {
+  std::size_t bytes = 0;
+  check(cub::DeviceRadixSort::SortPairs(nullptr, bytes, keys, values, cub_size(size), 0, bits,
+                                        exec.stream()),
+        "radix sort");
+  const auto scratch = exec.buffer<char>(bytes);
+  check(cub::DeviceRadixSort::SortPairs(scratch.data(), bytes, keys, values, cub_size(size), 0,
+                                        bits, exec.stream()),
+        "radix sort");
+}
+
+template <typename Key>
+void sort_buffers(Exec& exec, DeviceBuffer<Key>& keys, DeviceBuffer<std::uint32_t>& values,
+                  int bits) {
+  if (keys.size() == 0) return;
+  auto other_keys = exec.buffer<Key>(keys.size());
+  auto other_values = exec.buffer<std::uint32_t>(values.size());
+  cub::DoubleBuffer<Key> k(keys.data(), other_keys.data());
+  cub::DoubleBuffer<std::uint32_t> v(values.data(), other_values.data());
+  sort(exec, k, v, keys.size(), bits);
+  if (k.Current() != keys.data()) keys = std::move(other_keys);
+  if (v.Current() != values.data()) values = std::move(other_values);
+}
+
+}  // namespace
+
+void sort_pairs(Exec& exec, DeviceBuffer<std::uint32_t>& keys, DeviceBuffer<std::uint32_t>& values,
+                int bits) {
+  sort_buffers(exec, keys, values, bits);
+}
+
+void sort_pairs(Exec& exec, DeviceBuffer<std::uint64_t>& keys, DeviceBuffer<std::uint32_t>& values,
+                int bits) {
+  sort_buffers(exec, keys, values, bits);
+}
+
+void sort_pairs_in_place(Exec& exec, std::uint64_t* keys, std::uint32_t* values, std::size_t size,
+                         int bits) {
+  if (size == 0) return;
+  const auto other_keys = exec.buffer<std::uint64_t>(size);
+  const auto other_values = exec.buffer<std::uint32_t>(size);
+  cub::DoubleBuffer<std::uint64_t> k(keys, other_keys.data());
+  cub::DoubleBuffer<std::uint32_t> v(values, other_values.data());
+  sort(exec, k, v, size, bits);
+  if (k.Current() != keys)
+    check(cudaMemcpyAsync(keys, k.Current(), size * sizeof(std::uint64_t), cudaMemcpyDeviceToDevice,
+                          exec.stream()),
+          "cudaMemcpyAsync");
+  if (v.Current() != values)
+    check(cudaMemcpyAsync(values, v.Current(), size * sizeof(std::uint32_t),
+                          cudaMemcpyDeviceToDevice, exec.stream()),
+          "cudaMemcpyAsync");
+}
+
+void exclusive_sum(Exec& exec, const std::uint32_t* in, std::uint32_t* out, std::size_t size) {
+  if (size == 0) return;
+  std::size_t bytes = 0;
+  check(cub::DeviceScan::ExclusiveSum(nullptr, bytes, in, out, cub_size(size), exec.stream()),
+        "scan");
+  const auto scratch = exec.buffer<char>(bytes);
+  check(
+      cub::DeviceScan::ExclusiveSum(scratch.data(), bytes, in, out, cub_size(size), exec.stream()),
+      "scan");
+}
+
+}  // namespace gpureg::cuda

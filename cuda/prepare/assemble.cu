@@ -1,0 +1,254 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "algorithm/normal_weight.hpp"
+#include "cuda/common/stages.hpp"
+#include "cuda/device/warp.cuh"
+#include "cuda/prepare/feature_aids.hpp"
+#include "cuda/prepare/scoring_data.hpp"
+
+namespace gpureg::cuda {
+namespace {
+
+/// One array to copy into the memory of a cloud.
+struct Part {
+  const char* from;
+  char* to;
+  std::size_t bytes;
+};
+
+__global__ void copy_parts(const Part* parts) {
+  const Part part = parts[blockIdx.y];
+  const std::size_t stride = static_cast<std::size_t>(gridDim.x) * blockDim.x,
+                    first = static_cast<std::size_t>(blockIdx.x) * blockDim.x + threadIdx.x;
+  const bool words = (reinterpret_cast<std::size_t>(part.from) | part.bytes) % 4 == 0;
+  if (words) {
+    for (std::size_t k = first; k < part.bytes / 4; k += stride)
+      reinterpret_cast<std::uint32_t*>(part.to)[k] =
+          reinterpret_cast<const std::uint32_t*>(part.from)[k];
+  } else {
+    for (std::size_t k = first; k < part.bytes; k += stride) part.to[k] = part.from[k];
+  }
+}
+
+/// Counts of a cloud.
+struct Counts {
+  std::uint32_t features;               // missing
+  std::uint32_t extreme, extreme_wide;  // features that are too long for the tensor cores
+  // points by the direction of their normals; the last bin: without
+  std::uint32_t normal_bin[kNormalBins];
+};
+
+__global__ void count(const std::uint32_t* offset, const Vec3* normals, const std::uint8_t* valid,
+                      std::uint32_t* const* normal_weight, Counts* counts) {
+  __shared__ std::uint32_t bins[kNormalBins];
+  const std::uint32_t c = blockIdx.y, begin = offset[c], end = offset[c + 1];
+  if (threadIdx.x < kNormalBins) bins[threadIdx.x] = 0;
+  __syncthreads();
+  std::uint32_t no_feature = 0;
+  for (std::uint32_t i = begin + blockIdx.x * blockDim.x + threadIdx.x; i < end;
+       i += gridDim.x * blockDim.x) {
+    const std::uint32_t bin = normal_bin(normals[i]);
+    normal_weight[c][i - begin] = bin;
+    atomicAdd(bins + bin, 1u);
+    no_feature += !valid[i];
+  }
+  no_feature = warp_sum(no_feature);
+  if (threadIdx.x % 32 == 0 && no_feature > 0) atomicAdd(&counts[c].features, no_feature);
+  __syncthreads();
+  if (threadIdx.x < kNormalBins && bins[threadIdx.x] > 0)
+    atomicAdd(counts[c].normal_bin + threadIdx.x, bins[threadIdx.x]);
+}
+
+/// Weights from the counts of the bins.
+__global__ void weight_by_normals(const std::uint32_t* offset, const Counts* counts,
+                                  std::uint32_t* const* normal_weight) {
+  __shared__ std::uint32_t weight[kNormalBins];
+  const std::uint32_t c = blockIdx.y, size = offset[c + 1] - offset[c];
+  if (threadIdx.x < kNormalBins)
+    weight[threadIdx.x] = normal_weight_in_bin(counts[c].normal_bin[threadIdx.x]);
+  __syncthreads();
+  for (std::uint32_t i = blockIdx.x * blockDim.x + threadIdx.x; i < size;
+       i += gridDim.x * blockDim.x)
+    normal_weight[c][i] = weight[normal_weight[c][i]];
+}
+
+template <typename T>
+std::vector<T> copy_back(const CudaCloud& cloud, const T* device, std::size_t size) {
+  std::vector<T> host(size);
+  if (size > 0) {
+    const DeviceScope scope(cloud.data.memory()->device());
+    // Synchronised data: any stream may read it, and this stream waits for no other.
+    cudaStream_t stream = nullptr;
+    check(cudaStreamCreateWithFlags(&stream, cudaStreamNonBlocking), "cudaStreamCreateWithFlags");
+    cudaError_t error =
+        cudaMemcpyAsync(host.data(), device, size * sizeof(T), cudaMemcpyDeviceToHost, stream);
+    if (error == cudaSuccess) error = cudaStreamSynchronize(stream);
+    cudaStreamDestroy(stream);
+    check(error, "copying a cloud to the host");
+  }
+  return host;
+}
+
+}  // namespace
+
+std::vector<Vec3> CudaCloud::copy_points() const {
+  return copy_back(*this, view_on_device.points, size);
+}
+std::vector<Vec3> CudaCloud::copy_normals() const {
+  return copy_back(*this, view_on_device.normals, size);
+}
+std::vector<float> CudaCloud::copy_features() const {
+  return copy_back(*this, view_on_device.features,
+                   static_cast<std::size_t>(size) * feature_dimension);
+}
+
+std::vector<std::shared_ptr<CudaCloud>> assemble(
+    Exec& exec, const DownsampledClouds& clouds, const DeviceBuffer<Vec3>& normals,
+    const Features& features, const Features& wide_features, const ClosestGrids& closest,
+    const DepthMaps& depth_maps, const SurfaceSides& surface_sides, const PrepareOptions& options) {
+  const Segments& segments = clouds.segments;
+  const std::size_t clouds_count = segments.entries();
+  const auto counts = exec.filled<Counts>(clouds_count, 0);
+  std::vector<std::shared_ptr<CudaCloud>> out;
+  std::vector<Part> parts;
+  std::vector<FeaturesToMeasure> features_to_measure;
+  std::vector<std::uint32_t*> normal_weight;
+  for (std::size_t c = 0; c < clouds_count; ++c) {
+    auto cloud = std::make_shared<CudaCloud>();
+    const CloudFacts& facts = clouds.facts[c];
+    cloud->options = options;
+    for (int k = 0; k < 3; ++k) cloud->origin[k] = facts.origin[k];
+    cloud->size = segments.size(c);
+    cloud->feature_dimension = features.dimension[c];
+    cloud->radius = facts.radius;
+    cloud->viewpoints = facts.viewpoints;
+    cloud->statistics.input_points = facts.input_points;
+    cloud->statistics.invalid_points = facts.invalid_points;
+    cloud->statistics.points = cloud->size;
+    cloud->block_count = closest.blocks.size(c);
+    cloud->candidate_count = closest.candidate_offset[c + 1] - closest.candidate_offset[c];
+
+    // First the offsets, then the memory, then the pointers.
+    const std::size_t first_part = parts.size();
+    std::size_t bytes = 0;
+    const auto place = [&](const auto* from, std::size_t size) {
+      parts.push_back({reinterpret_cast<const char*>(from), reinterpret_cast<char*>(bytes),
+                       size * sizeof(*from)});
+      bytes += (size * sizeof(*from) + 255) / 256 * 256;
+    };
+    const std::size_t begin = segments.offset[c], n = cloud->size,
+                      block_begin = closest.blocks.offset[c];
+    place(clouds.points.data() + begin, n);
+    place(normals.data() + begin, n);
+    place(features.values.data() + features.offset[c], n * cloud->feature_dimension);
+    place(features.valid.data() + begin, n);
+    place(closest.table.data() + closest.table_offset[c],
+          closest.table_offset[c + 1] - closest.table_offset[c]);
+    place(closest.cell_start.data() + block_begin * (ClosestGridView::kBlockCells + 1),
+          std::size_t(cloud->block_count) * (ClosestGridView::kBlockCells + 1));
+    place(closest.candidates.data() + closest.candidate_offset[c], cloud->candidate_count);
+    place(closest.block.data() + block_begin, cloud->block_count);
+    const bool has_wide = wide_features.dimension[c] > 0 && n > 0;
+    place(wide_features.values.data() + wide_features.offset[c], n * wide_features.dimension[c]);
+    place(wide_features.valid.data() + (has_wide ? begin : 0), has_wide ? n : 0);
+    const std::uint32_t map_begin = depth_maps.offset[c],
+                        maps = depth_maps.offset[c + 1] - map_begin;
+    place(depth_maps.depth.data() + std::size_t(map_begin) * kMapCells,
+          std::size_t(maps) * kMapCells);
+    place(depth_maps.viewpoints.data() + map_begin, maps);
+    const SurfaceSideGrid& box = surface_sides.boxes[c];
+    place(surface_sides.words.data() + surface_sides.offset[c], box.words());
+    // Space for the arrays that are computed in place.
+    const auto reserve = [&](std::size_t more) {
+      const std::size_t at = bytes;
+      bytes += (more + 255) / 256 * 256;
+      return at;
+    };
+    const HalfCopy copy = facts.feature_dimension == 0 ? HalfCopy::turned : HalfCopy::plain;
+    const auto reserve_aids = [&](std::uint32_t dimension, HalfCopy copy_of) {
+      FeatureAidsPlaces at{};
+      for (int k = 0; k < FeatureAidsPlaces::kArrays; ++k)
+        at.begin[k] = reserve(feature_aids_bytes(k, n, dimension, copy_of));
+      return at;
+    };
+    const auto aids = reserve_aids(cloud->feature_dimension, copy);
+    const auto wide_aids =
+        reserve_aids(has_wide ? wide_features.dimension[c] : 0, HalfCopy::turned);
+    const std::size_t weights = reserve(n * sizeof(std::uint32_t));
+    const std::size_t copied = bytes;
+    const ScoringLayout layout = scoring_layout(*cloud, closest.block_range[c]);
+    // Filled: tables start empty, and gaps between the arrays are copied with them.
+    cloud->data = exec.filled<char>(copied + layout.bytes, 0);
+    for (std::size_t k = first_part; k < parts.size(); ++k)
+      parts[k].to = cloud->data.data() + reinterpret_cast<std::size_t>(parts[k].to);
+    const Part* part = parts.data() + first_part;
+    CloudView& view = cloud->view_on_device;
+    view.points = reinterpret_cast<const Vec3*>(part[0].to);
+    view.normals = reinterpret_cast<const Vec3*>(part[1].to);
+    view.features = reinterpret_cast<const float*>(part[2].to);
+    view.has_feature = reinterpret_cast<const std::uint8_t*>(part[3].to);
+    view.size = cloud->size;
+    view.feature_dimension = cloud->feature_dimension;
+    view.radius = cloud->radius;
+    view.closest = {1.0f / closest.geometry[c].cell_size,
+                    {reinterpret_cast<const CellEntry*>(part[4].to),
+                     closest.table_offset[c + 1] - closest.table_offset[c]},
+                    {reinterpret_cast<const std::uint32_t*>(part[5].to),
+                     std::size_t(cloud->block_count) * (ClosestGridView::kBlockCells + 1)},
+                    {reinterpret_cast<const std::uint32_t*>(part[6].to), cloud->candidate_count}};
+    view.executor_data = cloud.get();
+    view.wide_features = has_wide ? reinterpret_cast<const float*>(part[8].to) : nullptr;
+    view.has_wide_feature = has_wide ? reinterpret_cast<const std::uint8_t*>(part[9].to) : nullptr;
+    view.visibility = {reinterpret_cast<const std::uint16_t*>(part[10].to),
+                       reinterpret_cast<const Vec3*>(part[11].to), maps, depth_maps.step};
+    view.surface_sides = {
+        box, box.words() > 0 ? reinterpret_cast<const std::uint32_t*>(part[12].to) : nullptr};
+    char* const memory = cloud->data.data();
+    normal_weight.push_back(reinterpret_cast<std::uint32_t*>(memory + weights));
+    view.normal_weight = normal_weight.back();
+    const auto measure = [&](FeatureAids& to, const FeatureAidsPlaces& at, HalfCopy copy_of,
+                             const float* rows, const std::uint8_t* valid, std::uint32_t dimension,
+                             std::uint32_t* extreme) {
+      if (half_width(dimension, copy_of) == 0) return;
+      to = feature_aids_at(memory, at, copy_of);
+      features_to_measure.push_back({rows, valid, view.size, dimension, to, extreme});
+    };
+    measure(cloud->narrow_aids, aids, copy, view.features, view.has_feature, view.feature_dimension,
+            &counts.data()[c].extreme);
+    if (has_wide)
+      measure(cloud->wide_aids, wide_aids, HalfCopy::turned, view.wide_features,
+              view.has_wide_feature, wide_features.dimension[c], &counts.data()[c].extreme_wide);
+    cloud->blocks = reinterpret_cast<const Cell*>(part[7].to);
+    place_scoring_data(layout, closest.geometry[c], cloud->data.data() + copied, *cloud);
+    out.push_back(std::move(cloud));
+  }
+  const auto parts_on_device = exec.upload(parts);
+  copy_parts<<<dim3(16, static_cast<unsigned>(parts.size())), 256, 0, exec.stream()>>>(
+      parts_on_device.data());
+  check_launch("copy_parts");
+  const auto normal_weight_on_device = exec.upload(normal_weight);
+  const dim3 grid(8, static_cast<unsigned>(clouds_count));
+  count<<<grid, 256, 0, exec.stream()>>>(segments.on_device.data(), normals.data(),
+                                         features.valid.data(), normal_weight_on_device.data(),
+                                         counts.data());
+  check_launch("count");
+  weight_by_normals<<<grid, 256, 0, exec.stream()>>>(segments.on_device.data(), counts.data(),
+                                                     normal_weight_on_device.data());
+  check_launch("weight_by_normals");
+  fill_feature_aids(exec, features_to_measure);
+  fill_scoring_data(exec, out, closest.geometry);
+  const Counts* counted = exec.download(counts.data(), clouds_count);
+  exec.synchronize();
+  for (std::size_t c = 0; c < clouds_count; ++c) {
+    CudaCloud& cloud = *out[c];
+    cloud.statistics.points_without_normal = counted[c].normal_bin[kNormalBins - 1];
+    cloud.statistics.points_without_feature = counted[c].features;
+    for (const std::uint32_t points : counted[c].normal_bin)
+      cloud.normal_weight_total += std::uint64_t(points) * normal_weight_in_bin(points);
+    cloud.view_on_device.normal_weight_total = cloud.normal_weight_total;
+    if (counted[c].extreme > 0) cloud.narrow_aids.half = nullptr;
+    if (counted[c].extreme_wide > 0) cloud.wide_aids.half = nullptr;
+  }
+  return out;
+}
+
+}  // namespace gpureg::cuda

@@ -1,0 +1,342 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <algorithm>
+#include <limits>
+
+#include "algorithm/closest_build.hpp"
+#include "cpu/common/stages.hpp"
+#include "cpu/common/wide_vectors.hpp"
+#include "cpu/prepare/reachable_blocks.hpp"
+#include "pipeline/checks.hpp"
+
+namespace gpureg::cpu {
+namespace {
+
+constexpr int kEdge = ClosestGridView::kBlockEdge;
+constexpr int kCells = ClosestGridView::kBlockCells;
+/// Keys (32 MB) from which on duplicates are removed in between.
+constexpr std::size_t kLeastKeys = std::size_t(1) << 22;
+
+/// Cells along an edge of a part of a block. The points that matter to a part are found once for
+/// its cells.
+constexpr int kPart = 2;
+
+struct BlockLists {
+  std::vector<std::uint32_t> counts;      // per cell
+  std::vector<std::uint32_t> candidates;  // cells one after another
+};
+
+/// Points within the search distance of the block, ascending by index.
+std::vector<std::uint32_t> points_near_block(const GridView& grid, Vec3 center,
+                                             const ClosestGeometry& g) {
+  const float reach = block_reach(g);
+  const Cell lo =
+      cell_of({center.x - reach, center.y - reach, center.z - reach}, grid.inverse_cell_size);
+  const Cell hi =
+      cell_of({center.x + reach, center.y + reach, center.z + reach}, grid.inverse_cell_size);
+  std::vector<std::uint32_t> near;
+  for (std::int32_t z = lo.z; z <= hi.z; ++z)
+    for (std::int32_t y = lo.y; y <= hi.y; ++y)
+      for (std::int32_t x = lo.x; x <= hi.x; ++x) {
+        const std::uint32_t cell = find_cell(grid.table, cell_key({x, y, z}));
+        if (cell == kNoValue) continue;
+        for (std::uint32_t k = grid.cell_start[cell]; k < grid.cell_start[cell + 1]; ++k) {
+          const Vec3 d = grid.points[k] - center;
+          if (std::fabs(d.x) <= reach && std::fabs(d.y) <= reach && std::fabs(d.z) <= reach)
+            near.push_back(grid.index[k]);
+        }
+      }
+  std::sort(near.begin(), near.end());
+  return near;
+}
+
+constexpr std::size_t kLanes = 16;
+
+/// Squared distances of points to a location, 16 at a time. Both kinds round alike.
+struct NarrowLanes {
+  /// Writes d2 and returns the least; size: a multiple of 16.
+  static float measure(const float* x, const float* y, const float* z, std::size_t size,
+                       Vec3 center, float* d2) {
+    float least[kLanes];
+    for (float& l : least) l = std::numeric_limits<float>::max();
+    for (std::size_t k = 0; k < size; k += kLanes)
+      for (std::size_t l = 0; l < kLanes; ++l) {
+        const float dx = x[k + l] - center.x, dy = y[k + l] - center.y, dz = z[k + l] - center.z;
+        const float d = fmaf(dz, dz, fmaf(dy, dy, dx * dx));
+        d2[k + l] = d;
+        least[l] = d < least[l] ? d : least[l];
+      }
+    return *std::min_element(least, least + kLanes);
+  }
+  /// Bits of the 16 values that are at most `most`.
+  static std::uint32_t within(const float* d2, float most) {
+    std::uint32_t mask = 0;
+    for (std::uint32_t l = 0; l < kLanes; ++l)
+      mask |= static_cast<std::uint32_t>(d2[l] <= most) << l;
+    return mask;
+  }
+  /// Bits of the 16 points that dominated_in_cell() does not rule out. nearest2: of best.
+  static std::uint32_t undominated(const float* x, const float* y, const float* z, const float* d2,
+                                   Vec3 best, float nearest2, const ClosestGeometry& g) {
+    const DominanceTest test = dominance_test(g);
+    std::uint8_t flag[kLanes];
+    for (std::uint32_t l = 0; l < kLanes; ++l)
+      flag[l] = !dominated({x[l] - best.x, y[l] - best.y, z[l] - best.z}, d2[l] - nearest2, test);
+    std::uint32_t mask = 0;
+    for (std::uint32_t l = 0; l < kLanes; ++l) mask |= static_cast<std::uint32_t>(flag[l]) << l;
+    return mask;
+  }
+};
+#ifdef GPUREG_WIDE_TARGET
+struct WideLanes {
+  GPUREG_WIDE_TARGET static float measure(const float* x, const float* y, const float* z,
+                                          std::size_t size, Vec3 center, float* d2) {
+    const __m512 cx = _mm512_set1_ps(center.x), cy = _mm512_set1_ps(center.y),
+                 cz = _mm512_set1_ps(center.z);
+    __m512 least = _mm512_set1_ps(std::numeric_limits<float>::max());
+    for (std::size_t k = 0; k < size; k += kLanes) {
+      const __m512 dx = _mm512_sub_ps(_mm512_loadu_ps(x + k), cx),
+                   dy = _mm512_sub_ps(_mm512_loadu_ps(y + k), cy),
+                   dz = _mm512_sub_ps(_mm512_loadu_ps(z + k), cz);
+      const __m512 d = _mm512_fmadd_ps(dz, dz, _mm512_fmadd_ps(dy, dy, _mm512_mul_ps(dx, dx)));
+      _mm512_storeu_ps(d2 + k, d);
+      least = _mm512_min_ps(d, least);
+    }
+    return _mm512_reduce_min_ps(least);
+  }
+  GPUREG_WIDE_TARGET static std::uint32_t within(const float* d2, float most) {
+    return _mm512_cmp_ps_mask(_mm512_loadu_ps(d2), _mm512_set1_ps(most), _CMP_LE_OQ);
+  }
+  GPUREG_WIDE_TARGET static std::uint32_t undominated(const float* x, const float* y,
+                                                      const float* z, const float* d2, Vec3 best,
+                                                      float nearest2, const ClosestGeometry& g) {
+    const DominanceTest test = dominance_test(g);
+    const __m512 dx = _mm512_abs_ps(_mm512_sub_ps(_mm512_loadu_ps(x), _mm512_set1_ps(best.x))),
+                 dy = _mm512_abs_ps(_mm512_sub_ps(_mm512_loadu_ps(y), _mm512_set1_ps(best.y))),
+                 dz = _mm512_abs_ps(_mm512_sub_ps(_mm512_loadu_ps(z), _mm512_set1_ps(best.z)));
+    const __m512 l1 = _mm512_add_ps(_mm512_add_ps(dx, dy), dz),
+                 difference = _mm512_sub_ps(_mm512_loadu_ps(d2), _mm512_set1_ps(nearest2)),
+                 most = _mm512_add_ps(_mm512_mul_ps(l1, _mm512_set1_ps(test.edge)),
+                                      _mm512_set1_ps(test.rest));
+    return static_cast<std::uint32_t>(
+        static_cast<__mmask16>(~_mm512_cmp_ps_mask(difference, most, _CMP_GT_OQ)));
+  }
+};
+#endif
+
+/// Points near a block or a part of it, ascending by index, one array per coordinate. Infinite
+/// points fill whole vectors.
+struct NearPoints {
+  std::vector<float> x, y, z, d2;
+  std::vector<std::uint32_t> index;
+
+  void clear() {
+    for (auto* v : {&x, &y, &z}) v->clear();
+    index.clear();
+  }
+  void add(Vec3 p, std::uint32_t i) {
+    x.push_back(p.x);
+    y.push_back(p.y);
+    z.push_back(p.z);
+    index.push_back(i);
+  }
+  void pad() {
+    const std::size_t whole = (index.size() + kLanes - 1) / kLanes * kLanes;
+    for (auto* v : {&x, &y, &z}) v->resize(whole, std::numeric_limits<float>::infinity());
+    d2.resize(whole);
+  }
+  /// Squared distances to a location; returns the least.
+  template <typename Lanes>
+  GPUREG_ALWAYS_INLINE float measure(Vec3 center) {
+    return Lanes::measure(x.data(), y.data(), z.data(), x.size(), center, d2.data());
+  }
+  /// Calls visit(k) for the points within a distance of the location measured last.
+  template <typename Lanes, typename Visit>
+  GPUREG_ALWAYS_INLINE void for_each_within(float squared, Visit&& visit) const {
+    for (std::size_t begin = 0; begin < x.size(); begin += kLanes)
+      for (std::uint32_t mask = Lanes::within(d2.data() + begin, squared); mask != 0;
+           mask &= mask - 1)
+        visit(begin + static_cast<std::size_t>(__builtin_ctz(mask)));
+  }
+};
+
+/// Candidates of the cells of a block before they are put in order.
+struct CellLists {
+  std::uint32_t begin[kCells], count[kCells];
+  std::vector<std::uint32_t> candidates;
+};
+
+template <typename Lanes>
+GPUREG_ALWAYS_INLINE void fill_cell(NearPoints& near, Vec3 center, const ClosestGeometry& g,
+                                    std::vector<std::uint32_t>& out) {
+  const float nearest2 = near.measure<Lanes>(center), nearest = std::sqrt(nearest2);
+  if (!can_reach_cell(nearest, g)) return;
+  const float limit = candidate_limit(nearest, g);
+  std::size_t first = 0;
+  while (near.d2[first] != nearest2) ++first;
+  const Vec3 best{near.x[first], near.y[first], near.z[first]};
+  for (std::size_t begin = 0; begin < near.x.size(); begin += kLanes) {
+    std::uint32_t mask = Lanes::within(&near.d2[begin], limit * limit);
+    if (mask == 0) continue;
+    mask &= Lanes::undominated(&near.x[begin], &near.y[begin], &near.z[begin], &near.d2[begin],
+                               best, nearest2, g);
+    for (; mask != 0; mask &= mask - 1) {
+      const std::size_t k = begin + static_cast<std::size_t>(__builtin_ctz(mask));
+      if (k > first && coincide({near.x[k], near.y[k], near.z[k]}, best)) continue;
+      out.push_back(near.index[k]);
+    }
+  }
+}
+
+template <typename Lanes>
+GPUREG_ALWAYS_INLINE void fill_block(NearPoints& near, Cell block, const ClosestGeometry& g,
+                                     CellLists& out) {
+  const float part_edge = static_cast<float>(kPart) * g.cell_size;
+  // Of every cell of a part: its centre is this far from that of the part.
+  const float offset = kHalfDiagonal * (part_edge - g.cell_size);
+  const float slack = 1.0f + 1e-5f;
+  NearPoints some;
+  for (int part = 0; part < kCells / (kPart * kPart * kPart); ++part) {
+    constexpr int kParts = kEdge / kPart;
+    const int x = part % kParts * kPart, y = part / kParts % kParts * kPart,
+              z = part / (kParts * kParts) * kPart;
+    const Cell corner{block.x * kEdge + x, block.y * kEdge + y, block.z * kEdge + z};
+    const Vec3 middle =
+        cell_center(corner, g.cell_size) + Vec3{0.5f, 0.5f, 0.5f} * (part_edge - g.cell_size);
+    const float nearest = std::sqrt(near.measure<Lanes>(middle));
+    if (!can_reach_cell((nearest - offset) / slack - g.margin, g)) continue;
+    // A candidate of a cell is within candidate_limit() of the centre of the cell, whose nearest
+    // point is at most `offset` farther than that of the part.
+    const float limit = (candidate_limit(nearest + offset, g) + offset + g.margin) * slack;
+    some.clear();
+    near.for_each_within<Lanes>(limit * limit, [&](std::size_t k) {
+      some.add({near.x[k], near.y[k], near.z[k]}, near.index[k]);
+    });
+    if (some.index.empty()) continue;
+    some.pad();
+    for (int k = 0; k < kPart * kPart * kPart; ++k) {
+      const Cell c{corner.x + k % kPart, corner.y + k / kPart % kPart,
+                   corner.z + k / (kPart * kPart)};
+      const int cell = (z + k / (kPart * kPart)) * kEdge * kEdge + (y + k / kPart % kPart) * kEdge +
+                       x + k % kPart;
+      out.begin[cell] = static_cast<std::uint32_t>(out.candidates.size());
+      fill_cell<Lanes>(some, cell_center(c, g.cell_size), g, out.candidates);
+      out.count[cell] = static_cast<std::uint32_t>(out.candidates.size()) - out.begin[cell];
+    }
+    if (out.candidates.size() > limits::kMaxBlockCandidates)
+      pipeline::throw_too_dense(g.search_distance);
+  }
+}
+
+#ifdef GPUREG_WIDE_TARGET
+GPUREG_WIDE_TARGET void fill_block_wide(NearPoints& near, Cell block, const ClosestGeometry& g,
+                                        CellLists& out) {
+  fill_block<WideLanes>(near, block, g, out);
+}
+#endif
+
+void build_block(const GridView& grid, const std::vector<Vec3>& points, Cell block,
+                 const ClosestGeometry& g, BlockLists& out) {
+  NearPoints near;
+  for (const std::uint32_t i : points_near_block(grid, cell_center(block, block_edge(g)), g))
+    near.add(points[i], i);
+  near.pad();
+  CellLists lists{};
+  if (!near.index.empty()) {
+#ifdef GPUREG_WIDE_TARGET
+    if (has_wide_vectors())
+      fill_block_wide(near, block, g, lists);
+    else
+#endif
+      fill_block<NarrowLanes>(near, block, g, lists);
+  }
+  out.counts.assign(lists.count, lists.count + kCells);
+  out.candidates.reserve(lists.candidates.size());
+  for (int cell = 0; cell < kCells; ++cell)
+    out.candidates.insert(out.candidates.end(), lists.candidates.begin() + lists.begin[cell],
+                          lists.candidates.begin() + lists.begin[cell] + lists.count[cell]);
+}
+
+}  // namespace
+
+std::vector<std::uint64_t> reachable_blocks(const std::vector<Vec3>& points,
+                                            const ClosestGeometry& g, std::size_t least_keys) {
+  const float inverse = 1.0f / block_edge(g);
+  const float reach = point_reach(g);
+  std::vector<std::uint64_t> keys;
+  std::size_t most_keys = least_keys;
+  const auto remove_duplicates = [&] {
+    std::sort(keys.begin(), keys.end());
+    keys.erase(std::unique(keys.begin(), keys.end()), keys.end());
+  };
+  for (const Vec3& p : points) {
+    const Cell lo = cell_of({p.x - reach, p.y - reach, p.z - reach}, inverse);
+    const Cell hi = cell_of({p.x + reach, p.y + reach, p.z + reach}, inverse);
+    for (std::int32_t z = lo.z; z <= hi.z; ++z)
+      for (std::int32_t y = lo.y; y <= hi.y; ++y)
+        for (std::int32_t x = lo.x; x <= hi.x; ++x) {
+          const std::uint64_t key = cell_key({x, y, z});
+          if (keys.empty() || keys.back() != key) keys.push_back(key);
+        }
+    if (keys.size() > most_keys) {
+      remove_duplicates();
+      // A large map has more blocks than the first limit: sorting them all for every few points
+      // would never end.
+      most_keys = std::max(least_keys, 2 * keys.size());
+    }
+  }
+  remove_duplicates();
+  return keys;
+}
+
+ClosestGridView ClosestGrid::view() const {
+  return {1.0f / cell_size, span_of(table.entries), span_of(cell_start), span_of(candidates)};
+}
+
+std::vector<ClosestGrid> build_closest_grids(Exec& exec,
+                                             const std::vector<DownsampledCloud>& clouds,
+                                             const std::vector<Grid>& grids,
+                                             const PrepareOptions& options) {
+  std::vector<ClosestGrid> out(clouds.size());
+  std::vector<ClosestGeometry> geometry(clouds.size());
+  std::vector<std::vector<std::uint64_t>> keys(clouds.size());
+  std::vector<std::vector<BlockLists>> lists(clouds.size());
+  exec.parallel(clouds.size(), [&](std::size_t c) {
+    geometry[c] = closest_geometry(options.max_correspondence_distance, clouds[c].radius);
+    keys[c] = reachable_blocks(clouds[c].points, geometry[c], kLeastKeys);
+    lists[c].resize(keys[c].size());
+  });
+  exec.parallel_items(
+      clouds.size(), [&](std::size_t c) { return keys[c].size(); }, 16,
+      [&](std::size_t c, std::size_t begin, std::size_t end) {
+        const GridView grid = grids[c].view();
+        for (std::size_t b = begin; b < end; ++b)
+          build_block(grid, clouds[c].points, cell_from_key(keys[c][b]), geometry[c], lists[c][b]);
+      });
+  exec.parallel(clouds.size(), [&](std::size_t c) {
+    ClosestGrid& grid = out[c];
+    grid.cell_size = geometry[c].cell_size;
+    std::size_t total = 0;
+    for (const BlockLists& l : lists[c]) total += l.candidates.size();
+    if (pipeline::too_many_candidates(total, clouds[c].points.size()))
+      pipeline::throw_too_dense(options.max_correspondence_distance);
+    grid.table.reset(keys[c].size());
+    grid.cell_start.reserve(keys[c].size() * (kCells + 1));
+    grid.candidates.reserve(total);
+    for (std::size_t b = 0; b < keys[c].size(); ++b) {
+      grid.table.insert(keys[c][b], static_cast<std::uint32_t>(b));
+      grid.blocks.push_back(cell_from_key(keys[c][b]));
+      std::uint32_t offset = static_cast<std::uint32_t>(grid.candidates.size());
+      for (int cell = 0; cell < kCells; ++cell) {
+        grid.cell_start.push_back(offset);
+        offset += lists[c][b].counts[cell];
+      }
+      grid.cell_start.push_back(offset);
+      grid.candidates.insert(grid.candidates.end(), lists[c][b].candidates.begin(),
+                             lists[c][b].candidates.end());
+      lists[c][b] = BlockLists();  // a map's lists take as much memory as its grid
+    }
+  });
+  return out;
+}
+
+}  // namespace gpureg::cpu
