@@ -13,13 +13,15 @@ was not moved, `model` for a model. `decided_none` counts scans that were not mo
 free space is invented, but it is not the right decision. The last line has the shares over all sets.
 
 Sets: kitchen, dragon, cad, cad_mesh, kitti, lidar, fgr of DATA (its README.md has origins and
-licences). cad: scans on points of their models; cad_mesh: on the models as STL files.
+licences). cad: scans on points of their models; cad_mesh: on the models as STL files. The thresholds
+of the decisions were chosen on these. On house_a, hospital_e (fused fragments), frames
+(single depth images of the red kitchen) and clutter (scans of parts with clutter) nothing was chosen.
 
 The record keeps what other runs wrote about other sets; each set has the command and the commit that
 made it.
 
 usage: viewpoints.py DATA [--gpureg COMMAND] [--sets kitchen,cad] [--pairs 40] [--seeds 1 2 3] [--json OUT]
-Needs numpy and the Python package gpureg, which reads and writes the clouds."""
+Needs numpy, Pillow for frames, and the Python package gpureg, which reads and writes the clouds."""
 
 import argparse
 import collections
@@ -97,8 +99,8 @@ def near(limit):
     return lambda points, pose, truths: any(displacement(points, pose, t) < limit for t in truths)
 
 
-def kitchen(data, count, rng):
-    folder = data / "redkitchen/fragments"
+def fused(folder, fragments, count, rng):
+    """Fragments of a moving camera, each in the frame of its middle camera."""
     views = cameras(folder / "cameras.txt")
     frames = {}
     for line in (folder / "cameras.txt").read_text().splitlines():
@@ -107,7 +109,7 @@ def kitchen(data, count, rng):
         f = line.split()
         frames.setdefault(int(f[0]), []).append([float(x) for x in f[2:9]])
     clouds, into = [], []
-    for k in range(20):
+    for k in range(fragments):
         t = np.eye(4)  # into the frame of the middle camera
         x, y, z, qx, qy, qz, qw = frames[k][len(frames[k]) // 2]
         v = np.array([qx, qy, qz])
@@ -122,6 +124,36 @@ def kitchen(data, count, rng):
         for (i, j, _), t in matrices(folder / "gt.log")
         if j - i > 1
     ]
+    return [Set(clouds, chosen(pairs, count, rng), "0.05", near(0.2))]
+
+
+def kitchen(data, count, rng):
+    return fused(data / "redkitchen/fragments", 20, count, rng)
+
+
+def house_a(data, count, rng):
+    return fused(data / "house/A", 50, count, rng)
+
+
+def hospital_e(data, count, rng):
+    return fused(data / "hospital/E", 50, count, rng)
+
+
+def frames(data, count, rng):
+    """Every 20th depth image, in the frame of its camera; pixels 2 apart, nearer than 3.5 m."""
+    from PIL import Image
+
+    focal, centre = 585.0, (320, 240)
+    clouds, poses = [], []
+    for k in range(0, 1000, 20):
+        name = data / f"redkitchen/rgbd/frame-{k:06d}"
+        depth = np.asarray(Image.open(f"{name}.depth.png"), np.float64)[::2, ::2] / 1000
+        y, x = np.mgrid[0:480:2, 0:640:2]
+        rays = np.stack([(x - centre[0]) / focal, (y - centre[1]) / focal, np.ones(x.shape)], -1)
+        points = (rays * depth[..., None])[(depth > 0) & (depth < 3.5)]
+        clouds.append(Cloud(points, np.zeros((1, 3)), 3.0))
+        poses.append(np.loadtxt(f"{name}.pose.txt"))
+    pairs = [(k + 1, k, [np.linalg.inv(poses[k]) @ poses[k + 1]]) for k in range(len(clouds) - 1)]
     return [Set(clouds, chosen(pairs, count, rng), "0.05", near(0.2))]
 
 
@@ -171,10 +203,12 @@ def on_model(points, pose, truths):
     )
 
 
-def cad(data, count, rng, as_mesh=False):
+def cad(data, count, rng, as_mesh=False, scanned="filtered"):
     sets = []
     for path in sorted((data / "cad/model").glob("*.stl")):
-        scans = sorted((data / "cad/filtered").glob(f"{path.stem}_*.ply"))
+        scans = sorted((data / "cad" / scanned).glob(f"{path.stem}_*.ply"))
+        if not scans:
+            continue
         facts = [json.loads(scan.with_suffix(".json").read_text()) for scan in scans]
         triangles = stl(path)
         points, centre = sampled(triangles, rng)
@@ -190,6 +224,10 @@ def cad(data, count, rng, as_mesh=False):
 
 def cad_mesh(data, count, rng):
     return cad(data, count, rng, as_mesh=True)
+
+
+def clutter(data, count, rng):
+    return cad(data, count, rng, as_mesh=True, scanned="BB_1.4")
 
 
 def kitti(data, count, rng):
@@ -357,7 +395,8 @@ def main():
     parser.add_argument("--json", type=pathlib.Path)
     parser.add_argument("--extra", default="", help="more options of gpureg batch")
     arguments = parser.parse_args()
-    makers = {f.__name__: f for f in (kitchen, dragon, cad, cad_mesh, kitti, lidar, fgr)}
+    chosen_by = (kitchen, dragon, cad, cad_mesh, kitti, lidar, fgr)
+    makers = {f.__name__: f for f in (*chosen_by, house_a, hospital_e, frames, clutter)}
     record = {"sets": {}}
     if arguments.json and arguments.json.exists():
         known = json.loads(arguments.json.read_text())["sets"]

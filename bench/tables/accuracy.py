@@ -300,7 +300,6 @@ CONDITIONS = {
     "still": "not moved, nothing given",
 }
 
-
 DECISIONS = ("said", "origin", "normals", "none", "model")
 
 
@@ -453,7 +452,42 @@ def domains():
     return [*rows, "", " ".join([source(record) + ".", *also])]
 
 
+UNSEEN = {
+    "house_a": "rooms: house A, simulated depth camera",
+    "hospital_e": "rooms: hospital E, simulated depth camera",
+    "frames": "rooms: single depth images of the red kitchen",
+    "clutter": "CAD: scans of parts with clutter",
+}
+
+
+def decisions_unseen():
+    """Decisions about scans by which no threshold was chosen, over all seeds."""
+    record = load("viewpoints.json")
+    out = [
+        "| data | moved scans: `none` | moved: `origin`, free space invented | not moved: `origin` | not moved: `none`, safe | correct, % |",
+        "| --- | --- | --- | --- | --- | --- |",
+    ]
+    measured = {name: text for name, text in UNSEEN.items() if name in record["sets"]}
+    for name, text in measured.items():
+        counted = {}
+        for condition in ("nothing", "still"):
+            runs = record["sets"][name]["conditions"][condition]
+            for decision in ("none", "origin"):
+                counted[condition, decision] = sum(run.get(f"scan: {decision}", 0) for run in runs)
+            every = (n for run in runs for key, n in run.items() if key.startswith("scan: "))
+            counted[condition] = sum(every)
+        moved, still = counted["nothing"], counted["still"]
+        share = 100 * (counted["nothing", "none"] + counted["still", "origin"]) / (moved + still)
+        out.append(
+            f"| {text} | {counted['nothing', 'none']} of {moved} | {counted['nothing', 'origin']} | "
+            f"{counted['still', 'origin']} of {still} | {counted['still', 'none']} | {share:.0f} |"
+        )
+    commits = sorted({record["sets"][name]["commit"].rstrip("+") for name in measured})
+    return [*out, "", f"Made by `bench/accuracy/viewpoints.py` at commit {', '.join(commits)}."]
+
+
 TABLES = {
+    "decisions_unseen": decisions_unseen,
     "domains": domains,
     "calibration": calibration,
     "viewpoints": viewpoints,

@@ -35,7 +35,7 @@ def site_link(link: re.Match, folder: pathlib.Path, page: pathlib.Path, source: 
         path = DOCS / "examples.md"
     elif path in (ROOT / "CHANGELOG.md", ROOT / "CONTRIBUTING.md"):
         path = DOCS / path.name.lower()
-    if path.is_relative_to(DOCS) and path.suffix in (".md", ".png"):
+    if path.is_relative_to(DOCS) and path.suffix in (".md", ".png", ".webp"):
         return f"({os.path.relpath(path, page.parent)}{anchor})"
     return f"(repository:{path.relative_to(ROOT)}{anchor})"
 
