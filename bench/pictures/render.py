@@ -135,7 +135,7 @@ def draw(
     light = 0.62 + 0.38 * np.clip(normals[order] @ _lamp(view), 0, 1)
     paint = colours[order] * light[:, None]
     depth, image = np.full((height, width), -np.inf), np.full((height, width, 3), 255.0)
-    pixels = max(1, round(radius * view.scale * OVERSAMPLING))
+    pixels = max(2, round(radius * view.scale * OVERSAMPLING))
     for dy in range(-pixels, pixels + 1):
         for dx in range(-pixels, pixels + 1):
             if dx * dx + dy * dy > (pixels + 0.3) ** 2:
