@@ -6,11 +6,14 @@
 #include <pybind11/stl.h>
 
 #include <algorithm>
+#include <iterator>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "bindings.hpp"
 #include "confidence/features.hpp"
+#include "fields/evidence.hpp"
 
 namespace gpureg::python {
 namespace {
@@ -42,45 +45,55 @@ class Column {
   py::ssize_t width_ = 1;
 };
 
-/// The evidence that features depend on.
-std::vector<PoseEvidence> evidence_from(const py::dict& evidence) {
-  struct Sides {
-    const char* key;
-    double PoseEvidence::* source;
-    double PoseEvidence::* target;
-  };
-  using E = PoseEvidence;
-  static constexpr Sides kSides[] = {
-      {"overlap", &E::source_overlap, &E::target_overlap},
-      {"overlap_any_normal", &E::source_overlap_any_normal, &E::target_overlap_any_normal},
-      {"normal_weighted_overlap", &E::source_normal_weighted_overlap,
-       &E::target_normal_weighted_overlap},
-      {"observed", &E::source_observed, &E::target_observed},
-      {"free_space_violation", &E::source_free_space_violation, &E::target_free_space_violation},
-      {"occluded", &E::source_occluded, &E::target_occluded},
-      {"near_surface", &E::source_near_surface, &E::target_near_surface},
-      {"front_violation_near", &E::source_front_violation_near, &E::target_front_violation_near},
-      {"front_violation_far", &E::source_front_violation_far, &E::target_front_violation_far},
-      {"behind_surface", &E::source_behind_surface, &E::target_behind_surface}};
-  const Column inliers(evidence, "match_inliers", 1), support(evidence, "match_support", 1);
-  std::vector<PoseEvidence> out(static_cast<std::size_t>(inliers.size()));
-  const auto each = [&](const Column& column, auto&& assign) {
-    if (column.size() != inliers.size())
+/// Reads each described field of the evidence. No feature depends on those of kUnused: records may
+/// lack them.
+class EvidenceReader {
+ public:
+  explicit EvidenceReader(const py::dict& evidence)
+      : evidence_(evidence),
+        out_(static_cast<std::size_t>(Column(evidence, "match_inliers", 1).size())) {}
+
+  template <typename M>
+  void operator()(M PoseEvidence::* member, const fields::Field& field) {
+    constexpr py::ssize_t width = std::is_class_v<M> ? 6 : 1;
+    each(field.name, width, [&](PoseEvidence& e, const double* row) {
+      if constexpr (std::is_class_v<M>)
+        std::copy_n(row, width, (e.*member).begin());
+      else
+        e.*member = static_cast<M>(*row);
+    });
+  }
+  template <typename M>
+  void operator()(M PoseEvidence::* source, M PoseEvidence::* target, const fields::Field& field) {
+    each(field.name, 2, [&](PoseEvidence& e, const double* row) {
+      e.*source = row[0];
+      e.*target = row[1];
+    });
+  }
+  const std::vector<PoseEvidence>& modes() const { return out_; }
+
+ private:
+  static constexpr std::string_view kUnused[] = {"residual", "weakest_direction"};
+
+  template <typename Assign>
+  void each(const char* key, py::ssize_t width, Assign&& assign) {
+    if (std::count(std::begin(kUnused), std::end(kUnused), key) > 0 && !evidence_.contains(key))
+      return;
+    const Column column(evidence_, key, width);
+    if (column.size() != static_cast<py::ssize_t>(out_.size()))
       throw py::value_error("evidence['" + column.key() + "']: expected as many rows as modes");
     for (py::ssize_t k = 0; k < column.size(); ++k)
-      assign(out[static_cast<std::size_t>(k)], column.row(k));
-  };
-  each(inliers,
-       [](E& e, const double* row) { e.match_inliers = static_cast<std::uint32_t>(row[0]); });
-  each(support, [](E& e, const double* row) { e.match_support = row[0]; });
-  for (const Sides& sides : kSides)
-    each(Column(evidence, sides.key, 2), [&](E& e, const double* row) {
-      e.*sides.source = row[0];
-      e.*sides.target = row[1];
-    });
-  each(Column(evidence, "information_eigenvalues", 6),
-       [](E& e, const double* row) { std::copy_n(row, 6, e.information_eigenvalues.begin()); });
-  return out;
+      assign(out_[static_cast<std::size_t>(k)], column.row(k));
+  }
+
+  const py::dict& evidence_;
+  std::vector<PoseEvidence> out_;
+};
+
+std::vector<PoseEvidence> evidence_from(const py::dict& evidence) {
+  EvidenceReader reader(evidence);
+  fields::Fields<PoseEvidence>::visit(reader);
+  return reader.modes();
 }
 
 Numbers table(std::size_t rows) { return Numbers({rows, confidence::kFeatureCount}); }

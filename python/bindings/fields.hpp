@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cctype>
 #include <charconv>
 #include <cstdlib>
 #include <functional>
@@ -14,11 +15,10 @@
 #include <vector>
 
 #include "bindings.hpp"
-#include "gpureg/options.hpp"
-#include "gpureg/statistics.hpp"
+#include "fields/field.hpp"
 
-/// Plain structs of the library as Python classes, made from one list of fields each: constructor,
-/// attributes, repr, equality, pickle. A new field of the struct is one new line in its list.
+/// Plain structs of the library as Python classes, made from their fields::Fields: constructor,
+/// attributes, repr, equality, pickle.
 namespace gpureg::python {
 
 /// The shortest decimal that is this float: 0.05, not 0.05000000074505806. It converts back
@@ -43,25 +43,16 @@ inline bool is_bool(py::handle value) {
          std::string_view(Py_TYPE(value.ptr())->tp_name).substr(0, 10) == "numpy.bool";
 }
 
-/// Enumerations that are strings in Python.
+/// Enumerations are strings in Python.
+template <typename M, typename = void>
+constexpr bool is_named = false;
 template <typename M>
-constexpr bool is_named =
-    std::is_same_v<M, RegistrationMethod> || std::is_same_v<M, ViewpointSource>;
+constexpr bool is_named<M, std::void_t<decltype(fields::Values<M>::kAll)>> = true;
 
 template <typename M>
 M convert(py::handle value) {
-  if constexpr (std::is_same_v<M, RegistrationMethod>) {
-    const auto text = value.cast<std::string>();
-    for (const RegistrationMethod p :
-         {RegistrationMethod::compatibility, RegistrationMethod::quadruples})
-      if (text == to_string(p)) return p;
-    throw py::cast_error();
-  } else if constexpr (std::is_same_v<M, ViewpointSource>) {
-    const auto text = value.cast<std::string>();
-    for (const ViewpointSource s :
-         {ViewpointSource::said, ViewpointSource::origin, ViewpointSource::normals,
-          ViewpointSource::none, ViewpointSource::model})
-      if (text == to_string(s)) return s;
+  if constexpr (is_named<M>) {
+    if (const M* named = fields::value_named<M>(value.cast<std::string>())) return *named;
     throw py::cast_error();
   } else {
     // A bool is an int in Python; as a length or a count it is a mistake.
@@ -75,10 +66,8 @@ template <typename M>
 std::string expected() {
   if constexpr (std::is_same_v<M, bool>)
     return "True or False";
-  else if constexpr (std::is_same_v<M, RegistrationMethod>)
-    return "'compatibility' or 'quadruples'";
-  else if constexpr (std::is_same_v<M, ViewpointSource>)
-    return "'said', 'origin', 'normals', 'none' or 'model'";
+  else if constexpr (is_named<M>)
+    return fields::names_of<M>("'");
   else if constexpr (std::is_floating_point_v<M>)
     return "a number";
   else if constexpr (std::is_same_v<M, std::array<double, 6>>)
@@ -158,6 +147,33 @@ Field<T> field(std::string name, M T::* member, std::string doc) {
     }
   };
   return f;
+}
+
+/// Sentence, then unit or range, or the names of an enumeration.
+template <typename M>
+std::string docstring(const fields::Field& field) {
+  std::string more;
+  if constexpr (is_named<M>)
+    more = fields::names_of<M>("'");
+  else
+    more = fields::described(field.range);
+  if (more.empty()) return field.sentence;
+  more[0] = static_cast<char>(std::toupper(static_cast<unsigned char>(more[0])));
+  return field.sentence + (" " + more) + ".";
+}
+
+/// The described fields of T.
+template <typename T>
+const std::vector<Field<T>>& fields_of() {
+  static const std::vector<Field<T>> all = [] {
+    std::vector<Field<T>> out;
+    fields::each<T>([&](const std::string& name, auto member, const fields::Field& description) {
+      using M = std::remove_reference_t<decltype(std::declval<T&>().*member)>;
+      out.push_back(field(name, member, docstring<M>(description)));
+    });
+    return out;
+  }();
+  return all;
 }
 
 template <typename T>
@@ -259,6 +275,18 @@ py::class_<T> bind_record_class(py::module_& m, const std::string& name, const c
   define_common(cls, name, fields);
   cls.def("__repr__", [fields, name](const T& t) { return keyword_repr(t, name, fields); });
   return cls;
+}
+
+/// The same for structs that are described.
+template <typename T>
+py::class_<T> bind_options_class(py::module_& m) {
+  return bind_options_class<T>(m, fields::Fields<T>::kName, fields::Fields<T>::kSentence,
+                               fields_of<T>());
+}
+template <typename T>
+py::class_<T> bind_record_class(py::module_& m) {
+  return bind_record_class<T>(m, fields::Fields<T>::kName, fields::Fields<T>::kSentence,
+                              fields_of<T>());
 }
 
 }  // namespace gpureg::python

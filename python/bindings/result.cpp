@@ -7,120 +7,12 @@
 #include <limits>
 
 #include "fields.hpp"
+#include "fields/evidence.hpp"
+#include "fields/statistics.hpp"
 #include "matrix.hpp"
 
 namespace gpureg::python {
 namespace {
-
-std::vector<Field<RegistrationStatistics>> statistics_fields() {
-  using S = RegistrationStatistics;
-  return {
-      field("source_points", &S::source_points, "Prepared points of the source."),
-      field("target_points", &S::target_points, "Prepared points of the target."),
-      field("correspondences", &S::correspondences, "Matches that hypotheses are made of."),
-      field("hypotheses", &S::hypotheses, "Quadruples drawn, or seeds tried."),
-      field("survivors", &S::survivors,
-            "Quadruples that passed the polygon test, or seeds that gave a pose."),
-      field("scored", &S::scored, "Of these, those with a well-defined rigid fit."),
-      field("points_scored", &S::points_scored, "Points that the inlier ratio is relative to."),
-      field("consensus", &S::consensus, "Inliers by which the returned pose won."),
-      field("inliers", &S::inliers, "Inliers of the inlier ratio."),
-      field("refine_iterations", &S::refine_iterations,
-            "Iterations of the refinement of the returned pose."),
-      field("swapped", &S::swapped,
-            "The target was moved onto the source, being the smaller cloud (smaller_as_source)."),
-  };
-}
-
-std::vector<Field<StageTimings>> timing_fields() {
-  using T = StageTimings;
-  return {
-      field("match", &T::match, "Nearest features."),
-      field("propose", &T::propose, "Seeds and their poses, or quadruples and their poses."),
-      field("rank", &T::rank,
-            "Coarse scores and distinct modes, or inlier counts of all hypotheses."),
-      field("refine", &T::refine, "ICP."),
-      field("verify", &T::verify, "Evidence and degeneracy search, or the winner's support."),
-  };
-}
-
-std::vector<Field<PrepareStatistics>> prepare_fields() {
-  using P = PrepareStatistics;
-  return {
-      field("input_points", &P::input_points, "Points that came in."),
-      field("invalid_points", &P::invalid_points, "Of these, dropped for NaN or infinity."),
-      field("points", &P::points, "After downsampling."),
-      field("points_without_normal", &P::points_without_normal, "Fewer than 3 neighbours."),
-      field("points_without_feature", &P::points_without_feature, "Never matched."),
-      field("viewpoint", &P::viewpoint,
-            "What is known of the place that the cloud was seen from: 'said', 'origin', 'normals', "
-            "'none' or 'model'."),
-      field("repaired_normals", &P::repaired_normals,
-            "Prepared points whose input normal contradicted the normals around it."),
-      field("downsample", &P::downsample, "Milliseconds of downsampling."),
-      field("normals", &P::normals, "Milliseconds of the normals."),
-      field("features", &P::features, "Milliseconds of the features."),
-      field("grid", &P::grid, "Milliseconds of the search grid."),
-      field("depth_maps", &P::depth_maps, "Milliseconds of the depth maps."),
-      field("surface_sides", &P::surface_sides, "Milliseconds of the surfaces' sides."),
-  };
-}
-
-std::vector<Field<PoseEvidence>> evidence_fields() {
-  using E = PoseEvidence;
-  return {
-      field("match_inliers", &E::match_inliers,
-            "Matches that the pose brings within consensus_distance."),
-      field("match_support", &E::match_support,
-            "The same as a normal-weighted share of all matches, the smaller one of both sides."),
-      field("source_overlap", &E::source_overlap,
-            "Share of the source's points with a point of the target within "
-            "max_correspondence_distance and a similar normal."),
-      field("target_overlap", &E::target_overlap, "The other way round."),
-      field("source_overlap_any_normal", &E::source_overlap_any_normal,
-            "The same whatever the normals."),
-      field("target_overlap_any_normal", &E::target_overlap_any_normal, "The other way round."),
-      field("source_residual", &E::source_residual,
-            "RMS distance of the overlapping points over max_correspondence_distance; 1 where "
-            "there are none."),
-      field("target_residual", &E::target_residual, "The other way round."),
-      field("source_normal_weighted_overlap", &E::source_normal_weighted_overlap,
-            "Overlap in which a point weighs less the more normals of its cloud share its "
-            "direction."),
-      field("target_normal_weighted_overlap", &E::target_normal_weighted_overlap,
-            "The other way round."),
-      field("source_observed", &E::source_observed,
-            "Share of the source's points in directions that viewpoints of the target observed, "
-            "weighted by incidence; 0: no viewpoint known."),
-      field("target_observed", &E::target_observed, "The other way round."),
-      field("source_free_space_violation", &E::source_free_space_violation,
-            "Of these, with the same weights, the share in observed free space."),
-      field("target_free_space_violation", &E::target_free_space_violation, "The other way round."),
-      field("source_occluded", &E::source_occluded,
-            "Of the points in observed directions, the share behind the observed surface."),
-      field("target_occluded", &E::target_occluded, "The other way round."),
-      field("source_near_surface", &E::source_near_surface,
-            "Share of the source's points within surface_side_distance of the target's surfaces; "
-            "0: not known."),
-      field("target_near_surface", &E::target_near_surface, "The other way round."),
-      field("source_front_violation_near", &E::source_front_violation_near,
-            "Share of the source's points that are in front of a surface of the target without "
-            "touching any, within half of surface_side_distance."),
-      field("target_front_violation_near", &E::target_front_violation_near, "The other way round."),
-      field("source_front_violation_far", &E::source_front_violation_far,
-            "The same, beyond half of surface_side_distance."),
-      field("target_front_violation_far", &E::target_front_violation_far, "The other way round."),
-      field("source_behind_surface", &E::source_behind_surface,
-            "Share of the source's points behind a surface of the target and in front of none."),
-      field("target_behind_surface", &E::target_behind_surface, "The other way round."),
-      field("information_eigenvalues", &E::information_eigenvalues,
-            "6 eigenvalues, ascending, of the point-to-plane information. A small first one means "
-            "that the geometry hardly holds the pose in weakest_direction."),
-      field("weakest_direction", &E::weakest_direction,
-            "Eigenvector of the first eigenvalue, in the target's frame: rotation, then "
-            "translation."),
-  };
-}
 
 py::dict state_of(const CorrespondenceMoments& m) {
   py::dict state;
@@ -165,7 +57,7 @@ py::dict state_of(const RegistrationMode& mode) {
   state["confidence"] = mode.confidence;
   state["overlap_confidence"] = mode.overlap_confidence;
   state["equivalent"] = mode.equivalent;
-  state["evidence"] = to_dict(mode.evidence, evidence_fields());
+  state["evidence"] = to_dict(mode.evidence, fields_of<PoseEvidence>());
   state["rank_before_refinement"] = mode.rank_before_refinement;
   return state;
 }
@@ -177,7 +69,7 @@ RegistrationMode mode_from(const py::dict& state) {
   mode.confidence = state["confidence"].cast<double>();
   mode.overlap_confidence = state["overlap_confidence"].cast<double>();
   mode.equivalent = state["equivalent"].cast<bool>();
-  assign(mode.evidence, evidence_fields(), state["evidence"], "PoseEvidence");
+  assign(mode.evidence, fields_of<PoseEvidence>(), state["evidence"], "PoseEvidence");
   mode.rank_before_refinement = state["rank_before_refinement"].cast<std::uint32_t>();
   return mode;
 }
@@ -256,8 +148,8 @@ py::dict result_state(const RegistrationResult& r) {
   state["modes"] = modes;
   state["source_viewpoint"] = to_string(r.source_viewpoint);
   state["target_viewpoint"] = to_string(r.target_viewpoint);
-  state["statistics"] = to_dict(r.statistics, statistics_fields());
-  state["timings"] = to_dict(r.timings, timing_fields());
+  state["statistics"] = to_dict(r.statistics, fields_of<RegistrationStatistics>());
+  state["timings"] = to_dict(r.timings, fields_of<StageTimings>());
   return state;
 }
 
@@ -277,8 +169,9 @@ RegistrationResult result_from(const py::dict& state) {
     r.modes.push_back(mode_from(mode.cast<py::dict>()));
   r.source_viewpoint = convert<ViewpointSource>(state["source_viewpoint"]);
   r.target_viewpoint = convert<ViewpointSource>(state["target_viewpoint"]);
-  assign(r.statistics, statistics_fields(), state["statistics"], "RegistrationStatistics");
-  assign(r.timings, timing_fields(), state["timings"], "StageTimings");
+  assign(r.statistics, fields_of<RegistrationStatistics>(), state["statistics"],
+         "RegistrationStatistics");
+  assign(r.timings, fields_of<StageTimings>(), state["timings"], "StageTimings");
   return r;
 }
 
@@ -338,20 +231,13 @@ void bind_registration_result(py::module_& m) {
 }  // namespace
 
 void bind_result(py::module_& m) {
-  bind_record_class<RegistrationStatistics>(m, "RegistrationStatistics",
-                                            "What was left after each stage of one pair.",
-                                            statistics_fields());
-  bind_record_class<StageTimings>(
-      m, "StageTimings", "Wall time of each stage of one pair, milliseconds.", timing_fields())
-      .def_property_readonly("total", &StageTimings::total, "Milliseconds of all stages.");
-  bind_record_class<PrepareStatistics>(
-      m, "PrepareStatistics",
-      "Counts and wall times (milliseconds) of the preparation of one cloud.", prepare_fields())
-      .def_property_readonly("total", &PrepareStatistics::total, "Milliseconds of all stages.");
+  bind_record_class<RegistrationStatistics>(m);
+  bind_record_class<StageTimings>(m).def_property_readonly("total", &StageTimings::total,
+                                                           "Milliseconds of all stages.");
+  bind_record_class<PrepareStatistics>(m).def_property_readonly("total", &PrepareStatistics::total,
+                                                                "Milliseconds of all stages.");
   bind_moments(m);
-  bind_record_class<PoseEvidence>(m, "PoseEvidence",
-                                  "Evidence for and against a pose (method 'compatibility').",
-                                  evidence_fields());
+  bind_record_class<PoseEvidence>(m);
   bind_mode(m);
   bind_registration_result(m);
 }

@@ -51,6 +51,7 @@ class Context:
     def trim(self) -> None: ...
 
 class PrepareOptions:
+    # fields of PrepareOptions
     voxel_size: float
     normal_radius: float
     feature_radius: float
@@ -84,8 +85,10 @@ class PrepareOptions:
     def __eq__(self, other: object, /) -> bool: ...
     __hash__: None  # type: ignore[assignment]
     _fields: tuple[str, ...]
+    # end of fields
 
 class CompatibilityOptions:
+    # fields of CompatibilityOptions
     max_matches: int
     seeds: int
     max_members: int
@@ -125,8 +128,10 @@ class CompatibilityOptions:
     def __eq__(self, other: object, /) -> bool: ...
     __hash__: None  # type: ignore[assignment]
     _fields: tuple[str, ...]
+    # end of fields
 
 class QuadrupleOptions:
+    # fields of QuadrupleOptions
     count: int
     neighbors: int
     mutual: bool
@@ -163,8 +168,10 @@ class QuadrupleOptions:
     def __eq__(self, other: object, /) -> bool: ...
     __hash__: None  # type: ignore[assignment]
     _fields: tuple[str, ...]
+    # end of fields
 
 class RefineOptions:
+    # fields of RefineOptions
     max_iterations: int
     kernel_width: float
     def __init__(
@@ -183,8 +190,10 @@ class RefineOptions:
     def __eq__(self, other: object, /) -> bool: ...
     __hash__: None  # type: ignore[assignment]
     _fields: tuple[str, ...]
+    # end of fields
 
 class EvidenceOptions:
+    # fields of EvidenceOptions
     sample: int
     modes: int
     max_normal_angle: float
@@ -221,21 +230,35 @@ class EvidenceOptions:
     def __eq__(self, other: object, /) -> bool: ...
     __hash__: None  # type: ignore[assignment]
     _fields: tuple[str, ...]
+    # end of fields
 
 class ConfidenceCalibration:
+    # fields of ConfidenceCalibration
     slope: float
     offset: float
-    @property
-    def is_identity(self) -> bool: ...
-    def __init__(self, *, slope: float = ..., offset: float = ...) -> None: ...
-    def __call__(self, confidence: float) -> float: ...
-    def replace(self, *, slope: float = ..., offset: float = ...) -> ConfidenceCalibration: ...
+    def __init__(
+        self,
+        *,
+        slope: float = ...,
+        offset: float = ...,
+    ) -> None: ...
+    def replace(
+        self,
+        *,
+        slope: float = ...,
+        offset: float = ...,
+    ) -> ConfidenceCalibration: ...
     def validate(self) -> None: ...
     def __eq__(self, other: object, /) -> bool: ...
     __hash__: None  # type: ignore[assignment]
     _fields: tuple[str, ...]
+    # end of fields
+    def __call__(self, confidence: float) -> float: ...
+    @property
+    def is_identity(self) -> bool: ...
 
 class RegistrationOptions:
+    # fields of RegistrationOptions
     seed: int
     min_confidence: float
     accept_symmetry: bool
@@ -243,9 +266,9 @@ class RegistrationOptions:
     method: Literal["compatibility", "quadruples"]
     smaller_as_source: bool
     prepare: PrepareOptions
-    compatibility: CompatibilityOptions
     quadruples: QuadrupleOptions
     refine: RefineOptions
+    compatibility: CompatibilityOptions
     evidence: EvidenceOptions
     def __init__(
         self,
@@ -257,9 +280,9 @@ class RegistrationOptions:
         method: Literal["compatibility", "quadruples"] = ...,
         smaller_as_source: bool = ...,
         prepare: PrepareOptions = ...,
-        compatibility: CompatibilityOptions = ...,
         quadruples: QuadrupleOptions = ...,
         refine: RefineOptions = ...,
+        compatibility: CompatibilityOptions = ...,
         evidence: EvidenceOptions = ...,
     ) -> None: ...
     def replace(
@@ -272,22 +295,24 @@ class RegistrationOptions:
         method: Literal["compatibility", "quadruples"] = ...,
         smaller_as_source: bool = ...,
         prepare: PrepareOptions = ...,
-        compatibility: CompatibilityOptions = ...,
         quadruples: QuadrupleOptions = ...,
         refine: RefineOptions = ...,
+        compatibility: CompatibilityOptions = ...,
         evidence: EvidenceOptions = ...,
     ) -> RegistrationOptions: ...
+    def validate(self) -> None: ...
+    def __eq__(self, other: object, /) -> bool: ...
+    __hash__: None  # type: ignore[assignment]
+    _fields: tuple[str, ...]
+    # end of fields
     @staticmethod
     def from_voxel_size(voxel_size: float, quality: int = 5) -> RegistrationOptions: ...
     @staticmethod
     def loopsmart(voxel_size: float = ...) -> RegistrationOptions: ...
     def with_quality(self, quality: int) -> RegistrationOptions: ...
-    def validate(self) -> None: ...
-    def __eq__(self, other: object, /) -> bool: ...
-    __hash__: None  # type: ignore[assignment]
-    _fields: tuple[str, ...]
 
 class RegistrationStatistics:
+    # fields of RegistrationStatistics
     @property
     def source_points(self) -> int: ...
     @property
@@ -313,8 +338,10 @@ class RegistrationStatistics:
     def __eq__(self, other: object, /) -> bool: ...
     __hash__: None  # type: ignore[assignment]
     _fields: tuple[str, ...]
+    # end of fields
 
 class StageTimings:
+    # fields of StageTimings
     @property
     def match(self) -> float: ...
     @property
@@ -325,13 +352,15 @@ class StageTimings:
     def refine(self) -> float: ...
     @property
     def verify(self) -> float: ...
-    @property
-    def total(self) -> float: ...
     def __eq__(self, other: object, /) -> bool: ...
     __hash__: None  # type: ignore[assignment]
     _fields: tuple[str, ...]
+    # end of fields
+    @property
+    def total(self) -> float: ...
 
 class PrepareStatistics:
+    # fields of PrepareStatistics
     @property
     def input_points(self) -> int: ...
     @property
@@ -358,11 +387,12 @@ class PrepareStatistics:
     def depth_maps(self) -> float: ...
     @property
     def surface_sides(self) -> float: ...
-    @property
-    def total(self) -> float: ...
     def __eq__(self, other: object, /) -> bool: ...
     __hash__: None  # type: ignore[assignment]
     _fields: tuple[str, ...]
+    # end of fields
+    @property
+    def total(self) -> float: ...
 
 class CorrespondenceMoments:
     @property
@@ -375,6 +405,7 @@ class CorrespondenceMoments:
     def information_open3d(self) -> _Float64: ...
 
 class PoseEvidence:
+    # fields of PoseEvidence
     @property
     def match_inliers(self) -> int: ...
     @property
@@ -430,6 +461,7 @@ class PoseEvidence:
     def __eq__(self, other: object, /) -> bool: ...
     __hash__: None  # type: ignore[assignment]
     _fields: tuple[str, ...]
+    # end of fields
 
 class RegistrationMode:
     @property
@@ -511,6 +543,7 @@ class RegistrationResult:
     def __bool__(self) -> bool: ...
 
 class LoopConsistencyOptions:
+    # fields of LoopConsistencyOptions
     closing_angle: float
     closing_distance: float
     false_closure_rate: float
@@ -549,14 +582,16 @@ class LoopConsistencyOptions:
         neighbors: int = ...,
         iterations: int = ...,
     ) -> LoopConsistencyOptions: ...
-    @staticmethod
-    def from_voxel_size(voxel_size: float) -> LoopConsistencyOptions: ...
     def validate(self) -> None: ...
     def __eq__(self, other: object, /) -> bool: ...
     __hash__: None  # type: ignore[assignment]
     _fields: tuple[str, ...]
+    # end of fields
+    @staticmethod
+    def from_voxel_size(voxel_size: float) -> LoopConsistencyOptions: ...
 
 class PairConsistency:
+    # fields of PairConsistency
     @property
     def confidence(self) -> float: ...
     @property
@@ -568,6 +603,7 @@ class PairConsistency:
     def __eq__(self, other: object, /) -> bool: ...
     __hash__: None  # type: ignore[assignment]
     _fields: tuple[str, ...]
+    # end of fields
 
 class TimedResult:
     @property

@@ -1,59 +1,17 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include <cmath>
-
-#include "common/validate.hpp"
-#include "gpureg/loop_closure.hpp"
+#include "fields/loop_closure.hpp"
+#include "fields/scale.hpp"
+#include "fields/validate.hpp"
 
 namespace gpureg::loop_closure {
-namespace {
-
-bool positive(double v) { return std::isfinite(v) && v > 0; }
-bool not_negative(double v) { return std::isfinite(v) && v >= 0; }
-
-/// The voxel size that the defaults are for.
-constexpr double kDefaultVoxel = 0.05;
-
-}  // namespace
-
-void ProposalOptions::validate() const {
-  require(positive(coarse_voxel_size), "proposals.coarse_voxel_size", coarse_voxel_size,
-          "a finite number > 0");
-  require(min_overlap > 0 && min_overlap <= 1, "proposals.min_overlap", min_overlap, "(0, 1]");
-  require(not_negative(max_dilation), "proposals.max_dilation", max_dilation,
-          "a finite number >= 0");
-  require(not_negative(min_uncertainty), "proposals.min_uncertainty", min_uncertainty,
-          "a finite number >= 0");
-  require(not_negative(min_time), "proposals.min_time", min_time, "a finite number >= 0");
-}
-
-void AcceptanceOptions::validate() const {
-  require(min_confidence > 0 && min_confidence < 1, "acceptance.min_confidence", min_confidence,
-          "(0, 1)");
-  require(alone > 0 && alone <= 1, "acceptance.alone", alone, "(0, 1]");
-  require(confirmed >= 0 && confirmed <= 1, "acceptance.confirmed", confirmed, "[0, 1]");
-  require(together > 0 && together <= 1, "acceptance.together", together, "(0, 1]");
-  require(between_frames > 0 && between_frames <= 1, "acceptance.between_frames", between_frames,
-          "(0, 1]");
-  require(same_place_overlap >= 0 && same_place_overlap <= 1, "acceptance.same_place_overlap",
-          same_place_overlap, "[0, 1]");
-  require(drift_probability > 0 && drift_probability < 1, "acceptance.drift_probability",
-          drift_probability, "(0, 1)");
-  require(std::isfinite(max_drift_ratio) && max_drift_ratio >= 1, "acceptance.max_drift_ratio",
-          max_drift_ratio, "a finite number >= 1");
-}
+void ProposalOptions::validate() const { fields::validate(*this); }
+void AcceptanceOptions::validate() const { fields::validate(*this); }
+void Options::validate() const { fields::validate(*this); }
 
 Options Options::from_voxel_size(float voxel_size) {
   Options options;
   options.registration = RegistrationOptions::from_voxel_size(voxel_size);
-  const double scale = static_cast<double>(voxel_size) / kDefaultVoxel;
-  options.proposals.coarse_voxel_size *= scale;
-  options.proposals.max_dilation *= scale;
-  options.proposals.min_uncertainty *= scale;
-  options.noise.translation *= scale;
-  options.noise.max_translation *= scale;
-  options.information_unit *= scale;
-  options.graph.loop_noise.translation *= scale;
-  options.drift_correlation *= scale;
+  fields::scale(options, voxel_size);
   return options;
 }
 
@@ -65,20 +23,6 @@ Options Options::loopsmart() {
   options.drift_correlation = 0;
   options.modes = 1;
   return options;
-}
-
-void Options::validate() const {
-  registration.validate();
-  proposals.validate();
-  acceptance.validate();
-  noise.validate();
-  graph.validate();
-  require(positive(information_unit), "information_unit", information_unit, "a finite number > 0");
-  require(not_negative(drift_correlation), "drift_correlation", drift_correlation,
-          "a finite number >= 0");
-  require(not_negative(gravity_sigma), "gravity_sigma", gravity_sigma, "a finite number >= 0");
-  require(modes >= 1 && modes <= 16, "modes", modes, "1 to 16");
-  require(chunk >= 1, "chunk", chunk, "1 or more");
 }
 
 const char* to_string(LoopState state) {

@@ -4,7 +4,9 @@
 #include <cmath>
 #include <string>
 
-#include "common/validate.hpp"
+#include "fields/loop_consistency.hpp"
+#include "fields/scale.hpp"
+#include "fields/validate.hpp"
 #include "loop_consistency/consistency_graph.hpp"
 
 namespace gpureg {
@@ -44,37 +46,16 @@ void check(const std::vector<Pair>& pairs, const std::vector<RegistrationResult>
   }
 }
 
-void require_between(double value, double low, double high, const char* name,
-                     const char* expected) {
-  require(std::isfinite(value) && value > low && value < high, name, value, expected);
-}
-
 }  // namespace
 
 LoopConsistencyOptions LoopConsistencyOptions::from_voxel_size(float voxel_size) {
   require(positive(voxel_size), "voxel_size", voxel_size, "a length > 0");
   LoopConsistencyOptions options;
-  options.closing_distance = 3.0f * voxel_size;
+  fields::scale(options, voxel_size);
   return options;
 }
 
-void LoopConsistencyOptions::validate() const {
-  require(std::isfinite(closing_angle) && closing_angle > 0 && closing_angle <= 180,
-          "closing_angle", closing_angle, "degrees in (0, 180]");
-  require(positive(closing_distance), "closing_distance", closing_distance, "a length > 0");
-  require_between(false_closure_rate, 0, 1, "false_closure_rate", "a probability in (0, 1)");
-  require_between(missed_closure_rate, 0, 1, "missed_closure_rate", "a probability in (0, 1)");
-  require(std::isfinite(max_odds_factor) && max_odds_factor >= 1, "max_odds_factor",
-          max_odds_factor, "a factor of at least 1");
-  require(std::isfinite(min_confidence) && min_confidence >= 0 && min_confidence <= 1,
-          "min_confidence", min_confidence, "a probability in [0, 1]");
-  require(std::isfinite(min_alternative_confidence) && min_alternative_confidence >= 0 &&
-              min_alternative_confidence <= 1,
-          "min_alternative_confidence", min_alternative_confidence, "a probability in [0, 1]");
-  require(modes >= 1 && modes <= 16, "modes", modes, "1 to 16");
-  require(neighbors >= 2 && neighbors <= 1024, "neighbors", neighbors, "2 to 1024");
-  require(iterations >= 1 && iterations <= 100, "iterations", iterations, "1 to 100");
-}
+void LoopConsistencyOptions::validate() const { fields::validate(*this); }
 
 std::vector<PairConsistency> loop_consistency(const std::vector<Pair>& pairs,
                                               const std::vector<RegistrationResult>& results,

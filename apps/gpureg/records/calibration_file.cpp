@@ -5,7 +5,7 @@
 
 #include "gpureg/error.hpp"
 #include "records/json_file.hpp"
-#include "records/options_json.hpp"
+#include "records/fields_json.hpp"
 
 namespace gpureg::cli {
 namespace {

@@ -3,7 +3,7 @@
 
 #include <sstream>
 
-#include "records/options_json.hpp"
+#include "records/fields_json.hpp"
 #include "records/result_json.hpp"
 #include "text.hpp"
 #include "verbs/pair_run.hpp"

@@ -2,7 +2,6 @@
 #include "records/pair_record.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 
 #include "gpureg/error.hpp"
@@ -55,18 +54,6 @@ Eigen::Matrix<double, Size, Size> square(const Json& json, const char* name) {
   return matrix;
 }
 
-/// Zeros where the member is absent: results of older versions lack some of the evidence.
-std::array<double, 6> six(const Json& json, const char* name) {
-  const auto found = json.find(name);
-  if (found == json.end()) return {};
-  const Json& value = *found;
-  if (!value.is_array() || value.size() != 6)
-    throw InvalidArgument(std::string("\"") + name + "\" is not an array of 6 numbers");
-  std::array<double, 6> out;
-  for (std::size_t k = 0; k < 6; ++k) out[k] = number(value[k], name);
-  return out;
-}
-
 }  // namespace
 
 PairRecord PairRecord::from_result(int i, int j, const RegistrationResult& result) {
@@ -110,10 +97,8 @@ std::vector<RegistrationMode> modes_from_json(const Json& pair) {
     mode.confidence = number(member(json, "confidence"), "confidence");
     mode.equivalent = json.value("equivalent", false);
     if (const auto evidence = json.find("evidence");
-        evidence != json.end() && evidence->is_object()) {
-      mode.evidence.information_eigenvalues = six(*evidence, "information_eigenvalues");
-      mode.evidence.weakest_direction = six(*evidence, "weakest_direction");
-    }
+        evidence != json.end() && evidence->is_object())
+      read_json(*evidence, mode.evidence);
     modes.push_back(mode);
   }
   return modes;

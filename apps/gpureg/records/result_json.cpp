@@ -16,62 +16,6 @@ Json to_json(const Eigen::Ref<const Eigen::MatrixXd>& matrix) {
   return numbers;
 }
 
-Json to_json(const RegistrationStatistics& s) {
-  return {{"source_points", s.source_points},
-          {"target_points", s.target_points},
-          {"correspondences", s.correspondences},
-          {"hypotheses", s.hypotheses},
-          {"survivors", s.survivors},
-          {"scored", s.scored},
-          {"points_scored", s.points_scored},
-          {"consensus", s.consensus},
-          {"inliers", s.inliers},
-          {"refine_iterations", s.refine_iterations},
-          {"swapped", s.swapped}};
-}
-
-Json to_json(const StageTimings& t) {
-  return {{"match", t.match},   {"propose", t.propose}, {"rank", t.rank},
-          {"refine", t.refine}, {"verify", t.verify},   {"total", t.total()}};
-}
-
-Json to_json(const PrepareStatistics& p) {
-  return {{"input_points", p.input_points},
-          {"invalid_points", p.invalid_points},
-          {"points", p.points},
-          {"points_without_normal", p.points_without_normal},
-          {"points_without_feature", p.points_without_feature},
-          {"viewpoint", to_string(p.viewpoint)},
-          {"repaired_normals", p.repaired_normals},
-          {"ms",
-           {{"downsample", p.downsample},
-            {"normals", p.normals},
-            {"features", p.features},
-            {"grid", p.grid},
-            {"depth_maps", p.depth_maps},
-            {"surface_sides", p.surface_sides},
-            {"total", p.total()}}}};
-}
-
-Json to_json(const PoseEvidence& e) {
-  return {{"match_inliers", e.match_inliers},
-          {"match_support", e.match_support},
-          {"overlap", {e.source_overlap, e.target_overlap}},
-          {"overlap_any_normal", {e.source_overlap_any_normal, e.target_overlap_any_normal}},
-          {"residual", {e.source_residual, e.target_residual}},
-          {"normal_weighted_overlap",
-           {e.source_normal_weighted_overlap, e.target_normal_weighted_overlap}},
-          {"observed", {e.source_observed, e.target_observed}},
-          {"free_space_violation", {e.source_free_space_violation, e.target_free_space_violation}},
-          {"occluded", {e.source_occluded, e.target_occluded}},
-          {"near_surface", {e.source_near_surface, e.target_near_surface}},
-          {"front_violation_near", {e.source_front_violation_near, e.target_front_violation_near}},
-          {"front_violation_far", {e.source_front_violation_far, e.target_front_violation_far}},
-          {"behind_surface", {e.source_behind_surface, e.target_behind_surface}},
-          {"information_eigenvalues", e.information_eigenvalues},
-          {"weakest_direction", e.weakest_direction}};
-}
-
 Json to_json(const RegistrationMode& mode, const char* pose_name) {
   return {{pose_name, to_json(mode.target_from_source.matrix())},
           {"confidence", mode.confidence},

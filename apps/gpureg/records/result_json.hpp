@@ -6,16 +6,12 @@
 
 #include "gpureg/context.hpp"
 #include "gpureg/result.hpp"
-#include "records/json.hpp"
+#include "records/fields_json.hpp"
 
 namespace gpureg::cli {
 
 /// Numbers row by row.
 Json to_json(const Eigen::Ref<const Eigen::MatrixXd>& matrix);
-
-Json to_json(const RegistrationStatistics& statistics);
-Json to_json(const StageTimings& timings);       ///< milliseconds per stage, and their total
-Json to_json(const PrepareStatistics& prepare);  ///< counts, and "ms" per stage
 
 /// status, reason, score, inlier_ratio, inlier_rmse, the pose under the given name (null where
 /// there is none), statistics, ms.

@@ -14,7 +14,7 @@
 #include "gpureg/io.hpp"
 #include "records/journal.hpp"
 #include "records/json_file.hpp"
-#include "records/options_json.hpp"
+#include "records/fields_json.hpp"
 #include "records/result_json.hpp"
 #include "records/scene.hpp"
 #include "text.hpp"

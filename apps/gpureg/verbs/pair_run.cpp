@@ -7,7 +7,7 @@
 
 #include "gpureg/io.hpp"
 #include "records/cloud_file.hpp"
-#include "records/options_json.hpp"
+#include "records/fields_json.hpp"
 #include "records/result_json.hpp"
 #include "text.hpp"
 #include "verbs/interrupt.hpp"

@@ -18,7 +18,7 @@
 #include "records/cloud_file.hpp"
 #include "records/initial_poses.hpp"
 #include "records/json_file.hpp"
-#include "records/options_json.hpp"
+#include "records/fields_json.hpp"
 #include "records/result_json.hpp"
 #include "text.hpp"
 #include "verbs/knowledge_options.hpp"
