@@ -257,9 +257,10 @@ void CudaEngine::align(Span<const PairInput> pairs, const RegistrationOptions& o
   for_runs_within_budget(pairs, [&](std::size_t begin, std::size_t end) {
     const Span<const PairInput> run{pairs.data + begin, end - begin};
     const Span<PairOutcome> out{outcomes.data + begin, run.size};
-    if (run.size < kPairsOfLanes) return align_on(held.exec(), run, options, out);
+    if (run.size < kPairsOfLanes) return align_on(held, run, options, out);
     held.exec().begin();
     const ResidentPairs resident = bring(held.exec(), run);
+    const WaitOnFailure wait(held);
     on_lanes(held, run.size, [&](Exec& exec, std::size_t from, std::size_t to) {
       align_views(exec, {run.data + from, to - from}, {resident.views.data() + from, to - from},
                   options, {out.data + from, to - from});
@@ -268,18 +269,19 @@ void CudaEngine::align(Span<const PairInput> pairs, const RegistrationOptions& o
   });
 }
 
-void CudaEngine::align_on(Exec& exec, Span<const PairInput> pairs,
+void CudaEngine::align_on(const Lanes::Held& held, Span<const PairInput> pairs,
                           const RegistrationOptions& options, Span<PairOutcome> outcomes) {
-  exec.begin();
-  const ResidentPairs resident = bring(exec, pairs);
-  align_views(exec, pairs, span_of(resident.views), options, outcomes);
+  held.exec().begin();
+  const ResidentPairs resident = bring(held.exec(), pairs);
+  const WaitOnFailure wait(held);
+  align_views(held.exec(), pairs, span_of(resident.views), options, outcomes);
 }
 
 void CudaEngine::align_on_lane(std::size_t lane, Span<const PairInput> pairs,
                                const RegistrationOptions& options, Span<PairOutcome> outcomes) {
   const Lanes::Held held = lanes_.one(lane);
   const DeviceScope scope(device());
-  align_on(held.exec(), pairs, options, outcomes);
+  align_on(held, pairs, options, outcomes);
   share_time(outcomes);
 }
 
@@ -291,6 +293,7 @@ void CudaEngine::verify(Span<const PairInput> pairs, const std::vector<PosesOfPa
   for_runs_within_budget(pairs, [&](std::size_t begin, std::size_t end) {
     held.exec().begin();
     const ResidentPairs resident = bring(held.exec(), {pairs.data + begin, end - begin});
+    const WaitOnFailure wait(held);
     const std::vector<PosesOfPair> part(poses.begin() + static_cast<std::ptrdiff_t>(begin),
                                         poses.begin() + static_cast<std::ptrdiff_t>(end));
     pipeline::verify(held.exec(), span_of(resident.views), part, options, refine,

@@ -58,8 +58,8 @@ class CudaEngine final : public DeviceEngine {
   /// together; of one pair at least.
   std::size_t end_within_budget(Span<const PairInput> pairs, std::size_t begin) const;
   ResidentPairs bring(Exec& exec, Span<const PairInput> pairs);
-  void align_on(Exec& exec, Span<const PairInput> pairs, const RegistrationOptions& options,
-                Span<PairOutcome> outcomes);
+  void align_on(const Lanes::Held& held, Span<const PairInput> pairs,
+                const RegistrationOptions& options, Span<PairOutcome> outcomes);
   /// Calls work(begin, end) for runs of pairs whose clouds are within the memory budget together.
   template <typename Work>
   void for_runs_within_budget(Span<const PairInput> pairs, const Work& work);

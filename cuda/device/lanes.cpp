@@ -37,6 +37,15 @@ Lanes::Held Lanes::take(std::size_t first, std::size_t count) {
   return {*this, first, count};
 }
 
+Lanes::Held::~Held() {
+  if (std::uncaught_exceptions() > exceptions_) wait();
+  lanes_.release(first_, count_);
+}
+
+void Lanes::Held::wait() const noexcept {
+  for (std::size_t k = 0; k < count_; ++k) cudaStreamSynchronize(exec(k).stream());
+}
+
 void Lanes::release(std::size_t first, std::size_t count) {
   {
     const std::lock_guard<std::mutex> lock(mutex_);
@@ -47,6 +56,8 @@ void Lanes::release(std::size_t first, std::size_t count) {
 
 void Lanes::trim() {
   const Held held = all();
+  // A lane may read clouds in the memory of another one.
+  for (std::size_t k = 0; k < kLanes; ++k) held.exec(k).synchronize();
   for (std::size_t k = 0; k < kLanes; ++k) held.exec(k).trim();
   uploader_->clear();
 }

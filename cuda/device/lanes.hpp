@@ -4,6 +4,7 @@
 #include <array>
 #include <condition_variable>
 #include <cstddef>
+#include <exception>
 #include <memory>
 #include <mutex>
 
@@ -23,19 +24,24 @@ class Lanes {
 
   explicit Lanes(int device);
 
-  /// Lanes in use by a call until the end of the scope.
+  /// Lanes in use by a call until the end of the scope. A call that fails leaves them when their
+  /// work is done: it may read clouds in the memory of other lanes, which their owners may free
+  /// from then on.
   class Held {
    public:
     Held(Lanes& lanes, std::size_t first, std::size_t count)
         : lanes_(lanes), first_(first), count_(count) {}
-    ~Held() { lanes_.release(first_, count_); }
+    ~Held();
     Held(const Held&) = delete;
     Held& operator=(const Held&) = delete;
     Exec& exec(std::size_t k = 0) const { return *lanes_.execs_[first_ + k]; }
+    /// Waits for the work of these lanes, without a report of its errors.
+    void wait() const noexcept;
 
    private:
     Lanes& lanes_;
     std::size_t first_, count_;
+    int exceptions_ = std::uncaught_exceptions();
   };
   /// The first free lane that no other call waits for; waits where there is none.
   Held any();
@@ -58,6 +64,22 @@ class Lanes {
   std::condition_variable freed_;
   std::array<bool, kLanes> busy_{};
   std::array<std::size_t, kLanes> wanted_{};  ///< calls that wait for this lane in particular
+};
+
+/// Waits for the work of lanes where an exception leaves the scope, before what was made earlier in
+/// the scope is destroyed.
+class WaitOnFailure {
+ public:
+  explicit WaitOnFailure(const Lanes::Held& held) : held_(held) {}
+  ~WaitOnFailure() {
+    if (std::uncaught_exceptions() > exceptions_) held_.wait();
+  }
+  WaitOnFailure(const WaitOnFailure&) = delete;
+  WaitOnFailure& operator=(const WaitOnFailure&) = delete;
+
+ private:
+  const Lanes::Held& held_;
+  int exceptions_ = std::uncaught_exceptions();
 };
 
 }  // namespace gpureg::cuda

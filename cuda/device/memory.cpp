@@ -84,21 +84,30 @@ DeviceMemory::~DeviceMemory() {
   destroy();
 }
 
+cudaError_t DeviceMemory::try_to_allocate(void** pointer, std::size_t bytes, cudaStream_t stream) {
+  if (allocations_left_ != kNever && allocations_left_-- <= 0) return cudaErrorMemoryAllocation;
+  return cudaMallocFromPoolAsync(pointer, bytes, stream == stream_ ? pool_ : lent_pool_, stream);
+}
+
+void DeviceMemory::trim_all() {
+  std::vector<std::shared_ptr<DeviceMemory>> others;
+  for (const auto& other : others_)
+    if (auto memory = other.lock()) others.push_back(std::move(memory));
+  // All before any: each lane reads clouds in the memory of others.
+  cudaStreamSynchronize(stream_);
+  for (const auto& memory : others) cudaStreamSynchronize(memory->stream_);
+  trim();
+  for (const auto& memory : others) memory->trim();
+}
+
 void* DeviceMemory::allocate(std::size_t bytes, cudaStream_t stream) {
   void* pointer = nullptr;
-  const cudaMemPool_t pool = stream == stream_ ? pool_ : lent_pool_;
-  cudaError_t error = cudaMallocFromPoolAsync(&pointer, bytes, pool, stream);
+  cudaError_t error = try_to_allocate(&pointer, bytes, stream);
   if (error == cudaErrorMemoryAllocation) {
     // The pool may hold only small pieces: release them and try once more.
     cudaGetLastError();
-    cudaStreamSynchronize(stream_);
-    trim();
-    for (const auto& other : others_)
-      if (const auto memory = other.lock()) {
-        cudaStreamSynchronize(memory->stream_);
-        memory->trim();
-      }
-    error = cudaMallocFromPoolAsync(&pointer, bytes, pool, stream);
+    trim_all();
+    error = try_to_allocate(&pointer, bytes, stream);
   }
   if (error == cudaSuccess) {
     in_use_ += bytes;

@@ -5,6 +5,8 @@
 
 #include <atomic>
 #include <cstddef>
+#include <cstdint>
+#include <limits>
 #include <memory>
 #include <mutex>
 #include <utility>
@@ -53,10 +55,16 @@ class DeviceMemory {
   void take_from(const std::shared_ptr<DeviceMemory>& other) { others_.push_back(other); }
   std::size_t bytes_in_use() const { return in_use_; }
   std::size_t bytes_reserved() const;  ///< allocated from the driver: the peak of the use
+  static constexpr std::int64_t kNever = std::numeric_limits<std::int64_t>::max();
+  /// For tests: all allocations of the process after the next `count` ones fail as without memory.
+  static void fail_after(std::int64_t count) { allocations_left_ = count; }
 
  private:
+  cudaError_t try_to_allocate(void** pointer, std::size_t bytes, cudaStream_t stream);
+  void trim_all();  ///< of all lanes, after their work
   void destroy() noexcept;
 
+  inline static std::atomic<std::int64_t> allocations_left_{kNever};
   int device_;
   cudaStream_t stream_ = nullptr;
   cudaMemPool_t pool_ = nullptr;
