@@ -78,5 +78,30 @@ TEST_F(Determinism, AnotherSeedDrawsOtherHypotheses) {
   EXPECT_NE(run(Context::cpu(2), {pairs[0]}), first);
 }
 
+// What the comparisons of this and other tests rest on.
+TEST(ResultBytes, EveryFieldButTheTimings) {
+  RegistrationResult plain;
+  plain.modes.emplace_back();
+  const auto differs = [&](auto&& change) {
+    RegistrationResult other = plain;
+    change(other);
+    return bytes(other) != bytes(plain);
+  };
+  using Result = RegistrationResult;
+  EXPECT_FALSE(differs([](Result& r) { r.timings.match = 1; }));
+  EXPECT_TRUE(differs([](Result& r) { r.has_candidate = true; }));
+  EXPECT_TRUE(differs([](Result& r) { r.inlier_ratio = 1; }));
+  EXPECT_TRUE(differs([](Result& r) { r.source_viewpoint = ViewpointSource::none; }));
+  EXPECT_TRUE(differs([](Result& r) { r.target_viewpoint = ViewpointSource::none; }));
+  EXPECT_TRUE(differs([](Result& r) { r.statistics.swapped = true; }));
+  EXPECT_TRUE(differs([](Result& r) { r.source_moments.count = 1; }));
+  EXPECT_TRUE(differs([](Result& r) { r.target_moments.outer(1, 2) = 1; }));
+  EXPECT_TRUE(differs([](Result& r) { r.modes[0].overlap_confidence = 1; }));
+  EXPECT_TRUE(differs([](Result& r) { r.modes[0].rank_before_refinement = 1; }));
+  EXPECT_TRUE(differs([](Result& r) { r.modes[0].evidence.source_residual = 0; }));
+  EXPECT_TRUE(differs([](Result& r) { r.modes[0].evidence.target_overlap_any_normal = 1; }));
+  EXPECT_TRUE(differs([](Result& r) { r.modes[0].evidence.weakest_direction[5] = 1; }));
+}
+
 }  // namespace
 }  // namespace gpureg

@@ -88,7 +88,7 @@ TEST(Observations, EvidenceInGroupsIsThatOfEachPoint) {
       verify_point(t, s, inverse(there), test, s.visibility.count, i, reverse);
     for (const auto& [expected, found] :
          {std::pair(forth, outcome.source), std::pair(reverse, outcome.target)}) {
-      test::Bytes each, groups;
+      test::ByteWriter each, groups;
       add(each, expected);
       add(groups, found);
       EXPECT_EQ(each.all, groups.all);

@@ -4,36 +4,21 @@
 #include <vector>
 
 #include "pipeline/types.hpp"
+#include "support/result_bytes.hpp"
 
 namespace gpureg::test {
 
-/// Values one after the other, without the padding between them.
-class Bytes {
- public:
-  template <typename... T>
-  Bytes& add(const T&... values) {
-    (append(&values, sizeof values), ...);
-    return *this;
-  }
-  std::vector<char> all;
-
- private:
-  void append(const void* data, std::size_t size) {
-    all.insert(all.end(), static_cast<const char*>(data), static_cast<const char*>(data) + size);
-  }
-};
-
-inline void add(Bytes& out, const SideEvidence& e) {
+inline void add(ByteWriter& out, const SideEvidence& e) {
   out.add(e.normal_weighted, e.residual, e.tested, e.inliers, e.hits, e.observed, e.violating,
           e.occluded, e.incidence_observed, e.incidence_violating, e.near_surface,
           e.front_violation_near, e.front_violation_far, e.behind_surface);
 }
-inline void add(Bytes& out, const MatchEvidence& e) {
+inline void add(ByteWriter& out, const MatchEvidence& e) {
   out.add(e.source_weight, e.target_weight, e.inliers);
 }
 
 inline std::vector<char> bytes(const ModeOutcome& m) {
-  Bytes out;
+  ByteWriter out;
   out.add(m.pose, m.hypothesis, m.iterations, m.information, m.source_moments, m.target_moments);
   add(out, m.matches);
   add(out, m.source);
@@ -43,7 +28,7 @@ inline std::vector<char> bytes(const ModeOutcome& m) {
 
 /// Everything of a pair of RegistrationMethod::compatibility but the timings.
 inline std::vector<char> bytes(const PairOutcome& o) {
-  Bytes out;
+  ByteWriter out;
   const RegistrationStatistics& s = o.statistics;
   out.add(o.match_weight_source, o.match_weight_target, s.source_points, s.target_points,
           s.correspondences, s.hypotheses, s.survivors, s.scored);

@@ -1,52 +1,67 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <cstddef>
 #include <vector>
 
 #include "gpureg/result.hpp"
 
 namespace gpureg::test {
 
+/// Values one after the other, without the padding between them.
+class ByteWriter {
+ public:
+  template <typename... T>
+  void add(const T&... values) {
+    (append(&values, sizeof values), ...);
+  }
+  template <typename Matrix>
+  void add_matrix(const Matrix& m) {
+    append(m.data(), sizeof *m.data() * static_cast<std::size_t>(m.size()));
+  }
+  void append(const void* data, std::size_t size) {
+    all.insert(all.end(), static_cast<const char*>(data), static_cast<const char*>(data) + size);
+  }
+  std::vector<char> all;
+};
+
+inline void add(ByteWriter& out, const PoseEvidence& e) {
+  // Everything behind the count is a double: a new field is compared, too.
+  constexpr std::size_t kFirst = offsetof(PoseEvidence, match_support);
+  out.add(e.match_inliers);
+  out.append(reinterpret_cast<const char*>(&e) + kFirst, sizeof e - kFirst);
+}
+
+inline void add(ByteWriter& out, const RegistrationStatistics& s) {
+  out.add(s.source_points, s.target_points, s.correspondences, s.hypotheses, s.survivors, s.scored,
+          s.points_scored, s.consensus, s.inliers, s.refine_iterations, s.swapped);
+}
+
+inline void add(ByteWriter& out, const CorrespondenceMoments& m) {
+  out.add(m.count);
+  out.add_matrix(m.sum);
+  out.add_matrix(m.outer);
+  out.add_matrix(m.information_redwood());
+  out.add_matrix(m.information_open3d());
+}
+
+inline void add(ByteWriter& out, const RegistrationMode& mode) {
+  out.add_matrix(mode.target_from_source.matrix());
+  out.add(mode.confidence, mode.overlap_confidence, mode.rank_before_refinement, mode.equivalent);
+  add(out, mode.evidence);
+}
+
 /// Everything but the timings, as bytes.
 inline std::vector<char> bytes(const RegistrationResult& r) {
-  std::vector<char> out;
-  const auto add = [&](const void* data, std::size_t size) {
-    out.insert(out.end(), static_cast<const char*>(data), static_cast<const char*>(data) + size);
-  };
-  add(r.target_from_source.matrix().data(), 16 * sizeof(double));
-  add(&r.status, sizeof r.status);
-  add(&r.reason, sizeof r.reason);
-  add(&r.score, sizeof r.score);
-  add(&r.inlier_rmse, sizeof r.inlier_rmse);
-  const RegistrationStatistics& s = r.statistics;
-  for (const std::uint64_t v :
-       {std::uint64_t(s.source_points), std::uint64_t(s.target_points),
-        std::uint64_t(s.correspondences), s.hypotheses, s.survivors, s.scored,
-        std::uint64_t(s.points_scored), std::uint64_t(s.consensus), std::uint64_t(s.inliers),
-        std::uint64_t(s.refine_iterations)})
-    add(&v, sizeof v);
-  const auto redwood = r.source_moments.information_redwood(),
-             open3d = r.target_moments.information_open3d();
-  add(redwood.data(), 36 * sizeof(double));
-  add(open3d.data(), 36 * sizeof(double));
-  for (const RegistrationMode& mode : r.modes) {
-    add(mode.target_from_source.matrix().data(), 16 * sizeof(double));
-    add(&mode.confidence, sizeof mode.confidence);
-    add(&mode.equivalent, sizeof mode.equivalent);
-    const PoseEvidence& e = mode.evidence;
-    add(&e.match_inliers, sizeof e.match_inliers);
-    for (const double v :
-         {e.match_support, e.source_overlap, e.target_overlap, e.source_normal_weighted_overlap,
-          e.target_normal_weighted_overlap, e.source_observed, e.target_observed,
-          e.source_free_space_violation, e.target_free_space_violation, e.source_occluded,
-          e.target_occluded, e.source_near_surface, e.target_near_surface,
-          e.source_front_violation_near, e.target_front_violation_near,
-          e.source_front_violation_far, e.target_front_violation_far, e.source_behind_surface,
-          e.target_behind_surface})
-      add(&v, sizeof v);
-    add(e.information_eigenvalues.data(), e.information_eigenvalues.size() * sizeof(double));
-  }
-  return out;
+  ByteWriter out;
+  out.add_matrix(r.target_from_source.matrix());
+  out.add(r.status, r.reason, r.has_candidate, r.score, r.inlier_ratio, r.inlier_rmse,
+          r.source_viewpoint, r.target_viewpoint);
+  add(out, r.statistics);
+  add(out, r.source_moments);
+  add(out, r.target_moments);
+  for (const RegistrationMode& mode : r.modes) add(out, mode);
+  return out.all;
 }
 
 }  // namespace gpureg::test
