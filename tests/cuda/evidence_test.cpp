@@ -14,7 +14,7 @@
 namespace gpureg {
 namespace {
 
-using test::Bytes;
+using test::ByteWriter;
 using test::host;
 using test::same_bytes;
 
@@ -26,13 +26,13 @@ struct PairOfClouds {
 
 template <typename Mode>
 std::vector<char> mode_bytes(const std::vector<Mode>& modes) {
-  Bytes out;
+  ByteWriter out;
   for (const Mode& m : modes) out.add(m.pose, m.seed, m.iterations);
   return out.all;
 }
 
 std::vector<char> evidence_bytes(const std::vector<MatchEvidence>& all) {
-  Bytes out;
+  ByteWriter out;
   for (const MatchEvidence& e : all) add(out, e);
   return out.all;
 }
