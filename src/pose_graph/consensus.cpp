@@ -20,12 +20,13 @@ constexpr int kSteps = 4;
 /// the work on dense graphs.
 constexpr int kMaxClosedCycles = 8;
 constexpr int kMaxTriangles = 64;
+/// Modes of one pair of nodes that are compared with one other mode. A pair has 16 modes at most
+/// unless edges are repeated, and repeated edges say nothing new.
+constexpr int kMaxParallel = 64;
 /// Log of the largest density ratio that one cycle may contribute: covariances are never as exact
 /// as small ones pretend.
 constexpr double kMostEvidence = 5;
 constexpr int kBeliefRounds = 5;
-/// Variance, as a multiple of the smallest one, of what an information matrix leaves free.
-constexpr double kRegularisation = 1e-9;
 
 struct Candidate {
   int edge, mode;
@@ -75,6 +76,10 @@ class Cycles {
         lengths.push_back(mode.target_from_source.translation.norm());
       }
     }
+    links_by_other_ = links_;
+    const auto by_other = [](const Link& a, const Link& b) { return a.other < b.other; };
+    for (std::vector<Link>& links : links_by_other_)
+      std::stable_sort(links.begin(), links.end(), by_other);
     // A random pose lies in a ball as large as the loops are long.
     double reach = 1;
     if (!lengths.empty()) {
@@ -97,11 +102,15 @@ class Cycles {
     const std::vector<Neighbour> near_target = neighbours(edge.target);
     for (std::size_t k = 0; k < near_target.size(); ++k)
       reach[near_target[k].node] = static_cast<int>(k);
+    std::vector<int> compared;
     for (const Neighbour& at : near_source) {
       if (static_cast<int>(out.size()) >= kMaxClosedCycles) break;
+      compared.assign(near_target.size(), 0);
       for (const Link& link : links_[at.node]) {
-        if (reach[link.other] < 0 || candidates_[link.candidate].edge == mine.edge) continue;
-        const Neighbour& to = near_target[reach[link.other]];
+        const int place = reach[link.other];
+        if (place < 0 || candidates_[link.candidate].edge == mine.edge) continue;
+        if (++compared[place] > kMaxParallel) continue;
+        const Neighbour& to = near_target[place];
         if (const double e = evidence(mine, to.here_from_node, seen(link), at.here_from_node))
           out.push_back({{link.candidate, -1}, e});
       }
@@ -168,12 +177,8 @@ class Cycles {
   void triangles(const Candidate& mine, const EdgeTerm& edge, std::vector<ClosedCycle>& out) const {
     int tried = 0;
     std::size_t next = 0;
-    std::vector<Link> to_target = links_[edge.target];
-    const auto by_other = [](const Link& a, const Link& b) { return a.other < b.other; };
-    std::stable_sort(to_target.begin(), to_target.end(), by_other);
-    std::vector<Link> to_source = links_[edge.source];
-    std::stable_sort(to_source.begin(), to_source.end(), by_other);
-    for (const Link& first : to_source) {
+    const std::vector<Link>& to_target = links_by_other_[edge.target];
+    for (const Link& first : links_by_other_[edge.source]) {
       while (next < to_target.size() && to_target[next].other < first.other) ++next;
       for (std::size_t k = next; k < to_target.size() && to_target[k].other == first.other; ++k) {
         if (++tried > kMaxTriangles || static_cast<int>(out.size()) >= kMaxClosedCycles) return;
@@ -188,7 +193,8 @@ class Cycles {
   double quantile_;
   double log_volume_ = 0;
   std::vector<Candidate> candidates_;
-  std::vector<std::vector<Link>> links_;
+  std::vector<std::vector<Link>> links_;           ///< of each node
+  std::vector<std::vector<Link>> links_by_other_;  ///< the same, sorted by the other node
   std::vector<std::vector<Neighbour>> odometry_;
 };
 
@@ -219,12 +225,6 @@ std::vector<double> mode_probabilities(const std::vector<Candidate>& candidates,
 }
 
 }  // namespace
-
-Matrix6d covariance_of(const Matrix6d& information) {
-  Matrix6d regular = information;
-  regular.diagonal().array() += kRegularisation * information.diagonal().maxCoeff();
-  return regular.llt().solve(Matrix6d::Identity());
-}
 
 Consensus find_consensus(const Problem& problem, double quantile, int threads) {
   const Cycles cycles(problem, quantile);

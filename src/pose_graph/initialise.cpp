@@ -1,12 +1,14 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "pose_graph/initialise.hpp"
-#include "math/exponential.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <functional>
 #include <limits>
 #include <queue>
 #include <tuple>
+
+#include "math/exponential.hpp"
 
 namespace gpureg::pose_graph {
 namespace {
@@ -18,6 +20,28 @@ double doubt(const ModeTerm& mode) { return portable::exp(-0.5 * mode.prior); }
 /// diagonal: it exists where the matrix has no inverse.
 double variance(const ModeTerm& mode) {
   return mode.information.diagonal().cwiseMax(1e-12).cwiseInverse().sum();
+}
+
+/// Directions whose cosine is this close to -1 leave the axis of the turn open.
+constexpr double kOpposite = 1e-12;
+
+/// The smallest rotation that turns one direction into another. Eigen's
+/// Quaternion::FromTwoVectors without the singular value decomposition, whose only use there is an
+/// axis for opposite directions.
+Eigen::Matrix3d smallest_turn(const Eigen::Vector3d& from, const Eigen::Vector3d& to) {
+  const Eigen::Vector3d a = from.normalized(), b = to.normalized();
+  const double cosine = b.dot(a);
+  Eigen::Quaterniond turn;
+  if (cosine < -1 + kOpposite) {
+    const double half = 0.5 * (1 + std::max(cosine, -1.0));  // squared cosine of half the angle
+    turn.w() = std::sqrt(half);
+    turn.vec() = a.unitOrthogonal() * std::sqrt(1 - half);
+  } else {
+    const double scale = std::sqrt((1 + cosine) * 2);
+    turn.vec() = a.cross(b) * (1 / scale);
+    turn.w() = scale * 0.5;
+  }
+  return turn.toRotationMatrix();
 }
 
 }  // namespace
@@ -65,8 +89,7 @@ void align_with_gravity(const Problem& problem, int anchor, std::vector<Pose>& p
   for (const GravityTerm& term : problem.gravity)
     up += term.weight * (poses[term.node].rotation * term.up);
   if (problem.gravity.empty() || up.norm() < 1e-12) return;
-  const Eigen::Matrix3d turn =
-      Eigen::Quaterniond::FromTwoVectors(up, Eigen::Vector3d::UnitZ()).toRotationMatrix();
+  const Eigen::Matrix3d turn = smallest_turn(up, Eigen::Vector3d::UnitZ());
   const Eigen::Vector3d centre = poses[anchor].translation;
   for (Pose& pose : poses) {
     pose.rotation = turn * pose.rotation;

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <string_view>
 #include <system_error>
+#include <utility>
 
 #include "files/numbers.hpp"
 #include "files/text_file.hpp"
@@ -81,58 +82,55 @@ class Parser {
     Value value;
     const char c = peek();
     value.line = line_;
-    if (c == '{') {
-      value.kind = Kind::object;
-      object(value, depth);
-    } else if (c == '[') {
-      value.kind = Kind::array;
-      array(value, depth);
-    } else if (c == '"') {
-      value.kind = Kind::text;
-      value.text = string();
-    } else if (literal("true")) {
-      value.kind = Kind::boolean;
-      value.boolean = true;
-    } else if (literal("false")) {
-      value.kind = Kind::boolean;
-    } else if (!literal("null")) {
-      value.kind = Kind::number;
-      value.number = number();
-    }
+    if (c == '{')
+      value.content = object(depth);
+    else if (c == '[')
+      value.content = array(depth);
+    else if (c == '"')
+      value.content = std::make_unique<std::string>(string());
+    else if (literal("true"))
+      value.content = true;
+    else if (literal("false"))
+      value.content = false;
+    else if (!literal("null"))
+      value.content = number();
     return value;
   }
 
-  void object(Value& value, int depth) {
+  std::unique_ptr<Members> object(int depth) {
+    auto members = std::make_unique<Members>();
     expect('{');
     if (peek() == '}') {
       ++at_;
-      return;
+      return members;
     }
     for (;;) {
       if (peek() != '"') fail("expected the name of a member");
       std::string name = string();
-      for (const auto& member : value.members)
-        if (member.first == name) fail("the member " + files::quoted(name) + " stands twice");
+      if (members->count(name) > 0) fail("the member " + files::quoted(name) + " stands twice");
       expect(':');
-      value.members.emplace_back(std::move(name), parse(depth + 1));
+      members->emplace(std::move(name), parse(depth + 1));
       if (peek() == '}') break;
       expect(',');
     }
     ++at_;
+    return members;
   }
 
-  void array(Value& value, int depth) {
+  std::unique_ptr<Items> array(int depth) {
+    auto items = std::make_unique<Items>();
     expect('[');
     if (peek() == ']') {
       ++at_;
-      return;
+      return items;
     }
     for (;;) {
-      value.items.push_back(parse(depth + 1));
+      items->push_back(parse(depth + 1));
       if (peek() == ']') break;
       expect(',');
     }
     ++at_;
+    return items;
   }
 
   /// Escapes are kept as they stand: no name that a pose graph needs has one.
@@ -178,30 +176,51 @@ void Document::fail(std::size_t line, const std::string& reason) const {
   throw IoError(path_ + ":" + std::to_string(line) + ": " + reason);
 }
 
+const Value& Document::member(const Value& object, const char* name) const {
+  if (object.kind() != Kind::object)
+    fail(object.line, std::string("expected an object, found ") + name_of(object.kind()));
+  const Members& members = *std::get<std::unique_ptr<Members>>(object.content);
+  const auto found = members.find(name);
+  if (found == members.end())
+    fail(object.line, std::string("the object that begins here has no ") + name);
+  return found->second;
+}
+
 const Value& Document::member(const Value& object, const char* name, Kind kind) const {
-  if (object.kind != Kind::object)
-    fail(object.line, std::string("expected an object, found ") + name_of(object.kind));
-  for (const auto& [key, value] : object.members) {
-    if (key != name) continue;
-    if (value.kind != kind)
-      fail(value.line,
-           std::string(name) + " is " + name_of(value.kind) + ", expected " + name_of(kind));
-    return value;
-  }
-  fail(object.line, std::string("the object that begins here has no ") + name);
+  const Value& value = member(object, name);
+  if (value.kind() != kind)
+    fail(value.line,
+         std::string(name) + " is " + name_of(value.kind()) + ", expected " + name_of(kind));
+  return value;
+}
+
+double Document::number(const Value& object, const char* name) const {
+  return std::get<double>(member(object, name, Kind::number).content);
+}
+
+bool Document::boolean(const Value& object, const char* name) const {
+  return std::get<bool>(member(object, name, Kind::boolean).content);
+}
+
+const std::string& Document::text(const Value& object, const char* name) const {
+  return *std::get<std::unique_ptr<std::string>>(member(object, name, Kind::text).content);
+}
+
+const Items& Document::array(const Value& object, const char* name) const {
+  return *std::get<std::unique_ptr<Items>>(member(object, name, Kind::array).content);
 }
 
 std::vector<double> Document::numbers(const Value& object, const char* name,
                                       std::size_t count) const {
-  const Value& array = member(object, name, Kind::array);
-  if (array.items.size() != count)
-    fail(array.line, std::string(name) + " has " + std::to_string(array.items.size()) +
-                         " numbers, expected " + std::to_string(count));
+  const Items& items = array(object, name);
+  if (items.size() != count)
+    fail(line(object, name), std::string(name) + " has " + std::to_string(items.size()) +
+                                 " numbers, expected " + std::to_string(count));
   std::vector<double> out;
-  for (const Value& item : array.items) {
-    if (item.kind != Kind::number)
-      fail(item.line, std::string(name) + " holds " + name_of(item.kind) + ", expected a number");
-    out.push_back(item.number);
+  for (const Value& item : items) {
+    if (item.kind() != Kind::number)
+      fail(item.line, std::string(name) + " holds " + name_of(item.kind()) + ", expected a number");
+    out.push_back(std::get<double>(item.content));
   }
   return out;
 }

@@ -2,25 +2,34 @@
 #pragma once
 
 #include <cstddef>
+#include <functional>
+#include <map>
+#include <memory>
 #include <string>
-#include <utility>
+#include <variant>
 #include <vector>
 
 /// JSON (RFC 8259) as far as pose graphs need it. Every complaint is an IoError that names file and
 /// line.
 namespace gpureg::pose_graph::json {
 
+struct Value;
+using Items = std::vector<Value>;
+using Members = std::map<std::string, Value, std::less<>>;
+
+/// In the order of Value::content.
 enum class Kind { null, boolean, number, text, array, object };
 
+/// Small, since files consist of numbers. No pointer is null.
 struct Value {
-  Kind kind = Kind::null;
+  std::variant<std::monostate, bool, double, std::unique_ptr<std::string>, std::unique_ptr<Items>,
+               std::unique_ptr<Members>>
+      content;
   std::size_t line = 0;  ///< where it begins
-  bool boolean = false;
-  double number = 0;
-  std::string text;
-  std::vector<Value> items;                            ///< of an array
-  std::vector<std::pair<std::string, Value>> members;  ///< of an object
+
+  Kind kind() const { return static_cast<Kind>(content.index()); }
 };
+static_assert(sizeof(Value) <= 3 * sizeof(double));
 
 class Document {
  public:
@@ -32,13 +41,22 @@ class Document {
   /// Throws IoError "path:line: reason".
   [[noreturn]] void fail(std::size_t line, const std::string& reason) const;
 
-  /// A member that must be there and of that kind.
-  const Value& member(const Value& object, const char* name, Kind kind) const;
-
-  /// A member that is an array of exactly so many finite numbers.
+  // Members that must be there and of that kind.
+  double number(const Value& object, const char* name) const;
+  bool boolean(const Value& object, const char* name) const;
+  const std::string& text(const Value& object, const char* name) const;
+  const Items& array(const Value& object, const char* name) const;
+  /// An array of exactly so many finite numbers.
   std::vector<double> numbers(const Value& object, const char* name, std::size_t count) const;
+  /// Where a member begins; it must be there.
+  std::size_t line(const Value& object, const char* name) const {
+    return member(object, name).line;
+  }
 
  private:
+  const Value& member(const Value& object, const char* name) const;
+  const Value& member(const Value& object, const char* name, Kind kind) const;
+
   std::string path_;
   Value root_;
 };

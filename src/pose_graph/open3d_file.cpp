@@ -13,7 +13,6 @@ namespace gpureg::pose_graph {
 namespace {
 
 using json::Document;
-using json::Kind;
 using json::Value;
 
 constexpr double kRigidTolerance = 1e-3;
@@ -39,15 +38,15 @@ UnalignedIsometry3d read_pose(const Document& document, const Value& object, con
 
 std::int64_t read_id(const Document& document, const Value& edge, const char* name,
                      std::size_t nodes) {
-  const Value& value = document.member(edge, name, Kind::number);
-  if (value.number != std::floor(value.number) || value.number < 0 ||
-      value.number >= static_cast<double>(nodes)) {
+  const double id = document.number(edge, name);
+  if (id != std::floor(id) || id < 0 || id >= static_cast<double>(nodes)) {
     char text[40];
-    const auto end = std::to_chars(text, text + sizeof text, value.number).ptr;
-    document.fail(value.line, std::string(name) + " is " + std::string(text, end) +
-                                  ", but the file has " + std::to_string(nodes) + " nodes");
+    const auto end = std::to_chars(text, text + sizeof text, id).ptr;
+    document.fail(document.line(edge, name), std::string(name) + " is " + std::string(text, end) +
+                                                 ", but the file has " + std::to_string(nodes) +
+                                                 " nodes");
   }
-  return static_cast<std::int64_t>(value.number);
+  return static_cast<std::int64_t>(id);
 }
 
 Edge read_edge(const Document& document, const Value& value, std::size_t nodes) {
@@ -63,14 +62,14 @@ Edge read_edge(const Document& document, const Value& value, std::size_t nodes) 
   check_information(*edge.information, [&](const std::string& reason) {
     document.fail(value.line, "of the edge that begins here, " + reason);
   });
-  const bool uncertain = document.member(value, "uncertain", Kind::boolean).boolean;
+  const bool uncertain = document.boolean(value, "uncertain");
   edge.kind = uncertain ? EdgeKind::loop : EdgeKind::odometry;
-  const Value& confidence = document.member(value, "confidence", Kind::number);
-  if (!(confidence.number >= 0 && confidence.number <= 1))
-    document.fail(confidence.line, "confidence is " + std::to_string(confidence.number) +
-                                       ", expected a number in [0, 1]");
+  const double confidence = document.number(value, "confidence");
+  if (!(confidence >= 0 && confidence <= 1))
+    document.fail(document.line(value, "confidence"),
+                  "confidence is " + std::to_string(confidence) + ", expected a number in [0, 1]");
   // Open3D writes 1 where it has never estimated the confidence: that says nothing.
-  if (uncertain && confidence.number < 1) edge.confidence = confidence.number;
+  if (uncertain && confidence < 1) edge.confidence = confidence;
   return edge;
 }
 
@@ -93,18 +92,18 @@ constexpr const char* kVersion = "\"version_major\": 1, \"version_minor\": 0";
 Graph read_open3d(const std::string& path) {
   const Document document(path);
   const Value& root = document.root();
-  const Value& name = document.member(root, "class_name", Kind::text);
-  if (name.text != "PoseGraph")
-    document.fail(name.line,
-                  "class_name is '" + name.text.substr(0, 40) + "', expected 'PoseGraph'");
+  const std::string& name = document.text(root, "class_name");
+  if (name != "PoseGraph")
+    document.fail(document.line(root, "class_name"),
+                  "class_name is '" + name.substr(0, 40) + "', expected 'PoseGraph'");
   Graph graph;
-  for (const Value& value : document.member(root, "nodes", Kind::array).items) {
+  for (const Value& value : document.array(root, "nodes")) {
     Node node;
     node.id = static_cast<std::int64_t>(graph.nodes.size());
     node.world_from_node = read_pose(document, value, "pose");
     graph.nodes.push_back(node);
   }
-  for (const Value& value : document.member(root, "edges", Kind::array).items)
+  for (const Value& value : document.array(root, "edges"))
     graph.edges.push_back(read_edge(document, value, graph.nodes.size()));
   return graph;
 }

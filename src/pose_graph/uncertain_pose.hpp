@@ -11,14 +11,8 @@ struct UncertainPose {
   Matrix6d covariance = Matrix6d::Zero();
 
   /// First order (Barfoot and Furgale 2014).
-  UncertainPose operator*(const UncertainPose& next) const {
-    const Matrix6d a = adjoint(next.pose.inverse());
-    return {pose * next.pose, a * covariance * a.transpose() + next.covariance};
-  }
-  UncertainPose inverse() const {
-    const Matrix6d a = adjoint(pose);
-    return {pose.inverse(), a * covariance * a.transpose()};
-  }
+  UncertainPose operator*(const UncertainPose& next) const;
+  UncertainPose inverse() const;
 };
 
 /// The covariance of an information matrix; what it does not constrain gets a large variance.

@@ -8,8 +8,6 @@
 #include <cstdio>
 #include <unordered_map>
 
-#include "gpureg/pose_graph/graph.hpp"
-
 namespace gpureg::pose_graph {
 namespace {
 
@@ -18,19 +16,48 @@ constexpr double kRigidTolerance = 1e-3;
 /// Asymmetry, and negative eigenvalues, that rounding explains: share of the largest entry.
 constexpr double kSymmetryTolerance = 1e-6;
 constexpr double kEigenvalueTolerance = 1e-9;
-/// Coordinates and information beyond this overflow when squared and summed.
-constexpr double kLargest = 1e12;
-constexpr double kLargestInformation = 1e18;
 
 std::string at(const char* list, std::size_t index) {
   return std::string(list) + "[" + std::to_string(index) + "]";
 }
 
+using Places = std::unordered_map<std::int64_t, std::size_t>;
+
+void require_known(const Places& places, std::int64_t id, const std::string& name) {
+  if (places.find(id) == places.end())
+    throw InvalidArgument(name + " is " + std::to_string(id) + ", but no node has this id");
+}
+
+void validate_edge(const Edge& edge, const Places& places, const std::string& name) {
+  require_known(places, edge.source, name + ".source");
+  require_known(places, edge.target, name + ".target");
+  if (edge.source == edge.target)
+    throw InvalidArgument(name + " connects node " + std::to_string(edge.source) + " with itself");
+  if (edge.kind != EdgeKind::odometry && edge.kind != EdgeKind::loop)
+    throw InvalidArgument(name + ".kind is " + std::to_string(static_cast<int>(edge.kind)) +
+                          ", expected odometry or loop");
+  require_pose(edge.target_from_source, name + ".target_from_source");
+  if (edge.information) require_information(*edge.information, name + ".information");
+  require_confidence(edge.confidence, name + ".confidence");
+  if (edge.kind == EdgeKind::odometry && !edge.alternatives.empty())
+    throw InvalidArgument(name + " is odometry, which has no alternatives, but it has " +
+                          std::to_string(edge.alternatives.size()));
+  for (std::size_t k = 0; k < edge.alternatives.size(); ++k) {
+    const std::string mode = name + "." + at("alternatives", k);
+    require_pose(edge.alternatives[k].target_from_source, mode + ".target_from_source");
+    if (edge.alternatives[k].information)
+      require_information(*edge.alternatives[k].information, mode + ".information");
+    require_confidence(edge.alternatives[k].confidence, mode + ".confidence");
+  }
+}
+
+}  // namespace
+
 void require_pose(const UnalignedIsometry3d& pose, const std::string& name) {
   const Eigen::Matrix4d m = pose.matrix();
   for (int row = 0; row < 3; ++row)
     for (int column = 0; column < 4; ++column)
-      require(std::isfinite(m(row, column)) && std::abs(m(row, column)) <= kLargest,
+      require(std::isfinite(m(row, column)) && std::abs(m(row, column)) <= kFarthest,
               name + "(" + std::to_string(row) + ", " + std::to_string(column) + ")",
               m(row, column), "a finite number up to 1e12");
   const Eigen::Matrix3d r = m.topLeftCorner<3, 3>();
@@ -73,38 +100,6 @@ void require_confidence(double confidence, const std::string& name) {
   require(confidence >= 0 && confidence <= 1, name, confidence, "a probability in [0, 1]");
 }
 
-using Places = std::unordered_map<std::int64_t, std::size_t>;
-
-void require_known(const Places& places, std::int64_t id, const std::string& name) {
-  if (places.find(id) == places.end())
-    throw InvalidArgument(name + " is " + std::to_string(id) + ", but no node has this id");
-}
-
-void validate_edge(const Edge& edge, const Places& places, const std::string& name) {
-  require_known(places, edge.source, name + ".source");
-  require_known(places, edge.target, name + ".target");
-  if (edge.source == edge.target)
-    throw InvalidArgument(name + " connects node " + std::to_string(edge.source) + " with itself");
-  if (edge.kind != EdgeKind::odometry && edge.kind != EdgeKind::loop)
-    throw InvalidArgument(name + ".kind is " + std::to_string(static_cast<int>(edge.kind)) +
-                          ", expected odometry or loop");
-  require_pose(edge.target_from_source, name + ".target_from_source");
-  if (edge.information) require_information(*edge.information, name + ".information");
-  require_confidence(edge.confidence, name + ".confidence");
-  if (edge.kind == EdgeKind::odometry && !edge.alternatives.empty())
-    throw InvalidArgument(name + " is odometry, which has no alternatives, but it has " +
-                          std::to_string(edge.alternatives.size()));
-  for (std::size_t k = 0; k < edge.alternatives.size(); ++k) {
-    const std::string mode = name + "." + at("alternatives", k);
-    require_pose(edge.alternatives[k].target_from_source, mode + ".target_from_source");
-    if (edge.alternatives[k].information)
-      require_information(*edge.alternatives[k].information, mode + ".information");
-    require_confidence(edge.alternatives[k].confidence, mode + ".confidence");
-  }
-}
-
-}  // namespace
-
 std::string shown(double value) {
   char text[32];
   std::snprintf(text, sizeof text, "%.9g", value);
@@ -133,7 +128,7 @@ void Graph::validate() const {
   for (std::size_t k = 0; k < gravity.size(); ++k) {
     require_known(places, gravity[k].node, at("gravity", k) + ".node");
     const Eigen::Vector3d up = gravity[k].up;
-    require(up.allFinite() && up.norm() > 1e-9 && up.norm() <= kLargest,
+    require(up.allFinite() && up.norm() > 1e-9 && up.norm() <= kFarthest,
             at("gravity", k) + ".up.norm", up.norm(), "a direction: finite and not of length 0");
     require(gravity[k].sigma_degrees > 1e-6 && gravity[k].sigma_degrees <= 180,
             at("gravity", k) + ".sigma_degrees", gravity[k].sigma_degrees,

@@ -113,6 +113,27 @@ TEST(Optimize, GravityRemovesRollAndPitchDrift) {
   EXPECT_LE(tilt(result), 3 * 0.1 * 3.1416 / 180);
 }
 
+TEST(Optimize, GravityTurnsAGraphThatIsUpsideDown) {
+  // Exactly opposite directions leave the axis of the turn open.
+  Graph graph;
+  graph.nodes = {{0, UnalignedIsometry3d::Identity()}, {1, pose_of({0, 0, 0}, {1, 0, 0})}};
+  graph.edges.resize(1);
+  graph.edges[0].source = 1;
+  graph.edges[0].target_from_source = pose_of({0, 0, 0}, {1, 0, 0});
+  graph.edges[0].kind = EdgeKind::odometry;
+  for (int k = 0; k < 2; ++k) graph.gravity.push_back({k, {0, 0, -1}, 1});
+  const Result result = optimize(graph);
+  ASSERT_TRUE(result.converged()) << result.reason;
+  for (const UnalignedIsometry3d& pose : result.world_from_node) {
+    // The square root of the precision of double: half a turn from its sine.
+    EXPECT_NEAR(pose.linear()(2, 2), -1, 1e-7);
+    EXPECT_NEAR(pose.linear().determinant(), 1, 1e-12);
+  }
+  EXPECT_NEAR(
+      (result.world_from_node[1].translation() - result.world_from_node[0].translation()).norm(), 1,
+      1e-7);
+}
+
 TEST(Optimize, OdometryWithoutInformationDriftsByTheMetre) {
   // Two odometry edges of 1 m and 9 m between fixed ends that are 11 m apart: by default the sigma
   // is 2 % of the length, so the missing metre is shared 1 : 81.

@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include <ctime>
+
 #include "graphs.hpp"
 
 namespace gpureg::pose_graph {
@@ -157,6 +159,18 @@ TEST(Gnc, PlaceholdersForPosesDoNoHarm) {
   EXPECT_GT(result.initial_cost, 3 * result.final_cost);
   for (Node& node : world.graph.nodes) node.world_from_node.reset();
   EXPECT_LE(worst_difference(world, true_edges, result), 0.05);
+}
+
+TEST(Gnc, CopiesOfOneLoopTakeLinearTime) {
+  World world = rounds(20, 2, 20, 3);
+  const Edge loop = world.graph.edges.back();
+  for (int k = 1; k < 8000; ++k) world.graph.edges.push_back(loop);
+  const std::clock_t begin = std::clock();
+  const Result result = optimize(world.graph);
+  // A second of processor time. Comparing each copy with all others takes 82 s and 1 GB.
+  EXPECT_LT(std::clock() - begin, 20 * CLOCKS_PER_SEC);
+  EXPECT_TRUE(result.converged()) << result.reason;
+  EXPECT_EQ(result.accepted_loops(world.graph), 8000u);
 }
 
 TEST(Gnc, EveryEdgeHasAWeightAndASquaredError) {
