@@ -147,13 +147,12 @@ Edge edge_of(const PairGraph& pairs, std::size_t k, const pose_graph::EdgeResult
   return edge;
 }
 
-/// Optimises without the edges that are unconfirmed; reports those among the rest that turn out to
-/// be unconfirmed now.
+/// What one optimisation says.
 struct Round {
   pose_graph::Result result;
-  std::vector<Edge> edges;  ///< all
-  std::vector<std::uint32_t> parts;
-  bool dropped = false;
+  std::vector<Edge> edges;           ///< all
+  std::vector<std::uint32_t> parts;  ///< of each scan: the part that accepted edges connect it to
+  bool dropped = false;              ///< an edge turned out to be unconfirmed
 };
 
 /// A rejected edge that is alone between two parts contradicts nothing: it is not confident enough
@@ -170,12 +169,14 @@ void name_lone_edges(const std::vector<std::uint32_t>& parts, std::vector<Edge>&
       edge.reason = EdgeReason::unconfirmed;
 }
 
+/// Optimises without the edges that are unconfirmed; adds those among the rest that turn out to be
+/// unconfirmed now.
 Round optimise_round(std::size_t scans, const PairGraph& pairs,
                      const std::vector<Odometry>& odometry, const Options& options,
                      std::vector<char>& unconfirmed) {
-  pose_graph::Graph graph = pairs.graph;
+  pose_graph::Graph graph;
+  graph.nodes = pairs.graph.nodes;
   std::vector<std::size_t> kept;
-  graph.edges.clear();
   for (std::size_t k = 0; k < pairs.graph.edges.size(); ++k)
     if (!unconfirmed[k]) {
       graph.edges.push_back(pairs.graph.edges[k]);
