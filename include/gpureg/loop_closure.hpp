@@ -103,8 +103,8 @@ struct Options {
   /// Distance over which errors of odometry without covariance have one sign, metres, >= 0: biases
   /// make drift grow faster than independent errors would. 0: independent errors.
   double drift_correlation = 10;
-  /// Standard deviation of Fragment::up in the graph, degrees; 0: not used in the graph, and the
-  /// world need not be z-up.
+  /// Standard deviation of Fragment::up in the graph, degrees in (1e-6, 180]; 0: not used in the
+  /// graph, and the world need not be z-up.
   double gravity_sigma = 0;
   std::uint32_t modes = 4;  ///< poses of a pair that compete in the graph, 1..16
   std::uint32_t chunk = 4;  ///< registrations between two looks at the clock, >= 1
@@ -191,7 +191,9 @@ struct ProcessLimits {
   std::optional<double> milliseconds = std::nullopt;
   /// Number of registrations; the result does not depend on the clock.
   std::optional<std::size_t> registrations = std::nullopt;
-  /// Polled between chunks; true ends the call as a time limit does. May be empty.
+  /// Polled between chunks and while the graph is optimised; true ends the call. A verification
+  /// that it ends decides nothing (Update::status is cancelled), and the next call begins with it.
+  /// May be empty.
   std::function<bool()> should_stop = nullptr;
 };
 
@@ -218,6 +220,9 @@ using CloudProvider = std::function<PreparedCloud(FragmentId)>;
 ///
 /// Thread-safe. Every function but process(), save() and load() returns at once, also while another
 /// thread is in process(): what it adds takes effect in the next process().
+///
+/// A function that throws changes nothing. Coordinates are up to 1e9 metres; variances and
+/// information are from 1e-18 to 1e18.
 class LoopCloser {
  public:
   /// @throws InvalidArgument as Options::validate().
@@ -226,8 +231,9 @@ class LoopCloser {
   LoopCloser(LoopCloser&&) noexcept;
   LoopCloser& operator=(LoopCloser&&) noexcept;
 
-  /// @throws InvalidArgument for an id that is present, a pose that is not rigid, a time or an up
-  ///   that is not finite.
+  /// @throws InvalidArgument for an id that is present, a pose that is not rigid, a time that is
+  /// not
+  ///   finite, an up whose length is not within 1e-6 to 1e9.
   void add(const Fragment& fragment);
 
   /// Relative pose by tracking: p_target = target_from_source * p_source.
@@ -262,7 +268,8 @@ class LoopCloser {
 
   /// The result of an align() that the host ran itself: all its modes compete. The pair is not
   /// registered again.
-  /// @throws InvalidArgument for an unknown id, a fragment with itself, a pose that is not rigid.
+  /// @throws InvalidArgument for an unknown id, a fragment with itself, a pose that is not rigid, a
+  ///   confidence outside [0, 1], evidence that gives no information matrix.
   void add_result(FragmentId source, FragmentId target, const RegistrationResult& result);
 
   /// Poses after an optimisation of the host. They replace the estimates, for the proposals and as
@@ -277,7 +284,9 @@ class LoopCloser {
   void remove(FragmentId id);
 
   /// Registers what is due, verifies the loops, optimises.
-  /// @throws DeviceError where the device fails; nothing is lost, and the next call goes on.
+  /// @throws DeviceError where the device fails, std::bad_alloc. Nothing is lost: the next call
+  /// goes
+  ///   on, and ends in the same state.
   Update process(const ProcessLimits& limits = {});
   Update process(double milliseconds);  ///< process() with a time limit
 

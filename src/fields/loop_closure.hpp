@@ -70,7 +70,7 @@ struct Fields<loop_closure::Options> {
     v(&O::information_unit, {"information_unit", kPositive.in("metres"), kProportional, "Length in which the information eigenvalues count rotations: twenty voxels."});
     v(&O::graph, {"graph", "Optimisation: robust kernel, drift of odometry without covariance, noise of loops of the host."});
     v(&O::drift_correlation, {"drift_correlation", kNotNegative.in("metres"), kProportional, "Distance over which errors of odometry without covariance have one sign; 0: independent errors."});
-    v(&O::gravity_sigma, {"gravity_sigma", kNotNegative.in("degrees"), "Standard deviation of the up direction of fragments in the graph; 0: not used there."});
+    v(&O::gravity_sigma, {"gravity_sigma", Range{1e-6, 180, true, false, true, "0, or degrees in (1e-6, 180]", "degrees"}, "Standard deviation of the up direction of fragments in the graph; 0: not used there."});
     v(&O::modes, {"modes", from(1, 16), "Poses of a pair that compete in the graph."});
     v(&O::chunk, {"chunk", from(1, kInfinity), "Registrations between two looks at the clock."});
     v(&O::optimize, {"optimize", "Whether poses are optimised here, or left to the host."});

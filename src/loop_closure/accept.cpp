@@ -99,7 +99,7 @@ class Acceptance {
       const Node &first = state_.nodes.at(a), &second = state_.nodes.at(b);
       const auto second_from_first =
           to_pose(UnalignedIsometry3d(second.estimate.inverse() * first.estimate));
-      found->second = expected_overlap(first.coarse, second.coarse, second_from_first, 0, 0) >
+      found->second = expected_overlap(first.coarse(), second.coarse(), second_from_first, 0, 0) >
                       options_.same_place_overlap;
     }
     return found->second;
@@ -195,9 +195,12 @@ void compute_drift_ratios(State& state, const Paths& odometry, const Options& op
       continue;
     }
     PathTree tree = odometry.tree(target);
-    for (Mode& mode : record.modes)
+    for (Mode& mode : record.modes) {
       mode.drift_ratio =
           std::sqrt(squared_distance(uncertain(mode), tree.root_from(source)) / quantile);
+      // Covariances too different in size to be added.
+      if (!std::isfinite(mode.drift_ratio)) mode.drift_ratio = std::numeric_limits<double>::max();
+    }
   }
 }
 

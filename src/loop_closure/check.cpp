@@ -3,11 +3,11 @@
 
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
-#include <algorithm>
 #include <cmath>
 
 #include "gpureg/error.hpp"
 #include "math/exponential.hpp"
+#include "pose_graph/validate.hpp"
 
 namespace gpureg::loop_closure {
 namespace {
@@ -16,22 +16,43 @@ constexpr double kRadians = 3.14159265358979323846 / 180;
 /// Rotations of single precision are orthonormal to this.
 constexpr double kOrthonormal = 1e-4;
 constexpr double kSymmetric = 1e-6;  ///< relative to the largest element
-/// Eigenvalues of a semi-definite matrix may be negative by rounding, relative to the largest one.
-constexpr double kRounding = 1e-9;
+/// Metres. A thousand such edges in a row stay within what pose graphs take.
+constexpr double kFarthest = 1e9;
+/// Length of a direction, above what pose graphs and priors take as 0.
+constexpr double kShortest = 1e-6;
+using pose_graph::kLargestInformation;
 
 std::string fragment_name(FragmentId id) { return "fragment " + std::to_string(id); }
 
-void require_symmetric(const UnalignedMatrix6d& m, const std::string& name) {
-  if (!m.allFinite()) throw InvalidArgument(name + " has an element that is not finite");
-  const double largest = m.cwiseAbs().maxCoeff();
-  if ((m - m.transpose()).cwiseAbs().maxCoeff() > kSymmetric * largest)
-    throw InvalidArgument(name + " is not symmetric");
+[[noreturn]] void refuse(const std::string& name, double value, const char* expected) {
+  throw InvalidArgument(name + " is " + pose_graph::shown(value) + ", expected " + expected);
 }
 
-double least_eigenvalue(const UnalignedMatrix6d& m) {
-  const Matrix6d symmetric = 0.5 * (m + m.transpose());
-  return Eigen::SelfAdjointEigenSolver<Matrix6d>(symmetric, Eigen::EigenvaluesOnly)
-      .eigenvalues()[0];
+UnalignedMatrix6d information_of_covariance(const UnalignedMatrix6d& covariance) {
+  if (!covariance.allFinite())
+    throw InvalidArgument("covariance has an element that is not finite");
+  const double largest = covariance.cwiseAbs().maxCoeff();
+  if ((covariance - covariance.transpose()).cwiseAbs().maxCoeff() > kSymmetric * largest)
+    throw InvalidArgument("covariance is not symmetric");
+  if (largest > kLargestInformation)
+    refuse("the largest element of covariance", largest, "1e18 at most");
+  const Matrix6d symmetric = 0.5 * (covariance + covariance.transpose());
+  const double least =
+      Eigen::SelfAdjointEigenSolver<Matrix6d>(symmetric, Eigen::EigenvaluesOnly).eigenvalues()[0];
+  if (!(least > 0))
+    throw InvalidArgument("covariance is not positive definite: its smallest eigenvalue is " +
+                          pose_graph::shown(least));
+  if (least < 1 / kLargestInformation)
+    refuse("the smallest eigenvalue of covariance", least, "1e-18 or more");
+  const Matrix6d information = symmetric.llt().solve(Matrix6d::Identity());
+  return UnalignedMatrix6d(0.5 * (information + information.transpose()));
+}
+
+void require_information(const UnalignedMatrix6d& information, const std::string& name) {
+  pose_graph::require_information(information, name);
+  const double largest = information.cwiseAbs().maxCoeff();
+  if (largest < 1 / kLargestInformation)
+    refuse("the largest element of " + name, largest, "1e-18 or more");
 }
 
 }  // namespace
@@ -80,13 +101,17 @@ void check_fragment(const Fragment& fragment) {
   const std::string name = fragment_name(fragment.id);
   check_pose(fragment.world_from_fragment, "world_from_fragment of " + name);
   if (!std::isfinite(fragment.time)) throw InvalidArgument("time of " + name + " is not finite");
-  if (fragment.up && !(fragment.up->allFinite() && fragment.up->norm() > 0))
-    throw InvalidArgument("up of " + name + " is not a finite vector of a length > 0");
+  if (fragment.up && !(fragment.up->norm() >= kShortest && fragment.up->norm() <= kFarthest))
+    throw InvalidArgument("up of " + name + " has the length " +
+                          pose_graph::shown(fragment.up->norm()) + ", expected 1e-6 to 1e9");
 }
 
 void check_pose(const UnalignedIsometry3d& pose, const std::string& name) {
   if (!pose.matrix().allFinite())
     throw InvalidArgument(name + " has an element that is not finite");
+  const double farthest = pose.translation().cwiseAbs().maxCoeff();
+  if (farthest > kFarthest)
+    refuse("the largest coordinate of " + name, farthest, "1e9 metres at most");
   const Eigen::Matrix3d rotation = pose.linear();
   const double error =
       (rotation * rotation.transpose() - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff();
@@ -94,32 +119,33 @@ void check_pose(const UnalignedIsometry3d& pose, const std::string& name) {
     throw InvalidArgument(name + " is not rigid: its rotation is off by " + std::to_string(error));
 }
 
-void check_information(const UnalignedMatrix6d& information) {
-  require_symmetric(information, "information");
-  const double least = least_eigenvalue(information);
-  if (least < -kRounding * information.cwiseAbs().maxCoeff() || information.isZero(0))
-    throw InvalidArgument(
-        "information is not positive semi-definite, or zero: its smallest eigenvalue is " +
-        std::to_string(least));
-}
-
 void check_result(const RegistrationResult& result) {
   if (!result.has_candidate) return;
   check_pose(result.target_from_source, "result.target_from_source");
-  for (std::size_t k = 0; k < result.modes.size(); ++k)
-    check_pose(result.modes[k].target_from_source,
-               "result.modes[" + std::to_string(k) + "].target_from_source");
+  pose_graph::require_confidence(result.score, "result.score");
+  for (std::size_t k = 0; k < result.modes.size(); ++k) {
+    const std::string name = "result.modes[" + std::to_string(k) + "]";
+    check_pose(result.modes[k].target_from_source, name + ".target_from_source");
+    pose_graph::require_confidence(result.modes[k].confidence, name + ".confidence");
+  }
 }
 
-UnalignedMatrix6d information_of_covariance(const UnalignedMatrix6d& covariance) {
-  require_symmetric(covariance, "covariance");
-  const double least = least_eigenvalue(covariance);
-  if (!(least > 0))
-    throw InvalidArgument("covariance is not positive definite: its smallest eigenvalue is " +
-                          std::to_string(least));
-  const Matrix6d symmetric = 0.5 * (covariance + covariance.transpose());
-  const Matrix6d information = symmetric.llt().solve(Matrix6d::Identity());
-  return UnalignedMatrix6d(0.5 * (information + information.transpose()));
+void check_modes(const LoopRecord& record) {
+  for (const Mode& mode : record.modes)
+    require_information(mode.information, "result.modes.information");
+}
+
+Odometry odometry_edge(FragmentId source, FragmentId target,
+                       const UnalignedIsometry3d& target_from_source,
+                       const std::optional<UnalignedMatrix6d>& covariance, const Options& options) {
+  Odometry edge = modelled_odometry(source, target, target_from_source, options);
+  if (covariance) {
+    edge.information = information_of_covariance(*covariance);
+    edge.modelled = false;
+  }
+  require_information(edge.information,
+                      covariance ? "information of covariance" : "graph.drift.information");
+  return edge;
 }
 
 LoopRecord host_record(FragmentId source, FragmentId target, const UnalignedIsometry3d& pose,
@@ -141,6 +167,8 @@ LoopRecord host_record(FragmentId source, FragmentId target, const UnalignedIsom
   record.source = record.loop.source = source;
   record.target = record.loop.target = target;
   record.loop.from_host = true;
+  require_information(mode.information,
+                      information ? "information" : "graph.loop_noise.information");
   record.modes = {mode};
   choose_mode(record, 0);
   return record;
@@ -154,7 +182,8 @@ void give_clouds(State& state, const CloudProvider& clouds, const Options& optio
     if (fingerprint_of(node.cloud) != node.fingerprint)
       throw InvalidArgument("the cloud of " + fragment_name(id) +
                             " is another than when the state was saved");
-    node.coarse = coarse_of(node.cloud, options.proposals.coarse_voxel_size);
+    node.observed =
+        std::make_shared<const Coarse>(coarse_of(node.cloud, options.proposals.coarse_voxel_size));
   }
 }
 

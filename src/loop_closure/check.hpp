@@ -7,7 +7,8 @@
 
 #include "loop_closure/state.hpp"
 
-/// Checks of what the host passes. All throw InvalidArgument naming field and value.
+/// Checks of what the host passes: a pose graph takes what passes. All throw InvalidArgument naming
+/// field and value.
 namespace gpureg::loop_closure {
 
 /// The ids and odometry edges that calls may name, up to date before process() sees them.
@@ -31,9 +32,14 @@ class Registry {
 
 void check_fragment(const Fragment& fragment);
 void check_pose(const UnalignedIsometry3d& pose, const std::string& name);
-void check_information(const UnalignedMatrix6d& information);
 void check_result(const RegistrationResult& result);
-UnalignedMatrix6d information_of_covariance(const UnalignedMatrix6d& covariance);
+/// What a result, or Options::noise, has made of the information of its modes.
+void check_modes(const LoopRecord& record);
+
+/// An edge of add_odometry().
+Odometry odometry_edge(FragmentId source, FragmentId target,
+                       const UnalignedIsometry3d& target_from_source,
+                       const std::optional<UnalignedMatrix6d>& covariance, const Options& options);
 
 /// A loop of add_loop().
 LoopRecord host_record(FragmentId source, FragmentId target, const UnalignedIsometry3d& pose,

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "loop_closure/coarse.hpp"
-#include "math/exponential.hpp"
 
 #include <algorithm>
 #include <array>
@@ -8,11 +7,15 @@
 #include <cstring>
 #include <map>
 
+#include "math/exponential.hpp"
+
 namespace gpureg::loop_closure {
 namespace {
 
 /// Voxels of a fragment; pairs are compared voxel by voxel.
 constexpr std::size_t kMaxVoxels = 384;
+/// Numbers of voxels fit into 64 bits.
+constexpr double kMostVoxels = 9e18;
 
 std::vector<Eigen::Vector3f> centroids(const std::vector<Eigen::Vector3f>& points,
                                        const Eigen::Vector3d& origin, double voxel) {
@@ -25,7 +28,8 @@ std::vector<Eigen::Vector3f> centroids(const std::vector<Eigen::Vector3f>& point
     const Eigen::Vector3d p = point.cast<double>() + origin;
     std::array<std::int64_t, 3> key;
     for (int k = 0; k < 3; ++k)
-      key[static_cast<std::size_t>(k)] = static_cast<std::int64_t>(std::floor(p[k] / voxel));
+      key[static_cast<std::size_t>(k)] = static_cast<std::int64_t>(
+          std::clamp(std::floor(p[k] / voxel), -kMostVoxels, kMostVoxels));
     Sum& cell = cells[key];
     cell.sum += p;
     ++cell.count;

@@ -17,7 +17,8 @@ void add_fragment(State& state, const Fragment& fragment, const Options& options
   node.order = state.arrivals++;
   if (node.has_cloud) {
     node.fingerprint = fingerprint_of(node.cloud);
-    node.coarse = coarse_of(node.cloud, options.proposals.coarse_voxel_size);
+    node.observed =
+        std::make_shared<const Coarse>(coarse_of(node.cloud, options.proposals.coarse_voxel_size));
   }
   state.nodes.emplace(fragment.id, std::move(node));
   state.poses_changed = true;
@@ -32,9 +33,9 @@ void add_odometry(State& state, const Odometry& odometry) {
     for (LoopRecord& record : state.loops) record.gated = false;
     state.relations.clear();
   } else if (target.placed || (!source.placed && target.order < source.order)) {
-    source.estimate = target.estimate * odometry.target_from_source;
+    source.estimate = rigid(target.estimate * odometry.target_from_source);
   } else {
-    target.estimate = source.estimate * odometry.target_from_source.inverse();
+    target.estimate = rigid(source.estimate * odometry.target_from_source.inverse());
   }
   source.placed = target.placed = true;
   state.odometry.push_back(odometry);

@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <list>
 #include <mutex>
 #include <utility>
 
@@ -41,12 +42,53 @@ class Deadline {
   Clock::time_point start_;
 };
 
+/// The loop as a host sees it. One that no verification has seen yet fits, as far as is known.
+Loop shown(const LoopRecord& record) {
+  Loop loop = record.loop;
+  if (!record.modes.empty() && loop.reason == LoopReason::not_aligned) {
+    loop.state = LoopState::candidate;
+    loop.reason = LoopReason::unconfirmed;
+  }
+  return loop;
+}
+
 bool same_for_the_host(const Loop& a, const Loop& b) {
   return a.state == b.state && a.target_from_source.matrix() == b.target_from_source.matrix();
 }
 
+/// Room for so many more elements.
+template <typename T>
+void make_room(std::vector<T>& list, std::size_t more) {
+  if (list.capacity() - list.size() < more)
+    list.reserve(std::max(list.size() + more, 2 * list.size()));
+}
+
+/// What hosts see between two calls of process().
+struct Published {
+  std::shared_ptr<const std::vector<FragmentPose>> poses =
+      std::make_shared<const std::vector<FragmentPose>>();
+  std::shared_ptr<const std::vector<Loop>> loops = std::make_shared<const std::vector<Loop>>();
+};
+
+Published published(const State& state, const Options& options) {
+  std::vector<Loop> loops;
+  for (const LoopRecord& record : state.loops) loops.push_back(shown(record));
+  const Paths graph(state, true, options);
+  std::vector<FragmentPose> poses;
+  int position = 0;
+  for (const auto& [id, node] : state.nodes)
+    poses.push_back({id, node.estimate, graph.id(graph.component(position++))});
+  Published out;
+  out.loops = std::make_shared<const std::vector<Loop>>(std::move(loops));
+  out.poses = std::make_shared<const std::vector<FragmentPose>>(std::move(poses));
+  return out;
+}
+
 }  // namespace
 
+/// Every step either takes place or, where it throws, leaves everything as it was: what has not run
+/// is kept for the next call.
+///
 /// Two locks. `inbox` guards what every call touches for a moment: the ids, the calls that wait for
 /// process(), the published results. `working` is held by process(), save() and load() and guards
 /// the state; registrations run under it alone.
@@ -60,63 +102,81 @@ struct LoopCloser::Impl {
 
   mutable std::mutex inbox;
   Registry registry;
-  mutable std::vector<Command> commands;
-  std::shared_ptr<const std::vector<FragmentPose>> poses =
-      std::make_shared<const std::vector<FragmentPose>>();
-  std::shared_ptr<const std::vector<Loop>> loops = std::make_shared<const std::vector<Loop>>();
+  mutable std::list<Command> commands;  ///< a list, since splicing cannot fail
+  Published published;
 
   mutable std::mutex working;
   mutable State state;
+  Verification unreported;            ///< the last one that no Update has told of
+  bool verification_stopped = false;  ///< by ProcessLimits::should_stop: it goes first next time
+
+  /// Queues a command unless check(registry), which may add to the registry as its last step,
+  /// throws.
+  template <typename Check>
+  void submit(const Check& check, Command command) {
+    std::list<Command> entry;
+    entry.push_back(std::move(command));
+    const std::lock_guard<std::mutex> lock(inbox);
+    check(registry);
+    commands.splice(commands.end(), entry);
+  }
 
   void drain() const {
-    std::vector<Command> taken;
+    std::list<Command> taken;
     {
       const std::lock_guard<std::mutex> lock(inbox);
       taken.swap(commands);
     }
-    for (const Command& command : taken) command(state);
+    if (taken.empty()) return;
+    try {
+      on_copy(state, [&](State& next) {
+        for (const Command& command : taken) command(next);
+      });
+    } catch (...) {
+      const std::lock_guard<std::mutex> lock(inbox);
+      commands.splice(commands.begin(), taken);
+      throw;
+    }
   }
 
-  std::vector<FragmentPose> current_poses() const {
-    const Paths graph(state, true, options);
-    std::vector<FragmentPose> out;
-    int position = 0;
-    for (const auto& [id, node] : state.nodes)
-      out.push_back({id, node.estimate, graph.id(graph.component(position++))});
-    return out;
-  }
-
-  void publish() {
-    std::vector<Loop> all;
-    for (const LoopRecord& record : state.loops) all.push_back(record.loop);
-    auto new_loops = std::make_shared<const std::vector<Loop>>(std::move(all));
-    auto new_poses = std::make_shared<const std::vector<FragmentPose>>(current_poses());
-    const std::lock_guard<std::mutex> lock(inbox);
-    loops = std::move(new_loops);
-    poses = std::move(new_poses);
-  }
-
-  /// One chunk; the queue is as before where it throws.
   std::size_t register_chunk(std::size_t count) {
     const std::vector<Proposal> proposals = next_proposals(state, count);
     const std::vector<RegistrationResult> results =
         register_all(context, state, proposals, options);
-    drop_proposals(state, proposals.size());
+    std::vector<LoopRecord> records;
     for (std::size_t k = 0; k < proposals.size(); ++k)
-      add_record(state, record_of(proposals[k].source, proposals[k].target, results[k], options));
+      records.push_back(record_of(proposals[k].source, proposals[k].target, results[k], options));
+    make_room(state.loops, records.size());
+    // Nothing throws from here on: there is room, and the pairs of the queue are known.
+    drop_proposals(state, proposals.size());
+    for (LoopRecord& record : records) add_record(state, std::move(record));
     return proposals.size();
   }
 
+  void verify(const std::function<bool()>& should_stop) {
+    unreported = verify_loops(state, options, should_stop);
+    verification_stopped = unreported.status == pose_graph::Status::cancelled;
+  }
+
   void report(Update& update) {
+    std::vector<LoopRecord*> changed;
     for (LoopRecord& record : state.loops) {
-      if (record.reported && same_for_the_host(*record.reported, record.loop)) continue;
-      record.reported = record.loop;
-      update.changed.push_back(record.loop);
+      const Loop loop = shown(record);
+      if (record.reported && same_for_the_host(*record.reported, loop)) continue;
+      changed.push_back(&record);
+      update.changed.push_back(loop);
     }
     update.proposals_left = state.queue.size();
-    publish();
-    if (state.poses_changed && options.optimize) update.poses = *poses;
+    update.status = unreported.status;
+    update.reason = unreported.reason;
+    Published now = loop_closure::published(state, options);
+    if (state.poses_changed && options.optimize) update.poses = *now.poses;
+    // Nothing throws from here on.
+    for (std::size_t k = 0; k < changed.size(); ++k) changed[k]->reported = update.changed[k];
     state.poses_changed = false;
+    unreported = {};
+    const std::lock_guard<std::mutex> lock(inbox);
+    published = std::move(now);
   }
 };
 
@@ -128,33 +188,33 @@ LoopCloser& LoopCloser::operator=(LoopCloser&&) noexcept = default;
 
 void LoopCloser::add(const Fragment& fragment) {
   check_fragment(fragment);
-  const std::lock_guard<std::mutex> lock(impl_->inbox);
-  impl_->registry.add(fragment.id, fragment.cloud.valid());
-  impl_->commands.push_back([fragment, options = &impl_->options](State& state) {
-    add_fragment(state, fragment, *options);
-  });
+  impl_->submit([&](Registry& registry) { registry.add(fragment.id, fragment.cloud.valid()); },
+                [fragment, options = &impl_->options](State& state) {
+                  add_fragment(state, fragment, *options);
+                });
 }
 
 void LoopCloser::add_odometry(FragmentId source, FragmentId target,
                               const UnalignedIsometry3d& target_from_source,
                               const std::optional<UnalignedMatrix6d>& covariance) {
   check_pose(target_from_source, "target_from_source");
-  Odometry edge = modelled_odometry(source, target, target_from_source, impl_->options);
-  if (covariance) {
-    edge.information = information_of_covariance(*covariance);
-    edge.modelled = false;
-  }
-  const std::lock_guard<std::mutex> lock(impl_->inbox);
-  impl_->registry.require_pair(source, target);
-  impl_->registry.connect(source, target);
-  impl_->commands.push_back([edge](State& state) { loop_closure::add_odometry(state, edge); });
+  const Odometry edge =
+      odometry_edge(source, target, target_from_source, covariance, impl_->options);
+  impl_->submit(
+      [&](Registry& registry) {
+        registry.require_pair(source, target);
+        registry.connect(source, target);
+      },
+      [edge](State& state) { loop_closure::add_odometry(state, edge); });
 }
 
 void LoopCloser::set_covisible(FragmentId id, const std::vector<FragmentId>& others) {
-  const std::lock_guard<std::mutex> lock(impl_->inbox);
-  impl_->registry.require_known(id);
-  for (const FragmentId other : others) impl_->registry.require_known(other);
-  impl_->commands.push_back([id, others](State& state) { add_covisible(state, id, others); });
+  impl_->submit(
+      [&](const Registry& registry) {
+        registry.require_known(id);
+        for (const FragmentId other : others) registry.require_known(other);
+      },
+      [id, others](State& state) { add_covisible(state, id, others); });
 }
 
 void LoopCloser::propose(FragmentId source, FragmentId target,
@@ -164,10 +224,12 @@ void LoopCloser::propose(FragmentId source, FragmentId target,
   proposal.source = source;
   proposal.target = target;
   if (prior) proposal.prior = std::make_shared<const RegistrationPrior>(*prior);
-  const std::lock_guard<std::mutex> lock(impl_->inbox);
-  impl_->registry.require_pair(source, target);
-  impl_->registry.require_clouds(source, target);
-  impl_->commands.push_back([proposal](State& state) { add_proposal(state, proposal); });
+  impl_->submit(
+      [&](const Registry& registry) {
+        registry.require_pair(source, target);
+        registry.require_clouds(source, target);
+      },
+      [proposal](State& state) { add_proposal(state, proposal); });
 }
 
 void LoopCloser::add_loop(FragmentId source, FragmentId target,
@@ -175,21 +237,19 @@ void LoopCloser::add_loop(FragmentId source, FragmentId target,
                           const std::optional<UnalignedMatrix6d>& information, double confidence) {
   check_pose(target_from_source, "target_from_source");
   require(confidence >= 0 && confidence <= 1, "confidence", confidence, "[0, 1]");
-  if (information) check_information(*information);
-  LoopRecord record =
+  const LoopRecord record =
       host_record(source, target, target_from_source, information, confidence, impl_->options);
-  const std::lock_guard<std::mutex> lock(impl_->inbox);
-  impl_->registry.require_pair(source, target);
-  impl_->commands.push_back([record](State& state) { add_record(state, record); });
+  impl_->submit([&](const Registry& registry) { registry.require_pair(source, target); },
+                [record](State& state) { add_record(state, record); });
 }
 
 void LoopCloser::add_result(FragmentId source, FragmentId target,
                             const RegistrationResult& result) {
   check_result(result);
-  LoopRecord record = record_of(source, target, result, impl_->options);
-  const std::lock_guard<std::mutex> lock(impl_->inbox);
-  impl_->registry.require_pair(source, target);
-  impl_->commands.push_back([record](State& state) { add_record(state, record); });
+  const LoopRecord record = record_of(source, target, result, impl_->options);
+  check_modes(record);
+  impl_->submit([&](const Registry& registry) { registry.require_pair(source, target); },
+                [record](State& state) { add_record(state, record); });
 }
 
 void LoopCloser::set_poses(const std::vector<FragmentPose>& poses) {
@@ -200,15 +260,16 @@ void LoopCloser::set_poses(const std::vector<FragmentPose>& poses) {
     if (!seen.insert(pose.id).second)
       throw InvalidArgument("poses name fragment " + std::to_string(pose.id) + " twice");
   }
-  const std::lock_guard<std::mutex> lock(impl_->inbox);
-  for (const FragmentPose& pose : poses) impl_->registry.require_known(pose.id);
-  impl_->commands.push_back([poses](State& state) { set_estimates(state, poses); });
+  impl_->submit(
+      [&](const Registry& registry) {
+        for (const FragmentPose& pose : poses) registry.require_known(pose.id);
+      },
+      [poses](State& state) { set_estimates(state, poses); });
 }
 
 void LoopCloser::remove(FragmentId id) {
-  const std::lock_guard<std::mutex> lock(impl_->inbox);
-  impl_->registry.remove(id);
-  impl_->commands.push_back([id](State& state) { remove_fragment(state, id); });
+  impl_->submit([&](Registry& registry) { registry.remove(id); },
+                [id](State& state) { remove_fragment(state, id); });
 }
 
 Update LoopCloser::process(double milliseconds) {
@@ -229,16 +290,14 @@ Update LoopCloser::process(const ProcessLimits& limits) {
   for (;;) {
     refresh_proposals(state, impl_->options);
     const bool over = deadline.reached(update.registered);
-    if (!over && !state.queue.empty()) {
+    if (!over && !state.queue.empty() && !impl_->verification_stopped) {
       update.registered +=
           impl_->register_chunk(deadline.chunk(impl_->options.chunk, update.registered));
       continue;
     }
     if (!state.graph_changed) break;
     // Loops that are believed now change what overlaps, and what has to be confirmed.
-    const Verification verification = verify_loops(state, impl_->options);
-    update.status = verification.status;
-    update.reason = verification.reason;
+    impl_->verify(limits.should_stop);
     if (over || state.graph_changed) break;
   }
   impl_->report(update);
@@ -247,12 +306,12 @@ Update LoopCloser::process(const ProcessLimits& limits) {
 
 std::vector<FragmentPose> LoopCloser::poses() const {
   const std::lock_guard<std::mutex> lock(impl_->inbox);
-  return *impl_->poses;
+  return *impl_->published.poses;
 }
 
 std::vector<Loop> LoopCloser::loops() const {
   const std::lock_guard<std::mutex> lock(impl_->inbox);
-  return *impl_->loops;
+  return *impl_->published.loops;
 }
 
 std::size_t LoopCloser::size() const {
@@ -278,14 +337,17 @@ void LoopCloser::save(const std::string& path) const {
 void LoopCloser::load(const std::string& path, const CloudProvider& clouds) {
   State loaded = from_bytes(files::read_file(path), path);
   give_clouds(loaded, clouds, impl_->options);
+  Registry registry(loaded);
+  Published now = published(loaded, impl_->options);
+  // Nothing throws from here on.
   const std::lock_guard<std::mutex> lock(impl_->working);
   impl_->state = std::move(loaded);
-  {
-    const std::lock_guard<std::mutex> inbox_lock(impl_->inbox);
-    impl_->commands.clear();
-    impl_->registry = Registry(impl_->state);
-  }
-  impl_->publish();
+  impl_->unreported = {};
+  impl_->verification_stopped = false;
+  const std::lock_guard<std::mutex> inbox_lock(impl_->inbox);
+  impl_->commands.clear();
+  impl_->registry = std::move(registry);
+  impl_->published = std::move(now);
 }
 
 }  // namespace gpureg::loop_closure

@@ -5,13 +5,33 @@
 #include <utility>
 
 #include "loop_closure/commands.hpp"
+#include "pose_graph/validate.hpp"
 
 namespace gpureg::loop_closure {
 namespace {
 
+using pose_graph::kLargestInformation;
+/// Variance that is added where a covariance has no inverse, as a share of the largest one.
+constexpr double kRegularisation = 1e-9;
+/// Ten times as much each time: the last is a thousand times the covariance.
+constexpr int kMostAttempts = 13;
+
+/// An inverse that pose graphs take. Where rounding leaves the covariance none, the inverse of a
+/// larger covariance: no more certainty than there was. Nearly none where it is not finite.
 UnalignedMatrix6d inverse_of(const Matrix6d& covariance) {
-  const Matrix6d information = covariance.llt().solve(Matrix6d::Identity());
-  return UnalignedMatrix6d(0.5 * (information + information.transpose()));
+  Matrix6d regular = covariance;
+  double added = std::max(1 / kLargestInformation,
+                          kRegularisation * covariance.diagonal().cwiseAbs().maxCoeff());
+  for (int attempt = 0; attempt < kMostAttempts; ++attempt, added *= 10) {
+    const Eigen::LLT<Matrix6d> factor(regular);
+    const Matrix6d inverse = factor.solve(Matrix6d::Identity());
+    const Matrix6d information = 0.5 * (inverse + inverse.transpose());
+    if (factor.info() == Eigen::Success && information.cwiseAbs().maxCoeff() <= kLargestInformation)
+      return UnalignedMatrix6d(information);
+    regular = covariance;
+    regular.diagonal().array() += added;
+  }
+  return UnalignedMatrix6d(UnalignedMatrix6d::Identity() / kLargestInformation);
 }
 
 UncertainPose uncertain(const UnalignedIsometry3d& pose, const UnalignedMatrix6d& information) {
@@ -123,7 +143,7 @@ class Marginaliser {
       const UncertainPose pose =
           moved(edge.source, uncertain(edge.target_from_source, edge.information));
       (edge.source == id_ ? edge.source : edge.target) = hub_->other;
-      edge.target_from_source = to_isometry(pose.pose);
+      edge.target_from_source = rigid(to_isometry(pose.pose));
       edge.information = inverse_of(pose.covariance);
       edge.modelled = edge.modelled && hub_->modelled;
       edge.length += hub_->length;
@@ -137,7 +157,7 @@ class Marginaliser {
       for (Mode& mode : record.modes) {
         const UncertainPose pose =
             moved(record.source, uncertain(mode.target_from_source, mode.information));
-        mode.target_from_source = to_isometry(pose.pose);
+        mode.target_from_source = rigid(to_isometry(pose.pose));
         mode.information = inverse_of(pose.covariance);
       }
       (record.source == id_ ? record.source : record.target) = hub_->other;

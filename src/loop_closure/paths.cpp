@@ -10,6 +10,8 @@ namespace {
 
 /// Metres at which rotations count in the cost of an edge: most of a map is farther away.
 constexpr double kLever = 3;
+/// Edges of a larger cost say nothing: sums of any number of smaller ones are finite.
+constexpr double kMostCost = 1e200;
 
 double cost_of(const Matrix6d& covariance) {
   return kLever * kLever * covariance.topLeftCorner<3, 3>().trace() +
@@ -77,6 +79,7 @@ void Paths::connect(FragmentId source, FragmentId target, const UncertainPose& t
   const UncertainPose source_from_target = target_from_source.inverse();
   const double cost =
       std::max(cost_of(target_from_source.covariance), cost_of(source_from_target.covariance));
+  if (!(cost >= 0 && cost <= kMostCost)) return;
   links_[static_cast<std::size_t>(t)].push_back({s, cost, length, steps, target_from_source});
   links_[static_cast<std::size_t>(s)].push_back({t, cost, length, steps, source_from_target});
 }

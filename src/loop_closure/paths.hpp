@@ -39,7 +39,8 @@ class PathTree {
   double correlation_ = 0;
 };
 
-/// The graph of odometry, and of accepted loops where wanted. Nodes are positions in State::nodes.
+/// The graph of odometry, and of accepted loops where wanted, without edges whose covariance is
+/// beyond all numbers. Nodes are positions in State::nodes.
 class Paths {
  public:
   Paths(const State& state, bool with_loops, const Options& options);

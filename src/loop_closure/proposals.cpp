@@ -28,6 +28,18 @@ bool better(const Scored& a, const Scored& b) {
          std::make_tuple(-b.value, b.source, b.target);
 }
 
+bool any_due(const State& state) {
+  return std::any_of(state.nodes.begin(), state.nodes.end(), [](const auto& entry) {
+    return entry.second.look_within || entry.second.look_between;
+  });
+}
+
+bool any_to_confirm(const State& state) {
+  return std::any_of(state.loops.begin(), state.loops.end(), [](const LoopRecord& record) {
+    return record.loop.state == LoopState::candidate && !record.expanded;
+  });
+}
+
 class Proposer {
  public:
   Proposer(State& state, const Options& options)
@@ -37,14 +49,6 @@ class Proposer {
         noise_(options.noise.translation) {}
 
   void run() {
-    const bool due = std::any_of(state_.nodes.begin(), state_.nodes.end(), [](const auto& entry) {
-      return entry.second.look_within || entry.second.look_between;
-    });
-    const bool expand =
-        std::any_of(state_.loops.begin(), state_.loops.end(), [](const LoopRecord& record) {
-          return record.loop.state == LoopState::candidate && !record.expanded;
-        });
-    if (!due && !expand) return;
     const Paths graph(state_, true, all_);
     drop_superfluous(graph);
     for (auto& [id, node] : state_.nodes) {
@@ -52,7 +56,7 @@ class Proposer {
       if (node.look_between) between_frames(graph, id, node);
       node.look_within = node.look_between = false;
     }
-    if (expand) confirm_candidates();
+    confirm_candidates();
     std::sort(state_.queue.begin(), state_.queue.end(), [](const Proposal& a, const Proposal& b) {
       const auto key = [](const Proposal& p) {
         return std::make_tuple(p.kind, p.order, -p.value, p.source, p.target);
@@ -104,11 +108,11 @@ class Proposer {
       if (node.session == there.session && std::abs(node.time - there.time) < options_.min_time)
         continue;
       const UncertainPose here_from_there = tree.root_from(position);
-      const double sigma = sigma_at(here_from_there.covariance, there.coarse.centre);
+      const double sigma = sigma_at(here_from_there.covariance, there.coarse().centre);
       if (sigma < options_.min_uncertainty) continue;
       const pose_graph::Pose relative = to_pose(node.estimate).inverse() * to_pose(there.estimate);
       const double overlap =
-          expected_overlap(there.coarse, node.coarse, relative, sigma, options_.max_dilation);
+          expected_overlap(there.coarse(), node.coarse(), relative, sigma, options_.max_dilation);
       if (overlap < options_.min_overlap) continue;
       found.push_back({overlap * portable::log1p(sigma * sigma / (noise_ * noise_)), id, other});
     }
@@ -146,6 +150,7 @@ class Proposer {
   /// Pairs beside a candidate that overlap if it is correct. If it is an alias of one place, they
   /// do not align, or elsewhere.
   void confirm_candidates() {
+    if (!any_to_confirm(state_)) return;
     const Paths odometry(state_, false, all_);
     for (LoopRecord& record : state_.loops) {
       const Loop& loop = record.loop;
@@ -179,7 +184,7 @@ class Proposer {
         const UncertainPose source_from_a = by_source.root_from(a);
         const pose_graph::Pose b_from_a =
             target_from_b.pose.inverse() * (target_from_source * source_from_a.pose);
-        const double overlap = expected_overlap(from.coarse, to.coarse, b_from_a, 0, 0);
+        const double overlap = expected_overlap(from.coarse(), to.coarse(), b_from_a, 0, 0);
         if (overlap >= options_.min_overlap)
           found.push_back({overlap * record.loop.confidence, source, target});
       }
@@ -205,7 +210,10 @@ class Proposer {
 
 }  // namespace
 
-void refresh_proposals(State& state, const Options& options) { Proposer(state, options).run(); }
+void refresh_proposals(State& state, const Options& options) {
+  if (!any_due(state) && !any_to_confirm(state)) return;
+  on_copy(state, [&](State& next) { Proposer(next, options).run(); });
+}
 
 std::vector<Proposal> next_proposals(const State& state, std::size_t count) {
   const std::size_t taken = std::min(count, state.queue.size());

@@ -5,7 +5,8 @@
 
 namespace gpureg::loop_closure {
 
-/// Adds what is due to the queue, and takes from it what the graph has made superfluous.
+/// Adds what is due to the queue, and takes from it what the graph has made superfluous. Where it
+/// throws, the state stays as it was.
 void refresh_proposals(State& state, const Options& options);
 
 /// The next `count` proposals, fewer where there are fewer.

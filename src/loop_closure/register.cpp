@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <map>
 
+#include "pose_graph/validate.hpp"
 #include "reconstruction/edge_noise.hpp"
 
 namespace gpureg::loop_closure {
@@ -35,6 +36,10 @@ Mode mode_of(const RegistrationMode& given, const CorrespondenceMoments& moments
   else
     mode.information =
         reconstruction::edge_information(given, centre, options.noise, options.information_unit);
+  // A lever of kilometres to the origin of the cloud makes a rotation as certain.
+  const double largest = mode.information.cwiseAbs().maxCoeff();
+  if (largest > pose_graph::kLargestInformation)
+    mode.information *= 0.5 * pose_graph::kLargestInformation / largest;
   return mode;
 }
 

@@ -131,7 +131,7 @@ class Comparison {
     }
     const int source = ends_[k].first;
     if (relation.agrees_from < kDriftScaleCount) {
-      const Coarse& coarse = state_.nodes.at(state_.loops[k].source).coarse;
+      const Coarse& coarse = state_.nodes.at(state_.loops[k].source).coarse();
       const double sigma = sigma_at(by_odometry.covariance, coarse.centre);
       double most = 0;
       if (by_target_.reaches(source)) {

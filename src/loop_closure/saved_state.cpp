@@ -5,6 +5,7 @@
 #include <type_traits>
 
 #include "gpureg/error.hpp"
+#include "loop_closure/check_state.hpp"
 
 namespace gpureg::loop_closure {
 namespace {
@@ -185,7 +186,7 @@ void all(File& file, State& state) {
       FragmentId id = 0;
       Node read;
       node(file, id, read);
-      state.nodes.emplace(id, std::move(read));
+      if (!state.nodes.emplace(id, std::move(read)).second) file.fail();
     }
     const std::uint64_t pairs = file.count(state.known);
     for (std::uint64_t k = 0; k < pairs; ++k) {
@@ -239,18 +240,6 @@ T number_at(const std::string& content, std::size_t at) {
   return v;
 }
 
-/// What a checksum cannot see: a file made by another program.
-void check(const State& state, const Reader& file) {
-  const auto known = [&](FragmentId id) { return state.nodes.count(id) > 0; };
-  bool good = true;
-  for (const Odometry& edge : state.odometry) good &= known(edge.source) && known(edge.target);
-  for (const Proposal& p : state.queue) good &= known(p.source) && known(p.target);
-  for (const LoopRecord& r : state.loops)
-    good &= known(r.source) && known(r.target) && (r.modes.empty() || r.mode < r.modes.size()) &&
-            (r.loop.state != LoopState::accepted || !r.modes.empty());
-  if (!good) file.fail();
-}
-
 }  // namespace
 
 std::string to_bytes(const State& state) {
@@ -283,7 +272,11 @@ State from_bytes(const std::string& content, const std::string& path) {
   State state;
   all(file, state);
   if (!file.at_end()) file.fail();
-  check(state, file);
+  try {
+    check_state(state);
+  } catch (const InvalidArgument& error) {
+    throw IoError(path + ": " + error.what() + "; the file is damaged");
+  }
   return state;
 }
 

@@ -5,13 +5,30 @@
 #include <cmath>
 
 #include "math/exponential.hpp"
+#include "pose_graph/validate.hpp"
 
 namespace gpureg::loop_closure {
 namespace {
 
 constexpr double kRadians = 3.14159265358979323846 / 180;
+/// Rotations further from orthonormal are made so again.
+constexpr double kOrthonormal = 1e-5;
 
 }  // namespace
+
+const Coarse& Node::coarse() const {
+  static const Coarse nothing;
+  return observed ? *observed : nothing;
+}
+
+UnalignedIsometry3d rigid(UnalignedIsometry3d pose) {
+  const Eigen::Matrix3d r = pose.linear();
+  if ((r * r.transpose() - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff() > kOrthonormal)
+    pose.linear() = Eigen::Quaterniond(r).normalized().toRotationMatrix();
+  pose.translation() =
+      pose.translation().cwiseMax(-pose_graph::kFarthest).cwiseMin(pose_graph::kFarthest).eval();
+  return pose;
+}
 
 UnalignedIsometry3d to_isometry(const pose_graph::Pose& pose) {
   UnalignedIsometry3d out;

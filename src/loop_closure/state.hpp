@@ -4,6 +4,7 @@
 #include <map>
 #include <memory>
 #include <set>
+#include <type_traits>
 #include <utility>
 #include <vector>
 
@@ -27,13 +28,16 @@ struct Node {
   std::uint64_t fingerprint = 0;
   std::optional<Eigen::Vector3d> up;
   UnalignedIsometry3d estimate = UnalignedIsometry3d::Identity();
-  Coarse coarse;
-  std::uint64_t order = 0;  ///< of arrival
+  std::shared_ptr<const Coarse> observed;  ///< of the cloud; empty without one
+  std::uint64_t order = 0;                 ///< of arrival
   /// Proposals made so far; later fragments propose earlier ones.
   std::uint32_t within_frame = 0, between_frames = 0;
   bool placed = false;       ///< odometry connects it
   bool look_within = true;   ///< proposals within the frame are due
   bool look_between = true;  ///< proposals to other frames are due
+
+  /// What it observed: nothing without a cloud.
+  const Coarse& coarse() const;
 };
 
 struct Odometry {
@@ -107,6 +111,16 @@ struct State {
   bool poses_changed = false;  ///< since the last report
 };
 
+/// Runs work(State&) on a copy that then replaces the state. Where it throws, the state stays as it
+/// was.
+template <typename Work>
+void on_copy(State& state, const Work& work) {
+  static_assert(std::is_nothrow_move_assignable_v<State>);
+  State next(state);
+  work(next);
+  state = std::move(next);
+}
+
 inline FragmentPair pair_of(FragmentId a, FragmentId b) {
   return a < b ? FragmentPair{a, b} : FragmentPair{b, a};
 }
@@ -115,6 +129,10 @@ inline pose_graph::Pose to_pose(const UnalignedIsometry3d& t) {
   return {t.linear(), t.translation()};
 }
 UnalignedIsometry3d to_isometry(const pose_graph::Pose& pose);
+
+/// A product of poses, kept within what pose graphs take: a host's rotations are orthonormal to
+/// 1e-4 only, and long chains of them would leave that.
+UnalignedIsometry3d rigid(UnalignedIsometry3d pose);
 
 /// Standard deviation of a translation, metres, at a point of the frame that the covariance is in.
 double sigma_at(const Matrix6d& covariance, const Eigen::Vector3d& point);

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <utility>
 
 #include "loop_closure/accept.hpp"
@@ -24,6 +25,8 @@ constexpr double kFence = 3.5;
 constexpr std::size_t kLeastResiduals = 8;
 /// The estimated standard deviation is at least this share of the stated one.
 constexpr double kLeastNoise = 1.0 / 3;
+/// Largest factor on the covariance of an edge, of no length nearly: its information stays > 0.
+constexpr double kMostCorrelated = 1e18;
 /// Log odds that no confidence exceeds: 0.999, as of registrations.
 constexpr double kCertainLogOdds = 6.9;
 
@@ -44,8 +47,8 @@ pose_graph::Graph graph_without_loops(const State& state, const Options& options
     edge.information = odometry.information;
     if (odometry.modelled && odometry.length > 0) {
       // Edges of a graph are independent: each takes its share of the errors of one sign.
-      const double factor =
-          std::max(1.0, options.drift_correlation * odometry.steps / odometry.length);
+      const double factor = std::clamp(options.drift_correlation * odometry.steps / odometry.length,
+                                       1.0, kMostCorrelated);
       *edge.information /= factor * drift_scale * drift_scale;
     }
     edge.kind = pose_graph::EdgeKind::odometry;
@@ -79,9 +82,10 @@ std::vector<std::uint32_t> add_loop(const LoopRecord& record, const Options& opt
 
 class Verifier {
  public:
-  Verifier(State& state, const Options& options)
+  Verifier(State& state, const Options& options, const std::function<bool()>& should_stop)
       : state_(state),
         options_(options),
+        should_stop_(should_stop),
         odometry_(state, false, options),
         excluded_(state.loops.size(), 0),
         fitted_(state.loops.size(), 0),
@@ -97,9 +101,8 @@ class Verifier {
     pose_graph::Result result;
     for (int round = 0; round < kMostRounds; ++round) {
       result = optimise();
-      if (result.status == pose_graph::Status::failed ||
-          result.status == pose_graph::Status::cancelled)
-        return {result.status, result.reason};
+      const Verification so_far{result.status, result.reason};
+      if (!so_far.decided()) return so_far;
       bool refused = drop_contradicted();
       verdicts = accept_loops(state_, odometry_, fits_, scale_, options_, joined_);
       for (std::size_t k = 0; k < fits_.size(); ++k) {
@@ -180,6 +183,11 @@ class Verifier {
     }
     pose_graph::Options graph_options = options_.graph;
     graph_options.marginals.clear();
+    if (should_stop_)
+      graph_options.should_stop = [this](const pose_graph::Progress& progress) {
+        const auto& theirs = options_.graph.should_stop;
+        return should_stop_() || (theirs && theirs(progress));
+      };
     const pose_graph::Result result = pose_graph::optimize(graph, graph_options);
     fits_.assign(state_.loops.size(), 0);
     squared_errors_.assign(state_.loops.size(), 0);
@@ -236,7 +244,7 @@ class Verifier {
     for (auto& [id, node] : state_.nodes) {
       const UnalignedIsometry3d& pose = result.world_from_node[k++];
       look |= (pose.translation() - node.estimate.translation()).norm() > far;
-      node.estimate = pose;
+      node.estimate = rigid(pose);
     }
     state_.poses_changed = true;
     if (look)
@@ -245,6 +253,7 @@ class Verifier {
 
   State& state_;
   const Options& options_;
+  const std::function<bool()>& should_stop_;
   Paths odometry_;
   std::vector<char> excluded_, fitted_, fits_;
   std::vector<char> joined_;            ///< see accept_loops()
@@ -255,14 +264,18 @@ class Verifier {
 
 }  // namespace
 
-Verification verify_loops(State& state, const Options& options) {
-  state.graph_changed = false;
+Verification verify_loops(State& state, const Options& options,
+                          const std::function<bool()>& should_stop) {
   const bool any = std::any_of(state.loops.begin(), state.loops.end(),
                                [](const LoopRecord& record) { return !record.modes.empty(); });
-  if (!any && options.gravity_sigma == 0 && state.odometry.size() < state.nodes.size()) return {};
-  const Verification out = Verifier(state, options).run();
-  if (out.status == pose_graph::Status::failed || out.status == pose_graph::Status::cancelled)
-    state.graph_changed = true;  // nothing was decided
+  if (!any && options.gravity_sigma == 0 && state.odometry.size() < state.nodes.size()) {
+    state.graph_changed = false;
+    return {};
+  }
+  State next(state);
+  next.graph_changed = false;
+  Verification out = Verifier(next, options, should_stop).run();
+  if (out.decided()) state = std::move(next);
   return out;
 }
 

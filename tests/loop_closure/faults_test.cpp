@@ -85,6 +85,90 @@ TEST_F(LoopCloserFaults, CovariancesThatAreNone) {
   refused([&] { closer.add_loop(5, 1, Pose::Identity(), m); }, {"information", "zero"});
 }
 
+TEST_F(LoopCloserFaults, NumbersThatAPoseGraphDoesNotTake) {
+  const Pose far = planar(1e150, 0, 0);
+  refused([&] { closer.add({50, 0, 0, {}, far}); }, {"fragment 50", "1e+150", "1e9"});
+  refused([&] { closer.add_odometry(5, 1, far); }, {"target_from_source", "1e+150"});
+  refused([&] { closer.add_loop(5, 1, far); }, {"target_from_source", "1e+150"});
+  refused([&] { closer.set_poses({{5, far}}); }, {"fragment 5", "1e+150"});
+  refused([&] { closer.add({50, 0, 0, {}, Pose::Identity(), Eigen::Vector3d(0, 0, 1e-9)}); },
+          {"up of fragment 50", "1e-09"});
+  const UnalignedMatrix6d unit = UnalignedMatrix6d::Identity();
+  refused([&] { closer.add_odometry(5, 1, Pose::Identity(), unit * 1e307); },
+          {"covariance", "1e+307"});
+  refused([&] { closer.add_odometry(5, 1, Pose::Identity(), unit * 1e-20); },
+          {"covariance", "1e-20"});
+  refused([&] { closer.add_loop(5, 1, Pose::Identity(), unit * 1e20); }, {"information", "1e+20"});
+  refused([&] { closer.add_loop(5, 1, Pose::Identity(), unit * 1e-30); }, {"information", "1e-30"});
+}
+
+TEST_F(LoopCloserFaults, ResultsThatAreNone) {
+  const RegistrationResult good = result_of(Pose::Identity(), 0.9);
+  RegistrationResult result = good;
+  result.score = kNaN;
+  refused([&] { closer.add_result(5, 1, result); }, {"result.score", "nan"});
+  result = good;
+  result.modes[0].confidence = 1.5;
+  refused([&] { closer.add_result(5, 1, result); }, {"result.modes[0].confidence", "1.5"});
+  result = good;
+  result.modes[0].evidence.information_eigenvalues = {1, 1, 1, 1, 1, 1};
+  result.modes[0].evidence.weakest_direction[0] = kNaN;
+  refused([&] { closer.add_result(5, 1, result); }, {"result.modes.information", "nan"});
+}
+
+TEST(LoopCloserStates, NoiseOfOptionsThatIsTooSmallIsRefusedWhereItIsUsed) {
+  loop_closure::Options options;
+  options.graph.drift.min_translation = options.graph.loop_noise.translation = 1e-12;
+  LoopCloser closer = closer_of(options);
+  for (int k = 0; k < 2; ++k) closer.add({k});
+  expect_error<InvalidArgument>([&] { closer.add_odometry(1, 0, Pose::Identity()); },
+                                {"graph.drift", "1e+24"});
+  expect_error<InvalidArgument>([&] { closer.add_loop(1, 0, Pose::Identity()); },
+                                {"graph.loop_noise", "1e+24"});
+  closer.add_odometry(1, 0, planar(1, 0, 0));  // was not taken
+  EXPECT_EQ(closer.process().poses.size(), 2u);
+}
+
+TEST(LoopCloserStates, LongChainsOfRoundedRotationsStayRigid) {
+  for (const bool optimize : {true, false}) {
+    loop_closure::Options options;
+    options.optimize = optimize;
+    LoopCloser closer = closer_of(options);
+    Pose step = planar(1, 0, 3);
+    step.linear() *= 1 + 4e-5;  // as inexact as add_odometry() takes
+    for (int k = 0; k < 60; ++k) {
+      closer.add({k});
+      if (k > 0) closer.add_odometry(k, k - 1, step);
+      if (k > 2 && k % 3 == 0) closer.remove(k - 2);
+    }
+    closer.add_result(59, 0, result_of(Pose::Identity(), 0.9));
+    EXPECT_NO_THROW(closer.process());
+    for (const loop_closure::FragmentPose& pose : closer.poses()) {
+      const Eigen::Matrix3d r = pose.world_from_fragment.linear();
+      // Two such steps: what a pose graph takes is 1e-3.
+      EXPECT_LT((r * r.transpose() - Eigen::Matrix3d::Identity()).norm(), 5e-4);
+    }
+  }
+}
+
+TEST(LoopCloserStates, OdometryOfAnySizeEnds) {
+  LoopCloser closer = closer_of();
+  for (int k = 0; k < 12; ++k) closer.add({k});
+  for (int k = 1; k < 12; ++k) {
+    const double size = k % 2 == 0 ? 1e18 : 1e-18;
+    closer.add_odometry(k, k - 1, planar(k % 3 == 0 ? 1e9 : 0, k % 3 == 1 ? -1e9 : 1e-9, 77.0 * k),
+                        UnalignedMatrix6d(UnalignedMatrix6d::Identity() * size));
+  }
+  for (int k = 4; k < 12; ++k)
+    closer.add_result(k, k - 4, result_of(planar(1e9, double(k), 0), 0.9));
+  EXPECT_NO_THROW(closer.process());
+  closer.remove(5);
+  closer.remove(6);
+  EXPECT_NO_THROW(closer.process());
+  for (const loop_closure::FragmentPose& pose : closer.poses())
+    EXPECT_TRUE(pose.world_from_fragment.matrix().allFinite());
+}
+
 TEST_F(LoopCloserFaults, OptionsOutOfRange) {
   loop_closure::Options options;
   options.modes = 0;
@@ -95,6 +179,9 @@ TEST_F(LoopCloserFaults, OptionsOutOfRange) {
   options = {};
   options.proposals.min_overlap = 0;
   expect_error<InvalidArgument>([&] { closer_of(options); }, {"proposals.min_overlap", "0"});
+  options = {};
+  options.gravity_sigma = 1e-7;
+  expect_error<InvalidArgument>([&] { closer_of(options); }, {"gravity_sigma", "1e-07"});
   options = {};
   options.drift_correlation = -1;
   expect_error<InvalidArgument>([&] { closer_of(options); }, {"drift_correlation", "-1"});
@@ -122,8 +209,16 @@ TEST(LoopCloserStates, WhatIsStoppedGoesOnLater) {
   }
   loop_closure::ProcessLimits stopped;
   stopped.should_stop = [] { return true; };
-  closer.process(stopped);
-  closer.process();
+  const Update update = closer.process(stopped);
+  EXPECT_EQ(update.status, pose_graph::Status::cancelled);
+  EXPECT_FALSE(update.reason.empty());
+  // Nothing is decided yet.
+  ASSERT_EQ(update.changed.size(), 7u);
+  for (const Loop& loop : update.changed) {
+    EXPECT_EQ(loop.state, LoopState::candidate);
+    EXPECT_EQ(loop.reason, LoopReason::unconfirmed);
+  }
+  EXPECT_EQ(closer.process().status, pose_graph::Status::converged);
   other.process();
   EXPECT_EQ(bytes_of(closer), bytes_of(other));
 }

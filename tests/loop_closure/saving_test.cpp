@@ -2,6 +2,8 @@
 #include <gtest/gtest.h>
 
 #include <fstream>
+#include <iterator>
+#include <limits>
 
 #include "loop_closure/drive.hpp"
 #include "support/expect_error.hpp"
@@ -75,6 +77,53 @@ TEST_F(Saving, DamagedFilesAreNamedAndTheStateStays) {
     refused(flipped, "checksum");
   }
   expect_error<IoError>([&] { closer.load(folder / "missing", nullptr); }, {"missing"});
+}
+
+/// A file whose checksum is right whatever its payload is.
+std::string with_checksum(std::string content) {
+  constexpr std::size_t header = 28, place = 20;
+  std::uint64_t sum = 14695981039346656037ull;  // FNV-1a
+  for (std::size_t k = header; k < content.size(); ++k)
+    sum = (sum ^ static_cast<unsigned char>(content[k])) * 1099511628211ull;
+  std::memcpy(content.data() + place, &sum, sizeof sum);
+  return content;
+}
+
+TEST_F(Saving, WildNumbersUnderARightChecksumAreRefusedOrProcessed) {
+  closer.save(path);
+  const std::string good = content_of(path);
+  ASSERT_EQ(with_checksum(good), good);
+  const double wild[] = {1e200,
+                         -1e200,
+                         1e-300,
+                         std::numeric_limits<double>::quiet_NaN(),
+                         std::numeric_limits<double>::infinity(),
+                         -1,
+                         2};
+  std::size_t refused = 0, taken = 0, number = 0;
+  for (std::size_t at = 28; at + 8 < good.size(); at += 8 * 7 + 3) {
+    std::string bytes = good;
+    std::memcpy(bytes.data() + at, &wild[number++ % std::size(wild)], 8);
+    write(path, with_checksum(bytes));
+    LoopCloser other = closer_of();
+    try {
+      other.load(path, nullptr);
+    } catch (const IoError& error) {
+      EXPECT_NE(std::string(error.what()).find(path), std::string::npos);
+      ++refused;
+      continue;
+    } catch (const InvalidArgument&) {
+      ++refused;  // a fragment that has a cloud now
+      continue;
+    }
+    ++taken;
+    other.add_loop(29, 1, Pose::Identity());  // everything is verified again
+    EXPECT_NO_THROW(other.process()) << at;
+    EXPECT_NO_THROW(other.remove(other.poses().front().id)) << at;
+    EXPECT_NO_THROW(other.process()) << at;
+  }
+  EXPECT_GT(refused, 100u);
+  EXPECT_GT(taken, 20u);
 }
 
 TEST_F(Saving, AFullDiskLeavesTheOldFile) {
