@@ -3,6 +3,8 @@
 
 #include "fuzz/targets.hpp"
 #include "gpureg/pose_graph/files.hpp"
+#include "gpureg/pose_graph/optimize.hpp"
+#include "gpureg/registration.hpp"
 #include "gpureg/trajectory.hpp"
 #include "io/run_reader.hpp"
 #include "loop_closure/saved_state.hpp"
@@ -15,7 +17,7 @@ void read(std::string_view bytes) {
   test::run_reader(reader, bytes);
 }
 
-/// What a reader accepts must be a graph that the library takes, and that it can write and read
+/// What a reader accepts must be a graph that the library optimises, and that it can write and read
 /// again.
 template <typename Read, typename Write>
 void check_graph(std::string_view bytes, const Read& read_graph, const Write& write_graph) {
@@ -29,6 +31,10 @@ void check_graph(std::string_view bytes, const Read& read_graph, const Write& wr
     return;
   }
   graph.validate();
+  pose_graph::Options options;
+  options.threads = 1;
+  for (const UnalignedIsometry3d& pose : pose_graph::optimize(graph, options).world_from_node)
+    if (!pose.matrix().allFinite()) broken("poses are finite");
   static const std::string copy = "/dev/shm/gpureg-fuzz-" + std::to_string(::getpid());
   try {
     write_graph(copy, graph);
@@ -95,6 +101,52 @@ void read_saved_state(std::string_view bytes) {
   }
 }
 
+/// Whatever is read as a state can be gone on with.
+void go_on_from_saved_state(std::string_view bytes) {
+  static const Context context = Context::cpu(1);
+  static const PreparedCloud cloud = [] {
+    PointCloud points;
+    for (int k = 0; k < 90; ++k) {
+      const float x = 0.1f * static_cast<float>(k % 10), y = 0.1f * static_cast<float>(k / 10);
+      points.points.emplace_back(x, y, x * y - 0.3f * x);
+    }
+    return prepare(context, points.view());
+  }();
+  static const std::string path = "/dev/shm/gpureg-fuzz-" + std::to_string(::getpid());
+  loop_closure::State state;
+  try {
+    state = loop_closure::from_bytes(with_header(bytes), path);
+  } catch (const IoError&) {
+    return;
+  }
+  loop_closure::FragmentId unused = 0;
+  for (auto& [id, node] : state.nodes) {
+    node.fingerprint = loop_closure::fingerprint_of(cloud);
+    if (id == unused) ++unused;
+  }
+  std::ofstream(path, std::ios::binary) << loop_closure::to_bytes(state);
+  loop_closure::Options options;
+  options.registration = options.registration.with_quality(0);
+  options.graph.threads = 1;
+  loop_closure::LoopCloser closer(context, options);
+  closer.load(path, [](loop_closure::FragmentId) { return cloud; });
+  loop_closure::ProcessLimits limits;
+  limits.registrations = 1;
+  closer.process(limits);
+  closer.add({unused, 0, 0, cloud});
+  if (!state.nodes.empty()) {
+    closer.add_odometry(unused, state.nodes.begin()->first, UnalignedIsometry3d::Identity());
+    closer.process(limits);
+    closer.remove(state.nodes.begin()->first);
+  }
+  closer.process(limits);
+  for (const loop_closure::FragmentPose& pose : closer.poses())
+    if (!pose.world_from_fragment.matrix().allFinite()) broken("poses are finite");
+  closer.save(path);
+  closer.load(path, [](loop_closure::FragmentId) { return cloud; });
+  ::unlink(path.c_str());
+}
+
 void read_g2o(std::string_view bytes) {
   check_graph(
       bytes, [](const std::string& path) { return pose_graph::read_g2o(path); },
@@ -122,7 +174,8 @@ std::vector<Target> file_targets() {
           {"kitti", read_kitti},
           {"g2o", read_g2o},
           {"open3d", read_open3d},
-          {"saved_state", read_saved_state}};
+          {"saved_state", read_saved_state},
+          {"loop_closer", go_on_from_saved_state}};
 }
 
 }  // namespace gpureg::fuzz
