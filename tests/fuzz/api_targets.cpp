@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <Eigen/LU>
+#include <algorithm>
 #include <cmath>
 
+#include "fields/options.hpp"
 #include "fuzz/bytes.hpp"
 #include "fuzz/targets.hpp"
 #include "gpureg/loop_consistency.hpp"
@@ -34,50 +36,33 @@ PointCloud cloud_of(Bytes& bytes) {
   return cloud;
 }
 
+/// One in eight fields becomes a value around its range; what would take long stays small.
+template <typename T>
+void vary(Bytes& bytes, T& options) {
+  constexpr double kMostLength = 2, kMostNumber = 1000, kMostCount = 300;
+  fields::each<T>([&](const std::string&, auto member, const fields::Field& field) {
+    auto& value = options.*member;
+    using M = std::decay_t<decltype(value)>;
+    if constexpr (fields::is_described<M>)
+      vary(bytes, value);
+    else if constexpr (std::is_same_v<M, bool>)
+      value = bytes.flag();
+    else if constexpr (std::is_floating_point_v<M>) {
+      const double high = field.range.high > kMostNumber ? kMostLength : field.range.high;
+      if (bytes.below(8) == 0) value = bytes.number(static_cast<float>(high * 1.25));
+    } else if constexpr (std::is_same_v<M, std::uint32_t>) {
+      if (bytes.below(8) == 0)
+        value = bytes.below(static_cast<std::uint32_t>(std::min(field.range.high + 2, kMostCount)));
+    }
+  });
+}
+
 RegistrationOptions options_of(Bytes& bytes) {
   RegistrationOptions o = bytes.flag() ? RegistrationOptions::loopsmart(0.1f)
                                        : RegistrationOptions::from_voxel_size(0.1f);
   o.quadruples.count = 256;
   o.seed = bytes.take<std::uint8_t>();
-  const auto set = [&](float& value, float most) {
-    if (bytes.below(8) == 0) value = bytes.number(most);
-  };
-  const auto count = [&](std::uint32_t& value, std::uint32_t most) {
-    if (bytes.below(8) == 0) value = bytes.below(most);
-  };
-  set(o.prepare.voxel_size, 1);
-  set(o.prepare.normal_radius, 1);
-  set(o.prepare.feature_radius, 2);
-  set(o.prepare.wide_feature_radius, 2);
-  set(o.prepare.max_correspondence_distance, 1);
-  set(o.prepare.surface_side_distance, 2);
-  count(o.prepare.depth_maps, 4);
-  count(o.compatibility.max_matches, 300);
-  count(o.compatibility.seeds, 100);
-  count(o.compatibility.max_members, 100);
-  count(o.compatibility.triangles, 100);
-  count(o.compatibility.refits, 10);
-  set(o.compatibility.tolerance, 1);
-  set(o.compatibility.max_turn, 4);
-  set(o.compatibility.consensus_distance, 1);
-  set(o.compatibility.seed_separation, 1);
-  count(o.quadruples.count, 2000);
-  count(o.quadruples.neighbors, 20);
-  o.quadruples.mutual = bytes.flag();
-  set(o.quadruples.edge_similarity, 1);
-  set(o.quadruples.max_normal_angle, 200);
-  set(o.quadruples.max_verification_normal_angle, 200);
-  count(o.refine.max_iterations, 20);
-  set(o.refine.kernel_width, 1);
-  count(o.evidence.sample, 200);
-  count(o.evidence.modes, 70);
-  set(o.evidence.max_normal_angle, 200);
-  set(o.evidence.mode_angle, 200);
-  set(o.evidence.mode_distance, 1);
-  set(o.evidence.degeneracy_search_distance, 2);
-  set(o.evidence.free_space_margin, 1);
-  set(o.evidence.min_range, 1);
-  o.smaller_as_source = bytes.flag();
+  vary(bytes, o);
   return o;
 }
 
