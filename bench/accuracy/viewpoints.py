@@ -6,7 +6,7 @@ Every cloud is moved by a random pose. `said`: its true viewpoints move along an
 `nothing`: points alone. `still`: points alone of clouds that were not moved, whose sensor is at the
 origin (red kitchen: each fragment in the frame of its middle camera). A seed is that of the random
 poses and of gpureg. One line for each set, condition and seed: pairs, right, reported at 0.5, reported
-and wrong; the same of reports up to a symmetry (--accept-symmetry); and the decisions about the clouds,
+and wrong; the same of reports up to a symmetry (--set accept_symmetry=true); and the decisions about the clouds,
 models apart. Where nobody says a viewpoint, `decided` counts the clouds whose sensor is known, and
 `decided_right` those of them with the right decision: `none` for a moved scan, `origin` for a scan that
 was not moved, `model` for a model. `decided_none` counts scans that were not moved and got `none`: no

@@ -314,7 +314,7 @@ def viewpoints():
     """Of each condition the runs with several seeds; records of one seed have the counts alone."""
     record = load("viewpoints.json")
     out = [
-        "| data | clouds | seeds | pairs | first correct | reported | with `--accept-symmetry` | false reports | decisions about the clouds |",
+        "| data | clouds | seeds | pairs | first correct | reported | with `--set accept_symmetry=true` | false reports | decisions about the clouds |",
         "| --- | --- | --- | --- | --- | --- | --- | --- | --- |",
     ]
     for name, text in SENSORS.items():

@@ -217,7 +217,7 @@ def span(values, digits=0):
 
 
 def reported_of(run):
-    """Correct and false reports; symmetric poses count as with --accept-symmetry."""
+    """Correct and false reports; symmetric poses count as with --set accept_symmetry=true."""
     return (
         run.get("reported_up_to_symmetry", run["reported"]),
         run.get("reported_up_to_symmetry_wrong", run["reported_wrong"]),
@@ -293,7 +293,7 @@ KINDS = {
     "CAD parts and scans": (
         ("cad_mesh",),
         "gpureg_viewpoints",
-        "the mesh as TARGET, `--voxel-size auto --accept-symmetry`",
+        "the mesh as TARGET, `--voxel-size auto --set accept_symmetry=true`",
     ),
 }
 

@@ -14,8 +14,8 @@ namespace gpureg::test {
 /// What the clouds below are made for: they keep some 2,000 points, and a pair takes some ten
 /// milliseconds.
 inline const std::vector<std::string> kSmall = {"--voxel-size", "0.1", "--backend", "cpu"};
-inline const std::vector<std::string> kLoopsmart = {"--preset", "loopsmart", "--hypotheses",
-                                                    "40000"};
+inline const std::vector<std::string> kLoopsmart = {"--preset", "loopsmart", "--set",
+                                                    "quadruples.count=40000"};
 
 std::vector<std::string> joined(std::vector<std::string> a, const std::vector<std::string>& b);
 

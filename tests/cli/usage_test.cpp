@@ -77,12 +77,14 @@ TEST_F(Usage, OtherValues) {
   expect_refused(with({"--seed", "1.5"}), {"--seed", "1.5"});
   expect_refused(with({"--seed", "18446744073709551616"}), {"--seed", "18446744073709551616"});
   const auto hypotheses = [&](const char* count) {
-    return with({"--preset", "loopsmart", "--hypotheses", count});
+    return with({"--preset", "loopsmart", "--set", std::string("quadruples.count=") + count});
   };
   expect_refused(hypotheses("0"), {"quadruples.count is 0"});
   expect_refused(hypotheses("2000000000"), {"quadruples.count is 2000000000"});
-  expect_refused(with({"--hypotheses", "4e6"}), {"--hypotheses", "4e6"});
-  expect_refused(with({"--hypotheses", "4294967297"}), {"--hypotheses", "4294967297"});
+  expect_refused(hypotheses("4e6"), {"--set", "quadruples.count=4e6", "whole number"});
+  expect_refused(hypotheses("4294967297"), {"--set", "4294967297"});
+  expect_refused(with({"--set", "evidence.sampel=3"}), {"--set", "sampel", "sample, modes"});
+  expect_refused(with({"--set", "evidence.sample=3"}), {"evidence.sample is 3", "64 to 65536"});
   expect_refused(with({"--threads", "-1"}), {"--threads", "-1"});
   expect_refused(with({"--threads", "two"}), {"--threads", "two"});
   expect_refused(with({"--preset", "fast"}), {"--preset", "fast", "loopsmart"});
@@ -95,14 +97,15 @@ TEST_F(Usage, OtherValues) {
 }
 
 TEST_F(Usage, OptionsThatWouldDoNothing) {
-  expect_refused(with({"--hypotheses", "100"}), {"--hypotheses", "--preset default"});
-  expect_refused(with({"--preset", "default", "--hypotheses", "100"}),
-                 {"--hypotheses", "--preset default"});
+  expect_refused(with({"--set", "quadruples.count=100"}),
+                 {"--set quadruples.count=100", "method compatibility"});
+  expect_refused(with({"--preset", "loopsmart", "--set", "evidence.sample=64"}),
+                 {"--set evidence.sample=64", "method quadruples"});
   expect_refused(with({"--preset", "loopsmart", "--quality", "3"}),
                  {"--quality", "--preset loopsmart"});
   expect_refused(with({"--time-budget", "10", "--quality", "3"}), {"--time-budget", "--quality"});
-  expect_refused({"batch", folder_.path(), "-o", folder_ / "r.log", "--hypotheses", "100"},
-                 {"--hypotheses", "--preset default"});
+  expect_refused({"batch", folder_.path(), "-o", folder_ / "r.log", "--set", "quadruples.count=1"},
+                 {"--set quadruples.count=1", "method compatibility"});
 }
 
 TEST_F(Usage, MessagesStayInOneLine) {

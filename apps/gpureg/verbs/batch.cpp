@@ -203,8 +203,6 @@ void add_batch(CLI::App& app, Action& chosen) {
   verb->add_option("--up", o->up,
                    "Vertical direction x,y,z in all fragments, and perhaps how many degrees it may "
                    "be off (without: 10): 0,0,1,5");
-  verb->add_flag("--accept-symmetry", o->method.accept_symmetry,
-                 "Also report a pose that a symmetry makes one of several equivalent ones");
   verb->add_option("-o,--output", o->log, "Redwood log of the aligned pairs: T_ij, j into i")
       ->required();
   verb->add_option("--info", o->info, "Redwood information matrices of the same pairs");

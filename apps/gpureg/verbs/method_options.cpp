@@ -10,6 +10,7 @@
 #include "gpureg/voxel_size.hpp"
 #include "records/calibration_file.hpp"
 #include "text.hpp"
+#include "verbs/set_option.hpp"
 
 namespace gpureg::cli {
 
@@ -21,6 +22,15 @@ std::string check_natural(const std::string& text) {
   errno = 0;
   if (digits) std::strtoull(text.c_str(), nullptr, 10);
   return digits && errno == 0 ? "" : text + " is no whole number from 0 to 2^64 - 1";
+}
+
+/// Groups of options of the other method would change nothing.
+void refuse_idle(const RegistrationOptions& options, const std::string& assignment) {
+  const bool quadruples = options.method == RegistrationMethod::quadruples;
+  const std::string group = assignment.substr(0, assignment.find('.'));
+  if (quadruples ? group == "compatibility" || group == "evidence" : group == "quadruples")
+    throw InvalidArgument("--set " + assignment + " does nothing with the method " +
+                          to_string(options.method));
 }
 
 }  // namespace
@@ -53,10 +63,6 @@ void MethodOptions::add_to(CLI::App& verb) {
   verb.add_option("--threads", threads, "Threads of the CPU backend; 0: all")
       ->check(natural_number())
       ->capture_default_str();
-  verb.add_option("--hypotheses", hypotheses,
-                  "Quadruples of matches that the preset loopsmart tries per pair")
-      ->check(natural_number())
-      ->capture_default_str();
   verb.add_option("--quality", quality,
                   "From 0, the fastest, to 10, the highest recall; of the preset default")
       ->check(CLI::Range(0u, kHighestQuality))
@@ -67,6 +73,11 @@ void MethodOptions::add_to(CLI::App& verb) {
   verb.add_option("--min-score", min_score,
                   "Report a pair from this confidence on (without: 0.5); with --preset loopsmart, "
                   "from this inlier ratio on (0.3). 0: every best candidate");
+  verb.add_option("--set", set,
+                  "Any other option under its name in the JSON, for experts: evidence.sample=1024, "
+                  "accept_symmetry=true; may be repeated")
+      ->type_name("NAME=VALUE")
+      ->allow_extra_args(false);
 }
 
 void MethodOptions::add_calibration_to(CLI::App& verb) {
@@ -86,16 +97,12 @@ void MethodOptions::note_calibration() const {
 }
 
 RegistrationOptions MethodOptions::registration() const {
-  const char* idle = preset == "loopsmart" ? "--quality" : "--hypotheses";
-  if (given(idle))
-    throw InvalidArgument(std::string(idle) + " does nothing with --preset " + preset +
-                          (given("--preset") ? "" : ", which is the default"));
+  if (preset == "loopsmart" && given("--quality"))
+    throw InvalidArgument("--quality does nothing with --preset loopsmart");
   RegistrationOptions options = preset == "loopsmart"
                                     ? RegistrationOptions::loopsmart(voxel_size)
                                     : RegistrationOptions::from_voxel_size(voxel_size, quality);
-  options.quadruples.count = hypotheses;
   options.seed = seed;
-  options.accept_symmetry = accept_symmetry;
   if (!calibration.empty()) {
     if (options.method == RegistrationMethod::quadruples)
       throw InvalidArgument(
@@ -109,6 +116,8 @@ RegistrationOptions MethodOptions::registration() const {
     options.quadruples.min_inlier_ratio = static_cast<float>(*min_score);
   else if (min_score)
     options.min_confidence = *min_score;
+  for (const std::string& assignment : set) set_option(options, assignment);
+  for (const std::string& assignment : set) refuse_idle(options, assignment);
   options.validate();
   return options;
 }

@@ -17,14 +17,13 @@ namespace gpureg::cli {
 struct MethodOptions {
   float voxel_size = PrepareOptions{}.voxel_size;
   bool automatic_voxel_size = false;  ///< to be chosen by the clouds, see choose_voxel_size
-  bool accept_symmetry = false;
   std::string preset = "default";
   std::string backend = "auto";
   unsigned threads = 0;
-  std::uint32_t hypotheses = QuadrupleOptions{}.count;
   std::uint32_t quality = kDefaultQuality;
   std::uint64_t seed = RegistrationOptions{}.seed;
   std::optional<double> min_score;  ///< none: the preset's own
+  std::vector<std::string> set;     ///< further options, as "evidence.sample=1024"
   std::string calibration;          ///< file of `gpureg calibrate`; empty: none
 
   void add_to(CLI::App& verb);

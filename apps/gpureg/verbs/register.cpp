@@ -295,8 +295,6 @@ void add_register(CLI::App& app, Action& chosen) {
       "--up", o->up,
       "Vertical direction x,y,z in both clouds, and perhaps how many degrees it may be "
       "off (without: 10): 0,0,1,5");
-  verb->add_flag("--accept-symmetry", o->method.accept_symmetry,
-                 "Also report a pose that a symmetry makes one of several equivalent ones");
   verb->add_option("--json", o->json, "Write options, result, counts and times");
   verb->add_option("--overlay", o->overlay, "Write both clouds in colour, aligned, as PLY");
   verb->add_option("--image", o->image, "Draw both clouds before and after, as PNG");
