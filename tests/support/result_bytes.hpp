@@ -2,8 +2,11 @@
 #pragma once
 
 #include <cstddef>
+#include <string>
 #include <vector>
 
+#include "fields/evidence.hpp"
+#include "fields/statistics.hpp"
 #include "gpureg/result.hpp"
 
 namespace gpureg::test {
@@ -25,16 +28,11 @@ class ByteWriter {
   std::vector<char> all;
 };
 
-inline void add(ByteWriter& out, const PoseEvidence& e) {
-  // Everything behind the count is a double: a new field is compared, too.
-  constexpr std::size_t kFirst = offsetof(PoseEvidence, match_support);
-  out.add(e.match_inliers);
-  out.append(reinterpret_cast<const char*>(&e) + kFirst, sizeof e - kFirst);
-}
-
-inline void add(ByteWriter& out, const RegistrationStatistics& s) {
-  out.add(s.source_points, s.target_points, s.correspondences, s.hypotheses, s.survivors, s.scored,
-          s.points_scored, s.consensus, s.inliers, s.refine_iterations, s.swapped);
+/// A struct whose fields are described.
+template <typename T>
+void add_fields(ByteWriter& out, const T& object) {
+  fields::each<T>(
+      [&](const std::string&, auto member, const fields::Field&) { out.add(object.*member); });
 }
 
 inline void add(ByteWriter& out, const CorrespondenceMoments& m) {
@@ -48,7 +46,7 @@ inline void add(ByteWriter& out, const CorrespondenceMoments& m) {
 inline void add(ByteWriter& out, const RegistrationMode& mode) {
   out.add_matrix(mode.target_from_source.matrix());
   out.add(mode.confidence, mode.overlap_confidence, mode.rank_before_refinement, mode.equivalent);
-  add(out, mode.evidence);
+  add_fields(out, mode.evidence);
 }
 
 /// Everything but the timings, as bytes.
@@ -57,7 +55,7 @@ inline std::vector<char> bytes(const RegistrationResult& r) {
   out.add_matrix(r.target_from_source.matrix());
   out.add(r.status, r.reason, r.has_candidate, r.score, r.inlier_ratio, r.inlier_rmse,
           r.source_viewpoint, r.target_viewpoint);
-  add(out, r.statistics);
+  add_fields(out, r.statistics);
   add(out, r.source_moments);
   add(out, r.target_moments);
   for (const RegistrationMode& mode : r.modes) add(out, mode);
