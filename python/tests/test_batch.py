@@ -306,7 +306,7 @@ class TestCommand:
         self.compare(
             folder,
             tmp_path,
-            ["--preset", "loopsmart", "--hypotheses", 20000, "--voxel-size", 0.06],
+            ["--preset", "loopsmart", "--set", "quadruples.count=20000", "--voxel-size", 0.06],
             options,
         )
 
