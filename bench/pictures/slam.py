@@ -19,10 +19,12 @@ import pathlib
 import numpy as np
 import render
 from PIL import Image, ImageDraw
+from scipy.spatial import cKDTree
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
-AZIMUTH, ELEVATION = -60, 52  # degrees
+AZIMUTH, ELEVATION = 210, 52  # degrees
 WINDOW = 2.6  # metres that the detail shows
+ALONE = 0.06  # metres to the 16th neighbour
 
 
 def alignment(folder: pathlib.Path, truth: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -41,10 +43,14 @@ class Map:
 
     def __init__(self, folder: pathlib.Path, truth: np.ndarray) -> None:
         surfels = render.read_ply(folder / "map.ply")
+        points = render.columns(surfels, "x y z")
+        alone = cKDTree(points).query(points, 16)[0][:, -1] > ALONE
+        surfels = surfels[~alone]
         rotation, shift = alignment(folder, truth)
         self.points = render.columns(surfels, "x y z") @ rotation.T + shift
         self.normals = render.columns(surfels, "nx ny nz") @ rotation.T
-        self.colours = render.columns(surfels, "red green blue")
+        self.colours = 255 * (render.columns(surfels, "red green blue") / 255) ** 0.75  # brighter
+        self.kept = ~alone
         self.figures = json.loads((folder / "loops.json").read_text())
 
     def draw(self, view, size, centre, radius) -> Image.Image:
@@ -53,11 +59,15 @@ class Map:
 
 def most_moved(before: Map, after: Map) -> np.ndarray:
     """Middle of the cell of furniture that the loops moved most; maps of different surfels: None."""
-    if len(before.points) != len(after.points):
+    if len(before.kept) != len(after.kept):
         return None
-    moved = np.linalg.norm(after.points - before.points, axis=1)
-    shown = (after.points[:, 2] > 0.3) & (after.points[:, 2] < 1.5)
-    cells = np.floor(after.points[shown, :2] / (WINDOW / 2)).astype(int)
+    both = before.kept & after.kept
+    moved = np.linalg.norm(
+        after.points[both[after.kept]] - before.points[both[before.kept]], axis=1
+    )
+    after = after.points[both[after.kept]]
+    shown = (after[:, 2] > 0.3) & (after[:, 2] < 1.5)
+    cells = np.floor(after[shown, :2] / (WINDOW / 2)).astype(int)
     keys, index, count = np.unique(cells, axis=0, return_inverse=True, return_counts=True)
     mean = np.bincount(index.ravel(), moved[shown]) / count
     best = np.where(count > 0.3 * count.max(), mean, 0).argmax()
@@ -100,7 +110,7 @@ def main() -> None:
             frame = [left + 2, top + size[1] + 2, left + size[0] - 3, top + size[1] + below - 3]
             ImageDraw.Draw(page).rectangle(frame, outline=render.GREY)
     arguments.output.parent.mkdir(exist_ok=True)
-    page.save(arguments.output, optimize=True)
+    page.quantize(200, dither=Image.Dither.NONE).save(arguments.output, optimize=True)
 
 
 if __name__ == "__main__":
