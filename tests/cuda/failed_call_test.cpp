@@ -93,7 +93,7 @@ TEST_F(FailedCallOnCuda, ContextAndCloudsAreUsedAgain) {
     cuda_options.memory_budget = budget;
     const Context context = Context::cuda(cuda_options);
     std::size_t failures = 0;
-    for (const std::int64_t allocations : {0, 3, 10, 30, 60, 100, 200}) {
+    for (const std::int64_t allocations : {5, 100}) {
       auto clouds = prepare_batch(context, views, options.prepare);
       failures += fails_after(allocations, context, clouds, many);
       EXPECT_EQ(all_bytes(align_batch(context, clouds, many, options)), expected) << allocations;
