@@ -109,6 +109,8 @@ void check_fragment(const Fragment& fragment) {
 void check_pose(const UnalignedIsometry3d& pose, const std::string& name) {
   if (!pose.matrix().allFinite())
     throw InvalidArgument(name + " has an element that is not finite");
+  if (pose.matrix().row(3) != Eigen::RowVector4d(0, 0, 0, 1))
+    throw InvalidArgument(name + " has a last row other than 0 0 0 1");
   const double farthest = pose.translation().cwiseAbs().maxCoeff();
   if (farthest > kFarthest)
     refuse("the largest coordinate of " + name, farthest, "1e9 metres at most");

@@ -13,7 +13,6 @@ namespace {
 
 using pose_graph::require_confidence;
 using pose_graph::require_information;
-using pose_graph::require_pose;
 
 /// LoopRecord::key has room for so many modes of so many loops.
 constexpr std::size_t kMostModes = 16;
@@ -25,6 +24,12 @@ std::string name_of(const char* what, FragmentId source, FragmentId target) {
 
 void require(bool good, const std::string& name, const char* reason) {
   if (!good) throw InvalidArgument(name + " " + reason);
+}
+
+void require_pose(const UnalignedIsometry3d& pose, const std::string& name) {
+  pose_graph::require_pose(pose, name);
+  require(pose.matrix().row(3) == Eigen::RowVector4d(0, 0, 0, 1), name,
+          "has a last row other than 0 0 0 1");
 }
 
 template <typename Enum>

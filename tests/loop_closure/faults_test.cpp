@@ -67,6 +67,9 @@ TEST_F(LoopCloserFaults, NumbersThatAreNone) {
   Pose scaled = Pose::Identity();
   scaled.linear() *= 1.1;
   refused([&] { closer.add_loop(5, 1, scaled); }, {"not rigid"});
+  Pose projective = Pose::Identity();
+  projective.matrix()(3, 3) = 2;
+  refused([&] { closer.add_loop(5, 1, projective); }, {"target_from_source", "last row"});
   refused([&] { closer.process(kNaN); }, {"milliseconds"});
 }
 
