@@ -1,11 +1,16 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include <unistd.h>
+
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
+#include <optional>
+#include <string>
 
 #include "fields/options.hpp"
 #include "fuzz/bytes.hpp"
 #include "fuzz/targets.hpp"
+#include "gpureg/loop_closure.hpp"
 #include "gpureg/loop_consistency.hpp"
 #include "gpureg/pose_graph/optimize.hpp"
 #include "gpureg/registration.hpp"
@@ -185,6 +190,120 @@ void run_pose_graph(std::string_view input) {
   }
 }
 
+/// Calls of a host in any order, with numbers of any size. What is refused throws at once;
+/// process() takes the rest, and so does a saved state.
+class Host {
+ public:
+  explicit Host(std::string_view input) : bytes_(input), closer_(context(), options()) {}
+
+  void run() {
+    for (int k = 0; k < 60 && !bytes_.empty(); ++k) {
+      try {
+        call(bytes_.below(9));
+      } catch (const InvalidArgument&) {
+      }
+      if (bytes_.below(8) == 0) closer_.process();
+    }
+    closer_.process();
+    for (const loop_closure::FragmentPose& pose : closer_.poses())
+      if (!pose.world_from_fragment.matrix().allFinite()) broken("poses are finite");
+    static const std::string path = "/dev/shm/gpureg-fuzz-" + std::to_string(::getpid());
+    closer_.save(path);
+    closer_.load(path, nullptr);
+    ::unlink(path.c_str());
+  }
+
+ private:
+  static const Context& context() {
+    static const Context one = Context::cpu(1);
+    return one;
+  }
+
+  loop_closure::Options options() {
+    loop_closure::Options out =
+        bytes_.flag() ? loop_closure::Options{} : loop_closure::Options::loopsmart();
+    out.graph.threads = 1;
+    out.optimize = bytes_.flag();
+    if (bytes_.flag()) out.gravity_sigma = 1;
+    return out;
+  }
+
+  /// Mostly of the size of a room.
+  double number() {
+    const double size = bytes_.below(8) == 0 ? std::pow(10.0, int(bytes_.below(40)) - 20) : 5.0;
+    return static_cast<double>(bytes_.number(1)) * size;
+  }
+
+  UnalignedIsometry3d pose() {
+    UnalignedIsometry3d out = UnalignedIsometry3d::Identity();
+    out.linear() =
+        Eigen::Quaterniond(1, number(), number(), number()).normalized().toRotationMatrix();
+    for (int k = 0; k < 3; ++k) out.translation()[k] = number();
+    return out;
+  }
+
+  std::optional<pose_graph::UnalignedMatrix6d> matrix() {
+    if (bytes_.flag()) return std::nullopt;
+    Eigen::Matrix<double, 6, 6> root = Eigen::Matrix<double, 6, 6>::Zero();
+    for (int row = 0; row < 6; ++row)
+      for (int column = 0; column <= row; ++column)
+        if (row == column || bytes_.below(8) == 0) root(row, column) = number();
+    return pose_graph::UnalignedMatrix6d(root * root.transpose());
+  }
+
+  double confidence() { return static_cast<double>(bytes_.take<std::uint8_t>()) / 255; }
+
+  RegistrationResult result() {
+    RegistrationResult out;
+    for (std::uint32_t m = bytes_.below(4); m > 0; --m) {
+      RegistrationMode mode;
+      mode.confidence = confidence();
+      mode.target_from_source = pose();
+      if (bytes_.flag())
+        for (double& eigenvalue : mode.evidence.information_eigenvalues) eigenvalue = number();
+      out.modes.push_back(mode);
+    }
+    out.has_candidate = !out.modes.empty();
+    if (!out.has_candidate) return out;
+    out.target_from_source = out.modes[0].target_from_source;
+    out.score = out.modes[0].confidence;
+    return out;
+  }
+
+  void call(std::uint32_t which) {
+    const loop_closure::FragmentId a = bytes_.below(12), b = bytes_.below(12);
+    switch (which) {
+      case 0:
+      case 1:
+        return closer_.add(
+            {a,
+             bytes_.below(2),
+             number(),
+             {},
+             pose(),
+             bytes_.flag() ? std::optional(Eigen::Vector3d(number(), number(), 1)) : std::nullopt});
+      case 2:
+      case 3:
+        return closer_.add_odometry(a, b, pose(), matrix());
+      case 4:
+        return closer_.add_loop(a, b, pose(), matrix(), confidence());
+      case 5:
+        return closer_.add_result(a, b, result());
+      case 6:
+        return closer_.set_poses({{a, pose()}});
+      case 7:
+        return closer_.remove(a);
+      default:
+        return closer_.set_covisible(a, {b});
+    }
+  }
+
+  Bytes bytes_;
+  loop_closure::LoopCloser closer_;
+};
+
+void run_loop_closer(std::string_view input) { Host(input).run(); }
+
 /// Pairs with modes of any pose and confidence.
 void run_consistency(std::string_view input) {
   Bytes bytes(input);
@@ -221,7 +340,8 @@ std::vector<Target> api_targets() {
   return {{"align", run_align},
           {"verify", run_verify},
           {"pose_graph", run_pose_graph},
-          {"consistency", run_consistency}};
+          {"consistency", run_consistency},
+          {"loop_closer_calls", run_loop_closer}};
 }
 
 }  // namespace gpureg::fuzz
