@@ -8,6 +8,7 @@
 #include "cloud.hpp"
 #include "gpureg/prior.hpp"
 #include "gpureg/registration.hpp"
+#include "interrupt.hpp"
 
 namespace gpureg::python {
 namespace {
@@ -26,22 +27,16 @@ std::vector<Entry> entries_of(const IndexArray& array, const char* name) {
 }
 
 RegistrationResult align_pair(const Context& context, const Cloud& source, const Cloud& target,
-                              const RegistrationOptions& options,
+                              const RegistrationOptions options,
                               const std::optional<IndexArray>& correspondences,
                               const std::optional<RegistrationPrior>& prior) {
-  RegistrationResult result;
-  if (correspondences) {
-    const auto entries = entries_of<Correspondence>(*correspondences, "correspondences");
-    const py::gil_scoped_release release;
-    result = align(context, source.prepared, target.prepared, entries, options);
-  } else if (prior) {
-    const py::gil_scoped_release release;
-    result = align(context, source.prepared, target.prepared, *prior, options);
-  } else {
-    const py::gil_scoped_release release;
-    result = align(context, source.prepared, target.prepared, options);
-  }
-  return result;
+  std::vector<Correspondence> entries;
+  if (correspondences) entries = entries_of<Correspondence>(*correspondences, "correspondences");
+  return interruptible([&] {
+    if (correspondences) return align(context, source.prepared, target.prepared, entries, options);
+    if (prior) return align(context, source.prepared, target.prepared, *prior, options);
+    return align(context, source.prepared, target.prepared, options);
+  });
 }
 
 /// One call of align_batch from Python. Results reach Python between pieces of the batch.
@@ -61,15 +56,11 @@ class Batch {
   /// Returns (results, error). An exception raised between two pieces, by Ctrl-C or by a callback,
   /// does not take the finished results with it.
   py::tuple run(const std::vector<RegistrationPrior>& priors) {
-    {
-      const py::gil_scoped_release release;
-      priors_ = priors;
-      const bool watched = !progress_.is_none() || !on_result_.is_none();
-      if (watched && context_.backend() == Backend::cpu)
-        align_in_pieces();
-      else
-        align_at_once();
-    }
+    priors_ = priors;
+    if (context_.backend() == Backend::cpu)
+      align_in_pieces();
+    else
+      align_at_once();
     deliver();
     if (error_.is_none()) report();
     while (told_ < pairs_.size()) take();  // those never tried
@@ -85,38 +76,50 @@ class Batch {
       const py::gil_scoped_acquire acquire;
       return !report();
     };
+    const py::gil_scoped_release release;
     results_ = align_batch(context_, prepared_, pairs_, priors_, options_, callbacks);
   }
 
-  /// A chunk of the CPU may take seconds; pieces of about kPieceSeconds keep progress moving.
-  /// Results do not depend on the split.
+  /// A chunk of the CPU may take seconds; pieces of about kPieceSeconds keep progress moving, and
+  /// Ctrl-C drops no more than one. Results do not depend on the split.
   void align_in_pieces() {
     // Names whatever is wrong, before the first pair runs.
     BatchCallbacks nothing;
     nothing.should_stop = [] { return true; };
-    results_ = align_batch(context_, prepared_, pairs_, priors_, options_, nothing);
+    results_ = interruptible(
+        [&] { return align_batch(context_, prepared_, pairs_, priors_, options_, nothing); });
     const std::size_t most = 2 * std::size_t{context_.threads()} + 2;  // a chunk of the CPU
     std::size_t piece = 1;
     while (done_ < pairs_.size()) {
-      {
-        const py::gil_scoped_acquire acquire;
-        deliver();
-        if (!error_.is_none() || !report()) return;
-      }
+      deliver();
+      if (!error_.is_none() || !report()) return;
       const std::size_t count = std::min(piece, pairs_.size() - done_);
-      const auto part = [&](const auto& all) {
-        const auto begin = all.begin() + static_cast<std::ptrdiff_t>(done_);
-        return std::vector(begin, begin + static_cast<std::ptrdiff_t>(count));
-      };
       const auto begin = std::chrono::steady_clock::now();
-      auto results = align_batch(context_, prepared_, part(pairs_),
-                                 priors_.empty() ? priors_ : part(priors_), options_);
+      if (!align_next(count)) return;
       const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - begin;
-      for (RegistrationResult& result : results) results_[done_++] = std::move(result);
       const double wanted = kPieceSeconds * static_cast<double>(count) / seconds.count();
       piece = wanted < static_cast<double>(most)
                   ? std::max<std::size_t>(1, static_cast<std::size_t>(wanted))
                   : most;
+    }
+  }
+
+  /// False where Ctrl-C came before the end.
+  bool align_next(std::size_t count) {
+    const auto part = [&](const auto& all) {
+      const auto begin = all.begin() + static_cast<std::ptrdiff_t>(done_);
+      return std::vector(begin, begin + static_cast<std::ptrdiff_t>(count));
+    };
+    try {
+      auto results = interruptible([&] {
+        return align_batch(context_, prepared_, part(pairs_),
+                           priors_.empty() ? priors_ : part(priors_), options_);
+      });
+      for (RegistrationResult& result : results) results_[done_++] = std::move(result);
+      return true;
+    } catch (const py::error_already_set& raised) {
+      error_ = raised.value();
+      return false;
     }
   }
 
@@ -155,7 +158,7 @@ class Batch {
   static constexpr double kPieceSeconds = 0.4;
 
   const Context& context_;
-  const RegistrationOptions& options_;
+  const RegistrationOptions options_;
   std::vector<PreparedCloud> prepared_;  // copies share the data
   std::vector<Pair> pairs_;
   std::vector<RegistrationPrior> priors_;

@@ -24,7 +24,7 @@ py::dict to_dict(const CalibrationCount& count) {
 
 /// Raises what the callback raised, Ctrl-C included, between two pieces.
 CalibrationResult run(const Context& context, const py::sequence& clouds,
-                      const RegistrationOptions& options, const CalibrationOptions& calibration,
+                      const RegistrationOptions options, const CalibrationOptions& calibration,
                       const std::optional<PoseArray>& poses, const py::object& progress) {
   std::vector<Input> inputs;
   std::vector<PointCloudView> views;

@@ -11,6 +11,7 @@
 
 #include "cloud.hpp"
 #include "fields.hpp"
+#include "gpureg/files.hpp"
 #include "gpureg/io.hpp"
 #include "gpureg/mesh.hpp"
 #include "matrix.hpp"
@@ -125,6 +126,7 @@ void bind_files(py::module_& m) {
         return out;
       },
       py::arg("path"));
+  m.def("write_text", &files::write_atomically, py::arg("path"), py::arg("content"), release());
   m.def("read_pairs", &io::read_pairs, py::arg("path"), release());
 }
 

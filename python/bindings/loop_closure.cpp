@@ -109,7 +109,7 @@ void bind_loop_closure(py::module_& m) {
                        float voxel_size, bool loopsmart, bool optimize, double drift_per_metre,
                        double rotation_per_metre) {
              Options options =
-                 loopsmart ? Options::loopsmart() : Options::from_voxel_size(voxel_size);
+                 loopsmart ? Options::loopsmart(voxel_size) : Options::from_voxel_size(voxel_size);
              options.registration = registration;
              options.optimize = optimize;
              options.graph.drift.translation_per_metre = drift_per_metre;

@@ -13,7 +13,7 @@ namespace {
 using IndexArray = py::array_t<std::uint32_t, py::array::c_style>;
 
 std::vector<PairConsistency> consistency_of(const IndexArray& pairs, const py::list& results,
-                                            const LoopConsistencyOptions& options) {
+                                            const LoopConsistencyOptions options) {
   if (pairs.ndim() != 2 || pairs.shape(1) != 2)
     throw py::type_error("pairs: not a matrix with two columns");
   std::vector<Pair> entries(static_cast<std::size_t>(pairs.shape(0)));

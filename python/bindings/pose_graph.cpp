@@ -173,7 +173,7 @@ void bind_pose_graph(py::module_& m) {
   bind_pose_graph_result(m);
   m.def(
       "optimize_pose_graph",
-      [](const Graph& graph, const std::string& robust, bool loopsmart, int threads) {
+      [](const Graph graph, const std::string& robust, bool loopsmart, int threads) {
         Options options = loopsmart ? Options::loopsmart() : Options{};
         if (!loopsmart) options.robust = robust_of(robust);
         options.threads = threads;

@@ -7,6 +7,7 @@
 
 #include "cloud_input.hpp"
 #include "gpureg/registration.hpp"
+#include "interrupt.hpp"
 
 namespace gpureg::python {
 namespace {
@@ -86,18 +87,15 @@ std::vector<Cloud> prepare_clouds(const Context& context, const std::vector<Inpu
 void bind_prepare(py::module_& m) {
   m.def(
       "prepare_batch",
-      [](const Context& context, const py::sequence& clouds, const PrepareOptions& options,
+      [](const Context& context, const py::sequence& clouds, const PrepareOptions options,
          const std::vector<std::string>& names) {
         std::vector<Input> inputs;
         for (const py::handle cloud : clouds) inputs.emplace_back(cloud.cast<py::tuple>());
         if (!names.empty() && names.size() != inputs.size())
           throw py::value_error("names: expected one for each cloud");
         if (options.depth_maps > 0) warn_of_viewpoints(inputs, names);
-        std::vector<Cloud> prepared;
-        {
-          const py::gil_scoped_release release;
-          prepared = prepare_clouds(context, inputs, options, names);
-        }
+        std::vector<Cloud> prepared =
+            interruptible([&] { return prepare_clouds(context, inputs, options, names); });
         py::list out;
         for (Cloud& cloud : prepared) out.append(py::cast(std::move(cloud)));
         return out;

@@ -2,6 +2,7 @@
 #include "gpureg/time_budget.hpp"
 
 #include "cloud.hpp"
+#include "interrupt.hpp"
 
 namespace gpureg::python {
 
@@ -17,10 +18,10 @@ void bind_time_budget(py::module_& m) {
   m.def(
       "align_within",
       [](const Context& context, const Cloud& source, const Cloud& target, double milliseconds,
-         const RegistrationOptions& options) {
-        const py::gil_scoped_release release;
-        T out = align_within(context, source.prepared, target.prepared, milliseconds, options);
-        return out;
+         const RegistrationOptions options) {
+        return interruptible([&] {
+          return align_within(context, source.prepared, target.prepared, milliseconds, options);
+        });
       },
       py::arg("context"), py::arg("source"), py::arg("target"), py::arg("milliseconds"),
       py::arg("options"));

@@ -6,6 +6,7 @@
 #include <cstdio>
 
 #include "cloud.hpp"
+#include "interrupt.hpp"
 #include "matrix.hpp"
 
 namespace gpureg::python {
@@ -26,14 +27,15 @@ std::vector<UnalignedIsometry3d> poses_of(const PoseArray& array) {
 
 std::vector<PoseVerification> verify(const Context& context, const Cloud& source,
                                      const Cloud& target, const PoseArray& poses,
-                                     const RegistrationOptions& options, bool refine,
+                                     const RegistrationOptions options, bool refine,
                                      bool search_alternatives) {
   const std::vector<UnalignedIsometry3d> given = poses_of(poses);
   VerificationOptions verification;
   verification.refine = refine;
   verification.search_alternatives = search_alternatives;
-  const py::gil_scoped_release release;
-  return verify_poses(context, source.prepared, target.prepared, given, options, verification);
+  return interruptible([&] {
+    return verify_poses(context, source.prepared, target.prepared, given, options, verification);
+  });
 }
 
 }  // namespace

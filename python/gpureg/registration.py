@@ -73,6 +73,11 @@ def align(
         ``target_from_source`` maps points of the source into the target's frame. Not aligned is a
         status with a reason, not an exception.
 
+    Raises
+    ------
+    KeyboardInterrupt
+        After Ctrl-C, within a fraction of a second on the CPU; nothing runs on.
+
     Examples
     --------
     >>> import numpy as np, gpureg

@@ -5,10 +5,13 @@
 
 #include <algorithm>
 #include <atomic>
+#include <chrono>
 #include <random>
 #include <stdexcept>
+#include <thread>
 
 #include "common/radix_sort.hpp"
+#include "common/stop_scope.hpp"
 
 namespace gpureg::cpu {
 namespace {
@@ -51,6 +54,28 @@ TEST(Exec, RethrowsAndStaysUsable) {
   std::atomic<int> sum{0};
   exec.parallel(100, [&](std::size_t) { ++sum; });
   EXPECT_EQ(sum, 100);
+}
+
+TEST(Exec, StopsWhereTheCallerSaysSo) {
+  for (const unsigned threads : {1u, 4u}) {
+    Exec exec(threads);
+    const auto wait = [](std::size_t) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    };
+    int asked = 0;
+    {
+      const StopScope scope([&] {
+        EXPECT_TRUE(StopScope::asking());
+        return ++asked == 2;
+      });
+      // Ten seconds of work at four threads: ends long before.
+      EXPECT_THROW(exec.parallel(40000, wait), Stopped);
+      EXPECT_FALSE(StopScope::asking());
+    }
+    EXPECT_EQ(asked, 2);
+    exec.parallel(200, wait);  // nobody asks any more
+    EXPECT_EQ(asked, 2);
+  }
 }
 
 TEST(RadixSort, IsStableAndSorts) {

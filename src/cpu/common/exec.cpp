@@ -2,6 +2,7 @@
 #include "cpu/common/exec.hpp"
 
 #include "common/host_threads.hpp"
+#include "common/stop_scope.hpp"
 
 namespace gpureg::cpu {
 
@@ -27,6 +28,7 @@ void Exec::run_tasks() {
     lock.unlock();
     std::exception_ptr error;
     try {
+      StopScope::poll();
       (*task_)(k);
     } catch (...) {
       error = std::current_exception();
@@ -50,10 +52,14 @@ void Exec::worker() {
   }
 }
 
+// Asks the StopScope of the caller between the tasks.
 void Exec::parallel(std::size_t count, const std::function<void(std::size_t)>& task) {
   if (count == 0) return;
   if (workers_.empty() || count == 1) {
-    for (std::size_t k = 0; k < count; ++k) task(k);
+    for (std::size_t k = 0; k < count; ++k) {
+      StopScope::poll();
+      task(k);
+    }
     return;
   }
   std::unique_lock<std::mutex> lock(mutex_);
