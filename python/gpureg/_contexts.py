@@ -26,7 +26,7 @@ def default_context() -> Context:
     """
     global _default
     with _default_lock:
-        if any(context is not None and context.backend == "cuda" for context in _abandoned):
+        if _cuda_lost:
             raise BackendUnavailable(
                 "CUDA does not survive a fork: start processes by multiprocessing's 'spawn' or 'forkserver', or name a context of the CPU"
             )
@@ -36,15 +36,13 @@ def default_context() -> Context:
 
 
 def _forget_default() -> None:
-    global _default, _default_lock
+    global _default, _default_lock, _cuda_lost
     _default_lock = threading.Lock()
-    # The parent's threads do not exist here: joining them would wait for ever, so it is never
-    # freed.
-    _abandoned.append(_default)
+    _cuda_lost = _cuda_lost or (_default is not None and _default.backend == "cuda")
     _default = None
 
 
-_abandoned: list[Context | None] = []
+_cuda_lost = False
 os.register_at_fork(after_in_child=_forget_default)
 
 
