@@ -117,8 +117,8 @@ struct Options {
 
   /// Verification by the constants of LoopSmart: pose_graph::Options::loopsmart(), information of
   /// loops from their correspondences, one mode per pair, no rule but the line process. See there
-  /// for the drift that it tolerates.
-  static Options loopsmart();
+  /// for the drift that it tolerates. The lengths are those of from_voxel_size().
+  static Options loopsmart(float voxel_size = 0.05f);
 
   /// true: Loop::information is the sum of G'G over correspondences (LoopSmart's equation of f);
   /// false: from `noise`.

@@ -38,8 +38,10 @@ class LoopCloser:
 
     Parameters
     ----------
-    voxel_size : float
-        Metres; every other length follows from it.
+    voxel_size : float, optional
+        Metres; every other length follows from it. Default: that of the options, else 0.05.
+    options : RegistrationOptions, optional
+        Of the registrations. Default: those of the voxel size.
     loopsmart : bool
         Verification by the constants of the LoopSmart paper, which need odometry that is nearly
         exact.
@@ -67,7 +69,7 @@ class LoopCloser:
     def __init__(
         self,
         *,
-        voxel_size: float = 0.05,
+        voxel_size: float | None = None,
         options: RegistrationOptions | None = None,
         loopsmart: bool = False,
         optimize: bool = True,
@@ -76,9 +78,10 @@ class LoopCloser:
         context: Context | None = None,
     ) -> None:
         self._context = context_of(context)
-        self._options = checked(
-            options, RegistrationOptions, "options"
-        ) or RegistrationOptions.from_voxel_size(voxel_size)
+        options = checked(options, RegistrationOptions, "options")
+        if voxel_size is None:
+            voxel_size = (options or RegistrationOptions()).prepare.voxel_size
+        self._options = options or RegistrationOptions.from_voxel_size(voxel_size)
         self._core = _core.LoopCloser(
             self._context,
             self._options,

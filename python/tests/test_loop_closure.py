@@ -61,6 +61,27 @@ def test_a_host_that_optimises_gets_no_poses():
     assert np.array_equal(closer.poses[3], planar(1, 2, 3))
 
 
+@pytest.mark.parametrize("loopsmart", [False, True])
+def test_lengths_follow_the_voxel_size(loopsmart):
+    """The noise of a host's loop without information is a voxel, 5 cm at 5 cm."""
+
+    def noise(**keywords):
+        cpu = gpureg.Context.cpu(1)
+        closer = gpureg.LoopCloser(loopsmart=loopsmart, context=cpu, **keywords)
+        drifting(closer, lap())
+        closer.add_loop(19, 0, np.linalg.inv(lap()[0]) @ lap()[19], confidence=0.95)
+        closer.process()
+        (loop,) = closer.loops
+        return loop.information[3, 3] ** -0.5
+
+    coarse = gpureg.RegistrationOptions.from_voxel_size(0.2)
+    # The voxel size is a float32: 7 digits.
+    assert noise() == pytest.approx(0.05, rel=1e-6)
+    assert noise(voxel_size=0.2) == pytest.approx(0.2, rel=1e-6)
+    assert noise(options=coarse) == pytest.approx(0.2, rel=1e-6)
+    assert noise(options=coarse, voxel_size=0.1) == pytest.approx(0.1, rel=1e-6)
+
+
 def test_faults_name_what_is_wrong(closer):
     closer.add(1)
     with pytest.raises(gpureg.InvalidArgument, match="fragment 1"):

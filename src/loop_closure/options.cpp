@@ -15,9 +15,11 @@ Options Options::from_voxel_size(float voxel_size) {
   return options;
 }
 
-Options Options::loopsmart() {
-  Options options;
+Options Options::loopsmart(float voxel_size) {
+  Options options = from_voxel_size(voxel_size);
+  const pose_graph::LoopNoiseOptions loop_noise = options.graph.loop_noise;
   options.graph = pose_graph::Options::loopsmart();
+  options.graph.loop_noise = loop_noise;
   options.information_from_correspondences = true;
   options.accept_by_graph_alone = true;
   options.drift_correlation = 0;

@@ -185,6 +185,16 @@ TEST(LoopStates, TheFactorIsThatOfThePoseGraph) {
   graph.validate();
 }
 
+TEST(LoopStates, LengthsOfLoopsmartFollowTheVoxelSize) {
+  const loop_closure::Options paper = loop_closure::Options::loopsmart(0.2f),
+                              ours = loop_closure::Options::from_voxel_size(0.2f);
+  EXPECT_EQ(paper.registration.prepare.voxel_size, 0.2f);
+  EXPECT_EQ(paper.proposals.coarse_voxel_size, ours.proposals.coarse_voxel_size);
+  EXPECT_EQ(paper.noise.translation, ours.noise.translation);
+  EXPECT_EQ(paper.graph.loop_noise.translation, ours.graph.loop_noise.translation);
+  EXPECT_EQ(paper.graph.line_process.odometry_weight, 1000);
+}
+
 TEST(LoopStates, LoopsmartAcceptsByTheLineProcessAlone) {
   loop_closure::Options options = loop_closure::Options::loopsmart();
   EXPECT_EQ(options.graph.robust, pose_graph::Robust::line_process);
