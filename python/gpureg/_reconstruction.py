@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _core
-from ._arrays import CoreCloud, index_pairs
+from ._arrays import CoreCloud, float64, index_pairs
 from ._contexts import checked, context_of
 from ._core import Context, MapGraph, RegistrationOptions, RegistrationResult
 from ._map import Map, Poses
@@ -105,7 +105,7 @@ def reconstruct(
         min_island,
         np.asarray(drift, np.float64),
         _odometry(odometry, fragments),
-        0,
+        context.threads if context.backend == "cpu" else 0,
     )
     refinement = _refine(graph, fragments, options, context, progress) if refine else None
     return Map(graph, fragments, options, refinement)
@@ -184,7 +184,7 @@ def _odometry(odometry: Any, fragments: FragmentSet) -> Any:
     if isinstance(odometry, str | os.PathLike):
         return _from_trajectory(os.fspath(odometry), fragments)
     if hasattr(odometry, "shape"):
-        poses = np.ascontiguousarray(odometry, np.float64)
+        poses = float64(odometry, "odometry")
         if poses.shape != (len(fragments), 4, 4):
             raise ValueError(
                 f"odometry: expected shape ({len(fragments)}, 4, 4), got {poses.shape}"
@@ -197,7 +197,7 @@ def _odometry(odometry: Any, fragments: FragmentSet) -> Any:
         numbers = np.asarray([[entry[0], entry[1]]], np.int64)
         source, target = _positions(fragments, numbers, f"odometry[{k}]")[0].tolist()
         information = entry[3] if len(entry) == 4 else None
-        out.append((source, target, np.asarray(entry[2], np.float64), information))
+        out.append((source, target, float64(entry[2], f"odometry[{k}]"), information))
     return out
 
 

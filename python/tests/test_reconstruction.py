@@ -56,6 +56,22 @@ def test_points_of_the_map(map_of_scans, scans):
         map_of_scans.points(1)
 
 
+def test_the_threads_are_those_of_the_context(map_of_scans, scans, monkeypatch):
+    from gpureg import _core
+
+    pairs = [(j, i) for i in range(3) for j in range(i + 1, 3)]
+    results = gpureg.align_batch(scans[:3], pairs, options=OPTIONS)
+    given, make = [], _core.reconstruct_map
+    monkeypatch.setattr(
+        _core, "reconstruct_map", lambda *values: given.append(values[-1]) or make(*values)
+    )
+    context = gpureg.Context.cpu(3)
+    gpureg.reconstruct(
+        scans[:3], pairs, results=results, refine=False, options=OPTIONS, context=context
+    )
+    assert given == [context.threads] == [3]
+
+
 def test_same_map_from_results(map_of_scans, scans):
     pairs = [(j, i) for i in range(7) for j in range(i + 1, 7)]
     results = gpureg.align_batch(scans, pairs, options=OPTIONS)
