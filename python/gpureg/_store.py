@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import contextlib
 import fcntl
+import hashlib
 import json
 import os
 import shutil
@@ -23,9 +24,11 @@ from ._table import Key, entries_of, table_of
 
 Row = dict[str, Any]
 
+_DIGEST = 16  # bytes before the Parquet data of a chunk: their digest
+
 
 class Store:
-    """run.json says what the run is; chunks/NNNNNN.parquet are finished chunks; results.parquet,
+    """run.json says what the run is; chunks/NNNNNN.chunk are finished chunks; results.parquet,
     result.log and result.info, made of them at the end, replace them."""
 
     def __init__(self, folder: Path, plan: Plan, resume: bool) -> None:
@@ -95,18 +98,18 @@ class Store:
         """Numbers of the chunks that are done."""
         if self.complete:
             return set(range(self._plan.chunks))
-        return {int(path.stem) for path in self._chunks.glob("*.parquet") if path.stem.isdigit()}
+        return {int(path.stem) for path in self._chunks.glob("*.chunk") if path.stem.isdigit()}
 
     def partial(self, chunk: int) -> dict[Key, Row]:
         """What an interrupted run has left of a chunk."""
         path = self._chunks / f"{chunk:06d}.partial"
         if not path.exists():
             return {}
-        return {(row["i"], row["j"]): row for row in read_table(path).to_pylist()}
+        return {(row["i"], row["j"]): row for row in read_chunk(path).to_pylist()}
 
     def write(self, chunk: int, rows: Sequence[Row]) -> None:
         """A finished chunk, on disk when this returns."""
-        self._write_rows(self._chunks / f"{chunk:06d}.parquet", rows)
+        self._write_rows(self._chunks / f"{chunk:06d}.chunk", rows)
         (self._chunks / f"{chunk:06d}.partial").unlink(missing_ok=True)
 
     def write_partial(self, chunk: int, rows: Sequence[Row]) -> None:
@@ -114,7 +117,10 @@ class Store:
             self._write_rows(self._chunks / f"{chunk:06d}.partial", rows)
 
     def _write_rows(self, path: Path, rows: Sequence[Row]) -> None:
-        _write(path, lambda temporary: pq.write_table(table_of(rows), temporary))
+        stream = pa.BufferOutputStream()
+        pq.write_table(table_of(rows), stream)
+        data = stream.getvalue().to_pybytes()
+        _write(path, lambda temporary: temporary.write_bytes(_digest(data) + data))
 
     def conclude(self) -> None:
         """All chunks into one table and the two Redwood files; memory holds the aligned pairs'
@@ -141,7 +147,7 @@ class Store:
 
     def _read(self) -> Iterator[pa.Table]:
         for chunk in range(self._plan.chunks):
-            yield read_table(self._chunks / f"{chunk:06d}.parquet")
+            yield read_chunk(self._chunks / f"{chunk:06d}.chunk")
 
     def _merge(self, temporary: Path) -> None:
         with contextlib.ExitStack() as stack:
@@ -150,6 +156,18 @@ class Store:
                 if writer is None:
                     writer = stack.enter_context(pq.ParquetWriter(temporary, table.schema))
                 writer.write_table(table)
+
+
+def read_chunk(path: Path) -> pa.Table:
+    """The rows of a chunk, or of a part of one. A changed bit would otherwise become a result."""
+    content = path.read_bytes()
+    if _digest(content[_DIGEST:]) != content[:_DIGEST]:
+        raise IoError(f"output: {path} is damaged (its checksum differs); resume=False starts anew")
+    return pq.read_table(pa.BufferReader(content[_DIGEST:]))
+
+
+def _digest(data: bytes) -> bytes:
+    return hashlib.blake2b(data, digest_size=_DIGEST).digest()
 
 
 def read_table(path: Path, columns: list[str] | None = None) -> pa.Table:

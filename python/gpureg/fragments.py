@@ -13,10 +13,10 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _core
-from ._arrays import CoreCloud, core_cloud, several
+from ._arrays import CoreCloud, core_cloud, several, to_numpy
 from ._core import PrepareOptions
 
-_ENDS = 1 << 16  # bytes at either end of a file that its fingerprint looks at
+_PIECE = 1 << 20  # bytes of a file that are in memory while its fingerprint is made
 
 
 class FragmentSet:
@@ -100,18 +100,13 @@ class FragmentSet:
         )
 
     def fingerprint(self, position: int) -> str:
-        """Tells whether a fragment is the one that an earlier run saw: by size and both ends of its
-        data.
-        """
+        """Tells whether a fragment is the one that an earlier run saw: a digest of all its data."""
         digest = hashlib.blake2b(digest_size=16)
         source = self._sources[position]
         if isinstance(source, str | os.PathLike):
-            size = os.stat(source).st_size
-            digest.update(str(size).encode())
             with open(source, "rb") as file:
-                digest.update(file.read(_ENDS))
-                file.seek(max(0, size - _ENDS))
-                digest.update(file.read(_ENDS))
+                while piece := file.read(_PIECE):
+                    digest.update(piece)
         else:
             for part in self.load(position, PrepareOptions())[:5]:
                 digest.update(b"-" if part is None else np.ascontiguousarray(part).tobytes())
@@ -146,7 +141,7 @@ class FragmentSet:
             return np.stack(np.triu_indices(len(self), 1), axis=1)
         if callable(pairs):
             pairs = pairs(self)
-        chosen = np.asarray(pairs if hasattr(pairs, "shape") else list(pairs))
+        chosen = to_numpy(pairs if hasattr(pairs, "shape") else list(pairs), "pairs")
         if chosen.size == 0:
             return np.zeros((0, 2), np.int64)
         if chosen.dtype.kind not in "iu" or chosen.ndim != 2 or chosen.shape[1] != 2:

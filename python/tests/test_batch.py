@@ -135,7 +135,7 @@ def test_ten_kills(whole, tmp_path):
         assert child.stdout.readline() == "started\n"
         if kill % 3 == 1:  # a slow machine, too, shall have finished something
             before = len(kept[-1])
-            while len(list((tmp_path / "chunks").glob("*.parquet"))) <= before:
+            while len(list((tmp_path / "chunks").glob("*.chunk"))) <= before:
                 assert child.poll() is None
                 time.sleep(0.01)
         elif kill % 3 == 2:
@@ -149,7 +149,7 @@ def test_ten_kills(whole, tmp_path):
         child.stdout.close()
         chunks = tmp_path / "chunks"
         kept.append(
-            {p.name: p.stat().st_mtime_ns for p in chunks.glob("*.parquet")}
+            {p.name: p.stat().st_mtime_ns for p in chunks.glob("*.chunk")}
             if chunks.exists()
             else {}
         )
@@ -195,7 +195,7 @@ def test_an_error_stops_the_run_and_keeps_the_rest(whole, tmp_path):
         gpureg.register_all(
             fragments, output=tmp_path / "a", options=few(100, 0.1), progress=False, chunk_size=8
         )
-    assert list((tmp_path / "a" / "chunks").glob("*.parquet"))
+    assert list((tmp_path / "a" / "chunks").glob("*.chunk"))
 
 
 def test_progress_moves_within_a_chunk(tmp_path):
@@ -386,6 +386,31 @@ def test_damaged_files_are_named(tmp_path):
     run.parquet.unlink()
     with pytest.raises(FileNotFoundError, match="results.parquet"):
         run.table()
+
+
+@pytest.mark.parametrize("suffix", [".chunk", ".partial"])
+def test_a_changed_bit_is_not_resumed(tmp_path, suffix):
+    clouds = many.fragments()[:3]
+    keywords = {"output": tmp_path, "options": few(10, 0.08), "progress": False, "chunk_size": 2}
+    with pytest.MonkeyPatch.context() as patch, pytest.raises(RuntimeError, match="killed"):
+        patch.setattr(gpureg._store.Store, "conclude", killed)
+        gpureg.register_all(clouds, **keywords)
+    chunk = tmp_path / "chunks" / "000000.chunk"
+    chunk = chunk.rename(chunk.with_suffix(suffix))
+    whole = chunk.read_bytes()
+    rng = random.Random(1)
+    for place in [0, len(whole) - 1, *rng.sample(range(len(whole)), 50)]:
+        flipped = bytearray(whole)
+        flipped[place] ^= 1 << rng.randrange(8)
+        chunk.write_bytes(flipped)
+        with pytest.raises(gpureg.IoError, match=f"000000{suffix} is damaged .*checksum"):
+            gpureg.register_all(clouds, **keywords)
+    chunk.write_bytes(whole)
+    assert gpureg.register_all(clouds, **keywords).pairs == 3
+
+
+def killed(store):
+    raise RuntimeError("killed")
 
 
 @pytest.mark.parametrize("name", ["memory", "chunk_size"])

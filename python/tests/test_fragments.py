@@ -37,6 +37,17 @@ def test_fingerprints_tell_clouds_apart(folder):
     assert clouds.fingerprint(0) != clouds.fingerprint(1)
 
 
+def test_a_fingerprint_sees_the_middle_of_a_file(tmp_path):
+    path = tmp_path / "cloud_bin_0.ply"
+    gpureg.write_point_cloud(path, np.random.default_rng(1).random((20_000, 3)))
+    fragments = gpureg.FragmentSet.from_directory(tmp_path)
+    before = fragments.fingerprint(0)
+    with open(path, "r+b") as file:
+        file.seek(path.stat().st_size // 2)
+        file.write(b"\0\0\0\0")
+    assert fragments.fingerprint(0) != before
+
+
 def test_pairs():
     fragments = gpureg.FragmentSet([2, 5, 9, 12], [None] * 4)
     assert len(fragments.choose_pairs("all")) == 6
