@@ -42,7 +42,12 @@ _STEPS = 1 << 17
 
 
 def to_numpy(value: Any, name: str) -> npt.NDArray[Any]:
-    """An array on the host that shares memory with value where that is possible."""
+    """An array on the host that shares memory with value where that is possible.
+
+    Raises ValueError for a masked array with masked entries: what they hold is not meant.
+    """
+    if isinstance(value, np.ma.MaskedArray):
+        value = _unmasked(value, name)
     if isinstance(value, np.ndarray):
         return value
     if hasattr(value, "detach"):  # a tensor that is part of a graph refuses DLPack
@@ -60,6 +65,21 @@ def to_numpy(value: Any, name: str) -> npt.NDArray[Any]:
         return np.asarray(value)
     except (TypeError, ValueError) as error:  # such as rows of different lengths
         raise TypeError(f"{name}: no array can be made of this {_kind(value)}: {error}") from None
+
+
+def _unmasked(value: np.ma.MaskedArray[Any, Any], name: str) -> npt.NDArray[Any]:
+    mask = np.ma.getmaskarray(value)
+    if mask.any():
+        row = int(np.argwhere(mask)[0][0])
+        raise ValueError(
+            f"{name}: row {row} is masked, as are {int(mask.sum())} entries; drop such rows first (numpy.ma.compress_rows) (shape {value.shape})"
+        )
+    return value.data
+
+
+def float64(value: Any, name: str) -> npt.NDArray[np.float64]:
+    """Numbers that are no coordinates of a cloud: poses, times, confidences."""
+    return np.asarray(to_numpy(value, name), np.float64, order="C")
 
 
 def _kind(value: Any) -> str:

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from . import _core
-from ._arrays import several
+from ._arrays import float64, several, to_numpy
 from ._contexts import checked, context_of
 from ._core import ConfidenceCalibration, Context, IoError, RegistrationOptions, __version__
 from ._progress import Progress, Report, batch_progress
@@ -54,7 +54,14 @@ class CalibrationRun:
     voxel_size: float
 
     def save(self, path: str | os.PathLike[str]) -> None:
-        """Write the file that ``--calibration`` of the command and `read_calibration` read."""
+        """Write the file that ``--calibration`` of the command and `read_calibration` read,
+        completely or not at all.
+
+        Raises
+        ------
+        IoError
+            Naming the file and the reason.
+        """
         document = {
             "format_version": _FORMAT_VERSION,
             "gpureg": _KIND,
@@ -67,7 +74,7 @@ class CalibrationRun:
             "voxel_size": self.voxel_size,
             "preset": "default",
         }
-        Path(path).write_text(json.dumps(document, indent=1) + "\n")
+        _core.write_text(os.fspath(path), json.dumps(document, indent=1) + "\n")
 
 
 def calibrate(
@@ -130,7 +137,7 @@ def calibrate(
     fragments = fragment_set(clouds)
     known = None
     if poses is not None:
-        known = np.ascontiguousarray(poses, np.float64)
+        known = float64(poses, "poses")
         if known.shape != (len(fragments), 4, 4):
             raise ValueError(
                 f"poses: expected shape ({len(fragments)}, 4, 4), got {np.shape(poses)}"
@@ -183,9 +190,9 @@ def fit_calibration(
     >>> enough, calibration.slope > 1, calibration(0.6) < 0.3
     (True, True, True)
     """
-    values = np.asarray(confidences, np.float64)
-    verdicts = np.asarray(correct)
-    weight = np.ones(values.shape) if weights is None else np.asarray(weights, np.float64)
+    values = float64(confidences, "confidences")
+    verdicts = to_numpy(correct, "correct")
+    weight = np.ones(values.shape) if weights is None else float64(weights, "weights")
     if values.ndim != 1:
         raise ValueError(f"confidences: expected shape (N,), got {values.shape}")
     if verdicts.dtype != np.bool_:

@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _core
+from ._arrays import float64
 from ._core import TrajectoryEvaluation
 
 Format = Literal["auto", "tum", "kitti", "poses"]
@@ -86,8 +87,8 @@ def _arrays(trajectory: Any, format: Format, name: str) -> Arrays:
         return read_trajectory(trajectory, format)
     if not isinstance(trajectory, tuple) or len(trajectory) != 2:
         raise TypeError(f"{name}: expected a path or (times, poses), got {trajectory!r}")
-    times = np.ascontiguousarray(trajectory[0], np.float64)
-    poses = np.ascontiguousarray(trajectory[1], np.float64)
+    times = float64(trajectory[0], name)
+    poses = float64(trajectory[1], name)
     if times.ndim != 1 or poses.shape != (len(times), 4, 4):
         raise ValueError(
             f"{name}: expected shapes (N,) and (N, 4, 4), got {times.shape} and {poses.shape}"

@@ -16,6 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _core
+from ._arrays import to_numpy
 from ._contexts import default_context
 from ._core import Context, PrepareOptions
 from .fragments import FragmentSet, fragment_set
@@ -68,7 +69,7 @@ def describe(features: FloatArray, words: FloatArray) -> FloatArray:
 
 
 def _rows(features: FloatArray) -> FloatArray:
-    return np.ascontiguousarray(features, np.float32)
+    return np.ascontiguousarray(to_numpy(features, "features"), np.float32)
 
 
 def describe_all(

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from . import _core
+from ._arrays import float64
 from ._contexts import checked, context_of
 from ._core import Context, PoseVerification, RegistrationOptions
 from .preparation import prepared
@@ -62,7 +63,7 @@ def verify(
     """
     options = checked(options, RegistrationOptions, "options") or RegistrationOptions()
     context = context_of(context)
-    matrices = np.asarray(poses, np.float64)
+    matrices = float64(poses, "poses")
     if matrices.ndim == 2:
         matrices = matrices[None]
     if matrices.ndim != 3 or matrices.shape[1:] != (4, 4):

@@ -3,6 +3,8 @@
 
 import json
 import math
+import resource
+import signal
 
 import gpureg
 import numpy as np
@@ -116,6 +118,23 @@ def test_from_clouds_to_results(clouds, tmp_path):
     document = json.loads((tmp_path / "c.json").read_text())
     assert document["samples"] == run.counts and document["voxel_size"] == 0.1
     gpureg.register(*clouds[0][:2], options=options(run.calibration))
+
+
+def test_a_file_that_cannot_be_written_stays_as_it_was(tmp_path):
+    run = gpureg.CalibrationRun(gpureg.ConfidenceCalibration(), True, 0.2, 0.1, {}, 0.05)
+    path = tmp_path / "calibration.json"
+    run.save(path)
+    before = path.read_bytes()
+    limit = resource.getrlimit(resource.RLIMIT_FSIZE)
+    handler = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (len(before) // 2, limit[1]))  # as a full disk
+    try:
+        with pytest.raises(gpureg.IoError, match="cannot write .*calibration.json"):
+            run.save(path)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limit)
+        signal.signal(signal.SIGXFSZ, handler)
+    assert path.read_bytes() == before and list(tmp_path.iterdir()) == [path]
 
 
 def test_poses_decide(clouds):

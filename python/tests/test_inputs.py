@@ -137,6 +137,32 @@ def test_nan_and_infinite_rows_are_dropped_and_counted(source, reference):
     assert len(gpureg.prepare(np.full((4, 3), np.nan))) == 0
 
 
+def test_masked_entries_are_refused(source):
+    mask = np.zeros(source.shape, bool)
+    whole = np.ma.masked_array(source, mask)
+    assert same_points(gpureg.prepare(whole), gpureg.prepare(source))
+    mask[7, 1] = mask[9] = True
+    masked = np.ma.masked_array(source, mask)
+    eyes = np.ma.masked_array(
+        np.tile(np.eye(4), (2, 1, 1)), mask=np.arange(32).reshape(2, 4, 4) > 15
+    )
+    cloud = gpureg.prepare(source)
+    for call, name in [
+        (lambda: gpureg.prepare(masked), "points"),
+        (lambda: gpureg.prepare(source, masked), "normals"),
+        (lambda: gpureg.prepare(source, features=masked), "features"),
+        (lambda: gpureg.prepare(source, viewpoints=masked[:10]), "viewpoints"),
+        (lambda: gpureg.register(source, masked), "target"),
+        (lambda: gpureg.prepare_batch([source, masked]), r"clouds\[1\]"),
+        (lambda: gpureg.suggest_voxel_size([masked]), r"clouds\[0\]"),
+        (lambda: gpureg.PointCloud(masked), "points"),
+    ]:
+        with pytest.raises(ValueError, match=rf"^{name}: row 7 is masked, as are 4 entries"):
+            call()
+    with pytest.raises(ValueError, match=r"^poses: row 1 is masked, as are 16 entries"):
+        gpureg.verify(cloud, cloud, eyes)
+
+
 def test_empty_clouds_have_a_reason(source):
     for empty in (np.zeros((0, 3)), np.zeros((0, 3), np.float32), np.zeros((0, 3), np.int64)):
         assert gpureg.register(empty, source).reason == "too_few_source_points"
