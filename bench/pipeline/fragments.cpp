@@ -20,11 +20,11 @@ const std::vector<PointCloud>& fragments() {
     if (!scene && !data) return out;
     const std::string folder = scene ? scene : std::string(data) + "/redkitchen/fragments",
                       cameras = folder + "/cameras.txt";
-    std::map<int, std::vector<Eigen::Vector3f>> viewpoints;
+    std::map<int, std::vector<Eigen::Vector3d>> viewpoints;
     if (std::ifstream(cameras)) viewpoints = io::read_cameras(cameras);
     for (const auto& [number, file] : io::list_fragments(folder)) {
       out.push_back(io::read_point_cloud(file));
-      if (viewpoints.count(number) > 0) out.back().viewpoints = viewpoints[number];
+      if (viewpoints.count(number) > 0) out.back().set_viewpoints(viewpoints[number]);
     }
     return out;
   }();

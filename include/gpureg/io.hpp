@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <Eigen/Geometry>
 #include <map>
 #include <string>
 #include <utility>
@@ -9,30 +8,26 @@
 
 #include "gpureg/point_cloud.hpp"
 
-/// Component `io`: readers of clouds and lists, writers of clouds and overlays. Needs no other
-/// library; every function is thread-safe.
+/// Component `io`: readers of clouds and lists, a writer of clouds. Needs no other library; every
+/// function is thread-safe.
 namespace gpureg::io {
 
 /// Reads a PLY (text or binary of either byte order; of a mesh the vertices, see mesh.hpp for its
 /// faces) or PCD file (text, binary, compressed); of these two the content decides, not the
-/// extension. Coordinates of any numeric type become float. Normals are read where the file has
-/// them. Points with a NaN or infinite coordinate stay; prepare() drops them. A file that is
-/// neither and ends in .bin is a scan of KITTI: rows of float32 x y z reflectance. The VIEWPOINT of
-/// a PCD becomes the viewpoint unless it is the origin. Memory is bounded by the size of the file.
+/// extension. Coordinates of any numeric type become float; where that is too coarse, as for those
+/// of maps, the cloud gets an origin first. Normals are read where the file has them. Points with a
+/// NaN or infinite coordinate stay; prepare() drops them. A file that is neither and ends in .bin
+/// is a scan of KITTI: rows of float32 x y z reflectance. The VIEWPOINT of a PCD becomes the
+/// viewpoint unless it is the origin. Memory is bounded by the size of the file.
 /// @throws IoError naming file (and line, in text) and reason: missing, empty, truncated, a false
 ///   count in the header, no x y z.
 PointCloud read_point_cloud(const std::string& path);
 
-/// Writes a binary PLY with float32 x y z (and normals where the cloud has them), all or nothing.
+/// Writes a binary PLY with x y z (and normals where the cloud has them), all or nothing. x y z are
+/// float32, or double where the cloud has an origin.
 /// @throws IoError where writing fails.
 /// @throws InvalidArgument where the number of normals is neither 0 nor that of the points.
 void write_point_cloud(const std::string& path, const PointCloud& cloud);
-
-/// Writes one coloured binary PLY: the source moved by target_from_source (yellow) and the target
-/// (blue), without non-finite points.
-/// @throws IoError where writing fails.
-void write_overlay(const std::string& path, const PointCloud& source, const PointCloud& target,
-                   const Eigen::Isometry3d& target_from_source);
 
 /// Lists cloud_bin_<i>.ply|pcd|bin|stl|obj of a folder.
 /// @return number and path, ascending by number.
@@ -43,7 +38,7 @@ std::vector<std::pair<int, std::string>> list_fragments(const std::string& folde
 /// starts a comment.
 /// @return camera positions of each fragment, metres, in the order of the file.
 /// @throws IoError naming file and line.
-std::map<int, std::vector<Eigen::Vector3f>> read_cameras(const std::string& path);
+std::map<int, std::vector<Eigen::Vector3d>> read_cameras(const std::string& path);
 
 /// Reads pairs: one `i j` per line, i != j; '#' starts a comment.
 /// @throws IoError naming file and line.

@@ -74,10 +74,18 @@ struct PointCloudView {
 /// Owning point cloud in host memory, made by readers and generators. Empty normals and viewpoints
 /// mean unknown.
 struct PointCloud {
-  std::vector<Eigen::Vector3f> points;      ///< metres
+  std::vector<Eigen::Vector3f> points;      ///< metres, relative to origin
   std::vector<Eigen::Vector3f> normals;     ///< empty, or one per point
-  std::vector<Eigen::Vector3f> viewpoints;  ///< sensor positions in the cloud's frame, may be empty
+  std::vector<Eigen::Vector3f> viewpoints;  ///< sensor positions relative to origin, may be empty
   bool model = false;                       ///< see PointCloudView::model
+  Eigen::Vector3d origin{0, 0, 0};          ///< see PointCloudView::origin
+
+  /// Replaces the viewpoints.
+  /// @param positions of the sensor in the cloud's frame, metres.
+  void set_viewpoints(const std::vector<Eigen::Vector3d>& positions) {
+    viewpoints.clear();
+    for (const Eigen::Vector3d& p : positions) viewpoints.push_back((p - origin).cast<float>());
+  }
 
   /// @return a view, valid as long as the vectors do not change.
   /// @throws InvalidArgument where the number of normals is neither 0 nor that of the points.

@@ -7,16 +7,6 @@
 namespace gpureg::python {
 namespace {
 
-// In the caller's frame: float32 where no origin was taken off, else float64.
-py::object in_frame(const std::vector<Eigen::Vector3f>& rows, const Eigen::Vector3d& origin) {
-  if (origin.isZero(0)) return array_of(rows);
-  py::array_t<double> out({static_cast<py::ssize_t>(rows.size()), py::ssize_t(3)});
-  double* next = out.mutable_data();
-  for (const Eigen::Vector3f& row : rows)
-    for (int k = 0; k < 3; ++k) *next++ = static_cast<double>(row[k]) + origin[k];
-  return std::move(out);
-}
-
 py::array_t<float> features_of(const Cloud& cloud) {
   const std::vector<float> features = cloud.prepared.features();
   py::array_t<float> out({static_cast<py::ssize_t>(cloud.prepared.size()),

@@ -30,9 +30,10 @@ std::vector<Eigen::Vector3f> vectors_of(const py::object& array, const char* nam
   return out;
 }
 
-/// Files are read as float32. Says so where that is too coarse: beyond 1e5, and less than 2^17
-/// steps across the cloud.
+/// Says where the float32 of a file are too coarse: beyond 1e5, and less than 2^17 steps across the
+/// cloud. Other types have an origin then.
 void warn_of_large(const PointCloud& cloud, const std::string& path) {
+  if (!cloud.origin.isZero(0)) return;
   constexpr float kLarge = 1e5f, kSteps = 1 << 17;
   Eigen::Vector3f low = Eigen::Vector3f::Constant(std::numeric_limits<float>::max()), high = -low;
   for (const Eigen::Vector3f& point : cloud.points) {
@@ -47,8 +48,8 @@ void warn_of_large(const PointCloud& cloud, const std::string& path) {
   std::snprintf(numbers, sizeof(numbers), "coordinates up to %.7g resolve %.2g in float32",
                 static_cast<double>(largest), static_cast<double>(step));
   const std::string text = path + ": " + numbers +
-                           ", which files are read as; subtract an offset before they are written, "
-                           "or pass float64 arrays";
+                           ", which the file holds; write it with double coordinates, or subtract "
+                           "an offset before it is written";
   if (PyErr_WarnEx(PyExc_UserWarning, text.c_str(), 2) != 0) throw py::error_already_set();
 }
 
@@ -62,20 +63,24 @@ void bind_files(py::module_& m) {
              // The package converts the arguments, and names those that it refuses.
              const py::tuple parts = py::module_::import("gpureg._arrays")
                                          .attr("stored_cloud")(points, normals, viewpoints);
-             return PointCloud{vectors_of(parts[0], "points"), vectors_of(parts[1], "normals"),
-                               vectors_of(parts[2], "viewpoints"), false};
+             PointCloud cloud{vectors_of(parts[0], "points"), vectors_of(parts[1], "normals"),
+                              vectors_of(parts[2], "viewpoints"), false};
+             if (!parts[3].is_none())
+               cloud.origin =
+                   matrix_of<Eigen::Vector3d>(parts[3].cast<py::array_t<double>>(), "origin");
+             return cloud;
            }),
            py::arg("points"), py::arg("normals") = py::none(), py::arg("viewpoints") = py::none())
       .def("__len__", [](const PointCloud& c) { return c.points.size(); })
       .def_property_readonly(
-          "points", [](const PointCloud& c) { return array_of(c.points); },
-          "(N, 3) float32 copy, metres.")
+          "points", [](const PointCloud& c) { return in_frame(c.points, c.origin); },
+          "(N, 3) copy, metres: float32, or float64 where float32 is too coarse, as for a map.")
       .def_property_readonly(
           "normals", [](const PointCloud& c) { return array_of(c.normals); },
           "(N, 3) float32 copy, or (0, 3) where not known.")
       .def_property_readonly(
-          "viewpoints", [](const PointCloud& c) { return array_of(c.viewpoints); },
-          "(V, 3) float32 copy: sensor positions in the cloud's frame.")
+          "viewpoints", [](const PointCloud& c) { return in_frame(c.viewpoints, c.origin); },
+          "(V, 3) copy: sensor positions in the cloud's frame, of the type of the points.")
       .def_readonly("model", &PointCloud::model, "Sampled from a mesh, with normals outwards.")
       .def("__repr__", [](const PointCloud& c) {
         return "<gpureg.PointCloud, " + std::to_string(c.points.size()) + " points>";
@@ -121,8 +126,12 @@ void bind_files(py::module_& m) {
       "read_cameras",
       [](const std::string& path) {
         py::dict out;
-        for (const auto& [number, positions] : io::read_cameras(path))
-          out[py::int_(number)] = array_of(positions);
+        for (const auto& [number, positions] : io::read_cameras(path)) {
+          Eigen::Matrix<double, Eigen::Dynamic, 3> rows(positions.size(), 3);
+          for (std::size_t k = 0; k < positions.size(); ++k)
+            rows.row(static_cast<Eigen::Index>(k)) = positions[k].transpose();
+          out[py::int_(number)] = array_of(rows);
+        }
         return out;
       },
       py::arg("path"));

@@ -209,7 +209,7 @@ void bind_voxel_map(py::module_& m) {
         const PointCloud cloud = map.cloud();
         const py::object normals =
             cloud.normals.empty() ? py::object(py::none()) : py::object(array_of(cloud.normals));
-        return py::make_tuple(array_of(cloud.points), normals);
+        return py::make_tuple(in_frame(cloud.points, cloud.origin), normals);
       });
 }
 

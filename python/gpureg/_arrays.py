@@ -146,10 +146,19 @@ def origin_of(points: npt.NDArray[Any], voxel_size: float) -> npt.NDArray[np.flo
     bounds = _bounds(points)
     if bounds is None:
         return None
-    low, high, largest = bounds
-    if _step(largest) * _PARTS_OF_VOXEL <= (voxel_size or _MILLIMETRE):
+    if _step(bounds[2]) * _PARTS_OF_VOXEL <= (voxel_size or _MILLIMETRE):
         return None
-    return np.asarray(np.round(low + (high - low) / 2))
+    return _middle(points)[0]
+
+
+def _middle(points: npt.NDArray[Any]) -> tuple[npt.NDArray[np.float64], float]:
+    """Their median, rounded, and the longest side of the middle 90 %: single far points move
+    neither.
+    """
+    finite = points[np.isfinite(points).all(axis=1)]
+    sample = np.asarray(finite[:: len(finite) // 4096 + 1], np.float64)
+    low, median, high = np.percentile(sample, [5, 50, 95], axis=0)
+    return np.round(median), float((high - low).max())
 
 
 def _bounds(
@@ -177,22 +186,17 @@ def _step(largest: float) -> float:
 
 def stored_cloud(
     points: Any, normals: Any, viewpoints: Any
-) -> tuple[FloatArray, FloatArray | None, FloatArray | None]:
-    """What a PointCloud holds. It has no origin: coordinates that need one are refused, not
-    rounded.
+) -> tuple[FloatArray, FloatArray | None, FloatArray | None, npt.NDArray[np.float64] | None]:
+    """What a PointCloud holds: float32 rows, and the origin that was taken off points and
+    viewpoints, or None.
     """
     raw = matrix(points, "points", 3)
-    rows, bounds = float_rows(raw, "points"), _bounds(raw)
+    rows, bounds, origin = float_rows(raw, "points"), _bounds(raw), None
     if bounds is not None and not np.array_equal(rows, raw, equal_nan=True):
-        low, high, largest = bounds
-        step = _step(largest)
-        if step * _PARTS_OF_VOXEL > PrepareOptions().voxel_size and step * _STEPS > float(
-            (high - low).max()
-        ):
-            raise ValueError(
-                f"points: coordinates up to {largest:.7g} resolve {step:.2g} in float32, which clouds and files hold; pass the array itself"
-                f" to prepare or register, where nothing is lost, or subtract an offset (dtype {raw.dtype}, shape {raw.shape})"
-            )
+        step = _step(bounds[2])
+        middle, spread = _middle(raw)
+        if step * _PARTS_OF_VOXEL > PrepareOptions().voxel_size and step * _STEPS > spread:
+            origin, rows = middle, float_rows(raw - middle, "points")
     if normals is not None:
         normals = matrix(normals, "normals", 3)
         # As many as points, or none: that is how a cloud shows that it has none.
@@ -200,8 +204,9 @@ def stored_cloud(
             float_rows(matrix(normals, "normals", 3, len(raw)), "normals") if len(normals) else None
         )
     if viewpoints is not None:
-        viewpoints = float_rows(_finite_viewpoints(viewpoints, "viewpoints"), "viewpoints")
-    return rows, normals, viewpoints
+        views = _finite_viewpoints(viewpoints, "viewpoints")
+        viewpoints = float_rows(views if origin is None else views - origin, "viewpoints")
+    return rows, normals, viewpoints, origin
 
 
 def _finite_viewpoints(value: Any, name: str) -> Any:

@@ -175,7 +175,7 @@ class Map:
 
         Returns
         -------
-        points : (M, 3) float32
+        points : (M, 3) float32, or float64 where float32 is too coarse for map coordinates
         normals : (M, 3) float32 or None
 
         Raises

@@ -16,8 +16,8 @@ Path = str | os.PathLike[str]
 def read_point_cloud(path: Path, *, spacing: float = 0.0) -> PointCloud:
     """Read a PLY or PCD file, told apart by content, a scan of KITTI (.bin), or sample a mesh.
 
-    As float32. Warns (UserWarning) of coordinates that float32 is too coarse for: a map's. Files
-    with faces (STL, OBJ, PLY) become points of the faces, uniform by area, with the normals of the
+    Coordinates of a map keep the precision of the file. Warns (UserWarning) where the file itself
+    holds them in float32, which is too coarse. Files with faces (STL, OBJ, PLY) become points of the faces, uniform by area, with the normals of the
     faces, which point outwards where the mesh is closed. Warns of faces that were dropped or turned.
     LAS and LAZ files hold float64: give their paths to `prepare` or `register`.
 
@@ -40,14 +40,15 @@ def read_point_cloud(path: Path, *, spacing: float = 0.0) -> PointCloud:
 
 
 def write_point_cloud(path: Path, points: Any, normals: Any = None) -> None:
-    """Write a binary PLY with float32 points and, where given, normals: all of it, or nothing.
+    """Write a binary PLY with points and, where given, normals: all of it, or nothing.
+
+    Points are float32, or double where float32 is too coarse, as for a map.
 
     Parameters
     ----------
     path : str or PathLike
         Ending in .ply, or in nothing.
     points : (N, 3) array or PointCloud
-        float64 coordinates too large for float32 are a ValueError.
     normals : (N, 3) array, optional
 
     Examples

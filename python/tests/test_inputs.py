@@ -242,19 +242,18 @@ def test_only_ply_is_written(source, tmp_path):
         assert len(gpureg.read_point_cloud(tmp_path / name)) == len(source)
 
 
-def test_clouds_that_float32_would_round_are_refused(source, tmp_path):
+def test_clouds_that_float32_would_round_have_an_origin(source, tmp_path):
     there = source + 5e6
-    with pytest.raises(
-        ValueError,
-        match=r"points: coordinates up to 5000002 resolve 0.5 in float32, .* pass the array itself to prepare",
-    ):
-        gpureg.PointCloud(there)
-    with pytest.raises(ValueError, match="points: coordinates up to 5000002 resolve 0.5"):
-        gpureg.write_point_cloud(tmp_path / "there.ply", there)
-    assert not (tmp_path / "there.ply").exists()
-    with pytest.raises(ValueError, match="dtype int64"):
-        gpureg.PointCloud(np.array([[50_000_001, 0, 50_000_000]]))
-    # Fine: what float32 can tell apart, whatever the unit, and what was rounded before.
+    there[3] = 0  # a stray point
+    cloud = gpureg.PointCloud(there, viewpoints=[[5e6 + 1, 5e6, 5e6]])
+    gpureg.write_point_cloud(tmp_path / "there.ply", there)
+    for points in (cloud.points, gpureg.read_point_cloud(tmp_path / "there.ply").points):
+        # float32 resolves a millionth of the room, and half a metre at 5e6.
+        assert points.dtype == np.float64 and np.abs(points - there)[4:].max() < 1e-5
+    assert np.array_equal(cloud.viewpoints, [[5e6 + 1, 5e6, 5e6]])
+    prepared = gpureg.prepare(cloud).points[:, 0]
+    assert np.abs(np.median(prepared) - np.median(there[:, 0])) < 0.5
+    # What float32 can tell apart, whatever the unit, and what was rounded before, stays float32.
     rounded = there.astype(np.float32)
     for good in (
         source + 1000,
@@ -277,7 +276,7 @@ def test_files_with_large_coordinates_warn(source, tmp_path):
     for read in (gpureg.read_point_cloud, gpureg.prepare):
         with pytest.warns(
             UserWarning,
-            match=r"there.ply: coordinates up to 500000[12].* resolve 0.5 in float32, which files are read as",
+            match=r"there.ply: coordinates up to 500000[12].* resolve 0.5 in float32, which the file holds",
         ):
             read(path)
     gpureg.write_point_cloud(path, source * 1e5)  # large, but not too large for its extent

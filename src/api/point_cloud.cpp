@@ -61,6 +61,7 @@ PointCloudView PointCloud::view() const {
     v.viewpoint_count = viewpoints.size();
   }
   v.model = model && v.normals && v.viewpoint_count == 0;
+  for (int k = 0; k < 3; ++k) v.origin[k] = origin[k];
   return v;
 }
 

@@ -6,8 +6,8 @@
 
 namespace gpureg::io {
 
-std::map<int, std::vector<Eigen::Vector3f>> read_cameras(const std::string& path) {
-  std::map<int, std::vector<Eigen::Vector3f>> cameras;
+std::map<int, std::vector<Eigen::Vector3d>> read_cameras(const std::string& path) {
+  std::map<int, std::vector<Eigen::Vector3d>> cameras;
   files::TextFile file(path, '#');
   while (file.next()) {
     if (file.fields().size() != 9)
@@ -25,7 +25,7 @@ std::map<int, std::vector<Eigen::Vector3f>> read_cameras(const std::string& path
     constexpr double kNormTolerance = 1e-3;
     if (std::abs(q.norm() - 1) > kNormTolerance)
       file.fail("the quaternion has length " + std::to_string(q.norm()) + ", expected 1");
-    cameras[fragment].push_back(position.cast<float>());
+    cameras[fragment].push_back(position);
   }
   return cameras;
 }

@@ -3,8 +3,11 @@
 
 #include <algorithm>
 #include <cstring>
+#include <functional>
 #include <limits>
+#include <utility>
 
+#include "common/float_origin.hpp"
 #include "files/numbers.hpp"
 #include "files/text_file.hpp"
 
@@ -21,55 +24,63 @@ T load_as(const char* bytes, bool swap) {
   return value;
 }
 
+// Numbers of one coordinate: those of all rows, a stride apart.
+struct Numbers {
+  Scalar type;
+  const char* first;
+  std::size_t stride;
+};
+
 template <typename T>
-void fill(const char* first, std::size_t stride, bool swap, std::size_t axis,
+void fill(const Numbers& from, bool swap, Eigen::Index axis, double shift,
           std::vector<Eigen::Vector3f>& rows) {
-  for (std::size_t row = 0; row < rows.size(); ++row)
-    rows[row][static_cast<Eigen::Index>(axis)] =
-        static_cast<float>(load_as<T>(first + row * stride, swap));
+  for (std::size_t row = 0; row < rows.size(); ++row) {
+    const T value = load_as<T>(from.first + row * from.stride, swap);
+    rows[row][axis] = shift == 0 ? static_cast<float>(value)
+                                 : static_cast<float>(static_cast<double>(value) - shift);
+  }
 }
 
 // One branch per column, not per number.
-void fill_column(Scalar type, const char* first, std::size_t stride, bool swap, std::size_t axis,
+void fill_column(const Numbers& from, bool swap, Eigen::Index axis, double shift,
                  std::vector<Eigen::Vector3f>& rows) {
-  switch (type) {
+  switch (from.type) {
     case Scalar::int8:
-      return fill<std::int8_t>(first, stride, swap, axis, rows);
+      return fill<std::int8_t>(from, swap, axis, shift, rows);
     case Scalar::uint8:
-      return fill<std::uint8_t>(first, stride, swap, axis, rows);
+      return fill<std::uint8_t>(from, swap, axis, shift, rows);
     case Scalar::int16:
-      return fill<std::int16_t>(first, stride, swap, axis, rows);
+      return fill<std::int16_t>(from, swap, axis, shift, rows);
     case Scalar::uint16:
-      return fill<std::uint16_t>(first, stride, swap, axis, rows);
+      return fill<std::uint16_t>(from, swap, axis, shift, rows);
     case Scalar::int32:
-      return fill<std::int32_t>(first, stride, swap, axis, rows);
+      return fill<std::int32_t>(from, swap, axis, shift, rows);
     case Scalar::uint32:
-      return fill<std::uint32_t>(first, stride, swap, axis, rows);
+      return fill<std::uint32_t>(from, swap, axis, shift, rows);
     case Scalar::int64:
-      return fill<std::int64_t>(first, stride, swap, axis, rows);
+      return fill<std::int64_t>(from, swap, axis, shift, rows);
     case Scalar::uint64:
-      return fill<std::uint64_t>(first, stride, swap, axis, rows);
+      return fill<std::uint64_t>(from, swap, axis, shift, rows);
     case Scalar::float32:
-      return fill<float>(first, stride, swap, axis, rows);
+      return fill<float>(from, swap, axis, shift, rows);
     case Scalar::float64:
-      return fill<double>(first, stride, swap, axis, rows);
+      return fill<double>(from, swap, axis, shift, rows);
   }
 }
 
-// Parses a coordinate. Numbers beyond the range of double round as usual, to infinity or zero.
-bool parse_coordinate(std::string_view text, float& value) {
-  if (text.size() > 1 && text[0] == '+' && text[1] != '-') text.remove_prefix(1);
-  const char* const end = text.data() + text.size();
-  double parsed = 0;
-  const auto [stop, error] = files::from_chars(text.data(), end, parsed);
-  if (stop != end || error == std::errc::invalid_argument) return false;
-  if (error == std::errc::result_out_of_range) {
-    const bool tiny = text.find("e-") != text.npos || text.find("E-") != text.npos;
-    parsed = tiny ? 0.0 : std::numeric_limits<double>::infinity();
-    if (text[0] == '-') parsed = -parsed;
+std::vector<Eigen::Vector3d> sample_of(const Table& table,
+                                       const std::array<std::size_t, 3>& columns,
+                                       const std::function<Numbers(std::size_t)>& numbers,
+                                       bool swap) {
+  std::vector<Eigen::Vector3d> sample;
+  for (std::size_t row = 0; row < table.rows; row += origin_sample_step(table.rows)) {
+    const auto value = [&](std::size_t axis) {
+      const Numbers from = numbers(columns[axis]);
+      return load(from.type, from.first + row * from.stride, swap);
+    };
+    sample.emplace_back(value(0), value(1), value(2));
   }
-  value = static_cast<float>(parsed);
-  return true;
+  return sample;
 }
 
 }  // namespace
@@ -107,6 +118,20 @@ double load(Scalar type, const char* bytes, bool swap) {
   return load_as<double>(bytes, swap);
 }
 
+bool parse_coordinate(std::string_view text, double& value) {
+  if (text.size() > 1 && text[0] == '+' && text[1] != '-') text.remove_prefix(1);
+  const char* const end = text.data() + text.size();
+  value = 0;
+  const auto [stop, error] = files::from_chars(text.data(), end, value);
+  if (stop != end || error == std::errc::invalid_argument) return false;
+  if (error == std::errc::result_out_of_range) {
+    const bool tiny = text.find("e-") != text.npos || text.find("E-") != text.npos;
+    value = tiny ? 0.0 : std::numeric_limits<double>::infinity();
+    if (text[0] == '-') value = -value;
+  }
+  return true;
+}
+
 PointCloud decode_binary(const Table& table, const Source& source, const char* body, Order order,
                          ByteOrder bytes) {
   const Axes axes = find_axes(table, source);
@@ -117,20 +142,23 @@ PointCloud decode_binary(const Table& table, const Source& source, const char* b
     offsets.push_back(offset);
     offset += column.count * size_of(column.type);
   }
-  const auto read = [&](const std::array<std::size_t, 3>& columns) {
+  const auto numbers = [&](std::size_t k) {
+    const Scalar type = table.columns[k].type;
+    if (order == Order::by_row) return Numbers{type, body + offsets[k], offset};
+    return Numbers{type, body + offsets[k] * table.rows, size_of(type)};
+  };
+  const auto read = [&](const std::array<std::size_t, 3>& columns, const Eigen::Vector3d& origin) {
     std::vector<Eigen::Vector3f> rows(table.rows);
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      const std::size_t k = columns[axis];
-      const Scalar type = table.columns[k].type;
-      const bool by_row = order == Order::by_row;
-      fill_column(type, body + (by_row ? offsets[k] : offsets[k] * table.rows),
-                  by_row ? offset : size_of(type), swap, axis, rows);
+    for (std::size_t k = 0; k < 3; ++k) {
+      const auto axis = static_cast<Eigen::Index>(k);
+      fill_column(numbers(columns[k]), swap, axis, origin[axis], rows);
     }
     return rows;
   };
   PointCloud cloud;
-  cloud.points = read(axes.point);
-  if (axes.normal) cloud.normals = read(*axes.normal);
+  cloud.origin = float_origin(sample_of(table, axes.point, numbers, swap));
+  cloud.points = read(axes.point, cloud.origin);
+  if (axes.normal) cloud.normals = read(*axes.normal, Eigen::Vector3d::Zero());
   return cloud;
 }
 
@@ -147,7 +175,7 @@ PointCloud decode_text(const Table& table, Source& source) {
   std::vector<std::string_view> fields;
   std::string_view line;
   const auto read = [&](const std::array<std::size_t, 3>& columns) {
-    Eigen::Vector3f row;
+    Eigen::Vector3d row;
     for (std::size_t axis = 0; axis < 3; ++axis) {
       const std::string_view text = fields[first_value[columns[axis]]];
       if (!parse_coordinate(text, row[static_cast<Eigen::Index>(axis)]))
@@ -157,21 +185,23 @@ PointCloud decode_text(const Table& table, Source& source) {
     return row;
   };
   PointCloud cloud;
-  cloud.points.reserve(table.rows);
+  std::vector<Eigen::Vector3d> points;
+  points.reserve(table.rows);
   if (axes.normal) cloud.normals.reserve(table.rows);
-  while (cloud.points.size() < table.rows) {
+  while (points.size() < table.rows) {
     if (!source.next_line(line))
       source.fail("truncated: the header announces " + std::to_string(table.rows) +
-                  " points, the file ends after " + std::to_string(cloud.points.size()));
+                  " points, the file ends after " + std::to_string(points.size()));
     split(line, fields);
     if (fields.empty()) continue;
     if (fields.size() != values)
-      source.fail_line("point " + std::to_string(cloud.points.size() + 1) + " has " +
+      source.fail_line("point " + std::to_string(points.size() + 1) + " has " +
                        std::to_string(fields.size()) + " values, expected " +
                        std::to_string(values));
-    cloud.points.push_back(read(axes.point));
-    if (axes.normal) cloud.normals.push_back(read(*axes.normal));
+    points.push_back(read(axes.point));
+    if (axes.normal) cloud.normals.push_back(read(*axes.normal).cast<float>());
   }
+  set_points(cloud, points);
   return cloud;
 }
 

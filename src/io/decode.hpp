@@ -20,6 +20,9 @@ ByteOrder host_order();
 /// One number, wherever it lies.
 double load(Scalar type, const char* bytes, bool swap);
 
+/// The whole text as a number. Those beyond the range of double become infinity or zero.
+bool parse_coordinate(std::string_view text, double& value);
+
 /// The cloud in table.rows * table.bytes_per_row() bytes of body. Throws IoError for a table
 /// without coordinates.
 PointCloud decode_binary(const Table& table, const Source& source, const char* body, Order order,

@@ -2,7 +2,7 @@
 #include <algorithm>
 
 #include "gpureg/files.hpp"
-#include "gpureg/io.hpp"
+#include "gpureg/overlay.hpp"
 #include "io/ply_writer.hpp"
 
 namespace gpureg::io {
@@ -19,18 +19,17 @@ std::size_t finite_points(const PointCloud& cloud) {
 void write_overlay(const std::string& path, const PointCloud& source, const PointCloud& target,
                    const Eigen::Isometry3d& target_from_source) {
   // Non-finite points are left out: viewers fail on NaN.
-  PlyWriter ply(finite_points(source) + finite_points(target),
-                "property float x\nproperty float y\nproperty float z\n"
-                "property uchar red\nproperty uchar green\nproperty uchar blue\n",
-                15);
+  PlyWriter ply(finite_points(source) + finite_points(target), target.origin,
+                "property uchar red\nproperty uchar green\nproperty uchar blue\n", 3);
   for (const Eigen::Vector3f& p : source.points) {
     if (!p.allFinite()) continue;
-    ply.append((target_from_source * p.cast<double>()).cast<float>());
+    const Eigen::Vector3d moved = target_from_source * (p.cast<double>() + source.origin);
+    ply.append_point((moved - target.origin).cast<float>());
     ply.append(255, 180, 0);
   }
   for (const Eigen::Vector3f& p : target.points) {
     if (!p.allFinite()) continue;
-    ply.append(p);
+    ply.append_point(p);
     ply.append(0, 166, 237);
   }
   files::write_atomically(path, ply.bytes());

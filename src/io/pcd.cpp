@@ -21,7 +21,7 @@ enum class Data { ascii, binary, binary_compressed };
 struct Header {
   Fields names, sizes, types, counts;
   std::optional<std::size_t> width, height, points;
-  Eigen::Vector3f viewpoint = Eigen::Vector3f::Zero();
+  Eigen::Vector3d viewpoint = Eigen::Vector3d::Zero();
   Data data = Data::ascii;
 };
 
@@ -34,9 +34,9 @@ std::size_t count_of(const Fields& fields, const Source& source) {
   return value;
 }
 
-Eigen::Vector3f viewpoint_of(const Fields& fields, const Source& source) {
+Eigen::Vector3d viewpoint_of(const Fields& fields, const Source& source) {
   if (fields.size() != 8) source.fail_line("expected: VIEWPOINT tx ty tz qw qx qy qz");
-  Eigen::Vector3f t;
+  Eigen::Vector3d t;
   for (std::size_t k = 0; k < 3; ++k) {
     const std::string_view text = fields[k + 1];
     double value = 0;
@@ -44,7 +44,7 @@ Eigen::Vector3f viewpoint_of(const Fields& fields, const Source& source) {
     if (error != std::errc() || stop != text.data() + text.size() ||
         !std::isfinite(static_cast<float>(value)))
       source.fail_line("VIEWPOINT has " + quoted(text) + ", expected a finite number");
-    t[static_cast<Eigen::Index>(k)] = static_cast<float>(value);
+    t[static_cast<Eigen::Index>(k)] = value;
   }
   return t;
 }
@@ -219,7 +219,7 @@ PointCloud read_pcd(Source& source) {
     cloud = decode_binary(table, source, unpack(table, source).data(), Order::by_column,
                           ByteOrder::little);
   }
-  if (!header.viewpoint.isZero(0)) cloud.viewpoints.push_back(header.viewpoint);
+  if (!header.viewpoint.isZero(0)) cloud.set_viewpoints({header.viewpoint});
   return cloud;
 }
 

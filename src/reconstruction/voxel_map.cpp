@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "common/float_origin.hpp"
 #include "common/validate.hpp"
 #include "gpureg/reconstruction.hpp"
 
@@ -55,11 +56,12 @@ PointCloud VoxelMap::cloud() const {
   std::sort(ordered.begin(), ordered.end(),
             [](const auto* a, const auto* b) { return a->first < b->first; });
   PointCloud out;
-  out.points.reserve(ordered.size());
+  std::vector<Eigen::Vector3d> means;
+  means.reserve(ordered.size());
   if (has_normals_) out.normals.reserve(ordered.size());
   for (const auto* entry : ordered) {
     const Cell& cell = entry->second;
-    out.points.push_back((cell.point / static_cast<double>(cell.count)).cast<float>());
+    means.push_back(cell.point / static_cast<double>(cell.count));
     if (!has_normals_) continue;
     const double length = cell.normal.norm();
     // Below, the normals of the voxel's points cancel out: both sides of a thin wall.
@@ -68,6 +70,7 @@ PointCloud VoxelMap::cloud() const {
                               ? Eigen::Vector3f((cell.normal / length).cast<float>())
                               : Eigen::Vector3f(Eigen::Vector3f::Zero()));
   }
+  set_points(out, means);
   return out;
 }
 

@@ -44,6 +44,15 @@ Eigen::Translation3d translation(const double (&origin)[3]) {
   return Eigen::Translation3d(origin[0], origin[1], origin[2]);
 }
 
+TEST(Origin, OfAnOwningCloud) {
+  PointCloud cloud;
+  cloud.points = {{1, 2, 3}};
+  cloud.origin = {450123.25, 5412345.5, 310.75};
+  cloud.set_viewpoints({{450124.5, 5412345.5, 310.75}});
+  EXPECT_EQ(cloud.viewpoints, (std::vector<Eigen::Vector3f>{{1.25f, 0, 0}}));
+  for (int k = 0; k < 3; ++k) EXPECT_EQ(cloud.view().origin[k], kUtmSource[k]);
+}
+
 TEST(Origin, MovesPosesAndMomentsAndNothingElse) {
   const ScannedRoom pair = scanned_room(9);
   const Context context = Context::cpu(2);

@@ -11,6 +11,13 @@
 namespace gpureg::test {
 namespace {
 
+std::string comma(const Eigen::Vector3d& p) {
+  std::ostringstream text;
+  text.precision(17);
+  text << p.x() << ',' << p.y() << ',' << p.z();
+  return text.str();
+}
+
 class Register : public ::testing::Test {
  protected:
   Outcome align(const std::vector<std::string>& more) const {
@@ -48,6 +55,44 @@ TEST_F(Register, NumbersOfAFarPoseStayApart) {
     EXPECT_NEAR(std::stod(number, &end), expected.get<double>(), 1e-6);
     EXPECT_EQ(end, number.size()) << number;
   }
+}
+
+// As a scanner writes them: coordinates of a map, in double.
+TEST_F(Register, MapCoordinatesCostNothing) {
+  const auto error_at = [&](const Eigen::Vector3d& source_place,
+                            const Eigen::Vector3d& target_place) {
+    const auto at = [&](const char* name, int number, const Eigen::Vector3d& place) {
+      PointCloud cloud = room_scan(number);
+      cloud.origin = place;
+      cloud.set_viewpoints({place});
+      return write_cloud(folder_, name, cloud);
+    };
+    const std::string path = folder_ / "far.json";
+    const Outcome outcome =
+        run(joined({"register", at("a.ply", 0, source_place), at("b.ply", 1, target_place),
+                    "--source-viewpoint", comma(source_place), "--target-viewpoint",
+                    comma(target_place), "--json", path, "--overlay", folder_ / "o.ply"},
+                   kSmall));
+    EXPECT_EQ(outcome.status, 0) << outcome.out << outcome.err;
+    const auto values = json_of(path)["result"]["target_from_source"].get<std::vector<double>>();
+    const Eigen::Matrix4d pose = Eigen::Matrix<double, 4, 4, Eigen::RowMajor>(values.data());
+    const Eigen::Isometry3d truth = scan_from_room(1) * scan_from_room(0).inverse();
+    double worst = 0;  // at the corners of 6 m around the source
+    for (int k = 0; k < 8; ++k) {
+      const Eigen::Vector3d p(k & 1 ? 3 : -3, k & 2 ? 3 : -3, k & 4 ? 3 : -3);
+      const Eigen::Vector3d there = (pose * (p + source_place).homogeneous()).head<3>();
+      worst = std::max(worst, (there - target_place - truth * p).norm());
+    }
+    return worst;
+  };
+  const double here = error_at({0, 0, 0}, {0, 0, 0});
+  EXPECT_LT(here, 0.02);  // a fifth of the voxel
+  // Rounding of rows moves voxels' means by 1e-7 m, and hypotheses hence differ a little.
+  EXPECT_NEAR(error_at({1e6, 1e6, 0}, {1e6, 1e6, 0}), here, 2e-3);
+  EXPECT_NEAR(error_at({691000, 5.2e6, 300}, {691020, 5.2e6, 310}), here, 2e-3);
+  const PointCloud overlay = io::read_point_cloud(folder_ / "o.ply");
+  EXPECT_LT((overlay.origin - Eigen::Vector3d(691020, 5.2e6, 310)).norm(), 10);
+  expect_holds(run({"info", folder_ / "b.ply"}).out, {"extent", "from 6910", " 519999"});
 }
 
 TEST_F(Register, VoxelSizeByTheClouds) {

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "gpureg/io.hpp"
+#include "gpureg/overlay.hpp"
 #include "support/temporary_folder.hpp"
 
 namespace gpureg::io {

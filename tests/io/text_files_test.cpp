@@ -19,8 +19,8 @@ TEST(Cameras, PositionsByFragmentInTheOrderOfTheFile) {
                                 "# fragment frame t q\n2 100 1 2 3 0 0 0 1\n\n0 0 -0.5 0 0 0.6 0 "
                                 "0.8 0 # turned\r\n2\t101\t4 5 6 0 0 0 -1\n"));
   ASSERT_EQ(cameras.size(), 2u);
-  EXPECT_EQ(cameras.at(0), (std::vector<Eigen::Vector3f>{{-0.5f, 0, 0}}));
-  EXPECT_EQ(cameras.at(2), (std::vector<Eigen::Vector3f>{{1, 2, 3}, {4, 5, 6}}));
+  EXPECT_EQ(cameras.at(0), (std::vector<Eigen::Vector3d>{{-0.5, 0, 0}}));
+  EXPECT_EQ(cameras.at(2), (std::vector<Eigen::Vector3d>{{1, 2, 3}, {4, 5, 6}}));
   EXPECT_TRUE(read_cameras(folder.write("empty.txt", "")).empty());
 }
 

@@ -8,6 +8,7 @@
 
 #include "gpureg/error.hpp"
 #include "gpureg/io.hpp"
+#include "gpureg/overlay.hpp"
 #include "support/expect_error.hpp"
 #include "support/limited_file_size.hpp"
 #include "support/temporary_folder.hpp"

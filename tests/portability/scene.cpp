@@ -19,7 +19,7 @@ int run(const std::string& folder, const std::vector<std::string>& numbers) {
   for (const std::string& number : numbers) {
     scans.push_back(io::read_point_cloud(folder + "/cloud_bin_" + number + ".ply"));
     const auto found = cameras.find(std::stoi(number));
-    if (found != cameras.end()) scans.back().viewpoints = found->second;
+    if (found != cameras.end()) scans.back().set_viewpoints(found->second);
   }
   const Context context = Context::cpu();
   const auto options = RegistrationOptions::from_voxel_size(0.05f);

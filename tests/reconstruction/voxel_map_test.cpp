@@ -36,6 +36,22 @@ TEST(VoxelMap, MovesScansAndDropsWhatIsNotFinite) {
   EXPECT_TRUE(out.normals.empty());
 }
 
+TEST(VoxelMap, MapCoordinatesKeepTheirDigits) {
+  PointCloud cloud;
+  cloud.origin = {450123, 5412345, 310};
+  for (int k = 0; k < 100; ++k) cloud.points.emplace_back(0.01f * static_cast<float>(k), 0, 0);
+  reconstruction::VoxelMap map(0.005f);
+  map.add(cloud.view(), UnalignedIsometry3d::Identity());
+  const PointCloud out = map.cloud();
+  ASSERT_EQ(out.points.size(), 100u);
+  // float32 resolves half a metre at 5412345.
+  for (std::size_t k = 0; k < 100; ++k)
+    EXPECT_LT(
+        (out.points[k].cast<double>() + out.origin - cloud.origin - cloud.points[k].cast<double>())
+            .norm(),
+        1e-6);
+}
+
 TEST(VoxelMap, RefusesBadInput) {
   EXPECT_THROW(reconstruction::VoxelMap(0), InvalidArgument);
   reconstruction::VoxelMap map(1);

@@ -157,7 +157,8 @@ Image render(const std::vector<Layer>& layers, const Eigen::Matrix3d& view, int 
     const std::vector<Eigen::Vector3f> points = finite_points(layers[k].cloud->points);
     spacings.push_back(median_spacing(points, 6));
     for (const Eigen::Vector3f& p : points) {
-      splats.push_back({layers[k].pose * p.cast<double>(), static_cast<int>(k)});
+      splats.push_back(
+          {layers[k].pose * (p.cast<double>() + layers[k].cloud->origin), static_cast<int>(k)});
       middle += splats.back().position;
     }
   }

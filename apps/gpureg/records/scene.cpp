@@ -38,7 +38,7 @@ void mix(std::uint64_t& hash, const std::vector<Eigen::Vector3f>& rows) {
 }
 
 using Fragments = std::vector<std::pair<int, std::string>>;
-using Cameras = std::map<int, std::vector<Eigen::Vector3f>>;
+using Cameras = std::map<int, std::vector<Eigen::Vector3d>>;
 
 // A file that covers half of the scene works, but hardly as meant.
 void note_gaps(const Fragments& fragments, const Cameras& cameras, const std::string& file) {
@@ -75,6 +75,10 @@ std::uint64_t hash_of(const PointCloud& cloud) {
   mix(hash, cloud.points);
   mix(hash, cloud.normals);
   mix(hash, cloud.viewpoints);
+  if (!cloud.origin.isZero(0)) {
+    const Eigen::Vector3f coarse = cloud.origin.cast<float>();
+    mix(hash, {coarse, (cloud.origin - coarse.cast<double>()).cast<float>()});
+  }
   return hash;
 }
 
@@ -111,7 +115,7 @@ Scene prepare_scene(const Context& context, const std::string& folder,
       chunk.push_back(read_cloud(file, mesh_spacing(options.voxel_size),
                                  quiet ? MeshNote::none : MeshNote::print));
       if (const auto found = cameras.find(number); found != cameras.end())
-        chunk.back().viewpoints = found->second;
+        chunk.back().set_viewpoints(found->second);
       if (!quiet && options.depth_maps > 0) viewpoints.see(chunk.back(), file);
       points += chunk.back().points.size();
       scene.numbers.push_back(number);

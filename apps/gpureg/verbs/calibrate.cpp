@@ -47,7 +47,7 @@ struct Clouds {
 
 Clouds read_clouds(const CalibrateOptions& o) {
   const std::string cameras_file = (std::filesystem::path(o.folder) / "cameras.txt").string();
-  std::map<int, std::vector<Eigen::Vector3f>> cameras;
+  std::map<int, std::vector<Eigen::Vector3d>> cameras;
   if (std::filesystem::exists(cameras_file)) cameras = io::read_cameras(cameras_file);
   Clouds out;
   ViewpointNote viewpoints;
@@ -56,7 +56,7 @@ Clouds read_clouds(const CalibrateOptions& o) {
     out.clouds.push_back(read_cloud(file, mesh_spacing(o.method.voxel_size),
                                     o.quiet ? MeshNote::none : MeshNote::print));
     if (const auto found = cameras.find(number); found != cameras.end())
-      out.clouds.back().viewpoints = found->second;
+      out.clouds.back().set_viewpoints(found->second);
     if (!o.quiet) viewpoints.see(out.clouds.back(), file);
     check_voxel_size(o.method.voxel_size, extent_of(out.clouds.back().points), file);
   }

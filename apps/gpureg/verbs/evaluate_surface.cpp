@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include <Eigen/Geometry>
 #include <cmath>
 #include <iostream>
 #include <memory>
@@ -61,8 +62,9 @@ int run(const SurfaceRun& o) {
   const PointCloud truth = io::read_point_cloud(o.truth);
   PointCloud map = io::read_point_cloud(o.map);
   const Eigen::Matrix4d truth_from_map = alignment_of(o);
-  const Eigen::Matrix4f move = truth_from_map.cast<float>();
-  for (Eigen::Vector3f& p : map.points) p = (move * p.homogeneous()).head<3>().eval();
+  const Eigen::Isometry3d move(truth_from_map);
+  for (Eigen::Vector3f& p : map.points)
+    p = (move * (p.cast<double>() + map.origin) - truth.origin).cast<float>();
   const evaluation::SurfaceEvaluation e =
       evaluation::evaluate_surface(map.points, truth.points, truth.normals, o.options);
   std::cout << "points          " << e.distance.count << ", " << e.beyond << " beyond "

@@ -15,8 +15,9 @@
 namespace gpureg::cli {
 namespace {
 
-std::string describe(const Eigen::Vector3f& v) {
-  return significant(v.x(), 4) + " " + significant(v.y(), 4) + " " + significant(v.z(), 4);
+std::string describe(const Eigen::Vector3d& v, int digits) {
+  return significant(v.x(), digits) + " " + significant(v.y(), digits) + " " +
+         significant(v.z(), digits);
 }
 
 void print_cloud(const std::string& path) {
@@ -28,9 +29,12 @@ void print_cloud(const std::string& path) {
   if (points.empty()) return;
   Eigen::AlignedBox3f box;
   for (const Eigen::Vector3f& p : points) box.extend(p);
+  const Eigen::Vector3d low = box.min().cast<double>() + cloud.origin,
+                        high = box.max().cast<double>() + cloud.origin;
+  const int digits = cloud.origin.isZero(0) ? 4 : 10;
   const VoxelSizeSuggestion suggestion = suggest_voxel_size({cloud.view()});
-  std::cout << "  extent           " << describe(box.sizes()) << ", from " << describe(box.min())
-            << " to " << describe(box.max()) << "\n  spacing          "
+  std::cout << "  extent           " << describe((high - low).eval(), 4) << ", from "
+            << describe(low, digits) << " to " << describe(high, digits) << "\n  spacing          "
             << (suggestion.valid() ? significant(suggestion.spacing, 3) +
                                          " (median distance to the nearest neighbour)"
                                    : std::string("none, ") + explain(suggestion.reason))

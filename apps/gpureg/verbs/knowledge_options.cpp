@@ -47,13 +47,13 @@ void ViewpointChoice::check(const char* option) const {
 void ViewpointChoice::apply(PointCloud& cloud) const {
   if (text == "auto") return;
   cloud.viewpoints.clear();
-  if (!is_word()) cloud.viewpoints.push_back(direction(numbers_of(text)).cast<float>());
+  if (!is_word()) cloud.set_viewpoints({direction(numbers_of(text))});
 }
 
 void ViewpointChoice::note_place(const char* option, const PreparedCloud& cloud,
                                  const std::string& file) const {
   if (is_word()) return;
-  const Eigen::Vector3f place = direction(numbers_of(text)).cast<float>();
+  const Eigen::Vector3f place = (direction(numbers_of(text)) - cloud.origin()).cast<float>();
   // One point within a voxel may be a return of the sensor itself, a surface has about three.
   constexpr std::ptrdiff_t kSurface = 2;
   const float voxel = cloud.options().voxel_size;

@@ -191,7 +191,7 @@ class Reconstruct {
     const Scene& scene = run_.scene;
     surfaces_.resize(scene.numbers.size());
     const std::string cameras_file = (fs::path(o_.folder) / "cameras.txt").string();
-    std::map<int, std::vector<Eigen::Vector3f>> cameras;
+    std::map<int, std::vector<Eigen::Vector3d>> cameras;
     if (fs::exists(cameras_file)) cameras = io::read_cameras(cameras_file);
     Progress progress("preparing finer", "fragments", surfaces_.size(), o_.quiet);
     for (std::size_t k = 0; k < surfaces_.size(); ++k) {
@@ -199,7 +199,7 @@ class Reconstruct {
       if (run_.map.scans[k].placed) {
         PointCloud cloud = read_cloud(scene.files[k], mesh_spacing(run_.options.prepare.voxel_size),
                                       MeshNote::none);
-        cloud.viewpoints = cameras[scene.numbers[k]];
+        cloud.set_viewpoints(cameras[scene.numbers[k]]);
         surfaces_[k] = reconstruction::surface_of(context_, cloud.view(), run_.options.prepare);
       }
       progress.update(k + 1);

@@ -11,6 +11,7 @@
 #include "gpureg/files.hpp"
 #include "gpureg/io.hpp"
 #include "gpureg/mesh.hpp"
+#include "gpureg/overlay.hpp"
 #include "gpureg/registration.hpp"
 #include "gpureg/time_budget.hpp"
 #include "pictures/before_after.hpp"
