@@ -54,7 +54,7 @@ gpureg_optional(GPUREG_HAVE_EMBREE "the generator of synthetic rooms (needs Embr
 
 find_package(assimp 5 QUIET)
 set(GPUREG_HAVE_ASSIMP ${assimp_FOUND})
-gpureg_optional(GPUREG_HAVE_ASSIMP "meshes as clouds, and the generator's --building (need Assimp)")
+gpureg_optional(GPUREG_HAVE_ASSIMP "the generator's --building (needs Assimp)")
 
 if(GPUREG_BUILD_TESTS)
   find_package(GTest 1.11 QUIET)

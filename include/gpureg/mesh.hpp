@@ -33,9 +33,12 @@ struct SurfaceMesh {
 /// be read.
 bool is_mesh(const std::string& path);
 
-/// Reads STL, OBJ or PLY through Assimp. Polygons become triangles, and make_mesh repairs them.
-/// @throws IoError naming the file: unreadable, a vertex that is not finite (with its number), no
-///   face with an area, or gpureg was built without Assimp.
+/// Reads STL, OBJ or PLY. Polygons become triangles, vertices at the same place become one, and
+/// make_mesh repairs the faces. Those of fewer than three corners count as flat. Opens no other
+/// file: materials of OBJ are not looked at.
+/// @throws IoError naming the file: unreadable, not a regular file, truncated; a face with a vertex
+///   that is not there or not finite (with its number); a face of more than 500 corners that is not
+///   convex; no face with an area.
 SurfaceMesh read_mesh(const std::string& path);
 
 /// Drops faces without area, turns faces that are wound against most of their neighbours, and turns

@@ -5,6 +5,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <cmath>
 #include <system_error>
@@ -26,6 +27,27 @@ struct Descriptor {
   throw IoError("cannot read " + path + ": " + reason);
 }
 
+// Of an open file; also says why it could not be opened.
+struct stat status_of(const Descriptor& file, const std::string& path) {
+  struct stat info{};
+  if (file.fd < 0 || ::fstat(file.fd, &info) != 0)
+    fail_reading(path, std::generic_category().message(errno));
+  if (S_ISDIR(info.st_mode)) fail_reading(path, "it is a folder");
+  return info;
+}
+
+void read_up_to(const Descriptor& file, const std::string& path, std::size_t bytes,
+                std::string& content) {
+  char buffer[1 << 16];
+  while (content.size() < bytes) {
+    const ssize_t got = ::read(file.fd, buffer, std::min(sizeof buffer, bytes - content.size()));
+    if (got == 0) return;
+    if (got < 0 && errno == EINTR) continue;
+    if (got < 0) fail_reading(path, std::generic_category().message(errno));
+    content.append(buffer, static_cast<std::size_t>(got));
+  }
+}
+
 bool is_space(char c) { return c == ' ' || c == '\t' || c == '\r' || c == '\v' || c == '\f'; }
 
 // std::from_chars takes no '+', which some writers put in front of numbers; unlike strtod it does
@@ -42,27 +64,25 @@ bool parse(std::string_view text, T& value) {
 
 std::string read_file(const std::string& path, std::size_t max_bytes) {
   const Descriptor file{::open(path.c_str(), O_RDONLY | O_CLOEXEC)};
-  if (file.fd < 0) fail_reading(path, std::generic_category().message(errno));
-  struct stat info{};
-  if (::fstat(file.fd, &info) != 0) fail_reading(path, std::generic_category().message(errno));
-  if (S_ISDIR(info.st_mode)) fail_reading(path, "it is a folder");
+  const struct stat info = status_of(file, path);
   const std::string too_large = "larger than " + std::to_string(max_bytes) + " bytes";
   std::string content;
   if (S_ISREG(info.st_mode)) {
     if (static_cast<std::size_t>(info.st_size) > max_bytes) fail_reading(path, too_large);
     content.reserve(static_cast<std::size_t>(info.st_size));
   }
-  char buffer[1 << 16];
-  for (;;) {
-    const ssize_t got = ::read(file.fd, buffer, sizeof buffer);
-    if (got == 0) return content;
-    if (got < 0) {
-      if (errno == EINTR) continue;
-      fail_reading(path, std::generic_category().message(errno));
-    }
-    content.append(buffer, static_cast<std::size_t>(got));
-    if (content.size() > max_bytes) fail_reading(path, too_large);
-  }
+  read_up_to(file, path, max_bytes + 1, content);
+  if (content.size() > max_bytes) fail_reading(path, too_large);
+  return content;
+}
+
+std::string read_start(const std::string& path, std::size_t bytes) {
+  // Who opens a pipe to which nobody writes waits, unless told not to.
+  const Descriptor file{::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK)};
+  if (!S_ISREG(status_of(file, path).st_mode)) fail_reading(path, "it is not a regular file");
+  std::string content;
+  read_up_to(file, path, bytes, content);
+  return content;
 }
 
 std::string quoted(std::string_view text) {

@@ -18,6 +18,10 @@ inline constexpr std::size_t kMaxTextBytes = std::size_t{1} << 30;
 /// max_bytes.
 std::string read_file(const std::string& path, std::size_t max_bytes = kMaxTextBytes);
 
+/// The first bytes of a regular file, fewer where it is shorter. Throws IoError: missing,
+/// unreadable, a folder, a pipe, a device.
+std::string read_start(const std::string& path, std::size_t bytes);
+
 /// text for an error message: shortened, and without bytes that a terminal would act upon.
 std::string quoted(std::string_view text);
 

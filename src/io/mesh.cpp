@@ -4,15 +4,17 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
-#include <cstdlib>
 #include <filesystem>
-#include <fstream>
 #include <map>
 #include <random>
 #include <sstream>
 #include <utility>
 
+#include "common/float_origin.hpp"
+#include "files/text_file.hpp"
 #include "gpureg/error.hpp"
+#include "io/limits.hpp"
+#include "io/ply.hpp"
 
 namespace gpureg::io {
 namespace {
@@ -26,15 +28,15 @@ std::string extension_of(const std::string& path) {
   return extension;
 }
 
-bool ply_has_faces(const std::string& path) {
-  std::ifstream file(path, std::ios::binary);
-  std::string line;
-  if (!std::getline(file, line) || line.rfind("ply", 0) != 0) return false;
-  // No header is longer; a text file without end_header must not be read as a whole.
-  for (int k = 0; k < 1000 && std::getline(file, line); ++k) {
-    if (line.rfind("end_header", 0) == 0) return false;
-    if (line.rfind("element face ", 0) == 0) return std::atoll(line.c_str() + 13) > 0;
-  }
+bool ply_has_faces(const std::string& path) try {
+  const std::string start = files::read_start(path, kMostHeaderBytes);
+  if (start.compare(0, 3, "ply") != 0) return false;
+  Source source(path, start);
+  const PlyHeader header = read_ply_header(source);
+  return std::any_of(header.elements.begin(), header.elements.end(), [](const PlyElement& e) {
+    return e.name == "face" && e.has_list() && e.count > 0;
+  });
+} catch (const IoError&) {
   return false;
 }
 
@@ -135,8 +137,8 @@ std::string SurfaceMesh::notes() const {
 SurfaceMesh make_mesh(std::vector<Eigen::Vector3d> vertices,
                       std::vector<std::array<std::uint32_t, 3>> faces) {
   for (std::size_t k = 0; k < vertices.size(); ++k)
-    if (!vertices[k].allFinite())
-      throw InvalidArgument(number(vertices, k) + ", expected finite coordinates");
+    if (!vertices[k].cast<float>().allFinite())
+      throw InvalidArgument(number(vertices, k) + ", expected finite coordinates of float32");
   for (std::size_t f = 0; f < faces.size(); ++f)
     for (const std::uint32_t vertex : faces[f])
       if (vertex >= vertices.size())
@@ -166,7 +168,8 @@ PointCloud sample_mesh(const SurfaceMesh& mesh, double spacing) {
   const auto unit = [&] { return static_cast<double>(random()) / 4294967296.0; };
   PointCloud cloud;
   cloud.model = true;
-  cloud.points.reserve(count);
+  std::vector<Eigen::Vector3d> points;
+  points.reserve(count);
   cloud.normals.reserve(count);
   std::size_t f = 0;
   for (std::size_t k = 0; k < count; ++k) {
@@ -177,9 +180,10 @@ PointCloud sample_mesh(const SurfaceMesh& mesh, double spacing) {
     const double s = std::sqrt(unit()), u = unit();
     const Eigen::Vector3d p = (1 - s) * mesh.vertices[face[0]] +
                               s * (1 - u) * mesh.vertices[face[1]] + s * u * mesh.vertices[face[2]];
-    cloud.points.push_back(p.cast<float>());
+    points.push_back(p);
     cloud.normals.push_back(doubled_area(mesh, face).normalized().cast<float>());
   }
+  set_points(cloud, points);
   return cloud;
 }
 

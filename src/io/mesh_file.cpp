@@ -1,66 +1,81 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include <assimp/config.h>
-#include <assimp/postprocess.h>
-#include <assimp/scene.h>
-
+#include <algorithm>
 #include <array>
-#include <assimp/Importer.hpp>
-#include <fstream>
+#include <cstring>
 #include <string_view>
+#include <unordered_map>
 #include <utility>
 #include <vector>
 
+#include "files/text_file.hpp"
 #include "gpureg/error.hpp"
-#include "gpureg/io.hpp"
 #include "gpureg/mesh.hpp"
+#include "io/limits.hpp"
+#include "io/mesh_formats.hpp"
+#include "io/ply.hpp"
 
 namespace gpureg::io {
-
 namespace {
 
-bool starts_as_ply(const std::string& path) {
-  char start[3] = {};
-  return std::ifstream(path, std::ios::binary).read(start, sizeof(start)) &&
-         std::string_view(start, sizeof(start)) == "ply";
+struct Hash {
+  std::size_t operator()(const std::array<double, 3>& p) const {
+    std::uint64_t hash = 0;
+    for (const double axis : p) {
+      std::uint64_t bits;
+      std::memcpy(&bits, &axis, sizeof(bits));
+      hash = (hash ^ bits) * 0x9E3779B97F4A7C15ull;
+      hash ^= hash >> 32;
+    }
+    return static_cast<std::size_t>(hash);
+  }
+};
+
+/// Vertices of faces at the same place become one, which STL has no other way to say.
+std::vector<Eigen::Vector3d> merge_vertices(const std::vector<Eigen::Vector3d>& vertices,
+                                            std::vector<std::array<std::uint32_t, 3>>& faces) {
+  std::vector<Eigen::Vector3d> out;
+  std::unordered_map<std::array<double, 3>, std::uint32_t, Hash> known;
+  for (auto& face : faces)
+    for (std::uint32_t& vertex : face) {
+      const Eigen::Vector3d p = vertices[vertex].array() + 0.0;  // -0 is 0
+      const auto [at, is_new] =
+          known.emplace(std::array{p.x(), p.y(), p.z()}, static_cast<std::uint32_t>(out.size()));
+      if (is_new) out.push_back(p);
+      vertex = at->second;
+    }
+  return out;
+}
+
+bool ends_in_obj(const std::string& path) {
+  const std::string end = path.substr(path.size() - std::min<std::size_t>(4, path.size()));
+  return end == ".obj" || end == ".OBJ";
+}
+
+Polygons read_polygons(const std::string& path, Source& source) {
+  const std::string_view bytes = source.rest();
+  if (bytes.empty()) source.fail("the file is empty: it has no face");
+  if (bytes.compare(0, 3, "ply") == 0) return read_ply_mesh(source);
+  return ends_in_obj(path) ? read_obj(source) : read_stl(source);
 }
 
 }  // namespace
 
+// Assimp, which reads buildings, crashes on damaged files; these three formats are simple.
 SurfaceMesh read_mesh(const std::string& path) {
-  // Assimp takes a truncated PLY file for one of fewer faces; the reader of points refuses it.
-  if (starts_as_ply(path)) read_point_cloud(path);
-  Assimp::Importer importer;
-  importer.SetPropertyInteger(AI_CONFIG_PP_SBP_REMOVE,
-                              aiPrimitiveType_POINT | aiPrimitiveType_LINE);
-  // Vertices of an STL are shared by position alone.
-  importer.SetPropertyInteger(AI_CONFIG_PP_RVC_FLAGS, aiComponent_NORMALS | aiComponent_TEXCOORDS |
-                                                          aiComponent_COLORS |
-                                                          aiComponent_TANGENTS_AND_BITANGENTS);
-  const aiScene* file = importer.ReadFile(
-      path, aiProcess_Triangulate | aiProcess_SortByPType | aiProcess_PreTransformVertices |
-                aiProcess_RemoveComponent | aiProcess_JoinIdenticalVertices);
-  if (file == nullptr)
-    throw IoError(path + ": holds no readable face: " + importer.GetErrorString());
-  std::vector<Eigen::Vector3d> vertices;
-  std::vector<std::array<std::uint32_t, 3>> faces;
-  for (unsigned m = 0; m < file->mNumMeshes; ++m) {
-    const aiMesh& part = *file->mMeshes[m];
-    const auto first = static_cast<std::uint32_t>(vertices.size());
-    for (unsigned k = 0; k < part.mNumVertices; ++k) {
-      const aiVector3D& v = part.mVertices[k];
-      vertices.emplace_back(v.x, v.y, v.z);
-    }
-    for (unsigned k = 0; k < part.mNumFaces; ++k) {
-      const aiFace& face = part.mFaces[k];
-      if (face.mNumIndices == 3)
-        faces.push_back(
-            {first + face.mIndices[0], first + face.mIndices[1], first + face.mIndices[2]});
-    }
-  }
+  files::read_start(path, 0);  // refuses what is not a regular file
+  const std::string bytes = files::read_file(path, kMostDataBytes);
+  Source source(path, bytes);
+  const Polygons polygons = read_polygons(path, source);
+  std::size_t flat = 0, begin = 0;
+  for (const std::size_t end : polygons.ends) flat += end - std::exchange(begin, end) < 3;
+  auto faces = triangles_of(polygons, source);
+  auto vertices = merge_vertices(polygons.vertices, faces);
   try {
-    return make_mesh(std::move(vertices), std::move(faces));
+    SurfaceMesh mesh = make_mesh(std::move(vertices), std::move(faces));
+    mesh.flat_faces += flat;
+    return mesh;
   } catch (const InvalidArgument& error) {
-    throw IoError(path + ": " + error.what());
+    source.fail(error.what());
   }
 }
 

@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <algorithm>
 
+#include "files/text_file.hpp"
 #include "io/decode.hpp"
+#include "io/mesh_formats.hpp"
 #include "io/ply.hpp"
 
 namespace gpureg::io {
@@ -23,11 +25,12 @@ std::size_t checked_bytes(const PlyElement& element, const Source& source) {
 }
 
 // Lists have a size of their own in every row, so rows are walked one by one. Each takes at least a
-// byte: no count can make it hang.
-void skip_binary_lists(const PlyElement& element, Source& source, bool swap) {
+// byte: no count can make it hang. take(property, count, first) sees every list.
+template <typename Take>
+void walk_binary_lists(const PlyElement& element, Source& source, bool swap, Take&& take) {
   const std::string_view bytes = source.rest();
   std::size_t at = 0;
-  const auto take = [&](std::size_t size) {
+  const auto pass = [&](std::size_t size) {
     if (size > bytes.size() - at) fail_truncated(element, source);
     at += size;
   };
@@ -35,21 +38,23 @@ void skip_binary_lists(const PlyElement& element, Source& source, bool swap) {
     for (const PlyProperty& property : element.properties) {
       const std::size_t size = size_of(property.column.type);
       if (!property.list_count) {
-        take(size);
+        pass(size);
         continue;
       }
       const std::size_t before = at;
-      take(size_of(*property.list_count));
-      const double count = load(*property.list_count, bytes.data() + before,
-                                swap);  // integers of at most 32 bits: exact
-      if (count < 0) source.fail("a list of element " + element.name + " has a negative count");
-      take(static_cast<std::size_t>(count) * size);
+      pass(size_of(*property.list_count));
+      const double number = load(*property.list_count, bytes.data() + before,
+                                 swap);  // integers of at most 32 bits: exact
+      if (number < 0) source.fail("a list of element " + element.name + " has a negative count");
+      const auto count = static_cast<std::size_t>(number);
+      pass(count * size);
+      take(property, count, bytes.data() + at - count * size);
     }
   source.skip(at);
 }
 
 void skip_binary(const PlyElement& element, Source& source, bool swap) {
-  if (element.has_list()) return skip_binary_lists(element, source, swap);
+  if (element.has_list()) return walk_binary_lists(element, source, swap, [](auto&&...) {});
   source.skip(checked_bytes(element, source));
 }
 
@@ -60,6 +65,52 @@ void skip_text(const PlyElement& element, Source& source) {
   for (std::size_t row = 0; row < element.count;) {
     if (!source.next_line(line)) fail_truncated(element, source);
     row += line.find_first_not_of(" \t") != line.npos;
+  }
+}
+
+bool lists_corners(const PlyProperty& property) {
+  return property.list_count &&
+         (property.column.name == "vertex_indices" || property.column.name == "vertex_index");
+}
+
+void read_binary_faces(const PlyElement& element, Source& source, bool swap, Polygons& faces) {
+  walk_binary_lists(element, source, swap,
+                    [&](const PlyProperty& property, std::size_t count, const char* first) {
+                      if (!lists_corners(property)) return;
+                      const Scalar type = property.column.type;
+                      for (std::size_t k = 0; k < count; ++k)
+                        faces.add_corner(load(type, first + k * size_of(type), swap), source);
+                      faces.end_face();
+                    });
+}
+
+void read_text_faces(const PlyElement& element, Source& source, Polygons& faces) {
+  check_text_size(element.count, element.properties.size(), source);
+  std::string_view line;
+  std::vector<std::string_view> fields;
+  for (std::size_t row = 0; row < element.count;) {
+    if (!source.next_line(line)) fail_truncated(element, source);
+    split(line, fields);
+    if (fields.empty()) continue;
+    ++row;
+    std::size_t at = 0;
+    for (const PlyProperty& property : element.properties) {
+      std::size_t count = 1;
+      if (property.list_count && (at >= fields.size() || !parse_count(fields[at++], count)))
+        source.fail_line("the count of a list of element " + element.name + " is missing");
+      if (count > fields.size() - at)
+        source.fail_line("element " + element.name + " has " + std::to_string(fields.size()) +
+                         " values, fewer than its lists announce");
+      for (std::size_t k = 0; lists_corners(property) && k < count; ++k) {
+        double vertex = 0;
+        if (!parse_coordinate(fields[at + k], vertex))
+          source.fail_line("a vertex of a face is " + files::quoted(fields[at + k]) +
+                           ", expected a number");
+        faces.add_corner(vertex, source);
+      }
+      at += count;
+      if (lists_corners(property)) faces.end_face();
+    }
   }
 }
 
@@ -79,9 +130,8 @@ void check_nothing_left(const PlyElement& last, Source& source, bool text) {
   }
 }
 
-}  // namespace
-
-PointCloud read_ply(Source& source) {
+/// faces: where they go; null: they are skipped.
+PointCloud read(Source& source, Polygons* faces) {
   const PlyHeader header = read_ply_header(source);
   const auto is_vertex = [](const PlyElement& element) { return element.name == "vertex"; };
   const auto vertices = std::count_if(header.elements.begin(), header.elements.end(), is_vertex);
@@ -94,6 +144,11 @@ PointCloud read_ply(Source& source) {
       header.format == PlyFormat::binary_big_endian ? ByteOrder::big : ByteOrder::little;
   PointCloud cloud;
   for (const PlyElement& element : header.elements) {
+    if (faces != nullptr && element.name == "face" && element.has_list()) {
+      text ? read_text_faces(element, source, *faces)
+           : read_binary_faces(element, source, order != host_order(), *faces);
+      continue;
+    }
     if (!is_vertex(element)) {
       text ? skip_text(element, source) : skip_binary(element, source, order != host_order());
       continue;
@@ -111,6 +166,20 @@ PointCloud read_ply(Source& source) {
   }
   check_nothing_left(header.elements.back(), source, text);
   return cloud;
+}
+
+}  // namespace
+
+PointCloud read_ply(Source& source) { return read(source, nullptr); }
+
+Polygons read_ply_mesh(Source& source) {
+  Polygons out;
+  const PointCloud cloud = read(source, &out);
+  if (out.ends.empty()) source.fail("it has no face: no list vertex_indices of an element face");
+  for (const Eigen::Vector3f& p : cloud.points)
+    out.vertices.push_back(p.cast<double>() + cloud.origin);
+  check_corners(out, source, 0);
+  return out;
 }
 
 }  // namespace gpureg::io

@@ -3,6 +3,7 @@
 #include "gpureg/io.hpp"
 #include "gpureg/mesh.hpp"
 #include "io/kitti.hpp"
+#include "io/limits.hpp"
 #include "io/pcd.hpp"
 #include "io/ply.hpp"
 
@@ -11,14 +12,18 @@ namespace gpureg::io {
 // The library decodes the body itself: the readers of PCL allocate by the counts of the header,
 // print to the console, and need VTK at link time. They are the oracle of the tests.
 PointCloud read_point_cloud(const std::string& path) {
-  const std::string bytes = files::read_file(path, std::size_t{1} << 36);
+  // What has no header is not read as a whole.
+  const std::string start = files::read_start(path, kMostHeaderBytes);
+  const Source named(path, start);
+  if (start.empty()) named.fail("the file is empty");
+  const bool ply = start.compare(0, 3, "ply") == 0, pcd = !ply && looks_like_pcd(start);
+  if (!ply && !pcd && !looks_like_kitti(path)) {
+    if (is_mesh(path)) named.fail("a mesh, which read_mesh reads");
+    named.fail("neither a PLY nor a PCD file, nor a scan of KITTI (.bin)");
+  }
+  const std::string bytes = files::read_file(path, kMostDataBytes);
   Source source(path, bytes);
-  if (bytes.empty()) source.fail("the file is empty");
-  if (bytes.compare(0, 3, "ply") == 0) return read_ply(source);
-  if (looks_like_pcd(bytes)) return read_pcd(source);
-  if (looks_like_kitti(path)) return read_kitti(source);
-  if (is_mesh(path)) source.fail("a mesh, which read_mesh reads");
-  source.fail("neither a PLY nor a PCD file, nor a scan of KITTI (.bin)");
+  return ply ? read_ply(source) : pcd ? read_pcd(source) : read_kitti(source);
 }
 
 }  // namespace gpureg::io

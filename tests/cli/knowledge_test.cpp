@@ -119,7 +119,6 @@ TEST_F(Knowledge, TheVerticalDirectionExcludesPoses) {
   EXPECT_EQ(wrong.status, 1) << wrong.out;
 }
 
-#ifdef GPUREG_HAVE_ASSIMP
 /// An L-shaped prism: closed, and without symmetry but for a mirror.
 std::string bracket() {
   return "v 0 0 0\nv 1 0 0\nv 1 0.3 0\nv 0.25 0.3 0\nv 0.25 0.7 0\nv 0 0.7 0\n"
@@ -182,7 +181,6 @@ TEST(MeshInput, FlippedAndNonManifoldFacesAreSaid) {
   expect_holds(info.err, {"cube.ply", "not closed", "1 faces pointed the wrong way",
                           "1 edges belong to more than two faces"});
 }
-#endif
 
 TEST(KittiInput, IsAFragmentOfABatch) {
   const TemporaryFolder folder;

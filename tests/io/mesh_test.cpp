@@ -126,7 +126,6 @@ TEST(MeshFile, IsToldByItsFaces) {
   expect_error<IoError>([&] { read_point_cloud(stl); }, {stl, "mesh", "read_mesh"});
 }
 
-#ifdef GPUREG_HAVE_ASSIMP
 TEST(MeshFile, StlObjAndPlyHoldTheSameSurface) {
   const TemporaryFolder folder;
   for (const std::string& path :
@@ -187,13 +186,6 @@ TEST(MeshFile, WrongFilesAreNamed) {
   refused("truncated.stl", binary.substr(0, binary.size() - 1), {"face"});
   expect_error<IoError>([&] { read_mesh(folder / "none.stl"); }, {"none.stl"});
 }
-#else
-TEST(MeshFile, WithoutAssimpTheErrorSaysSo) {
-  const TemporaryFolder folder;
-  const std::string path = folder.write("a.obj", test::obj_text(cube_vertices(), cube_faces()));
-  expect_error<IoError>([&] { read_mesh(path); }, {path, "Assimp"});
-}
-#endif
 
 }  // namespace
 }  // namespace gpureg::io
