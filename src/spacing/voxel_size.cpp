@@ -17,9 +17,12 @@ constexpr std::size_t kWantedPoints = 5000, kMinPoints = 3000;
 constexpr std::size_t kVoxelSample = 400'000, kMinVoxelSample = 50'000;
 constexpr std::size_t kSpacingSample = 1000,
                       kNoiseSample =
-                          200;           // medians of samples this large are within a few per cent
-constexpr double kSizeTolerance = 1.02;  // of the bisection, below the rounding of the result
-constexpr double kNoiseRadius = 1.5;     // radius of the fitted plane, in voxels
+                          200;  // medians of samples this large are within a few per cent
+/// Points that are looked at around one, each way: all points may be at the same place along the
+/// longest side.
+constexpr std::size_t kMostVisits = 1'000'000;
+constexpr double kSizeTolerance = 1.02;     // of the bisection, below the rounding of the result
+constexpr double kNoiseRadius = 1.5;        // radius of the fitted plane, in voxels
 constexpr std::size_t kMinPlanePoints = 8;  // a plane fits fewer points however rough they are
 constexpr double kMaxNoise = 1.0 / 3.0;     // of a voxel: its centroid averages out less
 // Neighbourhoods of the normals, in voxels. They have an area if the second axis is not far shorter
@@ -190,12 +193,14 @@ class SortedCloud {
     const std::size_t count = std::min(most, points_.size());
     for (std::size_t s = 0; s < count; ++s) visit(s * points_.size() / count);
   }
-  /// Visits points on both sides in the order, each way until visit returns false.
+  /// Visits points on both sides in the order, each way until visit returns false, or kMostVisits.
   template <typename Visit>
   void around(std::size_t at, Visit&& visit) const {
-    for (std::size_t k = at + 1; k < points_.size() && visit(k); ++k) {
+    const std::size_t first = at - std::min(at, kMostVisits);
+    const std::size_t last = std::min(points_.size(), at + kMostVisits);
+    for (std::size_t k = at + 1; k < last && visit(k); ++k) {
     }
-    for (std::size_t k = at; k-- > 0 && visit(k);) {
+    for (std::size_t k = at; k-- > first && visit(k);) {
     }
   }
 
