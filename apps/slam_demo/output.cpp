@@ -135,6 +135,10 @@ json loops_json(const Slam& slam, const RunResult& result) {
 
 }  // namespace
 
+std::string text_of(const nlohmann::json& document, int indent) {
+  return document.dump(indent, ' ', false, json::error_handler_t::replace);
+}
+
 void evaluate(const Slam& slam, const std::string& true_surface, RunResult& result) {
   constexpr std::size_t kNeeded = 3;  // poses that hold an alignment
   const Trajectory final = slam.trajectory(), odometry = slam.odometry();
@@ -169,7 +173,7 @@ void write_results(const std::string& folder, const Slam& slam, const RunResult&
   const surfel::Cloud surfels = slam.surfels();
   gpureg::files::write_atomically(folder + "/map.ply", ply_of(surfels));
   const json figures = loops_json(slam, result);
-  gpureg::files::write_atomically(folder + "/loops.json", figures.dump(1) + "\n");
+  gpureg::files::write_atomically(folder + "/loops.json", text_of(figures, 1) + "\n");
   gpureg::files::write_atomically(folder + "/report.html",
                                   report_page(slam, result, surfels, figures));
 }

@@ -29,6 +29,9 @@ void evaluate(const Slam& slam, const std::string& true_surface, RunResult& resu
 /// Throws gpureg::IoError.
 void write_results(const std::string& folder, const Slam& slam, const RunResult& result);
 
+/// JSON as text. Names of files need not be UTF-8: other bytes become the replacement character.
+std::string text_of(const nlohmann::json& document, int indent);
+
 /// The page of report.html. figures: loops.json.
 std::string report_page(const Slam& slam, const RunResult& result, const surfel::Cloud& surfels,
                         const nlohmann::json& figures);

@@ -191,10 +191,10 @@ std::string report_page(const Slam& slam, const RunResult& r, const surfel::Clou
                      {"lines", lines},
                      {"errors", {errors_of("#c0392b", r.odometry), errors_of("#1e7a46", r.final)}},
                      {"map", map_of(surfels, axes)}};
-  std::string text = data.dump();
-  // Names of files could end the script.
-  for (std::size_t at = 0; (at = text.find("</", at)) != std::string::npos; at += 3)
-    text.replace(at, 2, "<\\/");
+  std::string text = text_of(data, -1);
+  // Names of files could end the script, or begin one; only strings have this character.
+  for (std::size_t at = 0; (at = text.find('<', at)) != std::string::npos; ++at)
+    text.replace(at, 1, "\\u003c");
   return kHead + text + kTail;
 }
 

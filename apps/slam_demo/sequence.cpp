@@ -7,6 +7,8 @@
 #include <fstream>
 #include <gpureg/error.hpp>
 #include <gpureg/evaluation.hpp>
+#include <iterator>
+#include <locale>
 #include <map>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
@@ -45,17 +47,35 @@ std::vector<std::vector<std::string>> read_lines(const fs::path& path, std::size
   return lines;
 }
 
+/// Reads a word as a number, whatever the locale of the program.
+bool parse(const std::string& word, double& value) {
+  std::istringstream in(word);
+  in.imbue(std::locale::classic());
+  return in >> value && in.peek() == std::istringstream::traits_type::eof() && std::isfinite(value);
+}
+
 double number(const std::string& word, const fs::path& path) {
-  std::size_t used = 0;
   double value = 0;
-  try {
-    value = std::stod(word, &used);
-  } catch (const std::exception&) {
-    used = 0;
-  }
-  if (used != word.size() || word.empty() || !std::isfinite(value))
-    throw IoError(path.string() + ": '" + word + "' is no number");
+  if (!parse(word, value)) throw IoError(path.string() + ": '" + word + "' is no number");
   return value;
+}
+
+/// The file `preferred` of a folder, else the only one whose name ends so; empty where none does.
+fs::path only_file(const fs::path& folder, const std::string& ending, const char* preferred) {
+  if (fs::exists(folder / preferred)) return folder / preferred;
+  std::vector<fs::path> found;
+  for (const auto& entry : fs::directory_iterator(folder)) {
+    const std::string name = entry.path().filename().string();
+    if (name.size() > ending.size() &&
+        name.compare(name.size() - ending.size(), ending.size(), ending) == 0)
+      found.push_back(entry.path());
+  }
+  std::sort(found.begin(), found.end());
+  if (found.size() > 1)
+    throw IoError(found[0].string() + " and " + found[1].string() +
+                  ": only one can be the true trajectory; call it " + preferred +
+                  ", or name it by --groundtruth");
+  return found.empty() ? fs::path() : found[0];
 }
 
 /// The digits at the end of a name without its extensions; -1 without.
@@ -71,6 +91,18 @@ std::vector<Listed> read_list(const fs::path& folder, const char* name) {
   for (const auto& words : read_lines(folder / name, 2))
     result.push_back({number(words[0], folder / name), (folder / words[1]).string()});
   return result;
+}
+
+/// Of entries by ascending time; of two at the same distance the earlier one.
+std::vector<Listed>::const_iterator nearest_to(double time, const std::vector<Listed>& entries) {
+  const auto from = [&](double t) {
+    return std::lower_bound(entries.begin(), entries.end(), t,
+                            [](const Listed& entry, double value) { return entry.time < value; });
+  };
+  const auto after = from(time);
+  if (after == entries.begin()) return after;
+  const double before = std::prev(after)->time;
+  return after != entries.end() && after->time - time < time - before ? after : from(before);
 }
 
 Sequence open_tum(const fs::path& folder) {
@@ -92,32 +124,27 @@ Sequence open_tum(const fs::path& folder) {
     std::stable_sort(depth.begin(), depth.end(),
                      [](const Listed& a, const Listed& b) { return a.time < b.time; });
     for (const Listed& colour : read_list(folder, "rgb.txt")) {
-      auto nearest =
-          std::min_element(depth.begin(), depth.end(), [&](const Listed& a, const Listed& b) {
-            return std::abs(a.time - colour.time) < std::abs(b.time - colour.time);
-          });
+      const auto nearest = nearest_to(colour.time, depth);
       if (nearest == depth.end() || std::abs(nearest->time - colour.time) > kMaxTimeDifference)
         continue;
       frames.push_back({colour.time, colour.path, nearest->path});
     }
   }
-  if (fs::exists(folder / "groundtruth.txt")) {
-    result.truth = gpureg::evaluation::read_trajectory((folder / "groundtruth.txt").string());
-  } else {
-    for (const auto& entry : fs::directory_iterator(folder)) {
-      const std::string name = entry.path().filename().string();
-      if (name.size() > 12 && name.substr(name.size() - 12) == ".gt.freiburg")
-        result.truth = gpureg::evaluation::read_trajectory(entry.path().string());
-    }
-  }
+  const fs::path truth = only_file(folder, ".gt.freiburg", "groundtruth.txt");
+  if (!truth.empty()) result.truth = gpureg::evaluation::read_trajectory(truth.string());
   return result;
+}
+
+/// Of two files with the same number the one whose name comes first.
+void keep_first(std::string& kept, const std::string& path) {
+  if (kept.empty() || path < kept) kept = path;
 }
 
 std::map<long, std::string> numbered(const fs::path& folder) {
   std::map<long, std::string> result;
   for (const auto& entry : fs::directory_iterator(folder)) {
     const long index = index_of(entry.path());
-    if (index >= 0) result[index] = entry.path().string();
+    if (index >= 0) keep_first(result[index], entry.path().string());
   }
   return result;
 }
@@ -126,8 +153,9 @@ std::map<long, std::string> numbered(const fs::path& folder) {
 std::vector<double> read_numbers(const fs::path& path, std::size_t count) {
   std::ifstream file(path);
   std::vector<double> numbers(count);
+  std::string word;
   for (double& value : numbers) {
-    if (!(file >> value))
+    if (!(file >> word) || !parse(word, value))
       throw IoError(path.string() + ": needs " + std::to_string(count) + " numbers");
   }
   return numbers;
@@ -151,12 +179,10 @@ Sequence open_redwood(const fs::path& folder, const fs::path& colour) {
     if (image != images.end())
       result.frames.push_back({static_cast<double>(index) / kFrameRate, image->second, path});
   }
-  for (const auto& entry : fs::directory_iterator(folder)) {
-    if (entry.path().extension() != ".log") continue;
-    for (const auto& pose : gpureg::evaluation::read_log(entry.path().string()))
-      result.truth.push_back({pose.i / kFrameRate, pose.transform});
-    break;
-  }
+  const fs::path truth = only_file(folder, ".log", "trajectory.log");
+  if (truth.empty()) return result;
+  for (const auto& pose : gpureg::evaluation::read_log(truth.string()))
+    result.truth.push_back({pose.i / kFrameRate, pose.transform});
   return result;
 }
 
@@ -180,8 +206,10 @@ Sequence open_seven_scenes(const fs::path& folder) {
     const std::string name = entry.path().filename().string();
     const long index = index_of(entry.path());
     if (index < 0 || name.rfind("frame-", 0) != 0) continue;
-    if (name.find(".color.") != std::string::npos) frames[index].colour = entry.path().string();
-    if (name.find(".depth.") != std::string::npos) frames[index].depth = entry.path().string();
+    if (name.find(".color.") != std::string::npos)
+      keep_first(frames[index].colour, entry.path().string());
+    if (name.find(".depth.") != std::string::npos)
+      keep_first(frames[index].depth, entry.path().string());
   }
   for (auto& [index, frame] : frames) {
     frame.time = static_cast<double>(index) / kFrameRate;

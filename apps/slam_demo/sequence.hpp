@@ -29,10 +29,10 @@ struct Sequence {
 
 /// Recognises the layout of a folder:
 ///   TUM, ICL-NUIM  associations.txt, or rgb.txt and depth.txt; groundtruth.txt or *.gt.freiburg
-///   Redwood        depth/ and color/, image/ or rgb/ with numbered files; trajectory*.log
+///   Redwood        depth/ and color/, image/ or rgb/ with numbered files; trajectory.log or *.log
 ///   7-Scenes       frame-NNNNNN.color.*, .depth.png, .pose.txt; depth not registered to colour
 /// @throws gpureg::IoError naming the file: no such folder, no known layout, a line that cannot be
-///   read, no frames.
+///   read, no frames, several files that may be the true trajectory.
 Sequence open_sequence(const std::string& folder);
 
 /// What a frame holds. Empty images where a file is missing or damaged.

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "tracking_file.hpp"
 
+#include <cmath>
+#include <cstdint>
 #include <cstring>
 #include <fstream>
 #include <gpureg/error.hpp>
@@ -9,6 +11,9 @@
 
 namespace slam_demo {
 namespace {
+
+constexpr float kMostPixels = 1 << 14;
+constexpr int kMostOctaves = 32;
 
 /// Says which build wrote the file: the sizes change with the structures.
 std::string mark() {
@@ -57,9 +62,20 @@ struct Archive {
   }
 };
 
+void require(bool holds, const std::string& path, const std::string& what) {
+  if (!holds) throw gpureg::IoError(path + ": is damaged: " + what);
+}
+
 void pass(Archive& file, Features& f) {
   file.lists(f.keys, f.descriptors, f.depth);
-  if (!file.writing) f.index();
+  if (file.writing) return;
+  require(f.descriptors.size() == f.size() && f.depth.size() == f.size(), file.path,
+          "lists of features differ in length");
+  for (const cv::KeyPoint& key : f.keys)
+    require(key.pt.x >= 0 && key.pt.x < kMostPixels && key.pt.y >= 0 && key.pt.y < kMostPixels &&
+                key.octave >= 0 && key.octave < kMostOctaves,
+            file.path, "a feature lies outside the image");
+  f.index();
 }
 
 void pass(Archive& file, Keyframe& k) {
@@ -75,7 +91,9 @@ void pass(Archive& file, Keyframe& k) {
 }
 
 void pass(Archive& file, MapPoint& p) {
-  file.values(p.position, p.descriptor, p.first_keyframe, p.octave_zero_distance, p.bad);
+  std::uint8_t bad = p.bad;  // not every byte is a bool
+  file.values(p.position, p.descriptor, p.first_keyframe, p.octave_zero_distance, bad);
+  p.bad = bad != 0;
   file.lists(p.observations);
 }
 
@@ -97,6 +115,41 @@ void pass(Archive& file, Tracking& t) {
   file.values(t.lost, t.dense);
 }
 
+/// Throws IoError for an index of something that is not there.
+void check(const Tracking& t, const std::string& path) {
+  const auto below = [](int index, std::size_t count) { return index >= 0 && at(index) < count; };
+  const auto none_or_below = [&](int index, std::size_t count) {
+    return index == kNone || below(index, count);
+  };
+  const std::size_t keyframes = t.map.keyframes.size(), points = t.map.points.size();
+  for (const Keyframe& k : t.map.keyframes) {
+    require(k.points.size() == k.features->size(), path, "a keyframe has points without features");
+    for (const int point : k.points)
+      require(none_or_below(point, points), path, "a keyframe sees a point that is not there");
+    for (const auto& [other, shared] : k.covisible)
+      require(below(other, keyframes), path, "a keyframe shares points with none");
+    require(k.session >= 0 && std::isfinite(k.time) && k.world_from_camera.matrix().allFinite(),
+            path, "a keyframe has no session, time or pose");
+  }
+  for (const MapPoint& p : t.map.points) {
+    require(none_or_below(p.first_keyframe, keyframes), path, "a point is of no keyframe");
+    for (const Observation& o : p.observations)
+      require(below(o.keyframe, keyframes) &&
+                  below(o.key, t.map.keyframes[at(o.keyframe)].features->size()),
+              path, "a point is seen by no feature");
+  }
+  for (const RelativePose& r : t.map.links)
+    require(below(r.a, keyframes) && below(r.b, keyframes), path, "a link is of no keyframe");
+  for (const FramePose& f : t.frames)
+    require(f.session >= 0 ? below(f.reference, keyframes) : f.session == kNone, path,
+            "a frame is of no keyframe");
+  for (const BuiltFragment& f : t.fragments)
+    require(below(f.keyframe, keyframes) &&
+                (f.cloud.normals.empty() || f.cloud.normals.size() == f.cloud.points.size()),
+            path, "a fragment is of no keyframe, or lacks normals");
+  require(t.lost >= 0 && t.dense >= 0, path, "a count is negative");
+}
+
 }  // namespace
 
 void write_tracking(const std::string& path, Tracking& tracking) {
@@ -114,6 +167,7 @@ Tracking read_tracking(const std::string& path) {
   file.at = mark().size();
   Tracking result;
   pass(file, result);
+  check(result, path);
   return result;
 }
 

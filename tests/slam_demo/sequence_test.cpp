@@ -4,8 +4,12 @@
 #include <gtest/gtest.h>
 #include <gpureg/error.hpp>
 
+#include <algorithm>
+#include <chrono>
+#include <clocale>
 #include <filesystem>
 #include <fstream>
+#include <iterator>
 #include <opencv2/imgcodecs.hpp>
 
 #include "support/temporary_folder.hpp"
@@ -168,6 +172,70 @@ TEST(Sequence, DamagedFilesAreNamed) {
   EXPECT_NE(load(files, Rig{}).problem.find("16 bit"), std::string::npos);
   cv::imwrite(folder / "depth/1.png", cv::Mat1w(40, 64, std::uint16_t{900}));
   EXPECT_NE(load(files, Rig{}).problem.find("size"), std::string::npos);
+}
+
+TEST(Sequence, NearestTimesAsALinearSearchFindsThem) {
+  const TemporaryFolder folder;
+  write(folder / "rgb.txt", "1.00 rgb/a.png\n2.00 rgb/b.png\n3.00 rgb/c.png\n");
+  // Of b two are as near: the earlier one. Of c two have the same time: the first of the file.
+  write(folder / "depth.txt",
+        "1.99 depth/b.png\n2.01 depth/x.png\n2.99 depth/c.png\n2.99 depth/y.png\n");
+  const Sequence sequence = open_sequence(folder.path());
+  ASSERT_EQ(sequence.frames.size(), 2u);
+  EXPECT_NE(sequence.frames[0].depth.find("b.png"), std::string::npos);
+  EXPECT_NE(sequence.frames[1].depth.find("c.png"), std::string::npos);
+}
+
+TEST(Sequence, ListsOfAnHourArePairedInNoTime) {
+  const TemporaryFolder folder;
+  std::string colour, depth;
+  for (int k = 0; k < 100000; ++k) {
+    const std::string time = std::to_string(k / 30.0);
+    colour += time + " c.png\n";
+    depth += time + " d.png\n";
+  }
+  write(folder / "rgb.txt", colour);
+  write(folder / "depth.txt", depth);
+  const auto start = std::chrono::steady_clock::now();
+  EXPECT_EQ(open_sequence(folder.path()).frames.size(), 100000u);
+  // Below a second; comparing each with each took 10^10 steps, half a minute.
+  EXPECT_LT(std::chrono::steady_clock::now() - start, std::chrono::seconds(15));
+}
+
+TEST(Sequence, SeveralLogs) {
+  const TemporaryFolder folder;
+  write_images(folder / "color/0.jpg", folder / "depth/0.png", 1500);
+  const auto log = [](int x) {
+    return "0 0 1\n1 0 0 " + std::to_string(x) + "\n0 1 0 0\n0 0 1 0\n0 0 0 1\n";
+  };
+  write(folder / "b.log", log(2));
+  write(folder / "a.log", log(1));
+  const std::string message = message_of(folder.path());
+  EXPECT_NE(message.find("a.log and "), std::string::npos) << message;
+  EXPECT_NE(message.find("b.log: only one"), std::string::npos) << message;
+  write(folder / "trajectory.log", log(3));
+  EXPECT_EQ(open_sequence(folder.path()).truth.at(0).world_from_body(0, 3), 3);
+
+  const TemporaryFolder tum;
+  write(tum / "associations.txt", "1 depth/1.png 1 rgb/1.png\n");
+  write(tum / "a.gt.freiburg", "1 0 0 5 0 0 0 1\n");
+  write(tum / "b.gt.freiburg", "1 0 0 5 0 0 0 1\n");
+  EXPECT_NE(message_of(tum.path()).find("a.gt.freiburg and "), std::string::npos);
+}
+
+// Programs that show windows set the user's locale, in which 1.5 may be 1,5.
+TEST(Sequence, NumbersDoNotDependOnTheLocale) {
+  const char* const names[] = {"de_DE.UTF-8", "de_DE.utf8", "fr_FR.UTF-8", "de_DE"};
+  const bool set = std::any_of(std::begin(names), std::end(names), [](const char* name) {
+    return std::setlocale(LC_ALL, name) != nullptr;
+  });
+  const TemporaryFolder folder;
+  write(folder / "associations.txt", "1.5 rgb/1.png 1.5 depth/1.png\n");
+  double time = 0;
+  EXPECT_NO_THROW(time = open_sequence(folder.path()).frames.at(0).time);
+  std::setlocale(LC_ALL, "C");
+  EXPECT_EQ(time, 1.5);
+  if (!set) GTEST_SKIP() << "this machine has no locale with a decimal comma";
 }
 
 TEST(Sequence, ErrorsNameTheFile) {
