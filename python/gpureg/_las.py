@@ -4,12 +4,16 @@
 from __future__ import annotations
 
 import os
+import struct
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from ._core import IoError
+
+# Points are read in pieces of so many bytes: the header of a damaged file may announce any number.
+_PIECE = 1 << 24
 
 
 def is_las(path: Any) -> bool:
@@ -19,7 +23,8 @@ def is_las(path: Any) -> bool:
 def read_las(path: str | os.PathLike[str]) -> npt.NDArray[np.float64]:
     """(N, 3) coordinates in the file's unit, with its scale and offset applied.
 
-    float64, as map coordinates need it: `prepare` and `register` lose nothing of them.
+    float64, as map coordinates need it: `prepare` and `register` lose nothing of them. Memory
+    grows with the points that the file holds, not with those that its header announces.
 
     Raises
     ------
@@ -36,7 +41,55 @@ def read_las(path: str | os.PathLike[str]) -> npt.NDArray[np.float64]:
             f"{name}: LAS and LAZ files need laspy: pip install 'gpureg[las]'"
         ) from None
     try:
-        file = laspy.read(name)
-    except (OSError, ValueError, laspy.errors.LaspyException) as error:
-        raise IoError(f"{name}: {error}") from error
-    return np.column_stack([np.asarray(axis, np.float64) for axis in (file.x, file.y, file.z)])
+        return _read(laspy, name)
+    except (KeyboardInterrupt, SystemExit):
+        raise
+    except BaseException as error:  # laspy has no type for damaged files, nor has lazrs for panics
+        raise IoError(f"{name}: {type(error).__name__}: {error}") from error
+
+
+def _check_header(name: str) -> tuple[bool, int, int]:
+    """Whether the points are compressed, where they start, and the bytes of one.
+
+    laspy reads as many records before the points as the header announces, also beyond the end.
+    """
+    with open(name, "rb") as file:
+        header = file.read(107)
+    if len(header) < 107 or header[:4] != b"LASF":
+        raise ValueError("it does not start as a LAS file")
+    header_size, start, records, point_format, size = struct.unpack_from("<HIIBH", header, 94)
+    if start > os.path.getsize(name) or header_size + 54 * records > start:
+        raise ValueError(f"{records} records announced before the points at byte {start}")
+    return point_format >= 128 or point_format & 64 != 0, start, size
+
+
+def _check_chunks(name: str, start: int, size: int) -> None:
+    """lazrs allocates as many entries as the table of chunks announces. Every chunk begins with a
+    whole point.
+    """
+    with open(name, "rb") as file:
+        file.seek(start)
+        (table,) = struct.unpack("<q", file.read(8))
+        if table == -1:
+            file.seek(-8, os.SEEK_END)
+            (table,) = struct.unpack("<q", file.read(8))
+        file.seek(table + 4)
+        (chunks,) = struct.unpack("<I", file.read(4))
+    if (chunks - 1) * size > os.path.getsize(name):
+        raise ValueError(f"{chunks} chunks announced, more than the file has room for")
+
+
+def _read(laspy: Any, name: str) -> npt.NDArray[np.float64]:
+    compressed, start, size = _check_header(name)
+    if compressed:
+        _check_chunks(name, start, size)
+    # The parallel decompressor allocates by the sizes of the chunks in their table.
+    with laspy.open(name, laz_backend=laspy.LazBackend.Lazrs, read_evlrs=False) as file:
+        count, held = file.header.point_count, (os.path.getsize(name) - start) // max(size, 1)
+        if not compressed and count > held:
+            raise ValueError(f"truncated: {count} points announced, {held} are there")
+        pieces = [
+            np.column_stack([np.asarray(axis, np.float64) for axis in (part.x, part.y, part.z)])
+            for part in file.chunk_iterator(max(1, _PIECE // max(size, 1)))
+        ]
+    return np.concatenate(pieces) if pieces else np.zeros((0, 3))

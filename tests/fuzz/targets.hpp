@@ -16,6 +16,8 @@ struct Target {
 
 /// Point clouds, Redwood's files, cameras.txt, pairs, trajectories, pose graphs, saved states.
 std::vector<Target> file_targets();
+/// Meshes.
+std::vector<Target> mesh_targets();
 /// What the command reads: results, journals, initial poses.
 std::vector<Target> command_targets();
 /// The functions of the library, with options and clouds made of bytes.
