@@ -3,6 +3,7 @@
 #include <charconv>
 #include <filesystem>
 #include <iterator>
+#include <limits>
 #include <optional>
 
 #include "gpureg/error.hpp"
@@ -38,6 +39,10 @@ std::vector<std::pair<int, std::string>> list_fragments(const std::string& folde
     const auto number = fragment_number(entries->path().filename().string());
     std::error_code unreadable;  // a dangling link is not a fragment
     if (number && std::filesystem::is_regular_file(entries->path(), unreadable)) {
+      // The files of results have the number of fragments, an int, beside their numbers.
+      if (*number == std::numeric_limits<int>::max())
+        throw IoError("the number of the fragment " + entries->path().string() +
+                      " is too large, expected at most 2147483646");
       const auto [first, is_new] = fragments.emplace(*number, entries->path().string());
       if (!is_new)
         throw IoError("fragment " + std::to_string(*number) + " is twice in the folder: " +

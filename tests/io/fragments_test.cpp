@@ -56,5 +56,14 @@ TEST(Fragments, AFolderWithoutAnyIsAnError) {
                         {"file", "Not a directory"});
 }
 
+TEST(Fragments, TheLargestNumberLeavesRoomForACount) {
+  const test::TemporaryFolder folder;
+  folder.write("cloud_bin_2147483646.ply", "");
+  EXPECT_EQ(list_fragments(folder.path()).at(0).first, 2147483646);
+  folder.write("cloud_bin_2147483647.ply", "");
+  test::expect_error<IoError>([&] { list_fragments(folder.path()); },
+                              {"cloud_bin_2147483647.ply", "at most 2147483646"});
+}
+
 }  // namespace
 }  // namespace gpureg::io
