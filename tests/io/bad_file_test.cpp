@@ -1,8 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <gtest/gtest.h>
+#include <sys/stat.h>
+
+#include <filesystem>
 
 #include "gpureg/error.hpp"
 #include "gpureg/io.hpp"
+#include "gpureg/mesh.hpp"
 #include "io/seed_files.hpp"
 #include "support/expect_error.hpp"
 #include "support/temporary_folder.hpp"
@@ -38,6 +42,26 @@ TEST(BadFile, MissingEmptyOrSomethingElse) {
   expect_bad("\x89PNG\r\n", {"neither a PLY nor a PCD"});
   expect_bad("1 2 3\n4 5 6\n", {"neither a PLY nor a PCD"});
   expect_bad("# only a comment", {"neither a PLY nor a PCD"});
+}
+
+// A device has no end, and a pipe to which nobody writes waits for ever.
+TEST(BadFile, DevicesAndPipes) {
+  const TemporaryFolder folder;
+  const std::string pipe = folder / "pipe.ply";
+  ASSERT_EQ(::mkfifo(pipe.c_str(), 0600), 0);
+  for (const std::string& path : {std::string("/dev/zero"), pipe}) {
+    EXPECT_FALSE(is_mesh(path));
+    expect_error<IoError>([&] { read_point_cloud(path); }, {path, "not a regular file"});
+    expect_error<IoError>([&] { read_mesh(path); }, {path, "not a regular file"});
+  }
+}
+
+// Sparse: it takes no room. Without a header it is not read as a whole.
+TEST(BadFile, LargeFilesWithoutAHeader) {
+  const TemporaryFolder folder;
+  const std::string path = folder.write("cloud.ply", "");
+  std::filesystem::resize_file(path, std::uintmax_t{1} << 35);
+  expect_error<IoError>([&] { read_point_cloud(path); }, {path, "neither a PLY nor a PCD"});
 }
 
 TEST(BadFile, TruncatedBinaryPly) {
