@@ -24,6 +24,7 @@ void bind_voxel_size(py::module_& m);
 void bind_files(py::module_& m);
 void bind_evaluation(py::module_& m);
 void bind_confidence(py::module_& m);
+void bind_map_options(py::module_& m);
 void bind_pose_graph(py::module_& m);
 void bind_loop_closure(py::module_& m);
 void bind_reconstruction(py::module_& m);

@@ -105,19 +105,7 @@ void bind_loop_closure(py::module_& m) {
   bind_loop(m);
   using Release = py::call_guard<py::gil_scoped_release>;
   py::class_<LoopCloser>(m, "LoopCloser", "Loops for a SLAM system.")
-      .def(py::init([](const Context& context, const RegistrationOptions& registration,
-                       float voxel_size, bool loopsmart, bool optimize, double drift_per_metre,
-                       double rotation_per_metre) {
-             Options options =
-                 loopsmart ? Options::loopsmart(voxel_size) : Options::from_voxel_size(voxel_size);
-             options.registration = registration;
-             options.optimize = optimize;
-             options.graph.drift.translation_per_metre = drift_per_metre;
-             options.graph.drift.rotation_per_metre = rotation_per_metre;
-             return std::make_unique<LoopCloser>(context, options);
-           }),
-           py::arg("context"), py::arg("registration"), py::arg("voxel_size"), py::arg("loopsmart"),
-           py::arg("optimize"), py::arg("drift_per_metre"), py::arg("rotation_per_metre"))
+      .def(py::init<const Context&, const Options&>(), py::arg("context"), py::arg("options"))
       .def("add", &add, py::arg("id"), py::arg("cloud"), py::arg("world_from_fragment"),
            py::arg("session"), py::arg("time"), py::arg("up"))
       .def(

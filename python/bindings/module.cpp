@@ -20,6 +20,7 @@ PYBIND11_MODULE(_core, m) {
   bind_files(m);
   bind_evaluation(m);
   bind_confidence(m);
+  bind_map_options(m);
   bind_pose_graph(m);
   bind_loop_closure(m);
   bind_reconstruction(m);

@@ -55,22 +55,11 @@ std::vector<Odometry> odometry_of(const py::object& given) {
 }
 
 Reconstruction reconstruct_of(std::size_t scans, const IndexArray& rows, const py::list& results,
-                              double voxel_size, double min_edge_confidence,
-                              double min_connection_confidence, std::uint32_t min_island,
-                              const DoubleArray& drift, const py::object& odometry, int threads) {
+                              const Options& options, const py::object& odometry) {
   const std::vector<Pair> pairs = pairs_of(rows);
   std::vector<RegistrationResult> values;
   for (const py::handle result : results)
     values.push_back(result.cast<const RegistrationResult&>());
-  Options options = Options::from_voxel_size(static_cast<float>(voxel_size));
-  options.min_edge_confidence = min_edge_confidence;
-  options.min_connection_confidence = min_connection_confidence;
-  options.min_island = min_island;
-  const auto drifts = matrix_of<Eigen::Vector3d>(drift, "drift");
-  options.drift.translation_per_metre = drifts[0];
-  options.drift.rotation_per_metre = drifts[1];
-  options.drift.rotation_per_degree = drifts[2];
-  options.threads = threads;
   const std::vector<Odometry> known = odometry_of(odometry);
   const py::gil_scoped_release release;
   return reconstruct(scans, pairs, values, options, known);
@@ -227,8 +216,7 @@ void bind_reconstruction(py::module_& m) {
         return out;
       });
   m.def("reconstruct_map", &reconstruct_of, py::arg("scans"), py::arg("pairs"), py::arg("results"),
-        py::arg("voxel_size"), py::arg("min_edge_confidence"), py::arg("min_connection_confidence"),
-        py::arg("min_island"), py::arg("drift"), py::arg("odometry"), py::arg("threads"));
+        py::arg("options"), py::arg("odometry"));
   m.def("refine_map", &refine_map, py::arg("context"), py::arg("map"), py::arg("clouds"),
         py::arg("seen"), py::arg("voxel_size"), py::arg("tell"));
   m.def("surface_options", &surface_options, py::arg("registration"));

@@ -764,6 +764,401 @@ def _confidence_rank_features(
 ) -> _Float64: ...
 def _confidence_factor(points: Any, of: Any) -> Any: ...
 
+class GncOptions:
+    # fields of GncOptions
+    inlier_probability: float
+    mu_step: float
+    max_rounds: int
+    min_bridge_confidence: float
+    consensus: bool
+    def __init__(
+        self,
+        *,
+        inlier_probability: float = ...,
+        mu_step: float = ...,
+        max_rounds: int = ...,
+        min_bridge_confidence: float = ...,
+        consensus: bool = ...,
+    ) -> None: ...
+    def replace(
+        self,
+        *,
+        inlier_probability: float = ...,
+        mu_step: float = ...,
+        max_rounds: int = ...,
+        min_bridge_confidence: float = ...,
+        consensus: bool = ...,
+    ) -> GncOptions: ...
+    def validate(self) -> None: ...
+    def __eq__(self, other: object, /) -> bool: ...
+    __hash__: None  # type: ignore[assignment]
+    _fields: tuple[str, ...]
+    # end of fields
+
+class LineProcessOptions:
+    # fields of LineProcessOptions
+    odometry_weight: float
+    tau: float
+    tau_not_squared: bool
+    min_weight: float
+    max_rounds: int
+    correspondence_distance: float
+    refresh_interval: int
+    def __init__(
+        self,
+        *,
+        odometry_weight: float = ...,
+        tau: float = ...,
+        tau_not_squared: bool = ...,
+        min_weight: float = ...,
+        max_rounds: int = ...,
+        correspondence_distance: float = ...,
+        refresh_interval: int = ...,
+    ) -> None: ...
+    def replace(
+        self,
+        *,
+        odometry_weight: float = ...,
+        tau: float = ...,
+        tau_not_squared: bool = ...,
+        min_weight: float = ...,
+        max_rounds: int = ...,
+        correspondence_distance: float = ...,
+        refresh_interval: int = ...,
+    ) -> LineProcessOptions: ...
+    def validate(self) -> None: ...
+    def __eq__(self, other: object, /) -> bool: ...
+    __hash__: None  # type: ignore[assignment]
+    _fields: tuple[str, ...]
+    # end of fields
+
+class DriftOptions:
+    # fields of DriftOptions
+    translation_per_metre: float
+    rotation_per_metre: float
+    rotation_per_degree: float
+    min_translation: float
+    min_rotation: float
+    def __init__(
+        self,
+        *,
+        translation_per_metre: float = ...,
+        rotation_per_metre: float = ...,
+        rotation_per_degree: float = ...,
+        min_translation: float = ...,
+        min_rotation: float = ...,
+    ) -> None: ...
+    def replace(
+        self,
+        *,
+        translation_per_metre: float = ...,
+        rotation_per_metre: float = ...,
+        rotation_per_degree: float = ...,
+        min_translation: float = ...,
+        min_rotation: float = ...,
+    ) -> DriftOptions: ...
+    def validate(self) -> None: ...
+    def __eq__(self, other: object, /) -> bool: ...
+    __hash__: None  # type: ignore[assignment]
+    _fields: tuple[str, ...]
+    # end of fields
+
+class LoopNoiseOptions:
+    # fields of LoopNoiseOptions
+    translation: float
+    rotation: float
+    def __init__(
+        self,
+        *,
+        translation: float = ...,
+        rotation: float = ...,
+    ) -> None: ...
+    def replace(
+        self,
+        *,
+        translation: float = ...,
+        rotation: float = ...,
+    ) -> LoopNoiseOptions: ...
+    def validate(self) -> None: ...
+    def __eq__(self, other: object, /) -> bool: ...
+    __hash__: None  # type: ignore[assignment]
+    _fields: tuple[str, ...]
+    # end of fields
+
+class SolverOptions:
+    # fields of SolverOptions
+    max_iterations: int
+    relative_tolerance: float
+    initial_damping: float
+    def __init__(
+        self,
+        *,
+        max_iterations: int = ...,
+        relative_tolerance: float = ...,
+        initial_damping: float = ...,
+    ) -> None: ...
+    def replace(
+        self,
+        *,
+        max_iterations: int = ...,
+        relative_tolerance: float = ...,
+        initial_damping: float = ...,
+    ) -> SolverOptions: ...
+    def validate(self) -> None: ...
+    def __eq__(self, other: object, /) -> bool: ...
+    __hash__: None  # type: ignore[assignment]
+    _fields: tuple[str, ...]
+    # end of fields
+
+class PoseGraphOptions:
+    # fields of PoseGraphOptions
+    robust: Literal["none", "gnc", "line_process"]
+    gnc: GncOptions
+    line_process: LineProcessOptions
+    drift: DriftOptions
+    loop_noise: LoopNoiseOptions
+    solver: SolverOptions
+    use_initial_poses: bool
+    threads: int
+    def __init__(
+        self,
+        *,
+        robust: Literal["none", "gnc", "line_process"] = ...,
+        gnc: GncOptions = ...,
+        line_process: LineProcessOptions = ...,
+        drift: DriftOptions = ...,
+        loop_noise: LoopNoiseOptions = ...,
+        solver: SolverOptions = ...,
+        use_initial_poses: bool = ...,
+        threads: int = ...,
+    ) -> None: ...
+    def replace(
+        self,
+        *,
+        robust: Literal["none", "gnc", "line_process"] = ...,
+        gnc: GncOptions = ...,
+        line_process: LineProcessOptions = ...,
+        drift: DriftOptions = ...,
+        loop_noise: LoopNoiseOptions = ...,
+        solver: SolverOptions = ...,
+        use_initial_poses: bool = ...,
+        threads: int = ...,
+    ) -> PoseGraphOptions: ...
+    def validate(self) -> None: ...
+    def __eq__(self, other: object, /) -> bool: ...
+    __hash__: None  # type: ignore[assignment]
+    _fields: tuple[str, ...]
+    # end of fields
+
+class EdgeNoiseOptions:
+    # fields of EdgeNoiseOptions
+    translation: float
+    rotation: float
+    max_translation: float
+    def __init__(
+        self,
+        *,
+        translation: float = ...,
+        rotation: float = ...,
+        max_translation: float = ...,
+    ) -> None: ...
+    def replace(
+        self,
+        *,
+        translation: float = ...,
+        rotation: float = ...,
+        max_translation: float = ...,
+    ) -> EdgeNoiseOptions: ...
+    def validate(self) -> None: ...
+    def __eq__(self, other: object, /) -> bool: ...
+    __hash__: None  # type: ignore[assignment]
+    _fields: tuple[str, ...]
+    # end of fields
+
+class ReconstructionOptions:
+    # fields of ReconstructionOptions
+    consistency: LoopConsistencyOptions
+    noise: EdgeNoiseOptions
+    drift: DriftOptions
+    information_unit: float
+    min_edge_confidence: float
+    min_connection_confidence: float
+    modes: int
+    min_island: int
+    threads: int
+    def __init__(
+        self,
+        *,
+        consistency: LoopConsistencyOptions = ...,
+        noise: EdgeNoiseOptions = ...,
+        drift: DriftOptions = ...,
+        information_unit: float = ...,
+        min_edge_confidence: float = ...,
+        min_connection_confidence: float = ...,
+        modes: int = ...,
+        min_island: int = ...,
+        threads: int = ...,
+    ) -> None: ...
+    def replace(
+        self,
+        *,
+        consistency: LoopConsistencyOptions = ...,
+        noise: EdgeNoiseOptions = ...,
+        drift: DriftOptions = ...,
+        information_unit: float = ...,
+        min_edge_confidence: float = ...,
+        min_connection_confidence: float = ...,
+        modes: int = ...,
+        min_island: int = ...,
+        threads: int = ...,
+    ) -> ReconstructionOptions: ...
+    def validate(self) -> None: ...
+    def __eq__(self, other: object, /) -> bool: ...
+    __hash__: None  # type: ignore[assignment]
+    _fields: tuple[str, ...]
+    # end of fields
+    @staticmethod
+    def from_voxel_size(voxel_size: float) -> ReconstructionOptions: ...
+
+class LoopProposalOptions:
+    # fields of LoopProposalOptions
+    coarse_voxel_size: float
+    min_overlap: float
+    max_dilation: float
+    min_uncertainty: float
+    min_time: float
+    per_fragment: int
+    between_frames: int
+    confirming_candidate: int
+    def __init__(
+        self,
+        *,
+        coarse_voxel_size: float = ...,
+        min_overlap: float = ...,
+        max_dilation: float = ...,
+        min_uncertainty: float = ...,
+        min_time: float = ...,
+        per_fragment: int = ...,
+        between_frames: int = ...,
+        confirming_candidate: int = ...,
+    ) -> None: ...
+    def replace(
+        self,
+        *,
+        coarse_voxel_size: float = ...,
+        min_overlap: float = ...,
+        max_dilation: float = ...,
+        min_uncertainty: float = ...,
+        min_time: float = ...,
+        per_fragment: int = ...,
+        between_frames: int = ...,
+        confirming_candidate: int = ...,
+    ) -> LoopProposalOptions: ...
+    def validate(self) -> None: ...
+    def __eq__(self, other: object, /) -> bool: ...
+    __hash__: None  # type: ignore[assignment]
+    _fields: tuple[str, ...]
+    # end of fields
+
+class LoopAcceptanceOptions:
+    # fields of LoopAcceptanceOptions
+    min_confidence: float
+    alone: float
+    confirmed: float
+    together: float
+    between_frames: float
+    same_place_overlap: float
+    drift_probability: float
+    max_drift_ratio: float
+    def __init__(
+        self,
+        *,
+        min_confidence: float = ...,
+        alone: float = ...,
+        confirmed: float = ...,
+        together: float = ...,
+        between_frames: float = ...,
+        same_place_overlap: float = ...,
+        drift_probability: float = ...,
+        max_drift_ratio: float = ...,
+    ) -> None: ...
+    def replace(
+        self,
+        *,
+        min_confidence: float = ...,
+        alone: float = ...,
+        confirmed: float = ...,
+        together: float = ...,
+        between_frames: float = ...,
+        same_place_overlap: float = ...,
+        drift_probability: float = ...,
+        max_drift_ratio: float = ...,
+    ) -> LoopAcceptanceOptions: ...
+    def validate(self) -> None: ...
+    def __eq__(self, other: object, /) -> bool: ...
+    __hash__: None  # type: ignore[assignment]
+    _fields: tuple[str, ...]
+    # end of fields
+
+class LoopClosureOptions:
+    # fields of LoopClosureOptions
+    registration: RegistrationOptions
+    proposals: LoopProposalOptions
+    acceptance: LoopAcceptanceOptions
+    noise: EdgeNoiseOptions
+    information_unit: float
+    graph: PoseGraphOptions
+    drift_correlation: float
+    gravity_sigma: float
+    modes: int
+    chunk: int
+    optimize: bool
+    information_from_correspondences: bool
+    accept_by_graph_alone: bool
+    def __init__(
+        self,
+        *,
+        registration: RegistrationOptions = ...,
+        proposals: LoopProposalOptions = ...,
+        acceptance: LoopAcceptanceOptions = ...,
+        noise: EdgeNoiseOptions = ...,
+        information_unit: float = ...,
+        graph: PoseGraphOptions = ...,
+        drift_correlation: float = ...,
+        gravity_sigma: float = ...,
+        modes: int = ...,
+        chunk: int = ...,
+        optimize: bool = ...,
+        information_from_correspondences: bool = ...,
+        accept_by_graph_alone: bool = ...,
+    ) -> None: ...
+    def replace(
+        self,
+        *,
+        registration: RegistrationOptions = ...,
+        proposals: LoopProposalOptions = ...,
+        acceptance: LoopAcceptanceOptions = ...,
+        noise: EdgeNoiseOptions = ...,
+        information_unit: float = ...,
+        graph: PoseGraphOptions = ...,
+        drift_correlation: float = ...,
+        gravity_sigma: float = ...,
+        modes: int = ...,
+        chunk: int = ...,
+        optimize: bool = ...,
+        information_from_correspondences: bool = ...,
+        accept_by_graph_alone: bool = ...,
+    ) -> LoopClosureOptions: ...
+    def validate(self) -> None: ...
+    def __eq__(self, other: object, /) -> bool: ...
+    __hash__: None  # type: ignore[assignment]
+    _fields: tuple[str, ...]
+    # end of fields
+    @staticmethod
+    def from_voxel_size(voxel_size: float) -> LoopClosureOptions: ...
+    @staticmethod
+    def loopsmart(voxel_size: float = ...) -> LoopClosureOptions: ...
+
 class PoseGraph:
     def __init__(self) -> None: ...
     @property
@@ -875,12 +1270,7 @@ class LoopCloser:
     def __init__(
         self,
         context: Context,
-        registration: RegistrationOptions,
-        voxel_size: float,
-        loopsmart: bool,
-        optimize: bool,
-        drift_per_metre: float,
-        rotation_per_metre: float,
+        options: LoopClosureOptions,
     ) -> None: ...
     def add(
         self,
@@ -950,13 +1340,8 @@ def reconstruct_map(
     scans: int,
     pairs: npt.NDArray[np.uint32],
     results: list[RegistrationResult],
-    voxel_size: float,
-    min_edge_confidence: float,
-    min_connection_confidence: float,
-    min_island: int,
-    drift: _Float64,
+    options: ReconstructionOptions,
     odometry: _Float64 | list[tuple[int, int, _Float64, _Float64 | None]],
-    threads: int,
 ) -> MapGraph: ...
 def refine_map(
     context: Context,

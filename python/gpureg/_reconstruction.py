@@ -13,14 +13,18 @@ import numpy.typing as npt
 from . import _core
 from ._arrays import CoreCloud, float64, index_pairs
 from ._contexts import checked, context_of
-from ._core import Context, MapGraph, RegistrationOptions, RegistrationResult
+from ._core import (
+    Context,
+    MapGraph,
+    ReconstructionOptions,
+    RegistrationOptions,
+    RegistrationResult,
+)
 from ._map import Map, Poses
 from ._progress import Progress, batch_progress
 from .fragments import FragmentSet, fragment_set
 from .preparation import pieces
 from .registration import ALIGNED, align_batch
-
-_DRIFT = (0.02, 0.2, 0.02)
 
 
 def reconstruct(
@@ -29,12 +33,9 @@ def reconstruct(
     *,
     results: Any = None,
     odometry: Any = None,
-    drift: tuple[float, float, float] = _DRIFT,
     refine: bool = True,
-    min_edge_confidence: float = 0.1,
-    min_connection_confidence: float = 0.9,
-    min_island: int = 2,
     options: RegistrationOptions | None = None,
+    map_options: ReconstructionOptions | None = None,
     context: Context | None = None,
     progress: Progress = False,
 ) -> Map:
@@ -55,17 +56,12 @@ def reconstruct(
         ``world_from_scan`` of each fragment (NaN: not known), of both of which consecutive ones
         count, or tuples (source, target, target_from_source) of fragment numbers, with a 6x6
         information matrix as a fourth entry where it is known.
-    drift : (float, float, float)
-        Error of the odometry: metres per metre travelled, degrees per metre, degrees per degree.
     refine : bool
         Refine all poses together at half the voxel size.
-    min_edge_confidence, min_connection_confidence : float
-        Confidence from which a pair takes part, and from which a connection between two parts
-        counts.
-    min_island : int
-        Scans of an island; smaller ones are left out.
     options : RegistrationOptions, optional
-        Of the alignment; its voxel size scales every tolerance.
+        Of the alignment.
+    map_options : ReconstructionOptions, optional
+        Of the map: drift of the odometry, confidences, islands. Default: those of the voxel size.
     context : Context, optional
     progress : bool or callable
         True: bars of tqdm. A callable gets (done, total) of each step: fragments, pairs, fragments
@@ -92,20 +88,21 @@ def reconstruct(
     """
     options = checked(options, RegistrationOptions, "options") or RegistrationOptions()
     options.validate()
+    map_options = checked(
+        map_options, ReconstructionOptions, "map_options"
+    ) or ReconstructionOptions.from_voxel_size(options.prepare.voxel_size)
+    map_options.validate()
     context = context_of(context)
+    if map_options.threads == 0 and context.backend == "cpu":
+        map_options = map_options.replace(threads=context.threads)
     fragments = fragment_set(fragments)
     rows, values = _pair_results(fragments, pairs, results, options, context, progress)
     graph = _core.reconstruct_map(
         len(fragments),
         rows,
         values,
-        options.prepare.voxel_size,
-        min_edge_confidence,
-        min_connection_confidence,
-        min_island,
-        np.asarray(drift, np.float64),
+        map_options,
         _odometry(odometry, fragments),
-        context.threads if context.backend == "cpu" else 0,
     )
     refinement = _refine(graph, fragments, options, context, progress) if refine else None
     return Map(graph, fragments, options, refinement)

@@ -13,10 +13,10 @@ from . import _core
 from ._contexts import checked, context_of
 from ._core import (
     Context,
+    LoopClosureOptions,
     LoopUpdate,
     PoseGraph,
     PreparedCloud,
-    RegistrationOptions,
     RegistrationPrior,
     RegistrationResult,
 )
@@ -38,17 +38,12 @@ class LoopCloser:
 
     Parameters
     ----------
-    voxel_size : float, optional
-        Metres; every other length follows from it. Default: that of the options, else 0.05.
-    options : RegistrationOptions, optional
-        Of the registrations. Default: those of the voxel size.
-    loopsmart : bool
-        Verification by the constants of the LoopSmart paper, which need odometry that is nearly
-        exact.
-    optimize : bool
-        False: the poses are left to the host, and `LoopUpdate.poses` is empty.
-    drift_per_metre, rotation_per_metre : float
-        Standard deviation of odometry without covariance: metres and degrees, each per metre.
+    voxel_size : float
+        Metres; every length follows from it. Not used where options are given.
+    options : LoopClosureOptions, optional
+        With `optimize` False the poses are left to the host, and `LoopUpdate.poses` is empty.
+        `graph.drift` is the noise of odometry without covariance. `LoopClosureOptions.loopsmart`
+        verifies by the constants of the LoopSmart paper, which need odometry that is nearly exact.
 
     Examples
     --------
@@ -69,28 +64,15 @@ class LoopCloser:
     def __init__(
         self,
         *,
-        voxel_size: float | None = None,
-        options: RegistrationOptions | None = None,
-        loopsmart: bool = False,
-        optimize: bool = True,
-        drift_per_metre: float = 0.02,
-        rotation_per_metre: float = 0.2,
+        voxel_size: float = 0.05,
+        options: LoopClosureOptions | None = None,
         context: Context | None = None,
     ) -> None:
         self._context = context_of(context)
-        options = checked(options, RegistrationOptions, "options")
-        if voxel_size is None:
-            voxel_size = (options or RegistrationOptions()).prepare.voxel_size
-        self._options = options or RegistrationOptions.from_voxel_size(voxel_size)
-        self._core = _core.LoopCloser(
-            self._context,
-            self._options,
-            voxel_size,
-            loopsmart,
-            optimize,
-            drift_per_metre,
-            rotation_per_metre,
-        )
+        self._options = checked(
+            options, LoopClosureOptions, "options"
+        ) or LoopClosureOptions.from_voxel_size(voxel_size)
+        self._core = _core.LoopCloser(self._context, self._options)
 
     def add(
         self,
@@ -118,7 +100,9 @@ class LoopCloser:
             Up in the fragment's frame: registrations keep gravity.
         """
         if cloud is not None and not isinstance(cloud, PreparedCloud):
-            cloud = prepare(cloud, options=self._options.prepare, context=self._context)
+            cloud = prepare(
+                cloud, options=self._options.registration.prepare, context=self._context
+            )
         pose = np.eye(4) if world_from_fragment is None else _matrix(world_from_fragment)
         assert pose is not None
         self._core.add(id, cloud, pose, session, float(time), _matrix(up))

@@ -53,7 +53,9 @@ def test_a_confident_loop_is_accepted_and_moves_the_poses(closer):
 
 
 def test_a_host_that_optimises_gets_no_poses():
-    closer = gpureg.LoopCloser(optimize=False, context=gpureg.Context.cpu(1))
+    closer = gpureg.LoopCloser(
+        options=gpureg.LoopClosureOptions(optimize=False), context=gpureg.Context.cpu(1)
+    )
     drifting(closer, lap())
     assert closer.process().poses == {}
     closer.set_poses({3: planar(1, 2, 3)})
@@ -61,25 +63,24 @@ def test_a_host_that_optimises_gets_no_poses():
     assert np.array_equal(closer.poses[3], planar(1, 2, 3))
 
 
-@pytest.mark.parametrize("loopsmart", [False, True])
-def test_lengths_follow_the_voxel_size(loopsmart):
+@pytest.mark.parametrize("preset", ["from_voxel_size", "loopsmart"])
+def test_lengths_follow_the_voxel_size(preset):
     """The noise of a host's loop without information is a voxel, 5 cm at 5 cm."""
 
     def noise(**keywords):
-        cpu = gpureg.Context.cpu(1)
-        closer = gpureg.LoopCloser(loopsmart=loopsmart, context=cpu, **keywords)
+        closer = gpureg.LoopCloser(context=gpureg.Context.cpu(1), **keywords)
         drifting(closer, lap())
         closer.add_loop(19, 0, np.linalg.inv(lap()[0]) @ lap()[19], confidence=0.95)
         closer.process()
         (loop,) = closer.loops
         return loop.information[3, 3] ** -0.5
 
-    coarse = gpureg.RegistrationOptions.from_voxel_size(0.2)
+    options = getattr(gpureg.LoopClosureOptions, preset)
     # The voxel size is a float32: 7 digits.
     assert noise() == pytest.approx(0.05, rel=1e-6)
     assert noise(voxel_size=0.2) == pytest.approx(0.2, rel=1e-6)
-    assert noise(options=coarse) == pytest.approx(0.2, rel=1e-6)
-    assert noise(options=coarse, voxel_size=0.1) == pytest.approx(0.1, rel=1e-6)
+    assert noise(options=options(0.05)) == pytest.approx(0.05, rel=1e-6)
+    assert noise(options=options(0.2)) == pytest.approx(0.2, rel=1e-6)
 
 
 def test_faults_name_what_is_wrong(closer):

@@ -16,6 +16,9 @@ CLASSES = [
     gpureg.EvidenceOptions,
     gpureg.RegistrationOptions,
     gpureg.LoopConsistencyOptions,
+    gpureg.ReconstructionOptions,
+    gpureg.LoopClosureOptions,
+    gpureg.PoseGraphOptions,
 ]
 
 
@@ -245,6 +248,27 @@ def test_presets():
     assert gpureg.RegistrationOptions.loopsmart().method == "quadruples"
     assert gpureg.RegistrationOptions.loopsmart().refine.max_iterations == 0
     assert gpureg.RegistrationOptions.loopsmart(0.1).prepare.voxel_size == 0.1
+
+
+def test_options_of_maps_and_loops():
+    maps = gpureg.ReconstructionOptions.from_voxel_size(0.1)
+    assert maps.consistency == gpureg.LoopConsistencyOptions.from_voxel_size(0.1)
+    # 0.1 is a float in C++: seven digits.
+    assert maps.noise.translation == pytest.approx(0.06, rel=1e-6)
+    loops = gpureg.LoopClosureOptions.from_voxel_size(0.1)
+    assert loops.registration == gpureg.RegistrationOptions.from_voxel_size(0.1)
+    assert loops.proposals.coarse_voxel_size == pytest.approx(1, rel=1e-6)
+    loops.graph.drift.translation_per_metre = 0.5
+    assert loops.graph.drift == gpureg.DriftOptions(translation_per_metre=0.5)
+    assert gpureg.LoopClosureOptions.loopsmart().graph.robust == "line_process"
+    with pytest.raises(TypeError, match="robust: expected 'none', 'gnc' or 'line_process'"):
+        gpureg.PoseGraphOptions(robust="luck")
+    with pytest.raises(ValueError, match=r"acceptance.alone is 2, expected \(0, 1\]"):
+        gpureg.LoopClosureOptions(acceptance=gpureg.LoopAcceptanceOptions(alone=2)).validate()
+    with pytest.raises(TypeError, match="options: expected a LoopClosureOptions"):
+        gpureg.LoopCloser(options=gpureg.RegistrationOptions())
+    assert gpureg.PoseEvidence.source_overlap.__doc__.startswith("Share of the source's points")
+    assert gpureg.PrepareOptions.voxel_size.__doc__.endswith("as they are. Metres, or 0.")
 
 
 def test_out_of_range_is_a_value_error():

@@ -63,7 +63,7 @@ def test_the_threads_are_those_of_the_context(map_of_scans, scans, monkeypatch):
     results = gpureg.align_batch(scans[:3], pairs, options=OPTIONS)
     given, make = [], _core.reconstruct_map
     monkeypatch.setattr(
-        _core, "reconstruct_map", lambda *values: given.append(values[-1]) or make(*values)
+        _core, "reconstruct_map", lambda *values: given.append(values[3].threads) or make(*values)
     )
     context = gpureg.Context.cpu(3)
     gpureg.reconstruct(
@@ -131,7 +131,12 @@ def test_wrong_arguments(scans):
     with pytest.raises(ValueError, match="results: 0 for 1 pairs"):
         gpureg.reconstruct(scans, [(1, 0)], results=[])
     with pytest.raises(ValueError, match="min_connection_confidence"):
-        gpureg.reconstruct(scans, [(0, 1)], options=OPTIONS, min_connection_confidence=2)
+        gpureg.reconstruct(
+            scans,
+            [(0, 1)],
+            options=OPTIONS,
+            map_options=gpureg.ReconstructionOptions(min_connection_confidence=2),
+        )
     assert gpureg.reconstruct(scans[:1], options=OPTIONS).islands == []
 
 

@@ -4,6 +4,7 @@
 #include "fields/validate.hpp"
 
 namespace gpureg::loop_closure {
+
 void ProposalOptions::validate() const { fields::validate(*this); }
 void AcceptanceOptions::validate() const { fields::validate(*this); }
 void Options::validate() const { fields::validate(*this); }
