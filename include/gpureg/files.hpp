@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <functional>
 #include <string>
+#include <string_view>
 
 /// Files, for the components and for programs (component `files`; standard library only).
 namespace gpureg::files {
@@ -11,5 +13,13 @@ namespace gpureg::files {
 /// existing file is kept, devices and pipes are written in place. Thread-safe.
 /// @throws IoError naming the file and the reason.
 void write_atomically(const std::string& path, const std::string& content);
+
+/// Takes the next part of a file.
+using Sink = std::function<void(std::string_view)>;
+
+/// The same for a content that is made part by part and need not fit into memory.
+/// @param content calls its argument with the parts in order; what it throws leaves the old file in
+///   place (devices and pipes have received the parts before).
+void write_atomically(const std::string& path, const std::function<void(const Sink&)>& content);
 
 }  // namespace gpureg::files

@@ -60,12 +60,20 @@ int write_all(int fd, std::string_view rest) {
   return 0;
 }
 
+using Content = std::function<void(const Sink&)>;
+
+void write_content(const OutputFile& file, const std::string& path, const Content& content) {
+  content([&](std::string_view part) {
+    if (const int error = write_all(file.fd(), part)) fail(path, why(error));
+  });
+}
+
 // Devices and pipes cannot be replaced by a rename (as root it would even succeed, and /dev/null be
 // gone).
-void write_special_file(const std::string& path, std::string_view content) {
+void write_special_file(const std::string& path, const Content& content) {
   OutputFile file(::open(path.c_str(), O_WRONLY | O_CLOEXEC), {});
   if (file.fd() < 0) fail(path, why(errno));
-  if (const int error = write_all(file.fd(), content)) fail(path, why(error));
+  write_content(file, path, content);
   if (const int error = file.close()) fail(path, why(error));
 }
 
@@ -108,6 +116,10 @@ std::string behind_links(const std::string& path) {
 }  // namespace
 
 void write_atomically(const std::string& path, const std::string& content) {
+  write_atomically(path, [&](const Sink& write) { write(content); });
+}
+
+void write_atomically(const std::string& path, const Content& content) {
   if (path.empty()) fail("''", "the path is empty");
   struct stat existing{};
   const bool exists = ::stat(path.c_str(), &existing) == 0;
@@ -122,7 +134,7 @@ void write_atomically(const std::string& path, const std::string& content) {
   std::string temporary;
   OutputFile file = open_temporary(target, temporary);
   if (exists) (void)::fchmod(file.fd(), existing.st_mode & 07777);
-  if (const int error = write_all(file.fd(), content)) fail(path, why(error));
+  write_content(file, path, content);
   if (::fsync(file.fd()) != 0) fail(path, why(errno));
   if (const int error = file.close()) fail(path, why(error));
   if (::rename(temporary.c_str(), target.c_str()) != 0) fail(path, why(errno));

@@ -31,6 +31,26 @@ TEST(AtomicFile, WritesAndReplacesAnyBytes) {
   EXPECT_EQ(folder.count(), 1u);
 }
 
+TEST(AtomicFile, PartByPart) {
+  const TemporaryFolder folder;
+  const std::string path = folder.write("a", "old");
+  write_atomically(path, [](const Sink& write) {
+    for (const char* part : {"one, ", "", "two"}) write(part);
+  });
+  EXPECT_EQ(content_of(path), "one, two");
+  // What the caller throws leaves the old file, and no other.
+  expect_error<InvalidArgument>(
+      [&] {
+        write_atomically(path, [](const Sink& write) {
+          write("half");
+          throw InvalidArgument("no more");
+        });
+      },
+      {"no more"});
+  EXPECT_EQ(content_of(path), "one, two");
+  EXPECT_EQ(folder.count(), 1u);
+}
+
 TEST(AtomicFile, RespectsTheUmaskAndKeepsTheModeOfAnExistingFile) {
   const TemporaryFolder folder;
   const mode_t before = ::umask(022);
