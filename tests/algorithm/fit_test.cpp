@@ -30,7 +30,7 @@ TEST(Fit, AgreesWithUmeyama) {
       source[k] = to_vec3(p.col(k));
       target[k] = to_vec3(q.col(k));
     }
-    Pose<float> pose;
+    Pose<float> pose{};
     ASSERT_TRUE(fit_rigid(source, target, pose));
     const Eigen::Matrix4d expected = Eigen::umeyama(p, q, false);
     const Pose<double> wide = widen(pose);

@@ -94,10 +94,9 @@ class CpuMap : public SurfelMap {
   void apply(const Frame& frame, int row, int columns, std::vector<Surfel>& births) {
     for (int column = 0; column < columns; ++column) {
       const auto cell = static_cast<std::size_t>(row * columns + column);
-      if (fates_[cell] == Fate::nothing) continue;
       const int u = column * frame.stride, v = row * frame.stride;
       Measured m;
-      measure(frame, u, v, m);
+      if (fates_[cell] == Fate::nothing || !measure(frame, u, v, m)) continue;
       if (fates_[cell] == Fate::update)
         update(frame, m, u, v, surfels_[static_cast<std::uint32_t>(cells_[cell])]);
       else
