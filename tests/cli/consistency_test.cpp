@@ -130,7 +130,7 @@ TEST_F(ConsistencyVerb, BadInputIsNamed) {
   refused(document(bad), {"pairs[1]", "modes"});
   bad = pairs();
   bad[3]["T_ij"][0] = 7;
-  refused(document(bad), {"results[3].target_from_source"});
+  refused(document(bad), {"pairs[3]", "\"T_ij\" is no rigid motion"});
   refused({{"pairs", pairs()}}, {"--voxel-size"});
   const std::string log = folder_.write("r.log", "");
   expect_refused({"consistency", log, "--json", folder_ / "a.json"}, {log, "a log"});

@@ -18,6 +18,12 @@ namespace {
 
 constexpr int kScans = 5;
 
+/// The data of a page.
+nlohmann::json data_of(const std::string& page) {
+  const std::size_t begin = page.find(R"(id="data">)") + 10;
+  return nlohmann::json::parse(page.substr(begin, page.find("</script>", begin) - begin));
+}
+
 class ReconstructCommand : public ::testing::Test {
  protected:
   std::vector<std::string> reconstruct(const std::string& name,
@@ -149,9 +155,7 @@ TEST_F(ReconstructCommand, ThePageIsSelfContained) {
   for (const char* link : {"http://", "https://", " src=", "<link", "@import", "fetch("})
     EXPECT_EQ(page.find(link), std::string::npos) << link;
   EXPECT_EQ(page.find("{{"), std::string::npos);
-  const std::size_t begin = page.find(R"(id="data">)") + 10;
-  const auto data =
-      nlohmann::json::parse(page.substr(begin, page.find("</script>", begin) - begin));
+  const auto data = data_of(page);
   EXPECT_EQ(data.at("figures").at("placed"), 5);
   std::size_t points = 0;
   for (const auto& scan : data.at("scans")) points += scan.at("count").get<std::size_t>();
@@ -160,6 +164,40 @@ TEST_F(ReconstructCommand, ThePageIsSelfContained) {
   EXPECT_GT(points, 1000u);
   ASSERT_EQ(run(reconstruct("plain", {"--no-map"})).status, 0);
   EXPECT_FALSE(std::filesystem::exists(file("plain", "map.html")));
+}
+
+TEST_F(ReconstructCommand, AFolderMayHaveTheNameOfAMark) {
+  const std::filesystem::path folder = std::filesystem::path(scans_.path()) / "{{data}}<b>";
+  write_scans(scans_, 2, false);
+  std::filesystem::create_directory(folder);
+  for (const char* name : {"cloud_bin_0.ply", "cloud_bin_1.ply"})
+    std::filesystem::rename(scans_ / name, folder / name);
+  const auto arguments =
+      joined({"reconstruct", folder.string(), "-o", out_ / "map", "--no-refine"}, kSmall);
+  run(arguments);
+  const std::string page = content_of(file("map", "map.html"));
+  expect_holds(page, {"<title>gpureg map: {{data}}&lt;b&gt;</title>"});
+  EXPECT_EQ(data_of(page).at("scans").size(), 2u);
+}
+
+// The page draws a scan at its sensor, or at the mean of its points where that is not known.
+TEST_F(ReconstructCommand, KeepsTheViewpointOfAFileThatCamerasLack) {
+  const Eigen::Vector3f shift(5, 0, 0);
+  for (int k = 0; k < 2; ++k) {
+    const PointCloud cloud = room_scan(k);
+    std::ostringstream pcd;
+    pcd << "VERSION .7\nFIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nCOUNT 1 1 1\nWIDTH "
+        << cloud.points.size() << "\nHEIGHT 1\nVIEWPOINT 5 0 0 1 0 0 0\nPOINTS "
+        << cloud.points.size() << "\nDATA ascii\n";
+    for (const Eigen::Vector3f& p : cloud.points) pcd << (p + shift).transpose() << "\n";
+    scans_.write("cloud_bin_" + std::to_string(k) + ".pcd", pcd.str());
+  }
+  scans_.write("cameras.txt", "1 0 5 0 0 0 0 0 1\n");
+  const Outcome outcome = run(reconstruct("map", {"--no-refine"}));
+  ASSERT_EQ(outcome.status, 0) << outcome.err;
+  const nlohmann::json position =
+      data_of(content_of(file("map", "map.html"))).at("scans").at(0).at("position");
+  EXPECT_EQ(position, nlohmann::json::parse("[5, 0, 0]"));
 }
 
 TEST_F(ReconstructCommand, DamagedResultsAreNamed) {
@@ -189,7 +227,7 @@ TEST_F(ReconstructCommand, DamagedResultsAreNamed) {
   refused(document, "pairs[4]", "fragment 77");
   document = whole;
   document["pairs"][4] = document["pairs"][0];
-  refused(document, "pairs[4]", "repeats");
+  refused(document, "pairs[4]", "stands twice");
   document = whole;
   document["pairs"][0]["score"] = "high";
   refused(document, "pairs[0]", "score");

@@ -3,6 +3,9 @@
 
 #include <algorithm>
 #include <csignal>
+#include <cstdint>
+#include <iomanip>
+#include <sstream>
 #include <thread>
 
 #include "cli/command.hpp"
@@ -173,6 +176,58 @@ TEST_F(Resume, DamagedJournalsAreRefused) {
   out_.write("r.log.journal", text);
   expect_refused(batch("r", {"--resume", "--quiet"}), {journal("r"), "line 2", "damaged"});
   EXPECT_EQ(content_of(journal("r")), text);
+}
+
+/// A line as the journal writes it: FNV-1a of the text, the text.
+std::string line_of(const std::string& text) {
+  std::uint64_t hash = 14695981039346656037ull;
+  for (const char c : text) hash = (hash ^ static_cast<unsigned char>(c)) * 1099511628211ull;
+  std::ostringstream line;
+  line << std::hex << std::setw(16) << std::setfill('0') << hash << " " << text << "\n";
+  return line.str();
+}
+
+TEST_F(Resume, EveryLineHasAChecksum) {
+  ended_midway("r", SIGINT);
+  const std::string text = content_of(journal("r"));
+  const auto resume = [&](const std::string& damaged, std::initializer_list<std::string> says) {
+    out_.write("r.log.journal", damaged);
+    expect_refused(batch("r", {"--resume", "--quiet"}), says);
+    EXPECT_EQ(content_of(journal("r")), damaged);
+  };
+  // A digit of the first pair's score.
+  std::string flipped = text;
+  char& digit = flipped[flipped.find("\"score\":0.") + 10];
+  digit = digit == '7' ? '3' : '7';
+  resume(flipped, {journal("r"), "line 2", "damaged", "checksum", "--restart"});
+  // The journal of an older version.
+  std::string older;
+  std::istringstream lines(text);
+  for (std::string line; std::getline(lines, line);) older += line.substr(17) + "\n";
+  resume(older, {journal("r"), "line 1", "no checksum", "older gpureg", "--restart"});
+}
+
+TEST_F(Resume, PairsThatCannotBeOfTheRun) {
+  ended_midway("r", SIGINT);
+  const std::string text = content_of(journal("r"));
+  const std::size_t second = text.find('\n') + 1;
+  const std::string header = text.substr(0, second),
+                    line = text.substr(second, text.find('\n', second) - second);
+  const auto refused = [&](const nlohmann::ordered_json& pair,
+                           std::initializer_list<std::string> says) {
+    out_.write("r.log.journal", text + line_of(pair.dump()));
+    expect_refused(batch("r", {"--resume", "--quiet"}), says);
+  };
+  EXPECT_EQ(line_of(line.substr(17)), line + "\n") << "the test writes lines as the command does";
+  const auto pair = nlohmann::ordered_json::parse(line.substr(17));
+  refused(pair, {"pair 0 1", "stands twice"});
+  auto bad = pair;
+  bad["pair"]["i"] = 3;
+  bad["pair"]["j"] = 77;
+  refused(bad, {"pair 3 77", "none of this run"});
+  bad = pair;
+  for (auto& number : bad["pair"]["T_ij"]) number = 2.0;
+  refused(bad, {"T_ij", "no rigid motion"});
 }
 
 TEST_F(Resume, TwoRunsOfTheSameResult) {

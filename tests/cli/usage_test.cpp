@@ -96,6 +96,13 @@ TEST_F(Usage, OtherValues) {
   }
 }
 
+TEST_F(Usage, ATimeBudgetIsRefusedBeforeTheWork) {
+  const std::string none = folder_ / "none.ply";
+  for (const char* budget : {"0", "-1", "nan", "inf"})
+    expect_refused({"register", none, none, "--time-budget", budget},
+                   {"--time-budget is ", budget, "> 0"});
+}
+
 TEST_F(Usage, OptionsThatWouldDoNothing) {
   expect_refused(with({"--set", "quadruples.count=100"}),
                  {"--set quadruples.count=100", "method compatibility"});

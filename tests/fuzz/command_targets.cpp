@@ -1,8 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include <algorithm>
+
 #include "fuzz/targets.hpp"
 #include "io/run_reader.hpp"
 #include "records/initial_poses.hpp"
 #include "records/journal.hpp"
+#include "records/json_file.hpp"
+#include "records/pair_json.hpp"
 #include "records/result_file.hpp"
 
 namespace gpureg::fuzz {
@@ -21,22 +25,49 @@ void read(std::string_view bytes, const Read& read_file) {
   }
 }
 
-void read_result(std::string_view bytes) {
+/// Whatever is read can be copied and written.
+void read_document(std::string_view bytes) {
   read(bytes, [](const std::string& path) {
-    const cli::ResultFile result = cli::read_result(path);
-    result.mean_milliseconds();
-    result.mean_prepare_milliseconds();
-    for (const cli::PairRecord& pair : result.pairs) cli::result_from_record(pair, nullptr);
+    const cli::Json document = cli::DocumentFile(path).read();
+    const cli::Json copy = document;
+    if (copy.is_object()) cli::write_document("/dev/null", copy);
   });
 }
 
-void read_journal(std::string_view bytes) {
+void read_result(std::string_view bytes) {
   read(bytes, [](const std::string& path) {
-    // The header of the corpus.
-    cli::Journal journal(path, cli::Json{{"version", 1}}, cli::Journal::Mode::resume);
-    for (const auto& [pair, entry] : journal.entries())
-      cli::result_from_record(entry.pair, entry.information);
+    const cli::ResultFile result = cli::read_result(path, [](const cli::Json& pair) {
+      const cli::Json once = cli::pair_to_json(0, 1, cli::result_from_json(pair));
+      if (cli::pair_to_json(0, 1, cli::result_from_json(once)) != once)
+        broken("a result survives its file");
+    });
+    result.mean_milliseconds();
+    result.mean_prepare_milliseconds();
   });
+}
+
+/// The lines of the input with their checksums: mutations shall reach what stands behind them.
+std::string with_checksums(std::string_view bytes) {
+  std::string out;
+  for (std::size_t at = 0; at < bytes.size();) {
+    const std::size_t end = std::min(bytes.find('\n', at), bytes.size());
+    out += cli::Journal::line_of(std::string(bytes.substr(at, end - at)));
+    at = end + 1;
+  }
+  return out;
+}
+
+void read_journal(std::string_view bytes) {
+  for (const std::string& journal : {std::string(bytes), with_checksums(bytes)})
+    read(journal, [](const std::string& path) {
+      // The header of the corpus.
+      const cli::Journal read(
+          path, cli::Json{{"version", 1}}, cli::Journal::Mode::resume,
+          [](int, int, RegistrationResult&& result) {
+            if (result.has_candidate && !result.target_from_source.matrix().allFinite())
+              broken("poses are finite");
+          });
+    });
 }
 
 void read_initial_poses(std::string_view bytes) {
@@ -46,8 +77,10 @@ void read_initial_poses(std::string_view bytes) {
 }  // namespace
 
 std::vector<Target> command_targets() {
-  return {
-      {"result", read_result}, {"journal", read_journal}, {"initial_poses", read_initial_poses}};
+  return {{"document", read_document},
+          {"result", read_result},
+          {"journal", read_journal},
+          {"initial_poses", read_initial_poses}};
 }
 
 }  // namespace gpureg::fuzz

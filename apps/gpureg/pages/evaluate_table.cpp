@@ -79,7 +79,8 @@ void print_notes(const SceneEvaluation& scene) {
     missing += entry.j - entry.i > 1 && tried.count({entry.i, entry.j}) == 0;
   note(neighbors, "poses of pairs with j - i <= 1 do not count");
   if (result.has_scores) note(missing, "pairs of the truth were not tried, they count as missed");
-  if (result.document.is_object() && result.document.value("complete", true) == false)
+  if (result.document.is_object() && result.document.contains("complete") &&
+      result.document["complete"] == false)
     std::cout << "note: " << scene.name << ": the batch was not finished\n";
 }
 

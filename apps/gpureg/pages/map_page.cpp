@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstdint>
 #include <limits>
+#include <map>
 #include <string>
 #include <unordered_set>
 
@@ -12,6 +13,7 @@
 #include "pages/base64.hpp"
 #include "pages/map_page_files.hpp"
 #include "pages/plot.hpp"
+#include "records/json.hpp"
 #include "records/result_json.hpp"
 #include "text.hpp"
 
@@ -220,9 +222,17 @@ Json links_json(std::vector<reconstruction::Link> links) {
   return out;
 }
 
-void replace(std::string& text, const std::string& mark, const std::string& by) {
-  const std::size_t at = text.find(mark);
-  text.replace(at, mark.size(), by);
+/// The page with its marks {{name}} replaced. What comes in may look like a mark itself.
+std::string filled(const std::string& page, const std::map<std::string, std::string>& values) {
+  std::string out;
+  for (std::size_t at = 0;;) {
+    const std::size_t mark = page.find("{{", at);
+    out += page.substr(at, mark - at);
+    if (mark == std::string::npos) return out;
+    const std::size_t end = page.find("}}", mark);
+    out += values.at(page.substr(mark + 2, end - mark - 2));
+    at = end + 2;
+  }
 }
 
 }  // namespace
@@ -245,11 +255,11 @@ void write_map_page(const MapRun& run, const std::vector<Surface>& surfaces) {
   // Nothing in the data may end the element that holds it.
   for (std::size_t at = 0; (at = text.find('<', at)) != std::string::npos;)
     text.replace(at, 1, "\\u003c");
-  std::string page = kMapPageHtml;
-  replace(page, "{{title}}", "gpureg map: " + escaped(base_name(run.folder)));
-  replace(page, "{{script}}", kMapPageScript);
-  replace(page, "{{data}}", text);
-  files::write_atomically(run.file("map.html"), page);
+  files::write_atomically(
+      run.file("map.html"),
+      filled(kMapPageHtml, {{"title", "gpureg map: " + escaped(base_name(run.folder))},
+                            {"script", kMapPageScript},
+                            {"data", text}}));
 }
 
 }  // namespace gpureg::cli

@@ -116,29 +116,15 @@ std::string score_plot(const ResultFile& result) {
                 histogram_plot({aligned, rejected}, "score", threshold(result)));
 }
 
-// records: objects "ms" of pairs or fragments. The bars keep the order of the stages.
-std::vector<Bar> stage_bars(const std::vector<const Json*>& records, const char* color) {
-  std::vector<Bar> bars;
-  for (const Json* ms : records)
-    for (const auto& stage : ms->items()) {
-      if (stage.key() == "total" || !stage.value().is_number()) continue;
-      auto bar = std::find_if(bars.begin(), bars.end(),
-                              [&](const Bar& b) { return b.name == stage.key(); });
-      if (bar == bars.end()) bar = bars.insert(bars.end(), {stage.key(), color, 0});
-      bar->value += stage.value().get<double>() / static_cast<double>(records.size());
-    }
-  return bars;
-}
-
-std::string time_plots(const ResultFile& result) {
-  std::vector<const Json*> fragments, pairs;
-  if (result.document.contains("fragments"))
-    for (const Json& fragment : result.document["fragments"])
-      if (fragment.contains("ms")) fragments.push_back(&fragment["ms"]);
-  for (const PairRecord& pair : result.pairs) pairs.push_back(&pair.json["ms"]);
+std::string time_plots(const ReportEntry& entry) {
+  StageTimes fragments;
+  if (const auto found = entry.result.document.find("fragments");
+      found != entry.result.document.end())
+    for (const Json& fragment : *found)
+      if (fragment.contains("ms")) fragments.add(fragment["ms"]);
   return "<h2>Time</h2>\n<div class=\"row\">\n" +
-         figure("Preparation, mean per fragment", bar_plot(stage_bars(fragments, kAmber), "ms")) +
-         figure("Alignment, mean per pair", bar_plot(stage_bars(pairs, kBlue), "ms")) + "</div>\n";
+         figure("Preparation, mean per fragment", bar_plot(fragments.bars(kAmber), "ms")) +
+         figure("Alignment, mean per pair", bar_plot(entry.stages.bars(kBlue), "ms")) + "</div>\n";
 }
 
 std::string picture_list(const std::vector<Picture>& pictures) {
@@ -171,8 +157,9 @@ std::string body(const ReportEntry& entry, bool unfolded) {
   } else {
     html += score_plot(entry.result);
   }
-  return html + time_plots(entry.result) + picture_list(entry.pictures) +
-         pair_table(entry.result, pairs, unfolded) + options_table(entry.result.document, unfolded);
+  return html + time_plots(entry) + picture_list(entry.pictures) +
+         pair_table(entry.result, entry.rows, pairs, unfolded) +
+         options_table(entry.result.document, unfolded);
 }
 
 }  // namespace

@@ -5,6 +5,8 @@
 #include <string>
 #include <vector>
 
+#include "pages/report_tables.hpp"
+#include "pages/stage_times.hpp"
 #include "records/result_file.hpp"
 
 namespace gpureg::cli {
@@ -18,7 +20,9 @@ struct Picture {
 struct ReportEntry {
   std::string name;  ///< tells the results of one page apart
   ResultFile result;
-  std::string scene;  ///< name of the ground truth's folder, else of the fragments' folder
+  std::vector<PairRow> rows;  ///< of its pairs
+  StageTimes stages;          ///< of its pairs
+  std::string scene;          ///< name of the ground truth's folder, else of the fragments' folder
   std::optional<evaluation::GroundTruth> truth;
   std::optional<evaluation::Evaluation> evaluation;  ///< with truth
   std::vector<Picture> pictures;

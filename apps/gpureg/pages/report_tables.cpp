@@ -58,6 +58,12 @@ std::string table_row(const std::vector<std::string>& texts, const char* tag,
   return html + "</tr>\n";
 }
 
+PairRow pair_row(const Json& pair) {
+  return {text_of(pair, "/status"),          measure(pair, "inlier_rmse", 4),
+          count_of(pair, "correspondences"), count_of(pair, "survivors"),
+          count_of(pair, "scored"),          count_of(pair, "inliers")};
+}
+
 std::string score_table(const evaluation::Evaluation& e) {
   std::string html = "<h2>Recall and precision</h2>\n<div class=\"wide\"><table>\n";
   html += table_row({"rule", "correct", "true pairs", "reported", "recall, %", "precision, %",
@@ -89,8 +95,8 @@ std::string score_table(const evaluation::Evaluation& e) {
          "precision.</p>\n";
 }
 
-std::string pair_table(const ResultFile& result, const std::vector<EvaluatedPair>& evaluated,
-                       bool unfolded) {
+std::string pair_table(const ResultFile& result, const std::vector<PairRow>& rows,
+                       const std::vector<EvaluatedPair>& evaluated, bool unfolded) {
   std::map<const PairRecord*, std::string> outcomes;
   for (const EvaluatedPair& e : evaluated) outcomes[e.pair] = outcome(e);
   std::vector<std::string> titles = {"target i", "source j", "status",  "reason",
@@ -98,17 +104,19 @@ std::string pair_table(const ResultFile& result, const std::vector<EvaluatedPair
                                      "scored",   "inliers",  "ms"};
   if (!evaluated.empty()) titles.push_back("evaluation");
   std::string html = "<table>\n" + table_row(titles, "th");
-  for (const PairRecord& pair : result.pairs) {
+  for (std::size_t k = 0; k < result.pairs.size(); ++k) {
+    const PairRecord& pair = result.pairs[k];
+    const PairRow& row = rows[k];
     std::vector<std::string> texts = {std::to_string(pair.i),
                                       std::to_string(pair.j),
-                                      text_of(pair.json, "/status"),
+                                      row.status,
                                       pair.aligned ? "" : pair.reason,
                                       fixed(pair.score, 3),
-                                      measure(pair.json, "inlier_rmse", 4),
-                                      count_of(pair.json, "correspondences"),
-                                      count_of(pair.json, "survivors"),
-                                      count_of(pair.json, "scored"),
-                                      count_of(pair.json, "inliers"),
+                                      row.inlier_rmse,
+                                      row.correspondences,
+                                      row.survivors,
+                                      row.scored,
+                                      row.inliers,
                                       fixed(pair.milliseconds, 1)};
     const auto found = outcomes.find(&pair);
     const std::string text = found == outcomes.end() ? "" : found->second;

@@ -20,12 +20,19 @@ std::optional<double> number_of(const Json& json, const char* pointer);
 std::string table_row(const std::vector<std::string>& texts, const char* tag,
                       const std::string& style = "");
 
+/// What the table shows of the JSON of a pair; empty where that does not tell.
+struct PairRow {
+  std::string status, inlier_rmse, correspondences, survivors, scored, inliers;
+};
+PairRow pair_row(const Json& pair);
+
 /// Parts of the page, each with its heading. unfolded: whether a reader sees the rows without a
 /// click.
 std::string score_table(const evaluation::Evaluation& evaluation);
-/// evaluated: some of the pairs, in the order of the pairs; empty without ground truth.
-std::string pair_table(const ResultFile& result, const std::vector<EvaluatedPair>& evaluated,
-                       bool unfolded);
+/// rows: of all pairs. evaluated: some of the pairs, in the order of the pairs; empty without
+/// ground truth.
+std::string pair_table(const ResultFile& result, const std::vector<PairRow>& rows,
+                       const std::vector<EvaluatedPair>& evaluated, bool unfolded);
 std::string options_table(const Json& document, bool unfolded);
 
 }  // namespace gpureg::cli

@@ -4,8 +4,9 @@
 #include <cmath>
 
 #include "gpureg/error.hpp"
-#include "records/json_file.hpp"
 #include "records/fields_json.hpp"
+#include "records/json.hpp"
+#include "records/json_file.hpp"
 
 namespace gpureg::cli {
 namespace {
@@ -52,15 +53,7 @@ Json calibration_document(const CalibrationResult& result, const RegistrationOpt
 }
 
 CalibrationFile read_calibration(const std::string& path) {
-  Json document;
-  try {
-    document = Json::parse(read_text(path));
-  } catch (const Json::exception& error) {
-    const std::string message = error.what();
-    const std::size_t end = message.find("] ");
-    throw IoError(path + ": " + (end == std::string::npos ? message : message.substr(end + 2)));
-  }
-  check_format(path, document);
+  const Json document = DocumentFile(path).read();
   const auto kind = document.is_object() ? document.find("gpureg") : document.end();
   if (!document.is_object() || kind == document.end() || *kind != kKind)
     throw IoError(path + ": no calibration of `gpureg calibrate`, \"gpureg\" is not \"" +

@@ -11,6 +11,7 @@
 #include "fields/options.hpp"
 #include "fields/statistics.hpp"
 #include "gpureg/error.hpp"
+#include "records/json.hpp"
 
 namespace gpureg::cli {
 namespace {

@@ -5,11 +5,20 @@
 #include <sys/file.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
+#include <cstdint>
+#include <cstdio>
+#include <fstream>
+#include <string_view>
 #include <system_error>
 
 #include "gpureg/error.hpp"
+#include "records/json.hpp"
+#include "records/json_fields.hpp"
 #include "records/json_file.hpp"
+#include "records/pair_json.hpp"
+#include "records/result_json.hpp"
 
 namespace gpureg::cli {
 namespace {
@@ -47,10 +56,52 @@ void lock(int fd, const std::string& path) {
 }
 
 // A header alone holds no work that could be lost.
-void refuse_unfinished(const std::string& path, const std::string& text) {
-  const std::size_t header = text.find('\n');
-  if (header == std::string::npos || header + 1 == text.size()) return;
+void refuse_unfinished(const std::string& path) {
+  std::ifstream file(path, std::ios::binary);
+  std::string header;
+  if (!std::getline(file, header) || file.eof() || file.peek() == std::ifstream::traits_type::eof())
+    return;
   throw IoError(path + " is of an unfinished run: --resume continues it, --restart discards it");
+}
+
+constexpr std::size_t kChecksumDigits = 16;
+
+/// FNV-1a, as 16 hexadecimal digits.
+std::string checksum(std::string_view text) {
+  std::uint64_t hash = 14695981039346656037ull;
+  for (const char c : text) hash = (hash ^ static_cast<unsigned char>(c)) * 1099511628211ull;
+  char digits[kChecksumDigits + 1];
+  std::snprintf(digits, sizeof digits, "%016llx", static_cast<unsigned long long>(hash));
+  return digits;
+}
+
+/// The text of a line without its newline. Throws InvalidArgument.
+std::string checked_text(const std::string& line) {
+  if (!line.empty() && line[0] == '{')
+    throw InvalidArgument("it has no checksum, an older gpureg wrote it");
+  std::string text = line.substr(std::min(line.size(), kChecksumDigits + 1));
+  if (line.size() - text.size() != kChecksumDigits + 1 || line[kChecksumDigits] != ' ' ||
+      line.compare(0, kChecksumDigits, checksum(text)) != 0)
+    throw InvalidArgument("its checksum does not match");
+  return text;
+}
+
+Json moments_to_json(const CorrespondenceMoments& moments) {
+  return {
+      {"count", moments.count}, {"sum", to_json(moments.sum)}, {"outer", to_json(moments.outer)}};
+}
+
+CorrespondenceMoments moments_from_json(const Json& json) {
+  const Json &count = member(json, "count"), &sum = member(json, "sum");
+  if (!count.is_number_unsigned()) throw InvalidArgument("\"count\" of moments is no count");
+  if (!sum.is_array() || sum.size() != 3)
+    throw InvalidArgument("\"sum\" of moments is not an array of 3 numbers");
+  CorrespondenceMoments moments;
+  moments.count = count.get<std::uint64_t>();
+  for (int k = 0; k < 3; ++k)
+    moments.sum[k] = finite_number(sum[static_cast<std::size_t>(k)], "sum");
+  moments.outer = square_matrix<3>(member(json, "outer"), "outer");
+  return moments;
 }
 
 }  // namespace
@@ -60,7 +111,7 @@ void Journal::check(const std::string& path, Mode mode) {
   if (fd < 0) return;  // no journal, or an error that the constructor reports
   try {
     lock(fd, path);
-    if (mode == Mode::fresh) refuse_unfinished(path, read_text(path));
+    if (mode == Mode::fresh) refuse_unfinished(path);
   } catch (...) {
     ::close(fd);
     throw;
@@ -68,18 +119,20 @@ void Journal::check(const std::string& path, Mode mode) {
   ::close(fd);
 }
 
-Journal::Journal(std::string path, const Json& header, Mode mode) : path_(std::move(path)) {
+std::string Journal::line_of(const std::string& text) { return checksum(text) + " " + text + "\n"; }
+
+Journal::Journal(std::string path, const Json& header, Mode mode, const Take& take)
+    : path_(std::move(path)) {
   fd_ = ::open(path_.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0666);
   if (fd_ < 0) fail(path_, "write", errno);
   try {
     lock(fd_, path_);
-    const std::string text = read_text(path_);
-    if (mode == Mode::fresh) refuse_unfinished(path_, text);
-    const std::size_t good = mode == Mode::resume ? take_up(text, header) : 0;
+    if (mode == Mode::fresh) refuse_unfinished(path_);
+    const std::size_t good = mode == Mode::resume ? take_up(header, take) : 0;
     if (::ftruncate(fd_, static_cast<off_t>(good)) != 0) fail(path_, "write", errno);
     if (::lseek(fd_, 0, SEEK_END) < 0) fail(path_, "write", errno);
     if (good == 0) {
-      pending_ = header.dump() + "\n";
+      pending_ = line_of(header.dump());
       flush();
     }
   } catch (...) {
@@ -93,43 +146,48 @@ Journal::~Journal() {
 }
 
 // Returns the length of the part that is whole.
-std::size_t Journal::take_up(const std::string& text, const Json& header) {
-  std::size_t good = 0;
-  for (std::size_t line = 0;; ++line) {
-    const std::size_t end = text.find('\n', good);
-    if (end == std::string::npos) return good;  // torn, or nothing left
+std::size_t Journal::take_up(const Json& header, const Take& take) {
+  std::ifstream file(path_, std::ios::binary);
+  std::size_t good = 0, number = 0;
+  for (std::string line; std::getline(file, line) && !file.eof(); good += line.size() + 1) {
+    ++number;
     try {
-      const Json json = Json::parse(text.begin() + static_cast<std::ptrdiff_t>(good),
-                                    text.begin() + static_cast<std::ptrdiff_t>(end));
-      if (line == 0) {
-        if (json != header)
-          throw IoError("cannot resume from " + path_ + ": " + difference(json, header, "") +
-                        "; call with the same options, or " + kAnew);
-      } else if (json.contains("outputs")) {
-        wrote_outputs_ = true;
-      } else {
-        Entry entry{PairRecord::from_json(json.at("pair")), json.at("information")};
-        information_from_json(entry.information);
-        const std::pair<int, int> key(entry.pair.i, entry.pair.j);
-        entries_.emplace(key, std::move(entry));
-      }
+      const std::string text = checked_text(line);
+      if (number > 1)
+        take_line(text, take);
+      else if (const Json before = parse_json(text); before != header)
+        throw IoError("cannot resume from " + path_ + ": " + difference(before, header, "") +
+                      "; call with the same options, or " + kAnew);
     } catch (const IoError&) {
       throw;
     } catch (const std::exception& error) {
-      throw IoError("cannot resume from " + path_ + ": line " + std::to_string(line + 1) +
+      throw IoError("cannot resume from " + path_ + ": line " + std::to_string(number) +
                     " is damaged (" + error.what() + "); call " + kAnew);
     }
-    good = end + 1;
   }
+  return good;
 }
 
-void Journal::add(const PairRecord& pair, const Json& information) {
-  entries_.emplace(std::make_pair(pair.i, pair.j), Entry{pair, information});
-  pending_ += Json{{"pair", pair.json}, {"information", information}}.dump() + "\n";
+void Journal::take_line(const std::string& text, const Take& take) {
+  const Json json = parse_json(text);
+  if (json.contains("outputs")) {
+    wrote_outputs_ = true;
+    return;
+  }
+  const Json& pair = member(json, "pair");
+  RegistrationResult result = result_from_json(pair);
+  result.source_moments = moments_from_json(member(json, "source_moments"));
+  take(fragment_member(pair, "i"), fragment_member(pair, "j"), std::move(result));
+}
+
+void Journal::add(int i, int j, const RegistrationResult& result) {
+  const Json line = {{"pair", pair_to_json(i, j, result)},
+                     {"source_moments", moments_to_json(result.source_moments)}};
+  pending_ += line_of(line.dump());
 }
 
 void Journal::note_outputs() {
-  if (!wrote_outputs_) pending_ += Json{{"outputs", "as far as here"}}.dump() + "\n";
+  if (!wrote_outputs_) pending_ += line_of(Json{{"outputs", "as far as here"}}.dump());
   wrote_outputs_ = true;
   flush();
 }

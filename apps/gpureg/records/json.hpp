@@ -3,9 +3,4 @@
 
 #include <nlohmann/json.hpp>
 
-namespace gpureg::cli {
-
-/// Keys stay in the order in which a person would read them.
-using Json = nlohmann::ordered_json;
-
-}  // namespace gpureg::cli
+#include "records/json_fwd.hpp"

@@ -4,13 +4,14 @@
 #include <sstream>
 
 #include "records/fields_json.hpp"
+#include "records/json.hpp"
 #include "records/result_json.hpp"
 #include "text.hpp"
 #include "verbs/pair_run.hpp"
 
 namespace gpureg::cli {
 
-Json pairs_document(const MapRun& run, const Context& context) {
+Json pairs_head(const MapRun& run, const Context& context) {
   Json json;
   json["gpureg"] = "batch";
   json["environment"] = environment(context);
@@ -24,12 +25,6 @@ Json pairs_document(const MapRun& run, const Context& context) {
                      {"pairs_per_second", rate},
                      {"pairs_in_this_run", run.pairs_in_this_run}};
   json["fragments"] = fragments_json(run.scene);
-  Json records = Json::array();
-  for (std::size_t k = 0; k < run.records.size(); ++k) {
-    records.push_back(run.records[k].json);
-    if (run.records[k].transform) records.back()["information"] = run.information[k];
-  }
-  json["pairs"] = std::move(records);
   return json;
 }
 
@@ -96,8 +91,8 @@ std::string map_summary(const MapRun& run, const Context& context) {
   if (run.aligned_here)
     out << "fragments  " << run.scene.numbers.size() << ", prepared in "
         << fixed(run.seconds.prepare, 2) << " s\n"
-        << "pairs      " << run.records.size() << ", in " << fixed(run.seconds.align, 2) << " s ("
-        << context.description() << ")\n";
+        << "pairs      " << run.pairs.pairs.size() << ", in " << fixed(run.seconds.align, 2)
+        << " s (" << context.description() << ")\n";
   if (!run.map.odometry.empty()) out << "odometry   " << run.map.odometry.size() << " poses\n";
   const std::size_t accepted = run.accepted_edges();
   out << "edges      " << accepted << " accepted, " << run.map.edges.size() - accepted

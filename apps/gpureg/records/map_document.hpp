@@ -4,12 +4,13 @@
 #include <string>
 
 #include "gpureg/context.hpp"
+#include "records/json_fwd.hpp"
 #include "verbs/map_run.hpp"
 
 namespace gpureg::cli {
 
-/// pairs.json: what `gpureg report` and `--results` read.
-Json pairs_document(const MapRun& run, const Context& context);
+/// pairs.json without its pairs: what `gpureg report` and `--results` read.
+Json pairs_head(const MapRun& run, const Context& context);
 
 /// reconstruction.json.
 Json map_document(const MapRun& run, const Context& context);

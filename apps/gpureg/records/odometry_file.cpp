@@ -30,9 +30,9 @@ bool is_log(const std::string& path) {
 }
 
 std::uint32_t scan_of(const std::string& path, const MapRun& run, int number) {
-  if (!run.has(number))
+  if (!run.scene.has(number))
     fail(path, "names fragment " + std::to_string(number) + ", which " + run.folder + " lacks");
-  return run.index_of(number);
+  return run.scene.index_of(number);
 }
 
 std::vector<reconstruction::Odometry> from_log(const std::string& path, const MapRun& run) {

@@ -4,18 +4,15 @@
 #include <algorithm>
 #include <map>
 #include <set>
+#include <utility>
 
 #include "gpureg/error.hpp"
-#include "records/json_file.hpp"
 
 namespace gpureg::cli {
 namespace {
 
-// The library's number of the error, which its messages begin with, means nothing to a user.
-std::string plain(const std::string& message) {
-  const std::size_t end = message.find("] ");
-  return message.rfind("[json.", 0) == 0 && end != std::string::npos ? message.substr(end + 2)
-                                                                     : message;
+std::string name_of(int i, int j) {
+  return "pair " + std::to_string(i) + " " + std::to_string(j) + " ";
 }
 
 // A program that lists fragments says which there are; no pair may name another.
@@ -30,60 +27,48 @@ std::set<int> fragment_numbers(const Json& document) {
   return numbers;
 }
 
-void check_pairs(const ResultFile& file, const Json& document) {
-  const std::set<int> numbers = fragment_numbers(document);
-  std::map<std::pair<int, int>, std::size_t> places;
-  for (std::size_t k = 0; k < file.pairs.size(); ++k) {
-    const PairRecord& pair = file.pairs[k];
-    const auto fail = [&](const std::string& reason) {
-      throw IoError(file.path + ": pairs[" + std::to_string(k) + "]: pair " +
-                    std::to_string(pair.i) + " " + std::to_string(pair.j) + " " + reason);
-    };
-    if (pair.i == pair.j) fail("is a fragment and itself");
-    if (!numbers.empty())
-      for (const int number : {pair.i, pair.j})
-        if (numbers.count(number) == 0)
-          fail("names fragment " + std::to_string(number) + ", which \"fragments\" lacks");
-    const auto [first, is_new] = places.insert({{pair.i, pair.j}, k});
-    if (!is_new) fail("stands twice, first as pairs[" + std::to_string(first->second) + "]");
+/// Place of each pair in its file, whatever the order of its fragments.
+class Places {
+ public:
+  void add(const PairRecord& pair) {
+    if (pair.i == pair.j)
+      throw InvalidArgument(name_of(pair.i, pair.j) + "is a fragment and itself");
+    const auto [first, is_new] = places_.insert({std::minmax({pair.i, pair.j}), places_.size()});
+    if (!is_new)
+      throw InvalidArgument(name_of(pair.i, pair.j) + "stands twice, first as pairs[" +
+                            std::to_string(first->second) + "]");
   }
-}
 
-void read_pairs(ResultFile& file, Json document) {
-  if (!document.is_object() || !document.contains("pairs") || !document["pairs"].is_array())
-    throw IoError(file.path + ": no result of `gpureg batch`, it has no array \"pairs\"");
-  Json& pairs = document["pairs"];
-  for (std::size_t k = 0; k < pairs.size(); ++k) try {
-      file.pairs.push_back(PairRecord::from_json(pairs[k]));
-    } catch (const InvalidArgument& error) {
-      throw IoError(file.path + ": pairs[" + std::to_string(k) + "]: " + error.what());
-    }
-  check_pairs(file, document);
-  document.erase("pairs");
-  file.document = std::move(document);
-  for (const PairRecord& pair : file.pairs)
-    if (pair.transform)
-      file.reports.push_back(
-          {pair.i, pair.j, *pair.transform, pair.score, pair.aligned, pair.strict_score});
-}
+  void check_fragments(const std::string& path, const std::set<int>& numbers) const {
+    if (numbers.empty()) return;
+    for (const auto& [pair, place] : places_)
+      for (const int number : {pair.first, pair.second})
+        if (numbers.count(number) == 0)
+          throw IoError(path + ": pairs[" + std::to_string(place) +
+                        "]: " + name_of(pair.first, pair.second) + "names fragment " +
+                        std::to_string(number) + ", which \"fragments\" lacks");
+  }
 
-Json to_json(const evaluation::Scores& s) {
-  return {
-      {"good", s.good},         {"good_recall", s.good_recall}, {"ground_truth", s.ground_truth},
-      {"reported", s.reported}, {"recall", s.recall()},         {"precision", s.precision()}};
-}
-
-Json to_json(const evaluation::RankedScores& r) {
-  return {{"raw_recall", r.raw_recall},
-          {"recall_at_precision",
-           {{"50", r.recall_at_50},
-            {"80", r.recall_at_80},
-            {"95", r.recall_at_95},
-            {"99", r.recall_at_99}}},
-          {"average_precision", r.average_precision}};
-}
+ private:
+  std::map<std::pair<int, int>, std::size_t> places_;
+};
 
 }  // namespace
+
+Json read_pairs(DocumentFile& file,
+                const std::function<void(const PairRecord& pair, Json&& json)>& each) {
+  Places places;
+  Json document = file.read("pairs", [&](Json&& json) {
+    const PairRecord pair = record_from_json(json);
+    places.add(pair);
+    each(pair, std::move(json));
+  });
+  if (!document.is_object() || !document.contains("pairs") || !document["pairs"].is_array())
+    throw IoError(file.path() + ": no result of `gpureg batch`, it has no array \"pairs\"");
+  document.erase("pairs");
+  places.check_fragments(file.path(), fragment_numbers(document));
+  return document;
+}
 
 double ResultFile::mean_milliseconds() const {
   double sum = 0;
@@ -100,28 +85,27 @@ double ResultFile::mean_prepare_milliseconds() const try {
   return 0;  // not every program that writes pairs tells it
 }
 
-ResultFile read_result(const std::string& path) {
-  ResultFile file;
-  file.path = path;
-  const std::string text = read_text(path);
-  const std::size_t start = text.find_first_not_of(" \t\r\n");
-  file.has_scores = start != std::string::npos && text[start] == '{';
-  if (file.has_scores) {
-    Json document;
-    try {
-      document = Json::parse(text);
-    } catch (const Json::exception& error) {
-      throw IoError(path + ": " + plain(error.what()));
-    }
-    check_format(path, document);
-    read_pairs(file, std::move(document));
+ResultFile read_result(const std::string& path, const std::function<void(const Json&)>& each) {
+  ResultFile result;
+  result.path = path;
+  DocumentFile file(path);
+  result.has_scores = file.begins_object();
+  if (result.has_scores) {
+    result.document = read_pairs(file, [&](const PairRecord& pair, Json&& json) {
+      result.pairs.push_back(pair);
+      if (each) each(json);
+    });
+    for (const PairRecord& pair : result.pairs)
+      if (pair.transform)
+        result.reports.push_back(
+            {pair.i, pair.j, *pair.transform, pair.score, pair.aligned, pair.strict_score});
   } else {
-    file.log = evaluation::read_log(path);
-    evaluation::check_entries(path, file.log);
-    for (const evaluation::LogEntry& entry : file.log)
-      file.reports.push_back({entry.i, entry.j, entry.transform});
+    result.log = evaluation::read_log(path);
+    evaluation::check_entries(path, result.log);
+    for (const evaluation::LogEntry& entry : result.log)
+      result.reports.push_back({entry.i, entry.j, entry.transform});
   }
-  return file;
+  return result;
 }
 
 void check_belongs(const ResultFile& result, const std::string& truth_folder,
@@ -137,17 +121,6 @@ void check_belongs(const ResultFile& result, const std::string& truth_folder,
       throw IoError(result.path + ": pairs[" + std::to_string(k) + "]: pair " +
                     std::to_string(pair.i) + " " + std::to_string(pair.j) + " is out of range, " +
                     says + " fragments, from 0");
-}
-
-Json to_json(const evaluation::Evaluation& e) {
-  Json json;
-  json["strict"] = to_json(e.strict);
-  if (e.strict_ranked) json["strict"].update(to_json(*e.strict_ranked));
-  if (e.geometric) {
-    json["geometric"] = to_json(*e.geometric);
-    if (e.geometric_ranked) json["geometric"].update(to_json(*e.geometric_ranked));
-  }
-  return json;
 }
 
 }  // namespace gpureg::cli

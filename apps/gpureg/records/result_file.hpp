@@ -1,16 +1,27 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <functional>
 #include <string>
 #include <vector>
 
 #include "gpureg/evaluation.hpp"
 #include "records/json.hpp"
-#include "records/pair_record.hpp"
+#include "records/json_file.hpp"
+#include "records/pair_json.hpp"
 
 namespace gpureg::cli {
 
-/// What `evaluate` and `report` read: RESULT.log, or RESULT.json of a batch.
+/// The reader of RESULT.json: of `gpureg batch` and `consistency`, pairs.json of a map, or of
+/// another program that writes such pairs.
+/// @param each receives the pairs in order; what it throws as InvalidArgument names the pair.
+/// @return the document without its pairs.
+/// @throws IoError naming file and pair: no such document, a damaged pair, a pair that stands twice
+///   or is of one fragment, or whose fragments "fragments" lacks.
+Json read_pairs(DocumentFile& file,
+                const std::function<void(const PairRecord& pair, Json&& json)>& each);
+
+/// What `evaluate` and `report` read: RESULT.log or RESULT.json.
 struct ResultFile {
   std::string path;
   bool has_scores = false;        ///< it was JSON: scores and unreported candidates are known
@@ -23,15 +34,14 @@ struct ResultFile {
   double mean_prepare_milliseconds() const;  ///< per fragment; 0 where not known
 };
 
-/// Recognises the format by content. Throws IoError naming the file and the reason.
-ResultFile read_result(const std::string& path);
+/// Recognises the format by content.
+/// @param each sees the JSON of each pair; may be empty.
+/// @throws IoError naming the file and the reason.
+ResultFile read_result(const std::string& path, const std::function<void(const Json&)>& each = {});
 
 /// Throws IoError naming file and place where a result cannot be one of the scene that the truth is
 /// of.
 void check_belongs(const ResultFile& result, const std::string& truth_folder,
                    const evaluation::GroundTruth& truth);
-
-/// JSON of scores, as `evaluate --json` writes it.
-Json to_json(const evaluation::Evaluation& evaluation);
 
 }  // namespace gpureg::cli

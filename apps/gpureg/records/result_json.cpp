@@ -6,6 +6,8 @@
 #include <fstream>
 #include <string>
 
+#include "records/json.hpp"
+
 namespace gpureg::cli {
 
 Json to_json(const Eigen::Ref<const Eigen::MatrixXd>& matrix) {

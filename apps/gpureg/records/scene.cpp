@@ -84,66 +84,82 @@ std::uint64_t hash_of(const PointCloud& cloud) {
 
 }  // namespace
 
-std::vector<std::pair<std::string, std::size_t>> Scene::prepared_sizes() const {
+FragmentFolder::FragmentFolder(const std::string& path, bool quiet) {
+  const Fragments fragments = io::list_fragments(path);
+  for (const auto& [number, file] : fragments) {
+    numbers.push_back(number);
+    files.push_back(file);
+  }
+  const std::string cameras_file = (std::filesystem::path(path) / "cameras.txt").string();
+  if (!std::filesystem::exists(cameras_file)) return;
+  cameras_ = io::read_cameras(cameras_file);
+  if (!quiet) note_gaps(fragments, cameras_, cameras_file);
+}
+
+bool FragmentFolder::has(int number) const {
+  return std::binary_search(numbers.begin(), numbers.end(), number);
+}
+
+std::uint32_t FragmentFolder::index_of(int number) const {
+  const auto at = std::lower_bound(numbers.begin(), numbers.end(), number);
+  return static_cast<std::uint32_t>(at - numbers.begin());
+}
+
+PointCloud FragmentFolder::read(std::size_t k, double spacing, MeshNote note) const {
+  PointCloud cloud = read_cloud(files[k], spacing, note);
+  if (const auto found = cameras_.find(numbers[k]); found != cameras_.end())
+    cloud.set_viewpoints(found->second);
+  return cloud;
+}
+
+std::vector<std::pair<std::string, std::size_t>> PreparedFolder::prepared_sizes() const {
   std::vector<std::pair<std::string, std::size_t>> out;
   for (std::size_t k = 0; k < files.size(); ++k) out.emplace_back(files[k], clouds[k].size());
   return out;
 }
 
-Scene prepare_scene(const Context& context, const std::string& folder,
-                    const PrepareOptions& options, bool quiet, bool infer_viewpoint) {
-  const auto fragments = io::list_fragments(folder);
-  Cameras cameras;
-  const std::string cameras_file = (std::filesystem::path(folder) / "cameras.txt").string();
-  if (std::filesystem::exists(cameras_file)) {
-    cameras = io::read_cameras(cameras_file);
-    if (!quiet) note_gaps(fragments, cameras, cameras_file);
-  }
-
-  Scene scene;
+PreparedFolder prepare_folder(const Context& context, const std::string& path,
+                              const PrepareOptions& options, bool quiet, bool infer_viewpoint) {
+  PreparedFolder folder{FragmentFolder(path, quiet)};
+  const std::size_t size = folder.numbers.size();
   ViewpointNote viewpoints;
-  Progress progress("preparing", "fragments", fragments.size(), quiet);
-  for (std::size_t next = 0; next < fragments.size();) {
+  Progress progress("preparing", "fragments", size, quiet);
+  for (std::size_t next = 0; next < size;) {
     if (InterruptGuard::requested()) {
-      scene.interrupted = true;
+      folder.interrupted = true;
       break;
     }
     std::vector<PointCloud> chunk;
+    std::vector<std::string> files;
     for (std::size_t points = 0;
-         next < fragments.size() && chunk.size() < kChunkClouds && points < kChunkPoints; ++next) {
-      const auto& [number, file] = fragments[next];
-      chunk.push_back(read_cloud(file, mesh_spacing(options.voxel_size),
-                                 quiet ? MeshNote::none : MeshNote::print));
-      if (const auto found = cameras.find(number); found != cameras.end())
-        chunk.back().set_viewpoints(found->second);
-      if (!quiet && options.depth_maps > 0) viewpoints.see(chunk.back(), file);
+         next < size && chunk.size() < kChunkClouds && points < kChunkPoints; ++next) {
+      files.push_back(folder.files[next]);
+      chunk.push_back(folder.read(next, mesh_spacing(options.voxel_size),
+                                  quiet ? MeshNote::none : MeshNote::print));
+      if (!quiet && options.depth_maps > 0) viewpoints.see(chunk.back(), files.back());
       points += chunk.back().points.size();
-      scene.numbers.push_back(number);
-      scene.files.push_back(file);
-      scene.hashes.push_back(hash_of(chunk.back()));
-      scene.extent = std::max(scene.extent, extent_of(chunk.back().points));
+      folder.hashes.push_back(hash_of(chunk.back()));
+      folder.extent = std::max(folder.extent, extent_of(chunk.back().points));
     }
     std::vector<PointCloudView> views;
     for (const PointCloud& cloud : chunk) {
       views.push_back(cloud.view());
       views.back().infer_viewpoint = infer_viewpoint || !cloud.viewpoints.empty();
     }
-    const std::vector<std::string> files(
-        scene.files.end() - static_cast<std::ptrdiff_t>(chunk.size()), scene.files.end());
     for (PreparedCloud& cloud : prepare_batch(context, views, options, files))
-      scene.clouds.push_back(std::move(cloud));
+      folder.clouds.push_back(std::move(cloud));
     progress.update(next);
   }
-  scene.seconds = progress.seconds();
+  folder.seconds = progress.seconds();
   viewpoints.print();
-  return scene;
+  return folder;
 }
 
-std::vector<std::pair<std::uint32_t, std::uint32_t>> choose_pairs(const Scene& scene,
+std::vector<std::pair<std::uint32_t, std::uint32_t>> choose_pairs(const FragmentFolder& folder,
                                                                   const std::string& pairs,
                                                                   bool quiet) {
   std::vector<std::pair<std::uint32_t, std::uint32_t>> chosen;
-  const auto size = static_cast<std::uint32_t>(scene.numbers.size());
+  const auto size = static_cast<std::uint32_t>(folder.numbers.size());
   if (pairs == "all") {
     for (std::uint32_t i = 0; i < size; ++i)
       for (std::uint32_t j = i + 1; j < size; ++j) chosen.emplace_back(i, j);
@@ -152,11 +168,11 @@ std::vector<std::pair<std::uint32_t, std::uint32_t>> choose_pairs(const Scene& s
   const auto listed = io::read_pairs(pairs);
   std::size_t k = 0;
   const auto index_of = [&](int number) {
-    const auto at = std::lower_bound(scene.numbers.begin(), scene.numbers.end(), number);
-    if (at == scene.numbers.end() || *at != number)
+    const auto at = std::lower_bound(folder.numbers.begin(), folder.numbers.end(), number);
+    if (at == folder.numbers.end() || *at != number)
       throw IoError(pairs + ":" + std::to_string(line_of_pair(pairs, k)) +
                     ": there is no fragment " + std::to_string(number));
-    return static_cast<std::uint32_t>(at - scene.numbers.begin());
+    return static_cast<std::uint32_t>(at - folder.numbers.begin());
   };
   std::set<std::pair<std::uint32_t, std::uint32_t>> seen;
   for (; k < listed.size(); ++k) {

@@ -12,9 +12,10 @@
 #include "command.hpp"
 #include "gpureg/evaluation.hpp"
 #include "gpureg/io.hpp"
-#include "records/journal.hpp"
-#include "records/json_file.hpp"
 #include "records/fields_json.hpp"
+#include "records/journal.hpp"
+#include "records/json.hpp"
+#include "records/pair_store.hpp"
 #include "records/result_json.hpp"
 #include "records/scene.hpp"
 #include "text.hpp"
@@ -69,22 +70,21 @@ class Batch {
       throw InvalidArgument("--resume needs a file for -o, but " + o_.log + " is none");
     if (can_have_journal(o_.log)) Journal::check(o_.journal(), o_.journal_mode());
     const InterruptGuard guard;
-    scene_ =
-        prepare_scene(context_, o_.folder, options_.prepare, o_.quiet, o_.viewpoint.text != "none");
+    scene_ = prepare_folder(context_, o_.folder, options_.prepare, o_.quiet,
+                            o_.viewpoint.text != "none");
     if (scene_.interrupted) {
       std::cerr << "gpureg: interrupted before the first pair, nothing written" << std::endl;
       return kInterrupted;
     }
     check_voxel_size(options_.prepare.voxel_size, scene_.extent, "the largest fragment");
     if (o_.method.automatic_voxel_size && !o_.quiet) note_few_points(scene_.prepared_sizes());
-    Pairs pairs = choose_pairs(scene_, o_.pairs, o_.quiet);
+    const Pairs pairs = choose_pairs(scene_, o_.pairs, o_.quiet);
     if (pairs.empty())
       throw InvalidArgument(o_.pairs == "all" ? o_.folder + " holds one fragment; a batch needs two"
                                               : o_.pairs + " lists no pair");
     std::optional<std::string> journal;
     if (can_have_journal(o_.log)) journal = o_.journal();
-    run_.emplace(scene_, std::move(pairs), options_, up_prior(o_.up), journal, o_.journal_mode(),
-                 o_.quiet);
+    run_.emplace(scene_, pairs, options_, up_prior(o_.up), journal, o_.journal_mode(), o_.quiet);
     keep_outputs();
     run_->align(context_);
     if (!run_->complete() && run_->journal() && kept_.empty()) run_->journal()->note_outputs();
@@ -108,26 +108,25 @@ class Batch {
   void write_outputs() {
     std::vector<evaluation::LogEntry> log;
     std::vector<evaluation::InformationEntry> information;
-    Json records = Json::array();
-    for (const auto& [a, b] : run_->pairs()) {
-      const auto found = run_->done().find({scene_.numbers[a], scene_.numbers[b]});
-      if (found == run_->done().end()) continue;
-      const auto& [pair, matrix] = found->second;
-      records.push_back(pair.json);
-      if (!pair.aligned) {
-        ++reasons_[pair.reason];
+    for (const std::size_t k : run_->store().all_done()) {
+      const RegistrationResult& result = run_->store().results[k];
+      if (!result.aligned()) {
+        ++reasons_[to_string(result.reason)];
         continue;
       }
-      log.push_back({pair.i, pair.j, scene_.count(), *pair.transform});
-      information.push_back({pair.i, pair.j, scene_.count(), information_from_json(matrix)});
+      const Pair& pair = run_->store().pairs[k];
+      const int i = scene_.numbers[pair.target], j = scene_.numbers[pair.source];
+      log.push_back({i, j, scene_.count(), result.target_from_source.matrix()});
+      information.push_back({i, j, scene_.count(), result.source_moments.information_redwood()});
     }
     aligned_ = log.size();
     if (may_write(o_.log)) evaluation::write_log(o_.log, log);
     if (may_write(o_.info)) evaluation::write_information(o_.info, information);
-    if (may_write(o_.json)) write_document(o_.json, document(std::move(records)));
+    if (may_write(o_.json)) write_pairs(o_.json, head(), run_->store(), scene_, false);
   }
 
-  Json document(Json records) const {
+  /// RESULT.json without its pairs.
+  Json head() const {
     Json json;
     json["gpureg"] = "batch";
     json["environment"] = environment(context_);
@@ -140,14 +139,13 @@ class Batch {
                        {"pairs_in_this_run", run_->in_this_run()}};
     json["peak_memory_mib"] = peak_memory_mib();
     json["fragments"] = fragments_json(scene_);
-    json["pairs"] = std::move(records);
     return json;
   }
 
   int say_interrupted() const {
     std::string kept;
     for (const std::string& path : kept_) kept += (kept.empty() ? "" : ", ") + path;
-    std::cerr << "gpureg: interrupted, " << run_->done().size() << " of " << run_->pairs().size()
+    std::cerr << "gpureg: interrupted, " << run_->done() << " of " << run_->size()
               << " pairs are done and written"
               << (kept.empty() ? "" : " to the journal, " + kept + " left as before")
               << "; go on with the same command and --resume" << std::endl;
@@ -161,9 +159,8 @@ class Batch {
                   << "\n";
       std::cout << "fragments  " << scene_.numbers.size() << ", prepared in "
                 << fixed(scene_.seconds, 2) << " s\n"
-                << "pairs      " << run_->pairs().size() << ", in " << fixed(run_->seconds(), 2)
-                << " s (" << significant(run_->rate(), 3) << " pairs/s, " << context_.description()
-                << ")\n"
+                << "pairs      " << run_->size() << ", in " << fixed(run_->seconds(), 2) << " s ("
+                << significant(run_->rate(), 3) << " pairs/s, " << context_.description() << ")\n"
                 << "aligned    " << aligned_ << ", written to " << o_.log << "\n";
       for (const auto& [reason, count] : reasons_)
         std::cout << "not        " << count << ", " << reason << "\n";
@@ -175,7 +172,7 @@ class Batch {
   const BatchOptions& o_;
   RegistrationOptions options_;
   Context context_;
-  Scene scene_;
+  PreparedFolder scene_;
   std::optional<PairRun> run_;
   std::set<std::string> kept_;  // outputs of another run
   std::size_t aligned_ = 0;

@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include <filesystem>
 #include <iostream>
-#include <map>
 #include <memory>
 #include <optional>
 #include <string>
@@ -9,11 +7,12 @@
 
 #include "command.hpp"
 #include "gpureg/error.hpp"
-#include "gpureg/io.hpp"
 #include "records/calibration_file.hpp"
 #include "records/cloud_file.hpp"
+#include "records/json.hpp"
 #include "records/json_file.hpp"
 #include "records/odometry_file.hpp"
+#include "records/scene.hpp"
 #include "text.hpp"
 #include "verbs/interrupt.hpp"
 #include "verbs/method_options.hpp"
@@ -46,19 +45,14 @@ struct Clouds {
 };
 
 Clouds read_clouds(const CalibrateOptions& o) {
-  const std::string cameras_file = (std::filesystem::path(o.folder) / "cameras.txt").string();
-  std::map<int, std::vector<Eigen::Vector3d>> cameras;
-  if (std::filesystem::exists(cameras_file)) cameras = io::read_cameras(cameras_file);
-  Clouds out;
+  const FragmentFolder folder(o.folder, o.quiet);
+  Clouds out{folder.numbers, {}};
   ViewpointNote viewpoints;
-  for (const auto& [number, file] : io::list_fragments(o.folder)) {
-    out.numbers.push_back(number);
-    out.clouds.push_back(read_cloud(file, mesh_spacing(o.method.voxel_size),
-                                    o.quiet ? MeshNote::none : MeshNote::print));
-    if (const auto found = cameras.find(number); found != cameras.end())
-      out.clouds.back().set_viewpoints(found->second);
-    if (!o.quiet) viewpoints.see(out.clouds.back(), file);
-    check_voxel_size(o.method.voxel_size, extent_of(out.clouds.back().points), file);
+  for (std::size_t k = 0; k < folder.files.size(); ++k) {
+    out.clouds.push_back(folder.read(k, mesh_spacing(o.method.voxel_size),
+                                     o.quiet ? MeshNote::none : MeshNote::print));
+    if (!o.quiet) viewpoints.see(out.clouds.back(), folder.files[k]);
+    check_voxel_size(o.method.voxel_size, extent_of(out.clouds.back().points), folder.files[k]);
   }
   viewpoints.print();
   return out;

@@ -45,25 +45,24 @@ LoopConsistencyOptions loop_consistency_options(const ConsistencyOptions& o, con
   return LoopConsistencyOptions::from_voxel_size(static_cast<float>(voxel_size));
 }
 
-RegistrationResult result_of(const PairRecord& record) {
+RegistrationResult result_of(const PairRecord& record, const Json& json) {
   RegistrationResult result;
   result.has_candidate = record.transform.has_value();
   if (result.has_candidate) result.target_from_source.matrix() = *record.transform;
   result.score = record.score;
-  result.modes = modes_from_json(record.json);
+  result.modes = modes_from_json(json);
   return result;
 }
 
-/// The record with its confidence from all pairs beside its own score. The chosen mode is first, as
+/// Puts the confidence from all pairs beside the pair's own score. The chosen mode is first, as
 /// readers of results expect.
-Json consistent_record(const PairRecord& record, const PairConsistency& pair,
-                       double min_confidence) {
-  Json json = record.json;
+void make_consistent(const PairRecord& record, const PairConsistency& pair, double min_confidence,
+                     Json& json) {
   json["loop_consistency"] = {{"score_alone", record.score},
                               {"mode", pair.mode},
                               {"loops", pair.loops},
                               {"path", pair.path}};
-  if (!record.transform) return json;
+  if (!record.transform) return;
   const bool aligned = pair.confidence >= min_confidence;
   json["score"] = pair.confidence;
   json["status"] =
@@ -81,52 +80,58 @@ Json consistent_record(const PairRecord& record, const PairConsistency& pair,
         alone > 0 ? pair.confidence * std::min(1.0, overlap / alone) : 0.0;
     json["T_ij"] = first["T_ij"];
   }
-  return json;
 }
 
-// A second run would count the same loops as new evidence.
-void refuse_consistent(const ResultFile& file) {
-  bool done = file.document.contains("loop_consistency");
-  for (const PairRecord& pair : file.pairs) done |= pair.json.contains("loop_consistency");
-  if (done)
-    throw IoError(file.path +
+/// The pairs of a result, whose documents keep the members that only other programs know.
+struct Input {
+  Json document;
+  std::vector<PairRecord> records;
+  std::vector<Json> documents;
+  std::vector<Pair> pairs;
+  std::vector<RegistrationResult> results;
+};
+
+Input read_input(const std::string& path) {
+  DocumentFile file(path);
+  if (!file.begins_object()) throw IoError(path + ": is a log; loops need RESULT.json of a batch");
+  Input input;
+  bool done = false;
+  input.document = read_pairs(file, [&](const PairRecord& record, Json&& json) {
+    done |= json.contains("loop_consistency");
+    input.records.push_back(record);
+    input.pairs.push_back(
+        {static_cast<std::uint32_t>(record.j), static_cast<std::uint32_t>(record.i)});
+    input.results.push_back(result_of(record, json));
+    input.documents.push_back(std::move(json));
+  });
+  // A second run would count the same loops as new evidence.
+  if (done || input.document.contains("loop_consistency"))
+    throw IoError(path +
                   ": its scores are those of `gpureg consistency` already; give the RESULT.json of "
                   "the batch");
+  return input;
 }
 
 int run(const ConsistencyOptions& o) {
   check_outputs({{"--json", o.json}, {"-o", o.log}}, {{"RESULT", o.result}});
-  ResultFile file = read_result(o.result);
-  if (!file.has_scores) throw IoError(o.result + ": is a log; loops need RESULT.json of a batch");
-  refuse_consistent(file);
-  const LoopConsistencyOptions options = loop_consistency_options(o, file.document);
+  Input input = read_input(o.result);
+  const LoopConsistencyOptions options = loop_consistency_options(o, input.document);
   const double min_confidence =
-      o.min_confidence.value_or(option_of(file.document, nullptr, "min_confidence", 0.5));
-
-  std::vector<Pair> pairs;
-  std::vector<RegistrationResult> results;
-  for (std::size_t k = 0; k < file.pairs.size(); ++k) try {
-      const PairRecord& record = file.pairs[k];
-      pairs.push_back({static_cast<std::uint32_t>(record.j), static_cast<std::uint32_t>(record.i)});
-      results.push_back(result_of(record));
-    } catch (const InvalidArgument& error) {
-      throw IoError(o.result + ": pairs[" + std::to_string(k) + "]: " + error.what());
-    }
+      o.min_confidence.value_or(option_of(input.document, nullptr, "min_confidence", 0.5));
   std::vector<PairConsistency> consistency;
   try {
-    consistency = loop_consistency(pairs, results, options);
+    consistency = loop_consistency(input.pairs, input.results, options);
   } catch (const InvalidArgument& error) {
     throw IoError(o.result + ": " + error.what());
   }
 
   int count = 0;
   std::size_t raised = 0, lowered = 0, changed = 0, before = 0;
-  Json records = Json::array();
   std::vector<evaluation::LogEntry> log;
-  for (std::size_t k = 0; k < file.pairs.size(); ++k) {
-    const PairRecord& record = file.pairs[k];
-    records.push_back(consistent_record(record, consistency[k], min_confidence));
-    const PairRecord after = PairRecord::from_json(records.back());
+  for (std::size_t k = 0; k < input.records.size(); ++k) {
+    const PairRecord& record = input.records[k];
+    make_consistent(record, consistency[k], min_confidence, input.documents[k]);
+    const PairRecord after = record_from_json(input.documents[k]);
     count = std::max({count, record.i + 1, record.j + 1});
     raised += consistency[k].confidence > record.score;
     lowered += consistency[k].confidence < record.score;
@@ -134,18 +139,21 @@ int run(const ConsistencyOptions& o) {
     before += record.aligned;
     if (after.aligned) log.push_back({after.i, after.j, 0, *after.transform});
   }
-  for (const Json& fragment : file.document.value("fragments", Json::array()))
-    if (fragment.is_object()) count = std::max(count, fragment.value("number", 0) + 1);
+  for (const Json& fragment : input.document.value("fragments", Json::array()))
+    if (const auto number = fragment.find("number");
+        number != fragment.end() && number->is_number_integer())
+      count = std::max(count, number->get<int>() + 1);
   for (evaluation::LogEntry& entry : log) entry.count = count;
 
-  Json document = std::move(file.document);
+  Json& document = input.document;
   document["loop_consistency"] = {{"closing_angle", options.closing_angle},
                                   {"closing_distance", options.closing_distance},
                                   {"min_confidence", min_confidence}};
-  document["pairs"] = std::move(records);
-  write_document(o.json, document);
+  write_document(o.json, document, {"pairs", input.documents.size(), [&](std::size_t k) {
+                                      return std::move(input.documents[k]);
+                                    }});
   if (!o.log.empty()) evaluation::write_log(o.log, log);
-  std::cout << "pairs      " << file.pairs.size() << ", " << raised << " raised, " << lowered
+  std::cout << "pairs      " << input.records.size() << ", " << raised << " raised, " << lowered
             << " lowered, " << changed << " with another pose\n"
             << "aligned    " << log.size() << ", " << before << " before\n";
   return kOk;

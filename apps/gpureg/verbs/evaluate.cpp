@@ -9,8 +9,8 @@
 #include "gpureg/error.hpp"
 #include "pages/evaluate_table.hpp"
 #include "pages/report_pairs.hpp"
+#include "records/evaluation_json.hpp"
 #include "records/json_file.hpp"
-#include "records/pair_verdicts.hpp"
 #include "text.hpp"
 #include "verbs/output_path.hpp"
 

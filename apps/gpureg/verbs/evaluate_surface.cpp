@@ -9,6 +9,7 @@
 #include "gpureg/error.hpp"
 #include "gpureg/io.hpp"
 #include "gpureg/surface_error.hpp"
+#include "records/json.hpp"
 #include "records/json_file.hpp"
 #include "records/result_json.hpp"
 #include "text.hpp"

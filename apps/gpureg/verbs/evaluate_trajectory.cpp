@@ -6,6 +6,7 @@
 
 #include "command.hpp"
 #include "gpureg/trajectory.hpp"
+#include "records/json.hpp"
 #include "records/json_file.hpp"
 #include "records/result_json.hpp"
 #include "text.hpp"

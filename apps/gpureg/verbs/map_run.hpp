@@ -9,8 +9,7 @@
 #include "gpureg/context.hpp"
 #include "gpureg/options.hpp"
 #include "gpureg/reconstruction.hpp"
-#include "records/json.hpp"
-#include "records/pair_record.hpp"
+#include "records/pair_store.hpp"
 #include "records/scene.hpp"
 
 namespace gpureg::cli {
@@ -19,9 +18,8 @@ namespace gpureg::cli {
 struct MapRun {
   std::string folder, output;
   RegistrationOptions options;
-  Scene scene;  ///< without prepared clouds where the pairs come from a file
-  std::vector<PairRecord> records;
-  std::vector<Json> information;  ///< of each record; null: not known
+  PreparedFolder scene;  ///< without prepared clouds where the pairs come from a file
+  PairStore pairs;
   reconstruction::Reconstruction map;
   std::optional<reconstruction::RefineReport> refined;
   bool aligned_here = false;  ///< the pairs were aligned by this run
@@ -32,8 +30,6 @@ struct MapRun {
   } seconds;
 
   std::string file(const std::string& name) const;  ///< path in the output folder
-  std::uint32_t index_of(int number) const;         ///< of a scan that is there
-  bool has(int number) const;
   std::size_t accepted_edges() const;
 };
 

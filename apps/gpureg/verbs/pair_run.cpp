@@ -4,10 +4,13 @@
 #include <algorithm>
 #include <filesystem>
 #include <iostream>
+#include <map>
 
+#include "gpureg/error.hpp"
 #include "gpureg/io.hpp"
 #include "records/cloud_file.hpp"
 #include "records/fields_json.hpp"
+#include "records/json.hpp"
 #include "records/result_json.hpp"
 #include "text.hpp"
 #include "verbs/interrupt.hpp"
@@ -18,7 +21,7 @@ namespace {
 
 // Backend and threads may change between runs: they do not change results.
 Json header_of(const RegistrationOptions& options, const std::optional<GravityPrior>& gravity,
-               const Scene& scene, const Pairs& pairs) {
+               const PreparedFolder& scene, const Pairs& pairs) {
   std::uint64_t hash = pairs.size();
   for (const auto& [i, j] : pairs)
     hash = (hash ^ (static_cast<std::uint64_t>(i) << 32 | j)) * 0x9E3779B97F4A7C15ull;
@@ -27,7 +30,7 @@ Json header_of(const RegistrationOptions& options, const std::optional<GravityPr
     fragments.push_back({{"number", scene.numbers[k]},
                          {"hash", scene.hashes[k]},
                          {"viewpoint", to_string(scene.clouds[k].statistics().viewpoint)}});
-  Json header = {{"gpureg_journal", 1},
+  Json header = {{"gpureg_journal", 2},
                  {"version", GPUREG_VERSION},
                  {"options", to_json(options)},
                  {"pairs", {{"count", pairs.size()}, {"hash", hash}}},
@@ -36,6 +39,12 @@ Json header_of(const RegistrationOptions& options, const std::optional<GravityPr
     header["up"] = {gravity->target_up.x(), gravity->target_up.y(), gravity->target_up.z(),
                     gravity->max_angle};
   return header;
+}
+
+std::vector<Pair> sources_and_targets(const Pairs& pairs) {
+  std::vector<Pair> out;
+  for (const auto& [i, j] : pairs) out.push_back({j, i});
+  return out;
 }
 
 }  // namespace
@@ -53,37 +62,57 @@ void choose_voxel_size(MethodOptions& method, const std::string& folder) {
   method.choose_voxel_size(views, folder);
 }
 
-PairRun::PairRun(const Scene& scene, Pairs pairs, const RegistrationOptions& options,
-                 const std::optional<GravityPrior>& gravity,
+PairRun::PairRun(const PreparedFolder& scene, const Pairs& pairs,
+                 const RegistrationOptions& options, const std::optional<GravityPrior>& gravity,
                  const std::optional<std::string>& journal, Journal::Mode mode, bool quiet)
-    : scene_(scene), pairs_(std::move(pairs)), options_(options), gravity_(gravity), quiet_(quiet) {
-  if (!journal) return;
-  const bool found = std::filesystem::exists(*journal);
-  journal_.emplace(*journal, header_of(options, gravity, scene, pairs_), mode);
-  done_ = journal_->entries();
-  resumed_ = done_.size();
-  if (mode != Journal::Mode::resume || quiet) return;
+    : scene_(scene),
+      store_(sources_and_targets(pairs)),
+      options_(options),
+      gravity_(gravity),
+      quiet_(quiet),
+      size_(pairs.size()) {
+  if (journal) open_journal(*journal, pairs, mode);
+}
+
+void PairRun::open_journal(const std::string& path, const Pairs& pairs, Journal::Mode mode) {
+  std::map<std::pair<int, int>, std::size_t> places;
+  for (std::size_t k = 0; k < pairs.size(); ++k)
+    places[{scene_.numbers[pairs[k].first], scene_.numbers[pairs[k].second]}] = k;
+  const bool found = std::filesystem::exists(path);
+  journal_.emplace(
+      path, header_of(options_, gravity_, scene_, pairs), mode,
+      [&](int i, int j, RegistrationResult&& result) {
+        const auto place = places.find({i, j});
+        if (place == places.end() || store_.done(place->second))
+          throw InvalidArgument("pair " + std::to_string(i) + " " + std::to_string(j) +
+                                (place == places.end() ? " is none of this run" : " stands twice"));
+        store_.results[place->second] = std::move(result);
+        ++done_;
+      });
+  resumed_ = done_;
+  if (mode != Journal::Mode::resume || quiet_) return;
   if (found)
-    std::cerr << "gpureg: " << resumed_ << " of " << pairs_.size() << " pairs are done already"
+    std::cerr << "gpureg: " << resumed_ << " of " << size() << " pairs are done already"
               << std::endl;
   else
-    std::cerr << "gpureg: there is nothing to resume, as no " << *journal
+    std::cerr << "gpureg: there is nothing to resume, as no " << path
               << " of an unfinished run is there; all pairs are aligned" << std::endl;
 }
 
 void PairRun::align(const Context& context) {
   std::vector<Pair> left;
-  for (const auto& [i, j] : pairs_)
-    if (done_.count({scene_.numbers[i], scene_.numbers[j]}) == 0) left.push_back({j, i});
-  Progress progress("aligning", "pairs", pairs_.size(), quiet_, done_.size());
+  std::vector<std::size_t> places;
+  for (std::size_t k = 0; k < size(); ++k)
+    if (!store_.done(k)) {
+      left.push_back(store_.pairs[k]);
+      places.push_back(k);
+    }
+  Progress progress("aligning", "pairs", size(), quiet_, done_);
   BatchCallbacks callbacks;
   callbacks.on_result = [&](std::size_t k, const RegistrationResult& result) {
-    const int i = scene_.numbers[left[k].target], j = scene_.numbers[left[k].source];
-    const PairRecord record = PairRecord::from_result(i, j, result);
-    const Json information = to_json(result.source_moments.information_redwood());
-    if (journal_) journal_->add(record, information);
-    done_.emplace(std::make_pair(i, j), Journal::Entry{record, information});
-    progress.update(done_.size());
+    if (journal_)
+      journal_->add(scene_.numbers[left[k].target], scene_.numbers[left[k].source], result);
+    progress.update(++done_);
   };
   callbacks.should_stop = [&] {
     if (journal_) journal_->flush();
@@ -91,7 +120,9 @@ void PairRun::align(const Context& context) {
   };
   std::vector<RegistrationPrior> priors;
   if (gravity_) priors.assign(left.size(), RegistrationPrior{gravity_, std::nullopt});
-  align_batch(context, scene_.clouds, left, priors, options_, callbacks);
+  std::vector<RegistrationResult> results =
+      align_batch(context, scene_.clouds, left, priors, options_, callbacks);
+  for (std::size_t k = 0; k < left.size(); ++k) store_.results[places[k]] = std::move(results[k]);
   if (journal_) journal_->flush();
   seconds_ = progress.seconds();
 }
@@ -100,7 +131,7 @@ double PairRun::rate() const {
   return seconds_ > 0 ? static_cast<double>(in_this_run()) / seconds_ : 0;
 }
 
-Json fragments_json(const Scene& scene) {
+Json fragments_json(const PreparedFolder& scene) {
   Json fragments = Json::array();
   for (std::size_t k = 0; k < scene.numbers.size(); ++k) {
     Json fragment = {{"number", scene.numbers[k]}, {"file", base_name(scene.files[k])}};

@@ -11,6 +11,8 @@
 #include "gpureg/options.hpp"
 #include "gpureg/prior.hpp"
 #include "records/journal.hpp"
+#include "records/json_fwd.hpp"
+#include "records/pair_store.hpp"
 #include "records/scene.hpp"
 #include "verbs/method_options.hpp"
 
@@ -28,35 +30,38 @@ class PairRun {
  public:
   /// gravity: a prior for all pairs. Opens the journal; without one, nothing can be resumed. Throws
   /// IoError.
-  PairRun(const Scene& scene, Pairs pairs, const RegistrationOptions& options,
+  PairRun(const PreparedFolder& scene, const Pairs& pairs, const RegistrationOptions& options,
           const std::optional<GravityPrior>& gravity, const std::optional<std::string>& journal,
           Journal::Mode mode, bool quiet);
 
   /// Aligns what is left, until it is done or interrupted.
   void align(const Context& context);
 
-  bool complete() const { return done_.size() == pairs_.size(); }
-  const Pairs& pairs() const { return pairs_; }
-  const Journal::Entries& done() const { return done_; }
+  bool complete() const { return done_ == size(); }
+  std::size_t size() const { return size_; }  ///< of all pairs
+  std::size_t done() const { return done_; }
+  const PairStore& store() const { return store_; }  ///< until take_store()
+  PairStore take_store() { return std::move(store_); }
   Journal* journal() { return journal_ ? &*journal_ : nullptr; }
 
-  std::size_t in_this_run() const { return done_.size() - resumed_; }
+  std::size_t in_this_run() const { return done_ - resumed_; }
   double seconds() const { return seconds_; }
   double rate() const;  ///< pairs per second of this run
 
  private:
-  const Scene& scene_;
-  Pairs pairs_;
+  void open_journal(const std::string& path, const Pairs& pairs, Journal::Mode mode);
+
+  const PreparedFolder& scene_;
+  PairStore store_;
   const RegistrationOptions& options_;
   std::optional<GravityPrior> gravity_;
   std::optional<Journal> journal_;
   bool quiet_;
-  Journal::Entries done_;
-  std::size_t resumed_ = 0;
+  std::size_t size_, done_ = 0, resumed_ = 0;
   double seconds_ = 0;
 };
 
 /// The fragments of a scene as results list them.
-Json fragments_json(const Scene& scene);
+Json fragments_json(const PreparedFolder& scene);
 
 }  // namespace gpureg::cli

@@ -3,7 +3,6 @@
 #include <chrono>
 #include <filesystem>
 #include <iostream>
-#include <map>
 #include <memory>
 #include <optional>
 #include <string>
@@ -12,15 +11,15 @@
 
 #include "command.hpp"
 #include "gpureg/error.hpp"
-#include "gpureg/io.hpp"
 #include "gpureg/pruning.hpp"
 #include "pages/map_page.hpp"
 #include "records/cloud_file.hpp"
+#include "records/json.hpp"
 #include "records/json_file.hpp"
 #include "records/map_document.hpp"
 #include "records/map_files.hpp"
 #include "records/odometry_file.hpp"
-#include "records/pair_results.hpp"
+#include "records/pair_store.hpp"
 #include "text.hpp"
 #include "verbs/interrupt.hpp"
 #include "verbs/output_path.hpp"
@@ -95,7 +94,8 @@ class Reconstruct {
     if (o_.results.empty()) {
       if (!align_pairs()) return say_interrupted();
     } else {
-      read_pair_results(o_.results, run_);
+      run_.scene = PreparedFolder(FragmentFolder(o_.folder, o_.quiet));
+      run_.pairs = read_pairs(o_.results, run_.scene, run_.options.prepare.voxel_size);
     }
     if (!o_.odometry.empty() && odometry_.empty()) odometry_ = read_odometry(o_.odometry, run_);
     reconstruct();
@@ -124,32 +124,29 @@ class Reconstruct {
 
   /// Prepares and aligns. false: interrupted.
   bool align_pairs() {
-    Scene& scene = run_.scene;
-    scene = prepare_scene(context_, o_.folder, run_.options.prepare, o_.quiet);
+    PreparedFolder& scene = run_.scene;
+    scene = prepare_folder(context_, o_.folder, run_.options.prepare, o_.quiet);
     if (scene.interrupted) return false;
     run_.seconds.prepare = scene.seconds;
     check_voxel_size(run_.options.prepare.voxel_size, scene.extent, "the largest fragment");
     if (o_.method.automatic_voxel_size && !o_.quiet) note_few_points(scene.prepared_sizes());
     // A bad file shall show before hours of work.
     if (!o_.odometry.empty()) odometry_ = read_odometry(o_.odometry, run_);
-    Pairs pairs = o_.prune > 0 ? likely_pairs() : choose_pairs(scene, o_.pairs, o_.quiet);
+    const Pairs pairs = o_.prune > 0 ? likely_pairs() : choose_pairs(scene, o_.pairs, o_.quiet);
     if (pairs.empty())
       throw InvalidArgument(o_.pairs == "all" ? o_.folder + " holds one fragment; a map needs two"
                                               : o_.pairs + " lists no pair");
-    pairs_.emplace(scene, std::move(pairs), run_.options, std::nullopt, o_.journal(),
-                   o_.journal_mode(), o_.quiet);
+    pairs_.emplace(scene, pairs, run_.options, std::nullopt, o_.journal(), o_.journal_mode(),
+                   o_.quiet);
     pairs_->align(context_);
     if (!pairs_->complete()) return false;
-    for (const auto& [i, j] : pairs_->pairs()) {
-      const Journal::Entry& entry = pairs_->done().at({scene.numbers[i], scene.numbers[j]});
-      run_.records.push_back(entry.pair);
-      run_.information.push_back(entry.information);
-    }
+    run_.pairs = pairs_->take_store();
     run_.aligned_here = true;
     run_.seconds.align = pairs_->seconds();
     run_.pairs_in_this_run = pairs_->in_this_run();
     // The work of hours is safe from here on, whatever becomes of the map.
-    write_document(o_.file("pairs.json"), pairs_document(run_, context_));
+    write_pairs(o_.file("pairs.json"), pairs_head(run_, context_), run_.pairs, scene, true);
+    for (RegistrationResult& result : run_.pairs.results) reduce_moments(result);
     return true;
   }
 
@@ -172,34 +169,24 @@ class Reconstruct {
 
   void reconstruct() {
     const Clock::time_point start = Clock::now();
-    std::vector<Pair> pairs;
-    std::vector<RegistrationResult> results;
-    for (std::size_t k = 0; k < run_.records.size(); ++k) {
-      pairs.push_back({run_.index_of(run_.records[k].j), run_.index_of(run_.records[k].i)});
-      results.push_back(result_from_record(run_.records[k], run_.information[k]));
-    }
     auto options = reconstruction::Options::from_voxel_size(run_.options.prepare.voxel_size);
     options.threads = static_cast<int>(o_.method.threads);
     options.drift = o_.drift;
-    run_.map =
-        reconstruction::reconstruct(run_.scene.numbers.size(), pairs, results, options, odometry_);
+    run_.map = reconstruction::reconstruct(run_.scene.numbers.size(), run_.pairs.pairs,
+                                           run_.pairs.results, options, odometry_);
     run_.seconds.graph = since(start);
   }
 
   /// Points and normals of the placed scans. false: interrupted.
   bool make_surfaces() {
-    const Scene& scene = run_.scene;
+    const PreparedFolder& scene = run_.scene;
     surfaces_.resize(scene.numbers.size());
-    const std::string cameras_file = (fs::path(o_.folder) / "cameras.txt").string();
-    std::map<int, std::vector<Eigen::Vector3d>> cameras;
-    if (fs::exists(cameras_file)) cameras = io::read_cameras(cameras_file);
     Progress progress("preparing finer", "fragments", surfaces_.size(), o_.quiet);
     for (std::size_t k = 0; k < surfaces_.size(); ++k) {
       if (InterruptGuard::requested()) return false;
       if (run_.map.scans[k].placed) {
-        PointCloud cloud = read_cloud(scene.files[k], mesh_spacing(run_.options.prepare.voxel_size),
-                                      MeshNote::none);
-        cloud.set_viewpoints(cameras[scene.numbers[k]]);
+        const PointCloud cloud =
+            scene.read(k, mesh_spacing(run_.options.prepare.voxel_size), MeshNote::none);
         surfaces_[k] = reconstruction::surface_of(context_, cloud.view(), run_.options.prepare);
       }
       progress.update(k + 1);
@@ -240,7 +227,7 @@ class Reconstruct {
   int say_interrupted() const {
     std::cerr << "gpureg: interrupted";
     if (pairs_)
-      std::cerr << ", " << pairs_->done().size() << " of " << pairs_->pairs().size()
+      std::cerr << ", " << pairs_->done() << " of " << pairs_->size()
                 << " pairs are in the journal; go on with the same command and --resume";
     else
       std::cerr << ", nothing written";

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <algorithm>
+#include <cmath>
 #include <iostream>
 #include <memory>
 #include <optional>
@@ -17,9 +18,10 @@
 #include "pictures/before_after.hpp"
 #include "pictures/image.hpp"
 #include "records/cloud_file.hpp"
-#include "records/initial_poses.hpp"
-#include "records/json_file.hpp"
 #include "records/fields_json.hpp"
+#include "records/initial_poses.hpp"
+#include "records/json.hpp"
+#include "records/json_file.hpp"
 #include "records/result_json.hpp"
 #include "text.hpp"
 #include "verbs/knowledge_options.hpp"
@@ -187,6 +189,9 @@ void check_initial(const RegisterOptions& o) {
 int run(RegisterOptions o) {
   check_initial(o);
   o.method.registration();  // what is wrong with it shall be said before clouds are read
+  if (o.time_budget && !(*o.time_budget > 0 && std::isfinite(*o.time_budget)))
+    throw InvalidArgument("--time-budget is " + significant(*o.time_budget, 6) +
+                          ", expected milliseconds > 0");
   if (o.time_budget && o.method.given("--quality"))
     throw InvalidArgument("--time-budget chooses the quality, give it or --quality");
   o.source_viewpoint.check("--source-viewpoint");

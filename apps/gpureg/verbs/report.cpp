@@ -69,7 +69,10 @@ std::vector<Picture> draw(const std::vector<SamplePair>& samples, const std::str
 ReportEntry read_entry(const ReportOptions& o, std::size_t k) {
   ReportEntry entry;
   entry.name = o.names.empty() ? o.results[k] : o.names[k];
-  entry.result = read_result(o.results[k]);
+  entry.result = read_result(o.results[k], [&](const Json& pair) {
+    entry.rows.push_back(pair_row(pair));
+    entry.stages.add(pair["ms"]);
+  });
   if (!entry.result.has_scores)
     throw IoError(o.results[k] +
                   ": a report needs RESULT.json of `gpureg batch --json`, this is a log");

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "records/pair_verdicts.hpp"
+#include "records/evaluation_json.hpp"
 
 #include <Eigen/Geometry>
 #include <Eigen/LU>
@@ -37,7 +37,34 @@ void add(std::map<Pair, Known>& known, const std::vector<evaluation::LogEntry>& 
       known[{log[k].i, log[k].j}] = {log[k].transform, information[k].information};
 }
 
+Json to_json(const evaluation::Scores& s) {
+  return {
+      {"good", s.good},         {"good_recall", s.good_recall}, {"ground_truth", s.ground_truth},
+      {"reported", s.reported}, {"recall", s.recall()},         {"precision", s.precision()}};
+}
+
+Json to_json(const evaluation::RankedScores& r) {
+  return {{"raw_recall", r.raw_recall},
+          {"recall_at_precision",
+           {{"50", r.recall_at_50},
+            {"80", r.recall_at_80},
+            {"95", r.recall_at_95},
+            {"99", r.recall_at_99}}},
+          {"average_precision", r.average_precision}};
+}
+
 }  // namespace
+
+Json to_json(const evaluation::Evaluation& e) {
+  Json json;
+  json["strict"] = to_json(e.strict);
+  if (e.strict_ranked) json["strict"].update(to_json(*e.strict_ranked));
+  if (e.geometric) {
+    json["geometric"] = to_json(*e.geometric);
+    if (e.geometric_ranked) json["geometric"].update(to_json(*e.geometric_ranked));
+  }
+  return json;
+}
 
 Json pair_verdicts(const evaluation::GroundTruth& truth, const ResultFile& result) {
   std::map<Pair, Known> listed;

@@ -6,6 +6,9 @@
 
 namespace gpureg::cli {
 
+/// JSON of scores, as `evaluate --json` writes it.
+Json to_json(const evaluation::Evaluation& evaluation);
+
 /// Every pair with j - i > 1 that the result tried or the truth lists, beside the truth, in order
 /// of i and j: `listed` (in gt.log), `known` (in gt.log or gt_all.log), `tried`, `reported`,
 /// scores, and for poses of known pairs Redwood's error in metres and the errors of rotation
