@@ -124,7 +124,7 @@ TEST_F(Register, TimeBudget) {
   EXPECT_EQ(budget["ms"], 60000);
   EXPECT_GE(budget["levels"], 2);
   EXPECT_LE(budget["quality"], budget["highest_quality"]);
-  expect_refused({"register", source_, target_, "--time-budget", "0"}, {"milliseconds is 0"});
+  expect_refused({"register", source_, target_, "--time-budget", "0"}, {"--time-budget is 0"});
   expect_refused({"register", source_, target_, "--time-budget", "5", "--preset", "loopsmart"},
                  {"quadruples"});
 }
