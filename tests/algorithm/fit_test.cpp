@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
 #include <random>
 
@@ -30,7 +31,7 @@ TEST(Fit, AgreesWithUmeyama) {
       source[k] = to_vec3(p.col(k));
       target[k] = to_vec3(q.col(k));
     }
-    Pose<float> pose{};
+    Pose<float> pose;
     ASSERT_TRUE(fit_rigid(source, target, pose));
     const Eigen::Matrix4d expected = Eigen::umeyama(p, q, false);
     const Pose<double> wide = widen(pose);
@@ -38,8 +39,9 @@ TEST(Fit, AgreesWithUmeyama) {
     // The rotation is as well conditioned as the second eigenvalue gap: nearly flat or slim
     // quadruples lose digits of float.
     Eigen::Matrix<double, 3, 4> centred = p.colwise() - p.rowwise().mean();
-    const double width = Eigen::JacobiSVD<Eigen::Matrix<double, 3, 4>>(centred).singularValues()(1);
-    const double tolerance = 1e-5 / std::min(1.0, width * width);
+    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> spread(centred * centred.transpose(),
+                                                                Eigen::EigenvaluesOnly);
+    const double tolerance = 1e-5 / std::min(1.0, spread.eigenvalues()(1));
     EXPECT_LT(
         found.angularDistance(Eigen::Quaterniond(Eigen::Matrix3d(expected.topLeftCorner<3, 3>()))),
         tolerance)
