@@ -32,10 +32,14 @@ install_packages() {
 }
 
 # What the library, its io component and the command are built with.
-build_packages=(build-essential cmake ninja-build libeigen3-dev libembree-dev libcli11-dev nlohmann-json3-dev libpng-dev libassimp-dev)
+build_packages=(build-essential cmake ninja-build libeigen3-dev libembree-dev libcli11-dev nlohmann-json3-dev libpng-dev)
 # What the tests and benchmarks need besides; PCL and FLANN are oracles, valgrind counts instructions.
+# libassimp-dev is what the generator reads buildings with.
 # libopencv-dev and libceres-dev are what slam_demo needs.
-test_packages=(libopencv-dev libceres-dev libgtest-dev libbenchmark-dev libpcl-dev libflann-dev liblz4-dev ccache python3 valgrind assimp-utils)
+test_packages=(libassimp-dev libopencv-dev libceres-dev libgtest-dev libbenchmark-dev libpcl-dev libflann-dev liblz4-dev ccache python3 valgrind assimp-utils)
+
+# ccache refuses files with a precompiled header without these.
+export CCACHE_SLOPPINESS=${CCACHE_SLOPPINESS:-pch_defines,time_macros}
 
 # Configure arguments that make rebuilds cheap where ccache is installed.
 launcher_arguments() {

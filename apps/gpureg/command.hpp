@@ -1,28 +1,21 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <CLI/CLI.hpp>
-#include <functional>
+#include "command_line.hpp"
+#include "exit_status.hpp"
 
 namespace gpureg::cli {
 
-/// Exit status of the command. Errors are exceptions up to main(), which turns them into bad_input.
-enum ExitStatus { kOk = 0, kNoAlignment = 1, kBadInput = 2, kInterrupted = 130 };
-
-/// Action that main() runs after parsing; returns the exit status.
-using Action = std::function<int()>;
-
-/// Each verb adds its subcommand and sets chosen where the command line names it.
-void add_register(CLI::App& app, Action& chosen);
-void add_batch(CLI::App& app, Action& chosen);
-void add_consistency(CLI::App& app, Action& chosen);
-void add_reconstruct(CLI::App& app, Action& chosen);
-void add_evaluate(CLI::App& app, Action& chosen);
-void add_evaluate_trajectory(CLI::App& app, Action& chosen);
-void add_evaluate_surface(CLI::App& app, Action& chosen);
-void add_report(CLI::App& app, Action& chosen);
-void add_generate(CLI::App& app, Action& chosen);
-void add_calibrate(CLI::App& app, Action& chosen);
-void add_info(CLI::App& app, Action& chosen);
+/// Each adds its verb.
+void add_register(CommandLine& line);
+void add_batch(CommandLine& line);
+void add_consistency(CommandLine& line);
+void add_reconstruct(CommandLine& line);
+void add_evaluate(CommandLine& line);
+void add_evaluate_trajectory(CommandLine& line);
+void add_evaluate_surface(CommandLine& line);
+void add_report(CommandLine& line);
+void add_calibrate(CommandLine& line);
+void add_info(CommandLine& line);
 
 }  // namespace gpureg::cli

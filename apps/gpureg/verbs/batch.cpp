@@ -181,43 +181,39 @@ class Batch {
 
 }  // namespace
 
-void add_batch(CLI::App& app, Action& chosen) {
+void add_batch(CommandLine& line) {
   const auto o = std::make_shared<BatchOptions>();
-  CLI::App* verb = app.add_subcommand("batch", "Align the fragments cloud_bin_<i> of a folder");
-  verb->add_option(
+  Verb verb = line.verb("batch", "Align the fragments cloud_bin_<i> of a folder");
+  verb.option(
           "DIR", o->folder,
           "Folder with cloud_bin_<i>.ply|pcd|bin, or meshes .stl|obj|ply, and perhaps cameras.txt")
-      ->required();
-  verb->add_option("--pairs", o->pairs, "all, or a file with one pair `i j` a line")
-      ->capture_default_str();
-  o->method.add_to(*verb);
-  o->method.add_calibration_to(*verb);
-  verb->add_option("--viewpoint", o->viewpoint.text,
-                   "Of fragments without a camera. auto: the file, or the origin if the surfaces "
-                   "agree with it; none: not known")
-      ->check(CLI::IsMember({"auto", "none"}))
-      ->capture_default_str();
-  verb->add_option("--up", o->up,
-                   "Vertical direction x,y,z in all fragments, and perhaps how many degrees it may "
-                   "be off (without: 10): 0,0,1,5");
-  verb->add_option("-o,--output", o->log, "Redwood log of the aligned pairs: T_ij, j into i")
-      ->required();
-  verb->add_option("--info", o->info, "Redwood information matrices of the same pairs");
-  verb->add_option("--json", o->json, "Everything about every pair tried");
-  CLI::Option* resume = verb->add_flag("--resume", o->resume,
-                                       "Go on where an interrupted run of this output stopped");
-  verb->add_flag("--restart", o->restart, "Discard what an interrupted run of this output did")
-      ->excludes(resume);
-  verb->add_flag("--quiet", o->quiet, "No progress, no summary");
-  verb->callback([o, &chosen] {
-    chosen = [o] {
-      o->method.registration();  // reports bad options before the clouds are read
-      up_prior(o->up);
-      check_outputs(*o);
-      choose_voxel_size(o->method, o->folder);
-      if (!o->quiet) o->method.note_calibration();
-      return Batch(*o).run();
-    };
+      .required();
+  verb.option("--pairs", o->pairs, "all, or a file with one pair `i j` a line").show_default();
+  o->method.add_to(verb);
+  o->method.add_calibration_to(verb);
+  verb.option("--viewpoint", o->viewpoint.text,
+              "Of fragments without a camera. auto: the file, or the origin if the surfaces "
+              "agree with it; none: not known")
+      .one_of({"auto", "none"})
+      .show_default();
+  verb.option("--up", o->up,
+              "Vertical direction x,y,z in all fragments, and perhaps how many degrees it may "
+              "be off (without: 10): 0,0,1,5");
+  verb.option("-o,--output", o->log, "Redwood log of the aligned pairs: T_ij, j into i").required();
+  verb.option("--info", o->info, "Redwood information matrices of the same pairs");
+  verb.option("--json", o->json, "Everything about every pair tried");
+  const Option resume =
+      verb.flag("--resume", o->resume, "Go on where an interrupted run of this output stopped");
+  verb.flag("--restart", o->restart, "Discard what an interrupted run of this output did")
+      .excludes(resume);
+  verb.flag("--quiet", o->quiet, "No progress, no summary");
+  verb.run([o] {
+    o->method.registration();  // reports bad options before the clouds are read
+    up_prior(o->up);
+    check_outputs(*o);
+    choose_voxel_size(o->method, o->folder);
+    if (!o->quiet) o->method.note_calibration();
+    return Batch(*o).run();
   });
 }
 

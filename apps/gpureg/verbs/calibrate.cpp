@@ -117,30 +117,30 @@ int run(CalibrateOptions o) {
 
 }  // namespace
 
-void add_calibrate(CLI::App& app, Action& chosen) {
+void add_calibrate(CommandLine& line) {
   const auto o = std::make_shared<CalibrateOptions>();
-  CLI::App* verb = app.add_subcommand(
-      "calibrate", "Fit the scale of the confidence to the clouds of a folder, without truth");
-  verb->add_option(
+  Verb verb = line.verb("calibrate",
+                        "Fit the scale of the confidence to the clouds of a folder, without truth");
+  verb.option(
           "DIR", o->folder,
           "Folder with cloud_bin_<i>.ply|pcd|bin, or meshes .stl|obj|ply, and perhaps cameras.txt")
-      ->required();
-  verb->add_option("-o,--output", o->output,
-                   "JSON file for --calibration of register, batch and reconstruct")
-      ->required();
-  verb->add_option("--trajectory", o->trajectory,
-                   "Poses of the fragments, which decide instead of loops: TUM with fragment "
-                   "numbers as times, or poses.txt");
-  verb->add_option("--self-pairs", o->calibration.self_pairs, "Pairs made of one scan")
-      ->check(natural_number())
-      ->capture_default_str();
-  verb->add_option("--scan-pairs", o->calibration.scan_pairs,
-                   "Largest number of pairs of different scans")
-      ->check(natural_number())
-      ->capture_default_str();
-  o->method.add_to(*verb);
-  verb->add_flag("--quiet", o->quiet, "No progress, no summary");
-  verb->callback([o, &chosen] { chosen = [o] { return run(*o); }; });
+      .required();
+  verb.option("-o,--output", o->output,
+              "JSON file for --calibration of register, batch and reconstruct")
+      .required();
+  verb.option("--trajectory", o->trajectory,
+              "Poses of the fragments, which decide instead of loops: TUM with fragment "
+              "numbers as times, or poses.txt");
+  verb.option("--self-pairs", o->calibration.self_pairs, "Pairs made of one scan")
+      .natural()
+      .show_default();
+  verb.option("--scan-pairs", o->calibration.scan_pairs,
+              "Largest number of pairs of different scans")
+      .natural()
+      .show_default();
+  o->method.add_to(verb);
+  verb.flag("--quiet", o->quiet, "No progress, no summary");
+  verb.run([o] { return run(*o); });
 }
 
 }  // namespace gpureg::cli

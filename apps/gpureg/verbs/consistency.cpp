@@ -161,21 +161,20 @@ int run(const ConsistencyOptions& o) {
 
 }  // namespace
 
-void add_consistency(CLI::App& app, Action& chosen) {
+void add_consistency(CommandLine& line) {
   const auto o = std::make_shared<ConsistencyOptions>();
-  CLI::App* verb = app.add_subcommand(
+  Verb verb = line.verb(
       "consistency",
       "Re-score the pairs of a batch by loops of three clouds and by paths between clouds");
-  verb->add_option("RESULT", o->result, "RESULT.json of a batch")->required();
-  verb->add_option("--json", o->json, "The same with scores and poses in view of all pairs")
-      ->required();
-  verb->add_option("-o,--output", o->log, "Redwood log of the pairs that are aligned then");
-  verb->add_option("--voxel-size", o->voxel_size,
-                   "Voxel size of the tolerances; default: that of the batch");
-  verb->add_option("--min-score", o->min_confidence,
-                   "Report a pair from this score on; default: the batch's")
-      ->check(CLI::Range(0.0, 1.0));
-  verb->callback([o, &chosen] { chosen = [o] { return run(*o); }; });
+  verb.option("RESULT", o->result, "RESULT.json of a batch").required();
+  verb.option("--json", o->json, "The same with scores and poses in view of all pairs").required();
+  verb.option("-o,--output", o->log, "Redwood log of the pairs that are aligned then");
+  verb.option("--voxel-size", o->voxel_size,
+              "Voxel size of the tolerances; default: that of the batch");
+  verb.option("--min-score", o->min_confidence,
+              "Report a pair from this score on; default: the batch's")
+      .between(0.0, 1.0);
+  verb.run([o] { return run(*o); });
 }
 
 }  // namespace gpureg::cli

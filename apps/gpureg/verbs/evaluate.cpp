@@ -105,31 +105,27 @@ int run(const EvaluateOptions& o) {
 
 }  // namespace
 
-void add_evaluate(CLI::App& app, Action& chosen) {
+void add_evaluate(CommandLine& line) {
   const auto o = std::make_shared<EvaluateOptions>();
-  CLI::App* verb =
-      app.add_subcommand("evaluate", "Measure recall and precision by Redwood's protocol");
-  verb->add_option("RESULT", o->results, "RESULT.log or RESULT.json; several make a scene mean")
-      ->required();
-  verb->add_option(
-          "--ground-truth", o->truths,
-          "Folder with gt.log and gt.info, perhaps gt_all.log and gt_all.info; one a result")
-      ->required();
-  verb->add_option("--registration-recall", o->recall_logs,
-                   "Logs of true poses (3DMatch's gt.log): also the share of their pairs, "
-                   "consecutive ones too, whose "
-                   "best candidate is within 15 degrees and 0.30 m");
-  verb->add_option("--json", o->json, "Write the numbers, curves and the verdict on every pair");
-  verb->footer(
-      std::string(
-          "Numbers in %. Only pairs with j - i > 1 count. strict: a report that is not in gt.log\n"
-          "counts as false; geometric: a report is correct if the pair is in gt_all.log and the "
-          "pose\n"
-          "within 0.2 m. raw: recall if every best candidate is reported; R@P: recall at that\n"
-          "precision; AP: average precision. Rankings go by score; the strict one by\n"
-          "overlap_confidence if RESULT.json has it.\n") +
-      app.get_footer());
-  verb->callback([o, &chosen] { chosen = [o] { return run(*o); }; });
+  Verb verb = line.verb("evaluate", "Measure recall and precision by Redwood's protocol");
+  verb.option("RESULT", o->results, "RESULT.log or RESULT.json; several make a scene mean")
+      .required();
+  verb.option("--ground-truth", o->truths,
+              "Folder with gt.log and gt.info, perhaps gt_all.log and gt_all.info; one a result")
+      .required();
+  verb.option("--registration-recall", o->recall_logs,
+              "Logs of true poses (3DMatch's gt.log): also the share of their pairs, "
+              "consecutive ones too, whose "
+              "best candidate is within 15 degrees and 0.30 m");
+  verb.option("--json", o->json, "Write the numbers, curves and the verdict on every pair");
+  verb.notes(
+      "Numbers in %. Only pairs with j - i > 1 count. strict: a report that is not in gt.log\n"
+      "counts as false; geometric: a report is correct if the pair is in gt_all.log and the "
+      "pose\n"
+      "within 0.2 m. raw: recall if every best candidate is reported; R@P: recall at that\n"
+      "precision; AP: average precision. Rankings go by score; the strict one by\n"
+      "overlap_confidence if RESULT.json has it.\n");
+  verb.run([o] { return run(*o); });
 }
 
 }  // namespace gpureg::cli

@@ -83,28 +83,27 @@ int run(const SurfaceRun& o) {
 
 }  // namespace
 
-void add_evaluate_surface(CLI::App& app, Action& chosen) {
+void add_evaluate_surface(CommandLine& line) {
   const auto o = std::make_shared<SurfaceRun>();
-  CLI::App* verb =
-      app.add_subcommand("evaluate-surface", "Measure the distance of a map to the true surface");
-  verb->add_option("MAP", o->map, "Points of the map: PLY or PCD")->required();
-  verb->add_option("--surface", o->truth,
-                   "Points of the true surface: PLY or PCD, with normals where distances are those "
-                   "to tangent planes")
-      ->required();
-  verb->add_option("--trajectory", o->estimate,
-                   "Trajectory of the map; with --ground-truth: both are aligned first");
-  verb->add_option("--ground-truth", o->true_trajectory, "True trajectory");
-  verb->add_option("--plane-reach", o->options.plane_reach,
-                   "Metres from a true point within which its tangent plane counts; 0: points only")
-      ->capture_default_str()
-      ->check(CLI::NonNegativeNumber);
-  verb->add_option("--max-distance", o->options.max_distance,
-                   "Distances beyond count as this one, metres")
-      ->capture_default_str()
-      ->check(CLI::PositiveNumber);
-  verb->add_option("--json", o->json, "Write the figures");
-  verb->callback([o, &chosen] { chosen = [o] { return run(*o); }; });
+  Verb verb = line.verb("evaluate-surface", "Measure the distance of a map to the true surface");
+  verb.option("MAP", o->map, "Points of the map: PLY or PCD").required();
+  verb.option("--surface", o->truth,
+              "Points of the true surface: PLY or PCD, with normals where distances are those "
+              "to tangent planes")
+      .required();
+  verb.option("--trajectory", o->estimate,
+              "Trajectory of the map; with --ground-truth: both are aligned first");
+  verb.option("--ground-truth", o->true_trajectory, "True trajectory");
+  verb.option("--plane-reach", o->options.plane_reach,
+              "Metres from a true point within which its tangent plane counts; 0: points only")
+      .show_default()
+      .not_negative();
+  verb.option("--max-distance", o->options.max_distance,
+              "Distances beyond count as this one, metres")
+      .show_default()
+      .positive();
+  verb.option("--json", o->json, "Write the figures");
+  verb.run([o] { return run(*o); });
 }
 
 }  // namespace gpureg::cli

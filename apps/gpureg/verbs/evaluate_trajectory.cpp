@@ -95,41 +95,36 @@ int run(const TrajectoryRun& o) {
 
 }  // namespace
 
-void add_evaluate_trajectory(CLI::App& app, Action& chosen) {
+void add_evaluate_trajectory(CommandLine& line) {
   const auto o = std::make_shared<TrajectoryRun>();
-  CLI::App* verb =
-      app.add_subcommand("evaluate-trajectory", "Measure the errors of a trajectory: ATE and RPE");
-  verb->add_option("ESTIMATE", o->estimate,
-                   "Trajectory: TUM, KITTI, or poses.txt of `gpureg reconstruct`")
-      ->required();
-  verb->add_option("--ground-truth", o->truth, "True trajectory, in the same format or another")
-      ->required();
-  verb->add_option("--format", o->format, "Of both files; auto: by the fields of a line")
-      ->transform(CLI::CheckedTransformer(kFormats))
-      ->default_str("auto")
-      ->type_name("auto|tum|kitti|poses");
-  verb->add_option("--max-difference", o->options.max_difference,
-                   "Largest difference of the times of two poses that belong together")
-      ->capture_default_str()
-      ->check(CLI::NonNegativeNumber);
-  verb->add_flag("--no-align", o->no_align,
-                 "Compare the poses as they are; without: after the rigid motion, without scale, "
-                 "that fits the positions best");
-  verb->add_option("--delta", o->options.delta, "Step of the relative error, in --delta-unit")
-      ->capture_default_str()
-      ->check(CLI::PositiveNumber);
-  verb->add_option("--delta-unit", o->options.delta_unit,
-                   "frames: every pose and the one so many later; metres: consecutive steps of at "
-                   "least that length")
-      ->transform(CLI::CheckedTransformer(kUnits))
-      ->default_str("frames")
-      ->type_name("frames|metres");
-  verb->add_option("--json", o->json, "Write the figures");
-  verb->callback([o, &chosen] {
-    chosen = [o] {
-      o->options.align = !o->no_align;
-      return run(*o);
-    };
+  Verb verb = line.verb("evaluate-trajectory", "Measure the errors of a trajectory: ATE and RPE");
+  verb.option("ESTIMATE", o->estimate,
+              "Trajectory: TUM, KITTI, or poses.txt of `gpureg reconstruct`")
+      .required();
+  verb.option("--ground-truth", o->truth, "True trajectory, in the same format or another")
+      .required();
+  verb.choice("--format", o->format, kFormats, "Of both files; auto: by the fields of a line")
+      .show_default("auto")
+      .type_name("auto|tum|kitti|poses");
+  verb.option("--max-difference", o->options.max_difference,
+              "Largest difference of the times of two poses that belong together")
+      .show_default()
+      .not_negative();
+  verb.flag("--no-align", o->no_align,
+            "Compare the poses as they are; without: after the rigid motion, without scale, "
+            "that fits the positions best");
+  verb.option("--delta", o->options.delta, "Step of the relative error, in --delta-unit")
+      .show_default()
+      .positive();
+  verb.choice("--delta-unit", o->options.delta_unit, kUnits,
+              "frames: every pose and the one so many later; metres: consecutive steps of at "
+              "least that length")
+      .show_default("frames")
+      .type_name("frames|metres");
+  verb.option("--json", o->json, "Write the figures");
+  verb.run([o] {
+    o->options.align = !o->no_align;
+    return run(*o);
   });
 }
 

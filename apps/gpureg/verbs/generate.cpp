@@ -1,116 +1,30 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "data/generate.hpp"
+#include "verbs/generate.hpp"
+
+#include <unistd.h>
 
 #include <filesystem>
-#include <iostream>
-#include <memory>
-#include <optional>
-#include <string>
 
-#include "command.hpp"
 #include "gpureg/error.hpp"
-#include "gpureg/files.hpp"
-#include "verbs/interrupt.hpp"
-#include "verbs/method_options.hpp"
-#include "verbs/progress.hpp"
 
 namespace gpureg::cli {
 namespace {
 
-struct GenerateOptions {
-  std::string folder;
-  synthetic::GenerateOptions scene;
-  double depth_noise = 1;
-  bool quiet = false;
-};
-
-constexpr const char* kMark = "generated.txt";  // in every folder that is ours to write
-
-std::string mark_of(const std::string& folder) {
-  return (std::filesystem::path(folder) / kMark).string();
-}
-
-// Scans of another origin may have the same names.
-void check_folder(const std::string& folder) {
-  namespace fs = std::filesystem;
-  std::error_code error;  // other errors of the folder appear when it is written
-  if (!fs::is_directory(folder, error) || fs::exists(mark_of(folder), error)) return;
-  if (!fs::is_empty(folder, error) && !error)
-    throw IoError(folder + " is not empty and, without a " + kMark +
-                  ", no scene of `gpureg generate`; choose another folder");
-}
-
-int run(const GenerateOptions& o) {
-  check_folder(o.folder);
-  const InterruptGuard guard;
-  std::string stage;
-  std::optional<Progress> progress;
-  synthetic::Progress hooks;
-  hooks.report = [&](int done, int total, const char* name) {
-    // The folder is there by now, and no cloud in it yet.
-    if (stage.empty())
-      files::write_atomically(mark_of(o.folder),
-                              "Made by gpureg generate, which may replace files of this folder.\n");
-    if (stage != name) {
-      progress.emplace(name, name == std::string("fragments") ? "scanned" : "done",
-                       static_cast<std::size_t>(total), o.quiet);
-      stage = name;
-    }
-    progress->update(static_cast<std::size_t>(done));
-  };
-  hooks.should_stop = [] { return InterruptGuard::requested(); };
-  synthetic::GenerateOptions scene = o.scene;
-  for (double* error :
-       {&scene.sensor.pixel_shift, &scene.sensor.disparity_noise, &scene.sensor.distortion})
-    *error *= o.depth_noise;
-  synthetic::generate(o.folder, scene, hooks);
-  progress.reset();
-  if (InterruptGuard::requested()) {
-    std::cerr << "gpureg: interrupted, " << o.folder << " holds an unfinished scene" << std::endl;
-    return kInterrupted;
-  }
-  if (!o.quiet)
-    std::cout << o.scene.fragments << " fragments of " << o.scene.frames_per_fragment
-              << " frames written to " << o.folder << "\n";
-  return kOk;
+// The folder of the command, where the generator lies too.
+std::filesystem::path own_folder(const char* own_name) {
+  std::error_code error;  // no /proc: the name it was called by
+  const auto own = std::filesystem::read_symlink("/proc/self/exe", error);
+  return (error ? std::filesystem::path(own_name) : own).parent_path();
 }
 
 }  // namespace
 
-void add_generate(CLI::App& app, Action& chosen) {
-  const auto o = std::make_shared<GenerateOptions>();
-  CLI::App* verb =
-      app.add_subcommand("generate", "Make a synthetic scene in Redwood's layout, with its truth");
-  verb->add_option("OUT", o->folder,
-                   "Folder to write: new, empty, or of an earlier run, whose files are replaced")
-      ->required();
-  verb->add_option("--fragments", o->scene.fragments, "Number of fragments")->capture_default_str();
-  verb->add_option("--frames-per-fragment", o->scene.frames_per_fragment,
-                   "Depth frames fused into each")
-      ->capture_default_str();
-  verb->add_option("--seed", o->scene.seed, "Building, furniture, path and noise follow from it")
-      ->check(natural_number())
-      ->capture_default_str();
-  verb->add_option("--threads", o->scene.threads, "0: all")->capture_default_str();
-  verb->add_option(
-      "--building", o->scene.building,
-      "Mesh to scan instead of a building of its own: metres, z up, floor at z = 0. Its parts "
-      "get textures, in the colours of the file");
-  verb->add_option("--clutter", o->scene.clutter,
-                   "Pieces of furniture per square metre to put into it; copied rooms then differ")
-      ->capture_default_str();
-  verb->add_option("--no-return", o->scene.no_return,
-                   "Metres that the path goes before it comes back to a place")
-      ->capture_default_str();
-  verb->add_option(
-          "--depth-noise", o->depth_noise,
-          "Factor of all errors of the depth camera: shift, noise of disparities, distortion")
-      ->check(CLI::Range(0.0, 10.0))
-      ->capture_default_str();
-  verb->add_flag("--rgbd", o->scene.rgbd,
-                 "Also write the frames as a sequence in TUM's layout, and the true surfaces");
-  verb->add_flag("--quiet", o->quiet, "No progress, no summary");
-  verb->callback([o, &chosen] { chosen = [o] { return run(*o); }; });
+void become_generator(char** argv) {
+  const std::string program = own_folder(argv[0]) / "gpureg-generate";
+  argv[1] = argv[0];
+  ::execv(program.c_str(), argv + 1);
+  throw BackendUnavailable("there is no " + program +
+                           ": builds without Embree lack the generator of scenes");
 }
 
 }  // namespace gpureg::cli

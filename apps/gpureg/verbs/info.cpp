@@ -58,11 +58,11 @@ int run(const std::vector<std::string>& clouds) {
 
 }  // namespace
 
-void add_info(CLI::App& app, Action& chosen) {
+void add_info(CommandLine& line) {
   const auto clouds = std::make_shared<std::vector<std::string>>();
-  CLI::App* verb = app.add_subcommand("info", "Describe clouds; without any, version and devices");
-  verb->add_option("CLOUD", *clouds, "Clouds (PLY, PCD, KITTI .bin) or meshes (STL, OBJ, PLY)");
-  verb->callback([clouds, &chosen] { chosen = [clouds] { return run(*clouds); }; });
+  Verb verb = line.verb("info", "Describe clouds; without any, version and devices");
+  verb.option("CLOUD", *clouds, "Clouds (PLY, PCD, KITTI .bin) or meshes (STL, OBJ, PLY)");
+  verb.run([clouds] { return run(*clouds); });
 }
 
 }  // namespace gpureg::cli

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "verbs/knowledge_options.hpp"
 
-#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <iostream>
 #include <sstream>
 
+#include "command_line.hpp"
 #include "gpureg/error.hpp"
 #include "text.hpp"
 
@@ -20,7 +20,7 @@ std::vector<double> numbers_of(const std::string& text) {
   std::istringstream fields(text + ",");
   for (std::string field; std::getline(fields, field, ',');) {
     double number = 0;
-    if (!CLI::detail::lexical_cast(field, number)) return {};
+    if (!read_number(field, number)) return {};
     out.push_back(number);
   }
   return out;

@@ -1,9 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "verbs/method_options.hpp"
 
-#include <cerrno>
-#include <cmath>
-#include <cstdlib>
 #include <iostream>
 
 #include "gpureg/error.hpp"
@@ -16,14 +13,6 @@ namespace gpureg::cli {
 
 namespace {
 
-// CLI11 takes -4 for an unsigned number and wraps it around.
-std::string check_natural(const std::string& text) {
-  const bool digits = !text.empty() && text.find_first_not_of("0123456789") == std::string::npos;
-  errno = 0;
-  if (digits) std::strtoull(text.c_str(), nullptr, 10);
-  return digits && errno == 0 ? "" : text + " is no whole number from 0 to 2^64 - 1";
-}
-
 /// Groups of options of the other method would change nothing.
 void refuse_idle(const RegistrationOptions& options, const std::string& assignment) {
   const bool quadruples = options.method == RegistrationMethod::quadruples;
@@ -35,54 +24,46 @@ void refuse_idle(const RegistrationOptions& options, const std::string& assignme
 
 }  // namespace
 
-CLI::Validator natural_number() { return CLI::Validator(&check_natural, "", "natural number"); }
-
-void MethodOptions::add_to(CLI::App& verb) {
-  verb_ = &verb;
-  verb.add_option_function<std::string>(
+void MethodOptions::add_to(Verb verb) {
+  verb_ = verb;
+  verb.text(
           "--voxel-size",
           [this](const std::string& text) {
             automatic_voxel_size = text == "auto";
-            if (text.empty())
-              voxel_size = 0;  // refused by name, later
-            else if (!automatic_voxel_size && !CLI::detail::lexical_cast(text, voxel_size))
-              throw CLI::ConversionError(text, "--voxel-size");
+            if (text.empty()) voxel_size = 0;  // refused by name, later
+            return text.empty() || automatic_voxel_size || read_number(text, voxel_size);
           },
           "Edge of the downsampling voxel in metres; every other length follows from it. auto: "
           "suggested by the clouds")
-      ->default_str(significant(static_cast<double>(voxel_size), 6))
-      ->type_name("FLOAT or auto");
-  verb.add_option("--preset", preset,
-                  "default: poses from compatible matches, verified by evidence; loopsmart: the "
-                  "paper's method")
-      ->check(CLI::IsMember({"default", "loopsmart"}))
-      ->capture_default_str();
-  verb.add_option("--backend", backend, "auto: CUDA where there is a device, else the CPU")
-      ->check(CLI::IsMember({"auto", "cpu", "cuda"}))
-      ->capture_default_str();
-  verb.add_option("--threads", threads, "Threads of the CPU backend; 0: all")
-      ->check(natural_number())
-      ->capture_default_str();
-  verb.add_option("--quality", quality,
-                  "From 0, the fastest, to 10, the highest recall; of the preset default")
-      ->check(CLI::Range(0u, kHighestQuality))
-      ->capture_default_str();
-  verb.add_option("--seed", seed, "Same seed, same result, on any machine")
-      ->check(natural_number())
-      ->capture_default_str();
-  verb.add_option("--min-score", min_score,
-                  "Report a pair from this confidence on (without: 0.5); with --preset loopsmart, "
-                  "from this inlier ratio on (0.3). 0: every best candidate");
-  verb.add_option("--set", set,
-                  "Any other option under its name in the JSON, for experts: evidence.sample=1024, "
-                  "accept_symmetry=true; may be repeated")
-      ->type_name("NAME=VALUE")
-      ->allow_extra_args(false);
+      .show_default(significant(static_cast<double>(voxel_size), 6))
+      .type_name("FLOAT or auto");
+  verb.option("--preset", preset,
+              "default: poses from compatible matches, verified by evidence; loopsmart: the "
+              "paper's method")
+      .one_of({"default", "loopsmart"})
+      .show_default();
+  verb.option("--backend", backend, "auto: CUDA where there is a device, else the CPU")
+      .one_of({"auto", "cpu", "cuda"})
+      .show_default();
+  verb.option("--threads", threads, "Threads of the CPU backend; 0: all").natural().show_default();
+  verb.option("--quality", quality,
+              "From 0, the fastest, to 10, the highest recall; of the preset default")
+      .between(0u, kHighestQuality)
+      .show_default();
+  verb.option("--seed", seed, "Same seed, same result, on any machine").natural().show_default();
+  verb.option("--min-score", min_score,
+              "Report a pair from this confidence on (without: 0.5); with --preset loopsmart, "
+              "from this inlier ratio on (0.3). 0: every best candidate");
+  verb.option("--set", set,
+              "Any other option under its name in the JSON, for experts: evidence.sample=1024, "
+              "accept_symmetry=true; may be repeated")
+      .type_name("NAME=VALUE")
+      .one_at_a_time();
 }
 
-void MethodOptions::add_calibration_to(CLI::App& verb) {
-  verb.add_option("--calibration", calibration,
-                  "File of `gpureg calibrate`: scales the confidence to a sensor");
+void MethodOptions::add_calibration_to(Verb verb) {
+  verb.option("--calibration", calibration,
+              "File of `gpureg calibrate`: scales the confidence to a sensor");
 }
 
 void MethodOptions::note_calibration() const {

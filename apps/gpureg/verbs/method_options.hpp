@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <CLI/CLI.hpp>
 #include <cstdint>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "command_line.hpp"
 #include "gpureg/context.hpp"
 #include "gpureg/options.hpp"
 #include "gpureg/point_cloud.hpp"
@@ -26,11 +26,11 @@ struct MethodOptions {
   std::vector<std::string> set;     ///< further options, as "evidence.sample=1024"
   std::string calibration;          ///< file of `gpureg calibrate`; empty: none
 
-  void add_to(CLI::App& verb);
-  void add_calibration_to(CLI::App& verb);
+  void add_to(Verb verb);
+  void add_calibration_to(Verb verb);
 
   /// Whether the user gave the option, as "--quality"; add_to() was called.
-  bool given(const std::string& option) const { return verb_->count(option) > 0; }
+  bool given(const std::string& option) const { return verb_->given(option); }
 
   /// Throws InvalidArgument naming field and value, or options that do not go together.
   RegistrationOptions registration() const;
@@ -46,10 +46,7 @@ struct MethodOptions {
   Context context() const;
 
  private:
-  const CLI::App* verb_ = nullptr;
+  std::optional<Verb> verb_;
 };
-
-/// Refuses texts that are not unsigned 64-bit numbers.
-CLI::Validator natural_number();
 
 }  // namespace gpureg::cli

@@ -245,75 +245,72 @@ class Reconstruct {
 
 }  // namespace
 
-void add_reconstruct(CLI::App& app, Action& chosen) {
+void add_reconstruct(CommandLine& line) {
   const auto o = std::make_shared<ReconstructOptions>();
-  CLI::App* verb = app.add_subcommand(
-      "reconstruct", "Make one map of the unordered fragments cloud_bin_<i> of a folder");
-  verb->add_option(
+  Verb verb =
+      line.verb("reconstruct", "Make one map of the unordered fragments cloud_bin_<i> of a folder");
+  verb.option(
           "DIR", o->folder,
           "Folder with cloud_bin_<i>.ply|pcd|bin, or meshes .stl|obj|ply, and perhaps cameras.txt")
-      ->required();
-  verb->add_option("-o,--output", o->output,
-                   "Folder for poses.txt, reconstruction.json, trajectory.txt (TUM), edges.log "
-                   "(Redwood), graph.g2o, map.ply, map.html and pairs.json")
-      ->required();
-  CLI::Option* pairs =
-      verb->add_option("--pairs", o->pairs, "all, or a file with one pair `i j` a line")
-          ->capture_default_str();
-  CLI::Option* results =
-      verb->add_option("--results", o->results,
-                       "JSON of `gpureg batch`, or pairs.json of a map, instead of aligning");
-  verb->add_option("--prune", o->prune,
-                   "For large sets: align each fragment with the so many that look most like it "
-                   "only; without: all pairs")
-      ->check(CLI::Range(1u, 1000000u))
-      ->excludes(pairs)
-      ->excludes(results);
-  CLI::Option* odometry = verb->add_option(
+      .required();
+  verb.option("-o,--output", o->output,
+              "Folder for poses.txt, reconstruction.json, trajectory.txt (TUM), edges.log "
+              "(Redwood), graph.g2o, map.ply, map.html and pairs.json")
+      .required();
+  const Option pairs =
+      verb.option("--pairs", o->pairs, "all, or a file with one pair `i j` a line").show_default();
+  const Option results =
+      verb.option("--results", o->results,
+                  "JSON of `gpureg batch`, or pairs.json of a map, instead of aligning");
+  verb.option("--prune", o->prune,
+              "For large sets: align each fragment with the so many that look most like it "
+              "only; without: all pairs")
+      .between(1u, 1000000u)
+      .excludes(pairs)
+      .excludes(results);
+  const Option odometry = verb.option(
       "--odometry", o->odometry,
       "Known relative poses: a trajectory (TUM with fragment numbers as times, or poses.txt), of "
       "which those of consecutive fragments count, or a Redwood log of pairs");
-  verb->add_option("--drift", o->drift.translation_per_metre,
-                   "Odometry: metres of error per metre travelled")
-      ->capture_default_str()
-      ->check(CLI::NonNegativeNumber)
-      ->needs(odometry);
-  verb->add_option("--drift-rotation", o->drift.rotation_per_metre,
-                   "Odometry: degrees of error per metre travelled")
-      ->capture_default_str()
-      ->check(CLI::NonNegativeNumber)
-      ->needs(odometry);
-  verb->add_option("--drift-turn", o->drift.rotation_per_degree,
-                   "Odometry: degrees of error per degree turned")
-      ->capture_default_str()
-      ->check(CLI::NonNegativeNumber)
-      ->needs(odometry);
-  o->method.add_to(*verb);
-  o->method.add_calibration_to(*verb);
-  verb->add_flag("--no-refine", o->no_refine, "Without the joint refinement of all poses");
-  verb->add_flag("--no-map", o->no_map, "Without map.ply and map.html");
-  verb->add_option("--map-voxel-size", o->map_voxel_size,
-                   "Voxel size of map.ply; default: half the voxel size")
-      ->check(CLI::PositiveNumber);
-  CLI::Option* resume =
-      verb->add_flag("--resume", o->resume, "Go on where an interrupted run of this output stopped")
-          ->excludes(results);
-  verb->add_flag("--restart", o->restart, "Discard what an interrupted run of this output did")
-      ->excludes(resume)
-      ->excludes(results);
-  verb->add_flag("--quiet", o->quiet, "No progress, no summary");
-  verb->callback([o, &chosen] {
-    chosen = [o] {
-      o->method.registration();  // reports bad options before the clouds are read
-      if (!o->results.empty() && !o->method.calibration.empty())
-        throw InvalidArgument(
-            "--calibration scales confidences that are made here, --results has "
-            "its own");
-      check_output_folder(*o);
-      choose_voxel_size(o->method, o->folder);
-      if (!o->quiet) o->method.note_calibration();
-      return Reconstruct(*o).run();
-    };
+  verb.option("--drift", o->drift.translation_per_metre,
+              "Odometry: metres of error per metre travelled")
+      .show_default()
+      .not_negative()
+      .needs(odometry);
+  verb.option("--drift-rotation", o->drift.rotation_per_metre,
+              "Odometry: degrees of error per metre travelled")
+      .show_default()
+      .not_negative()
+      .needs(odometry);
+  verb.option("--drift-turn", o->drift.rotation_per_degree,
+              "Odometry: degrees of error per degree turned")
+      .show_default()
+      .not_negative()
+      .needs(odometry);
+  o->method.add_to(verb);
+  o->method.add_calibration_to(verb);
+  verb.flag("--no-refine", o->no_refine, "Without the joint refinement of all poses");
+  verb.flag("--no-map", o->no_map, "Without map.ply and map.html");
+  verb.option("--map-voxel-size", o->map_voxel_size,
+              "Voxel size of map.ply; default: half the voxel size")
+      .positive();
+  const Option resume =
+      verb.flag("--resume", o->resume, "Go on where an interrupted run of this output stopped")
+          .excludes(results);
+  verb.flag("--restart", o->restart, "Discard what an interrupted run of this output did")
+      .excludes(resume)
+      .excludes(results);
+  verb.flag("--quiet", o->quiet, "No progress, no summary");
+  verb.run([o] {
+    o->method.registration();  // reports bad options before the clouds are read
+    if (!o->results.empty() && !o->method.calibration.empty())
+      throw InvalidArgument(
+          "--calibration scales confidences that are made here, --results has "
+          "its own");
+    check_output_folder(*o);
+    choose_voxel_size(o->method, o->folder);
+    if (!o->quiet) o->method.note_calibration();
+    return Reconstruct(*o).run();
   });
 }
 

@@ -271,40 +271,37 @@ int run(RegisterOptions o) {
 
 }  // namespace
 
-void add_register(CLI::App& app, Action& chosen) {
+void add_register(CommandLine& line) {
   const auto o = std::make_shared<RegisterOptions>();
-  CLI::App* verb = app.add_subcommand(
-      "register", "Align two clouds (PLY, PCD, KITTI .bin) or meshes (STL, OBJ, PLY)");
-  verb->add_option("SOURCE", o->source, "Cloud that is moved")->required();
-  verb->add_option("TARGET", o->target, "Cloud that stays")->required();
-  o->method.add_to(*verb);
-  o->method.add_calibration_to(*verb);
-  verb->add_option(
-      "--time-budget", o->time_budget,
-      "Time budget of the alignment in milliseconds, instead of --quality; the quality "
-      "then varies between runs");
-  verb->add_option("--initial", o->initial,
-                   "Verify the poses of this file instead of a search: 4 x 4 matrices of "
-                   "target_from_source, row by row, or a Redwood log");
-  verb->add_flag("--refine-initial", o->refine_initial, "Refine these poses by ICP first");
-  verb->add_flag("--ignore-alternatives", o->ignore_alternatives,
-                 "Faster: do not search for other poses that compete with them");
-  verb->add_option(
+  Verb verb =
+      line.verb("register", "Align two clouds (PLY, PCD, KITTI .bin) or meshes (STL, OBJ, PLY)");
+  verb.option("SOURCE", o->source, "Cloud that is moved").required();
+  verb.option("TARGET", o->target, "Cloud that stays").required();
+  o->method.add_to(verb);
+  o->method.add_calibration_to(verb);
+  verb.option("--time-budget", o->time_budget,
+              "Time budget of the alignment in milliseconds, instead of --quality; the quality "
+              "then varies between runs");
+  verb.option("--initial", o->initial,
+              "Verify the poses of this file instead of a search: 4 x 4 matrices of "
+              "target_from_source, row by row, or a Redwood log");
+  verb.flag("--refine-initial", o->refine_initial, "Refine these poses by ICP first");
+  verb.flag("--ignore-alternatives", o->ignore_alternatives,
+            "Faster: do not search for other poses that compete with them");
+  verb.option(
           "--source-viewpoint", o->source_viewpoint.text,
           "Where SOURCE was seen from: x,y,z in its frame; none: not known; model: from "
           "everywhere, "
           "its normals point outwards; auto: the file, or the origin if the surfaces agree with it")
-      ->capture_default_str();
-  verb->add_option("--target-viewpoint", o->target_viewpoint.text, "The same of TARGET")
-      ->capture_default_str();
-  verb->add_option(
-      "--up", o->up,
-      "Vertical direction x,y,z in both clouds, and perhaps how many degrees it may be "
-      "off (without: 10): 0,0,1,5");
-  verb->add_option("--json", o->json, "Write options, result, counts and times");
-  verb->add_option("--overlay", o->overlay, "Write both clouds in colour, aligned, as PLY");
-  verb->add_option("--image", o->image, "Draw both clouds before and after, as PNG");
-  verb->callback([o, &chosen] { chosen = [o] { return run(*o); }; });
+      .show_default();
+  verb.option("--target-viewpoint", o->target_viewpoint.text, "The same of TARGET").show_default();
+  verb.option("--up", o->up,
+              "Vertical direction x,y,z in both clouds, and perhaps how many degrees it may be "
+              "off (without: 10): 0,0,1,5");
+  verb.option("--json", o->json, "Write options, result, counts and times");
+  verb.option("--overlay", o->overlay, "Write both clouds in colour, aligned, as PLY");
+  verb.option("--image", o->image, "Draw both clouds before and after, as PNG");
+  verb.run([o] { return run(*o); });
 }
 
 }  // namespace gpureg::cli

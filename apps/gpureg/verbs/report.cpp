@@ -114,15 +114,14 @@ int run(const ReportOptions& o) {
 
 }  // namespace
 
-void add_report(CLI::App& app, Action& chosen) {
+void add_report(CommandLine& line) {
   const auto o = std::make_shared<ReportOptions>();
-  CLI::App* verb = app.add_subcommand(
-      "report", "Make one HTML page of batches: numbers, plots, pictures, a comparison");
-  verb->add_option("RESULT", o->results, "RESULT.json of a batch; several are compared")
-      ->required();
+  Verb verb =
+      line.verb("report", "Make one HTML page of batches: numbers, plots, pictures, a comparison");
+  verb.option("RESULT", o->results, "RESULT.json of a batch; several are compared").required();
   // One value at a time, so that a RESULT may follow an option.
   const auto add = [&](const char* name, std::vector<std::string>& values, const char* text) {
-    verb->add_option(name, values, text)->allow_extra_args(false);
+    verb.option(name, values, text).one_at_a_time();
   };
   add("--ground-truth", o->truths,
       "Folder with gt.log and gt.info; of several results: once for all or once for each");
@@ -130,8 +129,8 @@ void add_report(CLI::App& app, Action& chosen) {
       "Folder with the fragments, for pictures of some pairs; once for all or once for each, - for "
       "none");
   add("--name", o->names, "Name of a result in a comparison, once for each; default: its path");
-  verb->add_option("-o,--output", o->output, "HTML file to write")->required();
-  verb->callback([o, &chosen] { chosen = [o] { return run(*o); }; });
+  verb.option("-o,--output", o->output, "HTML file to write").required();
+  verb.run([o] { return run(*o); });
 }
 
 }  // namespace gpureg::cli

@@ -1,0 +1,203 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "command_line.hpp"
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cerrno>
+#include <cstdint>
+#include <cstdlib>
+#include <optional>
+#include <utility>
+
+#include "gpureg/error.hpp"
+
+namespace gpureg::cli {
+namespace {
+
+// CLI11 takes -4 for an unsigned number and wraps it around.
+std::string check_natural(const std::string& text) {
+  const bool digits = !text.empty() && text.find_first_not_of("0123456789") == std::string::npos;
+  errno = 0;
+  if (digits) std::strtoull(text.c_str(), nullptr, 10);
+  return digits && errno == 0 ? "" : text + " is no whole number from 0 to 2^64 - 1";
+}
+
+std::string list_of_verbs(const CLI::App& app) {
+  std::string list;
+  for (const CLI::App* verb : app.get_subcommands(nullptr))
+    list += (list.empty() ? "" : ", ") + verb->get_name();
+  return list;
+}
+
+// CLI11's own words for a misspelt verb or option do not always name it.
+std::string what_is_wrong(const CLI::App& app, const CLI::ParseError& error, int argc,
+                          char** argv) {
+  const auto chosen = app.get_subcommands();
+  if (chosen.empty()) {
+    const std::string first = argc > 1 ? argv[1] : "";
+    return (first.empty() ? std::string("no verb given") : "there is no verb " + first) +
+           "; verbs: " + list_of_verbs(app) + " (see `gpureg --help`)";
+  }
+  const std::string help = " (see `gpureg " + chosen.front()->get_name() + " --help`)";
+  const std::vector<std::string> unknown = app.remaining(true);
+  if (dynamic_cast<const CLI::ExtrasError*>(&error) == nullptr || unknown.empty())
+    return error.what() + help;
+  const auto option = std::find_if(unknown.begin(), unknown.end(),
+                                   [](const std::string& text) { return text.rfind("-", 0) == 0; });
+  return option == unknown.end() ? "unexpected argument " + unknown.front() + help
+                                 : "unknown option " + *option + help;
+}
+
+}  // namespace
+
+Option& Option::required() {
+  option_->required();
+  return *this;
+}
+
+Option& Option::show_default() {
+  option_->capture_default_str();
+  return *this;
+}
+
+Option& Option::show_default(const std::string& text) {
+  option_->default_str(text);
+  return *this;
+}
+
+Option& Option::type_name(const std::string& text) {
+  option_->type_name(text);
+  return *this;
+}
+
+Option& Option::one_of(const std::vector<std::string>& words) {
+  option_->check(CLI::IsMember(words));
+  return *this;
+}
+
+Option& Option::natural() {
+  option_->check(CLI::Validator(&check_natural, "", "natural number"));
+  return *this;
+}
+
+Option& Option::between(double low, double high) {
+  option_->check(CLI::Range(low, high));
+  return *this;
+}
+
+Option& Option::between(unsigned low, unsigned high) {
+  option_->check(CLI::Range(low, high));
+  return *this;
+}
+
+Option& Option::not_negative() {
+  option_->check(CLI::NonNegativeNumber);
+  return *this;
+}
+
+Option& Option::positive() {
+  option_->check(CLI::PositiveNumber);
+  return *this;
+}
+
+Option& Option::one_at_a_time() {
+  option_->allow_extra_args(false);
+  return *this;
+}
+
+Option& Option::needs(const Option& other) {
+  option_->needs(other.option_);
+  return *this;
+}
+
+Option& Option::excludes(const Option& other) {
+  option_->excludes(other.option_);
+  return *this;
+}
+
+template <typename Value>
+Option Verb::option(const std::string& names, Value& value, const std::string& help) {
+  return Option(app_->add_option(names, value, help));
+}
+
+template Option Verb::option(const std::string&, std::string&, const std::string&);
+template Option Verb::option(const std::string&, std::vector<std::string>&, const std::string&);
+template Option Verb::option(const std::string&, int&, const std::string&);
+template Option Verb::option(const std::string&, std::uint32_t&, const std::string&);
+template Option Verb::option(const std::string&, std::uint64_t&, const std::string&);
+template Option Verb::option(const std::string&, float&, const std::string&);
+template Option Verb::option(const std::string&, double&, const std::string&);
+template Option Verb::option(const std::string&, std::optional<float>&, const std::string&);
+template Option Verb::option(const std::string&, std::optional<double>&, const std::string&);
+
+Option Verb::flag(const std::string& names, bool& value, const std::string& help) {
+  return Option(app_->add_flag(names, value, help));
+}
+
+Option Verb::text(const std::string& name, std::function<bool(const std::string&)> take,
+                  const std::string& help) {
+  const auto read = [name, take = std::move(take)](const std::string& text) {
+    if (!take(text)) throw CLI::ConversionError(text, name);
+  };
+  return Option(app_->add_option_function<std::string>(name, read, help));
+}
+
+Option Verb::choice(const std::string& name, std::function<void(int)> take,
+                    const std::map<std::string, int>& words, const std::string& help) {
+  return Option(
+      app_->add_option_function<int>(name, take, help)->transform(CLI::CheckedTransformer(words)));
+}
+
+void Verb::notes(const std::string& text) { app_->footer(text + app_->get_footer()); }
+
+void Verb::run(Action action) {
+  app_->callback([chosen = chosen_, action = std::move(action)] { *chosen = action; });
+}
+
+bool Verb::given(const std::string& option) const { return app_->count(option) > 0; }
+
+CommandLine::CommandLine(const std::string& program, const std::string& description,
+                         const std::string& version)
+    : app_(std::make_unique<CLI::App>(description, program)) {
+  app_->set_version_flag("--version", version);
+  app_->require_subcommand(1);
+  // Verbs take it over when they are added.
+  app_->footer(
+      "Exit status: 0 aligned or done, 1 no alignment found, 2 bad usage or input, 130 "
+      "interrupted.");
+}
+
+CommandLine::~CommandLine() = default;
+
+Verb CommandLine::verb(const std::string& name, const std::string& help) {
+  return {app_->add_subcommand(name, help), &chosen_};
+}
+
+void CommandLine::program(const std::string& name, const std::string& help,
+                          void (*become)(char** argv)) {
+  app_->add_subcommand(name, help);
+  programs_[name] = become;
+}
+
+int CommandLine::run(int argc, char** argv) {
+  const auto program = argc > 1 ? programs_.find(argv[1]) : programs_.end();
+  if (program != programs_.end()) program->second(argv);
+  try {
+    app_->parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    // Help and version come as exceptions, too.
+    if (error.get_exit_code() == 0) return app_->exit(error);
+    throw InvalidArgument(what_is_wrong(*app_, error, argc, argv));
+  }
+  return chosen_();
+}
+
+bool read_number(const std::string& text, float& number) {
+  return CLI::detail::lexical_cast(text, number);
+}
+
+bool read_number(const std::string& text, double& number) {
+  return CLI::detail::lexical_cast(text, number);
+}
+
+}  // namespace gpureg::cli

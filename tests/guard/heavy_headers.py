@@ -1,0 +1,103 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: BSD-3-Clause
+"""Headers that are slow to compile stay out of headers that everything includes.
+
+heavy_headers.py [ROOT]    exit status 1 and one line per file that may not include what it includes
+"""
+
+import pathlib
+import re
+import sys
+
+FOLDERS = ("include", "src", "apps/gpureg", "data")
+
+# Who may include a header of other libraries, or a part of its folder. Sources may include Eigen as they like.
+HEAVY = {
+    r"Eigen/(?!Core$).*": {
+        "include/gpureg/overlay.hpp",
+        "include/gpureg/result.hpp",
+        "src/api/frames.hpp",
+        "src/calibration/halves.hpp",
+        "src/pose_graph/se3.hpp",
+        "src/symmetry/symmetry.hpp",
+        "apps/gpureg/pictures/before_after.hpp",
+        "apps/gpureg/pictures/render.hpp",
+        *(
+            f"data/{name}.hpp"
+            for name in (
+                "depth_sensor fusion ground_truth house mesh rgbd scene_files surface trajectory"
+            ).split()
+        ),
+    },
+    r"nlohmann/json\.hpp": {"apps/gpureg/records/json.hpp"},
+    r"CLI/.*": {"apps/gpureg/command_line.cpp"},
+    r"iostream|fstream|regex|iomanip": set(),
+    r"sstream": {"src/common/validate.hpp"},
+}
+SOURCES_TOO = {r"nlohmann/json\.hpp", r"CLI/.*"}
+
+# What these include in turn may not be heavy either.
+LIGHT = ("include/gpureg/io.hpp", "include/gpureg/options.hpp", "include/gpureg/context.hpp",
+         "include/gpureg/point_cloud.hpp", "include/gpureg/evidence.hpp", "apps/gpureg/command_line.hpp",
+         "apps/gpureg/text.hpp")  # fmt: skip
+
+INCLUDE = re.compile(r'^\s*#\s*include\s+[<"]([^>"]+)[>"]', re.MULTILINE)
+
+
+def includes(path: pathlib.Path) -> list[str]:
+    return INCLUDE.findall(path.read_text())
+
+
+def forbidden(root: pathlib.Path) -> list[str]:
+    """Files with a heavy include that the table does not allow."""
+    found = []
+    for folder in FOLDERS:
+        for path in sorted((root / folder).rglob("*.[hc]pp")):
+            name = path.relative_to(root).as_posix()
+            for pattern, allowed in HEAVY.items():
+                if name in allowed or (path.suffix == ".cpp" and pattern not in SOURCES_TOO):
+                    continue
+                found += [
+                    f"{name} includes {i}" for i in includes(path) if re.fullmatch(pattern, i)
+                ]
+    return found
+
+
+def reached(root: pathlib.Path, name: str) -> set[str]:
+    """All that a header includes, also through headers of the project."""
+    seen: set[str] = set()
+    waiting = [root / name]
+    while waiting:
+        for include in includes(waiting.pop()):
+            if include in seen:
+                continue
+            seen.add(include)
+            places = (root / folder / include for folder in FOLDERS)
+            waiting += [place for place in places if place.is_file()]
+    return seen
+
+
+def heavy_through_others(root: pathlib.Path) -> list[str]:
+    return [
+        f"{name} includes {include} through other headers"
+        for name in LIGHT
+        if (root / name).is_file()
+        for include in sorted(reached(root, name))
+        if any(re.fullmatch(pattern, include) for pattern in HEAVY)
+    ]
+
+
+def complaints(root: pathlib.Path) -> list[str]:
+    return forbidden(root) + heavy_through_others(root)
+
+
+def main() -> int:
+    root = pathlib.Path(sys.argv[1]) if len(sys.argv) > 1 else pathlib.Path(__file__).parents[2]
+    found = complaints(root)
+    for line in found:
+        print(f"{line} (tests/guard/heavy_headers.py lists who may)")
+    return 1 if found else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

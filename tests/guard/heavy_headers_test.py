@@ -1,0 +1,55 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: BSD-3-Clause
+"""The check of heavy headers sees them, directly and through others."""
+
+import pathlib
+import tempfile
+import unittest
+
+import heavy_headers
+
+
+class HeavyHeaders(unittest.TestCase):
+    def complaints(self, **files):
+        with tempfile.TemporaryDirectory() as folder:
+            root = pathlib.Path(folder)
+            for name, text in files.items():
+                path = root / "include/gpureg" / name.replace("_dot_", ".")
+                path.parent.mkdir(parents=True, exist_ok=True)
+                path.write_text(text)
+            return heavy_headers.complaints(root)
+
+    def test_the_project_itself(self):
+        self.assertEqual(heavy_headers.complaints(pathlib.Path(__file__).parents[2]), [])
+
+    def test_light_ones_pass(self):
+        self.assertEqual(
+            self.complaints(a_dot_hpp="#include <Eigen/Core>\n#include <vector>\n"), []
+        )
+
+    def test_a_header_with_a_heavy_one(self):
+        for heavy in (
+            "Eigen/Geometry",
+            "Eigen/Dense",
+            "nlohmann/json.hpp",
+            "CLI/CLI.hpp",
+            "iostream",
+        ):
+            self.assertEqual(len(self.complaints(a_dot_hpp=f"#include <{heavy}>\n")), 1, heavy)
+
+    def test_sources(self):
+        self.assertEqual(self.complaints(a_dot_cpp="#include <Eigen/Geometry>\n"), [])
+        self.assertEqual(len(self.complaints(a_dot_cpp="#include <CLI/CLI.hpp>\n")), 1)
+
+    def test_through_another_header(self):
+        found = self.complaints(
+            io_dot_hpp='#include "gpureg/result.hpp"\n',
+            result_dot_hpp="#include <Eigen/Geometry>\n",
+        )
+        self.assertEqual(
+            found, ["include/gpureg/io.hpp includes Eigen/Geometry through other headers"]
+        )
+
+
+if __name__ == "__main__":
+    unittest.main()
