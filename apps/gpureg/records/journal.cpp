@@ -50,7 +50,7 @@ std::string difference(const Json& before, const Json& now, const std::string& n
 
 constexpr const char* kAnew = "with --restart instead of --resume to start anew";
 
-void lock(int fd, const std::string& path) {
+void lock_file(int fd, const std::string& path) {
   if (::flock(fd, LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK)
     throw IoError(path + " is in use: another run writes the same result");
 }
@@ -110,7 +110,7 @@ void Journal::check(const std::string& path, Mode mode) {
   const int fd = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
   if (fd < 0) return;  // no journal, or an error that the constructor reports
   try {
-    lock(fd, path);
+    lock_file(fd, path);
     if (mode == Mode::fresh) refuse_unfinished(path);
   } catch (...) {
     ::close(fd);
@@ -126,7 +126,7 @@ Journal::Journal(std::string path, const Json& header, Mode mode, const Take& ta
   fd_ = ::open(path_.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0666);
   if (fd_ < 0) fail(path_, "write", errno);
   try {
-    lock(fd_, path_);
+    lock_file(fd_, path_);
     if (mode == Mode::fresh) refuse_unfinished(path_);
     const std::size_t good = mode == Mode::resume ? take_up(header, take) : 0;
     if (::ftruncate(fd_, static_cast<off_t>(good)) != 0) fail(path_, "write", errno);
