@@ -16,10 +16,11 @@ namespace {
 
 // CLI11 takes -4 for an unsigned number and wraps it around.
 std::string check_natural(const std::string& text) {
-  const bool digits = !text.empty() && text.find_first_not_of("0123456789") == std::string::npos;
+  if (text.empty() || text.find_first_not_of("0123456789") != std::string::npos)
+    return "'" + text + "' is no whole number";
   errno = 0;
-  if (digits) std::strtoull(text.c_str(), nullptr, 10);
-  return digits && errno == 0 ? "" : text + " is no whole number from 0 to 2^64 - 1";
+  std::strtoull(text.c_str(), nullptr, 10);
+  return errno == 0 ? "" : text + " is too large";
 }
 
 std::string list_of_verbs(const CLI::App& app) {

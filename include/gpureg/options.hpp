@@ -82,8 +82,8 @@ struct QuadrupleOptions {
   float edge_similarity = 0.9f;
   /// Number of quadruples that are scored, the first ones that pass the polygon test, 1..2^22. The
   /// paper scores all of them: 2^18 does so for real pairs. 4,096 keep recall and precision within
-  /// the difference of two seeds (docs/experiments.md). The quadruples are drawn at random, so
-  /// those that are left out are like those that are scored.
+  /// the difference of two seeds (bench/notes/experiments.md). The quadruples are drawn at random,
+  /// so those that are left out are like those that are scored.
   std::uint32_t max_survivors = 4096;
   /// Degrees between the normals of an inlier while hypotheses are compared, (0, 180]; 180: no test
   /// (CZK: 30).

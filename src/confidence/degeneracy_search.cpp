@@ -27,8 +27,8 @@ Pose<double> moved_along(const InformationSpectrum& spectrum, const Pose<double>
 }
 
 /// Log odds of the most likely mode below which no perturbed pose was ever the correct one, and
-/// above which only the confidence may change. Other limits find as much (docs/accuracy.md); these
-/// need the fewest poses.
+/// above which only the confidence may change. Other limits find as much (bench/notes/accuracy.md);
+/// these need the fewest poses.
 constexpr double kHopelessLogOdds = -5, kConfidentLogOdds = 3;
 
 /// Distances as fractions of evidence.degeneracy_search_distance. Near the truth refinement stops
