@@ -177,9 +177,10 @@ TEST(Sequence, DamagedFilesAreNamed) {
 TEST(Sequence, NearestTimesAsALinearSearchFindsThem) {
   const TemporaryFolder folder;
   write(folder / "rgb.txt", "1.00 rgb/a.png\n2.00 rgb/b.png\n3.00 rgb/c.png\n");
-  // Of b two are as near: the earlier one. Of c two have the same time: the first of the file.
+  // Of b two are exactly as near: the earlier one. Of c two have the same time: the first of the
+  // file.
   write(folder / "depth.txt",
-        "1.99 depth/b.png\n2.01 depth/x.png\n2.99 depth/c.png\n2.99 depth/y.png\n");
+        "1.984375 depth/b.png\n2.015625 depth/x.png\n2.99 depth/c.png\n2.99 depth/y.png\n");
   const Sequence sequence = open_sequence(folder.path());
   ASSERT_EQ(sequence.frames.size(), 2u);
   EXPECT_NE(sequence.frames[0].depth.find("b.png"), std::string::npos);
