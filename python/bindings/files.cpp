@@ -135,7 +135,12 @@ void bind_files(py::module_& m) {
         return out;
       },
       py::arg("path"));
-  m.def("write_text", &files::write_atomically, py::arg("path"), py::arg("content"), release());
+  m.def(
+      "write_text",
+      [](const std::string& path, const std::string& content) {
+        files::write_atomically(path, content);
+      },
+      py::arg("path"), py::arg("content"), release());
   m.def("read_pairs", &io::read_pairs, py::arg("path"), release());
 }
 
