@@ -113,20 +113,25 @@ RegistrationResult align(const Context& context, const PreparedCloud& source,
     from.push_back(swapped ? c.target : c.source);
     to.push_back(swapped ? c.source : c.target);
   }
-  PairInput input = input_of(s, t, swapped);
-  input.custom_source = span_of(from);
-  input.custom_target = span_of(to);
-  PairOutcome outcome;
-  if (correspondences.empty()) {
-    // Without correspondences there is nothing to search, and the engine takes an empty list for
-    // "use the features".
-    outcome.statistics.source_points = input.source->size;
-    outcome.statistics.target_points = input.target->size;
-    outcome.reason = RegistrationReason::no_usable_features;
-  } else {
-    Access::engine(context)->align({&input, 1}, options, {&outcome, 1});
+  // The other sides of a cloud have its points in its order.
+  RegistrationResult result;
+  for (const PairVariant& variant : variants_of({source, target}, {{0, 1}})) {
+    PairInput input = input_of(*variant.source, *variant.target, swapped);
+    input.custom_source = span_of(from);
+    input.custom_target = span_of(to);
+    PairOutcome outcome;
+    if (correspondences.empty()) {
+      // Without correspondences there is nothing to search, and the engine takes an empty list for
+      // "use the features".
+      outcome.statistics.source_points = input.source->size;
+      outcome.statistics.target_points = input.target->size;
+      outcome.reason = RegistrationReason::no_usable_features;
+    } else {
+      Access::engine(context)->align({&input, 1}, options, {&outcome, 1});
+    }
+    keep_better(to_result(outcome, *variant.source, *variant.target, swapped, options), result);
   }
-  return to_result(outcome, s, t, swapped, options);
+  return result;
 }
 
 RegistrationResult align(const Context& context, const PreparedCloud& source,

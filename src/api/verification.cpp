@@ -8,6 +8,7 @@
 #include "api/frames.hpp"
 #include "api/outcome.hpp"
 #include "api/pair_input.hpp"
+#include "api/variants.hpp"
 #include "common/in_halves.hpp"
 #include "confidence/calibrate_modes.hpp"
 #include "confidence/confidence.hpp"
@@ -114,6 +115,18 @@ struct VerifiedPair {
   }
 };
 
+/// Sides of clouds are the same for all poses of a pair: keeps the variant whose most confident
+/// pose is the more confident, the first one of equals.
+void keep_more_confident(std::vector<PoseVerification>&& candidate,
+                         std::vector<PoseVerification>& kept) {
+  const auto most = [](const std::vector<PoseVerification>& poses) {
+    double confidence = -1;
+    for (const PoseVerification& pose : poses) confidence = std::max(confidence, pose.confidence);
+    return confidence;
+  };
+  if (most(candidate) > most(kept)) kept = std::move(candidate);
+}
+
 /// Outcomes of a pair's poses, as many calls as they need.
 std::vector<PairOutcome> verify_all(Engine& engine, const std::vector<PairInput>& inputs,
                                     const std::vector<std::vector<Pose<double>>>& poses,
@@ -166,28 +179,29 @@ std::vector<std::vector<PoseVerification>> verify_poses_batch(
   RegistrationOptions by_evidence = options;
   by_evidence.method = RegistrationMethod::compatibility;
   std::vector<std::vector<PoseVerification>> results(pairs.size());
+  const std::vector<PairVariant> variants = variants_of(clouds, pairs);
   const std::size_t chunk = engine.pairs_per_chunk(by_evidence);
-  for (std::size_t begin = 0; begin < pairs.size(); begin += chunk) {
-    const std::size_t end = std::min(pairs.size(), begin + chunk);
+  for (std::size_t begin = 0; begin < variants.size(); begin += chunk) {
+    const std::size_t end = std::min(variants.size(), begin + chunk);
     std::vector<PairInput> inputs;
     std::vector<VerifiedPair> verified;
     std::vector<std::vector<Pose<double>>> local(end - begin);
-    for (std::size_t p = begin; p < end; ++p) {
-      const PreparedState& s = *Access::state(clouds[pairs[p].source]);
-      const PreparedState& t = *Access::state(clouds[pairs[p].target]);
+    for (std::size_t v = begin; v < end; ++v) {
+      const PreparedState &s = *variants[v].source, &t = *variants[v].target;
       const bool swapped = swaps(s, t, options);
       inputs.push_back(input_of(s, t, swapped));
       verified.push_back({s, t, swapped, by_evidence});
-      for (const UnalignedIsometry3d& pose : poses[p])
-        local[p - begin].push_back(to_local(pose, s, t, swapped));
+      for (const UnalignedIsometry3d& pose : poses[variants[v].pair])
+        local[v - begin].push_back(to_local(pose, s, t, swapped));
     }
     const std::vector<PairOutcome> outcomes =
         verify_all(engine, inputs, local, by_evidence, verification.refine);
     std::vector<PairOutcome> found(inputs.size());
     if (verification.search_alternatives) align_all(engine, inputs, by_evidence, found);
-    for (std::size_t p = begin; p < end; ++p) {
-      const VerifiedPair& pair = verified[p - begin];
-      const PairOutcome& outcome = outcomes[p - begin];
+    for (std::size_t v = begin; v < end; ++v) {
+      const std::size_t p = variants[v].pair;
+      const VerifiedPair& pair = verified[v - begin];
+      const PairOutcome& outcome = outcomes[v - begin];
       std::vector<PoseVerification> poses_of_pair;
       std::vector<VerifiedPair::Candidate> given;
       for (std::size_t k = 0; k < outcome.modes.size(); ++k) {
@@ -197,7 +211,7 @@ std::vector<std::vector<PoseVerification>> verify_poses_batch(
                          VerifiedPair::overlap_of(mode)});
       }
       const std::vector<VerifiedPair::Candidate> alternatives =
-          verification.search_alternatives ? pair.alternatives_of(found[p - begin]) : given;
+          verification.search_alternatives ? pair.alternatives_of(found[v - begin]) : given;
       for (std::size_t k = 0; k < poses_of_pair.size(); ++k) {
         PoseVerification& out = poses_of_pair[k];
         const confidence::ModeConfidence confidence =
@@ -211,7 +225,7 @@ std::vector<std::vector<PoseVerification>> verify_poses_batch(
         move_to_frame(out.source_moments, pair.source);
         move_to_frame(out.target_moments, pair.target);
       }
-      results[p] = std::move(poses_of_pair);
+      keep_more_confident(std::move(poses_of_pair), results[p]);
     }
   }
   return results;

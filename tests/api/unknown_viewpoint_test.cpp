@@ -6,7 +6,9 @@
 #include <tuple>
 
 #include "gpureg/registration.hpp"
+#include "gpureg/verification.hpp"
 #include "support/expect_error.hpp"
+#include "support/same_evidence.hpp"
 #include "support/scan.hpp"
 
 namespace gpureg {
@@ -170,6 +172,68 @@ TEST(UnknownViewpoint, MovedScansAlign) {
     ASSERT_TRUE(result.aligned()) << to_string(result.source_viewpoint) << " "
                                   << to_string(result.target_viewpoint) << " " << result.score;
     EXPECT_LT(test::rotation_error_degrees(b * a.inverse(), result.target_from_source), 1);
+  }
+}
+
+/// A scan and where it was seen from: a room from within, a body from outside. Whichever side of a
+/// cloud is tried first, it is the wrong one of one of them.
+struct SeenScan {
+  std::vector<Eigen::Vector3f> points;
+  Eigen::Vector3f viewpoint;
+};
+
+std::vector<SeenScan> inside_and_outside(unsigned seed) {
+  std::vector<Eigen::Vector3f> front;
+  for (const Eigen::Vector3f& p : potato(seed))
+    if (p.x() > 0.2f) front.push_back(p);
+  return {{room_scan(seed), Eigen::Vector3f::Zero()}, {front, Eigen::Vector3f(6, 0, 0)}};
+}
+
+PreparedCloud of_unknown_sides(const std::vector<Eigen::Vector3f>& points) {
+  PointCloudView view(points);
+  view.infer_viewpoint = false;
+  return prepare(cpu(), view);
+}
+
+PreparedCloud of_known_sides(const SeenScan& scan) {
+  PointCloudView view(scan.points);
+  view.viewpoints = scan.viewpoint.data();
+  view.viewpoint_count = 1;
+  return prepare(cpu(), view);
+}
+
+TEST(UnknownViewpoint, VerificationTriesBothSidesAsAlignDoes) {
+  std::mt19937 random(8);
+  for (std::size_t k = 0; k < 2; ++k) {
+    SCOPED_TRACE(k);
+    const auto source =
+                   of_unknown_sides(moved(random_pose(random), inside_and_outside(1)[k].points)),
+               target = of_known_sides(inside_and_outside(2)[k]);
+    ASSERT_EQ(source.statistics().viewpoint, ViewpointSource::none);
+    const RegistrationResult found = align(cpu(), source, target);
+    ASSERT_TRUE(found.aligned()) << found.score;
+    std::vector<UnalignedIsometry3d> poses;
+    for (const RegistrationMode& mode : found.modes) poses.push_back(mode.target_from_source);
+    const auto verified = verify_poses(cpu(), source, target, poses);
+    ASSERT_EQ(verified.size(), found.modes.size());
+    for (std::size_t m = 0; m < verified.size(); ++m)
+      EXPECT_TRUE(test::same_evidence(verified[m].evidence, found.modes[m].evidence)) << m;
+    EXPECT_EQ(verified[0].confidence, found.modes[0].confidence);
+  }
+}
+
+TEST(UnknownViewpoint, GivenCorrespondencesAreTriedWithBothSides) {
+  for (std::size_t k = 0; k < 2; ++k) {
+    SCOPED_TRACE(k);
+    // The same points, in the same order.
+    const SeenScan scan = inside_and_outside(1)[k];
+    const auto source = of_unknown_sides(scan.points), target = of_known_sides(scan);
+    std::vector<Correspondence> same;
+    for (std::uint32_t i = 0; i < source.size(); ++i) same.push_back({i, i});
+    const RegistrationResult result = align(cpu(), source, target, same);
+    ASSERT_TRUE(result.aligned()) << result.score;
+    // Normals of the wrong side would agree nowhere.
+    EXPECT_GT(result.modes[0].evidence.source_overlap, 0.9);
   }
 }
 
