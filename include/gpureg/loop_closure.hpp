@@ -232,8 +232,7 @@ class LoopCloser {
   LoopCloser& operator=(LoopCloser&&) noexcept;
 
   /// @throws InvalidArgument for an id that is present, a pose that is not rigid, a time that is
-  /// not
-  ///   finite, an up whose length is not within 1e-6 to 1e9.
+  ///   not finite, an up whose length is not within 1e-6 to 1e9.
   void add(const Fragment& fragment);
 
   /// Relative pose by tracking: p_target = target_from_source * p_source.
@@ -284,9 +283,8 @@ class LoopCloser {
   void remove(FragmentId id);
 
   /// Registers what is due, verifies the loops, optimises.
-  /// @throws DeviceError where the device fails, std::bad_alloc. Nothing is lost: the next call
-  /// goes
-  ///   on, and ends in the same state.
+  /// @throws DeviceError where the device fails, std::bad_alloc without memory. Nothing is lost:
+  ///   the next call goes on, and ends in the same state.
   Update process(const ProcessLimits& limits = {});
   Update process(double milliseconds);  ///< process() with a time limit
 
