@@ -67,29 +67,42 @@ struct Replacement {
   }
 };
 
-/// Gives a cloud that was prepared from prepared points what belongs to the input.
-void inherit(const PreparedState& from, PreparedState& to) {
-  to.options = from.options;
-  const Vec3 moved{to.origin[0], to.origin[1], to.origin[2]};
-  to.viewpoints.clear();
-  for (const Vec3& viewpoint : from.viewpoints) to.viewpoints.push_back(viewpoint - moved);
-  for (int k = 0; k < 3; ++k) {
-    to.origin[k] += from.origin[k];
-    to.frame_offset[k] = from.frame_offset[k];
+/// What a cloud that is prepared from prepared points takes over from them.
+struct Inheritance {
+  PrepareOptions options;
+  PrepareStatistics statistics;
+  float origin[3];
+  double frame_offset[3];
+  std::vector<Vec3> viewpoints;
+
+  explicit Inheritance(const PreparedState& from)
+      : options(from.options), statistics(from.statistics), viewpoints(from.viewpoints) {
+    std::copy(from.origin, from.origin + 3, origin);
+    std::copy(from.frame_offset, from.frame_offset + 3, frame_offset);
   }
-  PrepareStatistics& s = to.statistics;
-  const PrepareStatistics& before = from.statistics;
-  s.input_points = before.input_points;
-  s.invalid_points = before.invalid_points;
-  s.viewpoint = before.viewpoint;
-  s.repaired_normals = before.repaired_normals;
-  s.downsample += before.downsample;
-  s.normals += before.normals;
-  s.features += before.features;
-  s.grid += before.grid;
-  s.depth_maps += before.depth_maps;
-  s.surface_sides += before.surface_sides;
-}
+
+  void give(PreparedState& to) const {
+    to.options = options;
+    const Vec3 moved{to.origin[0], to.origin[1], to.origin[2]};
+    to.viewpoints.clear();
+    for (const Vec3& viewpoint : viewpoints) to.viewpoints.push_back(viewpoint - moved);
+    for (int k = 0; k < 3; ++k) {
+      to.origin[k] += origin[k];
+      to.frame_offset[k] = frame_offset[k];
+    }
+    PrepareStatistics& s = to.statistics;
+    s.input_points = statistics.input_points;
+    s.invalid_points = statistics.invalid_points;
+    s.viewpoint = statistics.viewpoint;
+    s.repaired_normals = statistics.repaired_normals;
+    s.downsample += statistics.downsample;
+    s.normals += statistics.normals;
+    s.features += statistics.features;
+    s.grid += statistics.grid;
+    s.depth_maps += statistics.depth_maps;
+    s.surface_sides += statistics.surface_sides;
+  }
+};
 
 void decide(Engine& engine, Span<const RawCloud> raw, const std::vector<CloudKnowledge>& knowledge,
             const PrepareOptions& options,
@@ -145,6 +158,7 @@ void resolve_viewpoints(Engine& engine, Span<const RawCloud> raw,
   decide(engine, raw, knowledge, options, states, open);
 
   std::vector<Replacement> replacements;
+  std::vector<Inheritance> inheritances;
   std::vector<RawCloud> inputs;
   for (const OpenCloud& cloud : open) {
     if (cloud.sides.signs.empty()) continue;
@@ -152,6 +166,9 @@ void resolve_viewpoints(Engine& engine, Span<const RawCloud> raw,
     replacements.emplace_back(cloud, *states[cloud.index], own_features, 1.0f);
     if (!cloud.sides.sign_known)
       replacements.emplace_back(cloud, *states[cloud.index], own_features, -1.0f);
+    inheritances.emplace_back(*states[cloud.index]);
+    // Of a large cloud it takes gigabytes, and so do its replacements.
+    states[cloud.index].reset();
   }
   if (replacements.empty()) return;
   for (const Replacement& replacement : replacements) inputs.push_back(replacement.raw());
@@ -163,14 +180,17 @@ void resolve_viewpoints(Engine& engine, Span<const RawCloud> raw,
       prepared.push_back(std::move(state));
   });
   auto next = prepared.begin();
+  auto inheritance = inheritances.begin();
   for (const OpenCloud& cloud : open) {
     if (cloud.sides.signs.empty()) continue;
     std::shared_ptr<PreparedState>& state = states[cloud.index];
-    const std::shared_ptr<PreparedState> before = std::exchange(state, *next++);
-    inherit(*before, *state);
-    if (cloud.sides.sign_known) continue;
-    state->other_sides = *next++;
-    inherit(*before, *state->other_sides);
+    state = *next++;
+    inheritance->give(*state);
+    if (!cloud.sides.sign_known) {
+      state->other_sides = *next++;
+      inheritance->give(*state->other_sides);
+    }
+    ++inheritance;
   }
 }
 
