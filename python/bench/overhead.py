@@ -19,12 +19,12 @@ import gpureg
 
 
 def overhead(arguments: argparse.Namespace) -> None:
-    options = gpureg.RegistrationOptions()
-    options.quadruples.count = arguments.hypotheses
+    options = gpureg.RegistrationOptions.loopsmart()
+    options.quadruples.count = arguments.quadruples
     clouds = [gpureg.prepare(path) for _, path in gpureg._core.list_fragments(arguments.folder)]
     pairs = [(j, i) for i in range(len(clouds)) for j in range(i + 1, len(clouds))]
     reference = subprocess.Popen(
-        [arguments.reference, arguments.folder, str(arguments.hypotheses)],
+        [arguments.reference, arguments.folder, str(arguments.quadruples)],
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         text=True,
@@ -48,7 +48,7 @@ def overhead(arguments: argparse.Namespace) -> None:
     reference.wait()
     cpp, python = statistics.median(seconds["C++"]), statistics.median(seconds["Python"])
     print(
-        f"{gpureg.default_context().description}: {len(pairs)} pairs, {arguments.hypotheses} hypotheses, {arguments.rounds} rounds in turns"
+        f"{gpureg.default_context().description}: {len(pairs)} pairs, {arguments.quadruples} quadruples, {arguments.rounds} rounds in turns"
     )
     for name, values in seconds.items():
         print(
@@ -61,8 +61,8 @@ def overhead(arguments: argparse.Namespace) -> None:
 
 def scaling(arguments: argparse.Namespace) -> None:
     """The same work by one thread and by n, each with a context of one CPU thread."""
-    options = gpureg.RegistrationOptions()
-    options.quadruples.count = arguments.hypotheses
+    options = gpureg.RegistrationOptions.loopsmart()
+    options.quadruples.count = arguments.quadruples
     paths = [path for _, path in gpureg._core.list_fragments(arguments.folder)[:2]]
     contexts = [gpureg.Context.cpu(1) for _ in range(arguments.threads)]
     a, b = (gpureg.prepare(path, context=contexts[0]) for path in paths)
@@ -98,7 +98,7 @@ def main() -> None:
     )
     parser.add_argument("folder")
     parser.add_argument("--reference")
-    parser.add_argument("--hypotheses", type=int, default=gpureg.QuadrupleOptions().count)
+    parser.add_argument("--quadruples", type=int, default=gpureg.QuadrupleOptions().count)
     parser.add_argument("--rounds", type=int, default=7)
     parser.add_argument("--threads", type=int, default=4)
     arguments = parser.parse_args()

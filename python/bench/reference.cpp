@@ -8,12 +8,12 @@
 #include <cstdlib>
 #include <iostream>
 
-// reference FOLDER HYPOTHESES: for each line on standard input, one batch; answers with its
+// reference FOLDER QUADRUPLES: for each line on standard input, one batch; answers with its
 // seconds.
 int main(int argc, char** argv) {
   if (argc != 3) return 2;
   const auto context = gpureg::Context::best();
-  gpureg::RegistrationOptions options;
+  auto options = gpureg::RegistrationOptions::loopsmart();
   options.quadruples.count = static_cast<std::uint32_t>(std::strtoul(argv[2], nullptr, 10));
   std::vector<gpureg::PreparedCloud> clouds;
   for (const auto& [number, path] : gpureg::io::list_fragments(argv[1]))

@@ -8,8 +8,8 @@
 #include <utility>
 #include <vector>
 
-#include "api/finite_rows.hpp"
 #include "common/radix_sort.hpp"
+#include "pipeline/finite_rows.hpp"
 
 namespace gpureg {
 namespace {

@@ -6,7 +6,7 @@
 #include <limits>
 #include <vector>
 
-#include "api/finite_rows.hpp"
+#include "pipeline/finite_rows.hpp"
 
 namespace gpureg {
 namespace {
