@@ -14,6 +14,7 @@
 #include "gpureg/loop_consistency.hpp"
 #include "gpureg/pose_graph/optimize.hpp"
 #include "gpureg/registration.hpp"
+#include "gpureg/surface_set.hpp"
 #include "gpureg/verification.hpp"
 #include "gpureg/voxel_size.hpp"
 #include "support/result_bytes.hpp"
@@ -135,6 +136,61 @@ void run_verify(std::string_view input) {
       if (!(v.confidence >= 0 && v.confidence <= 1)) broken("a confidence is a probability");
     check_result(align(context, source, target, prior, options));
     suggest_voxel_size({a.view(), b.view()});
+  } catch (const InvalidArgument&) {
+  }
+}
+
+/// Scans with a normal and a variance for each point.
+struct FuzzedSurface {
+  explicit FuzzedSurface(Bytes& bytes) : cloud(cloud_of(bytes)) {
+    const bool varied = bytes.flag();
+    for (std::size_t k = 0; k < cloud.points.size(); ++k) {
+      if (k >= cloud.normals.size()) cloud.normals.emplace_back(0, 0, 1);
+      if (cloud.normals[k].norm() > 0 && !bytes.flag()) cloud.normals[k].normalize();
+      if (varied) variances.push_back(1 + bytes.number(3));
+    }
+  }
+  SurfaceView view() const {
+    SurfaceView out;
+    out.size = cloud.points.size();
+    out.points = out.size > 0 ? cloud.points.data()->data() : nullptr;
+    out.normals = out.size > 0 ? cloud.normals.data()->data() : nullptr;
+    out.variances = variances.empty() ? nullptr : variances.data();
+    return out;
+  }
+  PointCloud cloud;
+  std::vector<float> variances;
+};
+
+/// Sums are the same on any threads, finite, and those of a pair alone.
+void run_surface_set(std::string_view input) {
+  Bytes bytes(input);
+  static const Context one = Context::cpu(1), two = Context::cpu(2);
+  const std::vector<FuzzedSurface> surfaces{FuzzedSurface(bytes), FuzzedSurface(bytes)};
+  const std::vector<SurfaceView> views{surfaces[0].view(), surfaces[1].view()};
+  PointToPlaneOptions options;
+  options.max_distance = static_cast<double>(std::abs(bytes.number(2)));
+  options.kernel_width = static_cast<double>(std::abs(bytes.number(1)));
+  options.max_normal_angle = static_cast<double>(bytes.number(100));
+  options.max_points = bytes.below(200);
+  std::vector<SurfacePair> pairs(bytes.below(4));
+  for (SurfacePair& pair : pairs) {
+    pair.source = bytes.below(3);
+    pair.target = bytes.below(3);
+    for (int k = 0; k < 3; ++k)
+      pair.target_from_source.translation()[k] = static_cast<double>(bytes.number(2));
+  }
+  try {
+    const auto sums = SurfaceSet(one, views).linearise(pairs, options);
+    const SurfaceSet other(two, views);
+    for (std::size_t k = 0; k < pairs.size(); ++k) {
+      const PointToPlaneSums alone = other.linearise({pairs[k]}, options).front();
+      if (!sums[k].information.allFinite() || !sums[k].gradient.allFinite())
+        broken("sums are finite");
+      if (alone.information != sums[k].information || alone.gradient != sums[k].gradient ||
+          alone.count != sums[k].count || alone.squared_distance != sums[k].squared_distance)
+        broken("threads and other pairs change nothing");
+    }
   } catch (const InvalidArgument&) {
   }
 }
@@ -339,6 +395,7 @@ void run_consistency(std::string_view input) {
 std::vector<Target> api_targets() {
   return {{"align", run_align},
           {"verify", run_verify},
+          {"surface_set", run_surface_set},
           {"pose_graph", run_pose_graph},
           {"consistency", run_consistency},
           {"loop_closer_calls", run_loop_closer}};
