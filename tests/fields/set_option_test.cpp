@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "verbs/set_option.hpp"
+#include "options/set_option.hpp"
 
 #include <gtest/gtest.h>
 

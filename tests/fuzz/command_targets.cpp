@@ -2,10 +2,10 @@
 #include <algorithm>
 
 #include "fuzz/targets.hpp"
+#include "inputs/initial_poses.hpp"
 #include "io/run_reader.hpp"
-#include "records/initial_poses.hpp"
+#include "json/json_file.hpp"
 #include "records/journal.hpp"
-#include "records/json_file.hpp"
 #include "records/pair_json.hpp"
 #include "records/result_file.hpp"
 

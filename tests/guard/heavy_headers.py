@@ -29,10 +29,10 @@ HEAVY = {
             ).split()
         ),
     },
-    r"nlohmann/json\.hpp": {"apps/gpureg/records/json.hpp"},
+    r"nlohmann/json\.hpp": {"apps/gpureg/json/json.hpp"},
     r"CLI/.*": {"apps/gpureg/command_line.cpp"},
     r"iostream|regex|iomanip": set(),
-    r"fstream": {"apps/gpureg/records/json_file.hpp"},
+    r"fstream": {"apps/gpureg/json/json_file.hpp"},
     r"sstream": {"src/common/validate.hpp"},
 }
 SOURCES_TOO = {r"nlohmann/json\.hpp", r"CLI/.*"}

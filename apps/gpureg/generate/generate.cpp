@@ -11,8 +11,8 @@
 #include "exit_status.hpp"
 #include "gpureg/error.hpp"
 #include "gpureg/files.hpp"
-#include "verbs/interrupt.hpp"
-#include "verbs/progress.hpp"
+#include "run/interrupt.hpp"
+#include "run/progress.hpp"
 
 namespace gpureg::cli {
 namespace {

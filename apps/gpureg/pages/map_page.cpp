@@ -10,10 +10,10 @@
 #include <unordered_set>
 
 #include "gpureg/files.hpp"
+#include "json/json.hpp"
 #include "pages/base64.hpp"
 #include "pages/map_page_files.hpp"
 #include "pages/plot.hpp"
-#include "records/json.hpp"
 #include "records/result_json.hpp"
 #include "text.hpp"
 

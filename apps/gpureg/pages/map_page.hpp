@@ -3,7 +3,7 @@
 
 #include <vector>
 
-#include "verbs/map_run.hpp"
+#include "run/map_run.hpp"
 
 namespace gpureg::cli {
 

@@ -6,8 +6,8 @@
 #include <unordered_map>
 #include <vector>
 
+#include "json/json.hpp"
 #include "pages/plot.hpp"
-#include "records/json.hpp"
 
 namespace gpureg::cli {
 

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <limits>
 
-#include "verbs/spacing.hpp"
+#include "run/spacing.hpp"
 
 namespace gpureg::cli {
 namespace {

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <vector>
 
-#include "verbs/spacing.hpp"
+#include "run/spacing.hpp"
 
 namespace gpureg::cli {
 namespace {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include "records/json.hpp"
+#include "json/json.hpp"
 #include "records/result_file.hpp"
 
 namespace gpureg::cli {

@@ -14,9 +14,9 @@
 #include <system_error>
 
 #include "gpureg/error.hpp"
-#include "records/json.hpp"
-#include "records/json_fields.hpp"
-#include "records/json_file.hpp"
+#include "json/json.hpp"
+#include "json/json_fields.hpp"
+#include "json/json_file.hpp"
 #include "records/pair_json.hpp"
 #include "records/result_json.hpp"
 

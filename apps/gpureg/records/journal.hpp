@@ -5,7 +5,7 @@
 #include <string>
 
 #include "gpureg/result.hpp"
-#include "records/json_fwd.hpp"
+#include "json/json_fwd.hpp"
 
 namespace gpureg::cli {
 

@@ -3,11 +3,11 @@
 
 #include <sstream>
 
-#include "records/fields_json.hpp"
-#include "records/json.hpp"
+#include "json/fields_json.hpp"
+#include "json/json.hpp"
 #include "records/result_json.hpp"
+#include "run/pair_run.hpp"
 #include "text.hpp"
-#include "verbs/pair_run.hpp"
 
 namespace gpureg::cli {
 

@@ -4,8 +4,8 @@
 #include <string>
 
 #include "gpureg/context.hpp"
-#include "records/json_fwd.hpp"
-#include "verbs/map_run.hpp"
+#include "json/json_fwd.hpp"
+#include "run/map_run.hpp"
 
 namespace gpureg::cli {
 

@@ -8,8 +8,8 @@
 #include "gpureg/files.hpp"
 #include "gpureg/io.hpp"
 #include "gpureg/trajectory.hpp"
-#include "records/cloud_file.hpp"
-#include "verbs/progress.hpp"
+#include "inputs/cloud_file.hpp"
+#include "run/progress.hpp"
 
 namespace gpureg::cli {
 namespace {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "records/pair_json.hpp"
 
-#include "records/json_fields.hpp"
+#include "json/json_fields.hpp"
 #include "records/result_json.hpp"
 
 namespace gpureg::cli {

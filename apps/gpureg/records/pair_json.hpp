@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "gpureg/result.hpp"
-#include "records/json_fwd.hpp"
+#include "json/json_fwd.hpp"
 
 /// A pair as an object of RESULT.json and of the journal. Readers throw InvalidArgument.
 namespace gpureg::cli {

@@ -3,8 +3,8 @@
 
 #include "gpureg/error.hpp"
 #include "gpureg/reconstruction.hpp"
-#include "records/json_fields.hpp"
-#include "records/json_file.hpp"
+#include "json/json_fields.hpp"
+#include "json/json_file.hpp"
 #include "records/pair_json.hpp"
 #include "records/result_file.hpp"
 #include "records/result_json.hpp"

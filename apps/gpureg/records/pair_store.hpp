@@ -5,8 +5,8 @@
 #include <vector>
 
 #include "gpureg/registration.hpp"
-#include "records/json_fwd.hpp"
-#include "records/scene.hpp"
+#include "inputs/scene.hpp"
+#include "json/json_fwd.hpp"
 
 namespace gpureg::cli {
 

@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "gpureg/evaluation.hpp"
-#include "records/json.hpp"
-#include "records/json_file.hpp"
+#include "json/json.hpp"
+#include "json/json_file.hpp"
 #include "records/pair_json.hpp"
 
 namespace gpureg::cli {

@@ -6,7 +6,7 @@
 #include <fstream>
 #include <string>
 
-#include "records/json.hpp"
+#include "json/json.hpp"
 
 namespace gpureg::cli {
 

@@ -6,7 +6,7 @@
 
 #include "gpureg/context.hpp"
 #include "gpureg/result.hpp"
-#include "records/fields_json.hpp"
+#include "json/fields_json.hpp"
 
 namespace gpureg::cli {
 

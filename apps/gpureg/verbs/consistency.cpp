@@ -10,10 +10,10 @@
 #include "gpureg/error.hpp"
 #include "gpureg/loop_consistency.hpp"
 #include "gpureg/options.hpp"
-#include "records/json_file.hpp"
+#include "json/json_file.hpp"
+#include "options/output_path.hpp"
 #include "records/result_file.hpp"
 #include "records/result_json.hpp"
-#include "verbs/output_path.hpp"
 
 namespace gpureg::cli {
 namespace {

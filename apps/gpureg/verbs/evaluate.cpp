@@ -7,12 +7,12 @@
 
 #include "command.hpp"
 #include "gpureg/error.hpp"
+#include "json/json_file.hpp"
+#include "options/output_path.hpp"
 #include "pages/evaluate_table.hpp"
 #include "pages/report_pairs.hpp"
 #include "records/evaluation_json.hpp"
-#include "records/json_file.hpp"
 #include "text.hpp"
-#include "verbs/output_path.hpp"
 
 namespace gpureg::cli {
 namespace {

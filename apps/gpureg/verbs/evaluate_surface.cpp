@@ -9,11 +9,11 @@
 #include "gpureg/error.hpp"
 #include "gpureg/io.hpp"
 #include "gpureg/surface_error.hpp"
-#include "records/json.hpp"
-#include "records/json_file.hpp"
+#include "json/json.hpp"
+#include "json/json_file.hpp"
+#include "options/output_path.hpp"
 #include "records/result_json.hpp"
 #include "text.hpp"
-#include "verbs/output_path.hpp"
 
 namespace gpureg::cli {
 namespace {

@@ -8,9 +8,9 @@
 #include "command.hpp"
 #include "gpureg/context.hpp"
 #include "gpureg/voxel_size.hpp"
-#include "records/cloud_file.hpp"
+#include "inputs/cloud_file.hpp"
+#include "run/spacing.hpp"
 #include "text.hpp"
-#include "verbs/spacing.hpp"
 
 namespace gpureg::cli {
 namespace {

@@ -11,13 +11,13 @@
 #include "gpureg/error.hpp"
 #include "gpureg/files.hpp"
 #include "gpureg/io.hpp"
+#include "inputs/cloud_file.hpp"
+#include "options/output_path.hpp"
 #include "pages/report_page.hpp"
 #include "pages/report_pairs.hpp"
 #include "pages/report_tables.hpp"
 #include "pictures/before_after.hpp"
-#include "records/cloud_file.hpp"
 #include "text.hpp"
-#include "verbs/output_path.hpp"
 
 namespace gpureg::cli {
 namespace {

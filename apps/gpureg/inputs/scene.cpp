@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "records/scene.hpp"
+#include "inputs/scene.hpp"
 
 #include <algorithm>
 #include <cstring>
@@ -10,11 +10,11 @@
 #include <set>
 
 #include "gpureg/io.hpp"
-#include "records/cloud_file.hpp"
-#include "verbs/interrupt.hpp"
-#include "verbs/progress.hpp"
-#include "verbs/spacing.hpp"
-#include "verbs/viewpoint_note.hpp"
+#include "inputs/cloud_file.hpp"
+#include "run/interrupt.hpp"
+#include "run/progress.hpp"
+#include "run/spacing.hpp"
+#include "run/viewpoint_note.hpp"
 
 namespace gpureg::cli {
 namespace {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "records/odometry_file.hpp"
+#include "inputs/odometry_file.hpp"
 
 #include <algorithm>
 #include <cmath>

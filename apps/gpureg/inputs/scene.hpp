@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "gpureg/registration.hpp"
-#include "records/cloud_file.hpp"
+#include "inputs/cloud_file.hpp"
 
 namespace gpureg::cli {
 

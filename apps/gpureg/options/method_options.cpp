@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "verbs/method_options.hpp"
+#include "options/method_options.hpp"
 
 #include <iostream>
 
 #include "gpureg/error.hpp"
 #include "gpureg/voxel_size.hpp"
-#include "records/calibration_file.hpp"
+#include "inputs/calibration_file.hpp"
+#include "options/set_option.hpp"
 #include "text.hpp"
-#include "verbs/set_option.hpp"
 
 namespace gpureg::cli {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "records/initial_poses.hpp"
+#include "inputs/initial_poses.hpp"
 
 #include <algorithm>
 #include <cmath>

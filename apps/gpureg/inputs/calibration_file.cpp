@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "records/calibration_file.hpp"
+#include "inputs/calibration_file.hpp"
 
 #include <cmath>
 
 #include "gpureg/error.hpp"
-#include "records/fields_json.hpp"
-#include "records/json.hpp"
-#include "records/json_file.hpp"
+#include "json/fields_json.hpp"
+#include "json/json.hpp"
+#include "json/json_file.hpp"
 
 namespace gpureg::cli {
 namespace {

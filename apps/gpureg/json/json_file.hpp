@@ -6,7 +6,7 @@
 #include <functional>
 #include <string>
 
-#include "records/json_fwd.hpp"
+#include "json/json_fwd.hpp"
 
 namespace gpureg::cli {
 

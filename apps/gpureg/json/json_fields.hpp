@@ -5,7 +5,7 @@
 #include <string>
 
 #include "gpureg/error.hpp"
-#include "records/json.hpp"
+#include "json/json.hpp"
 
 /// Members of JSON objects, checked. All throw InvalidArgument that names the member and its value.
 namespace gpureg::cli {

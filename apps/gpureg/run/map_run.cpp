@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "verbs/map_run.hpp"
+#include "run/map_run.hpp"
 
 #include <algorithm>
 #include <filesystem>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "records/cloud_file.hpp"
+#include "inputs/cloud_file.hpp"
 
 #include <iostream>
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "verbs/progress.hpp"
+#include "run/progress.hpp"
 
 #include <unistd.h>
 

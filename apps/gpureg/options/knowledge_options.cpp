@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "verbs/knowledge_options.hpp"
+#include "options/knowledge_options.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -9,8 +9,8 @@
 #include "gpureg/context.hpp"
 #include "gpureg/options.hpp"
 #include "gpureg/reconstruction.hpp"
+#include "inputs/scene.hpp"
 #include "records/pair_store.hpp"
-#include "records/scene.hpp"
 
 namespace gpureg::cli {
 

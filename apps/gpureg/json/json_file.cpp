@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "records/json_file.hpp"
+#include "json/json_file.hpp"
 
 #include <cerrno>
 #include <filesystem>
@@ -10,7 +10,7 @@
 
 #include "gpureg/error.hpp"
 #include "gpureg/files.hpp"
-#include "records/json.hpp"
+#include "json/json.hpp"
 
 namespace gpureg::cli {
 namespace {

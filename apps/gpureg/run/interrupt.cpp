@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "verbs/interrupt.hpp"
+#include "run/interrupt.hpp"
 
 #include <csignal>
 

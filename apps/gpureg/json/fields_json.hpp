@@ -4,7 +4,7 @@
 #include "gpureg/evidence.hpp"
 #include "gpureg/options.hpp"
 #include "gpureg/statistics.hpp"
-#include "records/json_fwd.hpp"
+#include "json/json_fwd.hpp"
 
 /// Structs whose fields the library describes, as JSON: each field under its name in the API, the
 /// source's and the target's side of one as a pair. Floats become their shortest decimal: 0.05, not

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "records/fields_json.hpp"
+#include "json/fields_json.hpp"
 
 #include <array>
 #include <charconv>
@@ -11,7 +11,7 @@
 #include "fields/options.hpp"
 #include "fields/statistics.hpp"
 #include "gpureg/error.hpp"
-#include "records/json.hpp"
+#include "json/json.hpp"
 
 namespace gpureg::cli {
 namespace {

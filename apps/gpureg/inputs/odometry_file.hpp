@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "verbs/map_run.hpp"
+#include "run/map_run.hpp"
 
 namespace gpureg::cli {
 

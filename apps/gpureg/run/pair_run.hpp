@@ -10,11 +10,11 @@
 #include "gpureg/context.hpp"
 #include "gpureg/options.hpp"
 #include "gpureg/prior.hpp"
+#include "inputs/scene.hpp"
+#include "json/json_fwd.hpp"
+#include "options/method_options.hpp"
 #include "records/journal.hpp"
-#include "records/json_fwd.hpp"
 #include "records/pair_store.hpp"
-#include "records/scene.hpp"
-#include "verbs/method_options.hpp"
 
 namespace gpureg::cli {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "verbs/spacing.hpp"
+#include "run/spacing.hpp"
 
 #include <Eigen/Geometry>
 #include <algorithm>

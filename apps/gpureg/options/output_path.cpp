@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "verbs/output_path.hpp"
+#include "options/output_path.hpp"
 
 #include <unistd.h>
 

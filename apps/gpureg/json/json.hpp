@@ -3,4 +3,4 @@
 
 #include <nlohmann/json.hpp>
 
-#include "records/json_fwd.hpp"
+#include "json/json_fwd.hpp"

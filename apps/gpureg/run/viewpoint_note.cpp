@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "verbs/viewpoint_note.hpp"
+#include "run/viewpoint_note.hpp"
 
 #include <iostream>
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "records/json_fields.hpp"
+#include "json/json_fields.hpp"
 
 #include <Eigen/LU>
 #include <cmath>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "verbs/pair_run.hpp"
+#include "run/pair_run.hpp"
 
 #include <algorithm>
 #include <filesystem>
@@ -8,13 +8,13 @@
 
 #include "gpureg/error.hpp"
 #include "gpureg/io.hpp"
-#include "records/cloud_file.hpp"
-#include "records/fields_json.hpp"
-#include "records/json.hpp"
+#include "inputs/cloud_file.hpp"
+#include "json/fields_json.hpp"
+#include "json/json.hpp"
 #include "records/result_json.hpp"
+#include "run/interrupt.hpp"
+#include "run/progress.hpp"
 #include "text.hpp"
-#include "verbs/interrupt.hpp"
-#include "verbs/progress.hpp"
 
 namespace gpureg::cli {
 namespace {

@@ -4,7 +4,7 @@
 #include <string>
 
 #include "gpureg/calibration.hpp"
-#include "records/json_fwd.hpp"
+#include "json/json_fwd.hpp"
 
 namespace gpureg::cli {
 
