@@ -8,7 +8,7 @@
 #include <map>
 #include <set>
 
-#include "pose_graph/robust.hpp"
+#include "pose_graph/robust/robust.hpp"
 
 namespace gpureg::loop_closure {
 namespace {

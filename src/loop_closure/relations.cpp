@@ -9,7 +9,7 @@
 #include <optional>
 
 #include "loop_closure/accept.hpp"
-#include "pose_graph/robust.hpp"
+#include "pose_graph/robust/robust.hpp"
 
 namespace gpureg::loop_closure {
 namespace {

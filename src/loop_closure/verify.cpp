@@ -9,7 +9,7 @@
 #include "loop_closure/accept.hpp"
 #include "loop_closure/relations.hpp"
 #include "math/exponential.hpp"
-#include "pose_graph/robust.hpp"
+#include "pose_graph/robust/robust.hpp"
 
 namespace gpureg::loop_closure {
 namespace {

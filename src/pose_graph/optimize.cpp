@@ -12,7 +12,7 @@
 #include "pose_graph/initialise.hpp"
 #include "pose_graph/parallel.hpp"
 #include "pose_graph/problem.hpp"
-#include "pose_graph/robust.hpp"
+#include "pose_graph/robust/robust.hpp"
 
 namespace gpureg::pose_graph {
 namespace {

@@ -9,9 +9,9 @@
 #include "gpureg/reconstruction.hpp"
 #include "gpureg/surface_set.hpp"
 #include "math/trigonometry.hpp"
-#include "pose_graph/block_cholesky.hpp"
-#include "pose_graph/normal_equations.hpp"
 #include "pose_graph/parallel.hpp"
+#include "pose_graph/solver/block_cholesky.hpp"
+#include "pose_graph/solver/normal_equations.hpp"
 #include "reconstruction/connections.hpp"
 #include "reconstruction/relative_variances.hpp"
 

@@ -6,7 +6,7 @@
 #include <cstring>
 #include <random>
 
-#include "pose_graph/block_cholesky.hpp"
+#include "pose_graph/solver/block_cholesky.hpp"
 
 namespace gpureg::pose_graph {
 namespace {

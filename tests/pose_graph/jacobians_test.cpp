@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "graphs.hpp"
-#include "pose_graph/normal_equations.hpp"
+#include "pose_graph/solver/normal_equations.hpp"
 
 namespace gpureg::pose_graph {
 namespace {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "pose_graph/elimination.hpp"
+#include "pose_graph/solver/elimination.hpp"
 
 #include <Eigen/OrderingMethods>
 #include <Eigen/SparseCore>

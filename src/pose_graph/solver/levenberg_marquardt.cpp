@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "pose_graph/levenberg_marquardt.hpp"
+#include "pose_graph/solver/levenberg_marquardt.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -3,9 +3,9 @@
 #include <utility>
 
 #include "pose_graph/components.hpp"
-#include "pose_graph/consensus.hpp"
 #include "pose_graph/initialise.hpp"
-#include "pose_graph/robust.hpp"
+#include "pose_graph/robust/consensus.hpp"
+#include "pose_graph/robust/robust.hpp"
 
 namespace gpureg::pose_graph {
 namespace {

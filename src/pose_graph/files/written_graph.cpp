@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "pose_graph/written_graph.hpp"
+#include "pose_graph/files/written_graph.hpp"
 
 #include "gpureg/error.hpp"
 

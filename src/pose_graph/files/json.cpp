@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "pose_graph/json.hpp"
+#include "pose_graph/files/json.hpp"
 
 #include <cmath>
 #include <string_view>

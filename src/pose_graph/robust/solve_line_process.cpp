@@ -4,7 +4,7 @@
 
 #include "math/exponential.hpp"
 #include "pose_graph/initialise.hpp"
-#include "pose_graph/robust.hpp"
+#include "pose_graph/robust/robust.hpp"
 
 namespace gpureg::pose_graph {
 namespace {

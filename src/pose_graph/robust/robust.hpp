@@ -4,8 +4,8 @@
 #include <limits>
 #include <vector>
 
-#include "pose_graph/levenberg_marquardt.hpp"
 #include "pose_graph/problem.hpp"
+#include "pose_graph/solver/levenberg_marquardt.hpp"
 
 namespace gpureg::pose_graph {
 

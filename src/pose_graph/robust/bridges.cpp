@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "pose_graph/bridges.hpp"
+#include "pose_graph/robust/bridges.hpp"
 #include "math/exponential.hpp"
 
 #include <algorithm>

@@ -8,7 +8,7 @@
 #include "gpureg/error.hpp"
 #include "gpureg/files.hpp"
 #include "gpureg/pose_graph/files.hpp"
-#include "pose_graph/written_graph.hpp"
+#include "pose_graph/files/written_graph.hpp"
 
 namespace gpureg::pose_graph {
 namespace {

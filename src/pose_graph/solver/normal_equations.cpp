@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "pose_graph/normal_equations.hpp"
+#include "pose_graph/solver/normal_equations.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -4,9 +4,9 @@
 #include <limits>
 
 #include "math/exponential.hpp"
-#include "pose_graph/bridges.hpp"
 #include "pose_graph/parallel.hpp"
-#include "pose_graph/robust.hpp"
+#include "pose_graph/robust/bridges.hpp"
+#include "pose_graph/robust/robust.hpp"
 
 namespace gpureg::pose_graph {
 namespace {

@@ -4,8 +4,8 @@
 #include <memory>
 #include <vector>
 
-#include "pose_graph/block_cholesky.hpp"
 #include "pose_graph/problem.hpp"
+#include "pose_graph/solver/block_cholesky.hpp"
 
 namespace gpureg::pose_graph {
 

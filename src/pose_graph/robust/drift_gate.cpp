@@ -2,7 +2,7 @@
 #include <Eigen/Cholesky>
 
 #include "pose_graph/parallel.hpp"
-#include "pose_graph/robust.hpp"
+#include "pose_graph/robust/robust.hpp"
 #include "pose_graph/uncertain_pose.hpp"
 
 namespace gpureg::pose_graph {

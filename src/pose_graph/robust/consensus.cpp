@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "pose_graph/consensus.hpp"
+#include "pose_graph/robust/consensus.hpp"
 
 #include <Eigen/Cholesky>
 #include <algorithm>

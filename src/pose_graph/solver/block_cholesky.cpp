@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "pose_graph/block_cholesky.hpp"
+#include "pose_graph/solver/block_cholesky.hpp"
 
 #include <algorithm>
 #include <cstring>
 
-#include "pose_graph/dense_kernels.hpp"
-#include "pose_graph/elimination.hpp"
 #include "pose_graph/parallel.hpp"
+#include "pose_graph/solver/dense_kernels.hpp"
+#include "pose_graph/solver/elimination.hpp"
 
 namespace gpureg::pose_graph {
 namespace {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "pose_graph/dense_kernels.hpp"
+#include "pose_graph/solver/dense_kernels.hpp"
 
 #include <algorithm>
 #include <cmath>

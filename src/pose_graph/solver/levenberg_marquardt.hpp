@@ -4,7 +4,7 @@
 #include <limits>
 #include <vector>
 
-#include "pose_graph/normal_equations.hpp"
+#include "pose_graph/solver/normal_equations.hpp"
 
 namespace gpureg::pose_graph {
 
