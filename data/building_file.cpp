@@ -11,7 +11,7 @@
 
 #include "gpureg/error.hpp"
 #include "gpureg/mesh.hpp"
-#include "io/polygons.hpp"
+#include "io/meshes/polygons.hpp"
 
 namespace gpureg::synthetic {
 namespace {

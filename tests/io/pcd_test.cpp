@@ -5,7 +5,7 @@
 #include <random>
 
 #include "gpureg/io.hpp"
-#include "io/lzf.hpp"
+#include "io/clouds/lzf.hpp"
 #include "io/run_reader.hpp"
 #include "io/seed_files.hpp"
 

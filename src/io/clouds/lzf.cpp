@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "io/lzf.hpp"
+#include "io/clouds/lzf.hpp"
 
 namespace gpureg::io {
 

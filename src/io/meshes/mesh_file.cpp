@@ -11,7 +11,7 @@
 #include "gpureg/error.hpp"
 #include "gpureg/mesh.hpp"
 #include "io/limits.hpp"
-#include "io/mesh_formats.hpp"
+#include "io/meshes/mesh_formats.hpp"
 #include "io/ply.hpp"
 
 namespace gpureg::io {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "io/polygons.hpp"
+#include "io/meshes/polygons.hpp"
 
 #include <Eigen/Geometry>
 #include <algorithm>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "io/kitti.hpp"
+#include "io/clouds/kitti.hpp"
 
 #include <cmath>
 

@@ -2,9 +2,9 @@
 #include "files/text_file.hpp"
 #include "gpureg/io.hpp"
 #include "gpureg/mesh.hpp"
-#include "io/kitti.hpp"
+#include "io/clouds/kitti.hpp"
+#include "io/clouds/pcd.hpp"
 #include "io/limits.hpp"
-#include "io/pcd.hpp"
 #include "io/ply.hpp"
 
 namespace gpureg::io {

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "io/pcd.hpp"
+#include "io/clouds/pcd.hpp"
 
 #include <cmath>
 #include <optional>
 
 #include "files/numbers.hpp"
 #include "files/text_file.hpp"
+#include "io/clouds/lzf.hpp"
 #include "io/decode.hpp"
-#include "io/lzf.hpp"
 #include "io/table.hpp"
 
 namespace gpureg::io {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include "io/polygons.hpp"
+#include "io/meshes/polygons.hpp"
 
 /// Mesh files. Every function reads a whole file and throws IoError naming it and, in text, the
 /// line. Corners of faces are checked.

@@ -4,7 +4,7 @@
 
 #include "files/text_file.hpp"
 #include "io/decode.hpp"
-#include "io/mesh_formats.hpp"
+#include "io/meshes/mesh_formats.hpp"
 
 namespace gpureg::io {
 namespace {
