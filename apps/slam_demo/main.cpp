@@ -9,10 +9,10 @@
 #include <gpureg/error.hpp>
 #include <iostream>
 
-#include "output.hpp"
-#include "rerun.hpp"
+#include "output/output.hpp"
+#include "output/rerun.hpp"
 #include "stopwatch.hpp"
-#include "tracking_file.hpp"
+#include "tracking/tracking_file.hpp"
 
 namespace slam_demo {
 namespace {

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "loops.hpp"
+#include "loops/loops.hpp"
 #include "sequence.hpp"
 #include "surfel/surfel_map.hpp"
 

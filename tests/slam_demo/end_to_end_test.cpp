@@ -8,8 +8,8 @@
 #include <cstdlib>
 #include <nlohmann/json.hpp>
 
-#include "rerun.hpp"
-#include "tracking_file.hpp"
+#include "output/rerun.hpp"
+#include "tracking/tracking_file.hpp"
 
 namespace slam_demo {
 namespace {

@@ -12,7 +12,7 @@
 #include <nlohmann/json.hpp>
 
 #include "generated_sequence.hpp"
-#include "tracking_file.hpp"
+#include "tracking/tracking_file.hpp"
 
 /// What goes wrong on the way: frames that are missing, black or of elsewhere, and Ctrl-C.
 namespace slam_demo {

@@ -6,7 +6,7 @@
 #include <string>
 
 #include "data/generate.hpp"
-#include "output.hpp"
+#include "output/output.hpp"
 #include "sequence.hpp"
 #include "support/temporary_folder.hpp"
 

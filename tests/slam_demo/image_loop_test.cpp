@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "image_loop.hpp"
+#include "loops/image_loop.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "map.hpp"
+#include "mapping/map.hpp"
 
 #include <gtest/gtest.h>
 
-#include "bundle.hpp"
-#include "keyframe_graph.hpp"
+#include "mapping/bundle.hpp"
+#include "mapping/keyframe_graph.hpp"
 
 namespace slam_demo {
 namespace {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "tracking_file.hpp"
+#include "tracking/tracking_file.hpp"
 
 #include <gtest/gtest.h>
 #include <gpureg/error.hpp>
@@ -8,7 +8,7 @@
 #include <random>
 
 #include "io/mutate.hpp"
-#include "output.hpp"
+#include "output/output.hpp"
 #include "support/expect_error.hpp"
 #include "support/temporary_folder.hpp"
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "features.hpp"
+#include "tracking/features.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "bundle.hpp"
+#include "mapping/bundle.hpp"
 
 namespace slam_demo {
 

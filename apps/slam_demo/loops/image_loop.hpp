@@ -4,7 +4,7 @@
 #include <optional>
 #include <vector>
 
-#include "matching.hpp"
+#include "tracking/matching.hpp"
 
 /// Loops by features, where something else says where to look.
 namespace slam_demo {

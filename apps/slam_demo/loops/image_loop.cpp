@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "image_loop.hpp"
+#include "loops/image_loop.hpp"
 
 #include <algorithm>
 #include <map>
 #include <set>
 
-#include "keyframe_graph.hpp"
+#include "mapping/keyframe_graph.hpp"
 
 namespace slam_demo {
 namespace {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "map.hpp"
+#include "mapping/map.hpp"
 
 #include <algorithm>
 #include <stdexcept>

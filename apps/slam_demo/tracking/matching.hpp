@@ -4,7 +4,7 @@
 #include <memory>
 #include <vector>
 
-#include "bundle.hpp"
+#include "mapping/bundle.hpp"
 
 /// From features to the pose of one image: matches with points of the map, PnP, refinement.
 namespace slam_demo {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "fragment.hpp"
+#include "mapping/fragment.hpp"
 
 #include <cmath>
 #include <gpureg/reconstruction.hpp>

@@ -5,9 +5,9 @@
 #include <string>
 #include <vector>
 
-#include "fragment.hpp"
-#include "image_loop.hpp"
-#include "keyframe_graph.hpp"
+#include "loops/image_loop.hpp"
+#include "mapping/fragment.hpp"
+#include "mapping/keyframe_graph.hpp"
 
 namespace slam_demo {
 

@@ -6,7 +6,7 @@
 #include <memory>
 #include <vector>
 
-#include "features.hpp"
+#include "tracking/features.hpp"
 
 namespace slam_demo {
 

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "output.hpp"
+#include "output/output.hpp"
 
 /// report.html: one file, nothing loaded from elsewhere. C++ gives the numbers, the page draws.
 namespace slam_demo {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "dense_odometry.hpp"
+#include "tracking/dense_odometry.hpp"
 
 #include <opencv2/core/eigen.hpp>
 #include <opencv2/imgproc.hpp>

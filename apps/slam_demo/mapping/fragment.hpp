@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "camera.hpp"
-#include "tracker.hpp"
+#include "tracking/tracker.hpp"
 
 namespace slam_demo {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "bundle.hpp"
+#include "mapping/bundle.hpp"
 
 #include <ceres/ceres.h>
 #include <ceres/rotation.h>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "rerun.hpp"
+#include "output/rerun.hpp"
 
 #include <spawn.h>
 #include <sys/wait.h>

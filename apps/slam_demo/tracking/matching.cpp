@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "matching.hpp"
+#include "tracking/matching.hpp"
 
 #include <algorithm>
 #include <cmath>

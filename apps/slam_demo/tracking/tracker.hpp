@@ -5,8 +5,8 @@
 #include <optional>
 #include <string>
 
-#include "dense_odometry.hpp"
-#include "matching.hpp"
+#include "tracking/dense_odometry.hpp"
+#include "tracking/matching.hpp"
 
 namespace slam_demo {
 

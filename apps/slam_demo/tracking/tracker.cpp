@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "tracker.hpp"
+#include "tracking/tracker.hpp"
 
 #include <algorithm>
 #include <chrono>

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "camera.hpp"
-#include "map.hpp"
+#include "mapping/map.hpp"
 
 /// Bundle adjustment by Ceres: the paper's equation with Huber's kernel, and the measured depth
 /// beside the pixel.

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "tracking_file.hpp"
+#include "tracking/tracking_file.hpp"
 
 #include <cmath>
 #include <cstdint>

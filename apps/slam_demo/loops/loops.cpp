@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "loops.hpp"
+#include "loops/loops.hpp"
 
 #include <algorithm>
 #include <gpureg/registration.hpp>

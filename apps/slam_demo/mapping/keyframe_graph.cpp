@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "keyframe_graph.hpp"
+#include "mapping/keyframe_graph.hpp"
 
 #include <algorithm>
 #include <cmath>
