@@ -9,18 +9,18 @@
 #include <thread>
 #include <vector>
 
-#include "data/building_file.hpp"
-#include "data/building_texture.hpp"
-#include "data/depth_sensor.hpp"
-#include "data/fusion.hpp"
+#include "data/furniture/scatter.hpp"
 #include "data/ground_truth.hpp"
-#include "data/house.hpp"
 #include "data/random.hpp"
-#include "data/rgbd.hpp"
-#include "data/scatter.hpp"
+#include "data/rooms/building_file.hpp"
+#include "data/rooms/building_texture.hpp"
+#include "data/rooms/house.hpp"
 #include "data/scene_files.hpp"
+#include "data/sensor/depth_sensor.hpp"
+#include "data/sensor/fusion.hpp"
+#include "data/sensor/rgbd.hpp"
 #include "data/surface.hpp"
-#include "data/trajectory.hpp"
+#include "data/tours/trajectory.hpp"
 #include "gpureg/error.hpp"
 
 namespace gpureg::synthetic {

@@ -3,8 +3,8 @@
 
 #include <cmath>
 
-#include "data/camera.hpp"
 #include "data/scene_files.hpp"
+#include "data/sensor/camera.hpp"
 
 namespace gpureg::synthetic {
 namespace {

@@ -7,7 +7,7 @@
 #include <unordered_set>
 #include <vector>
 
-#include "data/ray_scene.hpp"
+#include "data/sensor/ray_scene.hpp"
 
 /// The true surfaces that a camera has seen, for the evaluation of maps.
 namespace gpureg::synthetic {

@@ -25,7 +25,8 @@ HEAVY = {
         *(
             f"data/{name}.hpp"
             for name in (
-                "depth_sensor fusion ground_truth house mesh rgbd scene_files surface trajectory"
+                "ground_truth mesh scene_files surface rooms/house tours/trajectory"
+                " sensor/depth_sensor sensor/fusion sensor/rgbd"
             ).split()
         ),
     },

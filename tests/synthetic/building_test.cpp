@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "data/building_file.hpp"
+#include "data/rooms/building_file.hpp"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <sstream>
 
-#include "data/building_texture.hpp"
-#include "data/rgbd.hpp"
+#include "data/rooms/building_texture.hpp"
+#include "data/sensor/rgbd.hpp"
 #include "gpureg/error.hpp"
 #include "scene.hpp"
 #include "support/expect_error.hpp"

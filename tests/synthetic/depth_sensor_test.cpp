@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "data/depth_sensor.hpp"
+#include "data/sensor/depth_sensor.hpp"
 
 #include <gtest/gtest.h>
 

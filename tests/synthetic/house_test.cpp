@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "data/house.hpp"
+#include "data/rooms/house.hpp"
 
 #include <gtest/gtest.h>
 
 #include <numeric>
 
-#include "data/ray_scene.hpp"
+#include "data/sensor/ray_scene.hpp"
 
 namespace gpureg::test {
 namespace {

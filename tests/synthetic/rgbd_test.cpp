@@ -5,7 +5,7 @@
 #include <cmath>
 #include <set>
 
-#include "data/camera.hpp"
+#include "data/sensor/camera.hpp"
 #include "scene.hpp"
 
 namespace gpureg::test {

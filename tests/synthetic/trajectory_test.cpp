@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "data/trajectory.hpp"
+#include "data/tours/trajectory.hpp"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 
-#include "data/tour.hpp"
+#include "data/tours/tour.hpp"
 #include "gpureg/error.hpp"
 
 namespace gpureg::test {

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "data/scatter.hpp"
+#include "data/furniture/scatter.hpp"
 
 #include <algorithm>
 #include <cmath>
 #include <vector>
 
-#include "data/furniture.hpp"
-#include "data/walk_map.hpp"
+#include "data/furniture/furniture.hpp"
+#include "data/tours/walk_map.hpp"
 
 namespace gpureg::synthetic {
 namespace {

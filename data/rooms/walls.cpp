@@ -2,8 +2,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "data/furniture.hpp"
-#include "data/house.hpp"
+#include "data/furniture/furniture.hpp"
+#include "data/rooms/house.hpp"
 
 namespace gpureg::synthetic {
 namespace {

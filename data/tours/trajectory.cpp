@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "data/trajectory.hpp"
+#include "data/tours/trajectory.hpp"
 
 #include <algorithm>
 #include <cmath>
 
 #include "data/random.hpp"
-#include "data/tour.hpp"
+#include "data/tours/tour.hpp"
 
 namespace gpureg::synthetic {
 namespace {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <cmath>
 
-#include "data/furniture.hpp"
+#include "data/furniture/furniture.hpp"
 
 namespace gpureg::synthetic {
 

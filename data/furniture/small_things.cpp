@@ -2,7 +2,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "data/furniture.hpp"
+#include "data/furniture/furniture.hpp"
 
 namespace gpureg::synthetic {
 namespace {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "data/rgbd.hpp"
+#include "data/sensor/rgbd.hpp"
 
 #include <png.h>
 
@@ -9,8 +9,8 @@
 #include <cstdio>
 
 #include "data/random.hpp"
+#include "data/rooms/texture.hpp"
 #include "data/scene_files.hpp"
-#include "data/texture.hpp"
 #include "gpureg/error.hpp"
 #include "gpureg/files.hpp"
 

@@ -3,7 +3,7 @@
 
 #include <cstdint>
 
-#include "data/house.hpp"
+#include "data/rooms/house.hpp"
 
 namespace gpureg::synthetic {
 

@@ -3,8 +3,8 @@
 #include <cmath>
 #include <optional>
 
-#include "data/furniture.hpp"
-#include "data/house.hpp"
+#include "data/furniture/furniture.hpp"
+#include "data/rooms/house.hpp"
 
 namespace gpureg::synthetic {
 namespace {

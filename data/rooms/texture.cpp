@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "data/texture.hpp"
+#include "data/rooms/texture.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "data/furniture.hpp"
+#include "data/furniture/furniture.hpp"
 
 namespace gpureg::synthetic {
 namespace {

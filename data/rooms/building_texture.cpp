@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "data/building_texture.hpp"
+#include "data/rooms/building_texture.hpp"
 
 #include <algorithm>
 #include <array>
 #include <map>
 #include <numeric>
 
-#include "data/furniture.hpp"
+#include "data/furniture/furniture.hpp"
 
 namespace gpureg::synthetic {
 namespace {

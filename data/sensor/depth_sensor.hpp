@@ -6,9 +6,9 @@
 #include <cstdint>
 #include <vector>
 
-#include "data/camera.hpp"
 #include "data/generate.hpp"
-#include "data/ray_scene.hpp"
+#include "data/sensor/camera.hpp"
+#include "data/sensor/ray_scene.hpp"
 
 namespace gpureg::synthetic {
 

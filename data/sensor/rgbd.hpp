@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "data/depth_sensor.hpp"
+#include "data/sensor/depth_sensor.hpp"
 
 /// The frames as a sequence in the layout of the TUM RGB-D benchmark (Sturm et al., IROS 2012).
 namespace gpureg::synthetic {

@@ -7,7 +7,7 @@
 
 #include "gpureg/error.hpp"
 
-#include "data/walk_map.hpp"
+#include "data/tours/walk_map.hpp"
 
 namespace gpureg::synthetic {
 namespace {

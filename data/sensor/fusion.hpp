@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "data/depth_sensor.hpp"
+#include "data/sensor/depth_sensor.hpp"
 
 namespace gpureg::synthetic {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "data/fusion.hpp"
+#include "data/sensor/fusion.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -2,7 +2,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "data/house.hpp"
+#include "data/rooms/house.hpp"
 
 namespace gpureg::synthetic {
 namespace {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "data/building_file.hpp"
+#include "data/rooms/building_file.hpp"
 
 #include <assimp/DefaultIOSystem.h>
 #include <assimp/scene.h>

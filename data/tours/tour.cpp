@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "data/tour.hpp"
+#include "data/tours/tour.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -7,7 +7,7 @@
 #include <string>
 
 #include "data/random.hpp"
-#include "data/walk_map.hpp"
+#include "data/tours/walk_map.hpp"
 #include "gpureg/error.hpp"
 
 namespace gpureg::synthetic {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "data/ray_scene.hpp"
+#include "data/sensor/ray_scene.hpp"
 
 #if GPUREG_EMBREE_MAJOR >= 4
 #include <embree4/rtcore.h>

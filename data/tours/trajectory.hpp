@@ -5,8 +5,8 @@
 #include <cstdint>
 #include <vector>
 
-#include "data/house.hpp"
-#include "data/ray_scene.hpp"
+#include "data/rooms/house.hpp"
+#include "data/sensor/ray_scene.hpp"
 
 namespace gpureg::synthetic {
 
