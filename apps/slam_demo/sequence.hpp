@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <gpureg/trajectory.hpp>
+#include <gpureg/evaluation/trajectory.hpp>
 #include <opencv2/core.hpp>
 #include <string>
 #include <vector>

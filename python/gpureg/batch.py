@@ -20,12 +20,12 @@ except ImportError as error:
         "register_all needs pyarrow: pip install 'gpureg[batch]', or '.[batch]' from a checkout"
     ) from error
 
+from ._batch.plan import Plan
+from ._batch.residency import Residency, Stopped
+from ._batch.store import Row, Store, read_table
+from ._batch.table import row_of
 from ._core import BackendUnavailable, Context, RegistrationOptions
-from ._plan import Plan
 from ._progress import Progress, batch_progress
-from ._residency import Residency, Stopped
-from ._store import Row, Store, read_table
-from ._table import row_of
 from .fragments import fragment_set
 from .registration import ALIGNED
 

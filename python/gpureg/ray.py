@@ -21,11 +21,11 @@ except ImportError as error:
         "gpureg.ray needs Ray: pip install 'gpureg[ray]', or '.[ray]' from a checkout"
     ) from error
 
+from ._batch.plan import Plan
+from ._batch.residency import Residency
+from ._batch.store import Row, Store
 from ._core import Context, RegistrationOptions
-from ._plan import Plan
 from ._progress import Progress, Report, batch_progress
-from ._residency import Residency
-from ._store import Row, Store
 from .batch import CHUNK, MEMORY, BatchRun, conclude, make_plan, run_chunk
 
 # of one actor, before the run gives up: a chunk that kills whoever takes it shall not go on for

@@ -72,10 +72,10 @@ def test_contexts_and_memory_change_nothing(tmp_path):
 
 
 def test_memory_is_bounded(monkeypatch, tmp_path):
-    from gpureg import _residency
+    from gpureg._batch import residency
 
     most = 0
-    align_group = _residency.Residency._align_group
+    align_group = residency.Residency._align_group
 
     def watched(self, pairs, rows, held, on_result, stop):
         nonlocal most
@@ -83,7 +83,7 @@ def test_memory_is_bounded(monkeypatch, tmp_path):
             most,
             sum(
                 map(
-                    _residency._bytes_of,
+                    residency._bytes_of,
                     {
                         **self._clouds,
                         **{-k - 1: c for k, c in held.items() if k not in self._clouds},
@@ -93,7 +93,7 @@ def test_memory_is_bounded(monkeypatch, tmp_path):
         )
         align_group(self, pairs, rows, held, on_result, stop)
 
-    monkeypatch.setattr(_residency.Residency, "_align_group", watched)
+    monkeypatch.setattr(residency.Residency, "_align_group", watched)
     clouds = many.fragments()[:20]
     gpureg.register_all(
         clouds,
@@ -104,7 +104,7 @@ def test_memory_is_bounded(monkeypatch, tmp_path):
         memory=1_000_000,
     )
     largest = max(
-        map(_residency._bytes_of, gpureg.prepare_batch(clouds, options=few(10, 0.08).prepare))
+        map(residency._bytes_of, gpureg.prepare_batch(clouds, options=few(10, 0.08).prepare))
     )
     # What is kept, and what a group of pairs holds: each within the budget and one fragment or two.
     assert most <= 2 * (1_000_000 + 2 * largest)
@@ -393,7 +393,7 @@ def test_a_changed_bit_is_not_resumed(tmp_path, suffix):
     clouds = many.fragments()[:3]
     keywords = {"output": tmp_path, "options": few(10, 0.08), "progress": False, "chunk_size": 2}
     with pytest.MonkeyPatch.context() as patch, pytest.raises(RuntimeError, match="killed"):
-        patch.setattr(gpureg._store.Store, "conclude", killed)
+        patch.setattr(gpureg._batch.store.Store, "conclude", killed)
         gpureg.register_all(clouds, **keywords)
     chunk = tmp_path / "chunks" / "000000.chunk"
     chunk = chunk.rename(chunk.with_suffix(suffix))

@@ -3,7 +3,7 @@
 
 #include <vector>
 
-#include "gpureg/trajectory.hpp"
+#include "gpureg/evaluation/trajectory.hpp"
 
 namespace gpureg::evaluation {
 

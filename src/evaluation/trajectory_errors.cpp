@@ -7,7 +7,7 @@
 
 #include "evaluation/statistics.hpp"
 #include "gpureg/error.hpp"
-#include "gpureg/trajectory.hpp"
+#include "gpureg/evaluation/trajectory.hpp"
 
 namespace gpureg::evaluation {
 namespace {

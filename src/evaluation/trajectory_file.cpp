@@ -8,8 +8,8 @@
 #include "evaluation/rigid.hpp"
 #include "files/text_file.hpp"
 #include "gpureg/error.hpp"
+#include "gpureg/evaluation/trajectory.hpp"
 #include "gpureg/files.hpp"
-#include "gpureg/trajectory.hpp"
 
 namespace gpureg::evaluation {
 namespace {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "gpureg/surface_error.hpp"
+#include "gpureg/evaluation/surface_error.hpp"
 
 #include <gtest/gtest.h>
 

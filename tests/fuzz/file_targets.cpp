@@ -2,10 +2,10 @@
 #include <fstream>
 
 #include "fuzz/targets.hpp"
+#include "gpureg/evaluation/trajectory.hpp"
 #include "gpureg/pose_graph/files.hpp"
 #include "gpureg/pose_graph/optimize.hpp"
 #include "gpureg/registration.hpp"
-#include "gpureg/trajectory.hpp"
 #include "io/run_reader.hpp"
 #include "loop_closure/saved_state.hpp"
 

@@ -8,7 +8,7 @@
 
 #include "gpureg/error.hpp"
 #include "gpureg/evaluation.hpp"
-#include "gpureg/trajectory.hpp"
+#include "gpureg/evaluation/trajectory.hpp"
 
 namespace gpureg::cli {
 namespace {

@@ -5,9 +5,9 @@
 #include <vector>
 
 #include "gpureg/evaluation.hpp"
+#include "gpureg/evaluation/trajectory.hpp"
 #include "gpureg/files.hpp"
 #include "gpureg/io.hpp"
-#include "gpureg/trajectory.hpp"
 #include "inputs/cloud_file.hpp"
 #include "run/progress.hpp"
 

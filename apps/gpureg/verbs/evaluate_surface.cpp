@@ -7,8 +7,8 @@
 
 #include "command.hpp"
 #include "gpureg/error.hpp"
+#include "gpureg/evaluation/surface_error.hpp"
 #include "gpureg/io.hpp"
-#include "gpureg/surface_error.hpp"
 #include "json/json.hpp"
 #include "json/json_file.hpp"
 #include "options/output_path.hpp"

@@ -5,7 +5,7 @@
 #include <string>
 
 #include "command.hpp"
-#include "gpureg/trajectory.hpp"
+#include "gpureg/evaluation/trajectory.hpp"
 #include "json/json.hpp"
 #include "json/json_file.hpp"
 #include "options/output_path.hpp"

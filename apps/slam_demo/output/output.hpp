@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <gpureg/surface_error.hpp>
+#include <gpureg/evaluation/surface_error.hpp>
 #include <nlohmann/json.hpp>
 #include <string>
 

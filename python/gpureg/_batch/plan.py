@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from . import _core
-from ._core import RegistrationOptions
-from .fragments import FragmentSet
+from .. import _core
+from .._core import RegistrationOptions
+from ..fragments import FragmentSet
 
 #: Chunks visit pairs in tiles of so many fragments by so many: a tile's fragments fit into memory together.
 TILE = 64

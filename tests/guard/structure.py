@@ -1,15 +1,23 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""Headers that are slow to compile stay out of headers that everything includes.
+"""Headers that are slow to compile stay out of headers that everything includes; folders stay small.
 
-heavy_headers.py [ROOT]    exit status 1 and one line per file that may not include what it includes
+structure.py [ROOT]    exit status 1 and one line per file that may not include what it includes, and per folder with
+                       too many files
 """
 
+import os
 import pathlib
 import re
 import sys
 
 FOLDERS = ("include", "src", "apps/gpureg", "data")
+
+MOST_FILES = 30  # of one folder
+# Records are data, one file a figure; builds and caches are nobody's code.
+UNCOUNTED = re.compile(
+    r"bench/results|tests/fuzz/corpus/.*|docs/(images|_static).*|build.*|out|shared|.*__pycache__|.*\..*"
+)
 
 # Who may include a header of other libraries, or a part of its folder. Sources may include Eigen as they like.
 HEAVY = {
@@ -89,15 +97,31 @@ def heavy_through_others(root: pathlib.Path) -> list[str]:
     ]
 
 
+def full_folders(root: pathlib.Path) -> list[str]:
+    """Folders with more files than one looks through."""
+    found = []
+    for folder, inner, names in os.walk(root):
+        place = pathlib.Path(folder)
+        inner[:] = [
+            i for i in inner if not UNCOUNTED.fullmatch((place / i).relative_to(root).as_posix())
+        ]
+        count = sum(not name.endswith((".so", ".pyc")) for name in names)
+        if count > MOST_FILES:
+            found.append(
+                f"{place.relative_to(root).as_posix()} has {count} files: split it by subject"
+            )
+    return found
+
+
 def complaints(root: pathlib.Path) -> list[str]:
-    return forbidden(root) + heavy_through_others(root)
+    return forbidden(root) + heavy_through_others(root) + full_folders(root)
 
 
 def main() -> int:
     root = pathlib.Path(sys.argv[1]) if len(sys.argv) > 1 else pathlib.Path(__file__).parents[2]
     found = complaints(root)
     for line in found:
-        print(f"{line} (tests/guard/heavy_headers.py lists who may)")
+        print(f"{line} (rules and exceptions: tests/guard/structure.py)")
     return 1 if found else 0
 
 

@@ -11,10 +11,10 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 import numpy.typing as npt
 
-from . import _core
-from ._core import Context, PreparedCloud, RegistrationOptions, RegistrationResult
-from .fragments import FragmentSet
-from .preparation import pieces
+from .. import _core
+from .._core import Context, PreparedCloud, RegistrationOptions, RegistrationResult
+from ..fragments import FragmentSet
+from ..preparation import pieces
 
 _READERS = 4  # reading a file leaves the interpreter free
 _TOGETHER = 32  # clouds per call of prepare: enough to fill a device

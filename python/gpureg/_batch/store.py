@@ -17,10 +17,10 @@ import pyarrow as pa
 import pyarrow.compute
 import pyarrow.parquet as pq
 
-from . import _core
-from ._core import IoError
-from ._plan import Plan, difference
-from ._table import Key, entries_of, table_of
+from .. import _core
+from .._core import IoError
+from .plan import Plan, difference
+from .table import Key, entries_of, table_of
 
 Row = dict[str, Any]
 

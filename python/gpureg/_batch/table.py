@@ -10,8 +10,8 @@ import numpy as np
 import numpy.typing as npt
 import pyarrow as pa
 
-from ._core import RegistrationResult
-from .registration import ALIGNED
+from .._core import RegistrationResult
+from ..registration import ALIGNED
 
 Key = tuple[int, int]
 

@@ -5,7 +5,7 @@
 #include <cstddef>
 #include <vector>
 
-#include "gpureg/trajectory.hpp"
+#include "gpureg/evaluation/trajectory.hpp"
 
 /// Distance of a map to the true surface (component `evaluation`). Thread-safe.
 namespace gpureg::evaluation {

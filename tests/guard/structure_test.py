@@ -1,15 +1,15 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""The check of heavy headers sees them, directly and through others."""
+"""The check of the structure sees heavy headers, directly and through others, and full folders."""
 
 import pathlib
 import tempfile
 import unittest
 
-import heavy_headers
+import structure
 
 
-class HeavyHeaders(unittest.TestCase):
+class Structure(unittest.TestCase):
     def complaints(self, **files):
         with tempfile.TemporaryDirectory() as folder:
             root = pathlib.Path(folder)
@@ -17,10 +17,10 @@ class HeavyHeaders(unittest.TestCase):
                 path = root / "include/gpureg" / name.replace("_dot_", ".")
                 path.parent.mkdir(parents=True, exist_ok=True)
                 path.write_text(text)
-            return heavy_headers.complaints(root)
+            return structure.complaints(root)
 
     def test_the_project_itself(self):
-        self.assertEqual(heavy_headers.complaints(pathlib.Path(__file__).parents[2]), [])
+        self.assertEqual(structure.complaints(pathlib.Path(__file__).parents[2]), [])
 
     def test_light_ones_pass(self):
         self.assertEqual(
@@ -49,6 +49,11 @@ class HeavyHeaders(unittest.TestCase):
         self.assertEqual(
             found, ["include/gpureg/io.hpp includes Eigen/Geometry through other headers"]
         )
+
+    def test_full_folders(self):
+        for count, most in ((30, 0), (31, 1)):
+            files = {f"a{k}_dot_hpp": "" for k in range(count)}
+            self.assertEqual(len(self.complaints(**files)), most, count)
 
 
 if __name__ == "__main__":
