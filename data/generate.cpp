@@ -33,6 +33,10 @@ void require(bool fine, const std::string& field, const std::string& value, cons
   if (!fine) throw InvalidArgument(field + " is " + value + ", but must be " + rule);
 }
 
+bool is_generated(const std::string& building) {
+  return building.empty() || building == "office" || building == "warehouse";
+}
+
 void validate(const GenerateOptions& o) {
   require(o.fragments >= 1 && o.fragments <= 10000, "fragments", std::to_string(o.fragments),
           "1 to 10000");
@@ -42,8 +46,8 @@ void validate(const GenerateOptions& o) {
           "0 (all cores) to 1024");
   require(o.clutter >= 0 && o.clutter <= 2, "clutter", std::to_string(o.clutter),
           "0 to 2 a square metre");
-  require(o.clutter == 0 || !o.building.empty(), "clutter", std::to_string(o.clutter),
-          "0 without a building: generated houses are furnished");
+  require(o.clutter == 0 || !is_generated(o.building), "clutter", std::to_string(o.clutter),
+          "0 without a mesh of a building: generated ones are furnished");
   require(o.no_return >= 0 && o.no_return <= 1000, "no_return", std::to_string(o.no_return),
           "0 to 1000 m");
   const SensorOptions& s = o.sensor;
@@ -84,7 +88,10 @@ void parallel(int threads, int count, const Work& work) {
   if (failure) std::rethrow_exception(failure);
 }
 
-House furnished_building(const GenerateOptions& options) {
+House building_of(const GenerateOptions& options) {
+  if (options.building.empty()) return build_house(options.seed);
+  if (options.building == "office") return build_office(options.seed);
+  if (options.building == "warehouse") return build_warehouse(options.seed);
   House house{{}, {}, {}, read_building(options.building)};
   texture_building(house.mesh, options.seed);
   scatter(house, options.seed, options.clutter);
@@ -101,7 +108,7 @@ class Generator {
         threads_(options.threads > 0
                      ? options.threads
                      : std::max(1, static_cast<int>(std::thread::hardware_concurrency()))),
-        house_(options.building.empty() ? build_house(options.seed) : furnished_building(options)),
+        house_(building_of(options)),
         scene_(house_.mesh),
         sensor_(scene_, options.sensor, options.seed),
         world_from_camera_(walk(house_, scene_, options.seed,

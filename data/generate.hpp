@@ -29,11 +29,12 @@ struct GenerateOptions {
   int fragments = 20;            ///< 1 .. 10000; about 0.7 MB of memory each
   int frames_per_fragment = 50;  ///< 1 .. 1000; the camera moves about 1.5 cm per frame
   std::uint64_t seed = 1;        ///< building, furniture, path and noise all follow from it
-  /// A mesh to scan instead of a building of its own: metres, z up (glTF and COLLADA: as the file
+  /// Instead of a house: "office" or "warehouse", with repeated furniture (house.hpp), or a mesh to
+  /// scan: metres, z up (glTF and COLLADA: as the file
   /// has it), floor at z = 0, one storey. Any format that Assimp reads. In the colour images every
   /// connected part has a texture of its own, from the seed, in the colours of the file.
   std::string building;
-  /// 0 .. 2, with building: pieces of furniture per square metre that are put into it, so that what
+  /// 0 .. 2, with a mesh: pieces of furniture per square metre that are put into it, so that what
   /// was copied in it differs
   double clutter = 0;
   /// 0 .. 1000 metres: the path does not come back to a place before this length; of some random

@@ -16,20 +16,6 @@ using Maker = Piece (*)(Random&);
 
 constexpr float kQuarter = 1.57079633f;
 
-/// The footprint of a piece in the world; exact for quarter turns, its bounding rectangle
-/// otherwise.
-Rect footprint(const Affine3f& frame, const Piece& piece) {
-  Rect r{Vector2f::Constant(1e9f), Vector2f::Constant(-1e9f)};
-  for (const float x : {-piece.width / 2, piece.width / 2}) {
-    for (const float y : {0.0f, piece.depth}) {
-      const Vector2f p = (frame * Vector3f(x, y, 0)).head<2>();
-      r.low = r.low.cwiseMin(p);
-      r.high = r.high.cwiseMax(p);
-    }
-  }
-  return r;
-}
-
 /// Furnishes one room: keeps the placed pieces, and tries locations until one is free.
 class Furnisher {
  public:
@@ -201,10 +187,7 @@ class Furnisher {
                     [&](const Rect& r) { return rect.overlaps(r, 0); }))
       return false;
     taken_.push_back(rect);
-    house_.obstacles.push_back({rect, piece.height});
-    mesh_.place(frame);
-    Random details(mix64(model));
-    piece.build(mesh_, details);
+    place_piece(house_, frame, piece, model);
     return true;
   }
 
@@ -296,6 +279,26 @@ const std::vector<std::vector<Wish>>& room_kinds() {
 }
 
 }  // namespace
+
+Rect footprint(const Affine3f& frame, const Piece& piece) {
+  Rect r{Vector2f::Constant(1e9f), Vector2f::Constant(-1e9f)};
+  for (const float x : {-piece.width / 2, piece.width / 2}) {
+    for (const float y : {0.0f, piece.depth}) {
+      const Vector2f p = (frame * Vector3f(x, y, 0)).head<2>();
+      r.low = r.low.cwiseMin(p);
+      r.high = r.high.cwiseMax(p);
+    }
+  }
+  return r;
+}
+
+void place_piece(House& house, const Affine3f& frame, const Piece& piece, std::uint64_t model) {
+  house.obstacles.push_back({footprint(frame, piece), piece.height});
+  MeshBuilder mesh(house.mesh);
+  mesh.place(frame);
+  Random details(mix64(model));
+  piece.build(mesh, details);
+}
 
 void furnish(House& house, std::uint64_t seed) {
   Random order(hash_key(seed, Purpose::furniture));

@@ -5,6 +5,7 @@
 
 #include "data/mesh.hpp"
 #include "data/random.hpp"
+#include "data/rooms/house.hpp"
 
 namespace gpureg::synthetic {
 
@@ -14,6 +15,13 @@ struct Piece {
   float width = 0, depth = 0, height = 0;
   std::function<void(MeshBuilder&, Random&)> build;
 };
+
+/// The footprint of a piece in the world; exact for quarter turns, its bounding rectangle
+/// otherwise.
+Rect footprint(const Eigen::Affine3f& world_from_piece, const Piece& piece);
+/// Builds a piece, whose details follow from the model, into the house, as an obstacle too.
+void place_piece(House& house, const Eigen::Affine3f& world_from_piece, const Piece& piece,
+                 std::uint64_t model);
 
 // Colours that a house has.
 Material wood(Random& random);

@@ -58,12 +58,23 @@ struct House {
   Mesh mesh;
 };
 
+constexpr float kWall = 0.14f;  ///< metres: thickness of the walls between rooms
+
 /// Plans, builds and furnishes a house of 4 to 7 rooms. The same seed gives the same house.
 House build_house(std::uint64_t seed);
+/// An office: rooms of equal desks along a corridor of equal doors, a hall with rows of the same
+/// desks and chairs, meeting rooms with equal tables. Size and models follow from the seed.
+House build_office(std::uint64_t seed);
+/// A warehouse: one hall with rows of equal racks, which hold equal boxes.
+House build_warehouse(std::uint64_t seed);
 
 // The steps of build_house.
 void plan_rooms(House& house, Random& random);
 void build_walls(House& house, Random& random);
 void furnish(House& house, std::uint64_t seed);
+
+/// Opens a doorway between room a and room b, which lies beyond a's side 1 (east) or 2 (north).
+/// centre: world coordinate along the wall.
+void open_door(House& house, int a, int b, int side_a, float centre, float width, float top);
 
 }  // namespace gpureg::synthetic

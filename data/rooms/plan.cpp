@@ -9,8 +9,6 @@ namespace {
 
 using Eigen::Vector2f;
 
-constexpr float kWall = 0.14f;  // thickness of the walls between rooms
-
 /// Rooms side by side from x = 0, all of one depth. Pairs of neighbours have the same width, which
 /// makes perceptual aliases.
 void add_row(House& house, Random& random, float bottom, float depth, int count, float height) {
@@ -26,7 +24,7 @@ void add_row(House& house, Random& random, float bottom, float depth, int count,
 }
 
 struct Contact {
-  int a, b, side_a, side_b;
+  int a, b, side_a;
   float from, to;  // along the shared wall, world coordinate
 };
 
@@ -43,8 +41,7 @@ std::vector<Contact> contacts(const House& house) {
         const int other = 1 - axis;
         const float from = std::max(ra.low[other], rb.low[other]),
                     to = std::min(ra.high[other], rb.high[other]);
-        if (to - from > 1.5f)
-          found.push_back({a, b, axis == 0 ? 1 : 2, axis == 0 ? 3 : 0, from, to});
+        if (to - from > 1.5f) found.push_back({a, b, axis == 0 ? 1 : 2, from, to});
       }
     }
   }
@@ -70,18 +67,7 @@ void add_door(House& house, const Contact& c, Random& random) {
   const float width = arch ? std::min(1.5f, c.to - c.from - 0.5f) : random.uniform(0.86f, 0.98f);
   const float top = arch ? 2.2f : 2.05f,
               centre = random.uniform(c.from + width / 2 + 0.2f, c.to - width / 2 - 0.2f);
-  for (const auto& [index, side] : {std::pair{c.a, c.side_a}, std::pair{c.b, c.side_b}}) {
-    Room& room = house.rooms[static_cast<std::size_t>(index)];
-    const auto [from, to] = to_side(room, side, centre - width / 2, centre + width / 2);
-    room.openings[static_cast<std::size_t>(side)].push_back(
-        {Opening::Kind::door, from, to, 0, top, kWall / 2});
-  }
-  const bool east = c.side_a == 1;
-  const Rect& floor = house.rooms[static_cast<std::size_t>(c.a)].floor;
-  house.doors.push_back({c.a, c.b,
-                         east ? Vector2f(floor.high.x() + kWall / 2, centre)
-                              : Vector2f(centre, floor.high.y() + kWall / 2),
-                         east ? Vector2f(1, 0) : Vector2f(0, 1)});
+  open_door(house, c.a, c.b, c.side_a, centre, width, top);
 }
 
 /// Doors until all rooms hang together, and a few more, so that there are loops to walk.
@@ -133,6 +119,21 @@ Eigen::Affine3f Room::world_from_side(int side) const {
   const Vector2f corner[4] = {
       floor.low, {floor.high.x(), floor.low.y()}, floor.high, {floor.low.x(), floor.high.y()}};
   return upright({corner[side].x(), corner[side].y(), 0}, 1.57079633f * static_cast<float>(side));
+}
+
+void open_door(House& house, int a, int b, int side_a, float centre, float width, float top) {
+  for (const auto& [index, side] : {std::pair{a, side_a}, std::pair{b, (side_a + 2) % 4}}) {
+    Room& room = house.rooms[static_cast<std::size_t>(index)];
+    const auto [from, to] = to_side(room, side, centre - width / 2, centre + width / 2);
+    room.openings[static_cast<std::size_t>(side)].push_back(
+        {Opening::Kind::door, from, to, 0, top, kWall / 2});
+  }
+  const bool east = side_a == 1;
+  const Rect& floor = house.rooms[static_cast<std::size_t>(a)].floor;
+  house.doors.push_back({a, b,
+                         east ? Vector2f(floor.high.x() + kWall / 2, centre)
+                              : Vector2f(centre, floor.high.y() + kWall / 2),
+                         east ? Vector2f(1, 0) : Vector2f(0, 1)});
 }
 
 void plan_rooms(House& house, Random& random) {

@@ -90,12 +90,12 @@ void add_generate(CommandLine& line) {
       .natural()
       .show_default();
   verb.option("--threads", o->scene.threads, "0: all").show_default();
-  verb.option(
-      "--building", o->scene.building,
-      "Mesh to scan instead of a building of its own: metres, z up, floor at z = 0. Its parts "
-      "get textures, in the colours of the file");
+  verb.option("--building", o->scene.building,
+              "Instead of a house: office or warehouse, whose furniture repeats, or a mesh to "
+              "scan: metres, "
+              "z up, floor at z = 0. Its parts get textures, in the colours of the file");
   verb.option("--clutter", o->scene.clutter,
-              "Pieces of furniture per square metre to put into it; copied rooms then differ")
+              "Pieces of furniture per square metre to put into the mesh; copied rooms then differ")
       .show_default();
   verb.option("--no-return", o->scene.no_return,
               "Metres that the path goes before it comes back to a place")
