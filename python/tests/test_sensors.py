@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Files of other sensors, meshes, and what is known of the clouds."""
 
+import pathlib
 import types
 import warnings
 
@@ -82,6 +83,23 @@ class TestLas:
                 path.write_bytes(whole[:at] + b"\xff\xff\xff\xff" + whole[at + 4 :])
                 with pytest.raises(gpureg.IoError, match=rf"wrong_{name}: .*{word}"):
                     gpureg.prepare(path)
+
+    @pytest.mark.parametrize("layer", [0, 8])
+    def test_layers_of_a_damaged_file_take_no_memory(self, laspy, tmp_path, layer):
+        file = laspy.create(point_format=6, file_version="1.4")
+        file.x, file.y, file.z = np.random.default_rng(1).random((3, 500))
+        path = str(tmp_path / "layers.laz")
+        file.write(path)
+        assert gpureg.prepare(path).statistics.input_points == 500
+        content = bytearray(open(path, "rb").read())
+        # A chunk is a whole point, the number of its points, the sizes of its layers, and these.
+        start, size = int.from_bytes(content[96:100], "little"), 30
+        at = start + 8 + size + 4 + 4 * layer
+        content[at : at + 4] = (0xF0000000).to_bytes(4, "little")
+        pathlib.Path(path).write_bytes(content)
+        # lazrs takes 4 GB for it before it finds that the file ends.
+        with pytest.raises(gpureg.IoError, match=r"layers\.laz: .*4026531840 bytes announced"):
+            gpureg.prepare(path)
 
     def test_without_laspy_the_error_says_what_to_install(self, tmp_path, monkeypatch):
         monkeypatch.setitem(__import__("sys").modules, "laspy", None)
