@@ -42,7 +42,7 @@ void Batch::align(Chunk& chunk) const {
 RegistrationResult Batch::result_of(const Chunk& chunk, std::size_t variant) const {
   const PreparedState &s = *variants_[variant].source, &t = *variants_[variant].target;
   const std::size_t place = variant - chunk.begin;
-  return to_result(chunk.outcomes[place], s, t, swaps(s, t, options_), options_,
+  return to_result(chunk.outcomes[place], {s, t, swaps(s, t, options_), options_},
                    chunk.inputs[place].prior);
 }
 

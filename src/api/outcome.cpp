@@ -2,16 +2,10 @@
 #include "api/outcome.hpp"
 
 #include <algorithm>
-#include <cmath>
-#include <limits>
 #include <map>
-#include <numeric>
 #include <utility>
 
-#include "api/frames.hpp"
 #include "confidence/calibrate_modes.hpp"
-#include "confidence/confidence.hpp"
-#include "confidence/pose_evidence.hpp"
 #include "pipeline/conclude.hpp"
 #include "symmetry/symmetry.hpp"
 
@@ -24,12 +18,6 @@ constexpr double kSimilarLogOdds = 2.302585;
 constexpr double kWorthTesting = 0.05;
 /// Prepared points of the largest cloud whose symmetry is tested; parts have some thousand.
 constexpr std::uint32_t kLargestSymmetric = 200'000;
-
-double rmse(std::uint64_t residual, std::uint32_t inliers, double distance) {
-  return inliers > 0 ? distance * std::sqrt(static_cast<double>(residual) /
-                                            static_cast<double>(kResidualScale) / inliers)
-                     : 0.0;
-}
 
 RegistrationReason evidence_reason(const RegistrationResult& result, bool contradicted,
                                    const RegistrationOptions& options) {
@@ -54,12 +42,11 @@ RegistrationStatus status_of(const RegistrationResult& result, const Registratio
 /// The modes of one pair, in the frames of its clouds.
 class Modes {
  public:
-  Modes(const PairOutcome& outcome, const PreparedState& source, const PreparedState& target,
-        bool swapped, const RegistrationOptions& options)
-      : outcome_(outcome), source_(source), target_(target), swapped_(swapped), options_(options) {
+  Modes(const PairOutcome& outcome, const AlignedPair& pair)
+      : outcome_(outcome), pair_(pair), options_(pair.options) {
     for (std::size_t k = 0; k < outcome.modes.size(); ++k) add(k);
     const ModeOutcome& first = outcome.modes.front();
-    middle_ = middle_of(source_moments(first), origin_of(source));
+    middle_ = middle_of(pair.source_moments(first), origin_of(pair.source));
   }
 
   /// Ranks the modes by their evidence, drops each that equals a better one, and fills in the
@@ -67,24 +54,19 @@ class Modes {
   std::vector<RegistrationMode> ranked() const {
     std::vector<PoseEvidence> evidence;
     for (const RegistrationMode& mode : modes_) evidence.push_back(mode.evidence);
-    const confidence::AvailableEvidence available = confidence::available_evidence(
-        evidence, source_.statistics.viewpoint, target_.statistics.viewpoint);
-    const std::vector<double> log_odds = confidence::rank_modes(evidence, available);
-    std::vector<std::size_t> order(modes_.size());
-    std::iota(order.begin(), order.end(), std::size_t(0));
-    std::stable_sort(order.begin(), order.end(),
-                     [&](std::size_t a, std::size_t b) { return log_odds[a] > log_odds[b]; });
+    const confidence::Ranking ranking = pair_.ranking_of(evidence);
     std::vector<RegistrationMode> out;
     std::vector<confidence::RankedMode> distinct;
-    for (const std::size_t k : order) {
+    for (const std::size_t k : ranking.order) {
       const RegistrationMode& mode = modes_[k];
       if (std::any_of(out.begin(), out.end(),
                       [&](const RegistrationMode& better) { return same(better, mode); }))
         continue;
       out.push_back(mode);
-      distinct.push_back({mode.evidence, log_odds[k], overlap_of(mode)});
+      distinct.push_back({mode.evidence, ranking.log_odds[k], pair_.overlap_of(outcome_of(mode))});
     }
-    auto confidences = confidence::confidences_of(distinct, available, options_.evidence.modes);
+    auto confidences =
+        confidence::confidences_of(distinct, ranking.available, options_.evidence.modes);
     set_confidences(confidences, out);
     mark_equivalents(distinct, out);
     std::vector<bool> equivalent;
@@ -109,7 +91,8 @@ class Modes {
     const auto close = [&](std::size_t k) {
       return ranked[k].log_odds >= ranked.front().log_odds - kSimilarLogOdds;
     };
-    const PreparedState& larger = source_.size > target_.size ? source_ : target_;
+    const PreparedState& larger =
+        pair_.source.size > pair_.target.size ? pair_.source : pair_.target;
     std::size_t last = 1;
     while (last < modes.size() && close(last)) ++last;
     double together = 0;
@@ -124,48 +107,37 @@ class Modes {
       const Eigen::Isometry3d first(modes.front().target_from_source.matrix());
       const Eigen::Isometry3d other(modes[k].target_from_source.matrix());
       Eigen::Isometry3d motion =
-          &larger == &source_ ? first.inverse() * other : other * first.inverse();
+          &larger == &pair_.source ? first.inverse() * other : other * first.inverse();
       motion.translation() += motion.linear() * origin - origin;
       modes[k].equivalent = symmetry.has(motion, slack);
     }
   }
 
-  CorrespondenceMoments source_moments(const ModeOutcome& mode) const {
-    return to_frame(swapped_ ? mode.target_moments : mode.source_moments, source_);
-  }
   /// Moments of the source points in correspondences under the origin mode.
   CorrespondenceMoments origin_moments(std::uint32_t origin_mode) const {
-    return source_moments(outcome_.modes[origins_.at(origin_mode)]);
+    return pair_.source_moments(outcome_.modes[origins_.at(origin_mode)]);
   }
 
   void add(std::size_t k) {
     const ModeOutcome& mode = outcome_.modes[k];
     RegistrationMode out;
-    out.target_from_source = to_transform(mode.pose, source_, target_, swapped_);
+    out.target_from_source = pair_.transform_of(mode.pose);
     // A perturbed pose within the correspondence distance of its origin is that mode, less well
     // refined; evidence cannot separate poses that close.
     const auto [origin, is_first] = origins_.emplace(mode.origin_mode, k);
     if (!is_first) {
-      const UnalignedIsometry3d before =
-          to_transform(outcome_.modes[origin->second].pose, source_, target_, swapped_);
+      const UnalignedIsometry3d before = pair_.transform_of(outcome_.modes[origin->second].pose);
       if (distance_between(out.target_from_source, before, origin_moments(mode.origin_mode)) <=
           static_cast<double>(options_.prepare.max_correspondence_distance))
         return;
     }
-    out.evidence = confidence::evidence_of(outcome_, mode, swapped_ ? target_ : source_,
-                                           swapped_ ? source_ : target_, swapped_);
+    out.evidence = pair_.evidence_of(outcome_, mode);
     out.rank_before_refinement = static_cast<std::uint32_t>(k);
     modes_.push_back(out);
   }
 
   const ModeOutcome& outcome_of(const RegistrationMode& mode) const {
     return outcome_.modes[mode.rank_before_refinement];
-  }
-
-  confidence::OverlapCount overlap_of(const RegistrationMode& m) const {
-    const ModeOutcome& mode = outcome_of(m);
-    return {std::min(mode.source.inliers, mode.target.inliers),
-            std::min(mode.source.tested, mode.target.tested)};
   }
 
   bool same(const RegistrationMode& a, const RegistrationMode& b) const {
@@ -179,18 +151,15 @@ class Modes {
   }
 
   const PairOutcome& outcome_;
-  const PreparedState& source_;
-  const PreparedState& target_;
-  bool swapped_;
+  const AlignedPair& pair_;
   const RegistrationOptions& options_;
   std::map<std::uint32_t, std::size_t> origins_;  ///< first mode of each origin mode
   std::vector<RegistrationMode> modes_;
   Eigen::Vector3d middle_;  ///< centre of the source points in correspondences
 };
 
-void add_modes(const PairOutcome& outcome, const PreparedState& source, const PreparedState& target,
-               bool swapped, const RegistrationOptions& options, RegistrationResult& result) {
-  result.modes = Modes(outcome, source, target, swapped, options).ranked();
+void add_modes(const PairOutcome& outcome, const AlignedPair& pair, RegistrationResult& result) {
+  result.modes = Modes(outcome, pair).ranked();
   const ModeOutcome& best = outcome.modes[result.modes.front().rank_before_refinement];
   result.has_candidate = true;
   result.target_from_source = result.modes.front().target_from_source;
@@ -199,17 +168,15 @@ void add_modes(const PairOutcome& outcome, const PreparedState& source, const Pr
   result.statistics.inliers = result.statistics.consensus = best.source.inliers;
   result.statistics.refine_iterations = best.iterations;
   result.inlier_ratio = pipeline::inlier_ratio(result.statistics);
-  result.inlier_rmse = rmse(best.source.residual, best.source.inliers,
-                            static_cast<double>(options.prepare.max_correspondence_distance));
-  result.source_moments = to_frame(swapped ? best.target_moments : best.source_moments, source);
-  result.target_moments = to_frame(swapped ? best.source_moments : best.target_moments, target);
+  result.inlier_rmse = pair.rmse(best.source.residual, best.source.inliers);
+  result.source_moments = pair.source_moments(best);
+  result.target_moments = pair.target_moments(best);
 }
 
 }  // namespace
 
-RegistrationResult to_row_result(const PairOutcome& all, const PreparedState& source,
-                                 const PreparedState& target, bool swapped,
-                                 const RegistrationOptions& options, const PriorTest& prior) {
+RegistrationResult to_row_result(const PairOutcome& all, const AlignedPair& pair,
+                                 const PriorTest& prior) {
   // Refinement moves poses, so they are asked again.
   const bool some_contradict =
       std::any_of(all.modes.begin(), all.modes.end(),
@@ -230,41 +197,37 @@ RegistrationResult to_row_result(const PairOutcome& all, const PreparedState& so
   result.has_candidate = outcome.has_pose;
   result.statistics = outcome.statistics;
   result.timings = outcome.timings;
-  result.source_viewpoint = source.statistics.viewpoint;
-  result.target_viewpoint = target.statistics.viewpoint;
-  result.statistics.swapped = swapped;
-  if (swapped) {
+  result.source_viewpoint = pair.source.statistics.viewpoint;
+  result.target_viewpoint = pair.target.statistics.viewpoint;
+  result.statistics.swapped = pair.swapped;
+  if (pair.swapped) {
     std::swap(result.statistics.source_points, result.statistics.target_points);
     if (result.reason == RegistrationReason::too_few_source_points)
       result.reason = RegistrationReason::too_few_target_points;
     else if (result.reason == RegistrationReason::too_few_target_points)
       result.reason = RegistrationReason::too_few_source_points;
   }
-  if (options.method == RegistrationMethod::compatibility) {
-    if (!outcome.modes.empty()) add_modes(outcome, source, target, swapped, options, result);
-    result.reason = evidence_reason(result, some_contradict && outcome.modes.empty(), options);
-    result.status = status_of(result, options);
+  if (pair.options.method == RegistrationMethod::compatibility) {
+    if (!outcome.modes.empty()) add_modes(outcome, pair, result);
+    result.reason = evidence_reason(result, some_contradict && outcome.modes.empty(), pair.options);
+    result.status = status_of(result, pair.options);
     return result;
   }
   if (!outcome.has_pose) return result;
 
-  result.target_from_source = to_transform(outcome.pose, source, target, swapped);
+  result.target_from_source = pair.transform_of(outcome.pose);
   result.inlier_ratio = pipeline::inlier_ratio(outcome.statistics);
   result.score = result.inlier_ratio;
-  result.inlier_rmse = rmse(outcome.support.residual, outcome.support.inliers,
-                            static_cast<double>(options.prepare.max_correspondence_distance));
-  result.source_moments =
-      to_frame(swapped ? outcome.target_moments : outcome.source_moments, source);
-  result.target_moments =
-      to_frame(swapped ? outcome.source_moments : outcome.target_moments, target);
+  result.inlier_rmse = pair.rmse(outcome.support.residual, outcome.support.inliers);
+  result.source_moments = pair.source_moments(outcome);
+  result.target_moments = pair.target_moments(outcome);
   return result;
 }
 
-RegistrationResult to_result(const PairOutcome& outcome, const PreparedState& source,
-                             const PreparedState& target, bool swapped,
-                             const RegistrationOptions& options, const PriorTest& prior) {
-  RegistrationResult result = to_row_result(outcome, source, target, swapped, options, prior);
-  move_to_frames(result, source, target);
+RegistrationResult to_result(const PairOutcome& outcome, const AlignedPair& pair,
+                             const PriorTest& prior) {
+  RegistrationResult result = to_row_result(outcome, pair, prior);
+  move_to_frames(result, pair.source, pair.target);
   return result;
 }
 

@@ -1,20 +1,17 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include "api/aligned_pair.hpp"
 #include "gpureg/result.hpp"
-#include "pipeline/engine.hpp"
 
 namespace gpureg {
 
-/// Converts an outcome to the public result in the frames of the clouds. swapped: the engine moved
-/// the target of the pair.
-RegistrationResult to_result(const PairOutcome& outcome, const PreparedState& source,
-                             const PreparedState& target, bool swapped,
-                             const RegistrationOptions& options, const PriorTest& prior = {});
+/// Converts an outcome to the public result in the frames of the clouds.
+RegistrationResult to_result(const PairOutcome& outcome, const AlignedPair& pair,
+                             const PriorTest& prior = {});
 
 /// The same between the rows of both clouds, without their origins (PointCloudView::origin).
-RegistrationResult to_row_result(const PairOutcome& outcome, const PreparedState& source,
-                                 const PreparedState& target, bool swapped,
-                                 const RegistrationOptions& options, const PriorTest& prior = {});
+RegistrationResult to_row_result(const PairOutcome& outcome, const AlignedPair& pair,
+                                 const PriorTest& prior = {});
 
 }  // namespace gpureg

@@ -129,7 +129,7 @@ RegistrationResult align(const Context& context, const PreparedCloud& source,
     } else {
       Access::engine(context)->align({&input, 1}, options, {&outcome, 1});
     }
-    keep_better(to_result(outcome, *variant.source, *variant.target, swapped, options), result);
+    keep_better(to_result(outcome, {*variant.source, *variant.target, swapped, options}), result);
   }
   return result;
 }

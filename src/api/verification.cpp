@@ -2,17 +2,13 @@
 #include "gpureg/verification.hpp"
 
 #include <algorithm>
-#include <cmath>
 #include <string>
 
-#include "api/frames.hpp"
 #include "api/outcome.hpp"
 #include "api/pair_input.hpp"
 #include "api/variants.hpp"
 #include "common/in_halves.hpp"
 #include "confidence/calibrate_modes.hpp"
-#include "confidence/confidence.hpp"
-#include "confidence/pose_evidence.hpp"
 
 namespace gpureg {
 namespace {
@@ -31,31 +27,18 @@ void check_pose(const UnalignedIsometry3d& pose, const std::string& name) {
     throw InvalidArgument(name + " is no rigid motion");
 }
 
-/// One pair whose poses are verified. Poses and moments are between the rows of the clouds, as
-/// large origins would cost their differences the last digits.
-struct VerifiedPair {
-  const PreparedState& source;
-  const PreparedState& target;
-  bool swapped;
-  const RegistrationOptions& options;
-
+/// One pair whose poses are verified.
+struct VerifiedPair : AlignedPair {
   PoseVerification verification_of(const PairOutcome& outcome, const ModeOutcome& mode) const {
     PoseVerification out;
-    out.target_from_source = to_transform(mode.pose, source, target, swapped);
-    const PreparedState& moved = swapped ? target : source;
-    const PreparedState& fixed = swapped ? source : target;
-    out.evidence = confidence::evidence_of(outcome, mode, moved, fixed, swapped);
+    out.target_from_source = transform_of(mode.pose);
+    out.evidence = evidence_of(outcome, mode);
     out.inliers = mode.source.inliers;
     out.points = mode.source.tested;
     out.inlier_ratio = out.points > 0 ? static_cast<double>(out.inliers) / out.points : 0.0;
-    const double distance = static_cast<double>(options.prepare.max_correspondence_distance);
-    out.inlier_rmse =
-        mode.source.inliers > 0
-            ? distance * std::sqrt(static_cast<double>(mode.source.residual) /
-                                   static_cast<double>(kResidualScale) / mode.source.inliers)
-            : 0.0;
-    out.source_moments = to_frame(swapped ? mode.target_moments : mode.source_moments, source);
-    out.target_moments = to_frame(swapped ? mode.source_moments : mode.target_moments, target);
+    out.inlier_rmse = rmse(mode.source.residual, mode.source.inliers);
+    out.source_moments = source_moments(mode);
+    out.target_moments = target_moments(mode);
     return out;
   }
 
@@ -66,16 +49,10 @@ struct VerifiedPair {
     confidence::OverlapCount overlap;  ///< counts for the verified pose alone
   };
 
-  static confidence::OverlapCount overlap_of(const ModeOutcome& mode) {
-    return {std::min(mode.source.inliers, mode.target.inliers),
-            std::min(mode.source.tested, mode.target.tested)};
-  }
-
   /// The distinct poses that align() finds for the pair.
   std::vector<Candidate> alternatives_of(const PairOutcome& found) const {
     std::vector<Candidate> out;
-    for (const RegistrationMode& mode :
-         to_row_result(found, source, target, swapped, options).modes)
+    for (const RegistrationMode& mode : to_row_result(found, *this).modes)
       out.push_back({mode.target_from_source, mode.evidence, {0, 0}});
     return out;
   }
@@ -95,23 +72,15 @@ struct VerifiedPair {
         all.push_back(other);
     std::vector<PoseEvidence> evidence;
     for (const Candidate& c : all) evidence.push_back(c.evidence);
-    const confidence::AvailableEvidence available = confidence::available_evidence(
-        evidence, source.statistics.viewpoint, target.statistics.viewpoint);
-    const std::vector<double> log_odds = confidence::rank_modes(evidence, available);
-    std::vector<std::size_t> order(all.size());
-    for (std::size_t k = 0; k < order.size(); ++k) order[k] = k;
-    std::stable_sort(order.begin(), order.end(),
-                     [&](std::size_t a, std::size_t b) { return log_odds[a] > log_odds[b]; });
+    const confidence::Ranking ranking = ranking_of(evidence);
     std::vector<confidence::RankedMode> ranked;
-    std::size_t place = 0;
-    for (const std::size_t k : order) {
-      if (k == 0) place = ranked.size();
-      ranked.push_back({all[k].evidence, log_odds[k], all[k].overlap});
-    }
+    for (const std::size_t k : ranking.order)
+      ranked.push_back({all[k].evidence, ranking.log_odds[k], all[k].overlap});
     std::vector<confidence::ModeConfidence> confidences =
-        confidence::confidences_of(ranked, available, options.evidence.modes);
+        confidence::confidences_of(ranked, ranking.available, options.evidence.modes);
     confidence::calibrate_modes(options.calibration, std::vector<bool>(ranked.size()), confidences);
-    return confidences[place];
+    const auto place = std::find(ranking.order.begin(), ranking.order.end(), std::size_t(0));
+    return confidences[static_cast<std::size_t>(place - ranking.order.begin())];
   }
 };
 
@@ -190,7 +159,7 @@ std::vector<std::vector<PoseVerification>> verify_poses_batch(
       const PreparedState &s = *variants[v].source, &t = *variants[v].target;
       const bool swapped = swaps(s, t, options);
       inputs.push_back(input_of(s, t, swapped));
-      verified.push_back({s, t, swapped, by_evidence});
+      verified.push_back({{s, t, swapped, by_evidence}});
       for (const UnalignedIsometry3d& pose : poses[variants[v].pair])
         local[v - begin].push_back(to_local(pose, s, t, swapped));
     }

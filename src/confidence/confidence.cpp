@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include "confidence/confidence_model.hpp"
 #include "math/exponential.hpp"
@@ -50,6 +51,18 @@ std::vector<double> rank_modes(const std::vector<PoseEvidence>& modes,
   std::vector<double> out;
   for (const PoseEvidence& evidence : modes)
     out.push_back(ranking.log_odds(features_of(evidence, available, Regressand::ranking)));
+  return out;
+}
+
+Ranking ranking_of(const std::vector<PoseEvidence>& modes, ViewpointSource source,
+                   ViewpointSource target) {
+  Ranking out;
+  out.available = available_evidence(modes, source, target);
+  out.log_odds = rank_modes(modes, out.available);
+  out.order.resize(modes.size());
+  std::iota(out.order.begin(), out.order.end(), std::size_t(0));
+  std::stable_sort(out.order.begin(), out.order.end(),
+                   [&](std::size_t a, std::size_t b) { return out.log_odds[a] > out.log_odds[b]; });
   return out;
 }
 

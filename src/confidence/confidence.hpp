@@ -13,6 +13,17 @@ namespace gpureg::confidence {
 /// Log odds of each mode by its own evidence, which rank the modes of a pair.
 std::vector<double> rank_modes(const std::vector<PoseEvidence>& modes, AvailableEvidence available);
 
+/// Poses of a pair in the order of their likelihood.
+struct Ranking {
+  AvailableEvidence available;
+  std::vector<double> log_odds;    ///< of each pose, from rank_modes()
+  std::vector<std::size_t> order;  ///< indices of the poses, the most likely first
+};
+
+/// @param source, target what was known of the viewpoints of the clouds.
+Ranking ranking_of(const std::vector<PoseEvidence>& modes, ViewpointSource source,
+                   ViewpointSource target);
+
 /// Number of overlapping points of the side with fewer of them, and the points of that side.
 struct OverlapCount {
   std::uint32_t points, of;

@@ -75,15 +75,14 @@ PosesOfPair perturb(const PairInput& pair, const PairOutcome& outcome,
     modes.push_back(&mode);
   }
   if (modes.empty()) return out;
-  const std::vector<double> log_odds =
-      rank_modes(evidence, available_evidence(evidence, pair.source->statistics.viewpoint,
-                                              pair.target->statistics.viewpoint));
-  const auto best = std::max_element(log_odds.begin(), log_odds.end());
-  const ModeOutcome& mode = *modes[static_cast<std::size_t>(best - log_odds.begin())];
+  const Ranking ranking =
+      ranking_of(evidence, pair.source->statistics.viewpoint, pair.target->statistics.viewpoint);
+  const std::size_t best = ranking.order.front();
+  const ModeOutcome& mode = *modes[best];
   const InformationSpectrum spectrum = spectrum_of(mode, *pair.source);
   out.origin_mode = mode.origin_mode;
   out.returned = return_test(mode, *pair.source, options);
-  for (const double fraction : fractions_for(*best))
+  for (const double fraction : fractions_for(ranking.log_odds[best]))
     for (const double step : {fraction * distance, -fraction * distance})
       out.poses.push_back(moved_along(spectrum, mode.pose, step));
   return out;

@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+
+#include "api/frames.hpp"
+#include "confidence/confidence.hpp"
+#include "confidence/pose_evidence.hpp"
+
+namespace gpureg {
+
+/// What the engine measured of the poses of a pair, in the caller's order of the clouds. Poses and
+/// moments are between the rows of the clouds, as large origins would cost their differences the
+/// last digits.
+struct AlignedPair {
+  const PreparedState& source;
+  const PreparedState& target;
+  bool swapped;  ///< the engine moved the target
+  const RegistrationOptions& options;
+
+  UnalignedIsometry3d transform_of(const Pose<double>& pose) const {
+    return to_transform(pose, source, target, swapped);
+  }
+  PoseEvidence evidence_of(const PairOutcome& outcome, const ModeOutcome& mode) const {
+    return confidence::evidence_of(outcome, mode, swapped ? target : source,
+                                   swapped ? source : target, swapped);
+  }
+  /// Points in correspondences. Measured: ModeOutcome or PairOutcome.
+  template <typename Measured>
+  CorrespondenceMoments source_moments(const Measured& pose) const {
+    return to_frame(swapped ? pose.target_moments : pose.source_moments, source);
+  }
+  template <typename Measured>
+  CorrespondenceMoments target_moments(const Measured& pose) const {
+    return to_frame(swapped ? pose.source_moments : pose.target_moments, target);
+  }
+  double rmse(std::uint64_t residual, std::uint32_t inliers) const {
+    const double distance = static_cast<double>(options.prepare.max_correspondence_distance);
+    return inliers > 0 ? distance * std::sqrt(static_cast<double>(residual) /
+                                              static_cast<double>(kResidualScale) / inliers)
+                       : 0.0;
+  }
+  static confidence::OverlapCount overlap_of(const ModeOutcome& mode) {
+    return {std::min(mode.source.inliers, mode.target.inliers),
+            std::min(mode.source.tested, mode.target.tested)};
+  }
+  confidence::Ranking ranking_of(const std::vector<PoseEvidence>& poses) const {
+    return confidence::ranking_of(poses, source.statistics.viewpoint, target.statistics.viewpoint);
+  }
+};
+
+}  // namespace gpureg
