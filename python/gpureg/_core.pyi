@@ -802,8 +802,6 @@ class LineProcessOptions:
     tau_not_squared: bool
     min_weight: float
     max_rounds: int
-    correspondence_distance: float
-    refresh_interval: int
     def __init__(
         self,
         *,
@@ -812,8 +810,6 @@ class LineProcessOptions:
         tau_not_squared: bool = ...,
         min_weight: float = ...,
         max_rounds: int = ...,
-        correspondence_distance: float = ...,
-        refresh_interval: int = ...,
     ) -> None: ...
     def replace(
         self,
@@ -823,8 +819,6 @@ class LineProcessOptions:
         tau_not_squared: bool = ...,
         min_weight: float = ...,
         max_rounds: int = ...,
-        correspondence_distance: float = ...,
-        refresh_interval: int = ...,
     ) -> LineProcessOptions: ...
     def validate(self) -> None: ...
     def __eq__(self, other: object, /) -> bool: ...

@@ -91,8 +91,6 @@ struct Fields<pose_graph::LineProcessOptions> {
     v(&O::tau_not_squared, {"tau_not_squared", "mu = tau * kappa, as LoopSmart prints it, not tau^2 * kappa."});
     v(&O::min_weight, {"min_weight", between(0, 1, "a weight in (0, 1)"), "A loop with a smaller weight is rejected."});
     v(&O::max_rounds, {"max_rounds", from(1, kInfinity), "Rounds at most."});
-    v(&O::correspondence_distance, {"correspondence_distance", kPositive.in("metres"), "Correspondences of the information matrices are closer than this."});
-    v(&O::refresh_interval, {"refresh_interval", from(1, kInfinity), "Fragments after which information matrices are computed again."});
   }
   // clang-format on
 };

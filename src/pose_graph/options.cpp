@@ -19,8 +19,6 @@ Options Options::loopsmart() {
   options.line_process.tau = 0.2;
   options.line_process.tau_not_squared = true;
   options.line_process.min_weight = 0.25;
-  options.line_process.correspondence_distance = 0.05;
-  options.line_process.refresh_interval = 50;
   return options;
 }
 

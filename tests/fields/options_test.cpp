@@ -180,7 +180,6 @@ TEST(OptionFields, LengthsOfMapsHaveTheBitsOfTheirFormulas) {
     EXPECT_EQ(c.noise.max_translation, 0.4 * scale);
     EXPECT_EQ(c.information_unit, scale);
     EXPECT_EQ(c.graph.loop_noise.translation, 0.05 * scale);
-    EXPECT_EQ(c.graph.line_process.correspondence_distance, 0.05);
     EXPECT_EQ(c.drift_correlation, 10 * scale);
   }
 }

@@ -59,10 +59,7 @@ struct LineProcessOptions {
   bool tau_not_squared = false;
   double min_weight = 0.25;  ///< a loop with a smaller l is rejected, (0, 1)
   int max_rounds = 100;      ///< >= 1
-  /// The two below concern whoever computes the information matrices; optimize() does not use them.
-  double correspondence_distance = 0.05;  ///< epsilon: correspondences are closer than this, metres
-  int refresh_interval = 50;              ///< fragments after which they are computed again
-  void validate() const;                  ///< throws InvalidArgument
+  void validate() const;     ///< throws InvalidArgument
 };
 
 /// Levenberg-Marquardt.
