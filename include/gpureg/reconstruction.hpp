@@ -202,7 +202,8 @@ struct Surface {
 /// registration needs.
 PrepareOptions surface_options(PrepareOptions registration);
 
-/// The points of a cloud that prepare() made with surface_options().
+/// The points of a cloud that prepare() made with surface_options(), and its viewpoints if the
+/// caller gave them.
 Surface surface_of(const PreparedCloud& cloud);
 
 /// The same from a raw cloud. Features of the cloud are not used, and none are computed.

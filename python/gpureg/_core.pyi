@@ -1321,6 +1321,8 @@ class MapGraph:
     @property
     def islands(self) -> list[list[int]]: ...
 
+class Surface: ...
+
 class VoxelMap:
     def __init__(self, voxel_size: float) -> None: ...
     def add(
@@ -1340,11 +1342,11 @@ def reconstruct_map(
 def refine_map(
     context: Context,
     map: MapGraph,
-    clouds: list[PreparedCloud | None],
-    seen: list[bool],
+    surfaces: list[Surface | None],
     voxel_size: float,
     tell: Callable[[int], object] | None,
 ) -> dict[str, Any]: ...
+def surface_of(context: Context, cloud: Any, registration: PrepareOptions) -> Surface: ...
 def surface_options(registration: PrepareOptions) -> PrepareOptions: ...
 def result_of_row(
     aligned: bool, target_from_source: _Float64 | None, score: float, information: _Float64 | None

@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _core
-from ._arrays import CoreCloud, float64, index_pairs
+from ._arrays import float64, index_pairs
 from ._contexts import checked, context_of
 from ._core import (
     Context,
@@ -130,7 +130,7 @@ def _pair_results(
     if results is None:
         chosen = fragments.choose_pairs("all" if pairs is None else pairs)
         rows = np.ascontiguousarray(chosen[:, ::-1], np.uint32)  # the later one into the earlier
-        clouds = _prepared(fragments, range(len(fragments)), options.prepare, context, progress)
+        clouds = _prepared(fragments, options.prepare, context, progress)
         return rows, align_batch(clouds, rows, options=options, context=context, progress=progress)
     if hasattr(results, "table"):  # a BatchRun
         if pairs is not None:
@@ -211,32 +211,20 @@ def _from_trajectory(path: str, fragments: FragmentSet) -> Poses:
 
 def _prepared(
     fragments: FragmentSet,
-    positions: Sequence[int],
     options: _core.PrepareOptions,
     context: Context,
     progress: Progress,
-    seen: list[bool] | None = None,
 ) -> list[_core.PreparedCloud]:
-    """seen: gets whether the viewpoints of each cloud are known; then without features."""
     out: list[_core.PreparedCloud] = []
-    device = context.backend == "cuda" and seen is None
-    with batch_progress(progress, "preparing", len(positions), unit="cloud") as report:
-        for piece in pieces(len(positions), context):
-            inputs = [fragments.load(positions[k], options, device) for k in piece]
-            if seen is not None:
-                seen += [cloud[3] is not None for cloud in inputs]
-                inputs = [_featureless(cloud) for cloud in inputs]
-            names = [f"fragments[{positions[k]}]" for k in piece]
+    device = context.backend == "cuda"
+    with batch_progress(progress, "preparing", len(fragments), unit="cloud") as report:
+        for piece in pieces(len(fragments), context):
+            inputs = [fragments.load(k, options, device) for k in piece]
+            names = [f"fragments[{k}]" for k in piece]
             out += _core.prepare_batch(context, inputs, options, names)
             if report is not None:
                 report(len(out))
     return out
-
-
-def _featureless(cloud: CoreCloud) -> CoreCloud:
-    """A constant takes the place of features that nobody needs."""
-    points, normals, _, viewpoints, origin, stream = cloud
-    return (points, normals, np.zeros((len(points), 1), np.float32), viewpoints, origin, stream)
 
 
 def _refine(
@@ -247,16 +235,16 @@ def _refine(
     progress: Progress,
 ) -> dict[str, Any]:
     placed = [k for k, scan in enumerate(graph.scans) if scan[0]]
-    clouds: list[_core.PreparedCloud | None] = [None] * len(fragments)
-    seen = [False] * len(fragments)
-    known: list[bool] = []
+    surfaces: list[_core.Surface | None] = [None] * len(fragments)
     finer = _core.surface_options(options.prepare)
-    surfaces = _prepared(fragments, placed, finer, context, progress, known)
-    for k, cloud, flag in zip(placed, surfaces, known, strict=True):
-        clouds[k], seen[k] = cloud, flag
+    with batch_progress(progress, "preparing", len(placed), unit="cloud") as report:
+        for done, k in enumerate(placed, 1):
+            surfaces[k] = _core.surface_of(context, fragments.load(k, finer), options.prepare)
+            if report is not None:
+                report(done)
     with batch_progress(progress, "refining", _core.REFINE_ITERATIONS, unit="step") as report:
         tell = None if report is None else report
-        return _core.refine_map(context, graph, clouds, seen, options.prepare.voxel_size, tell)
+        return _core.refine_map(context, graph, surfaces, options.prepare.voxel_size, tell)
 
 
 __all__ = ["reconstruct"]

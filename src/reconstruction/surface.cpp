@@ -13,7 +13,10 @@ PrepareOptions surface_options(PrepareOptions registration) {
 }
 
 Surface surface_of(const PreparedCloud& cloud) {
-  Surface surface{cloud.points(), cloud.normals(), cloud.viewpoints()};
+  Surface surface{cloud.points(), cloud.normals()};
+  // prepare() takes the origin for the viewpoint where none is given.
+  if (cloud.statistics().viewpoint == ViewpointSource::said)
+    surface.viewpoints = cloud.viewpoints();
   const Eigen::Vector3f origin = cloud.origin().cast<float>();
   for (Eigen::Vector3f& point : surface.points) point += origin;
   for (Eigen::Vector3f& viewpoint : surface.viewpoints) viewpoint += origin;
@@ -27,10 +30,7 @@ Surface surface_of(const Context& context, PointCloudView cloud,
   cloud.features = no_features.data();
   cloud.feature_dimension = 1;
   cloud.feature_stride = 1;
-  Surface surface = surface_of(prepare(context, cloud, surface_options(registration)));
-  // prepare() invents a viewpoint where none is known.
-  if (cloud.viewpoint_count == 0) surface.viewpoints.clear();
-  return surface;
+  return surface_of(prepare(context, cloud, surface_options(registration)));
 }
 
 }  // namespace gpureg::reconstruction

@@ -7,7 +7,7 @@
 #include <limits>
 #include <string>
 
-#include "cloud.hpp"
+#include "cloud_input.hpp"
 #include "gpureg/error.hpp"
 #include "matrix.hpp"
 
@@ -77,17 +77,19 @@ py::dict report_of(const RefineReport& report) {
   return out;
 }
 
-/// context: of the clouds. clouds: prepared with surface_options, None for scans that are left out.
-/// seen: whether their viewpoints are known. tell: called with the number of each iteration.
-py::dict refine_map(const Context& context, Reconstruction& map, const py::list& clouds,
-                    const std::vector<bool>& seen, double voxel_size, const py::object& tell) {
+Surface surface_of_input(const Context& context, const py::tuple& cloud,
+                         const PrepareOptions& registration) {
+  const Input input(cloud);
+  const py::gil_scoped_release release;
+  return surface_of(context, input.view, registration);
+}
+
+/// surfaces: None for scans that are left out. tell: called with the number of each iteration.
+py::dict refine_map(const Context& context, Reconstruction& map, const py::list& given,
+                    double voxel_size, const py::object& tell) {
   std::vector<Surface> surfaces;
-  for (const py::handle cloud : clouds) {
-    surfaces.emplace_back();
-    if (cloud.is_none()) continue;
-    surfaces.back() = surface_of(cloud.cast<const Cloud&>().prepared);
-    if (!seen.at(surfaces.size() - 1)) surfaces.back().viewpoints.clear();
-  }
+  for (const py::handle surface : given)
+    surfaces.push_back(surface.is_none() ? Surface{} : surface.cast<const Surface&>());
   reconstruction::RefineOptions options =
       reconstruction::RefineOptions::for_depth_cameras(static_cast<float>(voxel_size));
   options.threads = static_cast<int>(context.backend() == Backend::cpu ? context.threads() : 0);
@@ -217,8 +219,11 @@ void bind_reconstruction(py::module_& m) {
       });
   m.def("reconstruct_map", &reconstruct_of, py::arg("scans"), py::arg("pairs"), py::arg("results"),
         py::arg("options"), py::arg("odometry"));
-  m.def("refine_map", &refine_map, py::arg("context"), py::arg("map"), py::arg("clouds"),
-        py::arg("seen"), py::arg("voxel_size"), py::arg("tell"));
+  m.def("refine_map", &refine_map, py::arg("context"), py::arg("map"), py::arg("surfaces"),
+        py::arg("voxel_size"), py::arg("tell"));
+  py::class_<Surface>(m, "Surface", "Points of a scan with their normals.");
+  m.def("surface_of", &surface_of_input, py::arg("context"), py::arg("cloud"),
+        py::arg("registration"));
   m.def("surface_options", &surface_options, py::arg("registration"));
   m.def("result_of_row", &result_of_row, py::arg("aligned"), py::arg("target_from_source"),
         py::arg("score"), py::arg("information"));
