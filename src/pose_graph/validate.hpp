@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <cmath>
 #include <string>
 
 #include "gpureg/error.hpp"
@@ -23,13 +22,5 @@ void require(bool good, const std::string& field, double value, const char* expe
 void require_pose(const UnalignedIsometry3d& pose, const std::string& name);
 void require_information(const UnalignedMatrix6d& information, const std::string& name);
 void require_confidence(double confidence, const std::string& name);
-
-inline void require_positive(const std::string& field, double value) {
-  require(std::isfinite(value) && value > 0, field, value, "a finite number > 0");
-}
-
-inline void require_not_negative(const std::string& field, double value) {
-  require(std::isfinite(value) && value >= 0, field, value, "a finite number >= 0");
-}
 
 }  // namespace gpureg::pose_graph

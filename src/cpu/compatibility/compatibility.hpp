@@ -32,20 +32,4 @@ inline CompatibilityTest test_of(const CompatibilityOptions& options) {
   return compatibility_test(options.tolerance, options.max_turn);
 }
 
-/// Calls take(k) for all compatible matches of one match, in their order, until it returns false.
-template <typename Take>
-void for_each_compatible(const MatchSet& matches, std::uint32_t seed, const CompatibilityTest& test,
-                         Take&& take) {
-  constexpr std::uint32_t kBlock = 256;
-  const OrientedMatch own = MatchColumns(matches)[seed];
-  std::uint8_t flag[kBlock];
-  for (std::uint32_t from = 0; from < matches.size(); from += kBlock) {
-    const std::uint32_t count = matches.size() - from < kBlock ? matches.size() - from : kBlock;
-    const MatchColumns block(matches, from);
-    for (std::uint32_t k = 0; k < count; ++k) flag[k] = compatible(block[k], own, test);
-    for (std::uint32_t k = 0; k < count; ++k)
-      if (flag[k] && !take(from + k)) return;
-  }
-}
-
 }  // namespace gpureg::cpu

@@ -35,9 +35,6 @@ class BlockCholesky {
   /// inverse covariance is the matrix.
   void colour(std::vector<Vector6d>& noise) const;
 
-  /// Multiplications and additions of one factorisation.
-  double flops() const { return flops_; }
-
  private:
   struct Front {
     int first = 0, columns = 0;  ///< block columns of the factor, in elimination order
@@ -59,9 +56,9 @@ class BlockCholesky {
 
   int size_;
   int threads_;
-  double flops_ = 0;
-  std::vector<int> order_;                    ///< elimination position -> block
-  std::vector<int> inverse_;                  ///< block -> elimination position
+  double flops_ = 0;          ///< multiplications and additions of one factorisation
+  std::vector<int> order_;    ///< elimination position -> block
+  std::vector<int> inverse_;  ///< block -> elimination position
   std::vector<std::pair<int, int>> pattern_;  ///< of the matrix, in elimination positions
   std::vector<Front> fronts_;                 ///< children before parents
 };
