@@ -9,6 +9,7 @@
 namespace gpureg::portable {
 
 constexpr double kPi = 0x1.921fb54442d18p+1, kPiLow = 0x1.1a62633145c07p-53;
+constexpr double kRadiansPerDegree = kPi / 180.0;
 /// Beyond this angle, sin and cos first take the remainder by the double nearest 2 pi: the same
 /// everywhere, but with an error that grows with the angle.
 constexpr double kLargestExactAngle = 1e6;

@@ -76,6 +76,26 @@ TEST(Refine, FarPointsWeighLess) {
   EXPECT_EQ(reconstruction::relative_variances(surface, 1.0)[0], 1.0f);
 }
 
+/// The origin that prepare() takes for an unknown viewpoint says nothing about ranges.
+TEST(Refine, SurfacesHaveTheGivenViewpointsAlone) {
+  const Surface points = room(1);
+  PointCloudView cloud(points.points);
+  const PrepareOptions options;
+  const PrepareOptions finer = reconstruction::surface_options(options);
+  const float viewpoint[] = {1, 1, 1};
+  for (const std::size_t count : {0, 1}) {
+    cloud.viewpoints = count > 0 ? viewpoint : nullptr;
+    cloud.viewpoint_count = count;
+    const Context context = Context::cpu(1);
+    const Surface alone = reconstruction::surface_of(context, cloud, options);
+    const Surface prepared = reconstruction::surface_of(prepare(context, cloud, finer));
+    EXPECT_EQ(alone.viewpoints.size(), count);
+    EXPECT_EQ(prepared.viewpoints.size(), count);
+    EXPECT_EQ(prepared.points, alone.points);
+    EXPECT_EQ(prepared.normals, alone.normals);
+  }
+}
+
 TEST(Refine, RefusesBadInput) {
   auto map = PairResults(2).map();
   EXPECT_THROW(reconstruction::refine({}, map), InvalidArgument);
