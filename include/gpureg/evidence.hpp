@@ -11,7 +11,6 @@ namespace gpureg {
 /// `target_*` points of the target moved into the source.
 struct PoseEvidence {
   std::uint32_t match_inliers = 0;  ///< matches that the pose brings within consensus_distance
-  std::uint32_t match_count = 0;    ///< matches of the pair
   /// The same as a normal-weighted share of all matches, the smaller one of both sides.
   double match_support = 0;
   /// Share of the points with a point of the other cloud within max_correspondence_distance whose

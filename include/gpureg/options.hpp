@@ -127,7 +127,6 @@ struct EvidenceOptions {
   /// Metres in front of an observed surface within which a point does not violate free space.
   float free_space_margin = 0.12f;
   float min_range = 0.3f;  ///< metres from a viewpoint below which nothing counts as observed
-  std::uint32_t min_observed = 0;  ///< observed points below which free space counts as unknown
 
   /// @throws InvalidArgument naming field and value.
   void validate() const;

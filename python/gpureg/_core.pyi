@@ -202,7 +202,6 @@ class EvidenceOptions:
     degeneracy_search_distance: float
     free_space_margin: float
     min_range: float
-    min_observed: int
     def __init__(
         self,
         *,
@@ -214,7 +213,6 @@ class EvidenceOptions:
         degeneracy_search_distance: float = ...,
         free_space_margin: float = ...,
         min_range: float = ...,
-        min_observed: int = ...,
     ) -> None: ...
     def replace(
         self,
@@ -227,7 +225,6 @@ class EvidenceOptions:
         degeneracy_search_distance: float = ...,
         free_space_margin: float = ...,
         min_range: float = ...,
-        min_observed: int = ...,
     ) -> EvidenceOptions: ...
     def validate(self) -> None: ...
     def __eq__(self, other: object, /) -> bool: ...
@@ -411,8 +408,6 @@ class PoseEvidence:
     # fields of PoseEvidence
     @property
     def match_inliers(self) -> int: ...
-    @property
-    def match_count(self) -> int: ...
     @property
     def match_support(self) -> float: ...
     @property

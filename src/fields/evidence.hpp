@@ -17,7 +17,6 @@ struct Fields<PoseEvidence> {
   static void visit(V&& v) {
     using E = PoseEvidence;
     v(&E::match_inliers, {"match_inliers", "Matches that the pose brings within consensus_distance."});
-    v(&E::match_count, {"match_count", "Matches of the pair."});
     v(&E::match_support, {"match_support", "The same as a normal-weighted share of all matches, the smaller one of both sides."});
     v(&E::source_overlap, &E::target_overlap, {"overlap", "Share of the source's points with a point of the target within max_correspondence_distance and a similar normal."});
     v(&E::source_overlap_any_normal, &E::target_overlap_any_normal, {"overlap_any_normal", "The same whatever the normals."});

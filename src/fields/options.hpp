@@ -137,7 +137,6 @@ struct Fields<EvidenceOptions> {
     v(&O::degeneracy_search_distance, {"degeneracy_search_distance", kLengthOrZero, voxels(8), "Range of the degeneracy search: the most likely mode is perturbed along its weakest direction by up to this far, both ways; 0: no search."});
     v(&O::free_space_margin, {"free_space_margin", kLength, voxels(12, 5), "Distance in front of an observed surface within which a point does not violate free space."});
     v(&O::min_range, {"min_range", kLength, voxels(6), "Distance from a viewpoint below which nothing counts as observed."});
-    v(&O::min_observed, {"min_observed", from(0, kInfinity), "Observed points below which free space counts as unknown."});
   }
   // clang-format on
 };
