@@ -12,6 +12,7 @@ void add_verbs(CommandLine& line) {
   add_batch(line);
   add_consistency(line);
   add_reconstruct(line);
+  add_locate(line);
   add_calibrate(line);
   add_evaluate(line);
   add_evaluate_trajectory(line);

@@ -5,6 +5,7 @@
 #include <charconv>
 
 #include "fields/evidence.hpp"
+#include "fields/localization.hpp"
 #include "fields/loop_closure.hpp"
 #include "fields/scale.hpp"
 #include "fields/statistics.hpp"
@@ -91,7 +92,8 @@ std::vector<StructText> all_structs() {
                pose_graph::DriftOptions, pose_graph::LoopNoiseOptions, pose_graph::SolverOptions,
                reconstruction::Options, reconstruction::EdgeNoiseOptions,
                reconstruction::RefineOptions, loop_closure::Options, loop_closure::ProposalOptions,
-               loop_closure::AcceptanceOptions, PoseEvidence, RegistrationStatistics, StageTimings,
+               loop_closure::AcceptanceOptions, localization::MapOptions,
+               localization::LocateOptions, PoseEvidence, RegistrationStatistics, StageTimings,
                PrepareStatistics, PairConsistency>();
 }
 

@@ -229,7 +229,7 @@ TEST_F(Consumer, MissingComponent) {
   EXPECT_NE(configured.status, 0);
   EXPECT_NE(one_line(configured.output)
                 .find(R"(no component "teleport" (it has: files, evaluation, pose_graph, )"
-                      "reconstruction, loop_closure, io"),
+                      "reconstruction, loop_closure, localization, io"),
             std::string::npos)
       << configured.output;
 }

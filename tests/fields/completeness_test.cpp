@@ -5,6 +5,7 @@
 #include <set>
 
 #include "fields/evidence.hpp"
+#include "fields/localization.hpp"
 #include "fields/loop_closure.hpp"
 #include "fields/statistics.hpp"
 #include "support/member_count.hpp"
@@ -96,6 +97,8 @@ TEST(Fields, EveryMemberIsDescribed) {
   expect_complete<loop_closure::ProposalOptions>();
   expect_complete<loop_closure::AcceptanceOptions>();
   expect_complete<loop_closure::Options>();
+  expect_complete<localization::MapOptions>();
+  expect_complete<localization::LocateOptions>();
 }
 
 }  // namespace

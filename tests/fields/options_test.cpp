@@ -6,6 +6,7 @@
 #include <cstring>
 #include <limits>
 
+#include "fields/localization.hpp"
 #include "fields/loop_closure.hpp"
 #include "gpureg/error.hpp"
 #include "support/expect_error.hpp"
@@ -112,6 +113,8 @@ TEST(OptionFields, BoundsAreThoseOfTheRanges) {
   expect_bounds<loop_closure::ProposalOptions>();
   expect_bounds<loop_closure::AcceptanceOptions>();
   expect_bounds<loop_closure::Options>();
+  expect_bounds<localization::MapOptions>();
+  expect_bounds<localization::LocateOptions>();
 }
 
 TEST(OptionFields, MessagesOfMaps) {

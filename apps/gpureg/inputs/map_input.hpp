@@ -1,0 +1,28 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include "gpureg/localization.hpp"
+
+namespace gpureg::cli {
+
+/// A map as the command line names it: a file of `--save-map`, a cloud or mesh, a folder of scans
+/// with their poses in poses.txt or trajectory.txt, or the output folder of `gpureg reconstruct`,
+/// of which the largest island counts.
+struct MapInput {
+  std::string path;
+  enum class Kind { saved, cloud, scans } kind = Kind::cloud;
+  std::optional<localization::PreparedMap> saved;  ///< of a saved map
+
+  /// Recognises the kind; reads a saved map. Throws IoError.
+  explicit MapInput(std::string of);
+
+  /// Makes the map of a cloud or of scans; a saved one is returned as it is.
+  /// @throws IoError, InvalidArgument naming the file.
+  localization::PreparedMap prepare(const Context& context,
+                                    const localization::MapOptions& options) const;
+};
+
+}  // namespace gpureg::cli

@@ -1,0 +1,199 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <array>
+#include <chrono>
+#include <iostream>
+#include <memory>
+#include <sstream>
+
+#include "command.hpp"
+#include "gpureg/error.hpp"
+#include "gpureg/localization.hpp"
+#include "inputs/cloud_file.hpp"
+#include "inputs/map_input.hpp"
+#include "json/fields_json.hpp"
+#include "json/json.hpp"
+#include "json/json_file.hpp"
+#include "options/knowledge_options.hpp"
+#include "options/method_options.hpp"
+#include "options/output_path.hpp"
+#include "records/locate_json.hpp"
+#include "records/result_json.hpp"
+#include "run/viewpoint_note.hpp"
+#include "text.hpp"
+
+namespace gpureg::cli {
+namespace {
+
+using localization::LocatedPose;
+using localization::LocateOptions;
+using localization::LocatePrior;
+using localization::LocateResult;
+using localization::LocateStatus;
+using localization::MapOptions;
+using localization::PreparedMap;
+
+struct Options {
+  std::vector<std::string> files;  // scans, then the map
+  MethodOptions method;
+  ViewpointChoice viewpoint;
+  std::string up, near, json, save_map;
+
+  std::vector<std::string> scans() const { return {files.begin(), files.end() - 1}; }
+  const std::string& map() const { return files.back(); }
+};
+
+/// "x,y,z,radius". Throws InvalidArgument.
+std::optional<localization::PositionPrior> near_prior(const std::string& text) {
+  if (text.empty()) return std::nullopt;
+  std::array<double, 4> numbers{};
+  std::stringstream stream(text);
+  std::string field;
+  std::size_t count = 0;
+  bool good = true;
+  while (std::getline(stream, field, ',')) {
+    good = good && count < numbers.size() && read_number(field, numbers[count]);
+    ++count;
+  }
+  if (!good || count != numbers.size())
+    throw InvalidArgument("--near is '" + text + "', expected x,y,z,radius");
+  return localization::PositionPrior{{numbers[0], numbers[1], numbers[2]}, numbers[3]};
+}
+
+void print(const std::string& file, const LocateResult& result) {
+  std::cout << "scan     " << file << ": " << grouped(result.scan_points) << " points, "
+            << result.tiles << (result.tiles == 1 ? " tile\n" : " tiles\n") << "status   "
+            << localization::to_string(result.status)
+            << ", not at any of these poses with probability "
+            << fixed(result.absent_probability, 3) << "\n";
+  constexpr std::size_t kShown = 3;
+  for (std::size_t k = 0; k < std::min(kShown, result.poses.size()); ++k) {
+    const LocatedPose& pose = result.poses[k];
+    std::cout << "pose " << k + 1 << "   confidence " << fixed(pose.confidence, 3)
+              << (pose.alias ? ", an alias of pose 1" : "") << ", inliers "
+              << percent(pose.verification.inlier_ratio) << " %, map_from_scan\n";
+    for (int row = 0; row < 4; ++row) {
+      std::cout << "  ";
+      for (int column = 0; column < 4; ++column)
+        std::cout << " " << pad_left(fixed(pose.map_from_scan(row, column), 6), 13);
+      std::cout << "\n";
+    }
+  }
+}
+
+/// Voxel size of a saved map, or what the options say.
+void choose_voxel_size(Options& o, const MapInput& input) {
+  if (!input.saved) {
+    if (o.method.automatic_voxel_size && input.kind == MapInput::Kind::cloud)
+      o.method.choose_voxel_size({read_cloud(input.path, 0, MeshNote::none).view()}, input.path);
+    else if (o.method.automatic_voxel_size)
+      throw InvalidArgument("--voxel-size auto is for a map that is one cloud; give the size");
+    return;
+  }
+  const float of_map = input.saved->options().prepare.voxel_size;
+  if (o.method.given("--voxel-size") &&
+      (o.method.automatic_voxel_size || o.method.voxel_size != of_map))
+    throw InvalidArgument("--voxel-size is not that of " + input.path + ", which was made with " +
+                          significant(static_cast<double>(of_map), 6));
+  o.method.voxel_size = of_map;
+}
+
+std::vector<LocateResult> locate_all(const Options& o, const Context& context,
+                                     const PreparedMap& map, const LocateOptions& options) {
+  std::vector<PointCloud> clouds;
+  ViewpointNote note;
+  for (const std::string& file : o.scans()) {
+    clouds.push_back(
+        read_cloud(file, mesh_spacing(options.registration.prepare.voxel_size), MeshNote::print));
+    o.viewpoint.apply(clouds.back());
+    if (options.registration.prepare.depth_maps > 0) note.see(clouds.back(), file);
+  }
+  note.print();
+  std::vector<PointCloudView> views;
+  for (const PointCloud& cloud : clouds) views.push_back(o.viewpoint.view(cloud));
+  LocatePrior prior;
+  prior.gravity = up_prior(o.up);
+  prior.position = near_prior(o.near);
+  return localization::locate(context, views, map, options,
+                              std::vector<LocatePrior>(views.size(), prior), o.scans());
+}
+
+void write_json(const Options& o, const Context& context, const PreparedMap& map,
+                const LocateOptions& options, const std::vector<LocateResult>& results,
+                double seconds) {
+  Json head;
+  head["gpureg"] = "locate";
+  head["environment"] = environment(context);
+  head["options"] = to_json(options.registration);
+  head["map"] = {{"file", o.map()}, {"points", map.size()}, {"tiles", map.tiles()}};
+  head["seconds"] = seconds;
+  head["peak_memory_mib"] = peak_memory_mib();
+  const std::vector<std::string> scans = o.scans();
+  write_document(o.json, head, {"scans", results.size(), [&](std::size_t k) {
+                                  return to_json(results[k], scans[k]);
+                                }});
+}
+
+int run(Options o) {
+  if (o.files.size() < 2 && o.save_map.empty())
+    throw InvalidArgument("one file is given, expected scans and then the map");
+  o.method.registration();  // what is wrong with it shall be said before clouds are read
+  o.viewpoint.check("--viewpoint");
+  up_prior(o.up);
+  near_prior(o.near);
+  std::vector<NamedPath> inputs{{"MAP", o.map()}};
+  for (const std::string& file : o.scans()) inputs.push_back({"SCAN", file});
+  check_outputs({{"--json", o.json}, {"--save-map", o.save_map}}, inputs);
+  const Context context = o.method.context();
+  const MapInput input(o.map());
+  choose_voxel_size(o, input);
+  LocateOptions options = LocateOptions::from_voxel_size(o.method.voxel_size, o.method.quality);
+  options.registration = o.method.registration();
+  options.validate();
+  MapOptions of_map = MapOptions::from_voxel_size(o.method.voxel_size);
+  of_map.prepare = options.registration.prepare;
+  const PreparedMap map = input.prepare(context, of_map);
+  std::cout << "map      " << o.map() << ": " << grouped(map.size()) << " points, " << map.tiles()
+            << (map.tiles() == 1 ? " tile\n" : " tiles\n") << "backend  " << context.description()
+            << "\n";
+  if (!o.save_map.empty()) map.save(o.save_map);
+  if (o.scans().empty()) return kOk;
+  const auto begin = std::chrono::steady_clock::now();
+  const std::vector<LocateResult> results = locate_all(o, context, map, options);
+  const double seconds =
+      std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+  bool all = true;
+  for (std::size_t k = 0; k < results.size(); ++k) {
+    print(o.files[k], results[k]);
+    all = all && results[k].status == LocateStatus::found;
+  }
+  std::cout << "seconds  " << fixed(seconds, 2) << "\n";
+  if (!o.json.empty()) write_json(o, context, map, options, results, seconds);
+  return all ? kOk : kNoAlignment;
+}
+
+}  // namespace
+
+void add_locate(CommandLine& line) {
+  const auto o = std::make_shared<Options>();
+  Verb verb = line.verb("locate", "Find scans in a map, or say that they are not there");
+  verb.option("SCAN...MAP", o->files,
+              "Scans, then the map: a cloud, a folder of scans with poses, the output of "
+              "reconstruct, or a file of --save-map")
+      .required();
+  o->method.add_to(verb);
+  o->method.add_calibration_to(verb);
+  verb.option("--viewpoint", o->viewpoint.text,
+              "Where the scans were seen from: x,y,z in their frames; none: not known; auto: the "
+              "file, or the origin if the surfaces agree with it")
+      .show_default();
+  verb.option("--up", o->up,
+              "Vertical direction x,y,z in scans and map, and perhaps how many degrees it may be "
+              "off (without: 10): 0,0,1,5");
+  verb.option("--near", o->near, "Rough position of the scans: x,y,z,radius in the map");
+  verb.option("--save-map", o->save_map, "Write the prepared map; SCAN may be left out");
+  verb.option("--json", o->json, "Write options, poses, evidence and times");
+  verb.notes("Exit status 0: every scan was found, 1: one was not. ");
+  verb.run([o] { return run(*o); });
+}
+
+}  // namespace gpureg::cli

@@ -1,0 +1,202 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <Eigen/Core>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "gpureg/registration.hpp"
+#include "gpureg/verification.hpp"
+
+/// Component `localization`: where in a map a scan is, or that it is not there. Every function is
+/// deterministic and thread-safe unless it says otherwise.
+namespace gpureg::localization {
+
+/// Options of a map. The lengths are for voxels of 5 cm.
+struct MapOptions {
+  /// Of the map's tiles and of the scans; voxel_size > 0.
+  PrepareOptions prepare;
+  /// Largest edge of a tile, metres, > 0. A scan is aligned with every tile.
+  double tile_size = 20;
+  /// A tile also has the points of its neighbours within this distance, metres, >= 0: about half of
+  /// the extent of a scan.
+  double halo = 4;
+
+  /// Every length from the voxel size.
+  /// @throws InvalidArgument unless voxel_size is finite and > 0.
+  static MapOptions from_voxel_size(float voxel_size);
+
+  /// @throws InvalidArgument naming field and value.
+  void validate() const;
+};
+
+struct MapState;
+
+/// A map that scans are located in: the mean point of each voxel with the side that it was seen
+/// from, sensor positions, and overlapping tiles. An immutable handle: copies share the data, and
+/// threads may share copies. Tiles are prepared when the first scan needs them; those of up to a
+/// million points together stay prepared.
+///
+/// The accessors throw InvalidArgument on an empty handle.
+class PreparedMap {
+ public:
+  PreparedMap() = default;  ///< empty handle
+
+  bool valid() const { return state_ != nullptr; }  ///< false for an empty handle
+  std::size_t size() const;                         ///< number of points: voxels
+  std::size_t tiles() const;                        ///< number of tiles
+  const MapOptions& options() const;
+
+  /// @return a copy of the points, with normals where the sides of surfaces are known, and the
+  ///   sensor positions.
+  PointCloud cloud() const;
+
+  /// Writes the map into one file, all or nothing: a full disk leaves an old file as it was.
+  /// @throws IoError naming the file and the reason.
+  void save(const std::string& path) const;
+
+  /// Reads a file of save(). Scans are located in it as in the map that was saved, bit for bit.
+  /// @throws IoError naming the file and the reason: missing, another kind of file, another
+  ///   version, truncated, damaged.
+  static PreparedMap load(const std::string& path);
+
+  /// @return true where the file begins as those of save() do.
+  /// @throws IoError where it cannot be read.
+  static bool is_saved(const std::string& path);
+
+ private:
+  friend struct MapState;
+  explicit PreparedMap(std::shared_ptr<const MapState> state) : state_(std::move(state)) {}
+  std::shared_ptr<const MapState> state_;
+};
+
+/// Makes a map from scans or pieces of a cloud, one in memory at a time: memory grows with the
+/// surface of the map. Not thread-safe.
+class MapBuilder {
+ public:
+  /// @throws InvalidArgument as MapOptions::validate().
+  explicit MapBuilder(const MapOptions& options);
+  ~MapBuilder();
+  MapBuilder(MapBuilder&&) noexcept;
+  MapBuilder& operator=(MapBuilder&&) noexcept;
+
+  /// Adds a scan. Its viewpoints, given or inferred as prepare() does, tell the sides of its
+  /// surfaces and become sensor positions of the map.
+  /// @param map_from_scan p_map = map_from_scan * p_scan, metres.
+  /// @throws InvalidArgument as prepare(), and for a pose that is no rigid motion.
+  void add_scan(const Context& context, const PointCloudView& scan,
+                const UnalignedIsometry3d& map_from_scan);
+
+  /// Adds a cloud, or a piece of one, in the frame of the map. Sides of surfaces are those of its
+  /// normals; its viewpoints become sensor positions.
+  /// @throws InvalidArgument as PointCloudView::validate().
+  void add_cloud(const PointCloudView& cloud);
+
+  /// @return the map of what was added.
+  /// @throws InvalidArgument for a map without points.
+  PreparedMap build() const;
+
+ private:
+  struct State;
+  std::unique_ptr<State> state_;
+};
+
+/// The map of one cloud.
+/// @throws InvalidArgument as MapBuilder.
+PreparedMap prepare_map(const PointCloudView& cloud, const MapOptions& options = {});
+
+/// Options of locate(). The lengths are for voxels of 5 cm.
+struct LocateOptions {
+  /// Of the alignments; registration.prepare has to have the voxel size of the map. min_confidence:
+  /// of a place that is found.
+  RegistrationOptions registration;
+  /// Matches of a scan and a tile, in place of compatibility.max_matches, 4..65536: a tile has many
+  /// more matches of its own than the scan has, and a random choice of few holds hardly any of the
+  /// scan's.
+  std::uint32_t max_matches = 65536;
+  /// Poses of a scan that are verified against all of the map around them, 1..64.
+  std::uint32_t candidates = 8;
+  /// Distance from the points of the scan up to which the map takes part in this, metres, > 0.
+  double neighborhood = 1;
+
+  /// Every length from the voxel size.
+  /// @throws InvalidArgument as RegistrationOptions::from_voxel_size().
+  static LocateOptions from_voxel_size(float voxel_size, std::uint32_t quality = kDefaultQuality);
+
+  /// @throws InvalidArgument naming field and value.
+  void validate() const;
+};
+
+/// Approximate position of a scan.
+struct PositionPrior {
+  /// Of the origin of the scan's frame in the map, metres.
+  Eigen::Vector3d position = Eigen::Vector3d::Zero();
+  double radius = 5;  ///< largest distance from it, metres, > 0
+};
+
+/// Prior knowledge of the pose of one scan. Poses that contradict it are not considered.
+struct LocatePrior {
+  std::optional<GravityPrior> gravity;  ///< the source is the scan, the target the map
+  std::optional<PositionPrior> position;
+
+  /// @param name prefix of the field in error messages.
+  /// @throws InvalidArgument naming field and value.
+  void validate(const std::string& name = "prior") const;
+};
+
+enum class LocateStatus : std::uint8_t {
+  found,      ///< poses.front() reaches min_confidence
+  ambiguous,  ///< only several places that look alike reach it together: poses with alias
+  not_found   ///< not in this map, or not recognised: see absent_probability
+};
+const char* to_string(LocateStatus status);  ///< "not_found", ...
+
+/// A pose of a scan in a map.
+struct LocatedPose {
+  UnalignedIsometry3d map_from_scan = no_pose();
+  /// Probability that the pose is correct, in view of all other places.
+  double confidence = 0;
+  /// The scan fits here about as well as at the first pose, which is elsewhere.
+  bool alias = false;
+  /// Verification against the map around the pose; its confidence leaves other places aside.
+  PoseVerification verification;
+};
+
+/// Result of one scan. A plain value.
+struct LocateResult {
+  LocateStatus status = LocateStatus::not_found;
+  std::vector<LocatedPose> poses;  ///< the most confident first, all of different places
+  /// Probability that none of the poses is correct: the scan is not in this map, or its place was
+  /// not among the candidates.
+  double absent_probability = 1;
+  std::size_t scan_points = 0;          ///< prepared points of the scan
+  std::size_t tiles = 0;                ///< tiles that the scan was aligned with
+  std::size_t neighborhood_points = 0;  ///< points of the map around the first pose
+};
+
+/// Finds the poses of scans in a map: aligns each scan with every tile, merges the poses of all
+/// tiles, and verifies the most confident ones against the whole map around them. All places
+/// compete for the confidence.
+///
+/// @param scans host memory; viewpoints as for prepare().
+/// @param priors one per scan, or none.
+/// @param names of the scans in error messages, or none.
+/// @return one result per scan. The same bits on every backend, for any number of threads, and for
+///   any other scans of the call.
+/// @throws InvalidArgument as prepare() and align(), for an empty map, for options whose voxel size
+///   is not that of the map, and for a scan that looks as if it was in another unit.
+/// @throws DeviceError where the device fails.
+std::vector<LocateResult> locate(const Context& context, const std::vector<PointCloudView>& scans,
+                                 const PreparedMap& map, const LocateOptions& options,
+                                 const std::vector<LocatePrior>& priors = {},
+                                 const std::vector<std::string>& names = {});
+
+/// The same for one scan, with the options of the map's voxel size.
+LocateResult locate(const Context& context, const PointCloudView& scan, const PreparedMap& map,
+                    const LocatePrior& prior = {});
+
+}  // namespace gpureg::localization

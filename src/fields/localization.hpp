@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include "fields/options.hpp"
+#include "gpureg/localization.hpp"
+
+namespace gpureg::fields {
+
+template <>
+struct Fields<localization::MapOptions> {
+  static constexpr const char* kName = "MapOptions";
+  static constexpr const char* kGroup = "";
+  static constexpr const char* kSentence =
+      "Options of a map that scans are located in. The lengths are for voxels of 5 cm.";
+
+  // clang-format off: a field is a line.
+  template <typename V>
+  static void visit(V&& v) {
+    using O = localization::MapOptions;
+    v(&O::prepare, {"prepare", "Of tiles and scans."});
+    v(&O::tile_size, {"tile_size", kPositive.in("metres"), kProportional, "Largest edge of a tile."});
+    v(&O::halo, {"halo", kNotNegative.in("metres"), kProportional, "Overlap of tiles: about half of a scan."});
+  }
+  // clang-format on
+};
+
+template <>
+struct Fields<localization::LocateOptions> {
+  static constexpr const char* kName = "LocateOptions";
+  static constexpr const char* kGroup = "";
+  static constexpr const char* kSentence =
+      "How scans are located in a map. The lengths are for voxels of 5 cm.";
+
+  // clang-format off: a field is a line.
+  template <typename V>
+  static void visit(V&& v) {
+    using O = localization::LocateOptions;
+    v(&O::registration, {"registration", "Of the alignments."});
+    v(&O::max_matches, {"max_matches", from(limits::kMinMatches, limits::kMaxMatches), "Matches with a tile."});
+    v(&O::candidates, {"candidates", from(1, 64), "Poses of a scan that are verified."});
+    v(&O::neighborhood, {"neighborhood", kPositive.in("metres"), kProportional, "Distance up to which the map verifies a pose."});
+  }
+  // clang-format on
+};
+
+}  // namespace gpureg::fields

@@ -1,0 +1,98 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "localization/check_scan.hpp"
+
+#include <algorithm>
+#include <sstream>
+
+#include "gpureg/voxel_size.hpp"
+
+namespace gpureg::localization {
+namespace {
+
+/// Points farther apart than so many voxels have no neighbourhoods; a cloud of fewer voxels has no
+/// shape.
+constexpr double kSparse = 10, kSmall = 10;
+/// Scans of more voxels are unusual: worth a look at the spacing.
+constexpr double kWide = 2000;
+
+/// Extent of the middle 90 % along the longest axis: stray points do not count.
+double extent_of(const PointCloudView& scan) {
+  constexpr std::size_t kSample = 4096;
+  double longest = 0;
+  for (int axis = 0; axis < 3; ++axis) {
+    std::vector<float> values;
+    for (std::size_t k = 0; k < scan.size; k += scan.size / kSample + 1) {
+      const Eigen::Map<const Eigen::Vector3f> p(scan.points + k * scan.point_stride);
+      if (p.allFinite()) values.push_back(p[axis]);
+    }
+    if (values.empty()) return 0;
+    std::sort(values.begin(), values.end());
+    const std::size_t cut = values.size() / 20;
+    longest = std::max(longest, static_cast<double>(values[values.size() - 1 - cut]) -
+                                    static_cast<double>(values[cut]));
+  }
+  return longest;
+}
+
+std::string looks_like(double factor, const char* scan, const char* map) {
+  std::ostringstream text;
+  text << "; it looks like " << scan << ", and the map like " << map << ": multiply the scan by "
+       << factor;
+  return text.str();
+}
+
+}  // namespace
+
+void check_unit(const PointCloudView& scan, const MapState& map, const std::string& name) {
+  const double voxel = static_cast<double>(map.options.prepare.voxel_size);
+  const double extent = extent_of(scan);
+  if (extent == 0) return;  // too few points, which is for the result to say
+  const auto fits = [&](double spacing, double factor) {
+    return spacing * factor < 2 * voxel && extent * factor > 2 * kSmall * voxel;
+  };
+  if (extent >= kSmall * voxel && extent <= kWide * voxel) return;
+  std::ostringstream text;
+  text.precision(3);
+  const double spacing = suggest_voxel_size({scan}).spacing;
+  if (spacing > kSparse * voxel) {
+    text << name << ": its points are " << spacing << " apart, but the voxels of the map are "
+         << voxel;
+    if (fits(spacing, 1e-2) && !fits(spacing, 1e-1) && spacing < 40 * voxel)
+      text << looks_like(1e-2, "centimetres", "metres");
+    else if (fits(spacing, 1e-3))
+      text << looks_like(1e-3, "millimetres", "metres");
+    else if (fits(spacing, 1e-2))
+      text << looks_like(1e-2, "centimetres", "metres");
+    else
+      text << ": it is too sparse for this map";
+  } else if (extent < kSmall * voxel) {
+    text << name << ": it extends over " << extent << ", but the voxels of the map are " << voxel;
+    if (fits(spacing, 1e3))
+      text << looks_like(1e3, "metres", "millimetres");
+    else if (fits(spacing, 1e2))
+      text << looks_like(1e2, "metres", "centimetres");
+    else
+      text << ": it is too small for this map";
+  } else {
+    return;
+  }
+  throw InvalidArgument(text.str());
+}
+
+void check_map(const PointCloud& cloud, const MapOptions& options) {
+  const double voxel = static_cast<double>(options.prepare.voxel_size);
+  const double spacing = suggest_voxel_size({cloud.view()}).spacing;
+  const double extent = extent_of(cloud.view());
+  std::ostringstream text;
+  text.precision(3);
+  if (spacing > kSparse * voxel)
+    text << "the points of the map are " << spacing << " apart";
+  else if (extent < kSmall * voxel)
+    text << "the map extends over " << extent << " only";
+  else
+    return;
+  text << ", but prepare.voxel_size is " << voxel << ": it does not fit, or is in another unit";
+  throw InvalidArgument(text.str());
+}
+
+}  // namespace gpureg::localization

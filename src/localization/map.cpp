@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "localization/map_state.hpp"
+
+namespace gpureg::localization {
+
+const MapState& MapState::of(const PreparedMap& map) {
+  if (!map.valid()) throw InvalidArgument("map is an empty handle");
+  return *map.state_;
+}
+
+std::size_t PreparedMap::size() const { return MapState::of(*this).points.size(); }
+std::size_t PreparedMap::tiles() const { return MapState::of(*this).tiles.size(); }
+const MapOptions& PreparedMap::options() const { return MapState::of(*this).options; }
+
+PointCloud PreparedMap::cloud() const {
+  const MapState& state = MapState::of(*this);
+  PointCloud out;
+  out.origin = state.origin;
+  out.points = state.points;
+  for (const Side& side : state.sides)
+    out.normals.push_back(Eigen::Vector3i(side[0], side[1], side[2]).cast<float>().normalized());
+  out.viewpoints = state.viewpoints;
+  return out;
+}
+
+}  // namespace gpureg::localization

@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <array>
+#include <functional>
+#include <map>
+#include <mutex>
+
+#include "gpureg/localization.hpp"
+
+namespace gpureg::localization {
+
+/// Sides of surfaces need the direction of a normal only roughly.
+using Side = std::array<std::int8_t, 3>;
+
+/// What a map consists of, and what follows from it.
+struct MapState {
+  MapOptions options;
+  Eigen::Vector3d origin{0, 0, 0};          ///< of the frame that the rows below are relative to
+  std::vector<Eigen::Vector3f> points;      ///< by tile
+  std::vector<Side> sides;                  ///< empty, or one per point; 0 0 0: not known
+  std::vector<Eigen::Vector3f> viewpoints;  ///< sensor positions, thinned
+
+  struct Tile {
+    Eigen::AlignedBox3d core;  ///< relative to origin
+    std::size_t begin = 0, end = 0;
+  };
+  std::vector<Tile> tiles;  ///< follow from points and options
+
+  /// Sorts the points by tile; sets tiles.
+  void make_tiles();
+  /// The points that `keep` accepts of the tiles that meet the box, with sides and viewpoints of
+  /// the box.
+  PointCloud cut(const Eigen::AlignedBox3d& box,
+                 const std::function<bool(const Eigen::Vector3f&)>& keep = {}) const;
+  /// A tile with its halo.
+  PointCloud tile_cloud(std::size_t tile) const;
+  Eigen::AlignedBox3d tile_box(std::size_t tile) const;
+
+  /// Prepared tiles, those that fit into the cache.
+  std::vector<PreparedCloud> prepared_tiles(const Context& context,
+                                            const std::vector<std::size_t>& wanted) const;
+
+  static const MapState& of(const PreparedMap& map);
+  static PreparedMap map(std::shared_ptr<const MapState> state) {
+    return PreparedMap(std::move(state));
+  }
+
+ private:
+  mutable std::mutex mutex_;
+  mutable std::map<std::pair<Backend, std::size_t>, PreparedCloud> cache_;
+  mutable std::size_t cached_points_ = 0;
+};
+
+/// Views of clouds that cut() made; a piece of a map was not seen from its origin.
+std::vector<PointCloudView> views_of(const std::vector<PointCloud>& clouds);
+/// Options for points that are means of voxels already.
+PrepareOptions as_they_are(PrepareOptions options);
+
+}  // namespace gpureg::localization

@@ -1,0 +1,151 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include "localization/map_state.hpp"
+
+namespace gpureg::localization {
+namespace {
+
+/// Tiles along an axis; far stray points cost empty tiles only, which are not kept.
+constexpr double kMostTiles = 1 << 20;
+/// Prepared points that a map keeps: about 3 GB.
+constexpr std::size_t kMostCachedPoints = 1'000'000;
+
+std::int64_t count_of(double extent, const MapOptions& options) {
+  const double inner = extent - 2 * options.halo;
+  return static_cast<std::int64_t>(
+      std::clamp(std::ceil(inner / options.tile_size), 1.0, kMostTiles));
+}
+
+}  // namespace
+
+void MapState::make_tiles() {
+  Eigen::AlignedBox3d box;
+  for (const Eigen::Vector3f& p : points) box.extend(p.cast<double>());
+  std::array<std::int64_t, 3> count{};
+  Eigen::Vector3d edge = box.sizes();
+  for (int axis = 0; axis < 3; ++axis) {
+    count[static_cast<std::size_t>(axis)] = count_of(box.sizes()[axis], options);
+    edge[axis] /= static_cast<double>(count[static_cast<std::size_t>(axis)]);
+  }
+  using Cell = std::array<std::int64_t, 3>;
+  const auto cell_of = [&](const Eigen::Vector3f& p) {
+    Cell cell{};
+    for (int axis = 0; axis < 3; ++axis) {
+      const double at = static_cast<double>(p[axis]) - box.min()[axis];
+      const auto k = static_cast<std::size_t>(axis);
+      cell[k] = edge[axis] > 0
+                    ? std::clamp<std::int64_t>(
+                          static_cast<std::int64_t>(std::floor(at / edge[axis])), 0, count[k] - 1)
+                    : 0;
+    }
+    return cell;
+  };
+  std::vector<std::pair<Cell, std::size_t>> order(points.size());
+  for (std::size_t k = 0; k < points.size(); ++k) order[k] = {cell_of(points[k]), k};
+  std::sort(order.begin(), order.end());
+  std::vector<Eigen::Vector3f> sorted_points;
+  std::vector<Side> sorted_sides;
+  sorted_points.reserve(points.size());
+  sorted_sides.reserve(sides.size());
+  tiles.clear();
+  for (std::size_t k = 0; k < order.size(); ++k) {
+    const auto& [cell, index] = order[k];
+    if (k == 0 || cell != order[k - 1].first) {
+      const Eigen::Vector3d corner =
+          box.min() + edge.cwiseProduct(Eigen::Vector3d(static_cast<double>(cell[0]),
+                                                        static_cast<double>(cell[1]),
+                                                        static_cast<double>(cell[2])));
+      tiles.push_back({Eigen::AlignedBox3d(corner, corner + edge), k, k});
+    }
+    tiles.back().end = k + 1;
+    sorted_points.push_back(points[index]);
+    if (!sides.empty()) sorted_sides.push_back(sides[index]);
+  }
+  points = std::move(sorted_points);
+  sides = std::move(sorted_sides);
+}
+
+Eigen::AlignedBox3d MapState::tile_box(std::size_t tile) const {
+  const Eigen::Vector3d halo = Eigen::Vector3d::Constant(options.halo);
+  return {tiles[tile].core.min() - halo, tiles[tile].core.max() + halo};
+}
+
+PointCloud MapState::cut(const Eigen::AlignedBox3d& box,
+                         const std::function<bool(const Eigen::Vector3f&)>& keep) const {
+  PointCloud out;
+  out.origin = origin;
+  // The last point of a row of tiles may lie on its very end, an ulp outside of the core.
+  const double slack = static_cast<double>(options.prepare.voxel_size);
+  const Eigen::AlignedBox3d reach(box.min().array() - slack, box.max().array() + slack);
+  bool has_sides = false;
+  for (const Tile& tile : tiles) {
+    if (!reach.intersects(tile.core)) continue;
+    for (std::size_t k = tile.begin; k < tile.end; ++k) {
+      if (!box.contains(points[k].cast<double>()) || (keep && !keep(points[k]))) continue;
+      out.points.push_back(points[k]);
+      if (sides.empty()) continue;
+      const Side& side = sides[k];
+      out.normals.push_back(Eigen::Vector3i(side[0], side[1], side[2]).cast<float>());
+      has_sides |= side != Side{};
+    }
+  }
+  if (!has_sides) out.normals.clear();
+  for (const Eigen::Vector3f& place : viewpoints)
+    if (box.contains(place.cast<double>())) out.viewpoints.push_back(place);
+  return out;
+}
+
+PointCloud MapState::tile_cloud(std::size_t tile) const { return cut(tile_box(tile)); }
+
+PrepareOptions as_they_are(PrepareOptions options) {
+  options.voxel_size = 0;
+  return options;
+}
+
+std::vector<PointCloudView> views_of(const std::vector<PointCloud>& clouds) {
+  std::vector<PointCloudView> views;
+  for (const PointCloud& cloud : clouds) {
+    views.push_back(cloud.view());
+    views.back().infer_viewpoint = !cloud.viewpoints.empty();
+  }
+  return views;
+}
+
+std::vector<PreparedCloud> MapState::prepared_tiles(const Context& context,
+                                                    const std::vector<std::size_t>& wanted) const {
+  std::vector<PreparedCloud> out(wanted.size());
+  std::vector<std::size_t> missing;
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    for (std::size_t k = 0; k < wanted.size(); ++k) {
+      const auto found = cache_.find({context.backend(), wanted[k]});
+      if (found != cache_.end())
+        out[k] = found->second;
+      else
+        missing.push_back(k);
+    }
+  }
+  if (missing.empty()) return out;
+  std::vector<PointCloud> clouds;
+  std::vector<std::string> names;
+  for (const std::size_t k : missing) {
+    clouds.push_back(tile_cloud(wanted[k]));
+    names.push_back("tile " + std::to_string(wanted[k]) + " of the map");
+  }
+  const std::vector<PreparedCloud> prepared =
+      prepare_batch(context, views_of(clouds), as_they_are(options.prepare), names);
+  const std::lock_guard<std::mutex> lock(mutex_);
+  for (std::size_t m = 0; m < missing.size(); ++m) {
+    out[missing[m]] = prepared[m];
+    const std::size_t size = prepared[m].size();
+    if (cached_points_ + size > kMostCachedPoints) continue;
+    if (cache_.emplace(std::pair(context.backend(), wanted[missing[m]]), prepared[m]).second)
+      cached_points_ += size;
+  }
+  return out;
+}
+
+}  // namespace gpureg::localization

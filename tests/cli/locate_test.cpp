@@ -1,0 +1,81 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <gtest/gtest.h>
+
+#include "cli/command.hpp"
+#include "cli/scene.hpp"
+
+namespace gpureg::test {
+namespace {
+
+/// A folder of scans of the room with their poses, and one more scan.
+class Locate : public testing::Test {
+ protected:
+  Locate() {
+    write_scans(folder, 4, false);
+    std::string poses;
+    for (int k = 0; k < 4; ++k) {
+      const Eigen::Matrix4d pose = scan_from_room(k).inverse().matrix();
+      poses += std::to_string(k) + "\n";
+      for (int row = 0; row < 4; ++row)
+        for (int column = 0; column < 4; ++column)
+          poses += std::to_string(pose(row, column)) + (column < 3 ? " " : "\n");
+    }
+    folder.write("poses.txt", poses);
+    scan = write_cloud(other, "scan.ply", room_scan(6));
+  }
+
+  Outcome locate(const std::vector<std::string>& files, const std::vector<std::string>& more = {}) {
+    return run(joined(joined({"locate"}, files), joined({"--backend", "cpu"}, more)));
+  }
+
+  TemporaryFolder folder, other;
+  std::string scan;
+};
+
+TEST_F(Locate, FoundInScansWithPosesAndInTheSavedMapAndStrangersAreNot) {
+  const std::string map = other / "room.gpureg", first = other / "first.json",
+                    second = other / "second.json";
+  const Outcome saved = locate({folder.path()}, {"--voxel-size", "0.1", "--save-map", map});
+  EXPECT_EQ(saved.status, 0) << saved.err;
+  const Outcome found = locate({scan, folder.path()}, {"--voxel-size", "0.1", "--json", first});
+  EXPECT_EQ(found.status, 0) << found.out << found.err;
+  expect_holds(found.out, {"status   found", "map_from_scan", "1 tile"});
+  EXPECT_EQ(locate({scan, map}, {"--json", second}).status, 0);
+  const nlohmann::json a = json_of(first), b = json_of(second);
+  EXPECT_EQ(a.at("format_version"), 1);
+  EXPECT_EQ(a.at("scans"), b.at("scans"));
+  const nlohmann::json& pose = a.at("scans").at(0).at("poses").at(0);
+  EXPECT_GT(pose.at("confidence").get<double>(), 0.5);
+  const Eigen::Isometry3d truth = scan_from_room(6).inverse();
+  for (int k = 0; k < 16; ++k)  // 10 cm voxels: a pose is good to a few centimetres
+    EXPECT_NEAR(pose.at("map_from_scan").at(static_cast<std::size_t>(k)).get<double>(),
+                truth.matrix()(k / 4, k % 4), 0.08);
+
+  const std::string stranger = write_cloud(other, "stranger.ply", sticks());
+  const Outcome nowhere = locate({scan, stranger, map});
+  EXPECT_EQ(nowhere.status, 1);
+  expect_holds(nowhere.out, {"status   found", "status   not_found"});
+}
+
+TEST_F(Locate, RefusesWhatCannotBe) {
+  expect_refused({"locate", scan}, {"expected scans and then the map"});
+  expect_refused({"locate", scan, other.path()}, {other.path(), "poses.txt", "trajectory.txt"});
+  expect_refused({"locate", scan, other / "missing.ply"}, {"missing.ply"});
+  expect_refused({"locate", scan, scan, "--near", "1,2,3"}, {"--near", "x,y,z,radius"});
+  expect_refused({"locate", scan, scan, "--json", scan}, {"scan.ply"});
+  expect_refused({"locate", scan, scan, "--voxel-size", "0.1", "--preset", "loopsmart"},
+                 {"method", "quadruples"});
+  const std::string map = other / "room.gpureg";
+  ASSERT_EQ(locate({scan}, {"--voxel-size", "0.1", "--save-map", map}).status, 0);
+  expect_refused({"locate", scan, map, "--voxel-size", "0.05"}, {map, "0.1"});
+  const std::string content = content_of(map);
+  other.write("room.gpureg", content.substr(0, content.size() / 2));
+  expect_refused({"locate", scan, map}, {"room.gpureg", "truncated"});
+  PointCloud millimetres = room_scan(6);
+  for (Eigen::Vector3f& p : millimetres.points) p *= 1000;
+  expect_refused({"locate", write_cloud(other, "mm.ply", millimetres), scan, "--voxel-size", "0.1"},
+                 {"mm.ply", "millimetres"});
+}
+
+}  // namespace
+}  // namespace gpureg::test
