@@ -53,7 +53,10 @@ endfunction()
 
 function(gpureg_use_precompiled target family)
   set_target_properties(${target} PROPERTIES DEFINE_SYMBOL "")  # its macros are those of the family
-  target_precompile_headers(${target} REUSE_FROM ${family})
+  get_target_property(_type ${family} TYPE)
+  if(GPUREG_PRECOMPILED_LIBRARIES OR NOT _type STREQUAL "OBJECT_LIBRARY")
+    target_precompile_headers(${target} REUSE_FROM ${family})
+  endif()
 endfunction()
 
 # A library of loops over Eigen's types, which then become vector instructions.

@@ -47,3 +47,9 @@ launcher_arguments() {
     echo "-DCMAKE_CXX_COMPILER_LAUNCHER=ccache -DCMAKE_CUDA_COMPILER_LAUNCHER=ccache"
   fi
 }
+
+# The same, and several builds of one checkout share the objects of the libraries: ccache takes none for that of another build where the
+# two have a precompiled header each.
+shared_objects() {
+  if command -v ccache > /dev/null; then echo "$(launcher_arguments) -DGPUREG_PRECOMPILED_LIBRARIES=OFF"; fi
+}

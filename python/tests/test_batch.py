@@ -23,9 +23,16 @@ import many
 
 
 @pytest.fixture(scope="module")
-def whole(tmp_path_factory):
-    """The uninterrupted run."""
-    return many.run(tmp_path_factory.mktemp("whole"))
+def timed(tmp_path_factory):
+    """The uninterrupted run, and the seconds that it takes."""
+    begin = time.monotonic()
+    run = many.run(tmp_path_factory.mktemp("whole"))
+    return run, time.monotonic() - begin
+
+
+@pytest.fixture(scope="module")
+def whole(timed):
+    return timed[0]
 
 
 def files_of(run):
@@ -119,7 +126,7 @@ def test_a_finished_run_is_not_done_again(whole):
     assert before == {path: path.stat().st_mtime_ns for path in before}
 
 
-def test_ten_kills(whole, tmp_path):
+def test_ten_kills(whole, timed, tmp_path):
     """kill -9 at ten random moments, from before the first pair to the middle of a chunk."""
     seed = int(os.environ.get("GPUREG_KILL_SEED", "1"))
     rng = random.Random(seed)
@@ -140,7 +147,7 @@ def test_ten_kills(whole, tmp_path):
                 time.sleep(0.01)
         elif kill % 3 == 2:
             child.stdout.readline()  # it aligns
-        time.sleep(rng.random() * 0.4)
+        time.sleep(rng.random() * timed[1] / 20)  # all ten: a fourth of a run at most
         assert (
             child.poll() is None
         ), "the run ended before it was killed: it is too short for this test"
