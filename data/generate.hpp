@@ -62,9 +62,9 @@ struct Progress {
 ///   number and world_from_fragment (exact);  world: z up, floor at z = 0 cameras.txt `fragment
 ///   frame tx ty tz qx qy qz qw`: fragment_from_camera as the (drifting) odometry has it
 /// and with rgbd: rgb/, depth/ (16 bit, 5000 per metre), rgb.txt, depth.txt, associations.txt,
-/// groundtruth.txt (world_from_camera, exact), surface.ply (the surfaces in view, exact points and
-/// normals about 1 cm apart, world). Overlap of A with B is the share of A's points with
-/// a point of B within 7.5 cm, under the exact poses.
+/// groundtruth.txt (world_from_camera, exact), camera.yaml, surface.ply (the surfaces in view,
+/// exact points and normals about 1 cm apart, world). Overlap of A with B is the share of A's
+/// points with a point of B within 7.5 cm, under the exact poses.
 ///
 /// The same seed and options give the same bytes for any number of threads, and the scene of N
 /// fragments begins with the scene of fewer. Throws InvalidArgument (option out of range, a

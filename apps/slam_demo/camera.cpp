@@ -2,8 +2,29 @@
 #include "camera.hpp"
 
 #include <cmath>
+#include <gpureg/error.hpp>
+#include <opencv2/calib3d.hpp>
 
 namespace slam_demo {
+
+void set_camera(const Pinhole& camera, const cv::Mat1d& distortion, const cv::Size& size,
+                Rig& rig) {
+  rig.colour = camera;
+  rig.known = true;
+  rig.flipped = camera.fy < 0;
+  rig.undistort_x = rig.undistort_y = cv::Mat();
+  const bool distorted = !distortion.empty() && cv::countNonZero(distortion) > 0;
+  if (rig.flipped) {
+    if (distorted)
+      throw gpureg::InvalidArgument("a camera with distortion needs focal lengths > 0");
+    rig.colour.fy = -camera.fy;
+    rig.colour.cy = size.height - 1 - camera.cy;
+  }
+  if (!distorted) return;
+  const cv::Matx33d k(camera.fx, 0, camera.cx, 0, camera.fy, camera.cy, 0, 0, 1);
+  cv::initUndistortRectifyMap(k, distortion, cv::noArray(), k, size, CV_32FC1, rig.undistort_x,
+                              rig.undistort_y);
+}
 
 cv::Mat1f depth_in_colour(const cv::Mat& raw, const Rig& rig) {
   cv::Mat1f metres(raw.size(), 0.0f), result(raw.size(), 0.0f);

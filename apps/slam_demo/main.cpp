@@ -9,6 +9,7 @@
 #include <gpureg/error.hpp>
 #include <iostream>
 
+#include "camera_file.hpp"
 #include "output/output.hpp"
 #include "output/rerun.hpp"
 #include "stopwatch.hpp"
@@ -21,12 +22,14 @@ std::atomic<bool> interrupted{false};
 void interrupt(int) { interrupted = true; }
 
 struct Arguments {
-  std::string sequence, backend = "auto", truth, surface, tracking, rerun,
+  std::string sequence, backend = "auto", truth, surface, tracking, rerun, calibration,
                         output = "slam_demo_output";
-  std::vector<double> colour, depth;
+  std::vector<std::string> colour;
+  std::vector<double> depth;
   double depth_units = 0, baseline = 0;
   int first = 0, frames = 0;
-  bool sequential = false, no_dense_loops = false, no_bundle = false, no_map = false, quiet = false;
+  bool sequential = false, no_calibration = false, no_dense_loops = false, no_bundle = false,
+       no_map = false, quiet = false;
   SlamOptions slam;
 };
 
@@ -38,8 +41,26 @@ gpureg::Context context_of(const Arguments& a) {
 
 Pinhole pinhole_of(const std::vector<double>& k) { return {k[0], k[1], k[2], k[3]}; }
 
+Pinhole numbers_of(const std::vector<std::string>& words) {
+  std::vector<double> k;
+  for (const std::string& word : words) {
+    double value = 0;
+    if (!CLI::detail::lexical_cast(word, value))
+      throw gpureg::InvalidArgument("--camera: '" + word + "' is no number");
+    k.push_back(value);
+  }
+  if (k.size() != 4) throw gpureg::InvalidArgument("--camera needs a file, or fx fy cx cy");
+  return pinhole_of(k);
+}
+
 void set_rig(const Arguments& a, Rig& rig) {
-  if (!a.colour.empty()) rig.colour = pinhole_of(a.colour);
+  if (a.colour.size() == 1) read_camera(a.colour[0], rig);
+  if (a.colour.size() > 1) set_camera(numbers_of(a.colour), {}, {640, 480}, rig);
+  if (!rig.known)
+    throw gpureg::InvalidArgument(
+        a.sequence +
+        ": its cameras are unknown; put a camera.yaml there, or name one, or fx fy cx cy, by "
+        "--camera");
   if (!a.depth.empty()) {
     rig.depth = pinhole_of(a.depth);
     rig.registered = false;
@@ -65,10 +86,14 @@ int run(const Arguments& a) {
   options.loops.threads = a.sequential ? 1 : 0;
   options.loops.dense = !a.no_dense_loops;
   options.loops.bundle = !a.no_bundle;
+  options.loops.calibrate = !a.no_calibration;
   options.map = !a.no_map;
+  if (!a.calibration.empty()) options.calibration = read_depth_calibration(a.calibration);
   // Without the file this run only tracks, and writes it; with it, this run closes the loops.
   const bool replays = !a.tracking.empty() && std::filesystem::exists(a.tracking),
              only_tracks = !a.tracking.empty() && !replays;
+  if (replays && !a.calibration.empty())
+    throw gpureg::InvalidArgument("a file of --tracking has its depth calibration already");
   if (only_tracks) {
     options.keep_fragments = true;
     options.loops.dense = options.loops.bundle = options.loops.images = options.loops.sessions =
@@ -205,12 +230,17 @@ int main(int count, char** values) {
   app.add_option("--voxel-size", a.slam.loops.voxel_size, "Of the registration, metres")
       ->check(CLI::Range(0.005, 1.0))
       ->capture_default_str();
-  app.add_option("--camera", a.colour, "Colour camera, pixels: fx fy cx cy")->expected(4);
+  app.add_option("--camera", a.colour,
+                 "A camera.yaml of OpenCV's format; or the colour camera, pixels: fx fy cx cy")
+      ->expected(1, 4);
   app.add_option("--depth-camera", a.depth, "Depth camera, where depth is not registered")
       ->expected(4);
   app.add_option("--depth-baseline", a.baseline,
                  "x of the depth camera in the colour camera, metres");
   app.add_option("--depth-units", a.depth_units, "Values of a depth image per metre");
+  app.add_option("--depth-calibration", a.calibration,
+                 "Offsets of inverse depth to begin with: depth_calibration.json of another run");
+  app.add_flag("--no-calibration", a.no_calibration, "Adjustments leave these offsets as they are");
   app.add_flag("--quiet", a.quiet, "No progress");
   CLI11_PARSE(app, count, values);
   try {

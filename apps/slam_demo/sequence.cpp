@@ -2,6 +2,7 @@
 #include "sequence.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <filesystem>
 #include <fstream>
@@ -13,6 +14,8 @@
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 #include <sstream>
+
+#include "camera_file.hpp"
 
 namespace slam_demo {
 namespace {
@@ -105,6 +108,33 @@ std::vector<Listed>::const_iterator nearest_to(double time, const std::vector<Li
   return after != entries.end() && after->time - time < time - before ? after : from(before);
 }
 
+/// The published cameras of the two benchmarks. Names say which one it is: of the folder, of the
+/// bag in rgb.txt, of the true trajectory.
+void set_published_camera(const fs::path& folder, const fs::path& truth, Rig& rig) {
+  struct Published {
+    const char* name;
+    Pinhole camera;
+    std::array<double, 5> distortion;
+  };
+  static const Published kPublished[] = {
+      {"freiburg1", {517.3, 516.5, 318.6, 255.3}, {0.2624, -0.9531, -0.0054, 0.0026, 1.1633}},
+      {"freiburg2", {520.9, 521.0, 325.1, 249.7}, {0.2312, -0.7849, -0.0033, -0.0001, 0.9172}},
+      {"freiburg3", {535.4, 539.2, 320.1, 247.6}, {}},
+      {".gt.freiburg", {481.2, -480.0, 319.5, 239.5}, {}},  // ICL-NUIM, whose y points up
+      {"_frei_png", {481.2, -480.0, 319.5, 239.5}, {}}};
+  std::string names = fs::absolute(folder).lexically_normal().string() + "\n" +
+                      truth.filename().string() + "\n",
+              line;
+  std::ifstream list(folder / "rgb.txt");
+  while (std::getline(list, line) && !line.empty() && line[0] == '#') names += line;
+  for (const Published& p : kPublished) {
+    if (names.find(p.name) == std::string::npos) continue;
+    const cv::Mat1d distortion(1, 5, const_cast<double*>(p.distortion.data()));
+    set_camera(p.camera, distortion, {640, 480}, rig);
+    return;
+  }
+}
+
 Sequence open_tum(const fs::path& folder) {
   Sequence result;
   result.layout = "TUM";
@@ -132,6 +162,7 @@ Sequence open_tum(const fs::path& folder) {
   }
   const fs::path truth = only_file(folder, ".gt.freiburg", "groundtruth.txt");
   if (!truth.empty()) result.truth = gpureg::evaluation::read_trajectory(truth.string());
+  set_published_camera(folder, truth, result.rig);
   return result;
 }
 
@@ -172,6 +203,7 @@ Eigen::Matrix4d read_pose(const fs::path& path) {
 Sequence open_redwood(const fs::path& folder, const fs::path& colour) {
   Sequence result;
   result.layout = "Redwood";
+  result.rig.known = true;  // 525 pixels, of the data set
   result.rig.depth_units = 1000;
   const std::map<long, std::string> images = numbered(colour);
   for (const auto& [index, path] : numbered(folder / "depth")) {
@@ -192,6 +224,7 @@ Sequence open_seven_scenes(const fs::path& folder) {
   Rig& rig = result.rig;
   rig.depth_units = 1000;
   rig.registered = false;
+  rig.known = true;
   rig.truth_of_depth = true;
   rig.depth = {585, 585, 320, 240};
   // Measured on depth and colour edges of the red kitchen; the data set publishes neither.
@@ -240,6 +273,8 @@ Sequence open_sequence(const std::string& name) {
   } else {
     result = open_seven_scenes(folder);
   }
+  if (fs::exists(folder / "camera.yaml"))
+    read_camera((folder / "camera.yaml").string(), result.rig);
   std::vector<FrameFiles> ordered;
   for (const FrameFiles& frame : result.frames) {
     if (!ordered.empty() && frame.time <= ordered.back().time)
@@ -258,10 +293,8 @@ Sequence open_sequence(const std::string& name) {
 Images load(const FrameFiles& files, const Rig& rig) {
   Images result;
   // The other image still helps to find the frame's place among the others in time.
-  const cv::Mat colour =
-      files.colour.empty() ? cv::Mat() : cv::imread(files.colour, cv::IMREAD_COLOR);
-  const cv::Mat depth =
-      files.depth.empty() ? cv::Mat() : cv::imread(files.depth, cv::IMREAD_UNCHANGED);
+  cv::Mat colour = files.colour.empty() ? cv::Mat() : cv::imread(files.colour, cv::IMREAD_COLOR);
+  cv::Mat depth = files.depth.empty() ? cv::Mat() : cv::imread(files.depth, cv::IMREAD_UNCHANGED);
   if (colour.empty()) {
     result.problem = files.colour + ": missing or damaged";
   } else if (depth.empty() || depth.type() != CV_16UC1) {
@@ -269,7 +302,20 @@ Images load(const FrameFiles& files, const Rig& rig) {
   } else if (depth.size() != colour.size()) {
     result.problem = files.depth + ": not of the size of " + files.colour;
   }
+  const bool distorted = !rig.undistort_x.empty();
+  if (result.problem.empty() && distorted && colour.size() != rig.undistort_x.size())
+    result.problem = files.colour + ": not of the size of the camera";
   if (!result.problem.empty()) return result;
+  if (rig.flipped) {
+    cv::flip(colour, colour, 0);
+    cv::flip(depth, depth, 0);
+  }
+  if (distorted) {
+    cv::remap(colour.clone(), colour, rig.undistort_x, rig.undistort_y, cv::INTER_LINEAR);
+    // A registered depth image has the pixels of the colour image.
+    if (rig.registered)
+      cv::remap(depth.clone(), depth, rig.undistort_x, rig.undistort_y, cv::INTER_NEAREST);
+  }
   result.colour = colour;
   cv::cvtColor(colour, result.grey, cv::COLOR_BGR2GRAY);
   result.depth = depth_in_colour(depth, rig);

@@ -31,6 +31,8 @@ struct Sequence {
 ///   TUM, ICL-NUIM  associations.txt, or rgb.txt and depth.txt; groundtruth.txt or *.gt.freiburg
 ///   Redwood        depth/ and color/, image/ or rgb/ with numbered files; trajectory.log or *.log
 ///   7-Scenes       frame-NNNNNN.color.*, .depth.png, .pose.txt; depth not registered to colour
+/// Cameras: those that TUM (freiburg1, 2, 3), ICL-NUIM, Redwood and 7-Scenes publish; the folder's
+/// camera.yaml (camera_file.hpp) replaces them. Where neither is, Rig::known is false.
 /// @throws gpureg::IoError naming the file: no such folder, no known layout, a line that cannot be
 ///   read, no frames, several files that may be the true trajectory.
 Sequence open_sequence(const std::string& folder);

@@ -2,6 +2,7 @@
 #include "slam.hpp"
 
 #include <algorithm>
+#include <gpureg/error.hpp>
 #include <set>
 
 #include "stopwatch.hpp"
@@ -38,18 +39,32 @@ Slam::Slam(const gpureg::Context& context, const Rig& rig, const SlamOptions& op
       fragment_(rig.colour, options.fragment_frames, kFragmentVoxel * options.loops.voxel_size),
       surfels_(context.backend() == gpureg::Backend::cuda && surfel::cuda_available()
                    ? surfel::make_cuda_map(options.surfels)
-                   : surfel::make_cpu_map(options.surfels)) {}
+                   : surfel::make_cpu_map(options.surfels)) {
+  if (options.calibration) map_.calibration = *options.calibration;
+}
+
+void Slam::set_image_size(const cv::Size& size) {
+  DepthCalibration& c = map_.calibration;
+  if (size.empty() || (c.width == size.width && c.height == size.height)) return;
+  if (options_.calibration)
+    throw gpureg::InvalidArgument("the depth calibration is of another size than the images");
+  c.width = size.width;
+  c.height = size.height;
+}
 
 Tracker::Outcome Slam::frame(int index, double time, const Images& images) {
+  set_image_size(images.depth.size());
   Features features;
+  Images corrected = images;
   {
     const Stopwatch watch(extract_ms_);
     features = extractor_(images.grey, images.depth);
+    corrected.depth = map_.calibration.corrected(images.depth);
   }
   Tracker::Outcome outcome;
   {
     const Stopwatch watch(track_ms_);
-    outcome = tracker_.track(index, time, std::move(features), images.grey, images.depth);
+    outcome = tracker_.track(index, time, std::move(features), images.grey, corrected.depth);
   }
   if (outcome.pose.session == kNone) {
     ++lost_;
@@ -69,9 +84,9 @@ Tracker::Outcome Slam::frame(int index, double time, const Images& images) {
   }
   {
     const Stopwatch watch(fragment_ms_);
-    fragment_.add(index, outcome.pose, images.depth);
+    fragment_.add(index, outcome.pose, corrected.depth);
   }
-  if (options_.map && index % options_.surfel_every == 0) fuse(index, outcome.pose, images);
+  if (options_.map && index % options_.surfel_every == 0) fuse(index, outcome.pose, corrected);
   if (fragment_.full()) end_fragment();
   return outcome;
 }

@@ -4,6 +4,7 @@
 #include <functional>
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -23,7 +24,8 @@ struct SlamOptions {
   std::size_t max_surfels = 5000000;  ///< >= 2; beyond, the map is thinned to half of them
   int features = 1000;
   int fragment_frames = 50;
-  int final_iterations = 20;  ///< of the last bundle adjustment
+  int final_iterations = 20;                                   ///< of the last bundle adjustment
+  std::optional<DepthCalibration> calibration = std::nullopt;  ///< of the depth; none: all 0
 };
 
 /// What tracking found, before any loop.
@@ -69,6 +71,7 @@ class Slam {
   std::size_t worlds() const;  ///< parts of the trajectory that nothing connects
 
  private:
+  void set_image_size(const cv::Size& size);
   void end_fragment();
   void add_fragment(const BuiltFragment& fragment);
   void fuse(int frame, const FramePose& pose, const Images& images);

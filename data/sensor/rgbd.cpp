@@ -163,6 +163,16 @@ void write_sequence_lists(const std::string& folder,
   files::write_atomically(folder + "/depth.txt", depth);
   files::write_atomically(folder + "/groundtruth.txt", truth);
   files::write_atomically(folder + "/associations.txt", associations);
+  // The format of OpenCV's FileStorage.
+  std::snprintf(line, sizeof(line), "data: [ %.1f, 0., %.1f, 0., %.1f, %.1f, 0., 0., 1. ]\n",
+                static_cast<double>(camera::kFocal), static_cast<double>(camera::kCentreX),
+                static_cast<double>(camera::kFocal), static_cast<double>(camera::kCentreY));
+  files::write_atomically(folder + "/camera.yaml",
+                          "%YAML:1.0\n---\nimage_width: " + std::to_string(camera::kWidth) +
+                              "\nimage_height: " + std::to_string(camera::kHeight) +
+                              "\ncamera_matrix: !!opencv-matrix\n   rows: 3\n   cols: 3\n   dt: d\n"
+                              "   " +
+                              line);
 }
 
 }  // namespace gpureg::synthetic

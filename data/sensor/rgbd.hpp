@@ -26,7 +26,8 @@ std::vector<std::uint16_t> depth_image(const std::array<DepthQuarter, 4>& quarte
 void write_frame(const std::string& folder, int frame, const std::vector<std::uint8_t>& colour,
                  const std::vector<std::uint16_t>& depth);
 
-/// rgb.txt, depth.txt, associations.txt and groundtruth.txt (world_from_camera). Throws IoError.
+/// rgb.txt, depth.txt, associations.txt, groundtruth.txt (world_from_camera) and camera.yaml.
+/// Throws IoError.
 void write_sequence_lists(const std::string& folder,
                           const std::vector<Eigen::Isometry3d>& world_from_camera);
 

@@ -8,6 +8,7 @@
 #include <unistd.h>
 #include <gpureg/io.hpp>
 
+#include <cstdlib>
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
@@ -225,6 +226,29 @@ TEST(Faults, AnInterruptedReplayWritesWhatItHas) {
   const auto figures = read_output(output, 150);
   EXPECT_GE(figures.at("fragments"), 1);
   EXPECT_LT(figures.at("fragments"), 3) << "the rest is left out";
+}
+
+// A guess of the focal length would bend the map, and nobody would see why.
+TEST(Faults, UnknownCamerasAreAnError) {
+  const gpureg::test::TemporaryFolder folder;
+  const FrameFiles frame = open_sequence(frames_folder()).frames.front();
+  folder.write("associations.txt", "1 " + frame.colour + " 1 " + frame.depth + "\n");
+  const auto run = [&](const std::string& options) {
+    const std::string command = std::string(SLAM_DEMO) + " " + folder.path() +
+                                " --backend cpu --output " + (folder / "out") + options +
+                                " > /dev/null 2> " + (folder / "errors");
+    return std::system(command.c_str());
+  };
+  EXPECT_NE(run(""), 0);
+  const std::string message = gpureg::test::content_of(folder / "errors");
+  EXPECT_NE(message.find(folder.path() + ": its cameras are unknown"), std::string::npos)
+      << message;
+  EXPECT_NE(message.find("--camera"), std::string::npos);
+  EXPECT_EQ(run(" --camera 525 525 319.5 239.5"), 0) << gpureg::test::content_of(folder / "errors");
+  EXPECT_EQ(run(" --camera " + frames_folder() + "/camera.yaml"), 0);
+  EXPECT_NE(run(" --camera 525 525"), 0);
+  EXPECT_NE(run(" --camera " + (folder / "none.yaml")), 0);
+  EXPECT_NE(gpureg::test::content_of(folder / "errors").find("none.yaml"), std::string::npos);
 }
 
 // The camera goes to and fro over one place. Fragments and surfels stay within their limits, and

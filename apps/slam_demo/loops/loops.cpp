@@ -337,6 +337,9 @@ void LoopClosing::bundle_all(int iterations) {
   std::vector<RelativePose> relatives = graph_.loop_edges();
   for (const RelativePose& edge : graph_.weak_odometry(map_)) relatives.push_back(edge);
   BundleProblem problem = bundle_of(map_, free, fixed, relatives);
+  if (!prior_) prior_ = map_.calibration;
+  problem.calibrate = options_.calibrate;
+  problem.prior = *prior_;
   adjust(camera_, problem, iterations, options_.threads > 0 ? options_.threads : 2);
   apply(camera_, problem, map_);
   adjusted_.clear();

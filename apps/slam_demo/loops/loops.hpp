@@ -16,6 +16,7 @@ struct LoopOptions {
   bool images = false;       ///< also look for loops by images alone
   bool sessions = true;      ///< connect sessions by images
   bool bundle = true;        ///< full bundle adjustment after loops
+  bool calibrate = true;     ///< every full adjustment estimates the calibration of the depth
   float voxel_size = 0.05f;  ///< metres, of the registration
   int bundle_iterations = 6;
   int threads = 0;
@@ -103,6 +104,7 @@ class LoopClosing {
   std::vector<LoopRecord> records_;  // by number of the loop
   std::vector<ImageLoopRecord> image_records_;
   int image_loops_ = 0;
+  std::optional<DepthCalibration> prior_;    // before the first full adjustment
   std::vector<Eigen::Isometry3d> adjusted_;  // poses after the last full adjustment
   Milliseconds time_;
 };

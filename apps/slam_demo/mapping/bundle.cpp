@@ -1,23 +1,16 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "mapping/bundle.hpp"
 
-#include <ceres/ceres.h>
-#include <ceres/rotation.h>
-
 #include <algorithm>
 #include <cmath>
 #include <set>
+
+#include "mapping/costs.hpp"
 
 namespace slam_demo {
 namespace {
 
 using Pose = BundleProblem::Pose;
-
-// Standard deviation of inverse depths, 1/m. Structured light measures disparities, so their noise
-// is that of inverse depth; this is 1/6 px of a Kinect (focal length times baseline: 43 m px).
-constexpr double kInverseDepthSigma = 0.004;
-constexpr double kHuber =
-    2.8;  // standard deviations: the root of the 95 % quantile of three numbers
 
 Pose pose_of(const Eigen::Isometry3d& world_from_camera) {
   const Eigen::Isometry3d m = world_from_camera.inverse();
@@ -34,90 +27,13 @@ Eigen::Isometry3d isometry_of(const Pose& pose) {
   return m.inverse();
 }
 
-template <class T>
-using Vector3 = Eigen::Matrix<T, 3, 1>;
-
-/// Pixel and inverse depth of a point, each over its standard deviation.
-template <class T>
-void residual_of(const Pinhole& camera, const Measurement& m, const T* pose, const T* point,
-                 T* residual, bool depth) {
-  const Eigen::Map<const Eigen::Quaternion<T>> q(pose);
-  const Eigen::Map<const Vector3<T>> t(pose + 4), x(point);
-  const Vector3<T> p = q * x + t;
-  const T inverse = T(1) / p.z(), sigma = T(m.sigma);
-  residual[0] = (T(camera.fx) * p.x() * inverse + T(camera.cx) - T(m.u)) / sigma;
-  residual[1] = (T(camera.fy) * p.y() * inverse + T(camera.cy) - T(m.v)) / sigma;
-  if (depth) residual[2] = (inverse - T(1 / m.depth)) / T(kInverseDepthSigma);
-}
-
-/// kSize: 3 with depth, 2 without.
-template <int kSize>
-struct SightCost {
-  const Pinhole camera;
-  const Measurement m;
-  template <class T>
-  bool operator()(const T* pose, const T* point, T* residual) const {
-    residual_of(camera, m, pose, point, residual, kSize == 3);
-    return true;
-  }
-};
-
-/// Of a point that is known.
-template <int kSize>
-struct PoseCost {
-  const Pinhole camera;
-  const PointMatch match;
-  template <class T>
-  bool operator()(const T* pose, T* residual) const {
-    const Vector3<T> point = match.world.cast<T>();
-    residual_of(camera, match.seen, pose, point.data(), residual, kSize == 3);
-    return true;
-  }
-};
-
-ceres::CostFunction* pose_cost(const Pinhole& camera, const PointMatch& match) {
-  if (match.seen.depth > 0)
-    return new ceres::AutoDiffCostFunction<PoseCost<3>, 3, 7>(new PoseCost<3>{camera, match});
-  return new ceres::AutoDiffCostFunction<PoseCost<2>, 2, 7>(new PoseCost<2>{camera, match});
-}
-
-ceres::CostFunction* sight_cost(const Pinhole& camera, const Measurement& m) {
-  if (m.depth > 0)
-    return new ceres::AutoDiffCostFunction<SightCost<3>, 3, 7, 3>(new SightCost<3>{camera, m});
-  return new ceres::AutoDiffCostFunction<SightCost<2>, 2, 7, 3>(new SightCost<2>{camera, m});
-}
-
-struct RelativeCost {
-  const Eigen::Quaterniond a_from_b_rotation;
-  const Eigen::Vector3d a_from_b_translation;
-  const Eigen::Matrix<double, 6, 6> root;
-  template <class T>
-  bool operator()(const T* a, const T* b, T* residual) const {
-    const Eigen::Map<const Eigen::Quaternion<T>> qa(a), qb(b);  // camera_from_world
-    const Eigen::Map<const Vector3<T>> ta(a + 4), tb(b + 4);
-    const Eigen::Quaternion<T> q = qa * qb.conjugate();  // a_from_b
-    const Vector3<T> t = ta - q * tb;
-    const Eigen::Quaternion<T> back = a_from_b_rotation.conjugate().cast<T>();
-    const Eigen::Quaternion<T> turn = back * q;
-    Eigen::Matrix<T, 6, 1> e;
-    const T sign = turn.w() < T(0) ? T(-2) : T(2);
-    e.template head<3>() = sign * turn.vec();
-    e.template tail<3>() = back * (t - a_from_b_translation.cast<T>());
-    Eigen::Map<Eigen::Matrix<T, 6, 1>> r(residual);
-    r = root.cast<T>() * e;
-    return true;
-  }
-};
-
-ceres::Manifold* pose_manifold() {
-  return new ceres::ProductManifold<ceres::EigenQuaternionManifold, ceres::EuclideanManifold<3>>();
-}
-
 }  // namespace
 
-Measurement measurement(const Features& features, int key) {
+Measurement measurement(const Features& features, int key, const DepthCalibration& calibration) {
   const cv::KeyPoint& k = features.keys[at(key)];
-  return {k.pt.x, k.pt.y, features.depth[at(key)], scale_of(k.octave)};
+  return {k.pt.x, k.pt.y,
+          calibration.corrected(k.pt.x, k.pt.y, static_cast<double>(features.depth[at(key)])),
+          scale_of(k.octave)};
 }
 
 double squared_error(const Pinhole& camera, const Measurement& m, const Eigen::Vector3d& p) {
@@ -167,6 +83,7 @@ Eigen::Isometry3d refine_pose(const Pinhole& camera, const std::vector<PointMatc
 BundleProblem bundle_of(const Map& map, const std::vector<int>& keyframes,
                         const std::vector<int>& fixed, const std::vector<RelativePose>& relatives) {
   BundleProblem problem;
+  problem.calibration = map.calibration;
   std::map<int, int> place;
   const auto add = [&](int keyframe, bool still) {
     place[keyframe] = static_cast<int>(problem.poses.size());
@@ -190,9 +107,9 @@ BundleProblem bundle_of(const Map& map, const std::vector<int>& keyframes,
     for (const Observation& o : point.observations) {
       const auto found = place.find(o.keyframe);
       if (found == place.end()) continue;
-      problem.sights.push_back({found->second, static_cast<int>(problem.points.size()) - 1, o.key,
-                                o.loop,
-                                measurement(*map.keyframes[at(o.keyframe)].features, o.key)});
+      problem.sights.push_back(
+          {found->second, static_cast<int>(problem.points.size()) - 1, o.key, o.loop,
+           measurement(*map.keyframes[at(o.keyframe)].features, o.key, map.calibration)});
     }
   }
   std::vector<RelativePose> all = map.links;
@@ -228,6 +145,48 @@ BundleProblem local_bundle(const Map& map, int keyframe, std::size_t size) {
   return bundle_of(map, local, fixed, {});
 }
 
+namespace {
+
+void add_calibration(DepthCalibration& calibration, const DepthCalibration& prior,
+                     ceres::Problem& problem, ceres::ParameterBlockOrdering& order) {
+  for (std::size_t k = 0; k < DepthCalibration::kNodes; ++k) {
+    double* node = &calibration.offsets[k];
+    order.AddElementToGroup(node, 1);
+    problem.AddResidualBlock(
+        new ceres::AutoDiffCostFunction<NodeCost, 1, 1>(new NodeCost{prior.offsets[k]}), nullptr,
+        node);
+    const auto smooth = [&](std::size_t other) {
+      problem.AddResidualBlock(new ceres::AutoDiffCostFunction<SmoothCost, 1, 1, 1>(new SmoothCost),
+                               nullptr, node, &calibration.offsets[other]);
+    };
+    if ((k + 1) % DepthCalibration::kColumns != 0) smooth(k + 1);
+    if (k + DepthCalibration::kColumns < DepthCalibration::kNodes)
+      smooth(k + DepthCalibration::kColumns);
+  }
+}
+
+void add_calibrated_sight(const Pinhole& camera, const Measurement& m, double* pose, double* point,
+                          const DepthCalibration& before, DepthCalibration& calibration,
+                          ceres::Problem& problem) {
+  const auto around = before.around(m.u, m.v);
+  const auto node = [&](std::size_t k) { return &calibration.offsets[around[k].node]; };
+  problem.AddResidualBlock(
+      new ceres::AutoDiffCostFunction<CalibratedSightCost, 3, 7, 3, 1, 1, 1, 1>(
+          new CalibratedSightCost{camera, m, around, before.offset(m.u, m.v)}),
+      new ceres::HuberLoss(kHuber), pose, point, node(0), node(1), node(2), node(3));
+}
+
+/// Corrects the depths of the sights by the calibration that was found.
+void correct_sights(const DepthCalibration& before, BundleProblem& problem) {
+  for (BundleProblem::Sight& s : problem.sights) {
+    if (s.seen.depth > 0)
+      s.seen.depth = 1 / (1 / s.seen.depth + before.offset(s.seen.u, s.seen.v) -
+                          problem.calibration.offset(s.seen.u, s.seen.v));
+  }
+}
+
+}  // namespace
+
 BundleReport adjust(const Pinhole& camera, BundleProblem& problem, int iterations, int threads) {
   if (problem.sights.empty()) return {};
   ceres::Problem ceres_problem;
@@ -237,10 +196,16 @@ BundleReport adjust(const Pinhole& camera, BundleProblem& problem, int iteration
     if (problem.fixed[k]) ceres_problem.SetParameterBlockConstant(problem.poses[k].data());
     order->AddElementToGroup(problem.poses[k].data(), 1);
   }
+  const DepthCalibration before = problem.calibration;
+  if (problem.calibrate) add_calibration(problem.calibration, problem.prior, ceres_problem, *order);
   for (const BundleProblem::Sight& s : problem.sights) {
     double* point = problem.points[at(s.point)].data();
     double* pose = problem.poses[at(s.pose)].data();
     order->AddElementToGroup(point, 0);
+    if (problem.calibrate && s.seen.depth > 0) {
+      add_calibrated_sight(camera, s.seen, pose, point, before, problem.calibration, ceres_problem);
+      continue;
+    }
     ceres_problem.AddResidualBlock(sight_cost(camera, s.seen), new ceres::HuberLoss(kHuber), pose,
                                    point);
   }
@@ -260,8 +225,25 @@ BundleReport adjust(const Pinhole& camera, BundleProblem& problem, int iteration
   options.logging_type = ceres::SILENT;
   ceres::Solver::Summary summary;
   ceres::Solve(options, &ceres_problem, &summary);
+  if (problem.calibrate) correct_sights(before, problem);
   return {summary.initial_cost, summary.final_cost};
 }
+
+namespace {
+
+/// Points of a single keyframe take no part in an adjustment: they go where it measured them.
+void place_lone_points(const Pinhole& camera, Map& map) {
+  for (MapPoint& point : map.points) {
+    if (point.bad || point.observations.size() != 1) continue;
+    const Observation& o = point.observations.front();
+    const Keyframe& keyframe = map.keyframes[at(o.keyframe)];
+    const Measurement m = measurement(*keyframe.features, o.key, map.calibration);
+    if (m.depth > 0)
+      point.position = keyframe.world_from_camera * camera.unproject(m.u, m.v, m.depth);
+  }
+}
+
+}  // namespace
 
 void apply(const Pinhole& camera, const BundleProblem& problem, Map& map) {
   constexpr double kDrop = 3;  // times the threshold of an inlier
@@ -275,6 +257,10 @@ void apply(const Pinhole& camera, const BundleProblem& problem, Map& map) {
   for (std::size_t k = 0; k < problem.points.size(); ++k) {
     MapPoint& point = map.points[at(problem.point_ids[k])];
     if (!point.bad) point.position = problem.points[k];
+  }
+  if (problem.calibrate) {
+    map.calibration = problem.calibration;
+    place_lone_points(camera, map);
   }
   for (const BundleProblem::Sight& s : problem.sights) {
     const double error =

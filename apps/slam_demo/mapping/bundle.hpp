@@ -17,7 +17,8 @@ struct Measurement {
   double u = 0, v = 0, depth = 0;  ///< pixels; metres, 0: none
   double sigma = 1;                ///< pixels
 };
-Measurement measurement(const Features& features, int key);
+/// Its depth is corrected.
+Measurement measurement(const Features& features, int key, const DepthCalibration& calibration);
 
 /// Squared error of a point in the camera, in units of its variance. Behind the camera: 1e9.
 double squared_error(const Pinhole& camera, const Measurement& m, const Eigen::Vector3d& point);
@@ -50,6 +51,9 @@ struct BundleProblem {
   std::vector<Eigen::Vector3d> points;
   std::vector<Sight> sights;
   std::vector<RelativePose> relatives;  ///< a, b: indices into poses
+  DepthCalibration calibration;         ///< by which the depths of the sights are corrected
+  bool calibrate = false;               ///< estimate it too
+  DepthCalibration prior;               ///< expected calibration
 };
 
 /// Keyframes (those in fixed keep their poses) with all points that they see, the links of the map

@@ -6,6 +6,7 @@
 #include <memory>
 #include <vector>
 
+#include "depth_calibration.hpp"
 #include "tracking/features.hpp"
 
 namespace slam_demo {
@@ -61,6 +62,8 @@ class Map {
   std::vector<MapPoint> points;
   /// Motions between keyframes that share few points: adjustments keep them.
   std::vector<RelativePose> links;
+  /// Of the depth camera; features have the depths as they were measured.
+  DepthCalibration calibration;
 
   int add_keyframe(Keyframe keyframe);  ///< without observations
   /// A new point at a feature with depth. Returns its index.

@@ -170,6 +170,7 @@ void write_results(const std::string& folder, const Slam& slam, const RunResult&
   for (const Keyframe& keyframe : slam.map().keyframes)
     keyframes.push_back({keyframe.time, keyframe.world_from_camera.matrix()});
   ev::write_trajectory(folder + "/keyframes.txt", keyframes);
+  write_depth_calibration(folder + "/depth_calibration.json", slam.map().calibration);
   const surfel::Cloud surfels = slam.surfels();
   gpureg::files::write_atomically(folder + "/map.ply", ply_of(surfels));
   const json figures = loops_json(slam, result);

@@ -25,8 +25,8 @@ struct RunResult {
 /// and with fewer than three poses in common, the figures stay empty.
 void evaluate(const Slam& slam, const std::string& true_surface, RunResult& result);
 
-/// Writes trajectory.txt, odometry.txt, keyframes.txt (TUM), map.ply, loops.json, report.html.
-/// Throws gpureg::IoError.
+/// Writes trajectory.txt, odometry.txt, keyframes.txt (TUM), map.ply,
+/// depth_calibration.json, loops.json, report.html. Throws gpureg::IoError.
 void write_results(const std::string& folder, const Slam& slam, const RunResult& result);
 
 /// JSON as text. Names of files need not be UTF-8: other bytes become the replacement character.

@@ -101,7 +101,7 @@ int refine(const Map& map, const Pinhole& camera, View& view) {
   for (std::size_t k = 0; k < view.points.size(); ++k) {
     if (view.points[k] == kNone) continue;
     matches.push_back({map.points[at(view.points[k])].position,
-                       measurement(*view.features, static_cast<int>(k))});
+                       measurement(*view.features, static_cast<int>(k), map.calibration)});
     keys.push_back(k);
   }
   std::vector<bool> inliers;

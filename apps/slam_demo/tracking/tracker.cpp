@@ -105,8 +105,8 @@ int Tracker::make_keyframe(const View& view, int frame, double time, int session
   for (std::size_t k = 0; k < view.points.size(); ++k) {
     const Features& f = *view.features;
     if (map_.keyframes[at(index)].points[k] != kNone || f.depth[k] <= 0) continue;
-    map_.add_point(index, static_cast<int>(k),
-                   view.pose * camera_.unproject(f.keys[k].pt.x, f.keys[k].pt.y, f.depth[k]));
+    const Measurement m = measurement(f, static_cast<int>(k), map_.calibration);
+    map_.add_point(index, static_cast<int>(k), view.pose * camera_.unproject(m.u, m.v, m.depth));
   }
   if (linked && view.inliers < kWellLinked) {
     map_.links.push_back({reference_, index,

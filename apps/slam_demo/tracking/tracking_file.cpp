@@ -17,7 +17,7 @@ constexpr int kMostOctaves = 32;
 
 /// Says which build wrote the file: the sizes change with the structures.
 std::string mark() {
-  return "slam_demo tracking 1 " + std::to_string(sizeof(Keyframe)) + " " +
+  return "slam_demo tracking 2 " + std::to_string(sizeof(Keyframe)) + " " +
          std::to_string(sizeof(MapPoint)) + " " + std::to_string(sizeof(FramePose)) + " " +
          std::to_string(sizeof(surfel::Surfel)) + "\n";
 }
@@ -112,7 +112,7 @@ void pass(Archive& file, Tracking& t) {
     file.each(f.cloud.viewpoints, [&](Eigen::Vector3f& v) { file.values(v); });
   });
   file.lists(t.surfels);
-  file.values(t.lost, t.dense);
+  file.values(t.map.calibration, t.lost, t.dense);
 }
 
 /// Throws IoError for an index of something that is not there.
@@ -147,6 +147,9 @@ void check(const Tracking& t, const std::string& path) {
     require(below(f.keyframe, keyframes) &&
                 (f.cloud.normals.empty() || f.cloud.normals.size() == f.cloud.points.size()),
             path, "a fragment is of no keyframe, or lacks normals");
+  const DepthCalibration& c = t.map.calibration;
+  require(c.width > 1 && c.height > 1 && std::isfinite(c.difference({})), path,
+          "the depth calibration is none");
   require(t.lost >= 0 && t.dense >= 0, path, "a count is negative");
 }
 
