@@ -159,52 +159,29 @@ void redwood_sized(benchmark::State& state, const std::string& backend) {
   state.counters["ms_warm"] = since(begin);
 }
 
-BENCHMARK_CAPTURE(align_many, cuda_loopsmart, "cuda", "loopsmart")
-    ->Arg(11)
-    ->Unit(benchmark::kMillisecond)
-    ->UseRealTime();
-BENCHMARK_CAPTURE(align_many, cuda_loopsmart_all, "cuda", "loopsmart_all")
-    ->Arg(11)
-    ->Unit(benchmark::kMillisecond)
-    ->UseRealTime();
-BENCHMARK_CAPTURE(align_many, cuda_default, "cuda", "default")
-    ->Arg(11)
-    ->Unit(benchmark::kMillisecond)
-    ->UseRealTime();
-BENCHMARK_CAPTURE(align_one, cuda_loopsmart, "cuda", "loopsmart")
-    ->Iterations(190)
-    ->Unit(benchmark::kMillisecond)
-    ->UseRealTime();
-BENCHMARK_CAPTURE(align_one, cuda_default, "cuda", "default")
-    ->Iterations(190)
-    ->Unit(benchmark::kMillisecond)
-    ->UseRealTime();
+BENCHMARK_CAPTURE(align_many, cuda_loopsmart, "cuda", "loopsmart")->Arg(11)->Apply(elapsed);
+BENCHMARK_CAPTURE(align_many, cuda_loopsmart_all, "cuda", "loopsmart_all")->Arg(11)->Apply(elapsed);
+BENCHMARK_CAPTURE(align_many, cuda_default, "cuda", "default")->Arg(11)->Apply(elapsed);
+BENCHMARK_CAPTURE(align_one, cuda_loopsmart, "cuda", "loopsmart")->Iterations(190)->Apply(elapsed);
+BENCHMARK_CAPTURE(align_one, cuda_default, "cuda", "default")->Iterations(190)->Apply(elapsed);
 BENCHMARK_CAPTURE(align_from_threads, cuda_default, "cuda", "default")
     ->Arg(1)
     ->Arg(2)
     ->Arg(4)
     ->Arg(8)
-    ->Unit(benchmark::kMillisecond)
-    ->UseRealTime();
+    ->Apply(elapsed);
 BENCHMARK_CAPTURE(raw_to_pose, cuda_loopsmart, "cuda", "loopsmart")
     ->Iterations(100)
-    ->Unit(benchmark::kMillisecond)
-    ->UseRealTime();
-BENCHMARK_CAPTURE(redwood_sized, cuda, "cuda")
-    ->Iterations(1)
-    ->Repetitions(7)
-    ->Unit(benchmark::kMillisecond)
-    ->UseRealTime();
+    ->Apply(elapsed);
+BENCHMARK_CAPTURE(redwood_sized, cuda, "cuda")->Iterations(1)->Repetitions(7)->Apply(elapsed);
 BENCHMARK_CAPTURE(redwood_sized, cuda_all, "cuda_all")
     ->Iterations(1)
     ->Repetitions(7)
-    ->Unit(benchmark::kMillisecond)
-    ->UseRealTime();
+    ->Apply(elapsed);
 BENCHMARK_CAPTURE(align_many, cpu_loopsmart, "cpu", "loopsmart")
     ->Arg(1)
     ->Iterations(1)
-    ->Unit(benchmark::kMillisecond)
-    ->UseRealTime();
+    ->Apply(elapsed);
 
 }  // namespace
 }  // namespace gpureg::bench

@@ -27,6 +27,11 @@ void report(benchmark::State& state, const std::vector<RegistrationResult>& resu
 /// Memory that the context has reserved on its devices.
 void report_memory(benchmark::State& state, const Context& context);
 
+/// Elapsed milliseconds, not those of the processor.
+inline void elapsed(benchmark::internal::Benchmark* b) {
+  b->Unit(benchmark::kMillisecond)->UseRealTime();
+}
+
 /// Of a backend by name: "cpu", "cuda" (device 0), "cuda_all" (every device).
 Context new_context(const std::string& backend);
 /// Context of a backend by name, made once; null, and the benchmark skipped, where there is none.

@@ -46,7 +46,7 @@ void paper_mode(benchmark::State& state) {
   state.counters["ms_worst"] = ms.back();
 }
 
-BENCHMARK(paper_mode)->Iterations(1)->Unit(benchmark::kMillisecond)->UseRealTime();
+BENCHMARK(paper_mode)->Iterations(1)->Apply(elapsed);
 
 }  // namespace
 }  // namespace gpureg::bench

@@ -66,18 +66,10 @@ void prepare_one_fragment(benchmark::State& state, const std::string& backend,
   report(state, cloud, runs);
 }
 
-BENCHMARK_CAPTURE(prepare_batch_of_fragments, cuda, "cuda", "loopsmart")
-    ->Unit(benchmark::kMillisecond)
-    ->UseRealTime();
-BENCHMARK_CAPTURE(prepare_batch_of_fragments, cuda_default, "cuda", "default")
-    ->Unit(benchmark::kMillisecond)
-    ->UseRealTime();
-BENCHMARK_CAPTURE(prepare_one_fragment, cuda, "cuda", "loopsmart")
-    ->Unit(benchmark::kMillisecond)
-    ->UseRealTime();
-BENCHMARK_CAPTURE(prepare_batch_of_fragments, cpu, "cpu", "loopsmart")
-    ->Unit(benchmark::kMillisecond)
-    ->UseRealTime();
+BENCHMARK_CAPTURE(prepare_batch_of_fragments, cuda, "cuda", "loopsmart")->Apply(elapsed);
+BENCHMARK_CAPTURE(prepare_batch_of_fragments, cuda_default, "cuda", "default")->Apply(elapsed);
+BENCHMARK_CAPTURE(prepare_one_fragment, cuda, "cuda", "loopsmart")->Apply(elapsed);
+BENCHMARK_CAPTURE(prepare_batch_of_fragments, cpu, "cpu", "loopsmart")->Apply(elapsed);
 
 }  // namespace
 }  // namespace gpureg::bench

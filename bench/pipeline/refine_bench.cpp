@@ -42,11 +42,9 @@ void refine_map(benchmark::State& state, const std::string& backend, std::uint32
   state.counters["mm_rmse"] = 1e3 * report.final_rmse;
 }
 
-BENCHMARK_CAPTURE(refine_map, cuda, "cuda", 1500)->Unit(benchmark::kMillisecond)->UseRealTime();
-BENCHMARK_CAPTURE(refine_map, cuda_all_points, "cuda", 1u << 20)
-    ->Unit(benchmark::kMillisecond)
-    ->UseRealTime();
-BENCHMARK_CAPTURE(refine_map, cpu, "cpu", 1500)->Unit(benchmark::kMillisecond)->UseRealTime();
+BENCHMARK_CAPTURE(refine_map, cuda, "cuda", 1500)->Apply(elapsed);
+BENCHMARK_CAPTURE(refine_map, cuda_all_points, "cuda", 1u << 20)->Apply(elapsed);
+BENCHMARK_CAPTURE(refine_map, cpu, "cpu", 1500)->Apply(elapsed);
 
 }  // namespace
 }  // namespace gpureg::bench

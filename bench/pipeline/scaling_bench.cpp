@@ -159,26 +159,9 @@ void many_fragments(benchmark::State& state) {
   report_memory(state, *on);
 }
 
-BENCHMARK(points_per_cloud)
-    ->Arg(1000)
-    ->Arg(5000)
-    ->Arg(20000)
-    ->Arg(100000)
-    ->Unit(benchmark::kMillisecond)
-    ->UseRealTime();
-BENCHMARK(pair_by_default)
-    ->Arg(1000)
-    ->Arg(5000)
-    ->Arg(20000)
-    ->Arg(100000)
-    ->Unit(benchmark::kMillisecond)
-    ->UseRealTime();
-BENCHMARK(raw_points)
-    ->Arg(100000)
-    ->Arg(300000)
-    ->Arg(1000000)
-    ->Unit(benchmark::kMillisecond)
-    ->UseRealTime();
+BENCHMARK(points_per_cloud)->Arg(1000)->Arg(5000)->Arg(20000)->Arg(100000)->Apply(elapsed);
+BENCHMARK(pair_by_default)->Arg(1000)->Arg(5000)->Arg(20000)->Arg(100000)->Apply(elapsed);
+BENCHMARK(raw_points)->Arg(100000)->Arg(300000)->Arg(1000000)->Apply(elapsed);
 BENCHMARK(many_fragments)
     ->Arg(10)
     ->Arg(50)
@@ -186,8 +169,7 @@ BENCHMARK(many_fragments)
     ->Arg(500)
     ->Arg(2000)
     ->Iterations(1)
-    ->Unit(benchmark::kMillisecond)
-    ->UseRealTime();
+    ->Apply(elapsed);
 
 }  // namespace
 }  // namespace gpureg::bench
