@@ -24,6 +24,7 @@ PYBIND11_MODULE(_core, m) {
   bind_pose_graph(m);
   bind_loop_closure(m);
   bind_reconstruction(m);
+  bind_localization(m);
   bind_pruning(m);
   bind_trajectory(m);
   bind_calibration(m);

@@ -30,6 +30,9 @@ from ._core import (
     InvalidArgument,
     IoError,
     LineProcessOptions,
+    LocatedPose,
+    LocateOptions,
+    LocateResult,
     Loop,
     LoopAcceptanceOptions,
     LoopClosureOptions,
@@ -37,12 +40,14 @@ from ._core import (
     LoopNoiseOptions,
     LoopProposalOptions,
     LoopUpdate,
+    MapOptions,
     PairConsistency,
     PointCloud,
     PoseEvidence,
     PoseGraphOptions,
     PoseVerification,
     PreparedCloud,
+    PreparedMap,
     PrepareOptions,
     PrepareStatistics,
     QuadrupleOptions,
@@ -67,6 +72,7 @@ from ._reconstruction import reconstruct
 from ._trajectory import evaluate_trajectory, read_trajectory
 from .files import read_point_cloud, write_point_cloud
 from .fragments import FragmentSet
+from .localization import load_map, locate, locate_batch, prepare_map
 from .loop_closure import LoopCloser
 from .preparation import prepare, prepare_batch
 from .registration import (
@@ -112,6 +118,9 @@ __all__ = [
     "InvalidArgument",
     "IoError",
     "LineProcessOptions",
+    "LocateOptions",
+    "LocateResult",
+    "LocatedPose",
     "Loop",
     "LoopAcceptanceOptions",
     "LoopCloser",
@@ -123,6 +132,7 @@ __all__ = [
     "Map",
     "MapEdge",
     "MapLink",
+    "MapOptions",
     "MapScan",
     "PairConsistency",
     "PointCloud",
@@ -132,6 +142,7 @@ __all__ = [
     "PrepareOptions",
     "PrepareStatistics",
     "PreparedCloud",
+    "PreparedMap",
     "QuadrupleOptions",
     "ReconstructionOptions",
     "RefineOptions",
@@ -154,9 +165,13 @@ __all__ = [
     "describe_backends",
     "evaluate_trajectory",
     "fit_calibration",
+    "load_map",
+    "locate",
+    "locate_batch",
     "loop_consistency",
     "prepare",
     "prepare_batch",
+    "prepare_map",
     "read_calibration",
     "read_point_cloud",
     "read_trajectory",

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 # Types of the compiled module. python/tests/test_stubs.py compares it with the module.
-from collections.abc import Callable, Sequence
+import os
+from collections.abc import Callable, Iterable, Sequence
 from typing import Any, Literal, overload
 
 import numpy as np
@@ -1093,6 +1094,118 @@ class LoopAcceptanceOptions:
     __hash__: None  # type: ignore[assignment]
     _fields: tuple[str, ...]
     # end of fields
+
+class MapOptions:
+    # fields of MapOptions
+    prepare: PrepareOptions
+    tile_size: float
+    halo: float
+    def __init__(
+        self,
+        *,
+        prepare: PrepareOptions = ...,
+        tile_size: float = ...,
+        halo: float = ...,
+    ) -> None: ...
+    def replace(
+        self,
+        *,
+        prepare: PrepareOptions = ...,
+        tile_size: float = ...,
+        halo: float = ...,
+    ) -> MapOptions: ...
+    def validate(self) -> None: ...
+    def __eq__(self, other: object, /) -> bool: ...
+    __hash__: None  # type: ignore[assignment]
+    _fields: tuple[str, ...]
+    # end of fields
+    @staticmethod
+    def from_voxel_size(voxel_size: float) -> MapOptions: ...
+
+class LocateOptions:
+    # fields of LocateOptions
+    registration: RegistrationOptions
+    max_matches: int
+    candidates: int
+    neighborhood: float
+    def __init__(
+        self,
+        *,
+        registration: RegistrationOptions = ...,
+        max_matches: int = ...,
+        candidates: int = ...,
+        neighborhood: float = ...,
+    ) -> None: ...
+    def replace(
+        self,
+        *,
+        registration: RegistrationOptions = ...,
+        max_matches: int = ...,
+        candidates: int = ...,
+        neighborhood: float = ...,
+    ) -> LocateOptions: ...
+    def validate(self) -> None: ...
+    def __eq__(self, other: object, /) -> bool: ...
+    __hash__: None  # type: ignore[assignment]
+    _fields: tuple[str, ...]
+    # end of fields
+    @staticmethod
+    def from_voxel_size(voxel_size: float) -> LocateOptions: ...
+
+class PreparedMap:
+    def __len__(self) -> int: ...
+    @property
+    def tiles(self) -> int: ...
+    @property
+    def options(self) -> MapOptions: ...
+    @property
+    def cloud(self) -> PointCloud: ...
+    def save(self, path: str | os.PathLike[str]) -> None: ...
+
+class LocatedPose:
+    @property
+    def map_from_scan(self) -> _Float64: ...
+    @property
+    def confidence(self) -> float: ...
+    @property
+    def alias(self) -> bool: ...
+    @property
+    def verification(self) -> PoseVerification: ...
+
+class LocateResult:
+    @property
+    def status(self) -> str: ...
+    @property
+    def found(self) -> bool: ...
+    @property
+    def map_from_scan(self) -> _Float64: ...
+    @property
+    def poses(self) -> list[LocatedPose]: ...
+    @property
+    def absent_probability(self) -> float: ...
+    @property
+    def scan_points(self) -> int: ...
+    @property
+    def tiles(self) -> int: ...
+    @property
+    def neighborhood_points(self) -> int: ...
+
+def load_map(path: str | os.PathLike[str]) -> PreparedMap: ...
+def make_map(
+    context: Context,
+    clouds: Iterable[Any],
+    poses: npt.NDArray[np.float64] | None,
+    options: MapOptions,
+) -> PreparedMap: ...
+def locate(
+    context: Context,
+    scans: Sequence[Any],
+    map: PreparedMap,
+    options: LocateOptions,
+    up: tuple[_Float64, _Float64, float] | None,
+    near: tuple[_Float64, float] | None,
+    names: Sequence[str],
+) -> list[LocateResult]: ...
 
 class LoopClosureOptions:
     # fields of LoopClosureOptions

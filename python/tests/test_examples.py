@@ -85,6 +85,15 @@ def test_map(scans, tmp_path):
     assert len(gpureg.read_point_cloud(tmp_path / "map.ply").points) > 500
 
 
+def test_locate(scans, tmp_path):
+    later = tmp_path / "later"
+    later.mkdir()
+    (scans / "cloud_bin_0.ply").rename(later / "cloud_bin_7.ply")
+    gpureg.write_point_cloud(scans / "cloud_bin_3.ply", moved(room(), np.eye(4)))
+    shown = run("09_locate.py", scans, later, "--save-map", tmp_path / "map.gpureg")
+    assert "scan 7: found" in shown and len(gpureg.load_map(tmp_path / "map.gpureg")) > 500
+
+
 def test_own_features():
     pytest.importorskip("torch")
     assert "aligned" in run("04_own_features.py")

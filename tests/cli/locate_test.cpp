@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <gtest/gtest.h>
 
+#include <filesystem>
+
 #include "cli/command.hpp"
 #include "cli/scene.hpp"
 
@@ -55,6 +57,24 @@ TEST_F(Locate, FoundInScansWithPosesAndInTheSavedMapAndStrangersAreNot) {
   const Outcome nowhere = locate({scan, stranger, map});
   EXPECT_EQ(nowhere.status, 1);
   expect_holds(nowhere.out, {"status   found", "status   not_found"});
+}
+
+TEST_F(Locate, TheLargestIslandOfAReconstructionIsTheMap) {
+  const std::string name = std::filesystem::path(folder.path()).filename().string();
+  const TemporaryFolder map;
+  map.write("poses.txt", content_of(folder / "poses.txt"));
+  const auto document = [&](const std::string& scans) {
+    map.write("reconstruction.json",
+              R"({"format_version":1,"folder":")" + scans + R"(","islands":[[0,1,2],[3]]})");
+  };
+  document(folder.path());
+  const Outcome found = locate({scan, map.path()}, {"--voxel-size", "0.1"});
+  EXPECT_EQ(found.status, 0) << found.out << found.err;
+  expect_holds(found.err, {"2 islands", "the largest one"});
+  document("/nowhere/" + name);  // moved, together with the map
+  EXPECT_EQ(locate({map.path()}, {"--voxel-size", "0.1", "--save-map", other / "m"}).status, 0);
+  document("/nowhere/scans");
+  expect_refused({"locate", scan, map.path()}, {"reconstruction.json", "/nowhere/scans"});
 }
 
 TEST_F(Locate, RefusesWhatCannotBe) {

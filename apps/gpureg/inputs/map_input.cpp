@@ -31,15 +31,14 @@ PosedScans of_reconstruction(const std::string& path, const std::string& file) {
   PosedScans out;
   DocumentFile document(file);
   const Json json = document.read();
+  std::size_t count = 0;
   try {
     out.folder = text_member(json, "folder");
     out.numbers.emplace();
     const Json& islands = member(json, "islands");
     if (islands.empty()) throw InvalidArgument("no scan was placed");
     for (const Json& number : islands.front()) out.numbers->insert(number.get<int>());
-    if (islands.size() > 1)
-      std::cerr << "gpureg: note: " << path << " has " << islands.size()
-                << " islands, the map is the largest one" << std::endl;
+    count = islands.size();
   } catch (const std::exception& error) {
     throw IoError(file + ": " + error.what());
   }
@@ -51,6 +50,9 @@ PosedScans of_reconstruction(const std::string& path, const std::string& file) {
       throw IoError(file + " names the scans of " + out.folder + ", which is not there");
     out.folder = beside;
   }
+  if (count > 1)
+    std::cerr << "gpureg: note: " << path << " has " << count
+              << " islands, the map is the largest one" << std::endl;
   out.poses = (fs::path(path) / "poses.txt").string();
   return out;
 }

@@ -1,0 +1,199 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Left-out fragments located in maps of the others, and fragments of other scenes, which are not there.
+
+    python3 bench/accuracy/locate.py --data DATA --work WORK --command build/cpu/bin/gpureg
+
+Every STEP-th fragment of the red kitchen, the houses A and B and hospital E is left out and asked for,
+turned at random and with its middle camera at the origin, in the map of its scene and, with --joint, in
+one map of all scenes. Those of the next scene are asked for in the map of each scene, too. A pose is
+correct if its RMSE over the points of the scan is below 0.2 m.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import pathlib
+import resource
+import subprocess
+from typing import Any
+
+import numpy as np
+
+SCENES = {"kitchen": "redkitchen/fragments", "A": "house/A", "B": "house/B", "E": "hospital/E"}
+CORRECT, FIRST, GAP = 0.2, 2, 40.0
+
+
+def moved(points: np.ndarray, pose: np.ndarray) -> np.ndarray:
+    return points @ pose[:3, :3].T + pose[:3, 3]
+
+
+def read_points(path: pathlib.Path) -> np.ndarray:
+    with open(path, "rb") as file:
+        header = []
+        while (line := file.readline().decode().strip()) != "end_header":
+            header.append(line.split())
+        count = next(int(h[2]) for h in header if h[:2] == ["element", "vertex"])
+        width = sum(h[0] == "property" for h in header)
+        if any(h[0] == "property" and h[1] not in ("float", "float32") for h in header):
+            raise SystemExit(f"{path}: not of float32 alone")
+        return np.fromfile(file, "<f4", count * width).reshape(count, width)[:, :3].astype(float)
+
+
+def write_points(path: pathlib.Path, points: np.ndarray) -> None:
+    header = f"ply\nformat binary_little_endian 1.0\nelement vertex {len(points)}\n"
+    header += "".join(f"property float {axis}\n" for axis in "xyz") + "end_header\n"
+    path.write_bytes(header.encode() + points.astype("<f4").tobytes())
+
+
+def read_poses(path: pathlib.Path) -> dict[int, np.ndarray]:
+    numbers = path.read_text().split()
+    rows = np.array(numbers, float).reshape(-1, 17)
+    return {int(row[0]): row[1:].reshape(4, 4) for row in rows}
+
+
+class Scene:
+    def __init__(self, folder: pathlib.Path, step: int) -> None:
+        self.folder = folder
+        self.poses = read_poses(folder / "poses.txt")
+        self.cameras: dict[int, list[list[str]]] = {}
+        for line in (folder / "cameras.txt").read_text().splitlines():
+            if line.strip() and not line.startswith("#"):
+                self.cameras.setdefault(int(line.split()[0]), []).append(line.split())
+        self.left_out = [n for n in sorted(self.poses) if n % step == FIRST]
+
+    def query(self, number: int, path: pathlib.Path, seed: int) -> np.ndarray:
+        """Writes the scan; returns scan_from_fragment."""
+        cameras = self.cameras[number]
+        middle = np.array(cameras[len(cameras) // 2][2:5], float)
+        q, _ = np.linalg.qr(np.random.default_rng([seed, number]).normal(size=(3, 3)))
+        frame = np.eye(4)
+        frame[:3, :3] = q * np.sign(np.linalg.det(q))
+        frame[:3, 3] = -frame[:3, :3] @ middle
+        write_points(path, moved(read_points(self.folder / f"cloud_bin_{number}.ply"), frame))
+        return frame
+
+
+def map_folder(
+    work: pathlib.Path, scenes: dict[str, Scene], shifts: dict[str, np.ndarray]
+) -> pathlib.Path:
+    work.mkdir(parents=True)
+    poses, cameras, count = "", "", 0
+    for name, scene in scenes.items():
+        for number in sorted(scene.poses):
+            if number in scene.left_out:
+                continue
+            source = (scene.folder / f"cloud_bin_{number}.ply").resolve()
+            os.symlink(source, work / f"cloud_bin_{count}.ply")
+            pose = shifts[name] @ scene.poses[number]
+            poses += f"{count}\n" + "".join(
+                " ".join(map(repr, row)) + "\n" for row in pose.tolist()
+            )
+            cameras += "".join(" ".join([str(count), *c[1:]]) + "\n" for c in scene.cameras[number])
+            count += 1
+    (work / "poses.txt").write_text(poses)
+    (work / "cameras.txt").write_text(cameras)
+    return work
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--data", type=pathlib.Path, required=True)
+    parser.add_argument("--work", type=pathlib.Path, required=True, help="a new folder")
+    parser.add_argument("--command", default="build/cpu/bin/gpureg")
+    parser.add_argument("--output", type=pathlib.Path, help="record, a row a line")
+    parser.add_argument("--step", type=int, default=10)
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--joint", action="store_true")
+    arguments = parser.parse_args()
+    scenes = {n: Scene(arguments.data / f, arguments.step) for n, f in SCENES.items()}
+    names, work = list(scenes), arguments.work
+    shifts = {name: np.eye(4) for name in names}
+    rows: list[dict[str, Any]] = []
+
+    def gpureg(*words: str | pathlib.Path) -> float:
+        """CPU seconds: those of the clock depend on what else runs."""
+        before = resource.getrusage(resource.RUSAGE_CHILDREN)
+        done = subprocess.run([arguments.command, "locate", *map(str, words)], capture_output=True)
+        if done.returncode not in (0, 1):
+            raise SystemExit(done.stderr.decode())
+        after = resource.getrusage(resource.RUSAGE_CHILDREN)
+        return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+
+    def ask(kind: str, map: pathlib.Path, of: str, here: bool) -> None:
+        scene, paths, truths = scenes[of], [], []
+        for number in scene.left_out:
+            paths.append(work / f"{of}_{number}.ply")
+            frame = scene.query(number, paths[-1], arguments.seed)
+            truths.append(shifts[of] @ scene.poses[number] @ np.linalg.inv(frame))
+        seconds = gpureg(*paths, map, "--viewpoint", "0,0,0", "--json", work / "result.json")
+        result = json.loads((work / "result.json").read_text())
+        for path, truth, scan in zip(paths, truths, result["scans"]):
+            points = read_points(path)
+            errors = [
+                float(
+                    np.sqrt(
+                        (
+                            (
+                                moved(points, np.reshape(p["map_from_scan"], (4, 4)))
+                                - moved(points, truth)
+                            )
+                            ** 2
+                        )
+                        .sum(1)
+                        .mean()
+                    )
+                )
+                for p in scan["poses"]
+            ]
+            first = scan["poses"][0]["confidence"] if errors else 0.0
+            row = {
+                "map": kind,
+                "scan": path.stem,
+                "here": here,
+                "status": scan["status"],
+                "confidence": round(first, 4),
+                "error": round(errors[0], 4) if here and errors else None,
+                "correct": here and bool(errors) and errors[0] < CORRECT,
+                "tiles": scan["tiles"],
+                "map_points": result["map"]["points"],
+                "cpu_seconds": round(seconds / len(paths), 2),
+                "peak_memory_mib": round(result["peak_memory_mib"]),
+            }
+            rows.append(row)
+            print(row, flush=True)
+            if arguments.output:
+                lines = ",\n ".join(json.dumps(r) for r in rows)
+                head = json.dumps(
+                    {"seed": arguments.seed, "step": arguments.step, **result["environment"]}
+                )
+                arguments.output.write_text(f'{{"run": {head},\n"rows": [\n {lines}\n]}}\n')
+
+    for k, name in enumerate(names):
+        folder = map_folder(work / name, {name: scenes[name]}, shifts)
+        gpureg(folder, "--save-map", work / f"{name}.gpureg")
+        ask(name, work / f"{name}.gpureg", name, True)
+        ask(name, work / f"{name}.gpureg", names[(k + 1) % len(names)], False)
+    if arguments.joint:
+        for k, name in enumerate(names):
+            shifts[name] = np.eye(4)
+            shifts[name][0, 3] = GAP * k
+        folder = map_folder(work / "joint", scenes, shifts)
+        gpureg(folder, "--save-map", work / "joint.gpureg")
+        for name in names:
+            ask("all four", work / "joint.gpureg", name, True)
+    here = [r for r in rows if r["here"]]
+    found = [r for r in rows if r["status"] == "found"]
+    print(
+        f"{sum(r['correct'] for r in here)} of {len(here)} first poses correct, "
+        f"{sum(r['correct'] for r in found)} of {len(found)} found correct, "
+        f"{sum(r['status'] == 'found' for r in rows if not r['here'])} of "
+        f"{sum(not r['here'] for r in rows)} strangers found"
+    )
+
+
+if __name__ == "__main__":
+    main()

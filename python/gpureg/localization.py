@@ -1,0 +1,199 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Where in a map a scan is, or that it is not there."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from . import _core
+from ._arrays import CoreCloud, core_cloud, float64, several
+from ._contexts import checked, context_of
+from ._core import (
+    Context,
+    LocateOptions,
+    LocateResult,
+    MapOptions,
+    PreparedMap,
+    PrepareOptions,
+    load_map,
+)
+from .fragments import FragmentSet
+
+
+def _set_of(scans: Any, name: str) -> FragmentSet | list[Any]:
+    if isinstance(scans, str | os.PathLike) and os.path.isdir(scans):
+        return FragmentSet.from_directory(scans)
+    return scans if isinstance(scans, FragmentSet) else several(scans, name)
+
+
+def _load(scans: FragmentSet | list[Any], options: PrepareOptions, name: str, k: int) -> CoreCloud:
+    if isinstance(scans, FragmentSet):
+        return scans.load(k, options)
+    return core_cloud(scans[k], None, None, None, options, f"{name}[{k}]")
+
+
+def prepare_map(
+    clouds: Any,
+    poses: Any = None,
+    *,
+    options: MapOptions | None = None,
+    context: Context | None = None,
+) -> PreparedMap:
+    """Make a map that scans are located in.
+
+    Parameters
+    ----------
+    clouds : cloud; where poses are given a sequence of scans, a folder or a FragmentSet
+        Each whatever `prepare` takes as points. Scans that know where they were seen from (by
+        cameras.txt, by the viewpoints of a `PointCloud`, or at the origin of their frame) are best:
+        what was seen through tells places apart that look alike.
+    poses : (N, 4, 4) array, optional
+        ``map_from_scan`` of each scan; those that are NaN, as of `reconstruct`, are left out. None:
+        clouds is one cloud in the frame of the map.
+    options : MapOptions, optional
+        Default: voxels of 5 cm. See `MapOptions.from_voxel_size`.
+    context : Context, optional
+
+    Returns
+    -------
+    PreparedMap
+        Immutable. ``save(path)`` writes it, `load_map` reads it.
+
+    Raises
+    ------
+    ValueError
+        Naming the scan whose pose is no rigid motion; for a voxel size that does not fit.
+
+    Examples
+    --------
+    >>> import numpy as np, gpureg
+    >>> room = np.random.default_rng(1).random((20000, 3)) * [4, 3, 2]
+    >>> map = gpureg.prepare_map(room, options=gpureg.MapOptions.from_voxel_size(0.1))
+    >>> map.tiles
+    1
+    """
+    options = checked(options, MapOptions, "options") or MapOptions()
+    context = context_of(context)
+    if poses is None:
+        cloud = core_cloud(clouds, None, None, None, options.prepare, "clouds")
+        return _core.make_map(context, [cloud], None, options)
+    scans = _set_of(clouds, "clouds")
+    matrices = float64(poses, "poses")
+    if matrices.shape != (len(scans), 4, 4):
+        raise ValueError(
+            f"poses: expected shape ({len(scans)}, 4, 4), one for each scan, got {np.shape(poses)}"
+        )
+    placed = np.flatnonzero(np.isfinite(matrices).all(axis=(1, 2)))
+
+    def inputs() -> Iterator[CoreCloud]:  # one scan in memory at a time
+        for k in placed:
+            yield _load(scans, options.prepare, "clouds", int(k))
+
+    return _core.make_map(context, inputs(), matrices[placed], options)
+
+
+def _vector(value: Any, name: str) -> npt.NDArray[np.float64]:
+    vector = float64(value, name)
+    if vector.shape != (3,):
+        raise ValueError(f"{name}: expected shape (3,), got {vector.shape}")
+    return vector
+
+
+def locate_batch(
+    scans: Any,
+    map: PreparedMap,
+    *,
+    scan_up: Any = None,
+    map_up: Any = (0.0, 0.0, 1.0),
+    max_angle: float = 10.0,
+    near: tuple[Any, float] | None = None,
+    options: LocateOptions | None = None,
+    context: Context | None = None,
+) -> list[LocateResult]:
+    """`locate` for many scans at once: the same results, and each tile is prepared once.
+
+    scans: a sequence, a folder of fragments, or a `FragmentSet`.
+    """
+    map = checked(map, PreparedMap, "map")
+    voxel_size = map.options.prepare.voxel_size
+    options = checked(options, LocateOptions, "options") or LocateOptions.from_voxel_size(
+        voxel_size
+    )
+    context = context_of(context)
+    clouds = _set_of(scans, "scans")
+    names = [f"scans[{k}]" for k in range(len(clouds))]
+    inputs = [_load(clouds, map.options.prepare, "scans", k) for k in range(len(clouds))]
+    up = (
+        None
+        if scan_up is None
+        else (_vector(scan_up, "scan_up"), _vector(map_up, "map_up"), float(max_angle))
+    )
+    place = None if near is None else (_vector(near[0], "near"), float(near[1]))
+    return _core.locate(context, inputs, map, options, up, place, names)
+
+
+def locate(
+    scan: Any,
+    map: PreparedMap,
+    *,
+    scan_up: Any = None,
+    map_up: Any = (0.0, 0.0, 1.0),
+    max_angle: float = 10.0,
+    near: tuple[Any, float] | None = None,
+    options: LocateOptions | None = None,
+    context: Context | None = None,
+) -> LocateResult:
+    """Find the pose of a scan in a map, or say that it is not there.
+
+    Parameters
+    ----------
+    scan
+        Whatever `prepare` takes as points.
+    map : PreparedMap
+        Of `prepare_map` or `load_map`.
+    scan_up, map_up : (3,) arrays, optional
+        The vertical direction in both, and by how many degrees it may be off: max_angle.
+    near : ((x, y, z), radius), optional
+        Rough position of the origin of the scan's frame in the map, metres.
+    options : LocateOptions, optional
+        Default: `LocateOptions.from_voxel_size` of the map.
+    context : Context, optional
+
+    Returns
+    -------
+    LocateResult
+        ``status`` is 'found', 'ambiguous' (places that look alike) or 'not_found'; ``poses`` has the
+        candidates, ``absent_probability`` the probability that none of them is correct.
+
+    Raises
+    ------
+    ValueError
+        For a scan that looks as if it was in another unit than the map, and options of another
+        voxel size.
+
+    Examples
+    --------
+    >>> import numpy as np, gpureg
+    >>> room = np.random.default_rng(1).random((20000, 3)) * [4, 3, 2]
+    >>> map = gpureg.prepare_map(room, options=gpureg.MapOptions.from_voxel_size(0.1))
+    >>> gpureg.locate(np.random.default_rng(2).random((3000, 3)) * 3, map).status
+    'not_found'
+    """
+    return locate_batch(
+        [scan],
+        map,
+        scan_up=scan_up,
+        map_up=map_up,
+        max_angle=max_angle,
+        near=near,
+        options=options,
+        context=context,
+    )[0]
+
+
+__all__ = ["load_map", "locate", "locate_batch", "prepare_map"]

@@ -1,0 +1,91 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Where in a map a scan is, or that it is not there."""
+
+import pathlib
+from typing import Any
+
+import gpureg
+import numpy as np
+import pytest
+from scenes import moved, pose, room
+
+OPTIONS = gpureg.MapOptions.from_voxel_size(0.05)
+PLACES = [np.eye(4), np.eye(4)]
+PLACES[1][:3, 3] = [4, 1, 0]
+SENSOR = [1.8, 1.7, 1.6]
+
+
+def scan_of(seed: int, frame: np.ndarray, thinned: int = 0) -> gpureg.PointCloud:
+    points = room(seed, 24000)[thinned::2]
+    return gpureg.PointCloud(moved(points, frame), viewpoints=moved(np.array([SENSOR]), frame))
+
+
+@pytest.fixture(scope="module")
+def two_rooms() -> gpureg.PreparedMap:
+    scans = [scan_of(seed, np.eye(4)) for seed in (1, 2)]
+    return gpureg.prepare_map(scans, np.array(PLACES), options=OPTIONS)
+
+
+def numbers(result: gpureg.LocateResult) -> list[Any]:
+    return [
+        result.status,
+        result.absent_probability,
+        *(p.map_from_scan.tolist() + [p.confidence, p.alias] for p in result.poses),
+    ]
+
+
+def test_found_and_not_there(two_rooms: gpureg.PreparedMap) -> None:
+    frame = pose()
+    result = gpureg.locate(scan_of(2, frame, 1), two_rooms)
+    assert result.status == "found" and result.found
+    assert np.abs(result.map_from_scan - PLACES[1] @ np.linalg.inv(frame)).max() < 0.05
+    assert result.poses[0].confidence + result.absent_probability <= 1 + 1e-12
+    assert result.poses[0].verification.inlier_ratio > 0.5
+    foreign = gpureg.locate(scan_of(9, frame), two_rooms)
+    assert foreign.status == "not_found" and foreign.absent_probability > 0.5
+    assert [numbers(r) for r in gpureg.locate_batch([scan_of(9, frame)], two_rooms)] == [
+        numbers(foreign)
+    ]
+
+
+def test_saved_and_loaded(two_rooms: gpureg.PreparedMap, tmp_path: pathlib.Path) -> None:
+    path = tmp_path / "rooms.gpureg"
+    two_rooms.save(path)
+    loaded = gpureg.load_map(path)
+    assert len(loaded) == len(two_rooms) and loaded.tiles == two_rooms.tiles
+    assert loaded.options == two_rooms.options == OPTIONS
+    assert np.array_equal(loaded.cloud.points, two_rooms.cloud.points)
+    scan = scan_of(1, pose(5), 1)
+    assert numbers(gpureg.locate(scan, loaded)) == numbers(gpureg.locate(scan, two_rooms))
+    path.write_bytes(path.read_bytes()[:-10])
+    with pytest.raises(gpureg.IoError, match="truncated"):
+        gpureg.load_map(path)
+    with pytest.raises(gpureg.IoError, match="nowhere"):
+        gpureg.load_map(tmp_path / "nowhere")
+
+
+def test_priors(two_rooms: gpureg.PreparedMap) -> None:
+    frame = pose()
+    scan = scan_of(1, frame, 1)
+    truth = np.linalg.inv(frame)
+    assert gpureg.locate(scan, two_rooms, near=(truth[:3, 3], 1.0)).found
+    assert not gpureg.locate(scan, two_rooms, near=(truth[:3, 3] + [0, 0, 40], 1.0)).found
+    assert gpureg.locate(scan, two_rooms, scan_up=frame[:3, 2]).found
+    with pytest.raises(ValueError, match=r"near: expected shape \(3,\)"):
+        gpureg.locate(scan, two_rooms, near=([1, 2], 1.0))
+
+
+def test_wrong_arguments(two_rooms: gpureg.PreparedMap) -> None:
+    scan = room(1)
+    with pytest.raises(gpureg.InvalidArgument, match="millimetres"):
+        gpureg.locate(scan * 1000, two_rooms)
+    with pytest.raises(gpureg.InvalidArgument, match="voxel_size"):
+        gpureg.locate(scan, two_rooms, options=gpureg.LocateOptions.from_voxel_size(0.1))
+    with pytest.raises(TypeError, match="map: expected a PreparedMap"):
+        gpureg.locate(scan, scan)
+    with pytest.raises(TypeError, match="sequence of clouds"):
+        gpureg.locate_batch(scan, two_rooms)
+    with pytest.raises(ValueError, match=r"poses: expected shape \(1, 4, 4\)"):
+        gpureg.prepare_map([scan], np.eye(4))
+    with pytest.raises(gpureg.InvalidArgument, match="no points"):
+        gpureg.prepare_map(np.zeros((0, 3)))
