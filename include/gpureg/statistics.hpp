@@ -97,7 +97,10 @@ struct StageTimings {
 /// Counts and wall times (milliseconds) of the preparation of one cloud.
 struct PrepareStatistics {
   std::uint64_t input_points = 0;
-  std::uint64_t invalid_points = 0;         ///< dropped for NaN or infinite coordinates
+  std::uint64_t invalid_points = 0;  ///< dropped for NaN or infinite coordinates
+  /// Dropped for having fewer than two points within the normal radius, which only happens to
+  /// clouds of so many that they would exhaust the memory.
+  std::uint64_t stray_points = 0;
   std::uint32_t points = 0;                 ///< after downsampling
   std::uint32_t points_without_normal = 0;  ///< fewer than 3 neighbours
   /// No neighbour within the feature radius, or no normal: never matched.

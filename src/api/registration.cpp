@@ -2,6 +2,7 @@
 #include "gpureg/registration.hpp"
 
 #include <algorithm>
+#include <optional>
 #include <string>
 
 #include "api/access.hpp"
@@ -10,7 +11,9 @@
 #include "api/outcome.hpp"
 #include "api/pair_input.hpp"
 #include "api/raw_cloud.hpp"
+#include "api/stray_points.hpp"
 #include "api/variants.hpp"
+#include "common/host_threads.hpp"
 #include "common/in_halves.hpp"
 #include "common/limits.hpp"
 #include "common/validate.hpp"
@@ -31,6 +34,27 @@ void check_priors(const std::vector<RegistrationPrior>& priors, std::size_t pair
       require(options.method == RegistrationMethod::compatibility, "method",
               to_string(options.method), "compatibility: only it can use priors");
   }
+}
+
+/// Points from which another thread is worth its start.
+constexpr std::size_t kPointsPerThread = 200'000;
+
+/// Replaces clouds by those without their stray points. @return the owners of the rows.
+template <typename Naming>
+std::vector<std::optional<WithoutStrayPoints>> drop_stray_points(const Engine& engine,
+                                                                 const PrepareOptions& options,
+                                                                 const Naming& naming,
+                                                                 std::vector<RawCloud>& raw) {
+  std::vector<std::optional<WithoutStrayPoints>> owners(raw.size());
+  std::size_t points = 0;
+  for (const RawCloud& cloud : raw) points += cloud.size;
+  const std::size_t workers = std::min<std::size_t>(
+      {std::max(1u, engine.host_threads()), raw.size(), 1 + points / kPointsPerThread});
+  on_threads(workers, [&](std::size_t worker) {
+    for (std::size_t k = worker; k < raw.size(); k += workers)
+      naming(k, [&] { raw[k] = owners[k].emplace(raw[k], options).cloud(); });
+  });
+  return owners;
 }
 
 }  // namespace
@@ -55,6 +79,7 @@ std::vector<PreparedCloud> prepare_batch(const Context& context,
   }
   std::vector<PreparedCloud> out;
   if (raw.empty()) return out;
+  const auto owners = drop_stray_points(*Access::engine(context), options, naming, raw);
   std::vector<std::shared_ptr<PreparedState>> states;
   in_halves(0, raw.size(), [&](std::size_t begin, std::size_t end) {
     const auto work = [&] {
@@ -62,6 +87,7 @@ std::vector<PreparedCloud> prepare_batch(const Context& context,
     };
     for (auto& state : end - begin == 1 ? naming(begin, work) : work()) {
       set_frame_offset(clouds[states.size()].origin, *state);
+      owners[states.size()]->count(state->statistics);
       states.push_back(std::move(state));
     }
   });

@@ -38,6 +38,10 @@ constexpr double kMaxPointsPerCell = 1000;
 /// closest-point grid would take about 20 KB for each.
 constexpr std::uint32_t kMaxIsolatedPoints = 20000;
 constexpr double kIsolatedPointsPerCell = 1.1;
+/// Blocks of a closest-point grid, 4 KB each, and blocks per point of a larger cloud. Surfaces take
+/// 0.1 to 0.4 blocks per prepared point, isolated points about 5.4.
+constexpr std::uint64_t kMaxClosestBlocks = std::uint64_t(1) << 17;
+constexpr double kBlocksPerPoint = 0.5;
 /// Candidates of a closest-point grid, and of one of its blocks: longer lists mean millions of
 /// points within one correspondence distance of each other.
 constexpr std::uint64_t kMaxGridCandidates = std::uint64_t(1) << 28;

@@ -10,6 +10,7 @@
 #include "common/in_halves.hpp"
 #include "common/limits.hpp"
 #include "common/validate.hpp"
+#include "pipeline/runs.hpp"
 #include "viewpoint/viewpoint_inference.hpp"
 
 namespace gpureg {
@@ -21,6 +22,9 @@ constexpr float kGraphRadius = 1.25f;
 
 /// Points from which another thread is worth its start.
 constexpr std::size_t kPointsPerThread = 2'000;
+
+/// Points that are prepared together: a preparation takes twice the memory of its result.
+constexpr std::size_t kPointsTogether = std::size_t(1) << 20;
 
 /// A cloud whose sides are to be decided.
 struct OpenCloud {
@@ -93,6 +97,7 @@ struct Inheritance {
     PrepareStatistics& s = to.statistics;
     s.input_points = statistics.input_points;
     s.invalid_points = statistics.invalid_points;
+    s.stray_points = statistics.stray_points;
     s.viewpoint = statistics.viewpoint;
     s.repaired_normals = statistics.repaired_normals;
     s.downsample += statistics.downsample;
@@ -175,10 +180,13 @@ void resolve_viewpoints(Engine& engine, Span<const RawCloud> raw,
   PrepareOptions as_they_are = options;
   as_they_are.voxel_size = 0;
   std::vector<std::shared_ptr<PreparedState>> prepared;
-  in_halves(0, inputs.size(), [&](std::size_t begin, std::size_t end) {
-    for (auto& state : engine.prepare({inputs.data() + begin, end - begin}, as_they_are))
-      prepared.push_back(std::move(state));
-  });
+  const auto runs = pipeline::runs_within(inputs.size(), kPointsTogether,
+                                          [&](std::size_t k) { return inputs[k].size; });
+  for (const pipeline::Run& run : runs)
+    in_halves(run.begin, run.end, [&](std::size_t begin, std::size_t end) {
+      for (auto& state : engine.prepare({inputs.data() + begin, end - begin}, as_they_are))
+        prepared.push_back(std::move(state));
+    });
   auto next = prepared.begin();
   auto inheritance = inheritances.begin();
   for (const OpenCloud& cloud : open) {

@@ -94,6 +94,19 @@ TEST_F(DegenerateCloud, PointsThatAreNotFinite) {
   expect_not_aligned(holed, "too_few_source_points", "too_few_target_points");
 }
 
+// Thirty thousand points within a kilometre, none near another: more memory than a room.
+TEST_F(DegenerateCloud, StrayPoints) {
+  PointCloud source = room_scan(0);
+  for (int k = 0; k < 30'000; ++k)
+    source.points.emplace_back(30.f * static_cast<float>(k % 32) - 480.f,
+                               30.f * static_cast<float>(k / 32 % 32) - 480.f,
+                               30.f * static_cast<float>(k / 1024) + 30.f);
+  const Outcome outcome = align(source, room_scan(1));
+  expect_aligned(outcome, kTruth, {0, 0, 0});
+  expect_holds(outcome.out, {"(30,000 stray, dropped)"});
+  EXPECT_EQ(json_of(folder_ / "r.json")["source"]["prepare"]["stray_points"], 30'000);
+}
+
 // PCD, as it can say where the sensor was: seen from a far origin, walls would turn their backs to
 // it.
 std::string pcd_seen_from(const Eigen::Vector3f& sensor, const PointCloud& cloud) {

@@ -47,6 +47,7 @@ struct RegisterOptions {
 std::string describe(const PrepareStatistics& s) {
   std::string text = grouped(s.input_points) + " points";
   if (s.invalid_points > 0) text += " (" + grouped(s.invalid_points) + " not finite, dropped)";
+  if (s.stray_points > 0) text += " (" + grouped(s.stray_points) + " stray, dropped)";
   text += ", " + grouped(s.points) + " prepared";
   if (s.points_without_feature > 0)
     text += " (" + grouped(s.points_without_feature) + " without a feature)";

@@ -4,7 +4,7 @@
 
 #include "algorithm/closest_build.hpp"
 #include "cpu/common/stages.hpp"
-#include "cpu/common/wide_vectors.hpp"
+#include "cpu/prepare/candidate_lanes.hpp"
 #include "cpu/prepare/reachable_blocks.hpp"
 #include "pipeline/checks.hpp"
 
@@ -20,10 +20,8 @@ constexpr std::size_t kLeastKeys = std::size_t(1) << 22;
 /// its cells.
 constexpr int kPart = 2;
 
-struct BlockLists {
-  std::vector<std::uint32_t> counts;      // per cell
-  std::vector<std::uint32_t> candidates;  // cells one after another
-};
+/// Blocks of a cloud whose candidates are listed before they move to the grid.
+constexpr std::size_t kBlocksTogether = 4096;
 
 /// Points within the search distance of the block, ascending by index.
 std::vector<std::uint32_t> points_near_block(const GridView& grid, Vec3 center,
@@ -48,80 +46,6 @@ std::vector<std::uint32_t> points_near_block(const GridView& grid, Vec3 center,
   std::sort(near.begin(), near.end());
   return near;
 }
-
-constexpr std::size_t kLanes = 16;
-
-/// Squared distances of points to a location, 16 at a time. Both kinds round alike.
-struct NarrowLanes {
-  /// Writes d2 and returns the least; size: a multiple of 16.
-  static float measure(const float* x, const float* y, const float* z, std::size_t size,
-                       Vec3 center, float* d2) {
-    float least[kLanes];
-    for (float& l : least) l = std::numeric_limits<float>::max();
-    for (std::size_t k = 0; k < size; k += kLanes)
-      for (std::size_t l = 0; l < kLanes; ++l) {
-        const float dx = x[k + l] - center.x, dy = y[k + l] - center.y, dz = z[k + l] - center.z;
-        const float d = fmaf(dz, dz, fmaf(dy, dy, dx * dx));
-        d2[k + l] = d;
-        least[l] = d < least[l] ? d : least[l];
-      }
-    return *std::min_element(least, least + kLanes);
-  }
-  /// Bits of the 16 values that are at most `most`.
-  static std::uint32_t within(const float* d2, float most) {
-    std::uint32_t mask = 0;
-    for (std::uint32_t l = 0; l < kLanes; ++l)
-      mask |= static_cast<std::uint32_t>(d2[l] <= most) << l;
-    return mask;
-  }
-  /// Bits of the 16 points that dominated_in_cell() does not rule out. nearest2: of best.
-  static std::uint32_t undominated(const float* x, const float* y, const float* z, const float* d2,
-                                   Vec3 best, float nearest2, const ClosestGeometry& g) {
-    const DominanceTest test = dominance_test(g);
-    std::uint8_t flag[kLanes];
-    for (std::uint32_t l = 0; l < kLanes; ++l)
-      flag[l] = !dominated({x[l] - best.x, y[l] - best.y, z[l] - best.z}, d2[l] - nearest2, test);
-    std::uint32_t mask = 0;
-    for (std::uint32_t l = 0; l < kLanes; ++l) mask |= static_cast<std::uint32_t>(flag[l]) << l;
-    return mask;
-  }
-};
-#ifdef GPUREG_WIDE_TARGET
-struct WideLanes {
-  GPUREG_WIDE_TARGET static float measure(const float* x, const float* y, const float* z,
-                                          std::size_t size, Vec3 center, float* d2) {
-    const __m512 cx = _mm512_set1_ps(center.x), cy = _mm512_set1_ps(center.y),
-                 cz = _mm512_set1_ps(center.z);
-    __m512 least = _mm512_set1_ps(std::numeric_limits<float>::max());
-    for (std::size_t k = 0; k < size; k += kLanes) {
-      const __m512 dx = _mm512_sub_ps(_mm512_loadu_ps(x + k), cx),
-                   dy = _mm512_sub_ps(_mm512_loadu_ps(y + k), cy),
-                   dz = _mm512_sub_ps(_mm512_loadu_ps(z + k), cz);
-      const __m512 d = _mm512_fmadd_ps(dz, dz, _mm512_fmadd_ps(dy, dy, _mm512_mul_ps(dx, dx)));
-      _mm512_storeu_ps(d2 + k, d);
-      least = _mm512_min_ps(d, least);
-    }
-    return _mm512_reduce_min_ps(least);
-  }
-  GPUREG_WIDE_TARGET static std::uint32_t within(const float* d2, float most) {
-    return _mm512_cmp_ps_mask(_mm512_loadu_ps(d2), _mm512_set1_ps(most), _CMP_LE_OQ);
-  }
-  GPUREG_WIDE_TARGET static std::uint32_t undominated(const float* x, const float* y,
-                                                      const float* z, const float* d2, Vec3 best,
-                                                      float nearest2, const ClosestGeometry& g) {
-    const DominanceTest test = dominance_test(g);
-    const __m512 dx = _mm512_abs_ps(_mm512_sub_ps(_mm512_loadu_ps(x), _mm512_set1_ps(best.x))),
-                 dy = _mm512_abs_ps(_mm512_sub_ps(_mm512_loadu_ps(y), _mm512_set1_ps(best.y))),
-                 dz = _mm512_abs_ps(_mm512_sub_ps(_mm512_loadu_ps(z), _mm512_set1_ps(best.z)));
-    const __m512 l1 = _mm512_add_ps(_mm512_add_ps(dx, dy), dz),
-                 difference = _mm512_sub_ps(_mm512_loadu_ps(d2), _mm512_set1_ps(nearest2)),
-                 most = _mm512_add_ps(_mm512_mul_ps(l1, _mm512_set1_ps(test.edge)),
-                                      _mm512_set1_ps(test.rest));
-    return static_cast<std::uint32_t>(
-        static_cast<__mmask16>(~_mm512_cmp_ps_mask(difference, most, _CMP_GT_OQ)));
-  }
-};
-#endif
 
 /// Points near a block or a part of it, ascending by index, one array per coordinate. Infinite
 /// points fill whole vectors.
@@ -234,8 +158,11 @@ GPUREG_WIDE_TARGET void fill_block_wide(NearPoints& near, Cell block, const Clos
 }
 #endif
 
-void build_block(const GridView& grid, const std::vector<Vec3>& points, Cell block,
-                 const ClosestGeometry& g, BlockLists& out) {
+/// @param counts number of candidates of each cell. @return the candidates, cells one after
+/// another.
+std::vector<std::uint32_t> build_block(const GridView& grid, const std::vector<Vec3>& points,
+                                       Cell block, const ClosestGeometry& g,
+                                       std::uint32_t* counts) {
   NearPoints near;
   for (const std::uint32_t i : points_near_block(grid, cell_center(block, block_edge(g)), g))
     near.add(points[i], i);
@@ -249,12 +176,61 @@ void build_block(const GridView& grid, const std::vector<Vec3>& points, Cell blo
 #endif
       fill_block<NarrowLanes>(near, block, g, lists);
   }
-  out.counts.assign(lists.count, lists.count + kCells);
-  out.candidates.reserve(lists.candidates.size());
+  std::copy(lists.count, lists.count + kCells, counts);
+  std::vector<std::uint32_t> out;
+  out.reserve(lists.candidates.size());
   for (int cell = 0; cell < kCells; ++cell)
-    out.candidates.insert(out.candidates.end(), lists.candidates.begin() + lists.begin[cell],
-                          lists.candidates.begin() + lists.begin[cell] + lists.count[cell]);
+    out.insert(out.end(), lists.candidates.begin() + lists.begin[cell],
+               lists.candidates.begin() + lists.begin[cell] + lists.count[cell]);
+  return out;
 }
+
+/// A grid while it is built, some blocks at a time: of a large cloud, the candidates take most of
+/// the memory of a preparation, so that they are never there twice.
+struct GrowingGrid {
+  ClosestGeometry geometry;
+  std::vector<std::uint64_t> keys;
+  std::vector<std::uint32_t> cell_start;
+  std::vector<std::vector<std::uint32_t>> lists;       // of the blocks at hand
+  std::vector<std::vector<std::uint32_t>> candidates;  // of all blocks before, in pieces
+  std::size_t done = 0, total = 0;
+
+  std::size_t at_hand() const { return std::min(kBlocksTogether, keys.size() - done); }
+  std::uint32_t* starts(std::size_t block) { return &cell_start[block * (kCells + 1)]; }
+
+  /// Moves the blocks at hand to those before.
+  void add_lists() {
+    std::size_t size = 0;
+    for (const auto& list : lists) size += list.size();
+    std::vector<std::uint32_t> piece;
+    piece.reserve(size);
+    std::uint32_t offset = static_cast<std::uint32_t>(total);
+    for (const auto& list : lists) {
+      piece.insert(piece.end(), list.begin(), list.end());
+      std::uint32_t* start = starts(done++);
+      for (int cell = 0; cell < kCells; ++cell) {
+        const std::uint32_t count = start[cell];
+        start[cell] = offset;
+        offset += count;
+      }
+      start[kCells] = offset;
+    }
+    lists.clear();
+    total += size;
+    candidates.push_back(std::move(piece));
+  }
+
+  std::vector<std::uint32_t> all_candidates() {
+    if (candidates.size() == 1) return std::move(candidates.front());
+    std::vector<std::uint32_t> out;
+    out.reserve(total);
+    for (auto& piece : candidates) {
+      out.insert(out.end(), piece.begin(), piece.end());
+      piece = {};
+    }
+    return out;
+  }
+};
 
 }  // namespace
 
@@ -297,44 +273,43 @@ std::vector<ClosestGrid> build_closest_grids(Exec& exec,
                                              const std::vector<Grid>& grids,
                                              const PrepareOptions& options) {
   std::vector<ClosestGrid> out(clouds.size());
-  std::vector<ClosestGeometry> geometry(clouds.size());
-  std::vector<std::vector<std::uint64_t>> keys(clouds.size());
-  std::vector<std::vector<BlockLists>> lists(clouds.size());
+  std::vector<GrowingGrid> growing(clouds.size());
   exec.parallel(clouds.size(), [&](std::size_t c) {
-    geometry[c] = closest_geometry(options.max_correspondence_distance, clouds[c].radius);
-    keys[c] = reachable_blocks(clouds[c].points, geometry[c], kLeastKeys);
-    lists[c].resize(keys[c].size());
+    GrowingGrid& g = growing[c];
+    g.geometry = closest_geometry(options.max_correspondence_distance, clouds[c].radius);
+    g.keys = reachable_blocks(clouds[c].points, g.geometry, kLeastKeys);
+    g.cell_start.resize(g.keys.size() * (kCells + 1));
   });
-  exec.parallel_items(
-      clouds.size(), [&](std::size_t c) { return keys[c].size(); }, 16,
-      [&](std::size_t c, std::size_t begin, std::size_t end) {
-        const GridView grid = grids[c].view();
-        for (std::size_t b = begin; b < end; ++b)
-          build_block(grid, clouds[c].points, cell_from_key(keys[c][b]), geometry[c], lists[c][b]);
-      });
+  const auto unfinished = [](const GrowingGrid& g) { return g.done < g.keys.size(); };
+  while (std::any_of(growing.begin(), growing.end(), unfinished)) {
+    for (GrowingGrid& g : growing) g.lists.resize(g.at_hand());
+    exec.parallel_items(
+        clouds.size(), [&](std::size_t c) { return growing[c].lists.size(); }, 16,
+        [&](std::size_t c, std::size_t begin, std::size_t end) {
+          GrowingGrid& g = growing[c];
+          const GridView grid = grids[c].view();
+          for (std::size_t k = begin; k < end; ++k)
+            g.lists[k] = build_block(grid, clouds[c].points, cell_from_key(g.keys[g.done + k]),
+                                     g.geometry, g.starts(g.done + k));
+        });
+    exec.parallel(clouds.size(), [&](std::size_t c) {
+      if (!unfinished(growing[c])) return;
+      growing[c].add_lists();
+      if (pipeline::too_many_candidates(growing[c].total, clouds[c].points.size()))
+        pipeline::throw_too_dense(options.max_correspondence_distance);
+    });
+  }
   exec.parallel(clouds.size(), [&](std::size_t c) {
     ClosestGrid& grid = out[c];
-    grid.cell_size = geometry[c].cell_size;
-    std::size_t total = 0;
-    for (const BlockLists& l : lists[c]) total += l.candidates.size();
-    if (pipeline::too_many_candidates(total, clouds[c].points.size()))
-      pipeline::throw_too_dense(options.max_correspondence_distance);
-    grid.table.reset(keys[c].size());
-    grid.cell_start.reserve(keys[c].size() * (kCells + 1));
-    grid.candidates.reserve(total);
-    for (std::size_t b = 0; b < keys[c].size(); ++b) {
-      grid.table.insert(keys[c][b], static_cast<std::uint32_t>(b));
-      grid.blocks.push_back(cell_from_key(keys[c][b]));
-      std::uint32_t offset = static_cast<std::uint32_t>(grid.candidates.size());
-      for (int cell = 0; cell < kCells; ++cell) {
-        grid.cell_start.push_back(offset);
-        offset += lists[c][b].counts[cell];
-      }
-      grid.cell_start.push_back(offset);
-      grid.candidates.insert(grid.candidates.end(), lists[c][b].candidates.begin(),
-                             lists[c][b].candidates.end());
-      lists[c][b] = BlockLists();  // a map's lists take as much memory as its grid
+    GrowingGrid& g = growing[c];
+    grid.cell_size = g.geometry.cell_size;
+    grid.table.reset(g.keys.size());
+    for (std::size_t b = 0; b < g.keys.size(); ++b) {
+      grid.table.insert(g.keys[b], static_cast<std::uint32_t>(b));
+      grid.blocks.push_back(cell_from_key(g.keys[b]));
     }
+    grid.cell_start = std::move(g.cell_start);
+    grid.candidates = g.all_candidates();
   });
   return out;
 }
