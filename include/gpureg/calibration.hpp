@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <optional>
 #include <vector>
 
 #include "gpureg/registration.hpp"
@@ -57,6 +58,47 @@ CalibrationFit fit_calibration(const std::vector<CalibrationSample>& samples);
 double calibration_error(const std::vector<CalibrationSample>& samples,
                          const ConfidenceCalibration& calibration = {});
 
+/// What a caller demands of the poses that are reported.
+struct RiskControl {
+  double max_risk = 0.01;     ///< largest share of false poses among the reported ones, (0, 1)
+  double max_failure = 0.05;  ///< probability that the samples mislead about it, (0, 1)
+
+  /// @throws InvalidArgument naming field and value.
+  void validate() const;
+};
+
+/// Result of control_risk().
+struct RiskThreshold {
+  bool supported = false;     ///< false: the samples are no proof for any threshold
+  double min_confidence = 1;  ///< for RegistrationOptions::min_confidence
+  std::size_t samples = 0;    ///< all
+  std::size_t reported = 0;   ///< from min_confidence on
+  std::size_t wrong = 0;      ///< of these
+  double recall = 0;          ///< share of the correct samples that are reported, [0, 1]
+  /// Where it is not supported: so many more samples would do if their shares of false poses stay
+  /// as they are. None: no number would do, too many of the most confident poses are false.
+  std::optional<std::size_t> more_samples;
+};
+
+/// Finds the lowest threshold on the confidence that keeps a promise: of the poses that pairs like
+/// the samples report, at most max_risk are false in the long run. With probability 1 - max_failure
+/// over the samples the promise is true, whatever their number and the quality of the confidence.
+///
+/// Learn-then-test (Angelopoulos et al. 2021, sections 2 and 3.2): thresholds on a fixed ladder are
+/// tested from four fixed starts downwards, each with a quarter of max_failure, by the exact
+/// binomial tail of the false poses among the reported ones; a sequence ends with its first
+/// failure.
+///
+/// @param samples independent pairs, drawn like those of later; weights are not used. Pairs made of
+///   one scan are easier than others and do not belong here: CalibrationResult::of_two_scans().
+/// @param calibration of the later runs: the threshold is chosen on confidences without it, and
+///   min_confidence is its value with it.
+/// @throws InvalidArgument for options and confidences out of range.
+/// Deterministic for any order of the samples; thread-safe.
+RiskThreshold control_risk(const std::vector<CalibrationSample>& samples,
+                           const RiskControl& control = {},
+                           const ConfidenceCalibration& calibration = {});
+
 /// Options of calibrate().
 struct CalibrationOptions {
   /// Pairs made of one scan, spread over the clouds; 0: none.
@@ -100,6 +142,8 @@ struct CalibrationResult {
            : kind == CalibrationKind::loop_consistency ? loop_consistency
                                                        : trajectory;
   }
+  /// The samples of pairs of different scans, for control_risk().
+  std::vector<CalibrationSample> of_two_scans() const;
 };
 
 /// Makes the calibration of a sensor from its clouds.

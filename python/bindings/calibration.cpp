@@ -94,6 +94,12 @@ void bind_calibration(py::module_& m) {
         out["error_before"] = result.error_before;
         out["error_after"] = result.error_after;
         out["counts"] = counts;
+        py::list confidences, correct;
+        for (const CalibrationSample& sample : result.of_two_scans()) {
+          confidences.append(sample.confidence);
+          correct.append(sample.correct);
+        }
+        out["samples"] = py::make_tuple(confidences, correct);
         return out;
       },
       py::arg("context"), py::arg("clouds"), py::arg("options"), py::arg("self_pairs"),
@@ -109,6 +115,29 @@ void bind_calibration(py::module_& m) {
         return py::make_tuple(fit.calibration, fit.enough_samples);
       },
       py::arg("confidences"), py::arg("correct"), py::arg("weights"));
+  m.def(
+      "control_risk",
+      [](const std::vector<double>& confidences, const std::vector<bool>& correct, double max_risk,
+         double max_failure, const ConfidenceCalibration& calibration) {
+        std::vector<CalibrationSample> samples;
+        for (std::size_t k = 0; k < confidences.size(); ++k)
+          samples.push_back({confidences[k], correct.at(k)});
+        RiskControl control;
+        control.max_risk = max_risk;
+        control.max_failure = max_failure;
+        const RiskThreshold found = control_risk(samples, control, calibration);
+        py::dict out;
+        out["supported"] = found.supported;
+        out["min_confidence"] = found.min_confidence;
+        out["samples"] = found.samples;
+        out["reported"] = found.reported;
+        out["wrong"] = found.wrong;
+        out["recall"] = found.recall;
+        out["more_samples"] = found.more_samples;
+        return out;
+      },
+      py::arg("confidences"), py::arg("correct"), py::arg("max_risk"), py::arg("max_failure"),
+      py::arg("calibration"));
 }
 
 }  // namespace gpureg::python

@@ -12,7 +12,14 @@ and `register_all`.
 
 from typing import TYPE_CHECKING, Any
 
-from ._calibration import CalibrationRun, calibrate, fit_calibration, read_calibration
+from ._calibration import (
+    CalibrationRun,
+    RiskThreshold,
+    calibrate,
+    control_risk,
+    fit_calibration,
+    read_calibration,
+)
 from ._contexts import default_context
 from ._core import (
     BackendUnavailable,
@@ -151,6 +158,7 @@ __all__ = [
     "RegistrationPrior",
     "RegistrationResult",
     "RegistrationStatistics",
+    "RiskThreshold",
     "SolverOptions",
     "StageTimings",
     "TimedResult",
@@ -161,6 +169,7 @@ __all__ = [
     "align_batch",
     "align_within",
     "calibrate",
+    "control_risk",
     "default_context",
     "describe_backends",
     "evaluate_trajectory",

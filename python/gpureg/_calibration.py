@@ -26,6 +26,46 @@ _FORMAT_VERSION = 1
 
 
 @dataclasses.dataclass(frozen=True)
+class RiskThreshold:
+    """Result of `control_risk`.
+
+    Attributes
+    ----------
+    max_risk, max_failure : float
+        That were asked for.
+    supported : bool
+        False: the samples are no proof for any threshold.
+    min_confidence : float
+        For ``RegistrationOptions.min_confidence``; 1 where nothing is supported.
+    samples, reported, wrong : int
+        All; those from ``min_confidence`` on; the false ones of these.
+    recall : float
+        Share of the correct samples that are reported, [0, 1].
+    more_samples : int or None
+        Where it is not supported: so many more would do if their shares of false poses stay as they
+        are. None: no number would do.
+    """
+
+    max_risk: float
+    max_failure: float
+    supported: bool
+    min_confidence: float
+    samples: int
+    reported: int
+    wrong: int
+    recall: float
+    more_samples: int | None
+
+    def _json(self) -> dict[str, Any]:
+        out = dataclasses.asdict(self)
+        out["false"] = out.pop("wrong")
+        unknown = ("min_confidence", "reported", "false", "recall")
+        for name in ("more_samples",) if self.supported else unknown:
+            del out[name]
+        return out
+
+
+@dataclasses.dataclass(frozen=True)
 class CalibrationRun:
     """Result of `calibrate`.
 
@@ -44,6 +84,8 @@ class CalibrationRun:
         ``trajectory``.
     voxel_size : float
         That it was made with.
+    risk : RiskThreshold, optional
+        The answer to ``max_risk``.
     """
 
     calibration: ConfidenceCalibration
@@ -52,6 +94,7 @@ class CalibrationRun:
     error_after: float
     counts: dict[str, dict[str, int]]
     voxel_size: float
+    risk: RiskThreshold | None = None
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write the file that ``--calibration`` of the command and `read_calibration` read,
@@ -74,6 +117,8 @@ class CalibrationRun:
             "voxel_size": self.voxel_size,
             "preset": "default",
         }
+        if self.risk is not None:
+            document["risk"] = self.risk._json()
         _core.write_text(os.fspath(path), json.dumps(document, indent=1) + "\n")
 
 
@@ -83,6 +128,7 @@ def calibrate(
     poses: Any = None,
     self_pairs: int = 200,
     scan_pairs: int = 600,
+    max_risk: float | None = None,
     options: RegistrationOptions | None = None,
     context: Context | None = None,
     progress: Progress = False,
@@ -102,6 +148,8 @@ def calibrate(
     scan_pairs : int
         Largest number of pairs of different scans; where there are more, those within groups of
         consecutive scans.
+    max_risk : float, optional
+        Also find the threshold of `control_risk` for this share, on the pairs of different scans.
     options : RegistrationOptions, optional
         The calibration holds for its voxel size.
     context : Context, optional
@@ -147,7 +195,11 @@ def calibrate(
         found = _core.calibrate(
             context, inputs, options, numbers["self_pairs"], numbers["scan_pairs"], known, tell
         )
-    return CalibrationRun(voxel_size=options.prepare.voxel_size, **found)
+    samples = found.pop("samples")
+    risk = None
+    if max_risk is not None:
+        risk = _control_risk(*samples, max_risk, 0.05, found["calibration"])
+    return CalibrationRun(voxel_size=options.prepare.voxel_size, risk=risk, **found)
 
 
 @contextlib.contextmanager
@@ -190,17 +242,67 @@ def fit_calibration(
     >>> enough, calibration.slope > 1, calibration(0.6) < 0.3
     (True, True, True)
     """
-    values = float64(confidences, "confidences")
-    verdicts = to_numpy(correct, "correct")
+    values, verdicts = _labelled(confidences, correct)
     weight = np.ones(values.shape) if weights is None else float64(weights, "weights")
+    if weight.shape != values.shape:
+        raise ValueError(f"weights: expected shape {values.shape}, got {weight.shape}")
+    return _core.fit_calibration(values.tolist(), verdicts.tolist(), weight.tolist())
+
+
+def control_risk(
+    confidences: Any, correct: Any, *, max_risk: float = 0.01, max_failure: float = 0.05
+) -> RiskThreshold:
+    """Find the lowest confidence from which at most ``max_risk`` of the reported poses are false.
+
+    With probability ``1 - max_failure`` over the samples this is so in the long run for pairs like
+    them, whatever the confidence is worth.
+
+    Parameters
+    ----------
+    confidences : (N,) floats
+        Of independent pairs, drawn like those of later.
+    correct : (N,) bools
+    max_risk, max_failure : float
+        In (0, 1).
+
+    Returns
+    -------
+    RiskThreshold
+
+    Examples
+    --------
+    >>> import gpureg
+    >>> gpureg.control_risk([0.99] * 100, [True] * 100, max_risk=0.05).min_confidence
+    0.05
+    >>> gpureg.control_risk([0.99] * 100, [True] * 100, max_risk=0.01).more_samples > 300
+    True
+    """
+    values, verdicts = _labelled(confidences, correct)
+    return _control_risk(
+        values.tolist(), verdicts.tolist(), max_risk, max_failure, ConfidenceCalibration()
+    )
+
+
+def _labelled(confidences: Any, correct: Any) -> tuple[Any, Any]:
+    values, verdicts = float64(confidences, "confidences"), to_numpy(correct, "correct")
     if values.ndim != 1:
         raise ValueError(f"confidences: expected shape (N,), got {values.shape}")
     if verdicts.dtype != np.bool_:
         raise TypeError(f"correct: expected bools, got {verdicts.dtype}")
-    for name, array in (("correct", verdicts), ("weights", weight)):
-        if array.shape != values.shape:
-            raise ValueError(f"{name}: expected shape {values.shape}, got {array.shape}")
-    return _core.fit_calibration(values.tolist(), verdicts.tolist(), weight.tolist())
+    if verdicts.shape != values.shape:
+        raise ValueError(f"correct: expected shape {values.shape}, got {verdicts.shape}")
+    return values, verdicts
+
+
+def _control_risk(
+    confidences: list[float],
+    correct: list[bool],
+    max_risk: float,
+    max_failure: float,
+    calibration: ConfidenceCalibration,
+) -> RiskThreshold:
+    found = _core.control_risk(confidences, correct, max_risk, max_failure, calibration)
+    return RiskThreshold(max_risk=max_risk, max_failure=max_failure, **found)
 
 
 def read_calibration(path: str | os.PathLike[str]) -> ConfidenceCalibration:
@@ -240,4 +342,11 @@ def read_calibration(path: str | os.PathLike[str]) -> ConfidenceCalibration:
     return ConfidenceCalibration(**values)
 
 
-__all__ = ["CalibrationRun", "calibrate", "fit_calibration", "read_calibration"]
+__all__ = [
+    "CalibrationRun",
+    "RiskThreshold",
+    "calibrate",
+    "control_risk",
+    "fit_calibration",
+    "read_calibration",
+]

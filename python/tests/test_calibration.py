@@ -185,6 +185,39 @@ def test_an_error_of_the_callback_ends_the_call(clouds):
         gpureg.calibrate(clouds[0], self_pairs=64, options=options(), progress=stop)
 
 
+def test_a_promised_risk(clouds, tmp_path):
+    run = gpureg.calibrate(clouds[0], self_pairs=8, max_risk=0.001, options=options())
+    assert not run.risk.supported and run.risk.min_confidence == 1
+    run.save(tmp_path / "c.json")
+    risk = json.loads((tmp_path / "c.json").read_text())["risk"]
+    assert risk["max_risk"] == 0.001 and "min_confidence" not in risk
+    found = gpureg.control_risk(
+        [0.95] * 400 + [0.2] * 100, [True] * 400 + [False] * 100, max_risk=0.05
+    )
+    assert (found.supported, found.min_confidence, found.reported, found.wrong) == (
+        True,
+        0.3,
+        400,
+        0,
+    )
+    assert found.recall == 1 and found.more_samples is None
+
+
+@pytest.mark.parametrize(
+    ("confidences", "correct", "max_risk", "error"),
+    [
+        ([0.5], [True, False], 0.1, ValueError),
+        ([[0.5]], [[True]], 0.1, ValueError),
+        ([0.5], [1], 0.1, TypeError),
+        ([1.5], [True], 0.1, ValueError),
+        ([0.5], [True], 0, ValueError),
+    ],
+)
+def test_bad_samples_of_a_risk(confidences, correct, max_risk, error):
+    with pytest.raises(error):
+        gpureg.control_risk(confidences, correct, max_risk=max_risk)
+
+
 GOOD = {"format_version": 1, "gpureg": "calibration", "slope": 0.5, "offset": -1}
 
 

@@ -107,6 +107,33 @@ TEST_F(CalibrateVerb, ATrajectoryDecides) {
   expect_refused(joined(calibrate(path), {"--trajectory", folder_ / "none.txt"}), {"none.txt"});
 }
 
+TEST_F(CalibrateVerb, PromisesARiskOrSaysWhatItTakes) {
+  write_scans(folder_, kScans, false);
+  const std::string path = folder_ / "calibration.json";
+  // 45 pairs may prove that at most nine of ten reports are false, and never one of a thousand.
+  const Outcome kept = run(joined(calibrate(path), {"--max-risk", "0.9"}));
+  ASSERT_EQ(kept.status, 0) << kept.err;
+  const json risk = json_of(path)["risk"];
+  EXPECT_EQ(risk["supported"], true) << risk;
+  EXPECT_EQ(risk["max_risk"], 0.9);
+  EXPECT_EQ(risk["samples"], json_of(path)["samples"]["loop_consistency"]["samples"]);
+  const auto min_confidence = [&](const std::vector<std::string>& more) {
+    run(joined(registered(path, {"--json", folder_ / "r.json"}), more));
+    return json_of(folder_ / "r.json")["options"]["min_confidence"];
+  };
+  EXPECT_EQ(min_confidence({}), risk["min_confidence"]);
+  EXPECT_EQ(min_confidence({"--min-score", "0.25"}), 0.25) << "the user's own goes first";
+
+  const Outcome refused = run(joined(calibrate(path), {"--max-risk", "0.001"}));
+  EXPECT_EQ(refused.status, 1);
+  expect_holds(refused.err, {"0.1 %", "cannot be promised", "more would"});
+  EXPECT_EQ(json_of(path)["risk"]["supported"], false);
+  EXPECT_FALSE(json_of(path)["risk"].contains("min_confidence"));
+  EXPECT_EQ(min_confidence({}), 0.5) << "as without a promise";
+  for (const char* bad : {"0", "1", "nan"})
+    expect_refused(joined(calibrate(path), {"--max-risk", bad}), {"--max-risk"});
+}
+
 TEST_F(CalibrateVerb, TooFewScansSaySo) {
   write_scans(folder_, 3, false);
   std::vector<std::string> words = calibrate(folder_ / "c.json");
@@ -196,6 +223,9 @@ TEST_F(CalibrateVerb, BadFilesAreNamed) {
   for (const json& value : {json(nullptr), json("1"), json(true)})
     refused(file_with("offset", value), {"bad.json", "\"offset\" is " + value.dump()});
   refused(file_with("voxel_size", 0), {"bad.json", "\"voxel_size\" is 0"});
+  for (const json& value : {json(0), json(1.5), json("1")})
+    refused(file_with("risk", {{"min_confidence", value}}),
+            {"bad.json", "\"min_confidence\" is " + value.dump()});
   json document = good();
   document.erase("offset");
   refused(folder_.write("bad.json", document.dump()), {"bad.json", "\"offset\" is missing"});

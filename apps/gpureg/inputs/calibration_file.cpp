@@ -17,6 +17,22 @@ Json to_json(const CalibrationCount& count) {
   return {{"pairs", count.pairs}, {"samples", count.samples}, {"correct", count.correct}};
 }
 
+Json to_json(const PromisedRisk& risk) {
+  const RiskThreshold& found = risk.threshold;
+  Json json = {{"max_risk", risk.control.max_risk},
+               {"max_failure", risk.control.max_failure},
+               {"supported", found.supported},
+               {"samples", found.samples}};
+  if (found.supported)
+    json.update({{"min_confidence", found.min_confidence},
+                 {"reported", found.reported},
+                 {"false", found.wrong},
+                 {"recall", found.recall}});
+  else
+    json["more_samples"] = found.more_samples ? Json(*found.more_samples) : Json();
+  return json;
+}
+
 double number(const std::string& path, const Json& document, const char* field,
               const char* expected, bool positive) {
   const auto found = document.find(field);
@@ -35,7 +51,7 @@ double number(const std::string& path, const Json& document, const char* field,
 }  // namespace
 
 Json calibration_document(const CalibrationResult& result, const RegistrationOptions& options,
-                          unsigned quality) {
+                          unsigned quality, const std::optional<PromisedRisk>& risk) {
   Json json;
   json["gpureg"] = kKind;
   json["version"] = GPUREG_VERSION;
@@ -49,6 +65,7 @@ Json calibration_document(const CalibrationResult& result, const RegistrationOpt
   json["voxel_size"] = to_json(options)["prepare"]["voxel_size"];
   json["preset"] = "default";  // the only one with a confidence
   json["quality"] = quality;
+  if (risk) json["risk"] = to_json(*risk);
   return json;
 }
 
@@ -62,6 +79,14 @@ CalibrationFile read_calibration(const std::string& path) {
   out.calibration.slope = number(path, document, "slope", "a number > 0", true);
   out.calibration.offset = number(path, document, "offset", "a number", false);
   out.voxel_size = number(path, document, "voxel_size", "a length > 0", true);
+  const auto risk = document.find("risk");
+  if (risk != document.end() && risk->is_object() && risk->contains("min_confidence")) {
+    constexpr const char* kExpected = "a probability in (0, 1]";
+    out.min_confidence = number(path, *risk, "min_confidence", kExpected, true);
+    if (*out.min_confidence > 1)
+      throw IoError(path + ": \"min_confidence\" is " + (*risk)["min_confidence"].dump() +
+                    ", expected " + kExpected);
+  }
   return out;
 }
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <optional>
 #include <string>
 
 #include "gpureg/calibration.hpp"
@@ -11,12 +12,19 @@ namespace gpureg::cli {
 /// What `gpureg calibrate` writes.
 struct CalibrationFile {
   ConfidenceCalibration calibration;
-  double voxel_size = 0;  ///< that it was made with
+  double voxel_size = 0;                 ///< that it was made with
+  std::optional<double> min_confidence;  ///< that keeps a promised risk, of `--max-risk`
 };
 
-/// Document of a calibration.
+/// A promise that was asked for, and the answer.
+struct PromisedRisk {
+  RiskControl control;
+  RiskThreshold threshold;
+};
+
+/// Document of a calibration; risk: none was asked for.
 Json calibration_document(const CalibrationResult& result, const RegistrationOptions& options,
-                          unsigned quality);
+                          unsigned quality, const std::optional<PromisedRisk>& risk);
 
 /// @throws IoError naming file and field: no such file, no JSON, another kind of document or a
 /// newer version, a field that is missing or out of range.

@@ -63,7 +63,8 @@ void MethodOptions::add_to(Verb verb) {
 
 void MethodOptions::add_calibration_to(Verb verb) {
   verb.option("--calibration", calibration,
-              "File of `gpureg calibrate`: scales the confidence to a sensor");
+              "File of `gpureg calibrate`: scales the confidence to a sensor, and sets --min-score "
+              "where it promises a risk");
 }
 
 void MethodOptions::note_calibration() const {
@@ -88,7 +89,9 @@ RegistrationOptions MethodOptions::registration() const {
     if (options.method == RegistrationMethod::quadruples)
       throw InvalidArgument(
           "--calibration scales the confidence, which preset loopsmart does not have");
-    options.calibration = read_calibration(calibration).calibration;
+    const CalibrationFile file = read_calibration(calibration);
+    options.calibration = file.calibration;
+    if (file.min_confidence) options.min_confidence = *file.min_confidence;
   }
   if (min_score && !(*min_score >= 0 && *min_score <= 1))
     throw InvalidArgument("--min-score is " + significant(*min_score, 6) +

@@ -29,6 +29,7 @@ struct CalibrateOptions {
   std::string folder, output, trajectory;
   MethodOptions method;
   CalibrationOptions calibration;
+  std::optional<double> max_risk;
   bool quiet = false;
 };
 
@@ -64,7 +65,38 @@ void print_count(const char* name, const CalibrationCount& count) {
             << " of them decided, " << grouped(count.correct) << " correct\n";
 }
 
+std::optional<PromisedRisk> promise(const CalibrateOptions& o, const CalibrationResult& result) {
+  if (!o.max_risk) return std::nullopt;
+  PromisedRisk out;
+  out.control.max_risk = *o.max_risk;
+  out.threshold = control_risk(result.of_two_scans(), out.control, result.calibration);
+  return out;
+}
+
+/// The answer to --max-risk. A refusal is no summary: --quiet keeps it.
+void print_risk(const CalibrateOptions& o, const PromisedRisk& risk) {
+  const RiskThreshold& found = risk.threshold;
+  const std::string percent = significant(100 * risk.control.max_risk, 3) + " %";
+  if (found.supported && !o.quiet)
+    std::cout << "risk         at most " << percent << " of the reports are false from confidence "
+              << fixed(found.min_confidence, 4) << " on: " << found.wrong << " of "
+              << grouped(found.reported) << " were; " << fixed(100 * found.recall, 1)
+              << " % of the correct poses are reported\n";
+  if (found.supported) return;
+  std::cerr << "gpureg: a risk of " << percent << " cannot be promised by "
+            << grouped(found.samples) << " decided pairs of different scans: ";
+  if (found.more_samples)
+    std::cerr << "about " << grouped(*found.more_samples)
+              << " more would do, if no larger share of them is false";
+  else
+    std::cerr << "more would not help, too many of the most confident poses are false";
+  std::cerr << std::endl;
+}
+
 int run(CalibrateOptions o) {
+  if (o.max_risk && !(*o.max_risk > 0 && *o.max_risk < 1))
+    throw InvalidArgument("--max-risk is " + significant(*o.max_risk, 6) +
+                          ", expected a share between 0 and 1");
   o.method.registration();  // what is wrong with it shall be said before clouds are read
   if (o.method.preset == "loopsmart")
     throw InvalidArgument("--preset loopsmart has no confidence to calibrate");
@@ -93,13 +125,16 @@ int run(CalibrateOptions o) {
     std::cerr << "gpureg: interrupted, nothing written" << std::endl;
     return kInterrupted;
   }
-  write_document(o.output, calibration_document(result, options, o.method.quality));
+  const std::optional<PromisedRisk> risk = promise(o, result);
+  write_document(o.output, calibration_document(result, options, o.method.quality, risk));
   if (!result.enough_samples)
     std::cerr << "gpureg: note: too few samples: " << kMinDecidedPairs
               << " decided pairs of different scans are needed, and " << kMinCalibrationSamples
               << " correct and as many false samples in all; the calibration changes nothing"
               << std::endl;
-  if (o.quiet) return kOk;
+  if (risk) print_risk(o, *risk);
+  const int status = risk && !risk->threshold.supported ? kNoAlignment : kOk;
+  if (o.quiet) return status;
   if (o.method.automatic_voxel_size)
     std::cout << "voxel size   " << significant(static_cast<double>(o.method.voxel_size), 3)
               << "\n";
@@ -112,7 +147,7 @@ int run(CalibrateOptions o) {
             << "error        " << fixed(result.error_before, 3) << " before, "
             << fixed(result.error_after, 3) << " after, of the same samples\n"
             << "written to   " << o.output << "\n";
-  return kOk;
+  return status;
 }
 
 }  // namespace
@@ -138,6 +173,9 @@ void add_calibrate(CommandLine& line) {
               "Largest number of pairs of different scans")
       .natural()
       .show_default();
+  verb.option("--max-risk", o->max_risk,
+              "Also choose the --min-score that keeps the share of false reports at or below this, "
+              "for runs with this calibration");
   o->method.add_to(verb);
   verb.flag("--quiet", o->quiet, "No progress, no summary");
   verb.run([o] { return run(*o); });

@@ -1,0 +1,141 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <algorithm>
+#include <cmath>
+#include <iterator>
+#include <string>
+
+#include "common/validate.hpp"
+#include "gpureg/calibration.hpp"
+#include "math/exponential.hpp"
+
+namespace gpureg {
+namespace {
+
+/// Thresholds that are tested, chosen before any data.
+constexpr double kLadder[] = {0.05, 0.1,  0.2,  0.3,  0.4,  0.5,   0.6,   0.7,   0.8,
+                              0.9,  0.95, 0.97, 0.98, 0.99, 0.995, 0.998, 0.999, 0.9999};
+/// Where sequences of tests start: the strictest threshold alone would seldom have enough reports.
+constexpr std::size_t kStarts[] = {5, 9, 13, 16};  // 0.5, 0.9, 0.99, 0.999
+/// Beyond so many reports no advice is given.
+constexpr double kMostReports = 1e6;
+
+struct Counts {
+  std::size_t reported = 0, wrong = 0, correct = 0;
+};
+
+Counts count_from(const std::vector<CalibrationSample>& samples, double threshold) {
+  Counts out;
+  for (const CalibrationSample& sample : samples) {
+    if (!(sample.confidence >= threshold)) continue;
+    ++out.reported;
+    ++(sample.correct ? out.correct : out.wrong);
+  }
+  return out;
+}
+
+/// Logarithm of the probability of at most `wrong` false ones of `count`, each false with
+/// probability `risk`.
+double log_tail(double wrong, double count, double risk) {
+  const double log_odds = portable::log(risk) - portable::log1p(-risk);
+  // The last term, then the sum of all in units of it; they fall towards the first.
+  double log_last = count * portable::log1p(-risk), sum = 1, term = 1;
+  for (double k = 1; k <= wrong; ++k) log_last += portable::log((count - k + 1) / k) + log_odds;
+  const double inverse_odds = (1 - risk) / risk;
+  for (double k = wrong; k >= 1; --k) {
+    term *= k / (count - k + 1) * inverse_odds;
+    sum += term;
+  }
+  return std::min(0.0, log_last + portable::log(sum));
+}
+
+bool passes(const Counts& counts, double risk, double log_level) {
+  const auto wrong = static_cast<double>(counts.wrong),
+             reported = static_cast<double>(counts.reported);
+  // Above the mean the tail is no proof, and its terms do not fall.
+  return wrong < risk * reported && log_tail(wrong, reported, risk) <= log_level;
+}
+
+/// Fewest reports that would pass with the same share of false ones; kMostReports: none would.
+double reports_that_pass(const Counts& counts, double risk, double log_level) {
+  const auto reported = static_cast<double>(counts.reported);
+  const double share =
+      counts.reported == 0 ? 0 : static_cast<double>(counts.wrong) / std::max(reported, 1.0);
+  if (share >= risk) return kMostReports;
+  const auto pass = [&](double n) { return log_tail(std::ceil(share * n), n, risk) <= log_level; };
+  double few = std::max(1.0, reported), enough = few;
+  while (enough < kMostReports && !pass(enough)) {
+    few = enough;
+    enough = 2 * enough;
+  }
+  if (enough >= kMostReports) return kMostReports;
+  while (enough - few > 1) {
+    const double middle = std::floor(0.5 * (few + enough));
+    (pass(middle) ? enough : few) = middle;
+  }
+  return enough;
+}
+
+std::optional<std::size_t> more_samples(const std::vector<CalibrationSample>& samples, double risk,
+                                        double log_level) {
+  const auto all = static_cast<double>(samples.size());
+  std::optional<std::size_t> fewest;
+  for (const std::size_t start : kStarts) {
+    const Counts counts = count_from(samples, kLadder[start]);
+    // Without a sample nobody knows how many are reported: all, at best.
+    if (counts.reported == 0 && !samples.empty()) continue;
+    const double reports = reports_that_pass(counts, risk, log_level);
+    if (reports >= kMostReports) continue;
+    const double factor = counts.reported == 0 ? 1.0 : all / static_cast<double>(counts.reported);
+    const double more = std::max(1.0, std::ceil(reports * factor - all));
+    if (!fewest || more < static_cast<double>(*fewest)) fewest = static_cast<std::size_t>(more);
+  }
+  return fewest;
+}
+
+}  // namespace
+
+void RiskControl::validate() const {
+  require(max_risk > 0 && max_risk < 1, "max_risk", max_risk, "a share in (0, 1)");
+  require(max_failure > 0 && max_failure < 1, "max_failure", max_failure,
+          "a probability in (0, 1)");
+}
+
+std::vector<CalibrationSample> CalibrationResult::of_two_scans() const {
+  std::vector<CalibrationSample> out;
+  std::copy_if(samples.begin(), samples.end(), std::back_inserter(out),
+               [](const CalibrationSample& s) { return s.kind != CalibrationKind::one_scan; });
+  return out;
+}
+
+RiskThreshold control_risk(const std::vector<CalibrationSample>& samples,
+                           const RiskControl& control, const ConfidenceCalibration& calibration) {
+  control.validate();
+  for (std::size_t k = 0; k < samples.size(); ++k)
+    require(samples[k].confidence >= 0 && samples[k].confidence <= 1,
+            ("samples[" + std::to_string(k) + "].confidence").c_str(), samples[k].confidence,
+            "a probability in [0, 1]");
+  const double log_level =
+      portable::log(control.max_failure / static_cast<double>(std::size(kStarts)));
+  RiskThreshold out;
+  out.samples = samples.size();
+  std::size_t lowest = std::size(kLadder);
+  for (const std::size_t start : kStarts) {
+    for (std::size_t k = start + 1; k-- > 0;) {
+      if (!passes(count_from(samples, kLadder[k]), control.max_risk, log_level)) break;
+      lowest = std::min(lowest, k);
+    }
+  }
+  if (lowest == std::size(kLadder)) {
+    out.more_samples = more_samples(samples, control.max_risk, log_level);
+    return out;
+  }
+  const Counts counts = count_from(samples, kLadder[lowest]), all = count_from(samples, 0);
+  out.supported = true;
+  out.min_confidence = calibration(kLadder[lowest]);
+  out.reported = counts.reported;
+  out.wrong = counts.wrong;
+  out.recall = static_cast<double>(counts.correct) / static_cast<double>(all.correct);
+  return out;
+}
+
+}  // namespace gpureg
