@@ -5,7 +5,8 @@
     map_rmse.py OUT TRUTH [PAIRS.json]     OUT of `gpureg reconstruct`; TRUTH/poses.txt, gt_all.log, gt_all.info
 
 Rotations are aligned by positions, and by themselves (the chordal mean): positions hardly determine a rotation where scans are close.
-An accepted edge is wrong where its error by Redwood's measure is above 0.2 m. Pairs with an overlap below 5 % are not in
+An accepted edge is wrong where its error by Redwood's measure is above 0.2 m, and far off where its pose is off by more than
+0.35 m or 8 degrees, or its scans are of different scenes. Pairs with an overlap below 5 % are not in
 gt_all: their truth is that of the poses, their information that of the result, or else of points 2 m around the source.
 """
 
@@ -16,6 +17,7 @@ import sys
 import numpy as np
 
 MAX_EDGE_METRES = 0.2
+FAR_METRES, FAR_DEGREES = 0.35, 8
 
 
 def read_poses(path):
@@ -90,6 +92,14 @@ def edge_error(pair, pose, truth, information, scene_of):
     return redwood_error(relative, pose, information.get(pair, NO_INFORMATION))
 
 
+def is_far_off(pair, pose, truth_poses, scene_of):
+    i, j = pair
+    if not {i, j} <= truth_poses.keys() or scene_of(i) != scene_of(j):
+        return True
+    error = np.linalg.inv(truth_poses[j]) @ truth_poses[i] @ pose
+    return bool(np.linalg.norm(error[:3, 3]) > FAR_METRES or angle(error[:3, :3]) > FAR_DEGREES)
+
+
 def information_of(pairs):
     """Of the pairs of a result."""
     return {
@@ -123,10 +133,12 @@ def measure(out, truth, information, scene_of=lambda scan: 0):
                 "worst_scan": known[metres.argmax()],
             }
         )
-    wrong, accepted = [], [e for e in document["edges"] if e["state"] == "accepted"]
+    wrong, far, accepted = [], [], [e for e in document["edges"] if e["state"] == "accepted"]
     for edge in accepted:
         pair = (edge["i"], edge["j"])
         pose = np.array(edge["T_ij"]).reshape(4, 4)
+        if is_far_off(pair, pose, truth_poses, scene_of):
+            far.append(pair)
         error = edge_error(pair, pose, truth, information, scene_of)
         if error > MAX_EDGE_METRES:
             wrong.append(
@@ -142,6 +154,7 @@ def measure(out, truth, information, scene_of=lambda scan: 0):
         "islands": islands,
         "accepted": len(accepted),
         "wrong": wrong,
+        "far_off": far,
     }
 
 
@@ -159,7 +172,10 @@ def main():
                 f"by positions, {island['rmse_degrees_own']:.2f} by rotations; "
                 f"worst {island['worst_cm']:.2f} cm (scan {island['worst_scan']})"
             )
-    print(f"edges: {figures['accepted']} accepted, {len(figures['wrong'])} wrong")
+    print(
+        f"edges: {figures['accepted']} accepted, {len(figures['wrong'])} wrong, "
+        f"{len(figures['far_off'])} far off"
+    )
     for edge in figures["wrong"]:
         far = "no overlap" if edge["metres"] is None else f"{edge['metres']:.3f} m"
         print(f"    {edge['pair']}: {far}, confidence {edge['confidence']:.3f}")

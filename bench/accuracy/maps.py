@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""Maps of real and simulated scenes: complete, thinned, with foreign scans, of two houses at once, without cameras.
+"""Maps of real and simulated scenes: complete, thinned, with foreign scans, of two houses at once, without cameras; each before
+and after the audit and the joint refinement.
 
     maps.py --data DATA --work WORK [CASE ...]
 
@@ -25,6 +26,8 @@ SCENES = {
 }
 # Houses of 120 fragments by `gpureg generate --fragments 120 --seed SEED`, in WORK/generated.
 GENERATED = {f"generated_{seed}": seed for seed in (8101, 8102, 8103, 8104, 8105)}
+# Buildings of repeated furniture by `gpureg generate --building KIND --fragments 50 --seed SEED`, there too.
+REPEATED = {"office_1": ("office", 1), "office_2": ("office", 2), "warehouse_1": ("warehouse", 1)}
 PRUNE = 20  # partners that a scan of a generated house is aligned with
 OFFSET = 100  # of the numbers of a second scene in the same folder
 FOREIGN = (3, 13, 23, 33, 43)
@@ -85,23 +88,28 @@ def folder_of(scene, arguments):
         return arguments.data / SCENES[scene]
     folder = arguments.work / "generated" / scene
     if not (folder / "poses.txt").exists():
-        command = [arguments.gpureg, "generate", folder, "--fragments", "120", "--quiet"]
-        subprocess.run([*command, "--seed", str(GENERATED[scene])], check=True)
+        words = ["--fragments", "120", "--seed", str(GENERATED.get(scene))]
+        if scene in REPEATED:
+            building, seed = REPEATED[scene]
+            words = ["--fragments", "50", "--seed", str(seed), "--building", building]
+        subprocess.run([arguments.gpureg, "generate", folder, "--quiet", *words], check=True)
     return folder
 
 
 def count_of(scene, data):
+    if scene in REPEATED:
+        return 50
     return len(list((data / SCENES[scene]).glob("cloud_bin_*.ply")))
 
 
 def cases(data):
     out = {scene: Set(scene, [(scene, range(120), 0)], prune=PRUNE) for scene in GENERATED}
-    for scene in SCENES:
+    for scene in (*SCENES, *REPEATED):
         every = range(count_of(scene, data))
-        out[scene] = Set(scene, [(scene, every, 0)])
-        out[scene + "_half"] = Set(scene + "_half", [(scene, every[::2], 0)])
-        out[scene + "_third"] = Set(scene + "_third", [(scene, every[::3], 0)])
-        out[scene + "_nocam"] = Set(scene + "_nocam", [(scene, every, 0)], cameras=False)
+        for suffix, cameras in (("", True), ("_nocam", False)):
+            for thinned, step in (("", 1), ("_half", 2), ("_third", 3)):
+                name = scene + thinned + suffix
+                out[name] = Set(name, [(scene, every[::step], 0)], cameras)
     out["foreign"] = Set(
         "foreign",
         [("house_A", range(count_of("house_A", data)), 0), ("hospital_E", FOREIGN, OFFSET)],
@@ -208,7 +216,7 @@ def short(name, figures):
         + (f" {i['rmse_cm']:.2f} cm {i['rmse_degrees_own']:.2f} deg" if "rmse_cm" in i else "")
         for i in figures["islands"]
     )
-    return f"{name}: {figures['placed']}/{figures['scans']} placed; {islands}; {figures['accepted']} edges, {len(figures['wrong'])} wrong"
+    return f"{name}: {figures['placed']}/{figures['scans']} placed; {islands}; {figures['accepted']} edges, {len(figures['wrong'])} wrong, {len(figures['far_off'])} far off"
 
 
 def main():
@@ -229,10 +237,12 @@ def main():
         folder = arguments.work / "sets" / name
         chosen.write(arguments, folder)
         out = arguments.work / "maps" / name
-        before = run(arguments.gpureg, folder, chosen, arguments, out / "before", ["--no-refine"])
-        if before is None:
+        plain = ["--no-refine", "--no-audit"]
+        unaudited = run(arguments.gpureg, folder, chosen, arguments, out / "unaudited", plain)
+        if unaudited is None:
             print(short(name, None))
             continue
+        before = run(arguments.gpureg, folder, chosen, arguments, out / "before", ["--no-refine"])
         after = run(arguments.gpureg, folder, chosen, arguments, out / "after", [])
         strong = [
             (i + offset, j + offset)
@@ -240,8 +250,13 @@ def main():
             for i, j in read_blocks(folder_of(scene, arguments) / "gt.log", 4)
         ]
         overlapping_islands(chosen, strong, after)
-        maps[name] = {"before_refinement": before, "after_refinement": after}
-        print(short(name, before), "|", short("refined", after), flush=True)
+        maps[name] = {
+            "before_audit": unaudited,
+            "before_refinement": before,
+            "after_refinement": after,
+        }
+        stages = (("not audited", unaudited), ("audited", before), ("refined", after))
+        print(name, *(short(stage, figures) for stage, figures in stages), sep=" | ", flush=True)
     for peer in ("open3d",):
         for out in sorted((arguments.work / peer).glob("*/reconstruction.json")):
             name = out.parent.name
