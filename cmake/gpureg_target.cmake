@@ -67,13 +67,17 @@ function(gpureg_numeric_target target)
 endfunction()
 
 # add_gpureg_test(name SOURCES a_test.cpp ... LIBS gpureg::gpureg ...): one executable, each of its cases a ctest test.
-# NOT_PRECOMPILED: where a library of it adds flags.
+# NOT_PRECOMPILED: where a library of it adds flags. EXHAUSTIVE: compares with searches of its own, which the optimiser makes faster; the
+# other tests run once per compilation.
 function(add_gpureg_test name)
-  cmake_parse_arguments(arg "NOT_PRECOMPILED" "" "SOURCES;LIBS" ${ARGN})
+  cmake_parse_arguments(arg "NOT_PRECOMPILED;EXHAUSTIVE" "" "SOURCES;LIBS" ${ARGN})
   add_executable(${name} ${arg_SOURCES})
   gpureg_target(${name})
   if(NOT arg_NOT_PRECOMPILED)
     gpureg_use_precompiled(${name} gpureg_test_headers)
+  endif()
+  if(NOT arg_EXHAUSTIVE)
+    target_compile_options(${name} PRIVATE $<$<AND:$<COMPILE_LANGUAGE:CXX>,$<CONFIG:Release>>:-O1>)
   endif()
   # GoogleTest's macros are an if-else of their own.
   target_compile_options(${name} PRIVATE $<$<COMPILE_LANGUAGE:CXX>:-Wno-dangling-else>)

@@ -108,6 +108,18 @@ inline void require_no_positional(const py::args& values, const std::string& cls
                          "=...), got " + shown(values[0]));
 }
 
+/// Once per class, not per type of a field: pybind11 makes much code of every function.
+template <typename T>
+void define_value(py::class_<T>& cls, const Field<T>& f, bool writable) {
+  const auto get = [get = f.get](const T& t) { return get(t); };
+  if (writable)
+    cls.def_property(
+        f.name.c_str(), get, [set = f.set](T& t, const py::object& value) { set(t, value); },
+        f.doc.c_str());
+  else
+    cls.def_property_readonly(f.name.c_str(), get, f.doc.c_str());
+}
+
 template <typename T, typename M>
 Field<T> field(std::string name, M T::* member, std::string doc) {
   Field<T> f;
@@ -137,13 +149,8 @@ Field<T> field(std::string name, M T::* member, std::string doc) {
             [set = self.set](T& t, const py::object& value) { set(t, value); }, self.doc.c_str());
       else
         cls.def_readonly(self.name.c_str(), member, self.doc.c_str());
-    } else if (writable) {
-      cls.def_property(
-          self.name.c_str(), [get = self.get](const T& t) { return get(t); },
-          [set = self.set](T& t, const py::object& value) { set(t, value); }, self.doc.c_str());
     } else {
-      cls.def_property_readonly(
-          self.name.c_str(), [get = self.get](const T& t) { return get(t); }, self.doc.c_str());
+      define_value(cls, self, writable);
     }
   };
   return f;
