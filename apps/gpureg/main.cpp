@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "command.hpp"
 #include "program.hpp"
+#include "verbs/audit.hpp"
 #include "verbs/generate.hpp"
 
 namespace {
@@ -13,6 +14,7 @@ void add_verbs(CommandLine& line) {
   add_consistency(line);
   add_reconstruct(line);
   add_locate(line);
+  add_audit(line);
   add_calibrate(line);
   add_evaluate(line);
   add_evaluate_trajectory(line);

@@ -12,6 +12,7 @@ and `register_all`.
 
 from typing import TYPE_CHECKING, Any
 
+from ._audit import Audit, AuditedConnection, AuditedPair, audit
 from ._calibration import (
     CalibrationRun,
     RiskThreshold,
@@ -106,6 +107,9 @@ def __getattr__(name: str) -> Any:
 
 
 __all__ = [
+    "Audit",
+    "AuditedConnection",
+    "AuditedPair",
     "BackendUnavailable",
     "BatchInterrupted",
     "BatchRun",
@@ -168,6 +172,7 @@ __all__ = [
     "align",
     "align_batch",
     "align_within",
+    "audit",
     "calibrate",
     "control_risk",
     "default_context",

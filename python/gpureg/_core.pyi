@@ -1460,7 +1460,19 @@ def reconstruct_map(
     results: list[RegistrationResult],
     options: ReconstructionOptions,
     odometry: _Float64 | list[tuple[int, int, _Float64, _Float64 | None]],
+    context: Context,
+    clouds: list[PreparedCloud],
+    registration: RegistrationOptions,
 ) -> MapGraph: ...
+def audit(
+    context: Context,
+    clouds: list[PreparedCloud],
+    poses: _Float64,
+    options: RegistrationOptions,
+) -> tuple[
+    list[tuple[int, int, str, float, float, float, float, float]],
+    list[tuple[list[int], str, float, int, int, list[int]]],
+]: ...
 def refine_map(
     context: Context,
     map: MapGraph,

@@ -33,6 +33,7 @@ def reconstruct(
     *,
     results: Any = None,
     odometry: Any = None,
+    audit: bool = True,
     refine: bool = True,
     options: RegistrationOptions | None = None,
     map_options: ReconstructionOptions | None = None,
@@ -56,6 +57,9 @@ def reconstruct(
         ``world_from_scan`` of each fragment (NaN: not known), of both of which consecutive ones
         count, or tuples (source, target, target_from_source) of fragment numbers, with a 6x6
         information matrix as a fourth entry where it is known.
+    audit : bool
+        Ask the scans whether they contradict each other where the map puts them, and take edges
+        out that cannot be right. Clouds are needed, and prepared where `results` are given.
     refine : bool
         Refine all poses together at half the voxel size.
     options : RegistrationOptions, optional
@@ -96,14 +100,22 @@ def reconstruct(
     if map_options.threads == 0 and context.backend == "cpu":
         map_options = map_options.replace(threads=context.threads)
     fragments = fragment_set(fragments)
-    rows, values = _pair_results(fragments, pairs, results, options, context, progress)
+    clouds: list[_core.PreparedCloud] = []
+    rows, values = _pair_results(fragments, pairs, results, options, context, progress, clouds)
+    known = _odometry(odometry, fragments)
+    if audit and not clouds:
+        clouds = prepared_fragments(fragments, options.prepare, context, progress)
     graph = _core.reconstruct_map(
         len(fragments),
         rows,
         values,
         map_options,
-        _odometry(odometry, fragments),
+        known,
+        context,
+        clouds if audit else [],
+        options,
     )
+    del clouds
     refinement = _refine(graph, fragments, options, context, progress) if refine else None
     return Map(graph, fragments, options, refinement)
 
@@ -126,11 +138,13 @@ def _pair_results(
     options: RegistrationOptions,
     context: Context,
     progress: Progress,
+    clouds: list[_core.PreparedCloud],
 ) -> tuple[npt.NDArray[np.uint32], list[RegistrationResult]]:
+    """clouds: gets those that were prepared."""
     if results is None:
         chosen = fragments.choose_pairs("all" if pairs is None else pairs)
         rows = np.ascontiguousarray(chosen[:, ::-1], np.uint32)  # the later one into the earlier
-        clouds = _prepared(fragments, options.prepare, context, progress)
+        clouds += prepared_fragments(fragments, options.prepare, context, progress)
         return rows, align_batch(clouds, rows, options=options, context=context, progress=progress)
     if hasattr(results, "table"):  # a BatchRun
         if pairs is not None:
@@ -209,7 +223,7 @@ def _from_trajectory(path: str, fragments: FragmentSet) -> Poses:
     return poses
 
 
-def _prepared(
+def prepared_fragments(
     fragments: FragmentSet,
     options: _core.PrepareOptions,
     context: Context,
@@ -247,4 +261,4 @@ def _refine(
         return _core.refine_map(context, graph, surfaces, options.prepare.voxel_size, tell)
 
 
-__all__ = ["reconstruct"]
+__all__ = ["prepared_fragments", "reconstruct"]

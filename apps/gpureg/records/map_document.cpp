@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "records/map_document.hpp"
 
+#include <algorithm>
 #include <sstream>
 
 #include "json/fields_json.hpp"
 #include "json/json.hpp"
+#include "records/audit_document.hpp"
 #include "records/result_json.hpp"
 #include "run/pair_run.hpp"
 #include "text.hpp"
@@ -72,6 +74,7 @@ Json map_document(const MapRun& run, const Context& context) {
                                      {"accepted", link.accepted},
                                      {"rejected", link.rejected}});
   }
+  json["audit"] = run.audit ? audit_json(*run.audit, run.scene.numbers) : Json(nullptr);
   json["edges"] = Json::array();
   for (const reconstruction::Edge& edge : run.map.edges)
     json["edges"].push_back({{"i", run.scene.numbers[edge.target]},
@@ -100,6 +103,13 @@ std::string map_summary(const MapRun& run, const Context& context) {
       << "placed     " << run.map.placed() << " of " << run.map.scans.size() << ", islands of";
   for (const reconstruction::Island& island : run.map.islands) out << " " << island.scans.size();
   out << (run.map.islands.empty() ? " no scan\n" : " scans\n");
+  if (run.audit)
+    out << "audit      " << run.audit->pairs.size() << " pairs near each other, "
+        << std::count_if(run.audit->pairs.begin(), run.audit->pairs.end(),
+                         [](const reconstruction::AuditedPair& pair) {
+                           return pair.verdict == reconstruction::PairVerdict::contradicts;
+                         })
+        << " contradict their poses\n";
   for (std::size_t k = 0; k < run.map.scans.size(); ++k)
     if (run.map.scans[k].reason != reconstruction::ScanReason::none)
       out << (run.map.scans[k].placed ? "note       " : "left out   ") << run.scene.numbers[k]

@@ -9,6 +9,7 @@
 #include "gpureg/context.hpp"
 #include "gpureg/options.hpp"
 #include "gpureg/reconstruction.hpp"
+#include "gpureg/reconstruction/audit.hpp"
 #include "inputs/scene.hpp"
 #include "records/pair_store.hpp"
 
@@ -21,6 +22,7 @@ struct MapRun {
   PreparedFolder scene;  ///< without prepared clouds where the pairs come from a file
   PairStore pairs;
   reconstruction::Reconstruction map;
+  std::optional<reconstruction::Audit> audit;  ///< none: --no-audit
   std::optional<reconstruction::RefineReport> refined;
   bool aligned_here = false;  ///< the pairs were aligned by this run
   std::size_t pairs_in_this_run = 0;

@@ -43,7 +43,7 @@ struct ReconstructOptions {
   std::uint32_t prune = 0;
   pose_graph::DriftOptions drift;
   std::optional<float> map_voxel_size;
-  bool no_refine = false, no_map = false;
+  bool no_refine = false, no_map = false, no_audit = false;
   bool resume = false, restart = false, quiet = false;
 
   std::string file(const std::string& name) const { return (fs::path(output) / name).string(); }
@@ -96,6 +96,12 @@ class Reconstruct {
     } else {
       run_.scene = PreparedFolder(FragmentFolder(o_.folder, o_.quiet));
       run_.pairs = read_pairs(o_.results, run_.scene, run_.options.prepare.voxel_size);
+      if (!o_.no_audit) {
+        PreparedFolder scene = prepare_folder(context_, o_.folder, run_.options.prepare, o_.quiet);
+        if (scene.interrupted) return say_interrupted();
+        run_.seconds.prepare = scene.seconds;
+        run_.scene = std::move(scene);
+      }
     }
     if (!o_.odometry.empty() && odometry_.empty()) odometry_ = read_odometry(o_.odometry, run_);
     reconstruct();
@@ -172,8 +178,17 @@ class Reconstruct {
     auto options = reconstruction::Options::from_voxel_size(run_.options.prepare.voxel_size);
     options.threads = static_cast<int>(o_.method.threads);
     options.drift = o_.drift;
-    run_.map = reconstruction::reconstruct(run_.scene.numbers.size(), run_.pairs.pairs,
-                                           run_.pairs.results, options, odometry_);
+    if (o_.no_audit) {
+      run_.map = reconstruction::reconstruct(run_.scene.numbers.size(), run_.pairs.pairs,
+                                             run_.pairs.results, options, odometry_);
+    } else {
+      const float voxel_size = run_.options.prepare.voxel_size;
+      reconstruction::AuditedReconstruction audited = reconstruction::reconstruct_audited(
+          context_, run_.scene.clouds, run_.pairs.pairs, run_.pairs.results, options, odometry_,
+          run_.options, reconstruction::AuditOptions::from_voxel_size(voxel_size));
+      run_.map = std::move(audited.map);
+      run_.audit = std::move(audited.audit);
+    }
     run_.seconds.graph = since(start);
   }
 
@@ -289,6 +304,8 @@ void add_reconstruct(CommandLine& line) {
       .needs(odometry);
   o->method.add_to(verb);
   o->method.add_calibration_to(verb);
+  verb.flag("--no-audit", o->no_audit,
+            "Without asking the scans whether they contradict each other where the map puts them");
   verb.flag("--no-refine", o->no_refine, "Without the joint refinement of all poses");
   verb.flag("--no-map", o->no_map, "Without map.ply and map.html");
   verb.option("--map-voxel-size", o->map_voxel_size,

@@ -7,8 +7,11 @@
 #include <limits>
 #include <string>
 
+#include "cloud.hpp"
 #include "cloud_input.hpp"
 #include "gpureg/error.hpp"
+#include "gpureg/reconstruction/audit.hpp"
+#include "interrupt.hpp"
 #include "matrix.hpp"
 
 namespace gpureg::python {
@@ -54,13 +57,54 @@ std::vector<Odometry> odometry_of(const py::object& given) {
   return out;
 }
 
+std::vector<PreparedCloud> prepared_of(const py::list& clouds) {
+  std::vector<PreparedCloud> out;
+  for (const py::handle cloud : clouds) out.push_back(cloud.cast<const Cloud&>().prepared);
+  return out;
+}
+
+/// poses: (N, 4, 4), NaN where a scan has none.
+py::tuple audit_of(const Context& context, const py::list& clouds, const DoubleArray& poses,
+                   const RegistrationOptions options) {
+  const std::vector<PreparedCloud> prepared = prepared_of(clouds);
+  std::vector<UnalignedIsometry3d> world_from_scan(static_cast<std::size_t>(poses.shape(0)));
+  for (std::size_t k = 0; k < world_from_scan.size(); ++k)
+    for (int n = 0; n < 16; ++n)
+      world_from_scan[k].matrix()(n / 4, n % 4) =
+          poses.data()[16 * k + static_cast<std::size_t>(n)];
+  const Audit found = interruptible([&] {
+    return audit(context, prepared, world_from_scan, options,
+                 AuditOptions::from_voxel_size(options.prepare.voxel_size));
+  });
+  py::list pairs, connections;
+  for (const AuditedPair& pair : found.pairs)
+    pairs.append(py::make_tuple(pair.source, pair.target, to_string(pair.verdict),
+                                pair.log_likelihood_ratio, pair.overlap, pair.observed,
+                                pair.violation, pair.shift));
+  for (const AuditedConnection& connection : found.connections)
+    connections.append(py::make_tuple(connection.scans, to_string(connection.verdict),
+                                      connection.confidence, connection.supporting,
+                                      connection.contradicting, connection.contradictions));
+  return py::make_tuple(pairs, connections);
+}
+
+/// clouds: of the pairs, audited; none: not audited.
 Reconstruction reconstruct_of(std::size_t scans, const IndexArray& rows, const py::list& results,
-                              const Options& options, const py::object& odometry) {
+                              const Options& options, const py::object& odometry,
+                              const Context& context, const py::list& clouds,
+                              const RegistrationOptions registration) {
+  const std::vector<PreparedCloud> prepared = prepared_of(clouds);
   const std::vector<Pair> pairs = pairs_of(rows);
   std::vector<RegistrationResult> values;
   for (const py::handle result : results)
     values.push_back(result.cast<const RegistrationResult&>());
   const std::vector<Odometry> known = odometry_of(odometry);
+  if (!prepared.empty())
+    return interruptible([&] {
+      return reconstruct_audited(context, prepared, pairs, values, options, known, registration,
+                                 AuditOptions::from_voxel_size(registration.prepare.voxel_size))
+          .map;
+    });
   const py::gil_scoped_release release;
   return reconstruct(scans, pairs, values, options, known);
 }
@@ -218,7 +262,10 @@ void bind_reconstruction(py::module_& m) {
         return out;
       });
   m.def("reconstruct_map", &reconstruct_of, py::arg("scans"), py::arg("pairs"), py::arg("results"),
-        py::arg("options"), py::arg("odometry"));
+        py::arg("options"), py::arg("odometry"), py::arg("context"), py::arg("clouds"),
+        py::arg("registration"));
+  m.def("audit", &audit_of, py::arg("context"), py::arg("clouds"), py::arg("poses"),
+        py::arg("options"));
   m.def("refine_map", &refine_map, py::arg("context"), py::arg("map"), py::arg("surfaces"),
         py::arg("voxel_size"), py::arg("tell"));
   py::class_<Surface>(m, "Surface", "Points of a scan with their normals.");

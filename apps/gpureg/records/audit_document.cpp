@@ -1,0 +1,99 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "records/audit_document.hpp"
+
+#include <sstream>
+
+#include "json/json.hpp"
+#include "records/result_json.hpp"
+#include "run/pair_run.hpp"
+#include "text.hpp"
+
+namespace gpureg::cli {
+namespace {
+
+Json pair_json(const reconstruction::AuditedPair& pair, const std::vector<int>& numbers) {
+  return {{"i", numbers[pair.target]},
+          {"j", numbers[pair.source]},
+          {"verdict", to_string(pair.verdict)},
+          {"log_likelihood_ratio", pair.log_likelihood_ratio},
+          {"overlap", pair.overlap},
+          {"observed", pair.observed},
+          {"free_space_violation", pair.violation},
+          {"shift", pair.shift}};
+}
+
+std::vector<int> numbers_of(const std::vector<std::uint32_t>& scans,
+                            const std::vector<int>& numbers) {
+  std::vector<int> out;
+  for (const std::uint32_t scan : scans) out.push_back(numbers[scan]);
+  return out;
+}
+
+}  // namespace
+
+std::string ranges(const std::vector<int>& numbers) {
+  std::ostringstream out;
+  for (std::size_t k = 0; k < numbers.size();) {
+    std::size_t last = k;
+    while (last + 1 < numbers.size() && numbers[last + 1] == numbers[last] + 1) ++last;
+    out << (k > 0 ? ", " : "") << numbers[k];
+    if (last > k) out << (last == k + 1 ? ", " : "-") << numbers[last];
+    k = last + 1;
+  }
+  return out.str();
+}
+
+std::string describe(const AuditRun& run, const reconstruction::AuditedConnection& connection) {
+  std::ostringstream out;
+  out << (connection.scans.size() == 1 ? "scan " : "scans ")
+      << ranges(numbers_of(connection.scans, run.scene.numbers)) << ": " << connection.contradicting
+      << (connection.contradicting == 1 ? " pair" : " pairs")
+      << " with the other scans contradict, " << connection.supporting << " agree";
+  if (connection.contradictions.empty()) return out.str();
+  const reconstruction::AuditedPair& worst = run.audit.pairs[connection.contradictions.front()];
+  out << "; worst " << run.scene.numbers[worst.target] << " and " << run.scene.numbers[worst.source]
+      << ": ";
+  if (worst.violation > 0.1)
+    out << fixed(100 * worst.violation, 0) << " % of what should be seen is in free space";
+  else
+    out << "the surfaces fit better " << fixed(100 * worst.shift, 0) << " cm away";
+  return out.str();
+}
+
+Json audit_json(const reconstruction::Audit& audit, const std::vector<int>& numbers) {
+  Json json;
+  json["sound"] = audit.sound();
+  json["connections"] = Json::array();
+  for (const reconstruction::AuditedConnection& connection : audit.connections) {
+    Json contradictions = Json::array();
+    for (const std::size_t k : connection.contradictions)
+      contradictions.push_back({numbers[audit.pairs[k].target], numbers[audit.pairs[k].source]});
+    json["connections"].push_back({{"scans", numbers_of(connection.scans, numbers)},
+                                   {"verdict", to_string(connection.verdict)},
+                                   {"confidence", connection.confidence},
+                                   {"supporting", connection.supporting},
+                                   {"contradicting", connection.contradicting},
+                                   {"contradictions", std::move(contradictions)}});
+  }
+  json["pairs"] = Json::array();
+  for (const reconstruction::AuditedPair& pair : audit.pairs)
+    if (pair.verdict != reconstruction::PairVerdict::silent)
+      json["pairs"].push_back(pair_json(pair, numbers));
+  return json;
+}
+
+Json audit_document(const AuditRun& run, const Context& context) {
+  Json json;
+  json["gpureg"] = "audit";
+  json["environment"] = environment(context);
+  json["folder"] = run.folder;
+  json["poses"] = run.poses_file;
+  json["voxel_size"] = run.options.prepare.voxel_size;
+  json["seconds"] = run.seconds;
+  json["missing"] = run.missing;
+  json["near_pairs"] = run.audit.pairs.size();
+  json.update(audit_json(run.audit, run.scene.numbers));
+  return json;
+}
+
+}  // namespace gpureg::cli

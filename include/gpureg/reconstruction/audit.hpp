@@ -1,0 +1,118 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "gpureg/reconstruction.hpp"
+#include "gpureg/verification.hpp"
+
+/// Audit of finished maps: do scans that come to lie near each other agree, whether or not anybody
+/// registered them? Every function is deterministic and thread-safe.
+namespace gpureg::reconstruction {
+
+/// Options of audit(). The lengths are for voxels of 5 cm.
+struct AuditOptions {
+  /// ICP may move a pair by so much before it contradicts its pose, metres, > 0: what is left of
+  /// the errors of a good map.
+  double max_shift = 0.15;
+  /// The same for each metre between the scans, >= 0: how far a map may bend.
+  double max_shift_per_metre = 0.02;
+  /// Probability, (0, 1), up to which a connection is contradicted.
+  double max_contradicted = 0.1;
+  /// Probability, (0, 1), from which a connection is confirmed.
+  double min_confirmed = 0.9;
+  /// Pairs of one scan that are looked at, 2 to 10000: the nearest half, others evenly chosen.
+  std::uint32_t most_pairs = 40;
+
+  /// Every length from the voxel size of the registration.
+  /// @throws InvalidArgument unless voxel_size is finite and > 0.
+  static AuditOptions from_voxel_size(float voxel_size);
+
+  /// @throws InvalidArgument naming field and value.
+  void validate() const;
+};
+
+/// What two scans say about their poses in a map.
+enum class PairVerdict {
+  silent,      ///< they hardly overlap, and neither stands in the other's view
+  supports,    ///< their surfaces coincide
+  contradicts  ///< one stands where the other saw nothing, or their surfaces belong elsewhere
+};
+const char* to_string(PairVerdict verdict);
+
+/// Two scans that are near each other in a map.
+struct AuditedPair {
+  std::uint32_t source = 0, target = 0;  ///< scans
+  PairVerdict verdict = PairVerdict::silent;
+  /// Logarithm of: how much more likely such evidence is at a right pose than at a wrong one.
+  double log_likelihood_ratio = 0;
+  /// Of the map.
+  UnalignedIsometry3d target_from_source = UnalignedIsometry3d::Identity();
+  double overlap = 0;    ///< the larger share of points of one scan on the other's surfaces, [0, 1]
+  double observed = 0;   ///< the larger share of points in the view of the other scan, [0, 1]
+  double violation = 0;  ///< of these, the larger share that lies in free space, [0, 1]
+  double shift = 0;      ///< RMS distance by which ICP moves the scans' overlap, metres
+};
+
+enum class ConnectionVerdict {
+  undecided,    ///< the two parts hardly see each other
+  confirmed,    ///< scans of both parts agree
+  contradicted  ///< scans of both parts contradict each other
+};
+const char* to_string(ConnectionVerdict verdict);
+
+/// A place where a map would fall into two parts: all pairs across it are judged together. Pairs of
+/// one scan fail together: for each scan only the strongest pair of either kind counts.
+struct AuditedConnection {
+  std::vector<std::uint32_t> scans;  ///< the smaller part, ascending
+  ConnectionVerdict verdict = ConnectionVerdict::undecided;
+  double confidence = 0.5;  ///< probability that the parts lie right to each other
+  std::size_t supporting = 0, contradicting = 0;  ///< pairs across it
+  /// Indices of the pairs that contradict it, the strongest first.
+  std::vector<std::size_t> contradictions;
+};
+
+struct Audit {
+  std::vector<AuditedPair> pairs;              ///< by source and target
+  std::vector<AuditedConnection> connections;  ///< the least confident first
+  /// Whether no connection is contradicted.
+  bool sound() const;
+};
+
+/// Judges every pair of scans that are near each other at their poses, and then the connections
+/// along the best supported spanning trees.
+///
+/// @param clouds one per scan, with sensor positions where they are known: without, only surfaces
+///   can contradict.
+/// @param world_from_scan one per scan; not finite: the scan is left out.
+/// @param registration as for align_batch().
+/// @throws InvalidArgument for options out of range, another number of poses than clouds, a pose
+///   that is no rigid motion (named); otherwise as verify_poses_batch().
+Audit audit(const Context& context, const std::vector<PreparedCloud>& clouds,
+            const std::vector<UnalignedIsometry3d>& world_from_scan,
+            const RegistrationOptions& registration = {}, const AuditOptions& options = {});
+
+/// The same for a map: scans of different islands are no pairs.
+Audit audit(const Context& context, const std::vector<PreparedCloud>& clouds,
+            const Reconstruction& map, const RegistrationOptions& registration = {},
+            const AuditOptions& options = {});
+
+/// A map and what its last audit says.
+struct AuditedReconstruction {
+  Reconstruction map;
+  Audit audit;
+};
+
+/// reconstruct(), audited: edges across a contradicted connection are taken out, the graph is
+/// solved again, until nothing is contradicted. Their reason is EdgeReason::contradicted.
+/// @param clouds as for audit(). Other parameters as for reconstruct().
+/// @throws InvalidArgument as reconstruct() and audit().
+AuditedReconstruction reconstruct_audited(
+    const Context& context, const std::vector<PreparedCloud>& clouds,
+    const std::vector<Pair>& pairs, const std::vector<RegistrationResult>& results,
+    const Options& options = {}, const std::vector<Odometry>& odometry = {},
+    const RegistrationOptions& registration = {}, const AuditOptions& audit_options = {});
+
+}  // namespace gpureg::reconstruction

@@ -1,0 +1,29 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <vector>
+
+#include "gpureg/reconstruction/audit.hpp"
+
+namespace gpureg::reconstruction {
+
+/// A map that was put together again where its audit contradicted it.
+struct MendedMap {
+  /// In the frame of the poses given; not finite: what is right could not be found.
+  std::vector<UnalignedIsometry3d> world_from_scan;
+  std::vector<std::uint32_t> moved;     ///< scans that got another pose, ascending
+  std::vector<std::uint32_t> left_out;  ///< scans that have none any more, ascending
+  std::size_t registered = 0;           ///< pairs that were aligned
+  Audit audit;                          ///< of the mended map
+};
+
+/// Takes a map apart at its contradicted connections, aligns scans across them, and puts the parts
+/// together as reconstruct_audited() does. Within the parts, poses stay as they are, but for what
+/// the pose graph spreads. The part with the most scans keeps its place.
+/// @param found what audit() says about these poses.
+/// @throws InvalidArgument as audit() and align_batch().
+MendedMap mend(const Context& context, const std::vector<PreparedCloud>& clouds,
+               const std::vector<UnalignedIsometry3d>& world_from_scan, const Audit& found,
+               const RegistrationOptions& registration = {}, const AuditOptions& options = {});
+
+}  // namespace gpureg::reconstruction

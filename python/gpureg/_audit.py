@@ -1,0 +1,168 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Where a finished map contradicts its own scans."""
+
+from __future__ import annotations
+
+import dataclasses
+import os
+from typing import Any
+
+import numpy as np
+
+from . import _core
+from ._arrays import float64
+from ._contexts import checked, context_of
+from ._core import Context, RegistrationOptions
+from ._progress import Progress
+from ._reconstruction import prepared_fragments
+from ._trajectory import read_trajectory
+from .fragments import FragmentSet, fragment_set
+
+
+@dataclasses.dataclass(frozen=True)
+class AuditedPair:
+    """Two scans that are near each other in a map.
+
+    Attributes
+    ----------
+    source, target : int
+        Numbers of fragments.
+    verdict : str
+        "supports", "contradicts" or "silent".
+    log_likelihood_ratio : float
+        Logarithm of: how much more likely such evidence is at a right pose than at a wrong one.
+    overlap, observed, free_space_violation : float
+        Shares of points: on the other scan's surfaces, in its view, and of these in free space.
+    shift : float
+        Metres by which ICP moves the overlap.
+    """
+
+    source: int
+    target: int
+    verdict: str
+    log_likelihood_ratio: float
+    overlap: float
+    observed: float
+    free_space_violation: float
+    shift: float
+
+
+@dataclasses.dataclass(frozen=True)
+class AuditedConnection:
+    """A place where a map would fall into two parts; all pairs across it are judged together.
+
+    Attributes
+    ----------
+    scans : list of int
+        Numbers of the fragments of the smaller part.
+    verdict : str
+        "confirmed", "contradicted" or "undecided".
+    confidence : float
+        Probability that the parts lie right to each other.
+    supporting, contradicting : int
+        Pairs across it.
+    contradictions : list of int
+        Indices into ``Audit.pairs``, the strongest first.
+    """
+
+    scans: list[int]
+    verdict: str
+    confidence: float
+    supporting: int
+    contradicting: int
+    contradictions: list[int]
+
+
+@dataclasses.dataclass(frozen=True)
+class Audit:
+    """What the scans of a map say about it.
+
+    Attributes
+    ----------
+    pairs : list of AuditedPair
+    connections : list of AuditedConnection
+        The least confident first.
+    """
+
+    pairs: list[AuditedPair]
+    connections: list[AuditedConnection]
+
+    @property
+    def sound(self) -> bool:
+        """Whether no connection is contradicted."""
+        return all(connection.verdict != "contradicted" for connection in self.connections)
+
+
+def audit(
+    fragments: Any,
+    poses: Any,
+    *,
+    options: RegistrationOptions | None = None,
+    context: Context | None = None,
+    progress: Progress = False,
+) -> Audit:
+    """Say where a finished map, of any program, contradicts its own scans. No truth is needed.
+
+    Parameters
+    ----------
+    fragments : FragmentSet, folder, or sequence of clouds
+    poses : path, or (N, 4, 4) array
+        ``world_from_scan`` of each fragment, NaN where it has none; or a trajectory file (TUM with
+        fragment numbers as times, KITTI, or poses.txt).
+    options : RegistrationOptions, optional
+    context : Context, optional
+    progress : bool or callable
+
+    Returns
+    -------
+    Audit
+
+    Raises
+    ------
+    ValueError
+        Naming the pose that is no rigid motion.
+
+    Examples
+    --------
+    >>> import numpy as np, gpureg
+    >>> cloud = np.random.default_rng(1).random((2000, 3))
+    >>> gpureg.audit([cloud, cloud], np.stack([np.eye(4)] * 2)).sound
+    True
+    """
+    options = checked(options, RegistrationOptions, "options") or RegistrationOptions()
+    options.validate()
+    context = context_of(context)
+    fragments = fragment_set(fragments)
+    matrices = _poses(poses, fragments)
+    clouds = prepared_fragments(fragments, options.prepare, context, progress)
+    pairs, connections = _core.audit(context, clouds, matrices, options)
+    numbers = [int(number) for number in fragments.numbers]
+    return Audit(
+        [AuditedPair(numbers[source], numbers[target], *rest) for source, target, *rest in pairs],
+        [
+            AuditedConnection([numbers[scan] for scan in scans], *rest)
+            for scans, *rest in connections
+        ],
+    )
+
+
+def _poses(poses: Any, fragments: FragmentSet) -> Any:
+    if not isinstance(poses, str | os.PathLike):
+        matrices = float64(poses, "poses")
+        if matrices.shape != (len(fragments), 4, 4):
+            raise ValueError(
+                f"poses: expected shape ({len(fragments)}, 4, 4), got {matrices.shape}"
+            )
+        return matrices
+    matrices = np.full((len(fragments), 4, 4), np.nan)
+    positions = {int(number): k for k, number in enumerate(fragments.numbers)}
+    times, known = read_trajectory(os.fspath(poses))
+    for time, pose in zip(times, known, strict=True):
+        if time in positions:
+            matrices[positions[int(time)]] = pose
+    if np.isfinite(matrices[:, 0, 0]).sum() < 2:
+        raise ValueError(f"poses: {os.fspath(poses)} holds no poses of two fragments")
+    return matrices
+
+
+__all__ = ["Audit", "AuditedConnection", "AuditedPair", "audit"]

@@ -1,0 +1,244 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "gpureg/reconstruction/audit.hpp"
+
+#include <algorithm>
+#include <map>
+#include <set>
+#include <string>
+
+#include "common/validate.hpp"
+#include "fields/audit.hpp"
+#include "fields/scale.hpp"
+#include "fields/validate.hpp"
+#include "gpureg/error.hpp"
+#include "reconstruction/blame.hpp"
+#include "reconstruction/companions.hpp"
+#include "reconstruction/near_pairs.hpp"
+#include "reconstruction/pair_verdicts.hpp"
+
+namespace gpureg::reconstruction {
+namespace {
+
+/// Edges are taken out and the graph solved again at most so often.
+constexpr int kMostRounds = 12;
+
+void check_poses(const std::vector<PreparedCloud>& clouds,
+                 const std::vector<UnalignedIsometry3d>& world_from_scan) {
+  if (world_from_scan.size() != clouds.size())
+    throw InvalidArgument("world_from_scan has " + std::to_string(world_from_scan.size()) +
+                          " entries, expected one per cloud, " + std::to_string(clouds.size()));
+  for (std::size_t k = 0; k < world_from_scan.size(); ++k) {
+    const UnalignedIsometry3d& pose = world_from_scan[k];
+    if (!pose.matrix().allFinite()) continue;
+    const Eigen::Matrix3d r = pose.linear();
+    // As for verify_poses(): a scale, a shear or a mirror image is no pose.
+    constexpr double kTolerance = 1e-3;
+    if ((r * r.transpose() - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff() > kTolerance ||
+        r.determinant() < 0)
+      throw InvalidArgument("world_from_scan[" + std::to_string(k) + "] is no rigid motion");
+  }
+}
+
+/// Two poses are the same to a verdict: metres, and of the entries of the rotation.
+constexpr double kSameDistance = 0.01, kSameRotation = 0.005;
+
+bool same(const UnalignedIsometry3d& a, const UnalignedIsometry3d& b) {
+  return (a.translation() - b.translation()).norm() < kSameDistance &&
+         (a.linear() - b.linear()).cwiseAbs().maxCoeff() < kSameRotation;
+}
+
+/// judge_pairs(), but for pairs that an earlier audit judged at the same pose.
+void judge_new_pairs(const Context& context, const std::vector<PreparedCloud>& clouds,
+                     const RegistrationOptions& registration, const AuditOptions& options,
+                     const Audit& before, std::vector<AuditedPair>& pairs) {
+  std::map<std::pair<std::uint32_t, std::uint32_t>, const AuditedPair*> known;
+  for (const AuditedPair& pair : before.pairs) known[{pair.source, pair.target}] = &pair;
+  std::vector<AuditedPair> asked;
+  std::vector<std::size_t> asked_for;
+  for (std::size_t k = 0; k < pairs.size(); ++k) {
+    const auto at = known.find({pairs[k].source, pairs[k].target});
+    if (at != known.end() && same(at->second->target_from_source, pairs[k].target_from_source)) {
+      pairs[k] = *at->second;
+      continue;
+    }
+    asked.push_back(pairs[k]);
+    asked_for.push_back(k);
+  }
+  judge_pairs(context, clouds, registration, options, asked);
+  for (std::size_t k = 0; k < asked.size(); ++k) pairs[asked_for[k]] = asked[k];
+}
+
+Audit audit_of(const Context& context, const std::vector<PreparedCloud>& clouds,
+               const std::vector<UnalignedIsometry3d>& world_from_scan,
+               const std::vector<std::uint32_t>& islands, const std::vector<Bond>& bonds,
+               const RegistrationOptions& registration, const AuditOptions& options,
+               const Audit& before = {}) {
+  Audit out;
+  for (const Pair& near : near_pairs(clouds, world_from_scan, islands, options.most_pairs)) {
+    AuditedPair pair;
+    pair.source = near.source;
+    pair.target = near.target;
+    pair.target_from_source = world_from_scan[near.target].inverse() * world_from_scan[near.source];
+    out.pairs.push_back(pair);
+  }
+  judge_new_pairs(context, clouds, registration, options, before, out.pairs);
+  out.connections = judge_connections(islands, bonds, out.pairs, options);
+  return out;
+}
+
+Audit audit_of(const Context& context, const std::vector<PreparedCloud>& clouds,
+               const Reconstruction& map, const RegistrationOptions& registration,
+               const AuditOptions& options, const Audit& before) {
+  options.validate();
+  std::vector<UnalignedIsometry3d> poses;
+  std::vector<std::uint32_t> islands;
+  for (const Scan& scan : map.scans) {
+    poses.push_back(scan.placed ? scan.island_from_scan : no_pose());
+    islands.push_back(scan.placed ? scan.island : kNoIsland);
+  }
+  check_poses(clouds, poses);
+  std::vector<Bond> bonds;
+  for (const Edge& edge : map.edges)
+    if (edge.accepted && map.scans[edge.source].placed)
+      bonds.push_back({edge.source, edge.target, edge.confidence});
+  for (const Odometry& edge : map.odometry)
+    if (map.scans[edge.source].placed) bonds.push_back({edge.source, edge.target, 1});
+  return audit_of(context, clouds, poses, islands, bonds, registration, options, before);
+}
+
+/// Whether a pair lies across a connection.
+bool divides(const AuditedConnection& connection, std::uint32_t a, std::uint32_t b) {
+  const auto within = [&](std::uint32_t scan) {
+    return std::binary_search(connection.scans.begin(), connection.scans.end(), scan);
+  };
+  return within(a) != within(b);
+}
+
+bool held_by_odometry(const AuditedConnection& connection, const std::vector<Odometry>& odometry) {
+  return std::any_of(odometry.begin(), odometry.end(), [&](const Odometry& edge) {
+    return divides(connection, edge.source, edge.target);
+  });
+}
+
+/// A mode that the audit has ruled out takes no part any more.
+void rule_out(const Edge& edge, std::vector<RegistrationResult>& results) {
+  RegistrationResult& result = results[edge.pair];
+  if (edge.mode < result.modes.size()) result.modes[edge.mode].confidence = 0;
+  const bool none =
+      std::all_of(result.modes.begin(), result.modes.end(),
+                  [](const RegistrationMode& mode) { return mode.confidence < 0.02; });
+  if (none) result.has_candidate = false;
+}
+
+/// Edges of `ruled_out` that the map lacks, as rejected ones.
+void add_ruled_out(const std::vector<Edge>& ruled_out, Reconstruction& map) {
+  std::set<std::size_t> known;
+  for (const Edge& edge : map.edges) known.insert(edge.pair);
+  for (const Edge& edge : ruled_out) {
+    if (!known.insert(edge.pair).second) continue;
+    map.edges.push_back(edge);
+    map.edges.back().accepted = false;
+    map.edges.back().weight = 0;
+    map.edges.back().reason = EdgeReason::inconsistent;
+  }
+  std::stable_sort(map.edges.begin(), map.edges.end(),
+                   [](const Edge& a, const Edge& b) { return a.pair < b.pair; });
+}
+
+}  // namespace
+
+const char* to_string(PairVerdict verdict) {
+  switch (verdict) {
+    case PairVerdict::silent:
+      return "silent";
+    case PairVerdict::supports:
+      return "supports";
+    case PairVerdict::contradicts:
+      return "contradicts";
+  }
+  return "unknown";
+}
+
+const char* to_string(ConnectionVerdict verdict) {
+  switch (verdict) {
+    case ConnectionVerdict::undecided:
+      return "undecided";
+    case ConnectionVerdict::confirmed:
+      return "confirmed";
+    case ConnectionVerdict::contradicted:
+      return "contradicted";
+  }
+  return "unknown";
+}
+
+AuditOptions AuditOptions::from_voxel_size(float voxel_size) {
+  require(positive(voxel_size), "voxel_size", voxel_size, "a finite number > 0");
+  AuditOptions options;
+  fields::scale(options, voxel_size);
+  return options;
+}
+
+void AuditOptions::validate() const {
+  fields::validate(*this);
+  require(max_contradicted < min_confirmed, "max_contradicted", max_contradicted,
+          "less than min_confirmed");
+}
+
+bool Audit::sound() const {
+  return std::none_of(connections.begin(), connections.end(), [](const AuditedConnection& c) {
+    return c.verdict == ConnectionVerdict::contradicted;
+  });
+}
+
+Audit audit(const Context& context, const std::vector<PreparedCloud>& clouds,
+            const std::vector<UnalignedIsometry3d>& world_from_scan,
+            const RegistrationOptions& registration, const AuditOptions& options) {
+  options.validate();
+  check_poses(clouds, world_from_scan);
+  std::vector<std::uint32_t> islands;
+  for (const UnalignedIsometry3d& pose : world_from_scan)
+    islands.push_back(pose.matrix().allFinite() ? 0 : kNoIsland);
+  return audit_of(context, clouds, world_from_scan, islands, {}, registration, options);
+}
+
+Audit audit(const Context& context, const std::vector<PreparedCloud>& clouds,
+            const Reconstruction& map, const RegistrationOptions& registration,
+            const AuditOptions& options) {
+  return audit_of(context, clouds, map, registration, options, {});
+}
+
+AuditedReconstruction reconstruct_audited(
+    const Context& context, const std::vector<PreparedCloud>& clouds,
+    const std::vector<Pair>& pairs, const std::vector<RegistrationResult>& results,
+    const Options& options, const std::vector<Odometry>& odometry,
+    const RegistrationOptions& registration, const AuditOptions& audit_options) {
+  std::vector<RegistrationResult> left = results;
+  hear_companions(context, clouds, pairs, registration, audit_options, left);
+  std::vector<Edge> ruled_out;
+  audit_options.validate();
+  AuditedReconstruction out;
+  for (int round = 0;; ++round) {
+    out.map = reconstruct(clouds.size(), pairs, left, options, odometry);
+    out.audit = audit_of(context, clouds, out.map, registration, audit_options, out.audit);
+    bool changed = false;
+    // The worst connection of each island: others may be contradicted because of it.
+    std::set<std::uint32_t> judged;
+    for (const AuditedConnection& connection : out.audit.connections) {
+      if (round == kMostRounds || connection.verdict != ConnectionVerdict::contradicted) break;
+      if (held_by_odometry(connection, odometry) ||
+          !judged.insert(out.map.scans[connection.scans.front()].island).second)
+        continue;
+      for (const Edge& edge : out.map.edges) {
+        if (!edge.accepted || !divides(connection, edge.source, edge.target)) continue;
+        rule_out(edge, left);
+        ruled_out.push_back(edge);
+        changed = true;
+      }
+    }
+    if (!changed) break;
+  }
+  add_ruled_out(ruled_out, out.map);
+  return out;
+}
+
+}  // namespace gpureg::reconstruction

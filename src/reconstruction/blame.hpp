@@ -1,0 +1,29 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "gpureg/reconstruction/audit.hpp"
+
+namespace gpureg::reconstruction {
+
+/// An edge of a graph that holds two scans together.
+struct Bond {
+  std::uint32_t a = 0, b = 0;
+  double confidence = 0;
+};
+
+/// From the verdicts of pairs to those of connections: along the most supported spanning tree of
+/// each island, and between the parts of an island that nothing supports.
+/// @param islands of each scan; scans of kNoIsland are left out.
+/// @param bonds edges of the graph; empty: none is known. Their own pairs support nothing more.
+/// @return the least confident first.
+std::vector<AuditedConnection> judge_connections(const std::vector<std::uint32_t>& islands,
+                                                 const std::vector<Bond>& bonds,
+                                                 const std::vector<AuditedPair>& pairs,
+                                                 const AuditOptions& options);
+
+constexpr std::uint32_t kNoIsland = 0xffffffffu;
+
+}  // namespace gpureg::reconstruction

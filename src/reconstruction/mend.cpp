@@ -1,0 +1,153 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "gpureg/reconstruction/mend.hpp"
+
+#include <algorithm>
+#include <map>
+#include <set>
+#include <string>
+
+#include "gpureg/error.hpp"
+
+namespace gpureg::reconstruction {
+namespace {
+
+/// Pairs of one scan that are aligned with scans of other parts.
+constexpr std::size_t kPairsOfScan = 24;
+/// Scans at either side of a break that are aligned, by their number in the set.
+constexpr std::uint32_t kBeside = 4;
+/// Within a part poses are right: nothing but drift.
+constexpr double kOfPart = 0.999;
+/// Shift from which a scan has another pose, metres, and the same for the entries of its rotation.
+constexpr double kMoved = 0.02;
+
+using Parts = std::vector<std::uint32_t>;
+constexpr std::uint32_t kNoPart = 0xffffffffu;
+
+/// Scans on the same side of every contradicted connection are one part.
+Parts parts_of(const std::vector<UnalignedIsometry3d>& poses, const Audit& found) {
+  std::vector<std::string> sides(poses.size());
+  for (const AuditedConnection& connection : found.connections) {
+    if (connection.verdict != ConnectionVerdict::contradicted) continue;
+    for (std::string& side : sides) side.push_back('0');
+    for (const std::uint32_t scan : connection.scans) sides[scan].back() = '1';
+  }
+  std::map<std::string, std::uint32_t> numbers;
+  Parts parts;
+  for (std::size_t k = 0; k < poses.size(); ++k)
+    parts.push_back(
+        poses[k].matrix().allFinite()
+            ? numbers.insert({sides[k], static_cast<std::uint32_t>(numbers.size())}).first->second
+            : kNoPart);
+  return parts;
+}
+
+/// Each scan of a part with the one before.
+std::vector<Odometry> held(const std::vector<UnalignedIsometry3d>& poses, const Parts& parts) {
+  std::map<std::uint32_t, std::uint32_t> last;
+  std::vector<Odometry> out;
+  for (std::uint32_t k = 0; k < parts.size(); ++k) {
+    if (parts[k] == kNoPart) continue;
+    const auto [at, first] = last.insert({parts[k], k});
+    if (!first) {
+      Odometry edge;
+      edge.source = k;
+      edge.target = at->second;
+      edge.target_from_source = poses[at->second].inverse() * poses[k];
+      edge.confidence = kOfPart;
+      out.push_back(edge);
+    }
+    at->second = k;
+  }
+  return out;
+}
+
+/// Pairs of different parts that may see each other: neighbours by number, those that were near at
+/// the wrong poses, and of a small part as many others as it may have, evenly chosen.
+std::vector<Pair> pairs_across(const Parts& parts, const Audit& found) {
+  std::set<std::pair<std::uint32_t, std::uint32_t>> chosen;
+  std::vector<std::size_t> count(parts.size(), 0);
+  const auto add = [&](std::uint32_t a, std::uint32_t b) {
+    if (parts[a] == kNoPart || parts[b] == kNoPart || parts[a] == parts[b]) return;
+    if (std::min(count[a], count[b]) >= kPairsOfScan) return;
+    if (!chosen.insert(std::minmax(a, b)).second) return;
+    ++count[a];
+    ++count[b];
+  };
+  const auto scans = static_cast<std::uint32_t>(parts.size());
+  for (std::uint32_t k = 0; k < scans; ++k)
+    for (std::uint32_t m = k + 1; m < std::min(scans, k + 1 + kBeside); ++m) add(k, m);
+  for (const AuditedPair& pair : found.pairs) add(pair.source, pair.target);
+  std::map<std::uint32_t, std::size_t> sizes;
+  for (const std::uint32_t part : parts) ++sizes[part];
+  for (std::uint32_t k = 0; k < scans; ++k) {
+    if (parts[k] == kNoPart || 4 * sizes[parts[k]] > parts.size()) continue;
+    const std::uint32_t step =
+        std::max<std::uint32_t>(1, scans / static_cast<std::uint32_t>(kPairsOfScan));
+    for (std::uint32_t m = k % step; m < scans; m += step) add(k, m);
+  }
+  std::vector<Pair> out;
+  for (const auto& [low, high] : chosen) out.push_back({high, low});
+  return out;
+}
+
+/// The island with the most scans goes where its first scan was.
+void place(const Reconstruction& map, const std::vector<UnalignedIsometry3d>& before,
+           MendedMap& out) {
+  out.world_from_scan.assign(before.size(), no_pose());
+  if (!map.islands.empty()) {
+    const std::vector<std::uint32_t>& scans = map.islands.front().scans;
+    // Of the part that is largest in it, a scan in the middle: what moved is the smaller part.
+    std::map<std::uint32_t, std::size_t> agree;
+    for (const std::uint32_t anchor : scans) {
+      const UnalignedIsometry3d world_from_island =
+          before[anchor] * map.scans[anchor].island_from_scan.inverse();
+      for (const std::uint32_t scan : scans)
+        agree[anchor] += (world_from_island * map.scans[scan].island_from_scan.translation() -
+                          before[scan].translation())
+                             .norm() < 10 * kMoved;
+    }
+    const std::uint32_t anchor =
+        std::max_element(agree.begin(), agree.end(), [](const auto& a, const auto& b) {
+          return a.second < b.second;
+        })->first;
+    const UnalignedIsometry3d world_from_island =
+        before[anchor] * map.scans[anchor].island_from_scan.inverse();
+    for (const std::uint32_t scan : scans)
+      out.world_from_scan[scan] = world_from_island * map.scans[scan].island_from_scan;
+  }
+  for (std::uint32_t k = 0; k < before.size(); ++k) {
+    if (!before[k].matrix().allFinite()) continue;
+    if (!out.world_from_scan[k].matrix().allFinite())
+      out.left_out.push_back(k);
+    else if ((out.world_from_scan[k].matrix() - before[k].matrix()).cwiseAbs().maxCoeff() > kMoved)
+      out.moved.push_back(k);
+  }
+}
+
+}  // namespace
+
+MendedMap mend(const Context& context, const std::vector<PreparedCloud>& clouds,
+               const std::vector<UnalignedIsometry3d>& world_from_scan, const Audit& found,
+               const RegistrationOptions& registration, const AuditOptions& options) {
+  if (world_from_scan.size() != clouds.size())
+    throw InvalidArgument("world_from_scan has " + std::to_string(world_from_scan.size()) +
+                          " entries, expected one per cloud, " + std::to_string(clouds.size()));
+  MendedMap out;
+  if (found.sound()) {
+    out.world_from_scan = world_from_scan;
+    out.audit = found;
+    return out;
+  }
+  const Parts parts = parts_of(world_from_scan, found);
+  const std::vector<Pair> pairs = pairs_across(parts, found);
+  out.registered = pairs.size();
+  const std::vector<RegistrationResult> results = align_batch(context, clouds, pairs, registration);
+  const AuditedReconstruction again = reconstruct_audited(
+      context, clouds, pairs, results, Options::from_voxel_size(registration.prepare.voxel_size),
+      held(world_from_scan, parts), registration, options);
+  place(again.map, world_from_scan, out);
+  out.audit = audit(context, clouds, out.world_from_scan, registration, options);
+  return out;
+}
+
+}  // namespace gpureg::reconstruction

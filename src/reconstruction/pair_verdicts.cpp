@@ -1,0 +1,141 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "reconstruction/pair_verdicts.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace gpureg::reconstruction {
+namespace {
+
+/// Share of the points in view from which free space says something.
+constexpr double kLeastObserved = 0.04;
+/// Of the points in view: noise and thin surfaces put some into free space at right poses, too.
+constexpr double kViolation = 0.1, kStrongViolation = 0.3;
+/// Points in free space, at least so many.
+constexpr double kLeastPoints = 40;
+/// Confidence of a pose whose surfaces coincide, and of one whose surfaces do not.
+constexpr double kSupports = 0.9, kDoubts = 0.3;
+/// Share of one scan that lies at the other's surfaces, whatever the normals, from which surfaces
+/// that do not coincide contradict the pose. With less, right poses have low confidences, too.
+constexpr double kLeastShared = 0.25;
+/// Overlap below which the pose is not worth an ICP.
+constexpr double kLeastOverlap = 0.05;
+/// Logarithms of likelihood ratios. In good maps 95 of 100 pairs reach kSupports, and 1 to 2 of 100
+/// violate free space; 0.3 metres off, none of 100 and a third. Equal furniture makes wrong poses
+/// look right, too.
+constexpr double kOfSupport = 0.7, kOfViolation = -2, kOfStrongViolation = -3.5, kOfDoubt = -2.5,
+                 kOfShift = -2;
+
+/// The worse side of the evidence.
+struct Violation {
+  double share = 0, points = 0;
+};
+
+Violation violation_of(const PoseVerification& pose, std::size_t points) {
+  const PoseEvidence& e = pose.evidence;
+  Violation worst;
+  for (const auto& [observed, share] :
+       {std::pair(e.source_observed, e.source_free_space_violation),
+        std::pair(e.target_observed, e.target_free_space_violation)})
+    if (observed >= kLeastObserved && share > worst.share)
+      worst = {share, share * observed * static_cast<double>(points)};
+  return worst;
+}
+
+bool violates(const Violation& violation) {
+  return violation.share > kViolation && violation.points >= kLeastPoints;
+}
+
+/// RMS distance between two poses of the points that overlap at the second.
+double shift_of(const UnalignedIsometry3d& before, const PoseVerification& after) {
+  const CorrespondenceMoments& moments = after.source_moments;
+  if (moments.count == 0) return 0;
+  const auto count = static_cast<double>(moments.count);
+  const Eigen::Vector3d middle = moments.sum / count;
+  const Eigen::Matrix3d spread = moments.outer / count - middle * middle.transpose();
+  const UnalignedIsometry3d& moved = after.target_from_source;
+  const Eigen::Matrix3d turn = moved.linear() - before.linear();
+  return std::sqrt((moved * middle - before * middle).squaredNorm() +
+                   std::max(0.0, (turn * spread * turn.transpose()).trace()));
+}
+
+double overlap_of(const PoseEvidence& e) { return std::max(e.source_overlap, e.target_overlap); }
+
+double shared(const PoseEvidence& e) {
+  return std::max(e.source_overlap_any_normal, e.target_overlap_any_normal);
+}
+
+/// Whether the pose as it is gives no reason to ask ICP.
+bool settled(const PoseVerification& given, std::size_t points) {
+  if (violates(violation_of(given, points))) return false;
+  return given.confidence >= kSupports || shared(given.evidence) < kLeastOverlap;
+}
+
+void judge(const PoseVerification& given, const PoseVerification* refined, std::size_t points,
+           double margin, AuditedPair& out) {
+  out.overlap = overlap_of(given.evidence);
+  out.observed = std::max(given.evidence.source_observed, given.evidence.target_observed);
+  Violation violation = violation_of(given, points);
+  double confidence = given.confidence;
+  bool elsewhere = false;
+  if (refined != nullptr) {
+    out.shift = shift_of(out.target_from_source, *refined);
+    const Violation left = violation_of(*refined, points);
+    if (out.shift <= margin) {
+      // What goes away within the margin of the map is no contradiction.
+      if (left.share < violation.share) violation = left;
+      confidence = std::max(confidence, refined->confidence);
+    } else {
+      elsewhere = refined->confidence >= kSupports && !violates(left);
+    }
+  }
+  out.violation = violation.share;
+  double& ratio = out.log_likelihood_ratio;
+  if (violates(violation))
+    ratio = violation.share > kStrongViolation ? kOfStrongViolation : kOfViolation;
+  else if (confidence < kDoubts && shared(given.evidence) >= kLeastShared)
+    ratio = kOfDoubt;
+  else if (confidence < kDoubts && elsewhere)
+    ratio = kOfShift;
+  if (confidence >= kSupports) ratio += kOfSupport;
+  if (ratio > 0) out.verdict = PairVerdict::supports;
+  if (ratio < 0) out.verdict = PairVerdict::contradicts;
+}
+
+}  // namespace
+
+void judge_pairs(const Context& context, const std::vector<PreparedCloud>& clouds,
+                 const RegistrationOptions& registration, const AuditOptions& options,
+                 std::vector<AuditedPair>& pairs) {
+  std::vector<Pair> all, doubtful;
+  std::vector<std::vector<UnalignedIsometry3d>> poses, doubtful_poses;
+  for (const AuditedPair& pair : pairs) {
+    all.push_back({pair.source, pair.target});
+    poses.push_back({pair.target_from_source});
+  }
+  const auto points = [&](const AuditedPair& pair) {
+    return std::min(clouds[pair.source].size(), clouds[pair.target].size());
+  };
+  VerificationOptions verification;
+  verification.search_alternatives = false;
+  const auto given = verify_poses_batch(context, clouds, all, poses, registration, verification);
+  std::vector<std::size_t> place(pairs.size(), pairs.size());
+  for (std::size_t k = 0; k < pairs.size(); ++k) {
+    if (settled(given[k].front(), points(pairs[k]))) continue;
+    place[k] = doubtful.size();
+    doubtful.push_back(all[k]);
+    doubtful_poses.push_back(poses[k]);
+  }
+  verification.refine = true;
+  const auto refined =
+      verify_poses_batch(context, clouds, doubtful, doubtful_poses, registration, verification);
+  for (std::size_t k = 0; k < pairs.size(); ++k) {
+    AuditedPair& pair = pairs[k];
+    const double margin = options.max_shift + options.max_shift_per_metre *
+                                                  pair.target_from_source.translation().norm();
+    judge(given[k].front(), place[k] < doubtful.size() ? &refined[place[k]].front() : nullptr,
+          points(pair), margin, pair);
+  }
+}
+
+}  // namespace gpureg::reconstruction

@@ -1,0 +1,235 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "gpureg/reconstruction/audit.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <random>
+
+#include "gpureg/error.hpp"
+#include "reconstruction/blame.hpp"
+#include "reconstruction/near_pairs.hpp"
+#include "support/registration_result.hpp"
+#include "support/scan.hpp"
+
+namespace gpureg::test {
+namespace {
+
+using namespace reconstruction;
+
+AuditedPair pair_of(std::uint32_t source, std::uint32_t target, double ratio) {
+  AuditedPair pair;
+  pair.source = source;
+  pair.target = target;
+  pair.log_likelihood_ratio = ratio;
+  pair.verdict = ratio > 0   ? PairVerdict::supports
+                 : ratio < 0 ? PairVerdict::contradicts
+                             : PairVerdict::silent;
+  return pair;
+}
+
+/// Scans of a path, each of which agrees with the next two; `slip`: from there on with none before.
+std::vector<AuditedPair> path_of(std::uint32_t scans, std::uint32_t slip) {
+  std::vector<AuditedPair> pairs;
+  for (std::uint32_t k = 0; k < scans; ++k)
+    for (std::uint32_t m = k + 1; m < std::min(scans, k + 3); ++m)
+      pairs.push_back(pair_of(m, k, k < slip && m >= slip ? -2.5 : 1.5));
+  return pairs;
+}
+
+std::vector<AuditedConnection> judged(std::uint32_t scans, const std::vector<AuditedPair>& pairs) {
+  return judge_connections(std::vector<std::uint32_t>(scans, 0), {}, pairs, {});
+}
+
+TEST(Connections, ASlipIsFoundWhereItIs) {
+  const auto connections = judged(20, path_of(20, 14));
+  ASSERT_EQ(connections.size(), 19u);
+  EXPECT_EQ(connections[0].verdict, ConnectionVerdict::contradicted);
+  EXPECT_EQ(connections[0].scans, (std::vector<std::uint32_t>{14, 15, 16, 17, 18, 19}));
+  EXPECT_EQ(connections[0].contradicting, 3u);
+  for (std::size_t k = 1; k < connections.size(); ++k)
+    EXPECT_EQ(connections[k].verdict, ConnectionVerdict::confirmed) << k;
+}
+
+TEST(Connections, OnePairIsNoContradictionAmongMany) {
+  std::vector<AuditedPair> pairs = path_of(20, 20);
+  pairs[10] = pair_of(pairs[10].source, pairs[10].target, -3.5);
+  for (const AuditedConnection& connection : judged(20, pairs))
+    EXPECT_NE(connection.verdict, ConnectionVerdict::contradicted);
+}
+
+TEST(Connections, OneScanAmongOthersIsNamed) {
+  std::vector<AuditedPair> pairs = path_of(12, 12);
+  for (AuditedPair& pair : pairs)
+    if (pair.source == 5 || pair.target == 5) pair = pair_of(pair.source, pair.target, -2.5);
+  const auto connections = judged(12, pairs);
+  EXPECT_EQ(connections[0].verdict, ConnectionVerdict::contradicted);
+  EXPECT_EQ(connections[0].scans, std::vector<std::uint32_t>{5});
+}
+
+TEST(Connections, PartsThatDoNotSeeEachOtherAreUndecided) {
+  std::vector<AuditedPair> pairs = path_of(10, 5);
+  for (AuditedPair& pair : pairs)
+    if (pair.log_likelihood_ratio < 0) pair = pair_of(pair.source, pair.target, 0);
+  const auto connections = judged(10, pairs);
+  EXPECT_EQ(std::count_if(connections.begin(), connections.end(),
+                          [](const AuditedConnection& c) {
+                            return c.verdict == ConnectionVerdict::undecided;
+                          }),
+            1);
+}
+
+// Accepted edges look right: that is why they were accepted.
+TEST(Connections, EdgesDoNotConfirmThemselves) {
+  std::vector<AuditedPair> pairs = path_of(20, 10);
+  std::vector<Bond> bonds;
+  for (std::uint32_t k = 0; k + 1 < 20; ++k) bonds.push_back({k, k + 1, 0.99});
+  for (AuditedPair& pair : pairs)
+    if (pair.source == pair.target + 1)
+      pair = pair_of(pair.source, pair.target, 1.5);
+    else if (pair.log_likelihood_ratio < 0)
+      pair = pair_of(pair.source, pair.target, -3.5);
+  const auto connections = judge_connections(std::vector<std::uint32_t>(20, 0), bonds, pairs, {});
+  EXPECT_EQ(connections[0].verdict, ConnectionVerdict::contradicted);
+  EXPECT_EQ(connections[0].scans.size(), 10u);
+}
+
+/// Scans of a room, each without another slice of it, at their places in the room.
+struct AuditedRoom : ::testing::Test {
+  AuditedRoom() {
+    options = RegistrationOptions::from_voxel_size(0.1f);
+    for (unsigned k = 0; k < 6; ++k) {
+      std::mt19937 random(k + 1);
+      world_from_scan.emplace_back(k == 0 ? Eigen::Isometry3d::Identity() : random_pose(random));
+      const Eigen::Isometry3d scan_from_world(world_from_scan.back().inverse().matrix());
+      const std::vector<Eigen::Vector3f> points = moved(scan_from_world, scan_room(random));
+      const Eigen::Vector3f sensor = (scan_from_world * kRoomSensor.cast<double>()).cast<float>();
+      PointCloudView view;
+      view.points = points.front().data();
+      view.size = points.size();
+      view.viewpoints = sensor.data();
+      view.viewpoint_count = 1;
+      clouds.push_back(prepare(context, view, options.prepare));
+    }
+  }
+
+  Audit audited(const std::vector<UnalignedIsometry3d>& poses) const {
+    return audit(context, clouds, poses, options, AuditOptions::from_voxel_size(0.1f));
+  }
+
+  std::vector<UnalignedIsometry3d> with_slip(std::size_t scan, double metres) const {
+    std::vector<UnalignedIsometry3d> poses = world_from_scan;
+    poses[scan].translation() += metres * Eigen::Vector3d(0.6, 0.48, 0.64);
+    return poses;
+  }
+
+  Context context = Context::cpu(1);
+  RegistrationOptions options;
+  std::vector<PreparedCloud> clouds;
+  std::vector<UnalignedIsometry3d> world_from_scan;
+};
+
+TEST_F(AuditedRoom, ARightMapIsSound) {
+  const Audit result = audited(world_from_scan);
+  EXPECT_EQ(result.pairs.size(), 15u);
+  EXPECT_TRUE(result.sound());
+  for (const AuditedPair& pair : result.pairs) EXPECT_EQ(pair.verdict, PairVerdict::supports);
+  for (const AuditedConnection& connection : result.connections)
+    EXPECT_EQ(connection.verdict, ConnectionVerdict::confirmed);
+}
+
+TEST_F(AuditedRoom, AScanAtAWrongPlaceIsNamed) {
+  for (const double metres : {0.5, 1.0}) {
+    const Audit result = audited(with_slip(3, metres));
+    EXPECT_FALSE(result.sound()) << metres;
+    ASSERT_FALSE(result.connections.empty());
+    EXPECT_EQ(result.connections[0].scans, std::vector<std::uint32_t>{3}) << metres;
+    for (const std::size_t k : result.connections[0].contradictions)
+      EXPECT_TRUE(result.pairs[k].source == 3 || result.pairs[k].target == 3);
+  }
+}
+
+TEST_F(AuditedRoom, ThreadsDoNotMatter) {
+  const std::vector<UnalignedIsometry3d> poses = with_slip(2, 0.5);
+  const Audit one = audited(poses);
+  const Audit four =
+      audit(Context::cpu(4), clouds, poses, options, AuditOptions::from_voxel_size(0.1f));
+  ASSERT_EQ(one.pairs.size(), four.pairs.size());
+  for (std::size_t k = 0; k < one.pairs.size(); ++k) {
+    EXPECT_EQ(one.pairs[k].log_likelihood_ratio, four.pairs[k].log_likelihood_ratio);
+    EXPECT_EQ(one.pairs[k].violation, four.pairs[k].violation);
+  }
+  ASSERT_EQ(one.connections.size(), four.connections.size());
+  for (std::size_t k = 0; k < one.connections.size(); ++k)
+    EXPECT_EQ(one.connections[k].confidence, four.connections[k].confidence);
+}
+
+TEST_F(AuditedRoom, ScansWithoutAPoseAreLeftOut) {
+  std::vector<UnalignedIsometry3d> poses = world_from_scan;
+  poses[4] = no_pose();
+  const Audit result = audited(poses);
+  EXPECT_EQ(result.pairs.size(), 10u);
+  EXPECT_TRUE(result.sound());
+}
+
+TEST_F(AuditedRoom, BadPosesAreNamed) {
+  std::vector<UnalignedIsometry3d> poses = world_from_scan;
+  poses.pop_back();
+  EXPECT_THROW(audited(poses), InvalidArgument);
+  poses = world_from_scan;
+  poses[2].linear() *= 1.1;
+  try {
+    audited(poses);
+    FAIL();
+  } catch (const InvalidArgument& error) {
+    EXPECT_NE(std::string(error.what()).find("world_from_scan[2]"), std::string::npos);
+  }
+  poses = world_from_scan;
+  poses[1].linear().col(0) *= -1;
+  EXPECT_THROW(audited(poses), InvalidArgument);
+  AuditOptions bad;
+  bad.max_shift = -1;
+  EXPECT_THROW(audit(context, clouds, world_from_scan, options, bad), InvalidArgument);
+}
+
+// Three edges agree on a wrong place of the last two scans; nobody registered the other pairs.
+TEST_F(AuditedRoom, EdgesOfAContradictedConnectionAreTakenOut) {
+  const auto relative = [&](std::uint32_t source, std::uint32_t target) {
+    UnalignedIsometry3d wrong = world_from_scan[source];
+    if (source >= 4 && target < 4) wrong.translation() += Eigen::Vector3d(0.6, 0.5, 0.2);
+    return UnalignedIsometry3d(world_from_scan[target].inverse() * wrong);
+  };
+  std::vector<Pair> pairs;
+  std::vector<RegistrationResult> results;
+  const auto add = [&](std::uint32_t source, std::uint32_t target) {
+    pairs.push_back({source, target});
+    results.push_back(result_of(relative(source, target), 0.98));
+  };
+  for (std::uint32_t k = 0; k < 4; ++k)
+    for (std::uint32_t m = k + 1; m < 4; ++m) add(m, k);
+  add(5, 4);
+  add(4, 0);
+  add(5, 1);
+  add(4, 2);
+  EXPECT_EQ(reconstruct(6, pairs, results).islands.size(), 1u);
+  const AuditedReconstruction out = reconstruct_audited(
+      context, clouds, pairs, results, {}, {}, options, AuditOptions::from_voxel_size(0.1f));
+  ASSERT_EQ(out.map.islands.size(), 2u);
+  EXPECT_EQ(out.map.islands[1].scans, (std::vector<std::uint32_t>{4, 5}));
+  EXPECT_TRUE(out.audit.sound());
+  ASSERT_EQ(out.map.edges.size(), pairs.size());
+  for (const Edge& edge : out.map.edges)
+    EXPECT_EQ(edge.accepted, (edge.source < 4) == (edge.target < 4));
+}
+
+TEST_F(AuditedRoom, NearPairsAreThoseThatMeet) {
+  std::vector<UnalignedIsometry3d> poses = world_from_scan;
+  poses[5].translation().x() += 100;
+  EXPECT_EQ(near_pairs(clouds, poses, {}, 40).size(), 10u);
+  EXPECT_EQ(near_pairs(clouds, poses, {0, 0, 0, 1, 1, 1}, 40).size(), 4u);
+  EXPECT_LE(near_pairs(clouds, poses, {}, 2).size(), 10u);
+}
+
+}  // namespace
+}  // namespace gpureg::test
