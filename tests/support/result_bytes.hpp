@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstring>
 #include <string>
 #include <vector>
 
@@ -23,7 +24,9 @@ class ByteWriter {
     append(m.data(), sizeof *m.data() * static_cast<std::size_t>(m.size()));
   }
   void append(const void* data, std::size_t size) {
-    all.insert(all.end(), static_cast<const char*>(data), static_cast<const char*>(data) + size);
+    const std::size_t before = all.size();
+    all.resize(before + size);
+    if (size > 0) std::memcpy(all.data() + before, data, size);
   }
   std::vector<char> all;
 };
