@@ -203,7 +203,7 @@ TEST_F(Consumer, SlamDemo) {
   const Outcome configured = configure(project, "-O0");
   ASSERT_EQ(configured.status, 0) << configured.output;
   std::size_t headers = 0;
-  for (const auto& entry : std::filesystem::directory_iterator(project)) {
+  for (const auto& entry : std::filesystem::recursive_directory_iterator(project)) {
     std::ifstream file(entry.path());
     for (std::string line; std::getline(file, line);) {
       const std::string start = "#include <gpureg/";
