@@ -25,14 +25,20 @@ class AuditedPair:
 
     Attributes
     ----------
-    source, target : int
-        Numbers of fragments.
+    source : int
+        Number of a fragment.
+    target : int
+        The same.
     verdict : str
         "supports", "contradicts" or "silent".
     log_likelihood_ratio : float
         Logarithm of: how much more likely such evidence is at a right pose than at a wrong one.
-    overlap, observed, free_space_violation : float
-        Shares of points: on the other scan's surfaces, in its view, and of these in free space.
+    overlap : float
+        Share of points on the other scan's surfaces.
+    observed : float
+        Share of points in its view.
+    free_space_violation : float
+        Of these, the share in free space.
     shift : float
         Metres by which ICP moves the overlap.
     """
@@ -59,8 +65,10 @@ class AuditedConnection:
         "confirmed", "contradicted" or "undecided".
     confidence : float
         Probability that the parts lie right to each other.
-    supporting, contradicting : int
+    supporting : int
         Pairs across it.
+    contradicting : int
+        The same.
     contradictions : list of int
         Indices into ``Audit.pairs``, the strongest first.
     """
@@ -138,11 +146,8 @@ def audit(
     pairs, connections = _core.audit(context, clouds, matrices, options)
     numbers = [int(number) for number in fragments.numbers]
     return Audit(
-        [AuditedPair(numbers[source], numbers[target], *rest) for source, target, *rest in pairs],
-        [
-            AuditedConnection([numbers[scan] for scan in scans], *rest)
-            for scans, *rest in connections
-        ],
+        [AuditedPair(numbers[row[0]], numbers[row[1]], *row[2:]) for row in pairs],
+        [AuditedConnection([numbers[k] for k in row[0]], *row[1:]) for row in connections],
     )
 
 

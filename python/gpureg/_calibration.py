@@ -31,14 +31,19 @@ class RiskThreshold:
 
     Attributes
     ----------
-    max_risk, max_failure : float
-        That were asked for.
+    max_risk : float
+        That was asked for.
+    max_failure : float
+        That was asked for.
     supported : bool
         False: the samples are no proof for any threshold.
     min_confidence : float
         For ``RegistrationOptions.min_confidence``; 1 where nothing is supported.
-    samples, reported, wrong : int
-        All; those from ``min_confidence`` on; the false ones of these.
+    samples : int
+    reported : int
+        Those from ``min_confidence`` on.
+    wrong : int
+        The false ones of these.
     recall : float
         Share of the correct samples that are reported, [0, 1].
     more_samples : int or None
@@ -84,7 +89,7 @@ class CalibrationRun:
         ``trajectory``.
     voxel_size : float
         That it was made with.
-    risk : RiskThreshold, optional
+    risk : RiskThreshold or None
         The answer to ``max_risk``.
     """
 
@@ -198,7 +203,8 @@ def calibrate(
     samples = found.pop("samples")
     risk = None
     if max_risk is not None:
-        risk = _control_risk(*samples, max_risk, 0.05, found["calibration"])
+        confidences, correct = samples
+        risk = _control_risk(confidences, correct, max_risk, 0.05, found["calibration"])
     return CalibrationRun(voxel_size=options.prepare.voxel_size, risk=risk, **found)
 
 

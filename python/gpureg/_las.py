@@ -81,7 +81,7 @@ def _check_chunks(name: str, start: int, size: int) -> int:
             file.seek(-8, os.SEEK_END)
             (table,) = struct.unpack("<q", file.read(8))
         file.seek(table + 4)
-        (chunks,) = struct.unpack("<I", file.read(4))
+        chunks = int(struct.unpack("<I", file.read(4))[0])
     if (chunks - 1) * size > os.path.getsize(name):
         raise ValueError(f"{chunks} chunks announced, more than the file has room for")
     return chunks

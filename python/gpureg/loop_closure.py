@@ -41,8 +41,8 @@ class LoopCloser:
     voxel_size : float
         Metres; every length follows from it. Not used where options are given.
     options : LoopClosureOptions, optional
-        With `optimize` False the poses are left to the host, and `LoopUpdate.poses` is empty.
-        `graph.drift` is the noise of odometry without covariance. `LoopClosureOptions.loopsmart`
+        With ``optimize`` False the poses are left to the host, and `LoopUpdate.poses` is empty.
+        ``graph.drift`` is the noise of odometry without covariance. `LoopClosureOptions.loopsmart`
         verifies by the constants of the LoopSmart paper, which need odometry that is nearly exact.
 
     Examples

@@ -10,10 +10,18 @@ OPTIONS = gpureg.RegistrationOptions.from_voxel_size(0.1, quality=2)
 
 
 @pytest.fixture(scope="module")
-def scans():
+def points():
     rng = np.random.default_rng(1)
     whole = room(1, 12000)
     return [moved(whole[rng.random(len(whole)) < 0.6], pose(k)) for k in range(5)]
+
+
+@pytest.fixture(scope="module")
+def scans(points):
+    """With viewpoints: what stands in free space can be told."""
+    viewpoint = np.array([[1.9, 1.9, 1.9]])
+    viewpoints = {k: moved(viewpoint, pose(k)) for k in range(5)}
+    return gpureg.FragmentSet(range(5), points, viewpoints)
 
 
 def poses():
@@ -35,6 +43,14 @@ def test_a_wrong_scan_is_named(scans):
     assert audit.connections[0].scans == [3]
     for k in audit.connections[0].contradictions:
         assert 3 in (audit.pairs[k].source, audit.pairs[k].target)
+
+
+def test_without_viewpoints_a_wrong_scan_is_not_confirmed(points):
+    wrong = poses()
+    wrong[3, :3, 3] += [0.5, 0.4, 0.3]
+    audit = gpureg.audit(points, wrong, options=OPTIONS)
+    assert audit.connections[0].scans == [3]
+    assert audit.connections[0].verdict == "undecided"
 
 
 def test_bad_poses(scans):
