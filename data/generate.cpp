@@ -48,6 +48,8 @@ void validate(const GenerateOptions& o) {
           "0 to 2 a square metre");
   require(o.clutter == 0 || !is_generated(o.building), "clutter", std::to_string(o.clutter),
           "0 without a mesh of a building: generated ones are furnished");
+  require(o.rearrangement == 0 || o.building.empty(), "rearrangement",
+          std::to_string(o.rearrangement), "0 with a building: only houses are rearranged");
   require(o.no_return >= 0 && o.no_return <= 1000, "no_return", std::to_string(o.no_return),
           "0 to 1000 m");
   const SensorOptions& s = o.sensor;
@@ -88,8 +90,15 @@ void parallel(int threads, int count, const Work& work) {
   if (failure) std::rethrow_exception(failure);
 }
 
+/// Of path and noise.
+std::uint64_t visit_seed(const GenerateOptions& options) {
+  return options.rearrangement == 0
+             ? options.seed
+             : hash_key(options.seed, Purpose::rearrangement, options.rearrangement);
+}
+
 House building_of(const GenerateOptions& options) {
-  if (options.building.empty()) return build_house(options.seed);
+  if (options.building.empty()) return build_house(options.seed, options.rearrangement);
   if (options.building == "office") return build_office(options.seed);
   if (options.building == "warehouse") return build_warehouse(options.seed);
   House house{{}, {}, {}, read_building(options.building)};
@@ -110,8 +119,8 @@ class Generator {
                      : std::max(1, static_cast<int>(std::thread::hardware_concurrency()))),
         house_(building_of(options)),
         scene_(house_.mesh),
-        sensor_(scene_, options.sensor, options.seed),
-        world_from_camera_(walk(house_, scene_, options.seed,
+        sensor_(scene_, options.sensor, visit_seed(options)),
+        world_from_camera_(walk(house_, scene_, visit_seed(options),
                                 options.fragments * options.frames_per_fragment,
                                 static_cast<float>(options.no_return))),
         fragments_(static_cast<std::size_t>(options.fragments)),
@@ -155,7 +164,8 @@ class Generator {
   std::vector<Eigen::Isometry3d> odometry(int first) const {
     std::vector<Eigen::Isometry3d> estimate(1, Eigen::Isometry3d::Identity());
     for (int frame = first + 1; frame < first + options_.frames_per_fragment; ++frame) {
-      Random random(hash_key(options_.seed, Purpose::drift, static_cast<std::uint64_t>(frame)));
+      Random random(
+          hash_key(visit_seed(options_), Purpose::drift, static_cast<std::uint64_t>(frame)));
       Eigen::Vector3d turn, shift;
       for (int axis = 0; axis < 3; ++axis) {
         turn[axis] =

@@ -37,6 +37,9 @@ struct GenerateOptions {
   /// 0 .. 2, with a mesh: pieces of furniture per square metre that are put into it, so that what
   /// was copied in it differs
   double clutter = 0;
+  /// The house at another time: 0: as built; another number: a third of the furniture is moved,
+  /// taken away or added, and small boxes; another path and noise.
+  std::uint64_t rearrangement = 0;
   /// 0 .. 1000 metres: the path does not come back to a place before this length; of some random
   /// paths the first that does so is taken
   double no_return = 0;

@@ -28,7 +28,8 @@ enum class Purpose : std::uint64_t {
   hole,
   distortion,
   drift,
-  texture
+  texture,
+  rearrangement
 };
 
 inline std::uint64_t hash_key(std::uint64_t seed, Purpose purpose, std::uint64_t a = 0,

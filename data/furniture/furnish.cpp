@@ -293,6 +293,11 @@ Rect footprint(const Affine3f& frame, const Piece& piece) {
 }
 
 void place_piece(House& house, const Affine3f& frame, const Piece& piece, std::uint64_t model) {
+  for (const Affine3f& place : places_of(house, frame, piece))
+    build_piece(house, place, piece, model);
+}
+
+void build_piece(House& house, const Affine3f& frame, const Piece& piece, std::uint64_t model) {
   house.obstacles.push_back({footprint(frame, piece), piece.height});
   MeshBuilder mesh(house.mesh);
   mesh.place(frame);
@@ -330,6 +335,7 @@ void furnish(House& house, std::uint64_t seed) {
     filler.on_walls();
     filler.ceiling_lamp();
   }
+  add_boxes(house);
 }
 
 }  // namespace gpureg::synthetic

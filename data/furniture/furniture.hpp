@@ -2,6 +2,7 @@
 #pragma once
 
 #include <functional>
+#include <vector>
 
 #include "data/mesh.hpp"
 #include "data/random.hpp"
@@ -20,8 +21,18 @@ struct Piece {
 /// otherwise.
 Rect footprint(const Eigen::Affine3f& world_from_piece, const Piece& piece);
 /// Builds a piece, whose details follow from the model, into the house, as an obstacle too.
+void build_piece(House& house, const Eigen::Affine3f& world_from_piece, const Piece& piece,
+                 std::uint64_t model);
+/// The same, wherever the rearrangement of the house leaves it.
 void place_piece(House& house, const Eigen::Affine3f& world_from_piece, const Piece& piece,
                  std::uint64_t model);
+
+// rearrange.cpp
+/// Where the next piece of the house stands: at its place, elsewhere, at both, or nowhere.
+std::vector<Eigen::Affine3f> places_of(House& house, const Eigen::Affine3f& frame,
+                                       const Piece& piece);
+/// Boxes of 10 to 30 cm on the floors of a house that is rearranged.
+void add_boxes(House& house);
 
 // Colours that a house has.
 Material wood(Random& random);

@@ -56,12 +56,16 @@ struct House {
   std::vector<Doorway> doors;
   std::vector<Obstacle> obstacles;  ///< furniture; walls follow from rooms and doors
   Mesh mesh;
+  /// 0: furnished as its seed says; another number: with some pieces moved, taken away or added.
+  std::uint64_t rearrangement = 0;
+  std::uint64_t pieces = 0;  ///< of furniture that were to be placed
 };
 
 constexpr float kWall = 0.14f;  ///< metres: thickness of the walls between rooms
 
-/// Plans, builds and furnishes a house of 4 to 7 rooms. The same seed gives the same house.
-House build_house(std::uint64_t seed);
+/// Plans, builds and furnishes a house of 4 to 7 rooms. The same numbers give the same
+/// house.
+House build_house(std::uint64_t seed, std::uint64_t rearrangement = 0);
 /// An office: rooms of equal desks along a corridor of equal doors, a hall with rows of the same
 /// desks and chairs, meeting rooms with equal tables. Size and models follow from the seed.
 House build_office(std::uint64_t seed);

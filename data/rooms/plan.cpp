@@ -157,8 +157,9 @@ void plan_rooms(House& house, Random& random) {
   open_outer_walls(house, random, outline);
 }
 
-House build_house(std::uint64_t seed) {
+House build_house(std::uint64_t seed, std::uint64_t rearrangement) {
   House house;
+  house.rearrangement = rearrangement;
   Random random(hash_key(seed, Purpose::house));
   plan_rooms(house, random);
   build_walls(house, random);

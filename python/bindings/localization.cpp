@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "gpureg/localization.hpp"
+#include "gpureg/change.hpp"
 
 #include <pybind11/stl.h>
 
@@ -81,6 +81,60 @@ void bind_from_voxel_size(py::class_<T>& cls) {
         return T::from_voxel_size(argument<float>(voxel_size, "voxel_size"));
       },
       py::arg("voxel_size"), "Every length from the voxel size (metres).");
+}
+
+ChangeResult compare(const Context& context, const py::tuple& scan, const PreparedMap& map,
+                     const DoubleArray& pose, const ChangeOptions& options) {
+  const Input input(scan);
+  UnalignedIsometry3d map_from_scan = no_pose();
+  map_from_scan.matrix() =
+      Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(pose.data());
+  return interruptible(
+      [&] { return find_changes(context, input.view, map, map_from_scan, options); });
+}
+
+py::array_t<std::uint8_t> labels_of(const PointChanges& changes) {
+  static_assert(sizeof(ChangeLabel) == 1);
+  return py::array_t<std::uint8_t>(static_cast<py::ssize_t>(changes.labels.size()),
+                                   reinterpret_cast<const std::uint8_t*>(changes.labels.data()));
+}
+
+py::array_t<float> probabilities_of(const PointChanges& changes) {
+  return py::array_t<float>(static_cast<py::ssize_t>(changes.probabilities.size()),
+                            changes.probabilities.data());
+}
+
+void bind_change(py::module_& m) {
+  auto options = bind_options_class<ChangeOptions>(m);
+  bind_from_voxel_size(options);
+  using C = ChangeResult;
+  py::class_<C>(m, "ChangeResult",
+                "Labels of the points of a scan and of a map: rows of CHANGE_LABELS.")
+      .def_property_readonly(
+          "map_from_scan", [](const C& c) { return array_of(c.map_from_scan.matrix()); },
+          "(4, 4) float64: as given, or refined.")
+      .def_readonly("inlier_ratio", &C::inlier_ratio,
+                    "Share of the scan on surfaces of the map; low: a wrong pose.")
+      .def_property_readonly(
+          "scan_labels", [](const C& c) { return labels_of(c.scan); },
+          "(N,) uint8, of the points of the scan.")
+      .def_property_readonly(
+          "scan_probabilities", [](const C& c) { return probabilities_of(c.scan); },
+          "(N,) float32: that the label is correct.")
+      .def_property_readonly(
+          "map_labels", [](const C& c) { return labels_of(c.map); },
+          "(M,) uint8, of the points of PreparedMap.cloud.")
+      .def_property_readonly(
+          "map_probabilities", [](const C& c) { return probabilities_of(c.map); },
+          "(M,) float32: that the label is correct.")
+      .def("__repr__", [](const C& c) {
+        char text[128];
+        std::snprintf(text, sizeof(text), "<gpureg.ChangeResult, %zu points new, %zu gone>",
+                      c.scan.count(ChangeLabel::appeared), c.map.count(ChangeLabel::gone));
+        return std::string(text);
+      });
+  m.def("find_changes", &compare, py::arg("context"), py::arg("scan"), py::arg("map"),
+        py::arg("pose"), py::arg("options"));
 }
 
 }  // namespace
@@ -172,6 +226,7 @@ void bind_localization(py::module_& m) {
         py::arg("options"));
   m.def("locate", &locate_all, py::arg("context"), py::arg("scans"), py::arg("map"),
         py::arg("options"), py::arg("up"), py::arg("near"), py::arg("names"));
+  bind_change(m);
 }
 
 }  // namespace gpureg::python

@@ -24,6 +24,8 @@ from ._calibration import (
 from ._contexts import default_context
 from ._core import (
     BackendUnavailable,
+    ChangeOptions,
+    ChangeResult,
     CompatibilityOptions,
     ConfidenceCalibration,
     Context,
@@ -80,7 +82,7 @@ from ._reconstruction import reconstruct
 from ._trajectory import evaluate_trajectory, read_trajectory
 from .files import read_point_cloud, write_point_cloud
 from .fragments import FragmentSet
-from .localization import load_map, locate, locate_batch, prepare_map
+from .localization import CHANGE_LABELS, change, load_map, locate, locate_batch, prepare_map
 from .loop_closure import LoopCloser
 from .preparation import prepare, prepare_batch
 from .registration import (
@@ -107,6 +109,7 @@ def __getattr__(name: str) -> Any:
 
 
 __all__ = [
+    "CHANGE_LABELS",
     "Audit",
     "AuditedConnection",
     "AuditedPair",
@@ -114,6 +117,8 @@ __all__ = [
     "BatchInterrupted",
     "BatchRun",
     "CalibrationRun",
+    "ChangeOptions",
+    "ChangeResult",
     "CompatibilityOptions",
     "ConfidenceCalibration",
     "Context",
@@ -174,6 +179,7 @@ __all__ = [
     "align_within",
     "audit",
     "calibrate",
+    "change",
     "control_risk",
     "default_context",
     "describe_backends",

@@ -1216,6 +1216,64 @@ def locate(
     names: Sequence[str],
 ) -> list[LocateResult]: ...
 
+class ChangeOptions:
+    # fields of ChangeOptions
+    tolerance: float
+    translation_sigma: float
+    rotation_sigma: float
+    min_extent: float
+    viewpoints: int
+    refine: bool
+    def __init__(
+        self,
+        *,
+        tolerance: float = ...,
+        translation_sigma: float = ...,
+        rotation_sigma: float = ...,
+        min_extent: float = ...,
+        viewpoints: int = ...,
+        refine: bool = ...,
+    ) -> None: ...
+    def replace(
+        self,
+        *,
+        tolerance: float = ...,
+        translation_sigma: float = ...,
+        rotation_sigma: float = ...,
+        min_extent: float = ...,
+        viewpoints: int = ...,
+        refine: bool = ...,
+    ) -> ChangeOptions: ...
+    def validate(self) -> None: ...
+    def __eq__(self, other: object, /) -> bool: ...
+    __hash__: None  # type: ignore[assignment]
+    _fields: tuple[str, ...]
+    # end of fields
+    @staticmethod
+    def from_voxel_size(voxel_size: float) -> ChangeOptions: ...
+
+class ChangeResult:
+    @property
+    def map_from_scan(self) -> _Float64: ...
+    @property
+    def inlier_ratio(self) -> float: ...
+    @property
+    def scan_labels(self) -> npt.NDArray[np.uint8]: ...
+    @property
+    def scan_probabilities(self) -> npt.NDArray[np.float32]: ...
+    @property
+    def map_labels(self) -> npt.NDArray[np.uint8]: ...
+    @property
+    def map_probabilities(self) -> npt.NDArray[np.float32]: ...
+
+def find_changes(
+    context: Context,
+    scan: Any,
+    map: PreparedMap,
+    pose: _Float64,
+    options: ChangeOptions,
+) -> ChangeResult: ...
+
 class LoopClosureOptions:
     # fields of LoopClosureOptions
     registration: RegistrationOptions

@@ -14,6 +14,8 @@ from . import _core
 from ._arrays import CoreCloud, core_cloud, float64, several
 from ._contexts import checked, context_of
 from ._core import (
+    ChangeOptions,
+    ChangeResult,
     Context,
     LocateOptions,
     LocateResult,
@@ -196,4 +198,70 @@ def locate(
     )[0]
 
 
-__all__ = ["load_map", "locate", "locate_batch", "prepare_map"]
+#: Names of the labels of a `ChangeResult`, by number.
+CHANGE_LABELS = ("same", "new", "gone", "occluded", "not_observed")
+
+
+def change(
+    scan: Any,
+    map: PreparedMap,
+    map_from_scan: Any = None,
+    *,
+    options: ChangeOptions | None = None,
+    context: Context | None = None,
+) -> ChangeResult | None:
+    """Tell which points of a scan are new, and which of a map are gone.
+
+    A point is new or gone only where the other cloud saw through it: between a sensor position and
+    the surface behind. In a map without sensor positions, what stands before its surfaces as seen
+    from the scan is new.
+
+    Parameters
+    ----------
+    scan
+        Whatever `prepare` takes as points.
+    map : PreparedMap
+        Of `prepare_map` or `load_map`. Those of scans with poses know from where they were seen.
+    map_from_scan : (4, 4) array, optional
+        Pose of the scan, which is refined. None: the scan is located first.
+    options : ChangeOptions, optional
+        Default: `ChangeOptions.from_voxel_size` of the map.
+    context : Context, optional
+
+    Returns
+    -------
+    ChangeResult or None
+        Labels and probabilities of every point of both; None where the scan was not found.
+
+    Raises
+    ------
+    ValueError
+        For a pose that is no rigid motion, and a scan that looks as if it was in another unit.
+
+    Examples
+    --------
+    >>> import numpy as np, gpureg
+    >>> room = np.random.default_rng(1).random((20000, 3)) * [4, 3, 2]
+    >>> map = gpureg.prepare_map(room, options=gpureg.MapOptions.from_voxel_size(0.1))
+    >>> result = gpureg.change(room, map, np.eye(4))
+    >>> gpureg.CHANGE_LABELS[result.scan_labels[0]]
+    'same'
+    """
+    map = checked(map, PreparedMap, "map")
+    options = checked(options, ChangeOptions, "options") or ChangeOptions.from_voxel_size(
+        map.options.prepare.voxel_size
+    )
+    context = context_of(context)
+    if map_from_scan is None:
+        where = locate(scan, map, context=context)
+        if not where.found:
+            return None
+        map_from_scan = where.map_from_scan
+    pose = float64(map_from_scan, "map_from_scan")
+    if pose.shape != (4, 4):
+        raise ValueError(f"map_from_scan: expected shape (4, 4), got {pose.shape}")
+    cloud = core_cloud(scan, None, None, None, map.options.prepare, "scan")
+    return _core.find_changes(context, cloud, map, pose, options)
+
+
+__all__ = ["CHANGE_LABELS", "change", "load_map", "locate", "locate_batch", "prepare_map"]

@@ -75,6 +75,29 @@ def test_priors(two_rooms: gpureg.PreparedMap) -> None:
         gpureg.locate(scan, two_rooms, near=([1, 2], 1.0))
 
 
+def test_change(two_rooms: gpureg.PreparedMap) -> None:
+    frame = pose()
+    scan = scan_of(1, frame, 1)
+    truth = np.linalg.inv(frame)
+    same = gpureg.change(scan, two_rooms, truth)
+    assert same is not None
+    assert same.scan_labels.shape == (len(scan.points),) and same.map_labels.shape == (
+        len(two_rooms),
+    )
+    names = np.array(gpureg.CHANGE_LABELS)
+    assert (names[same.scan_labels] == "same").mean() > 0.9
+    assert (names[same.scan_labels] == "new").mean() < 0.01
+    assert same.scan_probabilities.min() >= 0 and same.scan_probabilities.max() <= 1
+    assert np.abs(same.map_from_scan - truth).max() < 0.05
+    located = gpureg.change(scan, two_rooms)
+    assert located is not None and np.abs(located.map_from_scan - truth).max() < 0.05
+    assert gpureg.change(scan_of(9, frame), two_rooms) is None
+    with pytest.raises(gpureg.InvalidArgument, match="rigid"):
+        gpureg.change(scan, two_rooms, 2 * truth)
+    with pytest.raises(ValueError, match="map_from_scan: expected shape"):
+        gpureg.change(scan, two_rooms, [1, 2, 3])
+
+
 def test_wrong_arguments(two_rooms: gpureg.PreparedMap) -> None:
     scan = room(1)
     with pytest.raises(gpureg.InvalidArgument, match="millimetres"):

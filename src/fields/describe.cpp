@@ -93,8 +93,8 @@ std::vector<StructText> all_structs() {
                reconstruction::Options, reconstruction::EdgeNoiseOptions,
                reconstruction::RefineOptions, loop_closure::Options, loop_closure::ProposalOptions,
                loop_closure::AcceptanceOptions, localization::MapOptions,
-               localization::LocateOptions, PoseEvidence, RegistrationStatistics, StageTimings,
-               PrepareStatistics, PairConsistency>();
+               localization::LocateOptions, localization::ChangeOptions, PoseEvidence,
+               RegistrationStatistics, StageTimings, PrepareStatistics, PairConsistency>();
 }
 
 }  // namespace gpureg::fields

@@ -2,7 +2,7 @@
 #pragma once
 
 #include "fields/options.hpp"
-#include "gpureg/localization.hpp"
+#include "gpureg/change.hpp"
 
 namespace gpureg::fields {
 
@@ -39,6 +39,27 @@ struct Fields<localization::LocateOptions> {
     v(&O::max_matches, {"max_matches", from(limits::kMinMatches, limits::kMaxMatches), "Matches with a tile."});
     v(&O::candidates, {"candidates", from(1, 64), "Poses of a scan that are verified."});
     v(&O::neighborhood, {"neighborhood", kPositive.in("metres"), kProportional, "Distance up to which the map verifies a pose."});
+  }
+  // clang-format on
+};
+
+template <>
+struct Fields<localization::ChangeOptions> {
+  static constexpr const char* kName = "ChangeOptions";
+  static constexpr const char* kGroup = "";
+  static constexpr const char* kSentence =
+      "How a scan is compared with a map. The lengths are for voxels of 5 cm.";
+
+  // clang-format off: a field is a line.
+  template <typename V>
+  static void visit(V&& v) {
+    using O = localization::ChangeOptions;
+    v(&O::tolerance, {"tolerance", kPositive.in("metres"), kProportional, "Surfaces closer together are the same."});
+    v(&O::translation_sigma, {"translation_sigma", kNotNegative.in("metres"), kProportional, "Uncertainty of the pose."});
+    v(&O::rotation_sigma, {"rotation_sigma", kNotNegative.in("degrees"), "Uncertainty of the pose."});
+    v(&O::min_extent, {"min_extent", kNotNegative.in("metres"), kProportional, "Smaller changes are noise."});
+    v(&O::viewpoints, {"viewpoints", from(1, 4096), "Sensor positions of each cloud whose free space is compared."});
+    v(&O::refine, {"refine", "Refine the pose by ICP first."});
   }
   // clang-format on
 };

@@ -14,7 +14,7 @@ namespace {
 // Layout: kMagic, version, size and checksum of the payload, payload. All numbers little-endian, as
 // every processor that the library runs on.
 constexpr char kMagic[8] = {'g', 'p', 'u', 'r', 'e', 'g', 'M', 'P'};
-constexpr std::uint32_t kVersion = 1;
+constexpr std::uint32_t kVersion = 2;
 constexpr std::size_t kHeader = sizeof kMagic + sizeof kVersion + 2 * sizeof(std::uint64_t);
 /// Of a file that is read: keeps devices and mistaken paths from eating the memory.
 constexpr std::size_t kMostBytes = std::size_t{1} << 36;
@@ -59,6 +59,7 @@ void each_part(const MapState& map, const files::Sink& write) {
   write(bytes_of(map.points.data(), map.points.size()));
   write(bytes_of(map.sides.data(), map.sides.size()));
   write(bytes_of(map.viewpoints.data(), map.viewpoints.size()));
+  write(bytes_of(map.horizons.data(), map.horizons.size()));
 }
 
 /// Takes the payload apart.
@@ -159,6 +160,7 @@ PreparedMap PreparedMap::load(const std::string& path) {
     file.list(map->points, counts[0]);
     file.list(map->sides, counts[1]);
     file.list(map->viewpoints, counts[2]);
+    file.list(map->horizons, counts[2]);
     if (!file.at_end()) file.fail();
   }
   check_values(*map, path);

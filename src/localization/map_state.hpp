@@ -7,6 +7,7 @@
 #include <mutex>
 
 #include "gpureg/localization.hpp"
+#include "localization/horizon.hpp"
 
 namespace gpureg::localization {
 
@@ -20,6 +21,7 @@ struct MapState {
   std::vector<Eigen::Vector3f> points;      ///< by tile
   std::vector<Side> sides;                  ///< empty, or one per point; 0 0 0: not known
   std::vector<Eigen::Vector3f> viewpoints;  ///< sensor positions, thinned
+  std::vector<Horizon> horizons;            ///< one per viewpoint
 
   struct Tile {
     Eigen::AlignedBox3d core;  ///< relative to origin

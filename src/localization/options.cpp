@@ -30,6 +30,15 @@ void LocateOptions::validate() const {
           to_string(registration.method), "compatibility: only it verifies poses by evidence");
 }
 
+ChangeOptions ChangeOptions::from_voxel_size(float voxel_size) {
+  require(positive(voxel_size), "voxel_size", voxel_size, "a finite number > 0");
+  ChangeOptions options;
+  fields::scale(options, voxel_size);
+  return options;
+}
+
+void ChangeOptions::validate() const { fields::validate(*this); }
+
 void LocatePrior::validate(const std::string& name) const {
   RegistrationPrior pair;
   pair.gravity = gravity;

@@ -77,6 +77,35 @@ TEST_F(Locate, TheLargestIslandOfAReconstructionIsTheMap) {
   expect_refused({"locate", scan, map.path()}, {"reconstruction.json", "/nowhere/scans"});
 }
 
+TEST_F(Locate, WhatHasChangedIsLabelled) {
+  const auto change = [&](const std::string& file, const std::vector<std::string>& more) {
+    return run(
+        joined({"change", file, folder.path(), "--voxel-size", "0.1", "--backend", "cpu"}, more));
+  };
+  const std::string json = other / "change.json", ply = other / "scan_changes.ply";
+  const Outcome same =
+      change(scan, {"--json", json, "--scan-ply", ply, "--map-ply", other / "m.ply"});
+  EXPECT_EQ(same.status, 0) << same.out << same.err;
+  expect_holds(same.out, {"status   found", "scan     same", "map      same"});
+  const nlohmann::json document = json_of(json);
+  EXPECT_EQ(document.at("located").at("status"), "found");
+  const nlohmann::json& points = document.at("scan");
+  EXPECT_GT(points.at("same").get<double>(), 0.9 * points.at("points").get<double>());
+  EXPECT_LT(points.at("new").get<double>(), 0.01 * points.at("points").get<double>());
+  EXPECT_EQ(content_of(ply).rfind("ply\nformat binary_little_endian 1.0", 0), 0u);
+
+  std::string numbers;
+  for (const nlohmann::json& number : document.at("map_from_scan")) numbers += number.dump() + " ";
+  other.write("pose.txt", numbers);
+  const Outcome posed = change(scan, {"--pose", other / "pose.txt", "--json", json});
+  EXPECT_EQ(posed.status, 0) << posed.err;
+  EXPECT_FALSE(json_of(json).contains("located"));
+  EXPECT_EQ(change(write_cloud(other, "stranger.ply", sticks()), {}).status, 1);
+  other.write("pose.txt", "1 0 0");
+  expect_refused({"change", scan, folder.path(), "--pose", other / "pose.txt"}, {"pose.txt", "16"});
+  expect_refused({"change", scan, folder.path(), "--json", scan}, {"scan.ply"});
+}
+
 TEST_F(Locate, RefusesWhatCannotBe) {
   expect_refused({"locate", scan}, {"expected scans and then the map"});
   expect_refused({"locate", scan, other.path()}, {other.path(), "poses.txt", "trajectory.txt"});

@@ -99,6 +99,7 @@ TEST(Fields, EveryMemberIsDescribed) {
   expect_complete<loop_closure::Options>();
   expect_complete<localization::MapOptions>();
   expect_complete<localization::LocateOptions>();
+  expect_complete<localization::ChangeOptions>();
 }
 
 }  // namespace

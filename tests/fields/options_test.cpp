@@ -115,6 +115,7 @@ TEST(OptionFields, BoundsAreThoseOfTheRanges) {
   expect_bounds<loop_closure::Options>();
   expect_bounds<localization::MapOptions>();
   expect_bounds<localization::LocateOptions>();
+  expect_bounds<localization::ChangeOptions>();
 }
 
 TEST(OptionFields, MessagesOfMaps) {

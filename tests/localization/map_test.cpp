@@ -54,8 +54,8 @@ TEST_F(SavedMap, OtherFilesAreNamed) {
     refused(good.substr(0, size), "truncated");
   refused(good + "x", "longer");
   std::string later = good;
-  later[8] = 2;
-  refused(later, "version 2");
+  later[8] = 3;
+  refused(later, "version 3");
   for (std::size_t at = 28; at < good.size(); at += good.size() / 20) {
     std::string flipped = good;
     flipped[at] = static_cast<char>(flipped[at] ^ 0x10);

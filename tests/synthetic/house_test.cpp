@@ -73,5 +73,22 @@ TEST(House, IsFurnishedAndVaried) {
   EXPECT_GT(largest, smallest + 10000u);
 }
 
+TEST(House, AnotherTimeHasTheSameWallsAndOtherFurniture) {
+  const synthetic::House built = synthetic::build_house(5), later = synthetic::build_house(5, 1),
+                         again = synthetic::build_house(5, 1), other = synthetic::build_house(5, 2);
+  EXPECT_EQ(later.mesh.vertices, again.mesh.vertices);
+  EXPECT_NE(later.mesh.vertices, built.mesh.vertices);
+  EXPECT_NE(later.mesh.vertices, other.mesh.vertices);
+  ASSERT_EQ(later.rooms.size(), built.rooms.size());
+  for (std::size_t k = 0; k < built.rooms.size(); ++k)
+    EXPECT_EQ(later.rooms[k].floor.low, built.rooms[k].floor.low);
+  std::size_t kept = 0;
+  for (const synthetic::Obstacle& a : built.obstacles)
+    for (const synthetic::Obstacle& b : later.obstacles)
+      kept += a.rect.low == b.rect.low && a.rect.high == b.rect.high;
+  EXPECT_GT(kept, built.obstacles.size() / 2);
+  EXPECT_LT(kept, built.obstacles.size());
+}
+
 }  // namespace
 }  // namespace gpureg::test

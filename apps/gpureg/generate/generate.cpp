@@ -97,6 +97,12 @@ void add_generate(CommandLine& line) {
   verb.option("--clutter", o->scene.clutter,
               "Pieces of furniture per square metre to put into the mesh; copied rooms then differ")
       .show_default();
+  verb.option(
+          "--rearrange", o->scene.rearrangement,
+          "Another number than 0: the house at another time, with furniture moved, taken away and "
+          "added, another path and noise")
+      .natural()
+      .show_default();
   verb.option("--no-return", o->scene.no_return,
               "Metres that the path goes before it comes back to a place")
       .show_default();

@@ -1,9 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include <array>
 #include <chrono>
 #include <iostream>
 #include <memory>
-#include <sstream>
 
 #include "command.hpp"
 #include "gpureg/error.hpp"
@@ -13,9 +11,9 @@
 #include "json/fields_json.hpp"
 #include "json/json.hpp"
 #include "json/json_file.hpp"
-#include "options/knowledge_options.hpp"
 #include "options/method_options.hpp"
 #include "options/output_path.hpp"
+#include "options/place_options.hpp"
 #include "records/locate_json.hpp"
 #include "records/result_json.hpp"
 #include "run/viewpoint_note.hpp"
@@ -35,29 +33,12 @@ using localization::PreparedMap;
 struct Options {
   std::vector<std::string> files;  // scans, then the map
   MethodOptions method;
-  ViewpointChoice viewpoint;
-  std::string up, near, json, save_map;
+  PlaceOptions place;
+  std::string json, save_map;
 
   std::vector<std::string> scans() const { return {files.begin(), files.end() - 1}; }
   const std::string& map() const { return files.back(); }
 };
-
-/// "x,y,z,radius". Throws InvalidArgument.
-std::optional<localization::PositionPrior> near_prior(const std::string& text) {
-  if (text.empty()) return std::nullopt;
-  std::array<double, 4> numbers{};
-  std::stringstream stream(text);
-  std::string field;
-  std::size_t count = 0;
-  bool good = true;
-  while (std::getline(stream, field, ',')) {
-    good = good && count < numbers.size() && read_number(field, numbers[count]);
-    ++count;
-  }
-  if (!good || count != numbers.size())
-    throw InvalidArgument("--near is '" + text + "', expected x,y,z,radius");
-  return localization::PositionPrior{{numbers[0], numbers[1], numbers[2]}, numbers[3]};
-}
 
 void print(const std::string& file, const LocateResult& result) {
   std::cout << "scan     " << file << ": " << grouped(result.scan_points) << " points, "
@@ -80,23 +61,6 @@ void print(const std::string& file, const LocateResult& result) {
   }
 }
 
-/// Voxel size of a saved map, or what the options say.
-void choose_voxel_size(Options& o, const MapInput& input) {
-  if (!input.saved) {
-    if (o.method.automatic_voxel_size && input.kind == MapInput::Kind::cloud)
-      o.method.choose_voxel_size({read_cloud(input.path, 0, MeshNote::none).view()}, input.path);
-    else if (o.method.automatic_voxel_size)
-      throw InvalidArgument("--voxel-size auto is for a map that is one cloud; give the size");
-    return;
-  }
-  const float of_map = input.saved->options().prepare.voxel_size;
-  if (o.method.given("--voxel-size") &&
-      (o.method.automatic_voxel_size || o.method.voxel_size != of_map))
-    throw InvalidArgument("--voxel-size is not that of " + input.path + ", which was made with " +
-                          significant(static_cast<double>(of_map), 6));
-  o.method.voxel_size = of_map;
-}
-
 std::vector<LocateResult> locate_all(const Options& o, const Context& context,
                                      const PreparedMap& map, const LocateOptions& options) {
   std::vector<PointCloud> clouds;
@@ -104,17 +68,14 @@ std::vector<LocateResult> locate_all(const Options& o, const Context& context,
   for (const std::string& file : o.scans()) {
     clouds.push_back(
         read_cloud(file, mesh_spacing(options.registration.prepare.voxel_size), MeshNote::print));
-    o.viewpoint.apply(clouds.back());
+    o.place.viewpoint.apply(clouds.back());
     if (options.registration.prepare.depth_maps > 0) note.see(clouds.back(), file);
   }
   note.print();
   std::vector<PointCloudView> views;
-  for (const PointCloud& cloud : clouds) views.push_back(o.viewpoint.view(cloud));
-  LocatePrior prior;
-  prior.gravity = up_prior(o.up);
-  prior.position = near_prior(o.near);
+  for (const PointCloud& cloud : clouds) views.push_back(o.place.viewpoint.view(cloud));
   return localization::locate(context, views, map, options,
-                              std::vector<LocatePrior>(views.size(), prior), o.scans());
+                              std::vector<LocatePrior>(views.size(), o.place.prior()), o.scans());
 }
 
 void write_json(const Options& o, const Context& context, const PreparedMap& map,
@@ -137,15 +98,13 @@ int run(Options o) {
   if (o.files.size() < 2 && o.save_map.empty())
     throw InvalidArgument("one file is given, expected scans and then the map");
   o.method.registration();  // what is wrong with it shall be said before clouds are read
-  o.viewpoint.check("--viewpoint");
-  up_prior(o.up);
-  near_prior(o.near);
+  o.place.check();
   std::vector<NamedPath> inputs{{"MAP", o.map()}};
   for (const std::string& file : o.scans()) inputs.push_back({"SCAN", file});
   check_outputs({{"--json", o.json}, {"--save-map", o.save_map}}, inputs);
   const Context context = o.method.context();
   const MapInput input(o.map());
-  choose_voxel_size(o, input);
+  choose_voxel_size(o.method, input);
   LocateOptions options = LocateOptions::from_voxel_size(o.method.voxel_size, o.method.quality);
   options.registration = o.method.registration();
   options.validate();
@@ -182,14 +141,7 @@ void add_locate(CommandLine& line) {
       .required();
   o->method.add_to(verb);
   o->method.add_calibration_to(verb);
-  verb.option("--viewpoint", o->viewpoint.text,
-              "Where the scans were seen from: x,y,z in their frames; none: not known; auto: the "
-              "file, or the origin if the surfaces agree with it")
-      .show_default();
-  verb.option("--up", o->up,
-              "Vertical direction x,y,z in scans and map, and perhaps how many degrees it may be "
-              "off (without: 10): 0,0,1,5");
-  verb.option("--near", o->near, "Rough position of the scans: x,y,z,radius in the map");
+  o->place.add_to(verb);
   verb.option("--save-map", o->save_map, "Write the prepared map; SCAN may be left out");
   verb.option("--json", o->json, "Write options, poses, evidence and times");
   verb.notes("Exit status 0: every scan was found, 1: one was not. ");

@@ -1,0 +1,95 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "localization/surface.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace gpureg::localization {
+namespace {
+
+/// For the sides of surfaces: points of half a voxel, no features.
+PrepareOptions side_options(PrepareOptions options) {
+  options.voxel_size /= 2;
+  options.depth_maps = 1;
+  options.surface_side_distance = 0;
+  options.wide_feature_radius = 0;
+  return options;
+}
+
+}  // namespace
+
+PointCloud seen_surface(const Context& context, const PointCloudView& scan,
+                        const PrepareOptions& options) {
+  PointCloudView plain = scan;
+  if (scan.size == 0) return {};
+  const std::vector<float> no_features(scan.size, 0);  // one constant per point takes their place
+  plain.features = no_features.data();
+  plain.feature_dimension = plain.feature_stride = 1;
+  const PreparedCloud prepared = prepare(context, plain, side_options(options));
+  PointCloud out;
+  out.points = prepared.points();
+  out.origin = prepared.origin();
+  const ViewpointSource source = prepared.statistics().viewpoint;
+  if (source != ViewpointSource::none) out.normals = prepared.normals();
+  if (source == ViewpointSource::said || source == ViewpointSource::origin)
+    out.viewpoints = prepared.viewpoints();
+  return out;
+}
+
+void check_rigid(const UnalignedIsometry3d& pose) {
+  const Eigen::Matrix3d r = pose.linear();
+  // A float pose has errors of 1e-6; more than 1e-3 is a scale, a shear or a mirror image.
+  constexpr double kTolerance = 1e-3;
+  if (!pose.matrix().allFinite() ||
+      (r * r.transpose() - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff() > kTolerance ||
+      r.determinant() < 0)
+    throw InvalidArgument("map_from_scan is no rigid motion");
+}
+
+SurfaceDistance::SurfaceDistance(const Surface& surface, float reach)
+    : surface_(surface), reach_(reach) {
+  std::vector<std::pair<std::uint64_t, std::uint32_t>> keys;
+  for (std::uint32_t k = 0; k < surface.points.size(); ++k)
+    keys.emplace_back(key_of(cell_of(surface.points[k])), k);
+  std::sort(keys.begin(), keys.end());
+  for (std::uint32_t k = 0; k < keys.size(); ++k) {
+    const auto found = cells_.try_emplace(keys[k].first, k, k).first;
+    found->second.second = k + 1;
+    order_.push_back(keys[k].second);
+  }
+}
+
+SurfaceDistance::Cell SurfaceDistance::cell_of(const Eigen::Vector3f& p) const {
+  return (p / reach_).array().floor().cast<std::int64_t>();
+}
+
+/// Cells of one key are 2^21 cells apart: their points are too far away to count.
+std::uint64_t SurfaceDistance::key_of(const Cell& cell) {
+  constexpr std::uint64_t kMask = (std::uint64_t{1} << 21) - 1;
+  const auto part = [&](int axis) { return static_cast<std::uint64_t>(cell[axis]) & kMask; };
+  return part(0) << 42 | part(1) << 21 | part(2);
+}
+
+float SurfaceDistance::at(const Eigen::Vector3f& p) const {
+  const Cell centre = cell_of(p);
+  // Beside a disc as far as its neighbour, its plane still tells where the surface is.
+  const float beside = 1.5f * surface_.spacing, squared_beside = beside * beside;
+  float least = reach_;
+  for (int z = -1; z <= 1; ++z)
+    for (int y = -1; y <= 1; ++y)
+      for (int x = -1; x <= 1; ++x) {
+        const auto cell = cells_.find(key_of(centre + Cell(x, y, z)));
+        if (cell == cells_.end()) continue;
+        for (std::uint32_t k = cell->second.first; k < cell->second.second; ++k) {
+          const std::uint32_t i = order_[k];
+          const Eigen::Vector3f d = p - surface_.points[i];
+          const float squared = d.squaredNorm(), along = surface_.normals[i].dot(d);
+          const bool known = surface_.normals[i].squaredNorm() > 0;
+          if (known && squared - along * along > squared_beside) continue;
+          least = std::min(least, known ? std::abs(along) : std::sqrt(squared));
+        }
+      }
+  return least;
+}
+
+}  // namespace gpureg::localization
