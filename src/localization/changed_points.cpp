@@ -144,7 +144,7 @@ PointChanges changed_points(const Question& question, const Surface& other, doub
     otherwise[k] = sight.surface > 0   ? ChangeLabel::same
                    : sight.blocked > 0 ? ChangeLabel::occluded
                                        : ChangeLabel::not_observed;
-    const bool seen_through = sight.free > sight.surface && sight.known() >= enough;
+    const bool seen_through = 2 * sight.free > sight.surface && sight.known() >= enough;
     const float through = seen_through ? beyond(sight.gap, tolerance) : 0.0f;
     const bool changed = through > 0;
     out.labels.push_back(changed ? question.changed : otherwise[k]);
