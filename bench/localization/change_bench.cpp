@@ -26,7 +26,7 @@ using localization::PreparedMap;
 
 constexpr float kVoxel = 0.05f;
 constexpr float kRecorded = 0.05f;  // a point that near to a seen surface is one of it
-constexpr int kCameraStep = 3;  // of so many cameras one is asked whether it saw through
+constexpr int kCameraStep = 3;      // of so many cameras one is asked whether it saw through
 
 struct Visit {
   std::vector<PointCloud> clouds;
@@ -87,10 +87,11 @@ struct Score {
     const auto ratio = [](std::size_t a, std::size_t b) {
       return b == 0 ? 1.0 : static_cast<double>(a) / static_cast<double>(b);
     };
-    std::printf("{\"label\": \"%s\", \"points\": %zu, \"changed\": %zu, \"precision\": %.4f, "
-                "\"recall\": %.4f, \"false_share\": %.4f, \"calibration\": [",
-                name, points, changed, ratio(right, right + wrong), ratio(changed - missed, changed),
-                ratio(wrong, points));
+    std::printf(
+        "{\"label\": \"%s\", \"points\": %zu, \"changed\": %zu, \"precision\": %.4f, "
+        "\"recall\": %.4f, \"false_share\": %.4f, \"calibration\": [",
+        name, points, changed, ratio(right, right + wrong), ratio(changed - missed, changed),
+        ratio(wrong, points));
     for (std::size_t k = 5; k < said.size(); ++k)
       std::printf("%s[%zu, %.3f]", k == 5 ? "" : ", ", said[k], ratio(held[k], said[k]));
     std::printf("]");
@@ -150,15 +151,17 @@ int run(std::uint64_t seed, std::uint64_t rearrangement, const std::string& map_
       const Eigen::Vector3f& p = placed[k];
       const auto surface = before.surface_at(p);
       const ChangeLabel label = result.scan.labels[k];
-      appeared.add(label, result.scan.probabilities[k], label == ChangeLabel::appeared, surface,
-                   surface == TrueHouse::Surface::none && before.seen_through(p, map_cameras, map_grid));
+      appeared.add(
+          label, result.scan.probabilities[k], label == ChangeLabel::appeared, surface,
+          surface == TrueHouse::Surface::none && before.seen_through(p, map_cameras, map_grid));
     }
     for (std::size_t k = 0; k < in_world.size(); ++k) {
       const Eigen::Vector3f& p = in_world[k];
       const auto surface = after.surface_at(p);
       const ChangeLabel label = result.map.labels[k];
       gone.add(label, result.map.probabilities[k], label == ChangeLabel::gone, surface,
-               surface == TrueHouse::Surface::none && after.seen_through(p, of_scans.cameras[s], scan_grid));
+               surface == TrueHouse::Surface::none &&
+                   after.seen_through(p, of_scans.cameras[s], scan_grid));
     }
   }
   appeared.print("new");

@@ -94,8 +94,7 @@ void cut_map(const MapState& map, const ChangeOptions& options, Scene& scene) {
   for (const auto* rows : {&scene.scan.points, &scene.scan.viewpoints})
     for (const Eigen::Vector3f& p : *rows) box.extend(p.cast<double>());
   const double voxel = static_cast<double>(map.options.prepare.voxel_size);
-  const double margin =
-      std::max(box.sizes().maxCoeff() / 2, kNeighborhoodVoxels * voxel);
+  const double margin = std::max(box.sizes().maxCoeff() / 2, kNeighborhoodVoxels * voxel);
   box.min().array() -= margin;
   box.max().array() += margin;
   const Eigen::Vector3d shift = map.origin - scene.middle;
@@ -145,10 +144,10 @@ std::vector<float> tolerances(const std::vector<Eigen::Vector3f>& points,
                               const Eigen::Vector3f& pivot, const ChangeOptions& options) {
   std::vector<float> out;
   for (const Eigen::Vector3f& p : points) {
-    const double arm = static_cast<double>((p - pivot).norm()) * options.rotation_sigma *
-                       kRadiansPerDegree;
-    const double sigma = std::sqrt(options.translation_sigma * options.translation_sigma +
-                                   arm * arm);
+    const double arm =
+        static_cast<double>((p - pivot).norm()) * options.rotation_sigma * kRadiansPerDegree;
+    const double sigma =
+        std::sqrt(options.translation_sigma * options.translation_sigma + arm * arm);
     out.push_back(static_cast<float>(options.tolerance + 2 * sigma));
   }
   return out;

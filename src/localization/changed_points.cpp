@@ -128,9 +128,9 @@ PointChanges changed_points(const Question& question, const Surface& other, doub
   // them seems to have seen through, most of them have to know of.
   constexpr double kShare = 0.75;
   const std::size_t enough =
-      other.horizons.empty()
-          ? static_cast<std::size_t>(std::ceil(kShare * static_cast<double>(other.viewpoints.size())))
-          : 0;
+      other.horizons.empty() ? static_cast<std::size_t>(
+                                   std::ceil(kShare * static_cast<double>(other.viewpoints.size())))
+                             : 0;
   PointChanges out;
   std::vector<ChangeLabel> otherwise(size, ChangeLabel::same);
   for (std::size_t k = 0; k < size; ++k) {
@@ -148,8 +148,9 @@ PointChanges changed_points(const Question& question, const Surface& other, doub
     const float through = seen_through ? beyond(sight.gap, tolerance) : 0.0f;
     const bool changed = through > 0;
     out.labels.push_back(changed ? question.changed : otherwise[k]);
-    out.probabilities.push_back(changed ? off * through
-                                : otherwise[k] == ChangeLabel::same ? 0.5f : off);
+    out.probabilities.push_back(changed                             ? off * through
+                                : otherwise[k] == ChangeLabel::same ? 0.5f
+                                                                    : off);
   }
   drop_small(question, otherwise, min_extent, out);
   return out;

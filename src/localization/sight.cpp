@@ -45,8 +45,8 @@ void DepthPyramid::splat(Level& level, std::uint32_t disc, float range) {
   const int left = cube_row(ray.u - half, level.edge), right = cube_row(ray.u + half, level.edge),
             low = cube_row(ray.v - half, level.edge), high = cube_row(ray.v + half, level.edge);
   for (int v = low; v <= high; ++v) {
-    const std::size_t row = static_cast<std::size_t>(ray.face * level.edge + v) *
-                            static_cast<std::size_t>(level.edge);
+    const std::size_t row =
+        static_cast<std::size_t>(ray.face * level.edge + v) * static_cast<std::size_t>(level.edge);
     for (int u = left; u <= right; ++u) {
       const std::size_t cell = row + static_cast<std::size_t>(u);
       if (range >= level.range[cell]) continue;

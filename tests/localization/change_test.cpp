@@ -85,8 +85,7 @@ PreparedMap map_of(const Room& room) {
 }
 
 bool on_box(const Eigen::Vector3f& p, const Eigen::Vector3f& corner, float margin) {
-  const Eigen::Array3f low = corner.array() - 0.03f,
-                       high = corner.array() + Room::kSide + 0.03f;
+  const Eigen::Array3f low = corner.array() - 0.03f, high = corner.array() + Room::kSide + 0.03f;
   return (p.array() > low).all() && (p.array() < high).all() && p.z() > margin;
 }
 
@@ -204,9 +203,7 @@ TEST(Change, RefusesWhatCannotBe) {
   ChangeOptions options;
   options.tolerance = 0;
   expect_error<InvalidArgument>(
-      [&] {
-        find_changes(context(), scan.view(), map, UnalignedIsometry3d::Identity(), options);
-      },
+      [&] { find_changes(context(), scan.view(), map, UnalignedIsometry3d::Identity(), options); },
       {"tolerance"});
   const ChangeResult empty =
       find_changes(context(), PointCloudView(), map, UnalignedIsometry3d::Identity());

@@ -51,7 +51,8 @@ UnalignedIsometry3d read_pose(const std::string& path) {
 
 Json counts(const PointChanges& changes) {
   Json json{{"points", changes.labels.size()}};
-  for (const ChangeLabel label : kLabels) json[localization::to_string(label)] = changes.count(label);
+  for (const ChangeLabel label : kLabels)
+    json[localization::to_string(label)] = changes.count(label);
   return json;
 }
 
