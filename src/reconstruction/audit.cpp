@@ -15,6 +15,7 @@
 #include "reconstruction/companions.hpp"
 #include "reconstruction/near_pairs.hpp"
 #include "reconstruction/pair_verdicts.hpp"
+#include "reconstruction/path.hpp"
 
 namespace gpureg::reconstruction {
 namespace {
@@ -130,16 +131,51 @@ void rule_out(const Edge& edge, std::vector<RegistrationResult>& results) {
   if (none) result.has_candidate = false;
 }
 
+/// Mean of the viewpoints of each scan.
+std::vector<Eigen::Vector3d> sensors_of(const std::vector<PreparedCloud>& clouds) {
+  std::vector<Eigen::Vector3d> out(clouds.size(), Eigen::Vector3d::Zero());
+  for (std::size_t k = 0; k < clouds.size(); ++k) {
+    if (!clouds[k].valid()) continue;
+    const std::vector<Eigen::Vector3f> viewpoints = clouds[k].viewpoints();
+    for (const Eigen::Vector3f& viewpoint : viewpoints) out[k] += viewpoint.cast<double>();
+    out[k] = out[k] / static_cast<double>(viewpoints.size()) + clouds[k].origin();
+  }
+  return out;
+}
+
+/// Takes the pairs out that are not trusted where places look alike.
+/// @return them as rejected edges.
+std::vector<Edge> keep_to_the_path(const std::vector<Eigen::Vector3d>& sensors,
+                                   const std::vector<Pair>& pairs, const Options& options,
+                                   std::vector<RegistrationResult>& results) {
+  const std::vector<char> trusted = pairs_along_the_path(sensors, pairs, results, options);
+  std::vector<Edge> out;
+  for (std::size_t k = 0; k < pairs.size(); ++k) {
+    if (trusted[k] || !results[k].has_candidate || results[k].modes.empty()) continue;
+    results[k].has_candidate = false;
+    const RegistrationMode& mode = results[k].modes.front();
+    if (mode.confidence < options.min_edge_confidence) continue;
+    Edge edge;
+    edge.source = pairs[k].source;
+    edge.target = pairs[k].target;
+    edge.pair = k;
+    edge.target_from_source = mode.target_from_source;
+    edge.confidence = edge.pair_confidence = mode.confidence;
+    edge.reason = EdgeReason::unconfirmed;
+    out.push_back(edge);
+  }
+  return out;
+}
+
 /// Edges of `ruled_out` that the map lacks, as rejected ones.
 void add_ruled_out(const std::vector<Edge>& ruled_out, Reconstruction& map) {
   std::set<std::size_t> known;
   for (const Edge& edge : map.edges) known.insert(edge.pair);
   for (const Edge& edge : ruled_out) {
-    if (!known.insert(edge.pair).second) continue;
-    map.edges.push_back(edge);
-    map.edges.back().accepted = false;
-    map.edges.back().weight = 0;
-    map.edges.back().reason = EdgeReason::inconsistent;
+    for (const std::uint32_t scan : {edge.source, edge.target})
+      if (map.scans[scan].reason == ScanReason::no_confident_pair)
+        map.scans[scan].reason = ScanReason::unconfirmed;
+    if (known.insert(edge.pair).second) map.edges.push_back(edge);
   }
   std::stable_sort(map.edges.begin(), map.edges.end(),
                    [](const Edge& a, const Edge& b) { return a.pair < b.pair; });
@@ -212,11 +248,16 @@ AuditedReconstruction reconstruct_audited(
     const std::vector<Pair>& pairs, const std::vector<RegistrationResult>& results,
     const Options& options, const std::vector<Odometry>& odometry,
     const RegistrationOptions& registration, const AuditOptions& audit_options) {
-  std::vector<RegistrationResult> left = results;
-  hear_companions(context, clouds, pairs, registration, audit_options, left);
-  std::vector<Edge> ruled_out;
   audit_options.validate();
   AuditedReconstruction out;
+  std::vector<RegistrationResult> left = results;
+  std::vector<Edge> ruled_out;
+  const std::vector<Eigen::Vector3d> sensors = sensors_of(clouds);
+  out.places_look_alike =
+      odometry.empty() &&
+      places_look_alike(reconstruct(clouds.size(), pairs, results, options), sensors);
+  if (out.places_look_alike) ruled_out = keep_to_the_path(sensors, pairs, options, left);
+  hear_companions(context, clouds, pairs, registration, audit_options, left);
   for (int round = 0;; ++round) {
     out.map = reconstruct(clouds.size(), pairs, left, options, odometry);
     out.audit = audit_of(context, clouds, out.map, registration, audit_options, out.audit);
@@ -232,6 +273,9 @@ AuditedReconstruction reconstruct_audited(
         if (!edge.accepted || !divides(connection, edge.source, edge.target)) continue;
         rule_out(edge, left);
         ruled_out.push_back(edge);
+        ruled_out.back().accepted = false;
+        ruled_out.back().weight = 0;
+        ruled_out.back().reason = EdgeReason::inconsistent;
         changed = true;
       }
     }

@@ -75,6 +75,7 @@ Json map_document(const MapRun& run, const Context& context) {
                                      {"rejected", link.rejected}});
   }
   json["audit"] = run.audit ? audit_json(*run.audit, run.scene.numbers) : Json(nullptr);
+  json["places_look_alike"] = run.places_look_alike;
   json["edges"] = Json::array();
   for (const reconstruction::Edge& edge : run.map.edges)
     json["edges"].push_back({{"i", run.scene.numbers[edge.target]},
@@ -110,6 +111,8 @@ std::string map_summary(const MapRun& run, const Context& context) {
                            return pair.verdict == reconstruction::PairVerdict::contradicts;
                          })
         << " contradict their poses\n";
+  if (run.places_look_alike)
+    out << "note       places look alike: only pairs along the path of the sensor were trusted\n";
   for (std::size_t k = 0; k < run.map.scans.size(); ++k)
     if (run.map.scans[k].reason != reconstruction::ScanReason::none)
       out << (run.map.scans[k].placed ? "note       " : "left out   ") << run.scene.numbers[k]

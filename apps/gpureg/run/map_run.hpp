@@ -23,6 +23,7 @@ struct MapRun {
   PairStore pairs;
   reconstruction::Reconstruction map;
   std::optional<reconstruction::Audit> audit;  ///< none: --no-audit
+  bool places_look_alike = false;              ///< AuditedReconstruction
   std::optional<reconstruction::RefineReport> refined;
   bool aligned_here = false;  ///< the pairs were aligned by this run
   std::size_t pairs_in_this_run = 0;

@@ -188,6 +188,7 @@ class Reconstruct {
           run_.options, reconstruction::AuditOptions::from_voxel_size(voxel_size));
       run_.map = std::move(audited.map);
       run_.audit = std::move(audited.audit);
+      run_.places_look_alike = audited.places_look_alike;
     }
     run_.seconds.graph = since(start);
   }

@@ -103,11 +103,16 @@ Audit audit(const Context& context, const std::vector<PreparedCloud>& clouds,
 struct AuditedReconstruction {
   Reconstruction map;
   Audit audit;
+  /// More confident pairs contradicted the map than their confidences explain. Then only pairs are
+  /// trusted that keep scans of consecutive numbers beside each other.
+  bool places_look_alike = false;
 };
 
 /// reconstruct(), audited: edges across a contradicted connection are taken out, the graph is
-/// solved again, until nothing is contradicted. Their reason is EdgeReason::contradicted.
-/// @param clouds as for audit(). Other parameters as for reconstruct().
+/// solved again, until nothing is contradicted. Their reason is EdgeReason::inconsistent; that of
+/// pairs that are not trusted because places look alike is EdgeReason::unconfirmed.
+/// @param clouds as for audit(); without odometry, in the order of the sensor's path where there is
+///   one. Other parameters as for reconstruct().
 /// @throws InvalidArgument as reconstruct() and audit().
 AuditedReconstruction reconstruct_audited(
     const Context& context, const std::vector<PreparedCloud>& clouds,

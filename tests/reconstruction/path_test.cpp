@@ -1,0 +1,111 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "reconstruction/path.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <numeric>
+
+#include "pair_results.hpp"
+
+namespace gpureg::test {
+namespace {
+
+using namespace reconstruction;
+
+constexpr std::uint32_t kScans = 40, kBay = 14, kSecond = 26;
+
+std::vector<Eigen::Vector3d> sensors() {
+  return std::vector<Eigen::Vector3d>(kScans, Eigen::Vector3d::Zero());
+}
+
+/// A path through two bays that look alike: scans 0 to 13 and 26 to 39, of which those 26 numbers
+/// apart see the same. One step between the bays is registered hardly, and the many aliases agree.
+struct TwinBays : PairResults {
+  explicit TwinBays(const std::vector<std::uint32_t>& number) : PairResults(0) {
+    world_from_scan.resize(kScans);
+    for (std::uint32_t k = 0; k < kScans; ++k) {
+      UnalignedIsometry3d pose = UnalignedIsometry3d::Identity();
+      pose.translation().x() = k;
+      pose.rotate(Eigen::AngleAxisd(0.2 * k, Eigen::Vector3d::UnitZ()));
+      world_from_scan[number[k]] = pose;
+    }
+    const auto alias = [&](std::uint32_t target, std::uint32_t source) {
+      const UnalignedIsometry3d& moved = world_from_scan[number[source - kSecond]];
+      return UnalignedIsometry3d(world_from_scan[number[target]].inverse() * moved);
+    };
+    for (std::uint32_t t = 0; t < kScans; ++t)
+      for (std::uint32_t s = t + 1; s < kScans; ++s) {
+        const bool twins = t < kBay && s >= kSecond && s - kSecond + 2 >= t && s - kSecond <= t + 2;
+        if (s - t <= 2)
+          add_correct(number[s], number[t], s == 20 || t == 20 ? 0.6 : 0.99);
+        else if (twins)
+          add(number[s], number[t], 0.98, alias(t, s));
+        else if (t == 17 && s == 21)
+          add_correct(number[s], number[t], 0.95);
+        else
+          add_too_few_points(number[s], number[t], true);
+      }
+  }
+
+  bool right(std::uint32_t source, std::uint32_t target, const UnalignedIsometry3d& pose) const {
+    return (truth(source, target).translation() - pose.translation()).norm() < 0.35;
+  }
+
+  std::size_t wrong_edges(const Reconstruction& map) const {
+    return static_cast<std::size_t>(
+        std::count_if(map.edges.begin(), map.edges.end(), [&](const Edge& edge) {
+          return edge.accepted && !right(edge.source, edge.target, edge.target_from_source);
+        }));
+  }
+
+  std::vector<char> trusted() const { return pairs_along_the_path(sensors(), pairs, results, {}); }
+};
+
+std::vector<std::uint32_t> in_order() {
+  std::vector<std::uint32_t> number(kScans);
+  std::iota(number.begin(), number.end(), 0u);
+  return number;
+}
+
+TEST(Path, AliasesCollapseAMapAndShow) {
+  const TwinBays set(in_order());
+  const Reconstruction map = reconstruct(kScans, set.pairs, set.results);
+  EXPECT_GT(set.wrong_edges(map), 10u);
+  EXPECT_TRUE(places_look_alike(map, sensors()));
+}
+
+TEST(Path, AMapWithoutContradictionHasNoPlacesThatLookAlike) {
+  TwinBays set(in_order());
+  for (std::size_t k = 0; k < set.pairs.size(); ++k)
+    if (set.pairs[k].source >= set.pairs[k].target + kBay) set.results[k].has_candidate = false;
+  EXPECT_FALSE(places_look_alike(reconstruct(kScans, set.pairs, set.results), sensors()));
+}
+
+TEST(Path, OnlyPairsThatContinueThePathAreTrusted) {
+  TwinBays set(in_order());
+  const std::vector<char> trusted = set.trusted();
+  for (std::size_t k = 0; k < set.pairs.size(); ++k) {
+    const std::uint32_t gap = set.pairs[k].source - set.pairs[k].target;
+    if (!set.results[k].has_candidate) continue;
+    EXPECT_EQ(trusted[k] != 0, gap <= 4) << set.pairs[k].target << " " << set.pairs[k].source;
+    if (!trusted[k]) set.results[k].has_candidate = false;
+  }
+  const Reconstruction map = reconstruct(kScans, set.pairs, set.results);
+  EXPECT_EQ(set.wrong_edges(map), 0u);
+  ASSERT_FALSE(map.islands.empty());
+  EXPECT_GE(map.islands[0].scans.size(), kScans - 1);
+}
+
+// A permutation in which no numbers that follow each other are neighbours.
+TEST(Path, NumbersInAnyOrderSayNothing) {
+  std::vector<std::uint32_t> number(kScans);
+  for (std::uint32_t k = 0; k < kScans; ++k) number[k] = (17 * k + 5) % 40;
+  const TwinBays set(number);
+  const std::vector<char> trusted = set.trusted();
+  EXPECT_EQ(std::count(trusted.begin(), trusted.end(), 1),
+            static_cast<std::ptrdiff_t>(trusted.size()));
+}
+
+}  // namespace
+}  // namespace gpureg::test
