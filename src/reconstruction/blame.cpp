@@ -121,23 +121,18 @@ class Forest {
 };
 
 /// Adds up what pairs of one kind say, the strongest first: every further pair of a scan counts
-/// less. A part of one scan has no other: there the scans beyond count alone.
+/// less, as what is wrong with a scan shows in all of its pairs.
 class Sum {
  public:
-  explicit Sum(bool lone) : lone_(lone) {}
-
   void add(const AuditedPair& pair, double value) {
     std::size_t &a = used_[pair.source], &b = used_[pair.target];
-    const double fewer = static_cast<double>(1 + std::min(a, b)),
-                 more = static_cast<double>(1 + std::max(a, b));
-    sum_ += value / (lone_ ? fewer : std::sqrt(fewer * more));
+    sum_ += value / std::sqrt(static_cast<double>((1 + a) * (1 + b)));
     ++a;
     ++b;
   }
   double value() const { return sum_; }
 
  private:
-  bool lone_;
   std::map<std::uint32_t, std::size_t> used_;
   double sum_ = 0;
 };
@@ -153,7 +148,7 @@ AuditedConnection judge(std::vector<std::size_t> across, const std::vector<Audit
     return std::abs(pairs[a].log_likelihood_ratio) > std::abs(pairs[b].log_likelihood_ratio);
   });
   AuditedConnection out;
-  Sum supports(lone), contradictions(lone);
+  Sum supports, contradictions;
   for (const std::size_t k : across) {
     const AuditedPair& pair = pairs[k];
     if (pair.log_likelihood_ratio < 0) {
@@ -161,8 +156,9 @@ AuditedConnection judge(std::vector<std::size_t> across, const std::vector<Audit
       out.contradictions.push_back(k);
       ++out.contradicting;
     } else {
-      // An edge was chosen because its pair looks right: it is part of what is judged.
-      if (!bonded[k]) supports.add(pair, pair.log_likelihood_ratio);
+      // An edge was chosen because its pair looks right: it is part of what is judged. A single
+      // scan that was registered with its neighbours has no other support.
+      if (lone || !bonded[k]) supports.add(pair, pair.log_likelihood_ratio);
       ++out.supporting;
     }
   }

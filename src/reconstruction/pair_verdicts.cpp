@@ -13,6 +13,9 @@ constexpr double kLeastObserved = 0.04;
 constexpr double kViolation = 0.1, kStrongViolation = 0.3;
 /// Points in free space, at least so many.
 constexpr double kLeastPoints = 40;
+/// Of all points: one bent corner of a scan contradicts many others with less. In ten right maps
+/// six of 6,809 pairs had more, at aliases a fifth.
+constexpr double kCorner = 0.03, kOfCorner = 0.5;
 /// Confidence of a pose whose surfaces coincide, and of one whose surfaces do not.
 constexpr double kSupports = 0.9, kDoubts = 0.3;
 /// Share of one scan that lies at the other's surfaces, whatever the normals, from which surfaces
@@ -91,9 +94,10 @@ void judge(const PoseVerification& given, const PoseVerification* refined, std::
   }
   out.violation = violation.share;
   double& ratio = out.log_likelihood_ratio;
-  if (violates(violation))
+  if (violates(violation)) {
     ratio = violation.share > kStrongViolation ? kOfStrongViolation : kOfViolation;
-  else if (confidence < kDoubts && shared(given.evidence) >= kLeastShared)
+    if (violation.points < kCorner * static_cast<double>(points)) ratio *= kOfCorner;
+  } else if (confidence < kDoubts && shared(given.evidence) >= kLeastShared)
     ratio = kOfDoubt;
   else if (confidence < kDoubts && elsewhere)
     ratio = kOfShift;
