@@ -2,11 +2,13 @@
 #include "gpureg/reconstruction/mend.hpp"
 
 #include <algorithm>
+#include <iterator>
 #include <map>
 #include <set>
 #include <string>
 
 #include "gpureg/error.hpp"
+#include "reconstruction/near_pairs.hpp"
 
 namespace gpureg::reconstruction {
 namespace {
@@ -15,8 +17,8 @@ namespace {
 constexpr std::size_t kPairsOfScan = 24;
 /// Scans at either side of a break that are aligned, by their number in the set.
 constexpr std::uint32_t kBeside = 4;
-/// Within a part poses are right: nothing but drift.
-constexpr double kOfPart = 0.999;
+/// Within a part poses are right, from scan to scan up to so many metres and radians.
+constexpr double kOfPart = 0.999, kShiftOfPart = 0.005, kTurnOfPart = 0.002;
 /// Shift from which a scan has another pose, metres, and the same for the entries of its rotation.
 constexpr double kMoved = 0.02;
 
@@ -45,6 +47,9 @@ Parts parts_of(const std::vector<UnalignedIsometry3d>& poses, const Audit& found
 std::vector<Odometry> held(const std::vector<UnalignedIsometry3d>& poses, const Parts& parts) {
   std::map<std::uint32_t, std::uint32_t> last;
   std::vector<Odometry> out;
+  pose_graph::UnalignedMatrix6d information = pose_graph::UnalignedMatrix6d::Identity();
+  information.diagonal().head<3>() /= kTurnOfPart * kTurnOfPart;
+  information.diagonal().tail<3>() /= kShiftOfPart * kShiftOfPart;
   for (std::uint32_t k = 0; k < parts.size(); ++k) {
     if (parts[k] == kNoPart) continue;
     const auto [at, first] = last.insert({parts[k], k});
@@ -54,6 +59,7 @@ std::vector<Odometry> held(const std::vector<UnalignedIsometry3d>& poses, const 
       edge.target = at->second;
       edge.target_from_source = poses[at->second].inverse() * poses[k];
       edge.confidence = kOfPart;
+      edge.information = information;
       out.push_back(edge);
     }
     at->second = k;
@@ -87,6 +93,20 @@ std::vector<Pair> pairs_across(const Parts& parts, const Audit& found) {
   }
   std::vector<Pair> out;
   for (const auto& [low, high] : chosen) out.push_back({high, low});
+  return out;
+}
+
+/// Pairs of different parts that see each other at the mended poses.
+std::vector<Pair> pairs_between(const std::vector<PreparedCloud>& clouds, const Parts& parts,
+                                const std::vector<UnalignedIsometry3d>& poses,
+                                const std::vector<Pair>& known, std::uint32_t most) {
+  std::set<std::pair<std::uint32_t, std::uint32_t>> seen;
+  for (const Pair& pair : known) seen.insert(std::minmax(pair.source, pair.target));
+  std::vector<Pair> out;
+  for (const Pair& pair : near_pairs(clouds, poses, {}, most))
+    if (parts[pair.source] != parts[pair.target] &&
+        seen.insert(std::minmax(pair.source, pair.target)).second)
+      out.push_back(pair);
   return out;
 }
 
@@ -139,13 +159,23 @@ MendedMap mend(const Context& context, const std::vector<PreparedCloud>& clouds,
     return out;
   }
   const Parts parts = parts_of(world_from_scan, found);
-  const std::vector<Pair> pairs = pairs_across(parts, found);
+  const auto reconstruction = Options::from_voxel_size(registration.prepare.voxel_size);
+  std::vector<Pair> pairs, more = pairs_across(parts, found);
+  std::vector<RegistrationResult> results;
+  // Few pairs see each other where the parts were; where they belong, more pairs hold them.
+  for (int pass = 0; pass < 2 && !more.empty(); ++pass) {
+    std::vector<RegistrationResult> aligned = align_batch(context, clouds, more, registration);
+    pairs.insert(pairs.end(), more.begin(), more.end());
+    std::move(aligned.begin(), aligned.end(), std::back_inserter(results));
+    const AuditedReconstruction again =
+        reconstruct_audited(context, clouds, pairs, results, reconstruction,
+                            held(world_from_scan, parts), registration, options);
+    out.moved.clear();
+    out.left_out.clear();
+    place(again.map, world_from_scan, out);
+    more = pairs_between(clouds, parts, out.world_from_scan, pairs, kPairsOfScan);
+  }
   out.registered = pairs.size();
-  const std::vector<RegistrationResult> results = align_batch(context, clouds, pairs, registration);
-  const AuditedReconstruction again = reconstruct_audited(
-      context, clouds, pairs, results, Options::from_voxel_size(registration.prepare.voxel_size),
-      held(world_from_scan, parts), registration, options);
-  place(again.map, world_from_scan, out);
   out.audit = audit(context, clouds, out.world_from_scan, registration, options);
   return out;
 }

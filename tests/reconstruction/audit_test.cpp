@@ -8,6 +8,7 @@
 #include <random>
 
 #include "gpureg/error.hpp"
+#include "gpureg/reconstruction/mend.hpp"
 #include "reconstruction/blame.hpp"
 #include "reconstruction/near_pairs.hpp"
 #include "support/registration_result.hpp"
@@ -93,6 +94,22 @@ TEST(Connections, EdgesDoNotConfirmThemselves) {
   const auto connections = judge_connections(std::vector<std::uint32_t>(20, 0), bonds, pairs, {});
   EXPECT_EQ(connections[0].verdict, ConnectionVerdict::contradicted);
   EXPECT_EQ(connections[0].scans.size(), 10u);
+}
+
+// A corner of scan 0 is bent: it contradicts six scans a little, and fits the fourteen that it was
+// registered with.
+TEST(Connections, ABentCornerIsNoWrongPlace) {
+  std::vector<AuditedPair> pairs;
+  std::vector<Bond> bonds;
+  for (std::uint32_t k = 1; k <= 20; ++k) {
+    for (std::uint32_t m = std::max(1u, k - std::min(k - 1, 3u)); m < k; ++m)
+      pairs.push_back(pair_of(k, m, 0.7));
+    pairs.push_back(pair_of(k, 0, k <= 14 ? 0.7 : -1));
+    if (k <= 14) bonds.push_back({k, 0, 0.99});
+  }
+  const auto connections = judge_connections(std::vector<std::uint32_t>(21, 0), bonds, pairs, {});
+  for (const AuditedConnection& connection : connections)
+    EXPECT_NE(connection.verdict, ConnectionVerdict::contradicted);
 }
 
 /// Scans of a room, each without another slice of it, at their places in the room.
@@ -221,6 +238,24 @@ TEST_F(AuditedRoom, EdgesOfAContradictedConnectionAreTakenOut) {
   ASSERT_EQ(out.map.edges.size(), pairs.size());
   for (const Edge& edge : out.map.edges)
     EXPECT_EQ(edge.accepted, (edge.source < 4) == (edge.target < 4));
+}
+
+// Registrations are right to a few millimetres here; parts keep their shape.
+TEST_F(AuditedRoom, ASlipIsMended) {
+  std::vector<UnalignedIsometry3d> poses = world_from_scan;
+  for (std::size_t k = 3; k < 6; ++k) poses[k].translation() += Eigen::Vector3d(0.4, 0.3, 0.1);
+  const AuditOptions audit_options = AuditOptions::from_voxel_size(0.1f);
+  const Audit found = audit(context, clouds, poses, options, audit_options);
+  ASSERT_FALSE(found.sound());
+  const MendedMap mended = mend(context, clouds, poses, found, options, audit_options);
+  EXPECT_TRUE(mended.audit.sound());
+  EXPECT_TRUE(mended.left_out.empty());
+  const UnalignedIsometry3d back = world_from_scan[0] * mended.world_from_scan[0].inverse();
+  for (std::size_t k = 0; k < 6; ++k)
+    EXPECT_LT(
+        (back * mended.world_from_scan[k].translation() - world_from_scan[k].translation()).norm(),
+        0.03)
+        << k;
 }
 
 TEST_F(AuditedRoom, NearPairsAreThoseThatMeet) {
