@@ -21,6 +21,10 @@ constexpr double kLeastWrong = 0.2;
 /// Confidences down to which connections are made, one after the other, before the least one.
 constexpr double kLevels[] = {0.9999, 0.999, 0.99, 0.97, 0.95, 0.92, 0};
 
+/// An edge is also wrong if it puts the whole scan off by so many times its error over the overlap,
+/// or turns it so far (Frobenius norm: six degrees).
+constexpr double kMostOff = 1.5, kMostTurn = 0.148;
+
 }  // namespace
 
 void Connection::add(const Edge& edge, bool lone) {
@@ -104,7 +108,10 @@ std::size_t reject_deviating(Reconstruction& map, double max_error) {
     const double error =
         std::sqrt((measured * edge.overlap_centre - refined * edge.overlap_centre).squaredNorm() +
                   std::max(0.0, (turn * edge.overlap_spread * turn.transpose()).trace()));
-    if (error > max_error) deviating.emplace_back(-error, k);
+    // The overlap of a pair that is small tells little about its turn.
+    const double off = (measured.translation() - refined.translation()).norm();
+    if (error > max_error || off > kMostOff * max_error || turn.norm() > kMostTurn)
+      deviating.emplace_back(-std::max(error, off), k);
   }
   std::sort(deviating.begin(), deviating.end());
   std::size_t rejected = 0;
