@@ -15,6 +15,7 @@ between its ends takes up evenly, two scans exchanged, a scan of the next map in
 | found | the audit contradicts the map; share of those that are seen |
 | pair | the strongest pair that it names lies across the break; share of those that are found |
 | cut | its least confident connection is the break, to within a tenth of the scans; share of those found |
+| mended | `--mend` brings 95 % of the scans to within 5 cm (RMS) of the unharmed map; share of those found |
 | alarms | contradicted connections among 100 of the unharmed maps |
 
 Verdicts in WORK/audit_faults are used again. Needs numpy.
@@ -22,17 +23,20 @@ Verdicts in WORK/audit_faults are used again. Needs numpy.
 
 import hashlib
 import json
+import os
 import pathlib
 import subprocess
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
-from map_rmse import angle, read_poses
+from map_rmse import angle, errors, read_poses, rms
 from record import parser, write
 
 SLIPS = [(m, 0) for m in (0.3, 0.5, 1, 2)] + [(0, d) for d in (2, 5, 10)]  # metres, degrees
 NEAR = 0.3  # metres between surfaces that are near each other
 SHARE = 0.05  # of a cloud's cells that have to be near the other cloud
 WRONG_METRES, WRONG_DEGREES = 0.35, 8
+PLACED, RESTORED = 0.95, 0.05  # share of the scans, metres
 
 
 def read_points(path):
@@ -212,7 +216,7 @@ def folder_with(chosen, other, replaced, where):
 
 
 def audit(arguments, folder, poses, key):
-    """The verdict of `gpureg audit`; WORK keeps it."""
+    """The verdict of `gpureg audit`, and the file of mended poses; WORK keeps both."""
     work = arguments.work / "audit_faults"
     work.mkdir(parents=True, exist_ok=True)
     path = work / f"{key}.txt"
@@ -221,10 +225,27 @@ def audit(arguments, folder, poses, key):
     out = work / f"{key}_{mark}.json"
     if not out.exists():
         command = [arguments.gpureg, "audit", folder, path, "--json", out, "--quiet"]
+        command += ["--mend", out.with_suffix(".txt")]
         done = subprocess.run([*map(str, command), "--backend", arguments.backend])
         if done.returncode not in (0, 1):
             raise SystemExit(f"{key}: the audit failed")
-    return json.loads(out.read_text())
+    return json.loads(out.read_text()), out.with_suffix(".txt")
+
+
+def restored(path, right, replaced):
+    """Whether mended poses (TUM) are those of the unharmed map; a foreign scan has none there."""
+    poses = {}
+    for line in path.read_text().splitlines():
+        words = line.split()
+        if not words or words[0].startswith("#"):
+            continue
+        poses[round(float(words[0]))] = shift([float(word) for word in words[1:4]])
+    foreign_scan = replaced[0] if replaced else None
+    known = [k for k in poses if k in right and k != foreign_scan]
+    if foreign_scan in poses or len(known) < PLACED * (len(right) - bool(replaced)):
+        return False
+    metres, _, _ = errors(poses, right, known)
+    return bool(rms(metres) <= RESTORED)
 
 
 def score(verdict, sides, n):
@@ -242,6 +263,23 @@ def score(verdict, sides, n):
     return True, pair, cut
 
 
+def judged(work):
+    """Kind of a fault, and what is said of it; none: it is not seen."""
+    arguments, chosen, other, number, (kind, poses, sides, replaced) = work
+    if not chosen.seen(poses, sides):
+        return kind, None
+    key = f"{chosen.name}_{arguments.seed}_{number}"
+    folder = chosen.folder
+    if replaced:
+        folder = folder_with(chosen, other, replaced, arguments.work / "audit_scans" / key)
+    verdict, mended = audit(arguments, folder, poses, key)
+    found, *place = score(verdict, sides, len(chosen.order))
+    names = ("found", "pair", "cut", "mended")
+    answers = (found, *place, found and restored(mended, chosen.poses, replaced))
+    print(key, kind, ", ".join(map("{} {}".format, names, answers)), flush=True)
+    return kind, dict(zip(("seen", *names), (True, *answers)))
+
+
 def main():
     options = parser(__doc__, "audit_faults.json")
     options.add_argument("maps", nargs="+", metavar="NAME=SCANS[:POSES[:PAIRS]]")
@@ -251,9 +289,10 @@ def main():
     arguments = options.parse_args()
     maps = [Map(text, arguments.work) for text in arguments.maps]
     table, unharmed, connections, alarms = {}, {}, 0, 0
+    pool = ThreadPoolExecutor(max(1, (os.cpu_count() or 1) // 2))
     for at, chosen in enumerate(maps):
         other = maps[(at + 1) % len(maps)]
-        right = audit(arguments, chosen.folder, chosen.poses, f"{chosen.name}_right")
+        right, _ = audit(arguments, chosen.folder, chosen.poses, f"{chosen.name}_right")
         wrong = sum(c["verdict"] == "contradicted" for c in right["connections"])
         connections += len(right["connections"])
         alarms += wrong
@@ -274,26 +313,17 @@ def main():
         ]
         if other is not chosen:
             cases += foreign(chosen, other, random, arguments.places)
-        for number, (kind, poses, sides, replaced) in enumerate(cases):
-            key = f"{chosen.name}_{arguments.seed}_{number}"
-            folder = chosen.folder
-            if replaced:
-                folder = folder_with(chosen, other, replaced, arguments.work / "audit_scans" / key)
+        work = [(arguments, chosen, other, k, case) for k, case in enumerate(cases)]
+        for kind, answers in pool.map(judged, work):
             row = table.setdefault(
-                kind, dict.fromkeys(("faults", "seen", "found", "pair", "cut"), 0)
+                kind, dict.fromkeys(("faults", "seen", "found", "pair", "cut", "mended"), 0)
             )
             row["faults"] += 1
-            if not chosen.seen(poses, sides):
-                continue
-            found, pair, cut = score(audit(arguments, folder, poses, key), sides, len(chosen.order))
-            row["seen"] += 1
-            row["found"] += found
-            row["pair"] += pair
-            row["cut"] += cut
-            print(f"{key} {kind}: found {found}, pair {pair}, cut {cut}", flush=True)
+            for name, answer in (answers or {}).items():
+                row[name] += answer
     total = {name: sum(row[name] for row in table.values()) for name in next(iter(table.values()))}
     table["all"] = total
-    print("\n| fault | faults | seen | found | pair | cut |\n| --- | --- | --- | --- | --- | --- |")
+    print("\n| fault | faults | seen | found | pair | cut | mended |\n" + 7 * "| --- " + "|")
     for kind, row in table.items():
         print(f"| {kind} | " + " | ".join(str(value) for value in row.values()) + " |")
     per_100 = 100 * alarms / max(1, connections)
