@@ -98,6 +98,32 @@ def test_change(two_rooms: gpureg.PreparedMap) -> None:
         gpureg.change(scan, two_rooms, [1, 2, 3])
 
 
+def test_scans_with_odometry_are_one_scan(two_rooms: gpureg.PreparedMap) -> None:
+    frame = pose()
+    points = scan_of(2, frame, 1).points.astype(float)
+    step = pose(8)  # the second scan, half of the points, has a frame of its own
+    halves = [points[::2], moved(points[1::2], np.linalg.inv(step))]
+    walk = gpureg.prepare_map(halves, np.array([np.eye(4), step]), options=OPTIONS).cloud
+    result = gpureg.locate(walk, two_rooms)
+    assert result.found
+    assert np.abs(result.map_from_scan - PLACES[1] @ np.linalg.inv(frame)).max() < 0.05
+
+
+def test_map_of_a_las_file(two_rooms: gpureg.PreparedMap, tmp_path: pathlib.Path) -> None:
+    laspy = pytest.importorskip("laspy")
+    points = room(2, 24000)[::2] + np.array([500000.0, 5400000.0, 0.0])
+    file = laspy.create(point_format=3, file_version="1.2")
+    file.header.offsets, file.header.scales = points.min(axis=0), [0.001] * 3
+    file.x, file.y, file.z = points.T
+    path = tmp_path / "map.las"
+    file.write(str(path))
+    frame = pose()
+    result = gpureg.locate(scan_of(2, frame, 1), gpureg.prepare_map(path, options=OPTIONS))
+    assert result.found
+    placed = moved(scan_of(2, frame, 1).points.astype(float), result.map_from_scan)
+    assert np.abs(placed - room(2, 24000)[1::2] - [500000, 5400000, 0]).max() < 0.1
+
+
 def test_wrong_arguments(two_rooms: gpureg.PreparedMap) -> None:
     scan = room(1)
     with pytest.raises(gpureg.InvalidArgument, match="millimetres"):

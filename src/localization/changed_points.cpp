@@ -37,10 +37,10 @@ std::vector<float> distances(const Question& question, const Surface& other, uns
 }
 
 /// Where the surfaces of a block lie farther apart than the tolerance foresees, by errors of the
-/// pose, of the map or of the sensor, the tolerance of the block grows, at most to twice of it.
+/// pose, of the map or of the sensor, the tolerance of the block grows, at most by half of it.
 void widen(const Question& question, const std::vector<float>& distance,
            std::vector<float>& tolerances) {
-  constexpr float kBlock = 20, kMedians = 2;
+  constexpr float kBlock = 20, kMedians = 1.5f, kMost = 1.5f;
   std::map<std::array<std::int64_t, 3>, std::vector<std::size_t>> blocks;
   for (std::size_t k = 0; k < distance.size(); ++k) {
     if (distance[k] >= 2 * tolerances[k]) continue;
@@ -55,7 +55,7 @@ void widen(const Question& question, const std::vector<float>& distance,
     const auto middle = near.begin() + static_cast<std::ptrdiff_t>(near.size() / 2);
     std::nth_element(near.begin(), middle, near.end());
     for (const std::size_t k : members)
-      tolerances[k] = std::clamp(kMedians * *middle, tolerances[k], 2 * tolerances[k]);
+      tolerances[k] = std::clamp(kMedians * *middle, tolerances[k], kMost * tolerances[k]);
   }
 }
 

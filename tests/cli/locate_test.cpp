@@ -77,6 +77,29 @@ TEST_F(Locate, TheLargestIslandOfAReconstructionIsTheMap) {
   expect_refused({"locate", scan, map.path()}, {"reconstruction.json", "/nowhere/scans"});
 }
 
+TEST_F(Locate, ScansWithOdometryAreOneScan) {
+  const std::string map = other / "room.gpureg";
+  ASSERT_EQ(locate({folder.path()}, {"--voxel-size", "0.1", "--save-map", map}).status, 0);
+  const TemporaryFolder walk;
+  std::string poses;
+  for (int k = 0; k < 2; ++k) {
+    write_cloud(walk, "cloud_bin_" + std::to_string(k) + ".ply", room_scan(5 + k));
+    const Eigen::Matrix4d pose = (scan_from_room(5) * scan_from_room(5 + k).inverse()).matrix();
+    poses += std::to_string(k) + "\n";
+    for (int n = 0; n < 16; ++n)
+      poses += std::to_string(pose(n / 4, n % 4)) + (n % 4 < 3 ? " " : "\n");
+  }
+  walk.write("poses.txt", poses);
+  const std::string json = other / "walk.json";
+  const Outcome found = locate({walk.path(), map}, {"--json", json});
+  EXPECT_EQ(found.status, 0) << found.out << found.err;
+  const nlohmann::json& pose = json_of(json).at("scans").at(0).at("poses").at(0);
+  const Eigen::Isometry3d truth = scan_from_room(5).inverse();
+  for (int k = 0; k < 16; ++k)  // 10 cm voxels: a pose is good to a few centimetres
+    EXPECT_NEAR(pose.at("map_from_scan").at(static_cast<std::size_t>(k)).get<double>(),
+                truth.matrix()(k / 4, k % 4), 0.08);
+}
+
 TEST_F(Locate, WhatHasChangedIsLabelled) {
   const auto change = [&](const std::string& file, const std::vector<std::string>& more) {
     return run(

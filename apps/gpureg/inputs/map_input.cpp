@@ -113,4 +113,11 @@ PreparedMap MapInput::prepare(const Context& context,
   }
 }
 
+PointCloud read_scan(const std::string& path, const Context& context,
+                     const localization::MapOptions& options) {
+  if (!fs::is_directory(path))
+    return read_cloud(path, mesh_spacing(options.prepare.voxel_size), MeshNote::print);
+  return MapInput(path).prepare(context, options).cloud();
+}
+
 }  // namespace gpureg::cli

@@ -25,4 +25,10 @@ struct MapInput {
                                     const localization::MapOptions& options) const;
 };
 
+/// A scan as the command line names it: a cloud or mesh, or a folder of scans with their poses by
+/// odometry, which become one.
+/// @throws IoError, InvalidArgument naming the file.
+PointCloud read_scan(const std::string& path, const Context& context,
+                     const localization::MapOptions& options);
+
 }  // namespace gpureg::cli

@@ -7,7 +7,7 @@
 
 #include "command.hpp"
 #include "gpureg/error.hpp"
-#include "inputs/cloud_file.hpp"
+#include "inputs/map_input.hpp"
 #include "json/json.hpp"
 #include "json/json_file.hpp"
 #include "options/output_path.hpp"
@@ -101,7 +101,7 @@ int run(Options o) {
   if (o.tolerance != 0) change.tolerance = o.tolerance;
   change.validate();
   const PreparedMap map = input.prepare(context, of_map);
-  PointCloud scan = read_cloud(o.scan, mesh_spacing(o.method.voxel_size), MeshNote::print);
+  PointCloud scan = read_scan(o.scan, context, map.options());
   o.place.viewpoint.apply(scan);
   const PointCloudView view = o.place.viewpoint.view(scan);
   Json record;
@@ -129,7 +129,7 @@ int run(Options o) {
 void add_change(CommandLine& line) {
   const auto o = std::make_shared<Options>();
   Verb verb = line.verb("change", "Tell what has changed between a map and a scan");
-  verb.option("SCAN", o->scan, "Scan").required();
+  verb.option("SCAN", o->scan, "A cloud, or a folder of scans with poses by odometry").required();
   verb.option("MAP", o->map,
               "A cloud, a folder of scans with poses, the output of reconstruct, or a file of "
               "locate --save-map")

@@ -66,8 +66,7 @@ std::vector<LocateResult> locate_all(const Options& o, const Context& context,
   std::vector<PointCloud> clouds;
   ViewpointNote note;
   for (const std::string& file : o.scans()) {
-    clouds.push_back(
-        read_cloud(file, mesh_spacing(options.registration.prepare.voxel_size), MeshNote::print));
+    clouds.push_back(read_scan(file, context, map.options()));
     o.place.viewpoint.apply(clouds.back());
     if (options.registration.prepare.depth_maps > 0) note.see(clouds.back(), file);
   }
@@ -135,9 +134,11 @@ int run(Options o) {
 void add_locate(CommandLine& line) {
   const auto o = std::make_shared<Options>();
   Verb verb = line.verb("locate", "Find scans in a map, or say that they are not there");
-  verb.option("SCAN...MAP", o->files,
-              "Scans, then the map: a cloud, a folder of scans with poses, the output of "
-              "reconstruct, or a file of --save-map")
+  verb.option(
+          "SCAN...MAP", o->files,
+          "Scans, clouds or folders of scans with poses by odometry, which are one scan; then the "
+          "map: a cloud, a folder of scans with poses, the output of "
+          "reconstruct, or a file of --save-map")
       .required();
   o->method.add_to(verb);
   o->method.add_calibration_to(verb);
