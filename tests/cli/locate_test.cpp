@@ -93,7 +93,8 @@ TEST_F(Locate, ScansWithOdometryAreOneScan) {
   const std::string json = other / "walk.json";
   const Outcome found = locate({walk.path(), map}, {"--json", json});
   EXPECT_EQ(found.status, 0) << found.out << found.err;
-  const nlohmann::json& pose = json_of(json).at("scans").at(0).at("poses").at(0);
+  const nlohmann::json document = json_of(json);
+  const nlohmann::json& pose = document.at("scans").at(0).at("poses").at(0);
   const Eigen::Isometry3d truth = scan_from_room(5).inverse();
   for (int k = 0; k < 16; ++k)  // 10 cm voxels: a pose is good to a few centimetres
     EXPECT_NEAR(pose.at("map_from_scan").at(static_cast<std::size_t>(k)).get<double>(),
