@@ -27,7 +27,12 @@ SCENES = {
 # Houses of 120 fragments by `gpureg generate --fragments 120 --seed SEED`, in WORK/generated.
 GENERATED = {f"generated_{seed}": seed for seed in (8101, 8102, 8103, 8104, 8105)}
 # Buildings of repeated furniture by `gpureg generate --building KIND --fragments 50 --seed SEED`, there too.
-REPEATED = {"office_1": ("office", 1), "office_2": ("office", 2), "warehouse_1": ("warehouse", 1)}
+REPEATED = {
+    "office_1": ("office", 1),
+    "office_2": ("office", 2),
+    "warehouse_1": ("warehouse", 1),
+    "warehouse_2": ("warehouse", 2),
+}
 PRUNE = 20  # partners that a scan of a generated house is aligned with
 OFFSET = 100  # of the numbers of a second scene in the same folder
 FOREIGN = (3, 13, 23, 33, 43)

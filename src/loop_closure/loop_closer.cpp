@@ -12,6 +12,7 @@
 #include "gpureg/files.hpp"
 #include "loop_closure/check.hpp"
 #include "loop_closure/commands.hpp"
+#include "loop_closure/neighbors.hpp"
 #include "loop_closure/paths.hpp"
 #include "loop_closure/proposals.hpp"
 #include "loop_closure/register.hpp"
@@ -146,6 +147,7 @@ struct LoopCloser::Impl {
     std::vector<LoopRecord> records;
     for (std::size_t k = 0; k < proposals.size(); ++k)
       records.push_back(record_of(proposals[k].source, proposals[k].target, results[k], options));
+    hear_neighbors(context, state, options, records);
     make_room(state.loops, records.size());
     // Nothing throws from here on: there is room, and the pairs of the queue are known.
     drop_proposals(state, proposals.size());

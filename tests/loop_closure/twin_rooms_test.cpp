@@ -83,5 +83,32 @@ TEST(TwinRooms, AnAcceptedOneIsRetractedOnTheWayBack) {
   EXPECT_LT(relative_error(closer.poses(), scans.s, 3, 0), 0.5);
 }
 
+// As before, but the neighbours of the twin see another room (the mirror image) at its place.
+TEST(TwinRooms, NeighboursThatCannotBeThereRefuseAnAlias) {
+  const Context context = Context::cpu(2);
+  LoopCloser closer(context, quick_options());
+  const Scans scans({{planar(0.3, 0.1, 5), Pose::Identity(), false},
+                     {planar(0.9, 0.3, 25), Pose::Identity(), false},
+                     {planar(6, 0.2, 10), planar(6, 0, 15), true},
+                     {planar(12.2, 0.1, 30), planar(12, 0, 0), false},
+                     {planar(12.7, 0.2, 50), planar(15, 0, 0), true},
+                     {planar(13.1, 0.1, 65), planar(15, 0, 0), true}});
+  scans.add_to(closer, context, 0, 3);
+  scans.add(closer, context, 3);
+  UnalignedMatrix6d lost = UnalignedMatrix6d::Identity() * 0.01;
+  lost.bottomRightCorner<3, 3>() = 25 * Eigen::Matrix3d::Identity();
+  closer.add_odometry(3, 2, scans.s.odometry[2].inverse() * scans.s.odometry[3], lost);
+  for (int k = 4; k < 6; ++k) {
+    const auto at = static_cast<std::size_t>(k);
+    scans.add(closer, context, k);
+    closer.add_odometry(k, k - 1, scans.s.odometry[at - 1].inverse() * scans.s.odometry[at]);
+  }
+  closer.propose(3, 0);
+  closer.process();
+  const Loop alias = loop_of(closer.loops(), 3, 0);
+  EXPECT_LT(alias.confidence, 0.5);
+  EXPECT_NE(alias.state, LoopState::accepted) << to_string(alias.reason);
+}
+
 }  // namespace
 }  // namespace gpureg::test
