@@ -2,10 +2,19 @@
 #pragma once
 
 #include <cstdint>
+#include <cstring>
 #include <utility>
 #include <vector>
 
 namespace gpureg {
+
+/// Bits that sort like the number, which is none of NaN.
+inline std::uint32_t sortable_bits(float value) {
+  value += 0.0f;  // -0 becomes 0
+  std::uint32_t bits;
+  std::memcpy(&bits, &value, sizeof bits);
+  return bits & 0x80000000u ? ~bits : bits | 0x80000000u;
+}
 
 struct KeyIndex {
   std::uint64_t key;

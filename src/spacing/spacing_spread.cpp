@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstring>
 #include <limits>
 #include <utility>
 #include <vector>
@@ -17,19 +16,11 @@ namespace {
 /// Rows whose spacing is measured.
 constexpr std::size_t kSample = 1000;
 
-/// Bits that sort like the number.
-std::uint32_t sortable(float value) {
-  value += 0.0f;  // -0 becomes 0
-  std::uint32_t bits;
-  std::memcpy(&bits, &value, sizeof bits);
-  return bits & 0x80000000u ? ~bits : bits | 0x80000000u;
-}
-
 std::vector<Vec3> finite_rows_by_x(const RawCloud& rows) {
   const std::vector<Vec3> all = finite_rows(rows);
   std::vector<KeyIndex> order;
   order.reserve(all.size());
-  for (std::uint32_t i = 0; i < all.size(); ++i) order.push_back({sortable(all[i].x), i});
+  for (std::uint32_t i = 0; i < all.size(); ++i) order.push_back({sortable_bits(all[i].x), i});
   radix_sort(order);
   std::vector<Vec3> sorted;
   sorted.reserve(order.size());

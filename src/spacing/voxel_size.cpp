@@ -5,7 +5,9 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <unordered_map>
 
+#include "common/radix_sort.hpp"
 #include "math/jacobi.hpp"
 
 namespace gpureg {
@@ -18,9 +20,11 @@ constexpr std::size_t kVoxelSample = 400'000, kMinVoxelSample = 50'000;
 constexpr std::size_t kSpacingSample = 1000,
                       kNoiseSample =
                           200;  // medians of samples this large are within a few per cent
-/// Points that are looked at around one, each way: all points may be at the same place along the
-/// longest side.
+/// Places that are looked at around one for the nearest, each way: all of them may be at the same
+/// coordinate of the longest side.
 constexpr std::size_t kMostVisits = 1'000'000;
+/// Points of a neighbourhood along the longest side; of more, every second, third, ... one.
+constexpr std::size_t kMostNeighbors = 100'000;
 constexpr double kSizeTolerance = 1.02;     // of the bisection, below the rounding of the result
 constexpr double kNoiseRadius = 1.5;        // radius of the fitted plane, in voxels
 constexpr std::size_t kMinPlanePoints = 8;  // a plane fits fewer points however rough they are
@@ -55,11 +59,44 @@ Eigen::Vector3d eigenvalues(const Eigen::Matrix3d& matrix) {
   return out;
 }
 
+using Row = std::vector<Eigen::Vector3f>::iterator;
+
+void sort_by_coordinates(Row first, Row last) {
+  constexpr std::ptrdiff_t kFew = 4096;  // the buckets of a radix sort cost more
+  if (last - first < kFew) {
+    std::sort(first, last, [](const Eigen::Vector3f& p, const Eigen::Vector3f& q) {
+      return std::lexicographical_compare(p.data(), p.data() + 3, q.data(), q.data() + 3);
+    });
+    return;
+  }
+  std::vector<Eigen::Vector3f> rows(first, last);
+  for (const int axis : {2, 1, 0})
+    radix_sort(rows, [axis](const Eigen::Vector3f& p) { return sortable_bits(p[axis]); });
+  std::copy(rows.begin(), rows.end(), first);
+}
+
+/// Numbers of the voxels of prepare().
+class VoxelKeys {
+ public:
+  VoxelKeys(const Eigen::AlignedBox3d& box, double size)
+      : size_(size), first_((box.min().array() / size).floor()) {}
+  std::uint64_t operator()(const Eigen::Vector3f& p) const {
+    const Eigen::Array3d cell = (p.cast<double>().array() / size_).floor() - first_;
+    return static_cast<std::uint64_t>(cell.x()) << 42 | static_cast<std::uint64_t>(cell.y()) << 21 |
+           static_cast<std::uint64_t>(cell.z());
+  }
+
+ private:
+  double size_;
+  Eigen::Array3d first_;
+};
+
 /// The finite points of a cloud, sorted along its longest side: neighbours within d are within d
 /// along the order.
 class SortedCloud {
  public:
   explicit SortedCloud(const PointCloudView& view) {
+    points_.reserve(view.size);
     for (std::size_t k = 0; k < view.size; ++k) {
       const Eigen::Vector3f p =
           Eigen::Map<const Eigen::Vector3f>(view.points + k * view.point_stride);
@@ -73,17 +110,23 @@ class SortedCloud {
   double extent() const { return points_.empty() ? 0 : box_.sizes().maxCoeff(); }
 
   double spacing() const {
+    const std::vector<std::size_t> places = distinct_rows();
     std::vector<double> distances;
-    for_sample(kSpacingSample, [&](std::size_t at) {
+    for_sample(kSpacingSample, [&](std::size_t row) {
+      const auto place = std::upper_bound(places.begin(), places.end(), row) - 1;
       double nearest = std::numeric_limits<double>::infinity();  // squared
       const auto visit = [&](std::size_t k) {
-        const Eigen::Vector3d d = (points_[k] - points_[at]).cast<double>();
+        const Eigen::Vector3d d = (points_[k] - points_[row]).cast<double>();
         if (d[axis_] * d[axis_] >= nearest) return false;
-        const double squared = d.squaredNorm();
-        if (squared > 0) nearest = std::min(nearest, squared);
+        nearest = std::min(nearest, d.squaredNorm());
         return true;
       };
-      around(at, visit);
+      const auto after = places.end() - place, before = place - places.begin();
+      constexpr auto most = static_cast<std::ptrdiff_t>(kMostVisits);
+      for (auto k = place + 1; k < place + std::min(after, most) && visit(*k); ++k) {
+      }
+      for (auto k = place; k > place - std::min(before, most) && visit(*(k - 1)); --k) {
+      }
       if (std::isfinite(nearest)) distances.push_back(std::sqrt(nearest));
     });
     return median(std::move(distances));
@@ -127,16 +170,28 @@ class SortedCloud {
 
   /// The centroids of the voxels.
   SortedCloud downsampled(double size) const {
-    std::vector<std::pair<std::uint64_t, std::size_t>> order;
-    for (std::size_t k = 0; k < points_.size(); ++k) order.push_back({key_of(k, size), k});
-    std::sort(order.begin(), order.end());
-    std::vector<Eigen::Vector3f> out;
-    for (std::size_t first = 0, last = 0; first < order.size(); first = last) {
+    struct Voxel {
       Eigen::Vector3d sum = Eigen::Vector3d::Zero();
-      for (; last < order.size() && order[last].first == order[first].first; ++last)
-        sum += points_[order[last].second].cast<double>();
-      out.push_back((sum / static_cast<double>(last - first)).cast<float>());
+      std::size_t count = 0;
+    };
+    const VoxelKeys key_of(box_, size);
+    std::unordered_map<std::uint64_t, std::size_t> number_of;
+    std::vector<Voxel> voxels;
+    std::uint64_t last = 0;
+    std::size_t at = 0;  // of the voxel with this key
+    for (const Eigen::Vector3f& p : points_) {
+      const std::uint64_t key = key_of(p);
+      if (voxels.empty() || key != last) {
+        at = number_of.emplace(key, voxels.size()).first->second;
+        if (at == voxels.size()) voxels.emplace_back();
+        last = key;
+      }
+      voxels[at].sum += p.cast<double>();
+      ++voxels[at].count;
     }
+    std::vector<Eigen::Vector3f> out;
+    for (const Voxel& voxel : voxels)
+      out.push_back((voxel.sum / static_cast<double>(voxel.count)).cast<float>());
     return SortedCloud(std::move(out));
   }
 
@@ -144,7 +199,8 @@ class SortedCloud {
   std::size_t occupied(double size, std::size_t most, std::vector<std::uint64_t>& keys) const {
     keys.clear();
     const std::size_t step = points_.size() / most + 1;
-    for (std::size_t k = 0; k < points_.size(); k += step) keys.push_back(key_of(k, size));
+    const VoxelKeys key_of(box_, size);
+    for (std::size_t k = 0; k < points_.size(); k += step) keys.push_back(key_of(points_[k]));
     std::sort(keys.begin(), keys.end());
     return static_cast<std::size_t>(std::unique(keys.begin(), keys.end()) - keys.begin());
   }
@@ -154,18 +210,21 @@ class SortedCloud {
     for (const Eigen::Vector3f& p : points_) box_.extend(p.cast<double>());
     if (points_.empty()) return;
     box_.sizes().maxCoeff(&axis_);
-    // A total order: the order of equal coordinates must not depend on the sort of the library.
-    std::sort(points_.begin(), points_.end(),
-              [a = axis_](const Eigen::Vector3f& p, const Eigen::Vector3f& q) {
-                if (p[a] != q[a]) return p[a] < q[a];
-                return std::lexicographical_compare(p.data(), p.data() + 3, q.data(), q.data() + 3);
-              });
+    radix_sort(points_, [a = axis_](const Eigen::Vector3f& p) { return sortable_bits(p[a]); });
+    // A total order: the order of equal coordinates must not depend on that of the rows.
+    for (auto first = points_.begin(), last = first; first != points_.end(); first = last) {
+      bool equal = true;
+      for (; last != points_.end() && (*last)[axis_] == (*first)[axis_]; ++last)
+        equal = equal && *last == *first;
+      if (!equal) sort_by_coordinates(first, last);
+    }
   }
-  std::uint64_t key_of(std::size_t k, double size) const {
-    const Eigen::Array3d first = (box_.min().array() / size).floor(),
-                         cell = (points_[k].cast<double>().array() / size).floor() - first;
-    return static_cast<std::uint64_t>(cell.x()) << 42 | static_cast<std::uint64_t>(cell.y()) << 21 |
-           static_cast<std::uint64_t>(cell.z());
+  /// The first row of each place.
+  std::vector<std::size_t> distinct_rows() const {
+    std::vector<std::size_t> rows;
+    for (std::size_t k = 0; k < points_.size(); ++k)
+      if (k == 0 || points_[k] != points_[k - 1]) rows.push_back(k);
+    return rows;
   }
   /// Covariance of the points within the radius of a point, and their number.
   std::size_t neighborhood(std::size_t at, double radius, Eigen::Matrix3d& covariance) const {
@@ -174,34 +233,32 @@ class SortedCloud {
     std::size_t count = 0;
     const auto visit = [&](std::size_t k) {
       const Eigen::Vector3d d = (points_[k] - points_[at]).cast<double>();
-      if (std::abs(d[axis_]) > radius) return false;
-      if (d.squaredNorm() <= radius * radius) {
-        sum += d;
-        outer += d * d.transpose();
-        ++count;
-      }
-      return true;
+      if (d.squaredNorm() > radius * radius) return;
+      sum += d;
+      outer += d * d.transpose();
+      ++count;
     };
-    around(at, visit);
+    const auto row = points_.begin() + static_cast<std::ptrdiff_t>(at);
+    const auto is_far = [&](const Eigen::Vector3f& p) {
+      return std::abs(static_cast<double>(p[axis_] - (*row)[axis_])) > radius;
+    };
+    const auto is_near = [&](const Eigen::Vector3f& p) { return !is_far(p); };
+    const auto first = std::partition_point(points_.begin(), row, is_far),
+               last = std::partition_point(row, points_.end(), is_near);
+    const std::size_t step = static_cast<std::size_t>(last - first) / kMostNeighbors + 1,
+                      before = static_cast<std::size_t>(row - first),
+                      after = static_cast<std::size_t>(last - row);
+    for (std::size_t k = step; k < after; k += step) visit(at + k);
+    for (std::size_t k = step; k <= before; k += step) visit(at - k);
     visit(at);
     const Eigen::Vector3d mean = sum / static_cast<double>(count);
     covariance = outer / static_cast<double>(count) - mean * mean.transpose();
-    return count;
+    return count * step;
   }
   template <typename Visit>
   void for_sample(std::size_t most, Visit&& visit) const {
     const std::size_t count = std::min(most, points_.size());
     for (std::size_t s = 0; s < count; ++s) visit(s * points_.size() / count);
-  }
-  /// Visits points on both sides in the order, each way until visit returns false, or kMostVisits.
-  template <typename Visit>
-  void around(std::size_t at, Visit&& visit) const {
-    const std::size_t first = at - std::min(at, kMostVisits);
-    const std::size_t last = std::min(points_.size(), at + kMostVisits);
-    for (std::size_t k = at + 1; k < last && visit(k); ++k) {
-    }
-    for (std::size_t k = at; k-- > first && visit(k);) {
-    }
   }
 
   std::vector<Eigen::Vector3f> points_;
