@@ -49,7 +49,7 @@ launcher_arguments() {
 }
 
 # The same, and several builds of one checkout share the objects of the libraries: ccache takes none for that of another build where the
-# two have a precompiled header each.
+# two have a precompiled header each, or where the wheel compiles several sources at a time.
 shared_objects() {
-  if command -v ccache > /dev/null; then echo "$(launcher_arguments) -DGPUREG_PRECOMPILED_LIBRARIES=OFF"; fi
+  if command -v ccache > /dev/null; then echo "$(launcher_arguments) -DGPUREG_PRECOMPILED_LIBRARIES=OFF -DCMAKE_UNITY_BUILD=OFF"; fi
 }

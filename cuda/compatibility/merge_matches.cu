@@ -5,6 +5,7 @@
 
 #include "algorithm/compatibility.hpp"
 #include "algorithm/normal_weight.hpp"
+#include "common/in_halves.hpp"
 #include "cuda/common/feature_query.hpp"
 #include "cuda/common/stages.hpp"
 #include "cuda/device/entry_of.cuh"
@@ -192,8 +193,8 @@ DeviceBuffer<std::uint32_t> search(Exec& exec, Span<const PairView> pairs,
     query.out = static_cast<std::uint32_t>(at);
     at += query.query_count;
     if (at > limits::kMaxPoints)
-      throw InvalidArgument("a batch of " + std::to_string(at) +
-                            " feature queries exceeds 2^31 - 1: split it");
+      throw BatchTooLarge("a batch of " + std::to_string(at) +
+                          " feature queries exceeds 2^31 - 1: split it");
     queries.push_back(query);
     return query.out;
   };

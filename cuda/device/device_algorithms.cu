@@ -7,14 +7,14 @@
 #include <limits>
 #include <string>
 
-#include "gpureg/error.hpp"
+#include "common/in_halves.hpp"
 
 namespace gpureg::cuda {
 
 int cub_size(std::size_t size) {
   if (size > static_cast<std::size_t>(std::numeric_limits<int>::max()))
-    throw InvalidArgument("a batch of " + std::to_string(size) +
-                          " elements exceeds 2^31 - 1: split it");
+    throw BatchTooLarge("a batch of " + std::to_string(size) +
+                        " elements exceeds 2^31 - 1: split it");
   return static_cast<int>(size);
 }
 

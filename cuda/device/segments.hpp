@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
+#include "common/in_halves.hpp"
 #include "cuda/device/exec.hpp"
-#include "gpureg/error.hpp"
 
 namespace gpureg::cuda {
 
@@ -34,7 +34,7 @@ inline Segments segments_of(Exec& exec, std::vector<std::uint32_t> offset) {
 /// Elements of a batch. CUB counts by int, and arrays of ranks have one element more.
 constexpr std::uint64_t kMaxElements = 0x7ffffffe;
 
-/// Offsets of entries of size(e) elements. Throws InvalidArgument where the total exceeds
+/// Offsets of entries of size(e) elements. Throws BatchTooLarge where the total exceeds
 /// kMaxElements.
 template <typename Size>
 std::vector<std::uint32_t> batch_offsets(std::size_t entries, Size&& size) {
@@ -43,8 +43,8 @@ std::vector<std::uint32_t> batch_offsets(std::size_t entries, Size&& size) {
   for (std::size_t e = 0; e < entries; ++e) {
     sum += size(e);
     if (sum > kMaxElements)
-      throw InvalidArgument("a batch of " + std::to_string(sum) +
-                            " elements exceeds 2^31 - 2: split it");
+      throw BatchTooLarge("a batch of " + std::to_string(sum) +
+                          " elements exceeds 2^31 - 2: split it");
     offset.push_back(static_cast<std::uint32_t>(sum));
   }
   return offset;

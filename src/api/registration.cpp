@@ -37,7 +37,7 @@ void check_priors(const std::vector<RegistrationPrior>& priors, std::size_t pair
 }
 
 /// Points from which another thread is worth its start.
-constexpr std::size_t kPointsPerThread = 200'000;
+constexpr std::size_t kRawPointsPerThread = 200'000;
 
 /// Replaces clouds by those without their stray points. @return the owners of the rows.
 template <typename Naming>
@@ -49,7 +49,7 @@ std::vector<std::optional<WithoutStrayPoints>> drop_stray_points(const Engine& e
   std::size_t points = 0;
   for (const RawCloud& cloud : raw) points += cloud.size;
   const std::size_t workers = std::min<std::size_t>(
-      {std::max(1u, engine.host_threads()), raw.size(), 1 + points / kPointsPerThread});
+      {std::max(1u, engine.host_threads()), raw.size(), 1 + points / kRawPointsPerThread});
   on_threads(workers, [&](std::size_t worker) {
     for (std::size_t k = worker; k < raw.size(); k += workers)
       naming(k, [&] { raw[k] = owners[k].emplace(raw[k], options).cloud(); });

@@ -25,7 +25,7 @@ constexpr double kMaxLogOdds = 14;
 
 double log_at_least(double value, double least) { return portable::log(std::max(value, least)); }
 
-double share(double part, double whole) { return part / std::max(whole, kMinDenominator); }
+double safe_share(double part, double whole) { return part / std::max(whole, kMinDenominator); }
 
 /// The value of both sides.
 struct Sides {
@@ -83,8 +83,8 @@ void add_free_space(const PoseEvidence& e, Setter& set) {
 void add_surface_sides(const PoseEvidence& e, bool free_space, Regressand regressand, Setter& set) {
   const Sides any_normal{e.source_overlap_any_normal, e.target_overlap_any_normal};
   // Share of the points within the distance whose normals agree: the same side of the surface.
-  const Sides normal_agreement{share(e.source_overlap, any_normal.source),
-                               share(e.target_overlap, any_normal.target)};
+  const Sides normal_agreement{safe_share(e.source_overlap, any_normal.source),
+                               safe_share(e.target_overlap, any_normal.target)};
   const Sides near_surface{e.source_near_surface, e.target_near_surface};
   const Sides front_near{e.source_front_violation_near, e.target_front_violation_near};
   const bool verified = free_space && regressand == Regressand::confidence;
@@ -98,8 +98,8 @@ void add_surface_sides(const PoseEvidence& e, bool free_space, Regressand regres
   const Sides front_far{e.source_front_violation_far, e.target_front_violation_far};
   const Sides behind{e.source_behind_surface, e.target_behind_surface};
   const auto of_near = [&](const Sides& part) {
-    return Sides{share(part.source, part.source + any_normal.source),
-                 share(part.target, part.target + any_normal.target)};
+    return Sides{safe_share(part.source, part.source + any_normal.source),
+                 safe_share(part.target, part.target + any_normal.target)};
   };
   const Sides front_share =
       of_near({front_near.source + front_far.source, front_near.target + front_far.target});

@@ -10,9 +10,9 @@
 namespace gpureg::loop_closure {
 namespace {
 
-constexpr double kRadians = 3.14159265358979323846 / 180;
+constexpr double kRadiansPerDegree = 3.14159265358979323846 / 180;
 /// Rotations further from orthonormal are made so again.
-constexpr double kOrthonormal = 1e-5;
+constexpr double kSavedOrthonormal = 1e-5;
 
 }  // namespace
 
@@ -23,7 +23,7 @@ const Coarse& Node::coarse() const {
 
 UnalignedIsometry3d rigid(UnalignedIsometry3d pose) {
   const Eigen::Matrix3d r = pose.linear();
-  if ((r * r.transpose() - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff() > kOrthonormal)
+  if ((r * r.transpose() - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff() > kSavedOrthonormal)
     pose.linear() = Eigen::Quaterniond(r).normalized().toRotationMatrix();
   pose.translation() =
       pose.translation().cwiseMax(-pose_graph::kFarthest).cwiseMin(pose_graph::kFarthest).eval();
@@ -54,13 +54,14 @@ Odometry modelled_odometry(FragmentId source, FragmentId target,
   edge.modelled = true;
   edge.length = target_from_source.translation().norm();
   const double degrees =
-      pose_graph::log_rotation(Eigen::Matrix3d(target_from_source.linear())).norm() / kRadians;
+      pose_graph::log_rotation(Eigen::Matrix3d(target_from_source.linear())).norm() /
+      kRadiansPerDegree;
   const double translation =
       std::max(drift.min_translation, drift.translation_per_metre * edge.length);
   const double rotation = std::max(drift.min_rotation, drift.rotation_per_metre * edge.length +
                                                            drift.rotation_per_degree * degrees);
   Vector6d information;
-  information.head<3>().setConstant(1 / portable::square(rotation * kRadians));
+  information.head<3>().setConstant(1 / portable::square(rotation * kRadiansPerDegree));
   information.tail<3>().setConstant(1 / portable::square(translation));
   edge.information = UnalignedMatrix6d(information.asDiagonal());
   return edge;

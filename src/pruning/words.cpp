@@ -12,7 +12,7 @@ namespace {
 
 /// Features per word that k-means looks at; more do not change the words much.
 constexpr std::size_t kFeaturesPerWord = 256;
-constexpr int kIterations = 20;
+constexpr int kClusterRounds = 20;
 
 /// Moves a centre without features to the feature that is farthest from its own centre.
 void revive(Eigen::Index centre, const Rows& rows, const Eigen::VectorXf& similarity,
@@ -99,7 +99,7 @@ Matrix learn_words(const std::vector<FeatureView>& clouds, std::uint32_t most) {
     centres.row(static_cast<Eigen::Index>(c)) =
         rows.row(static_cast<Eigen::Index>(c * static_cast<std::size_t>(used) / words.rows));
   if (words.rows > 0)
-    for (int k = 0; k < kIterations; ++k) improve(rows, centres);
+    for (int k = 0; k < kClusterRounds; ++k) improve(rows, centres);
   words.data.assign(centres.data(), centres.data() + centres.size());
   return words;
 }

@@ -19,7 +19,7 @@ constexpr int kRounds = 8;
 constexpr double kDamping = 0.5;
 /// A pair that looks right says less than one that contradicts: at equal furniture half of the
 /// wrong ones look right.
-constexpr double kOfSupport = 0.2;
+constexpr double kOfAgreement = 0.2;
 constexpr double kLeastOdds = 1e-4;
 
 /// A pair of the set whose first mode takes part.
@@ -113,16 +113,17 @@ AuditedPair implied(const Member& first, const Member& second) {
 bool agrees(const Member& member, const AuditedPair& pair, const AuditOptions& options) {
   const UnalignedIsometry3d source_from_target = member.from_other(pair.source);
   const UnalignedIsometry3d difference = pair.target_from_source * source_from_target;
-  constexpr double kSameRotation = 0.1;  // of an entry of the matrix: some six degrees
+  constexpr double kSameEntry = 0.1;  // of an entry of the matrix: some six degrees
   return difference.translation().norm() <= options.max_shift &&
-         (difference.linear() - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff() < kSameRotation;
+         (difference.linear() - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff() < kSameEntry;
 }
 
 /// What a triplet says about one of its members, in view of the odds of the other.
 double message(double log_likelihood_ratio, double odds_of_other) {
   const double right = confidence_of(odds_of_other);
-  const double ratio = std::exp(
-      log_likelihood_ratio > 0 ? std::min(log_likelihood_ratio, kOfSupport) : log_likelihood_ratio);
+  const double ratio =
+      std::exp(log_likelihood_ratio > 0 ? std::min(log_likelihood_ratio, kOfAgreement)
+                                        : log_likelihood_ratio);
   return std::log(right * ratio + 1 - right);
 }
 
@@ -143,7 +144,7 @@ void hear_companions(const Context& context, const std::vector<PreparedCloud>& c
     const AuditedPair pair = implied(members[triplets[k].first], members[triplets[k].second]);
     const auto third = known.find(std::minmax(pair.source, pair.target));
     if (third != known.end() && agrees(members[third->second], pair, options)) {
-      triplets[k].log_likelihood_ratio = kOfSupport;
+      triplets[k].log_likelihood_ratio = kOfAgreement;
       continue;
     }
     asked.push_back(pair);

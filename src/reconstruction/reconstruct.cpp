@@ -20,7 +20,7 @@ constexpr double kCertain = 0.999;
 constexpr double kMinAlternative = 0.02;
 /// Connections are rejected and the rest optimised again at most so often; each round removes
 /// edges, and the first one removes nearly all.
-constexpr int kMostRounds = 8;
+constexpr int kMostDrops = 8;
 
 void check_pairs(std::size_t scans, const std::vector<Pair>& pairs) {
   std::set<std::pair<std::uint32_t, std::uint32_t>> seen;
@@ -301,7 +301,7 @@ Reconstruction reconstruct(std::size_t scans, const std::vector<Pair>& pairs,
 
   std::vector<char> unconfirmed(graph.graph.edges.size(), 0);
   Round round = optimise_round(scans, graph, map.odometry, options, unconfirmed);
-  for (int k = 1; round.dropped && k < kMostRounds; ++k)
+  for (int k = 1; round.dropped && k < kMostDrops; ++k)
     round = optimise_round(scans, graph, map.odometry, options, unconfirmed);
 
   map.status = round.result.status;

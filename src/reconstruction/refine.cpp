@@ -25,7 +25,7 @@ using pose_graph::Vector6d;
 /// Share of the iterations after which the distance has reached its final value.
 constexpr double kShrinkingShare = 0.6;
 /// Levenberg-Marquardt damping, relative to the diagonal: enough for directions that nothing holds.
-constexpr double kDamping = 1e-6;
+constexpr double kDiagonalDamping = 1e-6;
 /// Steps below this, in radians and metres, end the refinement.
 constexpr double kSmallestStep = 1e-4;
 /// Squared error of an edge at which it counts half: the mean of the chi-square distribution with 6
@@ -277,7 +277,7 @@ class Refiner {
       if (in_map(odometry))
         add_edge(odometry.source, odometry.target, odometry.target_from_source,
                  *odometry.information);
-    for (Matrix6d& block : matrix_.diagonal) block.diagonal() *= 1 + kDamping;
+    for (Matrix6d& block : matrix_.diagonal) block.diagonal() *= 1 + kDiagonalDamping;
     pose_graph::BlockCholesky cholesky(system_.columns, matrix_.pattern, threads_);
     if (!cholesky.factorise(matrix_)) return -1;
     cholesky.solve(rhs_);

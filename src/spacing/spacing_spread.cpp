@@ -14,7 +14,7 @@ namespace gpureg {
 namespace {
 
 /// Rows whose spacing is measured.
-constexpr std::size_t kSample = 1000;
+constexpr std::size_t kMeasuredRows = 1000;
 
 std::vector<Vec3> finite_rows_by_x(const RawCloud& rows) {
   const std::vector<Vec3> all = finite_rows(rows);
@@ -31,7 +31,7 @@ std::vector<Vec3> finite_rows_by_x(const RawCloud& rows) {
 /// Evenly spaced places in the order of x, y, z, whatever the order of the rows. The rows are
 /// sorted by x; of rows with one x only those at the places move to where they belong.
 std::vector<std::size_t> evenly_spaced(std::vector<Vec3>& rows) {
-  const std::size_t count = std::min(kSample, rows.size());
+  const std::size_t count = std::min(kMeasuredRows, rows.size());
   std::vector<std::size_t> places;
   auto begin = rows.begin(), end = begin;  // of the rows with one x that are not at a place yet
   for (std::size_t s = 0; s < count; ++s) {

@@ -31,7 +31,7 @@ constexpr std::size_t kMinPlanePoints = 8;  // a plane fits fewer points however
 constexpr double kMaxNoise = 1.0 / 3.0;     // of a voxel: its centroid averages out less
 // Neighbourhoods of the normals, in voxels. They have an area if the second axis is not far shorter
 // than the first, in squared lengths: those of a LiDAR with few rings lie on one ring.
-constexpr double kNormalRadius = 2, kLeastWidth = 0.2, kLeastShare = 0.6;
+constexpr double kNormalRadius = 2, kLeastWidth = 0.2, kShareWithArea = 0.6;
 constexpr std::size_t kMinAreaPoints = 4, kAreaSample = 400;
 constexpr double kGrowth = 1.1;
 constexpr std::size_t kFewestPoints = 1000;
@@ -348,7 +348,7 @@ VoxelSizeSuggestion suggest_voxel_size(const std::vector<PointCloudView>& views)
       return cloud.downsampled(s).share_with_area(kNormalRadius * s);
     });
   };
-  while (points(size * kGrowth) >= kFewestPoints && share_with_area(size) < kLeastShare)
+  while (points(size * kGrowth) >= kFewestPoints && share_with_area(size) < kShareWithArea)
     size *= kGrowth;
   size = rounded(size);
   out.voxel_size = static_cast<float>(size);

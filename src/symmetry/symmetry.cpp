@@ -18,7 +18,7 @@ constexpr std::size_t kSample = 1000;
 constexpr double kSymmetricShare = 0.95;
 /// Below this share before the refinement, the motion is not close to a symmetry.
 constexpr double kWorthRefining = 0.15;
-constexpr int kIterations = 10;
+constexpr int kPolishSteps = 10;
 /// Neighbours are searched within so many distances while the motion is refined.
 constexpr float kSearch = 2;
 /// Cosine of the largest angle between the normals of a moved point and of the cloud there, 30
@@ -153,7 +153,7 @@ double CloudSymmetry::share(const Eigen::Isometry3d& motion) const {
 }
 
 bool CloudSymmetry::refine(Eigen::Isometry3d& motion) const {
-  for (int k = 0; k < kIterations; ++k) {
+  for (int k = 0; k < kPolishSteps; ++k) {
     Eigen::Matrix<double, 6, 6> information = Eigen::Matrix<double, 6, 6>::Zero();
     Eigen::Matrix<double, 6, 1> gradient = Eigen::Matrix<double, 6, 1>::Zero();
     const Eigen::Vector3d centre = motion * middle_;

@@ -12,7 +12,7 @@ namespace gpureg {
 namespace {
 
 /// Rows of which directions are compared, and those of them whose neighbours are searched.
-constexpr std::size_t kDirections = 8000, kSample = 1500;
+constexpr std::size_t kDirections = 8000, kReturns = 1500;
 /// Neighbours in direction are on different surfaces from this ratio of their ranges on.
 constexpr float kOtherSurface = 1.16f;
 /// Distance of the places that a viewpoint is compared with, in median ranges.
@@ -108,7 +108,7 @@ double share_behind(const std::vector<Vec3>& points, Vec3 place) {
       rays.push_back({(p - place) * (1 / range), range});
   if (rays.empty()) return 0;
   const DirectionGrid grid(rays);
-  const std::size_t count = std::min(kSample, rays.size());
+  const std::size_t count = std::min(kReturns, rays.size());
   std::size_t behind = 0;
   for (std::size_t s = 0; s < count; ++s) {
     const std::size_t at = s * rays.size() / count;

@@ -1,11 +1,13 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""Headers that are slow to compile stay out of headers that everything includes; folders stay small.
+"""Headers that are slow to compile stay out of headers that everything includes; folders stay small; sources of one
+library can be compiled together (CMAKE_UNITY_BUILD).
 
-structure.py [ROOT]    exit status 1 and one line per file that may not include what it includes, and per folder with
-                       too many files
+structure.py [ROOT]    exit status 1 and one line per file that may not include what it includes, per folder with
+                       too many files, and per name that two sources of a library keep for themselves
 """
 
+import collections
 import os
 import pathlib
 import re
@@ -113,8 +115,61 @@ def full_folders(root: pathlib.Path) -> list[str]:
     return found
 
 
+# Folders whose sources are one target, without those that are compiled alone, for their flags.
+TOGETHER = (
+    ("src/cpu",),
+    tuple(f"src/{name}" for name in ("api viewpoint symmetry spacing confidence calibration"
+                                     " loop_consistency pruning").split()),
+    *((f"src/{name}",) for name in ("evaluation io pose_graph reconstruction loop_closure localization"
+                                    " fields files").split()),
+    ("data",),
+    tuple(f"apps/gpureg/{name}" for name in "verbs options run inputs json records pages pictures".split()),
+    ("python/bindings",),
+)  # fmt: skip
+ALONE = {"byte_rows.cpp", "closest_grid.cpp", "feature_search.cpp", "surface_graph.cpp"}
+
+UNNAMED = re.compile(r"^namespace \{$(.*?)^\}  // namespace$", re.MULTILINE | re.DOTALL)
+CONSTANT = re.compile(r"^(?:constexpr|const) .*?;", re.MULTILINE | re.DOTALL)
+TYPE = re.compile(r"^(?:struct|class|enum class) (\w+)", re.MULTILINE)
+FUNCTION = re.compile(
+    r"^(?!return|using|static_assert)[A-Za-z][\w:<>,&* ]*? (\w+\([^()]*\)) \{", re.MULTILINE
+)
+
+
+def own_names(text: str) -> set[str]:
+    """Constants, types and functions, with the types of their parameters, of the unnamed namespace."""
+    names: set[str] = set()
+    for part in UNNAMED.findall(text):
+        for constant in CONSTANT.findall(part):
+            names.update(re.findall(r"\b(k[A-Z]\w*)\b(?:\[[^]]*\])?(?= = | = \{)", constant))
+        names.update(TYPE.findall(part))
+        names.update(re.sub(r" \w+(?=[,)])", "", call) for call in FUNCTION.findall(part))
+    return names
+
+
+def names_of_two_sources(root: pathlib.Path) -> list[str]:
+    found = []
+    for folders in TOGETHER:
+        owners: dict[str, list[str]] = collections.defaultdict(list)
+        for path in sorted(path for folder in folders for path in (root / folder).rglob("*.cpp")):
+            if path.name not in ALONE:
+                for name in own_names(path.read_text()):
+                    owners[name].append(path.relative_to(root).as_posix())
+        found += [
+            f"{name} is a name in the unnamed namespaces of {' and '.join(paths)}: give one another"
+            for name, paths in sorted(owners.items())
+            if len(paths) > 1
+        ]
+    return found
+
+
 def complaints(root: pathlib.Path) -> list[str]:
-    return forbidden(root) + heavy_through_others(root) + full_folders(root)
+    return (
+        forbidden(root)
+        + heavy_through_others(root)
+        + full_folders(root)
+        + names_of_two_sources(root)
+    )
 
 
 def main() -> int:

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""The check of the structure sees heavy headers, directly and through others, and full folders."""
+"""The check of the structure sees heavy headers, directly and through others, full folders, and names of two sources."""
 
 import pathlib
 import tempfile
@@ -54,6 +54,21 @@ class Structure(unittest.TestCase):
         for count, most in ((30, 0), (31, 1)):
             files = {f"a{k}_dot_hpp": "" for k in range(count)}
             self.assertEqual(len(self.complaints(**files)), most, count)
+
+    def test_names_of_two_sources(self):
+        for text, names in (
+            ("constexpr int kMost = 3, kLeast = 1;", 2),
+            ("struct Part {};", 1),
+            ("double share(double part, double whole) {\n  return part / whole;\n}", 1),
+            ("using Rows = int;", 0),
+        ):
+            with tempfile.TemporaryDirectory() as folder:
+                source = pathlib.Path(folder) / "src/io"
+                source.mkdir(parents=True)
+                for name in ("a.cpp", "b.cpp"):
+                    (source / name).write_text(f"namespace {{\n\n{text}\n\n}}  // namespace\n")
+                found = structure.complaints(pathlib.Path(folder))
+                self.assertEqual(len(found), names, text)
 
 
 if __name__ == "__main__":

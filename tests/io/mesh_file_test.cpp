@@ -2,8 +2,8 @@
 #include <gtest/gtest.h>
 #include <sys/stat.h>
 
-#include <chrono>
 #include <cmath>
+#include <ctime>
 #include <sstream>
 
 #include "gpureg/error.hpp"
@@ -168,14 +168,14 @@ TEST(MeshFile, PolygonsThatAreNotConvex) {
 }
 
 TEST(MeshFile, PolygonsOfManyCorners) {
-  const auto start = std::chrono::steady_clock::now();
+  const std::clock_t begin = std::clock();
   const TemporaryFolder folder;
   const SurfaceMesh disc = read_mesh(folder.write("a.obj", polygon(star(300000, 1))));
   EXPECT_EQ(disc.faces.size(), 299998u);
   EXPECT_NEAR(disc.area(), M_PI, 1e-8);  // the polygon lacks 2/3 pi^3 / 300000^2 of the circle
   refused("a.obj", polygon(star(300000, 0.5)), {"face 1", "300000 corners", "500"});
   // It takes about a second; looking for ears of 300,000 corners takes minutes.
-  EXPECT_LT(std::chrono::steady_clock::now() - start, std::chrono::seconds(30));
+  EXPECT_LT(std::clock() - begin, 30 * CLOCKS_PER_SEC);
 }
 
 }  // namespace

@@ -49,9 +49,9 @@ Eigen::Matrix<double, 2, 3> view_of(const Points& points) {
 }
 
 /// An SVG whose scale fits its points.
-class Picture {
+class Drawing {
  public:
-  Picture(const Points& points, double width, double height)
+  Drawing(const Points& points, double width, double height)
       : view_(view_of(points)), width_(width), height_(height) {
     Eigen::Vector2d high = Eigen::Vector2d::Constant(-std::numeric_limits<double>::infinity());
     low_ = -high;
@@ -141,12 +141,12 @@ std::string map_picture(const AuditRun& run) {
     for (const Eigen::Vector3d& sensor : sensors)
       centres[k] += sensor / static_cast<double>(sensors.size());
   }
-  Picture picture(all, kWidth, kHeight);
-  picture.dots(all, "#c9cbd0", 1.2);
+  Drawing drawing(all, kWidth, kHeight);
+  drawing.dots(all, "#c9cbd0", 1.2);
   for (const PairVerdict verdict : {PairVerdict::supports, PairVerdict::contradicts})
     for (const AuditedPair& pair : run.audit.pairs)
       if (pair.verdict == verdict)
-        picture.line(centres[pair.source], centres[pair.target],
+        drawing.line(centres[pair.source], centres[pair.target],
                      verdict == PairVerdict::supports ? "#2f9e5b66" : "#d6453d",
                      verdict == PairVerdict::supports ? 0.8 : 1.6);
   std::set<std::uint32_t> broken;
@@ -155,10 +155,10 @@ std::string map_picture(const AuditRun& run) {
       broken.insert(connection.scans.begin(), connection.scans.end());
   for (std::uint32_t k = 0; k < clouds.size(); ++k) {
     if (!run.poses[k].matrix().allFinite()) continue;
-    picture.dots({centres[k]}, broken.count(k) ? "#d6453d" : "#22221f", 6);
-    picture.label(centres[k], std::to_string(run.scene.numbers[k]));
+    drawing.dots({centres[k]}, broken.count(k) ? "#d6453d" : "#22221f", 6);
+    drawing.label(centres[k], std::to_string(run.scene.numbers[k]));
   }
-  return picture.text();
+  return drawing.text();
 }
 
 std::string pair_picture(const AuditRun& run, const AuditedPair& pair) {
@@ -173,12 +173,12 @@ std::string pair_picture(const AuditRun& run, const AuditedPair& pair) {
   const Points a = points_of(pair.target), b = points_of(pair.source);
   Points all = a;
   all.insert(all.end(), b.begin(), b.end());
-  Picture picture(all, kWidth / 2, kHeight / 2);
-  picture.dots(a, "#7aa6d8", 1.6);
-  picture.dots(b, "#9a9a92", 1.6);
-  picture.dots(in_front(b, a, sensors_of(pair.target), margin), "#d6453d", 2.2);
-  picture.dots(in_front(a, b, sensors_of(pair.source), margin), "#d6453d", 2.2);
-  return picture.text();
+  Drawing drawing(all, kWidth / 2, kHeight / 2);
+  drawing.dots(a, "#7aa6d8", 1.6);
+  drawing.dots(b, "#9a9a92", 1.6);
+  drawing.dots(in_front(b, a, sensors_of(pair.target), margin), "#d6453d", 2.2);
+  drawing.dots(in_front(a, b, sensors_of(pair.source), margin), "#d6453d", 2.2);
+  return drawing.text();
 }
 
 }  // namespace

@@ -10,8 +10,9 @@ namespace gpureg::cli {
 namespace {
 
 // Size of a plot and its margins around the axes, in pixels.
-constexpr double kWidth = 460, kHeight = 320, kLeft = 52, kTop = 14, kRight = 14, kBottom = 46;
-constexpr double kSpanX = kWidth - kLeft - kRight, kSpanY = kHeight - kTop - kBottom;
+constexpr double kPlotWidth = 460, kPlotHeight = 320, kLeft = 52, kTop = 14, kRight = 14,
+                 kBottom = 46;
+constexpr double kSpanX = kPlotWidth - kLeft - kRight, kSpanY = kPlotHeight - kTop - kBottom;
 
 std::string n(double value) { return fixed(value, 1); }
 double px(double x) { return kLeft + kSpanX * std::clamp(x, 0.0, 1.0); }
@@ -42,7 +43,7 @@ constexpr const char* kGrid = "stroke=\"#e4e4de\"";
 
 std::string titles(const std::string& x_title, const std::string& y_title) {
   const double middle = kTop + kSpanY / 2;
-  return label(kLeft + kSpanX / 2, kHeight - 8, "middle", x_title) +
+  return label(kLeft + kSpanX / 2, kPlotHeight - 8, "middle", x_title) +
          label(14, middle, "middle", y_title, "transform=\"rotate(-90 14 " + n(middle) + ")\"");
 }
 
@@ -75,7 +76,7 @@ std::string escaped(const std::string& text) {
 
 std::string curve_plot(const std::vector<Curve>& curves, const std::string& x_title,
                        const std::string& y_title) {
-  std::string svg = begin(kWidth, kHeight);
+  std::string svg = begin(kPlotWidth, kPlotHeight);
   for (int tick = 0; tick <= 5; ++tick) {
     const double at = tick / 5.0;
     svg += line(px(at), py(0), px(at), py(1), kGrid) + line(px(0), py(at), px(1), py(at), kGrid);
@@ -110,7 +111,7 @@ std::string histogram_plot(const std::vector<Population>& populations, const std
   const auto most =
       static_cast<double>(std::max<std::size_t>(1, *std::max_element(sums.begin(), sums.end())));
   const double highest = 1.3 * most;  // space for the legend and the threshold's label
-  std::string svg = begin(kWidth, kHeight);
+  std::string svg = begin(kPlotWidth, kPlotHeight);
   for (int tick = 0; tick <= 5; ++tick)
     svg += label(px(tick / 5.0), py(0) + 17, "middle", fixed(tick / 5.0, 1));
   // About four ticks, at integers: the axis counts pairs.
@@ -148,10 +149,10 @@ std::string bar_plot(const std::vector<Bar>& bars, const std::string& unit) {
   constexpr double kLeastShown = 0.01;
   double longest = 1e-12;
   for (const Bar& bar : bars) longest = std::max(longest, bar.value);
-  std::string svg = begin(kWidth, kRow * static_cast<double>(bars.size()) + 8);
+  std::string svg = begin(kPlotWidth, kRow * static_cast<double>(bars.size()) + 8);
   double y = 4;
   for (const Bar& bar : bars) {
-    const double length = (kWidth - kName - kValue) * std::max(0.0, bar.value) / longest;
+    const double length = (kPlotWidth - kName - kValue) * std::max(0.0, bar.value) / longest;
     svg += label(kName - 8, y + 16, "end", bar.name) +
            rectangle(kName, y + 3, std::max(length, 1.0), kRow - 6, bar.color) +
            label(kName + length + 6, y + 16, "start",

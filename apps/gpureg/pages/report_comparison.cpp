@@ -22,15 +22,15 @@ std::vector<std::string> scenes_of(const std::vector<ReportEntry>& entries) {
   return scenes;
 }
 
-std::string cell(const std::string& text) { return "<td>" + escaped(text) + "</td>"; }
+std::string td(const std::string& text) { return "<td>" + escaped(text) + "</td>"; }
 
 std::string rule_cells(const std::optional<evaluation::Scores>& scores,
                        const std::optional<evaluation::RankedScores>& ranked) {
   if (!scores) return "<td></td><td></td><td></td><td></td>";
-  return cell(percent(scores->recall())) +
-         cell(scores->reported > 0 ? percent(scores->precision()) : "n/a") +
-         cell(ranked ? percent(ranked->recall_at_95) : "") +
-         cell(ranked ? percent(ranked->average_precision) : "");
+  return td(percent(scores->recall())) +
+         td(scores->reported > 0 ? percent(scores->precision()) : "n/a") +
+         td(ranked ? percent(ranked->recall_at_95) : "") +
+         td(ranked ? percent(ranked->average_precision) : "");
 }
 
 std::string row(const ReportEntry& entry, std::size_t index, bool evaluated) {
@@ -38,8 +38,8 @@ std::string row(const ReportEntry& entry, std::size_t index, bool evaluated) {
   const auto reported = std::count_if(result.pairs.begin(), result.pairs.end(),
                                       [](const PairRecord& pair) { return pair.aligned; });
   std::string html = "<tr><td><a href=\"#" + result_anchor(index) + "\">" + escaped(entry.name) +
-                     "</a></td>" + cell(std::to_string(result.pairs.size())) +
-                     cell(std::to_string(reported));
+                     "</a></td>" + td(std::to_string(result.pairs.size())) +
+                     td(std::to_string(reported));
   if (evaluated) {
     const evaluation::Evaluation none;
     const evaluation::Evaluation& e = entry.evaluation ? *entry.evaluation : none;
@@ -47,9 +47,9 @@ std::string row(const ReportEntry& entry, std::size_t index, bool evaluated) {
             rule_cells(e.geometric, e.geometric_ranked);
   }
   const auto memory = number_of(result.document, "/peak_memory_mib");
-  return html + cell(fixed(result.mean_milliseconds(), 1)) +
-         cell(fixed(result.mean_prepare_milliseconds(), 1)) +
-         cell(memory ? fixed(*memory, 0) : "") + "</tr>\n";
+  return html + td(fixed(result.mean_milliseconds(), 1)) +
+         td(fixed(result.mean_prepare_milliseconds(), 1)) + td(memory ? fixed(*memory, 0) : "") +
+         "</tr>\n";
 }
 
 std::string table(const std::vector<ReportEntry>& entries) {

@@ -16,7 +16,7 @@ namespace {
 
 constexpr const char* kGreen = "#2f9e5b";
 constexpr const char* kRed = "#d6453d";
-constexpr const char* kBlue = "#268be6";
+constexpr const char* kPlotBlue = "#268be6";
 constexpr const char* kAmber = "#e39a12";
 
 constexpr const char* kHead = R"(<!DOCTYPE html>
@@ -94,7 +94,7 @@ std::string truth_plots(const ResultFile& result, const evaluation::GroundTruth&
     curves.push_back(
         {name, color, recall_precision(truth, result, geometric), {s.recall(), s.precision()}});
   };
-  if (e.geometric) add("geometric", kBlue, true, *e.geometric);
+  if (e.geometric) add("geometric", kPlotBlue, true, *e.geometric);
   add("strict", kAmber, false, e.strict);
   Population correct{"correct", kGreen, {}}, incorrect{"false", kRed, {}};
   for (const EvaluatedPair& pair : evaluate_pairs(truth, result))
@@ -109,7 +109,7 @@ std::string truth_plots(const ResultFile& result, const evaluation::GroundTruth&
 }
 
 std::string score_plot(const ResultFile& result) {
-  Population aligned{"reported", kBlue, {}}, rejected{"not reported", kAmber, {}};
+  Population aligned{"reported", kPlotBlue, {}}, rejected{"not reported", kAmber, {}};
   for (const PairRecord& pair : result.pairs)
     if (pair.transform) (pair.aligned ? aligned : rejected).values.push_back(pair.score);
   return figure("Scores of the best candidates",
@@ -124,7 +124,8 @@ std::string time_plots(const ReportEntry& entry) {
       if (fragment.contains("ms")) fragments.add(fragment["ms"]);
   return "<h2>Time</h2>\n<div class=\"row\">\n" +
          figure("Preparation, mean per fragment", bar_plot(fragments.bars(kAmber), "ms")) +
-         figure("Alignment, mean per pair", bar_plot(entry.stages.bars(kBlue), "ms")) + "</div>\n";
+         figure("Alignment, mean per pair", bar_plot(entry.stages.bars(kPlotBlue), "ms")) +
+         "</div>\n";
 }
 
 std::string picture_list(const std::vector<Picture>& pictures) {

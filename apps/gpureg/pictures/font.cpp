@@ -6,11 +6,11 @@
 namespace gpureg::cli {
 namespace {
 
-constexpr int kWidth = 5, kHeight = 7;
+constexpr int kDotColumns = 5, kDotRows = 7;
 
 struct Glyph {
   char character;
-  std::uint8_t rows[kHeight];  // bit 4 is the leftmost dot
+  std::uint8_t rows[kDotRows];  // bit 4 is the leftmost dot
 };
 
 constexpr Glyph kGlyphs[] = {
@@ -76,16 +76,16 @@ const Glyph& glyph(char character) {
 void draw_text(Image& image, int x, int y, int scale, Color color, const std::string& text) {
   for (const char character : text) {
     const Glyph& g = glyph(character);
-    for (int row = 0; row < kHeight; ++row)
-      for (int column = 0; column < kWidth; ++column)
-        if (g.rows[row] >> (kWidth - 1 - column) & 1)
+    for (int row = 0; row < kDotRows; ++row)
+      for (int column = 0; column < kDotColumns; ++column)
+        if (g.rows[row] >> (kDotColumns - 1 - column) & 1)
           fill(image, x + column * scale, y + row * scale, scale, scale, color);
-    x += (kWidth + 1) * scale;
+    x += (kDotColumns + 1) * scale;
   }
 }
 
 int text_width(const std::string& text, int scale) {
-  return text.empty() ? 0 : (static_cast<int>(text.size()) * (kWidth + 1) - 1) * scale;
+  return text.empty() ? 0 : (static_cast<int>(text.size()) * (kDotColumns + 1) - 1) * scale;
 }
 
 }  // namespace gpureg::cli

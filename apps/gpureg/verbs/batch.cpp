@@ -50,7 +50,7 @@ bool can_have_journal(const std::string& path) {
   return ::stat(path.c_str(), &status) != 0 || S_ISREG(status.st_mode);
 }
 
-void check_outputs(const BatchOptions& o) {
+void check_batch_outputs(const BatchOptions& o) {
   std::vector<NamedPath> inputs = scene_files("DIR", o.folder);
   if (o.pairs != "all") inputs.push_back({"--pairs", o.pairs});
   if (!o.method.calibration.empty()) inputs.push_back({"--calibration", o.method.calibration});
@@ -210,7 +210,7 @@ void add_batch(CommandLine& line) {
   verb.run([o] {
     o->method.registration();  // reports bad options before the clouds are read
     up_prior(o->up);
-    check_outputs(*o);
+    check_batch_outputs(*o);
     choose_voxel_size(o->method, o->folder);
     if (!o->quiet) o->method.note_calibration();
     return Batch(*o).run();

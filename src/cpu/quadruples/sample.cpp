@@ -11,10 +11,10 @@ namespace gpureg::cpu {
 namespace {
 
 static_assert(sizeof(MatchedPoints) == 8 * sizeof(float), "first_sides steps by eight floats");
-constexpr std::uint32_t kBlock = 1 << 16;  // hypotheses per task
-constexpr int kLanes = 8;
+constexpr std::uint32_t kHypothesesPerTask = 1 << 16;
+constexpr int kDrawnTogether = 8;
 
-/// The quadruples of kLanes hypotheses at once, out[draw][lane]: the same integer steps as
+/// The quadruples of kDrawnTogether hypotheses at once, out[draw][lane]: the same integer steps as
 /// draw_quadruple.
 #if defined(__AVX2__)
 /// Low and high words of the products of eight words with a constant.
@@ -26,8 +26,8 @@ inline void multiply(__m256i a, std::uint32_t factor, __m256i& low, __m256i& hig
 }
 
 void draw_lanes(std::uint32_t first, std::uint64_t seed, std::uint32_t count,
-                std::uint32_t (*out)[kLanes]) {
-  static_assert(kLanes == 8, "one vector register");
+                std::uint32_t (*out)[kDrawnTogether]) {
+  static_assert(kDrawnTogether == 8, "one vector register");
   __m256i c0 = _mm256_add_epi32(_mm256_set1_epi32(static_cast<int>(first)),
                                 _mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7));
   __m256i c1 = _mm256_setzero_si256(), c2 = c1,
@@ -53,8 +53,8 @@ void draw_lanes(std::uint32_t first, std::uint64_t seed, std::uint32_t count,
 }
 #else
 void draw_lanes(std::uint32_t first, std::uint64_t seed, std::uint32_t count,
-                std::uint32_t (*out)[kLanes]) {
-  for (int l = 0; l < kLanes; ++l) {
+                std::uint32_t (*out)[kDrawnTogether]) {
+  for (int l = 0; l < kDrawnTogether; ++l) {
     const Quadruple q = draw_quadruple(first + static_cast<std::uint32_t>(l), seed, count);
     for (int d = 0; d < 4; ++d) out[d][l] = q.match[d];
   }
@@ -63,7 +63,8 @@ void draw_lanes(std::uint32_t first, std::uint64_t seed, std::uint32_t count,
 
 /// Bit l is set where the first side of lane l's quadrilateral passes the polygon test.
 #if defined(__AVX2__) && defined(__FMA__)
-unsigned first_sides(const MatchedPoints* m, const std::uint32_t (*draw)[kLanes], float tau2) {
+unsigned first_sides(const MatchedPoints* m, const std::uint32_t (*draw)[kDrawnTogether],
+                     float tau2) {
   // Eight matches of 32 bytes to six vectors of one coordinate each, by gathers with a stride:
   // float k of match i is at 8 i + k.
   const float* base = reinterpret_cast<const float*>(m);
@@ -85,9 +86,10 @@ unsigned first_sides(const MatchedPoints* m, const std::uint32_t (*draw)[kLanes]
   return static_cast<unsigned>(_mm256_movemask_ps(pass));
 }
 #else
-unsigned first_sides(const MatchedPoints* m, const std::uint32_t (*draw)[kLanes], float tau2) {
+unsigned first_sides(const MatchedPoints* m, const std::uint32_t (*draw)[kDrawnTogether],
+                     float tau2) {
   unsigned mask = 0;
-  for (int l = 0; l < kLanes; ++l)
+  for (int l = 0; l < kDrawnTogether; ++l)
     mask |= static_cast<unsigned>(similar_sides(m[draw[0][l]], m[draw[1][l]], tau2)) << l;
   return mask;
 }
@@ -98,7 +100,8 @@ unsigned first_sides(const MatchedPoints* m, const std::uint32_t (*draw)[kLanes]
 std::vector<std::vector<std::uint32_t>> sample_quadruples(Exec& exec,
                                                           const std::vector<Matches>& matches,
                                                           const RegistrationOptions& options) {
-  const std::uint32_t blocks = (options.quadruples.count + kBlock - 1) / kBlock;
+  const std::uint32_t blocks =
+      (options.quadruples.count + kHypothesesPerTask - 1) / kHypothesesPerTask;
   std::vector<std::vector<std::vector<std::uint32_t>>> parts(matches.size());
   for (std::size_t p = 0; p < matches.size(); ++p)
     if (matches[p].pairs.size() >= 4) parts[p].resize(blocks);
@@ -109,13 +112,15 @@ std::vector<std::vector<std::uint32_t>> sample_quadruples(Exec& exec,
         const std::vector<MatchedPoints>& m = matches[p].pairs;
         const std::uint32_t count = static_cast<std::uint32_t>(m.size());
         std::vector<std::uint32_t>& kept = parts[p][block];
-        const std::uint64_t begin = static_cast<std::uint64_t>(block) * kBlock;
-        const std::uint64_t end =
-            begin + kBlock < options.quadruples.count ? begin + kBlock : options.quadruples.count;
-        std::uint32_t draw[4][kLanes];
-        for (std::uint64_t first = begin; first < end; first += kLanes) {
+        const std::uint64_t begin = static_cast<std::uint64_t>(block) * kHypothesesPerTask;
+        const std::uint64_t end = begin + kHypothesesPerTask < options.quadruples.count
+                                      ? begin + kHypothesesPerTask
+                                      : options.quadruples.count;
+        std::uint32_t draw[4][kDrawnTogether];
+        for (std::uint64_t first = begin; first < end; first += kDrawnTogether) {
           draw_lanes(static_cast<std::uint32_t>(first), options.seed, count, draw);
-          const int lanes = end - first < kLanes ? static_cast<int>(end - first) : kLanes;
+          const int lanes =
+              end - first < kDrawnTogether ? static_cast<int>(end - first) : kDrawnTogether;
           // Most hypotheses fail at their first side, so only its matches are fetched.
           for (unsigned mask = first_sides(m.data(), draw, tau2) & ((1u << lanes) - 1); mask != 0;
                mask &= mask - 1) {

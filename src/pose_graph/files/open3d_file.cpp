@@ -15,7 +15,7 @@ namespace {
 using json::Document;
 using json::Value;
 
-constexpr double kRigidTolerance = 1e-3;
+constexpr double kRotationTolerance = 1e-3;
 
 /// Open3D writes matrices column by column.
 UnalignedIsometry3d read_pose(const Document& document, const Value& object, const char* name) {
@@ -25,7 +25,7 @@ UnalignedIsometry3d read_pose(const Document& document, const Value& object, con
   const Eigen::Matrix3d r = pose.linear();
   const double off = (r * r.transpose() - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff();
   const double last = (pose.matrix().row(3) - Eigen::RowVector4d(0, 0, 0, 1)).cwiseAbs().maxCoeff();
-  if (!(off <= kRigidTolerance) || !(last <= 1e-6) || r.determinant() < 0)
+  if (!(off <= kRotationTolerance) || !(last <= 1e-6) || r.determinant() < 0)
     document.fail(
         object.line,
         std::string(name) + " of the object that begins here is not a rotation and a translation");

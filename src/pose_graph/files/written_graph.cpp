@@ -10,7 +10,7 @@ namespace {
   throw InvalidArgument(what + ", which a file of " + format + " cannot say");
 }
 
-std::string at(const char* list, std::size_t index) {
+std::string entry(const char* list, std::size_t index) {
   return std::string(list) + "[" + std::to_string(index) + "]";
 }
 
@@ -46,7 +46,7 @@ WrittenGraph::WrittenGraph(const Graph& graph, const Result* result, const char*
       poses.push_back(result->world_from_node[k]);
     } else {
       if (!graph.nodes[k].world_from_node)
-        refuse(at("nodes", k) + " has no world_from_node", format);
+        refuse(entry("nodes", k) + " has no world_from_node", format);
       poses.push_back(*graph.nodes[k].world_from_node);
     }
   }
@@ -55,10 +55,10 @@ WrittenGraph::WrittenGraph(const Graph& graph, const Result* result, const char*
     if (result && result->edges[k].state == EdgeState::rejected) continue;
     const std::uint32_t mode = result ? result->edges[k].mode : 0;
     if (mode > edge.alternatives.size())
-      throw InvalidArgument("result." + at("edges", k) + ".mode is " + std::to_string(mode) +
+      throw InvalidArgument("result." + entry("edges", k) + ".mode is " + std::to_string(mode) +
                             ", but the edge has " + std::to_string(edge.alternatives.size()) +
                             " alternatives");
-    edges.push_back(written_edge(edge, mode, at("edges", k), format));
+    edges.push_back(written_edge(edge, mode, entry("edges", k), format));
   }
 }
 

@@ -12,8 +12,8 @@ namespace gpureg::pose_graph {
 namespace {
 
 /// Steps per round: the weights of the next round matter more than the minimum of this one.
-constexpr int kStepsPerRound = 1;
-constexpr double kRoundTolerance = 1e-3;
+constexpr int kGraduateSteps = 1;
+constexpr double kGraduateTolerance = 1e-3;
 /// Weights closer than this to 0 or 1 are so.
 constexpr double kBinary = 1e-3;
 /// Beyond this mu only loops within 12 % of their threshold are undecided, which settle() decides.
@@ -126,7 +126,7 @@ double hard_weight(double ratio) { return ratio <= 1 ? 1 : 0; }
 bool minimised(const Problem& problem, NormalEquations& equations, int iterations, Control& control,
                Estimate& estimate) {
   const MinimisationResult result = minimise(problem, equations, estimate.selection, iterations,
-                                             kRoundTolerance, control, estimate.poses);
+                                             kGraduateTolerance, control, estimate.poses);
   estimate.failed = result.failed;
   estimate.converged = result.converged;
   estimate.last_decrease = result.last_decrease;
@@ -179,7 +179,7 @@ void graduate(const Problem& problem, NormalEquations& equations,
           update_weights(problem, candidates, now, estimate.selection,
                          [&](double ratio) { return truncated_weight(ratio, mu); });
       if ((!undecided && mu > 1) || mu > kLastMu) break;
-      if (!minimised(problem, equations, kStepsPerRound, control, estimate)) return;
+      if (!minimised(problem, equations, kGraduateSteps, control, estimate)) return;
       now = fits_of(problem, candidates, estimate.poses, quantile, control.threads);
     }
   }

@@ -21,7 +21,7 @@ constexpr int kLargeSet = 16;
 /// those, there is nothing that levels could improve.
 constexpr double kNearlyAll = 0.9;
 
-bool any(const std::vector<char>& flags) {
+bool any_flag(const std::vector<char>& flags) {
   return std::find(flags.begin(), flags.end(), 1) != flags.end();
 }
 
@@ -161,7 +161,7 @@ class GncSolver {
         fresh[k] = in || last;
         seen[k] = fresh[k];
       }
-      if (any(fresh)) {
+      if (any_flag(fresh)) {
         bool apart = false;
         estimate = restarted(std::move(estimate), fresh, consensus.modes, apart);
         if (!first) fresh = explained(estimate, fresh);
@@ -169,7 +169,7 @@ class GncSolver {
         // Least squares is a good start while nearly all loops are correct, and where new poses of
         // a part came from single paths. Among later loops may be false ones that agree with each
         // other; then the estimate is a better start.
-        if (first || any(fresh))
+        if (first || any_flag(fresh))
           estimate = graduated(std::move(estimate), admitted, first || apart);
         first = false;
         if (estimate.failed || control_.cancelled) return estimate;
