@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <gtest/gtest.h>
-
-#include <chrono>
+#include <sys/resource.h>
 
 #include "cli/command.hpp"
 #include "cli/scene.hpp"
@@ -33,6 +32,13 @@ class HostileJson : public ::testing::Test {
            R"(,"status":"aligned","reason":"none","score":1,)"
            R"("T_ij":[1,0,0,0,0,1,0,0,0,0,1,0,0,0,0,1],"ms":{"total":1)" +
            ms + "}}";
+  }
+
+  /// Processor time of all commands so far.
+  static long seconds_of_commands() {
+    rusage usage{};
+    getrusage(RUSAGE_CHILDREN, &usage);
+    return usage.ru_utime.tv_sec;
   }
 
   /// The verbs that read a result, with what else they need.
@@ -85,11 +91,11 @@ TEST_F(HostileJson, ManyStagesTakeNoTime) {
     pairs += (k > 0 ? "," : "") + pair(k, k + 1, ms);
   }
   const std::string many = out_.write("many.json", "{\"pairs\":[" + pairs + "]}");
-  const auto start = std::chrono::steady_clock::now();
+  const auto begin = seconds_of_commands();
   Command command({"report", many, "-o", out_ / "r.html"});
   EXPECT_EQ(command.wait().status, 0);
   // It takes a few seconds; a search through all names for each of them takes minutes.
-  EXPECT_LT(std::chrono::steady_clock::now() - start, std::chrono::seconds(60));
+  EXPECT_LT(seconds_of_commands() - begin, 60);
 }
 
 TEST_F(HostileJson, MembersThatStandTwiceAreNamed) {
