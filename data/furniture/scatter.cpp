@@ -15,7 +15,7 @@ using Eigen::Vector2f;
 using Eigen::Vector3f;
 
 constexpr float kPassage = 0.5f;  // metres left between two pieces
-constexpr float kFullTurn = 6.2831853f;
+constexpr float kAnyYaw = 6.2831853f;
 
 using Maker = Piece (*)(Random&);
 const Maker kMakers[] = {chair,     office_chair, armchair,     bookshelf,    wardrobe,
@@ -59,7 +59,7 @@ class Scatterer {
     const float radius = 0.5f * std::hypot(piece.width, piece.depth);
     for (int attempt = 0; attempt < 30; ++attempt) {
       const Vector2f at = any_place();
-      const float yaw = random_.uniform(0, kFullTurn);
+      const float yaw = random_.uniform(0, kAnyYaw);
       const bool crowded = std::any_of(taken_.begin(), taken_.end(), [&](const Circle& other) {
         return (other.centre - at).norm() < other.radius + radius + kPassage;
       });
@@ -95,7 +95,7 @@ class Scatterer {
   void put_picture() {
     for (int attempt = 0; attempt < 30; ++attempt) {
       const Vector2f at = any_place();
-      const float yaw = random_.uniform(0, kFullTurn), low = random_.uniform(1.0f, 1.6f),
+      const float yaw = random_.uniform(0, kAnyYaw), low = random_.uniform(1.0f, 1.6f),
                   width = random_.uniform(0.25f, 1.0f), height = random_.uniform(0.3f, 0.8f);
       const Vector3f eye(at.x(), at.y(), low + height / 2), ray(std::cos(yaw), std::sin(yaw), 0);
       const RayHit wall = scene_.cast(eye, ray);

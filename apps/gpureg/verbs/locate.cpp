@@ -30,7 +30,7 @@ using localization::LocateStatus;
 using localization::MapOptions;
 using localization::PreparedMap;
 
-struct Options {
+struct LocateRun {
   std::vector<std::string> files;  // scans, then the map
   MethodOptions method;
   PlaceOptions place;
@@ -61,7 +61,7 @@ void print(const std::string& file, const LocateResult& result) {
   }
 }
 
-std::vector<LocateResult> locate_all(const Options& o, const Context& context,
+std::vector<LocateResult> locate_all(const LocateRun& o, const Context& context,
                                      const PreparedMap& map, const LocateOptions& options) {
   std::vector<PointCloud> clouds;
   ViewpointNote note;
@@ -77,7 +77,7 @@ std::vector<LocateResult> locate_all(const Options& o, const Context& context,
                               std::vector<LocatePrior>(views.size(), o.place.prior()), o.scans());
 }
 
-void write_json(const Options& o, const Context& context, const PreparedMap& map,
+void write_json(const LocateRun& o, const Context& context, const PreparedMap& map,
                 const LocateOptions& options, const std::vector<LocateResult>& results,
                 double seconds) {
   Json head;
@@ -93,7 +93,7 @@ void write_json(const Options& o, const Context& context, const PreparedMap& map
                                 }});
 }
 
-int run(Options o) {
+int run(LocateRun o) {
   if (o.files.size() < 2 && o.save_map.empty())
     throw InvalidArgument("one file is given, expected scans and then the map");
   o.method.registration();  // what is wrong with it shall be said before clouds are read
@@ -132,7 +132,7 @@ int run(Options o) {
 }  // namespace
 
 void add_locate(CommandLine& line) {
-  const auto o = std::make_shared<Options>();
+  const auto o = std::make_shared<LocateRun>();
   Verb verb = line.verb("locate", "Find scans in a map, or say that they are not there");
   verb.option(
           "SCAN...MAP", o->files,
