@@ -13,7 +13,7 @@ namespace {
 constexpr double kConfident = 0.9;
 /// Modes of a pair that are asked, and the least confidence of one.
 constexpr std::size_t kModes = 4;
-constexpr double kLeastConfidence = 0.1;
+constexpr double kLeastOfMode = 0.1;
 /// A rival at another pose that is as likely as not.
 constexpr double kRival = 0.5;
 /// Scans so many numbers apart are as if they had none.
@@ -29,19 +29,18 @@ constexpr double kSignificant = 3;
 constexpr std::size_t kLeastSteps = 3;
 constexpr double kStepQuantile = 0.9, kLongestStep = 1.5;
 /// Poses of one pair that are the same but for drift, metres and degrees.
-constexpr double kSameDistance = 0.3, kSameTurn = 6;
+constexpr double kFitDistance = 0.3, kFitTurn = 6;
 /// Islands grow at most so often.
-constexpr int kMostRounds = 16;
+constexpr int kMostPasses = 16;
 
 double degrees(const Eigen::Matrix3d& rotation) {
   constexpr double kDegrees = 180 / 3.14159265358979323846;
   return kDegrees * std::acos(std::clamp((rotation.trace() - 1) / 2, -1.0, 1.0));
 }
 
-bool same(const UnalignedIsometry3d& a, const UnalignedIsometry3d& b) {
+bool fits(const UnalignedIsometry3d& a, const UnalignedIsometry3d& b) {
   const UnalignedIsometry3d difference = a.inverse() * b;
-  return difference.translation().norm() < kSameDistance &&
-         degrees(difference.linear()) < kSameTurn;
+  return difference.translation().norm() < kFitDistance && degrees(difference.linear()) < kFitTurn;
 }
 
 std::uint32_t gap_of(const Pair& pair) {
@@ -161,11 +160,11 @@ class Growth {
       const std::uint32_t s = pairs[k].source, t = pairs[k].target;
       const std::vector<RegistrationMode>& modes = results[k].modes;
       for (std::size_t m = 0; m < std::min(kModes, modes.size()); ++m) {
-        if (modes[m].confidence < kLeastConfidence) continue;
+        if (modes[m].confidence < kLeastOfMode) continue;
         const UnalignedIsometry3d& pose = modes[m].target_from_source;
         if (island_[s] != island_[t])
           add(modes[m].confidence, k, s, t, pose, between);
-        else if (m == 0 && same(pose_[t].inverse() * pose_[s], pose))
+        else if (m == 0 && fits(pose_[t].inverse() * pose_[s], pose))
           trusted[k] = grown = true;
       }
     }
@@ -244,7 +243,7 @@ class Growth {
     for (const Placement& p : placements) {
       const UnalignedIsometry3d implied =
           pose_[p.scan_a].inverse() * seed.a_from_b * pose_[p.scan_b];
-      if (used.count(p.pair) || !same(implied, p.pose)) continue;
+      if (used.count(p.pair) || !fits(implied, p.pose)) continue;
       used.insert(p.pair);
       join.pairs.push_back(p.pair);
       join.wrong *= 1 - std::min(p.confidence, 1 - 1e-9);
@@ -295,7 +294,7 @@ std::vector<char> pairs_along_the_path(const std::vector<Eigen::Vector3d>& senso
     trusted[k] = gap_of(pairs[k]) <= path.near && results[k].has_candidate &&
                  step_of(pairs[k], results[k].target_from_source, sensors) <=
                      gap_of(pairs[k]) * path.max_step;
-  for (int round = 0; round < kMostRounds; ++round) {
+  for (int round = 0; round < kMostPasses; ++round) {
     const Reconstruction map = reconstruct(sensors.size(), pairs, only(results, trusted), options);
     if (!Growth(map, path, sensors).grow(pairs, results, trusted)) break;
   }
