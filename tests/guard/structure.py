@@ -115,16 +115,13 @@ def full_folders(root: pathlib.Path) -> list[str]:
     return found
 
 
-# Folders whose sources are one target, without those that are compiled alone, for their flags.
+# Folders whose sources are one library, without those that are compiled alone, for their flags.
 TOGETHER = (
     ("src/cpu",),
     tuple(f"src/{name}" for name in ("api viewpoint symmetry spacing confidence calibration"
                                      " loop_consistency pruning").split()),
-    *((f"src/{name}",) for name in ("evaluation io pose_graph reconstruction loop_closure localization"
-                                    " fields files").split()),
+    *((f"src/{name}",) for name in "evaluation io pose_graph reconstruction localization fields files".split()),
     ("data",),
-    tuple(f"apps/gpureg/{name}" for name in "verbs options run inputs json records pages pictures".split()),
-    ("python/bindings",),
 )  # fmt: skip
 ALONE = {"byte_rows.cpp", "closest_grid.cpp", "feature_search.cpp", "surface_graph.cpp"}
 
