@@ -76,7 +76,8 @@ std::optional<UnalignedIsometry3d> pose_of(const Options& o, const Context& cont
   record["located"] = to_json(result, o.scan);
   std::cout << "status   " << localization::to_string(result.status);
   if (result.status != LocateStatus::found) {
-    std::cout << ": not compared; --pose says where the scan is\n";
+    std::cout << ": not compared. In a place that has changed, --min-score asks for less, and "
+                 "--pose gives the pose\n";
     return std::nullopt;
   }
   std::cout << ", confidence " << fixed(result.poses.front().confidence, 3) << "\n";
