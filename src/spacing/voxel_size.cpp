@@ -7,8 +7,9 @@
 #include <limits>
 #include <unordered_map>
 
-#include "common/radix_sort.hpp"
 #include "math/jacobi.hpp"
+#include "spacing/sorted_rows.hpp"
+#include "spacing/voxel_keys.hpp"
 
 namespace gpureg {
 namespace {
@@ -59,38 +60,6 @@ Eigen::Vector3d eigenvalues(const Eigen::Matrix3d& matrix) {
   return out;
 }
 
-using Row = std::vector<Eigen::Vector3f>::iterator;
-
-void sort_by_coordinates(Row first, Row last) {
-  constexpr std::ptrdiff_t kFew = 4096;  // the buckets of a radix sort cost more
-  if (last - first < kFew) {
-    std::sort(first, last, [](const Eigen::Vector3f& p, const Eigen::Vector3f& q) {
-      return std::lexicographical_compare(p.data(), p.data() + 3, q.data(), q.data() + 3);
-    });
-    return;
-  }
-  std::vector<Eigen::Vector3f> rows(first, last);
-  for (const int axis : {2, 1, 0})
-    radix_sort(rows, [axis](const Eigen::Vector3f& p) { return sortable_bits(p[axis]); });
-  std::copy(rows.begin(), rows.end(), first);
-}
-
-/// Numbers of the voxels of prepare().
-class VoxelKeys {
- public:
-  VoxelKeys(const Eigen::AlignedBox3d& box, double size)
-      : size_(size), first_((box.min().array() / size).floor()) {}
-  std::uint64_t operator()(const Eigen::Vector3f& p) const {
-    const Eigen::Array3d cell = (p.cast<double>().array() / size_).floor() - first_;
-    return static_cast<std::uint64_t>(cell.x()) << 42 | static_cast<std::uint64_t>(cell.y()) << 21 |
-           static_cast<std::uint64_t>(cell.z());
-  }
-
- private:
-  double size_;
-  Eigen::Array3d first_;
-};
-
 /// The finite points of a cloud, sorted along its longest side: neighbours within d are within d
 /// along the order.
 class SortedCloud {
@@ -110,7 +79,7 @@ class SortedCloud {
   double extent() const { return points_.empty() ? 0 : box_.sizes().maxCoeff(); }
 
   double spacing() const {
-    const std::vector<std::size_t> places = distinct_rows();
+    const std::vector<std::size_t> places = distinct_rows(points_);
     std::vector<double> distances;
     for_sample(kSpacingSample, [&](std::size_t row) {
       const auto place = std::upper_bound(places.begin(), places.end(), row) - 1;
@@ -174,7 +143,7 @@ class SortedCloud {
       Eigen::Vector3d sum = Eigen::Vector3d::Zero();
       std::size_t count = 0;
     };
-    const VoxelKeys key_of(box_, size);
+    const VoxelKeys key_of(box_.min(), size);
     std::unordered_map<std::uint64_t, std::size_t> number_of;
     std::vector<Voxel> voxels;
     std::uint64_t last = 0;
@@ -199,7 +168,7 @@ class SortedCloud {
   std::size_t occupied(double size, std::size_t most, std::vector<std::uint64_t>& keys) const {
     keys.clear();
     const std::size_t step = points_.size() / most + 1;
-    const VoxelKeys key_of(box_, size);
+    const VoxelKeys key_of(box_.min(), size);
     for (std::size_t k = 0; k < points_.size(); k += step) keys.push_back(key_of(points_[k]));
     std::sort(keys.begin(), keys.end());
     return static_cast<std::size_t>(std::unique(keys.begin(), keys.end()) - keys.begin());
@@ -210,21 +179,7 @@ class SortedCloud {
     for (const Eigen::Vector3f& p : points_) box_.extend(p.cast<double>());
     if (points_.empty()) return;
     box_.sizes().maxCoeff(&axis_);
-    radix_sort(points_, [a = axis_](const Eigen::Vector3f& p) { return sortable_bits(p[a]); });
-    // A total order: the order of equal coordinates must not depend on that of the rows.
-    for (auto first = points_.begin(), last = first; first != points_.end(); first = last) {
-      bool equal = true;
-      for (; last != points_.end() && (*last)[axis_] == (*first)[axis_]; ++last)
-        equal = equal && *last == *first;
-      if (!equal) sort_by_coordinates(first, last);
-    }
-  }
-  /// The first row of each place.
-  std::vector<std::size_t> distinct_rows() const {
-    std::vector<std::size_t> rows;
-    for (std::size_t k = 0; k < points_.size(); ++k)
-      if (k == 0 || points_[k] != points_[k - 1]) rows.push_back(k);
-    return rows;
+    sort_rows(points_, axis_);
   }
   /// Covariance of the points within the radius of a point, and their number.
   std::size_t neighborhood(std::size_t at, double radius, Eigen::Matrix3d& covariance) const {
