@@ -66,23 +66,27 @@ function(gpureg_numeric_target target)
   target_compile_options(${target} PRIVATE -fno-math-errno -fno-trapping-math)
 endfunction()
 
+function(gpureg_test_flags target)
+  target_compile_options(${target} PRIVATE $<$<AND:$<COMPILE_LANGUAGE:CXX>,$<CONFIG:Release>>:-O1>)
+endfunction()
+
 # add_gpureg_test(name SOURCES a_test.cpp ... LIBS gpureg::gpureg ...): one executable, each of its cases a ctest test.
 # NOT_PRECOMPILED: where a library of it adds flags. EXHAUSTIVE: compares with searches of its own, which the optimiser makes faster; the
-# other tests run once per compilation.
+# other tests run once per compilation, and share a header that was compiled with their flags.
 function(add_gpureg_test name)
   cmake_parse_arguments(arg "NOT_PRECOMPILED;EXHAUSTIVE" "" "SOURCES;LIBS" ${ARGN})
   add_executable(${name} ${arg_SOURCES})
   gpureg_target(${name})
-  if(NOT arg_NOT_PRECOMPILED)
-    gpureg_use_precompiled(${name} gpureg_test_headers)
-  endif()
   if(NOT arg_EXHAUSTIVE)
-    target_compile_options(${name} PRIVATE $<$<AND:$<COMPILE_LANGUAGE:CXX>,$<CONFIG:Release>>:-O1>)
+    gpureg_test_flags(${name})
+    if(NOT arg_NOT_PRECOMPILED)
+      gpureg_use_precompiled(${name} gpureg_test_headers)
+    endif()
   endif()
   # GoogleTest's macros are an if-else of their own.
   target_compile_options(${name} PRIVATE $<$<COMPILE_LANGUAGE:CXX>:-Wno-dangling-else>)
   target_include_directories(${name} PRIVATE ${PROJECT_SOURCE_DIR}/src ${PROJECT_SOURCE_DIR}/tests)
-  target_link_libraries(${name} PRIVATE ${arg_LIBS} GTest::gtest GTest::gtest_main)
+  target_link_libraries(${name} PRIVATE ${arg_LIBS} Eigen3::Eigen GTest::gtest GTest::gtest_main)
   gtest_discover_tests(${name} TEST_PREFIX ${name}. DISCOVERY_TIMEOUT 60 PROPERTIES TIMEOUT 900)
 endfunction()
 

@@ -16,7 +16,8 @@ int device_of(const void* pointer) {
              : -1;
 }
 
-void check_on_host(const RawCloud& cloud) {
+void CudaEngine::check_on_host(const RawCloud& cloud) const {
+  const DeviceScope scope(device());
   const std::pair<const char*, const float*> fields[] = {{"cloud.points", cloud.points},
                                                          {"cloud.normals", cloud.normals},
                                                          {"cloud.features", cloud.features}};
@@ -148,7 +149,7 @@ std::vector<std::shared_ptr<PreparedState>> CudaEngine::prepare_adopted(
     adopted.wait();
     raw.push_back(adopted.raw);
   }
-  return prepare_anywhere(span_of(raw), options);
+  return prepare(span_of(raw), options);
 }
 
 std::vector<float> CudaEngine::copy_points(const AdoptedCloud& cloud) {

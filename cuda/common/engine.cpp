@@ -153,15 +153,6 @@ std::size_t CudaEngine::pairs_per_chunk(const RegistrationOptions& options) cons
 }
 
 CudaEngine::Clouds CudaEngine::prepare(Span<const RawCloud> clouds, const PrepareOptions& options) {
-  {
-    const DeviceScope scope(device());
-    for (const RawCloud& cloud : clouds) check_on_host(cloud);
-  }
-  return prepare_anywhere(clouds, options);
-}
-
-CudaEngine::Clouds CudaEngine::prepare_anywhere(Span<const RawCloud> clouds,
-                                                const PrepareOptions& options) {
   if (has_budget()) return prepare_within_budget(clouds, options);
   if (chunks_of(clouds, kRawPointsPerChunk).size() > 1)
     return prepare_on_lanes(clouds, chunks_of(clouds, kRawPointsPerLane), options);

@@ -28,6 +28,7 @@ class CudaEngine final : public DeviceEngine {
   std::vector<DeviceMemoryUse> device_memory() const override;
   void trim() override;
   std::size_t pairs_per_chunk(const RegistrationOptions& options) const override;
+  void check_on_host(const RawCloud& cloud) const override;
   std::vector<std::shared_ptr<PreparedState>> prepare(Span<const RawCloud> clouds,
                                                       const PrepareOptions& options) override;
   std::shared_ptr<AdoptedCloud> adopt(const RawCloud& cloud, const RowStreams& streams) override;
@@ -64,7 +65,6 @@ class CudaEngine final : public DeviceEngine {
   template <typename Work>
   void for_runs_within_budget(Span<const PairInput> pairs, const Work& work);
 
-  Clouds prepare_anywhere(Span<const RawCloud> clouds, const PrepareOptions& options);
   /// Chunk after chunk, each as large as the memory budget allows after those before it.
   Clouds prepare_within_budget(Span<const RawCloud> clouds, const PrepareOptions& options);
   /// Chunks on both lanes in turns: while one uploads, the other computes.
@@ -83,8 +83,6 @@ std::shared_ptr<Engine> make_engine_of_many(const std::vector<int>& devices,
 
 /// Device of the memory of a pointer; -1: not device memory.
 int device_of(const void* pointer);
-/// Throws InvalidArgument naming the field where a cloud's rows are not in host memory.
-void check_on_host(const RawCloud& cloud);
 /// Device that prepares an adopted cloud: the one that holds it.
 int device_of(const AdoptedCloud& cloud);
 

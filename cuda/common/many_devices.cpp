@@ -74,6 +74,7 @@ class EngineOfMany final : public DeviceEngine {
     return engines_[0]->pairs_per_chunk(options) * kChunksPerDevice * engines_.size();
   }
 
+  void check_on_host(const RawCloud& cloud) const override { engines_[0]->check_on_host(cloud); }
   std::vector<std::shared_ptr<PreparedState>> prepare(Span<const RawCloud> clouds,
                                                       const PrepareOptions& options) override {
     std::vector<std::shared_ptr<PreparedState>> out(clouds.size);

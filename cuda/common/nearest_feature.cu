@@ -46,9 +46,8 @@ __global__ void __launch_bounds__(kThreads)
         const int row = k / kDims, d = k % kDims;
         const std::uint32_t q = q_begin + static_cast<std::uint32_t>(row);
         if (d < dims)
-          q_tile[d][row] = q < f.query_count
-                               ? f.queries[static_cast<std::size_t>(q) * f.dimension + d0 + d]
-                               : 0.0f;
+          q_tile[d][row] =
+              q < f.query_count ? f.queries[std::size_t(f.row_of(q)) * f.dimension + d0 + d] : 0.0f;
       }
       for (int k = static_cast<int>(threadIdx.x); k < kRows * kDims; k += kThreads) {
         const int row = k / kDims, d = k % kDims;
@@ -95,7 +94,8 @@ __global__ void unpack_nearest(const FeatureQuery* batch, const unsigned long lo
   const FeatureQuery f = batch[blockIdx.y];
   const std::uint32_t q = blockIdx.x * blockDim.x + threadIdx.x;
   if (q < f.query_count)
-    out[f.out + q] = f.query_valid[q] ? static_cast<std::uint32_t>(best[f.out + q]) : kNoValue;
+    out[f.out + q] =
+        f.query_valid[f.row_of(q)] ? static_cast<std::uint32_t>(best[f.out + q]) : kNoValue;
 }
 
 /// Any k up to limits::kMaxNeighbors: a warp per query. Every lane keeps the best of its rows, then
@@ -105,7 +105,7 @@ __global__ void __launch_bounds__(128)
   const FeatureQuery f = batch[blockIdx.y];
   const std::uint32_t q = blockIdx.x * 4 + threadIdx.x / 32, lane = threadIdx.x % 32;
   if (q >= f.query_count) return;
-  const float* query = f.queries + static_cast<std::size_t>(q) * f.dimension;
+  const float* query = f.queries + static_cast<std::size_t>(f.row_of(q)) * f.dimension;
   unsigned long long best[limits::kMaxNeighbors];
   for (auto& b : best) b = kNone;
   for (std::uint32_t r = lane; r < f.row_count; r += 32) {
@@ -138,7 +138,7 @@ __global__ void __launch_bounds__(128)
     if (head == least && head != kNone) ++taken;
     if (lane == 0)
       out[f.out + static_cast<std::size_t>(q) * k + t] =
-          f.query_valid[q] ? static_cast<std::uint32_t>(least) : kNoValue;
+          f.query_valid[f.row_of(q)] ? static_cast<std::uint32_t>(least) : kNoValue;
   }
 }
 

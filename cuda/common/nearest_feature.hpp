@@ -13,6 +13,7 @@ namespace gpureg::cuda {
 struct FeatureQuery {
   const float* queries;
   const std::uint8_t* query_valid;
+  const std::uint32_t* query_row;  ///< row of each query; null: query k is row k
   std::uint32_t query_count;
   const float* rows;
   const std::uint8_t* row_valid;
@@ -25,6 +26,10 @@ struct FeatureQuery {
   const float* query_error;
   const float2* row_square;
   const float *query_scale, *row_scale;
+
+  GPUREG_HD std::uint32_t row_of(std::uint32_t query) const {
+    return query_row ? query_row[query] : query;
+  }
 };
 
 /// Nearest rows of every query: k indices per query in order of distance (squared norm of the

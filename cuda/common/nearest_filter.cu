@@ -91,8 +91,8 @@ __device__ void load_rows(std::uint32_t (&b)[2 * kSteps], const std::uint32_t* t
 template <int kWidth>
 __device__ void measure(const FeatureQuery& f, std::uint32_t q, std::uint32_t r,
                         unsigned long long* best) {
-  const float4* query =
-      reinterpret_cast<const float4*>(f.query_padded + static_cast<std::size_t>(q) * kWidth);
+  const float4* query = reinterpret_cast<const float4*>(
+      f.query_padded + static_cast<std::size_t>(f.row_of(q)) * kWidth);
   const float4* row =
       reinterpret_cast<const float4*>(f.row_padded + static_cast<std::size_t>(r) * kWidth);
   float sum = 0.0f;
@@ -182,13 +182,14 @@ __global__ void __launch_bounds__(kThreads, blocks_a_multiprocessor(kSteps))
 #pragma unroll
   for (int m = 0; m < 2 * kTiles; ++m) {
     const std::uint32_t q = q_first + static_cast<std::uint32_t>(m * 8 + row_of_lane);
-    const bool asks = q < f.query_count && f.query_valid[q];
+    const std::uint32_t own = q < f.query_count ? f.row_of(q) : 0;
+    const bool asks = q < f.query_count && f.query_valid[own];
     limit[m] = kCollect ? -kInfinity : kInfinity;
     if (kCollect && asks)
-      limit[m] = from_ordered(batch.bound[f.out + q]) + 2.0f * f.query_error[q] / unit +
+      limit[m] = from_ordered(batch.bound[f.out + q]) + 2.0f * f.query_error[own] / unit +
                  kTinySquare * (*f.query_scale * *f.row_scale);
     const std::uint32_t* query = reinterpret_cast<const std::uint32_t*>(f.query_half) +
-                                 static_cast<std::size_t>(q) * kWords + k_of_lane;
+                                 static_cast<std::size_t>(own) * kWords + k_of_lane;
 #pragma unroll
     for (int s = 0; s < kSteps; ++s)
 #pragma unroll

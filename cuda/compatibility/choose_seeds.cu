@@ -5,7 +5,6 @@
 #include "cuda/compatibility/match_set.cuh"
 #include "cuda/device/device_algorithms.hpp"
 #include "cuda/device/group_by_cell.cuh"
-#include "cuda/device/warp.cuh"
 
 namespace gpureg::cuda {
 namespace {
@@ -14,15 +13,17 @@ constexpr int kThreads = 128, kRows = 4;                // matches of a thread
 constexpr std::uint32_t kBlockRows = kThreads * kRows;  // matches of a thread block
 // matches in shared memory at a time
 constexpr std::uint32_t kTile = kThreads;
+// matches of the sample that a thread block compares: enough blocks for a single pair
+constexpr std::uint32_t kBlockColumns = 4 * kTile;
 // matches that a lane of find_slopes() holds
 constexpr std::uint32_t kHeld = 8;
-constexpr int kDegreeBits = 17;  // 0 to 2^16
+constexpr int kDegreeBits = 12;  // 0 to 2^11
 constexpr std::uint32_t kMaxDegree = (1u << kDegreeBits) - 1;
 constexpr int kStrengthBits = 24;  // 0 to 2^23, see seed_strength()
 constexpr std::uint32_t kMaxStrength = (1u << kStrengthBits) - 2;
 constexpr std::uint32_t kPadding = (2u << kStrengthBits) - 1;  // greater than the key of any match
-static_assert(limits::kMaxMatches <= kMaxDegree, "keys hold every degree");
-static_assert(std::uint64_t(limits::kMaxMatches) << 17 >> kStrengthShift <= kMaxStrength,
+static_assert(kDegreeSample <= kMaxDegree, "keys hold every degree");
+static_assert(std::uint64_t(kDegreeSample) << 17 >> kStrengthShift <= kMaxStrength,
               "keys hold every strength, see seed_strength()");
 
 struct SeedBatch {
@@ -35,24 +36,19 @@ struct SeedBatch {
   std::uint8_t* slope;
 };
 
-/// Number of compatible matches of each match, itself included. Compatibility is symmetric: a
-/// thread block compares one range of the matches (y) with an equal or later range (x) and counts
-/// for both. z: pair.
+/// Degrees, see kDegreeSample. Thread blocks: x matches, y part of the sample, z pair.
 __global__ void __launch_bounds__(kThreads) count_compatible(SeedBatch b) {
   __shared__ PackedMatch tile[kTile];
-  __shared__ std::uint32_t column_count[kTile];
   const std::uint32_t p = blockIdx.z, n = b.count[p], room = b.room[p],
-                      row = blockIdx.y * kBlockRows, column = blockIdx.x * kBlockRows;
-  if (blockIdx.x < blockIdx.y || column >= n) return;
-  const std::uint32_t lane = threadIdx.x % 32, last = min(n, column + kBlockRows);
-  const bool mutual = blockIdx.x > blockIdx.y;
+                      row = blockIdx.x * kBlockRows, column = blockIdx.y * kBlockColumns;
+  const std::uint32_t last = min(min(n, kDegreeSample), column + kBlockColumns);
+  if (row >= n || column >= last) return;
   OrientedMatch own[kRows];
   std::uint32_t count[kRows];
 #pragma unroll
   for (int r = 0; r < kRows; ++r) {
     const std::uint32_t i = row + static_cast<std::uint32_t>(r) * kThreads + threadIdx.x;
     own[r] = match_at(b.matches, room + min(i, n - 1));
-    if (i >= n) own[r].p.x = __uint_as_float(0x7fffffffu);  // NaN: compatible with nothing
     count[r] = 0;
   }
   for (std::uint32_t base = column; base < last; base += kTile) {
@@ -60,28 +56,12 @@ __global__ void __launch_bounds__(kThreads) count_compatible(SeedBatch b) {
     __syncthreads();
     if (threadIdx.x < size)
       tile[threadIdx.x] = packed(match_at(b.matches, room + base + threadIdx.x));
-    column_count[threadIdx.x] = 0;
     __syncthreads();
-    for (std::uint32_t first = 0; first < size; first += 32) {
-      std::uint32_t kept = 0;  // of the column that has the lane's number
-      for (std::uint32_t k = first; k < min(first + 32, size); ++k) {
-        const OrientedMatch other = tile[k].unpacked();
-        std::uint32_t both = 0;
+    for (std::uint32_t k = 0; k < size; ++k) {
+      const OrientedMatch other = tile[k].unpacked();
 #pragma unroll
-        for (int r = 0; r < kRows; ++r) {
-          const std::uint32_t one = compatible(other, own[r], b.test) ? 1u : 0u;
-          count[r] += one;
-          both += one;
-        }
-        if (!mutual) continue;
-        both = warp_sum(both);
-        kept = lane == k - first ? both : kept;
-      }
-      if (kept > 0) atomicAdd(column_count + first + lane, kept);
+      for (int r = 0; r < kRows; ++r) count[r] += compatible(other, own[r], b.test) ? 1u : 0u;
     }
-    __syncthreads();
-    if (mutual && threadIdx.x < size && column_count[threadIdx.x] > 0)
-      atomicAdd(b.degree + room + base + threadIdx.x, column_count[threadIdx.x]);
   }
 #pragma unroll
   for (int r = 0; r < kRows; ++r) {
@@ -188,8 +168,9 @@ Seeds choose_seeds(Exec& exec, const MatchSets& matches, const RegistrationOptio
       options.compatibility.seed_separation * options.compatibility.seed_separation;
   batch.degree = degree.data();
   batch.slope = slope.data();
-  const unsigned ranges = blocks_for(largest, kBlockRows);
-  count_compatible<<<dim3(ranges, ranges, pair_count), kThreads, 0, exec.stream()>>>(batch);
+  count_compatible<<<dim3(blocks_for(largest, kBlockRows),
+                          blocks_for(std::min(largest, kDegreeSample), kBlockColumns), pair_count),
+                     kThreads, 0, exec.stream()>>>(batch);
   check_launch("count_compatible");
   auto key = exec.buffer<std::uint64_t>(total);
   auto match = exec.buffer<std::uint32_t>(total);

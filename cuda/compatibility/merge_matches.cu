@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <algorithm>
-#include <array>
 #include <string>
 
 #include "algorithm/compatibility.hpp"
 #include "algorithm/normal_weight.hpp"
+#include "algorithm/query_sample.hpp"
 #include "common/in_halves.hpp"
 #include "cuda/common/feature_query.hpp"
 #include "cuda/common/stages.hpp"
@@ -16,12 +16,21 @@ namespace {
 
 constexpr int kThreads = 256;
 
-/// The four searches of one pair: first result of each, kNoValue where there was no search. Or the
-/// given matches.
+/// One search of a pair.
+struct PairSearch {
+  QuerySample sample;
+  const std::uint32_t *row, *nearest;  ///< per query
+
+  __device__ bool found(std::uint32_t from, std::uint32_t to) const {
+    if (sample.count == 0) return false;
+    const std::uint32_t place = sample.place_of(from);
+    return row[place] == from && nearest[place] == to;
+  }
+};
+
+/// The searches of one pair in the order of query_samples(), or the given matches.
 struct MergePair {
-  std::uint32_t sources, targets;           ///< sizes of the clouds
-  const std::uint32_t *forward, *backward;  ///< null: not searched
-  const std::uint32_t *wide_forward, *wide_backward;
+  PairSearch search[4];
   const std::uint32_t *custom_source, *custom_target;
   /// results of all searches one after another, or number of given matches
   std::uint32_t answers;
@@ -53,22 +62,23 @@ struct Match {
 __device__ Match answer_of(const MergePair& u, std::uint32_t k, bool& keep) {
   keep = true;
   if (u.custom_source) return {u.custom_source[k], u.custom_target[k]};
-  Match m;
-  const std::uint32_t round = u.sources + u.targets;
-  const bool wide = k >= round, asks_source = k - (wide ? round : 0) < u.sources;
-  if (wide) k -= round;
-  if (asks_source) {
-    m = {k, (wide ? u.wide_forward : u.forward)[k]};
-    keep = m.target != kNoValue;
-  } else {
-    m = {(wide ? u.wide_backward : u.backward)[k - u.sources], k - u.sources};
-    keep = m.source != kNoValue;
-  }
-  if (!keep) return m;
-  if (wide || !asks_source) keep = u.forward[m.source] != m.target;
-  if (wide) keep = keep && u.backward[m.target] != m.source;
-  if (wide && !asks_source) keep = keep && u.wide_forward[m.source] != m.target;
+  int number = 0;
+  for (; k >= u.search[number].sample.count; ++number) k -= u.search[number].sample.count;
+  const std::uint32_t row = u.search[number].row[k], near = u.search[number].nearest[k];
+  const Match m = number % 2 == 0 ? Match{row, near} : Match{near, row};
+  keep = near != kNoValue;
+  for (int earlier = 0; keep && earlier < number; ++earlier)
+    keep = earlier % 2 == 0 ? !u.search[earlier].found(m.source, m.target)
+                            : !u.search[earlier].found(m.target, m.source);
   return m;
+}
+
+/// y: search.
+__global__ void write_query_rows(const QuerySample* samples, const std::uint32_t* offset,
+                                 std::uint32_t* row) {
+  const QuerySample sample = samples[blockIdx.y];
+  const std::uint32_t k = blockIdx.x * blockDim.x + threadIdx.x;
+  if (k < sample.count) row[offset[blockIdx.y] + k] = sample.row(k);
 }
 
 __global__ void __launch_bounds__(kThreads) order_matches(MergeBatch b) {
@@ -184,44 +194,64 @@ std::vector<std::uint64_t> distinct_matches(const PairView& pair) {
   return out;
 }
 
-/// Runs all searches of the batch and sets the pointers of each pair.
-DeviceBuffer<std::uint32_t> search(Exec& exec, Span<const PairView> pairs,
-                                   std::vector<MergePair>& entries) {
+/// Queries of all searches of the batch and their results.
+struct Answers {
+  DeviceBuffer<std::uint32_t> rows, nearest;
+};
+
+/// Runs all searches of the batch and sets those of each pair.
+Answers search(Exec& exec, Span<const PairView> pairs, const RegistrationOptions& options,
+               std::vector<MergePair>& entries) {
   std::vector<FeatureQuery> queries;
+  std::vector<QuerySample> samples;
+  std::vector<std::uint32_t> offset;
+  std::vector<PairSearch*> searches;
   std::uint64_t at = 0;
-  const auto ask = [&](FeatureQuery query) {
+  std::uint32_t largest = 0;
+  const auto ask = [&](FeatureQuery query, const QuerySample& sample, MergePair& pair, int number) {
     query.out = static_cast<std::uint32_t>(at);
-    at += query.query_count;
+    query.query_count = sample.count;
+    queries.push_back(query);
+    samples.push_back(sample);
+    offset.push_back(query.out);
+    searches.push_back(&pair.search[number]);
+    pair.search[number].sample = sample;
+    pair.answers += sample.count;
+    largest = std::max(largest, sample.count);
+    at += sample.count;
     if (at > limits::kMaxPoints)
       throw BatchTooLarge("a batch of " + std::to_string(at) +
                           " feature queries exceeds 2^31 - 1: split it");
-    queries.push_back(query);
-    return query.out;
   };
-  std::vector<std::array<std::uint32_t, 4>> place(pairs.size);
   for (std::size_t p = 0; p < pairs.size; ++p) {
     const CloudView &s = pairs[p].source, &t = pairs[p].target;
     if (pairs[p].custom_count > 0 || s.size == 0 || t.size == 0) continue;
-    entries[p].answers = s.size + t.size;
-    place[p][0] = ask(narrow_query(s, t, 0));
-    place[p][1] = ask(narrow_query(t, s, 0));
-    if (!s.wide_features || !t.wide_features) continue;
-    entries[p].answers *= 2;
-    place[p][2] = ask(wide_query(s, t, 0));
-    place[p][3] = ask(wide_query(t, s, 0));
+    const bool both = s.wide_features && t.wide_features;
+    const auto sample = query_samples(s.size, t.size, both ? 4 : 2,
+                                      options.compatibility.max_matches, options.seed);
+    ask(narrow_query(s, t, 0), sample[0], entries[p], 0);
+    ask(narrow_query(t, s, 0), sample[1], entries[p], 1);
+    if (!both) continue;
+    ask(wide_query(s, t, 0), sample[2], entries[p], 2);
+    ask(wide_query(t, s, 0), sample[3], entries[p], 3);
   }
-  auto answers = nearest_features(exec, queries, 1, static_cast<std::size_t>(at));
-  for (std::size_t p = 0; p < pairs.size; ++p) {
-    MergePair& u = entries[p];
-    if (u.answers == 0) continue;
-    u.forward = answers.data() + place[p][0];
-    u.backward = answers.data() + place[p][1];
-    if (u.answers > u.sources + u.targets) {
-      u.wide_forward = answers.data() + place[p][2];
-      u.wide_backward = answers.data() + place[p][3];
-    }
+  Answers out;
+  if (at == 0) return out;
+  out.rows = exec.buffer<std::uint32_t>(at);
+  const auto samples_on_device = exec.upload(samples);
+  const auto offset_on_device = exec.upload(offset);
+  write_query_rows<<<dim3(blocks_for(largest, kThreads), static_cast<unsigned>(samples.size())),
+                     kThreads, 0, exec.stream()>>>(samples_on_device.data(),
+                                                   offset_on_device.data(), out.rows.data());
+  check_launch("write_query_rows");
+  for (std::size_t k = 0; k < queries.size(); ++k)
+    queries[k].query_row = out.rows.data() + offset[k];
+  out.nearest = nearest_features(exec, queries, 1, static_cast<std::size_t>(at));
+  for (std::size_t k = 0; k < searches.size(); ++k) {
+    searches[k]->row = out.rows.data() + offset[k];
+    searches[k]->nearest = out.nearest.data() + offset[k];
   }
-  return answers;
+  return out;
 }
 
 }  // namespace
@@ -229,11 +259,7 @@ DeviceBuffer<std::uint32_t> search(Exec& exec, Span<const PairView> pairs,
 MatchSets merge_matches(Exec& exec, Span<const PairView> pairs,
                         const RegistrationOptions& options) {
   std::vector<MergePair> entries(pairs.size);
-  for (std::size_t p = 0; p < pairs.size; ++p) {
-    entries[p].sources = pairs[p].source.size;
-    entries[p].targets = pairs[p].target.size;
-  }
-  const auto answers = search(exec, pairs, entries);
+  const auto answers = search(exec, pairs, options, entries);
   std::vector<DeviceBuffer<std::uint32_t>> custom;
   for (std::size_t p = 0; p < pairs.size; ++p) {
     if (pairs[p].custom_count == 0) continue;

@@ -92,6 +92,14 @@ struct StageTimings {
   double refine = 0;   ///< ICP
   double verify = 0;   ///< evidence and degeneracy search, or the winner's support
   double total() const { return match + propose + rank + refine + verify; }
+  StageTimings& operator+=(const StageTimings& more) {
+    match += more.match;
+    propose += more.propose;
+    rank += more.rank;
+    refine += more.refine;
+    verify += more.verify;
+    return *this;
+  }
 };
 
 /// Counts and wall times (milliseconds) of the preparation of one cloud.

@@ -99,6 +99,8 @@ class CompatibilityOptions:
     max_turn: float
     consensus_distance: float
     seed_separation: float
+    first_pass_reject: float
+    first_pass_accept: float
     def __init__(
         self,
         *,
@@ -111,6 +113,8 @@ class CompatibilityOptions:
         max_turn: float = ...,
         consensus_distance: float = ...,
         seed_separation: float = ...,
+        first_pass_reject: float = ...,
+        first_pass_accept: float = ...,
     ) -> None: ...
     def replace(
         self,
@@ -124,6 +128,8 @@ class CompatibilityOptions:
         max_turn: float = ...,
         consensus_distance: float = ...,
         seed_separation: float = ...,
+        first_pass_reject: float = ...,
+        first_pass_accept: float = ...,
     ) -> CompatibilityOptions: ...
     def validate(self) -> None: ...
     def __eq__(self, other: object, /) -> bool: ...

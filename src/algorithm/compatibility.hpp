@@ -86,11 +86,14 @@ GPUREG_HD bool wide_triangle(Vec3 p0, Vec3 p1, Vec3 p2, float squared_length) {
          (squared_norm(p2 - p1) >= squared_length);
 }
 
-/// Strength of a match as a seed: the number of its compatible matches times its normal weight.
-/// Without the weight, floors and walls with their many similar matches take all seeds. degree <=
-/// 2^16, weight <= 2^17.
+/// The degree of a match is the number of matches that are compatible with it, among the first
+/// ones, which are a random sample: the rank of a match is random.
+constexpr std::uint32_t kDegreeSample = 2048;
+
 /// Bits that the strength drops, so that it fits 24 bits.
-constexpr int kStrengthShift = 10;
+constexpr int kStrengthShift = 5;
+/// Strength of a match as a seed: its degree times its normal weight, which is at most 2^17.
+/// Without the weight, floors and walls with their many similar matches take all seeds.
 GPUREG_HD std::uint32_t seed_strength(std::uint32_t degree, std::uint32_t weight) {
   return static_cast<std::uint32_t>((static_cast<std::uint64_t>(degree) * weight) >>
                                     kStrengthShift);

@@ -73,7 +73,11 @@ std::vector<PreparedCloud> prepare_batch(const Context& context,
   std::vector<FrameOrigin> frame_origins(clouds.size());
   std::vector<CloudKnowledge> knowledge;
   for (std::size_t k = 0; k < clouds.size(); ++k) {
-    raw.push_back(naming(k, [&] { return raw_cloud(clouds[k]); }));
+    raw.push_back(naming(k, [&] {
+      const RawCloud cloud = raw_cloud(clouds[k]);
+      Access::engine(context)->check_on_host(cloud);
+      return cloud;
+    }));
     knowledge.push_back(knowledge_of(clouds[k]));
     view_from_frame_origin(clouds[k].origin, frame_origins[k], raw.back());
   }

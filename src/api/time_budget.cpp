@@ -97,7 +97,11 @@ TimedResult align_within(const Context& context, const PreparedCloud& source,
         .count();
   };
   return run_levels({[&](std::uint32_t quality) {
-                       return align(context, source, target, options.with_quality(quality));
+                       RegistrationOptions level = options.with_quality(quality);
+                       // The lower levels are first passes.
+                       level.compatibility.first_pass_reject = 0;
+                       level.compatibility.first_pass_accept = 1;
+                       return align(context, source, target, level);
                      },
                      now},
                     milliseconds, options);

@@ -38,13 +38,8 @@ inline std::vector<PairVariant> variants_of(const std::vector<PreparedCloud>& cl
 /// time of both.
 inline void keep_better(RegistrationResult&& candidate, RegistrationResult& kept) {
   const bool first = kept.status == RegistrationStatus::skipped;
-  StageTimings& t = first ? candidate.timings : kept.timings;
-  if (!first) {
-    const StageTimings& more = candidate.timings;
-    t = {t.match + more.match, t.propose + more.propose, t.rank + more.rank, t.refine + more.refine,
-         t.verify + more.verify};
-  }
-  const StageTimings sum = t;
+  StageTimings sum = candidate.timings;
+  sum += kept.timings;
   const auto better = [&] {
     if (candidate.has_candidate != kept.has_candidate) return candidate.has_candidate;
     const double together = candidate.symmetry_confidence(), before = kept.symmetry_confidence();

@@ -27,6 +27,8 @@ class Engine {
   virtual const void* memory() const = 0;  ///< owner of the clouds that this engine can align
   /// Number of pairs that go through the stages together.
   virtual std::size_t pairs_per_chunk(const RegistrationOptions& options) const = 0;
+  /// Throws InvalidArgument for rows that the host cannot read.
+  virtual void check_on_host(const RawCloud&) const {}
   virtual std::vector<std::shared_ptr<PreparedState>> prepare(Span<const RawCloud> clouds,
                                                               const PrepareOptions& options) = 0;
   virtual void align(Span<const PairInput> pairs, const RegistrationOptions& options,

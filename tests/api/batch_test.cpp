@@ -143,21 +143,19 @@ TEST_F(BatchOfChunks, EqualsThePairsOneByOne) {
                   .empty());
 }
 
-// Each pair is aligned with both sides of both clouds, and chunks end between these variants.
-TEST_F(BatchOfChunks, PairsOfUnknownSidesSpanChunks) {
+// Each pair is aligned with both sides of both clouds.
+TEST_F(BatchOfChunks, VariantsOfAPairStayTogether) {
   prepare(3, false);
-  constexpr std::size_t kVariants = 4, kChunk = 3;
-  for (std::size_t polls = 0; polls <= 4; ++polls) {
-    const auto engine = std::make_shared<IdleHostEngine>(kChunk);
+  for (std::size_t polls = 0; polls <= 3; ++polls) {
+    const auto engine = std::make_shared<IdleHostEngine>(3);
     BatchCallbacks callbacks;
     collect(callbacks);
     delivered = 0;
     std::size_t polled = 0;
     callbacks.should_stop = [&] { return polled++ == polls; };
-    const std::size_t finished = polls * kChunk / kVariants;
-    expect_equal(align_batch(Access::context(engine), clouds, pairs, options, callbacks), finished);
-    EXPECT_EQ(delivered, finished);
-    EXPECT_EQ(engine->calls, polls) << "twelve variants in chunks of three";
+    expect_equal(align_batch(Access::context(engine), clouds, pairs, options, callbacks), polls);
+    EXPECT_EQ(delivered, polls);
+    EXPECT_EQ(engine->sizes, std::vector<std::size_t>(polls, 4)) << "a pair needs four";
   }
 }
 
@@ -226,6 +224,91 @@ TEST_F(BatchOfChunks, StopsBetweenChunks) {
                  2 * polls);
     EXPECT_EQ(delivered, 2 * polls);
     EXPECT_EQ(engine->calls, polls);
+  }
+}
+
+/// With the default's candidates; some pairs are decided by the first pass.
+class FirstPass : public BatchOfChunks {
+ protected:
+  FirstPass() {
+    options = RegistrationOptions::from_voxel_size(0.12f);
+    options.compatibility.max_matches = 1024;
+    const Context cpu = Context::cpu(2);
+    few = align_batch(cpu, clouds, pairs, with(options.with_quality(1), 0, 1));
+    all = align_batch(cpu, clouds, pairs, with(options, 0, 1));
+  }
+  static RegistrationOptions with(RegistrationOptions o, double reject, double accept) {
+    o.compatibility.first_pass_reject = reject;
+    o.compatibility.first_pass_accept = accept;
+    return o;
+  }
+  /// Expects the results of these limits. @return number of pairs that the first pass decides.
+  std::size_t expect_limits(double reject, double accept) {
+    expected.clear();
+    std::size_t decided = 0;
+    for (std::size_t p = 0; p < pairs.size(); ++p) {
+      const double confidence = few[p].symmetry_confidence();
+      const bool is_final = confidence < reject || confidence > accept;
+      decided += is_final;
+      expected.push_back(is_final ? few[p] : all[p]);
+    }
+    options = with(options, reject, accept);
+    return decided;
+  }
+  double middle_confidence() const {
+    std::vector<double> of;
+    for (const RegistrationResult& result : few) of.push_back(result.symmetry_confidence());
+    std::sort(of.begin(), of.end());
+    return (of[4] + of[5]) / 2;
+  }
+  std::vector<RegistrationResult> few, all;
+};
+
+TEST_F(FirstPass, DecidesOutsideItsLimits) {
+  ASSERT_NE(test::bytes(few[0]), test::bytes(all[0]));
+  const double middle = middle_confidence();
+  const struct {
+    double reject, accept;
+    std::size_t decided;
+  } cases[] = {{0, 1, 0}, {1, 0, 10}, {0, middle, 5}, {middle, 1, 5}};
+  for (const auto& limits : cases) {
+    EXPECT_EQ(expect_limits(limits.reject, limits.accept), limits.decided);
+    for (const std::size_t chunk : {1u, 3u, 100u})
+      for (const bool idle : {false, true}) {
+        BatchCallbacks callbacks;
+        collect(callbacks);
+        delivered = 0;
+        const Context context = Access::context(std::make_shared<IdleHostEngine>(chunk, idle));
+        expect_equal(align_batch(context, clouds, pairs, options, callbacks), pairs.size());
+        EXPECT_EQ(delivered, pairs.size());
+      }
+    for (std::size_t p = 0; p < pairs.size(); p += 3)
+      EXPECT_EQ(test::bytes(align(Context::cpu(1), clouds[pairs[p].source], clouds[pairs[p].target],
+                                  options)),
+                test::bytes(expected[p]));
+  }
+}
+
+TEST_F(FirstPass, PairsThatBeganAreFinishedAfterAStop) {
+  expect_limits(0, middle_confidence());
+  for (std::size_t polls = 0; polls <= 6; ++polls) {
+    const auto engine = std::make_shared<IdleHostEngine>(3);
+    BatchCallbacks callbacks;
+    collect(callbacks);
+    delivered = 0;
+    std::size_t polled = 0;
+    callbacks.should_stop = [&] { return polled++ >= polls; };
+    const auto results = align_batch(Access::context(engine), clouds, pairs, options, callbacks);
+    EXPECT_GE(delivered, std::min<std::size_t>(polls, 3));
+    expect_equal(results, delivered);
+  }
+}
+
+TEST_F(FirstPass, HighestQualityHasNone) {
+  for (std::uint32_t quality = 0; quality <= kHighestQuality; ++quality) {
+    const CompatibilityOptions c = options.with_quality(quality).compatibility;
+    EXPECT_EQ(c.first_pass_accept < 1, quality < kHighestQuality);
+    EXPECT_EQ(c.first_pass_reject > 0, quality < kHighestQuality);
   }
 }
 

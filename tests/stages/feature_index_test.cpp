@@ -5,6 +5,7 @@
 
 #include <cmath>
 #include <limits>
+#include <numeric>
 #include <random>
 
 namespace gpureg::cpu {
@@ -44,9 +45,10 @@ constexpr SearchVectors kVectors[] = {SearchVectors::kNarrow, SearchVectors::kWi
 std::vector<std::uint32_t> by_index(const Rows& queries, const Rows& rows, std::size_t grain,
                                     SearchVectors most = SearchVectors::kBytes) {
   const FeatureIndex order = index_features(queries.view()), index = index_features(rows.view());
-  std::vector<std::uint32_t> out(queries.valid.size(), kNoValue);
+  std::vector<std::uint32_t> out(queries.valid.size(), kNoValue), places(order.rows);
+  std::iota(places.begin(), places.end(), 0u);
   for (std::size_t begin = 0; begin < order.rows; begin += grain)
-    nearest_features(queries.view(), order, rows.view(), index, begin,
+    nearest_features(queries.view(), order, places, rows.view(), index, begin,
                      std::min<std::size_t>(begin + grain, order.rows), out.data(), most);
   return out;
 }

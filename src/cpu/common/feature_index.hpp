@@ -32,11 +32,12 @@ FeatureIndex index_features(FeatureRows rows);
 /// Which vectors a search uses, at most; the result is the same.
 enum class SearchVectors { kNarrow, kWide, kBytes };
 
-/// Searches the nearest row for the rows begin to end (exclusive) in the order of their own index,
-/// and for the rows that equal them.
-/// out[q]: result of nearest_features() with k = 1 for row q. The rows of one leaf are similar, so
-/// each search starts with the result of the previous one.
-void nearest_features(FeatureRows queries, const FeatureIndex& order, FeatureRows rows,
+/// Searches the nearest row for the queries at places[begin] to places[end] (exclusive) of their
+/// own index, and for the rows that equal them. places: ascending. The rows of one leaf are
+/// similar, so each search starts with the result of the previous one.
+/// out[q]: result of nearest_features() with k = 1 for row q.
+void nearest_features(FeatureRows queries, const FeatureIndex& order,
+                      const std::vector<std::uint32_t>& places, FeatureRows rows,
                       const FeatureIndex& index, std::size_t begin, std::size_t end,
                       std::uint32_t* out, SearchVectors most = SearchVectors::kBytes);
 

@@ -292,16 +292,18 @@ class Search {
 
 }  // namespace
 
-void nearest_features(FeatureRows queries, const FeatureIndex& order, FeatureRows rows,
+void nearest_features(FeatureRows queries, const FeatureIndex& order,
+                      const std::vector<std::uint32_t>& places, FeatureRows rows,
                       const FeatureIndex& index, std::size_t begin, std::size_t end,
                       std::uint32_t* out, SearchVectors most) {
   Search search(index, most >= SearchVectors::kWide && has_wide_vectors());
   const bool bytes = most == SearchVectors::kBytes && index.bytes.valid;
   const auto query = [&](std::size_t k) {
-    return queries.values + static_cast<std::size_t>(order.row[k]) * queries.dimension;
+    return queries.values + static_cast<std::size_t>(order.row[places[k]]) * queries.dimension;
   };
   const auto answer = [&](std::size_t k, std::uint32_t row) {
-    for (std::uint32_t q = order.row[k]; q != kNoValue; q = order.next_equal[q]) out[q] = row;
+    for (std::uint32_t q = order.row[places[k]]; q != kNoValue; q = order.next_equal[q])
+      out[q] = row;
   };
   for (std::size_t k = begin; bytes && k < end; k += ByteRows::kQueries) {
     const std::size_t count = std::min(ByteRows::kQueries, end - k);

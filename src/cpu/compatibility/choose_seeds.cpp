@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <algorithm>
-#include <mutex>
 #include <numeric>
 
 #include "cpu/common/stages.hpp"
@@ -10,64 +9,36 @@
 namespace gpureg::cpu {
 namespace {
 
-constexpr std::uint32_t kRows = 4;     // rows per pass: the columns are loaded once for all of them
-constexpr std::uint32_t kTile = 1024;  // columns: they stay in the nearest cache
+constexpr std::uint32_t kRows = 4;  // rows per pass: the columns are loaded once for all of them
 
-/// Compatibility is symmetric: each pair of matches is tested once and counts for both. Adds the
-/// compatible pairs of the rows [begin, end) with themselves and with all later matches. out: one
-/// count per match.
+/// Degrees of the matches [begin, end), see kDegreeSample. out: one per match.
 GPUREG_ALWAYS_INLINE void count_compatible_in_vectors(const MatchSet& matches,
                                                       const CompatibilityTest& test,
                                                       std::uint32_t begin, std::uint32_t end,
                                                       std::uint32_t* out) {
   const MatchColumns columns(matches);
-  const std::uint32_t n = matches.size();
-  for (std::uint32_t i = begin; i < end; ++i) {
-    const OrientedMatch own = columns[i];
-    std::uint32_t count = compatible(own, own, test) ? 1u : 0u;
-    for (std::uint32_t k = i + 1; k < end; ++k) {
-      const std::uint32_t one = compatible(columns[k], own, test) ? 1u : 0u;
-      out[k] += one;
-      count += one;
+  const std::uint32_t sample = std::min(matches.size(), kDegreeSample);
+  std::uint32_t i = begin;
+  for (; i + kRows <= end; i += kRows) {
+    const OrientedMatch a = columns[i], b = columns[i + 1], c = columns[i + 2], d = columns[i + 3];
+    std::uint32_t of_a = 0, of_b = 0, of_c = 0, of_d = 0;
+    for (std::uint32_t k = 0; k < sample; ++k) {
+      const OrientedMatch other = columns[k];
+      of_a += compatible(other, a, test) ? 1u : 0u;
+      of_b += compatible(other, b, test) ? 1u : 0u;
+      of_c += compatible(other, c, test) ? 1u : 0u;
+      of_d += compatible(other, d, test) ? 1u : 0u;
     }
-    out[i] += count;
+    out[i] = of_a;
+    out[i + 1] = of_b;
+    out[i + 2] = of_c;
+    out[i + 3] = of_d;
   }
-  for (std::uint32_t from = end; from < n; from += kTile) {
-    const std::uint32_t size = std::min(kTile, n - from);
-    const MatchColumns tile(matches, from);
-    std::uint32_t* counts = out + from;
-    std::uint32_t i = begin;
-    for (; i + kRows <= end; i += kRows) {
-      const OrientedMatch a = columns[i], b = columns[i + 1], c = columns[i + 2],
-                          d = columns[i + 3];
-      std::uint32_t of_a = 0, of_b = 0, of_c = 0, of_d = 0;
-      for (std::uint32_t k = 0; k < size; ++k) {
-        const OrientedMatch other = tile[k];
-        const std::uint32_t with_a = compatible(other, a, test) ? 1u : 0u,
-                            with_b = compatible(other, b, test) ? 1u : 0u;
-        const std::uint32_t with_c = compatible(other, c, test) ? 1u : 0u,
-                            with_d = compatible(other, d, test) ? 1u : 0u;
-        of_a += with_a;
-        of_b += with_b;
-        of_c += with_c;
-        of_d += with_d;
-        counts[k] += (with_a + with_b) + (with_c + with_d);
-      }
-      out[i] += of_a;
-      out[i + 1] += of_b;
-      out[i + 2] += of_c;
-      out[i + 3] += of_d;
-    }
-    for (; i < end; ++i) {
-      const OrientedMatch own = columns[i];
-      std::uint32_t count = 0;
-      for (std::uint32_t k = 0; k < size; ++k) {
-        const std::uint32_t one = compatible(tile[k], own, test) ? 1u : 0u;
-        counts[k] += one;
-        count += one;
-      }
-      out[i] += count;
-    }
+  for (; i < end; ++i) {
+    const OrientedMatch own = columns[i];
+    std::uint32_t count = 0;
+    for (std::uint32_t k = 0; k < sample; ++k) count += compatible(columns[k], own, test) ? 1u : 0u;
+    out[i] = count;
   }
 }
 
@@ -160,16 +131,12 @@ std::vector<std::vector<std::uint32_t>> choose_seeds(Exec& exec,
     degree[p].resize(matches[p].size());
     peak[p].resize(matches[p].size());
   }
-  std::vector<std::mutex> mutex(matches.size());
   constexpr std::size_t kGrain = 512;  // rows per task: milliseconds of work
   exec.parallel_items(
       matches.size(), [&](std::size_t p) { return degree[p].size(); }, kGrain,
       [&](std::size_t p, std::size_t begin, std::size_t end) {
-        std::vector<std::uint32_t> part(degree[p].size(), 0);
         count_compatible(matches[p], test, static_cast<std::uint32_t>(begin),
-                         static_cast<std::uint32_t>(end), part.data());
-        std::lock_guard<std::mutex> lock(mutex[p]);
-        for (std::size_t k = begin; k < part.size(); ++k) degree[p][k] += part[k];
+                         static_cast<std::uint32_t>(end), degree[p].data());
       });
   exec.parallel(matches.size(), [&](std::size_t p) {
     find_peaks(matches[p], degree[p], squared_separation, peak[p].data());

@@ -4,6 +4,7 @@
 
 #include "algorithm/compatibility.hpp"
 #include "algorithm/normal_weight.hpp"
+#include "algorithm/query_sample.hpp"
 #include "common/radix_sort.hpp"
 #include "cpu/common/feature_index.hpp"
 #include "cpu/common/stages.hpp"
@@ -11,22 +12,18 @@
 namespace gpureg::cpu {
 namespace {
 
-/// One search of all rows of one cloud in the other.
+/// One search of rows of one cloud in the other.
 struct Search {
   FeatureRows from, in;
   const KeptIndex *from_kept, *in_kept;
   bool forward;  ///< from source to target
-  std::vector<std::uint32_t> nearest;
+  QuerySample sample;
+  std::vector<std::uint32_t> nearest;  ///< per row
   const FeatureIndex *from_index = nullptr, *in_index = nullptr;
+  std::vector<std::uint32_t> places = {};  ///< of the queries in their index
 };
 
-void add_searches(FeatureRows s, FeatureRows t, const KeptIndex& of_s, const KeptIndex& of_t,
-                  std::vector<Search>& out) {
-  out.push_back({s, t, &of_s, &of_t, true, std::vector<std::uint32_t>(s.size, kNoValue)});
-  out.push_back({t, s, &of_t, &of_s, false, std::vector<std::uint32_t>(t.size, kNoValue)});
-}
-
-std::vector<Search> searches_of(const PairView& pair) {
+std::vector<Search> searches_of(const PairView& pair, const RegistrationOptions& options) {
   std::vector<Search> out;
   const CloudView &s = pair.source, &t = pair.target;
   if (pair.custom_count > 0 || s.size == 0 || t.size == 0) return out;
@@ -37,9 +34,31 @@ std::vector<Search> searches_of(const PairView& pair) {
     return FeatureRows{c.wide_features, c.has_wide_feature, c.size, c.feature_dimension};
   };
   const CpuCloud &kept_s = executor_data(s), &kept_t = executor_data(t);
-  add_searches(narrow(s), narrow(t), kept_s.index, kept_t.index, out);
-  if (s.wide_features != nullptr && t.wide_features != nullptr)
-    add_searches(wide(s), wide(t), kept_s.wide_index, kept_t.wide_index, out);
+  const bool both = s.wide_features != nullptr && t.wide_features != nullptr;
+  const auto samples =
+      query_samples(s.size, t.size, both ? 4 : 2, options.compatibility.max_matches, options.seed);
+  const auto add = [&](FeatureRows from, FeatureRows in, const KeptIndex& of, const KeptIndex& to) {
+    out.push_back({from, in, &of, &to, out.size() % 2 == 0, samples[out.size()],
+                   std::vector<std::uint32_t>(from.size, kNoValue)});
+  };
+  add(narrow(s), narrow(t), kept_s.index, kept_t.index);
+  add(narrow(t), narrow(s), kept_t.index, kept_s.index);
+  if (!both) return out;
+  add(wide(s), wide(t), kept_s.wide_index, kept_t.wide_index);
+  add(wide(t), wide(s), kept_t.wide_index, kept_s.wide_index);
+  return out;
+}
+
+/// Places of the sampled rows in their index. Equal rows have one place.
+std::vector<std::uint32_t> places_of(const QuerySample& sample, const FeatureIndex& index) {
+  std::vector<bool> asked(sample.rows, false);
+  for (std::uint32_t k = 0; k < sample.count; ++k) asked[sample.row(k)] = true;
+  std::vector<std::uint32_t> out;
+  for (std::uint32_t place = 0; place < index.rows; ++place) {
+    std::uint32_t row = index.row[place];
+    while (row != kNoValue && !asked[row]) row = index.next_equal[row];
+    if (row != kNoValue) out.push_back(place);
+  }
   return out;
 }
 
@@ -79,14 +98,17 @@ std::uint64_t normal_weight(const Vec3* normals, const std::vector<std::uint32_t
 MatchSet merge(const PairView& pair, const std::vector<Search>& searches, std::uint64_t seed,
                std::uint32_t most) {
   std::vector<KeyIndex> all;
-  all.reserve(pair.custom_count + 2 * (std::size_t(pair.source.size) + pair.target.size));
+  std::size_t most_found = pair.custom_count;
+  for (const Search& search : searches) most_found += search.sample.count;
+  all.reserve(most_found);
   for (std::uint32_t c = 0; c < pair.custom_count; ++c)
     all.push_back({joined(pair.custom_source[c], pair.custom_target[c]), 0});
   for (const Search& search : searches)
-    for (std::uint32_t k = 0; k < search.nearest.size(); ++k)
-      if (search.nearest[k] != kNoValue)
-        all.push_back(
-            {search.forward ? joined(k, search.nearest[k]) : joined(search.nearest[k], k), 0});
+    for (std::uint32_t k = 0; k < search.sample.count; ++k) {
+      const std::uint32_t row = search.sample.row(k), near = search.nearest[row];
+      if (near != kNoValue)
+        all.push_back({search.forward ? joined(row, near) : joined(near, row), 0});
+    }
   radix_sort(all);
   all.erase(std::unique(all.begin(), all.end(),
                         [](const KeyIndex& a, const KeyIndex& b) { return a.key == b.key; }),
@@ -136,16 +158,19 @@ std::vector<MatchSet> merge_matches(Exec& exec, Span<const PairView> pairs,
   std::vector<std::vector<Search>> searches(pairs.size);
   std::vector<Search*> flat;
   for (std::size_t p = 0; p < pairs.size; ++p) {
-    searches[p] = searches_of(pairs[p]);
+    searches[p] = searches_of(pairs[p], options);
     for (Search& search : searches[p]) flat.push_back(&search);
   }
   index_rows(exec, flat);
+  exec.parallel(flat.size(), [&](std::size_t k) {
+    flat[k]->places = places_of(flat[k]->sample, *flat[k]->from_index);
+  });
   constexpr std::size_t kGrain = 512;  // queries per task: milliseconds of work
   exec.parallel_items(
-      flat.size(), [&](std::size_t k) { return flat[k]->from_index->rows; }, kGrain,
+      flat.size(), [&](std::size_t k) { return flat[k]->places.size(); }, kGrain,
       [&](std::size_t k, std::size_t begin, std::size_t end) {
         const Search& s = *flat[k];
-        nearest_features(s.from, *s.from_index, s.in, *s.in_index, begin, end,
+        nearest_features(s.from, *s.from_index, s.places, s.in, *s.in_index, begin, end,
                          flat[k]->nearest.data());
       });
   std::vector<MatchSet> out(pairs.size);
