@@ -100,6 +100,8 @@ void search(const Context& context, const MapState& map, const LocateOptions& op
             std::vector<Scan>& scans) {
   RegistrationOptions registration = options.registration;
   registration.compatibility.max_matches = options.max_matches;
+  // "Not in this map" needs the whole search: a contained scan has a low confidence at first.
+  registration.compatibility.first_pass_reject = 0;
   for (std::size_t begin = 0; begin < map.tiles.size();) {
     std::size_t end = begin, points = 0;
     while (end < map.tiles.size() && (end == begin || points < kPointsAtOnce)) {
