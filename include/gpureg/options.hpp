@@ -68,7 +68,8 @@ struct CompatibilityOptions {
   float seed_separation = 0.1f;
   /// A first pass with few candidates (those of quality 1) decides most pairs: its result is final
   /// where its confidence is below first_pass_reject or above first_pass_accept. The others are
-  /// aligned in full. 0 and 1: no first pass. There is none either with fewer than 512 seeds.
+  /// aligned in full. 0 and 1: no first pass. There is none either with fewer than 512 seeds
+  /// or at most 12 modes. A result below min_confidence is never final for being above.
   double first_pass_reject = 1e-3, first_pass_accept = 0.95;
 
   /// @throws InvalidArgument naming field and value.
@@ -190,7 +191,8 @@ struct RegistrationOptions {
   static RegistrationOptions from_voxel_size(float voxel_size,
                                              std::uint32_t quality = kDefaultQuality);
 
-  /// A copy with the number of candidates of a quality, everything else as it is.
+  /// A copy with the number of candidates of a quality and the default limits of the first pass
+  /// (none at 10), everything else as it is.
   /// @throws InvalidArgument where quality is above 10.
   RegistrationOptions with_quality(std::uint32_t quality) const;
 

@@ -101,9 +101,13 @@ void Batch::settle(std::size_t pair, RegistrationResult* found,
   for (std::size_t k = 0; k < variants_of_pair(pair); ++k) keep_better(std::move(found[k]), best);
   const double confidence = best.symmetry_confidence();
   const CompatibilityOptions& c = options_.compatibility;
-  const bool decided = &options == &options_ ||
-                       (best.has_candidate &&
-                        (confidence < c.first_pass_reject || confidence > c.first_pass_accept));
+  // A calibration changes confidences alone, so it applies to the limits as well.
+  const ConfidenceCalibration& calibrated = options_.calibration;
+  const bool decided =
+      &options == &options_ ||
+      (best.has_candidate &&
+       (confidence < calibrated(c.first_pass_reject) ||
+        confidence > std::max(calibrated(c.first_pass_accept), options_.min_confidence)));
   best.timings += results_[pair].timings;
   results_[pair] = std::move(best);
   if (decided)
