@@ -69,7 +69,7 @@ struct CompatibilityOptions {
   /// A first pass with few candidates (those of quality 1) decides most pairs: its result is final
   /// where its confidence is below first_pass_reject or above first_pass_accept. The others are
   /// aligned in full. 0 and 1: no first pass. There is none either with fewer than 512 seeds
-  /// or at most 12 modes. A result below min_confidence is never final for being above.
+  /// or at most 12 modes.
   double first_pass_reject = 1e-3, first_pass_accept = 0.95;
 
   /// @throws InvalidArgument naming field and value.

@@ -103,11 +103,9 @@ void Batch::settle(std::size_t pair, RegistrationResult* found,
   const CompatibilityOptions& c = options_.compatibility;
   // A calibration changes confidences alone, so it applies to the limits as well.
   const ConfidenceCalibration& calibrated = options_.calibration;
-  const bool decided =
-      &options == &options_ ||
-      (best.has_candidate &&
-       (confidence < calibrated(c.first_pass_reject) ||
-        confidence > std::max(calibrated(c.first_pass_accept), options_.min_confidence)));
+  const bool decided = &options == &options_ ||
+                       (best.has_candidate && (confidence < calibrated(c.first_pass_reject) ||
+                                               confidence > calibrated(c.first_pass_accept)));
   best.timings += results_[pair].timings;
   results_[pair] = std::move(best);
   if (decided)
