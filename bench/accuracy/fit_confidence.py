@@ -176,6 +176,12 @@ class Run:
         modes = [p.get("modes", []) for p in pairs]
         if not any(modes):
             sys.exit(f"error: {result}: no pair has a mode with evidence")
+        compatibility = recorded["options"].get("compatibility", {})
+        if (
+            compatibility.get("first_pass_reject", 0) > 0
+            or compatibility.get("first_pass_accept", 1) < 1
+        ):
+            sys.exit(f"error: {result}: a first pass tried fewer modes, switch it off to fit")
         self.refined = recorded["options"]["evidence"]["modes"]
         self.keys = [(p["i"], p["j"]) for p in pairs]
         self.modes_per_pair = np.array([len(m) for m in modes])
