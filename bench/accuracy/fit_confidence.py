@@ -42,7 +42,7 @@ import sys
 from typing import NamedTuple
 
 import numpy as np
-from record import save
+from record import AFTER_FIRST_PASS, modes_tried, save
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 
@@ -176,13 +176,9 @@ class Run:
         modes = [p.get("modes", []) for p in pairs]
         if not any(modes):
             sys.exit(f"error: {result}: no pair has a mode with evidence")
-        compatibility = recorded["options"].get("compatibility", {})
-        if (
-            compatibility.get("first_pass_reject", 0) > 0
-            or compatibility.get("first_pass_accept", 1) < 1
-        ):
-            sys.exit(f"error: {result}: a first pass tried fewer modes, switch it off to fit")
-        self.refined = recorded["options"]["evidence"]["modes"]
+        self.refined = modes_tried(recorded["options"])
+        if self.refined is None:
+            sys.exit(f"error: {result}: {AFTER_FIRST_PASS}")
         self.keys = [(p["i"], p["j"]) for p in pairs]
         self.modes_per_pair = np.array([len(m) for m in modes])
         self.pair = np.repeat(np.arange(len(pairs)), self.modes_per_pair)
