@@ -165,12 +165,14 @@ void resolve_viewpoints(Engine& engine, Span<const RawCloud> raw,
   std::vector<Replacement> replacements;
   std::vector<Inheritance> inheritances;
   std::vector<RawCloud> inputs;
+  std::vector<std::size_t> first{0};  // of each cloud: its sides stay together
   for (const OpenCloud& cloud : open) {
     if (cloud.sides.signs.empty()) continue;
     const bool own_features = knowledge[cloud.index].features;
     replacements.emplace_back(cloud, *states[cloud.index], own_features, 1.0f);
     if (!cloud.sides.sign_known)
       replacements.emplace_back(cloud, *states[cloud.index], own_features, -1.0f);
+    first.push_back(replacements.size());
     inheritances.emplace_back(*states[cloud.index]);
     // Of a large cloud it takes gigabytes, and so do its replacements.
     states[cloud.index].reset();
@@ -180,10 +182,11 @@ void resolve_viewpoints(Engine& engine, Span<const RawCloud> raw,
   PrepareOptions as_they_are = options;
   as_they_are.voxel_size = 0;
   std::vector<std::shared_ptr<PreparedState>> prepared;
-  const auto runs = pipeline::runs_within(inputs.size(), kPointsTogether,
-                                          [&](std::size_t k) { return inputs[k].size; });
+  const auto runs = pipeline::runs_within(inheritances.size(), kPointsTogether, [&](std::size_t k) {
+    return inputs[first[k]].size * (first[k + 1] - first[k]);
+  });
   for (const pipeline::Run& run : runs)
-    in_halves(run.begin, run.end, [&](std::size_t begin, std::size_t end) {
+    in_halves(first[run.begin], first[run.end], [&](std::size_t begin, std::size_t end) {
       for (auto& state : engine.prepare({inputs.data() + begin, end - begin}, as_they_are))
         prepared.push_back(std::move(state));
     });

@@ -121,7 +121,7 @@ struct CpuCloud : PreparedState {
   std::vector<std::uint32_t> normal_weight;
   Visibility visibility;
   SurfaceSides surface_sides;
-  ClosestGrid closest;
+  std::shared_ptr<const ClosestGrid> closest;  ///< one for both sides of a cloud
   ScoringOrder order;
   CellSummaries summaries;
   std::vector<Vec3> copy_points() const override { return points; }

@@ -21,10 +21,9 @@ std::vector<Features> compute_features(Exec& exec, const std::vector<Downsampled
                                        const std::vector<std::vector<Vec3>>& normals,
                                        const std::vector<Grid>& grids,
                                        const PrepareOptions& options);
-std::vector<ClosestGrid> build_closest_grids(Exec& exec,
-                                             const std::vector<DownsampledCloud>& clouds,
-                                             const std::vector<Grid>& grids,
-                                             const PrepareOptions& options);
+std::vector<std::shared_ptr<const ClosestGrid>> build_closest_grids(
+    Exec& exec, const std::vector<DownsampledCloud>& clouds, const std::vector<Grid>& grids,
+    const PrepareOptions& options);
 /// FPFH of the wide radius, from normals of a wide radius; empty without one.
 std::vector<Features> compute_wide_features(Exec& exec, const std::vector<DownsampledCloud>& clouds,
                                             const std::vector<Grid>& grids,
@@ -39,7 +38,7 @@ std::vector<SurfaceSides> build_surface_sides(Exec& exec,
 std::vector<std::shared_ptr<CpuCloud>> assemble(
     Exec& exec, std::vector<DownsampledCloud>& clouds, std::vector<std::vector<Vec3>>& normals,
     std::vector<Features>& features, std::vector<Features>& wide_features,
-    std::vector<ClosestGrid>& closest, std::vector<Visibility>& visibility,
+    std::vector<std::shared_ptr<const ClosestGrid>>& closest, std::vector<Visibility>& visibility,
     std::vector<SurfaceSides>& surface_sides, const PrepareOptions& options);
 
 // Alignment, one entry per pair.

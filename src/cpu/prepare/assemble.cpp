@@ -28,7 +28,7 @@ CloudView CpuCloud::view() const {
   v.size = size;
   v.feature_dimension = feature_dimension;
   v.radius = radius;
-  v.closest = closest.view();
+  v.closest = closest->view();
   v.executor_data = this;
   v.wide_features = wide ? wide_features.values.data() : nullptr;
   v.has_wide_feature = wide ? wide_features.valid.data() : nullptr;
@@ -42,7 +42,7 @@ CloudView CpuCloud::view() const {
 std::vector<std::shared_ptr<CpuCloud>> assemble(
     Exec& exec, std::vector<DownsampledCloud>& clouds, std::vector<std::vector<Vec3>>& normals,
     std::vector<Features>& features, std::vector<Features>& wide_features,
-    std::vector<ClosestGrid>& closest, std::vector<Visibility>& visibility,
+    std::vector<std::shared_ptr<const ClosestGrid>>& closest, std::vector<Visibility>& visibility,
     std::vector<SurfaceSides>& surface_sides, const PrepareOptions& options) {
   std::vector<std::shared_ptr<CpuCloud>> out(clouds.size());
   exec.parallel(clouds.size(), [&](std::size_t c) {
@@ -68,7 +68,7 @@ std::vector<std::shared_ptr<CpuCloud>> assemble(
     cloud->closest = std::move(closest[c]);
     cloud->order =
         scoring_order(cloud->points, cloud->normals, options.max_correspondence_distance);
-    cloud->summaries = summarize_cells(cloud->closest, options.max_correspondence_distance,
+    cloud->summaries = summarize_cells(*cloud->closest, options.max_correspondence_distance,
                                        cloud->radius, cloud->points, cloud->normals);
     out[c] = std::move(cloud);
   });

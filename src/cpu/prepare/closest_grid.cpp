@@ -232,6 +232,12 @@ struct GrowingGrid {
   }
 };
 
+bool same_points(const std::vector<Vec3>& a, const std::vector<Vec3>& b) {
+  return a.size() == b.size() && std::equal(a.begin(), a.end(), b.begin(), [](Vec3 p, Vec3 q) {
+           return p.x == q.x && p.y == q.y && p.z == q.z;
+         });
+}
+
 }  // namespace
 
 std::vector<std::uint64_t> reachable_blocks(const std::vector<Vec3>& points,
@@ -268,13 +274,18 @@ ClosestGridView ClosestGrid::view() const {
   return {1.0f / cell_size, span_of(table.entries), span_of(cell_start), span_of(candidates)};
 }
 
-std::vector<ClosestGrid> build_closest_grids(Exec& exec,
-                                             const std::vector<DownsampledCloud>& clouds,
-                                             const std::vector<Grid>& grids,
-                                             const PrepareOptions& options) {
-  std::vector<ClosestGrid> out(clouds.size());
+std::vector<std::shared_ptr<const ClosestGrid>> build_closest_grids(
+    Exec& exec, const std::vector<DownsampledCloud>& clouds, const std::vector<Grid>& grids,
+    const PrepareOptions& options) {
+  std::vector<std::shared_ptr<const ClosestGrid>> out(clouds.size());
   std::vector<GrowingGrid> growing(clouds.size());
+  // Both sides of a cloud come one after the other, and the grid knows no sides.
+  const auto same_as_previous = [&](std::size_t c) {
+    return c > 0 && clouds[c].radius == clouds[c - 1].radius &&
+           same_points(clouds[c].points, clouds[c - 1].points);
+  };
   exec.parallel(clouds.size(), [&](std::size_t c) {
+    if (same_as_previous(c)) return;
     GrowingGrid& g = growing[c];
     g.geometry = closest_geometry(options.max_correspondence_distance, clouds[c].radius);
     g.keys = reachable_blocks(clouds[c].points, g.geometry, kLeastKeys);
@@ -300,7 +311,10 @@ std::vector<ClosestGrid> build_closest_grids(Exec& exec,
     });
   }
   exec.parallel(clouds.size(), [&](std::size_t c) {
-    ClosestGrid& grid = out[c];
+    if (same_as_previous(c)) return;
+    auto kept = std::make_shared<ClosestGrid>();
+    out[c] = kept;
+    ClosestGrid& grid = *kept;
     GrowingGrid& g = growing[c];
     grid.cell_size = g.geometry.cell_size;
     grid.table.reset(g.keys.size());
@@ -311,6 +325,8 @@ std::vector<ClosestGrid> build_closest_grids(Exec& exec,
     grid.cell_start = std::move(g.cell_start);
     grid.candidates = g.all_candidates();
   });
+  for (std::size_t c = 0; c < clouds.size(); ++c)
+    if (same_as_previous(c)) out[c] = out[c - 1];
   return out;
 }
 
