@@ -18,9 +18,9 @@ using UnalignedMatrix6d = Eigen::Matrix<double, 6, 6, Eigen::DontAlign>;
 using UnalignedVector6d = Eigen::Matrix<double, 6, 1, Eigen::DontAlign>;
 
 /// Points and unit normals of a scan in host memory: tight rows of three floats. A point that is
-/// not finite, or has no normal of unit length, takes no part. Sums resolve 2^-40 of the squared
-/// size of the box of the points: stray points beyond 10,000 times the size of the scan cost the
-/// rotation its digits.
+/// not finite or beyond 1e15 m, or has no normal of unit length, takes no part. Sums resolve 2^-40
+/// of the squared size of the box of the points: stray points beyond 10,000 times the size of the
+/// scan cost the rotation its digits.
 struct SurfaceView {
   const float* points = nullptr;   ///< size x 3, metres
   const float* normals = nullptr;  ///< size x 3

@@ -53,10 +53,13 @@ GPUREG_HD Vec3 row_of(const float* rows, std::uint32_t i) {
   return {row[0], row[1], row[2]};
 }
 
-/// Whether a point takes part: it is finite and has a normal of unit length.
+/// Whether a point takes part: it is finite, near enough, and has a normal of unit length.
 GPUREG_HD bool usable(Vec3 point, Vec3 normal) {
+  // Squares of coordinates stay finite.
+  constexpr float kFarthest = 1e15f;
   const float n = squared_norm(normal);
-  return all_finite(point) && n > 0.25f && n < 1.1f;
+  return fabsf(point.x) <= kFarthest && fabsf(point.y) <= kFarthest &&
+         fabsf(point.z) <= kFarthest && n > 0.25f && n < 1.1f;
 }
 
 /// View of a grid without its arrays.
