@@ -33,7 +33,9 @@ false positives. Needs numpy, scikit-learn, the Python package gpureg, and clang
 --header."""
 
 import argparse
+import itertools
 import json
+import multiprocessing
 import pathlib
 import re
 import shutil
@@ -493,6 +495,20 @@ def text_of(figures):
     return " ".join(f"{key} {value(key, v)}" for key, v in figures.items())
 
 
+def parallel(work, arguments):
+    """work(*of) for each of the arguments, in order, by as many processes as there are processors. They inherit what
+    `work` refers to, which is not copied.
+    """
+    global _work
+    _work = work
+    with multiprocessing.get_context("fork").Pool() as pool:
+        return pool.map(_call, arguments, chunksize=1)
+
+
+def _call(arguments):
+    return _work(*arguments)
+
+
 def test_and_fit(runs, beside, others):
     """Figures of all runs by fits on other buildings, and the models of the fit on all of them."""
 
@@ -502,34 +518,35 @@ def test_and_fit(runs, beside, others):
             return []
         return [run for run in of if run.has(model) and run.building != building]
 
+    def fit_without(name, building):
+        model = MODELS[name]
+        if not allowed(runs, model, building):
+            return None
+        return fit(allowed(runs, model, building), allowed(beside, model, building), model)
+
+    names = [name for name, model in MODELS.items() if not model.model]  # see fit_models.py
+    buildings = [*dict.fromkeys(run.building for run in [*runs, *beside, *others]), None]
+    keys = list(itertools.product(names, buildings))
+    fits = dict(zip(keys, parallel(fit_without, keys)))
     tested = []
-    for name, model in MODELS.items():
-        if model.model:
-            continue  # see fit_models.py
-        fits = {}
+    for name in names:
+        model = MODELS[name]
         for run in [*runs, *beside, *others]:
-            left = allowed(runs, model, run.building)
             # Models without free space are tested where there is none. Those without sides of
             # surfaces are tested everywhere, which shows the gain of the sides.
-            if not left or not run.has(model) or (not model.free_space and run.free_space):
+            left_out = fits[name, run.building]
+            if not left_out or not run.has(model) or (not model.free_space and run.free_space):
                 continue
-            if run.building not in fits:
-                fits[run.building] = fit(left, allowed(beside, model, run.building), model)
             out = {
                 "scene": run.name,
                 **({"label": run.label} if run.label else {}),
                 "viewpoints": run.viewpoints,
                 "model": name,
-                **figures(run, model, fits[run.building]),
+                **figures(run, model, left_out),
             }
             tested.append(out)
             print(text_of(out), flush=True)
-    models = {
-        name: fit(allowed(runs, model), allowed(beside, model), model)
-        for name, model in MODELS.items()
-        if not model.model
-    }
-    return tested, models
+    return tested, {name: fits[name, None] for name in names if fits[name, None]}
 
 
 def parse_run(text, viewpoints="known"):

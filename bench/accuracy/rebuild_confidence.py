@@ -312,17 +312,20 @@ def fit(inputs, runs, absent, arguments):
     import fit_confidence  # needs numpy
 
     def load(role):
-        return [
-            fit_confidence.Run(
-                inputs.manifest["scenes"][run.scene]["building"],
-                inputs.scene(run.scene),
-                inputs.result(run),
-                run.label,
-                VIEWPOINTS[run.viewpoints],
-            )
-            for run in runs
-            if run.role == role
-        ]
+        return fit_confidence.parallel(
+            fit_confidence.Run,
+            [
+                (
+                    inputs.manifest["scenes"][run.scene]["building"],
+                    inputs.scene(run.scene),
+                    inputs.result(run),
+                    run.label,
+                    VIEWPOINTS[run.viewpoints],
+                )
+                for run in runs
+                if run.role == role
+            ],
+        )
 
     tested, models = fit_confidence.test_and_fit(*map(load, ROLES))
     fit_confidence.write_header(arguments.header, models)
