@@ -118,6 +118,13 @@ struct LocateOptions {
   /// more matches of its own than the scan has, and a random choice of few holds hardly any of the
   /// scan's.
   std::uint32_t max_matches = 65536;
+  /// All tiles are searched with voxels this many times as wide as those of the map, 1..8: several
+  /// times as fast, and thinned scans of spinning LiDARs find more. 1: with those of the map.
+  double coarse_factor = 2;
+  /// Where the first search does not end in a place with a confidence of 0.75, so many tiles are
+  /// searched with the voxels of the map, >= 1: those in which the first search was the most
+  /// confident.
+  std::uint32_t fine_tiles = 4;
   /// Poses of a scan that are verified against all of the map around them, 1..64.
   std::uint32_t candidates = 8;
   /// Distance from the points of the scan up to which the map takes part in this, metres, > 0.
@@ -178,8 +185,9 @@ struct LocateResult {
   std::size_t neighborhood_points = 0;  ///< points of the map around the first pose
 };
 
-/// Finds the poses of scans in a map: aligns each scan with every tile, merges the poses of all
-/// tiles, and verifies the most confident ones against the whole map around them. All places
+/// Finds the poses of scans in a map: aligns each scan with every tile in coarse voxels, merges the
+/// poses of all tiles, and verifies the most confident ones against the whole map around them, in
+/// its own voxels. Where none is sure, the best tiles are searched in those, too. All places
 /// compete for the confidence.
 ///
 /// @param scans host memory; viewpoints as for prepare().

@@ -1141,6 +1141,8 @@ class LocateOptions:
     # fields of LocateOptions
     registration: RegistrationOptions
     max_matches: int
+    coarse_factor: float
+    fine_tiles: int
     candidates: int
     neighborhood: float
     def __init__(
@@ -1148,6 +1150,8 @@ class LocateOptions:
         *,
         registration: RegistrationOptions = ...,
         max_matches: int = ...,
+        coarse_factor: float = ...,
+        fine_tiles: int = ...,
         candidates: int = ...,
         neighborhood: float = ...,
     ) -> None: ...
@@ -1156,6 +1160,8 @@ class LocateOptions:
         *,
         registration: RegistrationOptions = ...,
         max_matches: int = ...,
+        coarse_factor: float = ...,
+        fine_tiles: int = ...,
         candidates: int = ...,
         neighborhood: float = ...,
     ) -> LocateOptions: ...

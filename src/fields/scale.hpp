@@ -26,4 +26,20 @@ void scale(T& options, float voxel_size) {
   });
 }
 
+/// Multiplies every length of `options`, and of its groups.
+template <typename T>
+void multiply_lengths(T& options, double factor) {
+  each<T>([&](const std::string&, auto member, const Field& field) {
+    auto& value = options.*member;
+    using M = std::decay_t<decltype(value)>;
+    if constexpr (is_described<M>)
+      multiply_lengths(value, factor);
+    else if constexpr (std::is_same_v<M, float>) {
+      if (field.scale.factor != 0) value *= static_cast<float>(factor);
+    } else if constexpr (std::is_same_v<M, double>) {
+      if (field.scale.proportional) value *= factor;
+    }
+  });
+}
+
 }  // namespace gpureg::fields

@@ -89,12 +89,16 @@ PointCloud neighborhood(const MapState& map, const std::vector<Eigen::Vector3d>&
   return map.cut(box, [&](const Eigen::Vector3f& p) { return cells.has(p.cast<double>()); });
 }
 
+double odds_of(double confidence) {
+  const double c = std::clamp(confidence, 0.0, kMostCertain);
+  return c / (1 - c);
+}
+
 std::vector<double> shared_probability(const std::vector<double>& alone) {
   std::vector<double> out;
   double sum = 1;
   for (const double confidence : alone) {
-    const double c = std::clamp(confidence, 0.0, kMostCertain);
-    out.push_back(c / (1 - c));
+    out.push_back(odds_of(confidence));
     sum += out.back();
   }
   for (double& odds : out) odds /= sum;

@@ -24,6 +24,9 @@ std::vector<Candidate> distinct(std::vector<Candidate> candidates, const Eigen::
 PointCloud neighborhood(const MapState& map, const std::vector<Eigen::Vector3d>& scan,
                         const UnalignedIsometry3d& map_from_scan, double distance);
 
+/// Odds of a confidence, bounded: differences of near-certain ones do not tell places apart.
+double odds_of(double confidence);
+
 /// Shares the probability among places: each has the odds that it would have alone, and so has
 /// "nowhere", with odds of 1.
 /// @return probability of each place, and that of none at the end.

@@ -2,128 +2,28 @@
 #include <algorithm>
 #include <cmath>
 
-#include "localization/candidates.hpp"
 #include "localization/check_scan.hpp"
+#include "localization/search.hpp"
 
 namespace gpureg::localization {
 namespace {
 
-/// Prepared points of the tiles that are aligned together: about 1 GB.
-constexpr std::size_t kPointsAtOnce = 400'000;
-/// Poses that a tile finds less likely than this are left out, but for the first one.
-constexpr double kHopeless = 1e-4;
-
-/// A scan on its way through the map.
-struct Scan {
-  PreparedCloud cloud;
-  std::vector<Eigen::Vector3d> points;  ///< in the scan's frame
-  Eigen::Vector3d middle{0, 0, 0};
-  double reach = 0;  ///< largest distance of a point from the origin of the frame
-  LocatePrior prior;
-  std::size_t tiles = 0;
-  std::vector<Candidate> candidates;
-};
-
-Scan scan_of(PreparedCloud cloud, const LocatePrior& prior) {
-  Scan scan;
-  for (const Eigen::Vector3f& point : cloud.points()) {
-    scan.points.push_back(point.cast<double>() + cloud.origin());
-    scan.middle += scan.points.back();
-    scan.reach = std::max(scan.reach, scan.points.back().norm());
-  }
-  if (!scan.points.empty()) scan.middle /= static_cast<double>(scan.points.size());
-  scan.cloud = std::move(cloud);
-  scan.prior = prior;
-  return scan;
-}
-
-bool may_be_in(const Scan& scan, const MapState& map, std::size_t tile) {
-  if (!scan.prior.position) return true;
-  const Eigen::Vector3d place = scan.prior.position->position - map.origin;
-  return map.tile_box(tile).exteriorDistance(place) <= scan.prior.position->radius + scan.reach;
-}
-
-/// The pair's prior is about the middle of the scan, whose place depends on the attitude.
-RegistrationPrior prior_of_pair(const Scan& scan) {
-  RegistrationPrior prior;
-  prior.gravity = scan.prior.gravity;
-  if (const auto& known = scan.prior.position) {
-    PosePrior pose;
-    pose.target_from_source.translation() = known->position - scan.middle;
-    pose.max_rotation = 180;
-    pose.max_translation = known->radius + 3 * scan.reach;
-    prior.pose = pose;
-  }
-  return prior;
-}
-
-bool contradicts(const Scan& scan, const UnalignedIsometry3d& map_from_scan) {
-  const auto& known = scan.prior.position;
-  return known && (map_from_scan.translation() - known->position).norm() > known->radius;
-}
-
-/// Aligns every scan with the tiles begin..end - 1 and collects the modes.
-void search_tiles(const Context& context, const MapState& map, std::size_t begin, std::size_t end,
-                  const RegistrationOptions& options, std::vector<Scan>& scans) {
-  std::vector<std::size_t> wanted;
-  for (std::size_t tile = begin; tile < end; ++tile)
-    if (std::any_of(scans.begin(), scans.end(),
-                    [&](const Scan& scan) { return may_be_in(scan, map, tile); }))
-      wanted.push_back(tile);
-  std::vector<PreparedCloud> clouds = map.prepared_tiles(context, wanted);
-  std::vector<Pair> pairs;
-  std::vector<RegistrationPrior> priors;
-  for (std::size_t k = 0; k < scans.size(); ++k) {
-    clouds.push_back(scans[k].cloud);
-    for (std::size_t t = 0; t < wanted.size(); ++t) {
-      if (!may_be_in(scans[k], map, wanted[t])) continue;
-      ++scans[k].tiles;
-      pairs.push_back(
-          {static_cast<std::uint32_t>(wanted.size() + k), static_cast<std::uint32_t>(t)});
-      priors.push_back(prior_of_pair(scans[k]));
-    }
-  }
-  const std::vector<RegistrationResult> results =
-      align_batch(context, clouds, pairs, priors, options);
-  for (std::size_t p = 0; p < pairs.size(); ++p) {
-    Scan& scan = scans[pairs[p].source - wanted.size()];
-    for (std::size_t m = 0; m < results[p].modes.size(); ++m) {
-      const RegistrationMode& mode = results[p].modes[m];
-      if (!contradicts(scan, mode.target_from_source))
-        scan.candidates.push_back(
-            {mode.target_from_source, mode.confidence, wanted[pairs[p].target], m});
-    }
-  }
-}
-
-void search(const Context& context, const MapState& map, const LocateOptions& options,
-            std::vector<Scan>& scans) {
-  RegistrationOptions registration = options.registration;
-  registration.compatibility.max_matches = options.max_matches;
-  // "Not in this map" needs the whole search: a contained scan has a low confidence at first.
-  registration.compatibility.first_pass_reject = 0;
-  for (std::size_t begin = 0; begin < map.tiles.size();) {
-    std::size_t end = begin, points = 0;
-    while (end < map.tiles.size() && (end == begin || points < kPointsAtOnce)) {
-      points += map.tiles[end].end - map.tiles[end].begin;
-      ++end;
-    }
-    search_tiles(context, map, begin, end, registration, scans);
-    begin = end;
-  }
-  for (Scan& scan : scans) {
-    scan.candidates = distinct(std::move(scan.candidates), scan.middle, registration.evidence,
-                               options.candidates);
-    while (scan.candidates.size() > 1 && scan.candidates.back().confidence < kHopeless)
-      scan.candidates.pop_back();
-  }
-}
+/// Confidence of a place from which the coarse search is enough.
+constexpr double kSure = 0.75;
 
 /// A candidate in all of the map around it.
 struct Verified {
   PoseVerification verification;
   std::size_t points = 0;  ///< of the neighbourhood
+  double confidence = 0;   ///< other places aside
 };
+
+/// Sparse scans overlap little in narrow voxels, and the search in wide ones knows better: the mean
+/// of both log odds, where it is more than the verification alone.
+double confidence_of(double searched, double verified) {
+  const double odds = std::sqrt(odds_of(searched) * odds_of(verified));
+  return std::max(verified, odds / (1 + odds));
+}
 
 std::vector<Verified> verify(const Context& context, const MapState& map,
                              const LocateOptions& options, const Scan& scan) {
@@ -145,9 +45,10 @@ std::vector<Verified> verify(const Context& context, const MapState& map,
       verify_poses_batch(context, clouds, pairs, poses, options.registration, verification);
   std::vector<Verified> out;
   for (std::size_t k = 0; k < results.size(); ++k)
-    out.push_back({results[k].front(), clouds[k + 1].size()});
+    out.push_back({results[k].front(), clouds[k + 1].size(),
+                   confidence_of(scan.candidates[k].confidence, results[k].front().confidence)});
   std::stable_sort(out.begin(), out.end(), [](const Verified& a, const Verified& b) {
-    return a.verification.confidence > b.verification.confidence;
+    return a.confidence > b.confidence;
   });
   return out;
 }
@@ -182,10 +83,9 @@ LocateResult result_of(const std::vector<Verified>& verified, const Scan& scan,
     LocatedPose place;
     place.map_from_scan = pose;
     place.verification = v.verification;
-    place.alias =
-        !out.poses.empty() && v.verification.confidence >= options.registration.min_confidence;
+    place.alias = !out.poses.empty() && v.confidence >= options.registration.min_confidence;
     out.poses.push_back(place);
-    alone.push_back(v.verification.confidence);
+    alone.push_back(v.confidence);
   }
   const std::vector<double> shared = shared_probability(alone);
   for (std::size_t k = 0; k < out.poses.size(); ++k) out.poses[k].confidence = shared[k];
@@ -227,13 +127,25 @@ std::vector<LocateResult> locate(const Context& context, const std::vector<Point
   }
   const std::vector<PreparedCloud> prepared =
       prepare_batch(context, scans, state.options.prepare, names);
+  const bool coarse_first = options.coarse_factor > 1;
+  const std::vector<PreparedCloud> coarse =
+      coarse_first ? prepare_batch(context, scans, coarse_prepare(state, options), names)
+                   : prepared;
   std::vector<Scan> found;
   for (std::size_t k = 0; k < scans.size(); ++k)
-    found.push_back(scan_of(prepared[k], priors.empty() ? LocatePrior{} : priors[k]));
-  search(context, state, options, found);
+    found.push_back(scan_of(prepared[k], coarse[k], priors.empty() ? LocatePrior{} : priors[k]));
+  search_all_tiles(context, state, options, found);
   std::vector<LocateResult> out;
-  for (const Scan& scan : found)
-    out.push_back(result_of(verify(context, state, options, scan), scan, options));
+  std::vector<std::size_t> unsure;
+  for (std::size_t k = 0; k < found.size(); ++k) {
+    out.push_back(result_of(verify(context, state, options, found[k]), found[k], options));
+    if (coarse_first && (out[k].poses.empty() || out[k].poses.front().confidence < kSure))
+      unsure.push_back(k);
+  }
+  if (unsure.empty()) return out;
+  search_best_tiles(context, state, options, unsure, found);
+  for (const std::size_t k : unsure)
+    out[k] = result_of(verify(context, state, options, found[k]), found[k], options);
   return out;
 }
 

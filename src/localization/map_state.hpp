@@ -5,6 +5,7 @@
 #include <functional>
 #include <map>
 #include <mutex>
+#include <tuple>
 
 #include "gpureg/localization.hpp"
 #include "localization/horizon.hpp"
@@ -39,9 +40,11 @@ struct MapState {
   PointCloud tile_cloud(std::size_t tile) const;
   Eigen::AlignedBox3d tile_box(std::size_t tile) const;
 
-  /// Prepared tiles, those that fit into the cache.
+  /// Prepared tiles. Those that fit stay in the cache.
+  /// @param prepare the options of the map with another voxel size, 0 for points as they are.
   std::vector<PreparedCloud> prepared_tiles(const Context& context,
-                                            const std::vector<std::size_t>& wanted) const;
+                                            const std::vector<std::size_t>& wanted,
+                                            const PrepareOptions& prepare) const;
 
   static const MapState& of(const PreparedMap& map);
   static PreparedMap map(std::shared_ptr<const MapState> state) {
@@ -50,7 +53,8 @@ struct MapState {
 
  private:
   mutable std::mutex mutex_;
-  mutable std::map<std::pair<Backend, std::size_t>, PreparedCloud> cache_;
+  /// By backend, voxel size and tile.
+  mutable std::map<std::tuple<Backend, float, std::size_t>, PreparedCloud> cache_;
   mutable std::size_t cached_points_ = 0;
 };
 

@@ -115,13 +115,17 @@ std::vector<PointCloudView> views_of(const std::vector<PointCloud>& clouds) {
 }
 
 std::vector<PreparedCloud> MapState::prepared_tiles(const Context& context,
-                                                    const std::vector<std::size_t>& wanted) const {
+                                                    const std::vector<std::size_t>& wanted,
+                                                    const PrepareOptions& prepare) const {
+  const auto key = [&](std::size_t tile) {
+    return std::tuple(context.backend(), prepare.voxel_size, tile);
+  };
   std::vector<PreparedCloud> out(wanted.size());
   std::vector<std::size_t> missing;
   {
     const std::lock_guard<std::mutex> lock(mutex_);
     for (std::size_t k = 0; k < wanted.size(); ++k) {
-      const auto found = cache_.find({context.backend(), wanted[k]});
+      const auto found = cache_.find(key(wanted[k]));
       if (found != cache_.end())
         out[k] = found->second;
       else
@@ -136,14 +140,13 @@ std::vector<PreparedCloud> MapState::prepared_tiles(const Context& context,
     names.push_back("tile " + std::to_string(wanted[k]) + " of the map");
   }
   const std::vector<PreparedCloud> prepared =
-      prepare_batch(context, views_of(clouds), as_they_are(options.prepare), names);
+      prepare_batch(context, views_of(clouds), prepare, names);
   const std::lock_guard<std::mutex> lock(mutex_);
   for (std::size_t m = 0; m < missing.size(); ++m) {
     out[missing[m]] = prepared[m];
     const std::size_t size = prepared[m].size();
     if (cached_points_ + size > kMostCachedPoints) continue;
-    if (cache_.emplace(std::pair(context.backend(), wanted[missing[m]]), prepared[m]).second)
-      cached_points_ += size;
+    if (cache_.emplace(key(wanted[missing[m]]), prepared[m]).second) cached_points_ += size;
   }
   return out;
 }

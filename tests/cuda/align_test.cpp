@@ -310,7 +310,7 @@ TEST_F(AlignOnCuda, AMapOfManyCandidates) {
   options.prepare.voxel_size = 0;
   options.quadruples.count = 50'000;
   cpu::Exec exec(2);
-  ASSERT_GT(test::prepare_one(exec, raw()[0], options.prepare)->closest.candidates.size(),
+  ASSERT_GT(test::prepare_one(exec, raw()[0], options.prepare)->closest->candidates.size(),
             std::size_t(1) << 24);
   expect_same_alignment(raw(), {{1, 0, {}, {}}}, options);
 }

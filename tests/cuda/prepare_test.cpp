@@ -144,7 +144,7 @@ void expect_same_preparation(const std::vector<RawCloud>& raw, const PrepareOpti
   const auto cuda_closest = cuda::build_closest_grids(on_cuda, cuda_points, cuda_grids, options);
   for (std::size_t c = 0; c < raw.size(); ++c) {
     SCOPED_TRACE("closest grid, cloud " + std::to_string(c));
-    const auto& expected = cpu_closest[c];
+    const auto& expected = *cpu_closest[c];
     const std::size_t first = cuda_closest.blocks.offset[c];
     ASSERT_EQ(expected.blocks.size(), cuda_closest.blocks.size(c));
     ASSERT_TRUE(same_bytes(
@@ -199,10 +199,10 @@ void expect_same_preparation(const std::vector<RawCloud>& raw, const PrepareOpti
     ASSERT_EQ(expected[c]->statistics.points_without_feature,
               assembled[c]->statistics.points_without_feature);
     // Look-ups in both tables agree, whatever the slots of their entries.
-    for (std::size_t b = 0; b < cpu_closest[c].blocks.size(); b += 7) {
+    for (std::size_t b = 0; b < cpu_closest[c]->blocks.size(); b += 7) {
       const auto table = host(on_cuda, assembled[c]->view_on_device.closest.table.data,
                               assembled[c]->view_on_device.closest.table.size);
-      ASSERT_EQ(find_cell(span_of(table), cell_key(cpu_closest[c].blocks[b])), b);
+      ASSERT_EQ(find_cell(span_of(table), cell_key(cpu_closest[c]->blocks[b])), b);
       if (b > 70) break;
     }
   }

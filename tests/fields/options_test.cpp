@@ -8,6 +8,7 @@
 
 #include "fields/localization.hpp"
 #include "fields/loop_closure.hpp"
+#include "fields/scale.hpp"
 #include "gpureg/error.hpp"
 #include "support/expect_error.hpp"
 
@@ -157,6 +158,18 @@ TEST(OptionFields, LengthsHaveTheBitsOfTheirFormulas) {
     EXPECT_TRUE(same_bits(o.evidence.free_space_margin, v / 5.0f * 12.0f));
     EXPECT_TRUE(same_bits(o.evidence.min_range, 6.0f * v));
   }
+}
+
+TEST(OptionFields, MultiplyingLengthsLeavesTheRest) {
+  RegistrationOptions o = RegistrationOptions::from_voxel_size(0.05f);
+  o.evidence.mode_angle = 7;
+  fields::multiply_lengths(o, 2);
+  const RegistrationOptions wide = RegistrationOptions::from_voxel_size(0.1f);
+  EXPECT_FLOAT_EQ(o.prepare.voxel_size, wide.prepare.voxel_size);
+  EXPECT_FLOAT_EQ(o.prepare.feature_radius, wide.prepare.feature_radius);
+  EXPECT_FLOAT_EQ(o.evidence.min_range, wide.evidence.min_range);
+  EXPECT_EQ(o.evidence.mode_angle, 7);
+  EXPECT_EQ(o.evidence.sample, wide.evidence.sample);
 }
 
 TEST(OptionFields, LengthsOfMapsHaveTheBitsOfTheirFormulas) {

@@ -45,6 +45,28 @@ TEST(Locate, TilesFindWhatTheWholeMapFinds) {
   EXPECT_LT(query.error(result.poses.front()), kClose);
 }
 
+TEST(Locate, FindsTheSamePlaceInVoxelsOfAnyWidth) {
+  const PreparedMap map = building({1, 2, 3}, map_options(5));
+  const Query query(2, 1, 1);
+  for (const double factor : {1.0, 1.5, 2.0}) {
+    LocateOptions options = LocateOptions::from_voxel_size(kVoxel);
+    options.coarse_factor = factor;
+    const LocateResult result = locate(context(), {query.scan.view()}, map, options).front();
+    ASSERT_EQ(result.status, LocateStatus::found) << factor;
+    EXPECT_LT(query.error(result.poses.front()), kClose) << factor;
+  }
+}
+
+TEST(Locate, WhatTooCoarseVoxelsLoseIsSearchedInThoseOfTheMap) {
+  const PreparedMap map = building({1, 2, 3}, map_options());
+  const Query query(3, 2, 8);
+  LocateOptions options = LocateOptions::from_voxel_size(kVoxel);
+  options.coarse_factor = 8;  // 80 cm: a room has no features left
+  const LocateResult result = locate(context(), {query.scan.view()}, map, options).front();
+  ASSERT_EQ(result.status, LocateStatus::found);
+  EXPECT_LT(query.error(result.poses.front()), kClose);
+}
+
 TEST(Locate, ACopiedRoomIsAnAliasUntilSomebodySaysRoughlyWhere) {
   const PreparedMap map = building({1, 2, 1}, map_options());
   const Query query(1, 2, 5);

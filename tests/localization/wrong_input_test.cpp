@@ -79,6 +79,14 @@ TEST_F(WrongInput, Arguments) {
   options.candidates = 0;
   expect_error<InvalidArgument>([&] { locate(context, {query.scan.view()}, map, options); },
                                 {"candidates", "0"});
+  options = LocateOptions::from_voxel_size(kVoxel);
+  options.coarse_factor = 0.5;
+  expect_error<InvalidArgument>([&] { locate(context, {query.scan.view()}, map, options); },
+                                {"coarse_factor", "0.5"});
+  options = LocateOptions::from_voxel_size(kVoxel);
+  options.fine_tiles = 0;
+  expect_error<InvalidArgument>([&] { locate(context, {query.scan.view()}, map, options); },
+                                {"fine_tiles", "0"});
   LocatePrior prior;
   prior.position = localization::PositionPrior{{0, 0, 0}, -1};
   expect_error<InvalidArgument>([&] { locate(context, query.scan.view(), map, prior); },

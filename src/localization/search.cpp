@@ -1,0 +1,184 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "localization/search.hpp"
+
+#include <algorithm>
+#include <functional>
+#include <numeric>
+
+#include "fields/localization.hpp"
+#include "fields/scale.hpp"
+
+namespace gpureg::localization {
+namespace {
+
+/// Prepared points of the tiles that are aligned together: about 1 GB.
+constexpr double kPointsAtOnce = 400'000;
+/// Poses with less than this share of the odds of the most confident one, or of even odds, are left
+/// out.
+constexpr double kHopeless = 0.01, kHopelessAlone = 1e-4;
+
+bool may_be_in(const Scan& scan, const MapState& map, std::size_t tile) {
+  if (!scan.prior.position) return true;
+  const Eigen::Vector3d place = scan.prior.position->position - map.origin;
+  return map.tile_box(tile).exteriorDistance(place) <= scan.prior.position->radius + scan.reach;
+}
+
+/// The pair's prior is about the middle of the scan, whose place depends on the attitude.
+RegistrationPrior prior_of_pair(const Scan& scan) {
+  RegistrationPrior prior;
+  prior.gravity = scan.prior.gravity;
+  if (const auto& known = scan.prior.position) {
+    PosePrior pose;
+    pose.target_from_source.translation() = known->position - scan.middle;
+    pose.max_rotation = 180;
+    pose.max_translation = known->radius + 3 * scan.reach;
+    prior.pose = pose;
+  }
+  return prior;
+}
+
+/// One search: in which voxels, and which scans in which tiles.
+struct Search {
+  RegistrationOptions registration;
+  PrepareOptions prepare;  ///< of the tiles
+  double factor = 1;       ///< of the voxels
+  std::function<bool(std::size_t scan, std::size_t tile)> wants;
+
+  bool coarse() const { return factor > 1; }
+};
+
+Search search_with(RegistrationOptions registration, const LocateOptions& options) {
+  registration.compatibility.max_matches = options.max_matches;
+  // "Not in this map" needs the whole search: a contained scan has a low confidence at first.
+  registration.compatibility.first_pass_reject = 0;
+  Search out;
+  out.registration = std::move(registration);
+  return out;
+}
+
+/// Aligns the scans with the tiles and collects the modes.
+void search_tiles(const Context& context, const MapState& map, const Search& search,
+                  const std::vector<std::size_t>& tiles, std::vector<Scan>& scans) {
+  std::vector<PreparedCloud> clouds = map.prepared_tiles(context, tiles, search.prepare);
+  std::vector<Pair> pairs;
+  std::vector<RegistrationPrior> priors;
+  for (std::size_t k = 0; k < scans.size(); ++k) {
+    clouds.push_back(search.coarse() ? scans[k].coarse : scans[k].cloud);
+    for (std::size_t t = 0; t < tiles.size(); ++t) {
+      if (!search.wants(k, tiles[t])) continue;
+      pairs.push_back(
+          {static_cast<std::uint32_t>(tiles.size() + k), static_cast<std::uint32_t>(t)});
+      priors.push_back(prior_of_pair(scans[k]));
+    }
+  }
+  const std::vector<RegistrationResult> results =
+      align_batch(context, clouds, pairs, priors, search.registration);
+  for (std::size_t p = 0; p < pairs.size(); ++p) {
+    Scan& scan = scans[pairs[p].source - tiles.size()];
+    const std::size_t tile = tiles[pairs[p].target];
+    for (std::size_t m = 0; m < results[p].modes.size(); ++m) {
+      const RegistrationMode& mode = results[p].modes[m];
+      if (contradicts(scan, mode.target_from_source)) continue;
+      scan.candidates.push_back({mode.target_from_source, mode.confidence, tile, m});
+      scan.best[tile] = std::max(scan.best[tile], mode.confidence);
+    }
+  }
+}
+
+/// Whether the last of the candidates is, beside the first.
+bool is_hopeless(const std::vector<Candidate>& candidates) {
+  return odds_of(candidates.back().confidence) <
+         std::max(kHopelessAlone, kHopeless * odds_of(candidates.front().confidence));
+}
+
+void run(const Context& context, const MapState& map, const LocateOptions& options,
+         const Search& search, std::vector<Scan>& scans) {
+  std::vector<std::size_t> together;
+  double points = 0;
+  const auto search_those = [&] {
+    if (!together.empty()) search_tiles(context, map, search, together, scans);
+    together.clear();
+    points = 0;
+  };
+  for (std::size_t tile = 0; tile < map.tiles.size(); ++tile) {
+    bool wanted = false;
+    for (std::size_t k = 0; k < scans.size(); ++k) wanted |= search.wants(k, tile);
+    if (!wanted) continue;
+    together.push_back(tile);
+    // Of a surface, voxels twice as wide leave a quarter of the points.
+    points += static_cast<double>(map.tiles[tile].end - map.tiles[tile].begin) /
+              (search.factor * search.factor);
+    if (points >= kPointsAtOnce) search_those();
+  }
+  search_those();
+  for (Scan& scan : scans) {
+    scan.candidates = distinct(std::move(scan.candidates), scan.middle,
+                               options.registration.evidence, options.candidates);
+    while (scan.candidates.size() > 1 && is_hopeless(scan.candidates)) scan.candidates.pop_back();
+  }
+}
+
+}  // namespace
+
+Scan scan_of(PreparedCloud cloud, PreparedCloud coarse, const LocatePrior& prior) {
+  Scan scan;
+  for (const Eigen::Vector3f& point : cloud.points()) {
+    scan.points.push_back(point.cast<double>() + cloud.origin());
+    scan.middle += scan.points.back();
+    scan.reach = std::max(scan.reach, scan.points.back().norm());
+  }
+  if (!scan.points.empty()) scan.middle /= static_cast<double>(scan.points.size());
+  scan.cloud = std::move(cloud);
+  scan.coarse = std::move(coarse);
+  scan.prior = prior;
+  return scan;
+}
+
+bool contradicts(const Scan& scan, const UnalignedIsometry3d& map_from_scan) {
+  const auto& known = scan.prior.position;
+  return known && (map_from_scan.translation() - known->position).norm() > known->radius;
+}
+
+PrepareOptions coarse_prepare(const MapState& map, const LocateOptions& options) {
+  if (options.coarse_factor == 1) return as_they_are(map.options.prepare);
+  PrepareOptions out = map.options.prepare;
+  fields::multiply_lengths(out, options.coarse_factor);
+  return out;
+}
+
+void search_all_tiles(const Context& context, const MapState& map, const LocateOptions& options,
+                      std::vector<Scan>& scans) {
+  RegistrationOptions registration = options.registration;
+  fields::multiply_lengths(registration, options.coarse_factor);
+  Search search = search_with(std::move(registration), options);
+  search.prepare = coarse_prepare(map, options);
+  search.factor = options.coarse_factor;
+  search.wants = [&](std::size_t k, std::size_t tile) { return may_be_in(scans[k], map, tile); };
+  for (std::size_t k = 0; k < scans.size(); ++k) {
+    scans[k].best.assign(map.tiles.size(), 0);
+    for (std::size_t tile = 0; tile < map.tiles.size(); ++tile)
+      scans[k].tiles += search.wants(k, tile);
+  }
+  run(context, map, options, search, scans);
+}
+
+void search_best_tiles(const Context& context, const MapState& map, const LocateOptions& options,
+                       const std::vector<std::size_t>& which, std::vector<Scan>& scans) {
+  Search search = search_with(options.registration, options);
+  search.prepare = as_they_are(map.options.prepare);
+  std::vector<std::vector<char>> wanted(scans.size(), std::vector<char>(map.tiles.size(), 0));
+  for (const std::size_t k : which) {
+    std::vector<std::size_t> order;
+    for (std::size_t tile = 0; tile < map.tiles.size(); ++tile)
+      if (may_be_in(scans[k], map, tile)) order.push_back(tile);
+    std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
+      return scans[k].best[a] > scans[k].best[b];
+    });
+    order.resize(std::min<std::size_t>(order.size(), options.fine_tiles));
+    for (const std::size_t tile : order) wanted[k][tile] = 1;
+  }
+  search.wants = [&](std::size_t k, std::size_t tile) { return wanted[k][tile] != 0; };
+  run(context, map, options, search, scans);
+}
+
+}  // namespace gpureg::localization
