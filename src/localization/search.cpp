@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <functional>
-#include <numeric>
 
 #include "fields/localization.hpp"
 #include "fields/scale.hpp"
