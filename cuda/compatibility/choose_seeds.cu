@@ -4,7 +4,6 @@
 #include "cuda/common/stages.hpp"
 #include "cuda/compatibility/match_set.cuh"
 #include "cuda/device/device_algorithms.hpp"
-#include "cuda/device/group_by_cell.cuh"
 
 namespace gpureg::cuda {
 namespace {
@@ -13,7 +12,7 @@ constexpr int kThreads = 128, kRows = 4;                // matches of a thread
 constexpr std::uint32_t kBlockRows = kThreads * kRows;  // matches of a thread block
 // matches in shared memory at a time
 constexpr std::uint32_t kTile = kThreads;
-// matches of the sample that a thread block compares: enough blocks for a single pair
+// matches of the sample that a thread block compares, at most
 constexpr std::uint32_t kBlockColumns = 4 * kTile;
 // matches that a lane of find_slopes() holds
 constexpr std::uint32_t kHeld = 8;
@@ -30,6 +29,7 @@ struct SeedBatch {
   MatchSetView matches;
   const std::uint32_t* room;
   const std::uint32_t* count;
+  std::uint32_t columns;  ///< of a thread block
   CompatibilityTest test;
   float squared_separation;
   std::uint32_t* degree;
@@ -40,8 +40,8 @@ struct SeedBatch {
 __global__ void __launch_bounds__(kThreads) count_compatible(SeedBatch b) {
   __shared__ PackedMatch tile[kTile];
   const std::uint32_t p = blockIdx.z, n = b.count[p], room = b.room[p],
-                      row = blockIdx.x * kBlockRows, column = blockIdx.y * kBlockColumns;
-  const std::uint32_t last = min(min(n, kDegreeSample), column + kBlockColumns);
+                      row = blockIdx.x * kBlockRows, column = blockIdx.y * b.columns;
+  const std::uint32_t last = min(min(n, kDegreeSample), column + b.columns);
   if (row >= n || column >= last) return;
   OrientedMatch own[kRows];
   std::uint32_t count[kRows];
@@ -95,7 +95,7 @@ __global__ void rank_points(SeedBatch b, const std::uint32_t* match, float4* ran
 __global__ void __launch_bounds__(kThreads)
     find_slopes(SeedBatch b, const float4* ranked, const std::uint32_t* match) {
   const std::uint32_t p = blockIdx.y, n = b.count[p], room = b.room[p], lane = threadIdx.x % 32;
-  const std::uint32_t k = blockIdx.x * kThreads + threadIdx.x, first = k - lane;
+  const std::uint32_t k = blockIdx.x * blockDim.x + threadIdx.x, first = k - lane;
   if (first >= n) return;
   const float4 own = ranked[room + min(k, n - 1)];
   unsigned open = __ballot_sync(~0u, k < n);
@@ -168,9 +168,11 @@ Seeds choose_seeds(Exec& exec, const MatchSets& matches, const RegistrationOptio
       options.compatibility.seed_separation * options.compatibility.seed_separation;
   batch.degree = degree.data();
   batch.slope = slope.data();
-  count_compatible<<<dim3(blocks_for(largest, kBlockRows),
-                          blocks_for(std::min(largest, kDegreeSample), kBlockColumns), pair_count),
-                     kThreads, 0, exec.stream()>>>(batch);
+  const std::uint32_t row_blocks = blocks_for(largest, kBlockRows),
+                      columns = std::min(largest, kDegreeSample);
+  batch.columns = items_per_block(exec, row_blocks * pairs, columns, kBlockColumns, kTile);
+  count_compatible<<<dim3(row_blocks, blocks_for(columns, batch.columns), pair_count), kThreads, 0,
+                     exec.stream()>>>(batch);
   check_launch("count_compatible");
   auto key = exec.buffer<std::uint64_t>(total);
   auto match = exec.buffer<std::uint32_t>(total);
@@ -178,15 +180,17 @@ Seeds choose_seeds(Exec& exec, const MatchSets& matches, const RegistrationOptio
   const dim3 grid(blocks_for(largest, 256), pair_count);
   write_degree_keys<<<grid, 256, 0, exec.stream()>>>(batch, key.data(), match.data());
   check_launch("write_degree_keys");
-  sort_pairs(exec, key, match, kDegreeBits + bits_for(pairs));
+  sort_segments(exec, key, match, matches.room, kDegreeBits);
   rank_points<<<grid, 256, 0, exec.stream()>>>(batch, match.data(), ranked.data());
   check_launch("rank_points");
-  find_slopes<<<dim3(blocks_for(largest, kThreads), pair_count), kThreads, 0, exec.stream()>>>(
+  // Its warps work by themselves.
+  const std::uint32_t threads = items_per_block(exec, pairs, largest, kThreads, 32);
+  find_slopes<<<dim3(blocks_for(largest, threads), pair_count), threads, 0, exec.stream()>>>(
       batch, ranked.data(), match.data());
   check_launch("find_slopes");
   write_keys<<<grid, 256, 0, exec.stream()>>>(batch, key.data(), match.data());
   check_launch("write_keys");
-  sort_pairs(exec, key, match, kStrengthBits + 1 + bits_for(pairs));
+  sort_segments(exec, key, match, matches.room, kStrengthBits + 1);
   take_seeds<<<dim3(blocks_for(out.most, 256), pair_count), 256, 0, exec.stream()>>>(
       batch, match.data(), out.most, out.match.data(), out.count.data());
   check_launch("take_seeds");

@@ -8,8 +8,8 @@
 #include "common/in_halves.hpp"
 #include "cuda/common/feature_query.hpp"
 #include "cuda/common/stages.hpp"
+#include "cuda/device/device_algorithms.hpp"
 #include "cuda/device/entry_of.cuh"
-#include "cuda/device/group_by_cell.cuh"
 
 namespace gpureg::cuda {
 namespace {
@@ -314,7 +314,7 @@ MatchSets merge_matches(Exec& exec, Span<const PairView> pairs,
                   exec.stream()>>>(batch);
   check_launch("order_matches");
   constexpr int kOrderBits = 32 + 1;  // order of the match, whether it is dropped
-  sort_pairs(exec, key, answer, kOrderBits + bits_for(pairs.size));
+  sort_segments(exec, key, answer, answer_segments, kOrderBits);
   batch.key = key.data();
   batch.answer = answer.data();
   const dim3 grid(blocks_for(out.room.largest, kThreads), pair_count);

@@ -11,8 +11,8 @@ namespace {
 
 constexpr int kThreads = 128, kWarps = kThreads / 32;
 constexpr std::uint32_t kTile = 128;  // matches in shared memory at a time
-/// Matches of a thread block of count_matches(): their weights, at most 2^16 each, sum up in 32
-/// bits.
+/// Matches of a thread block of count_matches() at most: their weights, at most 2^16 each, sum up
+/// in 32 bits.
 constexpr std::uint32_t kMatchesPerBlock = 2048;
 static_assert(kMatchesPerBlock << 16 >> 16 == kMatchesPerBlock, "weights sum up in 32 bits");
 
@@ -52,11 +52,11 @@ __global__ void __launch_bounds__(kThreads)
 /// Thread blocks (x: candidates, y: pair, z: part of the matches); a thread per candidate.
 __global__ void __launch_bounds__(kThreads)
     count_matches(MatchSetView m, const std::uint32_t* room, const std::uint32_t* match_count,
-                  std::uint32_t most, const std::uint32_t* candidate_count, float squared_distance,
-                  const Pose<float>* pose, MatchEvidence* out) {
+                  std::uint32_t per_block, std::uint32_t most, const std::uint32_t* candidate_count,
+                  float squared_distance, const Pose<float>* pose, MatchEvidence* out) {
   __shared__ float4 tile[2 * kTile];
-  const std::uint32_t p = blockIdx.y, first = blockIdx.z * kMatchesPerBlock,
-                      last = min(match_count[p], first + kMatchesPerBlock);
+  const std::uint32_t p = blockIdx.y, first = blockIdx.z * per_block,
+                      last = min(match_count[p], first + per_block);
   if (first >= last || blockIdx.x * kThreads >= candidate_count[p]) return;
   const std::uint32_t c = blockIdx.x * kThreads + threadIdx.x;
   const Rigid rigid = to_rigid(pose[p * most + min(c, candidate_count[p] - 1)]);
@@ -112,11 +112,13 @@ Candidates propose_poses(Exec& exec, const MatchSets& matches, const Seeds& seed
   const std::uint32_t most_seeds = std::min(seeds.most, largest);
   const float squared_distance =
       options.compatibility.consensus_distance * options.compatibility.consensus_distance;
-  count_matches<<<dim3(blocks_for(most_seeds, kThreads), pair_count,
-                       blocks_for(largest, kMatchesPerBlock)),
-                  kThreads, 0, exec.stream()>>>(
-      matches.view(), matches.room.on_device.data(), matches.count.data(), out.most,
-      out.count.data(), squared_distance, out.pose.data(), out.matches.data());
+  const std::uint32_t candidate_blocks = blocks_for(most_seeds, kThreads),
+                      per_block = items_per_block(exec, candidate_blocks * pairs, largest,
+                                                  kMatchesPerBlock, kTile);
+  count_matches<<<dim3(candidate_blocks, pair_count, blocks_for(largest, per_block)), kThreads, 0,
+                  exec.stream()>>>(matches.view(), matches.room.on_device.data(),
+                                   matches.count.data(), per_block, out.most, out.count.data(),
+                                   squared_distance, out.pose.data(), out.matches.data());
   check_launch("count_matches");
   return out;
 }

@@ -192,22 +192,33 @@ void refine_by_clusters(Exec& exec, const RefineModes& batch, unsigned pairs) {
 /// Merges modes that refinement moved to the same pose; keeps the first. A warp per pair.
 __global__ void __launch_bounds__(32)
     merge(std::uint32_t most, Mode* all_modes, std::uint32_t* counts, ModeLimits within) {
-  __shared__ Rigid kept[limits::kMaxModes];
+  __shared__ Rigid rigid[limits::kMaxModes];  // the first `count` of them are kept
+  __shared__ std::uint32_t kept[limits::kMaxModes];
   const std::uint32_t size = counts[blockIdx.x], lane = threadIdx.x;
   Mode* modes = all_modes + static_cast<std::size_t>(blockIdx.x) * most;
+  for (std::uint32_t k = lane; k < size; k += 32) rigid[k] = to_rigid(modes[k].pose);
+  __syncwarp();
   std::uint32_t count = 0;
   for (std::uint32_t k = 0; k < size; ++k) {
-    const Mode mode = modes[k];
-    const Rigid rigid = to_rigid(mode.pose);
+    const Rigid mine = rigid[k];
     bool known = false;
-    for (std::uint32_t o = lane; o < count; o += 32) known |= same_mode(rigid, kept[o], within);
+    for (std::uint32_t o = lane; o < count; o += 32) known |= same_mode(mine, rigid[o], within);
     if (__any_sync(~0u, known)) continue;
     if (lane == 0) {
-      kept[count] = rigid;
-      modes[count] = mode;
+      rigid[count] = mine;
+      kept[count] = k;
     }
     __syncwarp();
     ++count;
+  }
+  // Modes move to the front, 32 at a time: none is overwritten before it is read.
+  for (std::uint32_t base = 0; base < count; base += 32) {
+    const std::uint32_t k = base + lane;
+    Mode mode{};
+    if (k < count) mode = modes[kept[k]];
+    __syncwarp();
+    if (k < count) modes[k] = mode;
+    __syncwarp();
   }
   if (lane == 0) counts[blockIdx.x] = count;
 }

@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include <algorithm>
+
 #include "algorithm/evidence.hpp"
 #include "cuda/common/stages.hpp"
 #include "cuda/compatibility/compare_point.cuh"
@@ -8,9 +10,11 @@
 namespace gpureg::cuda {
 namespace {
 
-constexpr int kWarps = 4;  // candidates per thread block
+constexpr int kWarps = 4;  // of a thread block, a candidate each
 constexpr int kBlocks =
     10;  // of a multiprocessor at least: more warps hide the latency of the search
+/// Warps that share a candidate where there are too few candidates to fill the device.
+constexpr int kTogether = 8;
 
 /// Normal weight of the sampled points of each cloud: a thread block per cloud (x: pair, y: source
 /// or target).
@@ -27,13 +31,15 @@ __global__ void __launch_bounds__(256)
   if (threadIdx.x == 0) out[2 * blockIdx.x + blockIdx.y] = sum;
 }
 
-/// Side evidence of one candidate for coarse_score(), by a warp. moved: the sample of a cloud.
-__device__ SideEvidence score_sample(const CloudView& moved, const CloudView& other,
+/// Side evidence of one candidate for coarse_score(), by `warps` warps, `warp` of them. moved: the
+/// sample of a cloud. Sums of the warp.
+__device__ SideEvidence score_sample(std::uint32_t warp, std::uint32_t warps,
+                                     const CloudView& moved, const CloudView& other,
                                      const CellSummaries& cells, const Rigid& pose,
                                      const EvidenceTest& test) {
   SideEvidence e{};
   const std::uint32_t maps = coarse_score_maps(other.visibility);
-  for (std::uint32_t i = threadIdx.x % 32; i < moved.size; i += 32) {
+  for (std::uint32_t i = 32 * warp + threadIdx.x % 32; i < moved.size; i += 32 * warps) {
     compare_point(moved, other, cells, pose, test, maps, i, e);
   }
   e.normal_weighted =
@@ -43,18 +49,27 @@ __device__ SideEvidence score_sample(const CloudView& moved, const CloudView& ot
   return e;
 }
 
+__device__ SideEvidence sum_for_score(SideEvidence a, const SideEvidence& b) {
+  a.normal_weighted += b.normal_weighted;
+  a.observed += b.observed;
+  a.violating += b.violating;
+  return a;
+}
+
 __device__ float smaller_share(const MatchEvidence& m, const std::uint64_t* total) {
   const float s = static_cast<float>(m.source_weight) / static_cast<float>(total[0]);
   const float t = static_cast<float>(m.target_weight) / static_cast<float>(total[1]);
   return s < t ? s : t;
 }
 
-/// A warp per candidate.
-__global__ void __launch_bounds__(32 * kWarps, kBlocks)
+/// kEach warps per candidate: one, or all of a thread block.
+template <int kEach>
+__global__ void __launch_bounds__(32 * std::max(kEach, kWarps), kEach > 1 ? 4 : kBlocks)
     score(const SampledPair* pairs, const std::uint64_t* match_total,
           const unsigned long long* weight, std::uint32_t most, const std::uint32_t* count,
           const Pose<float>* pose, const MatchEvidence* matches, EvidenceTest test, float* out) {
-  const std::uint32_t p = blockIdx.y, c = blockIdx.x * kWarps + threadIdx.x / 32;
+  const std::uint32_t p = blockIdx.y, warp = threadIdx.x / 32,
+                      c = kEach > 1 ? blockIdx.x : blockIdx.x * kWarps + warp;
   if (c >= count[p]) return;
   const std::size_t at = static_cast<std::size_t>(p) * most + c;
   const SampledPair& sampled = pairs[p];
@@ -64,8 +79,21 @@ __global__ void __launch_bounds__(32 * kWarps, kBlocks)
     if (threadIdx.x % 32 == 0) out[at] = 0.0f;
     return;
   }
-  const SideEvidence a = score_sample(sampled.source, pair.target, pair.target_cells, there, test),
-                     b = score_sample(sampled.target, pair.source, pair.source_cells, back, test);
+  const std::uint32_t part = kEach > 1 ? warp : 0;
+  SideEvidence a = score_sample(part, kEach, sampled.source, pair.target, pair.target_cells, there,
+                                test),
+               b = score_sample(part, kEach, sampled.target, pair.source, pair.source_cells, back,
+                                test);
+  if constexpr (kEach > 1) {
+    __shared__ SideEvidence of_warp[2][kEach];
+    if (threadIdx.x % 32 == 0) of_warp[0][warp] = a, of_warp[1][warp] = b;
+    __syncthreads();
+    if (threadIdx.x > 0) return;
+    for (int o = 1; o < kEach; ++o) {
+      a = sum_for_score(a, of_warp[0][o]);
+      b = sum_for_score(b, of_warp[1][o]);
+    }
+  }
   if (threadIdx.x % 32 == 0)
     out[at] =
         coarse_score(smaller_share(matches[at], match_total + 2 * p), a,
@@ -87,7 +115,11 @@ void score_candidates(Exec& exec, Span<const PairView> pairs, const MatchSets& m
   const EvidenceTest test{
       inlier_test(options.prepare.max_correspondence_distance, options.evidence.max_normal_angle),
       options.evidence.free_space_margin, options.evidence.min_range};
-  score<<<dim3(blocks_for(most, kWarps), pair_count), 32 * kWarps, 0, exec.stream()>>>(
+  const bool together =
+      std::size_t(most) * pairs.size < 16 * static_cast<std::size_t>(exec.multiprocessors());
+  (together ? score<kTogether>
+            : score<1>)<<<dim3(together ? most : blocks_for(most, kWarps), pair_count),
+                          32 * (together ? kTogether : kWarps), 0, exec.stream()>>>(
       sampled.pairs.data(), matches.total.data(), weight.data(), candidates.most,
       candidates.count.data(), candidates.pose.data(), candidates.matches.data(), test,
       candidates.coarse_score.data());

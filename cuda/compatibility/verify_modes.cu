@@ -112,20 +112,18 @@ struct Share {
   std::uint32_t p, part, first, step;
   bool alone;
   std::size_t mode;
-  __device__ explicit Share(const VerifyModes& w)
+  __device__ Share(const VerifyModes& w, std::uint32_t number, std::uint32_t parts)
       : p(blockIdx.y),
-        part(blockIdx.z),
-        first(blockIdx.z * kThreads + threadIdx.x),
-        step(gridDim.z * kThreads),
-        alone(gridDim.z == 1),
+        part(number),
+        first(number * kThreads + threadIdx.x),
+        step(parts * kThreads),
+        alone(parts == 1),
         mode(static_cast<std::size_t>(blockIdx.y) * w.most + blockIdx.x) {}
 };
 
-/// One or several thread blocks per mode: the points of the target in the source.
-__global__ void __launch_bounds__(kThreads) verify_target(VerifyModes w) {
+/// The points of the target in the source.
+__device__ void compare_target(const VerifyModes& w, const Share& share) {
   __shared__ std::int64_t scratch[kWarps * kSideSums];
-  const Share share(w);
-  if (blockIdx.x >= w.count[share.p]) return;
   const CloudView &s = w.pairs[share.p].source, &t = w.pairs[share.p].target;
   const Rigid back = inverse(to_rigid(w.modes[share.mode].pose));
   SideEvidence side{};
@@ -171,16 +169,13 @@ __device__ LaneSum moment_sum(std::uint32_t k, std::uint32_t first) {
   return {first + row, first + (row == 0 ? k - 3 : row == 1 ? k - 5 : 2), 0};
 }
 
-/// One or several thread blocks per mode: the points of the source in the target, the information
-/// of the inliers, the moments of the correspondences, and the matches. Each lane adds up one sum
-/// of the information and one of the moments over the points of its warp: two registers instead of
-/// one for each of 42 sums.
-__global__ void __launch_bounds__(kThreads) verify_source(VerifyModes w) {
+/// The points of the source in the target, the information of the inliers, the moments of the
+/// correspondences, and the matches. Each lane adds up one sum of the information and one of the
+/// moments over the points of its warp: two registers instead of one for each of 42 sums.
+__device__ void compare_source(const VerifyModes& w, const Share& share) {
   __shared__ SumRow rows[kWarps][32];
   __shared__ std::int64_t scratch[kWarps * kSideSums], partial[kWarps][2 * 32];
   static_assert(kIcpFixedScale == kMomentFixedScale, "one conversion for all sums");
-  const Share share(w);
-  if (blockIdx.x >= w.count[share.p]) return;
   const SearchPair& pair = w.pairs[share.p];
   const CloudView &s = pair.source, &t = pair.target;
   const Mode& mode = w.modes[share.mode];
@@ -251,6 +246,23 @@ __global__ void __launch_bounds__(kThreads) verify_source(VerifyModes w) {
   put(out.target_moments.count, std::uint64_t(side.hits), share.alone);
 }
 
+/// One or several thread blocks per mode (z).
+__global__ void __launch_bounds__(kThreads) verify_target(VerifyModes w) {
+  if (blockIdx.x < w.count[blockIdx.y]) compare_target(w, Share(w, blockIdx.z, gridDim.z));
+}
+__global__ void __launch_bounds__(kThreads) verify_source(VerifyModes w) {
+  if (blockIdx.x < w.count[blockIdx.y]) compare_source(w, Share(w, blockIdx.z, gridDim.z));
+}
+/// Both at the same time: half of the blocks each.
+__global__ void __launch_bounds__(kThreads) verify_both(VerifyModes w) {
+  if (blockIdx.x >= w.count[blockIdx.y]) return;
+  const Share share(w, blockIdx.z / 2, gridDim.z / 2);
+  if (blockIdx.z % 2 == 0)
+    compare_target(w, share);
+  else
+    compare_source(w, share);
+}
+
 }  // namespace
 
 void verify_modes(Exec& exec, Span<const PairView> pairs, const MatchSets& matches,
@@ -267,7 +279,7 @@ void verify_modes(Exec& exec, Span<const PairView> pairs, const MatchSets& match
   const std::size_t blocks = std::size_t(modes.most) * pairs.size,
                     processors = static_cast<std::size_t>(exec.multiprocessors());
   const unsigned parts =
-      static_cast<unsigned>(std::clamp<std::size_t>(8 * processors / blocks, 1, 16));
+      static_cast<unsigned>(std::clamp<std::size_t>(8 * processors / blocks, 1, 24));
   VerifyModes batch{};
   batch.pairs = views.data();
   batch.matches = matches.view();
@@ -280,11 +292,18 @@ void verify_modes(Exec& exec, Span<const PairView> pairs, const MatchSets& match
   batch.squared_distance =
       options.compatibility.consensus_distance * options.compatibility.consensus_distance;
   batch.out = verified.data();
-  const dim3 grid(modes.most, static_cast<unsigned>(pairs.size), parts);
-  verify_target<<<grid, kThreads, 0, exec.stream()>>>(batch);
-  check_launch("verify_target");
-  verify_source<<<grid, kThreads, 0, exec.stream()>>>(batch);
-  check_launch("verify_source");
+  const auto grid = [&](unsigned z) {
+    return dim3(modes.most, static_cast<unsigned>(pairs.size), z);
+  };
+  if (parts > 1) {
+    verify_both<<<grid(2 * parts), kThreads, 0, exec.stream()>>>(batch);
+    check_launch("verify_both");
+  } else {
+    verify_target<<<grid(1), kThreads, 0, exec.stream()>>>(batch);
+    check_launch("verify_target");
+    verify_source<<<grid(1), kThreads, 0, exec.stream()>>>(batch);
+    check_launch("verify_source");
+  }
   const ModeOutcome* mode = exec.download(verified.data(), verified.size());
   const std::uint32_t* mode_count = exec.download(modes.count.data(), pairs.size);
   const std::uint32_t* match_count = exec.download(matches.count.data(), pairs.size);

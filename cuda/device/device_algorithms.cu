@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "cuda/device/device_algorithms.hpp"
 
+#include <cub/block/block_radix_sort.cuh>
 #include <cub/device/device_radix_sort.cuh>
 #include <cub/device/device_scan.cuh>
 
@@ -46,7 +47,60 @@ void sort_buffers(Exec& exec, DeviceBuffer<Key>& keys, DeviceBuffer<std::uint32_
   if (v.Current() != values.data()) values = std::move(other_values);
 }
 
+constexpr int kSortThreads = 1024, kFewItems = 8, kManyItems = 12;
+
+/// A thread block per segment.
+template <int kItems>
+__global__ void __launch_bounds__(kSortThreads)
+    sort_in_block(const std::uint32_t* offset, int bits, std::uint64_t* keys,
+                  std::uint32_t* values) {
+  using Sort = cub::BlockRadixSort<std::uint64_t, kSortThreads, kItems, std::uint32_t>;
+  extern __shared__ __align__(16) char shared[];
+  const std::uint32_t begin = offset[blockIdx.x], size = offset[blockIdx.x + 1] - begin;
+  std::uint64_t key[kItems];
+  std::uint32_t value[kItems];
+#pragma unroll
+  for (int k = 0; k < kItems; ++k) {
+    const std::uint32_t at = threadIdx.x * kItems + static_cast<std::uint32_t>(k);
+    key[k] = at < size ? keys[begin + at] : ~std::uint64_t(0);
+    value[k] = at < size ? values[begin + at] : 0u;
+  }
+  Sort(*reinterpret_cast<typename Sort::TempStorage*>(shared))
+      .SortBlockedToStriped(key, value, 0, bits);
+#pragma unroll
+  for (int k = 0; k < kItems; ++k) {
+    const std::uint32_t at = static_cast<std::uint32_t>(k) * kSortThreads + threadIdx.x;
+    if (at >= size) continue;
+    keys[begin + at] = key[k];
+    values[begin + at] = value[k];
+  }
+}
+
+/// False where the device has too little shared memory.
+template <int kItems>
+bool sort_in_blocks(Exec& exec, DeviceBuffer<std::uint64_t>& keys,
+                    DeviceBuffer<std::uint32_t>& values, const Segments& segments, int bits) {
+  using Sort = cub::BlockRadixSort<std::uint64_t, kSortThreads, kItems, std::uint32_t>;
+  constexpr std::size_t kBytes = sizeof(typename Sort::TempStorage);
+  if (exec.allow_shared_memory(sort_in_block<kItems>) < kBytes) return false;
+  sort_in_block<kItems>
+      <<<static_cast<unsigned>(segments.entries()), kSortThreads, kBytes, exec.stream()>>>(
+          segments.on_device.data(), bits, keys.data(), values.data());
+  check_launch("sort_in_block");
+  return true;
+}
+
 }  // namespace
+
+void sort_segments(Exec& exec, DeviceBuffer<std::uint64_t>& keys,
+                   DeviceBuffer<std::uint32_t>& values, const Segments& segments, int bits) {
+  if (segments.largest <= kSortThreads * kFewItems
+          ? sort_in_blocks<kFewItems>(exec, keys, values, segments, bits)
+          : segments.largest <= kSortThreads * kManyItems &&
+                sort_in_blocks<kManyItems>(exec, keys, values, segments, bits))
+    return;
+  sort_pairs(exec, keys, values, bits + bits_for(segments.entries()));
+}
 
 void sort_pairs(Exec& exec, DeviceBuffer<std::uint32_t>& keys, DeviceBuffer<std::uint32_t>& values,
                 int bits) {

@@ -124,4 +124,13 @@ inline unsigned blocks_for(std::size_t items, unsigned threads) {
   return static_cast<unsigned>((items + threads - 1) / threads);
 }
 
+/// Items of each thread block along a loop that several blocks share: halved from `most` down to
+/// `least` until `rows` such loops give every multiprocessor two blocks.
+inline std::uint32_t items_per_block(const Exec& exec, std::size_t rows, std::uint32_t items,
+                                     std::uint32_t most, std::uint32_t least) {
+  const std::size_t enough = 2 * static_cast<std::size_t>(exec.multiprocessors());
+  while (most > least && rows * blocks_for(items, most) < enough) most /= 2;
+  return most;
+}
+
 }  // namespace gpureg::cuda

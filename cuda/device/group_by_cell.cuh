@@ -40,12 +40,6 @@ struct Groups {
   DeviceBuffer<std::uint32_t> start;  ///< first sorted position of each group
 };
 
-inline int bits_for(std::uint64_t values) {
-  int bits = 0;
-  while (bits < 64 && (std::uint64_t(1) << bits) < values) ++bits;
-  return bits;
-}
-
 namespace detail {
 
 template <typename Key, typename CellOf>

@@ -53,7 +53,7 @@ void Uploader::upload(Span<const RowsToUpload> parts, int device, cudaStream_t s
   prepare_slots();
   // One core packs slower than the bus transfers; few pieces do not amortise the start of a thread.
   const std::size_t threads = std::min<std::size_t>(
-      {kThreads, 1 + pieces.size() / 16, std::max(1u, std::thread::hardware_concurrency())});
+      {kThreads, 1 + pieces.size() / 4, std::max(1u, std::thread::hardware_concurrency())});
   std::atomic<std::size_t> next{0};
   on_threads(threads, [&](std::size_t thread) {
     const DeviceScope scope(device);

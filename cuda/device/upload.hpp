@@ -34,7 +34,7 @@ class Uploader {
   void clear() noexcept;
 
  private:
-  static constexpr std::size_t kThreads = 4, kSlots = 2;  // slots of each thread
+  static constexpr std::size_t kThreads = 8, kSlots = 2;  // slots of each thread
   static constexpr std::size_t kSlotBytes = std::size_t(1) << 20;
   void prepare_slots();
 
