@@ -122,7 +122,7 @@ __device__ void leave_cluster() {
 }
 
 /// A thread block per mode, or a cluster of kBlocks, runs all iterations of one refinement.
-template <int kThreads, int kBlocks, int kResident = 1024>
+template <int kThreads, int kBlocks, int kResident = kBlocks == 1 ? 1024 : 512>
 __global__ void __launch_bounds__(kThreads, kResident / kThreads) refine(RefineModes r) {
   __shared__ float rows[kThreads / 32][32][8];
   __shared__ std::int64_t partial[kThreads / 32][kSums];
@@ -131,7 +131,14 @@ __global__ void __launch_bounds__(kThreads, kResident / kThreads) refine(RefineM
   __shared__ bool done;
   const std::uint32_t number = blockIdx.x / kBlocks, first = blockIdx.x % kBlocks;
   if (number >= r.count[blockIdx.y]) return;
-  const SampledPair& pair = r.pairs[blockIdx.y];
+  // A copy in shared memory: its fields are read again at every point.
+  __shared__ __align__(16) char pair_bytes[sizeof(SampledPair)];
+  static_assert(sizeof(SampledPair) % 4 == 0, "copied by words");
+  for (std::uint32_t w = threadIdx.x; w < sizeof(SampledPair) / 4; w += kThreads)
+    reinterpret_cast<std::uint32_t*>(pair_bytes)[w] =
+        reinterpret_cast<const std::uint32_t*>(r.pairs + blockIdx.y)[w];
+  __syncthreads();
+  const SampledPair& pair = *reinterpret_cast<const SampledPair*>(pair_bytes);
   Mode& mode = r.modes[static_cast<std::size_t>(blockIdx.y) * r.most + number];
   if (threadIdx.x == 0) {
     pose = mode.pose;
