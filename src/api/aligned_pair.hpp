@@ -22,9 +22,16 @@ struct AlignedPair {
   UnalignedIsometry3d transform_of(const Pose<double>& pose) const {
     return to_transform(pose, source, target, swapped);
   }
-  PoseEvidence evidence_of(const PairOutcome& outcome, const ModeOutcome& mode) const {
-    return confidence::evidence_of(outcome, mode, swapped ? target : source,
-                                   swapped ? source : target, swapped);
+  /// Of all modes, in their order.
+  std::vector<PoseEvidence> evidence_of(const PairOutcome& outcome) const {
+    const PreparedState &moved = swapped ? target : source, &fixed = swapped ? source : target;
+    std::vector<const ModeOutcome*> modes;
+    for (const ModeOutcome& mode : outcome.modes) modes.push_back(&mode);
+    const auto spectra = confidence::spectra_of(modes, moved);
+    std::vector<PoseEvidence> out;
+    for (std::size_t k = 0; k < modes.size(); ++k)
+      out.push_back(confidence::evidence_of(outcome, *modes[k], spectra[k], moved, fixed, swapped));
+    return out;
   }
   /// Points in correspondences. Measured: ModeOutcome or PairOutcome.
   template <typename Measured>

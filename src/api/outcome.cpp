@@ -44,7 +44,8 @@ class Modes {
  public:
   Modes(const PairOutcome& outcome, const AlignedPair& pair)
       : outcome_(outcome), pair_(pair), options_(pair.options) {
-    for (std::size_t k = 0; k < outcome.modes.size(); ++k) add(k);
+    const std::vector<PoseEvidence> evidence = pair.evidence_of(outcome);
+    for (std::size_t k = 0; k < outcome.modes.size(); ++k) add(k, evidence[k]);
     const ModeOutcome& first = outcome.modes.front();
     middle_ = middle_of(pair.source_moments(first), origin_of(pair.source));
   }
@@ -118,7 +119,7 @@ class Modes {
     return pair_.source_moments(outcome_.modes[origins_.at(origin_mode)]);
   }
 
-  void add(std::size_t k) {
+  void add(std::size_t k, const PoseEvidence& evidence) {
     const ModeOutcome& mode = outcome_.modes[k];
     RegistrationMode out;
     out.target_from_source = pair_.transform_of(mode.pose);
@@ -131,7 +132,7 @@ class Modes {
           static_cast<double>(options_.prepare.max_correspondence_distance))
         return;
     }
-    out.evidence = pair_.evidence_of(outcome_, mode);
+    out.evidence = evidence;
     out.rank_before_refinement = static_cast<std::uint32_t>(k);
     modes_.push_back(out);
   }

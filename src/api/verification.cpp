@@ -29,10 +29,10 @@ void check_pose(const UnalignedIsometry3d& pose, const std::string& name) {
 
 /// One pair whose poses are verified.
 struct VerifiedPair : AlignedPair {
-  PoseVerification verification_of(const PairOutcome& outcome, const ModeOutcome& mode) const {
+  PoseVerification verification_of(const ModeOutcome& mode, const PoseEvidence& evidence) const {
     PoseVerification out;
     out.target_from_source = transform_of(mode.pose);
-    out.evidence = evidence_of(outcome, mode);
+    out.evidence = evidence;
     out.inliers = mode.source.inliers;
     out.points = mode.source.tested;
     out.inlier_ratio = out.points > 0 ? static_cast<double>(out.inliers) / out.points : 0.0;
@@ -173,9 +173,10 @@ std::vector<std::vector<PoseVerification>> verify_poses_batch(
       const PairOutcome& outcome = outcomes[v - begin];
       std::vector<PoseVerification> poses_of_pair;
       std::vector<VerifiedPair::Candidate> given;
+      const std::vector<PoseEvidence> evidence = pair.evidence_of(outcome);
       for (std::size_t k = 0; k < outcome.modes.size(); ++k) {
         const ModeOutcome& mode = outcome.modes[k];
-        poses_of_pair.push_back(pair.verification_of(outcome, mode));
+        poses_of_pair.push_back(pair.verification_of(mode, evidence[k]));
         given.push_back({poses_of_pair.back().target_from_source, poses_of_pair.back().evidence,
                          VerifiedPair::overlap_of(mode)});
       }

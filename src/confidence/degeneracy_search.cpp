@@ -6,7 +6,6 @@
 
 #include "common/host_threads.hpp"
 #include "confidence/confidence.hpp"
-#include "confidence/information.hpp"
 #include "confidence/pose_evidence.hpp"
 
 namespace gpureg::confidence {
@@ -71,15 +70,18 @@ PosesOfPair perturb(const PairInput& pair, const PairOutcome& outcome,
   for (const ModeOutcome& mode : outcome.modes) {
     // A pose that the prior forbids is not reported.
     if (!permitted(pair.prior, to_rigid(mode.pose))) continue;
-    evidence.push_back(evidence_of(outcome, mode, *pair.source, *pair.target, false));
     modes.push_back(&mode);
   }
   if (modes.empty()) return out;
+  const std::vector<InformationSpectrum> spectra = spectra_of(modes, *pair.source);
+  for (std::size_t k = 0; k < modes.size(); ++k)
+    evidence.push_back(
+        evidence_of(outcome, *modes[k], spectra[k], *pair.source, *pair.target, false));
   const Ranking ranking =
       ranking_of(evidence, pair.source->statistics.viewpoint, pair.target->statistics.viewpoint);
   const std::size_t best = ranking.order.front();
   const ModeOutcome& mode = *modes[best];
-  const InformationSpectrum spectrum = spectrum_of(mode, *pair.source);
+  const InformationSpectrum& spectrum = spectra[best];
   out.origin_mode = mode.origin_mode;
   out.returned = return_test(mode, *pair.source, options);
   for (const double fraction : fractions_for(ranking.log_odds[best]))

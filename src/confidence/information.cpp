@@ -5,7 +5,7 @@
 #include <iterator>
 #include <numeric>
 
-#include "math/jacobi.hpp"
+#include "math/jacobi_lanes.hpp"
 
 namespace gpureg::confidence {
 namespace {
@@ -22,9 +22,9 @@ double unit_length(const PrepareOptions& options) {
 /// Twice what 6 x 6 matrices need: the off-diagonal shrinks quadratically from the fourth on.
 constexpr int kSweeps = 12;
 
-}  // namespace
-
-InformationSpectrum spectrum_of(const ModeOutcome& mode, const PreparedState& moved) {
+/// The information of a mode, about the centre of its inliers.
+Eigen::Matrix<double, 6, 6> centred_information(const ModeOutcome& mode, const PreparedState& moved,
+                                                InformationSpectrum& out) {
   const double fixed = 1.0 / static_cast<double>(kIcpFixedScale),
                radius = static_cast<double>(moved.radius);
   const InformationSums& sums = mode.information;
@@ -41,23 +41,41 @@ InformationSpectrum spectrum_of(const ModeOutcome& mode, const PreparedState& mo
   cross << 0, -c.z(), c.y(), c.z(), 0, -c.x(), -c.y(), c.x(), 0;
   turn.topLeftCorner<3, 3>() *= scale;
   turn.topRightCorner<3, 3>() = -scale * cross;
-  const Eigen::Matrix<double, 6, 6> centred = turn * a * turn.transpose();
-  // The project's own solver: Eigen's differs between its versions in the last bits.
-  double values[6][6], vectors[6][6];
-  for (int i = 0; i < 6; ++i)
-    for (int j = 0; j < 6; ++j) values[i][j] = centred(i, j);
-  jacobi_eigen<6, kSweeps>(values, vectors);
-  int order[6];
-  std::iota(std::begin(order), std::end(order), 0);
-  std::stable_sort(std::begin(order), std::end(order),
-                   [&](int i, int j) { return values[i][i] < values[j][j]; });
-  InformationSpectrum out;
   out.centre = c * radius;
   out.unit = unit;
-  for (int k = 0; k < 6; ++k) {
-    out.eigenvalues[k] = values[order[k]][order[k]];
-    out.weakest_direction[k] = vectors[k][order[0]];
+  return turn * a * turn.transpose();
+}
+
+/// The project's own solver: Eigen's differs between its versions in the last bits.
+void decompose(const std::vector<Eigen::Matrix<double, 6, 6>>& matrices, std::size_t first,
+               std::size_t count, std::vector<InformationSpectrum>& out) {
+  Matrices6 values{}, vectors;
+  for (int i = 0; i < 6; ++i)
+    for (int j = 0; j < 6; ++j)
+      for (std::size_t l = 0; l < count; ++l) values.at[i][j][l] = matrices[first + l](i, j);
+  jacobi_eigen(kSweeps, values, vectors);
+  for (std::size_t l = 0; l < count; ++l) {
+    int order[6];
+    std::iota(std::begin(order), std::end(order), 0);
+    std::stable_sort(std::begin(order), std::end(order),
+                     [&](int i, int j) { return values.at[i][i][l] < values.at[j][j][l]; });
+    for (int k = 0; k < 6; ++k) {
+      out[first + l].eigenvalues[k] = values.at[order[k]][order[k]][l];
+      out[first + l].weakest_direction[k] = vectors.at[k][order[0]][l];
+    }
   }
+}
+
+}  // namespace
+
+std::vector<InformationSpectrum> spectra_of(const std::vector<const ModeOutcome*>& modes,
+                                            const PreparedState& moved) {
+  std::vector<InformationSpectrum> out(modes.size());
+  std::vector<Eigen::Matrix<double, 6, 6>> matrices;
+  for (std::size_t k = 0; k < modes.size(); ++k)
+    matrices.push_back(centred_information(*modes[k], moved, out[k]));
+  for (std::size_t first = 0; first < modes.size(); first += Matrices6::kLanes)
+    decompose(matrices, first, std::min<std::size_t>(Matrices6::kLanes, modes.size() - first), out);
   return out;
 }
 

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <vector>
 
 #include "pipeline/prepared_state.hpp"
 
@@ -17,6 +18,7 @@ struct InformationSpectrum {
   Eigen::Matrix<double, 6, 1> weakest_direction;  ///< unit eigenvector of the first
 };
 
-InformationSpectrum spectrum_of(const ModeOutcome& mode, const PreparedState& moved);
+std::vector<InformationSpectrum> spectra_of(const std::vector<const ModeOutcome*>& modes,
+                                            const PreparedState& moved);
 
 }  // namespace gpureg::confidence

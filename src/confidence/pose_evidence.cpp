@@ -5,8 +5,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "confidence/information.hpp"
-
 namespace gpureg::confidence {
 namespace {
 
@@ -27,7 +25,8 @@ double incidence_share(const SideEvidence& side) {
 }  // namespace
 
 PoseEvidence evidence_of(const PairOutcome& outcome, const ModeOutcome& mode,
-                         const PreparedState& moved, const PreparedState& fixed, bool swapped) {
+                         const InformationSpectrum& spectrum, const PreparedState& moved,
+                         const PreparedState& fixed, bool swapped) {
   const SideEvidence &s = swapped ? mode.target : mode.source,
                      &t = swapped ? mode.source : mode.target;
   const std::uint64_t whole_s = swapped ? fixed.normal_weight_total : moved.normal_weight_total,
@@ -62,7 +61,6 @@ PoseEvidence evidence_of(const PairOutcome& outcome, const ModeOutcome& mode,
       Eigen::Quaterniond(mode.pose.w, mode.pose.x, mode.pose.y, mode.pose.z)
           .normalized()
           .toRotationMatrix();
-  const InformationSpectrum spectrum = spectrum_of(mode, moved);
   Eigen::Matrix<double, 6, 1> weakest = spectrum.weakest_direction;
   if (swapped) {
     weakest.head<3>() = fixed_from_moved.transpose() * weakest.head<3>().eval();

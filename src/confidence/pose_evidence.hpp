@@ -1,14 +1,17 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <vector>
+
+#include "confidence/information.hpp"
 #include "gpureg/evidence.hpp"
-#include "pipeline/prepared_state.hpp"
 
 namespace gpureg::confidence {
 
 /// Counts of a mode as shares. moved, fixed: the clouds in the engine; swapped: the moved cloud is
 /// the target of the pair.
 PoseEvidence evidence_of(const PairOutcome& outcome, const ModeOutcome& mode,
-                         const PreparedState& moved, const PreparedState& fixed, bool swapped);
+                         const InformationSpectrum& spectrum, const PreparedState& moved,
+                         const PreparedState& fixed, bool swapped);
 
 }  // namespace gpureg::confidence

@@ -6,6 +6,8 @@
 #include <Eigen/Eigenvalues>
 #include <random>
 
+#include "math/jacobi_lanes.hpp"
+
 namespace gpureg {
 namespace {
 
@@ -42,6 +44,35 @@ TEST(Jacobi, ThreeByThree) { compare_with_eigen<3, 5>(1.0); }
 TEST(Jacobi, ThreeByThreeIllConditioned) { compare_with_eigen<3, 5>(0.03); }
 TEST(Jacobi, FourByFour) { compare_with_eigen<4, 6>(1.0); }
 TEST(Jacobi, FourByFourIllConditioned) { compare_with_eigen<4, 6>(0.03); }
+
+TEST(Jacobi, LanesHaveTheBitsOfOneByOne) {
+  std::mt19937 random(6);
+  std::normal_distribution<double> normal;
+  constexpr int kLanes = Matrices6::kLanes, kSweeps = 12;
+  for (int trial = 0; trial < 500; ++trial) {
+    Matrices6 a, v;
+    double expected[kLanes][6][6], vectors[kLanes][6][6];
+    for (int l = 0; l < kLanes; ++l) {
+      Eigen::Matrix<double, 6, 6> b;
+      const double spread = std::pow(10.0, -l);
+      for (int i = 0; i < 6; ++i)
+        for (int j = 0; j < 6; ++j) b(i, j) = normal(random) * std::pow(spread, i);
+      Eigen::Matrix<double, 6, 6> m = b * b.transpose();
+      if (l == 5) m.setZero();
+      if (l == 6) m = m.diagonal().asDiagonal();
+      for (int i = 0; i < 6; ++i)
+        for (int j = 0; j < 6; ++j) a.at[i][j][l] = expected[l][i][j] = m(i, j);
+      jacobi_eigen<6, kSweeps>(expected[l], vectors[l]);
+    }
+    jacobi_eigen(kSweeps, a, v);
+    for (int l = 0; l < kLanes; ++l)
+      for (int i = 0; i < 6; ++i)
+        for (int j = 0; j < 6; ++j) {
+          EXPECT_EQ(a.at[i][j][l], expected[l][i][j]);
+          EXPECT_EQ(v.at[i][j][l], vectors[l][i][j]);
+        }
+  }
+}
 
 TEST(Jacobi, ZeroAndDiagonal) {
   float a[3][3] = {{0, 0, 0}, {0, 0, 0}, {0, 0, 0}}, v[3][3];
