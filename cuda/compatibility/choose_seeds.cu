@@ -92,6 +92,7 @@ __global__ void rank_points(SeedBatch b, const std::uint32_t* match, float4* ran
 /// Marks the matches with a neighbour that has more compatible matches. Matches of high degree are
 /// compared first, as most matches have one of them near. A warp takes 32 matches of similar
 /// degree: each lane holds other matches, and all lanes compare them with one of the 32 at a time.
+/// Several warps (z) may share the others.
 __global__ void __launch_bounds__(kThreads)
     find_slopes(SeedBatch b, const float4* ranked, const std::uint32_t* match) {
   const std::uint32_t p = blockIdx.y, n = b.count[p], room = b.room[p], lane = threadIdx.x % 32;
@@ -100,7 +101,9 @@ __global__ void __launch_bounds__(kThreads)
   const float4 own = ranked[room + min(k, n - 1)];
   unsigned open = __ballot_sync(~0u, k < n);
   // No degree is greater behind the matches of the warp.
-  for (std::uint32_t base = 0; open != 0 && base < min(n, first + 32); base += 32 * kHeld) {
+  const std::uint32_t step = 32 * kHeld;
+  for (std::uint32_t base = blockIdx.z * step; open != 0 && base < min(n, first + 32);
+       base += gridDim.z * step) {
     float4 other[kHeld];
 #pragma unroll
     for (std::uint32_t h = 0; h < kHeld; ++h)
@@ -183,10 +186,10 @@ Seeds choose_seeds(Exec& exec, const MatchSets& matches, const RegistrationOptio
   sort_segments(exec, key, match, matches.room, kDegreeBits);
   rank_points<<<grid, 256, 0, exec.stream()>>>(batch, match.data(), ranked.data());
   check_launch("rank_points");
-  // Its warps work by themselves.
+  // Its warps work by themselves; where they are few, four take the place of one.
   const std::uint32_t threads = items_per_block(exec, pairs, largest, kThreads, 32);
-  find_slopes<<<dim3(blocks_for(largest, threads), pair_count), threads, 0, exec.stream()>>>(
-      batch, ranked.data(), match.data());
+  find_slopes<<<dim3(blocks_for(largest, threads), pair_count, threads == 32 ? 4 : 1), threads, 0,
+                exec.stream()>>>(batch, ranked.data(), match.data());
   check_launch("find_slopes");
   write_keys<<<grid, 256, 0, exec.stream()>>>(batch, key.data(), match.data());
   check_launch("write_keys");

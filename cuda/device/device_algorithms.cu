@@ -47,14 +47,14 @@ void sort_buffers(Exec& exec, DeviceBuffer<Key>& keys, DeviceBuffer<std::uint32_
   if (v.Current() != values.data()) values = std::move(other_values);
 }
 
-constexpr int kSortThreads = 1024, kFewItems = 8, kManyItems = 12;
+constexpr int kSortThreads = 1024, kItems = 8, kDigitBits = 6;
+using SortInBlock =
+    cub::BlockRadixSort<std::uint64_t, kSortThreads, kItems, std::uint32_t, kDigitBits>;
 
 /// A thread block per segment.
-template <int kItems>
 __global__ void __launch_bounds__(kSortThreads)
     sort_in_block(const std::uint32_t* offset, int bits, std::uint64_t* keys,
                   std::uint32_t* values) {
-  using Sort = cub::BlockRadixSort<std::uint64_t, kSortThreads, kItems, std::uint32_t>;
   extern __shared__ __align__(16) char shared[];
   const std::uint32_t begin = offset[blockIdx.x], size = offset[blockIdx.x + 1] - begin;
   std::uint64_t key[kItems];
@@ -65,7 +65,7 @@ __global__ void __launch_bounds__(kSortThreads)
     key[k] = at < size ? keys[begin + at] : ~std::uint64_t(0);
     value[k] = at < size ? values[begin + at] : 0u;
   }
-  Sort(*reinterpret_cast<typename Sort::TempStorage*>(shared))
+  SortInBlock(*reinterpret_cast<SortInBlock::TempStorage*>(shared))
       .SortBlockedToStriped(key, value, 0, bits);
 #pragma unroll
   for (int k = 0; k < kItems; ++k) {
@@ -76,30 +76,16 @@ __global__ void __launch_bounds__(kSortThreads)
   }
 }
 
-/// False where the device has too little shared memory.
-template <int kItems>
-bool sort_in_blocks(Exec& exec, DeviceBuffer<std::uint64_t>& keys,
-                    DeviceBuffer<std::uint32_t>& values, const Segments& segments, int bits) {
-  using Sort = cub::BlockRadixSort<std::uint64_t, kSortThreads, kItems, std::uint32_t>;
-  constexpr std::size_t kBytes = sizeof(typename Sort::TempStorage);
-  if (exec.allow_shared_memory(sort_in_block<kItems>) < kBytes) return false;
-  sort_in_block<kItems>
-      <<<static_cast<unsigned>(segments.entries()), kSortThreads, kBytes, exec.stream()>>>(
-          segments.on_device.data(), bits, keys.data(), values.data());
-  check_launch("sort_in_block");
-  return true;
-}
-
 }  // namespace
 
 void sort_segments(Exec& exec, DeviceBuffer<std::uint64_t>& keys,
                    DeviceBuffer<std::uint32_t>& values, const Segments& segments, int bits) {
-  if (segments.largest <= kSortThreads * kFewItems
-          ? sort_in_blocks<kFewItems>(exec, keys, values, segments, bits)
-          : segments.largest <= kSortThreads * kManyItems &&
-                sort_in_blocks<kManyItems>(exec, keys, values, segments, bits))
-    return;
-  sort_pairs(exec, keys, values, bits + bits_for(segments.entries()));
+  constexpr std::size_t kBytes = sizeof(SortInBlock::TempStorage);
+  if (segments.largest > kSortThreads * kItems || exec.allow_shared_memory(sort_in_block) < kBytes)
+    return sort_pairs(exec, keys, values, bits + bits_for(segments.entries()));
+  sort_in_block<<<static_cast<unsigned>(segments.entries()), kSortThreads, kBytes, exec.stream()>>>(
+      segments.on_device.data(), bits, keys.data(), values.data());
+  check_launch("sort_in_block");
 }
 
 void sort_pairs(Exec& exec, DeviceBuffer<std::uint32_t>& keys, DeviceBuffer<std::uint32_t>& values,

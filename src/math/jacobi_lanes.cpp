@@ -41,8 +41,7 @@ bool find_rotations(const Matrices6& a, int p, int q, Rotations& r) {
   for (int l = 0; l < kLanes; ++l) {
     const double theta = (a.at[q][q][l] - a.at[p][p][l]) / (2.0 * a.at[p][q][l]);
     const double magnitude = std::abs(theta);
-    const double far = 0.5 / magnitude,
-                 near = 1.0 / (magnitude + std::sqrt(theta * theta + 1.0));
+    const double far = 0.5 / magnitude, near = 1.0 / (magnitude + std::sqrt(theta * theta + 1.0));
     double t = magnitude > 1e9 ? far : near;
     t = theta < 0.0 ? -t : t;
     r.c[l] = 1.0 / std::sqrt(t * t + 1.0);
