@@ -122,7 +122,7 @@ __device__ void leave_cluster() {
 }
 
 /// A thread block per mode, or a cluster of kBlocks, runs all iterations of one refinement.
-template <int kThreads, int kBlocks, int kResident = kBlocks == 1 ? 1024 : 512>
+template <int kThreads, int kBlocks, int kResident = 1024>
 __global__ void __launch_bounds__(kThreads, kResident / kThreads) refine(RefineModes r) {
   __shared__ float rows[kThreads / 32][32][8];
   __shared__ std::int64_t partial[kThreads / 32][kSums];
@@ -169,7 +169,7 @@ __global__ void __launch_bounds__(kThreads, kResident / kThreads) refine(RefineM
 
 /// Clusters of blocks, for so few modes that the device would wait for single blocks. Two of these
 /// blocks share a multiprocessor, so that the 24 modes of one pair run at once; clusters of blocks
-/// twice as large would need two waves.
+/// twice as large would need two waves. Half as many modes leave a block all registers.
 constexpr int kClusterBlocks = 8, kClusterThreads = 512;
 
 /// Threads of small blocks on a multiprocessor: more hide the latency of the search, though they
@@ -192,7 +192,12 @@ void refine_by_clusters(Exec& exec, const RefineModes& batch, unsigned pairs) {
   config.stream = exec.stream();
   config.attrs = &cluster;
   config.numAttrs = 1;
-  check(cudaLaunchKernelEx(&config, refine<kClusterThreads, kClusterBlocks>, batch),
+  const bool alone = std::size_t(batch.most) * pairs * kClusterBlocks <=
+                     static_cast<std::size_t>(exec.multiprocessors());
+  check(cudaLaunchKernelEx(&config,
+                           alone ? refine<kClusterThreads, kClusterBlocks, kClusterThreads>
+                                 : refine<kClusterThreads, kClusterBlocks>,
+                           batch),
         "refine by clusters");
 }
 

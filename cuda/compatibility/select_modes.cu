@@ -5,8 +5,8 @@
 namespace gpureg::cuda {
 namespace {
 
-constexpr int kThreads = 256, kWarps = kThreads / 32;
-static_assert(limits::kMaxSeeds <= 32 * kThreads, "a thread marks its candidates in one word");
+constexpr std::uint32_t kFewThreads = 256, kThreads = 1024;
+static_assert(limits::kMaxSeeds <= 32 * kFewThreads, "a thread marks its candidates in one word");
 
 /// A thread block per pair takes the candidate with the highest coarse score, the first of equals,
 /// drops all candidates of the same mode, and repeats: the result of the CPU, which processes them
@@ -15,17 +15,17 @@ __global__ void __launch_bounds__(kThreads)
     select(std::uint32_t most, const std::uint32_t* count, const Pose<float>* poses,
            const float* coarse_scores, const std::uint32_t* seeds, ModeLimits within,
            std::uint32_t most_modes, Mode* modes, std::uint32_t* mode_count) {
-  __shared__ unsigned long long warp_best[kWarps];
-  const std::uint32_t p = blockIdx.x, size = count[p];
+  __shared__ unsigned long long warp_best[kThreads / 32];
+  const std::uint32_t p = blockIdx.x, size = count[p], threads = blockDim.x;
   const std::size_t begin = static_cast<std::size_t>(p) * most;
   std::uint32_t left = 0;
-  for (std::uint32_t r = 0; r * kThreads + threadIdx.x < size; ++r) left |= 1u << r;
+  for (std::uint32_t r = 0; r * threads + threadIdx.x < size; ++r) left |= 1u << r;
   std::uint32_t taken = 0;
   for (; taken < most_modes; ++taken) {
     unsigned long long best = 0;
     for (std::uint32_t bits = left; bits != 0; bits &= bits - 1) {
       const std::uint32_t k =
-          (static_cast<std::uint32_t>(__ffs(static_cast<int>(bits))) - 1) * kThreads + threadIdx.x;
+          (static_cast<std::uint32_t>(__ffs(static_cast<int>(bits))) - 1) * threads + threadIdx.x;
       // Scores are not negative, so their bits have their order.
       best = max(
           best,
@@ -35,7 +35,7 @@ __global__ void __launch_bounds__(kThreads)
     if (threadIdx.x % 32 == 0) warp_best[threadIdx.x / 32] = best;
     __syncthreads();
     best = 0;
-    for (int w = 0; w < kWarps; ++w) best = max(best, warp_best[w]);
+    for (std::uint32_t w = 0; w < threads / 32; ++w) best = max(best, warp_best[w]);
     __syncthreads();
     if (best == 0) break;
     const std::uint32_t winner = ~static_cast<std::uint32_t>(best);
@@ -45,7 +45,7 @@ __global__ void __launch_bounds__(kThreads)
                                                                  seeds[begin + winner], 0};
     for (std::uint32_t bits = left; bits != 0; bits &= bits - 1) {
       const int r = __ffs(static_cast<int>(bits)) - 1;
-      const std::uint32_t k = static_cast<std::uint32_t>(r) * kThreads + threadIdx.x;
+      const std::uint32_t k = static_cast<std::uint32_t>(r) * threads + threadIdx.x;
       if (k == winner || same_mode(to_rigid(poses[begin + k]), one, within)) left &= ~(1u << r);
     }
   }
@@ -60,7 +60,8 @@ Modes select_modes(Exec& exec, const Candidates& candidates, const RegistrationO
   out.most = options.evidence.modes;
   out.mode = exec.buffer<Mode>(pairs * out.most);
   out.count = exec.buffer<std::uint32_t>(pairs);
-  select<<<static_cast<unsigned>(pairs), kThreads, 0, exec.stream()>>>(
+  const unsigned threads = candidates.most > kThreads / 2 ? kThreads : kFewThreads;
+  select<<<static_cast<unsigned>(pairs), threads, 0, exec.stream()>>>(
       candidates.most, candidates.count.data(), candidates.pose.data(),
       candidates.coarse_score.data(), candidates.seed.data(),
       mode_limits(options.evidence.mode_angle, options.evidence.mode_distance, 1.0f), out.most,

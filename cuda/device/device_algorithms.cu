@@ -47,9 +47,8 @@ void sort_buffers(Exec& exec, DeviceBuffer<Key>& keys, DeviceBuffer<std::uint32_
   if (v.Current() != values.data()) values = std::move(other_values);
 }
 
-constexpr int kSortThreads = 1024, kItems = 8, kDigitBits = 6;
-using SortInBlock =
-    cub::BlockRadixSort<std::uint64_t, kSortThreads, kItems, std::uint32_t, kDigitBits>;
+constexpr int kSortThreads = 1024, kItems = 8;
+using SortInBlock = cub::BlockRadixSort<std::uint64_t, kSortThreads, kItems, std::uint32_t>;
 
 /// A thread block per segment.
 __global__ void __launch_bounds__(kSortThreads)
