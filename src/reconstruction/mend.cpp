@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <iterator>
 #include <map>
+#include <numeric>
 #include <set>
 #include <string>
 
@@ -17,39 +18,84 @@ namespace {
 constexpr std::size_t kPairsOfScan = 24;
 /// Scans at either side of a break that are aligned, by their number in the set.
 constexpr std::uint32_t kBeside = 4;
-/// Within a part poses are right, from scan to scan up to so many metres and radians.
-constexpr double kOfPart = 0.999, kShiftOfPart = 0.005, kTurnOfPart = 0.002;
+/// Within a part poses are right, from scan to scan up to so many metres and radians; less so
+/// beside scans that a false loop has bent.
+constexpr double kOfPart = 0.999, kShiftOfPart = 0.005, kTurnOfPart = 0.002, kShiftOfBent = 0.1,
+                 kTurnOfBent = 0.03;
 /// Shift from which a scan has another pose, metres, and the same for the entries of its rotation.
 constexpr double kMoved = 0.02;
 
 using Parts = std::vector<std::uint32_t>;
 constexpr std::uint32_t kNoPart = 0xffffffffu;
 
-/// Scans on the same side of every contradicted connection are one part.
-Parts parts_of(const std::vector<UnalignedIsometry3d>& poses, const Audit& found) {
-  std::vector<std::string> sides(poses.size());
+/// On which side of every contradicted connection each scan is.
+std::vector<std::string> sides_of(std::size_t scans, const Audit& found) {
+  std::vector<std::string> sides(scans);
   for (const AuditedConnection& connection : found.connections) {
     if (connection.verdict != ConnectionVerdict::contradicted) continue;
     for (std::string& side : sides) side.push_back('0');
     for (const std::uint32_t scan : connection.scans) sides[scan].back() = '1';
   }
-  std::map<std::string, std::uint32_t> numbers;
-  Parts parts;
-  for (std::size_t k = 0; k < poses.size(); ++k)
-    parts.push_back(
-        poses[k].matrix().allFinite()
-            ? numbers.insert({sides[k], static_cast<std::uint32_t>(numbers.size())}).first->second
-            : kNoPart);
-  return parts;
+  return sides;
+}
+
+/// Scans on the same side of every contradicted connection are one part where pairs that support
+/// each other link them, or consecutive numbers without a contradiction: a connection may name a
+/// scan beside the break with the wrong part. A scan without support is a part by itself.
+Parts parts_of(const std::vector<UnalignedIsometry3d>& poses, const Audit& found) {
+  const auto scans = static_cast<std::uint32_t>(poses.size());
+  const std::vector<std::string> sides = sides_of(scans, found);
+  Parts parts(scans);
+  std::iota(parts.begin(), parts.end(), 0u);
+  const auto root_of = [&](std::uint32_t k) {
+    while (parts[k] != k) k = parts[k] = parts[parts[k]];
+    return k;
+  };
+  const auto link = [&](std::uint32_t a, std::uint32_t b) { parts[root_of(a)] = root_of(b); };
+  std::set<std::pair<std::uint32_t, std::uint32_t>> contradicted;
+  std::vector<char> supported(scans, 0);
+  for (const AuditedPair& pair : found.pairs) {
+    if (pair.log_likelihood_ratio > 0 && sides[pair.source] == sides[pair.target]) {
+      link(pair.source, pair.target);
+      supported[pair.source] = supported[pair.target] = 1;
+    }
+    if (pair.log_likelihood_ratio < 0) contradicted.insert(std::minmax(pair.source, pair.target));
+  }
+  for (std::uint32_t k = 0, last = kNoPart; k < scans; ++k) {
+    if (!poses[k].matrix().allFinite()) continue;
+    if (supported[k] == 0) continue;
+    if (last != kNoPart && sides[last] == sides[k] && contradicted.count({last, k}) == 0)
+      link(last, k);
+    last = k;
+  }
+  Parts out(scans, kNoPart);
+  for (std::uint32_t k = 0; k < scans; ++k)
+    if (poses[k].matrix().allFinite()) out[k] = root_of(k);
+  return out;
+}
+
+/// Whether a scan and another of its part do not coincide: those of a right part do, while a false
+/// loop has its error taken up by all scans between its ends.
+std::vector<char> bent_scans(const Parts& parts, const Audit& found) {
+  std::vector<char> out(parts.size(), 0);
+  for (const AuditedPair& pair : found.pairs)
+    if (parts[pair.source] == parts[pair.target] && pair.shift > kMoved)
+      out[pair.source] = out[pair.target] = 1;
+  return out;
+}
+
+pose_graph::UnalignedMatrix6d information_of(double shift, double turn) {
+  pose_graph::UnalignedMatrix6d information = pose_graph::UnalignedMatrix6d::Identity();
+  information.diagonal().head<3>() /= turn * turn;
+  information.diagonal().tail<3>() /= shift * shift;
+  return information;
 }
 
 /// Each scan of a part with the one before.
-std::vector<Odometry> held(const std::vector<UnalignedIsometry3d>& poses, const Parts& parts) {
+std::vector<Odometry> held(const std::vector<UnalignedIsometry3d>& poses, const Parts& parts,
+                           const std::vector<char>& bent) {
   std::map<std::uint32_t, std::uint32_t> last;
   std::vector<Odometry> out;
-  pose_graph::UnalignedMatrix6d information = pose_graph::UnalignedMatrix6d::Identity();
-  information.diagonal().head<3>() /= kTurnOfPart * kTurnOfPart;
-  information.diagonal().tail<3>() /= kShiftOfPart * kShiftOfPart;
   for (std::uint32_t k = 0; k < parts.size(); ++k) {
     if (parts[k] == kNoPart) continue;
     const auto [at, first] = last.insert({parts[k], k});
@@ -59,7 +105,9 @@ std::vector<Odometry> held(const std::vector<UnalignedIsometry3d>& poses, const 
       edge.target = at->second;
       edge.target_from_source = poses[at->second].inverse() * poses[k];
       edge.confidence = kOfPart;
-      edge.information = information;
+      edge.information = bent[k] != 0 || bent[at->second] != 0
+                             ? information_of(kShiftOfBent, kTurnOfBent)
+                             : information_of(kShiftOfPart, kTurnOfPart);
       out.push_back(edge);
     }
     at->second = k;
@@ -68,12 +116,15 @@ std::vector<Odometry> held(const std::vector<UnalignedIsometry3d>& poses, const 
 }
 
 /// Pairs of different parts that may see each other: neighbours by number, those that were near at
-/// the wrong poses, and of a small part as many others as it may have, evenly chosen.
-std::vector<Pair> pairs_across(const Parts& parts, const Audit& found) {
+/// the wrong poses, and of a small part as many others as it may have, evenly chosen. The first two
+/// also of bent scans within a part.
+std::vector<Pair> pairs_to_align(const Parts& parts, const std::vector<char>& bent,
+                                 const Audit& found) {
   std::set<std::pair<std::uint32_t, std::uint32_t>> chosen;
   std::vector<std::size_t> count(parts.size(), 0);
   const auto add = [&](std::uint32_t a, std::uint32_t b) {
-    if (parts[a] == kNoPart || parts[b] == kNoPart || parts[a] == parts[b]) return;
+    if (a == b || parts[a] == kNoPart || parts[b] == kNoPart) return;
+    if (parts[a] == parts[b] && bent[a] == 0 && bent[b] == 0) return;
     if (std::min(count[a], count[b]) >= kPairsOfScan) return;
     if (!chosen.insert(std::minmax(a, b)).second) return;
     ++count[a];
@@ -160,7 +211,8 @@ MendedMap mend(const Context& context, const std::vector<PreparedCloud>& clouds,
   }
   const Parts parts = parts_of(world_from_scan, found);
   const auto reconstruction = Options::from_voxel_size(registration.prepare.voxel_size);
-  std::vector<Pair> pairs, more = pairs_across(parts, found);
+  const std::vector<char> bent = bent_scans(parts, found);
+  std::vector<Pair> pairs, more = pairs_to_align(parts, bent, found);
   std::vector<RegistrationResult> results;
   // Few pairs see each other where the parts were; where they belong, more pairs hold them.
   for (int pass = 0; pass < 2 && !more.empty(); ++pass) {
@@ -169,7 +221,7 @@ MendedMap mend(const Context& context, const std::vector<PreparedCloud>& clouds,
     std::move(aligned.begin(), aligned.end(), std::back_inserter(results));
     const AuditedReconstruction again =
         reconstruct_audited(context, clouds, pairs, results, reconstruction,
-                            held(world_from_scan, parts), registration, options);
+                            held(world_from_scan, parts, bent), registration, options);
     out.moved.clear();
     out.left_out.clear();
     place(again.map, world_from_scan, out);
