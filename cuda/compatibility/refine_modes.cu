@@ -216,6 +216,7 @@ __global__ void __launch_bounds__(32)
     bool known = false;
     for (std::uint32_t o = lane; o < count; o += 32) known |= same_mode(mine, rigid[o], within);
     if (__any_sync(~0u, known)) continue;
+    __syncwarp();  // a vote does not order the reads of other lanes before this write
     if (lane == 0) {
       rigid[count] = mine;
       kept[count] = k;
