@@ -20,8 +20,8 @@ constexpr std::size_t kPairsOfScan = 24;
 constexpr std::uint32_t kBeside = 4;
 /// Within a part poses are right, from scan to scan up to so many metres and radians; less so
 /// beside scans that a false loop has bent.
-constexpr double kOfPart = 0.999, kShiftOfPart = 0.005, kTurnOfPart = 0.002, kShiftOfBent = 0.1,
-                 kTurnOfBent = 0.03;
+constexpr double kOfPart = 0.999, kShiftOfPart = 0.005, kTurnOfPart = 0.002, kShiftOfBent = 0.3,
+                 kTurnOfBent = 0.1;
 /// Shift from which a scan has another pose, metres, and the same for the entries of its rotation.
 constexpr double kMoved = 0.02;
 
