@@ -96,7 +96,9 @@ class MapBuilder {
   /// @throws InvalidArgument as PointCloudView::validate().
   void add_cloud(const PointCloudView& cloud);
 
-  /// @return the map of what was added.
+  /// @return the map of what was added. Where nothing tells the sides of its surfaces, they are
+  ///   inferred for the search of places, on all cores: where most of its surroundings lie on one
+  ///   side of a surface, the sensor was there, too.
   /// @throws InvalidArgument for a map without points.
   PreparedMap build() const;
 

@@ -18,9 +18,11 @@ using Side = std::array<std::int8_t, 3>;
 /// What a map consists of, and what follows from it.
 struct MapState {
   MapOptions options;
-  Eigen::Vector3d origin{0, 0, 0};          ///< of the frame that the rows below are relative to
-  std::vector<Eigen::Vector3f> points;      ///< by tile
-  std::vector<Side> sides;                  ///< empty, or one per point; 0 0 0: not known
+  Eigen::Vector3d origin{0, 0, 0};      ///< of the frame that the rows below are relative to
+  std::vector<Eigen::Vector3f> points;  ///< by tile
+  std::vector<Side> sides;              ///< empty, or one per point; 0 0 0: not known
+  /// Good enough for the search of a place, where both would be tried else, but no evidence.
+  bool sides_inferred = false;
   std::vector<Eigen::Vector3f> viewpoints;  ///< sensor positions, thinned
   std::vector<Horizon> horizons;            ///< one per viewpoint
 
@@ -39,6 +41,7 @@ struct MapState {
   /// A tile with its halo.
   PointCloud tile_cloud(std::size_t tile) const;
   Eigen::AlignedBox3d tile_box(std::size_t tile) const;
+  static std::string name_of(std::size_t tile);  ///< in error messages
 
   /// Number of a new search: tells prepared_tiles() which tiles were used last.
   std::uint64_t begin_search() const;

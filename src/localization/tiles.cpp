@@ -100,6 +100,10 @@ PointCloud MapState::cut(const Eigen::AlignedBox3d& box,
 
 PointCloud MapState::tile_cloud(std::size_t tile) const { return cut(tile_box(tile)); }
 
+std::string MapState::name_of(std::size_t tile) {
+  return "tile " + std::to_string(tile) + " of the map";
+}
+
 PrepareOptions as_they_are(PrepareOptions options) {
   options.voxel_size = 0;
   return options;
@@ -162,7 +166,7 @@ std::vector<PreparedCloud> MapState::prepared_tiles(const Context& context, std:
   std::vector<std::string> names;
   for (const std::size_t k : missing) {
     clouds.push_back(tile_cloud(wanted[k]));
-    names.push_back("tile " + std::to_string(wanted[k]) + " of the map");
+    names.push_back(name_of(wanted[k]));
   }
   const std::vector<PreparedCloud> prepared =
       prepare_batch(context, views_of(clouds), prepare, names);
