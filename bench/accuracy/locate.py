@@ -4,9 +4,10 @@
     python3 bench/accuracy/locate.py --data DATA --work WORK --command build/cpu/bin/gpureg
 
 Every STEP-th fragment of the red kitchen, the houses A and B and hospital E is left out and asked for,
-turned at random and with its middle camera at the origin, in the map of its scene and, with --joint, in
-one map of all scenes. Those of the next scene are asked for in the map of each scene, too. A pose is
-correct if its RMSE over the points of the scan is below 0.2 m.
+turned at random and with its middle camera at the origin, in the map of its scene and, with --maps joint, in
+one map of all scenes, where those of --copies stand twice: either place is correct, and the other has to be
+an alias. Those of the next scene are asked for in the map of each scene, too. A pose is correct if its RMSE
+over the points of the scan is below 0.2 m.
 """
 
 from __future__ import annotations
@@ -76,17 +77,18 @@ class Scene:
 
 
 def map_folder(
-    work: pathlib.Path, scenes: dict[str, Scene], shifts: dict[str, np.ndarray]
+    work: pathlib.Path, scenes: dict[str, Scene], shifts: dict[tuple[str, int], np.ndarray]
 ) -> pathlib.Path:
     work.mkdir(parents=True)
     poses, cameras, count = "", "", 0
-    for name, scene in scenes.items():
-        for number in sorted(scene.poses):
+    for (name, _), shift in shifts.items():
+        scene = scenes.get(name)
+        for number in sorted(scene.poses) if scene else []:
             if number in scene.left_out:
                 continue
             source = (scene.folder / f"cloud_bin_{number}.ply").resolve()
             os.symlink(source, work / f"cloud_bin_{count}.ply")
-            pose = shifts[name] @ scene.poses[number]
+            pose = shift @ scene.poses[number]
             poses += f"{count}\n" + "".join(
                 " ".join(map(repr, row)) + "\n" for row in pose.tolist()
             )
@@ -107,11 +109,13 @@ def main() -> None:
     parser.add_argument("--output", type=pathlib.Path, help="record, a row a line")
     parser.add_argument("--step", type=int, default=10)
     parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--joint", action="store_true")
+    parser.add_argument("--maps", nargs="+", default=["single"], choices=["single", "joint"])
+    parser.add_argument("--copies", nargs="*", default=[], choices=SCENES, help="in the joint map")
     arguments = parser.parse_args()
     scenes = {n: Scene(arguments.data / f, arguments.step) for n, f in SCENES.items()}
     names, work = list(scenes), arguments.work
-    shifts = {name: np.eye(4) for name in names}
+    # By scene and copy. Maps of one scene have its frame.
+    shifts = {(name, 0): np.eye(4) for name in names}
     rows: list[dict[str, Any]] = []
 
     def gpureg(*words: str | pathlib.Path) -> float:
@@ -128,36 +132,33 @@ def main() -> None:
         for number in scene.left_out:
             paths.append(work / f"{of}_{number}.ply")
             frame = scene.query(number, paths[-1], arguments.seed)
-            truths.append(shifts[of] @ scene.poses[number] @ np.linalg.inv(frame))
+            truth = scene.poses[number] @ np.linalg.inv(frame)
+            truths.append([shift @ truth for name, shift in shifts.items() if name[0] == of])
         seconds = gpureg(*paths, map, "--viewpoint", "0,0,0", "--json", work / "result.json")
         result = json.loads((work / "result.json").read_text())
-        for path, truth, scan in zip(paths, truths, result["scans"]):
+        for path, places, scan in zip(paths, truths, result["scans"]):
             points = read_points(path)
             errors = [
-                float(
-                    np.sqrt(
-                        (
-                            (
-                                moved(points, np.reshape(p["map_from_scan"], (4, 4)))
-                                - moved(points, truth)
-                            )
-                            ** 2
-                        )
-                        .sum(1)
-                        .mean()
+                [
+                    float(
+                        np.sqrt(((moved(points, pose) - moved(points, place)) ** 2).sum(1).mean())
                     )
-                )
-                for p in scan["poses"]
+                    for place in places
+                ]
+                for pose in (np.reshape(p["map_from_scan"], (4, 4)) for p in scan["poses"])
             ]
             first = scan["poses"][0]["confidence"] if errors else 0.0
+            aliases = [e for e, p in zip(errors, scan["poses"]) if p["alias"]]
             row = {
                 "map": kind,
                 "scan": path.stem,
                 "here": here,
                 "status": scan["status"],
                 "confidence": round(first, 4),
-                "error": round(errors[0], 4) if here and errors else None,
-                "correct": here and bool(errors) and errors[0] < CORRECT,
+                "error": round(min(errors[0]), 4) if here and errors else None,
+                "correct": here and bool(errors) and min(errors[0]) < CORRECT,
+                "copies": len(places) if here else 0,
+                "aliases": sum(min(e) < CORRECT for e in aliases) if here else 0,
                 "tiles": scan["tiles"],
                 "map_points": result["map"]["points"],
                 "cpu_seconds": round(seconds / len(paths), 2),
@@ -172,19 +173,21 @@ def main() -> None:
                 )
                 arguments.output.write_text(f'{{"run": {head},\n"rows": [\n {lines}\n]}}\n')
 
-    for k, name in enumerate(names):
+    for k, name in enumerate(names if "single" in arguments.maps else []):
         folder = map_folder(work / name, {name: scenes[name]}, shifts)
         gpureg(folder, "--save-map", work / f"{name}.gpureg")
         ask(name, work / f"{name}.gpureg", name, True)
         ask(name, work / f"{name}.gpureg", names[(k + 1) % len(names)], False)
-    if arguments.joint:
-        for k, name in enumerate(names):
-            shifts[name] = np.eye(4)
-            shifts[name][0, 3] = GAP * k
+    if "joint" in arguments.maps:
+        places = [(name, 0) for name in names] + [(name, 1) for name in arguments.copies]
+        for k, place in enumerate(places):
+            shifts[place] = np.eye(4)
+            shifts[place][0, 3] = GAP * k
         folder = map_folder(work / "joint", scenes, shifts)
         gpureg(folder, "--save-map", work / "joint.gpureg")
+        kind = "all four" + "".join(f", {name} twice" for name in arguments.copies)
         for name in names:
-            ask("all four", work / "joint.gpureg", name, True)
+            ask(kind, work / "joint.gpureg", name, True)
     here = [r for r in rows if r["here"]]
     found = [r for r in rows if r["status"] == "found"]
     print(

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Tables of maps."""
 
-from tables.records import load, source
+from tables.records import load, mean, source
 
 SCENES = {
     "redkitchen": "red kitchen",
@@ -99,4 +99,26 @@ def peers():
     return rows
 
 
-TABLES = {"maps": maps, "maps_short": maps_short, "map_peers": peers}
+def located():
+    """Scans of a kind in a map, a row each."""
+    groups = {}
+    for name in ("locate.json", "locate_copies.json", "locate_sweeps.json"):
+        for row in load(name)["rows"]:
+            kind = row.get("kind", "fragment" if row["here"] else "fragment of another scene")
+            groups.setdefault((row["map"], kind), []).append(row)
+    rows = [
+        "| map | scans | asked | first pose correct | found | of them wrong | ambiguous | CPU seconds a scan |",
+        "| --- | --- | --- | --- | --- | --- | --- | --- |",
+    ]
+    for (place, kind), scans in groups.items():
+        found = [s for s in scans if s["status"] == "found"]
+        correct = sum(s["correct"] for s in scans) if scans[0]["here"] else "-"
+        rows.append(
+            f"| {place} | {kind} | {len(scans)} | {correct} | {len(found)} "
+            f"| {sum(not s['correct'] for s in found)} | {sum(s['status'] == 'ambiguous' for s in scans)} "
+            f"| {mean([s['cpu_seconds'] for s in scans]):.1f} |"
+        )
+    return rows
+
+
+TABLES = {"maps": maps, "maps_short": maps_short, "map_peers": peers, "located": located}

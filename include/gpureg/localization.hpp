@@ -96,7 +96,9 @@ class MapBuilder {
   /// @throws InvalidArgument as PointCloudView::validate().
   void add_cloud(const PointCloudView& cloud);
 
-  /// @return the map of what was added.
+  /// @return the map of what was added. Where nothing tells the sides of its surfaces, they are
+  ///   inferred for the search of places, on all cores: where most of its surroundings lie on one
+  ///   side of a surface, the sensor was there, too.
   /// @throws InvalidArgument for a map without points.
   PreparedMap build() const;
 
@@ -121,9 +123,10 @@ struct LocateOptions {
   /// All tiles are searched with voxels this many times as wide as those of the map, 1..8: several
   /// times as fast, and thinned scans of spinning LiDARs find more. 1: with those of the map.
   double coarse_factor = 2;
-  /// Where the first search does not end in a place with a confidence of 0.75, so many tiles are
-  /// searched with the voxels of the map, >= 1: those in which the first search was the most
-  /// confident.
+  /// Where the first search does not end in a place with a confidence of 0.75, at most so many
+  /// tiles are searched with the voxels of the map, >= 1: those in which the first search was the
+  /// most confident. None where no pose of it reaches 0.1, of a scan with a thousand coarse points:
+  /// the scan is not in the map.
   std::uint32_t fine_tiles = 4;
   /// Poses of a scan that are verified against all of the map around them, 1..64.
   std::uint32_t candidates = 8;
@@ -187,8 +190,8 @@ struct LocateResult {
 
 /// Finds the poses of scans in a map: aligns each scan with every tile in coarse voxels, merges the
 /// poses of all tiles, and verifies the most confident ones against the whole map around them, in
-/// its own voxels. Where none is sure, the best tiles are searched in those, too. All places
-/// compete for the confidence.
+/// its own voxels. Where none is sure, but one is possible, the best tiles are searched in those,
+/// too. All places compete for the confidence.
 ///
 /// @param scans host memory; viewpoints as for prepare().
 /// @param priors one per scan, or none.

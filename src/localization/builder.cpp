@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include <cmath>
 #include <map>
 #include <set>
 
 #include "gpureg/reconstruction.hpp"
 #include "localization/check_scan.hpp"
+#include "localization/sides.hpp"
 #include "localization/surface.hpp"
 
 namespace gpureg::localization {
@@ -12,15 +12,6 @@ namespace {
 
 /// Sensor positions closer together than this number of voxels see the same.
 constexpr double kViewpointVoxels = 10;
-
-Side side_of(const Eigen::Vector3f& normal) {
-  constexpr float kScale = 127;
-  const Eigen::Vector3f scaled = normal * kScale;
-  Side side{};
-  for (int k = 0; k < 3; ++k)
-    side[static_cast<std::size_t>(k)] = static_cast<std::int8_t>(std::lround(scaled[k]));
-  return side;
-}
 
 }  // namespace
 
@@ -95,6 +86,7 @@ PreparedMap MapBuilder::build() const {
     out->viewpoints.push_back((place - out->origin).cast<float>());
   out->horizons = state_->horizons;
   out->make_tiles();
+  if (out->sides.empty() && out->viewpoints.empty()) infer_sides(Context::cpu(), *out);
   return MapState::map(std::move(out));
 }
 

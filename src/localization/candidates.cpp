@@ -86,7 +86,10 @@ PointCloud neighborhood(const MapState& map, const std::vector<Eigen::Vector3d>&
   }
   box.min().array() -= distance;
   box.max().array() += distance;
-  return map.cut(box, [&](const Eigen::Vector3f& p) { return cells.has(p.cast<double>()); });
+  PointCloud out =
+      map.cut(box, [&](const Eigen::Vector3f& p) { return cells.has(p.cast<double>()); });
+  if (map.sides_inferred) out.normals.clear();
+  return out;
 }
 
 double odds_of(double confidence) {

@@ -20,7 +20,7 @@ bool same_place(const UnalignedIsometry3d& a, const UnalignedIsometry3d& b,
 std::vector<Candidate> distinct(std::vector<Candidate> candidates, const Eigen::Vector3d& middle,
                                 const EvidenceOptions& options, std::size_t most);
 
-/// The map within a distance of the scan's points at a pose.
+/// The map within a distance of the scan's points at a pose, without sides that are inferred.
 PointCloud neighborhood(const MapState& map, const std::vector<Eigen::Vector3d>& scan,
                         const UnalignedIsometry3d& map_from_scan, double distance);
 

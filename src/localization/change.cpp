@@ -124,9 +124,9 @@ void cut_map(const MapState& map, const ChangeOptions& options, Scene& scene) {
   scene.map.horizon_step = horizon_step(map.options.prepare.voxel_size);
 }
 
-/// Normals of a map that has none; their signs do not matter.
+/// Normals of a map that came without any; their signs do not matter.
 void estimate_normals(const Context& context, const MapState& map, Surface& surface) {
-  if (!map.sides.empty() || surface.points.empty()) return;
+  if ((!map.sides.empty() && !map.sides_inferred) || surface.points.empty()) return;
   PointCloudView view(surface.points);
   view.infer_viewpoint = false;
   const std::vector<float> no_features(view.size, 0);

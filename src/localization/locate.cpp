@@ -8,11 +8,17 @@
 namespace gpureg::localization {
 namespace {
 
-/// Confidence of a place from which the coarse search is enough.
-constexpr double kSure = 0.75;
+/// Confidence of a place from which the coarse search is enough, and one of its poses, not verified
+/// yet, that a search in narrower voxels hardly surpasses.
+constexpr double kSure = 0.75, kSureSearch = 0.95;
+/// Where no pose of the coarse search reaches this confidence, the scan is not in the map, if its
+/// coarse points are so many that the search had something to see.
+constexpr double kHopelessSearch = 0.1;
+constexpr std::size_t kTellingPoints = 1000;
 
 /// A candidate in all of the map around it.
 struct Verified {
+  Candidate candidate;
   PoseVerification verification;
   std::size_t points = 0;  ///< of the neighbourhood
   double confidence = 0;   ///< other places aside
@@ -25,12 +31,22 @@ double confidence_of(double searched, double verified) {
   return std::max(verified, odds / (1 + odds));
 }
 
+/// @param before candidates of the scan that were verified already.
 std::vector<Verified> verify(const Context& context, const MapState& map,
-                             const LocateOptions& options, const Scan& scan) {
+                             const LocateOptions& options, const Scan& scan,
+                             const std::vector<Verified>& before = {}) {
   std::vector<PointCloud> around;
   std::vector<Pair> pairs;
   std::vector<std::vector<UnalignedIsometry3d>> poses;
+  std::vector<Verified> out;
+  std::vector<std::size_t> open;
   for (const Candidate& candidate : scan.candidates) {
+    const auto known = std::find_if(before.begin(), before.end(), [&](const Verified& v) {
+      return v.candidate.map_from_scan.matrix() == candidate.map_from_scan.matrix();
+    });
+    out.push_back(known == before.end() ? Verified{candidate, {}, 0, 0} : *known);
+    if (known != before.end()) continue;
+    open.push_back(out.size() - 1);
     around.push_back(neighborhood(map, scan.points, candidate.map_from_scan, options.neighborhood));
     pairs.push_back({0, static_cast<std::uint32_t>(around.size())});
     poses.push_back({candidate.map_from_scan});
@@ -43,14 +59,20 @@ std::vector<Verified> verify(const Context& context, const MapState& map,
   verification.refine = true;
   const auto results =
       verify_poses_batch(context, clouds, pairs, poses, options.registration, verification);
-  std::vector<Verified> out;
-  for (std::size_t k = 0; k < results.size(); ++k)
-    out.push_back({results[k].front(), clouds[k + 1].size(),
-                   confidence_of(scan.candidates[k].confidence, results[k].front().confidence)});
+  for (std::size_t k = 0; k < results.size(); ++k) {
+    Verified& v = out[open[k]];
+    v.verification = results[k].front();
+    v.points = clouds[k + 1].size();
+    v.confidence = confidence_of(v.candidate.confidence, v.verification.confidence);
+  }
   std::stable_sort(out.begin(), out.end(), [](const Verified& a, const Verified& b) {
     return a.confidence > b.confidence;
   });
   return out;
+}
+
+double best_searched(const Scan& scan) {
+  return scan.candidates.empty() ? 0 : scan.candidates.front().confidence;
 }
 
 LocateStatus status_of(const LocateResult& result, double min_confidence) {
@@ -136,16 +158,22 @@ std::vector<LocateResult> locate(const Context& context, const std::vector<Point
     found.push_back(scan_of(prepared[k], coarse[k], priors.empty() ? LocatePrior{} : priors[k]));
   search_all_tiles(context, state, options, found);
   std::vector<LocateResult> out;
+  std::vector<std::vector<Verified>> verified;
   std::vector<std::size_t> unsure;
   for (std::size_t k = 0; k < found.size(); ++k) {
-    out.push_back(result_of(verify(context, state, options, found[k]), found[k], options));
-    if (coarse_first && (out[k].poses.empty() || out[k].poses.front().confidence < kSure))
-      unsure.push_back(k);
+    const double searched = best_searched(found[k]);
+    const bool hopeless =
+        coarse_first && searched < kHopelessSearch && found[k].coarse.size() >= kTellingPoints;
+    if (hopeless && !found[k].candidates.empty()) found[k].candidates.resize(1);
+    verified.push_back(verify(context, state, options, found[k]));
+    out.push_back(result_of(verified[k], found[k], options));
+    const bool sure = !out[k].poses.empty() && out[k].poses.front().confidence >= kSure;
+    if (coarse_first && !hopeless && !sure && searched < kSureSearch) unsure.push_back(k);
   }
   if (unsure.empty()) return out;
   search_best_tiles(context, state, options, unsure, found);
   for (const std::size_t k : unsure)
-    out[k] = result_of(verify(context, state, options, found[k]), found[k], options);
+    out[k] = result_of(verify(context, state, options, found[k], verified[k]), found[k], options);
   return out;
 }
 

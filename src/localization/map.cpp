@@ -17,7 +17,7 @@ PointCloud PreparedMap::cloud() const {
   PointCloud out;
   out.origin = state.origin;
   out.points = state.points;
-  for (const Side& side : state.sides)
+  for (const Side& side : state.sides_inferred ? std::vector<Side>() : state.sides)
     out.normals.push_back(Eigen::Vector3i(side[0], side[1], side[2]).cast<float>().normalized());
   out.viewpoints = state.viewpoints;
   return out;

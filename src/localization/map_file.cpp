@@ -14,7 +14,7 @@ namespace {
 // Layout: kMagic, version, size and checksum of the payload, payload. All numbers little-endian, as
 // every processor that the library runs on.
 constexpr char kMagic[8] = {'g', 'p', 'u', 'r', 'e', 'g', 'M', 'P'};
-constexpr std::uint32_t kVersion = 2;
+constexpr std::uint32_t kVersion = 3;
 constexpr std::size_t kHeader = sizeof kMagic + sizeof kVersion + 2 * sizeof(std::uint64_t);
 /// Of a file that is read: keeps devices and mistaken paths from eating the memory.
 constexpr std::size_t kMostBytes = std::size_t{1} << 36;
@@ -54,8 +54,9 @@ void each_number(T& object, const With& with) {
 void each_part(const MapState& map, const files::Sink& write) {
   each_number(map.options, [&](const auto& value) { write(bytes_of(&value, 1)); });
   write(bytes_of(map.origin.data(), 3));
-  const std::uint64_t counts[3] = {map.points.size(), map.sides.size(), map.viewpoints.size()};
-  write(bytes_of(counts, 3));
+  const std::uint64_t counts[4] = {map.points.size(), map.sides.size(), map.viewpoints.size(),
+                                   map.sides_inferred};
+  write(bytes_of(counts, 4));
   write(bytes_of(map.points.data(), map.points.size()));
   write(bytes_of(map.sides.data(), map.sides.size()));
   write(bytes_of(map.viewpoints.data(), map.viewpoints.size()));
@@ -155,8 +156,10 @@ PreparedMap PreparedMap::load(const std::string& path) {
     Reader file(std::string_view(content).substr(kHeader), path);
     each_number(map->options, [&](auto& value) { file.values(&value, 1); });
     file.values(map->origin.data(), 3);
-    std::uint64_t counts[3];
-    file.values(counts, 3);
+    std::uint64_t counts[4];
+    file.values(counts, 4);
+    if (counts[3] > 1) file.fail();
+    map->sides_inferred = counts[3] == 1;
     file.list(map->points, counts[0]);
     file.list(map->sides, counts[1]);
     file.list(map->viewpoints, counts[2]);

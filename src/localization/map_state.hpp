@@ -18,9 +18,11 @@ using Side = std::array<std::int8_t, 3>;
 /// What a map consists of, and what follows from it.
 struct MapState {
   MapOptions options;
-  Eigen::Vector3d origin{0, 0, 0};          ///< of the frame that the rows below are relative to
-  std::vector<Eigen::Vector3f> points;      ///< by tile
-  std::vector<Side> sides;                  ///< empty, or one per point; 0 0 0: not known
+  Eigen::Vector3d origin{0, 0, 0};      ///< of the frame that the rows below are relative to
+  std::vector<Eigen::Vector3f> points;  ///< by tile
+  std::vector<Side> sides;              ///< empty, or one per point; 0 0 0: not known
+  /// Good enough for the search of a place, where both would be tried else, but no evidence.
+  bool sides_inferred = false;
   std::vector<Eigen::Vector3f> viewpoints;  ///< sensor positions, thinned
   std::vector<Horizon> horizons;            ///< one per viewpoint
 
@@ -39,10 +41,13 @@ struct MapState {
   /// A tile with its halo.
   PointCloud tile_cloud(std::size_t tile) const;
   Eigen::AlignedBox3d tile_box(std::size_t tile) const;
+  static std::string name_of(std::size_t tile);  ///< in error messages
 
-  /// Prepared tiles. Those that fit stay in the cache.
+  /// Number of a new search: tells prepared_tiles() which tiles were used last.
+  std::uint64_t begin_search() const;
+  /// Prepared tiles, some of them from the cache.
   /// @param prepare the options of the map with another voxel size, 0 for points as they are.
-  std::vector<PreparedCloud> prepared_tiles(const Context& context,
+  std::vector<PreparedCloud> prepared_tiles(const Context& context, std::uint64_t search,
                                             const std::vector<std::size_t>& wanted,
                                             const PrepareOptions& prepare) const;
 
@@ -52,10 +57,18 @@ struct MapState {
   }
 
  private:
+  /// Backend, voxel size and tile.
+  using Key = std::tuple<Backend, float, std::size_t>;
+  struct Cached {
+    PreparedCloud cloud;
+    std::uint64_t search = 0;  ///< that used it last
+  };
+  void keep(const Key& key, const PreparedCloud& cloud, std::uint64_t search) const;
+
   mutable std::mutex mutex_;
-  /// By backend, voxel size and tile.
-  mutable std::map<std::tuple<Backend, float, std::size_t>, PreparedCloud> cache_;
+  mutable std::map<Key, Cached> cache_;
   mutable std::size_t cached_points_ = 0;
+  mutable std::uint64_t searches_ = 0;
 };
 
 /// Views of clouds that cut() made; a piece of a map was not seen from its origin.

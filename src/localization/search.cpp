@@ -12,8 +12,8 @@ namespace {
 
 /// Prepared points of the tiles that are aligned together: about 1 GB.
 constexpr double kPointsAtOnce = 400'000;
-/// Poses with less than this share of the odds of the most confident one, or of even odds, are left
-/// out.
+/// Poses and tiles with less than this share of the odds of the most confident one, and poses with
+/// less than this share of even odds, are left out.
 constexpr double kHopeless = 0.01, kHopelessAlone = 1e-4;
 
 bool may_be_in(const Scan& scan, const MapState& map, std::size_t tile) {
@@ -41,24 +41,28 @@ struct Search {
   RegistrationOptions registration;
   PrepareOptions prepare;  ///< of the tiles
   double factor = 1;       ///< of the voxels
+  std::uint64_t number = 0;
   std::function<bool(std::size_t scan, std::size_t tile)> wants;
 
   bool coarse() const { return factor > 1; }
 };
 
-Search search_with(RegistrationOptions registration, const LocateOptions& options) {
+Search search_with(const MapState& map, RegistrationOptions registration,
+                   const LocateOptions& options) {
   registration.compatibility.max_matches = options.max_matches;
   // "Not in this map" needs the whole search: a contained scan has a low confidence at first.
   registration.compatibility.first_pass_reject = 0;
   Search out;
   out.registration = std::move(registration);
+  out.number = map.begin_search();
   return out;
 }
 
 /// Aligns the scans with the tiles and collects the modes.
 void search_tiles(const Context& context, const MapState& map, const Search& search,
                   const std::vector<std::size_t>& tiles, std::vector<Scan>& scans) {
-  std::vector<PreparedCloud> clouds = map.prepared_tiles(context, tiles, search.prepare);
+  std::vector<PreparedCloud> clouds =
+      map.prepared_tiles(context, search.number, tiles, search.prepare);
   std::vector<Pair> pairs;
   std::vector<RegistrationPrior> priors;
   for (std::size_t k = 0; k < scans.size(); ++k) {
@@ -84,10 +88,8 @@ void search_tiles(const Context& context, const MapState& map, const Search& sea
   }
 }
 
-/// Whether the last of the candidates is, beside the first.
-bool is_hopeless(const std::vector<Candidate>& candidates) {
-  return odds_of(candidates.back().confidence) <
-         std::max(kHopelessAlone, kHopeless * odds_of(candidates.front().confidence));
+bool is_hopeless(double confidence, double best) {
+  return odds_of(confidence) < kHopeless * odds_of(best);
 }
 
 void run(const Context& context, const MapState& map, const LocateOptions& options,
@@ -113,7 +115,12 @@ void run(const Context& context, const MapState& map, const LocateOptions& optio
   for (Scan& scan : scans) {
     scan.candidates = distinct(std::move(scan.candidates), scan.middle,
                                options.registration.evidence, options.candidates);
-    while (scan.candidates.size() > 1 && is_hopeless(scan.candidates)) scan.candidates.pop_back();
+    const auto is_last_hopeless = [&] {
+      const double last = scan.candidates.back().confidence;
+      return odds_of(last) < kHopelessAlone ||
+             is_hopeless(last, scan.candidates.front().confidence);
+    };
+    while (scan.candidates.size() > 1 && is_last_hopeless()) scan.candidates.pop_back();
   }
 }
 
@@ -149,7 +156,7 @@ void search_all_tiles(const Context& context, const MapState& map, const LocateO
                       std::vector<Scan>& scans) {
   RegistrationOptions registration = options.registration;
   fields::multiply_lengths(registration, options.coarse_factor);
-  Search search = search_with(std::move(registration), options);
+  Search search = search_with(map, std::move(registration), options);
   search.prepare = coarse_prepare(map, options);
   search.factor = options.coarse_factor;
   search.wants = [&](std::size_t k, std::size_t tile) { return may_be_in(scans[k], map, tile); };
@@ -163,7 +170,7 @@ void search_all_tiles(const Context& context, const MapState& map, const LocateO
 
 void search_best_tiles(const Context& context, const MapState& map, const LocateOptions& options,
                        const std::vector<std::size_t>& which, std::vector<Scan>& scans) {
-  Search search = search_with(options.registration, options);
+  Search search = search_with(map, options.registration, options);
   search.prepare = as_they_are(map.options.prepare);
   std::vector<std::vector<char>> wanted(scans.size(), std::vector<char>(map.tiles.size(), 0));
   for (const std::size_t k : which) {
@@ -174,6 +181,9 @@ void search_best_tiles(const Context& context, const MapState& map, const Locate
       return scans[k].best[a] > scans[k].best[b];
     });
     order.resize(std::min<std::size_t>(order.size(), options.fine_tiles));
+    while (order.size() > 1 &&
+           is_hopeless(scans[k].best[order.back()], scans[k].best[order.front()]))
+      order.pop_back();
     for (const std::size_t tile : order) wanted[k][tile] = 1;
   }
   search.wants = [&](std::size_t k, std::size_t tile) { return wanted[k][tile] != 0; };

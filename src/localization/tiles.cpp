@@ -10,7 +10,7 @@ namespace {
 
 /// Tiles along an axis; far stray points cost empty tiles only, which are not kept.
 constexpr double kMostTiles = 1 << 20;
-/// Prepared points that a map keeps: about 3 GB.
+/// Prepared points that a map keeps: about 3 GB. The least recently used ones make room.
 constexpr std::size_t kMostCachedPoints = 1'000'000;
 
 std::int64_t count_of(double extent, const MapOptions& options) {
@@ -100,6 +100,10 @@ PointCloud MapState::cut(const Eigen::AlignedBox3d& box,
 
 PointCloud MapState::tile_cloud(std::size_t tile) const { return cut(tile_box(tile)); }
 
+std::string MapState::name_of(std::size_t tile) {
+  return "tile " + std::to_string(tile) + " of the map";
+}
+
 PrepareOptions as_they_are(PrepareOptions options) {
   options.voxel_size = 0;
   return options;
@@ -114,7 +118,30 @@ std::vector<PointCloudView> views_of(const std::vector<PointCloud>& clouds) {
   return views;
 }
 
-std::vector<PreparedCloud> MapState::prepared_tiles(const Context& context,
+std::uint64_t MapState::begin_search() const {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  return ++searches_;
+}
+
+/// A search goes through all tiles in one order, so it does not replace tiles of its own. Points as
+/// they are belong to the few tiles of a second search; they do not replace what every search
+/// needs.
+void MapState::keep(const Key& key, const PreparedCloud& cloud, std::uint64_t search) const {
+  const auto is_first = [](const Key& k) { return std::get<float>(k) > 0; };
+  while (cached_points_ + cloud.size() > kMostCachedPoints) {
+    auto oldest = cache_.end();
+    for (auto k = cache_.begin(); k != cache_.end(); ++k)
+      if (k->second.search < search && (is_first(key) || !is_first(k->first)) &&
+          (oldest == cache_.end() || k->second.search < oldest->second.search))
+        oldest = k;
+    if (oldest == cache_.end()) return;
+    cached_points_ -= oldest->second.cloud.size();
+    cache_.erase(oldest);
+  }
+  if (cache_.emplace(key, Cached{cloud, search}).second) cached_points_ += cloud.size();
+}
+
+std::vector<PreparedCloud> MapState::prepared_tiles(const Context& context, std::uint64_t search,
                                                     const std::vector<std::size_t>& wanted,
                                                     const PrepareOptions& prepare) const {
   const auto key = [&](std::size_t tile) {
@@ -126,10 +153,12 @@ std::vector<PreparedCloud> MapState::prepared_tiles(const Context& context,
     const std::lock_guard<std::mutex> lock(mutex_);
     for (std::size_t k = 0; k < wanted.size(); ++k) {
       const auto found = cache_.find(key(wanted[k]));
-      if (found != cache_.end())
-        out[k] = found->second;
-      else
+      if (found == cache_.end()) {
         missing.push_back(k);
+        continue;
+      }
+      out[k] = found->second.cloud;
+      found->second.search = std::max(found->second.search, search);
     }
   }
   if (missing.empty()) return out;
@@ -137,16 +166,14 @@ std::vector<PreparedCloud> MapState::prepared_tiles(const Context& context,
   std::vector<std::string> names;
   for (const std::size_t k : missing) {
     clouds.push_back(tile_cloud(wanted[k]));
-    names.push_back("tile " + std::to_string(wanted[k]) + " of the map");
+    names.push_back(name_of(wanted[k]));
   }
   const std::vector<PreparedCloud> prepared =
       prepare_batch(context, views_of(clouds), prepare, names);
   const std::lock_guard<std::mutex> lock(mutex_);
   for (std::size_t m = 0; m < missing.size(); ++m) {
     out[missing[m]] = prepared[m];
-    const std::size_t size = prepared[m].size();
-    if (cached_points_ + size > kMostCachedPoints) continue;
-    if (cache_.emplace(key(wanted[missing[m]]), prepared[m]).second) cached_points_ += size;
+    keep(key(wanted[missing[m]]), prepared[m], search);
   }
   return out;
 }

@@ -40,6 +40,25 @@ TEST_F(SavedMap, LoadedIsEqual) {
             numbers_of(locate(context, query.scan.view(), map)));
 }
 
+TEST_F(SavedMap, SidesThatAreInferredAreSavedButAreNoNormals) {
+  PointCloud cloud;
+  for (const unsigned room : {1u, 2u, 3u})
+    for (const Eigen::Vector3f& p : moved(map_from_room(room - 1), furnished_room(room, room)))
+      cloud.points.push_back(p);
+  const PreparedMap bare = localization::prepare_map(cloud.view(), map_options(5));
+  EXPECT_TRUE(bare.cloud().normals.empty());
+  bare.save(path);
+  const PreparedMap loaded = PreparedMap::load(path);
+  EXPECT_TRUE(loaded.cloud().normals.empty());
+  EXPECT_GT(content_of(path).size(), (sizeof(Eigen::Vector3f) + 3) * bare.size());
+  const Query query(2, 1, 8);
+  const LocateResult result = locate(Context::cpu(2), query.scan.view(), loaded);
+  EXPECT_EQ(result.status, LocateStatus::found);
+  ASSERT_FALSE(result.poses.empty());
+  EXPECT_LT(query.error(result.poses.front()), 0.05);  // half a voxel
+  EXPECT_EQ(numbers_of(result), numbers_of(locate(Context::cpu(1), query.scan.view(), bare)));
+}
+
 TEST_F(SavedMap, OtherFilesAreNamed) {
   map.save(path);
   const std::string good = content_of(path);
@@ -54,8 +73,8 @@ TEST_F(SavedMap, OtherFilesAreNamed) {
     refused(good.substr(0, size), "truncated");
   refused(good + "x", "longer");
   std::string later = good;
-  later[8] = 3;
-  refused(later, "version 3");
+  later[8] = 4;
+  refused(later, "version 4");
   for (std::size_t at = 28; at < good.size(); at += good.size() / 20) {
     std::string flipped = good;
     flipped[at] = static_cast<char>(flipped[at] ^ 0x10);
