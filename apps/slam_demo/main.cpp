@@ -83,7 +83,7 @@ int run(const Arguments& a) {
   result.out_of_order = sequence.out_of_order;
   SlamOptions options = a.slam;
   options.tracker.sequential = a.sequential;
-  options.loops.threads = a.sequential ? 1 : 0;
+  options.loops.parallel = !a.sequential;
   options.loops.dense = !a.no_dense_loops;
   options.loops.bundle = !a.no_bundle;
   options.loops.calibrate = !a.no_calibration;

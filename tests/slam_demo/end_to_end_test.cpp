@@ -49,6 +49,29 @@ TEST(EndToEnd, TrajectoryMapAndFiles) {
   EXPECT_EQ(page.find("http"), std::string::npos) << "nothing is loaded from elsewhere";
 }
 
+// There and back: the loops of the way back are found while tracking goes on.
+TEST(EndToEnd, LoopsBesideTracking) {
+  Sequence sequence = open_sequence(frames_folder());
+  const auto frames = sequence.frames;
+  const auto truth = sequence.truth;
+  for (std::size_t k = frames.size(); k-- > 0;) {
+    sequence.frames.push_back(frames[k]);
+    sequence.frames.back().time = static_cast<double>(sequence.frames.size() - 1) / 30;
+    sequence.truth.push_back(truth[k]);
+    sequence.truth.back().time = sequence.frames.back().time;
+  }
+  SlamOptions options;
+  options.loops.parallel = true;
+  const auto slam = run(sequence, options, [](int) { return false; });
+  EXPECT_EQ(slam->lost(), 0);
+  EXPECT_EQ(slam->worlds(), 1u);
+  EXPECT_EQ(slam->fragments(), 6);
+  EXPECT_EQ(slam->loops().fragments_kept(), 6u) << "all were registered at the end";
+  EXPECT_FALSE(slam->loops().busy());
+  EXPECT_EQ(slam->waits().size(), sequence.frames.size());
+  EXPECT_LT(ate(slam->trajectory(), sequence.truth).rmse, 0.02);
+}
+
 TEST(EndToEnd, SequentialRunsGiveTheSameBitsAndSoDoesTheFileOfTracking) {
   Sequence sequence = open_sequence(frames_folder());
   sequence.frames.resize(60);
