@@ -88,6 +88,7 @@ Tracker::Outcome Slam::track(int index, double time, const Images& images) {
     tracker_.settle();
     loops_.record_odometry();
     loops_.search_images(outcome.new_keyframe);
+    loops_.calibrate_early();
   }
   go_on();
   {

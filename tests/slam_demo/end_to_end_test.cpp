@@ -72,6 +72,26 @@ TEST(EndToEnd, LoopsBesideTracking) {
   EXPECT_LT(ate(slam->trajectory(), sequence.truth).rmse, 0.02);
 }
 
+// A depth camera that is wrong on one side: tracking corrects it long before the first loop.
+TEST(EndToEnd, CalibratesTheDepthWithoutLoops) {
+  const Sequence sequence = open_sequence(frames_folder());
+  SlamOptions options = sequential();
+  options.map = false;
+  options.loops.dense = false;
+  Slam slam(gpureg::Context::cpu(), sequence.rig, options);
+  constexpr double kWrong = 0.02;  // 1/m, from the left edge to the right one
+  for (int k = 0; k < 130; ++k) {
+    Images images = load(sequence.frames[static_cast<std::size_t>(k)], sequence.rig);
+    images.depth.forEach([](float& z, const int* at) {
+      if (z > 0) z = static_cast<float>(1 / (1 / static_cast<double>(z) + kWrong * at[1] / 639));
+    });
+    slam.frame(k, sequence.frames[static_cast<std::size_t>(k)].time, images);
+  }
+  const DepthCalibration& found = slam.map().calibration;
+  EXPECT_TRUE(slam.loops().graph().loops().empty());
+  EXPECT_NEAR(found.offset(550, 240) - found.offset(90, 240), kWrong * 460 / 639, 0.3 * kWrong);
+}
+
 TEST(EndToEnd, SequentialRunsGiveTheSameBitsAndSoDoesTheFileOfTracking) {
   Sequence sequence = open_sequence(frames_folder());
   sequence.frames.resize(60);

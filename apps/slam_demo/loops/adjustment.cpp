@@ -55,6 +55,18 @@ bool LoopClosing::moved_since_bundle() const {
   return adjusted_.empty();
 }
 
+/// Tracking and fragments need the calibration before the first loop. The more keyframes, the less
+/// a new one changes: they double.
+void LoopClosing::calibrate_early() {
+  if (!options_.bundle || !options_.calibrate || map_.keyframes.size() < next_calibration_) return;
+  next_calibration_ *= 2;
+  steps_.then([this] { bundle_all(options_.bundle_iterations); });
+  steps_.then([this] {
+    // What tracking measured before had the wrong depths. With loops the map knows more than that.
+    if (graph_.loops().empty()) record_all_odometry();
+  });
+}
+
 BundleProblem LoopClosing::full_problem() {
   std::vector<int> free, fixed;
   const std::vector<int> world = graph_.world_of_session(map_);

@@ -57,6 +57,8 @@ class LoopClosing {
   void record_odometry() { graph_.record(map_); }
   /// The odometry of all keyframes at once.
   void record_all_odometry() { graph_.record(map_, 0); }
+  /// After every new keyframe: an adjustment of all, where the depth is still to be calibrated.
+  void calibrate_early();
   /// A keyframe that may see an old place: looks for it by its image.
   void search_images(int keyframe);
   /// make_cloud: called by another thread.
@@ -124,6 +126,7 @@ class LoopClosing {
   std::vector<ImageLoopRecord> image_records_;
   std::optional<DepthCalibration> prior_;    // before the first full adjustment
   std::vector<Eigen::Isometry3d> adjusted_;  // poses after the last full adjustment
+  std::size_t next_calibration_ = 20;        // keyframes: then enough see each part of the image
   bool moved_ = false, connected_ = false, searching_ = false;
   Milliseconds time_;
   Steps steps_;  // last: its threads end before what they use
