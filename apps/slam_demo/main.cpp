@@ -204,6 +204,8 @@ int main(int count, char** values) {
   app.add_flag("--no-dense-loops", a.no_dense_loops, "Tracking alone; sessions are still merged");
   app.add_flag("--no-bundle", a.no_bundle, "Loops end with the pose graph");
   app.add_flag("--image-loops", a.slam.loops.images, "Also look for loops by images alone");
+  app.add_flag("--loopsmart", a.slam.loops.loopsmart,
+               "Register by quadruples and verify by the line process, as the paper does");
   app.add_option(
       "--tracking", a.tracking,
       "File with what tracking found. Where there is none the run only tracks, and writes "

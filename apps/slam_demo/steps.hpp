@@ -36,7 +36,9 @@ class Steps {
     using Result = decltype(std::declval<Job&>()());
     auto future = std::make_shared<std::future<std::pair<Result, double>>>(
         std::async(parallel_ ? std::launch::async : std::launch::deferred, std::move(timed)));
-    add({[future] { return future->wait_for(std::chrono::seconds(0)) != std::future_status::timeout; },
+    add({[future] {
+           return future->wait_for(std::chrono::seconds(0)) != std::future_status::timeout;
+         },
          [future] { future->wait(); },
          [future, next = std::move(next), &milliseconds]() mutable {
            auto [result, time] = future->get();
@@ -49,8 +51,7 @@ class Steps {
   /// without parallel, all.
   void run(double milliseconds) {
     const auto start = Clock::now();
-    while (!steps_.empty() && steps_.front().ready() &&
-           (!parallel_ || since(start) < milliseconds))
+    while (!steps_.empty() && steps_.front().ready() && (!parallel_ || since(start) < milliseconds))
       run_first();
   }
 

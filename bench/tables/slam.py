@@ -9,6 +9,8 @@ ROWS = (
     "+ dense loops",
     "+ bundle adjustment",
     "without image loops",
+    "in one run",
+    "in one run, LoopSmart",
 )
 
 

@@ -17,8 +17,8 @@ class DenseLoops {
       : context_(context), options_(options), closer_(context, options) {}
 
   struct Fragment {
-    gpureg::loop_closure::Fragment node;  ///< without its cloud
-    std::function<gpureg::PointCloud()> cloud;            ///< called once, by process()
+    gpureg::loop_closure::Fragment node;        ///< without its cloud
+    std::function<gpureg::PointCloud()> cloud;  ///< called once, by process()
     std::vector<gpureg::loop_closure::FragmentId> covisible;
     /// Odometry: an earlier fragment, and its pose of this one.
     std::vector<std::pair<gpureg::loop_closure::FragmentId, gpureg::UnalignedIsometry3d>> odometry;
@@ -30,7 +30,8 @@ class DenseLoops {
   /// Tracking's thread: what process() gets to do.
   std::vector<Fragment> take_waiting() { return std::exchange(waiting_, {}); }
 
-  /// Another thread, one at a time: registers what the fragments propose. Loops whose state changed.
+  /// Another thread, one at a time: registers what the fragments propose. Loops whose state
+  /// changed.
   std::vector<gpureg::loop_closure::Loop> process(std::vector<Fragment> fragments) {
     for (Fragment& f : fragments) {
       f.node.cloud = gpureg::prepare(context_, f.cloud().view(), options_.registration.prepare);

@@ -32,7 +32,10 @@ LoopClosing::LoopClosing(const gpureg::Context& context, Map& map, const Pinhole
       options_(options),
       dense_(context,
              [&] {
-               auto o = lc::Options::from_voxel_size(options.voxel_size);
+               auto o = options.loopsmart ? lc::Options::loopsmart(options.voxel_size)
+                                          : lc::Options::from_voxel_size(options.voxel_size);
+               if (options.loopsmart)
+                 o.registration = gpureg::RegistrationOptions::loopsmart(options.voxel_size);
                o.optimize = false;  // the keyframes are optimised here
                o.registration.seed = options.seed;
                return o;
@@ -195,8 +198,9 @@ void LoopClosing::update(const lc::Loop& loop) {
   record.target_from_source = Eigen::Isometry3d(loop.target_from_source.matrix());
   if (loop.state != lc::LoopState::accepted) return;
   connected_ = true;
+  const double certainty = options_.loopsmart ? 1 : kDenseCertainty;  // the paper: sums of G'G
   graph_.add(number, {{record.target_keyframe, record.source_keyframe, record.target_from_source,
-                       Eigen::Matrix<double, 6, 6>(kDenseCertainty * loop.information)}});
+                       Eigen::Matrix<double, 6, 6>(certainty * loop.information)}});
   connect_image_loops(number, record);
 }
 

@@ -15,6 +15,7 @@ namespace slam_demo {
 
 struct LoopOptions {
   bool dense = true;         ///< register fragments
+  bool loopsmart = false;    ///< registration and verification of the paper
   bool images = false;       ///< also look for loops by images alone
   bool sessions = true;      ///< connect sessions by images
   bool bundle = true;        ///< full bundle adjustment after loops
