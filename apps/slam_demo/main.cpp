@@ -83,7 +83,7 @@ int run(const Arguments& a) {
   result.out_of_order = sequence.out_of_order;
   SlamOptions options = a.slam;
   options.tracker.sequential = a.sequential;
-  options.loops.threads = a.sequential ? 1 : 0;
+  options.loops.parallel = !a.sequential;
   options.loops.dense = !a.no_dense_loops;
   options.loops.bundle = !a.no_bundle;
   options.loops.calibrate = !a.no_calibration;
@@ -204,6 +204,8 @@ int main(int count, char** values) {
   app.add_flag("--no-dense-loops", a.no_dense_loops, "Tracking alone; sessions are still merged");
   app.add_flag("--no-bundle", a.no_bundle, "Loops end with the pose graph");
   app.add_flag("--image-loops", a.slam.loops.images, "Also look for loops by images alone");
+  app.add_flag("--loopsmart", a.slam.loops.loopsmart,
+               "Register by quadruples and verify by the line process, as the paper does");
   app.add_option(
       "--tracking", a.tracking,
       "File with what tracking found. Where there is none the run only tracks, and writes "

@@ -39,7 +39,8 @@ Slam::Slam(const gpureg::Context& context, const Rig& rig, const SlamOptions& op
       fragment_(rig.colour, options.fragment_frames, kFragmentVoxel * options.loops.voxel_size),
       surfels_(context.backend() == gpureg::Backend::cuda && surfel::cuda_available()
                    ? surfel::make_cuda_map(options.surfels)
-                   : surfel::make_cpu_map(options.surfels)) {
+                   : surfel::make_cpu_map(options.surfels)),
+      surfel_work_(options.loops.parallel) {
   if (options.calibration) map_.calibration = *options.calibration;
 }
 
@@ -53,6 +54,12 @@ void Slam::set_image_size(const cv::Size& size) {
 }
 
 Tracker::Outcome Slam::frame(int index, double time, const Images& images) {
+  const Tracker::Outcome outcome = track(index, time, images);
+  waits_.push_back(std::exchange(waited_ms_, 0));
+  return outcome;
+}
+
+Tracker::Outcome Slam::track(int index, double time, const Images& images) {
   set_image_size(images.depth.size());
   Features features;
   Images corrected = images;
@@ -80,8 +87,10 @@ Tracker::Outcome Slam::frame(int index, double time, const Images& images) {
   if (outcome.new_keyframe != kNone) {
     tracker_.settle();
     loops_.record_odometry();
-    with_correction([&] { return loops_.search_images(outcome.new_keyframe); });
+    loops_.search_images(outcome.new_keyframe);
+    loops_.calibrate_early();
   }
+  go_on();
   {
     const Stopwatch watch(fragment_ms_);
     fragment_.add(index, outcome.pose, corrected.depth);
@@ -92,21 +101,30 @@ Tracker::Outcome Slam::frame(int index, double time, const Images& images) {
 }
 
 void Slam::fuse(int index, const FramePose& pose, const Images& images) {
-  const Stopwatch watch(fuse_ms_);
-  surfels_->fuse({images.depth.cols, images.depth.rows, images.depth.ptr<float>(),
-                  images.colour.ptr<std::uint8_t>()},
-                 surfel_camera(rig_.colour), surfel_pose(world_from_camera(map_, pose)), index,
-                 session_start_);
-  if (surfels_->size() > options_.max_surfels)
-    surfels_->upload(surfel::thinned(surfels_->download(), options_.max_surfels / 2));
+  surfel_work_.post([this, index, images, camera = surfel_camera(rig_.colour),
+                     world_from_surfels = surfel_pose(world_from_camera(map_, pose)),
+                     since = session_start_] {
+    const Stopwatch watch(fuse_ms_);
+    surfels_->fuse({images.depth.cols, images.depth.rows, images.depth.ptr<float>(),
+                    images.colour.ptr<std::uint8_t>()},
+                   camera, world_from_surfels, index, since);
+    if (surfels_->size() > options_.max_surfels)
+      surfels_->upload(surfel::thinned(surfels_->download(), options_.max_surfels / 2));
+  });
+}
+
+/// The loops' share of a frame.
+void Slam::go_on() {
+  if (loops_.busy()) with_correction([&] { loops_.advance(); });
 }
 
 /// Runs what may move keyframes; the surfels follow.
-void Slam::with_correction(const std::function<bool()>& work) {
+void Slam::with_correction(const std::function<void()>& work) {
+  const Stopwatch waiting(waited_ms_);
   std::vector<Eigen::Isometry3d> before;
   for (const Keyframe& keyframe : map_.keyframes) before.push_back(keyframe.world_from_camera);
-  if (!work() || !options_.map) return;
-  const Stopwatch watch(correct_ms_);
+  work();
+  if (!loops_.take_moved() || !options_.map) return;
   std::vector<surfel::Correction> corrections;
   for (std::size_t k = 0; k < before.size(); ++k) {
     const Keyframe& keyframe = map_.keyframes[k];
@@ -114,7 +132,10 @@ void Slam::with_correction(const std::function<bool()>& work) {
                            surfel_pose(keyframe.world_from_camera * before[k].inverse()),
                            keyframe.session});
   }
-  surfels_->correct(corrections);
+  surfel_work_.post([this, corrections = std::move(corrections)] {
+    const Stopwatch watch(correct_ms_);
+    surfels_->correct(corrections);
+  });
 }
 
 void Slam::end_fragment() {
@@ -122,25 +143,21 @@ void Slam::end_fragment() {
     fragment_.clear();
     return;
   }
-  tracker_.settle();
-  BuiltFragment built;
   {
-    const Stopwatch watch(fragment_ms_);
-    built = fragment_.build(map_);
+    const Stopwatch waiting(waited_ms_);
+    tracker_.settle();
+    ++fragments_;
+    const auto scans = std::make_shared<const FragmentScans>(fragment_.take(map_));
+    loops_.add_fragment(scans->fragment, [scans] { return fused(*scans); });
+    if (options_.keep_fragments) {
+      kept_.push_back(scans->fragment);
+      kept_.back().cloud = fused(*scans);
+    }
   }
-  add_fragment(built);
-  if (options_.keep_fragments) kept_.push_back(std::move(built));
+  go_on();
 }
 
-void Slam::add_fragment(const BuiltFragment& fragment) {
-  ++fragments_;
-  loops_.add_fragment(fragment);
-  with_correction([&] { return loops_.process(); });
-}
-
-Tracking Slam::tracking() const {
-  return {map_, frames_, kept_, surfels_->download(), lost_, dense_};
-}
+Tracking Slam::tracking() const { return {map_, frames_, kept_, all(), lost_, dense_}; }
 
 void Slam::replay(const Tracking& tracking, const std::function<bool()>& stop) {
   map_ = tracking.map;
@@ -154,22 +171,35 @@ void Slam::replay(const Tracking& tracking, const std::function<bool()>& stop) {
     if (stop && stop()) return;
     for (; next < map_.keyframes.size() && map_.keyframes[next].frame <= fragment.last_frame;
          ++next)
-      with_correction([&] { return loops_.search_images(static_cast<int>(next)); });
-    add_fragment(fragment);
+      with_correction([&] {
+        loops_.search_images(static_cast<int>(next));
+        loops_.finish();
+      });
+    ++fragments_;
+    with_correction([&] {
+      loops_.add_fragment(fragment, [&] { return fragment.cloud; });
+      loops_.finish();
+    });
   }
 }
 
 void Slam::finish() {
   end_fragment();
   tracker_.settle();
-  with_correction([&] { return loops_.conclude(options_.final_iterations); });
+  with_correction([&] { loops_.finish(); });
+  with_correction([&] { loops_.conclude(options_.final_iterations); });
+}
+
+surfel::Cloud Slam::all() const {
+  surfel_work_.drain();
+  return surfels_->download();
 }
 
 surfel::Cloud Slam::surfels() const {
   surfel::Cloud result;
   const std::vector<int> world = loops_.graph().world_of_session(map_);
   const int largest = largest_world();
-  for (const surfel::Surfel& s : surfels_->download()) {
+  for (const surfel::Surfel& s : all()) {
     if (s.confidence < options_.surfels.min_confidence) continue;
     // The session of a surfel is that of the frame that made it.
     const auto after = std::upper_bound(
@@ -220,13 +250,13 @@ Trajectory Slam::odometry() const {
 }
 
 std::map<std::string, double> Slam::milliseconds() const {
+  surfel_work_.drain();
   const LoopClosing::Milliseconds& l = loops_.milliseconds();
   return {{"features", extract_ms_},
           {"tracking", track_ms_},
           {"local bundle adjustment", tracker_.bundle_milliseconds()},
-          {"fragments", fragment_ms_},
-          {"preparation", l.prepare},
-          {"registration and verification", l.registration},
+          {"points of fragments", fragment_ms_},
+          {"fragments, registration and verification", l.registration},
           {"image loops", l.image},
           {"pose graph", l.graph},
           {"full bundle adjustment", l.bundle},

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "background.hpp"
 #include "loops/loops.hpp"
 #include "sequence.hpp"
 #include "surfel/surfel_map.hpp"
@@ -61,23 +62,27 @@ class Slam {
   const LoopClosing& loops() const { return loops_; }
   /// The confirmed surfels of the largest world.
   surfel::Cloud surfels() const;
-  std::size_t all_surfels() const { return surfels_->size(); }
+  std::size_t all_surfels() const { return all().size(); }
   const std::vector<FramePose>& frames() const { return frames_; }
   int lost() const { return lost_; }
   int dense() const { return dense_; }
   int fragments() const { return fragments_; }
   /// Milliseconds of each part, all frames together.
   std::map<std::string, double> milliseconds() const;
+  /// Of each frame: how long it waited for loops, milliseconds.
+  const std::vector<double>& waits() const { return waits_; }
   std::size_t worlds() const;  ///< parts of the trajectory that nothing connects
 
  private:
+  Tracker::Outcome track(int index, double time, const Images& images);
   void set_image_size(const cv::Size& size);
   void end_fragment();
-  void add_fragment(const BuiltFragment& fragment);
+  void go_on();
   void fuse(int frame, const FramePose& pose, const Images& images);
-  void with_correction(const std::function<bool()>& work);
+  void with_correction(const std::function<void()>& work);
   Trajectory poses_of(const std::function<Eigen::Isometry3d(int)>& world_from_keyframe) const;
   int largest_world() const;
+  surfel::Cloud all() const;
 
   const Rig rig_;
   const SlamOptions options_;
@@ -90,7 +95,10 @@ class Slam {
   std::vector<FramePose> frames_;
   std::vector<BuiltFragment> kept_;
   int lost_ = 0, dense_ = 0, fragments_ = 0, session_ = kNone, session_start_ = 0;
-  double extract_ms_ = 0, track_ms_ = 0, fragment_ms_ = 0, fuse_ms_ = 0, correct_ms_ = 0;
+  std::vector<double> waits_;
+  double waited_ms_ = 0, extract_ms_ = 0, track_ms_ = 0, fragment_ms_ = 0, fuse_ms_ = 0,
+         correct_ms_ = 0;
+  mutable Background surfel_work_;  // surfels_, fuse_ms_ and correct_ms_ are its own
 };
 
 }  // namespace slam_demo

@@ -5,8 +5,9 @@
     bench/slam/run.py PROGRAM SEQUENCE... --work FOLDER -o record.json [--name NAME...]
                       [--seeds N] [--evo EVO_APE]
 
-Each sequence is tracked once; the rows share what tracking found (`slam_demo --tracking`). The
-registration of the last sequence runs with N seeds. With --evo the absolute errors are compared
+Each sequence is tracked once; the rows share what tracking found (`slam_demo --tracking`), but for
+those in one run, where tracking has the depth calibration of the adjustments. The registration of
+the last sequence runs with N seeds. With --evo the absolute errors are compared
 with those of PyPI's evo, which runs as a program. Sequences and rows that are in the record already
 and not named stay there.
 """
@@ -31,16 +32,19 @@ ROWS = {
     "+ dense loops": ["--image-loops", "--no-bundle"],
     "+ bundle adjustment": ["--image-loops"],
     "without image loops": [],
+    "in one run": [],
+    "in one run, LoopSmart": ["--loopsmart"],
 }
-SEEDED = ("+ dense loops", "+ bundle adjustment", "without image loops")
+IN_ONE_RUN = ("in one run", "in one run, LoopSmart")
+SEEDED = ("+ dense loops", "+ bundle adjustment", "without image loops", "in one run")
 # A loop is false where it is this far from the truth: Redwood's bound of a correct pair, and what a
 # fragment of 2 m makes of it as an angle.
 FALSE_METRES, FALSE_DEGREES = 0.2, 6.0
 
 
-def run_demo(program: str, sequence: str, tracking: Path, output: Path, options: list) -> dict:
-    command = [program, sequence, "--quiet", "--sequential", "--tracking", str(tracking)]
-    subprocess.run([*command, "--output", str(output), *options], check=True)
+def run_demo(program: str, sequence: str, output: Path, options: list) -> dict:
+    command = [program, sequence, "--quiet", "--sequential", "--output", str(output)]
+    subprocess.run([*command, *options], check=True)
     return json.loads((output / "loops.json").read_text())
 
 
@@ -88,8 +92,9 @@ def measure(args, sequence: str, name: str, seeds: int) -> dict:
     work = Path(args.work) / name
     work.mkdir(parents=True, exist_ok=True)
     tracking = work / "tracking"
+    shared = ["--tracking", str(tracking)]
     if not tracking.exists():
-        run_demo(args.program, sequence, tracking, work / "tracked", [])
+        run_demo(args.program, sequence, work / "tracked", shared)
     tracked = json.loads((work / "tracked/loops.json").read_text())
     rows = []
     for row in args.rows:
@@ -99,8 +104,9 @@ def measure(args, sequence: str, name: str, seeds: int) -> dict:
             if options is None:
                 output, figures = work / "tracked", tracked
             else:
+                more = [] if row in IN_ONE_RUN else shared
                 figures = run_demo(
-                    args.program, sequence, tracking, output, [*options, "--seed", str(seed)]
+                    args.program, sequence, output, [*options, *more, "--seed", str(seed)]
                 )
             rows.append(row_of(row, seed, figures))
             truth = Path(sequence) / "groundtruth.txt"

@@ -9,6 +9,8 @@ ROWS = (
     "+ dense loops",
     "+ bundle adjustment",
     "without image loops",
+    "in one run",
+    "in one run, LoopSmart",
 )
 
 
@@ -54,10 +56,8 @@ def slam_short():
         "| --- | --- | --- | --- |",
     ]
     for sequence in load("slam_demo.json")["sequences"]:
-        alone, everything = (
-            [row for row in sequence["rows"] if row["row"] == name]
-            for name in ("odometry", "+ bundle adjustment")
-        )
+        of = {name: [r for r in sequence["rows"] if r["row"] == name] for name in ROWS}
+        alone, everything = of["odometry"], of["in one run"] or of["+ bundle adjustment"]
         cells = [
             f"{rows[0]['poses']} of {sequence['frames']}, {millimetres(r['ate_m'] for r in rows)} mm"
             for rows in (alone, everything)

@@ -49,6 +49,49 @@ TEST(EndToEnd, TrajectoryMapAndFiles) {
   EXPECT_EQ(page.find("http"), std::string::npos) << "nothing is loaded from elsewhere";
 }
 
+// There and back: the loops of the way back are found while tracking goes on.
+TEST(EndToEnd, LoopsBesideTracking) {
+  Sequence sequence = open_sequence(frames_folder());
+  const auto frames = sequence.frames;
+  const auto truth = sequence.truth;
+  for (std::size_t k = frames.size(); k-- > 0;) {
+    sequence.frames.push_back(frames[k]);
+    sequence.frames.back().time = static_cast<double>(sequence.frames.size() - 1) / 30;
+    sequence.truth.push_back(truth[k]);
+    sequence.truth.back().time = sequence.frames.back().time;
+  }
+  SlamOptions options;
+  options.loops.parallel = true;
+  const auto slam = run(sequence, options, [](int) { return false; });
+  EXPECT_EQ(slam->lost(), 0);
+  EXPECT_EQ(slam->worlds(), 1u);
+  EXPECT_EQ(slam->fragments(), 6);
+  EXPECT_EQ(slam->loops().fragments_kept(), 6u) << "all were registered at the end";
+  EXPECT_FALSE(slam->loops().busy());
+  EXPECT_EQ(slam->waits().size(), sequence.frames.size());
+  EXPECT_LT(ate(slam->trajectory(), sequence.truth).rmse, 0.02);
+}
+
+// A depth camera that is wrong on one side: tracking corrects it long before the first loop.
+TEST(EndToEnd, CalibratesTheDepthWithoutLoops) {
+  const Sequence sequence = open_sequence(frames_folder());
+  SlamOptions options = sequential();
+  options.map = false;
+  options.loops.dense = false;
+  Slam slam(gpureg::Context::cpu(), sequence.rig, options);
+  constexpr double kWrong = 0.02;  // 1/m, from the left edge to the right one
+  for (int k = 0; k < 130; ++k) {
+    Images images = load(sequence.frames[static_cast<std::size_t>(k)], sequence.rig);
+    images.depth.forEach([](float& z, const int* at) {
+      if (z > 0) z = static_cast<float>(1 / (1 / static_cast<double>(z) + kWrong * at[1] / 639));
+    });
+    slam.frame(k, sequence.frames[static_cast<std::size_t>(k)].time, images);
+  }
+  const DepthCalibration& found = slam.map().calibration;
+  EXPECT_TRUE(slam.loops().graph().loops().empty());
+  EXPECT_NEAR(found.offset(550, 240) - found.offset(90, 240), kWrong * 460 / 639, 0.3 * kWrong);
+}
+
 TEST(EndToEnd, SequentialRunsGiveTheSameBitsAndSoDoesTheFileOfTracking) {
   Sequence sequence = open_sequence(frames_folder());
   sequence.frames.resize(60);

@@ -31,7 +31,7 @@ inline const std::string& frames_folder() {
 inline SlamOptions sequential() {
   SlamOptions options;
   options.tracker.sequential = true;
-  options.loops.threads = 1;
+  options.loops.parallel = false;
   return options;
 }
 

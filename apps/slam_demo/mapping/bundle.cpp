@@ -84,41 +84,40 @@ BundleProblem bundle_of(const Map& map, const std::vector<int>& keyframes,
                         const std::vector<int>& fixed, const std::vector<RelativePose>& relatives) {
   BundleProblem problem;
   problem.calibration = map.calibration;
-  std::map<int, int> place;
+  std::vector<int> place(map.keyframes.size(), kNone);  // in problem.poses
   const auto add = [&](int keyframe, bool still) {
-    place[keyframe] = static_cast<int>(problem.poses.size());
+    place[at(keyframe)] = static_cast<int>(problem.poses.size());
     problem.keyframes.push_back(keyframe);
     problem.poses.push_back(pose_of(map.keyframes[at(keyframe)].world_from_camera));
     problem.fixed.push_back(still);
   };
   for (const int k : keyframes) add(k, false);
-  std::set<int> ids;
+  std::vector<bool> wanted(map.points.size(), false);
   for (const int k : keyframes) {
     for (const int p : map.keyframes[at(k)].points) {
       if (p != kNone && !map.points[at(p)].bad && map.points[at(p)].observations.size() > 1)
-        ids.insert(p);
+        wanted[at(p)] = true;
     }
   }
   for (const int k : fixed) add(k, true);
-  for (const int id : ids) {
-    const MapPoint& point = map.points[at(id)];
-    problem.point_ids.push_back(id);
+  for (std::size_t id = 0; id < wanted.size(); ++id) {
+    if (!wanted[id]) continue;
+    const MapPoint& point = map.points[id];
+    problem.point_ids.push_back(static_cast<int>(id));
     problem.points.push_back(point.position);
     for (const Observation& o : point.observations) {
-      const auto found = place.find(o.keyframe);
-      if (found == place.end()) continue;
+      if (place[at(o.keyframe)] == kNone) continue;
       problem.sights.push_back(
-          {found->second, static_cast<int>(problem.points.size()) - 1, o.key, o.loop,
+          {place[at(o.keyframe)], static_cast<int>(problem.points.size()) - 1, o.key, o.loop,
            measurement(*map.keyframes[at(o.keyframe)].features, o.key, map.calibration)});
     }
   }
   std::vector<RelativePose> all = map.links;
   all.insert(all.end(), relatives.begin(), relatives.end());
   for (RelativePose r : all) {
-    const auto a = place.find(r.a), b = place.find(r.b);
-    if (a == place.end() || b == place.end()) continue;
-    r.a = a->second;
-    r.b = b->second;
+    r.a = place[at(r.a)];
+    r.b = place[at(r.b)];
+    if (r.a == kNone || r.b == kNone) continue;
     problem.relatives.push_back(r);
   }
   return problem;

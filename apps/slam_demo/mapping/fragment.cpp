@@ -45,35 +45,44 @@ void FragmentBuilder::add(int frame, const FramePose& pose, const cv::Mat1f& dep
   scans_.push_back(std::move(scan));
 }
 
-BuiltFragment FragmentBuilder::build(const Map& map) {
-  BuiltFragment result;
-  result.first_frame = scans_.front().frame;
-  result.last_frame = scans_.back().frame;
+FragmentScans FragmentBuilder::take(const Map& map) {
+  FragmentScans result;
+  result.voxel_size = voxel_size_;
+  BuiltFragment& fragment = result.fragment;
+  fragment.first_frame = scans_.front().frame;
+  fragment.last_frame = scans_.back().frame;
   const int middle = scans_[scans_.size() / 2].frame;
   for (const Scan& scan : scans_) {
     const auto distance = [&](int keyframe) {
       return std::abs(map.keyframes[static_cast<std::size_t>(keyframe)].frame - middle);
     };
-    if (result.keyframe == kNone || distance(scan.pose.reference) < distance(result.keyframe))
-      result.keyframe = scan.pose.reference;
+    if (fragment.keyframe == kNone || distance(scan.pose.reference) < distance(fragment.keyframe))
+      fragment.keyframe = scan.pose.reference;
   }
-  const Keyframe& keyframe = map.keyframes[static_cast<std::size_t>(result.keyframe)];
-  result.time = keyframe.time;
-  gpureg::reconstruction::VoxelMap fused(voxel_size_);
-  std::vector<Eigen::Vector3f> viewpoints;
-  for (std::size_t k = 0; k < scans_.size(); ++k) {
-    const Eigen::Isometry3d fragment_from_camera =
-        keyframe.world_from_camera.inverse() * world_from_camera(map, scans_[k].pose);
-    if (k % 5 == 0) viewpoints.push_back(fragment_from_camera.translation().cast<float>());
-    if (scans_[k].points.empty()) continue;
-    gpureg::PointCloudView view(scans_[k].points);
-    view.normals = scans_[k].normals.front().data();
-    fused.add(view, gpureg::UnalignedIsometry3d(fragment_from_camera.matrix()));
-  }
-  result.cloud = fused.cloud();
-  result.cloud.viewpoints = std::move(viewpoints);
+  const Keyframe& keyframe = map.keyframes[static_cast<std::size_t>(fragment.keyframe)];
+  fragment.time = keyframe.time;
+  for (Scan& scan : scans_)
+    result.scans.push_back(
+        {keyframe.world_from_camera.inverse() * world_from_camera(map, scan.pose),
+         std::move(scan.points), std::move(scan.normals)});
   scans_.clear();
   return result;
+}
+
+gpureg::PointCloud fused(const FragmentScans& all) {
+  gpureg::reconstruction::VoxelMap map(all.voxel_size);
+  std::vector<Eigen::Vector3f> viewpoints;
+  for (std::size_t k = 0; k < all.scans.size(); ++k) {
+    const FragmentScans::Scan& scan = all.scans[k];
+    if (k % 5 == 0) viewpoints.push_back(scan.fragment_from_camera.translation().cast<float>());
+    if (scan.points.empty()) continue;
+    gpureg::PointCloudView view(scan.points);
+    view.normals = scan.normals.front().data();
+    map.add(view, gpureg::UnalignedIsometry3d(scan.fragment_from_camera.matrix()));
+  }
+  gpureg::PointCloud cloud = map.cloud();
+  cloud.viewpoints = std::move(viewpoints);
+  return cloud;
 }
 
 }  // namespace slam_demo

@@ -23,8 +23,21 @@ struct BuiltFragment {
   gpureg::PointCloud cloud;  ///< with normals and camera positions
 };
 
-/// Collects the frames of one session and fuses them when there are enough: by the poses that
-/// the map has then.
+/// The same, not fused yet.
+struct FragmentScans {
+  struct Scan {
+    Eigen::Isometry3d fragment_from_camera;
+    std::vector<Eigen::Vector3f> points, normals;
+  };
+  BuiltFragment fragment;  ///< its cloud is empty
+  std::vector<Scan> scans;
+  float voxel_size = 0;  ///< metres; the cloud has one point per voxel
+};
+
+/// Takes long; needs no map.
+gpureg::PointCloud fused(const FragmentScans& scans);
+
+/// Collects the frames of one session until there are enough.
 class FragmentBuilder {
  public:
   /// voxel_size: metres; the cloud has one point per voxel.
@@ -33,8 +46,8 @@ class FragmentBuilder {
   void add(int frame, const FramePose& pose, const cv::Mat1f& depth);
   bool full() const { return static_cast<int>(scans_.size()) >= frames_; }
   std::size_t size() const { return scans_.size(); }
-  /// Fuses and forgets the frames.
-  BuiltFragment build(const Map& map);
+  /// Hands the frames over, by the poses that the map has now.
+  FragmentScans take(const Map& map);
   void clear() { scans_.clear(); }
 
  private:

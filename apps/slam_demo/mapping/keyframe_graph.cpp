@@ -29,15 +29,56 @@ Misfit misfit_of(const Map& map, int a, int b, const Eigen::Isometry3d& a_from_b
   return {error.translation().norm(), Eigen::AngleAxisd(error.linear()).angle()};
 }
 
+namespace {
+
+/// Keyframes that were made meanwhile follow the newest known one of their session.
+Eigen::Isometry3d correction_of_session(const std::vector<Eigen::Isometry3d>& corrections,
+                                        std::size_t known, std::size_t keyframe, const Map& map) {
+  for (std::size_t k = known; k-- > 0;) {
+    if (map.keyframes[k].session == map.keyframes[keyframe].session) return corrections[k];
+  }
+  return Eigen::Isometry3d::Identity();
+}
+
+}  // namespace
+
 void move_keyframes(const std::vector<Eigen::Isometry3d>& poses, Map& map) {
   std::vector<Eigen::Isometry3d> correction;
   for (std::size_t k = 0; k < poses.size(); ++k) {
     correction.push_back(poses[k] * map.keyframes[k].world_from_camera.inverse());
     map.keyframes[k].world_from_camera = poses[k];
   }
+  for (std::size_t k = poses.size(); k < map.keyframes.size(); ++k) {
+    correction.push_back(correction_of_session(correction, poses.size(), k, map));
+    map.keyframes[k].world_from_camera = correction[k] * map.keyframes[k].world_from_camera;
+  }
   for (MapPoint& point : map.points) {
-    if (!point.bad && at(point.first_keyframe) < poses.size())
-      point.position = correction[at(point.first_keyframe)] * point.position;
+    if (!point.bad) point.position = correction[at(point.first_keyframe)] * point.position;
+  }
+}
+
+void apply_full(const Pinhole& camera, const BundleProblem& problem, Map& map) {
+  std::vector<Eigen::Isometry3d> correction;
+  for (const Keyframe& keyframe : map.keyframes)
+    correction.push_back(keyframe.world_from_camera.inverse());
+  std::vector<bool> adjusted(map.points.size(), false);
+  for (const int id : problem.point_ids) adjusted[at(id)] = true;
+  apply(camera, problem, map);
+  const std::size_t known = problem.poses.size();
+  if (known == map.keyframes.size()) return;
+  for (std::size_t k = 0; k < known; ++k)
+    correction[k] = map.keyframes[k].world_from_camera * correction[k];
+  for (std::size_t k = known; k < map.keyframes.size(); ++k) {
+    correction[k] = correction_of_session(correction, known, k, map);
+    map.keyframes[k].world_from_camera = correction[k] * map.keyframes[k].world_from_camera;
+  }
+  for (std::size_t p = 0; p < map.points.size(); ++p) {
+    MapPoint& point = map.points[p];
+    // Points of one keyframe are where it measured them, by the new poses of the known ones.
+    if (point.bad || adjusted[p] ||
+        (at(point.first_keyframe) < known && problem.calibrate && point.observations.size() == 1))
+      continue;
+    point.position = correction[at(point.first_keyframe)] * point.position;
   }
 }
 
@@ -125,7 +166,7 @@ std::vector<int> KeyframeGraph::world_of_session(const Map& map) const {
   return world;
 }
 
-std::string KeyframeGraph::optimize(Map& map) const {
+gpureg::pose_graph::Graph KeyframeGraph::problem(const Map& map) const {
   using namespace gpureg::pose_graph;
   Graph graph;
   const std::vector<int> world = world_of_session(map);
@@ -173,15 +214,26 @@ std::string KeyframeGraph::optimize(Map& map) const {
     graph.edges.push_back(edge_of(key.a, key.b, a_from_b, odometry_information(a_from_b)));
   for (const RelativePose& e : loop_edges())
     graph.edges.push_back(edge_of(e.a, e.b, e.a_from_b, e.information));
-  Options options;
-  options.robust = Robust::none;
-  const Result result = gpureg::pose_graph::optimize(graph, options);
-  if (result.status != Status::failed && result.status != Status::no_nodes) {
-    std::vector<Eigen::Isometry3d> poses;
-    for (const auto& pose : result.world_from_node)
-      poses.push_back(Eigen::Isometry3d(pose.matrix()));
-    move_keyframes(poses, map);
-  }
+  return graph;
+}
+
+gpureg::pose_graph::Result KeyframeGraph::solve(const gpureg::pose_graph::Graph& graph) {
+  gpureg::pose_graph::Options options;
+  options.robust = gpureg::pose_graph::Robust::none;
+  return gpureg::pose_graph::optimize(graph, options);
+}
+
+void KeyframeGraph::apply(const gpureg::pose_graph::Result& result, Map& map) {
+  using gpureg::pose_graph::Status;
+  if (result.status == Status::failed || result.status == Status::no_nodes) return;
+  std::vector<Eigen::Isometry3d> poses;
+  for (const auto& pose : result.world_from_node) poses.push_back(Eigen::Isometry3d(pose.matrix()));
+  move_keyframes(poses, map);
+}
+
+std::string KeyframeGraph::optimize(Map& map) const {
+  const gpureg::pose_graph::Result result = solve(problem(map));
+  apply(result, map);
   return result.reason;
 }
 

@@ -35,9 +35,13 @@ class KeyframeGraph {
   void remove(int loop) { loops_.erase(loop); }
   const std::map<int, std::vector<RelativePose>>& loops() const { return loops_; }
 
-  /// Optimises the poses of all keyframes and moves the points along. Returns the reason where it
-  /// did not converge. Worlds of different sessions that loops connect become that of the earlier
-  /// one.
+  /// A copy to optimise in another thread. Worlds of different sessions that loops connect become
+  /// that of the earlier one.
+  gpureg::pose_graph::Graph problem(const Map& map) const;
+  static gpureg::pose_graph::Result solve(const gpureg::pose_graph::Graph& problem);
+  /// Moves keyframes and points, unless the optimisation failed.
+  static void apply(const gpureg::pose_graph::Result& result, Map& map);
+  /// All three at once. Returns the reason where it did not converge.
   std::string optimize(Map& map) const;
 
   std::vector<RelativePose> loop_edges() const;
@@ -64,7 +68,10 @@ class KeyframeGraph {
   std::map<int, std::vector<RelativePose>> loops_;
 };
 
-/// Moves keyframes, and with each the points that it saw first.
+/// Moves keyframes, and with each the points that it saw first. Later keyframes follow.
 void move_keyframes(const std::vector<Eigen::Isometry3d>& world_from_camera, Map& map);
+
+/// apply() of an adjustment of all keyframes. Those that were made meanwhile follow.
+void apply_full(const Pinhole& camera, const BundleProblem& problem, Map& map);
 
 }  // namespace slam_demo

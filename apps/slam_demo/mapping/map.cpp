@@ -92,6 +92,21 @@ void Map::cull(int newest) {
   }
 }
 
+Map Map::excerpt(const std::vector<int>& keyframes_with_points) const {
+  Map part;
+  part.calibration = calibration;
+  part.points.resize(points.size());
+  for (const Keyframe& k : keyframes)
+    part.keyframes.push_back({k.frame, k.time, k.session, k.world_from_camera, k.features, {}, {}});
+  for (const int k : keyframes_with_points) {
+    part.keyframes[at(k)].points = keyframes[at(k)].points;
+    for (const int p : keyframes[at(k)].points) {
+      if (p != kNone) part.points[at(p)] = points[at(p)];
+    }
+  }
+  return part;
+}
+
 std::vector<int> Map::covisible(int keyframe, std::size_t count, int min_shared) const {
   std::vector<int> result = by_count(keyframes[at(keyframe)].covisible, min_shared);
   result.resize(std::min(result.size(), count));

@@ -77,6 +77,9 @@ class Map {
   /// Removes points that few keyframes confirmed since they were made.
   void cull(int newest_keyframe);
 
+  /// A copy for another thread: all keyframes with pose and features, the points only of some.
+  Map excerpt(const std::vector<int>& keyframes_with_points) const;
+
   /// At most count keyframes that share at least min_shared points, most first.
   std::vector<int> covisible(int keyframe, std::size_t count, int min_shared = 1) const;
 

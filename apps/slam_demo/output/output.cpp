@@ -72,6 +72,20 @@ json loop_error(double target_time, double source_time, const Eigen::Isometry3d&
           {"rotation_degrees", Eigen::AngleAxisd(error.linear()).angle() * kDegrees}};
 }
 
+/// How long frames waited for loops.
+json waits_json(const std::vector<double>& waits) {
+  json bins = json::array();
+  double lower = 0;
+  for (const double upper : {1., 2., 5., 10., 20., 50., 100., 1e9}) {
+    const auto frames = std::count_if(waits.begin(), waits.end(),
+                                      [&](double w) { return w >= lower && w < upper; });
+    bins.push_back({{"from_ms", lower}, {"frames", frames}});
+    lower = upper;
+  }
+  const auto longest = std::max_element(waits.begin(), waits.end());
+  return {{"longest_ms", longest == waits.end() ? 0 : *longest}, {"histogram", bins}};
+}
+
 json loops_json(const Slam& slam, const RunResult& result) {
   json loops = json::array(), image = json::array();
   for (const LoopRecord& r : slam.loops().records()) {
@@ -118,6 +132,7 @@ json loops_json(const Slam& slam, const RunResult& result) {
                {"surfels", slam.all_surfels()},
                {"seconds", result.seconds},
                {"milliseconds", slam.milliseconds()},
+               {"waits_for_loops", waits_json(slam.waits())},
                {"ate_odometry", error_json(result.odometry)},
                {"ate", error_json(result.final)},
                {"notes", slam.loops().notes},
