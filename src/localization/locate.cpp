@@ -2,6 +2,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "fields/localization.hpp"
+#include "fields/scale.hpp"
 #include "localization/check_scan.hpp"
 #include "localization/search.hpp"
 
@@ -24,11 +26,44 @@ struct Verified {
   double confidence = 0;   ///< other places aside
 };
 
-/// Sparse scans overlap little in narrow voxels, and the search in wide ones knows better: the mean
-/// of both log odds, where it is more than the verification alone.
+/// The mean of both log odds, where it is more than the verification alone.
 double confidence_of(double searched, double verified) {
   const double odds = std::sqrt(odds_of(searched) * odds_of(verified));
   return std::max(verified, odds / (1 + odds));
+}
+
+/// Sparse scans overlap little in narrow voxels: what is not sure there and possible in the wide
+/// ones of the search is verified in these, too. @return confidences, 0 where it is not.
+std::vector<double> verify_coarsely(const Context& context, const MapState& map,
+                                    const LocateOptions& options, const Scan& scan,
+                                    const std::vector<const Verified*>& fine,
+                                    const std::vector<PointCloud>& around) {
+  std::vector<double> out(fine.size(), 0);
+  if (options.coarse_factor == 1) return out;
+  std::vector<std::size_t> asked;
+  std::vector<PointCloudView> neighborhoods;
+  std::vector<Pair> pairs;
+  std::vector<std::vector<UnalignedIsometry3d>> poses;
+  for (std::size_t k = 0; k < fine.size(); ++k) {
+    const PoseVerification& found = fine[k]->verification;
+    if (found.confidence >= kSure || fine[k]->candidate.confidence < kHopelessSearch) continue;
+    asked.push_back(k);
+    neighborhoods.push_back(around[k].view());
+    pairs.push_back({0, static_cast<std::uint32_t>(asked.size())});
+    poses.push_back({found.target_from_source});
+  }
+  if (asked.empty()) return out;
+  std::vector<PreparedCloud> clouds{scan.coarse};
+  for (PreparedCloud& cloud : prepare_batch(context, neighborhoods, coarse_prepare(map, options)))
+    clouds.push_back(std::move(cloud));
+  RegistrationOptions registration = options.registration;
+  fields::multiply_lengths(registration, options.coarse_factor);
+  VerificationOptions verification;
+  verification.refine = true;
+  const auto results =
+      verify_poses_batch(context, clouds, pairs, poses, registration, verification);
+  for (std::size_t k = 0; k < asked.size(); ++k) out[asked[k]] = results[k].front().confidence;
+  return out;
 }
 
 /// @param before candidates of the scan that were verified already.
@@ -59,11 +94,18 @@ std::vector<Verified> verify(const Context& context, const MapState& map,
   verification.refine = true;
   const auto results =
       verify_poses_batch(context, clouds, pairs, poses, options.registration, verification);
+  std::vector<const Verified*> fine;
   for (std::size_t k = 0; k < results.size(); ++k) {
     Verified& v = out[open[k]];
     v.verification = results[k].front();
     v.points = clouds[k + 1].size();
-    v.confidence = confidence_of(v.candidate.confidence, v.verification.confidence);
+    fine.push_back(&v);
+  }
+  const std::vector<double> coarse = verify_coarsely(context, map, options, scan, fine, around);
+  for (std::size_t k = 0; k < results.size(); ++k) {
+    Verified& v = out[open[k]];
+    v.confidence =
+        confidence_of(v.candidate.confidence, std::max(v.verification.confidence, coarse[k]));
   }
   std::stable_sort(out.begin(), out.end(), [](const Verified& a, const Verified& b) {
     return a.confidence > b.confidence;
