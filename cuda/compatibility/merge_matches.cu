@@ -8,6 +8,7 @@
 #include "common/in_halves.hpp"
 #include "cuda/common/feature_query.hpp"
 #include "cuda/common/stages.hpp"
+#include "cuda/compatibility/sort_matches.hpp"
 #include "cuda/device/device_algorithms.hpp"
 #include "cuda/device/entry_of.cuh"
 
@@ -101,74 +102,6 @@ __global__ void __launch_bounds__(kThreads) order_matches(MergeBatch b) {
     atomicAdd(&kept, static_cast<std::uint32_t>(__popc(static_cast<int>(mask))));
   __syncthreads();
   if (threadIdx.x == 0 && kept > 0) atomicAdd(b.found + p, kept);
-}
-
-constexpr int kSortThreads = 1024, kSortItems = 12;
-constexpr std::uint32_t kMostSorted = kSortThreads * kSortItems, kBuckets = 4 * kSortThreads;
-constexpr int kBucketShift = 20;  // of an order, whose values are random
-static_assert(kBuckets == 1u << (32 - kBucketShift), "an order has a bucket");
-
-/// Results of pair blockIdx.x that are kept, by order, then by place: sorted in shared memory by
-/// buckets of a few.
-__global__ void __launch_bounds__(kSortThreads) sort_matches(MergeBatch b) {
-  extern __shared__ std::uint64_t item[];  // order << 32 | place
-  __shared__ std::uint32_t start[kBuckets], warp_sum_of[kSortThreads / 32];
-  const std::uint32_t p = blockIdx.x, offset = b.answer_offset[p],
-                      size = b.answer_offset[p + 1] - offset, lane = threadIdx.x % 32;
-  const auto key_at = [&](int i, std::uint32_t& place) {
-    place = static_cast<std::uint32_t>(i) * kSortThreads + threadIdx.x;
-    return place < size ? b.key[offset + place] : ~std::uint64_t(0);
-  };
-  const auto is_kept = [](std::uint64_t key) { return (key >> 32 & 1) == 0; };
-  for (std::uint32_t k = threadIdx.x; k < kBuckets; k += kSortThreads) start[k] = 0;
-  __syncthreads();
-  std::uint32_t slot[kSortItems], place;
-#pragma unroll
-  for (int i = 0; i < kSortItems; ++i) {
-    const std::uint64_t key = key_at(i, place);
-    if (is_kept(key))
-      slot[i] = atomicAdd(start + (static_cast<std::uint32_t>(key) >> kBucketShift), 1u);
-  }
-  __syncthreads();
-  // Four buckets a thread: counts to starts.
-  std::uint32_t count[4], mine = 0;
-#pragma unroll
-  for (int k = 0; k < 4; ++k) mine += count[k] = start[4 * threadIdx.x + k];
-  std::uint32_t before = mine;
-  for (int step = 1; step < 32; step *= 2) {
-    const std::uint32_t other = __shfl_up_sync(~0u, before, static_cast<unsigned>(step));
-    if (lane >= static_cast<std::uint32_t>(step)) before += other;
-  }
-  if (lane == 31) warp_sum_of[threadIdx.x / 32] = before;
-  __syncthreads();
-  before -= mine;
-  for (std::uint32_t w = 0; w < threadIdx.x / 32; ++w) before += warp_sum_of[w];
-  const std::uint32_t first = before;
-#pragma unroll
-  for (int k = 0; k < 4; ++k) {
-    start[4 * threadIdx.x + k] = before;
-    before += count[k];
-  }
-  __syncthreads();
-#pragma unroll
-  for (int i = 0; i < kSortItems; ++i) {
-    const std::uint64_t key = key_at(i, place);
-    if (is_kept(key))
-      item[start[static_cast<std::uint32_t>(key) >> kBucketShift] + slot[i]] = key << 32 | place;
-  }
-  __syncthreads();
-  // The buckets of a thread lie one after another, so it sorts all of them at once.
-  for (std::uint32_t i = first + 1; i < before; ++i) {
-    const std::uint64_t one = item[i];
-    std::uint32_t to = i;
-    for (; to > first && item[to - 1] > one; --to) item[to] = item[to - 1];
-    item[to] = one;
-  }
-  __syncthreads();
-  for (std::uint32_t k = threadIdx.x; k < b.found[p]; k += kSortThreads) {
-    b.key[offset + k] = static_cast<std::uint64_t>(p) << 33 | item[k] >> 32;
-    b.answer[offset + k] = static_cast<std::uint32_t>(item[k]);
-  }
 }
 
 /// Writes the first matches of every pair, and counts the directions of their normals.
@@ -381,12 +314,7 @@ MatchSets merge_matches(Exec& exec, Span<const PairView> pairs,
   order_matches<<<dim3(blocks_for(answer_segments.largest, kThreads), pair_count), kThreads, 0,
                   exec.stream()>>>(batch);
   check_launch("order_matches");
-  constexpr std::size_t kSortBytes = kMostSorted * sizeof(std::uint64_t);
-  if (answer_segments.largest <= kMostSorted &&
-      exec.allow_shared_memory(sort_matches) >= kSortBytes) {
-    sort_matches<<<pair_count, kSortThreads, kSortBytes, exec.stream()>>>(batch);
-    check_launch("sort_matches");
-  } else {
+  if (!sort_matches(exec, answer_segments, found.data(), key.data(), answer.data())) {
     constexpr int kOrderBits = 32 + 1;  // order of the match, whether it is dropped
     sort_pairs(exec, key, answer, kOrderBits + bits_for(pairs.size));
     batch.key = key.data();
