@@ -20,8 +20,8 @@ static_assert(kBuckets == 1u << (32 - kBucketShift), "an order has a bucket");
 __global__ void __launch_bounds__(kSortThreads) sort_by_buckets(SortBatch b) {
   extern __shared__ std::uint64_t item[];  // order << 32 | place
   __shared__ std::uint32_t start[kBuckets], warp_sum_of[kSortThreads / 32];
-  const std::uint32_t p = blockIdx.x, offset = b.offset[p],
-                      size = b.offset[p + 1] - offset, lane = threadIdx.x % 32;
+  const std::uint32_t p = blockIdx.x, offset = b.offset[p], size = b.offset[p + 1] - offset,
+                      lane = threadIdx.x % 32;
   const auto key_at = [&](int i, std::uint32_t& place) {
     place = static_cast<std::uint32_t>(i) * kSortThreads + threadIdx.x;
     return place < size ? b.key[offset + place] : ~std::uint64_t(0);
