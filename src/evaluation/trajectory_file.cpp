@@ -14,7 +14,7 @@
 namespace gpureg::evaluation {
 namespace {
 
-constexpr std::size_t kTumFields = 8, kKittiFields = 12, kBlockFields = 1;
+constexpr std::size_t kTumFields = 8, kKittiFields = 12, kNumberFields = 1, kRowFields = 4;
 /// Files carry six digits, which leaves 1e-6; the bound only detects columns that are no
 /// quaternion.
 constexpr double kNormTolerance = 1e-3;
@@ -30,12 +30,14 @@ TrajectoryFormat format_of(const files::TextFile& file) {
       return TrajectoryFormat::tum;
     case kKittiFields:
       return TrajectoryFormat::kitti;
-    case kBlockFields:
+    case kNumberFields:
+    case kRowFields:
       return TrajectoryFormat::blocks;
     default:
-      expect_fields(file, kTumFields,
-                    "8 (TUM: time tx ty tz qx qy qz qw), 12 (KITTI: rows of a pose) or 1 (number "
-                    "of a 4 x 4 block)");
+      expect_fields(
+          file, kTumFields,
+          "8 (TUM: time tx ty tz qx qy qz qw), 12 (KITTI: rows of a pose), 1 (number of a "
+          "4 x 4 block) or 4 (a row of one without number)");
       return TrajectoryFormat::automatic;
   }
 }
@@ -64,13 +66,18 @@ StampedPose kitti_pose(const files::TextFile& file, std::size_t place) {
   return pose;
 }
 
-StampedPose block_pose(files::TextFile& file) {
-  expect_fields(file, kBlockFields, "1: the number of a 4 x 4 block");
+/// Without a number, the block counts by its place.
+StampedPose block_pose(files::TextFile& file, std::size_t place) {
   StampedPose pose;
-  pose.time = file.number(0, "number");
-  for (int row = 0; row < 4; ++row) {
+  pose.time = static_cast<double>(place);
+  if (file.fields().size() != kRowFields) {
+    expect_fields(file, kNumberFields, "1: the number of a 4 x 4 block");
+    pose.time = file.number(0, "number");
     if (!file.next()) file.fail("the file ends within a 4 x 4 block");
-    expect_fields(file, 4, "4: a row of a pose");
+  }
+  for (int row = 0; row < 4; ++row) {
+    if (row > 0 && !file.next()) file.fail("the file ends within a 4 x 4 block");
+    expect_fields(file, kRowFields, "4: a row of a pose");
     for (int column = 0; column < 4; ++column)
       pose.world_from_body(row, column) = file.number(static_cast<std::size_t>(column), "pose");
   }
@@ -95,7 +102,7 @@ Trajectory read_trajectory(const std::string& path, TrajectoryFormat format) {
     else if (format == TrajectoryFormat::kitti)
       poses.push_back(kitti_pose(file, poses.size()));
     else
-      poses.push_back(block_pose(file));
+      poses.push_back(block_pose(file, poses.size()));
   }
   if (poses.empty()) throw IoError(path + ": holds no pose");
   std::stable_sort(poses.begin(), poses.end(),

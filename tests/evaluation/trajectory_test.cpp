@@ -106,7 +106,7 @@ TEST(Trajectory, MatchesNearestTimesOnce) {
       {"0 of 1 poses", "3 or more"});
 }
 
-TEST(Trajectory, ReadsTheThreeFormats) {
+TEST(Trajectory, ReadsTheFormats) {
   const TemporaryFolder folder;
   const std::string tum =
       folder.write("a.tum",
@@ -117,14 +117,18 @@ TEST(Trajectory, ReadsTheThreeFormats) {
   const std::string blocks = folder.write(
       "poses.txt",
       "0\n1 0 0 0\n0 1 0 0\n0 0 1 0\n0 0 0 1\n7\n0 -1 0 1\n1 0 0 2\n0 0 1 3\n0 0 0 1\n");
+  const std::string rows = folder.write(
+      "rows.txt", "1 0 0 0\n0 1 0 0\n0 0 1 0\n0 0 0 1\n0 -1 0 1\n1 0 0 2\n0 0 1 3\n0 0 0 1\n");
   const Trajectory a = read_trajectory(tum), b = read_trajectory(kitti),
-                   c = read_trajectory(blocks);
+                   c = read_trajectory(blocks), d = read_trajectory(rows);
   ASSERT_EQ(a.size(), 2u);
   EXPECT_EQ(a[0].time, 0.5);  // sorted
   EXPECT_EQ(b[1].time, 1);
   EXPECT_EQ(c[1].time, 7);
   EXPECT_LT((a[1].world_from_body - b[1].world_from_body).cwiseAbs().maxCoeff(), kRounding);
   EXPECT_EQ(b[1].world_from_body, c[1].world_from_body);
+  EXPECT_EQ(d[1].time, 1);
+  EXPECT_EQ(d[1].world_from_body, c[1].world_from_body);
   expect_error<IoError>([&] { read_trajectory(kitti, TrajectoryFormat::tum); },
                         {"a.txt:1", "12 fields", "8"});
 }
@@ -176,6 +180,7 @@ TEST(Trajectory, ErrorsNameFileAndLine) {
   refused("0 0 0 0 0 0 0 1\n0 1 0 0 0 0 0 1\n", {"bad.txt", "time 0", "twice"});
   refused("2 0 0 0 0 1 0 0 0 0 1 0\n", {"bad.txt:1", "rotation"});
   refused("0\n1 0 0 0\n0 1 0 0\n", {"bad.txt", "ends within"});
+  refused("1 0 0 0\n0 1 0 0\n", {"bad.txt", "ends within"});
   TrajectoryOptions options;
   options.delta = 0.5;
   expect_error<InvalidArgument>([&] { options.validate(); }, {"delta", "whole number"});

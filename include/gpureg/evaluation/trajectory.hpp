@@ -24,7 +24,9 @@ enum class TrajectoryFormat {
   automatic,  ///< by the number of fields of the first line
   tum,        ///< lines `time tx ty tz qx qy qz qw`
   kitti,  ///< lines of 12 numbers, the first three rows of the pose; the time is the line's place
-  blocks  ///< `number`, then four rows of four: poses.txt of gpureg, the number is the time
+  /// Four rows of four; before them `number`, as in poses.txt of gpureg, which is the time, or
+  /// nothing: the time is the block's place.
+  blocks
 };
 
 /// @return the poses in ascending order of their times.
