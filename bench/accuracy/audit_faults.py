@@ -225,7 +225,7 @@ def audit(arguments, folder, poses, key):
     out = work / f"{key}_{mark}.json"
     if not out.exists():
         command = [arguments.gpureg, "audit", folder, path, "--json", out, "--quiet"]
-        command += ["--mend", out.with_suffix(".txt")]
+        command += ["--mend", out.with_suffix(".txt"), "--voxel-size", arguments.voxel_size]
         done = subprocess.run([*map(str, command), "--backend", arguments.backend])
         if done.returncode not in (0, 1):
             raise SystemExit(f"{key}: the audit failed")
@@ -286,6 +286,7 @@ def main():
     options.add_argument("--work", type=pathlib.Path, required=True)
     options.add_argument("--places", type=int, default=2, help="of each fault in each map")
     options.add_argument("--seed", type=int, default=1)
+    options.add_argument("--voxel-size", default="0.05", help="metres, or auto")
     arguments = options.parse_args()
     maps = [Map(text, arguments.work) for text in arguments.maps]
     table, unharmed, connections, alarms = {}, {}, 0, 0

@@ -2,6 +2,7 @@
 #include "gpureg/reconstruction/audit.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <map>
 #include <set>
 #include <string>
@@ -210,7 +211,10 @@ const char* to_string(ConnectionVerdict verdict) {
 AuditOptions AuditOptions::from_voxel_size(float voxel_size) {
   require(positive(voxel_size), "voxel_size", voxel_size, "a finite number > 0");
   AuditOptions options;
+  const double factor = static_cast<double>(voxel_size) / fields::kDefaultVoxel;
   fields::scale(options, voxel_size);
+  // Coarse voxels suit large scenes, not worse sensors: ICP places LiDAR scans to decimetres.
+  if (factor > 1) options.max_shift *= std::pow(factor, -0.75);
   return options;
 }
 

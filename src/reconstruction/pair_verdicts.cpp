@@ -23,6 +23,9 @@ constexpr double kSupports = 0.9, kDoubts = 0.3;
 constexpr double kLeastShared = 0.25;
 /// Overlap below which the pose is not worth an ICP.
 constexpr double kLeastOverlap = 0.05;
+/// A pose from which ICP moves the scans further than the map may be off is wrong where their
+/// surfaces then coincide so much better: along a corridor they do not.
+constexpr double kBetterResidual = 0.9, kBetterOverlap = 1.1;
 /// Logarithms of likelihood ratios. In good maps 95 of 100 pairs reach kSupports, and 1 to 2 of 100
 /// violate free space; 0.3 metres off, none of 100 and a third. Equal furniture makes wrong poses
 /// look right, too.
@@ -64,14 +67,20 @@ double shift_of(const UnalignedIsometry3d& before, const PoseVerification& after
 
 double overlap_of(const PoseEvidence& e) { return std::max(e.source_overlap, e.target_overlap); }
 
+/// Whether the surfaces coincide much better at the second pose.
+bool fits_better(const PoseEvidence& before, const PoseEvidence& after) {
+  const double residual = std::min(before.source_residual, before.target_residual);
+  return std::max(after.source_residual, after.target_residual) < kBetterResidual * residual ||
+         overlap_of(after) > kBetterOverlap * overlap_of(before);
+}
+
 double shared(const PoseEvidence& e) {
   return std::max(e.source_overlap_any_normal, e.target_overlap_any_normal);
 }
 
 /// Whether the pose as it is gives no reason to ask ICP.
 bool settled(const PoseVerification& given, std::size_t points) {
-  if (violates(violation_of(given, points))) return false;
-  return given.confidence >= kSupports || shared(given.evidence) < kLeastOverlap;
+  return !violates(violation_of(given, points)) && shared(given.evidence) < kLeastOverlap;
 }
 
 void judge(const PoseVerification& given, const PoseVerification* refined, std::size_t points,
@@ -80,7 +89,7 @@ void judge(const PoseVerification& given, const PoseVerification* refined, std::
   out.observed = std::max(given.evidence.source_observed, given.evidence.target_observed);
   Violation violation = violation_of(given, points);
   double confidence = given.confidence;
-  bool elsewhere = false;
+  bool elsewhere = false, moved = false;
   if (refined != nullptr) {
     out.shift = shift_of(out.target_from_source, *refined);
     const Violation left = violation_of(*refined, points);
@@ -90,6 +99,7 @@ void judge(const PoseVerification& given, const PoseVerification* refined, std::
       confidence = std::max(confidence, refined->confidence);
     } else {
       elsewhere = refined->confidence >= kSupports && !violates(left);
+      moved = elsewhere && fits_better(given.evidence, refined->evidence);
     }
   }
   out.violation = violation.share;
@@ -99,9 +109,9 @@ void judge(const PoseVerification& given, const PoseVerification* refined, std::
     if (violation.points < kCorner * static_cast<double>(points)) ratio *= kOfCorner;
   } else if (confidence < kDoubts && shared(given.evidence) >= kLeastShared)
     ratio = kOfDoubt;
-  else if (confidence < kDoubts && elsewhere)
+  else if (moved || (confidence < kDoubts && elsewhere))
     ratio = kOfShift;
-  if (confidence >= kSupports) ratio += kOfSupport;
+  if (confidence >= kSupports && !moved) ratio += kOfSupport;
   if (ratio > 0) out.verdict = PairVerdict::supports;
   if (ratio < 0) out.verdict = PairVerdict::contradicts;
 }

@@ -173,7 +173,7 @@ TEST_F(AuditedRoom, ARightMapIsSound) {
 }
 
 TEST_F(AuditedRoom, AScanAtAWrongPlaceIsNamed) {
-  for (const double metres : {0.5, 1.0}) {
+  for (const double metres : {0.3, 0.5, 1.0}) {
     const Audit result = audited(with_slip(3, metres));
     EXPECT_FALSE(result.sound()) << metres;
     ASSERT_FALSE(result.connections.empty());
