@@ -127,7 +127,10 @@ struct Edge {
       Eigen::Matrix<double, 3, 3, Eigen::DontAlign>::Zero();
   double confidence = 0;       ///< of this mode, after loop consistency
   double pair_confidence = 0;  ///< of this mode, by the pair alone
-  double weight = 0;           ///< in the pose graph, [0, 1]
+  /// Of this mode, in view of the finished map and its audit: reconstruct_audited(). Of
+  /// reconstruct(), confidence.
+  double map_confidence = 0;
+  double weight = 0;  ///< in the pose graph, [0, 1]
   bool accepted = false;
   EdgeReason reason = EdgeReason::inconsistent;
   /// As pose_graph::Edge::information.

@@ -55,8 +55,8 @@ class MapEdge:
         Numbers of fragments.
     target_from_source : (4, 4) float64
         As registered.
-    confidence, weight : float
-        After loop consistency; in the pose graph.
+    confidence, map_confidence, weight : float
+        After loop consistency; in view of the finished map and its audit; in the pose graph.
     accepted : bool
     reason : str
         "none", "inconsistent" or "unconfirmed".
@@ -70,6 +70,7 @@ class MapEdge:
     target: int
     target_from_source: Poses
     confidence: float
+    map_confidence: float
     weight: float
     accepted: bool
     reason: str

@@ -14,6 +14,7 @@
 #include "gpureg/error.hpp"
 #include "reconstruction/blame.hpp"
 #include "reconstruction/companions.hpp"
+#include "reconstruction/edge_confidence.hpp"
 #include "reconstruction/near_pairs.hpp"
 #include "reconstruction/pair_verdicts.hpp"
 #include "reconstruction/path.hpp"
@@ -161,7 +162,7 @@ std::vector<Edge> keep_to_the_path(const std::vector<Eigen::Vector3d>& sensors,
     edge.target = pairs[k].target;
     edge.pair = k;
     edge.target_from_source = mode.target_from_source;
-    edge.confidence = edge.pair_confidence = mode.confidence;
+    edge.confidence = edge.pair_confidence = edge.map_confidence = mode.confidence;
     edge.reason = EdgeReason::unconfirmed;
     out.push_back(edge);
   }
@@ -286,6 +287,7 @@ AuditedReconstruction reconstruct_audited(
     if (!changed) break;
   }
   add_ruled_out(ruled_out, out.map);
+  judge_edges(out.audit, audit_options.max_shift, out.map);
   return out;
 }
 

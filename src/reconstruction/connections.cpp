@@ -96,22 +96,27 @@ std::vector<std::uint32_t> certain_parts(std::size_t scans, const std::vector<Ed
   return part;
 }
 
+double deviation(const Edge& edge, const Reconstruction& map, double max_error) {
+  const UnalignedIsometry3d measured =
+      map.scans[edge.target].island_from_scan * edge.target_from_source;
+  const UnalignedIsometry3d& refined = map.scans[edge.source].island_from_scan;
+  const Eigen::Matrix3d turn = measured.linear() - refined.linear();
+  const double error =
+      std::sqrt((measured * edge.overlap_centre - refined * edge.overlap_centre).squaredNorm() +
+                std::max(0.0, (turn * edge.overlap_spread * turn.transpose()).trace()));
+  // The overlap of a pair that is small tells little about its turn.
+  const double off = (measured.translation() - refined.translation()).norm();
+  const bool deviates = error > max_error || off > kMostOff * max_error || turn.norm() > kMostTurn;
+  return deviates ? std::max(error, off) : 0;
+}
+
 std::size_t reject_deviating(Reconstruction& map, double max_error) {
   std::vector<std::pair<double, std::size_t>> deviating;
   for (std::size_t k = 0; k < map.edges.size(); ++k) {
     const Edge& edge = map.edges[k];
     if (!edge.accepted || !map.scans[edge.source].placed) continue;
-    const UnalignedIsometry3d measured =
-        map.scans[edge.target].island_from_scan * edge.target_from_source;
-    const UnalignedIsometry3d& refined = map.scans[edge.source].island_from_scan;
-    const Eigen::Matrix3d turn = measured.linear() - refined.linear();
-    const double error =
-        std::sqrt((measured * edge.overlap_centre - refined * edge.overlap_centre).squaredNorm() +
-                  std::max(0.0, (turn * edge.overlap_spread * turn.transpose()).trace()));
-    // The overlap of a pair that is small tells little about its turn.
-    const double off = (measured.translation() - refined.translation()).norm();
-    if (error > max_error || off > kMostOff * max_error || turn.norm() > kMostTurn)
-      deviating.emplace_back(-std::max(error, off), k);
+    if (const double error = deviation(edge, map, max_error); error > 0)
+      deviating.emplace_back(-error, k);
   }
   std::sort(deviating.begin(), deviating.end());
   std::size_t rejected = 0;

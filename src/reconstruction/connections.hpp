@@ -48,6 +48,10 @@ std::vector<std::uint32_t> certain_parts(std::size_t scans, const std::vector<Ed
 void split_at_weak_links(const std::vector<Edge>& edges, const std::vector<Odometry>& odometry,
                          double min_confidence, std::vector<std::uint32_t>& parts);
 
+/// How far the pose of an edge is from that of the map, metres: 0 up to max_error, RMS over the
+/// overlap. Both scans are placed, in one island.
+double deviation(const Edge& edge, const Reconstruction& map, double max_error);
+
 /// Rejects accepted edges whose pose is farther from that of the map than max_error, RMS over the
 /// overlap, the farthest first, as long as other accepted edges or odometry connect their scans.
 /// @return number of edges rejected.

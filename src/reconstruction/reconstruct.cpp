@@ -135,7 +135,7 @@ Edge edge_of(const PairGraph& pairs, std::size_t k, const pose_graph::EdgeResult
   edge.overlap_centre = pairs.centres[k];
   edge.overlap_spread = pairs.spreads[k];
   edge.mode = pairs.candidates[k][result.mode].mode;
-  edge.confidence = pairs.candidates[k][result.mode].confidence;
+  edge.confidence = edge.map_confidence = pairs.candidates[k][result.mode].confidence;
   edge.pair_confidence = pairs.candidates[k][result.mode].alone;
   const bool first = result.mode == 0;
   edge.target_from_source =

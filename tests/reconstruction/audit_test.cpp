@@ -252,8 +252,10 @@ TEST_F(AuditedRoom, EdgesOfAContradictedConnectionAreTakenOut) {
   EXPECT_EQ(out.map.islands[1].scans, (std::vector<std::uint32_t>{4, 5}));
   EXPECT_TRUE(out.audit.sound());
   ASSERT_EQ(out.map.edges.size(), pairs.size());
-  for (const Edge& edge : out.map.edges)
+  for (const Edge& edge : out.map.edges) {
     EXPECT_EQ(edge.accepted, (edge.source < 4) == (edge.target < 4));
+    EXPECT_EQ(edge.map_confidence > 0.9, edge.accepted);
+  }
 }
 
 TEST_F(AuditedRoom, ASlipIsMended) {

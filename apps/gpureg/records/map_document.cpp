@@ -83,6 +83,7 @@ Json map_document(const MapRun& run, const Context& context) {
                              {"T_ij", to_json(edge.target_from_source.matrix())},
                              {"confidence", edge.confidence},
                              {"pair_confidence", edge.pair_confidence},
+                             {"map_confidence", edge.map_confidence},
                              {"weight", edge.weight},
                              {"state", edge.accepted ? "accepted" : "rejected"},
                              {"reason", reconstruction::to_string(edge.reason)},

@@ -182,8 +182,8 @@ py::list edges_list(const Reconstruction& map) {
   py::list out;
   for (const Edge& edge : map.edges)
     out.append(py::make_tuple(edge.source, edge.target, array_of(edge.target_from_source.matrix()),
-                              edge.confidence, edge.weight, edge.accepted, to_string(edge.reason),
-                              edge.mode, array_of(edge.information)));
+                              edge.confidence, edge.map_confidence, edge.weight, edge.accepted,
+                              to_string(edge.reason), edge.mode, array_of(edge.information)));
   return out;
 }
 
