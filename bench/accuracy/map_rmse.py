@@ -16,6 +16,7 @@ import sys
 
 import numpy as np
 
+SURE = 0.9  # confidence
 MAX_EDGE_METRES = 0.2
 FAR_METRES, FAR_DEGREES = 0.35, 8
 
@@ -148,6 +149,21 @@ def measure(out, truth, information, scene_of=lambda scan: 0):
                     "confidence": edge["confidence"],
                 }
             )
+    sure = {}
+    for name in ("pair_confidence", "map_confidence"):
+        errors_of_sure = [
+            edge_error(
+                (edge["i"], edge["j"]),
+                np.reshape(edge["T_ij"], (4, 4)),
+                truth,
+                information,
+                scene_of,
+            )
+            for edge in document["edges"]
+            if edge.get(name, 0) > SURE
+        ]
+        right = sum(error <= MAX_EDGE_METRES for error in errors_of_sure)
+        sure[name] = {"edges": len(errors_of_sure), "right": right}
     return {
         "scans": len(document["scans"]),
         "placed": len(poses),
@@ -155,6 +171,7 @@ def measure(out, truth, information, scene_of=lambda scan: 0):
         "accepted": len(accepted),
         "wrong": wrong,
         "far_off": far,
+        "sure": sure,
     }
 
 

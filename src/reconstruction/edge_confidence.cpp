@@ -10,10 +10,11 @@
 namespace gpureg::reconstruction {
 namespace {
 
-/// Confident poses between islands are right less often than poses of pairs are: that the islands
-/// stay apart means that others speak against them. Ratio of the odds, measured in buildings whose
-/// places look alike.
-constexpr double kOfRejection = 1.0 / 16;
+/// Poses between islands are right less often than their confidence says: that the islands stay
+/// apart means that others speak against them. Ratio of the odds, and the most that is left, in
+/// buildings whose places look alike: 48 of 100 above 0.9 were right, and 16 of 206 between 0.5 and
+/// 0.9.
+constexpr double kOfRejection = 1.0 / 16, kMostOfRejected = 0.5;
 
 /// The least confidence of the connections between the scans of each edge; 1 where there is none.
 std::vector<double> weakest_between(const Audit& audit, const Reconstruction& map) {
@@ -46,7 +47,8 @@ void judge_edges(const Audit& audit, double max_error, Reconstruction& map) {
     const Scan &source = map.scans[edge.source], &target = map.scans[edge.target];
     const double odds = edge.confidence / (1 - std::min(edge.confidence, kMostConfidence));
     if (!source.placed || !target.placed || source.island != target.island)
-      edge.map_confidence = odds * kOfRejection / (1 + odds * kOfRejection);
+      edge.map_confidence =
+          std::min(kMostOfRejected, odds * kOfRejection / (1 + odds * kOfRejection));
     else if (deviation(edge, map, max_error) == 0)
       edge.map_confidence = weakest[k];
     else
