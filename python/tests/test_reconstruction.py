@@ -39,6 +39,7 @@ def test_places_the_scans_of_a_room(map_of_scans):
     assert all(scan.placed and scan.confidence > 0.5 for scan in map_of_scans.scans[:6])
     edge = next(e for e in map_of_scans.edges if e.accepted)
     assert edge.target_from_source.shape == (4, 4) and edge.information.shape == (6, 6)
+    assert edge.map_confidence > 0.9
     assert map_of_scans.refinement["final_rmse"] < 0.02
     assert len(map_of_scans.weakest_links) == 5
     assert "6 of 7" in repr(map_of_scans)
