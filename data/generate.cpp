@@ -138,6 +138,7 @@ class Generator {
     for (const Fragment& fragment : fragments_) poses.push_back(fragment.world_from_fragment);
     if (options_.rgbd) {
       write_sequence_lists(folder_, world_from_camera_);
+      write_depth_calibration(folder_, sensor_);
       write_surface(folder_ + "/surface.ply", surfaces_);
     }
     write_poses(folder_ + "/poses.txt", poses);

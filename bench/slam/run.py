@@ -3,11 +3,11 @@
 """Trajectory and surface errors of slam_demo without loops, and with each kind of loop.
 
     bench/slam/run.py PROGRAM SEQUENCE... --work FOLDER -o record.json [--name NAME...]
-                      [--seeds N] [--evo EVO_APE]
+                      [--seeds N] [--evo EVO_APE] [--options NAME=OPTIONS...]
 
 Each sequence is tracked once; the rows share what tracking found (`slam_demo --tracking`), but for
-those in one run, where tracking has the depth calibration of the adjustments. The registration of
-the last sequence runs with N seeds. With --evo the absolute errors are compared
+those in one run, where tracking has the depth calibration of the adjustments, and "beside
+tracking", the same without --sequential. The registration of the last sequence runs with N seeds. With --evo the absolute errors are compared
 with those of PyPI's evo, which runs as a program. Sequences and rows that are in the record already
 and not named stay there.
 """
@@ -19,6 +19,8 @@ import itertools
 import json
 import math
 import re
+import shlex
+import statistics
 import subprocess
 import sys
 from pathlib import Path
@@ -34,8 +36,9 @@ ROWS = {
     "without image loops": [],
     "in one run": [],
     "in one run, LoopSmart": ["--loopsmart"],
+    "beside tracking": [],
 }
-IN_ONE_RUN = ("in one run", "in one run, LoopSmart")
+IN_ONE_RUN = ("in one run", "in one run, LoopSmart", "beside tracking")
 SEEDED = ("+ dense loops", "+ bundle adjustment", "without image loops", "in one run")
 # A loop is false where it is this far from the truth: Redwood's bound of a correct pair, and what a
 # fragment of 2 m makes of it as an angle.
@@ -43,7 +46,7 @@ FALSE_METRES, FALSE_DEGREES = 0.2, 6.0
 
 
 def run_demo(program: str, sequence: str, output: Path, options: list) -> dict:
-    command = [program, sequence, "--quiet", "--sequential", "--output", str(output)]
+    command = [program, sequence, "--quiet", "--output", str(output)]
     subprocess.run([*command, *options], check=True)
     return json.loads((output / "loops.json").read_text())
 
@@ -62,6 +65,14 @@ def is_false(loop: dict) -> bool:
     return error["translation_m"] > FALSE_METRES or error["rotation_degrees"] > FALSE_DEGREES
 
 
+def correlation(truth: Path, found: Path) -> float | None:
+    """Of the true offsets of inverse depth and those that were found."""
+    if not truth.exists():
+        return None
+    files = [json.loads(path.read_text()) for path in (truth, found)]
+    return statistics.correlation(*(file["inverse_depth_offsets"] for file in files))
+
+
 def row_of(name: str, seed: int, figures: dict) -> dict:
     accepted = [loop for loop in figures["loops"] if loop["state"] == "accepted"]
     images = [loop for loop in figures["image_loops"] if loop["state"] == "accepted"]
@@ -71,12 +82,15 @@ def row_of(name: str, seed: int, figures: dict) -> dict:
         "seed": seed,
         "poses": figures["ate"]["poses"],
         "ate_m": figures["ate"]["rmse_m"],
+        "odometry_ate_m": figures["ate_odometry"]["rmse_m"],  # over the same frames
         "surface_mean_m": surface and surface["mean_m"],
         "surface_median_m": surface and surface["median_m"],
         "dense_loops": len(accepted),
         "false_dense_loops": sum(map(is_false, accepted)),
         "image_loops": len(images),
         "false_image_loops": sum(map(is_false, images)),
+        "keyframes_per_point": figures["keyframes_per_point"],
+        "longest_wait_ms": figures["waits_for_loops"]["longest_ms"],
         "seconds": figures["seconds"],
     }
 
@@ -92,10 +106,13 @@ def measure(args, sequence: str, name: str, seeds: int) -> dict:
     work = Path(args.work) / name
     work.mkdir(parents=True, exist_ok=True)
     tracking = work / "tracking"
-    shared = ["--tracking", str(tracking)]
-    if not tracking.exists():
-        run_demo(args.program, sequence, work / "tracked", shared)
-    tracked = json.loads((work / "tracked/loops.json").read_text())
+    own = shlex.split(args.options.get(name, ""))
+    shared = ["--sequential", "--tracking", str(tracking)]
+    tracked = None
+    if not tracking.exists() and not set(args.rows) <= set(IN_ONE_RUN):
+        run_demo(args.program, sequence, work / "tracked", [*own, *shared])
+    if tracking.exists():
+        tracked = json.loads((work / "tracked/loops.json").read_text())
     rows = []
     for row in args.rows:
         options = ROWS[row]
@@ -104,11 +121,17 @@ def measure(args, sequence: str, name: str, seeds: int) -> dict:
             if options is None:
                 output, figures = work / "tracked", tracked
             else:
-                more = [] if row in IN_ONE_RUN else shared
+                more = ["--sequential"] if row in IN_ONE_RUN else shared
+                if row == "beside tracking":
+                    more = []
                 figures = run_demo(
-                    args.program, sequence, output, [*options, *more, "--seed", str(seed)]
+                    args.program, sequence, output, [*own, *options, *more, "--seed", str(seed)]
                 )
+                tracked = tracked or figures
             rows.append(row_of(row, seed, figures))
+            rows[-1]["calibration_correlation"] = correlation(
+                Path(sequence) / "true_depth_calibration.json", output / "depth_calibration.json"
+            )
             truth = Path(sequence) / "groundtruth.txt"
             if args.evo and truth.exists():
                 difference = evo_difference(args.evo, truth, output, rows[-1]["ate_m"])
@@ -123,6 +146,7 @@ def measure(args, sequence: str, name: str, seeds: int) -> dict:
         "keyframes": tracked["keyframes"],
         "path_m": path_of(Path(sequence) / "groundtruth.txt"),
         "generated_by": args.generated.get(name),
+        "options": args.options.get(name),
         "tracking_seconds": tracked["seconds"],
         "rows": rows,
     }
@@ -140,11 +164,13 @@ def main() -> None:
     parser.add_argument(
         "--generated", nargs="*", default=[], help="NAME=OPTIONS of gpureg generate"
     )
+    parser.add_argument("--options", nargs="*", default=[], help="NAME=OPTIONS of slam_demo")
     parser.add_argument("--seeds", type=int, default=1)
     parser.add_argument("--rows", nargs="*", default=list(ROWS), choices=list(ROWS))
     parser.add_argument("--evo", help="evo_ape of PyPI's evo")
     args = parser.parse_args()
     args.generated = dict(item.split("=", 1) for item in args.generated)
+    args.options = dict(item.split("=", 1) for item in args.options)
     names = args.name or [Path(s).name for s in args.sequences]
     path = Path(args.output)
     record = json.loads(path.read_text()) if path.exists() else {"sequences": []}

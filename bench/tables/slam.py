@@ -9,9 +9,8 @@ ROWS = (
     "+ dense loops",
     "+ bundle adjustment",
     "without image loops",
-    "in one run",
-    "in one run, LoopSmart",
 )
+IN_ONE_RUN = ("in one run", "in one run, LoopSmart", "beside tracking")
 
 
 def millimetres(values):
@@ -21,6 +20,15 @@ def millimetres(values):
 
 def loops(rows, kind):
     return "; ".join(f"{r[f'{kind}_loops']} / {r[f'false_{kind}_loops']}" for r in rows)
+
+
+def about(sequence):
+    text = f"{sequence['name']}: {sequence['frames']} frames"
+    if sequence["path_m"]:
+        text += f", {sequence['path_m']:.0f} m"
+    if "--depth-noise" in (sequence["generated_by"] or ""):
+        text += f", depth noise x {sequence['generated_by'].split('--depth-noise ')[1].split()[0]}"
+    return text
 
 
 def slam():
@@ -37,14 +45,37 @@ def slam():
             surface = ", ".join(
                 millimetres(row[f"surface_{kind}_m"] for row in rows) for kind in ("mean", "median")
             )
-            about = f"{sequence['name']}: {sequence['frames']} frames"
-            if sequence["path_m"]:
-                about += f", {sequence['path_m']:.0f} m"
-            if "--depth-noise" in (sequence["generated_by"] or ""):
-                about += f", depth noise x {sequence['generated_by'].split('--depth-noise ')[1].split()[0]}"
             table.append(
-                f"| {about} | {name}{seeds} | {rows[0]['poses']} | {millimetres(row['ate_m'] for row in rows)} | {surface} "
+                f"| {about(sequence)} | {name}{seeds} | {rows[0]['poses']} | {millimetres(row['ate_m'] for row in rows)} | {surface} "
                 f"| {loops(rows, 'dense')} | {loops(rows, 'image')} |"
+            )
+    return table
+
+
+def figures(rows, key, digits=0):
+    values = [row.get(key) for row in rows]
+    return "; ".join(f"{v:.{digits}f}" for v in values if v is not None) or "-"
+
+
+def slam_one_run():
+    """Tracking and loops together; tracking alone over the same frames."""
+    table = [
+        "| sequence | row | frames in one world | ATE RMSE in mm: tracking, final | surface: mean in mm | dense loops: accepted / false | keyframes a point | correlation of the offsets of depth | frames/s | longest wait, ms |",
+        "| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |",
+    ]
+    for sequence in load("slam_demo.json")["sequences"]:
+        for name in IN_ONE_RUN:
+            rows = [row for row in sequence["rows"] if row["row"] == name]
+            if not rows:
+                continue
+            seeds = f" (seeds {', '.join(str(r['seed']) for r in rows)})" if len(rows) > 1 else ""
+            speed = "; ".join(f"{sequence['frames'] / row['seconds']:.1f}" for row in rows)
+            wait = figures(rows, "longest_wait_ms") if name == "beside tracking" else "-"
+            ate = [millimetres(row.get(key) for row in rows) for key in ("odometry_ate_m", "ate_m")]
+            table.append(
+                f"| {about(sequence)} | {name}{seeds} | {figures(rows, 'poses')} | {ate[0]}, {ate[1]} "
+                f"| {millimetres(row['surface_mean_m'] for row in rows)} | {loops(rows, 'dense')} | {figures(rows, 'keyframes_per_point', 1)} "
+                f"| {figures(rows, 'calibration_correlation', 3)} | {speed} | {wait} |"
             )
     return table
 
@@ -56,7 +87,9 @@ def slam_short():
         "| --- | --- | --- | --- |",
     ]
     for sequence in load("slam_demo.json")["sequences"]:
-        of = {name: [r for r in sequence["rows"] if r["row"] == name] for name in ROWS}
+        of = {
+            name: [r for r in sequence["rows"] if r["row"] == name] for name in (*ROWS, *IN_ONE_RUN)
+        }
         alone, everything = of["odometry"], of["in one run"] or of["+ bundle adjustment"]
         cells = [
             f"{rows[0]['poses']} of {sequence['frames']}, {millimetres(r['ate_m'] for r in rows)} mm"
@@ -69,4 +102,4 @@ def slam_short():
     return table
 
 
-TABLES = {"slam": slam, "slam_short": slam_short}
+TABLES = {"slam": slam, "slam_one_run": slam_one_run, "slam_short": slam_short}

@@ -175,4 +175,26 @@ void write_sequence_lists(const std::string& folder,
                               line);
 }
 
+void write_depth_calibration(const std::string& folder, const DepthSensor& sensor) {
+  constexpr int kColumns = 9, kRows = 7;
+  constexpr float kDepth = 2;  // metres: the offsets hardly depend on it
+  std::string offsets;
+  for (int row = 0; row < kRows; ++row) {
+    for (int column = 0; column < kColumns; ++column) {
+      const float x = static_cast<float>(column * (camera::kWidth - 1)) / (kColumns - 1),
+                  y = static_cast<float>(row * (camera::kHeight - 1)) / (kRows - 1),
+                  error = sensor.distortion(x, y, kDepth);
+      char text[32];
+      std::snprintf(text, sizeof(text), "%s%.7f", offsets.empty() ? "" : ", ",
+                    static_cast<double>(-error / (kDepth * (1 + error))));
+      offsets += text;
+    }
+  }
+  files::write_atomically(
+      folder + "/true_depth_calibration.json",
+      "{\"columns\": 9, \"rows\": 7, \"width\": " + std::to_string(camera::kWidth) +
+          ", \"height\": " + std::to_string(camera::kHeight) + ", \"inverse_depth_offsets\": [" +
+          offsets + "]}\n");
+}
+
 }  // namespace gpureg::synthetic

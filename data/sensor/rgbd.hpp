@@ -31,4 +31,8 @@ void write_frame(const std::string& folder, int frame, const std::vector<std::ui
 void write_sequence_lists(const std::string& folder,
                           const std::vector<Eigen::Isometry3d>& world_from_camera);
 
+/// true_depth_calibration.json: what the distortion of the sensor adds to inverse depths, in the
+/// format of slam_demo's depth_calibration.json. Throws IoError.
+void write_depth_calibration(const std::string& folder, const DepthSensor& sensor);
+
 }  // namespace gpureg::synthetic

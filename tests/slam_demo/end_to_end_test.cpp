@@ -14,6 +14,13 @@
 namespace slam_demo {
 namespace {
 
+double correlation(const DepthCalibration& a, const DepthCalibration& b) {
+  constexpr auto kNodes = static_cast<Eigen::Index>(DepthCalibration::kNodes);
+  const Eigen::Map<const Eigen::ArrayXd> x(a.offsets.data(), kNodes), y(b.offsets.data(), kNodes);
+  const Eigen::ArrayXd dx = x - x.mean(), dy = y - y.mean();
+  return (dx * dy).sum() / std::sqrt(dx.square().sum() * dy.square().sum());
+}
+
 TEST(EndToEnd, TrajectoryMapAndFiles) {
   const Sequence sequence = open_sequence(frames_folder());
   ASSERT_EQ(sequence.frames.size(), 150u);
@@ -32,6 +39,11 @@ TEST(EndToEnd, TrajectoryMapAndFiles) {
   EXPECT_GT(result.surface.distance.count, 50000u);
   EXPECT_LT(result.surface.distance.mean, 0.012) << "3.7 mm when this was written";
   EXPECT_LT(result.surface.beyond, result.surface.distance.count / 1000);
+
+  const DepthCalibration truth =
+      read_depth_calibration(frames_folder() + "/true_depth_calibration.json");
+  EXPECT_GT(truth.difference({}), 0.001) << "1/m: 1 cm at 3 m";
+  EXPECT_GT(correlation(slam->map().calibration, truth), 0.5) << "0.85 when this was written";
 
   const gpureg::test::TemporaryFolder output;
   write_results(output.path(), *slam, result);

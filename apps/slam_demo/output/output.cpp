@@ -86,6 +86,16 @@ json waits_json(const std::vector<double>& waits) {
   return {{"longest_ms", longest == waits.end() ? 0 : *longest}, {"histogram", bins}};
 }
 
+/// How many keyframes see a point of the map.
+double keyframes_per_point(const Map& map) {
+  double points = 0, observations = 0;
+  for (const MapPoint& point : map.points) {
+    points += !point.bad;
+    if (!point.bad) observations += static_cast<double>(point.observations.size());
+  }
+  return points > 0 ? observations / points : 0;
+}
+
 json loops_json(const Slam& slam, const RunResult& result) {
   json loops = json::array(), image = json::array();
   for (const LoopRecord& r : slam.loops().records()) {
@@ -127,6 +137,7 @@ json loops_json(const Slam& slam, const RunResult& result) {
                {"frames_out_of_order", result.out_of_order},
                {"frames_tracked_densely", slam.dense()},
                {"keyframes", slam.map().keyframes.size()},
+               {"keyframes_per_point", keyframes_per_point(slam.map())},
                {"fragments", slam.fragments()},
                {"worlds", slam.worlds()},
                {"surfels", slam.all_surfels()},
