@@ -5,6 +5,7 @@
 #include <gpureg/error.hpp>
 
 #include <cmath>
+#include <functional>
 #include <numeric>
 #include <random>
 #include <set>
@@ -135,11 +136,16 @@ struct Scene {
     }
   }
 
-  void adjust_all() {
+  BundleProblem problem() const {
     std::vector<int> free(truth.size() - 1);
     std::iota(free.begin(), free.end(), 1);
-    BundleProblem problem = bundle_of(map, free, {0}, {});
-    problem.calibrate = true;
+    BundleProblem result = bundle_of(map, free, {0}, {});
+    result.calibrate = true;
+    return result;
+  }
+
+  void adjust_all() {
+    BundleProblem problem = this->problem();
     adjust(camera, problem, 30, 1);
     apply(camera, problem, map);
   }
@@ -157,6 +163,26 @@ TEST(DepthCalibration, AdjustmentFindsIt) {
             .norm(),
         2e-3)
         << k;
+}
+
+// Ceres sorts by addresses: the poses lie after the offsets in one problem, before them in the
+// other.
+TEST(DepthCalibration, TheBitsDoNotDependOnAddresses) {
+  const Scene scene(field());
+  std::vector<BundleProblem> problems(2, scene.problem());
+  const auto before = [](const BundleProblem& p) {
+    return std::less<const void*>()(p.poses.data(), p.calibration.offsets.data());
+  };
+  // Somewhere among these there is memory on the other side.
+  std::vector<std::vector<BundleProblem::Pose>> elsewhere;
+  while (before(problems[0]) == before(problems[1]) && elsewhere.size() < 100) {
+    elsewhere.push_back(problems[1].poses);
+    elsewhere.back().reserve(std::size_t{1} << (elsewhere.size() % 20));
+    elsewhere.back().swap(problems[1].poses);
+  }
+  for (BundleProblem& problem : problems) adjust(scene.camera, problem, 5, 1);
+  EXPECT_EQ(problems[0].calibration.offsets, problems[1].calibration.offsets);
+  EXPECT_EQ(problems[0].poses, problems[1].poses);
 }
 
 TEST(DepthCalibration, ACameraWithoutOffsetsGetsNone) {

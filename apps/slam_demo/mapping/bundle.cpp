@@ -11,6 +11,7 @@ namespace slam_demo {
 namespace {
 
 using Pose = BundleProblem::Pose;
+constexpr std::size_t kPoseSize = std::tuple_size<Pose>::value;
 
 Pose pose_of(const Eigen::Isometry3d& world_from_camera) {
   const Eigen::Isometry3d m = world_from_camera.inverse();
@@ -146,17 +147,17 @@ BundleProblem local_bundle(const Map& map, int keyframe, std::size_t size) {
 
 namespace {
 
-void add_calibration(DepthCalibration& calibration, const DepthCalibration& prior,
-                     ceres::Problem& problem, ceres::ParameterBlockOrdering& order) {
+void add_calibration(double* offsets, const DepthCalibration& prior, ceres::Problem& problem,
+                     ceres::ParameterBlockOrdering& order) {
   for (std::size_t k = 0; k < DepthCalibration::kNodes; ++k) {
-    double* node = &calibration.offsets[k];
+    double* node = offsets + k;
     order.AddElementToGroup(node, 1);
     problem.AddResidualBlock(
         new ceres::AutoDiffCostFunction<NodeCost, 1, 1>(new NodeCost{prior.offsets[k]}), nullptr,
         node);
     const auto smooth = [&](std::size_t other) {
       problem.AddResidualBlock(new ceres::AutoDiffCostFunction<SmoothCost, 1, 1, 1>(new SmoothCost),
-                               nullptr, node, &calibration.offsets[other]);
+                               nullptr, node, offsets + other);
     };
     if ((k + 1) % DepthCalibration::kColumns != 0) smooth(k + 1);
     if (k + DepthCalibration::kColumns < DepthCalibration::kNodes)
@@ -165,10 +166,10 @@ void add_calibration(DepthCalibration& calibration, const DepthCalibration& prio
 }
 
 void add_calibrated_sight(const Pinhole& camera, const Measurement& m, double* pose, double* point,
-                          const DepthCalibration& before, DepthCalibration& calibration,
+                          const DepthCalibration& before, double* offsets,
                           ceres::Problem& problem) {
   const auto around = before.around(m.u, m.v);
-  const auto node = [&](std::size_t k) { return &calibration.offsets[around[k].node]; };
+  const auto node = [&](std::size_t k) { return offsets + around[k].node; };
   problem.AddResidualBlock(
       new ceres::AutoDiffCostFunction<CalibratedSightCost, 3, 7, 3, 1, 1, 1, 1>(
           new CalibratedSightCost{camera, m, around, before.offset(m.u, m.v)}),
@@ -188,21 +189,29 @@ void correct_sights(const DepthCalibration& before, BundleProblem& problem) {
 
 BundleReport adjust(const Pinhole& camera, BundleProblem& problem, int iterations, int threads) {
   if (problem.sights.empty()) return {};
+  // Ceres orders the blocks of a group by their addresses: in one array, that is always the same.
+  std::vector<double> cameras;  // poses, then offsets of the calibration
+  for (const Pose& pose : problem.poses) cameras.insert(cameras.end(), pose.begin(), pose.end());
+  cameras.insert(cameras.end(), problem.calibration.offsets.begin(),
+                 problem.calibration.offsets.end());
+  const auto pose_at = [&](int k) { return &cameras[at(k) * kPoseSize]; };
+  double* const offsets = &cameras[problem.poses.size() * kPoseSize];
   ceres::Problem ceres_problem;
   auto* order = new ceres::ParameterBlockOrdering;
   for (std::size_t k = 0; k < problem.poses.size(); ++k) {
-    ceres_problem.AddParameterBlock(problem.poses[k].data(), 7, pose_manifold());
-    if (problem.fixed[k]) ceres_problem.SetParameterBlockConstant(problem.poses[k].data());
-    order->AddElementToGroup(problem.poses[k].data(), 1);
+    double* pose = pose_at(static_cast<int>(k));
+    ceres_problem.AddParameterBlock(pose, kPoseSize, pose_manifold());
+    if (problem.fixed[k]) ceres_problem.SetParameterBlockConstant(pose);
+    order->AddElementToGroup(pose, 1);
   }
   const DepthCalibration before = problem.calibration;
-  if (problem.calibrate) add_calibration(problem.calibration, problem.prior, ceres_problem, *order);
+  if (problem.calibrate) add_calibration(offsets, problem.prior, ceres_problem, *order);
   for (const BundleProblem::Sight& s : problem.sights) {
     double* point = problem.points[at(s.point)].data();
-    double* pose = problem.poses[at(s.pose)].data();
+    double* pose = pose_at(s.pose);
     order->AddElementToGroup(point, 0);
     if (problem.calibrate && s.seen.depth > 0) {
-      add_calibrated_sight(camera, s.seen, pose, point, before, problem.calibration, ceres_problem);
+      add_calibrated_sight(camera, s.seen, pose, point, before, offsets, ceres_problem);
       continue;
     }
     ceres_problem.AddResidualBlock(sight_cost(camera, s.seen), new ceres::HuberLoss(kHuber), pose,
@@ -213,7 +222,7 @@ BundleReport adjust(const Pinhole& camera, BundleProblem& problem, int iteration
     ceres_problem.AddResidualBlock(
         new ceres::AutoDiffCostFunction<RelativeCost, 6, 7, 7>(new RelativeCost{
             Eigen::Quaterniond(r.a_from_b.linear()), r.a_from_b.translation(), root}),
-        nullptr, problem.poses[at(r.a)].data(), problem.poses[at(r.b)].data());
+        nullptr, pose_at(r.a), pose_at(r.b));
   }
   ceres::Solver::Options options;
   options.linear_solver_type = ceres::SPARSE_SCHUR;
@@ -224,6 +233,9 @@ BundleReport adjust(const Pinhole& camera, BundleProblem& problem, int iteration
   options.logging_type = ceres::SILENT;
   ceres::Solver::Summary summary;
   ceres::Solve(options, &ceres_problem, &summary);
+  for (std::size_t k = 0; k < problem.poses.size(); ++k)
+    std::copy_n(pose_at(static_cast<int>(k)), kPoseSize, problem.poses[k].begin());
+  std::copy_n(offsets, DepthCalibration::kNodes, problem.calibration.offsets.begin());
   if (problem.calibrate) correct_sights(before, problem);
   return {summary.initial_cost, summary.final_cost};
 }
