@@ -91,6 +91,8 @@ def slam_short():
             name: [r for r in sequence["rows"] if r["row"] == name] for name in (*ROWS, *IN_ONE_RUN)
         }
         alone, everything = of["odometry"], of["in one run"] or of["+ bundle adjustment"]
+        if not alone:
+            continue
         cells = [
             f"{rows[0]['poses']} of {sequence['frames']}, {millimetres(r['ate_m'] for r in rows)} mm"
             for rows in (alone, everything)
