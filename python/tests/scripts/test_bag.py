@@ -17,7 +17,7 @@ from rosbags.rosbag2 import StoragePlugin
 from rosbags.rosbag2 import Writer as Writer2
 from rosbags.typesys import Stores, get_typestore
 
-SCRIPT = pathlib.Path(__file__).resolve().parents[2] / "apps/slam_demo/bag_to_tum.py"
+SCRIPT = pathlib.Path(__file__).resolve().parents[3] / "apps/slam_demo/bag_to_tum.py"
 IMAGE, INFO = "sensor_msgs/msg/Image", "sensor_msgs/msg/CameraInfo"
 KINDS = ("ros1", "sqlite3", "mcap")
 COLOUR = np.arange(2 * 3 * 3, dtype=np.uint8).reshape(2, 3, 3)  # 3 pixels wide
