@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <Eigen/Core>
 #include <cstddef>
 #include <cstdint>
 #include <vector>
@@ -26,7 +27,7 @@ struct Matrix {
 
 /// Options of likely_pairs().
 struct Options {
-  std::uint32_t neighbors = 20;   ///< a pair is kept where either is among so many nearest, >= 1
+  std::uint32_t neighbors = 20;   ///< a pair is kept where either is among so many most alike, >= 1
   std::uint32_t consecutive = 0;  ///< also the so many that follow each cloud in their order
   std::uint32_t words = 64;       ///< >= 1
   int threads = 0;                ///< 0: one per core. Results do not depend on it.
@@ -35,8 +36,8 @@ struct Options {
   void validate() const;
 };
 
-/// Centres of k-means over features of some clouds. No labels and no training set: the words are
-/// those of the scene itself.
+/// Centres of k-means over features of some clouds, the rarest first. No labels and no training
+/// set: the words are those of the scene itself.
 /// @param most number of words, >= 1; fewer come back where there are fewer features.
 /// @return words x dimension.
 /// @throws InvalidArgument for clouds of different dimensions.
@@ -49,10 +50,28 @@ Matrix learn_words(const std::vector<FeatureView>& clouds, std::uint32_t most);
 /// Sources: Jegou et al. 2010 (VLAD); Arandjelovic and Zisserman 2013 (intra-normalisation).
 std::vector<float> describe(const FeatureView& cloud, const Matrix& words);
 
-/// Pairs source > target of rows where either has the other among its k nearest by inner product.
-/// Exact. @return ascending by target, then source.
-/// @throws InvalidArgument unless k >= 1.
-std::vector<Pair> nearest_pairs(const Matrix& descriptors, std::uint32_t k, int threads = 0);
+/// What the choice of pairs needs of a cloud: some 15 KB instead of megabytes.
+struct Summary {
+  std::vector<float> descriptor;  ///< of describe()
+  /// At most 256 key points: those whose features have the rarest words, at a distance from each
+  /// other.
+  std::vector<Eigen::Vector3f> points;
+  std::vector<Eigen::Vector3f> normals;  ///< one per key point
+  /// One row per key point: signed roots at a length of 127.
+  std::vector<std::int8_t> features;
+  float feature_radius = 0;  ///< of the cloud's options, metres
+};
+
+/// @throws InvalidArgument for an empty handle, and where the dimensions of features and words
+///   differ.
+Summary summarize(const PreparedCloud& cloud, const Matrix& words);
+
+/// Pairs source > target of clouds that are likely to overlap. Two clouds are alike where their
+/// descriptors are, where matches of their key points agree with one motion (only those of the
+/// most similar descriptors are compared), and where a third cloud is like both.
+/// @return ascending by target, then source.
+/// @throws InvalidArgument for options out of range, and for summaries by different words.
+std::vector<Pair> likely_pairs(const std::vector<Summary>& clouds, const Options& options = {});
 
 /// All of the above for clouds in memory.
 /// @return pairs source > target, ascending by target, then source.

@@ -45,12 +45,21 @@ FloatArray descriptor(const FloatArray& features, const FloatArray& words) {
   return FloatArray(static_cast<py::ssize_t>(out.size()), out.data());
 }
 
-py::array_t<std::int64_t> nearest(const FloatArray& descriptors, std::uint32_t k) {
-  const pruning::Matrix rows = matrix_from(descriptors, "descriptors");
+pruning::Summary summary(const PreparedCloud& cloud, const FloatArray& words) {
+  const pruning::Matrix rows = matrix_from(words, "words");
+  const py::gil_scoped_release release;
+  return pruning::summarize(cloud, rows);
+}
+
+py::array_t<std::int64_t> likely(const std::vector<pruning::Summary>& summaries,
+                                 std::uint32_t neighbors, std::uint32_t consecutive) {
   std::vector<Pair> pairs;
   {
     const py::gil_scoped_release release;
-    pairs = pruning::nearest_pairs(rows, k);
+    pruning::Options options;
+    options.neighbors = neighbors;
+    options.consecutive = consecutive;
+    pairs = pruning::likely_pairs(summaries, options);
   }
   py::array_t<std::int64_t> out({static_cast<py::ssize_t>(pairs.size()), py::ssize_t(2)});
   std::int64_t* next = out.mutable_data();
@@ -66,7 +75,16 @@ py::array_t<std::int64_t> nearest(const FloatArray& descriptors, std::uint32_t k
 void bind_pruning(py::module_& m) {
   m.def("learn_words", &learn, py::arg("clouds"), py::arg("most"));
   m.def("describe_features", &descriptor, py::arg("features"), py::arg("words"));
-  m.def("nearest_descriptors", &nearest, py::arg("descriptors"), py::arg("k"));
+  py::class_<pruning::Summary>(m, "CloudSummary")
+      .def_property_readonly("descriptor",
+                             [](const pruning::Summary& own) {
+                               return FloatArray(static_cast<py::ssize_t>(own.descriptor.size()),
+                                                 own.descriptor.data());
+                             })
+      .def("__len__", [](const pruning::Summary& own) { return own.points.size(); });
+  m.def("summarize_cloud", &summary, py::arg("cloud"), py::arg("words"));
+  m.def("likely_pairs", &likely, py::arg("summaries"), py::arg("neighbors"),
+        py::arg("consecutive"));
 }
 
 }  // namespace gpureg::python

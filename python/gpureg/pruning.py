@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Which pairs of a large set are worth trying: those whose fragments look alike.
 
-A fragment's global descriptor is an aggregate of its local features that needs no training;
-candidates are the k nearest neighbours. The cost of a run then grows as n * k, not as n *
-n."""
+A fragment is summarised by a global descriptor, an aggregate of its local features that needs no
+training, and by its key points. Candidates are the k most alike, by both and by what third
+fragments tell. The cost of a run then grows as n * k, not as n * n."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ import numpy.typing as npt
 from . import _core
 from ._arrays import to_numpy
 from ._contexts import default_context
-from ._core import Context, PrepareOptions
+from ._core import CloudSummary, Context, PrepareOptions
 from .fragments import FragmentSet, fragment_set
 
 _TOGETHER = 32  # clouds in memory at once
@@ -72,15 +72,15 @@ def _rows(features: FloatArray) -> FloatArray:
     return np.ascontiguousarray(to_numpy(features, "features"), np.float32)
 
 
-def describe_all(
+def summarize_all(
     fragments: Any,
     *,
     words: int = _WORDS,
     options: PrepareOptions | None = None,
     context: Context | None = None,
-) -> FloatArray:
-    """(n, words * D) descriptors of a set's fragments, which are loaded and prepared a few at a
-    time.
+) -> list[CloudSummary]:
+    """What `likely_pairs` needs of a set's fragments, some 15 KB each: ``descriptor``, and
+    ``len(summary)`` key points. Fragments are loaded and prepared a few at a time.
     """
     fragments, options, context = (
         fragment_set(fragments),
@@ -88,25 +88,34 @@ def describe_all(
         context or default_context(),
     )
 
-    def features(positions: Sequence[int]) -> Iterator[FloatArray]:
+    def prepared(positions: Sequence[int]) -> Iterator[_core.PreparedCloud]:
         for begin in range(0, len(positions), _TOGETHER):
             part = positions[begin : begin + _TOGETHER]
             inputs = [fragments.load(k, options, context.backend == "cuda") for k in part]
-            for cloud in _core.prepare_batch(
+            yield from _core.prepare_batch(
                 context, inputs, options, [f"fragments[{k}]" for k in part]
-            ):
-                yield cloud.features
+            )
 
     n = len(fragments)
-    centres = learn_words(
-        [
-            rows[:: max(1, len(rows) // _SAMPLE)]
-            for rows in features(range(0, n, max(1, n // _SAMPLED)))
-        ],
-        words,
-    )
-    out = [describe(rows, centres) for rows in features(range(n))]
-    return np.stack(out) if out else np.zeros((0, 0), np.float32)
+    samples = (cloud.features for cloud in prepared(range(0, n, max(1, n // _SAMPLED))))
+    centres = learn_words([rows[:: max(1, len(rows) // _SAMPLE)] for rows in samples], words)
+    return [_core.summarize_cloud(cloud, centres) for cloud in prepared(range(n))]
+
+
+def likely_pairs(summaries: Sequence[CloudSummary], k: int = 20, *, consecutive: int = 0) -> Pairs:
+    """Pairs of `summarize_all`'s fragments that are likely to overlap.
+
+    Two fragments are alike where their descriptors are, where matches of their key points agree with
+    one motion, and where a third fragment is like both.
+
+    Returns
+    -------
+    (M, 2) int64
+        Positions i < j where either has the other among its k most alike, ascending.
+    """
+    if k < 1:
+        raise ValueError(f"k is {k}, expected 1 or more")
+    return _core.likely_pairs(list(summaries), k, consecutive)
 
 
 @dataclasses.dataclass
@@ -127,7 +136,7 @@ class Nearest:
     Attributes
     ----------
     seconds : float
-        Of the last call: descriptors and search.
+        Of the last call: summaries and search.
 
     Examples
     --------
@@ -151,23 +160,12 @@ class Nearest:
         if self.k < 1:
             raise ValueError(f"k is {self.k}, expected 1 or more")
         begin = time.monotonic()
-        descriptors = describe_all(fragments, options=self.options, context=self.context)
-        positions = nearest_pairs(descriptors, self.k)
-        n = len(fragments)
-        steps = [
-            np.stack([np.arange(n - s), np.arange(s, n)], axis=1)
-            for s in range(1, min(self.consecutive, n - 1) + 1)
-        ]
-        positions = np.unique(np.concatenate([positions, *steps]), axis=0)
+        summaries = summarize_all(fragments, options=self.options, context=self.context)
+        positions = likely_pairs(summaries, self.k, consecutive=self.consecutive)
         self.seconds = time.monotonic() - begin
         return np.asarray(np.asarray(fragments.numbers, np.int64)[positions], np.int64).reshape(
             -1, 2
         )
-
-
-def nearest_pairs(descriptors: FloatArray, k: int) -> Pairs:
-    """(M, 2) positions i < j where either has the other among its k nearest; exact."""
-    return _core.nearest_descriptors(_rows(descriptors), k)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -228,11 +226,12 @@ def _as_set(pairs: Any) -> set[tuple[int, int]]:
 
 
 __all__ = [
+    "CloudSummary",
     "Nearest",
     "PruningReport",
     "describe",
-    "describe_all",
     "learn_words",
+    "likely_pairs",
     "measure",
-    "nearest_pairs",
+    "summarize_all",
 ]

@@ -14,11 +14,11 @@ from gpureg import pruning
 def test_descriptor_belongs_to_the_place_not_to_the_pose():
     clouds = [room(k % 3, 3000) for k in range(6)]
     clouds = [moved(cloud, pose(k)) for k, cloud in enumerate(clouds)]
-    descriptors = pruning.describe_all(clouds)
-    assert descriptors.shape == (6, 64 * 33) and np.allclose(
-        np.linalg.norm(descriptors, axis=1), 1, atol=1e-5
-    )
-    assert pruning.nearest_pairs(descriptors, 1).tolist() == [[0, 3], [1, 4], [2, 5]]
+    summaries = pruning.summarize_all(clouds)
+    for summary in summaries:
+        assert summary.descriptor.shape == (64 * 33,) and 50 < len(summary) <= 256
+        assert abs(np.linalg.norm(summary.descriptor) - 1) < 1e-5
+    assert pruning.likely_pairs(summaries, 1).tolist() == [[0, 3], [1, 4], [2, 5]]
 
 
 def test_same_candidates_again():

@@ -15,6 +15,7 @@ namespace {
 
 using pruning::FeatureView;
 using pruning::Matrix;
+using pruning::Summary;
 
 /// Features around a few centres: those of one place differ from those of another.
 std::vector<float> place(unsigned kind, unsigned seed, std::size_t rows, std::size_t dimension) {
@@ -31,29 +32,6 @@ std::vector<float> place(unsigned kind, unsigned seed, std::size_t rows, std::si
 
 FeatureView view(const std::vector<float>& rows, std::size_t dimension) {
   return {rows.data(), rows.size() / dimension, dimension};
-}
-
-Matrix descriptors_of(const std::vector<std::vector<float>>& clouds, std::size_t dimension) {
-  std::vector<FeatureView> views;
-  for (const auto& cloud : clouds) views.push_back(view(cloud, dimension));
-  const Matrix words = pruning::learn_words(views, 8);
-  Matrix out;
-  out.rows = clouds.size();
-  out.columns = words.rows * words.columns;
-  for (const FeatureView& cloud : views)
-    for (const float v : pruning::describe(cloud, words)) out.data.push_back(v);
-  return out;
-}
-
-TEST(Pruning, FindsCloudsOfTheSamePlace) {
-  std::vector<std::vector<float>> clouds;
-  for (unsigned k = 0; k < 6; ++k) clouds.push_back(place(k % 3, k, 300, 33));
-  const std::vector<Pair> pairs = pruning::nearest_pairs(descriptors_of(clouds, 33), 1);
-  ASSERT_EQ(pairs.size(), 3u);
-  for (std::uint32_t k = 0; k < 3; ++k) {
-    EXPECT_EQ(pairs[k].target, k);
-    EXPECT_EQ(pairs[k].source, k + 3);
-  }
 }
 
 TEST(Pruning, DescriptorsHaveUnitLengthOrAreZero) {
@@ -76,39 +54,18 @@ TEST(Pruning, WordsAreNotMoreThanFeatures) {
     EXPECT_TRUE(std::isfinite(v));
 }
 
-TEST(Pruning, NearestPairsAgreeWithTheirDefinition) {
-  constexpr std::size_t kRows = 300, kColumns = 12;
-  constexpr std::uint32_t kNeighbors = 4;
-  std::mt19937 random(7);
-  std::normal_distribution<float> normal;
-  Matrix rows{std::vector<float>(kRows * kColumns), kRows, kColumns};
-  for (float& v : rows.data) v = normal(random);
-  std::vector<std::vector<char>> near(kRows, std::vector<char>(kRows, 0));
-  for (std::size_t i = 0; i < kRows; ++i) {
-    std::vector<std::pair<double, std::size_t>> order;
-    for (std::size_t j = 0; j < kRows; ++j) {
-      if (i == j) continue;
-      double product = 0;
-      for (std::size_t d = 0; d < kColumns; ++d)
-        product += double(rows.data[i * kColumns + d]) * double(rows.data[j * kColumns + d]);
-      order.emplace_back(-product, j);
-    }
-    std::sort(order.begin(), order.end());
-    for (std::uint32_t k = 0; k < kNeighbors; ++k)
-      near[std::min(i, order[k].second)][std::max(i, order[k].second)] = 1;
-  }
-  std::size_t expected = 0;
-  for (const auto& row : near)
-    for (const char v : row) expected += static_cast<std::size_t>(v);
-  const std::vector<Pair> one = pruning::nearest_pairs(rows, kNeighbors, 1),
-                          two = pruning::nearest_pairs(rows, kNeighbors, 2);
-  ASSERT_EQ(one.size(), expected);
-  ASSERT_EQ(two.size(), expected);
-  for (std::size_t k = 0; k < expected; ++k) {
-    EXPECT_TRUE(near[one[k].target][one[k].source]);
-    EXPECT_EQ(one[k].source, two[k].source);
-    EXPECT_EQ(one[k].target, two[k].target);
-  }
+TEST(Pruning, WordsComeWithTheRarestFirst) {
+  // One centre has ten times as many features as each of the others.
+  std::vector<float> rows;
+  std::mt19937 random(3);
+  std::uniform_real_distribution<float> noise(0, 0.02f);
+  for (std::size_t k = 0; k < 120; ++k)
+    for (std::size_t d = 0; d < 4; ++d)
+      rows.push_back((d == (k < 100 ? 0 : 1 + k % 2) ? 1.0f : 0.0f) + noise(random));
+  const Matrix words = pruning::learn_words({view(rows, 4)}, 3);
+  ASSERT_EQ(words.rows, 3u);
+  EXPECT_GT(words.data[2 * 4], words.data[0]);
+  EXPECT_GT(words.data[2 * 4], words.data[4]);
 }
 
 TEST(Pruning, ErrorsNameTheField) {
@@ -118,10 +75,16 @@ TEST(Pruning, ErrorsNameTheField) {
                                 {"clouds[1]", "10", "5"});
   const Matrix words = pruning::learn_words({view(cloud, 5)}, 2);
   expect_error<InvalidArgument>([&] { pruning::describe(view(cloud, 10), words); }, {"10", "5"});
-  expect_error<InvalidArgument>([&] { pruning::nearest_pairs(words, 0); }, {"k", "0"});
+  Summary one, other;
+  one.descriptor = {1, 0};
+  other.descriptor = {1};
+  expect_error<InvalidArgument>([&] { pruning::likely_pairs(std::vector<Summary>{one, other}); },
+                                {"clouds[1].descriptor", "1", "2"});
   pruning::Options options;
   options.neighbors = 0;
-  expect_error<InvalidArgument>([&] { options.validate(); }, {"neighbors"});
+  expect_error<InvalidArgument>([&] { options.validate(); }, {"neighbors", "0"});
+  expect_error<InvalidArgument>(
+      [&] { pruning::likely_pairs(std::vector<PreparedCloud>{PreparedCloud()}); }, {"empty"});
 }
 
 }  // namespace

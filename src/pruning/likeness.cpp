@@ -1,0 +1,188 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "pruning/likeness.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "pruning/agreement.hpp"
+#include "pruning/for_each_on.hpp"
+
+namespace gpureg::pruning {
+namespace {
+
+/// Pairs of each cloud from which the likeness of unrelated clouds is estimated.
+constexpr std::size_t kBackground = 32;
+/// Descriptors that are multiplied with one row at a time.
+constexpr std::size_t kBlock = 64;
+
+double dot(const std::vector<float>& a, const std::vector<float>& b) {
+  double sum = 0;
+  for (std::size_t d = 0; d < a.size(); ++d)
+    sum += static_cast<double>(a[d]) * static_cast<double>(b[d]);
+  return sum;
+}
+
+/// Each cloud with others that are evenly spread over the set.
+std::vector<Edge> background(std::size_t n) {
+  std::vector<Edge> edges;
+  const std::size_t count = std::min(kBackground, n - 1);
+  for (std::size_t i = 0; i < n; ++i)
+    for (std::size_t k = 0; k < count; ++k) {
+      const std::size_t j = (i + 1 + k * (n - 1) / count) % n;
+      edges.emplace_back(std::minmax(static_cast<std::uint32_t>(i), static_cast<std::uint32_t>(j)));
+    }
+  std::sort(edges.begin(), edges.end());
+  edges.erase(std::unique(edges.begin(), edges.end()), edges.end());
+  return edges;
+}
+
+void keep_best(std::vector<Partner>& partners, std::size_t most) {
+  const auto last = partners.begin() + static_cast<std::ptrdiff_t>(std::min(most, partners.size()));
+  std::partial_sort(partners.begin(), last, partners.end(), [](const Partner& a, const Partner& b) {
+    return a.value != b.value ? a.value > b.value : a.cloud < b.cloud;
+  });
+  partners.erase(last, partners.end());
+}
+
+}  // namespace
+
+LikenessModel::LikenessModel(const std::vector<Summary>& clouds, std::size_t threads)
+    : clouds_(clouds), threads_(threads) {
+  if (clouds.size() < 2) return;
+  const std::vector<Edge> edges = background(clouds.size());
+  descriptors_ = scale_of(edges, similarities(edges));
+  key_points_ = scale_of(edges, agreements(edges));
+}
+
+LikenessModel::Scale LikenessModel::scale_of(const std::vector<Edge>& edges,
+                                             const std::vector<double>& values) const {
+  Scale out;
+  out.means.assign(clouds_.size(), 0);
+  std::vector<double> counts(clouds_.size(), 0);
+  for (std::size_t k = 0; k < edges.size(); ++k)
+    for (const std::uint32_t cloud : {edges[k].first, edges[k].second}) {
+      out.means[cloud] += values[k];
+      ++counts[cloud];
+    }
+  for (std::size_t k = 0; k < counts.size(); ++k) out.means[k] /= counts[k];
+  double squares = 0;
+  for (std::size_t k = 0; k < edges.size(); ++k) {
+    const double rest = out.normalized(values[k], edges[k]);
+    squares += rest * rest;
+  }
+  if (squares > 0) out.deviation = std::sqrt(squares / static_cast<double>(edges.size()));
+  return out;
+}
+
+std::vector<double> LikenessModel::similarities(const std::vector<Edge>& edges) const {
+  std::vector<double> out(edges.size());
+  for_each_on(
+      threads_, edges.size(), [] { return 0; },
+      [&](std::size_t k, int) {
+        out[k] = dot(clouds_[edges[k].first].descriptor, clouds_[edges[k].second].descriptor);
+      });
+  return out;
+}
+
+std::vector<double> LikenessModel::agreements(const std::vector<Edge>& edges) const {
+  std::vector<std::size_t> begins;
+  for (std::size_t k = 0; k < edges.size(); ++k)
+    if (k == 0 || edges[k].first != edges[k - 1].first) begins.push_back(k);
+  std::vector<double> out(edges.size());
+  for_each_on(
+      threads_, begins.size(), [] { return Agreement(); },
+      [&](std::size_t part, Agreement& agreement) {
+        const std::size_t begin = begins[part];
+        const std::size_t end = part + 1 < begins.size() ? begins[part + 1] : edges.size();
+        agreement.set_target(clouds_[edges[begin].first]);
+        for (std::size_t k = begin; k < end; ++k) out[k] = agreement.with(clouds_[edges[k].second]);
+      });
+  return out;
+}
+
+Partners LikenessModel::similar(std::size_t most) const {
+  const std::size_t n = clouds_.size();
+  Partners out(n);
+  if (n < 2) return out;
+  const std::size_t dimension = clouds_.front().descriptor.size();
+  for_each_on(
+      threads_, (n + kBlock - 1) / kBlock, [] { return std::vector<float>(); },
+      [&](std::size_t block, std::vector<float>& rows) {
+        // A block of descriptors side by side: sums of any vector width have the same order.
+        const std::size_t begin = block * kBlock, count = std::min(kBlock, n - begin);
+        rows.assign(dimension * kBlock, 0.0f);
+        for (std::size_t k = 0; k < count; ++k)
+          for (std::size_t d = 0; d < dimension; ++d)
+            rows[d * kBlock + k] = clouds_[begin + k].descriptor[d];
+        for (std::size_t j = 0; j < n; ++j) {
+          float sums[kBlock] = {};
+          for (std::size_t d = 0; d < dimension; ++d) {
+            const float value = clouds_[j].descriptor[d];
+            const float* row = rows.data() + d * kBlock;
+            for (std::size_t k = 0; k < kBlock; ++k) sums[k] += value * row[k];
+          }
+          for (std::size_t k = 0; k < count; ++k) {
+            const auto self = static_cast<std::uint32_t>(begin + k);
+            const auto other = static_cast<std::uint32_t>(j);
+            if (self == other) continue;
+            const double value = descriptors_.normalized(sums[k], {self, other});
+            out[self].push_back({static_cast<float>(value), other});
+          }
+        }
+        for (std::size_t k = 0; k < count; ++k) {
+          keep_best(out[begin + k], most);
+          out[begin + k].shrink_to_fit();
+        }
+      });
+  return out;
+}
+
+std::vector<Likeness> LikenessModel::compare(const std::vector<Edge>& edges) const {
+  const std::vector<double> similar = similarities(edges), agreed = agreements(edges);
+  std::vector<Likeness> out(edges.size());
+  for (std::size_t k = 0; k < edges.size(); ++k)
+    out[k] = {edges[k], static_cast<float>(descriptors_.normalized(similar[k], edges[k]) +
+                                           key_points_.normalized(agreed[k], edges[k]))};
+  return out;
+}
+
+Partners with_third_clouds(const std::vector<Likeness>& known, std::size_t n, std::size_t most,
+                           std::size_t threads) {
+  Partners direct(n), out(n);
+  for (const Likeness& pair : known) {
+    direct[pair.edge.first].push_back({pair.value, pair.edge.second});
+    direct[pair.edge.second].push_back({pair.value, pair.edge.first});
+  }
+  for_each_on(
+      threads, n, [&] { return std::vector<float>(n); },
+      [&](std::size_t self, std::vector<float>& best) {
+        std::fill(best.begin(), best.end(), 0.0f);
+        for (const Partner& third : direct[self]) {
+          if (third.value <= 0) continue;
+          for (const Partner& far : direct[third.cloud])
+            best[far.cloud] = std::max(best[far.cloud], std::min(third.value, far.value));
+        }
+        best[self] = 0;
+        for (const Partner& partner : direct[self]) {
+          out[self].push_back({partner.value + best[partner.cloud], partner.cloud});
+          best[partner.cloud] = 0;
+        }
+        for (std::size_t cloud = 0; cloud < n; ++cloud)
+          if (best[cloud] > 0)
+            out[self].push_back({best[cloud], static_cast<std::uint32_t>(cloud)});
+        keep_best(out[self], most);
+      });
+  return out;
+}
+
+std::vector<Edge> edges_of(const Partners& partners) {
+  std::vector<Edge> edges;
+  for (std::size_t k = 0; k < partners.size(); ++k)
+    for (const Partner& partner : partners[k])
+      edges.emplace_back(std::minmax(static_cast<std::uint32_t>(k), partner.cloud));
+  std::sort(edges.begin(), edges.end());
+  edges.erase(std::unique(edges.begin(), edges.end()), edges.end());
+  return edges;
+}
+
+}  // namespace gpureg::pruning
