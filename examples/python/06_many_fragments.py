@@ -46,7 +46,7 @@ def main() -> None:
     )
     pairs = nearest(fragments)
     kept = [(i, j) for i, j in pairs.tolist() if j <= numbers[-1]]
-    print(f"descriptors and search in {nearest.seconds:.1f} s")
+    print(f"summaries and search in {nearest.seconds:.1f} s")
     print(pruning.measure(kept, aligned_pairs(complete), len(numbers)))
 
     # All fragments, pruned. An interrupted run goes on where it stopped.

@@ -16,13 +16,20 @@ namespace {
 constexpr float kTolerance = 0.6f, kShortest = 0.8f;
 /// Largest difference of cosines between compatible matches.
 constexpr float kMaxTurn = 0.3f;
-/// Key points per cloud fit into eight bits, so that a product and a point fit into one integer.
-constexpr std::int32_t kPoints = 256;
-/// Points of the target whose products are computed together.
-constexpr std::size_t kBlock = 16;
+/// A key is the product of two features and the place of a key point counted from the end: below
+/// 127 * 127 * 256 + 256, which a float holds exactly, as it does every sum on the way there.
+constexpr float kPoints = 256;
+constexpr float kNone = -1;
+/// Dimensions that are summed together.
+constexpr std::size_t kDimensions = 4;
 
-std::uint32_t point_of(std::int32_t key) {
-  return static_cast<std::uint32_t>(kPoints - 1 - (key & (kPoints - 1)));
+float key_of(float product, std::size_t point) {
+  return std::max(product, 0.0f) * kPoints + (kPoints - 1 - static_cast<float>(point));
+}
+
+std::uint32_t point_of(float key) {
+  return static_cast<std::uint32_t>(kPoints) - 1 -
+         static_cast<std::uint32_t>(key) % static_cast<std::uint32_t>(kPoints);
 }
 
 int count_bits(std::uint64_t bits) { return static_cast<int>(std::bitset<64>(bits).count()); }
@@ -59,12 +66,10 @@ void Agreement::set_target(const Summary& target) {
   target_ = &target;
   const std::size_t points = target.points.size();
   dimension_ = points > 0 ? target.features.size() / points : 0;
-  blocks_ = (points + kBlock - 1) / kBlock;
-  columns_.assign(dimension_ * blocks_ * kBlock, 0.0f);
+  columns_.assign((dimension_ + kDimensions - 1) / kDimensions * kDimensions * points, 0.0f);
   for (std::size_t j = 0; j < points; ++j)
     for (std::size_t d = 0; d < dimension_; ++d)
-      columns_[(j / kBlock * dimension_ + d) * kBlock + j % kBlock] =
-          static_cast<float>(target.features[j * dimension_ + d]);
+      columns_[d * points + j] = static_cast<float>(target.features[j * dimension_ + d]);
 }
 
 double Agreement::with(const Summary& source) {
@@ -74,50 +79,54 @@ double Agreement::with(const Summary& source) {
   return portable::log(1 + std::sqrt(strongest_support()));
 }
 
-/// Pairs of key points that are among the most similar of each other.
+/// products_ of a key point with those of the target.
+void Agreement::multiply(const Summary& source, std::size_t point) {
+  const std::size_t columns = target_->points.size();
+  feature_.assign(columns_.size() / columns, 0.0f);
+  for (std::size_t d = 0; d < dimension_; ++d)
+    feature_[d] = static_cast<float>(source.features[point * dimension_ + d]);
+  products_.assign(columns, 0.0f);
+  float* products = products_.data();
+  for (std::size_t d = 0; d < feature_.size(); d += kDimensions) {
+    const float *f = feature_.data() + d, *first = columns_.data() + d * columns,
+                *second = first + columns, *third = second + columns, *fourth = third + columns;
+    for (std::size_t j = 0; j < columns; ++j)
+      products[j] += f[0] * first[j] + f[1] * second[j] + f[2] * third[j] + f[3] * fourth[j];
+  }
+}
+
+/// Pairs of key points that are among the two most similar of each other.
 void Agreement::match(const Summary& source) {
   const std::size_t rows = source.points.size(), columns = target_->points.size();
-  for (Best* best : {&of_source_, &of_target_}) {
-    const std::size_t points = best == &of_source_ ? rows : columns;
-    best->first.assign(points, -1);
-    best->second.assign(points, -1);
-  }
-  products_.resize(blocks_ * kBlock);
-  std::vector<float> feature(dimension_);
+  for (std::vector<float>* best : {&of_source_.first, &of_source_.second})
+    best->assign(rows, kNone);
+  for (std::vector<float>* best : {&of_target_.first, &of_target_.second})
+    best->assign(columns, kNone);
   for (std::size_t i = 0; i < rows; ++i) {
-    for (std::size_t d = 0; d < dimension_; ++d)
-      feature[d] = static_cast<float>(source.features[i * dimension_ + d]);
-    for (std::size_t block = 0; block < blocks_; ++block) {
-      // Products of integers below 2^24: any order of the sums is exact.
-      float sums[kBlock] = {};
-      const float* column = columns_.data() + block * dimension_ * kBlock;
-      for (std::size_t d = 0; d < dimension_; ++d)
-        for (std::size_t j = 0; j < kBlock; ++j) sums[j] += feature[d] * column[d * kBlock + j];
-      std::copy(sums, sums + kBlock,
-                products_.begin() + static_cast<std::ptrdiff_t>(block * kBlock));
-    }
+    multiply(source, i);
     const float* products = products_.data();
-    std::int32_t first = -1, second = -1;
-    std::int32_t *firsts = of_target_.first.data(), *seconds = of_target_.second.data();
-    const std::int32_t own = kPoints - 1 - static_cast<std::int32_t>(i);
+    float *firsts = of_target_.first.data(), *seconds = of_target_.second.data();
     for (std::size_t j = 0; j < columns; ++j) {
-      const std::int32_t product = std::max(0, static_cast<std::int32_t>(products[j])) * kPoints;
-      const std::int32_t key = product + kPoints - 1 - static_cast<std::int32_t>(j);
+      const float key = key_of(products[j], i);
+      seconds[j] = std::max(seconds[j], std::min(firsts[j], key));
+      firsts[j] = std::max(firsts[j], key);
+    }
+    float first = kNone, second = kNone;
+    for (std::size_t j = 0; j < columns; ++j) {
+      const float key = key_of(products[j], j);
       second = std::max(second, std::min(first, key));
       first = std::max(first, key);
-      seconds[j] = std::max(seconds[j], std::min(firsts[j], product + own));
-      firsts[j] = std::max(firsts[j], product + own);
     }
     of_source_.first[i] = first;
     of_source_.second[i] = second;
   }
   matches_.clear();
   for (std::uint32_t i = 0; i < rows; ++i)
-    for (const std::int32_t key : {of_source_.first[i], of_source_.second[i]}) {
-      if (key < 0) continue;
+    for (const float key : {of_source_.first[i], of_source_.second[i]}) {
+      if (key == kNone) continue;
       const std::uint32_t j = point_of(key);
-      for (const std::int32_t back : {of_target_.first[j], of_target_.second[j]})
-        if (back >= 0 && point_of(back) == i) matches_.push_back({i, j});
+      for (const float back : {of_target_.first[j], of_target_.second[j]})
+        if (back != kNone && point_of(back) == i) matches_.push_back({i, j});
     }
 }
 

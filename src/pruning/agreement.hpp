@@ -20,6 +20,7 @@ class Agreement {
   double with(const Summary& source);
 
  private:
+  void multiply(const Summary& source, std::size_t point);
   void match(const Summary& source);
   void compare(const Summary& source);
   double strongest_support() const;
@@ -27,13 +28,14 @@ class Agreement {
   struct Match {
     std::uint32_t source, target;
   };
+  /// Per key point the keys of the two most similar of the other cloud: product and point.
   struct Best {
-    std::vector<std::int32_t> first, second;
+    std::vector<float> first, second;
   };
   const Summary* target_ = nullptr;
-  std::size_t dimension_ = 0, blocks_ = 0;
-  std::vector<float> columns_;  ///< features of the target: block of points, dimension, point
-  std::vector<float> products_;
+  std::size_t dimension_ = 0;
+  std::vector<float> columns_;  ///< features of the target, transposed; zeros fill the last four
+  std::vector<float> products_, feature_;
   Best of_source_, of_target_;
   std::vector<Match> matches_;
   std::size_t width_ = 0;                   ///< words of a row of bits
