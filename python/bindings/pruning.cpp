@@ -4,29 +4,30 @@
 #include <pybind11/numpy.h>
 
 #include "bindings.hpp"
+#include "cloud.hpp"
 
 namespace gpureg::python {
 namespace {
 
-using FloatArray = py::array_t<float, py::array::c_style>;
+using Floats = py::array_t<float, py::array::c_style>;
 
-pruning::FeatureView view_of(const FloatArray& rows, const char* name) {
+pruning::FeatureView view_of(const Floats& rows, const char* name) {
   if (rows.ndim() != 2) throw py::type_error(std::string(name) + ": not a matrix");
   return {rows.data(), static_cast<std::size_t>(rows.shape(0)),
           static_cast<std::size_t>(rows.shape(1))};
 }
 
-pruning::Matrix matrix_from(const FloatArray& rows, const char* name) {
+pruning::Matrix matrix_from(const Floats& rows, const char* name) {
   const pruning::FeatureView view = view_of(rows, name);
   return {std::vector<float>(view.data, view.data + view.size * view.dimension), view.size,
           view.dimension};
 }
 
-FloatArray learn(const py::list& clouds, std::uint32_t most) {
-  std::vector<FloatArray> kept;
+Floats learn(const py::list& clouds, std::uint32_t most) {
+  std::vector<Floats> kept;
   std::vector<pruning::FeatureView> views;
   for (const py::handle cloud : clouds) {
-    kept.push_back(cloud.cast<FloatArray>());
+    kept.push_back(cloud.cast<Floats>());
     views.push_back(view_of(kept.back(), "features"));
   }
   pruning::Matrix words;
@@ -34,21 +35,21 @@ FloatArray learn(const py::list& clouds, std::uint32_t most) {
     const py::gil_scoped_release release;
     words = pruning::learn_words(views, most);
   }
-  FloatArray out({static_cast<py::ssize_t>(words.rows), static_cast<py::ssize_t>(words.columns)});
+  Floats out({static_cast<py::ssize_t>(words.rows), static_cast<py::ssize_t>(words.columns)});
   std::copy(words.data.begin(), words.data.end(), out.mutable_data());
   return out;
 }
 
-FloatArray descriptor(const FloatArray& features, const FloatArray& words) {
+Floats descriptor(const Floats& features, const Floats& words) {
   const std::vector<float> out =
       pruning::describe(view_of(features, "features"), matrix_from(words, "words"));
-  return FloatArray(static_cast<py::ssize_t>(out.size()), out.data());
+  return Floats(static_cast<py::ssize_t>(out.size()), out.data());
 }
 
-pruning::Summary summary(const PreparedCloud& cloud, const FloatArray& words) {
+pruning::Summary summary(const Cloud& cloud, const Floats& words) {
   const pruning::Matrix rows = matrix_from(words, "words");
   const py::gil_scoped_release release;
-  return pruning::summarize(cloud, rows);
+  return pruning::summarize(cloud.prepared, rows);
 }
 
 py::array_t<std::int64_t> likely(const std::vector<pruning::Summary>& summaries,
@@ -78,8 +79,8 @@ void bind_pruning(py::module_& m) {
   py::class_<pruning::Summary>(m, "CloudSummary")
       .def_property_readonly("descriptor",
                              [](const pruning::Summary& own) {
-                               return FloatArray(static_cast<py::ssize_t>(own.descriptor.size()),
-                                                 own.descriptor.data());
+                               return Floats(static_cast<py::ssize_t>(own.descriptor.size()),
+                                             own.descriptor.data());
                              })
       .def("__len__", [](const pruning::Summary& own) { return own.points.size(); });
   m.def("summarize_cloud", &summary, py::arg("cloud"), py::arg("words"));
