@@ -55,8 +55,10 @@ class MapEdge:
         Numbers of fragments.
     target_from_source : (4, 4) float64
         As registered.
-    confidence, map_confidence, weight : float
-        After loop consistency; in view of the finished map and its audit; in the pose graph.
+    confidence, weight : float
+        After loop consistency; in the pose graph.
+    map_confidence : float
+        In view of the finished map and its audit.
     accepted : bool
     reason : str
         "none", "inconsistent" or "unconfirmed".
