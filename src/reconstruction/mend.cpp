@@ -79,7 +79,7 @@ Parts parts_of(const std::vector<UnalignedIsometry3d>& poses, const Audit& found
 std::vector<char> bent_scans(const Parts& parts, const Audit& found) {
   std::vector<char> out(parts.size(), 0);
   for (const AuditedPair& pair : found.pairs)
-    if (parts[pair.source] == parts[pair.target] && pair.verdict != PairVerdict::supports &&
+    if (parts[pair.source] == parts[pair.target] && pair.verdict == PairVerdict::contradicts &&
         pair.shift > kMoved)
       out[pair.source] = out[pair.target] = 1;
   return out;
