@@ -7,37 +7,21 @@ usage: bag_to_tum.py BAG FOLDER [--colour TOPIC] [--depth TOPIC]
 BAG is a file of ROS 1 or a folder of ROS 2. FOLDER gets TUM's layout, and a camera.yaml where the
 bag has the CameraInfo of the colour camera. Depth images need to be registered to the colour
 camera. Topics that are not named are the only ones of their kind. Needs rosbags
-(python3 -m pip install rosbags), which brings numpy.
+and pillow (python3 -m pip install rosbags pillow).
 """
 
 import argparse
-import struct
 import sys
-import zlib
 from pathlib import Path
 
 import numpy as np
-from rosbags.highlevel import AnyReader
+from PIL import Image
+from rosbags.highlevel import AnyReader, AnyReaderError
 
 IMAGE, INFO = "sensor_msgs/msg/Image", "sensor_msgs/msg/CameraInfo"
 COLOUR = {"rgb8": 3, "bgr8": 3, "rgba8": 4, "bgra8": 4, "mono8": 1}  # channels
 DEPTH = {"16UC1": 0.001, "mono16": 0.001, "32FC1": 1}  # metres of a value
 TUM_DEPTH_UNITS = 5000  # values per metre
-
-
-def png(image):
-    """The bytes of an image of 8 or 16 bits and one or three channels."""
-    rows = image.reshape(image.shape[0], -1)
-    rows = rows.astype(rows.dtype.newbyteorder(">")).view(np.uint8)
-    rows = np.insert(rows, 0, 0, axis=1)  # no filter
-    colour = 2 if image.ndim > 2 else 0
-    head = struct.pack(">IIBB3x", image.shape[1], image.shape[0], 8 * image.itemsize, colour)
-    chunks = {b"IHDR": head, b"IDAT": zlib.compress(rows.tobytes(), 1), b"IEND": b""}
-    out = b"\x89PNG\r\n\x1a\n"
-    for kind, data in chunks.items():
-        out += struct.pack(">I", len(data)) + kind + data
-        out += struct.pack(">I", zlib.crc32(kind + data))
-    return out
 
 
 def pixels(message, dtype, channels):
@@ -48,20 +32,20 @@ def pixels(message, dtype, channels):
     return rows.reshape(message.height, message.width, channels).astype(dtype.newbyteorder("="))
 
 
-def colour_png(message):
+def colour_image(message):
     image = pixels(message, np.uint8, COLOUR[message.encoding])
     if image.shape[2] == 1:
-        return png(image[:, :, 0])
+        return image[:, :, 0]
     order = (2, 1, 0) if message.encoding.startswith("bgr") else (0, 1, 2)
-    return png(np.ascontiguousarray(image[:, :, order]))
+    return np.ascontiguousarray(image[:, :, order])
 
 
-def depth_png(message):
+def depth_image(message):
     metres = pixels(message, np.float32 if message.encoding == "32FC1" else np.uint16, 1)[:, :, 0]
     values = metres * DEPTH[message.encoding] * TUM_DEPTH_UNITS
     values = np.rint(np.nan_to_num(values, posinf=0, neginf=0))
     values[(values < 0) | (values > 65535)] = 0
-    return png(values.astype(np.uint16))
+    return values.astype(np.uint16)
 
 
 def choose(kind, wanted, known, reader):
@@ -104,8 +88,8 @@ def camera_yaml(info):
 def convert(bag, folder, colour, depth):
     with AnyReader([bag]) as reader:
         topics = {
-            choose("colour", colour, COLOUR, reader): ("rgb", colour_png),
-            choose("depth", depth, DEPTH, reader): ("depth", depth_png),
+            choose("colour", colour, COLOUR, reader): ("rgb", colour_image),
+            choose("depth", depth, DEPTH, reader): ("depth", depth_image),
         }
         info_topic = str(Path(next(iter(topics))).parent / "camera_info")
         lists = {name: [] for name, _ in topics.values()}
@@ -119,10 +103,10 @@ def convert(bag, folder, colour, depth):
                 if not camera.exists():
                     camera.write_text(camera_yaml(message))
                 continue
-            name, encode = topics[connection.topic]
+            name, pixels_of = topics[connection.topic]
             stamp = message.header.stamp
             file = f"{name}/{stamp.sec}.{stamp.nanosec:09d}.png"
-            (folder / file).write_bytes(encode(message))
+            Image.fromarray(pixels_of(message)).save(folder / file)
             lists[name].append(f"{file[len(name) + 1 : -4]} {file}\n")
     for name, lines in lists.items():
         (folder / f"{name}.txt").write_text("".join(sorted(lines)))
@@ -136,7 +120,10 @@ if __name__ == "__main__":
     parser.add_argument("--colour", help="topic of the colour images")
     parser.add_argument("--depth", help="topic of the depth images, registered to colour")
     args = parser.parse_args()
-    counts = convert(args.bag, args.folder, args.colour, args.depth)
+    try:
+        counts = convert(args.bag, args.folder, args.colour, args.depth)
+    except (AnyReaderError, OSError) as error:
+        raise SystemExit(f"bag_to_tum: {args.bag}: {error}") from error
     print(f"{counts['rgb']} colour and {counts['depth']} depth images in {args.folder}")
     if not (args.folder / "camera.yaml").exists():
         print("no CameraInfo: name the camera by slam_demo --camera", file=sys.stderr)

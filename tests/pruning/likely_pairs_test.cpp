@@ -4,6 +4,7 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <random>
 #include <set>
 
@@ -200,8 +201,16 @@ TEST(LikelyPairs, SimilarDescriptorsAreThoseOfBruteForce) {
   }
   const pruning::LikenessModel model(clouds, 2);
   const Partners all = model.similar(clouds.size()), some = model.similar(4);
-  for (std::size_t k = 0; k < clouds.size(); ++k) {
+  // Without key points, pairs compared one by one, in double, are alike by their descriptors.
+  std::vector<pruning::Edge> edges;
+  for (std::uint32_t a = 0; a < clouds.size(); ++a)
+    for (std::uint32_t b = a + 1; b < clouds.size(); ++b) edges.emplace_back(a, b);
+  std::map<pruning::Edge, float> expected;
+  for (const pruning::Likeness& pair : model.compare(edges)) expected[pair.edge] = pair.value;
+  for (std::uint32_t k = 0; k < clouds.size(); ++k) {
     ASSERT_EQ(all[k].size(), clouds.size() - 1);
+    for (const pruning::Partner& partner : all[k])
+      EXPECT_NEAR(partner.value, expected.at(std::minmax(k, partner.cloud)), 1e-5f);
     ASSERT_EQ(some[k].size(), 4u);
     for (std::size_t p = 0; p + 1 < all[k].size(); ++p)
       EXPECT_GE(all[k][p].value, all[k][p + 1].value);

@@ -26,7 +26,8 @@ struct AuditOptions {
   /// Pairs of one scan that are looked at, 2 to 10000: the nearest half, others evenly chosen.
   std::uint32_t most_pairs = 40;
 
-  /// Every length from the voxel size of the registration.
+  /// Every length from the voxel size of the registration; max_shift beyond 5 cm by its fourth
+  /// root.
   /// @throws InvalidArgument unless voxel_size is finite and > 0.
   static AuditOptions from_voxel_size(float voxel_size);
 

@@ -2,16 +2,15 @@
 """apps/slam_demo/bag_to_tum.py: bags of ROS 1, ROS 2 and MCAP as TUM's layout."""
 
 import pathlib
-import struct
 import subprocess
 import sys
-import zlib
 
 import numpy as np
 import pytest
 
 pytest.importorskip("rosbags")
 
+from PIL import Image
 from rosbags.rosbag1 import Writer as Writer1
 from rosbags.rosbag2 import StoragePlugin
 from rosbags.rosbag2 import Writer as Writer2
@@ -74,14 +73,7 @@ def convert(bag, folder, *words):
 
 
 def read_png(path):
-    """Of a file without filters."""
-    data = path.read_bytes()
-    width, height, bits, colour = struct.unpack(">IIBB", data[16:26])
-    start = data.index(b"IDAT")
-    (length,) = struct.unpack(">I", data[start - 4 : start])
-    rows = np.frombuffer(zlib.decompress(data[start + 4 : start + 4 + length]), np.uint8)
-    rows = rows.reshape(height, -1)[:, 1:].copy().view(">u2" if bits == 16 else "u1")
-    return rows.reshape(height, width, 3) if colour == 2 else rows
+    return np.asarray(Image.open(path))
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -120,3 +112,14 @@ def test_the_error_names_the_topic(tmp_path, leave_out, words, message):
     assert message in done.stderr
     assert "/rgb/camera_info (sensor_msgs/msg/CameraInfo)" in done.stderr
     assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize("text", [None, "no bag"])
+def test_what_is_no_bag_is_named(tmp_path, text):
+    bag = tmp_path / "a.bag"
+    if text is not None:
+        bag.write_text(text)
+    done = convert(bag, tmp_path / "out")
+    assert done.returncode == 1
+    assert f"bag_to_tum: {bag}: " in done.stderr
+    assert "Traceback" not in done.stderr
