@@ -7,7 +7,7 @@
 
 #include "loop_closure/paths.hpp"
 #include "math/exponential.hpp"
-#include "reconstruction/pair_verdicts.hpp"
+#include "reconstruction/audit/pair_verdicts.hpp"
 
 namespace gpureg::loop_closure {
 namespace {

@@ -28,21 +28,21 @@ constexpr double kMostOff = 1.5, kMostTurn = 0.148;
 }  // namespace
 
 void Connection::add(const Edge& edge, bool lone) {
-  if (!edge.accepted) {
-    rejected_wrong_ *= 1 - std::min(edge.confidence, kMostConfidence);
-    return;
-  }
+  // Registrations of one map fail together: each scan is counted once, for and against.
+  std::vector<std::uint32_t>& used = edge.accepted ? used_ : used_against_;
+  double& all_wrong = edge.accepted ? accepted_wrong_ : rejected_wrong_;
   if (lone) {
-    accepted_wrong_ *= 1 - std::min(edge.confidence, kMostConfidence);
+    all_wrong *= 1 - std::min(edge.confidence, kMostConfidence);
     return;
   }
   const auto counted = [&](std::uint32_t scan) {
-    return std::find(used_.begin(), used_.end(), scan) != used_.end();
+    return std::find(used.begin(), used.end(), scan) != used.end();
   };
   if (counted(edge.source) || counted(edge.target)) return;
-  const double wrong = 1 - std::min({edge.confidence, edge.pair_confidence, kMostConfidence});
-  accepted_wrong_ *= used_.empty() ? wrong : std::max(kLeastWrong, wrong);
-  used_.insert(used_.end(), {edge.source, edge.target});
+  const double wrong =
+      1 - std::min({edge.confidence, edge.accepted ? edge.pair_confidence : 1, kMostConfidence});
+  all_wrong *= used.empty() ? wrong : std::max(kLeastWrong, wrong);
+  used.insert(used.end(), {edge.source, edge.target});
 }
 
 double Connection::confidence() const {

@@ -27,7 +27,7 @@ class Connection {
 
  private:
   double accepted_wrong_ = 1, rejected_wrong_ = 1;  ///< probabilities that all of them are wrong
-  std::vector<std::uint32_t> used_;                 ///< scans of accepted edges that counted
+  std::vector<std::uint32_t> used_, used_against_;  ///< scans of edges that counted
 };
 
 /// Indices of the edges, the most confident first.

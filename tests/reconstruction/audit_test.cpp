@@ -9,8 +9,8 @@
 
 #include "gpureg/error.hpp"
 #include "gpureg/reconstruction/mend.hpp"
-#include "reconstruction/blame.hpp"
-#include "reconstruction/near_pairs.hpp"
+#include "reconstruction/audit/blame.hpp"
+#include "reconstruction/audit/near_pairs.hpp"
 #include "support/registration_result.hpp"
 #include "support/scan.hpp"
 
@@ -39,8 +39,8 @@ std::vector<AuditedPair> path_of(std::uint32_t scans, std::uint32_t slip) {
   return pairs;
 }
 
-std::vector<AuditedConnection> judged(std::uint32_t scans, const std::vector<AuditedPair>& pairs) {
-  return judge_connections(std::vector<std::uint32_t>(scans, 0), {}, pairs, {});
+std::vector<AuditedConnection> judged(std::uint32_t scans, std::vector<AuditedPair> pairs) {
+  return judge_connections(std::vector<std::uint32_t>(scans, 0), {}, {}, {}, pairs);
 }
 
 TEST(Connections, ASlipIsFoundWhereItIs) {
@@ -91,7 +91,7 @@ TEST(Connections, EdgesDoNotConfirmThemselves) {
       pair = pair_of(pair.source, pair.target, 1.5);
     else if (pair.log_likelihood_ratio < 0)
       pair = pair_of(pair.source, pair.target, -3.5);
-  const auto connections = judge_connections(std::vector<std::uint32_t>(20, 0), bonds, pairs, {});
+  const auto connections = judge_connections(std::vector<std::uint32_t>(20, 0), bonds, {}, {}, pairs);
   EXPECT_EQ(connections[0].verdict, ConnectionVerdict::contradicted);
   EXPECT_EQ(connections[0].scans.size(), 10u);
 }
@@ -107,7 +107,7 @@ TEST(Connections, ABentCornerIsNoWrongPlace) {
     pairs.push_back(pair_of(k, 0, k <= 14 ? 0.7 : -1));
     if (k <= 14) bonds.push_back({k, 0, 0.99});
   }
-  const auto connections = judge_connections(std::vector<std::uint32_t>(21, 0), bonds, pairs, {});
+  const auto connections = judge_connections(std::vector<std::uint32_t>(21, 0), bonds, {}, {}, pairs);
   for (const AuditedConnection& connection : connections)
     EXPECT_NE(connection.verdict, ConnectionVerdict::contradicted);
 }

@@ -55,6 +55,10 @@ struct AuditedPair {
   double observed = 0;   ///< the larger share of points in the view of the other scan, [0, 1]
   double violation = 0;  ///< of these, the larger share that lies in free space, [0, 1]
   double shift = 0;      ///< RMS distance by which ICP moves the scans' overlap, metres
+  /// Where ICP puts the scans; where it was not asked, the pose of the map.
+  UnalignedIsometry3d refined = UnalignedIsometry3d::Identity();
+  Eigen::Vector3d overlap_centre = Eigen::Vector3d::Zero();  ///< in the source's frame, metres
+  Eigen::Matrix3d overlap_spread = Eigen::Matrix3d::Zero();  ///< covariance of its points
 };
 
 enum class ConnectionVerdict {
@@ -65,7 +69,8 @@ enum class ConnectionVerdict {
 const char* to_string(ConnectionVerdict verdict);
 
 /// A place where a map would fall into two parts: all pairs across it are judged together. Pairs of
-/// one scan fail together: for each scan only the strongest pair of either kind counts.
+/// one scan fail together: every further one counts less. Pairs that ICP moves by one and the same
+/// motion contradict it, too, however small the motion is.
 struct AuditedConnection {
   std::vector<std::uint32_t> scans;  ///< the smaller part, ascending
   ConnectionVerdict verdict = ConnectionVerdict::undecided;

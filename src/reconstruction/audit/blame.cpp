@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "reconstruction/blame.hpp"
+#include "reconstruction/audit/blame.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -7,19 +7,22 @@
 #include <numeric>
 #include <set>
 
+#include "reconstruction/audit/common_shift.hpp"
+
 namespace gpureg::reconstruction {
 namespace {
 
 /// Log odds of a connection before its pairs are heard.
 constexpr double kPrior = 3;
-/// An edge of the graph comes before any support that nobody registered.
-constexpr double kOfBond = 10;
+/// An edge of the graph comes before any support that nobody registered. Pairs that ICP moves, of
+/// which those across a slip are, come late: a slip is then in one edge of the tree.
+constexpr double kOfBond = 10, kOfShift = 0.5;
 
 /// A spanning forest with, for each scan, the way to the root of its island.
 class Forest {
  public:
   Forest(const std::vector<std::uint32_t>& islands, const std::vector<Bond>& bonds,
-         const std::vector<AuditedPair>& pairs)
+         const std::vector<AuditedPair>& pairs, double noise)
       : islands_(islands), parent_(islands.size()), tree_(islands.size()) {
     std::iota(parent_.begin(), parent_.end(), 0u);
     struct Candidate {
@@ -31,7 +34,9 @@ class Forest {
       candidates.push_back({kOfBond + bond.confidence, bond.a, bond.b});
     for (const AuditedPair& pair : pairs)
       if (pair.log_likelihood_ratio > 0)
-        candidates.push_back({pair.log_likelihood_ratio + pair.overlap, pair.target, pair.source});
+        candidates.push_back(
+            {pair.log_likelihood_ratio + pair.overlap - kOfShift * pair.shift / noise, pair.target,
+             pair.source});
     std::stable_sort(candidates.begin(), candidates.end(),
                      [](const Candidate& x, const Candidate& y) { return x.weight > y.weight; });
     for (const Candidate& candidate : candidates) join(candidate.a, candidate.b);
@@ -137,28 +142,52 @@ class Sum {
   double sum_ = 0;
 };
 
-/// @param explained contradictions that another connection answers for: they do not count.
-AuditedConnection judge(std::vector<std::size_t> across, const std::vector<AuditedPair>& pairs,
-                        const std::vector<char>& bonded, const std::vector<char>& explained,
+/// ICP's noise in a right map, of the margin.
+constexpr double kNoise = 0.2;
+
+/// Log likelihood ratios of the pairs across a connection, with what a common shift says of those
+/// that seem to support it.
+std::vector<double> ratios_of(const std::vector<std::size_t>& across,
+                              const std::vector<AuditedPair>& pairs, const std::vector<char>& below,
+                              const std::vector<UnalignedIsometry3d>& world_from_scan,
+                              double noise) {
+  std::vector<double> out;
+  std::vector<std::size_t> supporters, places;
+  for (const std::size_t k : across) {
+    if (pairs[k].log_likelihood_ratio > 0) {
+      supporters.push_back(k);
+      places.push_back(out.size());
+    }
+    out.push_back(pairs[k].log_likelihood_ratio);
+  }
+  if (world_from_scan.empty()) return out;
+  const std::vector<double> says = common_shift(pairs, supporters, below, world_from_scan, noise);
+  for (std::size_t k = 0; k < says.size(); ++k)
+    if (says[k] < 0) out[places[k]] = says[k];
+  return out;
+}
+
+/// @param ratios of the pairs, in the order of `across`.
+AuditedConnection judge(const std::vector<std::size_t>& across, const std::vector<double>& ratios,
+                        const std::vector<AuditedPair>& pairs, const std::vector<char>& bonded,
                         bool lone, const AuditOptions& options) {
-  across.erase(std::remove_if(across.begin(), across.end(),
-                              [&](std::size_t k) { return explained[k] != 0; }),
-               across.end());
-  std::stable_sort(across.begin(), across.end(), [&](std::size_t a, std::size_t b) {
-    return std::abs(pairs[a].log_likelihood_ratio) > std::abs(pairs[b].log_likelihood_ratio);
+  std::vector<std::size_t> order(across.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
+    return std::abs(ratios[a]) > std::abs(ratios[b]);
   });
   AuditedConnection out;
   Sum supports, contradictions;
-  for (const std::size_t k : across) {
-    const AuditedPair& pair = pairs[k];
-    if (pair.log_likelihood_ratio < 0) {
-      contradictions.add(pair, pair.log_likelihood_ratio);
+  for (const std::size_t at : order) {
+    const std::size_t k = across[at];
+    if (ratios[at] < 0) {
+      contradictions.add(pairs[k], ratios[at]);
       out.contradictions.push_back(k);
       ++out.contradicting;
     } else {
       // An edge was chosen because its pair looks right: it is part of what is judged. A single
       // scan that was registered with its neighbours has no other support.
-      if (lone || !bonded[k]) supports.add(pair, pair.log_likelihood_ratio);
+      if (lone || !bonded[k]) supports.add(pairs[k], ratios[at]);
       ++out.supporting;
     }
   }
@@ -173,11 +202,12 @@ AuditedConnection judge(std::vector<std::size_t> across, const std::vector<Audit
 
 }  // namespace
 
-std::vector<AuditedConnection> judge_connections(const std::vector<std::uint32_t>& islands,
-                                                 const std::vector<Bond>& bonds,
-                                                 const std::vector<AuditedPair>& pairs,
-                                                 const AuditOptions& options) {
-  const Forest forest(islands, bonds, pairs);
+std::vector<AuditedConnection> judge_connections(
+    const std::vector<std::uint32_t>& islands, const std::vector<Bond>& bonds,
+    const std::vector<UnalignedIsometry3d>& world_from_scan, const AuditOptions& options,
+    std::vector<AuditedPair>& pairs) {
+  const double noise = kNoise * options.max_shift;
+  const Forest forest(islands, bonds, pairs, noise);
   std::set<std::pair<std::uint32_t, std::uint32_t>> held;
   for (const Bond& bond : bonds) held.insert(std::minmax(bond.a, bond.b));
   std::vector<char> bonded(pairs.size(), 0);
@@ -191,10 +221,19 @@ std::vector<AuditedConnection> judge_connections(const std::vector<std::uint32_t
   std::map<std::uint32_t, std::size_t> sizes;
   for (const std::uint32_t island : islands) ++sizes[island];
   std::vector<char> explained(pairs.size(), 0);
+  std::vector<char> below(islands.size(), 0);
+  std::vector<double> ratios;
   const auto judged = [&](std::uint32_t scan) {
-    const std::size_t part = forest.size_below(scan);
-    return judge(across[scan], pairs, bonded, explained,
-                 std::min(part, sizes[islands[scan]] - part) == 1, options);
+    std::vector<std::size_t>& pairs_across = across[scan];
+    pairs_across.erase(std::remove_if(pairs_across.begin(), pairs_across.end(),
+                                      [&](std::size_t k) { return explained[k] != 0; }),
+                       pairs_across.end());
+    const std::vector<std::uint32_t> part = forest.below(scan);
+    for (const std::uint32_t k : part) below[k] = 1;
+    ratios = ratios_of(pairs_across, pairs, below, world_from_scan, noise);
+    for (const std::uint32_t k : part) below[k] = 0;
+    return judge(pairs_across, ratios, pairs, bonded,
+                 std::min(part.size(), sizes[islands[scan]] - part.size()) == 1, options);
   };
   // The worst first: what contradicts it contradicts the connections beside it, too, and is not
   // their fault.
@@ -211,8 +250,14 @@ std::vector<AuditedConnection> judge_connections(const std::vector<std::uint32_t
       waiting.insert({connection.confidence, scan});
       continue;
     }
-    if (connection.verdict == ConnectionVerdict::contradicted)
+    if (connection.verdict == ConnectionVerdict::contradicted) {
+      for (std::size_t k = 0; k < ratios.size(); ++k) {
+        AuditedPair& pair = pairs[across[scan][k]];
+        pair.log_likelihood_ratio = ratios[k];
+        if (ratios[k] < 0) pair.verdict = PairVerdict::contradicts;
+      }
       for (const std::size_t k : connection.contradictions) explained[k] = 1;
+    }
     connection.scans = forest.below(scan);
     const std::size_t whole = sizes[islands[scan]];
     if (2 * connection.scans.size() > whole) {

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "reconstruction/companions.hpp"
+#include "reconstruction/audit/companions.hpp"
 
 #include <algorithm>
 #include <cmath>
 #include <map>
 
-#include "reconstruction/pair_verdicts.hpp"
+#include "reconstruction/audit/pair_verdicts.hpp"
 
 namespace gpureg::reconstruction {
 namespace {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "reconstruction/path.hpp"
+#include "reconstruction/audit/path.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -12,12 +12,12 @@
 #include "fields/scale.hpp"
 #include "fields/validate.hpp"
 #include "gpureg/error.hpp"
-#include "reconstruction/blame.hpp"
-#include "reconstruction/companions.hpp"
-#include "reconstruction/edge_confidence.hpp"
-#include "reconstruction/near_pairs.hpp"
-#include "reconstruction/pair_verdicts.hpp"
-#include "reconstruction/path.hpp"
+#include "reconstruction/audit/blame.hpp"
+#include "reconstruction/audit/companions.hpp"
+#include "reconstruction/audit/edge_confidence.hpp"
+#include "reconstruction/audit/near_pairs.hpp"
+#include "reconstruction/audit/pair_verdicts.hpp"
+#include "reconstruction/audit/path.hpp"
 
 namespace gpureg::reconstruction {
 namespace {
@@ -85,7 +85,7 @@ Audit audit_of(const Context& context, const std::vector<PreparedCloud>& clouds,
     out.pairs.push_back(pair);
   }
   judge_new_pairs(context, clouds, registration, options, before, out.pairs);
-  out.connections = judge_connections(islands, bonds, out.pairs, options);
+  out.connections = judge_connections(islands, bonds, world_from_scan, options, out.pairs);
   return out;
 }
 

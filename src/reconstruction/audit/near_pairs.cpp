@@ -5,7 +5,7 @@
 #include <map>
 #include <set>
 
-#include "reconstruction/near_pairs.hpp"
+#include "reconstruction/audit/near_pairs.hpp"
 
 namespace gpureg::reconstruction {
 namespace {

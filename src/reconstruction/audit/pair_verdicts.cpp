@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "reconstruction/pair_verdicts.hpp"
+#include "reconstruction/audit/pair_verdicts.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -56,17 +56,24 @@ bool violates(const Violation& violation, double least = kViolation) {
   return violation.share > least && violation.points >= kLeastPoints;
 }
 
-/// RMS distance between two poses of the points that overlap at the second.
-double shift_of(const UnalignedIsometry3d& before, const PoseVerification& after) {
-  const CorrespondenceMoments& moments = after.source_moments;
-  if (moments.count == 0) return 0;
+/// Where the pair belongs, and the points that overlap there.
+void keep(const PoseVerification& pose, AuditedPair& out) {
+  out.refined = pose.target_from_source;
+  const CorrespondenceMoments& moments = pose.source_moments;
+  if (moments.count == 0) return;
   const auto count = static_cast<double>(moments.count);
-  const Eigen::Vector3d middle = moments.sum / count;
-  const Eigen::Matrix3d spread = moments.outer / count - middle * middle.transpose();
-  const UnalignedIsometry3d& moved = after.target_from_source;
+  out.overlap_centre = moments.sum / count;
+  out.overlap_spread =
+      moments.outer / count - out.overlap_centre * out.overlap_centre.transpose();
+}
+
+/// RMS distance between the poses of the overlap before and after.
+double shift_of(const AuditedPair& pair) {
+  const UnalignedIsometry3d &before = pair.target_from_source, &moved = pair.refined;
   const Eigen::Matrix3d turn = moved.linear() - before.linear();
-  return std::sqrt((moved * middle - before * middle).squaredNorm() +
-                   std::max(0.0, (turn * spread * turn.transpose()).trace()));
+  return std::sqrt(
+      (moved * pair.overlap_centre - before * pair.overlap_centre).squaredNorm() +
+      std::max(0.0, (turn * pair.overlap_spread * turn.transpose()).trace()));
 }
 
 double overlap_of(const PoseEvidence& e) { return std::max(e.source_overlap, e.target_overlap); }
@@ -111,8 +118,9 @@ void judge(const PoseVerification& given, const PoseVerification* refined, std::
   Violation violation = violation_of(given, points);
   double confidence = given.confidence;
   bool elsewhere = false, moved = false, stays = true;
+  keep(refined != nullptr ? *refined : given, out);
   if (refined != nullptr) {
-    out.shift = shift_of(out.target_from_source, *refined);
+    out.shift = shift_of(out);
     const Violation left = violation_of(*refined, points);
     stays = out.shift <= margin;
     if (stays) {

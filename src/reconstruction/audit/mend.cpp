@@ -7,9 +7,10 @@
 #include <numeric>
 #include <set>
 #include <string>
+#include <tuple>
 
 #include "gpureg/error.hpp"
-#include "reconstruction/near_pairs.hpp"
+#include "reconstruction/audit/near_pairs.hpp"
 
 namespace gpureg::reconstruction {
 namespace {
@@ -18,10 +19,12 @@ namespace {
 constexpr std::size_t kPairsOfScan = 24;
 /// Scans at either side of a break that are aligned, by their number in the set.
 constexpr std::uint32_t kBeside = 4;
-/// Within a part poses are right, from scan to scan up to so many metres and radians; less so
-/// beside scans that a false loop has bent.
-constexpr double kOfPart = 0.999, kShiftOfPart = 0.005, kTurnOfPart = 0.002, kShiftOfBent = 0.3,
-                 kTurnOfBent = 0.1;
+/// Within a part poses are right, from scan to scan up to so many metres and radians.
+constexpr double kOfPart = 0.999, kShiftOfPart = 0.005, kTurnOfPart = 0.002;
+/// What consecutive numbers say for two parts: the log odds of a connection that no pair speaks of.
+constexpr double kOfNumbers = 3;
+/// Parts of fewer scans are aligned anew, scan by scan: a false loop leaves them bent.
+constexpr std::size_t kLeastPart = 8;
 /// Shift from which a scan has another pose, metres, and the same for the entries of its rotation.
 constexpr double kMoved = 0.02;
 
@@ -39,49 +42,86 @@ std::vector<std::string> sides_of(std::size_t scans, const Audit& found) {
   return sides;
 }
 
-/// Scans on the same side of every contradicted connection are one part where pairs that support
-/// each other link them, or consecutive numbers without a contradiction: a connection may name a
-/// scan beside the break with the wrong part. A scan without support is a part by itself.
+/// What pairs between parts say of them.
+class Affinities {
+ public:
+  explicit Affinities(std::size_t scans) : between_(scans), part_(scans) {
+    std::iota(part_.begin(), part_.end(), 0u);
+  }
+
+  void add(std::uint32_t a, std::uint32_t b, double ratio) {
+    a = part_[a];
+    b = part_[b];
+    if (a == b) return;
+    between_[a][b] += ratio;
+    between_[b][a] += ratio;
+  }
+
+  /// Merges parts, the most supported first, as long as more is said for it than against it: greedy
+  /// additive edge contraction, Keuper et al. 2015.
+  Parts merged() {
+    std::set<std::tuple<double, std::uint32_t, std::uint32_t>> queue;
+    for (std::uint32_t a = 0; a < between_.size(); ++a)
+      for (const auto& [b, ratio] : between_[a])
+        if (a < b && ratio > 0) queue.insert({-ratio, a, b});
+    while (!queue.empty()) {
+      const auto [minus_ratio, a, b] = *queue.begin();
+      queue.erase(queue.begin());
+      for (const auto& [c, ratio] : between_[b]) {
+        if (ratio > 0) {
+          const auto [low, high] = std::minmax(b, c);
+          queue.erase({-ratio, low, high});
+        }
+        between_[c].erase(b);
+        if (c == a) continue;
+        double& sum = between_[a][c];
+        const auto [low, high] = std::minmax(a, c);
+        if (sum > 0) queue.erase({-sum, low, high});
+        sum += ratio;
+        between_[c][a] = sum;
+        if (sum > 0) queue.insert({-sum, low, high});
+      }
+      between_[b].clear();
+      for (std::uint32_t& part : part_)
+        if (part == b) part = a;
+    }
+    return part_;
+  }
+
+ private:
+  std::vector<std::map<std::uint32_t, double>> between_;
+  Parts part_;
+};
+
+/// Scans whose poses are right to each other as far as pairs say. Support across a contradicted
+/// connection counts for nothing: what stands between the parts may look alike.
 Parts parts_of(const std::vector<UnalignedIsometry3d>& poses, const Audit& found) {
   const auto scans = static_cast<std::uint32_t>(poses.size());
   const std::vector<std::string> sides = sides_of(scans, found);
-  Parts parts(scans);
-  std::iota(parts.begin(), parts.end(), 0u);
-  const auto root_of = [&](std::uint32_t k) {
-    while (parts[k] != k) k = parts[k] = parts[parts[k]];
-    return k;
-  };
-  const auto link = [&](std::uint32_t a, std::uint32_t b) { parts[root_of(a)] = root_of(b); };
-  std::set<std::pair<std::uint32_t, std::uint32_t>> contradicted;
-  std::vector<char> supported(scans, 0);
-  for (const AuditedPair& pair : found.pairs) {
-    if (pair.log_likelihood_ratio > 0 && sides[pair.source] == sides[pair.target]) {
-      link(pair.source, pair.target);
-      supported[pair.source] = supported[pair.target] = 1;
-    }
-    if (pair.log_likelihood_ratio < 0) contradicted.insert(std::minmax(pair.source, pair.target));
-  }
+  Affinities affinities(scans);
+  for (const AuditedPair& pair : found.pairs)
+    if (pair.log_likelihood_ratio < 0 || sides[pair.source] == sides[pair.target])
+      affinities.add(pair.source, pair.target, pair.log_likelihood_ratio);
+  Parts out = affinities.merged();
+  std::map<std::uint32_t, std::size_t> sizes;
+  for (const std::uint32_t part : out) ++sizes[part];
+  std::set<std::pair<std::uint32_t, std::uint32_t>> heard;
   for (std::uint32_t k = 0, last = kNoPart; k < scans; ++k) {
     if (!poses[k].matrix().allFinite()) continue;
-    if (supported[k] == 0) continue;
-    if (last != kNoPart && sides[last] == sides[k] && contradicted.count({last, k}) == 0)
-      link(last, k);
+    if (last != kNoPart && sides[last] == sides[k] &&
+        std::min(sizes[out[last]], sizes[out[k]]) >= kLeastPart &&
+        heard.insert(std::minmax(out[last], out[k])).second)
+      affinities.add(last, k, kOfNumbers);
     last = k;
   }
-  Parts out(scans, kNoPart);
+  out = affinities.merged();
+  sizes.clear();
+  for (const std::uint32_t part : out) ++sizes[part];
   for (std::uint32_t k = 0; k < scans; ++k)
-    if (poses[k].matrix().allFinite()) out[k] = root_of(k);
-  return out;
-}
-
-/// Whether a scan and another of its part do not coincide: those of a right part do, while a false
-/// loop has its error taken up by all scans between its ends.
-std::vector<char> bent_scans(const Parts& parts, const Audit& found) {
-  std::vector<char> out(parts.size(), 0);
-  for (const AuditedPair& pair : found.pairs)
-    if (parts[pair.source] == parts[pair.target] && pair.verdict == PairVerdict::contradicts &&
-        pair.shift > kMoved)
-      out[pair.source] = out[pair.target] = 1;
+    if (!poses[k].matrix().allFinite())
+      out[k] = kNoPart;
+    else if (sizes[out[k]] < kLeastPart)
+      out[k] = k;
   return out;
 }
 
@@ -93,8 +133,7 @@ pose_graph::UnalignedMatrix6d information_of(double shift, double turn) {
 }
 
 /// Each scan of a part with the one before.
-std::vector<Odometry> held(const std::vector<UnalignedIsometry3d>& poses, const Parts& parts,
-                           const std::vector<char>& bent) {
+std::vector<Odometry> held(const std::vector<UnalignedIsometry3d>& poses, const Parts& parts) {
   std::map<std::uint32_t, std::uint32_t> last;
   std::vector<Odometry> out;
   for (std::uint32_t k = 0; k < parts.size(); ++k) {
@@ -106,9 +145,7 @@ std::vector<Odometry> held(const std::vector<UnalignedIsometry3d>& poses, const 
       edge.target = at->second;
       edge.target_from_source = poses[at->second].inverse() * poses[k];
       edge.confidence = kOfPart;
-      edge.information = bent[k] != 0 || bent[at->second] != 0
-                             ? information_of(kShiftOfBent, kTurnOfBent)
-                             : information_of(kShiftOfPart, kTurnOfPart);
+      edge.information = information_of(kShiftOfPart, kTurnOfPart);
       out.push_back(edge);
     }
     at->second = k;
@@ -117,15 +154,12 @@ std::vector<Odometry> held(const std::vector<UnalignedIsometry3d>& poses, const 
 }
 
 /// Pairs of different parts that may see each other: neighbours by number, those that were near at
-/// the wrong poses, and of a small part as many others as it may have, evenly chosen. The first two
-/// also of bent scans within a part.
-std::vector<Pair> pairs_to_align(const Parts& parts, const std::vector<char>& bent,
-                                 const Audit& found) {
+/// the wrong poses, and of a small part as many others as it may have, evenly chosen.
+std::vector<Pair> pairs_to_align(const Parts& parts, const Audit& found) {
   std::set<std::pair<std::uint32_t, std::uint32_t>> chosen;
   std::vector<std::size_t> count(parts.size(), 0);
   const auto add = [&](std::uint32_t a, std::uint32_t b) {
-    if (a == b || parts[a] == kNoPart || parts[b] == kNoPart) return;
-    if (parts[a] == parts[b] && bent[a] == 0 && bent[b] == 0) return;
+    if (parts[a] == parts[b] || parts[a] == kNoPart || parts[b] == kNoPart) return;
     if (std::min(count[a], count[b]) >= kPairsOfScan) return;
     if (!chosen.insert(std::minmax(a, b)).second) return;
     ++count[a];
@@ -212,8 +246,7 @@ MendedMap mend(const Context& context, const std::vector<PreparedCloud>& clouds,
   }
   const Parts parts = parts_of(world_from_scan, found);
   const auto reconstruction = Options::from_voxel_size(registration.prepare.voxel_size);
-  const std::vector<char> bent = bent_scans(parts, found);
-  std::vector<Pair> pairs, more = pairs_to_align(parts, bent, found);
+  std::vector<Pair> pairs, more = pairs_to_align(parts, found);
   std::vector<RegistrationResult> results;
   // Few pairs see each other where the parts were; where they belong, more pairs hold them.
   for (int pass = 0; pass < 2 && !more.empty(); ++pass) {
@@ -222,7 +255,7 @@ MendedMap mend(const Context& context, const std::vector<PreparedCloud>& clouds,
     std::move(aligned.begin(), aligned.end(), std::back_inserter(results));
     const AuditedReconstruction again =
         reconstruct_audited(context, clouds, pairs, results, reconstruction,
-                            held(world_from_scan, parts, bent), registration, options);
+                            held(world_from_scan, parts), registration, options);
     out.moved.clear();
     out.left_out.clear();
     place(again.map, world_from_scan, out);

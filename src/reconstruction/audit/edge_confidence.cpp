@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "reconstruction/edge_confidence.hpp"
+#include "reconstruction/audit/edge_confidence.hpp"
 
 #include <algorithm>
 #include <cstddef>
