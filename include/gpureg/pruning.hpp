@@ -27,7 +27,9 @@ struct Matrix {
 
 /// Options of likely_pairs().
 struct Options {
-  std::uint32_t neighbors = 20;   ///< a pair is kept where either is among so many most alike, >= 1
+  /// Pairs of a cloud on average, >= 1. A cloud that is like many others has more, every cloud at
+  /// least a quarter of them: those with its most alike ones.
+  std::uint32_t neighbors = 20;
   std::uint32_t consecutive = 0;  ///< also the so many that follow each cloud in their order
   std::uint32_t words = 64;       ///< >= 1
   int threads = 0;                ///< 0: one per core. Results do not depend on it.
