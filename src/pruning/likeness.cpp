@@ -18,7 +18,7 @@ constexpr std::size_t kBlock = 64;
 constexpr std::size_t kOwnShare = 4;
 /// Weight of the likeness that two clouds have to their neighbours: of clouds that are like many
 /// others, a likeness says less (Conneau et al. 2018: CSLS, with a weight of 1).
-constexpr double kNeighborWeight = 0.5;
+constexpr double kNeighborWeight = 0.75;
 
 double dot(const std::vector<float>& a, const std::vector<float>& b) {
   double sum = 0;
@@ -206,8 +206,7 @@ std::vector<Likeness> with_third_clouds(const std::vector<Likeness>& known,
   return pairs_of(out);
 }
 
-std::vector<Edge> choose(const std::vector<Likeness>& pairs, std::size_t n,
-                         std::size_t neighbors) {
+std::vector<Edge> choose(const std::vector<Likeness>& pairs, std::size_t n, std::size_t neighbors) {
   const Partners partners = partners_of(pairs, n);
   std::vector<double> typical(n, 0);
   std::vector<Edge> chosen;

@@ -200,12 +200,12 @@ TEST(LikelyPairs, ThirdCloudsHelp) {
 
 TEST(LikelyPairs, CloudsThatAreLikeManyGetMorePairs) {
   // 0 to 3 are alike, all weakly like 4; 5 is like nothing.
-  const std::vector<Likeness> pairs{{{0, 1}, 9}, {{0, 2}, 8}, {{0, 3}, 7}, {{0, 4}, 1},
+  const std::vector<Likeness> pairs{{{0, 1}, 9}, {{0, 2}, 8}, {{0, 3}, 7},    {{0, 4}, 1},
                                     {{1, 2}, 6}, {{1, 3}, 5}, {{2, 3}, 5.9f}, {{4, 5}, -3}};
   const auto chosen = [&](std::size_t neighbors) { return pruning::choose(pairs, 6, neighbors); };
   // The nearest one of each.
   EXPECT_EQ(chosen(1), (std::vector<Edge>{{0, 1}, {0, 2}, {0, 3}, {0, 4}, {4, 5}}));
-  // (2, 3) before (1, 2): 5.9 less a quarter of 7 + 6.45, 6 less a quarter of 7.5 + 7.
+  // (2, 3) before (1, 2): 5.9 less 3/8 of 7 + 6.45, 6 less 3/8 of 7.5 + 7.
   EXPECT_EQ(chosen(2), (std::vector<Edge>{{0, 1}, {0, 2}, {0, 3}, {0, 4}, {2, 3}, {4, 5}}));
   EXPECT_EQ(chosen(9).size(), pairs.size());
 }
