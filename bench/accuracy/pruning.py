@@ -14,7 +14,6 @@ Python package.
 import pathlib
 import sys
 import tempfile
-import time
 
 import gpureg
 import numpy as np
@@ -91,7 +90,6 @@ def rows_of(name, fragments, overlapping, shares, options=None):
     count = len(numbers)
     every = [pair for pairs in overlapping.values() for pair in pairs]
     for share in shares:
-        begin = time.process_time()
         neighbors = max(1, round(share / 100 * (count - 1)))
         chosen = numbers[pruning.likely_pairs(summaries, neighbors)]
         report = pruning.measure(chosen, every, count)
@@ -109,7 +107,6 @@ def rows_of(name, fragments, overlapping, shares, options=None):
             "tried_percent": round(100 * report.tried / report.pairs, 2),
             "kept_percent": round(100 * report.recall, 1),
             "kept_percent_of": parts if len(parts) > 1 else {},
-            "cpu_seconds": round(time.process_time() - begin),
         }
         print(row, flush=True)
         yield row

@@ -68,9 +68,9 @@ struct Summary {
 ///   differ.
 Summary summarize(const PreparedCloud& cloud, const Matrix& words);
 
-/// The most alike pairs of clouds, source > target: those that are likely to overlap. Two clouds are
-/// alike where their descriptors are, where matches of their key points agree with one motion (only
-/// those of the most similar descriptors are compared), and where a third cloud is like both.
+/// The most alike pairs of clouds, source > target: those that are likely to overlap. Two clouds
+/// are alike where their descriptors are, where matches of their key points agree with one motion
+/// (only those of the most similar descriptors are compared), and where a third cloud is like both.
 /// @return ascending by target, then source.
 /// @throws InvalidArgument for options out of range, and for summaries by different words.
 std::vector<Pair> likely_pairs(const std::vector<Summary>& clouds, const Options& options = {});
