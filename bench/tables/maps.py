@@ -121,4 +121,32 @@ def located():
     return rows
 
 
-TABLES = {"maps": maps, "maps_short": maps_short, "map_peers": peers, "located": located}
+def pruning():
+    """Overlapping pairs that pruning keeps, a column for each share of pairs tried."""
+    record = load("pruning.json")
+    sets, kept = {}, {}
+    for row in sorted(record["rows"], key=lambda row: row["neighbors"]):
+        sets.setdefault(row["set"], []).append(row)
+    shares = [f"{row['tried_percent']:.1f} %" for row in next(iter(sets.values()))]
+    for name, rows in sets.items():
+        kept[f"**{name}**: {rows[0]['scans']} scans, {rows[0]['overlapping']} pairs overlap"] = [
+            row["kept_percent"] for row in rows
+        ]
+        for part in rows[0]["kept_percent_of"]:
+            kept[part] = [row["kept_percent_of"][part] for row in rows]
+    return [
+        f"| pairs tried | {' | '.join(shares)} |",
+        "| --- |" + " --- |" * len(shares),
+        *(f"| {name} | {' | '.join(map(str, values))} |" for name, values in kept.items()),
+        "",
+        source(record) + ".",
+    ]
+
+
+TABLES = {
+    "maps": maps,
+    "maps_short": maps_short,
+    "map_peers": peers,
+    "located": located,
+    "pruning": pruning,
+}

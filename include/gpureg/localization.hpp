@@ -123,8 +123,12 @@ struct LocateOptions {
   /// All tiles are searched with voxels this many times as wide as those of the map, 1..8: several
   /// times as fast, and thinned scans of spinning LiDARs find more. 1: with those of the map.
   double coarse_factor = 2;
-  /// Where the first search does not end in a place with a confidence of 0.75, at most so many
-  /// tiles are searched with the voxels of the map, >= 1: those in which the first search was the
+  /// In a map of more tiles, all are searched in voxels twice as wide again first, and at most so
+  /// many in coarse ones, >= 1: those in which that search was the most confident. Scans with less
+  /// than a thousand points in its voxels are searched in all tiles in coarse ones.
+  std::uint32_t coarse_tiles = 8;
+  /// Where the coarse search does not end in a place with a confidence of 0.75, at most so many
+  /// tiles are searched with the voxels of the map, >= 1: those in which the coarse search was the
   /// most confident. None where no pose of it reaches 0.1, of a scan with a thousand coarse points:
   /// the scan is not in the map.
   std::uint32_t fine_tiles = 4;

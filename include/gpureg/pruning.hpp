@@ -27,7 +27,9 @@ struct Matrix {
 
 /// Options of likely_pairs().
 struct Options {
-  std::uint32_t neighbors = 20;   ///< a pair is kept where either is among so many most alike, >= 1
+  /// Pairs of a cloud on average, >= 1. A cloud that is like many others has more, every cloud at
+  /// least a quarter of them: those with its most alike ones.
+  std::uint32_t neighbors = 20;
   std::uint32_t consecutive = 0;  ///< also the so many that follow each cloud in their order
   std::uint32_t words = 64;       ///< >= 1
   int threads = 0;                ///< 0: one per core. Results do not depend on it.
@@ -66,9 +68,9 @@ struct Summary {
 ///   differ.
 Summary summarize(const PreparedCloud& cloud, const Matrix& words);
 
-/// Pairs source > target of clouds that are likely to overlap. Two clouds are alike where their
-/// descriptors are, where matches of their key points agree with one motion (only those of the
-/// most similar descriptors are compared), and where a third cloud is like both.
+/// The most alike pairs of clouds, source > target: those that are likely to overlap. Two clouds
+/// are alike where their descriptors are, where matches of their key points agree with one motion
+/// (only those of the most similar descriptors are compared), and where a third cloud is like both.
 /// @return ascending by target, then source.
 /// @throws InvalidArgument for options out of range, and for summaries by different words.
 std::vector<Pair> likely_pairs(const std::vector<Summary>& clouds, const Options& options = {});

@@ -1142,6 +1142,7 @@ class LocateOptions:
     registration: RegistrationOptions
     max_matches: int
     coarse_factor: float
+    coarse_tiles: int
     fine_tiles: int
     candidates: int
     neighborhood: float
@@ -1151,6 +1152,7 @@ class LocateOptions:
         registration: RegistrationOptions = ...,
         max_matches: int = ...,
         coarse_factor: float = ...,
+        coarse_tiles: int = ...,
         fine_tiles: int = ...,
         candidates: int = ...,
         neighborhood: float = ...,
@@ -1161,6 +1163,7 @@ class LocateOptions:
         registration: RegistrationOptions = ...,
         max_matches: int = ...,
         coarse_factor: float = ...,
+        coarse_tiles: int = ...,
         fine_tiles: int = ...,
         candidates: int = ...,
         neighborhood: float = ...,

@@ -2,8 +2,8 @@
 """Which pairs of a large set are worth trying: those whose fragments look alike.
 
 A fragment is summarised by a global descriptor, an aggregate of its local features that needs no
-training, and by its key points. Candidates are the k most alike, by both and by what third
-fragments tell. The cost of a run then grows as n * k, not as n * n."""
+training, and by its key points. Candidates are the most alike pairs, k per fragment on average, by
+both and by what third fragments tell. The cost of a run then grows as n * k, not as n * n."""
 
 from __future__ import annotations
 
@@ -111,7 +111,8 @@ def likely_pairs(summaries: Sequence[CloudSummary], k: int = 20, *, consecutive:
     Returns
     -------
     (M, 2) int64
-        Positions i < j where either has the other among its k most alike, ascending.
+        Positions i < j of the most alike pairs, ascending: k per fragment on average. Of each
+        fragment at least the k / 4 most alike.
     """
     if k < 1:
         raise ValueError(f"k is {k}, expected 1 or more")
@@ -120,13 +121,12 @@ def likely_pairs(summaries: Sequence[CloudSummary], k: int = 20, *, consecutive:
 
 @dataclasses.dataclass
 class Nearest:
-    """Pairs of each fragment and the k that look most like it: for the argument pairs of
-    `register_all`.
+    """Pairs of fragments that look alike: for the argument pairs of `register_all`.
 
     Parameters
     ----------
     k : int
-        Neighbours per fragment. A pair is tried where either has the other among them.
+        Pairs per fragment on average.
     consecutive : int
         Also the so many fragments that follow each one by number: scans of a walk.
     options : PrepareOptions, optional

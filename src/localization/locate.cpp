@@ -16,7 +16,6 @@ constexpr double kSure = 0.75, kSureSearch = 0.95;
 /// Where no pose of the coarse search reaches this confidence, the scan is not in the map, if its
 /// coarse points are so many that the search had something to see.
 constexpr double kHopelessSearch = 0.1;
-constexpr std::size_t kTellingPoints = 1000;
 
 /// A candidate in all of the map around it.
 struct Verified {
@@ -54,7 +53,8 @@ std::vector<double> verify_coarsely(const Context& context, const MapState& map,
   }
   if (asked.empty()) return out;
   std::vector<PreparedCloud> clouds{scan.coarse};
-  for (PreparedCloud& cloud : prepare_batch(context, neighborhoods, coarse_prepare(map, options)))
+  for (PreparedCloud& cloud :
+       prepare_batch(context, neighborhoods, prepare_for(map, options.coarse_factor)))
     clouds.push_back(std::move(cloud));
   RegistrationOptions registration = options.registration;
   fields::multiply_lengths(registration, options.coarse_factor);
@@ -192,12 +192,18 @@ std::vector<LocateResult> locate(const Context& context, const std::vector<Point
   const std::vector<PreparedCloud> prepared =
       prepare_batch(context, scans, state.options.prepare, names);
   const bool coarse_first = options.coarse_factor > 1;
+  const auto thinned = [&](double factor) {
+    return prepare_batch(context, scans, prepare_for(state, factor), names);
+  };
   const std::vector<PreparedCloud> coarse =
-      coarse_first ? prepare_batch(context, scans, coarse_prepare(state, options), names)
-                   : prepared;
+      coarse_first ? thinned(options.coarse_factor) : prepared;
+  const double factor = coarsest_factor(state, options);
+  const std::vector<PreparedCloud> coarsest =
+      factor > 0 ? thinned(factor) : std::vector<PreparedCloud>(scans.size());
   std::vector<Scan> found;
   for (std::size_t k = 0; k < scans.size(); ++k)
-    found.push_back(scan_of(prepared[k], coarse[k], priors.empty() ? LocatePrior{} : priors[k]));
+    found.push_back(
+        scan_of(prepared[k], coarse[k], coarsest[k], priors.empty() ? LocatePrior{} : priors[k]));
   search_all_tiles(context, state, options, found);
   std::vector<LocateResult> out;
   std::vector<std::vector<Verified>> verified;

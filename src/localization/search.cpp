@@ -12,6 +12,8 @@ namespace {
 
 /// Prepared points of the tiles that are aligned together: about 1 GB.
 constexpr double kPointsAtOnce = 400'000;
+/// Of the coarsest voxels, in voxels of the coarse search.
+constexpr double kCoarser = 2;
 /// Poses and tiles with less than this share of the odds of the most confident one, and poses with
 /// less than this share of even odds, are left out.
 constexpr double kHopeless = 0.01, kHopelessAlone = 1e-4;
@@ -41,19 +43,22 @@ struct Search {
   RegistrationOptions registration;
   PrepareOptions prepare;  ///< of the tiles
   double factor = 1;       ///< of the voxels
+  PreparedCloud Scan::* cloud = &Scan::cloud;
   std::uint64_t number = 0;
   std::function<bool(std::size_t scan, std::size_t tile)> wants;
-
-  bool coarse() const { return factor > 1; }
 };
 
-Search search_with(const MapState& map, RegistrationOptions registration,
-                   const LocateOptions& options) {
-  registration.compatibility.max_matches = options.max_matches;
-  // "Not in this map" needs the whole search: a contained scan has a low confidence at first.
-  registration.compatibility.first_pass_reject = 0;
+Search search_with(const MapState& map, const LocateOptions& options, double factor,
+                   PreparedCloud Scan::* cloud) {
   Search out;
-  out.registration = std::move(registration);
+  out.registration = options.registration;
+  fields::multiply_lengths(out.registration, factor);
+  out.registration.compatibility.max_matches = options.max_matches;
+  // "Not in this map" needs the whole search: a contained scan has a low confidence at first.
+  out.registration.compatibility.first_pass_reject = 0;
+  out.prepare = prepare_for(map, factor);
+  out.factor = factor;
+  out.cloud = cloud;
   out.number = map.begin_search();
   return out;
 }
@@ -66,7 +71,7 @@ void search_tiles(const Context& context, const MapState& map, const Search& sea
   std::vector<Pair> pairs;
   std::vector<RegistrationPrior> priors;
   for (std::size_t k = 0; k < scans.size(); ++k) {
-    clouds.push_back(search.coarse() ? scans[k].coarse : scans[k].cloud);
+    clouds.push_back(scans[k].*search.cloud);
     for (std::size_t t = 0; t < tiles.size(); ++t) {
       if (!search.wants(k, tiles[t])) continue;
       pairs.push_back(
@@ -124,9 +129,49 @@ void run(const Context& context, const MapState& map, const LocateOptions& optio
   }
 }
 
+/// Whether each scan is searched in each tile.
+using Wanted = std::vector<std::vector<char>>;
+
+std::function<bool(std::size_t, std::size_t)> in(const Wanted& wanted) {
+  return [&wanted](std::size_t scan, std::size_t tile) { return wanted[scan][tile] != 0; };
+}
+
+/// Of the tiles, the `most` ones that were the most confident, without hopeless ones.
+void keep_best(const Scan& scan, std::size_t most, std::vector<char>& tiles) {
+  std::vector<std::size_t> order;
+  for (std::size_t tile = 0; tile < tiles.size(); ++tile)
+    if (tiles[tile] != 0) order.push_back(tile);
+  std::stable_sort(order.begin(), order.end(),
+                   [&](std::size_t a, std::size_t b) { return scan.best[a] > scan.best[b]; });
+  order.resize(std::min(order.size(), most));
+  while (order.size() > 1 && is_hopeless(scan.best[order.back()], scan.best[order.front()]))
+    order.pop_back();
+  std::fill(tiles.begin(), tiles.end(), 0);
+  for (const std::size_t tile : order) tiles[tile] = 1;
+}
+
+/// Leaves the tiles that a search in coarser voxels finds the best of a large map.
+void search_coarser(const Context& context, const MapState& map, const LocateOptions& options,
+                    std::vector<Scan>& scans, Wanted& wanted) {
+  Search search = search_with(map, options, kCoarser * options.coarse_factor, &Scan::coarsest);
+  std::vector<char> large;
+  for (const Scan& scan : scans)
+    large.push_back(scan.tiles > options.coarse_tiles && scan.coarsest.size() >= kTellingPoints);
+  search.wants = [&](std::size_t k, std::size_t tile) {
+    return large[k] != 0 && wanted[k][tile] != 0;
+  };
+  run(context, map, options, search, scans);
+  for (std::size_t k = 0; k < scans.size(); ++k) {
+    if (large[k] != 0) keep_best(scans[k], options.coarse_tiles, wanted[k]);
+    scans[k].candidates.clear();
+    scans[k].best.assign(map.tiles.size(), 0);
+  }
+}
+
 }  // namespace
 
-Scan scan_of(PreparedCloud cloud, PreparedCloud coarse, const LocatePrior& prior) {
+Scan scan_of(PreparedCloud cloud, PreparedCloud coarse, PreparedCloud coarsest,
+             const LocatePrior& prior) {
   Scan scan;
   for (const Eigen::Vector3f& point : cloud.points()) {
     scan.points.push_back(point.cast<double>() + cloud.origin());
@@ -136,6 +181,7 @@ Scan scan_of(PreparedCloud cloud, PreparedCloud coarse, const LocatePrior& prior
   if (!scan.points.empty()) scan.middle /= static_cast<double>(scan.points.size());
   scan.cloud = std::move(cloud);
   scan.coarse = std::move(coarse);
+  scan.coarsest = std::move(coarsest);
   scan.prior = prior;
   return scan;
 }
@@ -145,48 +191,41 @@ bool contradicts(const Scan& scan, const UnalignedIsometry3d& map_from_scan) {
   return known && (map_from_scan.translation() - known->position).norm() > known->radius;
 }
 
-PrepareOptions coarse_prepare(const MapState& map, const LocateOptions& options) {
-  if (options.coarse_factor == 1) return as_they_are(map.options.prepare);
+PrepareOptions prepare_for(const MapState& map, double factor) {
+  if (factor == 1) return as_they_are(map.options.prepare);
   PrepareOptions out = map.options.prepare;
-  fields::multiply_lengths(out, options.coarse_factor);
+  fields::multiply_lengths(out, factor);
   return out;
+}
+
+double coarsest_factor(const MapState& map, const LocateOptions& options) {
+  return map.tiles.size() > options.coarse_tiles ? kCoarser * options.coarse_factor : 0;
 }
 
 void search_all_tiles(const Context& context, const MapState& map, const LocateOptions& options,
                       std::vector<Scan>& scans) {
-  RegistrationOptions registration = options.registration;
-  fields::multiply_lengths(registration, options.coarse_factor);
-  Search search = search_with(map, std::move(registration), options);
-  search.prepare = coarse_prepare(map, options);
-  search.factor = options.coarse_factor;
-  search.wants = [&](std::size_t k, std::size_t tile) { return may_be_in(scans[k], map, tile); };
+  Wanted wanted(scans.size(), std::vector<char>(map.tiles.size(), 0));
   for (std::size_t k = 0; k < scans.size(); ++k) {
     scans[k].best.assign(map.tiles.size(), 0);
     for (std::size_t tile = 0; tile < map.tiles.size(); ++tile)
-      scans[k].tiles += search.wants(k, tile);
+      scans[k].tiles += wanted[k][tile] = may_be_in(scans[k], map, tile);
   }
+  if (coarsest_factor(map, options) > 0) search_coarser(context, map, options, scans, wanted);
+  Search search = search_with(map, options, options.coarse_factor, &Scan::coarse);
+  search.wants = in(wanted);
   run(context, map, options, search, scans);
 }
 
 void search_best_tiles(const Context& context, const MapState& map, const LocateOptions& options,
                        const std::vector<std::size_t>& which, std::vector<Scan>& scans) {
-  Search search = search_with(map, options.registration, options);
-  search.prepare = as_they_are(map.options.prepare);
-  std::vector<std::vector<char>> wanted(scans.size(), std::vector<char>(map.tiles.size(), 0));
+  Wanted wanted(scans.size(), std::vector<char>(map.tiles.size(), 0));
   for (const std::size_t k : which) {
-    std::vector<std::size_t> order;
     for (std::size_t tile = 0; tile < map.tiles.size(); ++tile)
-      if (may_be_in(scans[k], map, tile)) order.push_back(tile);
-    std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
-      return scans[k].best[a] > scans[k].best[b];
-    });
-    order.resize(std::min<std::size_t>(order.size(), options.fine_tiles));
-    while (order.size() > 1 &&
-           is_hopeless(scans[k].best[order.back()], scans[k].best[order.front()]))
-      order.pop_back();
-    for (const std::size_t tile : order) wanted[k][tile] = 1;
+      wanted[k][tile] = may_be_in(scans[k], map, tile);
+    keep_best(scans[k], options.fine_tiles, wanted[k]);
   }
-  search.wants = [&](std::size_t k, std::size_t tile) { return wanted[k][tile] != 0; };
+  Search search = search_with(map, options, 1, &Scan::cloud);
+  search.wants = in(wanted);
   run(context, map, options, search, scans);
 }
 

@@ -8,6 +8,7 @@ namespace gpureg::localization {
 /// A scan on its way through the map.
 struct Scan {
   PreparedCloud cloud, coarse;          ///< in voxels of the map, and of the coarse search
+  PreparedCloud coarsest;               ///< of the search before it; may be an empty handle
   std::vector<Eigen::Vector3d> points;  ///< of `cloud`, in the scan's frame
   Eigen::Vector3d middle{0, 0, 0};
   double reach = 0;  ///< largest distance of a point from the origin of the frame
@@ -17,15 +18,24 @@ struct Scan {
   std::vector<double> best;  ///< per tile: the largest confidence of a mode
 };
 
-/// @param coarse may be an empty handle.
-Scan scan_of(PreparedCloud cloud, PreparedCloud coarse, const LocatePrior& prior);
+/// So many points show enough of a place to tell that it is not there.
+constexpr std::size_t kTellingPoints = 1000;
+
+Scan scan_of(PreparedCloud cloud, PreparedCloud coarse, PreparedCloud coarsest,
+             const LocatePrior& prior);
 
 bool contradicts(const Scan& scan, const UnalignedIsometry3d& map_from_scan);
 
-/// Preparation of scans and tiles for the coarse search.
-PrepareOptions coarse_prepare(const MapState& map, const LocateOptions& options);
+/// Preparation of scans and tiles in voxels `factor` times as wide as those of the map.
+PrepareOptions prepare_for(const MapState& map, double factor);
 
-/// Aligns the scans with all tiles in coarse voxels, and keeps the most confident places.
+/// Voxels of the search before the coarse one, in voxels of the map; 0: a map of so few tiles needs
+/// none.
+double coarsest_factor(const MapState& map, const LocateOptions& options);
+
+/// Aligns the scans with all tiles in coarse voxels, and keeps the most confident places. A scan
+/// that may be in more than `coarse_tiles` tiles, and has enough points in coarser voxels, is
+/// aligned with all of them in those, and in coarse voxels with the best.
 void search_all_tiles(const Context& context, const MapState& map, const LocateOptions& options,
                       std::vector<Scan>& scans);
 

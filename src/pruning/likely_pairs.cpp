@@ -16,7 +16,7 @@ namespace {
 constexpr std::size_t kSampledClouds = 256, kSampledFeatures = 400;
 /// The key points of each cloud are compared with those of so many others per neighbour that is
 /// asked for, and of at least so many.
-constexpr std::size_t kComparedPerNeighbor = 4, kLeastCompared = 100;
+constexpr std::size_t kComparedPerNeighbor = 3, kLeastCompared = 100;
 
 std::size_t thread_count(int threads) {
   return threads > 0 ? static_cast<std::size_t>(threads)
@@ -64,14 +64,19 @@ std::vector<Pair> likely_pairs(const std::vector<Summary>& clouds, const Options
   const std::size_t compared =
       std::max(kLeastCompared, kComparedPerNeighbor * std::size_t{options.neighbors});
   const LikenessModel model(clouds, threads);
-  const std::vector<Edge> first = edges_of(model.similar(compared));
+  const std::vector<Edge> first = edges_of(pairs_of(model.similar(compared)));
   std::vector<Likeness> known = model.compare(first);
   // Clouds that a third one suggests are compared, too.
-  std::vector<Edge> second, suggested = edges_of(with_third_clouds(known, n, compared, threads));
+  std::vector<Edge> second,
+      suggested = edges_of(with_third_clouds(known, known, n, compared, threads));
   std::set_difference(suggested.begin(), suggested.end(), first.begin(), first.end(),
                       std::back_inserter(second));
   for (const Likeness& pair : model.compare(second)) known.push_back(pair);
-  std::vector<Edge> edges = edges_of(with_third_clouds(known, n, options.neighbors, threads));
+  // What third clouds tell makes them better third clouds.
+  std::vector<Likeness> steps = with_third_clouds(known, known, n, compared, threads);
+  for (Likeness& pair : steps) pair.value /= 2;
+  std::vector<Edge> edges =
+      choose(with_third_clouds(known, steps, n, compared, threads), n, options.neighbors);
   std::vector<Edge> consecutive;
   for (std::uint32_t k = 0; k < n; ++k)
     for (std::uint32_t other = k + 1; other < n && other - k <= options.consecutive; ++other)

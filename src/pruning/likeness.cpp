@@ -14,6 +14,11 @@ namespace {
 constexpr std::size_t kBackground = 32;
 /// Descriptors that are multiplied with one row at a time.
 constexpr std::size_t kBlock = 64;
+/// Every cloud keeps at least one in so many of the neighbours that are asked for.
+constexpr std::size_t kOwnShare = 4;
+/// Weight of the likeness that two clouds have to their neighbours: of clouds that are like many
+/// others, a likeness says less (Conneau et al. 2018: CSLS, with a weight of 1).
+constexpr double kNeighborWeight = 0.75;
 
 double dot(const std::vector<float>& a, const std::vector<float>& b) {
   double sum = 0;
@@ -146,20 +151,46 @@ std::vector<Likeness> LikenessModel::compare(const std::vector<Edge>& edges) con
   return out;
 }
 
-Partners with_third_clouds(const std::vector<Likeness>& known, std::size_t n, std::size_t most,
-                           std::size_t threads) {
-  Partners direct(n), out(n);
-  for (const Likeness& pair : known) {
-    direct[pair.edge.first].push_back({pair.value, pair.edge.second});
-    direct[pair.edge.second].push_back({pair.value, pair.edge.first});
+Partners partners_of(const std::vector<Likeness>& pairs, std::size_t n) {
+  Partners out(n);
+  for (const Likeness& pair : pairs) {
+    out[pair.edge.first].push_back({pair.value, pair.edge.second});
+    out[pair.edge.second].push_back({pair.value, pair.edge.first});
   }
+  for (std::vector<Partner>& partners : out) keep_best(partners, partners.size());
+  return out;
+}
+
+std::vector<Likeness> pairs_of(const Partners& partners) {
+  std::vector<Likeness> out;
+  for (std::size_t k = 0; k < partners.size(); ++k)
+    for (const Partner& partner : partners[k])
+      out.push_back({std::minmax(static_cast<std::uint32_t>(k), partner.cloud), partner.value});
+  const auto before = [](const Likeness& a, const Likeness& b) { return a.edge < b.edge; };
+  const auto same = [](const Likeness& a, const Likeness& b) { return a.edge == b.edge; };
+  std::stable_sort(out.begin(), out.end(), before);
+  out.erase(std::unique(out.begin(), out.end(), same), out.end());
+  return out;
+}
+
+std::vector<Edge> edges_of(const std::vector<Likeness>& pairs) {
+  std::vector<Edge> edges;
+  for (const Likeness& pair : pairs) edges.push_back(pair.edge);
+  return edges;
+}
+
+std::vector<Likeness> with_third_clouds(const std::vector<Likeness>& known,
+                                        const std::vector<Likeness>& through, std::size_t n,
+                                        std::size_t most, std::size_t threads) {
+  const Partners direct = partners_of(known, n), steps = partners_of(through, n);
+  Partners out(n);
   for_each_on(
       threads, n, [&] { return std::vector<float>(n); },
       [&](std::size_t self, std::vector<float>& best) {
         std::fill(best.begin(), best.end(), 0.0f);
-        for (const Partner& third : direct[self]) {
-          if (third.value <= 0) continue;
-          for (const Partner& far : direct[third.cloud])
+        for (const Partner& third : steps[self]) {
+          if (third.value <= 0) break;
+          for (const Partner& far : steps[third.cloud])
             best[far.cloud] = std::max(best[far.cloud], std::min(third.value, far.value));
         }
         best[self] = 0;
@@ -172,17 +203,35 @@ Partners with_third_clouds(const std::vector<Likeness>& known, std::size_t n, st
             out[self].push_back({best[cloud], static_cast<std::uint32_t>(cloud)});
         keep_best(out[self], most);
       });
-  return out;
+  return pairs_of(out);
 }
 
-std::vector<Edge> edges_of(const Partners& partners) {
-  std::vector<Edge> edges;
-  for (std::size_t k = 0; k < partners.size(); ++k)
-    for (const Partner& partner : partners[k])
-      edges.emplace_back(std::minmax(static_cast<std::uint32_t>(k), partner.cloud));
-  std::sort(edges.begin(), edges.end());
-  edges.erase(std::unique(edges.begin(), edges.end()), edges.end());
-  return edges;
+std::vector<Edge> choose(const std::vector<Likeness>& pairs, std::size_t n, std::size_t neighbors) {
+  const Partners partners = partners_of(pairs, n);
+  std::vector<double> typical(n, 0);
+  std::vector<Edge> chosen;
+  for (std::size_t k = 0; k < n; ++k) {
+    const std::size_t near = std::min(neighbors, partners[k].size());
+    for (std::size_t p = 0; p < near; ++p) {
+      typical[k] += static_cast<double>(partners[k][p].value) / static_cast<double>(near);
+      if (kOwnShare * p < neighbors)
+        chosen.push_back(std::minmax(static_cast<std::uint32_t>(k), partners[k][p].cloud));
+    }
+  }
+  std::sort(chosen.begin(), chosen.end());
+  chosen.erase(std::unique(chosen.begin(), chosen.end()), chosen.end());
+  std::vector<std::pair<double, Edge>> others;
+  for (const auto& [edge, value] : pairs)
+    if (!std::binary_search(chosen.begin(), chosen.end(), edge))
+      others.emplace_back(kNeighborWeight * (typical[edge.first] + typical[edge.second]) / 2 -
+                              static_cast<double>(value),
+                          edge);
+  std::sort(others.begin(), others.end());
+  const std::size_t most = (n * neighbors + 1) / 2;
+  for (std::size_t k = 0; k < others.size() && chosen.size() < most; ++k)
+    chosen.push_back(others[k].second);
+  std::sort(chosen.begin(), chosen.end());
+  return chosen;
 }
 
 }  // namespace gpureg::pruning

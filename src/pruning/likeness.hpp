@@ -55,11 +55,22 @@ class LikenessModel {
 };
 
 /// Adds to the likeness of two clouds that of the best third cloud which is like both: the lower of
-/// its two. @return the `most` partners of each of n clouds, in order.
-Partners with_third_clouds(const std::vector<Likeness>& known, std::size_t n, std::size_t most,
-                           std::size_t threads);
+/// its two in `through`. @return the pairs of each of n clouds with its `most` best partners,
+/// ascending.
+std::vector<Likeness> with_third_clouds(const std::vector<Likeness>& known,
+                                        const std::vector<Likeness>& through, std::size_t n,
+                                        std::size_t most, std::size_t threads);
+
+/// The partners of each of n clouds, the most alike first.
+Partners partners_of(const std::vector<Likeness>& pairs, std::size_t n);
 
 /// Each pair of partners once, ascending.
-std::vector<Edge> edges_of(const Partners& partners);
+std::vector<Likeness> pairs_of(const Partners& partners);
+
+std::vector<Edge> edges_of(const std::vector<Likeness>& pairs);
+
+/// The most alike pairs of n clouds: `neighbors` for each cloud on average, and for each at least a
+/// quarter of that.
+std::vector<Edge> choose(const std::vector<Likeness>& pairs, std::size_t n, std::size_t neighbors);
 
 }  // namespace gpureg::pruning

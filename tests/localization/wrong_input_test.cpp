@@ -84,6 +84,10 @@ TEST_F(WrongInput, Arguments) {
   expect_error<InvalidArgument>([&] { locate(context, {query.scan.view()}, map, options); },
                                 {"coarse_factor", "0.5"});
   options = LocateOptions::from_voxel_size(kVoxel);
+  options.coarse_tiles = 0;
+  expect_error<InvalidArgument>([&] { locate(context, {query.scan.view()}, map, options); },
+                                {"coarse_tiles", "0"});
+  options = LocateOptions::from_voxel_size(kVoxel);
   options.fine_tiles = 0;
   expect_error<InvalidArgument>([&] { locate(context, {query.scan.view()}, map, options); },
                                 {"fine_tiles", "0"});

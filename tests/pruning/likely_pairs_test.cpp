@@ -177,7 +177,8 @@ TEST(LikelyPairs, KeyPointsAreApartAndHaveFeaturesAndNormals) {
 TEST(LikelyPairs, ThirdCloudsHelp) {
   const std::vector<Likeness> known{
       {{0, 1}, 5}, {{1, 2}, 4}, {{0, 3}, 2}, {{1, 3}, -1}, {{3, 4}, -2}};
-  const Partners partners = pruning::with_third_clouds(known, 5, 9, 1);
+  const Partners partners =
+      pruning::partners_of(pruning::with_third_clouds(known, known, 5, 9, 1), 5);
   const auto value = [&](std::uint32_t a, std::uint32_t b) {
     for (const Partner& partner : partners[a])
       if (partner.cloud == b) return partner.value;
@@ -189,7 +190,24 @@ TEST(LikelyPairs, ThirdCloudsHelp) {
   EXPECT_EQ(value(1, 3), -1 + 2);  // by cloud 0
   EXPECT_EQ(value(3, 4), -2);
   EXPECT_EQ(value(0, 4), -99);  // no cloud is like both
-  EXPECT_EQ(pruning::with_third_clouds(known, 5, 1, 2)[0].front().cloud, 1u);
+  EXPECT_EQ(pruning::edges_of(pruning::with_third_clouds(known, known, 5, 1, 2)),
+            (std::vector<Edge>{{0, 1}, {0, 2}, {0, 3}, {3, 4}}));  // 0 before 1 for 2
+  // Other steps: 2 and 3 are like 4.
+  const std::vector<Likeness> steps{{{2, 4}, 3}, {{3, 4}, 6}};
+  EXPECT_EQ(pruning::edges_of(pruning::with_third_clouds({}, steps, 5, 9, 1)),
+            (std::vector<Edge>{{2, 3}}));
+}
+
+TEST(LikelyPairs, CloudsThatAreLikeManyGetMorePairs) {
+  // 0 to 3 are alike, all weakly like 4; 5 is like nothing.
+  const std::vector<Likeness> pairs{{{0, 1}, 9}, {{0, 2}, 8}, {{0, 3}, 7},    {{0, 4}, 1},
+                                    {{1, 2}, 6}, {{1, 3}, 5}, {{2, 3}, 5.9f}, {{4, 5}, -3}};
+  const auto chosen = [&](std::size_t neighbors) { return pruning::choose(pairs, 6, neighbors); };
+  // The nearest one of each.
+  EXPECT_EQ(chosen(1), (std::vector<Edge>{{0, 1}, {0, 2}, {0, 3}, {0, 4}, {4, 5}}));
+  // (2, 3) before (1, 2): 5.9 less 3/8 of 7 + 6.45, 6 less 3/8 of 7.5 + 7.
+  EXPECT_EQ(chosen(2), (std::vector<Edge>{{0, 1}, {0, 2}, {0, 3}, {0, 4}, {2, 3}, {4, 5}}));
+  EXPECT_EQ(chosen(9).size(), pairs.size());
 }
 
 TEST(LikelyPairs, SimilarDescriptorsAreThoseOfBruteForce) {

@@ -279,8 +279,8 @@ void add_reconstruct(CommandLine& line) {
       verb.option("--results", o->results,
                   "JSON of `gpureg batch`, or pairs.json of a map, instead of aligning");
   verb.option("--prune", o->prune,
-              "For large sets: align each fragment with the so many that look most like it "
-              "only; without: all pairs")
+              "For large sets: align so many pairs per fragment on average, those that look most "
+              "alike; without: all pairs")
       .between(1u, 1000000u)
       .excludes(pairs)
       .excludes(results);
