@@ -6,6 +6,7 @@
 namespace slam_demo {
 
 Eigen::Vector2d in_image(const Pinhole& c, const Lens& lens, const Eigen::Vector2d& pixel) {
+  if (lens == Lens{}) return pixel;
   const double x = (pixel.x() - c.cx) / c.fx, y = (pixel.y() - c.cy) / c.fy, r = x * x + y * y;
   const double scale = 1 + r * (lens[4] + r * lens[5]);
   return {(c.fx + lens[0]) * x * scale + c.cx + lens[2],
@@ -14,6 +15,7 @@ Eigen::Vector2d in_image(const Pinhole& c, const Lens& lens, const Eigen::Vector
 
 Eigen::Vector2d in_pinhole(const Pinhole& camera, const Lens& lens, const Eigen::Vector2d& pixel) {
   constexpr int kRounds = 20;  // each leaves a third of the error, at most
+  if (lens == Lens{}) return pixel;
   Eigen::Vector2d result = pixel;
   for (int k = 0; k < kRounds; ++k) result += pixel - in_image(camera, lens, result);
   return result;

@@ -84,7 +84,8 @@ BundleProblem LoopClosing::full_problem() {
   BundleProblem problem = bundle_of(map_, free, fixed, relatives);
   if (!prior_) prior_ = map_.calibration;
   problem.calibrate = options_.calibrate;
-  problem.calibrate_lens = options_.calibrate && map_.keyframes.size() >= kLensKeyframes;
+  problem.calibrate_lens =
+      options_.calibrate && options_.calibrate_lens && map_.keyframes.size() >= kLensKeyframes;
   problem.prior = *prior_;
   return problem;
 }

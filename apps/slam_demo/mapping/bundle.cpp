@@ -225,7 +225,7 @@ BundleReport adjust(const Pinhole& camera, BundleProblem& problem, int iteration
     double* point = problem.points[at(s.point)].data();
     double* pose = pose_at(s.pose);
     order->AddElementToGroup(point, 0);
-    if (problem.calibrate) {
+    if (problem.calibrate && (s.seen.depth > 0 || problem.calibrate_lens)) {
       add_calibrated_sight(camera, s.seen, pose, point, before, offsets, lens, ceres_problem);
       continue;
     }
