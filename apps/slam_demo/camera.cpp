@@ -27,7 +27,7 @@ void set_camera(const Pinhole& camera, const cv::Mat1d& distortion, const cv::Si
 }
 
 cv::Mat1f depth_in_colour(const cv::Mat& raw, const Rig& rig) {
-  cv::Mat1f metres(raw.size(), 0.0f), result(raw.size(), 0.0f);
+  cv::Mat1f metres(raw.size(), 0.0f);
   for (int y = 0; y < raw.rows; ++y) {
     for (int x = 0; x < raw.cols; ++x) {
       const std::uint16_t value = raw.at<std::uint16_t>(y, x);
@@ -37,19 +37,25 @@ cv::Mat1f depth_in_colour(const cv::Mat& raw, const Rig& rig) {
     }
   }
   if (rig.registered) return metres;
-  // A depth pixel covers about one colour pixel, a little less where the focal lengths differ: two
-  // pixels are written, so that no holes stay.
-  for (int y = 0; y < raw.rows; ++y) {
-    for (int x = 0; x < raw.cols; ++x) {
-      if (metres(y, x) == 0) continue;
-      const Eigen::Vector3d p = rig.colour_from_depth * rig.depth.unproject(x, y, metres(y, x));
+  return seen_from(rig.colour, rig.colour_from_depth, rig.depth, metres);
+}
+
+cv::Mat1f seen_from(const Pinhole& to, const Eigen::Isometry3d& to_from_from, const Pinhole& from,
+                    const cv::Mat1f& depth) {
+  cv::Mat1f result(depth.size(), 0.0f);
+  // A depth pixel covers about one pixel of the other camera, a little less where the focal lengths
+  // differ: two pixels are written, so that no holes stay.
+  for (int y = 0; y < depth.rows; ++y) {
+    for (int x = 0; x < depth.cols; ++x) {
+      if (depth(y, x) == 0) continue;
+      const Eigen::Vector3d p = to_from_from * from.unproject(x, y, depth(y, x));
       if (p.z() <= 0) continue;
-      const Eigen::Vector2d at = rig.colour.project(p);
+      const Eigen::Vector2d at = to.project(p);
       for (const int dx : {0, 1}) {
         for (const int dy : {0, 1}) {
           const int u = static_cast<int>(std::floor(at.x())) + dx,
                     v = static_cast<int>(std::floor(at.y())) + dy;
-          if (u < 0 || v < 0 || u >= raw.cols || v >= raw.rows) continue;
+          if (u < 0 || v < 0 || u >= depth.cols || v >= depth.rows) continue;
           float& z = result(v, u);
           if (z == 0 || p.z() < z) z = static_cast<float>(p.z());
         }

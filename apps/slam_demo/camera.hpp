@@ -43,4 +43,8 @@ void set_camera(const Pinhole& camera, const cv::Mat1d& distortion, const cv::Si
 /// pixel the nearest stays.
 cv::Mat1f depth_in_colour(const cv::Mat& raw, const Rig& rig);
 
+/// Depth in metres (0: none) as another camera, or the same one elsewhere, would see it.
+cv::Mat1f seen_from(const Pinhole& to, const Eigen::Isometry3d& to_from_from, const Pinhole& from,
+                    const cv::Mat1f& depth);
+
 }  // namespace slam_demo

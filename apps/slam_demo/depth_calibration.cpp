@@ -72,7 +72,8 @@ void write_depth_calibration(const std::string& path, const DepthCalibration& c)
                                {"rows", DepthCalibration::kRows},
                                {"width", c.width},
                                {"height", c.height},
-                               {"inverse_depth_offsets", c.offsets}};
+                               {"inverse_depth_offsets", c.offsets},
+                               {"lens", c.lens}};
   gpureg::files::write_atomically(path, page.dump(1) + "\n");
 }
 
@@ -89,6 +90,7 @@ DepthCalibration read_depth_calibration(const std::string& path) {
     page.at("width").get_to(c.width);
     page.at("height").get_to(c.height);
     page.at("inverse_depth_offsets").get_to(c.offsets);
+    if (page.contains("lens")) page.at("lens").get_to(c.lens);
   } catch (const nlohmann::json::exception& error) {
     throw gpureg::IoError(path + ": is no depth calibration: " + error.what());
   }

@@ -6,17 +6,19 @@
 #include <opencv2/core.hpp>
 #include <string>
 
-#include "camera.hpp"
+#include "lens.hpp"
 
 namespace slam_demo {
 
 /// What a depth camera adds to each inverse depth: measured 1/z = true 1/z + offset(pixel). A fixed
 /// image for one camera, smooth, so a grid over the image holds it; bilinear between the nodes.
+/// Pixels are those of the colour camera's pinhole; lens: how its images differ from that.
 struct DepthCalibration {
   static constexpr int kColumns = 9, kRows = 7;
   static constexpr std::size_t kNodes = std::size_t{kColumns} * kRows;
   int width = 640, height = 480;         ///< of the image, pixels; the outer nodes are on its edge
   std::array<double, kNodes> offsets{};  ///< 1/metres, row by row
+  Lens lens{};                           ///< in pixels of the images as they are loaded
 
   struct Weight {
     std::size_t node;

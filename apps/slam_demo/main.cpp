@@ -243,6 +243,9 @@ int main(int count, char** values) {
   app.add_option("--depth-calibration", a.calibration,
                  "Offsets of inverse depth to begin with: depth_calibration.json of another run");
   app.add_flag("--no-calibration", a.no_calibration, "Adjustments leave these offsets as they are");
+  app.add_flag("--calibrate-lens", a.slam.loops.calibrate_lens,
+               "Adjustments also estimate fx fy cx cy k1 k2 of the colour camera: where nobody has "
+               "calibrated it");
   app.add_flag("--quiet", a.quiet, "No progress");
   CLI11_PARSE(app, count, values);
   try {

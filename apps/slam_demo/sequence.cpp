@@ -146,8 +146,9 @@ Sequence open_tum(const fs::path& folder) {
         std::swap(words[0], words[2]);
         std::swap(words[1], words[3]);
       }
-      frames.push_back({number(words[0], folder / "associations.txt"), (folder / words[1]).string(),
-                        (folder / words[3]).string()});
+      const double time = number(words[0], folder / "associations.txt");
+      frames.push_back({time, (folder / words[1]).string(), (folder / words[3]).string(),
+                        number(words[2], folder / "associations.txt") - time});
     }
   } else {
     std::vector<Listed> depth = read_list(folder, "depth.txt");
@@ -157,7 +158,7 @@ Sequence open_tum(const fs::path& folder) {
       const auto nearest = nearest_to(colour.time, depth);
       if (nearest == depth.end() || std::abs(nearest->time - colour.time) > kMaxTimeDifference)
         continue;
-      frames.push_back({colour.time, colour.path, nearest->path});
+      frames.push_back({colour.time, colour.path, nearest->path, nearest->time - colour.time});
     }
   }
   const fs::path truth = only_file(folder, ".gt.freiburg", "groundtruth.txt");
@@ -319,6 +320,7 @@ Images load(const FrameFiles& files, const Rig& rig) {
   result.colour = colour;
   cv::cvtColor(colour, result.grey, cv::COLOR_BGR2GRAY);
   result.depth = depth_in_colour(depth, rig);
+  result.depth_delay = files.depth_delay;
   return result;
 }
 

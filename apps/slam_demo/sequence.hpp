@@ -14,8 +14,9 @@ using gpureg::evaluation::Trajectory;
 
 /// One frame of a sequence on disk.
 struct FrameFiles {
-  double time = 0;            ///< seconds
+  double time = 0;            ///< seconds, of the colour image
   std::string colour, depth;  ///< paths
+  double depth_delay = 0;     ///< seconds from the colour image to the depth image
 };
 
 /// An RGB-D sequence: what is on disk, nothing loaded.
@@ -41,8 +42,9 @@ Sequence open_sequence(const std::string& folder);
 struct Images {
   cv::Mat3b colour;
   cv::Mat1b grey;
-  cv::Mat1f depth;      ///< metres in the colour camera; 0: none
-  std::string problem;  ///< empty, or what is wrong with which file
+  cv::Mat1f depth;         ///< metres in the colour camera; 0: none
+  double depth_delay = 0;  ///< seconds from the colour image to the depth image
+  std::string problem;     ///< empty, or what is wrong with which file
 };
 
 Images load(const FrameFiles& files, const Rig& rig);

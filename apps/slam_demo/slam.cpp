@@ -2,6 +2,7 @@
 #include "slam.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <gpureg/error.hpp>
 #include <set>
 
@@ -11,6 +12,7 @@ namespace slam_demo {
 namespace {
 
 constexpr std::size_t kMinFragment = 20;  // frames of a fragment that a session ends with
+constexpr double kSameTime = 0.001;       // seconds: a tenth of a degree at 100 degrees/s
 constexpr float kFragmentVoxel = 0.4f;    // of the voxel size of the registration
 
 surfel::Camera surfel_camera(const Pinhole& camera) {
@@ -65,13 +67,26 @@ Tracker::Outcome Slam::track(int index, double time, const Images& images) {
   Images corrected = images;
   {
     const Stopwatch watch(extract_ms_);
-    features = extractor_(images.grey, images.depth);
-    corrected.depth = map_.calibration.corrected(images.depth);
+    const Lens& lens = map_.calibration.lens;
+    if (lens != lens_)
+      rectification_ = Rectification(rig_.colour, lens_ = lens, images.grey.size());
+    corrected.grey = rectification_(images.grey, cv::INTER_LINEAR);
+    corrected.colour = rectification_(images.colour, cv::INTER_LINEAR);
+    // A depth image that is not registered is projected into the pinhole already.
+    if (rig_.registered) corrected.depth = rectification_(images.depth, cv::INTER_NEAREST);
+    if (std::abs(images.depth_delay) > kSameTime && !images.depth.empty())
+      corrected.depth = seen_from(rig_.colour, tracker_.motion_within(images.depth_delay),
+                                  rig_.colour, corrected.depth);
+    features = extractor_(images.grey, corrected.depth, [&](const cv::Point2f& at) {
+      const Eigen::Vector2d pixel = in_pinhole(rig_.colour, lens, {at.x, at.y});
+      return cv::Point2f(static_cast<float>(pixel.x()), static_cast<float>(pixel.y()));
+    });
+    corrected.depth = map_.calibration.corrected(corrected.depth);
   }
   Tracker::Outcome outcome;
   {
     const Stopwatch watch(track_ms_);
-    outcome = tracker_.track(index, time, std::move(features), images.grey, corrected.depth);
+    outcome = tracker_.track(index, time, std::move(features), corrected.grey, corrected.depth);
   }
   if (outcome.pose.session == kNone) {
     ++lost_;

@@ -88,6 +88,8 @@ class Slam {
   const SlamOptions options_;
   Map map_;
   Extractor extractor_;
+  Lens lens_{};  // of rectification_
+  Rectification rectification_{rig_.colour, lens_, {}};
   Tracker tracker_;
   LoopClosing loops_;
   FragmentBuilder fragment_;

@@ -67,9 +67,11 @@ TEST(DepthCalibration, FileKeepsEveryBit) {
   const gpureg::test::TemporaryFolder folder;
   DepthCalibration c = field();
   c.width = 320;
+  c.lens = {1, 2.5, -3, 0.1, 1e-3, -1.0 / 3};
   write_depth_calibration(folder / "c.json", c);
   const DepthCalibration read = read_depth_calibration(folder / "c.json");
   EXPECT_EQ(read.offsets, c.offsets);
+  EXPECT_EQ(read.lens, c.lens);
   EXPECT_EQ(read.width, 320);
   for (const char* bad : {"", "{}", "[1]", R"({"columns": 2, "rows": 2})"}) {
     folder.write("bad.json", bad);
@@ -84,12 +86,12 @@ TEST(DepthCalibration, FileKeepsEveryBit) {
 }
 
 /// Twelve keyframes that look at points 1 to 4 m away from different places and angles; their
-/// depths have the offsets of a camera. The map starts from these depths.
+/// depths have the offsets of a camera, its pixels the lens. The map starts from these depths.
 struct Scene {
   Pinhole camera;
   Map map;
   std::vector<Eigen::Isometry3d> truth;
-  explicit Scene(const DepthCalibration& offsets) {
+  explicit Scene(const DepthCalibration& offsets, const Lens& lens = {}) {
     std::mt19937 random(3);
     const auto uniform = [&](double low, double high) {
       return low + (high - low) * (random() / 4294967296.0);
@@ -112,7 +114,9 @@ struct Scene {
         const Eigen::Vector2d at = camera.project(in_camera);
         if (in_camera.z() < 0.5 || at.x() < 0 || at.y() < 0 || at.x() > 639 || at.y() > 479)
           continue;
-        features->keys.emplace_back(static_cast<float>(at.x()), static_cast<float>(at.y()), 31.0f);
+        const Eigen::Vector2d key = in_image(camera, lens, at);
+        features->keys.emplace_back(static_cast<float>(key.x()), static_cast<float>(key.y()),
+                                    31.0f);
         features->depth.push_back(
             static_cast<float>(1 / (1 / in_camera.z() + offsets.offset(at.x(), at.y()))));
         ids.push_back(p);
@@ -144,8 +148,9 @@ struct Scene {
     return result;
   }
 
-  void adjust_all() {
+  void adjust_all(bool with_lens = false) {
     BundleProblem problem = this->problem();
+    problem.calibrate_lens = with_lens;
     adjust(camera, problem, 30, 1);
     apply(camera, problem, map);
   }
@@ -163,6 +168,30 @@ TEST(DepthCalibration, AdjustmentFindsIt) {
             .norm(),
         2e-3)
         << k;
+}
+
+// A focal length that is 7 pixels off, a centre that is 9 off, and distortion by 3 pixels in the
+// corners. Features go to where the pinhole has them.
+TEST(DepthCalibration, AdjustmentFindsTheLens) {
+  const Lens lens = {7, 7, -4, 8, 0.05, -0.07};
+  Scene scene(field(), lens);
+  const auto features = scene.map.keyframes[5].features;
+  scene.adjust_all();
+  EXPECT_EQ(scene.map.calibration.lens, Lens{}) << "nobody asked for it";
+  scene.adjust_all(true);
+  const Lens& found = scene.map.calibration.lens;
+  for (std::size_t k = 0; k < 4; ++k) EXPECT_NEAR(found[k], lens[k], 0.5) << k;
+  for (std::size_t k = 4; k < 6; ++k) EXPECT_NEAR(found[k], lens[k], 0.01) << k;
+  EXPECT_LT(scene.map.calibration.difference(field()), 1e-3);
+  const Features& now = *scene.map.keyframes[5].features;
+  for (std::size_t k = 0; k < now.size(); k += 20) {
+    const cv::Point2f before = features->keys[k].pt;
+    const Eigen::Vector2d pixel = in_pinhole(scene.camera, lens, {before.x, before.y});
+    EXPECT_LT(std::hypot(now.keys[k].pt.x - pixel.x(), now.keys[k].pt.y - pixel.y()), 0.5) << k;
+  }
+  EXPECT_LT((scene.map.keyframes[5].world_from_camera.translation() - scene.truth[5].translation())
+                .norm(),
+            5e-3);
 }
 
 // Ceres sorts by addresses: the poses lie after the offsets in one problem, before them in the
@@ -189,6 +218,8 @@ TEST(DepthCalibration, ACameraWithoutOffsetsGetsNone) {
   Scene scene{DepthCalibration()};
   scene.adjust_all();
   EXPECT_LT(scene.map.calibration.difference({}), 1e-5) << "pixels and depths are floats";
+  scene.adjust_all(true);
+  for (const double number : scene.map.calibration.lens) EXPECT_LT(std::abs(number), 0.01);
 }
 
 }  // namespace

@@ -61,6 +61,35 @@ TEST(EndToEnd, TrajectoryMapAndFiles) {
   EXPECT_EQ(page.find("http"), std::string::npos) << "nothing is loaded from elsewhere";
 }
 
+// The depth image of the next frame, moved back by the motion of the last two frames, is nearer to
+// that of this frame, whose noise remains.
+TEST(EndToEnd, DepthImagesOfAnotherTime) {
+  const Sequence sequence = open_sequence(frames_folder());
+  const Pinhole& camera = sequence.rig.colour;
+  Map map;
+  const Extractor extractor;
+  Tracker tracker(map, camera, sequential().tracker);
+  EXPECT_EQ(tracker.motion_within(1).matrix(), Eigen::Isometry3d::Identity().matrix());
+  double moved = 0, unmoved = 0;
+  for (std::size_t k = 0; k + 1 < 60; ++k) {
+    const FrameFiles& files = sequence.frames[k];
+    const Images now = load(files, sequence.rig), next = load(sequence.frames[k + 1], sequence.rig);
+    const Eigen::Isometry3d motion =
+        tracker.motion_within(sequence.frames[k + 1].time - files.time);
+    if (k > 2) {
+      const auto difference = [&](const cv::Mat1f& depth) {
+        const cv::Mat both = (now.depth > 0) & (depth > 0);
+        return cv::mean(cv::abs(depth - now.depth), both)[0];
+      };
+      moved += difference(seen_from(camera, motion, camera, next.depth));
+      unmoved += difference(next.depth);
+    }
+    tracker.track(static_cast<int>(k), files.time, extractor(now.grey, now.depth), now.grey,
+                  now.depth);
+  }
+  EXPECT_LT(moved, 0.5 * unmoved) << moved << " " << unmoved;
+}
+
 // There and back: the loops of the way back are found while tracking goes on.
 TEST(EndToEnd, LoopsBesideTracking) {
   Sequence sequence = open_sequence(frames_folder());

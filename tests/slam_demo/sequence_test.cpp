@@ -52,11 +52,14 @@ TEST(Sequence, TumWithAssociations) {
   EXPECT_EQ(sequence.layout, "TUM");
   ASSERT_EQ(sequence.frames.size(), 2u);
   EXPECT_EQ(sequence.frames[0].time, 1.0);
+  EXPECT_NEAR(sequence.frames[0].depth_delay, 0.01, 1e-12);
+  EXPECT_EQ(sequence.frames[1].depth_delay, 0);
   ASSERT_EQ(sequence.truth.size(), 1u);
   EXPECT_EQ(Eigen::Vector3d(sequence.truth[0].world_from_body.topRightCorner<3, 1>()),
             Eigen::Vector3d(1, 2, 3));
   const Images first = load(sequence.frames[0], sequence.rig);
   EXPECT_EQ(first.problem, "");
+  EXPECT_EQ(first.depth_delay, sequence.frames[0].depth_delay);
   EXPECT_FLOAT_EQ(first.depth(20, 30), 2.0f) << "10000 / 5000";
   EXPECT_EQ(first.grey.size(), cv::Size(64, 48));
   EXPECT_NE(load(sequence.frames[1], sequence.rig).problem.find("2.png"), std::string::npos);
@@ -64,11 +67,13 @@ TEST(Sequence, TumWithAssociations) {
 
 TEST(Sequence, IclNamesTheDepthFirst) {
   const TemporaryFolder folder;
-  write(folder / "associations.txt", "1 depth/1.png 1 rgb/1.png\n");
+  write(folder / "associations.txt", "1 depth/1.png 1.5 rgb/1.png\n");
   write(folder / "living.gt.freiburg", "1 0 0 5 0 0 0 1\n");
   const Sequence sequence = open_sequence(folder.path());
   EXPECT_NE(sequence.frames.front().colour.find("rgb/1.png"), std::string::npos);
   EXPECT_NE(sequence.frames.front().depth.find("depth/1.png"), std::string::npos);
+  EXPECT_EQ(sequence.frames.front().time, 1.5) << "of the colour image";
+  EXPECT_EQ(sequence.frames.front().depth_delay, -0.5);
   EXPECT_EQ(sequence.truth.size(), 1u);
 }
 
@@ -80,6 +85,8 @@ TEST(Sequence, TumWithTwoListsPairsByTime) {
   ASSERT_EQ(sequence.frames.size(), 2u) << "nothing within 20 ms of 1.50";
   EXPECT_NE(sequence.frames[0].depth.find("a.png"), std::string::npos);
   EXPECT_NE(sequence.frames[1].depth.find("c.png"), std::string::npos);
+  EXPECT_NEAR(sequence.frames[0].depth_delay, -0.01, 1e-12);
+  EXPECT_NEAR(sequence.frames[1].depth_delay, 0.015, 1e-12);
 }
 
 TEST(Sequence, TimesOutOfOrderAreLeftOut) {
@@ -133,6 +140,23 @@ TEST(Sequence, SevenScenesPutsDepthIntoTheColourCamera) {
           (y == 24 || y == 25) && (x == static_cast<int>(u) || x == static_cast<int>(u) + 1);
       ASSERT_FLOAT_EQ(depth(y, x), hit ? 1.0f : 0.0f) << x << " " << y;
     }
+  }
+}
+
+// A wall 2 m in front, and a camera that has gone 0.5 m ahead and turned by ten degrees.
+TEST(Sequence, DepthFromElsewhere) {
+  const Pinhole camera{60, 60, 32, 24};
+  const cv::Mat1f wall(48, 64, 2.0f);
+  EXPECT_EQ(
+      cv::countNonZero(seen_from(camera, Eigen::Isometry3d::Identity(), camera, wall) != wall), 0);
+  Eigen::Isometry3d wall_from_there = Eigen::Isometry3d::Identity();
+  wall_from_there.translate(Eigen::Vector3d(0, 0, 0.5));
+  wall_from_there.rotate(Eigen::AngleAxisd(M_PI / 18, Eigen::Vector3d::UnitY()));
+  const cv::Mat1f seen = seen_from(camera, wall_from_there.inverse(), camera, wall);
+  for (const auto& [u, v] : {std::pair{32, 24}, std::pair{20, 10}, std::pair{38, 40}}) {
+    const Eigen::Vector3d ray = wall_from_there.linear() * camera.unproject(u, v, 1);
+    // A pixel is as wide as 1/60 of the depth, and the wall is slanted by ten degrees.
+    EXPECT_NEAR(seen(v, u), 1.5 / ray.z(), 0.01) << u << " " << v;
   }
 }
 

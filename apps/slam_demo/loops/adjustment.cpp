@@ -16,6 +16,9 @@ constexpr double kWorthBundle = 0.02;
 // wrong with the fragments, and the pose that all else agrees on is the better one.
 constexpr double kMisfitMetres = 0.1, kMisfitRadians = 0.05;
 
+// With fewer keyframes the motion need not show the lens: a walk of ten seconds has twice as many.
+constexpr std::size_t kLensKeyframes = 40;
+
 }  // namespace
 
 void LoopClosing::optimize() {
@@ -81,6 +84,8 @@ BundleProblem LoopClosing::full_problem() {
   BundleProblem problem = bundle_of(map_, free, fixed, relatives);
   if (!prior_) prior_ = map_.calibration;
   problem.calibrate = options_.calibrate;
+  problem.calibrate_lens =
+      options_.calibrate && options_.calibrate_lens && map_.keyframes.size() >= kLensKeyframes;
   problem.prior = *prior_;
   return problem;
 }

@@ -14,13 +14,14 @@
 namespace slam_demo {
 
 struct LoopOptions {
-  bool dense = true;         ///< register fragments
-  bool loopsmart = false;    ///< registration and verification of the paper
-  bool images = false;       ///< also look for loops by images alone
-  bool sessions = true;      ///< connect sessions by images
-  bool bundle = true;        ///< full bundle adjustment after loops
-  bool calibrate = true;     ///< every full adjustment estimates the calibration of the depth
-  float voxel_size = 0.05f;  ///< metres, of the registration
+  bool dense = true;            ///< register fragments
+  bool loopsmart = false;       ///< registration and verification of the paper
+  bool images = false;          ///< also look for loops by images alone
+  bool sessions = true;         ///< connect sessions by images
+  bool bundle = true;           ///< full bundle adjustment after loops
+  bool calibrate = true;        ///< every full adjustment estimates the calibration of the depth
+  bool calibrate_lens = false;  ///< and that of the colour camera
+  float voxel_size = 0.05f;     ///< metres, of the registration
   int bundle_iterations = 6;
   bool parallel = true;  ///< beside tracking: what is found when depends on threads
   std::size_t max_fragments =

@@ -12,6 +12,7 @@ namespace {
 
 using Pose = BundleProblem::Pose;
 constexpr std::size_t kPoseSize = std::tuple_size<Pose>::value;
+constexpr int kLensSize = std::tuple_size<Lens>::value;
 
 Pose pose_of(const Eigen::Isometry3d& world_from_camera) {
   const Eigen::Isometry3d m = world_from_camera.inverse();
@@ -147,8 +148,12 @@ BundleProblem local_bundle(const Map& map, int keyframe, std::size_t size) {
 
 namespace {
 
-void add_calibration(double* offsets, const DepthCalibration& prior, ceres::Problem& problem,
-                     ceres::ParameterBlockOrdering& order) {
+void add_calibration(double* offsets, double* lens, const DepthCalibration& prior,
+                     ceres::Problem& problem, ceres::ParameterBlockOrdering& order) {
+  order.AddElementToGroup(lens, 1);
+  problem.AddResidualBlock(
+      new ceres::AutoDiffCostFunction<LensCost, kLensSize + 1, kLensSize>(new LensCost{prior.lens}),
+      nullptr, lens);
   for (std::size_t k = 0; k < DepthCalibration::kNodes; ++k) {
     double* node = offsets + k;
     order.AddElementToGroup(node, 1);
@@ -166,22 +171,27 @@ void add_calibration(double* offsets, const DepthCalibration& prior, ceres::Prob
 }
 
 void add_calibrated_sight(const Pinhole& camera, const Measurement& m, double* pose, double* point,
-                          const DepthCalibration& before, double* offsets,
+                          const DepthCalibration& before, double* offsets, double* lens,
                           ceres::Problem& problem) {
   const auto around = before.around(m.u, m.v);
   const auto node = [&](std::size_t k) { return offsets + around[k].node; };
   problem.AddResidualBlock(
-      new ceres::AutoDiffCostFunction<CalibratedSightCost, 3, 7, 3, 1, 1, 1, 1>(
-          new CalibratedSightCost{camera, m, around, before.offset(m.u, m.v)}),
-      new ceres::HuberLoss(kHuber), pose, point, node(0), node(1), node(2), node(3));
+      new ceres::AutoDiffCostFunction<CalibratedSightCost, 3, 7, 3, kLensSize, 1, 1, 1, 1>(
+          new CalibratedSightCost{camera, m, in_image(camera, before.lens, {m.u, m.v}), around,
+                                  before.offset(m.u, m.v)}),
+      new ceres::HuberLoss(kHuber), pose, point, lens, node(0), node(1), node(2), node(3));
 }
 
-/// Corrects the depths of the sights by the calibration that was found.
-void correct_sights(const DepthCalibration& before, BundleProblem& problem) {
+/// Corrects the sights by the calibration that was found.
+void correct_sights(const Pinhole& camera, const DepthCalibration& before, BundleProblem& problem) {
   for (BundleProblem::Sight& s : problem.sights) {
-    if (s.seen.depth > 0)
-      s.seen.depth = 1 / (1 / s.seen.depth + before.offset(s.seen.u, s.seen.v) -
-                          problem.calibration.offset(s.seen.u, s.seen.v));
+    Measurement& m = s.seen;
+    if (m.depth > 0)
+      m.depth = 1 / (1 / m.depth + before.offset(m.u, m.v) - problem.calibration.offset(m.u, m.v));
+    const Eigen::Vector2d pixel =
+        in_pinhole(camera, problem.calibration.lens, in_image(camera, before.lens, {m.u, m.v}));
+    m.u = pixel.x();
+    m.v = pixel.y();
   }
 }
 
@@ -190,12 +200,14 @@ void correct_sights(const DepthCalibration& before, BundleProblem& problem) {
 BundleReport adjust(const Pinhole& camera, BundleProblem& problem, int iterations, int threads) {
   if (problem.sights.empty()) return {};
   // Ceres orders the blocks of a group by their addresses: in one array, that is always the same.
-  std::vector<double> cameras;  // poses, then offsets of the calibration
+  std::vector<double> cameras;  // poses, then offsets of the calibration, then the lens
   for (const Pose& pose : problem.poses) cameras.insert(cameras.end(), pose.begin(), pose.end());
   cameras.insert(cameras.end(), problem.calibration.offsets.begin(),
                  problem.calibration.offsets.end());
+  cameras.insert(cameras.end(), problem.calibration.lens.begin(), problem.calibration.lens.end());
   const auto pose_at = [&](int k) { return &cameras[at(k) * kPoseSize]; };
   double* const offsets = &cameras[problem.poses.size() * kPoseSize];
+  double* const lens = offsets + DepthCalibration::kNodes;
   ceres::Problem ceres_problem;
   auto* order = new ceres::ParameterBlockOrdering;
   for (std::size_t k = 0; k < problem.poses.size(); ++k) {
@@ -205,13 +217,16 @@ BundleReport adjust(const Pinhole& camera, BundleProblem& problem, int iteration
     order->AddElementToGroup(pose, 1);
   }
   const DepthCalibration before = problem.calibration;
-  if (problem.calibrate) add_calibration(offsets, problem.prior, ceres_problem, *order);
+  if (problem.calibrate) {
+    add_calibration(offsets, lens, problem.prior, ceres_problem, *order);
+    if (!problem.calibrate_lens) ceres_problem.SetParameterBlockConstant(lens);
+  }
   for (const BundleProblem::Sight& s : problem.sights) {
     double* point = problem.points[at(s.point)].data();
     double* pose = pose_at(s.pose);
     order->AddElementToGroup(point, 0);
-    if (problem.calibrate && s.seen.depth > 0) {
-      add_calibrated_sight(camera, s.seen, pose, point, before, offsets, ceres_problem);
+    if (problem.calibrate && (s.seen.depth > 0 || problem.calibrate_lens)) {
+      add_calibrated_sight(camera, s.seen, pose, point, before, offsets, lens, ceres_problem);
       continue;
     }
     ceres_problem.AddResidualBlock(sight_cost(camera, s.seen), new ceres::HuberLoss(kHuber), pose,
@@ -236,11 +251,26 @@ BundleReport adjust(const Pinhole& camera, BundleProblem& problem, int iteration
   for (std::size_t k = 0; k < problem.poses.size(); ++k)
     std::copy_n(pose_at(static_cast<int>(k)), kPoseSize, problem.poses[k].begin());
   std::copy_n(offsets, DepthCalibration::kNodes, problem.calibration.offsets.begin());
-  if (problem.calibrate) correct_sights(before, problem);
+  std::copy_n(lens, kLensSize, problem.calibration.lens.begin());
+  if (problem.calibrate) correct_sights(camera, before, problem);
   return {summary.initial_cost, summary.final_cost};
 }
 
 namespace {
+
+/// The pixels of all features by another lens.
+void rectify_features(const Pinhole& camera, const Lens& before, const Lens& after, Map& map) {
+  for (Keyframe& keyframe : map.keyframes) {
+    auto features = std::make_shared<Features>(*keyframe.features);
+    for (cv::KeyPoint& key : features->keys) {
+      const Eigen::Vector2d pixel =
+          in_pinhole(camera, after, in_image(camera, before, {key.pt.x, key.pt.y}));
+      key.pt = {static_cast<float>(pixel.x()), static_cast<float>(pixel.y())};
+    }
+    features->index();
+    keyframe.features = std::move(features);
+  }
+}
 
 /// Points of a single keyframe take no part in an adjustment: they go where it measured them.
 void place_lone_points(const Pinhole& camera, Map& map) {
@@ -270,6 +300,7 @@ void apply(const Pinhole& camera, const BundleProblem& problem, Map& map) {
     if (!point.bad) point.position = problem.points[k];
   }
   if (problem.calibrate) {
+    rectify_features(camera, map.calibration.lens, problem.calibration.lens, map);
     map.calibration = problem.calibration;
     place_lone_points(camera, map);
   }

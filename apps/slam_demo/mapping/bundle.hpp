@@ -52,7 +52,8 @@ struct BundleProblem {
   std::vector<Sight> sights;
   std::vector<RelativePose> relatives;  ///< a, b: indices into poses
   DepthCalibration calibration;         ///< by which the depths of the sights are corrected
-  bool calibrate = false;               ///< estimate it too
+  bool calibrate = false;               ///< estimate its offsets too
+  bool calibrate_lens = false;          ///< and its lens
   DepthCalibration prior;               ///< expected calibration
 };
 

@@ -19,6 +19,11 @@ constexpr double kHuber =
 // neighbouring nodes. Ten and two times what cameras show: only nodes that nothing sees need them.
 constexpr double kNodeSigma = 0.01, kNeighbourSigma = 0.002;
 
+// Prior of the lens: fx fy cx cy, pixels, k1 k2. Cameras of one kind differ by this, and a focal
+// length that somebody guessed. Pixels are square to a part in 500.
+constexpr Lens kLensSigma = {10, 10, 10, 10, 0.1, 0.2};
+constexpr double kAspectSigma = 1;
+
 template <class T>
 using Vector3 = Eigen::Matrix<T, 3, 1>;
 
@@ -60,19 +65,42 @@ struct PoseCost {
   }
 };
 
-/// Of a camera whose offsets of inverse depth are unknown: those of the four nodes around.
+/// Of a camera whose lens is unknown, and its offsets of inverse depth: those of the four nodes
+/// around.
 struct CalibratedSightCost {
   const Pinhole camera;
   const Measurement m;
+  const Eigen::Vector2d image;  // where the image itself has it, pixels
   const std::array<DepthCalibration::Weight, 4> around;
   const double corrected;  // offset that m.depth is without already, 1/m
   template <class T>
-  bool operator()(const T* pose, const T* point, const T* a, const T* b, const T* c, const T* d,
-                  T* residual) const {
-    residual_of(camera, m, pose, point, residual, true);
-    const T offset = T(around[0].share) * *a + T(around[1].share) * *b + T(around[2].share) * *c +
-                     T(around[3].share) * *d;
-    residual[2] += (offset - T(corrected)) / T(kInverseDepthSigma);
+  bool operator()(const T* pose, const T* point, const T* lens, const T* a, const T* b, const T* c,
+                  const T* d, T* residual) const {
+    const Eigen::Map<const Eigen::Quaternion<T>> q(pose);
+    const Eigen::Map<const Vector3<T>> t(pose + 4), x(point);
+    const Vector3<T> p = q * x + t;
+    const T inverse = T(1) / p.z(), sigma = T(m.sigma);
+    const T u = p.x() * inverse, v = p.y() * inverse, r = u * u + v * v,
+            scale = T(1) + r * (lens[4] + r * lens[5]);
+    residual[0] = ((camera.fx + lens[0]) * u * scale + camera.cx + lens[2] - image.x()) / sigma;
+    residual[1] = ((camera.fy + lens[1]) * v * scale + camera.cy + lens[3] - image.y()) / sigma;
+    residual[2] = T(0);
+    if (m.depth <= 0) return true;
+    const T offset =
+        around[0].share * *a + around[1].share * *b + around[2].share * *c + around[3].share * *d;
+    residual[2] = (inverse - 1 / m.depth + offset - corrected) / kInverseDepthSigma;
+    return true;
+  }
+};
+
+/// A lens is near what is known of it.
+struct LensCost {
+  const Lens expected;
+  template <class T>
+  bool operator()(const T* lens, T* residual) const {
+    for (std::size_t k = 0; k < expected.size(); ++k)
+      residual[k] = (lens[k] - expected[k]) / kLensSigma[k];
+    residual[expected.size()] = (lens[0] - lens[1] - expected[0] + expected[1]) / kAspectSigma;
     return true;
   }
 };

@@ -61,6 +61,8 @@ int hamming(const Descriptor& a, const Descriptor& b) {
 double scale_of(int octave) { return std::pow(kScaleFactor, octave); }
 
 void Features::index() {
+  // A lens may put features outside the image.
+  const auto cell_of = [](float x) { return std::max(0, static_cast<int>(x)) / kCell; };
   columns_ = rows_ = 1;
   for (const cv::KeyPoint& key : keys) {
     columns_ = std::max(columns_, static_cast<int>(key.pt.x) / kCell + 1);
@@ -68,8 +70,7 @@ void Features::index() {
   }
   cells_.assign(static_cast<std::size_t>(columns_ * rows_), {});
   for (std::size_t k = 0; k < keys.size(); ++k)
-    cells_[static_cast<std::size_t>(static_cast<int>(keys[k].pt.y) / kCell * columns_ +
-                                    static_cast<int>(keys[k].pt.x) / kCell)]
+    cells_[static_cast<std::size_t>(cell_of(keys[k].pt.y) * columns_ + cell_of(keys[k].pt.x))]
         .push_back(static_cast<int>(k));
 }
 
@@ -98,7 +99,8 @@ Extractor::Extractor(int count) : count_(count) {
   weak_ = orb(6);
 }
 
-Features Extractor::operator()(const cv::Mat1b& grey, const cv::Mat1f& depth) const {
+Features Extractor::operator()(const cv::Mat1b& grey, const cv::Mat1f& depth,
+                               const std::function<cv::Point2f(cv::Point2f)>& pixel) const {
   Features result;
   std::vector<cv::KeyPoint> keys;
   if (grey.empty()) {
@@ -113,6 +115,7 @@ Features Extractor::operator()(const cv::Mat1b& grey, const cv::Mat1f& depth) co
   result.descriptors.resize(result.keys.size());
   for (std::size_t k = 0; k < result.keys.size(); ++k) {
     std::memcpy(result.descriptors[k].data(), descriptors.ptr(static_cast<int>(k)), 32);
+    if (pixel) result.keys[k].pt = pixel(result.keys[k].pt);
     result.depth.push_back(depth_at(depth, result.keys[k].pt));
   }
   result.index();

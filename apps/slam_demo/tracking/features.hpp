@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstdint>
+#include <functional>
 #include <opencv2/core.hpp>
 #include <opencv2/features2d.hpp>
 #include <vector>
@@ -36,7 +37,10 @@ struct Features {
 class Extractor {
  public:
   explicit Extractor(int count = 1000);
-  Features operator()(const cv::Mat1b& grey, const cv::Mat1f& depth) const;
+  /// Of an image as it is; pixel: where the pinhole has what the image has there. The depth is that
+  /// of the pinhole.
+  Features operator()(const cv::Mat1b& grey, const cv::Mat1f& depth,
+                      const std::function<cv::Point2f(cv::Point2f)>& pixel = {}) const;
 
  private:
   int count_;

@@ -152,6 +152,16 @@ void Tracker::finish_bundle(bool wait) {
   }
 }
 
+Eigen::Isometry3d Tracker::motion_within(double seconds) const {
+  Eigen::Isometry3d motion = Eigen::Isometry3d::Identity();
+  if (lost_ || velocity_seconds_ <= 0) return motion;
+  const double share = seconds / velocity_seconds_;
+  const Eigen::AngleAxisd turn(velocity_.linear());
+  motion.linear() = Eigen::AngleAxisd(share * turn.angle(), turn.axis()).toRotationMatrix();
+  motion.translation() = share * velocity_.translation();
+  return motion;
+}
+
 void Tracker::settle() { finish_bundle(true); }
 
 /// Repeated texture can match with a shift: a pose that no motion from the last one explains is
@@ -210,6 +220,7 @@ Tracker::Outcome Tracker::track(int frame, double time, Features features, const
   }
   velocity_ = found && !lost_ ? world_from_camera(map_, last_).inverse() * view.pose
                               : Eigen::Isometry3d::Identity();
+  velocity_seconds_ = found && !lost_ ? time - last_.time : 0;
   lost_ = false;
   if (since_keyframe_ == 1) reference_inliers_ = view.inliers;
   if (outcome.new_session || needs_keyframe(view)) {

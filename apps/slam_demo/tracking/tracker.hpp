@@ -47,6 +47,10 @@ class Tracker {
   Outcome track(int frame, double time, Features features, const cv::Mat1b& grey,
                 const cv::Mat1f& depth);
 
+  /// Motion from the next frame's time on, by the motion of the last two frames. Identity where
+  /// these are unknown.
+  Eigen::Isometry3d motion_within(double seconds) const;
+
   /// Waits for the adjustment in the other thread and applies it; before anyone else changes the
   /// map.
   void settle();
@@ -79,6 +83,7 @@ class Tracker {
   cv::Mat1f last_depth_;
   int reference_inliers_ = 0;  // of the frame after the newest keyframe
   Eigen::Isometry3d velocity_ = Eigen::Isometry3d::Identity();  // last_from_now
+  double velocity_seconds_ = 0;                                 // from the last one to now
   struct Running {
     BundleProblem problem;
     double milliseconds = 0;
