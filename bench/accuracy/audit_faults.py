@@ -248,6 +248,11 @@ def restored(path, right, replaced):
     return bool(rms(metres) <= RESTORED)
 
 
+def scans_of(connection):
+    """Numbers of the smaller part, which the document has as ranges."""
+    return {k for first, last in connection["scans"] for k in range(first, last + 1)}
+
+
 def score(verdict, sides, n):
     """Found; the strongest pair crosses the break; the least confident connection is the break."""
     broken = [c for c in verdict["connections"] if c["verdict"] == "contradicted"]
@@ -257,7 +262,7 @@ def score(verdict, sides, n):
     strongest = next((c["contradictions"][0] for c in broken if c["contradictions"]), None)
     pair = strongest is not None and (strongest[0] in left) != (strongest[1] in left)
     everyone = {*sides[0], *sides[1]}
-    parts = [set(c["scans"]) & everyone for c in broken]
+    parts = [scans_of(c) & everyone for c in broken]
     allowed = max(1, n // 10)
     cut = min(min(len(p ^ left), len(p ^ (everyone - left))) for p in parts[:1]) <= allowed
     return True, pair, cut
@@ -295,12 +300,13 @@ def main():
         other = maps[(at + 1) % len(maps)]
         right, _ = audit(arguments, chosen.folder, chosen.poses, f"{chosen.name}_right")
         wrong = sum(c["verdict"] == "contradicted" for c in right["connections"])
-        connections += len(right["connections"])
+        of_map = right["confirmed"] + len(right["connections"])
+        connections += of_map
         alarms += wrong
         unharmed[chosen.name] = {
             "scans": len(chosen.order),
             "near_pairs": right["near_pairs"],
-            "connections": len(right["connections"]),
+            "connections": of_map,
             "undecided": sum(c["verdict"] == "undecided" for c in right["connections"]),
             "alarms": wrong,
             "seconds": right["seconds"],

@@ -67,10 +67,11 @@ struct RiskControl {
   void validate() const;
 };
 
-/// Result of control_risk().
+/// Result of control_risk() and control_risk_of_scenes().
 struct RiskThreshold {
   bool supported = false;     ///< false: the samples are no proof for any threshold
   double min_confidence = 1;  ///< for RegistrationOptions::min_confidence
+  std::size_t scenes = 0;     ///< of control_risk_of_scenes()
   std::size_t samples = 0;    ///< all
   std::size_t reported = 0;   ///< from min_confidence on
   std::size_t wrong = 0;      ///< of these
@@ -78,6 +79,8 @@ struct RiskThreshold {
   /// Where it is not supported: so many more samples would do if their shares of false poses stay
   /// as they are. None: no number would do, too many of the most confident poses are false.
   std::optional<std::size_t> more_samples;
+  /// The same in scenes.
+  std::optional<std::size_t> more_scenes;
 };
 
 /// Finds the lowest threshold on the confidence that keeps a promise: of the poses that pairs like
@@ -98,6 +101,21 @@ struct RiskThreshold {
 RiskThreshold control_risk(const std::vector<CalibrationSample>& samples,
                            const RiskControl& control = {},
                            const ConfidenceCalibration& calibration = {});
+
+/// The same for pairs of other scenes than the samples. Pairs of one scene share its aliases and
+/// are not independent: what is drawn is a scene. With probability 1 - max_failure over the scenes,
+/// at most max_risk of the poses that a further scene reports are false.
+///
+/// Split conformal prediction (Vovk et al. 2005; Angelopoulos and Bates 2023, section 1) of the
+/// threshold from which on a scene keeps the risk: the k-th largest of n scenes holds for a further
+/// one with probability 1 - k / (n + 1). A failure of 5 % takes 19 scenes, of which every one keeps
+/// the risk; 39 allow for one that does not. With fewer nothing is supported.
+///
+/// @param scenes samples of each, drawn like those of later: buildings, not parts of one.
+/// @throws InvalidArgument also for a scene without samples.
+RiskThreshold control_risk_of_scenes(const std::vector<std::vector<CalibrationSample>>& scenes,
+                                     const RiskControl& control = {},
+                                     const ConfidenceCalibration& calibration = {});
 
 /// Options of calibrate().
 struct CalibrationOptions {

@@ -3,6 +3,7 @@
 
 #include <pybind11/stl.h>
 
+#include <algorithm>
 #include <exception>
 #include <optional>
 
@@ -117,27 +118,35 @@ void bind_calibration(py::module_& m) {
       py::arg("confidences"), py::arg("correct"), py::arg("weights"));
   m.def(
       "control_risk",
-      [](const std::vector<double>& confidences, const std::vector<bool>& correct, double max_risk,
-         double max_failure, const ConfidenceCalibration& calibration) {
-        std::vector<CalibrationSample> samples;
-        for (std::size_t k = 0; k < confidences.size(); ++k)
-          samples.push_back({confidences[k], correct.at(k)});
+      [](const std::vector<double>& confidences, const std::vector<bool>& correct,
+         const std::optional<std::vector<std::size_t>>& scenes, double max_risk, double max_failure,
+         const ConfidenceCalibration& calibration) {
+        // Without scenes, all are of the first.
+        std::vector<std::vector<CalibrationSample>> samples(scenes ? 0 : 1);
+        for (std::size_t k = 0; k < confidences.size(); ++k) {
+          const std::size_t scene = scenes ? scenes->at(k) : 0;
+          samples.resize(std::max(samples.size(), scene + 1));
+          samples[scene].push_back({confidences[k], correct.at(k)});
+        }
         RiskControl control;
         control.max_risk = max_risk;
         control.max_failure = max_failure;
-        const RiskThreshold found = control_risk(samples, control, calibration);
+        const RiskThreshold found = scenes ? control_risk_of_scenes(samples, control, calibration)
+                                           : control_risk(samples[0], control, calibration);
         py::dict out;
         out["supported"] = found.supported;
         out["min_confidence"] = found.min_confidence;
+        out["scenes"] = found.scenes;
         out["samples"] = found.samples;
         out["reported"] = found.reported;
         out["wrong"] = found.wrong;
         out["recall"] = found.recall;
         out["more_samples"] = found.more_samples;
+        out["more_scenes"] = found.more_scenes;
         return out;
       },
-      py::arg("confidences"), py::arg("correct"), py::arg("max_risk"), py::arg("max_failure"),
-      py::arg("calibration"));
+      py::arg("confidences"), py::arg("correct"), py::arg("scenes"), py::arg("max_risk"),
+      py::arg("max_failure"), py::arg("calibration"));
 }
 
 }  // namespace gpureg::python

@@ -59,8 +59,6 @@ class AuditedConnection:
 
     Attributes
     ----------
-    scans : list of int
-        Numbers of the fragments of the smaller part.
     verdict : str
         "confirmed", "contradicted" or "undecided".
     confidence : float
@@ -73,12 +71,18 @@ class AuditedConnection:
         Indices into ``Audit.pairs``, the strongest first.
     """
 
-    scans: list[int]
     verdict: str
     confidence: float
     supporting: int
     contradicting: int
     contradictions: list[int]
+    _order: Any = dataclasses.field(repr=False, compare=False)
+    _part: slice = dataclasses.field(repr=False)
+
+    @property
+    def scans(self) -> list[int]:
+        """Numbers of the fragments of the smaller part."""
+        return sorted(self._order[self._part])
 
 
 @dataclasses.dataclass(frozen=True)
@@ -143,11 +147,15 @@ def audit(
     fragments = fragment_set(fragments)
     matrices = _poses(poses, fragments)
     clouds = prepared_fragments(fragments, options.prepare, context, progress)
-    pairs, connections = _core.audit(context, clouds, matrices, options)
+    pairs, connections, order = _core.audit(context, clouds, matrices, options)
     numbers = [int(number) for number in fragments.numbers]
+    order = [numbers[k] for k in order]
     return Audit(
         [AuditedPair(numbers[row[0]], numbers[row[1]], *row[2:]) for row in pairs],
-        [AuditedConnection([numbers[k] for k in row[0]], *row[1:]) for row in connections],
+        [
+            AuditedConnection(*row, _order=order, _part=slice(first, first + size))
+            for *row, first, size in connections
+        ],
     )
 
 

@@ -39,6 +39,8 @@ class RiskThreshold:
         False: the samples are no proof for any threshold.
     min_confidence : float
         For ``RegistrationOptions.min_confidence``; 1 where nothing is supported.
+    scenes : int
+        0: all samples count as independent.
     samples : int
     reported : int
         Those from ``min_confidence`` on.
@@ -49,24 +51,29 @@ class RiskThreshold:
     more_samples : int or None
         Where it is not supported: so many more would do if their shares of false poses stay as they
         are. None: no number would do.
+    more_scenes : int or None
+        The same in scenes, at least.
     """
 
     max_risk: float
     max_failure: float
     supported: bool
     min_confidence: float
+    scenes: int
     samples: int
     reported: int
     wrong: int
     recall: float
     more_samples: int | None
+    more_scenes: int | None
 
     def _json(self) -> dict[str, Any]:
         out = dataclasses.asdict(self)
         out["false"] = out.pop("wrong")
-        unknown = ("min_confidence", "reported", "false", "recall")
-        for name in ("more_samples",) if self.supported else unknown:
-            del out[name]
+        more = ("more_samples", "more_scenes")
+        gone = more if self.supported else ("min_confidence", "reported", "false", "recall")
+        for name in (*gone, more[self.scenes == 0], *(() if self.scenes else ("scenes",))):
+            out.pop(name, None)
         return out
 
 
@@ -91,6 +98,9 @@ class CalibrationRun:
         That it was made with.
     risk : RiskThreshold or None
         The answer to ``max_risk``.
+    samples : tuple of list
+        Confidences of the decided pairs of different scans, and whether they are correct: for
+        `control_risk`.
     """
 
     calibration: ConfidenceCalibration
@@ -100,6 +110,7 @@ class CalibrationRun:
     counts: dict[str, dict[str, int]]
     voxel_size: float
     risk: RiskThreshold | None = None
+    samples: tuple[list[float], list[bool]] = ((), ())
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write the file that ``--calibration`` of the command and `read_calibration` read,
@@ -121,6 +132,7 @@ class CalibrationRun:
             "calibration_error": {"before": self.error_before, "after": self.error_after},
             "voxel_size": self.voxel_size,
             "preset": "default",
+            "decided_pairs": dict(zip(("confidence", "correct"), self.samples, strict=True)),
         }
         if self.risk is not None:
             document["risk"] = self.risk._json()
@@ -200,11 +212,9 @@ def calibrate(
         found = _core.calibrate(
             context, inputs, options, numbers["self_pairs"], numbers["scan_pairs"], known, tell
         )
-    samples = found.pop("samples")
     risk = None
     if max_risk is not None:
-        confidences, correct = samples
-        risk = _control_risk(confidences, correct, max_risk, 0.05, found["calibration"])
+        risk = _control_risk(*found["samples"], None, max_risk, 0.05, found["calibration"])
     return CalibrationRun(voxel_size=options.prepare.voxel_size, risk=risk, **found)
 
 
@@ -256,18 +266,26 @@ def fit_calibration(
 
 
 def control_risk(
-    confidences: Any, correct: Any, *, max_risk: float = 0.01, max_failure: float = 0.05
+    confidences: Any,
+    correct: Any,
+    *,
+    scenes: Any = None,
+    max_risk: float = 0.01,
+    max_failure: float = 0.05,
 ) -> RiskThreshold:
     """Find the lowest confidence from which at most ``max_risk`` of the reported poses are false.
 
     With probability ``1 - max_failure`` over the samples this is so in the long run for pairs like
-    them, whatever the confidence is worth.
+    them, whatever the confidence is worth; with ``scenes``, for the pairs of a further scene.
 
     Parameters
     ----------
     confidences : (N,) floats
-        Of independent pairs, drawn like those of later.
+        Of pairs, drawn like those of later.
     correct : (N,) bools
+    scenes : (N,) labels, optional
+        Scene of each pair: buildings, not parts of one. 19 or more are needed for a ``max_failure``
+        of 0.05. Default: the pairs are independent, which pairs of one scene are not.
     max_risk, max_failure : float
         In (0, 1).
 
@@ -284,8 +302,15 @@ def control_risk(
     True
     """
     values, verdicts = _labelled(confidences, correct)
+    groups = None
+    if scenes is not None:
+        labels = to_numpy(scenes, "scenes")
+        if labels.shape != values.shape:
+            raise ValueError(f"scenes: expected shape {values.shape}, got {labels.shape}")
+        groups = np.unique(labels, return_inverse=True)[1].tolist()
+    identity = ConfidenceCalibration()
     return _control_risk(
-        values.tolist(), verdicts.tolist(), max_risk, max_failure, ConfidenceCalibration()
+        values.tolist(), verdicts.tolist(), groups, max_risk, max_failure, identity
     )
 
 
@@ -303,11 +328,12 @@ def _labelled(confidences: Any, correct: Any) -> tuple[Any, Any]:
 def _control_risk(
     confidences: list[float],
     correct: list[bool],
+    scenes: list[int] | None,
     max_risk: float,
     max_failure: float,
     calibration: ConfidenceCalibration,
 ) -> RiskThreshold:
-    found = _core.control_risk(confidences, correct, max_risk, max_failure, calibration)
+    found = _core.control_risk(confidences, correct, scenes, max_risk, max_failure, calibration)
     return RiskThreshold(max_risk=max_risk, max_failure=max_failure, **found)
 
 

@@ -746,6 +746,7 @@ def fit_calibration(
 def control_risk(
     confidences: Sequence[float],
     correct: Sequence[bool],
+    scenes: Sequence[int] | None,
     max_risk: float,
     max_failure: float,
     calibration: ConfidenceCalibration,
@@ -1544,7 +1545,8 @@ def audit(
     options: RegistrationOptions,
 ) -> tuple[
     list[tuple[int, int, str, float, float, float, float, float]],
-    list[tuple[list[int], str, float, int, int, list[int]]],
+    list[tuple[str, float, int, int, list[int], int, int]],
+    list[int],
 ]: ...
 def refine_map(
     context: Context,

@@ -189,7 +189,10 @@ def test_a_promised_risk(clouds, tmp_path):
     run = gpureg.calibrate(clouds[0], self_pairs=8, max_risk=0.001, options=options())
     assert not run.risk.supported and run.risk.min_confidence == 1
     run.save(tmp_path / "c.json")
-    risk = json.loads((tmp_path / "c.json").read_text())["risk"]
+    document = json.loads((tmp_path / "c.json").read_text())
+    risk, pairs = document["risk"], document["decided_pairs"]
+    assert len(pairs["confidence"]) == len(pairs["correct"]) == risk["samples"] > 0
+    assert "scenes" not in risk and "more_scenes" not in risk
     assert risk["max_risk"] == 0.001 and "min_confidence" not in risk
     found = gpureg.control_risk(
         [0.95] * 400 + [0.2] * 100, [True] * 400 + [False] * 100, max_risk=0.05
@@ -201,6 +204,18 @@ def test_a_promised_risk(clouds, tmp_path):
         0,
     )
     assert found.recall == 1 and found.more_samples is None
+
+
+def test_a_promised_risk_of_scenes():
+    confidences, correct = np.tile([0.95, 0.4], 20), np.tile([True, False], 20)
+    scenes = np.repeat([f"building {k}" for k in range(20)], 2)
+    found = gpureg.control_risk(confidences, correct, scenes=scenes, max_risk=0.05)
+    assert (found.supported, found.scenes, found.reported, found.wrong) == (True, 20, 20, 0)
+    assert found.min_confidence == np.nextafter(0.4, 1)
+    few = gpureg.control_risk(confidences[:30], correct[:30], scenes=scenes[:30], max_risk=0.05)
+    assert not few.supported and few.more_scenes == 4
+    with pytest.raises(ValueError, match=r"scenes: expected shape \(40,\), got \(39,\)"):
+        gpureg.control_risk(confidences, correct, scenes=scenes[1:])
 
 
 @pytest.mark.parametrize(

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <iterator>
 #include <string>
 
@@ -92,6 +93,27 @@ std::optional<std::size_t> more_samples(const std::vector<CalibrationSample>& sa
   return fewest;
 }
 
+void check(const std::vector<CalibrationSample>& samples, const std::string& name) {
+  for (std::size_t k = 0; k < samples.size(); ++k)
+    require(samples[k].confidence >= 0 && samples[k].confidence <= 1,
+            (name + "[" + std::to_string(k) + "].confidence").c_str(), samples[k].confidence,
+            "a probability in [0, 1]");
+}
+
+/// The largest confidence from which on more than `risk` of the reports are false; 0: none.
+double last_failure(std::vector<CalibrationSample> samples, double risk) {
+  std::sort(samples.begin(), samples.end(),
+            [](const auto& a, const auto& b) { return a.confidence > b.confidence; });
+  double wrong = 0;
+  for (std::size_t k = 0; k < samples.size(); ++k) {
+    wrong += samples[k].correct ? 0 : 1;
+    // Equal confidences are reported together.
+    if (k + 1 < samples.size() && samples[k + 1].confidence == samples[k].confidence) continue;
+    if (wrong > risk * static_cast<double>(k + 1)) return samples[k].confidence;
+  }
+  return 0;
+}
+
 }  // namespace
 
 void RiskControl::validate() const {
@@ -110,10 +132,7 @@ std::vector<CalibrationSample> CalibrationResult::of_two_scans() const {
 RiskThreshold control_risk(const std::vector<CalibrationSample>& samples,
                            const RiskControl& control, const ConfidenceCalibration& calibration) {
   control.validate();
-  for (std::size_t k = 0; k < samples.size(); ++k)
-    require(samples[k].confidence >= 0 && samples[k].confidence <= 1,
-            ("samples[" + std::to_string(k) + "].confidence").c_str(), samples[k].confidence,
-            "a probability in [0, 1]");
+  check(samples, "samples");
   const double log_level =
       portable::log(control.max_failure / static_cast<double>(std::size(kStarts)));
   RiskThreshold out;
@@ -135,6 +154,50 @@ RiskThreshold control_risk(const std::vector<CalibrationSample>& samples,
   out.reported = counts.reported;
   out.wrong = counts.wrong;
   out.recall = static_cast<double>(counts.correct) / static_cast<double>(all.correct);
+  return out;
+}
+
+RiskThreshold control_risk_of_scenes(const std::vector<std::vector<CalibrationSample>>& scenes,
+                                     const RiskControl& control,
+                                     const ConfidenceCalibration& calibration) {
+  control.validate();
+  RiskThreshold out;
+  out.scenes = scenes.size();
+  std::vector<double> failures;
+  for (std::size_t k = 0; k < scenes.size(); ++k) {
+    const std::string name = "scenes[" + std::to_string(k) + "]";
+    require(!scenes[k].empty(), (name + ".size").c_str(), 0, "one sample or more");
+    check(scenes[k], name);
+    out.samples += scenes[k].size();
+    failures.push_back(last_failure(scenes[k], control.max_risk));
+  }
+  // So many scenes may fail, the further one included.
+  const auto fails = static_cast<std::size_t>(
+      std::floor(control.max_failure * static_cast<double>(scenes.size() + 1) * (1 + 1e-12)));
+  if (fails == 0) {
+    const double fewest = std::ceil(1 / control.max_failure * (1 - 1e-12)) - 1;
+    out.more_scenes = static_cast<std::size_t>(fewest) - scenes.size();
+    return out;
+  }
+  std::sort(failures.begin(), failures.end(), std::greater<>());
+  // Below the ladder of control_risk() hardly any sample was seen. All calibrated confidences above
+  // the failure are reported.
+  const double threshold =
+      std::max(calibration(kLadder[0]), std::nextafter(calibration(failures[fails - 1]), 2.0));
+  if (threshold > 1) return out;
+  out.supported = true;
+  out.min_confidence = threshold;
+  std::size_t correct = 0, all_correct = 0;
+  for (const std::vector<CalibrationSample>& scene : scenes)
+    for (const CalibrationSample& sample : scene) {
+      const bool reported = calibration(sample.confidence) >= threshold;
+      out.reported += reported ? 1 : 0;
+      out.wrong += reported && !sample.correct ? 1 : 0;
+      correct += reported && sample.correct ? 1 : 0;
+      all_correct += sample.correct ? 1 : 0;
+    }
+  out.recall =
+      all_correct == 0 ? 0 : static_cast<double>(correct) / static_cast<double>(all_correct);
   return out;
 }
 

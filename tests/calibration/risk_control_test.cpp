@@ -139,5 +139,130 @@ TEST(RiskControl, KeepsThePromiseWhateverTheConfidenceIsWorth) {
   }
 }
 
+/// Scenes of different difficulty: in some of them confident poses are false.
+std::vector<Samples> random_scenes(std::size_t count, unsigned seed) {
+  std::mt19937 random(seed);
+  std::uniform_real_distribution<double> unit;
+  std::vector<Samples> scenes(count);
+  for (Samples& scene : scenes) {
+    const double aliases = 0.3 * std::pow(unit(random), 3);
+    for (std::size_t k = 20 + random() % 60; k > 0; --k) {
+      // In steps, so that confidences are equal now and then.
+      const double confidence = std::floor(100 * unit(random)) / 100;
+      scene.push_back({confidence, unit(random) < confidence * (1 - aliases)});
+    }
+  }
+  return scenes;
+}
+
+bool keeps(const Samples& scene, double threshold, double max_risk) {
+  double reported = 0, wrong = 0;
+  for (const CalibrationSample& sample : scene)
+    if (sample.confidence >= threshold) {
+      ++reported;
+      wrong += sample.correct ? 0 : 1;
+    }
+  return wrong <= max_risk * reported;
+}
+
+// All thresholds, from the top down, until more scenes fail than may.
+TEST(RiskOfScenes, IsTheLowestThresholdByBruteForce) {
+  for (unsigned seed = 1; seed <= 60; ++seed) {
+    const std::size_t count = seed % 3 == 0 ? 19 : seed % 3 == 1 ? 39 : 65;
+    const std::size_t may_fail = (count + 1) / 20 - 1;
+    const std::vector<Samples> scenes = random_scenes(count, seed);
+    RiskControl control;
+    control.max_risk = seed % 2 == 0 ? 0.1 : 0.3;
+    double lowest = 2;
+    std::vector<char> failed(count, 0);
+    for (int step = 100; step >= 5; --step) {
+      std::size_t failures = 0;
+      for (std::size_t k = 0; k < count; ++k) {
+        if (!keeps(scenes[k], step / 100.0, control.max_risk)) failed[k] = 1;
+        failures += failed[k] != 0 ? 1 : 0;
+      }
+      if (failures > may_fail) break;
+      lowest = step / 100.0;
+    }
+    const RiskThreshold found = control_risk_of_scenes(scenes, control);
+    EXPECT_EQ(found.scenes, count);
+    EXPECT_TRUE(found.supported) << seed;
+    // It lies right above the last confidence that fails.
+    EXPECT_GT(found.min_confidence, lowest - 0.0101) << seed;
+    EXPECT_LE(found.min_confidence, lowest) << seed;
+  }
+}
+
+// Of n + 1 scenes, each held out once, at most as many fail as the promise says: no luck needed.
+TEST(RiskOfScenes, HoldsForScenesThatWereLeftOut) {
+  for (unsigned seed = 1; seed <= 20; ++seed) {
+    const std::vector<Samples> scenes = random_scenes(40, 100 + seed);
+    RiskControl control;
+    control.max_risk = 0.2;
+    int failures = 0;
+    for (std::size_t k = 0; k < scenes.size(); ++k) {
+      std::vector<Samples> others = scenes;
+      others.erase(others.begin() + static_cast<std::ptrdiff_t>(k));
+      const RiskThreshold found = control_risk_of_scenes(others, control);
+      failures +=
+          keeps(scenes[k], found.supported ? found.min_confidence : 2, control.max_risk) ? 0 : 1;
+    }
+    EXPECT_LE(failures, 2) << seed;
+  }
+}
+
+TEST(RiskOfScenes, AbstainsWithTooFewScenes) {
+  const std::vector<Samples> scenes(18, repeated(0.99, 1000, 0));
+  const RiskThreshold few = control_risk_of_scenes(scenes);
+  EXPECT_FALSE(few.supported);
+  EXPECT_EQ(few.min_confidence, 1);
+  EXPECT_EQ(few.more_scenes, 1u);
+  EXPECT_EQ(control_risk_of_scenes({}).more_scenes, 19u);
+  RiskControl control;
+  control.max_failure = 0.1;
+  EXPECT_TRUE(control_risk_of_scenes(scenes, control).supported);
+  control.max_failure = 0.01;
+  EXPECT_EQ(control_risk_of_scenes(scenes, control).more_scenes, 81u);
+}
+
+// 19 scenes allow for no failure, 39 for one.
+TEST(RiskOfScenes, OneSceneOfManyMayFail) {
+  for (const std::size_t count : {19u, 38u, 39u}) {
+    std::vector<Samples> scenes(count, repeated(0.9, 50, 0));
+    scenes.back() = repeated(1, 5, 5);
+    const RiskThreshold found = control_risk_of_scenes(scenes);
+    EXPECT_EQ(found.supported, count == 39) << count;
+    EXPECT_FALSE(found.more_scenes) << "as many as are needed at least";
+  }
+}
+
+TEST(RiskOfScenes, CountsAndCalibrates) {
+  std::vector<Samples> scenes(19, repeated(0.9, 9, 0));
+  for (Samples& scene : scenes) scene.insert(scene.end(), {{0.6, true}, {0.6, false}, {0.3, true}});
+  ConfidenceCalibration calibration;
+  calibration.slope = 0.7;
+  calibration.offset = -1;
+  RiskControl control;
+  control.max_risk = 0.05;
+  const RiskThreshold found = control_risk_of_scenes(scenes, control, calibration);
+  EXPECT_EQ(found.min_confidence, std::nextafter(calibration(0.6), 1));
+  EXPECT_EQ(found.samples, 19u * 12);
+  EXPECT_EQ(found.reported, 19u * 9);
+  EXPECT_EQ(found.wrong, 0u);
+  EXPECT_DOUBLE_EQ(found.recall, 9.0 / 11);
+  control.max_risk = 0.1;
+  EXPECT_EQ(control_risk_of_scenes(scenes, control, calibration).min_confidence, calibration(0.05))
+      << "one of eleven is kept from every threshold on";
+}
+
+TEST(RiskOfScenes, BadInputsAreNamed) {
+  std::vector<Samples> scenes(19, repeated(0.9, 9, 0));
+  scenes[3].clear();
+  test::expect_error<InvalidArgument>([&] { control_risk_of_scenes(scenes); }, {"scenes[3].size"});
+  scenes[3] = repeated(1.5, 1, 0);
+  test::expect_error<InvalidArgument>([&] { control_risk_of_scenes(scenes); },
+                                      {"scenes[3][0].confidence"});
+}
+
 }  // namespace
 }  // namespace gpureg

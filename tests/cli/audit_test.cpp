@@ -52,10 +52,47 @@ TEST_F(AuditCommand, AWrongScanIsNamed) {
   EXPECT_EQ(outcome.status, 1) << outcome.err;
   expect_holds(outcome.out, {"verdict    contradicted", "broken     scan 3:"});
   const auto worst = json_of(out_ / "wrong.json").at("connections").at(0);
-  EXPECT_EQ(worst.at("scans"), nlohmann::json::parse("[3]"));
+  EXPECT_EQ(worst.at("scans"), nlohmann::json::parse("[[3, 3]]"));
   EXPECT_EQ(worst.at("verdict"), "contradicted");
   const std::string page = content_of(out_ / "wrong.html");
   expect_holds(page, {"Contradicted", "Broken at scan 3", "<svg"});
+}
+
+TEST_F(AuditCommand, PosesThatKeepAllScansApartAreNoSoundMap) {
+  std::ofstream file(out_ / "apart.txt");
+  for (int k = 0; k < kScans; ++k) file << k << " " << 1000 * k << " 0 0 0 0 0 1\n";
+  file.close();
+  const Outcome outcome = audit(out_ / "apart.txt");
+  EXPECT_EQ(outcome.status, 1) << outcome.err;
+  expect_holds(outcome.out, {"verdict    undecided", "in the unit of their points?"});
+}
+
+TEST_F(AuditCommand, AMissingScanIsNamed) {
+  std::ifstream whole(poses("right.txt"));
+  std::ofstream part(out_ / "part.txt");
+  std::string line;
+  for (int n = 0; std::getline(whole, line); ++n)
+    if (n < 10 || n >= 15) part << line << "\n";  // without scan 2
+  part.close();
+  const Outcome outcome = audit(out_ / "part.txt", {"--json", out_ / "part.json"});
+  EXPECT_EQ(outcome.status, 0) << outcome.err;
+  expect_holds(outcome.out, {"5 with a pose, 1 without"});
+  EXPECT_EQ(json_of(out_ / "part.json").at("missing"), nlohmann::json::parse("[2]"));
+}
+
+TEST_F(AuditCommand, BadLogsAreErrors) {
+  const auto log = [&](const std::string& name, const std::string& first) {
+    std::ofstream file(out_ / name);
+    for (int k = 0; k + 1 < kScans; ++k)
+      file << k << " " << k + 1 << " " << kScans << "\n"
+           << (k == 2 ? first : "1") << " 0 0 0\n0 1 0 0\n0 0 1 0\n0 0 0 1\n";
+    return out_ / name;
+  };
+  for (const std::string first : {"nan", "-1", "1.5"}) {
+    const Outcome outcome = audit(log("bad.log", first));
+    EXPECT_EQ(outcome.status, 2) << first;
+    expect_holds(outcome.err, {"bad.log"});
+  }
 }
 
 TEST_F(AuditCommand, BadPosesAreErrors) {

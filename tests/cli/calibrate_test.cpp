@@ -134,6 +134,39 @@ TEST_F(CalibrateVerb, PromisesARiskOrSaysWhatItTakes) {
     expect_refused(joined(calibrate(path), {"--max-risk", bad}), {"--max-risk"});
 }
 
+TEST_F(CalibrateVerb, PromisesARiskForFurtherScenes) {
+  write_scans(folder_, kScans, false);
+  const std::string path = folder_ / "calibration.json";
+  const auto of_scenes = [&](int count, const json& pairs) {
+    json other = good();
+    other["decided_pairs"] = pairs;
+    const std::string scene = folder_.write("other.json", other.dump());
+    std::vector<std::string> words = joined(calibrate(path), {"--max-risk", "0.9"});
+    for (int k = 0; k < count; ++k) words = joined(words, {"--scenes", scene});
+    return run(words);
+  };
+  const json pairs = {{"confidence", {0.9, 0.4, 0.3}}, {"correct", {true, false, false}}};
+  const Outcome kept = of_scenes(18, pairs);
+  ASSERT_EQ(kept.status, 0) << kept.err;
+  const json document = json_of(path), risk = document["risk"];
+  EXPECT_EQ(risk["scenes"], 19);
+  EXPECT_EQ(risk["samples"], 18 * 3 + document["decided_pairs"]["correct"].size());
+  EXPECT_EQ(document["decided_pairs"]["correct"].size(),
+            document["samples"]["loop_consistency"]["samples"]);
+  const Outcome few = of_scenes(3, pairs);
+  EXPECT_EQ(few.status, 1);
+  expect_holds(few.err, {"cannot be promised", "of 4 scenes", "15 more scenes are needed"});
+  EXPECT_EQ(json_of(path)["risk"]["more_scenes"], 15);
+  for (const json& bad : {json(), json({{"confidence", {0.9}}}),
+                          json({{"confidence", {0.9}}, {"correct", {true, true}}}),
+                          json({{"confidence", {"a"}}, {"correct", {true}}})}) {
+    const Outcome outcome = of_scenes(1, bad);
+    EXPECT_EQ(outcome.status, 2);
+    expect_holds(outcome.err, {"other.json", "decided_pairs"});
+  }
+  expect_refused(joined(calibrate(path), {"--scenes", path}), {"--scenes needs --max-risk"});
+}
+
 TEST_F(CalibrateVerb, TooFewScansSaySo) {
   write_scans(folder_, 3, false);
   std::vector<std::string> words = calibrate(folder_ / "c.json");

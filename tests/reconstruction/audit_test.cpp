@@ -10,6 +10,7 @@
 #include "gpureg/error.hpp"
 #include "gpureg/reconstruction/mend.hpp"
 #include "reconstruction/audit/blame.hpp"
+#include "reconstruction/audit/edge_confidence.hpp"
 #include "reconstruction/audit/near_pairs.hpp"
 #include "support/registration_result.hpp"
 #include "support/scan.hpp"
@@ -39,15 +40,20 @@ std::vector<AuditedPair> path_of(std::uint32_t scans, std::uint32_t slip) {
   return pairs;
 }
 
-std::vector<AuditedConnection> judged(std::uint32_t scans, std::vector<AuditedPair> pairs) {
-  return judge_connections(std::vector<std::uint32_t>(scans, 0), {}, {}, {}, pairs);
+Audit judged(std::uint32_t scans, const std::vector<AuditedPair>& pairs,
+             const std::vector<Bond>& bonds = {}) {
+  Audit audit;
+  audit.pairs = pairs;
+  judge_connections(std::vector<std::uint32_t>(scans, 0), bonds, {}, {}, audit);
+  return audit;
 }
 
 TEST(Connections, ASlipIsFoundWhereItIs) {
-  const auto connections = judged(20, path_of(20, 14));
+  const Audit audit = judged(20, path_of(20, 14));
+  const auto& connections = audit.connections;
   ASSERT_EQ(connections.size(), 19u);
   EXPECT_EQ(connections[0].verdict, ConnectionVerdict::contradicted);
-  EXPECT_EQ(connections[0].scans, (std::vector<std::uint32_t>{14, 15, 16, 17, 18, 19}));
+  EXPECT_EQ(audit.scans_of(connections[0]), (std::vector<std::uint32_t>{14, 15, 16, 17, 18, 19}));
   EXPECT_EQ(connections[0].contradicting, 3u);
   for (std::size_t k = 1; k < connections.size(); ++k)
     EXPECT_EQ(connections[k].verdict, ConnectionVerdict::confirmed) << k;
@@ -56,7 +62,7 @@ TEST(Connections, ASlipIsFoundWhereItIs) {
 TEST(Connections, OnePairIsNoContradictionAmongMany) {
   std::vector<AuditedPair> pairs = path_of(20, 20);
   pairs[10] = pair_of(pairs[10].source, pairs[10].target, -3.5);
-  for (const AuditedConnection& connection : judged(20, pairs))
+  for (const AuditedConnection& connection : judged(20, pairs).connections)
     EXPECT_NE(connection.verdict, ConnectionVerdict::contradicted);
 }
 
@@ -64,21 +70,16 @@ TEST(Connections, OneScanAmongOthersIsNamed) {
   std::vector<AuditedPair> pairs = path_of(12, 12);
   for (AuditedPair& pair : pairs)
     if (pair.source == 5 || pair.target == 5) pair = pair_of(pair.source, pair.target, -2.5);
-  const auto connections = judged(12, pairs);
-  EXPECT_EQ(connections[0].verdict, ConnectionVerdict::contradicted);
-  EXPECT_EQ(connections[0].scans, std::vector<std::uint32_t>{5});
+  const Audit audit = judged(12, pairs);
+  EXPECT_EQ(audit.connections[0].verdict, ConnectionVerdict::contradicted);
+  EXPECT_EQ(audit.scans_of(audit.connections[0]), std::vector<std::uint32_t>{5});
 }
 
 TEST(Connections, PartsThatDoNotSeeEachOtherAreUndecided) {
   std::vector<AuditedPair> pairs = path_of(10, 5);
   for (AuditedPair& pair : pairs)
     if (pair.log_likelihood_ratio < 0) pair = pair_of(pair.source, pair.target, 0);
-  const auto connections = judged(10, pairs);
-  EXPECT_EQ(std::count_if(connections.begin(), connections.end(),
-                          [](const AuditedConnection& c) {
-                            return c.verdict == ConnectionVerdict::undecided;
-                          }),
-            1);
+  EXPECT_EQ(judged(10, pairs).count(ConnectionVerdict::undecided), 1u);
 }
 
 // Accepted edges look right: that is why they were accepted.
@@ -91,9 +92,9 @@ TEST(Connections, EdgesDoNotConfirmThemselves) {
       pair = pair_of(pair.source, pair.target, 1.5);
     else if (pair.log_likelihood_ratio < 0)
       pair = pair_of(pair.source, pair.target, -3.5);
-  const auto connections = judge_connections(std::vector<std::uint32_t>(20, 0), bonds, {}, {}, pairs);
-  EXPECT_EQ(connections[0].verdict, ConnectionVerdict::contradicted);
-  EXPECT_EQ(connections[0].scans.size(), 10u);
+  const Audit audit = judged(20, pairs, bonds);
+  EXPECT_EQ(audit.connections[0].verdict, ConnectionVerdict::contradicted);
+  EXPECT_EQ(audit.connections[0].size, 10u);
 }
 
 // A corner of scan 0 is bent: it contradicts six scans a little, and fits the fourteen that it was
@@ -107,9 +108,103 @@ TEST(Connections, ABentCornerIsNoWrongPlace) {
     pairs.push_back(pair_of(k, 0, k <= 14 ? 0.7 : -1));
     if (k <= 14) bonds.push_back({k, 0, 0.99});
   }
-  const auto connections = judge_connections(std::vector<std::uint32_t>(21, 0), bonds, {}, {}, pairs);
-  for (const AuditedConnection& connection : connections)
-    EXPECT_NE(connection.verdict, ConnectionVerdict::contradicted);
+  EXPECT_TRUE(judged(21, pairs, bonds).sound());
+}
+
+// Each pair is within the margin of the audit, but all across one place ask for the same motion.
+TEST(Connections, ACommonShiftContradicts) {
+  constexpr std::uint32_t kScans = 20, kSlip = 12;
+  const auto judged_with = [](double common, double own) {
+    Audit audit;
+    for (std::uint32_t k = 0; k < kScans; ++k)
+      for (std::uint32_t m = k + 1; m < std::min(kScans, k + 5); ++m)
+        audit.pairs.push_back(pair_of(m, k, 0.7));
+    std::vector<UnalignedIsometry3d> poses(kScans, UnalignedIsometry3d::Identity());
+    for (std::uint32_t k = 0; k < kScans; ++k) poses[k].translation().x() = 0.5 * k;
+    std::mt19937 random(3);
+    std::normal_distribution<double> noise(0, own);
+    for (AuditedPair& pair : audit.pairs) {
+      pair.target_from_source = poses[pair.target].inverse() * poses[pair.source];
+      pair.refined = pair.target_from_source;
+      Eigen::Vector3d shift(noise(random), noise(random), noise(random));
+      if ((pair.source >= kSlip) != (pair.target >= kSlip)) shift.y() += common;
+      pair.refined.translation() += shift;
+      pair.shift = shift.norm();
+      pair.overlap_spread = Eigen::Matrix3d::Identity();
+    }
+    judge_connections(std::vector<std::uint32_t>(kScans, 0), {}, poses, {}, audit);
+    return audit;
+  };
+  const Audit slipped = judged_with(0.1, 0.01);
+  ASSERT_EQ(slipped.connections[0].verdict, ConnectionVerdict::contradicted);
+  EXPECT_EQ(slipped.connections[0].size, kScans - kSlip);
+  EXPECT_NE(slipped.connections[1].verdict, ConnectionVerdict::contradicted);
+  EXPECT_TRUE(judged_with(0.01, 0.03).sound());
+}
+
+// A list of its scans for each connection would be 2.5 billion numbers.
+TEST(Connections, AHundredThousandScansOfACorridor) {
+  constexpr std::uint32_t kScans = 100000, kSlip = 40000;
+  std::vector<AuditedPair> pairs = path_of(kScans, kSlip);
+  for (AuditedPair& pair : pairs) pair.overlap = pair.source == pair.target + 1 ? 0.6 : 0.3;
+  const Audit audit = judged(kScans, pairs);
+  ASSERT_EQ(audit.connections.size(), kScans - 1);
+  EXPECT_EQ(audit.count(ConnectionVerdict::contradicted), 1u);
+  const std::vector<std::uint32_t> part = audit.scans_of(audit.connections[0]);
+  ASSERT_EQ(part.size(), kSlip);
+  EXPECT_EQ(part.back(), kSlip - 1);
+  for (const AuditedConnection& connection : audit.connections)
+    ASSERT_LE(2 * connection.size, kScans);
+}
+
+// Without an overlap that tells them apart, even and odd scans are two strands of the tree that
+// meet at its end: most pairs are across most connections.
+TEST(Connections, StrandsThatMeetFarAwayTakeBoundedTime) {
+  constexpr std::uint32_t kScans = 8000;
+  EXPECT_TRUE(judged(kScans, path_of(kScans, kScans)).sound());
+  const Audit audit = judged(kScans, path_of(kScans, 3000));
+  EXPECT_FALSE(audit.sound());
+  const std::vector<std::uint32_t> part = audit.scans_of(audit.connections[0]);
+  EXPECT_TRUE(part.front() >= 2998 || part.back() <= 3001) << "beside the slip";
+}
+
+/// Edges between the scans of a tree; the connections of an audit are those of the same tree.
+TEST(MapConfidence, IsThatOfTheWeakestConnectionOnTheWay) {
+  Reconstruction map;
+  map.scans.resize(7);
+  Audit audit;
+  // 3 holds 1, 4 and 5; 1 holds 0 and 2; 5 holds 6.
+  audit.order = {3, 1, 0, 2, 4, 5, 6};
+  const struct {
+    std::size_t first, size;
+    double confidence;
+  } parts[] = {{1, 3, 0.6}, {2, 1, 0.9}, {3, 1, 0.5}, {4, 1, 0.8}, {5, 2, 0.7}, {6, 1, 0.95}};
+  for (const auto& [first, size, confidence] : parts) {
+    audit.connections.emplace_back();
+    audit.connections.back().first = first;
+    audit.connections.back().size = size;
+    audit.connections.back().confidence = confidence;
+  }
+  for (Scan& scan : map.scans) {
+    scan.placed = true;
+    scan.island = 0;
+    scan.island_from_scan = UnalignedIsometry3d::Identity();
+  }
+  const struct {
+    std::uint32_t source, target;
+    double weakest;
+  } edges[] = {{6, 5, 0.95}, {6, 3, 0.7}, {6, 4, 0.7}, {0, 1, 0.9}, {0, 6, 0.6},
+               {2, 0, 0.5},  {3, 4, 0.8}, {1, 3, 0.6}, {2, 6, 0.5}};
+  for (const auto& [source, target, weakest] : edges) {
+    map.edges.emplace_back();
+    map.edges.back().source = source;
+    map.edges.back().target = target;
+    map.edges.back().target_from_source = UnalignedIsometry3d::Identity();
+    map.edges.back().confidence = 0.99;
+  }
+  judge_edges(audit, 0.1, map);
+  for (std::size_t k = 0; k < map.edges.size(); ++k)
+    EXPECT_EQ(map.edges[k].map_confidence, edges[k].weakest) << k;
 }
 
 /// Scans of a room, each without another slice of it, at their places in the room.
@@ -177,7 +272,7 @@ TEST_F(AuditedRoom, AScanAtAWrongPlaceIsNamed) {
     const Audit result = audited(with_slip(3, metres));
     EXPECT_FALSE(result.sound()) << metres;
     ASSERT_FALSE(result.connections.empty());
-    EXPECT_EQ(result.connections[0].scans, std::vector<std::uint32_t>{3}) << metres;
+    EXPECT_EQ(result.scans_of(result.connections[0]), std::vector<std::uint32_t>{3}) << metres;
     for (const std::size_t k : result.connections[0].contradictions)
       EXPECT_TRUE(result.pairs[k].source == 3 || result.pairs[k].target == 3);
   }
@@ -224,6 +319,55 @@ TEST_F(AuditedRoom, BadPosesAreNamed) {
   AuditOptions bad;
   bad.max_shift = -1;
   EXPECT_THROW(audit(context, clouds, world_from_scan, options, bad), InvalidArgument);
+}
+
+TEST_F(AuditedRoom, PosesOfOtherScansAreNotConfirmed) {
+  std::vector<UnalignedIsometry3d> poses = world_from_scan;
+  std::rotate(poses.begin(), poses.begin() + 1, poses.end());
+  const Audit result = audited(poses);
+  EXPECT_EQ(result.count(PairVerdict::supports), 0u);
+  EXPECT_EQ(result.count(ConnectionVerdict::confirmed), 0u);
+}
+
+// Each pose is a rigid motion; the map is none of the room.
+TEST_F(AuditedRoom, AMirroredMapIsNotConfirmed) {
+  const Eigen::Matrix3d mirror = Eigen::Vector3d(1, -1, 1).asDiagonal();
+  std::vector<UnalignedIsometry3d> poses = world_from_scan;
+  for (UnalignedIsometry3d& pose : poses) {
+    pose.linear() = mirror * pose.linear() * mirror;
+    pose.translation() = mirror * pose.translation();
+  }
+  EXPECT_EQ(audited(poses).count(ConnectionVerdict::confirmed), 0u);
+}
+
+TEST_F(AuditedRoom, AScaledMapIsNotConfirmed) {
+  for (const double scale : {0.001, 0.9, 1.1, 1000.0}) {
+    std::vector<UnalignedIsometry3d> poses = world_from_scan;
+    for (UnalignedIsometry3d& pose : poses) pose.translation() *= scale;
+    const Audit result = audited(poses);
+    EXPECT_EQ(result.count(ConnectionVerdict::confirmed), 0u) << scale;
+    if (scale == 0.9 || scale == 1.1) EXPECT_FALSE(result.sound()) << scale;
+  }
+}
+
+TEST_F(AuditedRoom, ScansWithoutPointsSayNothing) {
+  clouds[2] = PreparedCloud();
+  const float none = 0;
+  PointCloudView empty;
+  empty.points = &none;
+  clouds[4] = prepare(context, empty, options.prepare);
+  const Audit result = audited(world_from_scan);
+  EXPECT_EQ(result.count(PairVerdict::supports), 6u) << "of four scans";
+  EXPECT_EQ(result.count(ConnectionVerdict::undecided), 2u);
+}
+
+// As of poses in other units: a cell holds all scans.
+TEST_F(AuditedRoom, ScansOnTopOfEachOtherHaveFewPairsEach) {
+  const std::vector<PreparedCloud> same(20000, clouds[0]);
+  const std::vector<UnalignedIsometry3d> poses(same.size(), world_from_scan[0]);
+  const std::vector<Pair> pairs = near_pairs(same, poses, {}, 4);
+  EXPECT_GE(pairs.size(), 2 * same.size());
+  EXPECT_LE(pairs.size(), 4 * same.size());
 }
 
 // Three edges agree on a wrong place of the last two scans; nobody registered the other pairs.

@@ -2,6 +2,7 @@
 #include "inputs/calibration_file.hpp"
 
 #include <cmath>
+#include <utility>
 
 #include "gpureg/error.hpp"
 #include "json/fields_json.hpp"
@@ -23,11 +24,14 @@ Json to_json(const PromisedRisk& risk) {
                {"max_failure", risk.control.max_failure},
                {"supported", found.supported},
                {"samples", found.samples}};
+  if (found.scenes > 0) json["scenes"] = found.scenes;
   if (found.supported)
     json.update({{"min_confidence", found.min_confidence},
                  {"reported", found.reported},
                  {"false", found.wrong},
                  {"recall", found.recall}});
+  else if (found.scenes > 0)
+    json["more_scenes"] = found.more_scenes ? Json(*found.more_scenes) : Json();
   else
     json["more_samples"] = found.more_samples ? Json(*found.more_samples) : Json();
   return json;
@@ -48,6 +52,15 @@ double number(const std::string& path, const Json& document, const char* field,
   return found->get<double>();
 }
 
+Json document_of(const std::string& path) {
+  Json document = DocumentFile(path).read();
+  const auto kind = document.is_object() ? document.find("gpureg") : document.end();
+  if (!document.is_object() || kind == document.end() || *kind != kKind)
+    throw IoError(path + ": no calibration of `gpureg calibrate`, \"gpureg\" is not \"" +
+                  std::string(kKind) + "\"");
+  return document;
+}
+
 }  // namespace
 
 Json calibration_document(const CalibrationResult& result, const RegistrationOptions& options,
@@ -65,16 +78,33 @@ Json calibration_document(const CalibrationResult& result, const RegistrationOpt
   json["voxel_size"] = to_json(options)["prepare"]["voxel_size"];
   json["preset"] = "default";  // the only one with a confidence
   json["quality"] = quality;
+  Json confidences = Json::array(), correct = Json::array();
+  for (const CalibrationSample& sample : result.of_two_scans()) {
+    confidences.push_back(sample.confidence);
+    correct.push_back(sample.correct);
+  }
+  json["decided_pairs"] = {{"confidence", std::move(confidences)}, {"correct", std::move(correct)}};
   if (risk) json["risk"] = to_json(*risk);
   return json;
 }
 
+std::vector<CalibrationSample> read_decided_pairs(const std::string& path) {
+  const Json document = document_of(path);
+  const auto pairs = document.find("decided_pairs");
+  const Json none, &confidences = pairs == document.end() ? none : pairs->value("confidence", none),
+                   &correct = pairs == document.end() ? none : pairs->value("correct", none);
+  std::vector<CalibrationSample> out;
+  for (std::size_t k = 0; k < confidences.size(); ++k)
+    if (correct.is_array() && k < correct.size() && confidences[k].is_number() &&
+        correct[k].is_boolean())
+      out.push_back({confidences[k].get<double>(), correct[k].get<bool>()});
+  if (out.empty() || out.size() != confidences.size() || out.size() != correct.size())
+    throw IoError(path + ": \"decided_pairs\" has no confidences and labels of pairs");
+  return out;
+}
+
 CalibrationFile read_calibration(const std::string& path) {
-  const Json document = DocumentFile(path).read();
-  const auto kind = document.is_object() ? document.find("gpureg") : document.end();
-  if (!document.is_object() || kind == document.end() || *kind != kKind)
-    throw IoError(path + ": no calibration of `gpureg calibrate`, \"gpureg\" is not \"" +
-                  std::string(kKind) + "\"");
+  const Json document = document_of(path);
   CalibrationFile out;
   out.calibration.slope = number(path, document, "slope", "a number > 0", true);
   out.calibration.offset = number(path, document, "offset", "a number", false);

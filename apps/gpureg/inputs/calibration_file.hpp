@@ -3,6 +3,7 @@
 
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "gpureg/calibration.hpp"
 #include "json/json_fwd.hpp"
@@ -15,6 +16,10 @@ struct CalibrationFile {
   double voxel_size = 0;                 ///< that it was made with
   std::optional<double> min_confidence;  ///< that keeps a promised risk, of `--max-risk`
 };
+
+/// Pairs of different scans of a calibration file, for control_risk_of_scenes().
+/// @throws IoError as read_calibration().
+std::vector<CalibrationSample> read_decided_pairs(const std::string& path);
 
 /// A promise that was asked for, and the answer.
 struct PromisedRisk {

@@ -5,6 +5,7 @@
 #include <fstream>
 #include <map>
 #include <sstream>
+#include <utility>
 
 #include "gpureg/error.hpp"
 #include "gpureg/evaluation.hpp"
@@ -43,21 +44,21 @@ Poses of_log(const std::string& path) {
   for (const evaluation::LogEntry& entry : log)
     if (entry.i == entry.j) poses[entry.i].matrix() = entry.transform;
   if (!poses.empty() || log.empty()) return poses;
+  std::map<std::int64_t, std::vector<const evaluation::LogEntry*>> entries_of;
+  for (const evaluation::LogEntry& entry : log)
+    for (const std::int64_t scan : {entry.i, entry.j}) entries_of[scan].push_back(&entry);
   poses[log.front().i] = UnalignedIsometry3d::Identity();
-  for (bool more = true; more;) {
-    more = false;
-    for (const evaluation::LogEntry& entry : log) {
-      UnalignedIsometry3d i_from_j;
-      i_from_j.matrix() = entry.transform;
-      if (poses.count(entry.i) && !poses.count(entry.j)) {
-        poses[entry.j] = poses[entry.i] * i_from_j;
-        more = true;
-      } else if (poses.count(entry.j) && !poses.count(entry.i)) {
-        poses[entry.i] = poses[entry.j] * i_from_j.inverse();
-        more = true;
+  for (std::vector<std::int64_t> waiting = {log.front().i}, next; !waiting.empty();
+       waiting = std::exchange(next, {}))
+    for (const std::int64_t scan : waiting)
+      for (const evaluation::LogEntry* entry : entries_of[scan]) {
+        UnalignedIsometry3d i_from_j;
+        i_from_j.matrix() = entry->transform;
+        const std::int64_t other = entry->i == scan ? entry->j : entry->i;
+        if (poses.count(other)) continue;
+        poses[other] = poses[scan] * (entry->i == scan ? i_from_j : i_from_j.inverse());
+        next.push_back(other);
       }
-    }
-  }
   return poses;
 }
 

@@ -150,9 +150,11 @@ std::string map_picture(const AuditRun& run) {
                      verdict == PairVerdict::supports ? "#2f9e5b66" : "#d6453d",
                      verdict == PairVerdict::supports ? 0.8 : 1.6);
   std::set<std::uint32_t> broken;
-  for (const auto& connection : run.audit.connections)
-    if (connection.verdict == ConnectionVerdict::contradicted)
-      broken.insert(connection.scans.begin(), connection.scans.end());
+  for (const auto& connection : run.audit.connections) {
+    if (connection.verdict != ConnectionVerdict::contradicted) continue;
+    const std::vector<std::uint32_t> scans = run.audit.scans_of(connection);
+    broken.insert(scans.begin(), scans.end());
+  }
   for (std::uint32_t k = 0; k < clouds.size(); ++k) {
     if (!run.poses[k].matrix().allFinite()) continue;
     drawing.dots({centres[k]}, broken.count(k) ? "#d6453d" : "#22221f", 6);

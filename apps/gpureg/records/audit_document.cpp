@@ -22,10 +22,23 @@ Json pair_json(const reconstruction::AuditedPair& pair, const std::vector<int>& 
           {"shift", pair.shift}};
 }
 
-std::vector<int> numbers_of(const std::vector<std::uint32_t>& scans,
+/// First and last of consecutive ones.
+std::vector<std::pair<int, int>> ranges_of(const std::vector<int>& numbers) {
+  std::vector<std::pair<int, int>> out;
+  for (const int number : numbers)
+    if (!out.empty() && out.back().second + 1 == number)
+      out.back().second = number;
+    else
+      out.push_back({number, number});
+  return out;
+}
+
+/// The smaller part of a connection.
+std::vector<int> numbers_of(const reconstruction::Audit& audit,
+                            const reconstruction::AuditedConnection& connection,
                             const std::vector<int>& numbers) {
   std::vector<int> out;
-  for (const std::uint32_t scan : scans) out.push_back(numbers[scan]);
+  for (const std::uint32_t scan : audit.scans_of(connection)) out.push_back(numbers[scan]);
   return out;
 }
 
@@ -33,21 +46,18 @@ std::vector<int> numbers_of(const std::vector<std::uint32_t>& scans,
 
 std::string ranges(const std::vector<int>& numbers) {
   std::ostringstream out;
-  for (std::size_t k = 0; k < numbers.size();) {
-    std::size_t last = k;
-    while (last + 1 < numbers.size() && numbers[last + 1] == numbers[last] + 1) ++last;
-    out << (k > 0 ? ", " : "") << numbers[k];
-    if (last > k) out << (last == k + 1 ? ", " : "-") << numbers[last];
-    k = last + 1;
+  for (const auto& [first, last] : ranges_of(numbers)) {
+    out << (out.tellp() > 0 ? ", " : "") << first;
+    if (last > first) out << (last == first + 1 ? ", " : "-") << last;
   }
   return out.str();
 }
 
 std::string describe(const AuditRun& run, const reconstruction::AuditedConnection& connection) {
   std::ostringstream out;
-  out << (connection.scans.size() == 1 ? "scan " : "scans ")
-      << ranges(numbers_of(connection.scans, run.scene.numbers)) << ": " << connection.contradicting
-      << (connection.contradicting == 1 ? " pair" : " pairs")
+  out << (connection.size == 1 ? "scan " : "scans ")
+      << ranges(numbers_of(run.audit, connection, run.scene.numbers)) << ": "
+      << connection.contradicting << (connection.contradicting == 1 ? " pair" : " pairs")
       << " with the other scans contradict, " << connection.supporting << " agree";
   if (connection.contradictions.empty()) return out.str();
   const reconstruction::AuditedPair& worst = run.audit.pairs[connection.contradictions.front()];
@@ -64,11 +74,13 @@ Json audit_json(const reconstruction::Audit& audit, const std::vector<int>& numb
   Json json;
   json["sound"] = audit.sound();
   json["connections"] = Json::array();
+  json["confirmed"] = audit.count(reconstruction::ConnectionVerdict::confirmed);
   for (const reconstruction::AuditedConnection& connection : audit.connections) {
+    if (connection.verdict == reconstruction::ConnectionVerdict::confirmed) continue;
     Json contradictions = Json::array();
     for (const std::size_t k : connection.contradictions)
       contradictions.push_back({numbers[audit.pairs[k].target], numbers[audit.pairs[k].source]});
-    json["connections"].push_back({{"scans", numbers_of(connection.scans, numbers)},
+    json["connections"].push_back({{"scans", ranges_of(numbers_of(audit, connection, numbers))},
                                    {"verdict", to_string(connection.verdict)},
                                    {"confidence", connection.confidence},
                                    {"supporting", connection.supporting},

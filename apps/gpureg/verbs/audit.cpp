@@ -32,28 +32,36 @@ struct AuditVerbOptions {
   bool quiet = false;
 };
 
+/// Poses of other scans, or in other units, may keep most scans out of each other's sight. Of right
+/// maps at most one connection of six was undecided.
+bool says_nothing(const reconstruction::Audit& audit) {
+  return audit.sound() && audit.count(reconstruction::ConnectionVerdict::confirmed) <=
+                              audit.count(reconstruction::ConnectionVerdict::undecided);
+}
+
+int status_of(const reconstruction::Audit& audit) {
+  return audit.sound() && !says_nothing(audit) ? kOk : kNoAlignment;
+}
+
 /// What a person reads first.
 std::string summary(const AuditRun& run) {
-  const auto count = [&](reconstruction::PairVerdict verdict) {
-    return std::count_if(run.audit.pairs.begin(), run.audit.pairs.end(),
-                         [&](const auto& pair) { return pair.verdict == verdict; });
-  };
   std::ostringstream out;
   out << "scans      " << run.scene.numbers.size() - run.missing.size() << " with a pose, "
       << run.missing.size() << " without\n"
       << "pairs      " << run.audit.pairs.size()
-      << " near each other: " << count(reconstruction::PairVerdict::supports)
-      << " support their poses, " << count(reconstruction::PairVerdict::contradicts)
+      << " near each other: " << run.audit.count(reconstruction::PairVerdict::supports)
+      << " support their poses, " << run.audit.count(reconstruction::PairVerdict::contradicts)
       << " contradict them, in " << fixed(run.seconds, 2) << " s\n";
-  std::size_t undecided = 0;
-  for (const reconstruction::AuditedConnection& connection : run.audit.connections) {
-    undecided += connection.verdict == reconstruction::ConnectionVerdict::undecided;
+  for (const reconstruction::AuditedConnection& connection : run.audit.connections)
     if (connection.verdict == reconstruction::ConnectionVerdict::contradicted)
       out << "broken     " << describe(run, connection) << "\n";
-  }
-  out << "undecided  " << undecided << " of " << run.audit.connections.size() << " connections\n"
-      << (run.audit.sound() ? "verdict    sound: no connection is contradicted\n"
-                            : "verdict    contradicted\n");
+  out << "undecided  " << run.audit.count(reconstruction::ConnectionVerdict::undecided) << " of "
+      << run.audit.connections.size() << " connections\n"
+      << (says_nothing(run.audit)
+              ? "verdict    undecided: most scans do not see each other; are they poses of these "
+                "scans, in the unit of their points?\n"
+          : run.audit.sound() ? "verdict    sound: no connection is contradicted\n"
+                              : "verdict    contradicted\n");
   return out.str();
 }
 
@@ -72,7 +80,7 @@ int mend(const AuditVerbOptions& o, const Context& context, const AuditRun& run)
     std::cout << "mended     " << map.registered << " pairs aligned, " << map.moved.size()
               << " scans moved, " << map.left_out.size() << " left out; "
               << (map.audit.sound() ? "sound" : "still contradicted") << "\n";
-  return map.audit.sound() ? kOk : kNoAlignment;
+  return status_of(map.audit);
 }
 
 int run_audit(const AuditVerbOptions& o) {
@@ -102,7 +110,7 @@ int run_audit(const AuditVerbOptions& o) {
   if (!o.page.empty()) files::write_atomically(o.page, audit_page(run));
   if (!o.quiet) std::cout << summary(run);
   if (!o.mended.empty()) return mend(o, context, run);
-  return run.audit.sound() ? kOk : kNoAlignment;
+  return status_of(run.audit);
 }
 
 }  // namespace

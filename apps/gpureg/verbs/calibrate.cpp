@@ -3,6 +3,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "command.hpp"
@@ -30,6 +31,7 @@ struct CalibrateOptions {
   MethodOptions method;
   CalibrationOptions calibration;
   std::optional<double> max_risk;
+  std::vector<std::string> scenes;
   bool quiet = false;
 };
 
@@ -65,11 +67,20 @@ void print_count(const char* name, const CalibrationCount& count) {
             << " of them decided, " << grouped(count.correct) << " correct\n";
 }
 
-std::optional<PromisedRisk> promise(const CalibrateOptions& o, const CalibrationResult& result) {
+/// scenes: the decided pairs of --scenes.
+std::optional<PromisedRisk> promise(const CalibrateOptions& o, const CalibrationResult& result,
+                                    std::vector<std::vector<CalibrationSample>> scenes) {
   if (!o.max_risk) return std::nullopt;
   PromisedRisk out;
   out.control.max_risk = *o.max_risk;
-  out.threshold = control_risk(result.of_two_scans(), out.control, result.calibration);
+  if (scenes.empty()) {
+    out.threshold = control_risk(result.of_two_scans(), out.control, result.calibration);
+    return out;
+  }
+  if (result.of_two_scans().empty())
+    throw InvalidArgument(o.folder + " has no decided pair of different scans");
+  scenes.push_back(result.of_two_scans());
+  out.threshold = control_risk_of_scenes(scenes, out.control, result.calibration);
   return out;
 }
 
@@ -78,14 +89,18 @@ void print_risk(const CalibrateOptions& o, const PromisedRisk& risk) {
   const RiskThreshold& found = risk.threshold;
   const std::string percent = significant(100 * risk.control.max_risk, 3) + " %";
   if (found.supported && !o.quiet)
-    std::cout << "risk         at most " << percent << " of the reports are false from confidence "
+    std::cout << "risk         at most " << percent << " of the reports "
+              << (found.scenes > 0 ? "of a scene " : "") << "are false from confidence "
               << fixed(found.min_confidence, 4) << " on: " << found.wrong << " of "
               << grouped(found.reported) << " were; " << fixed(100 * found.recall, 1)
               << " % of the correct poses are reported\n";
   if (found.supported) return;
   std::cerr << "gpureg: a risk of " << percent << " cannot be promised by "
-            << grouped(found.samples) << " decided pairs of different scans: ";
-  if (found.more_samples)
+            << grouped(found.samples) << " decided pairs of different scans"
+            << (found.scenes > 0 ? " of " + grouped(found.scenes) + " scenes: " : ": ");
+  if (found.more_scenes)
+    std::cerr << grouped(*found.more_scenes) << " more scenes are needed at least";
+  else if (found.more_samples)
     std::cerr << "about " << grouped(*found.more_samples)
               << " more would do, if no larger share of them is false";
   else
@@ -97,11 +112,17 @@ int run(CalibrateOptions o) {
   if (o.max_risk && !(*o.max_risk > 0 && *o.max_risk < 1))
     throw InvalidArgument("--max-risk is " + significant(*o.max_risk, 6) +
                           ", expected a share between 0 and 1");
+  if (!o.scenes.empty() && !o.max_risk) throw InvalidArgument("--scenes needs --max-risk");
   o.method.registration();  // what is wrong with it shall be said before clouds are read
   if (o.method.preset == "loopsmart")
     throw InvalidArgument("--preset loopsmart has no confidence to calibrate");
   std::vector<NamedPath> inputs = scene_files("DIR", o.folder);
   if (!o.trajectory.empty()) inputs.push_back({"--trajectory", o.trajectory});
+  std::vector<std::vector<CalibrationSample>> scenes;
+  for (const std::string& scene : o.scenes) {
+    inputs.push_back({"--scenes", scene});
+    scenes.push_back(read_decided_pairs(scene));
+  }
   check_outputs({{"-o", o.output}}, inputs);
   choose_voxel_size(o.method, o.folder);
   const RegistrationOptions options = o.method.registration();
@@ -125,7 +146,7 @@ int run(CalibrateOptions o) {
     std::cerr << "gpureg: interrupted, nothing written" << std::endl;
     return kInterrupted;
   }
-  const std::optional<PromisedRisk> risk = promise(o, result);
+  const std::optional<PromisedRisk> risk = promise(o, result, std::move(scenes));
   write_document(o.output, calibration_document(result, options, o.method.quality, risk));
   if (!result.enough_samples)
     std::cerr << "gpureg: note: too few samples: " << kMinDecidedPairs
@@ -176,6 +197,10 @@ void add_calibrate(CommandLine& line) {
   verb.option("--max-risk", o->max_risk,
               "Also choose the --min-score that keeps the share of false reports at or below this, "
               "for runs with this calibration");
+  verb.option(
+      "--scenes", o->scenes,
+      "Calibration files of other scenes: --max-risk then holds for a further scene, with 19 "
+      "or more");
   o->method.add_to(verb);
   verb.flag("--quiet", o->quiet, "No progress, no summary");
   verb.run([o] { return run(*o); });

@@ -72,7 +72,8 @@ const char* to_string(ConnectionVerdict verdict);
 /// one scan fail together: every further one counts less. Pairs that ICP moves by one and the same
 /// motion contradict it, too, however small the motion is.
 struct AuditedConnection {
-  std::vector<std::uint32_t> scans;  ///< the smaller part, ascending
+  /// The smaller part: so many entries of Audit::order, from this one on; see Audit::scans_of().
+  std::size_t first = 0, size = 0;
   ConnectionVerdict verdict = ConnectionVerdict::undecided;
   double confidence = 0.5;  ///< probability that the parts lie right to each other
   std::size_t supporting = 0, contradicting = 0;  ///< pairs across it
@@ -83,8 +84,14 @@ struct AuditedConnection {
 struct Audit {
   std::vector<AuditedPair> pairs;              ///< by source and target
   std::vector<AuditedConnection> connections;  ///< the least confident first
+  std::vector<std::uint32_t> order;            ///< the scans that have a pose
+
   /// Whether no connection is contradicted.
   bool sound() const;
+  /// The smaller part of a connection, ascending.
+  std::vector<std::uint32_t> scans_of(const AuditedConnection& connection) const;
+  std::size_t count(PairVerdict verdict) const;
+  std::size_t count(ConnectionVerdict verdict) const;
 };
 
 /// Judges every pair of scans that are near each other at their poses, and then the connections

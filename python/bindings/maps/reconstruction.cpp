@@ -82,10 +82,10 @@ py::tuple audit_of(const Context& context, const py::list& clouds, const DoubleA
                                 pair.log_likelihood_ratio, pair.overlap, pair.observed,
                                 pair.violation, pair.shift));
   for (const AuditedConnection& connection : found.connections)
-    connections.append(py::make_tuple(connection.scans, to_string(connection.verdict),
-                                      connection.confidence, connection.supporting,
-                                      connection.contradicting, connection.contradictions));
-  return py::make_tuple(pairs, connections);
+    connections.append(py::make_tuple(
+        to_string(connection.verdict), connection.confidence, connection.supporting,
+        connection.contradicting, connection.contradictions, connection.first, connection.size));
+  return py::make_tuple(pairs, connections, found.order);
 }
 
 /// clouds: of the pairs, audited; none: not audited.

@@ -54,6 +54,7 @@ bool same(const UnalignedIsometry3d& a, const UnalignedIsometry3d& b) {
 void judge_new_pairs(const Context& context, const std::vector<PreparedCloud>& clouds,
                      const RegistrationOptions& registration, const AuditOptions& options,
                      const Audit& before, std::vector<AuditedPair>& pairs) {
+  if (before.pairs.empty()) return judge_pairs(context, clouds, registration, options, pairs);
   std::map<std::pair<std::uint32_t, std::uint32_t>, const AuditedPair*> known;
   for (const AuditedPair& pair : before.pairs) known[{pair.source, pair.target}] = &pair;
   std::vector<AuditedPair> asked;
@@ -85,7 +86,7 @@ Audit audit_of(const Context& context, const std::vector<PreparedCloud>& clouds,
     out.pairs.push_back(pair);
   }
   judge_new_pairs(context, clouds, registration, options, before, out.pairs);
-  out.connections = judge_connections(islands, bonds, world_from_scan, options, out.pairs);
+  judge_connections(islands, bonds, world_from_scan, options, out);
   return out;
 }
 
@@ -109,18 +110,16 @@ Audit audit_of(const Context& context, const std::vector<PreparedCloud>& clouds,
   return audit_of(context, clouds, poses, islands, bonds, registration, options, before);
 }
 
-/// Whether a pair lies across a connection.
-bool divides(const AuditedConnection& connection, std::uint32_t a, std::uint32_t b) {
-  const auto within = [&](std::uint32_t scan) {
-    return std::binary_search(connection.scans.begin(), connection.scans.end(), scan);
-  };
-  return within(a) != within(b);
+/// Whether a pair lies across the connection that a part has with the others.
+bool divides(const std::vector<std::uint32_t>& part, std::uint32_t a, std::uint32_t b) {
+  return std::binary_search(part.begin(), part.end(), a) !=
+         std::binary_search(part.begin(), part.end(), b);
 }
 
-bool held_by_odometry(const AuditedConnection& connection, const std::vector<Odometry>& odometry) {
-  return std::any_of(odometry.begin(), odometry.end(), [&](const Odometry& edge) {
-    return divides(connection, edge.source, edge.target);
-  });
+bool held_by_odometry(const std::vector<std::uint32_t>& part,
+                      const std::vector<Odometry>& odometry) {
+  return std::any_of(odometry.begin(), odometry.end(),
+                     [&](const Odometry& edge) { return divides(part, edge.source, edge.target); });
 }
 
 /// A mode that the audit has ruled out takes no part any more.
@@ -225,10 +224,25 @@ void AuditOptions::validate() const {
           "less than min_confirmed");
 }
 
-bool Audit::sound() const {
-  return std::none_of(connections.begin(), connections.end(), [](const AuditedConnection& c) {
-    return c.verdict == ConnectionVerdict::contradicted;
-  });
+bool Audit::sound() const { return count(ConnectionVerdict::contradicted) == 0; }
+
+std::vector<std::uint32_t> Audit::scans_of(const AuditedConnection& connection) const {
+  const auto begin = order.begin() + static_cast<std::ptrdiff_t>(connection.first);
+  std::vector<std::uint32_t> out(begin, begin + static_cast<std::ptrdiff_t>(connection.size));
+  std::sort(out.begin(), out.end());
+  return out;
+}
+
+std::size_t Audit::count(PairVerdict verdict) const {
+  return static_cast<std::size_t>(
+      std::count_if(pairs.begin(), pairs.end(),
+                    [&](const AuditedPair& pair) { return pair.verdict == verdict; }));
+}
+
+std::size_t Audit::count(ConnectionVerdict verdict) const {
+  return static_cast<std::size_t>(std::count_if(
+      connections.begin(), connections.end(),
+      [&](const AuditedConnection& connection) { return connection.verdict == verdict; }));
 }
 
 Audit audit(const Context& context, const std::vector<PreparedCloud>& clouds,
@@ -271,11 +285,12 @@ AuditedReconstruction reconstruct_audited(
     std::set<std::uint32_t> judged;
     for (const AuditedConnection& connection : out.audit.connections) {
       if (round == kMostRounds || connection.verdict != ConnectionVerdict::contradicted) break;
-      if (held_by_odometry(connection, odometry) ||
-          !judged.insert(out.map.scans[connection.scans.front()].island).second)
+      const std::vector<std::uint32_t> part = out.audit.scans_of(connection);
+      if (held_by_odometry(part, odometry) ||
+          !judged.insert(out.map.scans[part.front()].island).second)
         continue;
       for (const Edge& edge : out.map.edges) {
-        if (!edge.accepted || !divides(connection, edge.source, edge.target)) continue;
+        if (!edge.accepted || !divides(part, edge.source, edge.target)) continue;
         rule_out(edge, left);
         ruled_out.push_back(edge);
         ruled_out.back().accepted = false;

@@ -5,7 +5,9 @@
 #include <cmath>
 #include <map>
 #include <numeric>
+#include <random>
 #include <set>
+#include <unordered_map>
 
 #include "reconstruction/audit/common_shift.hpp"
 
@@ -18,7 +20,12 @@ constexpr double kPrior = 3;
 /// which those across a slip are, come late: a slip is then in one edge of the tree.
 constexpr double kOfBond = 10, kOfShift = 0.5;
 
-/// A spanning forest with, for each scan, the way to the root of its island.
+/// Pairs across one connection that are heard. Where there are more, as along a corridor that was
+/// walked there and back, they are drawn without regard to what they say.
+constexpr std::size_t kMostAcross = 1024;
+
+/// A spanning forest with, for each scan, the way to the root of its island: the scan that has at
+/// most half of the others at each side, so that what lies below a scan is the smaller part.
 class Forest {
  public:
   Forest(const std::vector<std::uint32_t>& islands, const std::vector<Bond>& bonds,
@@ -51,28 +58,51 @@ class Forest {
     walk();
   }
 
-  /// The scans whose edge to their parent lies on the way between two scans of an island.
-  template <typename Function>
-  void for_each_edge_between(std::uint32_t a, std::uint32_t b, const Function& function) const {
-    while (a != b) {
-      std::uint32_t& deeper = depth_[a] >= depth_[b] ? a : b;
-      function(deeper);
-      deeper = above_[deeper];
+  /// The pairs across the edge from each scan to its parent, ascending, at most kMostAcross.
+  std::vector<std::vector<std::uint32_t>> pairs_across(
+      const std::vector<AuditedPair>& pairs) const {
+    std::vector<std::vector<std::uint32_t>> across(islands_.size());
+    // The nearest scan at or above one whose edge still takes pairs.
+    std::vector<std::uint32_t> open(islands_.size());
+    std::iota(open.begin(), open.end(), 0u);
+    const auto opened = [&](std::uint32_t scan) {
+      while (open[scan] != scan) scan = open[scan] = open[open[scan]];
+      return scan;
+    };
+    for (const std::uint32_t k : drawn(pairs)) {
+      std::uint32_t a = opened(pairs[k].source), b = opened(pairs[k].target);
+      while (a != b) {
+        std::uint32_t& deeper = depth_[a] >= depth_[b] ? a : b;
+        across[deeper].push_back(k);
+        if (across[deeper].size() == kMostAcross) open[deeper] = above_[deeper];
+        deeper = opened(above_[deeper]);
+      }
     }
+    for (std::vector<std::uint32_t>& of_scan : across) std::sort(of_scan.begin(), of_scan.end());
+    return across;
   }
 
   bool is_root(std::uint32_t scan) const { return above_[scan] == scan; }
 
-  /// Scans at and below one, ascending.
-  std::vector<std::uint32_t> below(std::uint32_t scan) const {
-    std::vector<std::uint32_t> out(order_.begin() + static_cast<std::ptrdiff_t>(begin_[scan]),
-                                   order_.begin() + static_cast<std::ptrdiff_t>(end_[scan]));
-    std::sort(out.begin(), out.end());
-    return out;
+  /// Scans in an order in which those at and below one follow each other, from begin_of() on.
+  const std::vector<std::uint32_t>& order() const { return order_; }
+  std::size_t begin_of(std::uint32_t scan) const { return begin_[scan]; }
+  bool is_below(std::uint32_t scan, std::uint32_t above) const {
+    return begin_[scan] >= begin_[above] && begin_[scan] < end_[above];
   }
   std::size_t size_below(std::uint32_t scan) const { return end_[scan] - begin_[scan]; }
 
  private:
+  /// Pairs that say something, in a random order that is always the same.
+  static std::vector<std::uint32_t> drawn(const std::vector<AuditedPair>& pairs) {
+    std::vector<std::uint32_t> out;
+    for (std::uint32_t k = 0; k < pairs.size(); ++k)
+      if (pairs[k].log_likelihood_ratio != 0) out.push_back(k);
+    std::mt19937 random(1);
+    for (std::size_t k = out.size(); k > 1; --k) std::swap(out[k - 1], out[random() % k]);
+    return out;
+  }
+
   std::uint32_t find(std::uint32_t k) {
     while (parent_[k] != k) k = parent_[k] = parent_[parent_[k]];
     return k;
@@ -85,7 +115,7 @@ class Forest {
     tree_[b].push_back(a);
   }
 
-  /// Depth first from the smallest scan of each island.
+  /// Each island from its middle.
   void walk() {
     const std::size_t scans = islands_.size();
     above_.resize(scans);
@@ -93,30 +123,55 @@ class Forest {
     begin_.assign(scans, 0);
     end_.assign(scans, 0);
     std::vector<char> seen(scans, 0);
-    for (std::uint32_t root = 0; root < scans; ++root) {
-      if (seen[root] || islands_[root] == kNoIsland) continue;
-      above_[root] = root;
-      std::vector<std::pair<std::uint32_t, std::size_t>> stack = {{root, 0}};
-      seen[root] = 1;
-      begin_[root] = order_.size();
-      order_.push_back(root);
-      while (!stack.empty()) {
-        const std::uint32_t scan = stack.back().first;
-        if (stack.back().second == tree_[scan].size()) {
-          end_[scan] = order_.size();
-          stack.pop_back();
-          continue;
-        }
-        const std::uint32_t next = tree_[scan][stack.back().second++];
-        if (seen[next]) continue;
-        seen[next] = 1;
-        above_[next] = scan;
-        depth_[next] = depth_[scan] + 1;
-        begin_[next] = order_.size();
-        order_.push_back(next);
-        stack.push_back({next, 0});
-      }
+    for (std::uint32_t scan = 0; scan < scans; ++scan) {
+      if (seen[scan] || islands_[scan] == kNoIsland) continue;
+      walk(scan);
+      const std::uint32_t middle = middle_of(scan);
+      order_.resize(begin_[scan]);
+      walk(middle);
+      for (std::size_t k = begin_[middle]; k < order_.size(); ++k) seen[order_[k]] = 1;
     }
+  }
+
+  /// Depth first.
+  void walk(std::uint32_t root) {
+    enter(root, root, 0);
+    std::vector<std::pair<std::uint32_t, std::size_t>> stack = {{root, 0}};
+    while (!stack.empty()) {
+      const std::uint32_t scan = stack.back().first;
+      if (stack.back().second == tree_[scan].size()) {
+        end_[scan] = order_.size();
+        stack.pop_back();
+        continue;
+      }
+      const std::uint32_t next = tree_[scan][stack.back().second++];
+      if (next == above_[scan]) continue;
+      enter(next, scan, depth_[scan] + 1);
+      stack.push_back({next, 0});
+    }
+  }
+
+  void enter(std::uint32_t scan, std::uint32_t above, std::size_t depth) {
+    above_[scan] = above;
+    depth_[scan] = depth;
+    begin_[scan] = order_.size();
+    order_.push_back(scan);
+  }
+
+  /// The deepest scan at and below which more than half of the island lies.
+  std::uint32_t middle_of(std::uint32_t root) const {
+    const std::size_t whole = size_below(root);
+    std::uint32_t middle = root;
+    for (bool more = true; more;) {
+      more = false;
+      for (const std::uint32_t next : tree_[middle])
+        if (next != above_[middle] && 2 * size_below(next) > whole) {
+          middle = next;
+          more = true;
+          break;
+        }
+    }
+    return middle;
   }
 
   const std::vector<std::uint32_t>& islands_;
@@ -138,7 +193,7 @@ class Sum {
   double value() const { return sum_; }
 
  private:
-  std::map<std::uint32_t, std::size_t> used_;
+  std::unordered_map<std::uint32_t, std::size_t> used_;
   double sum_ = 0;
 };
 
@@ -147,13 +202,13 @@ constexpr double kNoise = 0.2;
 
 /// Log likelihood ratios of the pairs across a connection, with what a common shift says of those
 /// that seem to support it.
-std::vector<double> ratios_of(const std::vector<std::size_t>& across,
-                              const std::vector<AuditedPair>& pairs, const std::vector<char>& below,
+std::vector<double> ratios_of(const std::vector<std::uint32_t>& across,
+                              const std::vector<AuditedPair>& pairs, const ScansBelow& below,
                               const std::vector<UnalignedIsometry3d>& world_from_scan,
                               double noise) {
   std::vector<double> out;
   std::vector<std::size_t> supporters, places;
-  for (const std::size_t k : across) {
+  for (const std::uint32_t k : across) {
     if (pairs[k].log_likelihood_ratio > 0) {
       supporters.push_back(k);
       places.push_back(out.size());
@@ -168,7 +223,7 @@ std::vector<double> ratios_of(const std::vector<std::size_t>& across,
 }
 
 /// @param ratios of the pairs, in the order of `across`.
-AuditedConnection judge(const std::vector<std::size_t>& across, const std::vector<double>& ratios,
+AuditedConnection judge(const std::vector<std::uint32_t>& across, const std::vector<double>& ratios,
                         const std::vector<AuditedPair>& pairs, const std::vector<char>& bonded,
                         bool lone, const AuditOptions& options) {
   std::vector<std::size_t> order(across.size());
@@ -179,7 +234,7 @@ AuditedConnection judge(const std::vector<std::size_t>& across, const std::vecto
   AuditedConnection out;
   Sum supports, contradictions;
   for (const std::size_t at : order) {
-    const std::size_t k = across[at];
+    const std::uint32_t k = across[at];
     if (ratios[at] < 0) {
       contradictions.add(pairs[k], ratios[at]);
       out.contradictions.push_back(k);
@@ -202,38 +257,28 @@ AuditedConnection judge(const std::vector<std::size_t>& across, const std::vecto
 
 }  // namespace
 
-std::vector<AuditedConnection> judge_connections(
-    const std::vector<std::uint32_t>& islands, const std::vector<Bond>& bonds,
-    const std::vector<UnalignedIsometry3d>& world_from_scan, const AuditOptions& options,
-    std::vector<AuditedPair>& pairs) {
+void judge_connections(const std::vector<std::uint32_t>& islands, const std::vector<Bond>& bonds,
+                       const std::vector<UnalignedIsometry3d>& world_from_scan,
+                       const AuditOptions& options, Audit& audit) {
+  std::vector<AuditedPair>& pairs = audit.pairs;
   const double noise = kNoise * options.max_shift;
   const Forest forest(islands, bonds, pairs, noise);
   std::set<std::pair<std::uint32_t, std::uint32_t>> held;
   for (const Bond& bond : bonds) held.insert(std::minmax(bond.a, bond.b));
   std::vector<char> bonded(pairs.size(), 0);
-  std::vector<std::vector<std::size_t>> across(islands.size());
-  for (std::size_t k = 0; k < pairs.size(); ++k) {
+  for (std::size_t k = 0; k < pairs.size(); ++k)
     bonded[k] = held.count(std::minmax(pairs[k].source, pairs[k].target)) > 0;
-    if (pairs[k].log_likelihood_ratio == 0) continue;
-    forest.for_each_edge_between(pairs[k].source, pairs[k].target,
-                                 [&](std::uint32_t scan) { across[scan].push_back(k); });
-  }
-  std::map<std::uint32_t, std::size_t> sizes;
-  for (const std::uint32_t island : islands) ++sizes[island];
+  std::vector<std::vector<std::uint32_t>> across = forest.pairs_across(pairs);
   std::vector<char> explained(pairs.size(), 0);
-  std::vector<char> below(islands.size(), 0);
   std::vector<double> ratios;
   const auto judged = [&](std::uint32_t scan) {
-    std::vector<std::size_t>& pairs_across = across[scan];
-    pairs_across.erase(std::remove_if(pairs_across.begin(), pairs_across.end(),
-                                      [&](std::size_t k) { return explained[k] != 0; }),
-                       pairs_across.end());
-    const std::vector<std::uint32_t> part = forest.below(scan);
-    for (const std::uint32_t k : part) below[k] = 1;
-    ratios = ratios_of(pairs_across, pairs, below, world_from_scan, noise);
-    for (const std::uint32_t k : part) below[k] = 0;
-    return judge(pairs_across, ratios, pairs, bonded,
-                 std::min(part.size(), sizes[islands[scan]] - part.size()) == 1, options);
+    std::vector<std::uint32_t>& heard = across[scan];
+    heard.erase(std::remove_if(heard.begin(), heard.end(),
+                               [&](std::uint32_t k) { return explained[k] != 0; }),
+                heard.end());
+    const auto below = [&](std::uint32_t other) { return forest.is_below(other, scan); };
+    ratios = ratios_of(heard, pairs, below, world_from_scan, noise);
+    return judge(heard, ratios, pairs, bonded, forest.size_below(scan) == 1, options);
   };
   // The worst first: what contradicts it contradicts the connections beside it, too, and is not
   // their fault.
@@ -241,7 +286,8 @@ std::vector<AuditedConnection> judge_connections(
   for (std::uint32_t scan = 0; scan < islands.size(); ++scan)
     if (islands[scan] != kNoIsland && !forest.is_root(scan))
       waiting.insert({judged(scan).confidence, scan});
-  std::vector<AuditedConnection> out;
+  std::vector<AuditedConnection>& out = audit.connections;
+  out.clear();
   while (!waiting.empty()) {
     const auto [before, scan] = *waiting.begin();
     waiting.erase(waiting.begin());
@@ -258,23 +304,15 @@ std::vector<AuditedConnection> judge_connections(
       }
       for (const std::size_t k : connection.contradictions) explained[k] = 1;
     }
-    connection.scans = forest.below(scan);
-    const std::size_t whole = sizes[islands[scan]];
-    if (2 * connection.scans.size() > whole) {
-      std::vector<std::uint32_t> rest;
-      for (std::uint32_t k = 0; k < islands.size(); ++k)
-        if (islands[k] == islands[scan] &&
-            !std::binary_search(connection.scans.begin(), connection.scans.end(), k))
-          rest.push_back(k);
-      connection.scans = std::move(rest);
-    }
+    connection.first = forest.begin_of(scan);
+    connection.size = forest.size_below(scan);
     out.push_back(std::move(connection));
   }
   std::stable_sort(out.begin(), out.end(),
                    [](const AuditedConnection& a, const AuditedConnection& b) {
                      return a.confidence < b.confidence;
                    });
-  return out;
+  audit.order = forest.order();
 }
 
 }  // namespace gpureg::reconstruction

@@ -18,13 +18,13 @@ struct Bond {
 /// each island, and between the parts of an island that nothing supports.
 /// @param islands of each scan; scans of kNoIsland are left out.
 /// @param bonds edges of the graph; empty: none is known. Their own pairs support nothing more.
+/// Time and memory grow with the number of scans and of pairs.
 /// @param world_from_scan in the frame of each island; empty: no common shift is looked for.
-/// @param pairs those across a connection that a common shift contradicts get their share of it.
-/// @return the least confident first.
-std::vector<AuditedConnection> judge_connections(
-    const std::vector<std::uint32_t>& islands, const std::vector<Bond>& bonds,
-    const std::vector<UnalignedIsometry3d>& world_from_scan, const AuditOptions& options,
-    std::vector<AuditedPair>& pairs);
+/// @param audit its pairs are given, connections and order are filled in. Pairs across a connection
+///   that a common shift contradicts get their share of it.
+void judge_connections(const std::vector<std::uint32_t>& islands, const std::vector<Bond>& bonds,
+                       const std::vector<UnalignedIsometry3d>& world_from_scan,
+                       const AuditOptions& options, Audit& audit);
 
 constexpr std::uint32_t kNoIsland = 0xffffffffu;
 

@@ -17,10 +17,10 @@ constexpr double kMostOfPair = 2;
 
 /// What a pair says of a motion of one part, in the frame of the map.
 struct Vote {
-  UnalignedIsometry3d motion;    ///< that ICP asks for
-  Eigen::Vector3d centre;        ///< of the overlap
-  Eigen::Matrix3d spread;        ///< its covariance
-  double shift = 0;              ///< squared, mean over the overlap
+  UnalignedIsometry3d motion;  ///< that ICP asks for
+  Eigen::Vector3d centre;      ///< of the overlap
+  Eigen::Matrix3d spread;      ///< its covariance
+  double shift = 0;            ///< squared, mean over the overlap
 };
 
 /// Mean squared distance between the overlap moved by either motion.
@@ -46,17 +46,17 @@ Vote vote_of(const AuditedPair& pair, bool source_moves,
 }  // namespace
 
 std::vector<double> common_shift(const std::vector<AuditedPair>& pairs,
-                                 const std::vector<std::size_t>& across,
-                                 const std::vector<char>& below,
+                                 const std::vector<std::size_t>& across, const ScansBelow& below,
                                  const std::vector<UnalignedIsometry3d>& world_from_scan,
                                  double noise) {
   std::vector<Vote> votes;
   std::vector<std::size_t> moved;
   for (const std::size_t k : across) {
-    votes.push_back(vote_of(pairs[k], below[pairs[k].source] != 0, world_from_scan));
+    votes.push_back(vote_of(pairs[k], below(pairs[k].source), world_from_scan));
     if (votes.back().shift > noise * noise) moved.push_back(votes.size() - 1);
   }
-  if (static_cast<double>(moved.size()) < kLeastShare * static_cast<double>(votes.size())) return {};
+  if (static_cast<double>(moved.size()) < kLeastShare * static_cast<double>(votes.size()))
+    return {};
   std::vector<double> best, says(votes.size());
   double best_sum = kLeastSum;
   const std::size_t step = std::max<std::size_t>(1, moved.size() / kMostTried);

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <limits>
 #include <vector>
 
 #include "reconstruction/connections.hpp"
@@ -18,22 +19,32 @@ constexpr double kOfRejection = 1.0 / 16, kMostOfRejected = 0.4;
 
 /// The least confidence of the connections between the scans of each edge; 1 where there is none.
 std::vector<double> weakest_between(const Audit& audit, const Reconstruction& map) {
-  std::vector<std::vector<std::size_t>> edges_of(map.scans.size());
-  for (std::size_t k = 0; k < map.edges.size(); ++k)
-    for (const std::uint32_t scan : {map.edges[k].source, map.edges[k].target})
-      edges_of[scan].push_back(k);
+  // Of each place in the order of the audit: the connection of the part that begins there, and
+  // where the smallest part ends that holds it.
+  constexpr std::size_t kNone = std::numeric_limits<std::size_t>::max();
+  std::vector<std::size_t> place(map.scans.size(), kNone), begins(audit.order.size(), kNone),
+      above(audit.order.size(), kNone);
+  for (std::size_t k = 0; k < audit.order.size(); ++k) place[audit.order[k]] = k;
+  for (std::size_t k = 0; k < audit.connections.size(); ++k) begins[audit.connections[k].first] = k;
+  std::vector<std::size_t> open;
+  for (std::size_t k = 0; k < begins.size(); ++k) {
+    const auto ended = [&](std::size_t at) {
+      return audit.connections[begins[at]].first + audit.connections[begins[at]].size <= k;
+    };
+    while (!open.empty() && ended(open.back())) open.pop_back();
+    if (!open.empty()) above[k] = open.back();
+    if (begins[k] != kNone) open.push_back(k);
+  }
   std::vector<double> out(map.edges.size(), 1);
-  std::vector<char> found(map.edges.size(), 0), within(map.scans.size(), 0);
-  // The least confident come first.
-  for (const AuditedConnection& connection : audit.connections) {
-    for (const std::uint32_t scan : connection.scans) within[scan] = 1;
-    for (const std::uint32_t scan : connection.scans)
-      for (const std::size_t k : edges_of[scan]) {
-        if (found[k] || within[map.edges[k].source] == within[map.edges[k].target]) continue;
-        found[k] = 1;
-        out[k] = connection.confidence;
-      }
-    for (const std::uint32_t scan : connection.scans) within[scan] = 0;
+  for (std::size_t k = 0; k < map.edges.size(); ++k) {
+    std::size_t a = place[map.edges[k].source], b = place[map.edges[k].target];
+    // Whichever comes later in the order is not above the other one; above all is the root, kNone.
+    while (a != b) {
+      std::size_t& later = b == kNone || (a != kNone && a > b) ? a : b;
+      if (begins[later] != kNone)
+        out[k] = std::min(out[k], audit.connections[begins[later]].confidence);
+      later = above[later];
+    }
   }
   return out;
 }

@@ -37,7 +37,7 @@ std::vector<std::string> sides_of(std::size_t scans, const Audit& found) {
   for (const AuditedConnection& connection : found.connections) {
     if (connection.verdict != ConnectionVerdict::contradicted) continue;
     for (std::string& side : sides) side.push_back('0');
-    for (const std::uint32_t scan : connection.scans) sides[scan].back() = '1';
+    for (const std::uint32_t scan : found.scans_of(connection)) sides[scan].back() = '1';
   }
   return sides;
 }

@@ -3,7 +3,6 @@
 #include <array>
 #include <cmath>
 #include <map>
-#include <set>
 
 #include "reconstruction/audit/near_pairs.hpp"
 
@@ -70,6 +69,25 @@ void for_each_cell(const Box& box, double size, const Function& function) {
       for (std::int64_t z = low[2]; z <= high[2]; ++z) function(Cell{x, y, z});
 }
 
+/// Scans of one cell that a scan is compared with: next to it in number, and others evenly chosen.
+/// Right poses keep to it; poses in other units put all scans into one cell.
+constexpr std::size_t kMostOfCell = 2048;
+
+template <typename Function>
+void for_each_other(const std::vector<std::uint32_t>& scans, std::uint32_t scan,
+                    const Function& function) {
+  std::size_t begin = 0, end = scans.size();
+  if (scans.size() > kMostOfCell) {
+    const auto place = static_cast<std::size_t>(std::lower_bound(scans.begin(), scans.end(), scan) -
+                                                scans.begin());
+    begin = place - std::min(place, kMostOfCell / 4);
+    end = std::min(place + kMostOfCell / 4, scans.size());
+    for (std::size_t k = 0; k < kMostOfCell / 2; ++k)
+      function(scans[k * scans.size() / (kMostOfCell / 2)]);
+  }
+  for (std::size_t k = begin; k < end; ++k) function(scans[k]);
+}
+
 /// The nearest half of the pairs that a scan may have, and others evenly chosen: revisits of a
 /// place are as many as steps of the path.
 std::vector<std::uint32_t> chosen_partners(std::uint32_t scan, std::vector<std::uint32_t> partners,
@@ -99,24 +117,26 @@ std::vector<Pair> near_pairs(const std::vector<PreparedCloud>& clouds,
   for (std::uint32_t k = 0; k < scans; ++k)
     if (!boxes[k].empty())
       for_each_cell(boxes[k], size, [&](const Cell& cell) { cells[cell].push_back(k); });
-  std::set<std::pair<std::uint32_t, std::uint32_t>> chosen;
+  std::vector<std::pair<std::uint32_t, std::uint32_t>> chosen;
   std::vector<std::uint32_t> seen_by(scans, scans);
   for (std::uint32_t k = 0; k < scans; ++k) {
     if (boxes[k].empty()) continue;
     std::vector<std::uint32_t> partners;
     seen_by[k] = k;
     for_each_cell(boxes[k], size, [&](const Cell& cell) {
-      for (const std::uint32_t other : cells[cell]) {
-        if (seen_by[other] == k) continue;
+      for_each_other(cells[cell], k, [&](std::uint32_t other) {
+        if (seen_by[other] == k) return;
         seen_by[other] = k;
         if ((islands.empty() || islands[other] == islands[k]) && boxes[k].meets(boxes[other]))
           partners.push_back(other);
-      }
+      });
     });
     std::sort(partners.begin(), partners.end());
     for (const std::uint32_t other : chosen_partners(k, std::move(partners), boxes, most))
-      chosen.insert(std::minmax(k, other));
+      chosen.push_back(std::minmax(k, other));
   }
+  std::sort(chosen.begin(), chosen.end());
+  chosen.erase(std::unique(chosen.begin(), chosen.end()), chosen.end());
   std::vector<Pair> pairs;
   // The later scan moves, as for the pairs of a folder.
   for (const auto& [low, high] : chosen) pairs.push_back({high, low});

@@ -36,6 +36,9 @@ constexpr double kBetterResidual = 0.9, kBetterOverlap = 1.1;
 constexpr double kOfSupport = 0.7, kOfSlightViolation = -1, kOfViolation = -2,
                  kOfStrongViolation = -3.5, kOfDoubt = -2.5, kOfShift = -2;
 
+/// Pairs that are verified in one batch: evidence and moments take up a kilobyte each.
+constexpr std::size_t kMostAtOnce = 65536;
+
 /// The worse side of the evidence.
 struct Violation {
   double share = 0, points = 0;
@@ -63,17 +66,15 @@ void keep(const PoseVerification& pose, AuditedPair& out) {
   if (moments.count == 0) return;
   const auto count = static_cast<double>(moments.count);
   out.overlap_centre = moments.sum / count;
-  out.overlap_spread =
-      moments.outer / count - out.overlap_centre * out.overlap_centre.transpose();
+  out.overlap_spread = moments.outer / count - out.overlap_centre * out.overlap_centre.transpose();
 }
 
 /// RMS distance between the poses of the overlap before and after.
 double shift_of(const AuditedPair& pair) {
   const UnalignedIsometry3d &before = pair.target_from_source, &moved = pair.refined;
   const Eigen::Matrix3d turn = moved.linear() - before.linear();
-  return std::sqrt(
-      (moved * pair.overlap_centre - before * pair.overlap_centre).squaredNorm() +
-      std::max(0.0, (turn * pair.overlap_spread * turn.transpose()).trace()));
+  return std::sqrt((moved * pair.overlap_centre - before * pair.overlap_centre).squaredNorm() +
+                   std::max(0.0, (turn * pair.overlap_spread * turn.transpose()).trace()));
 }
 
 double overlap_of(const PoseEvidence& e) { return std::max(e.source_overlap, e.target_overlap); }
@@ -149,27 +150,26 @@ void judge(const PoseVerification& given, const PoseVerification* refined, std::
   if (ratio < 0) out.verdict = PairVerdict::contradicts;
 }
 
-}  // namespace
-
-void judge_pairs(const Context& context, const std::vector<PreparedCloud>& clouds,
-                 const RegistrationOptions& registration, const AuditOptions& options,
-                 std::vector<AuditedPair>& pairs) {
+/// judge_pairs() for those from `first` on.
+void judge_some(const Context& context, const std::vector<PreparedCloud>& clouds,
+                const RegistrationOptions& registration, const AuditOptions& options,
+                std::size_t first, std::size_t count, std::vector<AuditedPair>& pairs) {
   std::vector<Pair> all, doubtful;
   std::vector<std::vector<UnalignedIsometry3d>> poses, doubtful_poses;
-  for (const AuditedPair& pair : pairs) {
-    all.push_back({pair.source, pair.target});
-    poses.push_back({pair.target_from_source});
+  for (std::size_t k = first; k < first + count; ++k) {
+    all.push_back({pairs[k].source, pairs[k].target});
+    poses.push_back({pairs[k].target_from_source});
   }
-  const auto points = [&](const AuditedPair& pair) {
+  const auto points = [&](const Pair& pair) {
     return std::min(clouds[pair.source].size(), clouds[pair.target].size());
   };
   VerificationOptions verification;
   verification.search_alternatives = false;
   const auto given = verify_poses_batch(context, clouds, all, poses, registration, verification);
   const double usual = usual_residual_of(given);
-  std::vector<std::size_t> place(pairs.size(), pairs.size());
-  for (std::size_t k = 0; k < pairs.size(); ++k) {
-    if (settled(given[k].front(), points(pairs[k]), usual)) continue;
+  std::vector<std::size_t> place(count, count);
+  for (std::size_t k = 0; k < count; ++k) {
+    if (settled(given[k].front(), points(all[k]), usual)) continue;
     place[k] = doubtful.size();
     doubtful.push_back(all[k]);
     doubtful_poses.push_back(poses[k]);
@@ -177,13 +177,23 @@ void judge_pairs(const Context& context, const std::vector<PreparedCloud>& cloud
   verification.refine = true;
   const auto refined =
       verify_poses_batch(context, clouds, doubtful, doubtful_poses, registration, verification);
-  for (std::size_t k = 0; k < pairs.size(); ++k) {
-    AuditedPair& pair = pairs[k];
+  for (std::size_t k = 0; k < count; ++k) {
+    AuditedPair& pair = pairs[first + k];
     const double margin = options.max_shift + options.max_shift_per_metre *
                                                   pair.target_from_source.translation().norm();
     judge(given[k].front(), place[k] < doubtful.size() ? &refined[place[k]].front() : nullptr,
-          points(pair), margin, pair);
+          points(all[k]), margin, pair);
   }
+}
+
+}  // namespace
+
+void judge_pairs(const Context& context, const std::vector<PreparedCloud>& clouds,
+                 const RegistrationOptions& registration, const AuditOptions& options,
+                 std::vector<AuditedPair>& pairs) {
+  for (std::size_t first = 0; first < pairs.size(); first += kMostAtOnce)
+    judge_some(context, clouds, registration, options, first,
+               std::min(kMostAtOnce, pairs.size() - first), pairs);
 }
 
 }  // namespace gpureg::reconstruction
