@@ -113,8 +113,8 @@ TEST(Connections, ABentCornerIsNoWrongPlace) {
 
 // Each pair is within the margin of the audit, but all across one place ask for the same motion.
 TEST(Connections, ACommonShiftContradicts) {
-  constexpr std::uint32_t kScans = 20, kSlip = 12;
-  const auto judged_with = [](double common, double own) {
+  const std::uint32_t kScans = 20, kSlip = 12;
+  const auto judged_with = [&](double common, double own) {
     Audit audit;
     for (std::uint32_t k = 0; k < kScans; ++k)
       for (std::uint32_t m = k + 1; m < std::min(kScans, k + 5); ++m)
