@@ -152,10 +152,7 @@ def audit(
     order = [numbers[k] for k in order]
     return Audit(
         [AuditedPair(numbers[row[0]], numbers[row[1]], *row[2:]) for row in pairs],
-        [
-            AuditedConnection(*row, _order=order, _part=slice(first, first + size))
-            for *row, first, size in connections
-        ],
+        [AuditedConnection(*row[:5], order, slice(row[5], row[5] + row[6])) for row in connections],
     )
 
 

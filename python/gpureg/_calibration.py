@@ -8,7 +8,7 @@ import dataclasses
 import json
 import math
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -110,7 +110,7 @@ class CalibrationRun:
     counts: dict[str, dict[str, int]]
     voxel_size: float
     risk: RiskThreshold | None = None
-    samples: tuple[list[float], list[bool]] = ((), ())
+    samples: tuple[Sequence[float], Sequence[bool]] = ((), ())
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write the file that ``--calibration`` of the command and `read_calibration` read,
@@ -214,7 +214,8 @@ def calibrate(
         )
     risk = None
     if max_risk is not None:
-        risk = _control_risk(*found["samples"], None, max_risk, 0.05, found["calibration"])
+        confidences, correct = found["samples"]
+        risk = _control_risk(confidences, correct, None, max_risk, 0.05, found["calibration"])
     return CalibrationRun(voxel_size=options.prepare.voxel_size, risk=risk, **found)
 
 
@@ -326,8 +327,8 @@ def _labelled(confidences: Any, correct: Any) -> tuple[Any, Any]:
 
 
 def _control_risk(
-    confidences: list[float],
-    correct: list[bool],
+    confidences: Sequence[float],
+    correct: Sequence[bool],
     scenes: list[int] | None,
     max_risk: float,
     max_failure: float,

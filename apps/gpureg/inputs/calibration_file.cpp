@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "inputs/calibration_file.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <utility>
 
@@ -90,16 +91,22 @@ Json calibration_document(const CalibrationResult& result, const RegistrationOpt
 
 std::vector<CalibrationSample> read_decided_pairs(const std::string& path) {
   const Json document = document_of(path);
-  const auto pairs = document.find("decided_pairs");
-  const Json none, &confidences = pairs == document.end() ? none : pairs->value("confidence", none),
-                   &correct = pairs == document.end() ? none : pairs->value("correct", none);
+  const auto list = [&](const char* field) {
+    const auto pairs = document.find("decided_pairs");
+    if (pairs == document.end() || !pairs->is_object()) return Json::array();
+    return pairs->value(field, Json::array());
+  };
+  const Json confidences = list("confidence"), correct = list("correct");
+  const auto all = [](const Json& values, bool (Json::*is)() const noexcept) {
+    return values.is_array() &&
+           std::all_of(values.begin(), values.end(), [&](const Json& v) { return (v.*is)(); });
+  };
+  if (!all(confidences, &Json::is_number) || !all(correct, &Json::is_boolean) ||
+      confidences.empty() || confidences.size() != correct.size())
+    throw IoError(path + ": \"decided_pairs\" has no confidences and labels of pairs");
   std::vector<CalibrationSample> out;
   for (std::size_t k = 0; k < confidences.size(); ++k)
-    if (correct.is_array() && k < correct.size() && confidences[k].is_number() &&
-        correct[k].is_boolean())
-      out.push_back({confidences[k].get<double>(), correct[k].get<bool>()});
-  if (out.empty() || out.size() != confidences.size() || out.size() != correct.size())
-    throw IoError(path + ": \"decided_pairs\" has no confidences and labels of pairs");
+    out.push_back({confidences[k].get<double>(), correct[k].get<bool>()});
   return out;
 }
 

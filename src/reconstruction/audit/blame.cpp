@@ -18,7 +18,7 @@ namespace {
 constexpr double kPrior = 3;
 /// An edge of the graph comes before any support that nobody registered. Pairs that ICP moves, of
 /// which those across a slip are, come late: a slip is then in one edge of the tree.
-constexpr double kOfBond = 10, kOfShift = 0.5;
+constexpr double kOfBond = 10, kOfMove = 0.5;
 
 /// Pairs across one connection that are heard. Where there are more, as along a corridor that was
 /// walked there and back, they are drawn without regard to what they say.
@@ -42,7 +42,7 @@ class Forest {
     for (const AuditedPair& pair : pairs)
       if (pair.log_likelihood_ratio > 0)
         candidates.push_back(
-            {pair.log_likelihood_ratio + pair.overlap - kOfShift * pair.shift / noise, pair.target,
+            {pair.log_likelihood_ratio + pair.overlap - kOfMove * pair.shift / noise, pair.target,
              pair.source});
     std::stable_sort(candidates.begin(), candidates.end(),
                      [](const Candidate& x, const Candidate& y) { return x.weight > y.weight; });
