@@ -202,9 +202,65 @@ TEST(MapConfidence, IsThatOfTheWeakestConnectionOnTheWay) {
     map.edges.back().target_from_source = UnalignedIsometry3d::Identity();
     map.edges.back().confidence = 0.99;
   }
-  judge_edges(audit, 0.1, map);
+  judge_edges(audit, {}, false, map);
   for (std::size_t k = 0; k < map.edges.size(); ++k)
     EXPECT_EQ(map.edges[k].map_confidence, edges[k].weakest) << k;
+}
+
+// Odds of 99 to 1, a quarter of it where places are distinct; at most 0.4 where they look alike,
+// and half of that where four of five sure poses are rejected.
+TEST(MapConfidence, OfRejectedPosesFollowsTheSet) {
+  Reconstruction map;
+  map.scans.resize(6);
+  for (std::uint32_t k = 0; k < 6; ++k) {
+    map.scans[k].placed = true;
+    map.scans[k].island = k / 4;
+    map.scans[k].island_from_scan = UnalignedIsometry3d::Identity();
+  }
+  const auto add = [&](std::uint32_t source, std::uint32_t target, bool accepted) {
+    map.edges.emplace_back();
+    map.edges.back().source = source;
+    map.edges.back().target = target;
+    map.edges.back().accepted = accepted;
+    map.edges.back().target_from_source = UnalignedIsometry3d::Identity();
+    map.edges.back().confidence = 0.99;
+  };
+  add(1, 0, true);
+  add(4, 0, false);
+  const auto of_rejected = [&](bool places_look_alike) {
+    judge_edges(Audit(), {}, places_look_alike, map);
+    return map.edges[1].map_confidence;
+  };
+  EXPECT_EQ(of_rejected(false), 0.9) << "at most";
+  EXPECT_EQ(of_rejected(true), 0.4);
+  for (const std::uint32_t source : {1u, 2u, 3u}) add(4, source, false);
+  EXPECT_EQ(of_rejected(false), 0.9);
+  EXPECT_NEAR(of_rejected(true), 0.2, 1e-12) << "one accepted, four rejected";
+  map.edges[1].confidence = 0.4;
+  EXPECT_NEAR(of_rejected(false), 1.0 / 7, 1e-12) << "odds of 2 to 3, then of 1 to 6";
+  EXPECT_NEAR(of_rejected(true), 1.0 / 13, 1e-12);
+}
+
+// A map bends: what is a decimetre more at ten metres still agrees.
+TEST(MapConfidence, TheMarginGrowsWithTheDistanceOfTheScans) {
+  for (const double metres : {1.0, 10.0}) {
+    Reconstruction map;
+    map.scans.resize(2);
+    for (Scan& scan : map.scans) {
+      scan.placed = true;
+      scan.island = 0;
+      scan.island_from_scan = UnalignedIsometry3d::Identity();
+    }
+    map.scans[1].island_from_scan.translation().x() = metres + 0.25;
+    map.edges.resize(1);
+    map.edges[0].source = 1;
+    map.edges[0].target = 0;
+    map.edges[0].confidence = 0.99;
+    map.edges[0].target_from_source = UnalignedIsometry3d::Identity();
+    map.edges[0].target_from_source.translation().x() = metres;
+    judge_edges(Audit(), {}, false, map);
+    EXPECT_EQ(map.edges[0].map_confidence, metres > 5 ? 1.0 : 0.0);
+  }
 }
 
 /// Scans of a room, each without another slice of it, at their places in the room.

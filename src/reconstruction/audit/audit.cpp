@@ -302,7 +302,7 @@ AuditedReconstruction reconstruct_audited(
     if (!changed) break;
   }
   add_ruled_out(ruled_out, out.map);
-  judge_edges(out.audit, audit_options.max_shift, out.map);
+  judge_edges(out.audit, audit_options, out.places_look_alike, out.map);
   return out;
 }
 

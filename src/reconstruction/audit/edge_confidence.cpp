@@ -2,6 +2,7 @@
 #include "reconstruction/audit/edge_confidence.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <cstddef>
 #include <limits>
 #include <vector>
@@ -12,10 +13,36 @@ namespace gpureg::reconstruction {
 namespace {
 
 /// Poses between islands are right less often than their confidence says: that the islands stay
-/// apart means that others speak against them. Ratio of the odds, and the most that is left, in
-/// buildings whose places look alike: 85 of 221 above 0.9 were right, and 57 of 336 between 0.5 and
-/// 0.9.
-constexpr double kOfRejection = 1.0 / 16, kMostOfRejected = 0.4;
+/// apart means that others speak against them. Ratio of the odds, and the most that is left. Fits
+/// without each of eight buildings chose the same (bench/accuracy/map_confidence.py).
+struct Rejection {
+  double ratio, most;
+};
+constexpr Rejection kOfDistinctPlaces = {1.0 / 4, 0.9}, kOfAlikePlaces = {1.0 / 8, 0.4};
+/// Confidence of an edge that nobody would doubt.
+constexpr double kSure = 0.9;
+
+bool between_islands(const Edge& edge, const Reconstruction& map) {
+  const Scan &source = map.scans[edge.source], &target = map.scans[edge.target];
+  return !source.placed || !target.placed || source.island != target.island;
+}
+
+/// The more of the sure poses a set of equal places rejects, the fewer of those are right: the
+/// pairs that see each other are about as many in every set.
+Rejection rejection_in(const Reconstruction& map, bool places_look_alike) {
+  if (!places_look_alike) return kOfDistinctPlaces;
+  double accepted = 0, rejected = 0;
+  for (const Edge& edge : map.edges) {
+    if (edge.confidence <= kSure) continue;
+    if (between_islands(edge, map))
+      ++rejected;
+    else if (edge.accepted)
+      ++accepted;
+  }
+  Rejection out = kOfAlikePlaces;
+  if (rejected > accepted) out.most *= std::sqrt(accepted / rejected);
+  return out;
+}
 
 /// The least confidence of the connections between the scans of each edge; 1 where there is none.
 std::vector<double> weakest_between(const Audit& audit, const Reconstruction& map) {
@@ -51,16 +78,19 @@ std::vector<double> weakest_between(const Audit& audit, const Reconstruction& ma
 
 }  // namespace
 
-void judge_edges(const Audit& audit, double max_error, Reconstruction& map) {
+void judge_edges(const Audit& audit, const AuditOptions& options, bool places_look_alike,
+                 Reconstruction& map) {
   const std::vector<double> weakest = weakest_between(audit, map);
+  const Rejection rejection = rejection_in(map, places_look_alike);
   for (std::size_t k = 0; k < map.edges.size(); ++k) {
     Edge& edge = map.edges[k];
-    const Scan &source = map.scans[edge.source], &target = map.scans[edge.target];
-    const double odds = edge.confidence / (1 - std::min(edge.confidence, kMostConfidence));
-    if (!source.placed || !target.placed || source.island != target.island)
-      edge.map_confidence =
-          std::min(kMostOfRejected, odds * kOfRejection / (1 + odds * kOfRejection));
-    else if (deviation(edge, map, max_error) == 0)
+    const double odds =
+        edge.confidence / (1 - std::min(edge.confidence, kMostConfidence)) * rejection.ratio;
+    const double margin = options.max_shift + options.max_shift_per_metre *
+                                                  edge.target_from_source.translation().norm();
+    if (between_islands(edge, map))
+      edge.map_confidence = std::min(rejection.most, odds / (1 + odds));
+    else if (deviation(edge, map, margin) == 0)
       edge.map_confidence = weakest[k];
     else
       edge.map_confidence = edge.confidence * (1 - weakest[k]);

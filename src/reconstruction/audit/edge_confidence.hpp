@@ -8,7 +8,9 @@ namespace gpureg::reconstruction {
 /// Sets Edge::map_confidence: edges that agree with the map are as certain as the weakest
 /// connection between their scans, edges that differ from it are as likely as that connection is
 /// wrong, and edges between islands were not certain enough to join them.
-/// @param max_error RMS distance over the overlap up to which an edge agrees, metres.
-void judge_edges(const Audit& audit, double max_error, Reconstruction& map);
+/// @param options those of the audit: an edge agrees with the map up to the same margin.
+/// @param places_look_alike as of AuditedReconstruction.
+void judge_edges(const Audit& audit, const AuditOptions& options, bool places_look_alike,
+                 Reconstruction& map);
 
 }  // namespace gpureg::reconstruction
