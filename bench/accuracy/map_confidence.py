@@ -6,9 +6,9 @@ An edge is correct within 0.2 m (Redwood's measure). For each map: expected cali
 bins) and the share of correct edges above 0.9, of the pair alone (pair_confidence), after loop
 consistency (confidence) and in view of the map and its audit (map_confidence). `without`: the error
 of map_confidence if the constants for poses between islands (src/reconstruction/edge_confidence.cpp)
-are fitted by maximum likelihood on the other buildings.
+are those of the least mean error of the other buildings.
 
-usage: map_confidence.py BUILDING=SCENE_FOLDER=RECONSTRUCTION.json ... [-o RECORD]
+usage: map_confidence.py NAME=BUILDING=SCENE_FOLDER=RECONSTRUCTION.json ... [-o RECORD]
 Maps of one building may be several. Needs numpy."""
 
 import itertools
@@ -23,21 +23,15 @@ from calibrate import calibration_error
 KINDS = ("pair_confidence", "confidence", "map_confidence")
 SURE = 0.9
 MOST = 0.9999  # of a confidence whose odds are taken
+RATIOS = [1 / k for k in (2, 4, 6, 8, 12, 16, 24)]
 GRID = list(
-    itertools.product(
-        (1 / 2, 1 / 4, 1 / 8, 1 / 16),
-        (0.6, 0.75, 0.9),
-        (1 / 8, 1 / 12, 1 / 16, 1 / 24),
-        (0.3, 0.35, 0.4, 0.45, 0.5),
-        (0, 0.25, 0.5, 0.75),
-    )
-)  # of places that are distinct, and of those that look alike: ratio, most; exponent
-CHOSEN = 1 / 4, 0.9, 1 / 8, 0.4, 0.5
+    itertools.product(RATIOS, (0.6, 0.75, 0.9), RATIOS, (0.15, 0.2, 0.25, 0.3, 0.35, 0.4, 0.5))
+)  # ratio and most where places are distinct, and where they look alike
 
 
 class Map:
     def __init__(self, text):
-        self.building, scene, document = text.split("=")
+        self.name, self.building, scene, document = text.split("=")
         document = json.loads(pathlib.Path(document).read_text())
         truth = map_rmse.read_truth(scene)
         edges = document["edges"]
@@ -56,17 +50,10 @@ class Map:
         self.between = np.array(
             [islands[e["i"]] is None or islands[e["i"]] != islands[e["j"]] for e in edges]
         )
-        sure = self.confidences["confidence"] > SURE
-        accepted = np.array([e["state"] == "accepted" for e in edges])
-        self.accepted = (sure & accepted & ~self.between).sum()
-        self.rejected = max(1, (sure & self.between).sum())
 
     def mapped(self, constants):
         """map_confidence with other constants."""
-        ratio, most, ratio_alike, most_alike, exponent = constants
-        if self.alike:
-            ratio = ratio_alike
-            most = most_alike * min(1, self.accepted / self.rejected) ** exponent
+        ratio, most = constants[2:] if self.alike else constants[:2]
         confidence = np.minimum(self.confidences["confidence"], MOST)
         odds = confidence / (1 - confidence) * ratio
         rejected = np.minimum(most, odds / (1 + odds))
@@ -88,29 +75,29 @@ class Map:
 
 
 def fitted(maps):
-    """Constants of the largest likelihood; of equal ones the first."""
+    """Constants of the least error, as a mean of all maps; of equal ones the first."""
 
     def loss(constants):
-        values = np.concatenate([m.mapped(constants) for m in maps]).clip(1e-3, 1 - 1e-3)
-        correct = np.concatenate([m.correct for m in maps])
-        return -np.log(np.where(correct, values, 1 - values)).mean()
+        return np.mean([m.error(m.mapped(constants)) for m in maps])
 
-    return min([CHOSEN, *GRID], key=loss)
+    return min(GRID, key=loss)
 
 
 def main():
     parser = record.parser(__doc__, "map_confidence.json")
-    parser.add_argument("maps", nargs="+", metavar="BUILDING=SCENE=RECONSTRUCTION")
+    parser.add_argument("maps", nargs="+", metavar="NAME=BUILDING=SCENE=MAP")
     arguments = parser.parse_args()
     maps = [Map(text) for text in arguments.maps]
     content = []
     for chosen in maps:
         constants = fitted([m for m in maps if m.building != chosen.building])
         error = round(float(chosen.error(chosen.mapped(constants))), 4)
-        content.append({"building": chosen.building, **chosen.figures(), "without": error})
+        content.append(
+            {"map": chosen.name, "building": chosen.building, **chosen.figures(), "without": error}
+        )
         content[-1]["fitted"] = [round(value, 4) for value in constants]
         print(content[-1], flush=True)
-    command = "bench/accuracy/map_confidence.py BUILDING=SCENE=RECONSTRUCTION ..."
+    command = "bench/accuracy/map_confidence.py NAME=BUILDING=SCENE=MAP ..."
     record.write(arguments, command, {"maps": content})
 
 

@@ -10,7 +10,7 @@ for which nothing is promised. Recall: of the correct poses of all left-out scen
 and from 0.5 on.
 
 usage: risk.py FOLDER [--building NAME=SCENE_FOLDER=RESULT.json ...]
-       [--map NAME=SCENE_FOLDER=RECONSTRUCTION.json ...] [-o RECORD]
+       [--map NAME=BUILDING=SCENE_FOLDER=RECONSTRUCTION.json ...] [-o RECORD]
 FOLDER: DOMAIN.json files of domains.py. A building has gt_all.log and gt_all.info, and its result is
 that of `gpureg batch` or the pairs.json of `gpureg reconstruct`. Of maps, the map_confidence of the
 edges counts: `pairs` of the record has the domains with the buildings, `maps` with the maps. Needs
@@ -147,7 +147,9 @@ def main():
             content[name][str(risk)] = measured([*scenes, *more], risk)
             for draws, of in content[name][str(risk)].items():
                 print(name, risk, draws, of, flush=True)
-    command = "bench/accuracy/risk.py FOLDER --building NAME=SCENE=RESULT --map NAME=SCENE=MAP"
+    command = (
+        "bench/accuracy/risk.py FOLDER --building NAME=SCENE=RESULT --map NAME=BUILDING=SCENE=MAP"
+    )
     record.write(arguments, command, content)
 
 

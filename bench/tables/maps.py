@@ -143,10 +143,56 @@ def pruning():
     ]
 
 
+def confidences():
+    """The confidences of the edges of each map."""
+    record = load("map_confidence.json")
+    rows = [
+        "| map | edges | ECE: pair alone | loop consistency | map | map, fitted without the building | correct above 0.9: pair alone | loop consistency | map |",
+        "| --- | --- | --- | --- | --- | --- | --- | --- | --- |",
+    ]
+    kinds = ("pair_confidence", "confidence", "map_confidence")
+    for of in record["maps"]:
+        errors = " | ".join(f"{of[kind]['ECE']:.3f}" for kind in kinds)
+        sure = " | ".join(f"{of[kind]['of_them_correct']} of {of[kind]['above']}" for kind in kinds)
+        rows.append(f"| {of['map']} | {of['edges']} | {errors} | {of['without']:.3f} | {sure} |")
+    return [*rows, "", source(record) + "."]
+
+
+SCORES = {
+    "pairs": "every pair by itself",
+    "maps": "pairs of buildings by `map_confidence`",
+}
+DRAWS = {
+    "scenes": "all other scenes",
+    "few_scenes": "19 other scenes",
+    "domain": "scenes of other domains",
+    "as_independent_pairs": "all others, as independent pairs",
+}
+
+
+def promised_risk():
+    record = load("risk.json")
+    rows = [
+        "| confidence | calibrated on | risk, % | draws | kept, % | recall, % | from 0.5 on, % |",
+        "| --- | --- | --- | --- | --- | --- | --- |",
+    ]
+    for score, of_score in SCORES.items():
+        for draws, of_draws in DRAWS.items():
+            for risk, of in record[score].items():
+                of = of[draws]
+                rows.append(
+                    f"| {of_score} | {of_draws} | {100 * float(risk):.0f} | {of['draws']} | {100 * of['kept']:.1f} "
+                    f"| {100 * of['recall']:.1f} | {100 * of['recall_from_half']:.1f} |"
+                )
+    return [*rows, "", source(record) + "."]
+
+
 TABLES = {
     "maps": maps,
     "maps_short": maps_short,
     "map_peers": peers,
     "located": located,
     "pruning": pruning,
+    "map_confidence": confidences,
+    "promised_risk": promised_risk,
 }
