@@ -20,7 +20,7 @@ import shutil
 import sys
 
 import numpy as np
-from cameras import cameras
+from record import cameras
 
 # Chosen by hand; no record compares other values.
 WAVES = 24  # in the sum that makes a field

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Shared by the benchmarks: arguments, the command gpureg, and a JSON record with the command and
-the commit that made it.
+"""Shared by the benchmarks: arguments, the command gpureg, cameras of a scene, and a JSON record with
+the command and the commit that made it.
 """
 
 import argparse
@@ -117,6 +117,17 @@ def write(arguments, command, content):
     record = {"command": command, "commit": commit(), "processor": processor(), **content}
     save(arguments.output, record)
     print(f"written: {arguments.output}")
+
+
+def cameras(path):
+    """Positions in each fragment's frame, in the order of the frames, by fragment; path: a scene's
+    cameras.txt, which need not exist.
+    """
+    out = {}
+    for values in map(str.split, path.read_text().splitlines() if path.exists() else []):
+        if values:
+            out.setdefault(int(values[0]), []).append([float(v) for v in values[2:5]])
+    return out
 
 
 AFTER_FIRST_PASS = "a first pass gave most pairs fewer modes: fit to runs without one"

@@ -94,10 +94,10 @@ def figures(draws, risk):
         correct += rows[:, 1].sum()
     return {
         "draws": len(draws),
-        "kept": round(kept / len(draws), 4),
+        "kept": round(float(kept / len(draws)), 4),
         "median_threshold": round(float(np.median(thresholds)), 5),
-        "recall": round(reported / correct, 4),
-        "recall_from_half": round(usual / correct, 4),
+        "recall": round(float(reported / correct), 4),
+        "recall_from_half": round(float(usual / correct), 4),
     }
 
 

@@ -33,8 +33,7 @@ import tempfile
 
 import gpureg
 import numpy as np
-from cameras import cameras
-from record import commit, save
+from record import cameras, commit, save
 
 # triangles: of a model that is written as an STL file, or None.
 Cloud = collections.namedtuple("Cloud", "points viewpoints reach triangles", defaults=(None,))

@@ -16,7 +16,7 @@ import shutil
 import sys
 
 import numpy as np
-from cameras import cameras
+from record import cameras
 
 EVERY = 5  # thins out the cameras, whose neighbours in the sequence stand close together
 
