@@ -197,8 +197,13 @@ class Sum {
   double sum_ = 0;
 };
 
-/// ICP's noise in a right map, of the margin.
-constexpr double kNoise = 0.2;
+/// What ICP finds in a right map of rooms, of its margin, and that margin in metres. Beyond it the
+/// noise grows with the square: right poses of LiDAR scans, as of GNSS, are a decimetre off.
+constexpr double kNoise = 0.2, kRoomMargin = 0.15;
+
+double noise_of(double max_shift) {
+  return kNoise * max_shift * std::max(1.0, max_shift / kRoomMargin);
+}
 
 /// Log likelihood ratios of the pairs across a connection, with what a common shift says of those
 /// that seem to support it.
@@ -261,7 +266,7 @@ void judge_connections(const std::vector<std::uint32_t>& islands, const std::vec
                        const std::vector<UnalignedIsometry3d>& world_from_scan,
                        const AuditOptions& options, Audit& audit) {
   std::vector<AuditedPair>& pairs = audit.pairs;
-  const double noise = kNoise * options.max_shift;
+  const double noise = noise_of(options.max_shift);
   const Forest forest(islands, bonds, pairs, noise);
   std::set<std::pair<std::uint32_t, std::uint32_t>> held;
   for (const Bond& bond : bonds) held.insert(std::minmax(bond.a, bond.b));

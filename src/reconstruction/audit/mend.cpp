@@ -50,8 +50,8 @@ class Affinities {
   }
 
   void add(std::uint32_t a, std::uint32_t b, double ratio) {
-    a = part_[a];
-    b = part_[b];
+    a = part_of(a);
+    b = part_of(b);
     if (a == b) return;
     between_[a][b] += ratio;
     between_[b][a] += ratio;
@@ -82,13 +82,19 @@ class Affinities {
         if (sum > 0) queue.insert({-sum, low, high});
       }
       between_[b].clear();
-      for (std::uint32_t& part : part_)
-        if (part == b) part = a;
+      part_[b] = a;
     }
-    return part_;
+    Parts out;
+    for (std::uint32_t k = 0; k < part_.size(); ++k) out.push_back(part_of(k));
+    return out;
   }
 
  private:
+  std::uint32_t part_of(std::uint32_t k) {
+    while (part_[k] != k) k = part_[k] = part_[part_[k]];
+    return k;
+  }
+
   std::vector<std::map<std::uint32_t, double>> between_;
   Parts part_;
 };
