@@ -5,6 +5,15 @@ import gpureg
 import numpy as np
 
 
+def planar(x, y, degrees):
+    """A pose in the plane."""
+    pose = np.eye(4)
+    c, s = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
+    pose[:2, :2] = [[c, -s], [s, c]]
+    pose[:2, 3] = x, y
+    return pose
+
+
 def room(seed: int = 1, points: int = 6000) -> np.ndarray:
     """(points, 3) float64: floor, two walls and six boxes of a 2 m corner, sampled at random."""
     rng = np.random.default_rng(seed)

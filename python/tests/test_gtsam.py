@@ -6,7 +6,7 @@ import importlib.util
 import gpureg
 import numpy as np
 import pytest
-from scenes import moved, room
+from scenes import moved, planar, room
 from test_examples import FOLDER, run
 
 pytest.importorskip("gtsam", reason="gtsam is not installed (pip install gtsam)")
@@ -18,14 +18,6 @@ def example():
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     return module
-
-
-def planar(x, y, degrees):
-    pose = np.eye(4)
-    c, s = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
-    pose[:2, :2] = [[c, -s], [s, c]]
-    pose[:2, 3] = x, y
-    return pose
 
 
 def relative(poses, source, target):

@@ -6,14 +6,7 @@ import threading
 import gpureg
 import numpy as np
 import pytest
-
-
-def planar(x, y, degrees):
-    pose = np.eye(4)
-    c, s = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
-    pose[:2, :2] = [[c, -s], [s, c]]
-    pose[:2, 3] = x, y
-    return pose
+from scenes import planar
 
 
 def lap(count=20):

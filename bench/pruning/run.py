@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Share of the overlapping pairs that pruning keeps against the share of the pairs that it tries.
 
-    PYTHONPATH=python python3 bench/accuracy/pruning.py --data DATA --generated FOLDER... [--shares 2 5 10]
+    PYTHONPATH=python python3 bench/pruning/run.py --data DATA --generated FOLDER... [--shares 2 5 10]
 
 One set is the red kitchen, the houses A and B, hospital E and folders of `gpureg generate` in one folder; the
 other is a generated country (python/tests/country.py). Pairs overlap by 30 % or more at the true poses, in
@@ -18,12 +18,13 @@ import tempfile
 import gpureg
 import numpy as np
 from gpureg import pruning
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+sys.path[1:1] = [str(ROOT / "bench/accuracy"), str(ROOT / "python/tests")]
+from country import make_fragments
 from locate import moved, read_points, read_poses
 from map_rmse import read_blocks
-from record import ROOT, data_folder, parser, write
-
-sys.path.append(str(ROOT / "python/tests"))
-from country import make_fragments
+from record import data_folder, parser, write
 
 SCENES = {
     "kitchen": "redkitchen/fragments",
@@ -139,7 +140,7 @@ def main():
     shares = " ".join(f"{share:g}" for share in arguments.shares)
     write(
         arguments,
-        f"python3 bench/accuracy/pruning.py --data DATA --generated{generated} --shares {shares}",
+        f"python3 bench/pruning/run.py --data DATA --generated{generated} --shares {shares}",
         {"rows": rows},
     )
 
