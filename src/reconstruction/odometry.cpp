@@ -64,4 +64,16 @@ pose_graph::Edge edge_of(const Odometry& odometry) {
   return edge;
 }
 
+Odometry odometry_of(std::uint32_t source, std::uint32_t target,
+                     const UnalignedIsometry3d& target_from_source, double shift, double turn) {
+  Odometry out;
+  out.source = source;
+  out.target = target;
+  out.target_from_source = target_from_source;
+  out.information = pose_graph::UnalignedMatrix6d::Identity();
+  out.information->diagonal().head<3>() /= turn * turn;
+  out.information->diagonal().tail<3>() /= shift * shift;
+  return out;
+}
+
 }  // namespace gpureg::reconstruction

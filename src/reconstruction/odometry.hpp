@@ -16,4 +16,8 @@ std::vector<Odometry> checked_odometry(std::size_t scans, std::vector<Odometry> 
 /// Nodes are indices of scans.
 pose_graph::Edge edge_of(const Odometry& odometry);
 
+/// A relative pose with isotropic noise at the source: standard deviations in metres and radians.
+Odometry odometry_of(std::uint32_t source, std::uint32_t target,
+                     const UnalignedIsometry3d& target_from_source, double shift, double turn);
+
 }  // namespace gpureg::reconstruction

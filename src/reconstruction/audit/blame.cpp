@@ -320,4 +320,17 @@ void judge_connections(const std::vector<std::uint32_t>& islands, const std::vec
   audit.order = forest.order();
 }
 
+double log_odds_between(const std::vector<AuditedPair>& pairs, const ScansBelow& below,
+                        const std::vector<UnalignedIsometry3d>& world_from_scan,
+                        const AuditOptions& options) {
+  std::vector<std::uint32_t> all;
+  for (std::uint32_t k = 0; k < pairs.size(); ++k)
+    if (pairs[k].log_likelihood_ratio != 0) all.push_back(k);
+  const std::vector<double> ratios =
+      ratios_of(all, pairs, below, world_from_scan, noise_of(options.max_shift));
+  const double p =
+      judge(all, ratios, pairs, std::vector<char>(pairs.size(), 0), true, options).confidence;
+  return std::log(p / (1 - p)) - kPrior;
+}
+
 }  // namespace gpureg::reconstruction

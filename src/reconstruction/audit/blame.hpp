@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "gpureg/reconstruction/audit.hpp"
+#include "reconstruction/audit/common_shift.hpp"
 
 namespace gpureg::reconstruction {
 
@@ -25,6 +26,13 @@ struct Bond {
 void judge_connections(const std::vector<std::uint32_t>& islands, const std::vector<Bond>& bonds,
                        const std::vector<UnalignedIsometry3d>& world_from_scan,
                        const AuditOptions& options, Audit& audit);
+
+/// What pairs between two parts say together, as of judge_connections(): the logarithm of how much
+/// more likely they are if the parts lie right to each other.
+/// @param below says of a scan whether it is of the one part.
+double log_odds_between(const std::vector<AuditedPair>& pairs, const ScansBelow& below,
+                        const std::vector<UnalignedIsometry3d>& world_from_scan,
+                        const AuditOptions& options);
 
 constexpr std::uint32_t kNoIsland = 0xffffffffu;
 

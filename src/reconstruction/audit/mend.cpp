@@ -10,7 +10,9 @@
 #include <tuple>
 
 #include "gpureg/error.hpp"
+#include "reconstruction/audit/joins.hpp"
 #include "reconstruction/audit/near_pairs.hpp"
+#include "reconstruction/odometry.hpp"
 
 namespace gpureg::reconstruction {
 namespace {
@@ -27,6 +29,8 @@ constexpr double kOfNumbers = 3;
 constexpr std::size_t kLeastPart = 8;
 /// Shift from which a scan has another pose, metres, and the same for the entries of its rotation.
 constexpr double kMoved = 0.02;
+/// Pairs are aligned at most so often.
+constexpr int kMostPasses = 3;
 
 using Parts = std::vector<std::uint32_t>;
 constexpr std::uint32_t kNoPart = 0xffffffffu;
@@ -131,13 +135,6 @@ Parts parts_of(const std::vector<UnalignedIsometry3d>& poses, const Audit& found
   return out;
 }
 
-pose_graph::UnalignedMatrix6d information_of(double shift, double turn) {
-  pose_graph::UnalignedMatrix6d information = pose_graph::UnalignedMatrix6d::Identity();
-  information.diagonal().head<3>() /= turn * turn;
-  information.diagonal().tail<3>() /= shift * shift;
-  return information;
-}
-
 /// Each scan of a part with the one before.
 std::vector<Odometry> held(const std::vector<UnalignedIsometry3d>& poses, const Parts& parts) {
   std::map<std::uint32_t, std::uint32_t> last;
@@ -146,13 +143,9 @@ std::vector<Odometry> held(const std::vector<UnalignedIsometry3d>& poses, const 
     if (parts[k] == kNoPart) continue;
     const auto [at, first] = last.insert({parts[k], k});
     if (!first) {
-      Odometry edge;
-      edge.source = k;
-      edge.target = at->second;
-      edge.target_from_source = poses[at->second].inverse() * poses[k];
-      edge.confidence = kOfPart;
-      edge.information = information_of(kShiftOfPart, kTurnOfPart);
-      out.push_back(edge);
+      out.push_back(odometry_of(k, at->second, poses[at->second].inverse() * poses[k], kShiftOfPart,
+                                kTurnOfPart));
+      out.back().confidence = kOfPart;
     }
     at->second = k;
   }
@@ -227,12 +220,62 @@ void place(const Reconstruction& map, const std::vector<UnalignedIsometry3d>& be
     for (const std::uint32_t scan : scans)
       out.world_from_scan[scan] = world_from_island * map.scans[scan].island_from_scan;
   }
+}
+
+/// Scans that have another pose, and none any more.
+void list_changes(const std::vector<UnalignedIsometry3d>& before, MendedMap& out) {
   for (std::uint32_t k = 0; k < before.size(); ++k) {
     if (!before[k].matrix().allFinite()) continue;
     if (!out.world_from_scan[k].matrix().allFinite())
       out.left_out.push_back(k);
     else if ((out.world_from_scan[k].matrix() - before[k].matrix()).cwiseAbs().maxCoeff() > kMoved)
       out.moved.push_back(k);
+  }
+}
+
+/// Takes the map apart, and puts the parts together.
+MendedMap put_together(const Context& context, const std::vector<PreparedCloud>& clouds,
+                       const std::vector<UnalignedIsometry3d>& poses, const Audit& found,
+                       const RegistrationOptions& registration, const AuditOptions& options) {
+  MendedMap out;
+  out.world_from_scan = poses;
+  const Parts parts = parts_of(poses, found);
+  const auto reconstruction = Options::from_voxel_size(registration.prepare.voxel_size);
+  std::vector<Pair> pairs, more = pairs_to_align(parts, found);
+  std::vector<RegistrationResult> results;
+  std::vector<Odometry> odometry = held(poses, parts);
+  // Few pairs see each other where the parts were; where they belong, more pairs hold them.
+  for (int pass = 0; pass < kMostPasses && !more.empty(); ++pass) {
+    std::vector<RegistrationResult> aligned = align_batch(context, clouds, more, registration);
+    pairs.insert(pairs.end(), more.begin(), more.end());
+    std::move(aligned.begin(), aligned.end(), std::back_inserter(results));
+    AuditedReconstruction again = reconstruct_audited(
+        context, clouds, pairs, results, reconstruction, odometry, registration, options);
+    const std::vector<Odometry> joins =
+        confirmed_joins(context, clouds, pairs, results, found.pairs, again.map, reconstruction,
+                        registration, options);
+    if (!joins.empty()) {
+      odometry.insert(odometry.end(), joins.begin(), joins.end());
+      again = reconstruct_audited(context, clouds, pairs, results, reconstruction, odometry,
+                                  registration, options);
+    }
+    place(again.map, poses, out);
+    more = pairs_between(clouds, parts, out.world_from_scan, pairs, kPairsOfScan);
+  }
+  out.registered = pairs.size();
+  return out;
+}
+
+/// What an audit of the mended map contradicts has no pose any more.
+void leave_out_contradicted(const Context& context, const std::vector<PreparedCloud>& clouds,
+                            const RegistrationOptions& registration, const AuditOptions& options,
+                            MendedMap& map) {
+  for (;;) {
+    map.audit = audit(context, clouds, map.world_from_scan, registration, options);
+    if (map.audit.sound()) return;
+    // The worst connection: others may be contradicted because of it.
+    for (const std::uint32_t scan : map.audit.scans_of(map.audit.connections.front()))
+      map.world_from_scan[scan] = no_pose();
   }
 }
 
@@ -250,25 +293,9 @@ MendedMap mend(const Context& context, const std::vector<PreparedCloud>& clouds,
     out.audit = found;
     return out;
   }
-  const Parts parts = parts_of(world_from_scan, found);
-  const auto reconstruction = Options::from_voxel_size(registration.prepare.voxel_size);
-  std::vector<Pair> pairs, more = pairs_to_align(parts, found);
-  std::vector<RegistrationResult> results;
-  // Few pairs see each other where the parts were; where they belong, more pairs hold them.
-  for (int pass = 0; pass < 2 && !more.empty(); ++pass) {
-    std::vector<RegistrationResult> aligned = align_batch(context, clouds, more, registration);
-    pairs.insert(pairs.end(), more.begin(), more.end());
-    std::move(aligned.begin(), aligned.end(), std::back_inserter(results));
-    const AuditedReconstruction again =
-        reconstruct_audited(context, clouds, pairs, results, reconstruction,
-                            held(world_from_scan, parts), registration, options);
-    out.moved.clear();
-    out.left_out.clear();
-    place(again.map, world_from_scan, out);
-    more = pairs_between(clouds, parts, out.world_from_scan, pairs, kPairsOfScan);
-  }
-  out.registered = pairs.size();
-  out.audit = audit(context, clouds, out.world_from_scan, registration, options);
+  out = put_together(context, clouds, world_from_scan, found, registration, options);
+  leave_out_contradicted(context, clouds, registration, options, out);
+  list_changes(world_from_scan, out);
   return out;
 }
 
