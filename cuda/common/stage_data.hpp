@@ -94,10 +94,10 @@ struct SurfaceSides {
 /// Sizes of the closest-point grid of a cloud.
 struct ClosestGridSize {
   std::uint32_t blocks = 0;
-  std::uint32_t bricks = 0;         ///< with candidates, see bricks.cuh
-  std::uint64_t candidates = 0;     ///< of all cells
-  std::uint64_t near_points = 0;    ///< candidates of all blocks, see candidate_lists.cuh
-  std::uint64_t list_units = 0;     ///< of the lists of the cells there
+  std::uint32_t bricks = 0;       ///< with candidates, see bricks.cuh
+  std::uint64_t candidates = 0;   ///< of all cells
+  std::uint64_t near_points = 0;  ///< candidates of all blocks, see candidate_lists.hpp
+  std::uint64_t list_units = 0;   ///< of the lists of the cells there
 };
 
 struct ClosestGrids {
@@ -111,10 +111,10 @@ struct ClosestGrids {
   /// entries before each cloud's, and all; powers of two in between
   std::vector<std::size_t> table_offset;
   DeviceBuffer<CellEntry> table;
-  std::vector<ClosestGridSize> size;      ///< per cloud
-  DeviceBuffer<std::uint32_t> near_start; ///< per block, and all: offsets into near
-  DeviceBuffer<std::uint32_t> near;       ///< the candidates of each block once, ascending
-  DeviceBuffer<std::uint32_t> list_start; ///< per block: first unit of the lists of its cells
+  std::vector<ClosestGridSize> size;       ///< per cloud
+  DeviceBuffer<std::uint32_t> near_start;  ///< per block, and all: offsets into near
+  DeviceBuffer<std::uint32_t> near;        ///< the candidates of each block once, ascending
+  DeviceBuffer<std::uint32_t> list_start;  ///< per block: first unit of the lists of its cells
 };
 
 /// Summaries of the cells of a closest-point grid, see algorithm/cell_summary.hpp and bricks.cuh.
@@ -126,13 +126,13 @@ struct CellSummaries {
   /// rows z, rows y, words x: 32 bricks along x, the first in the highest bit, and 16 times the
   /// number of bricks up to the last of them; then (0, all bricks)
   uint2* run = nullptr;
-  std::uint32_t* brick = nullptr;  ///< bricks x 16 (z, y): codes of eight cells along x
-  std::uint32_t* summary = nullptr;    ///< bricks x 128 (z, y, x)
-  std::uint32_t* list = nullptr;       ///< bricks x 128: candidates, see candidate_lists.cuh
-  uint2* block = nullptr;              ///< bricks: lists of the block of each, packed
-  std::uint32_t* positions = nullptr;  ///< the lists of all cells
-  float4* near = nullptr;              ///< the near lists of all blocks: x, y, z, packed normal
-  std::uint32_t* near_index = nullptr; ///< of these points in the cloud
+  std::uint32_t* brick = nullptr;       ///< bricks x 16 (z, y): codes of eight cells along x
+  std::uint32_t* summary = nullptr;     ///< bricks x 128 (z, y, x)
+  std::uint32_t* list = nullptr;        ///< bricks x 128: candidates, see candidate_lists.hpp
+  uint2* block = nullptr;               ///< bricks: lists of the block of each, packed
+  std::uint32_t* positions = nullptr;   ///< the lists of all cells
+  float4* near = nullptr;               ///< the near lists of all blocks: x, y, z, packed normal
+  std::uint32_t* near_index = nullptr;  ///< of these points in the cloud
 
   /// A brick is a quarter of a block; one block more on each side.
   GPUREG_HD std::uint32_t brick_words_x() const {

@@ -175,8 +175,7 @@ std::vector<std::shared_ptr<CudaCloud>> assemble(
     const float* const narrow_rows = features.values.data() + features.offset[c];
     const float* const wide_rows = wide_features.values.data() + wide_features.offset[c];
     const std::uint32_t wide_dimension = has_wide ? wide_features.dimension[c] : 0;
-    const std::size_t narrow_at =
-        reserve(n * row_stride(cloud->feature_dimension) * sizeof(float));
+    const std::size_t narrow_at = reserve(n * row_stride(cloud->feature_dimension) * sizeof(float));
     const std::size_t wide_at = reserve(n * row_stride(wide_dimension) * sizeof(float));
     if (half_width(cloud->feature_dimension, copy) == 0)
       parts.push_back({reinterpret_cast<const char*>(narrow_rows),

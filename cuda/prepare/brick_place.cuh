@@ -29,8 +29,8 @@ __device__ inline BrickWord brick_word(const CellSummaries& v, Cell block, int c
   const uint2 run = v.run[place.run];
   const auto from_here =
       static_cast<std::uint32_t>(__popc(static_cast<int>(run.x & (place.bit * 2 - 1))));
-  return {run.y - 16 * from_here + static_cast<std::uint32_t>(((cell >> 6) & 3) * 4 +
-                                                              ((cell >> 3) & 3)),
+  return {run.y - 16 * from_here +
+              static_cast<std::uint32_t>(((cell >> 6) & 3) * 4 + ((cell >> 3) & 3)),
           (run.x & place.bit) != 0};
 }
 

@@ -28,8 +28,8 @@ struct Lists {
   std::uint32_t* used;  // 1 for those that are candidates
   // per cell: place in the near list of the point nearest to its centre, or kNoValue
   std::uint32_t* nearest;
-  std::uint32_t* cell_start;  // blocks x 513
-  std::uint32_t* list_start;  // per block; first the counts
+  std::uint32_t* cell_start;   // blocks x 513
+  std::uint32_t* list_start;   // per block; first the counts
   unsigned long long* totals;  // near points of all; most candidates of a block
   const std::size_t* candidate_offset;
   std::uint32_t* candidates;

@@ -141,9 +141,9 @@ __global__ void find_repeated_features(const FeatureSlot* slots) {
 std::size_t feature_aids_bytes(int k, std::size_t size, std::uint32_t dimension, HalfCopy copy) {
   const std::size_t width = half_width(dimension, copy);
   if (width == 0 || dimension == 0) return 0;
-  const std::size_t bytes[FeatureAidsPlaces::kArrays] = {
-      size * width * sizeof(std::uint16_t), size * sizeof(float2), size * sizeof(float),
-      sizeof(float)};
+  const std::size_t bytes[FeatureAidsPlaces::kArrays] = {size * width * sizeof(std::uint16_t),
+                                                         size * sizeof(float2),
+                                                         size * sizeof(float), sizeof(float)};
   return bytes[k];
 }
 

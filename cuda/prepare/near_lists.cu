@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "cuda/prepare/near_lists.hpp"
 
-#include "cuda/common/candidate_lists.cuh"
+#include "cuda/common/candidate_lists.hpp"
 #include "cuda/device/device_algorithms.hpp"
 #include "cuda/device/entry_of.cuh"
 #include "cuda/device/warp.cuh"
@@ -17,9 +17,9 @@ struct Sizes {
 
 /// A thread block per block, a thread per cell. cell_start: still within the block.
 __global__ void __launch_bounds__(kCells)
-    measure(const std::uint32_t* block_offset, std::uint32_t clouds, const std::uint32_t* near_start,
-            const std::uint32_t* used, const std::uint32_t* cell_start, std::uint32_t* list_start,
-            Sizes* sizes) {
+    measure(const std::uint32_t* block_offset, std::uint32_t clouds,
+            const std::uint32_t* near_start, const std::uint32_t* used,
+            const std::uint32_t* cell_start, std::uint32_t* list_start, Sizes* sizes) {
   __shared__ std::uint32_t positions, bricks;
   const std::uint32_t b = blockIdx.x;
   if (threadIdx.x == 0) positions = bricks = 0;
@@ -43,8 +43,7 @@ __global__ void __launch_bounds__(kCells)
   atomicAdd(&s.candidates, static_cast<unsigned long long>(start[kCells]));
   atomicAdd(&s.near_points, static_cast<unsigned long long>(near_points));
   atomicAdd(&s.list_units, static_cast<unsigned long long>(units));
-  atomicAdd(&s.bricks,
-            static_cast<unsigned long long>(__popc(static_cast<int>(bricks))));
+  atomicAdd(&s.bricks, static_cast<unsigned long long>(__popc(static_cast<int>(bricks))));
 }
 
 __global__ void keep_candidates(const std::uint32_t* near, const std::uint32_t* used,

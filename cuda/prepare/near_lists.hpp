@@ -4,7 +4,7 @@
 #include "cuda/common/stage_data.hpp"
 #include "cuda/device/exec.hpp"
 
-/// Near lists of the blocks of closest-point grids, see candidate_lists.cuh. Part of
+/// Near lists of the blocks of closest-point grids, see candidate_lists.hpp. Part of
 /// build_closest_grids().
 namespace gpureg::cuda {
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <cub/block/block_scan.cuh>
 
-#include "cuda/common/candidate_lists.cuh"
+#include "cuda/common/candidate_lists.hpp"
 #include "cuda/common/packed_normal.cuh"
 #include "cuda/prepare/brick_place.cuh"
 #include "cuda/prepare/scoring_data.hpp"
@@ -35,8 +35,7 @@ __global__ void __launch_bounds__(kCells) write_lists(const ScoringSlot* slots) 
     const std::uint32_t* near = s.near + s.near_start[b];
     const std::uint32_t count = start[1] - start[0],
                         near_points = s.near_start[b + 1] - s.near_start[b],
-                        size = position_size(near_points),
-                        unit = s.list_start[b] - s.list_start[0];
+                        size = position_size(near_points), unit = s.list_start[b] - s.list_start[0];
     std::uint32_t first;
     __syncthreads();
     Scan(storage).ExclusiveSum(list_room(count, size), first);

@@ -6,7 +6,7 @@
 #include <numeric>
 
 #include "algorithm/cell_summary.hpp"
-#include "cuda/common/candidate_lists.cuh"
+#include "cuda/common/candidate_lists.hpp"
 #include "cuda/common/packed_normal.cuh"
 #include "cuda/device/device_algorithms.hpp"
 #include "cuda/prepare/brick_place.cuh"
@@ -118,7 +118,8 @@ __device__ std::uint32_t morton(std::uint32_t x, std::uint32_t y, std::uint32_t 
   return spread(x) | spread(y) << 1 | spread(z) << 2;
 }
 
-__global__ void write_morton_keys(const ScoringSlot* slots, std::uint64_t* keys, std::uint32_t* index) {
+__global__ void write_morton_keys(const ScoringSlot* slots, std::uint64_t* keys,
+                                  std::uint32_t* index) {
   const ScoringSlot& s = slots[blockIdx.y];
   const float scale = 511.0f / s.view.radius;
   for (std::uint32_t i = blockIdx.x * blockDim.x + threadIdx.x; i < s.view.size;
@@ -169,8 +170,7 @@ ScoringLayout scoring_layout(std::uint32_t points, const ClosestGridSize& size,
   shape.ny = static_cast<std::int32_t>(ny);
   shape.nz = static_cast<std::int32_t>(nz);
   // A large map may have a large table: up to 64 places for each of its blocks.
-  const std::uint64_t most_blocks =
-                          std::max(kMaxSummaryBlocks, kPlacesPerBlock * size.blocks),
+  const std::uint64_t most_blocks = std::max(kMaxSummaryBlocks, kPlacesPerBlock * size.blocks),
                       most_runs = std::max(kMaxSummaryBlocks, kRunsPerBlock * size.blocks);
   const bool fits = nx <= kMaxBlocksAlong && ny <= kMaxBlocksAlong && nz <= kMaxBlocksAlong &&
                     size.blocks <= kMaxNumberedBlocks && nx * ny <= most_blocks &&
@@ -185,8 +185,8 @@ ScoringLayout scoring_layout(std::uint32_t points, const ClosestGridSize& size,
     l.bytes += (bytes + 255) / 256 * 256;
     return at;
   };
-  const std::size_t padded = (points + std::size_t(31)) / 32 * 32,
-                    bricks = fits ? size.bricks : 0, near = fits ? size.near_points : 0;
+  const std::size_t padded = (points + std::size_t(31)) / 32 * 32, bricks = fits ? size.bricks : 0,
+                    near = fits ? size.near_points : 0;
   l.near = take(near * sizeof(float4));
   l.near_index = take(near * sizeof(std::uint32_t));
   // Reading a list goes up to a word beyond its end.

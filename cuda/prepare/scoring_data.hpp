@@ -43,7 +43,7 @@ struct ScoringSlot {
   std::uint32_t point_offset;                    ///< in the batch
 };
 
-/// Packs the candidates of all cells, see candidate_lists.cuh. Part of fill_scoring_data(), after
+/// Packs the candidates of all cells, see candidate_lists.hpp. Part of fill_scoring_data(), after
 /// the bricks have numbers.
 void pack_lists(Exec& exec, const DeviceBuffer<ScoringSlot>& slots);
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Closest points by the packed lists of the device: the point, its distance and its normal are those
-// of the CPU's closest-point grid, whatever the size of the positions in the near lists.
-#include "cuda/common/candidate_lists.cuh"
+// Closest points by the packed lists of the device: the point, its distance and its normal are
+// those of the CPU's closest-point grid, whatever the size of the positions in the near lists.
+#include "cuda/common/candidate_lists.hpp"
 #include "cuda/common/stages.hpp"
 #include "cuda/find_points.hpp"
 #include "cuda/gpu.hpp"
@@ -38,8 +38,7 @@ class ClosestCells : public ::testing::Test {
     on_cuda.begin();
     const RawCloud raw = test::raw_cloud(points);
     const auto expected = test::prepare_one(on_cpu, raw, options);
-    const auto cloud =
-        pipeline::prepare(on_cuda, Span<const RawCloud>{&raw, 1}, options).front();
+    const auto cloud = pipeline::prepare(on_cuda, Span<const RawCloud>{&raw, 1}, options).front();
     const float reach = options.max_correspondence_distance;
     const auto queries = locations(expected->points, reach);
     for (const float distance : {reach, 0.3f * reach}) {
@@ -76,8 +75,8 @@ TEST_F(ClosestCells, ALatticeOfPoints) {
   for (int x = 0; x < 30; ++x)
     for (int y = 0; y < 30; ++y)
       for (int z = 0; z < 3; ++z)
-        lattice.push_back(Vec3{static_cast<float>(x), static_cast<float>(y),
-                               static_cast<float>(z)} * 0.0625f);
+        lattice.push_back(
+            Vec3{static_cast<float>(x), static_cast<float>(y), static_cast<float>(z)} * 0.0625f);
   std::shuffle(lattice.begin(), lattice.end(), random);
   options.voxel_size = 0;
   EXPECT_GT(expect_same_points(lattice).bricks[0], 0u);

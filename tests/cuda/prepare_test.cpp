@@ -176,8 +176,7 @@ void expect_same_preparation(const std::vector<RawCloud>& raw, const PrepareOpti
     if (assembled[c]->summaries.nx > 0) {
       const cuda::CellSummaries& cells = assembled[c]->summaries;
       ASSERT_EQ(assembled[c]->view_on_device.closest.candidates.size, 0u);
-      ASSERT_EQ(host(on_cuda, cells.run + cells.brick_runs(), 1)[0].y,
-                cuda_closest.size[c].bricks);
+      ASSERT_EQ(host(on_cuda, cells.run + cells.brick_runs(), 1)[0].y, cuda_closest.size[c].bricks);
     }
     ASSERT_TRUE(same_bytes(cpu_points[c].points, assembled[c]->copy_points()));
     ASSERT_TRUE(same_bytes(cpu_normals[c], assembled[c]->copy_normals()));

@@ -8,9 +8,7 @@
 namespace gpureg::cuda {
 namespace {
 
-ScoringLayout layout_of(Cell lo, Cell hi) {
-  return scoring_layout(2, {2, 3, 2, 2, 1}, {lo, hi});
-}
+ScoringLayout layout_of(Cell lo, Cell hi) { return scoring_layout(2, {2, 3, 2, 2, 1}, {lo, hi}); }
 
 TEST(ScoringLayout, HasATableForARoom) {
   const ScoringLayout l = layout_of({-8, -7, -3}, {8, 6, 12});
@@ -43,7 +41,8 @@ TEST(ScoringLayout, CountsCellsIn22BitsAlongEveryAxis) {
             map.near_points * 20 + map.list_units * 8 + std::uint64_t(map.bricks) * 128 * 8);
   EXPECT_EQ(layout_of(building.lo, building.hi).nx, 0);
   map.blocks = (1 << 25) + 1;
-  EXPECT_EQ(scoring_layout(kPoints, map, building).nx, 0) << "its words are not numbered in 32 bits";
+  EXPECT_EQ(scoring_layout(kPoints, map, building).nx, 0)
+      << "its words are not numbered in 32 bits";
   const Cell far{1 << 20, 1 << 20, 1 << 20};
   EXPECT_EQ(layout_of({-(1 << 20), -(1 << 20), -(1 << 20)}, far).nx, 0);
 }
