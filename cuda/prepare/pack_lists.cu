@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include <algorithm>
+
 #include <cub/block/block_scan.cuh>
 
 #include "cuda/common/candidate_lists.hpp"
@@ -87,9 +89,11 @@ __global__ void copy_near_points(const ScoringSlot* slots) {
 
 }  // namespace
 
-void pack_lists(Exec& exec, const DeviceBuffer<ScoringSlot>& slots) {
+void pack_lists(Exec& exec, const DeviceBuffer<ScoringSlot>& slots, std::uint32_t most_blocks) {
+  constexpr std::uint32_t kMostThreadBlocks = 1024;  // of a cloud
   const unsigned count = static_cast<unsigned>(slots.size());
-  write_lists<<<dim3(256, count), kCells, 0, exec.stream()>>>(slots.data());
+  write_lists<<<dim3(std::max(1u, std::min(most_blocks, kMostThreadBlocks)), count), kCells, 0,
+                exec.stream()>>>(slots.data());
   check_launch("write_lists");
   copy_near_points<<<dim3(64, count), 256, 0, exec.stream()>>>(slots.data());
   check_launch("copy_near_points");

@@ -266,7 +266,7 @@ void fill_scoring_data(Exec& exec, const std::vector<std::shared_ptr<CudaCloud>>
   check_launch("number_bricks");
   summarize<<<dim3(128, count), 256, 0, exec.stream()>>>(on_device.data(), tables.data());
   check_launch("summarize");
-  pack_lists(exec, on_device);
+  pack_lists(exec, on_device, grids.blocks.largest);
   write_morton_keys<<<dim3(16, count), 256, 0, exec.stream()>>>(on_device.data(), keys.data(),
                                                                 index.data());
   check_launch("write_morton_keys");

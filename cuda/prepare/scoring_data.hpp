@@ -44,7 +44,7 @@ struct ScoringSlot {
 };
 
 /// Packs the candidates of all cells, see candidate_lists.hpp. Part of fill_scoring_data(), after
-/// the bricks have numbers.
-void pack_lists(Exec& exec, const DeviceBuffer<ScoringSlot>& slots);
+/// the bricks have numbers. most_blocks: of a cloud.
+void pack_lists(Exec& exec, const DeviceBuffer<ScoringSlot>& slots, std::uint32_t most_blocks);
 
 }  // namespace gpureg::cuda

@@ -82,9 +82,26 @@ TEST_F(ClosestCells, ALatticeOfPoints) {
   EXPECT_GT(expect_same_points(lattice).bricks[0], 0u);
 }
 
+// All points of a sphere are candidates of the cells around its centre.
+TEST_F(ClosestCells, LongListsOfOneByte) {
+  std::vector<Vec3> sphere;
+  for (int k = 0; k < 128; ++k) {
+    const Vec3 p = test::random_unit(random) * 0.12f;
+    sphere.push_back(p);
+    sphere.push_back(p * -1.0f);
+  }
+  options.voxel_size = 0;
+  options.max_correspondence_distance = 0.16f;
+  const ListCounts counts = expect_same_points(sphere);
+  EXPECT_EQ(counts.bricks[1] + counts.bricks[2], 0u);
+  EXPECT_GT(counts.long_lists, 0u);
+}
+
 TEST_F(ClosestCells, PositionsOfTwoBytesAndLongLists) {
+  options = RegistrationOptions::from_voxel_size(0.03f).prepare;
   options.max_correspondence_distance = 0.4f;
-  const ListCounts counts = expect_same_points(test::bumpy_sheet(random, 40'000, 3.0f));
+  const ListCounts counts = expect_same_points(test::bumpy_sheet(random, 100'000, 3.0f));
+  EXPECT_GT(counts.bricks[0], 10u);
   EXPECT_GT(counts.bricks[1], 10u);
   EXPECT_GT(counts.long_lists, 10u);
 }

@@ -18,8 +18,8 @@ struct Found {
 std::vector<Found> find_points(cuda::Exec& exec, const cuda::CudaCloud& cloud,
                                const std::vector<Vec3>& locations, float max_squared);
 
-/// Positions of this size (see position_size()) in the near lists of the cloud's bricks, and the
-/// number of cells with a list of kLongList or more.
+/// Number of bricks by the size of the positions in their lists, see position_size(), and of cells
+/// with kLongList candidates or more.
 struct ListCounts {
   std::size_t bricks[3] = {0, 0, 0};
   std::size_t long_lists = 0;
