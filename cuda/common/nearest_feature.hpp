@@ -104,7 +104,7 @@ constexpr std::uint32_t kAxisPlace = 29, kTurnedWidth = 32;
 GPUREG_HD std::uint32_t half_width(std::uint32_t dimension, HalfCopy copy) {
   return copy == HalfCopy::turned ? kTurnedWidth : dimension <= 64 ? (dimension + 15) / 16 * 16 : 0;
 }
-/// The same for the rows of exact distances.
+/// Width of the rows for exact distances, padded with zeros. 0: too many dimensions.
 GPUREG_HD std::uint32_t padded_width(std::uint32_t dimension) {
   return dimension > 64                      ? 0
          : dimension > 32 && dimension <= 36 ? 36

@@ -2,6 +2,7 @@
 // Closest points by the packed lists of the device: the point, its distance and its normal are
 // those of the CPU's closest-point grid, whatever the size of the positions in the near lists.
 #include "cuda/common/candidate_lists.hpp"
+#include "cuda/common/prepared_cloud.hpp"
 #include "cuda/common/stages.hpp"
 #include "cuda/find_points.hpp"
 #include "cuda/gpu.hpp"
@@ -31,35 +32,48 @@ class ClosestCells : public ::testing::Test {
     return out;
   }
 
-  /// Compares a cloud of both backends; returns the kinds of its lists.
+  void expect_same(cuda::Exec& exec, const cpu::CpuCloud& expected, const cuda::CudaCloud& cloud,
+                   const std::vector<Vec3>& queries, float distance) {
+    const auto found = test::find_points(exec, cloud, queries, distance * distance);
+    std::size_t hits = 0;
+    for (std::size_t k = 0; k < queries.size() && !HasFailure(); ++k) {
+      const Closest c = find_closest(expected.view().closest, expected.points.data(), queries[k],
+                                     distance * distance);
+      EXPECT_EQ(found[k].index, c.index) << k;
+      EXPECT_EQ(found[k].squared_distance, c.squared_distance) << k;
+      EXPECT_TRUE(found[k].normal_is_packed) << k;
+      if (c.index == kNoValue) continue;
+      ++hits;
+      EXPECT_EQ(std::memcmp(&found[k].point, &expected.points[c.index], sizeof(Vec3)), 0) << k;
+    }
+    EXPECT_GT(hits, queries.size() / 4);
+  }
+
+  /// Compares a cloud of both backends, also after an eviction; returns the kinds of its lists.
   ListCounts expect_same_points(const std::vector<Vec3>& points) {
     cpu::Exec on_cpu(2);
     cuda::Exec on_cuda(0);
     on_cuda.begin();
     const RawCloud raw = test::raw_cloud(points);
     const auto expected = test::prepare_one(on_cpu, raw, options);
-    const auto cloud = pipeline::prepare(on_cuda, Span<const RawCloud>{&raw, 1}, options).front();
+    std::shared_ptr<const cuda::CudaCloud> cloud =
+        pipeline::prepare(on_cuda, Span<const RawCloud>{&raw, 1}, options).front();
+    bytes_per_point = cloud->data.size() / cloud->size;
     const float reach = options.max_correspondence_distance;
     const auto queries = locations(expected->points, reach);
-    for (const float distance : {reach, 0.3f * reach}) {
-      const auto found = test::find_points(on_cuda, *cloud, queries, distance * distance);
-      std::size_t hits = 0;
-      for (std::size_t k = 0; k < queries.size(); ++k) {
-        const Closest c = find_closest(expected->view().closest, expected->points.data(),
-                                       queries[k], distance * distance);
-        EXPECT_EQ(found[k].index, c.index) << k;
-        EXPECT_EQ(found[k].squared_distance, c.squared_distance) << k;
-        EXPECT_TRUE(found[k].normal_is_packed) << k;
-        if (c.index != kNoValue) EXPECT_EQ(found[k].point.x, expected->points[c.index].x);
-        hits += c.index != kNoValue;
-        if (HasFailure()) return {};
-      }
-      EXPECT_GT(hits, queries.size() / 4);
-    }
-    return test::count_lists(on_cuda, *cloud);
+    for (const float distance : {reach, 0.3f * reach})
+      expect_same(on_cuda, *expected, *cloud, queries, distance);
+    const ListCounts counts = test::count_lists(on_cuda, *cloud);
+    const cuda::PreparedCloud prepared(std::move(cloud));
+    EXPECT_TRUE(prepared.evict(*on_cuda.memory()));
+    const auto returned = prepared.start_copy(on_cuda);
+    on_cuda.synchronize();
+    expect_same(on_cuda, *expected, *returned, queries, reach);
+    return counts;
   }
 
   std::mt19937 random{11};
+  std::size_t bytes_per_point = 0;
   PrepareOptions options = RegistrationOptions::from_voxel_size(0.05f).prepare;
 };
 
@@ -67,6 +81,8 @@ TEST_F(ClosestCells, PositionsOfOneByte) {
   const ListCounts counts = expect_same_points(test::bumpy_sheet(random, 40'000, 3.0f));
   EXPECT_GT(counts.bricks[0], 100u);
   EXPECT_EQ(counts.bricks[1] + counts.bricks[2], 0u);
+  // 1.13 KB by the sizes of the arrays, of which the features take 440.
+  EXPECT_LT(bytes_per_point, 1250u);
 }
 
 // Equal distances everywhere: the lower index wins.
