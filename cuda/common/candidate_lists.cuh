@@ -23,9 +23,10 @@ struct ClosestCandidate {
 __device__ inline ClosestCandidate closest_in_list(const CellSummaries& cells, std::uint32_t brick,
                                                    std::uint32_t word, Vec3 q) {
   constexpr std::uint32_t kAtOnce = 4;  // loads in flight hide the latency of memory
+  // Before the word is read: both loads are in flight.
+  const BlockLists lists = lists_of_brick(cells, brick);
   std::uint32_t count = word & 255u, first = word >> 8;
   if (count == 0) return {3.402823466e38f, kNoValue};
-  const BlockLists lists = lists_of_brick(cells, brick);
   const bool in_word = fits_word(count, lists.size);
   if (count == kLongList) {
     count = __ldg(lists.words + (first << lists.size) / 4);
