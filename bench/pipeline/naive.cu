@@ -8,6 +8,7 @@
 #include "algorithm/fit.hpp"
 #include "algorithm/inlier.hpp"
 #include "algorithm/quadruple.hpp"
+#include "cuda/common/nearest_feature.hpp"
 #include "cuda/common/prepared_cloud.hpp"
 #include "gpureg/error.hpp"
 
@@ -24,13 +25,13 @@ __global__ void match(CloudView source, CloudView target, MatchedPoints* matches
                       std::uint32_t* count) {
   const std::uint32_t i = blockIdx.x * blockDim.x + threadIdx.x;
   if (i >= source.size || !source.has_feature[i]) return;
-  const std::uint32_t dimension = source.feature_dimension;
-  const float* query = source.features + static_cast<std::size_t>(i) * dimension;
+  const std::uint32_t dimension = source.feature_dimension, stride = cuda::row_stride(dimension);
+  const float* query = source.features + static_cast<std::size_t>(i) * stride;
   float best = 3.402823466e38f;
   std::uint32_t nearest = kNoValue;
   for (std::uint32_t j = 0; j < target.size; ++j) {
     if (!target.has_feature[j]) continue;
-    const float* row = target.features + static_cast<std::size_t>(j) * dimension;
+    const float* row = target.features + static_cast<std::size_t>(j) * stride;
     float sum = 0.0f;
     for (std::uint32_t d = 0; d < dimension; ++d)
       sum = fmaf(query[d] - row[d], query[d] - row[d], sum);
@@ -143,12 +144,20 @@ Naive::Naive(std::size_t most_points, const RegistrationOptions& options)
     : options_(options), arrays_(std::make_unique<Arrays>(most_points, options.quadruples.count)) {}
 Naive::~Naive() = default;
 
+const ClosestGridView& Naive::grid_of(const PreparedState& cloud) {
+  std::unique_ptr<HashGrid>& grid = grids_[&cloud];
+  if (!grid) grid = std::make_unique<HashGrid>(cloud);
+  return grid->view();
+}
+
 NaiveResult Naive::align(const PreparedState& source_state, const PreparedState& target_state) {
   const auto source_copy = static_cast<const cuda::PreparedCloud&>(source_state).on(0),
              target_copy = static_cast<const cuda::PreparedCloud&>(target_state).on(0);
   if (!source_copy || !target_copy)
     throw InvalidArgument("the naive mode wants both clouds on device 0");
   CloudView source = source_copy->view_on_device, target = target_copy->view_on_device;
+  source.closest = grid_of(source_state);
+  target.closest = grid_of(target_state);
   if (options_.smaller_as_source && target.size < source.size) std::swap(source, target);
   Arrays& a = *arrays_;
   const QuadrupleOptions& o = options_.quadruples;

@@ -2,10 +2,12 @@
 #pragma once
 
 #include <memory>
+#include <unordered_map>
 #include <vector>
 
 #include "algorithm/support.hpp"
 #include "gpureg/options.hpp"
+#include "hash_grid.hpp"
 #include "pipeline/engine.hpp"
 
 namespace gpureg::bench {
@@ -24,12 +26,15 @@ class Naive {
   Naive(std::size_t most_points, const RegistrationOptions& options);
   ~Naive();
   NaiveResult align(const PreparedState& source, const PreparedState& target);
+  /// Grid of a cloud, part of its preparation: the first call makes it, which takes long.
+  const ClosestGridView& grid_of(const PreparedState& cloud);
 
  private:
   struct Arrays;
   RegistrationOptions options_;
   std::unique_ptr<Arrays> arrays_;
   std::vector<Support> supports_;
+  std::unordered_map<const PreparedState*, std::unique_ptr<HashGrid>> grids_;
 };
 
 }  // namespace gpureg::bench

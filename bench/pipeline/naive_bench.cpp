@@ -22,6 +22,7 @@ void paper_mode(benchmark::State& state) {
   std::size_t most = 0;
   for (const PreparedCloud& cloud : clouds) most = std::max(most, cloud.size());
   Naive naive(most, options);
+  for (const PreparedCloud& cloud : clouds) naive.grid_of(*Access::state(cloud));
   naive.align(*Access::state(clouds[pairs[0].source]), *Access::state(clouds[pairs[0].target]));
   std::vector<double> ms;
   for (auto _ : state) {

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "cuda/common/bricks.cuh"
+#include "cuda/common/candidate_lists.cuh"
 #include "cuda/common/packed_normal.cuh"
 #include "cuda/common/stage_data.hpp"
 #include "cuda/device/exec.hpp"
@@ -35,22 +36,23 @@ struct FoundPoint {
   float squared_distance;
   Vec3 point;
   std::uint32_t normal;  ///< packed
-  std::uint32_t place;   ///< among the candidates of all cells; kNoValue: no point
+  std::uint32_t place;   ///< in the near lists; kNoValue: no point
   std::uint32_t index;   ///< of the point, where there is no place
 
   __device__ bool found() const { return (place & index) != kNoValue; }
-  __device__ std::uint32_t index_in(const CloudView& cloud) const {
-    return place == kNoValue ? index : __ldg(cloud.closest.candidates.data + place);
+  __device__ std::uint32_t index_in(const CellSummaries& cells) const {
+    return place == kNoValue ? index : __ldg(cells.near_index + place);
   }
   /// normals_agree() of a moved normal and that of the point. The packed normal decides unless the
   /// cosine is near the limit.
-  __device__ bool agrees(const CloudView& cloud, Vec3 moved, float min_cosine) const {
+  __device__ bool agrees(const CloudView& cloud, const CellSummaries& cells, Vec3 moved,
+                         float min_cosine) const {
     if (min_cosine <= -1.0f) return true;
     if (normal == kPackedZero || is_zero(moved)) return false;
     const float off = dot(moved, unpack_normal(normal)) - min_cosine;
     return fabsf(off) > kHalfPackedCosineError
                ? off > 0.0f
-               : normals_agree(moved, cloud.normals[index_in(cloud)], min_cosine);
+               : normals_agree(moved, cloud.normals[index_in(cells)], min_cosine);
   }
 };
 
@@ -63,8 +65,7 @@ static __device__ __noinline__ FoundPoint found_by_hash(const CloudView& cloud, 
           c.index};
 }
 
-/// find_closest() with a table of bricks instead of a hash table, on contiguous copies of the
-/// candidates. Lists of any length, anywhere in the array.
+/// find_closest() with a table of bricks instead of a hash table.
 __device__ inline FoundPoint find_point(const CloudView& cloud, const CellSummaries& cells, Vec3 q,
                                         float max_squared) {
   if (cells.nx == 0) return found_by_hash(cloud, q, max_squared);
@@ -85,47 +86,21 @@ __device__ inline FoundPoint find_point(const CloudView& cloud, const CellSummar
   if (!inside(c.x, cells.nx) || !inside(c.y, cells.ny) || !inside(c.z, cells.nz)) return none;
   const BrickWord word = BrickTable(cells, 0).find(c, cells.run);
   if (!word.there) return none;
-  const std::uint32_t list = __ldg(&cells.cell[cell_in_bricks(word, c)].y);
-  std::uint32_t first = list >> 8, last = first + (list & 255u);
-  if (list == kNoValue) {
-    // The block gives the ends of any list. The table begins at a block, so the low bits of a cell
-    // are those of the closest-point grid.
-    const std::uint32_t* start = cloud.closest.cell_start.data +
-                                 static_cast<std::size_t>(__ldg(cells.block + word.number / 16)) *
-                                     (ClosestGridView::kBlockCells + 1) +
-                                 ((c.z & 7) << 6 | (c.y & 7) << 3 | (c.x & 7));
-    first = __ldg(start);
-    last = __ldg(start + 1);
-  }
-  constexpr std::uint32_t kAtOnce = 4;  // loads in flight hide the latency of memory
-  std::uint32_t best = kNoValue;
-  float best_squared = 3.402823466e38f;
-#pragma unroll 1
-  for (std::uint32_t k = first; k < last; k += kAtOnce) {
-    Vec3 c[kAtOnce];
-#pragma unroll
-    for (std::uint32_t i = 0; i < kAtOnce; ++i) {
-      const float4 one = __ldg(cells.candidate + min(k + i, last - 1));
-      c[i] = {one.x, one.y, one.z};
-    }
-#pragma unroll
-    for (std::uint32_t i = 0; i < kAtOnce; ++i) {
-      // The last one repeats, which changes nothing.
-      const float d2 = squared_norm(c[i] - q);
-      const bool less = d2 < best_squared;
-      best = less ? k + i : best;
-      best_squared = less ? d2 : best_squared;
-    }
-  }
-  if (best == kNoValue || !(best_squared <= max_squared)) return none;
-  const float4 c4 = __ldg(cells.candidate + best);  // read a moment ago
-  return {best_squared, {c4.x, c4.y, c4.z}, __float_as_uint(c4.w), best, kNoValue};
+  const ClosestCandidate best =
+      closest_in_list(cells, word.number / 16, __ldg(cells.list + cell_in_bricks(word, c)), q);
+  if (best.place == kNoValue || !(best.squared_distance <= max_squared)) return none;
+  const float4 near = __ldg(cells.near + best.place);  // read a moment ago
+  return {best.squared_distance,
+          {near.x, near.y, near.z},
+          __float_as_uint(near.w),
+          best.place,
+          kNoValue};
 }
 
 __device__ inline Closest find_closest(const CloudView& cloud, const CellSummaries& cells, Vec3 q,
                                        float max_squared) {
   const FoundPoint best = find_point(cloud, cells, q, max_squared);
-  return best.found() ? Closest{best.index_in(cloud), best.squared_distance}
+  return best.found() ? Closest{best.index_in(cells), best.squared_distance}
                       : Closest{kNoValue, max_squared};
 }
 

@@ -17,8 +17,6 @@ inline FeatureQuery make_query(const CloudView& from, const FeatureAids& a, cons
   query.query_half = a.copy == b.copy ? a.half : nullptr;
   query.row_half = b.half;
   query.copy = b.copy;
-  query.query_padded = a.padded;
-  query.row_padded = b.padded;
   query.query_error = a.error;
   query.row_square = b.square;
   query.query_scale = a.scale;

@@ -26,7 +26,7 @@ __global__ void __launch_bounds__(kThreads)
   __shared__ float q_tile[kDims][kQueries + 4];
   __shared__ float r_tile[kDims][kRows + 4];
   const FeatureQuery f = batch[blockIdx.z];
-  const std::uint32_t q_begin = blockIdx.x * kQueries;
+  const std::uint32_t q_begin = blockIdx.x * kQueries, stride = row_stride(f.dimension);
   const std::uint32_t r_first = blockIdx.y * rows_per_part,
                       r_last = min(f.row_count, r_first + rows_per_part);
   if (q_begin >= f.query_count || r_first >= f.row_count) return;
@@ -47,14 +47,14 @@ __global__ void __launch_bounds__(kThreads)
         const std::uint32_t q = q_begin + static_cast<std::uint32_t>(row);
         if (d < dims)
           q_tile[d][row] =
-              q < f.query_count ? f.queries[std::size_t(f.row_of(q)) * f.dimension + d0 + d] : 0.0f;
+              q < f.query_count ? f.queries[std::size_t(f.row_of(q)) * stride + d0 + d] : 0.0f;
       }
       for (int k = static_cast<int>(threadIdx.x); k < kRows * kDims; k += kThreads) {
         const int row = k / kDims, d = k % kDims;
         const std::uint32_t r = r_begin + static_cast<std::uint32_t>(row);
         if (d < dims)
           r_tile[d][row] =
-              r < r_last ? f.rows[static_cast<std::size_t>(r) * f.dimension + d0 + d] : 0.0f;
+              r < r_last ? f.rows[static_cast<std::size_t>(r) * stride + d0 + d] : 0.0f;
       }
       __syncthreads();
       for (int d = 0; d < dims; ++d) {
@@ -105,12 +105,13 @@ __global__ void __launch_bounds__(128)
   const FeatureQuery f = batch[blockIdx.y];
   const std::uint32_t q = blockIdx.x * 4 + threadIdx.x / 32, lane = threadIdx.x % 32;
   if (q >= f.query_count) return;
-  const float* query = f.queries + static_cast<std::size_t>(f.row_of(q)) * f.dimension;
+  const std::uint32_t stride = row_stride(f.dimension);
+  const float* query = f.queries + static_cast<std::size_t>(f.row_of(q)) * stride;
   unsigned long long best[limits::kMaxNeighbors];
   for (auto& b : best) b = kNone;
   for (std::uint32_t r = lane; r < f.row_count; r += 32) {
     if (!f.row_valid[r]) continue;
-    const float* row = f.rows + static_cast<std::size_t>(r) * f.dimension;
+    const float* row = f.rows + static_cast<std::size_t>(r) * stride;
     float sum = 0.0f;
     for (std::uint32_t d = 0; d < f.dimension; ++d) {
       const float difference = query[d] - row[d];

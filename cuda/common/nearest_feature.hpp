@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <algorithm>
 #include <vector>
 
 #include "algorithm/fpfh.hpp"
@@ -11,7 +12,7 @@ namespace gpureg::cuda {
 
 /// Search of the features of one cloud in those of another; all pointers on the device.
 struct FeatureQuery {
-  const float* queries;
+  const float* queries;  ///< rows of row_stride() floats
   const std::uint8_t* query_valid;
   const std::uint32_t* query_row;  ///< row of each query; null: query k is row k
   std::uint32_t query_count;
@@ -22,7 +23,6 @@ struct FeatureQuery {
   std::uint32_t out;                           ///< first element of its results
   const std::uint16_t *query_half, *row_half;  ///< see FeatureAids; null: not made
   HalfCopy copy;                               ///< of both
-  const float *query_padded, *row_padded;
   const float* query_error;
   const float2* row_square;
   const float *query_scale, *row_scale;
@@ -101,14 +101,32 @@ constexpr std::uint32_t kAxisPlace = 29, kTurnedWidth = 32;
 
 /// Features for the tensor cores: rows padded with zeros to this width, zero where not valid. 0:
 /// too many dimensions.
-inline std::uint32_t half_width(std::uint32_t dimension, HalfCopy copy) {
+GPUREG_HD std::uint32_t half_width(std::uint32_t dimension, HalfCopy copy) {
   return copy == HalfCopy::turned ? kTurnedWidth : dimension <= 64 ? (dimension + 15) / 16 * 16 : 0;
 }
-/// The same for the rows of exact distances.
-inline std::uint32_t padded_width(std::uint32_t dimension) {
+/// Width of the rows for exact distances, padded with zeros. 0: too many dimensions.
+GPUREG_HD std::uint32_t padded_width(std::uint32_t dimension) {
   return dimension > 64                      ? 0
          : dimension > 32 && dimension <= 36 ? 36
                                              : half_width(dimension, HalfCopy::plain);
+}
+
+/// Floats between the rows of features on the device: they are filled up with zeros where the
+/// filter reads them.
+GPUREG_HD std::uint32_t row_stride(std::uint32_t dimension) {
+  const std::uint32_t padded = padded_width(dimension);
+  return padded > 0 ? padded : dimension;
+}
+/// The rows without the zeros between them.
+inline std::vector<float> tight_rows(std::vector<float> rows, std::uint32_t dimension) {
+  const std::uint32_t stride = row_stride(dimension);
+  if (stride == dimension) return rows;
+  const std::size_t size = rows.size() / stride;
+  for (std::size_t i = 0; i < size; ++i)
+    std::copy_n(rows.begin() + static_cast<std::ptrdiff_t>(i * stride), dimension,
+                rows.begin() + static_cast<std::ptrdiff_t>(i * dimension));
+  rows.resize(size * dimension);
+  return rows;
 }
 
 /// True where filter_nearest() was compiled for tensor cores with float32 sums: architecture 8.0.

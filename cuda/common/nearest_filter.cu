@@ -91,10 +91,10 @@ __device__ void load_rows(std::uint32_t (&b)[2 * kSteps], const std::uint32_t* t
 template <int kWidth>
 __device__ void measure(const FeatureQuery& f, std::uint32_t q, std::uint32_t r,
                         unsigned long long* best) {
-  const float4* query = reinterpret_cast<const float4*>(
-      f.query_padded + static_cast<std::size_t>(f.row_of(q)) * kWidth);
+  const float4* query =
+      reinterpret_cast<const float4*>(f.queries + static_cast<std::size_t>(f.row_of(q)) * kWidth);
   const float4* row =
-      reinterpret_cast<const float4*>(f.row_padded + static_cast<std::size_t>(r) * kWidth);
+      reinterpret_cast<const float4*>(f.rows + static_cast<std::size_t>(r) * kWidth);
   float sum = 0.0f;
   const auto add = [&](float a, float b) {
     const float difference = a - b;

@@ -3,6 +3,8 @@
 
 #include <algorithm>
 
+#include "cuda/common/nearest_feature.hpp"
+
 namespace gpureg::cuda {
 namespace {
 
@@ -41,13 +43,15 @@ CloudArrays CloudArrays::moved(const char* from, char* to) const {
   move(v.closest.table.data);
   move(v.closest.cell_start.data);
   move(v.closest.candidates.data);
-  move(out.blocks);
   CellSummaries& s = out.summaries;
   move(s.run);
   move(s.brick);
-  move(s.cell);
+  move(s.summary);
+  move(s.list);
   move(s.block);
-  move(s.candidate);
+  move(s.positions);
+  move(s.near);
+  move(s.near_index);
   move(out.order.point);
   move(out.order.normal);
   move(out.order.index);
@@ -59,7 +63,6 @@ CloudArrays CloudArrays::moved(const char* from, char* to) const {
   move(v.surface_sides.words);
   for (FeatureAids* aids : {&out.narrow_aids, &out.wide_aids}) {
     move(aids->half);
-    move(aids->padded);
     move(aids->square);
     move(aids->error);
     move(aids->scale);
@@ -161,8 +164,9 @@ std::vector<Vec3> PreparedCloud::copy_normals() const {
 std::vector<float> PreparedCloud::copy_features() const {
   const auto copy = any();
   return copy ? copy->copy_features()
-              : copied(host_arrays_.view_on_device.features,
-                       static_cast<std::size_t>(size) * feature_dimension);
+              : tight_rows(copied(host_arrays_.view_on_device.features,
+                                  std::size_t(size) * row_stride(feature_dimension)),
+                           feature_dimension);
 }
 
 }  // namespace gpureg::cuda

@@ -91,6 +91,15 @@ struct SurfaceSides {
   DeviceBuffer<std::uint32_t> words;
 };
 
+/// Sizes of the closest-point grid of a cloud.
+struct ClosestGridSize {
+  std::uint32_t blocks = 0;
+  std::uint32_t bricks = 0;       ///< with candidates, see bricks.cuh
+  std::uint64_t candidates = 0;   ///< of all cells
+  std::uint64_t near_points = 0;  ///< candidates of all blocks, see candidate_lists.hpp
+  std::uint64_t list_units = 0;   ///< of the lists of the cells there
+};
+
 struct ClosestGrids {
   std::vector<ClosestGeometry> geometry;      ///< per cloud
   std::vector<CellRange> block_range;         ///< per cloud: no block is outside
@@ -102,6 +111,10 @@ struct ClosestGrids {
   /// entries before each cloud's, and all; powers of two in between
   std::vector<std::size_t> table_offset;
   DeviceBuffer<CellEntry> table;
+  std::vector<ClosestGridSize> size;       ///< per cloud
+  DeviceBuffer<std::uint32_t> near_start;  ///< per block, and all: offsets into near
+  DeviceBuffer<std::uint32_t> near;        ///< the candidates of each block once, ascending
+  DeviceBuffer<std::uint32_t> list_start;  ///< per block: first unit of the lists of its cells
 };
 
 /// Summaries of the cells of a closest-point grid, see algorithm/cell_summary.hpp and bricks.cuh.
@@ -113,15 +126,13 @@ struct CellSummaries {
   /// rows z, rows y, words x: 32 bricks along x, the first in the highest bit, and 16 times the
   /// number of bricks up to the last of them; then (0, all bricks)
   uint2* run = nullptr;
-  std::uint32_t* brick = nullptr;  ///< bricks x 16 (z, y): codes of eight cells along x
-  /// bricks x 128 (z, y, x): the summary; the candidates, first << 8 | number, or kNoValue where
-  /// that does not hold them: lists of 256 and more, and those beyond 2^24 candidates of a map of a
-  /// few hundred thousand points. Their ends are in cell_start of the closest-point grid.
-  uint2* cell = nullptr;
-  std::uint32_t* block = nullptr;  ///< bricks: index of the block of each
-  /// the candidates of all cells: x, y, z, packed normal
-  float4* candidate = nullptr;
-  std::uint32_t block_count = 0;
+  std::uint32_t* brick = nullptr;       ///< bricks x 16 (z, y): codes of eight cells along x
+  std::uint32_t* summary = nullptr;     ///< bricks x 128 (z, y, x)
+  std::uint32_t* list = nullptr;        ///< bricks x 128: candidates, see candidate_lists.hpp
+  uint2* block = nullptr;               ///< bricks: lists of the block of each, packed
+  std::uint32_t* positions = nullptr;   ///< the lists of all cells
+  float4* near = nullptr;               ///< the near lists of all blocks: x, y, z, packed normal
+  std::uint32_t* near_index = nullptr;  ///< of these points in the cloud
 
   /// A brick is a quarter of a block; one block more on each side.
   GPUREG_HD std::uint32_t brick_words_x() const {
@@ -152,21 +163,18 @@ enum class HalfCopy : std::uint8_t { plain, turned };
 struct FeatureAids {
   /// rounded to binary16, times *scale; null where the dimension or a length (over 1e15) forbids it
   std::uint16_t* half = nullptr;
-  float* padded = nullptr;  ///< the rows filled up with zeros
   /// bounds of the squared length; infinite for rows outside the search
   float2* square = nullptr;
   float* error = nullptr;           ///< half of the distance of the bounds
   float* scale = nullptr;           ///< one for the cloud, a power of two
-  HalfCopy copy = HalfCopy::plain;  ///< content of all arrays but padded
+  HalfCopy copy = HalfCopy::plain;  ///< content of all arrays
 };
 
 /// Arrays of a prepared cloud: pointers into one piece of memory, and their metadata.
 struct CloudArrays {
-  /// host struct of device pointers; executor_data is the CudaCloud
+  /// Host struct of device pointers; executor_data is the CudaCloud. The rows of features have
+  /// row_stride() floats. The closest-point grid has arrays only where `summaries` has no table.
   CloudView view_on_device{};
-  std::uint32_t block_count = 0;
-  std::size_t candidate_count = 0;
-  const Cell* blocks = nullptr;
   CellSummaries summaries;
   ScoringOrder order;
   FeatureAids narrow_aids, wide_aids;

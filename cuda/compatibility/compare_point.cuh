@@ -19,7 +19,8 @@ __device__ inline ComparedWith compare_point(const CloudView& moved, const Cloud
                                              std::uint32_t i, SideEvidence& e) {
   const Vec3 q = apply(pose, moved.points[i]), normal = rotate(pose, moved.normals[i]);
   const FoundPoint c = find_point(other, cells, q, test.inlier.max_squared);
-  const bool hit = c.found(), inlier = hit && c.agrees(other, normal, test.inlier.min_cosine);
+  const bool hit = c.found(),
+             inlier = hit && c.agrees(other, cells, normal, test.inlier.min_cosine);
   add_evidence({q, normal, hit, inlier, c.squared_distance, moved.normal_weight[i]}, other, test,
                maps, e);
   return {c, inlier};

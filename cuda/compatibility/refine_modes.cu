@@ -28,11 +28,12 @@ __device__ bool correspondence(const SampledPair& pair, const RefineModes& r, co
                                float inverse_radius, std::uint32_t i, float (&row)[8]) {
   const CloudView &s = pair.source, &t = pair.pair.target;
   const Vec3 p = s.points[i], q = apply(rigid, p);
-  const FoundPoint c = find_point(t, pair.pair.target_cells, q, r.max_distance * r.max_distance);
+  const CellSummaries& cells = pair.pair.target_cells;
+  const FoundPoint c = find_point(t, cells, q, r.max_distance * r.max_distance);
   if (!c.found() || c.normal == kPackedZero ||
-      !c.agrees(t, rotate(rigid, s.normals[i]), r.min_cosine))
+      !c.agrees(t, cells, rotate(rigid, s.normals[i]), r.min_cosine))
     return false;
-  const Vec3 normal = t.normals[c.index_in(t)];
+  const Vec3 normal = t.normals[c.index_in(cells)];
   const float distance = dot(q - c.point, normal);
   const Vec3 turn = cross(rotate(rigid, p) * inverse_radius, normal);
   row[0] = turn.x;

@@ -97,8 +97,9 @@ std::vector<Vec3> CudaCloud::copy_normals() const {
   return copy_back(*this, view_on_device.normals, size);
 }
 std::vector<float> CudaCloud::copy_features() const {
-  return copy_back(*this, view_on_device.features,
-                   static_cast<std::size_t>(size) * feature_dimension);
+  return tight_rows(
+      copy_back(*this, view_on_device.features, std::size_t(size) * row_stride(feature_dimension)),
+      feature_dimension);
 }
 
 std::vector<std::shared_ptr<CudaCloud>> assemble(
@@ -124,8 +125,6 @@ std::vector<std::shared_ptr<CudaCloud>> assemble(
     cloud->statistics.input_points = facts.input_points;
     cloud->statistics.invalid_points = facts.invalid_points;
     cloud->statistics.points = cloud->size;
-    cloud->block_count = closest.blocks.size(c);
-    cloud->candidate_count = closest.candidate_offset[c + 1] - closest.candidate_offset[c];
 
     // First the offsets, then the memory, then the pointers.
     const std::size_t first_part = parts.size();
@@ -135,20 +134,23 @@ std::vector<std::shared_ptr<CudaCloud>> assemble(
                        size * sizeof(*from)});
       bytes += (size * sizeof(*from) + 255) / 256 * 256;
     };
-    const std::size_t begin = segments.offset[c], n = cloud->size,
-                      block_begin = closest.blocks.offset[c];
+    const std::size_t begin = segments.offset[c], n = cloud->size;
+    const ClosestGridSize& grid_size = closest.size[c];
+    const ScoringLayout layout = scoring_layout(cloud->size, grid_size, closest.block_range[c]);
     place(clouds.points.data() + begin, n);
     place(normals.data() + begin, n);
-    place(features.values.data() + features.offset[c], n * cloud->feature_dimension);
     place(features.valid.data() + begin, n);
-    place(closest.table.data() + closest.table_offset[c],
-          closest.table_offset[c + 1] - closest.table_offset[c]);
-    place(closest.cell_start.data() + block_begin * (ClosestGridView::kBlockCells + 1),
-          std::size_t(cloud->block_count) * (ClosestGridView::kBlockCells + 1));
-    place(closest.candidates.data() + closest.candidate_offset[c], cloud->candidate_count);
-    place(closest.block.data() + block_begin, cloud->block_count);
+    // The hash table serves clouds without a table of bricks.
+    const bool hashed = !layout.has_table();
+    constexpr std::size_t kStarts = ClosestGridView::kBlockCells + 1;
+    const std::size_t table_size =
+                          hashed ? closest.table_offset[c + 1] - closest.table_offset[c] : 0,
+                      starts = hashed ? grid_size.blocks * kStarts : 0,
+                      candidates = hashed ? grid_size.candidates : 0;
+    place(closest.table.data() + closest.table_offset[c], table_size);
+    place(closest.cell_start.data() + closest.blocks.offset[c] * kStarts, starts);
+    place(closest.candidates.data() + closest.candidate_offset[c], candidates);
     const bool has_wide = wide_features.dimension[c] > 0 && n > 0;
-    place(wide_features.values.data() + wide_features.offset[c], n * wide_features.dimension[c]);
     place(wide_features.valid.data() + (has_wide ? begin : 0), has_wide ? n : 0);
     const std::uint32_t map_begin = depth_maps.offset[c],
                         maps = depth_maps.offset[c + 1] - map_begin;
@@ -170,12 +172,19 @@ std::vector<std::shared_ptr<CudaCloud>> assemble(
         at.begin[k] = reserve(feature_aids_bytes(k, n, dimension, copy_of));
       return at;
     };
+    const float* const narrow_rows = features.values.data() + features.offset[c];
+    const float* const wide_rows = wide_features.values.data() + wide_features.offset[c];
+    const std::uint32_t wide_dimension = has_wide ? wide_features.dimension[c] : 0;
+    const std::size_t narrow_at = reserve(n * row_stride(cloud->feature_dimension) * sizeof(float));
+    const std::size_t wide_at = reserve(n * row_stride(wide_dimension) * sizeof(float));
+    if (half_width(cloud->feature_dimension, copy) == 0)
+      parts.push_back({reinterpret_cast<const char*>(narrow_rows),
+                       reinterpret_cast<char*>(narrow_at),
+                       n * cloud->feature_dimension * sizeof(float)});
     const auto aids = reserve_aids(cloud->feature_dimension, copy);
-    const auto wide_aids =
-        reserve_aids(has_wide ? wide_features.dimension[c] : 0, HalfCopy::turned);
+    const auto wide_aids = reserve_aids(wide_dimension, HalfCopy::turned);
     const std::size_t weights = reserve(n * sizeof(std::uint32_t));
     const std::size_t copied = bytes;
-    const ScoringLayout layout = scoring_layout(*cloud, closest.block_range[c]);
     // Filled: tables start empty, and gaps between the arrays are copied with them.
     cloud->data = exec.filled<char>(copied + layout.bytes, 0);
     for (std::size_t k = first_part; k < parts.size(); ++k)
@@ -184,40 +193,39 @@ std::vector<std::shared_ptr<CudaCloud>> assemble(
     CloudView& view = cloud->view_on_device;
     view.points = reinterpret_cast<const Vec3*>(part[0].to);
     view.normals = reinterpret_cast<const Vec3*>(part[1].to);
-    view.features = reinterpret_cast<const float*>(part[2].to);
-    view.has_feature = reinterpret_cast<const std::uint8_t*>(part[3].to);
+    view.has_feature = reinterpret_cast<const std::uint8_t*>(part[2].to);
     view.size = cloud->size;
     view.feature_dimension = cloud->feature_dimension;
     view.radius = cloud->radius;
     view.closest = {1.0f / closest.geometry[c].cell_size,
-                    {reinterpret_cast<const CellEntry*>(part[4].to),
-                     closest.table_offset[c + 1] - closest.table_offset[c]},
-                    {reinterpret_cast<const std::uint32_t*>(part[5].to),
-                     std::size_t(cloud->block_count) * (ClosestGridView::kBlockCells + 1)},
-                    {reinterpret_cast<const std::uint32_t*>(part[6].to), cloud->candidate_count}};
+                    {reinterpret_cast<const CellEntry*>(part[3].to), table_size},
+                    {reinterpret_cast<const std::uint32_t*>(part[4].to), starts},
+                    {reinterpret_cast<const std::uint32_t*>(part[5].to), candidates}};
     view.executor_data = cloud.get();
-    view.wide_features = has_wide ? reinterpret_cast<const float*>(part[8].to) : nullptr;
-    view.has_wide_feature = has_wide ? reinterpret_cast<const std::uint8_t*>(part[9].to) : nullptr;
-    view.visibility = {reinterpret_cast<const std::uint16_t*>(part[10].to),
-                       reinterpret_cast<const Vec3*>(part[11].to), maps, depth_maps.step};
+    view.has_wide_feature = has_wide ? reinterpret_cast<const std::uint8_t*>(part[6].to) : nullptr;
+    view.visibility = {reinterpret_cast<const std::uint16_t*>(part[7].to),
+                       reinterpret_cast<const Vec3*>(part[8].to), maps, depth_maps.step};
     view.surface_sides = {
-        box, box.words() > 0 ? reinterpret_cast<const std::uint32_t*>(part[12].to) : nullptr};
+        box, box.words() > 0 ? reinterpret_cast<const std::uint32_t*>(part[9].to) : nullptr};
     char* const memory = cloud->data.data();
+    float* const narrow_to = reinterpret_cast<float*>(memory + narrow_at);
+    float* const wide_to = reinterpret_cast<float*>(memory + wide_at);
+    view.features = narrow_to;
+    view.wide_features = has_wide ? wide_to : nullptr;
     normal_weight.push_back(reinterpret_cast<std::uint32_t*>(memory + weights));
     view.normal_weight = normal_weight.back();
     const auto measure = [&](FeatureAids& to, const FeatureAidsPlaces& at, HalfCopy copy_of,
-                             const float* rows, const std::uint8_t* valid, std::uint32_t dimension,
-                             std::uint32_t* extreme) {
+                             const float* rows, float* padded, const std::uint8_t* valid,
+                             std::uint32_t dimension, std::uint32_t* extreme) {
       if (half_width(dimension, copy_of) == 0) return;
       to = feature_aids_at(memory, at, copy_of);
-      features_to_measure.push_back({rows, valid, view.size, dimension, to, extreme});
+      features_to_measure.push_back({rows, padded, valid, view.size, dimension, to, extreme});
     };
-    measure(cloud->narrow_aids, aids, copy, view.features, view.has_feature, view.feature_dimension,
-            &counts.data()[c].extreme);
+    measure(cloud->narrow_aids, aids, copy, narrow_rows, narrow_to, view.has_feature,
+            view.feature_dimension, &counts.data()[c].extreme);
     if (has_wide)
-      measure(cloud->wide_aids, wide_aids, HalfCopy::turned, view.wide_features,
-              view.has_wide_feature, wide_features.dimension[c], &counts.data()[c].extreme_wide);
-    cloud->blocks = reinterpret_cast<const Cell*>(part[7].to);
+      measure(cloud->wide_aids, wide_aids, HalfCopy::turned, wide_rows, wide_to,
+              view.has_wide_feature, wide_dimension, &counts.data()[c].extreme_wide);
     place_scoring_data(layout, closest.geometry[c], cloud->data.data() + copied, *cloud);
     out.push_back(std::move(cloud));
   }
@@ -235,7 +243,7 @@ std::vector<std::shared_ptr<CudaCloud>> assemble(
                                                      normal_weight_on_device.data());
   check_launch("weight_by_normals");
   fill_feature_aids(exec, features_to_measure);
-  fill_scoring_data(exec, out, closest.geometry);
+  fill_scoring_data(exec, out, closest);
   const Counts* counted = exec.download(counts.data(), clouds_count);
   exec.synchronize();
   for (std::size_t c = 0; c < clouds_count; ++c) {

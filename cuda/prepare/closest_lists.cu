@@ -3,6 +3,7 @@
 
 #include "cuda/device/device_algorithms.hpp"
 #include "cuda/device/entry_of.cuh"
+#include "cuda/prepare/near_lists.hpp"
 #include "cuda/prepare/neighbor_rows.cuh"
 #include "pipeline/checks.hpp"
 
@@ -24,12 +25,12 @@ struct Lists {
   std::uint32_t clouds;
   std::uint32_t* near_start;  // per block; first the counts
   std::uint32_t* near;  // indices of the points within the search distance of a block, ascending
+  std::uint32_t* used;  // 1 for those that are candidates
   // per cell: place in the near list of the point nearest to its centre, or kNoValue
   std::uint32_t* nearest;
-  std::uint32_t* cell_start;  // blocks x 513
-  std::uint32_t* list_start;  // per block; first the counts
-  // near points of all; candidates of each cloud; most of a block
-  unsigned long long* totals;
+  std::uint32_t* cell_start;   // blocks x 513
+  std::uint32_t* list_start;   // per block; first the counts
+  unsigned long long* totals;  // near points of all; most candidates of a block
   const std::size_t* candidate_offset;
   std::uint32_t* candidates;
 };
@@ -181,7 +182,9 @@ __global__ void __launch_bounds__(kThreads) count_candidates(Lists l) {
     const Vec3 best = nearest != kNoValue ? points[l.near[begin + nearest]] : Vec3{0, 0, 0};
     for_each_listed(points, l.near + begin, size, tile, [&](std::uint32_t k, Vec3 p) {
       if (nearest == kNoValue || squared_norm(p - center) > limit2) return;
-      count += k == nearest || can_win_in_cell(center, best, p, k > nearest, g);
+      if (k != nearest && !can_win_in_cell(center, best, p, k > nearest, g)) return;
+      ++count;
+      l.used[begin + k] = 1;
     });
     l.nearest[static_cast<std::size_t>(b) * kCells + cell] = nearest;
     counts[cell] = count;
@@ -205,7 +208,6 @@ __global__ void __launch_bounds__(kThreads) count_candidates(Lists l) {
   if (threadIdx.x != 31) return;
   start[kCells] = at;
   l.list_start[b] = at;
-  atomicAdd(&l.totals[2 + c], static_cast<unsigned long long>(at));
   atomicMax(&l.totals[1], static_cast<unsigned long long>(at));
 }
 
@@ -246,10 +248,11 @@ void fill_closest_lists(Exec& exec, const DownsampledClouds& clouds, const Grids
   const std::uint32_t blocks = out.blocks.total();
   out.cell_start = exec.buffer<std::uint32_t>(static_cast<std::size_t>(blocks) * (kCells + 1));
   out.candidate_offset.assign(count + 1, 0);
+  out.size.resize(count);
   if (blocks == 0) return;
   const auto near_start = exec.filled<std::uint32_t>(blocks + 1, 0);
   const auto list_start = exec.filled<std::uint32_t>(blocks + 1, 0);
-  const auto totals = exec.filled<unsigned long long>(2 + count, 0);
+  const auto totals = exec.filled<unsigned long long>(2, 0);
   Lists l{};
   l.block_offset = out.blocks.on_device.data();
   l.block = out.block.data();
@@ -268,25 +271,30 @@ void fill_closest_lists(Exec& exec, const DownsampledClouds& clouds, const Grids
   exclusive_sum(exec, near_start.data(), near_start.data(), blocks + 1);
   const unsigned long long* near_total = exec.download(totals.data(), 1);
   exec.synchronize();
-  if (*near_total > limits::kMaxPoints)
+  if (*near_total >= limits::kMaxPoints)
     pipeline::throw_too_dense(options.max_correspondence_distance);
 
   const auto near = exec.buffer<std::uint32_t>(*near_total);
   const auto nearest = exec.buffer<std::uint32_t>(static_cast<std::size_t>(blocks) * kCells);
+  // Flags, then the number of candidates before each point.
+  const auto used = exec.filled<std::uint32_t>(*near_total + 1, 0);
   l.near = near.data();
+  l.used = used.data();
   l.nearest = nearest.data();
   list_near<<<blocks, kThreads, 0, exec.stream()>>>(l);
   check_launch("list_near");
   count_candidates<<<blocks, kThreads, 0, exec.stream()>>>(l);
   check_launch("count_candidates");
   exclusive_sum(exec, list_start.data(), list_start.data(), blocks + 1);
-  const unsigned long long* sums = exec.download(totals.data(), 2 + count);
-  exec.synchronize();
+  exclusive_sum(exec, used.data(), used.data(), *near_total + 1);
+  const unsigned long long* most = exec.download(totals.data() + 1, 1);
+  measure_near_lists(exec, near_start.data(), used.data(), out);
   for (std::size_t c = 0; c < count; ++c) {
-    if (pipeline::too_many_candidates(sums[2 + c], clouds.segments.size(c)) ||
-        sums[1] > limits::kMaxBlockCandidates)
+    const ClosestGridSize& size = out.size[c];
+    if (pipeline::too_many_candidates(size.candidates, clouds.segments.size(c)) ||
+        *most > limits::kMaxBlockCandidates || size.list_units > kMaxListUnits)
       pipeline::throw_too_dense(options.max_correspondence_distance);
-    out.candidate_offset[c + 1] = out.candidate_offset[c] + sums[2 + c];
+    out.candidate_offset[c + 1] = out.candidate_offset[c] + size.candidates;
   }
   const auto candidate_offset = exec.upload(out.candidate_offset);
   out.candidates = exec.buffer<std::uint32_t>(out.candidate_offset.back());
@@ -294,6 +302,8 @@ void fill_closest_lists(Exec& exec, const DownsampledClouds& clouds, const Grids
   l.candidates = out.candidates.data();
   write_candidates<<<blocks, kThreads, 0, exec.stream()>>>(l);
   check_launch("write_candidates");
+  fill_near_lists(exec, near_start.data(), near.data(), used.data(),
+                  static_cast<std::uint32_t>(*near_total), out);
 }
 
 }  // namespace gpureg::cuda

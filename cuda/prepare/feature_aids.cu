@@ -106,8 +106,7 @@ __global__ void measure_features(const FeatureSlot* slots) {
     }
     square = square + rest;
     for (std::uint32_t d = 0; d < s.padded_width; ++d)
-      s.aids.padded[static_cast<std::size_t>(i) * s.padded_width + d] =
-          valid && d < s.dimension ? row[d] : 0.0f;
+      s.rows[static_cast<std::size_t>(i) * s.padded_width + d] = d < s.dimension ? row[d] : 0.0f;
     const float error = product_error(square, rest, lost);
     s.aids.error[i] = error;
     s.aids.square[i] =
@@ -142,17 +141,16 @@ __global__ void find_repeated_features(const FeatureSlot* slots) {
 std::size_t feature_aids_bytes(int k, std::size_t size, std::uint32_t dimension, HalfCopy copy) {
   const std::size_t width = half_width(dimension, copy);
   if (width == 0 || dimension == 0) return 0;
-  const std::size_t bytes[FeatureAidsPlaces::kArrays] = {
-      size * width * sizeof(std::uint16_t), size * padded_width(dimension) * sizeof(float),
-      size * sizeof(float2), size * sizeof(float), sizeof(float)};
+  const std::size_t bytes[FeatureAidsPlaces::kArrays] = {size * width * sizeof(std::uint16_t),
+                                                         size * sizeof(float2),
+                                                         size * sizeof(float), sizeof(float)};
   return bytes[k];
 }
 
 FeatureAids feature_aids_at(char* memory, const FeatureAidsPlaces& places, HalfCopy copy) {
   const auto at = [&](int k) { return memory + places.begin[k]; };
-  return {reinterpret_cast<std::uint16_t*>(at(0)), reinterpret_cast<float*>(at(1)),
-          reinterpret_cast<float2*>(at(2)),        reinterpret_cast<float*>(at(3)),
-          reinterpret_cast<float*>(at(4)),         copy};
+  return {reinterpret_cast<std::uint16_t*>(at(0)), reinterpret_cast<float2*>(at(1)),
+          reinterpret_cast<float*>(at(2)), reinterpret_cast<float*>(at(3)), copy};
 }
 
 void fill_feature_aids(Exec& exec, const std::vector<FeaturesToMeasure>& clouds) {

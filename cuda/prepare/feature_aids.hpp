@@ -7,12 +7,12 @@
 #include "cuda/common/stage_data.hpp"
 
 /// Search data beside the features: copies for the tensor cores, and error bounds of their
-/// products. Part of assemble().
+/// products. Writes the padded rows too. Part of assemble().
 namespace gpureg::cuda {
 
 /// Where each array of a FeatureAids begins in a cloud's memory.
 struct FeatureAidsPlaces {
-  static constexpr int kArrays = 5;
+  static constexpr int kArrays = 4;
   std::size_t begin[kArrays];
 };
 
@@ -22,7 +22,8 @@ FeatureAids feature_aids_at(char* memory, const FeatureAidsPlaces& places, HalfC
 
 /// Features of one cloud; all pointers on the device.
 struct FeaturesToMeasure {
-  const float* features;
+  const float* features;  ///< tight rows
+  float* rows;            ///< to be filled: the rows of the cloud, padded with zeros
   const std::uint8_t* valid;
   std::uint32_t size, dimension;
   FeatureAids aids;        ///< laid out, to be filled

@@ -6,14 +6,17 @@
 #include <numeric>
 
 #include "algorithm/cell_summary.hpp"
+#include "cuda/common/candidate_lists.hpp"
 #include "cuda/common/packed_normal.cuh"
 #include "cuda/device/device_algorithms.hpp"
+#include "cuda/prepare/brick_place.cuh"
 #include "cuda/prepare/directions.hpp"
 
 namespace gpureg::cuda {
 namespace {
 
 constexpr int kCells = ClosestGridView::kBlockCells;
+constexpr std::size_t kBrickCells = kCells / 4;
 using limits::kMaxSummaryBlocks;
 /// BrickMotion counts cells, including those of the empty blocks on both sides, in 22 bits.
 constexpr std::uint64_t kMaxBlocksAlong = (std::uint64_t(1) << 19) - 2;
@@ -34,56 +37,29 @@ constexpr double kGoldenSection = 0.6180339887;
 /// Bits of a Morton key: ten per coordinate.
 constexpr int kMortonBits = 30;
 
-struct Slot {
-  CloudView view;
-  CellSummaries summaries;
-  ScoringOrder order;
-  ClosestGeometry geometry;
-  const Cell* blocks;
-  std::uint32_t block_count;
-  std::uint32_t group_step;    // coprime to the number of groups
-  std::uint32_t point_offset;  // in the batch
-};
-
-struct BrickPlace {
-  std::uint32_t run, bit;
-};
-
-/// Position of the bit of a quarter of a block.
-__device__ BrickPlace place_of_brick(const CellSummaries& v, Cell block, std::uint32_t upper_y,
-                                     std::uint32_t upper_z) {
-  const auto coordinate = [](std::int32_t c, float offset) {
-    return static_cast<std::uint32_t>(c + static_cast<std::int32_t>(offset) / 8 + 1);
-  };
-  const std::uint32_t x = coordinate(block.x, v.offset.x),
-                      y = 2 * coordinate(block.y, v.offset.y) + upper_y,
-                      z = 2 * coordinate(block.z, v.offset.z) + upper_z;
-  return {(z * v.brick_rows_y() + y) * v.brick_words_x() + x / 32, 0x80000000u >> (x % 32)};
-}
-
 /// Sets the bit of each brick that has a cell with candidates.
-__global__ void mark_bricks(const Slot* slots) {
-  const Slot& s = slots[blockIdx.y];
+__global__ void mark_bricks(const ScoringSlot* slots) {
+  const ScoringSlot& s = slots[blockIdx.y];
   const CellSummaries& v = s.summaries;
   if (v.nx == 0) return;
   for (std::uint32_t k = blockIdx.x * blockDim.x + threadIdx.x; k < s.block_count * 4;
        k += gridDim.x * blockDim.x) {
     const std::uint32_t b = k / 4, upper_y = k & 1, upper_z = (k >> 1) & 1;
-    const std::uint32_t* start =
-        s.view.closest.cell_start.data + static_cast<std::size_t>(b) * (kCells + 1);
+    const std::uint32_t* start = s.cell_start + static_cast<std::size_t>(b) * (kCells + 1);
     bool any = false;
     for (std::uint32_t row = 0; row < 16; ++row) {
       const std::uint32_t cell = ((upper_z * 4 + row / 4) * 8 + upper_y * 4 + row % 4) * 8;
       any = any || start[cell] != start[cell + 8];
     }
     if (!any) continue;
-    const BrickPlace place = place_of_brick(v, s.blocks[b], upper_y, upper_z);
+    const BrickPlace place =
+        place_of_brick(v, s.blocks[b], static_cast<int>(upper_z << 8 | upper_y << 5));
     atomicOr(&v.run[place.run].x, place.bit);
   }
 }
 
 /// Numbers the bricks in the order of the runs. A thread block per cloud.
-__global__ void __launch_bounds__(kNumberThreads) number_bricks(const Slot* slots) {
+__global__ void __launch_bounds__(kNumberThreads) number_bricks(const ScoringSlot* slots) {
   using Scan = cub::BlockScan<std::uint32_t, kNumberThreads>;
   __shared__ typename Scan::TempStorage storage;
   const CellSummaries& v = slots[blockIdx.x].summaries;
@@ -103,51 +79,31 @@ __global__ void __launch_bounds__(kNumberThreads) number_bricks(const Slot* slot
   if (threadIdx.x == 0) v.run[runs] = make_uint2(0, before);
 }
 
-__global__ void summarize(const Slot* slots, const DirectionTables* tables) {
-  const Slot& s = slots[blockIdx.y];
+__global__ void summarize(const ScoringSlot* slots, const DirectionTables* tables) {
+  const ScoringSlot& s = slots[blockIdx.y];
   if (s.summaries.nx == 0) return;
   const std::size_t cells = static_cast<std::size_t>(s.block_count) * kCells;
   for (std::size_t k = static_cast<std::size_t>(blockIdx.x) * blockDim.x + threadIdx.x; k < cells;
        k += static_cast<std::size_t>(gridDim.x) * blockDim.x) {
     const std::size_t b = k / kCells;
     const int cell = static_cast<int>(k % kCells);
-    const std::uint32_t* start = s.view.closest.cell_start.data + b * (kCells + 1) + cell;
+    const std::uint32_t* start = s.cell_start + b * (kCells + 1) + cell;
     const Cell block = s.blocks[b];
     const Cell c{block.x * 8 + (cell & 7), block.y * 8 + ((cell >> 3) & 7),
                  block.z * 8 + (cell >> 6)};
-    const Span<const std::uint32_t> candidates{s.view.closest.candidates.data + start[0],
-                                               start[1] - start[0]};
+    const Span<const std::uint32_t> candidates{s.candidates + start[0], start[1] - start[0]};
     const bool empty = candidates.size == 0;
-    const bool short_list = candidates.size < 256 && start[0] < (1u << 24);
     // Eight lanes hold the cells of a word.
     std::uint32_t codes =
         empty ? 0u : code_of_cell(*tables, candidates, s.view.normals) << 4 * (cell & 7);
     for (int step = 1; step < 8; step *= 2) codes |= __shfl_xor_sync(~0u, codes, step);
-    const BrickPlace place = place_of_brick(s.summaries, block, (cell >> 5) & 1, (cell >> 8) & 1);
-    const uint2 run = s.summaries.run[place.run];
-    if ((run.x & place.bit) == 0) continue;
-    const std::uint32_t from_here =
-        static_cast<std::uint32_t>(__popc(static_cast<int>(run.x & (place.bit * 2 - 1))));
-    const std::uint32_t word = run.y - 16 * from_here + ((cell >> 6) & 3) * 4 + ((cell >> 3) & 3);
-    if ((cell & 7) == 0) s.summaries.brick[word] = codes;
-    if ((cell & 7) == 0 && word % 16 == 0)
-      s.summaries.block[word / 16] = static_cast<std::uint32_t>(b);
-    s.summaries.cell[std::size_t(word) * 8 + (cell & 7)] = make_uint2(
+    const BrickWord word = brick_word(s.summaries, block, cell);
+    if (!word.there) continue;
+    if ((cell & 7) == 0) s.summaries.brick[word.number] = codes;
+    s.summaries.summary[std::size_t(word.number) * 8 + (cell & 7)] =
         empty ? 0u
               : summarize_cell(candidates, cell_center(c, s.geometry.cell_size), s.geometry,
-                               s.view.points, s.view.normals),
-        short_list ? start[0] << 8 | static_cast<std::uint32_t>(candidates.size) : kNoValue);
-  }
-}
-
-__global__ void copy_candidates(const Slot* slots) {
-  const Slot& s = slots[blockIdx.y];
-  const Span<const std::uint32_t> candidates = s.view.closest.candidates;
-  for (std::size_t k = static_cast<std::size_t>(blockIdx.x) * blockDim.x + threadIdx.x;
-       k < candidates.size; k += static_cast<std::size_t>(gridDim.x) * blockDim.x) {
-    const Vec3 p = s.view.points[candidates[k]];
-    s.summaries.candidate[k] =
-        make_float4(p.x, p.y, p.z, __uint_as_float(pack_normal(s.view.normals[candidates[k]])));
+                               s.view.points, s.view.normals);
   }
 }
 
@@ -162,8 +118,9 @@ __device__ std::uint32_t morton(std::uint32_t x, std::uint32_t y, std::uint32_t 
   return spread(x) | spread(y) << 1 | spread(z) << 2;
 }
 
-__global__ void write_morton_keys(const Slot* slots, std::uint64_t* keys, std::uint32_t* index) {
-  const Slot& s = slots[blockIdx.y];
+__global__ void write_morton_keys(const ScoringSlot* slots, std::uint64_t* keys,
+                                  std::uint32_t* index) {
+  const ScoringSlot& s = slots[blockIdx.y];
   const float scale = 511.0f / s.view.radius;
   for (std::uint32_t i = blockIdx.x * blockDim.x + threadIdx.x; i < s.view.size;
        i += gridDim.x * blockDim.x) {
@@ -175,9 +132,9 @@ __global__ void write_morton_keys(const Slot* slots, std::uint64_t* keys, std::u
   }
 }
 
-__global__ void write_order(const Slot* slots, const std::uint32_t* index,
+__global__ void write_order(const ScoringSlot* slots, const std::uint32_t* index,
                             const DirectionTables* tables) {
-  const Slot& s = slots[blockIdx.y];
+  const ScoringSlot& s = slots[blockIdx.y];
   for (std::uint32_t k = blockIdx.x * blockDim.x + threadIdx.x; k < s.order.groups * 32;
        k += gridDim.x * blockDim.x) {
     const std::uint32_t from = static_cast<std::uint32_t>(static_cast<std::uint64_t>(k / 32) *
@@ -201,7 +158,8 @@ __global__ void write_order(const Slot* slots, const std::uint32_t* index,
 
 }  // namespace
 
-ScoringLayout scoring_layout(const CudaCloud& cloud, const CellRange& blocks) {
+ScoringLayout scoring_layout(std::uint32_t points, const ClosestGridSize& size,
+                             const CellRange& blocks) {
   ScoringLayout l{};
   l.first_block = blocks.lo;
   const std::uint64_t nx = static_cast<std::uint64_t>(blocks.hi.x - blocks.lo.x + 1),
@@ -212,11 +170,10 @@ ScoringLayout scoring_layout(const CudaCloud& cloud, const CellRange& blocks) {
   shape.ny = static_cast<std::int32_t>(ny);
   shape.nz = static_cast<std::int32_t>(nz);
   // A large map may have a large table: up to 64 places for each of its blocks.
-  const std::uint64_t most_blocks =
-                          std::max(kMaxSummaryBlocks, kPlacesPerBlock * cloud.block_count),
-                      most_runs = std::max(kMaxSummaryBlocks, kRunsPerBlock * cloud.block_count);
+  const std::uint64_t most_blocks = std::max(kMaxSummaryBlocks, kPlacesPerBlock * size.blocks),
+                      most_runs = std::max(kMaxSummaryBlocks, kRunsPerBlock * size.blocks);
   const bool fits = nx <= kMaxBlocksAlong && ny <= kMaxBlocksAlong && nz <= kMaxBlocksAlong &&
-                    cloud.block_count <= kMaxNumberedBlocks && nx * ny <= most_blocks &&
+                    size.blocks <= kMaxNumberedBlocks && nx * ny <= most_blocks &&
                     nx * ny * nz <= most_blocks && runs_of(nx, ny, nz) <= most_runs;
   if (fits) {
     l.nx = static_cast<std::int32_t>(nx);
@@ -228,15 +185,20 @@ ScoringLayout scoring_layout(const CudaCloud& cloud, const CellRange& blocks) {
     l.bytes += (bytes + 255) / 256 * 256;
     return at;
   };
-  const std::size_t padded = (cloud.size + 31) / 32 * 32;
-  l.candidates = take(cloud.candidate_count * sizeof(float4));
+  const std::size_t padded = (points + std::size_t(31)) / 32 * 32, bricks = fits ? size.bricks : 0,
+                    near = fits ? size.near_points : 0;
+  l.near = take(near * sizeof(float4));
+  l.near_index = take(near * sizeof(std::uint32_t));
+  // Reading a list goes up to a word beyond its end.
+  l.positions = take(fits ? (size.list_units + 1) * kListUnit : 0);
   l.points = take(padded * sizeof(float4));
   l.normals = take(padded * sizeof(std::uint32_t));
   l.index = take(padded * sizeof(std::uint32_t));
-  l.cells = take(fits ? std::size_t(cloud.block_count) * kCells * sizeof(uint2) : 0);
+  l.lists = take(bricks * kBrickCells * sizeof(std::uint32_t));
+  l.summaries = take(bricks * kBrickCells * sizeof(std::uint32_t));
+  l.blocks = take(bricks * sizeof(uint2));
   l.runs = take(fits ? (std::size_t(shape.brick_runs()) + 1) * sizeof(uint2) : 0);
-  l.bricks = take(fits ? std::size_t(cloud.block_count) * 4 * 16 * sizeof(std::uint32_t) : 0);
-  l.blocks = take(fits ? std::size_t(cloud.block_count) * 4 * sizeof(std::uint32_t) : 0);
+  l.bricks = take(bricks * (kBrickCells / 8) * sizeof(std::uint32_t));
   return l;
 }
 
@@ -250,34 +212,42 @@ void place_scoring_data(const ScoringLayout& l, const ClosestGeometry& geometry,
   v.nx = l.nx;
   v.ny = l.ny;
   v.nz = l.nz;
-  v.block_count = cloud.block_count;
-  v.candidate = reinterpret_cast<float4*>(memory + l.candidates);
+  v.near = reinterpret_cast<float4*>(memory + l.near);
+  v.near_index = reinterpret_cast<std::uint32_t*>(memory + l.near_index);
+  v.positions = reinterpret_cast<std::uint32_t*>(memory + l.positions);
   cloud.order.groups = (cloud.size + 31) / 32;
   cloud.order.point = reinterpret_cast<float4*>(memory + l.points);
   cloud.order.normal = reinterpret_cast<std::uint32_t*>(memory + l.normals);
   cloud.order.index = reinterpret_cast<std::uint32_t*>(memory + l.index);
-  v.cell = reinterpret_cast<uint2*>(memory + l.cells);
+  v.summary = reinterpret_cast<std::uint32_t*>(memory + l.summaries);
+  v.list = reinterpret_cast<std::uint32_t*>(memory + l.lists);
   v.run = reinterpret_cast<uint2*>(memory + l.runs);
   v.brick = reinterpret_cast<std::uint32_t*>(memory + l.bricks);
-  v.block = reinterpret_cast<std::uint32_t*>(memory + l.blocks);
+  v.block = reinterpret_cast<uint2*>(memory + l.blocks);
 }
 
 void fill_scoring_data(Exec& exec, const std::vector<std::shared_ptr<CudaCloud>>& clouds,
-                       const std::vector<ClosestGeometry>& geometry) {
-  std::vector<Slot> slots;
+                       const ClosestGrids& grids) {
+  std::vector<ScoringSlot> slots;
   std::uint32_t total = 0;
   for (std::size_t c = 0; c < clouds.size(); ++c) {
     CudaCloud& cloud = *clouds[c];
     const std::uint32_t groups = cloud.order.groups;
     std::uint32_t step = static_cast<std::uint32_t>(kGoldenSection * groups) | 1u;
     while (groups > 0 && std::gcd(step, groups) != 1) ++step;
-    Slot slot{};
+    ScoringSlot slot{};
     slot.view = cloud.view_on_device;
     slot.summaries = cloud.summaries;
     slot.order = cloud.order;
-    slot.geometry = geometry[c];
-    slot.blocks = cloud.blocks;
-    slot.block_count = cloud.block_count;
+    slot.geometry = grids.geometry[c];
+    const std::size_t first_block = grids.blocks.offset[c];
+    slot.block_count = grids.blocks.size(c);
+    slot.blocks = grids.block.data() + first_block;
+    slot.cell_start = grids.cell_start.data() + first_block * (kCells + 1);
+    slot.candidates = grids.candidates.data() + grids.candidate_offset[c];
+    slot.near_start = grids.near_start.data() + first_block;
+    slot.list_start = grids.list_start.data() + first_block;
+    slot.near = grids.near.data();
     slot.group_step = step;
     slot.point_offset = total;
     slots.push_back(slot);
@@ -296,8 +266,7 @@ void fill_scoring_data(Exec& exec, const std::vector<std::shared_ptr<CudaCloud>>
   check_launch("number_bricks");
   summarize<<<dim3(128, count), 256, 0, exec.stream()>>>(on_device.data(), tables.data());
   check_launch("summarize");
-  copy_candidates<<<dim3(128, count), 256, 0, exec.stream()>>>(on_device.data());
-  check_launch("copy_candidates");
+  pack_lists(exec, on_device, grids.blocks.largest);
   write_morton_keys<<<dim3(16, count), 256, 0, exec.stream()>>>(on_device.data(), keys.data(),
                                                                 index.data());
   check_launch("write_morton_keys");

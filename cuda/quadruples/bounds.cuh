@@ -54,40 +54,6 @@ __device__ inline bool may_be_inlier(const Rigid& rigid, const Limits* limits, s
                        normal != kPackedZero, certain);
 }
 
-/// The closest of a cell's candidates, and its packed normal.
-struct ClosestCandidate {
-  float squared_distance;
-  std::uint32_t normal, place;  ///< place: among the cloud's candidates
-};
-
-/// closest_candidate() on contiguous copies of the candidates. A list has at least one.
-__device__ inline ClosestCandidate closest_in_list(const float4* candidate, std::uint32_t list,
-                                                   Vec3 q) {
-  constexpr std::uint32_t kAtOnce = 4;  // loads in flight hide the latency of memory
-  ClosestCandidate best{3.402823466e38f, 0, kNoValue};
-  std::uint32_t k = list >> 8;
-  const std::uint32_t last = k + (list & 255u);
-#pragma unroll 1
-  do {
-    float4 c[kAtOnce];
-#pragma unroll
-    for (std::uint32_t i = 0; i < kAtOnce; ++i) {
-      c[i] = make_float4(1e30f, 0, 0, 0);  // infinitely far
-      if (k + i < last) c[i] = __ldg(candidate + k + i);
-    }
-#pragma unroll
-    for (std::uint32_t i = 0; i < kAtOnce; ++i) {
-      const float d2 = squared_norm(Vec3{c[i].x, c[i].y, c[i].z} - q);
-      const bool less = d2 < best.squared_distance;
-      best.squared_distance = less ? d2 : best.squared_distance;
-      best.normal = less ? __float_as_uint(c[i].w) : best.normal;
-      best.place = less ? k + i : best.place;
-    }
-    k += kAtOnce;
-  } while (k < last);
-  return best;
-}
-
 /// Exact test of a moved source point with a known closest target point. moved: its normal; error:
 /// largest error of cosines with a packed normal; index: where the index of the point is stored.
 __device__ inline bool agrees_with(const ScorePair& pair, const InlierTest& test,
@@ -95,33 +61,22 @@ __device__ inline bool agrees_with(const ScorePair& pair, const InlierTest& test
                                    const std::uint32_t* index, const ClosestCandidate& closest) {
   if (!(closest.squared_distance <= test.max_squared)) return false;
   if (test.min_cosine <= -1.0f) return true;
-  if (closest.normal == kPackedZero || !has_normal) return false;
-  const float off = dot(moved, unpack_normal(closest.normal)) - test.min_cosine;
+  const std::uint32_t normal = __float_as_uint(__ldg(&pair.cells.near[closest.place].w));
+  if (normal == kPackedZero || !has_normal) return false;
+  const float off = dot(moved, unpack_normal(normal)) - test.min_cosine;
   if (fabsf(off) > error) return off > 0.0f;
   return normals_agree(rotate(rigid, pair.source.normals[*index]),
-                       pair.target.normals[pair.target.closest.candidates[closest.place]],
+                       pair.target.normals[__ldg(pair.cells.near_index + closest.place)],
                        test.min_cosine);
 }
 
-/// Exact test by search, for cells whose list does not fit their word. test: by value, as the
-/// address of a part of the arguments of a kernel makes the compiler copy all of them to local
-/// memory.
-static __device__ __noinline__ bool is_inlier_by_search(const ScorePair& pair, InlierTest test,
-                                                        const Rigid& rigid, Vec3 q,
-                                                        const std::uint32_t* index) {
-  const Closest found = find_closest(pair.target, pair.cells, q, test.max_squared);
-  return found.index != kNoValue &&
-         normals_agree(rotate(rigid, pair.source.normals[*index]), pair.target.normals[found.index],
-                       test.min_cosine);
-}
-
-/// Exact test of a source point in a known cell, by one thread. list: of the cell.
+/// Exact test of a source point in a known cell, by one thread.
 __device__ inline bool is_inlier(const ScorePair& pair, const InlierTest& test, const Rigid& rigid,
                                  float4 p, std::uint32_t normal, const std::uint32_t* index,
-                                 std::uint32_t list) {
+                                 BrickWord word, BrickCell cell) {
   const Vec3 q = apply(rigid, {p.x, p.y, p.z});
-  if (list == kNoValue) return is_inlier_by_search(pair, test, rigid, q, index);
-  const ClosestCandidate best = closest_in_list(pair.cells.candidate, list, q);
+  const ClosestCandidate best = closest_in_list(
+      pair.cells, word.number / 16, __ldg(pair.cells.list + cell_in_bricks(word, cell)), q);
   return best.place != kNoValue &&
          agrees_with(pair, test, rigid,
                      rotate(rigid, normal == kPackedZero ? Vec3{0, 0, 0} : unpack_normal(normal)),

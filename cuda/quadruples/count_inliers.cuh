@@ -73,7 +73,7 @@ __device__ std::uint32_t count_possible(const BrickMotion& motion, const Staged<
 /// An undecided point and the summary of its cell.
 struct Look {
   float4 point, normal;
-  uint2 summary;
+  std::uint32_t summary, list, brick;
   bool counted;  ///< already, by the code of its cell
   __device__ bool has_normal() const { return normal.w != 0.0f; }
 };
@@ -86,8 +86,11 @@ __device__ void finish_look(const ScorePair& pair, const Staged<Points>& staged,
   const BrickWord word = memory.motion.find(cell, staged.runs);
   look.counted = word.there && code_agrees(staged.bricks[word.number], cell,
                                            memory.agreeing[__float_as_uint(look.point.w)]);
-  look.summary = make_uint2(0, 0);
-  if (look.counted) look.summary = __ldg(pair.cells.cell + cell_in_bricks(word, cell));
+  look.summary = look.list = 0;
+  look.brick = word.number / 16;
+  if (!look.counted) return;
+  look.summary = __ldg(pair.cells.summary + cell_in_bricks(word, cell));
+  look.list = __ldg(pair.cells.list + cell_in_bricks(word, cell));
 }
 
 template <typename Points>
@@ -155,14 +158,12 @@ __device__ std::uint32_t count_inliers(const ScoreBatch& b, const ScorePair& pai
     if (now.counted) {
       const Vec3 moved_normal = rotate_fast(memory.rigid, now.normal);
       bool certain;
-      refuted = !may_be_inlier(limits, now.summary.x, moved_normal, now.has_normal(), certain);
+      refuted = !may_be_inlier(limits, now.summary, moved_normal, now.has_normal(), certain);
       if (!refuted && !certain) {
         const Vec3 q = apply(memory.rigid, {now.point.x, now.point.y, now.point.z});
-        refuted = now.summary.y == kNoValue
-                      ? !is_inlier_by_search(pair, b.test, memory.rigid, q, look.index + k)
-                      : !agrees_with(pair, b.test, memory.rigid, moved_normal, now.has_normal(),
-                                     kHalfPackedCosineError, look.index + k,
-                                     closest_in_list(pair.cells.candidate, now.summary.y, q));
+        refuted = !agrees_with(pair, b.test, memory.rigid, moved_normal, now.has_normal(),
+                               kHalfPackedCosineError, look.index + k,
+                               closest_in_list(pair.cells, now.brick, now.list, q));
       }
     }
     if (k + 32 < end) finish_look(pair, staged, memory, next);
@@ -221,12 +222,12 @@ __device__ inline std::uint32_t count_by_block(const ScoreBatch& b, const ScoreP
       const BrickCell cell = motion.locate(point);
       const BrickWord word = motion.find(cell, pair.cells.run);
       if (!word.there) continue;
-      const uint2 summary = __ldg(pair.cells.cell + cell_in_bricks(word, cell));
+      const std::uint32_t summary = __ldg(pair.cells.summary + cell_in_bricks(word, cell));
       const std::uint32_t normal = __ldg(pair.order.normal + k);
       bool certain;
-      const bool possible = may_be_inlier(rigid, limits, summary.x, normal, certain);
+      const bool possible = may_be_inlier(rigid, limits, summary, normal, certain);
       mine += possible && (certain || is_inlier(pair, b.test, rigid, point, normal,
-                                                pair.order.index + k, summary.y));
+                                                pair.order.index + k, word, cell));
     }
   } else {
     support_by_search(pair, b.test, rigid, threadIdx.x, blockDim.x, mine);

@@ -60,11 +60,11 @@ __global__ void __launch_bounds__(kThreads)
                                                     agreeing[s][__float_as_uint(point.w)]);
     bool inlier = false;
     if (possible) {
-      const uint2 summary = __ldg(pair.cells.cell + cell_in_bricks(word, cell));
+      const std::uint32_t summary = __ldg(pair.cells.summary + cell_in_bricks(word, cell));
       bool certain;
-      inlier = may_be_inlier(poses[s], limits, summary.x, normal, certain) &&
+      inlier = may_be_inlier(poses[s], limits, summary, normal, certain) &&
                (certain ||
-                is_inlier(pair, b.test, poses[s], point, normal, pair.order.index + k, summary.y));
+                is_inlier(pair, b.test, poses[s], point, normal, pair.order.index + k, word, cell));
     }
     misses += !possible;
     refuted += possible && !inlier;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "algorithm/icp.hpp"
 #include "algorithm/inlier.hpp"
+#include "cuda/common/closest_cells.cuh"
 #include "cuda/common/stages.hpp"
 #include "cuda/device/block_sum.cuh"
 
@@ -10,7 +11,7 @@ namespace {
 constexpr int kThreads = 512;
 
 struct RefineBatch {
-  const PairView* pairs;
+  const SearchPair* pairs;
   const BestPose* best;
   InlierTest test;
   std::uint32_t max_iterations;
@@ -19,11 +20,11 @@ struct RefineBatch {
 };
 
 /// Terms of one source point, if its closest target point is within distance and normal angle.
-__device__ void add_point(const PairView& pair, const RefineBatch& r, const Rigid& rigid,
+__device__ void add_point(const SearchPair& pair, const RefineBatch& r, const Rigid& rigid,
                           float max_squared, float inverse_max, float inverse_radius,
                           std::uint32_t i, IcpSums& sums) {
   const Vec3 q = apply(rigid, pair.source.points[i]);
-  const Closest c = find_closest(pair.target.closest, pair.target.points, q, max_squared);
+  const Closest c = find_closest(pair.target, pair.target_cells, q, max_squared);
   if (c.index == kNoValue) return;
   const Vec3 normal = pair.target.normals[c.index];
   if (is_zero(normal)) return;
@@ -39,7 +40,7 @@ __global__ void __launch_bounds__(kThreads) refine(RefineBatch r) {
   __shared__ Pose<double> pose;
   __shared__ std::uint32_t iterations;
   __shared__ bool done;
-  const PairView& pair = r.pairs[blockIdx.x];
+  const SearchPair& pair = r.pairs[blockIdx.x];
   const BestPose best = r.best[blockIdx.x];
   if (!best.found) {
     if (threadIdx.x == 0) r.out[blockIdx.x] = best;
@@ -72,7 +73,7 @@ __global__ void __launch_bounds__(kThreads) refine(RefineBatch r) {
   const Rigid rigid = to_rigid(pose);
   std::int64_t support[2] = {0, 0};
   for (std::uint32_t i = threadIdx.x; i < pair.source.size; i += kThreads) {
-    const Closest c = find_closest(pair.target.closest, pair.target.points,
+    const Closest c = find_closest(pair.target, pair.target_cells,
                                    apply(rigid, pair.source.points[i]), r.test.max_squared);
     if (c.index == kNoValue) continue;
     if (!normals_agree(rotate(rigid, pair.source.normals[i]), pair.target.normals[c.index],
@@ -107,7 +108,7 @@ DeviceBuffer<BestPose> refine_poses(Exec& exec, Span<const PairView> pairs,
           "cudaMemcpyAsync");
     return out;
   }
-  const auto views = exec.upload(pairs.data, pairs.size);
+  const auto views = upload_search_pairs(exec, pairs);
   RefineBatch batch{};
   batch.pairs = views.data();
   batch.best = best.data();

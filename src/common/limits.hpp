@@ -48,7 +48,8 @@ constexpr std::uint64_t kMaxGridCandidates = std::uint64_t(1) << 28;
 /// A map of many points may have more: so many per point (about 120 at the default radii), and as
 /// many as 32 bits number.
 constexpr std::uint64_t kMaxCandidatesPerPoint = 256, kMaxMapCandidates = std::uint64_t(1) << 32;
-constexpr std::uint64_t kMaxBlockCandidates = std::uint64_t(1) << 24;
+/// 24 bits number those of a block, with up to seven gaps for each of its 512 lists.
+constexpr std::uint64_t kMaxBlockCandidates = (std::uint64_t(1) << 24) - (std::uint64_t(1) << 12);
 /// Blocks in the dense table of cell summaries. The table of a wider cloud, one with far stray
 /// points, costs more memory than it saves time.
 constexpr std::uint64_t kMaxSummaryBlocks = std::uint64_t(1) << 22;

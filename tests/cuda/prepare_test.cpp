@@ -4,6 +4,7 @@
 #include <limits>
 
 #include "cpu/common/stages.hpp"
+#include "cuda/common/nearest_feature.hpp"
 #include "cuda/common/stages.hpp"
 #include "cuda/gpu.hpp"
 #include "support/data_folder.hpp"
@@ -170,6 +171,13 @@ void expect_same_preparation(const std::vector<RawCloud>& raw, const PrepareOpti
                     expected_closest, cpu_maps, cpu_surface_sides, options);
   for (std::size_t c = 0; c < raw.size(); ++c) {
     SCOPED_TRACE("assembled, cloud " + std::to_string(c));
+    ASSERT_EQ(cpu_closest[c]->candidates.size(), cuda_closest.size[c].candidates);
+    // A cloud with a table of bricks keeps no other arrays of the grid.
+    if (assembled[c]->summaries.nx > 0) {
+      const cuda::CellSummaries& cells = assembled[c]->summaries;
+      ASSERT_EQ(assembled[c]->view_on_device.closest.candidates.size, 0u);
+      ASSERT_EQ(host(on_cuda, cells.run + cells.brick_runs(), 1)[0].y, cuda_closest.size[c].bricks);
+    }
     ASSERT_TRUE(same_bytes(cpu_points[c].points, assembled[c]->copy_points()));
     ASSERT_TRUE(same_bytes(cpu_normals[c], assembled[c]->copy_normals()));
     ASSERT_TRUE(
@@ -177,9 +185,10 @@ void expect_same_preparation(const std::vector<RawCloud>& raw, const PrepareOpti
     const CloudView on_host = expected[c]->view(), &on_gpu = assembled[c]->view_on_device;
     ASSERT_EQ(on_host.wide_features == nullptr, on_gpu.wide_features == nullptr);
     if (on_host.wide_features) {
-      ASSERT_TRUE(same_bytes(
-          expected[c]->wide_features.values,
-          host(on_cuda, on_gpu.wide_features, expected[c]->wide_features.values.size())));
+      const std::size_t rows = std::size_t(on_host.size) * cuda::row_stride(kFpfhSize);
+      ASSERT_TRUE(
+          same_bytes(expected[c]->wide_features.values,
+                     cuda::tight_rows(host(on_cuda, on_gpu.wide_features, rows), kFpfhSize)));
       ASSERT_TRUE(same_bytes(expected[c]->wide_features.valid,
                              host(on_cuda, on_gpu.has_wide_feature, on_host.size)));
     }
@@ -198,10 +207,10 @@ void expect_same_preparation(const std::vector<RawCloud>& raw, const PrepareOpti
               assembled[c]->statistics.points_without_normal);
     ASSERT_EQ(expected[c]->statistics.points_without_feature,
               assembled[c]->statistics.points_without_feature);
-    // Look-ups in both tables agree, whatever the slots of their entries.
+    // Look-ups in both hash tables agree, whatever the slots of their entries.
+    const auto table = host(on_cuda, cuda_closest.table.data() + cuda_closest.table_offset[c],
+                            cuda_closest.table_offset[c + 1] - cuda_closest.table_offset[c]);
     for (std::size_t b = 0; b < cpu_closest[c]->blocks.size(); b += 7) {
-      const auto table = host(on_cuda, assembled[c]->view_on_device.closest.table.data,
-                              assembled[c]->view_on_device.closest.table.size);
       ASSERT_EQ(find_cell(span_of(table), cell_key(cpu_closest[c]->blocks[b])), b);
       if (b > 70) break;
     }

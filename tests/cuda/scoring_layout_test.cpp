@@ -8,13 +8,7 @@
 namespace gpureg::cuda {
 namespace {
 
-ScoringLayout layout_of(Cell lo, Cell hi) {
-  CudaCloud cloud;
-  cloud.size = 2;
-  cloud.block_count = 2;
-  cloud.candidate_count = 2;
-  return scoring_layout(cloud, {lo, hi});
-}
+ScoringLayout layout_of(Cell lo, Cell hi) { return scoring_layout(2, {2, 3, 2, 2, 1}, {lo, hi}); }
 
 TEST(ScoringLayout, HasATableForARoom) {
   const ScoringLayout l = layout_of({-8, -7, -3}, {8, 6, 12});
@@ -39,15 +33,16 @@ TEST(ScoringLayout, CountsCellsIn22BitsAlongEveryAxis) {
   }
   // A large map may have a table of as many places per block; a cloud with stray points may not.
   const CellRange building{{0, 0, 0}, {999, 499, 49}};
-  CudaCloud map;
-  map.size = 16'000'000;
-  map.block_count = 3'000'000;
-  map.candidate_count = std::size_t(84) * map.size;
-  EXPECT_EQ(scoring_layout(map, building).nx, 1000);
-  EXPECT_GT(scoring_layout(map, building).bytes, map.candidate_count * 16);
+  constexpr std::uint32_t kPoints = 16'000'000;
+  ClosestGridSize map{3'000'000, 9'000'000, std::uint64_t(84) * kPoints, std::uint64_t(7) * kPoints,
+                      std::uint64_t(10) * kPoints};
+  EXPECT_EQ(scoring_layout(kPoints, map, building).nx, 1000);
+  EXPECT_GT(scoring_layout(kPoints, map, building).bytes,
+            map.near_points * 20 + map.list_units * 8 + std::uint64_t(map.bricks) * 128 * 8);
   EXPECT_EQ(layout_of(building.lo, building.hi).nx, 0);
-  map.block_count = (1 << 25) + 1;
-  EXPECT_EQ(scoring_layout(map, building).nx, 0) << "its words are not numbered in 32 bits";
+  map.blocks = (1 << 25) + 1;
+  EXPECT_EQ(scoring_layout(kPoints, map, building).nx, 0)
+      << "its words are not numbered in 32 bits";
   const Cell far{1 << 20, 1 << 20, 1 << 20};
   EXPECT_EQ(layout_of({-(1 << 20), -(1 << 20), -(1 << 20)}, far).nx, 0);
 }
