@@ -27,6 +27,8 @@ constexpr double kSameShift = 2, kSameTurn = 0.1;
 /// the pairs across say. Other poses have to be so much less likely: of 25 joins that were tried in
 /// maps of offices and houses without bent parts, none of these was wrong, and below were half.
 constexpr double kLeastOdds = 9, kLead = 8;
+/// A pose is refined from these log odds on.
+constexpr double kWorthRefining = -10;
 /// Noise of the pose of two islands, metres and radians; within an island, there is nearly none.
 constexpr double kShift = 0.1, kTurn = 0.03, kShiftWithin = 0.005, kTurnWithin = 0.002;
 
@@ -134,54 +136,123 @@ std::vector<std::size_t> most_agreed(const std::vector<Suggestion>& all, double 
 struct Trial {
   const Suggestion* suggestion = nullptr;
   std::vector<UnalignedIsometry3d> poses;  ///< of their scans
-  std::size_t first = 0, last = 0;         ///< its pairs across
-  double odds = 0;
+  double alone = 0;                        ///< log odds of the surest pair that suggests it
+  double odds = 0;                         ///< with what the pairs across say
+  std::vector<AuditedPair> across;
+  pose_graph::Graph graph;
 
   UnalignedIsometry3d pose(const Suggestion& of) const {
     return UnalignedIsometry3d(poses[of.target].inverse() * poses[of.source]);
   }
 };
 
+/// Solves the graph of a trial.
+void solve(std::size_t scans, int threads, Trial& trial) {
+  pose_graph::Options options;
+  options.threads = threads;
+  const pose_graph::Result result = pose_graph::optimize(trial.graph, options);
+  trial.poses.assign(scans, no_pose());
+  for (std::size_t k = 0; k < trial.graph.nodes.size(); ++k)
+    trial.poses[static_cast<std::size_t>(trial.graph.nodes[k].id)] = result.world_from_node[k];
+}
+
+pose_graph::Edge edge_between(std::uint32_t source, std::uint32_t target,
+                              const UnalignedIsometry3d& pose,
+                              const pose_graph::UnalignedMatrix6d& information) {
+  pose_graph::Edge edge;
+  edge.source = source;
+  edge.target = target;
+  edge.target_from_source = pose;
+  edge.information = information;
+  edge.kind = pose_graph::EdgeKind::odometry;
+  return edge;
+}
+
 /// The scans of both islands where all suggestions that agree put them.
 Trial trial_of(const Suggestion& chosen, const std::vector<Suggestion>& all, double distance,
                const Islands& islands, const Options& options) {
   Trial out;
   out.suggestion = &chosen;
-  out.odds = chosen.odds;
-  pose_graph::Graph graph;
-  std::vector<std::uint32_t> scans;
+  out.alone = chosen.odds;
   std::map<std::uint32_t, std::uint32_t> last;
   for (std::uint32_t k = 0; k < islands.of_scan.size(); ++k) {
     const std::uint32_t island = islands.of_scan[k];
     if (island != chosen.a && island != chosen.b) continue;
-    scans.push_back(k);
     const UnalignedIsometry3d& pose = islands.island_from_scan[k];
-    graph.nodes.push_back({k, island == chosen.a ? pose : chosen.a_from_b * pose});
+    out.graph.nodes.push_back({k, island == chosen.a ? pose : chosen.a_from_b * pose});
     const auto [at, first] = last.insert({island, k});
     if (!first)
-      graph.edges.push_back(edge_of(odometry_of(
-          k, at->second, islands.island_from_scan[at->second].inverse() * pose, kShiftWithin,
-          kTurnWithin)));
+      out.graph.edges.push_back(
+          edge_of(odometry_of(k, at->second, islands.island_from_scan[at->second].inverse() * pose,
+                              kShiftWithin, kTurnWithin)));
     at->second = k;
   }
   for (const Suggestion& other : all) {
     if (!agree(chosen, other, distance)) continue;
-    out.odds = std::max(out.odds, other.odds);
-    pose_graph::Edge edge;
-    edge.source = other.source;
-    edge.target = other.target;
-    edge.target_from_source = other.target_from_source;
-    edge.information = other.information;
-    edge.kind = pose_graph::EdgeKind::odometry;
-    graph.edges.push_back(edge);
+    out.alone = std::max(out.alone, other.odds);
+    out.graph.edges.push_back(
+        edge_between(other.source, other.target, other.target_from_source, other.information));
   }
-  pose_graph::Options graph_options;
-  graph_options.threads = options.threads;
-  const pose_graph::Result result = pose_graph::optimize(graph, graph_options);
-  out.poses.assign(islands.of_scan.size(), no_pose());
-  for (std::size_t k = 0; k < scans.size(); ++k) out.poses[scans[k]] = result.world_from_node[k];
+  solve(islands.of_scan.size(), options.threads, out);
   return out;
 }
+
+/// Judges poses of two islands by the pairs between them.
+struct Auditor {
+  const Context& context;
+  const std::vector<PreparedCloud>& clouds;
+  const RegistrationOptions& registration;
+  const AuditOptions& options;
+  const Islands& islands;
+  const Options& reconstruction;
+
+  /// In one batch.
+  void judge(std::vector<Trial>& trials) const {
+    std::vector<AuditedPair> across;
+    std::vector<std::size_t> first;
+    for (const Trial& trial : trials) {
+      first.push_back(across.size());
+      for (const Pair& near : near_pairs(clouds, trial.poses, {}, options.most_pairs)) {
+        if (islands.of_scan[near.source] == islands.of_scan[near.target]) continue;
+        AuditedPair pair;
+        pair.source = near.source;
+        pair.target = near.target;
+        pair.target_from_source = trial.poses[near.target].inverse() * trial.poses[near.source];
+        across.push_back(pair);
+      }
+    }
+    first.push_back(across.size());
+    judge_pairs(context, clouds, registration, options, across);
+    for (std::size_t k = 0; k < trials.size(); ++k) {
+      Trial& trial = trials[k];
+      const auto at = [&](std::size_t pair) {
+        return across.begin() + static_cast<std::ptrdiff_t>(pair);
+      };
+      trial.across.assign(at(first[k]), at(first[k + 1]));
+      const std::uint32_t a = trial.suggestion->a;
+      trial.odds = trial.alone + log_odds_between(
+                                     trial.across,
+                                     [&](std::uint32_t scan) { return islands.of_scan[scan] == a; },
+                                     trial.poses, options);
+    }
+  }
+
+  /// Where the pairs that support the pose go by ICP.
+  Trial refined(const Trial& trial) const {
+    Trial out = trial;
+    for (const AuditedPair& pair : trial.across) {
+      if (pair.log_likelihood_ratio <= 0) continue;
+      RegistrationMode mode;
+      mode.target_from_source = pair.refined;
+      out.graph.edges.push_back(
+          edge_between(pair.source, pair.target, pair.refined,
+                       edge_information(mode, pair.overlap_centre, reconstruction.noise,
+                                        reconstruction.information_unit)));
+    }
+    solve(islands.of_scan.size(), reconstruction.threads, out);
+    return out;
+  }
+};
 
 /// Whether another pose of the same islands is nearly as likely.
 bool rivals(const Trial& best, const Trial& other, double distance) {
@@ -208,31 +279,17 @@ std::vector<Odometry> confirmed_joins(const Context& context,
   const double distance = kSameShift * options.max_shift;
   const Between between = suggestions(pairs, results, refined, islands, reconstruction);
   std::vector<Trial> trials;
-  std::vector<AuditedPair> across;
   for (const auto& [both, all] : between)
-    for (const std::size_t k : most_agreed(all, distance)) {
-      Trial trial = trial_of(all[k], all, distance, islands, reconstruction);
-      trial.first = across.size();
-      for (const Pair& near : near_pairs(clouds, trial.poses, {}, options.most_pairs)) {
-        if (islands.of_scan[near.source] == islands.of_scan[near.target]) continue;
-        AuditedPair pair;
-        pair.source = near.source;
-        pair.target = near.target;
-        pair.target_from_source = trial.poses[near.target].inverse() * trial.poses[near.source];
-        across.push_back(pair);
-      }
-      trial.last = across.size();
-      trials.push_back(std::move(trial));
-    }
-  judge_pairs(context, clouds, registration, options, across);
-  for (Trial& trial : trials) {
-    const auto at = [&](std::size_t k) { return across.begin() + static_cast<std::ptrdiff_t>(k); };
-    const std::vector<AuditedPair> heard(at(trial.first), at(trial.last));
-    const std::uint32_t a = trial.suggestion->a;
-    trial.odds += log_odds_between(
-        heard, [&](std::uint32_t scan) { return islands.of_scan[scan] == a; }, trial.poses,
-        options);
-  }
+    for (const std::size_t k : most_agreed(all, distance))
+      trials.push_back(trial_of(all[k], all, distance, islands, reconstruction));
+  Auditor auditor{context, clouds, registration, options, islands, reconstruction};
+  auditor.judge(trials);
+  // The pairs across refine the pose: what contradicts it may go away.
+  std::vector<Trial> better;
+  for (const Trial& trial : trials)
+    if (trial.odds >= kWorthRefining) better.push_back(auditor.refined(trial));
+  auditor.judge(better);
+  trials.insert(trials.end(), better.begin(), better.end());
   std::stable_sort(trials.begin(), trials.end(),
                    [](const Trial& x, const Trial& y) { return x.odds > y.odds; });
   std::vector<char> asked(map.islands.size(), 0);

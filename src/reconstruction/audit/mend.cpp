@@ -29,6 +29,8 @@ constexpr double kOfNumbers = 3;
 constexpr std::size_t kLeastPart = 8;
 /// Shift from which a scan has another pose, metres, and the same for the entries of its rotation.
 constexpr double kMoved = 0.02;
+/// Scans that may alone be wrong: so many, or this share.
+constexpr double kFew = 2, kFewOfAll = 0.05;
 /// Pairs are aligned at most so often.
 constexpr int kMostPasses = 3;
 
@@ -44,6 +46,16 @@ std::vector<std::string> sides_of(std::size_t scans, const Audit& found) {
     for (const std::uint32_t scan : found.scans_of(connection)) sides[scan].back() = '1';
   }
   return sides;
+}
+
+/// The pairs that contradict a connection that is contradicted. Others look wrong, too, in right
+/// maps, and say nothing here.
+std::vector<const AuditedPair*> contradictions_of(const Audit& found) {
+  std::vector<const AuditedPair*> out;
+  for (const AuditedConnection& connection : found.connections)
+    if (connection.verdict == ConnectionVerdict::contradicted)
+      for (const std::size_t k : connection.contradictions) out.push_back(&found.pairs[k]);
+  return out;
 }
 
 /// What pairs between parts say of them.
@@ -109,28 +121,39 @@ Parts parts_of(const std::vector<UnalignedIsometry3d>& poses, const Audit& found
   const auto scans = static_cast<std::uint32_t>(poses.size());
   const std::vector<std::string> sides = sides_of(scans, found);
   Affinities affinities(scans);
+  const std::vector<const AuditedPair*> contradictions = contradictions_of(found);
+  for (const AuditedPair* pair : contradictions)
+    affinities.add(pair->source, pair->target, pair->log_likelihood_ratio);
   for (const AuditedPair& pair : found.pairs)
-    if (pair.log_likelihood_ratio < 0 || sides[pair.source] == sides[pair.target])
+    if (pair.log_likelihood_ratio > 0 && sides[pair.source] == sides[pair.target])
       affinities.add(pair.source, pair.target, pair.log_likelihood_ratio);
   Parts out = affinities.merged();
   std::map<std::uint32_t, std::size_t> sizes;
   for (const std::uint32_t part : out) ++sizes[part];
+  std::set<std::uint32_t> doubtful;
+  for (const AuditedPair* pair : contradictions)
+    doubtful.insert({out[pair->source], out[pair->target]});
+  const auto stays = [&](std::uint32_t part) {
+    return sizes[part] >= kLeastPart || doubtful.count(part) == 0;
+  };
   std::set<std::pair<std::uint32_t, std::uint32_t>> heard;
   for (std::uint32_t k = 0, last = kNoPart; k < scans; ++k) {
     if (!poses[k].matrix().allFinite()) continue;
-    if (last != kNoPart && sides[last] == sides[k] &&
-        std::min(sizes[out[last]], sizes[out[k]]) >= kLeastPart &&
+    if (last != kNoPart && sides[last] == sides[k] && stays(out[last]) && stays(out[k]) &&
         heard.insert(std::minmax(out[last], out[k])).second)
       affinities.add(last, k, kOfNumbers);
     last = k;
   }
   out = affinities.merged();
+  doubtful.clear();
+  for (const AuditedPair* pair : contradictions)
+    doubtful.insert({out[pair->source], out[pair->target]});
   sizes.clear();
   for (const std::uint32_t part : out) ++sizes[part];
   for (std::uint32_t k = 0; k < scans; ++k)
     if (!poses[k].matrix().allFinite())
       out[k] = kNoPart;
-    else if (sizes[out[k]] < kLeastPart)
+    else if (sizes[out[k]] < kLeastPart && doubtful.count(out[k]) > 0)
       out[k] = k;
   return out;
 }
@@ -233,13 +256,57 @@ void list_changes(const std::vector<UnalignedIsometry3d>& before, MendedMap& out
   }
 }
 
+/// Scans that take part in all contradictions, greedily: the one with the most of them first.
+std::vector<std::uint32_t> blamed_scans(const Audit& found, std::size_t scans) {
+  std::vector<const AuditedPair*> left = contradictions_of(found);
+  std::vector<std::uint32_t> out;
+  while (!left.empty()) {
+    std::vector<double> blame(scans, 0);
+    for (const AuditedPair* pair : left)
+      for (const std::uint32_t scan : {pair->source, pair->target})
+        blame[scan] -= pair->log_likelihood_ratio;
+    const auto most =
+        static_cast<std::uint32_t>(std::max_element(blame.begin(), blame.end()) - blame.begin());
+    out.push_back(most);
+    left.erase(std::remove_if(left.begin(), left.end(),
+                              [&](const AuditedPair* pair) {
+                                return pair->source == most || pair->target == most;
+                              }),
+               left.end());
+  }
+  return out;
+}
+
+/// Where the map is sound without a few scans, and hangs together as before, they alone are wrong:
+/// each is a part of its own, and the others are one. Empty: it is not so.
+Parts parts_without_few(const Context& context, const std::vector<PreparedCloud>& clouds,
+                        const std::vector<UnalignedIsometry3d>& poses, const Audit& found,
+                        const RegistrationOptions& registration, const AuditOptions& options) {
+  const std::vector<std::uint32_t> few = blamed_scans(found, poses.size());
+  if (static_cast<double>(few.size()) >
+      std::max(kFew, kFewOfAll * static_cast<double>(found.order.size())))
+    return {};
+  std::vector<UnalignedIsometry3d> rest = poses;
+  for (const std::uint32_t scan : few) rest[scan] = no_pose();
+  const Audit left = audit(context, clouds, rest, registration, options);
+  if (!left.sound() ||
+      left.count(ConnectionVerdict::undecided) > found.count(ConnectionVerdict::undecided))
+    return {};
+  Parts out(poses.size(), kNoPart);
+  for (std::uint32_t k = 0; k < poses.size(); ++k)
+    if (poses[k].matrix().allFinite())
+      out[k] = rest[k].matrix().allFinite() ? static_cast<std::uint32_t>(poses.size()) : k;
+  return out;
+}
+
 /// Takes the map apart, and puts the parts together.
 MendedMap put_together(const Context& context, const std::vector<PreparedCloud>& clouds,
                        const std::vector<UnalignedIsometry3d>& poses, const Audit& found,
                        const RegistrationOptions& registration, const AuditOptions& options) {
   MendedMap out;
   out.world_from_scan = poses;
-  const Parts parts = parts_of(poses, found);
+  Parts parts = parts_without_few(context, clouds, poses, found, registration, options);
+  if (parts.empty()) parts = parts_of(poses, found);
   const auto reconstruction = Options::from_voxel_size(registration.prepare.voxel_size);
   std::vector<Pair> pairs, more = pairs_to_align(parts, found);
   std::vector<RegistrationResult> results;
