@@ -61,38 +61,18 @@ def points_of(message: Any) -> npt.NDArray[Any]:
     points = points[np.isfinite(points).all(axis=1)]
     if len(points) == 0:
         raise ValueError(f"data: none of {width * height} points is finite")
-    return points.astype(points.dtype.newbyteorder("="), copy=False)
+    return np.asarray(points, points.dtype.newbyteorder("="))
 
 
 def quaternion_of(rotation: FloatArray) -> FloatArray:
     """x, y, z, w of a rotation matrix, w >= 0."""
-    r = rotation
-    # Four times the outer product of the quaternion with itself; its longest row is accurate.
-    outer = np.array(
-        [
-            [
-                1 + r[0, 0] - r[1, 1] - r[2, 2],
-                r[0, 1] + r[1, 0],
-                r[0, 2] + r[2, 0],
-                r[2, 1] - r[1, 2],
-            ],
-            [
-                r[0, 1] + r[1, 0],
-                1 - r[0, 0] + r[1, 1] - r[2, 2],
-                r[1, 2] + r[2, 1],
-                r[0, 2] - r[2, 0],
-            ],
-            [
-                r[0, 2] + r[2, 0],
-                r[1, 2] + r[2, 1],
-                1 - r[0, 0] - r[1, 1] + r[2, 2],
-                r[1, 0] - r[0, 1],
-            ],
-            [r[2, 1] - r[1, 2], r[0, 2] - r[2, 0], r[1, 0] - r[0, 1], 1 + np.trace(r)],
-        ]
-    )
-    longest = outer[np.argmax(np.diag(outer))]
-    return longest / np.linalg.norm(longest) * (1 if longest[3] >= 0 else -1)
+    r, trace = rotation, np.trace(rotation)
+    outer = np.empty((4, 4))  # four times the outer product of the quaternion with itself
+    outer[:3, :3] = r + r.T + (1 - trace) * np.eye(3)
+    outer[3, :3] = outer[:3, 3] = r[2, 1] - r[1, 2], r[0, 2] - r[2, 0], r[1, 0] - r[0, 1]
+    outer[3, 3] = 1 + trace
+    row = outer[np.argmax(np.diag(outer))]  # the longest is the most accurate
+    return np.asarray(np.copysign(1, row[3]) * row / np.linalg.norm(row))
 
 
 def _skew(v: FloatArray) -> FloatArray:
@@ -142,7 +122,7 @@ def covariance_of(
     by_error = np.zeros((6, 6))
     by_error[:3, :3] = _skew(rotation @ centre)
     by_error[:3, 3:] = by_error[3:, :3] = np.eye(3)
-    return by_error @ covariance @ by_error.T
+    return np.asarray(by_error @ covariance @ by_error.T)
 
 
 @dataclasses.dataclass(frozen=True)
