@@ -6,8 +6,7 @@
 /// Search in the candidates of a cell.
 namespace gpureg::cuda {
 
-__device__ inline BlockLists lists_of_brick(const CellSummaries& cells, std::uint32_t brick) {
-  const uint2 packed = __ldg(cells.block + brick);
+__device__ inline BlockLists unpack_block_lists(const CellSummaries& cells, uint2 packed) {
   return {cells.positions +
               static_cast<std::size_t>(packed.y & ~kListBit) * (kListUnit / sizeof(std::uint32_t)),
           packed.x & ~kListBit, packed.x >> 31 | packed.y >> 31 << 1};
@@ -19,12 +18,12 @@ struct ClosestCandidate {
   std::uint32_t place;  ///< in the near lists of the cloud; kNoValue: the cell has no candidates
 };
 
-/// closest_candidate() of the cell with this word.
-__device__ inline ClosestCandidate closest_in_list(const CellSummaries& cells, std::uint32_t brick,
+/// closest_candidate() of the cell with this word, in a brick with this entry of
+/// CellSummaries::block. Callers load the two at once.
+__device__ inline ClosestCandidate closest_in_list(const CellSummaries& cells, uint2 block,
                                                    std::uint32_t word, Vec3 q) {
   constexpr std::uint32_t kAtOnce = 4;  // loads in flight hide the latency of memory
-  // Before the word is read: both loads are in flight.
-  const BlockLists lists = lists_of_brick(cells, brick);
+  const BlockLists lists = unpack_block_lists(cells, block);
   std::uint32_t count = word & 255u, first = word >> 8;
   if (count == 0) return {3.402823466e38f, kNoValue};
   const bool in_word = fits_word(count, lists.size);

@@ -86,8 +86,9 @@ __device__ inline FoundPoint find_point(const CloudView& cloud, const CellSummar
   if (!inside(c.x, cells.nx) || !inside(c.y, cells.ny) || !inside(c.z, cells.nz)) return none;
   const BrickWord word = BrickTable(cells, 0).find(c, cells.run);
   if (!word.there) return none;
+  const uint2 block = __ldg(cells.block + word.number / 16);
   const ClosestCandidate best =
-      closest_in_list(cells, word.number / 16, __ldg(cells.list + cell_in_bricks(word, c)), q);
+      closest_in_list(cells, block, __ldg(&cells.cell[cell_in_bricks(word, c)].y), q);
   if (best.place == kNoValue || !(best.squared_distance <= max_squared)) return none;
   const float4 near = __ldg(cells.near + best.place);  // read a moment ago
   return {best.squared_distance,

@@ -46,8 +46,7 @@ CloudArrays CloudArrays::moved(const char* from, char* to) const {
   CellSummaries& s = out.summaries;
   move(s.run);
   move(s.brick);
-  move(s.summary);
-  move(s.list);
+  move(s.cell);
   move(s.block);
   move(s.positions);
   move(s.near);

@@ -127,8 +127,8 @@ struct CellSummaries {
   /// number of bricks up to the last of them; then (0, all bricks)
   uint2* run = nullptr;
   std::uint32_t* brick = nullptr;       ///< bricks x 16 (z, y): codes of eight cells along x
-  std::uint32_t* summary = nullptr;     ///< bricks x 128 (z, y, x)
-  std::uint32_t* list = nullptr;        ///< bricks x 128: candidates, see candidate_lists.hpp
+  /// bricks x 128 (z, y, x): summary, and candidates by candidate_lists.hpp
+  uint2* cell = nullptr;
   uint2* block = nullptr;               ///< bricks: lists of the block of each, packed
   std::uint32_t* positions = nullptr;   ///< the lists of all cells
   float4* near = nullptr;               ///< the near lists of all blocks: x, y, z, packed normal

@@ -69,7 +69,7 @@ __global__ void __launch_bounds__(kCells) write_lists(const ScoringSlot* slots) 
           words[first + k] = position;
       }
     }
-    s.summaries.list[std::size_t(at.number) * 8 + (cell & 7)] = word;
+    s.summaries.cell[std::size_t(at.number) * 8 + (cell & 7)].y = word;
   }
 }
 

@@ -100,7 +100,7 @@ __global__ void summarize(const ScoringSlot* slots, const DirectionTables* table
     const BrickWord word = brick_word(s.summaries, block, cell);
     if (!word.there) continue;
     if ((cell & 7) == 0) s.summaries.brick[word.number] = codes;
-    s.summaries.summary[std::size_t(word.number) * 8 + (cell & 7)] =
+    s.summaries.cell[std::size_t(word.number) * 8 + (cell & 7)].x =
         empty ? 0u
               : summarize_cell(candidates, cell_center(c, s.geometry.cell_size), s.geometry,
                                s.view.points, s.view.normals);
@@ -194,8 +194,7 @@ ScoringLayout scoring_layout(std::uint32_t points, const ClosestGridSize& size,
   l.points = take(padded * sizeof(float4));
   l.normals = take(padded * sizeof(std::uint32_t));
   l.index = take(padded * sizeof(std::uint32_t));
-  l.lists = take(bricks * kBrickCells * sizeof(std::uint32_t));
-  l.summaries = take(bricks * kBrickCells * sizeof(std::uint32_t));
+  l.cells = take(bricks * kBrickCells * sizeof(uint2));
   l.blocks = take(bricks * sizeof(uint2));
   l.runs = take(fits ? (std::size_t(shape.brick_runs()) + 1) * sizeof(uint2) : 0);
   l.bricks = take(bricks * (kBrickCells / 8) * sizeof(std::uint32_t));
@@ -219,8 +218,7 @@ void place_scoring_data(const ScoringLayout& l, const ClosestGeometry& geometry,
   cloud.order.point = reinterpret_cast<float4*>(memory + l.points);
   cloud.order.normal = reinterpret_cast<std::uint32_t*>(memory + l.normals);
   cloud.order.index = reinterpret_cast<std::uint32_t*>(memory + l.index);
-  v.summary = reinterpret_cast<std::uint32_t*>(memory + l.summaries);
-  v.list = reinterpret_cast<std::uint32_t*>(memory + l.lists);
+  v.cell = reinterpret_cast<uint2*>(memory + l.cells);
   v.run = reinterpret_cast<uint2*>(memory + l.runs);
   v.brick = reinterpret_cast<std::uint32_t*>(memory + l.bricks);
   v.block = reinterpret_cast<uint2*>(memory + l.blocks);

@@ -12,7 +12,7 @@ struct ScoringLayout {
   Cell first_block;         ///< of the table
   std::int32_t nx, ny, nz;  ///< 0: too wide for a table
   /// where each array begins
-  std::size_t runs, bricks, blocks, summaries, lists, positions, near, near_index;
+  std::size_t runs, bricks, blocks, cells, positions, near, near_index;
   std::size_t points, normals, index;
   std::size_t bytes;
   bool has_table() const { return nx > 0; }

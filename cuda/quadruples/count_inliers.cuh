@@ -73,7 +73,8 @@ __device__ std::uint32_t count_possible(const BrickMotion& motion, const Staged<
 /// An undecided point and the summary of its cell.
 struct Look {
   float4 point, normal;
-  std::uint32_t summary, list, brick;
+  uint2 cell;   ///< summary and list
+  uint2 block;  ///< lists of its block
   bool counted;  ///< already, by the code of its cell
   __device__ bool has_normal() const { return normal.w != 0.0f; }
 };
@@ -86,11 +87,10 @@ __device__ void finish_look(const ScorePair& pair, const Staged<Points>& staged,
   const BrickWord word = memory.motion.find(cell, staged.runs);
   look.counted = word.there && code_agrees(staged.bricks[word.number], cell,
                                            memory.agreeing[__float_as_uint(look.point.w)]);
-  look.summary = look.list = 0;
-  look.brick = word.number / 16;
+  look.cell = look.block = {};
   if (!look.counted) return;
-  look.summary = __ldg(pair.cells.summary + cell_in_bricks(word, cell));
-  look.list = __ldg(pair.cells.list + cell_in_bricks(word, cell));
+  look.cell = __ldg(pair.cells.cell + cell_in_bricks(word, cell));
+  look.block = __ldg(pair.cells.block + word.number / 16);
 }
 
 template <typename Points>
@@ -158,12 +158,12 @@ __device__ std::uint32_t count_inliers(const ScoreBatch& b, const ScorePair& pai
     if (now.counted) {
       const Vec3 moved_normal = rotate_fast(memory.rigid, now.normal);
       bool certain;
-      refuted = !may_be_inlier(limits, now.summary, moved_normal, now.has_normal(), certain);
+      refuted = !may_be_inlier(limits, now.cell.x, moved_normal, now.has_normal(), certain);
       if (!refuted && !certain) {
         const Vec3 q = apply(memory.rigid, {now.point.x, now.point.y, now.point.z});
         refuted = !agrees_with(pair, b.test, memory.rigid, moved_normal, now.has_normal(),
                                kHalfPackedCosineError, look.index + k,
-                               closest_in_list(pair.cells, now.brick, now.list, q));
+                               closest_in_list(pair.cells, now.block, now.cell.y, q));
       }
     }
     if (k + 32 < end) finish_look(pair, staged, memory, next);
@@ -222,7 +222,7 @@ __device__ inline std::uint32_t count_by_block(const ScoreBatch& b, const ScoreP
       const BrickCell cell = motion.locate(point);
       const BrickWord word = motion.find(cell, pair.cells.run);
       if (!word.there) continue;
-      const std::uint32_t summary = __ldg(pair.cells.summary + cell_in_bricks(word, cell));
+      const std::uint32_t summary = __ldg(&pair.cells.cell[cell_in_bricks(word, cell)].x);
       const std::uint32_t normal = __ldg(pair.order.normal + k);
       bool certain;
       const bool possible = may_be_inlier(rigid, limits, summary, normal, certain);

@@ -35,7 +35,7 @@ __global__ void __launch_bounds__(kProbeThreads) probe(ScoreBatch b) {
         const BrickWord word = motion.find(cell, pair.cells.run);
         possible +=
             word.there && may_be_inlier(rigid, limits + pair.limits * 256,
-                                        __ldg(pair.cells.summary + cell_in_bricks(word, cell)),
+                                        __ldg(&pair.cells.cell[cell_in_bricks(word, cell)].x),
                                         __ldg(pair.order.normal + g * 32 + lane), certain);
       }
       possible = warp_sum(possible);

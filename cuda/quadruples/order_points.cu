@@ -60,7 +60,7 @@ __global__ void __launch_bounds__(kThreads)
                                                     agreeing[s][__float_as_uint(point.w)]);
     bool inlier = false;
     if (possible) {
-      const std::uint32_t summary = __ldg(pair.cells.summary + cell_in_bricks(word, cell));
+      const std::uint32_t summary = __ldg(&pair.cells.cell[cell_in_bricks(word, cell)].x);
       bool certain;
       inlier = may_be_inlier(poses[s], limits, summary, normal, certain) &&
                (certain ||

@@ -39,8 +39,8 @@ ListCounts count_lists(cuda::Exec& exec, const cuda::CudaCloud& cloud) {
   for (const uint2 block : host(exec, cells.block, last.y))
     ++counts.bricks[block.x >> 31 | block.y >> 31 << 1];
   constexpr std::size_t kBrickCells = ClosestGridView::kBlockCells / 4;
-  for (const std::uint32_t word : host(exec, cells.list, last.y * kBrickCells))
-    counts.long_lists += (word & 255u) == cuda::kLongList;
+  for (const uint2 cell : host(exec, cells.cell, last.y * kBrickCells))
+    counts.long_lists += (cell.y & 255u) == cuda::kLongList;
   return counts;
 }
 
