@@ -168,6 +168,7 @@ BENCHMARK(many_fragments)
     ->Arg(200)
     ->Arg(500)
     ->Arg(2000)
+    ->Arg(10000)
     ->Iterations(1)
     ->Apply(elapsed);
 

@@ -126,7 +126,7 @@ struct CellSummaries {
   /// rows z, rows y, words x: 32 bricks along x, the first in the highest bit, and 16 times the
   /// number of bricks up to the last of them; then (0, all bricks)
   uint2* run = nullptr;
-  std::uint32_t* brick = nullptr;       ///< bricks x 16 (z, y): codes of eight cells along x
+  std::uint32_t* brick = nullptr;  ///< bricks x 16 (z, y): codes of eight cells along x
   /// bricks x 128 (z, y, x): summary, and candidates by candidate_lists.hpp
   uint2* cell = nullptr;
   uint2* block = nullptr;               ///< bricks: lists of the block of each, packed

@@ -76,8 +76,8 @@ __device__ inline bool is_inlier(const ScorePair& pair, const InlierTest& test, 
                                  BrickWord word, BrickCell cell) {
   const Vec3 q = apply(rigid, {p.x, p.y, p.z});
   const uint2 block = __ldg(pair.cells.block + word.number / 16);
-  const ClosestCandidate best = closest_in_list(
-      pair.cells, block, __ldg(&pair.cells.cell[cell_in_bricks(word, cell)].y), q);
+  const ClosestCandidate best =
+      closest_in_list(pair.cells, block, __ldg(&pair.cells.cell[cell_in_bricks(word, cell)].y), q);
   return best.place != kNoValue &&
          agrees_with(pair, test, rigid,
                      rotate(rigid, normal == kPackedZero ? Vec3{0, 0, 0} : unpack_normal(normal)),

@@ -73,8 +73,8 @@ __device__ std::uint32_t count_possible(const BrickMotion& motion, const Staged<
 /// An undecided point and the summary of its cell.
 struct Look {
   float4 point, normal;
-  uint2 cell;   ///< summary and list
-  uint2 block;  ///< lists of its block
+  uint2 cell;    ///< summary and list
+  uint2 block;   ///< lists of its block
   bool counted;  ///< already, by the code of its cell
   __device__ bool has_normal() const { return normal.w != 0.0f; }
 };

@@ -70,9 +70,9 @@ class SharedRuns {
 /// first chunk, it is that of a prepared point. Later chunks follow what the earlier ones took.
 class RawPointBudget {
  public:
-  /// Memory of a prepared point with default options: 2.5 to 2.8 KB on room-sized scans, half of it
-  /// the closest-point grid.
-  static constexpr std::size_t kBytesPerPreparedPoint = 2816;
+  /// Memory of a prepared point with default options: 1.1 to 1.3 KB on room-sized scans, and what
+  /// depth maps of several viewpoints add.
+  static constexpr std::size_t kBytesPerPreparedPoint = 1536;
   /// Later clouds may be sparser than the measured ones, so that fewer of their points merge.
   static constexpr std::size_t kMargin = 2;
 

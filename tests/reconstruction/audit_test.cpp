@@ -8,12 +8,11 @@
 #include <random>
 
 #include "gpureg/error.hpp"
-#include "gpureg/reconstruction/mend.hpp"
 #include "reconstruction/audit/blame.hpp"
 #include "reconstruction/audit/edge_confidence.hpp"
 #include "reconstruction/audit/near_pairs.hpp"
+#include "support/audited_room.hpp"
 #include "support/registration_result.hpp"
-#include "support/scan.hpp"
 
 namespace gpureg::test {
 namespace {
@@ -249,57 +248,6 @@ TEST(MapConfidence, TheMarginGrowsWithTheDistanceOfTheScans) {
   }
 }
 
-/// Scans of a room, each without another slice of it, at their places in the room.
-struct AuditedRoom : ::testing::Test {
-  AuditedRoom() {
-    options = RegistrationOptions::from_voxel_size(0.1f);
-    for (unsigned k = 0; k < 6; ++k) {
-      std::mt19937 random(k + 1);
-      world_from_scan.emplace_back(k == 0 ? Eigen::Isometry3d::Identity() : random_pose(random));
-      const Eigen::Isometry3d scan_from_world(world_from_scan.back().inverse().matrix());
-      const std::vector<Eigen::Vector3f> points = moved(scan_from_world, scan_room(random));
-      const Eigen::Vector3f sensor = (scan_from_world * kRoomSensor.cast<double>()).cast<float>();
-      PointCloudView view;
-      view.points = points.front().data();
-      view.size = points.size();
-      view.viewpoints = sensor.data();
-      view.viewpoint_count = 1;
-      clouds.push_back(prepare(context, view, options.prepare));
-    }
-  }
-
-  Audit audited(const std::vector<UnalignedIsometry3d>& poses) const {
-    return audit(context, clouds, poses, options, AuditOptions::from_voxel_size(0.1f));
-  }
-
-  std::vector<UnalignedIsometry3d> with_slip(std::size_t scan, double metres) const {
-    std::vector<UnalignedIsometry3d> poses = world_from_scan;
-    poses[scan].translation() += metres * Eigen::Vector3d(0.6, 0.48, 0.64);
-    return poses;
-  }
-
-  /// Registrations are right to a few millimetres here; parts keep their shape.
-  void expect_mended(const std::vector<UnalignedIsometry3d>& poses) const {
-    const AuditOptions audit_options = AuditOptions::from_voxel_size(0.1f);
-    const Audit found = audit(context, clouds, poses, options, audit_options);
-    ASSERT_FALSE(found.sound());
-    const MendedMap mended = mend(context, clouds, poses, found, options, audit_options);
-    EXPECT_TRUE(mended.audit.sound());
-    EXPECT_TRUE(mended.left_out.empty());
-    const UnalignedIsometry3d back = world_from_scan[0] * mended.world_from_scan[0].inverse();
-    for (std::size_t k = 0; k < 6; ++k)
-      EXPECT_LT((back * mended.world_from_scan[k].translation() - world_from_scan[k].translation())
-                    .norm(),
-                0.03)
-          << k;
-  }
-
-  Context context = Context::cpu(1);
-  RegistrationOptions options;
-  std::vector<PreparedCloud> clouds;
-  std::vector<UnalignedIsometry3d> world_from_scan;
-};
-
 TEST_F(AuditedRoom, ARightMapIsSound) {
   const Audit result = audited(world_from_scan);
   EXPECT_EQ(result.pairs.size(), 15u);
@@ -442,20 +390,6 @@ TEST_F(AuditedRoom, EdgesOfAContradictedConnectionAreTakenOut) {
     EXPECT_EQ(edge.accepted, (edge.source < 4) == (edge.target < 4));
     EXPECT_EQ(edge.map_confidence > 0.9, edge.accepted);
   }
-}
-
-TEST_F(AuditedRoom, ASlipIsMended) {
-  std::vector<UnalignedIsometry3d> poses = world_from_scan;
-  for (std::size_t k = 3; k < 6; ++k) poses[k].translation() += Eigen::Vector3d(0.4, 0.3, 0.1);
-  expect_mended(poses);
-}
-
-// As a false loop does it to the scans between its ends.
-TEST_F(AuditedRoom, BentScansAreMended) {
-  std::vector<UnalignedIsometry3d> poses = world_from_scan;
-  for (std::size_t k = 0; k < 6; ++k)
-    poses[k].translation() += static_cast<double>(k) * Eigen::Vector3d(0.2, 0.15, 0.05);
-  expect_mended(poses);
 }
 
 TEST_F(AuditedRoom, NearPairsAreThoseThatMeet) {

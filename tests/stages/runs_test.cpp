@@ -61,21 +61,21 @@ TEST(SharedRuns, StopLeavesNothing) {
 
 // Clouds that keep so much of their points: the prepared bytes of a chunk stay within the budget.
 TEST(RawPointBudget, HoldsForAnyDownsampling) {
-  constexpr std::size_t kBudget = std::size_t(256) << 20, kCloud = 5000;
+  constexpr std::size_t kBudget = std::size_t(256) << 20, kCloud = 5000, kPoint = 1500;
   for (const std::size_t prepared_of_ten : {1u, 3u, 10u}) {
     RawPointBudget budget(kBudget, std::size_t(1) << 22);
     std::size_t largest = 0, chunks = 0;
     for (std::size_t left = 2000; left > 0; ++chunks) {
       const std::size_t clouds =
           std::min(left, std::max<std::size_t>(1, budget.most_points() / kCloud));
-      const std::size_t bytes = clouds * kCloud * prepared_of_ten / 10 * 2800;
+      const std::size_t bytes = clouds * kCloud * prepared_of_ten / 10 * kPoint;
       budget.measured(clouds * kCloud, bytes);
       largest = std::max(largest, bytes);
       left -= clouds;
     }
     EXPECT_LE(largest, kBudget) << prepared_of_ten;
     // Half the budget or more is used: two chunks instead of many small ones.
-    EXPECT_LE(chunks, 3 + 2 * (2000 * kCloud * prepared_of_ten / 10 * 2800) / kBudget);
+    EXPECT_LE(chunks, 3 + 2 * (2000 * kCloud * prepared_of_ten / 10 * kPoint) / kBudget);
   }
 }
 
