@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""Draws bench/notes/images/scaling.png, cost as the work grows, from bench/results/pipeline_h200.json.
+"""Draws bench/notes/images/scaling.png, cost as the work grows, from bench/results/pipeline.json.
 Needs matplotlib.
 """
 
@@ -14,7 +14,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
-RECORD = json.loads((ROOT / "bench/results/pipeline_h200.json").read_text())
+RECORD = json.loads((ROOT / "bench/results/pipeline.json").read_text())
 RUNS = {
     run["name"].split("/real_time")[0].split("/iterations")[0]: run for run in RECORD["benchmarks"]
 }

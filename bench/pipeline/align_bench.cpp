@@ -162,6 +162,7 @@ void redwood_sized(benchmark::State& state, const std::string& backend) {
 BENCHMARK_CAPTURE(align_many, cuda_loopsmart, "cuda", "loopsmart")->Arg(11)->Apply(elapsed);
 BENCHMARK_CAPTURE(align_many, cuda_loopsmart_all, "cuda", "loopsmart_all")->Arg(11)->Apply(elapsed);
 BENCHMARK_CAPTURE(align_many, cuda_default, "cuda", "default")->Arg(11)->Apply(elapsed);
+BENCHMARK_CAPTURE(align_many, cuda_all_default, "cuda_all", "default")->Arg(11)->Apply(elapsed);
 BENCHMARK_CAPTURE(align_one, cuda_loopsmart, "cuda", "loopsmart")->Iterations(190)->Apply(elapsed);
 BENCHMARK_CAPTURE(align_one, cuda_default, "cuda", "default")->Iterations(190)->Apply(elapsed);
 BENCHMARK_CAPTURE(align_from_threads, cuda_default, "cuda", "default")

@@ -59,17 +59,18 @@ def peers():
                 f"{own['processor_ms_per_pair']:.0f}",
             ]
         rows.append(f"| {peer_label(entry)} | " + " | ".join(cells) + " |")
+    gpu = " ".join(benchmarks()[0]["gpu"].split()[:2])
     for preset, times in device_times():
         if preset != "default":
             continue
         cells = " | ".join(f"same | same | {ms:.2f}" for ms in times)
-        rows.append(f"| gpureg `{preset}`, NVIDIA H200 | {cells} |")
+        rows.append(f"| gpureg `{preset}`, {gpu} | {cells} |")
     return rows
 
 
 def device_times():
     """Preset, and ms per pair in a batch on each scene."""
-    devices = [benchmarks(), benchmarks("pipeline_h200_house_a.json")]
+    devices = [benchmarks(), benchmarks("pipeline_house_a.json")]
     return [
         (preset, [runs[f"align_many/cuda_{preset}/11"]["ms_per_pair"] for _, runs in devices])
         for preset in ("default", "loopsmart")
@@ -78,7 +79,7 @@ def device_times():
 
 def peers_device():
     """Times of gpureg on a device, on the same scenes."""
-    devices = [benchmarks(), benchmarks("pipeline_h200_house_a.json")]
+    devices = [benchmarks(), benchmarks("pipeline_house_a.json")]
     scenes = list(PEER_SCENES.values())
     rows = [
         f"| method | {' | '.join(f'{scene}: ms per pair in a batch' for scene in scenes)} |",

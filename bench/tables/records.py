@@ -24,7 +24,7 @@ def source(record):
     return f"Made by `{record['command']}` at commit {record['commit'].rstrip('+')}"
 
 
-def benchmarks(file="pipeline_h200.json"):
+def benchmarks(file="pipeline.json"):
     """Context and runs by name; of a benchmark that was repeated, the median."""
     record = load(file)
     runs = {

@@ -113,7 +113,7 @@ def pipeline():
 
 
 def pipeline_house():
-    context, runs = benchmarks("pipeline_h200_house_a.json")
+    context, runs = benchmarks("pipeline_house_a.json")
     stages = ("match", "propose", "rank", "refine", "verify")
     out = ["| | ms | " + " | ".join(stages) + " |", "| --- | --- |" + " --- |" * len(stages)]
     for text, name, key in (
