@@ -2,6 +2,7 @@
 #include "reconstruction/odometry.hpp"
 
 #include <algorithm>
+#include <map>
 #include <string>
 
 #include "gpureg/error.hpp"
@@ -73,6 +74,22 @@ Odometry odometry_of(std::uint32_t source, std::uint32_t target,
   out.information = pose_graph::UnalignedMatrix6d::Identity();
   out.information->diagonal().head<3>() /= turn * turn;
   out.information->diagonal().tail<3>() /= shift * shift;
+  return out;
+}
+
+std::vector<Odometry> chains_of(const std::vector<UnalignedIsometry3d>& poses,
+                                const std::vector<std::uint32_t>& parts, double shift,
+                                double turn) {
+  std::map<std::uint32_t, std::uint32_t> last;
+  std::vector<Odometry> out;
+  for (std::uint32_t k = 0; k < parts.size(); ++k) {
+    if (parts[k] == 0xffffffffu) continue;
+    const auto [at, first] = last.insert({parts[k], k});
+    if (!first)
+      out.push_back(
+          odometry_of(k, at->second, poses[at->second].inverse() * poses[k], shift, turn));
+    at->second = k;
+  }
   return out;
 }
 

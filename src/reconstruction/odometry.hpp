@@ -20,4 +20,9 @@ pose_graph::Edge edge_of(const Odometry& odometry);
 Odometry odometry_of(std::uint32_t source, std::uint32_t target,
                      const UnalignedIsometry3d& target_from_source, double shift, double turn);
 
+/// Each scan of a part with the one before it, as odometry_of().
+/// @param parts of each scan; 0xffffffff: of none.
+std::vector<Odometry> chains_of(const std::vector<UnalignedIsometry3d>& poses,
+                                const std::vector<std::uint32_t>& parts, double shift, double turn);
+
 }  // namespace gpureg::reconstruction

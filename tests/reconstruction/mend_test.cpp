@@ -70,8 +70,8 @@ struct TwoIslands : MendedRoom {
     results.push_back(result_of(pose, confidence));
   }
   std::vector<Odometry> joins() const {
-    return confirmed_joins(context, clouds, pairs, results, {}, map,
-                           Options::from_voxel_size(0.1f), options, audit_options);
+    return confirmed_joins(context, clouds, pairs, results, {}, map, Options::from_voxel_size(0.1f),
+                           options, audit_options);
   }
 
   Reconstruction map;

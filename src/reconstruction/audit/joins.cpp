@@ -174,19 +174,16 @@ Trial trial_of(const Suggestion& chosen, const std::vector<Suggestion>& all, dou
   Trial out;
   out.suggestion = &chosen;
   out.alone = chosen.odds;
-  std::map<std::uint32_t, std::uint32_t> last;
-  for (std::uint32_t k = 0; k < islands.of_scan.size(); ++k) {
+  std::vector<std::uint32_t> parts(islands.of_scan.size(), kNoIsland);
+  for (std::uint32_t k = 0; k < parts.size(); ++k) {
     const std::uint32_t island = islands.of_scan[k];
     if (island != chosen.a && island != chosen.b) continue;
+    parts[k] = island;
     const UnalignedIsometry3d& pose = islands.island_from_scan[k];
     out.graph.nodes.push_back({k, island == chosen.a ? pose : chosen.a_from_b * pose});
-    const auto [at, first] = last.insert({island, k});
-    if (!first)
-      out.graph.edges.push_back(
-          edge_of(odometry_of(k, at->second, islands.island_from_scan[at->second].inverse() * pose,
-                              kShiftWithin, kTurnWithin)));
-    at->second = k;
   }
+  for (const Odometry& edge : chains_of(islands.island_from_scan, parts, kShiftWithin, kTurnWithin))
+    out.graph.edges.push_back(edge_of(edge));
   for (const Suggestion& other : all) {
     if (!agree(chosen, other, distance)) continue;
     out.alone = std::max(out.alone, other.odds);

@@ -25,6 +25,9 @@ constexpr double kSupports = 0.9, kDoubts = 0.3;
 /// Share of one scan that lies at the other's surfaces, whatever the normals, from which surfaces
 /// that do not coincide contradict the pose. With less, right poses have low confidences, too.
 constexpr double kLeastShared = 0.25;
+/// Of these, so many have other normals there. Where the normals agree, surfaces coincide, and the
+/// confidence is low because they look alike everywhere, as walls and floors do.
+constexpr double kOtherNormals = 0.2;
 /// Overlap below which the pose is not worth an ICP.
 constexpr double kLeastOverlap = 0.05;
 /// A pose from which ICP moves the scans further than the map may be off is wrong where their
@@ -138,7 +141,8 @@ void judge(const PoseVerification& given, const PoseVerification* refined, std::
   if (violates(violation)) {
     ratio = violation.share > kStrongViolation ? kOfStrongViolation : kOfViolation;
     if (violation.points < kCorner * static_cast<double>(points)) ratio *= kOfCorner;
-  } else if (confidence < kDoubts && shared(given.evidence) >= kLeastShared)
+  } else if (confidence < kDoubts && shared(given.evidence) >= kLeastShared &&
+             out.overlap < (1 - kOtherNormals) * shared(given.evidence))
     ratio = kOfDoubt;
   else if (moved || (confidence < kDoubts && elsewhere))
     ratio = kOfShift;
