@@ -11,6 +11,7 @@
 #include "reconstruction/audit/blame.hpp"
 #include "reconstruction/audit/edge_confidence.hpp"
 #include "reconstruction/audit/near_pairs.hpp"
+#include "reconstruction/audit/pair_verdicts.hpp"
 #include "support/audited_room.hpp"
 #include "support/registration_result.hpp"
 
@@ -390,6 +391,22 @@ TEST_F(AuditedRoom, EdgesOfAContradictedConnectionAreTakenOut) {
     EXPECT_EQ(edge.accepted, (edge.source < 4) == (edge.target < 4));
     EXPECT_EQ(edge.map_confidence > 0.9, edge.accepted);
   }
+}
+
+// A floor and a wall fit anywhere along them: the confidence of a right pose is low.
+TEST(Audit, BareSurfacesThatCoincideContradictNothing) {
+  const auto verdict_of = [](float overlap, float any_normal) {
+    PoseVerification pose;
+    pose.confidence = 0.05;
+    pose.evidence.source_overlap = pose.evidence.target_overlap = overlap;
+    pose.evidence.source_overlap_any_normal = pose.evidence.target_overlap_any_normal = any_normal;
+    AuditedPair pair;
+    judge_pair(pose, nullptr, 5000, 0.15, pair);
+    return pair.verdict;
+  };
+  EXPECT_EQ(verdict_of(0.35f, 0.36f), PairVerdict::silent);
+  EXPECT_EQ(verdict_of(0.15f, 0.36f), PairVerdict::contradicts);
+  EXPECT_EQ(verdict_of(0.15f, 0.2f), PairVerdict::silent) << "too little is shared";
 }
 
 TEST_F(AuditedRoom, NearPairsAreThoseThatMeet) {

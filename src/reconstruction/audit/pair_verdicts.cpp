@@ -115,8 +115,46 @@ double usual_residual_of(const std::vector<std::vector<PoseVerification>>& given
   return *middle;
 }
 
-void judge(const PoseVerification& given, const PoseVerification* refined, std::size_t points,
-           double margin, AuditedPair& out) {
+/// judge_pairs() for those from `first` on.
+void judge_some(const Context& context, const std::vector<PreparedCloud>& clouds,
+                const RegistrationOptions& registration, const AuditOptions& options,
+                std::size_t first, std::size_t count, std::vector<AuditedPair>& pairs) {
+  std::vector<Pair> all, doubtful;
+  std::vector<std::vector<UnalignedIsometry3d>> poses, doubtful_poses;
+  for (std::size_t k = first; k < first + count; ++k) {
+    all.push_back({pairs[k].source, pairs[k].target});
+    poses.push_back({pairs[k].target_from_source});
+  }
+  const auto points = [&](const Pair& pair) {
+    return std::min(clouds[pair.source].size(), clouds[pair.target].size());
+  };
+  VerificationOptions verification;
+  verification.search_alternatives = false;
+  const auto given = verify_poses_batch(context, clouds, all, poses, registration, verification);
+  const double usual = usual_residual_of(given);
+  std::vector<std::size_t> place(count, count);
+  for (std::size_t k = 0; k < count; ++k) {
+    if (settled(given[k].front(), points(all[k]), usual)) continue;
+    place[k] = doubtful.size();
+    doubtful.push_back(all[k]);
+    doubtful_poses.push_back(poses[k]);
+  }
+  verification.refine = true;
+  const auto refined =
+      verify_poses_batch(context, clouds, doubtful, doubtful_poses, registration, verification);
+  for (std::size_t k = 0; k < count; ++k) {
+    AuditedPair& pair = pairs[first + k];
+    const double margin = options.max_shift + options.max_shift_per_metre *
+                                                  pair.target_from_source.translation().norm();
+    judge_pair(given[k].front(), place[k] < doubtful.size() ? &refined[place[k]].front() : nullptr,
+               points(all[k]), margin, pair);
+  }
+}
+
+}  // namespace
+
+void judge_pair(const PoseVerification& given, const PoseVerification* refined, std::size_t points,
+                double margin, AuditedPair& out) {
   out.overlap = overlap_of(given.evidence);
   out.observed = std::max(given.evidence.source_observed, given.evidence.target_observed);
   Violation violation = violation_of(given, points);
@@ -153,44 +191,6 @@ void judge(const PoseVerification& given, const PoseVerification* refined, std::
   if (ratio > 0) out.verdict = PairVerdict::supports;
   if (ratio < 0) out.verdict = PairVerdict::contradicts;
 }
-
-/// judge_pairs() for those from `first` on.
-void judge_some(const Context& context, const std::vector<PreparedCloud>& clouds,
-                const RegistrationOptions& registration, const AuditOptions& options,
-                std::size_t first, std::size_t count, std::vector<AuditedPair>& pairs) {
-  std::vector<Pair> all, doubtful;
-  std::vector<std::vector<UnalignedIsometry3d>> poses, doubtful_poses;
-  for (std::size_t k = first; k < first + count; ++k) {
-    all.push_back({pairs[k].source, pairs[k].target});
-    poses.push_back({pairs[k].target_from_source});
-  }
-  const auto points = [&](const Pair& pair) {
-    return std::min(clouds[pair.source].size(), clouds[pair.target].size());
-  };
-  VerificationOptions verification;
-  verification.search_alternatives = false;
-  const auto given = verify_poses_batch(context, clouds, all, poses, registration, verification);
-  const double usual = usual_residual_of(given);
-  std::vector<std::size_t> place(count, count);
-  for (std::size_t k = 0; k < count; ++k) {
-    if (settled(given[k].front(), points(all[k]), usual)) continue;
-    place[k] = doubtful.size();
-    doubtful.push_back(all[k]);
-    doubtful_poses.push_back(poses[k]);
-  }
-  verification.refine = true;
-  const auto refined =
-      verify_poses_batch(context, clouds, doubtful, doubtful_poses, registration, verification);
-  for (std::size_t k = 0; k < count; ++k) {
-    AuditedPair& pair = pairs[first + k];
-    const double margin = options.max_shift + options.max_shift_per_metre *
-                                                  pair.target_from_source.translation().norm();
-    judge(given[k].front(), place[k] < doubtful.size() ? &refined[place[k]].front() : nullptr,
-          points(all[k]), margin, pair);
-  }
-}
-
-}  // namespace
 
 void judge_pairs(const Context& context, const std::vector<PreparedCloud>& clouds,
                  const RegistrationOptions& registration, const AuditOptions& options,
