@@ -162,7 +162,7 @@ def measure(out, truth, information, scene_of=lambda scan: 0):
             for edge in document["edges"]
             if edge.get(name, 0) > SURE
         ]
-        right = sum(error <= MAX_EDGE_METRES for error in errors_of_sure)
+        right = int(sum(error <= MAX_EDGE_METRES for error in errors_of_sure))
         sure[name] = {"edges": len(errors_of_sure), "right": right}
     return {
         "scans": len(document["scans"]),
