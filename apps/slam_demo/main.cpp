@@ -112,7 +112,7 @@ int run(const Arguments& a) {
                    : sequence.frames.size();
   result.frames = last - first;
   const auto note_progress = [&] {
-    progress.update(static_cast<int>(first + result.frames_done), slam.map(),
+    progress.update(static_cast<int>(first + result.frames_done) - 1, slam.map(),
                     slam.loops().records(), slam.loops().image_records());
   };
   double total = 0;

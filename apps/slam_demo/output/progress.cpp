@@ -136,8 +136,6 @@ void Progress::update(int frame, const Map& map, const std::vector<LoopRecord>& 
              image_loops[k].keyframe, "image");
 }
 
-void Progress::end(const std::string& how) {
-  write(json{{"end", how}, {"frame", frame_}}.dump());
-}
+void Progress::end(const std::string& how) { write(json{{"end", how}, {"frame", frame_}}.dump()); }
 
 }  // namespace slam_demo

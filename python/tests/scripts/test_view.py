@@ -74,7 +74,9 @@ class Recorder(types.ModuleType):
 
     def of(self, path):
         """Frame and first argument of what was logged for an entity."""
-        return [(t and t["frame"], e[1][0] if e[1] else e[2]) for p, e, t in self.logged if p == path]
+        return [
+            (t and t["frame"], e[1][0] if e[1] else e[2]) for p, e, t in self.logged if p == path
+        ]
 
 
 @pytest.fixture
