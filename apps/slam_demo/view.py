@@ -175,8 +175,8 @@ class View:
             points = rr.Points3D(map_["position"], radii=map_["radius"], colors=map_["colour"])
             rr.log("world/map", points)
         if (self.output / "odometry.txt").exists():
-            rows = [row.split()[1:4] for row in (self.output / "odometry.txt").open()]
-            log_strips("world/odometry", [np.reshape(rows, (-1, 3)).astype(float)], RED, 0.004)
+            rows = np.loadtxt(self.output / "odometry.txt", ndmin=2).reshape(-1, 8)  # TUM's format
+            log_strips("world/odometry", [rows[:, 1:4]], RED, 0.004)
 
     def strips(self):
         """The keyframes' positions, one strip for each session."""

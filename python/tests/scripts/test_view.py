@@ -110,7 +110,7 @@ def test_a_finished_run(tmp_path, monkeypatch, recorder):
     surfels = np.zeros(2, dtype)
     surfels["floats"][1, :3] = 1, 2, 3
     (tmp_path / "map.ply").write_bytes(b"ply\nend_header\n" + surfels.tobytes())
-    (tmp_path / "odometry.txt").write_text("0.0 0 0 0 0 0 0 1\n0.1 5 6 7 0 0 0 1\n")
+    (tmp_path / "odometry.txt").write_text("# time\n0.0 0 0 0 0 0 0 1\n0.1 5 6 7 0 0 0 1\n")
     assert view(monkeypatch, tmp_path, "--save", "a.rrd") is None
     assert recorder.calls == [("init", "slam_demo", False), ("save", "a.rrd"), ("disconnect",)]
 
