@@ -11,6 +11,7 @@
 
 #include "camera_file.hpp"
 #include "output/output.hpp"
+#include "output/progress.hpp"
 #include "output/rerun.hpp"
 #include "stopwatch.hpp"
 #include "tracking/tracking_file.hpp"
@@ -29,7 +30,7 @@ struct Arguments {
   double depth_units = 0, baseline = 0;
   int first = 0, frames = 0;
   bool sequential = false, no_calibration = false, no_dense_loops = false, no_bundle = false,
-       no_map = false, quiet = false;
+       no_map = false, quiet = false, view = false;
   SlamOptions slam;
 };
 
@@ -73,7 +74,7 @@ void set_rig(const Arguments& a, Rig& rig) {
 }
 
 int run(const Arguments& a) {
-  if (!a.rerun.empty()) require_rerun();  // not after an hour of frames
+  if (!a.rerun.empty() || a.view) require_rerun();  // not after an hour of frames
   Sequence sequence = open_sequence(a.sequence);
   set_rig(a, sequence.rig);
   RunResult result;
@@ -100,6 +101,8 @@ int run(const Arguments& a) {
         false;
   }
   Slam slam(context_of(a), sequence.rig, options);
+  Progress progress(a.output, sequence.rig.colour);
+  if (a.view) start_view(a.output);
   std::signal(SIGINT, interrupt);
   std::signal(SIGTERM, interrupt);
 
@@ -108,6 +111,10 @@ int run(const Arguments& a) {
       a.frames > 0 ? std::min(sequence.frames.size(), first + static_cast<std::size_t>(a.frames))
                    : sequence.frames.size();
   result.frames = last - first;
+  const auto note_progress = [&] {
+    progress.update(static_cast<int>(first + result.frames_done) - 1, slam.map(),
+                    slam.loops().records(), slam.loops().image_records());
+  };
   double total = 0;
   {
     const Stopwatch watch(total);
@@ -116,6 +123,7 @@ int run(const Arguments& a) {
       const Tracking tracking = read_tracking(a.tracking);
       result.frames_done = tracking.frames.size() + static_cast<std::size_t>(tracking.lost);
       slam.replay(tracking, [&] {
+        note_progress();
         if (!a.quiet && slam.fragments() > 0)
           std::fprintf(stderr, "fragment %d of %zu, %zu loops\n", slam.fragments(),
                        tracking.fragments.size(), slam.loops().graph().loops().size());
@@ -145,6 +153,7 @@ int run(const Arguments& a) {
         outcome = slam.frame(static_cast<int>(k), sequence.frames[k].time, images);
       }
       ++result.frames_done;
+      note_progress();
       if (!a.quiet && result.frames_done % 25 == 0) {
         std::fprintf(stderr,
                      "frame %zu of %zu, %.1f frames/s, %d points, %zu keyframes, %zu loops\n",
@@ -154,6 +163,7 @@ int run(const Arguments& a) {
       }
     }
     slam.finish();
+    note_progress();
   }
   if (only_tracks && !interrupted) {
     Tracking tracking = slam.tracking();
@@ -165,6 +175,9 @@ int run(const Arguments& a) {
     surface = a.sequence + "/surface.ply";
   evaluate(slam, surface, result);
   write_results(a.output, slam, result);
+  progress.end(interrupted ? "interrupted" : "finished");
+  if (!progress.complete())
+    std::cerr << "slam_demo: " << a.output << "/progress.jsonl is incomplete: disk full?\n";
   if (!a.rerun.empty()) write_rerun(a.output, a.rerun);
   std::printf(
       "%zu frames, %d lost, %zu keyframes, %d fragments, %zu loops, %zu worlds, %.1f s, %.1f "
@@ -210,6 +223,8 @@ int main(int count, char** values) {
       "--tracking", a.tracking,
       "File with what tracking found. Where there is none the run only tracks, and writes "
       "it; runs with it close the loops only");
+  app.add_flag("--view", a.view,
+               "Show the run in the viewer of rerun.io (needs python3 with rerun-sdk)");
   app.add_option(
       "--rerun", a.rerun,
       "Also write a recording for the viewer of rerun.io (needs python3 with rerun-sdk)");

@@ -8,6 +8,7 @@
 #include <cstdlib>
 #include <nlohmann/json.hpp>
 
+#include "output/progress.hpp"
 #include "output/rerun.hpp"
 #include "tracking/tracking_file.hpp"
 
@@ -165,10 +166,14 @@ TEST(EndToEnd, SequentialRunsGiveTheSameBitsAndSoDoesTheFileOfTracking) {
   EXPECT_THROW(read_tracking(folder / "other"), gpureg::IoError);
 }
 
-/// The folder of an output with three poses and two surfels.
+/// The folder of an output with two keyframes and two surfels.
 void write_small_output(const gpureg::test::TemporaryFolder& folder) {
-  for (const char* name : {"trajectory.txt", "odometry.txt", "keyframes.txt"})
-    folder.write(name, "0.0 0 0 0 0 0 0 1\n0.1 0.1 0 0 0 0 0 1\n0.2 0.2 0 0 0 0 0 1\n");
+  Map map;
+  map.keyframes.resize(2);
+  Progress progress(folder.path(), Pinhole());
+  progress.update(9, map, {}, {});
+  progress.end("finished");
+  folder.write("odometry.txt", "0.0 0 0 0 0 0 0 1\n0.1 0.1 0 0 0 0 0 1\n");
   folder.write("map.ply", "ply\nend_header\n" + std::string(2 * 35, '\0'));
 }
 

@@ -186,10 +186,14 @@ void evaluate(const Slam& slam, const std::string& true_surface, RunResult& resu
   result.surface = ev::evaluate_surface(map, truth.points, truth.normals);
 }
 
-void write_results(const std::string& folder, const Slam& slam, const RunResult& result) {
+void make_folder(const std::string& folder) {
   std::error_code error;
   std::filesystem::create_directories(folder, error);
   if (error) throw gpureg::IoError(folder + ": cannot make this folder: " + error.message());
+}
+
+void write_results(const std::string& folder, const Slam& slam, const RunResult& result) {
+  make_folder(folder);
   ev::write_trajectory(folder + "/trajectory.txt", slam.trajectory());
   ev::write_trajectory(folder + "/odometry.txt", slam.odometry());
   Trajectory keyframes;

@@ -25,6 +25,9 @@ struct RunResult {
 /// and with fewer than three poses in common, the figures stay empty.
 void evaluate(const Slam& slam, const std::string& true_surface, RunResult& result);
 
+/// With the folders above it. Throws gpureg::IoError.
+void make_folder(const std::string& folder);
+
 /// Writes trajectory.txt, odometry.txt, keyframes.txt (TUM), map.ply,
 /// depth_calibration.json, loops.json, report.html. Throws gpureg::IoError.
 void write_results(const std::string& folder, const Slam& slam, const RunResult& result);
