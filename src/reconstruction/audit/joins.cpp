@@ -16,17 +16,17 @@ namespace gpureg::reconstruction {
 namespace {
 
 /// Modes from this confidence suggest a pose.
-constexpr double kLeastConfidence = 0.02;
+constexpr double kLeastSuggested = 0.02;
 /// Poses of two islands that are tried.
 constexpr std::size_t kPosesTried = 12;
 /// What one pair says for a pose at most, as log odds.
-constexpr double kMostOfPair = 7;
+constexpr double kMostOfSuggestion = 7;
 /// Poses agree up to so many times the margin of the audit, and this turn (Frobenius norm).
 constexpr double kSameShift = 2, kSameTurn = 0.1;
 /// Log odds from which islands are joined: of the surest pair that suggests the pose, and of what
 /// the pairs across say. Other poses have to be so much less likely: of 25 joins that were tried in
 /// maps of offices and houses without bent parts, none of these was wrong, and below were half.
-constexpr double kLeastOdds = 9, kLead = 8;
+constexpr double kLeastJoined = 9, kLead = 8;
 /// A pose is refined from these log odds on.
 constexpr double kWorthRefining = -10;
 /// Noise of the pose of two islands, metres and radians; within an island, there is nearly none.
@@ -80,7 +80,7 @@ void suggest(const Pair& pair, const RegistrationMode& mode, const Eigen::Vector
     one.a_from_b = UnalignedIsometry3d(one.a_from_b.inverse());
   }
   const double p = std::clamp(mode.confidence, 1e-9, 1 - 1e-9);
-  one.odds = std::clamp(std::log(p / (1 - p)), -kMostOfPair, kMostOfPair);
+  one.odds = std::clamp(std::log(p / (1 - p)), -kMostOfSuggestion, kMostOfSuggestion);
   out[{one.a, one.b}].push_back(one);
 }
 
@@ -94,7 +94,7 @@ Between suggestions(const std::vector<Pair>& pairs, const std::vector<Registrati
     Eigen::Vector3d centre = Eigen::Vector3d::Zero();
     if (moments.count > 0) centre = moments.sum / static_cast<double>(moments.count);
     for (const RegistrationMode& mode : results[k].modes)
-      if (mode.confidence >= kLeastConfidence)
+      if (mode.confidence >= kLeastSuggested)
         suggest(pairs[k], mode, centre, islands, options, out);
   }
   for (const AuditedPair& pair : refined) {
@@ -118,7 +118,7 @@ std::vector<std::size_t> most_agreed(const std::vector<Suggestion>& all, double 
   std::vector<double> support(all.size(), 0);
   for (std::size_t k = 0; k < all.size(); ++k)
     for (const Suggestion& other : all)
-      if (agree(all[k], other, distance)) support[k] += other.odds + kMostOfPair;
+      if (agree(all[k], other, distance)) support[k] += other.odds + kMostOfSuggestion;
   std::vector<std::size_t> order(all.size()), out;
   std::iota(order.begin(), order.end(), std::size_t{0});
   std::stable_sort(order.begin(), order.end(),
@@ -291,7 +291,7 @@ std::vector<Odometry> confirmed_joins(const Context& context,
                    [](const Trial& x, const Trial& y) { return x.odds > y.odds; });
   std::vector<char> asked(map.islands.size(), 0);
   std::vector<Odometry> out;
-  for (auto trial = trials.begin(); trial != trials.end() && trial->odds >= kLeastOdds; ++trial) {
+  for (auto trial = trials.begin(); trial != trials.end() && trial->odds >= kLeastJoined; ++trial) {
     const Suggestion& chosen = *trial->suggestion;
     // Islands that are joined now are asked again, as one.
     if (asked[chosen.a] || asked[chosen.b]) continue;

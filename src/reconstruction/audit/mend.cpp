@@ -25,7 +25,7 @@ constexpr double kOfPart = 0.999, kShiftOfPart = 0.005, kTurnOfPart = 0.002;
 /// Shift from which a scan has another pose, metres, and the same for the entries of its rotation.
 constexpr double kMoved = 0.02;
 /// Pairs are aligned at most so often.
-constexpr int kMostPasses = 3;
+constexpr int kMostAlignments = 3;
 
 /// Poses within the parts.
 std::vector<Odometry> held(const std::vector<UnalignedIsometry3d>& poses, const Parts& parts) {
@@ -128,7 +128,7 @@ MendedMap put_together(const Context& context, const std::vector<PreparedCloud>&
   std::vector<RegistrationResult> results;
   std::vector<Odometry> odometry = held(poses, parts);
   // Few pairs see each other where the parts were; where they belong, more pairs hold them.
-  for (int pass = 0; pass < kMostPasses && !more.empty(); ++pass) {
+  for (int pass = 0; pass < kMostAlignments && !more.empty(); ++pass) {
     std::vector<RegistrationResult> aligned = align_batch(context, clouds, more, registration);
     pairs.insert(pairs.end(), more.begin(), more.end());
     std::move(aligned.begin(), aligned.end(), std::back_inserter(results));

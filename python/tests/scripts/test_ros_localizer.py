@@ -16,7 +16,7 @@ pytest.importorskip("rosbags")
 
 from rosbags.typesys import Stores, get_typestore
 
-PACKAGE = pathlib.Path(__file__).resolve().parents[2] / "ros/gpureg_localizer"
+PACKAGE = pathlib.Path(__file__).resolve().parents[3] / "ros/gpureg_localizer"
 sys.path.insert(0, str(PACKAGE))
 
 from gpureg_localizer.localizer import Localizer, covariance_of, points_of, quaternion_of
