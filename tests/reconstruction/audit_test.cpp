@@ -395,8 +395,10 @@ TEST_F(AuditedRoom, EdgesOfAContradictedConnectionAreTakenOut) {
 
 // A floor and a wall fit anywhere along them: the confidence of a right pose is low.
 TEST(Audit, BareSurfacesThatCoincideContradictNothing) {
-  const auto verdict_of = [](float overlap, float any_normal) {
+  const auto verdict_of = [](float overlap, float any_normal, float weakest) {
     PoseVerification pose;
+    pose.evidence.information_eigenvalues[0] = weakest;
+    pose.evidence.information_eigenvalues[5] = 1000;
     pose.confidence = 0.05;
     pose.evidence.source_overlap = pose.evidence.target_overlap = overlap;
     pose.evidence.source_overlap_any_normal = pose.evidence.target_overlap_any_normal = any_normal;
@@ -404,9 +406,11 @@ TEST(Audit, BareSurfacesThatCoincideContradictNothing) {
     judge_pair(pose, nullptr, 5000, 0.15, pair);
     return pair.verdict;
   };
-  EXPECT_EQ(verdict_of(0.35f, 0.36f), PairVerdict::silent);
-  EXPECT_EQ(verdict_of(0.15f, 0.36f), PairVerdict::contradicts);
-  EXPECT_EQ(verdict_of(0.15f, 0.2f), PairVerdict::silent) << "too little is shared";
+  EXPECT_EQ(verdict_of(0.35f, 0.36f, 0.1f), PairVerdict::silent);
+  EXPECT_EQ(verdict_of(0.35f, 0.36f, 10), PairVerdict::contradicts)
+      << "nothing hides a better pose";
+  EXPECT_EQ(verdict_of(0.15f, 0.36f, 0.1f), PairVerdict::contradicts);
+  EXPECT_EQ(verdict_of(0.15f, 0.2f, 10), PairVerdict::silent) << "too little is shared";
 }
 
 TEST_F(AuditedRoom, NearPairsAreThoseThatMeet) {

@@ -25,9 +25,11 @@ constexpr double kSupports = 0.9, kDoubts = 0.3;
 /// Share of one scan that lies at the other's surfaces, whatever the normals, from which surfaces
 /// that do not coincide contradict the pose. With less, right poses have low confidences, too.
 constexpr double kLeastShared = 0.25;
-/// Of these, so many have other normals there. Where the normals agree, surfaces coincide, and the
-/// confidence is low because they look alike everywhere, as walls and floors do.
-constexpr double kOtherNormals = 0.2;
+/// Where nothing holds the scans along a wall or a floor, surfaces that coincide have low
+/// confidences at right poses, too: the smallest eigenvalue of the information as a share of the
+/// largest; and of the points at the other's surfaces, so many have other normals where they do not
+/// coincide.
+constexpr double kHeld = 1e-3, kOtherNormals = 0.2;
 /// Overlap below which the pose is not worth an ICP.
 constexpr double kLeastOverlap = 0.05;
 /// A pose from which ICP moves the scans further than the map may be off is wrong where their
@@ -93,6 +95,10 @@ bool fits_better(const PoseEvidence& before, const PoseEvidence& after) {
 
 double shared(const PoseEvidence& e) {
   return std::max(e.source_overlap_any_normal, e.target_overlap_any_normal);
+}
+
+bool is_held(const PoseEvidence& e) {
+  return e.information_eigenvalues[0] > kHeld * e.information_eigenvalues[5];
 }
 
 /// Whether the pose as it is gives no reason to ask ICP.
@@ -180,7 +186,8 @@ void judge_pair(const PoseVerification& given, const PoseVerification* refined, 
     ratio = violation.share > kStrongViolation ? kOfStrongViolation : kOfViolation;
     if (violation.points < kCorner * static_cast<double>(points)) ratio *= kOfCorner;
   } else if (confidence < kDoubts && shared(given.evidence) >= kLeastShared &&
-             out.overlap < (1 - kOtherNormals) * shared(given.evidence))
+             (is_held(given.evidence) ||
+              out.overlap < (1 - kOtherNormals) * shared(given.evidence)))
     ratio = kOfDoubt;
   else if (moved || (confidence < kDoubts && elsewhere))
     ratio = kOfShift;
