@@ -5,6 +5,7 @@
 
 #include "cuda/common/candidate_lists.hpp"
 #include "cuda/common/packed_normal.cuh"
+#include "cuda/device/entry_of.cuh"
 #include "cuda/prepare/brick_place.cuh"
 #include "cuda/prepare/scoring_data.hpp"
 
@@ -12,17 +13,6 @@ namespace gpureg::cuda {
 namespace {
 
 constexpr int kCells = ClosestGridView::kBlockCells;
-
-/// Position of a candidate in the near list of its block, which ascends.
-__device__ std::uint32_t position_in(const std::uint32_t* near, std::uint32_t size,
-                                     std::uint32_t candidate) {
-  std::uint32_t lo = 0, hi = size;
-  while (hi - lo > 1) {
-    const std::uint32_t mid = (lo + hi) / 2;
-    (near[mid] <= candidate ? lo : hi) = mid;
-  }
-  return lo;
-}
 
 /// A thread block takes one block after another, and a thread its cell.
 __global__ void __launch_bounds__(kCells) write_lists(const ScoringSlot* slots) {
@@ -49,7 +39,7 @@ __global__ void __launch_bounds__(kCells) write_lists(const ScoringSlot* slots) 
     std::uint32_t word = count;
     if (fits_word(count, size)) {
       for (std::uint32_t k = 0; k < count; ++k)
-        word |= position_in(near, near_points, candidates[k]) << (8 + (k << (3 + size)));
+        word |= entry_of(near, near_points, candidates[k]) << (8 + (k << (3 + size)));
     } else {
       std::uint32_t* words =
           s.summaries.positions + static_cast<std::size_t>(unit) * (kListUnit / sizeof(word));
@@ -60,7 +50,7 @@ __global__ void __launch_bounds__(kCells) write_lists(const ScoringSlot* slots) 
       word = first << 8 | min(count, kLongList);
       if (count >= kLongList) first += positions_per_word(size);
       for (std::uint32_t k = 0; k < count; ++k) {
-        const std::uint32_t position = position_in(near, near_points, candidates[k]);
+        const std::uint32_t position = entry_of(near, near_points, candidates[k]);
         if (size == 0)
           reinterpret_cast<std::uint8_t*>(words)[first + k] = static_cast<std::uint8_t>(position);
         else if (size == 1)

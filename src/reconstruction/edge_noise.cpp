@@ -59,4 +59,10 @@ pose_graph::UnalignedMatrix6d edge_information(const RegistrationMode& mode,
   return 0.5 * (information + information.transpose());
 }
 
+Eigen::Vector3d overlap_centre(const RegistrationResult& result) {
+  const CorrespondenceMoments& moments = result.source_moments;
+  if (moments.count == 0) return Eigen::Vector3d::Zero();
+  return moments.sum / static_cast<double>(moments.count);
+}
+
 }  // namespace gpureg::reconstruction

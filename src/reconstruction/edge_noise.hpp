@@ -14,4 +14,7 @@ pose_graph::UnalignedMatrix6d edge_information(const RegistrationMode& mode,
                                                const Eigen::Vector3d& source_centre,
                                                const EdgeNoiseOptions& noise, double unit);
 
+/// Centre of the overlap in the source's frame; the origin where it is not known.
+Eigen::Vector3d overlap_centre(const RegistrationResult& result);
+
 }  // namespace gpureg::reconstruction

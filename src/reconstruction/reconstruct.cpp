@@ -35,13 +35,6 @@ void check_pairs(std::size_t scans, const std::vector<Pair>& pairs) {
   }
 }
 
-/// Centre of the overlap in the source's frame; the origin where it is not known.
-Eigen::Vector3d overlap_centre(const RegistrationResult& result) {
-  const CorrespondenceMoments& moments = result.source_moments;
-  if (moments.count == 0) return Eigen::Vector3d::Zero();
-  return moments.sum / static_cast<double>(moments.count);
-}
-
 /// Covariance of its points; 0 where it is not known.
 Eigen::Matrix3d overlap_spread(const RegistrationResult& result) {
   const CorrespondenceMoments& moments = result.source_moments;

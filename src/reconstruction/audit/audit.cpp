@@ -79,11 +79,7 @@ Audit audit_of(const Context& context, const std::vector<PreparedCloud>& clouds,
                const Audit& before = {}) {
   Audit out;
   for (const Pair& near : near_pairs(clouds, world_from_scan, islands, options.most_pairs)) {
-    AuditedPair pair;
-    pair.source = near.source;
-    pair.target = near.target;
-    pair.target_from_source = world_from_scan[near.target].inverse() * world_from_scan[near.source];
-    out.pairs.push_back(pair);
+    out.pairs.push_back(pair_at(near, world_from_scan));
   }
   judge_new_pairs(context, clouds, registration, options, before, out.pairs);
   judge_connections(islands, bonds, world_from_scan, options, out);

@@ -90,9 +90,7 @@ Between suggestions(const std::vector<Pair>& pairs, const std::vector<Registrati
   Between out;
   for (std::size_t k = 0; k < pairs.size(); ++k) {
     if (!results[k].has_candidate) continue;
-    const CorrespondenceMoments& moments = results[k].source_moments;
-    Eigen::Vector3d centre = Eigen::Vector3d::Zero();
-    if (moments.count > 0) centre = moments.sum / static_cast<double>(moments.count);
+    const Eigen::Vector3d centre = overlap_centre(results[k]);
     for (const RegistrationMode& mode : results[k].modes)
       if (mode.confidence >= kLeastSuggested)
         suggest(pairs[k], mode, centre, islands, options, out);
@@ -156,18 +154,6 @@ void solve(std::size_t scans, int threads, Trial& trial) {
     trial.poses[static_cast<std::size_t>(trial.graph.nodes[k].id)] = result.world_from_node[k];
 }
 
-pose_graph::Edge edge_between(std::uint32_t source, std::uint32_t target,
-                              const UnalignedIsometry3d& pose,
-                              const pose_graph::UnalignedMatrix6d& information) {
-  pose_graph::Edge edge;
-  edge.source = source;
-  edge.target = target;
-  edge.target_from_source = pose;
-  edge.information = information;
-  edge.kind = pose_graph::EdgeKind::odometry;
-  return edge;
-}
-
 /// The scans of both islands where all suggestions that agree put them.
 Trial trial_of(const Suggestion& chosen, const std::vector<Suggestion>& all, double distance,
                const Islands& islands, const Options& options) {
@@ -188,7 +174,7 @@ Trial trial_of(const Suggestion& chosen, const std::vector<Suggestion>& all, dou
     if (!agree(chosen, other, distance)) continue;
     out.alone = std::max(out.alone, other.odds);
     out.graph.edges.push_back(
-        edge_between(other.source, other.target, other.target_from_source, other.information));
+        edge_of({other.source, other.target, other.target_from_source, other.information}));
   }
   solve(islands.of_scan.size(), options.threads, out);
   return out;
@@ -211,11 +197,7 @@ struct Auditor {
       first.push_back(across.size());
       for (const Pair& near : near_pairs(clouds, trial.poses, {}, options.most_pairs)) {
         if (islands.of_scan[near.source] == islands.of_scan[near.target]) continue;
-        AuditedPair pair;
-        pair.source = near.source;
-        pair.target = near.target;
-        pair.target_from_source = trial.poses[near.target].inverse() * trial.poses[near.source];
-        across.push_back(pair);
+        across.push_back(pair_at(near, trial.poses));
       }
     }
     first.push_back(across.size());
@@ -242,9 +224,9 @@ struct Auditor {
       RegistrationMode mode;
       mode.target_from_source = pair.refined;
       out.graph.edges.push_back(
-          edge_between(pair.source, pair.target, pair.refined,
-                       edge_information(mode, pair.overlap_centre, reconstruction.noise,
-                                        reconstruction.information_unit)));
+          edge_of({pair.source, pair.target, pair.refined,
+                   edge_information(mode, pair.overlap_centre, reconstruction.noise,
+                                    reconstruction.information_unit)}));
     }
     solve(islands.of_scan.size(), reconstruction.threads, out);
     return out;

@@ -159,6 +159,14 @@ void judge_some(const Context& context, const std::vector<PreparedCloud>& clouds
 
 }  // namespace
 
+AuditedPair pair_at(const Pair& pair, const std::vector<UnalignedIsometry3d>& world_from_scan) {
+  AuditedPair out;
+  out.source = pair.source;
+  out.target = pair.target;
+  out.target_from_source = world_from_scan[pair.target].inverse() * world_from_scan[pair.source];
+  return out;
+}
+
 void judge_pair(const PoseVerification& given, const PoseVerification* refined, std::size_t points,
                 double margin, AuditedPair& out) {
   out.overlap = overlap_of(given.evidence);

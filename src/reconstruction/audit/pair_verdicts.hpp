@@ -8,6 +8,9 @@
 
 namespace gpureg::reconstruction {
 
+/// A pair at its pose in a map, not judged yet.
+AuditedPair pair_at(const Pair& pair, const std::vector<UnalignedIsometry3d>& world_from_scan);
+
 /// What the evidence at a pose says.
 /// @param refined where ICP moves the pair; null: it was not asked.
 /// @param points of the smaller cloud.
