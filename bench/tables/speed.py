@@ -269,7 +269,7 @@ def scaling():
         "| fragments, each with four others | ms | ms per fragment | device memory, GiB |",
         "| --- | --- | --- | --- |",
     ]
-    for n in (10, 50, 200, 500, 2000):
+    for n in (10, 50, 200, 500, 2000, 10000):
         run = runs[f"many_fragments/{n}"]
         out.append(
             f"| {n:,} | {run['real_time']:.0f} | {run['ms_per_fragment']:.2f} | {run['GiB_per_device']:.1f} |"
