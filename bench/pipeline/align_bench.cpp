@@ -124,9 +124,10 @@ void raw_to_pose(benchmark::State& state, const std::string& backend,
 /// As large as Redwood's four scenes, 207 fragments and 5,280 pairs, from raw points in host
 /// memory: the fragments come round again and again, and no fragment meets itself. Cold: the
 /// context has seen twenty fragments and their pairs only. ms_warm: the same once more.
-void redwood_sized(benchmark::State& state, const std::string& backend) {
+void redwood_sized(benchmark::State& state, const std::string& backend,
+                   const std::string& options_name) {
   if (!context(state, backend)) return;
-  const RegistrationOptions options = RegistrationOptions::loopsmart();
+  const RegistrationOptions options = preset(options_name);
   const auto scene = views();
   std::vector<PointCloudView> raw;
   for (std::size_t k = 0; k < 207; ++k) raw.push_back(scene[k % scene.size()]);
@@ -174,8 +175,15 @@ BENCHMARK_CAPTURE(align_from_threads, cuda_default, "cuda", "default")
 BENCHMARK_CAPTURE(raw_to_pose, cuda_loopsmart, "cuda", "loopsmart")
     ->Iterations(100)
     ->Apply(elapsed);
-BENCHMARK_CAPTURE(redwood_sized, cuda, "cuda")->Iterations(1)->Repetitions(7)->Apply(elapsed);
-BENCHMARK_CAPTURE(redwood_sized, cuda_all, "cuda_all")
+BENCHMARK_CAPTURE(redwood_sized, cuda, "cuda", "loopsmart")
+    ->Iterations(1)
+    ->Repetitions(7)
+    ->Apply(elapsed);
+BENCHMARK_CAPTURE(redwood_sized, cuda_default, "cuda", "default")
+    ->Iterations(1)
+    ->Repetitions(7)
+    ->Apply(elapsed);
+BENCHMARK_CAPTURE(redwood_sized, cuda_all, "cuda_all", "loopsmart")
     ->Iterations(1)
     ->Repetitions(7)
     ->Apply(elapsed);

@@ -39,18 +39,34 @@ RegistrationOptions preset(const std::string& name) {
 }
 
 /// All fragments of the scene from host memory in one call.
-void prepare_batch_of_fragments(benchmark::State& state, const std::string& backend,
-                                const std::string& options_name) {
+void prepare_all(benchmark::State& state, const std::string& backend,
+                 const std::string& options_name, const std::vector<PointCloudView>& all) {
   const Context* on = context(state, backend);
   if (!on) return;
   const RegistrationOptions options = preset(options_name);
-  std::vector<PreparedCloud> clouds = prepare_batch(*on, views(), options.prepare);
+  std::vector<PreparedCloud> clouds = prepare_batch(*on, all, options.prepare);
   std::size_t runs = 0;
   for (auto _ : state) {
-    clouds = prepare_batch(*on, views(), options.prepare);
+    clouds = prepare_batch(*on, all, options.prepare);
     ++runs;
   }
   report(state, clouds, runs);
+}
+
+void prepare_batch_of_fragments(benchmark::State& state, const std::string& backend,
+                                const std::string& options_name) {
+  prepare_all(state, backend, options_name, views());
+}
+
+/// The cameras are unknown: preparation decides whether the origin is the viewpoint.
+void prepare_without_viewpoints(benchmark::State& state, const std::string& backend,
+                                const std::string& options_name) {
+  std::vector<PointCloudView> all = views();
+  for (PointCloudView& view : all) {
+    view.viewpoints = nullptr;
+    view.viewpoint_count = 0;
+  }
+  prepare_all(state, backend, options_name, all);
 }
 
 /// One fragment at a time.
@@ -68,6 +84,7 @@ void prepare_one_fragment(benchmark::State& state, const std::string& backend,
 
 BENCHMARK_CAPTURE(prepare_batch_of_fragments, cuda, "cuda", "loopsmart")->Apply(elapsed);
 BENCHMARK_CAPTURE(prepare_batch_of_fragments, cuda_default, "cuda", "default")->Apply(elapsed);
+BENCHMARK_CAPTURE(prepare_without_viewpoints, cuda_default, "cuda", "default")->Apply(elapsed);
 BENCHMARK_CAPTURE(prepare_one_fragment, cuda, "cuda", "loopsmart")->Apply(elapsed);
 BENCHMARK_CAPTURE(prepare_batch_of_fragments, cpu, "cpu", "loopsmart")->Apply(elapsed);
 
