@@ -82,6 +82,22 @@ TEST(Path, AMapWithoutContradictionHasNoPlacesThatLookAlike) {
   EXPECT_FALSE(places_look_alike(reconstruct(kScans, set.pairs, set.results), sensors()));
 }
 
+TEST(Path, FewRejectedPairsOfManySayNothing) {
+  Reconstruction map;
+  map.scans.resize(kScans);
+  map.edges.resize(500);
+  const auto look_alike = [&](std::size_t rejected) {
+    for (std::size_t k = 0; k < map.edges.size(); ++k) {
+      map.edges[k].source = 2;  // no step of the path
+      map.edges[k].pair_confidence = 0.99;
+      map.edges[k].accepted = k >= rejected;
+    }
+    return places_look_alike(map, sensors());
+  };
+  EXPECT_FALSE(look_alike(15));  // more than the confidences explain
+  EXPECT_TRUE(look_alike(25));
+}
+
 TEST(Path, OnlyPairsThatContinueThePathAreTrusted) {
   TwinBays set(in_order());
   const std::vector<char> trusted = set.trusted();

@@ -14,6 +14,10 @@ constexpr double kConfident = 0.9;
 /// Modes of a pair that are asked, and the least confidence of one.
 constexpr std::size_t kModes = 4;
 constexpr double kLeastOfMode = 0.1;
+/// Of the confident pairs, at least such a share is rejected where places look alike (0.08 to 0.15
+/// in offices and warehouses). Large right maps of houses reject up to 0.02, more than is
+/// explained.
+constexpr double kLeastRejected = 0.04;
 /// A rival at another pose that is as likely as not.
 constexpr double kRival = 0.5;
 /// Scans so many numbers apart are as if they had none.
@@ -261,16 +265,17 @@ class Growth {
 }  // namespace
 
 bool places_look_alike(const Reconstruction& map, const std::vector<Eigen::Vector3d>& sensors) {
-  double expected = 0, rejected = 0;
+  double confident = 0, expected = 0, rejected = 0;
   std::vector<double> steps;
   for (const Edge& edge : map.edges) {
     if (edge.pair_confidence < kConfident) continue;
+    ++confident;
     expected += 1 - edge.pair_confidence;
     rejected += !edge.accepted;
     const Pair pair{edge.source, edge.target};
     if (gap_of(pair) == 1) steps.push_back(step_of(pair, edge.target_from_source, sensors));
   }
-  if (rejected <= std::max(1.0, expected)) return false;
+  if (rejected <= std::max({1.0, expected, kLeastRejected * confident})) return false;
   if (rejected > expected + 2 * std::sqrt(expected) + 1) return true;
   if (steps.size() < kLeastSteps) return false;
   const double max_step = kLongestStep * quantile(std::move(steps));
