@@ -228,6 +228,19 @@ def short(name, figures):
     return f"{name}: {figures['placed']}/{figures['scans']} placed; {islands}; {figures['accepted']} edges, {len(figures['wrong'])} wrong, {len(figures['far_off'])} far off; above .9 by pairs and in the map {', '.join('{right} of {edges} right'.format(**s) for s in figures['sure'].values())}"
 
 
+BRIEF = ("scans", "placed", "islands", "accepted", "wrong", "far_off", "sure")  # before the end
+
+
+def summary(figures):
+    """Counts instead of lists of scans and edges, rounded."""
+    if isinstance(figures, dict):
+        counted = ("scans", "wrong", "far_off", "left_out")
+        return {k: len(v) if k in counted and isinstance(v, (list, dict)) else summary(v) for k, v in figures.items()}
+    if isinstance(figures, list):
+        return [summary(value) for value in figures]
+    return round(figures, 4) if isinstance(figures, float) else figures
+
+
 def main():
     options = parser(__doc__, "maps.json")
     options.add_argument("cases", nargs="*", help="default: all; others of the record stay")
@@ -260,9 +273,9 @@ def main():
         ]
         overlapping_islands(chosen, strong, after)
         maps[name] = {
-            "before_audit": unaudited,
-            "before_refinement": before,
-            "after_refinement": after,
+            "before_audit": summary({key: unaudited[key] for key in BRIEF}),
+            "before_refinement": summary({key: before[key] for key in BRIEF}),
+            "after_refinement": summary(after),
         }
         stages = (("not audited", unaudited), ("audited", before), ("refined", after))
         print(name, *(short(stage, figures) for stage, figures in stages), sep=" | ", flush=True)
@@ -272,7 +285,7 @@ def main():
             figures = measure(out.parent, known[name].truth(arguments), {}, known[name].scene_of)
             figures["seconds"] = json.loads(out.read_text())["seconds"]
             figures["peak_memory_mib"] = json.loads(out.read_text())["peak_memory_mib"]
-            peers.setdefault(peer, {})[name] = figures
+            peers.setdefault(peer, {})[name] = summary(figures)
             print(short(f"{peer} {name}", figures))
     command = "python3 bench/accuracy/maps.py --data DATA --work WORK"
     write(arguments, command, {"maps": maps, "peers": peers})
