@@ -97,6 +97,25 @@ TEST(Connections, EdgesDoNotConfirmThemselves) {
   EXPECT_EQ(audit.connections[0].size, 10u);
 }
 
+// All pairs that overlap were registered: there is no other support.
+TEST(Connections, ManyEdgesOutweighFewContradictions) {
+  const auto verdict_of = [](std::uint32_t contradictions) {
+    std::vector<AuditedPair> pairs;
+    std::vector<Bond> bonds;
+    for (std::uint32_t k = 0; k < 40; ++k)
+      for (std::uint32_t m = k + 1; m < 40; ++m) {
+        const bool across = k < 20 && m >= 20;
+        const bool contradicts = m == k + 20 && k < contradictions;
+        if (across && !contradicts && (k + m) % 4 != 0) continue;
+        pairs.push_back(pair_of(m, k, contradicts ? -2.5 : 0.7));
+        if (!contradicts) bonds.push_back({m, k, across ? 0.95 : 0.99});
+      }
+    return judged(40, pairs, bonds).sound();
+  };
+  EXPECT_TRUE(verdict_of(3));
+  EXPECT_FALSE(verdict_of(20));
+}
+
 // A corner of scan 0 is bent: it contradicts six scans a little, and fits the fourteen that it was
 // registered with.
 TEST(Connections, ABentCornerIsNoWrongPlace) {

@@ -20,6 +20,12 @@ constexpr double kPrior = 3;
 /// which those across a slip are, come late: a slip is then in one edge of the tree.
 constexpr double kOfBond = 10, kOfMove = 0.5;
 
+/// An edge was chosen because its pair looks right, so what its pair supports is part of what is
+/// judged and counts less. Of 120 scans of a house, all pairs, right cuts have 115 such pairs for 34
+/// that contradict, wrong ones 26 for 382. 0 takes four of five right maps apart, 0.25 two, 0.5 and
+/// 1 none; what is wrong is found with all of them.
+constexpr double kOfChosen = 0.5;
+
 /// Pairs across one connection that are heard. Where there are more, as along a corridor that was
 /// walked there and back, they are drawn without regard to what they say.
 constexpr std::size_t kMostAcross = 1024;
@@ -245,9 +251,8 @@ AuditedConnection judge(const std::vector<std::uint32_t>& across, const std::vec
       out.contradictions.push_back(k);
       ++out.contradicting;
     } else {
-      // An edge was chosen because its pair looks right: it is part of what is judged. A single
-      // scan that was registered with its neighbours has no other support.
-      if (lone || !bonded[k]) supports.add(pairs[k], ratios[at]);
+      // A single scan that was registered with its neighbours has no other support.
+      supports.add(pairs[k], (lone || !bonded[k] ? 1 : kOfChosen) * ratios[at]);
       ++out.supporting;
     }
   }
