@@ -21,9 +21,9 @@ constexpr double kPrior = 3;
 constexpr double kOfBond = 10, kOfMove = 0.5;
 
 /// An edge was chosen because its pair looks right, so what its pair supports is part of what is
-/// judged and counts less. Of 120 scans of a house, all pairs, right cuts have 115 such pairs for 34
-/// that contradict, wrong ones 26 for 382. 0 takes four of five right maps apart, 0.25 two, 0.5 and
-/// 1 none; what is wrong is found with all of them.
+/// judged and counts less. Of 120 scans of a house, all pairs, right cuts have 115 such pairs for
+/// 34 that contradict, wrong ones 26 for 382. 0 takes four of five right maps apart, 0.25 two, 0.5
+/// and 1 none; what is wrong is found with all of them.
 constexpr double kOfChosen = 0.5;
 
 /// Pairs across one connection that are heard. Where there are more, as along a corridor that was
