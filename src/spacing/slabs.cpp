@@ -167,8 +167,8 @@ Vec3 Slabs::row_of(std::size_t slab, const std::vector<std::uint64_t>& keys,
     if (sortable_bits(y_[k]) == low_bits && key_of(x_[k], y_[k]) == keys[place])
       equal.push_back({x_[k], y_[k], z_[k]});
   if (equal.size() == 1) return equal.front();
-  const auto at = std::count(keys.begin(), keys.begin() + static_cast<std::ptrdiff_t>(place),
-                             keys[place]);
+  const auto at =
+      std::count(keys.begin(), keys.begin() + static_cast<std::ptrdiff_t>(place), keys[place]);
   std::nth_element(equal.begin(), equal.begin() + at, equal.end(),
                    [](const Vec3& a, const Vec3& b) { return a.z < b.z; });
   return equal[static_cast<std::size_t>(at)];
