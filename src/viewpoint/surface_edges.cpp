@@ -5,7 +5,6 @@
 #include <utility>
 
 #include "algorithm/cell.hpp"
-#include "common/host_threads.hpp"
 #include "common/radix_sort.hpp"
 #include "common/vector_targets.hpp"
 
@@ -14,6 +13,8 @@ namespace {
 
 /// Nearest neighbours of each point that become edges.
 constexpr std::size_t kNeighbors = 12;
+/// Points that one thread at a time searches the neighbours of.
+constexpr std::size_t kPointsOfPart = 600;
 
 /// Points in the order of their cells, whose edge is the radius of neighbours.
 struct Cells {
@@ -305,11 +306,11 @@ struct SecondPoints {
 
 std::vector<SurfaceEdge> surface_edges(const std::vector<Vec3>& points,
                                        const std::vector<Vec3>& normals, float radius,
-                                       std::size_t threads) {
+                                       ThreadGroup& threads) {
   const Cells cells = sorted_into_cells(points, normals, radius);
-  const std::size_t parts = std::max<std::size_t>(threads, 1);
+  const std::size_t parts = 1 + points.size() / kPointsOfPart;
   std::vector<std::vector<Pair>> found(parts);
-  on_threads(parts, [&](std::size_t part) {
+  threads.parallel(parts, [&](std::size_t part) {
     found[part] = PairFinder(cells, radius)
                       .pairs_of_cells(part * cells.keys.size() / parts,
                                       (part + 1) * cells.keys.size() / parts);

@@ -4,7 +4,9 @@
 #include <cstdint>
 #include <vector>
 
+#include "common/thread_group.hpp"
 #include "math/vec3.hpp"
+#include "viewpoint/contradictions.hpp"
 #include "viewpoint/surface_edges.hpp"
 
 namespace gpureg {
@@ -19,9 +21,12 @@ class SurfaceGraph {
 
   /// @param normals unit vectors of any sign; zero where unknown, such points have no neighbours.
   /// @param radius largest distance of neighbours, in the unit of the points.
-  /// @param threads that build the graph; it does not depend on their number.
+  /// @param threads that share the work of the graph, which does not depend on their number; they
+  ///   have to outlive it.
   SurfaceGraph(std::vector<Vec3> points, std::vector<Vec3> normals, float radius,
-               std::size_t threads);
+               ThreadGroup& threads);
+
+  ThreadGroup& threads() const { return *threads_; }
 
   const std::vector<Vec3>& points() const { return points_; }
   const std::vector<Vec3>& normals() const { return normals_; }
@@ -48,17 +53,13 @@ class SurfaceGraph {
   bool outwards(const Signs& signs) const;
 
  private:
-  /// Edge that contradictions() reads.
-  struct CountedEdge {
-    std::uint32_t a, b;  ///< places in counted_ends_
-    float weight;        ///< with the sign of the cosine
-  };
   void choose_counted();
 
   std::vector<Vec3> points_, normals_;
   std::vector<SurfaceEdge> edges_;
   float radius_;
-  std::vector<CountedEdge> counted_;
+  ThreadGroup* threads_;
+  CountedEdges counted_;                     ///< those that contradictions() reads
   std::vector<std::uint32_t> counted_ends_;  ///< places in points_
 };
 

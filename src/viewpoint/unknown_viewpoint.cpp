@@ -11,7 +11,6 @@
 #include "common/limits.hpp"
 #include "common/validate.hpp"
 #include "pipeline/runs.hpp"
-#include "viewpoint/viewpoint_inference.hpp"
 
 namespace gpureg {
 namespace {
@@ -20,27 +19,13 @@ namespace {
 /// prepared points.
 constexpr float kGraphRadius = 1.25f;
 
-/// Points from which another thread is worth its start.
-constexpr std::size_t kPointsPerThread = 2'000;
-
 /// Points that are prepared together: a preparation takes twice the memory of its result.
 constexpr std::size_t kPointsTogether = std::size_t(1) << 20;
 
-/// A cloud whose sides are to be decided.
-struct OpenCloud {
-  std::size_t index;
-  std::vector<Vec3> points, normals;
-  InferredSides sides;
-};
-
-InferredSides sides_of(const SurfaceGraph& graph, const RawCloud& raw, const CloudKnowledge& known,
-                       const PreparedState& state) {
-  if (known.normals) return check_given_sides(graph);
-  const double* offset = state.frame_offset;
-  const Vec3 of_rows{static_cast<float>(-offset[0]), static_cast<float>(-offset[1]),
-                     static_cast<float>(-offset[2])};
-  const Vec3 local = of_rows - Vec3{state.origin[0], state.origin[1], state.origin[2]};
-  return infer_sides(graph, local, raw, of_rows, known.infer_viewpoint);
+/// The origin of a cloud's frame, relative to its rows.
+Vec3 origin_of_rows(const CloudKnowledge& known) {
+  return {static_cast<float>(-known.origin[0]), static_cast<float>(-known.origin[1]),
+          static_cast<float>(-known.origin[2])};
 }
 
 /// Points of a prepared cloud with other sides, as input of a preparation that keeps them.
@@ -49,10 +34,12 @@ struct Replacement {
   std::vector<float> features;
   std::uint32_t feature_dimension = 0;
 
-  Replacement(const OpenCloud& cloud, const PreparedState& state, bool own_features, float sign)
-      : points(cloud.points), normals(cloud.normals) {
+  Replacement(const std::vector<Vec3>& of_points, const std::vector<Vec3>& of_normals,
+              const SurfaceGraph::Signs& signs, const PreparedState& state, bool own_features,
+              float sign)
+      : points(of_points), normals(of_normals) {
     for (std::size_t i = 0; i < normals.size(); ++i)
-      normals[i] = normals[i] * (sign * static_cast<float>(cloud.sides.signs[i]));
+      normals[i] = normals[i] * (sign * static_cast<float>(signs[i]));
     if (!own_features) return;
     features = state.copy_features();
     feature_dimension = state.feature_dimension;
@@ -109,31 +96,6 @@ struct Inheritance {
   }
 };
 
-void decide(Engine& engine, Span<const RawCloud> raw, const std::vector<CloudKnowledge>& knowledge,
-            const PrepareOptions& options,
-            const std::vector<std::shared_ptr<PreparedState>>& states,
-            std::vector<OpenCloud>& open) {
-  // It computes much and reads little, so with a device it is worth all processors.
-  const std::size_t threads =
-      std::max({1u, engine.host_threads(),
-                engine.leaves_host_idle() ? std::thread::hardware_concurrency() : 1u});
-  const std::size_t workers = std::max<std::size_t>(1, std::min(threads, open.size()));
-  on_threads(workers, [&](std::size_t worker) {
-    for (std::size_t k = worker; k < open.size(); k += workers) {
-      OpenCloud& cloud = open[k];
-      PreparedState& state = *states[cloud.index];
-      const SurfaceGraph graph(
-          cloud.points, cloud.normals, kGraphRadius * options.normal_radius,
-          std::min(threads / workers, 1 + cloud.points.size() / kPointsPerThread));
-      cloud.sides = sides_of(graph, raw.data[cloud.index], knowledge[cloud.index], state);
-      state.statistics.viewpoint = cloud.sides.source;
-      if (knowledge[cloud.index].normals)
-        state.statistics.repaired_normals = static_cast<std::uint32_t>(
-            std::count(cloud.sides.signs.begin(), cloud.sides.signs.end(), std::int8_t(-1)));
-    }
-  });
-}
-
 }  // namespace
 
 void check_viewpoints(const CloudKnowledge& knowledge, const PreparedState& state) {
@@ -146,32 +108,97 @@ void check_viewpoints(const CloudKnowledge& knowledge, const PreparedState& stat
               "the rays of a farther viewpoint apart");
 }
 
-void resolve_viewpoints(Engine& engine, Span<const RawCloud> raw,
-                        const std::vector<CloudKnowledge>& knowledge, const PrepareOptions& options,
-                        std::vector<std::shared_ptr<PreparedState>>& states) {
+UnknownViewpoints::UnknownViewpoints(Engine& engine, Span<const RawCloud> raw,
+                                     const std::vector<CloudKnowledge>& knowledge,
+                                     const PrepareOptions& options)
+    : engine_(engine), raw_(raw), knowledge_(knowledge), options_(options), spread_(raw.size) {}
+
+bool UnknownViewpoints::is_open(std::size_t cloud) const {
+  const CloudKnowledge& known = knowledge_[cloud];
+  return !known.viewpoints && !known.model && options_.depth_maps > 0;
+}
+
+bool UnknownViewpoints::asks_rows(std::size_t cloud) const {
+  return is_open(cloud) && !knowledge_[cloud].normals && knowledge_[cloud].infer_viewpoint;
+}
+
+ThreadGroup& UnknownViewpoints::threads() {
+  // They compute much and read little, so with a device they are worth all processors.
+  if (!threads_)
+    threads_ = std::make_unique<ThreadGroup>(
+        std::max({1u, engine_.host_threads(),
+                  engine_.leaves_host_idle() ? std::thread::hardware_concurrency() : 1u}));
+  return *threads_;
+}
+
+void UnknownViewpoints::measure_rows(std::size_t cloud) {
+  if (!spread_[cloud])
+    spread_[cloud] = spacing_spread(raw_[cloud], origin_of_rows(knowledge_[cloud]));
+}
+
+void UnknownViewpoints::during(const std::function<void()>& prepare) {
+  std::vector<std::size_t> asked;
+  for (std::size_t k = 0; k < raw_.size; ++k)
+    if (asks_rows(k)) asked.push_back(k);
+  if (asked.empty() || !engine_.leaves_host_idle()) return prepare();
+  on_threads(2, [&](std::size_t thread) {
+    if (thread == 0) return prepare();
+    threads().parallel(asked.size(), [&](std::size_t k) { measure_rows(asked[k]); });
+  });
+}
+
+void UnknownViewpoints::decide(OpenCloud& cloud, PreparedState& state) {
+  const CloudKnowledge& known = knowledge_[cloud.index];
+  const bool asks = asks_rows(cloud.index);
+  if (asks) measure_rows(cloud.index);
+  if (asks && is_scanner(*spread_[cloud.index])) {
+    state.statistics.viewpoint = ViewpointSource::origin;
+    return;
+  }
+  cloud.points = state.copy_points();
+  cloud.normals = state.copy_normals();
+  const SurfaceGraph graph(cloud.points, cloud.normals, kGraphRadius * options_.normal_radius,
+                           threads());
+  const Vec3 of_rows = origin_of_rows(known);
+  const Vec3 local = of_rows - Vec3{state.origin[0], state.origin[1], state.origin[2]};
+  cloud.sides = known.normals ? check_given_sides(graph)
+                              : infer_sides(graph, local, raw_[cloud.index], of_rows,
+                                            asks ? &*spread_[cloud.index] : nullptr);
+  state.statistics.viewpoint = cloud.sides.source;
+  if (known.normals)
+    state.statistics.repaired_normals = static_cast<std::uint32_t>(
+        std::count(cloud.sides.signs.begin(), cloud.sides.signs.end(), std::int8_t(-1)));
+}
+
+void UnknownViewpoints::resolve(std::vector<std::shared_ptr<PreparedState>>& states) {
   std::vector<OpenCloud> open;
   for (std::size_t k = 0; k < states.size(); ++k) {
-    PreparedState& state = *states[k];
-    const CloudKnowledge& known = knowledge[k];
-    state.statistics.viewpoint = known.viewpoints ? ViewpointSource::said
-                                 : known.model    ? ViewpointSource::model
-                                 : known.normals  ? ViewpointSource::normals
-                                                  : ViewpointSource::origin;
-    if (known.viewpoints || known.model || options.depth_maps == 0 || state.size == 0) continue;
-    open.push_back({k, state.copy_points(), state.copy_normals(), {}});
+    const CloudKnowledge& known = knowledge_[k];
+    states[k]->statistics.viewpoint = known.viewpoints ? ViewpointSource::said
+                                      : known.model    ? ViewpointSource::model
+                                      : known.normals  ? ViewpointSource::normals
+                                                       : ViewpointSource::origin;
+    if (is_open(k) && states[k]->size > 0) open.push_back({k, {}, {}, {}});
   }
-  decide(engine, raw, knowledge, options, states, open);
+  if (open.empty()) return;
+  threads().parallel(open.size(), [&](std::size_t k) { decide(open[k], *states[open[k].index]); });
+  prepare_again(open, states);
+}
 
+void UnknownViewpoints::prepare_again(const std::vector<OpenCloud>& clouds,
+                                      std::vector<std::shared_ptr<PreparedState>>& states) {
   std::vector<Replacement> replacements;
   std::vector<Inheritance> inheritances;
   std::vector<RawCloud> inputs;
   std::vector<std::size_t> first{0};  // of each cloud: its sides stay together
-  for (const OpenCloud& cloud : open) {
+  for (const OpenCloud& cloud : clouds) {
     if (cloud.sides.signs.empty()) continue;
-    const bool own_features = knowledge[cloud.index].features;
-    replacements.emplace_back(cloud, *states[cloud.index], own_features, 1.0f);
-    if (!cloud.sides.sign_known)
-      replacements.emplace_back(cloud, *states[cloud.index], own_features, -1.0f);
+    const auto add = [&](float sign) {
+      replacements.emplace_back(cloud.points, cloud.normals, cloud.sides.signs,
+                                *states[cloud.index], knowledge_[cloud.index].features, sign);
+    };
+    add(1.0f);
+    if (!cloud.sides.sign_known) add(-1.0f);
     first.push_back(replacements.size());
     inheritances.emplace_back(*states[cloud.index]);
     // Of a large cloud it takes gigabytes, and so do its replacements.
@@ -179,7 +206,7 @@ void resolve_viewpoints(Engine& engine, Span<const RawCloud> raw,
   }
   if (replacements.empty()) return;
   for (const Replacement& replacement : replacements) inputs.push_back(replacement.raw());
-  PrepareOptions as_they_are = options;
+  PrepareOptions as_they_are = options_;
   as_they_are.voxel_size = 0;
   std::vector<std::shared_ptr<PreparedState>> prepared;
   const auto runs = pipeline::runs_within(inheritances.size(), kPointsTogether, [&](std::size_t k) {
@@ -187,12 +214,12 @@ void resolve_viewpoints(Engine& engine, Span<const RawCloud> raw,
   });
   for (const pipeline::Run& run : runs)
     in_halves(first[run.begin], first[run.end], [&](std::size_t begin, std::size_t end) {
-      for (auto& state : engine.prepare({inputs.data() + begin, end - begin}, as_they_are))
+      for (auto& state : engine_.prepare({inputs.data() + begin, end - begin}, as_they_are))
         prepared.push_back(std::move(state));
     });
   auto next = prepared.begin();
   auto inheritance = inheritances.begin();
-  for (const OpenCloud& cloud : open) {
+  for (const OpenCloud& cloud : clouds) {
     if (cloud.sides.signs.empty()) continue;
     std::shared_ptr<PreparedState>& state = states[cloud.index];
     state = *next++;

@@ -53,7 +53,8 @@ TEST(SurfaceEdges, AreTheTwelveNearestWithinTheRadius) {
     std::sort(expected.begin(), expected.end());
     expected.erase(std::unique(expected.begin(), expected.end()), expected.end());
     for (const std::size_t threads : {1, 2, 7}) {
-      const auto edges = surface_edges(sheet.points, sheet.normals, radius, threads);
+      ThreadGroup group(threads);
+      const auto edges = surface_edges(sheet.points, sheet.normals, radius, group);
       ASSERT_EQ(edges.size(), expected.size());
       for (std::size_t k = 0; k < edges.size(); ++k) {
         ASSERT_EQ(std::make_pair(edges[k].a, edges[k].b), expected[k]);
@@ -86,8 +87,9 @@ TEST(SurfaceGraph, ContradictionsAgreeWithDouble) {
   std::mt19937 random(2);
   std::uniform_real_distribution<float> place(-3, 3);
   const Sheet sheet = noisy_sheet(random, 3000);
-  const SurfaceGraph graph(sheet.points, sheet.normals, 0.1f, 2);
-  const auto edges = surface_edges(sheet.points, sheet.normals, 0.1f, 1);
+  ThreadGroup threads(2);
+  const SurfaceGraph graph(sheet.points, sheet.normals, 0.1f, threads);
+  const auto edges = surface_edges(sheet.points, sheet.normals, 0.1f, threads);
   ASSERT_LT(edges.size(), 40'000u);  // all are counted
   std::vector<Vec3> viewpoints{sheet.points[7], {0, 0, 1000}};
   for (int k = 0; k < 19; ++k) viewpoints.push_back({place(random), place(random), place(random)});
@@ -107,7 +109,8 @@ TEST(SurfaceGraph, AFlatSheetHasNoContradiction) {
       sheet.points.push_back({0.05f * static_cast<float>(x), 0.05f * static_cast<float>(y), 0});
       sheet.normals.push_back({0, 0, (x + y) % 3 == 0 ? -1.0f : 1.0f});
     }
-  const SurfaceGraph graph(sheet.points, sheet.normals, 0.11f, 1);
+  ThreadGroup threads(1);
+  const SurfaceGraph graph(sheet.points, sheet.normals, 0.11f, threads);
   EXPECT_EQ(graph.contradiction(Vec3{0.7f, 0.3f, 2}), 0);
   EXPECT_EQ(graph.contradiction(graph.consistent_signs()), 0);
   EXPECT_GT(graph.contradiction(SurfaceGraph::Signs(sheet.points.size(), 1)), 0.3);
