@@ -8,6 +8,10 @@
 
 namespace gpureg {
 
+struct PointsAndNormals {
+  std::vector<Vec3> points, normals;
+};
+
 /// Content of a PreparedCloud: metadata on the host, data in the memory of its engine.
 struct PreparedState {
   virtual ~PreparedState() = default;
@@ -15,6 +19,10 @@ struct PreparedState {
   virtual std::vector<Vec3> copy_points() const = 0;
   virtual std::vector<Vec3> copy_normals() const = 0;
   virtual std::vector<float> copy_features() const = 0;
+  /// With one wait where they are on a device.
+  virtual PointsAndNormals copy_points_and_normals() const {
+    return {copy_points(), copy_normals()};
+  }
 
   /// Identifies the memory that holds the data: clouds of one owner can be aligned.
   const void* owner = nullptr;

@@ -16,6 +16,7 @@ struct CountedEdges {
   };
   std::vector<Edge> edges;
   std::vector<Vec3> points, normals;  ///< of the ends
+  std::vector<float> weight;          ///< half of the weights of the edges of each end
 };
 
 /// Number of viewpoints whose contradictions take the time of one.
@@ -23,8 +24,10 @@ std::size_t viewpoints_at_once();
 
 /// Normal-weighted share of the edges whose ends show a viewpoint different sides, for each of
 /// several viewpoints.
+/// @param limit where all shares of viewpoints_at_once() are greater, they may be infinite: that
+///   takes fewer edges.
 void count_contradictions(const CountedEdges& counted, const Vec3* viewpoints, std::size_t count,
-                          double* shares);
+                          double limit, double* shares);
 
 /// The side of every point that a viewpoint sees: 1 that of its normal, -1 the other one.
 void find_signs_towards(Vec3 viewpoint, const std::vector<Vec3>& points,

@@ -128,19 +128,23 @@ void SurfaceGraph::choose_counted() {
     counted_.points.push_back(points_[i]);
     counted_.normals.push_back(normals_[i]);
   }
+  counted_.weight.resize(counted_ends_.size(), 0.0f);
   for (CountedEdges::Edge& e : counted_.edges) {
     e.a = place[e.a];
     e.b = place[e.b];
+    for (const std::uint32_t end : {e.a, e.b}) counted_.weight[end] += 0.5f * std::fabs(e.weight);
   }
 }
 
-std::vector<double> SurfaceGraph::contradictions(const std::vector<Vec3>& viewpoints) const {
+std::vector<double> SurfaceGraph::contradictions(const std::vector<Vec3>& viewpoints,
+                                                 double limit) const {
   std::vector<double> shares(viewpoints.size());
   const std::size_t together = viewpoints_at_once();
   threads_->parallel((viewpoints.size() + together - 1) / together, [&](std::size_t part) {
     const std::size_t first = part * together;
     count_contradictions(counted_, viewpoints.data() + first,
-                         std::min(together, viewpoints.size() - first), shares.data() + first);
+                         std::min(together, viewpoints.size() - first), limit,
+                         shares.data() + first);
   });
   return shares;
 }

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <limits>
 #include <vector>
 
 #include "common/thread_group.hpp"
@@ -37,7 +38,9 @@ class SurfaceGraph {
   /// at grazing incidence weigh less: noise turns their normals to either side.
   double contradiction(Vec3 viewpoint) const { return contradictions({viewpoint})[0]; }
   /// The same for each of several viewpoints, which takes little more time than for one.
-  std::vector<double> contradictions(const std::vector<Vec3>& viewpoints) const;
+  /// @param limit shares above it may be infinite instead, which takes less time.
+  std::vector<double> contradictions(const std::vector<Vec3>& viewpoints,
+                                     double limit = std::numeric_limits<double>::infinity()) const;
   /// The same share for a choice of sides, without incidence.
   double contradiction(const Signs& signs) const;
 

@@ -155,8 +155,9 @@ void UnknownViewpoints::decide(OpenCloud& cloud, PreparedState& state) {
     state.statistics.viewpoint = ViewpointSource::origin;
     return;
   }
-  cloud.points = state.copy_points();
-  cloud.normals = state.copy_normals();
+  PointsAndNormals surface = state.copy_points_and_normals();
+  cloud.points = std::move(surface.points);
+  cloud.normals = std::move(surface.normals);
   const SurfaceGraph graph(cloud.points, cloud.normals, kGraphRadius * options_.normal_radius,
                            threads());
   const Vec3 of_rows = origin_of_rows(known);

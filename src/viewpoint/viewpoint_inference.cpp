@@ -47,7 +47,10 @@ struct SearchedViewpoint {
     Vec3 place;
     double contradiction;
   };
-  std::vector<Tried> tried;  ///< the first places
+  /// The first places; where the contradiction is above as_good(), it may be infinite.
+  std::vector<Tried> tried;
+  /// Contradiction up to which a place explains the surfaces as well.
+  double as_good() const { return kAsGood * contradiction + kContradictionNoise; }
 
   void take(Vec3 other, double its_contradiction) {
     if (its_contradiction >= contradiction) return;
@@ -104,20 +107,27 @@ SearchedViewpoint search_viewpoint(const SurfaceGraph& graph, float radius) {
   }
   const float half = 0.5f * norm(hi - lo);
   SearchedViewpoint best;
-  std::vector<Vec3> places = start_places(graph, radius, (lo + hi) * 0.5f, half);
-  std::vector<double> contradictions = graph.contradictions(places);
-  for (std::size_t k = 0; k < places.size(); ++k) {
-    best.tried.push_back({places[k], contradictions[k]});
-    best.take(places[k], contradictions[k]);
+  const std::vector<Vec3> starts = start_places(graph, radius, (lo + hi) * 0.5f, half);
+  // The first places bound what matters about the others. Those after them are compared in
+  // parallel.
+  const std::size_t some = std::min(viewpoints_at_once(), starts.size());
+  for (std::size_t begin = 0, end = some; begin < starts.size(); begin = end, end = starts.size()) {
+    const std::vector<Vec3> places(starts.begin() + static_cast<std::ptrdiff_t>(begin),
+                                   starts.begin() + static_cast<std::ptrdiff_t>(end));
+    const std::vector<double> contradictions = graph.contradictions(places, best.as_good());
+    for (std::size_t k = 0; k < places.size(); ++k) {
+      best.tried.push_back({places[k], contradictions[k]});
+      best.take(places[k], contradictions[k]);
+    }
   }
   // Where there is room for it, the next smaller step is tried at the same time.
   const bool both = viewpoints_at_once() >= 2 * kPlacesOfStep;
   for (float step = 0.2f * half; step > 0.5f * radius;) {
     const Vec3 from = best.place;
-    places.clear();
+    std::vector<Vec3> places;
     add_places_of_step(from, step, places);
     if (both && 0.5f * step > 0.5f * radius) add_places_of_step(from, 0.5f * step, places);
-    contradictions = graph.contradictions(places);
+    const std::vector<double> contradictions = graph.contradictions(places, best.contradiction);
     for (std::size_t first = 0; first < places.size() && same_place(best.place, from);
          first += kPlacesOfStep) {
       for (std::size_t k = first; k < first + kPlacesOfStep; ++k)
@@ -142,7 +152,7 @@ bool opposite(const SurfaceGraph& graph, const SurfaceGraph::Signs& sides, Vec3 
 /// object looks as plausible from its back.
 bool explains(const SurfaceGraph& graph, const SearchedViewpoint& best, Vec3 viewpoint,
               const SpacingSpread& spread) {
-  const double limit = kAsGood * best.contradiction + kContradictionNoise;
+  const double limit = best.as_good();
   if (graph.contradiction(viewpoint) > limit) return false;
   if (spread.radial - 1 <= kIrregularityRatio * (spread.plain - 1)) return true;
   const SurfaceGraph::Signs sides = graph.signs_towards(viewpoint);
