@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <vector>
 
@@ -11,6 +12,14 @@ namespace gpureg {
 struct PointsAndNormals {
   std::vector<Vec3> points, normals;
 };
+
+/// Points and normals of a cloud while its preparation goes on.
+struct EarlySurface : PointsAndNormals {
+  float origin[3];  ///< local origin, as in PreparedState
+};
+/// Takes those of consecutive clouds of a batch from `first` on. A preparation that fails and is
+/// tried again may give those of a cloud twice, from several threads; they are equal.
+using SurfaceWatcher = std::function<void(std::size_t first, std::vector<EarlySurface> surfaces)>;
 
 /// Content of a PreparedCloud: metadata on the host, data in the memory of its engine.
 struct PreparedState {
