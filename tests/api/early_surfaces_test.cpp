@@ -13,8 +13,8 @@
 namespace gpureg {
 namespace {
 
-/// The CPU's engine as if it were a device. Gives the surfaces of every `stride`-th cloud, and where
-/// `fails`, no batch but single clouds gets ready after that.
+/// The CPU's engine as if it were a device. Gives the surfaces of every `stride`-th cloud, and
+/// where `fails`, no batch but single clouds gets ready after that.
 class WatchedEngine final : public Engine {
  public:
   WatchedEngine(std::size_t stride, bool fails) : stride_(stride), fails_(fails) {}
@@ -121,9 +121,9 @@ TEST_F(EarlySurfaces, AnErrorOfThePreparationLeavesTheCall) {
   clouds[1].points.assign(2, Eigen::Vector3f(0, 0, 0));
   clouds[1].points[1].x() = 1e30f;
   views[1] = clouds[1].view();
-  EXPECT_THROW(prepare_batch(Access::context(std::make_shared<WatchedEngine>(1, false)), views,
-                             options),
-               Error);
+  EXPECT_THROW(
+      prepare_batch(Access::context(std::make_shared<WatchedEngine>(1, false)), views, options),
+      Error);
 }
 
 }  // namespace
