@@ -68,7 +68,7 @@ void resolve(const AdoptedBatch& batch, std::vector<std::shared_ptr<PreparedStat
     raw[k].size = rows[k].size() / 3;
     raw[k].point_stride = 3;
   }
-  resolve_viewpoints(*batch.engine, span_of(raw), batch.knowledge, batch.options, states);
+  UnknownViewpoints(*batch.engine, span_of(raw), batch.knowledge, batch.options).resolve(states);
 }
 
 std::vector<PreparedCloud> prepared(const AdoptedBatch& batch) {

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "common/thread_group.hpp"
 #include "math/vec3.hpp"
 
 namespace gpureg {
@@ -20,6 +21,6 @@ struct SurfaceEdge {
 /// @param radius largest distance of neighbours, in the unit of the points.
 std::vector<SurfaceEdge> surface_edges(const std::vector<Vec3>& points,
                                        const std::vector<Vec3>& normals, float radius,
-                                       std::size_t threads);
+                                       ThreadGroup& threads);
 
 }  // namespace gpureg

@@ -2,9 +2,12 @@
 #pragma once
 
 #include <cstdint>
+#include <limits>
 #include <vector>
 
+#include "common/thread_group.hpp"
 #include "math/vec3.hpp"
+#include "viewpoint/contradictions.hpp"
 #include "viewpoint/surface_edges.hpp"
 
 namespace gpureg {
@@ -19,9 +22,12 @@ class SurfaceGraph {
 
   /// @param normals unit vectors of any sign; zero where unknown, such points have no neighbours.
   /// @param radius largest distance of neighbours, in the unit of the points.
-  /// @param threads that build the graph; it does not depend on their number.
+  /// @param threads that share the work of the graph, which does not depend on their number; they
+  ///   have to outlive it.
   SurfaceGraph(std::vector<Vec3> points, std::vector<Vec3> normals, float radius,
-               std::size_t threads);
+               ThreadGroup& threads);
+
+  ThreadGroup& threads() const { return *threads_; }
 
   const std::vector<Vec3>& points() const { return points_; }
   const std::vector<Vec3>& normals() const { return normals_; }
@@ -32,7 +38,9 @@ class SurfaceGraph {
   /// at grazing incidence weigh less: noise turns their normals to either side.
   double contradiction(Vec3 viewpoint) const { return contradictions({viewpoint})[0]; }
   /// The same for each of several viewpoints, which takes little more time than for one.
-  std::vector<double> contradictions(const std::vector<Vec3>& viewpoints) const;
+  /// @param limit shares above it may be infinite instead, which takes less time.
+  std::vector<double> contradictions(const std::vector<Vec3>& viewpoints,
+                                     double limit = std::numeric_limits<double>::infinity()) const;
   /// The same share for a choice of sides, without incidence.
   double contradiction(const Signs& signs) const;
 
@@ -48,17 +56,13 @@ class SurfaceGraph {
   bool outwards(const Signs& signs) const;
 
  private:
-  /// Edge that contradictions() reads.
-  struct CountedEdge {
-    std::uint32_t a, b;  ///< places in counted_ends_
-    float weight;        ///< with the sign of the cosine
-  };
   void choose_counted();
 
   std::vector<Vec3> points_, normals_;
   std::vector<SurfaceEdge> edges_;
   float radius_;
-  std::vector<CountedEdge> counted_;
+  ThreadGroup* threads_;
+  CountedEdges counted_;                     ///< those that contradictions() reads
   std::vector<std::uint32_t> counted_ends_;  ///< places in points_
 };
 

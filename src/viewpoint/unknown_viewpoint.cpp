@@ -3,6 +3,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <condition_variable>
+#include <deque>
+#include <mutex>
 #include <thread>
 #include <utility>
 
@@ -11,7 +14,6 @@
 #include "common/limits.hpp"
 #include "common/validate.hpp"
 #include "pipeline/runs.hpp"
-#include "viewpoint/viewpoint_inference.hpp"
 
 namespace gpureg {
 namespace {
@@ -20,28 +22,62 @@ namespace {
 /// prepared points.
 constexpr float kGraphRadius = 1.25f;
 
-/// Points from which another thread is worth its start.
-constexpr std::size_t kPointsPerThread = 2'000;
-
 /// Points that are prepared together: a preparation takes twice the memory of its result.
 constexpr std::size_t kPointsTogether = std::size_t(1) << 20;
 
-/// A cloud whose sides are to be decided.
-struct OpenCloud {
-  std::size_t index;
-  std::vector<Vec3> points, normals;
-  InferredSides sides;
-};
-
-InferredSides sides_of(const SurfaceGraph& graph, const RawCloud& raw, const CloudKnowledge& known,
-                       const PreparedState& state) {
-  if (known.normals) return check_given_sides(graph);
-  const double* offset = state.frame_offset;
-  const Vec3 of_rows{static_cast<float>(-offset[0]), static_cast<float>(-offset[1]),
-                     static_cast<float>(-offset[2])};
-  const Vec3 local = of_rows - Vec3{state.origin[0], state.origin[1], state.origin[2]};
-  return infer_sides(graph, local, raw, of_rows, known.infer_viewpoint);
+/// The origin of a cloud's frame, relative to its rows.
+Vec3 origin_of_rows(const CloudKnowledge& known) {
+  return {static_cast<float>(-known.origin[0]), static_cast<float>(-known.origin[1]),
+          static_cast<float>(-known.origin[2])};
 }
+
+/// Surfaces on their way from a preparation to the decisions.
+class SurfaceQueue {
+ public:
+  struct Chunk {
+    std::size_t first;  ///< cloud
+    std::vector<EarlySurface> surfaces;
+  };
+  void push(Chunk chunk) {
+    {
+      const std::lock_guard<std::mutex> lock(mutex_);
+      chunks_.push_back(std::move(chunk));
+    }
+    changed_.notify_one();
+  }
+  /// Waits for the next chunk; none once the preparation has ended.
+  std::optional<Chunk> pop() {
+    std::unique_lock<std::mutex> lock(mutex_);
+    changed_.wait(lock, [&] { return closed_ || !chunks_.empty(); });
+    if (chunks_.empty()) return std::nullopt;
+    std::optional<Chunk> out(std::move(chunks_.front()));
+    chunks_.pop_front();
+    return out;
+  }
+  /// Ends the queue, also where the preparation fails.
+  class Closing {
+   public:
+    explicit Closing(SurfaceQueue& queue) : queue_(queue) {}
+    ~Closing() {
+      {
+        const std::lock_guard<std::mutex> lock(queue_.mutex_);
+        queue_.closed_ = true;
+      }
+      queue_.changed_.notify_one();
+    }
+    Closing(const Closing&) = delete;
+    Closing& operator=(const Closing&) = delete;
+
+   private:
+    SurfaceQueue& queue_;
+  };
+
+ private:
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  std::deque<Chunk> chunks_;
+  bool closed_ = false;
+};
 
 /// Points of a prepared cloud with other sides, as input of a preparation that keeps them.
 struct Replacement {
@@ -49,10 +85,11 @@ struct Replacement {
   std::vector<float> features;
   std::uint32_t feature_dimension = 0;
 
-  Replacement(const OpenCloud& cloud, const PreparedState& state, bool own_features, float sign)
-      : points(cloud.points), normals(cloud.normals) {
+  Replacement(const PointsAndNormals& surface, const SurfaceGraph::Signs& signs,
+              const PreparedState& state, bool own_features, float sign)
+      : points(surface.points), normals(surface.normals) {
     for (std::size_t i = 0; i < normals.size(); ++i)
-      normals[i] = normals[i] * (sign * static_cast<float>(cloud.sides.signs[i]));
+      normals[i] = normals[i] * (sign * static_cast<float>(signs[i]));
     if (!own_features) return;
     features = state.copy_features();
     feature_dimension = state.feature_dimension;
@@ -109,31 +146,6 @@ struct Inheritance {
   }
 };
 
-void decide(Engine& engine, Span<const RawCloud> raw, const std::vector<CloudKnowledge>& knowledge,
-            const PrepareOptions& options,
-            const std::vector<std::shared_ptr<PreparedState>>& states,
-            std::vector<OpenCloud>& open) {
-  // It computes much and reads little, so with a device it is worth all processors.
-  const std::size_t threads =
-      std::max({1u, engine.host_threads(),
-                engine.leaves_host_idle() ? std::thread::hardware_concurrency() : 1u});
-  const std::size_t workers = std::max<std::size_t>(1, std::min(threads, open.size()));
-  on_threads(workers, [&](std::size_t worker) {
-    for (std::size_t k = worker; k < open.size(); k += workers) {
-      OpenCloud& cloud = open[k];
-      PreparedState& state = *states[cloud.index];
-      const SurfaceGraph graph(
-          cloud.points, cloud.normals, kGraphRadius * options.normal_radius,
-          std::min(threads / workers, 1 + cloud.points.size() / kPointsPerThread));
-      cloud.sides = sides_of(graph, raw.data[cloud.index], knowledge[cloud.index], state);
-      state.statistics.viewpoint = cloud.sides.source;
-      if (knowledge[cloud.index].normals)
-        state.statistics.repaired_normals = static_cast<std::uint32_t>(
-            std::count(cloud.sides.signs.begin(), cloud.sides.signs.end(), std::int8_t(-1)));
-    }
-  });
-}
-
 }  // namespace
 
 void check_viewpoints(const CloudKnowledge& knowledge, const PreparedState& state) {
@@ -146,40 +158,134 @@ void check_viewpoints(const CloudKnowledge& knowledge, const PreparedState& stat
               "the rays of a farther viewpoint apart");
 }
 
-void resolve_viewpoints(Engine& engine, Span<const RawCloud> raw,
-                        const std::vector<CloudKnowledge>& knowledge, const PrepareOptions& options,
-                        std::vector<std::shared_ptr<PreparedState>>& states) {
-  std::vector<OpenCloud> open;
-  for (std::size_t k = 0; k < states.size(); ++k) {
-    PreparedState& state = *states[k];
-    const CloudKnowledge& known = knowledge[k];
-    state.statistics.viewpoint = known.viewpoints ? ViewpointSource::said
-                                 : known.model    ? ViewpointSource::model
-                                 : known.normals  ? ViewpointSource::normals
-                                                  : ViewpointSource::origin;
-    if (known.viewpoints || known.model || options.depth_maps == 0 || state.size == 0) continue;
-    open.push_back({k, state.copy_points(), state.copy_normals(), {}});
-  }
-  decide(engine, raw, knowledge, options, states, open);
+UnknownViewpoints::UnknownViewpoints(Engine& engine, Span<const RawCloud> raw,
+                                     const std::vector<CloudKnowledge>& knowledge,
+                                     const PrepareOptions& options)
+    : engine_(engine),
+      raw_(raw),
+      knowledge_(knowledge),
+      options_(options),
+      spread_(raw.size),
+      decisions_(raw.size) {}
 
+bool UnknownViewpoints::is_open(std::size_t cloud) const {
+  const CloudKnowledge& known = knowledge_[cloud];
+  return !known.viewpoints && !known.model && options_.depth_maps > 0;
+}
+
+bool UnknownViewpoints::asks_rows(std::size_t cloud) const {
+  return is_open(cloud) && !knowledge_[cloud].normals && knowledge_[cloud].infer_viewpoint;
+}
+
+ThreadGroup& UnknownViewpoints::threads() {
+  // They compute much and read little, so with a device they are worth all processors.
+  if (!threads_)
+    threads_ = std::make_unique<ThreadGroup>(
+        std::max({1u, engine_.host_threads(),
+                  engine_.leaves_host_idle() ? std::thread::hardware_concurrency() : 1u}));
+  return *threads_;
+}
+
+void UnknownViewpoints::measure_rows(std::size_t cloud) {
+  if (!spread_[cloud])
+    spread_[cloud] = spacing_spread(raw_[cloud], origin_of_rows(knowledge_[cloud]));
+}
+
+void UnknownViewpoints::during(const std::function<void(const SurfaceWatcher&)>& prepare) {
+  std::vector<std::size_t> asked;
+  bool any_open = false;
+  for (std::size_t k = 0; k < raw_.size; ++k) {
+    any_open = any_open || is_open(k);
+    if (asks_rows(k)) asked.push_back(k);
+  }
+  if (!any_open || !engine_.leaves_host_idle()) return prepare(nullptr);
+  SurfaceQueue queue;
+  on_threads(2, [&](std::size_t thread) {
+    if (thread == 0) {
+      const SurfaceQueue::Closing closing(queue);
+      return prepare([&](std::size_t first, std::vector<EarlySurface> surfaces) {
+        queue.push({first, std::move(surfaces)});
+      });
+    }
+    threads().parallel(asked.size(), [&](std::size_t k) { measure_rows(asked[k]); });
+    while (auto chunk = queue.pop())
+      threads().parallel(chunk->surfaces.size(), [&](std::size_t k) {
+        EarlySurface& surface = chunk->surfaces[k];
+        decide(chunk->first + k, std::move(surface), surface.origin);
+      });
+  });
+}
+
+void UnknownViewpoints::decide(std::size_t cloud, PointsAndNormals surface,
+                               const float (&origin)[3]) {
+  Decision& out = decisions_[cloud];
+  if (out.made || !is_open(cloud) || surface.points.empty()) return;
+  const CloudKnowledge& known = knowledge_[cloud];
+  const bool asks = asks_rows(cloud);
+  if (asks) measure_rows(cloud);
+  if (asks && is_scanner(*spread_[cloud])) {
+    out.sides.source = ViewpointSource::origin;
+  } else {
+    out.surface = std::move(surface);
+    const SurfaceGraph graph(out.surface.points, out.surface.normals,
+                             kGraphRadius * options_.normal_radius, threads());
+    const Vec3 of_rows = origin_of_rows(known);
+    const Vec3 local = of_rows - Vec3{origin[0], origin[1], origin[2]};
+    out.sides = known.normals ? check_given_sides(graph)
+                              : infer_sides(graph, local, raw_[cloud], of_rows,
+                                            asks ? &*spread_[cloud] : nullptr);
+  }
+  out.made = true;
+}
+
+void UnknownViewpoints::set_statistics(std::size_t cloud, PrepareStatistics& statistics) const {
+  const CloudKnowledge& known = knowledge_[cloud];
+  const Decision& decision = decisions_[cloud];
+  statistics.viewpoint = decision.made      ? decision.sides.source
+                         : known.viewpoints ? ViewpointSource::said
+                         : known.model      ? ViewpointSource::model
+                         : known.normals    ? ViewpointSource::normals
+                                            : ViewpointSource::origin;
+  if (decision.made && known.normals)
+    statistics.repaired_normals = static_cast<std::uint32_t>(
+        std::count(decision.sides.signs.begin(), decision.sides.signs.end(), std::int8_t(-1)));
+}
+
+void UnknownViewpoints::resolve(std::vector<std::shared_ptr<PreparedState>>& states) {
+  std::vector<std::size_t> undecided;
+  for (std::size_t k = 0; k < states.size(); ++k)
+    if (is_open(k) && !decisions_[k].made && states[k]->size > 0) undecided.push_back(k);
+  if (!undecided.empty())
+    threads().parallel(undecided.size(), [&](std::size_t k) {
+      const PreparedState& state = *states[undecided[k]];
+      decide(undecided[k], state.copy_points_and_normals(), state.origin);
+    });
+  for (std::size_t k = 0; k < states.size(); ++k) set_statistics(k, states[k]->statistics);
+  prepare_again(states);
+}
+
+void UnknownViewpoints::prepare_again(std::vector<std::shared_ptr<PreparedState>>& states) {
   std::vector<Replacement> replacements;
   std::vector<Inheritance> inheritances;
   std::vector<RawCloud> inputs;
   std::vector<std::size_t> first{0};  // of each cloud: its sides stay together
-  for (const OpenCloud& cloud : open) {
-    if (cloud.sides.signs.empty()) continue;
-    const bool own_features = knowledge[cloud.index].features;
-    replacements.emplace_back(cloud, *states[cloud.index], own_features, 1.0f);
-    if (!cloud.sides.sign_known)
-      replacements.emplace_back(cloud, *states[cloud.index], own_features, -1.0f);
+  for (std::size_t k = 0; k < states.size(); ++k) {
+    const InferredSides& sides = decisions_[k].sides;
+    if (sides.signs.empty()) continue;
+    const auto add = [&](float sign) {
+      replacements.emplace_back(decisions_[k].surface, sides.signs, *states[k],
+                                knowledge_[k].features, sign);
+    };
+    add(1.0f);
+    if (!sides.sign_known) add(-1.0f);
     first.push_back(replacements.size());
-    inheritances.emplace_back(*states[cloud.index]);
+    inheritances.emplace_back(*states[k]);
     // Of a large cloud it takes gigabytes, and so do its replacements.
-    states[cloud.index].reset();
+    states[k].reset();
   }
   if (replacements.empty()) return;
   for (const Replacement& replacement : replacements) inputs.push_back(replacement.raw());
-  PrepareOptions as_they_are = options;
+  PrepareOptions as_they_are = options_;
   as_they_are.voxel_size = 0;
   std::vector<std::shared_ptr<PreparedState>> prepared;
   const auto runs = pipeline::runs_within(inheritances.size(), kPointsTogether, [&](std::size_t k) {
@@ -187,17 +293,17 @@ void resolve_viewpoints(Engine& engine, Span<const RawCloud> raw,
   });
   for (const pipeline::Run& run : runs)
     in_halves(first[run.begin], first[run.end], [&](std::size_t begin, std::size_t end) {
-      for (auto& state : engine.prepare({inputs.data() + begin, end - begin}, as_they_are))
+      for (auto& state : engine_.prepare({inputs.data() + begin, end - begin}, as_they_are))
         prepared.push_back(std::move(state));
     });
   auto next = prepared.begin();
   auto inheritance = inheritances.begin();
-  for (const OpenCloud& cloud : open) {
-    if (cloud.sides.signs.empty()) continue;
-    std::shared_ptr<PreparedState>& state = states[cloud.index];
+  for (std::size_t k = 0; k < states.size(); ++k) {
+    if (decisions_[k].sides.signs.empty()) continue;
+    std::shared_ptr<PreparedState>& state = states[k];
     state = *next++;
     inheritance->give(*state);
-    if (!cloud.sides.sign_known) {
+    if (!decisions_[k].sides.sign_known) {
       state->other_sides = *next++;
       inheritance->give(*state->other_sides);
     }

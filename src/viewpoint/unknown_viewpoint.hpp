@@ -1,10 +1,14 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <functional>
 #include <memory>
+#include <optional>
 #include <vector>
 
+#include "common/thread_group.hpp"
 #include "pipeline/engine.hpp"
+#include "viewpoint/viewpoint_inference.hpp"
 
 namespace gpureg {
 
@@ -13,25 +17,62 @@ struct CloudKnowledge {
   bool viewpoints, normals, features;  ///< given
   bool infer_viewpoint;                ///< PointCloudView::infer_viewpoint
   bool model;                          ///< PointCloudView::model
+  double origin[3];                    ///< of the rows in the cloud's frame
 };
 
 template <typename View>
 CloudKnowledge knowledge_of(const View& view) {
-  return {view.viewpoint_count > 0, view.normals != nullptr, view.features != nullptr,
-          view.infer_viewpoint, view.model};
+  return {view.viewpoint_count > 0,
+          view.normals != nullptr,
+          view.features != nullptr,
+          view.infer_viewpoint,
+          view.model,
+          {view.origin[0], view.origin[1], view.origin[2]}};
 }
 
 /// @throws InvalidArgument for a given viewpoint that is so far from the cloud that its rays mean
 ///   nothing. The origin of a cloud in map coordinates may be that far, as long as nobody gives it.
 void check_viewpoints(const CloudKnowledge& knowledge, const PreparedState& state);
 
-/// Sets PrepareStatistics::viewpoint of prepared clouds. Clouds whose sides turn out to be others
-/// than the preparation took are replaced: prepared again from their prepared points, with the
-/// right sides as input normals and no viewpoint, and once more with the other sides where both are
-/// likely. The choice is made on the host, so that backends agree bit for bit.
-/// @param raw rows of the points in host memory.
-void resolve_viewpoints(Engine& engine, Span<const RawCloud> raw,
-                        const std::vector<CloudKnowledge>& knowledge, const PrepareOptions& options,
-                        std::vector<std::shared_ptr<PreparedState>>& states);
+/// The viewpoints of a batch of clouds that nobody gave. The choice is made on the host, so that
+/// backends agree bit for bit.
+class UnknownViewpoints {
+ public:
+  /// @param raw rows of the points in host memory, which have to outlive this.
+  UnknownViewpoints(Engine& engine, Span<const RawCloud> raw,
+                    const std::vector<CloudKnowledge>& knowledge, const PrepareOptions& options);
+
+  /// Calls prepare(watcher), and meanwhile decides about the clouds whose surfaces the watcher
+  /// gets, where a device leaves the host idle. Elsewhere the watcher is empty.
+  void during(const std::function<void(const SurfaceWatcher& watcher)>& prepare);
+
+  /// Sets PrepareStatistics::viewpoint of prepared clouds. Clouds whose sides turn out to be others
+  /// than the preparation took are replaced: prepared again from their prepared points, with the
+  /// right sides as input normals and no viewpoint, and once more with the other sides where both
+  /// are likely.
+  void resolve(std::vector<std::shared_ptr<PreparedState>>& states);
+
+ private:
+  struct Decision {
+    bool made = false;
+    PointsAndNormals surface;
+    InferredSides sides;
+  };
+  bool is_open(std::size_t cloud) const;
+  bool asks_rows(std::size_t cloud) const;
+  void measure_rows(std::size_t cloud);
+  void decide(std::size_t cloud, PointsAndNormals surface, const float (&origin)[3]);
+  void set_statistics(std::size_t cloud, PrepareStatistics& statistics) const;
+  void prepare_again(std::vector<std::shared_ptr<PreparedState>>& states);
+  ThreadGroup& threads();
+
+  Engine& engine_;
+  Span<const RawCloud> raw_;
+  const std::vector<CloudKnowledge>& knowledge_;
+  const PrepareOptions& options_;
+  std::vector<std::optional<SpacingSpread>> spread_;  ///< of each cloud, once measured
+  std::vector<Decision> decisions_;                   ///< about each cloud
+  std::unique_ptr<ThreadGroup> threads_;
+};
 
 }  // namespace gpureg

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <utility>
 
-#include "spacing/spacing_spread.hpp"
+#include "viewpoint/contradictions.hpp"
 #include "viewpoint/one_return.hpp"
 
 namespace gpureg {
@@ -47,7 +47,10 @@ struct SearchedViewpoint {
     Vec3 place;
     double contradiction;
   };
-  std::vector<Tried> tried;  ///< the first places
+  /// The first places; where the contradiction is above as_good(), it may be infinite.
+  std::vector<Tried> tried;
+  /// Contradiction up to which a place explains the surfaces as well.
+  double as_good() const { return kAsGood * contradiction + kContradictionNoise; }
 
   void take(Vec3 other, double its_contradiction) {
     if (its_contradiction >= contradiction) return;
@@ -82,6 +85,18 @@ std::vector<Vec3> start_places(const SurfaceGraph& graph, float radius, Vec3 cen
   return places;
 }
 
+/// Places that a step of a pattern search compares.
+constexpr std::size_t kPlacesOfStep = 6;
+
+void add_places_of_step(Vec3 from, float step, std::vector<Vec3>& places) {
+  for (const Vec3 along : {Vec3{step, 0, 0}, Vec3{0, step, 0}, Vec3{0, 0, step}}) {
+    places.push_back(from - along);
+    places.push_back(from + along);
+  }
+}
+
+bool same_place(Vec3 a, Vec3 b) { return a.x == b.x && a.y == b.y && a.z == b.z; }
+
 /// The place with the fewest contradictions: the best of the first ones, then a pattern search.
 SearchedViewpoint search_viewpoint(const SurfaceGraph& graph, float radius) {
   Vec3 lo{0, 0, 0}, hi{0, 0, 0};
@@ -92,32 +107,44 @@ SearchedViewpoint search_viewpoint(const SurfaceGraph& graph, float radius) {
   }
   const float half = 0.5f * norm(hi - lo);
   SearchedViewpoint best;
-  std::vector<Vec3> places = start_places(graph, radius, (lo + hi) * 0.5f, half);
-  std::vector<double> contradictions = graph.contradictions(places);
-  for (std::size_t k = 0; k < places.size(); ++k) {
-    best.tried.push_back({places[k], contradictions[k]});
-    best.take(places[k], contradictions[k]);
+  const std::vector<Vec3> starts = start_places(graph, radius, (lo + hi) * 0.5f, half);
+  // The first places bound what matters about the others. Those after them are compared in
+  // parallel.
+  const std::size_t some = std::min(viewpoints_at_once(), starts.size());
+  for (std::size_t begin = 0, end = some; begin < starts.size(); begin = end, end = starts.size()) {
+    const std::vector<Vec3> places(starts.begin() + static_cast<std::ptrdiff_t>(begin),
+                                   starts.begin() + static_cast<std::ptrdiff_t>(end));
+    const std::vector<double> contradictions = graph.contradictions(places, best.as_good());
+    for (std::size_t k = 0; k < places.size(); ++k) {
+      best.tried.push_back({places[k], contradictions[k]});
+      best.take(places[k], contradictions[k]);
+    }
   }
+  // Where there is room for it, the next smaller step is tried at the same time.
+  const bool both = viewpoints_at_once() >= 2 * kPlacesOfStep;
   for (float step = 0.2f * half; step > 0.5f * radius;) {
     const Vec3 from = best.place;
-    places.clear();
-    for (const Vec3 along : {Vec3{step, 0, 0}, Vec3{0, step, 0}, Vec3{0, 0, step}}) {
-      places.push_back(from - along);
-      places.push_back(from + along);
+    std::vector<Vec3> places;
+    add_places_of_step(from, step, places);
+    if (both && 0.5f * step > 0.5f * radius) add_places_of_step(from, 0.5f * step, places);
+    const std::vector<double> contradictions = graph.contradictions(places, best.contradiction);
+    for (std::size_t first = 0; first < places.size() && same_place(best.place, from);
+         first += kPlacesOfStep) {
+      for (std::size_t k = first; k < first + kPlacesOfStep; ++k)
+        best.take(places[k], contradictions[k]);
+      if (!same_place(best.place, from)) break;
+      step *= 0.5f;
     }
-    contradictions = graph.contradictions(places);
-    for (std::size_t k = 0; k < places.size(); ++k) best.take(places[k], contradictions[k]);
-    if (best.place.x == from.x && best.place.y == from.y && best.place.z == from.z) step *= 0.5f;
   }
   return best;
 }
 
-/// True where most points show two viewpoints different sides.
-bool opposite(const SurfaceGraph& graph, Vec3 a, Vec3 b) {
-  const SurfaceGraph::Signs from_a = graph.signs_towards(a), from_b = graph.signs_towards(b);
+/// True where most points show a viewpoint other sides than these.
+bool opposite(const SurfaceGraph& graph, const SurfaceGraph::Signs& sides, Vec3 viewpoint) {
+  const SurfaceGraph::Signs others = graph.signs_towards(viewpoint);
   std::size_t different = 0;
-  for (std::size_t i = 0; i < from_a.size(); ++i) different += from_a[i] != from_b[i];
-  return 2 * different > from_a.size();
+  for (std::size_t i = 0; i < sides.size(); ++i) different += sides[i] != others[i];
+  return 2 * different > sides.size();
 }
 
 /// True where a viewpoint explains the surfaces, and either the points are spaced as from there, or
@@ -125,14 +152,15 @@ bool opposite(const SurfaceGraph& graph, Vec3 a, Vec3 b) {
 /// object looks as plausible from its back.
 bool explains(const SurfaceGraph& graph, const SearchedViewpoint& best, Vec3 viewpoint,
               const SpacingSpread& spread) {
-  const double limit = kAsGood * best.contradiction + kContradictionNoise;
+  const double limit = best.as_good();
   if (graph.contradiction(viewpoint) > limit) return false;
   if (spread.radial - 1 <= kIrregularityRatio * (spread.plain - 1)) return true;
-  if (opposite(graph, viewpoint, best.place)) return false;
+  const SurfaceGraph::Signs sides = graph.signs_towards(viewpoint);
+  if (opposite(graph, sides, best.place)) return false;
   std::size_t as_good = 0;
   for (const SearchedViewpoint::Tried& tried : best.tried) {
     if (tried.contradiction > limit) continue;
-    if (opposite(graph, viewpoint, tried.place)) return false;
+    if (opposite(graph, sides, tried.place)) return false;
     ++as_good;
   }
   return static_cast<double>(as_good) <= kMostPlaces * static_cast<double>(best.tried.size());
@@ -156,32 +184,39 @@ SurfaceGraph::Signs best_sides(const SurfaceGraph& graph, Vec3 best_place,
   return seen;
 }
 
+/// The best viewpoint and the sides along the surface.
+struct BothSides {
+  SearchedViewpoint best;
+  SurfaceGraph::Signs along;
+
+  explicit BothSides(const SurfaceGraph& graph) {
+    graph.threads().parallel(2, [&](std::size_t k) {
+      if (k == 0) best = search_viewpoint(graph, graph.radius());
+      if (k == 1) along = graph.consistent_signs();
+    });
+  }
+};
+
+}  // namespace
+
 bool is_scanner(const SpacingSpread& spread) {
   return spread.radial <= kScannerSpread && spread.radial <= kSpreadRatio * spread.plain;
 }
 
-}  // namespace
-
 InferredSides infer_sides(const SurfaceGraph& graph, Vec3 origin, const RawCloud& rows,
-                          Vec3 origin_of_rows, bool infer) {
+                          Vec3 origin_of_rows, const SpacingSpread* spread) {
   InferredSides out;
-  if (graph.edges() < kMinEdges) {
-    if (infer) out.source = ViewpointSource::origin;
+  if (graph.edges() < kMinEdges || (spread && is_scanner(*spread))) {
+    if (spread) out.source = ViewpointSource::origin;
     return out;
   }
-  const SpacingSpread spread = infer ? spacing_spread(rows, origin_of_rows) : SpacingSpread{};
-  if (infer && is_scanner(spread)) {
-    out.source = ViewpointSource::origin;
-    return out;
-  }
-  const SearchedViewpoint best = search_viewpoint(graph, graph.radius());
-  SurfaceGraph::Signs along = graph.consistent_signs();
+  auto [best, along] = BothSides(graph);
   if (is_closed(graph, along)) {
     if (!graph.outwards(along)) flip(along);
     return {ViewpointSource::model, std::move(along), true};
   }
-  if (infer && (explains(graph, best, origin, spread) ||
-                has_one_return_per_direction(rows, origin_of_rows))) {
+  if (spread && (explains(graph, best, origin, *spread) ||
+                 has_one_return_per_direction(rows, origin_of_rows))) {
     out.source = ViewpointSource::origin;
     return out;
   }
@@ -198,8 +233,8 @@ InferredSides check_given_sides(const SurfaceGraph& graph) {
       graph.flux(given) <= kClosedFlux && graph.outwards(given))
     out.source = ViewpointSource::model;
   if (graph.edges() < kMinEdges || contradiction < kContradictory) return out;
-  const SearchedViewpoint best = search_viewpoint(graph, graph.radius());
-  SurfaceGraph::Signs better = best_sides(graph, best.place, graph.consistent_signs());
+  auto [best, along] = BothSides(graph);
+  SurfaceGraph::Signs better = best_sides(graph, best.place, std::move(along));
   if (contradiction < kBetterSides * graph.contradiction(better)) return out;
   std::ptrdiff_t sum = 0;
   for (const std::int8_t sign : better) sum += sign;

@@ -3,6 +3,7 @@
 
 #include "gpureg/statistics.hpp"
 #include "pipeline/types.hpp"
+#include "spacing/spacing_spread.hpp"
 #include "viewpoint/surface_graph.hpp"
 
 namespace gpureg {
@@ -19,10 +20,13 @@ struct InferredSides {
 /// it does nearly as well and other places do not, if the points are spaced as a scanner there
 /// spaces them, or if the directions from there have one return each. A closed surface is a model.
 /// @param origin of the cloud's frame, relative to the points.
-/// @param rows of the input, for the spacing.
-/// @param infer false: the origin is known not to be a viewpoint.
+/// @param rows of the input.
+/// @param spread of the rows about the origin; null: the origin is known not to be a viewpoint.
 InferredSides infer_sides(const SurfaceGraph& graph, Vec3 origin, const RawCloud& rows,
-                          Vec3 origin_of_rows, bool infer);
+                          Vec3 origin_of_rows, const SpacingSpread* spread);
+
+/// True where the rows are spaced as a scanner at the origin spaces them: no surface has to tell.
+bool is_scanner(const SpacingSpread& spread);
 
 /// Sides of a cloud whose input normals gave the graph its signs: they are kept, unless they
 /// contradict each other far more than sides from a viewpoint or along the surface do. Those then

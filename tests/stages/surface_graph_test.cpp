@@ -53,7 +53,8 @@ TEST(SurfaceEdges, AreTheTwelveNearestWithinTheRadius) {
     std::sort(expected.begin(), expected.end());
     expected.erase(std::unique(expected.begin(), expected.end()), expected.end());
     for (const std::size_t threads : {1, 2, 7}) {
-      const auto edges = surface_edges(sheet.points, sheet.normals, radius, threads);
+      ThreadGroup group(threads);
+      const auto edges = surface_edges(sheet.points, sheet.normals, radius, group);
       ASSERT_EQ(edges.size(), expected.size());
       for (std::size_t k = 0; k < edges.size(); ++k) {
         ASSERT_EQ(std::make_pair(edges[k].a, edges[k].b), expected[k]);
@@ -86,8 +87,9 @@ TEST(SurfaceGraph, ContradictionsAgreeWithDouble) {
   std::mt19937 random(2);
   std::uniform_real_distribution<float> place(-3, 3);
   const Sheet sheet = noisy_sheet(random, 3000);
-  const SurfaceGraph graph(sheet.points, sheet.normals, 0.1f, 2);
-  const auto edges = surface_edges(sheet.points, sheet.normals, 0.1f, 1);
+  ThreadGroup threads(2);
+  const SurfaceGraph graph(sheet.points, sheet.normals, 0.1f, threads);
+  const auto edges = surface_edges(sheet.points, sheet.normals, 0.1f, threads);
   ASSERT_LT(edges.size(), 40'000u);  // all are counted
   std::vector<Vec3> viewpoints{sheet.points[7], {0, 0, 1000}};
   for (int k = 0; k < 19; ++k) viewpoints.push_back({place(random), place(random), place(random)});
@@ -100,6 +102,34 @@ TEST(SurfaceGraph, ContradictionsAgreeWithDouble) {
   EXPECT_GT(*std::max_element(shares.begin(), shares.end()), 0.01);
 }
 
+TEST(SurfaceGraph, ContradictionsAboveALimitMayBeInfinite) {
+  std::mt19937 random(5);
+  std::uniform_real_distribution<float> place(-3, 3);
+  Sheet sheet = noisy_sheet(random, 6000);
+  // Half of the normals tell nothing: from the front, hardly any edge contradicts.
+  for (std::size_t i = 0; i < sheet.normals.size(); ++i)
+    if (i % 2) sheet.normals[i] = {0, 0, 1};
+  ThreadGroup threads(3);
+  const SurfaceGraph graph(sheet.points, sheet.normals, 0.2f, threads);
+  std::vector<Vec3> viewpoints;
+  for (int k = 0; k < 64; ++k) viewpoints.push_back({place(random), place(random), 2});
+  for (int k = 0; k < 64; ++k) viewpoints.push_back({place(random), place(random), 0});
+  const std::vector<double> shares = graph.contradictions(viewpoints);
+  std::size_t infinite = 0;
+  for (const double limit : {0.0, 0.001, shares[0], shares[70], 1.0}) {
+    const std::vector<double> limited = graph.contradictions(viewpoints, limit);
+    for (std::size_t k = 0; k < shares.size(); ++k) {
+      if (std::isinf(limited[k])) {
+        EXPECT_GT(shares[k], limit);
+        ++infinite;
+      } else {
+        EXPECT_EQ(limited[k], shares[k]);
+      }
+    }
+  }
+  EXPECT_GT(infinite, 0u);
+}
+
 TEST(SurfaceGraph, AFlatSheetHasNoContradiction) {
   Sheet sheet;
   for (int x = 0; x < 30; ++x)
@@ -107,7 +137,8 @@ TEST(SurfaceGraph, AFlatSheetHasNoContradiction) {
       sheet.points.push_back({0.05f * static_cast<float>(x), 0.05f * static_cast<float>(y), 0});
       sheet.normals.push_back({0, 0, (x + y) % 3 == 0 ? -1.0f : 1.0f});
     }
-  const SurfaceGraph graph(sheet.points, sheet.normals, 0.11f, 1);
+  ThreadGroup threads(1);
+  const SurfaceGraph graph(sheet.points, sheet.normals, 0.11f, threads);
   EXPECT_EQ(graph.contradiction(Vec3{0.7f, 0.3f, 2}), 0);
   EXPECT_EQ(graph.contradiction(graph.consistent_signs()), 0);
   EXPECT_GT(graph.contradiction(SurfaceGraph::Signs(sheet.points.size(), 1)), 0.3);
@@ -141,6 +172,22 @@ TEST(SpacingSpread, AgreesWithDouble) {
   const SpacingSpread spread = spacing_spread(test::raw_cloud(points), viewpoint);
   EXPECT_NEAR(spread.plain, ratio(plain), 1e-5);
   EXPECT_NEAR(spread.radial, ratio(radial), 1e-5);
+}
+
+TEST(SpacingSpread, FarRowsAndRowsAtOnePlaceCountAsWell) {
+  std::mt19937 random(6);
+  std::uniform_real_distribution<float> unit;
+  std::vector<Vec3> points;
+  for (int k = 0; k < 3000; ++k) points.push_back({unit(random), unit(random), 0});
+  const SpacingSpread near = spacing_spread(test::raw_cloud(points), {0, 0, 5});
+  points.push_back({1e30f, 0, 0});
+  points.push_back({-1e38f, 0, 0});
+  const SpacingSpread with_far = spacing_spread(test::raw_cloud(points), {0, 0, 5});
+  EXPECT_NEAR(with_far.plain, near.plain, 0.1 * near.plain);
+  points.assign(500, {1, 2, 3});
+  const SpacingSpread none = spacing_spread(test::raw_cloud(points), {0, 0, 5});
+  EXPECT_EQ(none.plain, 1);
+  EXPECT_EQ(none.radial, 1);
 }
 
 TEST(SpacingSpread, DoesNotDependOnTheOrderOfTheRows) {
