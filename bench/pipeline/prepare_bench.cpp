@@ -58,15 +58,16 @@ void prepare_batch_of_fragments(benchmark::State& state, const std::string& back
   prepare_all(state, backend, options_name, views());
 }
 
-/// The cameras are unknown: preparation decides whether the origin is the viewpoint.
+/// The cameras are unknown: preparation decides which sides of the surfaces were seen.
 void prepare_without_viewpoints(benchmark::State& state, const std::string& backend,
-                                const std::string& options_name) {
+                                bool with_normals) {
   std::vector<PointCloudView> all = views();
   for (PointCloudView& view : all) {
     view.viewpoints = nullptr;
     view.viewpoint_count = 0;
+    if (!with_normals) view.normals = nullptr;
   }
-  prepare_all(state, backend, options_name, all);
+  prepare_all(state, backend, "default", all);
 }
 
 /// One fragment at a time.
@@ -84,7 +85,8 @@ void prepare_one_fragment(benchmark::State& state, const std::string& backend,
 
 BENCHMARK_CAPTURE(prepare_batch_of_fragments, cuda, "cuda", "loopsmart")->Apply(elapsed);
 BENCHMARK_CAPTURE(prepare_batch_of_fragments, cuda_default, "cuda", "default")->Apply(elapsed);
-BENCHMARK_CAPTURE(prepare_without_viewpoints, cuda_default, "cuda", "default")->Apply(elapsed);
+BENCHMARK_CAPTURE(prepare_without_viewpoints, cuda, "cuda", false)->Apply(elapsed);
+BENCHMARK_CAPTURE(prepare_without_viewpoints, cuda_with_normals, "cuda", true)->Apply(elapsed);
 BENCHMARK_CAPTURE(prepare_one_fragment, cuda, "cuda", "loopsmart")->Apply(elapsed);
 BENCHMARK_CAPTURE(prepare_batch_of_fragments, cpu, "cpu", "loopsmart")->Apply(elapsed);
 

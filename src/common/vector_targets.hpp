@@ -23,9 +23,9 @@
 #endif
 #endif
 #ifdef __GNUC__
-#define GPUREG_INLINE_IN_TARGETS inline __attribute__((always_inline))
+#define GPUREG_ALWAYS_INLINE inline __attribute__((always_inline))
 #else
-#define GPUREG_INLINE_IN_TARGETS inline
+#define GPUREG_ALWAYS_INLINE inline
 #endif
 
 namespace gpureg {

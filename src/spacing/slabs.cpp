@@ -18,7 +18,7 @@ constexpr std::size_t kReachSample = 1024, kOutermost = 100;
 /// Rows that a row is compared with at once.
 constexpr std::size_t kLanes = 8;
 /// Least number of rows between two decisions about the end of a search.
-constexpr std::size_t kTogether = 4 * kLanes;
+constexpr std::size_t kTogetherRows = 4 * kLanes;
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
 
 Vec3 row_at(const RawCloud& rows, std::size_t i) {
@@ -199,14 +199,14 @@ float Slabs::nearest_squared(const Row& row) const {
   const auto is_far = [&](float along_x) { return along_x > 0 && along_x * along_x >= nearest; };
   for (std::size_t first = row.slab, last = first; first < slabs(); first = last) {
     const std::size_t begin = begin_[first];
-    while (last < slabs() && begin_[last] < begin + kTogether) ++last;
+    while (last < slabs() && begin_[last] < begin + kTogetherRows) ++last;
     if (begin_[last] == begin) break;
     nearest = nearest_of(begin, begin_[last], p, nearest);
     if (is_far(x_[begin_[last] - 1] - p.x)) break;
   }
   for (std::size_t first = row.slab, last = first; first > 0; last = first) {
     const std::size_t end = begin_[last];
-    while (first > 0 && begin_[first] + kTogether > end) --first;
+    while (first > 0 && begin_[first] + kTogetherRows > end) --first;
     if (begin_[first] == end) break;
     nearest = nearest_of(begin_[first], end, p, nearest);
     if (is_far(p.x - x_[begin_[first]])) break;

@@ -25,9 +25,9 @@ struct alignas(4 * kLanes) Lanes {
 
 /// Cosines of the angles between a normal and the directions to the viewpoints; 0 at the point.
 template <std::size_t kLanes>
-GPUREG_INLINE_IN_TARGETS void measure_cosines(Vec3 point, Vec3 normal, const Lanes<kLanes>& x,
-                                              const Lanes<kLanes>& y, const Lanes<kLanes>& z,
-                                              Lanes<kLanes>& out) {
+GPUREG_ALWAYS_INLINE void measure_cosines(Vec3 point, Vec3 normal, const Lanes<kLanes>& x,
+                                          const Lanes<kLanes>& y, const Lanes<kLanes>& z,
+                                          Lanes<kLanes>& out) {
 #pragma omp simd
   for (std::size_t l = 0; l < kLanes; ++l) {
     const float dx = x.of[l] - point.x, dy = y.of[l] - point.y, dz = z.of[l] - point.z;
@@ -38,16 +38,15 @@ GPUREG_INLINE_IN_TARGETS void measure_cosines(Vec3 point, Vec3 normal, const Lan
 
 /// Adds the largest weights that the edges of an end may have.
 template <std::size_t kLanes>
-GPUREG_INLINE_IN_TARGETS void add_most(const Lanes<kLanes>& cosines, float weight,
-                                       Lanes<kLanes>& most) {
+GPUREG_ALWAYS_INLINE void add_most(const Lanes<kLanes>& cosines, float weight,
+                                   Lanes<kLanes>& most) {
 #pragma omp simd
   for (std::size_t l = 0; l < kLanes; ++l) most.of[l] += weight * std::fabs(cosines.of[l]);
 }
 
 /// True where the shares of all viewpoints will be above a limit.
 template <std::size_t kLanes>
-GPUREG_INLINE_IN_TARGETS bool all_above(const double* bad, const Lanes<kLanes>& most,
-                                        double limit) {
+GPUREG_ALWAYS_INLINE bool all_above(const double* bad, const Lanes<kLanes>& most, double limit) {
   int above = 0;
   for (std::size_t l = 0; l < kLanes; ++l)
     above += bad[l] > kMargin * limit * static_cast<double>(most.of[l]);
@@ -56,8 +55,8 @@ GPUREG_INLINE_IN_TARGETS bool all_above(const double* bad, const Lanes<kLanes>& 
 
 /// Adds the weight of an edge, and the same, negative where its ends show different sides.
 template <std::size_t kLanes>
-GPUREG_INLINE_IN_TARGETS void add_edge(const Lanes<kLanes>& a, const Lanes<kLanes>& b, float weight,
-                                       Lanes<kLanes>& all, Lanes<kLanes>& signed_sum) {
+GPUREG_ALWAYS_INLINE void add_edge(const Lanes<kLanes>& a, const Lanes<kLanes>& b, float weight,
+                                   Lanes<kLanes>& all, Lanes<kLanes>& signed_sum) {
   const float size = std::fabs(weight);
 #pragma omp simd
   for (std::size_t l = 0; l < kLanes; ++l) {
@@ -68,8 +67,8 @@ GPUREG_INLINE_IN_TARGETS void add_edge(const Lanes<kLanes>& a, const Lanes<kLane
 }
 
 template <std::size_t kLanes>
-GPUREG_INLINE_IN_TARGETS void count_in_lanes(const CountedEdges& counted, const Vec3* viewpoints,
-                                             std::size_t count, double limit, double* shares) {
+GPUREG_ALWAYS_INLINE void count_in_lanes(const CountedEdges& counted, const Vec3* viewpoints,
+                                         std::size_t count, double limit, double* shares) {
   const std::size_t points = counted.points.size();
   const std::unique_ptr<Lanes<kLanes>[]> towards(new Lanes<kLanes>[points]);
   for (std::size_t first = 0; first < count; first += kLanes) {
@@ -108,8 +107,8 @@ GPUREG_INLINE_IN_TARGETS void count_in_lanes(const CountedEdges& counted, const 
   }
 }
 
-GPUREG_INLINE_IN_TARGETS void find_signs(Vec3 viewpoint, const std::vector<Vec3>& points,
-                                         const std::vector<Vec3>& normals, std::int8_t* signs) {
+GPUREG_ALWAYS_INLINE void find_signs(Vec3 viewpoint, const std::vector<Vec3>& points,
+                                     const std::vector<Vec3>& normals, std::int8_t* signs) {
   for (std::size_t i = 0; i < points.size(); ++i)
     signs[i] = dot(normals[i], viewpoint - points[i]) < 0 ? -1 : 1;
 }

@@ -92,7 +92,7 @@ struct Pair {
 
 /// Points whose neighbours are searched together, and one number for each.
 constexpr std::size_t kTogether = 8;
-struct alignas(32) Numbers {
+struct alignas(32) OfEach {
   float of[kTogether];
 };
 
@@ -100,7 +100,7 @@ struct alignas(32) Numbers {
 struct Candidates {
   std::vector<Vec3> position;
   std::vector<std::uint32_t> index;
-  std::vector<Numbers> squared;  ///< distances to the points
+  std::vector<OfEach> squared;  ///< distances to the points
   /// Places of the nearest ones of each point, the point itself among them: kNeighbors + 1 or all
   /// within the radius, and more where several are at the largest distance.
   std::vector<std::uint32_t> near[kTogether];
@@ -117,7 +117,7 @@ struct Candidates {
   }
 };
 
-void find_nearest(const Numbers (&point)[3], float squared_radius, Candidates& candidates) {
+void find_nearest(const OfEach (&point)[3], float squared_radius, Candidates& candidates) {
   const std::size_t size = candidates.position.size();
   for (std::size_t k = 0; k < size; ++k)
 #pragma omp simd
@@ -147,10 +147,10 @@ void find_nearest(const Numbers (&point)[3], float squared_radius, Candidates& c
 
 #ifdef GPUREG_HAS_VECTOR_TARGETS
 /// The same in vectors. The least distances stay sorted in registers.
-GPUREG_TARGET_8_LANES void find_nearest_in_vectors(const Numbers (&point)[3], float squared_radius,
+GPUREG_TARGET_8_LANES void find_nearest_in_vectors(const OfEach (&point)[3], float squared_radius,
                                                    Candidates& candidates) {
   const std::size_t size = candidates.position.size();
-  Numbers* const squared = candidates.squared.data();
+  OfEach* const squared = candidates.squared.data();
   const __m256 x = _mm256_load_ps(point[0].of), y = _mm256_load_ps(point[1].of),
                z = _mm256_load_ps(point[2].of);
   __m256 least[kNeighbors + 1];
@@ -226,7 +226,7 @@ class PairFinder {
  private:
   /// Those of `count` points from a place on.
   void add_pairs(std::uint32_t at, std::uint32_t count) {
-    Numbers point[3];
+    OfEach point[3];
     for (std::uint32_t l = 0; l < kTogether; ++l) {
       const Vec3& p = cells_.position[at + std::min(l, count - 1)];
       point[0].of[l] = p.x;
@@ -260,7 +260,7 @@ class PairFinder {
 
   const Cells& cells_;
   float squared_radius_;
-  void (*find_nearest_)(const Numbers (&)[3], float, Candidates&) = find_nearest;
+  void (*find_nearest_)(const OfEach (&)[3], float, Candidates&) = find_nearest;
   Candidates candidates_;
   std::vector<Pair> pairs_;
   std::size_t size_ = 0;

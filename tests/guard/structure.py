@@ -127,7 +127,7 @@ ALONE = {"byte_rows.cpp", "closest_grid.cpp", "feature_search.cpp", "surface_gra
 
 UNNAMED = re.compile(r"^namespace \{$(.*?)^\}  // namespace$", re.MULTILINE | re.DOTALL)
 CONSTANT = re.compile(r"^(?:constexpr|const) .*?;", re.MULTILINE | re.DOTALL)
-TYPE = re.compile(r"^(?:struct|class|enum class) (\w+)", re.MULTILINE)
+TYPE = re.compile(r"^(?:struct|class|enum class)(?: alignas\(.*?\))? (\w+)", re.MULTILINE)
 FUNCTION = re.compile(
     r"^(?!return|using|static_assert)[A-Za-z][\w:<>,&* ]*? (\w+\([^()]*\)) \{", re.MULTILINE
 )

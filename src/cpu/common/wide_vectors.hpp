@@ -2,18 +2,12 @@
 #pragma once
 
 #include <cstdint>
-#include <cstdlib>
 #include <cstring>
 
-#if defined(__AVX2__) && defined(__FMA__) && defined(__GNUC__)
-/// A function for processors with vectors of 16 floats. Each lane does the operations of the scalar
-/// code in the same order, so the result is the same.
-#ifdef __clang__
-#define GPUREG_WIDE_TARGET __attribute__((target("avx512f,avx512vl,avx512bw,avx512dq")))
-#else
-#define GPUREG_WIDE_TARGET \
-  __attribute__((target("avx512f,avx512vl,avx512bw,avx512dq,prefer-vector-width=512")))
-#endif
+#include "common/vector_targets.hpp"
+
+#if defined(__AVX2__) && defined(__FMA__) && defined(GPUREG_HAS_VECTOR_TARGETS)
+#define GPUREG_WIDE_TARGET GPUREG_TARGET_16_LANES
 /// The same with products of bytes.
 #ifdef __clang__
 #define GPUREG_BYTE_TARGET __attribute__((target("avx512f,avx512vl,avx512bw,avx512dq,avx512vnni")))
@@ -21,14 +15,6 @@
 #define GPUREG_BYTE_TARGET \
   __attribute__((target("avx512f,avx512vl,avx512bw,avx512dq,avx512vnni,prefer-vector-width=512")))
 #endif
-#endif
-#ifdef GPUREG_WIDE_TARGET
-#include <immintrin.h>
-#endif
-#ifdef __GNUC__
-#define GPUREG_ALWAYS_INLINE inline __attribute__((always_inline))
-#else
-#define GPUREG_ALWAYS_INLINE inline
 #endif
 
 namespace gpureg::cpu {
@@ -56,20 +42,10 @@ struct WideMask {
 };
 #endif
 
-/// The environment variable GPUREG_VECTORS=narrow keeps to the vectors that the build requires, for
-/// tests and comparisons. The results are the same.
-inline bool narrow_vectors_only() {
-  const char* asked = std::getenv("GPUREG_VECTORS");
-  return asked != nullptr && std::strcmp(asked, "narrow") == 0;
-}
-
 /// Whether the build has functions for vectors of 16 floats (AVX-512), and the processor runs them.
 inline bool has_wide_vectors() {
 #ifdef GPUREG_WIDE_TARGET
-  static const bool has = !narrow_vectors_only() && __builtin_cpu_supports("avx512f") &&
-                          __builtin_cpu_supports("avx512vl") &&
-                          __builtin_cpu_supports("avx512bw") && __builtin_cpu_supports("avx512dq");
-  return has;
+  return float_lanes() == 16;
 #else
   return false;
 #endif
