@@ -86,6 +86,17 @@ class Maker:
 
         return draw if gap.any() else None
 
+    def in_garden(self, k: int) -> Any:
+        low, high = self.city.piece(k).plot
+
+        def draw(random: Any) -> np.ndarray:
+            place = np.array([*random.uniform(low + 1, high - 1), EYE])
+            axis = random.integers(2)
+            place[axis] = random.choice([low[axis] + 1, high[axis] - 1])
+            return place
+
+        return draw
+
     def in_room(self, k: int, number: int | None = None) -> Any:
         piece = self.city.piece(k)
         _, rooms = city_scene.building(piece.key)
@@ -110,9 +121,7 @@ class Maker:
         rooms = range(len(city_scene.building(piece.key)[1]))
         draws = [self.in_room(k, number) for number in rooms]
         draws += [self.on_street(k)] * 3 if self.on_street(k) else []
-        for at in ([1, 1], [1, -1], [-1, 1], [-1, -1]):  # in the garden
-            place = [*np.where(np.array(at) > 0, piece.plot[0], piece.plot[1]) + at, EYE]
-            draws.append(lambda random, p=np.array(place): p + random.uniform(-0.5, 0.5, 3))
+        draws += [self.in_garden(k)] * 4
         places = [free_place(piece.boxes, random, draw) for draw in draws]
         return len(points), corner, np.array(places) - corner, time.process_time() - begin
 
@@ -126,7 +135,7 @@ class Maker:
                 continue
             place = draw(random)
             boxes = self.city.near(place, reach)
-            if any(city_scene.contains(b, place[None], 0.3)[0] for b in boxes):
+            if any(city_scene.contains(b, place[None], 0.5)[0] for b in boxes):
                 continue
             up = np.radians(np.linspace(low, high, rings))
             turn = random.uniform(0, 7) + np.radians(np.arange(columns) * around / columns)
@@ -135,7 +144,8 @@ class Maker:
             rays = np.stack([flat * np.cos(turn), flat * np.sin(turn), rise], -1).reshape(-1, 3)
             seen = np.isfinite(ranges)
             points = rays[seen] * (ranges + random.normal(0, RANGE_NOISE, len(rays)))[seen, None]
-            if seen.mean() > 0.2 and extent(points) > 3:  # not into a cupboard
+            is_wide = extent(points) > 3 and np.median(ranges[seen]) > 1.5
+            if seen.mean() > 0.2 and is_wide:  # not into a cupboard
                 break
         q, _ = np.linalg.qr(random.normal(size=(3, 3)))
         q *= np.sign(np.linalg.det(q))
@@ -328,8 +338,11 @@ def main() -> None:
         q for sensor in o.sensors for q in [q for q in queries if q.sensor == sensor][: o.alone]
     ]
     alone = [gpureg(q.path, saved, "--viewpoint", "0,0,0") for q in asked]
-    run["alone_seconds"] = round(float(np.mean([call["seconds"] for call in alone])), 2)
-    run["alone_most"] = round(max(call["seconds"] for call in alone), 2)
+    for figure, key in (("alone_seconds", "seconds"), ("alone_cpu", "cpu")):
+        run[figure] = round(sum(call[key] for call in alone) / max(len(alone), 1), 2)
+    run["alone_memory_mib"] = max((call["memory_mib"] for call in alone), default=0)
+    if not queries:
+        return print(run)
     call = gpureg(*[q.path for q in queries], saved, "--viewpoint", "0,0,0")
     run["batch_seconds"] = round(call["seconds"] / len(queries), 2)
     run |= {"batch_cpu": round(call["cpu"] / len(queries), 2), "queries": len(queries)}

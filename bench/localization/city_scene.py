@@ -238,7 +238,9 @@ class City:
                 yaw = axis * np.pi / 2 + random.normal(0, 0.03)
                 put(low, high, yaw, (size, 0.25), (cabin, 0.25 + size[2]))
 
-            def post(low: Any, high: Any) -> None:  # a lamp, a sign, a bin, a shelter
+            def post(
+                low: Any, high: Any, axis: int = axis
+            ) -> None:  # a lamp, a sign, a bin, a shelter
                 size = random.uniform(0.08, [0.3, 0.3, 0.3]) + [0, 0, random.choice([1, 2.5, 6])]
                 put(low, high, random.uniform(0, 3), (size, 0.12))
                 if random.random() < 0.3:
