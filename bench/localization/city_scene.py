@@ -275,6 +275,12 @@ def contains(b: np.ndarray, points: np.ndarray, slack: float) -> np.ndarray:
     return (np.abs(turned) < b[HALF] + slack).all(1)
 
 
+def is_free(boxes: np.ndarray, place: np.ndarray, slack: float) -> bool:
+    d, c, s = place - boxes[:, :3], np.cos(boxes[:, YAW]), np.sin(boxes[:, YAW])
+    turned = np.stack([c * d[:, 0] + s * d[:, 1], c * d[:, 1] - s * d[:, 0], d[:, 2]], 1)
+    return not (np.abs(turned) < boxes[:, HALF] + slack).all(1).any()
+
+
 def sample(boxes: np.ndarray, spacing: float, random: Any) -> tuple[np.ndarray, np.ndarray]:
     """Points and normals of the surfaces that are not hidden in other boxes."""
     parts = []
