@@ -1,22 +1,24 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <algorithm>
 #include <cmath>
-#include <numeric>
+#include <cstdint>
 
+#include "common/radix_sort.hpp"
 #include "localization/map_state.hpp"
 
 namespace gpureg::localization {
 namespace {
 
 /// Tiles along an axis; far stray points cost empty tiles only, which are not kept.
-constexpr double kMostTiles = 1 << 20;
+constexpr int kTileBits = 20;
+constexpr std::uint64_t kMostTiles = 1 << kTileBits;
 /// Prepared points that a map keeps: about 3 GB. The least recently used ones make room.
 constexpr std::size_t kMostCachedPoints = 1'000'000;
 
 std::int64_t count_of(double extent, const MapOptions& options) {
   const double inner = extent - 2 * options.halo;
   return static_cast<std::int64_t>(
-      std::clamp(std::ceil(inner / options.tile_size), 1.0, kMostTiles));
+      std::clamp(std::ceil(inner / options.tile_size), 1.0, static_cast<double>(kMostTiles)));
 }
 
 }  // namespace
@@ -30,42 +32,43 @@ void MapState::make_tiles() {
     count[static_cast<std::size_t>(axis)] = count_of(box.sizes()[axis], options);
     edge[axis] /= static_cast<double>(count[static_cast<std::size_t>(axis)]);
   }
-  using Cell = std::array<std::int64_t, 3>;
+  // Cells in the order of x, y, z.
   const auto cell_of = [&](const Eigen::Vector3f& p) {
-    Cell cell{};
+    std::uint64_t cell = 0;
     for (int axis = 0; axis < 3; ++axis) {
       const double at = static_cast<double>(p[axis]) - box.min()[axis];
-      const auto k = static_cast<std::size_t>(axis);
-      cell[k] = edge[axis] > 0
-                    ? std::clamp<std::int64_t>(
-                          static_cast<std::int64_t>(std::floor(at / edge[axis])), 0, count[k] - 1)
-                    : 0;
+      const std::int64_t last = count[static_cast<std::size_t>(axis)] - 1;
+      const auto k = edge[axis] > 0 ? static_cast<std::int64_t>(std::floor(at / edge[axis])) : 0;
+      cell = cell << kTileBits | static_cast<std::uint64_t>(std::clamp<std::int64_t>(k, 0, last));
     }
     return cell;
   };
-  std::vector<std::pair<Cell, std::size_t>> order(points.size());
-  for (std::size_t k = 0; k < points.size(); ++k) order[k] = {cell_of(points[k]), k};
-  std::sort(order.begin(), order.end());
-  std::vector<Eigen::Vector3f> sorted_points;
-  std::vector<Side> sorted_sides;
-  sorted_points.reserve(points.size());
-  sorted_sides.reserve(sides.size());
+  std::vector<KeyIndex> order(points.size());
+  for (std::size_t k = 0; k < points.size(); ++k)
+    order[k] = {cell_of(points[k]), static_cast<std::uint32_t>(k)};
+  // Those of a file are in this order.
+  const auto before = [](const KeyIndex& a, const KeyIndex& b) { return a.key < b.key; };
+  if (!std::is_sorted(order.begin(), order.end(), before)) {
+    radix_sort(order);
+    std::vector<Eigen::Vector3f> sorted_points(points.size());
+    std::vector<Side> sorted_sides(sides.size());
+    for (std::size_t k = 0; k < order.size(); ++k) sorted_points[k] = points[order[k].index];
+    for (std::size_t k = 0; k < sides.size(); ++k) sorted_sides[k] = sides[order[k].index];
+    points = std::move(sorted_points);
+    sides = std::move(sorted_sides);
+  }
   tiles.clear();
   for (std::size_t k = 0; k < order.size(); ++k) {
-    const auto& [cell, index] = order[k];
-    if (k == 0 || cell != order[k - 1].first) {
-      const Eigen::Vector3d corner =
-          box.min() + edge.cwiseProduct(Eigen::Vector3d(static_cast<double>(cell[0]),
-                                                        static_cast<double>(cell[1]),
-                                                        static_cast<double>(cell[2])));
+    const std::uint64_t cell = order[k].key;
+    if (k == 0 || cell != order[k - 1].key) {
+      Eigen::Vector3d at;
+      for (int axis = 0; axis < 3; ++axis)
+        at[axis] = static_cast<double>(cell >> (2 - axis) * kTileBits & (kMostTiles - 1));
+      const Eigen::Vector3d corner = box.min() + edge.cwiseProduct(at);
       tiles.push_back({Eigen::AlignedBox3d(corner, corner + edge), k, k});
     }
     tiles.back().end = k + 1;
-    sorted_points.push_back(points[index]);
-    if (!sides.empty()) sorted_sides.push_back(sides[index]);
   }
-  points = std::move(sorted_points);
-  sides = std::move(sorted_sides);
 }
 
 Eigen::AlignedBox3d MapState::tile_box(std::size_t tile) const {
