@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Scans located in generated cities of known truth, and scans of another city, which are not there.
 
-    python3 bench/localization/city.py --buildings 100 --work WORK --output bench/results/city.json
+    python3 bench/localization/city.py --buildings 100 --work WORK --output bench/results/locate_city.json
 
 The map (city_scene.py) is a folder of one cloud a plot: a jittered grid on all surfaces that somebody
 on a street or in a room can see, with normals and sensor positions. Queries are sweeps of spinning
