@@ -235,7 +235,10 @@ def summary(figures):
     """Counts instead of lists of scans and edges, rounded."""
     if isinstance(figures, dict):
         counted = ("scans", "wrong", "far_off", "left_out")
-        return {k: len(v) if k in counted and isinstance(v, (list, dict)) else summary(v) for k, v in figures.items()}
+        return {
+            k: len(v) if k in counted and isinstance(v, list | dict) else summary(v)
+            for k, v in figures.items()
+        }
     if isinstance(figures, list):
         return [summary(value) for value in figures]
     return round(figures, 4) if isinstance(figures, float) else figures

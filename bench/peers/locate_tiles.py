@@ -91,7 +91,12 @@ def main() -> None:
                 seconds = time.monotonic() - begin
                 error = float(np.linalg.norm(pose[:3, 3] - query.pose[:3, 3]))
                 rows.append(
-                    {"map": arguments.name, "kind": query.kind, "seed": seed, "scan": query.path.stem}
+                    {
+                        "map": arguments.name,
+                        "kind": query.kind,
+                        "seed": seed,
+                        "scan": query.path.stem,
+                    }
                     | {"inliers": inliers, "error": round(error, 3), "correct": error < 0.5}
                     | {"seconds": round(seconds, 1)}
                 )
