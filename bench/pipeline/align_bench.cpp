@@ -160,6 +160,10 @@ void redwood_sized(benchmark::State& state, const std::string& backend,
   state.counters["ms_warm"] = since(begin);
 }
 
+void seven_cold_runs(benchmark::internal::Benchmark* b) {
+  b->Iterations(1)->Repetitions(7)->Apply(elapsed);
+}
+
 BENCHMARK_CAPTURE(align_many, cuda_loopsmart, "cuda", "loopsmart")->Arg(11)->Apply(elapsed);
 BENCHMARK_CAPTURE(align_many, cuda_loopsmart_all, "cuda", "loopsmart_all")->Arg(11)->Apply(elapsed);
 BENCHMARK_CAPTURE(align_many, cuda_default, "cuda", "default")->Arg(11)->Apply(elapsed);
@@ -175,18 +179,9 @@ BENCHMARK_CAPTURE(align_from_threads, cuda_default, "cuda", "default")
 BENCHMARK_CAPTURE(raw_to_pose, cuda_loopsmart, "cuda", "loopsmart")
     ->Iterations(100)
     ->Apply(elapsed);
-BENCHMARK_CAPTURE(redwood_sized, cuda, "cuda", "loopsmart")
-    ->Iterations(1)
-    ->Repetitions(7)
-    ->Apply(elapsed);
-BENCHMARK_CAPTURE(redwood_sized, cuda_default, "cuda", "default")
-    ->Iterations(1)
-    ->Repetitions(7)
-    ->Apply(elapsed);
-BENCHMARK_CAPTURE(redwood_sized, cuda_all, "cuda_all", "loopsmart")
-    ->Iterations(1)
-    ->Repetitions(7)
-    ->Apply(elapsed);
+BENCHMARK_CAPTURE(redwood_sized, cuda, "cuda", "loopsmart")->Apply(seven_cold_runs);
+BENCHMARK_CAPTURE(redwood_sized, cuda_default, "cuda", "default")->Apply(seven_cold_runs);
+BENCHMARK_CAPTURE(redwood_sized, cuda_all, "cuda_all", "loopsmart")->Apply(seven_cold_runs);
 BENCHMARK_CAPTURE(align_many, cpu_loopsmart, "cpu", "loopsmart")
     ->Arg(1)
     ->Iterations(1)

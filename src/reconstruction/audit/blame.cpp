@@ -243,7 +243,7 @@ AuditedConnection judge(const std::vector<std::uint32_t>& across, const std::vec
     return std::abs(ratios[a]) > std::abs(ratios[b]);
   });
   AuditedConnection out;
-  Sum supports, contradictions;
+  Sum supports, of_chosen, contradictions;
   for (const std::size_t at : order) {
     const std::uint32_t k = across[at];
     if (ratios[at] < 0) {
@@ -252,15 +252,22 @@ AuditedConnection judge(const std::vector<std::uint32_t>& across, const std::vec
       ++out.contradicting;
     } else {
       // A single scan that was registered with its neighbours has no other support.
-      supports.add(pairs[k], (lone || !bonded[k] ? 1 : kOfChosen) * ratios[at]);
+      const bool chosen = bonded[k] != 0 && !lone;
+      of_chosen.add(pairs[k], (chosen ? kOfChosen : 1) * ratios[at]);
+      if (!chosen) supports.add(pairs[k], ratios[at]);
       ++out.supporting;
     }
   }
-  const double log_odds = kPrior + supports.value() + contradictions.value();
-  out.confidence = 1 / (1 + std::exp(-log_odds));
-  if (out.contradicting > 0 && out.confidence <= options.max_contradicted)
+  const auto confidence_with = [&](const Sum& heard) {
+    return 1 / (1 + std::exp(-(kPrior + heard.value() + contradictions.value())));
+  };
+  // Chosen edges keep a connection from being contradicted. They do not make it surer.
+  out.confidence = confidence_with(of_chosen);
+  if (out.contradicting == 0 || out.confidence > options.max_contradicted)
+    out.confidence = std::max(confidence_with(supports), options.max_contradicted);
+  else
     out.verdict = ConnectionVerdict::contradicted;
-  else if (out.supporting > 0 && out.confidence >= options.min_confirmed)
+  if (out.supporting > 0 && out.confidence >= options.min_confirmed)
     out.verdict = ConnectionVerdict::confirmed;
   return out;
 }
