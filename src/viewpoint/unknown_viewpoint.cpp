@@ -155,6 +155,8 @@ void UnknownViewpoints::decide(OpenCloud& cloud, PreparedState& state) {
     state.statistics.viewpoint = ViewpointSource::origin;
     return;
   }
+  cloud.points = state.copy_points();
+  cloud.normals = state.copy_normals();
   const SurfaceGraph graph(cloud.points, cloud.normals, kGraphRadius * options_.normal_radius,
                            threads());
   const Vec3 of_rows = origin_of_rows(known);
@@ -176,9 +178,7 @@ void UnknownViewpoints::resolve(std::vector<std::shared_ptr<PreparedState>>& sta
                                       : known.model    ? ViewpointSource::model
                                       : known.normals  ? ViewpointSource::normals
                                                        : ViewpointSource::origin;
-    // Only the calling thread uses the device.
-    if (is_open(k) && states[k]->size > 0)
-      open.push_back({k, states[k]->copy_points(), states[k]->copy_normals(), {}});
+    if (is_open(k) && states[k]->size > 0) open.push_back({k, {}, {}, {}});
   }
   if (open.empty()) return;
   threads().parallel(open.size(), [&](std::size_t k) { decide(open[k], *states[open[k].index]); });
