@@ -39,11 +39,39 @@ constexpr std::size_t kPairsOfLanes = 128;
 /// Clouds of all CUDA engines are compatible: they share one owner, the memory of all devices.
 const char kDeviceMemory = 0;
 
+/// Prepared points that are copied to the host for a watcher: they go through page-locked memory.
+constexpr std::size_t kMostWatched = std::size_t(1) << 20;
+
+/// Waits for the points and the normals.
+std::vector<EarlySurface> copy_surfaces(Exec& exec, const DownsampledClouds& clouds,
+                                        const DeviceBuffer<Vec3>& normals) {
+  const Segments& segments = clouds.segments;
+  const Vec3* const points_on_host = exec.download(clouds.points.data(), segments.total());
+  const Vec3* const normals_on_host = exec.download(normals.data(), segments.total());
+  exec.synchronize();
+  std::vector<EarlySurface> out(segments.entries());
+  for (std::size_t c = 0; c < out.size(); ++c) {
+    const std::uint32_t begin = segments.offset[c], end = segments.offset[c + 1];
+    out[c].points.assign(points_on_host + begin, points_on_host + end);
+    out[c].normals.assign(normals_on_host + begin, normals_on_host + end);
+    std::copy(clouds.facts[c].origin, clouds.facts[c].origin + 3, out[c].origin);
+  }
+  return out;
+}
+
+/// @param first index of the first cloud for the watcher, which may be empty.
 std::vector<std::shared_ptr<PreparedCloud>> prepare_chunk(Exec& exec, Span<const RawCloud> clouds,
-                                                          const PrepareOptions& options) {
+                                                          const PrepareOptions& options,
+                                                          const SurfaceWatcher& watcher,
+                                                          std::size_t first) {
   exec.begin();
   std::vector<std::shared_ptr<PreparedCloud>> out;
-  for (auto& cloud : pipeline::prepare(exec, clouds, options)) {
+  const auto watch = [&](Exec&, const DownsampledClouds& points,
+                         const DeviceBuffer<Vec3>& normals) {
+    if (watcher && points.segments.total() <= kMostWatched)
+      watcher(first, copy_surfaces(exec, points, normals));
+  };
+  for (auto& cloud : pipeline::prepare(exec, clouds, options, watch)) {
     cloud->owner = &kDeviceMemory;
     out.push_back(std::make_shared<PreparedCloud>(std::move(cloud)));
   }
@@ -153,25 +181,32 @@ std::size_t CudaEngine::pairs_per_chunk(const RegistrationOptions& options) cons
 }
 
 CudaEngine::Clouds CudaEngine::prepare(Span<const RawCloud> clouds, const PrepareOptions& options) {
-  if (has_budget()) return prepare_within_budget(clouds, options);
+  return prepare_watched(clouds, options, nullptr);
+}
+
+CudaEngine::Clouds CudaEngine::prepare_watched(Span<const RawCloud> clouds,
+                                               const PrepareOptions& options,
+                                               const SurfaceWatcher& watcher) {
+  if (has_budget()) return prepare_within_budget(clouds, options, watcher);
   if (chunks_of(clouds, kRawPointsPerChunk).size() > 1)
-    return prepare_on_lanes(clouds, chunks_of(clouds, kRawPointsPerLane), options);
+    return prepare_on_lanes(clouds, chunks_of(clouds, kRawPointsPerLane), options, watcher);
   const Lanes::Held held = lanes_.any();
   const DeviceScope scope(device());
-  const auto made = prepare_chunk(held.exec(), clouds, options);
+  const auto made = prepare_chunk(held.exec(), clouds, options, watcher, 0);
   return {made.begin(), made.end()};
 }
 
 CudaEngine::Clouds CudaEngine::prepare_on_lanes(Span<const RawCloud> clouds,
                                                 const std::vector<pipeline::Run>& chunks,
-                                                const PrepareOptions& options) {
+                                                const PrepareOptions& options,
+                                                const SurfaceWatcher& watcher) {
   const Lanes::Held held = lanes_.together();
   std::vector<std::vector<std::shared_ptr<PreparedCloud>>> made(chunks.size());
   on_threads(Lanes::kTogether, [&](std::size_t lane) {
     const DeviceScope scope(device());
     for (std::size_t k = lane; k < chunks.size(); k += Lanes::kTogether) {
       made[k] = prepare_chunk(held.exec(lane), {clouds.data + chunks[k].begin, chunks[k].size()},
-                              options);
+                              options, watcher, chunks[k].begin);
       share_time(made[k]);
     }
   });
@@ -181,7 +216,8 @@ CudaEngine::Clouds CudaEngine::prepare_on_lanes(Span<const RawCloud> clouds,
 }
 
 CudaEngine::Clouds CudaEngine::prepare_within_budget(Span<const RawCloud> clouds,
-                                                     const PrepareOptions& options) {
+                                                     const PrepareOptions& options,
+                                                     const SurfaceWatcher& watcher) {
   const Lanes::Held held = lanes_.all();
   const DeviceScope scope(device());
   pipeline::RawPointBudget budget(residence_.budget(), kRawPointsPerChunk);
@@ -193,7 +229,8 @@ CudaEngine::Clouds CudaEngine::prepare_within_budget(Span<const RawCloud> clouds
          ++end)
       points += clouds[end].size;
     std::size_t bytes = 0;
-    for (auto& cloud : prepare_chunk(held.exec(), {clouds.data + begin, end - begin}, options)) {
+    for (auto& cloud :
+         prepare_chunk(held.exec(), {clouds.data + begin, end - begin}, options, watcher, begin)) {
       bytes += cloud->bytes();
       residence_.add(*cloud);
       out.push_back(std::move(cloud));

@@ -31,6 +31,9 @@ class CudaEngine final : public DeviceEngine {
   void check_on_host(const RawCloud& cloud) const override;
   std::vector<std::shared_ptr<PreparedState>> prepare(Span<const RawCloud> clouds,
                                                       const PrepareOptions& options) override;
+  std::vector<std::shared_ptr<PreparedState>> prepare_watched(
+      Span<const RawCloud> clouds, const PrepareOptions& options,
+      const SurfaceWatcher& watcher) override;
   std::shared_ptr<AdoptedCloud> adopt(const RawCloud& cloud, const RowStreams& streams) override;
   std::vector<std::shared_ptr<PreparedState>> prepare_adopted(
       Span<const std::shared_ptr<AdoptedCloud>> clouds, const PrepareOptions& options) override;
@@ -66,10 +69,11 @@ class CudaEngine final : public DeviceEngine {
   void for_runs_within_budget(Span<const PairInput> pairs, const Work& work);
 
   /// Chunk after chunk, each as large as the memory budget allows after those before it.
-  Clouds prepare_within_budget(Span<const RawCloud> clouds, const PrepareOptions& options);
+  Clouds prepare_within_budget(Span<const RawCloud> clouds, const PrepareOptions& options,
+                               const SurfaceWatcher& watcher);
   /// Chunks on both lanes in turns: while one uploads, the other computes.
   Clouds prepare_on_lanes(Span<const RawCloud> clouds, const std::vector<pipeline::Run>& chunks,
-                          const PrepareOptions& options);
+                          const PrepareOptions& options, const SurfaceWatcher& watcher);
 
   Lanes lanes_;
   Residence residence_;

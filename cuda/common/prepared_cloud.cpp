@@ -160,6 +160,11 @@ std::vector<Vec3> PreparedCloud::copy_normals() const {
   const auto copy = any();
   return copy ? copy->copy_normals() : copied(host_arrays_.view_on_device.normals, size);
 }
+PointsAndNormals PreparedCloud::copy_points_and_normals() const {
+  if (const auto copy = any()) return copy->copy_points_and_normals();
+  return {copied(host_arrays_.view_on_device.points, size),
+          copied(host_arrays_.view_on_device.normals, size)};
+}
 std::vector<float> PreparedCloud::copy_features() const {
   const auto copy = any();
   return copy ? copy->copy_features()

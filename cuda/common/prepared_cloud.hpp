@@ -32,6 +32,7 @@ class PreparedCloud final : public PreparedState,
   std::vector<Vec3> copy_points() const override;
   std::vector<Vec3> copy_normals() const override;
   std::vector<float> copy_features() const override;
+  PointsAndNormals copy_points_and_normals() const override;
 
  private:
   std::shared_ptr<const CudaCloud> any() const;

@@ -189,6 +189,7 @@ struct CudaCloud : PreparedState, CloudArrays {
   std::vector<Vec3> copy_points() const override;
   std::vector<Vec3> copy_normals() const override;
   std::vector<float> copy_features() const override;
+  PointsAndNormals copy_points_and_normals() const override;
 };
 
 struct Matches {

@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include <initializer_list>
+
 #include "algorithm/normal_weight.hpp"
 #include "cuda/common/stages.hpp"
 #include "cuda/device/warp.cuh"
@@ -71,20 +73,31 @@ __global__ void weight_by_normals(const std::uint32_t* offset, const Counts* cou
     normal_weight[c][i] = weight[normal_weight[c][i]];
 }
 
+struct ToHost {
+  void* to;
+  const void* from;
+  std::size_t bytes;
+};
+
+void copy_to_host(const CudaCloud& cloud, std::initializer_list<ToHost> arrays) {
+  if (cloud.size == 0) return;
+  const DeviceScope scope(cloud.data.memory()->device());
+  // Synchronised data: any stream may read it, and this stream waits for no other.
+  cudaStream_t stream = nullptr;
+  check(cudaStreamCreateWithFlags(&stream, cudaStreamNonBlocking), "cudaStreamCreateWithFlags");
+  cudaError_t error = cudaSuccess;
+  for (const ToHost& array : arrays)
+    if (error == cudaSuccess)
+      error = cudaMemcpyAsync(array.to, array.from, array.bytes, cudaMemcpyDeviceToHost, stream);
+  if (error == cudaSuccess) error = cudaStreamSynchronize(stream);
+  cudaStreamDestroy(stream);
+  check(error, "copying a cloud to the host");
+}
+
 template <typename T>
 std::vector<T> copy_back(const CudaCloud& cloud, const T* device, std::size_t size) {
   std::vector<T> host(size);
-  if (size > 0) {
-    const DeviceScope scope(cloud.data.memory()->device());
-    // Synchronised data: any stream may read it, and this stream waits for no other.
-    cudaStream_t stream = nullptr;
-    check(cudaStreamCreateWithFlags(&stream, cudaStreamNonBlocking), "cudaStreamCreateWithFlags");
-    cudaError_t error =
-        cudaMemcpyAsync(host.data(), device, size * sizeof(T), cudaMemcpyDeviceToHost, stream);
-    if (error == cudaSuccess) error = cudaStreamSynchronize(stream);
-    cudaStreamDestroy(stream);
-    check(error, "copying a cloud to the host");
-  }
+  if (size > 0) copy_to_host(cloud, {{host.data(), device, size * sizeof(T)}});
   return host;
 }
 
@@ -95,6 +108,13 @@ std::vector<Vec3> CudaCloud::copy_points() const {
 }
 std::vector<Vec3> CudaCloud::copy_normals() const {
   return copy_back(*this, view_on_device.normals, size);
+}
+PointsAndNormals CudaCloud::copy_points_and_normals() const {
+  PointsAndNormals out{std::vector<Vec3>(size), std::vector<Vec3>(size)};
+  const std::size_t bytes = size * sizeof(Vec3);
+  copy_to_host(*this, {{out.points.data(), view_on_device.points, bytes},
+                       {out.normals.data(), view_on_device.normals, bytes}});
+  return out;
 }
 std::vector<float> CudaCloud::copy_features() const {
   return tight_rows(

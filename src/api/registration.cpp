@@ -86,10 +86,15 @@ std::vector<PreparedCloud> prepare_batch(const Context& context,
   const auto owners = drop_stray_points(*Access::engine(context), options, naming, raw);
   UnknownViewpoints unknown(*Access::engine(context), span_of(raw), knowledge, options);
   std::vector<std::shared_ptr<PreparedState>> states;
-  unknown.during([&] {
+  unknown.during([&](const SurfaceWatcher& watcher) {
     in_halves(0, raw.size(), [&](std::size_t begin, std::size_t end) {
       const auto work = [&] {
-        return Access::engine(context)->prepare({raw.data() + begin, end - begin}, options);
+        Engine& engine = *Access::engine(context);
+        const Span<const RawCloud> run{raw.data() + begin, end - begin};
+        if (!watcher) return engine.prepare(run, options);
+        return engine.prepare_watched(run, options, [&](std::size_t first, auto surfaces) {
+          watcher(begin + first, std::move(surfaces));
+        });
       };
       for (auto& state : end - begin == 1 ? naming(begin, work) : work()) {
         set_frame_offset(clouds[states.size()].origin, *state);

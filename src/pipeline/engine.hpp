@@ -31,6 +31,12 @@ class Engine {
   virtual void check_on_host(const RawCloud&) const {}
   virtual std::vector<std::shared_ptr<PreparedState>> prepare(Span<const RawCloud> clouds,
                                                               const PrepareOptions& options) = 0;
+  /// The same; the watcher may get the surfaces of some of the clouds before the end.
+  virtual std::vector<std::shared_ptr<PreparedState>> prepare_watched(Span<const RawCloud> clouds,
+                                                                      const PrepareOptions& options,
+                                                                      const SurfaceWatcher&) {
+    return prepare(clouds, options);
+  }
   virtual void align(Span<const PairInput> pairs, const RegistrationOptions& options,
                      Span<PairOutcome> outcomes) = 0;
   /// Evidence of given poses, one entry for each pair; refine: they are refined before.

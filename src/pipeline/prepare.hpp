@@ -8,14 +8,17 @@ namespace gpureg::pipeline {
 /// Raw clouds to prepared clouds, one statement per stage (LoopSmart, section III).
 /// Argument-dependent look-up by Exec finds the stages of a backend; assemble() waits for the
 /// results.
-template <typename Exec>
-auto prepare(Exec& exec, Span<const RawCloud> clouds, const PrepareOptions& options) {
+/// @param watch called with the points and the normals once they are there.
+template <typename Exec, typename Watch>
+auto prepare(Exec& exec, Span<const RawCloud> clouds, const PrepareOptions& options,
+             const Watch& watch) {
   const auto begin = exec.mark();
   auto points = downsample(exec, clouds, options);
   const auto downsampled = exec.mark();
   auto grids = build_grids(exec, points, options);
   const auto gridded = exec.mark();
   auto normals = estimate_normals(exec, points, grids, options.normal_radius);
+  watch(exec, points, normals);
   const auto oriented = exec.mark();
   auto features = compute_features(exec, points, normals, grids, options);
   auto wide_features = compute_wide_features(exec, points, grids, options);
@@ -41,6 +44,11 @@ auto prepare(Exec& exec, Span<const RawCloud> clouds, const PrepareOptions& opti
     ms.surface_sides = exec.milliseconds(mapped, fronted) * share;
   }
   return prepared;
+}
+
+template <typename Exec>
+auto prepare(Exec& exec, Span<const RawCloud> clouds, const PrepareOptions& options) {
+  return prepare(exec, clouds, options, [](const auto&...) {});
 }
 
 }  // namespace gpureg::pipeline

@@ -1,12 +1,25 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <vector>
 
 #include "pipeline/types.hpp"
 
 namespace gpureg {
+
+struct PointsAndNormals {
+  std::vector<Vec3> points, normals;
+};
+
+/// Points and normals of a cloud while its preparation goes on.
+struct EarlySurface : PointsAndNormals {
+  float origin[3];  ///< local origin, as in PreparedState
+};
+/// Takes those of consecutive clouds of a batch from `first` on. A preparation that fails and is
+/// tried again may give those of a cloud twice, from several threads; they are equal.
+using SurfaceWatcher = std::function<void(std::size_t first, std::vector<EarlySurface> surfaces)>;
 
 /// Content of a PreparedCloud: metadata on the host, data in the memory of its engine.
 struct PreparedState {
@@ -15,6 +28,10 @@ struct PreparedState {
   virtual std::vector<Vec3> copy_points() const = 0;
   virtual std::vector<Vec3> copy_normals() const = 0;
   virtual std::vector<float> copy_features() const = 0;
+  /// With one wait where they are on a device.
+  virtual PointsAndNormals copy_points_and_normals() const {
+    return {copy_points(), copy_normals()};
+  }
 
   /// Identifies the memory that holds the data: clouds of one owner can be aligned.
   const void* owner = nullptr;

@@ -3,6 +3,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <condition_variable>
+#include <deque>
+#include <mutex>
 #include <thread>
 #include <utility>
 
@@ -28,16 +31,63 @@ Vec3 origin_of_rows(const CloudKnowledge& known) {
           static_cast<float>(-known.origin[2])};
 }
 
+/// Surfaces on their way from a preparation to the decisions.
+class SurfaceQueue {
+ public:
+  struct Chunk {
+    std::size_t first;  ///< cloud
+    std::vector<EarlySurface> surfaces;
+  };
+  void push(Chunk chunk) {
+    {
+      const std::lock_guard<std::mutex> lock(mutex_);
+      chunks_.push_back(std::move(chunk));
+    }
+    changed_.notify_one();
+  }
+  /// Waits for the next chunk; none once the preparation has ended.
+  std::optional<Chunk> pop() {
+    std::unique_lock<std::mutex> lock(mutex_);
+    changed_.wait(lock, [&] { return closed_ || !chunks_.empty(); });
+    if (chunks_.empty()) return std::nullopt;
+    std::optional<Chunk> out(std::move(chunks_.front()));
+    chunks_.pop_front();
+    return out;
+  }
+  /// Ends the queue, also where the preparation fails.
+  class Closing {
+   public:
+    explicit Closing(SurfaceQueue& queue) : queue_(queue) {}
+    ~Closing() {
+      {
+        const std::lock_guard<std::mutex> lock(queue_.mutex_);
+        queue_.closed_ = true;
+      }
+      queue_.changed_.notify_one();
+    }
+    Closing(const Closing&) = delete;
+    Closing& operator=(const Closing&) = delete;
+
+   private:
+    SurfaceQueue& queue_;
+  };
+
+ private:
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  std::deque<Chunk> chunks_;
+  bool closed_ = false;
+};
+
 /// Points of a prepared cloud with other sides, as input of a preparation that keeps them.
 struct Replacement {
   std::vector<Vec3> points, normals;
   std::vector<float> features;
   std::uint32_t feature_dimension = 0;
 
-  Replacement(const std::vector<Vec3>& of_points, const std::vector<Vec3>& of_normals,
-              const SurfaceGraph::Signs& signs, const PreparedState& state, bool own_features,
-              float sign)
-      : points(of_points), normals(of_normals) {
+  Replacement(const PointsAndNormals& surface, const SurfaceGraph::Signs& signs,
+              const PreparedState& state, bool own_features, float sign)
+      : points(surface.points), normals(surface.normals) {
     for (std::size_t i = 0; i < normals.size(); ++i)
       normals[i] = normals[i] * (sign * static_cast<float>(signs[i]));
     if (!own_features) return;
@@ -111,7 +161,12 @@ void check_viewpoints(const CloudKnowledge& knowledge, const PreparedState& stat
 UnknownViewpoints::UnknownViewpoints(Engine& engine, Span<const RawCloud> raw,
                                      const std::vector<CloudKnowledge>& knowledge,
                                      const PrepareOptions& options)
-    : engine_(engine), raw_(raw), knowledge_(knowledge), options_(options), spread_(raw.size) {}
+    : engine_(engine),
+      raw_(raw),
+      knowledge_(knowledge),
+      options_(options),
+      spread_(raw.size),
+      decisions_(raw.size) {}
 
 bool UnknownViewpoints::is_open(std::size_t cloud) const {
   const CloudKnowledge& known = knowledge_[cloud];
@@ -136,73 +191,97 @@ void UnknownViewpoints::measure_rows(std::size_t cloud) {
     spread_[cloud] = spacing_spread(raw_[cloud], origin_of_rows(knowledge_[cloud]));
 }
 
-void UnknownViewpoints::during(const std::function<void()>& prepare) {
+void UnknownViewpoints::during(const std::function<void(const SurfaceWatcher&)>& prepare) {
   std::vector<std::size_t> asked;
-  for (std::size_t k = 0; k < raw_.size; ++k)
+  bool any_open = false;
+  for (std::size_t k = 0; k < raw_.size; ++k) {
+    any_open = any_open || is_open(k);
     if (asks_rows(k)) asked.push_back(k);
-  if (asked.empty() || !engine_.leaves_host_idle()) return prepare();
+  }
+  if (!any_open || !engine_.leaves_host_idle()) return prepare(nullptr);
+  SurfaceQueue queue;
   on_threads(2, [&](std::size_t thread) {
-    if (thread == 0) return prepare();
+    if (thread == 0) {
+      const SurfaceQueue::Closing closing(queue);
+      return prepare([&](std::size_t first, std::vector<EarlySurface> surfaces) {
+        queue.push({first, std::move(surfaces)});
+      });
+    }
     threads().parallel(asked.size(), [&](std::size_t k) { measure_rows(asked[k]); });
+    while (auto chunk = queue.pop())
+      threads().parallel(chunk->surfaces.size(), [&](std::size_t k) {
+        EarlySurface& surface = chunk->surfaces[k];
+        decide(chunk->first + k, std::move(surface), surface.origin);
+      });
   });
 }
 
-void UnknownViewpoints::decide(OpenCloud& cloud, PreparedState& state) {
-  const CloudKnowledge& known = knowledge_[cloud.index];
-  const bool asks = asks_rows(cloud.index);
-  if (asks) measure_rows(cloud.index);
-  if (asks && is_scanner(*spread_[cloud.index])) {
-    state.statistics.viewpoint = ViewpointSource::origin;
-    return;
+void UnknownViewpoints::decide(std::size_t cloud, PointsAndNormals surface,
+                               const float (&origin)[3]) {
+  Decision& out = decisions_[cloud];
+  if (out.made || !is_open(cloud) || surface.points.empty()) return;
+  const CloudKnowledge& known = knowledge_[cloud];
+  const bool asks = asks_rows(cloud);
+  if (asks) measure_rows(cloud);
+  if (asks && is_scanner(*spread_[cloud])) {
+    out.sides.source = ViewpointSource::origin;
+  } else {
+    out.surface = std::move(surface);
+    const SurfaceGraph graph(out.surface.points, out.surface.normals,
+                             kGraphRadius * options_.normal_radius, threads());
+    const Vec3 of_rows = origin_of_rows(known);
+    const Vec3 local = of_rows - Vec3{origin[0], origin[1], origin[2]};
+    out.sides = known.normals ? check_given_sides(graph)
+                              : infer_sides(graph, local, raw_[cloud], of_rows,
+                                            asks ? &*spread_[cloud] : nullptr);
   }
-  cloud.points = state.copy_points();
-  cloud.normals = state.copy_normals();
-  const SurfaceGraph graph(cloud.points, cloud.normals, kGraphRadius * options_.normal_radius,
-                           threads());
-  const Vec3 of_rows = origin_of_rows(known);
-  const Vec3 local = of_rows - Vec3{state.origin[0], state.origin[1], state.origin[2]};
-  cloud.sides = known.normals ? check_given_sides(graph)
-                              : infer_sides(graph, local, raw_[cloud.index], of_rows,
-                                            asks ? &*spread_[cloud.index] : nullptr);
-  state.statistics.viewpoint = cloud.sides.source;
-  if (known.normals)
-    state.statistics.repaired_normals = static_cast<std::uint32_t>(
-        std::count(cloud.sides.signs.begin(), cloud.sides.signs.end(), std::int8_t(-1)));
+  out.made = true;
+}
+
+void UnknownViewpoints::set_statistics(std::size_t cloud, PrepareStatistics& statistics) const {
+  const CloudKnowledge& known = knowledge_[cloud];
+  const Decision& decision = decisions_[cloud];
+  statistics.viewpoint = decision.made      ? decision.sides.source
+                         : known.viewpoints ? ViewpointSource::said
+                         : known.model      ? ViewpointSource::model
+                         : known.normals    ? ViewpointSource::normals
+                                            : ViewpointSource::origin;
+  if (decision.made && known.normals)
+    statistics.repaired_normals = static_cast<std::uint32_t>(
+        std::count(decision.sides.signs.begin(), decision.sides.signs.end(), std::int8_t(-1)));
 }
 
 void UnknownViewpoints::resolve(std::vector<std::shared_ptr<PreparedState>>& states) {
-  std::vector<OpenCloud> open;
-  for (std::size_t k = 0; k < states.size(); ++k) {
-    const CloudKnowledge& known = knowledge_[k];
-    states[k]->statistics.viewpoint = known.viewpoints ? ViewpointSource::said
-                                      : known.model    ? ViewpointSource::model
-                                      : known.normals  ? ViewpointSource::normals
-                                                       : ViewpointSource::origin;
-    if (is_open(k) && states[k]->size > 0) open.push_back({k, {}, {}, {}});
-  }
-  if (open.empty()) return;
-  threads().parallel(open.size(), [&](std::size_t k) { decide(open[k], *states[open[k].index]); });
-  prepare_again(open, states);
+  std::vector<std::size_t> undecided;
+  for (std::size_t k = 0; k < states.size(); ++k)
+    if (is_open(k) && !decisions_[k].made && states[k]->size > 0) undecided.push_back(k);
+  if (!undecided.empty())
+    threads().parallel(undecided.size(), [&](std::size_t k) {
+      const PreparedState& state = *states[undecided[k]];
+      decide(undecided[k], state.copy_points_and_normals(), state.origin);
+    });
+  for (std::size_t k = 0; k < states.size(); ++k) set_statistics(k, states[k]->statistics);
+  prepare_again(states);
 }
 
-void UnknownViewpoints::prepare_again(const std::vector<OpenCloud>& clouds,
-                                      std::vector<std::shared_ptr<PreparedState>>& states) {
+void UnknownViewpoints::prepare_again(std::vector<std::shared_ptr<PreparedState>>& states) {
   std::vector<Replacement> replacements;
   std::vector<Inheritance> inheritances;
   std::vector<RawCloud> inputs;
   std::vector<std::size_t> first{0};  // of each cloud: its sides stay together
-  for (const OpenCloud& cloud : clouds) {
-    if (cloud.sides.signs.empty()) continue;
+  for (std::size_t k = 0; k < states.size(); ++k) {
+    const InferredSides& sides = decisions_[k].sides;
+    if (sides.signs.empty()) continue;
     const auto add = [&](float sign) {
-      replacements.emplace_back(cloud.points, cloud.normals, cloud.sides.signs,
-                                *states[cloud.index], knowledge_[cloud.index].features, sign);
+      replacements.emplace_back(decisions_[k].surface, sides.signs, *states[k],
+                                knowledge_[k].features, sign);
     };
     add(1.0f);
-    if (!cloud.sides.sign_known) add(-1.0f);
+    if (!sides.sign_known) add(-1.0f);
     first.push_back(replacements.size());
-    inheritances.emplace_back(*states[cloud.index]);
+    inheritances.emplace_back(*states[k]);
     // Of a large cloud it takes gigabytes, and so do its replacements.
-    states[cloud.index].reset();
+    states[k].reset();
   }
   if (replacements.empty()) return;
   for (const Replacement& replacement : replacements) inputs.push_back(replacement.raw());
@@ -219,12 +298,12 @@ void UnknownViewpoints::prepare_again(const std::vector<OpenCloud>& clouds,
     });
   auto next = prepared.begin();
   auto inheritance = inheritances.begin();
-  for (const OpenCloud& cloud : clouds) {
-    if (cloud.sides.signs.empty()) continue;
-    std::shared_ptr<PreparedState>& state = states[cloud.index];
+  for (std::size_t k = 0; k < states.size(); ++k) {
+    if (decisions_[k].sides.signs.empty()) continue;
+    std::shared_ptr<PreparedState>& state = states[k];
     state = *next++;
     inheritance->give(*state);
-    if (!cloud.sides.sign_known) {
+    if (!decisions_[k].sides.sign_known) {
       state->other_sides = *next++;
       inheritance->give(*state->other_sides);
     }

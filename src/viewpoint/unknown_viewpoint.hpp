@@ -42,9 +42,9 @@ class UnknownViewpoints {
   UnknownViewpoints(Engine& engine, Span<const RawCloud> raw,
                     const std::vector<CloudKnowledge>& knowledge, const PrepareOptions& options);
 
-  /// Calls prepare(), and meanwhile does what needs only the rows where a device leaves the host
-  /// idle.
-  void during(const std::function<void()>& prepare);
+  /// Calls prepare(watcher), and meanwhile decides about the clouds whose surfaces the watcher
+  /// gets, where a device leaves the host idle. Elsewhere the watcher is empty.
+  void during(const std::function<void(const SurfaceWatcher& watcher)>& prepare);
 
   /// Sets PrepareStatistics::viewpoint of prepared clouds. Clouds whose sides turn out to be others
   /// than the preparation took are replaced: prepared again from their prepared points, with the
@@ -53,18 +53,17 @@ class UnknownViewpoints {
   void resolve(std::vector<std::shared_ptr<PreparedState>>& states);
 
  private:
-  /// A cloud whose sides are to be decided.
-  struct OpenCloud {
-    std::size_t index;
-    std::vector<Vec3> points, normals;
+  struct Decision {
+    bool made = false;
+    PointsAndNormals surface;
     InferredSides sides;
   };
   bool is_open(std::size_t cloud) const;
   bool asks_rows(std::size_t cloud) const;
   void measure_rows(std::size_t cloud);
-  void decide(OpenCloud& cloud, PreparedState& state);
-  void prepare_again(const std::vector<OpenCloud>& clouds,
-                     std::vector<std::shared_ptr<PreparedState>>& states);
+  void decide(std::size_t cloud, PointsAndNormals surface, const float (&origin)[3]);
+  void set_statistics(std::size_t cloud, PrepareStatistics& statistics) const;
+  void prepare_again(std::vector<std::shared_ptr<PreparedState>>& states);
   ThreadGroup& threads();
 
   Engine& engine_;
@@ -72,6 +71,7 @@ class UnknownViewpoints {
   const std::vector<CloudKnowledge>& knowledge_;
   const PrepareOptions& options_;
   std::vector<std::optional<SpacingSpread>> spread_;  ///< of each cloud, once measured
+  std::vector<Decision> decisions_;                   ///< about each cloud
   std::unique_ptr<ThreadGroup> threads_;
 };
 
