@@ -167,6 +167,11 @@ std::vector<float> CudaEngine::copy_points(const AdoptedCloud& cloud) {
   return rows;
 }
 
+void load_adoption() {
+  cudaFuncAttributes attributes{};
+  check(cudaFuncGetAttributes(&attributes, pack_rows), "cudaFuncGetAttributes");
+}
+
 int device_of(const AdoptedCloud& cloud) { return static_cast<const Adopted&>(cloud).device(); }
 
 }  // namespace gpureg::cuda

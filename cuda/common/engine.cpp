@@ -121,6 +121,8 @@ CudaEngine::CudaEngine(int device, std::size_t memory_budget)
   cudaDeviceProp properties{};
   check(cudaGetDeviceProperties(&properties, device), "cudaGetDeviceProperties");
   description_ = "cuda:" + std::to_string(device) + ", " + properties.name;
+  const DeviceScope scope(device);
+  load_adoption();
 }
 
 Backend CudaEngine::backend() const { return Backend::cuda; }

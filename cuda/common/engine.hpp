@@ -90,6 +90,10 @@ int device_of(const void* pointer);
 /// Device that prepares an adopted cloud: the one that holds it.
 int device_of(const AdoptedCloud& cloud);
 
+/// Loads the kernel of adopt() on the current device. CUDA loads a kernel at its first launch, and
+/// may wait for the device then: for ever, where the program holds up the stream of that launch.
+void load_adoption();
+
 /// Describes the devices by the status of the runtime and the driver.
 std::string why_no_device(cudaError_t error, int driver, int runtime);
 
