@@ -18,6 +18,10 @@ def millimetres(values):
     return "; ".join(f"{1000 * value:.1f}" for value in values if value is not None) or "-"
 
 
+def seeds(rows):
+    return f" (seeds {', '.join(str(row['seed']) for row in rows)})" if len(rows) > 1 else ""
+
+
 def loops(rows, kind):
     return "; ".join(f"{r[f'{kind}_loops']} / {r[f'false_{kind}_loops']}" for r in rows)
 
@@ -41,12 +45,11 @@ def slam():
             rows = [row for row in sequence["rows"] if row["row"] == name]
             if not rows:
                 continue
-            seeds = f" (seeds {', '.join(str(r['seed']) for r in rows)})" if len(rows) > 1 else ""
             surface = ", ".join(
                 millimetres(row[f"surface_{kind}_m"] for row in rows) for kind in ("mean", "median")
             )
             table.append(
-                f"| {about(sequence)} | {name}{seeds} | {rows[0]['poses']} | {millimetres(row['ate_m'] for row in rows)} | {surface} "
+                f"| {about(sequence)} | {name}{seeds(rows)} | {rows[0]['poses']} | {millimetres(row['ate_m'] for row in rows)} | {surface} "
                 f"| {loops(rows, 'dense')} | {loops(rows, 'image')} |"
             )
     return table
@@ -68,12 +71,11 @@ def slam_one_run():
             rows = [row for row in sequence["rows"] if row["row"] == name]
             if not rows:
                 continue
-            seeds = f" (seeds {', '.join(str(r['seed']) for r in rows)})" if len(rows) > 1 else ""
             speed = "; ".join(f"{sequence['frames'] / row['seconds']:.1f}" for row in rows)
             wait = figures(rows, "longest_wait_ms") if name == "beside tracking" else "-"
             ate = [millimetres(row.get(key) for row in rows) for key in ("odometry_ate_m", "ate_m")]
             table.append(
-                f"| {about(sequence)} | {name}{seeds} | {figures(rows, 'poses')} | {ate[0]}, {ate[1]} "
+                f"| {about(sequence)} | {name}{seeds(rows)} | {figures(rows, 'poses')} | {ate[0]}, {ate[1]} "
                 f"| {millimetres(row['surface_mean_m'] for row in rows)} | {loops(rows, 'dense')} | {figures(rows, 'keyframes_per_point', 1)} "
                 f"| {figures(rows, 'calibration_correlation', 3)} | {speed} | {wait} |"
             )
@@ -99,4 +101,53 @@ def slam_short():
     return table
 
 
-TABLES = {"slam": slam, "slam_one_run": slam_one_run, "slam_short": slam_short}
+def slam_published():
+    """Real sequences: errors of every run beside those that others publish."""
+    table = [
+        "| sequence | system | ATE RMSE in mm | input | figure given by | source |",
+        "| --- | --- | --- | --- | --- | --- |",
+    ]
+    published = load("slam_published.json")["figures"]
+    for sequence in load("slam_demo.json")["sequences"]:
+        name = sequence["name"]
+        if name.split("_focal")[0] not in {figure["sequence"] for figure in published}:
+            continue
+        for row_name in IN_ONE_RUN:
+            rows = [row for row in sequence["rows"] if row["row"] == row_name]
+            if rows:
+                table.append(
+                    f"| {name} | **slam_demo**, {row_name}{seeds(rows)} | {millimetres(row['ate_m'] for row in rows)} "
+                    "| RGB-D | us | slam_demo.json |"
+                )
+        for figure in published:
+            if figure["sequence"] != name:
+                continue
+            error, given, by = figure.get("state"), "", ""
+            if figure["ate_m"] is not None:
+                error = f"{1000 * figure['ate_m']:.0f}"
+                given = figure["input"]
+                if figure["alignment"] == "with scale":
+                    given += ", scale aligned"
+                by = "its authors" if figure["own_paper"] else "others"
+            table.append(
+                f"| {name} | {figure['system']} | {error} | {given} | {by} | {figure['paper']}, {figure['place']} |"
+            )
+    return table
+
+
+def slam_published_papers():
+    table = ["| source | paper | what was read |", "| --- | --- | --- |"]
+    for name, paper in load("slam_published.json")["papers"].items():
+        title = f"[{paper['title']}]({paper['address']})" if paper["address"] else paper["title"]
+        words = [paper["authors"], title, paper["venue"], paper["year"] and str(paper["year"])]
+        table.append(f"| {name} | {', '.join(filter(None, words))} | {paper['read']} |")
+    return table
+
+
+TABLES = {
+    "slam": slam,
+    "slam_one_run": slam_one_run,
+    "slam_short": slam_short,
+    "slam_published": slam_published,
+    "slam_published_papers": slam_published_papers,
+}
