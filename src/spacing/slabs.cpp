@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "common/radix_sort.hpp"
+#include "spacing/sorted_rows.hpp"
 
 namespace gpureg {
 namespace {
@@ -15,6 +16,10 @@ constexpr std::size_t kRowsPerSlab = 8, kMostSlabs = std::size_t(1) << 14;
 /// Rows that tell how far a cloud reaches. One in so many of them lies in each of the outermost
 /// slabs: a few far points do not widen the others.
 constexpr std::size_t kReachSample = 1024, kOutermost = 100;
+/// More rows are not compared one by one with each row.
+constexpr std::size_t kCrowd = std::size_t(1) << 14;
+/// Of more places in one slab the slab is sorted.
+constexpr std::size_t kManyPlaces = 16;
 /// Rows that a row is compared with at once.
 constexpr std::size_t kLanes = 8;
 /// Least number of rows between two decisions about the end of a search.
@@ -108,7 +113,44 @@ void put_in_place(std::uint64_t* keys, std::size_t first, std::size_t last,
                scratch);
 }
 
+/// The axis along which the middle half of the rows extends most.
+Eigen::Index widest_axis(const std::vector<Eigen::Vector3f>& rows) {
+  const std::size_t count = std::min(kReachSample, rows.size());
+  Eigen::Vector3f spread;
+  for (Eigen::Index axis = 0; axis < 3; ++axis) {
+    std::vector<float> along(count);
+    for (std::size_t k = 0; k < count; ++k) along[k] = rows[k * rows.size() / count][axis];
+    std::sort(along.begin(), along.end());
+    spread[axis] = along[count * 3 / 4] - along[count / 4];
+  }
+  Eigen::Index axis = 0;
+  spread.maxCoeff(&axis);
+  return axis;
+}
+
 }  // namespace
+
+CrowdedSlab::CrowdedSlab(std::vector<Eigen::Vector3f> rows)
+    : axis_(widest_axis(rows)), rows_(std::move(rows)) {
+  sort_rows(rows_, axis_);
+  rows_.erase(std::unique(rows_.begin(), rows_.end()), rows_.end());
+}
+
+float CrowdedSlab::nearest_squared(Vec3 p, float nearest) const {
+  const Eigen::Vector3f from(p.x, p.y, p.z);
+  const auto visit = [&](const Eigen::Vector3f& row) {
+    const float dx = row.x() - p.x, dy = row.y() - p.y, dz = row.z() - p.z;
+    const float along = row[axis_] - from[axis_], squared = dx * dx + dy * dy + dz * dz;
+    if (squared > 0) nearest = std::min(nearest, squared);
+    return along * along < nearest;
+  };
+  const auto middle =
+      std::lower_bound(rows_.begin(), rows_.end(), from[axis_],
+                       [&](const Eigen::Vector3f& row, float value) { return row[axis_] < value; });
+  for (auto row = middle; row != rows_.end() && visit(*row);) ++row;
+  for (auto row = middle; row != rows_.begin() && visit(*(row - 1));) --row;
+  return nearest;
+}
 
 Slabs::Slabs(const RawCloud& rows) {
   constexpr auto kNone = std::numeric_limits<std::uint16_t>::max();
@@ -136,6 +178,18 @@ Slabs::Slabs(const RawCloud& rows) {
   }
   for (float* of : {x, y, z}) std::fill(of + size(), of + stride, kInfinity);
   x_ = x, y_ = y, z_ = z;
+  for (std::size_t b = 0; b < slabs(); ++b)
+    if (is_crowded(b)) crowded_.emplace(b, rows_of(b));
+}
+
+bool Slabs::is_crowded(std::size_t slab) const { return begin_[slab + 1] - begin_[slab] > kCrowd; }
+
+std::vector<Eigen::Vector3f> Slabs::rows_of(std::size_t slab) const {
+  std::vector<Eigen::Vector3f> rows;
+  rows.reserve(begin_[slab + 1] - begin_[slab]);
+  for (std::size_t k = begin_[slab]; k < begin_[slab + 1]; ++k)
+    rows.emplace_back(x_[k], y_[k], z_[k]);
+  return rows;
 }
 
 std::vector<Slabs::Row> Slabs::evenly_spaced(std::size_t most) const {
@@ -149,6 +203,13 @@ std::vector<Slabs::Row> Slabs::evenly_spaced(std::size_t most) const {
     places.clear();
     for (; s < count && s * size() / count < end; ++s) places.push_back(s * size() / count - begin);
     if (places.empty()) continue;
+    if (places.size() > kManyPlaces) {
+      std::vector<Eigen::Vector3f> rows = rows_of(slab);
+      sort_by_coordinates(rows.begin(), rows.end());
+      for (const std::size_t place : places)
+        out.push_back({{rows[place].x(), rows[place].y(), rows[place].z()}, slab});
+      continue;
+    }
     keys.resize(end - begin);
     scratch.resize(end - begin);
     for (std::size_t k = begin; k < end; ++k) keys[k - begin] = key_of(x_[k], y_[k]);
@@ -197,18 +258,24 @@ float Slabs::nearest_squared(const Row& row) const {
   // A row nearer than d is less than d away along x, and the rows beyond a slab are farther along x
   // than its own.
   const auto is_far = [&](float along_x) { return along_x > 0 && along_x * along_x >= nearest; };
+  const auto visit = [&](std::size_t first, std::size_t last) {
+    nearest = last == first + 1 && is_crowded(first)
+                  ? crowded_.at(first).nearest_squared(p, nearest)
+                  : nearest_of(begin_[first], begin_[last], p, nearest);
+  };
   for (std::size_t first = row.slab, last = first; first < slabs(); first = last) {
-    const std::size_t begin = begin_[first];
-    while (last < slabs() && begin_[last] < begin + kTogetherRows) ++last;
-    if (begin_[last] == begin) break;
-    nearest = nearest_of(begin, begin_[last], p, nearest);
+    const std::size_t most = begin_[first] + kTogetherRows;
+    do ++last;
+    while (last < slabs() && begin_[last] < most && !is_crowded(last));
+    if (begin_[last] == begin_[first]) continue;
+    visit(first, last);
     if (is_far(x_[begin_[last] - 1] - p.x)) break;
   }
   for (std::size_t first = row.slab, last = first; first > 0; last = first) {
-    const std::size_t end = begin_[last];
-    while (first > 0 && begin_[first] + kTogetherRows > end) --first;
-    if (begin_[first] == end) break;
-    nearest = nearest_of(begin_[first], end, p, nearest);
+    do --first;
+    while (first > 0 && begin_[first] + kTogetherRows > begin_[last] && !is_crowded(first - 1));
+    if (begin_[last] == begin_[first]) continue;
+    visit(first, last);
     if (is_far(p.x - x_[begin_[first]])) break;
   }
   return nearest;

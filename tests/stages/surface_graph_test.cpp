@@ -7,6 +7,7 @@
 #include <cmath>
 #include <random>
 
+#include "spacing/slabs.hpp"
 #include "spacing/spacing_spread.hpp"
 #include "support/prepared.hpp"
 #include "support/random_clouds.hpp"
@@ -188,6 +189,45 @@ TEST(SpacingSpread, FarRowsAndRowsAtOnePlaceCountAsWell) {
   const SpacingSpread none = spacing_spread(test::raw_cloud(points), {0, 0, 5});
   EXPECT_EQ(none.plain, 1);
   EXPECT_EQ(none.radial, 1);
+}
+
+/// Clouds most of whose rows are in few slabs: walls across x, a pole, one place.
+TEST(Slabs, CrowdsAgreeWithAllRows) {
+  std::mt19937 random(8);
+  std::uniform_real_distribution<float> unit;
+  const auto at = [&] { return 9 * unit(random); };
+  const auto by_coordinates = [](Vec3 a, Vec3 b) {
+    return a.x != b.x ? a.x < b.x : a.y != b.y ? a.y < b.y : a.z < b.z;
+  };
+  for (const std::size_t scattered : {0, 400, 4000}) {
+    std::vector<Vec3> points;
+    for (int k = 0; k < 40'000; ++k) points.push_back({1, at(), at()});
+    for (int k = 0; k < 40'000; ++k) points.push_back({3, 2, at()});
+    for (int k = 0; k < 20'000; ++k) points.push_back({4, 5 + 1e-4f * at(), 6});
+    for (int k = 0; k < 30'000; ++k) points.push_back({6, 6, 6});
+    for (std::size_t k = 0; k < scattered; ++k) points.push_back({at(), at(), at()});
+    std::shuffle(points.begin(), points.end(), random);
+    const Slabs slabs(test::raw_cloud(points));
+    std::sort(points.begin(), points.end(), by_coordinates);
+    const auto rows = slabs.evenly_spaced(300);
+    ASSERT_EQ(rows.size(), 300u);
+    for (std::size_t s = 0; s < rows.size(); ++s) {
+      const Vec3 p = rows[s].position, expected = points[s * points.size() / rows.size()];
+      ASSERT_FALSE(by_coordinates(p, expected) || by_coordinates(expected, p)) << s;
+      float nearest = INFINITY;
+      for (const Vec3& q : points) {
+        const Vec3 d = q - p;
+        const float squared = d.x * d.x + d.y * d.y + d.z * d.z;
+        if (squared > 0) nearest = std::min(nearest, squared);
+      }
+      ASSERT_EQ(slabs.nearest_squared(rows[s]), nearest) << s;
+    }
+  }
+}
+
+TEST(Slabs, MillionsOfRowsAtOnePlaceTakeNoLongerThanASort) {
+  const std::vector<Vec3> points(3'000'000, Vec3{1, 2, 3});
+  EXPECT_EQ(spacing_spread(test::raw_cloud(points), {0, 0, 5}).plain, 1);
 }
 
 TEST(SpacingSpread, DoesNotDependOnTheOrderOfTheRows) {
