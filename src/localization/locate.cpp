@@ -6,6 +6,7 @@
 #include "fields/scale.hpp"
 #include "localization/check_scan.hpp"
 #include "localization/search.hpp"
+#include "math/exponential.hpp"
 
 namespace gpureg::localization {
 namespace {
@@ -17,6 +18,16 @@ constexpr double kSure = 0.75, kSureSearch = 0.95;
 /// coarse points are so many that the search had something to see.
 constexpr double kHopelessSearch = 0.1;
 
+/// The evidence of a pair may overlap little, but a scan that is in the map lies in it, and sees what
+/// the map has there. Log odds that a place loses:
+/// with the part of the scan beyond a tenth that has no surface of the map beside it,
+constexpr double kContained = 0.9, kLogOddsOfRest = 8;
+/// with the part of the map that lies in free space of the scan, and with the parts of both in front
+/// of surfaces of the other, beyond what right places have; at most so many, as rooms change.
+constexpr double kInFreeSpace = 0.005, kLogOddsInFreeSpace = 150;
+constexpr double kInFront = 0.01, kLogOddsInFront = 100;
+constexpr double kMostLogOdds = 4;
+
 /// A candidate in all of the map around it.
 struct Verified {
   Candidate candidate;
@@ -25,19 +36,35 @@ struct Verified {
   double confidence = 0;   ///< other places aside
 };
 
-/// The mean of both log odds, where it is more than the verification alone.
-double confidence_of(double searched, double verified) {
-  const double odds = std::sqrt(odds_of(searched) * odds_of(verified));
-  return std::max(verified, odds / (1 + odds));
+/// Log odds against a place. Sparse scans are contained in wide voxels at least.
+double doubt(const PoseVerification& fine, const PoseVerification& wide) {
+  const PoseEvidence& e = fine.evidence;
+  const double contained =
+      std::max(e.source_overlap_any_normal, wide.evidence.source_overlap_any_normal);
+  const auto beyond = [](double share, double usual) { return std::max(0.0, share - usual); };
+  const double contradicted =
+      kLogOddsInFreeSpace * beyond(e.target_free_space_violation, kInFreeSpace) +
+      kLogOddsInFront * (beyond(e.source_front_violation_near, kInFront) +
+                         beyond(e.target_front_violation_near, kInFront));
+  return kLogOddsOfRest * beyond(kContained, contained) + std::min(kMostLogOdds, contradicted);
+}
+
+/// The mean of the log odds of the search and the verification, where it is more than that of the
+/// verification alone, less the doubt.
+double confidence_of(double searched, const PoseVerification& fine, const PoseVerification& wide) {
+  const double verified = odds_of(std::max(fine.confidence, wide.confidence));
+  const double odds = std::max(verified, std::sqrt(odds_of(searched) * verified)) *
+                      portable::exp(-doubt(fine, wide));
+  return odds / (1 + odds);
 }
 
 /// Sparse scans overlap little in narrow voxels: what is not sure there and possible in the wide
-/// ones of the search is verified in these, too. @return confidences, 0 where it is not.
-std::vector<double> verify_coarsely(const Context& context, const MapState& map,
+/// ones of the search is verified in these, too. @return confidences of 0 where it is not.
+std::vector<PoseVerification> verify_coarsely(const Context& context, const MapState& map,
                                     const LocateOptions& options, const Scan& scan,
                                     const std::vector<const Verified*>& fine,
                                     const std::vector<PointCloud>& around) {
-  std::vector<double> out(fine.size(), 0);
+  std::vector<PoseVerification> out(fine.size());
   if (options.coarse_factor == 1) return out;
   std::vector<std::size_t> asked;
   std::vector<PointCloudView> neighborhoods;
@@ -62,7 +89,7 @@ std::vector<double> verify_coarsely(const Context& context, const MapState& map,
   verification.refine = true;
   const auto results =
       verify_poses_batch(context, clouds, pairs, poses, registration, verification);
-  for (std::size_t k = 0; k < asked.size(); ++k) out[asked[k]] = results[k].front().confidence;
+  for (std::size_t k = 0; k < asked.size(); ++k) out[asked[k]] = results[k].front();
   return out;
 }
 
@@ -101,11 +128,10 @@ std::vector<Verified> verify(const Context& context, const MapState& map,
     v.points = clouds[k + 1].size();
     fine.push_back(&v);
   }
-  const std::vector<double> coarse = verify_coarsely(context, map, options, scan, fine, around);
+  const auto coarse = verify_coarsely(context, map, options, scan, fine, around);
   for (std::size_t k = 0; k < results.size(); ++k) {
     Verified& v = out[open[k]];
-    v.confidence =
-        confidence_of(v.candidate.confidence, std::max(v.verification.confidence, coarse[k]));
+    v.confidence = confidence_of(v.candidate.confidence, v.verification, coarse[k]);
   }
   std::stable_sort(out.begin(), out.end(), [](const Verified& a, const Verified& b) {
     return a.confidence > b.confidence;
