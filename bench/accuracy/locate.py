@@ -8,6 +8,9 @@ turned at random and with its middle camera at the origin, in the map of its sce
 one map of all scenes, where those of --copies stand twice: either place is correct, and the other has to be
 an alias. Those of the next scene are asked for in the map of each scene, too. A pose is correct if its RMSE
 over the points of the scan is below 0.2 m.
+
+With --generated FOLDER --inside N the scenes are those of FOLDER, by `gpureg generate --fragments 50`, one map of
+the first N, 30 m apart, and the fragments of the others are not there. --thin K: the map has every K-th fragment.
 """
 
 from __future__ import annotations
@@ -77,15 +80,17 @@ class Scene:
 
 
 def map_folder(
-    work: pathlib.Path, scenes: dict[str, Scene], shifts: dict[tuple[str, int], np.ndarray]
+    work: pathlib.Path,
+    scenes: dict[str, Scene],
+    shifts: dict[tuple[str, int], np.ndarray],
+    thin: int = 1,
 ) -> pathlib.Path:
     work.mkdir(parents=True)
     poses, cameras, count = "", "", 0
     for (name, _), shift in shifts.items():
         scene = scenes.get(name)
-        for number in sorted(scene.poses) if scene else []:
-            if number in scene.left_out:
-                continue
+        kept = [n for n in sorted(scene.poses) if n not in scene.left_out] if scene else []
+        for number in kept[::thin]:
             source = (scene.folder / f"cloud_bin_{number}.ply").resolve()
             os.symlink(source, work / f"cloud_bin_{count}.ply")
             pose = shift @ scene.poses[number]
@@ -103,7 +108,10 @@ def main() -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("--data", type=pathlib.Path, required=True)
+    parser.add_argument("--data", type=pathlib.Path, help="needed without --generated")
+    parser.add_argument("--generated", type=pathlib.Path)
+    parser.add_argument("--inside", type=int, default=8)
+    parser.add_argument("--thin", type=int, default=1)
     parser.add_argument("--work", type=pathlib.Path, required=True, help="a new folder")
     parser.add_argument("--command", default="build/cpu/bin/gpureg")
     parser.add_argument("--output", type=pathlib.Path, help="record, a row a line")
@@ -112,7 +120,11 @@ def main() -> None:
     parser.add_argument("--maps", nargs="+", default=["single"], choices=["single", "joint"])
     parser.add_argument("--copies", nargs="*", default=[], choices=SCENES, help="in the joint map")
     arguments = parser.parse_args()
-    scenes = {n: Scene(arguments.data / f, arguments.step) for n, f in SCENES.items()}
+    if arguments.generated:
+        folders = {f.name: f for f in sorted(arguments.generated.iterdir())}
+    else:
+        folders = {n: arguments.data / f for n, f in SCENES.items()}
+    scenes = {n: Scene(f, arguments.step) for n, f in folders.items()}
     names, work = list(scenes), arguments.work
     # By scene and copy. Maps of one scene have its frame.
     shifts = {(name, 0): np.eye(4) for name in names}
@@ -173,7 +185,20 @@ def main() -> None:
                 )
                 arguments.output.write_text(f'{{"run": {head},\n"rows": [\n {lines}\n]}}\n')
 
-    for k, name in enumerate(names if "single" in arguments.maps else []):
+    if arguments.generated:
+        inside = names[: arguments.inside]
+        for k, name in enumerate(inside):
+            shifts[name, 0][:2, 3] = 30 * (k % 5), 30 * (k // 5)
+        kind = f"{len(inside)} generated buildings" + (
+            f", one of {arguments.thin} fragments" if arguments.thin > 1 else ""
+        )
+        those = {name: scenes[name] for name in inside}
+        folder = map_folder(work / "generated", those, shifts, arguments.thin)
+        gpureg(folder, "--save-map", work / "generated.gpureg")
+        for name in names:
+            ask(kind, work / "generated.gpureg", name, name in inside)
+    single = "single" in arguments.maps and not arguments.generated
+    for k, name in enumerate(names if single else []):
         folder = map_folder(work / name, {name: scenes[name]}, shifts)
         gpureg(folder, "--save-map", work / f"{name}.gpureg")
         ask(name, work / f"{name}.gpureg", name, True)
