@@ -104,6 +104,35 @@ def map_folder(
     return work
 
 
+def recall(rows: list[dict[str, Any]], precision: float) -> int:
+    """Most first poses that are correct while so many of those with their confidence are."""
+    best = right = 0
+    for count, row in enumerate(sorted(rows, key=lambda row: -row["confidence"]), 1):
+        right += row["correct"]
+        if right >= precision * count:
+            best = right
+    return best
+
+
+def counts(rows: list[dict[str, Any]]) -> dict[str, Any]:
+    """Of the rows of one map."""
+    here, away = [r for r in rows if r["here"]], [r for r in rows if not r["here"]]
+    found = [r for r in here if r["status"] == "found"]
+    return {
+        "map": rows[0]["map"],
+        "map_points": rows[0]["map_points"],
+        "tiles": rows[0]["tiles"],
+        "asked": len(here),
+        "first_correct": sum(r["correct"] for r in here),
+        "found": len(found),
+        "found_wrong": sum(not r["correct"] for r in found),
+        "ambiguous": sum(r["status"] == "ambiguous" for r in here),
+        "recall_at_precision_99": recall(rows, 0.99),
+        "strangers": len(away),
+        "strangers_found": sum(r["status"] == "found" for r in away),
+    }
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
@@ -197,6 +226,10 @@ def main() -> None:
         gpureg(folder, "--save-map", work / "generated.gpureg")
         for name in names:
             ask(kind, work / "generated.gpureg", name, name in inside)
+        if arguments.output:
+            record = json.loads(arguments.output.read_text())
+            record = {"run": record["run"], "maps": [counts(rows)]}
+            arguments.output.write_text(json.dumps(record, indent=2) + "\n")
     single = "single" in arguments.maps and not arguments.generated
     for k, name in enumerate(names if single else []):
         folder = map_folder(work / name, {name: scenes[name]}, shifts)

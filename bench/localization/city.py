@@ -46,7 +46,7 @@ def write_cloud(path: pathlib.Path, rows: np.ndarray) -> None:
 
 
 def extent(points: np.ndarray) -> float:
-    """As gpureg measures it: less than ten voxels are refused."""
+    """As gpureg measures it: less than ten voxels have no shape."""
     return float(np.ptp(np.quantile(points, [0.05, 0.95], axis=0), axis=0).max())
 
 

@@ -151,6 +151,21 @@ def located():
     return rows
 
 
+def located_generated():
+    """Fragments among many generated buildings."""
+    record = load("locate_generated.json")
+    rows = [
+        "| map | points, tiles | asked | first pose correct | found, of them wrong | ambiguous | recall at 99 % precision | of other buildings: found |",
+        "| --- | --- | --- | --- | --- | --- | --- | --- |",
+    ]
+    for of in record["maps"]:
+        rows.append(
+            f"| {of['map']} | {of['map_points']:,}, {of['tiles']} | {of['asked']} | {of['first_correct']} | {of['found']}, {of['found_wrong']} "
+            f"| {of['ambiguous']} | {of['recall_at_precision_99']} of {of['asked']} | {of['strangers_found']} of {of['strangers']} |"
+        )
+    return [*rows, "", source(record) + "."]
+
+
 def pruning():
     """Overlapping pairs that pruning keeps, a column for each share of pairs tried."""
     record = load("pruning.json")
@@ -223,6 +238,7 @@ TABLES = {
     "maps_short": maps_short,
     "map_peers": peers,
     "located": located,
+    "located_generated": located_generated,
     "pruning": pruning,
     "map_confidence": confidences,
     "promised_risk": promised_risk,

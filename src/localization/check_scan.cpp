@@ -72,7 +72,7 @@ void check_unit(const PointCloudView& scan, const MapState& map, const std::stri
     else if (fits(spacing, 1e2))
       text << looks_like(1e2, "metres", "centimetres");
     else
-      text << ": it is too small for this map";
+      return;  // too small to be recognised, which is for the result to say
   } else {
     return;
   }

@@ -18,12 +18,12 @@ constexpr double kSure = 0.75, kSureSearch = 0.95;
 /// coarse points are so many that the search had something to see.
 constexpr double kHopelessSearch = 0.1;
 
-/// The evidence of a pair may overlap little, but a scan that is in the map lies in it, and sees what
-/// the map has there. Log odds that a place loses:
-/// with the part of the scan beyond a tenth that has no surface of the map beside it,
+/// The evidence of a pair may overlap little, but a scan that is in the map lies in it, and sees
+/// what the map has there. Log odds that a place loses: with the part of the scan beyond a tenth
+/// that has no surface of the map beside it,
 constexpr double kContained = 0.9, kLogOddsOfRest = 8;
-/// with the part of the map that lies in free space of the scan, and with the parts of both in front
-/// of surfaces of the other, beyond what right places have; at most so many, as rooms change.
+/// with the part of the map that lies in free space of the scan, and with the parts of both in
+/// front of surfaces of the other, beyond what right places have; at most so many, as rooms change.
 constexpr double kInFreeSpace = 0.005, kLogOddsInFreeSpace = 150;
 constexpr double kInFront = 0.01, kLogOddsInFront = 100;
 constexpr double kMostLogOdds = 4;
@@ -61,9 +61,9 @@ double confidence_of(double searched, const PoseVerification& fine, const PoseVe
 /// Sparse scans overlap little in narrow voxels: what is not sure there and possible in the wide
 /// ones of the search is verified in these, too. @return confidences of 0 where it is not.
 std::vector<PoseVerification> verify_coarsely(const Context& context, const MapState& map,
-                                    const LocateOptions& options, const Scan& scan,
-                                    const std::vector<const Verified*>& fine,
-                                    const std::vector<PointCloud>& around) {
+                                              const LocateOptions& options, const Scan& scan,
+                                              const std::vector<const Verified*>& fine,
+                                              const std::vector<PointCloud>& around) {
   std::vector<PoseVerification> out(fine.size());
   if (options.coarse_factor == 1) return out;
   std::vector<std::size_t> asked;

@@ -51,6 +51,19 @@ TEST_F(WrongInput, AnotherUnitIsRecognised) {
                                 {"scans[0]", "metres", "millimetres", "1000"});
 }
 
+// Other scans of the call keep their results.
+TEST_F(WrongInput, ATooSmallScanIsNotFound) {
+  PointCloud small = query.scan;
+  small.points.clear();
+  for (const Eigen::Vector3f& p : query.scan.points)
+    if ((p - query.scan.points.front()).norm() < 3 * kVoxel) small.points.push_back(p);
+  ASSERT_GT(small.points.size(), 20u);
+  const auto results = locate(context, {small.view(), query.scan.view()}, map,
+                              LocateOptions::from_voxel_size(kVoxel));
+  EXPECT_EQ(results[0].status, LocateStatus::not_found);
+  EXPECT_EQ(results[1].status, LocateStatus::found);
+}
+
 TEST_F(WrongInput, VoxelSizesThatDoNotFit) {
   expect_error<InvalidArgument>(
       [&] { locate(context, {query.scan.view()}, map, LocateOptions::from_voxel_size(0.05f)); },
