@@ -195,7 +195,8 @@ struct LocateResult {
 /// Finds the poses of scans in a map: aligns each scan with every tile in coarse voxels, merges the
 /// poses of all tiles, and verifies the most confident ones against the whole map around them, in
 /// its own voxels. Where none is sure, but one is possible, the best tiles are searched in those,
-/// too. All places compete for the confidence.
+/// too. All places compete for the confidence. A part of the scan that the map lacks, or that sees
+/// through what the map has, makes a place less likely.
 ///
 /// @param scans host memory; viewpoints as for prepare().
 /// @param priors one per scan, or none.
