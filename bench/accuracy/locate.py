@@ -11,6 +11,7 @@ over the points of the scan is below 0.2 m.
 
 With --generated FOLDER --inside N the scenes are those of FOLDER, by `gpureg generate --fragments 50`, one map of
 the first N, 30 m apart, and the fragments of the others are not there. --thin K: the map has every K-th fragment.
+The record then has counts, and keeps its other maps.
 """
 
 from __future__ import annotations
@@ -24,6 +25,7 @@ import subprocess
 from typing import Any
 
 import numpy as np
+import record
 
 SCENES = {"kitchen": "redkitchen/fragments", "A": "house/A", "B": "house/B", "E": "hospital/E"}
 CORRECT, FIRST, GAP = 0.2, 2, 40.0
@@ -141,6 +143,7 @@ def main() -> None:
     parser.add_argument("--generated", type=pathlib.Path)
     parser.add_argument("--inside", type=int, default=8)
     parser.add_argument("--thin", type=int, default=1)
+    parser.add_argument("--name", help="of that map in the record")
     parser.add_argument("--work", type=pathlib.Path, required=True, help="a new folder")
     parser.add_argument("--command", default="build/cpu/bin/gpureg")
     parser.add_argument("--output", type=pathlib.Path, help="record, a row a line")
@@ -149,6 +152,8 @@ def main() -> None:
     parser.add_argument("--maps", nargs="+", default=["single"], choices=["single", "joint"])
     parser.add_argument("--copies", nargs="*", default=[], choices=SCENES, help="in the joint map")
     arguments = parser.parse_args()
+    if not arguments.generated and not arguments.data:
+        parser.error("one of --data and --generated is needed")
     if arguments.generated:
         folders = {f.name: f for f in sorted(arguments.generated.iterdir())}
     else:
@@ -158,6 +163,7 @@ def main() -> None:
     # By scene and copy. Maps of one scene have its frame.
     shifts = {(name, 0): np.eye(4) for name in names}
     rows: list[dict[str, Any]] = []
+    run: dict[str, Any] = {"seed": arguments.seed, "step": arguments.step}
 
     def gpureg(*words: str | pathlib.Path) -> float:
         """CPU seconds: those of the clock depend on what else runs."""
@@ -207,18 +213,18 @@ def main() -> None:
             }
             rows.append(row)
             print(row, flush=True)
-            if arguments.output:
+            run.update(result["environment"])
+            if arguments.output and not arguments.generated:
                 lines = ",\n ".join(json.dumps(r) for r in rows)
-                head = json.dumps(
-                    {"seed": arguments.seed, "step": arguments.step, **result["environment"]}
+                arguments.output.write_text(
+                    f'{{"run": {json.dumps(run)},\n"rows": [\n {lines}\n]}}\n'
                 )
-                arguments.output.write_text(f'{{"run": {head},\n"rows": [\n {lines}\n]}}\n')
 
     if arguments.generated:
         inside = names[: arguments.inside]
         for k, name in enumerate(inside):
             shifts[name, 0][:2, 3] = 30 * (k % 5), 30 * (k // 5)
-        kind = f"{len(inside)} generated buildings" + (
+        kind = arguments.name or f"{len(inside)} generated buildings" + (
             f", one of {arguments.thin} fragments" if arguments.thin > 1 else ""
         )
         those = {name: scenes[name] for name in inside}
@@ -226,10 +232,16 @@ def main() -> None:
         gpureg(folder, "--save-map", work / "generated.gpureg")
         for name in names:
             ask(kind, work / "generated.gpureg", name, name in inside)
-        if arguments.output:
-            record = json.loads(arguments.output.read_text())
-            record = {"run": record["run"], "maps": [counts(rows)]}
-            arguments.output.write_text(json.dumps(record, indent=2) + "\n")
+        path = arguments.output
+        if path:
+            old = json.loads(path.read_text())["maps"] if path.exists() else []
+            content = {
+                "command": "python3 bench/accuracy/locate.py --generated FOLDER --inside N --work WORK",
+                "commit": record.commit(),
+                "run": run,
+                "maps": [m for m in old if m["map"] != kind] + [counts(rows)],
+            }
+            record.save(path, content)
     single = "single" in arguments.maps and not arguments.generated
     for k, name in enumerate(names if single else []):
         folder = map_folder(work / name, {name: scenes[name]}, shifts)
