@@ -1,143 +1,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <algorithm>
-#include <cmath>
 
 #include "fields/localization.hpp"
-#include "fields/scale.hpp"
 #include "localization/check_scan.hpp"
-#include "localization/search.hpp"
-#include "math/exponential.hpp"
+#include "localization/plan_search.hpp"
+#include "localization/verify_places.hpp"
 
 namespace gpureg::localization {
 namespace {
-
-/// Confidence of a place from which the coarse search is enough, and one of its poses, not verified
-/// yet, that a search in narrower voxels hardly surpasses.
-constexpr double kSure = 0.75, kSureSearch = 0.95;
-/// Where no pose of the coarse search reaches this confidence, the scan is not in the map, if its
-/// coarse points are so many that the search had something to see.
-constexpr double kHopelessSearch = 0.1;
-
-/// The evidence of a pair may overlap little, but a scan that is in the map lies in it, and sees
-/// what the map has there. Log odds that a place loses: with the part of the scan beyond a tenth
-/// that has no surface of the map beside it,
-constexpr double kContained = 0.9, kLogOddsOfRest = 8;
-/// with the part of the map that lies in free space of the scan, and with the parts of both in
-/// front of surfaces of the other, beyond what right places have; at most so many, as rooms change.
-constexpr double kInFreeSpace = 0.005, kLogOddsInFreeSpace = 150;
-constexpr double kInFront = 0.01, kLogOddsInFront = 100;
-constexpr double kMostLogOdds = 4;
-
-/// A candidate in all of the map around it.
-struct Verified {
-  Candidate candidate;
-  PoseVerification verification;
-  std::size_t points = 0;  ///< of the neighbourhood
-  double confidence = 0;   ///< other places aside
-};
-
-/// Log odds against a place. Sparse scans are contained in wide voxels at least.
-double doubt(const PoseVerification& fine, const PoseVerification& wide) {
-  const PoseEvidence& e = fine.evidence;
-  const double contained =
-      std::max(e.source_overlap_any_normal, wide.evidence.source_overlap_any_normal);
-  const auto beyond = [](double share, double usual) { return std::max(0.0, share - usual); };
-  const double contradicted =
-      kLogOddsInFreeSpace * beyond(e.target_free_space_violation, kInFreeSpace) +
-      kLogOddsInFront * (beyond(e.source_front_violation_near, kInFront) +
-                         beyond(e.target_front_violation_near, kInFront));
-  return kLogOddsOfRest * beyond(kContained, contained) + std::min(kMostLogOdds, contradicted);
-}
-
-/// The mean of the log odds of the search and the verification, where it is more than that of the
-/// verification alone, less the doubt.
-double confidence_of(double searched, const PoseVerification& fine, const PoseVerification& wide) {
-  const double verified = odds_of(std::max(fine.confidence, wide.confidence));
-  const double odds = std::max(verified, std::sqrt(odds_of(searched) * verified)) *
-                      portable::exp(-doubt(fine, wide));
-  return odds / (1 + odds);
-}
-
-/// Sparse scans overlap little in narrow voxels: what is not sure there and possible in the wide
-/// ones of the search is verified in these, too. @return confidences of 0 where it is not.
-std::vector<PoseVerification> verify_coarsely(const Context& context, const MapState& map,
-                                              const LocateOptions& options, const Scan& scan,
-                                              const std::vector<const Verified*>& fine,
-                                              const std::vector<PointCloud>& around) {
-  std::vector<PoseVerification> out(fine.size());
-  if (options.coarse_factor == 1) return out;
-  std::vector<std::size_t> asked;
-  std::vector<PointCloudView> neighborhoods;
-  std::vector<Pair> pairs;
-  std::vector<std::vector<UnalignedIsometry3d>> poses;
-  for (std::size_t k = 0; k < fine.size(); ++k) {
-    const PoseVerification& found = fine[k]->verification;
-    if (found.confidence >= kSure || fine[k]->candidate.confidence < kHopelessSearch) continue;
-    asked.push_back(k);
-    neighborhoods.push_back(around[k].view());
-    pairs.push_back({0, static_cast<std::uint32_t>(asked.size())});
-    poses.push_back({found.target_from_source});
-  }
-  if (asked.empty()) return out;
-  std::vector<PreparedCloud> clouds{scan.coarse};
-  for (PreparedCloud& cloud :
-       prepare_batch(context, neighborhoods, prepare_for(map, options.coarse_factor)))
-    clouds.push_back(std::move(cloud));
-  RegistrationOptions registration = options.registration;
-  fields::multiply_lengths(registration, options.coarse_factor);
-  VerificationOptions verification;
-  verification.refine = true;
-  const auto results =
-      verify_poses_batch(context, clouds, pairs, poses, registration, verification);
-  for (std::size_t k = 0; k < asked.size(); ++k) out[asked[k]] = results[k].front();
-  return out;
-}
-
-/// @param before candidates of the scan that were verified already.
-std::vector<Verified> verify(const Context& context, const MapState& map,
-                             const LocateOptions& options, const Scan& scan,
-                             const std::vector<Verified>& before = {}) {
-  std::vector<PointCloud> around;
-  std::vector<Pair> pairs;
-  std::vector<std::vector<UnalignedIsometry3d>> poses;
-  std::vector<Verified> out;
-  std::vector<std::size_t> open;
-  for (const Candidate& candidate : scan.candidates) {
-    const auto known = std::find_if(before.begin(), before.end(), [&](const Verified& v) {
-      return v.candidate.map_from_scan.matrix() == candidate.map_from_scan.matrix();
-    });
-    out.push_back(known == before.end() ? Verified{candidate, {}, 0, 0} : *known);
-    if (known != before.end()) continue;
-    open.push_back(out.size() - 1);
-    around.push_back(neighborhood(map, scan.points, candidate.map_from_scan, options.neighborhood));
-    pairs.push_back({0, static_cast<std::uint32_t>(around.size())});
-    poses.push_back({candidate.map_from_scan});
-  }
-  std::vector<PreparedCloud> clouds{scan.cloud};
-  for (PreparedCloud& cloud :
-       prepare_batch(context, views_of(around), as_they_are(map.options.prepare)))
-    clouds.push_back(std::move(cloud));
-  VerificationOptions verification;
-  verification.refine = true;
-  const auto results =
-      verify_poses_batch(context, clouds, pairs, poses, options.registration, verification);
-  std::vector<const Verified*> fine;
-  for (std::size_t k = 0; k < results.size(); ++k) {
-    Verified& v = out[open[k]];
-    v.verification = results[k].front();
-    v.points = clouds[k + 1].size();
-    fine.push_back(&v);
-  }
-  const auto coarse = verify_coarsely(context, map, options, scan, fine, around);
-  for (std::size_t k = 0; k < results.size(); ++k) {
-    Verified& v = out[open[k]];
-    v.confidence = confidence_of(v.candidate.confidence, v.verification, coarse[k]);
-  }
-  std::stable_sort(out.begin(), out.end(), [](const Verified& a, const Verified& b) {
-    return a.confidence > b.confidence;
-  });
-  return out;
-}
 
 double best_searched(const Scan& scan) {
   return scan.candidates.empty() ? 0 : scan.candidates.front().confidence;
@@ -154,6 +24,10 @@ LocateStatus status_of(const LocateResult& result, double min_confidence) {
       several = true;
     }
   return several && together >= min_confidence ? LocateStatus::ambiguous : LocateStatus::not_found;
+}
+
+bool is_sure(const LocateResult& result) {
+  return !result.poses.empty() && result.poses.front().confidence >= kSure;
 }
 
 LocateResult result_of(const std::vector<Verified>& verified, const Scan& scan,
@@ -226,28 +100,41 @@ std::vector<LocateResult> locate(const Context& context, const std::vector<Point
   const double factor = coarsest_factor(state, options);
   const std::vector<PreparedCloud> coarsest =
       factor > 0 ? thinned(factor) : std::vector<PreparedCloud>(scans.size());
-  std::vector<Scan> found;
-  for (std::size_t k = 0; k < scans.size(); ++k)
-    found.push_back(
-        scan_of(prepared[k], coarse[k], coarsest[k], priors.empty() ? LocatePrior{} : priors[k]));
-  search_all_tiles(context, state, options, found);
-  std::vector<LocateResult> out;
+  std::vector<LocateResult> out(scans.size());
+  std::vector<Scan> open;
   std::vector<std::vector<Verified>> verified;
+  std::vector<std::size_t> number;
+  for (std::size_t k = 0; k < scans.size(); ++k) {
+    Scan scan =
+        scan_of(prepared[k], coarse[k], coarsest[k], priors.empty() ? LocatePrior{} : priors[k]);
+    scan.candidates = search_plan(state, state.plan(), scan, options.candidates, context.threads());
+    refine_places(context, state, options, scan);
+    std::vector<Verified> places = verify_places(context, state, options, scan);
+    out[k] = result_of(places, scan, options);
+    if (is_sure(out[k])) continue;
+    scan.planned = scan.candidates;
+    open.push_back(std::move(scan));
+    verified.push_back(std::move(places));
+    number.push_back(k);
+  }
+  search_all_tiles(context, state, options, open);
   std::vector<std::size_t> unsure;
-  for (std::size_t k = 0; k < found.size(); ++k) {
-    const double searched = best_searched(found[k]);
+  for (std::size_t k = 0; k < open.size(); ++k) {
+    const double searched = best_searched(open[k]);
     const bool hopeless =
-        coarse_first && searched < kHopelessSearch && found[k].coarse.size() >= kTellingPoints;
-    if (hopeless && !found[k].candidates.empty()) found[k].candidates.resize(1);
-    verified.push_back(verify(context, state, options, found[k]));
-    out.push_back(result_of(verified[k], found[k], options));
-    const bool sure = !out[k].poses.empty() && out[k].poses.front().confidence >= kSure;
-    if (coarse_first && !hopeless && !sure && searched < kSureSearch) unsure.push_back(k);
+        coarse_first && searched < kHopelessSearch && open[k].coarse.size() >= kTellingPoints;
+    if (hopeless && !open[k].candidates.empty()) open[k].candidates.resize(1);
+    verified[k] = verify_places(context, state, options, open[k], verified[k]);
+    LocateResult& result = out[number[k]];
+    result = result_of(verified[k], open[k], options);
+    if (coarse_first && !hopeless && !is_sure(result) && searched < kSureSearch)
+      unsure.push_back(k);
   }
   if (unsure.empty()) return out;
-  search_best_tiles(context, state, options, unsure, found);
+  search_best_tiles(context, state, options, unsure, open);
   for (const std::size_t k : unsure)
-    out[k] = result_of(verify(context, state, options, found[k], verified[k]), found[k], options);
+    out[number[k]] = result_of(
+        verify_places(context, state, options, open[k], verified[k]), open[k], options);
   return out;
 }
 

@@ -15,6 +15,8 @@ namespace gpureg::localization {
 /// Sides of surfaces need the direction of a normal only roughly.
 using Side = std::array<std::int8_t, 3>;
 
+struct FloorPlan;
+
 /// What a map consists of, and what follows from it.
 struct MapState {
   MapOptions options;
@@ -51,6 +53,9 @@ struct MapState {
                                             const std::vector<std::size_t>& wanted,
                                             const PrepareOptions& prepare) const;
 
+  /// Made when the first scan needs it.
+  const FloorPlan& plan() const;
+
   static const MapState& of(const PreparedMap& map);
   static PreparedMap map(std::shared_ptr<const MapState> state) {
     return PreparedMap(std::move(state));
@@ -65,6 +70,8 @@ struct MapState {
   };
   void keep(const Key& key, const PreparedCloud& cloud, std::uint64_t search) const;
 
+  mutable std::once_flag planned_;
+  mutable std::shared_ptr<const FloorPlan> plan_;
   mutable std::mutex mutex_;
   mutable std::map<Key, Cached> cache_;
   mutable std::size_t cached_points_ = 0;

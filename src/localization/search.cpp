@@ -117,16 +117,7 @@ void run(const Context& context, const MapState& map, const LocateOptions& optio
     if (points >= kPointsAtOnce) search_those();
   }
   search_those();
-  for (Scan& scan : scans) {
-    scan.candidates = distinct(std::move(scan.candidates), scan.middle,
-                               options.registration.evidence, options.candidates);
-    const auto is_last_hopeless = [&] {
-      const double last = scan.candidates.back().confidence;
-      return odds_of(last) < kHopelessAlone ||
-             is_hopeless(last, scan.candidates.front().confidence);
-    };
-    while (scan.candidates.size() > 1 && is_last_hopeless()) scan.candidates.pop_back();
-  }
+  for (Scan& scan : scans) keep_likely(options, scan);
 }
 
 /// Whether each scan is searched in each tile.
@@ -163,7 +154,7 @@ void search_coarser(const Context& context, const MapState& map, const LocateOpt
   run(context, map, options, search, scans);
   for (std::size_t k = 0; k < scans.size(); ++k) {
     if (large[k] != 0) keep_best(scans[k], options.coarse_tiles, wanted[k]);
-    scans[k].candidates.clear();
+    scans[k].candidates = scans[k].planned;
     scans[k].best.assign(map.tiles.size(), 0);
   }
 }
@@ -184,6 +175,16 @@ Scan scan_of(PreparedCloud cloud, PreparedCloud coarse, PreparedCloud coarsest,
   scan.coarsest = std::move(coarsest);
   scan.prior = prior;
   return scan;
+}
+
+void keep_likely(const LocateOptions& options, Scan& scan) {
+  std::vector<Candidate>& all = scan.candidates;
+  all = distinct(std::move(all), scan.middle, options.registration.evidence, options.candidates);
+  const auto is_last_hopeless = [&] {
+    return odds_of(all.back().confidence) < kHopelessAlone ||
+           is_hopeless(all.back().confidence, all.front().confidence);
+  };
+  while (all.size() > 1 && is_last_hopeless()) all.pop_back();
 }
 
 bool contradicts(const Scan& scan, const UnalignedIsometry3d& map_from_scan) {

@@ -15,6 +15,7 @@ struct Scan {
   LocatePrior prior;
   std::size_t tiles = 0;  ///< that the scan was aligned with
   std::vector<Candidate> candidates;
+  std::vector<Candidate> planned;  ///< those of the plan of the map
   std::vector<double> best;  ///< per tile: the largest confidence of a mode
 };
 
@@ -25,6 +26,9 @@ Scan scan_of(PreparedCloud cloud, PreparedCloud coarse, PreparedCloud coarsest,
              const LocatePrior& prior);
 
 bool contradicts(const Scan& scan, const UnalignedIsometry3d& map_from_scan);
+
+/// The most confident candidates of different places, without hopeless ones.
+void keep_likely(const LocateOptions& options, Scan& scan);
 
 /// Preparation of scans and tiles in voxels `factor` times as wide as those of the map.
 PrepareOptions prepare_for(const MapState& map, double factor);

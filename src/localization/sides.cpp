@@ -72,6 +72,18 @@ Side side_of(const Eigen::Vector3f& normal) {
   return side;
 }
 
+std::vector<Eigen::Vector3f> tile_normals(const Context& context, const MapState& map,
+                                          std::size_t tile) {
+  const std::size_t begin = map.tiles[tile].begin, end = map.tiles[tile].end;
+  std::vector<Eigen::Vector3f> out(end - begin, Eigen::Vector3f::Zero());
+  const Sided found = sided(context, map, tile);
+  if (found.cloud.size() != found.index.size()) return out;  // stray points were left out
+  const std::vector<Eigen::Vector3f> normals = found.cloud.normals();
+  for (std::size_t k = 0; k < normals.size(); ++k)
+    if (found.index[k] >= begin && found.index[k] < end) out[found.index[k] - begin] = normals[k];
+  return out;
+}
+
 void infer_sides(const Context& context, MapState& map) {
   std::vector<Side> sides(map.points.size(), Side{});
   for (std::size_t tile = 0; tile < map.tiles.size(); ++tile) {

@@ -6,7 +6,7 @@
 
 #include "common/validate.hpp"
 #include "gpureg/pruning.hpp"
-#include "pruning/for_each_on.hpp"
+#include "common/for_each_on.hpp"
 #include "pruning/likeness.hpp"
 
 namespace gpureg::pruning {

@@ -5,7 +5,7 @@
 #include <cmath>
 
 #include "pruning/agreement.hpp"
-#include "pruning/for_each_on.hpp"
+#include "common/for_each_on.hpp"
 
 namespace gpureg::pruning {
 namespace {

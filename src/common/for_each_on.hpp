@@ -7,7 +7,7 @@
 
 #include "common/host_threads.hpp"
 
-namespace gpureg::pruning {
+namespace gpureg {
 
 /// Calls work(k, state) for each k < count, with one state of make_state() per thread.
 template <typename MakeState, typename Work>
@@ -20,4 +20,4 @@ void for_each_on(std::size_t threads, std::size_t count, const MakeState& make_s
   });
 }
 
-}  // namespace gpureg::pruning
+}  // namespace gpureg

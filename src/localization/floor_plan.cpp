@@ -1,0 +1,236 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "localization/floor_plan.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "common/radix_sort.hpp"
+#include "localization/sides.hpp"
+#include "math/atan2.hpp"
+
+namespace gpureg::localization {
+namespace {
+
+/// Normals that are looked at, and the cosines within which they agree, belong to an axis, and make
+/// another axis the same.
+constexpr std::size_t kNormals = 2048;
+constexpr float kAgree = 0.985f, kBelong = 0.98f, kSameAxis = 0.87f;
+/// Sines of the slope of a wall, at most, and of a floor, at least.
+constexpr float kWall = 0.4f, kFloor = 0.8f;
+/// Share of an axis that its opposite has at least where a map has ceilings.
+constexpr double kCeilings = 0.1;
+constexpr int kFacingBits = 18;
+constexpr std::uint32_t kMostHeight = (1u << (32 - kFacingBits)) - 1;
+constexpr double kMostCells = 1 << 27;
+
+/// Of a cell: its number and a height.
+struct Entry {
+  std::uint64_t key;
+  std::uint32_t facing;
+};
+
+void merge(std::vector<Entry>& entries) {
+  radix_sort(entries, [](const Entry& e) { return e.key; });
+  std::size_t kept = 0;
+  for (const Entry& entry : entries) {
+    if (kept > 0 && entries[kept - 1].key == entry.key)
+      entries[kept - 1].facing |= entry.facing;
+    else
+      entries[kept++] = entry;
+  }
+  entries.resize(kept);
+}
+
+/// The map's normals, by tile.
+class Normals {
+ public:
+  explicit Normals(const MapState& map) : map_(map), context_(Context::cpu()) {
+    for (std::size_t tile = 0; tile < map.tiles.size() && has_sides_; ++tile)
+      has_sides_ = knows(tile);
+  }
+  bool has_sides() const { return has_sides_; }
+
+  std::vector<Eigen::Vector3f> of(std::size_t tile) const {
+    if (!knows(tile)) return tile_normals(context_, map_, tile);
+    std::vector<Eigen::Vector3f> out;
+    for (std::size_t k = map_.tiles[tile].begin; k < map_.tiles[tile].end; ++k) {
+      const Side& side = map_.sides[k];
+      const Eigen::Vector3f normal = Eigen::Vector3i(side[0], side[1], side[2]).cast<float>();
+      out.push_back(side == Side{} ? normal : Eigen::Vector3f(normal.normalized()));
+    }
+    return out;
+  }
+
+ private:
+  bool knows(std::size_t tile) const {
+    if (map_.sides.empty()) return false;
+    const std::size_t begin = map_.tiles[tile].begin, end = map_.tiles[tile].end;
+    std::size_t known = 0;
+    for (std::size_t k = begin; k < end; ++k) known += map_.sides[k] != Side{};
+    return 2 * known > end - begin;
+  }
+
+  const MapState& map_;
+  Context context_;
+  bool has_sides_ = true;
+};
+
+}  // namespace
+
+std::vector<Axis> frequent_axes(const std::vector<Eigen::Vector3f>& normals, std::size_t most) {
+  std::vector<Eigen::Vector3f> sample;
+  for (std::size_t k = 0; k < normals.size(); k += normals.size() / kNormals + 1)
+    if (normals[k].squaredNorm() > 0.5f) sample.push_back(normals[k]);
+  std::vector<Axis> axes;
+  while (axes.size() < most && !sample.empty()) {
+    std::size_t best = 0, agreeing = 0;
+    for (std::size_t a = 0; a < sample.size(); ++a) {
+      std::size_t count = 0;
+      for (const Eigen::Vector3f& other : sample) count += std::abs(sample[a].dot(other)) > kAgree;
+      if (count > agreeing) best = a, agreeing = count;
+    }
+    Axis axis;
+    axis.direction = sample[best];
+    for (int round = 0; round < 3; ++round) {
+      Eigen::Vector3f sum = Eigen::Vector3f::Zero();
+      axis.facing = axis.opposite = 0;
+      for (const Eigen::Vector3f& normal : sample) {
+        const float along = normal.dot(axis.direction);
+        if (std::abs(along) <= kBelong) continue;
+        sum += along > 0 ? normal : Eigen::Vector3f(-normal);
+        ++(along > 0 ? axis.facing : axis.opposite);
+      }
+      axis.direction = sum.normalized();
+    }
+    if (axis.facing < axis.opposite) {
+      axis.direction = -axis.direction;
+      std::swap(axis.facing, axis.opposite);
+    }
+    axes.push_back(axis);
+    sample.erase(std::remove_if(sample.begin(), sample.end(),
+                                [&](const Eigen::Vector3f& normal) {
+                                  return std::abs(normal.dot(axis.direction)) > kSameAxis;
+                                }),
+                 sample.end());
+  }
+  return axes;
+}
+
+Eigen::Matrix3f upright(const Eigen::Vector3f& direction) {
+  // Any rotation about the axis will do: a basis from the coordinate that is the smallest.
+  Eigen::Index least = 0;
+  direction.cwiseAbs().minCoeff(&least);
+  const Eigen::Vector3f x = direction.cross(Eigen::Vector3f::Unit(least)).normalized();
+  Eigen::Matrix3f rotation;
+  rotation << x.transpose(), direction.cross(x).transpose(), direction.transpose();
+  return rotation;
+}
+
+namespace facing {
+
+std::uint32_t of(const Eigen::Vector3f& normal, bool exact) {
+  if (normal.squaredNorm() < 0.5f) return 0;
+  if (std::abs(normal[2]) >= localization::kFloor) return normal[2] > 0 ? kFloor : kCeiling;
+  if (std::abs(normal[2]) > kWall) return 0;
+  constexpr float kPerRadian = kDirections / (2 * kPi);
+  const int nearest = static_cast<int>(std::lround(exact_atan2(normal[1], normal[0]) * kPerRadian));
+  const auto bit = [](int direction) {
+    return 1u << ((direction + 2 * kDirections) % kDirections);
+  };
+  return exact ? bit(nearest) : bit(nearest - 1) | bit(nearest) | bit(nearest + 1);
+}
+
+std::uint32_t both_sides(std::uint32_t facing) {
+  const std::uint32_t walls = facing & kWalls;
+  const std::uint32_t turned = (walls << kDirections / 2 | walls >> kDirections / 2) & kWalls;
+  const bool flat = (facing & ~kWalls) != 0;
+  return walls | turned | (flat ? kFloor | kCeiling : 0);
+}
+
+}  // namespace facing
+
+FloorPlan::FloorPlan(const MapState& map) {
+  const Normals normals(map);
+  has_sides = normals.has_sides();
+  std::vector<Eigen::Vector3f> some;
+  for (std::size_t tile = 0; tile < map.tiles.size(); ++tile) {
+    const std::vector<Eigen::Vector3f> of_tile = normals.of(tile);
+    const std::size_t step = map.points.size() / (4 * kNormals) + 1;
+    for (std::size_t k = 0; k < of_tile.size(); k += step) some.push_back(of_tile[k]);
+  }
+  const std::vector<Axis> axes = frequent_axes(some, 1);
+  if (axes.empty()) return;
+  turn = upright(axes.front().direction);
+  has_ceiling = !has_sides || static_cast<double>(axes.front().opposite) >
+                                  kCeilings * static_cast<double>(axes.front().facing);
+  cell = kCell * map.options.prepare.voxel_size;
+  Eigen::AlignedBox3f box;
+  for (const Eigen::Vector3f& point : map.points) box.extend(turn * point);
+  const auto coarse_cells = [&](int axis) {
+    return std::floor(static_cast<double>(box.sizes()[axis]) / (2 * static_cast<double>(cell))) + 2;
+  };
+  if (coarse_cells(0) * coarse_cells(1) > kMostCells) return;
+  corner = box.min().array() - cell / 2;
+  width = 2 * static_cast<int>(coarse_cells(0));
+  height = 2 * static_cast<int>(coarse_cells(1));
+
+  std::vector<Entry> entries, of_tile;
+  for (std::size_t tile = 0; tile < map.tiles.size(); ++tile) {
+    const std::vector<Eigen::Vector3f> tile_of_normals = normals.of(tile);
+    of_tile.clear();
+    for (std::size_t k = 0; k < tile_of_normals.size(); ++k) {
+      std::uint32_t faces = facing::of(turn * tile_of_normals[k], false);
+      if (!has_sides) faces = facing::both_sides(faces);
+      if (faces == 0) continue;
+      const Eigen::Vector3f at = (turn * map.points[map.tiles[tile].begin + k] - corner) / cell;
+      const auto up = std::min(static_cast<std::uint32_t>(at[2]), kMostHeight);
+      // A scan's points fall into a neighbouring cell, too, up to a quarter of a cell away.
+      for (const float dx : {-0.25f, 0.25f})
+        for (const float dy : {-0.25f, 0.25f}) {
+          const auto x = static_cast<std::uint64_t>(at[0] + dx),
+                     y = static_cast<std::uint64_t>(at[1] + dy);
+          const std::uint64_t number = y * static_cast<std::uint64_t>(width) + x;
+          of_tile.push_back({number << (32 - kFacingBits) | up, faces});
+        }
+    }
+    merge(of_tile);
+    entries.insert(entries.end(), of_tile.begin(), of_tile.end());
+  }
+  merge(entries);
+
+  const std::size_t cells = static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
+  walls.assign(cells, 0);
+  column_begin.assign(cells + 1, 0);
+  columns.reserve(entries.size());
+  for (const Entry& entry : entries) {
+    const std::uint64_t number = entry.key >> (32 - kFacingBits);
+    walls[number] |= static_cast<std::uint16_t>(entry.facing & facing::kWalls);
+    ++column_begin[number + 1];
+    columns.push_back(static_cast<std::uint32_t>(entry.key) << kFacingBits | entry.facing);
+  }
+  for (std::size_t k = 0; k < cells; ++k) column_begin[k + 1] += column_begin[k];
+
+  const std::size_t coarse_count = cells / 4;
+  coarse.assign(coarse_count * kPlanes, 0);
+  for (std::size_t k = 0; k < cells; ++k) {
+    if (walls[k] == 0) continue;
+    const std::size_t x = k % static_cast<std::size_t>(width),
+                      y = k / static_cast<std::size_t>(width);
+    const std::size_t at = y / 2 * static_cast<std::size_t>(coarse_width()) + x / 2;
+    const std::uint32_t either = facing::both_sides(walls[k]);
+    for (int d = 0; d < facing::kDirections; ++d) {
+      const auto plane_at = [&](int number) -> std::uint8_t& {
+        return coarse[static_cast<std::size_t>(number) * coarse_count + at];
+      };
+      if (walls[k] >> d & 1) plane_at(d) = 1;
+      if (d < facing::kDirections / 2 && either >> d & 1) plane_at(facing::kDirections + d) = 1;
+    }
+  }
+}
+
+const FloorPlan& MapState::plan() const {
+  std::call_once(planned_, [&] { plan_ = std::make_shared<const FloorPlan>(*this); });
+  return *plan_;
+}
+
+}  // namespace gpureg::localization

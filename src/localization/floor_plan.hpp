@@ -1,0 +1,65 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <array>
+
+#include "localization/map_state.hpp"
+
+namespace gpureg::localization {
+
+/// A direction that many normals have, and how many face it and its opposite.
+struct Axis {
+  Eigen::Vector3f direction{0, 0, 1};  ///< at least as many face it as its opposite
+  std::size_t facing = 0, opposite = 0;
+};
+
+/// The most frequent directions of normals, up to the sign, at least 30 degrees apart.
+std::vector<Axis> frequent_axes(const std::vector<Eigen::Vector3f>& normals, std::size_t most);
+
+/// The rotation that turns a direction to z.
+Eigen::Matrix3f upright(const Eigen::Vector3f& direction);
+
+/// What faces a point of a surface, as bits: 16 directions of walls, floor and ceiling.
+namespace facing {
+constexpr int kDirections = 16;
+constexpr std::uint32_t kWalls = (1u << kDirections) - 1, kFloor = 1u << 16, kCeiling = 1u << 17;
+/// Bits of a normal, upright; 0 for a slope. exact: for walls the nearest direction alone, without
+/// both neighbours.
+std::uint32_t of(const Eigen::Vector3f& normal, bool exact);
+/// The same surfaces seen from either side.
+std::uint32_t both_sides(std::uint32_t facing);
+}  // namespace facing
+
+/// A map seen along its most frequent normal, which is the vertical nearly everywhere: its walls by
+/// the direction that they face, in cells of two voxels and of four, and what is in the column of
+/// each cell.
+struct FloorPlan {
+  /// Cells of the search, in voxels.
+  static constexpr float kCell = 2;
+  /// Coarse planes: one per direction, and one per direction up to the sign.
+  static constexpr int kPlanes = facing::kDirections * 3 / 2;
+
+  Eigen::Matrix3f turn = Eigen::Matrix3f::Identity();  ///< of the map's rows
+  bool has_sides = false;    ///< false: every surface faces both sides
+  bool has_ceiling = false;  ///< some surfaces face the opposite of the axis
+  float cell = 0;            ///< metres
+  Eigen::Vector3f corner{0, 0, 0};
+  int width = 0, height = 0;         ///< cells, even; 0: the map is too wide or has no normals
+  std::vector<std::uint16_t> walls;  ///< per cell: the directions that walls in it face
+  /// Per plane and coarse cell: whether it has such a wall.
+  std::vector<std::uint8_t> coarse;
+  /// The entries of each cell: height over `corner` in cells << 18 | what faces.
+  std::vector<std::uint32_t> column_begin, columns;
+
+  explicit FloorPlan(const MapState& map);
+
+  int coarse_width() const { return width / 2; }
+  int coarse_height() const { return height / 2; }
+  const std::uint8_t* plane(int number) const {
+    return coarse.data() +
+           static_cast<std::size_t>(number) * static_cast<std::size_t>(coarse_width()) *
+               static_cast<std::size_t>(coarse_height());
+  }
+};
+
+}  // namespace gpureg::localization

@@ -1,0 +1,394 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "localization/plan_search.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <set>
+
+#include "common/for_each_on.hpp"
+#include "math/atan2.hpp"
+#include "math/trigonometry.hpp"
+
+namespace gpureg::localization {
+namespace {
+
+/// Directions of a scan that are tried as the vertical.
+constexpr std::size_t kAxes = 3;
+/// Walls farther from the middle of the scan, in voxels, do not decide: a step of the heading moves
+/// them too far.
+constexpr float kReach = 100;
+/// Walls of a scan in coarse cells (a score is a byte), in cells, and points for the height.
+constexpr std::size_t kCoarseWalls = 255, kWalls = 512, kPoints = 512;
+/// Places of a heading, and of an axis, that go on from coarse cells.
+constexpr std::size_t kOfHeading = 64, kOfAxis = 128;
+/// Cells scored at once: they stay in the cache.
+constexpr int kCellsAtOnce = 1 << 14;
+/// Half the width of the search around a coarse place, in cells and in steps of the heading.
+constexpr int kAround = 3, kTurnsAround = 2;
+/// Heights of one place that go on, at least so many cells apart, with this share of the best.
+constexpr std::size_t kHeights = 3;
+constexpr int kHeightsApart = 5;
+constexpr double kShareOfHeight = 0.7;
+
+struct Wall {
+  float x, y;
+  std::uint32_t facing;
+  float direction;  ///< of facing::kDirections
+};
+
+/// A scan with one of its directions upright, relative to its middle.
+struct Upright {
+  Eigen::Matrix3f turn = Eigen::Matrix3f::Identity();
+  std::vector<Wall> walls, coarse_walls;
+  struct Point {
+    Eigen::Vector3f at, normal;
+  };
+  std::vector<Point> points;
+  int headings = 0;  ///< steps of a coarse turn
+};
+
+/// A place of the middle of the scan, in cells, and a heading in steps.
+struct Place {
+  int score = 0, x = 0, y = 0, heading = 0;
+};
+
+template <typename T>
+std::vector<T> some_of(const std::vector<T>& all, std::size_t most) {
+  if (all.size() <= most) return all;
+  std::vector<T> out;
+  for (std::size_t k = 0; k < most; ++k) out.push_back(all[k * all.size() / most]);
+  return out;
+}
+
+/// One wall per cell and direction.
+std::vector<Wall> walls_in_cells(const std::vector<Wall>& walls, float cell, std::size_t most) {
+  std::set<std::array<int, 3>> seen;
+  std::vector<Wall> out;
+  for (const Wall& wall : walls)
+    if (seen.insert({static_cast<int>(std::floor(wall.x / cell)),
+                     static_cast<int>(std::floor(wall.y / cell)),
+                     static_cast<int>(std::lround(wall.direction))})
+            .second)
+      out.push_back(wall);
+  return some_of(out, most);
+}
+
+struct ScanPoints {
+  std::vector<Eigen::Vector3f> points, normals;  ///< relative to the middle
+  bool has_sides = false;
+};
+
+Upright stand(const ScanPoints& scan, const Eigen::Vector3f& up, float cell) {
+  Upright out;
+  out.turn = upright(up);
+  const float reach = kReach / FloorPlan::kCell * cell;
+  constexpr float kPerRadian = facing::kDirections / (2 * kPi);
+  std::vector<Wall> walls;
+  std::vector<Upright::Point> points;
+  std::set<std::array<int, 4>> seen;
+  float farthest = 0;
+  for (std::size_t k = 0; k < scan.points.size(); ++k) {
+    const Eigen::Vector3f normal = out.turn * scan.normals[k];
+    const std::uint32_t faces = facing::of(normal, true);
+    const Eigen::Vector3f at = out.turn * scan.points[k];
+    const float distance = at.head<2>().norm();
+    if (faces == 0 || distance > reach) continue;
+    const Eigen::Vector3i in = (at / cell).array().floor().cast<int>();
+    if (seen.insert({in[0], in[1], in[2], static_cast<int>(faces)}).second)
+      points.push_back({at, normal});
+    if ((faces & facing::kWalls) == 0) continue;
+    farthest = std::max(farthest, distance);
+    walls.push_back({at[0], at[1], faces, exact_atan2(normal[1], normal[0]) * kPerRadian});
+  }
+  out.walls = walls_in_cells(walls, cell, kWalls);
+  out.coarse_walls = walls_in_cells(walls, 2 * cell, kCoarseWalls);
+  out.points = some_of(points, kPoints);
+  // A step moves the farthest wall by 1.4 coarse cells.
+  out.headings =
+      std::max(16, static_cast<int>(std::ceil(2 * kPi * 0.7f * farthest / (2 * cell))));
+  return out;
+}
+
+struct Heading {
+  float cos, sin, turn;  ///< turn: in facing::kDirections
+};
+
+Heading heading_of(int step, int steps) {
+  const double angle = 2 * portable::kPi * step / steps;
+  return {static_cast<float>(portable::cos(angle)), static_cast<float>(portable::sin(angle)),
+          static_cast<float>(step) * facing::kDirections / static_cast<float>(steps)};
+}
+
+struct Turned {
+  int dx, dy, direction;
+};
+
+Turned turned(const Wall& wall, const Heading& heading, float cell) {
+  constexpr int kAll = facing::kDirections;
+  const int direction = static_cast<int>(std::lround(wall.direction + heading.turn));
+  return {static_cast<int>(std::lround((heading.cos * wall.x - heading.sin * wall.y) / cell)),
+          static_cast<int>(std::lround((heading.sin * wall.x + heading.cos * wall.y) / cell)),
+          (direction % kAll + kAll) % kAll};
+}
+
+/// Cells in which the middle of the scan may be: [low, high).
+struct Region {
+  Eigen::Vector2i low, high;
+};
+
+Region region_of(const MapState& map, const FloorPlan& plan, const Scan& scan) {
+  Region region{{0, 0}, {plan.width, plan.height}};
+  if (!scan.prior.position) return region;
+  const Eigen::Vector3f place =
+      plan.turn * (scan.prior.position->position - map.origin).cast<float>();
+  const auto radius = static_cast<float>(scan.prior.position->radius + scan.middle.norm());
+  for (int axis = 0; axis < 2; ++axis) {
+    const int most = region.high[axis];
+    const auto cell = [&](float at) {
+      return static_cast<int>(std::clamp((at - plan.corner[axis]) / plan.cell, 0.0f,
+                                         static_cast<float>(most)));
+    };
+    region.low[axis] = cell(place[axis] - radius);
+    region.high[axis] = std::min(most, cell(place[axis] + radius) + 1);
+  }
+  return region;
+}
+
+/// The best coarse cells of one heading.
+std::vector<Place> score_heading(const FloorPlan& plan, const Upright& scan, bool has_sides,
+                                 const Region& region, int heading) {
+  const int width = plan.coarse_width(), height = plan.coarse_height();
+  const int left = region.low[0] / 2, right = (region.high[0] + 1) / 2;
+  const int top = region.low[1] / 2, bottom = (region.high[1] + 1) / 2;
+  const Heading turn = heading_of(heading, scan.headings);
+  struct Shifted {
+    const std::uint8_t* plane;
+    int dx, dy;
+  };
+  std::vector<Shifted> walls;
+  for (const Wall& wall : scan.coarse_walls) {
+    const Turned at = turned(wall, turn, 2 * plan.cell);
+    const int plane = has_sides
+                          ? at.direction
+                          : facing::kDirections + at.direction % (facing::kDirections / 2);
+    walls.push_back({plan.plane(plane), at.dx, at.dy});
+  }
+  std::vector<Place> best;
+  const int columns = right - left, rows_at_once = std::max(1, kCellsAtOnce / std::max(1, columns));
+  std::vector<std::uint8_t> scores;
+  std::array<std::size_t, 256> counts{};
+  std::vector<std::uint8_t> all(static_cast<std::size_t>(columns) *
+                                static_cast<std::size_t>(bottom - top));
+  for (int row = top; row < bottom; row += rows_at_once) {
+    const int end = std::min(bottom, row + rows_at_once);
+    std::uint8_t* block =
+        all.data() + static_cast<std::size_t>(row - top) * static_cast<std::size_t>(columns);
+    for (const Shifted& wall : walls) {
+      const int first = std::max(left, -wall.dx), last = std::min(right, width - wall.dx);
+      for (int y = std::max(row, -wall.dy); y < std::min(end, height - wall.dy); ++y) {
+        std::uint8_t* to = block + static_cast<std::ptrdiff_t>(y - row) * columns - left;
+        const std::uint8_t* from =
+            wall.plane + static_cast<std::ptrdiff_t>(y + wall.dy) * width + wall.dx;
+        for (int x = first; x < last; ++x) to[x] = static_cast<std::uint8_t>(to[x] + from[x]);
+      }
+    }
+  }
+  for (const std::uint8_t score : all) ++counts[score];
+  int least = 255;
+  for (std::size_t above = counts[255]; least > 1 && above < kOfHeading;)
+    above += counts[static_cast<std::size_t>(--least)];
+  for (std::size_t k = 0; k < all.size(); ++k)
+    if (all[k] >= least)
+      best.push_back({all[k], static_cast<int>(k % static_cast<std::size_t>(columns)) + left,
+                      static_cast<int>(k / static_cast<std::size_t>(columns)) + top, heading});
+  std::stable_sort(best.begin(), best.end(),
+                   [](const Place& a, const Place& b) { return a.score > b.score; });
+  best.resize(std::min(best.size(), kOfHeading));
+  return best;
+}
+
+/// The best places that are not neighbours.
+std::vector<Place> apart(std::vector<Place> places, int headings, std::size_t most) {
+  std::stable_sort(places.begin(), places.end(),
+                   [](const Place& a, const Place& b) { return a.score > b.score; });
+  std::vector<Place> out;
+  for (const Place& place : places) {
+    if (out.size() == most) break;
+    const auto is_near = [&](const Place& kept) {
+      const int turn = std::abs(place.heading - kept.heading);
+      return std::abs(place.x - kept.x) <= 1 && std::abs(place.y - kept.y) <= 1 &&
+             std::min(turn, headings - turn) <= 1;
+    };
+    if (std::none_of(out.begin(), out.end(), is_near)) out.push_back(place);
+  }
+  return out;
+}
+
+/// The best cell and heading, in half the step, around a coarse place.
+Place refine(const FloorPlan& plan, const Upright& scan, bool has_sides, const Place& coarse) {
+  constexpr int kEdge = 2 * kAround + 1;
+  Place best;
+  best.score = -1;
+  for (int turn = -kTurnsAround; turn <= kTurnsAround; ++turn) {
+    const int heading = 2 * coarse.heading + turn;
+    const Heading at = heading_of(heading, 2 * scan.headings);
+    std::array<int, kEdge * kEdge> scores{};
+    for (const Wall& wall : scan.walls) {
+      const Turned cell = turned(wall, at, plan.cell);
+      std::uint32_t bits = 1u << cell.direction;
+      if (!has_sides) bits = facing::both_sides(bits);
+      const int x = 2 * coarse.x + cell.dx - kAround, y = 2 * coarse.y + cell.dy - kAround;
+      for (int v = 0; v < kEdge; ++v) {
+        if (y + v < 0 || y + v >= plan.height) continue;
+        const std::uint16_t* row =
+            plan.walls.data() + static_cast<std::ptrdiff_t>(y + v) * plan.width;
+        for (int u = 0; u < kEdge; ++u)
+          if (x + u >= 0 && x + u < plan.width)
+            scores[static_cast<std::size_t>(v * kEdge + u)] += (row[x + u] & bits) != 0;
+      }
+    }
+    for (int v = 0; v < kEdge; ++v)
+      for (int u = 0; u < kEdge; ++u) {
+        const int score = scores[static_cast<std::size_t>(v * kEdge + u)];
+        if (score > best.score)
+          best = {score, 2 * coarse.x + u - kAround, 2 * coarse.y + v - kAround, heading};
+      }
+  }
+  return best;
+}
+
+struct Height {
+  int votes = 0;
+  float at = 0;  ///< cells over the corner of the plan
+};
+
+/// Heights of the middle of the scan at which most points have a surface of the map that faces as
+/// they do.
+std::vector<Height> heights_of(const FloorPlan& plan, const Upright& scan, bool has_sides,
+                               const Place& place) {
+  const Heading heading = heading_of(place.heading, 2 * scan.headings);
+  std::vector<int> shifts;
+  Eigen::Matrix3f turn = Eigen::Matrix3f::Identity();
+  turn.topLeftCorner<2, 2>() << heading.cos, -heading.sin, heading.sin, heading.cos;
+  for (const Upright::Point& point : scan.points) {
+    const Eigen::Vector3f at = turn * point.at / plan.cell;
+    const int x = place.x + static_cast<int>(std::lround(at[0])),
+              y = place.y + static_cast<int>(std::lround(at[1]));
+    if (x < 0 || y < 0 || x >= plan.width || y >= plan.height) continue;
+    std::uint32_t faces = facing::of(turn * point.normal, true);
+    if (!has_sides) faces = facing::both_sides(faces);
+    const std::size_t cell =
+        static_cast<std::size_t>(y) * static_cast<std::size_t>(plan.width) +
+        static_cast<std::size_t>(x);
+    int last = std::numeric_limits<int>::min();
+    for (std::uint32_t k = plan.column_begin[cell]; k < plan.column_begin[cell + 1]; ++k) {
+      if ((plan.columns[k] & faces) == 0) continue;
+      const int shift = static_cast<int>(plan.columns[k] >> 18) - static_cast<int>(std::floor(at[2]));
+      // One point votes once for a height and the one below it.
+      for (const int vote : {shift - 1, shift})
+        if (vote > last) shifts.push_back(last = vote);
+    }
+  }
+  std::vector<Height> out;
+  if (shifts.empty()) return out;
+  const auto [low, high] = std::minmax_element(shifts.begin(), shifts.end());
+  std::vector<int> votes(static_cast<std::size_t>(*high - *low) + 1, 0);
+  const int lowest = *low;
+  for (const int shift : shifts) ++votes[static_cast<std::size_t>(shift - lowest)];
+  while (out.size() < kHeights) {
+    const auto best = std::max_element(votes.begin(), votes.end());
+    if (*best == 0 || (!out.empty() && *best < kShareOfHeight * out.front().votes)) break;
+    const int shift = static_cast<int>(best - votes.begin());
+    out.push_back({*best, static_cast<float>(lowest + shift) + 1});
+    for (int k = std::max(0, shift - kHeightsApart);
+         k <= std::min(shift + kHeightsApart, static_cast<int>(votes.size()) - 1); ++k)
+      votes[static_cast<std::size_t>(k)] = 0;
+  }
+  return out;
+}
+
+UnalignedIsometry3d pose_of(const MapState& map, const FloorPlan& plan, const Upright& up,
+                            const Scan& scan, const Place& place, float height) {
+  const double angle = portable::kPi * place.heading / up.headings;
+  Eigen::Matrix3d heading = Eigen::Matrix3d::Identity();
+  heading.topLeftCorner<2, 2>() << portable::cos(angle), -portable::sin(angle),
+      portable::sin(angle), portable::cos(angle);
+  const Eigen::Vector3d cell(place.x + 0.5, place.y + 0.5, static_cast<double>(height));
+  const Eigen::Vector3d middle =
+      plan.corner.cast<double>() + cell * static_cast<double>(plan.cell);
+  const Eigen::Matrix3d back = plan.turn.cast<double>().transpose();
+  UnalignedIsometry3d pose = UnalignedIsometry3d::Identity();
+  pose.linear() = back * heading * up.turn.cast<double>();
+  pose.translation() = back * middle + map.origin - pose.linear() * scan.middle;
+  return pose;
+}
+
+}  // namespace
+
+std::vector<Candidate> search_plan(const MapState& map, const FloorPlan& plan, const Scan& scan,
+                                   std::size_t most, unsigned threads) {
+  if (plan.width == 0 || scan.points.empty()) return {};
+  ScanPoints centred;
+  for (const Eigen::Vector3d& point : scan.points)
+    centred.points.push_back((point - scan.middle).cast<float>());
+  centred.normals = scan.cloud.normals();
+  const bool scan_has_sides = scan.cloud.statistics().viewpoint != ViewpointSource::none;
+  const bool has_sides = scan_has_sides && plan.has_sides;
+  const Region region = region_of(map, plan, scan);
+  if ((region.high - region.low).minCoeff() <= 0) return {};
+
+  std::vector<Upright> uprights;
+  for (const Axis& axis : frequent_axes(centred.normals, kAxes)) {
+    uprights.push_back(stand(centred, axis.direction, plan.cell));
+    if (plan.has_ceiling || !has_sides)
+      uprights.push_back(stand(centred, -axis.direction, plan.cell));
+  }
+  struct Task {
+    std::size_t upright;
+    int heading;
+  };
+  std::vector<Task> tasks;
+  for (std::size_t u = 0; u < uprights.size(); ++u)
+    for (int heading = 0; heading < uprights[u].headings; ++heading) tasks.push_back({u, heading});
+  std::vector<std::vector<Place>> found(tasks.size());
+  const auto nothing = [] { return 0; };
+  for_each_on(threads, tasks.size(), nothing, [&](std::size_t k, int) {
+    found[k] =
+        score_heading(plan, uprights[tasks[k].upright], has_sides, region, tasks[k].heading);
+  });
+  std::vector<std::vector<Place>> coarse(uprights.size());
+  for (std::size_t k = 0; k < tasks.size(); ++k)
+    coarse[tasks[k].upright].insert(coarse[tasks[k].upright].end(), found[k].begin(),
+                                    found[k].end());
+  struct Fine {
+    std::size_t upright;
+    Place place;
+    std::vector<Height> heights;
+  };
+  std::vector<Fine> fine;
+  for (std::size_t u = 0; u < uprights.size(); ++u)
+    for (const Place& place : apart(std::move(coarse[u]), uprights[u].headings, kOfAxis))
+      fine.push_back({u, place, {}});
+  for_each_on(threads, fine.size(), nothing, [&](std::size_t k, int) {
+    const Upright& up = uprights[fine[k].upright];
+    fine[k].place = refine(plan, up, has_sides, fine[k].place);
+    fine[k].heights = heights_of(plan, up, has_sides, fine[k].place);
+  });
+  std::vector<Candidate> out;
+  for (std::size_t k = 0; k < fine.size(); ++k)
+    for (const Height& height : fine[k].heights) {
+      const Upright& up = uprights[fine[k].upright];
+      Candidate candidate;
+      candidate.map_from_scan = pose_of(map, plan, up, scan, fine[k].place, height.at);
+      candidate.confidence = static_cast<double>(height.votes) /
+                             static_cast<double>(std::max<std::size_t>(1, up.points.size()));
+      candidate.mode = out.size();
+      if (!contradicts(scan, candidate.map_from_scan)) out.push_back(candidate);
+    }
+  EvidenceOptions near;  // of two places
+  near.mode_distance = 2 * plan.cell;
+  return distinct(std::move(out), scan.middle, near, most);
+}
+
+}  // namespace gpureg::localization
