@@ -5,11 +5,12 @@
 
 namespace gpureg::localization {
 
-/// A pose that a tile proposes for a scan.
+/// A pose that a tile, or the plan of the map, proposes for a scan.
 struct Candidate {
   UnalignedIsometry3d map_from_scan = no_pose();
   double confidence = 0;
   std::size_t tile = 0, mode = 0;
+  double agreeing = 0;  ///< of a place of the plan: share of the scan's points that agree with it
 };
 
 /// Of two poses that move the middle of the scan to one place with one attitude, one is enough.

@@ -9,6 +9,11 @@
 namespace gpureg::localization {
 namespace {
 
+/// Confidence of a place of the plan that stands out, and share of a scan's points that agree with
+/// it, from which on it is verified before the tiles are searched; and least confidence of the
+/// verification from which on it takes part afterwards.
+constexpr double kStandsOut = 0.35, kAgreeing = 0.7, kPossible = 0.05;
+
 double best_searched(const Scan& scan) {
   return scan.candidates.empty() ? 0 : scan.candidates.front().confidence;
 }
@@ -28,6 +33,24 @@ LocateStatus status_of(const LocateResult& result, double min_confidence) {
 
 bool is_sure(const LocateResult& result) {
   return !result.poses.empty() && result.poses.front().confidence >= kSure;
+}
+
+/// Whether the best place of the plan stands out, or most of the scan agrees with it.
+bool is_promising(const Scan& scan) {
+  return !scan.candidates.empty() && (scan.candidates.front().confidence >= kStandsOut ||
+                                      scan.candidates.front().agreeing >= kAgreeing);
+}
+
+/// Leaves the places of the plan that stand out or that the verification finds possible.
+void keep_possible(const std::vector<Verified>& places, Scan& scan) {
+  scan.planned.clear();
+  for (const Verified& v : places) {
+    scan.planned.push_back(v.candidate);
+    double& confidence = scan.planned.back().confidence;
+    if (confidence >= kStandsOut) continue;
+    confidence = v.confidence;
+    if (confidence < kPossible) scan.planned.pop_back();
+  }
 }
 
 LocateResult result_of(const std::vector<Verified>& verified, const Scan& scan,
@@ -91,50 +114,64 @@ std::vector<LocateResult> locate(const Context& context, const std::vector<Point
   }
   const std::vector<PreparedCloud> prepared =
       prepare_batch(context, scans, state.options.prepare, names);
-  const bool coarse_first = options.coarse_factor > 1;
-  const auto thinned = [&](double factor) {
-    return prepare_batch(context, scans, prepare_for(state, factor), names);
-  };
-  const std::vector<PreparedCloud> coarse =
-      coarse_first ? thinned(options.coarse_factor) : prepared;
-  const double factor = coarsest_factor(state, options);
-  const std::vector<PreparedCloud> coarsest =
-      factor > 0 ? thinned(factor) : std::vector<PreparedCloud>(scans.size());
-  std::vector<LocateResult> out(scans.size());
-  std::vector<Scan> open;
-  std::vector<std::vector<Verified>> verified;
-  std::vector<std::size_t> number;
+  std::vector<LocateResult> out;
+  std::vector<std::size_t> open;  // scans that the plan does not place surely
+  std::vector<Scan> searched;
   for (std::size_t k = 0; k < scans.size(); ++k) {
-    Scan scan =
-        scan_of(prepared[k], coarse[k], coarsest[k], priors.empty() ? LocatePrior{} : priors[k]);
-    scan.candidates = search_plan(state, state.plan(), scan, options.candidates, context.threads());
-    refine_places(context, state, options, scan);
-    std::vector<Verified> places = verify_places(context, state, options, scan);
-    out[k] = result_of(places, scan, options);
+    Scan scan = scan_of(prepared[k], priors.empty() ? LocatePrior{} : priors[k]);
+    scan.planned =
+        search_plan(state, state.plan(), scan, options.candidates, context.threads());
+    scan.candidates = scan.planned;
+    keep_likely(options, scan);
+    std::vector<Verified> places;
+    if (is_promising(scan)) {
+      places = verify_places(context, state, options, scan);
+      keep_possible(places, scan);
+    }
+    out.push_back(result_of(places, scan, options));
     if (is_sure(out[k])) continue;
-    scan.planned = scan.candidates;
-    open.push_back(std::move(scan));
-    verified.push_back(std::move(places));
-    number.push_back(k);
+    open.push_back(k);
+    searched.push_back(std::move(scan));
   }
-  search_all_tiles(context, state, options, open);
+  if (open.empty()) return out;
+  const bool coarse_first = options.coarse_factor > 1;
+  const double coarsest = coarsest_factor(state, options);
+  const auto thinned = [&](double factor) {
+    std::vector<PointCloudView> views;
+    std::vector<std::string> of_views;
+    for (const std::size_t k : open) {
+      views.push_back(scans[k]);
+      if (!names.empty()) of_views.push_back(names[k]);
+    }
+    return prepare_batch(context, views, prepare_for(state, factor), of_views);
+  };
+  const auto set = [&](PreparedCloud Scan::* cloud, std::vector<PreparedCloud> clouds) {
+    for (std::size_t k = 0; k < open.size(); ++k) searched[k].*cloud = std::move(clouds[k]);
+  };
+  if (coarse_first)
+    set(&Scan::coarse, thinned(options.coarse_factor));
+  else
+    for (Scan& scan : searched) scan.coarse = scan.cloud;
+  if (coarsest > 0) set(&Scan::coarsest, thinned(coarsest));
+  search_all_tiles(context, state, options, searched);
+  std::vector<std::vector<Verified>> verified;
   std::vector<std::size_t> unsure;
   for (std::size_t k = 0; k < open.size(); ++k) {
-    const double searched = best_searched(open[k]);
+    Scan& scan = searched[k];
+    const double best = best_searched(scan);
     const bool hopeless =
-        coarse_first && searched < kHopelessSearch && open[k].coarse.size() >= kTellingPoints;
-    if (hopeless && !open[k].candidates.empty()) open[k].candidates.resize(1);
-    verified[k] = verify_places(context, state, options, open[k], verified[k]);
-    LocateResult& result = out[number[k]];
-    result = result_of(verified[k], open[k], options);
-    if (coarse_first && !hopeless && !is_sure(result) && searched < kSureSearch)
-      unsure.push_back(k);
+        coarse_first && best < kHopelessSearch && scan.coarse.size() >= kTellingPoints;
+    if (hopeless && !scan.candidates.empty()) scan.candidates.resize(1);
+    verified.push_back(verify_places(context, state, options, scan));
+    LocateResult& result = out[open[k]];
+    result = result_of(verified[k], scan, options);
+    if (coarse_first && !hopeless && !is_sure(result) && best < kSureSearch) unsure.push_back(k);
   }
   if (unsure.empty()) return out;
-  search_best_tiles(context, state, options, unsure, open);
+  search_best_tiles(context, state, options, unsure, searched);
   for (const std::size_t k : unsure)
-    out[number[k]] = result_of(
-        verify_places(context, state, options, open[k], verified[k]), open[k], options);
+    out[open[k]] = result_of(
+        verify_places(context, state, options, searched[k], verified[k]), searched[k], options);
   return out;
 }
 

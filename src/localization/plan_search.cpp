@@ -8,6 +8,7 @@
 
 #include "common/for_each_on.hpp"
 #include "math/atan2.hpp"
+#include "math/exponential.hpp"
 #include "math/trigonometry.hpp"
 
 namespace gpureg::localization {
@@ -30,6 +31,10 @@ constexpr int kAround = 3, kTurnsAround = 2;
 constexpr std::size_t kHeights = 3;
 constexpr int kHeightsApart = 5;
 constexpr double kShareOfHeight = 0.7;
+
+/// Votes of the next place over those of the best at which it is right as likely as not, and log
+/// odds for each unit less (of .5 to .85 where scans are right, .85 to 1 where they are foreign).
+constexpr double kUsualRival = 0.88, kLogOddsOfRival = 30;
 
 struct Wall {
   float x, y;
@@ -324,6 +329,19 @@ UnalignedIsometry3d pose_of(const MapState& map, const FloorPlan& plan, const Up
   return pose;
 }
 
+/// Turns votes, the most first, into confidences: of all places of a map, the right one has many
+/// more votes than any other, and what others have in a map without the right one is about equal.
+void rate(std::vector<Candidate>& places) {
+  if (places.empty()) return;
+  const double first = places.front().confidence;
+  const double second = places.size() > 1 ? places[1].confidence : 0;
+  for (std::size_t k = 0; k < places.size(); ++k) {
+    const double rival = (k == 0 ? second : first) / places[k].confidence;
+    const double odds = portable::exp(kLogOddsOfRival * (kUsualRival - rival));
+    places[k].confidence = odds / (1 + odds);
+  }
+}
+
 }  // namespace
 
 std::vector<Candidate> search_plan(const MapState& map, const FloorPlan& plan, const Scan& scan,
@@ -383,12 +401,16 @@ std::vector<Candidate> search_plan(const MapState& map, const FloorPlan& plan, c
       candidate.map_from_scan = pose_of(map, plan, up, scan, fine[k].place, height.at);
       candidate.confidence = static_cast<double>(height.votes) /
                              static_cast<double>(std::max<std::size_t>(1, up.points.size()));
+      candidate.agreeing = candidate.confidence;
       candidate.mode = out.size();
       if (!contradicts(scan, candidate.map_from_scan)) out.push_back(candidate);
     }
   EvidenceOptions near;  // of two places
   near.mode_distance = 2 * plan.cell;
-  return distinct(std::move(out), scan.middle, near, most);
+  out = distinct(std::move(out), scan.middle, near, most + 1);
+  rate(out);
+  out.resize(std::min(out.size(), most));
+  return out;
 }
 
 }  // namespace gpureg::localization

@@ -10,7 +10,7 @@ namespace gpureg::localization {
 /// "Real-time correlative scan matching", ICRA 2009) of walls, which agree in the direction that
 /// they face, for each direction of the scan that may be the map's vertical. All cells and
 /// headings are tried, coarse cells first. Heights follow from the columns of the best cells.
-/// @return the best first, with the share of the scan's points that agree as `confidence`.
+/// @return the most confident first.
 std::vector<Candidate> search_plan(const MapState& map, const FloorPlan& plan, const Scan& scan,
                                    std::size_t most, unsigned threads);
 

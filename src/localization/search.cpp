@@ -161,8 +161,7 @@ void search_coarser(const Context& context, const MapState& map, const LocateOpt
 
 }  // namespace
 
-Scan scan_of(PreparedCloud cloud, PreparedCloud coarse, PreparedCloud coarsest,
-             const LocatePrior& prior) {
+Scan scan_of(PreparedCloud cloud, const LocatePrior& prior) {
   Scan scan;
   for (const Eigen::Vector3f& point : cloud.points()) {
     scan.points.push_back(point.cast<double>() + cloud.origin());
@@ -171,8 +170,6 @@ Scan scan_of(PreparedCloud cloud, PreparedCloud coarse, PreparedCloud coarsest,
   }
   if (!scan.points.empty()) scan.middle /= static_cast<double>(scan.points.size());
   scan.cloud = std::move(cloud);
-  scan.coarse = std::move(coarse);
-  scan.coarsest = std::move(coarsest);
   scan.prior = prior;
   return scan;
 }

@@ -7,8 +7,8 @@ namespace gpureg::localization {
 
 /// A scan on its way through the map.
 struct Scan {
-  PreparedCloud cloud, coarse;          ///< in voxels of the map, and of the coarse search
-  PreparedCloud coarsest;               ///< of the search before it; may be an empty handle
+  PreparedCloud cloud;                  ///< in voxels of the map
+  PreparedCloud coarse, coarsest;       ///< of the searches of tiles; may be empty handles
   std::vector<Eigen::Vector3d> points;  ///< of `cloud`, in the scan's frame
   Eigen::Vector3d middle{0, 0, 0};
   double reach = 0;  ///< largest distance of a point from the origin of the frame
@@ -22,8 +22,7 @@ struct Scan {
 /// So many points show enough of a place to tell that it is not there.
 constexpr std::size_t kTellingPoints = 1000;
 
-Scan scan_of(PreparedCloud cloud, PreparedCloud coarse, PreparedCloud coarsest,
-             const LocatePrior& prior);
+Scan scan_of(PreparedCloud cloud, const LocatePrior& prior);
 
 bool contradicts(const Scan& scan, const UnalignedIsometry3d& map_from_scan);
 

@@ -43,53 +43,38 @@ double confidence_of(double searched, const PoseVerification& fine, const PoseVe
   return odds / (1 + odds);
 }
 
-/// Poses of a scan, one in each piece of the map, in voxels of the coarse search.
-std::vector<PoseVerification> verify_coarsely(const Context& context, const MapState& map,
-                                              const LocateOptions& options, const Scan& scan,
-                                              const std::vector<PointCloudView>& around,
-                                              const std::vector<UnalignedIsometry3d>& of_scan) {
-  std::vector<PoseVerification> out;
-  if (around.empty()) return out;
-  std::vector<Pair> pairs;
-  std::vector<std::vector<UnalignedIsometry3d>> poses;
-  for (const UnalignedIsometry3d& pose : of_scan) {
-    pairs.push_back({0, static_cast<std::uint32_t>(pairs.size() + 1)});
-    poses.push_back({pose});
-  }
-  std::vector<PreparedCloud> clouds{scan.coarse};
-  for (PreparedCloud& cloud :
-       prepare_batch(context, around, prepare_for(map, options.coarse_factor)))
-    clouds.push_back(std::move(cloud));
-  RegistrationOptions registration = options.registration;
-  fields::multiply_lengths(registration, options.coarse_factor);
-  VerificationOptions verification;
-  verification.refine = true;
-  for (const auto& result :
-       verify_poses_batch(context, clouds, pairs, poses, registration, verification))
-    out.push_back(result.front());
-  return out;
-}
-
 /// Sparse scans overlap little in narrow voxels: what is not sure there and possible in the wide
 /// ones of the search is verified in these, too. @return confidences of 0 where it is not.
-std::vector<PoseVerification> verify_again(const Context& context, const MapState& map,
-                                           const LocateOptions& options, const Scan& scan,
-                                           const std::vector<const Verified*>& fine,
-                                           const std::vector<PointCloud>& around) {
+std::vector<PoseVerification> verify_coarsely(const Context& context, const MapState& map,
+                                              const LocateOptions& options, const Scan& scan,
+                                              const std::vector<const Verified*>& fine,
+                                              const std::vector<PointCloud>& around) {
   std::vector<PoseVerification> out(fine.size());
-  if (options.coarse_factor == 1) return out;
+  if (options.coarse_factor == 1 || !scan.coarse.valid()) return out;
   std::vector<std::size_t> asked;
   std::vector<PointCloudView> neighborhoods;
-  std::vector<UnalignedIsometry3d> poses;
+  std::vector<Pair> pairs;
+  std::vector<std::vector<UnalignedIsometry3d>> poses;
   for (std::size_t k = 0; k < fine.size(); ++k) {
     const PoseVerification& found = fine[k]->verification;
     if (found.confidence >= kSure || fine[k]->candidate.confidence < kHopelessSearch) continue;
     asked.push_back(k);
     neighborhoods.push_back(around[k].view());
-    poses.push_back(found.target_from_source);
+    pairs.push_back({0, static_cast<std::uint32_t>(asked.size())});
+    poses.push_back({found.target_from_source});
   }
-  const auto results = verify_coarsely(context, map, options, scan, neighborhoods, poses);
-  for (std::size_t k = 0; k < asked.size(); ++k) out[asked[k]] = results[k];
+  if (asked.empty()) return out;
+  std::vector<PreparedCloud> clouds{scan.coarse};
+  for (PreparedCloud& cloud :
+       prepare_batch(context, neighborhoods, prepare_for(map, options.coarse_factor)))
+    clouds.push_back(std::move(cloud));
+  RegistrationOptions registration = options.registration;
+  fields::multiply_lengths(registration, options.coarse_factor);
+  VerificationOptions verification;
+  verification.refine = true;
+  const auto results =
+      verify_poses_batch(context, clouds, pairs, poses, registration, verification);
+  for (std::size_t k = 0; k < asked.size(); ++k) out[asked[k]] = results[k].front();
   return out;
 }
 
@@ -129,7 +114,7 @@ std::vector<Verified> verify_places(const Context& context, const MapState& map,
     v.points = clouds[k + 1].size();
     fine.push_back(&v);
   }
-  const auto coarse = verify_again(context, map, options, scan, fine, around);
+  const auto coarse = verify_coarsely(context, map, options, scan, fine, around);
   for (std::size_t k = 0; k < results.size(); ++k) {
     Verified& v = out[open[k]];
     v.confidence = confidence_of(v.candidate.confidence, v.verification, coarse[k]);
@@ -138,23 +123,6 @@ std::vector<Verified> verify_places(const Context& context, const MapState& map,
     return a.confidence > b.confidence;
   });
   return out;
-}
-
-void refine_places(const Context& context, const MapState& map, const LocateOptions& options,
-                   Scan& scan) {
-  std::vector<PointCloud> around;
-  std::vector<UnalignedIsometry3d> poses;
-  for (const Candidate& candidate : scan.candidates) {
-    around.push_back(neighborhood(map, scan.points, candidate.map_from_scan, options.neighborhood));
-    poses.push_back(candidate.map_from_scan);
-  }
-  const auto results =
-      verify_coarsely(context, map, options, scan, views_of(around), poses);
-  for (std::size_t k = 0; k < results.size(); ++k) {
-    scan.candidates[k].map_from_scan = results[k].target_from_source;
-    scan.candidates[k].confidence = results[k].confidence;
-  }
-  keep_likely(options, scan);
 }
 
 }  // namespace gpureg::localization

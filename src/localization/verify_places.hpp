@@ -20,11 +20,6 @@ struct Verified {
   double confidence = 0;   ///< other places aside
 };
 
-/// Refines the candidates of a scan in voxels of the coarse search, sets their confidences, and
-/// keeps the likely ones.
-void refine_places(const Context& context, const MapState& map, const LocateOptions& options,
-                   Scan& scan);
-
 /// Verifies the candidates of a scan against all of the map around them; the most confident first.
 /// @param before candidates of the scan that were verified already.
 std::vector<Verified> verify_places(const Context& context, const MapState& map,
