@@ -41,6 +41,11 @@ bool is_promising(const Scan& scan) {
                                       scan.candidates.front().agreeing >= kAgreeing);
 }
 
+/// Whether the best place is found and has no rival in all of the plan.
+bool is_without_rival(const LocateResult& result, const std::vector<Verified>& places) {
+  return result.status == LocateStatus::found && places.front().candidate.confidence >= kSure;
+}
+
 /// Leaves the places of the plan that stand out or that the verification finds possible.
 void keep_possible(const std::vector<Verified>& places, Scan& scan) {
   scan.planned.clear();
@@ -129,7 +134,7 @@ std::vector<LocateResult> locate(const Context& context, const std::vector<Point
       keep_possible(places, scan);
     }
     out.push_back(result_of(places, scan, options));
-    if (is_sure(out[k])) continue;
+    if (is_sure(out[k]) || is_without_rival(out[k], places)) continue;
     open.push_back(k);
     searched.push_back(std::move(scan));
   }

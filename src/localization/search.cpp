@@ -6,6 +6,7 @@
 
 #include "fields/localization.hpp"
 #include "fields/scale.hpp"
+#include "math/trigonometry.hpp"
 
 namespace gpureg::localization {
 namespace {
@@ -185,8 +186,14 @@ void keep_likely(const LocateOptions& options, Scan& scan) {
 }
 
 bool contradicts(const Scan& scan, const UnalignedIsometry3d& map_from_scan) {
-  const auto& known = scan.prior.position;
-  return known && (map_from_scan.translation() - known->position).norm() > known->radius;
+  if (const auto& known = scan.prior.position)
+    if ((map_from_scan.translation() - known->position).norm() > known->radius) return true;
+  if (const auto& gravity = scan.prior.gravity) {
+    const Eigen::Vector3d up = map_from_scan.linear() * gravity->source_up.normalized();
+    const double least = portable::cos(gravity->max_angle * portable::kRadiansPerDegree);
+    return up.dot(gravity->target_up.normalized()) < least;
+  }
+  return false;
 }
 
 PrepareOptions prepare_for(const MapState& map, double factor) {

@@ -30,9 +30,10 @@ class LargeMap : public testing::Test {
     const auto prepared = [&](const PrepareOptions& options) {
       return prepare_batch(context(), {query_.scan.view()}, options).front();
     };
-    const PreparedCloud cloud = prepared(map_.options().prepare);
-    return localization::scan_of(cloud, cloud,
-                                 prepared(localization::prepare_for(state_, coarsest)), {});
+    Scan scan = localization::scan_of(prepared(map_.options().prepare), {});
+    scan.coarse = scan.cloud;
+    scan.coarsest = prepared(localization::prepare_for(state_, coarsest));
+    return scan;
   }
   static std::size_t searched(const Scan& scan) {
     return static_cast<std::size_t>(
@@ -70,6 +71,19 @@ TEST_F(LargeMap, ScansOfFewPointsAreSearchedInAllTiles) {
 TEST_F(LargeMap, SmallMapsAndLargeNumbersNeedNoCoarserSearch) {
   options_.coarse_tiles = static_cast<std::uint32_t>(map_.tiles());
   EXPECT_EQ(localization::coarsest_factor(state_, options_), 0);
+}
+
+TEST_F(LargeMap, WhatTooCoarseVoxelsLoseIsSearchedInThoseOfTheMap) {
+  options_.coarse_factor = 8;  // 80 cm: a room has no features left
+  std::vector<Scan> scans{scan_in_voxels(6)};
+  scans[0].coarse =
+      prepare_batch(context(), {query_.scan.view()}, localization::prepare_for(state_, 8)).front();
+  localization::search_all_tiles(context(), state_, options_, scans);
+  localization::search_best_tiles(context(), state_, options_, {0}, scans);
+  ASSERT_FALSE(scans[0].candidates.empty());
+  LocatedPose pose;
+  pose.map_from_scan = scans[0].candidates.front().map_from_scan;
+  EXPECT_LT(query_.error(pose), 0.1);
 }
 
 TEST_F(LargeMap, FindsTheScanWithTheSameBitsForOtherScansAndThreads) {

@@ -1,0 +1,225 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "localization/plan_search.hpp"
+
+#include <gtest/gtest.h>
+
+#include "localization/building.hpp"
+
+namespace gpureg::test {
+namespace {
+
+using localization::Axis;
+using localization::Candidate;
+using localization::FloorPlan;
+using localization::MapState;
+using localization::Scan;
+
+const Context& context() {
+  static const Context cpu = Context::cpu(2);
+  return cpu;
+}
+
+/// A place of the plan is off by a cell, of two voxels.
+constexpr double kOfCell = 0.3;
+
+Scan scan_of(const PointCloud& cloud, const MapState& map, const LocatePrior& prior = {}) {
+  return localization::scan_of(prepare_batch(context(), {cloud.view()}, map.options.prepare)[0],
+                               prior);
+}
+
+std::vector<Candidate> places_of(const Scan& scan, const PreparedMap& map, unsigned threads = 2) {
+  const MapState& state = MapState::of(map);
+  return search_plan(state, state.plan(), scan, 8, threads);
+}
+
+double error(const Query& query, const Candidate& place) {
+  LocatedPose pose;
+  pose.map_from_scan = place.map_from_scan;
+  return query.error(pose);
+}
+
+std::vector<double> numbers_of(const std::vector<Candidate>& places) {
+  std::vector<double> out;
+  for (const Candidate& place : places) {
+    const Eigen::Matrix4d pose = place.map_from_scan.matrix();
+    out.insert(out.end(), pose.data(), pose.data() + pose.size());
+    out.push_back(place.confidence);
+    out.push_back(place.agreeing);
+  }
+  return out;
+}
+
+TEST(FrequentAxes, AreThoseOfTheNormalsUpToTheSign) {
+  std::mt19937 random(3);
+  std::normal_distribution<float> noise(0, 0.03f);
+  std::vector<Eigen::Vector3f> normals;
+  const auto add = [&](const Eigen::Vector3f& direction, int count) {
+    for (int k = 0; k < count; ++k)
+      normals.push_back((direction + Eigen::Vector3f(noise(random), noise(random), noise(random)))
+                            .normalized());
+  };
+  const Eigen::Vector3f up = Eigen::Vector3f(1, 2, 2).normalized();
+  const Eigen::Vector3f wall = Eigen::Vector3f(2, 1, -2).normalized();
+  add(up, 300);
+  add(-up, 500);
+  add(wall, 400);
+  add(up.cross(wall), 100);
+  normals.push_back(Eigen::Vector3f::Zero());  // not known
+  const std::vector<Axis> axes = localization::frequent_axes(normals, 2);
+  ASSERT_EQ(axes.size(), 2u);
+  EXPECT_GT(axes[0].direction.dot(-up), 0.999f);
+  EXPECT_GT(axes[1].direction.dot(wall), 0.999f);
+  EXPECT_GT(axes[0].facing, axes[0].opposite);
+  EXPECT_GT(axes[0].opposite, 200u);
+  EXPECT_EQ(axes[1].opposite, 0u);
+  EXPECT_TRUE(localization::frequent_axes({}, 3).empty());
+}
+
+TEST(FrequentAxes, AreTurnedUpright) {
+  std::mt19937 random(4);
+  for (int k = 0; k < 20; ++k) {
+    const Eigen::Vector3f axis =
+        random_pose(random).linear().cast<float>() * Eigen::Vector3f::UnitZ();
+    const Eigen::Matrix3f turn = localization::upright(axis);
+    EXPECT_TRUE((turn * axis).isApprox(Eigen::Vector3f::UnitZ(), 1e-5f));
+    EXPECT_NEAR(turn.determinant(), 1, 1e-5f);
+    EXPECT_TRUE((turn * turn.transpose()).isApprox(Eigen::Matrix3f::Identity(), 1e-5f));
+  }
+}
+
+TEST(FloorPlan, WallsFaceTheSensor) {
+  const PreparedMap map = building({1}, map_options());
+  const FloorPlan& plan = MapState::of(map).plan();
+  EXPECT_TRUE(plan.has_sides);
+  ASSERT_GT(plan.width, 0);
+  // Two surfaces that meet at the origin; the axis of one room may be that of either.
+  const bool is_along_y = std::abs((plan.turn * Eigen::Vector3f::UnitY())[2]) > 0.5f;
+  const Eigen::Vector3f place = is_along_y ? Eigen::Vector3f(0.05f, 1, 1) : Eigen::Vector3f(2, 0.05f, 1);
+  const Eigen::Vector3f at =
+      (plan.turn * (place - MapState::of(map).origin.cast<float>()) - plan.corner) / plan.cell;
+  const std::uint32_t bits =
+      plan.walls[static_cast<std::size_t>(at[1]) * static_cast<std::size_t>(plan.width) +
+                 static_cast<std::size_t>(at[0])];
+  const Eigen::Vector3f facing =
+      plan.turn * (is_along_y ? Eigen::Vector3f::UnitX() : Eigen::Vector3f::UnitY());
+  EXPECT_NE(bits & localization::facing::of(facing, true), 0u);
+  EXPECT_EQ(bits & localization::facing::of(-facing, true), 0u);
+}
+
+TEST(PlanSearch, FindsScansOfAnyAttitude) {
+  const PreparedMap map = building({1, 2, 3, 4, 5, 6, 7, 8, 9}, map_options());
+  const Query foreign(77, 0, 9);
+  const auto elsewhere = places_of(scan_of(foreign.scan, MapState::of(map)), map);
+  ASSERT_FALSE(elsewhere.empty());
+  EXPECT_LT(elsewhere[0].confidence, 0.3);
+  for (unsigned room = 1; room <= 9; ++room) {
+    const Query query(room, room - 1, 20 + room);
+    const std::vector<Candidate> places = places_of(scan_of(query.scan, MapState::of(map)), map);
+    ASSERT_FALSE(places.empty());
+    EXPECT_LT(error(query, places[0]), kOfCell) << room;
+    EXPECT_GT(places[0].confidence, elsewhere[0].confidence) << room;
+    EXPECT_GT(places[0].agreeing, elsewhere[0].agreeing) << room;
+  }
+}
+
+TEST(PlanSearch, TheAxisIsThatOfTheMap) {
+  std::mt19937 random(5);
+  const Eigen::Isometry3d turned = random_pose(random);
+  MapBuilder builder(map_options());
+  for (const unsigned room : {1u, 2u, 3u})
+    builder.add_scan(context(), seen_room(room, room, Eigen::Isometry3d::Identity()).view(),
+                     UnalignedIsometry3d(turned * map_from_room(room - 1)));
+  const PreparedMap map = builder.build();
+  Query query(2, 1, 7);
+  query.map_from_scan = turned * query.map_from_scan;
+  const auto places = places_of(scan_of(query.scan, MapState::of(map)), map);
+  ASSERT_FALSE(places.empty());
+  EXPECT_LT(error(query, places[0]), kOfCell);
+}
+
+TEST(PlanSearch, SidesThatNobodyKnowsAreBothTried) {
+  Query query(2, 1, 8);
+  const PreparedMap known = building({1, 2, 3}, map_options());
+  PointCloud unknown;  // no normals, no viewpoints, and rooms side by side look alike from outside
+  unknown.points = known.cloud().points;
+  unknown.origin = known.cloud().origin;
+  const PreparedMap map = prepare_map(unknown.view(), map_options());
+  auto scan = query.scan;
+  scan.viewpoints.clear();
+  PointCloudView view = scan.view();
+  view.infer_viewpoint = false;
+  for (const PreparedMap& each : {known, map}) {
+    const MapState& state = MapState::of(each);
+    const Scan of_view =
+        localization::scan_of(prepare_batch(context(), {view}, state.options.prepare)[0], {});
+    const auto places = search_plan(state, state.plan(), of_view, 8, 2);
+    ASSERT_FALSE(places.empty());
+    EXPECT_LT(error(query, places[0]), kOfCell);
+  }
+}
+
+TEST(PlanSearch, HeightsFollowFromColumns) {
+  MapBuilder builder(map_options());
+  for (const unsigned room : {1u, 2u, 3u, 4u}) {
+    UnalignedIsometry3d pose = UnalignedIsometry3d::Identity();
+    pose.translation().z() = 3.0 * room;
+    builder.add_scan(context(), seen_room(room, room, Eigen::Isometry3d::Identity()).view(), pose);
+  }
+  const PreparedMap map = builder.build();
+  Query query(3, 0, 11);
+  query.map_from_scan = Eigen::Translation3d(0, 0, 9) * query.map_from_scan;
+  const auto places = places_of(scan_of(query.scan, MapState::of(map)), map);
+  ASSERT_FALSE(places.empty());
+  EXPECT_LT(error(query, places[0]), kOfCell);
+}
+
+TEST(PlanSearch, SaysNothingThatThePriorExcludes) {
+  const PreparedMap map = building({1, 2, 1}, map_options());
+  const Query query(1, 2, 5);
+  LocatePrior prior;
+  const auto all = places_of(scan_of(query.scan, MapState::of(map), prior), map);
+  ASSERT_GE(all.size(), 2u);
+  EXPECT_LT(all[0].confidence, 0.5) << "the copy is a rival";
+  prior.position = localization::PositionPrior{query.map_from_scan.translation(), 2};
+  const auto near = places_of(scan_of(query.scan, MapState::of(map), prior), map);
+  ASSERT_FALSE(near.empty());
+  EXPECT_LT(error(query, near[0]), kOfCell);
+  for (const Candidate& place : near)
+    EXPECT_LE((place.map_from_scan.translation() - prior.position->position).norm(), 2);
+  prior.position->position.x() += 1000;
+  EXPECT_TRUE(places_of(scan_of(query.scan, MapState::of(map), prior), map).empty());
+  prior.position.reset();
+  prior.gravity = GravityPrior{query.map_from_scan.linear().transpose() * Eigen::Vector3d::UnitZ(),
+                               Eigen::Vector3d::UnitX(), 5};
+  for (const Candidate& place : places_of(scan_of(query.scan, MapState::of(map), prior), map))
+    EXPECT_GT((place.map_from_scan.linear() * prior.gravity->source_up).x(), 0.996);
+}
+
+TEST(PlanSearch, SameBitsForAnyNumberOfThreads) {
+  const PreparedMap map = building({1, 2, 3, 4}, map_options());
+  const Scan scan = scan_of(Query(3, 2, 1).scan, MapState::of(map));
+  const std::vector<double> expected = numbers_of(places_of(scan, map, 1));
+  EXPECT_FALSE(expected.empty());
+  for (const unsigned threads : {2u, 5u}) EXPECT_EQ(numbers_of(places_of(scan, map, threads)), expected);
+}
+
+TEST(PlanSearch, MapsAndScansWithoutWallsHaveNoPlaces) {
+  MapBuilder far(map_options());
+  PointCloud cloud = seen_room(1, 1, Eigen::Isometry3d::Identity());
+  far.add_scan(context(), cloud.view(), UnalignedIsometry3d::Identity());
+  UnalignedIsometry3d away = UnalignedIsometry3d::Identity();
+  away.translation() = Eigen::Vector3d(1e6, 1e6, 0);
+  far.add_scan(context(), cloud.view(), away);
+  const PreparedMap wide = far.build();  // a plan would need 2e13 cells
+  EXPECT_EQ(MapState::of(wide).plan().width, 0);
+  const Query query(1, 0, 2);
+  EXPECT_TRUE(places_of(scan_of(query.scan, MapState::of(wide)), wide).empty());
+
+  const PreparedMap map = building({1, 2}, map_options());
+  PointCloud few;
+  few.points = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
+  EXPECT_TRUE(places_of(scan_of(few, MapState::of(map)), map).empty());
+}
+
+}  // namespace
+}  // namespace gpureg::test
