@@ -11,10 +11,9 @@
 namespace gpureg::localization {
 namespace {
 
-/// Normals that are looked at, and the cosines within which they agree, belong to an axis, and make
-/// another axis the same.
+/// Normals that are looked at, and the cosines within which they agree and belong to an axis.
 constexpr std::size_t kNormals = 2048;
-constexpr float kAgree = 0.985f, kBelong = 0.98f, kSameAxis = 0.87f;
+constexpr float kAgree = 0.985f, kBelong = 0.98f;
 /// Sines of the slope of a wall, at most, and of a floor, at least.
 constexpr float kWall = 0.4f, kFloor = 0.8f;
 /// Share of an axis that its opposite has at least where a map has ceilings.

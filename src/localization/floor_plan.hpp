@@ -13,7 +13,9 @@ struct Axis {
   std::size_t facing = 0, opposite = 0;
 };
 
-/// The most frequent directions of normals, up to the sign, at least 30 degrees apart.
+constexpr float kSameAxis = 0.87f;  ///< cosine of 30 degrees
+
+/// The most frequent directions of normals, up to the sign, farther apart than kSameAxis.
 std::vector<Axis> frequent_axes(const std::vector<Eigen::Vector3f>& normals, std::size_t most);
 
 /// The rotation that turns a direction to z.

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <numeric>
 #include <set>
+#include <unordered_set>
 
 #include "common/for_each_on.hpp"
 #include "math/atan2.hpp"
@@ -21,8 +22,11 @@ constexpr std::size_t kAxes = 3;
 constexpr float kReach = 100;
 /// Walls of a scan in coarse cells (a score is a byte), in cells, and points for the height.
 constexpr std::size_t kCoarseWalls = 255, kWalls = 512, kPoints = 512;
-/// Places of a heading, and of an axis, that go on from coarse cells.
-constexpr std::size_t kOfHeading = 64, kOfAxis = 128;
+/// Places of a heading that go on from coarse cells.
+constexpr std::size_t kOfHeading = 256;
+/// Of these, so many are refined at once, until no coarse score is above those of so many refined
+/// places, or with the work of so many walls; so many of an axis then get heights.
+constexpr std::size_t kAtOnce = 128, kRefined = 8, kWallsRefined = 150'000, kOfAxis = 128;
 /// Cells scored at once: they stay in the cache.
 constexpr int kCellsAtOnce = 1 << 14;
 /// Half the width of the search around a coarse place, in cells and in steps of the heading.
@@ -83,6 +87,23 @@ struct ScanPoints {
   std::vector<Eigen::Vector3f> points, normals;  ///< relative to the middle
   bool has_sides = false;
 };
+
+/// Floors of the map may be what faces the axis or what faces the opposite.
+bool faces_both(const Axis& axis) { return 4 * axis.opposite >= axis.facing; }
+
+/// The most frequent normals, and what is perpendicular to the first two: of a scan that sees walls
+/// alone.
+std::vector<Axis> possible_verticals(const std::vector<Eigen::Vector3f>& normals) {
+  std::vector<Axis> axes = frequent_axes(normals, kAxes);
+  if (axes.size() < 2) return axes;
+  Axis third;
+  third.direction = axes[0].direction.cross(axes[1].direction).normalized();
+  const auto is_known = [&](const Axis& axis) {
+    return std::abs(axis.direction.dot(third.direction)) > kSameAxis;
+  };
+  if (std::none_of(axes.begin(), axes.end(), is_known)) axes.push_back(third);
+  return axes;
+}
 
 Upright stand(const ScanPoints& scan, const Eigen::Vector3f& up, float cell) {
   Upright out;
@@ -213,19 +234,25 @@ std::vector<Place> score_heading(const FloorPlan& plan, const Upright& scan, boo
   return best;
 }
 
-/// The best places that are not neighbours.
-std::vector<Place> apart(std::vector<Place> places, int headings, std::size_t most) {
+/// The places that no better one is next to, the best first.
+std::vector<Place> peaks(std::vector<Place> places, int headings, std::size_t most) {
   std::stable_sort(places.begin(), places.end(),
                    [](const Place& a, const Place& b) { return a.score > b.score; });
+  std::unordered_set<std::uint64_t> taken;
+  const auto key = [&](const Place& place, int dx, int dy, int turn) {
+    const auto part = [](int value) { return static_cast<std::uint64_t>(value + 1); };
+    return part(place.x + dx) << 42 | part(place.y + dy) << 21 |
+           part((place.heading + turn + headings) % headings);
+  };
   std::vector<Place> out;
   for (const Place& place : places) {
     if (out.size() == most) break;
-    const auto is_near = [&](const Place& kept) {
-      const int turn = std::abs(place.heading - kept.heading);
-      return std::abs(place.x - kept.x) <= 1 && std::abs(place.y - kept.y) <= 1 &&
-             std::min(turn, headings - turn) <= 1;
-    };
-    if (std::none_of(out.begin(), out.end(), is_near)) out.push_back(place);
+    bool is_peak = true;
+    for (int k = 0; k < 27 && is_peak; ++k)
+      is_peak = taken.count(key(place, k % 3 - 1, k / 3 % 3 - 1, k / 9 - 1)) == 0;
+    if (!is_peak) continue;
+    taken.insert(key(place, 0, 0, 0));
+    out.push_back(place);
   }
   return out;
 }
@@ -261,6 +288,34 @@ Place refine(const FloorPlan& plan, const Upright& scan, bool has_sides, const P
       }
   }
   return best;
+}
+
+/// Refines coarse places in the order of their scores, which the refined ones hardly surpass, until
+/// enough refined ones are better than what is left.
+std::vector<Place> refine_best(const FloorPlan& plan, const Upright& scan, bool has_sides,
+                               std::vector<Place> coarse, unsigned threads) {
+  std::vector<Place> out;
+  if (scan.walls.empty()) return out;
+  coarse = peaks(std::move(coarse), scan.headings,
+                 std::max(kAtOnce, kWallsRefined / scan.walls.size()));
+  const auto order = [](const Place& a, const Place& b) { return a.score > b.score; };
+  while (out.size() < coarse.size()) {
+    const std::size_t begin = out.size(), end = std::min(coarse.size(), begin + kAtOnce);
+    out.resize(end);
+    for_each_on(threads, end - begin, [] { return 0; }, [&](std::size_t k, int) {
+      out[begin + k] = refine(plan, scan, has_sides, coarse[begin + k]);
+    });
+    if (end == coarse.size() || end < kRefined) break;
+    std::vector<Place> sorted = out;
+    std::nth_element(sorted.begin(), sorted.begin() + kRefined - 1, sorted.end(), order);
+    // Shares of walls: coarse ones are fewer.
+    if (static_cast<double>(sorted[kRefined - 1].score) * static_cast<double>(scan.coarse_walls.size()) >=
+        static_cast<double>(coarse[end].score) * static_cast<double>(scan.walls.size()))
+      break;
+  }
+  std::stable_sort(out.begin(), out.end(), order);
+  out.resize(std::min(out.size(), kOfAxis));
+  return out;
 }
 
 struct Height {
@@ -357,9 +412,9 @@ std::vector<Candidate> search_plan(const MapState& map, const FloorPlan& plan, c
   if ((region.high - region.low).minCoeff() <= 0) return {};
 
   std::vector<Upright> uprights;
-  for (const Axis& axis : frequent_axes(centred.normals, kAxes)) {
+  for (const Axis& axis : possible_verticals(centred.normals)) {
     uprights.push_back(stand(centred, axis.direction, plan.cell));
-    if (plan.has_ceiling || !has_sides)
+    if (plan.has_ceiling || !has_sides || faces_both(axis))
       uprights.push_back(stand(centred, -axis.direction, plan.cell));
   }
   struct Task {
@@ -386,12 +441,11 @@ std::vector<Candidate> search_plan(const MapState& map, const FloorPlan& plan, c
   };
   std::vector<Fine> fine;
   for (std::size_t u = 0; u < uprights.size(); ++u)
-    for (const Place& place : apart(std::move(coarse[u]), uprights[u].headings, kOfAxis))
+    for (const Place& place :
+         refine_best(plan, uprights[u], has_sides, std::move(coarse[u]), threads))
       fine.push_back({u, place, {}});
   for_each_on(threads, fine.size(), nothing, [&](std::size_t k, int) {
-    const Upright& up = uprights[fine[k].upright];
-    fine[k].place = refine(plan, up, has_sides, fine[k].place);
-    fine[k].heights = heights_of(plan, up, has_sides, fine[k].place);
+    fine[k].heights = heights_of(plan, uprights[fine[k].upright], has_sides, fine[k].place);
   });
   std::vector<Candidate> out;
   for (std::size_t k = 0; k < fine.size(); ++k)
