@@ -135,7 +135,7 @@ struct LocateOptions {
   /// Poses of a scan that are verified against all of the map around them, 1..64.
   std::uint32_t candidates = 8;
   /// Distance from the points of the scan up to which the map takes part in this, metres, > 0.
-  double neighborhood = 1;
+  double neighborhood = 0.5;
 
   /// Every length from the voxel size.
   /// @throws InvalidArgument as RegistrationOptions::from_voxel_size().

@@ -235,12 +235,12 @@ ChangeResult find_changes(const Context& context, const PointCloudView& scan,
   of_scan.spacing = of_map.spacing = state.options.prepare.voxel_size;
   const std::vector<std::size_t> numbers = place_points(scan, scene, of_scan.points);
   of_scan.tolerances = tolerances(of_scan.points, pivot, options);
-  out.scan = all_of(changed_points(of_scan, scene.map, options.min_extent, context.threads()),
+  out.scan = all_of(changed_points(of_scan, scene.map, options.min_extent, host_threads(context)),
                     numbers, scan.size, 0);
   of_map.points = scene.map.points;
   of_map.tolerances = tolerances(of_map.points, pivot, options);
   of_map.changed = ChangeLabel::gone;
-  out.map = all_of(changed_points(of_map, scene.scan, options.min_extent, context.threads()),
+  out.map = all_of(changed_points(of_map, scene.scan, options.min_extent, host_threads(context)),
                    scene.numbers, state.points.size(), 1);
   return out;
 }

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "common/for_each_on.hpp"
 #include "common/radix_sort.hpp"
 #include "localization/sides.hpp"
 #include "math/atan2.hpp"
@@ -22,11 +23,7 @@ constexpr int kFacingBits = 18;
 constexpr std::uint32_t kMostHeight = (1u << (32 - kFacingBits)) - 1;
 constexpr double kMostCells = 1 << 27;
 
-/// Of a cell: its number and a height.
-struct Entry {
-  std::uint64_t key;
-  std::uint32_t facing;
-};
+using Entry = FloorPlan::Entry;
 
 void merge(std::vector<Entry>& entries) {
   radix_sort(entries, [](const Entry& e) { return e.key; });
@@ -40,23 +37,30 @@ void merge(std::vector<Entry>& entries) {
   entries.resize(kept);
 }
 
-/// The map's normals, by tile.
+/// The map's normals. Those of tiles without sides are estimated.
 class Normals {
  public:
-  explicit Normals(const MapState& map) : map_(map), context_(Context::cpu()) {
-    for (std::size_t tile = 0; tile < map.tiles.size() && has_sides_; ++tile)
-      has_sides_ = knows(tile);
+  explicit Normals(const MapState& map) : map_(map), estimated_(map.tiles.size()) {
+    for (std::size_t tile = 0; tile < map.tiles.size(); ++tile) {
+      if (knows(tile)) continue;
+      estimated_[tile] = tile_normals(Context::cpu(), map, tile);
+      has_sides_ = false;
+    }
   }
   bool has_sides() const { return has_sides_; }
 
-  std::vector<Eigen::Vector3f> of(std::size_t tile) const {
-    if (!knows(tile)) return tile_normals(context_, map_, tile);
+  Eigen::Vector3f at(std::size_t tile, std::size_t point) const {
+    if (!estimated_[tile].empty()) return estimated_[tile][point - map_.tiles[tile].begin];
+    const Side& side = map_.sides[point];
+    const Eigen::Vector3f normal = Eigen::Vector3i(side[0], side[1], side[2]).cast<float>();
+    return side == Side{} ? normal : Eigen::Vector3f(normal.normalized());
+  }
+  std::vector<Eigen::Vector3f> some() const {
     std::vector<Eigen::Vector3f> out;
-    for (std::size_t k = map_.tiles[tile].begin; k < map_.tiles[tile].end; ++k) {
-      const Side& side = map_.sides[k];
-      const Eigen::Vector3f normal = Eigen::Vector3i(side[0], side[1], side[2]).cast<float>();
-      out.push_back(side == Side{} ? normal : Eigen::Vector3f(normal.normalized()));
-    }
+    const std::size_t step = map_.points.size() / (4 * kNormals) + 1;
+    for (std::size_t tile = 0; tile < map_.tiles.size(); ++tile)
+      for (std::size_t k = map_.tiles[tile].begin; k < map_.tiles[tile].end; k += step)
+        out.push_back(at(tile, k));
     return out;
   }
 
@@ -70,7 +74,7 @@ class Normals {
   }
 
   const MapState& map_;
-  Context context_;
+  std::vector<std::vector<Eigen::Vector3f>> estimated_;
   bool has_sides_ = true;
 };
 
@@ -148,16 +152,10 @@ std::uint32_t both_sides(std::uint32_t facing) {
 
 }  // namespace facing
 
-FloorPlan::FloorPlan(const MapState& map) {
+FloorPlan::FloorPlan(const MapState& map, unsigned threads) {
   const Normals normals(map);
   has_sides = normals.has_sides();
-  std::vector<Eigen::Vector3f> some;
-  for (std::size_t tile = 0; tile < map.tiles.size(); ++tile) {
-    const std::vector<Eigen::Vector3f> of_tile = normals.of(tile);
-    const std::size_t step = map.points.size() / (4 * kNormals) + 1;
-    for (std::size_t k = 0; k < of_tile.size(); k += step) some.push_back(of_tile[k]);
-  }
-  const std::vector<Axis> axes = frequent_axes(some, 1);
+  const std::vector<Axis> axes = frequent_axes(normals.some(), 1);
   if (axes.empty()) return;
   turn = upright(axes.front().direction);
   has_ceiling = !has_sides || static_cast<double>(axes.front().opposite) >
@@ -173,30 +171,39 @@ FloorPlan::FloorPlan(const MapState& map) {
   width = 2 * static_cast<int>(coarse_cells(0));
   height = 2 * static_cast<int>(coarse_cells(1));
 
-  std::vector<Entry> entries, of_tile;
-  for (std::size_t tile = 0; tile < map.tiles.size(); ++tile) {
-    const std::vector<Eigen::Vector3f> tile_of_normals = normals.of(tile);
-    of_tile.clear();
-    for (std::size_t k = 0; k < tile_of_normals.size(); ++k) {
-      std::uint32_t faces = facing::of(turn * tile_of_normals[k], false);
+  std::vector<std::vector<Entry>> of_tiles(map.tiles.size());
+  for_each_on(threads, map.tiles.size(), [] { return 0; }, [&](std::size_t tile, int) {
+    std::vector<Entry>& entries = of_tiles[tile];
+    for (std::size_t k = map.tiles[tile].begin; k < map.tiles[tile].end; ++k) {
+      std::uint32_t faces = facing::of(turn * normals.at(tile, k), false);
       if (!has_sides) faces = facing::both_sides(faces);
       if (faces == 0) continue;
-      const Eigen::Vector3f at = (turn * map.points[map.tiles[tile].begin + k] - corner) / cell;
+      const Eigen::Vector3f at = (turn * map.points[k] - corner) / cell;
       const auto up = std::min(static_cast<std::uint32_t>(at[2]), kMostHeight);
       // A scan's points fall into a neighbouring cell, too, up to a quarter of a cell away.
-      for (const float dx : {-0.25f, 0.25f})
-        for (const float dy : {-0.25f, 0.25f}) {
-          const auto x = static_cast<std::uint64_t>(at[0] + dx),
-                     y = static_cast<std::uint64_t>(at[1] + dy);
-          const std::uint64_t number = y * static_cast<std::uint64_t>(width) + x;
-          of_tile.push_back({number << (32 - kFacingBits) | up, faces});
+      const auto low = (at.array() - 0.25f).cast<std::int32_t>().eval(),
+                 high = (at.array() + 0.25f).cast<std::int32_t>().eval();
+      for (std::int32_t y = low[1]; y <= high[1]; ++y)
+        for (std::int32_t x = low[0]; x <= high[0]; ++x) {
+          const std::uint64_t number =
+              static_cast<std::uint64_t>(y) * static_cast<std::uint64_t>(width) +
+              static_cast<std::uint64_t>(x);
+          entries.push_back({number << (32 - kFacingBits) | up, faces});
         }
     }
-    merge(of_tile);
+    merge(entries);
+  });
+  std::vector<Entry> entries;
+  for (std::vector<Entry>& of_tile : of_tiles) {
     entries.insert(entries.end(), of_tile.begin(), of_tile.end());
+    of_tile = {};
   }
-  merge(entries);
+  if (map.tiles.size() > 1) merge(entries);
+  fill_columns(entries);
+  fill_coarse();
+}
 
+void FloorPlan::fill_columns(const std::vector<Entry>& entries) {
   const std::size_t cells = static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
   walls.assign(cells, 0);
   column_begin.assign(cells + 1, 0);
@@ -208,27 +215,27 @@ FloorPlan::FloorPlan(const MapState& map) {
     columns.push_back(static_cast<std::uint32_t>(entry.key) << kFacingBits | entry.facing);
   }
   for (std::size_t k = 0; k < cells; ++k) column_begin[k + 1] += column_begin[k];
+}
 
-  const std::size_t coarse_count = cells / 4;
-  coarse.assign(coarse_count * kPlanes, 0);
-  for (std::size_t k = 0; k < cells; ++k) {
+void FloorPlan::fill_coarse() {
+  const std::size_t count = walls.size() / 4;
+  coarse.assign(count * kPlanes, 0);
+  for (std::size_t k = 0; k < walls.size(); ++k) {
     if (walls[k] == 0) continue;
     const std::size_t x = k % static_cast<std::size_t>(width),
                       y = k / static_cast<std::size_t>(width);
     const std::size_t at = y / 2 * static_cast<std::size_t>(coarse_width()) + x / 2;
     const std::uint32_t either = facing::both_sides(walls[k]);
-    for (int d = 0; d < facing::kDirections; ++d) {
-      const auto plane_at = [&](int number) -> std::uint8_t& {
-        return coarse[static_cast<std::size_t>(number) * coarse_count + at];
-      };
-      if (walls[k] >> d & 1) plane_at(d) = 1;
-      if (d < facing::kDirections / 2 && either >> d & 1) plane_at(facing::kDirections + d) = 1;
+    for (std::size_t d = 0; d < facing::kDirections; ++d) {
+      if (walls[k] >> d & 1) coarse[d * count + at] = 1;
+      if (d < facing::kDirections / 2 && either >> d & 1)
+        coarse[(facing::kDirections + d) * count + at] = 1;
     }
   }
 }
 
-const FloorPlan& MapState::plan() const {
-  std::call_once(planned_, [&] { plan_ = std::make_shared<const FloorPlan>(*this); });
+const FloorPlan& MapState::plan(unsigned threads) const {
+  std::call_once(planned_, [&] { plan_ = std::make_shared<const FloorPlan>(*this, threads); });
   return *plan_;
 }
 

@@ -53,7 +53,13 @@ struct FloorPlan {
   /// The entries of each cell: height over `corner` in cells << 18 | what faces.
   std::vector<std::uint32_t> column_begin, columns;
 
-  explicit FloorPlan(const MapState& map);
+  FloorPlan(const MapState& map, unsigned threads);
+
+  /// Of a cell: its number << 14 | a height, and what faces.
+  struct Entry {
+    std::uint64_t key;
+    std::uint32_t facing;
+  };
 
   int coarse_width() const { return width / 2; }
   int coarse_height() const { return height / 2; }
@@ -62,6 +68,10 @@ struct FloorPlan {
            static_cast<std::size_t>(number) * static_cast<std::size_t>(coarse_width()) *
                static_cast<std::size_t>(coarse_height());
   }
+
+ private:
+  void fill_columns(const std::vector<Entry>& entries);
+  void fill_coarse();
 };
 
 }  // namespace gpureg::localization

@@ -119,13 +119,13 @@ std::vector<LocateResult> locate(const Context& context, const std::vector<Point
   }
   const std::vector<PreparedCloud> prepared =
       prepare_batch(context, scans, state.options.prepare, names);
+  const unsigned threads = host_threads(context);
   std::vector<LocateResult> out;
   std::vector<std::size_t> open;  // scans that the plan does not place surely
   std::vector<Scan> searched;
   for (std::size_t k = 0; k < scans.size(); ++k) {
     Scan scan = scan_of(prepared[k], priors.empty() ? LocatePrior{} : priors[k]);
-    scan.planned =
-        search_plan(state, state.plan(), scan, options.candidates, context.threads());
+    scan.planned = search_plan(state, state.plan(threads), scan, options.candidates, threads);
     scan.candidates = scan.planned;
     keep_likely(options, scan);
     std::vector<Verified> places;

@@ -1,4 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include <algorithm>
+#include <thread>
+
 #include "localization/map_state.hpp"
 
 namespace gpureg::localization {
@@ -6,6 +9,11 @@ namespace gpureg::localization {
 const MapState& MapState::of(const PreparedMap& map) {
   if (!map.valid()) throw InvalidArgument("map is an empty handle");
   return *map.state_;
+}
+
+unsigned host_threads(const Context& context) {
+  return context.backend() == Backend::cpu ? context.threads()
+                                           : std::max(1u, std::thread::hardware_concurrency());
 }
 
 std::size_t PreparedMap::size() const { return MapState::of(*this).points.size(); }

@@ -54,7 +54,7 @@ struct MapState {
                                             const PrepareOptions& prepare) const;
 
   /// Made when the first scan needs it.
-  const FloorPlan& plan() const;
+  const FloorPlan& plan(unsigned threads) const;
 
   static const MapState& of(const PreparedMap& map);
   static PreparedMap map(std::shared_ptr<const MapState> state) {
@@ -77,6 +77,9 @@ struct MapState {
   mutable std::size_t cached_points_ = 0;
   mutable std::uint64_t searches_ = 0;
 };
+
+/// For work on the host: those of the context, or all while a device waits.
+unsigned host_threads(const Context& context);
 
 /// Views of clouds that cut() made; a piece of a map was not seen from its origin.
 std::vector<PointCloudView> views_of(const std::vector<PointCloud>& clouds);

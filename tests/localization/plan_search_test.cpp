@@ -29,7 +29,7 @@ Scan scan_of(const PointCloud& cloud, const MapState& map, const LocatePrior& pr
 
 std::vector<Candidate> places_of(const Scan& scan, const PreparedMap& map, unsigned threads = 2) {
   const MapState& state = MapState::of(map);
-  return search_plan(state, state.plan(), scan, 8, threads);
+  return search_plan(state, state.plan(2), scan, 8, threads);
 }
 
 double error(const Query& query, const Candidate& place) {
@@ -89,7 +89,7 @@ TEST(FrequentAxes, AreTurnedUpright) {
 
 TEST(FloorPlan, WallsFaceTheSensor) {
   const PreparedMap map = building({1}, map_options());
-  const FloorPlan& plan = MapState::of(map).plan();
+  const FloorPlan& plan = MapState::of(map).plan(2);
   EXPECT_TRUE(plan.has_sides);
   ASSERT_GT(plan.width, 0);
   // Two surfaces that meet at the origin; the axis of one room may be that of either.
@@ -152,7 +152,7 @@ TEST(PlanSearch, SidesThatNobodyKnowsAreBothTried) {
     const MapState& state = MapState::of(each);
     const Scan of_view =
         localization::scan_of(prepare_batch(context(), {view}, state.options.prepare)[0], {});
-    const auto places = search_plan(state, state.plan(), of_view, 8, 2);
+    const auto places = search_plan(state, state.plan(2), of_view, 8, 2);
     ASSERT_FALSE(places.empty());
     EXPECT_LT(error(query, places[0]), kOfCell);
   }
@@ -211,7 +211,7 @@ TEST(PlanSearch, MapsAndScansWithoutWallsHaveNoPlaces) {
   away.translation() = Eigen::Vector3d(1e6, 1e6, 0);
   far.add_scan(context(), cloud.view(), away);
   const PreparedMap wide = far.build();  // a plan would need 2e13 cells
-  EXPECT_EQ(MapState::of(wide).plan().width, 0);
+  EXPECT_EQ(MapState::of(wide).plan(2).width, 0);
   const Query query(1, 0, 2);
   EXPECT_TRUE(places_of(scan_of(query.scan, MapState::of(wide)), wide).empty());
 
