@@ -19,8 +19,9 @@ class Cells {
  public:
   explicit Cells(double edge) : edge_(edge) {}
 
-  void add_around(const Eigen::Vector3d& p) {
+  void add(const Eigen::Vector3d& p) {
     const auto [x, y, z] = cell(p);
+    if (!own_.insert(key(x, y, z)).second) return;  // many points share a cell
     for (std::int64_t dx = -1; dx <= 1; ++dx)
       for (std::int64_t dy = -1; dy <= 1; ++dy)
         for (std::int64_t dz = -1; dz <= 1; ++dz) keys_.insert(key(x + dx, y + dy, z + dz));
@@ -45,7 +46,7 @@ class Cells {
   }
 
   double edge_;
-  std::unordered_set<std::uint64_t> keys_;
+  std::unordered_set<std::uint64_t> own_, keys_;
 };
 
 }  // namespace
@@ -81,7 +82,7 @@ PointCloud neighborhood(const MapState& map, const std::vector<Eigen::Vector3d>&
   Eigen::AlignedBox3d box;
   for (const Eigen::Vector3d& point : scan) {
     const Eigen::Vector3d p = map_from_scan * point - map.origin;
-    cells.add_around(p);
+    cells.add(p);
     box.extend(p);
   }
   box.min().array() -= distance;

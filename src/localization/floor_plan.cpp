@@ -172,27 +172,29 @@ FloorPlan::FloorPlan(const MapState& map, unsigned threads) {
   height = 2 * static_cast<int>(coarse_cells(1));
 
   std::vector<std::vector<Entry>> of_tiles(map.tiles.size());
-  for_each_on(threads, map.tiles.size(), [] { return 0; }, [&](std::size_t tile, int) {
-    std::vector<Entry>& entries = of_tiles[tile];
-    for (std::size_t k = map.tiles[tile].begin; k < map.tiles[tile].end; ++k) {
-      std::uint32_t faces = facing::of(turn * normals.at(tile, k), false);
-      if (!has_sides) faces = facing::both_sides(faces);
-      if (faces == 0) continue;
-      const Eigen::Vector3f at = (turn * map.points[k] - corner) / cell;
-      const auto up = std::min(static_cast<std::uint32_t>(at[2]), kMostHeight);
-      // A scan's points fall into a neighbouring cell, too, up to a quarter of a cell away.
-      const auto low = (at.array() - 0.25f).cast<std::int32_t>().eval(),
-                 high = (at.array() + 0.25f).cast<std::int32_t>().eval();
-      for (std::int32_t y = low[1]; y <= high[1]; ++y)
-        for (std::int32_t x = low[0]; x <= high[0]; ++x) {
-          const std::uint64_t number =
-              static_cast<std::uint64_t>(y) * static_cast<std::uint64_t>(width) +
-              static_cast<std::uint64_t>(x);
-          entries.push_back({number << (32 - kFacingBits) | up, faces});
+  for_each_on(
+      threads, map.tiles.size(), [] { return 0; },
+      [&](std::size_t tile, int) {
+        std::vector<Entry>& entries = of_tiles[tile];
+        for (std::size_t k = map.tiles[tile].begin; k < map.tiles[tile].end; ++k) {
+          std::uint32_t faces = facing::of(turn * normals.at(tile, k), false);
+          if (!has_sides) faces = facing::both_sides(faces);
+          if (faces == 0) continue;
+          const Eigen::Vector3f at = (turn * map.points[k] - corner) / cell;
+          const auto up = std::min(static_cast<std::uint32_t>(at[2]), kMostHeight);
+          // A scan's points fall into a neighbouring cell, too, up to a quarter of a cell away.
+          const auto low = (at.array() - 0.25f).cast<std::int32_t>().eval(),
+                     high = (at.array() + 0.25f).cast<std::int32_t>().eval();
+          for (std::int32_t y = low[1]; y <= high[1]; ++y)
+            for (std::int32_t x = low[0]; x <= high[0]; ++x) {
+              const std::uint64_t number =
+                  static_cast<std::uint64_t>(y) * static_cast<std::uint64_t>(width) +
+                  static_cast<std::uint64_t>(x);
+              entries.push_back({number << (32 - kFacingBits) | up, faces});
+            }
         }
-    }
-    merge(entries);
-  });
+        merge(entries);
+      });
   std::vector<Entry> entries;
   for (std::vector<Entry>& of_tile : of_tiles) {
     entries.insert(entries.end(), of_tile.begin(), of_tile.end());
@@ -218,18 +220,20 @@ void FloorPlan::fill_columns(const std::vector<Entry>& entries) {
 }
 
 void FloorPlan::fill_coarse() {
-  const std::size_t count = walls.size() / 4;
-  coarse.assign(count * kPlanes, 0);
+  const auto rows = static_cast<std::size_t>(coarse_height() + 2 * kMargin);
+  const auto row = static_cast<std::size_t>(stride());
+  coarse.assign(kPlanes * rows * row, 0);
   for (std::size_t k = 0; k < walls.size(); ++k) {
     if (walls[k] == 0) continue;
-    const std::size_t x = k % static_cast<std::size_t>(width),
-                      y = k / static_cast<std::size_t>(width);
-    const std::size_t at = y / 2 * static_cast<std::size_t>(coarse_width()) + x / 2;
+    const std::size_t x = k % static_cast<std::size_t>(width) / 2,
+                      y = k / static_cast<std::size_t>(width) / 2;
     const std::uint32_t either = facing::both_sides(walls[k]);
+    const auto set = [&](std::size_t plane) {
+      coarse[(plane * rows + y + kMargin) * row + x + kMargin] = 1;
+    };
     for (std::size_t d = 0; d < facing::kDirections; ++d) {
-      if (walls[k] >> d & 1) coarse[d * count + at] = 1;
-      if (d < facing::kDirections / 2 && either >> d & 1)
-        coarse[(facing::kDirections + d) * count + at] = 1;
+      if (walls[k] >> d & 1) set(d);
+      if (d < facing::kDirections / 2 && either >> d & 1) set(facing::kDirections + d);
     }
   }
 }

@@ -38,11 +38,16 @@ std::uint32_t both_sides(std::uint32_t facing);
 struct FloorPlan {
   /// Cells of the search, in voxels.
   static constexpr float kCell = 2;
-  /// Coarse planes: one per direction, and one per direction up to the sign.
+  /// Walls of a scan farther from its middle, in voxels, do not decide: a step of the heading moves
+  /// them too far.
+  static constexpr float kReach = 100;
+  /// Coarse planes: one per direction, and one per direction up to the sign. Around them lie empty
+  /// cells, as far as the walls of a scan reach.
   static constexpr int kPlanes = facing::kDirections * 3 / 2;
+  static constexpr int kMargin = static_cast<int>(kReach / (2 * kCell)) + 2;
 
   Eigen::Matrix3f turn = Eigen::Matrix3f::Identity();  ///< of the map's rows
-  bool has_sides = false;    ///< false: every surface faces both sides
+  bool has_sides = false;                              ///< false: every surface faces both sides
   bool has_ceiling = false;  ///< some surfaces face the opposite of the axis
   float cell = 0;            ///< metres
   Eigen::Vector3f corner{0, 0, 0};
@@ -63,10 +68,11 @@ struct FloorPlan {
 
   int coarse_width() const { return width / 2; }
   int coarse_height() const { return height / 2; }
+  std::ptrdiff_t stride() const { return coarse_width() + 2 * kMargin; }  ///< of rows of planes
+  /// The first cell of a plane.
   const std::uint8_t* plane(int number) const {
-    return coarse.data() +
-           static_cast<std::size_t>(number) * static_cast<std::size_t>(coarse_width()) *
-               static_cast<std::size_t>(coarse_height());
+    const std::ptrdiff_t rows = coarse_height() + 2 * kMargin;
+    return coarse.data() + (number * rows + kMargin) * stride() + kMargin;
   }
 
  private:

@@ -175,8 +175,8 @@ std::vector<LocateResult> locate(const Context& context, const std::vector<Point
   if (unsure.empty()) return out;
   search_best_tiles(context, state, options, unsure, searched);
   for (const std::size_t k : unsure)
-    out[open[k]] = result_of(
-        verify_places(context, state, options, searched[k], verified[k]), searched[k], options);
+    out[open[k]] = result_of(verify_places(context, state, options, searched[k], verified[k]),
+                             searched[k], options);
   return out;
 }
 

@@ -17,9 +17,6 @@ namespace {
 
 /// Directions of a scan that are tried as the vertical.
 constexpr std::size_t kAxes = 3;
-/// Walls farther from the middle of the scan, in voxels, do not decide: a step of the heading moves
-/// them too far.
-constexpr float kReach = 100;
 /// Walls of a scan in coarse cells (a score is a byte), in cells, and points for the height.
 constexpr std::size_t kCoarseWalls = 255, kWalls = 512, kPoints = 512;
 /// Places of a heading that go on from coarse cells.
@@ -108,7 +105,7 @@ std::vector<Axis> possible_verticals(const std::vector<Eigen::Vector3f>& normals
 Upright stand(const ScanPoints& scan, const Eigen::Vector3f& up, float cell) {
   Upright out;
   out.turn = upright(up);
-  const float reach = kReach / FloorPlan::kCell * cell;
+  const float reach = FloorPlan::kReach / FloorPlan::kCell * cell;
   constexpr float kPerRadian = facing::kDirections / (2 * kPi);
   std::vector<Wall> walls;
   std::vector<Upright::Point> points;
@@ -131,8 +128,7 @@ Upright stand(const ScanPoints& scan, const Eigen::Vector3f& up, float cell) {
   out.coarse_walls = walls_in_cells(walls, 2 * cell, kCoarseWalls);
   out.points = some_of(points, kPoints);
   // A step moves the farthest wall by 1.4 coarse cells.
-  out.headings =
-      std::max(16, static_cast<int>(std::ceil(2 * kPi * 0.7f * farthest / (2 * cell))));
+  out.headings = std::max(16, static_cast<int>(std::ceil(2 * kPi * 0.7f * farthest / (2 * cell))));
   return out;
 }
 
@@ -172,8 +168,8 @@ Region region_of(const MapState& map, const FloorPlan& plan, const Scan& scan) {
   for (int axis = 0; axis < 2; ++axis) {
     const int most = region.high[axis];
     const auto cell = [&](float at) {
-      return static_cast<int>(std::clamp((at - plan.corner[axis]) / plan.cell, 0.0f,
-                                         static_cast<float>(most)));
+      return static_cast<int>(
+          std::clamp((at - plan.corner[axis]) / plan.cell, 0.0f, static_cast<float>(most)));
     };
     region.low[axis] = cell(place[axis] - radius);
     region.high[axis] = std::min(most, cell(place[axis] + radius) + 1);
@@ -181,45 +177,44 @@ Region region_of(const MapState& map, const FloorPlan& plan, const Scan& scan) {
   return region;
 }
 
+/// Wider registers where there are some: sums of bytes have the same bits in any.
+#if defined(__x86_64__) && defined(__GNUC__) && !defined(__SANITIZE_THREAD__) && \
+    !defined(__SANITIZE_ADDRESS__)
+__attribute__((target_clones("avx2", "default")))
+#endif
+void add_rows(std::uint8_t* to, const std::array<const std::uint8_t*, 4>& rows, int count) {
+  const std::uint8_t *a = rows[0], *b = rows[1], *c = rows[2], *d = rows[3];
+  for (int k = 0; k < count; ++k)
+    to[k] = static_cast<std::uint8_t>(to[k] + a[k] + b[k] + c[k] + d[k]);
+}
+
 /// The best coarse cells of one heading.
 std::vector<Place> score_heading(const FloorPlan& plan, const Upright& scan, bool has_sides,
                                  const Region& region, int heading) {
-  const int width = plan.coarse_width(), height = plan.coarse_height();
   const int left = region.low[0] / 2, right = (region.high[0] + 1) / 2;
   const int top = region.low[1] / 2, bottom = (region.high[1] + 1) / 2;
   const Heading turn = heading_of(heading, scan.headings);
-  struct Shifted {
-    const std::uint8_t* plane;
-    int dx, dy;
-  };
-  std::vector<Shifted> walls;
+  std::vector<const std::uint8_t*> walls;  // where the wall is for cell (0, 0)
   for (const Wall& wall : scan.coarse_walls) {
     const Turned at = turned(wall, turn, 2 * plan.cell);
-    const int plane = has_sides
-                          ? at.direction
-                          : facing::kDirections + at.direction % (facing::kDirections / 2);
-    walls.push_back({plan.plane(plane), at.dx, at.dy});
+    const int plane =
+        has_sides ? at.direction : facing::kDirections + at.direction % (facing::kDirections / 2);
+    walls.push_back(plan.plane(plane) + at.dy * plan.stride() + at.dx);
   }
   std::vector<Place> best;
   const int columns = right - left, rows_at_once = std::max(1, kCellsAtOnce / std::max(1, columns));
-  std::vector<std::uint8_t> scores;
   std::array<std::size_t, 256> counts{};
   std::vector<std::uint8_t> all(static_cast<std::size_t>(columns) *
                                 static_cast<std::size_t>(bottom - top));
-  for (int row = top; row < bottom; row += rows_at_once) {
-    const int end = std::min(bottom, row + rows_at_once);
-    std::uint8_t* block =
-        all.data() + static_cast<std::size_t>(row - top) * static_cast<std::size_t>(columns);
-    for (const Shifted& wall : walls) {
-      const int first = std::max(left, -wall.dx), last = std::min(right, width - wall.dx);
-      for (int y = std::max(row, -wall.dy); y < std::min(end, height - wall.dy); ++y) {
-        std::uint8_t* to = block + static_cast<std::ptrdiff_t>(y - row) * columns - left;
-        const std::uint8_t* from =
-            wall.plane + static_cast<std::ptrdiff_t>(y + wall.dy) * width + wall.dx;
-        for (int x = first; x < last; ++x) to[x] = static_cast<std::uint8_t>(to[x] + from[x]);
+  const std::vector<std::uint8_t> nothing(static_cast<std::size_t>(columns), 0);
+  for (int block = top; block < bottom; block += rows_at_once)
+    for (std::size_t k = 0; k < walls.size(); k += 4)
+      for (int y = block; y < std::min(bottom, block + rows_at_once); ++y) {
+        std::array<const std::uint8_t*, 4> rows;
+        for (std::size_t i = 0; i < 4; ++i)
+          rows[i] = k + i < walls.size() ? walls[k + i] + y * plan.stride() + left : nothing.data();
+        add_rows(all.data() + static_cast<std::ptrdiff_t>(y - top) * columns, rows, columns);
       }
-    }
-  }
   for (const std::uint8_t score : all) ++counts[score];
   int least = 255;
   for (std::size_t above = counts[255]; least > 1 && above < kOfHeading;)
@@ -296,20 +291,23 @@ std::vector<Place> refine_best(const FloorPlan& plan, const Upright& scan, bool 
                                std::vector<Place> coarse, unsigned threads) {
   std::vector<Place> out;
   if (scan.walls.empty()) return out;
-  coarse = peaks(std::move(coarse), scan.headings,
-                 std::max(kAtOnce, kWallsRefined / scan.walls.size()));
+  coarse =
+      peaks(std::move(coarse), scan.headings, std::max(kAtOnce, kWallsRefined / scan.walls.size()));
   const auto order = [](const Place& a, const Place& b) { return a.score > b.score; };
   while (out.size() < coarse.size()) {
     const std::size_t begin = out.size(), end = std::min(coarse.size(), begin + kAtOnce);
     out.resize(end);
-    for_each_on(threads, end - begin, [] { return 0; }, [&](std::size_t k, int) {
-      out[begin + k] = refine(plan, scan, has_sides, coarse[begin + k]);
-    });
+    for_each_on(
+        threads, end - begin, [] { return 0; },
+        [&](std::size_t k, int) {
+          out[begin + k] = refine(plan, scan, has_sides, coarse[begin + k]);
+        });
     if (end == coarse.size() || end < kRefined) break;
     std::vector<Place> sorted = out;
     std::nth_element(sorted.begin(), sorted.begin() + kRefined - 1, sorted.end(), order);
     // Shares of walls: coarse ones are fewer.
-    if (static_cast<double>(sorted[kRefined - 1].score) * static_cast<double>(scan.coarse_walls.size()) >=
+    if (static_cast<double>(sorted[kRefined - 1].score) *
+            static_cast<double>(scan.coarse_walls.size()) >=
         static_cast<double>(coarse[end].score) * static_cast<double>(scan.walls.size()))
       break;
   }
@@ -338,13 +336,13 @@ std::vector<Height> heights_of(const FloorPlan& plan, const Upright& scan, bool 
     if (x < 0 || y < 0 || x >= plan.width || y >= plan.height) continue;
     std::uint32_t faces = facing::of(turn * point.normal, true);
     if (!has_sides) faces = facing::both_sides(faces);
-    const std::size_t cell =
-        static_cast<std::size_t>(y) * static_cast<std::size_t>(plan.width) +
-        static_cast<std::size_t>(x);
+    const std::size_t cell = static_cast<std::size_t>(y) * static_cast<std::size_t>(plan.width) +
+                             static_cast<std::size_t>(x);
     int last = std::numeric_limits<int>::min();
     for (std::uint32_t k = plan.column_begin[cell]; k < plan.column_begin[cell + 1]; ++k) {
       if ((plan.columns[k] & faces) == 0) continue;
-      const int shift = static_cast<int>(plan.columns[k] >> 18) - static_cast<int>(std::floor(at[2]));
+      const int shift =
+          static_cast<int>(plan.columns[k] >> 18) - static_cast<int>(std::floor(at[2]));
       // One point votes once for a height and the one below it.
       for (const int vote : {shift - 1, shift})
         if (vote > last) shifts.push_back(last = vote);
@@ -375,8 +373,7 @@ UnalignedIsometry3d pose_of(const MapState& map, const FloorPlan& plan, const Up
   heading.topLeftCorner<2, 2>() << portable::cos(angle), -portable::sin(angle),
       portable::sin(angle), portable::cos(angle);
   const Eigen::Vector3d cell(place.x + 0.5, place.y + 0.5, static_cast<double>(height));
-  const Eigen::Vector3d middle =
-      plan.corner.cast<double>() + cell * static_cast<double>(plan.cell);
+  const Eigen::Vector3d middle = plan.corner.cast<double>() + cell * static_cast<double>(plan.cell);
   const Eigen::Matrix3d back = plan.turn.cast<double>().transpose();
   UnalignedIsometry3d pose = UnalignedIsometry3d::Identity();
   pose.linear() = back * heading * up.turn.cast<double>();
@@ -427,8 +424,7 @@ std::vector<Candidate> search_plan(const MapState& map, const FloorPlan& plan, c
   std::vector<std::vector<Place>> found(tasks.size());
   const auto nothing = [] { return 0; };
   for_each_on(threads, tasks.size(), nothing, [&](std::size_t k, int) {
-    found[k] =
-        score_heading(plan, uprights[tasks[k].upright], has_sides, region, tasks[k].heading);
+    found[k] = score_heading(plan, uprights[tasks[k].upright], has_sides, region, tasks[k].heading);
   });
   std::vector<std::vector<Place>> coarse(uprights.size());
   for (std::size_t k = 0; k < tasks.size(); ++k)

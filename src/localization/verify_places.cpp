@@ -81,8 +81,8 @@ std::vector<PoseVerification> verify_coarsely(const Context& context, const MapS
 }  // namespace
 
 std::vector<Verified> verify_places(const Context& context, const MapState& map,
-                             const LocateOptions& options, const Scan& scan,
-                             const std::vector<Verified>& before) {
+                                    const LocateOptions& options, const Scan& scan,
+                                    const std::vector<Verified>& before) {
   std::vector<PointCloud> around;
   std::vector<Pair> pairs;
   std::vector<std::vector<UnalignedIsometry3d>> poses;

@@ -4,9 +4,9 @@
 #include <string>
 #include <thread>
 
+#include "common/for_each_on.hpp"
 #include "common/validate.hpp"
 #include "gpureg/pruning.hpp"
-#include "common/for_each_on.hpp"
 #include "pruning/likeness.hpp"
 
 namespace gpureg::pruning {

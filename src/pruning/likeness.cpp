@@ -4,8 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "pruning/agreement.hpp"
 #include "common/for_each_on.hpp"
+#include "pruning/agreement.hpp"
 
 namespace gpureg::pruning {
 namespace {

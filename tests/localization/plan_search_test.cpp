@@ -55,8 +55,8 @@ TEST(FrequentAxes, AreThoseOfTheNormalsUpToTheSign) {
   std::vector<Eigen::Vector3f> normals;
   const auto add = [&](const Eigen::Vector3f& direction, int count) {
     for (int k = 0; k < count; ++k)
-      normals.push_back((direction + Eigen::Vector3f(noise(random), noise(random), noise(random)))
-                            .normalized());
+      normals.push_back(
+          (direction + Eigen::Vector3f(noise(random), noise(random), noise(random))).normalized());
   };
   const Eigen::Vector3f up = Eigen::Vector3f(1, 2, 2).normalized();
   const Eigen::Vector3f wall = Eigen::Vector3f(2, 1, -2).normalized();
@@ -94,7 +94,8 @@ TEST(FloorPlan, WallsFaceTheSensor) {
   ASSERT_GT(plan.width, 0);
   // Two surfaces that meet at the origin; the axis of one room may be that of either.
   const bool is_along_y = std::abs((plan.turn * Eigen::Vector3f::UnitY())[2]) > 0.5f;
-  const Eigen::Vector3f place = is_along_y ? Eigen::Vector3f(0.05f, 1, 1) : Eigen::Vector3f(2, 0.05f, 1);
+  const Eigen::Vector3f place =
+      is_along_y ? Eigen::Vector3f(0.05f, 1, 1) : Eigen::Vector3f(2, 0.05f, 1);
   const Eigen::Vector3f at =
       (plan.turn * (place - MapState::of(map).origin.cast<float>()) - plan.corner) / plan.cell;
   const std::uint32_t bits =
@@ -200,7 +201,8 @@ TEST(PlanSearch, SameBitsForAnyNumberOfThreads) {
   const Scan scan = scan_of(Query(3, 2, 1).scan, MapState::of(map));
   const std::vector<double> expected = numbers_of(places_of(scan, map, 1));
   EXPECT_FALSE(expected.empty());
-  for (const unsigned threads : {2u, 5u}) EXPECT_EQ(numbers_of(places_of(scan, map, threads)), expected);
+  for (const unsigned threads : {2u, 5u})
+    EXPECT_EQ(numbers_of(places_of(scan, map, threads)), expected);
 }
 
 TEST(PlanSearch, MapsAndScansWithoutWallsHaveNoPlaces) {
