@@ -120,8 +120,9 @@ struct LocateOptions {
   /// more matches of its own than the scan has, and a random choice of few holds hardly any of the
   /// scan's.
   std::uint32_t max_matches = 65536;
-  /// All tiles are searched with voxels this many times as wide as those of the map, 1..8: several
-  /// times as fast, and thinned scans of spinning LiDARs find more. 1: with those of the map.
+  /// Where the view from above does not tell the place, all tiles are searched with voxels this
+  /// many times as wide as those of the map, 1..8: several times as fast, and thinned scans of
+  /// spinning LiDARs find more. 1: with those of the map.
   double coarse_factor = 2;
   /// In a map of more tiles, all are searched in voxels twice as wide again first, and at most so
   /// many in coarse ones, >= 1: those in which that search was the most confident. Scans with less
@@ -188,15 +189,18 @@ struct LocateResult {
   /// not among the candidates.
   double absent_probability = 1;
   std::size_t scan_points = 0;          ///< prepared points of the scan
-  std::size_t tiles = 0;                ///< tiles that the scan was aligned with
+  std::size_t tiles = 0;                ///< that the scan was aligned with; 0: seen from above
   std::size_t neighborhood_points = 0;  ///< points of the map around the first pose
 };
 
-/// Finds the poses of scans in a map: aligns each scan with every tile in coarse voxels, merges the
-/// poses of all tiles, and verifies the most confident ones against the whole map around them, in
-/// its own voxels. Where none is sure, but one is possible, the best tiles are searched in those,
-/// too. All places compete for the confidence. A part of the scan that the map lacks, or that sees
-/// through what the map has, makes a place less likely.
+/// Finds the poses of scans in a map. First it looks at both from above, along the most frequent
+/// normal of the map and along those of the scan, and finds the places where most walls coincide
+/// (after Olson, "Real-time correlative scan matching", ICRA 2009), of all cells and headings. The
+/// best are verified against the whole map around them. Where that is not sure, the scan is aligned
+/// with every tile in coarse voxels, the poses of all tiles are merged, and the most confident ones
+/// are verified; where none is sure, but one is possible, the best tiles are searched in the voxels
+/// of the map, too. All places compete for the confidence. A part of the scan that the map lacks,
+/// or that sees through what the map has, makes a place less likely.
 ///
 /// @param scans host memory; viewpoints as for prepare().
 /// @param priors one per scan, or none.

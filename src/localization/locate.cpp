@@ -9,10 +9,9 @@
 namespace gpureg::localization {
 namespace {
 
-/// Confidence of a place of the plan that stands out, and share of a scan's points that agree with
-/// it, from which on it is verified before the tiles are searched; and least confidence of the
-/// verification from which on it takes part afterwards.
-constexpr double kStandsOut = 0.35, kAgreeing = 0.7, kPossible = 0.05;
+/// Least confidence of the verification with which a place of the plan takes part in the search of
+/// the tiles.
+constexpr double kPossible = 0.05;
 
 double best_searched(const Scan& scan) {
   return scan.candidates.empty() ? 0 : scan.candidates.front().confidence;
@@ -126,6 +125,9 @@ std::vector<LocateResult> locate(const Context& context, const std::vector<Point
   for (std::size_t k = 0; k < scans.size(); ++k) {
     Scan scan = scan_of(prepared[k], priors.empty() ? LocatePrior{} : priors[k]);
     scan.planned = search_plan(state, state.plan(threads), scan, options.candidates, threads);
+    for (const Candidate& place : scan.planned)
+      if (scan.seen_from_above.empty() || place.confidence >= kStandsOut)
+        scan.seen_from_above.push_back(place);
     scan.candidates = scan.planned;
     keep_likely(options, scan);
     std::vector<Verified> places;

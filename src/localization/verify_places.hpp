@@ -11,6 +11,9 @@ constexpr double kSure = 0.75, kSureSearch = 0.95;
 /// Where no pose of the coarse search reaches this confidence, the scan is not in the map, if its
 /// coarse points are so many that the search had something to see.
 constexpr double kHopelessSearch = 0.1;
+/// Confidence of a place of the plan that stands out, and share of a scan's points that agree with
+/// it, from which on it is verified before the tiles are searched.
+constexpr double kStandsOut = 0.35, kAgreeing = 0.7;
 
 /// A candidate in all of the map around it.
 struct Verified {
