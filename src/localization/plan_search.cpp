@@ -27,7 +27,7 @@ constexpr std::size_t kAtOnce = 128, kRefined = 8, kWallsRefined = 150'000, kOfA
 /// Cells scored at once: they stay in the cache.
 constexpr int kCellsAtOnce = 1 << 14;
 /// Half the width of the search around a coarse place, in cells and in steps of the heading.
-constexpr int kAround = 3, kTurnsAround = 2;
+constexpr int kAroundPlace = 3, kTurnsAround = 2;
 /// Heights of one place that go on, at least so many cells apart, with this share of the best.
 constexpr std::size_t kHeights = 3;
 constexpr int kHeightsApart = 5;
@@ -254,7 +254,7 @@ std::vector<Place> peaks(std::vector<Place> places, int headings, std::size_t mo
 
 /// The best cell and heading, in half the step, around a coarse place.
 Place refine(const FloorPlan& plan, const Upright& scan, bool has_sides, const Place& coarse) {
-  constexpr int kEdge = 2 * kAround + 1;
+  constexpr int kEdge = 2 * kAroundPlace + 1;
   Place best;
   best.score = -1;
   for (int turn = -kTurnsAround; turn <= kTurnsAround; ++turn) {
@@ -265,7 +265,8 @@ Place refine(const FloorPlan& plan, const Upright& scan, bool has_sides, const P
       const Turned cell = turned(wall, at, plan.cell);
       std::uint32_t bits = 1u << cell.direction;
       if (!has_sides) bits = facing::both_sides(bits);
-      const int x = 2 * coarse.x + cell.dx - kAround, y = 2 * coarse.y + cell.dy - kAround;
+      const int x = 2 * coarse.x + cell.dx - kAroundPlace,
+                y = 2 * coarse.y + cell.dy - kAroundPlace;
       for (int v = 0; v < kEdge; ++v) {
         if (y + v < 0 || y + v >= plan.height) continue;
         const std::uint16_t* row =
@@ -279,7 +280,7 @@ Place refine(const FloorPlan& plan, const Upright& scan, bool has_sides, const P
       for (int u = 0; u < kEdge; ++u) {
         const int score = scores[static_cast<std::size_t>(v * kEdge + u)];
         if (score > best.score)
-          best = {score, 2 * coarse.x + u - kAround, 2 * coarse.y + v - kAround, heading};
+          best = {score, 2 * coarse.x + u - kAroundPlace, 2 * coarse.y + v - kAroundPlace, heading};
       }
   }
   return best;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "localization/sight.hpp"
+#include "localization/change/sight.hpp"
 
 #include <algorithm>
 #include <atomic>

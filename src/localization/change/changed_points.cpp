@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "localization/changed_points.hpp"
+#include "localization/change/changed_points.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -7,7 +7,7 @@
 #include <numeric>
 
 #include "common/host_threads.hpp"
-#include "localization/sight.hpp"
+#include "localization/change/sight.hpp"
 #include "math/exponential.hpp"
 
 namespace gpureg::localization {

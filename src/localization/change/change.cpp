@@ -5,7 +5,7 @@
 #include <cmath>
 
 #include "localization/candidates.hpp"
-#include "localization/changed_points.hpp"
+#include "localization/change/changed_points.hpp"
 #include "localization/check_scan.hpp"
 
 namespace gpureg::localization {
