@@ -206,7 +206,7 @@ def main() -> None:
                 "correct": here and bool(errors) and min(errors[0]) < CORRECT,
                 "copies": len(places) if here else 0,
                 "aliases": sum(min(e) < CORRECT for e in aliases) if here else 0,
-                "tiles": scan["tiles"],
+                "tiles": result["map"]["tiles"],
                 "map_points": result["map"]["points"],
                 "cpu_seconds": round(seconds / len(paths), 2),
                 "peak_memory_mib": round(result["peak_memory_mib"]),
