@@ -13,7 +13,7 @@ namespace gpureg::localization {
 namespace {
 
 /// Normals that are looked at, and the cosines within which they agree and belong to an axis.
-constexpr std::size_t kNormals = 2048;
+constexpr std::size_t kNormals = 1024;
 constexpr float kAgree = 0.985f, kBelong = 0.98f;
 /// Sines of the slope of a wall, at most, and of a floor, at least.
 constexpr float kWall = 0.4f, kFloor = 0.8f;

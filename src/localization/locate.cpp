@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <algorithm>
 
+#include "common/for_each_on.hpp"
 #include "fields/localization.hpp"
 #include "localization/check_scan.hpp"
 #include "localization/plan_search.hpp"
@@ -32,6 +33,26 @@ LocateStatus status_of(const LocateResult& result, double min_confidence) {
 
 bool is_sure(const LocateResult& result) {
   return !result.poses.empty() && result.poses.front().confidence >= kSure;
+}
+
+/// Sets the places that the plan of the map proposes. Many scans are searched side by side.
+void see_from_above(const MapState& map, const LocateOptions& options, unsigned threads,
+                    std::vector<Scan>& scans) {
+  if (scans.empty()) return;
+  const FloorPlan& plan = map.plan(threads);
+  const unsigned of_scan =
+      std::max(1u, threads / static_cast<unsigned>(std::min<std::size_t>(scans.size(), threads)));
+  for_each_on(
+      threads, scans.size(), [] { return 0; },
+      [&](std::size_t k, int) {
+        Scan& scan = scans[k];
+        scan.planned = search_plan(map, plan, scan, options.candidates, of_scan);
+        for (const Candidate& place : scan.planned)
+          if (scan.seen_from_above.empty() || place.confidence >= kStandsOut)
+            scan.seen_from_above.push_back(place);
+        scan.candidates = scan.planned;
+        keep_likely(options, scan);
+      });
 }
 
 /// Whether the best place of the plan stands out, or most of the scan agrees with it.
@@ -118,18 +139,15 @@ std::vector<LocateResult> locate(const Context& context, const std::vector<Point
   }
   const std::vector<PreparedCloud> prepared =
       prepare_batch(context, scans, state.options.prepare, names);
-  const unsigned threads = host_threads(context);
+  std::vector<Scan> all;
+  for (std::size_t k = 0; k < scans.size(); ++k)
+    all.push_back(scan_of(prepared[k], priors.empty() ? LocatePrior{} : priors[k]));
+  see_from_above(state, options, host_threads(context), all);
   std::vector<LocateResult> out;
   std::vector<std::size_t> open;  // scans that the plan does not place surely
   std::vector<Scan> searched;
   for (std::size_t k = 0; k < scans.size(); ++k) {
-    Scan scan = scan_of(prepared[k], priors.empty() ? LocatePrior{} : priors[k]);
-    scan.planned = search_plan(state, state.plan(threads), scan, options.candidates, threads);
-    for (const Candidate& place : scan.planned)
-      if (scan.seen_from_above.empty() || place.confidence >= kStandsOut)
-        scan.seen_from_above.push_back(place);
-    scan.candidates = scan.planned;
-    keep_likely(options, scan);
+    Scan& scan = all[k];
     std::vector<Verified> places;
     if (is_promising(scan)) {
       places = verify_places(context, state, options, scan);

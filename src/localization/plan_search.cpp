@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
-#include <set>
 #include <unordered_set>
 
 #include "common/for_each_on.hpp"
@@ -67,14 +66,22 @@ std::vector<T> some_of(const std::vector<T>& all, std::size_t most) {
   return out;
 }
 
+/// A cell and what faces it, as one number; a scan reaches less than 2^14 cells, but for heights.
+std::uint64_t key_of(int x, int y, int z, std::uint32_t faces) {
+  const auto part = [](int value, int bits) {
+    return static_cast<std::uint64_t>(value) & ((std::uint64_t{1} << bits) - 1);
+  };
+  return part(x, 16) << 48 | part(y, 16) << 32 | part(z, 14) << 18 | faces;
+}
+
 /// One wall per cell and direction.
 std::vector<Wall> walls_in_cells(const std::vector<Wall>& walls, float cell, std::size_t most) {
-  std::set<std::array<int, 3>> seen;
+  std::unordered_set<std::uint64_t> seen;
   std::vector<Wall> out;
   for (const Wall& wall : walls)
-    if (seen.insert({static_cast<int>(std::floor(wall.x / cell)),
-                     static_cast<int>(std::floor(wall.y / cell)),
-                     static_cast<int>(std::lround(wall.direction))})
+    if (seen.insert(key_of(static_cast<int>(std::floor(wall.x / cell)),
+                           static_cast<int>(std::floor(wall.y / cell)),
+                           static_cast<int>(std::lround(wall.direction)), 0))
             .second)
       out.push_back(wall);
   return some_of(out, most);
@@ -109,7 +116,7 @@ Upright stand(const ScanPoints& scan, const Eigen::Vector3f& up, float cell) {
   constexpr float kPerRadian = facing::kDirections / (2 * kPi);
   std::vector<Wall> walls;
   std::vector<Upright::Point> points;
-  std::set<std::array<int, 4>> seen;
+  std::unordered_set<std::uint64_t> seen;
   float farthest = 0;
   for (std::size_t k = 0; k < scan.points.size(); ++k) {
     const Eigen::Vector3f normal = out.turn * scan.normals[k];
@@ -118,8 +125,7 @@ Upright stand(const ScanPoints& scan, const Eigen::Vector3f& up, float cell) {
     const float distance = at.head<2>().norm();
     if (faces == 0 || distance > reach) continue;
     const Eigen::Vector3i in = (at / cell).array().floor().cast<int>();
-    if (seen.insert({in[0], in[1], in[2], static_cast<int>(faces)}).second)
-      points.push_back({at, normal});
+    if (seen.insert(key_of(in[0], in[1], in[2], faces)).second) points.push_back({at, normal});
     if ((faces & facing::kWalls) == 0) continue;
     farthest = std::max(farthest, distance);
     walls.push_back({at[0], at[1], faces, exact_atan2(normal[1], normal[0]) * kPerRadian});
@@ -409,12 +415,15 @@ std::vector<Candidate> search_plan(const MapState& map, const FloorPlan& plan, c
   const Region region = region_of(map, plan, scan);
   if ((region.high - region.low).minCoeff() <= 0) return {};
 
-  std::vector<Upright> uprights;
+  std::vector<Eigen::Vector3f> verticals;
   for (const Axis& axis : possible_verticals(centred.normals)) {
-    uprights.push_back(stand(centred, axis.direction, plan.cell));
-    if (plan.has_ceiling || !has_sides || faces_both(axis))
-      uprights.push_back(stand(centred, -axis.direction, plan.cell));
+    verticals.push_back(axis.direction);
+    if (plan.has_ceiling || !has_sides || faces_both(axis)) verticals.push_back(-axis.direction);
   }
+  std::vector<Upright> uprights(verticals.size());
+  for_each_on(
+      threads, verticals.size(), [] { return 0; },
+      [&](std::size_t u, int) { uprights[u] = stand(centred, verticals[u], plan.cell); });
   struct Task {
     std::size_t upright;
     int heading;
