@@ -47,9 +47,6 @@ void see_from_above(const MapState& map, const LocateOptions& options, unsigned 
       [&](std::size_t k, int) {
         Scan& scan = scans[k];
         scan.planned = search_plan(map, plan, scan, options.candidates, of_scan);
-        for (const Candidate& place : scan.planned)
-          if (scan.seen_from_above.empty() || place.confidence >= kStandsOut)
-            scan.seen_from_above.push_back(place);
         scan.candidates = scan.planned;
         keep_likely(options, scan);
       });

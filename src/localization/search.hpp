@@ -16,9 +16,7 @@ struct Scan {
   std::size_t tiles = 0;  ///< that the scan was aligned with
   std::vector<Candidate> candidates;
   std::vector<Candidate> planned;  ///< those of the plan of the map
-  /// The place of the plan that most of the scan agrees with, and others that stand out.
-  std::vector<Candidate> seen_from_above;
-  std::vector<double> best;  ///< per tile: the largest confidence of a mode
+  std::vector<double> best;        ///< per tile: the largest confidence of a mode
 };
 
 /// So many points show enough of a place to tell that it is not there.

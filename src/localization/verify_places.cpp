@@ -20,22 +20,9 @@ constexpr double kContained = 0.9, kLogOddsOfRest = 8;
 constexpr double kInFreeSpace = 0.005, kLogOddsInFreeSpace = 150;
 constexpr double kInFront = 0.01, kLogOddsInFront = 100;
 constexpr double kMostLogOdds = 4;
-/// And a place that the plan does not show, where no place of it agrees with most of the scan: that
-/// happens to one of six right places, and to nearly all others.
-constexpr double kLogOddsUnseen = 1.8;
-
-/// Whether the plan of the map shows the place, or cannot tell.
-bool is_seen_from_above(const Scan& scan, const UnalignedIsometry3d& map_from_scan,
-                        const EvidenceOptions& options) {
-  const std::vector<Candidate>& seen = scan.seen_from_above;
-  return seen.empty() || seen.front().agreeing >= kAgreeing ||
-         std::any_of(seen.begin(), seen.end(), [&](const Candidate& place) {
-           return same_place(place.map_from_scan, map_from_scan, scan.middle, options);
-         });
-}
 
 /// Log odds against a place. Sparse scans are contained in wide voxels at least.
-double doubt(const PoseVerification& fine, const PoseVerification& wide, bool seen_from_above) {
+double doubt(const PoseVerification& fine, const PoseVerification& wide) {
   const PoseEvidence& e = fine.evidence;
   const double contained =
       std::max(e.source_overlap_any_normal, wide.evidence.source_overlap_any_normal);
@@ -44,17 +31,15 @@ double doubt(const PoseVerification& fine, const PoseVerification& wide, bool se
       kLogOddsInFreeSpace * beyond(e.target_free_space_violation, kInFreeSpace) +
       kLogOddsInFront * (beyond(e.source_front_violation_near, kInFront) +
                          beyond(e.target_front_violation_near, kInFront));
-  return kLogOddsOfRest * beyond(kContained, contained) + std::min(kMostLogOdds, contradicted) +
-         (seen_from_above ? 0 : kLogOddsUnseen);
+  return kLogOddsOfRest * beyond(kContained, contained) + std::min(kMostLogOdds, contradicted);
 }
 
 /// The mean of the log odds of the search and the verification, where it is more than that of the
 /// verification alone, less the doubt.
-double confidence_of(double searched, const PoseVerification& fine, const PoseVerification& wide,
-                     bool seen_from_above) {
+double confidence_of(double searched, const PoseVerification& fine, const PoseVerification& wide) {
   const double verified = odds_of(std::max(fine.confidence, wide.confidence));
   const double odds = std::max(verified, std::sqrt(odds_of(searched) * verified)) *
-                      portable::exp(-doubt(fine, wide, seen_from_above));
+                      portable::exp(-doubt(fine, wide));
   return odds / (1 + odds);
 }
 
@@ -132,9 +117,7 @@ std::vector<Verified> verify_places(const Context& context, const MapState& map,
   const auto coarse = verify_coarsely(context, map, options, scan, fine, around);
   for (std::size_t k = 0; k < results.size(); ++k) {
     Verified& v = out[open[k]];
-    v.confidence = confidence_of(
-        v.candidate.confidence, v.verification, coarse[k],
-        is_seen_from_above(scan, v.verification.target_from_source, options.registration.evidence));
+    v.confidence = confidence_of(v.candidate.confidence, v.verification, coarse[k]);
   }
   std::stable_sort(out.begin(), out.end(), [](const Verified& a, const Verified& b) {
     return a.confidence > b.confidence;
