@@ -19,9 +19,10 @@ constexpr float kAgree = 0.985f, kBelong = 0.98f;
 constexpr float kWall = 0.4f, kFloor = 0.8f;
 /// Share of an axis that its opposite has at least where a map has ceilings.
 constexpr double kCeilings = 0.1;
-constexpr int kFacingBits = 18;
-constexpr std::uint32_t kMostHeight = (1u << (32 - kFacingBits)) - 1;
-constexpr double kMostCells = 1 << 27;
+constexpr std::uint32_t kMostHeight = (1u << FloorPlan::kHeightBits) - 1;
+/// A map of so many coarse cells, or of twice as many as it has points, has far stray points: its
+/// plan would be empty nearly everywhere, and a search through it would take too long.
+constexpr double kAnyCells = 1 << 17, kCellsOfPoint = 2;
 
 using Entry = FloorPlan::Entry;
 
@@ -40,10 +41,11 @@ void merge(std::vector<Entry>& entries) {
 /// The map's normals. Those of tiles without sides are estimated.
 class Normals {
  public:
-  explicit Normals(const MapState& map) : map_(map), estimated_(map.tiles.size()) {
+  Normals(const MapState& map, unsigned threads) : map_(map), estimated_(map.tiles.size()) {
+    const Context context = Context::cpu(threads);
     for (std::size_t tile = 0; tile < map.tiles.size(); ++tile) {
       if (knows(tile)) continue;
-      estimated_[tile] = tile_normals(Context::cpu(), map, tile);
+      estimated_[tile] = tile_normals(context, map, tile);
       has_sides_ = false;
     }
   }
@@ -153,7 +155,7 @@ std::uint32_t both_sides(std::uint32_t facing) {
 }  // namespace facing
 
 FloorPlan::FloorPlan(const MapState& map, unsigned threads) {
-  const Normals normals(map);
+  const Normals normals(map, threads);
   has_sides = normals.has_sides();
   const std::vector<Axis> axes = frequent_axes(normals.some(), 1);
   if (axes.empty()) return;
@@ -166,7 +168,8 @@ FloorPlan::FloorPlan(const MapState& map, unsigned threads) {
   const auto coarse_cells = [&](int axis) {
     return std::floor(static_cast<double>(box.sizes()[axis]) / (2 * static_cast<double>(cell))) + 2;
   };
-  if (coarse_cells(0) * coarse_cells(1) > kMostCells) return;
+  const double with_margin = (coarse_cells(0) + 2 * kMargin) * (coarse_cells(1) + 2 * kMargin);
+  if (with_margin > kAnyCells + kCellsOfPoint * static_cast<double>(map.points.size())) return;
   corner = box.min().array() - cell / 2;
   width = 2 * static_cast<int>(coarse_cells(0));
   height = 2 * static_cast<int>(coarse_cells(1));
@@ -190,7 +193,7 @@ FloorPlan::FloorPlan(const MapState& map, unsigned threads) {
               const std::uint64_t number =
                   static_cast<std::uint64_t>(y) * static_cast<std::uint64_t>(width) +
                   static_cast<std::uint64_t>(x);
-              entries.push_back({number << (32 - kFacingBits) | up, faces});
+              entries.push_back({number << kHeightBits | up, faces});
             }
         }
         merge(entries);
@@ -211,10 +214,10 @@ void FloorPlan::fill_columns(const std::vector<Entry>& entries) {
   column_begin.assign(cells + 1, 0);
   columns.reserve(entries.size());
   for (const Entry& entry : entries) {
-    const std::uint64_t number = entry.key >> (32 - kFacingBits);
+    const std::uint64_t number = entry.key >> kHeightBits;
     walls[number] |= static_cast<std::uint16_t>(entry.facing & facing::kWalls);
     ++column_begin[number + 1];
-    columns.push_back(static_cast<std::uint32_t>(entry.key) << kFacingBits | entry.facing);
+    columns.push_back(static_cast<std::uint32_t>(entry.key) << facing::kBits | entry.facing);
   }
   for (std::size_t k = 0; k < cells; ++k) column_begin[k + 1] += column_begin[k];
 }

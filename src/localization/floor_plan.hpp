@@ -23,7 +23,7 @@ Eigen::Matrix3f upright(const Eigen::Vector3f& direction);
 
 /// What faces a point of a surface, as bits: 16 directions of walls, floor and ceiling.
 namespace facing {
-constexpr int kDirections = 16;
+constexpr int kDirections = 16, kBits = kDirections + 2;
 constexpr std::uint32_t kWalls = (1u << kDirections) - 1, kFloor = 1u << 16, kCeiling = 1u << 17;
 /// Bits of a normal, upright; 0 for a slope. exact: for walls the nearest direction alone, without
 /// both neighbours.
@@ -38,6 +38,7 @@ std::uint32_t both_sides(std::uint32_t facing);
 struct FloorPlan {
   /// Cells of the search, in voxels.
   static constexpr float kCell = 2;
+  static constexpr int kHeightBits = 32 - facing::kBits;
   /// Walls of a scan farther from its middle, in voxels, do not decide: a step of the heading moves
   /// them too far.
   static constexpr float kReach = 100;
@@ -51,16 +52,17 @@ struct FloorPlan {
   bool has_ceiling = false;  ///< some surfaces face the opposite of the axis
   float cell = 0;            ///< metres
   Eigen::Vector3f corner{0, 0, 0};
-  int width = 0, height = 0;         ///< cells, even; 0: the map is too wide or has no normals
+  int width = 0,
+      height = 0;  ///< cells, even; 0: no plan, the map has no normals or far stray points
   std::vector<std::uint16_t> walls;  ///< per cell: the directions that walls in it face
   /// Per plane and coarse cell: whether it has such a wall.
   std::vector<std::uint8_t> coarse;
-  /// The entries of each cell: height over `corner` in cells << 18 | what faces.
+  /// The entries of each cell: height over `corner` in cells << facing::kBits | what faces.
   std::vector<std::uint32_t> column_begin, columns;
 
   FloorPlan(const MapState& map, unsigned threads);
 
-  /// Of a cell: its number << 14 | a height, and what faces.
+  /// Of a cell: its number << kHeightBits | a height, and what faces.
   struct Entry {
     std::uint64_t key;
     std::uint32_t facing;

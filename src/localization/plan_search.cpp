@@ -3,7 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
+#include <limits>
 #include <unordered_set>
 
 #include "common/for_each_on.hpp"
@@ -38,7 +38,6 @@ constexpr double kUsualRival = 0.88, kLogOddsOfRival = 30;
 
 struct Wall {
   float x, y;
-  std::uint32_t facing;
   float direction;  ///< of facing::kDirections
 };
 
@@ -89,7 +88,6 @@ std::vector<Wall> walls_in_cells(const std::vector<Wall>& walls, float cell, std
 
 struct ScanPoints {
   std::vector<Eigen::Vector3f> points, normals;  ///< relative to the middle
-  bool has_sides = false;
 };
 
 /// Floors of the map may be what faces the axis or what faces the opposite.
@@ -128,7 +126,7 @@ Upright stand(const ScanPoints& scan, const Eigen::Vector3f& up, float cell) {
     if (seen.insert(key_of(in[0], in[1], in[2], faces)).second) points.push_back({at, normal});
     if ((faces & facing::kWalls) == 0) continue;
     farthest = std::max(farthest, distance);
-    walls.push_back({at[0], at[1], faces, exact_atan2(normal[1], normal[0]) * kPerRadian});
+    walls.push_back({at[0], at[1], exact_atan2(normal[1], normal[0]) * kPerRadian});
   }
   out.walls = walls_in_cells(walls, cell, kWalls);
   out.coarse_walls = walls_in_cells(walls, 2 * cell, kCoarseWalls);
@@ -349,7 +347,7 @@ std::vector<Height> heights_of(const FloorPlan& plan, const Upright& scan, bool 
     for (std::uint32_t k = plan.column_begin[cell]; k < plan.column_begin[cell + 1]; ++k) {
       if ((plan.columns[k] & faces) == 0) continue;
       const int shift =
-          static_cast<int>(plan.columns[k] >> 18) - static_cast<int>(std::floor(at[2]));
+          static_cast<int>(plan.columns[k] >> facing::kBits) - static_cast<int>(std::floor(at[2]));
       // One point votes once for a height and the one below it.
       for (const int vote : {shift - 1, shift})
         if (vote > last) shifts.push_back(last = vote);
@@ -392,10 +390,10 @@ UnalignedIsometry3d pose_of(const MapState& map, const FloorPlan& plan, const Up
 /// more votes than any other, and what others have in a map without the right one is about equal.
 void rate(std::vector<Candidate>& places) {
   if (places.empty()) return;
-  const double first = places.front().confidence;
-  const double second = places.size() > 1 ? places[1].confidence : 0;
+  const double first = places.front().agreeing;
+  const double second = places.size() > 1 ? places[1].agreeing : 0;
   for (std::size_t k = 0; k < places.size(); ++k) {
-    const double rival = (k == 0 ? second : first) / places[k].confidence;
+    const double rival = (k == 0 ? second : first) / places[k].agreeing;
     const double odds = portable::exp(kLogOddsOfRival * (kUsualRival - rival));
     places[k].confidence = odds / (1 + odds);
   }
@@ -459,9 +457,9 @@ std::vector<Candidate> search_plan(const MapState& map, const FloorPlan& plan, c
       const Upright& up = uprights[fine[k].upright];
       Candidate candidate;
       candidate.map_from_scan = pose_of(map, plan, up, scan, fine[k].place, height.at);
-      candidate.confidence = static_cast<double>(height.votes) /
-                             static_cast<double>(std::max<std::size_t>(1, up.points.size()));
-      candidate.agreeing = candidate.confidence;
+      candidate.agreeing =
+          static_cast<double>(height.votes) / static_cast<double>(up.points.size());
+      candidate.confidence = candidate.agreeing;  // distinct() keeps the most; rate() follows
       candidate.mode = out.size();
       if (!contradicts(scan, candidate.map_from_scan)) out.push_back(candidate);
     }
