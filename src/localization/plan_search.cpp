@@ -7,6 +7,7 @@
 #include <unordered_set>
 
 #include "common/for_each_on.hpp"
+#include "common/stop_scope.hpp"
 #include "math/atan2.hpp"
 #include "math/exponential.hpp"
 #include "math/trigonometry.hpp"
@@ -432,6 +433,7 @@ std::vector<Candidate> search_plan(const MapState& map, const FloorPlan& plan, c
   std::vector<std::vector<Place>> found(tasks.size());
   const auto nothing = [] { return 0; };
   for_each_on(threads, tasks.size(), nothing, [&](std::size_t k, int) {
+    StopScope::poll();
     found[k] = score_heading(plan, uprights[tasks[k].upright], has_sides, region, tasks[k].heading);
   });
   std::vector<std::vector<Place>> coarse(uprights.size());

@@ -190,8 +190,9 @@ bool contradicts(const Scan& scan, const UnalignedIsometry3d& map_from_scan) {
     if ((map_from_scan.translation() - known->position).norm() > known->radius) return true;
   if (const auto& gravity = scan.prior.gravity) {
     const Eigen::Vector3d up = map_from_scan.linear() * gravity->source_up.normalized();
+    constexpr double kRounding = 1e-6;  // 180 degrees permit every pose
     const double least = portable::cos(gravity->max_angle * portable::kRadiansPerDegree);
-    return up.dot(gravity->target_up.normalized()) < least;
+    return up.dot(gravity->target_up.normalized()) < least - kRounding;
   }
   return false;
 }
