@@ -20,4 +20,10 @@ void for_each_on(std::size_t threads, std::size_t count, const MakeState& make_s
   });
 }
 
+/// Calls work(k) for each k < count.
+template <typename Work>
+void for_each_on(std::size_t threads, std::size_t count, const Work& work) {
+  for_each_on(threads, count, [] { return 0; }, [&](std::size_t k, int) { work(k); });
+}
+
 }  // namespace gpureg

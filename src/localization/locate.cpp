@@ -1,10 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <algorithm>
 
-#include "common/for_each_on.hpp"
 #include "fields/localization.hpp"
 #include "localization/check_scan.hpp"
-#include "localization/plan_search.hpp"
+#include "localization/plan/plan_search.hpp"
 #include "localization/verify_places.hpp"
 
 namespace gpureg::localization {
@@ -33,23 +32,6 @@ LocateStatus status_of(const LocateResult& result, double min_confidence) {
 
 bool is_sure(const LocateResult& result) {
   return !result.poses.empty() && result.poses.front().confidence >= kSure;
-}
-
-/// Sets the places that the plan of the map proposes. Many scans are searched side by side.
-void see_from_above(const MapState& map, const LocateOptions& options, unsigned threads,
-                    std::vector<Scan>& scans) {
-  if (scans.empty()) return;
-  const FloorPlan& plan = map.plan(threads);
-  const unsigned of_scan =
-      std::max(1u, threads / static_cast<unsigned>(std::min<std::size_t>(scans.size(), threads)));
-  for_each_on(
-      threads, scans.size(), [] { return 0; },
-      [&](std::size_t k, int) {
-        Scan& scan = scans[k];
-        scan.planned = search_plan(map, plan, scan, options.candidates, of_scan);
-        scan.candidates = scan.planned;
-        keep_likely(options, scan);
-      });
 }
 
 /// Whether the best place of the plan stands out, or most of the scan agrees with it.
@@ -139,7 +121,11 @@ std::vector<LocateResult> locate(const Context& context, const std::vector<Point
   std::vector<Scan> all;
   for (std::size_t k = 0; k < scans.size(); ++k)
     all.push_back(scan_of(prepared[k], priors.empty() ? LocatePrior{} : priors[k]));
-  see_from_above(state, options, host_threads(context), all);
+  search_plan(context, state, options.candidates, all);
+  for (Scan& scan : all) {
+    scan.candidates = scan.planned;
+    keep_likely(options, scan);
+  }
   std::vector<LocateResult> out;
   std::vector<std::size_t> open;  // scans that the plan does not place surely
   std::vector<Scan> searched;

@@ -10,6 +10,11 @@
 #include "gpureg/localization.hpp"
 #include "localization/horizon.hpp"
 
+namespace gpureg {
+class Engine;
+class PlanMatcher;
+}  // namespace gpureg
+
 namespace gpureg::localization {
 
 /// Sides of surfaces need the direction of a normal only roughly.
@@ -55,6 +60,8 @@ struct MapState {
 
   /// Made when the first scan needs it.
   const FloorPlan& plan(unsigned threads) const;
+  /// The plan in the memory of the context's engine.
+  std::shared_ptr<PlanMatcher> plan_matcher(const Context& context) const;
 
   static const MapState& of(const PreparedMap& map);
   static PreparedMap map(std::shared_ptr<const MapState> state) {
@@ -73,6 +80,7 @@ struct MapState {
   mutable std::once_flag planned_;
   mutable std::shared_ptr<const FloorPlan> plan_;
   mutable std::mutex mutex_;
+  mutable std::vector<std::pair<std::weak_ptr<Engine>, std::shared_ptr<PlanMatcher>>> matchers_;
   mutable std::map<Key, Cached> cache_;
   mutable std::size_t cached_points_ = 0;
   mutable std::uint64_t searches_ = 0;

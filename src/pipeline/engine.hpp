@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "pipeline/plan_matcher.hpp"
 #include "pipeline/prepared_state.hpp"
 #include "pipeline/surface_matcher.hpp"
 
@@ -45,6 +46,8 @@ class Engine {
                       Span<PairOutcome> outcomes) = 0;
   /// Surfaces for comparisons in pairs. The arrays, in host memory, have to outlive the result.
   virtual std::unique_ptr<SurfaceMatcher> match_surfaces(Span<const SurfaceArrays> surfaces) = 0;
+  /// The arrays of the map, in host memory, have to outlive the result.
+  virtual std::unique_ptr<PlanMatcher> match_plan(const plan::Map& map) = 0;
 };
 
 /// threads > 0. Throws BackendUnavailable where this processor lacks instructions that the stages

@@ -51,6 +51,9 @@ class IdleHostEngine final : public Engine {
   std::unique_ptr<SurfaceMatcher> match_surfaces(Span<const SurfaceArrays> surfaces) override {
     return cpu_->match_surfaces(surfaces);
   }
+  std::unique_ptr<PlanMatcher> match_plan(const plan::Map& map) override {
+    return cpu_->match_plan(map);
+  }
 
   std::function<void(std::size_t)> before_align;  ///< gets the number of the call
   std::atomic<std::size_t> calls{0};

@@ -49,6 +49,9 @@ class LimitedEngine final : public Engine {
   std::unique_ptr<SurfaceMatcher> match_surfaces(Span<const SurfaceArrays> surfaces) override {
     return cpu_->match_surfaces(surfaces);
   }
+  std::unique_ptr<PlanMatcher> match_plan(const plan::Map& map) override {
+    return cpu_->match_plan(map);
+  }
 
   std::size_t refused = 0;
 

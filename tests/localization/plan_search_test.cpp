@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "localization/plan_search.hpp"
+#include "localization/plan/plan_search.hpp"
 
 #include <gtest/gtest.h>
 
 #include "localization/building.hpp"
+#include "localization/plan/floor_plan.hpp"
 
 namespace gpureg::test {
 namespace {
@@ -27,9 +28,11 @@ Scan scan_of(const PointCloud& cloud, const MapState& map, const LocatePrior& pr
                                prior);
 }
 
-std::vector<Candidate> places_of(const Scan& scan, const PreparedMap& map, unsigned threads = 2) {
-  const MapState& state = MapState::of(map);
-  return search_plan(state, state.plan(2), scan, 8, threads);
+std::vector<Candidate> places_of(const Scan& scan, const PreparedMap& map,
+                                 const Context& on = context()) {
+  std::vector<Scan> scans{scan};
+  search_plan(on, MapState::of(map), 8, scans);
+  return scans[0].planned;
 }
 
 double error(const Query& query, const Candidate& place) {
@@ -98,9 +101,7 @@ TEST(FloorPlan, WallsFaceTheSensor) {
       is_along_y ? Eigen::Vector3f(0.05f, 1, 1) : Eigen::Vector3f(2, 0.05f, 1);
   const Eigen::Vector3f at =
       (plan.turn * (place - MapState::of(map).origin.cast<float>()) - plan.corner) / plan.cell;
-  const std::uint32_t bits =
-      plan.walls[static_cast<std::size_t>(at[1]) * static_cast<std::size_t>(plan.width) +
-                 static_cast<std::size_t>(at[0])];
+  const std::uint32_t bits = plan.walls_of(static_cast<int>(at[0]), static_cast<int>(at[1]));
   const Eigen::Vector3f facing =
       plan.turn * (is_along_y ? Eigen::Vector3f::UnitX() : Eigen::Vector3f::UnitY());
   EXPECT_NE(bits & localization::facing::of(facing, true), 0u);
@@ -153,7 +154,7 @@ TEST(PlanSearch, SidesThatNobodyKnowsAreBothTried) {
     const MapState& state = MapState::of(each);
     const Scan of_view =
         localization::scan_of(prepare_batch(context(), {view}, state.options.prepare)[0], {});
-    const auto places = search_plan(state, state.plan(2), of_view, 8, 2);
+    const auto places = places_of(of_view, each);
     ASSERT_FALSE(places.empty());
     EXPECT_LT(error(query, places[0]), kOfCell);
   }
@@ -199,10 +200,10 @@ TEST(PlanSearch, SaysNothingThatThePriorExcludes) {
 TEST(PlanSearch, SameBitsForAnyNumberOfThreads) {
   const PreparedMap map = building({1, 2, 3, 4}, map_options());
   const Scan scan = scan_of(Query(3, 2, 1).scan, MapState::of(map));
-  const std::vector<double> expected = numbers_of(places_of(scan, map, 1));
+  const std::vector<double> expected = numbers_of(places_of(scan, map, Context::cpu(1)));
   EXPECT_FALSE(expected.empty());
   for (const unsigned threads : {2u, 5u})
-    EXPECT_EQ(numbers_of(places_of(scan, map, threads)), expected);
+    EXPECT_EQ(numbers_of(places_of(scan, map, Context::cpu(threads))), expected);
 }
 
 TEST(PlanSearch, MapsAndScansWithoutWallsHaveNoPlaces) {

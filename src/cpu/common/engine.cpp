@@ -2,6 +2,7 @@
 #include <mutex>
 #include <string>
 
+#include "cpu/common/plan_matcher.hpp"
 #include "cpu/common/stages.hpp"
 #include "cpu/common/surface_matcher.hpp"
 #include "gpureg/context.hpp"
@@ -63,6 +64,10 @@ class CpuEngine final : public Engine {
 
   std::unique_ptr<SurfaceMatcher> match_surfaces(Span<const SurfaceArrays> surfaces) override {
     return std::make_unique<CpuSurfaces>(exec_, mutex_, surfaces);
+  }
+
+  std::unique_ptr<PlanMatcher> match_plan(const plan::Map& map) override {
+    return std::make_unique<CpuPlan>(exec_, mutex_, map);
   }
 
  private:

@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "localization/floor_plan.hpp"
+#include "localization/plan/floor_plan.hpp"
 
 #include <algorithm>
 #include <cmath>
 
+#include "api/access.hpp"
 #include "common/for_each_on.hpp"
 #include "common/radix_sort.hpp"
 #include "localization/sides.hpp"
@@ -168,16 +169,15 @@ FloorPlan::FloorPlan(const MapState& map, unsigned threads) {
   const auto coarse_cells = [&](int axis) {
     return std::floor(static_cast<double>(box.sizes()[axis]) / (2 * static_cast<double>(cell))) + 2;
   };
-  const double with_margin = (coarse_cells(0) + 2 * kMargin) * (coarse_cells(1) + 2 * kMargin);
+  const double with_margin =
+      (coarse_cells(0) + 2 * kCoarseMargin) * (coarse_cells(1) + 2 * kCoarseMargin);
   if (with_margin > kAnyCells + kCellsOfPoint * static_cast<double>(map.points.size())) return;
   corner = box.min().array() - cell / 2;
   width = 2 * static_cast<int>(coarse_cells(0));
   height = 2 * static_cast<int>(coarse_cells(1));
 
   std::vector<std::vector<Entry>> of_tiles(map.tiles.size());
-  for_each_on(
-      threads, map.tiles.size(), [] { return 0; },
-      [&](std::size_t tile, int) {
+  for_each_on(threads, map.tiles.size(), [&](std::size_t tile) {
         std::vector<Entry>& entries = of_tiles[tile];
         for (std::size_t k = map.tiles[tile].begin; k < map.tiles[tile].end; ++k) {
           std::uint32_t faces = facing::of(turn * normals.at(tile, k), false);
@@ -208,14 +208,31 @@ FloorPlan::FloorPlan(const MapState& map, unsigned threads) {
   fill_coarse();
 }
 
+plan::Map FloorPlan::view() const {
+  plan::Map out{};
+  out.coarse = coarse.data();
+  out.walls = walls.data();
+  out.coarse_rows = coarse_height() + 2 * kCoarseMargin;
+  out.coarse_words = (coarse_width() + 2 * kCoarseMargin) / 32 + 3;
+  out.rows = height + 2 * kMargin;
+  out.stride = width + 2 * kMargin;
+  out.coarse_margin = kCoarseMargin;
+  out.margin = kMargin;
+  return out;
+}
+
 void FloorPlan::fill_columns(const std::vector<Entry>& entries) {
   const std::size_t cells = static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
-  walls.assign(cells, 0);
+  walls.assign(static_cast<std::size_t>(width + 2 * kMargin) *
+                   static_cast<std::size_t>(height + 2 * kMargin),
+               0);
   column_begin.assign(cells + 1, 0);
   columns.reserve(entries.size());
   for (const Entry& entry : entries) {
     const std::uint64_t number = entry.key >> kHeightBits;
-    walls[number] |= static_cast<std::uint16_t>(entry.facing & facing::kWalls);
+    const auto row = static_cast<std::uint64_t>(width);
+    walls[place_of(static_cast<int>(number % row), static_cast<int>(number / row))] |=
+        static_cast<std::uint16_t>(entry.facing & facing::kWalls);
     ++column_begin[number + 1];
     columns.push_back(static_cast<std::uint32_t>(entry.key) << facing::kBits | entry.facing);
   }
@@ -223,27 +240,43 @@ void FloorPlan::fill_columns(const std::vector<Entry>& entries) {
 }
 
 void FloorPlan::fill_coarse() {
-  const auto rows = static_cast<std::size_t>(coarse_height() + 2 * kMargin);
-  const auto row = static_cast<std::size_t>(stride());
-  coarse.assign(kPlanes * rows * row, 0);
-  for (std::size_t k = 0; k < walls.size(); ++k) {
-    if (walls[k] == 0) continue;
-    const std::size_t x = k % static_cast<std::size_t>(width) / 2,
-                      y = k / static_cast<std::size_t>(width) / 2;
-    const std::uint32_t either = facing::both_sides(walls[k]);
-    const auto set = [&](std::size_t plane) {
-      coarse[(plane * rows + y + kMargin) * row + x + kMargin] = 1;
-    };
-    for (std::size_t d = 0; d < facing::kDirections; ++d) {
-      if (walls[k] >> d & 1) set(d);
-      if (d < facing::kDirections / 2 && either >> d & 1) set(facing::kDirections + d);
+  const plan::Map map = view();
+  const auto rows = static_cast<std::size_t>(map.coarse_rows),
+             words = static_cast<std::size_t>(map.coarse_words);
+  coarse.assign(plan::kPlanes * rows * words, 0);
+  for (int y = 0; y < height; ++y)
+    for (int x = 0; x < width; ++x) {
+      const std::uint32_t faces = walls_of(x, y);
+      if (faces == 0) continue;
+      const std::uint32_t either = facing::both_sides(faces);
+      const auto row = static_cast<std::size_t>(y / 2 + kCoarseMargin),
+                 column = static_cast<std::size_t>(x / 2 + kCoarseMargin);
+      const auto set = [&](std::size_t plane) {
+        coarse[(plane * rows + row) * words + column / 32] |= 1u << column % 32;
+      };
+      for (std::size_t d = 0; d < facing::kDirections; ++d) {
+        if (faces >> d & 1) set(d);
+        if (d < facing::kDirections / 2 && either >> d & 1) set(facing::kDirections + d);
+      }
     }
-  }
 }
 
 const FloorPlan& MapState::plan(unsigned threads) const {
   std::call_once(planned_, [&] { plan_ = std::make_shared<const FloorPlan>(*this, threads); });
   return *plan_;
+}
+
+std::shared_ptr<PlanMatcher> MapState::plan_matcher(const Context& context) const {
+  const FloorPlan& of_map = plan(host_threads(context));
+  const std::shared_ptr<Engine>& engine = Access::engine(context);
+  const std::lock_guard<std::mutex> lock(mutex_);
+  matchers_.erase(std::remove_if(matchers_.begin(), matchers_.end(),
+                                 [](const auto& m) { return m.first.expired(); }),
+                  matchers_.end());
+  for (const auto& [of_engine, matcher] : matchers_)
+    if (of_engine.lock() == engine) return matcher;
+  matchers_.emplace_back(engine, engine->match_plan(of_map.view()));
+  return matchers_.back().second;
 }
 
 }  // namespace gpureg::localization

@@ -3,6 +3,7 @@
 
 #include <array>
 
+#include "algorithm/plan.hpp"
 #include "localization/map_state.hpp"
 
 namespace gpureg::localization {
@@ -23,7 +24,7 @@ Eigen::Matrix3f upright(const Eigen::Vector3f& direction);
 
 /// What faces a point of a surface, as bits: 16 directions of walls, floor and ceiling.
 namespace facing {
-constexpr int kDirections = 16, kBits = kDirections + 2;
+constexpr int kDirections = plan::kDirections, kBits = kDirections + 2;
 constexpr std::uint32_t kWalls = (1u << kDirections) - 1, kFloor = 1u << 16, kCeiling = 1u << 17;
 /// Bits of a normal, upright; 0 for a slope. exact: for walls the nearest direction alone, without
 /// both neighbours.
@@ -42,10 +43,9 @@ struct FloorPlan {
   /// Walls of a scan farther from its middle, in voxels, do not decide: a step of the heading moves
   /// them too far.
   static constexpr float kReach = 100;
-  /// Coarse planes: one per direction, and one per direction up to the sign. Around them lie empty
-  /// cells, as far as the walls of a scan reach.
-  static constexpr int kPlanes = facing::kDirections * 3 / 2;
-  static constexpr int kMargin = static_cast<int>(kReach / (2 * kCell)) + 2;
+  /// Empty cells around the coarse planes, and around the walls, as far as the walls of a scan reach.
+  static constexpr int kCoarseMargin = static_cast<int>(kReach / (2 * kCell)) + 2;
+  static constexpr int kMargin = 2 * kCoarseMargin + 2 * plan::kAround + 2;
 
   Eigen::Matrix3f turn = Eigen::Matrix3f::Identity();  ///< of the map's rows
   bool has_sides = false;                              ///< false: every surface faces both sides
@@ -54,9 +54,9 @@ struct FloorPlan {
   Eigen::Vector3f corner{0, 0, 0};
   int width = 0,
       height = 0;  ///< cells, even; 0: no plan, the map has no normals or far stray points
-  std::vector<std::uint16_t> walls;  ///< per cell: the directions that walls in it face
-  /// Per plane and coarse cell: whether it has such a wall.
-  std::vector<std::uint8_t> coarse;
+  /// See plan::Map.
+  std::vector<std::uint16_t> walls;
+  std::vector<std::uint32_t> coarse;
   /// The entries of each cell: height over `corner` in cells << facing::kBits | what faces.
   std::vector<std::uint32_t> column_begin, columns;
 
@@ -70,14 +70,15 @@ struct FloorPlan {
 
   int coarse_width() const { return width / 2; }
   int coarse_height() const { return height / 2; }
-  std::ptrdiff_t stride() const { return coarse_width() + 2 * kMargin; }  ///< of rows of planes
-  /// The first cell of a plane.
-  const std::uint8_t* plane(int number) const {
-    const std::ptrdiff_t rows = coarse_height() + 2 * kMargin;
-    return coarse.data() + (number * rows + kMargin) * stride() + kMargin;
-  }
+  plan::Map view() const;
+  /// What walls of a cell face, as bits.
+  std::uint16_t walls_of(int x, int y) const { return walls[place_of(x, y)]; }
 
  private:
+  std::size_t place_of(int x, int y) const {
+    return static_cast<std::size_t>(y + kMargin) * static_cast<std::size_t>(width + 2 * kMargin) +
+           static_cast<std::size_t>(x + kMargin);
+  }
   void fill_columns(const std::vector<Entry>& entries);
   void fill_coarse();
 };
