@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "common/host_threads.hpp"
+#include "cuda/common/plan_matcher.hpp"
 #include "cuda/common/stages.hpp"
 #include "cuda/common/surface_matcher.hpp"
 #include "gpureg/context.hpp"
@@ -333,6 +334,10 @@ void CudaEngine::verify(Span<const PairInput> pairs, const std::vector<PosesOfPa
 
 std::unique_ptr<SurfaceMatcher> CudaEngine::match_surfaces(Span<const SurfaceArrays> surfaces) {
   return std::make_unique<CudaSurfaces>(lanes_, surfaces);
+}
+
+std::unique_ptr<PlanMatcher> CudaEngine::match_plan(const plan::Map& map) {
+  return std::make_unique<CudaPlan>(lanes_, map);
 }
 
 }  // namespace gpureg::cuda

@@ -46,6 +46,7 @@ class CudaEngine final : public DeviceEngine {
   void verify(Span<const PairInput> pairs, const std::vector<PosesOfPair>& poses,
               const RegistrationOptions& options, bool refine, Span<PairOutcome> outcomes) override;
   std::unique_ptr<SurfaceMatcher> match_surfaces(Span<const SurfaceArrays> surfaces) override;
+  std::unique_ptr<PlanMatcher> match_plan(const plan::Map& map) override;
 
  private:
   /// Pairs as the stages see them. The clouds stay on the device as long as they are held.

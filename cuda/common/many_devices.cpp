@@ -158,6 +158,10 @@ class EngineOfMany final : public DeviceEngine {
                [&](std::size_t e) { parts[e] = engines_[e]->match_surfaces(surfaces); });
     return std::make_unique<SurfacesOfMany>(std::move(parts));
   }
+  /// On the first device: the search of a scan takes milliseconds.
+  std::unique_ptr<PlanMatcher> match_plan(const plan::Map& map) override {
+    return engines_[0]->match_plan(map);
+  }
 
  private:
   /// The engine of a device, or the first one, which reports the error.

@@ -41,7 +41,7 @@ struct Wall {
 struct Scan {
   Span<const Wall> coarse_walls;  ///< at most kCoarseWalls, in coarse cells
   Span<const Wall> walls;
-  std::int32_t headings;  ///< steps of a coarse turn
+  std::int32_t headings;  ///< steps of a coarse turn, at most 256
   bool has_sides;         ///< false: a wall may face the opposite direction, too
   std::int32_t low[2], high[2];  ///< [low, high)
 };
@@ -122,6 +122,7 @@ GPUREG_HD void add_eight(const Word (&v)[8], Scores<Word>& scores) {
 template <typename Word>
 GPUREG_HD Word at_least(const Scores<Word>& scores, std::uint32_t least) {
   Word above = scores.bits[0] ^ scores.bits[0], equal = ~above;
+  if (least >> kScoreBits != 0) return above;
   for (int b = kScoreBits - 1; b >= 0; --b) {
     if (least >> b & 1) {
       equal &= scores.bits[b];

@@ -32,7 +32,7 @@ bool precedes(const Place& a, const Place& b) {
 /// The best cells of a scan, of all its headings. Thread-safe.
 class BestCells {
  public:
-  using Counts = std::array<std::uint32_t, 1 << plan::kScoreBits>;
+  using Counts = std::array<std::uint64_t, 1 << plan::kScoreBits>;
   explicit BestCells(std::size_t most) : most_(most) {}
 
   /// Cells with lower scores are not among them.
