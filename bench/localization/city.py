@@ -148,8 +148,9 @@ class Maker:
             rays = np.stack([flat * np.cos(turn), flat * np.sin(turn), rise], -1).reshape(-1, 3)
             seen = np.isfinite(ranges)
             points = rays[seen] * (ranges + random.normal(0, RANGE_NOISE, len(rays)))[seen, None]
-            is_wide = extent(points) > 3 and np.median(ranges[seen]) > 1.5
-            if seen.mean() > 0.2 and is_wide:  # not into a cupboard
+            if seen.mean() <= 0.2:  # into a cupboard, or into the sky
+                continue
+            if extent(points) > 3 and np.median(ranges[seen]) > 1.5:
                 break
         q, _ = np.linalg.qr(random.normal(size=(3, 3)))
         q *= np.sign(np.linalg.det(q))

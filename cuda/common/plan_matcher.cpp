@@ -3,6 +3,8 @@
 
 #include <algorithm>
 
+#include "common/for_each_on.hpp"
+
 namespace gpureg::cuda {
 namespace {
 
@@ -91,11 +93,11 @@ std::vector<std::vector<Place>> CudaPlan::best_cells(Span<const Scan> scans, std
   for (std::size_t s = 0; s < scans.size; ++s)
     keys.push_back(exec.download(cells.data() + most * s, sizes[s]));
   exec.synchronize();
-  for (std::size_t s = 0; s < scans.size; ++s) {
+  for_each_on(exec.host_threads(), scans.size, [&](std::size_t s) {
     std::vector<CellKey> sorted(keys[s], keys[s] + sizes[s]);
     std::sort(sorted.begin(), sorted.end());
     for (const CellKey key : sorted) out[s].push_back(place_of(key));
-  }
+  });
   return out;
 }
 

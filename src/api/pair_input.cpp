@@ -32,7 +32,8 @@ const PreparedState* checked_state(const Context& context, const PreparedCloud& 
 }
 
 void check_pairs(const Context& context, const std::vector<PreparedCloud>& clouds,
-                 const std::vector<Pair>& pairs, const RegistrationOptions& options) {
+                 const std::vector<Pair>& pairs, const RegistrationOptions& options,
+                 bool by_features) {
   std::vector<std::uint8_t> used(clouds.size(), 0);
   for (std::size_t p = 0; p < pairs.size(); ++p) {
     for (const std::uint32_t k : {pairs[p].source, pairs[p].target}) {
@@ -42,8 +43,9 @@ void check_pairs(const Context& context, const std::vector<PreparedCloud>& cloud
       if (!used[k]) checked_state(context, clouds[k], options, "clouds[" + std::to_string(k) + "]");
       used[k] = 1;
     }
-    check_dimensions(*Access::state(clouds[pairs[p].source]),
-                     *Access::state(clouds[pairs[p].target]));
+    if (by_features)
+      check_dimensions(*Access::state(clouds[pairs[p].source]),
+                       *Access::state(clouds[pairs[p].target]));
   }
 }
 

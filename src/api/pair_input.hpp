@@ -16,9 +16,10 @@ const PreparedState* checked_state(const Context& context, const PreparedCloud& 
                                    const RegistrationOptions& options, const std::string& name);
 
 /// Checks all pairs and their clouds, so that a long batch does not fail at its last pair. Throws
-/// InvalidArgument naming the pair or the cloud.
+/// InvalidArgument naming the pair or the cloud. by_features: those of a pair are compared.
 void check_pairs(const Context& context, const std::vector<PreparedCloud>& clouds,
-                 const std::vector<Pair>& pairs, const RegistrationOptions& options);
+                 const std::vector<Pair>& pairs, const RegistrationOptions& options,
+                 bool by_features = true);
 
 /// True where the engine moves the caller's target, being the smaller cloud.
 bool swaps(const PreparedState& source, const PreparedState& target,

@@ -7,6 +7,7 @@
 #include "api/outcome.hpp"
 #include "api/pair_input.hpp"
 #include "api/variants.hpp"
+#include "api/verify_by_surfaces.hpp"
 #include "common/in_halves.hpp"
 #include "confidence/calibrate_modes.hpp"
 
@@ -129,17 +130,47 @@ std::vector<PairOutcome> verify_all(Engine& engine, const std::vector<PairInput>
   return out;
 }
 
-}  // namespace
+/// The poses of one pair with their evidence, between the rows of the clouds.
+std::vector<PoseVerification> measured(const VerifiedPair& pair, const PairOutcome& outcome) {
+  std::vector<PoseVerification> out;
+  const std::vector<PoseEvidence> evidence = pair.evidence_of(outcome);
+  for (std::size_t k = 0; k < outcome.modes.size(); ++k)
+    out.push_back(pair.verification_of(outcome.modes[k], evidence[k]));
+  return out;
+}
 
-std::vector<std::vector<PoseVerification>> verify_poses_batch(
-    const Context& context, const std::vector<PreparedCloud>& clouds,
-    const std::vector<Pair>& pairs, const std::vector<std::vector<UnalignedIsometry3d>>& poses,
-    const RegistrationOptions& options, const VerificationOptions& verification) {
+/// Sets the confidences of the poses of one pair; found: what align() finds for it, if that counts.
+void set_confidences(const VerifiedPair& pair, const PairOutcome& outcome, const PairOutcome* found,
+                     std::vector<PoseVerification>& poses) {
+  std::vector<VerifiedPair::Candidate> given;
+  for (std::size_t k = 0; k < poses.size(); ++k)
+    given.push_back({poses[k].target_from_source, poses[k].evidence,
+                     VerifiedPair::overlap_of(outcome.modes[k])});
+  const std::vector<VerifiedPair::Candidate> alternatives =
+      found != nullptr ? pair.alternatives_of(*found) : given;
+  for (std::size_t k = 0; k < poses.size(); ++k) {
+    const confidence::ModeConfidence confidence =
+        pair.confidence_of(given[k], alternatives, poses[k].source_moments);
+    poses[k].confidence = confidence.confidence;
+    poses[k].overlap_confidence = confidence.overlap_confidence;
+  }
+}
+
+using Verifications = std::vector<std::vector<PoseVerification>>;
+
+/// Verifies the pairs chunk by chunk. conclude(engine, inputs, pairs, outcomes, results): sets the
+/// confidences of a chunk. matches: given ones, for all pairs; empty: of the features.
+template <typename Conclude>
+Verifications verify_pairs(const Context& context, const std::vector<PreparedCloud>& clouds,
+                           const std::vector<Pair>& pairs,
+                           const std::vector<std::vector<UnalignedIsometry3d>>& poses,
+                           const RegistrationOptions& options, bool refine,
+                           Span<const std::uint32_t> matches, const Conclude& conclude) {
   options.validate();
   if (poses.size() != pairs.size())
     throw InvalidArgument("poses has " + std::to_string(poses.size()) + " entries, but pairs has " +
                           std::to_string(pairs.size()));
-  check_pairs(context, clouds, pairs, options);
+  check_pairs(context, clouds, pairs, options, matches.size == 0);
   for (std::size_t p = 0; p < poses.size(); ++p)
     for (std::size_t k = 0; k < poses[p].size(); ++k)
       check_pose(poses[p][k], "poses[" + std::to_string(p) + "][" + std::to_string(k) + "]");
@@ -147,7 +178,7 @@ std::vector<std::vector<PoseVerification>> verify_poses_batch(
   Engine& engine = *Access::engine(context);
   RegistrationOptions by_evidence = options;
   by_evidence.method = RegistrationMethod::compatibility;
-  std::vector<std::vector<PoseVerification>> results(pairs.size());
+  Verifications results(pairs.size());
   const std::vector<PairVariant> variants = variants_of(clouds, pairs);
   const std::size_t chunk = engine.pairs_per_chunk(by_evidence);
   for (std::size_t begin = 0; begin < variants.size(); begin += chunk) {
@@ -159,36 +190,25 @@ std::vector<std::vector<PoseVerification>> verify_poses_batch(
       const PreparedState &s = *variants[v].source, &t = *variants[v].target;
       const bool swapped = swaps(s, t, options);
       inputs.push_back(input_of(s, t, swapped));
+      if (s.size > 0 && t.size > 0)
+        inputs.back().custom_source = inputs.back().custom_target = matches;
       verified.push_back({{s, t, swapped, by_evidence}});
       for (const UnalignedIsometry3d& pose : poses[variants[v].pair])
         local[v - begin].push_back(to_local(pose, s, t, swapped));
     }
     const std::vector<PairOutcome> outcomes =
-        verify_all(engine, inputs, local, by_evidence, verification.refine);
-    std::vector<PairOutcome> found(inputs.size());
-    if (verification.search_alternatives) align_all(engine, inputs, by_evidence, found);
+        verify_all(engine, inputs, local, by_evidence, refine);
+    Verifications made;
+    for (std::size_t v = 0; v < outcomes.size(); ++v)
+      made.push_back(measured(verified[v], outcomes[v]));
+    conclude(engine, inputs, verified, outcomes, made);
     for (std::size_t v = begin; v < end; ++v) {
       const std::size_t p = variants[v].pair;
       const VerifiedPair& pair = verified[v - begin];
-      const PairOutcome& outcome = outcomes[v - begin];
-      std::vector<PoseVerification> poses_of_pair;
-      std::vector<VerifiedPair::Candidate> given;
-      const std::vector<PoseEvidence> evidence = pair.evidence_of(outcome);
-      for (std::size_t k = 0; k < outcome.modes.size(); ++k) {
-        const ModeOutcome& mode = outcome.modes[k];
-        poses_of_pair.push_back(pair.verification_of(mode, evidence[k]));
-        given.push_back({poses_of_pair.back().target_from_source, poses_of_pair.back().evidence,
-                         VerifiedPair::overlap_of(mode)});
-      }
-      const std::vector<VerifiedPair::Candidate> alternatives =
-          verification.search_alternatives ? pair.alternatives_of(found[v - begin]) : given;
+      std::vector<PoseVerification>& poses_of_pair = made[v - begin];
       for (std::size_t k = 0; k < poses_of_pair.size(); ++k) {
         PoseVerification& out = poses_of_pair[k];
-        const confidence::ModeConfidence confidence =
-            pair.confidence_of(given[k], alternatives, out.source_moments);
-        out.confidence = confidence.confidence;
-        out.overlap_confidence = confidence.overlap_confidence;
-        if (verification.refine)
+        if (refine)
           move_to_frame(out.target_from_source, pair.source, pair.target);
         else
           out.target_from_source = poses[p][k];
@@ -199,6 +219,41 @@ std::vector<std::vector<PoseVerification>> verify_poses_batch(
     }
   }
   return results;
+}
+
+}  // namespace
+
+std::vector<std::vector<PoseVerification>> verify_poses_batch(
+    const Context& context, const std::vector<PreparedCloud>& clouds,
+    const std::vector<Pair>& pairs, const std::vector<std::vector<UnalignedIsometry3d>>& poses,
+    const RegistrationOptions& options, const VerificationOptions& verification) {
+  return verify_pairs(
+      context, clouds, pairs, poses, options, verification.refine, {},
+      [&](Engine& engine, const std::vector<PairInput>& inputs,
+          const std::vector<VerifiedPair>& verified, const std::vector<PairOutcome>& outcomes,
+          Verifications& made) {
+        std::vector<PairOutcome> found(inputs.size());
+        if (verification.search_alternatives)
+          align_all(engine, inputs, verified.front().options, found);
+        for (std::size_t v = 0; v < made.size(); ++v)
+          set_confidences(verified[v], outcomes[v],
+                          verification.search_alternatives ? &found[v] : nullptr, made[v]);
+      });
+}
+
+Verifications verify_by_surfaces(
+    const Context& context, const std::vector<PreparedCloud>& clouds,
+    const std::vector<Pair>& pairs, const std::vector<std::vector<UnalignedIsometry3d>>& poses,
+    const RegistrationOptions& options, bool refine,
+    const std::function<double(const PoseVerification&)>& confidence) {
+  const std::uint32_t first = 0;  // a match that the evidence of surfaces does not look at
+  return verify_pairs(context, clouds, pairs, poses, options, refine, {&first, 1},
+                      [&](Engine&, const std::vector<PairInput>&, const std::vector<VerifiedPair>&,
+                          const std::vector<PairOutcome>&, Verifications& made) {
+                        for (std::vector<PoseVerification>& of_pair : made)
+                          for (PoseVerification& pose : of_pair)
+                            pose.confidence = confidence(pose);
+                      });
 }
 
 std::vector<PoseVerification> verify_poses(const Context& context, const PreparedCloud& source,

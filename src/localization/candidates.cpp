@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <cmath>
 #include <tuple>
-#include <unordered_set>
 
 #include "math/trigonometry.hpp"
 
@@ -14,39 +13,47 @@ namespace {
 /// Beyond it, differences of confidences do not tell which of two places it is.
 constexpr double kMostCertain = 0.999;
 
-/// Cells as wide as the distance: what is near a point is in its cell or in a neighbour.
+/// Cells of a box at least as wide as the distance: what is near a point is in its cell or in a
+/// neighbour.
 class Cells {
  public:
-  explicit Cells(double edge) : edge_(edge) {}
+  Cells(const Eigen::AlignedBox3d& box, double distance) : corner_(box.min()) {
+    const auto cells = [&] { return ((box.sizes() / edge_).array() + 4).prod(); };
+    for (edge_ = distance; cells() > kMost;) edge_ *= 2;
+    for (int axis = 0; axis < 3; ++axis)
+      size_[axis] = static_cast<std::int64_t>(box.sizes()[axis] / edge_) + 3;
+    own_.assign(static_cast<std::size_t>(size_.prod()), false);
+    near_ = own_;
+  }
 
+  /// A point of the box.
   void add(const Eigen::Vector3d& p) {
-    const auto [x, y, z] = cell(p);
-    if (!own_.insert(key(x, y, z)).second) return;  // many points share a cell
-    for (std::int64_t dx = -1; dx <= 1; ++dx)
-      for (std::int64_t dy = -1; dy <= 1; ++dy)
-        for (std::int64_t dz = -1; dz <= 1; ++dz) keys_.insert(key(x + dx, y + dy, z + dz));
+    const Cell at = cell(p);
+    if (own_[index(at)]) return;  // many points share a cell
+    own_[index(at)] = true;
+    for (std::int64_t k = 0; k < 27; ++k)
+      near_[index(at + Cell(k % 3 - 1, k / 3 % 3 - 1, k / 9 - 1))] = true;
   }
   bool has(const Eigen::Vector3d& p) const {
-    const auto [x, y, z] = cell(p);
-    return keys_.count(key(x, y, z)) > 0;
+    const Cell at = cell(p);
+    return (at.array() >= 0).all() && (at.array() < size_.array()).all() && near_[index(at)];
   }
 
  private:
-  std::array<std::int64_t, 3> cell(const Eigen::Vector3d& p) const {
-    const auto at = [&](int axis) {
-      return static_cast<std::int64_t>(std::floor(p[axis] / edge_));
-    };
-    return {at(0), at(1), at(2)};
+  using Cell = Eigen::Matrix<std::int64_t, 3, 1>;
+  static constexpr double kMost = 1 << 24;
+
+  Cell cell(const Eigen::Vector3d& p) const {
+    return ((p - corner_) / edge_).array().floor().cast<std::int64_t>() + 1;
   }
-  /// Cells of one key are 2^21 cells apart: farther than a cut is wide.
-  static std::uint64_t key(std::int64_t x, std::int64_t y, std::int64_t z) {
-    constexpr std::uint64_t kMask = (std::uint64_t{1} << 21) - 1;
-    return (static_cast<std::uint64_t>(x) & kMask) << 42 |
-           (static_cast<std::uint64_t>(y) & kMask) << 21 | (static_cast<std::uint64_t>(z) & kMask);
+  std::size_t index(const Cell& at) const {
+    return static_cast<std::size_t>((at[2] * size_[1] + at[1]) * size_[0] + at[0]);
   }
 
-  double edge_;
-  std::unordered_set<std::uint64_t> own_, keys_;
+  Eigen::Vector3d corner_;
+  double edge_ = 0;
+  Cell size_;
+  std::vector<bool> own_, near_;
 };
 
 }  // namespace
@@ -78,13 +85,15 @@ std::vector<Candidate> distinct(std::vector<Candidate> candidates, const Eigen::
 
 PointCloud neighborhood(const MapState& map, const std::vector<Eigen::Vector3d>& scan,
                         const UnalignedIsometry3d& map_from_scan, double distance) {
-  Cells cells(distance);
+  std::vector<Eigen::Vector3d> moved;
   Eigen::AlignedBox3d box;
   for (const Eigen::Vector3d& point : scan) {
-    const Eigen::Vector3d p = map_from_scan * point - map.origin;
-    cells.add(p);
-    box.extend(p);
+    moved.push_back(map_from_scan * point - map.origin);
+    box.extend(moved.back());
   }
+  if (moved.empty()) return {};
+  Cells cells(box, distance);
+  for (const Eigen::Vector3d& point : moved) cells.add(point);
   box.min().array() -= distance;
   box.max().array() += distance;
   PointCloud out =

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <algorithm>
+#include <numeric>
 
 #include "fields/localization.hpp"
 #include "localization/check_scan.hpp"
@@ -34,26 +35,13 @@ bool is_sure(const LocateResult& result) {
   return !result.poses.empty() && result.poses.front().confidence >= kSure;
 }
 
-/// Whether the best place of the plan stands out, or most of the scan agrees with it.
-bool is_promising(const Scan& scan) {
-  return !scan.candidates.empty() && (scan.candidates.front().confidence >= kStandsOut ||
-                                      scan.candidates.front().agreeing >= kAgreeing);
-}
-
-/// Whether the best place is found and has no rival in all of the plan.
-bool is_without_rival(const LocateResult& result, const std::vector<Verified>& places) {
-  return result.status == LocateStatus::found && places.front().candidate.confidence >= kSure;
-}
-
-/// Leaves the places of the plan that stand out or that the verification finds possible.
+/// Leaves the places of the plan that the verification finds possible.
 void keep_possible(const std::vector<Verified>& places, Scan& scan) {
   scan.planned.clear();
   for (const Verified& v : places) {
+    if (v.confidence < kPossible) continue;
     scan.planned.push_back(v.candidate);
-    double& confidence = scan.planned.back().confidence;
-    if (confidence >= kStandsOut) continue;
-    confidence = v.confidence;
-    if (confidence < kPossible) scan.planned.pop_back();
+    scan.planned.back().confidence = v.confidence;
   }
 }
 
@@ -83,6 +71,33 @@ LocateResult result_of(const std::vector<Verified>& verified, const Scan& scan,
   out.absent_probability = shared.back();
   out.status = status_of(out, options.registration.min_confidence);
   return out;
+}
+
+/// Sets the results of the scans that the plan of the map places surely, first with little effort.
+/// @return numbers of the others.
+std::vector<std::size_t> see_from_above(const Context& context, const MapState& map,
+                                        const LocateOptions& options, std::vector<Scan>& scans,
+                                        std::vector<LocateResult>& results) {
+  std::vector<std::size_t> open(scans.size());
+  std::iota(open.begin(), open.end(), std::size_t{0});
+  for (const PlanEffort& effort : {kUsualEffort, kThoroughEffort}) {
+    std::vector<Scan*> asked;
+    for (const std::size_t k : open) asked.push_back(&scans[k]);
+    search_plan(context, map, options.candidates, effort, asked);
+    for (Scan* scan : asked) scan->candidates = scan->planned;
+    const std::vector<std::vector<Verified>> places =
+        verify_planned(context, map, options, asked);
+    std::vector<std::size_t> unsure;
+    for (std::size_t k = 0; k < open.size(); ++k) {
+      LocateResult& result = results[open[k]];
+      result = result_of(places[k], *asked[k], options);
+      if (is_sure(result)) continue;
+      keep_possible(places[k], *asked[k]);
+      unsure.push_back(open[k]);
+    }
+    open = unsure;
+  }
+  return open;
 }
 
 void check(const MapState& map, const LocateOptions& options, std::size_t scans,
@@ -121,26 +136,10 @@ std::vector<LocateResult> locate(const Context& context, const std::vector<Point
   std::vector<Scan> all;
   for (std::size_t k = 0; k < scans.size(); ++k)
     all.push_back(scan_of(prepared[k], priors.empty() ? LocatePrior{} : priors[k]));
-  search_plan(context, state, options.candidates, all);
-  for (Scan& scan : all) {
-    scan.candidates = scan.planned;
-    keep_likely(options, scan);
-  }
-  std::vector<LocateResult> out;
-  std::vector<std::size_t> open;  // scans that the plan does not place surely
+  std::vector<LocateResult> out(scans.size());
+  const std::vector<std::size_t> open = see_from_above(context, state, options, all, out);
   std::vector<Scan> searched;
-  for (std::size_t k = 0; k < scans.size(); ++k) {
-    Scan& scan = all[k];
-    std::vector<Verified> places;
-    if (is_promising(scan)) {
-      places = verify_places(context, state, options, scan);
-      keep_possible(places, scan);
-    }
-    out.push_back(result_of(places, scan, options));
-    if (is_sure(out[k]) || is_without_rival(out[k], places)) continue;
-    open.push_back(k);
-    searched.push_back(std::move(scan));
-  }
+  for (const std::size_t k : open) searched.push_back(std::move(all[k]));
   if (open.empty()) return out;
   const bool coarse_first = options.coarse_factor > 1;
   const double coarsest = coarsest_factor(state, options);

@@ -90,6 +90,7 @@ struct MapState {
 unsigned host_threads(const Context& context);
 
 /// Views of clouds that cut() made; a piece of a map was not seen from its origin.
+PointCloudView view_of(const PointCloud& cloud);
 std::vector<PointCloudView> views_of(const std::vector<PointCloud>& clouds);
 /// Options for points that are means of voxels already.
 PrepareOptions as_they_are(PrepareOptions options);

@@ -3,6 +3,8 @@
 
 #include <cmath>
 
+#include "localization/without_features.hpp"
+
 namespace gpureg::localization {
 namespace {
 
@@ -30,12 +32,8 @@ Sided sided(const Context& context, const MapState& map, std::size_t tile) {
   options.depth_maps = 1;
   options.surface_side_distance = 0;
   options.wide_feature_radius = 0;
-  const std::vector<float> no_features(cloud.points.size(), 0);  // a constant is cheaper
-  PointCloudView view = cloud.view();
-  view.features = no_features.data();
-  view.feature_dimension = view.feature_stride = 1;
-  view.infer_viewpoint = !cloud.viewpoints.empty();
-  out.cloud = prepare_batch(context, {view}, options, {map.name_of(tile)}).front();
+  const WithoutFeatures without(cloud.points.size());
+  out.cloud = prepare_batch(context, {without.of(view_of(cloud))}, options, {map.name_of(tile)}).front();
   return out;
 }
 

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "localization/without_features.hpp"
+
 namespace gpureg::localization {
 namespace {
 
@@ -20,12 +22,9 @@ PrepareOptions side_options(PrepareOptions options) {
 
 PointCloud seen_surface(const Context& context, const PointCloudView& scan,
                         const PrepareOptions& options) {
-  PointCloudView plain = scan;
   if (scan.size == 0) return {};
-  const std::vector<float> no_features(scan.size, 0);  // one constant per point takes their place
-  plain.features = no_features.data();
-  plain.feature_dimension = plain.feature_stride = 1;
-  const PreparedCloud prepared = prepare(context, plain, side_options(options));
+  const WithoutFeatures without(scan.size);
+  const PreparedCloud prepared = prepare(context, without.of(scan), side_options(options));
   PointCloud out;
   out.points = prepared.points();
   out.origin = prepared.origin();

@@ -112,12 +112,15 @@ PrepareOptions as_they_are(PrepareOptions options) {
   return options;
 }
 
+PointCloudView view_of(const PointCloud& cloud) {
+  PointCloudView view = cloud.view();
+  view.infer_viewpoint = !cloud.viewpoints.empty();
+  return view;
+}
+
 std::vector<PointCloudView> views_of(const std::vector<PointCloud>& clouds) {
   std::vector<PointCloudView> views;
-  for (const PointCloud& cloud : clouds) {
-    views.push_back(cloud.view());
-    views.back().infer_viewpoint = !cloud.viewpoints.empty();
-  }
+  for (const PointCloud& cloud : clouds) views.push_back(view_of(cloud));
   return views;
 }
 

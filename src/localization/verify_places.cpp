@@ -4,8 +4,11 @@
 #include <algorithm>
 #include <cmath>
 
+#include "api/verify_by_surfaces.hpp"
+#include "common/for_each_on.hpp"
 #include "fields/localization.hpp"
 #include "fields/scale.hpp"
+#include "localization/without_features.hpp"
 #include "math/exponential.hpp"
 
 namespace gpureg::localization {
@@ -78,6 +81,87 @@ std::vector<PoseVerification> verify_coarsely(const Context& context, const MapS
   return out;
 }
 
+/// Of a place that the plan of the map proposes: the log odds by surfaces, a line in logarithms of the
+/// part of the scan without a surface of the map, of the part of the map in free space of the scan,
+/// and of the parts of both in front of surfaces of the other; and the share of the log odds of the
+/// search. Fitted on houses, offices, streets and rooms: bench/notes/maps.md, "Places by surfaces".
+constexpr double kIntercept = -9.96, kOfUncovered = -0.56, kOfFreeSpace = -0.67, kOfFront = -1.29,
+                 kOfSearch = 0.48;
+/// The logarithms are of at least these shares.
+constexpr double kLeastUncovered = 0.01, kLeastFreeSpace = 0.002, kLeastFront = 0.004;
+/// Odds of a search, at most, and 1 / at least.
+constexpr double kMostSearchOdds = 1e4;
+
+double surface_odds(const PoseVerification& pose) {
+  const PoseEvidence& e = pose.evidence;
+  const auto log_of = [](double share, double least) {
+    return portable::log(std::max(share, least));
+  };
+  return portable::exp(
+      kIntercept + kOfUncovered * log_of(1 - e.source_overlap_any_normal, kLeastUncovered) +
+      kOfFreeSpace * log_of(e.target_free_space_violation, kLeastFreeSpace) +
+      kOfFront * log_of(e.source_front_violation_near + e.target_front_violation_near, kLeastFront));
+}
+
+double confidence_of_surfaces(const PoseVerification& pose) {
+  const double odds = surface_odds(pose);
+  return odds / (1 + odds);
+}
+
+double confidence_of_planned(double searched, const PoseVerification& pose) {
+  const double of_search = std::clamp(searched / (1 - std::min(searched, 1 - 1e-9)),
+                                      1 / kMostSearchOdds, kMostSearchOdds);
+  const double odds = surface_odds(pose) * portable::exp(kOfSearch * portable::log(of_search));
+  return odds / (1 + odds);
+}
+
+void sort(std::vector<Verified>& places) {
+  std::stable_sort(places.begin(), places.end(), [](const Verified& a, const Verified& b) {
+    return a.confidence > b.confidence;
+  });
+}
+
+/// Neighbourhoods that are cut out, and points that are prepared and compared, together.
+constexpr std::size_t kPlacesAtOnce = 64, kPointsAtOnce = 400'000;
+
+/// A candidate of a scan and the map around it.
+struct Place {
+  std::size_t scan;
+  const Candidate* candidate;
+  PointCloud around;
+};
+
+void compare_surfaces(const Context& context, const MapState& map, const LocateOptions& options,
+                      const std::vector<Scan*>& scans, const Place* begin, const Place* end,
+                      std::vector<std::vector<Verified>>& out) {
+  std::size_t most = 0;
+  std::vector<PointCloudView> views;
+  for (const Place* place = begin; place != end; ++place)
+    most = std::max(most, place->around.points.size());
+  const WithoutFeatures without(most);
+  for (const Place* place = begin; place != end; ++place)
+    views.push_back(without.of(view_of(place->around)));
+  PrepareOptions prepare = as_they_are(map.options.prepare);
+  prepare.wide_feature_radius = 0;
+  std::vector<PreparedCloud> clouds = prepare_batch(context, views, prepare);
+  std::vector<Pair> pairs;
+  std::vector<std::vector<UnalignedIsometry3d>> poses;
+  for (const Place* place = begin; place != end; ++place) {
+    if (place == begin || place->scan != place[-1].scan) clouds.push_back(scans[place->scan]->cloud);
+    pairs.push_back({static_cast<std::uint32_t>(clouds.size() - 1),
+                     static_cast<std::uint32_t>(place - begin)});
+    poses.push_back({place->candidate->map_from_scan});
+  }
+  const auto results = verify_by_surfaces(context, clouds, pairs, poses, options.registration,
+                                          true, confidence_of_surfaces);
+  for (std::size_t k = 0; k < results.size(); ++k) {
+    const Candidate& candidate = *begin[k].candidate;
+    const PoseVerification& pose = results[k].front();
+    out[begin[k].scan].push_back({candidate, pose, clouds[k].size(),
+                                  confidence_of_planned(candidate.confidence, pose)});
+  }
+}
+
 }  // namespace
 
 std::vector<Verified> verify_places(const Context& context, const MapState& map,
@@ -119,9 +203,34 @@ std::vector<Verified> verify_places(const Context& context, const MapState& map,
     Verified& v = out[open[k]];
     v.confidence = confidence_of(v.candidate.confidence, v.verification, coarse[k]);
   }
-  std::stable_sort(out.begin(), out.end(), [](const Verified& a, const Verified& b) {
-    return a.confidence > b.confidence;
-  });
+  sort(out);
+  return out;
+}
+
+std::vector<std::vector<Verified>> verify_planned(const Context& context, const MapState& map,
+                                                  const LocateOptions& options,
+                                                  const std::vector<Scan*>& scans) {
+  std::vector<Place> places;
+  for (std::size_t k = 0; k < scans.size(); ++k)
+    for (const Candidate& candidate : scans[k]->candidates) places.push_back({k, &candidate, {}});
+  std::vector<std::vector<Verified>> out(scans.size());
+  for (std::size_t begin = 0; begin < places.size();) {
+    const std::size_t some = std::min(kPlacesAtOnce, places.size() - begin);
+    for_each_on(host_threads(context), some, [&](std::size_t k) {
+      Place& place = places[begin + k];
+      place.around = neighborhood(map, scans[place.scan]->points, place.candidate->map_from_scan,
+                                  options.neighborhood);
+    });
+    const std::size_t last = begin + some;
+    while (begin < last) {
+      std::size_t end = begin, points = 0;
+      do points += places[end++].around.points.size();
+      while (end < last && points + places[end].around.points.size() <= kPointsAtOnce);
+      compare_surfaces(context, map, options, scans, &places[begin], &places[0] + end, out);
+      for (; begin < end; ++begin) places[begin].around = {};
+    }
+  }
+  for (std::vector<Verified>& of_scan : out) sort(of_scan);
   return out;
 }
 

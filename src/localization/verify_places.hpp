@@ -11,10 +11,6 @@ constexpr double kSure = 0.75, kSureSearch = 0.95;
 /// Where no pose of the coarse search reaches this confidence, the scan is not in the map, if its
 /// coarse points are so many that the search had something to see.
 constexpr double kHopelessSearch = 0.1;
-/// Confidence of a place of the plan that stands out, and share of a scan's points that agree with
-/// it, from which on it is verified before the tiles are searched.
-constexpr double kStandsOut = 0.35, kAgreeing = 0.7;
-
 /// A candidate in all of the map around it.
 struct Verified {
   Candidate candidate;
@@ -22,6 +18,12 @@ struct Verified {
   std::size_t points = 0;  ///< of the neighbourhood
   double confidence = 0;   ///< other places aside
 };
+
+/// Verifies the candidates of scans, which the plan of the map proposes, by the surfaces of all of
+/// the map around them, without features; the most confident of each scan first.
+std::vector<std::vector<Verified>> verify_planned(const Context& context, const MapState& map,
+                                                  const LocateOptions& options,
+                                                  const std::vector<Scan*>& scans);
 
 /// Verifies the candidates of a scan against all of the map around them; the most confident first.
 /// @param before candidates of the scan that were verified already.

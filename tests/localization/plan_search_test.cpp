@@ -31,7 +31,7 @@ Scan scan_of(const PointCloud& cloud, const MapState& map, const LocatePrior& pr
 std::vector<Candidate> places_of(const Scan& scan, const PreparedMap& map,
                                  const Context& on = context()) {
   std::vector<Scan> scans{scan};
-  search_plan(on, MapState::of(map), 8, scans);
+  search_plan(on, MapState::of(map), 8, localization::kUsualEffort, {scans.data()});
   return scans[0].planned;
 }
 

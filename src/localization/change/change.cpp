@@ -7,6 +7,7 @@
 #include "localization/candidates.hpp"
 #include "localization/change/changed_points.hpp"
 #include "localization/check_scan.hpp"
+#include "localization/without_features.hpp"
 
 namespace gpureg::localization {
 namespace {
@@ -127,11 +128,9 @@ void cut_map(const MapState& map, const ChangeOptions& options, Scene& scene) {
 /// Normals of a map that came without any; their signs do not matter.
 void estimate_normals(const Context& context, const MapState& map, Surface& surface) {
   if ((!map.sides.empty() && !map.sides_inferred) || surface.points.empty()) return;
-  PointCloudView view(surface.points);
+  const WithoutFeatures without(surface.points.size());
+  PointCloudView view = without.of(PointCloudView(surface.points));
   view.infer_viewpoint = false;
-  const std::vector<float> no_features(view.size, 0);
-  view.features = no_features.data();
-  view.feature_dimension = view.feature_stride = 1;
   PrepareOptions options = as_they_are(map.options.prepare);
   options.depth_maps = 0;
   options.surface_side_distance = 0;

@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <unordered_set>
 
 #include "common/for_each_on.hpp"
 #include "localization/plan/upright_scan.hpp"
@@ -15,11 +14,8 @@
 namespace gpureg::localization {
 namespace {
 
-/// Coarse cells of an upright scan that are looked at, places of these that are refined, and refined
-/// places that get heights.
-constexpr std::size_t kCells = 8192, kRefined = 256, kWithHeights = 128;
 /// Scans searched together: their cells take a few MB each.
-constexpr std::size_t kScansAtOnce = 64;
+constexpr std::ptrdiff_t kScansAtOnce = 64;
 /// Heights of one place that go on, at least so many cells apart, with this share of the best.
 constexpr std::size_t kHeights = 3;
 constexpr int kHeightsApart = 5;
@@ -52,10 +48,31 @@ Region region_of(const MapState& map, const FloorPlan& plan, const Scan& scan) {
   return region;
 }
 
+/// Numbers that are few, and looked for often.
+class FewNumbers {
+ public:
+  explicit FewNumbers(std::size_t most) {
+    while (table_.size() < 4 * most) table_.assign(2 * table_.size(), kNone);
+  }
+  bool has(std::uint64_t number) const { return table_[place_of(number)] == number; }
+  void add(std::uint64_t number) { table_[place_of(number)] = number; }
+
+ private:
+  static constexpr std::uint64_t kNone = ~std::uint64_t{0};
+  std::size_t place_of(std::uint64_t number) const {
+    std::size_t place = static_cast<std::size_t>(number * 0x9e3779b97f4a7c15u >> 32);
+    for (;; ++place) {
+      place &= table_.size() - 1;
+      if (table_[place] == number || table_[place] == kNone) return place;
+    }
+  }
+  std::vector<std::uint64_t> table_ = std::vector<std::uint64_t>(64, kNone);
+};
+
 /// The places that no better one is next to; places: the best first.
 std::vector<plan::Place> peaks(const std::vector<plan::Place>& places, int headings,
                                std::size_t most) {
-  std::unordered_set<std::uint64_t> taken;
+  FewNumbers taken(most);
   const auto key = [&](const plan::Place& place, int dx, int dy, int turn) {
     const auto part = [](int value) { return static_cast<std::uint64_t>(value + 1); };
     return part(place.x + dx) << 42 | part(place.y + dy) << 21 |
@@ -66,9 +83,9 @@ std::vector<plan::Place> peaks(const std::vector<plan::Place>& places, int headi
     if (out.size() == most) break;
     bool is_peak = true;
     for (int k = 0; k < 27 && is_peak; ++k)
-      is_peak = taken.count(key(place, k % 3 - 1, k / 3 % 3 - 1, k / 9 - 1)) == 0;
+      is_peak = !taken.has(key(place, k % 3 - 1, k / 3 % 3 - 1, k / 9 - 1));
     if (!is_peak) continue;
-    taken.insert(key(place, 0, 0, 0));
+    taken.add(key(place, 0, 0, 0));
     out.push_back(place);
   }
   return out;
@@ -170,23 +187,34 @@ plan::Scan view_of(const Standing& standing, const Region& region) {
 }
 
 /// The scans with each of their possible verticals.
-std::vector<Standing> stand_up(const FloorPlan& plan, const Scan* scans, std::size_t count,
+std::vector<Standing> stand_up(const FloorPlan& plan, const std::vector<Scan*>& scans,
                                unsigned threads) {
-  std::vector<std::vector<Standing>> of_scans(count);
-  for_each_on(threads, count, [&](std::size_t k) {
-    const Scan& scan = scans[k];
+  const std::size_t count = scans.size();
+  struct Shown {
     ScanSurface surface;
+    bool has_sides = false;
+    std::vector<Eigen::Vector3f> verticals;
+  };
+  std::vector<Shown> shown(count);
+  for_each_on(threads, count, [&](std::size_t k) {
+    const Scan& scan = *scans[k];
     for (const Eigen::Vector3d& point : scan.points)
-      surface.points.push_back((point - scan.middle).cast<float>());
-    surface.normals = scan.cloud.normals();
-    const bool has_sides =
+      shown[k].surface.points.push_back((point - scan.middle).cast<float>());
+    shown[k].surface.normals = scan.cloud.normals();
+    shown[k].has_sides =
         plan.has_sides && scan.cloud.statistics().viewpoint != ViewpointSource::none;
-    for (const Eigen::Vector3f& up : possible_verticals(surface, plan, has_sides))
-      of_scans[k].push_back({k, has_sides, stand(surface, up, plan.cell), {}, {}});
+    shown[k].verticals = possible_verticals(shown[k].surface, plan, shown[k].has_sides);
   });
   std::vector<Standing> out;
-  for (std::vector<Standing>& of_scan : of_scans)
-    std::move(of_scan.begin(), of_scan.end(), std::back_inserter(out));
+  std::vector<Eigen::Vector3f> verticals;
+  for (std::size_t k = 0; k < count; ++k)
+    for (const Eigen::Vector3f& up : shown[k].verticals) {
+      out.push_back({k, shown[k].has_sides, {}, {}, {}});
+      verticals.push_back(up);
+    }
+  for_each_on(threads, out.size(), [&](std::size_t s) {
+    out[s].upright = stand(shown[out[s].scan].surface, verticals[s], plan.cell);
+  });
   return out;
 }
 
@@ -214,47 +242,59 @@ std::vector<Candidate> candidates_of(const MapState& map, const FloorPlan& plan,
   return out;
 }
 
-void search_some(const MapState& map, const FloorPlan& plan, PlanMatcher& matcher, Scan* scans,
-                 std::size_t count, std::size_t most, unsigned threads) {
-  std::vector<Standing> standing = stand_up(plan, scans, count, threads);
+void search_some(const MapState& map, const FloorPlan& plan, PlanMatcher& matcher,
+                 const PlanEffort& effort, const std::vector<Scan*>& scans, std::size_t most,
+                 unsigned threads) {
+  std::vector<Standing> standing = stand_up(plan, scans, threads);
   std::vector<plan::Scan> views;
   for (const Standing& s : standing)
-    views.push_back(view_of(s, region_of(map, plan, scans[s.scan])));
-  std::vector<std::vector<plan::Place>> places = matcher.best_cells(span_of(views), kCells);
+    views.push_back(view_of(s, region_of(map, plan, *scans[s.scan])));
+  std::vector<std::vector<plan::Place>> places = matcher.best_cells(span_of(views), effort.cells);
   for_each_on(threads, standing.size(), [&](std::size_t s) {
-    places[s] = peaks(places[s], standing[s].upright.headings, kRefined);
+    places[s] = peaks(places[s], standing[s].upright.headings, effort.refined);
   });
   places = matcher.refine(span_of(views), places);
-  for_each_on(threads, standing.size(), [&](std::size_t k) {
+  std::vector<std::pair<std::size_t, std::size_t>> of_all;  // standing scans and their places
+  for (std::size_t k = 0; k < standing.size(); ++k) {
     Standing& s = standing[k];
     s.places = std::move(places[k]);
     std::stable_sort(s.places.begin(), s.places.end(), [](const auto& a, const auto& b) {
       return a.score > b.score;
     });
-    s.places.resize(std::min(s.places.size(), kWithHeights));
-    for (const plan::Place& place : s.places)
-      s.heights.push_back(heights_of(plan, s.upright, s.has_sides, place));
+    s.places.resize(std::min(s.places.size(), effort.with_heights));
+    s.heights.resize(s.places.size());
+    for (std::size_t place = 0; place < s.places.size(); ++place) of_all.emplace_back(k, place);
+  }
+  constexpr std::size_t kTogether = 8;
+  for_each_on(threads, (of_all.size() + kTogether - 1) / kTogether, [&](std::size_t part) {
+    for (std::size_t k = part * kTogether; k < std::min(of_all.size(), (part + 1) * kTogether); ++k) {
+      Standing& s = standing[of_all[k].first];
+      s.heights[of_all[k].second] =
+          heights_of(plan, s.upright, s.has_sides, s.places[of_all[k].second]);
+    }
   });
-  for_each_on(threads, count, [&](std::size_t k) {
+  for_each_on(threads, scans.size(), [&](std::size_t k) {
     const auto of_scan = std::equal_range(
         standing.data(), standing.data() + standing.size(), Standing{k, false, {}, {}, {}},
         [](const Standing& a, const Standing& b) { return a.scan < b.scan; });
-    scans[k].planned = candidates_of(map, plan, scans[k], of_scan.first, of_scan.second, most);
+    scans[k]->planned = candidates_of(map, plan, *scans[k], of_scan.first, of_scan.second, most);
   });
 }
 
 }  // namespace
 
 void search_plan(const Context& context, const MapState& map, std::size_t most,
-                 std::vector<Scan>& scans) {
+                 const PlanEffort& effort, const std::vector<Scan*>& scans) {
   if (scans.empty()) return;
   const unsigned threads = host_threads(context);
   const FloorPlan& plan = map.plan(threads);
   if (plan.width == 0) return;
   const std::shared_ptr<PlanMatcher> matcher = map.plan_matcher(context);
-  for (std::size_t begin = 0; begin < scans.size(); begin += kScansAtOnce)
-    search_some(map, plan, *matcher, scans.data() + begin,
-                std::min(kScansAtOnce, scans.size() - begin), most, threads);
+  for (auto begin = scans.begin(); begin != scans.end();) {
+    const auto end = begin + std::min<std::ptrdiff_t>(kScansAtOnce, scans.end() - begin);
+    search_some(map, plan, *matcher, effort, {begin, end}, most, threads);
+    begin = end;
+  }
 }
 
 }  // namespace gpureg::localization

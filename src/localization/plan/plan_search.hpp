@@ -5,11 +5,19 @@
 
 namespace gpureg::localization {
 
+/// Of an upright scan: coarse cells that are looked at, places of these that are refined, and refined
+/// places that get heights.
+struct PlanEffort {
+  std::size_t cells, refined, with_heights;
+};
+/// Enough for most scans; and for sparse ones, whose walls may fit thousands of places better.
+constexpr PlanEffort kUsualEffort{8192, 256, 128}, kThoroughEffort{65536, 2048, 1024};
+
 /// Sets `planned` of the scans: the places of the map that look most like the scan from above, the
 /// most confident first. Correlative scan matching of walls (algorithm/plan.hpp) for each direction
 /// of the scan that may be the map's vertical: all cells and headings are tried, coarse cells first.
 /// Heights follow from the columns of the best cells.
 void search_plan(const Context& context, const MapState& map, std::size_t most,
-                 std::vector<Scan>& scans);
+                 const PlanEffort& effort, const std::vector<Scan*>& scans);
 
 }  // namespace gpureg::localization
