@@ -84,7 +84,10 @@ std::vector<std::size_t> see_from_above(const Context& context, const MapState& 
     std::vector<Scan*> asked;
     for (const std::size_t k : open) asked.push_back(&scans[k]);
     search_plan(context, map, options.candidates, effort, asked);
-    for (Scan* scan : asked) scan->candidates = scan->planned;
+    for (Scan* scan : asked) {
+      scan->candidates = scan->planned;
+      keep_likely(options, *scan);
+    }
     const std::vector<std::vector<Verified>> places =
         verify_planned(context, map, options, asked);
     std::vector<std::size_t> unsure;
