@@ -14,35 +14,48 @@
 namespace gpureg::localization {
 namespace {
 
-/// The evidence of a pair may overlap little, but a scan that is in the map lies in it, and sees
-/// what the map has there. Log odds that a place loses: with the part of the scan beyond a tenth
-/// that has no surface of the map beside it,
-constexpr double kContained = 0.9, kLogOddsOfRest = 8;
-/// with the part of the map that lies in free space of the scan, and with the parts of both in
-/// front of surfaces of the other, beyond what right places have; at most so many, as rooms change.
-constexpr double kInFreeSpace = 0.005, kLogOddsInFreeSpace = 150;
-constexpr double kInFront = 0.01, kLogOddsInFront = 100;
-constexpr double kMostLogOdds = 4;
+/// The log odds of a place by surfaces: a line in logarithms of the part of the scan without a surface
+/// of the map, of the part of the map in free space of the scan, and of the parts of both in front of
+/// surfaces of the other. The evidence of a pair may overlap little, but a scan that is in the map
+/// lies in it, and sees what the map has there. Fitted, with the weight of the log odds of the search
+/// of the plan, by bench/accuracy/fit_places.py.
+constexpr double kIntercept = -9.96, kOfUncovered = -0.56, kOfFreeSpace = -0.67, kOfFront = -1.29,
+                 kOfPlan = 0.48;
+/// The logarithms are of at least these shares.
+constexpr double kLeastUncovered = 0.01, kLeastFreeSpace = 0.002, kLeastFront = 0.004;
+/// Confidence of a search, and of its opposite, at least.
+constexpr double kLeastSearch = 1e-4;
 
-/// Log odds against a place. Sparse scans are contained in wide voxels at least.
-double doubt(const PoseVerification& fine, const PoseVerification& wide) {
-  const PoseEvidence& e = fine.evidence;
-  const double contained =
-      std::max(e.source_overlap_any_normal, wide.evidence.source_overlap_any_normal);
-  const auto beyond = [](double share, double usual) { return std::max(0.0, share - usual); };
-  const double contradicted =
-      kLogOddsInFreeSpace * beyond(e.target_free_space_violation, kInFreeSpace) +
-      kLogOddsInFront * (beyond(e.source_front_violation_near, kInFront) +
-                         beyond(e.target_front_violation_near, kInFront));
-  return kLogOddsOfRest * beyond(kContained, contained) + std::min(kMostLogOdds, contradicted);
+double surface_odds(const PoseVerification& pose) {
+  const PoseEvidence& e = pose.evidence;
+  const auto log_of = [](double share, double least) {
+    return portable::log(std::max(share, least));
+  };
+  return portable::exp(
+      kIntercept + kOfUncovered * log_of(1 - e.source_overlap_any_normal, kLeastUncovered) +
+      kOfFreeSpace * log_of(e.target_free_space_violation, kLeastFreeSpace) +
+      kOfFront * log_of(e.source_front_violation_near + e.target_front_violation_near, kLeastFront));
 }
 
-/// The mean of the log odds of the search and the verification, where it is more than that of the
-/// verification alone, less the doubt.
+double confidence_of_surfaces(const PoseVerification& pose) {
+  const double odds = surface_odds(pose);
+  return odds / (1 + odds);
+}
+
+/// Of a place that the plan of the map proposes.
+double confidence_of_planned(double searched, const PoseVerification& pose) {
+  const double c = std::clamp(searched, kLeastSearch, 1 - kLeastSearch);
+  const double odds =
+      surface_odds(pose) * portable::exp(kOfPlan * portable::log(c / (1 - c)));
+  return odds / (1 + odds);
+}
+
+/// Of a place that a tile proposes: half the log odds of the pair, or of the mean of pair and search
+/// where that is more, count beside those by surfaces.
 double confidence_of(double searched, const PoseVerification& fine, const PoseVerification& wide) {
   const double verified = odds_of(std::max(fine.confidence, wide.confidence));
-  const double odds = std::max(verified, std::sqrt(odds_of(searched) * verified)) *
-                      portable::exp(-doubt(fine, wide));
+  const double of_pair = std::max(verified, std::sqrt(odds_of(searched) * verified));
+  const double odds = std::sqrt(of_pair) * surface_odds(fine);
   return odds / (1 + odds);
 }
 
@@ -79,40 +92,6 @@ std::vector<PoseVerification> verify_coarsely(const Context& context, const MapS
       verify_poses_batch(context, clouds, pairs, poses, registration, verification);
   for (std::size_t k = 0; k < asked.size(); ++k) out[asked[k]] = results[k].front();
   return out;
-}
-
-/// Of a place that the plan of the map proposes: the log odds by surfaces, a line in logarithms of the
-/// part of the scan without a surface of the map, of the part of the map in free space of the scan,
-/// and of the parts of both in front of surfaces of the other; and the share of the log odds of the
-/// search. Fitted on houses, offices, streets and rooms: bench/notes/maps.md, "Places by surfaces".
-constexpr double kIntercept = -9.96, kOfUncovered = -0.56, kOfFreeSpace = -0.67, kOfFront = -1.29,
-                 kOfSearch = 0.48;
-/// The logarithms are of at least these shares.
-constexpr double kLeastUncovered = 0.01, kLeastFreeSpace = 0.002, kLeastFront = 0.004;
-/// Odds of a search, at most, and 1 / at least.
-constexpr double kMostSearchOdds = 1e4;
-
-double surface_odds(const PoseVerification& pose) {
-  const PoseEvidence& e = pose.evidence;
-  const auto log_of = [](double share, double least) {
-    return portable::log(std::max(share, least));
-  };
-  return portable::exp(
-      kIntercept + kOfUncovered * log_of(1 - e.source_overlap_any_normal, kLeastUncovered) +
-      kOfFreeSpace * log_of(e.target_free_space_violation, kLeastFreeSpace) +
-      kOfFront * log_of(e.source_front_violation_near + e.target_front_violation_near, kLeastFront));
-}
-
-double confidence_of_surfaces(const PoseVerification& pose) {
-  const double odds = surface_odds(pose);
-  return odds / (1 + odds);
-}
-
-double confidence_of_planned(double searched, const PoseVerification& pose) {
-  const double of_search = std::clamp(searched / (1 - std::min(searched, 1 - 1e-9)),
-                                      1 / kMostSearchOdds, kMostSearchOdds);
-  const double odds = surface_odds(pose) * portable::exp(kOfSearch * portable::log(of_search));
-  return odds / (1 + odds);
 }
 
 void sort(std::vector<Verified>& places) {
