@@ -50,12 +50,35 @@ double confidence_of_planned(double searched, const PoseVerification& pose) {
   return odds / (1 + odds);
 }
 
-/// Of a place that a tile proposes: half the log odds of the pair, or of the mean of pair and search
-/// where that is more, count beside those by surfaces.
+/// A tile proposes many places, of which the best is chosen by its evidence as a pair, so the doubts
+/// about it are greater: log odds that it loses with the part of the scan beyond a tenth that has no
+/// surface of the map beside it,
+constexpr double kContained = 0.9, kLogOddsOfRest = 8;
+/// with the part of the map that lies in free space of the scan, and with the parts of both in
+/// front of surfaces of the other, beyond what right places have; at most so many, as rooms change.
+constexpr double kInFreeSpace = 0.005, kLogOddsInFreeSpace = 150;
+constexpr double kInFront = 0.01, kLogOddsInFront = 100;
+constexpr double kMostLogOdds = 4;
+
+/// Log odds against a place. Sparse scans are contained in wide voxels at least.
+double doubt(const PoseVerification& fine, const PoseVerification& wide) {
+  const PoseEvidence& e = fine.evidence;
+  const double contained =
+      std::max(e.source_overlap_any_normal, wide.evidence.source_overlap_any_normal);
+  const auto beyond = [](double share, double usual) { return std::max(0.0, share - usual); };
+  const double contradicted =
+      kLogOddsInFreeSpace * beyond(e.target_free_space_violation, kInFreeSpace) +
+      kLogOddsInFront * (beyond(e.source_front_violation_near, kInFront) +
+                         beyond(e.target_front_violation_near, kInFront));
+  return kLogOddsOfRest * beyond(kContained, contained) + std::min(kMostLogOdds, contradicted);
+}
+
+/// Of a place that a tile proposes: the mean of the log odds of the search and of the pair, where it
+/// is more than that of the pair alone, less the doubt, and less those by surfaces that are against it.
 double confidence_of(double searched, const PoseVerification& fine, const PoseVerification& wide) {
   const double verified = odds_of(std::max(fine.confidence, wide.confidence));
-  const double of_pair = std::max(verified, std::sqrt(odds_of(searched) * verified));
-  const double odds = std::sqrt(of_pair) * surface_odds(fine);
+  const double odds = std::max(verified, std::sqrt(odds_of(searched) * verified)) *
+                      portable::exp(-doubt(fine, wide)) * std::min(1.0, surface_odds(fine));
   return odds / (1 + odds);
 }
 
