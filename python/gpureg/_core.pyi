@@ -1141,6 +1141,7 @@ class MapOptions:
 class LocateOptions:
     # fields of LocateOptions
     registration: RegistrationOptions
+    min_confidence: float
     max_matches: int
     coarse_factor: float
     coarse_tiles: int
@@ -1151,6 +1152,7 @@ class LocateOptions:
         self,
         *,
         registration: RegistrationOptions = ...,
+        min_confidence: float = ...,
         max_matches: int = ...,
         coarse_factor: float = ...,
         coarse_tiles: int = ...,
@@ -1162,6 +1164,7 @@ class LocateOptions:
         self,
         *,
         registration: RegistrationOptions = ...,
+        min_confidence: float = ...,
         max_matches: int = ...,
         coarse_factor: float = ...,
         coarse_tiles: int = ...,

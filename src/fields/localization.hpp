@@ -36,6 +36,7 @@ struct Fields<localization::LocateOptions> {
   static void visit(V&& v) {
     using O = localization::LocateOptions;
     v(&O::registration, {"registration", "Of the alignments."});
+    v(&O::min_confidence, {"min_confidence", kProbability, "Confidence from which a place is found."});
     v(&O::max_matches, {"max_matches", from(limits::kMinMatches, limits::kMaxMatches), "Matches with a tile."});
     v(&O::coarse_factor, {"coarse_factor", from(1, 8), "Voxels of the coarse search, in voxels of the map."});
     v(&O::coarse_tiles, {"coarse_tiles", from(1, 1e6), "Tiles of the coarse search; of more, a coarser one chooses."});

@@ -62,14 +62,14 @@ LocateResult result_of(const std::vector<Verified>& verified, const Scan& scan,
     LocatedPose place;
     place.map_from_scan = pose;
     place.verification = v.verification;
-    place.alias = !out.poses.empty() && v.confidence >= options.registration.min_confidence;
+    place.alias = !out.poses.empty() && v.confidence >= options.min_confidence;
     out.poses.push_back(place);
     alone.push_back(v.confidence);
   }
   const std::vector<double> shared = shared_probability(alone);
   for (std::size_t k = 0; k < out.poses.size(); ++k) out.poses[k].confidence = shared[k];
   out.absent_probability = shared.back();
-  out.status = status_of(out, options.registration.min_confidence);
+  out.status = status_of(out, options.min_confidence);
   return out;
 }
 

@@ -37,8 +37,7 @@ TEST(Locate, FindsAScanInItsRoomAndSaysWhereItIsNot) {
 TEST(Locate, WhatTheMapLacksCostsConfidence) {
   const PreparedMap map = building({1, 2, 3}, map_options());
   Query query(2, 1, 2);
-  const double whole =
-      locate(context(), query.scan.view(), map).poses.front().verification.confidence;
+  const double whole = locate(context(), query.scan.view(), map).poses.front().confidence;
   // Beyond a wall the scan sees a room that the map has not.
   const Eigen::Isometry3d beyond = query.map_from_scan.inverse() * Eigen::Translation3d(6, 5, 0);
   for (const Eigen::Vector3f& p : moved(beyond, furnished_room(50, 2)))
@@ -47,7 +46,7 @@ TEST(Locate, WhatTheMapLacksCostsConfidence) {
   ASSERT_FALSE(result.poses.empty());
   EXPECT_LT(query.error(result.poses.front()), kClose);
   EXPECT_LT(result.poses.front().verification.evidence.source_overlap_any_normal, 0.6);
-  EXPECT_LT(result.poses.front().verification.confidence, whole - 0.01);
+  EXPECT_LT(result.poses.front().confidence, whole - 0.01);
 }
 
 TEST(Locate, FindsAScanAmongTiles) {

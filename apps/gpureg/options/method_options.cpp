@@ -52,7 +52,8 @@ void MethodOptions::add_to(Verb verb) {
       .show_default();
   verb.option("--seed", seed, "Same seed, same result, on any machine").natural().show_default();
   verb.option("--min-score", min_score,
-              "Report a pair from this confidence on (without: 0.5); with --preset loopsmart, "
+              "Report a pair from this confidence on (without: 0.5), a place in a map (without: 0.8); "
+              "with --preset loopsmart, "
               "from this inlier ratio on (0.3). 0: every best candidate");
   verb.option("--set", set,
               "Any other option under its name in the JSON, for experts: evidence.sample=1024, "

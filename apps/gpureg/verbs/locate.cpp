@@ -104,9 +104,7 @@ int run(LocateRun o) {
   const Context context = o.method.context();
   const MapInput input(o.map());
   choose_voxel_size(o.method, input);
-  LocateOptions options = LocateOptions::from_voxel_size(o.method.voxel_size, o.method.quality);
-  options.registration = o.method.registration();
-  options.validate();
+  const LocateOptions options = locate_options(o.method);
   MapOptions of_map = MapOptions::from_voxel_size(o.method.voxel_size);
   of_map.prepare = options.registration.prepare;
   const PreparedMap map = input.prepare(context, of_map);
