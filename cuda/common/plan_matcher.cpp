@@ -46,8 +46,8 @@ CudaPlan::CudaPlan(Lanes& lanes, const plan::Map& map) : lanes_(lanes), map_(map
   coarse_ = exec.upload(map.coarse, static_cast<std::size_t>(plan::kPlanes) *
                                         static_cast<std::size_t>(map.coarse_rows) *
                                         static_cast<std::size_t>(map.coarse_words));
-  walls_ = exec.upload(
-      map.walls, static_cast<std::size_t>(map.rows) * static_cast<std::size_t>(map.stride));
+  walls_ = exec.upload(map.walls,
+                       static_cast<std::size_t>(map.rows) * static_cast<std::size_t>(map.stride));
   map_.coarse = coarse_.data();
   map_.walls = walls_.data();
   exec.synchronize();
@@ -61,8 +61,8 @@ std::vector<std::vector<Place>> CudaPlan::best_cells(Span<const Scan> scans, std
     const Scan& scan = scans[s];
     const std::int32_t columns = scan.high[0] - scan.low[0], rows = scan.high[1] - scan.low[1];
     if (columns <= 0 || rows <= 0) continue;
-    most_words = std::max(most_words, static_cast<std::size_t>((columns + 31) / 32) *
-                                          static_cast<std::size_t>(rows));
+    most_words = std::max(
+        most_words, static_cast<std::size_t>((columns + 31) / 32) * static_cast<std::size_t>(rows));
     for (std::int32_t h = 0; h < scan.headings; ++h)
       (h % kCountedFirst == 0 ? first : rest).push_back({s, h});
   }

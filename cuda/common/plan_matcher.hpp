@@ -35,9 +35,9 @@ GPUREG_HD CellKey key_of(const plan::Place& place) {
 }
 GPUREG_HD plan::Place place_of(CellKey key) {
   constexpr std::int32_t kMostScore = (1 << plan::kScoreBits) - 1;
-  return {kMostScore - static_cast<std::int32_t>(key >> 56),
-          static_cast<std::int32_t>(key & 0xffffff), static_cast<std::int32_t>(key >> 24 & 0xffffff),
-          static_cast<std::int32_t>(key >> 48 & 0xff)};
+  return {
+      kMostScore - static_cast<std::int32_t>(key >> 56), static_cast<std::int32_t>(key & 0xffffff),
+      static_cast<std::int32_t>(key >> 24 & 0xffffff), static_cast<std::int32_t>(key >> 48 & 0xff)};
 }
 
 /// A scan and one of its headings; a scan and one of its coarse places.
@@ -57,9 +57,10 @@ void count_cells(Exec& exec, const plan::Map& map, const plan::Scan* scans, std:
                  const HeadingTask* tasks, std::size_t count, const std::int32_t* least,
                  unsigned long long* counts);
 /// Sets least[scan] to least_score() of the counts, if that is more.
-void raise_least(Exec& exec, const unsigned long long* counts, std::size_t scans,
-                 std::size_t most, std::int32_t* least);
-/// Lists the cells whose scores are at least least[scan]: found[scan] of them, at cells + most scan.
+void raise_least(Exec& exec, const unsigned long long* counts, std::size_t scans, std::size_t most,
+                 std::int32_t* least);
+/// Lists the cells whose scores are at least least[scan]: found[scan] of them, at cells + most
+/// scan.
 void list_cells(Exec& exec, const plan::Map& map, const plan::Scan* scans, std::size_t most_words,
                 const HeadingTask* tasks, std::size_t count, const std::int32_t* least,
                 std::size_t most, std::uint32_t* found, CellKey* cells);

@@ -79,10 +79,9 @@ __global__ void __launch_bounds__(kThreads)
   for (unsigned k = threadIdx.x; k < kScores; k += kThreads) of_block[k] = 0;
   __syncthreads();
   const HeadingTask task = tasks[blockIdx.y];
-  score_cells(map, scans[task.scan], task.heading, least[task.scan],
-              [&](std::uint32_t score, std::int32_t, std::int32_t) {
-                atomicAdd(of_block + score, 1u);
-              });
+  score_cells(
+      map, scans[task.scan], task.heading, least[task.scan],
+      [&](std::uint32_t score, std::int32_t, std::int32_t) { atomicAdd(of_block + score, 1u); });
   __syncthreads();
   for (unsigned k = threadIdx.x; k < kScores; k += kThreads)
     if (of_block[k] != 0) atomicAdd(counts + kScores * task.scan + k, of_block[k]);
@@ -127,9 +126,8 @@ __global__ void __launch_bounds__(kRefineThreads)
   if (thread == 0) best = 0;
   const std::int32_t u = static_cast<std::int32_t>(cell % kEdge),
                      v = static_cast<std::int32_t>(cell / kEdge);
-  const std::uint16_t* here = map.walls +
-                              (map.margin + first_y + v) * std::int64_t{map.stride} + map.margin +
-                              first_x + u;
+  const std::uint16_t* here =
+      map.walls + (map.margin + first_y + v) * std::int64_t{map.stride} + map.margin + first_x + u;
   unsigned score = 0;
   for (unsigned begin = 0; begin < scan.walls.size; begin += kWallsAtOnce) {
     const unsigned some = min(kWallsAtOnce, static_cast<unsigned>(scan.walls.size) - begin);
@@ -178,8 +176,8 @@ void count_cells(Exec& exec, const Map& map, const Scan* scans, std::size_t most
   });
 }
 
-void raise_least(Exec& exec, const unsigned long long* counts, std::size_t scans,
-                 std::size_t most, std::int32_t* least) {
+void raise_least(Exec& exec, const unsigned long long* counts, std::size_t scans, std::size_t most,
+                 std::int32_t* least) {
   raise<<<blocks_for(scans, kThreads), kThreads, 0, exec.stream()>>>(counts, scans, most, least);
   check_launch("raise_least");
 }

@@ -17,7 +17,8 @@ constexpr int kPlanes = kDirections * 3 / 2;
 /// A score is the sum of so many bits: a byte.
 constexpr int kScoreBits = 8;
 constexpr std::size_t kCoarseWalls = (1u << kScoreBits) - 1;
-/// Half the width of the refinement around a coarse cell, in cells and in half steps of the heading.
+/// Half the width of the refinement around a coarse cell, in cells and in half steps of the
+/// heading.
 constexpr int kAround = 3, kTurnsAround = 2;
 constexpr int kEdge = 2 * kAround + 1, kTurns = 2 * kTurnsAround + 1;
 
@@ -27,8 +28,8 @@ struct Map {
   /// last two words of a row are empty.
   const std::uint32_t* coarse;
   std::int32_t coarse_rows, coarse_words;  ///< of a plane, of a row
-  const std::uint16_t* walls;  ///< per cell: the directions that walls in it face, as bits
-  std::int32_t rows, stride;   ///< of `walls`
+  const std::uint16_t* walls;          ///< per cell: the directions that walls in it face, as bits
+  std::int32_t rows, stride;           ///< of `walls`
   std::int32_t coarse_margin, margin;  ///< cells
 };
 
@@ -41,8 +42,8 @@ struct Wall {
 struct Scan {
   Span<const Wall> coarse_walls;  ///< at most kCoarseWalls, in coarse cells
   Span<const Wall> walls;
-  std::int32_t headings;  ///< steps of a coarse turn, at most 256
-  bool has_sides;         ///< false: a wall may face the opposite direction, too
+  std::int32_t headings;         ///< steps of a coarse turn, at most 256
+  bool has_sides;                ///< false: a wall may face the opposite direction, too
   std::int32_t low[2], high[2];  ///< [low, high)
 };
 

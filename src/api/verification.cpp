@@ -227,32 +227,31 @@ std::vector<std::vector<PoseVerification>> verify_poses_batch(
     const Context& context, const std::vector<PreparedCloud>& clouds,
     const std::vector<Pair>& pairs, const std::vector<std::vector<UnalignedIsometry3d>>& poses,
     const RegistrationOptions& options, const VerificationOptions& verification) {
-  return verify_pairs(
-      context, clouds, pairs, poses, options, verification.refine, {},
-      [&](Engine& engine, const std::vector<PairInput>& inputs,
-          const std::vector<VerifiedPair>& verified, const std::vector<PairOutcome>& outcomes,
-          Verifications& made) {
-        std::vector<PairOutcome> found(inputs.size());
-        if (verification.search_alternatives)
-          align_all(engine, inputs, verified.front().options, found);
-        for (std::size_t v = 0; v < made.size(); ++v)
-          set_confidences(verified[v], outcomes[v],
-                          verification.search_alternatives ? &found[v] : nullptr, made[v]);
-      });
+  return verify_pairs(context, clouds, pairs, poses, options, verification.refine, {},
+                      [&](Engine& engine, const std::vector<PairInput>& inputs,
+                          const std::vector<VerifiedPair>& verified,
+                          const std::vector<PairOutcome>& outcomes, Verifications& made) {
+                        std::vector<PairOutcome> found(inputs.size());
+                        if (verification.search_alternatives)
+                          align_all(engine, inputs, verified.front().options, found);
+                        for (std::size_t v = 0; v < made.size(); ++v)
+                          set_confidences(verified[v], outcomes[v],
+                                          verification.search_alternatives ? &found[v] : nullptr,
+                                          made[v]);
+                      });
 }
 
-Verifications verify_by_surfaces(
-    const Context& context, const std::vector<PreparedCloud>& clouds,
-    const std::vector<Pair>& pairs, const std::vector<std::vector<UnalignedIsometry3d>>& poses,
-    const RegistrationOptions& options, bool refine,
-    const std::function<double(const PoseVerification&)>& confidence) {
+Verifications verify_by_surfaces(const Context& context, const std::vector<PreparedCloud>& clouds,
+                                 const std::vector<Pair>& pairs,
+                                 const std::vector<std::vector<UnalignedIsometry3d>>& poses,
+                                 const RegistrationOptions& options, bool refine,
+                                 const std::function<double(const PoseVerification&)>& confidence) {
   const std::uint32_t first = 0;  // a match that the evidence of surfaces does not look at
   return verify_pairs(context, clouds, pairs, poses, options, refine, {&first, 1},
                       [&](Engine&, const std::vector<PairInput>&, const std::vector<VerifiedPair>&,
                           const std::vector<PairOutcome>&, Verifications& made) {
                         for (std::vector<PoseVerification>& of_pair : made)
-                          for (PoseVerification& pose : of_pair)
-                            pose.confidence = confidence(pose);
+                          for (PoseVerification& pose : of_pair) pose.confidence = confidence(pose);
                       });
 }
 

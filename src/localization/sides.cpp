@@ -33,7 +33,8 @@ Sided sided(const Context& context, const MapState& map, std::size_t tile) {
   options.surface_side_distance = 0;
   options.wide_feature_radius = 0;
   const WithoutFeatures without(cloud.points.size());
-  out.cloud = prepare_batch(context, {without.of(view_of(cloud))}, options, {map.name_of(tile)}).front();
+  out.cloud =
+      prepare_batch(context, {without.of(view_of(cloud))}, options, {map.name_of(tile)}).front();
   return out;
 }
 

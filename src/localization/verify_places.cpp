@@ -14,11 +14,11 @@
 namespace gpureg::localization {
 namespace {
 
-/// The log odds of a place by surfaces: a line in logarithms of the part of the scan without a surface
-/// of the map, of the part of the map in free space of the scan, and of the parts of both in front of
-/// surfaces of the other. The evidence of a pair may overlap little, but a scan that is in the map
-/// lies in it, and sees what the map has there. Fitted, with the weight of the log odds of the search
-/// of the plan, by bench/accuracy/fit_places.py.
+/// The log odds of a place by surfaces: a line in logarithms of the part of the scan without a
+/// surface of the map, of the part of the map in free space of the scan, and of the parts of both
+/// in front of surfaces of the other. The evidence of a pair may overlap little, but a scan that is
+/// in the map lies in it, and sees what the map has there. Fitted, with the weight of the log odds
+/// of the search of the plan, by bench/localization/fit_places.py.
 constexpr double kIntercept = -9.96, kOfUncovered = -0.56, kOfFreeSpace = -0.67, kOfFront = -1.29,
                  kOfPlan = 0.48;
 /// The logarithms are of at least these shares.
@@ -34,7 +34,8 @@ double surface_odds(const PoseVerification& pose) {
   return portable::exp(
       kIntercept + kOfUncovered * log_of(1 - e.source_overlap_any_normal, kLeastUncovered) +
       kOfFreeSpace * log_of(e.target_free_space_violation, kLeastFreeSpace) +
-      kOfFront * log_of(e.source_front_violation_near + e.target_front_violation_near, kLeastFront));
+      kOfFront *
+          log_of(e.source_front_violation_near + e.target_front_violation_near, kLeastFront));
 }
 
 double confidence_of_surfaces(const PoseVerification& pose) {
@@ -45,14 +46,13 @@ double confidence_of_surfaces(const PoseVerification& pose) {
 /// Of a place that the plan of the map proposes.
 double confidence_of_planned(double searched, const PoseVerification& pose) {
   const double c = std::clamp(searched, kLeastSearch, 1 - kLeastSearch);
-  const double odds =
-      surface_odds(pose) * portable::exp(kOfPlan * portable::log(c / (1 - c)));
+  const double odds = surface_odds(pose) * portable::exp(kOfPlan * portable::log(c / (1 - c)));
   return odds / (1 + odds);
 }
 
-/// A tile proposes many places, of which the best is chosen by its evidence as a pair, so the doubts
-/// about it are greater: log odds that it loses with the part of the scan beyond a tenth that has no
-/// surface of the map beside it,
+/// A tile proposes many places, of which the best is chosen by its evidence as a pair, so the
+/// doubts about it are greater: log odds that it loses with the part of the scan beyond a tenth
+/// that has no surface of the map beside it,
 constexpr double kContained = 0.9, kLogOddsOfRest = 8;
 /// with the part of the map that lies in free space of the scan, and with the parts of both in
 /// front of surfaces of the other, beyond what right places have; at most so many, as rooms change.
@@ -73,8 +73,9 @@ double doubt(const PoseVerification& fine, const PoseVerification& wide) {
   return kLogOddsOfRest * beyond(kContained, contained) + std::min(kMostLogOdds, contradicted);
 }
 
-/// Of a place that a tile proposes: the mean of the log odds of the search and of the pair, where it
-/// is more than that of the pair alone, less the doubt, and less those by surfaces that are against it.
+/// Of a place that a tile proposes: the mean of the log odds of the search and of the pair, where
+/// it is more than that of the pair alone, less the doubt, and less those by surfaces that are
+/// against it.
 double confidence_of(double searched, const PoseVerification& fine, const PoseVerification& wide) {
   const double verified = odds_of(std::max(fine.confidence, wide.confidence));
   const double odds = std::max(verified, std::sqrt(odds_of(searched) * verified)) *
@@ -124,7 +125,7 @@ void sort(std::vector<Verified>& places) {
 }
 
 /// Neighbourhoods that are cut out, and points that are prepared and compared, together.
-constexpr std::size_t kPlacesAtOnce = 64, kPointsAtOnce = 400'000;
+constexpr std::size_t kPlacesAtOnce = 64, kPointsTogether = 400'000;
 
 /// A candidate of a scan and the map around it.
 struct Place {
@@ -149,18 +150,19 @@ void compare_surfaces(const Context& context, const MapState& map, const LocateO
   std::vector<Pair> pairs;
   std::vector<std::vector<UnalignedIsometry3d>> poses;
   for (const Place* place = begin; place != end; ++place) {
-    if (place == begin || place->scan != place[-1].scan) clouds.push_back(scans[place->scan]->cloud);
-    pairs.push_back({static_cast<std::uint32_t>(clouds.size() - 1),
-                     static_cast<std::uint32_t>(place - begin)});
+    if (place == begin || place->scan != place[-1].scan)
+      clouds.push_back(scans[place->scan]->cloud);
+    pairs.push_back(
+        {static_cast<std::uint32_t>(clouds.size() - 1), static_cast<std::uint32_t>(place - begin)});
     poses.push_back({place->candidate->map_from_scan});
   }
-  const auto results = verify_by_surfaces(context, clouds, pairs, poses, options.registration,
-                                          true, confidence_of_surfaces);
+  const auto results = verify_by_surfaces(context, clouds, pairs, poses, options.registration, true,
+                                          confidence_of_surfaces);
   for (std::size_t k = 0; k < results.size(); ++k) {
     const Candidate& candidate = *begin[k].candidate;
     const PoseVerification& pose = results[k].front();
-    out[begin[k].scan].push_back({candidate, pose, clouds[k].size(),
-                                  confidence_of_planned(candidate.confidence, pose)});
+    out[begin[k].scan].push_back(
+        {candidate, pose, clouds[k].size(), confidence_of_planned(candidate.confidence, pose)});
   }
 }
 
@@ -227,7 +229,7 @@ std::vector<std::vector<Verified>> verify_planned(const Context& context, const 
     while (begin < last) {
       std::size_t end = begin, points = 0;
       do points += places[end++].around.points.size();
-      while (end < last && points + places[end].around.points.size() <= kPointsAtOnce);
+      while (end < last && points + places[end].around.points.size() <= kPointsTogether);
       compare_surfaces(context, map, options, scans, &places[begin], &places[0] + end, out);
       for (; begin < end; ++begin) places[begin].around = {};
     }

@@ -7,7 +7,7 @@ namespace gpureg::localization {
 
 /// Confidence of a place from which the coarse search is enough, and one of its poses, not verified
 /// yet, that a search in narrower voxels hardly surpasses.
-constexpr double kSure = 0.8, kSureSearch = 0.95;
+constexpr double kSure = 0.75, kSureSearch = 0.95;
 /// Where no pose of the coarse search reaches this confidence, the scan is not in the map, if its
 /// coarse points are so many that the search had something to see.
 constexpr double kHopelessSearch = 0.1;

@@ -50,9 +50,7 @@ class WatchedEngine final : public Engine {
   std::unique_ptr<SurfaceMatcher> match_surfaces(Span<const SurfaceArrays>) override {
     return nullptr;
   }
-  std::unique_ptr<PlanMatcher> match_plan(const plan::Map&) override {
-    return nullptr;
-  }
+  std::unique_ptr<PlanMatcher> match_plan(const plan::Map&) override { return nullptr; }
 
   std::size_t given = 0;
 

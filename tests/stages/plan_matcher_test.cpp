@@ -54,8 +54,7 @@ Place refined(const RandomPlan& map, const plan::Scan& scan, const Place& coarse
       for (int x = 2 * coarse.x - 3; x <= 2 * coarse.x + 3; ++x) {
         int score = 0;
         for (const plan::Wall& wall : scan.walls) {
-          const plan::Turned at =
-              plan::turned(wall, plan::heading_of(heading, 2 * scan.headings));
+          const plan::Turned at = plan::turned(wall, plan::heading_of(heading, 2 * scan.headings));
           std::uint32_t bits = 1u << at.direction;
           if (!scan.has_sides) bits |= 1u << (at.direction + 8) % 16;
           score += (map.faces(x + at.dx, y + at.dy) & bits) != 0;

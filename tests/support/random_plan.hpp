@@ -48,7 +48,8 @@ struct RandomPlan {
   bool coarse_bit(int plane, int x, int y) const {
     const plan::Map map = view();
     const int row = plane * map.coarse_rows + kMargin + y, column = kMargin + x;
-    return coarse[static_cast<std::size_t>(row * map.coarse_words + column / 32)] >> column % 32 & 1;
+    return coarse[static_cast<std::size_t>(row * map.coarse_words + column / 32)] >> column % 32 &
+           1;
   }
   std::uint32_t faces(int x, int y) const {
     return walls[static_cast<std::size_t>((kFineMargin + y) * view().stride + kFineMargin + x)];
@@ -77,8 +78,12 @@ struct RandomPlan {
       if (count > 100) made.fine.push_back({place(random_), place(random_), direction(random_)});
     scan_walls.push_back(std::move(made));
     const int headings = 16 + at(30);
-    scans.push_back(plan::Scan{span_of(scan_walls.back().coarse), span_of(scan_walls.back().fine),
-                               headings, has_sides, {0, 0}, {width, height}});
+    scans.push_back(plan::Scan{span_of(scan_walls.back().coarse),
+                               span_of(scan_walls.back().fine),
+                               headings,
+                               has_sides,
+                               {0, 0},
+                               {width, height}});
   }
 
   std::mt19937 random_;

@@ -51,10 +51,11 @@ void MethodOptions::add_to(Verb verb) {
       .between(0u, kHighestQuality)
       .show_default();
   verb.option("--seed", seed, "Same seed, same result, on any machine").natural().show_default();
-  verb.option("--min-score", min_score,
-              "Report a pair from this confidence on (without: 0.5), a place in a map (without: 0.8); "
-              "with --preset loopsmart, "
-              "from this inlier ratio on (0.3). 0: every best candidate");
+  verb.option(
+      "--min-score", min_score,
+      "Report a pair from this confidence on (without: 0.5), a place in a map (without: 0.75); "
+      "with --preset loopsmart, "
+      "from this inlier ratio on (0.3). 0: every best candidate");
   verb.option("--set", set,
               "Any other option under its name in the JSON, for experts: evidence.sample=1024, "
               "accept_symmetry=true; may be repeated")

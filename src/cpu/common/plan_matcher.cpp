@@ -16,7 +16,7 @@ using plan::kEdge, plan::Place, plan::Scan, plan::Wall;
 /// 256 cells, and a row of the cells around a place; the compiler splits them where the processor
 /// has shorter registers.
 typedef std::uint64_t Cells __attribute__((vector_size(32)));
-constexpr std::int32_t kCells = 256;
+constexpr std::int32_t kCellsAtOnce = 256;
 typedef std::int16_t RowOfCells __attribute__((vector_size(16), aligned(2), may_alias));
 static_assert(kEdge <= 8, "a row fits into a register");
 
@@ -79,7 +79,7 @@ class HeadingSearch {
   /// walls: of the first cell of the scan's box; stride: bytes of a row.
   void run(const std::vector<const std::uint8_t*>& walls, std::ptrdiff_t stride) {
     for (std::int32_t y = scan_.low[1]; y < scan_.high[1]; ++y)
-      for (std::int32_t x = scan_.low[0]; x < scan_.high[0]; x += kCells)
+      for (std::int32_t x = scan_.low[0]; x < scan_.high[0]; x += kCellsAtOnce)
         keep(scores_of(walls, (y - scan_.low[1]) * stride + (x - scan_.low[0]) / 8), x, y);
   }
   void add_to(BestCells& best) const { best.add(places_, counts_, least_); }
@@ -134,8 +134,8 @@ Place refine_place(const plan::Map& map, const Scan& scan, const Place& coarse) 
     for (std::int32_t v = 0; v < kEdge; ++v)
       for (std::int32_t u = 0; u < kEdge; ++u)
         if (scores[v][u] > best.score)
-          best = {scores[v][u], 2 * coarse.x + u - plan::kAround,
-                  2 * coarse.y + v - plan::kAround, heading};
+          best = {scores[v][u], 2 * coarse.x + u - plan::kAround, 2 * coarse.y + v - plan::kAround,
+                  heading};
   }
   return best;
 }
@@ -178,9 +178,8 @@ std::vector<std::vector<Place>> CpuPlan::best_cells(Span<const Scan> scans, std:
     const plan::Heading heading = plan::heading_of(tasks[k].heading, scan.headings);
     std::vector<const std::uint8_t*> walls;
     for (const Wall& wall : scan.coarse_walls) {
-      const std::int64_t bit =
-          plan::bit_of(map_, plan::turned(wall, heading), scan.has_sides) + scan.low[0] +
-          std::int64_t{scan.low[1]} * map_.coarse_words * 32;
+      const std::int64_t bit = plan::bit_of(map_, plan::turned(wall, heading), scan.has_sides) +
+                               scan.low[0] + std::int64_t{scan.low[1]} * map_.coarse_words * 32;
       walls.push_back(shifted_.data() + static_cast<std::size_t>(bit % 8) * bytes_ + bit / 8);
     }
     while (walls.size() % 8 != 0) walls.push_back(nothing.data());

@@ -178,26 +178,26 @@ FloorPlan::FloorPlan(const MapState& map, unsigned threads) {
 
   std::vector<std::vector<Entry>> of_tiles(map.tiles.size());
   for_each_on(threads, map.tiles.size(), [&](std::size_t tile) {
-        std::vector<Entry>& entries = of_tiles[tile];
-        for (std::size_t k = map.tiles[tile].begin; k < map.tiles[tile].end; ++k) {
-          std::uint32_t faces = facing::of(turn * normals.at(tile, k), false);
-          if (!has_sides) faces = facing::both_sides(faces);
-          if (faces == 0) continue;
-          const Eigen::Vector3f at = (turn * map.points[k] - corner) / cell;
-          const auto up = std::min(static_cast<std::uint32_t>(at[2]), kMostHeight);
-          // A scan's points fall into a neighbouring cell, too, up to a quarter of a cell away.
-          const auto low = (at.array() - 0.25f).cast<std::int32_t>().eval(),
-                     high = (at.array() + 0.25f).cast<std::int32_t>().eval();
-          for (std::int32_t y = low[1]; y <= high[1]; ++y)
-            for (std::int32_t x = low[0]; x <= high[0]; ++x) {
-              const std::uint64_t number =
-                  static_cast<std::uint64_t>(y) * static_cast<std::uint64_t>(width) +
-                  static_cast<std::uint64_t>(x);
-              entries.push_back({number << kHeightBits | up, faces});
-            }
+    std::vector<Entry>& entries = of_tiles[tile];
+    for (std::size_t k = map.tiles[tile].begin; k < map.tiles[tile].end; ++k) {
+      std::uint32_t faces = facing::of(turn * normals.at(tile, k), false);
+      if (!has_sides) faces = facing::both_sides(faces);
+      if (faces == 0) continue;
+      const Eigen::Vector3f at = (turn * map.points[k] - corner) / cell;
+      const auto up = std::min(static_cast<std::uint32_t>(at[2]), kMostHeight);
+      // A scan's points fall into a neighbouring cell, too, up to a quarter of a cell away.
+      const auto low = (at.array() - 0.25f).cast<std::int32_t>().eval(),
+                 high = (at.array() + 0.25f).cast<std::int32_t>().eval();
+      for (std::int32_t y = low[1]; y <= high[1]; ++y)
+        for (std::int32_t x = low[0]; x <= high[0]; ++x) {
+          const std::uint64_t number =
+              static_cast<std::uint64_t>(y) * static_cast<std::uint64_t>(width) +
+              static_cast<std::uint64_t>(x);
+          entries.push_back({number << kHeightBits | up, faces});
         }
-        merge(entries);
-      });
+    }
+    merge(entries);
+  });
   std::vector<Entry> entries;
   for (std::vector<Entry>& of_tile : of_tiles) {
     entries.insert(entries.end(), of_tile.begin(), of_tile.end());

@@ -43,7 +43,8 @@ struct FloorPlan {
   /// Walls of a scan farther from its middle, in voxels, do not decide: a step of the heading moves
   /// them too far.
   static constexpr float kReach = 100;
-  /// Empty cells around the coarse planes, and around the walls, as far as the walls of a scan reach.
+  /// Empty cells around the coarse planes, and around the walls, as far as the walls of a scan
+  /// reach.
   static constexpr int kCoarseMargin = static_cast<int>(kReach / (2 * kCell)) + 2;
   static constexpr int kMargin = 2 * kCoarseMargin + 2 * plan::kAround + 2;
 

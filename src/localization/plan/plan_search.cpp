@@ -106,16 +106,14 @@ std::vector<Height> heights_of(const FloorPlan& plan, const Upright& scan, bool 
     const plan::Turned at = plan::turned(point.at, heading);
     const int x = place.x + at.dx, y = place.y + at.dy;
     if (x < 0 || y < 0 || x >= plan.width || y >= plan.height) continue;
-    std::uint32_t faces =
-        point.flat != 0 ? point.flat : plan::facing_bits(at.direction, has_sides);
+    std::uint32_t faces = point.flat != 0 ? point.flat : plan::facing_bits(at.direction, has_sides);
     if (point.flat != 0 && !has_sides) faces = facing::both_sides(faces);
     const std::size_t cell = static_cast<std::size_t>(y) * static_cast<std::size_t>(plan.width) +
                              static_cast<std::size_t>(x);
     int last = std::numeric_limits<int>::min();
     for (std::uint32_t k = plan.column_begin[cell]; k < plan.column_begin[cell + 1]; ++k) {
       if ((plan.columns[k] & faces) == 0) continue;
-      const int shift =
-          static_cast<int>(plan.columns[k] >> facing::kBits) - point.height;
+      const int shift = static_cast<int>(plan.columns[k] >> facing::kBits) - point.height;
       // One point votes once for a height and the one below it.
       for (const int vote : {shift - 1, shift})
         if (vote > last) shifts.push_back(last = vote);
@@ -220,8 +218,7 @@ std::vector<Standing> stand_up(const FloorPlan& plan, const std::vector<Scan*>& 
 
 /// Candidates of one scan, the most confident first.
 std::vector<Candidate> candidates_of(const MapState& map, const FloorPlan& plan, const Scan& scan,
-                                     const Standing* begin, const Standing* end,
-                                     std::size_t most) {
+                                     const Standing* begin, const Standing* end, std::size_t most) {
   std::vector<Candidate> out;
   for (const Standing* s = begin; s != end; ++s)
     for (std::size_t k = 0; k < s->places.size(); ++k)
@@ -258,16 +255,16 @@ void search_some(const MapState& map, const FloorPlan& plan, PlanMatcher& matche
   for (std::size_t k = 0; k < standing.size(); ++k) {
     Standing& s = standing[k];
     s.places = std::move(places[k]);
-    std::stable_sort(s.places.begin(), s.places.end(), [](const auto& a, const auto& b) {
-      return a.score > b.score;
-    });
+    std::stable_sort(s.places.begin(), s.places.end(),
+                     [](const auto& a, const auto& b) { return a.score > b.score; });
     s.places.resize(std::min(s.places.size(), effort.with_heights));
     s.heights.resize(s.places.size());
     for (std::size_t place = 0; place < s.places.size(); ++place) of_all.emplace_back(k, place);
   }
   constexpr std::size_t kTogether = 8;
   for_each_on(threads, (of_all.size() + kTogether - 1) / kTogether, [&](std::size_t part) {
-    for (std::size_t k = part * kTogether; k < std::min(of_all.size(), (part + 1) * kTogether); ++k) {
+    for (std::size_t k = part * kTogether; k < std::min(of_all.size(), (part + 1) * kTogether);
+         ++k) {
       Standing& s = standing[of_all[k].first];
       s.heights[of_all[k].second] =
           heights_of(plan, s.upright, s.has_sides, s.places[of_all[k].second]);

@@ -5,8 +5,8 @@
 
 namespace gpureg::localization {
 
-/// Of an upright scan: coarse cells that are looked at, places of these that are refined, and refined
-/// places that get heights.
+/// Of an upright scan: coarse cells that are looked at, places of these that are refined, and
+/// refined places that get heights.
 struct PlanEffort {
   std::size_t cells, refined, with_heights;
 };
@@ -15,8 +15,8 @@ constexpr PlanEffort kUsualEffort{8192, 256, 128}, kThoroughEffort{65536, 2048, 
 
 /// Sets `planned` of the scans: the places of the map that look most like the scan from above, the
 /// most confident first. Correlative scan matching of walls (algorithm/plan.hpp) for each direction
-/// of the scan that may be the map's vertical: all cells and headings are tried, coarse cells first.
-/// Heights follow from the columns of the best cells.
+/// of the scan that may be the map's vertical: all cells and headings are tried, coarse cells
+/// first. Heights follow from the columns of the best cells.
 void search_plan(const Context& context, const MapState& map, std::size_t most,
                  const PlanEffort& effort, const std::vector<Scan*>& scans);
 

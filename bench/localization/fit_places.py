@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Fits the confidence of places of a scan in a map to surfaces, and tests it on places that it did not see.
 
-    python3 bench/accuracy/fit_places.py bench/results/planned_places.json
+    python3 bench/localization/fit_places.py bench/results/planned_places.json
 
 A row is a scan, with the places that the plan of a map proposes (src/localization/plan) after their refinement:
 whether the place is correct, the part of the scan without a surface of the map, the part of the map in free
@@ -51,7 +51,10 @@ def fit(rows: list[dict[str, Any]]) -> np.ndarray:
 
 
 def report(name: str, rows: list[dict[str, Any]], b: np.ndarray) -> None:
-    found = {True: [0, 0, 0], False: [0, 0, 0]}  # of scans that are there, or not: all, right, wrong
+    found = {
+        True: [0, 0, 0],
+        False: [0, 0, 0],
+    }  # of scans that are there, or not: all, right, wrong
     for row in rows:
         x, right = design([row])
         best = int(np.argmax(x @ b))
@@ -66,7 +69,9 @@ def report(name: str, rows: list[dict[str, Any]], b: np.ndarray) -> None:
 def main() -> None:
     rows = json.loads(pathlib.Path(sys.argv[1]).read_text())["rows"]
     domains = sorted({r["domain"] for r in rows})
-    print("| not in the fit | scans | found | wrong | foreign found |\n| --- | --- | --- | --- | --- |")
+    print(
+        "| not in the fit | scans | found | wrong | foreign found |\n| --- | --- | --- | --- | --- |"
+    )
     for domain in domains:
         inside = [r for r in rows if r["domain"] == domain]
         report(domain, inside, fit([r for r in rows if r["domain"] != domain]))
