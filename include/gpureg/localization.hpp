@@ -180,7 +180,9 @@ struct LocatedPose {
   double confidence = 0;
   /// The scan fits here about as well as at the first pose, which is elsewhere.
   bool alias = false;
-  /// Verification against the map around the pose; its confidence leaves other places aside.
+  /// Verification against the map around the pose; its confidence leaves other places aside. Where
+  /// the view from above was enough, it is by surfaces alone: match_inliers, match_support and
+  /// overlap_confidence tell nothing.
   PoseVerification verification;
 };
 

@@ -11,8 +11,8 @@ namespace gpureg::localization {
 /// cheaper.
 class WithoutFeatures {
  public:
-  /// most: points of the largest cloud.
-  explicit WithoutFeatures(std::size_t most) : constant_(most, 0) {}
+  /// most: points of the largest cloud, 0 of an empty one, whose view needs a pointer, too.
+  explicit WithoutFeatures(std::size_t most) : constant_(most + 1, 0) {}
 
   /// As long as this object lives.
   PointCloudView of(PointCloudView view) const {

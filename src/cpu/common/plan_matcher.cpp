@@ -42,16 +42,21 @@ class BestCells {
     for (std::size_t s = 0; s < counts.size(); ++s) counts_[s] += counts[s];
     least_ = std::max({least_.load(), least, plan::least_score(counts_.data(), most_)});
     places_.insert(places_.end(), places.begin(), places.end());
+    if (places_.size() > 8 * most_) leave_out();
   }
   std::vector<Place> take() {
-    places_.erase(std::remove_if(places_.begin(), places_.end(),
-                                 [&](const Place& p) { return p.score < least_; }),
-                  places_.end());
+    leave_out();
     std::sort(places_.begin(), places_.end(), precedes);
     return std::move(places_);
   }
 
  private:
+  void leave_out() {
+    places_.erase(std::remove_if(places_.begin(), places_.end(),
+                                 [&](const Place& p) { return p.score < least_; }),
+                  places_.end());
+  }
+
   std::size_t most_;
   std::mutex mutex_;
   std::atomic<std::int32_t> least_{1};

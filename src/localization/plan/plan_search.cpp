@@ -14,8 +14,8 @@
 namespace gpureg::localization {
 namespace {
 
-/// Scans searched together: their cells take a few MB each.
-constexpr std::ptrdiff_t kScansAtOnce = 64;
+/// Scans searched together: their cells take up to 8 MB each.
+constexpr std::ptrdiff_t kScansAtOnce = 16;
 /// Heights of one place that go on, at least so many cells apart, with this share of the best.
 constexpr std::size_t kHeights = 3;
 constexpr int kHeightsApart = 5;
