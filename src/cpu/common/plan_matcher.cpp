@@ -11,19 +11,17 @@
 namespace gpureg::cpu {
 namespace {
 
-using plan::kEdge, plan::Place, plan::Scan, plan::Wall;
-
 /// 256 cells, and a row of the cells around a place; the compiler splits them where the processor
 /// has shorter registers.
 typedef std::uint64_t Cells __attribute__((vector_size(32)));
 constexpr std::int32_t kCellsAtOnce = 256;
 typedef std::int16_t RowOfCells __attribute__((vector_size(16), aligned(2), may_alias));
-static_assert(kEdge <= 8, "a row fits into a register");
+static_assert(plan::kEdge <= 8, "a row fits into a register");
 
 /// Bytes behind the planes that a read of Cells may touch.
 constexpr std::size_t kBehind = 64;
 
-bool precedes(const Place& a, const Place& b) {
+bool precedes(const plan::Place& a, const plan::Place& b) {
   if (a.score != b.score) return a.score > b.score;
   if (a.heading != b.heading) return a.heading < b.heading;
   return a.y != b.y ? a.y < b.y : a.x < b.x;
@@ -37,14 +35,14 @@ class BestCells {
 
   /// Cells with lower scores are not among them.
   std::int32_t least() const { return least_; }
-  void add(const std::vector<Place>& places, const Counts& counts, std::int32_t least) {
+  void add(const std::vector<plan::Place>& places, const Counts& counts, std::int32_t least) {
     const std::lock_guard<std::mutex> lock(mutex_);
     for (std::size_t s = 0; s < counts.size(); ++s) counts_[s] += counts[s];
     least_ = std::max({least_.load(), least, plan::least_score(counts_.data(), most_)});
     places_.insert(places_.end(), places.begin(), places.end());
     if (places_.size() > 8 * most_) leave_out();
   }
-  std::vector<Place> take() {
+  std::vector<plan::Place> take() {
     leave_out();
     std::sort(places_.begin(), places_.end(), precedes);
     return std::move(places_);
@@ -53,7 +51,7 @@ class BestCells {
  private:
   void leave_out() {
     places_.erase(std::remove_if(places_.begin(), places_.end(),
-                                 [&](const Place& p) { return p.score < least_; }),
+                                 [&](const plan::Place& p) { return p.score < least_; }),
                   places_.end());
   }
 
@@ -61,7 +59,7 @@ class BestCells {
   std::mutex mutex_;
   std::atomic<std::int32_t> least_{1};
   Counts counts_{};
-  std::vector<Place> places_;
+  std::vector<plan::Place> places_;
 };
 
 /// Sums of the bits of 256 cells; walls: where the bit of each wall is, in eights.
@@ -78,7 +76,7 @@ plan::Scores<Cells> scores_of(const std::vector<const std::uint8_t*>& walls, std
 /// The best cells of one heading; those of other headings may leave only few of them.
 class HeadingSearch {
  public:
-  HeadingSearch(const Scan& scan, std::int32_t heading, std::size_t most, std::int32_t least)
+  HeadingSearch(const plan::Scan& scan, std::int32_t heading, std::size_t most, std::int32_t least)
       : scan_(scan), heading_(heading), most_(most), least_(least) {}
 
   /// walls: of the first cell of the scan's box; stride: bytes of a row.
@@ -106,38 +104,38 @@ class HeadingSearch {
     if (places_.size() <= 4 * most_) return;
     least_ = std::max(least_, plan::least_score(counts_.data(), most_));
     places_.erase(std::remove_if(places_.begin(), places_.end(),
-                                 [&](const Place& p) { return p.score < least_; }),
+                                 [&](const plan::Place& p) { return p.score < least_; }),
                   places_.end());
   }
 
-  const Scan& scan_;
+  const plan::Scan& scan_;
   std::int32_t heading_;
   std::size_t most_;
   std::int32_t least_;
   BestCells::Counts counts_{};
-  std::vector<Place> places_;
+  std::vector<plan::Place> places_;
 };
 
-Place refine_place(const plan::Map& map, const Scan& scan, const Place& coarse) {
-  Place best{-1, 0, 0, 0};
+plan::Place refine_place(const plan::Map& map, const plan::Scan& scan, const plan::Place& coarse) {
+  plan::Place best{-1, 0, 0, 0};
   for (std::int32_t turn = -plan::kTurnsAround; turn <= plan::kTurnsAround; ++turn) {
     const std::int32_t heading = 2 * coarse.heading + turn;
     const plan::Heading at = plan::heading_of(heading, 2 * scan.headings);
     const std::uint16_t* first =
         map.walls + (map.margin + 2 * coarse.y - plan::kAround) * std::ptrdiff_t{map.stride} +
         map.margin + 2 * coarse.x - plan::kAround;
-    RowOfCells scores[kEdge] = {};
-    for (const Wall& wall : scan.walls) {
+    RowOfCells scores[plan::kEdge] = {};
+    for (const plan::Wall& wall : scan.walls) {
       const plan::Turned cell = plan::turned(wall, at);
       const auto faces =
           static_cast<std::int16_t>(plan::facing_bits(cell.direction, scan.has_sides));
       const RowOfCells bits = {faces, faces, faces, faces, faces, faces, faces, faces};
       const std::uint16_t* row = first + cell.dy * std::ptrdiff_t{map.stride} + cell.dx;
-      for (int v = 0; v < kEdge; ++v, row += map.stride)
+      for (int v = 0; v < plan::kEdge; ++v, row += map.stride)
         scores[v] -= (*reinterpret_cast<const RowOfCells*>(row) & bits) != 0;
     }
-    for (std::int32_t v = 0; v < kEdge; ++v)
-      for (std::int32_t u = 0; u < kEdge; ++u)
+    for (std::int32_t v = 0; v < plan::kEdge; ++v)
+      for (std::int32_t u = 0; u < plan::kEdge; ++u)
         if (scores[v][u] > best.score)
           best = {scores[v][u], 2 * coarse.x + u - plan::kAround, 2 * coarse.y + v - plan::kAround,
                   heading};
@@ -163,7 +161,8 @@ CpuPlan::CpuPlan(Exec& exec, std::mutex& mutex, const plan::Map& map)
     }
 }
 
-std::vector<std::vector<Place>> CpuPlan::best_cells(Span<const Scan> scans, std::size_t most) {
+std::vector<std::vector<plan::Place>> CpuPlan::best_cells(Span<const plan::Scan> scans,
+                                                          std::size_t most) {
   const std::lock_guard<std::mutex> lock(mutex_);
   struct Task {
     std::size_t scan;
@@ -179,10 +178,10 @@ std::vector<std::vector<Place>> CpuPlan::best_cells(Span<const Scan> scans, std:
   const std::vector<std::uint8_t> nothing(
       static_cast<std::size_t>(stride) * static_cast<std::size_t>(map_.coarse_rows) + kBehind, 0);
   exec_.parallel(tasks.size(), [&](std::size_t k) {
-    const Scan& scan = scans[tasks[k].scan];
+    const plan::Scan& scan = scans[tasks[k].scan];
     const plan::Heading heading = plan::heading_of(tasks[k].heading, scan.headings);
     std::vector<const std::uint8_t*> walls;
-    for (const Wall& wall : scan.coarse_walls) {
+    for (const plan::Wall& wall : scan.coarse_walls) {
       const std::int64_t bit = plan::bit_of(map_, plan::turned(wall, heading), scan.has_sides) +
                                scan.low[0] + std::int64_t{scan.low[1]} * map_.coarse_words * 32;
       walls.push_back(shifted_.data() + static_cast<std::size_t>(bit % 8) * bytes_ + bit / 8);
@@ -192,15 +191,15 @@ std::vector<std::vector<Place>> CpuPlan::best_cells(Span<const Scan> scans, std:
     search.run(walls, stride);
     search.add_to(*best[tasks[k].scan]);
   });
-  std::vector<std::vector<Place>> out(scans.size);
+  std::vector<std::vector<plan::Place>> out(scans.size);
   exec_.parallel(scans.size, [&](std::size_t s) { out[s] = best[s]->take(); });
   return out;
 }
 
-std::vector<std::vector<Place>> CpuPlan::refine(Span<const Scan> scans,
-                                                const std::vector<std::vector<Place>>& coarse) {
+std::vector<std::vector<plan::Place>> CpuPlan::refine(
+    Span<const plan::Scan> scans, const std::vector<std::vector<plan::Place>>& coarse) {
   const std::lock_guard<std::mutex> lock(mutex_);
-  std::vector<std::vector<Place>> out(scans.size);
+  std::vector<std::vector<plan::Place>> out(scans.size);
   for (std::size_t s = 0; s < scans.size; ++s) out[s].resize(coarse[s].size());
   constexpr std::size_t kGrain = 16;
   exec_.parallel_items(

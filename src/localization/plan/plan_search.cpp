@@ -174,7 +174,7 @@ struct Standing {
   std::vector<std::vector<Height>> heights;  ///< of each place
 };
 
-plan::Scan view_of(const Standing& standing, const Region& region) {
+plan::Scan walls_of(const Standing& standing, const Region& region) {
   const Upright& up = standing.upright;
   return {span_of(up.coarse_walls),
           span_of(up.walls),
@@ -245,7 +245,7 @@ void search_some(const MapState& map, const FloorPlan& plan, PlanMatcher& matche
   std::vector<Standing> standing = stand_up(plan, scans, threads);
   std::vector<plan::Scan> views;
   for (const Standing& s : standing)
-    views.push_back(view_of(s, region_of(map, plan, *scans[s.scan])));
+    views.push_back(walls_of(s, region_of(map, plan, *scans[s.scan])));
   std::vector<std::vector<plan::Place>> places = matcher.best_cells(span_of(views), effort.cells);
   for_each_on(threads, standing.size(), [&](std::size_t s) {
     places[s] = peaks(places[s], standing[s].upright.headings, effort.refined);
