@@ -6,7 +6,8 @@
 A row is a scan, with the places that the plan of a map proposes (src/localization/plan) after their refinement:
 whether the place is correct, the part of the scan without a surface of the map, the part of the map in free
 space of the scan, the part of both in front of surfaces of the other, and the confidence of the search. Domains
-count alike in the fit. Each is tested with a fit on the others; a fit on all gives the constants of
+count alike in the fit. The rows were printed by verify_planned() in a build with that line added; scans and maps are
+those of city.py, bench/accuracy/locate.py and locate_sweeps.py with other seeds. Each is tested with a fit on the others; a fit on all gives the constants of
 src/localization/verify_places.cpp.
 """
 

@@ -31,8 +31,10 @@ LocateStatus status_of(const LocateResult& result, double min_confidence) {
   return several && together >= min_confidence ? LocateStatus::ambiguous : LocateStatus::not_found;
 }
 
-bool is_sure(const LocateResult& result) {
-  return !result.poses.empty() && result.poses.front().confidence >= kSure;
+/// A caller who asks for more confidence than usual gets the whole search before "not found".
+bool is_sure(const LocateResult& result, const LocateOptions& options) {
+  return !result.poses.empty() &&
+         result.poses.front().confidence >= std::max(kSure, options.min_confidence);
 }
 
 /// Leaves the places of the plan that the verification finds possible.
@@ -93,7 +95,7 @@ std::vector<std::size_t> see_from_above(const Context& context, const MapState& 
     for (std::size_t k = 0; k < open.size(); ++k) {
       LocateResult& result = results[open[k]];
       result = result_of(places[k], *asked[k], options);
-      if (is_sure(result)) continue;
+      if (is_sure(result, options)) continue;
       keep_possible(places[k], *asked[k]);
       unsure.push_back(open[k]);
     }
@@ -174,7 +176,8 @@ std::vector<LocateResult> locate(const Context& context, const std::vector<Point
     verified.push_back(verify_places(context, state, options, scan));
     LocateResult& result = out[open[k]];
     result = result_of(verified[k], scan, options);
-    if (coarse_first && !hopeless && !is_sure(result) && best < kSureSearch) unsure.push_back(k);
+    if (coarse_first && !hopeless && !is_sure(result, options) && best < kSureSearch)
+      unsure.push_back(k);
   }
   if (unsure.empty()) return out;
   search_best_tiles(context, state, options, unsure, searched);

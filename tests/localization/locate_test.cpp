@@ -60,6 +60,21 @@ TEST(Locate, FindsAScanAmongTiles) {
   EXPECT_LT(query.error(result.poses.front()), kClose);
 }
 
+TEST(Locate, MoreConfidenceThanUsualTakesTheWholeSearch) {
+  const PreparedMap map = building({1, 2, 3}, map_options());
+  const Query query(2, 1, 1);
+  LocateOptions options = LocateOptions::from_voxel_size(kVoxel);
+  const LocateResult usual = locate(context(), {query.scan.view()}, map, options).front();
+  EXPECT_EQ(usual.status, LocateStatus::found);
+  EXPECT_EQ(usual.tiles, 0u);
+  options.min_confidence = 1;
+  const LocateResult result = locate(context(), {query.scan.view()}, map, options).front();
+  EXPECT_EQ(result.status, LocateStatus::not_found);
+  EXPECT_GT(result.tiles, 0u);
+  ASSERT_FALSE(result.poses.empty());
+  EXPECT_LT(query.error(result.poses.front()), kClose);
+}
+
 TEST(Locate, FindsTheSamePlaceInVoxelsOfAnyWidth) {
   const PreparedMap map = building({1, 2, 3}, map_options(5));
   const Query query(2, 1, 1);
