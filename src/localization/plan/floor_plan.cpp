@@ -198,14 +198,8 @@ FloorPlan::FloorPlan(const MapState& map, unsigned threads) {
     }
     merge(entries);
   });
-  std::vector<Entry> entries;
-  for (std::vector<Entry>& of_tile : of_tiles) {
-    entries.insert(entries.end(), of_tile.begin(), of_tile.end());
-    of_tile = {};
-  }
-  if (map.tiles.size() > 1) merge(entries);
-  fill_columns(entries);
-  fill_coarse();
+  fill_columns(of_tiles, threads);
+  fill_coarse(threads);
 }
 
 plan::Map FloorPlan::view() const {
@@ -221,36 +215,57 @@ plan::Map FloorPlan::view() const {
   return out;
 }
 
-void FloorPlan::fill_columns(const std::vector<Entry>& entries) {
-  const std::size_t cells = static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
+void FloorPlan::fill_columns(const std::vector<std::vector<Entry>>& of_tiles, unsigned threads) {
+  const auto row = static_cast<std::uint64_t>(width);
+  const std::size_t cells = static_cast<std::size_t>(row) * static_cast<std::size_t>(height);
   walls.assign(static_cast<std::size_t>(width + 2 * kMargin) *
                    static_cast<std::size_t>(height + 2 * kMargin),
                0);
   column_begin.assign(cells + 1, 0);
-  columns.reserve(entries.size());
-  for (const Entry& entry : entries) {
-    const std::uint64_t number = entry.key >> kHeightBits;
-    const auto row = static_cast<std::uint64_t>(width);
-    walls[place_of(static_cast<int>(number % row), static_cast<int>(number / row))] |=
-        static_cast<std::uint16_t>(entry.facing & facing::kWalls);
-    ++column_begin[number + 1];
-    columns.push_back(static_cast<std::uint32_t>(entry.key) << facing::kBits | entry.facing);
-  }
+  // Tiles overlap by a cell at their borders. Bands of rows are merged side by side.
+  constexpr std::size_t kRows = 32;
+  const std::size_t bands = (static_cast<std::size_t>(height) + kRows - 1) / kRows;
+  std::vector<std::vector<Entry>> of_bands(bands);
+  for_each_on(threads, bands, [&](std::size_t band) {
+    std::vector<Entry>& entries = of_bands[band];
+    const auto first_of = [&](const std::vector<Entry>& of_tile, std::size_t number) {
+      const std::uint64_t key = number * kRows * row << kHeightBits;
+      return std::lower_bound(of_tile.begin(), of_tile.end(), key,
+                              [](const Entry& e, std::uint64_t k) { return e.key < k; });
+    };
+    for (const std::vector<Entry>& of_tile : of_tiles)
+      entries.insert(entries.end(), first_of(of_tile, band), first_of(of_tile, band + 1));
+    if (of_tiles.size() > 1) merge(entries);
+    for (const Entry& entry : entries) {
+      const std::uint64_t number = entry.key >> kHeightBits;
+      walls[place_of(static_cast<int>(number % row), static_cast<int>(number / row))] |=
+          static_cast<std::uint16_t>(entry.facing & facing::kWalls);
+      ++column_begin[number + 1];
+    }
+  });
   for (std::size_t k = 0; k < cells; ++k) column_begin[k + 1] += column_begin[k];
+  columns.resize(column_begin.back());
+  for_each_on(threads, bands, [&](std::size_t band) {
+    std::uint32_t* out = columns.data() + column_begin[band * kRows * row];
+    for (const Entry& entry : of_bands[band])
+      *out++ = static_cast<std::uint32_t>(entry.key) << facing::kBits | entry.facing;
+    of_bands[band] = {};
+  });
 }
 
-void FloorPlan::fill_coarse() {
+void FloorPlan::fill_coarse(unsigned threads) {
   const plan::Map map = view();
   const auto rows = static_cast<std::size_t>(map.coarse_rows),
              words = static_cast<std::size_t>(map.coarse_words);
   coarse.assign(plan::kPlanes * rows * words, 0);
-  for (int y = 0; y < height; ++y)
-    for (int x = 0; x < width; ++x) {
-      const std::uint32_t faces = walls_of(x, y);
+  for_each_on(threads, static_cast<std::size_t>(height / 2), [&](std::size_t coarse_row) {
+    const std::size_t row = coarse_row + kCoarseMargin;
+    for (int k = 0; k < 2 * width; ++k) {
+      const int x = k / 2;
+      const std::uint32_t faces = walls_of(x, 2 * static_cast<int>(coarse_row) + k % 2);
       if (faces == 0) continue;
       const std::uint32_t either = facing::both_sides(faces);
-      const auto row = static_cast<std::size_t>(y / 2 + kCoarseMargin),
-                 column = static_cast<std::size_t>(x / 2 + kCoarseMargin);
+      const auto column = static_cast<std::size_t>(x / 2 + kCoarseMargin);
       const auto set = [&](std::size_t plane) {
         coarse[(plane * rows + row) * words + column / 32] |= 1u << column % 32;
       };
@@ -259,6 +274,7 @@ void FloorPlan::fill_coarse() {
         if (d < facing::kDirections / 2 && either >> d & 1) set(facing::kDirections + d);
       }
     }
+  });
 }
 
 const FloorPlan& MapState::plan(unsigned threads) const {

@@ -80,8 +80,9 @@ struct FloorPlan {
     return static_cast<std::size_t>(y + kMargin) * static_cast<std::size_t>(width + 2 * kMargin) +
            static_cast<std::size_t>(x + kMargin);
   }
-  void fill_columns(const std::vector<Entry>& entries);
-  void fill_coarse();
+  /// @param of_tiles sorted by key, without duplicates.
+  void fill_columns(const std::vector<std::vector<Entry>>& of_tiles, unsigned threads);
+  void fill_coarse(unsigned threads);
 };
 
 }  // namespace gpureg::localization
