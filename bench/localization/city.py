@@ -7,7 +7,8 @@ The map (city_scene.py) is a folder of one cloud a plot: a jittered grid on all 
 on a street or in a room can see, with normals and sensor positions. Queries are sweeps of spinning
 LiDARs on a street or in a room and depth cameras in rooms, by intersection of rays and boxes, turned
 at random. A pose is correct if it is off by less than 0.5 m in streets and 0.3 m in rooms. A room of a
-copied building may be found in any copy, or be ambiguous. Loading: a call with an empty scan.
+copied building may be found in any copy, or be ambiguous. Times of calls are those of
+gpureg_locate_bench, in one process; what is loaded, a call of the command with an empty scan.
 """
 
 from __future__ import annotations
@@ -197,6 +198,16 @@ class Command:
         return result | {"wall": wall, "cpu": used, "memory_mib": round(usage.ru_maxrss / 1024)}
 
 
+def seconds_of_calls(
+    o: argparse.Namespace, saved: pathlib.Path, scans: list[Any]
+) -> dict[str, Any]:
+    """Of the first call of a process, of one scan alone, and of one in a batch."""
+    bench = pathlib.Path(o.command).with_name("gpureg_locate_bench")
+    words = map(str, [bench, o.backend, saved, *scans])
+    call = json.loads(subprocess.run(words, check=True, stdout=subprocess.PIPE).stdout)
+    return {key: call[key] for key in ("first_seconds", "alone_seconds", "batch_seconds")}
+
+
 def make_map(maker: Maker, pool: Any) -> tuple[int, float]:
     """Raw points, and seconds of a processor a building."""
     poses, cameras, count, seconds = "", "", 0, 0.0
@@ -260,7 +271,7 @@ def placed(row: dict[str, Any]) -> bool:
 
 def print_table(record: dict[str, Any]) -> None:
     print(
-        "map | sensor | recall | first correct | precision | foreign found | s alone | s in batch"
+        "map | sensor | recall | first correct | precision | foreign found | ms alone | ms in batch"
     )
     for run in record["runs"]:
         for sensor in [*SENSORS, "all"]:
@@ -273,7 +284,7 @@ def print_table(record: dict[str, Any]) -> None:
                 f"{sum(r['correct'] for r in here)}/{len(here)}",
                 f"{sum(r['correct'] for r in found)}/{len(found)}",
                 f"{sum(r['status'] == 'found' for r in away)}/{len(away)}",
-                f"{run['alone_seconds']:.2f} | {run['batch_seconds']:.2f}"
+                f"{1e3 * run['alone_seconds']:.0f} | {1e3 * run['batch_seconds']:.0f}"
                 if sensor == "all"
                 else "",
             ]
@@ -287,8 +298,10 @@ def main() -> None:
     )
     parser.add_argument("--buildings", type=int, default=10)
     parser.add_argument("--work", type=pathlib.Path, required=True, help="a folder")
-    parser.add_argument("--command", default="build/cpu/bin/gpureg")
-    parser.add_argument("--backend", default="auto")
+    parser.add_argument(
+        "--command", default="build/cpu/bin/gpureg", help="beside gpureg_locate_bench"
+    )
+    parser.add_argument("--backend", default="cuda", choices=["cpu", "cuda"])
     parser.add_argument("--voxel-size", type=float, default=0.2, help="metres")
     parser.add_argument("--spacing", type=float, default=0.15, help="of the map's points, metres")
     parser.add_argument("--copied", type=float, default=0.1, help="share of copied buildings")
@@ -296,7 +309,9 @@ def main() -> None:
     parser.add_argument("--seeds", type=int, nargs="+", default=[1, 2, 3], help="of the queries")
     parser.add_argument("--queries", type=int, default=4, help="of each seed and sensor")
     parser.add_argument("--foreign", type=int, default=1, help="of each seed and sensor")
-    parser.add_argument("--alone", type=int, default=2, help="queries of each sensor, for the time")
+    parser.add_argument(
+        "--timed", type=int, default=3, help="queries of each sensor, for the times"
+    )
     parser.add_argument("--city", type=int, default=1, help="seed of the city")
     parser.add_argument("--jobs", type=int, default=os.cpu_count())
     parser.add_argument("--output", type=pathlib.Path, help="record; rows of other maps stay")
@@ -340,18 +355,13 @@ def main() -> None:
     refused = [q for q in queries if q.extent < 10.2 * o.voxel_size]
     queries = [q for q in queries if q.extent >= 10.2 * o.voxel_size]
     asked = [
-        q for sensor in o.sensors for q in [q for q in queries if q.sensor == sensor][: o.alone]
+        q for sensor in o.sensors for q in [q for q in queries if q.sensor == sensor][: o.timed]
     ]
-    alone = [gpureg(q.path, saved, "--viewpoint", "0,0,0") for q in asked]
-    for figure, key in (("alone_seconds", "seconds"), ("alone_cpu", "cpu")):
-        run[figure] = round(sum(call[key] for call in alone) / max(len(alone), 1), 2)
-    run["alone_memory_mib"] = max((call["memory_mib"] for call in alone), default=0)
     if not queries:
         return print(run)
     call = gpureg(*[q.path for q in queries], saved, "--viewpoint", "0,0,0")
-    run["batch_seconds"] = round(call["seconds"] / len(queries), 2)
-    run |= {"batch_cpu": round(call["cpu"] / len(queries), 2), "queries": len(queries)}
-    run |= {"batch_memory_mib": call["memory_mib"], **call["environment"]}
+    run |= {"queries": len(queries), "memory_mib": call["memory_mib"], **call["environment"]}
+    run |= seconds_of_calls(o, saved, [q.path for q in asked])
     rows = [row_of(query, scan, name) for query, scan in zip(queries, call["scans"])]
     small = {"poses": [], "points": 0, "tiles": 0, "status": "refused"}
     rows += [row_of(query, small, name) for query in refused]

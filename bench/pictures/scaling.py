@@ -1,7 +1,9 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""Draws bench/notes/images/scaling.png, cost as the work grows, from bench/results/pipeline.json.
-Needs matplotlib.
+"""Draws cost as the work grows. Needs matplotlib.
+
+bench/notes/images/scaling.png: pairs and fragments, from bench/results/pipeline.json;
+bench/notes/images/map_scaling.png: a scan in a map, from bench/results/locate_city.json.
 """
 
 import json
@@ -14,17 +16,51 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
-RECORD = json.loads((ROOT / "bench/results/pipeline.json").read_text())
-RUNS = {
-    run["name"].split("/real_time")[0].split("/iterations")[0]: run for run in RECORD["benchmarks"]
-}
 
 
-def runs(name):
-    return [run for key, run in RUNS.items() if key.startswith(name + "/")]
+def record(name):
+    return json.loads((ROOT / "bench/results" / name).read_text())
 
 
-def main():
+def draw_maps():
+    """Street sensors, voxels of 0.4 m: one row of runs for each size of the city."""
+    runs = [run for run in record("locate_city.json")["runs"] if " 0.4 m" in run["map"]]
+    points = [run["raw_points"] for run in runs]
+    figure, (asked, built, kept) = plt.subplots(
+        1, 3, figsize=(12.5, 3.8), constrained_layout=True, sharex=True
+    )
+    for axes, curves in (
+        (
+            asked,
+            {
+                "first_seconds": "first call of a process",
+                "alone_seconds": "a scan alone",
+                "batch_seconds": "a scan in a batch",
+            },
+        ),
+        (built, {"build_seconds": "built", "load_seconds": "loaded, with the start of a process"}),
+        (kept, {"build_memory_mib": "peak while building", "file_mib": "file"}),
+    ):
+        for key, label in curves.items():
+            axes.loglog(points, [run[key] for run in runs], marker="o", label=label)
+        axes.set_xlabel("raw points of the map")
+        axes.grid(True, alpha=0.3)
+        axes.legend(frameon=False)
+    asked.set(ylabel="s", title="where is this scan?")
+    built.set(ylabel="s", title="map")
+    kept.set(ylabel="MiB", title="memory and file")
+    figure.savefig(ROOT / "bench/notes/images/map_scaling.png", dpi=110)
+
+
+def draw_pairs():
+    all_runs = {
+        run["name"].split("/real_time")[0].split("/iterations")[0]: run
+        for run in record("pipeline.json")["benchmarks"]
+    }
+
+    def runs(name):
+        return [run for key, run in all_runs.items() if key.startswith(name + "/")]
+
     figure, (pair, scored, fragments) = plt.subplots(
         1, 3, figsize=(12.5, 3.8), constrained_layout=True
     )
@@ -72,4 +108,5 @@ def main():
     figure.savefig(ROOT / "bench/notes/images/scaling.png", dpi=110)
 
 
-main()
+draw_pairs()
+draw_maps()

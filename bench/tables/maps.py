@@ -166,6 +166,60 @@ def located_generated():
     return [*rows, "", source(record) + "."]
 
 
+def city_runs(sensor, voxel_size):
+    """Runs of the record whose rows are of such sensors, with these rows."""
+    record = load("locate_city.json")
+    for run in record["runs"]:
+        rows = [row for row in record["rows"] if row["map"] == run["map"]]
+        if rows[0]["sensor"].startswith(sensor) and f" {voxel_size} m" in run["map"]:
+            yield run, rows
+
+
+def found_of(rows):
+    here = [row for row in rows if row["here"]]
+    away = [row for row in rows if not row["here"]]
+    found = [row for row in here if row["status"] == "found"]
+    right = [
+        row
+        for row in here
+        if row["correct"]
+        and (row["status"] == "found" or (row["status"] == "ambiguous" and row["copies"] > 1))
+    ]
+    return (
+        f"{len(right)} of {len(here)}, {sum(not row['correct'] for row in found)} wrong "
+        f"| {sum(row['correct'] for row in here)} "
+        f"| {sum(row['status'] == 'found' for row in away)} of {len(away)}"
+    )
+
+
+def located_city():
+    """Sweeps from streets: cost against the size of the map."""
+    rows = [
+        "| buildings | raw points | voxels, tiles | built in, peak | file | loaded in | first call | a scan alone, in a batch | found | first pose correct | of other cities: found |",
+        "| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |",
+    ]
+    for run, of_run in city_runs("street", 0.4):
+        rows.append(
+            f"| {run['buildings']:,} | {run['raw_points']:,} | {run['map_points']:,}, {run['tiles']} "
+            f"| {run['build_seconds']:.1f} s, {run['build_memory_mib']:,} MiB | {run['file_mib']:.1f} MiB | {run['load_seconds']:.1f} s "
+            f"| {run['first_seconds']:.2f} s | {1e3 * run['alone_seconds']:.0f} ms, {1e3 * run['batch_seconds']:.0f} ms | {found_of(of_run)} |"
+        )
+    return rows
+
+
+def located_rooms():
+    rows = [
+        "| buildings | voxels | a scan alone, in a batch | found | first pose correct | of other cities: found |",
+        "| --- | --- | --- | --- | --- | --- |",
+    ]
+    for voxel_size in (0.2, 0.1):
+        for run, of_run in city_runs("room", voxel_size):
+            rows.append(
+                f"| {run['buildings']} | {voxel_size} m | {1e3 * run['alone_seconds']:.0f} ms, {1e3 * run['batch_seconds']:.0f} ms | {found_of(of_run)} |"
+            )
+    return rows
+
+
 def pruning():
     """Overlapping pairs that pruning keeps, a column for each share of pairs tried."""
     record = load("pruning.json")
@@ -239,6 +293,8 @@ TABLES = {
     "map_peers": peers,
     "located": located,
     "located_generated": located_generated,
+    "located_city": located_city,
+    "located_rooms": located_rooms,
     "pruning": pruning,
     "map_confidence": confidences,
     "promised_risk": promised_risk,

@@ -11,7 +11,7 @@ struct PlanEffort {
   std::size_t cells, refined, with_heights;
 };
 /// Enough for most scans; and for sparse ones, whose walls may fit thousands of places better.
-constexpr PlanEffort kUsualEffort{8192, 256, 128}, kThoroughEffort{65536, 2048, 1024};
+constexpr PlanEffort kUsualEffort{8192, 256, 128}, kThoroughEffort{131072, 32768, 16384};
 
 /// Sets `planned` of the scans: the places of the map that look most like the scan from above, the
 /// most confident first. Correlative scan matching of walls (algorithm/plan.hpp) for each direction
