@@ -90,7 +90,8 @@ std::vector<std::size_t> see_from_above(const Context& context, const MapState& 
       scan->candidates = scan->planned;
       keep_likely(options, *scan);
     }
-    const std::vector<std::vector<Verified>> places = verify_planned(context, map, options, asked);
+    const std::vector<std::vector<Verified>> places =
+        verify_planned(context, map, options, effort.first_kernel, asked);
     std::vector<std::size_t> unsure;
     for (std::size_t k = 0; k < open.size(); ++k) {
       LocateResult& result = results[open[k]];

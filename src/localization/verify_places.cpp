@@ -135,8 +135,8 @@ struct Place {
 };
 
 void compare_surfaces(const Context& context, const MapState& map, const LocateOptions& options,
-                      const std::vector<Scan*>& scans, const Place* begin, const Place* end,
-                      std::vector<std::vector<Verified>>& out) {
+                      float first_kernel, const std::vector<Scan*>& scans, const Place* begin,
+                      const Place* end, std::vector<std::vector<Verified>>& out) {
   std::size_t most = 0;
   std::vector<PointCloudView> views;
   for (const Place* place = begin; place != end; ++place)
@@ -156,8 +156,18 @@ void compare_surfaces(const Context& context, const MapState& map, const LocateO
         {static_cast<std::uint32_t>(clouds.size() - 1), static_cast<std::uint32_t>(place - begin)});
     poses.push_back({place->candidate->map_from_scan});
   }
-  const auto results = verify_by_surfaces(context, clouds, pairs, poses, options.registration, true,
-                                          confidence_of_surfaces);
+  const auto verify = [&](const RegistrationOptions& registration) {
+    return verify_by_surfaces(context, clouds, pairs, poses, registration, true,
+                              confidence_of_surfaces);
+  };
+  if (first_kernel > 0) {
+    RegistrationOptions wide = options.registration;
+    wide.refine.kernel_width *= first_kernel;
+    const auto refined = verify(wide);
+    for (std::size_t k = 0; k < refined.size(); ++k)
+      poses[k] = {refined[k].front().target_from_source};
+  }
+  const auto results = verify(options.registration);
   for (std::size_t k = 0; k < results.size(); ++k) {
     const Candidate& candidate = *begin[k].candidate;
     const PoseVerification& pose = results[k].front();
@@ -212,7 +222,7 @@ std::vector<Verified> verify_places(const Context& context, const MapState& map,
 }
 
 std::vector<std::vector<Verified>> verify_planned(const Context& context, const MapState& map,
-                                                  const LocateOptions& options,
+                                                  const LocateOptions& options, float first_kernel,
                                                   const std::vector<Scan*>& scans) {
   std::vector<Place> places;
   for (std::size_t k = 0; k < scans.size(); ++k)
@@ -230,7 +240,8 @@ std::vector<std::vector<Verified>> verify_planned(const Context& context, const 
       std::size_t end = begin, points = 0;
       do points += places[end++].around.points.size();
       while (end < last && points + places[end].around.points.size() <= kPointsTogether);
-      compare_surfaces(context, map, options, scans, &places[begin], &places[0] + end, out);
+      compare_surfaces(context, map, options, first_kernel, scans, &places[begin], &places[0] + end,
+                       out);
       for (; begin < end; ++begin) places[begin].around = {};
     }
   }

@@ -21,8 +21,9 @@ struct Verified {
 
 /// Verifies the candidates of scans, which the plan of the map proposes, by the surfaces of all of
 /// the map around them, without features; the most confident of each scan first.
+/// @param first_kernel see PlanEffort.
 std::vector<std::vector<Verified>> verify_planned(const Context& context, const MapState& map,
-                                                  const LocateOptions& options,
+                                                  const LocateOptions& options, float first_kernel,
                                                   const std::vector<Scan*>& scans);
 
 /// Verifies the candidates of a scan against all of the map around them; the most confident first.
