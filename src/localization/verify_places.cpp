@@ -8,6 +8,7 @@
 #include "common/for_each_on.hpp"
 #include "fields/localization.hpp"
 #include "fields/scale.hpp"
+#include "localization/plan/floor_plan.hpp"
 #include "localization/without_features.hpp"
 #include "math/exponential.hpp"
 
@@ -127,6 +128,18 @@ void sort(std::vector<Verified>& places) {
 /// Neighbourhoods that are cut out, and points that are prepared and compared, together.
 constexpr std::size_t kPlacesAtOnce = 64, kPointsTogether = 400'000;
 
+/// Sweeps of few rings see walls alone, so that a refinement stops at a wrong height: poses so many
+/// voxels above and below that of a candidate are refined, too.
+constexpr double kUp = 3;
+
+std::vector<UnalignedIsometry3d> with_other_heights(const UnalignedIsometry3d& pose,
+                                                    const Eigen::Vector3d& step) {
+  std::vector<UnalignedIsometry3d> out(3, pose);
+  out[1].translation() += step;
+  out[2].translation() -= step;
+  return out;
+}
+
 /// A candidate of a scan and the map around it.
 struct Place {
   std::size_t scan;
@@ -149,12 +162,14 @@ void compare_surfaces(const Context& context, const MapState& map, const LocateO
   std::vector<PreparedCloud> clouds = prepare_batch(context, views, prepare);
   std::vector<Pair> pairs;
   std::vector<std::vector<UnalignedIsometry3d>> poses;
+  const Eigen::Vector3d step = kUp * static_cast<double>(map.options.prepare.voxel_size) *
+                               map.plan(host_threads(context)).turn.row(2).cast<double>();
   for (const Place* place = begin; place != end; ++place) {
     if (place == begin || place->scan != place[-1].scan)
       clouds.push_back(scans[place->scan]->cloud);
     pairs.push_back(
         {static_cast<std::uint32_t>(clouds.size() - 1), static_cast<std::uint32_t>(place - begin)});
-    poses.push_back({place->candidate->map_from_scan});
+    poses.push_back(with_other_heights(place->candidate->map_from_scan, step));
   }
   const auto verify = [&](const RegistrationOptions& registration) {
     return verify_by_surfaces(context, clouds, pairs, poses, registration, true,
@@ -165,12 +180,15 @@ void compare_surfaces(const Context& context, const MapState& map, const LocateO
     wide.refine.kernel_width *= first_kernel;
     const auto refined = verify(wide);
     for (std::size_t k = 0; k < refined.size(); ++k)
-      poses[k] = {refined[k].front().target_from_source};
+      for (std::size_t h = 0; h < poses[k].size(); ++h)
+        poses[k][h] = refined[k][h].target_from_source;
   }
   const auto results = verify(options.registration);
   for (std::size_t k = 0; k < results.size(); ++k) {
     const Candidate& candidate = *begin[k].candidate;
-    const PoseVerification& pose = results[k].front();
+    const PoseVerification& pose =
+        *std::max_element(results[k].begin(), results[k].end(),
+                          [](const auto& a, const auto& b) { return a.confidence < b.confidence; });
     out[begin[k].scan].push_back(
         {candidate, pose, clouds[k].size(), confidence_of_planned(candidate.confidence, pose)});
   }
