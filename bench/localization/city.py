@@ -8,7 +8,7 @@ on a street or in a room can see, with normals and sensor positions. Queries are
 LiDARs on a street or in a room and depth cameras in rooms, by intersection of rays and boxes, turned
 at random. A pose is correct if it is off by less than 0.5 m in streets and 0.3 m in rooms. A room of a
 copied building may be found in any copy, or be ambiguous. Times of calls are those of
-gpureg_locate_bench, in one process; what is loaded, a call of the command with an empty scan.
+gpureg_locate_bench, in one process; the time of loading is that of a command with an empty scan.
 """
 
 from __future__ import annotations
@@ -301,7 +301,7 @@ def main() -> None:
     parser.add_argument(
         "--command", default="build/cpu/bin/gpureg", help="beside gpureg_locate_bench"
     )
-    parser.add_argument("--backend", default="cuda", choices=["cpu", "cuda"])
+    parser.add_argument("--backend", default="cpu", choices=["cpu", "cuda"])
     parser.add_argument("--voxel-size", type=float, default=0.2, help="metres")
     parser.add_argument("--spacing", type=float, default=0.15, help="of the map's points, metres")
     parser.add_argument("--copied", type=float, default=0.1, help="share of copied buildings")
@@ -310,7 +310,7 @@ def main() -> None:
     parser.add_argument("--queries", type=int, default=4, help="of each seed and sensor")
     parser.add_argument("--foreign", type=int, default=1, help="of each seed and sensor")
     parser.add_argument(
-        "--timed", type=int, default=3, help="queries of each sensor, for the times"
+        "--timed", type=int, default=3, help="queries of each sensor, for the times, >= 1"
     )
     parser.add_argument("--city", type=int, default=1, help="seed of the city")
     parser.add_argument("--jobs", type=int, default=os.cpu_count())
