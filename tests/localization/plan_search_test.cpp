@@ -5,6 +5,7 @@
 
 #include "localization/building.hpp"
 #include "localization/plan/floor_plan.hpp"
+#include "localization/verify_places.hpp"
 
 namespace gpureg::test {
 namespace {
@@ -106,6 +107,53 @@ TEST(FloorPlan, WallsFaceTheSensor) {
       plan.turn * (is_along_y ? Eigen::Vector3f::UnitX() : Eigen::Vector3f::UnitY());
   EXPECT_NE(bits & localization::facing::of(facing, true), 0u);
   EXPECT_EQ(bits & localization::facing::of(-facing, true), 0u);
+}
+
+TEST(FloorPlan, MergesTilesOnAnyNumberOfThreads) {
+  const PreparedMap map = building({1, 2, 3, 4, 5, 6, 7, 8, 9}, map_options(5));
+  ASSERT_GT(map.tiles(), 1u);
+  const FloorPlan one(MapState::of(map), 1), many(MapState::of(map), 3);
+  ASSERT_GT(one.height, 64);  // several bands of rows are merged
+  EXPECT_EQ(one.walls, many.walls);
+  EXPECT_EQ(one.coarse, many.coarse);
+  EXPECT_EQ(one.column_begin, many.column_begin);
+  EXPECT_EQ(one.columns, many.columns);
+  // A cell has each height once, and the walls of its column.
+  constexpr int kBits = localization::facing::kBits;
+  std::size_t cell = 0;
+  for (int y = 0; y < one.height; ++y)
+    for (int x = 0; x < one.width; ++x, ++cell) {
+      std::uint32_t faces = 0;
+      for (std::uint32_t k = one.column_begin[cell]; k < one.column_begin[cell + 1]; ++k) {
+        faces |= one.columns[k];
+        if (k > one.column_begin[cell])
+          ASSERT_LT(one.columns[k - 1] >> kBits, one.columns[k] >> kBits);
+      }
+      ASSERT_EQ(one.walls_of(x, y), faces & localization::facing::kWalls);
+    }
+  EXPECT_EQ(one.column_begin[cell], one.columns.size());
+}
+
+TEST(VerifyPlanned, RefinesFromOtherHeights) {
+  const PreparedMap map = building({1, 2, 3}, map_options());
+  const MapState& state = MapState::of(map);
+  const Query query(2, 1, 7);
+  Scan scan = scan_of(query.scan, state);
+  const Eigen::Vector3d up = state.plan(2).turn.row(2).cast<double>();
+  // Farther than the correspondences of a refinement, 1.5 voxels, reach.
+  for (const double voxels : {-3.5, 3.5}) {
+    Candidate candidate;
+    candidate.map_from_scan = UnalignedIsometry3d(query.map_from_scan);
+    candidate.map_from_scan.translation() += voxels * static_cast<double>(kVoxel) * up;
+    candidate.confidence = 0.5;
+    scan.candidates = {candidate};
+    const auto places =
+        verify_planned(context(), state, LocateOptions::from_voxel_size(kVoxel), 0, {&scan});
+    ASSERT_EQ(places.at(0).size(), 1u);
+    LocatedPose pose;
+    pose.map_from_scan = places[0][0].verification.target_from_source;
+    EXPECT_LT(query.error(pose), 0.02) << voxels;
+  }
 }
 
 TEST(PlanSearch, FindsScansOfAnyAttitude) {
