@@ -24,7 +24,6 @@ import tempfile
 
 import numpy as np
 import viewpoints
-from record import modes_tried
 from viewpoints import Cloud, Set
 
 SIMULATED = ("parts", "figures", "objects", "street", "hall")
@@ -109,7 +108,7 @@ def evidence_of(command, scene, condition, seed, extra=()):
                 "status": found[i, j]["status"],
                 "points": [fragments[i]["points"], fragments[j]["points"]],
                 "viewpoints": [fragments[i]["viewpoint"], fragments[j]["viewpoint"]],
-                "refined": modes_tried(document["options"]),
+                "refined": document["options"]["evidence"]["modes"],
                 "voxel_size": document["options"]["prepare"]["voxel_size"],
                 "modes": [
                     {k: m[k] for k in ("evidence", "confidence", "equivalent") if k in m}

@@ -44,7 +44,7 @@ import sys
 from typing import NamedTuple
 
 import numpy as np
-from record import AFTER_FIRST_PASS, modes_tried, save
+from record import save
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 
@@ -178,9 +178,7 @@ class Run:
         modes = [p.get("modes", []) for p in pairs]
         if not any(modes):
             sys.exit(f"error: {result}: no pair has a mode with evidence")
-        self.refined = modes_tried(recorded["options"])
-        if self.refined is None:
-            sys.exit(f"error: {result}: {AFTER_FIRST_PASS}")
+        self.refined = recorded["options"]["evidence"]["modes"]
         self.keys = [(p["i"], p["j"]) for p in pairs]
         self.modes_per_pair = np.array([len(m) for m in modes])
         self.pair = np.repeat(np.arange(len(pairs)), self.modes_per_pair)

@@ -12,11 +12,9 @@ Needs numpy, scikit-learn, the Python package gpureg, and clang-format for --hea
 import argparse
 import json
 import pathlib
-import sys
 
 import fit_confidence
 import numpy as np
-from record import AFTER_FIRST_PASS
 
 MODEL = fit_confidence.MODELS["model"]
 DOMAINS = ("parts", "figures", "cad", "cad_mesh")
@@ -34,8 +32,6 @@ class DomainRun(fit_confidence.Run):
         self.name = ", ".join([domain, *kinds])
         self.free_space, self.model, self.weight = free_space, model, weight
         self.refined = pairs[0]["refined"]
-        if self.refined is None:
-            sys.exit(f"error: {domain}: {AFTER_FIRST_PASS}")
         self.keys = [(k, k) for k in range(len(pairs))]
         self.modes_per_pair = np.array([len(p["modes"]) for p in pairs])
         self.pair = np.repeat(np.arange(len(pairs)), self.modes_per_pair)

@@ -163,9 +163,6 @@ class Inputs:
         words = [self.arguments.gpureg, "batch", self.scene(run.scene), "--preset", "default"]
         words += ["--voxel-size", run.voxel_size, "--seed", run.seed, "--quiet"]
         words += ["--backend", self.arguments.backend]
-        # The fit knows how many modes were tried.
-        for limit in ("first_pass_reject=0", "first_pass_accept=1"):
-            words += ["--set", f"compatibility.{limit}"]
         return [*words, "-o", result.with_suffix(".log"), "--json", result]
 
     def recipe(self, scene):

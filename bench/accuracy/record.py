@@ -128,16 +128,3 @@ def cameras(path):
         if values:
             out.setdefault(int(values[0]), []).append([float(v) for v in values[2:5]])
     return out
-
-
-AFTER_FIRST_PASS = "a first pass gave most pairs fewer modes: fit to runs without one"
-
-
-def modes_tried(options):
-    """Modes that every pair of a run got; None where a first pass gave most pairs fewer."""
-    compatibility = options.get("compatibility", {})
-    has_first_pass = (
-        compatibility.get("first_pass_reject", 0) > 0
-        or compatibility.get("first_pass_accept", 1) < 1
-    )
-    return None if has_first_pass else options["evidence"]["modes"]

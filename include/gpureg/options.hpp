@@ -66,11 +66,6 @@ struct CompatibilityOptions {
   float consensus_distance = 0.1f;
   /// Metres around a seed without a weaker seed; shortest side of a triangle.
   float seed_separation = 0.1f;
-  /// A first pass with few candidates (those of quality 1) decides most pairs: its result is final
-  /// where its confidence is below first_pass_reject or above first_pass_accept. The others are
-  /// aligned in full. 0 and 1: no first pass. There is none either with fewer than 512 seeds
-  /// or at most 12 modes.
-  double first_pass_reject = 1e-3, first_pass_accept = 0.95;
 
   /// @throws InvalidArgument naming field and value.
   void validate() const;
@@ -186,13 +181,12 @@ struct RegistrationOptions {
   /// v, kernel 0.5 v, compatibility 1 v, free-space margin 2.4 v.
   /// @param voxel_size in the unit of the points, finite and > 0.
   /// @param quality 0 to 10, sets the number of candidates: compatibility.seeds and triangles,
-  ///   evidence.modes. 10 switches the first pass off (compatibility.first_pass_reject).
+  ///   evidence.modes.
   /// @throws InvalidArgument for a value out of range.
   static RegistrationOptions from_voxel_size(float voxel_size,
                                              std::uint32_t quality = kDefaultQuality);
 
-  /// A copy with the number of candidates of a quality and the default limits of the first pass
-  /// (none at 10), everything else as it is.
+  /// A copy with the number of candidates of a quality, everything else as it is.
   /// @throws InvalidArgument where quality is above 10.
   RegistrationOptions with_quality(std::uint32_t quality) const;
 

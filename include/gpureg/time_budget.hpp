@@ -11,16 +11,12 @@ namespace gpureg {
 /// Result of align_within().
 struct TimedResult {
   RegistrationResult result;  ///< the result with the highest confidence of all levels run
-  /// Quality level of the result: it equals align() with options.with_quality(quality) and no first
-  /// pass.
+  /// Quality level of the result: it equals align() with options.with_quality(quality).
   std::uint32_t quality = 0;
   std::uint32_t highest_quality = 0;  ///< the highest level run
   std::uint32_t levels = 0;           ///< number of levels run; some in between may be left out
   double milliseconds = 0;            ///< wall time of the whole call
 };
-
-/// What align_within() runs at a quality: options.with_quality(quality) without a first pass.
-RegistrationOptions options_of_level(const RegistrationOptions& options, std::uint32_t quality);
 
 /// align() at the highest quality that a budget of wall time allows. Runs levels of quality upwards
 /// from 0. It predicts the time of the next levels from the stages of the levels run so far, starts

@@ -122,8 +122,8 @@ def align_within(
     Returns
     -------
     TimedResult
-        ``result`` is that of `align` with ``options.with_quality(quality)`` and no
-        first pass, bit for bit.
+        ``result`` is that of `align` with ``options.with_quality(quality)``, bit for
+        bit.
 
     Examples
     --------

@@ -82,7 +82,6 @@ def test_the_shipped_coefficients_make_the_confidences(name):
     model, regressions = fit_confidence.MODELS[name], fit_confidence.read_header(HEADER)[name]
     options = gpureg.RegistrationOptions.from_voxel_size(0.05)
     options.min_confidence = 0
-    options.compatibility.first_pass_reject, options.compatibility.first_pass_accept = 0, 1
     if not model.free_space:
         options.prepare.depth_maps = 0
     if not model.surface_sides:

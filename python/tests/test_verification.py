@@ -12,10 +12,7 @@ def test_modes_of_align_keep_their_evidence():
     truth = pose(2)
     source = moved(target, np.linalg.inv(truth))
     a, b = gpureg.prepare(source), gpureg.prepare(target)
-    # Of as many poses as the confidence of given poses assumes.
-    options = gpureg.RegistrationOptions()
-    options.compatibility.first_pass_reject, options.compatibility.first_pass_accept = 0, 1
-    result = gpureg.align(a, b, options=options)
+    result = gpureg.align(a, b)
     assert result.aligned
     found = gpureg.verify(a, b, [mode.target_from_source for mode in result.modes])
     assert found[0].confidence == result.score

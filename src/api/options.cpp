@@ -61,10 +61,6 @@ RegistrationOptions RegistrationOptions::with_quality(std::uint32_t quality) con
   o.compatibility.seeds = kEfforts[quality].seeds;
   o.compatibility.triangles = kEfforts[quality].triangles;
   o.evidence.modes = kEfforts[quality].modes;
-  const CompatibilityOptions defaults;
-  const bool complete = quality == kHighestQuality;
-  o.compatibility.first_pass_reject = complete ? 0 : defaults.first_pass_reject;
-  o.compatibility.first_pass_accept = complete ? 1 : defaults.first_pass_accept;
   return o;
 }
 

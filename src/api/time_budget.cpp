@@ -84,14 +84,6 @@ TimedResult run_levels(const LevelRunner& runner, double milliseconds,
   }
 }
 
-RegistrationOptions options_of_level(const RegistrationOptions& options, std::uint32_t quality) {
-  RegistrationOptions level = options.with_quality(quality);
-  // The lower levels are first passes.
-  level.compatibility.first_pass_reject = 0;
-  level.compatibility.first_pass_accept = 1;
-  return level;
-}
-
 TimedResult align_within(const Context& context, const PreparedCloud& source,
                          const PreparedCloud& target, double milliseconds,
                          const RegistrationOptions& options) {
@@ -105,7 +97,7 @@ TimedResult align_within(const Context& context, const PreparedCloud& source,
         .count();
   };
   return run_levels({[&](std::uint32_t quality) {
-                       return align(context, source, target, options_of_level(options, quality));
+                       return align(context, source, target, options.with_quality(quality));
                      },
                      now},
                     milliseconds, options);

@@ -113,8 +113,6 @@ struct Fields<CompatibilityOptions> {
     v(&O::max_turn, {"max_turn", above(0, 2, "a difference of cosines in (0, 2]"), "Largest difference of the cosines between their normals; 2: no test."});
     v(&O::consensus_distance, {"consensus_distance", kLength, voxels(2), "Distance within which a pose brings a match together."});
     v(&O::seed_separation, {"seed_separation", kLength, voxels(2), "Distance around a seed without a weaker seed; shortest side of a triangle."});
-    v(&O::first_pass_reject, {"first_pass_reject", kProbability, "A first pass with few candidates is final where its confidence is below this; 0: never."});
-    v(&O::first_pass_accept, {"first_pass_accept", kProbability, "The same where its confidence is above this; 1: never."});
   }
   // clang-format on
 };

@@ -55,8 +55,6 @@ Search search_with(const MapState& map, const LocateOptions& options, double fac
   out.registration = options.registration;
   fields::multiply_lengths(out.registration, factor);
   out.registration.compatibility.max_matches = options.max_matches;
-  // "Not in this map" needs the whole search: a contained scan has a low confidence at first.
-  out.registration.compatibility.first_pass_reject = 0;
   out.prepare = prepare_for(map, factor);
   out.factor = factor;
   out.cloud = cloud;

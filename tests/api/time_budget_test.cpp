@@ -125,7 +125,7 @@ TEST(TimeBudget, ResultsAreThoseOfTheirLevel) {
   EXPECT_GE(out.levels, 2u);
   EXPECT_GT(out.milliseconds, 0);
   const RegistrationResult alone =
-      align(context, source, target, options_of_level(options, out.quality));
+      align(context, source, target, options.with_quality(out.quality));
   EXPECT_EQ(test::bytes(out.result), test::bytes(alone));
 }
 

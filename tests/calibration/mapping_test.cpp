@@ -190,7 +190,6 @@ TEST(Calibration, VerifyPoses) {
   }
   // A mode gets the confidence that align() gives it.
   RegistrationOptions options = options_with({0.5, -1});
-  options.compatibility.first_pass_accept = 1;  // as many poses as verify_poses() assumes
   const RegistrationResult found = align(scene().context, scene().source, scene().target, options);
   EXPECT_EQ(verify_poses(scene().context, scene().source, scene().target,
                          {found.target_from_source}, options)[0]
