@@ -29,43 +29,35 @@ PRECISIONS = (95, 99)
 MOVED_SEED = 1
 
 
-def setting(matches, seeds, modes, triangles=64, members=512, sample=512, refits=2, **more):
+def setting(matches, seeds, modes, triangles=64, members=512, sample=512):
     return {
         "compatibility.max_matches": matches,
         "compatibility.seeds": seeds,
         "compatibility.triangles": triangles,
         "compatibility.max_members": members,
-        "compatibility.refits": refits,
         "evidence.modes": modes,
         "evidence.sample": sample,
-        **more,
     }
 
 
-# A name is matches/seeds/modes, and what differs from the default besides.
+# By name; besides, `quality 0` to `quality 10`. A change stands beside the default of quality 5.
 SETTINGS = {
-    "512/64/6": setting(512, 64, 6, 32),
-    "1024/64/8": setting(1024, 64, 8, 32),
-    "1024/128/8": setting(1024, 128, 8),
     "1536/192/12": setting(1536, 192, 12),
-    "2048/128/12": setting(2048, 128, 12),
-    "2048/256/12": setting(2048, 256, 12),
-    "2048/256/16": setting(2048, 256, 16),
     "2048/512/16": setting(2048, 512, 16),
     "3072/256/16": setting(3072, 256, 16),
-    "3072/512/16": setting(3072, 512, 16),
-    "3072/512/24": setting(3072, 512, 24),
     "4096/512/16": setting(4096, 512, 16),
-    "4096/512/24": setting(4096, 512, 24),
-    "4096/1024/24": setting(4096, 1024, 24),
-    "4096/1024/32": setting(4096, 1024, 32),
     "4096/2048/32": setting(4096, 2048, 32, 128),
-    "4096/2048/48": setting(4096, 2048, 48, 128),
     "6144/1024/24": setting(6144, 1024, 24),
     "8192/1024/24": setting(8192, 1024, 24),
-    "8192/2048/48": setting(8192, 2048, 48, 128),
-    "8192/8192/64": setting(8192, 8192, 64, 384),
+    "128 members": {"compatibility.max_members": 128},
+    "16 triangles": {"compatibility.triangles": 16},
+    "sample 1024": {"evidence.sample": 1024},
+    "10 iterations": {"refine.max_iterations": 10},
+    "24 iterations": {"refine.max_iterations": 24},
+    "separation .2": {"compatibility.seed_separation": 0.2},
+    "turn .3": {"compatibility.max_turn": 0.3},
 }
+QUALITIES = {f"quality {k}": k for k in range(11)}
 
 
 def apply(options, changes):
@@ -114,10 +106,11 @@ class Scene:
             for name in ("gt", "gt_all")
         }
 
-    def pose(self, pair, target_from_source):
-        """In the coordinates of the files."""
+    def poses(self, pair, modes):
+        """In the coordinates of the files, (n, 4, 4)."""
         j, i = pair
-        return np.linalg.inv(self.motions[i]) @ target_from_source @ self.motions[j]
+        poses = np.array([mode.target_from_source for mode in modes])
+        return np.linalg.inv(self.motions[i]) @ poses @ self.motions[j]
 
 
 def ranked(score, good, strict, total):
@@ -138,16 +131,16 @@ def figures(scene, results):
         i, j = scene.numbers[pair[1]], scene.numbers[pair[0]]
         if j - i < MIN_SEPARATION:
             continue
-        poses = [scene.pose(pair, mode.target_from_source) for mode in result.modes]
+        modes = result.modes
         within = {}
         for name, (truth, information) in scene.truth.items():
             within[name] = (
-                errors(truth[i, j], information[i, j], np.array(poses)) <= MAX_ERROR
-                if (i, j) in truth and poses
-                else np.zeros(max(1, len(poses)), bool)
+                errors(truth[i, j], information[i, j], scene.poses(pair, modes)) <= MAX_ERROR
+                if modes and (i, j) in truth
+                else np.zeros(1, bool)
             )
         total += (i, j) in scene.truth["gt"][0]
-        best = result.modes[0] if result.modes else None
+        best = modes[0] if modes else None
         confidence.append(best.confidence if best else 0.0)
         overlapping.append(best.overlap_confidence if best else 0.0)
         correct.append(within["gt_all"][0])
@@ -179,19 +172,22 @@ def measure(arguments):
     context = {"auto": gpureg.Context.best, "cpu": gpureg.Context.cpu, "cuda": gpureg.Context.cuda}[
         arguments.backend
     ]()
-    unknown = [name for name in arguments.settings if name not in SETTINGS]
+    names = [*QUALITIES, *SETTINGS]
+    unknown = [name for name in arguments.settings if name not in names]
     if unknown:
-        sys.exit(f"error: there is no setting {unknown[0]}; there are {', '.join(SETTINGS)}")
+        sys.exit(f"error: there is no setting {unknown[0]}; there are {', '.join(names)}")
     rows = []
     for folder in arguments.scenes:
         for moved in (False, True) if arguments.moved else (False,):
             options = gpureg.RegistrationOptions()
             scene = Scene(gpureg, context, folder, options, moved)
             align_all(gpureg, context, scene, options)  # the first call allocates
-            for name in arguments.settings or SETTINGS:
+            for name in arguments.settings or names:
                 for seed in arguments.seeds:
                     options = gpureg.RegistrationOptions(seed=seed)
-                    apply(options, SETTINGS[name])
+                    if name in QUALITIES:
+                        options = options.with_quality(QUALITIES[name])
+                    apply(options, SETTINGS.get(name, {}))
                     results, seconds = align_all(gpureg, context, scene, options)
                     rows.append(
                         {

@@ -50,12 +50,12 @@ struct PrepareOptions {
 /// (RegistrationMethod::compatibility).
 struct CompatibilityOptions {
   /// Matches kept per pair, chosen at random where there are more, 4..65536.
-  std::uint32_t max_matches = 8192;
-  std::uint32_t seeds = 1024;  ///< matches whose neighbourhoods become candidates, 1..8192
+  std::uint32_t max_matches = 4096;
+  std::uint32_t seeds = 512;  ///< matches whose neighbourhoods become candidates, 1..8192
   /// Compatible matches of a seed that take part, 3..1024.
-  std::uint32_t max_members = 512;
+  std::uint32_t max_members = 256;
   /// Triangles tried per seed, each of the seed and two compatible members, 1..4096.
-  std::uint32_t triangles = 64;
+  std::uint32_t triangles = 32;
   /// Least-squares fits to the consensus set of the best triangle, 1..8.
   std::uint32_t refits = 2;
   /// Metres that the distances of compatible matches may differ by.
@@ -113,7 +113,7 @@ struct RefineOptions {
 /// overlap of both clouds, free space.
 struct EvidenceOptions {
   /// Approximate number of points of each cloud that score a candidate, 64..65536.
-  std::uint32_t sample = 512;
+  std::uint32_t sample = 384;
   std::uint32_t modes = 24;  ///< distinct poses that are refined and verified by all points, 1..64
   float max_normal_angle = 30.0f;  ///< degrees between the normals of an inlier
   /// Two poses are one mode where their rotations differ by less than this, degrees, ...
@@ -180,8 +180,8 @@ struct RegistrationOptions {
   /// Every length from the voxel size: normals 2 v, FPFH 5 v and 8 v, correspondence distance 1.5
   /// v, kernel 0.5 v, compatibility 1 v, free-space margin 2.4 v.
   /// @param voxel_size in the unit of the points, finite and > 0.
-  /// @param quality 0 to 10, sets the number of candidates: compatibility.seeds and triangles,
-  ///   evidence.modes.
+  /// @param quality 0 to 10, sets the number of candidates: compatibility.max_matches, seeds and
+  ///   triangles, evidence.modes.
   /// @throws InvalidArgument for a value out of range.
   static RegistrationOptions from_voxel_size(float voxel_size,
                                              std::uint32_t quality = kDefaultQuality);

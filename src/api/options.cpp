@@ -42,22 +42,23 @@ double ConfidenceCalibration::operator()(double confidence) const {
 
 namespace {
 
-/// Numbers of candidates by quality. More seeds find more of the difficult pairs, and more modes
-/// keep their poses. Matches and evidence do not depend on the quality, so a confidence means the
-/// same at every quality.
+/// Numbers of candidates by quality: points of the Pareto front of recall and time that
+/// bench/accuracy/front.py measures (bench/results/front.json). More matches and seeds find more of
+/// the difficult pairs, and more modes keep their poses.
 struct Effort {
-  std::uint32_t seeds, triangles, modes;
+  std::uint32_t matches, seeds, triangles, modes;
 };
-constexpr Effort kEfforts[kHighestQuality + 1] = {{64, 32, 8},     {128, 32, 12},   {256, 48, 16},
-                                                  {384, 64, 16},   {512, 64, 24},   {1024, 64, 24},
-                                                  {1536, 96, 32},  {2048, 128, 48}, {3072, 192, 48},
-                                                  {4096, 256, 64}, {8192, 384, 64}};
+constexpr Effort kEfforts[kHighestQuality + 1] = {
+    {512, 64, 32, 6},      {1024, 64, 32, 8},     {2048, 128, 32, 12},  {2048, 256, 32, 12},
+    {3072, 512, 32, 16},   {4096, 512, 32, 24},   {4096, 1024, 64, 24}, {4096, 1024, 64, 32},
+    {4096, 2048, 128, 48}, {8192, 2048, 128, 48}, {8192, 8192, 384, 64}};
 
 }  // namespace
 
 RegistrationOptions RegistrationOptions::with_quality(std::uint32_t quality) const {
   require(quality <= kHighestQuality, "quality", quality, "0 to 10");
   RegistrationOptions o = *this;
+  o.compatibility.max_matches = kEfforts[quality].matches;
   o.compatibility.seeds = kEfforts[quality].seeds;
   o.compatibility.triangles = kEfforts[quality].triangles;
   o.evidence.modes = kEfforts[quality].modes;

@@ -18,9 +18,9 @@ struct LevelRunner {
 TimedResult run_levels(const LevelRunner& runner, double milliseconds,
                        const RegistrationOptions& options);
 
-/// Predicted milliseconds of a level from the stages of another one: matching is constant,
-/// proposals grow with seeds and triangles, refinement and verification with the modes. overhead:
-/// milliseconds of the call outside its stages.
+/// Predicted milliseconds of a level from the stages of another one: matching grows with the
+/// matches, proposals grow with seeds and triangles, refinement and verification with the modes.
+/// overhead: milliseconds of the call outside its stages.
 double predicted_milliseconds(const StageTimings& measured, double overhead,
                               const RegistrationOptions& measured_options,
                               const RegistrationOptions& options);

@@ -29,10 +29,12 @@ double ratio(double a, double b) { return b > 0 ? a / b : 1.0; }
 
 double predicted_milliseconds(const StageTimings& t, double overhead,
                               const RegistrationOptions& from, const RegistrationOptions& to) {
+  // As many features are searched as matches are kept.
+  const double matches = ratio(to.compatibility.max_matches, from.compatibility.max_matches);
   const double seeds = ratio(to.compatibility.seeds, from.compatibility.seeds);
   const double triangles = seeds * ratio(to.compatibility.triangles, from.compatibility.triangles);
   const double modes = ratio(to.evidence.modes, from.evidence.modes);
-  return overhead + t.match + t.propose * triangles + t.rank * seeds +
+  return overhead + t.match * matches + t.propose * triangles + t.rank * seeds +
          (t.refine + t.verify) * modes;
 }
 

@@ -106,11 +106,12 @@ TEST(TimeBudget, PredictionsFollowTheStages) {
   t.refine = 5;
   t.verify = 6;
   RegistrationOptions from, to;
+  to.compatibility.max_matches = 3 * from.compatibility.max_matches;
   to.compatibility.seeds = 2 * from.compatibility.seeds;
   to.compatibility.triangles = 3 * from.compatibility.triangles;
   to.evidence.modes = 2 * from.evidence.modes;
   EXPECT_DOUBLE_EQ(predicted_milliseconds(t, 7, from, from), 28);
-  EXPECT_DOUBLE_EQ(predicted_milliseconds(t, 7, from, to), 7 + 1 + 5 * 6 + 4 * 2 + 11 * 2);
+  EXPECT_DOUBLE_EQ(predicted_milliseconds(t, 7, from, to), 7 + 3 + 5 * 6 + 4 * 2 + 11 * 2);
 }
 
 TEST(TimeBudget, ResultsAreThoseOfTheirLevel) {
