@@ -60,6 +60,15 @@ SETTINGS = {
 QUALITIES = {f"quality {k}": k for k in range(11)}
 
 
+EFFORTS = ("max_matches", "seeds", "triangles", "max_members")
+
+
+def efforts(gpureg, quality):
+    options = gpureg.RegistrationOptions().with_quality(quality)
+    out = {f"compatibility.{name}": getattr(options.compatibility, name) for name in EFFORTS}
+    return {**out, "evidence.modes": options.evidence.modes}
+
+
 def apply(options, changes):
     for name, value in changes.items():
         *path, field = name.split(".")
@@ -203,7 +212,14 @@ def measure(arguments):
     record.write(
         arguments,
         "bench/accuracy/front.py SCENE... --moved",
-        {"device": context.description, "settings": SETTINGS, "rows": rows},
+        {
+            "device": context.description,
+            "settings": {
+                **{name: efforts(gpureg, quality) for name, quality in QUALITIES.items()},
+                **SETTINGS,
+            },
+            "rows": rows,
+        },
     )
 
 

@@ -2,6 +2,7 @@
 """Tables of recall, precision and confidence."""
 
 import json
+import statistics
 
 from tables.records import RESULTS, load, mean, percent, source
 
@@ -258,20 +259,49 @@ def loop_consistency_fresh():
     return out
 
 
-def accuracy_sweep():
-    record = load("accuracy_sweep.json")
-    scenes = [key for key in record["rows"][0] if key != "setting"]
+FRONT_SCENES = {
+    "houses A, B, hospital E": ("house/A", "house/B", "hospital/E"),
+    "red kitchen": ("redkitchen/fragments",),
+    "generated houses": ("gen/house1", "gen/house2"),
+    "offices": ("gen/office1", "gen/office2"),
+    "warehouses": ("gen/ware1", "gen/ware2"),
+    "A, E, moved": ("house/A, moved", "hospital/E, moved"),
+}
+
+
+def front():
+    record = load("front.json")
+    rows = record["rows"]
+
+    def mean_of(scenes, setting, value):
+        return statistics.mean(
+            value(row) for row in rows if row["setting"] == setting and row["scene"] in scenes
+        )
+
+    def cell(scenes, setting):
+        first, found, recall = (
+            mean_of(scenes, setting, value)
+            for value in (
+                lambda row: row["first"],
+                lambda row: row["any"],
+                lambda row: row["geometric"]["R@P95"],
+            )
+        )
+        ms = mean_of(scenes, setting, lambda row: row["ms"])
+        return f"{first:.1f} / {found:.1f} / {recall:.1f} / {ms:.3f}"
+
+    out = [
+        f"| setting | {' | '.join(FRONT_SCENES)} |",
+        "| --- |" + " --- |" * len(FRONT_SCENES),
+    ]
+    for setting in dict.fromkeys(row["setting"] for row in rows):
+        cells = [cell(scenes, setting) for scenes in FRONT_SCENES.values()]
+        out.append(f"| {setting} | {' | '.join(cells)} |")
+    seeds = sorted({row["seed"] for row in rows})
     return [
-        f"| setting | {' | '.join(scenes)} |",
-        "| --- |" + " --- |" * len(scenes),
-        *[
-            f"| {row['setting']} | "
-            + " | ".join(" / ".join(f"{v:.1f}" for v in row[s]) for s in scenes)
-            + " |"
-            for row in record["rows"]
-        ],
+        *out,
         "",
-        f"Seeds {' and '.join(map(str, record['seeds']))} at commit {record['commit']}, with the confidence shipped there.",
+        f"Seeds {', '.join(map(str, seeds))} at commit {record['commit']}, {record['device']}.",
     ]
 
 
@@ -505,6 +535,6 @@ TABLES = {
     "loop_consistency_fresh": loop_consistency_fresh,
     "closing_loops": closing_loops,
     "few_points": few_points,
-    "accuracy_sweep": accuracy_sweep,
+    "front": front,
     "accuracy_attempts": accuracy_attempts,
 }
