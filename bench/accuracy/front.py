@@ -44,18 +44,13 @@ def setting(matches, seeds, modes, triangles=64, members=512, sample=512):
 SETTINGS = {
     "1536/192/12": setting(1536, 192, 12),
     "2048/512/16": setting(2048, 512, 16),
-    "3072/256/16": setting(3072, 256, 16),
     "4096/512/16": setting(4096, 512, 16),
     "4096/2048/32": setting(4096, 2048, 32, 128),
-    "6144/1024/24": setting(6144, 1024, 24),
     "8192/1024/24": setting(8192, 1024, 24),
     "128 members": {"compatibility.max_members": 128},
     "16 triangles": {"compatibility.triangles": 16},
     "sample 1024": {"evidence.sample": 1024},
     "10 iterations": {"refine.max_iterations": 10},
-    "24 iterations": {"refine.max_iterations": 24},
-    "separation .2": {"compatibility.seed_separation": 0.2},
-    "turn .3": {"compatibility.max_turn": 0.3},
 }
 QUALITIES = {f"quality {k}": k for k in range(11)}
 
