@@ -19,7 +19,7 @@ namespace {
 
 /// Levels whose times and results a test decides; its clock moves only while a level runs.
 struct FakeLevels {
-  double match = 10, per_triangle = 1e-3, per_seed = 0.05, per_mode = 0.5, overhead = 1;
+  double per_match = 2.5e-3, per_triangle = 1e-3, per_seed = 0.05, per_mode = 0.5, overhead = 1;
   double exponent = 1;  ///< below 1: a device that more work does not slow down in proportion
   std::function<double(std::uint32_t)> confidence = [](std::uint32_t) { return 0.5; };
   std::function<double(std::uint32_t)> shift = [](std::uint32_t) { return 0.0; };
@@ -34,7 +34,7 @@ struct FakeLevels {
     result.score = confidence(quality);
     result.target_from_source.setIdentity();
     result.target_from_source.translation().x() = shift(quality);
-    result.timings.match = match;
+    result.timings.match = std::pow(per_match * o.compatibility.max_matches, exponent);
     result.timings.propose =
         std::pow(per_triangle * o.compatibility.seeds * o.compatibility.triangles, exponent);
     result.timings.rank = std::pow(per_seed * o.compatibility.seeds, exponent);
