@@ -151,7 +151,7 @@ struct LocateOptions {
 
 /// Approximate position of a scan.
 struct PositionPrior {
-  /// Of the origin of the scan's frame in the map, metres.
+  /// Of the origin of the scan's frame in the map, metres, at most 1e12.
   Eigen::Vector3d position = Eigen::Vector3d::Zero();
   double radius = 5;  ///< largest distance from it, metres, > 0
 };

@@ -2,6 +2,7 @@
 #include "gpureg/point_cloud.hpp"
 
 #include "algorithm/normal.hpp"
+#include "common/coordinates.hpp"
 #include "common/limits.hpp"
 #include "common/validate.hpp"
 
@@ -30,7 +31,8 @@ void PointCloudView::validate() const {
           "false, or normals that point outwards");
   require(!model || viewpoint_count == 0, "cloud.model", "true", "false, as viewpoints are given");
   for (const double coordinate : origin)
-    require(std::isfinite(coordinate), "cloud.origin", coordinate, "finite coordinates");
+    require(std::abs(coordinate) <= limits::kMaxCoordinate, "cloud.origin", coordinate,
+            "finite coordinates of at most 1e12");
 }
 
 double PointCloudView::share_facing_away() const {

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "api/frames.hpp"
+#include "common/coordinates.hpp"
 #include "common/validate.hpp"
 #include "math/trigonometry.hpp"
 
@@ -21,7 +22,8 @@ constexpr double kMaxSkew = 1e-3;
 
 void require_direction(const Eigen::Vector3d& v, const std::string& name) {
   const std::string field = name + ".norm";
-  require(v.allFinite() && v.norm() > kMinNorm, field.c_str(), v.norm(),
+  // The square of a longer one is infinite.
+  require(v.norm() > kMinNorm && v.norm() <= limits::kMaxCoordinate, field.c_str(), v.norm(),
           "a direction: finite, and not of length 0");
 }
 

@@ -1,10 +1,16 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include "common/coordinates.hpp"
 #include "fields/options.hpp"
 #include "gpureg/change.hpp"
 
 namespace gpureg::fields {
+
+constexpr Range
+    kReach =
+        from(limits::kMinLength, limits::kMaxCoordinate, "a number in [1e-6, 1e12]").in("metres"),
+    kReachOrZero = from(0, limits::kMaxCoordinate, "a number in [0, 1e12]").in("metres");
 
 template <>
 struct Fields<localization::MapOptions> {
@@ -18,8 +24,8 @@ struct Fields<localization::MapOptions> {
   static void visit(V&& v) {
     using O = localization::MapOptions;
     v(&O::prepare, {"prepare", "Of tiles and scans."});
-    v(&O::tile_size, {"tile_size", kPositive.in("metres"), kProportional, "Largest edge of a tile."});
-    v(&O::halo, {"halo", kNotNegative.in("metres"), kProportional, "Overlap of tiles: about half of a scan."});
+    v(&O::tile_size, {"tile_size", kReach, kProportional, "Largest edge of a tile."});
+    v(&O::halo, {"halo", kReachOrZero, kProportional, "Overlap of tiles: about half of a scan."});
   }
   // clang-format on
 };
@@ -42,7 +48,7 @@ struct Fields<localization::LocateOptions> {
     v(&O::coarse_tiles, {"coarse_tiles", from(1, 1e6), "Tiles of the coarse search; of more, a coarser one chooses."});
     v(&O::fine_tiles, {"fine_tiles", from(1, 1e6), "Tiles of the fine search, where the coarse one is not sure."});
     v(&O::candidates, {"candidates", from(1, 64), "Poses of a scan that are verified."});
-    v(&O::neighborhood, {"neighborhood", kPositive.in("metres"), kProportional, "Distance up to which the map verifies a pose."});
+    v(&O::neighborhood, {"neighborhood", kReach, kProportional, "Distance up to which the map verifies a pose."});
   }
   // clang-format on
 };
@@ -58,10 +64,10 @@ struct Fields<localization::ChangeOptions> {
   template <typename V>
   static void visit(V&& v) {
     using O = localization::ChangeOptions;
-    v(&O::tolerance, {"tolerance", kPositive.in("metres"), kProportional, "Surfaces closer together are the same."});
-    v(&O::translation_sigma, {"translation_sigma", kNotNegative.in("metres"), kProportional, "Uncertainty of the pose."});
-    v(&O::rotation_sigma, {"rotation_sigma", kNotNegative.in("degrees"), "Uncertainty of the pose."});
-    v(&O::min_extent, {"min_extent", kNotNegative.in("metres"), kProportional, "Smaller changes are noise."});
+    v(&O::tolerance, {"tolerance", kReach, kProportional, "Surfaces closer together are the same."});
+    v(&O::translation_sigma, {"translation_sigma", kReachOrZero, kProportional, "Uncertainty of the pose."});
+    v(&O::rotation_sigma, {"rotation_sigma", from(0, 180, "degrees in [0, 180]").in("degrees"), "Uncertainty of the pose."});
+    v(&O::min_extent, {"min_extent", kReachOrZero, kProportional, "Smaller changes are noise."});
     v(&O::viewpoints, {"viewpoints", from(1, 4096), "Sensor positions of each cloud whose free space is compared."});
     v(&O::refine, {"refine", "Refine the pose by ICP first."});
   }

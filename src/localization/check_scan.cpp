@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <sstream>
 
+#include "common/coordinates.hpp"
+#include "common/shown.hpp"
 #include "gpureg/voxel_size.hpp"
 
 namespace gpureg::localization {
@@ -15,23 +17,30 @@ constexpr double kSparse = 10, kSmall = 10;
 /// Scans of more voxels are unusual: worth a look at the spacing.
 constexpr double kWide = 2000;
 
-/// Extent of the middle 90 % along the longest axis: stray points do not count.
-double extent_of(const PointCloudView& scan) {
+/// Of the middle 90 % along each axis: stray points do not count.
+struct Extent {
+  double longest = 0;   ///< along an axis
+  double farthest = 0;  ///< coordinate
+};
+
+Extent extent_of(const PointCloudView& scan) {
   constexpr std::size_t kSample = 4096;
-  double longest = 0;
+  Extent out;
   for (int axis = 0; axis < 3; ++axis) {
     std::vector<float> values;
     for (std::size_t k = 0; k < scan.size; k += scan.size / kSample + 1) {
       const Eigen::Map<const Eigen::Vector3f> p(scan.points + k * scan.point_stride);
       if (p.allFinite()) values.push_back(p[axis]);
     }
-    if (values.empty()) return 0;
+    if (values.empty()) return out;
     std::sort(values.begin(), values.end());
     const std::size_t cut = values.size() / 20;
-    longest = std::max(longest, static_cast<double>(values[values.size() - 1 - cut]) -
-                                    static_cast<double>(values[cut]));
+    const double low = static_cast<double>(values[cut]),
+                 high = static_cast<double>(values[values.size() - 1 - cut]);
+    out.longest = std::max(out.longest, high - low);
+    out.farthest = std::max({out.farthest, -low, high});
   }
-  return longest;
+  return out;
 }
 
 std::string looks_like(double factor, const char* scan, const char* map) {
@@ -45,7 +54,10 @@ std::string looks_like(double factor, const char* scan, const char* map) {
 
 void check_unit(const PointCloudView& scan, const MapState& map, const std::string& name) {
   const double voxel = static_cast<double>(map.options.prepare.voxel_size);
-  const double extent = extent_of(scan);
+  const auto [extent, farthest] = extent_of(scan);
+  if (farthest > limits::kMaxCoordinate)
+    throw InvalidArgument(name + ": its points lie " + shown(farthest) +
+                          " from the origin of its frame, expected at most 1e12");
   if (extent == 0) return;  // too few points, which is for the result to say
   const auto fits = [&](double spacing, double factor) {
     return spacing * factor < 2 * voxel && extent * factor > 2 * kSmall * voxel;
@@ -82,7 +94,7 @@ void check_unit(const PointCloudView& scan, const MapState& map, const std::stri
 void check_map(const PointCloud& cloud, const MapOptions& options) {
   const double voxel = static_cast<double>(options.prepare.voxel_size);
   const double spacing = suggest_voxel_size({cloud.view()}).spacing;
-  const double extent = extent_of(cloud.view());
+  const double extent = extent_of(cloud.view()).longest;
   std::ostringstream text;
   text.precision(3);
   if (spacing > kSparse * voxel)

@@ -8,6 +8,8 @@
 #include <cstdint>
 #include <limits>
 
+#include "common/whole.hpp"
+
 namespace gpureg::localization {
 
 /// Where a direction meets a cube around its origin: a face, two coordinates in [-1, 1], and the
@@ -27,8 +29,7 @@ inline CubeRay cube_ray(const Eigen::Vector3f& d) {
 
 /// Row or column, of `edge` ones, of a coordinate.
 inline int cube_row(float at, int edge) {
-  const float row = (at + 1) * 0.5f * static_cast<float>(edge);
-  return std::clamp(static_cast<int>(row), 0, edge - 1);
+  return whole((at + 1) * 0.5f * static_cast<float>(edge), 0, edge - 1);
 }
 
 /// How far the scans of one sensor position saw in each direction. What other scans know beyond was
@@ -46,8 +47,8 @@ struct Horizon {
   void see(const Eigen::Vector3f& direction, float step) {
     const float far = direction.norm() / step;
     std::uint16_t& known = steps[cell(direction)];
-    constexpr float kMost = kUnlimited - 1;
-    known = std::max(known, static_cast<std::uint16_t>(std::min(std::ceil(far), kMost)));
+    constexpr std::uint16_t kMost = kUnlimited - 1;
+    known = std::max(known, whole(std::ceil(far), std::uint16_t{0}, kMost));
   }
   bool reaches(const Eigen::Vector3f& direction, float step) const {
     const std::uint16_t known = steps[cell(direction)];

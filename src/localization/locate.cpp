@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <numeric>
 
+#include "common/shown.hpp"
 #include "fields/localization.hpp"
 #include "localization/check_scan.hpp"
 #include "localization/plan/plan_search.hpp"
@@ -120,8 +121,8 @@ void check(const MapState& map, const LocateOptions& options, std::size_t scans,
   const float of_map = map.options.prepare.voxel_size,
               of_options = options.registration.prepare.voxel_size;
   if (of_map != of_options)
-    throw InvalidArgument("registration.prepare.voxel_size is " + std::to_string(of_options) +
-                          ", but the map was made with " + std::to_string(of_map));
+    throw InvalidArgument("registration.prepare.voxel_size is " + shown(of_options) +
+                          ", but the map was made with " + shown(of_map));
 }
 
 }  // namespace

@@ -2,6 +2,8 @@
 #include <cmath>
 #include <cstring>
 
+#include "common/coordinates.hpp"
+#include "common/limits.hpp"
 #include "fields/localization.hpp"
 #include "files/text_file.hpp"
 #include "gpureg/error.hpp"
@@ -124,8 +126,10 @@ void check_values(const MapState& map, const std::string& path) {
   } catch (const InvalidArgument& error) {
     require_that(false, error.what());
   }
-  require_that(map.origin.allFinite(), "its origin is not finite");
+  require_that(map.origin.cwiseAbs().maxCoeff() <= limits::kMaxCoordinate,
+               "its origin is not finite, or beyond 1e12");
   require_that(!map.points.empty(), "it has no points");
+  require_that(map.points.size() <= limits::kMaxPoints, "it has more than 2^31 - 1 points");
   require_that(map.sides.empty() || map.sides.size() == map.points.size(),
                "points and sides differ in number");
   for (const auto* rows : {&map.points, &map.viewpoints})

@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include <cmath>
+
 #include "fields/localization.hpp"
 #include "fields/scale.hpp"
 #include "fields/validate.hpp"
@@ -44,11 +46,11 @@ void LocatePrior::validate(const std::string& name) const {
   pair.gravity = gravity;
   pair.validate(name);
   if (!position) return;
-  if (!position->position.allFinite())
-    throw InvalidArgument(name + ".position.position is not finite");
-  if (!(position->radius > 0 && position->radius <= fields::kMost))
-    throw InvalidArgument(name + ".position.radius is " + std::to_string(position->radius) +
-                          ", expected a finite number > 0");
+  for (const double coordinate : position->position)
+    require(std::abs(coordinate) <= limits::kMaxCoordinate, (name + ".position.position").c_str(),
+            coordinate, "coordinates of at most 1e12");
+  require(position->radius > 0 && position->radius <= fields::kMost,
+          (name + ".position.radius").c_str(), position->radius, "a finite number > 0");
 }
 
 const char* to_string(LocateStatus status) {

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 
+#include "gpureg/change.hpp"
 #include "localization/building.hpp"
 #include "support/expect_error.hpp"
 
@@ -80,6 +81,60 @@ TEST_F(WrongInput, VoxelSizesThatDoNotFit) {
   }
 }
 
+// Numbers that float does not hold became cells of the plan, and their addresses.
+TEST_F(WrongInput, PriorsOfNumbersThatAreNoPlaces) {
+  for (const double far : {1e39, 1e30, -1e300, std::numeric_limits<double>::infinity(),
+                           std::numeric_limits<double>::quiet_NaN()}) {
+    LocatePrior prior;
+    prior.position = localization::PositionPrior{{0, far, 0}, 2};
+    expect_error<InvalidArgument>([&] { locate(context, query.scan.view(), map, prior); },
+                                  {"priors[0].position.position is ", "1e12"});
+  }
+  LocatePrior prior;
+  prior.position = localization::PositionPrior{{1e12, -1e12, 1e12}, 2};
+  EXPECT_EQ(locate(context, query.scan.view(), map, prior).status, LocateStatus::not_found);
+  prior.position = localization::PositionPrior{query.map_from_scan.translation(), 1e300};
+  EXPECT_EQ(locate(context, query.scan.view(), map, prior).status, LocateStatus::found);
+  prior = {};
+  prior.gravity = GravityPrior{{0, 0, 1e200}, {0, 0, 1}, 10};
+  expect_error<InvalidArgument>([&] { locate(context, query.scan.view(), map, prior); },
+                                {"priors[0].gravity.source_up.norm is inf"});
+}
+
+TEST_F(WrongInput, CoordinatesAtTheEndOfFloat) {
+  PointCloud surfaces;  // without sides: its normals are estimated
+  surfaces.points = furnished_room(1, 1);
+  const PreparedMap bare = prepare_map(surfaces.view(), map_options());
+  PointCloud far = query.scan;
+  far.viewpoints.clear();
+  far.points.assign(5000, Eigen::Vector3f::Constant(3e38f));
+  for (const PreparedMap& any : {map, bare}) {
+    expect_error<InvalidArgument>([&] { locate(context, far.view(), any); },
+                                  {"scans[0]", "3.0", "e+38", "at most 1e12"});
+    expect_error<InvalidArgument>(
+        [&] {
+          localization::find_changes(context, far.view(), any, UnalignedIsometry3d::Identity());
+        },
+        {"scan: its points lie 3", "e+38", "at most 1e12"});
+  }
+  far.points = query.scan.points;
+  far.origin = Eigen::Vector3d::Constant(1e300);
+  expect_error<InvalidArgument>([&] { locate(context, far.view(), map); },
+                                {"cloud.origin is 1e+300", "1e12"});
+}
+
+// Heights are counted from the lowest to the highest: a bird high above the scan is no reason for
+// gigabytes.
+TEST_F(WrongInput, AStrayPointFarAboveTheScan) {
+  PointCloud above = query.scan;
+  const Eigen::Vector3f up =
+      query.map_from_scan.inverse().linear().cast<float>() * Eigen::Vector3f::UnitZ();
+  for (int k = 0; k < 40; ++k)
+    above.points.push_back(4e4f * up + Eigen::Vector3f(0.05f * static_cast<float>(k % 7),
+                                                       0.05f * static_cast<float>(k / 7), 0));
+  EXPECT_EQ(locate(context, above.view(), map).status, LocateStatus::found);
+}
+
 TEST_F(WrongInput, Arguments) {
   expect_error<InvalidArgument>([] { MapBuilder(map_options()).build(); }, {"no points"});
   expect_error<InvalidArgument>([] { PreparedMap().size(); }, {"empty handle"});
@@ -104,6 +159,14 @@ TEST_F(WrongInput, Arguments) {
   options.fine_tiles = 0;
   expect_error<InvalidArgument>([&] { locate(context, {query.scan.view()}, map, options); },
                                 {"fine_tiles", "0"});
+  localization::ChangeOptions changes;
+  changes.tolerance = 1e300;
+  expect_error<InvalidArgument>(
+      [&] {
+        localization::find_changes(context, query.scan.view(), map, UnalignedIsometry3d::Identity(),
+                                   changes);
+      },
+      {"tolerance is 1e+300"});
   LocatePrior prior;
   prior.position = localization::PositionPrior{{0, 0, 0}, -1};
   expect_error<InvalidArgument>([&] { locate(context, query.scan.view(), map, prior); },

@@ -7,11 +7,18 @@
 #include <numeric>
 
 #include "common/host_threads.hpp"
+#include "common/whole.hpp"
 #include "localization/change/sight.hpp"
 #include "math/exponential.hpp"
 
 namespace gpureg::localization {
 namespace {
+
+using Cell = std::array<std::int64_t, 3>;
+
+Cell cell_of(const Eigen::Vector3f& p, float edge) {
+  return {cell_at(p[0], edge), cell_at(p[1], edge), cell_at(p[2], edge)};
+}
 
 /// Log odds at twice the tolerance.
 constexpr double kSharpness = 4;
@@ -41,13 +48,10 @@ std::vector<float> distances(const Question& question, const Surface& other, uns
 void widen(const Question& question, const std::vector<float>& distance,
            std::vector<float>& tolerances) {
   constexpr float kBlock = 20, kMedians = 1.5f, kMost = 1.5f;
-  std::map<std::array<std::int64_t, 3>, std::vector<std::size_t>> blocks;
+  std::map<Cell, std::vector<std::size_t>> blocks;
   for (std::size_t k = 0; k < distance.size(); ++k) {
     if (distance[k] >= 2 * tolerances[k]) continue;
-    const Eigen::Array3f at = (question.points[k] / (kBlock * question.spacing)).array().floor();
-    blocks[{static_cast<std::int64_t>(at[0]), static_cast<std::int64_t>(at[1]),
-            static_cast<std::int64_t>(at[2])}]
-        .push_back(k);
+    blocks[cell_of(question.points[k], kBlock * question.spacing)].push_back(k);
   }
   for (const auto& [at, members] : blocks) {
     std::vector<float> near;
@@ -64,15 +68,9 @@ class Groups {
  public:
   Groups(const std::vector<Eigen::Vector3f>& points, const std::vector<std::size_t>& members,
          float cell) {
-    using Cell = std::array<std::int64_t, 3>;
     std::map<Cell, std::size_t> cells;
-    const auto cell_of = [&](std::size_t k) {
-      const Eigen::Array3f at = (points[k] / cell).array().floor();
-      return Cell{static_cast<std::int64_t>(at[0]), static_cast<std::int64_t>(at[1]),
-                  static_cast<std::int64_t>(at[2])};
-    };
     for (const std::size_t k : members)
-      cell_of_.push_back(cells.try_emplace(cell_of(k), cells.size()).first->second);
+      cell_of_.push_back(cells.try_emplace(cell_of(points[k], cell), cells.size()).first->second);
     parent_.resize(cells.size());
     std::iota(parent_.begin(), parent_.end(), std::size_t{0});
     for (const auto& [at, number] : cells)

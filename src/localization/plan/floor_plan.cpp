@@ -7,6 +7,7 @@
 #include "api/access.hpp"
 #include "common/for_each_on.hpp"
 #include "common/radix_sort.hpp"
+#include "common/whole.hpp"
 #include "localization/sides.hpp"
 #include "math/atan2.hpp"
 
@@ -184,10 +185,11 @@ FloorPlan::FloorPlan(const MapState& map, unsigned threads) {
       if (!has_sides) faces = facing::both_sides(faces);
       if (faces == 0) continue;
       const Eigen::Vector3f at = (turn * map.points[k] - corner) / cell;
-      const auto up = std::min(static_cast<std::uint32_t>(at[2]), kMostHeight);
+      const auto up = whole(at[2], std::uint32_t{0}, kMostHeight);
       // A scan's points fall into a neighbouring cell, too, up to a quarter of a cell away.
-      const auto low = (at.array() - 0.25f).cast<std::int32_t>().eval(),
-                 high = (at.array() + 0.25f).cast<std::int32_t>().eval();
+      const Eigen::Array2f across = at.head<2>();
+      const auto low = (across - 0.25f).cast<std::int32_t>().eval(),
+                 high = (across + 0.25f).cast<std::int32_t>().eval();
       for (std::int32_t y = low[1]; y <= high[1]; ++y)
         for (std::int32_t x = low[0]; x <= high[0]; ++x) {
           const std::uint64_t number =

@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "common/for_each_on.hpp"
+#include "common/whole.hpp"
 #include "localization/plan/upright_scan.hpp"
 #include "math/exponential.hpp"
 #include "math/trigonometry.hpp"
@@ -39,8 +40,7 @@ Region region_of(const MapState& map, const FloorPlan& plan, const Scan& scan) {
   for (int axis = 0; axis < 2; ++axis) {
     const int most = region.high[axis];
     const auto cell = [&](float at) {
-      return static_cast<int>(
-          std::clamp((at - plan.corner[axis]) / (2 * plan.cell), 0.0f, static_cast<float>(most)));
+      return whole((at - plan.corner[axis]) / (2 * plan.cell), 0, most);
     };
     region.low[axis] = cell(place[axis] - radius);
     region.high[axis] = std::min(most, cell(place[axis] + radius) + 1);

@@ -15,6 +15,10 @@ constexpr std::size_t kAxes = 3;
 /// Walls of a scan, and points for the height.
 constexpr std::size_t kWalls = 512, kPoints = 512;
 
+/// Cells. No column of a plan reaches a point that is farther above or below the middle of its
+/// scan.
+constexpr float kFarthest = 2 << FloorPlan::kHeightBits;
+
 template <typename T>
 std::vector<T> some_of(const std::vector<T>& all, std::size_t most) {
   if (all.size() <= most) return all;
@@ -90,6 +94,7 @@ Upright stand(const ScanSurface& scan, const Eigen::Vector3f& up, float cell) {
     const float distance = at.head<2>().norm();
     if (faces == 0 || distance > reach) continue;
     const Eigen::Vector3f in = at / cell;
+    if (!(std::abs(in[2]) < kFarthest)) continue;
     const Eigen::Vector3i whole = in.array().floor().cast<int>();
     const bool is_wall = (faces & facing::kWalls) != 0;
     const float direction = is_wall ? exact_atan2(normal[1], normal[0]) * kPerRadian : 0;
