@@ -2,6 +2,7 @@
 #include "api/pair_input.hpp"
 
 #include "common/in_halves.hpp"
+#include "common/shown.hpp"
 
 namespace gpureg {
 namespace {
@@ -26,8 +27,8 @@ const PreparedState* checked_state(const Context& context, const PreparedCloud& 
   const float needed = options.prepare.max_correspondence_distance;
   if (needed > state.options.max_correspondence_distance)
     throw InvalidArgument(name + " was prepared with max_correspondence_distance " +
-                          std::to_string(state.options.max_correspondence_distance) +
-                          ", less than " + std::to_string(needed) + " asked for now");
+                          shown(state.options.max_correspondence_distance) + ", less than " +
+                          shown(needed) + " asked for now");
   return &state;
 }
 

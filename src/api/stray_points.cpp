@@ -9,7 +9,9 @@
 #include "algorithm/closest_build.hpp"
 #include "common/limits.hpp"
 #include "common/radix_sort.hpp"
+#include "common/shown.hpp"
 #include "gpureg/error.hpp"
+#include "pipeline/checks.hpp"
 
 namespace gpureg {
 namespace {
@@ -57,7 +59,9 @@ struct Box {
     }
   }
   double size(int k) const { return static_cast<double>(hi[k]) - static_cast<double>(lo[k]); }
-  double diagonal() const { return std::hypot(size(0), size(1), size(2)); }
+  double diagonal() const {
+    return std::sqrt(size(0) * size(0) + size(1) * size(1) + size(2) * size(2));
+  }
   double blocks(float edge, float reach) const {
     double product = 1;
     for (int k = 0; k < 3; ++k)
@@ -231,39 +235,37 @@ std::vector<std::uint32_t> rows_with_neighbors(const RawCloud& raw, const Box& b
   return rows;
 }
 
-std::vector<float> chosen(const float* values, std::size_t stride,
+std::vector<float> chosen(const float* values, std::size_t width, std::size_t stride,
                           const std::vector<std::uint32_t>& rows) {
   std::vector<float> out;
-  out.reserve(3 * rows.size());
+  out.reserve(width * rows.size());
   for (const std::uint32_t row : rows)
-    out.insert(out.end(), values + row * stride, values + row * stride + 3);
+    out.insert(out.end(), values + row * stride, values + row * stride + width);
   return out;
 }
 
 std::string extent_of(const Box& box) {
-  return std::to_string(box.size(0)) + " x " + std::to_string(box.size(1)) + " x " +
-         std::to_string(box.size(2));
+  return shown(box.size(0), 6) + " x " + shown(box.size(1), 6) + " x " + shown(box.size(2), 6);
 }
 
 /// As pipeline::check_density() says it of a cloud without other points.
 [[noreturn]] void throw_isolated(const Box& box, const PrepareOptions& options) {
   throw InvalidArgument("nearly all of " + std::to_string(box.finite) +
                         " points are isolated within normal_radius " +
-                        std::to_string(options.normal_radius) + ", in " + extent_of(box) +
-                        ": voxel_size " + std::to_string(options.voxel_size) +
+                        shown(options.normal_radius) + ", in " + extent_of(box) + ": " +
+                        pipeline::resolution_of(options) +
                         " or the radii are too small for the cloud; are they in the unit of the "
                         "points?");
 }
 
 [[noreturn]] void throw_too_wide(const Box& box, std::uint64_t stray,
                                  const PrepareOptions& options) {
-  std::string text = std::to_string(box.finite) + " points in " + extent_of(box);
-  if (stray > 0)
-    text += ", " + std::to_string(stray) + " of them without two others within normal_radius " +
-            std::to_string(options.normal_radius) + ",";
-  throw InvalidArgument(text + " are too few for voxel_size " + std::to_string(options.voxel_size) +
-                        ": a search for the closest of them would exhaust the memory; use a larger "
-                        "voxel_size, remove stray points, or check the unit of the points");
+  throw InvalidArgument(
+      std::to_string(box.finite) + " points in " + extent_of(box) + ", " + std::to_string(stray) +
+      " of them without two others within normal_radius " + shown(options.normal_radius) +
+      ", are too few for " + pipeline::resolution_of(options) +
+      ": a search for the closest of them would exhaust the memory; use a larger voxel_size, "
+      "remove stray points, or check the unit of the points");
 }
 
 }  // namespace
@@ -292,25 +294,28 @@ WithoutStrayPoints::WithoutStrayPoints(const RawCloud& raw, const PrepareOptions
            .in_range(box) ||
       !blocks.in_range(box) || !exceeds(raw, blocks, reach, most))
     return;
-  // Features of the caller mean something without neighbours.
-  if (raw.features) throw_too_wide(box, 0, options);
-  const std::vector<std::uint32_t> rows = rows_with_neighbors(raw, box, options);
+  rows_ = rows_with_neighbors(raw, box, options);
   invalid_points_ = raw.size - box.finite;
-  stray_points_ = box.finite - rows.size();
-  if (rows.size() * kLeastShare < box.finite) throw_isolated(box, options);
-  keep(raw, rows);
+  stray_points_ = box.finite - rows_.size();
+  if (rows_.size() * kLeastShare < box.finite) throw_isolated(box, options);
+  keep(raw);
   if (exceeds(cloud_, blocks, reach, most)) throw_too_wide(box, stray_points_, options);
 }
 
-void WithoutStrayPoints::keep(const RawCloud& raw, const std::vector<std::uint32_t>& rows) {
-  points_ = chosen(raw.points, raw.point_stride, rows);
+void WithoutStrayPoints::keep(const RawCloud& raw) {
+  points_ = chosen(raw.points, 3, raw.point_stride, rows_);
   cloud_.points = points_.data();
-  cloud_.size = rows.size();
+  cloud_.size = rows_.size();
   cloud_.point_stride = 3;
-  if (!raw.normals) return;
-  normals_ = chosen(raw.normals, raw.normal_stride, rows);
-  cloud_.normals = normals_.data();
-  cloud_.normal_stride = 3;
+  if (raw.normals) {
+    normals_ = chosen(raw.normals, 3, raw.normal_stride, rows_);
+    cloud_.normals = normals_.data();
+    cloud_.normal_stride = 3;
+  }
+  if (!raw.features) return;
+  features_ = chosen(raw.features, raw.feature_dimension, raw.feature_stride, rows_);
+  cloud_.features = features_.data();
+  cloud_.feature_stride = raw.feature_dimension;
 }
 
 void WithoutStrayPoints::count(PrepareStatistics& statistics) const {

@@ -21,15 +21,18 @@ class WithoutStrayPoints {
 
   /// Valid as long as this object and the rows given to it.
   const RawCloud& cloud() const { return cloud_; }
+  /// Rows that are left, where some were dropped; else empty.
+  const std::vector<std::uint32_t>& rows() const { return rows_; }
   /// Corrects the counts of the cloud's preparation.
   void count(PrepareStatistics& statistics) const;
 
  private:
-  void keep(const RawCloud& raw, const std::vector<std::uint32_t>& rows);
+  void keep(const RawCloud& raw);
 
   RawCloud cloud_;
   std::uint64_t input_points_, invalid_points_ = 0, stray_points_ = 0;
-  std::vector<float> points_, normals_;
+  std::vector<std::uint32_t> rows_;
+  std::vector<float> points_, normals_, features_;
 };
 
 }  // namespace gpureg

@@ -7,6 +7,7 @@
 
 #include "api/access.hpp"
 #include "common/limits.hpp"
+#include "common/shown.hpp"
 #include "common/validate.hpp"
 #include "math/trigonometry.hpp"
 #include "pipeline/surface_matcher.hpp"
@@ -25,8 +26,7 @@ void check(const SurfaceView& surface, std::size_t number) {
   for (std::size_t k = 0; surface.variances != nullptr && k < surface.size; ++k)
     if (!(surface.variances[k] >= 1) || !std::isfinite(surface.variances[k]))
       throw InvalidArgument(name + "variances[" + std::to_string(k) + "] is " +
-                            std::to_string(surface.variances[k]) +
-                            ", expected a finite number >= 1");
+                            shown(surface.variances[k]) + ", expected a finite number >= 1");
 }
 
 /// Measures the points that take part.

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "localization/sides.hpp"
+#include "common/without_features.hpp"
+#include "localization/surface.hpp"
 
 #include <cmath>
-
-#include "localization/without_features.hpp"
 
 namespace gpureg::localization {
 namespace {
@@ -18,7 +18,7 @@ constexpr double kClear = 0.75;
 
 /// A tile whose points have normals of consistent sides, either of which may be the seen one.
 struct Sided {
-  std::vector<std::size_t> index;  ///< of its points, in the map
+  std::vector<std::size_t> index;  ///< of its points that are not stray, in the map
   PreparedCloud cloud;
 };
 
@@ -33,8 +33,11 @@ Sided sided(const Context& context, const MapState& map, std::size_t tile) {
   options.surface_side_distance = 0;
   options.wide_feature_radius = 0;
   const WithoutFeatures without(cloud.points.size());
-  out.cloud =
-      prepare_batch(context, {without.of(view_of(cloud))}, options, {map.name_of(tile)}).front();
+  const PointCloudView view = without.of(view_of(cloud));
+  out.cloud = prepare_batch(context, {view}, options, {map.name_of(tile)}).front();
+  const std::vector<std::size_t> kept = kept_rows(view, options);
+  for (std::size_t k = 0; k < kept.size(); ++k) out.index[k] = out.index[kept[k]];
+  out.index.resize(kept.size());
   return out;
 }
 
@@ -76,7 +79,6 @@ std::vector<Eigen::Vector3f> tile_normals(const Context& context, const MapState
   const std::size_t begin = map.tiles[tile].begin, end = map.tiles[tile].end;
   std::vector<Eigen::Vector3f> out(end - begin, Eigen::Vector3f::Zero());
   const Sided found = sided(context, map, tile);
-  if (found.cloud.size() != found.index.size()) return out;  // stray points were left out
   const std::vector<Eigen::Vector3f> normals = found.cloud.normals();
   for (std::size_t k = 0; k < normals.size(); ++k)
     if (found.index[k] >= begin && found.index[k] < end) out[found.index[k] - begin] = normals[k];
@@ -87,7 +89,6 @@ void infer_sides(const Context& context, MapState& map) {
   std::vector<Side> sides(map.points.size(), Side{});
   for (std::size_t tile = 0; tile < map.tiles.size(); ++tile) {
     const Sided found = sided(context, map, tile);
-    if (found.cloud.size() != found.index.size()) continue;  // stray points were left out
     const std::vector<Eigen::Vector3f> normals = found.cloud.normals();
     const double before = share_before(found.cloud.points(), normals, map.options.halo);
     if (std::max(before, 1 - before) < kClear) continue;

@@ -1,10 +1,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "localization/surface.hpp"
+#include "api/raw_cloud.hpp"
+#include "api/stray_points.hpp"
+#include "common/without_features.hpp"
 
 #include <algorithm>
 #include <cmath>
 
-#include "localization/without_features.hpp"
+#include "common/whole.hpp"
 
 namespace gpureg::localization {
 namespace {
@@ -45,6 +48,16 @@ void check_rigid(const UnalignedIsometry3d& pose) {
     throw InvalidArgument("map_from_scan is no rigid motion");
 }
 
+std::vector<std::size_t> kept_rows(const PointCloudView& view, const PrepareOptions& options) {
+  const WithoutStrayPoints without(raw_cloud(view), options);
+  if (!without.rows().empty()) return {without.rows().begin(), without.rows().end()};
+  std::vector<std::size_t> out;
+  for (std::size_t k = 0; k < view.size; ++k)
+    if (Eigen::Map<const Eigen::Vector3f>(view.points + k * view.point_stride).allFinite())
+      out.push_back(k);
+  return out;
+}
+
 SurfaceDistance::SurfaceDistance(const Surface& surface, float reach)
     : surface_(surface), reach_(reach) {
   std::vector<std::pair<std::uint64_t, std::uint32_t>> keys;
@@ -59,7 +72,7 @@ SurfaceDistance::SurfaceDistance(const Surface& surface, float reach)
 }
 
 SurfaceDistance::Cell SurfaceDistance::cell_of(const Eigen::Vector3f& p) const {
-  return (p / reach_).array().floor().cast<std::int64_t>();
+  return p.unaryExpr([&](float coordinate) { return cell_at(coordinate, reach_); });
 }
 
 /// Cells of one key are 2^21 cells apart: their points are too far away to count.

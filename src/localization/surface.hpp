@@ -16,6 +16,10 @@ PointCloud seen_surface(const Context& context, const PointCloudView& scan,
 /// @throws InvalidArgument for a pose that is no rigid motion.
 void check_rigid(const UnalignedIsometry3d& pose);
 
+/// Numbers of the points that prepare() keeps where it does not downsample: those that are finite
+/// and not stray. The others have no normals.
+std::vector<std::size_t> kept_rows(const PointCloudView& view, const PrepareOptions& options);
+
 /// Small discs that a surface consists of, in one frame.
 struct Surface {
   std::vector<Eigen::Vector3f> points, normals;  ///< normals of either sign; zero: not known

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "localization/verify_places.hpp"
+#include "common/without_features.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -9,7 +10,6 @@
 #include "fields/localization.hpp"
 #include "fields/scale.hpp"
 #include "localization/plan/floor_plan.hpp"
-#include "localization/without_features.hpp"
 #include "math/exponential.hpp"
 
 namespace gpureg::localization {

@@ -25,7 +25,7 @@ using pose_graph::kLargestInformation;
 std::string fragment_name(FragmentId id) { return "fragment " + std::to_string(id); }
 
 [[noreturn]] void refuse(const std::string& name, double value, const char* expected) {
-  throw InvalidArgument(name + " is " + pose_graph::shown(value) + ", expected " + expected);
+  throw InvalidArgument(name + " is " + shown(value) + ", expected " + expected);
 }
 
 UnalignedMatrix6d information_of_covariance(const UnalignedMatrix6d& covariance) {
@@ -41,7 +41,7 @@ UnalignedMatrix6d information_of_covariance(const UnalignedMatrix6d& covariance)
       Eigen::SelfAdjointEigenSolver<Matrix6d>(symmetric, Eigen::EigenvaluesOnly).eigenvalues()[0];
   if (!(least > 0))
     throw InvalidArgument("covariance is not positive definite: its smallest eigenvalue is " +
-                          pose_graph::shown(least));
+                          shown(least));
   if (least < 1 / kLargestInformation)
     refuse("the smallest eigenvalue of covariance", least, "1e-18 or more");
   const Matrix6d information = symmetric.llt().solve(Matrix6d::Identity());
@@ -102,8 +102,8 @@ void check_fragment(const Fragment& fragment) {
   check_pose(fragment.world_from_fragment, "world_from_fragment of " + name);
   if (!std::isfinite(fragment.time)) throw InvalidArgument("time of " + name + " is not finite");
   if (fragment.up && !(fragment.up->norm() >= kShortest && fragment.up->norm() <= kFarthest))
-    throw InvalidArgument("up of " + name + " has the length " +
-                          pose_graph::shown(fragment.up->norm()) + ", expected 1e-6 to 1e9");
+    throw InvalidArgument("up of " + name + " has the length " + shown(fragment.up->norm()) +
+                          ", expected 1e-6 to 1e9");
 }
 
 void check_pose(const UnalignedIsometry3d& pose, const std::string& name) {

@@ -101,12 +101,6 @@ void require_confidence(double confidence, const std::string& name) {
   require(confidence >= 0 && confidence <= 1, name, confidence, "a probability in [0, 1]");
 }
 
-std::string shown(double value) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%.9g", value);
-  return text;
-}
-
 void require(bool good, const std::string& field, double value, const char* expected) {
   if (!good) throw InvalidArgument(field + " is " + shown(value) + ", expected " + expected);
 }

@@ -3,6 +3,7 @@
 
 #include <string>
 
+#include "common/shown.hpp"
 #include "gpureg/error.hpp"
 #include "gpureg/pose_graph/graph.hpp"
 
@@ -11,9 +12,6 @@ namespace gpureg::pose_graph {
 /// Coordinates and information beyond this overflow when squared and summed.
 inline constexpr double kFarthest = 1e12;
 inline constexpr double kLargestInformation = 1e18;
-
-/// A number as messages show it.
-std::string shown(double value);
 
 /// Throws InvalidArgument "field is value, expected ...".
 void require(bool good, const std::string& field, double value, const char* expected);

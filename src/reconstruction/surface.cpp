@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include <vector>
-
+#include "common/without_features.hpp"
 #include "gpureg/reconstruction.hpp"
 
 namespace gpureg::reconstruction {
@@ -25,12 +24,8 @@ Surface surface_of(const PreparedCloud& cloud) {
 
 Surface surface_of(const Context& context, PointCloudView cloud,
                    const PrepareOptions& registration) {
-  // Features are of no use here: one constant per point takes their place.
-  const std::vector<float> no_features(cloud.size, 0);
-  cloud.features = no_features.data();
-  cloud.feature_dimension = 1;
-  cloud.feature_stride = 1;
-  return surface_of(prepare(context, cloud, surface_options(registration)));
+  const WithoutFeatures without(cloud.size);
+  return surface_of(prepare(context, without.of(cloud), surface_options(registration)));
 }
 
 }  // namespace gpureg::reconstruction

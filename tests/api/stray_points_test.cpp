@@ -69,6 +69,23 @@ TEST(StrayPoints, NormalsStayWithTheirPoints) {
   EXPECT_EQ(cloud.features(), expected.features());
 }
 
+TEST(StrayPoints, FeaturesStayWithTheirPoints) {
+  const Points clean = room(), all = mixed(clean, cube(30'000, 2000));
+  const auto with_features = [](const Points& points, std::vector<float>& features) {
+    for (const Eigen::Vector3f& p : points) features.insert(features.end(), {p[0], p[1], p[2], 1});
+    PointCloudView view(points);
+    view.features = features.data();
+    view.feature_dimension = 3;
+    view.feature_stride = 4;
+    return view;
+  };
+  std::vector<float> some, more;
+  const PreparedCloud expected = prepared(with_features(clean, some)),
+                      cloud = prepared(with_features(all, more));
+  EXPECT_EQ(cloud.statistics().stray_points, 30'000u);
+  EXPECT_EQ(cloud.features(), expected.features());
+}
+
 // Few stray points cost little; they stay, as the sparse returns of an outdoor scan do.
 TEST(StrayPoints, StayWhereTheyAreFew) {
   const PreparedCloud alone = prepared(PointCloudView(room())),
@@ -107,6 +124,10 @@ TEST(StrayPoints, WhereTheOtherPointsExceedTheMemoryTheCloudIsRefused) {
   const Points noise = cube(120'000, 12);
   test::expect_error<InvalidArgument>([&] { prepared(PointCloudView(noise)); },
                                       {"120000 points in 11.99", "larger voxel_size"});
+  PrepareOptions all;
+  all.voxel_size = 0;
+  test::expect_error<InvalidArgument>([&] { prepare(Context::cpu(2), PointCloudView(noise), all); },
+                                      {"too few for voxel_size 0, which keeps every point"});
   PrepareOptions larger = RegistrationOptions::from_voxel_size(0.5f).prepare;
   larger.wide_feature_radius = 0;
   EXPECT_GT(prepare(Context::cpu(2), PointCloudView(noise), larger).size(), 10'000u);

@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "gpureg/change.hpp"
+#include "common/without_features.hpp"
+#include "localization/surface.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -7,7 +9,6 @@
 #include "localization/candidates.hpp"
 #include "localization/change/changed_points.hpp"
 #include "localization/check_scan.hpp"
-#include "localization/without_features.hpp"
 
 namespace gpureg::localization {
 namespace {
@@ -135,7 +136,10 @@ void estimate_normals(const Context& context, const MapState& map, Surface& surf
   options.depth_maps = 0;
   options.surface_side_distance = 0;
   options.wide_feature_radius = 0;
-  surface.normals = prepare(context, view, options).normals();
+  const std::vector<Eigen::Vector3f> normals = prepare(context, view, options).normals();
+  const std::vector<std::size_t> kept = kept_rows(view, options);
+  surface.normals.assign(surface.points.size(), Eigen::Vector3f::Zero());
+  for (std::size_t k = 0; k < kept.size(); ++k) surface.normals[kept[k]] = normals[k];
 }
 
 /// The tolerance of points, more where an uncertain turn moves them more.
@@ -166,7 +170,7 @@ Scene scene_of(const Context& context, const PointCloudView& scan, const MapStat
   return scene;
 }
 
-/// The finite points of a view in the frame of the scene; others stay away.
+/// The points of a view that are finite in the frame of the scene; others stay away.
 std::vector<std::size_t> place_points(const PointCloudView& scan, const Scene& scene,
                                       std::vector<Eigen::Vector3f>& out) {
   std::vector<std::size_t> numbers;
@@ -175,7 +179,9 @@ std::vector<std::size_t> place_points(const PointCloudView& scan, const Scene& s
     const Eigen::Map<const Eigen::Vector3f> p(scan.points + k * scan.point_stride);
     if (!p.allFinite()) continue;
     const Eigen::Vector3d in_map = scene.map_from_scan * (p.cast<double>() + origin);
-    out.push_back((in_map - scene.middle).cast<float>());
+    const Eigen::Vector3f in_scene = (in_map - scene.middle).cast<float>();
+    if (!in_scene.allFinite()) continue;
+    out.push_back(in_scene);
     numbers.push_back(k);
   }
   return numbers;

@@ -5,7 +5,7 @@
 
 #include "gpureg/point_cloud.hpp"
 
-namespace gpureg::localization {
+namespace gpureg {
 
 /// Views of clouds whose features nobody needs: one constant per point takes their place, which is
 /// cheaper.
@@ -25,4 +25,4 @@ class WithoutFeatures {
   std::vector<float> constant_;
 };
 
-}  // namespace gpureg::localization
+}  // namespace gpureg
