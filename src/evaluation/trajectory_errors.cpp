@@ -8,11 +8,10 @@
 #include "evaluation/statistics.hpp"
 #include "gpureg/error.hpp"
 #include "gpureg/evaluation/trajectory.hpp"
+#include "math/trigonometry.hpp"
 
 namespace gpureg::evaluation {
 namespace {
-
-constexpr double kDegrees = 180 / 3.14159265358979323846;
 
 struct Match {
   Eigen::Isometry3d estimate, truth;
@@ -71,8 +70,8 @@ Eigen::Isometry3d alignment(const std::vector<Match>& matches) {
 }
 
 double degrees_of(const Eigen::Isometry3d& error) {
-  const Eigen::Matrix3d rotation = error.linear();
-  return kDegrees * Eigen::AngleAxisd(Eigen::Quaterniond(rotation).normalized()).angle();
+  const Eigen::Quaterniond q(error.linear());
+  return 2 * portable::atan2(q.vec().norm(), std::abs(q.w())) / portable::kRadiansPerDegree;
 }
 
 /// Index pairs of the relative error.

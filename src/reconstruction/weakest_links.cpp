@@ -5,6 +5,7 @@
 #include <numeric>
 
 #include "gpureg/reconstruction.hpp"
+#include "math/exponential.hpp"
 #include "reconstruction/connections.hpp"
 
 namespace gpureg::reconstruction {
@@ -140,7 +141,7 @@ void split_at_weak_links(const std::vector<Edge>& edges, const std::vector<Odome
       if (map.scans[edge.source].island != island || map.scans[edge.target].island != island ||
           !divides(link, edge))
         continue;
-      const double evidence = -std::log(1 - std::min(edge.pair_confidence, kMostConfidence));
+      const double evidence = -portable::log(1 - std::min(edge.pair_confidence, kMostConfidence));
       sum += edge.accepted ? -evidence : evidence;
     }
     return sum;

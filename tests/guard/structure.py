@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
 """Headers that are slow to compile stay out of headers that everything includes; folders stay small; sources of one
-library can be compiled together (CMAKE_UNITY_BUILD).
+library can be compiled together (CMAKE_UNITY_BUILD). portable.py has rules of its own.
 
 structure.py [ROOT]    exit status 1 and one line per file that may not include what it includes, per folder with
                        too many files, and per name that two sources of a library keep for themselves
@@ -12,6 +12,8 @@ import os
 import pathlib
 import re
 import sys
+
+import portable
 
 FOLDERS = ("include", "src", "apps/gpureg", "data")
 
@@ -166,6 +168,7 @@ def complaints(root: pathlib.Path) -> list[str]:
         + heavy_through_others(root)
         + full_folders(root)
         + names_of_two_sources(root)
+        + portable.complaints(root)
     )
 
 

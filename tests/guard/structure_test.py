@@ -70,6 +70,42 @@ class Structure(unittest.TestCase):
                 found = structure.complaints(pathlib.Path(folder))
                 self.assertEqual(len(found), names, text)
 
+    def in_project(self, **files):
+        """Complaints about files of src/io in a project with a table of layers."""
+        with tempfile.TemporaryDirectory() as folder:
+            root = pathlib.Path(folder)
+            for name in ("docs", "src/io", "src/api", "include/gpureg"):
+                (root / name).mkdir(parents=True)
+            (root / "docs/design.md").write_text(
+                "| folder | may include |\n| --- | --- |\n| `include/gpureg` | nothing |\n"
+                "| `src/io` | of the public headers `gpureg/error.hpp` |\n| `src/api` | `src/io` |\n\nmore `src/x`\n"
+            )
+            for header in (
+                "src/api/a.hpp",
+                "src/io/b.hpp",
+                "include/gpureg/error.hpp",
+                "include/gpureg/c.hpp",
+            ):
+                (root / header).write_text("")
+            for name, text in files.items():
+                (root / "src/io" / f"{name}.cpp").write_text(text)
+            return structure.complaints(root)
+
+    def test_functions_that_differ_between_libraries(self):
+        for text, count in (
+            ("double y = std::exp(x);", 1),
+            ("double y = exp(x) + expf(x);", 2),
+            ("double y = 2*std::pow (x, 2) - ::acosf(x);", 2),
+            ("double y = portable::exp(x) + sqrt(x);  // not std::exp(x)", 0),
+            ("auto y = cloud.log(x), z = problem->exp(x), w = expand(x);", 0),
+            ("Eigen::AngleAxisd turn(a, b);", 1),
+            ("auto y = a.array().exp();", 1),
+            ("std::mt19937 random(1);", 1),
+            ("std::normal_distribution<double> noise;", 1),
+            ("int k = rand() + strand(3);", 1),
+        ):
+            self.assertEqual(len(self.in_project(x=text)), count, text)
+
 
 if __name__ == "__main__":
     unittest.main()

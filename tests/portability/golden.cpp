@@ -13,7 +13,7 @@
 #include "gpureg/registration.hpp"
 #include "gpureg/verification.hpp"
 #include "gpureg/voxel_size.hpp"
-#include "portability/report.hpp"
+#include "portability/golden_maps.hpp"
 #include "portability/scans.hpp"
 
 namespace gpureg {
@@ -93,6 +93,10 @@ Report results_of(const Context& context) {
   report.pairs("quadruples", two, align_batch(context, clouds, two, quadruples));
 
   add_map(context, clouds, pairs, results, kVoxelSize, report);
+  const test::AlignedSet set{scans, clouds, pairs, results, options};
+  test::add_audits(context, set, report);
+  test::add_places(context, set, report);
+  test::add_risk(set, report);
   return report;
 }
 

@@ -5,10 +5,11 @@
 #include <cmath>
 #include <map>
 #include <numeric>
-#include <random>
 #include <set>
 #include <unordered_map>
 
+#include "math/exponential.hpp"
+#include "math/philox.hpp"
 #include "reconstruction/audit/common_shift.hpp"
 
 namespace gpureg::reconstruction {
@@ -104,8 +105,8 @@ class Forest {
     std::vector<std::uint32_t> out;
     for (std::uint32_t k = 0; k < pairs.size(); ++k)
       if (pairs[k].log_likelihood_ratio != 0) out.push_back(k);
-    std::mt19937 random(1);
-    for (std::size_t k = out.size(); k > 1; --k) std::swap(out[k - 1], out[random() % k]);
+    for (auto k = static_cast<std::uint32_t>(out.size()); k > 1; --k)
+      std::swap(out[k - 1], out[scale_to(philox(k, 0, 0, 0, 1, 0).v[0], k)]);
     return out;
   }
 
@@ -259,7 +260,7 @@ AuditedConnection judge(const std::vector<std::uint32_t>& across, const std::vec
     }
   }
   const auto confidence_with = [&](const Sum& heard) {
-    return 1 / (1 + std::exp(-(kPrior + heard.value() + contradictions.value())));
+    return portable::logistic(kPrior + heard.value() + contradictions.value());
   };
   // Chosen edges keep a connection from being contradicted. They do not make it surer.
   out.confidence = confidence_with(of_chosen);
@@ -342,7 +343,7 @@ double log_odds_between(const std::vector<AuditedPair>& pairs, const ScansBelow&
       ratios_of(all, pairs, below, world_from_scan, noise_of(options.max_shift));
   const double p =
       judge(all, ratios, pairs, std::vector<char>(pairs.size(), 0), true, options).confidence;
-  return std::log(p / (1 - p)) - kPrior;
+  return portable::log(p / (1 - p)) - kPrior;
 }
 
 }  // namespace gpureg::reconstruction

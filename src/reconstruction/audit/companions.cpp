@@ -5,6 +5,7 @@
 #include <cmath>
 #include <map>
 
+#include "math/exponential.hpp"
 #include "reconstruction/audit/pair_verdicts.hpp"
 
 namespace gpureg::reconstruction {
@@ -45,9 +46,9 @@ struct Triplet {
 
 double log_odds(double confidence) {
   const double p = std::clamp(confidence, kLeastOdds, 1 - kLeastOdds);
-  return std::log(p / (1 - p));
+  return portable::log(p / (1 - p));
 }
-double confidence_of(double odds) { return 1 / (1 + std::exp(-odds)); }
+double confidence_of(double odds) { return portable::logistic(odds); }
 
 std::vector<Member> members_of(std::size_t scans, const std::vector<Pair>& pairs,
                                const std::vector<RegistrationResult>& results) {
@@ -122,9 +123,9 @@ bool agrees(const Member& member, const AuditedPair& pair, const AuditOptions& o
 double message(double log_likelihood_ratio, double odds_of_other) {
   const double right = confidence_of(odds_of_other);
   const double ratio =
-      std::exp(log_likelihood_ratio > 0 ? std::min(log_likelihood_ratio, kOfAgreement)
-                                        : log_likelihood_ratio);
-  return std::log(right * ratio + 1 - right);
+      portable::exp(log_likelihood_ratio > 0 ? std::min(log_likelihood_ratio, kOfAgreement)
+                                             : log_likelihood_ratio);
+  return portable::log(right * ratio + 1 - right);
 }
 
 }  // namespace

@@ -6,6 +6,7 @@
 #include <map>
 #include <numeric>
 
+#include "math/exponential.hpp"
 #include "reconstruction/audit/blame.hpp"
 #include "reconstruction/audit/near_pairs.hpp"
 #include "reconstruction/audit/pair_verdicts.hpp"
@@ -80,7 +81,7 @@ void suggest(const Pair& pair, const RegistrationMode& mode, const Eigen::Vector
     one.a_from_b = UnalignedIsometry3d(one.a_from_b.inverse());
   }
   const double p = std::clamp(mode.confidence, 1e-9, 1 - 1e-9);
-  one.odds = std::clamp(std::log(p / (1 - p)), -kMostOfSuggestion, kMostOfSuggestion);
+  one.odds = std::clamp(portable::log(p / (1 - p)), -kMostOfSuggestion, kMostOfSuggestion);
   out[{one.a, one.b}].push_back(one);
 }
 

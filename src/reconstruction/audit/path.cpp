@@ -6,6 +6,8 @@
 #include <map>
 #include <set>
 
+#include "math/trigonometry.hpp"
+
 namespace gpureg::reconstruction {
 namespace {
 
@@ -38,8 +40,8 @@ constexpr double kFitDistance = 0.3, kFitTurn = 6;
 constexpr int kMostPasses = 16;
 
 double degrees(const Eigen::Matrix3d& rotation) {
-  constexpr double kDegrees = 180 / 3.14159265358979323846;
-  return kDegrees * std::acos(std::clamp((rotation.trace() - 1) / 2, -1.0, 1.0));
+  return portable::acos(std::clamp((rotation.trace() - 1) / 2, -1.0, 1.0)) /
+         portable::kRadiansPerDegree;
 }
 
 bool fits(const UnalignedIsometry3d& a, const UnalignedIsometry3d& b) {
