@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
 """Headers that are slow to compile stay out of headers that everything includes; folders stay small; sources of one
-library can be compiled together (CMAKE_UNITY_BUILD). portable.py has rules of its own.
+library can be compiled together (CMAKE_UNITY_BUILD). layers.py and portable.py have rules of their own.
 
 structure.py [ROOT]    exit status 1 and one line per file that may not include what it includes, per folder with
                        too many files, and per name that two sources of a library keep for themselves
@@ -13,6 +13,7 @@ import pathlib
 import re
 import sys
 
+import layers
 import portable
 
 FOLDERS = ("include", "src", "apps/gpureg", "data")
@@ -101,6 +102,23 @@ def heavy_through_others(root: pathlib.Path) -> list[str]:
     ]
 
 
+def outside_of_umbrella(root: pathlib.Path) -> list[str]:
+    """Public headers that gpureg.hpp neither includes nor names as others."""
+    umbrella = root / "include/gpureg/gpureg.hpp"
+    if not umbrella.is_file():
+        return []
+    known = (
+        reached(root, "include/gpureg/gpureg.hpp")
+        | {"gpureg/gpureg.hpp"}
+        | {f"gpureg/{name}" for name in re.findall(r"\w+\.hpp", umbrella.read_text())}
+    )
+    return [
+        f"include/gpureg/gpureg.hpp neither includes nor names {path.name}"
+        for path in sorted(umbrella.parent.glob("*.hpp"))
+        if f"gpureg/{path.name}" not in known
+    ]
+
+
 def full_folders(root: pathlib.Path) -> list[str]:
     """Folders with more files than one looks through."""
     found = []
@@ -166,8 +184,10 @@ def complaints(root: pathlib.Path) -> list[str]:
     return (
         forbidden(root)
         + heavy_through_others(root)
+        + outside_of_umbrella(root)
         + full_folders(root)
         + names_of_two_sources(root)
+        + layers.complaints(root)
         + portable.complaints(root)
     )
 

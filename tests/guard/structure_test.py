@@ -50,6 +50,13 @@ class Structure(unittest.TestCase):
             found, ["include/gpureg/io.hpp includes Eigen/Geometry through other headers"]
         )
 
+    def test_what_gpureg_hpp_says(self):
+        header = {"gpureg_dot_hpp": '/// But io.hpp.\n#include "gpureg/a.hpp"\n', "io_dot_hpp": ""}
+        found = self.complaints(a_dot_hpp='#include "gpureg/b.hpp"\n', b_dot_hpp="", **header)
+        self.assertEqual(found, [])
+        found = self.complaints(a_dot_hpp="", b_dot_hpp="", **header)
+        self.assertEqual(found, ["include/gpureg/gpureg.hpp neither includes nor names b.hpp"])
+
     def test_full_folders(self):
         for count, most in ((30, 0), (31, 1)):
             files = {f"a{k}_dot_hpp": "" for k in range(count)}
@@ -90,6 +97,17 @@ class Structure(unittest.TestCase):
             for name, text in files.items():
                 (root / "src/io" / f"{name}.cpp").write_text(text)
             return structure.complaints(root)
+
+    def test_layers(self):
+        for include, count in (
+            ("io/b.hpp", 0),
+            ("b.hpp", 0),
+            ("gpureg/error.hpp", 0),
+            ("gpureg/c.hpp", 1),
+            ("api/a.hpp", 1),
+        ):
+            found = self.in_project(x=f'#include "{include}"\n')
+            self.assertEqual(len(found), count, include)
 
     def test_functions_that_differ_between_libraries(self):
         for text, count in (
