@@ -3,6 +3,7 @@
 
 #include "fuzz/targets.hpp"
 #include "inputs/initial_poses.hpp"
+#include "inputs/map_poses.hpp"
 #include "io/run_reader.hpp"
 #include "json/json_file.hpp"
 #include "records/journal.hpp"
@@ -74,13 +75,30 @@ void read_initial_poses(std::string_view bytes) {
   read(bytes, [](const std::string& path) { cli::read_initial_poses(path); });
 }
 
+/// Of a map: a trajectory, a log or a graph; those that are there are rigid.
+void read_poses(std::string_view bytes) {
+  read(bytes, [](const std::string& path) {
+    const std::vector<int> numbers{0, 1, 2, 3, 5};
+    std::size_t known = 0;
+    for (const UnalignedIsometry3d& pose : cli::read_map_poses(path, numbers, "scans")) {
+      const Eigen::Matrix3d r = pose.linear();
+      if (!pose.matrix().allFinite()) continue;
+      ++known;
+      if (!((r * r.transpose() - Eigen::Matrix3d::Identity()).norm() < 0.1))
+        broken("a pose is a rigid motion");
+    }
+    if (known < 2) broken("a map has two poses");
+  });
+}
+
 }  // namespace
 
 std::vector<Target> command_targets() {
   return {{"document", read_document},
           {"result", read_result},
           {"journal", read_journal},
-          {"initial_poses", read_initial_poses}};
+          {"initial_poses", read_initial_poses},
+          {"poses", read_poses}};
 }
 
 }  // namespace gpureg::fuzz

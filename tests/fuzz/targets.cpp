@@ -9,7 +9,7 @@ void broken(const std::string& promise) { throw std::logic_error("broken promise
 
 std::vector<Target> all_targets() {
   std::vector<Target> out = file_targets();
-  for (const auto& more : {mesh_targets(), command_targets(), api_targets()})
+  for (const auto& more : {mesh_targets(), command_targets(), api_targets(), map_targets()})
     out.insert(out.end(), more.begin(), more.end());
   return out;
 }

@@ -18,10 +18,13 @@ struct Target {
 std::vector<Target> file_targets();
 /// Meshes.
 std::vector<Target> mesh_targets();
-/// What the command reads: JSON documents, results, journals, initial poses.
+/// What the command reads: JSON documents, results, journals, poses.
 std::vector<Target> command_targets();
 /// The functions of the library, with options and clouds made of bytes.
 std::vector<Target> api_targets();
+
+/// Saved maps, places and changes in maps, audits.
+std::vector<Target> map_targets();
 
 std::vector<Target> all_targets();
 
