@@ -78,7 +78,8 @@ ChangeResult find_changes(const Context& context, const PointCloudView& scan,
 /// Writes a cloud as a binary PLY with red, green, blue and label (of ChangeLabel) as bytes and the
 /// probability as float: same grey, new green, gone red, occluded blue, not observed light grey.
 /// x y z are float, or double where the cloud has an origin. All or nothing. Thread-safe.
-/// @throws InvalidArgument where points and labels differ in number.
+/// @throws InvalidArgument where points, labels and probabilities differ in number, and for a label
+///   that is none.
 /// @throws IoError where writing fails.
 void write_changes(const std::string& path, const PointCloud& cloud, const PointChanges& changes);
 

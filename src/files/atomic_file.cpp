@@ -5,8 +5,7 @@
 
 #include <atomic>
 #include <cerrno>
-#include <cstdlib>
-#include <memory>
+#include <climits>
 #include <string_view>
 #include <system_error>
 
@@ -106,11 +105,17 @@ void sync_folder(const std::string& folder) {
   ::close(fd);
 }
 
-// A rename would replace a link itself: write where it points to.
-std::string behind_links(const std::string& path) {
-  const std::unique_ptr<char, decltype(&std::free)> real(::realpath(path.c_str(), nullptr),
-                                                         &std::free);
-  return real ? std::string(real.get()) : path;
+// A rename would replace a link itself: write where it points to, whether or not a file is there.
+std::string behind_links(std::string path) {
+  constexpr int kMostLinks = 40;  // as the system follows
+  for (int k = 0; k < kMostLinks; ++k) {
+    char to[PATH_MAX];
+    const ssize_t size = ::readlink(path.c_str(), to, sizeof to);
+    if (size <= 0) break;
+    const std::string next(to, static_cast<std::size_t>(size));
+    path = next.front() == '/' ? next : folder_of(path) + next;
+  }
+  return path;
 }
 
 }  // namespace
@@ -130,7 +135,7 @@ void write_atomically(const std::string& path, const Content& content) {
   // as it is.
   if (exists && ::access(path.c_str(), W_OK) != 0) fail(path, why(errno));
 
-  const std::string target = exists ? behind_links(path) : path;
+  const std::string target = behind_links(path);
   std::string temporary;
   OutputFile file = open_temporary(target, temporary);
   if (exists) (void)::fchmod(file.fd(), existing.st_mode & 07777);

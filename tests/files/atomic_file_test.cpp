@@ -71,6 +71,25 @@ TEST(AtomicFile, WritesThroughALinkInsteadOfReplacingIt) {
   EXPECT_EQ(content_of(folder / "real"), "new");
 }
 
+TEST(AtomicFile, WritesThroughALinkToAFileThatIsNotThereYet) {
+  const TemporaryFolder folder;
+  std::filesystem::create_directory(folder / "results");
+  std::filesystem::create_symlink("results/real", folder / "second");
+  std::filesystem::create_symlink("second", folder / "first");
+  write_atomically(folder / "first", "new");
+  EXPECT_TRUE(std::filesystem::is_symlink(folder / "first"));
+  EXPECT_TRUE(std::filesystem::is_symlink(folder / "second"));
+  EXPECT_EQ(content_of(folder / "results/real"), "new");
+
+  std::filesystem::create_symlink(folder / "missing/real", folder / "lost");
+  expect_error<IoError>([&] { write_atomically(folder / "lost", "new"); },
+                        {"missing/real", "No such file"});
+  EXPECT_TRUE(std::filesystem::is_symlink(folder / "lost"));
+  std::filesystem::create_symlink("circle", folder / "circle");
+  expect_error<IoError>([&] { write_atomically(folder / "circle", "new"); }, {"circle"});
+  EXPECT_TRUE(std::filesystem::is_symlink(folder / "circle"));
+}
+
 TEST(AtomicFile, TakesNamesAsLongAsTheFileSystemDoes) {
   const TemporaryFolder folder;
   const std::string path = folder / std::string(255, 'n');

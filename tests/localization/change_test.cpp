@@ -190,6 +190,13 @@ TEST(Change, WrittenWithColours) {
   changes.labels.pop_back();
   expect_error<InvalidArgument>([&] { write_changes(folder / "c.ply", cloud, changes); },
                                 {"1 labels", "2 points"});
+  changes.labels.push_back(static_cast<ChangeLabel>(5));
+  expect_error<InvalidArgument>([&] { write_changes(folder / "c.ply", cloud, changes); },
+                                {"the label 5", "0 to 4"});
+  changes.labels.back() = ChangeLabel::same;
+  changes.probabilities.pop_back();
+  expect_error<InvalidArgument>([&] { write_changes(folder / "c.ply", cloud, changes); },
+                                {"1 probabilities", "2 points"});
 }
 
 TEST(Change, RefusesWhatCannotBe) {

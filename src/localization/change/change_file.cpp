@@ -32,10 +32,17 @@ void append(std::string& bytes, const T& value) {
 }  // namespace
 
 void write_changes(const std::string& path, const PointCloud& cloud, const PointChanges& changes) {
-  if (cloud.points.size() != changes.labels.size())
-    throw InvalidArgument("changes has " + std::to_string(changes.labels.size()) +
-                          " labels, but cloud has " + std::to_string(cloud.points.size()) +
-                          " points");
+  const auto check = [&](std::size_t count, const char* what) {
+    if (count != cloud.points.size())
+      throw InvalidArgument("changes has " + std::to_string(count) + " " + what +
+                            ", but cloud has " + std::to_string(cloud.points.size()) + " points");
+  };
+  check(changes.labels.size(), "labels");
+  check(changes.probabilities.size(), "probabilities");
+  for (const ChangeLabel label : changes.labels)
+    if (static_cast<std::size_t>(label) >= kColours.size())
+      throw InvalidArgument("changes has the label " + std::to_string(static_cast<int>(label)) +
+                            ", expected 0 to " + std::to_string(kColours.size() - 1));
   constexpr std::size_t kAtOnce = 1 << 20;
   const bool wide = !cloud.origin.isZero(0);
   files::write_atomically(path, [&](const files::Sink& write) {
