@@ -49,7 +49,7 @@ MapBuilder& MapBuilder::operator=(MapBuilder&&) noexcept = default;
 
 void MapBuilder::add_scan(const Context& context, const PointCloudView& scan,
                           const UnalignedIsometry3d& map_from_scan) {
-  check_rigid(map_from_scan);
+  check_place(map_from_scan);
   const PointCloud surface = seen_surface(context, scan, state_->options.prepare);
   state_->cells.add(surface.view(), map_from_scan);
   std::set<std::size_t> from;

@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "localization/sides.hpp"
-#include "common/without_features.hpp"
-#include "localization/surface.hpp"
 
 #include <cmath>
+
+#include "common/without_features.hpp"
+#include "localization/surface.hpp"
 
 namespace gpureg::localization {
 namespace {

@@ -1,13 +1,15 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "localization/surface.hpp"
-#include "api/raw_cloud.hpp"
-#include "api/stray_points.hpp"
-#include "common/without_features.hpp"
 
 #include <algorithm>
 #include <cmath>
 
+#include "api/raw_cloud.hpp"
+#include "api/stray_points.hpp"
+#include "common/coordinates.hpp"
+#include "common/validate.hpp"
 #include "common/whole.hpp"
+#include "common/without_features.hpp"
 
 namespace gpureg::localization {
 namespace {
@@ -102,6 +104,13 @@ float SurfaceDistance::at(const Eigen::Vector3f& p) const {
         }
       }
   return least;
+}
+
+void check_place(const UnalignedIsometry3d& map_from_scan) {
+  check_rigid(map_from_scan);
+  const double farthest = map_from_scan.translation().cwiseAbs().maxCoeff();
+  require(farthest <= limits::kMaxCoordinate, "map_from_scan.translation", farthest,
+          "coordinates of at most 1e12");
 }
 
 }  // namespace gpureg::localization

@@ -15,6 +15,8 @@ PointCloud seen_surface(const Context& context, const PointCloudView& scan,
 
 /// @throws InvalidArgument for a pose that is no rigid motion.
 void check_rigid(const UnalignedIsometry3d& pose);
+/// The same, and for one whose coordinates float does not hold.
+void check_place(const UnalignedIsometry3d& map_from_scan);
 
 /// Numbers of the points that prepare() keeps where it does not downsample: those that are finite
 /// and not stray. The others have no normals.

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "localization/verify_places.hpp"
-#include "common/without_features.hpp"
 
 #include <algorithm>
 #include <cmath>
 
 #include "api/verify_by_surfaces.hpp"
 #include "common/for_each_on.hpp"
+#include "common/without_features.hpp"
 #include "fields/localization.hpp"
 #include "fields/scale.hpp"
 #include "localization/plan/floor_plan.hpp"

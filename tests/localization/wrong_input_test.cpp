@@ -101,6 +101,19 @@ TEST_F(WrongInput, PriorsOfNumbersThatAreNoPlaces) {
                                 {"priors[0].gravity.source_up.norm is inf"});
 }
 
+TEST_F(WrongInput, PosesThatAreNoPlaces) {
+  UnalignedIsometry3d pose(query.map_from_scan);
+  for (const double far : {1e39, -1e300, std::numeric_limits<double>::infinity()}) {
+    pose.translation().y() = far;
+    MapBuilder builder(map_options());
+    expect_error<InvalidArgument>([&] { builder.add_scan(context, query.scan.view(), pose); },
+                                  {"map_from_scan"});
+    expect_error<InvalidArgument>(
+        [&] { localization::find_changes(context, query.scan.view(), map, pose); },
+        {"map_from_scan"});
+  }
+}
+
 TEST_F(WrongInput, CoordinatesAtTheEndOfFloat) {
   PointCloud surfaces;  // without sides: its normals are estimated
   surfaces.points = furnished_room(1, 1);

@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "gpureg/change.hpp"
-#include "common/without_features.hpp"
-#include "localization/surface.hpp"
 
 #include <algorithm>
 #include <cmath>
 
+#include "common/without_features.hpp"
 #include "localization/candidates.hpp"
 #include "localization/change/changed_points.hpp"
 #include "localization/check_scan.hpp"
+#include "localization/surface.hpp"
 
 namespace gpureg::localization {
 namespace {
@@ -228,7 +228,7 @@ ChangeResult find_changes(const Context& context, const PointCloudView& scan,
   const MapState& state = MapState::of(map);
   options.validate();
   scan.validate();
-  check_rigid(map_from_scan);
+  check_place(map_from_scan);
   check_unit(scan, state, "scan");
   const Scene scene = scene_of(context, scan, state, map_from_scan, options);
   ChangeResult out;
