@@ -64,7 +64,7 @@ LocatePrior prior_of(const py::object& up, const py::object& near) {
 }
 
 std::vector<LocateResult> locate_all(const Context& context, const py::list& scans,
-                                     const PreparedMap& map, const LocateOptions& options,
+                                     const PreparedMap& map, const LocateOptions options,
                                      const py::object& up, const py::object& near,
                                      const std::vector<std::string>& names) {
   std::vector<PointCloudView> views;
@@ -84,7 +84,7 @@ void bind_from_voxel_size(py::class_<T>& cls) {
 }
 
 ChangeResult compare(const Context& context, const py::tuple& scan, const PreparedMap& map,
-                     const DoubleArray& pose, const ChangeOptions& options) {
+                     const DoubleArray& pose, const ChangeOptions options) {
   const Input input(scan);
   UnalignedIsometry3d map_from_scan = no_pose();
   map_from_scan.matrix() =

@@ -2,6 +2,9 @@
 """Where in a map a scan is, or that it is not there."""
 
 import pathlib
+import sys
+import threading
+from collections.abc import Callable
 from typing import Any
 
 import gpureg
@@ -71,6 +74,8 @@ def test_priors(two_rooms: gpureg.PreparedMap) -> None:
     assert gpureg.locate(scan, two_rooms, near=(truth[:3, 3], 1.0)).found
     assert not gpureg.locate(scan, two_rooms, near=(truth[:3, 3] + [0, 0, 40], 1.0)).found
     assert gpureg.locate(scan, two_rooms, scan_up=frame[:3, 2]).found
+    with pytest.raises(gpureg.InvalidArgument, match=r"position is 1e\+39, .* at most 1e12"):
+        gpureg.locate(scan, two_rooms, near=([0, 1e39, 0], 1.0))
     with pytest.raises(ValueError, match=r"near: expected shape \(3,\)"):
         gpureg.locate(scan, two_rooms, near=([1, 2], 1.0))
 
@@ -96,6 +101,39 @@ def test_change(two_rooms: gpureg.PreparedMap) -> None:
         gpureg.change(scan, two_rooms, 2 * truth)
     with pytest.raises(ValueError, match="map_from_scan: expected shape"):
         gpureg.change(scan, two_rooms, [1, 2, 3])
+
+
+def test_options_may_change_while_a_call_runs(two_rooms: gpureg.PreparedMap) -> None:
+    frame, context = pose(), gpureg.Context.cpu(1)
+    scan, truth = scan_of(1, frame, 1), np.linalg.inv(frame)
+
+    def found(options: gpureg.LocateOptions) -> list[Any]:
+        return numbers(gpureg.locate(scan, two_rooms, options=options, context=context))
+
+    def changed(options: gpureg.ChangeOptions) -> list[Any]:
+        result = gpureg.change(scan, two_rooms, truth, options=options, context=context)
+        assert result is not None
+        return [result.scan_labels.tolist(), result.scan_probabilities.tolist()]
+
+    calls: list[tuple[Callable[[Any], list[Any]], Any, str, float]] = [
+        (found, gpureg.LocateOptions.from_voxel_size(0.05), "min_confidence", 1.0),
+        (changed, gpureg.ChangeOptions.from_voxel_size(0.05), "tolerance", 5.0),
+    ]
+    for call, options, field, value in calls:
+        expected, results = call(options), []
+        interval = sys.getswitchinterval()
+        sys.setswitchinterval(1000)  # the other thread runs until the library lets this one go on
+        try:
+            thread = threading.Thread(
+                target=lambda c, o, r: r.append(c(o)), args=(call, options, results)
+            )
+            thread.start()
+            setattr(options, field, value)
+            thread.join()
+        finally:
+            sys.setswitchinterval(interval)
+        assert results == [expected]
+        assert call(options) != expected
 
 
 def test_scans_with_odometry_are_one_scan(two_rooms: gpureg.PreparedMap) -> None:

@@ -90,7 +90,7 @@ py::tuple audit_of(const Context& context, const py::list& clouds, const DoubleA
 
 /// clouds: of the pairs, audited; none: not audited.
 Reconstruction reconstruct_of(std::size_t scans, const IndexArray& rows, const py::list& results,
-                              const Options& options, const py::object& odometry,
+                              const Options options, const py::object& odometry,
                               const Context& context, const py::list& clouds,
                               const RegistrationOptions registration) {
   const std::vector<PreparedCloud> prepared = prepared_of(clouds);
@@ -122,7 +122,7 @@ py::dict report_of(const RefineReport& report) {
 }
 
 Surface surface_of_input(const Context& context, const py::tuple& cloud,
-                         const PrepareOptions& registration) {
+                         const PrepareOptions registration) {
   const Input input(cloud);
   const py::gil_scoped_release release;
   return surface_of(context, input.view, registration);
@@ -148,11 +148,13 @@ py::dict refine_map(const Context& context, Reconstruction& map, const py::list&
     }
     return failed != nullptr;
   };
+  Reconstruction refined = map;  // which another thread may read meanwhile
   RefineReport report;
   {
     const py::gil_scoped_release release;
-    report = refine(context, surfaces, map, options);
+    report = refine(context, surfaces, refined, options);
   }
+  map = std::move(refined);
   if (failed) std::rethrow_exception(failed);
   return report_of(report);
 }
