@@ -6,6 +6,7 @@
 #include <gpureg/io.hpp>
 
 #include <cstdlib>
+#include <filesystem>
 #include <nlohmann/json.hpp>
 
 #include "output/progress.hpp"
@@ -190,6 +191,22 @@ TEST(Rerun, WritesARecording) {
     EXPECT_NE(bytes.find(entity), std::string::npos) << entity;
   folder.write("map.ply", "no cloud");
   EXPECT_THROW(write_rerun(folder.path(), folder / "other.rrd"), gpureg::Error);
+}
+
+// Results lie in folders that others fill, too.
+TEST(Rerun, TakesNoModuleOfTheCurrentFolder) {
+  const gpureg::test::TemporaryFolder folder;
+  for (const char* module : {"rerun", "numpy", "argparse"})
+    folder.write(module + std::string(".py"), "open('taken', 'w')\n");
+  const auto before = std::filesystem::current_path();
+  std::filesystem::current_path(folder.path());
+  try {
+    require_rerun();
+  } catch (const gpureg::Error&) {
+    // It may be missing.
+  }
+  std::filesystem::current_path(before);
+  EXPECT_FALSE(std::filesystem::exists(folder / "taken"));
 }
 
 TEST(Rerun, SaysWhatIsMissing) {

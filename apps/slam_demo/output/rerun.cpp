@@ -16,9 +16,10 @@ const char* const kProgram =
 #include "view.inc"
     ;
 
-/// The Python program says itself what is wrong.
+/// The Python program says itself what is wrong. -I: no module of the current folder takes the
+/// place of one that it imports.
 pid_t start_python(std::vector<std::string> arguments, const posix_spawnattr_t* attributes) {
-  arguments.insert(arguments.begin(), {"python3", "-c", kProgram});
+  arguments.insert(arguments.begin(), {"python3", "-I", "-c", kProgram});
   std::vector<char*> words;
   for (std::string& argument : arguments) words.push_back(argument.data());
   words.push_back(nullptr);
