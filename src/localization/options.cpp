@@ -30,6 +30,8 @@ void LocateOptions::validate() const {
   fields::validate(*this);
   require(registration.method == RegistrationMethod::compatibility, "registration.method",
           to_string(registration.method), "compatibility: only it verifies poses by evidence");
+  require(registration.calibration.is_identity(), "registration.calibration", "given",
+          "none: it is of pairs, and the confidence of a place has a fit of its own");
 }
 
 ChangeOptions ChangeOptions::from_voxel_size(float voxel_size) {

@@ -128,6 +128,30 @@ TEST_F(Locate, WhatHasChangedIsLabelled) {
   other.write("pose.txt", "1 0 0");
   expect_refused({"change", scan, folder.path(), "--pose", other / "pose.txt"}, {"pose.txt", "16"});
   expect_refused({"change", scan, folder.path(), "--json", scan}, {"scan.ply"});
+  expect_refused({"change", scan, folder.path(), "--tolerance", "0"}, {"tolerance is 0"});
+}
+
+TEST_F(Locate, ThresholdsOfPairsAreNotThoseOfPlaces) {
+  const std::string map = other / "room.gpureg", json = other / "r.json";
+  ASSERT_EQ(locate({folder.path()}, {"--voxel-size", "0.1", "--save-map", map}).status, 0);
+  const auto threshold = [&](const std::vector<std::string>& more) {
+    const Outcome outcome = locate({scan, map}, joined({"--json", json}, more));
+    EXPECT_LE(outcome.status, 1) << outcome.err;
+    return json_of(json).at("options").at("min_confidence");
+  };
+  EXPECT_EQ(threshold({}), 0.75);
+  // As good as any other number, though it is the default of pairs.
+  EXPECT_EQ(threshold({"--set", "min_confidence=0.5"}), 0.5);
+  EXPECT_EQ(threshold({"--min-score", "0.5"}), 0.5);
+  EXPECT_EQ(threshold({"--min-score", "1"}), 1);
+  EXPECT_EQ(locate({scan, map}, {"--min-score", "1"}).status, 1);
+  const std::string calibration = other.write(
+      "c.json",
+      R"({"gpureg":"calibration","slope":1,"offset":0,"voxel_size":5,"risk":{"min_confidence":0.2}})");
+  for (const char* verb : {"locate", "change"})
+    expect_refused({verb, scan, map, "--calibration", calibration}, {"--calibration"});
+  expect_refused({"locate", scan, map, "--set", "calibration.offset=1"},
+                 {"registration.calibration"});
 }
 
 TEST_F(Locate, RefusesWhatCannotBe) {

@@ -105,6 +105,8 @@ TEST_F(Usage, ATimeBudgetIsRefusedBeforeTheWork) {
 TEST_F(Usage, OptionsThatWouldDoNothing) {
   expect_refused(with({"--set", "quadruples.count=100"}),
                  {"--set quadruples.count=100", "method compatibility"});
+  expect_refused(with({"--preset", "loopsmart", "--set", "min_confidence=0.5"}),
+                 {"min_confidence=0.5", "does nothing", "quadruples"});
   expect_refused(with({"--preset", "loopsmart", "--set", "evidence.sample=64"}),
                  {"--set evidence.sample=64", "method quadruples"});
   expect_refused(with({"--preset", "loopsmart", "--quality", "3"}),

@@ -180,6 +180,10 @@ TEST_F(WrongInput, Arguments) {
                                    changes);
       },
       {"tolerance is 1e+300"});
+  options = LocateOptions::from_voxel_size(kVoxel);
+  options.registration.calibration.offset = 1;  // of pairs: places have a fit of their own
+  expect_error<InvalidArgument>([&] { locate(context, {query.scan.view()}, map, options); },
+                                {"registration.calibration", "of pairs"});
   LocatePrior prior;
   prior.position = localization::PositionPrior{{0, 0, 0}, -1};
   expect_error<InvalidArgument>([&] { locate(context, query.scan.view(), map, prior); },

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "options/method_options.hpp"
 
+#include <algorithm>
 #include <iostream>
 
 #include "gpureg/error.hpp"
@@ -13,11 +14,19 @@ namespace gpureg::cli {
 
 namespace {
 
-/// Groups of options of the other method would change nothing.
+/// "evidence" of "evidence.sample=1024", "min_confidence" of "min_confidence=0.5".
+std::string first_name(const std::string& assignment) {
+  return assignment.substr(0, assignment.find_first_of(".="));
+}
+
+/// Options of the other method would change nothing.
 void refuse_idle(const RegistrationOptions& options, const std::string& assignment) {
   const bool quadruples = options.method == RegistrationMethod::quadruples;
-  const std::string group = assignment.substr(0, assignment.find('.'));
-  if (quadruples ? group == "compatibility" || group == "evidence" : group == "quadruples")
+  const std::vector<std::string> idle =
+      quadruples ? std::vector<std::string>{"compatibility", "evidence", "min_confidence",
+                                            "accept_symmetry", "calibration"}
+                 : std::vector<std::string>{"quadruples"};
+  if (std::find(idle.begin(), idle.end(), first_name(assignment)) != idle.end())
     throw InvalidArgument("--set " + assignment + " does nothing with the method " +
                           to_string(options.method));
 }
@@ -71,13 +80,21 @@ void MethodOptions::add_calibration_to(Verb verb) {
 
 void MethodOptions::note_calibration() const {
   if (calibration.empty()) return;
-  const double of_file = read_calibration(calibration).voxel_size;
+  const CalibrationFile file = read_calibration(calibration);
+  const double of_file = file.voxel_size;
   const double of_run = static_cast<double>(voxel_size);
   constexpr double kSimilar = 1.5;
   if (of_run <= kSimilar * of_file && of_file <= kSimilar * of_run) return;
   std::cerr << "gpureg: note: " << calibration << " was made with a voxel size of "
             << significant(of_file, 3) << ", this run has " << significant(of_run, 3)
-            << "; the confidence may be off" << std::endl;
+            << "; the confidence may be off"
+            << (file.min_confidence ? ", and the promised risk does not hold" : "") << std::endl;
+}
+
+bool MethodOptions::sets_confidence() const {
+  return min_score.has_value() || std::any_of(set.begin(), set.end(), [](const std::string& text) {
+           return first_name(text) == "min_confidence";
+         });
 }
 
 RegistrationOptions MethodOptions::registration() const {

@@ -32,6 +32,9 @@ struct MethodOptions {
   /// Whether the user gave the option, as "--quality"; add_to() was called.
   bool given(const std::string& option) const { return verb_->given(option); }
 
+  /// Whether the user gave a confidence to report from, by --min-score or --set.
+  bool sets_confidence() const;
+
   /// Throws InvalidArgument naming field and value, or options that do not go together.
   RegistrationOptions registration() const;
 

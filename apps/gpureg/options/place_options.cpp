@@ -71,9 +71,9 @@ void choose_voxel_size(MethodOptions& method, const MapInput& input) {
 localization::LocateOptions locate_options(const MethodOptions& method) {
   auto options = localization::LocateOptions::from_voxel_size(method.voxel_size, method.quality);
   options.registration = method.registration();
-  if (method.min_score ||
-      options.registration.min_confidence != RegistrationOptions().min_confidence)
-    options.min_confidence = options.registration.min_confidence;
+  // The default of pairs is not that of places. Here and in the JSON there is one threshold.
+  if (method.sets_confidence()) options.min_confidence = options.registration.min_confidence;
+  options.registration.min_confidence = options.min_confidence;
   options.validate();
   return options;
 }

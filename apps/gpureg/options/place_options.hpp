@@ -25,7 +25,7 @@ struct PlaceOptions {
 /// @throws InvalidArgument where they contradict each other.
 void choose_voxel_size(MethodOptions& method, const MapInput& input);
 
-/// With the confidence that --min-score, --set or a calibration asks for, if one does.
+/// With the confidence that --min-score or --set asks for, if one does.
 localization::LocateOptions locate_options(const MethodOptions& method);
 
 }  // namespace gpureg::cli

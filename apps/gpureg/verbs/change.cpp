@@ -4,6 +4,7 @@
 #include <fstream>
 #include <iostream>
 #include <memory>
+#include <optional>
 
 #include "command.hpp"
 #include "gpureg/error.hpp"
@@ -36,7 +37,7 @@ struct Options {
   std::string scan, map, pose, json, scan_ply, map_ply;
   MethodOptions method;
   PlaceOptions place;
-  double tolerance = 0;  // 0: from the voxel size
+  std::optional<double> tolerance;  // none: from the voxel size
 };
 
 /// 16 numbers, row by row. Throws IoError.
@@ -97,7 +98,7 @@ int run(Options o) {
   MapOptions of_map = MapOptions::from_voxel_size(o.method.voxel_size);
   of_map.prepare = options.registration.prepare;
   ChangeOptions change = ChangeOptions::from_voxel_size(o.method.voxel_size);
-  if (o.tolerance != 0) change.tolerance = o.tolerance;
+  if (o.tolerance) change.tolerance = *o.tolerance;
   change.validate();
   const PreparedMap map = input.prepare(context, of_map);
   PointCloud scan = read_scan(o.scan, context, map.options());
@@ -134,7 +135,6 @@ void add_change(CommandLine& line) {
               "locate --save-map")
       .required();
   o->method.add_to(verb);
-  o->method.add_calibration_to(verb);
   o->place.add_to(verb);
   verb.option("--pose", o->pose,
               "File with the 16 numbers of map_from_scan, row by row, which is refined; without, "

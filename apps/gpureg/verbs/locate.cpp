@@ -139,7 +139,6 @@ void add_locate(CommandLine& line) {
           "reconstruct, or a file of --save-map")
       .required();
   o->method.add_to(verb);
-  o->method.add_calibration_to(verb);
   o->place.add_to(verb);
   verb.option("--save-map", o->save_map, "Write the prepared map; SCAN may be left out");
   verb.option("--json", o->json, "Write options, poses, evidence and times");
