@@ -122,6 +122,8 @@ def counts(rows: list[dict[str, Any]]) -> dict[str, Any]:
     found = [r for r in here if r["status"] == "found"]
     return {
         "map": rows[0]["map"],
+        "commit": record.commit(),
+        "min_confidence": rows[0]["min_confidence"],
         "map_points": rows[0]["map_points"],
         "tiles": rows[0]["tiles"],
         "asked": len(here),
@@ -208,6 +210,7 @@ def main() -> None:
                 "aliases": sum(min(e) < CORRECT for e in aliases) if here else 0,
                 "tiles": result["map"]["tiles"],
                 "map_points": result["map"]["points"],
+                "min_confidence": result["options"]["min_confidence"],
                 "cpu_seconds": round(seconds / len(paths), 2),
                 "peak_memory_mib": round(result["peak_memory_mib"]),
             }
@@ -237,7 +240,6 @@ def main() -> None:
             old = json.loads(path.read_text())["maps"] if path.exists() else []
             content = {
                 "command": "python3 bench/accuracy/locate.py --generated FOLDER --inside N --work WORK",
-                "commit": record.commit(),
                 "run": run,
                 "maps": [m for m in old if m["map"] != kind] + [counts(rows)],
             }

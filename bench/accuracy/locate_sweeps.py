@@ -24,6 +24,7 @@ from typing import Any
 
 import locate
 import numpy as np
+from record import commit
 
 RINGS = {16: (-15.0, 15.0), 64: (-24.8, 2.0)}
 COLUMNS, HEIGHT, NOISE, FOOT = 1800, 1.8, 0.02, 0.3048
@@ -149,10 +150,10 @@ class Queries:
 
 def save(path: pathlib.Path, run: dict[str, Any], rows: list[dict[str, Any]]) -> None:
     """A row a line; those of other maps stay."""
-    record = json.loads(path.read_text()) if path.exists() else {"runs": [], "rows": []}
-    lists = {"runs": [run], "rows": rows}
+    old = json.loads(path.read_text()) if path.exists() else {"runs": [], "rows": []}
+    lists = {"runs": [run | {"commit": commit()}], "rows": rows}
     for name, new in lists.items():
-        new = [old for old in record[name] if old["map"] != run["map"]] + new
+        new = [row for row in old[name] if row["map"] != run["map"]] + new
         lists[name] = ",\n ".join(map(json.dumps, new))
     path.write_text(f'{{"runs": [\n {lists["runs"]}],\n"rows": [\n {lists["rows"]}]}}\n')
 

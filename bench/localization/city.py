@@ -19,6 +19,7 @@ import multiprocessing
 import os
 import pathlib
 import subprocess
+import sys
 import tempfile
 import time
 import typing
@@ -27,6 +28,9 @@ from typing import Any
 import city_scene
 import numpy as np
 from city_scene import City
+
+sys.path.append(str(pathlib.Path(__file__).resolve().parents[1] / "accuracy"))
+from record import commit
 
 SENSORS = {  # elevations, rings, azimuths, columns, reach in metres
     "street 16": (-15, 15, 16, 360, 1800, 80),
@@ -360,7 +364,12 @@ def main() -> None:
     if not queries:
         return print(run)
     call = gpureg(*[q.path for q in queries], saved, "--viewpoint", "0,0,0")
-    run |= {"queries": len(queries), "memory_mib": call["memory_mib"], **call["environment"]}
+    run |= {
+        "commit": commit(),
+        "queries": len(queries),
+        "memory_mib": call["memory_mib"],
+        **call["environment"],
+    }
     run |= seconds_of_calls(o, saved, [q.path for q in asked])
     rows = [row_of(query, scan, name) for query, scan in zip(queries, call["scans"])]
     small = {"poses": [], "points": 0, "tiles": 0, "status": "refused"}

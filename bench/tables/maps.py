@@ -155,15 +155,16 @@ def located_generated():
     """Fragments among many generated buildings."""
     record = load("locate_generated.json")
     rows = [
-        "| map | points, tiles | asked | first pose correct | found, of them wrong | ambiguous | recall at 99 % precision | of other buildings: found |",
-        "| --- | --- | --- | --- | --- | --- | --- | --- |",
+        "| map | at commit | points, tiles | asked | first pose correct | found, of them wrong | from | ambiguous | recall at 99 % precision | of other buildings: found |",
+        "| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |",
     ]
     for of in record["maps"]:
         rows.append(
-            f"| {of['map']} | {of['map_points']:,}, {of['tiles']} | {of['asked']} | {of['first_correct']} | {of['found']}, {of['found_wrong']} "
-            f"| {of['ambiguous']} | {of['recall_at_precision_99']} of {of['asked']} | {of['strangers_found']} of {of['strangers']} |"
+            f"| {of['map']} | {of['commit']} | {of['map_points']:,}, {of['tiles']} | {of['asked']} "
+            f"| {of['first_correct']} | {of['found']}, {of['found_wrong']} | {of['min_confidence']} | {of['ambiguous']} "
+            f"| {of['recall_at_precision_99']} of {of['asked']} | {of['strangers_found']} of {of['strangers']} |"
         )
-    return [*rows, "", source(record) + "."]
+    return [*rows, "", f"Made by `{record['command']}`."]
 
 
 def city_runs(sensor, voxel_size):
