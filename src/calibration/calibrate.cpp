@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <string>
 
 #include "calibration/halves.hpp"
@@ -100,21 +101,28 @@ class Calibration {
     if (callbacks_.on_progress) callbacks_.on_progress(done_, total_);
   }
 
-  void add(CalibrationKind kind, const RegistrationResult& result, bool correct, double weight) {
+  void add(CalibrationKind kind, const Pair& scans, const RegistrationResult& result, bool correct,
+           double weight) {
     CalibrationCount& count = kind == CalibrationKind::one_scan           ? out_.one_scan
                               : kind == CalibrationKind::loop_consistency ? out_.loop_consistency
                                                                           : out_.trajectory;
     ++count.samples;
     count.correct += correct;
-    out_.samples.push_back({confidence_of(result), correct, weight, kind});
+    out_.samples.push_back(
+        {confidence_of(result), correct, weight, kind, scans.source, scans.target});
   }
 
   /// All pairs, or all within groups of consecutive clouds, evenly spread.
   void choose_pairs() {
     const std::size_t n = usable_.size();
+    out_.scan_groups.assign(clouds_.size(), kNoScanGroup);
+    std::uint32_t groups_added = 0;
     const auto add_pairs = [&](std::size_t begin, std::size_t end) {
-      for (std::size_t i = begin; i < end; ++i)
+      for (std::size_t i = begin; i < end; ++i) {
+        out_.scan_groups[usable_[i]] = groups_added;
         for (std::size_t j = i + 1; j < end; ++j) pairs_.push_back({usable_[j], usable_[i]});
+      }
+      ++groups_added;
     };
     if (n * (n - std::min<std::size_t>(n, 1)) / 2 <= o_.scan_pairs) return add_pairs(0, n);
     std::size_t group = kGroup;
@@ -157,7 +165,8 @@ class Calibration {
       for (std::size_t k = 0; k < results.size(); ++k) {
         ++out_.one_scan.pairs;
         if (!results[k].has_candidate) continue;
-        add(CalibrationKind::one_scan, results[k],
+        const std::uint32_t cloud = usable_[(begin + k) % usable_.size()];
+        add(CalibrationKind::one_scan, {cloud, cloud}, results[k],
             is_correct(results[k], halves[k].target_from_source, prepared[pairs[k].source].points(),
                        o_.max_error * voxel),
             kOneScanWeight);
@@ -179,6 +188,8 @@ class Calibration {
 
   void judge_by_trajectory() {
     const double max_rms = o_.max_error * static_cast<double>(voxel_of(options_));
+    for (std::size_t k = 0; k < poses_.size(); ++k)
+      if (!poses_[k].matrix().allFinite()) out_.scan_groups[k] = kNoScanGroup;
     for (std::size_t p = 0; p < pairs_.size(); ++p) {
       const UnalignedIsometry3d &source = poses_[pairs_[p].source],
                                 &target = poses_[pairs_[p].target];
@@ -189,7 +200,7 @@ class Calibration {
       std::vector<Eigen::Vector3f> points = cloud.points();
       for (Eigen::Vector3f& point : points)
         point = (point.cast<double>() + cloud.origin()).cast<float>();
-      add(CalibrationKind::trajectory, results_[p],
+      add(CalibrationKind::trajectory, pairs_[p], results_[p],
           is_correct(results_[p], Eigen::Isometry3d((target.inverse() * source).matrix()), points,
                      max_rms),
           1.0);
@@ -200,7 +211,8 @@ class Calibration {
     out_.loop_consistency.pairs = pairs_.size();
     const auto verdicts = calibration::verdicts_of_loops(pairs_, results_, voxel_of(options_));
     for (std::size_t p = 0; p < pairs_.size(); ++p)
-      if (verdicts[p]) add(CalibrationKind::loop_consistency, results_[p], *verdicts[p], 1.0);
+      if (verdicts[p])
+        add(CalibrationKind::loop_consistency, pairs_[p], results_[p], *verdicts[p], 1.0);
   }
 
   const Context& context_;
@@ -218,6 +230,16 @@ class Calibration {
 };
 
 }  // namespace
+
+std::uint64_t cloud_fingerprint(const PointCloudView& cloud) {
+  std::uint64_t hash = 14695981039346656037ull;  // FNV-1a, of words
+  for (std::size_t k = 0; k < cloud.size; ++k) {
+    std::uint32_t words[3];
+    std::memcpy(words, cloud.points + k * cloud.point_stride, sizeof words);
+    for (const std::uint32_t word : words) hash = (hash ^ word) * 1099511628211ull;
+  }
+  return hash;
+}
 
 void CalibrationOptions::validate() const {
   require(self_pairs <= kMostPairs, "self_pairs", self_pairs, "at most 1,000,000");

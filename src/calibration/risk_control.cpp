@@ -5,24 +5,13 @@
 #include <iterator>
 #include <string>
 
+#include "calibration/risk_ladder.hpp"
 #include "common/validate.hpp"
 #include "gpureg/calibration.hpp"
 #include "math/exponential.hpp"
 
 namespace gpureg {
-namespace {
-
-/// Thresholds that are tested, chosen before any data.
-constexpr double kLadder[] = {0.05, 0.1,  0.2,  0.3,  0.4,  0.5,   0.6,   0.7,   0.8,
-                              0.9,  0.95, 0.97, 0.98, 0.99, 0.995, 0.998, 0.999, 0.9999};
-/// Where sequences of tests start: the strictest threshold alone would seldom have enough reports.
-constexpr std::size_t kStarts[] = {5, 9, 13, 16};  // 0.5, 0.9, 0.99, 0.999
-/// Beyond so many reports no advice is given.
-constexpr double kMostReports = 1e6;
-
-struct Counts {
-  std::size_t reported = 0, wrong = 0, correct = 0;
-};
+namespace calibration {
 
 Counts count_from(const std::vector<CalibrationSample>& samples, double threshold) {
   Counts out;
@@ -33,6 +22,38 @@ Counts count_from(const std::vector<CalibrationSample>& samples, double threshol
   }
   return out;
 }
+
+void check_confidences(const std::vector<CalibrationSample>& samples, const std::string& name) {
+  for (std::size_t k = 0; k < samples.size(); ++k)
+    require(samples[k].confidence >= 0 && samples[k].confidence <= 1,
+            (name + "[" + std::to_string(k) + "].confidence").c_str(), samples[k].confidence,
+            "a probability in [0, 1]");
+}
+
+double log_level(const RiskControl& control) {
+  return portable::log(control.max_failure / static_cast<double>(std::size(kStarts)));
+}
+
+void promise(std::size_t k, const std::vector<CalibrationSample>& samples,
+             const ConfidenceCalibration& calibration, RiskThreshold& out) {
+  const Counts counts = count_from(samples, kLadder[k]), all = count_from(samples, 0);
+  out.supported = true;
+  out.min_confidence = calibration(kLadder[k]);
+  out.reported = counts.reported;
+  out.wrong = counts.wrong;
+  out.recall = static_cast<double>(counts.correct) / static_cast<double>(all.correct);
+}
+
+}  // namespace calibration
+
+namespace {
+
+using calibration::check_confidences;
+using calibration::count_from;
+using calibration::Counts;
+using calibration::kLadder;
+using calibration::kMostReports;
+using calibration::kStarts;
 
 /// Logarithm of the probability of at most `wrong` false ones of `count`, each false with
 /// probability `risk`.
@@ -58,22 +79,16 @@ bool passes(const Counts& counts, double risk, double log_level) {
 
 /// Fewest reports that would pass with the same share of false ones; kMostReports: none would.
 double reports_that_pass(const Counts& counts, double risk, double log_level) {
-  const auto reported = static_cast<double>(counts.reported);
-  const double share =
-      counts.reported == 0 ? 0 : static_cast<double>(counts.wrong) / std::max(reported, 1.0);
+  const auto reported = static_cast<double>(std::max<std::size_t>(counts.reported, 1));
+  const double share = static_cast<double>(counts.wrong) / reported;
   if (share >= risk) return kMostReports;
-  const auto pass = [&](double n) { return log_tail(std::ceil(share * n), n, risk) <= log_level; };
-  double few = std::max(1.0, reported), enough = few;
-  while (enough < kMostReports && !pass(enough)) {
-    few = enough;
-    enough = 2 * enough;
-  }
-  if (enough >= kMostReports) return kMostReports;
-  while (enough - few > 1) {
-    const double middle = std::floor(0.5 * (few + enough));
-    (pass(middle) ? enough : few) = middle;
-  }
-  return enough;
+  const double factor = calibration::smallest_factor(
+      [&](double f) {
+        const double n = std::ceil(f * reported);
+        return log_tail(std::ceil(share * n), n, risk) <= log_level;
+      },
+      1 / reported, kMostReports / reported);
+  return std::ceil(factor * reported);
 }
 
 std::optional<std::size_t> more_samples(const std::vector<CalibrationSample>& samples, double risk,
@@ -91,13 +106,6 @@ std::optional<std::size_t> more_samples(const std::vector<CalibrationSample>& sa
     if (!fewest || more < static_cast<double>(*fewest)) fewest = static_cast<std::size_t>(more);
   }
   return fewest;
-}
-
-void check(const std::vector<CalibrationSample>& samples, const std::string& name) {
-  for (std::size_t k = 0; k < samples.size(); ++k)
-    require(samples[k].confidence >= 0 && samples[k].confidence <= 1,
-            (name + "[" + std::to_string(k) + "].confidence").c_str(), samples[k].confidence,
-            "a probability in [0, 1]");
 }
 
 /// The largest confidence from which on more than `risk` of the reports are false; 0: none.
@@ -132,28 +140,17 @@ std::vector<CalibrationSample> CalibrationResult::of_two_scans() const {
 RiskThreshold control_risk(const std::vector<CalibrationSample>& samples,
                            const RiskControl& control, const ConfidenceCalibration& calibration) {
   control.validate();
-  check(samples, "samples");
-  const double log_level =
-      portable::log(control.max_failure / static_cast<double>(std::size(kStarts)));
+  check_confidences(samples, "samples");
+  const double level = calibration::log_level(control);
   RiskThreshold out;
   out.samples = samples.size();
-  std::size_t lowest = std::size(kLadder);
-  for (const std::size_t start : kStarts) {
-    for (std::size_t k = start + 1; k-- > 0;) {
-      if (!passes(count_from(samples, kLadder[k]), control.max_risk, log_level)) break;
-      lowest = std::min(lowest, k);
-    }
-  }
-  if (lowest == std::size(kLadder)) {
-    out.more_samples = more_samples(samples, control.max_risk, log_level);
-    return out;
-  }
-  const Counts counts = count_from(samples, kLadder[lowest]), all = count_from(samples, 0);
-  out.supported = true;
-  out.min_confidence = calibration(kLadder[lowest]);
-  out.reported = counts.reported;
-  out.wrong = counts.wrong;
-  out.recall = static_cast<double>(counts.correct) / static_cast<double>(all.correct);
+  const std::size_t lowest = calibration::lowest_proved([&](double threshold) {
+    return passes(count_from(samples, threshold), control.max_risk, level);
+  });
+  if (lowest == std::size(kLadder))
+    out.more_samples = more_samples(samples, control.max_risk, level);
+  else
+    calibration::promise(lowest, samples, calibration, out);
   return out;
 }
 
@@ -167,7 +164,7 @@ RiskThreshold control_risk_of_scenes(const std::vector<std::vector<CalibrationSa
   for (std::size_t k = 0; k < scenes.size(); ++k) {
     const std::string name = "scenes[" + std::to_string(k) + "]";
     require(!scenes[k].empty(), (name + ".size").c_str(), 0, "one sample or more");
-    check(scenes[k], name);
+    check_confidences(scenes[k], name);
     out.samples += scenes[k].size();
     failures.push_back(last_failure(scenes[k], control.max_risk));
   }

@@ -110,12 +110,13 @@ TEST_F(CalibrateVerb, ATrajectoryDecides) {
 TEST_F(CalibrateVerb, PromisesARiskOrSaysWhatItTakes) {
   write_scans(folder_, kScans, false);
   const std::string path = folder_ / "calibration.json";
-  // 45 pairs may prove that at most nine of ten reports are false, and never one of a thousand.
+  // Ten scans may prove that at most nine of ten reports are false, and never one of a thousand.
   const Outcome kept = run(joined(calibrate(path), {"--max-risk", "0.9"}));
   ASSERT_EQ(kept.status, 0) << kept.err;
   const json risk = json_of(path)["risk"];
   EXPECT_EQ(risk["supported"], true) << risk;
   EXPECT_EQ(risk["max_risk"], 0.9);
+  EXPECT_EQ(risk["scans"], kScans);
   EXPECT_EQ(risk["samples"], json_of(path)["samples"]["loop_consistency"]["samples"]);
   const auto min_confidence = [&](const std::vector<std::string>& more) {
     run(joined(registered(path, {"--json", folder_ / "r.json"}), more));
@@ -126,7 +127,7 @@ TEST_F(CalibrateVerb, PromisesARiskOrSaysWhatItTakes) {
 
   const Outcome refused = run(joined(calibrate(path), {"--max-risk", "0.001"}));
   EXPECT_EQ(refused.status, 1);
-  expect_holds(refused.err, {"0.1 %", "cannot be promised", "more would"});
+  expect_holds(refused.err, {"0.1 %", "cannot be promised", "of 10 scans", "more scans would do"});
   EXPECT_EQ(json_of(path)["risk"]["supported"], false);
   EXPECT_FALSE(json_of(path)["risk"].contains("min_confidence"));
   EXPECT_EQ(min_confidence({}), 0.5) << "as without a promise";
@@ -137,34 +138,70 @@ TEST_F(CalibrateVerb, PromisesARiskOrSaysWhatItTakes) {
 TEST_F(CalibrateVerb, PromisesARiskForFurtherScenes) {
   write_scans(folder_, kScans, false);
   const std::string path = folder_ / "calibration.json";
-  const auto of_scenes = [&](int count, const json& pairs) {
+  ASSERT_EQ(run(calibrate(path)).status, 0);
+  const json here = json_of(path);
+  EXPECT_EQ(here["clouds"].size(), static_cast<std::size_t>(kScans));
+  // Pairs of another building of one cloud, as its number.
+  const auto scene = [&](int number) {
     json other = good();
-    other["decided_pairs"] = pairs;
-    const std::string scene = folder_.write("other.json", other.dump());
+    other["decided_pairs"] = {{"confidence", {0.9, 0.4, 0.3}}, {"correct", {true, false, false}}};
+    other["options"] = here["options"];
+    other["clouds"] = {number};
+    return other;
+  };
+  const auto of_scenes = [&](const std::vector<json>& scenes) {
     std::vector<std::string> words = joined(calibrate(path), {"--max-risk", "0.9"});
-    for (int k = 0; k < count; ++k) words = joined(words, {"--scenes", scene});
+    for (std::size_t k = 0; k < scenes.size(); ++k)
+      words = joined(words, {"--scenes", folder_.write("other_" + std::to_string(k) + ".json",
+                                                       scenes[k].dump())});
     return run(words);
   };
-  const json pairs = {{"confidence", {0.9, 0.4, 0.3}}, {"correct", {true, false, false}}};
-  const Outcome kept = of_scenes(18, pairs);
+  std::vector<json> scenes;
+  for (int k = 0; k < 18; ++k) scenes.push_back(scene(k));
+  const Outcome kept = of_scenes(scenes);
   ASSERT_EQ(kept.status, 0) << kept.err;
   const json document = json_of(path), risk = document["risk"];
   EXPECT_EQ(risk["scenes"], 19);
   EXPECT_EQ(risk["samples"], 18 * 3 + document["decided_pairs"]["correct"].size());
   EXPECT_EQ(document["decided_pairs"]["correct"].size(),
             document["samples"]["loop_consistency"]["samples"]);
-  const Outcome few = of_scenes(3, pairs);
+  const Outcome few = of_scenes({scene(1), scene(2), scene(3)});
   EXPECT_EQ(few.status, 1);
   expect_holds(few.err, {"cannot be promised", "of 4 scenes", "15 more scenes are needed"});
   EXPECT_EQ(json_of(path)["risk"]["more_scenes"], 15);
+  expect_refused(joined(calibrate(path), {"--scenes", path}), {"--scenes needs --max-risk"});
+
+  const auto refused = [&](const std::vector<json>& files,
+                           std::initializer_list<std::string> words) {
+    const Outcome outcome = of_scenes(files);
+    EXPECT_EQ(outcome.status, 2);
+    expect_holds(outcome.err, words);
+  };
+  const auto with = [&](const char* field, const json& value) {
+    json other = scene(1);
+    other[field] = value;
+    return other;
+  };
   for (const json& bad : {json(), json({{"confidence", {0.9}}}),
                           json({{"confidence", {0.9}}, {"correct", {true, true}}}),
-                          json({{"confidence", {"a"}}, {"correct", {true}}})}) {
-    const Outcome outcome = of_scenes(1, bad);
-    EXPECT_EQ(outcome.status, 2);
-    expect_holds(outcome.err, {"other.json", "decided_pairs"});
-  }
-  expect_refused(joined(calibrate(path), {"--scenes", path}), {"--scenes needs --max-risk"});
+                          json({{"confidence", {"a"}}, {"correct", {true}}})})
+    refused({with("decided_pairs", bad)}, {"other_0.json", "decided_pairs"});
+  for (const json& bad : {json(), json({1.5}), json(json::array())})
+    refused({with("clouds", bad)}, {"other_0.json", "clouds"});
+  refused({with("options", json())}, {"other_0.json", "options"});
+  // One scene counts once: a file twice, a part of a scene, this folder.
+  refused({scene(1), scene(2), scene(1)}, {"other_0.json", "other_2.json", "1 cloud in common"});
+  refused({with("clouds", {1, 2, 3}), with("clouds", {7, 3, 2})}, {"2 clouds in common"});
+  json self = scene(1);
+  self["clouds"] = here["clouds"];
+  self["clouds"].erase(0);
+  refused({self}, {folder_.path(), "other_0.json", "9 clouds in common"});
+  json other = scene(1);
+  other["options"]["prepare"]["voxel_size"] = 0.2;
+  refused({other}, {"other_0.json", "another prepare.voxel_size"});
+  other = scene(1);
+  other["options"]["evidence"].erase("sample");
+  refused({other}, {"another evidence.sample"});
 }
 
 TEST_F(CalibrateVerb, TooFewScansSaySo) {
@@ -241,6 +278,11 @@ TEST_F(CalibrateVerb, AnotherVoxelSizeIsSaid) {
   EXPECT_EQ(run(registered(file_with("voxel_size", 0.12))).err.find("note"), std::string::npos);
   expect_holds(run(registered(file_with("voxel_size", 0.3))).err,
                {"bad.json", "voxel size of 0.3", "this run has 0.1"});
+  json promised = good();
+  promised["voxel_size"] = 0.3;
+  promised["risk"] = {{"min_confidence", 0.4}};
+  expect_holds(run(registered(folder_.write("promised.json", promised.dump()))).err,
+               {"the promised risk does not hold"});
 }
 
 TEST_F(CalibrateVerb, BadFilesAreNamed) {

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "gpureg/error.hpp"
+#include "inputs/scene_file.hpp"
 #include "json/fields_json.hpp"
 #include "json/json.hpp"
 #include "json/json_file.hpp"
@@ -25,7 +26,7 @@ Json to_json(const PromisedRisk& risk) {
                {"max_failure", risk.control.max_failure},
                {"supported", found.supported},
                {"samples", found.samples}};
-  if (found.scenes > 0) json["scenes"] = found.scenes;
+  json[found.scenes > 0 ? "scenes" : "scans"] = found.scenes > 0 ? found.scenes : found.scans;
   if (found.supported)
     json.update({{"min_confidence", found.min_confidence},
                  {"reported", found.reported},
@@ -34,7 +35,7 @@ Json to_json(const PromisedRisk& risk) {
   else if (found.scenes > 0)
     json["more_scenes"] = found.more_scenes ? Json(*found.more_scenes) : Json();
   else
-    json["more_samples"] = found.more_samples ? Json(*found.more_samples) : Json();
+    json["more_scans"] = found.more_scans ? Json(*found.more_scans) : Json();
   return json;
 }
 
@@ -53,7 +54,9 @@ double number(const std::string& path, const Json& document, const char* field,
   return found->get<double>();
 }
 
-Json document_of(const std::string& path) {
+}  // namespace
+
+Json read_calibration_document(const std::string& path) {
   Json document = DocumentFile(path).read();
   const auto kind = document.is_object() ? document.find("gpureg") : document.end();
   if (!document.is_object() || kind == document.end() || *kind != kKind)
@@ -62,10 +65,9 @@ Json document_of(const std::string& path) {
   return document;
 }
 
-}  // namespace
-
 Json calibration_document(const CalibrationResult& result, const RegistrationOptions& options,
-                          unsigned quality, const std::optional<PromisedRisk>& risk) {
+                          unsigned quality, const std::vector<std::uint64_t>& clouds,
+                          const std::optional<PromisedRisk>& risk) {
   Json json;
   json["gpureg"] = kKind;
   json["version"] = GPUREG_VERSION;
@@ -79,6 +81,8 @@ Json calibration_document(const CalibrationResult& result, const RegistrationOpt
   json["voxel_size"] = to_json(options)["prepare"]["voxel_size"];
   json["preset"] = "default";  // the only one with a confidence
   json["quality"] = quality;
+  json["options"] = scene_options(options);
+  json["clouds"] = clouds;
   Json confidences = Json::array(), correct = Json::array();
   for (const CalibrationSample& sample : result.of_two_scans()) {
     confidences.push_back(sample.confidence);
@@ -89,29 +93,8 @@ Json calibration_document(const CalibrationResult& result, const RegistrationOpt
   return json;
 }
 
-std::vector<CalibrationSample> read_decided_pairs(const std::string& path) {
-  const Json document = document_of(path);
-  const auto list = [&](const char* field) {
-    const auto pairs = document.find("decided_pairs");
-    if (pairs == document.end() || !pairs->is_object()) return Json::array();
-    return pairs->value(field, Json::array());
-  };
-  const Json confidences = list("confidence"), correct = list("correct");
-  const auto all = [](const Json& values, bool (Json::*is)() const noexcept) {
-    return values.is_array() &&
-           std::all_of(values.begin(), values.end(), [&](const Json& v) { return (v.*is)(); });
-  };
-  if (!all(confidences, &Json::is_number) || !all(correct, &Json::is_boolean) ||
-      confidences.empty() || confidences.size() != correct.size())
-    throw IoError(path + ": \"decided_pairs\" has no confidences and labels of pairs");
-  std::vector<CalibrationSample> out;
-  for (std::size_t k = 0; k < confidences.size(); ++k)
-    out.push_back({confidences[k].get<double>(), correct[k].get<bool>()});
-  return out;
-}
-
 CalibrationFile read_calibration(const std::string& path) {
-  const Json document = document_of(path);
+  const Json document = read_calibration_document(path);
   CalibrationFile out;
   out.calibration.slope = number(path, document, "slope", "a number > 0", true);
   out.calibration.offset = number(path, document, "offset", "a number", false);

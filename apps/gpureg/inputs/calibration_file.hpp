@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <cstdint>
 #include <optional>
 #include <string>
 #include <vector>
@@ -17,19 +18,20 @@ struct CalibrationFile {
   std::optional<double> min_confidence;  ///< that keeps a promised risk, of `--max-risk`
 };
 
-/// Pairs of different scans of a calibration file, for control_risk_of_scenes().
-/// @throws IoError as read_calibration().
-std::vector<CalibrationSample> read_decided_pairs(const std::string& path);
-
 /// A promise that was asked for, and the answer.
 struct PromisedRisk {
   RiskControl control;
   RiskThreshold threshold;
 };
 
-/// Document of a calibration; risk: none was asked for.
+/// Document of a calibration; clouds: cloud_fingerprint() of each; risk: none was asked for.
 Json calibration_document(const CalibrationResult& result, const RegistrationOptions& options,
-                          unsigned quality, const std::optional<PromisedRisk>& risk);
+                          unsigned quality, const std::vector<std::uint64_t>& clouds,
+                          const std::optional<PromisedRisk>& risk);
+
+/// The document of a calibration file.
+/// @throws IoError as read_calibration().
+Json read_calibration_document(const std::string& path);
 
 /// @throws IoError naming file and field: no such file, no JSON, another kind of document or a
 /// newer version, a field that is missing or out of range.

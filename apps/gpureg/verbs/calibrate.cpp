@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include <cstdint>
 #include <iostream>
 #include <memory>
 #include <optional>
@@ -12,6 +13,7 @@
 #include "inputs/cloud_file.hpp"
 #include "inputs/odometry_file.hpp"
 #include "inputs/scene.hpp"
+#include "inputs/scene_file.hpp"
 #include "json/json.hpp"
 #include "json/json_file.hpp"
 #include "options/method_options.hpp"
@@ -67,20 +69,39 @@ void print_count(const char* name, const CalibrationCount& count) {
             << " of them decided, " << grouped(count.correct) << " correct\n";
 }
 
-/// scenes: the decided pairs of --scenes.
+std::vector<SceneFile> read_scenes(const std::vector<std::string>& paths) {
+  std::vector<SceneFile> out;
+  for (const std::string& path : paths) {
+    SceneFile scene = read_scene(path);
+    for (const SceneFile& other : out) check_different(other, scene);
+    out.push_back(std::move(scene));
+  }
+  return out;
+}
+
+std::vector<std::uint64_t> fingerprints(const std::vector<PointCloudView>& clouds) {
+  std::vector<std::uint64_t> out;
+  for (const PointCloudView& cloud : clouds)
+    if (cloud.size > 0) out.push_back(cloud_fingerprint(cloud));
+  return out;
+}
+
+/// scenes: those of --scenes.
 std::optional<PromisedRisk> promise(const CalibrateOptions& o, const CalibrationResult& result,
-                                    std::vector<std::vector<CalibrationSample>> scenes) {
+                                    const std::vector<SceneFile>& scenes) {
   if (!o.max_risk) return std::nullopt;
   PromisedRisk out;
   out.control.max_risk = *o.max_risk;
   if (scenes.empty()) {
-    out.threshold = control_risk(result.of_two_scans(), out.control, result.calibration);
+    out.threshold = control_risk_of_scans(result.of_two_scans(), result.scan_groups, out.control,
+                                          result.calibration);
     return out;
   }
   if (result.of_two_scans().empty())
     throw InvalidArgument(o.folder + " has no decided pair of different scans");
-  scenes.push_back(result.of_two_scans());
-  out.threshold = control_risk_of_scenes(scenes, out.control, result.calibration);
+  std::vector<std::vector<CalibrationSample>> pairs{result.of_two_scans()};
+  for (const SceneFile& scene : scenes) pairs.push_back(scene.pairs);
+  out.threshold = control_risk_of_scenes(pairs, out.control, result.calibration);
   return out;
 }
 
@@ -96,15 +117,16 @@ void print_risk(const CalibrateOptions& o, const PromisedRisk& risk) {
               << " % of the correct poses are reported\n";
   if (found.supported) return;
   std::cerr << "gpureg: a risk of " << percent << " cannot be promised by "
-            << grouped(found.samples) << " decided pairs of different scans"
-            << (found.scenes > 0 ? " of " + grouped(found.scenes) + " scenes: " : ": ");
+            << grouped(found.samples) << " decided pairs of "
+            << (found.scenes > 0 ? grouped(found.scenes) + " scenes: "
+                                 : grouped(found.scans) + " scans: ");
   if (found.more_scenes)
     std::cerr << grouped(*found.more_scenes) << " more scenes are needed at least";
-  else if (found.more_samples)
-    std::cerr << "about " << grouped(*found.more_samples)
-              << " more would do, if no larger share of them is false";
+  else if (found.more_scans)
+    std::cerr << "about " << grouped(*found.more_scans)
+              << " more scans would do, if no larger share of their pairs is false";
   else
-    std::cerr << "more would not help, too many of the most confident poses are false";
+    std::cerr << "more would not help, too few poses are confident or too many of these are false";
   std::cerr << std::endl;
 }
 
@@ -118,16 +140,16 @@ int run(CalibrateOptions o) {
     throw InvalidArgument("--preset loopsmart has no confidence to calibrate");
   std::vector<NamedPath> inputs = scene_files("DIR", o.folder);
   if (!o.trajectory.empty()) inputs.push_back({"--trajectory", o.trajectory});
-  std::vector<std::vector<CalibrationSample>> scenes;
-  for (const std::string& scene : o.scenes) {
-    inputs.push_back({"--scenes", scene});
-    scenes.push_back(read_decided_pairs(scene));
-  }
+  for (const std::string& scene : o.scenes) inputs.push_back({"--scenes", scene});
+  const std::vector<SceneFile> scenes = read_scenes(o.scenes);
   check_outputs({{"-o", o.output}}, inputs);
   choose_voxel_size(o.method, o.folder);
   const RegistrationOptions options = o.method.registration();
+  for (const SceneFile& scene : scenes) check_options(scene, scene_options(options));
   const InterruptGuard guard;
   const Clouds clouds = read_clouds(o);
+  const SceneFile here{o.folder, {}, fingerprints(clouds.views()), {}};
+  for (const SceneFile& scene : scenes) check_different(here, scene);
   std::vector<UnalignedIsometry3d> poses;
   if (!o.trajectory.empty()) poses = read_scan_poses(o.trajectory, clouds.numbers, o.folder);
   const Context context = o.method.context();
@@ -146,8 +168,9 @@ int run(CalibrateOptions o) {
     std::cerr << "gpureg: interrupted, nothing written" << std::endl;
     return kInterrupted;
   }
-  const std::optional<PromisedRisk> risk = promise(o, result, std::move(scenes));
-  write_document(o.output, calibration_document(result, options, o.method.quality, risk));
+  const std::optional<PromisedRisk> risk = promise(o, result, scenes);
+  write_document(o.output,
+                 calibration_document(result, options, o.method.quality, here.clouds, risk));
   if (!result.enough_samples)
     std::cerr << "gpureg: note: too few samples: " << kMinDecidedPairs
               << " decided pairs of different scans are needed, and " << kMinCalibrationSamples
