@@ -4,6 +4,7 @@
 #include <pybind11/stl.h>
 
 #include <algorithm>
+#include <array>
 #include <exception>
 #include <optional>
 
@@ -95,12 +96,22 @@ void bind_calibration(py::module_& m) {
         out["error_before"] = result.error_before;
         out["error_after"] = result.error_after;
         out["counts"] = counts;
-        py::list confidences, correct;
+        py::list confidences, correct, scans;
         for (const CalibrationSample& sample : result.of_two_scans()) {
           confidences.append(sample.confidence);
           correct.append(sample.correct);
+          scans.append(py::make_tuple(sample.source, sample.target));
         }
         out["samples"] = py::make_tuple(confidences, correct);
+        out["scans"] = scans;
+        out["scan_groups"] = result.scan_groups;
+        py::list fingerprints;
+        for (const py::handle cloud : clouds) {
+          const Input input(cloud.cast<py::tuple>());
+          if (input.view.size > 0 && !input.on_device)
+            fingerprints.append(cloud_fingerprint(input.view));
+        }
+        out["clouds"] = fingerprints;
         return out;
       },
       py::arg("context"), py::arg("clouds"), py::arg("options"), py::arg("self_pairs"),
@@ -119,6 +130,8 @@ void bind_calibration(py::module_& m) {
   m.def(
       "control_risk",
       [](const std::vector<double>& confidences, const std::vector<bool>& correct,
+         const std::optional<std::vector<std::array<std::uint32_t, 2>>>& scans,
+         const std::vector<std::uint32_t>& scan_groups,
          const std::optional<std::vector<std::size_t>>& scenes, double max_risk, double max_failure,
          const ConfidenceCalibration& calibration) {
         // Without scenes, all are of the first.
@@ -127,26 +140,33 @@ void bind_calibration(py::module_& m) {
           const std::size_t scene = scenes ? scenes->at(k) : 0;
           samples.resize(std::max(samples.size(), scene + 1));
           samples[scene].push_back({confidences[k], correct.at(k)});
+          if (!scans) continue;
+          samples[scene].back().source = scans->at(k)[0];
+          samples[scene].back().target = scans->at(k)[1];
         }
         RiskControl control;
         control.max_risk = max_risk;
         control.max_failure = max_failure;
-        const RiskThreshold found = scenes ? control_risk_of_scenes(samples, control, calibration)
-                                           : control_risk(samples[0], control, calibration);
+        const RiskThreshold found =
+            scenes  ? control_risk_of_scenes(samples, control, calibration)
+            : scans ? control_risk_of_scans(samples[0], scan_groups, control, calibration)
+                    : control_risk(samples[0], control, calibration);
         py::dict out;
         out["supported"] = found.supported;
         out["min_confidence"] = found.min_confidence;
+        out["scans"] = found.scans;
         out["scenes"] = found.scenes;
         out["samples"] = found.samples;
         out["reported"] = found.reported;
         out["wrong"] = found.wrong;
         out["recall"] = found.recall;
         out["more_samples"] = found.more_samples;
+        out["more_scans"] = found.more_scans;
         out["more_scenes"] = found.more_scenes;
         return out;
       },
-      py::arg("confidences"), py::arg("correct"), py::arg("scenes"), py::arg("max_risk"),
-      py::arg("max_failure"), py::arg("calibration"));
+      py::arg("confidences"), py::arg("correct"), py::arg("scans"), py::arg("scan_groups"),
+      py::arg("scenes"), py::arg("max_risk"), py::arg("max_failure"), py::arg("calibration"));
 }
 
 }  // namespace gpureg::python

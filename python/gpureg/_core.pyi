@@ -746,6 +746,8 @@ def fit_calibration(
 def control_risk(
     confidences: Sequence[float],
     correct: Sequence[bool],
+    scans: Sequence[Sequence[int]] | None,
+    scan_groups: Sequence[int],
     scenes: Sequence[int] | None,
     max_risk: float,
     max_failure: float,

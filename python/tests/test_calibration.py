@@ -191,6 +191,14 @@ def test_a_promised_risk(clouds, tmp_path):
     run.save(tmp_path / "c.json")
     document = json.loads((tmp_path / "c.json").read_text())
     risk, pairs = document["risk"], document["decided_pairs"]
+    assert risk["scans"] == 8 and risk["more_scans"] > 900 and "more_samples" not in risk
+    assert len(document["clouds"]) == 8
+    assert document["options"]["prepare"]["voxel_size"] == pytest.approx(0.1)
+    assert "seed" not in document["options"]
+    again = gpureg.control_risk(
+        *run.samples, scans=run.scans, scan_groups=run.scan_groups, max_risk=0.001
+    )
+    assert again == run.risk
     assert len(pairs["confidence"]) == len(pairs["correct"]) == risk["samples"] > 0
     assert "scenes" not in risk and "more_scenes" not in risk
     assert risk["max_risk"] == 0.001 and "min_confidence" not in risk
@@ -204,6 +212,49 @@ def test_a_promised_risk(clouds, tmp_path):
         0,
     )
     assert found.recall == 1 and found.more_samples is None
+
+
+def test_pairs_share_scans():
+    pairs = np.array([(i, j) for i in range(24) for j in range(i)])
+    confidences, correct = np.full(len(pairs), 0.95), np.full(len(pairs), True)
+    assert gpureg.control_risk(confidences, correct, max_risk=0.05).supported
+    few = gpureg.control_risk(confidences, correct, scans=pairs, max_risk=0.05)
+    assert (few.supported, few.scans, few.more_scans) == (False, 24, 168)
+    assert few == gpureg.control_risk(confidences, correct, scans=1000 * pairs, max_risk=0.05)
+    groups = [k // 12 for k in range(96)]  # as many scans as it takes
+    pairs = [(i, j) for i in range(96) for j in range(i) if groups[i] == groups[j]]
+    found = gpureg.control_risk(
+        [0.95] * len(pairs), [True] * len(pairs), scans=pairs, scan_groups=groups, max_risk=0.1
+    )
+    assert found.supported and found.scans == 96
+
+
+@pytest.mark.parametrize(
+    ("arguments", "error", "message"),
+    [
+        ({"scans": [[0, 1]]}, ValueError, r"scans: expected shape \(2, 2\), got \(1, 2\)"),
+        ({"scans": [[0, 1], [1, 0]]}, ValueError, r"samples\[1\].target is 0, expected a pair"),
+        ({"scans": [[0, 1], [2, 2]]}, ValueError, r"samples\[1\].target is 2"),
+        ({"scans": [[0, 1], [2, -1]]}, TypeError, "scans: expected whole numbers"),
+        ({"scans": [[0.5, 1], [2, 1]]}, TypeError, "scans: expected whole numbers"),
+        ({"scan_groups": [0, 0]}, ValueError, "scan_groups: needs scans"),
+        ({"scans": [[0, 1], [2, 3]], "scan_groups": [0, 0, 1]}, ValueError, "target is 3"),
+        ({"scans": [[0, 1], [2, 3]], "scenes": [0, 1]}, ValueError, "scenes: not with scans"),
+    ],
+)
+def test_bad_scans_are_named(arguments, error, message):
+    with pytest.raises(error, match=message):
+        gpureg.control_risk([0.9, 0.9], [True, True], **arguments)
+
+
+def test_places_have_a_threshold_of_their_own():
+    options = gpureg.LocateOptions.from_voxel_size(0.1)
+    options.registration.calibration = CALIBRATION
+    room = gpureg.prepare_map(
+        scenes.room(points=20000), options=gpureg.MapOptions.from_voxel_size(0.1)
+    )
+    with pytest.raises(ValueError, match="registration.calibration is given"):
+        gpureg.locate(scenes.room(points=2000), room, options=options)
 
 
 def test_a_promised_risk_of_scenes():
