@@ -17,11 +17,18 @@ namespace gpureg::io {
 /// extension. Coordinates of any numeric type become float; where that is too coarse, as for those
 /// of maps, the cloud gets an origin first. Normals are read where the file has them. Points with a
 /// NaN or infinite coordinate stay; prepare() drops them. A file that is neither and ends in .bin
-/// is a scan of KITTI: rows of float32 x y z reflectance. The VIEWPOINT of a PCD becomes the
-/// viewpoint unless it is the origin. Memory is bounded by the size of the file.
+/// is a scan of KITTI (rows of float32 x y z reflectance) or of nuScenes (x y z intensity ring), or
+/// has rows of three or six numbers: the columns of 64 rows or more tell, and where they do not,
+/// the file is refused. The VIEWPOINT of a PCD becomes the viewpoint unless it is the origin.
+/// Memory is bounded by the size of the file.
 /// @throws IoError naming file (and line, in text) and reason: missing, empty, truncated, a false
 ///   count in the header, no x y z.
 PointCloud read_point_cloud(const std::string& path);
+
+/// What the coordinates of a file have lost to float32: beyond 1e5, and with less than 2^17 steps
+/// across the cloud. Coordinates of finer types have an origin then, and lose nothing.
+/// @return a sentence for a note, with a remedy; empty where they are fine enough.
+std::string coarse_coordinates(const PointCloud& cloud);
 
 /// Writes a binary PLY with x y z (and normals where the cloud has them), all or nothing. x y z are
 /// float32, or double where the cloud has an origin.
