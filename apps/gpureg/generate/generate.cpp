@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "generate/generate.hpp"
 
+#include <algorithm>
 #include <filesystem>
 #include <iostream>
 #include <memory>
@@ -30,6 +31,20 @@ std::string mark_of(const std::string& folder) {
   return (std::filesystem::path(folder) / kMark).string();
 }
 
+// The files of the scene may have the name of the mesh.
+void check_building(const GenerateOptions& o) {
+  namespace fs = std::filesystem;
+  std::error_code error;
+  const fs::path building = fs::weakly_canonical(o.scene.building, error),
+                 folder = fs::weakly_canonical(o.folder, error);
+  if (!fs::is_regular_file(building, error)) return;
+  const auto [in_folder, in_building] =
+      std::mismatch(folder.begin(), folder.end(), building.begin(), building.end());
+  if (in_folder == folder.end())
+    throw InvalidArgument("--building and OUT must be different places, but " + o.scene.building +
+                          " is in " + o.folder);
+}
+
 // Scans of another origin may have the same names.
 void check_folder(const std::string& folder) {
   namespace fs = std::filesystem;
@@ -41,6 +56,7 @@ void check_folder(const std::string& folder) {
 }
 
 int run(const GenerateOptions& o) {
+  check_building(o);
   check_folder(o.folder);
   const InterruptGuard guard;
   std::string stage;

@@ -27,13 +27,29 @@ struct PosedScans {
   std::optional<std::set<int>> numbers;  ///< those of the largest island; none: all
 };
 
+/// The folder of the scans that a reconstruction names.
+std::string scans_of(const Json& json, const std::string& file) {
+  std::string named;
+  try {
+    named = text_member(json, "folder");
+  } catch (const std::exception& error) {
+    throw IoError(file + ": " + error.what());
+  }
+  if (fs::is_directory(named)) return named;
+  // It was named from where `reconstruct` ran.
+  const fs::path output = fs::absolute(file).parent_path();
+  const fs::path beside = output.parent_path() / fs::path(named).filename();
+  if (!fs::is_directory(beside))
+    throw IoError(file + " names the scans of " + named + ", which is not there");
+  return beside.string();
+}
+
 PosedScans of_reconstruction(const std::string& path, const std::string& file) {
   PosedScans out;
-  DocumentFile document(file);
-  const Json json = document.read();
+  const Json json = DocumentFile(file).read();
+  out.folder = scans_of(json, file);
   std::size_t count = 0;
   try {
-    out.folder = text_member(json, "folder");
     out.numbers.emplace();
     const Json& islands = member(json, "islands");
     if (islands.empty()) throw InvalidArgument("no scan was placed");
@@ -41,14 +57,6 @@ PosedScans of_reconstruction(const std::string& path, const std::string& file) {
     count = islands.size();
   } catch (const std::exception& error) {
     throw IoError(file + ": " + error.what());
-  }
-  // The folder was named from where `reconstruct` ran.
-  if (!fs::is_directory(out.folder)) {
-    const std::string beside =
-        (fs::path(path).parent_path() / fs::path(out.folder).filename()).string();
-    if (!fs::is_directory(beside))
-      throw IoError(file + " names the scans of " + out.folder + ", which is not there");
-    out.folder = beside;
   }
   if (count > 1)
     std::cerr << "gpureg: note: " << path << " has " << count
@@ -90,6 +98,10 @@ PreparedMap map_of_scans(const Context& context, const std::string& path,
 }
 
 }  // namespace
+
+std::string scans_of_reconstruction(const std::string& file) {
+  return scans_of(DocumentFile(file).read(), file);
+}
 
 MapInput::MapInput(std::string of) : path(std::move(of)) {
   if (fs::is_directory(path)) {

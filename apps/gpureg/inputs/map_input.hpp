@@ -25,6 +25,11 @@ struct MapInput {
                                     const localization::MapOptions& options) const;
 };
 
+/// The folder of the scans of a reconstruction.json, which names it from where `reconstruct` ran,
+/// or the folder of that name beside the output of `reconstruct`.
+/// @throws IoError naming the file: damaged, or neither folder is there.
+std::string scans_of_reconstruction(const std::string& file);
+
 /// A scan as the command line names it: a cloud or mesh, or a folder of scans with their poses by
 /// odometry, which become one.
 /// @throws IoError, InvalidArgument naming the file.

@@ -3,12 +3,14 @@
 
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <filesystem>
+#include <iterator>
 #include <system_error>
 
 #include "gpureg/error.hpp"
-#include "gpureg/io.hpp"
+#include "inputs/map_input.hpp"
 
 namespace gpureg::cli {
 namespace {
@@ -35,6 +37,52 @@ void refuse_same(const NamedPath& output, const NamedPath& other) {
                         a + (a == b ? " twice" : " and " + b));
 }
 
+void check_input(const NamedPath& input) {
+  if (input.path.empty() || ::access(input.path.c_str(), R_OK) == 0) return;
+  throw IoError(input.name + ": cannot read " + input.path + ": " +
+                std::generic_category().message(errno));
+}
+
+constexpr const char* kReconstruction = "reconstruction.json";
+constexpr const char* kTruth[] = {"cameras.txt", "gt.log", "gt.info", "gt_all.log", "gt_all.info"};
+constexpr const char* kMap[] = {"poses.txt",  "trajectory.txt", "edges.log",
+                                "graph.g2o",  "map.ply",        "map.html",
+                                "pairs.json", "pairs.journal",  kReconstruction};
+
+/// Whether a file of a map or a cloud of a scene has this name.
+bool belongs(const std::string& name) {
+  return std::find(std::begin(kMap), std::end(kMap), name) != std::end(kMap) ||
+         name.rfind("cloud_bin_", 0) == 0 || name.rfind("map_", 0) == 0;
+}
+
+void add_folder(const std::string& name, const fs::path& folder, std::vector<NamedPath>& files) {
+  // Nor may these come to be: the next run would read them.
+  for (const char* file : kTruth) files.push_back({name, (folder / file).string()});
+  std::error_code error;
+  for (fs::directory_iterator entry(folder, error), end; !error && entry != end;
+       entry.increment(error))
+    if (belongs(entry->path().filename().string())) files.push_back({name, entry->path().string()});
+}
+
+/// The files that an input stands for.
+std::vector<NamedPath> files_of(const NamedPath& input) {
+  std::vector<NamedPath> files = {input};
+  std::error_code error;
+  const fs::path path(input.path);
+  const bool is_folder = fs::is_directory(path, error);
+  if (is_folder) add_folder(input.name, path, files);
+  const fs::path reconstruction = is_folder ? path / kReconstruction : path;
+  if (reconstruction.filename() != kReconstruction || !fs::exists(reconstruction, error))
+    return files;
+  if (!is_folder)
+    add_folder(input.name, path.parent_path().empty() ? "." : path.parent_path(), files);
+  try {
+    add_folder(input.name, scans_of_reconstruction(reconstruction.string()), files);
+  } catch (const Error&) {  // whoever reads it says what is wrong with it
+  }
+  return files;
+}
+
 }  // namespace
 
 void check_output(const std::string& path) {
@@ -51,26 +99,14 @@ void check_output(const std::string& path) {
     throw IoError("cannot write " + path + ": " + std::generic_category().message(errno));
 }
 
-std::vector<NamedPath> truth_files(const std::string& name, const std::string& folder) {
-  std::vector<NamedPath> files;
-  for (const char* file : {"gt.log", "gt.info", "gt_all.log", "gt_all.info"})
-    if (!folder.empty()) files.push_back({name, (fs::path(folder) / file).string()});
-  return files;
-}
-
-std::vector<NamedPath> scene_files(const std::string& name, const std::string& folder) {
-  if (folder.empty()) return {};
-  std::vector<NamedPath> files = {{name, (fs::path(folder) / "cameras.txt").string()}};
-  for (const auto& [number, file] : io::list_fragments(folder)) files.push_back({name, file});
-  return files;
-}
-
 void check_outputs(const std::vector<NamedPath>& outputs, const std::vector<NamedPath>& inputs) {
+  for (const NamedPath& input : inputs) check_input(input);
   for (const NamedPath& output : outputs) check_output(output.path);
-  for (std::size_t k = 0; k < outputs.size(); ++k) {
-    for (const NamedPath& input : inputs) refuse_same(outputs[k], input);
+  for (std::size_t k = 0; k < outputs.size(); ++k)
     for (std::size_t other = 0; other < k; ++other) refuse_same(outputs[k], outputs[other]);
-  }
+  for (const NamedPath& input : inputs)
+    for (const NamedPath& file : files_of(input))
+      for (const NamedPath& output : outputs) refuse_same(output, file);
 }
 
 }  // namespace gpureg::cli

@@ -16,13 +16,13 @@ struct NamedPath {
   std::string path;
 };
 
-/// The files of a folder that `name` stands for, as far as they are there: those that the verbs
-/// read.
-std::vector<NamedPath> truth_files(const std::string& name, const std::string& folder);
-std::vector<NamedPath> scene_files(const std::string& name, const std::string& folder);
-
-/// check_output() for each, and throws InvalidArgument where an output is the same file as another
-/// or as one of the inputs, however it is spelt. Empty paths are fine, and devices and pipes.
+/// What a verb does with its paths before it works: each input must be there and readable, each
+/// output must be writable (check_output), and no output may be the same file as another one or as
+/// an input, however it is spelt. Empty paths are fine, and devices and pipes.
+/// @param inputs files and folders. Of a folder count the files that belong to a scene, its truth
+/// or
+///   a map; of the output of `reconstruct` also those of its scans.
+/// @throws IoError, InvalidArgument naming option and path.
 void check_outputs(const std::vector<NamedPath>& outputs, const std::vector<NamedPath>& inputs);
 
 }  // namespace gpureg::cli

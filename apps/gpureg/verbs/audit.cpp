@@ -84,11 +84,8 @@ int mend(const AuditVerbOptions& o, const Context& context, const AuditRun& run)
 }
 
 int run_audit(const AuditVerbOptions& o) {
-  check_outputs({{"--json", o.json}, {"--page", o.page}, {"--mend", o.mended}}, [&] {
-    std::vector<NamedPath> inputs = scene_files("SCANS", o.folder);
-    inputs.push_back({"POSES", o.poses});
-    return inputs;
-  }());
+  check_outputs({{"--json", o.json}, {"--page", o.page}, {"--mend", o.mended}},
+                {{"SCANS", o.folder}, {"POSES", o.poses}});
   const InterruptGuard guard;
   const Context context = o.method.context();
   AuditRun run;

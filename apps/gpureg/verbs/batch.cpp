@@ -51,12 +51,11 @@ bool can_have_journal(const std::string& path) {
 }
 
 void check_batch_outputs(const BatchOptions& o) {
-  std::vector<NamedPath> inputs = scene_files("DIR", o.folder);
-  if (o.pairs != "all") inputs.push_back({"--pairs", o.pairs});
-  if (!o.method.calibration.empty()) inputs.push_back({"--calibration", o.method.calibration});
   std::vector<NamedPath> outputs = {{"-o", o.log}, {"--info", o.info}, {"--json", o.json}};
   if (can_have_journal(o.log)) outputs.push_back({"the journal of -o", o.journal()});
-  check_outputs(outputs, inputs);
+  check_outputs(outputs, {{"DIR", o.folder},
+                          {"--pairs", o.pairs == "all" ? "" : o.pairs},
+                          {"--calibration", o.method.calibration}});
 }
 
 /// One run, from the folder to the files.

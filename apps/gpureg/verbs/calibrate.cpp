@@ -138,11 +138,10 @@ int run(CalibrateOptions o) {
   o.method.registration();  // what is wrong with it shall be said before clouds are read
   if (o.method.preset == "loopsmart")
     throw InvalidArgument("--preset loopsmart has no confidence to calibrate");
-  std::vector<NamedPath> inputs = scene_files("DIR", o.folder);
-  if (!o.trajectory.empty()) inputs.push_back({"--trajectory", o.trajectory});
+  std::vector<NamedPath> inputs = {{"DIR", o.folder}, {"--trajectory", o.trajectory}};
   for (const std::string& scene : o.scenes) inputs.push_back({"--scenes", scene});
-  const std::vector<SceneFile> scenes = read_scenes(o.scenes);
   check_outputs({{"-o", o.output}}, inputs);
+  const std::vector<SceneFile> scenes = read_scenes(o.scenes);
   choose_voxel_size(o.method, o.folder);
   const RegistrationOptions options = o.method.registration();
   for (const SceneFile& scene : scenes) check_options(scene, scene_options(options));

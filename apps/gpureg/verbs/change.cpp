@@ -90,7 +90,10 @@ int run(Options o) {
   o.place.check();
   if (!o.pose.empty()) read_pose(o.pose);
   check_outputs({{"--json", o.json}, {"--scan-ply", o.scan_ply}, {"--map-ply", o.map_ply}},
-                {{"SCAN", o.scan}, {"MAP", o.map}, {"--pose", o.pose}});
+                {{"SCAN", o.scan},
+                 {"MAP", o.map},
+                 {"--pose", o.pose},
+                 {"--calibration", o.method.calibration}});
   const Context context = o.method.context();
   const MapInput input(o.map);
   choose_voxel_size(o.method, input);

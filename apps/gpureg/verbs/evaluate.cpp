@@ -79,8 +79,7 @@ int run(const EvaluateOptions& o) {
     throw InvalidArgument("--registration-recall takes one result, not " +
                           std::to_string(o.results.size()));
   std::vector<NamedPath> inputs;
-  for (const std::string& folder : o.truths)
-    for (NamedPath& file : truth_files("--ground-truth", folder)) inputs.push_back(std::move(file));
+  for (const std::string& folder : o.truths) inputs.push_back({"--ground-truth", folder});
   for (const std::string& result : o.results) inputs.push_back({"RESULT", result});
   for (const std::string& log : o.recall_logs) inputs.push_back({"--registration-recall", log});
   check_outputs({{"--json", o.json}}, inputs);

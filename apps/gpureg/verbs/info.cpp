@@ -9,6 +9,7 @@
 #include "gpureg/context.hpp"
 #include "gpureg/voxel_size.hpp"
 #include "inputs/cloud_file.hpp"
+#include "options/output_path.hpp"
 #include "run/spacing.hpp"
 #include "text.hpp"
 
@@ -52,6 +53,9 @@ int run(const std::vector<std::string>& clouds) {
     std::cout << "gpureg " GPUREG_VERSION "\n";
     for (const std::string& line : describe_backends()) std::cout << line << "\n";
   }
+  std::vector<NamedPath> inputs;
+  for (const std::string& path : clouds) inputs.push_back({"CLOUD", path});
+  check_outputs({}, inputs);
   for (const std::string& path : clouds) print_cloud(path);
   return kOk;
 }

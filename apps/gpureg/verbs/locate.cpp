@@ -98,7 +98,7 @@ int run(LocateRun o) {
     throw InvalidArgument("one file is given, expected scans and then the map");
   o.method.registration();  // what is wrong with it shall be said before clouds are read
   o.place.check();
-  std::vector<NamedPath> inputs{{"MAP", o.map()}};
+  std::vector<NamedPath> inputs{{"MAP", o.map()}, {"--calibration", o.method.calibration}};
   for (const std::string& file : o.scans()) inputs.push_back({"SCAN", file});
   check_outputs({{"--json", o.json}, {"--save-map", o.save_map}}, inputs);
   const Context context = o.method.context();

@@ -56,14 +56,12 @@ struct ReconstructOptions {
 
 /// Makes the output folder, and refuses one whose files could be inputs.
 void check_output_folder(const ReconstructOptions& o) {
-  const std::vector<NamedPath> inputs = [&] {
-    std::vector<NamedPath> files = scene_files("DIR", o.folder);
-    files.push_back({"--results", o.results});
-    files.push_back({"--odometry", o.odometry});
-    if (o.pairs != "all") files.push_back({"--pairs", o.pairs});
-    if (!o.method.calibration.empty()) files.push_back({"--calibration", o.method.calibration});
-    return files;
-  }();
+  const std::vector<NamedPath> inputs = {{"DIR", o.folder},
+                                         {"--results", o.results},
+                                         {"--odometry", o.odometry},
+                                         {"--pairs", o.pairs == "all" ? "" : o.pairs},
+                                         {"--calibration", o.method.calibration}};
+  check_outputs({}, inputs);  // before a folder is made
   std::error_code error;
   if (fs::exists(o.output, error) && !fs::is_directory(o.output, error))
     throw IoError("cannot write " + o.output + ": it is no folder");
@@ -76,6 +74,9 @@ void check_output_folder(const ReconstructOptions& o) {
   for (const char* name : kOutputs)
     if (o.results.empty() || std::string(name) != "pairs.json")
       outputs.push_back({"a file of -o", o.file(name)});
+  for (const auto& entry : fs::directory_iterator(o.output, error))
+    if (entry.path().filename().string().rfind("map_", 0) == 0)  // of further islands
+      outputs.push_back({"a file of -o", entry.path().string()});
   check_outputs(outputs, inputs);
 }
 

@@ -201,10 +201,11 @@ int run(RegisterOptions o) {
   prior.gravity = up_prior(o.up);
   if (o.time_budget && !prior.empty())
     throw InvalidArgument("--up and --time-budget do not go together");
-  std::vector<NamedPath> inputs{{"SOURCE", o.source}, {"TARGET", o.target}};
-  if (!o.initial.empty()) inputs.push_back({"--initial", o.initial});
-  if (!o.method.calibration.empty()) inputs.push_back({"--calibration", o.method.calibration});
-  check_outputs({{"--json", o.json}, {"--overlay", o.overlay}, {"--image", o.image}}, inputs);
+  check_outputs({{"--json", o.json}, {"--overlay", o.overlay}, {"--image", o.image}},
+                {{"SOURCE", o.source},
+                 {"TARGET", o.target},
+                 {"--initial", o.initial},
+                 {"--calibration", o.method.calibration}});
   const Context context = o.method.context();
   auto [source_cloud, target_cloud] = read_clouds(o);
   o.source_viewpoint.apply(source_cloud);

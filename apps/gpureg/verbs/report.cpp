@@ -98,11 +98,9 @@ int run(const ReportOptions& o) {
     throw InvalidArgument("--name was given " + std::to_string(o.names.size()) + " times for " +
                           std::to_string(o.results.size()) + " results");
   std::vector<NamedPath> inputs;
-  for (const std::string& folder : o.truths)
-    for (NamedPath& file : truth_files("--ground-truth", folder)) inputs.push_back(std::move(file));
+  for (const std::string& folder : o.truths) inputs.push_back({"--ground-truth", folder});
   for (const std::string& folder : o.clouds)
-    if (folder != kNoPictures)
-      for (NamedPath& file : scene_files("--clouds", folder)) inputs.push_back(std::move(file));
+    if (folder != kNoPictures) inputs.push_back({"--clouds", folder});
   for (const std::string& result : o.results) inputs.push_back({"RESULT", result});
   check_outputs({{"-o", o.output}}, inputs);
   std::vector<ReportEntry> entries;
