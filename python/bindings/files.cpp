@@ -2,10 +2,7 @@
 #include <pybind11/stl.h>
 
 #include <array>
-#include <cmath>
 #include <cstdint>
-#include <cstdio>
-#include <limits>
 #include <utility>
 #include <vector>
 
@@ -30,27 +27,11 @@ std::vector<Eigen::Vector3f> vectors_of(const py::object& array, const char* nam
   return out;
 }
 
-/// Says where the float32 of a file are too coarse: beyond 1e5, and less than 2^17 steps across the
-/// cloud. Other types have an origin then.
+/// Warns where the float32 of a file are too coarse.
 void warn_of_large(const PointCloud& cloud, const std::string& path) {
-  if (!cloud.origin.isZero(0)) return;
-  constexpr float kLarge = 1e5f, kSteps = 1 << 17;
-  Eigen::Vector3f low = Eigen::Vector3f::Constant(std::numeric_limits<float>::max()), high = -low;
-  for (const Eigen::Vector3f& point : cloud.points) {
-    if (!point.allFinite()) continue;
-    low = low.cwiseMin(point);
-    high = high.cwiseMax(point);
-  }
-  const float largest = std::max(low.cwiseAbs().maxCoeff(), high.cwiseAbs().maxCoeff());
-  const float step = std::nextafter(largest, std::numeric_limits<float>::infinity()) - largest;
-  if (low.x() > high.x() || largest <= kLarge || step * kSteps <= (high - low).maxCoeff()) return;
-  char numbers[96];
-  std::snprintf(numbers, sizeof(numbers), "coordinates up to %.7g resolve %.2g in float32",
-                static_cast<double>(largest), static_cast<double>(step));
-  const std::string text = path + ": " + numbers +
-                           ", which the file holds; write it with double coordinates, or subtract "
-                           "an offset before it is written";
-  if (PyErr_WarnEx(PyExc_UserWarning, text.c_str(), 2) != 0) throw py::error_already_set();
+  const std::string what = io::coarse_coordinates(cloud);
+  if (!what.empty() && PyErr_WarnEx(PyExc_UserWarning, (path + ": " + what).c_str(), 2) != 0)
+    throw py::error_already_set();
 }
 
 }  // namespace

@@ -57,6 +57,44 @@ TEST_F(Register, NumbersOfAFarPoseStayApart) {
   }
 }
 
+const Eigen::Vector3d kOnMap(512345, 5403210, 310);
+
+TEST_F(Register, APoseOfMapCoordinatesReadsBack) {
+  std::vector<std::string> files;
+  for (int k = 0; k < 2; ++k) {
+    PointCloud cloud = room_scan(k);
+    cloud.origin = kOnMap;
+    files.push_back(write_cloud(folder_, std::to_string(k) + ".ply", cloud));
+  }
+  const Outcome outcome =
+      run(joined({"register", files[0], files[1], "--json", folder_ / "r.json"}, kSmall));
+  EXPECT_EQ(outcome.status, 0) << outcome.err;
+  EXPECT_EQ(outcome.err, "");
+  const auto exact = json_of(folder_ / "r.json")["result"]["target_from_source"];
+  std::istringstream printed(outcome.out.substr(outcome.out.find("target_from_source\n") + 19));
+  Eigen::Matrix4d pose, expected;
+  for (int k = 0; k < 16; ++k) {
+    printed >> pose(k / 4, k % 4);
+    expected(k / 4, k % 4) = exact[static_cast<std::size_t>(k)].get<double>();
+  }
+  // A tenth of a millimetre; six decimals of the rotation are metres there.
+  EXPECT_LT(((pose - expected) * kOnMap.homogeneous()).norm(), 1e-4) << outcome.out;
+}
+
+TEST_F(Register, FloatCoordinatesOfAMapAreNoted) {
+  PointCloud cloud = room_scan(0);
+  for (Eigen::Vector3f& p : cloud.points) p += kOnMap.cast<float>();
+  const std::string file = write_cloud(folder_, "float.ply", cloud);
+  const auto noted = [&](const std::vector<std::string>& arguments) {
+    expect_holds(run(arguments).err, {"note: " + file, "resolve 0.5 in float32", "double"});
+  };
+  noted({"info", file});
+  noted(joined({"register", file, target_}, kSmall));
+  noted(joined({"locate", file, target_}, kSmall));
+  noted({"evaluate-surface", file, "--surface", target_});
+  EXPECT_EQ(run({"info", target_}).err, "");
+}
+
 // As a scanner writes them: coordinates of a map, in double.
 TEST_F(Register, MapCoordinatesCostNothing) {
   const auto error_at = [&](const Eigen::Vector3d& source_place,
@@ -184,8 +222,8 @@ TEST_F(Register, VerifiesPosesOfAFile) {
     expect_refused(joined({"register", source_, target_, "--initial", poses}, kSmall), words);
   };
   refused("", {poses, "no pose"});
-  refused("1 0 0 0\n0 1 0 0\n", {poses + ":2", "ends after row 2"});
-  refused("1 0 0 0\n0 1 0\n", {poses + ":2", "row 2", "3 numbers"});
+  refused("1 0 0 0\n0 1 0 0\n", {poses + ":2", "ends within a 4 x 4 block"});
+  refused("1 0 0 0\n0 1 0\n", {poses + ":2", "3 fields", "a row of a pose"});
   refused("1 0 0 x\n", {poses + ":1", "'x'"});
   refused("2 0 0 0\n0 2 0 0\n0 0 2 0\n0 0 0 1\n", {poses + ":4", "no rigid motion"});
   expect_refused(joined({"register", source_, target_, "--refine-initial"}, kSmall), {"--initial"});

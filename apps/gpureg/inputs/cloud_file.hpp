@@ -7,13 +7,16 @@
 
 namespace gpureg::cli {
 
-/// Says on stderr what became of the faces of a mesh, or nothing.
+/// Says on stderr what became of the faces of a mesh, and where coordinates are coarse; or nothing.
 enum class MeshNote { print, none };
 
 /// Reads a cloud, or samples the faces of a mesh.
 /// @param spacing of the samples of a mesh, see io::sample_mesh.
 /// @throws IoError naming the file.
 PointCloud read_cloud(const std::string& path, double spacing, MeshNote note);
+
+/// Says on stderr where the coordinates of a file have lost their digits to float32.
+void note_coarse(const PointCloud& cloud, const std::string& path);
 
 /// Spacing of the samples of a mesh that becomes a cloud of this voxel size: about four points in
 /// each voxel that the surface passes. 0 for a voxel size of 0.

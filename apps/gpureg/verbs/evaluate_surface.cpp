@@ -9,6 +9,7 @@
 #include "gpureg/error.hpp"
 #include "gpureg/evaluation/surface_error.hpp"
 #include "gpureg/io.hpp"
+#include "inputs/cloud_file.hpp"
 #include "json/json.hpp"
 #include "json/json_file.hpp"
 #include "options/output_path.hpp"
@@ -51,17 +52,19 @@ Json document_of(const SurfaceRun& o, const Eigen::Matrix4d& truth_from_map,
 }
 
 int run(const SurfaceRun& o) {
-  check_outputs({{"--json", o.json}}, {{"MAP", o.map},
-                                       {"--surface", o.truth},
-                                       {"--trajectory", o.estimate},
-                                       {"--ground-truth", o.true_trajectory}});
   if (o.estimate.empty() != o.true_trajectory.empty())
     throw InvalidArgument("--trajectory and --ground-truth align the map together: " +
                           std::string(o.estimate.empty() ? "--trajectory" : "--ground-truth") +
                           " is missing");
   o.options.validate();
+  check_outputs({{"--json", o.json}}, {{"MAP", o.map},
+                                       {"--surface", o.truth},
+                                       {"--trajectory", o.estimate},
+                                       {"--ground-truth", o.true_trajectory}});
   const PointCloud truth = io::read_point_cloud(o.truth);
   PointCloud map = io::read_point_cloud(o.map);
+  note_coarse(truth, o.truth);
+  note_coarse(map, o.map);
   const Eigen::Matrix4d truth_from_map = alignment_of(o);
   const Eigen::Isometry3d move(truth_from_map);
   for (Eigen::Vector3f& p : map.points)

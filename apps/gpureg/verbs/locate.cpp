@@ -15,6 +15,7 @@
 #include "options/output_path.hpp"
 #include "options/place_options.hpp"
 #include "records/locate_json.hpp"
+#include "records/pose_text.hpp"
 #include "records/result_json.hpp"
 #include "run/viewpoint_note.hpp"
 #include "text.hpp"
@@ -52,12 +53,7 @@ void print(const std::string& file, const LocateResult& result) {
     std::cout << "pose " << k + 1 << "   confidence " << fixed(pose.confidence, 3)
               << (pose.alias ? ", an alias of pose 1" : "") << ", inliers "
               << percent(pose.verification.inlier_ratio) << " %, map_from_scan\n";
-    for (int row = 0; row < 4; ++row) {
-      std::cout << "  ";
-      for (int column = 0; column < 4; ++column)
-        std::cout << " " << pad_left(fixed(pose.map_from_scan(row, column), 6), 13);
-      std::cout << "\n";
-    }
+    std::cout << pose_text(pose.map_from_scan.matrix());
   }
 }
 

@@ -25,6 +25,7 @@
 #include "options/output_path.hpp"
 #include "pictures/before_after.hpp"
 #include "pictures/image.hpp"
+#include "records/pose_text.hpp"
 #include "records/result_json.hpp"
 #include "run/spacing.hpp"
 #include "run/viewpoint_note.hpp"
@@ -57,17 +58,6 @@ std::string describe(const PrepareStatistics& s) {
                                  : "");
 }
 
-std::string describe(const Eigen::Matrix4d& pose) {
-  std::string text;
-  for (int row = 0; row < 4; ++row) {
-    text += "   ";
-    for (int column = 0; column < 4; ++column)
-      text += " " + pad_left(fixed(pose(row, column), 6), column < 3 ? 10 : 13);
-    text += "\n";
-  }
-  return text;
-}
-
 void print_report(const RegisterOptions& o, const Context& context, const PreparedCloud& source,
                   const PreparedCloud& target, const RegistrationResult& r) {
   const RegistrationStatistics& s = r.statistics;
@@ -81,7 +71,7 @@ void print_report(const RegisterOptions& o, const Context& context, const Prepar
   std::cout << "\n";
   if (r.has_candidate) {
     std::cout << (r.aligned() ? "target_from_source\n" : "best candidate, target_from_source\n")
-              << describe(r.target_from_source.matrix()) << "score    " << fixed(r.score, 3)
+              << pose_text(r.target_from_source.matrix()) << "score    " << fixed(r.score, 3)
               << ", inliers " << grouped(s.inliers) << " of " << grouped(s.points_scored) << " ("
               << percent(r.inlier_ratio) << " %), rmse " << significant(r.inlier_rmse, 3) << " m\n";
     if (r.equivalent_poses() > 1)
@@ -111,7 +101,7 @@ void print_verified(const RegisterOptions& o, const Context& context, const Prep
             << "status   " << to_string(r.status);
   if (!r.aligned()) std::cout << ": " << to_string(r.reason) << ", " << explain(r.reason);
   std::cout << "\ntarget_from_source" << (o.refine_initial ? ", refined" : "") << "\n"
-            << describe(r.target_from_source.matrix()) << "score    " << fixed(r.score, 3)
+            << pose_text(r.target_from_source.matrix()) << "score    " << fixed(r.score, 3)
             << ", inliers " << grouped(r.statistics.inliers) << " of "
             << grouped(r.statistics.points_scored) << " (" << percent(r.inlier_ratio)
             << " %), rmse " << significant(r.inlier_rmse, 3) << " m\n";
@@ -161,8 +151,8 @@ RegistrationResult verify(const RegisterOptions& o, const Context& context,
 std::pair<PointCloud, PointCloud> read_clouds(const RegisterOptions& o) {
   const bool source = io::is_mesh(o.source), target = io::is_mesh(o.target);
   std::pair<PointCloud, PointCloud> clouds;
-  if (!source) clouds.first = io::read_point_cloud(o.source);
-  if (!target) clouds.second = io::read_point_cloud(o.target);
+  if (!source) clouds.first = read_cloud(o.source, 0, MeshNote::print);
+  if (!target) clouds.second = read_cloud(o.target, 0, MeshNote::print);
   const auto spacing = [](const PointCloud& other) {
     return median_spacing(finite_points(other.points), 1);
   };
