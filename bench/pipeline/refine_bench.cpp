@@ -15,8 +15,8 @@ struct Scene {
     const Context best = Context::best();
     const auto clouds = prepare_batch(best, views(), options.prepare);
     const auto pairs = all_pairs();
-    map = reconstruction::reconstruct(clouds.size(), pairs,
-                                      align_batch(best, clouds, pairs, options));
+    map = reconstruction::reconstruct_from_poses(clouds.size(), pairs,
+                                                 align_batch(best, clouds, pairs, options));
     for (const PreparedCloud& cloud :
          prepare_batch(best, views(), reconstruction::surface_options(options.prepare)))
       surfaces.push_back(reconstruction::surface_of(cloud));

@@ -281,9 +281,10 @@ void explain(const std::vector<Pair>& pairs, const std::vector<RegistrationResul
 
 }  // namespace
 
-Reconstruction reconstruct(std::size_t scans, const std::vector<Pair>& pairs,
-                           const std::vector<RegistrationResult>& results, const Options& options,
-                           const std::vector<Odometry>& odometry) {
+Reconstruction reconstruct_from_poses(std::size_t scans, const std::vector<Pair>& pairs,
+                                      const std::vector<RegistrationResult>& results,
+                                      const Options& options,
+                                      const std::vector<Odometry>& odometry) {
   options.validate();
   check_pairs(scans, pairs);
   Reconstruction map;

@@ -29,7 +29,7 @@ void add_map(const Context& context, const std::vector<PreparedCloud>& clouds,
              float voxel_size, Report& report) {
   reconstruction::Options options = reconstruction::Options::from_voxel_size(voxel_size);
   reconstruction::Reconstruction map =
-      reconstruction::reconstruct(clouds.size(), pairs, results, options);
+      reconstruction::reconstruct_from_poses(clouds.size(), pairs, results, options);
   const auto poses = [&](const std::string& name) {
     for (std::size_t k = 0; k < map.scans.size(); ++k)
       report.line(name + " scan " + std::to_string(k) + " confidence " +

@@ -8,6 +8,7 @@
 #include <random>
 
 #include "gpureg/error.hpp"
+#include "gpureg/reconstruction.hpp"
 #include "reconstruction/audit/blame.hpp"
 #include "reconstruction/audit/edge_confidence.hpp"
 #include "reconstruction/audit/near_pairs.hpp"
@@ -401,9 +402,9 @@ TEST_F(AuditedRoom, EdgesOfAContradictedConnectionAreTakenOut) {
   add(4, 0);
   add(5, 1);
   add(4, 2);
-  EXPECT_EQ(reconstruct(6, pairs, results).islands.size(), 1u);
-  const AuditedReconstruction out = reconstruct_audited(
-      context, clouds, pairs, results, {}, {}, options, AuditOptions::from_voxel_size(0.1f));
+  EXPECT_EQ(reconstruct_from_poses(6, pairs, results).islands.size(), 1u);
+  const AuditedReconstruction out = reconstruct(context, clouds, pairs, results, {}, {}, options,
+                                                AuditOptions::from_voxel_size(0.1f));
   ASSERT_EQ(out.map.islands.size(), 2u);
   EXPECT_EQ(out.map.islands[1].scans, (std::vector<std::uint32_t>{4, 5}));
   EXPECT_TRUE(out.audit.sound());

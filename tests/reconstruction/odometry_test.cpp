@@ -26,8 +26,8 @@ std::vector<Odometry> odometry_of(const PairResults& data, double metres) {
 reconstruction::Reconstruction map_of(const PairResults& data,
                                       const std::vector<Odometry>& odometry,
                                       const reconstruction::Options& options = {}) {
-  return reconstruction::reconstruct(data.world_from_scan.size(), data.pairs, data.results, options,
-                                     odometry);
+  return reconstruction::reconstruct_from_poses(data.world_from_scan.size(), data.pairs,
+                                                data.results, options, odometry);
 }
 
 TEST(Odometry, PlacesScansWithoutPairsAndSaysSo) {

@@ -66,7 +66,7 @@ struct PairResults {
   }
 
   reconstruction::Reconstruction map(const reconstruction::Options& options = {}) const {
-    return reconstruction::reconstruct(world_from_scan.size(), pairs, results, options);
+    return reconstruction::reconstruct_from_poses(world_from_scan.size(), pairs, results, options);
   }
 };
 

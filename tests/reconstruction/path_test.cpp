@@ -70,7 +70,7 @@ std::vector<std::uint32_t> in_order() {
 
 TEST(Path, AliasesCollapseAMapAndShow) {
   const TwinBays set(in_order());
-  const Reconstruction map = reconstruct(kScans, set.pairs, set.results);
+  const Reconstruction map = reconstruct_from_poses(kScans, set.pairs, set.results);
   EXPECT_GT(set.wrong_edges(map), 10u);
   EXPECT_TRUE(places_look_alike(map, sensors()));
 }
@@ -79,7 +79,8 @@ TEST(Path, AMapWithoutContradictionHasNoPlacesThatLookAlike) {
   TwinBays set(in_order());
   for (std::size_t k = 0; k < set.pairs.size(); ++k)
     if (set.pairs[k].source >= set.pairs[k].target + kBay) set.results[k].has_candidate = false;
-  EXPECT_FALSE(places_look_alike(reconstruct(kScans, set.pairs, set.results), sensors()));
+  EXPECT_FALSE(
+      places_look_alike(reconstruct_from_poses(kScans, set.pairs, set.results), sensors()));
 }
 
 TEST(Path, FewRejectedPairsOfManySayNothing) {
@@ -107,7 +108,7 @@ TEST(Path, OnlyPairsThatContinueThePathAreTrusted) {
     EXPECT_EQ(trusted[k] != 0, gap <= 4) << set.pairs[k].target << " " << set.pairs[k].source;
     if (!trusted[k]) set.results[k].has_candidate = false;
   }
-  const Reconstruction map = reconstruct(kScans, set.pairs, set.results);
+  const Reconstruction map = reconstruct_from_poses(kScans, set.pairs, set.results);
   EXPECT_EQ(set.wrong_edges(map), 0u);
   ASSERT_FALSE(map.islands.empty());
   EXPECT_GE(map.islands[0].scans.size(), kScans - 1);

@@ -180,11 +180,11 @@ class Reconstruct {
     options.threads = static_cast<int>(o_.method.threads);
     options.drift = o_.drift;
     if (o_.no_audit) {
-      run_.map = reconstruction::reconstruct(run_.scene.numbers.size(), run_.pairs.pairs,
-                                             run_.pairs.results, options, odometry_);
+      run_.map = reconstruction::reconstruct_from_poses(run_.scene.numbers.size(), run_.pairs.pairs,
+                                                        run_.pairs.results, options, odometry_);
     } else {
       const float voxel_size = run_.options.prepare.voxel_size;
-      reconstruction::AuditedReconstruction audited = reconstruction::reconstruct_audited(
+      reconstruction::AuditedReconstruction audited = reconstruction::reconstruct(
           context_, run_.scene.clouds, run_.pairs.pairs, run_.pairs.results, options, odometry_,
           run_.options, reconstruction::AuditOptions::from_voxel_size(voxel_size));
       run_.map = std::move(audited.map);

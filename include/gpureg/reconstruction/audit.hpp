@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "gpureg/reconstruction.hpp"
+#include "gpureg/reconstruction/map.hpp"
 #include "gpureg/verification.hpp"
 
 /// Audit of finished maps: do scans that come to lie near each other agree, whether or not anybody
@@ -111,26 +111,5 @@ Audit audit(const Context& context, const std::vector<PreparedCloud>& clouds,
 Audit audit(const Context& context, const std::vector<PreparedCloud>& clouds,
             const Reconstruction& map, const RegistrationOptions& registration = {},
             const AuditOptions& options = {});
-
-/// A map and what its last audit says.
-struct AuditedReconstruction {
-  Reconstruction map;
-  Audit audit;
-  /// More confident pairs contradicted the map than their confidences explain. Then only pairs are
-  /// trusted that keep scans of consecutive numbers beside each other.
-  bool places_look_alike = false;
-};
-
-/// reconstruct(), audited: edges across a contradicted connection are taken out, the graph is
-/// solved again, until nothing is contradicted. Their reason is EdgeReason::inconsistent; that of
-/// pairs that are not trusted because places look alike is EdgeReason::unconfirmed.
-/// @param clouds as for audit(); without odometry, in the order of the sensor's path where there is
-///   one. Other parameters as for reconstruct().
-/// @throws InvalidArgument as reconstruct() and audit().
-AuditedReconstruction reconstruct_audited(
-    const Context& context, const std::vector<PreparedCloud>& clouds,
-    const std::vector<Pair>& pairs, const std::vector<RegistrationResult>& results,
-    const Options& options = {}, const std::vector<Odometry>& odometry = {},
-    const RegistrationOptions& registration = {}, const AuditOptions& audit_options = {});
 
 }  // namespace gpureg::reconstruction

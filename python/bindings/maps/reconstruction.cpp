@@ -10,7 +10,6 @@
 #include "cloud.hpp"
 #include "cloud_input.hpp"
 #include "gpureg/error.hpp"
-#include "gpureg/reconstruction/audit.hpp"
 #include "interrupt.hpp"
 #include "matrix.hpp"
 
@@ -101,12 +100,12 @@ Reconstruction reconstruct_of(std::size_t scans, const IndexArray& rows, const p
   const std::vector<Odometry> known = odometry_of(odometry);
   if (!prepared.empty())
     return interruptible([&] {
-      return reconstruct_audited(context, prepared, pairs, values, options, known, registration,
-                                 AuditOptions::from_voxel_size(registration.prepare.voxel_size))
+      return reconstruct(context, prepared, pairs, values, options, known, registration,
+                         AuditOptions::from_voxel_size(registration.prepare.voxel_size))
           .map;
     });
   const py::gil_scoped_release release;
-  return reconstruct(scans, pairs, values, options, known);
+  return reconstruct_from_poses(scans, pairs, values, options, known);
 }
 
 py::dict report_of(const RefineReport& report) {

@@ -12,6 +12,7 @@
 #include "fields/scale.hpp"
 #include "fields/validate.hpp"
 #include "gpureg/error.hpp"
+#include "gpureg/reconstruction.hpp"
 #include "reconstruction/audit/blame.hpp"
 #include "reconstruction/audit/companions.hpp"
 #include "reconstruction/audit/edge_confidence.hpp"
@@ -258,11 +259,12 @@ Audit audit(const Context& context, const std::vector<PreparedCloud>& clouds,
   return audit_of(context, clouds, map, registration, options, {});
 }
 
-AuditedReconstruction reconstruct_audited(
-    const Context& context, const std::vector<PreparedCloud>& clouds,
-    const std::vector<Pair>& pairs, const std::vector<RegistrationResult>& results,
-    const Options& options, const std::vector<Odometry>& odometry,
-    const RegistrationOptions& registration, const AuditOptions& audit_options) {
+AuditedReconstruction reconstruct(const Context& context, const std::vector<PreparedCloud>& clouds,
+                                  const std::vector<Pair>& pairs,
+                                  const std::vector<RegistrationResult>& results,
+                                  const Options& options, const std::vector<Odometry>& odometry,
+                                  const RegistrationOptions& registration,
+                                  const AuditOptions& audit_options) {
   audit_options.validate();
   AuditedReconstruction out;
   std::vector<RegistrationResult> left = results;
@@ -270,11 +272,11 @@ AuditedReconstruction reconstruct_audited(
   const std::vector<Eigen::Vector3d> sensors = sensors_of(clouds);
   out.places_look_alike =
       odometry.empty() &&
-      places_look_alike(reconstruct(clouds.size(), pairs, results, options), sensors);
+      places_look_alike(reconstruct_from_poses(clouds.size(), pairs, results, options), sensors);
   if (out.places_look_alike) ruled_out = keep_to_the_path(sensors, pairs, options, left);
   hear_companions(context, clouds, pairs, registration, audit_options, left);
   for (int round = 0;; ++round) {
-    out.map = reconstruct(clouds.size(), pairs, left, options, odometry);
+    out.map = reconstruct_from_poses(clouds.size(), pairs, left, options, odometry);
     out.audit = audit_of(context, clouds, out.map, registration, audit_options, out.audit);
     bool changed = false;
     // The worst connection of each island: others may be contradicted because of it.

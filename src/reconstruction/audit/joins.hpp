@@ -9,7 +9,7 @@ namespace gpureg::reconstruction {
 
 /// Relative poses of islands that too few sure pairs connect, where an audit of the joined islands
 /// confirms them. For each two islands, the poses that most pairs between them agree on are tried.
-/// @param results belong to the pairs, as for reconstruct().
+/// @param results belong to the pairs, as for reconstruct_from_poses().
 /// @param refined pairs whose poses an audit has refined: they suggest poses, too.
 /// @param map of these pairs; its islands are taken as rigid.
 /// @return one for each two islands that are joined, as odometry.

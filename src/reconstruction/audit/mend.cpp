@@ -8,6 +8,7 @@
 #include <string>
 
 #include "gpureg/error.hpp"
+#include "gpureg/reconstruction.hpp"
 #include "reconstruction/audit/joins.hpp"
 #include "reconstruction/audit/near_pairs.hpp"
 #include "reconstruction/audit/parts.hpp"
@@ -132,15 +133,15 @@ MendedMap put_together(const Context& context, const std::vector<PreparedCloud>&
     std::vector<RegistrationResult> aligned = align_batch(context, clouds, more, registration);
     pairs.insert(pairs.end(), more.begin(), more.end());
     std::move(aligned.begin(), aligned.end(), std::back_inserter(results));
-    AuditedReconstruction again = reconstruct_audited(
-        context, clouds, pairs, results, reconstruction, odometry, registration, options);
+    AuditedReconstruction again = reconstruct(context, clouds, pairs, results, reconstruction,
+                                              odometry, registration, options);
     const std::vector<Odometry> joins =
         confirmed_joins(context, clouds, pairs, results, found.pairs, again.map, reconstruction,
                         registration, options);
     if (!joins.empty()) {
       odometry.insert(odometry.end(), joins.begin(), joins.end());
-      again = reconstruct_audited(context, clouds, pairs, results, reconstruction, odometry,
-                                  registration, options);
+      again = reconstruct(context, clouds, pairs, results, reconstruction, odometry, registration,
+                          options);
     }
     place(again.map, poses, out);
     more = pairs_between(clouds, parts, out.world_from_scan, pairs, kPairsOfScan);

@@ -302,7 +302,8 @@ std::vector<char> pairs_along_the_path(const std::vector<Eigen::Vector3d>& senso
                  step_of(pairs[k], results[k].target_from_source, sensors) <=
                      gap_of(pairs[k]) * path.max_step;
   for (int round = 0; round < kMostPasses; ++round) {
-    const Reconstruction map = reconstruct(sensors.size(), pairs, only(results, trusted), options);
+    const Reconstruction map =
+        reconstruct_from_poses(sensors.size(), pairs, only(results, trusted), options);
     if (!Growth(map, path, sensors).grow(pairs, results, trusted)) break;
   }
   return trusted;
