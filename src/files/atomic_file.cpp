@@ -1,13 +1,20 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <fcntl.h>
+#include <sys/file.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
 #include <atomic>
 #include <cerrno>
 #include <climits>
+#include <cstdlib>
+#include <filesystem>
+#include <memory>
+#include <mutex>
+#include <set>
 #include <string_view>
 #include <system_error>
+#include <utility>
 
 #include "gpureg/error.hpp"
 #include "gpureg/files.hpp"
@@ -25,8 +32,9 @@ std::string why(int error) { return std::generic_category().message(error); }
 class OutputFile {
  public:
   OutputFile(int fd, std::string remove_path) : fd_(fd), remove_path_(std::move(remove_path)) {}
-  OutputFile(const OutputFile&) = delete;
-  OutputFile& operator=(const OutputFile&) = delete;
+  OutputFile(OutputFile&& other) noexcept
+      : fd_(std::exchange(other.fd_, -1)),
+        remove_path_(std::exchange(other.remove_path_, std::string())) {}
   ~OutputFile() {
     if (fd_ >= 0) ::close(fd_);
     if (!remove_path_.empty()) ::unlink(remove_path_.c_str());
@@ -82,16 +90,53 @@ std::string folder_of(const std::string& path) {
   return path.substr(0, slash + 1);
 }
 
+constexpr std::string_view kPrefix = ".gpureg-", kSuffix = ".tmp";
+
+bool is_temporary(std::string_view name) {
+  return name.size() > kPrefix.size() + kSuffix.size() &&
+         name.substr(0, kPrefix.size()) == kPrefix &&
+         name.substr(name.size() - kSuffix.size()) == kSuffix;
+}
+
+// Temporary files are locked while they are written: a lock ends with its process.
+bool lock(int fd) { return ::flock(fd, LOCK_EX | LOCK_NB) == 0; }
+
+// Whether an open file still has this name.
+bool has_name(int fd, const std::string& path) {
+  struct stat open_file{}, named{};
+  return ::fstat(fd, &open_file) == 0 && ::lstat(path.c_str(), &named) == 0 &&
+         open_file.st_dev == named.st_dev && open_file.st_ino == named.st_ino;
+}
+
+// Removes temporary files that killed processes left. Looks into each folder once.
+void remove_leftovers(const std::string& folder) {
+  static std::mutex mutex;
+  static std::set<std::string> seen;
+  const std::lock_guard<std::mutex> guard(mutex);
+  if (!seen.insert(folder).second) return;
+  std::error_code error;
+  for (std::filesystem::directory_iterator at(folder, error), end; !error && at != end;
+       at.increment(error)) {
+    if (!is_temporary(at->path().filename().native())) continue;
+    const std::string& path = at->path().native();
+    const OutputFile file(::open(path.c_str(), O_RDWR | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC), {});
+    if (file.fd() >= 0 && lock(file.fd()) && has_name(file.fd(), path)) ::unlink(path.c_str());
+  }
+}
+
 // The name does not derive from the final one, which may already be as long as the file system
 // allows.
 OutputFile open_temporary(const std::string& path, std::string& temporary) {
   static std::atomic<unsigned> counter{0};
   for (int attempt = 0; attempt < 100; ++attempt) {
-    temporary = folder_of(path) + ".gpureg-" + std::to_string(::getpid()) + "-" +
-                std::to_string(counter++) + ".tmp";
+    temporary = folder_of(path) + std::string(kPrefix) + std::to_string(::getpid()) + "-" +
+                std::to_string(counter++) + std::string(kSuffix);
     const int fd = ::open(temporary.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
-    if (fd >= 0) return {fd, temporary};
-    if (errno != EEXIST) fail(path, why(errno));
+    if (fd < 0 && errno != EEXIST) fail(path, why(errno));
+    if (fd < 0) continue;
+    OutputFile file(fd, temporary);
+    // Another process may take the file for a leftover before it is locked.
+    if ((lock(fd) || errno != EWOULDBLOCK) && has_name(fd, temporary)) return file;
   }
   fail(path, "no free name for a temporary file");
 }
@@ -136,8 +181,10 @@ void write_atomically(const std::string& path, const Content& content) {
   if (exists && ::access(path.c_str(), W_OK) != 0) fail(path, why(errno));
 
   const std::string target = behind_links(path);
+  remove_leftovers(folder_of(target));
   std::string temporary;
   OutputFile file = open_temporary(target, temporary);
+  const OutputFile locked(::fcntl(file.fd(), F_DUPFD_CLOEXEC, 0), {});  // until it has its name
   if (exists) (void)::fchmod(file.fd(), existing.st_mode & 07777);
   write_content(file, path, content);
   if (::fsync(file.fd()) != 0) fail(path, why(errno));

@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include <fcntl.h>
 #include <gtest/gtest.h>
+#include <sys/file.h>
 #include <sys/stat.h>
+#include <sys/wait.h>
 #include <unistd.h>
 
 #include <filesystem>
@@ -88,6 +91,47 @@ TEST(AtomicFile, WritesThroughALinkToAFileThatIsNotThereYet) {
   std::filesystem::create_symlink("circle", folder / "circle");
   expect_error<IoError>([&] { write_atomically(folder / "circle", "new"); }, {"circle"});
   EXPECT_TRUE(std::filesystem::is_symlink(folder / "circle"));
+}
+
+TEST(AtomicFile, RemovesWhatKilledProcessesLeft) {
+  const TemporaryFolder folder;
+  const std::string left = folder.write(".gpureg-1-0.tmp", "half"),
+                    other = folder.write(".gpureg-notes", "mine"),
+                    written = folder.write(".gpureg-1-1.tmp", "goes on");
+  const int fd = ::open(written.c_str(), O_RDONLY);
+  ASSERT_EQ(::flock(fd, LOCK_EX), 0);  // as a process does that still writes
+  write_atomically(folder / "a", "x");
+  EXPECT_FALSE(std::filesystem::exists(left));
+  EXPECT_TRUE(std::filesystem::exists(other));
+  EXPECT_TRUE(std::filesystem::exists(written));
+  ::close(fd);
+}
+
+// While many write at a time, nobody takes the file of another for a leftover.
+TEST(AtomicFile, ProcessesDoNotTakeEachOthersFiles) {
+  const TemporaryFolder folder;
+  constexpr int kProcesses = 8, kFiles = 50;
+  std::vector<pid_t> children;
+  for (int p = 0; p < kProcesses; ++p) {
+    const pid_t child = ::fork();
+    if (child == 0) {
+      int failed = 0;
+      try {
+        for (int k = 0; k < kFiles; ++k)  // a name of its own for each look
+          write_atomically(folder.path() + std::string(1 + k, '/') + std::to_string(p), "x");
+      } catch (const std::exception&) {
+        failed = 1;
+      }
+      ::_exit(failed);
+    }
+    children.push_back(child);
+  }
+  for (const pid_t child : children) {
+    int status = -1;
+    ASSERT_EQ(::waitpid(child, &status, 0), child);
+    EXPECT_EQ(status, 0);
+  }
+  EXPECT_EQ(folder.count(), static_cast<std::size_t>(kProcesses));
 }
 
 TEST(AtomicFile, TakesNamesAsLongAsTheFileSystemDoes) {
