@@ -80,7 +80,7 @@ from ._loop_consistency import loop_consistency
 from ._map import Map, MapEdge, MapLink, MapScan
 from ._reconstruction import reconstruct
 from ._trajectory import evaluate_trajectory, read_trajectory
-from .files import read_point_cloud, write_point_cloud
+from .files import read_cameras, read_point_cloud, write_point_cloud
 from .fragments import FragmentSet
 from .localization import CHANGE_LABELS, change, load_map, locate, locate_batch, prepare_map
 from .loop_closure import LoopCloser
@@ -106,6 +106,10 @@ def __getattr__(name: str) -> Any:
 
         return getattr(batch, name)
     raise AttributeError(f"module 'gpureg' has no attribute '{name}'")
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})
 
 
 __all__ = [
@@ -193,6 +197,7 @@ __all__ = [
     "prepare_batch",
     "prepare_map",
     "read_calibration",
+    "read_cameras",
     "read_point_cloud",
     "read_trajectory",
     "reconstruct",

@@ -3,13 +3,14 @@
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import numbers
 import os
 import queue
 import threading
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -46,6 +47,8 @@ class BatchRun:
         Pairs that earlier calls had done.
     seconds : float
         Of this call.
+    unusable : dict of int to str
+        Fragments that could not be read or prepared, and why; their pairs are missing.
     """
 
     folder: Path
@@ -53,6 +56,7 @@ class BatchRun:
     aligned: int
     resumed: int
     seconds: float
+    unusable: dict[int, str] = dataclasses.field(default_factory=dict)
 
     @property
     def log(self) -> Path:
@@ -76,7 +80,11 @@ class BatchRun:
     def __str__(self) -> str:
         done = self.pairs - self.resumed
         rate = f", {done / self.seconds:.3g} pairs/s" if done and self.seconds else ""
-        return f"{self.pairs} pairs, {self.aligned} aligned, {self.resumed} done before, {self.seconds:.1f} s{rate}: {self.folder}"
+        without = f", without the fragments {', '.join(map(str, self.unusable))}"
+        return (
+            f"{self.pairs} pairs, {self.aligned} aligned, {self.resumed} done before"
+            f"{without if self.unusable else ''}, {self.seconds:.1f} s{rate}: {self.folder}"
+        )
 
 
 def all_contexts() -> list[Context]:
@@ -105,7 +113,9 @@ def register_all(
 
     Chunks of pairs are written as they finish. A run that was killed, or stopped by Ctrl-C, goes on
     when the same call is made again; the files in the end are, byte for byte, those of an
-    uninterrupted run, on any number of devices.
+    uninterrupted run, on any number of devices. A fragment that cannot be read or prepared costs its
+    own pairs, and is named in the result; once it is repaired or removed, the same call does what is
+    missing.
 
     Parameters
     ----------
@@ -136,7 +146,7 @@ def register_all(
     ValueError
         Where the folder holds another run; says what differs.
     IoError
-        Where a file of the folder is damaged; names it.
+        Where a file of the folder is damaged; names it. Where no pair has two usable fragments.
     KeyboardInterrupt
         After Ctrl-C; what was done is on disk.
 
@@ -159,11 +169,14 @@ def register_all(
         finished = store.finished()
         left = [chunk for chunk in range(plan.chunks) if chunk not in finished]
         resumed = sum(len(plan.chunk(chunk)) for chunk in finished)
+        unusable: dict[int, str] = {}
         if left:
-            resumed += _Workers(
+            workers = _Workers(
                 plan, store, left, list(contexts) if contexts else all_contexts(), memory
-            ).run(progress, resumed)
-        return conclude(store, plan, resumed, begin)
+            )
+            resumed += workers.run(progress, resumed)
+            unusable = workers.unusable
+        return conclude(store, plan, resumed, begin, unusable)
     finally:
         store.close()
 
@@ -189,12 +202,18 @@ def make_plan(
     return Plan.make(fragments, options, chosen, chunk_size)
 
 
-def conclude(store: Store, plan: Plan, resumed: int, begin: float) -> BatchRun:
-    """The final files of a run whose chunks are all there."""
-    store.conclude()
-    status = read_table(store.table_path, ["status"])["status"]
-    aligned = sum(name in ALIGNED for name in status.to_pylist())
-    return BatchRun(store.folder, len(plan.pairs), aligned, resumed, time.monotonic() - begin)
+def conclude(
+    store: Store, plan: Plan, resumed: int, begin: float, unusable: dict[int, str]
+) -> BatchRun:
+    """The final files of a run whose chunks are all there. unusable: positions of fragments, and
+    why.
+    """
+    numbers = plan.fragments.numbers
+    named = {numbers[position]: unusable[position] for position in sorted(unusable)}
+    store.conclude(named)
+    status = read_table(store.table_path, ["status"])["status"].to_pylist()
+    aligned = sum(name in ALIGNED for name in status)
+    return BatchRun(store.folder, len(status), aligned, resumed, time.monotonic() - begin, named)
 
 
 def run_chunk(
@@ -203,15 +222,14 @@ def run_chunk(
     residency: Residency,
     known: dict[Any, Row],
     add: Any = None,
-    stop: threading.Event | None = None,
+    stop: Callable[[], bool] | None = None,
 ) -> list[Row]:
-    """Rows of one chunk, in its order. known: those that are done; add(row) is called for each that
-    is new.
+    """Rows of one chunk, in its order, without the pairs of fragments that cannot be used. known:
+    those that are done; add(row) is called for each that is new.
     """
-    pairs = plan.chunk(chunk)
-    keys = [tuple(key) for key in plan.numbers(pairs).tolist()]
+    pairs, keys = plan.chunk(chunk), plan.keys(chunk)
     todo = [k for k, key in enumerate(keys) if key not in known]
-    rows = dict(known)
+    rows: dict[Any, Row] = dict(known)
 
     def take(k: int, result: Any) -> None:
         key = keys[todo[k]]
@@ -220,12 +238,17 @@ def run_chunk(
             add(rows[key])
 
     residency.align(pairs[todo], take, stop)
-    return [rows[key] for key in keys]
+    return [rows[key] for key in keys if key in rows]
 
 
 class _Workers:
     """One thread per context, each taking the next chunk; the calling thread waits, and hears
     Ctrl-C.
+
+    Ctrl-C raises between any two instructions of the calling thread. That thread therefore shares
+    with the others only what is never half done: integers, and queues and locks written in C. It
+    neither joins a running thread nor asks whether it lives: Python before 3.13 takes a thread for
+    dead whose `join` was interrupted, and would end the process under it.
     """
 
     def __init__(
@@ -240,8 +263,10 @@ class _Workers:
         self._chunks: queue.SimpleQueue[int] = queue.SimpleQueue()
         for chunk in chunks:
             self._chunks.put(chunk)
-        self._stop = threading.Event()
+        self._stopping = False
         self._lock = threading.Lock()
+        self._begun = self._ended = 0  # threads
+        self._endings: queue.SimpleQueue[None] = queue.SimpleQueue()  # wakes who waits
         self._errors: list[BaseException] = []
         self._done = 0
         self._residencies: list[Residency] = []
@@ -251,49 +276,85 @@ class _Workers:
         """Returns the number of pairs that partial chunks had."""
         partial = sum(map(len, self._partial.values()))
         self._done = before + partial
-        threads = [
-            threading.Thread(target=self._work, args=(context,)) for context in self._contexts
-        ]
+        threads: list[threading.Thread] = []
         with batch_progress(progress, "aligning", len(self._plan.pairs), self._done) as report:
             if report is not None:
                 report(self._done, self._note())
-            for thread in threads:
-                thread.start()
             try:
-                while any(thread.is_alive() for thread in threads):
-                    for thread in threads:
-                        thread.join(0.1 / len(threads))
+                for context in self._contexts:
+                    thread = threading.Thread(target=self._work, args=(context,))
+                    thread.start()
+                    threads.append(thread)
+                while self._ended < len(self._contexts):
+                    self._wait(0.1)
                     if report is not None:
                         report(self._done, self._note())
             finally:
-                self._stop.set()
-                for thread in threads:
-                    thread.join()
+                self._wind_up(threads)
             if report is not None:
                 report(self._done, self._note())
         if self._errors:
             raise self._errors[0]
         return partial
 
+    def _wait(self, seconds: float) -> None:
+        with contextlib.suppress(queue.Empty):
+            self._endings.get(timeout=seconds)
+
+    def _wind_up(self, threads: Sequence[threading.Thread]) -> None:
+        """Returns when no thread works any more, however often Ctrl-C is pressed: nothing else keeps
+        the interpreter, and the lock of the folder, until then.
+        """
+        pressed: KeyboardInterrupt | None = None
+        while True:
+            try:
+                with self._lock:  # a thread that begins later sees it, and returns
+                    self._stopping = True
+                while self._ended < self._begun:
+                    self._wait(0.1)
+                for thread in threads:  # past their work
+                    thread.join()
+                break
+            except KeyboardInterrupt as again:
+                pressed = again
+        if pressed is not None:
+            raise pressed
+
+    @property
+    def unusable(self) -> dict[int, str]:
+        return {k: why for residency in self._residencies for k, why in residency.unusable.items()}
+
     def _note(self) -> str:
         """Fragments are prepared before the first of their pairs."""
         return f"{sum(residency.prepared for residency in self._residencies)} clouds prepared"
 
     def _work(self, context: Context) -> None:
+        with self._lock:
+            if self._stopping:
+                return
+            self._begun += 1
+        try:
+            self._take_chunks(context)
+        except Stopped:
+            pass
+        except BaseException as error:  # raised again by the thread that waits
+            self._errors.append(error)
+            self._stopping = True
+        finally:
+            with self._lock:
+                self._ended += 1
+            self._endings.put(None)
+
+    def _take_chunks(self, context: Context) -> None:
         residency = Residency(context, self._plan.fragments, self._plan.options, self._memory)
         self._residencies.append(residency)
         try:
-            while not self._stop.is_set():
+            while not self._stopping:
                 try:
                     chunk = self._chunks.get_nowait()
                 except queue.Empty:
                     return
                 self._run(chunk, residency)
-        except Stopped:
-            pass
-        except BaseException as error:  # raised again by the thread that waits
-            self._errors.append(error)
-            self._stop.set()
         finally:
             residency.close()
 
@@ -307,11 +368,13 @@ class _Workers:
                 self._done += 1
 
         try:
-            rows = run_chunk(self._plan, chunk, residency, known, add, self._stop)
+            rows = run_chunk(self._plan, chunk, residency, known, add, lambda: self._stopping)
         except BaseException:
-            self._store.write_partial(chunk, [*known.values(), *new])
+            self._store.write(chunk, [*known.values(), *new])
             raise
         self._store.write(chunk, rows)
+        with self._lock:  # those that cannot be done count as done
+            self._done += len(self._plan.chunk(chunk)) - len(rows)
 
 
 __all__: list[str] = ["BatchRun", "all_contexts", "register_all"]

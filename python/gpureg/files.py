@@ -6,6 +6,9 @@ from __future__ import annotations
 import os
 from typing import Any
 
+import numpy as np
+import numpy.typing as npt
+
 from . import _core
 from ._core import PointCloud
 from ._mesh import mesh_as_cloud
@@ -37,6 +40,23 @@ def read_point_cloud(path: Path, *, spacing: float = 0.0) -> PointCloud:
     if cloud is not None:
         return cloud
     return _core.read_point_cloud(os.fspath(path))
+
+
+def read_cameras(path: Path) -> dict[int, npt.NDArray[np.float64]]:
+    """Read the sensor positions of a folder's fragments, its cameras.txt.
+
+    Returns
+    -------
+    dict of int to (V, 3) float64
+        By fragment number: positions in the fragment's frame, in metres, as `prepare` takes
+        ``viewpoints``.
+
+    Raises
+    ------
+    IoError
+        Naming file and line.
+    """
+    return _core.read_cameras(os.fspath(path))
 
 
 def write_point_cloud(path: Path, points: Any, normals: Any = None) -> None:

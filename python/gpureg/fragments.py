@@ -3,9 +3,10 @@
 
 from __future__ import annotations
 
+import errno
 import hashlib
 import os
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +15,8 @@ import numpy.typing as npt
 
 from . import _core
 from ._arrays import CoreCloud, core_cloud, several, to_numpy
-from ._core import PrepareOptions
+from ._core import IoError, PrepareOptions
+from .files import read_cameras
 
 _PIECE = 1 << 20  # bytes of a file that are in memory while its fingerprint is made
 
@@ -57,7 +59,7 @@ class FragmentSet:
         """
         found = _core.list_fragments(os.fspath(directory))
         cameras = Path(directory) / "cameras.txt"
-        viewpoints: dict[int, Any] = _core.read_cameras(str(cameras)) if cameras.exists() else {}
+        viewpoints: dict[int, Any] = read_cameras(cameras) if cameras.exists() else {}
         return cls([number for number, _ in found], [path for _, path in found], viewpoints)
 
     @classmethod
@@ -84,29 +86,56 @@ class FragmentSet:
         """What Redwood's files give as the number of fragments: one more than the largest number."""
         return self._numbers[-1] + 1 if self._numbers else 0
 
-    def load(self, position: int, options: PrepareOptions, device: bool = False) -> CoreCloud:
-        """The fragment at a position (not: of a number), as the core takes it; device: on a GPU, if
-        it is there. Thread-safe.
-        """
-        source, number = self._sources[position], self._numbers[position]
-        return core_cloud(
-            source,
-            None,
-            None,
-            self._viewpoints.get(number),
-            options,
-            f"fragments[{position}]",
-            device,
+    def without(self, positions: Collection[int]) -> FragmentSet:
+        """The others, under their numbers."""
+        kept = [k for k in range(len(self)) if k not in positions]
+        return FragmentSet(
+            [self._numbers[k] for k in kept], [self._sources[k] for k in kept], self._viewpoints
         )
 
+    def load(self, position: int, options: PrepareOptions, device: bool = False) -> CoreCloud:
+        """The fragment at a position (not: of a number), as the core takes it; device: on a GPU, if
+        it is there. Thread-safe. Raises OSError for all that is wrong with a file.
+        """
+        source, number = self._sources[position], self._numbers[position]
+        try:
+            return core_cloud(
+                source,
+                None,
+                None,
+                self._viewpoints.get(number),
+                options,
+                f"fragments[{position}]",
+                device,
+            )
+        except ValueError as error:
+            if isinstance(source, str | os.PathLike):
+                raise IoError(str(error)) from error
+            raise
+
+    def check_files(self) -> None:
+        """Raises FileNotFoundError for a path where nothing is: that is no bad fragment, but a wrong
+        argument.
+        """
+        for source in self._sources:
+            if isinstance(source, str | os.PathLike) and not os.path.lexists(source):
+                raise FileNotFoundError(errno.ENOENT, os.strerror(errno.ENOENT), os.fspath(source))
+
     def fingerprint(self, position: int) -> str:
-        """Tells whether a fragment is the one that an earlier run saw: a digest of all its data."""
+        """Tells whether a fragment is the one that an earlier run saw: a digest of all its data;
+        "unreadable" for a file that is there and cannot be read.
+        """
         digest = hashlib.blake2b(digest_size=16)
         source = self._sources[position]
         if isinstance(source, str | os.PathLike):
-            with open(source, "rb") as file:
-                while piece := file.read(_PIECE):
-                    digest.update(piece)
+            try:
+                with open(source, "rb") as file:
+                    while piece := file.read(_PIECE):
+                        digest.update(piece)
+            except FileNotFoundError:
+                raise
+            except OSError:
+                return "unreadable"
         else:
             for part in self.load(position, PrepareOptions())[:5]:
                 digest.update(b"-" if part is None else np.ascontiguousarray(part).tobytes())

@@ -6,7 +6,7 @@ in.
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any
 
 from . import _core
@@ -33,7 +33,7 @@ def prepare(
     Parameters
     ----------
     points : (N, 3) array, path, PointCloud, mesh or Open3D point cloud
-        A path: PLY, PCD, KITTI (.bin), LAS or LAZ (with ``gpureg[las]``), or a mesh (STL, OBJ, PLY
+        A fourth column, intensities as of KITTI, is not used. A path: PLY, PCD, KITTI (.bin), LAS or LAZ (with ``gpureg[las]``), or a mesh (STL, OBJ, PLY
         with faces). Of these meshes, of trimesh's and of Open3D's, points of the faces are taken,
         half a voxel apart, with the normals of the faces. Metres, any real dtype and layout: numpy, DLPack (torch, jax, ...),
         ``__cuda_array_interface__`` (cupy, ...) or nested lists. float32 rows are read in place;
@@ -181,3 +181,37 @@ def prepared(
     for k, cloud in zip(raw, done):
         clouds[k] = cloud
     return clouds
+
+
+def prepare_usable(
+    context: Context,
+    loads: Mapping[int, Callable[[], CoreCloud]],
+    options: PrepareOptions,
+    unusable: dict[int, str],
+) -> list[tuple[int, PreparedCloud]]:
+    """Fragments by position, together, and one by one where one of them cannot be prepared.
+    unusable gets those whose files cannot be read or that cannot be prepared, and why.
+    """
+    inputs: dict[int, CoreCloud] = {}
+    for k, load in loads.items():
+        try:
+            inputs[k] = load()
+        except OSError as error:
+            unusable[k] = str(error)
+    try:
+        clouds = _prepare_together(context, inputs, options)
+    except ValueError:
+        clouds = []
+        for k, cloud in inputs.items():
+            try:
+                clouds += _prepare_together(context, {k: cloud}, options)
+            except ValueError as error:
+                unusable[k] = str(error)
+    return list(zip([k for k in inputs if k not in unusable], clouds, strict=True))
+
+
+def _prepare_together(
+    context: Context, inputs: Mapping[int, CoreCloud], options: PrepareOptions
+) -> list[PreparedCloud]:
+    names = [f"fragments[{k}]" for k in inputs]
+    return _core.prepare_batch(context, list(inputs.values()), options, names) if inputs else []

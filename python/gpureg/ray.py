@@ -56,7 +56,10 @@ class ChunkWorker:
         )  # Ray shows an actor its own GPU as device 0
         self._plan, self._residency = plan, Residency(context, plan.fragments, plan.options, memory)
 
-    def run(self, chunk: int, known: dict[Any, Row], board: Any = None) -> tuple[int, list[Row]]:
+    def run(
+        self, chunk: int, known: dict[Any, Row], board: Any = None
+    ) -> tuple[int, list[Row], dict[int, str]]:
+        """The chunk, its rows, and the fragments that could not be used so far."""
         done, told = len(known), time.monotonic()
 
         def add(row: Row) -> None:
@@ -67,7 +70,8 @@ class ChunkWorker:
                 board.write.remote(chunk, done)
                 told = now
 
-        return chunk, run_chunk(self._plan, chunk, self._residency, known, add)
+        rows = run_chunk(self._plan, chunk, self._residency, known, add)
+        return chunk, rows, self._residency.unusable
 
 
 def register_all(
@@ -116,6 +120,7 @@ def register_all(
         ray.init()
     store = Store(Path(output), plan, resume)
     workers: list[Any] = []
+    unusable: dict[int, str] = {}
     try:
         finished = store.finished()
         known = {
@@ -125,8 +130,8 @@ def register_all(
         if known:
             workers = _start(plan, memory, actors, gpus)
             with batch_progress(progress, "aligning", len(plan.pairs), resumed) as report:
-                _run(plan, store, known, workers, report)
-        return conclude(store, plan, resumed, begin)
+                _run(plan, store, known, workers, report, unusable)
+        return conclude(store, plan, resumed, begin, unusable)
     finally:
         for worker in workers:
             ray.kill(worker)
@@ -139,8 +144,9 @@ def _run(
     known: dict[int, dict[Any, Row]],
     workers: list[Any],
     report: Report | None,
+    unusable: dict[int, str],
 ) -> None:
-    """All chunks that are left, each written as it comes back."""
+    """All chunks that are left, each written as it comes back. unusable gets what could not be used."""
     board = None if report is None else ray.remote(ProgressBoard).options(num_cpus=0).remote()
     pool = ActorPool(workers)
     for task in known.items():
@@ -150,9 +156,10 @@ def _run(
     try:
         while pool.has_next():
             try:
-                chunk, rows = pool.get_next_unordered(timeout=_POLL)
+                chunk, rows, bad = pool.get_next_unordered(timeout=_POLL)
                 store.write(chunk, rows)
-                done[chunk] = len(rows)
+                unusable.update(bad)
+                done[chunk] = len(plan.chunk(chunk))
             except TimeoutError:
                 for chunk, count in _read(board).items():
                     # A chunk that is tried again after its actor's death begins anew.

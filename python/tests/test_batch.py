@@ -169,14 +169,52 @@ def test_ten_kills(whole, timed, tmp_path):
     assert files_of(run) == files_of(whole)
 
 
+def test_ctrl_c_from_outside_loses_nothing(whole, tmp_path):
+    """A signal like that of a terminal, at several moments of one run: before a thread runs, while
+    fragments are prepared, in the middle of pairs, and more than once.
+    """
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(p for p in sys.path if p)}
+    kept = 0
+    for wanted, delay, presses in [
+        (0, 0, 1),
+        (0, 0.05, 1),
+        (30, 0, 1),
+        (30, 0.03, 5),
+        (30, 0.1, 1),
+    ]:
+        child = subprocess.Popen(
+            [sys.executable, many.__file__, str(tmp_path)],
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+            env=environment,
+        )
+        assert child.stdout.readline() == "started\n"
+        first = done = int(child.stdout.readline())
+        assert first >= kept, "what the run before had counted was lost"
+        while done < first + wanted:
+            done = int(child.stdout.readline())
+        time.sleep(delay)
+        for _ in range(presses):
+            child.send_signal(signal.SIGINT)
+            time.sleep(0.02)
+        output, errors = child.communicate(timeout=120)
+        assert child.returncode == -signal.SIGINT, errors  # not SIGABRT: C++ was waited for
+        assert "KeyboardInterrupt" in errors and "FATAL" not in errors
+        kept = max([done, *map(int, output.split())])
+        assert kept == 0 or any((tmp_path / "chunks").iterdir())
+    assert kept >= 90
+    run = many.run(tmp_path)
+    assert run.resumed >= kept
+    assert files_of(run) == files_of(whole)
+
+
 def test_ctrl_c_loses_nothing(whole, tmp_path):
     done, pressed = [], []
 
     def progress(count, total):
         done.append(count)
-        if (
-            count >= 40 and not pressed
-        ):  # once: a second one, while the run winds up, ends it at once
+        if count >= 40 and not pressed:
             pressed.append(count)
             os.kill(os.getpid(), signal.SIGINT)
 
@@ -188,21 +226,95 @@ def test_ctrl_c_loses_nothing(whole, tmp_path):
     assert files_of(run) == files_of(whole)
 
 
-def test_an_error_stops_the_run_and_keeps_the_rest(whole, tmp_path):
-    clouds = many.fragments()
-    fragments = gpureg.FragmentSet.from_clouds([*clouds[:40], tmp_path / "missing.ply"])
-    with pytest.raises(FileNotFoundError):
-        gpureg.register_all(
-            fragments, output=tmp_path / "a", progress=False
-        )  # at once, not after hours
-    gpureg.write_point_cloud(tmp_path / "missing.ply", clouds[0])
-    with open(tmp_path / "missing.ply", "r+b") as file:
-        file.truncate(1000)
-    with pytest.raises(gpureg.IoError, match="missing.ply"):
-        gpureg.register_all(
-            fragments, output=tmp_path / "a", options=few(100, 0.1), progress=False, chunk_size=8
+def test_a_file_that_is_not_there_is_named_at_once(tmp_path):
+    with pytest.raises(FileNotFoundError, match="missing.ply"):
+        gpureg.register_all([many.fragments()[0], tmp_path / "missing.ply"], output=tmp_path / "a")
+
+
+class TestABadFragment:
+    """Costs its own pairs; once it is repaired or removed, the same call does what is missing."""
+
+    BAD, COUNT = 3, 7
+    keywords = {"options": few(500, 0.08), "progress": False, "chunk_size": 4}
+
+    @pytest.fixture()
+    def folder(self, tmp_path):
+        folder = tmp_path / "scans"
+        folder.mkdir()
+        for k, cloud in enumerate(many.fragments()[: self.COUNT]):
+            gpureg.write_point_cloud(folder / f"cloud_bin_{k}.ply", cloud)
+        return folder
+
+    def damage(self, folder, size=1000):
+        path = folder / f"cloud_bin_{self.BAD}.ply"
+        whole = path.read_bytes()
+        path.write_bytes(whole[:size])
+        return path, whole
+
+    def without(self, table):
+        return [row for row in table.to_pylist() if self.BAD not in (row["i"], row["j"])]
+
+    def test_the_others_finish(self, folder, tmp_path):
+        whole = gpureg.register_all(folder, output=tmp_path / "whole", **self.keywords)
+        path, _ = self.damage(folder)
+        run = gpureg.register_all(folder, output=tmp_path / "run", **self.keywords)
+        assert list(run.unusable) == [self.BAD] and path.name in run.unusable[self.BAD]
+        assert "truncated" in run.unusable[self.BAD] and "without the fragments 3" in str(run)
+        assert run.pairs == 15 and run.table().to_pylist() == self.without(whole.table())
+        written = json.loads((tmp_path / "run" / "run.json").read_text())
+        assert list(written["unusable"]) == ["3"]
+        again = gpureg.register_all(folder, output=tmp_path / "run", **self.keywords)
+        assert (again.resumed, again.pairs, again.unusable) == (15, 15, run.unusable)
+        assert files_of(again) == files_of(run)
+
+    @pytest.mark.parametrize("interrupted", [False, True])
+    def test_repaired(self, folder, tmp_path, interrupted):
+        whole = gpureg.register_all(folder, output=tmp_path / "whole", **self.keywords)
+        path, content = self.damage(folder)
+        self.run(folder, tmp_path, interrupted)
+        path.write_bytes(content)
+        run = gpureg.register_all(folder, output=tmp_path / "run", **self.keywords)
+        assert run.resumed == 15 and not run.unusable
+        assert files_of(run) == files_of(whole)
+        assert (tmp_path / "run/run.json").read_text() == (tmp_path / "whole/run.json").read_text()
+
+    @pytest.mark.parametrize("interrupted", [False, True])
+    def test_removed(self, folder, tmp_path, interrupted):
+        path, _ = self.damage(folder)
+        self.run(folder, tmp_path, interrupted)
+        path.unlink()
+        run = gpureg.register_all(folder, output=tmp_path / "run", **self.keywords)
+        assert run.resumed == run.pairs == 15 and not run.unusable
+        whole = gpureg.register_all(folder, output=tmp_path / "whole", **self.keywords)
+        assert files_of(run) == files_of(whole)
+
+    def run(self, folder, tmp_path, interrupted):
+        if not interrupted:
+            gpureg.register_all(folder, output=tmp_path / "run", **self.keywords)
+            return
+        with pytest.MonkeyPatch.context() as patch, pytest.raises(RuntimeError, match="killed"):
+            patch.setattr(gpureg._batch.store.Store, "conclude", killed)
+            gpureg.register_all(folder, output=tmp_path / "run", **self.keywords)
+
+    def test_a_fragment_with_pairs_must_not_change(self, folder, tmp_path):
+        gpureg.register_all(folder, output=tmp_path / "run", **self.keywords)
+        self.damage(folder)
+        with pytest.raises(ValueError, match=r"fragments\[3\].fingerprint was"):
+            gpureg.register_all(folder, output=tmp_path / "run", **self.keywords)
+
+    def test_points_that_cannot_be_prepared(self, tmp_path):
+        clouds = many.fragments()[:3]
+        bad = 4000 * np.random.default_rng(3).random((30_000, 3), np.float32)  # millimetres
+        run = gpureg.register_all(
+            [clouds[0], bad, clouds[2]], output=tmp_path / "run", **self.keywords
         )
-    assert list((tmp_path / "a" / "chunks").glob("*.chunk"))
+        assert run.pairs == 1 and "nearly all of 30000" in run.unusable[1]
+
+    def test_nothing_but_bad_ones_is_an_error(self, folder, tmp_path):
+        for path in sorted(folder.iterdir())[1:]:
+            path.write_bytes(b"ply")
+        with pytest.raises(gpureg.IoError, match="no pair can be aligned: .*cloud_bin_1.ply"):
+            gpureg.register_all(folder, output=tmp_path / "run", **self.keywords)
 
 
 def test_progress_moves_within_a_chunk(tmp_path):
@@ -402,7 +514,7 @@ def test_a_changed_bit_is_not_resumed(tmp_path, suffix):
     with pytest.MonkeyPatch.context() as patch, pytest.raises(RuntimeError, match="killed"):
         patch.setattr(gpureg._batch.store.Store, "conclude", killed)
         gpureg.register_all(clouds, **keywords)
-    chunk = tmp_path / "chunks" / "000000.chunk"
+    (chunk,) = (tmp_path / "chunks").glob("000000-*.chunk")
     chunk = chunk.rename(chunk.with_suffix(suffix))
     whole = chunk.read_bytes()
     rng = random.Random(1)
@@ -410,13 +522,13 @@ def test_a_changed_bit_is_not_resumed(tmp_path, suffix):
         flipped = bytearray(whole)
         flipped[place] ^= 1 << rng.randrange(8)
         chunk.write_bytes(flipped)
-        with pytest.raises(gpureg.IoError, match=f"000000{suffix} is damaged .*checksum"):
+        with pytest.raises(gpureg.IoError, match=f"000000-.*{suffix} is damaged .*checksum"):
             gpureg.register_all(clouds, **keywords)
     chunk.write_bytes(whole)
     assert gpureg.register_all(clouds, **keywords).pairs == 3
 
 
-def killed(store):
+def killed(*_):
     raise RuntimeError("killed")
 
 

@@ -26,6 +26,14 @@ def test_folder(folder):
         gpureg.FragmentSet.from_directory(folder / "nowhere")
 
 
+def test_cameras(folder):
+    cameras = gpureg.read_cameras(folder / "cameras.txt")
+    assert {number: rows.tolist() for number, rows in cameras.items()} == {4: [[1, 2, 3]]}
+    (folder / "cameras.txt").write_text("4 0 1 2 nan 0 0 0 1\n")
+    with pytest.raises(gpureg.IoError, match="cameras.txt:1"):
+        gpureg.read_cameras(folder / "cameras.txt")
+
+
 def test_fingerprints_tell_clouds_apart(folder):
     before = gpureg.FragmentSet.from_directory(folder)
     prints = [before.fingerprint(k) for k in range(3)]

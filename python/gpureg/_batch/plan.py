@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 import hashlib
 from typing import Any
 
@@ -16,6 +17,8 @@ from ..fragments import FragmentSet
 
 #: Chunks visit pairs in tiles of so many fragments by so many: a tile's fragments fit into memory together.
 TILE = 64
+
+Key = tuple[int, int]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -48,17 +51,27 @@ class Plan:
         begin = index * self.chunk_size
         return np.asarray(self.pairs[self.order[begin : begin + self.chunk_size]])
 
+    def keys(self, index: int) -> list[Key]:
+        """The same, as numbers of fragments."""
+        return list(map(tuple, self.numbers(self.chunk(index)).tolist()))
+
+    def name(self, index: int) -> str:
+        """Of a chunk's file: another one where the chunk has other pairs."""
+        pairs = np.ascontiguousarray(self.numbers(self.chunk(index)), "<i8")
+        return f"{index:06d}-{hashlib.blake2b(pairs.tobytes(), digest_size=4).hexdigest()}"
+
     def numbers(self, pairs: npt.NDArray[np.int64]) -> npt.NDArray[np.int64]:
         """Positions to the fragments' numbers."""
-        numbers: npt.NDArray[np.int64] = np.asarray(self.fragments.numbers, np.int64)
-        return np.asarray(numbers[pairs])
+        return np.asarray(self._numbers[pairs])
+
+    @functools.cached_property
+    def _numbers(self) -> npt.NDArray[np.int64]:
+        return np.asarray(self.fragments.numbers, np.int64)
 
     def manifest(self) -> dict[str, Any]:
-        """What must be the same for a run to go on. Devices and memory may change: they change no
-        result.
-        """
+        """What a run is. Devices and memory may change: they change no result."""
         return {
-            "gpureg_run": 1,
+            "gpureg_run": 2,
             "version": _core.__version__,
             "options": options_dict(self.options),
             "chunk_size": self.chunk_size,
@@ -66,7 +79,7 @@ class Plan:
             "pairs": {
                 "count": len(self.pairs),
                 "hash": hashlib.blake2b(
-                    np.ascontiguousarray(self.pairs, "<i8").tobytes(), digest_size=16
+                    np.ascontiguousarray(self.numbers(self.pairs), "<i8").tobytes(), digest_size=16
                 ).hexdigest(),
             },
             "fragments": [

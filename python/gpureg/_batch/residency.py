@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import threading
 from collections import OrderedDict
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -14,7 +13,7 @@ import numpy.typing as npt
 from .. import _core
 from .._core import Context, PreparedCloud, RegistrationOptions, RegistrationResult
 from ..fragments import FragmentSet
-from ..preparation import pieces
+from ..preparation import pieces, prepare_usable
 
 _READERS = 4  # reading a file leaves the interpreter free
 _TOGETHER = 32  # clouds per call of prepare: enough to fill a device
@@ -43,6 +42,7 @@ class Residency:
         self._clouds: OrderedDict[int, PreparedCloud] = OrderedDict()
         self._bytes = 0
         self.prepared = 0  # preparations so far
+        self.unusable: dict[int, str] = {}  # positions of fragments, and why
         self._readers = ThreadPoolExecutor(_READERS)
 
     def close(self) -> None:
@@ -52,29 +52,31 @@ class Residency:
         self,
         pairs: npt.NDArray[np.int64],
         on_result: Callable[[int, RegistrationResult], object],
-        stop: threading.Event | None = None,
+        stop: Callable[[], bool] | None = None,
     ) -> None:
         """Calls on_result(row, result) for each row (i, j) of pairs, in order and while others are
-        under way: fragment j into fragment i.
+        under way: fragment j into fragment i. Leaves out the pairs of fragments that cannot be read
+        or prepared.
 
-        Raises Stopped where stop was set; on_result has been called for what was done.
+        Raises Stopped where stop says so; on_result has been called for what was done.
         """
         group: list[int] = []
         held: dict[int, PreparedCloud] = {}
         for row, pair in enumerate(pairs.tolist()):
-            if stop is not None and stop.is_set():
+            if stop is not None and stop():
                 break
             missing = [k for k in pair if k not in held]
             if missing and group and sum(map(_bytes_of, held.values())) >= self._memory:
                 self._align_group(pairs, group, held, on_result, stop)
                 group, held = [], {k: cloud for k, cloud in held.items() if k in pair}
             for k in missing:
-                if k not in held:
-                    held[k] = self._cloud(k, pairs[row:], stop)
-            group.append(row)
+                if k not in held and (cloud := self._cloud(k, pairs[row:], stop)) is not None:
+                    held[k] = cloud
+            if all(k in held for k in pair):
+                group.append(row)
         if group:
             self._align_group(pairs, group, held, on_result, stop)
-        if stop is not None and stop.is_set():
+        if stop is not None and stop():
             raise Stopped
 
     def _align_group(
@@ -83,13 +85,13 @@ class Residency:
         rows: Sequence[int],
         held: dict[int, PreparedCloud],
         on_result: Callable[[int, RegistrationResult], object],
-        stop: threading.Event | None,
+        stop: Callable[[], bool] | None,
     ) -> None:
         places = {k: place for place, k in enumerate(held)}
         entries = np.array([[places[j], places[i]] for i, j in pairs[rows].tolist()], np.uint32)
 
         def check(done: int) -> None:
-            if stop is not None and stop.is_set():
+            if stop is not None and stop():
                 raise Stopped
 
         _, error = _core.align_batch(
@@ -104,8 +106,10 @@ class Residency:
             raise error
 
     def _cloud(
-        self, wanted: int, ahead: npt.NDArray[np.int64], stop: threading.Event | None
-    ) -> PreparedCloud:
+        self, wanted: int, ahead: npt.NDArray[np.int64], stop: Callable[[], bool] | None
+    ) -> PreparedCloud | None:
+        if wanted in self.unusable:
+            return None
         if wanted in self._clouds:
             self._clouds.move_to_end(wanted)
             return self._clouds[wanted]
@@ -116,7 +120,7 @@ class Residency:
         for k in dict.fromkeys(ahead.ravel().tolist()):
             if len(chosen) >= room:
                 break
-            if k not in self._clouds and k != wanted:
+            if k not in self._clouds and k != wanted and k not in self.unusable:
                 chosen.append(k)
         device = self._context.backend == "cuda"
         loads = [
@@ -125,20 +129,19 @@ class Residency:
         ]
         try:
             for piece in pieces(len(chosen), self._context):
-                if stop is not None and stop.is_set():
+                if stop is not None and stop():
                     raise Stopped
-                inputs = [loads[k].result() for k in piece]
-                names = [f"fragments[{chosen[k]}]" for k in piece]
-                for k, cloud in zip(
-                    piece, _core.prepare_batch(self._context, inputs, self._options.prepare, names)
+                inputs = {chosen[k]: loads[k].result for k in piece}
+                for k, cloud in prepare_usable(
+                    self._context, inputs, self._options.prepare, self.unusable
                 ):
-                    self._clouds[chosen[k]] = cloud
+                    self._clouds[k] = cloud
                     self._bytes += _bytes_of(cloud)
-                self.prepared += len(piece)
+                    self.prepared += 1
         finally:
             for load in loads:
                 load.cancel()
-        found = self._clouds[wanted]
+        found = self._clouds.get(wanted)
         while self._bytes > self._memory and len(self._clouds) > len(chosen):
             _, old = self._clouds.popitem(last=False)
             self._bytes -= _bytes_of(old)

@@ -19,8 +19,8 @@ import pyarrow.parquet as pq
 
 from .. import _core
 from .._core import IoError
-from .plan import Plan, difference
-from .table import Key, entries_of, table_of
+from .plan import Key, Plan, difference
+from .table import entries_of, table_of
 
 Row = dict[str, Any]
 
@@ -28,11 +28,15 @@ _DIGEST = 16  # bytes before the Parquet data of a chunk: their digest
 
 
 class Store:
-    """run.json says what the run is; chunks/NNNNNN.chunk are finished chunks; results.parquet,
-    result.log and result.info, made of them at the end, replace them."""
+    """run.json says what the run is; chunks/NNNNNN-*.chunk are finished chunks, *.partial those that
+    lack pairs; results.parquet, result.log and result.info, made of them at the end, replace them.
+
+    A fragment of which there is no pair yet may change, come or go: pairs are kept, and put into the
+    chunks of the new plan.
+    """
 
     def __init__(self, folder: Path, plan: Plan, resume: bool) -> None:
-        self.folder, self._plan = folder, plan
+        self.folder, self._plan, self._manifest = folder, plan, plan.manifest()
         self._chunks = folder / "chunks"
         folder.mkdir(parents=True, exist_ok=True)
         self._lock = open(folder / "run.lock", "w")
@@ -42,38 +46,89 @@ class Store:
             self._lock.close()
             raise IoError(f"output: {folder} is in use by another run") from None
         try:
-            self._open(plan.manifest(), resume)
+            self._open(resume)
         except BaseException:
             self.close()
             raise
 
-    def _open(self, manifest: Row, resume: bool) -> None:
+    def _open(self, resume: bool) -> None:
         path = self.folder / "run.json"
         if not resume:
             path.unlink(missing_ok=True)  # first: a folder without it holds nothing
             shutil.rmtree(self._chunks, ignore_errors=True)
             for result in (self.table_path, self.log_path, self.information_path):
                 result.unlink(missing_ok=True)
+        before = None
         if path.exists():
             try:
-                before = json.loads(path.read_text())
-            except ValueError as error:
+                before = dict(json.loads(path.read_text()))
+            except (TypeError, ValueError) as error:
                 raise IoError(
                     f"output: {path} is damaged ({error}); resume=False starts anew"
                 ) from None
-            changed = difference(before, json.loads(json.dumps(manifest)))
-            if changed:
-                raise ValueError(
-                    f"output: {self.folder} holds a run that is not this one: {changed}; take another folder, or resume=False to start anew"
-                )
-        else:
-            if self._chunks.exists() or self.table_path.exists():
-                raise IoError(
-                    f"output: {self.folder} holds results without run.json; take another folder, or resume=False"
-                )
-            _write(path, lambda temporary: temporary.write_text(json.dumps(manifest, indent=1)))
-        if not self.complete:
-            self._chunks.mkdir(exist_ok=True)
+            before.pop("unusable", None)
+        elif self._chunks.exists() or self.table_path.exists():
+            raise IoError(
+                f"output: {self.folder} holds results without run.json; take another folder, or resume=False"
+            )
+        now = json.loads(json.dumps(self._manifest))
+        if before != now:
+            if before is not None:
+                self._check_goes_on(before, now)
+            self._take_over()
+            self._write_manifest()
+        elif not self._has_all_pairs():
+            self._take_over()
+
+    def _check_goes_on(self, before: Row, now: Row) -> None:
+        """Raises ValueError where the folder has pairs that are none of this run's."""
+        keys = {key for table in self._tables() for key in _keys_of(table)}
+        used = {number for key in keys for number in key}
+        changed = difference(_of_fragments(before, used), _of_fragments(now, used))
+        planned = map(tuple, self._plan.numbers(self._plan.pairs).tolist())
+        if not changed and not keys <= set(planned):
+            changed = difference(before.get("pairs"), now["pairs"], "pairs")
+        if changed:
+            raise ValueError(
+                f"output: {self.folder} holds a run that is not this one: {changed}; take another folder, or resume=False to start anew"
+            )
+
+    def _has_all_pairs(self) -> bool:
+        return self.complete and read_table(self.table_path, ["i"]).num_rows == len(
+            self._plan.pairs
+        )
+
+    def _tables(self) -> Iterator[pa.Table]:
+        """All pairs that there are, perhaps some of them twice."""
+        if self.complete:
+            yield read_table(self.table_path)
+        for pattern in ("*.chunk", "*.partial"):
+            for path in sorted(self._chunks.glob(pattern)):
+                yield read_chunk(path)
+
+    def _take_over(self) -> None:
+        """Puts what there is into the chunks of the plan. Nothing is deleted before it is there."""
+        self._chunks.mkdir(exist_ok=True)
+        finished = self._chunk_files("chunk")
+        mine = set(finished.values()) | set(self._chunk_files("partial").values())
+        strangers = [path for path in self._chunks.iterdir() if path not in mine]
+        if strangers or self.complete:
+            tables = list(self._tables())
+            places = {key: k for k, key in enumerate(key for t in tables for key in _keys_of(t))}
+            for chunk in range(self._plan.chunks):
+                rows = [places[key] for key in self._plan.keys(chunk) if key in places]
+                if rows and chunk not in finished:
+                    pool = pa.concat_tables(tables)
+                    self._write_table(chunk, pool.take(pa.array(rows)).combine_chunks())
+        for path in (*strangers, self.table_path, self.log_path, self.information_path):
+            path.unlink(missing_ok=True)
+
+    def _write_manifest(self, unusable: dict[int, str] | None = None) -> None:
+        document = {**self._manifest, **({"unusable": unusable} if unusable else {})}
+        _write(
+            self.folder / "run.json",
+            lambda temporary: temporary.write_text(json.dumps(document, indent=1)),
+        )
 
     def close(self) -> None:
         self._lock.close()
@@ -98,35 +153,49 @@ class Store:
         """Numbers of the chunks that are done."""
         if self.complete:
             return set(range(self._plan.chunks))
-        return {int(path.stem) for path in self._chunks.glob("*.chunk") if path.stem.isdigit()}
+        return set(self._chunk_files("chunk"))
+
+    def _chunk_files(self, kind: str) -> dict[int, Path]:
+        paths = {k: self._path(k, kind) for k in range(self._plan.chunks)}
+        there = set(self._chunks.glob(f"*.{kind}"))
+        return {k: path for k, path in paths.items() if path in there}
+
+    def _path(self, chunk: int, kind: str) -> Path:
+        return self._chunks / f"{self._plan.name(chunk)}.{kind}"
 
     def partial(self, chunk: int) -> dict[Key, Row]:
         """What an interrupted run has left of a chunk."""
-        path = self._chunks / f"{chunk:06d}.partial"
+        path = self._path(chunk, "partial")
         if not path.exists():
             return {}
         return {(row["i"], row["j"]): row for row in read_chunk(path).to_pylist()}
 
     def write(self, chunk: int, rows: Sequence[Row]) -> None:
-        """A finished chunk, on disk when this returns."""
-        self._write_rows(self._chunks / f"{chunk:06d}.chunk", rows)
-        (self._chunks / f"{chunk:06d}.partial").unlink(missing_ok=True)
-
-    def write_partial(self, chunk: int, rows: Sequence[Row]) -> None:
+        """Pairs of a chunk in any order, on disk when this returns. It is finished with all of them."""
+        places = {key: k for k, key in enumerate(self._plan.keys(chunk))}
         if rows:
-            self._write_rows(self._chunks / f"{chunk:06d}.partial", rows)
+            self._write_table(
+                chunk, table_of(sorted(rows, key=lambda row: places[row["i"], row["j"]]))
+            )
 
-    def _write_rows(self, path: Path, rows: Sequence[Row]) -> None:
+    def _write_table(self, chunk: int, table: pa.Table) -> None:
         stream = pa.BufferOutputStream()
-        pq.write_table(table_of(rows), stream)
+        pq.write_table(table, stream)
         data = stream.getvalue().to_pybytes()
+        finished = table.num_rows == len(self._plan.chunk(chunk))
+        path = self._path(chunk, "chunk" if finished else "partial")
         _write(path, lambda temporary: temporary.write_bytes(_digest(data) + data))
+        if finished:
+            self._path(chunk, "partial").unlink(missing_ok=True)
 
-    def conclude(self) -> None:
+    def conclude(self, unusable: dict[int, str]) -> None:
         """All chunks into one table and the two Redwood files; memory holds the aligned pairs'
-        matrices, nothing else.
+        matrices, nothing else. unusable: numbers of fragments whose pairs are missing, and why.
         """
         if not self.complete:
+            if next(self._read(), None) is None:
+                raise IoError(f"fragments: no pair can be aligned: {next(iter(unusable.values()))}")
+            self._write_manifest(unusable)
             positions = {
                 tuple(pair): k
                 for k, pair in enumerate(self._plan.numbers(self._plan.pairs).tolist())
@@ -147,7 +216,10 @@ class Store:
 
     def _read(self) -> Iterator[pa.Table]:
         for chunk in range(self._plan.chunks):
-            yield read_chunk(self._chunks / f"{chunk:06d}.chunk")
+            for path in (self._path(chunk, "chunk"), self._path(chunk, "partial")):
+                if path.exists():
+                    yield read_chunk(path)
+                    break
 
     def _merge(self, temporary: Path) -> None:
         with contextlib.ExitStack() as stack:
@@ -156,6 +228,16 @@ class Store:
                 if writer is None:
                     writer = stack.enter_context(pq.ParquetWriter(temporary, table.schema))
                 writer.write_table(table)
+
+
+def _keys_of(table: pa.Table) -> Iterator[Key]:
+    return zip(table["i"].to_pylist(), table["j"].to_pylist())
+
+
+def _of_fragments(manifest: Row, numbers: set[int]) -> Row:
+    """A manifest without its pairs, and without what it says of other fragments."""
+    fragments = [entry for entry in manifest.get("fragments", []) if entry["number"] in numbers]
+    return {**manifest, "pairs": None, "fragments": fragments}
 
 
 def read_chunk(path: Path) -> pa.Table:

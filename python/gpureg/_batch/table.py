@@ -13,8 +13,6 @@ import pyarrow as pa
 from .._core import RegistrationResult
 from ..registration import ALIGNED
 
-Key = tuple[int, int]
-
 
 def row_of(i: int, j: int, result: RegistrationResult) -> dict[str, Any]:
     """Fragment j into fragment i: target_from_source is Redwood's T_ij."""
