@@ -7,7 +7,7 @@ option(GPUREG_SLAM_DEMO "Build slam_demo with the apps (needs OpenCV and Ceres)"
 option(GPUREG_BUILD_PYTHON "Build the Python module (needs pybind11; pip does this)" OFF)
 option(GPUREG_WERROR "Treat warnings as errors (for the tests of the project itself)" OFF)
 option(GPUREG_PRECOMPILED_LIBRARIES "Compile the libraries with precompiled headers; without, ccache finds objects of other builds" ON)
-set(GPUREG_CUDA "AUTO" CACHE STRING "CUDA backend: AUTO (when nvcc is found), ON or OFF")
+set(GPUREG_CUDA "AUTO" CACHE STRING "CUDA backend: AUTO (where nvcc and a device are, for that device), ON (for every architecture) or OFF")
 set_property(CACHE GPUREG_CUDA PROPERTY STRINGS AUTO ON OFF)
 set(GPUREG_SANITIZE "" CACHE STRING "Sanitizers for every target, e.g. address,undefined or thread")
 
