@@ -113,7 +113,7 @@ struct RefineOptions {
 /// overlap of both clouds, free space.
 struct EvidenceOptions {
   /// Approximate number of points of each cloud that score a candidate, 64..65536.
-  std::uint32_t sample = 384;
+  std::uint32_t sample = 512;
   std::uint32_t modes = 24;  ///< distinct poses that are refined and verified by all points, 1..64
   float max_normal_angle = 30.0f;  ///< degrees between the normals of an inlier
   /// Two poses are one mode where their rotations differ by less than this, degrees, ...
