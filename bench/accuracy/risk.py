@@ -9,8 +9,15 @@ the poses that the left-out scene reports are false. `scenes`: leave-one-scene-o
 for which nothing is promised. Recall: of the correct poses of all left-out scenes, at the threshold
 and from 0.5 on.
 
+With --simulate: is it kept in folders whose pairs share scans? A share of the scans is bad, and a share
+of the pairs of a bad scan is false, whatever its confidence. A folder breaks a promise where a threshold
+is supported though more of all pairs are false in the long run. `scans`: by the scans of all pairs;
+`pairs`: as if these were independent; `runs`: by scans, but bad ones come in runs of five, for which
+nothing is promised. `supported`: folders with a threshold, by scans.
+
 usage: risk.py FOLDER [--building NAME=SCENE_FOLDER=RESULT.json ...]
        [--map NAME=BUILDING=SCENE_FOLDER=RECONSTRUCTION.json ...] [-o RECORD]
+       risk.py --simulate    (risk_of_scans.json beside RECORD)
 FOLDER: DOMAIN.json files of domains.py. A building has gt_all.log and gt_all.info, and its result is
 that of `gpureg batch` or the pairs.json of `gpureg reconstruct`. Of maps, the map_confidence of the
 edges counts: `pairs` of the record has the domains with the buildings, `maps` with the maps. Needs
@@ -29,6 +36,8 @@ RISKS = (0.1, 0.05, 0.01)
 FEWEST = 19  # scenes of which control_risk can promise anything
 DRAWS = 400  # with so few
 REPORTED = 0.5
+SCANS = (24, 50, 100, 200, 400)  # of a simulated folder
+BAD_SHARES, FALSE_SHARES, RUN, FOLDERS = (0.002, 0.01, 0.02, 0.06, 0.1), (0.5, 1), 5, 200
 ONE_SCENE = ("fgr", "dragon", "kitchen", "kitti", "lidar")  # pairs of one sensor in one place
 
 
@@ -127,12 +136,56 @@ def measured(scenes, risk):
     }
 
 
+def simulated_folder(rng, scans, bad_share, false_share, run):
+    """Pairs of all scans, confidences and labels; most are confident, right or not."""
+    bad = np.repeat(rng.random(-(-scans // run)) < bad_share, run)[:scans]
+    pairs = np.argwhere(np.tri(scans, k=-1))
+    false = bad[pairs].any(1) & (rng.random(len(pairs)) < false_share)
+    return pairs, 1 - rng.random(len(pairs)) ** 3, ~false
+
+
+def simulated(scans, bad_share, false_share, draws):
+    """By risk: shares of the folders that break the promise, and of those with a threshold."""
+    true_risk = false_share * (1 - (1 - bad_share) ** 2)
+    counts = {risk: dict.fromkeys(("scans", "pairs", "runs"), 0) for risk in RISKS}
+    for draw in range(draws):
+        for kind, run in (("scans", 1), ("pairs", 1), ("runs", RUN)):
+            rng = np.random.default_rng([draw, scans])
+            pairs, confidences, correct = simulated_folder(rng, scans, bad_share, false_share, run)
+            of = None if kind == "pairs" else pairs
+            for risk in RISKS:
+                found = gpureg.control_risk(confidences, correct, scans=of, max_risk=risk)
+                counts[risk][kind] += found.supported
+    out = []
+    for risk, of in counts.items():
+        row = {"draws": draws, "scans": scans, "bad": bad_share, "false": false_share, "risk": risk}
+        row |= {"supported": of["scans"] / draws}
+        broken = {kind: count / draws if true_risk > risk else 0.0 for kind, count in of.items()}
+        out.append(row | {"broken": broken})
+    return out
+
+
+def simulate(arguments):
+    rows = []
+    for scans in SCANS:
+        for bad_share in BAD_SHARES:
+            for false_share in FALSE_SHARES:
+                draws = min(FOLDERS, FOLDERS * 40 // scans)  # large ones take time
+                rows += simulated(scans, bad_share, false_share, draws)
+                print(*rows[-len(RISKS) :], sep="\n", flush=True)
+    arguments.output = arguments.output.with_name("risk_of_scans.json")
+    record.write(arguments, "bench/accuracy/risk.py --simulate", {"rows": rows})
+
+
 def main():
     parser = record.parser(__doc__, "risk.json")
-    parser.add_argument("folder", type=pathlib.Path)
+    parser.add_argument("folder", type=pathlib.Path, nargs="?")
+    parser.add_argument("--simulate", action="store_true")
     parser.add_argument("--building", nargs="+", default=[])
     parser.add_argument("--map", nargs="+", default=[])
     arguments = parser.parse_args()
+    if arguments.simulate:
+        return simulate(arguments)
     scenes = []
     for path in sorted(arguments.folder.glob("*.json")):
         scenes += scenes_of_domain(path)

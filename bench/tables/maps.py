@@ -287,7 +287,29 @@ def promised_risk():
     return [*rows, "", source(record) + "."]
 
 
+def risk_of_scans():
+    """Of the shares of bad scans, the one of which most folders break the promise."""
+    record = load("risk_of_scans.json")
+    rows = [
+        "| scans | promised, % | broken, % | as independent pairs, % | bad scans in runs of five, % | with a threshold, of 0.2 % bad scans, % | of 1 %, % |",
+        "| --- | --- | --- | --- | --- | --- | --- |",
+    ]
+    for scans, risk in dict.fromkeys((row["scans"], row["risk"]) for row in record["rows"]):
+        of = [row for row in record["rows"] if (row["scans"], row["risk"]) == (scans, risk)]
+        worst = [max(row["broken"][kind] for row in of) for kind in ("scans", "pairs", "runs")]
+        use = [
+            row["supported"]
+            for bad in (0.002, 0.01)
+            for row in of
+            if (row["bad"], row["false"]) == (bad, 1)
+        ]
+        figures = " | ".join(f"{100 * share:.0f}" for share in worst + use)
+        rows.append(f"| {scans} | {100 * risk:.0f} | {figures} |")
+    return [*rows, "", source(record) + "."]
+
+
 TABLES = {
+    "risk_of_scans": risk_of_scans,
     "maps": maps,
     "maps_repeated": maps_repeated,
     "maps_short": maps_short,
