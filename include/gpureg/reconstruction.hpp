@@ -181,7 +181,7 @@ class VoxelMap {
   explicit VoxelMap(float voxel_size);
 
   /// Adds the finite points of a scan, moved by map_from_scan; normals where the view has them.
-  /// @throws InvalidArgument as PointCloudView::validate(), and for a pose that is not finite.
+  /// @throws InvalidArgument as PointCloudView::validate(), and for a pose that is not rigid.
   void add(const PointCloudView& scan, const UnalignedIsometry3d& map_from_scan);
 
   std::size_t size() const { return cells_.size(); }  ///< number of voxels

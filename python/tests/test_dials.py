@@ -135,11 +135,11 @@ def test_voxel_size_suggestions_show_what_they_hold(clouds):
     [
         (
             lambda t: t.T,
-            r"target_from_source: its last row is \[5, 6, 7, 1\], expected \[0, 0, 0, 1\]; it looks transposed",
+            r"target_from_source is no rigid motion: its last row is \[5, 6, 7, 1\], expected \[0, 0, 0, 1\]; it looks transposed",
         ),
         (
             lambda t: t + np.diag([0, 0, 0, 1]),
-            r"target_from_source: its last row is \[0, 0, 0, 2\], expected \[0, 0, 0, 1\]$",
+            r"target_from_source is no rigid motion: its last row is \[0, 0, 0, 2\], expected \[0, 0, 0, 1\]$",
         ),
         (
             lambda t: t @ np.diag([1.1, 1.1, 1.1, 1]),
@@ -151,7 +151,7 @@ def test_voxel_size_suggestions_show_what_they_hold(clouds):
         ),
         (
             lambda t: t + np.diag([0, np.nan, 0], -1),
-            r"target_from_source\[2, 1\] is nan, expected a finite number",
+            r"target_from_source is no rigid motion: its element \[2, 1\] is nan, expected a finite number",
         ),
         (lambda t: t[:3], r"target_from_source: expected shape \(4, 4\), got \(3, 4\)"),
     ],

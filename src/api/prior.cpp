@@ -5,6 +5,7 @@
 
 #include "api/frames.hpp"
 #include "common/coordinates.hpp"
+#include "common/rigid.hpp"
 #include "common/validate.hpp"
 #include "math/trigonometry.hpp"
 
@@ -17,8 +18,6 @@ constexpr double kRadians = 3.14159265358979323846 / 180.0;
 constexpr double kRounding = 1e-6;
 /// Shortest direction, far above the rounding of its components.
 constexpr double kMinNorm = 1e-9;
-/// Largest deviation of R R' from the identity: poses written with few digits pass.
-constexpr double kMaxSkew = 1e-3;
 
 void require_direction(const Eigen::Vector3d& v, const std::string& name) {
   const std::string field = name + ".norm";
@@ -45,12 +44,7 @@ void RegistrationPrior::validate(const std::string& name) const {
     require_degrees(gravity->max_angle, name + ".gravity.max_angle");
   }
   if (!pose) return;
-  const Eigen::Matrix4d m = pose->target_from_source.matrix();
-  const Eigen::Matrix3d r = m.topLeftCorner<3, 3>();
-  if (!m.allFinite() ||
-      (r * r.transpose() - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff() > kMaxSkew ||
-      r.determinant() < 0)
-    throw InvalidArgument(name + ".pose.target_from_source is no rigid motion");
+  require_rigid(pose->target_from_source, name + ".pose.target_from_source");
   require_degrees(pose->max_rotation, name + ".pose.max_rotation");
   const std::string field = name + ".pose.max_translation";
   require(std::isfinite(pose->max_translation) && pose->max_translation > 0, field.c_str(),

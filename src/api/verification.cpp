@@ -9,6 +9,7 @@
 #include "api/variants.hpp"
 #include "api/verify_by_surfaces.hpp"
 #include "common/in_halves.hpp"
+#include "common/rigid.hpp"
 #include "confidence/calibrate_modes.hpp"
 
 namespace gpureg {
@@ -17,16 +18,6 @@ namespace {
 /// Poses of a pair that go through the engine together: enough to fill a device, few enough for its
 /// memory.
 constexpr std::size_t kPosesPerCall = 64;
-
-void check_pose(const UnalignedIsometry3d& pose, const std::string& name) {
-  const Eigen::Matrix3d r = pose.linear();
-  // A float pose has errors of 1e-6; more than 1e-3 is a scale, a shear or a mirror image.
-  constexpr double kTolerance = 1e-3;
-  if (!pose.matrix().allFinite() ||
-      (r * r.transpose() - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff() > kTolerance ||
-      r.determinant() < 0)
-    throw InvalidArgument(name + " is no rigid motion");
-}
 
 /// One pair whose poses are verified.
 struct VerifiedPair : AlignedPair {
@@ -173,7 +164,7 @@ Verifications verify_pairs(const Context& context, const std::vector<PreparedClo
   check_pairs(context, clouds, pairs, options, matches.size == 0);
   for (std::size_t p = 0; p < poses.size(); ++p)
     for (std::size_t k = 0; k < poses[p].size(); ++k)
-      check_pose(poses[p][k], "poses[" + std::to_string(p) + "][" + std::to_string(k) + "]");
+      require_rigid(poses[p][k], "poses[" + std::to_string(p) + "][" + std::to_string(k) + "]");
 
   Engine& engine = *Access::engine(context);
   RegistrationOptions by_evidence = options;

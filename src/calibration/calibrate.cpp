@@ -6,6 +6,7 @@
 
 #include "calibration/halves.hpp"
 #include "calibration/labels.hpp"
+#include "common/rigid.hpp"
 #include "common/validate.hpp"
 #include "gpureg/calibration.hpp"
 #include "gpureg/voxel_size.hpp"
@@ -40,14 +41,8 @@ void check_poses(const std::vector<UnalignedIsometry3d>& poses, std::size_t clou
     throw InvalidArgument("world_from_cloud has " + std::to_string(poses.size()) +
                           " poses, but there are " + std::to_string(clouds) + " clouds");
   for (std::size_t k = 0; k < poses.size(); ++k) {
-    const Eigen::Matrix4d& m = Eigen::Matrix4d(poses[k].matrix());
-    if (m.array().isNaN().all()) continue;
-    const Eigen::Matrix3d r = m.topLeftCorner<3, 3>();
-    constexpr double kTolerance = 1e-3;  // of a float pose 1e-6; a scale or a shear is far more
-    if (!m.allFinite() ||
-        (r * r.transpose() - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff() > kTolerance ||
-        r.determinant() < 0)
-      throw InvalidArgument("world_from_cloud[" + std::to_string(k) + "] is no rigid motion");
+    if (poses[k].matrix().array().isNaN().all()) continue;
+    require_rigid(poses[k], "world_from_cloud[" + std::to_string(k) + "]");
   }
 }
 

@@ -19,7 +19,7 @@ namespace gpureg::files {
 template <int Size, typename Take>
 void read_blocks(const std::string& path, Take&& take) {
   const auto columns = std::to_string(Size);
-  TextFile file(path);
+  TextFile file(path, '#');
   while (file.next()) {
     if (file.fields().size() != 3)
       file.fail("a block starts with " + std::to_string(file.fields().size()) +

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <sstream>
 
+#include "common/rigid.hpp"
 #include "evaluation/rigid.hpp"
 #include "files/text_file.hpp"
 #include "gpureg/error.hpp"
@@ -14,7 +15,8 @@
 namespace gpureg::evaluation {
 namespace {
 
-constexpr std::size_t kTumFields = 8, kKittiFields = 12, kNumberFields = 1, kRowFields = 4;
+constexpr std::size_t kTumFields = 8, kKittiFields = 12, kNumberFields = 1, kRowFields = 4,
+                      kMatrixFields = 16;
 /// Files carry six digits, which leaves 1e-6; the bound only detects columns that are no
 /// quaternion.
 constexpr double kNormTolerance = 1e-3;
@@ -32,12 +34,13 @@ TrajectoryFormat format_of(const files::TextFile& file) {
       return TrajectoryFormat::kitti;
     case kNumberFields:
     case kRowFields:
+    case kMatrixFields:
       return TrajectoryFormat::blocks;
     default:
       expect_fields(
           file, kTumFields,
           "8 (TUM: time tx ty tz qx qy qz qw), 12 (KITTI: rows of a pose), 1 (number of a "
-          "4 x 4 block) or 4 (a row of one without number)");
+          "4 x 4 block), 4 (a row of one without number) or 16 (a whole one)");
       return TrajectoryFormat::automatic;
   }
 }
@@ -70,16 +73,21 @@ StampedPose kitti_pose(const files::TextFile& file, std::size_t place) {
 StampedPose block_pose(files::TextFile& file, std::size_t place) {
   StampedPose pose;
   pose.time = static_cast<double>(place);
-  if (file.fields().size() != kRowFields) {
+  const auto is_matrix = [&] {
+    return file.fields().size() == kRowFields || file.fields().size() == kMatrixFields;
+  };
+  if (!is_matrix()) {
     expect_fields(file, kNumberFields, "1: the number of a 4 x 4 block");
     pose.time = file.number(0, "number");
     if (!file.next()) file.fail("the file ends within a 4 x 4 block");
   }
+  const bool whole = file.fields().size() == kMatrixFields;
   for (int row = 0; row < 4; ++row) {
-    if (row > 0 && !file.next()) file.fail("the file ends within a 4 x 4 block");
-    expect_fields(file, kRowFields, "4: a row of a pose");
+    if (row > 0 && !whole && !file.next()) file.fail("the file ends within a 4 x 4 block");
+    if (!whole) expect_fields(file, kRowFields, "4: a row of a pose");
     for (int column = 0; column < 4; ++column)
-      pose.world_from_body(row, column) = file.number(static_cast<std::size_t>(column), "pose");
+      pose.world_from_body(row, column) =
+          file.number(static_cast<std::size_t>(whole ? 4 * row + column : column), "pose");
   }
   check_rigid(file, pose.world_from_body);
   return pose;
@@ -120,10 +128,12 @@ Trajectory read_trajectory(const std::string& path, TrajectoryFormat format) {
 void write_trajectory(const std::string& path, const Trajectory& trajectory) {
   std::string text = "# time tx ty tz qx qy qz qw\n";
   for (const StampedPose& pose : trajectory) {
+    const std::string why =
+        std::isfinite(pose.time) ? why_not_rigid(pose.world_from_body) : "its time is not finite";
+    if (!why.empty())
+      throw InvalidArgument("the pose at time " + std::to_string(pose.time) +
+                            " is not rigid: " + why);
     const Eigen::Matrix3d turn = pose.world_from_body.topLeftCorner<3, 3>();
-    if (!std::isfinite(pose.time) || !pose.world_from_body.allFinite() ||
-        !(turn.transpose() * turn).isIdentity(kNormTolerance) || turn.determinant() < 0)
-      throw InvalidArgument("the pose at time " + std::to_string(pose.time) + " is not rigid");
     Eigen::Quaterniond q = Eigen::Quaterniond(turn).normalized();
     if (q.w() < 0) q.coeffs() *= -1;  // one sign of the two
     const Eigen::Vector3d t = pose.world_from_body.topRightCorner<3, 1>();

@@ -7,6 +7,7 @@
 #include "api/raw_cloud.hpp"
 #include "api/stray_points.hpp"
 #include "common/coordinates.hpp"
+#include "common/rigid.hpp"
 #include "common/validate.hpp"
 #include "common/whole.hpp"
 #include "common/without_features.hpp"
@@ -40,15 +41,7 @@ PointCloud seen_surface(const Context& context, const PointCloudView& scan,
   return out;
 }
 
-void check_rigid(const UnalignedIsometry3d& pose) {
-  const Eigen::Matrix3d r = pose.linear();
-  // A float pose has errors of 1e-6; more than 1e-3 is a scale, a shear or a mirror image.
-  constexpr double kTolerance = 1e-3;
-  if (!pose.matrix().allFinite() ||
-      (r * r.transpose() - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff() > kTolerance ||
-      r.determinant() < 0)
-    throw InvalidArgument("map_from_scan is no rigid motion");
-}
+void check_rigid(const UnalignedIsometry3d& pose) { require_rigid(pose, "map_from_scan"); }
 
 std::vector<std::size_t> kept_rows(const PointCloudView& view, const PrepareOptions& options) {
   const WithoutStrayPoints without(raw_cloud(view), options);

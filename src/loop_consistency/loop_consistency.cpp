@@ -4,6 +4,7 @@
 #include <cmath>
 #include <string>
 
+#include "common/rigid.hpp"
 #include "fields/loop_consistency.hpp"
 #include "fields/scale.hpp"
 #include "fields/validate.hpp"
@@ -19,13 +20,7 @@ double probability(double value, const std::string& name) {
 }
 
 const UnalignedIsometry3d& rigid(const UnalignedIsometry3d& pose, const std::string& name) {
-  const Eigen::Matrix3d r = pose.linear();
-  const bool fine =
-      pose.matrix().allFinite() &&
-      (r * r.transpose() - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff() < 1e-3 &&
-      r.determinant() > 0 &&
-      (pose.matrix().row(3) - Eigen::RowVector4d(0, 0, 0, 1)).cwiseAbs().maxCoeff() == 0;
-  if (!fine) throw InvalidArgument(name + " is no rigid motion");
+  require_rigid(pose, name);
   return pose;
 }
 

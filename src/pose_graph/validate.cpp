@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "pose_graph/validate.hpp"
+#include "common/rigid.hpp"
 
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
@@ -12,8 +13,6 @@
 namespace gpureg::pose_graph {
 namespace {
 
-/// Files carry six digits; what is further from a rotation than this is a mistake.
-constexpr double kRigidTolerance = 1e-3;
 /// Asymmetry, and negative eigenvalues, that rounding explains: share of the largest entry.
 constexpr double kSymmetryTolerance = 1e-6;
 constexpr double kEigenvalueTolerance = 1e-9;
@@ -61,12 +60,8 @@ void require_pose(const UnalignedIsometry3d& pose, const std::string& name) {
       require(std::isfinite(m(row, column)) && std::abs(m(row, column)) <= kFarthest,
               name + "(" + std::to_string(row) + ", " + std::to_string(column) + ")",
               m(row, column), "a finite number up to 1e12");
-  const Eigen::Matrix3d r = m.topLeftCorner<3, 3>();
-  const double off = (r * r.transpose() - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff();
-  if (off > kRigidTolerance || r.determinant() < 0)
-    throw InvalidArgument(name + " is not rigid: its rotation R has determinant " +
-                          shown(r.determinant()) + ", and R R' differs from the identity by " +
-                          shown(off));
+  const std::string why = why_not_rigid(m);
+  if (!why.empty()) throw InvalidArgument(name + " is not rigid: " + why);
 }
 
 void require_information(const UnalignedMatrix6d& information, const std::string& name) {

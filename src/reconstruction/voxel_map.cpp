@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "common/float_origin.hpp"
+#include "common/rigid.hpp"
 #include "common/validate.hpp"
 #include "gpureg/reconstruction.hpp"
 
@@ -29,7 +30,7 @@ std::size_t VoxelMap::Hash::operator()(const Key& key) const {
 
 void VoxelMap::add(const PointCloudView& scan, const UnalignedIsometry3d& map_from_scan) {
   scan.validate();
-  if (!map_from_scan.matrix().allFinite()) throw InvalidArgument("map_from_scan is not finite");
+  require_rigid(map_from_scan, "map_from_scan");
   has_normals_ |= scan.normals != nullptr;
   const Eigen::Vector3d origin(scan.origin[0], scan.origin[1], scan.origin[2]);
   for (std::size_t k = 0; k < scan.size; ++k) {

@@ -142,6 +142,8 @@ TEST(Verification, BadInputIsNamed) {
   };
   refused({{0, 1}}, {{scene.truth, bad}}, {"poses[0][1]", "rigid"});
   refused({{0, 1}}, {{no_pose()}}, {"poses[0][0]", "rigid"});
+  bad.matrix() = scene.truth.matrix().transpose();
+  refused({{0, 1}}, {{bad}}, {"poses[0][0]", "last row", "looks transposed"});
   refused({{0, 1}}, {}, {"poses", "0", "1"});
   refused({{0, 2}}, {{}}, {"pairs[0]", "2"});
   test::expect_error<InvalidArgument>(

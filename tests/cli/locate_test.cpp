@@ -125,8 +125,9 @@ TEST_F(Locate, WhatHasChangedIsLabelled) {
   EXPECT_EQ(posed.status, 0) << posed.err;
   EXPECT_FALSE(json_of(json).contains("located"));
   EXPECT_EQ(change(write_cloud(other, "stranger.ply", sticks()), {}).status, 1);
-  other.write("pose.txt", "1 0 0");
-  expect_refused({"change", scan, folder.path(), "--pose", other / "pose.txt"}, {"pose.txt", "16"});
+  other.write("pose.txt", "1 0 0 0 0 1");
+  expect_refused({"change", scan, folder.path(), "--pose", other / "pose.txt"},
+                 {"pose.txt:1", "6 fields", "4 x 4"});
   expect_refused({"change", scan, folder.path(), "--json", scan}, {"scan.ply"});
   expect_refused({"change", scan, folder.path(), "--tolerance", "0"}, {"tolerance is 0"});
 }

@@ -156,6 +156,16 @@ TEST_F(WrongInput, Arguments) {
   MapBuilder builder(map_options());
   expect_error<InvalidArgument>([&] { builder.add_scan(context, query.scan.view(), mirror); },
                                 {"rigid motion"});
+  UnalignedIsometry3d transposed = UnalignedIsometry3d::Identity();
+  transposed.matrix()(3, 0) = 2;
+  expect_error<InvalidArgument>([&] { builder.add_scan(context, query.scan.view(), transposed); },
+                                {"looks transposed"});
+  expect_error<InvalidArgument>(
+      [&] {
+        localization::find_changes(context, query.scan.view(), map, transposed,
+                                   localization::ChangeOptions::from_voxel_size(kVoxel));
+      },
+      {"looks transposed"});
   LocateOptions options = LocateOptions::from_voxel_size(kVoxel);
   options.candidates = 0;
   expect_error<InvalidArgument>([&] { locate(context, {query.scan.view()}, map, options); },

@@ -8,9 +8,13 @@
 
 namespace gpureg::cli {
 
-/// Poses of a text file: 4 x 4 matrices row by row, separated by anything blank, or the blocks of a
-/// Redwood log. Lines that begin with # are comments. Throws IoError naming file and line.
+/// Poses of a text file: 4 x 4 matrices row by row, or 16 numbers a line, or the blocks of a
+/// Redwood log. What follows a # is a comment. @throws IoError naming file and line: more or less
+/// numbers, a matrix that is no rigid motion, as a transposed one.
 std::vector<UnalignedIsometry3d> read_initial_poses(const std::string& path);
+
+/// The only pose of such a file. @throws IoError.
+UnalignedIsometry3d read_pose(const std::string& path);
 
 /// The verified poses as a result: modes in descending order of their confidence, aligned where the
 /// first reaches min_confidence.

@@ -11,9 +11,7 @@
 #include "gpureg/evaluation/trajectory.hpp"
 
 namespace gpureg::cli {
-namespace {
 
-/// Whether the first line with content has three fields, as the blocks of a Redwood log.
 bool is_log(const std::string& path) {
   std::ifstream file(path);
   for (std::string line; std::getline(file, line);) {
@@ -24,6 +22,8 @@ bool is_log(const std::string& path) {
   }
   return false;
 }
+
+namespace {
 
 [[noreturn]] void fail(const std::string& path, const std::string& why) {
   throw IoError(path + ": " + why);

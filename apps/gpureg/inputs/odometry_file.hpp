@@ -8,6 +8,9 @@
 
 namespace gpureg::cli {
 
+/// Whether the first line with content has three fields, as the blocks of a Redwood log.
+bool is_log(const std::string& path);
+
 /// Relative poses of scans from a file. A trajectory (TUM, whose times are numbers of fragments, or
 /// poses.txt) gives those of consecutive scans of the folder; a Redwood log gives its pairs.
 /// @throws IoError naming the file: no such file, numbers that the folder lacks, nothing in it.

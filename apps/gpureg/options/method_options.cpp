@@ -15,7 +15,7 @@ namespace gpureg::cli {
 namespace {
 
 /// "evidence" of "evidence.sample=1024", "min_confidence" of "min_confidence=0.5".
-std::string first_name(const std::string& assignment) {
+std::string group_of(const std::string& assignment) {
   return assignment.substr(0, assignment.find_first_of(".="));
 }
 
@@ -26,7 +26,7 @@ void refuse_idle(const RegistrationOptions& options, const std::string& assignme
       quadruples ? std::vector<std::string>{"compatibility", "evidence", "min_confidence",
                                             "accept_symmetry", "calibration"}
                  : std::vector<std::string>{"quadruples"};
-  if (std::find(idle.begin(), idle.end(), first_name(assignment)) != idle.end())
+  if (std::find(idle.begin(), idle.end(), group_of(assignment)) != idle.end())
     throw InvalidArgument("--set " + assignment + " does nothing with the method " +
                           to_string(options.method));
 }
@@ -78,6 +78,18 @@ void MethodOptions::add_calibration_to(Verb verb) {
               "where it promises a risk");
 }
 
+void MethodOptions::refuse(const std::vector<std::string>& options, const std::string& why) const {
+  for (const std::string& option : options)
+    if (given(option)) throw InvalidArgument(option + " does nothing " + why);
+}
+
+void MethodOptions::refuse_set_outside(const std::vector<std::string>& groups,
+                                       const std::string& why) const {
+  for (const std::string& assignment : set)
+    if (std::find(groups.begin(), groups.end(), group_of(assignment)) == groups.end())
+      throw InvalidArgument("--set " + assignment + " does nothing " + why);
+}
+
 void MethodOptions::note_calibration() const {
   if (calibration.empty()) return;
   const CalibrationFile file = read_calibration(calibration);
@@ -93,7 +105,7 @@ void MethodOptions::note_calibration() const {
 
 bool MethodOptions::sets_confidence() const {
   return min_score.has_value() || std::any_of(set.begin(), set.end(), [](const std::string& text) {
-           return first_name(text) == "min_confidence";
+           return group_of(text) == "min_confidence";
          });
 }
 

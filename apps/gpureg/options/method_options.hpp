@@ -34,6 +34,10 @@ struct MethodOptions {
 
   /// Whether the user gave a confidence to report from, by --min-score or --set.
   bool sets_confidence() const;
+  /// Refuse what would do nothing: these options where the user gave them, and any --set outside
+  /// these groups. @param why as "with --pose". @throws InvalidArgument naming the option.
+  void refuse(const std::vector<std::string>& options, const std::string& why) const;
+  void refuse_set_outside(const std::vector<std::string>& groups, const std::string& why) const;
 
   /// Throws InvalidArgument naming field and value, or options that do not go together.
   RegistrationOptions registration() const;

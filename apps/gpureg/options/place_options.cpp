@@ -65,6 +65,10 @@ void choose_voxel_size(MethodOptions& method, const MapInput& input) {
   if (method.given("--voxel-size") && (method.automatic_voxel_size || method.voxel_size != of_map))
     throw InvalidArgument("--voxel-size is not that of " + input.path + ", which was made with " +
                           significant(static_cast<double>(of_map), 6));
+  for (const std::string& assignment : method.set)
+    if (assignment.rfind("prepare.", 0) == 0)
+      throw InvalidArgument("--set " + assignment + " does nothing in " + input.path +
+                            ": a saved map is prepared, and scans as it was");
   method.voxel_size = of_map;
 }
 

@@ -128,6 +128,9 @@ void add_audit(CommandLine& line) {
   verb.flag("--quiet", o->quiet, "No progress, no summary");
   verb.run([o] {
     o->method.registration();  // reports bad options before the clouds are read
+    o->method.refuse({"--min-score"}, "in an audit: connections have verdicts of their own");
+    if (o->mended.empty())
+      o->method.refuse({"--seed", "--quality"}, "without --mend: no pair is aligned");
     choose_voxel_size(o->method, o->folder);
     return run_audit(*o);
   });

@@ -136,6 +136,7 @@ int run(CalibrateOptions o) {
                           ", expected a share between 0 and 1");
   if (!o.scenes.empty() && !o.max_risk) throw InvalidArgument("--scenes needs --max-risk");
   o.method.registration();  // what is wrong with it shall be said before clouds are read
+  o.method.refuse({"--min-score"}, "in a calibration: poses of every confidence count");
   if (o.method.preset == "loopsmart")
     throw InvalidArgument("--preset loopsmart has no confidence to calibrate");
   std::vector<NamedPath> inputs = {{"DIR", o.folder}, {"--trajectory", o.trajectory}};

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "gpureg/change.hpp"
 
-#include <fstream>
 #include <iostream>
 #include <memory>
 #include <optional>
 
 #include "command.hpp"
 #include "gpureg/error.hpp"
+#include "inputs/initial_poses.hpp"
 #include "inputs/map_input.hpp"
 #include "json/json.hpp"
 #include "json/json_file.hpp"
@@ -40,16 +40,6 @@ struct Options {
   std::optional<double> tolerance;  // none: from the voxel size
 };
 
-/// 16 numbers, row by row. Throws IoError.
-UnalignedIsometry3d read_pose(const std::string& path) {
-  std::ifstream stream(path);
-  UnalignedIsometry3d pose = no_pose();
-  for (int k = 0; k < 16; ++k)
-    if (!(stream >> pose.matrix()(k / 4, k % 4)))
-      throw IoError(path + ": expected the 16 numbers of map_from_scan, row by row");
-  return pose;
-}
-
 Json counts(const PointChanges& changes) {
   Json json{{"points", changes.labels.size()}};
   for (const ChangeLabel label : kLabels)
@@ -67,11 +57,10 @@ void print(const char* name, const PointChanges& changes) {
   std::cout << "\n";
 }
 
-/// The pose of the scan, given or found; none: it is not there.
-std::optional<UnalignedIsometry3d> pose_of(const Options& o, const Context& context,
-                                           const PointCloudView& scan, const PreparedMap& map,
-                                           const LocateOptions& options, Json& record) {
-  if (!o.pose.empty()) return read_pose(o.pose);
+/// The pose of the scan; none: it is not there.
+std::optional<UnalignedIsometry3d> locate_scan(const Options& o, const Context& context,
+                                               const PointCloudView& scan, const PreparedMap& map,
+                                               const LocateOptions& options, Json& record) {
   const LocateResult result =
       localization::locate(context, {scan}, map, options, {o.place.prior()}, {o.scan}).front();
   record["located"] = to_json(result, o.scan);
@@ -88,12 +77,18 @@ std::optional<UnalignedIsometry3d> pose_of(const Options& o, const Context& cont
 int run(Options o) {
   o.method.registration();  // what is wrong with it shall be said before clouds are read
   o.place.check();
-  if (!o.pose.empty()) read_pose(o.pose);
+  if (!o.pose.empty()) {
+    const std::string why = "with --pose: the scan is not searched for";
+    o.method.refuse({"--quality", "--seed", "--min-score", "--calibration", "--up", "--near"}, why);
+    o.method.refuse_set_outside({"prepare"}, why);
+  }
   check_outputs({{"--json", o.json}, {"--scan-ply", o.scan_ply}, {"--map-ply", o.map_ply}},
                 {{"SCAN", o.scan},
                  {"MAP", o.map},
                  {"--pose", o.pose},
                  {"--calibration", o.method.calibration}});
+  std::optional<UnalignedIsometry3d> pose;
+  if (!o.pose.empty()) pose = read_pose(o.pose);
   const Context context = o.method.context();
   const MapInput input(o.map);
   choose_voxel_size(o.method, input);
@@ -110,7 +105,7 @@ int run(Options o) {
   Json record;
   record["gpureg"] = "change";
   record["environment"] = environment(context);
-  const auto pose = pose_of(o, context, view, map, options, record);
+  if (!pose) pose = locate_scan(o, context, view, map, options, record);
   if (pose) {
     const ChangeResult result = localization::find_changes(context, view, map, *pose, change);
     std::cout << "inliers  " << percent(result.inlier_ratio) << " %\n";
@@ -140,8 +135,8 @@ void add_change(CommandLine& line) {
   o->method.add_to(verb);
   o->place.add_to(verb);
   verb.option("--pose", o->pose,
-              "File with the 16 numbers of map_from_scan, row by row, which is refined; without, "
-              "the scan is located");
+              "File with map_from_scan, a 4 x 4 matrix row by row, which is refined; without, the "
+              "scan is located");
   verb.option("--tolerance", o->tolerance,
               "Surfaces closer together are the same, metres (without: a voxel)");
   verb.option("--scan-ply", o->scan_ply, "Write the scan with labels, probabilities and colours");

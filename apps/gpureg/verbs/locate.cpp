@@ -94,6 +94,13 @@ int run(LocateRun o) {
     throw InvalidArgument("one file is given, expected scans and then the map");
   o.method.registration();  // what is wrong with it shall be said before clouds are read
   o.place.check();
+  if (o.scans().empty()) {
+    const std::string why = "without a scan";
+    o.method.refuse({"--quality", "--seed", "--min-score", "--calibration", "--viewpoint", "--up",
+                     "--near", "--json"},
+                    why);
+    o.method.refuse_set_outside({"prepare"}, why);
+  }
   std::vector<NamedPath> inputs{{"MAP", o.map()}, {"--calibration", o.method.calibration}};
   for (const std::string& file : o.scans()) inputs.push_back({"SCAN", file});
   check_outputs({{"--json", o.json}, {"--save-map", o.save_map}}, inputs);

@@ -326,6 +326,10 @@ void add_reconstruct(CommandLine& line) {
       throw InvalidArgument(
           "--calibration scales confidences that are made here, --results has "
           "its own");
+    if (!o->results.empty() && o->no_audit)
+      o->method.refuse({"--seed", "--quality", "--min-score"},
+                       "with --results and --no-audit: no pair is aligned");
+    if (o->no_map) o->method.refuse({"--map-voxel-size"}, "with --no-map");
     check_output_folder(*o);
     choose_voxel_size(o->method, o->folder);
     if (!o->quiet) o->method.note_calibration();

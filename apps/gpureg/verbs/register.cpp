@@ -169,6 +169,8 @@ void check_initial(const RegisterOptions& o) {
       throw InvalidArgument("--refine-initial and --ignore-alternatives need --initial");
     return;
   }
+  if (o.ignore_alternatives)
+    o.method.refuse({"--seed", "--quality"}, "with --ignore-alternatives: nothing is searched");
   if (!o.up.empty()) throw InvalidArgument("--initial verifies given poses, --up is for a search");
   if (o.time_budget)
     throw InvalidArgument("--initial verifies given poses, --time-budget is for a search");

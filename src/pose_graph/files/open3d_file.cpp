@@ -3,6 +3,7 @@
 #include <charconv>
 #include <cmath>
 
+#include "common/rigid.hpp"
 #include "gpureg/error.hpp"
 #include "gpureg/files.hpp"
 #include "gpureg/pose_graph/files.hpp"
@@ -15,20 +16,15 @@ namespace {
 using json::Document;
 using json::Value;
 
-constexpr double kRotationTolerance = 1e-3;
-
 /// Open3D writes matrices column by column.
 UnalignedIsometry3d read_pose(const Document& document, const Value& object, const char* name) {
   const std::vector<double> v = document.numbers(object, name, 16);
   UnalignedIsometry3d pose;
   pose.matrix() = Eigen::Map<const Eigen::Matrix4d>(v.data());
-  const Eigen::Matrix3d r = pose.linear();
-  const double off = (r * r.transpose() - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff();
-  const double last = (pose.matrix().row(3) - Eigen::RowVector4d(0, 0, 0, 1)).cwiseAbs().maxCoeff();
-  if (!(off <= kRotationTolerance) || !(last <= 1e-6) || r.determinant() < 0)
-    document.fail(
-        object.line,
-        std::string(name) + " of the object that begins here is not a rotation and a translation");
+  const std::string why = why_not_rigid(pose.matrix());
+  if (!why.empty())
+    document.fail(object.line,
+                  std::string(name) + " of the object that begins here is no rigid motion: " + why);
   pose.matrix().row(3) << 0, 0, 0, 1;
   check_pose(pose, [&](const std::string& reason) {
     document.fail(object.line, "of the object that begins here, " + reason);

@@ -7,6 +7,7 @@
 #include <set>
 #include <string>
 
+#include "common/rigid.hpp"
 #include "common/validate.hpp"
 #include "fields/audit.hpp"
 #include "fields/scale.hpp"
@@ -34,12 +35,7 @@ void check_poses(const std::vector<PreparedCloud>& clouds,
   for (std::size_t k = 0; k < world_from_scan.size(); ++k) {
     const UnalignedIsometry3d& pose = world_from_scan[k];
     if (!pose.matrix().allFinite()) continue;
-    const Eigen::Matrix3d r = pose.linear();
-    // As for verify_poses(): a scale, a shear or a mirror image is no pose.
-    constexpr double kTolerance = 1e-3;
-    if ((r * r.transpose() - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff() > kTolerance ||
-        r.determinant() < 0)
-      throw InvalidArgument("world_from_scan[" + std::to_string(k) + "] is no rigid motion");
+    require_rigid(pose, "world_from_scan[" + std::to_string(k) + "]");
   }
 }
 
