@@ -63,7 +63,8 @@ void read_journal(std::string_view bytes) {
     read(journal, [](const std::string& path) {
       // The header of the corpus.
       const cli::Journal read(
-          path, cli::Json{{"version", 1}}, cli::Journal::Mode::resume,
+          path, [](const cli::Json*) { return cli::Json{{"version", 1}}; },
+          cli::Journal::Mode::resume,
           [](int, int, RegistrationResult&& result) {
             if (result.has_candidate && !result.target_from_source.matrix().allFinite())
               broken("poses are finite");

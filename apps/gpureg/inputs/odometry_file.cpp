@@ -29,22 +29,29 @@ namespace {
   throw IoError(path + ": " + why);
 }
 
-std::uint32_t scan_of(const std::string& path, const MapRun& run, int number) {
-  if (!run.scene.has(number))
-    fail(path, "names fragment " + std::to_string(number) + ", which " + run.folder + " lacks");
-  return run.scene.index_of(number);
-}
-
-std::vector<reconstruction::Odometry> from_log(const std::string& path, const MapRun& run) {
+std::vector<reconstruction::Odometry> from_log(const std::string& path,
+                                               const std::vector<int>& numbers,
+                                               const std::string& folder,
+                                               const std::vector<int>& unusable) {
+  const auto scan_of = [&](int number) {
+    const auto at = std::lower_bound(numbers.begin(), numbers.end(), number);
+    if (at == numbers.end() || *at != number)
+      fail(path, "names fragment " + std::to_string(number) + ", which " + folder + " lacks");
+    return static_cast<std::uint32_t>(at - numbers.begin());
+  };
+  const auto is_unusable = [&](int number) {
+    return std::find(unusable.begin(), unusable.end(), number) != unusable.end();
+  };
   std::vector<reconstruction::Odometry> odometry;
   for (const evaluation::LogEntry& entry : evaluation::read_log(path)) {
     if (entry.i == entry.j)
       fail(path + ":" + std::to_string(entry.line),
            "is fragment " + std::to_string(entry.i) +
                " with itself, expected relative poses of two fragments");
+    if (is_unusable(entry.i) || is_unusable(entry.j)) continue;
     reconstruction::Odometry edge;
-    edge.source = scan_of(path, run, entry.j);
-    edge.target = scan_of(path, run, entry.i);
+    edge.source = scan_of(entry.j);
+    edge.target = scan_of(entry.i);
     edge.target_from_source.matrix() = entry.transform;
     odometry.push_back(edge);
   }
@@ -71,11 +78,14 @@ std::vector<UnalignedIsometry3d> poses_of(const std::string& path,
 
 }  // namespace
 
-std::vector<reconstruction::Odometry> read_odometry(const std::string& path, const MapRun& run) {
+std::vector<reconstruction::Odometry> read_odometry(const std::string& path,
+                                                    const std::vector<int>& numbers,
+                                                    const std::string& folder,
+                                                    const std::vector<int>& unusable) {
   std::vector<reconstruction::Odometry> odometry =
-      is_log(path) ? from_log(path, run)
-                   : reconstruction::odometry_of_poses(poses_of(path, run.scene.numbers));
-  if (odometry.empty()) fail(path, "holds no pose of two scans of " + run.folder);
+      is_log(path) ? from_log(path, numbers, folder, unusable)
+                   : reconstruction::odometry_of_poses(poses_of(path, numbers));
+  if (odometry.empty()) fail(path, "holds no pose of two scans of " + folder);
   return odometry;
 }
 

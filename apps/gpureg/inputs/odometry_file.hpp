@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "run/map_run.hpp"
+#include "gpureg/reconstruction.hpp"
 
 namespace gpureg::cli {
 
@@ -13,8 +13,14 @@ bool is_log(const std::string& path);
 
 /// Relative poses of scans from a file. A trajectory (TUM, whose times are numbers of fragments, or
 /// poses.txt) gives those of consecutive scans of the folder; a Redwood log gives its pairs.
+/// @param numbers of the fragments, ascending.
+/// @param folder for messages.
+/// @param unusable numbers of fragments whose poses are left out.
 /// @throws IoError naming the file: no such file, numbers that the folder lacks, nothing in it.
-std::vector<reconstruction::Odometry> read_odometry(const std::string& path, const MapRun& run);
+std::vector<reconstruction::Odometry> read_odometry(const std::string& path,
+                                                    const std::vector<int>& numbers,
+                                                    const std::string& folder,
+                                                    const std::vector<int>& unusable = {});
 
 /// Poses of fragments from a trajectory (TUM, whose times are numbers of fragments, or poses.txt);
 /// no_pose() of fragments that it lacks.

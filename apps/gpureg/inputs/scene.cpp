@@ -7,8 +7,10 @@
 #include <fstream>
 #include <iostream>
 #include <map>
+#include <optional>
 #include <set>
 
+#include "gpureg/error.hpp"
 #include "gpureg/io.hpp"
 #include "inputs/cloud_file.hpp"
 #include "run/interrupt.hpp"
@@ -82,6 +84,38 @@ std::uint64_t hash_of(const PointCloud& cloud) {
   return hash;
 }
 
+struct Prepared {
+  std::optional<PreparedCloud> cloud;
+  std::string reason;  // why there is none
+};
+
+// Of clouds that are read, those that can be prepared: together, and one by one where one cannot.
+std::vector<Prepared> prepare_usable(const Context& context, const FragmentFolder& folder,
+                                     const std::vector<PointCloud>& clouds,
+                                     const std::vector<std::size_t>& places,
+                                     const PrepareOptions& options, bool infer_viewpoint) {
+  std::vector<PointCloudView> views;
+  std::vector<std::string> names;
+  for (std::size_t k = 0; k < clouds.size(); ++k) {
+    views.push_back(clouds[k].view());
+    views.back().infer_viewpoint = infer_viewpoint || !clouds[k].viewpoints.empty();
+    names.push_back(folder.files[places[k]]);
+  }
+  std::vector<Prepared> out;
+  try {
+    for (PreparedCloud& cloud : prepare_batch(context, views, options, names))
+      out.push_back({std::move(cloud), ""});
+    return out;
+  } catch (const InvalidArgument&) {
+  }
+  for (std::size_t k = 0; k < views.size(); ++k) try {
+      out.push_back({prepare_batch(context, {views[k]}, options, {names[k]}).front(), ""});
+    } catch (const InvalidArgument& error) {
+      out.push_back({std::nullopt, error.what()});
+    }
+  return out;
+}
+
 }  // namespace
 
 FragmentFolder::FragmentFolder(const std::string& path, bool quiet) {
@@ -89,6 +123,7 @@ FragmentFolder::FragmentFolder(const std::string& path, bool quiet) {
   for (const auto& [number, file] : fragments) {
     numbers.push_back(number);
     files.push_back(file);
+    count_ = number + 1;
   }
   const std::string cameras_file = (std::filesystem::path(path) / "cameras.txt").string();
   if (!std::filesystem::exists(cameras_file)) return;
@@ -112,6 +147,39 @@ PointCloud FragmentFolder::read(std::size_t k, double spacing, MeshNote note) co
   return cloud;
 }
 
+bool FragmentFolder::is_unusable(int number) const {
+  return std::any_of(unusable.begin(), unusable.end(),
+                     [&](const UnusableFragment& fragment) { return fragment.number == number; });
+}
+
+void FragmentFolder::leave_out(const std::map<std::size_t, std::string>& reasons) {
+  if (reasons.empty()) return;
+  if (numbers.size() - reasons.size() < 2) throw IoError(reasons.begin()->second);
+  std::vector<int> kept_numbers;
+  std::vector<std::string> kept_files;
+  for (std::size_t k = 0; k < numbers.size(); ++k)
+    if (const auto found = reasons.find(k); found != reasons.end()) {
+      unusable.push_back({numbers[k], files[k], found->second});
+      std::cerr << "gpureg: fragment " << numbers[k] << " is left out: " << found->second
+                << std::endl;
+    } else {
+      kept_numbers.push_back(numbers[k]);
+      kept_files.push_back(std::move(files[k]));
+    }
+  numbers = std::move(kept_numbers);
+  files = std::move(kept_files);
+}
+
+void FragmentFolder::leave_out_unreadable() {
+  std::map<std::size_t, std::string> reasons;
+  for (std::size_t k = 0; k < files.size() && !InterruptGuard::requested(); ++k) try {
+      read(k, 0, MeshNote::none);
+    } catch (const IoError& error) {
+      reasons[k] = error.what();
+    }
+  leave_out(reasons);
+}
+
 std::vector<std::pair<std::string, std::size_t>> PreparedFolder::prepared_sizes() const {
   std::vector<std::pair<std::string, std::size_t>> out;
   for (std::size_t k = 0; k < files.size(); ++k) out.emplace_back(files[k], clouds[k].size());
@@ -122,6 +190,7 @@ PreparedFolder prepare_folder(const Context& context, const std::string& path,
                               const PrepareOptions& options, bool quiet, bool infer_viewpoint) {
   PreparedFolder folder{FragmentFolder(path, quiet)};
   const std::size_t size = folder.numbers.size();
+  std::map<std::size_t, std::string> bad;
   ViewpointNote viewpoints;
   Progress progress("preparing", "fragments", size, quiet);
   for (std::size_t next = 0; next < size;) {
@@ -130,28 +199,35 @@ PreparedFolder prepare_folder(const Context& context, const std::string& path,
       break;
     }
     std::vector<PointCloud> chunk;
-    std::vector<std::string> files;
+    std::vector<std::size_t> places;
     for (std::size_t points = 0;
          next < size && chunk.size() < kChunkClouds && points < kChunkPoints; ++next) {
-      files.push_back(folder.files[next]);
-      chunk.push_back(folder.read(next, mesh_spacing(options.voxel_size),
-                                  quiet ? MeshNote::none : MeshNote::print));
-      if (!quiet && options.depth_maps > 0) viewpoints.see(chunk.back(), files.back());
+      try {
+        chunk.push_back(folder.read(next, mesh_spacing(options.voxel_size),
+                                    quiet ? MeshNote::none : MeshNote::print));
+      } catch (const IoError& error) {
+        bad[next] = error.what();
+        continue;
+      }
+      places.push_back(next);
+      if (!quiet && options.depth_maps > 0) viewpoints.see(chunk.back(), folder.files[next]);
       points += chunk.back().points.size();
-      folder.hashes.push_back(hash_of(chunk.back()));
-      folder.extent = std::max(folder.extent, extent_of(chunk.back().points));
     }
-    std::vector<PointCloudView> views;
-    for (const PointCloud& cloud : chunk) {
-      views.push_back(cloud.view());
-      views.back().infer_viewpoint = infer_viewpoint || !cloud.viewpoints.empty();
+    const auto prepared = prepare_usable(context, folder, chunk, places, options, infer_viewpoint);
+    for (std::size_t k = 0; k < chunk.size(); ++k) {
+      if (!prepared[k].reason.empty()) {
+        bad[places[k]] = prepared[k].reason;
+        continue;
+      }
+      folder.clouds.push_back(*prepared[k].cloud);
+      folder.hashes.push_back(hash_of(chunk[k]));
+      folder.extent = std::max(folder.extent, extent_of(chunk[k].points));
     }
-    for (PreparedCloud& cloud : prepare_batch(context, views, options, files))
-      folder.clouds.push_back(std::move(cloud));
     progress.update(next);
   }
   folder.seconds = progress.seconds();
   viewpoints.print();
+  if (!folder.interrupted) folder.leave_out(bad);
   return folder;
 }
 
@@ -169,18 +245,23 @@ std::vector<std::pair<std::uint32_t, std::uint32_t>> choose_pairs(const Fragment
   std::size_t k = 0;
   const auto index_of = [&](int number) {
     const auto at = std::lower_bound(folder.numbers.begin(), folder.numbers.end(), number);
+    if (folder.is_unusable(number)) return std::optional<std::uint32_t>();
     if (at == folder.numbers.end() || *at != number)
       throw IoError(pairs + ":" + std::to_string(line_of_pair(pairs, k)) +
                     ": there is no fragment " + std::to_string(number));
-    return static_cast<std::uint32_t>(at - folder.numbers.begin());
+    return std::optional(static_cast<std::uint32_t>(at - folder.numbers.begin()));
   };
+  std::size_t repeated = 0;
   std::set<std::pair<std::uint32_t, std::uint32_t>> seen;
   for (; k < listed.size(); ++k) {
-    const std::uint32_t i = index_of(listed[k].first), j = index_of(listed[k].second);
-    const std::pair<std::uint32_t, std::uint32_t> pair(std::min(i, j), std::max(i, j));
-    if (seen.insert(pair).second) chosen.push_back(pair);
+    const auto i = index_of(listed[k].first), j = index_of(listed[k].second);
+    if (!i || !j) continue;
+    const std::pair<std::uint32_t, std::uint32_t> pair = std::minmax(*i, *j);
+    if (seen.insert(pair).second)
+      chosen.push_back(pair);
+    else
+      ++repeated;
   }
-  const std::size_t repeated = listed.size() - chosen.size();
   if (repeated > 0 && !quiet)
     std::cerr << "gpureg: note: " << repeated << " of " << listed.size() << " pairs in " << pairs
               << " repeat another one" << std::endl;

@@ -13,6 +13,13 @@
 
 namespace gpureg::cli {
 
+/// A fragment that cannot be read or prepared. It costs its own pairs; the others are as if it were
+/// not in the folder.
+struct UnusableFragment {
+  int number = 0;
+  std::string file, reason;
+};
+
 /// The clouds of a folder, cloud_bin_<i>, and their sensor positions of cameras.txt.
 class FragmentFolder {
  public:
@@ -23,18 +30,28 @@ class FragmentFolder {
 
   std::vector<int> numbers;  ///< as in the file names, ascending
   std::vector<std::string> files;
+  std::vector<UnusableFragment> unusable;  ///< in neither of the two any more
 
   /// What Redwood's files give as the number of fragments; larger than the number of files where
   /// numbers are missing.
-  int count() const { return numbers.empty() ? 0 : numbers.back() + 1; }
+  int count() const { return count_; }
   bool has(int number) const;
+  bool is_unusable(int number) const;
   std::uint32_t index_of(int number) const;  ///< of a fragment that is there
 
   /// Cloud k with its sensor positions: those of cameras.txt, else those of its file. See
   /// read_cloud().
   PointCloud read(std::size_t k, double spacing, MeshNote note) const;
 
+  /// Reads all files, and leaves out those that cannot be read, as leave_out() does.
+  void leave_out_unreadable();
+
+  /// Leaves out the fragments at these ascending places, for the reasons given, and says so on
+  /// stderr. Throws IoError where they leave less than a pair.
+  void leave_out(const std::map<std::size_t, std::string>& reasons);
+
  private:
+  int count_ = 0;
   std::map<int, std::vector<Eigen::Vector3d>> cameras_;
 };
 
@@ -54,15 +71,16 @@ struct PreparedFolder : FragmentFolder {
   std::vector<std::pair<std::string, std::size_t>> prepared_sizes() const;
 };
 
-/// Reads and prepares all fragments. infer_viewpoint: of fragments without a sensor position, see
-/// PointCloudView. Throws IoError.
+/// Reads and prepares all fragments, and says on stderr which are left out as unusable.
+/// infer_viewpoint: of fragments without a sensor position, see PointCloudView. Throws IoError,
+/// also where unusable fragments leave less than a pair.
 PreparedFolder prepare_folder(const Context& context, const std::string& path,
                               const PrepareOptions& options, bool quiet,
                               bool infer_viewpoint = true);
 
 /// Pairs i < j as indices into numbers, in the file's order without repetitions, or all of them for
-/// "all". Unless quiet, says how many are repetitions. Throws IoError for a number that no fragment
-/// has.
+/// "all". Pairs of unusable fragments are left out. Unless quiet, says how many are repetitions.
+/// Throws IoError for a number that no fragment has.
 std::vector<std::pair<std::uint32_t, std::uint32_t>> choose_pairs(const FragmentFolder& folder,
                                                                   const std::string& pairs,
                                                                   bool quiet);

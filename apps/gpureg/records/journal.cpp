@@ -50,6 +50,8 @@ std::string difference(const Json& before, const Json& now, const std::string& n
 
 constexpr const char* kAnew = "with --restart instead of --resume to start anew";
 
+constexpr const char* kHeader = "gpureg_journal";  // the first member of a header
+
 void lock_file(int fd, const std::string& path) {
   if (::flock(fd, LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK)
     throw IoError(path + " is in use: another run writes the same result");
@@ -121,18 +123,29 @@ void Journal::check(const std::string& path, Mode mode) {
 
 std::string Journal::line_of(const std::string& text) { return checksum(text) + " " + text + "\n"; }
 
-Journal::Journal(std::string path, const Json& header, Mode mode, const Take& take)
+Json Journal::header(const std::string& path) {
+  std::ifstream file(path);
+  std::string line;
+  if (!std::getline(file, line)) return nullptr;
+  try {
+    return parse_json(checked_text(line));
+  } catch (const InvalidArgument&) {
+    return nullptr;  // the constructor says so
+  }
+}
+
+Journal::Journal(std::string path, const HeaderOf& header_of, Mode mode, const Take& take)
     : path_(std::move(path)) {
   fd_ = ::open(path_.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0666);
   if (fd_ < 0) fail(path_, "write", errno);
   try {
     lock_file(fd_, path_);
     if (mode == Mode::fresh) refuse_unfinished(path_);
-    const std::size_t good = mode == Mode::resume ? take_up(header, take) : 0;
+    const std::size_t good = mode == Mode::resume ? take_up(header_of, take) : 0;
     if (::ftruncate(fd_, static_cast<off_t>(good)) != 0) fail(path_, "write", errno);
     if (::lseek(fd_, 0, SEEK_END) < 0) fail(path_, "write", errno);
-    if (good == 0) {
-      pending_ = line_of(header.dump());
+    if (const std::string header = header_of(nullptr).dump(); header != earlier_) {
+      pending_ = line_of(header);
       flush();
     }
   } catch (...) {
@@ -146,18 +159,17 @@ Journal::~Journal() {
 }
 
 // Returns the length of the part that is whole.
-std::size_t Journal::take_up(const Json& header, const Take& take) {
+std::size_t Journal::take_up(const HeaderOf& header_of, const Take& take) {
   std::ifstream file(path_, std::ios::binary);
   std::size_t good = 0, number = 0;
   for (std::string line; std::getline(file, line) && !file.eof(); good += line.size() + 1) {
     ++number;
     try {
-      const std::string text = checked_text(line);
-      if (number > 1)
-        take_line(text, take);
-      else if (const Json before = parse_json(text); before != header)
-        throw IoError("cannot resume from " + path_ + ": " + difference(before, header, "") +
-                      "; call with the same options, or " + kAnew);
+      const Json json = parse_json(checked_text(line));
+      if (number == 1 || json.contains(kHeader))
+        take_header(json, header_of);
+      else
+        take_line(json, take);
     } catch (const IoError&) {
       throw;
     } catch (const std::exception& error) {
@@ -168,8 +180,14 @@ std::size_t Journal::take_up(const Json& header, const Take& take) {
   return good;
 }
 
-void Journal::take_line(const std::string& text, const Take& take) {
-  const Json json = parse_json(text);
+void Journal::take_header(const Json& earlier, const HeaderOf& header_of) {
+  if (const Json now = header_of(&earlier); now != earlier)
+    throw IoError("cannot resume from " + path_ + ": " + difference(earlier, now, "") +
+                  "; call with the same options, or " + kAnew);
+  earlier_ = earlier.dump();
+}
+
+void Journal::take_line(const Json& json, const Take& take) {
   if (json.contains("outputs")) {
     wrote_outputs_ = true;
     return;

@@ -10,8 +10,9 @@
 namespace gpureg::cli {
 
 /// Journal of a batch beside its output: a line that identifies the run, then one line per pair,
-/// each with a checksum. A kill at any moment leaves complete lines and at most one torn line at
-/// the end, which a resumed run truncates. The outputs of a resumed run equal those of an
+/// each with a checksum. A run that goes on with fragments that the one before could not use adds
+/// another line that identifies it. A kill at any moment leaves complete lines and at most one torn
+/// line at the end, which a resumed run truncates. The outputs of a resumed run equal those of an
 /// uninterrupted one: lines hold results without loss.
 class Journal {
  public:
@@ -22,10 +23,15 @@ class Journal {
   /// cannot be one of the run.
   using Take = std::function<void(int i, int j, RegistrationResult&& result)>;
 
-  /// Opens or creates the journal. header: identity of the run; resume: continue an existing
-  /// journal, refused where headers differ. Throws IoError, also where another process writes the
-  /// same journal.
-  Journal(std::string path, const Json& header, Mode mode, const Take& take);
+  /// Identity of this run, or of its part that an earlier header is about.
+  using HeaderOf = std::function<Json(const Json* earlier)>;
+
+  /// Opens or creates the journal. resume: continue an existing journal, refused where it is not of
+  /// a part of this run. Throws IoError, also where another process writes the same journal.
+  Journal(std::string path, const HeaderOf& header_of, Mode mode, const Take& take);
+
+  /// The identity of the run that a journal is of, null where there is no readable one.
+  static Json header(const std::string& path);
   ~Journal();
   Journal(const Journal&) = delete;
   Journal& operator=(const Journal&) = delete;
@@ -49,12 +55,14 @@ class Journal {
   void remove();
 
  private:
-  std::size_t take_up(const Json& header, const Take& take);
-  void take_line(const std::string& text, const Take& take);
+  std::size_t take_up(const HeaderOf& header_of, const Take& take);
+  void take_header(const Json& earlier, const HeaderOf& header_of);
+  void take_line(const Json& json, const Take& take);
 
   std::string path_;
   int fd_ = -1;
   std::string pending_;
+  std::string earlier_;  // the last header of a resumed journal
   bool wrote_outputs_ = false;
 };
 

@@ -27,6 +27,7 @@ Json pairs_head(const MapRun& run, const Context& context) {
                      {"pairs_per_second", rate},
                      {"pairs_in_this_run", run.pairs_in_this_run}};
   json["fragments"] = fragments_json(run.scene);
+  json["unusable"] = unusable_json(run.scene);
   return json;
 }
 
@@ -65,6 +66,7 @@ Json map_document(const MapRun& run, const Context& context) {
                              {"confidence", scan.confidence},
                              {"reason", reconstruction::to_string(scan.reason)}});
   }
+  json["unusable"] = unusable_json(run.scene);
   json["weakest_links"] = Json::array();
   for (const reconstruction::Link& link : reconstruction::weakest_links(run.map)) {
     Json numbers = Json::array();
@@ -98,6 +100,7 @@ std::string map_summary(const MapRun& run, const Context& context) {
         << fixed(run.seconds.prepare, 2) << " s\n"
         << "pairs      " << run.pairs.pairs.size() << ", in " << fixed(run.seconds.align, 2)
         << " s (" << context.description() << ")\n";
+  out << unusable_line(run.scene);
   if (!run.map.odometry.empty()) out << "odometry   " << run.map.odometry.size() << " poses\n";
   const std::size_t accepted = run.accepted_edges();
   out << "edges      " << accepted << " accepted, " << run.map.edges.size() - accepted

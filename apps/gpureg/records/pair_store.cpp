@@ -66,6 +66,7 @@ PairStore read_pairs(const std::string& path, const FragmentFolder& folder, floa
   DocumentFile file(path);
   PairStore store;
   const Json document = read_pairs(file, [&](const PairRecord& pair, Json&& json) {
+    if (folder.is_unusable(pair.i) || folder.is_unusable(pair.j)) return;
     store.pairs.push_back({index_of(folder, pair.j), index_of(folder, pair.i)});
     store.results.push_back(stored_result(json));
   });

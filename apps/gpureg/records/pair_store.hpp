@@ -28,7 +28,8 @@ struct PairStore {
 void write_pairs(const std::string& path, const Json& head, const PairStore& store,
                  const FragmentFolder& folder, bool with_information);
 
-/// The pairs of a result of `gpureg batch` or of an earlier map.
+/// The pairs of a result of `gpureg batch` or of an earlier map, without those of unusable
+/// fragments.
 /// @throws IoError naming the file and the pair: no such result, a damaged or unfinished one,
 ///   fragments that the folder lacks.
 /// @throws InvalidArgument where it was made with another voxel size.

@@ -5,12 +5,14 @@
 #include <filesystem>
 #include <iostream>
 #include <map>
+#include <set>
 
 #include "gpureg/error.hpp"
 #include "gpureg/io.hpp"
 #include "inputs/cloud_file.hpp"
 #include "json/fields_json.hpp"
 #include "json/json.hpp"
+#include "json/json_fields.hpp"
 #include "records/result_json.hpp"
 #include "run/interrupt.hpp"
 #include "run/progress.hpp"
@@ -19,21 +21,39 @@
 namespace gpureg::cli {
 namespace {
 
-// Backend and threads may change between runs: they do not change results.
+/// Numbers of the fragments that a header names.
+std::set<int> numbers_of(const Json& header) {
+  std::set<int> numbers;
+  if (!header.is_object()) return numbers;
+  for (const Json& fragment : header.value("fragments", Json::array()))
+    numbers.insert(fragment_member(fragment, "number"));
+  return numbers;
+}
+
+// Backend and threads may change between runs: they do not change results. `among`: only these
+// fragments and the pairs of them, for a run that could not use the others.
 Json header_of(const RegistrationOptions& options, const std::optional<GravityPrior>& gravity,
-               const PreparedFolder& scene, const Pairs& pairs) {
-  std::uint64_t hash = pairs.size();
-  for (const auto& [i, j] : pairs)
-    hash = (hash ^ (static_cast<std::uint64_t>(i) << 32 | j)) * 0x9E3779B97F4A7C15ull;
+               const PreparedFolder& scene, const Pairs& pairs, const std::set<int>* among) {
+  const auto counts = [&](std::size_t k) {
+    return among == nullptr || among->count(scene.numbers[k]) > 0;
+  };
+  std::uint64_t hash = 0, count = 0;
+  for (const auto& [i, j] : pairs) {
+    if (!counts(i) || !counts(j)) continue;
+    const auto number = [&](std::size_t k) { return static_cast<std::uint64_t>(scene.numbers[k]); };
+    hash = (hash ^ (number(i) << 32 | number(j))) * 0x9E3779B97F4A7C15ull;
+    ++count;
+  }
   Json fragments = Json::array();
   for (std::size_t k = 0; k < scene.numbers.size(); ++k)
-    fragments.push_back({{"number", scene.numbers[k]},
-                         {"hash", scene.hashes[k]},
-                         {"viewpoint", to_string(scene.clouds[k].statistics().viewpoint)}});
-  Json header = {{"gpureg_journal", 2},
+    if (counts(k))
+      fragments.push_back({{"number", scene.numbers[k]},
+                           {"hash", scene.hashes[k]},
+                           {"viewpoint", to_string(scene.clouds[k].statistics().viewpoint)}});
+  Json header = {{"gpureg_journal", 3},
                  {"version", GPUREG_VERSION},
                  {"options", to_json(options)},
-                 {"pairs", {{"count", pairs.size()}, {"hash", hash}}},
+                 {"pairs", {{"count", count}, {"hash", hash}}},
                  {"fragments", fragments}};
   if (gravity)
     header["up"] = {gravity->target_up.x(), gravity->target_up.y(), gravity->target_up.z(),
@@ -49,14 +69,27 @@ std::vector<Pair> sources_and_targets(const Pairs& pairs) {
 
 }  // namespace
 
-void choose_voxel_size(MethodOptions& method, const std::string& folder) {
+void choose_voxel_size(MethodOptions& method, const std::string& folder,
+                       const std::string& journal) {
   if (!method.automatic_voxel_size) return;
+  if (!journal.empty()) {
+    const Json::json_pointer place("/options/prepare/voxel_size");
+    if (const Json header = Journal::header(journal);
+        header.contains(place) && header[place].is_number()) {
+      method.voxel_size = header[place].get<float>();
+      return;
+    }
+  }
   constexpr std::size_t kMost = 8;
   const auto files = io::list_fragments(folder);
   const std::size_t count = std::min(files.size(), kMost);
   std::vector<PointCloud> clouds;
-  for (std::size_t k = 0; k < count; ++k)
-    clouds.push_back(read_cloud(files[k * files.size() / count].second, 0, MeshNote::none));
+  for (std::size_t k = 0; k < count; ++k) try {
+      clouds.push_back(read_cloud(files[k * files.size() / count].second, 0, MeshNote::none));
+    } catch (const IoError&) {
+      // One that cannot be read is left out of the run, and named there.
+      if (k + 1 == count && clouds.empty()) throw;
+    }
   std::vector<PointCloudView> views;
   for (const PointCloud& cloud : clouds) views.push_back(cloud.view());
   method.choose_voxel_size(views, folder);
@@ -80,7 +113,12 @@ void PairRun::open_journal(const std::string& path, const Pairs& pairs, Journal:
     places[{scene_.numbers[pairs[k].first], scene_.numbers[pairs[k].second]}] = k;
   const bool found = std::filesystem::exists(path);
   journal_.emplace(
-      path, header_of(options_, gravity_, scene_, pairs), mode,
+      path,
+      [&](const Json* earlier) {
+        const std::set<int> among = earlier != nullptr ? numbers_of(*earlier) : std::set<int>();
+        return header_of(options_, gravity_, scene_, pairs, earlier != nullptr ? &among : nullptr);
+      },
+      mode,
       [&](int i, int j, RegistrationResult&& result) {
         const auto place = places.find({i, j});
         if (place == places.end() || store_.done(place->second))
@@ -129,6 +167,36 @@ void PairRun::align(const Context& context) {
 
 double PairRun::rate() const {
   return seconds_ > 0 ? static_cast<double>(in_this_run()) / seconds_ : 0;
+}
+
+void PairRun::close_journal() {
+  if (!journal_) return;
+  if (scene_.unusable.empty()) {
+    journal_->remove();
+    return;
+  }
+  journal_->note_outputs();
+  if (!quiet_)
+    std::cerr
+        << "gpureg: once those fragments are repaired or removed, go on with the same command "
+           "and --resume"
+        << std::endl;
+}
+
+std::string unusable_line(const FragmentFolder& scene) {
+  std::string line;
+  for (const UnusableFragment& fragment : scene.unusable)
+    line += " " + std::to_string(fragment.number);
+  return line.empty() ? "" : "unusable  " + line + "\n";
+}
+
+Json unusable_json(const FragmentFolder& scene) {
+  Json unusable = Json::array();
+  for (const UnusableFragment& fragment : scene.unusable)
+    unusable.push_back({{"number", fragment.number},
+                        {"file", base_name(fragment.file)},
+                        {"reason", fragment.reason}});
+  return unusable;
 }
 
 Json fragments_json(const PreparedFolder& scene) {

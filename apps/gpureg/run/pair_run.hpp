@@ -22,8 +22,9 @@ namespace gpureg::cli {
 using Pairs = std::vector<std::pair<std::uint32_t, std::uint32_t>>;
 
 /// Sets an automatic voxel size to that of some fragments of a folder, evenly chosen: it is the
-/// same for a run that is resumed.
-void choose_voxel_size(MethodOptions& method, const std::string& folder);
+/// same for a run that is resumed, whose journal says it, if there is one.
+void choose_voxel_size(MethodOptions& method, const std::string& folder,
+                       const std::string& journal = "");
 
 /// Aligns the pairs of a scene, with a journal from which an interrupted run goes on.
 class PairRun {
@@ -44,6 +45,10 @@ class PairRun {
   PairStore take_store() { return std::move(store_); }
   Journal* journal() { return journal_ ? &*journal_ : nullptr; }
 
+  /// The outputs are complete: deletes the journal. Where fragments were left out it stays, for a
+  /// run that finds them repaired.
+  void close_journal();
+
   std::size_t in_this_run() const { return done_ - resumed_; }
   double seconds() const { return seconds_; }
   double rate() const;  ///< pairs per second of this run
@@ -63,5 +68,9 @@ class PairRun {
 
 /// The fragments of a scene as results list them.
 Json fragments_json(const PreparedFolder& scene);
+
+/// Those that were left out, with the reasons; as a line of a summary, empty where there is none.
+Json unusable_json(const FragmentFolder& scene);
+std::string unusable_line(const FragmentFolder& scene);
 
 }  // namespace gpureg::cli

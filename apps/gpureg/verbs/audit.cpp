@@ -96,6 +96,7 @@ int run_audit(const AuditVerbOptions& o) {
   run.poses = read_map_poses(o.poses, FragmentFolder(o.folder, true).numbers, o.folder);
   run.scene = prepare_folder(context, o.folder, run.options.prepare, o.quiet);
   if (run.scene.interrupted) return kInterrupted;
+  if (!run.scene.unusable.empty()) run.poses = read_map_poses(o.poses, run.scene.numbers, o.folder);
   for (std::size_t k = 0; k < run.poses.size(); ++k)
     if (!run.poses[k].matrix().allFinite()) run.missing.push_back(run.scene.numbers[k]);
   const auto start = std::chrono::steady_clock::now();

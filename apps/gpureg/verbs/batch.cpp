@@ -89,7 +89,7 @@ class Batch {
     if (!run_->complete() && run_->journal() && kept_.empty()) run_->journal()->note_outputs();
     write_outputs();
     if (!run_->complete()) return say_interrupted();
-    if (run_->journal()) run_->journal()->remove();
+    run_->close_journal();
     return summarise();
   }
 
@@ -138,6 +138,7 @@ class Batch {
                        {"pairs_in_this_run", run_->in_this_run()}};
     json["peak_memory_mib"] = peak_memory_mib();
     json["fragments"] = fragments_json(scene_);
+    json["unusable"] = unusable_json(scene_);
     return json;
   }
 
@@ -158,13 +159,15 @@ class Batch {
                   << "\n";
       std::cout << "fragments  " << scene_.numbers.size() << ", prepared in "
                 << fixed(scene_.seconds, 2) << " s\n"
-                << "pairs      " << run_->size() << ", in " << fixed(run_->seconds(), 2) << " s ("
-                << significant(run_->rate(), 3) << " pairs/s, " << context_.description() << ")\n"
+                << unusable_line(scene_) << "pairs      " << run_->size() << ", in "
+                << fixed(run_->seconds(), 2) << " s (" << significant(run_->rate(), 3)
+                << " pairs/s, " << context_.description() << ")\n"
                 << "aligned    " << aligned_ << ", written to " << o_.log << "\n";
       for (const auto& [reason, count] : reasons_)
         std::cout << "not        " << count << ", " << reason << "\n";
       std::cout << "memory     " << fixed(peak_memory_mib(), 0) << " MiB at most\n";
     }
+    if (!scene_.unusable.empty()) return kIncomplete;
     return aligned_ > 0 ? kOk : kNoAlignment;
   }
 
@@ -210,7 +213,7 @@ void add_batch(CommandLine& line) {
     o->method.registration();  // reports bad options before the clouds are read
     up_prior(o->up);
     check_batch_outputs(*o);
-    choose_voxel_size(o->method, o->folder);
+    choose_voxel_size(o->method, o->folder, o->resume ? o->journal() : "");
     if (!o->quiet) o->method.note_calibration();
     return Batch(*o).run();
   });

@@ -102,9 +102,13 @@ class Reconstruct {
         if (scene.interrupted) return say_interrupted();
         run_.seconds.prepare = scene.seconds;
         run_.scene = std::move(scene);
+      } else if (!(o_.no_refine && o_.no_map)) {
+        run_.scene.leave_out_unreadable();
       }
+      if (!run_.scene.unusable.empty())
+        run_.pairs = read_pairs(o_.results, run_.scene, run_.options.prepare.voxel_size);
     }
-    if (!o_.odometry.empty() && odometry_.empty()) odometry_ = read_odometry(o_.odometry, run_);
+    if (!o_.odometry.empty() && odometry_.empty()) odometry_ = known_poses();
     reconstruct();
     if (!(o_.no_refine && o_.no_map)) {
       const Clock::time_point start = Clock::now();
@@ -113,13 +117,14 @@ class Reconstruct {
     }
     if (!o_.no_refine && !refine()) return say_interrupted();
     write_outputs();
-    if (pairs_) pairs_->journal()->remove();
+    if (pairs_) pairs_->close_journal();
     if (!o_.quiet) {
       if (o_.method.automatic_voxel_size)
         std::cout << "voxel size " << significant(static_cast<double>(o_.method.voxel_size), 3)
                   << "\n";
       std::cout << map_summary(run_, context_);
     }
+    if (!run_.scene.unusable.empty()) return kIncomplete;
     return run_.map.islands.empty() ? kNoAlignment : kOk;
   }
 
@@ -138,7 +143,7 @@ class Reconstruct {
     check_voxel_size(run_.options.prepare.voxel_size, scene.extent, "the largest fragment");
     if (o_.method.automatic_voxel_size && !o_.quiet) note_few_points(scene.prepared_sizes());
     // A bad file shall show before hours of work.
-    if (!o_.odometry.empty()) odometry_ = read_odometry(o_.odometry, run_);
+    if (!o_.odometry.empty()) odometry_ = known_poses();
     const Pairs pairs = o_.prune > 0 ? likely_pairs() : choose_pairs(scene, o_.pairs, o_.quiet);
     if (pairs.empty())
       throw InvalidArgument(o_.pairs == "all" ? o_.folder + " holds one fragment; a map needs two"
@@ -155,6 +160,13 @@ class Reconstruct {
     write_pairs(o_.file("pairs.json"), pairs_head(run_, context_), run_.pairs, scene, true);
     for (RegistrationResult& result : run_.pairs.results) reduce_moments(result);
     return true;
+  }
+
+  std::vector<reconstruction::Odometry> known_poses() const {
+    std::vector<int> unusable;
+    for (const UnusableFragment& fragment : run_.scene.unusable)
+      unusable.push_back(fragment.number);
+    return read_odometry(o_.odometry, run_.scene.numbers, o_.folder, unusable);
   }
 
   /// The pairs of --prune, and of consecutive scans where odometry knows them.
@@ -331,7 +343,7 @@ void add_reconstruct(CommandLine& line) {
                        "with --results and --no-audit: no pair is aligned");
     if (o->no_map) o->method.refuse({"--map-voxel-size"}, "with --no-map");
     check_output_folder(*o);
-    choose_voxel_size(o->method, o->folder);
+    choose_voxel_size(o->method, o->folder, o->resume ? o->journal() : "");
     if (!o->quiet) o->method.note_calibration();
     return Reconstruct(*o).run();
   });
