@@ -54,7 +54,8 @@ std::string looks_like(double factor, const char* scan, const char* map) {
 
 void check_unit(const PointCloudView& scan, const MapState& map, const std::string& name) {
   const double voxel = static_cast<double>(map.options.prepare.voxel_size);
-  const auto [extent, farthest] = extent_of(scan);
+  const Extent found = extent_of(scan);
+  const double extent = found.longest, farthest = found.farthest;
   if (farthest > limits::kMaxCoordinate)
     throw InvalidArgument(name + ": its points lie " + shown(farthest) +
                           " from the origin of its frame, expected at most 1e12");
