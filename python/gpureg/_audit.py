@@ -7,15 +7,12 @@ import dataclasses
 import os
 from typing import Any
 
-import numpy as np
-
 from . import _core
 from ._arrays import float64
 from ._contexts import checked, context_of
 from ._core import Context, RegistrationOptions
 from ._progress import Progress
-from ._reconstruction import prepared_fragments
-from ._trajectory import read_trajectory
+from ._reconstruction import usable_fragments
 from .fragments import FragmentSet, fragment_set
 
 
@@ -119,8 +116,9 @@ def audit(
     ----------
     fragments : FragmentSet, folder, or sequence of clouds
     poses : path, or (N, 4, 4) array
-        ``world_from_scan`` of each fragment, NaN where it has none; or a trajectory file (TUM with
-        fragment numbers as times, KITTI, or poses.txt).
+        ``world_from_scan`` of each fragment, NaN where it has none; or a file, as for `gpureg
+        audit`: a trajectory (TUM with fragment numbers as times, KITTI, or poses.txt), g2o, or a
+        Redwood log of scans or of pairs.
     options : RegistrationOptions, optional
     context : Context, optional
     progress : bool or callable
@@ -128,11 +126,14 @@ def audit(
     Returns
     -------
     Audit
+        Without fragments that cannot be read or prepared.
 
     Raises
     ------
     ValueError
         Naming the pose that is no rigid motion.
+    IoError
+        Naming the file that holds no poses of these fragments.
 
     Examples
     --------
@@ -145,8 +146,13 @@ def audit(
     options.validate()
     context = context_of(context)
     fragments = fragment_set(fragments)
+    fragments.check_files()
     matrices = _poses(poses, fragments)
-    clouds = prepared_fragments(fragments, options.prepare, context, progress)
+    unusable: dict[int, str] = {}
+    clouds = usable_fragments(fragments, options.prepare, context, progress, unusable)
+    if unusable:
+        kept = [k for k in range(len(fragments)) if k not in unusable]
+        fragments, matrices = fragments.without(unusable), matrices[kept]
     pairs, connections, order = _core.audit(context, clouds, matrices, options)
     numbers = [int(number) for number in fragments.numbers]
     order = [numbers[k] for k in order]
@@ -164,15 +170,7 @@ def _poses(poses: Any, fragments: FragmentSet) -> Any:
                 f"poses: expected shape ({len(fragments)}, 4, 4), got {matrices.shape}"
             )
         return matrices
-    matrices = np.full((len(fragments), 4, 4), np.nan)
-    positions = {int(number): k for k, number in enumerate(fragments.numbers)}
-    times, known = read_trajectory(os.fspath(poses))
-    for time, pose in zip(times, known, strict=True):
-        if time in positions:
-            matrices[positions[int(time)]] = pose
-    if np.isfinite(matrices[:, 0, 0]).sum() < 2:
-        raise ValueError(f"poses: {os.fspath(poses)} holds no poses of two fragments")
-    return matrices
+    return _core.read_map_poses(os.fspath(poses), list(fragments.numbers), "fragments")
 
 
 __all__ = ["Audit", "AuditedConnection", "AuditedPair", "audit"]

@@ -32,7 +32,8 @@ class MapScan:
         A lower bound of the probability that the pose is correct; of a scan that is left out, the
         confidence of its best pair.
     reason : str
-        "none" where the scan is placed and confirmed; see ``docs/maps.md``.
+        "none" where the scan is placed and confirmed, "unusable" where it cannot be read or
+        prepared; see ``docs/maps.md``.
     explanation : str
         The reason as a sentence.
     """
@@ -109,12 +110,19 @@ class Map:
         fragments: FragmentSet,
         options: RegistrationOptions,
         refinement: dict[str, Any] | None,
+        of: FragmentSet,
+        unusable: dict[int, str],
     ) -> None:
+        """of: the set that the map was made of; unusable: what fragments lacks of it, by position."""
         self._graph, self._fragments, self._options = graph, fragments, options
-        self._refinement = refinement
+        self._refinement, self._of = refinement, of
         numbers = fragments.numbers
+        scans = iter(graph.scans)
         self._scans = tuple(
-            MapScan(number, *scan) for number, scan in zip(numbers, graph.scans, strict=True)
+            MapScan(number, False, None, 0.0, "unusable", unusable[k])
+            if k in unusable
+            else MapScan(number, *next(scans))
+            for k, number in enumerate(of.numbers)
         )
         self._edges = tuple(
             MapEdge(numbers[edge[0]], numbers[edge[1]], *edge[2:]) for edge in graph.edges
@@ -133,12 +141,14 @@ class Map:
         """(N, 4, 4) ``island_from_scan`` in the order of the fragments; NaN where a scan is left
         out. The smallest scan of an island has the identity.
         """
-        return self._graph.poses
+        poses = np.full((len(self._scans), 4, 4), np.nan)
+        poses[[scan.reason != "unusable" for scan in self._scans]] = self._graph.poses
+        return poses
 
     @property
     def numbers(self) -> tuple[int, ...]:
         """Numbers of the fragments, in the order of ``poses`` and ``scans``."""
-        return self._fragments.numbers
+        return self._of.numbers
 
     @property
     def scans(self) -> tuple[MapScan, ...]:
@@ -192,7 +202,7 @@ class Map:
         merged = _core.VoxelMap(
             self._options.prepare.voxel_size / 2 if voxel_size is None else voxel_size
         )
-        poses = self.poses
+        poses = self._graph.poses
         for k in islands[island]:
             rows, normals, _, _, origin, _ = self._fragments.load(k, self._options.prepare)
             merged.add(

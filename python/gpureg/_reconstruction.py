@@ -4,7 +4,8 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -15,15 +16,16 @@ from ._arrays import float64, index_pairs
 from ._contexts import checked, context_of
 from ._core import (
     Context,
+    IoError,
     MapGraph,
     ReconstructionOptions,
     RegistrationOptions,
     RegistrationResult,
 )
-from ._map import Map, Poses
+from ._map import Map
 from ._progress import Progress, batch_progress
 from .fragments import FragmentSet, fragment_set
-from .preparation import pieces
+from .preparation import pieces, prepare_usable
 from .registration import ALIGNED, align_batch
 
 
@@ -55,7 +57,7 @@ def reconstruct(
     odometry : path, (N, 4, 4) array, or sequence, optional
         Known poses: a trajectory file (TUM with fragment numbers as times, or poses.txt),
         ``world_from_scan`` of each fragment (NaN: not known), of both of which consecutive ones
-        count, or tuples (source, target, target_from_source) of fragment numbers, with a 6x6
+        count, a Redwood log of pairs, or tuples (source, target, target_from_source) of fragment numbers, with a 6x6
         information matrix as a fourth entry where it is known.
     audit : bool
         Ask the scans whether they contradict each other where the map puts them, and take edges
@@ -74,11 +76,14 @@ def reconstruct(
     Returns
     -------
     Map
+        A scan that cannot be read or prepared is left out, with the reason "unusable".
 
     Raises
     ------
     ValueError
         Naming the argument: a repeated pair, an unknown fragment, results of another number.
+    IoError
+        Where fewer than two fragments can be used.
     BatchInterrupted
         After Ctrl-C during the alignment; its ``results`` hold what is done.
 
@@ -100,13 +105,24 @@ def reconstruct(
     if map_options.threads == 0 and context.backend == "cpu":
         map_options = map_options.replace(threads=context.threads)
     fragments = fragment_set(fragments)
-    clouds: list[_core.PreparedCloud] = []
-    rows, values = _pair_results(fragments, pairs, results, options, context, progress, clouds)
+    fragments.check_files()
+    rows, values = _pair_results(fragments, pairs, results)
     known = _odometry(odometry, fragments)
-    if audit and not clouds:
-        clouds = prepared_fragments(fragments, options.prepare, context, progress)
+    unusable: dict[int, str] = {}
+    clouds: list[_core.PreparedCloud] = []
+    if audit or values is None:
+        clouds = usable_fragments(fragments, options.prepare, context, progress, unusable)
+    elif refine:
+        _find_unreadable(fragments, options.prepare, unusable)
+    usable = fragments
+    if unusable:
+        usable = fragments.without(unusable)
+        rows, values = _pairs_of_others(rows, values, unusable, len(fragments))
+        known = _odometry_of_others(odometry, known, unusable, fragments)
+    if values is None:
+        values = align_batch(clouds, rows, options=options, context=context, progress=progress)
     graph = _core.reconstruct_map(
-        len(fragments),
+        len(usable),
         rows,
         values,
         map_options,
@@ -116,8 +132,8 @@ def reconstruct(
         options,
     )
     del clouds
-    refinement = _refine(graph, fragments, options, context, progress) if refine else None
-    return Map(graph, fragments, options, refinement)
+    refinement = _refine(graph, usable, options, context, progress) if refine else None
+    return Map(graph, usable, options, refinement, fragments, unusable)
 
 
 def _positions(fragments: FragmentSet, numbers: npt.NDArray[np.int64], name: str) -> Any:
@@ -132,20 +148,12 @@ def _positions(fragments: FragmentSet, numbers: npt.NDArray[np.int64], name: str
 
 
 def _pair_results(
-    fragments: FragmentSet,
-    pairs: Any,
-    results: Any,
-    options: RegistrationOptions,
-    context: Context,
-    progress: Progress,
-    clouds: list[_core.PreparedCloud],
-) -> tuple[npt.NDArray[np.uint32], list[RegistrationResult]]:
-    """clouds: gets those that were prepared."""
+    fragments: FragmentSet, pairs: Any, results: Any
+) -> tuple[npt.NDArray[np.uint32], list[RegistrationResult] | None]:
+    """None: the pairs are to be aligned."""
     if results is None:
         chosen = fragments.choose_pairs("all" if pairs is None else pairs)
-        rows = np.ascontiguousarray(chosen[:, ::-1], np.uint32)  # the later one into the earlier
-        clouds += prepared_fragments(fragments, options.prepare, context, progress)
-        return rows, align_batch(clouds, rows, options=options, context=context, progress=progress)
+        return np.ascontiguousarray(chosen[:, ::-1], np.uint32), None  # the later into the earlier
     if hasattr(results, "table"):  # a BatchRun
         if pairs is not None:
             raise TypeError("pairs: those of a BatchRun come with its results")
@@ -160,6 +168,19 @@ def _pair_results(
     if len(entries) != len(values):
         raise ValueError(f"results: {len(values)} for {len(entries)} pairs")
     return _positions(fragments, entries.astype(np.int64), "pairs"), values
+
+
+def _pairs_of_others(
+    rows: npt.NDArray[np.uint32],
+    values: list[RegistrationResult] | None,
+    unusable: Collection[int],
+    count: int,
+) -> tuple[npt.NDArray[np.uint32], list[RegistrationResult] | None]:
+    """Without those of unusable fragments, as positions among the others."""
+    places = np.array([k not in unusable for k in range(count)])
+    kept = np.flatnonzero(places[rows].all(axis=1))
+    rows = (np.cumsum(places) - 1)[rows[kept]].astype(np.uint32)
+    return rows, None if values is None else [values[k] for k in kept.tolist()]
 
 
 def _from_table(
@@ -190,10 +211,11 @@ def _from_table(
 
 
 def _odometry(odometry: Any, fragments: FragmentSet) -> Any:
+    """As the core takes it."""
     if odometry is None:
         return []
     if isinstance(odometry, str | os.PathLike):
-        return _from_trajectory(os.fspath(odometry), fragments)
+        return _from_file(odometry, fragments.numbers)
     if hasattr(odometry, "shape"):
         poses = float64(odometry, "odometry")
         if poses.shape != (len(fragments), 4, 4):
@@ -212,33 +234,69 @@ def _odometry(odometry: Any, fragments: FragmentSet) -> Any:
     return out
 
 
-def _from_trajectory(path: str, fragments: FragmentSet) -> Poses:
-    poses = np.full((len(fragments), 4, 4), np.nan)
-    places = {number: k for k, number in enumerate(fragments.numbers)}
-    for time, pose in zip(*_core.read_trajectory(path, "auto"), strict=True):
-        if time != int(time):
-            raise ValueError(f"odometry: {path} has the time {time}, expected a fragment's number")
-        if int(time) in places:
-            poses[places[int(time)]] = pose
-    return poses
+def _from_file(
+    path: str | os.PathLike[str], numbers: Sequence[int], unusable: Sequence[int] = ()
+) -> list[Any]:
+    return list(
+        _core.read_odometry(os.fspath(path), list(numbers), "the set of fragments", list(unusable))
+    )
 
 
-def prepared_fragments(
+def _odometry_of_others(
+    odometry: Any, known: Any, unusable: Collection[int], of: FragmentSet
+) -> Any:
+    """known: `_odometry` of the whole set."""
+    kept = [k for k in range(len(of)) if k not in unusable]
+    if isinstance(odometry, str | os.PathLike):
+        return _from_file(
+            odometry, [of.numbers[k] for k in kept], [of.numbers[k] for k in unusable]
+        )
+    if isinstance(known, np.ndarray):
+        return known[kept]
+    places = {k: place for place, k in enumerate(kept)}
+    return [
+        (places[edge[0]], places[edge[1]], *edge[2:])
+        for edge in known
+        if edge[0] in places and edge[1] in places
+    ]
+
+
+def usable_fragments(
     fragments: FragmentSet,
     options: _core.PrepareOptions,
     context: Context,
     progress: Progress,
+    unusable: dict[int, str],
 ) -> list[_core.PreparedCloud]:
+    """Prepared. unusable gets the positions of those that cannot be, and why; raises IoError where
+    fewer than two are left.
+    """
     out: list[_core.PreparedCloud] = []
     device = context.backend == "cuda"
     with batch_progress(progress, "preparing", len(fragments), unit="cloud") as report:
         for piece in pieces(len(fragments), context):
-            inputs = [fragments.load(k, options, device) for k in piece]
-            names = [f"fragments[{k}]" for k in piece]
-            out += _core.prepare_batch(context, inputs, options, names)
+            loads = {k: partial(fragments.load, k, options, device) for k in piece}
+            out += [cloud for _, cloud in prepare_usable(context, loads, options, unusable)]
             if report is not None:
-                report(len(out))
+                report(len(out) + len(unusable))
+    _check_enough(fragments, unusable)
     return out
+
+
+def _find_unreadable(
+    fragments: FragmentSet, options: _core.PrepareOptions, unusable: dict[int, str]
+) -> None:
+    for k in range(len(fragments)):
+        try:
+            fragments.load(k, options)
+        except OSError as error:
+            unusable[k] = str(error)
+    _check_enough(fragments, unusable)
+
+
+def _check_enough(fragments: FragmentSet, unusable: dict[int, str]) -> None:
+    if unusable and len(fragments) - len(unusable) < 2:
+        raise IoError(f"fragments: fewer than two can be used: {next(iter(unusable.values()))}")
 
 
 def _refine(
@@ -261,4 +319,4 @@ def _refine(
         return _core.refine_map(context, graph, surfaces, options.prepare.voxel_size, tell)
 
 
-__all__ = ["prepared_fragments", "reconstruct"]
+__all__ = ["reconstruct", "usable_fragments"]

@@ -4,6 +4,7 @@
 import gpureg
 import numpy as np
 import pytest
+from gpureg import pose_graph
 from scenes import moved, pose, room
 
 OPTIONS = gpureg.RegistrationOptions.from_voxel_size(0.1, quality=2)
@@ -51,6 +52,39 @@ def test_without_viewpoints_a_wrong_scan_is_not_confirmed(points):
     audit = gpureg.audit(points, wrong, options=OPTIONS)
     assert audit.connections[0].scans == [3]
     assert audit.connections[0].verdict == "undecided"
+
+
+def test_poses_are_read_as_by_the_command(scans, tmp_path):
+    right = gpureg.audit(scans, poses(), options=OPTIONS)
+    log, g2o = tmp_path / "poses.log", tmp_path / "poses.g2o"
+    with open(log, "w") as file:
+        for k, matrix in enumerate(poses()):
+            file.write(f"{k} {k} 5\n")
+            np.savetxt(file, matrix, "%.17g")
+    graph = pose_graph.PoseGraph()
+    for k, matrix in enumerate(poses()):
+        pose_graph.add_node(graph, k, matrix)
+    pose_graph.write_g2o(g2o, graph)
+    for path in (log, g2o):
+        audit = gpureg.audit(scans, path, options=OPTIONS)
+        assert [pair.verdict for pair in audit.pairs] == [pair.verdict for pair in right.pairs]
+        # g2o has quaternions: their rotations differ by the rounding of doubles.
+        shifts = [[pair.shift for pair in of.pairs] for of in (audit, right)]
+        assert np.allclose(*shifts, rtol=0, atol=1e-9)
+    half = tmp_path / "half.txt"
+    half.write_text("0 0 0 0 0 0 0 1\n1.5 0 0 0 0 0 0 1\n2 0 0 0 0 0 0 1\n")
+    with pytest.raises(gpureg.IoError, match="half.txt: has the time 1.5.*number of a fragment"):
+        gpureg.audit(scans, half, options=OPTIONS)
+    with pytest.raises(gpureg.IoError, match="half.txt: has the time 1.5.*number of a fragment"):
+        gpureg.reconstruct(scans, odometry=half, options=OPTIONS)
+
+
+def test_a_scan_that_cannot_be_read_is_left_out(points, tmp_path):
+    for k, cloud in enumerate(points):
+        gpureg.write_point_cloud(tmp_path / f"cloud_bin_{k}.ply", cloud)
+    (tmp_path / "cloud_bin_1.ply").write_bytes(b"ply")
+    audit = gpureg.audit(tmp_path, poses(), options=OPTIONS)
+    assert len(audit.pairs) == 6 and all(1 not in (p.source, p.target) for p in audit.pairs)
 
 
 def test_bad_poses(scans):

@@ -103,6 +103,35 @@ def test_folder_with_numbers(scans, tmp_path):
         gpureg.reconstruct(tmp_path, [(2, 3)], options=OPTIONS)
 
 
+def test_a_scan_that_cannot_be_read_is_left_out(scans, tmp_path):
+    for k, cloud in enumerate(scans[:4]):
+        gpureg.write_point_cloud(tmp_path / f"cloud_bin_{k}.ply", cloud)
+    whole = gpureg.reconstruct(tmp_path, options=OPTIONS)
+    pairs = [(j, i) for i in range(4) for j in range(i + 1, 4)]
+    results = gpureg.align_batch(
+        [tmp_path / f"cloud_bin_{k}.ply" for k in range(4)], pairs, options=OPTIONS
+    )
+    steps = [(k + 1, k, truth(k + 1, k)) for k in range(3)]
+    bad = tmp_path / "cloud_bin_1.ply"
+    bad.write_bytes(bad.read_bytes()[:1000])
+    first = gpureg.reconstruct(tmp_path, options=OPTIONS, odometry=steps)
+    for map in (
+        first,
+        gpureg.reconstruct(tmp_path, pairs, results=results, options=OPTIONS),
+        gpureg.reconstruct(tmp_path, pairs, results=results, options=OPTIONS, audit=False),
+    ):
+        assert map.islands == [[0, 2, 3]] and map.numbers == (0, 1, 2, 3)
+        assert map.poses.shape == (4, 4, 4) and np.isnan(map.poses[1]).all()
+        assert np.abs(map.poses[[0, 2, 3]] - whole.poses[[0, 2, 3]]).max() < 0.02
+        scan = map.scans[1]
+        assert not scan.placed and scan.reason == "unusable" and "truncated" in scan.explanation
+        assert len(map.points()[0]) > 1000
+    with pytest.raises(gpureg.IoError, match="fewer than two can be used: .*cloud_bin_1.ply"):
+        gpureg.reconstruct([scans[0], bad], options=OPTIONS)
+    with pytest.raises(FileNotFoundError, match="nowhere"):
+        gpureg.reconstruct([scans[0], scans[1], tmp_path / "nowhere.ply"], options=OPTIONS)
+
+
 def test_odometry(scans, tmp_path):
     poses = np.stack([np.linalg.inv(pose(k)) for k in range(7)])
     kept = {"pairs": [(0, 1), (0, 2)], "options": OPTIONS, "refine": False}
@@ -118,6 +147,12 @@ def test_odometry(scans, tmp_path):
             file.write(f"{k}\n")
             np.savetxt(file, matrix, "%.17g")
     assert np.allclose(gpureg.reconstruct(scans, odometry=path, **kept).poses, map.poses)
+    log = tmp_path / "odometry.log"
+    with open(log, "w") as file:
+        for source, target, matrix in steps:
+            file.write(f"{target} {source} 7\n")
+            np.savetxt(file, matrix, "%.17g")
+    assert np.allclose(gpureg.reconstruct(scans, odometry=log, **kept).poses, map.poses)
     with pytest.raises(ValueError, match=r"odometry: expected shape \(7, 4, 4\)"):
         gpureg.reconstruct(scans, odometry=poses[:3], **kept)
     with pytest.raises(ValueError, match=r"odometry\[0\].*fragment 8"):

@@ -5,6 +5,8 @@
 
 #include "fields.hpp"
 #include "gpureg/error.hpp"
+#include "inputs/map_poses.hpp"
+#include "inputs/odometry_file.hpp"
 #include "matrix.hpp"
 
 namespace gpureg::python {
@@ -83,6 +85,30 @@ void bind_trajectory(py::module_& m) {
         return py::make_tuple(times, matrices);
       },
       py::arg("path"), py::arg("format"));
+  // Of fragments, as the command reads them; `folder` is what messages call their set.
+  m.def(
+      "read_map_poses",
+      [](const std::string& path, const std::vector<int>& numbers, const std::string& folder) {
+        const auto poses = cli::read_map_poses(path, numbers, folder);
+        py::array_t<double> matrices(
+            {static_cast<py::ssize_t>(poses.size()), py::ssize_t(4), py::ssize_t(4)});
+        double* next = matrices.mutable_data();
+        for (const UnalignedIsometry3d& pose : poses)
+          for (int n = 0; n < 16; ++n) *next++ = pose.matrix()(n / 4, n % 4);
+        return matrices;
+      },
+      py::arg("path"), py::arg("numbers"), py::arg("folder"));
+  m.def(
+      "read_odometry",
+      [](const std::string& path, const std::vector<int>& numbers, const std::string& folder,
+         const std::vector<int>& unusable) {
+        py::list out;
+        for (const auto& edge : cli::read_odometry(path, numbers, folder, unusable))
+          out.append(py::make_tuple(edge.source, edge.target,
+                                    array_of(edge.target_from_source.matrix()), py::none()));
+        return out;
+      },
+      py::arg("path"), py::arg("numbers"), py::arg("folder"), py::arg("unusable"));
   m.def(
       "evaluate_trajectory",
       [](const DoubleArray& times, const DoubleArray& poses, const DoubleArray& true_times,
