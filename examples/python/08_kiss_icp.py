@@ -9,12 +9,18 @@ every few metres its scans become a fragment, and the closer says where the frag
 """
 
 import argparse
+import re
 from pathlib import Path
 
 import gpureg
 import numpy as np
 from kiss_icp.config import KISSConfig
 from kiss_icp.kiss_icp import KissICP
+
+
+def in_order(path: Path) -> list[tuple[int, str]]:
+    """Key of a name whose numbers count as numbers: scan_2 is before scan_10."""
+    return [(int(part) if part.isdigit() else -1, part) for part in re.split(r"(\d+)", path.name)]
 
 
 def main() -> int:
@@ -36,7 +42,9 @@ def main() -> int:
     points: list[np.ndarray] = []
     sensors: list[np.ndarray] = []
     world_from_fragments: list[np.ndarray] = []
-    files = sorted(p for p in arguments.folder.iterdir() if p.suffix in (".ply", ".pcd"))
+    files = sorted(
+        (p for p in arguments.folder.iterdir() if p.suffix in (".ply", ".pcd")), key=in_order
+    )
     for number, file in enumerate(files):
         scan = np.asarray(gpureg.read_point_cloud(file).points, np.float64)
         tracker.register_frame(scan, np.array([]))

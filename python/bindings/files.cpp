@@ -53,6 +53,12 @@ void bind_files(py::module_& m) {
            }),
            py::arg("points"), py::arg("normals") = py::none(), py::arg("viewpoints") = py::none())
       .def("__len__", [](const PointCloud& c) { return c.points.size(); })
+      .def(
+          "__array__",
+          [](const py::object& self, const py::object& dtype, const py::object& copy) {
+            return py::module_::import("gpureg._arrays").attr("points_as_array")(self, dtype, copy);
+          },
+          py::arg("dtype") = py::none(), py::arg("copy") = py::none(), "The points.")
       .def_property_readonly(
           "points", [](const PointCloud& c) { return in_frame(c.points, c.origin); },
           "(N, 3) copy, metres: float32, or float64 where float32 is too coarse, as for a map.")

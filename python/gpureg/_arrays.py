@@ -112,6 +112,21 @@ def matrix(value: Any, name: str, columns: int | None, rows: int | None = None) 
     return array
 
 
+def points_as_array(cloud: PointCloud, dtype: Any, copy: bool | None) -> npt.NDArray[Any]:
+    """What numpy.asarray makes of a PointCloud."""
+    if copy is False:
+        raise ValueError("copy: the points of a cloud are always copied, expected None or True")
+    return np.asarray(cloud.points, dtype)
+
+
+def coordinates(value: Any, name: str) -> npt.NDArray[Any]:
+    """(N, 3) coordinates; a fourth column is the intensity that a LiDAR measured."""
+    array = to_numpy(value, name)
+    if array.ndim == 2 and array.shape[1] == 4:
+        array = array[:, :3]
+    return matrix(value if array.dtype == object else array, name, 3)  # messages say what it is
+
+
 def float_rows(array: npt.NDArray[Any], name: str) -> FloatArray:
     """float32 rows. No copy where they are that already, also with room between the rows."""
     size = array.itemsize
@@ -190,7 +205,7 @@ def stored_cloud(
     """What a PointCloud holds: float32 rows, and the origin that was taken off points and
     viewpoints, or None.
     """
-    raw = matrix(points, "points", 3)
+    raw = coordinates(points, "points")
     rows, bounds, origin = float_rows(raw, "points"), _bounds(raw), None
     if bounds is not None and not np.array_equal(rows, raw, equal_nan=True):
         step = _step(bounds[2])
@@ -204,7 +219,7 @@ def stored_cloud(
             float_rows(matrix(normals, "normals", 3, len(raw)), "normals") if len(normals) else None
         )
     if viewpoints is not None:
-        views = _finite_viewpoints(viewpoints, "viewpoints")
+        views = _finite_viewpoints(_positions(viewpoints, "viewpoints"), "viewpoints")
         viewpoints = float_rows(views if origin is None else views - origin, "viewpoints")
     return rows, normals, viewpoints, origin
 
@@ -248,7 +263,7 @@ def core_cloud(
         stay = _stay_on_device(points, normals, features, viewpoints, prefix)
         if stay is not None:
             return stay if word is None else (*stay[:3], word, *stay[4:])
-    raw = matrix(points, name, 3)
+    raw = coordinates(points, name)
     count = raw.shape[0]
     origin = origin_of(raw, options.voxel_size)
     views = None if viewpoints is None else _finite_viewpoints(viewpoints, prefix + "viewpoints")
@@ -282,13 +297,18 @@ def _viewpoints(value: Any, name: str) -> Any:
         raise ValueError(
             f"{name}: expected (V, 3) positions, 'none', 'model' or 'auto', got {value!r}"
         )
+    return _positions(value, name)
+
+
+def _positions(value: Any, name: str) -> npt.NDArray[Any]:
+    """Rows; (3,) is one."""
     rows = to_numpy(value, name)
     return rows.reshape(1, 3) if rows.shape == (3,) else rows
 
 
 def host_points(cloud: Any, name: str) -> FloatArray:
     """float32 rows of the points alone, on the host. Large coordinates lose their origin."""
-    raw = matrix(_unpack(cloud, None, None, name, 0.0)[0], name, 3)
+    raw = coordinates(_unpack(cloud, None, None, name, 0.0)[0], name)
     origin = origin_of(raw, 0.0)
     return float_rows(raw if origin is None else raw - origin, name)
 
@@ -370,8 +390,7 @@ def several(value: Any, name: str) -> list[Any]:
     taken for clouds.
     """
     shape = getattr(value, "shape", None)
-    rows = shape is not None and len(shape) < 3 and getattr(value, "dtype", None) != object
-    single = rows or isinstance(value, str | bytes | os.PathLike | PointCloud | PreparedCloud)
+    single = is_one_cloud(value)
     if not single:
         try:
             return list(value)
@@ -385,6 +404,12 @@ def several(value: Any, name: str) -> list[Any]:
     raise TypeError(
         f"{name}: expected a sequence of clouds, got {'one: ' if single else ''}{given}"
     )
+
+
+def is_one_cloud(value: Any) -> bool:
+    shape = getattr(value, "shape", None)
+    rows = shape is not None and len(shape) < 3 and getattr(value, "dtype", None) != object
+    return rows or isinstance(value, str | bytes | os.PathLike | PointCloud | PreparedCloud)
 
 
 def index_pairs(

@@ -83,6 +83,7 @@ class LoopCloser:
         session: int = 0,
         time: float = 0.0,
         up: Any = None,
+        viewpoints: Any = None,
     ) -> None:
         """Add a fragment.
 
@@ -98,11 +99,18 @@ class LoopCloser:
             Seconds.
         up : (3,) array, optional
             Up in the fragment's frame: registrations keep gravity.
+        viewpoints : (V, 3) or (3,) array, "auto", "none" or "model", optional
+            Sensor positions of points that are prepared here, as for `prepare`.
         """
         if cloud is not None and not isinstance(cloud, PreparedCloud):
             cloud = prepare(
-                cloud, options=self._options.registration.prepare, context=self._context
+                cloud,
+                viewpoints=viewpoints,
+                options=self._options.registration.prepare,
+                context=self._context,
             )
+        elif viewpoints is not None:
+            raise TypeError("viewpoints: only for points, a PreparedCloud has its own")
         pose = np.eye(4) if world_from_fragment is None else _matrix(world_from_fragment)
         assert pose is not None
         self._core.add(id, cloud, pose, session, float(time), _matrix(up))

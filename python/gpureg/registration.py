@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from typing import Any, Literal
 
 from . import _core
-from ._arrays import core_cloud, host_points, index_pairs, several
+from ._arrays import core_cloud, host_points, index_pairs, is_one_cloud, several
 from ._contexts import checked, context_of, milliseconds_of
 from ._core import (
     Context,
@@ -140,13 +140,13 @@ def align_within(
     return _core.align_within(context_of(context), source, target, milliseconds, options)
 
 
-def suggest_voxel_size(clouds: Sequence[Any]) -> VoxelSizeSuggestion:
+def suggest_voxel_size(clouds: Any) -> VoxelSizeSuggestion:
     """A voxel size that leaves some thousand points of each cloud, and fits their spacing and
     noise.
 
     Parameters
     ----------
-    clouds : sequence
+    clouds : cloud, or sequence of clouds
         Each whatever `prepare` takes as points. At most 16, evenly chosen, are looked at.
 
     Examples
@@ -154,9 +154,11 @@ def suggest_voxel_size(clouds: Sequence[Any]) -> VoxelSizeSuggestion:
     >>> import numpy as np, gpureg
     >>> sphere = np.random.default_rng(1).normal(size=(50000, 3))
     >>> sphere /= np.linalg.norm(sphere, axis=1, keepdims=True)
-    >>> gpureg.suggest_voxel_size([sphere]).voxel_size
+    >>> gpureg.suggest_voxel_size(sphere).voxel_size
     0.06
     """
+    if is_one_cloud(clouds):
+        return _core.suggest_voxel_size([host_points(clouds, "clouds")])
     return _core.suggest_voxel_size(
         [host_points(cloud, f"clouds[{k}]") for k, cloud in enumerate(several(clouds, "clouds"))]
     )

@@ -54,6 +54,9 @@ def test_suggestions(clouds):
     one = gpureg.suggest_voxel_size(clouds)
     assert one.reason == "none" and 0 < one.noise < one.voxel_size
     assert 3000 <= one.points <= 20000
+    alone = gpureg.suggest_voxel_size([clouds[0]]).voxel_size
+    for cloud in (clouds[0], gpureg.PointCloud(clouds[0])):
+        assert gpureg.suggest_voxel_size(cloud).voxel_size == alone
     millimetres = gpureg.suggest_voxel_size([1000 * cloud for cloud in clouds])
     assert millimetres.voxel_size == pytest.approx(1000 * one.voxel_size, rel=0.1)
     far = gpureg.suggest_voxel_size([cloud + [4.5e5, 5.4e6, 0] for cloud in clouds])

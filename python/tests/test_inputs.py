@@ -174,6 +174,51 @@ def test_empty_clouds_have_a_reason(source):
     assert gpureg.align_batch([], []) == [] and gpureg.prepare_batch([]) == []
 
 
+def test_intensities_of_a_lidar_are_left_out(source, reference):
+    scan = np.column_stack([source, np.linspace(0, 1, len(source))]).astype(np.float32)
+    assert same_points(gpureg.prepare(scan), reference)
+    assert np.array_equal(gpureg.PointCloud(scan).points, scan[:, :3])
+    with pytest.raises(ValueError, match=r"points: expected shape \(N, 3\), got \(9, 5\)"):
+        gpureg.prepare(np.zeros((9, 5)))
+
+
+def test_numpy_takes_a_point_cloud(source):
+    cloud = gpureg.PointCloud(source.astype(np.float32), viewpoints=[0, 0, 0])
+    assert cloud.viewpoints.tolist() == [[0, 0, 0]]
+    assert np.array_equal(np.asarray(cloud), cloud.points)
+    assert np.asarray(cloud, np.float64).dtype == np.float64
+
+
+def test_a_loop_closer_prepares_with_viewpoints(source):
+    closer = gpureg.LoopCloser(voxel_size=0.05)
+    closer.add(0, source, viewpoints=[0, 0, 1])
+    with pytest.raises(ValueError, match="viewpoints"):
+        closer.add(1, source, viewpoints="nobody")
+    with pytest.raises(TypeError, match="viewpoints: only for points"):
+        closer.add(1, gpureg.prepare(source), viewpoints=[0, 0, 1])
+
+
+def test_what_is_loaded_late_is_listed():
+    assert {"register_all", "BatchRun", "read_cameras"} <= set(dir(gpureg))
+    assert set(gpureg.__all__) <= set(dir(gpureg))
+
+
+def test_names_of_scans_are_sorted_by_number():
+    file = pathlib.Path(__file__).parents[2] / "examples" / "python" / "08_kiss_icp.py"
+    text = file.read_text()
+    found = {"re": __import__("re"), "Path": pathlib.Path}
+    exec(text[text.index("def in_order") : text.index("def main")], found)
+    names = ["scan_10.ply", "scan_2.ply", "scan_1.pcd", "000007.ply", "b1.ply"]
+    paths = sorted(map(pathlib.Path, names), key=found["in_order"])
+    assert [path.name for path in paths] == [
+        "000007.ply",
+        "b1.ply",
+        "scan_1.pcd",
+        "scan_2.ply",
+        "scan_10.ply",
+    ]
+
+
 def test_normals_are_used(source):
     # They choose the side: all against all, but for those at a right angle to what was given.
     side = np.tile([0.3, 0.5, 2.0], (len(source), 1))

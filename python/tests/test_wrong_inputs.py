@@ -78,7 +78,6 @@ def test_wrong_sequences_of_clouds_are_named(source):
         gpureg.register(None, source)
     calls = [
         ("clouds", gpureg.prepare_batch),
-        ("clouds", gpureg.suggest_voxel_size),
         ("clouds", gpureg.FragmentSet.from_clouds),
         ("fragments", lambda clouds: gpureg.align_batch(clouds, [])),
     ]
