@@ -15,7 +15,7 @@ namespace gpureg::test {
 struct Outcome {
   int status = -1;  ///< exit status; -1: ended by a signal
   int signal = 0;
-  std::string out, err;
+  std::string out, err;  ///< err: without lines of progress
 };
 
 /// What the process that runs the command finds.

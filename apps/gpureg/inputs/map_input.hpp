@@ -19,6 +19,11 @@ struct MapInput {
   /// Recognises the kind; reads a saved map. Throws IoError.
   explicit MapInput(std::string of);
 
+  /// Of a saved map; else the given ones.
+  localization::MapOptions options_or(const localization::MapOptions& otherwise) const {
+    return saved ? saved->options() : otherwise;
+  }
+
   /// Makes the map of a cloud or of scans; a saved one is returned as it is.
   /// @throws IoError, InvalidArgument naming the file.
   localization::PreparedMap prepare(const Context& context,

@@ -268,4 +268,9 @@ std::vector<std::pair<std::uint32_t, std::uint32_t>> choose_pairs(const Fragment
   return chosen;
 }
 
+void check_pairs(const std::string& folder, const std::string& pairs) {
+  if (choose_pairs(FragmentFolder(folder, true), pairs, true).empty() && pairs != "all")
+    throw InvalidArgument(pairs + " lists no pair");
+}
+
 }  // namespace gpureg::cli

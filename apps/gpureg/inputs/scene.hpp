@@ -78,6 +78,10 @@ PreparedFolder prepare_folder(const Context& context, const std::string& path,
                               const PrepareOptions& options, bool quiet,
                               bool infer_viewpoint = true);
 
+/// Reads cameras.txt and a list of pairs before the clouds are read. Throws IoError as
+/// choose_pairs(), InvalidArgument for a list without a pair.
+void check_pairs(const std::string& folder, const std::string& pairs);
+
 /// Pairs i < j as indices into numbers, in the file's order without repetitions, or all of them for
 /// "all". Pairs of unusable fragments are left out. Unless quiet, says how many are repetitions.
 /// Throws IoError for a number that no fragment has.

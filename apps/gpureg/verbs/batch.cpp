@@ -78,9 +78,7 @@ class Batch {
     check_voxel_size(options_.prepare.voxel_size, scene_.extent, "the largest fragment");
     if (o_.method.automatic_voxel_size && !o_.quiet) note_few_points(scene_.prepared_sizes());
     const Pairs pairs = choose_pairs(scene_, o_.pairs, o_.quiet);
-    if (pairs.empty())
-      throw InvalidArgument(o_.pairs == "all" ? o_.folder + " holds one fragment; a batch needs two"
-                                              : o_.pairs + " lists no pair");
+    if (pairs.empty()) throw InvalidArgument(o_.folder + " holds one fragment; a batch needs two");
     std::optional<std::string> journal;
     if (can_have_journal(o_.log)) journal = o_.journal();
     run_.emplace(scene_, pairs, options_, up_prior(o_.up), journal, o_.journal_mode(), o_.quiet);
@@ -213,6 +211,7 @@ void add_batch(CommandLine& line) {
     o->method.registration();  // reports bad options before the clouds are read
     up_prior(o->up);
     check_batch_outputs(*o);
+    check_pairs(o->folder, o->pairs);
     choose_voxel_size(o->method, o->folder, o->resume ? o->journal() : "");
     if (!o->quiet) o->method.note_calibration();
     return Batch(*o).run();

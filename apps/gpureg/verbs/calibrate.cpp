@@ -143,6 +143,9 @@ int run(CalibrateOptions o) {
   for (const std::string& scene : o.scenes) inputs.push_back({"--scenes", scene});
   check_outputs({{"-o", o.output}}, inputs);
   const std::vector<SceneFile> scenes = read_scenes(o.scenes);
+  const FragmentFolder folder(o.folder, true);
+  std::vector<UnalignedIsometry3d> poses;
+  if (!o.trajectory.empty()) poses = read_scan_poses(o.trajectory, folder.numbers, o.folder);
   choose_voxel_size(o.method, o.folder);
   const RegistrationOptions options = o.method.registration();
   for (const SceneFile& scene : scenes) check_options(scene, scene_options(options));
@@ -150,8 +153,6 @@ int run(CalibrateOptions o) {
   const Clouds clouds = read_clouds(o);
   const SceneFile here{o.folder, {}, fingerprints(clouds.views()), {}};
   for (const SceneFile& scene : scenes) check_different(here, scene);
-  std::vector<UnalignedIsometry3d> poses;
-  if (!o.trajectory.empty()) poses = read_scan_poses(o.trajectory, clouds.numbers, o.folder);
   const Context context = o.method.context();
 
   std::optional<Progress> progress;

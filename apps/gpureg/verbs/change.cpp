@@ -98,8 +98,9 @@ int run(Options o) {
   ChangeOptions change = ChangeOptions::from_voxel_size(o.method.voxel_size);
   if (o.tolerance) change.tolerance = *o.tolerance;
   change.validate();
+  // A bad scan shall show before the map is prepared.
+  PointCloud scan = read_scan(o.scan, context, input.options_or(of_map));
   const PreparedMap map = input.prepare(context, of_map);
-  PointCloud scan = read_scan(o.scan, context, map.options());
   o.place.viewpoint.apply(scan);
   const PointCloudView view = o.place.viewpoint.view(scan);
   Json record;

@@ -61,11 +61,11 @@ int run(const SurfaceRun& o) {
                                        {"--surface", o.truth},
                                        {"--trajectory", o.estimate},
                                        {"--ground-truth", o.true_trajectory}});
+  const Eigen::Matrix4d truth_from_map = alignment_of(o);
   const PointCloud truth = io::read_point_cloud(o.truth);
   PointCloud map = io::read_point_cloud(o.map);
   note_coarse(truth, o.truth);
   note_coarse(map, o.map);
-  const Eigen::Matrix4d truth_from_map = alignment_of(o);
   const Eigen::Isometry3d move(truth_from_map);
   for (Eigen::Vector3f& p : map.points)
     p = (move * (p.cast<double>() + map.origin) - truth.origin).cast<float>();

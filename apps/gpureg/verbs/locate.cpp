@@ -57,16 +57,22 @@ void print(const std::string& file, const LocateResult& result) {
   }
 }
 
-std::vector<LocateResult> locate_all(const LocateRun& o, const Context& context,
-                                     const PreparedMap& map, const LocateOptions& options) {
+std::vector<PointCloud> read_scans(const LocateRun& o, const Context& context,
+                                   const MapOptions& of_map, const LocateOptions& options) {
   std::vector<PointCloud> clouds;
   ViewpointNote note;
   for (const std::string& file : o.scans()) {
-    clouds.push_back(read_scan(file, context, map.options()));
+    clouds.push_back(read_scan(file, context, of_map));
     o.place.viewpoint.apply(clouds.back());
     if (options.registration.prepare.depth_maps > 0) note.see(clouds.back(), file);
   }
   note.print();
+  return clouds;
+}
+
+std::vector<LocateResult> locate_all(const LocateRun& o, const Context& context,
+                                     const std::vector<PointCloud>& clouds, const PreparedMap& map,
+                                     const LocateOptions& options) {
   std::vector<PointCloudView> views;
   for (const PointCloud& cloud : clouds) views.push_back(o.place.viewpoint.view(cloud));
   return localization::locate(context, views, map, options,
@@ -110,6 +116,8 @@ int run(LocateRun o) {
   const LocateOptions options = locate_options(o.method);
   MapOptions of_map = MapOptions::from_voxel_size(o.method.voxel_size);
   of_map.prepare = options.registration.prepare;
+  // A bad scan shall show before the map is prepared.
+  const std::vector<PointCloud> scans = read_scans(o, context, input.options_or(of_map), options);
   const PreparedMap map = input.prepare(context, of_map);
   std::cout << "map      " << o.map() << ": " << grouped(map.size()) << " points, " << map.tiles()
             << (map.tiles() == 1 ? " tile\n" : " tiles\n") << "backend  " << context.description()
@@ -117,7 +125,7 @@ int run(LocateRun o) {
   if (!o.save_map.empty()) map.save(o.save_map);
   if (o.scans().empty()) return kOk;
   const auto begin = std::chrono::steady_clock::now();
-  const std::vector<LocateResult> results = locate_all(o, context, map, options);
+  const std::vector<LocateResult> results = locate_all(o, context, scans, map, options);
   const double seconds =
       std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   bool all = true;

@@ -80,6 +80,13 @@ void check_output_folder(const ReconstructOptions& o) {
   check_outputs(outputs, inputs);
 }
 
+/// A bad file shall show before the clouds are read.
+void check_inputs(const ReconstructOptions& o) {
+  check_pairs(o.folder, o.pairs);
+  if (o.odometry.empty()) return;
+  read_odometry(o.odometry, FragmentFolder(o.folder, true).numbers, o.folder);
+}
+
 /// One run, from the folder to the map.
 class Reconstruct {
  public:
@@ -145,9 +152,7 @@ class Reconstruct {
     // A bad file shall show before hours of work.
     if (!o_.odometry.empty()) odometry_ = known_poses();
     const Pairs pairs = o_.prune > 0 ? likely_pairs() : choose_pairs(scene, o_.pairs, o_.quiet);
-    if (pairs.empty())
-      throw InvalidArgument(o_.pairs == "all" ? o_.folder + " holds one fragment; a map needs two"
-                                              : o_.pairs + " lists no pair");
+    if (pairs.empty()) throw InvalidArgument(o_.folder + " holds one fragment; a map needs two");
     pairs_.emplace(scene, pairs, run_.options, std::nullopt, o_.journal(), o_.journal_mode(),
                    o_.quiet);
     pairs_->align(context_);
@@ -343,6 +348,7 @@ void add_reconstruct(CommandLine& line) {
                        "with --results and --no-audit: no pair is aligned");
     if (o->no_map) o->method.refuse({"--map-voxel-size"}, "with --no-map");
     check_output_folder(*o);
+    check_inputs(*o);
     choose_voxel_size(o->method, o->folder, o->resume ? o->journal() : "");
     if (!o->quiet) o->method.note_calibration();
     return Reconstruct(*o).run();

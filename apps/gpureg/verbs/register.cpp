@@ -135,13 +135,13 @@ Json document(const RegisterOptions& o, const RegistrationOptions& options, cons
 /// Verifies the poses of --initial.
 RegistrationResult verify(const RegisterOptions& o, const Context& context,
                           const PreparedCloud& source, const PreparedCloud& target,
+                          const std::vector<UnalignedIsometry3d>& poses,
                           const RegistrationOptions& options) {
   VerificationOptions verification;
   verification.refine = o.refine_initial;
   verification.search_alternatives = !o.ignore_alternatives;
   RegistrationResult result = result_of(
-      verify_poses(context, source, target, read_initial_poses(o.initial), options, verification),
-      options.min_confidence);
+      verify_poses(context, source, target, poses, options, verification), options.min_confidence);
   result.statistics.source_points = static_cast<std::uint32_t>(source.size());
   result.statistics.target_points = static_cast<std::uint32_t>(target.size());
   return result;
@@ -198,6 +198,8 @@ int run(RegisterOptions o) {
                  {"TARGET", o.target},
                  {"--initial", o.initial},
                  {"--calibration", o.method.calibration}});
+  std::vector<UnalignedIsometry3d> initial;
+  if (!o.initial.empty()) initial = read_initial_poses(o.initial);
   const Context context = o.method.context();
   auto [source_cloud, target_cloud] = read_clouds(o);
   o.source_viewpoint.apply(source_cloud);
@@ -228,7 +230,7 @@ int run(RegisterOptions o) {
     timed = align_within(context, source, target, *o.time_budget, options);
   else
     timed.result = o.initial.empty() ? align(context, source, target, prior, options)
-                                     : verify(o, context, source, target, options);
+                                     : verify(o, context, source, target, initial, options);
   const RegistrationResult& result = timed.result;
   if (o.initial.empty())
     print_report(o, context, source, target, result);

@@ -83,12 +83,15 @@ ReportEntry read_entry(const ReportOptions& o, std::size_t k) {
     entry.evaluation = evaluation::evaluate(*entry.truth, entry.result.reports, true);
     if (o.results.size() > 1) entry.scene = base_name(folder);
   }
-  if (const std::string folder = value_for(k, o.clouds); !folder.empty() && folder != kNoPictures)
-    entry.pictures =
-        draw(entry.truth ? samples(evaluate_pairs(*entry.truth, entry.result), kPicturesOfAKind)
-                         : samples(entry.result, kPicturesOfAKind),
-             folder);
   return entry;
+}
+
+void add_pictures(const std::string& folder, ReportEntry& entry) {
+  if (folder.empty() || folder == kNoPictures) return;
+  entry.pictures =
+      draw(entry.truth ? samples(evaluate_pairs(*entry.truth, entry.result), kPicturesOfAKind)
+                       : samples(entry.result, kPicturesOfAKind),
+           folder);
 }
 
 int run(const ReportOptions& o) {
@@ -105,6 +108,7 @@ int run(const ReportOptions& o) {
   check_outputs({{"-o", o.output}}, inputs);
   std::vector<ReportEntry> entries;
   for (std::size_t k = 0; k < o.results.size(); ++k) entries.push_back(read_entry(o, k));
+  for (std::size_t k = 0; k < entries.size(); ++k) add_pictures(value_for(k, o.clouds), entries[k]);
   files::write_atomically(o.output, report_page(entries));
   std::cout << "written " << o.output << "\n";
   return kOk;
