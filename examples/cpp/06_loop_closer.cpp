@@ -30,14 +30,15 @@ int main(int argc, char** argv) try {
     lc::Fragment fragment;
     fragment.id = k;
     fragment.time = k;
-    for (int cell = 0; cell < 16; ++cell)
-      tracked >> fragment.world_from_fragment.matrix()(cell / 4, cell % 4);
+    gpureg::UnalignedIsometry3d pose;
+    for (int cell = 0; cell < 16; ++cell) tracked >> pose.matrix()(cell / 4, cell % 4);
     if (!tracked) throw gpureg::IoError(std::string(argv[1]) + " has too few poses");
     const gpureg::PointCloud cloud = gpureg::io::read_point_cloud(argv[k + 2]);
     fragment.cloud = gpureg::prepare(context, cloud.view(), options.registration.prepare);
+    fragment.world_from_fragment = pose;
     closer.add(fragment);
-    if (k > 0) closer.add_odometry(k, k - 1, last.inverse() * fragment.world_from_fragment);
-    last = fragment.world_from_fragment;
+    if (k > 0) closer.add_odometry(k, k - 1, last.inverse() * pose);
+    last = pose;
 
     // Between two frames there are 20 ms to spare; what is left is done later.
     const lc::Update update = closer.process(20.0);

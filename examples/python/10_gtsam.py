@@ -63,9 +63,9 @@ class Isam2:
         removed, added = [], {}
         for loop in changed:
             edge = loop.source, loop.target
-            if edge in self.loops:  # retracted, or accepted with another pose
+            if loop.state == "retracted":
                 removed.append(self.loops.pop(edge))
-            if loop.state == "accepted":
+            elif loop.state == "accepted":
                 added[edge] = self.factors.size()
                 noise = gtsam.noiseModel.Gaussian.Information(loop.information)
                 pose = gtsam.Pose3(loop.target_from_source)

@@ -26,13 +26,16 @@ using pose_graph::UnalignedMatrix6d;
 /// A piece of the map: the points of a few seconds in one frame.
 struct Fragment {
   FragmentId id = 0;         ///< unique among the fragments present; any value
-  std::int64_t session = 0;  ///< fragments of one session share a world frame
+  std::int64_t session = 0;  ///< fragments of one session share a world
   double time = 0;           ///< seconds; any origin
-  /// Of the closer's context. An empty handle is a node of the graph that is never proposed.
+  /// Of the closer's context and voxel size, with a point or more. An empty handle is a node of the
+  /// graph that is never proposed.
   PreparedCloud cloud = {};
-  /// p_world = world_from_fragment * p_fragment, metres. Where odometry connects the fragment to
-  /// others, their estimates and the odometry replace it.
-  UnalignedIsometry3d world_from_fragment = UnalignedIsometry3d::Identity();
+  /// p_world = world_from_fragment * p_fragment, metres; none: not known. As long as the host adds
+  /// no odometry between fragments of a session, their poses are its odometry: the motion from one
+  /// to the next counts as an add_odometry() without covariance. Where odometry connects the
+  /// fragment to others, their estimates and the odometry replace the pose.
+  std::optional<UnalignedIsometry3d> world_from_fragment = std::nullopt;
   /// Up in the fragment's frame, of any length but 0. Registrations of two fragments that both have
   /// it keep gravity.
   std::optional<Eigen::Vector3d> up = std::nullopt;
@@ -146,7 +149,7 @@ enum class LoopReason {
   not_aligned,        ///< rejected: no pose of the pair reaches min_confidence
   inconsistent,       ///< rejected or retracted: contradicts odometry and other loops
   lost_confirmation,  ///< retracted: the loops that confirmed it are gone
-  fragment_removed    ///< final: one of its fragments was removed before it was accepted
+  replaced            ///< retracted: accepted with another pose, which follows
 };
 
 const char* to_string(LoopState state);    ///< "candidate", ...
@@ -191,15 +194,20 @@ struct ProcessLimits {
   std::optional<double> milliseconds = std::nullopt;
   /// Number of registrations; the result does not depend on the clock.
   std::optional<std::size_t> registrations = std::nullopt;
-  /// Polled between chunks and while the graph is optimised; true ends the call. A verification
-  /// that it ends decides nothing (Update::status is cancelled), and the next call begins with it.
-  /// May be empty.
+  /// Polled between chunks, while the graph is optimised and before the Update is made; true ends
+  /// the call. A verification that it ends decides nothing (Update::status is cancelled), and the
+  /// next call begins with it. What it throws ends the call without an Update; the next one has all
+  /// changes. May be empty.
   std::function<bool()> should_stop = nullptr;
 };
 
 /// What one process() did.
 struct Update {
-  std::vector<Loop> changed;  ///< loops whose state is new or other than before, in a fixed order
+  /// Each loop once per change of its state, in a fixed order. An accepted loop whose pose changes
+  /// is retracted with the old one (LoopReason::replaced) and accepted with the new one, in this
+  /// order. A host that adds a factor for each accepted loop and takes it out for each retracted
+  /// one never has two. What a call that threw did not deliver, the next one does.
+  std::vector<Loop> changed;
   /// All fragments, ascending by id; empty where no pose changed and with Options::optimize off.
   std::vector<FragmentPose> poses;
   std::size_t registered = 0;      ///< registrations of this call
@@ -232,7 +240,8 @@ class LoopCloser {
   LoopCloser& operator=(LoopCloser&&) noexcept;
 
   /// @throws InvalidArgument for an id that is present, a pose that is not rigid, a time that is
-  ///   not finite, an up whose length is not within 1e-6 to 1e9.
+  ///   not finite, an up whose length is not within 1e-6 to 1e9, a cloud without points or of
+  ///   another voxel size than Options::registration.
   void add(const Fragment& fragment);
 
   /// Relative pose by tracking: p_target = target_from_source * p_source.
@@ -304,7 +313,8 @@ class LoopCloser {
   /// Replaces the state by a saved one. Then the same calls give the same bits as without saving.
   /// @param clouds called once for each fragment that had a cloud; must return the same cloud.
   /// @throws IoError naming the file where it is missing, damaged or from a later version;
-  ///   InvalidArgument naming the fragment where a cloud differs. Then the state stays as it was.
+  ///   InvalidArgument naming both voxel sizes where they differ, or the fragment whose cloud does.
+  ///   Then the state stays as it was.
   void load(const std::string& path, const CloudProvider& clouds);
 
  private:

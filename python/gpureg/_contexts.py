@@ -50,10 +50,23 @@ def context_of(context: Context | None) -> Context:
     return checked(context, Context, "context") or default_context()
 
 
-def milliseconds_of(value: Any, name: str) -> float:
+def number_of(value: Any, name: str, expected: str = "a number") -> float:
     if isinstance(value, bool | np.bool_) or not isinstance(value, numbers.Real):
-        raise TypeError(f"{name}: expected milliseconds, a number, got {value!r}")
-    number = float(value)
+        raise TypeError(f"{name}: expected {expected}, got {value!r}")
+    return float(value)
+
+
+def whole_number_of(value: Any, name: str, least: int = -(2**63)) -> int:
+    if isinstance(value, bool | np.bool_) or not isinstance(value, numbers.Integral):
+        raise TypeError(f"{name}: expected a whole number, got {value!r}")
+    if not least <= value < 2**63:
+        expected = "64 bits" if least < 0 else f"{least} or more"
+        raise InvalidArgument(f"{name} is {value}, expected {expected}")
+    return int(value)
+
+
+def milliseconds_of(value: Any, name: str) -> float:
+    number = number_of(value, name, "milliseconds, a number")
     if not (math.isfinite(number) and number > 0):
         raise InvalidArgument(f"{name} is {value}, expected a number > 0")
     return number

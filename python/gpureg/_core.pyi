@@ -1472,7 +1472,7 @@ class LoopCloser:
         self,
         id: int,
         cloud: PreparedCloud | None,
-        world_from_fragment: _Float64,
+        world_from_fragment: _Float64 | None,
         session: int,
         time: float,
         up: _Float64 | None,

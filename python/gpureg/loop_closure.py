@@ -10,7 +10,7 @@ from typing import Any, Union
 import numpy as np
 
 from . import _core
-from ._contexts import checked, context_of
+from ._contexts import checked, context_of, number_of, whole_number_of
 from ._core import (
     Context,
     LoopClosureOptions,
@@ -29,12 +29,18 @@ def _matrix(value: Any) -> np.ndarray | None:
     return None if value is None else np.asarray(value, np.float64)
 
 
+def _pair(source: Any, target: Any) -> tuple[int, int]:
+    return whole_number_of(source, "source"), whole_number_of(target, "target")
+
+
 class LoopCloser:
     """Finds, verifies and, where wanted, optimises the loops of a SLAM system.
 
-    `process` registers pairs of fragments and says which loops changed their state; every other
-    method returns at once, also while another thread is in `process`. The same calls give the same
-    bits, as long as `process` has no time limit.
+    `process` registers pairs of fragments and says which loops changed their state. `save` and
+    `load` wait for it. Every other method returns at once, also while another thread is in
+    `process`; only `add` takes the time of preparing points where it is given points. On a GPU that
+    waits for the registrations under way. The same calls give the same bits, as long as `process`
+    has no time limit.
 
     Parameters
     ----------
@@ -73,6 +79,10 @@ class LoopCloser:
             options, LoopClosureOptions, "options"
         ) or LoopClosureOptions.from_voxel_size(voxel_size)
         self._core = _core.LoopCloser(self._context, self._options)
+        # process() holds the engine of its context while it registers. Clouds of all CPU contexts
+        # are the same.
+        cpu = self._context.backend == "cpu"
+        self._preparing = Context.cpu(self._context.threads) if cpu else self._context
 
     def add(
         self,
@@ -90,9 +100,11 @@ class LoopCloser:
         Parameters
         ----------
         cloud : PreparedCloud or points, optional
-            Points as `prepare` takes them are prepared here. None: a node without a cloud.
+            Points as `prepare` takes them are prepared here. A prepared cloud has the voxel size
+            of the closer. None: a node without a cloud.
         world_from_fragment : (4, 4) array, optional
-            Metres. Odometry to other fragments replaces it.
+            Metres. As long as no odometry is added between fragments of its session, the motion
+            from the pose of the one before is its odometry. Odometry replaces it.
         session : int
             Fragments of one session share a world.
         time : float
@@ -101,19 +113,26 @@ class LoopCloser:
             Up in the fragment's frame: registrations keep gravity.
         viewpoints : (V, 3) or (3,) array, "auto", "none" or "model", optional
             Sensor positions of points that are prepared here, as for `prepare`.
+
+        Raises
+        ------
+        InvalidArgument
+            The id is present; the cloud has no points or another voxel size; the pose is not rigid.
         """
+        id = whole_number_of(id, "id")
+        session = whole_number_of(session, "session")
         if cloud is not None and not isinstance(cloud, PreparedCloud):
             cloud = prepare(
                 cloud,
                 viewpoints=viewpoints,
                 options=self._options.registration.prepare,
-                context=self._context,
+                context=self._preparing,
             )
         elif viewpoints is not None:
             raise TypeError("viewpoints: only for points, a PreparedCloud has its own")
-        pose = np.eye(4) if world_from_fragment is None else _matrix(world_from_fragment)
-        assert pose is not None
-        self._core.add(id, cloud, pose, session, float(time), _matrix(up))
+        self._core.add(
+            id, cloud, _matrix(world_from_fragment), session, number_of(time, "time"), _matrix(up)
+        )
 
     def add_odometry(
         self, source: int, target: int, target_from_source: Any, covariance: Any = None
@@ -124,15 +143,16 @@ class LoopCloser:
         translation (metres), in the source's frame.
         """
         pose = np.asarray(target_from_source, np.float64)
-        self._core.add_odometry(source, target, pose, _matrix(covariance))
+        self._core.add_odometry(*_pair(source, target), pose, _matrix(covariance))
 
     def set_covisible(self, id: int, others: Iterable[int]) -> None:
         """Tracking has closed these pairs already: they are not proposed."""
-        self._core.set_covisible(id, list(others))
+        known = [whole_number_of(other, "others") for other in others]
+        self._core.set_covisible(whole_number_of(id, "id"), known)
 
     def propose(self, source: int, target: int, prior: RegistrationPrior | None = None) -> None:
         """Register a pair before all others: the host's place recognition."""
-        self._core.propose(source, target, prior)
+        self._core.propose(*_pair(source, target), checked(prior, RegistrationPrior, "prior"))
 
     def add_loop(
         self,
@@ -144,28 +164,46 @@ class LoopCloser:
     ) -> None:
         """Add a loop that the host found: images, GNSS, tags."""
         pose = np.asarray(target_from_source, np.float64)
-        self._core.add_loop(source, target, pose, _matrix(information), confidence)
+        self._core.add_loop(
+            *_pair(source, target), pose, _matrix(information), number_of(confidence, "confidence")
+        )
 
     def add_result(self, source: int, target: int, result: RegistrationResult) -> None:
         """Add the result of an `align` that the host ran itself."""
-        self._core.add_result(source, target, result)
+        if not isinstance(result, RegistrationResult):
+            raise TypeError(f"result: expected a RegistrationResult, got {result!r}")
+        self._core.add_result(*_pair(source, target), result)
 
     def set_poses(self, poses: Mapping[int, Any]) -> None:
         """Take over poses that the host has optimised: world_from_fragment by id."""
-        self._core.set_poses({id: np.asarray(pose, np.float64) for id, pose in poses.items()})
+        self._core.set_poses(
+            {
+                whole_number_of(id, "an id of poses"): np.asarray(pose, np.float64)
+                for id, pose in poses.items()
+            }
+        )
 
     def remove(self, id: int) -> None:
         """Forget a fragment; its edges are marginalised onto its neighbours."""
-        self._core.remove(id)
+        self._core.remove(whole_number_of(id, "id"))
 
     def process(
         self, *, milliseconds: float | None = None, registrations: int | None = None
     ) -> LoopUpdate:
         """Register what is due, verify the loops, optimise.
 
-        Other threads run meanwhile. Ctrl-C ends it between two chunks of registrations; nothing is
-        lost, and the next call goes on.
+        `LoopUpdate.changed` has each loop once per change of its state. An accepted loop whose pose
+        changes is retracted with the old one and accepted with the new one, in this order: add a
+        factor for each accepted loop, take it out for each retracted one.
+
+        Other threads run meanwhile. Ctrl-C ends it within a second on the CPU, on a GPU between two
+        chunks of registrations. Nothing is lost: the next call goes on, and returns all that
+        changed.
         """
+        if milliseconds is not None:
+            milliseconds = number_of(milliseconds, "milliseconds")
+        if registrations is not None:
+            registrations = whole_number_of(registrations, "registrations", 0)
         return self._core.process(milliseconds, registrations)
 
     @property
@@ -192,8 +230,21 @@ class LoopCloser:
         self._core.save(os.fspath(path))
 
     def load(self, path: Path, clouds: Callable[[int], PreparedCloud]) -> None:
-        """Replace the state by a saved one; ``clouds(id)`` returns the fragments' clouds again."""
-        self._core.load(os.fspath(path), clouds)
+        """Replace the state by a saved one; ``clouds(id)`` returns the fragments' clouds again.
+
+        The state stays as it was where the file is damaged (IoError), where it is of another voxel
+        size or a cloud is another (InvalidArgument), and where ``clouds`` raises.
+        """
+
+        def cloud_of(id: int) -> PreparedCloud:
+            cloud = clouds(id)
+            if not isinstance(cloud, PreparedCloud):
+                raise TypeError(f"clouds({id}): expected a PreparedCloud, got {cloud!r}")
+            return cloud
+
+        if not callable(clouds):
+            raise TypeError(f"clouds: expected a function of a fragment's id, got {clouds!r}")
+        self._core.load(os.fspath(path), cloud_of)
 
     def __len__(self) -> int:
         return len(self._core)

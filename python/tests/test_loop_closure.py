@@ -1,12 +1,17 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """LoopCloser: states, threads, saving; the C++ tests have the method."""
 
+import signal
+import subprocess
+import sys
 import threading
+import time
+from pathlib import Path
 
 import gpureg
 import numpy as np
 import pytest
-from scenes import planar
+from scenes import planar, room
 
 
 def lap(count=20):
@@ -123,3 +128,137 @@ def test_other_threads_run_beside_process(closer):
     thread.join()
     closer.process()
     assert len(closer.poses) == 40
+
+
+def test_numbers_of_other_kinds_are_refused(closer, tmp_path):
+    closer.add(1)
+    closer.add(2)
+    eye = np.eye(4)
+    for call, name in [
+        (lambda: closer.add(True), "id"),
+        (lambda: closer.add("7"), "id"),
+        (lambda: closer.add(7.0), "id"),
+        (lambda: closer.add(7, time=True), "time"),
+        (lambda: closer.add(7, session=False), "session"),
+        (lambda: closer.add_odometry(2, True, eye), "target"),
+        (lambda: closer.set_covisible(1, [True]), "others"),
+        (lambda: closer.propose("2", 1), "source"),
+        (lambda: closer.propose(2, 1, prior=3), "prior"),
+        (lambda: closer.add_loop(2, 1, eye, confidence=True), "confidence"),
+        (lambda: closer.add_result(2, 1, None), "result"),
+        (lambda: closer.set_poses({True: eye}), "poses"),
+        (lambda: closer.remove("1"), "id"),
+        (lambda: closer.process(milliseconds=True), "milliseconds"),
+        (lambda: closer.process(registrations=1.5), "registrations"),
+        (lambda: closer.load("missing", None), "clouds"),
+    ]:
+        with pytest.raises(TypeError, match=f"^{name}|^an id of {name}"):
+            call()
+    with pytest.raises(gpureg.InvalidArgument, match="registrations is -1, expected 0 or more"):
+        closer.process(registrations=-1)
+    with pytest.raises(gpureg.InvalidArgument, match="mirror image"):
+        closer.add_odometry(2, 1, np.diag([1.0, 1, -1, 1]))
+    assert len(closer) == 2
+
+
+def test_clouds_that_do_not_fit_are_refused(closer, tmp_path):
+    points = room()
+    context = gpureg.Context.cpu(1)
+    with pytest.raises(gpureg.InvalidArgument, match="fragment 3 has no points: of 9, 9 are not"):
+        closer.add(3, np.full((9, 3), np.nan, np.float32))
+    coarse = gpureg.RegistrationOptions.from_voxel_size(0.5).prepare
+    with pytest.raises(gpureg.InvalidArgument, match=r"fragment 3 has voxels of 0.5 m.* 0.05 m"):
+        closer.add(3, gpureg.prepare(points, options=coarse, context=context))
+    closer.add(3, points)
+    closer.save(tmp_path / "state")
+    with pytest.raises(gpureg.InvalidArgument, match=r"state.* 0.05 m.* 0.5 m"):
+        gpureg.LoopCloser(voxel_size=0.5, context=context).load(tmp_path / "state", lambda id: None)
+    with pytest.raises(TypeError, match=r"clouds\(3\): expected a PreparedCloud, got None"):
+        closer.load(tmp_path / "state", lambda id: None)
+    assert len(closer) == 1
+
+
+def test_poses_of_a_session_are_its_odometry(closer):
+    truth = lap(40)
+    for k, pose in enumerate(truth):
+        closer.add(k, world_from_fragment=pose, time=k)
+    for k in range(20, 40, 3):
+        closer.add_loop(k, k - 20, np.linalg.inv(truth[k - 20]) @ truth[k], confidence=0.8)
+    closer.process()
+    assert set(closer.frames.values()) == {0}
+    assert {loop.state for loop in closer.loops} == {"accepted"}
+
+
+def test_points_are_added_and_graphs_returned_while_process_registers():
+    """process() holds the engine of its context for most of a registration."""
+    closer = gpureg.LoopCloser(context=gpureg.Context.cpu(1))
+    points = [room(k) for k in range(4)]
+    for k in range(4):
+        closer.add(k, points[k], planar(0.1 * k, 0, 0))
+    for k in range(1, 4):
+        closer.propose(k, 0)
+    registering = threading.Thread(target=closer.process)
+    registering.start()
+    calls = 0
+    while registering.is_alive():
+        closer.graph()
+        closer.add(100 + calls, points[0])
+        calls += 1
+    registering.join()
+    # Preparing takes a fraction of a registration; had each waited, there would be one a chunk.
+    assert calls > 2
+
+
+INTERRUPTED = """
+import sys
+import gpureg
+import numpy as np
+sys.path.insert(0, sys.argv[1])
+from scenes import room
+from test_loop_closure import drifting, lap
+
+closer = gpureg.LoopCloser(context=gpureg.Context.cpu(1))
+truth = lap(40)
+drifting(closer, truth)
+for k in range(20, 40, 3):
+    closer.add_loop(k, k - 20, np.linalg.inv(truth[k - 20]) @ truth[k], confidence=0.8)
+cloud = gpureg.prepare(room(), context=gpureg.Context.cpu(1))
+for k in range(100, 108):
+    closer.add(k, cloud, session=k)
+    if k > 100:
+        closer.propose(k, 100)
+print("ready", flush=True)
+changed, interrupted = [], 0
+while len(closer.loops) < 7 + 7:
+    try:
+        changed += closer.process().changed
+    except KeyboardInterrupt:
+        interrupted += 1
+# The interrupts are over: what has changed since the last call that returned.
+changed += closer.process().changed
+states = {}
+for loop in changed:
+    pair = loop.source, loop.target
+    assert (states.get(pair) == "accepted") == (loop.state == "retracted"), (pair, loop.state)
+    states[pair] = loop.state
+assert states == {(loop.source, loop.target): loop.state for loop in closer.loops}
+assert list(states.values()).count("accepted") >= 7
+print("interrupted", interrupted, flush=True)
+"""
+
+
+def test_what_an_interrupt_took_away_comes_with_the_next_call():
+    """A real SIGINT from outside, while it registers."""
+    child = subprocess.Popen(
+        [sys.executable, "-c", INTERRUPTED, str(Path(__file__).parent)],
+        stdout=subprocess.PIPE,
+        text=True,
+    )
+    assert child.stdout is not None
+    assert child.stdout.readline() == "ready\n"
+    for _ in range(3):
+        time.sleep(0.3)
+        if child.poll() is None:
+            child.send_signal(signal.SIGINT)
+    rest = child.stdout.read()
+    assert child.wait() == 0 and int(rest.split()[-1]) > 0, rest

@@ -4,6 +4,7 @@
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
 #include <cmath>
+#include <sstream>
 
 #include "gpureg/error.hpp"
 #include "math/exponential.hpp"
@@ -21,6 +22,12 @@ constexpr double kFarthest = 1e9;
 /// Length of a direction, above what pose graphs and priors take as 0.
 constexpr double kShortest = 1e-6;
 using pose_graph::kLargestInformation;
+
+std::string metres(float length) {
+  std::ostringstream text;
+  text << length << " m";
+  return text.str();
+}
 
 std::string fragment_name(FragmentId id) { return "fragment " + std::to_string(id); }
 
@@ -59,7 +66,8 @@ void require_information(const UnalignedMatrix6d& information, const std::string
 
 Registry::Registry(const State& state) {
   for (const auto& [id, node] : state.nodes) has_cloud_[id] = node.has_cloud;
-  for (const Odometry& edge : state.odometry) odometry_.insert(pair_of(edge.source, edge.target));
+  for (const Odometry& edge : state.odometry)
+    if (!edge.implied) odometry_.insert(pair_of(edge.source, edge.target));
 }
 
 void Registry::add(FragmentId id, bool has_cloud) {
@@ -97,13 +105,37 @@ void Registry::require_clouds(FragmentId source, FragmentId target) const {
     if (!has_cloud_.at(id)) throw InvalidArgument(fragment_name(id) + " has no cloud");
 }
 
-void check_fragment(const Fragment& fragment) {
+void check_fragment(const Fragment& fragment, const Options& options) {
   const std::string name = fragment_name(fragment.id);
-  check_pose(fragment.world_from_fragment, "world_from_fragment of " + name);
+  if (fragment.world_from_fragment) {
+    check_pose(*fragment.world_from_fragment, "world_from_fragment of " + name);
+    // The most certain edge that its pose may imply.
+    odometry_edge(fragment.id, fragment.id, UnalignedIsometry3d::Identity(), std::nullopt, options);
+  }
+  if (fragment.cloud.valid()) {
+    const float voxel_size = fragment.cloud.options().voxel_size;
+    if (voxel_size != options.registration.prepare.voxel_size)
+      throw InvalidArgument("the cloud of " + name + " has voxels of " + metres(voxel_size) +
+                            ", this closer has voxels of " +
+                            metres(options.registration.prepare.voxel_size));
+    if (fragment.cloud.size() == 0) {
+      const PrepareStatistics& found = fragment.cloud.statistics();
+      throw InvalidArgument("the cloud of " + name + " has no points: of " +
+                            std::to_string(found.input_points) + ", " +
+                            std::to_string(found.invalid_points) + " are not finite");
+    }
+  }
   if (!std::isfinite(fragment.time)) throw InvalidArgument("time of " + name + " is not finite");
   if (fragment.up && !(fragment.up->norm() >= kShortest && fragment.up->norm() <= kFarthest))
     throw InvalidArgument("up of " + name + " has the length " + shown(fragment.up->norm()) +
                           ", expected 1e-6 to 1e9");
+}
+
+void check_voxel_size(const State& state, const Options& options, const std::string& path) {
+  if (state.voxel_size != options.registration.prepare.voxel_size)
+    throw InvalidArgument(path + " is the state of a closer with voxels of " +
+                          metres(state.voxel_size) + ", this one has voxels of " +
+                          metres(options.registration.prepare.voxel_size));
 }
 
 void check_pose(const UnalignedIsometry3d& pose, const std::string& name) {
@@ -117,8 +149,12 @@ void check_pose(const UnalignedIsometry3d& pose, const std::string& name) {
   const Eigen::Matrix3d rotation = pose.linear();
   const double error =
       (rotation * rotation.transpose() - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff();
-  if (error > kOrthonormal || rotation.determinant() < 0)
-    throw InvalidArgument(name + " is not rigid: its rotation is off by " + std::to_string(error));
+  if (error > kOrthonormal)
+    throw InvalidArgument(name +
+                          " is not rigid: R R' of its rotation R differs from the identity by " +
+                          pose_graph::shown(error));
+  if (rotation.determinant() < 0)
+    throw InvalidArgument(name + " is a mirror image: its rotation has the determinant -1");
 }
 
 void check_result(const RegistrationResult& result) {

@@ -30,7 +30,9 @@ class Registry {
   std::set<FragmentPair> odometry_;
 };
 
-void check_fragment(const Fragment& fragment);
+void check_fragment(const Fragment& fragment, const Options& options);
+/// A state that was read belongs to a closer of these options.
+void check_voxel_size(const State& state, const Options& options, const std::string& path);
 void check_pose(const UnalignedIsometry3d& pose, const std::string& name);
 void check_result(const RegistrationResult& result);
 /// What a result, or Options::noise, has made of the information of its modes.

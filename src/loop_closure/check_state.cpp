@@ -42,6 +42,8 @@ class Check {
   explicit Check(const State& state) : state_(state) {}
 
   void run() {
+    require(std::isfinite(state_.voxel_size) && state_.voxel_size > 0, "the voxel size",
+            "is no finite length > 0");
     require(state_.arrivals < kMostArrivals, "the number of arrivals", "is too large");
     for (const auto& [id, node] : state_.nodes) check(id, node);
     for (const Odometry& edge : state_.odometry) check(edge);
@@ -66,6 +68,7 @@ class Check {
   void check(FragmentId id, const Node& node) {
     const std::string name = "fragment " + std::to_string(id);
     require_pose(node.estimate, name + ".estimate");
+    if (node.given) require_pose(*node.given, name + ".given");
     require(std::isfinite(node.time), name, "has a time that is not finite");
     // As LoopCloser::add().
     require(!node.up || (node.up->norm() >= 1e-6 && node.up->norm() <= 1e9), name,
@@ -83,7 +86,7 @@ class Check {
 
   static void check(const Loop& loop, const std::string& name) {
     require(is_one_of(loop.state, LoopState::retracted), name, "has an unknown state");
-    require(is_one_of(loop.reason, LoopReason::fragment_removed), name, "has an unknown reason");
+    require(is_one_of(loop.reason, LoopReason::replaced), name, "has an unknown reason");
     if (!loop.target_from_source.matrix().array().isNaN().all())
       require_pose(loop.target_from_source, name + ".target_from_source");
     if (!loop.information.isZero(0)) require_information(loop.information, name + ".information");

@@ -10,6 +10,8 @@ namespace gpureg::loop_closure {
 
 void add_fragment(State& state, const Fragment& fragment, const Options& options);
 void add_odometry(State& state, const Odometry& odometry);
+/// Connects new fragments of sessions without odometry of the host: by their poses.
+void imply_odometry(State& state, const Options& options);
 void add_covisible(State& state, FragmentId id, const std::vector<FragmentId>& others);
 void add_proposal(State& state, Proposal proposal);
 void add_record(State& state, LoopRecord record);

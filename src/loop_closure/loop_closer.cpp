@@ -54,7 +54,8 @@ Loop shown(const LoopRecord& record) {
 }
 
 bool same_for_the_host(const Loop& a, const Loop& b) {
-  return a.state == b.state && a.target_from_source.matrix() == b.target_from_source.matrix();
+  return a.state == b.state && (a.state != LoopState::accepted ||
+                                a.target_from_source.matrix() == b.target_from_source.matrix());
 }
 
 /// Room for so many more elements.
@@ -69,6 +70,7 @@ struct Published {
   std::shared_ptr<const std::vector<FragmentPose>> poses =
       std::make_shared<const std::vector<FragmentPose>>();
   std::shared_ptr<const std::vector<Loop>> loops = std::make_shared<const std::vector<Loop>>();
+  std::shared_ptr<const pose_graph::Graph> graph = std::make_shared<const pose_graph::Graph>();
 };
 
 Published published(const State& state, const Options& options) {
@@ -82,6 +84,7 @@ Published published(const State& state, const Options& options) {
   Published out;
   out.loops = std::make_shared<const std::vector<Loop>>(std::move(loops));
   out.poses = std::make_shared<const std::vector<FragmentPose>>(std::move(poses));
+  out.graph = std::make_shared<const pose_graph::Graph>(accepted_graph(state, options));
   return out;
 }
 
@@ -96,7 +99,10 @@ Published published(const State& state, const Options& options) {
 struct LoopCloser::Impl {
   using Command = std::function<void(State&)>;
 
-  Impl(const Context& c, const Options& o) : context(c), options(o) { options.validate(); }
+  Impl(const Context& c, const Options& o) : context(c), options(o) {
+    options.validate();
+    state.voxel_size = options.registration.prepare.voxel_size;
+  }
 
   const Context context;
   const Options options;
@@ -109,7 +115,7 @@ struct LoopCloser::Impl {
   mutable std::mutex working;
   mutable State state;
   Verification unreported;            ///< the last one that no Update has told of
-  bool verification_stopped = false;  ///< by ProcessLimits::should_stop: it goes first next time
+  bool verification_stopped = false;  ///< it threw or was stopped: it goes first next time
 
   /// Queues a command unless check(registry), which may add to the registry as its last step,
   /// throws.
@@ -122,6 +128,11 @@ struct LoopCloser::Impl {
     commands.splice(commands.end(), entry);
   }
 
+  Published last() const {
+    const std::lock_guard<std::mutex> lock(inbox);
+    return published;
+  }
+
   void drain() const {
     std::list<Command> taken;
     {
@@ -132,6 +143,7 @@ struct LoopCloser::Impl {
     try {
       on_copy(state, [&](State& next) {
         for (const Command& command : taken) command(next);
+        imply_odometry(next, options);
       });
     } catch (...) {
       const std::lock_guard<std::mutex> lock(inbox);
@@ -156,16 +168,22 @@ struct LoopCloser::Impl {
   }
 
   void verify(const std::function<bool()>& should_stop) {
+    verification_stopped = true;
     unreported = verify_loops(state, options, should_stop);
     verification_stopped = unreported.status == pose_graph::Status::cancelled;
   }
 
-  void report(Update& update) {
-    std::vector<LoopRecord*> changed;
+  void report(const std::function<bool()>& should_stop, Update& update) {
+    std::vector<std::pair<LoopRecord*, Loop>> changed;
     for (LoopRecord& record : state.loops) {
       const Loop loop = shown(record);
       if (record.reported && same_for_the_host(*record.reported, loop)) continue;
-      changed.push_back(&record);
+      changed.emplace_back(&record, loop);
+      if (record.reported && record.reported->state == loop.state) {
+        update.changed.push_back(*record.reported);
+        update.changed.back().state = LoopState::retracted;
+        update.changed.back().reason = LoopReason::replaced;
+      }
       update.changed.push_back(loop);
     }
     update.proposals_left = state.queue.size();
@@ -173,8 +191,9 @@ struct LoopCloser::Impl {
     update.reason = unreported.reason;
     Published now = loop_closure::published(state, options);
     if (state.poses_changed && options.optimize) update.poses = *now.poses;
+    if (should_stop) should_stop();
     // Nothing throws from here on.
-    for (std::size_t k = 0; k < changed.size(); ++k) changed[k]->reported = update.changed[k];
+    for (const auto& [record, loop] : changed) record->reported = loop;
     state.poses_changed = false;
     unreported = {};
     const std::lock_guard<std::mutex> lock(inbox);
@@ -189,7 +208,7 @@ LoopCloser::LoopCloser(LoopCloser&&) noexcept = default;
 LoopCloser& LoopCloser::operator=(LoopCloser&&) noexcept = default;
 
 void LoopCloser::add(const Fragment& fragment) {
-  check_fragment(fragment);
+  check_fragment(fragment, impl_->options);
   impl_->submit([&](Registry& registry) { registry.add(fragment.id, fragment.cloud.valid()); },
                 [fragment, options = &impl_->options](State& state) {
                   add_fragment(state, fragment, *options);
@@ -302,29 +321,20 @@ Update LoopCloser::process(const ProcessLimits& limits) {
     impl_->verify(limits.should_stop);
     if (over || state.graph_changed) break;
   }
-  impl_->report(update);
+  impl_->report(limits.should_stop, update);
   return update;
 }
 
-std::vector<FragmentPose> LoopCloser::poses() const {
-  const std::lock_guard<std::mutex> lock(impl_->inbox);
-  return *impl_->published.poses;
-}
+std::vector<FragmentPose> LoopCloser::poses() const { return *impl_->last().poses; }
 
-std::vector<Loop> LoopCloser::loops() const {
-  const std::lock_guard<std::mutex> lock(impl_->inbox);
-  return *impl_->published.loops;
-}
+std::vector<Loop> LoopCloser::loops() const { return *impl_->last().loops; }
 
 std::size_t LoopCloser::size() const {
   const std::lock_guard<std::mutex> lock(impl_->inbox);
   return impl_->registry.size();
 }
 
-pose_graph::Graph LoopCloser::graph() const {
-  const std::lock_guard<std::mutex> lock(impl_->working);
-  return accepted_graph(impl_->state, impl_->options);
-}
+pose_graph::Graph LoopCloser::graph() const { return *impl_->last().graph; }
 
 void LoopCloser::save(const std::string& path) const {
   std::string content;
@@ -338,6 +348,7 @@ void LoopCloser::save(const std::string& path) const {
 
 void LoopCloser::load(const std::string& path, const CloudProvider& clouds) {
   State loaded = from_bytes(files::read_file(path), path);
+  check_voxel_size(loaded, impl_->options, path);
   give_clouds(loaded, clouds, impl_->options);
   Registry registry(loaded);
   Published now = published(loaded, impl_->options);

@@ -53,6 +53,7 @@ struct Spoke {
   bool modelled = false;
   double length = 0;
   std::uint32_t steps = 0;
+  bool implied = false;
 };
 
 Spoke spoke_of(FragmentId node, FragmentId source, FragmentId target,
@@ -90,6 +91,7 @@ class Marginaliser {
         odometry_.back().modelled = edge.modelled;
         odometry_.back().length = edge.length;
         odometry_.back().steps = edge.steps;
+        odometry_.back().implied = edge.implied;
       }
   }
 
@@ -148,6 +150,7 @@ class Marginaliser {
       edge.modelled = edge.modelled && hub_->modelled;
       edge.length += hub_->length;
       edge.steps += hub_->steps;
+      edge.implied = edge.implied && hub_->implied;
     }
   }
 

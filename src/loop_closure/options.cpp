@@ -60,8 +60,8 @@ const char* to_string(LoopReason reason) {
       return "inconsistent";
     case LoopReason::lost_confirmation:
       return "lost_confirmation";
-    case LoopReason::fragment_removed:
-      return "fragment_removed";
+    case LoopReason::replaced:
+      return "replaced";
   }
   return "unknown";
 }
@@ -84,8 +84,8 @@ const char* describe(LoopReason reason) {
       return "it contradicts odometry and the other loops";
     case LoopReason::lost_confirmation:
       return "the loops that confirmed it do not take part any more";
-    case LoopReason::fragment_removed:
-      return "one of its fragments was removed before it was accepted";
+    case LoopReason::replaced:
+      return "it is accepted with another pose from now on";
   }
   return "unknown";
 }

@@ -13,7 +13,7 @@ namespace {
 // Layout: kMagic, version, size and checksum of the payload, payload. All numbers little-endian, as
 // every processor that the library runs on.
 constexpr char kMagic[8] = {'g', 'p', 'u', 'r', 'e', 'g', 'L', 'C'};
-constexpr std::uint32_t kVersion = 1;
+constexpr std::uint32_t kVersion = 2;
 constexpr std::size_t kHeader = sizeof kMagic + sizeof kVersion + 2 * sizeof(std::uint64_t);
 
 /// FNV-1a.
@@ -138,12 +138,14 @@ void node(File& file, FragmentId& id, Node& n) {
   file.value(n.fingerprint);
   maybe(file, n.up, [&](Eigen::Vector3d& up) { matrix(file, up); });
   pose(file, n.estimate);
+  maybe(file, n.given, [&](UnalignedIsometry3d& given) { pose(file, given); });
   file.value(n.order);
   file.value(n.within_frame);
   file.value(n.between_frames);
   flag(file, n.placed);
   flag(file, n.look_within);
   flag(file, n.look_between);
+  flag(file, n.look_back);
 }
 
 template <typename File>
@@ -180,6 +182,7 @@ void record(File& file, LoopRecord& r) {
 
 template <typename File>
 void all(File& file, State& state) {
+  file.value(state.voxel_size);
   if constexpr (File::kReads) {
     const std::uint64_t n = file.count(state.nodes);
     for (std::uint64_t k = 0; k < n; ++k) {
@@ -195,6 +198,12 @@ void all(File& file, State& state) {
       file.value(pair.second);
       state.known.insert(pair);
     }
+    const std::uint64_t sessions = file.count(state.connected);
+    for (std::uint64_t k = 0; k < sessions; ++k) {
+      std::int64_t session = 0;
+      file.value(session);
+      state.connected.insert(session);
+    }
   } else {
     file.count(state.nodes);
     for (auto& [id, n] : state.nodes) {
@@ -206,6 +215,8 @@ void all(File& file, State& state) {
       file.value(pair.first);
       file.value(pair.second);
     }
+    file.count(state.connected);
+    for (std::int64_t session : state.connected) file.value(session);
   }
   list(file, state.odometry, [&](Odometry& edge) {
     file.value(edge.source);
@@ -215,6 +226,7 @@ void all(File& file, State& state) {
     flag(file, edge.modelled);
     file.value(edge.length);
     file.value(edge.steps);
+    flag(file, edge.implied);
   });
   list(file, state.loops, [&](LoopRecord& r) { record(file, r); });
   list(file, state.queue, [&](Proposal& p) {

@@ -28,13 +28,15 @@ struct Node {
   std::uint64_t fingerprint = 0;
   std::optional<Eigen::Vector3d> up;
   UnalignedIsometry3d estimate = UnalignedIsometry3d::Identity();
-  std::shared_ptr<const Coarse> observed;  ///< of the cloud; empty without one
-  std::uint64_t order = 0;                 ///< of arrival
+  std::optional<UnalignedIsometry3d> given;  ///< Fragment::world_from_fragment
+  std::shared_ptr<const Coarse> observed;    ///< of the cloud; empty without one
+  std::uint64_t order = 0;                   ///< of arrival
   /// Proposals made so far; later fragments propose earlier ones.
   std::uint32_t within_frame = 0, between_frames = 0;
   bool placed = false;       ///< odometry connects it
   bool look_within = true;   ///< proposals within the frame are due
   bool look_between = true;  ///< proposals to other frames are due
+  bool look_back = true;     ///< it may be due an edge from its pose and the last one's
 
   /// What it observed: nothing without a cloud.
   const Coarse& coarse() const;
@@ -49,6 +51,7 @@ struct Odometry {
   bool modelled = false;
   double length = 0;        ///< metres travelled
   std::uint32_t steps = 1;  ///< edges of the host that it is made of
+  bool implied = false;     ///< from the poses that were given with the fragments
 };
 
 /// One pose of a loop.
@@ -99,6 +102,8 @@ struct Proposal {
 };
 
 struct State {
+  float voxel_size = 0;              ///< of the clouds, metres
+  std::set<std::int64_t> connected;  ///< sessions between whose fragments the host added odometry
   std::map<FragmentId, Node> nodes;
   std::vector<Odometry> odometry;
   std::vector<LoopRecord> loops;

@@ -84,7 +84,7 @@ void read_kitti(std::string_view bytes) {
 std::string with_header(std::string_view payload) {
   std::uint64_t sum = 14695981039346656037ull;  // FNV-1a
   for (const char c : payload) sum = (sum ^ static_cast<unsigned char>(c)) * 1099511628211ull;
-  return "gpuregLC" + test::raw(std::uint32_t{1}) + test::raw(std::uint64_t{payload.size()}) +
+  return "gpuregLC" + test::raw(std::uint32_t{2}) + test::raw(std::uint64_t{payload.size()}) +
          test::raw(sum) + std::string(payload);
 }
 
@@ -124,8 +124,9 @@ void go_on_from_saved_state(std::string_view bytes) {
     node.fingerprint = loop_closure::fingerprint_of(cloud);
     if (id == unused) ++unused;
   }
-  std::ofstream(path, std::ios::binary) << loop_closure::to_bytes(state);
   loop_closure::Options options;
+  state.voxel_size = options.registration.prepare.voxel_size;
+  std::ofstream(path, std::ios::binary) << loop_closure::to_bytes(state);
   options.registration = options.registration.with_quality(0);
   options.graph.threads = 1;
   loop_closure::LoopCloser closer(context, options);

@@ -5,6 +5,7 @@
 
 #include "loop_closure/drive.hpp"
 #include "support/expect_error.hpp"
+#include "support/scan.hpp"
 
 namespace gpureg::test {
 namespace {
@@ -67,6 +68,9 @@ TEST_F(LoopCloserFaults, NumbersThatAreNone) {
   Pose scaled = Pose::Identity();
   scaled.linear() *= 1.1;
   refused([&] { closer.add_loop(5, 1, scaled); }, {"not rigid"});
+  Pose mirrored = Pose::Identity();
+  mirrored.linear().diagonal() << 1, 1, -1;
+  refused([&] { closer.add_loop(5, 1, mirrored); }, {"target_from_source", "mirror image"});
   Pose projective = Pose::Identity();
   projective.matrix()(3, 3) = 2;
   refused([&] { closer.add_loop(5, 1, projective); }, {"target_from_source", "last row"});
@@ -103,6 +107,22 @@ TEST_F(LoopCloserFaults, NumbersThatAPoseGraphDoesNotTake) {
           {"covariance", "1e-20"});
   refused([&] { closer.add_loop(5, 1, Pose::Identity(), unit * 1e20); }, {"information", "1e+20"});
   refused([&] { closer.add_loop(5, 1, Pose::Identity(), unit * 1e-30); }, {"information", "1e-30"});
+}
+
+TEST_F(LoopCloserFaults, CloudsOfAnotherVoxelSizeOrWithoutPoints) {
+  const Context context = Context::cpu(1);
+  const std::vector<Eigen::Vector3f> nothing(7, Eigen::Vector3f::Constant(float(kNaN)));
+  refused([&] { closer.add({50, 0, 0, prepare(context, PointCloudView(nothing))}); },
+          {"fragment 50", "no points", "7"});
+  std::mt19937 random(5);
+  const std::vector<Eigen::Vector3f> points = scan_room(random);
+  refused(
+      [&] {
+        closer.add({50, 0, 0,
+                    prepare(context, PointCloudView(points),
+                            RegistrationOptions::from_voxel_size(0.5f).prepare)});
+      },
+      {"fragment 50", "0.5 m", "0.05 m"});
 }
 
 TEST_F(LoopCloserFaults, ResultsThatAreNone) {
@@ -190,10 +210,10 @@ TEST_F(LoopCloserFaults, OptionsOutOfRange) {
   expect_error<InvalidArgument>([&] { closer_of(options); }, {"drift_correlation", "-1"});
 }
 
-TEST(LoopCloserStates, WithoutOdometryEveryFragmentIsAFrameOfItsOwn) {
+TEST(LoopCloserStates, WithoutPosesAndOdometryEveryFragmentIsAFrameOfItsOwn) {
   LoopCloser closer = closer_of();
   const Sequence s = sequence(square(6));
-  for (int k = 0; k < 6; ++k) closer.add({k, 0, 0, {}, s.odometry[static_cast<std::size_t>(k)]});
+  for (int k = 0; k < 6; ++k) closer.add({k});
   for (const loop_closure::FragmentPose& pose : closer.process().poses)
     EXPECT_EQ(pose.frame, pose.id);
   // One loop between two fragments is never enough, however confident.

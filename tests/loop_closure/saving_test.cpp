@@ -54,6 +54,13 @@ TEST_F(Saving, GoesOnWithTheSameBits) {
   expect_error<InvalidArgument>([&] { loaded.add_odometry(6, 5, Pose::Identity()); }, {"before"});
 }
 
+TEST_F(Saving, AStateOfAnotherVoxelSizeIsRefused) {
+  closer.save(path);
+  LoopCloser coarse = closer_of(loop_closure::Options::from_voxel_size(0.5f));
+  expect_error<InvalidArgument>([&] { coarse.load(path, nullptr); }, {path, "0.05 m", "0.5 m"});
+  EXPECT_EQ(coarse.size(), 0u);
+}
+
 TEST_F(Saving, DamagedFilesAreNamedAndTheStateStays) {
   closer.save(path);
   const std::string good = content_of(path), before = bytes_of(closer);
@@ -69,8 +76,8 @@ TEST_F(Saving, DamagedFilesAreNamedAndTheStateStays) {
     refused(good.substr(0, size), "truncated");
   refused(good + "x", "longer");
   std::string later = good;
-  later[8] = 2;
-  refused(later, "version 2");
+  later[8] = 3;
+  refused(later, "version 3");
   for (std::size_t at = 28; at < good.size(); at += good.size() / 50) {
     std::string flipped = good;
     flipped[at] = static_cast<char>(flipped[at] ^ 0x10);

@@ -6,6 +6,7 @@
 
 #include "loop_closure/drive.hpp"
 #include "loop_closure/scans.hpp"
+#include "support/temporary_folder.hpp"
 
 namespace gpureg::test {
 namespace {
@@ -63,6 +64,62 @@ TEST(Sessions, TwoLoopsThatAgreeMergeThem) {
   const Pose found = poses[9].world_from_fragment.inverse() * poses[22].world_from_fragment;
   EXPECT_EQ(poses[22].id, 102);
   EXPECT_LT(found.translation().norm(), 0.05);
+}
+
+/// Poses without odometry.
+void add_poses(LoopCloser& closer, const Sequence& s, int begin, int end) {
+  for (int k = begin; k < end; ++k)
+    closer.add({s.id(k), s.session, double(k), {}, s.odometry[static_cast<std::size_t>(k)]});
+}
+
+TEST(Sessions, ThePosesOfASessionAreItsOdometryWhereTheHostAddsNone) {
+  LoopCloser by_poses = closer_of(), by_odometry = closer_of();
+  const Sequence s = sequence(square(40));
+  add_poses(by_poses, s, 0, 20);
+  by_poses.process();
+  add_poses(by_poses, s, 20, 40);
+  s.add_to(by_odometry);
+  for (LoopCloser* closer : {&by_poses, &by_odometry}) {
+    for (int k = 20; k < 40; k += 3) add_correct(*closer, s, k, k - 20, 0.8);
+    closer->process();
+    EXPECT_EQ(frames(*closer), 1u);
+    for (const Loop& loop : closer->loops()) EXPECT_EQ(loop.state, LoopState::accepted);
+  }
+  // The products of poses are rounded otherwise.
+  EXPECT_NEAR(largest_error(by_poses.poses(), s), largest_error(by_odometry.poses(), s), 1e-6);
+  EXPECT_LT(relative_error(by_poses.poses(), s, 39, 19), 0.05);
+  // Removing a fragment keeps its neighbours connected.
+  by_poses.remove(5);
+  by_poses.process();
+  EXPECT_EQ(frames(by_poses), 1u);
+}
+
+TEST(Sessions, OdometryOfTheHostReplacesThatOfThePoses) {
+  const Sequence s = sequence(square(12));
+  LoopCloser closer = closer_of(), loaded = closer_of(), other = closer_of();
+  // process() comes between the fragments and their odometry.
+  add_poses(closer, s, 0, 6);
+  closer.process();
+  EXPECT_EQ(closer.graph().edges.size(), 5u);
+  const TemporaryFolder folder;
+  closer.save(folder / "state");
+  loaded.load(folder / "state", nullptr);
+  s.add_to(other);
+  other.process();
+  for (LoopCloser* c : {&closer, &loaded}) {
+    for (int k = 1; k < 6; ++k) {
+      const auto at = static_cast<std::size_t>(k);
+      c->add_odometry(k, k - 1, s.odometry[at - 1].inverse() * s.odometry[at]);
+    }
+    s.add_to(*c, 6, 12);
+    c->process();
+    EXPECT_EQ(c->graph().edges.size(), 11u);
+    EXPECT_EQ(bytes_of(*c), bytes_of(other));
+  }
+  // Tracking that is lost says so by adding none.
+  add_poses(closer, sequence(square(13)), 12, 13);
+  closer.process();
+  EXPECT_EQ(frames(closer), 2u);
 }
 
 TEST(Sessions, LoopsThatContradictEachOtherDoNotMergeThem) {

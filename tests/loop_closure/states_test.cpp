@@ -1,6 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <gtest/gtest.h>
 
+#include <map>
+#include <stdexcept>
+#include <utility>
+
 #include "loop_closure/drive.hpp"
 #include "support/expect_error.hpp"
 
@@ -131,6 +135,129 @@ TEST(LoopStates, OfSeveralModesTheOneThatFitsTakesPart) {
   EXPECT_EQ(loop.confidence, 0.52);
   EXPECT_LT((loop.target_from_source.matrix() - two.modes[1].target_from_source.matrix()).norm(),
             1e-12);
+}
+
+/// The factors of a host that does what the states say and nothing else.
+class Factors {
+ public:
+  void take(const Update& update) {
+    for (const Loop& loop : update.changed) {
+      Pose& factor = factors_[{loop.source, loop.target}];
+      const bool had = std::exchange(held_[{loop.source, loop.target}], false);
+      if (loop.state == LoopState::retracted) {
+        EXPECT_TRUE(had);
+        EXPECT_EQ(factor.matrix(), loop.target_from_source.matrix());
+      } else {
+        EXPECT_FALSE(had) << loop.source << " " << loop.target << " is added twice";
+      }
+      held_[{loop.source, loop.target}] = loop.state == LoopState::accepted;
+      factor = loop.target_from_source;
+    }
+  }
+
+  /// They are those of the closer.
+  void expect_equal(const LoopCloser& closer) const {
+    std::size_t held = 0;
+    for (const auto& [pair, is_held] : held_) held += is_held;
+    std::size_t accepted = 0;
+    for (const Loop& loop : closer.loops()) {
+      if (loop.state != LoopState::accepted) continue;
+      ++accepted;
+      ASSERT_TRUE(held_.at({loop.source, loop.target}));
+      EXPECT_EQ(factors_.at({loop.source, loop.target}).matrix(), loop.target_from_source.matrix());
+    }
+    EXPECT_EQ(held, accepted);
+  }
+
+ private:
+  std::map<std::pair<FragmentId, FragmentId>, bool> held_;
+  std::map<std::pair<FragmentId, FragmentId>, Pose> factors_;
+};
+
+TEST(LoopStates, AnAcceptedLoopWhosePoseChangesIsRetractedAndAcceptedAgain) {
+  const Sequence s = sequence(square(40));
+  // The first mode fits odometry; the loops that come later say that the second one is correct.
+  RegistrationResult two = result_of(s.odometry[2].inverse() * s.odometry[22], 0.92);
+  two.modes.push_back(correct(s.truth[22], s.truth[2], 0.92).modes[0]);
+  LoopCloser closer = closer_of(), twin = closer_of();
+  Factors host;
+  Update update;
+  for (LoopCloser* c : {&twin, &closer}) {
+    s.add_to(*c);
+    c->add_result(22, 2, two);
+    c->add_result(33, 13, {});
+    update = c->process();
+  }
+  host.take(update);
+  ASSERT_EQ(loop_of(update.changed, 22, 2).state, LoopState::accepted);
+  // The pair without a pose is rejected once.
+  EXPECT_EQ(update.changed.size(), 2u);
+  EXPECT_TRUE(closer.process().changed.empty());
+  for (LoopCloser* c : {&twin, &closer})
+    for (int k = 20; k < 40; k += 2)
+      if (k != 22) add_correct(*c, s, k, k - 20, 0.95);
+  // What the first call of the two decides is not delivered: its last poll throws.
+  int polls = 0;
+  loop_closure::ProcessLimits limits;
+  limits.should_stop = [&] { return ++polls < 0; };
+  twin.process(limits);
+  limits.should_stop = [&]() -> bool {
+    if (--polls == 0) throw std::runtime_error("interrupted");
+    return false;
+  };
+  EXPECT_THROW(closer.process(limits), std::runtime_error);
+  add_correct(closer, s, 39, 19, 0.95);
+  update = closer.process();
+  host.take(update);
+  host.expect_equal(closer);
+  std::vector<Loop> moved;
+  for (const Loop& loop : update.changed)
+    if (loop.source == 22) moved.push_back(loop);
+  ASSERT_EQ(moved.size(), 2u);
+  EXPECT_EQ(moved[0].state, LoopState::retracted);
+  EXPECT_EQ(moved[0].reason, LoopReason::replaced);
+  EXPECT_EQ(moved[0].target_from_source.matrix(), two.modes[0].target_from_source.matrix());
+  EXPECT_EQ(moved[1].state, LoopState::accepted);
+  EXPECT_EQ(moved[1].target_from_source.matrix(), two.modes[1].target_from_source.matrix());
+}
+
+TEST(LoopStates, WhatAThrowingHookEndsBelongsToTheNextCall) {
+  const Sequence s = sequence(square(40));
+  const auto fill = [&](LoopCloser& closer) {
+    s.add_to(closer);
+    for (int k = 20; k < 40; k += 3) add_correct(closer, s, k, k - 20, 0.8);
+  };
+  LoopCloser other = closer_of();
+  fill(other);
+  const Update whole = other.process();
+  // Thrown by the first poll, the second, ... until a call is through.
+  for (int polls = 0;; ++polls) {
+    LoopCloser closer = closer_of();
+    fill(closer);
+    loop_closure::ProcessLimits limits;
+    limits.should_stop = [left = polls]() mutable -> bool {
+      if (left-- == 0) throw std::runtime_error("interrupted");
+      return false;
+    };
+    bool threw = false;
+    Update update;
+    try {
+      update = closer.process(limits);
+    } catch (const std::runtime_error&) {
+      threw = true;
+      update = closer.process();
+    }
+    ASSERT_EQ(update.changed.size(), whole.changed.size()) << polls;
+    EXPECT_EQ(update.poses.size(), whole.poses.size());
+    for (std::size_t k = 0; k < whole.changed.size(); ++k)
+      EXPECT_EQ(update.changed[k].state, whole.changed[k].state);
+    EXPECT_EQ(bytes_of(closer), bytes_of(other));
+    EXPECT_TRUE(closer.process().changed.empty());
+    if (!threw) {
+      EXPECT_GT(polls, 3);  // before, while and after the graph is optimised
+      break;
+    }
+  }
 }
 
 TEST(LoopStates, LoopsOfTheHostAreVerifiedLikeOthers) {

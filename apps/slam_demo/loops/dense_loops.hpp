@@ -34,7 +34,9 @@ class DenseLoops {
   /// changed.
   std::vector<gpureg::loop_closure::Loop> process(std::vector<Fragment> fragments) {
     for (Fragment& f : fragments) {
-      f.node.cloud = gpureg::prepare(context_, f.cloud().view(), options_.registration.prepare);
+      const gpureg::PreparedCloud cloud =
+          gpureg::prepare(context_, f.cloud().view(), options_.registration.prepare);
+      if (cloud.size() > 0) f.node.cloud = cloud;
       closer_.add(f.node);
       for (const auto& [before, before_from_this] : f.odometry)
         closer_.add_odometry(f.node.id, before, before_from_this);

@@ -185,7 +185,7 @@ void LoopClosing::take_up(const std::vector<lc::Loop>& changed) {
 void LoopClosing::update(const lc::Loop& loop) {
   const int number = number_of(static_cast<int>(loop.source), static_cast<int>(loop.target));
   LoopRecord& record = records_[at(number)];
-  if (record.state == "accepted") {  // retracted, or accepted with another pose
+  if (record.state == "accepted") {  // it is retracted
     map_.remove_loop(number);
     graph_.remove(number);
     record.image_loops = 0;

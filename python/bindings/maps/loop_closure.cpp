@@ -7,7 +7,9 @@
 #include <algorithm>
 
 #include "cloud.hpp"
+#include "common/stop_scope.hpp"
 #include "gpureg/error.hpp"
+#include "interrupt.hpp"
 #include "matrix.hpp"
 
 namespace gpureg::python {
@@ -27,14 +29,15 @@ std::optional<UnalignedMatrix6d> matrix6_of(const py::object& value, const char*
   return UnalignedMatrix6d(matrix_of<Eigen::Matrix<double, 6, 6>>(value.cast<DoubleArray>(), name));
 }
 
-void add(LoopCloser& closer, FragmentId id, const py::object& cloud, const DoubleArray& pose,
+void add(LoopCloser& closer, FragmentId id, const py::object& cloud, const py::object& pose,
          std::int64_t session, double time, const py::object& up) {
   Fragment fragment;
   fragment.id = id;
   fragment.session = session;
   fragment.time = time;
   if (!cloud.is_none()) fragment.cloud = cloud.cast<const Cloud&>().prepared;
-  fragment.world_from_fragment = pose_of(pose, "world_from_fragment");
+  if (!pose.is_none())
+    fragment.world_from_fragment = pose_of(pose.cast<DoubleArray>(), "world_from_fragment");
   if (!up.is_none()) fragment.up = matrix_of<Eigen::Vector3d>(up.cast<DoubleArray>(), "up");
   const py::gil_scoped_release release;
   closer.add(fragment);
@@ -45,20 +48,12 @@ Update process(LoopCloser& closer, std::optional<double> milliseconds,
   ProcessLimits limits;
   limits.milliseconds = milliseconds;
   limits.registrations = registrations;
-  bool interrupted = false;
-  limits.should_stop = [&] {
-    const py::gil_scoped_acquire acquire;
-    interrupted = interrupted || PyErr_CheckSignals() != 0;
-    return interrupted;
+  // It throws: a call that is interrupted reports nothing, and the next one all.
+  limits.should_stop = [] {
+    StopScope::poll_now();
+    return false;
   };
-  Update update;
-  {
-    const py::gil_scoped_release release;
-    update = closer.process(limits);
-  }
-  // Loops that this call reported stay in loops().
-  if (interrupted) throw py::error_already_set();
-  return update;
+  return interruptible([&] { return closer.process(limits); });
 }
 
 py::dict poses_of(const std::vector<FragmentPose>& poses) {
@@ -103,7 +98,6 @@ void bind_loop(py::module_& m) {
 
 void bind_loop_closure(py::module_& m) {
   bind_loop(m);
-  using Release = py::call_guard<py::gil_scoped_release>;
   py::class_<LoopCloser>(m, "LoopCloser", "Loops for a SLAM system.")
       .def(py::init<const Context&, const Options&>(), py::arg("context"), py::arg("options"))
       .def("add", &add, py::arg("id"), py::arg("cloud"), py::arg("world_from_fragment"),
@@ -157,19 +151,22 @@ void bind_loop_closure(py::module_& m) {
                                return out;
                              })
       .def_property_readonly("loops", [](const LoopCloser& c) { return c.loops(); })
+      .def("graph", &LoopCloser::graph)
       .def(
-          "graph", [](const LoopCloser& c) { return c.graph(); }, Release())
-      .def(
-          "save", [](const LoopCloser& c, const std::string& path) { c.save(path); },
-          py::arg("path"), Release())
+          "save",
+          [](const LoopCloser& c, const std::string& path) {
+            interruptibly([&] { c.save(path); });
+          },
+          py::arg("path"))
       .def(
           "load",
           [](LoopCloser& c, const std::string& path, const py::object& clouds) {
             // process() asks for Python's lock while it holds its own: never the other way round.
-            const py::gil_scoped_release release;
-            c.load(path, [&](FragmentId id) {
-              const py::gil_scoped_acquire acquire;
-              return clouds(id).cast<const Cloud&>().prepared;
+            interruptibly([&] {
+              c.load(path, [&](FragmentId id) {
+                const py::gil_scoped_acquire acquire;
+                return clouds(id).cast<const Cloud&>().prepared;
+              });
             });
           },
           py::arg("path"), py::arg("clouds"))
