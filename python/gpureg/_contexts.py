@@ -59,10 +59,11 @@ def number_of(value: Any, name: str, expected: str = "a number") -> float:
 def whole_number_of(value: Any, name: str, least: int = -(2**63)) -> int:
     if isinstance(value, bool | np.bool_) or not isinstance(value, numbers.Integral):
         raise TypeError(f"{name}: expected a whole number, got {value!r}")
-    if not least <= value < 2**63:
+    number = int(value)
+    if not least <= number < 2**63:
         expected = "64 bits" if least < 0 else f"{least} or more"
-        raise InvalidArgument(f"{name} is {value}, expected {expected}")
-    return int(value)
+        raise InvalidArgument(f"{name} is {number}, expected {expected}")
+    return number
 
 
 def milliseconds_of(value: Any, name: str) -> float:
