@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "loop_closure/paths.hpp"
 
+#include <Eigen/Cholesky>
 #include <algorithm>
 #include <queue>
 #include <utility>
@@ -19,6 +20,42 @@ double cost_of(const Matrix6d& covariance) {
 }
 
 }  // namespace
+
+RotationShare rotation_share(const Matrix6d& covariance) {
+  const Eigen::Matrix3d cross = covariance.bottomLeftCorner<3, 3>();
+  const Eigen::LLT<Eigen::Matrix3d> rotation(covariance.topLeftCorner<3, 3>());
+  RotationShare out;
+  out.rotation = covariance;
+  out.rotation.bottomRightCorner<3, 3>() = cross * rotation.solve(cross.transpose());
+  out.translation = covariance - out.rotation;
+  return out;
+}
+
+PathParts PathTree::parts(int node) const {
+  std::vector<int> nodes;  // from the node to the root
+  for (int at = node; steps_[index(at)].parent >= 0; at = steps_[index(at)].parent)
+    nodes.push_back(at);
+  PathParts out{{}, Matrix6d::Zero(), Matrix6d::Zero(), Matrix6d::Zero()};
+  for (auto k = nodes.rbegin(); k != nodes.rend(); ++k) {
+    const Step& step = steps_[index(*k)];
+    const Matrix6d moved = pose_graph::adjoint(step.edge->pose.inverse());
+    for (Matrix6d* part : {&out.rotation, &out.translation, &out.fixed})
+      *part = moved * *part * moved.transpose();
+    out.pose = out.pose * step.edge->pose;
+    if (step.steps > steps_[index(step.parent)].steps) {
+      const RotationShare share = rotation_share(step.edge->covariance);
+      out.rotation += share.rotation;
+      out.translation += share.translation;
+    } else {
+      out.fixed += step.edge->covariance;
+    }
+  }
+  const Step& step = steps_[index(node)];
+  const double factor = correlation_factor(step.length, step.steps, correlation_);
+  out.rotation *= factor;
+  out.translation *= factor;
+  return out;
+}
 
 UncertainPose PathTree::root_from(int node) {
   std::vector<int> missing;

@@ -9,6 +9,19 @@
 
 namespace gpureg::loop_closure {
 
+/// A covariance as a sum: what comes with the rotation, and the translation where that is known.
+struct RotationShare {
+  Matrix6d rotation, translation;
+};
+RotationShare rotation_share(const Matrix6d& covariance);
+
+/// The relative pose along a path with the parts of its covariance.
+struct PathParts {
+  pose_graph::Pose pose;
+  Matrix6d rotation, translation;  ///< of modelled odometry, see RotationShare
+  Matrix6d fixed;                  ///< of odometry with a covariance of the host
+};
+
 /// The best-known paths from one node to all others.
 class PathTree {
  public:
@@ -20,6 +33,8 @@ class PathTree {
   /// composition along the path: other paths would only lower it. Errors of modelled odometry have
   /// one sign over Options::drift_correlation.
   UncertainPose root_from(int node);
+  /// The same by parts.
+  PathParts parts(int node) const;
   /// false: the host has given the covariance of the whole path.
   bool modelled(int node) const { return steps_[index(node)].steps > 0; }
 

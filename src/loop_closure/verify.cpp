@@ -4,9 +4,11 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <map>
 #include <utility>
 
 #include "loop_closure/accept.hpp"
+#include "loop_closure/noise.hpp"
 #include "loop_closure/relations.hpp"
 #include "math/exponential.hpp"
 #include "pose_graph/robust/robust.hpp"
@@ -30,9 +32,19 @@ constexpr double kMostCorrelated = 1e18;
 /// Log odds that no confidence exceeds: 0.999, as of registrations.
 constexpr double kCertainLogOdds = 6.9;
 
-/// @param drift_scale on the standard deviations of modelled odometry.
+/// Degrees of freedom of Student's t distribution of the residuals of loops, by which loops weigh
+/// in the last solution: registrations have heavier tails than their covariances (Lange, Little and
+/// Taylor 1989, who find 4 to suit most data).
+constexpr double kDegreesOfFreedom = 4;
+/// Correlation of two loops that share a fragment, where errors inside of fragments are all that
+/// their registrations have: each of two fragments has half of the error.
+constexpr double kSharedFragment = 0.5;
+/// Solutions with these weights; later ones change poses by less than millimetres.
+constexpr int kWeightedRounds = 3;
+
+/// @param noise on the standard deviations of modelled odometry.
 pose_graph::Graph graph_without_loops(const State& state, const Options& options,
-                                      double drift_scale) {
+                                      const NoiseScales& noise) {
   pose_graph::Graph graph;
   for (const auto& [id, node] : state.nodes) {
     graph.nodes.push_back({id, node.estimate, false});
@@ -45,11 +57,18 @@ pose_graph::Graph graph_without_loops(const State& state, const Options& options
     edge.target = odometry.target;
     edge.target_from_source = odometry.target_from_source;
     edge.information = odometry.information;
-    if (odometry.modelled && odometry.length > 0) {
+    if (odometry.modelled) {
       // Edges of a graph are independent: each takes its share of the errors of one sign.
-      const double factor = std::clamp(options.drift_correlation * odometry.steps / odometry.length,
-                                       1.0, kMostCorrelated);
-      *edge.information /= factor * drift_scale * drift_scale;
+      const double factor =
+          odometry.length > 0
+              ? std::clamp(options.drift_correlation * odometry.steps / odometry.length, 1.0,
+                           kMostCorrelated)
+              : 1;
+      if (noise.rotation == noise.translation)
+        *edge.information /= factor * noise.rotation * noise.rotation;
+      else
+        edge.information =
+            scaled_information(*edge.information, noise.rotation, noise.translation, 1 / factor);
     }
     edge.kind = pose_graph::EdgeKind::odometry;
     graph.edges.push_back(edge);
@@ -115,7 +134,11 @@ class Verifier {
       if (!refused && !drop_residuals()) break;
     }
     conclude(verdicts);
-    if (options_.optimize) move(result);
+    if (options_.optimize) {
+      if (!options_.accept_by_graph_alone) result = weighted(std::move(result));
+      if (result.status == pose_graph::Status::cancelled) return {result.status, result.reason};
+      move(result);
+    }
     return {result.status, result.reason};
   }
 
@@ -169,8 +192,72 @@ class Verifier {
     return true;
   }
 
+  pose_graph::Options graph_options() const {
+    pose_graph::Options out = options_.graph;
+    out.marginals.clear();
+    if (should_stop_)
+      out.should_stop = [this](const pose_graph::Progress& progress) {
+        const auto& theirs = options_.graph.should_stop;
+        return should_stop_() || (theirs && theirs(progress));
+      };
+    return out;
+  }
+
+  /// The poses by the accepted loops alone, from those of the last round, with the noise that their
+  /// misclosures show. Otherwise the small errors of loops would replace better odometry. As before
+  /// where this is not decided.
+  pose_graph::Result weighted(pose_graph::Result before) {
+    std::vector<const Mode*> modes;
+    std::vector<std::pair<FragmentId, FragmentId>> ends;
+    for (const LoopRecord& record : state_.loops) {
+      if (record.loop.state != LoopState::accepted) continue;
+      modes.push_back(&record.modes[record.mode]);
+      ends.emplace_back(record.source, record.target);
+    }
+    if (modes.empty()) return before;
+    const NoiseScales noise = estimate_noise(state_, odometry_, kDriftScales[scale_]);
+    pose_graph::Graph graph = graph_without_loops(state_, options_, noise);
+    const std::size_t first = graph.edges.size();
+    for (std::size_t k = 0; k < modes.size(); ++k) {
+      pose_graph::Edge edge;
+      edge.source = ends[k].first;
+      edge.target = ends[k].second;
+      edge.target_from_source = modes[k]->target_from_source;
+      graph.edges.push_back(edge);
+    }
+    pose_graph::Options options = graph_options();
+    options.robust = pose_graph::Robust::none;
+    // The loops of a fragment count as fewer: the design effect of clusters (Kish 1965).
+    std::map<FragmentId, int> loops;
+    for (const auto& [source, target] : ends) {
+      ++loops[source];
+      ++loops[target];
+    }
+    std::vector<double> shares, weights(modes.size(), 1);
+    for (const auto& [source, target] : ends)
+      shares.push_back(1 / (1 + kSharedFragment * (0.5 * (loops[source] + loops[target]) - 1)));
+    for (int round = 0; round < kWeightedRounds; ++round) {
+      for (std::size_t k = 0; k < graph.nodes.size(); ++k)
+        graph.nodes[k].world_from_node = before.world_from_node[k];
+      for (std::size_t k = 0; k < modes.size(); ++k)
+        graph.edges[first + k].information =
+            scaled_information(modes[k]->information, noise.loop_rotation, noise.loop_translation,
+                               shares[k] * weights[k]);
+      pose_graph::Result next = pose_graph::optimize(graph, options);
+      if (next.status == pose_graph::Status::cancelled) return next;
+      if (next.status == pose_graph::Status::failed) return before;
+      before.world_from_node = std::move(next.world_from_node);
+      for (std::size_t k = 0; k < modes.size(); ++k)
+        weights[k] =
+            (kDegreesOfFreedom + 6) /
+            (kDegreesOfFreedom + next.edges[first + k].squared_error / (shares[k] * weights[k]));
+    }
+    return before;
+  }
+
   pose_graph::Result optimise() {
-    pose_graph::Graph graph = graph_without_loops(state_, options_, kDriftScales[scale_]);
+    pose_graph::Graph graph =
+        graph_without_loops(state_, options_, {kDriftScales[scale_], kDriftScales[scale_]});
     const std::size_t first = graph.edges.size();
     std::vector<std::size_t> loops;
     std::vector<std::vector<std::uint32_t>> modes;
@@ -181,14 +268,7 @@ class Verifier {
       loops.push_back(k);
       modes.push_back(std::move(used));
     }
-    pose_graph::Options graph_options = options_.graph;
-    graph_options.marginals.clear();
-    if (should_stop_)
-      graph_options.should_stop = [this](const pose_graph::Progress& progress) {
-        const auto& theirs = options_.graph.should_stop;
-        return should_stop_() || (theirs && theirs(progress));
-      };
-    const pose_graph::Result result = pose_graph::optimize(graph, graph_options);
+    const pose_graph::Result result = pose_graph::optimize(graph, graph_options());
     fits_.assign(state_.loops.size(), 0);
     squared_errors_.assign(state_.loops.size(), 0);
     if (result.edges.size() != graph.edges.size()) return result;
@@ -280,7 +360,7 @@ Verification verify_loops(State& state, const Options& options,
 }
 
 pose_graph::Graph accepted_graph(const State& state, const Options& options) {
-  pose_graph::Graph graph = graph_without_loops(state, options, 1);
+  pose_graph::Graph graph = graph_without_loops(state, options, {});
   for (const LoopRecord& record : state.loops) {
     if (record.loop.state != LoopState::accepted) continue;
     const Mode& mode = record.modes[record.mode];
