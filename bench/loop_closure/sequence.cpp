@@ -168,6 +168,26 @@ SimulatedOdometry drifted(const Sequence& sequence, double metres, std::uint64_t
   return {poses, size};
 }
 
+std::vector<UnalignedIsometry3d> noisy(const Sequence& sequence, double share, double degrees,
+                                       std::uint64_t seed) {
+  std::mt19937_64 random(seed);
+  std::normal_distribution<double> normal(0, 1 / std::sqrt(3.0));  // of each axis
+  const auto draw = [&] {
+    const double x = normal(random), y = normal(random), z = normal(random);
+    return Eigen::Vector3d(x, y, z);
+  };
+  std::vector<UnalignedIsometry3d> out{sequence.truth[0]};
+  for (std::size_t k = 1; k < sequence.truth.size(); ++k) {
+    const UnalignedIsometry3d step = sequence.truth[k - 1].inverse() * sequence.truth[k];
+    const Eigen::Vector3d turn = degrees * M_PI / 180 * draw();
+    UnalignedIsometry3d error = UnalignedIsometry3d::Identity();
+    error.linear() = Eigen::AngleAxisd(turn.norm(), turn.stableNormalized()).toRotationMatrix();
+    error.translation() = share * step.translation().norm() * draw();
+    out.push_back(out.back() * step * error);
+  }
+  return out;
+}
+
 std::vector<Trial> trials(const Sequence& sequence, std::size_t most, double false_share,
                           bool shuffled, std::uint64_t seed) {
   std::mt19937_64 random(seed);

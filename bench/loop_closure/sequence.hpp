@@ -36,6 +36,10 @@ struct SimulatedOdometry {
 /// size, both drawn by the seed. Of several draws the one of median size.
 SimulatedOdometry drifted(const Sequence& sequence, double metres, std::uint64_t seed);
 
+/// Odometry of independent errors: RMS `share` of each step's length, and `degrees`.
+std::vector<UnalignedIsometry3d> noisy(const Sequence& sequence, double share, double degrees,
+                                       std::uint64_t seed);
+
 bool correct(const UnalignedIsometry3d& truth, const UnalignedIsometry3d& pose);
 
 /// A loop for verification.

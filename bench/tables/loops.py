@@ -82,7 +82,30 @@ def pose_graphs():
     return table
 
 
+def noise():
+    rows = [
+        "| scene | noise of a step | odometry | closer | told the covariance | accepted | wrong |",
+        "| --- | --- | --- | --- | --- | --- | --- |",
+    ]
+    groups = {}
+    for row in load("loop_closure_noise.json")["rows"]:
+        groups.setdefault((row["scene"], *row["noise"]), []).append(row)
+    for (scene, share, degrees), group in groups.items():
+        odometry, own, told = (
+            f"{100 * sum(row[key] for row in group) / len(group):.1f} cm"
+            for key in ("odometry_rmse", "rmse", "rmse_with_covariance")
+        )
+        accepted = sum(row["accepted"] for row in group) / len(group)
+        wrong = sum(row["wrong"] for row in group)
+        rows.append(
+            f"| {NAMES.get(scene, scene.replace('_', ' '))} | {100 * share:g} %, {degrees:g}° | {odometry} | {own} | {told} | "
+            f"{accepted:.0f} | {wrong} |"
+        )
+    return rows
+
+
 TABLES = {
+    "loops_noise": noise,
     "loops_online": online,
     "loops_sessions": sessions,
     "loops_drift": drift,
