@@ -28,6 +28,9 @@ constexpr double kLeastLog = -12, kMostLogOfOdometry = 5, kMostLogOfLoops = 0;
 /// Halvings of that range.
 constexpr int kHalvings = 40;
 
+/// See estimate_noise(). bench/notes/loops.md: 1 doubles the error of odometry of a wrong scale, 3
+/// adds a tenth to that of independent noise.
+constexpr double kTranslationBehind = 2;
 /// Half of what pose graphs take: rounding stays within.
 constexpr double kMostInformation = 0.5 * pose_graph::kLargestInformation;
 
@@ -118,8 +121,10 @@ NoiseScales estimate_noise(const State& state, const Paths& odometry, double dri
   const std::array<double, kComponents> factors = most_likely(data);
   NoiseScales out{drift_scale * std::sqrt(factors[0]), drift_scale * std::sqrt(factors[1]),
                   std::sqrt(factors[2]), std::sqrt(factors[3])};
-  // A wrong scale of the translation cancels along closed paths: loops show it last.
-  out.translation = std::max(out.translation, out.rotation);
+  // A wrong scale of the translation cancels along closed paths, and loops show it last: below the
+  // stated noise, no more than half of what they say of the rotation is believed of it.
+  out.translation = std::max(
+      {out.translation, out.rotation, std::min(drift_scale, kTranslationBehind * out.rotation)});
   return out;
 }
 
