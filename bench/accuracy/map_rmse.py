@@ -115,7 +115,9 @@ def measure(out, truth, information, scene_of=lambda scan: 0):
     Positions in centimetres. scene_of: of scans whose true poses have no common frame.
     """
     truth_poses = truth[0]
-    poses = read_poses(out / "poses.txt")
+    poses = {}
+    for path in out.glob("poses*.txt"):  # of each island
+        poses.update(read_poses(path))
     document = json.loads((out / "reconstruction.json").read_text())
     islands = []
     for island in document["islands"]:

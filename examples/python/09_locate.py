@@ -10,7 +10,6 @@ from __future__ import annotations
 import argparse
 
 import gpureg
-import numpy as np
 
 
 def main() -> None:
@@ -25,11 +24,8 @@ def main() -> None:
 
     options = gpureg.RegistrationOptions.from_voxel_size(arguments.voxel_size)
     scene = gpureg.reconstruct(arguments.earlier, options=options)
-    poses = np.full((len(scene.scans), 4, 4), np.nan)
-    largest = [k for k, scan in enumerate(scene.scans) if scan.island == 0]
-    poses[largest] = scene.poses[largest]  # those that stay NaN are left out
-    map = gpureg.prepare_map(
-        arguments.earlier, poses, options=gpureg.MapOptions.from_voxel_size(arguments.voxel_size)
+    map = gpureg.prepare_map(  # of the largest island
+        arguments.earlier, scene, options=gpureg.MapOptions.from_voxel_size(arguments.voxel_size)
     )
     if arguments.save_map:
         map.save(arguments.save_map)  # gpureg.load_map() reads it

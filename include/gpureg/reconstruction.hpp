@@ -41,6 +41,7 @@ struct AuditedReconstruction {
 /// @return the map. Scans that cannot be placed are no error. Independent of the number of threads.
 /// @throws InvalidArgument for options out of range, an index out of range, a pair of a scan with
 ///   itself, a repeated pair; as loop_consistency(), pose_graph::Graph::validate() and audit().
+///   Cancelled.
 AuditedReconstruction reconstruct(const Context& context, const std::vector<PreparedCloud>& clouds,
                                   const std::vector<Pair>& pairs,
                                   const std::vector<RegistrationResult>& results,

@@ -12,7 +12,7 @@ and `register_all`.
 
 from typing import TYPE_CHECKING, Any
 
-from ._audit import Audit, AuditedConnection, AuditedPair, audit
+from ._audit import Audit, AuditedConnection, AuditedIsland, AuditedPair, MendedMap, audit, mend
 from ._calibration import (
     CalibrationRun,
     RiskThreshold,
@@ -23,6 +23,7 @@ from ._calibration import (
 )
 from ._contexts import default_context
 from ._core import (
+    AuditOptions,
     BackendUnavailable,
     ChangeOptions,
     ChangeResult,
@@ -115,7 +116,9 @@ def __dir__() -> list[str]:
 __all__ = [
     "CHANGE_LABELS",
     "Audit",
+    "AuditOptions",
     "AuditedConnection",
+    "AuditedIsland",
     "AuditedPair",
     "BackendUnavailable",
     "BatchInterrupted",
@@ -154,6 +157,7 @@ __all__ = [
     "MapLink",
     "MapOptions",
     "MapScan",
+    "MendedMap",
     "PairConsistency",
     "PointCloud",
     "PoseEvidence",
@@ -193,6 +197,7 @@ __all__ = [
     "locate",
     "locate_batch",
     "loop_consistency",
+    "mend",
     "prepare",
     "prepare_batch",
     "prepare_map",

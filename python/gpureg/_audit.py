@@ -4,16 +4,21 @@
 from __future__ import annotations
 
 import dataclasses
+import json
 import os
+from collections.abc import Sequence
 from typing import Any
+
+import numpy as np
 
 from . import _core
 from ._arrays import float64
 from ._contexts import checked, context_of
-from ._core import Context, RegistrationOptions
+from ._core import AuditOptions, Context, PreparedCloud, RegistrationOptions
+from ._map import Map, Poses
 from ._progress import Progress
-from ._reconstruction import usable_fragments
 from .fragments import FragmentSet, fragment_set
+from .preparation import usable_fragments
 
 
 @dataclasses.dataclass(frozen=True)
@@ -66,6 +71,8 @@ class AuditedConnection:
         The same.
     contradictions : list of int
         Indices into ``Audit.pairs``, the strongest first.
+    island : int
+        Index into ``Audit.islands``.
     """
 
     verdict: str
@@ -73,6 +80,7 @@ class AuditedConnection:
     supporting: int
     contradicting: int
     contradictions: list[int]
+    island: int
     _order: Any = dataclasses.field(repr=False, compare=False)
     _part: slice = dataclasses.field(repr=False)
 
@@ -83,23 +91,89 @@ class AuditedConnection:
 
 
 @dataclasses.dataclass(frozen=True)
+class AuditedIsland:
+    """Scans that have one frame.
+
+    Attributes
+    ----------
+    scans : list of int
+        Numbers of the fragments.
+    verdict : str
+        "sound", "contradicted" or "undecided", as of `Audit`.
+    """
+
+    scans: list[int]
+    verdict: str
+
+
+@dataclasses.dataclass(frozen=True)
 class Audit:
     """What the scans of a map say about it.
 
     Attributes
     ----------
+    verdict : str
+        "contradicted": a connection is; "sound": none is, and in every island of two scans or more
+        more connections are confirmed than undecided; else "undecided", as of poses in other units
+        or of other scans, which keep most scans out of each other's sight.
+    islands : list of AuditedIsland
     pairs : list of AuditedPair
     connections : list of AuditedConnection
         The least confident first.
     """
 
+    verdict: str
+    islands: list[AuditedIsland]
     pairs: list[AuditedPair]
     connections: list[AuditedConnection]
+    _record: Any = dataclasses.field(repr=False, compare=False)
 
     @property
     def sound(self) -> bool:
-        """Whether no connection is contradicted."""
-        return all(connection.verdict != "contradicted" for connection in self.connections)
+        """Whether the verdict is "sound"."""
+        return self.verdict == "sound"
+
+    @classmethod
+    def _of(cls, record: _core.AuditRecord, numbers: Sequence[int]) -> Audit:
+        order = [numbers[k] for k in record.order]
+        return cls(
+            record.verdict,
+            [
+                AuditedIsland([numbers[k] for k in scans], verdict)
+                for scans, verdict in zip(record.islands, record.verdicts, strict=True)
+            ],
+            [AuditedPair(numbers[row[0]], numbers[row[1]], *row[2:]) for row in record.pairs],
+            [
+                AuditedConnection(*row[:6], order, slice(row[6], row[6] + row[7]))
+                for row in record.connections
+            ],
+            record,
+        )
+
+
+@dataclasses.dataclass(frozen=True)
+class MendedMap:
+    """A map that was put together again where its audit contradicted it.
+
+    Attributes
+    ----------
+    poses : (N, 4, 4) float64
+        Of each fragment, in the frame of its island; NaN: what is right could not be found.
+    moved : list of int
+        Numbers of the fragments that got another pose.
+    left_out : list of int
+        Of those that have none any more.
+    registered : int
+        Pairs that were aligned.
+    audit : Audit
+        Of the mended map.
+    """
+
+    poses: Poses
+    moved: list[int]
+    left_out: list[int]
+    registered: int
+    audit: Audit
 
 
 def audit(
@@ -107,6 +181,7 @@ def audit(
     poses: Any,
     *,
     options: RegistrationOptions | None = None,
+    audit_options: AuditOptions | None = None,
     context: Context | None = None,
     progress: Progress = False,
 ) -> Audit:
@@ -115,11 +190,14 @@ def audit(
     Parameters
     ----------
     fragments : FragmentSet, folder, or sequence of clouds
-    poses : path, or (N, 4, 4) array
+    poses : Map, path, or (N, 4, 4) array
+        A `Map`, or the output folder of ``gpureg reconstruct``: island by island. Of one frame:
         ``world_from_scan`` of each fragment, NaN where it has none; or a file, as for `gpureg
         audit`: a trajectory (TUM with fragment numbers as times, KITTI, or poses.txt), g2o, or a
         Redwood log of scans or of pairs.
     options : RegistrationOptions, optional
+    audit_options : AuditOptions, optional
+        Default: those of the voxel size.
     context : Context, optional
     progress : bool or callable
 
@@ -131,7 +209,7 @@ def audit(
     Raises
     ------
     ValueError
-        Naming the pose that is no rigid motion.
+        Naming the pose that is no rigid motion; for a folder without a finished map.
     IoError
         Naming the file that holds no poses of these fragments.
 
@@ -139,38 +217,171 @@ def audit(
     --------
     >>> import numpy as np, gpureg
     >>> cloud = np.random.default_rng(1).random((2000, 3))
-    >>> gpureg.audit([cloud, cloud], np.stack([np.eye(4)] * 2)).sound
-    True
+    >>> gpureg.audit([cloud, cloud], np.stack([np.eye(4)] * 2)).verdict
+    'sound'
     """
-    options = checked(options, RegistrationOptions, "options") or RegistrationOptions()
-    options.validate()
+    options, audit_options = options_of(options, audit_options)
     context = context_of(context)
     fragments = fragment_set(fragments)
     fragments.check_files()
-    matrices = _poses(poses, fragments)
-    unusable: dict[int, str] = {}
-    clouds = usable_fragments(fragments, options.prepare, context, progress, unusable)
-    if unusable:
-        kept = [k for k in range(len(fragments)) if k not in unusable]
-        fragments, matrices = fragments.without(unusable), matrices[kept]
-    pairs, connections, order = _core.audit(context, clouds, matrices, options)
-    numbers = [int(number) for number in fragments.numbers]
-    order = [numbers[k] for k in order]
-    return Audit(
-        [AuditedPair(numbers[row[0]], numbers[row[1]], *row[2:]) for row in pairs],
-        [AuditedConnection(*row[:5], order, slice(row[5], row[5] + row[6])) for row in connections],
+    matrices, islands = _map_of(poses, fragments)
+    clouds, kept = _usable(fragments, options, context, progress)
+    record = _core.audit(
+        context, clouds, matrices[kept], _islands_of(islands, kept), options, audit_options
+    )
+    return Audit._of(record, [fragments.numbers[k] for k in kept])
+
+
+def mend(
+    fragments: Any,
+    poses: Any,
+    *,
+    audit: Audit | None = None,
+    options: RegistrationOptions | None = None,
+    audit_options: AuditOptions | None = None,
+    context: Context | None = None,
+    progress: Progress = False,
+) -> MendedMap:
+    """Align again across what an audit contradicts, and put the parts together.
+
+    What is still contradicted then has no pose any more. Islands that are not contradicted stay as
+    they are.
+
+    Parameters
+    ----------
+    fragments, poses, options, audit_options, context, progress
+        As for `audit`.
+    audit : Audit, optional
+        What `audit` said about the same poses; None: the map is audited first.
+
+    Returns
+    -------
+    MendedMap
+
+    Raises
+    ------
+    ValueError
+        As `audit`; for an audit of another number of scans.
+
+    Examples
+    --------
+    >>> import numpy as np, gpureg
+    >>> cloud = np.random.default_rng(1).random((2000, 3))
+    >>> gpureg.mend([cloud, cloud], np.stack([np.eye(4)] * 2)).moved
+    []
+    """
+    options, audit_options = options_of(options, audit_options)
+    context = context_of(context)
+    fragments = fragment_set(fragments)
+    fragments.check_files()
+    matrices, islands = _map_of(poses, fragments)
+    found = checked(audit, Audit, "audit")
+    clouds, kept = _usable(fragments, options, context, progress)
+    islands, numbers = _islands_of(islands, kept), [fragments.numbers[k] for k in kept]
+    placed = np.flatnonzero(np.isfinite(matrices[kept]).all(axis=(1, 2)))
+    if found is not None and sorted(found._record.order) != placed.tolist():
+        raise ValueError("audit: it is not one of these poses")
+    record = (
+        _core.audit(context, clouds, matrices[kept], islands, options, audit_options)
+        if found is None
+        else found._record
+    )
+    mended, moved, left_out, registered, after = _core.mend(
+        context, clouds, matrices[kept], islands, record, options, audit_options
+    )
+    poses = np.full(matrices.shape, np.nan)
+    poses[kept] = mended
+    return MendedMap(
+        poses,
+        [numbers[k] for k in moved],
+        [numbers[k] for k in left_out],
+        registered,
+        Audit._of(after, numbers),
     )
 
 
-def _poses(poses: Any, fragments: FragmentSet) -> Any:
+def _usable(
+    fragments: FragmentSet, options: RegistrationOptions, context: Context, progress: Progress
+) -> tuple[list[PreparedCloud], list[int]]:
+    """Prepared, and their positions."""
+    unusable: dict[int, str] = {}
+    clouds = usable_fragments(fragments, options.prepare, context, progress, unusable)
+    return clouds, [k for k in range(len(fragments)) if k not in unusable]
+
+
+def _islands_of(islands: list[int], kept: list[int]) -> list[int]:
+    """Of the kept fragments: islands that have none of them do not count."""
+    counted: dict[int, int] = {}
+    return [counted.setdefault(islands[k], len(counted)) for k in kept]
+
+
+def options_of(
+    options: RegistrationOptions | None, audit_options: AuditOptions | None
+) -> tuple[RegistrationOptions, AuditOptions]:
+    options = checked(options, RegistrationOptions, "options") or RegistrationOptions()
+    options.validate()
+    audit_options = checked(
+        audit_options, AuditOptions, "audit_options"
+    ) or AuditOptions.from_voxel_size(options.prepare.voxel_size)
+    audit_options.validate()
+    return options, audit_options
+
+
+def _map_of(poses: Any, fragments: FragmentSet) -> tuple[Poses, list[int]]:
+    """Poses of the fragments, and the island of each."""
+    one = [0] * len(fragments)
+    if isinstance(poses, Map):
+        if poses.numbers != fragments.numbers:
+            raise ValueError("poses: the map is of other fragments")
+        return poses.poses, [scan.island or 0 for scan in poses.scans]
     if not isinstance(poses, str | os.PathLike):
         matrices = float64(poses, "poses")
         if matrices.shape != (len(fragments), 4, 4):
             raise ValueError(
                 f"poses: expected shape ({len(fragments)}, 4, 4), got {matrices.shape}"
             )
-        return matrices
-    return _core.read_map_poses(os.fspath(poses), list(fragments.numbers), "fragments")
+        return matrices, one
+    path = os.fspath(poses)
+    if not (os.path.isdir(path) or path.endswith(".json")):
+        return _core.read_pose_file(path, list(fragments.numbers), "fragments")
+    matrices = np.full((len(fragments), 4, 4), np.nan)
+    positions = {int(number): k for k, number in enumerate(fragments.numbers)}
+    islands = _read_map(path, positions, matrices)
+    if np.isfinite(matrices[:, 0, 0]).sum() < 2:
+        raise ValueError(f"poses: {path} holds no poses of two fragments")
+    return matrices, islands
 
 
-__all__ = ["Audit", "AuditedConnection", "AuditedPair", "audit"]
+def _read_map(path: str, positions: dict[int, int], matrices: Poses) -> list[int]:
+    """Fills in the poses of a reconstruction.json, and returns the island of each fragment."""
+    file = os.path.join(path, "reconstruction.json") if os.path.isdir(path) else path
+    if not os.path.exists(file):
+        raise ValueError(
+            f"poses: there is no {file}, which `gpureg reconstruct` writes when all else is there"
+        )
+    islands = [0] * len(positions)
+    counted: dict[int, int] = {}  # islands without a fragment here do not count
+    try:
+        with open(file, encoding="utf-8") as text:
+            scans = json.load(text)["scans"]
+        for scan in scans:
+            k = positions.get(scan["id"])
+            if k is None or scan["island"] is None:
+                continue
+            matrices[k] = np.reshape(scan["island_from_scan"], (4, 4))
+            islands[k] = counted.setdefault(scan["island"], len(counted))
+    except (ValueError, KeyError, TypeError) as error:
+        raise ValueError(f"poses: {file} is no map of `gpureg reconstruct`: {error!r}") from None
+    return islands
+
+
+__all__ = [
+    "Audit",
+    "AuditedConnection",
+    "AuditedIsland",
+    "AuditedPair",
+    "MendedMap",
+    "audit",
+    "mend",
+    "options_of",
+]

@@ -989,6 +989,39 @@ class EdgeNoiseOptions:
     _fields: tuple[str, ...]
     # end of fields
 
+class AuditOptions:
+    # fields of AuditOptions
+    max_shift: float
+    max_shift_per_metre: float
+    max_contradicted: float
+    min_confirmed: float
+    most_pairs: int
+    def __init__(
+        self,
+        *,
+        max_shift: float = ...,
+        max_shift_per_metre: float = ...,
+        max_contradicted: float = ...,
+        min_confirmed: float = ...,
+        most_pairs: int = ...,
+    ) -> None: ...
+    def replace(
+        self,
+        *,
+        max_shift: float = ...,
+        max_shift_per_metre: float = ...,
+        max_contradicted: float = ...,
+        min_confirmed: float = ...,
+        most_pairs: int = ...,
+    ) -> AuditOptions: ...
+    def validate(self) -> None: ...
+    def __eq__(self, other: object, /) -> bool: ...
+    __hash__: None  # type: ignore[assignment]
+    _fields: tuple[str, ...]
+    # end of fields
+    @staticmethod
+    def from_voxel_size(voxel_size: float) -> AuditOptions: ...
+
 class ReconstructionOptions:
     # fields of ReconstructionOptions
     consistency: LoopConsistencyOptions
@@ -1543,17 +1576,40 @@ def reconstruct_map(
     context: Context,
     clouds: list[PreparedCloud],
     registration: RegistrationOptions,
-) -> MapGraph: ...
+    audit_options: AuditOptions,
+) -> tuple[MapGraph, AuditRecord | None, bool]: ...
+
+class AuditRecord:
+    @property
+    def pairs(self) -> list[tuple[int, int, str, float, float, float, float, float]]: ...
+    @property
+    def connections(self) -> list[tuple[str, float, int, int, list[int], int, int, int]]: ...
+    @property
+    def order(self) -> list[int]: ...
+    @property
+    def islands(self) -> list[list[int]]: ...
+    @property
+    def verdicts(self) -> list[str]: ...
+    @property
+    def verdict(self) -> str: ...
+
 def audit(
     context: Context,
     clouds: list[PreparedCloud],
     poses: _Float64,
+    islands: list[int],
     options: RegistrationOptions,
-) -> tuple[
-    list[tuple[int, int, str, float, float, float, float, float]],
-    list[tuple[str, float, int, int, list[int], int, int]],
-    list[int],
-]: ...
+    audit_options: AuditOptions,
+) -> AuditRecord: ...
+def mend(
+    context: Context,
+    clouds: list[PreparedCloud],
+    poses: _Float64,
+    islands: list[int],
+    found: AuditRecord,
+    options: RegistrationOptions,
+    audit_options: AuditOptions,
+) -> tuple[_Float64, list[int], list[int], int, AuditRecord]: ...
 def refine_map(
     context: Context,
     map: MapGraph,
@@ -1618,7 +1674,9 @@ class TrajectoryEvaluation:
     @property
     def relative_rotation(self) -> ErrorStatistics: ...
 
-def read_map_poses(path: str, numbers: Sequence[int], folder: str) -> _Float64: ...
+def read_pose_file(
+    path: str, numbers: Sequence[int], folder: str
+) -> tuple[_Float64, list[int]]: ...
 def read_odometry(
     path: str, numbers: Sequence[int], folder: str, unusable: Sequence[int]
 ) -> list[tuple[int, int, _Float64, None]]: ...

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import dataclasses
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
@@ -12,6 +12,9 @@ import numpy.typing as npt
 from . import _core
 from ._core import MapGraph, RegistrationOptions
 from .fragments import FragmentSet
+
+if TYPE_CHECKING:
+    from ._audit import Audit
 
 Poses = npt.NDArray[np.float64]
 Points = npt.NDArray[np.float32]
@@ -112,10 +115,13 @@ class Map:
         refinement: dict[str, Any] | None,
         of: FragmentSet,
         unusable: dict[int, str],
+        audit: Audit | None,
+        places_look_alike: bool,
     ) -> None:
         """of: the set that the map was made of; unusable: what fragments lacks of it, by position."""
         self._graph, self._fragments, self._options = graph, fragments, options
         self._refinement, self._of = refinement, of
+        self._audit, self._places_look_alike = audit, places_look_alike
         numbers = fragments.numbers
         scans = iter(graph.scans)
         self._scans = tuple(
@@ -173,6 +179,18 @@ class Map:
         metres, solved.
         """
         return self._refinement
+
+    @property
+    def audit(self) -> Audit | None:
+        """What the scans say about the map before its refinement; None without ``audit``."""
+        return self._audit
+
+    @property
+    def places_look_alike(self) -> bool:
+        """Whether more confident pairs contradicted the map than their confidences explain. Then
+        only pairs are trusted that keep scans of consecutive numbers beside each other.
+        """
+        return self._places_look_alike
 
     def points(
         self, island: int = 0, *, voxel_size: float | None = None

@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import os
 from collections.abc import Collection, Sequence
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -13,10 +12,11 @@ import numpy.typing as npt
 
 from . import _core
 from ._arrays import float64, index_pairs
+from ._audit import Audit, options_of
 from ._contexts import checked, context_of
 from ._core import (
+    AuditOptions,
     Context,
-    IoError,
     MapGraph,
     ReconstructionOptions,
     RegistrationOptions,
@@ -25,7 +25,7 @@ from ._core import (
 from ._map import Map
 from ._progress import Progress, batch_progress
 from .fragments import FragmentSet, fragment_set
-from .preparation import pieces, prepare_usable
+from .preparation import check_enough, usable_fragments
 from .registration import ALIGNED, align_batch
 
 
@@ -39,6 +39,7 @@ def reconstruct(
     refine: bool = True,
     options: RegistrationOptions | None = None,
     map_options: ReconstructionOptions | None = None,
+    audit_options: AuditOptions | None = None,
     context: Context | None = None,
     progress: Progress = False,
 ) -> Map:
@@ -68,6 +69,8 @@ def reconstruct(
         Of the alignment.
     map_options : ReconstructionOptions, optional
         Of the map: drift of the odometry, confidences, islands. Default: those of the voxel size.
+    audit_options : AuditOptions, optional
+        Of the audit. Default: those of the voxel size.
     context : Context, optional
     progress : bool or callable
         True: bars of tqdm. A callable gets (done, total) of each step: fragments, pairs, fragments
@@ -95,8 +98,7 @@ def reconstruct(
     >>> map.islands, map.poses[1, :3, 3].round(2).tolist()  # doctest: +SKIP
     ([[0, 1, 2]], [-0.5, 0.0, 0.0])
     """
-    options = checked(options, RegistrationOptions, "options") or RegistrationOptions()
-    options.validate()
+    options, audit_options = options_of(options, audit_options)
     map_options = checked(
         map_options, ReconstructionOptions, "map_options"
     ) or ReconstructionOptions.from_voxel_size(options.prepare.voxel_size)
@@ -121,7 +123,7 @@ def reconstruct(
         known = _odometry_of_others(odometry, known, unusable, fragments)
     if values is None:
         values = align_batch(clouds, rows, options=options, context=context, progress=progress)
-    graph = _core.reconstruct_map(
+    graph, record, places_look_alike = _core.reconstruct_map(
         len(usable),
         rows,
         values,
@@ -130,10 +132,12 @@ def reconstruct(
         context,
         clouds if audit else [],
         options,
+        audit_options,
     )
     del clouds
     refinement = _refine(graph, usable, options, context, progress) if refine else None
-    return Map(graph, usable, options, refinement, fragments, unusable)
+    found = None if record is None else Audit._of(record, usable.numbers)
+    return Map(graph, usable, options, refinement, fragments, unusable, found, places_look_alike)
 
 
 def _positions(fragments: FragmentSet, numbers: npt.NDArray[np.int64], name: str) -> Any:
@@ -261,28 +265,6 @@ def _odometry_of_others(
     ]
 
 
-def usable_fragments(
-    fragments: FragmentSet,
-    options: _core.PrepareOptions,
-    context: Context,
-    progress: Progress,
-    unusable: dict[int, str],
-) -> list[_core.PreparedCloud]:
-    """Prepared. unusable gets the positions of those that cannot be, and why; raises IoError where
-    fewer than two are left.
-    """
-    out: list[_core.PreparedCloud] = []
-    device = context.backend == "cuda"
-    with batch_progress(progress, "preparing", len(fragments), unit="cloud") as report:
-        for piece in pieces(len(fragments), context):
-            loads = {k: partial(fragments.load, k, options, device) for k in piece}
-            out += [cloud for _, cloud in prepare_usable(context, loads, options, unusable)]
-            if report is not None:
-                report(len(out) + len(unusable))
-    _check_enough(fragments, unusable)
-    return out
-
-
 def _find_unreadable(
     fragments: FragmentSet, options: _core.PrepareOptions, unusable: dict[int, str]
 ) -> None:
@@ -291,12 +273,7 @@ def _find_unreadable(
             fragments.load(k, options)
         except OSError as error:
             unusable[k] = str(error)
-    _check_enough(fragments, unusable)
-
-
-def _check_enough(fragments: FragmentSet, unusable: dict[int, str]) -> None:
-    if unusable and len(fragments) - len(unusable) < 2:
-        raise IoError(f"fragments: fewer than two can be used: {next(iter(unusable.values()))}")
+    check_enough(fragments, unusable)
 
 
 def _refine(
@@ -319,4 +296,4 @@ def _refine(
         return _core.refine_map(context, graph, surfaces, options.prepare.voxel_size, tell)
 
 
-__all__ = ["reconstruct", "usable_fragments"]
+__all__ = ["reconstruct"]

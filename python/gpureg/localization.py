@@ -24,6 +24,7 @@ from ._core import (
     PrepareOptions,
     load_map,
 )
+from ._map import Map
 from .fragments import FragmentSet
 
 
@@ -54,9 +55,9 @@ def prepare_map(
         Each whatever `prepare` takes as points. Scans that know where they were seen from (by
         cameras.txt, by the viewpoints of a `PointCloud`, or at the origin of their frame) are best:
         what was seen through tells places apart that look alike.
-    poses : (N, 4, 4) array, optional
-        ``map_from_scan`` of each scan; those that are NaN, as of `reconstruct`, are left out. None:
-        clouds is one cloud in the frame of the map.
+    poses : Map or (N, 4, 4) array, optional
+        A `Map` of these scans: its largest island. Or ``map_from_scan`` of each scan, all in one
+        frame; those that are NaN are left out. None: clouds is one cloud in the frame of the map.
     options : MapOptions, optional
         Default: voxels of 5 cm. See `MapOptions.from_voxel_size`.
     context : Context, optional
@@ -69,7 +70,8 @@ def prepare_map(
     Raises
     ------
     ValueError
-        Naming the scan whose pose is no rigid motion; for a voxel size that does not fit.
+        Naming the scan whose pose is no rigid motion; for a voxel size that does not fit; for a
+        `Map` without an island.
 
     Examples
     --------
@@ -85,7 +87,7 @@ def prepare_map(
         cloud = core_cloud(clouds, None, None, None, options.prepare, "clouds")
         return _core.make_map(context, [cloud], None, options)
     scans = _set_of(clouds, "clouds")
-    matrices = float64(poses, "poses")
+    matrices = _largest_island(poses) if isinstance(poses, Map) else float64(poses, "poses")
     if matrices.shape != (len(scans), 4, 4):
         raise ValueError(
             f"poses: expected shape ({len(scans)}, 4, 4), one for each scan, got {np.shape(poses)}"
@@ -97,6 +99,14 @@ def prepare_map(
             yield _load(scans, options.prepare, "clouds", int(k))
 
     return _core.make_map(context, inputs(), matrices[placed], options)
+
+
+def _largest_island(map: Map) -> npt.NDArray[np.float64]:
+    if not map.islands:
+        raise ValueError("poses: the map has no island")
+    poses = map.poses
+    poses[[scan.island != 0 for scan in map.scans]] = np.nan
+    return poses
 
 
 def _vector(value: Any, name: str) -> npt.NDArray[np.float64]:

@@ -7,13 +7,15 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import partial
 from typing import Any
 
 from . import _core
 from ._arrays import CoreCloud, core_cloud, several
 from ._contexts import checked, context_of
-from ._core import Context, PreparedCloud, PrepareOptions
+from ._core import Context, IoError, PreparedCloud, PrepareOptions
 from ._progress import Progress, Report, batch_progress
+from .fragments import FragmentSet
 
 _TOGETHER = 32  # clouds per call where progress is shown: enough to fill a device
 _PIECE_SECONDS = 0.4  # on the CPU
@@ -215,3 +217,30 @@ def _prepare_together(
 ) -> list[PreparedCloud]:
     names = [f"fragments[{k}]" for k in inputs]
     return _core.prepare_batch(context, list(inputs.values()), options, names) if inputs else []
+
+
+def usable_fragments(
+    fragments: FragmentSet,
+    options: PrepareOptions,
+    context: Context,
+    progress: Progress,
+    unusable: dict[int, str],
+) -> list[PreparedCloud]:
+    """Prepared. unusable gets the positions of those that cannot be, and why; raises IoError where
+    fewer than two are left.
+    """
+    out: list[PreparedCloud] = []
+    device = context.backend == "cuda"
+    with batch_progress(progress, "preparing", len(fragments), unit="cloud") as report:
+        for piece in pieces(len(fragments), context):
+            loads = {k: partial(fragments.load, k, options, device) for k in piece}
+            out += [cloud for _, cloud in prepare_usable(context, loads, options, unusable)]
+            if report is not None:
+                report(len(out) + len(unusable))
+    check_enough(fragments, unusable)
+    return out
+
+
+def check_enough(fragments: FragmentSet, unusable: dict[int, str]) -> None:
+    if unusable and len(fragments) - len(unusable) < 2:
+        raise IoError(f"fragments: fewer than two can be used: {next(iter(unusable.values()))}")

@@ -9,6 +9,7 @@
 #include "api/pair_input.hpp"
 #include "api/prior.hpp"
 #include "common/host_threads.hpp"
+#include "common/stop_scope.hpp"
 
 namespace gpureg {
 
@@ -77,6 +78,7 @@ std::vector<RegistrationResult> Batch::run() {
   const bool overlap = engine_.leaves_host_idle();
   Chunk before;  // aligned, without results yet
   for (;;) {
+    StopScope::poll();
     Chunk now = next_chunk();
     if (now.size() == 0) break;
     const auto align = [&] { align_all(engine_, now.inputs, options_, now.outcomes); };

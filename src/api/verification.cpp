@@ -10,6 +10,7 @@
 #include "api/verify_by_surfaces.hpp"
 #include "common/in_halves.hpp"
 #include "common/rigid.hpp"
+#include "common/stop_scope.hpp"
 #include "confidence/calibrate_modes.hpp"
 
 namespace gpureg {
@@ -173,6 +174,7 @@ Verifications verify_pairs(const Context& context, const std::vector<PreparedClo
   const std::vector<PairVariant> variants = variants_of(clouds, pairs);
   const std::size_t chunk = engine.pairs_per_chunk(by_evidence);
   for (std::size_t begin = 0; begin < variants.size(); begin += chunk) {
+    StopScope::poll();
     const std::size_t end = std::min(variants.size(), begin + chunk);
     std::vector<PairInput> inputs;
     std::vector<VerifiedPair> verified;

@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "common/stop_scope.hpp"
 #include "loop_consistency/consistency_graph.hpp"
 #include "math/exponential.hpp"
 
@@ -75,7 +76,10 @@ std::vector<double> updated(const ConsistencyGraph& graph, ConsistencyEdge& edge
 void update_from_loops(ConsistencyGraph& graph) {
   std::vector<ConsistencyEdge>& edges = graph.edges();
   std::vector<std::vector<double>> next(edges.size());
-  for (std::size_t e = 0; e < edges.size(); ++e) next[e] = updated(graph, edges[e]);
+  for (std::size_t e = 0; e < edges.size(); ++e) {
+    StopScope::poll();
+    next[e] = updated(graph, edges[e]);
+  }
   for (std::size_t e = 0; e < edges.size(); ++e) edges[e].probability = std::move(next[e]);
 }
 

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <numeric>
 
+#include "common/stop_scope.hpp"
 #include "loop_consistency/consistency_graph.hpp"
 #include "math/exponential.hpp"
 
@@ -121,6 +122,7 @@ class SpanningForest {
 void update_from_paths(ConsistencyGraph& graph) {
   const SpanningForest forest(graph);
   for (std::size_t k = 0; k < graph.edges().size(); ++k) {
+    StopScope::poll();
     if (forest.holds(k)) continue;
     ConsistencyEdge& edge = graph.edges()[k];
     const SpanningForest::Path path = forest.between(edge.first, edge.second);

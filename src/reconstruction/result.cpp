@@ -82,6 +82,30 @@ std::size_t Reconstruction::placed() const {
       std::count_if(scans.begin(), scans.end(), [](const Scan& scan) { return scan.placed; }));
 }
 
+Reconstruction map_of_poses(const std::vector<UnalignedIsometry3d>& island_from_scan,
+                            const std::vector<std::uint32_t>& islands) {
+  if (!islands.empty() && islands.size() != island_from_scan.size())
+    throw InvalidArgument("islands has " + std::to_string(islands.size()) +
+                          " entries, expected none or one per scan, " +
+                          std::to_string(island_from_scan.size()));
+  Reconstruction map;
+  map.scans.resize(island_from_scan.size());
+  for (std::uint32_t k = 0; k < map.scans.size(); ++k) {
+    if (!island_from_scan[k].matrix().allFinite()) continue;
+    Scan& scan = map.scans[k];
+    scan.placed = true;
+    scan.reason = ScanReason::none;
+    scan.island = islands.empty() ? 0 : islands[k];
+    scan.island_from_scan = island_from_scan[k];
+    if (scan.island >= map.scans.size())
+      throw InvalidArgument("islands[" + std::to_string(k) + "] is " + std::to_string(scan.island) +
+                            " of " + std::to_string(map.scans.size()) + " scans");
+    if (scan.island >= map.islands.size()) map.islands.resize(scan.island + 1);
+    map.islands[scan.island].scans.push_back(k);
+  }
+  return map;
+}
+
 CorrespondenceMoments moments_of_information(const Eigen::Matrix<double, 6, 6>& redwood) {
   CorrespondenceMoments moments;
   moments.count = static_cast<std::uint64_t>(std::max(0.0, std::round(redwood(0, 0))));

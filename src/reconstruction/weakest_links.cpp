@@ -4,6 +4,7 @@
 #include <iterator>
 #include <numeric>
 
+#include "common/stop_scope.hpp"
 #include "gpureg/reconstruction.hpp"
 #include "math/exponential.hpp"
 #include "reconstruction/connections.hpp"
@@ -89,6 +90,7 @@ std::vector<Link> weakest_links(const Reconstruction& map) {
     walk(island.scans.front(), tree, order);
     for (const std::uint32_t top : island.scans) {
       if (top == island.scans.front()) continue;
+      StopScope::poll();
       const auto below = [&](std::uint32_t scan) {
         return order.begin[scan] >= order.begin[top] && order.begin[scan] < order.end[top];
       };

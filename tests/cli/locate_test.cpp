@@ -62,10 +62,16 @@ TEST_F(Locate, FoundInScansWithPosesAndInTheSavedMapAndStrangersAreNot) {
 TEST_F(Locate, TheLargestIslandOfAReconstructionIsTheMap) {
   const std::string name = std::filesystem::path(folder.path()).filename().string();
   const TemporaryFolder map;
-  map.write("poses.txt", content_of(folder / "poses.txt"));
   const auto document = [&](const std::string& scans) {
-    map.write("reconstruction.json",
-              R"({"format_version":1,"folder":")" + scans + R"(","islands":[[0,1,2],[3]]})");
+    nlohmann::json json = {{"format_version", 1}, {"folder", scans}, {"islands", {{0, 1, 2}, {3}}}};
+    for (int k = 0; k < 4; ++k) {
+      const Eigen::Matrix4d columns = scan_from_room(k).inverse().matrix().transpose();
+      json["scans"].push_back(
+          {{"id", k},
+           {"island", k / 3},
+           {"island_from_scan", std::vector<double>(columns.data(), columns.data() + 16)}});
+    }
+    map.write("reconstruction.json", json.dump());
   };
   document(folder.path());
   const Outcome found = locate({scan, map.path()}, {"--voxel-size", "0.1"});

@@ -246,6 +246,64 @@ TEST_F(ReconstructCommand, AFullDiskIsNamedAndTheJournalStays) {
   expect_same_map("whole", "map");
 }
 
+TEST_F(ReconstructCommand, AnEarlierMapLeavesNothing) {
+  write_scans(scans_, kScans, false);
+  write_scans_of_another_room(scans_, kScans, 4);
+  ASSERT_EQ(run(reconstruct("map", {"--no-refine"})).status, 0);
+  const std::vector<std::string> further = {"poses_1.txt", "trajectory_1.txt", "graph_1.g2o",
+                                            "map_1.ply"};
+  for (const std::string& name : further) EXPECT_TRUE(std::filesystem::exists(file("map", name)));
+  expect_refused(reconstruct("map", {"--odometry", file("map", "poses_1.txt")}),
+                 {"--odometry", "poses_1.txt"});
+  for (int k = 0; k < 4; ++k)
+    std::filesystem::remove(scans_ / ("cloud_bin_" + std::to_string(kScans + k) + ".ply"));
+  for (const char* name : {".gpureg-1-0.tmp", "map_1.txt", "map_01.ply"})
+    std::ofstream(file("map", name)) << "x";
+  ASSERT_EQ(run(reconstruct("map", {"--no-map"})).status, 0);
+  for (const std::string& name : further) EXPECT_FALSE(std::filesystem::exists(file("map", name)));
+  for (const char* name : {"map.ply", "map.html", ".gpureg-1-0.tmp"})
+    EXPECT_FALSE(std::filesystem::exists(file("map", name))) << name;
+  for (const char* name : {"map_1.txt", "map_01.ply", "poses.txt", "reconstruction.json"})
+    EXPECT_TRUE(std::filesystem::exists(file("map", name))) << name;
+  // The pairs of the map make another one in their folder; others would leave these beside it.
+  std::filesystem::copy_file(file("map", "pairs.json"), out_ / "others.json");
+  expect_refused(reconstruct("map", {"--results", out_ / "others.json"}),
+                 {"pairs of another map", file("map", "pairs.json")});
+  ASSERT_EQ(run(reconstruct("map", {"--results", file("map", "pairs.json")})).status, 0);
+  EXPECT_TRUE(std::filesystem::exists(file("map", "pairs.json")));
+}
+
+TEST_F(ReconstructCommand, WhatIsNotFinishedIsNoMap) {
+  write_scans(scans_, kScans, false);
+  ASSERT_EQ(run(reconstruct("map", {"--no-refine"})).status, 0);
+  Surroundings around;
+  around.file_bytes = 200'000;  // enough for the poses, too little for the map's points
+  const std::vector<std::string> finer = {"--map-voxel-size", "0.01"};
+  EXPECT_EQ(Command(reconstruct("map", finer), around).wait().status, 2);
+  EXPECT_TRUE(std::filesystem::exists(file("map", "poses.txt")));
+  EXPECT_FALSE(std::filesystem::exists(file("map", "reconstruction.json")));
+  expect_refused({"audit", scans_.path(), out_ / "map"}, {"reconstruction.json"});
+  expect_refused({"locate", scans_ / "cloud_bin_0.ply", out_ / "map"}, {"reconstruction.json"});
+  ASSERT_EQ(run(reconstruct("map", joined(finer, {"--resume"}))).status, 0);
+  EXPECT_TRUE(std::filesystem::exists(file("map", "reconstruction.json")));
+}
+
+// After the pairs, the map is made and audited.
+TEST_F(ReconstructCommand, CtrlCEndsTheAudit) {
+  constexpr int kMore = 12;
+  write_scans(scans_, kMore, false);
+  Command command(reconstruct("map", {"--threads", "1"}));
+  while (command.running() && !std::filesystem::exists(file("map", "pairs.json")))
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  command.send(SIGINT);
+  const Outcome outcome = command.wait();
+  EXPECT_EQ(outcome.status, 130);
+  expect_holds(outcome.err, {"interrupted", "66 of 66", "--resume"});
+  for (const char* name : {"poses.txt", "map.ply", "reconstruction.json"})
+    EXPECT_FALSE(std::filesystem::exists(file("map", name))) << name;
+  ASSERT_EQ(run(reconstruct("map", {"--resume"})).status, 0);
+}
+
 TEST_F(ReconstructCommand, RefusesFoldersThatCannotWork) {
   expect_refused(reconstruct("map"), {"no fragments"});
   write_scans(scans_, 1, false);

@@ -11,21 +11,22 @@ std::vector<std::string> joined(std::vector<std::string> a, const std::vector<st
   return a;
 }
 
-Eigen::Isometry3d scan_from_room(int number) {
+Eigen::Isometry3d scan_from_room(int number, const Eigen::Vector3f& size) {
   std::mt19937 random(static_cast<unsigned>(7 + number));
   Eigen::Isometry3d pose = random_pose(random, 0);  // the sensor is where it stands: at the origin
-  pose.translation() = -(pose.linear() * kRoomSensor.cast<double>());
+  pose.translation() = -(pose.linear() * kRoomSensor.cwiseProduct(size).cast<double>());
   return pose;
 }
 
-PointCloud room_scan(int number) {
+PointCloud room_scan(int number, const Eigen::Vector3f& size) {
   std::mt19937 random(static_cast<unsigned>(100 + number));
   const std::vector<Eigen::Vector3f> room = scan_room(random);
   const float missing = 0.4f * static_cast<float>(number % 7);
   PointCloud cloud;
   for (std::size_t k = 0; k < room.size(); k += 6)
-    if (room[k].x() < missing || room[k].x() > missing + 0.3f) cloud.points.push_back(room[k]);
-  cloud.points = moved(scan_from_room(number), std::move(cloud.points));
+    if (room[k].x() < missing || room[k].x() > missing + 0.3f)
+      cloud.points.push_back(room[k].cwiseProduct(size));
+  cloud.points = moved(scan_from_room(number, size), std::move(cloud.points));
   return cloud;
 }
 
@@ -60,6 +61,12 @@ void write_scans(const TemporaryFolder& folder, int scans, bool with_hopeless_on
   PointCloud two;
   two.points = {{0, 0, 1}, {0.5f, 0, 1}};
   write(two);
+}
+
+void write_scans_of_another_room(const TemporaryFolder& folder, int first, int count) {
+  for (int k = first; k < first + count; ++k)
+    write_cloud(folder, "cloud_bin_" + std::to_string(k) + ".ply",
+                room_scan(k, Eigen::Vector3f(1.6f, 0.7f, 1.3f)));
 }
 
 std::string write_cloud(const TemporaryFolder& folder, const std::string& name,

@@ -21,10 +21,14 @@ std::vector<std::string> joined(std::vector<std::string> a, const std::vector<st
 
 /// A scan of the room of support/scan.hpp, seen from the origin of its own frame; same number, same
 /// bytes. Different numbers share no point, and each misses another slice of the room.
-PointCloud room_scan(int number);
+/// @param size of the room, as factors: another one is another room.
+PointCloud room_scan(int number, const Eigen::Vector3f& size = Eigen::Vector3f::Ones());
 
 /// Where room_scan(number) has its frame in the room.
-Eigen::Isometry3d scan_from_room(int number);
+Eigen::Isometry3d scan_from_room(int number, const Eigen::Vector3f& size = Eigen::Vector3f::Ones());
+
+/// Scans first, ... of another room.
+void write_scans_of_another_room(const TemporaryFolder& folder, int first, int count);
 
 /// Thin sticks in all directions: a wall or a floor finds next to nothing to lie on.
 PointCloud sticks();

@@ -4,6 +4,7 @@
 
 #include <set>
 
+#include "fields/audit.hpp"
 #include "fields/evidence.hpp"
 #include "fields/localization.hpp"
 #include "fields/loop_closure.hpp"
@@ -94,6 +95,7 @@ TEST(Fields, EveryMemberIsDescribed) {
   expect_complete<reconstruction::EdgeNoiseOptions>();
   expect_complete<reconstruction::Options>();
   expect_complete<reconstruction::RefineOptions>(1);  // should_stop
+  expect_complete<reconstruction::AuditOptions>(1);   // should_stop
   expect_complete<loop_closure::ProposalOptions>();
   expect_complete<loop_closure::AcceptanceOptions>();
   expect_complete<loop_closure::Options>();

@@ -4,6 +4,7 @@
 #include "fuzz/targets.hpp"
 #include "inputs/initial_poses.hpp"
 #include "inputs/map_poses.hpp"
+#include "inputs/saved_map.hpp"
 #include "io/run_reader.hpp"
 #include "json/json_file.hpp"
 #include "records/journal.hpp"
@@ -81,9 +82,9 @@ void read_poses(std::string_view bytes) {
   read(bytes, [](const std::string& path) {
     const std::vector<int> numbers{0, 1, 2, 3, 5};
     std::size_t known = 0;
-    for (const UnalignedIsometry3d& pose : cli::read_map_poses(path, numbers, "scans")) {
-      const Eigen::Matrix3d r = pose.linear();
-      if (!pose.matrix().allFinite()) continue;
+    for (const auto& scan : cli::read_pose_file(path, numbers, "scans").scans) {
+      const Eigen::Matrix3d r = scan.island_from_scan.linear();
+      if (!scan.placed) continue;
       ++known;
       if (!((r * r.transpose() - Eigen::Matrix3d::Identity()).norm() < 0.1))
         broken("a pose is a rigid motion");
@@ -92,14 +93,25 @@ void read_poses(std::string_view bytes) {
   });
 }
 
+/// reconstruction.json: every scan of an island has a rigid pose.
+void read_reconstruction(std::string_view bytes) {
+  read(bytes, [](const std::string& path) {
+    const cli::SavedMap map = cli::read_saved_map(path);
+    for (const std::vector<int>& island : map.islands)
+      for (const int number : island) {
+        const Eigen::Matrix3d r = map.poses.at(number).linear();
+        if (!((r * r.transpose() - Eigen::Matrix3d::Identity()).norm() < 0.1))
+          broken("a pose is a rigid motion");
+      }
+  });
+}
+
 }  // namespace
 
 std::vector<Target> command_targets() {
-  return {{"document", read_document},
-          {"result", read_result},
-          {"journal", read_journal},
-          {"initial_poses", read_initial_poses},
-          {"poses", read_poses}};
+  return {{"document", read_document}, {"result", read_result},
+          {"journal", read_journal},   {"initial_poses", read_initial_poses},
+          {"poses", read_poses},       {"reconstruction", read_reconstruction}};
 }
 
 }  // namespace gpureg::fuzz

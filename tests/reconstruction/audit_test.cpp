@@ -9,6 +9,7 @@
 
 #include "gpureg/error.hpp"
 #include "gpureg/reconstruction.hpp"
+#include "gpureg/reconstruction/mend.hpp"
 #include "reconstruction/audit/blame.hpp"
 #include "reconstruction/audit/edge_confidence.hpp"
 #include "reconstruction/audit/near_pairs.hpp"
@@ -114,9 +115,9 @@ TEST(Connections, ManyEdgesOutweighFewContradictions) {
     return judged(40, pairs, bonds);
   };
   const Audit few = audit_with(3);
-  EXPECT_TRUE(few.sound());
+  EXPECT_NE(few.verdict(), AuditVerdict::contradicted);
   EXPECT_LT(few.connections[0].confidence, 0.2) << "edges do not confirm themselves";
-  EXPECT_FALSE(audit_with(20).sound());
+  EXPECT_EQ(audit_with(20).verdict(), AuditVerdict::contradicted);
 }
 
 // A corner of scan 0 is bent: it contradicts six scans a little, and fits the fourteen that it was
@@ -130,7 +131,7 @@ TEST(Connections, ABentCornerIsNoWrongPlace) {
     pairs.push_back(pair_of(k, 0, k <= 14 ? 0.7 : -1));
     if (k <= 14) bonds.push_back({k, 0, 0.99});
   }
-  EXPECT_TRUE(judged(21, pairs, bonds).sound());
+  EXPECT_NE(judged(21, pairs, bonds).verdict(), AuditVerdict::contradicted);
 }
 
 // Each pair is within the margin of the audit, but all across one place ask for the same motion.
@@ -161,7 +162,7 @@ TEST(Connections, ACommonShiftContradicts) {
   ASSERT_EQ(slipped.connections[0].verdict, ConnectionVerdict::contradicted);
   EXPECT_EQ(slipped.connections[0].size, kScans - kSlip);
   EXPECT_NE(slipped.connections[1].verdict, ConnectionVerdict::contradicted);
-  EXPECT_TRUE(judged_with(0.01, 0.03).sound());
+  EXPECT_NE(judged_with(0.01, 0.03).verdict(), AuditVerdict::contradicted);
 }
 
 // A list of its scans for each connection would be 2.5 billion numbers.
@@ -183,9 +184,9 @@ TEST(Connections, AHundredThousandScansOfACorridor) {
 // meet at its end: most pairs are across most connections.
 TEST(Connections, StrandsThatMeetFarAwayTakeBoundedTime) {
   constexpr std::uint32_t kScans = 8000;
-  EXPECT_TRUE(judged(kScans, path_of(kScans, kScans)).sound());
+  EXPECT_NE(judged(kScans, path_of(kScans, kScans)).verdict(), AuditVerdict::contradicted);
   const Audit audit = judged(kScans, path_of(kScans, 3000));
-  EXPECT_FALSE(audit.sound());
+  EXPECT_EQ(audit.verdict(), AuditVerdict::contradicted);
   const std::vector<std::uint32_t> part = audit.scans_of(audit.connections[0]);
   EXPECT_TRUE(part.front() >= 2998 || part.back() <= 3001) << "beside the slip";
 }
@@ -271,19 +272,96 @@ TEST(MapConfidence, TheMarginGrowsWithTheDistanceOfTheScans) {
   }
 }
 
+/// The connections of two islands: so many of each verdict.
+Audit with_connections(std::vector<std::pair<std::uint32_t, ConnectionVerdict>> given) {
+  Audit audit;
+  audit.islands = {{{0, 1, 2, 3}}, {{4, 5, 6}}};
+  for (const auto& [island, verdict] : given) {
+    audit.connections.emplace_back();
+    audit.connections.back().island = island;
+    audit.connections.back().verdict = verdict;
+  }
+  return audit;
+}
+
+TEST(AuditVerdicts, OnlyWhatIsConfirmedIsSound) {
+  constexpr auto confirmed = ConnectionVerdict::confirmed, undecided = ConnectionVerdict::undecided,
+                 contradicted = ConnectionVerdict::contradicted;
+  const auto verdict_of = [](const Audit& audit) {
+    return std::string(to_string(audit.verdict()));
+  };
+  Audit audit = with_connections(
+      {{0, undecided}, {0, confirmed}, {0, confirmed}, {1, confirmed}, {1, confirmed}});
+  EXPECT_EQ(verdict_of(audit), "sound");
+  audit.connections.back().verdict = undecided;
+  EXPECT_EQ(verdict_of(audit), "undecided") << "as many are undecided as confirmed";
+  EXPECT_EQ(audit.verdicts(),
+            (std::vector<AuditVerdict>{AuditVerdict::sound, AuditVerdict::undecided}));
+  audit.connections.back().verdict = contradicted;
+  EXPECT_EQ(verdict_of(audit), "contradicted");
+  EXPECT_EQ(audit.verdicts()[0], AuditVerdict::sound);
+  audit = with_connections({{0, confirmed}, {0, confirmed}, {0, confirmed}});
+  audit.islands[1].scans = {4};
+  EXPECT_EQ(verdict_of(audit), "sound") << "a scan alone has no connection";
+  audit.islands.clear();
+  audit.connections.clear();
+  EXPECT_EQ(verdict_of(audit), "undecided");
+}
+
 TEST_F(AuditedRoom, ARightMapIsSound) {
   const Audit result = audited(world_from_scan);
   EXPECT_EQ(result.pairs.size(), 15u);
-  EXPECT_TRUE(result.sound());
+  EXPECT_EQ(result.verdict(), AuditVerdict::sound);
   for (const AuditedPair& pair : result.pairs) EXPECT_EQ(pair.verdict, PairVerdict::supports);
   for (const AuditedConnection& connection : result.connections)
     EXPECT_EQ(connection.verdict, ConnectionVerdict::confirmed);
 }
 
+// Every island has a frame of its own. In one frame, their scans would lie in each other.
+TEST_F(AuditedRoom, IslandsAreMapsOfTheirOwn) {
+  std::vector<UnalignedIsometry3d> poses = world_from_scan;
+  for (const std::size_t k : {3, 4, 5}) poses[k].translation() += Eigen::Vector3d(0.4, 0.3, 0.1);
+  EXPECT_EQ(audited(poses).verdict(), AuditVerdict::contradicted);
+  const Reconstruction map = map_of_poses(poses, {0, 0, 0, 1, 1, 1});
+  const Audit result = audit(context, clouds, map, options, AuditOptions::from_voxel_size(0.1f));
+  EXPECT_EQ(result.verdict(), AuditVerdict::sound);
+  EXPECT_EQ(result.pairs.size(), 6u);
+  ASSERT_EQ(result.islands.size(), 2u);
+  EXPECT_EQ(result.islands[1].scans, (std::vector<std::uint32_t>{3, 4, 5}));
+  EXPECT_THROW(map_of_poses(poses, {0, 0}), InvalidArgument);
+  EXPECT_THROW(map_of_poses(poses, {0, 0, 0, 1, 1, 6}), InvalidArgument);
+}
+
+TEST_F(AuditedRoom, IsEndedByItsCaller) {
+  const Audit found = audited(with_slip(3, 0.6));
+  AuditOptions stopped = AuditOptions::from_voxel_size(0.1f);
+  int asked = 0;
+  stopped.should_stop = [&] { return ++asked == 2; };
+  EXPECT_THROW(mend(context, clouds, with_slip(3, 0.6), found, options, stopped), Cancelled);
+  EXPECT_EQ(asked, 2);
+  // Of so many pairs an audit takes seconds.
+  std::vector<PreparedCloud> many;
+  std::vector<UnalignedIsometry3d> poses;
+  for (std::size_t k = 0; k < 300; ++k) {
+    many.push_back(clouds[k % 6]);
+    poses.push_back(world_from_scan[k % 6]);
+  }
+  asked = 0;
+  EXPECT_THROW(audit(context, many, poses, options, stopped), Cancelled);
+  std::vector<Pair> pairs;
+  std::vector<RegistrationResult> results;
+  for (std::uint32_t k = 0; k + 1 < many.size(); ++k) {
+    pairs.push_back({k + 1, k});
+    results.push_back(result_of(UnalignedIsometry3d(poses[k].inverse() * poses[k + 1]), 0.98));
+  }
+  asked = 0;
+  EXPECT_THROW(reconstruct(context, many, pairs, results, {}, {}, options, stopped), Cancelled);
+}
+
 TEST_F(AuditedRoom, AScanAtAWrongPlaceIsNamed) {
   for (const double metres : {0.3, 0.5, 1.0}) {
     const Audit result = audited(with_slip(3, metres));
-    EXPECT_FALSE(result.sound()) << metres;
+    EXPECT_EQ(result.verdict(), AuditVerdict::contradicted) << metres;
     ASSERT_FALSE(result.connections.empty());
     EXPECT_EQ(result.scans_of(result.connections[0]), std::vector<std::uint32_t>{3}) << metres;
     for (const std::size_t k : result.connections[0].contradictions)
@@ -311,7 +389,7 @@ TEST_F(AuditedRoom, ScansWithoutAPoseAreLeftOut) {
   poses[4] = no_pose();
   const Audit result = audited(poses);
   EXPECT_EQ(result.pairs.size(), 10u);
-  EXPECT_TRUE(result.sound());
+  EXPECT_EQ(result.verdict(), AuditVerdict::sound);
 }
 
 TEST_F(AuditedRoom, BadPosesAreNamed) {
@@ -359,7 +437,8 @@ TEST_F(AuditedRoom, AScaledMapIsNotConfirmed) {
     for (UnalignedIsometry3d& pose : poses) pose.translation() *= scale;
     const Audit result = audited(poses);
     EXPECT_EQ(result.count(ConnectionVerdict::confirmed), 0u) << scale;
-    if (scale == 0.9 || scale == 1.1) EXPECT_FALSE(result.sound()) << scale;
+    if (scale == 0.9 || scale == 1.1)
+      EXPECT_EQ(result.verdict(), AuditVerdict::contradicted) << scale;
   }
 }
 
@@ -407,7 +486,7 @@ TEST_F(AuditedRoom, EdgesOfAContradictedConnectionAreTakenOut) {
                                                 AuditOptions::from_voxel_size(0.1f));
   ASSERT_EQ(out.map.islands.size(), 2u);
   EXPECT_EQ(out.map.islands[1].scans, (std::vector<std::uint32_t>{4, 5}));
-  EXPECT_TRUE(out.audit.sound());
+  EXPECT_EQ(out.audit.verdict(), AuditVerdict::sound);
   ASSERT_EQ(out.map.edges.size(), pairs.size());
   for (const Edge& edge : out.map.edges) {
     EXPECT_EQ(edge.accepted, (edge.source < 4) == (edge.target < 4));

@@ -3,15 +3,12 @@
 
 #include <filesystem>
 #include <iostream>
-#include <set>
 
 #include "gpureg/error.hpp"
 #include "inputs/cloud_file.hpp"
 #include "inputs/odometry_file.hpp"
+#include "inputs/saved_map.hpp"
 #include "inputs/scene.hpp"
-#include "json/json.hpp"
-#include "json/json_fields.hpp"
-#include "json/json_file.hpp"
 #include "run/progress.hpp"
 
 namespace gpureg::cli {
@@ -21,70 +18,54 @@ namespace fs = std::filesystem;
 using localization::MapBuilder;
 using localization::PreparedMap;
 
-/// Scans and the file of their poses.
+/// Scans of one frame.
 struct PosedScans {
-  std::string folder, poses;
-  std::optional<std::set<int>> numbers;  ///< those of the largest island; none: all
+  FragmentFolder folder;
+  std::vector<UnalignedIsometry3d> poses;  ///< no_pose(): of another frame, or not known
 };
 
-/// The folder of the scans that a reconstruction names.
-std::string scans_of(const Json& json, const std::string& file) {
-  std::string named;
-  try {
-    named = text_member(json, "folder");
-  } catch (const std::exception& error) {
-    throw IoError(file + ": " + error.what());
-  }
-  if (fs::is_directory(named)) return named;
-  // It was named from where `reconstruct` ran.
-  const fs::path output = fs::absolute(file).parent_path();
-  const fs::path beside = output.parent_path() / fs::path(named).filename();
-  if (!fs::is_directory(beside))
-    throw IoError(file + " names the scans of " + named + ", which is not there");
-  return beside.string();
-}
-
+/// The largest island.
 PosedScans of_reconstruction(const std::string& path, const std::string& file) {
-  PosedScans out;
-  const Json json = DocumentFile(file).read();
-  out.folder = scans_of(json, file);
-  std::size_t count = 0;
-  try {
-    out.numbers.emplace();
-    const Json& islands = member(json, "islands");
-    if (islands.empty()) throw InvalidArgument("no scan was placed");
-    for (const Json& number : islands.front()) out.numbers->insert(number.get<int>());
-    count = islands.size();
-  } catch (const std::exception& error) {
-    throw IoError(file + ": " + error.what());
-  }
-  if (count > 1)
-    std::cerr << "gpureg: note: " << path << " has " << count
+  const SavedMap map = read_saved_map(file);
+  if (!fs::is_directory(map.scans))
+    throw IoError(file + " names the scans of " + map.scans + ", which is not there");
+  if (map.islands.size() > 1)
+    std::cerr << "gpureg: note: " << path << " has " << map.islands.size()
               << " islands, the map is the largest one" << std::endl;
-  out.poses = (fs::path(path) / "poses.txt").string();
+  PosedScans out{FragmentFolder(map.scans, false), {}};
+  out.poses.assign(out.folder.numbers.size(), no_pose());
+  for (const int number : map.islands.front())
+    if (out.folder.has(number)) out.poses[out.folder.index_of(number)] = map.poses.at(number);
   return out;
 }
 
 PosedScans posed_scans(const std::string& path) {
-  const std::string reconstruction = (fs::path(path) / "reconstruction.json").string();
-  if (fs::exists(reconstruction)) return of_reconstruction(path, reconstruction);
-  for (const char* name : {"poses.txt", "trajectory.txt"})
-    if (const fs::path file = fs::path(path) / name; fs::exists(file))
-      return {path, file.string(), std::nullopt};
-  throw IoError(path + " has neither poses.txt nor trajectory.txt with the poses of its scans");
+  if (const std::string file = saved_map_file(path); !file.empty())
+    return of_reconstruction(path, file);
+  for (const char* name : {"poses.txt", "trajectory.txt"}) {
+    const fs::path file = fs::path(path) / name;
+    if (!fs::exists(file)) continue;
+    PosedScans out;
+    try {
+      out.folder = FragmentFolder(path, false);
+    } catch (const IoError& error) {
+      throw IoError(std::string(error.what()) + "; nor a reconstruction.json" + kWrittenLast);
+    }
+    out.poses = read_scan_poses(file.string(), out.folder.numbers, path);
+    return out;
+  }
+  throw IoError(path +
+                " has neither poses.txt nor trajectory.txt with the poses of its scans, nor " +
+                "a reconstruction.json" + kWrittenLast);
 }
 
 PreparedMap map_of_scans(const Context& context, const std::string& path,
                          const localization::MapOptions& options) {
-  const PosedScans scans = posed_scans(path);
-  const FragmentFolder folder(scans.folder, false);
-  const std::vector<UnalignedIsometry3d> poses =
-      read_scan_poses(scans.poses, folder.numbers, scans.folder);
+  const auto [folder, poses] = posed_scans(path);
   MapBuilder builder(options);
   Progress progress("mapping", "scans", folder.numbers.size(), false);
   for (std::size_t k = 0; k < folder.numbers.size(); ++k) {
     if (!poses[k].matrix().allFinite()) continue;
-    if (scans.numbers && scans.numbers->count(folder.numbers[k]) == 0) continue;
     const PointCloud cloud =
         folder.read(k, mesh_spacing(options.prepare.voxel_size), MeshNote::none);
     try {
@@ -99,9 +80,7 @@ PreparedMap map_of_scans(const Context& context, const std::string& path,
 
 }  // namespace
 
-std::string scans_of_reconstruction(const std::string& file) {
-  return scans_of(DocumentFile(file).read(), file);
-}
+std::string scans_of_reconstruction(const std::string& file) { return read_saved_map(file).scans; }
 
 MapInput::MapInput(std::string of) : path(std::move(of)) {
   if (fs::is_directory(path)) {

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "inputs/map_poses.hpp"
 
-#include <algorithm>
 #include <fstream>
 #include <map>
 #include <sstream>
@@ -14,8 +13,6 @@
 
 namespace gpureg::cli {
 namespace {
-
-using Poses = std::map<std::int64_t, UnalignedIsometry3d>;
 
 /// Fields of the first line with content.
 std::vector<std::string> first_line(const std::string& path) {
@@ -30,57 +27,81 @@ std::vector<std::string> first_line(const std::string& path) {
   throw IoError(path + ": holds no pose");
 }
 
-Poses of_graph(const std::string& path) {
-  Poses poses;
+PosesByNumber of_graph(const std::string& path) {
+  PosesByNumber poses;
   for (const pose_graph::Node& node : pose_graph::read_g2o(path).nodes)
     if (node.world_from_node) poses[node.id] = *node.world_from_node;
   return poses;
 }
 
-/// Entries i i are poses of scans, as Choi et al. write trajectories; others are pairs.
-Poses of_log(const std::string& path) {
+/// Entries i i are poses of scans, as Choi et al. write trajectories; others are pairs: scans that
+/// they connect are an island.
+PosesByNumber of_log(const std::string& path, std::map<std::int64_t, std::uint32_t>& island) {
   const std::vector<evaluation::LogEntry> log = evaluation::read_log(path);
-  Poses poses;
+  PosesByNumber poses;
   for (const evaluation::LogEntry& entry : log)
     if (entry.i == entry.j) poses[entry.i].matrix() = entry.transform;
-  if (!poses.empty() || log.empty()) return poses;
+  if (!poses.empty()) return poses;
   std::map<std::int64_t, std::vector<const evaluation::LogEntry*>> entries_of;
   for (const evaluation::LogEntry& entry : log)
     for (const std::int64_t scan : {entry.i, entry.j}) entries_of[scan].push_back(&entry);
-  poses[log.front().i] = UnalignedIsometry3d::Identity();
-  for (std::vector<std::int64_t> waiting = {log.front().i}, next; !waiting.empty();
-       waiting = std::exchange(next, {}))
-    for (const std::int64_t scan : waiting)
-      for (const evaluation::LogEntry* entry : entries_of[scan]) {
-        UnalignedIsometry3d i_from_j;
-        i_from_j.matrix() = entry->transform;
-        const std::int64_t other = entry->i == scan ? entry->j : entry->i;
-        if (poses.count(other)) continue;
-        poses[other] = poses[scan] * (entry->i == scan ? i_from_j : i_from_j.inverse());
-        next.push_back(other);
+  std::uint32_t islands = 0;
+  for (const evaluation::LogEntry& first : log) {
+    if (poses.count(first.i)) continue;
+    poses[first.i] = UnalignedIsometry3d::Identity();
+    for (std::vector<std::int64_t> waiting = {first.i}, next; !waiting.empty();
+         waiting = std::exchange(next, {}))
+      for (const std::int64_t scan : waiting) {
+        island[scan] = islands;
+        for (const evaluation::LogEntry* entry : entries_of[scan]) {
+          UnalignedIsometry3d i_from_j;
+          i_from_j.matrix() = entry->transform;
+          const std::int64_t other = entry->i == scan ? entry->j : entry->i;
+          if (poses.count(other)) continue;
+          poses[other] = poses[scan] * (entry->i == scan ? i_from_j : i_from_j.inverse());
+          next.push_back(other);
+        }
       }
+    ++islands;
+  }
   return poses;
 }
 
 }  // namespace
 
-std::vector<UnalignedIsometry3d> read_map_poses(const std::string& path,
-                                                const std::vector<int>& numbers,
-                                                const std::string& folder) {
+reconstruction::Reconstruction map_of(const PosesByNumber& poses,
+                                      const std::map<std::int64_t, std::uint32_t>& island,
+                                      const std::vector<int>& numbers, const std::string& path,
+                                      const std::string& folder) {
+  std::vector<UnalignedIsometry3d> known(numbers.size(), no_pose());
+  std::vector<std::uint32_t> islands(numbers.size(), 0);
+  std::map<std::uint32_t, std::uint32_t> counted;  // those without a fragment here do not count
+  std::size_t count = 0;
+  for (std::size_t k = 0; k < numbers.size(); ++k) {
+    const auto pose = poses.find(numbers[k]);
+    if (pose == poses.end()) continue;
+    known[k] = pose->second;
+    ++count;
+    const auto at = island.find(numbers[k]);
+    if (at != island.end())
+      islands[k] =
+          counted.insert({at->second, static_cast<std::uint32_t>(counted.size())}).first->second;
+  }
+  if (count < 2) throw IoError(path + ": holds no poses of two fragments of " + folder);
+  return reconstruction::map_of_poses(known, islands);
+}
+
+reconstruction::Reconstruction read_pose_file(const std::string& path,
+                                              const std::vector<int>& numbers,
+                                              const std::string& folder) {
   const std::vector<std::string> first = first_line(path);
   const std::string& tag = first.front();
   const bool graph = tag.rfind("VERTEX", 0) == 0 || tag.rfind("EDGE", 0) == 0 || tag == "FIX";
-  if (!graph && first.size() != 3) return read_scan_poses(path, numbers, folder);
-  const Poses poses = graph ? of_graph(path) : of_log(path);
-  std::vector<UnalignedIsometry3d> out(numbers.size(), no_pose());
-  std::size_t known = 0;
-  for (std::size_t k = 0; k < numbers.size(); ++k)
-    if (const auto at = poses.find(numbers[k]); at != poses.end()) {
-      out[k] = at->second;
-      ++known;
-    }
-  if (known < 2) throw IoError(path + ": holds no poses of two fragments of " + folder);
-  return out;
+  if (!graph && first.size() != 3)
+    return reconstruction::map_of_poses(read_scan_poses(path, numbers, folder));
+  std::map<std::int64_t, std::uint32_t> island;
+  const PosesByNumber poses = graph ? of_graph(path) : of_log(path, island);
+  return map_of(poses, island, numbers, path, folder);
 }
 
 }  // namespace gpureg::cli

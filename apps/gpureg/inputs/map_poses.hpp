@@ -1,24 +1,35 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <cstdint>
+#include <map>
 #include <string>
 #include <vector>
 
-#include "gpureg/result.hpp"
+#include "gpureg/reconstruction/map.hpp"
 
 namespace gpureg::cli {
 
-/// Poses of a map from a file of any program: poses.txt, TUM with numbers of fragments as times,
+using PosesByNumber = std::map<std::int64_t, UnalignedIsometry3d>;
+
+/// A map of any program, from a file of poses: poses.txt, TUM with numbers of fragments as times,
 /// KITTI (a line for each fragment from 0), g2o, or a Redwood log: of scans (i i n) or of pairs,
 /// which are put one behind the other.
 /// @param numbers of the fragments, ascending.
 /// @param folder for messages.
-/// @return world_from_scan of each fragment; no_pose() of those that the file lacks.
+/// @return one scan for each fragment, without a place where its pose is not known, and the
+///   islands: of a log of pairs the scans that it connects; else one.
 /// @throws IoError naming the file: not there, not readable, a pose that is not finite or not
-/// rigid,
-///   fewer than two poses of fragments.
-std::vector<UnalignedIsometry3d> read_map_poses(const std::string& path,
-                                                const std::vector<int>& numbers,
-                                                const std::string& folder);
+///   rigid, fewer than two poses of fragments.
+reconstruction::Reconstruction read_pose_file(const std::string& path,
+                                              const std::vector<int>& numbers,
+                                              const std::string& folder);
+
+/// The map of the fragments with these numbers. island: of each number; those without one are in
+/// the first. Throws IoError as read_pose_file().
+reconstruction::Reconstruction map_of(const PosesByNumber& poses,
+                                      const std::map<std::int64_t, std::uint32_t>& island,
+                                      const std::vector<int>& numbers, const std::string& path,
+                                      const std::string& folder);
 
 }  // namespace gpureg::cli

@@ -4,6 +4,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <cctype>
 #include <cerrno>
 #include <filesystem>
 #include <iterator>
@@ -49,10 +50,19 @@ constexpr const char* kMap[] = {"poses.txt",  "trajectory.txt", "edges.log",
                                 "graph.g2o",  "map.ply",        "map.html",
                                 "pairs.json", "pairs.journal",  kReconstruction};
 
+/// "poses.txt" of "poses_1.txt", the file of a further island.
+std::string of_first_island(const std::string& name) {
+  const std::size_t dot = std::min(name.rfind('.'), name.size());
+  std::size_t at = dot;
+  while (at > 0 && std::isdigit(static_cast<unsigned char>(name[at - 1]))) --at;
+  if (at == dot || at == 0 || name[at - 1] != '_') return name;
+  return name.substr(0, at - 1) + name.substr(dot);
+}
+
 /// Whether a file of a map or a cloud of a scene has this name.
 bool belongs(const std::string& name) {
-  return std::find(std::begin(kMap), std::end(kMap), name) != std::end(kMap) ||
-         name.rfind("cloud_bin_", 0) == 0 || name.rfind("map_", 0) == 0;
+  return std::find(std::begin(kMap), std::end(kMap), of_first_island(name)) != std::end(kMap) ||
+         name.rfind("cloud_bin_", 0) == 0;
 }
 
 void add_folder(const std::string& name, const fs::path& folder, std::vector<NamedPath>& files) {

@@ -16,6 +16,7 @@ namespace gpureg::cli {
 namespace {
 
 using reconstruction::AuditedPair;
+using reconstruction::AuditVerdict;
 using reconstruction::ConnectionVerdict;
 using reconstruction::PairVerdict;
 using Points = std::vector<Eigen::Vector3d>;
@@ -129,14 +130,17 @@ Points in_front(const Points& points, const Points& seen, const Points& sensors,
   return out;
 }
 
-std::string map_picture(const AuditRun& run) {
+bool is_of(std::uint32_t scan, const reconstruction::Island& island) {
+  return std::binary_search(island.scans.begin(), island.scans.end(), scan);
+}
+
+std::string map_picture(const AuditRun& run, const reconstruction::Island& island) {
   const std::vector<PreparedCloud>& clouds = run.scene.clouds;
   Points all, centres(clouds.size(), Eigen::Vector3d::Zero());
-  for (std::size_t k = 0; k < clouds.size(); ++k) {
-    if (!run.poses[k].matrix().allFinite()) continue;
-    const Points points =
-        placed(clouds[k].points(), clouds[k], run.poses[k], kPointsOfMap / clouds.size());
-    const Points sensors = placed(clouds[k].viewpoints(), clouds[k], run.poses[k], 50);
+  for (const std::uint32_t k : island.scans) {
+    const UnalignedIsometry3d& pose = run.map.scans[k].island_from_scan;
+    const Points points = placed(clouds[k].points(), clouds[k], pose, kPointsOfMap / clouds.size());
+    const Points sensors = placed(clouds[k].viewpoints(), clouds[k], pose, 50);
     all.insert(all.end(), points.begin(), points.end());
     for (const Eigen::Vector3d& sensor : sensors)
       centres[k] += sensor / static_cast<double>(sensors.size());
@@ -145,7 +149,7 @@ std::string map_picture(const AuditRun& run) {
   drawing.dots(all, "#c9cbd0", 1.2);
   for (const PairVerdict verdict : {PairVerdict::supports, PairVerdict::contradicts})
     for (const AuditedPair& pair : run.audit.pairs)
-      if (pair.verdict == verdict)
+      if (pair.verdict == verdict && is_of(pair.source, island))
         drawing.line(centres[pair.source], centres[pair.target],
                      verdict == PairVerdict::supports ? "#2f9e5b66" : "#d6453d",
                      verdict == PairVerdict::supports ? 0.8 : 1.6);
@@ -155,8 +159,7 @@ std::string map_picture(const AuditRun& run) {
     const std::vector<std::uint32_t> scans = run.audit.scans_of(connection);
     broken.insert(scans.begin(), scans.end());
   }
-  for (std::uint32_t k = 0; k < clouds.size(); ++k) {
-    if (!run.poses[k].matrix().allFinite()) continue;
+  for (const std::uint32_t k : island.scans) {
     drawing.dots({centres[k]}, broken.count(k) ? "#d6453d" : "#22221f", 6);
     drawing.label(centres[k], std::to_string(run.scene.numbers[k]));
   }
@@ -165,11 +168,12 @@ std::string map_picture(const AuditRun& run) {
 
 std::string pair_picture(const AuditRun& run, const AuditedPair& pair) {
   const auto points_of = [&](std::uint32_t k) {
-    return placed(run.scene.clouds[k].points(), run.scene.clouds[k], run.poses[k],
-                  kPointsOfPicture);
+    return placed(run.scene.clouds[k].points(), run.scene.clouds[k],
+                  run.map.scans[k].island_from_scan, kPointsOfPicture);
   };
   const auto sensors_of = [&](std::uint32_t k) {
-    return placed(run.scene.clouds[k].viewpoints(), run.scene.clouds[k], run.poses[k], 50);
+    return placed(run.scene.clouds[k].viewpoints(), run.scene.clouds[k],
+                  run.map.scans[k].island_from_scan, 50);
   };
   const double margin = 6 * static_cast<double>(run.options.prepare.voxel_size);
   const Points a = points_of(pair.target), b = points_of(pair.source);
@@ -183,17 +187,29 @@ std::string pair_picture(const AuditRun& run, const AuditedPair& pair) {
   return drawing.text();
 }
 
+const char* class_of(AuditVerdict verdict) {
+  return verdict == AuditVerdict::sound          ? "good"
+         : verdict == AuditVerdict::contradicted ? "bad"
+                                                 : "open";
+}
+
+const char* title_of(AuditVerdict verdict) {
+  return verdict == AuditVerdict::sound          ? "Sound"
+         : verdict == AuditVerdict::contradicted ? "Contradicted"
+                                                 : "Undecided";
+}
+
 }  // namespace
 
 std::string audit_page(const AuditRun& run) {
-  const bool sound = run.audit.sound();
+  const AuditVerdict verdict = run.audit.verdict();
   std::ostringstream out;
   out << "<!DOCTYPE html>\n<html lang='en'><head><meta charset='utf-8'><title>Audit of "
       << escaped(run.poses_file) << "</title><style>body{font:15px/1.5 system-ui,sans-serif;"
       << "margin:24px auto;max-width:900px;color:#22221f}h1{font-size:23px}svg{background:#fff;"
       << "border:1px solid #e2e2dc;max-width:100%}svg text{font-size:10px}.bad{color:#d6453d}"
       << ".good{color:#2f9e5b}figure{display:inline-block;width:430px;margin:8px 6px}</style>"
-      << "</head><body><h1 class='" << (sound ? "good'>Sound" : "bad'>Contradicted") << "</h1><p>"
+      << "</head><body><h1 class='" << class_of(verdict) << "'>" << title_of(verdict) << "</h1><p>"
       << escaped(run.poses_file) << ", scans of " << escaped(run.folder) << "</p>";
   std::vector<std::size_t> worst;
   for (const auto& connection : run.audit.connections) {
@@ -202,9 +218,19 @@ std::string audit_page(const AuditRun& run) {
     for (const std::size_t k : connection.contradictions)
       if (std::find(worst.begin(), worst.end(), k) == worst.end()) worst.push_back(k);
   }
+  if (verdict == AuditVerdict::undecided)
+    out << "<p>Nothing is contradicted, but most scans do not see each other. Are these poses of "
+           "these scans, in the unit of their points?</p>";
   out << "<p>From above: scans that agree are joined in green, scans that contradict each other in "
-         "red; red dots are the scans that do not fit the rest.</p>"
-      << map_picture(run);
+         "red; red dots are the scans that do not fit the rest.</p>";
+  const std::vector<AuditVerdict> verdicts = run.audit.verdicts();
+  for (std::size_t k = 0; k < verdicts.size(); ++k) {
+    if (run.audit.islands[k].scans.empty()) continue;
+    if (verdicts.size() > 1)
+      out << "<h2 class='" << class_of(verdicts[k]) << "'>Island " << k << ", "
+          << island_scans(run, k) << ": " << to_string(verdicts[k]) << "</h2>";
+    out << map_picture(run, run.audit.islands[k]);
+  }
   std::stable_sort(worst.begin(), worst.end(), [&](std::size_t a, std::size_t b) {
     return run.audit.pairs[a].violation > run.audit.pairs[b].violation;
   });

@@ -33,12 +33,10 @@ std::vector<std::pair<int, int>> ranges_of(const std::vector<int>& numbers) {
   return out;
 }
 
-/// The smaller part of a connection.
-std::vector<int> numbers_of(const reconstruction::Audit& audit,
-                            const reconstruction::AuditedConnection& connection,
+std::vector<int> numbers_of(const std::vector<std::uint32_t>& scans,
                             const std::vector<int>& numbers) {
   std::vector<int> out;
-  for (const std::uint32_t scan : audit.scans_of(connection)) out.push_back(numbers[scan]);
+  for (const std::uint32_t scan : scans) out.push_back(numbers[scan]);
   return out;
 }
 
@@ -53,10 +51,15 @@ std::string ranges(const std::vector<int>& numbers) {
   return out.str();
 }
 
+std::string island_scans(const AuditRun& run, std::size_t island) {
+  const std::vector<std::uint32_t>& scans = run.audit.islands[island].scans;
+  return (scans.size() == 1 ? "scan " : "scans ") + ranges(numbers_of(scans, run.scene.numbers));
+}
+
 std::string describe(const AuditRun& run, const reconstruction::AuditedConnection& connection) {
   std::ostringstream out;
   out << (connection.size == 1 ? "scan " : "scans ")
-      << ranges(numbers_of(run.audit, connection, run.scene.numbers)) << ": "
+      << ranges(numbers_of(run.audit.scans_of(connection), run.scene.numbers)) << ": "
       << connection.contradicting << (connection.contradicting == 1 ? " pair" : " pairs")
       << " with the other scans contradict, " << connection.supporting << " agree";
   if (connection.contradictions.empty()) return out.str();
@@ -72,7 +75,12 @@ std::string describe(const AuditRun& run, const reconstruction::AuditedConnectio
 
 Json audit_json(const reconstruction::Audit& audit, const std::vector<int>& numbers) {
   Json json;
-  json["sound"] = audit.sound();
+  json["verdict"] = to_string(audit.verdict());
+  json["islands"] = Json::array();
+  const std::vector<reconstruction::AuditVerdict> verdicts = audit.verdicts();
+  for (std::size_t k = 0; k < verdicts.size(); ++k)
+    json["islands"].push_back({{"scans", ranges_of(numbers_of(audit.islands[k].scans, numbers))},
+                               {"verdict", to_string(verdicts[k])}});
   json["connections"] = Json::array();
   json["confirmed"] = audit.count(reconstruction::ConnectionVerdict::confirmed);
   for (const reconstruction::AuditedConnection& connection : audit.connections) {
@@ -80,12 +88,14 @@ Json audit_json(const reconstruction::Audit& audit, const std::vector<int>& numb
     Json contradictions = Json::array();
     for (const std::size_t k : connection.contradictions)
       contradictions.push_back({numbers[audit.pairs[k].target], numbers[audit.pairs[k].source]});
-    json["connections"].push_back({{"scans", ranges_of(numbers_of(audit, connection, numbers))},
-                                   {"verdict", to_string(connection.verdict)},
-                                   {"confidence", connection.confidence},
-                                   {"supporting", connection.supporting},
-                                   {"contradicting", connection.contradicting},
-                                   {"contradictions", std::move(contradictions)}});
+    json["connections"].push_back(
+        {{"scans", ranges_of(numbers_of(audit.scans_of(connection), numbers))},
+         {"island", connection.island},
+         {"verdict", to_string(connection.verdict)},
+         {"confidence", connection.confidence},
+         {"supporting", connection.supporting},
+         {"contradicting", connection.contradicting},
+         {"contradictions", std::move(contradictions)}});
   }
   json["pairs"] = Json::array();
   for (const reconstruction::AuditedPair& pair : audit.pairs)

@@ -16,14 +16,17 @@ struct AuditRun {
   std::string folder, poses_file;
   RegistrationOptions options;
   PreparedFolder scene;
-  std::vector<UnalignedIsometry3d> poses;
-  std::vector<int> missing;  ///< numbers of fragments without a pose
+  reconstruction::Reconstruction map;  ///< poses and islands
+  std::vector<int> missing;            ///< numbers of fragments without a pose
   reconstruction::Audit audit;
   double seconds = 0;
 };
 
 /// Numbers as people write them: "3-7, 9".
 std::string ranges(const std::vector<int>& numbers);
+
+/// The scans of an island as people write them.
+std::string island_scans(const AuditRun& run, std::size_t island);
 
 /// Where a connection is broken, and which scans say so, in one sentence.
 std::string describe(const AuditRun& run, const reconstruction::AuditedConnection& connection);

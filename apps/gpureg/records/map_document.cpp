@@ -60,11 +60,14 @@ Json map_document(const MapRun& run, const Context& context) {
   json["scans"] = Json::array();
   for (std::size_t k = 0; k < run.map.scans.size(); ++k) {
     const reconstruction::Scan& scan = run.map.scans[k];
-    json["scans"].push_back({{"id", run.scene.numbers[k]},
-                             {"placed", scan.placed},
-                             {"island", scan.placed ? Json(scan.island) : Json(nullptr)},
-                             {"confidence", scan.confidence},
-                             {"reason", reconstruction::to_string(scan.reason)}});
+    json["scans"].push_back(
+        {{"id", run.scene.numbers[k]},
+         {"placed", scan.placed},
+         {"island", scan.placed ? Json(scan.island) : Json(nullptr)},
+         {"island_from_scan",
+          scan.placed ? to_json(scan.island_from_scan.matrix()) : Json(nullptr)},
+         {"confidence", scan.confidence},
+         {"reason", reconstruction::to_string(scan.reason)}});
   }
   json["unusable"] = unusable_json(run.scene);
   json["weakest_links"] = Json::array();

@@ -2,18 +2,28 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
 #include "run/map_run.hpp"
 
 namespace gpureg::cli {
 
-/// poses.txt, trajectory.txt, edges.log and graph.g2o. Throws IoError.
+/// The files of a map, but for those of further islands.
+inline constexpr const char* kMapFiles[] = {
+    "poses.txt", "trajectory.txt", "edges.log",  "graph.g2o",
+    "map.ply",   "map.html",       "pairs.json", "reconstruction.json"};
+
+/// Name of the file of an island, which has a frame of its own: map.ply, map_1.ply, ...
+std::string file_of_island(const std::string& name, std::size_t island);
+
+/// Paths of all files in a folder that have the names of a map's.
+std::vector<std::string> map_files_in(const std::string& folder);
+
+/// poses.txt, trajectory.txt and graph.g2o of each island, and edges.log. Throws IoError.
 void write_poses(const MapRun& run);
 
-/// Name of an island's map: map.ply, map_1.ply, ...
-std::string map_name(std::size_t island);
-
 /// The map of each island, one scan in memory at a time; counts the points. Throws IoError.
-void write_merged_maps(MapRun& run, float voxel_size, bool quiet);
+/// @return false: interrupted.
+bool write_merged_maps(MapRun& run, float voxel_size, bool quiet);
 
 }  // namespace gpureg::cli

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "verbs/audit.hpp"
 
-#include <algorithm>
 #include <chrono>
 #include <iostream>
 #include <memory>
@@ -12,13 +11,14 @@
 #include "gpureg/evaluation/trajectory.hpp"
 #include "gpureg/files.hpp"
 #include "gpureg/reconstruction/mend.hpp"
-#include "inputs/map_poses.hpp"
+#include "inputs/saved_map.hpp"
 #include "inputs/scene.hpp"
 #include "json/json_file.hpp"
 #include "options/method_options.hpp"
 #include "options/output_path.hpp"
 #include "pages/audit_page.hpp"
 #include "records/audit_document.hpp"
+#include "records/map_files.hpp"
 #include "run/interrupt.hpp"
 #include "run/pair_run.hpp"
 #include "text.hpp"
@@ -26,21 +26,29 @@
 namespace gpureg::cli {
 namespace {
 
+using reconstruction::AuditVerdict;
+
 struct AuditVerbOptions {
   std::string folder, poses, json, page, mended;
   MethodOptions method;
   bool quiet = false;
 };
 
-/// Poses of other scans, or in other units, may keep most scans out of each other's sight. Of right
-/// maps at most one connection of six was undecided.
-bool says_nothing(const reconstruction::Audit& audit) {
-  return audit.sound() && audit.count(reconstruction::ConnectionVerdict::confirmed) <=
-                              audit.count(reconstruction::ConnectionVerdict::undecided);
+int status_of(const reconstruction::Audit& audit) {
+  return audit.verdict() == AuditVerdict::sound ? kOk : kNoAlignment;
 }
 
-int status_of(const reconstruction::Audit& audit) {
-  return audit.sound() && !says_nothing(audit) ? kOk : kNoAlignment;
+const char* explained(AuditVerdict verdict) {
+  switch (verdict) {
+    case AuditVerdict::sound:
+      return "sound: no connection is contradicted";
+    case AuditVerdict::contradicted:
+      return "contradicted";
+    case AuditVerdict::undecided:
+      break;
+  }
+  return "undecided: most scans do not see each other; are they poses of these scans, in the unit "
+         "of their points?";
 }
 
 /// What a person reads first.
@@ -52,40 +60,66 @@ std::string summary(const AuditRun& run) {
       << " near each other: " << run.audit.count(reconstruction::PairVerdict::supports)
       << " support their poses, " << run.audit.count(reconstruction::PairVerdict::contradicts)
       << " contradict them, in " << fixed(run.seconds, 2) << " s\n";
+  if (run.audit.islands.size() > 1) {
+    const std::vector<AuditVerdict> verdicts = run.audit.verdicts();
+    for (std::size_t k = 0; k < verdicts.size(); ++k)
+      out << "island     " << island_scans(run, k) << ": " << to_string(verdicts[k]) << "\n";
+  }
   for (const reconstruction::AuditedConnection& connection : run.audit.connections)
     if (connection.verdict == reconstruction::ConnectionVerdict::contradicted)
       out << "broken     " << describe(run, connection) << "\n";
   out << "undecided  " << run.audit.count(reconstruction::ConnectionVerdict::undecided) << " of "
       << run.audit.connections.size() << " connections\n"
-      << (says_nothing(run.audit)
-              ? "verdict    undecided: most scans do not see each other; are they poses of these "
-                "scans, in the unit of their points?\n"
-          : run.audit.sound() ? "verdict    sound: no connection is contradicted\n"
-                              : "verdict    contradicted\n");
+      << "verdict    " << explained(run.audit.verdict()) << "\n";
   return out.str();
 }
 
+/// Where the mended poses of each island go.
+std::vector<std::string> mended_files(const AuditVerbOptions& o, std::size_t islands) {
+  std::vector<std::string> files;
+  for (std::size_t k = 0; !o.mended.empty() && k < islands; ++k)
+    files.push_back(file_of_island(o.mended, k));
+  return files;
+}
+
 /// Writes the mended poses. The exit status is that of their audit.
-int mend(const AuditVerbOptions& o, const Context& context, const AuditRun& run) {
-  const reconstruction::MendedMap map = reconstruction::mend(
-      context, run.scene.clouds, run.poses, run.audit, run.options,
-      reconstruction::AuditOptions::from_voxel_size(run.options.prepare.voxel_size));
-  evaluation::Trajectory trajectory;
-  for (std::size_t k = 0; k < map.world_from_scan.size(); ++k)
-    if (map.world_from_scan[k].matrix().allFinite())
-      trajectory.push_back(
-          {static_cast<double>(run.scene.numbers[k]), map.world_from_scan[k].matrix()});
-  evaluation::write_trajectory(o.mended, trajectory);
+int mend(const AuditVerbOptions& o, const Context& context, const AuditRun& run,
+         const reconstruction::AuditOptions& options) {
+  const reconstruction::MendedMap map =
+      reconstruction::mend(context, run.scene.clouds, run.map, run.audit, run.options, options);
+  const std::vector<std::string> files = mended_files(o, run.map.islands.size());
+  for (std::size_t k = 0; k < files.size(); ++k) {
+    evaluation::Trajectory trajectory;
+    for (const std::uint32_t scan : run.map.islands[k].scans)
+      if (map.world_from_scan[scan].matrix().allFinite())
+        trajectory.push_back(
+            {static_cast<double>(run.scene.numbers[scan]), map.world_from_scan[scan].matrix()});
+    evaluation::write_trajectory(files[k], trajectory);
+  }
   if (!o.quiet)
     std::cout << "mended     " << map.registered << " pairs aligned, " << map.moved.size()
               << " scans moved, " << map.left_out.size() << " left out; "
-              << (map.audit.sound() ? "sound" : "still contradicted") << "\n";
+              << to_string(map.audit.verdict()) << "\n";
   return status_of(map.audit);
 }
 
+int audit_and_mend(const AuditVerbOptions& o, const Context& context, AuditRun& run) {
+  auto options = reconstruction::AuditOptions::from_voxel_size(run.options.prepare.voxel_size);
+  options.should_stop = InterruptGuard::requested;
+  const auto start = std::chrono::steady_clock::now();
+  run.audit = reconstruction::audit(context, run.scene.clouds, run.map, run.options, options);
+  run.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  if (InterruptGuard::requested()) return kInterrupted;
+  if (!o.json.empty()) write_document(o.json, audit_document(run, context));
+  if (!o.page.empty()) files::write_atomically(o.page, audit_page(run));
+  if (!o.quiet) std::cout << summary(run) << std::flush;
+  return o.mended.empty() ? status_of(run.audit) : mend(o, context, run, options);
+}
+
 int run_audit(const AuditVerbOptions& o) {
-  check_outputs({{"--json", o.json}, {"--page", o.page}, {"--mend", o.mended}},
-                {{"SCANS", o.folder}, {"POSES", o.poses}});
+  const std::vector<NamedPath> inputs = {{"SCANS", o.folder}, {"POSES", o.poses}};
+  std::vector<NamedPath> outputs = {{"--json", o.json}, {"--page", o.page}, {"--mend", o.mended}};
+  check_outputs(outputs, inputs);
   const InterruptGuard guard;
   const Context context = o.method.context();
   AuditRun run;
@@ -93,22 +127,22 @@ int run_audit(const AuditVerbOptions& o) {
   run.poses_file = o.poses;
   run.options = o.method.registration();
   // A bad file shall show before the clouds are read.
-  run.poses = read_map_poses(o.poses, FragmentFolder(o.folder, true).numbers, o.folder);
+  run.map = read_map_poses(o.poses, FragmentFolder(o.folder, true).numbers, o.folder);
+  outputs.pop_back();
+  for (const std::string& file : mended_files(o, run.map.islands.size()))
+    outputs.push_back({"--mend", file});
+  check_outputs(outputs, inputs);
   run.scene = prepare_folder(context, o.folder, run.options.prepare, o.quiet);
-  if (run.scene.interrupted) return kInterrupted;
-  if (!run.scene.unusable.empty()) run.poses = read_map_poses(o.poses, run.scene.numbers, o.folder);
-  for (std::size_t k = 0; k < run.poses.size(); ++k)
-    if (!run.poses[k].matrix().allFinite()) run.missing.push_back(run.scene.numbers[k]);
-  const auto start = std::chrono::steady_clock::now();
-  run.audit = reconstruction::audit(
-      context, run.scene.clouds, run.poses, run.options,
-      reconstruction::AuditOptions::from_voxel_size(run.options.prepare.voxel_size));
-  run.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-  if (!o.json.empty()) write_document(o.json, audit_document(run, context));
-  if (!o.page.empty()) files::write_atomically(o.page, audit_page(run));
-  if (!o.quiet) std::cout << summary(run);
-  if (!o.mended.empty()) return mend(o, context, run);
-  return status_of(run.audit);
+  if (!run.scene.unusable.empty()) run.map = read_map_poses(o.poses, run.scene.numbers, o.folder);
+  for (std::size_t k = 0; k < run.map.scans.size(); ++k)
+    if (!run.map.scans[k].placed) run.missing.push_back(run.scene.numbers[k]);
+  int status = kInterrupted;
+  try {
+    if (!run.scene.interrupted) status = audit_and_mend(o, context, run);
+  } catch (const reconstruction::Cancelled&) {
+  }
+  if (status == kInterrupted) std::cerr << "gpureg: interrupted" << std::endl;
+  return status;
 }
 
 }  // namespace
@@ -117,14 +151,16 @@ void add_audit(CommandLine& line) {
   const auto o = std::make_shared<AuditVerbOptions>();
   Verb verb = line.verb("audit", "Say where a finished map contradicts its own scans");
   verb.option("SCANS", o->folder, "Folder with cloud_bin_<i>, and perhaps cameras.txt").required();
-  verb.option("POSES", o->poses,
-              "Poses of the scans: poses.txt, a trajectory (TUM with fragment numbers as times, "
-              "KITTI), a Redwood log, or g2o")
+  verb.option(
+          "POSES", o->poses,
+          "Output folder of `gpureg reconstruct`, or poses of the scans: poses.txt, a trajectory "
+          "(TUM with fragment numbers as times, KITTI), a Redwood log, or g2o")
       .required();
   verb.option("--json", o->json, "Write every verdict");
   verb.option("--page", o->page, "Write a page (HTML) that shows where the map is broken");
   verb.option("--mend", o->mended,
-              "Align again across what is contradicted, and write the mended poses (TUM)");
+              "Align again across what is contradicted, and write the mended poses (TUM); of "
+              "further islands beside it, as NAME_1.txt");
   o->method.add_to(verb);
   verb.flag("--quiet", o->quiet, "No progress, no summary");
   verb.run([o] {

@@ -33,9 +33,6 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr const char* kJournal = "pairs.journal";
-constexpr const char* kOutputs[] = {
-    "poses.txt", "trajectory.txt", "edges.log",  "graph.g2o",
-    "map.ply",   "map.html",       "pairs.json", "reconstruction.json"};
 
 struct ReconstructOptions {
   std::string folder, output, pairs = "all", results, odometry;
@@ -70,13 +67,17 @@ void check_output_folder(const ReconstructOptions& o) {
     throw InvalidArgument("-o and DIR must be different folders, not both " + o.output);
   fs::create_directories(o.output, error);
   if (error) throw IoError("cannot make the folder " + o.output + ": " + error.message());
+  if (const std::string pairs = o.file("pairs.json");
+      !o.results.empty() && fs::exists(pairs, error) && !fs::equivalent(pairs, o.results, error))
+    throw InvalidArgument("-o holds the pairs of another map, " + pairs +
+                          ": give --results that file, or -o another folder");
+  // Those of the map of an earlier run are removed. Its pairs may make another map.
+  for (const std::string& file : map_files_in(o.output))
+    if (!fs::equivalent(file, o.results, error)) check_outputs({{"a file of -o", file}}, inputs);
   std::vector<NamedPath> outputs = {{"the journal of -o", o.journal()}};
-  for (const char* name : kOutputs)
+  for (const char* name : kMapFiles)
     if (o.results.empty() || std::string(name) != "pairs.json")
       outputs.push_back({"a file of -o", o.file(name)});
-  for (const auto& entry : fs::directory_iterator(o.output, error))
-    if (entry.path().filename().string().rfind("map_", 0) == 0)  // of further islands
-      outputs.push_back({"a file of -o", entry.path().string()});
   check_outputs(outputs, inputs);
 }
 
@@ -116,14 +117,14 @@ class Reconstruct {
         run_.pairs = read_pairs(o_.results, run_.scene, run_.options.prepare.voxel_size);
     }
     if (!o_.odometry.empty() && odometry_.empty()) odometry_ = known_poses();
-    reconstruct();
+    if (!reconstruct()) return say_interrupted();
     if (!(o_.no_refine && o_.no_map)) {
       const Clock::time_point start = Clock::now();
       if (!make_surfaces()) return say_interrupted();
       run_.seconds.surfaces = since(start);
     }
     if (!o_.no_refine && !refine()) return say_interrupted();
-    write_outputs();
+    if (!write_outputs()) return say_interrupted();
     if (pairs_) pairs_->close_journal();
     if (!o_.quiet) {
       if (o_.method.automatic_voxel_size)
@@ -161,6 +162,7 @@ class Reconstruct {
     run_.aligned_here = true;
     run_.seconds.align = pairs_->seconds();
     run_.pairs_in_this_run = pairs_->in_this_run();
+    clear_output();
     // The work of hours is safe from here on, whatever becomes of the map.
     write_pairs(o_.file("pairs.json"), pairs_head(run_, context_), run_.pairs, scene, true);
     for (RegistrationResult& result : run_.pairs.results) reduce_moments(result);
@@ -191,7 +193,23 @@ class Reconstruct {
     return pairs;
   }
 
-  void reconstruct() {
+  /// Removes the map of an earlier run. A folder without reconstruction.json, which is written
+  /// last, holds no finished map.
+  void clear_output() const {
+    std::vector<std::string> files = map_files_in(o_.output);
+    std::stable_partition(files.begin(), files.end(), [&](const std::string& file) {
+      return file == o_.file("reconstruction.json");
+    });
+    for (const std::string& file : files) {
+      std::error_code error;
+      if (fs::equivalent(file, o_.results, error)) continue;
+      if (!fs::remove(file, error) && error)
+        throw IoError("cannot remove " + file + ": " + error.message());
+    }
+  }
+
+  /// false: interrupted.
+  bool reconstruct() {
     const Clock::time_point start = Clock::now();
     auto options = reconstruction::Options::from_voxel_size(run_.options.prepare.voxel_size);
     options.threads = static_cast<int>(o_.method.threads);
@@ -201,14 +219,22 @@ class Reconstruct {
                                                         run_.pairs.results, options, odometry_);
     } else {
       const float voxel_size = run_.options.prepare.voxel_size;
-      reconstruction::AuditedReconstruction audited = reconstruction::reconstruct(
-          context_, run_.scene.clouds, run_.pairs.pairs, run_.pairs.results, options, odometry_,
-          run_.options, reconstruction::AuditOptions::from_voxel_size(voxel_size));
+      auto audit = reconstruction::AuditOptions::from_voxel_size(voxel_size);
+      audit.should_stop = InterruptGuard::requested;
+      reconstruction::AuditedReconstruction audited;
+      try {
+        audited = reconstruction::reconstruct(context_, run_.scene.clouds, run_.pairs.pairs,
+                                              run_.pairs.results, options, odometry_, run_.options,
+                                              audit);
+      } catch (const reconstruction::Cancelled&) {
+        return false;
+      }
       run_.map = std::move(audited.map);
       run_.audit = std::move(audited.audit);
       run_.places_look_alike = audited.places_look_alike;
     }
     run_.seconds.graph = since(start);
+    return !InterruptGuard::requested();
   }
 
   /// Points and normals of the placed scans. false: interrupted.
@@ -245,17 +271,21 @@ class Reconstruct {
     return !InterruptGuard::requested();
   }
 
-  void write_outputs() {
+  /// false: interrupted.
+  bool write_outputs() {
     const Clock::time_point start = Clock::now();
+    if (!run_.aligned_here) clear_output();
     write_poses(run_);
     if (!o_.no_map) {
       const float voxel_size =
           o_.map_voxel_size.value_or(static_cast<float>(o_.method.voxel_size / 2));
-      write_merged_maps(run_, voxel_size, o_.quiet);
+      if (!write_merged_maps(run_, voxel_size, o_.quiet)) return false;
       write_map_page(run_, surfaces_);
     }
     run_.seconds.write = since(start);
+    if (InterruptGuard::requested()) return false;
     write_document(o_.file("reconstruction.json"), map_document(run_, context_));
+    return true;
   }
 
   int say_interrupted() const {
@@ -264,7 +294,7 @@ class Reconstruct {
       std::cerr << ", " << pairs_->done() << " of " << pairs_->size()
                 << " pairs are in the journal; go on with the same command and --resume";
     else
-      std::cerr << ", nothing written";
+      std::cerr << ", no map written";
     std::cerr << std::endl;
     return kInterrupted;
   }
@@ -288,8 +318,8 @@ void add_reconstruct(CommandLine& line) {
           "Folder with cloud_bin_<i>.ply|pcd|bin, or meshes .stl|obj|ply, and perhaps cameras.txt")
       .required();
   verb.option("-o,--output", o->output,
-              "Folder for poses.txt, reconstruction.json, trajectory.txt (TUM), edges.log "
-              "(Redwood), graph.g2o, map.ply, map.html and pairs.json")
+              "Folder for reconstruction.json, edges.log (Redwood), map.html, pairs.json, and of "
+              "each island poses.txt, trajectory.txt (TUM), graph.g2o and map.ply")
       .required();
   const Option pairs =
       verb.option("--pairs", o->pairs, "all, or a file with one pair `i j` a line").show_default();

@@ -3,14 +3,22 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <vector>
 
+#include "gpureg/error.hpp"
 #include "gpureg/reconstruction/map.hpp"
 #include "gpureg/verification.hpp"
 
 /// Audit of finished maps: do scans that come to lie near each other agree, whether or not anybody
 /// registered them? Every function is deterministic and thread-safe.
 namespace gpureg::reconstruction {
+
+/// AuditOptions::should_stop ended the call.
+class Cancelled : public Error {
+ public:
+  using Error::Error;
+};
 
 /// Options of audit(). The lengths are for voxels of 5 cm.
 struct AuditOptions {
@@ -25,6 +33,9 @@ struct AuditOptions {
   double min_confirmed = 0.9;
   /// Pairs of one scan that are looked at, 2 to 10000: the nearest half, others evenly chosen.
   std::uint32_t most_pairs = 40;
+  /// Asked every tenth of a second, in the thread of the call; true ends the call, which throws
+  /// Cancelled. May be empty.
+  std::function<bool()> should_stop;
 
   /// Every length from the voxel size of the registration; max_shift beyond 5 cm by its fourth
   /// root.
@@ -74,6 +85,7 @@ const char* to_string(ConnectionVerdict verdict);
 struct AuditedConnection {
   /// The smaller part: so many entries of Audit::order, from this one on; see Audit::scans_of().
   std::size_t first = 0, size = 0;
+  std::uint32_t island = 0;  ///< index into Audit::islands
   ConnectionVerdict verdict = ConnectionVerdict::undecided;
   double confidence = 0.5;  ///< probability that the parts lie right to each other
   std::size_t supporting = 0, contradicting = 0;  ///< pairs across it
@@ -81,13 +93,25 @@ struct AuditedConnection {
   std::vector<std::size_t> contradictions;
 };
 
+/// What an audit says of an island, or of a map.
+enum class AuditVerdict {
+  undecided,    ///< nothing is contradicted, but no more is confirmed than undecided
+  sound,        ///< nothing is contradicted, and more connections are confirmed than undecided
+  contradicted  ///< a connection is contradicted
+};
+const char* to_string(AuditVerdict verdict);
+
 struct Audit {
   std::vector<AuditedPair> pairs;              ///< by source and target
   std::vector<AuditedConnection> connections;  ///< the least confident first
   std::vector<std::uint32_t> order;            ///< the scans that have a pose
+  std::vector<Island> islands;                 ///< of the map, with the scans that have a pose
 
-  /// Whether no connection is contradicted.
-  bool sound() const;
+  /// Of each island. Undecided are those of poses in other units, or of other scans: they keep most
+  /// scans out of each other's sight.
+  std::vector<AuditVerdict> verdicts() const;
+  /// Of the map: contradicted where an island is; sound where every island of two scans or more is.
+  AuditVerdict verdict() const;
   /// The smaller part of a connection, ascending.
   std::vector<std::uint32_t> scans_of(const AuditedConnection& connection) const;
   std::size_t count(PairVerdict verdict) const;
@@ -102,7 +126,7 @@ struct Audit {
 /// @param world_from_scan one per scan; not finite: the scan is left out.
 /// @param registration as for align_batch().
 /// @throws InvalidArgument for options out of range, another number of poses than clouds, a pose
-///   that is no rigid motion (named); otherwise as verify_poses_batch().
+///   that is no rigid motion (named); Cancelled; otherwise as verify_poses_batch().
 Audit audit(const Context& context, const std::vector<PreparedCloud>& clouds,
             const std::vector<UnalignedIsometry3d>& world_from_scan,
             const RegistrationOptions& registration = {}, const AuditOptions& options = {});

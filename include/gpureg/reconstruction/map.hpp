@@ -150,4 +150,11 @@ struct Reconstruction {
   std::size_t placed() const;  ///< number of placed scans
 };
 
+/// A map of poses that are known, without edges: of another program, or of files.
+/// @param island_from_scan one per scan, in the frame of its island; not finite: left out.
+/// @param islands of each scan, counted from 0; empty: all are of one.
+/// @throws InvalidArgument where islands are neither none nor one per scan, or out of range.
+Reconstruction map_of_poses(const std::vector<UnalignedIsometry3d>& island_from_scan,
+                            const std::vector<std::uint32_t>& islands = {});
+
 }  // namespace gpureg::reconstruction

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Options of pose graphs, reconstructions and loop closure.
 #include "fields.hpp"
+#include "fields/audit.hpp"
 #include "fields/loop_closure.hpp"
 
 namespace gpureg::python {
@@ -29,6 +30,7 @@ void bind_map_options(py::module_& m) {
   bind_options_class<pose_graph::Options>(m);
   bind_options_class<reconstruction::EdgeNoiseOptions>(m);
   bind_scaled<reconstruction::Options>(m);
+  bind_scaled<reconstruction::AuditOptions>(m);
   bind_options_class<loop_closure::ProposalOptions>(m);
   bind_options_class<loop_closure::AcceptanceOptions>(m);
   bind_scaled<loop_closure::Options>(m).def_static(

@@ -3,13 +3,12 @@
 
 #include <pybind11/stl.h>
 
-#include <cmath>
-#include <limits>
 #include <string>
 
 #include "cloud.hpp"
 #include "cloud_input.hpp"
 #include "gpureg/error.hpp"
+#include "gpureg/reconstruction/mend.hpp"
 #include "interrupt.hpp"
 #include "matrix.hpp"
 
@@ -29,16 +28,20 @@ std::vector<Pair> pairs_of(const IndexArray& rows) {
   return pairs;
 }
 
+/// poses: (N, 4, 4), NaN where a scan has none.
+std::vector<UnalignedIsometry3d> poses_of(const DoubleArray& poses) {
+  std::vector<UnalignedIsometry3d> out(static_cast<std::size_t>(poses.shape(0)));
+  for (std::size_t k = 0; k < out.size(); ++k)
+    for (int n = 0; n < 16; ++n)
+      out[k].matrix()(n / 4, n % 4) = poses.data()[16 * k + static_cast<std::size_t>(n)];
+  return out;
+}
+
 /// (N, 4, 4) poses, NaN where not known, or (source, target, pose, information or None) of each.
 std::vector<Odometry> odometry_of(const py::object& given) {
   std::vector<Odometry> out;
   if (py::isinstance<py::array>(given)) {
-    const auto array = given.cast<DoubleArray>();
-    std::vector<UnalignedIsometry3d> poses(static_cast<std::size_t>(array.shape(0)));
-    for (std::size_t k = 0; k < poses.size(); ++k)
-      for (int n = 0; n < 16; ++n)
-        poses[k].matrix()(n / 4, n % 4) = array.data()[16 * k + static_cast<std::size_t>(n)];
-    return odometry_of_poses(poses);
+    return odometry_of_poses(poses_of(given.cast<DoubleArray>()));
   }
   const auto items = given.cast<py::list>();
   for (const py::handle item : items) {
@@ -62,50 +65,100 @@ std::vector<PreparedCloud> prepared_of(const py::list& clouds) {
   return out;
 }
 
-/// poses: (N, 4, 4), NaN where a scan has none.
-py::tuple audit_of(const Context& context, const py::list& clouds, const DoubleArray& poses,
-                   const RegistrationOptions options) {
+py::array_t<double> poses_array(const std::vector<UnalignedIsometry3d>& poses) {
+  py::array_t<double> out({static_cast<py::ssize_t>(poses.size()), py::ssize_t(4), py::ssize_t(4)});
+  double* next = out.mutable_data();
+  for (const UnalignedIsometry3d& pose : poses)
+    for (int k = 0; k < 16; ++k) *next++ = pose.matrix()(k / 4, k % 4);
+  return out;
+}
+
+std::vector<std::vector<std::uint32_t>> lists_of(const std::vector<Island>& islands) {
+  std::vector<std::vector<std::uint32_t>> out;
+  for (const Island& island : islands) out.push_back(island.scans);
+  return out;
+}
+
+/// islands: of each scan.
+Audit audit_of(const Context& context, const py::list& clouds, const DoubleArray& poses,
+               const std::vector<std::uint32_t>& islands, const RegistrationOptions options,
+               const AuditOptions audit_options) {
   const std::vector<PreparedCloud> prepared = prepared_of(clouds);
-  std::vector<UnalignedIsometry3d> world_from_scan(static_cast<std::size_t>(poses.shape(0)));
-  for (std::size_t k = 0; k < world_from_scan.size(); ++k)
-    for (int n = 0; n < 16; ++n)
-      world_from_scan[k].matrix()(n / 4, n % 4) =
-          poses.data()[16 * k + static_cast<std::size_t>(n)];
-  const Audit found = interruptible([&] {
-    return audit(context, prepared, world_from_scan, options,
-                 AuditOptions::from_voxel_size(options.prepare.voxel_size));
-  });
-  py::list pairs, connections;
-  for (const AuditedPair& pair : found.pairs)
-    pairs.append(py::make_tuple(pair.source, pair.target, to_string(pair.verdict),
-                                pair.log_likelihood_ratio, pair.overlap, pair.observed,
-                                pair.violation, pair.shift));
-  for (const AuditedConnection& connection : found.connections)
-    connections.append(py::make_tuple(
-        to_string(connection.verdict), connection.confidence, connection.supporting,
-        connection.contradicting, connection.contradictions, connection.first, connection.size));
-  return py::make_tuple(pairs, connections, found.order);
+  const Reconstruction map = map_of_poses(poses_of(poses), islands);
+  return interruptible([&] { return audit(context, prepared, map, options, audit_options); });
+}
+
+py::tuple mend_of(const Context& context, const py::list& clouds, const DoubleArray& poses,
+                  const std::vector<std::uint32_t>& islands, const Audit& found,
+                  const RegistrationOptions options, const AuditOptions audit_options) {
+  const std::vector<PreparedCloud> prepared = prepared_of(clouds);
+  const Reconstruction map = map_of_poses(poses_of(poses), islands);
+  const MendedMap mended =
+      interruptible([&] { return mend(context, prepared, map, found, options, audit_options); });
+  return py::make_tuple(poses_array(mended.world_from_scan), mended.moved, mended.left_out,
+                        mended.registered, mended.audit);
+}
+
+void bind_audit(py::module_& m) {
+  py::class_<Audit>(m, "AuditRecord", "What the scans of a map say about it.")
+      .def_property_readonly(
+          "pairs",
+          [](const Audit& audit) {
+            py::list pairs;
+            for (const AuditedPair& pair : audit.pairs)
+              pairs.append(py::make_tuple(pair.source, pair.target, to_string(pair.verdict),
+                                          pair.log_likelihood_ratio, pair.overlap, pair.observed,
+                                          pair.violation, pair.shift));
+            return pairs;
+          })
+      .def_property_readonly("connections",
+                             [](const Audit& audit) {
+                               py::list out;
+                               for (const AuditedConnection& c : audit.connections)
+                                 out.append(py::make_tuple(
+                                     to_string(c.verdict), c.confidence, c.supporting,
+                                     c.contradicting, c.contradictions, c.island, c.first, c.size));
+                               return out;
+                             })
+      .def_readonly("order", &Audit::order)
+      .def_property_readonly("islands", [](const Audit& audit) { return lists_of(audit.islands); })
+      .def_property_readonly("verdicts",
+                             [](const Audit& audit) {
+                               std::vector<std::string> out;
+                               for (const AuditVerdict verdict : audit.verdicts())
+                                 out.emplace_back(to_string(verdict));
+                               return out;
+                             })
+      .def_property_readonly("verdict",
+                             [](const Audit& audit) { return to_string(audit.verdict()); });
+  m.def("audit", &audit_of, py::arg("context"), py::arg("clouds"), py::arg("poses"),
+        py::arg("islands"), py::arg("options"), py::arg("audit_options"));
+  m.def("mend", &mend_of, py::arg("context"), py::arg("clouds"), py::arg("poses"),
+        py::arg("islands"), py::arg("found"), py::arg("options"), py::arg("audit_options"));
 }
 
 /// clouds: of the pairs, audited; none: not audited.
-Reconstruction reconstruct_of(std::size_t scans, const IndexArray& rows, const py::list& results,
-                              const Options options, const py::object& odometry,
-                              const Context& context, const py::list& clouds,
-                              const RegistrationOptions registration) {
+/// @return the map, its audit or None, and whether places look alike.
+py::tuple reconstruct_of(std::size_t scans, const IndexArray& rows, const py::list& results,
+                         const Options options, const py::object& odometry, const Context& context,
+                         const py::list& clouds, const RegistrationOptions registration,
+                         const AuditOptions audit_options) {
   const std::vector<PreparedCloud> prepared = prepared_of(clouds);
   const std::vector<Pair> pairs = pairs_of(rows);
   std::vector<RegistrationResult> values;
   for (const py::handle result : results)
     values.push_back(result.cast<const RegistrationResult&>());
   const std::vector<Odometry> known = odometry_of(odometry);
-  if (!prepared.empty())
-    return interruptible([&] {
+  if (!prepared.empty()) {
+    AuditedReconstruction out = interruptible([&] {
       return reconstruct(context, prepared, pairs, values, options, known, registration,
-                         AuditOptions::from_voxel_size(registration.prepare.voxel_size))
-          .map;
+                         audit_options);
     });
-  const py::gil_scoped_release release;
-  return reconstruct_from_poses(scans, pairs, values, options, known);
+    return py::make_tuple(std::move(out.map), std::move(out.audit), out.places_look_alike);
+  }
+  Reconstruction map =
+      interruptible([&] { return reconstruct_from_poses(scans, pairs, values, options, known); });
+  return py::make_tuple(std::move(map), py::none(), false);
 }
 
 py::dict report_of(const RefineReport& report) {
@@ -156,17 +209,6 @@ py::dict refine_map(const Context& context, Reconstruction& map, const py::list&
   map = std::move(refined);
   if (failed) std::rethrow_exception(failed);
   return report_of(report);
-}
-
-py::array_t<double> poses_array(const Reconstruction& map) {
-  py::array_t<double> out(
-      {static_cast<py::ssize_t>(map.scans.size()), py::ssize_t(4), py::ssize_t(4)});
-  double* next = out.mutable_data();
-  for (const Scan& scan : map.scans)
-    for (int k = 0; k < 16; ++k)
-      *next++ = scan.placed ? scan.island_from_scan.matrix()(k / 4, k % 4)
-                            : std::numeric_limits<double>::quiet_NaN();
-  return out;
 }
 
 py::list scans_list(const Reconstruction& map) {
@@ -253,20 +295,22 @@ void bind_voxel_map(py::module_& m) {
 
 void bind_reconstruction(py::module_& m) {
   py::class_<Reconstruction>(m, "MapGraph", "Scans, edges and islands of a map.")
-      .def_property_readonly("poses", &poses_array)
+      .def_property_readonly("poses",
+                             [](const Reconstruction& map) {
+                               std::vector<UnalignedIsometry3d> poses;
+                               for (const Scan& scan : map.scans)
+                                 poses.push_back(scan.placed ? scan.island_from_scan : no_pose());
+                               return poses_array(poses);
+                             })
       .def_property_readonly("scans", &scans_list)
       .def_property_readonly("edges", &edges_list)
       .def_property_readonly("links", &links_list)
-      .def_property_readonly("islands", [](const Reconstruction& map) {
-        std::vector<std::vector<std::uint32_t>> out;
-        for (const Island& island : map.islands) out.push_back(island.scans);
-        return out;
-      });
+      .def_property_readonly("islands",
+                             [](const Reconstruction& map) { return lists_of(map.islands); });
   m.def("reconstruct_map", &reconstruct_of, py::arg("scans"), py::arg("pairs"), py::arg("results"),
         py::arg("options"), py::arg("odometry"), py::arg("context"), py::arg("clouds"),
-        py::arg("registration"));
-  m.def("audit", &audit_of, py::arg("context"), py::arg("clouds"), py::arg("poses"),
-        py::arg("options"));
+        py::arg("registration"), py::arg("audit_options"));
+  bind_audit(m);
   m.def("refine_map", &refine_map, py::arg("context"), py::arg("map"), py::arg("surfaces"),
         py::arg("voxel_size"), py::arg("tell"));
   py::class_<Surface>(m, "Surface", "Points of a scan with their normals.");

@@ -87,15 +87,19 @@ void bind_trajectory(py::module_& m) {
       py::arg("path"), py::arg("format"));
   // Of fragments, as the command reads them; `folder` is what messages call their set.
   m.def(
-      "read_map_poses",
+      "read_pose_file",
       [](const std::string& path, const std::vector<int>& numbers, const std::string& folder) {
-        const auto poses = cli::read_map_poses(path, numbers, folder);
+        const auto map = cli::read_pose_file(path, numbers, folder);
         py::array_t<double> matrices(
-            {static_cast<py::ssize_t>(poses.size()), py::ssize_t(4), py::ssize_t(4)});
+            {static_cast<py::ssize_t>(map.scans.size()), py::ssize_t(4), py::ssize_t(4)});
         double* next = matrices.mutable_data();
-        for (const UnalignedIsometry3d& pose : poses)
+        std::vector<std::uint32_t> islands;
+        for (const auto& scan : map.scans) {
+          const UnalignedIsometry3d pose = scan.placed ? scan.island_from_scan : no_pose();
           for (int n = 0; n < 16; ++n) *next++ = pose.matrix()(n / 4, n % 4);
-        return matrices;
+          islands.push_back(scan.placed ? scan.island : 0);
+        }
+        return py::make_tuple(matrices, islands);
       },
       py::arg("path"), py::arg("numbers"), py::arg("folder"));
   m.def(

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "common/stop_scope.hpp"
+
 namespace gpureg::pose_graph {
 namespace {
 
@@ -15,6 +17,7 @@ constexpr double kNegligibleCost = 1e-12;
 }  // namespace
 
 bool Control::stop(double cost) {
+  StopScope::poll();
   if (!cancelled && options.should_stop && options.should_stop({iterations, cost}))
     cancelled = true;
   return cancelled;

@@ -20,6 +20,7 @@
 #include "reconstruction/audit/near_pairs.hpp"
 #include "reconstruction/audit/pair_verdicts.hpp"
 #include "reconstruction/audit/path.hpp"
+#include "reconstruction/audit/stoppable.hpp"
 
 namespace gpureg::reconstruction {
 namespace {
@@ -175,92 +176,12 @@ void add_ruled_out(const std::vector<Edge>& ruled_out, Reconstruction& map) {
                    [](const Edge& a, const Edge& b) { return a.pair < b.pair; });
 }
 
-}  // namespace
-
-const char* to_string(PairVerdict verdict) {
-  switch (verdict) {
-    case PairVerdict::silent:
-      return "silent";
-    case PairVerdict::supports:
-      return "supports";
-    case PairVerdict::contradicts:
-      return "contradicts";
-  }
-  return "unknown";
-}
-
-const char* to_string(ConnectionVerdict verdict) {
-  switch (verdict) {
-    case ConnectionVerdict::undecided:
-      return "undecided";
-    case ConnectionVerdict::confirmed:
-      return "confirmed";
-    case ConnectionVerdict::contradicted:
-      return "contradicted";
-  }
-  return "unknown";
-}
-
-AuditOptions AuditOptions::from_voxel_size(float voxel_size) {
-  require(positive(voxel_size), "voxel_size", voxel_size, "a finite number > 0");
-  AuditOptions options;
-  const double factor = static_cast<double>(voxel_size) / fields::kDefaultVoxel;
-  fields::scale(options, voxel_size);
-  // Coarse voxels suit large scenes, not worse sensors: ICP places LiDAR scans to decimetres.
-  if (factor > 1) options.max_shift /= std::sqrt(factor * std::sqrt(factor));
-  return options;
-}
-
-void AuditOptions::validate() const {
-  fields::validate(*this);
-  require(max_contradicted < min_confirmed, "max_contradicted", max_contradicted,
-          "less than min_confirmed");
-}
-
-bool Audit::sound() const { return count(ConnectionVerdict::contradicted) == 0; }
-
-std::vector<std::uint32_t> Audit::scans_of(const AuditedConnection& connection) const {
-  const auto begin = order.begin() + static_cast<std::ptrdiff_t>(connection.first);
-  std::vector<std::uint32_t> out(begin, begin + static_cast<std::ptrdiff_t>(connection.size));
-  std::sort(out.begin(), out.end());
-  return out;
-}
-
-std::size_t Audit::count(PairVerdict verdict) const {
-  return static_cast<std::size_t>(
-      std::count_if(pairs.begin(), pairs.end(),
-                    [&](const AuditedPair& pair) { return pair.verdict == verdict; }));
-}
-
-std::size_t Audit::count(ConnectionVerdict verdict) const {
-  return static_cast<std::size_t>(std::count_if(
-      connections.begin(), connections.end(),
-      [&](const AuditedConnection& connection) { return connection.verdict == verdict; }));
-}
-
-Audit audit(const Context& context, const std::vector<PreparedCloud>& clouds,
-            const std::vector<UnalignedIsometry3d>& world_from_scan,
-            const RegistrationOptions& registration, const AuditOptions& options) {
-  options.validate();
-  check_poses(clouds, world_from_scan);
-  std::vector<std::uint32_t> islands;
-  for (const UnalignedIsometry3d& pose : world_from_scan)
-    islands.push_back(pose.matrix().allFinite() ? 0 : kNoIsland);
-  return audit_of(context, clouds, world_from_scan, islands, {}, registration, options);
-}
-
-Audit audit(const Context& context, const std::vector<PreparedCloud>& clouds,
-            const Reconstruction& map, const RegistrationOptions& registration,
-            const AuditOptions& options) {
-  return audit_of(context, clouds, map, registration, options, {});
-}
-
-AuditedReconstruction reconstruct(const Context& context, const std::vector<PreparedCloud>& clouds,
-                                  const std::vector<Pair>& pairs,
-                                  const std::vector<RegistrationResult>& results,
-                                  const Options& options, const std::vector<Odometry>& odometry,
-                                  const RegistrationOptions& registration,
-                                  const AuditOptions& audit_options) {
+/// reconstruct(), within its should_stop.
+AuditedReconstruction reconstruct_and_audit(
+    const Context& context, const std::vector<PreparedCloud>& clouds,
+    const std::vector<Pair>& pairs, const std::vector<RegistrationResult>& results,
+    const Options& options, const std::vector<Odometry>& odometry,
+    const RegistrationOptions& registration, const AuditOptions& audit_options) {
   audit_options.validate();
   AuditedReconstruction out;
   std::vector<RegistrationResult> left = results;
@@ -298,6 +219,132 @@ AuditedReconstruction reconstruct(const Context& context, const std::vector<Prep
   add_ruled_out(ruled_out, out.map);
   judge_edges(out.audit, audit_options, out.places_look_alike, out.map);
   return out;
+}
+
+}  // namespace
+
+const char* to_string(PairVerdict verdict) {
+  switch (verdict) {
+    case PairVerdict::silent:
+      return "silent";
+    case PairVerdict::supports:
+      return "supports";
+    case PairVerdict::contradicts:
+      return "contradicts";
+  }
+  return "unknown";
+}
+
+const char* to_string(ConnectionVerdict verdict) {
+  switch (verdict) {
+    case ConnectionVerdict::undecided:
+      return "undecided";
+    case ConnectionVerdict::confirmed:
+      return "confirmed";
+    case ConnectionVerdict::contradicted:
+      return "contradicted";
+  }
+  return "unknown";
+}
+
+const char* to_string(AuditVerdict verdict) {
+  switch (verdict) {
+    case AuditVerdict::undecided:
+      return "undecided";
+    case AuditVerdict::sound:
+      return "sound";
+    case AuditVerdict::contradicted:
+      return "contradicted";
+  }
+  return "unknown";
+}
+
+AuditOptions AuditOptions::from_voxel_size(float voxel_size) {
+  require(positive(voxel_size), "voxel_size", voxel_size, "a finite number > 0");
+  AuditOptions options;
+  const double factor = static_cast<double>(voxel_size) / fields::kDefaultVoxel;
+  fields::scale(options, voxel_size);
+  // Coarse voxels suit large scenes, not worse sensors: ICP places LiDAR scans to decimetres.
+  if (factor > 1) options.max_shift *= std::pow(factor, -0.75);
+  return options;
+}
+
+void AuditOptions::validate() const {
+  fields::validate(*this);
+  require(max_contradicted < min_confirmed, "max_contradicted", max_contradicted,
+          "less than min_confirmed");
+}
+
+std::vector<AuditVerdict> Audit::verdicts() const {
+  std::vector<AuditVerdict> out(islands.size(), AuditVerdict::undecided);
+  std::vector<std::size_t> confirmed(islands.size(), 0), undecided(islands.size(), 0);
+  for (const AuditedConnection& connection : connections) {
+    confirmed[connection.island] += connection.verdict == ConnectionVerdict::confirmed;
+    undecided[connection.island] += connection.verdict == ConnectionVerdict::undecided;
+    if (connection.verdict == ConnectionVerdict::contradicted)
+      out[connection.island] = AuditVerdict::contradicted;
+  }
+  // Of right maps at most one connection of six was undecided.
+  for (std::size_t k = 0; k < out.size(); ++k)
+    if (out[k] != AuditVerdict::contradicted && confirmed[k] > undecided[k])
+      out[k] = AuditVerdict::sound;
+  return out;
+}
+
+AuditVerdict Audit::verdict() const {
+  const std::vector<AuditVerdict> all = verdicts();
+  bool any = false, sound = true;
+  for (std::size_t k = 0; k < all.size(); ++k) {
+    if (all[k] == AuditVerdict::contradicted) return AuditVerdict::contradicted;
+    if (islands[k].scans.size() < 2) continue;  // without a connection
+    any = true;
+    sound &= all[k] == AuditVerdict::sound;
+  }
+  return any && sound ? AuditVerdict::sound : AuditVerdict::undecided;
+}
+
+std::vector<std::uint32_t> Audit::scans_of(const AuditedConnection& connection) const {
+  const auto begin = order.begin() + static_cast<std::ptrdiff_t>(connection.first);
+  std::vector<std::uint32_t> out(begin, begin + static_cast<std::ptrdiff_t>(connection.size));
+  std::sort(out.begin(), out.end());
+  return out;
+}
+
+std::size_t Audit::count(PairVerdict verdict) const {
+  return static_cast<std::size_t>(
+      std::count_if(pairs.begin(), pairs.end(),
+                    [&](const AuditedPair& pair) { return pair.verdict == verdict; }));
+}
+
+std::size_t Audit::count(ConnectionVerdict verdict) const {
+  return static_cast<std::size_t>(std::count_if(
+      connections.begin(), connections.end(),
+      [&](const AuditedConnection& connection) { return connection.verdict == verdict; }));
+}
+
+Audit audit(const Context& context, const std::vector<PreparedCloud>& clouds,
+            const std::vector<UnalignedIsometry3d>& world_from_scan,
+            const RegistrationOptions& registration, const AuditOptions& options) {
+  return audit(context, clouds, map_of_poses(world_from_scan), registration, options);
+}
+
+Audit audit(const Context& context, const std::vector<PreparedCloud>& clouds,
+            const Reconstruction& map, const RegistrationOptions& registration,
+            const AuditOptions& options) {
+  return stoppable(options,
+                   [&] { return audit_of(context, clouds, map, registration, options, {}); });
+}
+
+AuditedReconstruction reconstruct(const Context& context, const std::vector<PreparedCloud>& clouds,
+                                  const std::vector<Pair>& pairs,
+                                  const std::vector<RegistrationResult>& results,
+                                  const Options& options, const std::vector<Odometry>& odometry,
+                                  const RegistrationOptions& registration,
+                                  const AuditOptions& audit_options) {
+  return stoppable(audit_options, [&] {
+    return reconstruct_and_audit(context, clouds, pairs, results, options, odometry, registration,
+                                 audit_options);
+  });
 }
 
 }  // namespace gpureg::reconstruction

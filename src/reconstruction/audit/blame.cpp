@@ -8,6 +8,7 @@
 #include <set>
 #include <unordered_map>
 
+#include "common/stop_scope.hpp"
 #include "math/exponential.hpp"
 #include "math/philox.hpp"
 #include "reconstruction/audit/common_shift.hpp"
@@ -302,11 +303,14 @@ void judge_connections(const std::vector<std::uint32_t>& islands, const std::vec
   // their fault.
   std::set<std::pair<double, std::uint32_t>> waiting;
   for (std::uint32_t scan = 0; scan < islands.size(); ++scan)
-    if (islands[scan] != kNoIsland && !forest.is_root(scan))
+    if (islands[scan] != kNoIsland && !forest.is_root(scan)) {
+      StopScope::poll();
       waiting.insert({judged(scan).confidence, scan});
+    }
   std::vector<AuditedConnection>& out = audit.connections;
   out.clear();
   while (!waiting.empty()) {
+    StopScope::poll();
     const auto [before, scan] = *waiting.begin();
     waiting.erase(waiting.begin());
     AuditedConnection connection = judged(scan);
@@ -322,6 +326,7 @@ void judge_connections(const std::vector<std::uint32_t>& islands, const std::vec
       }
       for (const std::size_t k : connection.contradictions) explained[k] = 1;
     }
+    connection.island = islands[scan];
     connection.first = forest.begin_of(scan);
     connection.size = forest.size_below(scan);
     out.push_back(std::move(connection));
@@ -331,6 +336,12 @@ void judge_connections(const std::vector<std::uint32_t>& islands, const std::vec
                      return a.confidence < b.confidence;
                    });
   audit.order = forest.order();
+  audit.islands.clear();
+  for (std::uint32_t scan = 0; scan < islands.size(); ++scan) {
+    if (islands[scan] == kNoIsland) continue;
+    if (islands[scan] >= audit.islands.size()) audit.islands.resize(islands[scan] + 1);
+    audit.islands[islands[scan]].scans.push_back(scan);
+  }
 }
 
 double log_odds_between(const std::vector<AuditedPair>& pairs, const ScansBelow& below,

@@ -21,7 +21,8 @@ struct Bond {
 /// @param bonds edges of the graph; empty: none is known. Their own pairs support nothing more.
 /// Time and memory grow with the number of scans and of pairs.
 /// @param world_from_scan in the frame of each island; empty: no common shift is looked for.
-/// @param audit its pairs are given, connections and order are filled in. Pairs across a connection
+/// @param audit its pairs are given, connections, order and islands are filled in. Pairs across a
+/// connection
 ///   that a common shift contradicts get their share of it.
 void judge_connections(const std::vector<std::uint32_t>& islands, const std::vector<Bond>& bonds,
                        const std::vector<UnalignedIsometry3d>& world_from_scan,

@@ -6,6 +6,7 @@
 #include <map>
 #include <numeric>
 
+#include "common/stop_scope.hpp"
 #include "math/exponential.hpp"
 #include "reconstruction/audit/blame.hpp"
 #include "reconstruction/audit/near_pairs.hpp"
@@ -115,9 +116,11 @@ bool agree(const Suggestion& x, const Suggestion& y, double distance) {
 /// The suggestions that most others agree with, no two of which agree: indices, the best first.
 std::vector<std::size_t> most_agreed(const std::vector<Suggestion>& all, double distance) {
   std::vector<double> support(all.size(), 0);
-  for (std::size_t k = 0; k < all.size(); ++k)
+  for (std::size_t k = 0; k < all.size(); ++k) {
+    StopScope::poll();
     for (const Suggestion& other : all)
       if (agree(all[k], other, distance)) support[k] += other.odds + kMostOfSuggestion;
+  }
   std::vector<std::size_t> order(all.size()), out;
   std::iota(order.begin(), order.end(), std::size_t{0});
   std::stable_sort(order.begin(), order.end(),

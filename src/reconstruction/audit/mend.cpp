@@ -12,6 +12,7 @@
 #include "reconstruction/audit/joins.hpp"
 #include "reconstruction/audit/near_pairs.hpp"
 #include "reconstruction/audit/parts.hpp"
+#include "reconstruction/audit/stoppable.hpp"
 #include "reconstruction/odometry.hpp"
 
 namespace gpureg::reconstruction {
@@ -150,37 +151,95 @@ MendedMap put_together(const Context& context, const std::vector<PreparedCloud>&
   return out;
 }
 
+/// The part of an audit that is about one island.
+Audit of_island(const Audit& found, std::uint32_t island) {
+  Audit out;
+  out.islands.resize(island + 1);
+  out.islands[island] = found.islands[island];
+  const std::vector<std::uint32_t>& scans = out.islands[island].scans;
+  std::vector<std::size_t> place(found.pairs.size());
+  for (std::size_t k = 0; k < found.pairs.size(); ++k) {
+    if (!std::binary_search(scans.begin(), scans.end(), found.pairs[k].source)) continue;
+    place[k] = out.pairs.size();
+    out.pairs.push_back(found.pairs[k]);
+  }
+  std::vector<std::size_t> before(found.order.size() + 1, 0);
+  for (std::size_t k = 0; k < found.order.size(); ++k) {
+    const bool here = std::binary_search(scans.begin(), scans.end(), found.order[k]);
+    before[k + 1] = before[k] + here;
+    if (here) out.order.push_back(found.order[k]);
+  }
+  for (AuditedConnection connection : found.connections) {
+    if (connection.island != island) continue;
+    connection.first = before[connection.first];
+    for (std::size_t& k : connection.contradictions) k = place[k];
+    out.connections.push_back(std::move(connection));
+  }
+  return out;
+}
+
 /// What an audit of the mended map contradicts has no pose any more.
 void leave_out_contradicted(const Context& context, const std::vector<PreparedCloud>& clouds,
+                            const std::vector<std::uint32_t>& islands,
                             const RegistrationOptions& registration, const AuditOptions& options,
                             MendedMap& map) {
   for (;;) {
-    map.audit = audit(context, clouds, map.world_from_scan, registration, options);
-    if (map.audit.sound()) return;
+    map.audit =
+        audit(context, clouds, map_of_poses(map.world_from_scan, islands), registration, options);
+    if (map.audit.verdict() != AuditVerdict::contradicted) return;
     // The worst connection: others may be contradicted because of it.
     for (const std::uint32_t scan : map.audit.scans_of(map.audit.connections.front()))
       map.world_from_scan[scan] = no_pose();
   }
 }
 
+/// mend(), within its should_stop.
+MendedMap mend_islands(const Context& context, const std::vector<PreparedCloud>& clouds,
+                       const Reconstruction& map, const Audit& found,
+                       const RegistrationOptions& registration, const AuditOptions& options) {
+  std::vector<UnalignedIsometry3d> poses;
+  std::vector<std::uint32_t> islands;
+  for (const Scan& scan : map.scans) {
+    poses.push_back(scan.placed ? scan.island_from_scan : no_pose());
+    islands.push_back(scan.placed ? scan.island : 0);
+  }
+  MendedMap out;
+  out.world_from_scan = poses;
+  out.audit = found;
+  if (found.verdict() != AuditVerdict::contradicted) return out;
+  const std::vector<AuditVerdict> verdicts = found.verdicts();
+  for (std::uint32_t island = 0; island < verdicts.size(); ++island) {
+    if (verdicts[island] != AuditVerdict::contradicted) continue;
+    std::vector<UnalignedIsometry3d> alone(poses.size(), no_pose());
+    for (const std::uint32_t scan : found.islands[island].scans) alone[scan] = poses[scan];
+    const MendedMap mended =
+        put_together(context, clouds, alone, of_island(found, island), registration, options);
+    for (const std::uint32_t scan : found.islands[island].scans)
+      out.world_from_scan[scan] = mended.world_from_scan[scan];
+    out.registered += mended.registered;
+  }
+  leave_out_contradicted(context, clouds, islands, registration, options, out);
+  list_changes(poses, out);
+  return out;
+}
+
 }  // namespace
+
+MendedMap mend(const Context& context, const std::vector<PreparedCloud>& clouds,
+               const Reconstruction& map, const Audit& found,
+               const RegistrationOptions& registration, const AuditOptions& options) {
+  options.validate();
+  if (map.scans.size() != clouds.size())
+    throw InvalidArgument("world_from_scan has " + std::to_string(map.scans.size()) +
+                          " entries, expected one per cloud, " + std::to_string(clouds.size()));
+  return stoppable(
+      options, [&] { return mend_islands(context, clouds, map, found, registration, options); });
+}
 
 MendedMap mend(const Context& context, const std::vector<PreparedCloud>& clouds,
                const std::vector<UnalignedIsometry3d>& world_from_scan, const Audit& found,
                const RegistrationOptions& registration, const AuditOptions& options) {
-  if (world_from_scan.size() != clouds.size())
-    throw InvalidArgument("world_from_scan has " + std::to_string(world_from_scan.size()) +
-                          " entries, expected one per cloud, " + std::to_string(clouds.size()));
-  MendedMap out;
-  if (found.sound()) {
-    out.world_from_scan = world_from_scan;
-    out.audit = found;
-    return out;
-  }
-  out = put_together(context, clouds, world_from_scan, found, registration, options);
-  leave_out_contradicted(context, clouds, registration, options, out);
-  list_changes(world_from_scan, out);
-  return out;
+  return mend(context, clouds, map_of_poses(world_from_scan), found, registration, options);
 }
 
 }  // namespace gpureg::reconstruction

@@ -6,6 +6,8 @@
 
 #include "reconstruction/audit/near_pairs.hpp"
 
+#include "common/stop_scope.hpp"
+
 namespace gpureg::reconstruction {
 namespace {
 
@@ -111,7 +113,10 @@ std::vector<Pair> near_pairs(const std::vector<PreparedCloud>& clouds,
                              const std::vector<std::uint32_t>& islands, std::uint32_t most) {
   const auto scans = static_cast<std::uint32_t>(clouds.size());
   std::vector<Box> boxes;
-  for (std::uint32_t k = 0; k < scans; ++k) boxes.push_back(box_of(clouds[k], world_from_scan[k]));
+  for (std::uint32_t k = 0; k < scans; ++k) {
+    StopScope::poll();
+    boxes.push_back(box_of(clouds[k], world_from_scan[k]));
+  }
   const double size = cell_size(boxes);
   std::map<Cell, std::vector<std::uint32_t>> cells;
   for (std::uint32_t k = 0; k < scans; ++k)
@@ -121,6 +126,7 @@ std::vector<Pair> near_pairs(const std::vector<PreparedCloud>& clouds,
   std::vector<std::uint32_t> seen_by(scans, scans);
   for (std::uint32_t k = 0; k < scans; ++k) {
     if (boxes[k].empty()) continue;
+    StopScope::poll();
     std::vector<std::uint32_t> partners;
     seen_by[k] = k;
     for_each_cell(boxes[k], size, [&](const Cell& cell) {

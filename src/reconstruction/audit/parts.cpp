@@ -170,7 +170,7 @@ Parts parts_without_few(const Context& context, const std::vector<PreparedCloud>
   std::vector<UnalignedIsometry3d> rest = poses;
   for (const std::uint32_t scan : few) rest[scan] = no_pose();
   const Audit left = audit(context, clouds, rest, registration, options);
-  if (!left.sound() ||
+  if (left.verdict() == AuditVerdict::contradicted ||
       left.count(ConnectionVerdict::undecided) > found.count(ConnectionVerdict::undecided))
     return {};
   Parts out(poses.size(), kNoPart);

@@ -6,6 +6,7 @@
 #include <map>
 #include <set>
 
+#include "common/stop_scope.hpp"
 #include "math/trigonometry.hpp"
 
 namespace gpureg::reconstruction {
@@ -222,6 +223,7 @@ class Growth {
       std::map<std::pair<std::uint32_t, std::uint32_t>, std::vector<Placement>> between) const {
     std::vector<Join> out;
     for (auto& [islands, placements] : between) {
+      StopScope::poll();
       std::stable_sort(
           placements.begin(), placements.end(),
           [](const Placement& x, const Placement& y) { return x.confidence > y.confidence; });

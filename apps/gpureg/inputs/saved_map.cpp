@@ -1,0 +1,87 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "inputs/saved_map.hpp"
+
+#include <filesystem>
+
+#include "gpureg/error.hpp"
+#include "inputs/map_poses.hpp"
+#include "json/json.hpp"
+#include "json/json_fields.hpp"
+#include "json/json_file.hpp"
+
+namespace gpureg::cli {
+namespace {
+
+namespace fs = std::filesystem;
+
+const Json& list_member(const Json& object, const char* name) {
+  const Json& list = member(object, name);
+  if (!list.is_array()) throw InvalidArgument(std::string("\"") + name + "\" is no list");
+  return list;
+}
+
+void add_scan(const Json& scan, SavedMap& map) {
+  if (member(scan, "island").is_null()) return;  // it is left out
+  const int number = fragment_member(scan, "id");
+  const auto island = static_cast<std::size_t>(fragment_member(scan, "island"));
+  if (island >= map.islands.size())
+    throw InvalidArgument("fragment " + std::to_string(number) + " is of island " +
+                          std::to_string(island) + " of " + std::to_string(map.islands.size()));
+  UnalignedIsometry3d pose;
+  pose.matrix() = rigid_motion(member(scan, "island_from_scan"), "island_from_scan");
+  if (!map.poses.emplace(number, pose).second)
+    throw InvalidArgument("fragment " + std::to_string(number) + " stands twice");
+  map.islands[island].push_back(number);
+}
+
+}  // namespace
+
+std::string saved_map_file(const std::string& path) {
+  std::error_code ignored;
+  const fs::path name = "reconstruction.json";
+  if (fs::is_directory(path, ignored)) {
+    const fs::path file = fs::path(path) / name;
+    return fs::exists(file, ignored) ? file.string() : std::string();
+  }
+  return fs::path(path).extension() == ".json" ? path : std::string();
+}
+
+SavedMap read_saved_map(const std::string& file) {
+  SavedMap map;
+  map.file = file;
+  DocumentFile document(file);
+  const Json json = document.read();
+  try {
+    map.scans = text_member(json, "folder");
+    map.islands.resize(list_member(json, "islands").size());
+    if (map.islands.empty()) throw InvalidArgument("no scan was placed");
+    for (const Json& scan : list_member(json, "scans")) add_scan(scan, map);
+  } catch (const InvalidArgument& error) {
+    throw IoError(file + ": " + error.what());
+  }
+  // The folder was named from where `reconstruct` ran.
+  if (!fs::is_directory(map.scans)) {
+    const fs::path beside =
+        fs::absolute(file).parent_path().parent_path() / fs::path(map.scans).filename();
+    if (fs::is_directory(beside)) map.scans = beside.string();
+  }
+  return map;
+}
+
+reconstruction::Reconstruction read_map_poses(const std::string& path,
+                                              const std::vector<int>& numbers,
+                                              const std::string& folder) {
+  const std::string file = saved_map_file(path);
+  if (file.empty()) {
+    if (std::error_code ignored; fs::is_directory(path, ignored))
+      throw IoError(path + " has no reconstruction.json" + kWrittenLast);
+    return read_pose_file(path, numbers, folder);
+  }
+  const SavedMap saved = read_saved_map(file);
+  std::map<std::int64_t, std::uint32_t> island;
+  for (std::uint32_t k = 0; k < saved.islands.size(); ++k)
+    for (const int number : saved.islands[k]) island[number] = k;
+  return map_of({saved.poses.begin(), saved.poses.end()}, island, numbers, file, folder);
+}
+
+}  // namespace gpureg::cli

@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <map>
+#include <string>
+#include <vector>
+
+#include "gpureg/reconstruction/map.hpp"
+
+namespace gpureg::cli {
+
+/// What `gpureg reconstruct` wrote, as far as other verbs read it: all from reconstruction.json, so
+/// that nothing of another run gets in.
+struct SavedMap {
+  std::string file;                          ///< its reconstruction.json
+  std::string scans;                         ///< folder of the scans
+  std::vector<std::vector<int>> islands;     ///< numbers of fragments, the largest island first
+  std::map<int, UnalignedIsometry3d> poses;  ///< of fragments, in the frames of their islands
+};
+
+/// For messages about a folder without one.
+inline constexpr const char* kWrittenLast =
+    ", which `gpureg reconstruct` writes when all else is there";
+
+/// The reconstruction.json that a path stands for: of a folder, or the file itself. Empty: none.
+std::string saved_map_file(const std::string& path);
+
+/// @param file reconstruction.json
+/// @throws IoError naming the file and what is wrong.
+SavedMap read_saved_map(const std::string& file);
+
+/// The map of the folder of a finished `gpureg reconstruct` or of its reconstruction.json, with its
+/// islands; or that of read_pose_file(), whose parameters these are.
+/// @throws IoError as read_pose_file(), also for a folder of an unfinished `gpureg reconstruct`.
+reconstruction::Reconstruction read_map_poses(const std::string& path,
+                                              const std::vector<int>& numbers,
+                                              const std::string& folder);
+
+}  // namespace gpureg::cli
