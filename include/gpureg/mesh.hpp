@@ -48,7 +48,9 @@ SurfaceMesh read_mesh(const std::string& path);
 SurfaceMesh make_mesh(std::vector<Eigen::Vector3d> vertices,
                       std::vector<std::array<std::uint32_t, 3>> faces);
 
-/// Points of the faces, uniform by area, with the normals of the faces. Same mesh, same bits.
+/// Points of the faces, uniform by area, with the normals of the faces. Same mesh, same bits. The
+/// cloud is a model, unless the mesh is open and what a sensor at the origin sees, one surface in
+/// each direction, from the front: then it is a scan with the origin as its viewpoint.
 /// @param spacing wanted mean distance of neighbours, in the unit of the vertices; between 20,000
 ///   and 2,000,000 points are made. 0: 20,000 points.
 /// @throws InvalidArgument where spacing is negative or not finite, or the mesh has no face.

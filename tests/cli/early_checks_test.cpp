@@ -64,6 +64,17 @@ TEST_F(EarlyChecks, OfScansBeforeTheMap) {
   expect_refused({"info", cloud_, out_ / "none.ply"}, {"CLOUD", "none.ply"});
 }
 
+TEST_F(EarlyChecks, AModelWithoutNormalsIsNamedWithARemedy) {
+  const std::string scan = write_cloud(out_, "scan.ply", room_scan(0)),
+                    model = write_cloud(out_, "model.ply", room_scan(1));
+  expect_refused({"register", scan, model, "--target-viewpoint", "model"},
+                 {"--target-viewpoint model needs normals", model, "give a mesh"});
+  expect_refused({"register", scan, model, "--source-viewpoint", "model"},
+                 {"--source-viewpoint model needs normals", scan});
+  expect_refused({"locate", scan, model, "--viewpoint", "model"}, {"--viewpoint model", scan});
+  expect_refused({"change", scan, model, "--viewpoint", "model"}, {"--viewpoint model", scan});
+}
+
 TEST_F(EarlyChecks, OfEveryResultBeforeAnyPicture) {
   const std::string good = out_.write("good.json", R"({"pairs": [{"i": 0, "j": 1, "score": 0.9,
       "status": "aligned", "reason": "none", "ms": {"total": 1},

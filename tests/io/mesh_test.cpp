@@ -60,6 +60,65 @@ TEST(Mesh, SpacingDecidesTheNumberOfSamples) {
   expect_error<InvalidArgument>([] { sample_mesh(SurfaceMesh{}); }, {"mesh.faces", "empty"});
 }
 
+/// A depth image with faces: a wall at z = 3 and a box before it.
+SurfaceMesh depth_image() {
+  constexpr std::uint32_t kSide = 120;
+  std::vector<Eigen::Vector3d> vertices;
+  std::vector<std::array<std::uint32_t, 3>> faces;
+  const auto near = [](std::uint32_t u, std::uint32_t v) {
+    return u > 30 && u < 70 && v > 40 && v < 90;
+  };
+  for (std::uint32_t v = 0; v < kSide; ++v)
+    for (std::uint32_t u = 0; u < kSide; ++u) {
+      const double depth = near(u, v) ? 2 : 3;
+      vertices.push_back(depth * Eigen::Vector3d((u - 60.0) / 100, (v - 60.0) / 100, 1));
+      if (u == 0 || v == 0 || near(u, v) != near(u - 1, v) || near(u, v) != near(u, v - 1) ||
+          near(u, v) != near(u - 1, v - 1))
+        continue;
+      const std::uint32_t at = v * kSide + u, left = at - 1, up = at - kSide;
+      faces.push_back({at, up, left});
+      faces.push_back({left, up, up - 1});
+    }
+  return make_mesh(std::move(vertices), std::move(faces));
+}
+
+TEST(Mesh, ADepthImageWithFacesIsAScanAndNoModel) {
+  const PointCloud scan = sample_mesh(depth_image());
+  EXPECT_FALSE(scan.model);
+  ASSERT_EQ(scan.viewpoints.size(), 1u);
+  EXPECT_EQ(scan.viewpoints[0], Eigen::Vector3f(0, 0, 0));
+  // From behind, or from the side, it is an open model.
+  const auto moved = [](const Eigen::Vector3d& by) {
+    SurfaceMesh mesh = depth_image();
+    for (Eigen::Vector3d& p : mesh.vertices) p += by;
+    return sample_mesh(mesh);
+  };
+  for (const Eigen::Vector3d& by : {Eigen::Vector3d(0, 0, -5), Eigen::Vector3d(4, 0, -2.5)}) {
+    EXPECT_TRUE(moved(by).model) << by.transpose();
+    EXPECT_TRUE(moved(by).viewpoints.empty());
+  }
+}
+
+TEST(Mesh, AnOpenModelIsAModelAlsoWhereItsOriginIsOutside) {
+  // A box without its lid, and a cabinet of shelves whose boards hide each other.
+  auto box = cube_faces();
+  box.resize(box.size() - 2);
+  std::vector<Eigen::Vector3d> vertices;
+  std::vector<std::array<std::uint32_t, 3>> faces;
+  for (int k = 0; k < 5; ++k) {
+    const auto first = static_cast<std::uint32_t>(vertices.size());
+    for (const double x : {-1.0, 1.0})
+      for (const double y : {-1.0, 1.0}) vertices.emplace_back(x, y, 2.0 + k);
+    faces.push_back({first, first + 1, first + 2});
+    faces.push_back({first + 1, first + 3, first + 2});
+  }
+  for (SurfaceMesh mesh : {make_mesh(cube_vertices(), box), make_mesh(vertices, faces)})
+    for (const double away : {0.0, 5.0}) {
+      for (Eigen::Vector3d& p : mesh.vertices) p.z() += away;
+      EXPECT_TRUE(sample_mesh(mesh).model);
+    }
+}
+
 TEST(Mesh, FlippedFacesAreTurned) {
   Triangles faces = cube_faces();
   std::swap(faces[3][0], faces[3][1]);

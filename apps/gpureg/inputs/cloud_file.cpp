@@ -33,7 +33,9 @@ PointCloud read_cloud(const std::string& path, double spacing, MeshNote note) {
   const std::string notes = mesh.notes();
   std::cerr << "gpureg: note: " << path << ": " << grouped(mesh.faces.size())
             << " faces were sampled by " << grouped(cloud.points.size()) << " points"
-            << (mesh.closed() ? ", normals outwards" : "; the surface is not closed")
+            << (mesh.closed() ? ", normals outwards"
+                : cloud.model ? "; the surface is not closed"
+                              : "; the surface is open and seen from the origin: a scan, no model")
             << (notes.empty() ? "" : "; " + notes) << std::endl;
   return cloud;
 }

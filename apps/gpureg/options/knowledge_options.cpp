@@ -50,6 +50,13 @@ void ViewpointChoice::apply(PointCloud& cloud) const {
   if (!is_word()) cloud.set_viewpoints({direction(numbers_of(text))});
 }
 
+void ViewpointChoice::check_cloud(const char* option, const PointCloud& cloud,
+                                  const std::string& file) const {
+  if (text == "model" && cloud.normals.empty() && !cloud.points.empty())
+    throw InvalidArgument(std::string(option) + " model needs normals that point outwards, and " +
+                          file + " has none: give a mesh, or write normals into the file");
+}
+
 void ViewpointChoice::note_place(const char* option, const PreparedCloud& cloud,
                                  const std::string& file) const {
   if (is_word()) return;

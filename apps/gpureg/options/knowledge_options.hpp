@@ -19,6 +19,8 @@ struct ViewpointChoice {
   void check(const char* option) const;
   /// Puts a given viewpoint into the cloud; "none" and "model" remove those of the file.
   void apply(PointCloud& cloud) const;
+  /// @throws InvalidArgument naming option and file, with a remedy, for a model without normals.
+  void check_cloud(const char* option, const PointCloud& cloud, const std::string& file) const;
   /// Says on stderr where a given viewpoint lies on a surface of the cloud, as no sensor does.
   void note_place(const char* option, const PreparedCloud& cloud, const std::string& file) const;
   /// View of a cloud that apply() has seen.

@@ -101,6 +101,7 @@ int run(Options o) {
   // A bad scan shall show before the map is prepared.
   PointCloud scan = read_scan(o.scan, context, input.options_or(of_map));
   const PreparedMap map = input.prepare(context, of_map);
+  o.place.viewpoint.check_cloud("--viewpoint", scan, o.scan);
   o.place.viewpoint.apply(scan);
   const PointCloudView view = o.place.viewpoint.view(scan);
   Json record;

@@ -63,6 +63,7 @@ std::vector<PointCloud> read_scans(const LocateRun& o, const Context& context,
   ViewpointNote note;
   for (const std::string& file : o.scans()) {
     clouds.push_back(read_scan(file, context, of_map));
+    o.place.viewpoint.check_cloud("--viewpoint", clouds.back(), file);
     o.place.viewpoint.apply(clouds.back());
     if (options.registration.prepare.depth_maps > 0) note.see(clouds.back(), file);
   }

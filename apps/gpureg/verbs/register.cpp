@@ -202,6 +202,8 @@ int run(RegisterOptions o) {
   if (!o.initial.empty()) initial = read_initial_poses(o.initial);
   const Context context = o.method.context();
   auto [source_cloud, target_cloud] = read_clouds(o);
+  o.source_viewpoint.check_cloud("--source-viewpoint", source_cloud, o.source);
+  o.target_viewpoint.check_cloud("--target-viewpoint", target_cloud, o.target);
   o.source_viewpoint.apply(source_cloud);
   o.target_viewpoint.apply(target_cloud);
   o.method.choose_voxel_size({source_cloud.view(), target_cloud.view()},

@@ -14,6 +14,7 @@
 #include "files/text_file.hpp"
 #include "gpureg/error.hpp"
 #include "io/limits.hpp"
+#include "io/meshes/one_view.hpp"
 #include "io/ply.hpp"
 
 namespace gpureg::io {
@@ -167,7 +168,6 @@ PointCloud sample_mesh(const SurfaceMesh& mesh, double spacing) {
   std::mt19937 random(1);
   const auto unit = [&] { return static_cast<double>(random()) / 4294967296.0; };
   PointCloud cloud;
-  cloud.model = true;
   std::vector<Eigen::Vector3d> points;
   points.reserve(count);
   cloud.normals.reserve(count);
@@ -184,6 +184,8 @@ PointCloud sample_mesh(const SurfaceMesh& mesh, double spacing) {
     cloud.normals.push_back(doubled_area(mesh, face).normalized().cast<float>());
   }
   set_points(cloud, points);
+  cloud.model = !is_one_view(mesh, points, cloud.normals);
+  if (!cloud.model) cloud.set_viewpoints({Eigen::Vector3d::Zero()});
   return cloud;
 }
 
