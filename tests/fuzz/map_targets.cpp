@@ -157,7 +157,9 @@ void read_saved_map(std::string_view payload) {
       again.cloud().points != cloud.points)
     broken("a saved map reads back");
   try {
-    check_places(locate(one(), cloud.view(), map));
+    LocateOptions options = LocateOptions::from_voxel_size(map.options().prepare.voxel_size, 0);
+    options.max_matches = 256;
+    check_places(locate(one(), {cloud.view()}, map, options).front());
     const ChangeResult changes =
         find_changes(one(), cloud.view(), map, UnalignedIsometry3d::Identity());
     check_changes(changes.scan, map.size());
