@@ -159,7 +159,8 @@ void read_saved_map(std::string_view payload) {
   try {
     LocateOptions options = LocateOptions::from_voxel_size(map.options().prepare.voxel_size, 0);
     options.max_matches = 256;
-    check_places(locate(one(), {cloud.view()}, map, options).front());
+    // It takes a hundred times as long as the rest: for some inputs, always the same.
+    if (sum % 8 == 0) check_places(locate(one(), {cloud.view()}, map, options).front());
     const ChangeResult changes =
         find_changes(one(), cloud.view(), map, UnalignedIsometry3d::Identity());
     check_changes(changes.scan, map.size());
