@@ -28,8 +28,8 @@ constexpr double kLeastLog = -12, kMostLogOfOdometry = 5, kMostLogOfLoops = 0;
 /// Halvings of that range.
 constexpr int kHalvings = 40;
 
-/// See estimate_noise(). bench/notes/loops.md: 1 doubles the error of odometry of a wrong scale, 3
-/// adds a tenth to that of independent noise.
+/// See estimate_noise(). bench/notes/loops.md: 1 adds a fifth or more to the error of a wrong
+/// scale, 3 a tenth to that of independent noise.
 constexpr double kTranslationBehind = 2;
 /// Half of what pose graphs take: rounding stays within.
 constexpr double kMostInformation = 0.5 * pose_graph::kLargestInformation;
