@@ -16,7 +16,7 @@
 #include "loop_closure/paths.hpp"
 #include "loop_closure/proposals.hpp"
 #include "loop_closure/register.hpp"
-#include "loop_closure/saved_state.hpp"
+#include "loop_closure/saving/saved_state.hpp"
 #include "loop_closure/verify.hpp"
 
 namespace gpureg::loop_closure {

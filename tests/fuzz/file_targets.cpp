@@ -7,7 +7,7 @@
 #include "gpureg/pose_graph/optimize.hpp"
 #include "gpureg/registration.hpp"
 #include "io/run_reader.hpp"
-#include "loop_closure/saved_state.hpp"
+#include "loop_closure/saving/saved_state.hpp"
 
 namespace gpureg::fuzz {
 namespace {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "loop_closure/check_state.hpp"
+#include "loop_closure/saving/check_state.hpp"
 
 #include <cmath>
 #include <set>

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "loop_closure/saved_state.hpp"
+#include "loop_closure/saving/saved_state.hpp"
 
 #include <cstring>
 #include <type_traits>
 
 #include "gpureg/error.hpp"
-#include "loop_closure/check_state.hpp"
+#include "loop_closure/saving/check_state.hpp"
 
 namespace gpureg::loop_closure {
 namespace {
