@@ -101,7 +101,8 @@ struct Options {
   /// voxels.
   double information_unit = 1.0;
   /// Graph optimisation: robust kernel, drift of odometry without covariance, noise of host loops
-  /// without information.
+  /// without information. By the drift pairs are proposed and loops verified. The poses start from
+  /// it: the accepted loops show how noisy odometry and loops are.
   pose_graph::Options graph;
   /// Distance over which errors of odometry without covariance have one sign, metres, >= 0: biases
   /// make drift grow faster than independent errors would. 0: independent errors.
@@ -302,7 +303,8 @@ class LoopCloser {
   std::vector<Loop> loops() const;  ///< every loop of fragments present, in a fixed order
   std::size_t size() const;         ///< number of fragments, those just added too
 
-  /// The graph of the accepted loops, as of the last process(), for a solver of the host.
+  /// The graph of the accepted loops, as of the last process(), for a solver of the host. With the
+  /// noise that Options state; that of poses() is what the loops show of it.
   pose_graph::Graph graph() const;
 
   /// Writes the whole state but the clouds and the options. Waits for a running process(). The file
