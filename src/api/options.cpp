@@ -43,7 +43,7 @@ double ConfidenceCalibration::operator()(double confidence) const {
 namespace {
 
 /// Numbers of candidates by quality: points of the Pareto front of recall and time that
-/// bench/accuracy/front.py measures (bench/results/front.json). More matches and seeds find more of
+/// bench/pipeline/front.py measures (bench/results/front.json). More matches and seeds find more of
 /// the difficult pairs, and more modes keep their poses.
 struct Effort {
   std::uint32_t matches, seeds, triangles, modes;

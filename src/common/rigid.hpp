@@ -2,11 +2,10 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <Eigen/LU>
 #include <cmath>
-#include <sstream>
 #include <string>
 
+#include "common/shown.hpp"
 #include "gpureg/error.hpp"
 
 namespace gpureg {
@@ -18,27 +17,28 @@ inline constexpr double kRigidTolerance = 1e-3;
 /// Why a matrix is no rigid motion, as "its last row is ..."; empty: it is one. All 16 numbers
 /// count: a matrix whose translation is in the last row has lost it otherwise.
 inline std::string why_not_rigid(const Eigen::Matrix4d& m, double tolerance = kRigidTolerance) {
-  std::ostringstream why;
   for (int row = 0; row < 4; ++row)
     for (int column = 0; column < 4; ++column)
-      if (!std::isfinite(m(row, column)) && why.str().empty())
-        why << "its element [" << row << ", " << column << "] is " << m(row, column)
-            << ", expected a finite number";
-  if (!m.allFinite()) return why.str();
+      if (!std::isfinite(m(row, column)))
+        return "its element [" + std::to_string(row) + ", " + std::to_string(column) + "] is " +
+               shown(m(row, column)) + ", expected a finite number";
   const Eigen::RowVector4d last(0, 0, 0, 1);
   constexpr double kLastRow = 1e-6;
   const Eigen::Matrix3d r = m.topLeftCorner<3, 3>();
   const double off = (r * r.transpose() - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff();
-  const bool rotation = off <= tolerance && r.determinant() > 0;
+  const auto minor = [&](int i, int j) { return r(1, i) * r(2, j) - r(1, j) * r(2, i); };
+  const double determinant = r(0, 0) * minor(1, 2) - r(0, 1) * minor(0, 2) + r(0, 2) * minor(0, 1);
+  const bool rotation = off <= tolerance && determinant > 0;
   if ((m.row(3) - last).cwiseAbs().maxCoeff() > kLastRow) {
-    why << "its last row is [" << m(3, 0) << ", " << m(3, 1) << ", " << m(3, 2) << ", " << m(3, 3)
-        << "], expected [0, 0, 0, 1]";
-    if (rotation && m.col(3) == last.transpose()) why << "; it looks transposed";
-  } else if (!rotation) {
-    why << "its rotation R has determinant " << r.determinant()
-        << ", and R R' is off the identity by " << off;
+    std::string row;
+    for (int k = 0; k < 4; ++k) row += (k > 0 ? ", " : "") + shown(m(3, k), 6);
+    const bool transposed = rotation && m.col(3) == last.transpose();
+    return "its last row is [" + row + "], expected [0, 0, 0, 1]" +
+           (transposed ? "; it looks transposed" : "");
   }
-  return why.str();
+  if (rotation) return {};
+  return "its rotation R has determinant " + shown(determinant, 6) +
+         ", and R R' is off the identity by " + shown(off, 6);
 }
 
 /// @throws InvalidArgument naming the pose and why it is no rigid motion.

@@ -265,7 +265,7 @@ AuditOptions AuditOptions::from_voxel_size(float voxel_size) {
   const double factor = static_cast<double>(voxel_size) / fields::kDefaultVoxel;
   fields::scale(options, voxel_size);
   // Coarse voxels suit large scenes, not worse sensors: ICP places LiDAR scans to decimetres.
-  if (factor > 1) options.max_shift *= std::pow(factor, -0.75);
+  if (factor > 1) options.max_shift /= std::sqrt(factor * std::sqrt(factor));
   return options;
 }
 

@@ -22,6 +22,8 @@ import sys
 import time
 
 import numpy as np
+
+sys.path.append(str(pathlib.Path(__file__).resolve().parents[1] / "accuracy"))
 import record
 from fit_confidence import CALIBRATION_BINS, MAX_ERROR, MIN_SEPARATION, SURE, blocks, errors
 
@@ -206,7 +208,7 @@ def measure(arguments):
                 print(summary(rows, scene.name, name), flush=True)
     record.write(
         arguments,
-        "bench/accuracy/front.py SCENE... --moved",
+        "bench/pipeline/front.py SCENE... --moved",
         {
             "device": context.description,
             "settings": {
