@@ -119,3 +119,19 @@ def test_errors_come_out(tmp_path):
     missing = gpureg.FragmentSet.from_clouds([[[0.0, 0, 0]], [[1.0, 2]]])
     with pytest.raises(ValueError, match=r"fragments\[1\]: expected shape \(N, 3\), got \(1, 2\)"):
         gpureg.ray.register_all(missing, output=tmp_path, progress=False)
+
+
+def test_a_bad_fragment_costs_its_own_pairs(tmp_path):
+    for k, cloud in enumerate(many.fragments()[:5]):
+        gpureg.write_point_cloud(tmp_path / f"cloud_bin_{k}.ply", cloud)
+    bad = tmp_path / "cloud_bin_3.ply"
+    content = bad.read_bytes()
+    bad.write_bytes(content[:1000])
+    keywords = {"options": few(500, 0.08), "chunk_size": 4, "progress": False}
+    run = gpureg.ray.register_all(tmp_path, output=tmp_path / "a", actors=2, **keywords)
+    assert run.pairs == 6 and list(run.unusable) == [3] and "truncated" in run.unusable[3]
+    bad.write_bytes(content)
+    run = gpureg.ray.register_all(tmp_path, output=tmp_path / "a", actors=2, **keywords)
+    assert run.resumed == 6 and not run.unusable
+    one = gpureg.register_all(tmp_path, output=tmp_path / "b", **keywords)
+    assert files_of(run) == files_of(one)
