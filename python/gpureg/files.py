@@ -17,7 +17,7 @@ Path = str | os.PathLike[str]
 
 
 def read_point_cloud(path: Path, *, spacing: float = 0.0) -> PointCloud:
-    """Read a PLY or PCD file, told apart by content, a scan of KITTI or nuScenes (.bin), or sample a mesh.
+    """Read a PLY or PCD file, told apart by content, a scan (.bin) of KITTI or nuScenes, or a mesh.
 
     Coordinates of a map keep the precision of the file. Warns (UserWarning) where the file itself
     holds them in float32, which is too coarse. Files with faces (STL, OBJ, PLY) become points of the faces, uniform by area, with the normals of the
