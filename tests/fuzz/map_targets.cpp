@@ -156,11 +156,12 @@ void read_saved_map(std::string_view payload) {
   if (again.size() != map.size() || again.tiles() != map.tiles() ||
       again.cloud().points != cloud.points)
     broken("a saved map reads back");
+  // What uses it takes a hundred times as long: for some inputs, always the same.
+  if (sum % 8 != 0) return;
   try {
     LocateOptions options = LocateOptions::from_voxel_size(map.options().prepare.voxel_size, 0);
     options.max_matches = 256;
-    // It takes a hundred times as long as the rest: for some inputs, always the same.
-    if (sum % 8 == 0) check_places(locate(one(), {cloud.view()}, map, options).front());
+    check_places(locate(one(), {cloud.view()}, map, options).front());
     const ChangeResult changes =
         find_changes(one(), cloud.view(), map, UnalignedIsometry3d::Identity());
     check_changes(changes.scan, map.size());
