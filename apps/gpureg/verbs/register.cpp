@@ -244,7 +244,7 @@ int run(RegisterOptions o) {
               << ", the result is of " << timed.quality << "\n";
 
   if (!o.json.empty()) {
-    Json json = document(o, o.time_budget ? options_of_level(options, timed.quality) : options,
+    Json json = document(o, o.time_budget ? options.with_quality(timed.quality) : options,
                          context, source, target, result);
     if (o.time_budget)
       json["time_budget"] = {{"ms", *o.time_budget},
