@@ -152,7 +152,7 @@ void check_pose(const UnalignedIsometry3d& pose, const std::string& name) {
   if (error > kOrthonormal)
     throw InvalidArgument(name +
                           " is not rigid: R R' of its rotation R differs from the identity by " +
-                          pose_graph::shown(error));
+                          shown(error));
   if (rotation.determinant() < 0)
     throw InvalidArgument(name + " is a mirror image: its rotation has the determinant -1");
 }
