@@ -5,6 +5,7 @@
 #include <cmath>
 #include <string>
 
+#include "common/coordinates.hpp"
 #include "common/shown.hpp"
 #include "gpureg/error.hpp"
 
@@ -36,6 +37,9 @@ inline std::string why_not_rigid(const Eigen::Matrix4d& m, double tolerance = kR
     return "its last row is [" + row + "], expected [0, 0, 0, 1]" +
            (transposed ? "; it looks transposed" : "");
   }
+  const double farthest = m.topRightCorner<3, 1>().cwiseAbs().maxCoeff();
+  if (farthest > limits::kMaxCoordinate)
+    return "its translation reaches " + shown(farthest) + ", expected at most 1e12";
   if (rotation) return {};
   return "its rotation R has determinant " + shown(determinant, 6) +
          ", and R R' is off the identity by " + shown(off, 6);

@@ -214,7 +214,7 @@ void run_audit(std::string_view input) {
       }
       results.push_back(result);
     }
-    const AuditedReconstruction map = reconstruct_audited(
+    const AuditedReconstruction map = reconstruct(
         one(), clouds, pairs, results, Options::from_voxel_size(0.1f), {}, registration, options);
     check_audit(map.audit);
     for (const Scan& scan : map.map.scans)

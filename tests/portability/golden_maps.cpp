@@ -57,9 +57,9 @@ void add_audits(const Context& context, const AlignedSet& set, Report& report) {
   add_audit("audit of a wrong map", audit(context, set.clouds, poses, set.options, options),
             report);
   const AuditedReconstruction map =
-      reconstruct_audited(context, set.clouds, set.pairs, set.results,
-                          reconstruction::Options::from_voxel_size(set.options.prepare.voxel_size),
-                          {}, set.options, options);
+      reconstruct(context, set.clouds, set.pairs, set.results,
+                  reconstruction::Options::from_voxel_size(set.options.prepare.voxel_size), {},
+                  set.options, options);
   add_audit("audited map", map.audit, report);
   for (std::size_t k = 0; k < map.map.scans.size(); ++k)
     report.line(
