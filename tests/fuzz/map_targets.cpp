@@ -9,7 +9,7 @@
 #include "fuzz/inputs.hpp"
 #include "fuzz/targets.hpp"
 #include "gpureg/change.hpp"
-#include "gpureg/reconstruction/audit.hpp"
+#include "gpureg/reconstruction.hpp"
 #include "io/run_reader.hpp"
 
 namespace gpureg::fuzz {

@@ -3,7 +3,7 @@
 
 #include "gpureg/calibration.hpp"
 #include "gpureg/change.hpp"
-#include "gpureg/reconstruction/audit.hpp"
+#include "gpureg/reconstruction.hpp"
 
 namespace gpureg::test {
 namespace {
