@@ -99,8 +99,6 @@ class CompatibilityOptions:
     max_turn: float
     consensus_distance: float
     seed_separation: float
-    first_pass_reject: float
-    first_pass_accept: float
     def __init__(
         self,
         *,
@@ -113,8 +111,6 @@ class CompatibilityOptions:
         max_turn: float = ...,
         consensus_distance: float = ...,
         seed_separation: float = ...,
-        first_pass_reject: float = ...,
-        first_pass_accept: float = ...,
     ) -> None: ...
     def replace(
         self,
@@ -128,8 +124,6 @@ class CompatibilityOptions:
         max_turn: float = ...,
         consensus_distance: float = ...,
         seed_separation: float = ...,
-        first_pass_reject: float = ...,
-        first_pass_accept: float = ...,
     ) -> CompatibilityOptions: ...
     def validate(self) -> None: ...
     def __eq__(self, other: object, /) -> bool: ...
