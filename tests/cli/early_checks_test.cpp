@@ -48,7 +48,6 @@ TEST_F(EarlyChecks, OfPairsAndPoses) {
   expect_named({"audit", dir}, "0 1 2 3\n");
   expect_named({"register", cloud_, cloud_, "--initial"}, "0 1 2 3\n");
   expect_named({"register", cloud_, cloud_, "--calibration"}, "{}");
-  expect_named({"locate", cloud_, cloud_, "--calibration"}, "{}");
   expect_named({"change", cloud_, cloud_, "--pose"}, "0 1 2 3\n");
   EXPECT_FALSE(std::filesystem::exists(log));
   // Cameras of the folder.

@@ -35,7 +35,7 @@ TEST_F(Register, ReportsTheResult) {
   EXPECT_EQ(outcome.err, "");
   expect_holds(outcome.out,
                {source_, target_, "backend  cpu", "status   aligned", "target_from_source\n",
-                "score", "inliers", "correspondences", "hypotheses 128", "survivors", "features",
+                "score", "inliers", "correspondences", "hypotheses 512", "survivors", "features",
                 "depth maps", "match", "refine"});
 }
 

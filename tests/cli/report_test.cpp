@@ -64,7 +64,7 @@ TEST_F(Report, NumbersAlone) {
   expect_self_contained(html);
   expect_holds(
       html,
-      {"voxel size 0.1 m", "1024 seeds per pair", "21 pairs of 7 fragments were tried, 10 reported",
+      {"voxel size 0.1 m", "512 seeds per pair", "21 pairs of 7 fragments were tried, 10 reported",
        "Preparation, mean per fragment", "Alignment, mean per pair", ">match<", ">features<",
        "Every pair", "confidence_too_low", "Options", ">max_verification_normal_angle<",
        "<td>min_confidence</td><td>0.5</td>", "<td>method</td><td>compatibility</td>"});

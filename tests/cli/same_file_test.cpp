@@ -48,14 +48,12 @@ class SameFile : public testing::Test {
     folder.write("pose.txt", text_of(scan_from_room(2).inverse().matrix()));
     folder.write("odometry.txt", poses);
     folder.write("pairs.txt", "0 1\n0 2\n1 2\n");
-    std::string confidences, labels;
-    for (int k = 0; k < 40; ++k) {
-      confidences += (k ? ", 0." : "0.") + std::to_string(50 + k);
-      labels += k ? ", true" : "true";
-    }
-    folder.write("calibration.json", R"({"gpureg": "calibration", "slope": 1, "offset": 0, )"
-                                     R"("voxel_size": 0.1, "decided_pairs": {"confidence": [)" +
-                                         confidences + R"(], "correct": [)" + labels + "]}}");
+    run(joined({"calibrate", folder / "scans", "--self-pairs", "4", "-o", folder / "made.json"},
+               kSmall));
+    auto calibration = json_of(folder / "made.json");
+    calibration["clouds"] = {7};  // of another scene
+    calibration["decided_pairs"] = {{"confidence", {0.9, 0.4}}, {"correct", {true, false}}};
+    folder.write("calibration.json", calibration.dump());
     make(
         {"batch", folder / "scans", "-o", folder / "result.log", "--json", folder / "result.json"});
     make({"reconstruct", folder / "scans", "-o", folder / "map"});
@@ -118,15 +116,13 @@ class SameFile : public testing::Test {
         {in("saved.gpureg"), {in("saved.gpureg")}},
         {other, {other}}};
     for (const auto& [map, files] : maps) {
-      rows.push_back({joined({"locate", scan, map}, calibration),
-                      joined(files, {scan, in("calibration.json")}),
-                      {"--json", "--save-map"}});
+      rows.push_back({{"locate", scan, map}, joined(files, {scan}), {"--json", "--save-map"}});
       rows.push_back({{"change", scan, map, "--pose", in("pose.txt")},
                       joined(files, {scan, in("pose.txt")}),
                       {"--json", "--scan-ply", "--map-ply"}});
     }
-    rows.push_back({joined({"change", scan, in("saved.gpureg")}, calibration),
-                    {scan, in("saved.gpureg"), in("calibration.json")},
+    rows.push_back({{"change", scan, in("saved.gpureg")},
+                    {scan, in("saved.gpureg")},
                     {"--json", "--scan-ply", "--map-ply"}});
     // A scan that is a folder.
     rows.push_back(
@@ -191,9 +187,9 @@ TEST_F(SameFile, NoOutputOfAnyVerbIsWrittenOverAnotherOne) {
 }
 
 TEST_F(SameFile, NoFileOfAMapIsWrittenOverAnInput) {
-  const Words names = {
-      "poses.txt", "trajectory.txt", "edges.log",  "graph.g2o",           "map.ply",
-      "map_1.ply", "map.html",       "pairs.json", "reconstruction.json", "pairs.journal"};
+  const Words names = {"poses.txt",  "trajectory.txt",      "edges.log",    "graph.g2o",
+                       "map.ply",    "map_1.ply",           "poses_1.txt",  "map.html",
+                       "pairs.json", "reconstruction.json", "pairs.journal"};
   const std::vector<std::pair<std::string, std::string>> inputs = {
       {"--odometry", "odometry.txt"},
       {"--pairs", "pairs.txt"},

@@ -79,14 +79,11 @@ int run(Options o) {
   o.place.check();
   if (!o.pose.empty()) {
     const std::string why = "with --pose: the scan is not searched for";
-    o.method.refuse({"--quality", "--seed", "--min-score", "--calibration", "--up", "--near"}, why);
+    o.method.refuse({"--quality", "--seed", "--min-score", "--up", "--near"}, why);
     o.method.refuse_set_outside({"prepare"}, why);
   }
   check_outputs({{"--json", o.json}, {"--scan-ply", o.scan_ply}, {"--map-ply", o.map_ply}},
-                {{"SCAN", o.scan},
-                 {"MAP", o.map},
-                 {"--pose", o.pose},
-                 {"--calibration", o.method.calibration}});
+                {{"SCAN", o.scan}, {"MAP", o.map}, {"--pose", o.pose}});
   std::optional<UnalignedIsometry3d> pose;
   if (!o.pose.empty()) pose = read_pose(o.pose);
   const Context context = o.method.context();

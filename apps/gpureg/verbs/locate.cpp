@@ -103,12 +103,11 @@ int run(LocateRun o) {
   o.place.check();
   if (o.scans().empty()) {
     const std::string why = "without a scan";
-    o.method.refuse({"--quality", "--seed", "--min-score", "--calibration", "--viewpoint", "--up",
-                     "--near", "--json"},
-                    why);
+    o.method.refuse(
+        {"--quality", "--seed", "--min-score", "--viewpoint", "--up", "--near", "--json"}, why);
     o.method.refuse_set_outside({"prepare"}, why);
   }
-  std::vector<NamedPath> inputs{{"MAP", o.map()}, {"--calibration", o.method.calibration}};
+  std::vector<NamedPath> inputs{{"MAP", o.map()}};
   for (const std::string& file : o.scans()) inputs.push_back({"SCAN", file});
   check_outputs({{"--json", o.json}, {"--save-map", o.save_map}}, inputs);
   const Context context = o.method.context();

@@ -73,7 +73,8 @@ void check_output_folder(const ReconstructOptions& o) {
                           ": give --results that file, or -o another folder");
   // Those of the map of an earlier run are removed. Its pairs may make another map.
   for (const std::string& file : map_files_in(o.output))
-    if (!fs::equivalent(file, o.results, error)) check_outputs({{"a file of -o", file}}, inputs);
+    if (fs::path(file).filename() != "pairs.json" || !fs::equivalent(file, o.results, error))
+      check_outputs({{"a file of -o", file}}, inputs);
   std::vector<NamedPath> outputs = {{"the journal of -o", o.journal()}};
   for (const char* name : kMapFiles)
     if (o.results.empty() || std::string(name) != "pairs.json")
