@@ -28,6 +28,7 @@ import record
 from fit_confidence import CALIBRATION_BINS, MAX_ERROR, MIN_SEPARATION, SURE, blocks, errors
 
 PRECISIONS = (95, 99)
+TICKS = (0.07, 0.1, 0.15, 0.2, 0.3, 0.5, 0.8)  # ms, of the plot
 MOVED_SEED = 1
 
 
@@ -258,8 +259,13 @@ def plot(arguments):
     import matplotlib.pyplot as plt
 
     rows = json.loads(arguments.output.read_text())["rows"]
-    scenes = list(dict.fromkeys(row["scene"] for row in rows))
     names = list(dict.fromkeys(row["setting"] for row in rows))
+    # Those that were run with every setting.
+    scenes = [
+        scene
+        for scene in dict.fromkeys(row["scene"] for row in rows)
+        if all(of(rows, scene, name) for name in names)
+    ]
     figure, axes = plt.subplots(1, 2, figsize=(11, 4.5), sharex=True)
     for axis, path, label in zip(
         axes, (("first",), ("geometric", "R@P95")), ("first correct, %", "R@P95, geometric, %")
@@ -270,8 +276,13 @@ def plot(arguments):
             )
             y = statistics.mean(mean(of(rows, scene, name), *path) for scene in scenes)
             axis.plot(x, y, "o", color="C0")
-            axis.annotate(name, (x, y), fontsize=7, xytext=(3, 3), textcoords="offset points")
+            # The others stand close together.
+            if name.startswith(("quality", "default", "8192")):
+                text = name.split(",")[0].replace("quality ", "")
+                axis.annotate(text, (x, y), fontsize=8, xytext=(4, 4), textcoords="offset points")
         axis.set_xscale("log")
+        axis.set_xticks(TICKS, TICKS)
+        axis.minorticks_off()
         axis.set_xlabel("ms a pair, mean of the scenes")
         axis.set_ylabel(label)
         axis.grid(alpha=0.3)

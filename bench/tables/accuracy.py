@@ -279,6 +279,8 @@ def front():
         )
 
     def cell(scenes, setting):
+        if not any(row["setting"] == setting and row["scene"] in scenes for row in rows):
+            return ""
         first, found, recall = (
             mean_of(scenes, setting, value)
             for value in (
@@ -301,7 +303,7 @@ def front():
     return [
         *out,
         "",
-        f"Seeds {', '.join(map(str, seeds))} at commit {record['commit']}, {record['device']}.",
+        f"Seeds {', '.join(map(str, seeds))} at commit {record['commit']}, {record['device']}. {record['remark']}",
     ]
 
 
