@@ -244,8 +244,8 @@ int run(RegisterOptions o) {
               << ", the result is of " << timed.quality << "\n";
 
   if (!o.json.empty()) {
-    Json json = document(o, o.time_budget ? options.with_quality(timed.quality) : options,
-                         context, source, target, result);
+    Json json = document(o, o.time_budget ? options.with_quality(timed.quality) : options, context,
+                         source, target, result);
     if (o.time_budget)
       json["time_budget"] = {{"ms", *o.time_budget},
                              {"used_ms", timed.milliseconds},
