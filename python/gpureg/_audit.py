@@ -192,8 +192,8 @@ def audit(
     fragments : FragmentSet, folder, or sequence of clouds
     poses : Map, path, or (N, 4, 4) array
         A `Map`, or the output folder of ``gpureg reconstruct``: island by island. Of one frame:
-        ``world_from_scan`` of each fragment, NaN where it has none; or a file, as for `gpureg
-        audit`: a trajectory (TUM with fragment numbers as times, KITTI, or poses.txt), g2o, or a
+        ``world_from_scan`` of each fragment, NaN where it has none; or a file, as for
+        ``gpureg audit``: a trajectory (TUM with fragment numbers as times, KITTI, or poses.txt), g2o, or a
         Redwood log of scans or of pairs.
     options : RegistrationOptions, optional
     audit_options : AuditOptions, optional

@@ -25,8 +25,9 @@ Graph read_g2o(const std::string& path, G2oRotation rotation = G2oRotation::quat
 /// Writes nodes, FIX lines and edges; an edge's first mode only.
 ///
 /// @param result  where given, its poses and chosen modes are written and rejected loops left out.
-/// @throws IoError; InvalidArgument for a node without a pose, an edge without information, a
-///   gravity factor or a prior, which g2o's tags cannot say.
+/// @throws IoError where the file cannot be written.
+/// @throws InvalidArgument for a node without a pose, an edge without information, a gravity factor
+///   or a prior, which g2o's tags cannot say.
 void write_g2o(const std::string& path, const Graph& graph, const Result* result = nullptr,
                G2oRotation rotation = G2oRotation::quaternion_vector);
 
@@ -38,7 +39,8 @@ Graph read_open3d(const std::string& path);
 /// Writes an Open3D PoseGraph (JSON). Nodes must have the ids 0, 1, ..., as Open3D refers to nodes
 /// by position.
 /// @param result  as for write_g2o.
-/// @throws IoError; InvalidArgument as write_g2o's.
+/// @throws IoError where the file cannot be written.
+/// @throws InvalidArgument as write_g2o().
 void write_open3d(const std::string& path, const Graph& graph, const Result* result = nullptr);
 
 }  // namespace gpureg::pose_graph
