@@ -68,7 +68,10 @@ nitpick_ignore_regex = [
     (r"cpp:.*", r"u?int\d+_t|size_t|CUstream_st|PreparedState|Engine|Base|Point\w+|SignatureT"),
     (r"py:.*", r"(np|numpy|npt|pa|pyarrow|ray|collections|os|pathlib)\..*|Path|Any"),
     (r"py:.*", r"(gpureg\.)?_.*|results"),
-    (r"py:class", r".* .*|fragments|pairs|tried|kept|source|confidence|accepted|float64|N|more_scans|MapGraph|\d"),
+    (
+        r"py:class",
+        r".* .*|fragments|pairs|tried|kept|source|confidence|accepted|float64|N|more_scans|MapGraph|\d",
+    ),
 ]
 
 html_theme = "furo"
