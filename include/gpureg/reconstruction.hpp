@@ -59,10 +59,6 @@ Reconstruction reconstruct_from_poses(std::size_t scans, const std::vector<Pair>
                                       const Options& options = {},
                                       const std::vector<Odometry>& odometry = {});
 
-/// The inverse of CorrespondenceMoments::information_redwood(), for results that were read from a
-/// file.
-CorrespondenceMoments moments_of_information(const Eigen::Matrix<double, 6, 6>& redwood);
-
 /// The placed scans with their poses, the odometry between them, and the accepted edges. Node ids
 /// are indices of scans, or `ids` of them where given.
 /// @throws InvalidArgument where ids are neither none nor one per scan.

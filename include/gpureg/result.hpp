@@ -34,6 +34,8 @@ struct CorrespondenceMoments {
   /// Redwood's 6x6: translation first, rotation as quaternion vector (factor 2): sum of A'A, A = [I
   /// | 2 [p]x'] (Choi et al. 2015).
   Eigen::Matrix<double, 6, 6> information_redwood() const;
+  /// Its inverse, for results that were read from a file.
+  static CorrespondenceMoments from_redwood(const Eigen::Matrix<double, 6, 6>& information);
   /// Open3D's 6x6: rotation (angles) first, no factor 2.
   Eigen::Matrix<double, 6, 6> information_open3d() const;
 };

@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "gpureg/result.hpp"
 
+#include <algorithm>
+#include <cmath>
+
 namespace gpureg {
 
 const char* to_string(RegistrationStatus status) {
@@ -136,6 +139,17 @@ Eigen::Matrix<double, 6, 6> CorrespondenceMoments::information_redwood() const {
   m.bottomLeftCorner<3, 3>() = m.topRightCorner<3, 3>().transpose();
   m.bottomRightCorner<3, 3>() = 4.0 * (outer.trace() * Eigen::Matrix3d::Identity() - outer);
   return m;
+}
+
+CorrespondenceMoments CorrespondenceMoments::from_redwood(
+    const Eigen::Matrix<double, 6, 6>& information) {
+  CorrespondenceMoments moments;
+  moments.count = static_cast<std::uint64_t>(std::max(0.0, std::round(information(0, 0))));
+  const Eigen::Matrix3d cross = information.topRightCorner<3, 3>() / -2;
+  moments.sum = {cross(2, 1), cross(0, 2), cross(1, 0)};
+  const Eigen::Matrix3d turn = information.bottomRightCorner<3, 3>() / 4;
+  moments.outer = 0.5 * turn.trace() * Eigen::Matrix3d::Identity() - turn;
+  return moments;
 }
 
 Eigen::Matrix<double, 6, 6> CorrespondenceMoments::information_open3d() const {

@@ -106,16 +106,6 @@ Reconstruction map_of_poses(const std::vector<UnalignedIsometry3d>& island_from_
   return map;
 }
 
-CorrespondenceMoments moments_of_information(const Eigen::Matrix<double, 6, 6>& redwood) {
-  CorrespondenceMoments moments;
-  moments.count = static_cast<std::uint64_t>(std::max(0.0, std::round(redwood(0, 0))));
-  const Eigen::Matrix3d cross = redwood.topRightCorner<3, 3>() / -2;
-  moments.sum = {cross(2, 1), cross(0, 2), cross(1, 0)};
-  const Eigen::Matrix3d turn = redwood.bottomRightCorner<3, 3>() / 4;
-  moments.outer = 0.5 * turn.trace() * Eigen::Matrix3d::Identity() - turn;
-  return moments;
-}
-
 pose_graph::Graph graph_of(const Reconstruction& map, const std::vector<std::int64_t>& ids) {
   if (!ids.empty() && ids.size() != map.scans.size())
     throw InvalidArgument("ids has " + std::to_string(ids.size()) +

@@ -142,6 +142,7 @@ TOGETHER = (
                                      " loop_consistency pruning").split()),
     *((f"src/{name}",) for name in "evaluation io pose_graph reconstruction localization fields files".split()),
     ("data",),
+    tuple(f"apps/gpureg/{name}" for name in "verbs options run inputs json records pages pictures".split()),
 )  # fmt: skip
 ALONE = {"byte_rows.cpp", "closest_grid.cpp", "feature_search.cpp", "surface_graph.cpp"}
 

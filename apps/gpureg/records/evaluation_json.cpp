@@ -13,7 +13,7 @@ namespace {
 constexpr double kGoodDistance = 0.2;                        // metres, Redwood's rule
 constexpr double kGoodDegrees = 15, kGoodTranslation = 0.3;  // 3DMatch's registration recall
 
-using Pair = std::pair<int, int>;
+using PairNumbers = std::pair<int, int>;
 
 struct Known {
   Eigen::Matrix4d transform;
@@ -30,20 +30,20 @@ double metres_between(const Eigen::Matrix4d& a, const Eigen::Matrix4d& b) {
   return (a.topRightCorner<3, 1>() - b.topRightCorner<3, 1>()).norm();
 }
 
-void add(std::map<Pair, Known>& known, const std::vector<evaluation::LogEntry>& log,
+void add(std::map<PairNumbers, Known>& known, const std::vector<evaluation::LogEntry>& log,
          const std::vector<evaluation::InformationEntry>& information) {
   for (std::size_t k = 0; k < log.size(); ++k)
     if (log[k].j - log[k].i > 1)
       known[{log[k].i, log[k].j}] = {log[k].transform, information[k].information};
 }
 
-Json to_json(const evaluation::Scores& s) {
+Json scores_json(const evaluation::Scores& s) {
   return {
       {"good", s.good},         {"good_recall", s.good_recall}, {"ground_truth", s.ground_truth},
       {"reported", s.reported}, {"recall", s.recall()},         {"precision", s.precision()}};
 }
 
-Json to_json(const evaluation::RankedScores& r) {
+Json ranked_json(const evaluation::RankedScores& r) {
   return {{"raw_recall", r.raw_recall},
           {"recall_at_precision",
            {{"50", r.recall_at_50},
@@ -57,31 +57,31 @@ Json to_json(const evaluation::RankedScores& r) {
 
 Json to_json(const evaluation::Evaluation& e) {
   Json json;
-  json["strict"] = to_json(e.strict);
-  if (e.strict_ranked) json["strict"].update(to_json(*e.strict_ranked));
+  json["strict"] = scores_json(e.strict);
+  if (e.strict_ranked) json["strict"].update(ranked_json(*e.strict_ranked));
   if (e.geometric) {
-    json["geometric"] = to_json(*e.geometric);
-    if (e.geometric_ranked) json["geometric"].update(to_json(*e.geometric_ranked));
+    json["geometric"] = scores_json(*e.geometric);
+    if (e.geometric_ranked) json["geometric"].update(ranked_json(*e.geometric_ranked));
   }
   return json;
 }
 
 Json pair_verdicts(const evaluation::GroundTruth& truth, const ResultFile& result) {
-  std::map<Pair, Known> listed;
+  std::map<PairNumbers, Known> listed;
   add(listed, truth.log, truth.information);
-  std::map<Pair, Known> known = listed;
+  std::map<PairNumbers, Known> known = listed;
   add(known, truth.all_log, truth.all_information);
-  std::map<Pair, const evaluation::Report*> reports;
-  std::set<Pair> tried, all;
+  std::map<PairNumbers, const evaluation::Report*> reports;
+  std::set<PairNumbers> tried, all;
   for (const evaluation::Report& report : result.reports) reports[{report.i, report.j}] = &report;
   for (const auto& [pair, unused] : reports) tried.insert(pair);
   for (const PairRecord& pair : result.pairs) tried.insert({pair.i, pair.j});
   for (const auto& [pair, unused] : listed) all.insert(pair);
-  for (const Pair& pair : tried)
+  for (const PairNumbers& pair : tried)
     if (pair.second - pair.first > 1) all.insert(pair);
 
   Json verdicts = Json::array();
-  for (const Pair& pair : all) {
+  for (const PairNumbers& pair : all) {
     const auto at = known.find(pair);
     const auto found = reports.find(pair);
     const bool is_listed = listed.count(pair) != 0;
@@ -128,7 +128,7 @@ Json pair_verdicts(const evaluation::GroundTruth& truth, const ResultFile& resul
 RegistrationRecall registration_recall(const std::string& truth_log, const ResultFile& result) {
   const std::vector<evaluation::LogEntry> truth = evaluation::read_log(truth_log);
   evaluation::check_entries(truth_log, truth);
-  std::map<Pair, const evaluation::Report*> reports;
+  std::map<PairNumbers, const evaluation::Report*> reports;
   for (const evaluation::Report& report : result.reports) reports[{report.i, report.j}] = &report;
   RegistrationRecall recall;
   for (const evaluation::LogEntry& entry : truth) {

@@ -2,7 +2,6 @@
 #include "records/pair_store.hpp"
 
 #include "gpureg/error.hpp"
-#include "gpureg/reconstruction.hpp"
 #include "json/json_fields.hpp"
 #include "json/json_file.hpp"
 #include "records/pair_json.hpp"
@@ -35,7 +34,7 @@ RegistrationResult stored_result(const Json& json) {
   RegistrationResult result = result_from_json(json);
   if (const auto found = json.find("information"); found != json.end() && !found->is_null())
     result.source_moments =
-        reconstruction::moments_of_information(square_matrix<6>(*found, "information"));
+        CorrespondenceMoments::from_redwood(square_matrix<6>(*found, "information"));
   return result;
 }
 
@@ -81,7 +80,7 @@ PairStore read_pairs(const std::string& path, const FragmentFolder& folder, floa
 
 void reduce_moments(RegistrationResult& result) {
   result.source_moments =
-      reconstruction::moments_of_information(result.source_moments.information_redwood());
+      CorrespondenceMoments::from_redwood(result.source_moments.information_redwood());
   result.target_moments = {};
 }
 

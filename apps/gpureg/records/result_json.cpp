@@ -18,7 +18,7 @@ Json to_json(const Eigen::Ref<const Eigen::MatrixXd>& matrix) {
   return numbers;
 }
 
-Json to_json(const RegistrationMode& mode, const char* pose_name) {
+Json mode_json(const RegistrationMode& mode, const char* pose_name) {
   return {{pose_name, to_json(mode.target_from_source.matrix())},
           {"confidence", mode.confidence},
           {"overlap_confidence", mode.overlap_confidence},
@@ -40,7 +40,7 @@ Json to_json(const RegistrationResult& result, const char* pose_name) {
                         {"confidence", result.symmetry_confidence()}};
     json["modes"] = Json::array();
     for (const RegistrationMode& mode : result.modes)
-      json["modes"].push_back(to_json(mode, pose_name));
+      json["modes"].push_back(mode_json(mode, pose_name));
   }
   json["statistics"] = to_json(result.statistics);
   json["ms"] = to_json(result.timings);

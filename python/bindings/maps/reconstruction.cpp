@@ -249,7 +249,7 @@ RegistrationResult result_of_row(bool aligned, const py::object& pose, double sc
   result.target_from_source.matrix() =
       matrix_of<Eigen::Matrix4d>(pose.cast<DoubleArray>(), "target_from_source");
   if (!information.is_none())
-    result.source_moments = moments_of_information(
+    result.source_moments = CorrespondenceMoments::from_redwood(
         matrix_of<Eigen::Matrix<double, 6, 6>>(information.cast<DoubleArray>(), "information"));
   return result;
 }
