@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Every folder includes only what the table of docs/design.md (Layers) lets it include."""
+"""Every folder includes only what the table of CONTRIBUTING.md (Layers) lets it include."""
 
 import pathlib
 import re
@@ -10,7 +10,7 @@ SOURCES = {".cpp", ".hpp", ".cu", ".cuh"}
 
 def table(root: pathlib.Path) -> dict[str, set[str]]:
     """Folder -> folders and public headers that it may include, of the rows `folder` | `folder`, ..."""
-    lines = (root / "docs/design.md").read_text().partition("| folder | may include |")[2]
+    lines = (root / "CONTRIBUTING.md").read_text().partition("| folder | may include |")[2]
     out: dict[str, set[str]] = {}
     for line in lines.split("\n\n")[0].splitlines()[2:]:
         folders, allowed = (re.findall(r"`([^`]+)`", cell) for cell in line.split("|")[1:3])
@@ -27,11 +27,11 @@ def folder_of(root: pathlib.Path, include: str, folders: set[str]) -> str:
 
 
 def complaints(root: pathlib.Path) -> list[str]:
-    if not (root / "docs/design.md").is_file():
+    if not (root / "CONTRIBUTING.md").is_file():
         return []
     rows = table(root)
     found = [
-        f"{path.relative_to(root).as_posix()} has no row in the table of docs/design.md"
+        f"{path.relative_to(root).as_posix()} has no row in the table of CONTRIBUTING.md"
         for path in sorted((root / "src").iterdir())
         if path.is_dir() and path.relative_to(root).as_posix() not in rows
     ]
@@ -47,5 +47,5 @@ def complaints(root: pathlib.Path) -> list[str]:
                 if to == "include/gpureg" and (not public or include in public):
                     continue
                 name = path.relative_to(root).as_posix()
-                found.append(f"{name} includes {include}, which docs/design.md does not list")
+                found.append(f"{name} includes {include}, which CONTRIBUTING.md does not list")
     return found

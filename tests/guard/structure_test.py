@@ -81,9 +81,9 @@ class Structure(unittest.TestCase):
         """Complaints about files of src/io in a project with a table of layers."""
         with tempfile.TemporaryDirectory() as folder:
             root = pathlib.Path(folder)
-            for name in ("docs", "src/io", "src/api", "include/gpureg"):
+            for name in ("src/io", "src/api", "include/gpureg"):
                 (root / name).mkdir(parents=True)
-            (root / "docs/design.md").write_text(
+            (root / "CONTRIBUTING.md").write_text(
                 "| folder | may include |\n| --- | --- |\n| `include/gpureg` | nothing |\n"
                 "| `src/io` | of the public headers `gpureg/error.hpp` |\n| `src/api` | `src/io` |\n\nmore `src/x`\n"
             )
