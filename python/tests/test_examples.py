@@ -11,7 +11,7 @@ import gpureg
 import numpy as np
 import pytest
 from country import make_fragments
-from scenes import moved, room
+from scenes import moved, planar, room
 
 FOLDER = pathlib.Path(__file__).parents[2] / "examples" / "python"
 
@@ -99,19 +99,30 @@ def test_own_features():
     assert "aligned" in run("04_own_features.py")
 
 
-def test_readme(scans, tmp_path, monkeypatch, source, truth):
-    """The snippet runs as printed, in a folder with the scans of scripts/quickstart."""
+def snippets():
+    """The Python programs of the README, as printed."""
     text = (pathlib.Path(__file__).parents[2] / "README.md").read_text()
-    section = text[text.index("## In Python") : text.index("## In C++")]
     assert "pip install '.[batch]'" in text
-    (tmp_path / "out" / "quickstart").mkdir(parents=True)
-    scans = scans.rename(tmp_path / "out" / "quickstart" / "scans-12-1")
-    gpureg.write_point_cloud(scans / "cloud_bin_2.ply", moved(source, truth))
+    return re.findall(r"```python\n(.*?)```", text, re.DOTALL)
+
+
+def test_readme_aligns_two_files(tmp_path, monkeypatch, source, truth):
+    gpureg.write_point_cloud(tmp_path / "scan_a.ply", moved(source, truth))
+    gpureg.write_point_cloud(tmp_path / "scan_b.ply", source)
     monkeypatch.chdir(tmp_path)
     names: dict = {}
-    exec(re.search(r"```python\n(.*?)```", section, re.DOTALL).group(1), names)
+    exec(snippets()[0], names)
     assert names["result"].aligned
     assert np.abs(names["moved"] - source).max() < 0.05  # a voxel
+
+
+def test_readme_closes_a_loop(capsys):
+    """Five looks into a room, the last one from where the first one was."""
+    poses = [planar(0.1 * k, 0.05 * k, 5 * k) for k in (0, 1, 2, 1, 0)]
+    fragments = [(moved(room(points=12000), np.linalg.inv(pose)), pose) for pose in poses]
+    names: dict = {"gpureg": gpureg, "fragments": fragments}
+    exec(snippets()[1], names)
+    assert len(names["poses"]) == 5 and "4 0 accepted" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize("path", sorted(FOLDER.glob("*.py")), ids=lambda path: path.name)
