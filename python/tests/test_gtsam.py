@@ -9,7 +9,7 @@ import pytest
 from scenes import moved, planar, room
 from test_examples import FOLDER, run
 
-pytest.importorskip("gtsam", reason="gtsam is not installed (pip install gtsam)")
+pytest.importorskip("gtsam", reason="gtsam is not installed (pip install 'gpureg[hosts]')")
 
 
 @pytest.fixture()

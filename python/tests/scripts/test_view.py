@@ -235,6 +235,21 @@ def test_no_map(tmp_path, monkeypatch, recorder):
     assert "map.ply: not a map of slam_demo" in view(monkeypatch, tmp_path)
 
 
+@pytest.mark.skipif(
+    importlib.util.find_spec("rerun") is None,
+    reason="rerun is not installed (pip install 'gpureg[hosts]')",
+)
+def test_the_package_records_a_run(tmp_path):
+    """With the real module: what is logged has its types."""
+    write(tmp_path, LINES)
+    record = tmp_path / "run.rrd"
+    done = subprocess.run(
+        [sys.executable, SCRIPT, tmp_path, "--save", record], capture_output=True, text=True
+    )
+    assert done.returncode == 0 and "Warning" not in done.stderr, done.stderr
+    assert record.read_bytes()[:3] == b"RRF"
+
+
 def test_it_says_how_to_install_rerun():
     program = f"import runpy, sys; sys.modules['rerun'] = None; runpy.run_path({str(SCRIPT)!r})"
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)
