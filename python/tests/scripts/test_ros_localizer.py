@@ -222,32 +222,56 @@ class Stand:
 
 
 def stand_in(monkeypatch, parameters):
-    """Modules of ROS that node.py imports. Returns the messages that it publishes."""
+    """Modules of ROS that node.py imports, with the signatures of rclpy (ros2/rclpy@ba72a01, of
+    December 2024). Returns the messages that it publishes.
+    """
     published = []
 
     class Node:
-        def __init__(self, name):
-            self.name = name
+        def __init__(self, node_name, *, context=None):
+            self.name = node_name
 
-        def declare_parameter(self, name, default):
-            return Stand(value=parameters.get(name, default))
+        def declare_parameter(self, name, value=None, descriptor=None, ignore_override=False):
+            return Stand(value=parameters.get(name, value))
 
-        def create_publisher(self, *_):
+        def create_publisher(self, msg_type, topic, qos_profile, *, callback_group=None):
+            assert topic == "pose"
             return Stand(publish=published.append)
 
-        def create_subscription(self, _, topic, callback, *__, **___):
+        def create_subscription(
+            self, msg_type, topic, callback, qos_profile, *, callback_group=None
+        ):
             assert topic == "points"
 
-        def create_service(self, _, name, callback, **__):
-            assert name == "relocalize"
+        def create_service(
+            self, srv_type, srv_name, callback, *, qos_profile=None, callback_group=None
+        ):
+            assert srv_name == "relocalize"
 
         def get_logger(self):
             return Stand()
 
+    def init(*, args=None, context=None, domain_id=None, signal_handler_options=None):
+        published.append("init")
+
+    def spin(node, executor=None):
+        assert node.name == "gpureg_localizer"
+        published.append("spin")
+        raise KeyboardInterrupt
+
+    def try_shutdown(*, context=None, uninstall_handlers=None):
+        published.append("shutdown")
+
+    def executor(num_threads=None, *, context=None):
+        assert num_threads > 1  # the service waits in one of them
+
     names = {
-        "rclpy": {},
+        "rclpy": {"init": init, "spin": spin, "try_shutdown": try_shutdown},
         "rclpy.callback_groups": {"MutuallyExclusiveCallbackGroup": Stand},
-        "rclpy.executors": {"ExternalShutdownException": Exception, "MultiThreadedExecutor": Stand},
+        "rclpy.executors": {
+            "ExternalShutdownException": Exception,
+            "MultiThreadedExecutor": executor,
+        },
         "rclpy.node": {"Node": Node},
         "rclpy.qos": {
             "QoSDurabilityPolicy": Stand(),
@@ -279,6 +303,22 @@ def ask(node, cloud=None):
     return node.relocalize(None, Stand())
 
 
+def read_back(out):
+    """A PoseWithCovarianceStamped that was serialised: its fields have the types of the message."""
+    make, (position, orientation) = STORE.types, (out.pose.pose.position, out.pose.pose.orientation)
+    kind = "geometry_msgs/msg/PoseWithCovarianceStamped"
+    pose = make["geometry_msgs/msg/Pose"](
+        make["geometry_msgs/msg/Point"](position.x, position.y, position.z),
+        make["geometry_msgs/msg/Quaternion"](
+            orientation.x, orientation.y, orientation.z, orientation.w
+        ),
+    )
+    covariance = np.array(out.pose.covariance, np.float64)
+    header = make["std_msgs/msg/Header"](out.header.stamp, out.header.frame_id)
+    stamped = make[kind](header, make["geometry_msgs/msg/PoseWithCovariance"](pose, covariance))
+    return STORE.deserialize_cdr(STORE.serialize_cdr(stamped, kind), kind)
+
+
 def test_the_node_on_stand_ins(monkeypatch, file):
     published = stand_in(monkeypatch, {"map": str(file), "timeout": 0.05})
     from gpureg_localizer.node import LocalizerNode
@@ -298,7 +338,7 @@ def test_the_node_on_stand_ins(monkeypatch, file):
     assert (
         np.abs([position.x - truth[0], position.y - truth[1], position.z - truth[2]]).max() < 0.05
     )
-    assert len(out.pose.covariance) == 36
+    assert np.array_equal(read_back(out).pose.covariance, out.pose.covariance)
     answer = ask(node, message(scan(1, frame), is_bigendian=True))
     assert not answer.success and "is_bigendian" in answer.message
     assert not ask(node, message(scan(9, frame))).success and len(published) == 1
@@ -310,3 +350,11 @@ def test_the_node_asks_for_a_map(monkeypatch):
 
     with pytest.raises(ValueError, match="parameter map"):
         LocalizerNode()
+
+
+def test_ctrl_c_ends_the_node(monkeypatch, file):
+    called = stand_in(monkeypatch, {"map": str(file)})
+    from gpureg_localizer.node import main
+
+    main()
+    assert called == ["init", "spin", "shutdown"]
