@@ -17,6 +17,7 @@ void add_evaluate(CommandLine& line);
 void add_evaluate_trajectory(CommandLine& line);
 void add_evaluate_surface(CommandLine& line);
 void add_report(CommandLine& line);
+void add_view(CommandLine& line);
 void add_calibrate(CommandLine& line);
 void add_info(CommandLine& line);
 

@@ -21,6 +21,7 @@ void add_verbs(CommandLine& line) {
   add_evaluate_trajectory(line);
   add_evaluate_surface(line);
   add_report(line);
+  add_view(line);
   line.program("generate", "Make a synthetic scene in Redwood's layout, with its truth",
                become_generator);
   add_info(line);

@@ -64,7 +64,8 @@ std::string summary(const ResultFile& result) {
                                      [](const PairRecord& pair) { return pair.aligned; });
   const std::size_t fragments =
       d.contains("fragments") && d["fragments"].is_array() ? d["fragments"].size() : 0;
-  std::string html = run_facts(d) + "<p>" + std::to_string(result.pairs.size()) + " pairs of " +
+  std::string html = run_facts(d) + "<p>" + std::to_string(result.pairs.size()) +
+                     (result.pairs.size() == 1 ? " pair of " : " pairs of ") +
                      std::to_string(fragments) + " fragments were tried, " +
                      std::to_string(aligned) + " reported as aligned. ";
   html += "A pair took " + significant(result.mean_milliseconds(), 3) +

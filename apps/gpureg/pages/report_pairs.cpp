@@ -111,14 +111,17 @@ std::vector<SamplePair> samples(const std::vector<EvaluatedPair>& evaluated, std
   return chosen;
 }
 
-std::vector<SamplePair> samples(const ResultFile& result, std::size_t each) {
-  std::vector<const PairRecord*> aligned, rejected;
-  for (const PairRecord& pair : result.pairs) (pair.aligned ? aligned : rejected).push_back(&pair);
-  for (auto* pairs : {&aligned, &rejected}) std::sort(pairs->begin(), pairs->end(), higher_score);
+std::vector<SamplePair> samples(const ResultFile& result, std::size_t most) {
+  std::vector<const PairRecord*> pairs;
+  for (const PairRecord& pair : result.pairs) pairs.push_back(&pair);
+  std::stable_sort(pairs.begin(), pairs.end(), higher_score);
   std::vector<SamplePair> chosen;
-  take(chosen, median_and_lowest(aligned), each, "Aligned", no_remark);
-  take(chosen, rejected, each, "Not aligned",
-       [](const PairRecord& pair) { return ": " + pair.reason; });
+  const std::size_t count = std::min(most, pairs.size());
+  for (std::size_t k = 0; k < count; ++k) {
+    const PairRecord& pair = *pairs[count < 2 ? 0 : k * (pairs.size() - 1) / (count - 1)];
+    chosen.push_back({&pair, pair.aligned ? "Aligned" : "Not aligned",
+                      numbers(pair) + (pair.aligned ? "" : ": " + pair.reason)});
+  }
   return chosen;
 }
 

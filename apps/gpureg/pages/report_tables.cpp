@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "pages/report_tables.hpp"
 
+#include <algorithm>
 #include <map>
+#include <numeric>
 
 #include "pages/plot.hpp"
 #include "text.hpp"
@@ -104,7 +106,12 @@ std::string pair_table(const ResultFile& result, const std::vector<PairRow>& row
                                      "scored",   "inliers",  "ms"};
   if (!evaluated.empty()) titles.push_back("evaluation");
   std::string html = "<table>\n" + table_row(titles, "th");
-  for (std::size_t k = 0; k < result.pairs.size(); ++k) {
+  std::vector<std::size_t> order(result.pairs.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
+    return result.pairs[a].score > result.pairs[b].score;
+  });
+  for (const std::size_t k : order) {
     const PairRecord& pair = result.pairs[k];
     const PairRow& row = rows[k];
     std::vector<std::string> texts = {std::to_string(pair.i),

@@ -18,11 +18,13 @@
 #include "pages/report_tables.hpp"
 #include "pictures/before_after.hpp"
 #include "text.hpp"
+#include "verbs/report.hpp"
 
 namespace gpureg::cli {
 namespace {
 
-constexpr std::size_t kPicturesOfAKind = 2;
+constexpr std::size_t kPicturesOfAKind = 2;  // with ground truth
+constexpr std::size_t kPictures = 12;        // without; a page of some 6 MB
 constexpr const char* kNoPictures = "-";
 constexpr int kPanelWidth = 480, kPanelHeight = 400;
 
@@ -90,11 +92,11 @@ void add_pictures(const std::string& folder, ReportEntry& entry) {
   if (folder.empty() || folder == kNoPictures) return;
   entry.pictures =
       draw(entry.truth ? samples(evaluate_pairs(*entry.truth, entry.result), kPicturesOfAKind)
-                       : samples(entry.result, kPicturesOfAKind),
+                       : samples(entry.result, kPictures),
            folder);
 }
 
-int run(const ReportOptions& o) {
+void make(const ReportOptions& o) {
   check_count("--ground-truth", o.truths, o.results.size());
   check_count("--clouds", o.clouds, o.results.size());
   if (!o.names.empty() && o.names.size() != o.results.size())
@@ -110,11 +112,13 @@ int run(const ReportOptions& o) {
   for (std::size_t k = 0; k < o.results.size(); ++k) entries.push_back(read_entry(o, k));
   for (std::size_t k = 0; k < entries.size(); ++k) add_pictures(value_for(k, o.clouds), entries[k]);
   files::write_atomically(o.output, report_page(entries));
-  std::cout << "written " << o.output << "\n";
-  return kOk;
 }
 
 }  // namespace
+
+void write_report(const std::string& result, const std::string& clouds, const std::string& page) {
+  make({{result}, {}, {}, {clouds}, page});
+}
 
 void add_report(CommandLine& line) {
   const auto o = std::make_shared<ReportOptions>();
@@ -132,7 +136,11 @@ void add_report(CommandLine& line) {
       "none");
   add("--name", o->names, "Name of a result in a comparison, once for each; default: its path");
   verb.option("-o,--output", o->output, "HTML file to write").required();
-  verb.run([o] { return run(*o); });
+  verb.run([o] {
+    make(*o);
+    std::cout << "written " << o->output << "\n";
+    return kOk;
+  });
 }
 
 }  // namespace gpureg::cli

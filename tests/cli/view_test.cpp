@@ -1,0 +1,107 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <gtest/gtest.h>
+#include <sys/stat.h>
+
+#include <chrono>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <regex>
+#include <thread>
+
+#include "cli/command.hpp"
+#include "cli/scene.hpp"
+
+namespace gpureg::test {
+namespace {
+
+class View : public ::testing::Test {
+ protected:
+  const TemporaryFolder scans_, out_;
+};
+
+TEST_F(View, PairsOfABatchByConfidenceWithPictures) {
+  write_scans(scans_, 3, true);
+  const std::string result = out_ / "r.json", page = result + ".html";
+  ASSERT_EQ(run(joined({"batch", scans_.path(), "--quiet", "-o", out_ / "r.log", "--json", result},
+                       kSmall))
+                .status,
+            0);
+  const Outcome outcome = run({"view", result, "--print"});
+  EXPECT_EQ(outcome.status, 0) << outcome.err;
+  EXPECT_EQ(outcome.out, std::filesystem::absolute(page).string() + "\n");
+  const std::string html = content_of(page);
+  std::vector<double> scores;
+  const std::regex caption("fragment \\d+ onto \\d+, score ([0-9.]+)");
+  for (std::sregex_iterator at(html.begin(), html.end(), caption), end; at != end; ++at)
+    scores.push_back(std::stod((*at)[1]));
+  EXPECT_EQ(scores.size(), 10u);  // five clouds
+  EXPECT_TRUE(std::is_sorted(scores.rbegin(), scores.rend()));
+  expect_holds(html, {">Aligned</b>", ">Not aligned</b>", "data:image/png"});
+
+  std::filesystem::rename(scans_ / "cloud_bin_0.ply", out_ / "elsewhere.ply");
+  EXPECT_EQ(run({"view", result, "--print"}).status, 2) << "a picture lacks its cloud";
+  auto json = json_of(result);
+  json["folder"] = out_ / "gone";
+  out_.write("r.json", json.dump());
+  const Outcome without = run({"view", result, "--print"});
+  EXPECT_EQ(without.status, 0);
+  expect_holds(without.err, {"no pictures", "gone"});
+}
+
+TEST_F(View, APair) {
+  const std::string source = write_cloud(out_, "door.ply", room_scan(0)),
+                    target = write_cloud(out_, "window.ply", room_scan(1)),
+                    result = out_ / "pair.json";
+  ASSERT_EQ(run(joined({"register", source, target, "--json", result}, kSmall)).status, 0);
+  const Outcome outcome = run({"view", result, "--print"});
+  EXPECT_EQ(outcome.status, 0) << outcome.err;
+  expect_holds(content_of(result + ".html"), {"door.ply onto window.ply", "1 pair of 2 fragments",
+                                              ">Aligned</b>", "data:image/png"});
+}
+
+TEST_F(View, AMapOrAPage) {
+  expect_refused({"view", out_.path()}, {"map.html", "gpureg reconstruct"});
+  const std::string page = out_.write("map.html", "<html>");
+  for (const std::string& path :
+       {out_.path(), page, out_.write("reconstruction.json", R"({"gpureg": "reconstruct"})")}) {
+    const Outcome outcome = run({"view", path, "--print"});
+    EXPECT_EQ(outcome.out, std::filesystem::absolute(page).string() + "\n") << outcome.err;
+  }
+}
+
+TEST_F(View, WhatHasNoPage) {
+  expect_refused({"view", out_ / "none.json"}, {"none.json"});
+  expect_refused({"view", write_cloud(out_, "a.ply", room_scan(0))}, {"a.ply", "gpureg register"});
+  expect_refused({"view", out_.write("l.json", R"({"gpureg": "locate"})")},
+                 {"l.json", "gpureg locate", "register, batch"});
+}
+
+// The desktop's program gets the page, whatever characters its name has.
+TEST_F(View, OpensTheBrowser) {
+#ifdef __APPLE__
+  GTEST_SKIP() << "macOS has another program";
+#endif
+  const std::string page = out_.write("my $(map).html", "<html>"), seen = out_ / "seen",
+                    program = out_.write("xdg-open", "#!/bin/sh\nprintf %s \"$1\" > '" + seen +
+                                                         "'; mv '" + seen + "' '" + seen +
+                                                         ".done'; sleep 2\n");
+  ASSERT_EQ(::chmod(program.c_str(), 0700), 0);
+  const char* const path = std::getenv("PATH");
+  ASSERT_NE(path, nullptr);
+  const std::string before = path;
+  ::setenv("PATH", (out_.path() + ":" + before).c_str(), 1);
+  ::setenv("DISPLAY", ":7", 1);
+  const auto start = std::chrono::steady_clock::now();
+  const Outcome outcome = run({"view", page});
+  ::setenv("PATH", before.c_str(), 1);
+  ::unsetenv("DISPLAY");
+  EXPECT_EQ(outcome.status, 0) << outcome.err;
+  EXPECT_LT(std::chrono::steady_clock::now() - start, std::chrono::milliseconds(1900));  // no wait
+  for (int k = 0; k < 100 && !std::filesystem::exists(seen + ".done"); ++k)
+    std::this_thread::sleep_for(std::chrono::milliseconds(50));
+  EXPECT_EQ(content_of(seen + ".done"), page);
+}
+
+}  // namespace
+}  // namespace gpureg::test
