@@ -17,10 +17,13 @@ namespace {
 using gpureg::fields::FieldText;
 using gpureg::fields::StructText;
 
+// A field without a default is a struct, which has a table of its own.
 std::string table(const StructText& text) {
-  std::string out = "| field | default | range | meaning |\n| --- | --- | --- | --- |\n";
+  std::string out = "| field | default; range | meaning |\n| --- | --- | --- |\n";
   for (const FieldText& f : text.fields)
-    out += "| `" + f.name + "` | " + f.value + " | " + f.range + " | " + f.sentence + " |\n";
+    if (!f.value.empty())
+      out += "| `" + f.name + "` | " + f.value + (f.range.empty() ? "" : "; ") + f.range + " | " +
+             f.sentence + " |\n";
   return out;
 }
 
