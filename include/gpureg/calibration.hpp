@@ -33,7 +33,7 @@ struct CalibrationSample {
 
 /// Result of fit_calibration().
 struct CalibrationFit {
-  ConfidenceCalibration calibration;  ///< the identity where the samples are too few
+  ConfidenceCalibration calibration;  ///< the identity if the samples are too few
   bool enough_samples = false;
   /// Expected calibration error of the samples with the identity and with the calibration.
   double error_before = 0, error_after = 0;
@@ -78,7 +78,7 @@ struct RiskThreshold {
   std::size_t reported = 0;   ///< from min_confidence on
   std::size_t wrong = 0;      ///< of these
   double recall = 0;          ///< share of the correct samples that are reported, [0, 1]
-  /// Where it is not supported: so many more samples would do if their shares of false poses stay
+  /// If it is not supported: how many more samples would do if their shares of false poses stay
   /// as they are. None: no number would do, too many of the most confident poses are false.
   std::optional<std::size_t> more_samples;
   /// The same in scans and in scenes.
@@ -151,7 +151,7 @@ std::uint64_t cloud_fingerprint(const PointCloudView& cloud);
 struct CalibrationOptions {
   /// Pairs made of one scan, spread over the clouds; 0: none.
   std::uint32_t self_pairs = 200;
-  /// Largest number of pairs of different scans. Where there are more, groups of consecutive clouds
+  /// Largest number of pairs of different scans. If there are more, groups of consecutive clouds
   /// are taken, evenly spread; 0: none.
   std::uint32_t scan_pairs = 600;
   /// A pose is correct within this RMS distance over the source points, in voxels.
@@ -202,13 +202,13 @@ struct CalibrationResult {
 /// overlap by 0 to 90 %, with noise of the size that the scan shows, the second one moved by a
 /// random pose together with its viewpoints. They are easier than pairs of two scans, so each
 /// weighs a twentieth, and the calibration is the identity without kMinDecidedPairs pairs of
-/// different scans. These are decided by the poses of the clouds where they are given, otherwise by
-/// loop_consistency() where it is sure from even odds.
+/// different scans. These are decided by the poses of the clouds if they are given, otherwise by
+/// loop_consistency() if it is sure from even odds.
 ///
 /// @param clouds host memory; a dozen or more, some of which overlap.
 /// @param options as for align(); its own calibration is not used. The samples hold for its voxel
 ///   size and quality.
-/// @param world_from_cloud pose of each cloud, accurate to about a voxel, no_pose() where it is not
+/// @param world_from_cloud pose of each cloud, accurate to about a voxel, no_pose() if it is not
 ///   known; empty: none is known.
 /// @return the calibration; the same bits for any number of threads and on every backend.
 /// @throws InvalidArgument as prepare_batch() and align(), for another method than compatibility,

@@ -58,9 +58,9 @@ struct ChangeResult {
   PointChanges map;         ///< of PreparedMap::cloud()
 };
 
-/// Compares a scan with the map around it, point by point. A point is new or gone only where the
+/// Compares a scan with the map around it, point by point. A point is new or gone only if the
 /// other cloud saw through it: between one of its sensor positions and the surface behind. In a map
-/// without sensor positions, a point of the scan is new where it stands before a surface of the
+/// without sensor positions, a point of the scan is new if it stands before a surface of the
 /// map, as seen from the scan.
 ///
 /// @param scan host memory; viewpoints as for prepare().
@@ -77,10 +77,10 @@ ChangeResult find_changes(const Context& context, const PointCloudView& scan,
 
 /// Writes a cloud as a binary PLY with red, green, blue and label (of ChangeLabel) as bytes and the
 /// probability as float: same grey, new green, gone red, occluded blue, not observed light grey.
-/// x y z are float, or double where the cloud has an origin. All or nothing. Thread-safe.
-/// @throws InvalidArgument where points, labels and probabilities differ in number, and for a label
+/// x y z are float, or double if the cloud has an origin. All or nothing. Thread-safe.
+/// @throws InvalidArgument if points, labels and probabilities differ in number, and for a label
 ///   that is none.
-/// @throws IoError where writing fails.
+/// @throws IoError if writing fails.
 void write_changes(const std::string& path, const PointCloud& cloud, const PointChanges& changes);
 
 }  // namespace gpureg::localization

@@ -48,7 +48,7 @@ class Context {
  public:
   /// CPU backend.
   /// @param threads number of threads, at most 1024; 0: one per hardware thread.
-  /// @throws BackendUnavailable where this CPU lacks instructions that the library was compiled
+  /// @throws BackendUnavailable if this CPU lacks instructions that the library was compiled
   ///   for.
   /// @throws InvalidArgument for more than 1024 threads.
   static Context cpu(unsigned threads = 0);
@@ -64,7 +64,7 @@ class Context {
   /// @throws InvalidArgument for a negative device.
   static Context cuda(const CudaOptions& options);
 
-  /// @return a CUDA context where a device is usable, otherwise a CPU context.
+  /// @return a CUDA context if a device is usable, otherwise a CPU context.
   static Context best();
 
   Backend backend() const;
@@ -77,7 +77,7 @@ class Context {
   /// Returns the memory that the context keeps for later calls, on its devices and page-locked on
   /// the host, to the driver: for programs that share a device. Prepared clouds stay; the next call
   /// allocates anew. Waits for running calls. Does nothing on the CPU. Thread-safe.
-  /// @throws DeviceError where running work failed.
+  /// @throws DeviceError if running work failed.
   void trim() const;
 
  private:

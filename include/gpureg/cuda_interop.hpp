@@ -35,7 +35,7 @@ struct DevicePointCloudView {
   bool infer_viewpoint = true;
   bool model = false;
   double origin[3] = {0, 0, 0};  ///< as that of PointCloudView
-  /// Streams that order the reading of normals and features, where another stream than that of the
+  /// Streams that order the reading of normals and features, if another stream than that of the
   /// points wrote them.
   std::optional<CudaStream> normal_stream, feature_stream;
 
@@ -68,7 +68,7 @@ struct DevicePointCloudView {
 /// @return future of the prepared cloud; it rethrows errors of the data.
 /// @throws InvalidArgument for options or views out of range, for memory on another device, and for
 ///   a context of another backend.
-/// @throws DeviceError where the device has no memory.
+/// @throws DeviceError if the device has no memory.
 std::future<PreparedCloud> prepare_async(const Context& context, const DevicePointCloudView& cloud,
                                          const PrepareOptions& options, CudaStream stream);
 
@@ -79,7 +79,7 @@ std::future<PreparedCloud> prepare_async(const Context& context, const DevicePoi
 /// @return future of the prepared clouds in order; it rethrows errors of the data.
 /// @throws InvalidArgument as prepare_async() does, naming the cloud, and for a wrong number of
 ///   streams or names.
-/// @throws DeviceError where the device has no memory.
+/// @throws DeviceError if the device has no memory.
 std::future<std::vector<PreparedCloud>> prepare_batch_async(
     const Context& context, const std::vector<DevicePointCloudView>& clouds,
     const PrepareOptions& options, const std::vector<CudaStream>& streams,

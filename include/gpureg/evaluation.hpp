@@ -44,8 +44,8 @@ void write_log(const std::string& path, const std::vector<LogEntry>& entries);
 void write_information(const std::string& path, const std::vector<InformationEntry>& entries);
 
 /// Checks the blocks of one file against each other.
-/// @throws IoError naming file and line where a pair is repeated, where the number of fragments
-///   differs from that of the first block, and where i or j is not below it.
+/// @throws IoError naming file and line if a pair is repeated, if the number of fragments
+///   differs from that of the first block, and if i or j is not below it.
 void check_entries(const std::string& path, const std::vector<LogEntry>& entries);
 void check_entries(const std::string& path, const std::vector<InformationEntry>& entries);
 
@@ -65,13 +65,13 @@ struct Report {
 struct GroundTruth {
   std::vector<LogEntry> log;                  ///< pairs with an overlap of 30 % or more
   std::vector<InformationEntry> information;  ///< in the order of log
-  /// Pairs with an overlap of 5 % or more; empty where the scene has no such list.
+  /// Pairs with an overlap of 5 % or more; empty if the scene has no such list.
   std::vector<LogEntry> all_log;
   std::vector<InformationEntry> all_information;
 };
 
-/// Reads gt.log and gt.info of a folder, and gt_all.log and gt_all.info where they exist.
-/// @throws IoError as the readers and check_entries(), and where a .log and its .info list
+/// Reads gt.log and gt.info of a folder, and gt_all.log and gt_all.info if they exist.
+/// @throws IoError as the readers and check_entries(), and if a .log and its .info list
 ///   different pairs or another order.
 GroundTruth read_ground_truth(const std::string& folder);
 
@@ -90,7 +90,7 @@ struct Scores {
 
 /// Recall at fixed precisions and average precision over the ranking by score.
 struct RankedScores {
-  double raw_recall = 0;  ///< recall where the best candidate of every pair is reported
+  double raw_recall = 0;  ///< recall if the best candidate of every pair is reported
   double recall_at_50 = 0, recall_at_80 = 0, recall_at_95 = 0, recall_at_99 = 0;
   double average_precision = 0;
 };
@@ -98,13 +98,13 @@ struct RankedScores {
 /// Scores of one scene.
 struct Evaluation {
   Scores strict;  ///< Redwood's rule: a report outside gt.log is false
-  /// Correct where the pair is in gt_all and the error is at most 0.2 m; empty without gt_all.
+  /// Correct if the pair is in gt_all and the error is at most 0.2 m; empty without gt_all.
   std::optional<Scores> geometric;
-  std::optional<RankedScores> strict_ranked, geometric_ranked;  ///< where ranked
+  std::optional<RankedScores> strict_ranked, geometric_ranked;  ///< if ranked
 };
 
 /// Pose error of Redwood (Choi et al. 2015): error^2 = e' Info e / Info(0,0), e = [t; q_xyz] of
-/// inverse(T_gt) T. A pose is correct where it is at most 0.2.
+/// inverse(T_gt) T. A pose is correct if it is at most 0.2.
 /// @return the error, metres.
 /// @throws InvalidArgument unless Info(0,0), the number of correspondences, is > 0.
 double redwood_error(const Eigen::Matrix4d& ground_truth, const Eigen::Matrix4d& result,
@@ -114,7 +114,7 @@ double redwood_error(const Eigen::Matrix4d& ground_truth, const Eigen::Matrix4d&
 /// Equal scores enter the ranking together. Average precision is the sum of precision times gain in
 /// recall over all thresholds.
 /// @param ranked also fill the ranked scores.
-/// @throws InvalidArgument for truths without information matrices and, where ranked, for a score
+/// @throws InvalidArgument for truths without information matrices and, if ranked, for a score
 ///   that is NaN.
 Evaluation evaluate(const GroundTruth& truth, const std::vector<Report>& reports, bool ranked);
 

@@ -51,7 +51,7 @@ class PreparedMap {
   std::size_t tiles() const;                        ///< number of tiles
   const MapOptions& options() const;
 
-  /// @return a copy of the points, with normals where the sides of surfaces are known, and the
+  /// @return a copy of the points, with normals if the sides of surfaces are known, and the
   ///   sensor positions.
   PointCloud cloud() const;
 
@@ -64,8 +64,8 @@ class PreparedMap {
   ///   version, truncated, damaged.
   static PreparedMap load(const std::string& path);
 
-  /// @return true where the file begins as those of save() do.
-  /// @throws IoError where it cannot be read.
+  /// @return true if the file begins as those of save() do.
+  /// @throws IoError if it cannot be read.
   static bool is_saved(const std::string& path);
 
  private:
@@ -96,9 +96,9 @@ class MapBuilder {
   /// @throws InvalidArgument as PointCloudView::validate().
   void add_cloud(const PointCloudView& cloud);
 
-  /// @return the map of what was added. Where nothing tells the sides of its surfaces, they are
-  ///   inferred for the search of places, on all cores: where most of its surroundings lie on one
-  ///   side of a surface, the sensor was there, too.
+  /// @return the map of what was added. If nothing tells the sides of its surfaces, they are
+  ///   inferred for the search of places, on all cores: the sensor is taken to have been on the
+  ///   side of a surface on which most of its surroundings lie.
   /// @throws InvalidArgument for a map without points.
   PreparedMap build() const;
 
@@ -123,18 +123,18 @@ struct LocateOptions {
   /// more matches of its own than the scan has, and a random choice of few holds hardly any of the
   /// scan's.
   std::uint32_t max_matches = 65536;
-  /// Where the view from above does not tell the place, all tiles are searched with voxels this
+  /// If the view from above does not tell the place, all tiles are searched with voxels this
   /// many times as wide as those of the map, 1..8: several times as fast, and thinned scans of
   /// spinning LiDARs find more. 1: with those of the map.
   double coarse_factor = 2;
-  /// In a map of more tiles, all are searched in voxels twice as wide again first, and at most so
-  /// many in coarse ones, >= 1: those in which that search was the most confident. Scans with less
-  /// than a thousand points in its voxels are searched in all tiles in coarse ones.
+  /// In a map of more tiles, all are searched in voxels twice as wide again first, and at most
+  /// this many in coarse ones, >= 1: those in which that search was the most confident. Scans with
+  /// less than a thousand points in its voxels are searched in all tiles in coarse ones.
   std::uint32_t coarse_tiles = 8;
-  /// Where the coarse search does not end in a place with a confidence of 0.75, at most so many
-  /// tiles are searched with the voxels of the map, >= 1: those in which the coarse search was the
-  /// most confident. None where no pose of it reaches 0.1, of a scan with a thousand coarse points:
-  /// the scan is not in the map.
+  /// If the coarse search does not end in a place with a confidence of 0.75, at most
+  /// this many tiles are searched with the voxels of the map, >= 1: those in which the coarse
+  /// search was the most confident. None if no pose of it reaches 0.1, of a scan with a thousand
+  /// coarse points: the scan is not in the map.
   std::uint32_t fine_tiles = 4;
   /// Poses of a scan that are verified against all of the map around them, 1..64.
   std::uint32_t candidates = 8;
@@ -180,7 +180,7 @@ struct LocatedPose {
   double confidence = 0;
   /// The scan fits here about as well as at the first pose, which is elsewhere.
   bool alias = false;
-  /// Verification against the map around the pose; its confidence leaves other places aside. Where
+  /// Verification against the map around the pose; its confidence leaves other places aside. If
   /// the view from above was enough, it is by surfaces alone: match_inliers, match_support and
   /// overlap_confidence tell nothing.
   PoseVerification verification;
@@ -201,9 +201,9 @@ struct LocateResult {
 /// Finds the poses of scans in a map. First it looks at both from above, along the most frequent
 /// normal of the map and along those of the scan, and finds the places where most walls coincide
 /// (after Olson, "Real-time correlative scan matching", ICRA 2009), of all cells and headings. The
-/// best are verified against the whole map around them. Where that is not sure, the scan is aligned
+/// best are verified against the whole map around them. If that is not sure, the scan is aligned
 /// with every tile in coarse voxels, the poses of all tiles are merged, and the most confident ones
-/// are verified; where none is sure, but one is possible, the best tiles are searched in the voxels
+/// are verified; if none is sure, but one is possible, the best tiles are searched in the voxels
 /// of the map, too. All places compete for the confidence. A part of the scan that the map lacks,
 /// or that sees through what the map has, makes a place less likely.
 ///
@@ -214,7 +214,7 @@ struct LocateResult {
 ///   any other scans of the call.
 /// @throws InvalidArgument as prepare() and align(), for an empty map, for options whose voxel size
 ///   is not that of the map, and for a scan that looks as if it was in another unit.
-/// @throws DeviceError where the device fails.
+/// @throws DeviceError if the device fails.
 std::vector<LocateResult> locate(const Context& context, const std::vector<PointCloudView>& scans,
                                  const PreparedMap& map, const LocateOptions& options,
                                  const std::vector<LocatePrior>& priors = {},

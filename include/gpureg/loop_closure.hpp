@@ -33,7 +33,7 @@ struct Fragment {
   PreparedCloud cloud = {};
   /// p_world = world_from_fragment * p_fragment, metres; none: not known. As long as the host adds
   /// no odometry between fragments of a session, their poses are its odometry: the motion from one
-  /// to the next counts as an add_odometry() without covariance. Where odometry connects the
+  /// to the next counts as an add_odometry() without covariance. If odometry connects the
   /// fragment to others, their estimates and the odometry replace the pose.
   std::optional<UnalignedIsometry3d> world_from_fragment = std::nullopt;
   /// Up in the fragment's frame, of any length but 0. Registrations of two fragments that both have
@@ -63,7 +63,7 @@ struct ProposalOptions {
   void validate() const;
 };
 
-/// When a loop is believed.
+/// When a loop is accepted.
 struct AcceptanceOptions {
   /// Registered poses below take no part, (0, 1).
   double min_confidence = 0.1;
@@ -84,7 +84,7 @@ struct AcceptanceOptions {
   /// (0, 1).
   double drift_probability = 0.99;
   /// Largest Loop::drift_ratio at which a loop may be accepted at all, if others confirm it, >= 1:
-  /// by so much odometry may be worse than Options::graph.drift says.
+  /// the factor by which odometry may be worse than Options::graph.drift.
   double max_drift_ratio = 6;
 
   /// @throws InvalidArgument naming field and value.
@@ -135,7 +135,7 @@ struct Options {
 };
 
 enum class LoopState {
-  candidate,  ///< fits, and is not yet believed: it moves nothing
+  candidate,  ///< registered, not yet accepted: it moves nothing
   accepted,   ///< takes part in the graph
   rejected,   ///< does not take part
   retracted   ///< was accepted, does not take part any more: take the factor out again
@@ -167,7 +167,7 @@ struct Loop {
   bool from_host = false;  ///< by add_loop()
   LoopState state = LoopState::candidate;
   LoopReason reason = LoopReason::unconfirmed;
-  /// p_target = target_from_source * p_source, metres; NaN where the pair was not aligned.
+  /// p_target = target_from_source * p_source, metres; NaN if the pair was not aligned.
   UnalignedIsometry3d target_from_source = no_pose();
   /// Inverse covariance of Log(target_from_source^-1 * true target_from_source): rotation (radians)
   /// first, then translation (metres), in the source's frame.
@@ -175,7 +175,7 @@ struct Loop {
   double confidence = 0;  ///< of the registration, or as the host gave it
   double weight = 0;      ///< in the graph, [0, 1]
   /// Distance between odometry and the loop in units of odometry's drift: 1 is the boundary of
-  /// AcceptanceOptions::drift_probability. Infinity where odometry does not connect the fragments.
+  /// AcceptanceOptions::drift_probability. Infinity if odometry does not connect the fragments.
   double drift_ratio = 0;
 };
 
@@ -209,19 +209,19 @@ struct Update {
   /// order. A host that adds a factor for each accepted loop and takes it out for each retracted
   /// one never has two. What a call that threw did not deliver, the next one does.
   std::vector<Loop> changed;
-  /// All fragments, ascending by id; empty where no pose changed and with Options::optimize off.
+  /// All fragments, ascending by id; empty if no pose changed and with Options::optimize off.
   std::vector<FragmentPose> poses;
   std::size_t registered = 0;      ///< registrations of this call
   std::size_t proposals_left = 0;  ///< registrations that the limits left for later calls
-  /// Of the optimisation, converged where none was necessary.
+  /// Of the optimisation, converged if none was necessary.
   pose_graph::Status status = pose_graph::Status::converged;
-  std::string reason;  ///< one sentence where not converged
+  std::string reason;  ///< one sentence if not converged
 };
 
 /// Gives a prepared cloud back to load().
 using CloudProvider = std::function<PreparedCloud(FragmentId)>;
 
-/// Finds, verifies and, where wanted, optimises the loops of a SLAM system.
+/// Finds, verifies and, if wanted, optimises the loops of a SLAM system.
 ///
 /// The host adds fragments and odometry; process() registers pairs and returns loops. Owns no
 /// thread. The same calls give the same bits for any number of threads and on every backend, as
@@ -293,7 +293,7 @@ class LoopCloser {
   void remove(FragmentId id);
 
   /// Registers what is due, verifies the loops, optimises.
-  /// @throws DeviceError where the device fails, std::bad_alloc without memory. Nothing is lost:
+  /// @throws DeviceError if the device fails, std::bad_alloc without memory. Nothing is lost:
   ///   the next call goes on, and ends in the same state.
   Update process(const ProcessLimits& limits = {});
   Update process(double milliseconds);  ///< process() with a time limit
@@ -314,8 +314,8 @@ class LoopCloser {
 
   /// Replaces the state by a saved one. Then the same calls give the same bits as without saving.
   /// @param clouds called once for each fragment that had a cloud; must return the same cloud.
-  /// @throws IoError naming the file where it is missing, damaged or from a later version;
-  ///   InvalidArgument naming both voxel sizes where they differ, or the fragment whose cloud does.
+  /// @throws IoError naming the file if it is missing, damaged or from a later version;
+  ///   InvalidArgument naming both voxel sizes if they differ, or the fragment whose cloud does.
   ///   Then the state stays as it was.
   void load(const std::string& path, const CloudProvider& clouds);
 

@@ -46,7 +46,7 @@ struct LoopConsistencyOptions {
 /// Confidence of one pair in view of the others.
 struct PairConsistency {
   double confidence = 0;  ///< probability that the mode is correct, given all pairs
-  /// Index into RegistrationResult::modes; 0, target_from_source, where there are none.
+  /// Index into RegistrationResult::modes; 0, target_from_source, if there are none.
   std::uint32_t mode = 0;
   std::uint32_t loops = 0;  ///< loops of three that the pair is in
   /// Number of pairs on the most confident path that it was compared with; 0: no such path, or the

@@ -24,12 +24,12 @@ struct SurfaceMesh {
 
   bool closed() const { return open_edges == 0 && non_manifold_edges == 0; }
   double area() const;
-  /// The counts above that are not 0, as one English phrase; empty where nothing is wrong. Open
+  /// The counts above that are not 0, as one English phrase; empty if nothing is wrong. Open
   /// edges are not wrong.
   std::string notes() const;
 };
 
-/// True for STL and OBJ by their extension, and for PLY files with faces. False where path cannot
+/// True for STL and OBJ by their extension, and for PLY files with faces. False if path cannot
 /// be read.
 bool is_mesh(const std::string& path);
 
@@ -44,7 +44,7 @@ SurfaceMesh read_mesh(const std::string& path);
 /// Drops faces without area, turns faces that are wound against most of their neighbours, and turns
 /// a closed mesh outwards.
 /// @throws InvalidArgument naming the vertex that is not finite, or the face with a vertex that is
-///   not there; or where no face has an area.
+///   not there; or if no face has an area.
 SurfaceMesh make_mesh(std::vector<Eigen::Vector3d> vertices,
                       std::vector<std::array<std::uint32_t, 3>> faces);
 
@@ -53,7 +53,7 @@ SurfaceMesh make_mesh(std::vector<Eigen::Vector3d> vertices,
 /// each direction, from the front: then it is a scan with the origin as its viewpoint.
 /// @param spacing wanted mean distance of neighbours, in the unit of the vertices; between 20,000
 ///   and 2,000,000 points are made. 0: 20,000 points.
-/// @throws InvalidArgument where spacing is negative or not finite, or the mesh has no face.
+/// @throws InvalidArgument if spacing is negative or not finite, or the mesh has no face.
 PointCloud sample_mesh(const SurfaceMesh& mesh, double spacing = 0);
 
 }  // namespace gpureg::io

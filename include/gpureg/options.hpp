@@ -25,7 +25,7 @@ struct PrepareOptions {
   /// radius that is larger by wide_feature_radius / feature_radius, at most 4 feature_radius.
   float normal_radius = 0.1f;
   float feature_radius = 0.25f;  ///< neighbourhood of FPFH, also of its SPFH (paper: 0.25)
-  /// Neighbourhood of a second FPFH, matched beside the first (only where the features are FPFH);
+  /// Neighbourhood of a second FPFH, matched beside the first (only if the features are FPFH);
   /// 0: none (paper: none). Wide features find matches on floors and walls, where small
   /// neighbourhoods look alike.
   float wide_feature_radius = 0.4f;
@@ -49,7 +49,7 @@ struct PrepareOptions {
 /// Candidate poses from matches that keep each other's distances and angles
 /// (RegistrationMethod::compatibility).
 struct CompatibilityOptions {
-  /// Matches kept per pair, chosen at random where there are more, 4..65536.
+  /// Matches kept per pair, chosen at random if there are more, 4..65536.
   std::uint32_t max_matches = 4096;
   std::uint32_t seeds = 512;  ///< matches whose neighbourhoods become candidates, 1..8192
   /// Compatible matches of a seed that take part, 3..1024.
@@ -116,7 +116,7 @@ struct EvidenceOptions {
   std::uint32_t sample = 512;
   std::uint32_t modes = 24;  ///< distinct poses that are refined and verified by all points, 1..64
   float max_normal_angle = 30.0f;  ///< degrees between the normals of an inlier
-  /// Two poses are one mode where their rotations differ by less than this, degrees, ...
+  /// Two poses are one mode if their rotations differ by less than this, degrees, ...
   float mode_angle = 11.5f;
   float mode_distance = 0.3f;  ///< ... and the cloud's centre by less than this, metres.
   /// Range of the degeneracy search, metres: the most likely mode is perturbed along its weakest
@@ -187,7 +187,7 @@ struct RegistrationOptions {
                                              std::uint32_t quality = kDefaultQuality);
 
   /// A copy with the number of candidates of a quality, everything else as it is.
-  /// @throws InvalidArgument where quality is above 10.
+  /// @throws InvalidArgument if quality is above 10.
   RegistrationOptions with_quality(std::uint32_t quality) const;
 
   /// The paper's algorithm with the paper's numbers (Zhang and Chen, LoopSmart, section III):

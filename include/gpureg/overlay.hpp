@@ -10,8 +10,8 @@ namespace gpureg::io {
 
 /// Writes one coloured binary PLY: the source moved by target_from_source (yellow) and the target
 /// (blue), in the target's frame and without non-finite points. Coordinates are float32, or double
-/// where the target has an origin.
-/// @throws IoError where writing fails.
+/// if the target has an origin.
+/// @throws IoError if writing fails.
 void write_overlay(const std::string& path, const PointCloud& source, const PointCloud& target,
                    const Eigen::Isometry3d& target_from_source);
 

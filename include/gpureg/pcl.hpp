@@ -16,7 +16,7 @@
 /// registration).
 namespace gpureg {
 
-/// View of a PCL cloud without a copy: points, normals where PointT has them, and sensor_origin_ as
+/// View of a PCL cloud without a copy: points, normals if PointT has them, and sensor_origin_ as
 /// the viewpoint.
 /// @tparam PointT any point type with x, y, z.
 /// @return a view, valid until the cloud is resized or destroyed.
@@ -48,7 +48,7 @@ PointCloudView view_of(const pcl::PointCloud<PointT>& cloud) {
 /// @tparam SignatureT any PCL signature with a histogram (pcl::FPFHSignature33,
 ///   pcl::VFHSignature308, pcl::Histogram<N>, ...).
 /// @param features one per point.
-/// @throws InvalidArgument where the clouds differ in size.
+/// @throws InvalidArgument if the clouds differ in size.
 template <typename PointT, typename SignatureT>
 PointCloudView view_of(const pcl::PointCloud<PointT>& cloud,
                        const pcl::PointCloud<SignatureT>& features) {
@@ -65,7 +65,7 @@ PointCloudView view_of(const pcl::PointCloud<PointT>& cloud,
   return view;
 }
 
-/// Copies a view into a PCL cloud of one row; normals are copied where both sides have them.
+/// Copies a view into a PCL cloud of one row; normals are copied if both sides have them.
 /// @throws InvalidArgument as PointCloudView::validate().
 template <typename PointT>
 pcl::PointCloud<PointT> to_pcl(const PointCloudView& view) {

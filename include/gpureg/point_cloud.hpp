@@ -22,12 +22,12 @@ struct PointCloudView {
   std::size_t normal_stride = 3;  ///< floats from one normal to the next, >= 3
   /// Optional, size rows of feature_dimension floats, used instead of FPFH.
   const float* features = nullptr;
-  std::size_t feature_dimension = 0;  ///< floats per feature, >= 1 where features are given
+  std::size_t feature_dimension = 0;  ///< floats per feature, >= 1 if features are given
   /// Floats from one feature to the next; 0: feature_dimension.
   std::size_t feature_stride = 0;
   /// Optional, viewpoint_count rows of x, y, z without gaps: sensor positions in the frame of the
   /// cloud. Input normals that face away from all viewpoints are flipped, because no sensor
-  /// observes the back of a surface. None is flipped where more than one eighth of the points face
+  /// observes the back of a surface. None is flipped if more than one eighth of the points face
   /// away (the viewpoints then belong to another frame), nor with PrepareOptions::depth_maps 0.
   /// prepare() refuses viewpoints whose coordinates are more than 2^23 normal radii from the
   /// cloud's.
@@ -36,9 +36,9 @@ struct PointCloudView {
   /// see infer_viewpoint.
   std::size_t viewpoint_count = 0;
   /// For a cloud without viewpoints and normals. true: the surfaces decide whether the origin of
-  /// the frame is the viewpoint. false: the viewpoint is unknown. Where it is unknown, no free
+  /// the frame is the viewpoint. false: the viewpoint is unknown. If it is unknown, no free
   /// space is known, and alignments try both sides of the surfaces. PrepareStatistics::viewpoint
-  /// has the decision. No effect where PrepareOptions::depth_maps is 0: the origin then orients the
+  /// has the decision. No effect if PrepareOptions::depth_maps is 0: the origin then orients the
   /// normals.
   bool infer_viewpoint = true;
   /// The cloud is a model: seen from everywhere, with normals that point outwards, as of a sampled
@@ -56,7 +56,7 @@ struct PointCloudView {
       : points(xyz.empty() ? nullptr : xyz.front().data()), size(xyz.size()) {}
 
   /// Checks pointers, counts, strides and viewpoints; reads no point.
-  /// @throws InvalidArgument where they contradict each other, for a viewpoint that is not finite,
+  /// @throws InvalidArgument if they contradict each other, for a viewpoint that is not finite,
   ///   or for more than 2^31 - 1 points.
   void validate() const;
 
@@ -88,7 +88,7 @@ struct PointCloud {
   }
 
   /// @return a view, valid as long as the vectors do not change.
-  /// @throws InvalidArgument where the number of normals is neither 0 nor that of the points.
+  /// @throws InvalidArgument if the number of normals is neither 0 nor that of the points.
   PointCloudView view() const;
 };
 

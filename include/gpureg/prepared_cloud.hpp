@@ -36,7 +36,7 @@ class PreparedCloud {
   Eigen::Vector3d origin() const;
   /// @return host copy: size() points, relative to origin().
   std::vector<Eigen::Vector3f> points() const;
-  /// @return host copy: size() unit vectors, (0,0,0) where no normal could be estimated.
+  /// @return host copy: size() unit vectors, (0,0,0) if no normal could be estimated.
   std::vector<Eigen::Vector3f> normals() const;
   /// @return host copy: size() x feature_dimension() floats, row by row.
   std::vector<float> features() const;

@@ -32,7 +32,7 @@ struct PosePrior {
 };
 
 /// Constraints on the pose of one pair. Candidates that contradict them rank last, and refined
-/// poses that contradict them are dropped. Where no pose remains, the pair is not aligned, with
+/// poses that contradict them are dropped. If no pose remains, the pair is not aligned, with
 /// RegistrationReason::contradicts_prior. An empty prior changes no bit of the result.
 struct RegistrationPrior {
   std::optional<GravityPrior> gravity;

@@ -30,7 +30,7 @@ struct Options {
   /// Pairs of a cloud on average, >= 1. A cloud that is like many others has more, every cloud at
   /// least a quarter of them: those with its most alike ones.
   std::uint32_t neighbors = 20;
-  std::uint32_t consecutive = 0;  ///< also the so many that follow each cloud in their order
+  std::uint32_t consecutive = 0;  ///< also this many clouds that follow each one in their order
   std::uint32_t words = 64;       ///< >= 1
   int threads = 0;                ///< 0: one per core. Results do not depend on it.
 
@@ -40,7 +40,7 @@ struct Options {
 
 /// Centres of k-means over features of some clouds, the rarest first. No labels and no training
 /// set: the words are those of the scene itself.
-/// @param most number of words, >= 1; fewer come back where there are fewer features.
+/// @param most number of words, >= 1; fewer come back if there are fewer features.
 /// @return words x dimension.
 /// @throws InvalidArgument for clouds of different dimensions.
 Matrix learn_words(const std::vector<FeatureView>& clouds, std::uint32_t most);
@@ -48,7 +48,7 @@ Matrix learn_words(const std::vector<FeatureView>& clouds, std::uint32_t most);
 /// Global descriptor of a cloud: the residuals of its features from their nearest words, summed per
 /// word. Rigid motions change it as little as they change the features.
 /// @return words.rows * words.columns floats of unit length; zeros for a cloud without features.
-/// @throws InvalidArgument where the dimensions differ.
+/// @throws InvalidArgument if the dimensions differ.
 /// Sources: Jegou et al. 2010 (VLAD); Arandjelovic and Zisserman 2013 (intra-normalisation).
 std::vector<float> describe(const FeatureView& cloud, const Matrix& words);
 
@@ -64,13 +64,13 @@ struct Summary {
   float feature_radius = 0;  ///< of the cloud's options, metres
 };
 
-/// @throws InvalidArgument for an empty handle, and where the dimensions of features and words
+/// @throws InvalidArgument for an empty handle, and if the dimensions of features and words
 ///   differ.
 Summary summarize(const PreparedCloud& cloud, const Matrix& words);
 
 /// The most alike pairs of clouds, source > target: those that are likely to overlap. Two clouds
-/// are alike where their descriptors are, where matches of their key points agree with one motion
-/// (only those of the most similar descriptors are compared), and where a third cloud is like both.
+/// are alike if their descriptors are, if matches of their key points agree with one motion
+/// (only those of the most similar descriptors are compared), and if a third cloud is like both.
 /// @return ascending by target, then source.
 /// @throws InvalidArgument for options out of range, and for summaries by different words.
 std::vector<Pair> likely_pairs(const std::vector<Summary>& clouds, const Options& options = {});

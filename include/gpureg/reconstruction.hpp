@@ -31,7 +31,7 @@ struct AuditedReconstruction {
 /// Their reason is EdgeReason::inconsistent; that of pairs that are not trusted because places look
 /// alike is EdgeReason::unconfirmed.
 ///
-/// @param clouds as for audit(); without odometry, in the order of the sensor's path where there is
+/// @param clouds as for audit(); without odometry, in the order of the sensor's path if there is
 ///   one.
 /// @param pairs indices of clouds, as for align_batch().
 /// @param results results[k] belongs to pairs[k], as align_batch() returns them.
@@ -50,9 +50,9 @@ AuditedReconstruction reconstruct(const Context& context, const std::vector<Prep
                                   const RegistrationOptions& registration = {},
                                   const AuditOptions& audit_options = {});
 
-/// reconstruct() by the poses of the pairs alone: no cloud is seen and nothing is audited. Where
+/// reconstruct() by the poses of the pairs alone: no cloud is seen and nothing is audited. If
 /// places look alike, pairs with equal errors confirm each other, and the map is wrong: use it
-/// where there are no clouds.
+/// if there are no clouds.
 /// @param scans number of scans; the indices of the pairs are below it.
 Reconstruction reconstruct_from_poses(std::size_t scans, const std::vector<Pair>& pairs,
                                       const std::vector<RegistrationResult>& results,
@@ -60,8 +60,8 @@ Reconstruction reconstruct_from_poses(std::size_t scans, const std::vector<Pair>
                                       const std::vector<Odometry>& odometry = {});
 
 /// The placed scans with their poses, the odometry between them, and the accepted edges. Node ids
-/// are indices of scans, or `ids` of them where given.
-/// @throws InvalidArgument where ids are neither none nor one per scan.
+/// are indices of scans, or `ids` of them if given.
+/// @throws InvalidArgument if ids are neither none nor one per scan.
 pose_graph::Graph graph_of(const Reconstruction& map, const std::vector<std::int64_t>& ids = {});
 
 /// A place where an island would fall into two parts if fewer edges were correct.
@@ -161,7 +161,7 @@ struct RefineReport {
 /// @param map poses are replaced.
 /// @throws InvalidArgument for options out of range, another number of surfaces than scans, and a
 ///   surface whose points and normals differ in number.
-/// @throws DeviceError where the device has no memory left; the map stays as it was.
+/// @throws DeviceError if the device has no memory left; the map stays as it was.
 /// Sources: Chen and Medioni 1992 (point-to-plane); Neugebauer 1997 (all scans together).
 RefineReport refine(const Context& context, const std::vector<Surface>& surfaces,
                     Reconstruction& map, const RefineOptions& options = {});
@@ -177,14 +177,14 @@ class VoxelMap {
   /// @throws InvalidArgument unless voxel_size is finite and > 0.
   explicit VoxelMap(float voxel_size);
 
-  /// Adds the finite points of a scan, moved by map_from_scan; normals where the view has them.
+  /// Adds the finite points of a scan, moved by map_from_scan; normals if the view has them.
   /// @throws InvalidArgument as PointCloudView::validate(), and for a pose that is not rigid.
   void add(const PointCloudView& scan, const UnalignedIsometry3d& map_from_scan);
 
   std::size_t size() const { return cells_.size(); }  ///< number of voxels
 
-  /// @return the mean of each voxel, ordered by voxel, with mean normals where any scan had some
-  ///   ((0,0,0) where they cancel out). The order of the scans changes rounding only.
+  /// @return the mean of each voxel, ordered by voxel, with mean normals if any scan had some
+  ///   ((0,0,0) if they cancel out). The order of the scans changes rounding only.
   PointCloud cloud() const;
 
  private:

@@ -29,7 +29,7 @@ namespace gpureg {
 /// @throws InvalidArgument for options or views out of range, and for points that do not fit the
 ///   options: a cloud wider than 2^20 voxels or too dense for the radii, or more than 20,000 points
 ///   of which nearly all are isolated (millimetres with a voxel size in metres).
-/// @throws DeviceError where the device fails.
+/// @throws DeviceError if the device fails.
 PreparedCloud prepare(const Context& context, const PointCloudView& cloud,
                       const PrepareOptions& options = {});
 
@@ -57,9 +57,9 @@ std::vector<PreparedCloud> prepare_batch(const Context& context,
 /// @param options options.prepare is validated but not applied; each cloud keeps the options that
 ///   it was prepared with.
 /// @return the result; "no alignment" is a status, not an error.
-/// @throws InvalidArgument where a correspondence distance exceeds that of the preparation, where
+/// @throws InvalidArgument if a correspondence distance exceeds that of the preparation, if
 ///   the dimensions of the features differ, and for clouds of another backend.
-/// @throws DeviceError where the device fails.
+/// @throws DeviceError if the device fails.
 RegistrationResult align(const Context& context, const PreparedCloud& source,
                          const PreparedCloud& target, const RegistrationOptions& options = {});
 
@@ -115,7 +115,7 @@ struct BatchCallbacks {
 /// @return one result per pair, by pair index.
 /// @throws InvalidArgument as align(), and for an index out of range; all pairs are checked before
 ///   the first one runs.
-/// @throws DeviceError where the device fails.
+/// @throws DeviceError if the device fails.
 std::vector<RegistrationResult> align_batch(const Context& context,
                                             const std::vector<PreparedCloud>& clouds,
                                             const std::vector<Pair>& pairs,

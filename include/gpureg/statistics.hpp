@@ -7,7 +7,7 @@ namespace gpureg {
 
 enum class RegistrationStatus : std::uint8_t {
   aligned,  ///< target_from_source passed every threshold
-  /// No pose passed. reason says why; target_from_source is the best candidate where has_candidate.
+  /// No pose passed. reason says why; target_from_source is the best candidate if has_candidate.
   not_aligned,
   skipped,  ///< never tried, because the batch was cancelled before
   /// target_from_source is one of several poses that a symmetry makes equivalent, and only their
@@ -37,8 +37,8 @@ enum class RegistrationReason : std::uint8_t {
   cancelled
 };
 
-/// What is known of the place that a cloud was seen from. It decides about free space and about the
-/// sides of surfaces.
+/// How the viewpoint of a cloud is known. It decides about free space and about the sides of
+/// surfaces.
 enum class ViewpointSource : std::uint8_t {
   said,     ///< viewpoints were given
   origin,   ///< the origin of the cloud's frame; nothing given, and the surfaces agree with it
@@ -106,8 +106,8 @@ struct StageTimings {
 struct PrepareStatistics {
   std::uint64_t input_points = 0;
   std::uint64_t invalid_points = 0;  ///< dropped for NaN or infinite coordinates
-  /// Dropped for having fewer than two points within the normal radius, which only happens to
-  /// clouds of so many that they would exhaust the memory.
+  /// Dropped because they have fewer than two points within the normal radius; only in clouds
+  /// with so many of them that they would exhaust the memory.
   std::uint64_t stray_points = 0;
   std::uint32_t points = 0;                 ///< after downsampling
   std::uint32_t points_without_normal = 0;  ///< fewer than 3 neighbours

@@ -67,7 +67,7 @@ class SurfaceSet {
   /// @param surfaces their arrays have to outlive the set.
   /// @throws InvalidArgument naming surface and field: a null pointer with a size > 0, more than
   ///   2^31 - 1 points, a variance below 1.
-  /// @throws DeviceError where the device has no memory left.
+  /// @throws DeviceError if the device has no memory left.
   SurfaceSet(const Context& context, const std::vector<SurfaceView>& surfaces);
   ~SurfaceSet();
   SurfaceSet(SurfaceSet&&) noexcept;

@@ -20,8 +20,8 @@ struct TimedResult {
 
 /// align() at the highest quality that a budget of wall time allows. Runs levels of quality upwards
 /// from 0. It predicts the time of the next levels from the stages of the levels run so far, starts
-/// no level that would end after the budget, and leaves levels out where time allows a higher one.
-/// It ends early where two levels in a row give the same pose with a confidence of 0.99 or more.
+/// no level that would end after the budget, and leaves levels out if time allows a higher one.
+/// It ends early if two levels in a row give the same pose with a confidence of 0.99 or more.
 /// Level 0 always runs, even beyond the budget.
 ///
 /// Not deterministic: the clock decides which levels run. The result of

@@ -15,7 +15,7 @@ struct VerificationOptions {
   bool refine = false;
   /// Also align the pair, so that the confidence of a pose takes the alternatives into account, as
   /// that of align() does. Without, a pose competes with the other given ones only: faster, and too
-  /// confident where the clouds overlap well in several poses.
+  /// confident if the clouds overlap well in several poses.
   bool search_alternatives = true;
 };
 
@@ -53,7 +53,7 @@ std::vector<PoseVerification> verify_poses(const Context& context, const Prepare
                                            const VerificationOptions& verification = {});
 
 /// The same for many pairs at once: poses[k] belongs to pairs[k].
-/// @throws InvalidArgument also where poses and pairs differ in number.
+/// @throws InvalidArgument also if poses and pairs differ in number.
 std::vector<std::vector<PoseVerification>> verify_poses_batch(
     const Context& context, const std::vector<PreparedCloud>& clouds,
     const std::vector<Pair>& pairs, const std::vector<std::vector<UnalignedIsometry3d>>& poses,

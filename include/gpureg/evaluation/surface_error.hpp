@@ -12,7 +12,7 @@ namespace gpureg::evaluation {
 
 /// Options of evaluate_surface().
 struct SurfaceOptions {
-  /// Where the true points have normals and the nearest one is at most this far away, metres, >= 0:
+  /// If the true points have normals and the nearest one is at most this far away, metres, >= 0:
   /// the distance is that to its tangent plane, because the surface goes on between the points.
   /// Three times their spacing is a good value. 0: distances to points.
   double plane_reach = 0.03;

@@ -38,21 +38,21 @@ Trajectory read_trajectory(const std::string& path,
 
 /// Writes lines `time tx ty tz qx qy qz qw` (TUM), with the digits that give the same numbers when
 /// they are read, all or nothing.
-/// @throws IoError where writing fails.
+/// @throws IoError if writing fails.
 /// @throws InvalidArgument for a time that is not finite and a pose that is not rigid.
 void write_trajectory(const std::string& path, const Trajectory& trajectory);
 
 /// How the steps of the relative error are counted.
 enum class DeltaUnit {
-  frames,  ///< every pose and the one so many matched poses later
-  metres   ///< consecutive steps of at least such a length along the true path
+  frames,  ///< every pose and the one `delta` matched poses later
+  metres   ///< consecutive steps of at least `delta` along the true path
 };
 
 /// Options of evaluate_trajectory().
 struct TrajectoryOptions {
   double max_difference = 0.01;  ///< largest difference of times of a match, >= 0
   bool align = true;  ///< moves the estimate rigidly onto the truth, by positions, without scale
-  double delta = 1;   ///< of the relative error, > 0; whole where it counts frames
+  double delta = 1;   ///< of the relative error, > 0; whole if it counts frames
   DeltaUnit delta_unit = DeltaUnit::frames;
 
   /// @throws InvalidArgument naming field and value.
@@ -74,20 +74,20 @@ struct PoseError {
 /// Errors of a trajectory.
 struct TrajectoryEvaluation {
   std::size_t estimated = 0, true_poses = 0, matched = 0;
-  /// Moves the estimate onto the truth; the identity where align is false.
+  /// Moves the estimate onto the truth; the identity if align is false.
   Eigen::Matrix<double, 4, 4, Eigen::DontAlign> truth_from_estimate =
       Eigen::Matrix<double, 4, 4, Eigen::DontAlign>::Identity();
   double path_length = 0;                ///< of the matched true poses, metres
   ErrorStatistics absolute_translation;  ///< ATE, metres
   ErrorStatistics absolute_rotation;     ///< degrees
-  ErrorStatistics relative_translation;  ///< RPE, metres; none where no step is long enough
+  ErrorStatistics relative_translation;  ///< RPE, metres; none if no step is long enough
   ErrorStatistics relative_rotation;     ///< degrees
   std::vector<PoseError> poses;          ///< absolute errors of the matched poses, ascending times
 };
 
 /// Matches every pose to the true one with the nearest time (a true pose only once, to the nearer),
 /// aligns, and measures.
-/// @throws InvalidArgument for options out of range, fewer than 2 matches, or fewer than 3 where
+/// @throws InvalidArgument for options out of range, fewer than 2 matches, or fewer than 3 if
 /// the
 ///   trajectories are to be aligned.
 /// Sources: Umeyama 1991, Horn 1987 (alignment); Sturm et al. 2012 (ATE, RPE).

@@ -24,8 +24,8 @@ Graph read_g2o(const std::string& path, G2oRotation rotation = G2oRotation::quat
 
 /// Writes nodes, FIX lines and edges; an edge's first mode only.
 ///
-/// @param result  where given, its poses and chosen modes are written and rejected loops left out.
-/// @throws IoError where the file cannot be written.
+/// @param result  if given, its poses and chosen modes are written and rejected loops left out.
+/// @throws IoError if the file cannot be written.
 /// @throws InvalidArgument for a node without a pose, an edge without information, a gravity factor
 ///   or a prior, which g2o's tags cannot say.
 void write_g2o(const std::string& path, const Graph& graph, const Result* result = nullptr,
@@ -39,7 +39,7 @@ Graph read_open3d(const std::string& path);
 /// Writes an Open3D PoseGraph (JSON). Nodes must have the ids 0, 1, ..., as Open3D refers to nodes
 /// by position.
 /// @param result  as for write_g2o.
-/// @throws IoError where the file cannot be written.
+/// @throws IoError if the file cannot be written.
 /// @throws InvalidArgument as write_g2o().
 void write_open3d(const std::string& path, const Graph& graph, const Result* result = nullptr);
 

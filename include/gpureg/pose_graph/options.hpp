@@ -84,7 +84,7 @@ struct Options {
   DriftOptions drift;
   LoopNoiseOptions loop_noise;
   SolverOptions solver;
-  /// false: poses of free nodes are computed from the edges even where the nodes have one.
+  /// false: poses of free nodes are computed from the edges even if the nodes have one.
   bool use_initial_poses = true;
   int threads = 0;  ///< 0: one per core. Results do not depend on it.
   /// Ids of the nodes whose marginal covariance is wanted; one linear solve each.

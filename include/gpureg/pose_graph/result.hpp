@@ -34,7 +34,7 @@ struct EdgeResult {
 /// A set of nodes that odometry and accepted loops connect.
 struct Component {
   std::vector<std::int64_t> nodes;  ///< ids, ascending
-  /// The node whose pose was held where nothing else holds the component in the world: neither a
+  /// The node whose pose was held if nothing else holds the component in the world: neither a
   /// fixed node nor a prior. The poses are then in a frame of the component's own.
   bool own_frame = true;
   std::int64_t anchor = 0;  ///< its id; the smallest fixed node or the smallest node otherwise

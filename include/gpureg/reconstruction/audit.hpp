@@ -46,11 +46,11 @@ struct AuditOptions {
   void validate() const;
 };
 
-/// What two scans say about their poses in a map.
+/// Whether two scans support or contradict their poses in a map.
 enum class PairVerdict {
   silent,      ///< they hardly overlap, and neither stands in the other's view
   supports,    ///< their surfaces coincide
-  contradicts  ///< one stands where the other saw nothing, or their surfaces belong elsewhere
+  contradicts  ///< one stands in the other's free space, or they fit better elsewhere
 };
 const char* to_string(PairVerdict verdict);
 
@@ -58,7 +58,7 @@ const char* to_string(PairVerdict verdict);
 struct AuditedPair {
   std::uint32_t source = 0, target = 0;  ///< scans
   PairVerdict verdict = PairVerdict::silent;
-  /// Logarithm of: how much more likely such evidence is at a right pose than at a wrong one.
+  /// log(p(evidence, correct pose) / p(evidence, wrong pose))
   double log_likelihood_ratio = 0;
   /// Of the map.
   UnalignedIsometry3d target_from_source = UnalignedIsometry3d::Identity();
@@ -66,7 +66,7 @@ struct AuditedPair {
   double observed = 0;   ///< the larger share of points in the view of the other scan, [0, 1]
   double violation = 0;  ///< of these, the larger share that lies in free space, [0, 1]
   double shift = 0;      ///< RMS distance by which ICP moves the scans' overlap, metres
-  /// Where ICP puts the scans; where it was not asked, the pose of the map.
+  /// The pose after ICP; without ICP, the pose of the map.
   UnalignedIsometry3d refined = UnalignedIsometry3d::Identity();
   Eigen::Vector3d overlap_centre = Eigen::Vector3d::Zero();  ///< in the source's frame, metres
   Eigen::Matrix3d overlap_spread = Eigen::Matrix3d::Zero();  ///< covariance of its points
@@ -79,21 +79,21 @@ enum class ConnectionVerdict {
 };
 const char* to_string(ConnectionVerdict verdict);
 
-/// A place where a map would fall into two parts: all pairs across it are judged together. Pairs of
-/// one scan fail together: every further one counts less. Pairs that ICP moves by one and the same
-/// motion contradict it, too, however small the motion is.
+/// Two parts of a map and all pairs between them, which give one verdict. Pairs of one scan fail
+/// together: every further one counts less. Pairs that ICP moves by one common motion contradict
+/// the connection, too, however small the motion is.
 struct AuditedConnection {
-  /// The smaller part: so many entries of Audit::order, from this one on; see Audit::scans_of().
+  /// The smaller part: `size` entries of Audit::order from `first` on; see Audit::scans_of().
   std::size_t first = 0, size = 0;
   std::uint32_t island = 0;  ///< index into Audit::islands
   ConnectionVerdict verdict = ConnectionVerdict::undecided;
-  double confidence = 0.5;  ///< probability that the parts lie right to each other
+  double confidence = 0.5;  ///< probability that the relative pose of the parts is correct
   std::size_t supporting = 0, contradicting = 0;  ///< pairs across it
   /// Indices of the pairs that contradict it, the strongest first.
   std::vector<std::size_t> contradictions;
 };
 
-/// What an audit says of an island, or of a map.
+/// The result of an audit for an island, or for a map.
 enum class AuditVerdict {
   undecided,    ///< nothing is contradicted, but no more is confirmed than undecided
   sound,        ///< nothing is contradicted, and more connections are confirmed than undecided
@@ -110,7 +110,7 @@ struct Audit {
   /// Of each island. Undecided are those of poses in other units, or of other scans: they keep most
   /// scans out of each other's sight.
   std::vector<AuditVerdict> verdicts() const;
-  /// Of the map: contradicted where an island is; sound where every island of two scans or more is.
+  /// Of the map: contradicted if an island is; sound if every island of two scans or more is.
   AuditVerdict verdict() const;
   /// The smaller part of a connection, ascending.
   std::vector<std::uint32_t> scans_of(const AuditedConnection& connection) const;
@@ -118,10 +118,10 @@ struct Audit {
   std::size_t count(ConnectionVerdict verdict) const;
 };
 
-/// Judges every pair of scans that are near each other at their poses, and then the connections
+/// Verifies every pair of scans that are near each other at their poses, and then the connections
 /// along the best supported spanning trees.
 ///
-/// @param clouds one per scan, with sensor positions where they are known: without, only surfaces
+/// @param clouds one per scan, with sensor positions if they are known: without, only surfaces
 ///   can contradict.
 /// @param world_from_scan one per scan; not finite: the scan is left out.
 /// @param registration as for align_batch().

@@ -98,14 +98,14 @@ std::vector<Odometry> odometry_of_poses(const std::vector<UnalignedIsometry3d>& 
 /// One scan of the map.
 struct Scan {
   bool placed = false;
-  /// Index into Reconstruction::islands where placed.
+  /// Index into Reconstruction::islands if placed.
   std::uint32_t island = 0;
   /// Product of the confidences along the most confident path of accepted edges from the best
   /// connected scan of the island, [0, 1]: a lower bound, as other paths confirm it. Of a scan that
   /// is left out, the largest confidence of its pairs.
   double confidence = 0;
   ScanReason reason = ScanReason::not_tried;
-  /// p_island = island_from_scan * p_scan, metres; NaN where the scan is left out. The smallest
+  /// p_island = island_from_scan * p_scan, metres; NaN if the scan is left out. The smallest
   /// scan of an island has the identity.
   UnalignedIsometry3d island_from_scan = no_pose();
 };
@@ -116,9 +116,9 @@ struct Edge {
   std::size_t pair = 0;                  ///< index into the pairs given
   std::uint32_t mode = 0;                ///< index into RegistrationResult::modes
   UnalignedIsometry3d target_from_source = UnalignedIsometry3d::Identity();
-  /// Centre of the overlap in the source's frame; the origin where it is not known.
+  /// Centre of the overlap in the source's frame; the origin if it is not known.
   Eigen::Vector3d overlap_centre = Eigen::Vector3d::Zero();
-  /// Covariance of the overlap's points in the source's frame, metres^2; 0 where it is not known.
+  /// Covariance of the overlap's points in the source's frame, metres^2; 0 if it is not known.
   Eigen::Matrix<double, 3, 3, Eigen::DontAlign> overlap_spread =
       Eigen::Matrix<double, 3, 3, Eigen::DontAlign>::Zero();
   double confidence = 0;       ///< of this mode, after loop consistency
@@ -153,7 +153,7 @@ struct Reconstruction {
 /// A map of poses that are known, without edges: of another program, or of files.
 /// @param island_from_scan one per scan, in the frame of its island; not finite: left out.
 /// @param islands of each scan, counted from 0; empty: all are of one.
-/// @throws InvalidArgument where islands are neither none nor one per scan, or out of range.
+/// @throws InvalidArgument if islands are neither none nor one per scan, or out of range.
 Reconstruction map_of_poses(const std::vector<UnalignedIsometry3d>& island_from_scan,
                             const std::vector<std::uint32_t>& islands = {});
 

@@ -19,7 +19,7 @@ struct MendedMap {
 
 /// Takes each contradicted island apart at its contradicted connections, aligns scans across them,
 /// and puts the parts together as reconstruct() does; parts that too few sure pairs connect are
-/// joined where an audit of the joined parts confirms it. Where a few scans take part in all
+/// joined if an audit of the joined parts confirms it. If a few scans take part in all
 /// contradictions, they alone are taken out. Within the parts, poses stay as they are, but for what
 /// the pose graph spreads. The part with the most scans keeps its place. What an audit of the
 /// mended map still contradicts is left out, so that nothing of the map is contradicted. Other
