@@ -57,7 +57,7 @@ class AuditedPair:
 
 @dataclasses.dataclass(frozen=True)
 class AuditedConnection:
-    """A place where a map would fall into two parts; all pairs across it are judged together.
+    """Two parts of a map and all pairs between them, which give one verdict.
 
     Attributes
     ----------
@@ -192,7 +192,7 @@ def audit(
     fragments : FragmentSet, folder, or sequence of clouds
     poses : Map, path, or (N, 4, 4) array
         A `Map`, or the output folder of ``gpureg reconstruct``: island by island. Of one frame:
-        ``world_from_scan`` of each fragment, NaN where it has none; or a file, as for
+        ``world_from_scan`` of each fragment, NaN if it has none; or a file, as for
         ``gpureg audit``: a trajectory (TUM with fragment numbers as times, KITTI, or poses.txt), g2o, or a
         Redwood log of scans or of pairs.
     options : RegistrationOptions, optional
@@ -252,7 +252,7 @@ def mend(
     fragments, poses, options, audit_options, context, progress
         As for `audit`.
     audit : Audit, optional
-        What `audit` said about the same poses; None: the map is audited first.
+        The result of `audit` for the same poses; None: the map is audited first.
 
     Returns
     -------

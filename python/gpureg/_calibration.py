@@ -48,7 +48,7 @@ class RiskThreshold:
     supported : bool
         False: the samples are no proof for any threshold.
     min_confidence : float
-        For ``RegistrationOptions.min_confidence``; 1 where nothing is supported.
+        For ``RegistrationOptions.min_confidence``; 1 if nothing is supported.
     scans : int
     scenes : int
         0 of both: all samples count as independent.
@@ -60,7 +60,7 @@ class RiskThreshold:
     recall : float
         Share of the correct samples that are reported, [0, 1].
     more_samples : int or None
-        Where it is not supported: so many more would do if their shares of false poses stay as they
+        If it is not supported: how many more would do if their shares of false poses stay as they
         are. None: no number would do.
     more_scans, more_scenes : int or None
         The same in scans; in scenes, at least.
@@ -186,12 +186,12 @@ def calibrate(
         A folder of fragments; or clouds, each whatever `prepare` takes as points. A dozen or more,
         some of which overlap.
     poses : (N, 4, 4) array, optional
-        ``world_from_cloud``, accurate to about a voxel; NaN where it is not known. They decide
+        ``world_from_cloud``, accurate to about a voxel; NaN if it is not known. They decide
         which poses are correct. Default: loops decide.
     self_pairs : int
         Pairs made of one scan.
     scan_pairs : int
-        Largest number of pairs of different scans; where there are more, those within groups of
+        Largest number of pairs of different scans; if there are more, those within groups of
         consecutive scans.
     max_risk : float, optional
         Also find the threshold of `control_risk` for this share, on the pairs of different scans.
@@ -199,7 +199,7 @@ def calibrate(
         The calibration holds for its voxel size.
     context : Context, optional
     progress : bool or callable
-        True: a bar of tqdm, where installed. A callable gets (pairs done, pairs).
+        True: a bar of tqdm, if installed. A callable gets (pairs done, pairs).
 
     Returns
     -------

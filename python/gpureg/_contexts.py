@@ -18,7 +18,7 @@ _default_lock = threading.Lock()
 
 
 def default_context() -> Context:
-    """The context that calls without one use: CUDA where a device can be used, else all CPU
+    """The context that calls without one use: CUDA if a device can be used, else all CPU
     threads.
 
     Made at the first call, once per process. A forked child makes its own, on the CPU; CUDA does

@@ -30,12 +30,12 @@ class MapScan:
         Of the fragment.
     placed : bool
     island : int or None
-        Index into ``Map.islands``; None where the scan is left out.
+        Index into ``Map.islands``; None if the scan is left out.
     confidence : float
         A lower bound of the probability that the pose is correct; of a scan that is left out, the
         confidence of its best pair.
     reason : str
-        "none" where the scan is placed and confirmed, "unusable" where it cannot be read or
+        "none" if the scan is placed and confirmed, "unusable" if it cannot be read or
         prepared; see ``docs/maps.md``.
     explanation : str
         The reason as a sentence.
@@ -144,7 +144,7 @@ class Map:
 
     @property
     def poses(self) -> Poses:
-        """(N, 4, 4) ``island_from_scan`` in the order of the fragments; NaN where a scan is left
+        """(N, 4, 4) ``island_from_scan`` in the order of the fragments; NaN if a scan is left
         out. The smallest scan of an island has the identity.
         """
         poses = np.full((len(self._scans), 4, 4), np.nan)
@@ -158,7 +158,7 @@ class Map:
 
     @property
     def scans(self) -> tuple[MapScan, ...]:
-        """One per fragment, with the reason where it is left out."""
+        """One per fragment, with the reason if it is left out."""
         return self._scans
 
     @property
@@ -195,7 +195,7 @@ class Map:
     def points(
         self, island: int = 0, *, voxel_size: float | None = None
     ) -> tuple[Points, Points | None]:
-        """Points of an island, averaged per voxel, and their normals where the scans have some.
+        """Points of an island, averaged per voxel, and their normals if the scans have some.
 
         Reads the fragments again, one at a time.
 
@@ -206,13 +206,13 @@ class Map:
 
         Returns
         -------
-        points : (M, 3) float32, or float64 where float32 is too coarse for map coordinates
+        points : (M, 3) float32, or float64 if float32 is too coarse for map coordinates
         normals : (M, 3) float32 or None
 
         Raises
         ------
         IndexError
-            Where there is no such island.
+            If there is no such island.
         """
         islands = self._graph.islands
         if not 0 <= island < len(islands):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Progress of long calls: tqdm's bar, where installed, or a callable of the user's."""
+"""Progress of long calls: tqdm's bar, if installed, or a callable of the user's."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ class Report:
 def batch_progress(
     progress: Progress, title: str, total: int, done: int = 0, unit: str = "pair"
 ) -> Iterator[Report | None]:
-    """Gives a function of the number done, or None where nobody wants to know."""
+    """Gives a function of the number done, or None if nobody wants to know."""
     if callable(progress):
         yield Report(progress, None, total)
         return

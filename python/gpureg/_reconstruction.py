@@ -59,10 +59,10 @@ def reconstruct(
         Known poses: a trajectory file (TUM with fragment numbers as times, or poses.txt),
         ``world_from_scan`` of each fragment (NaN: not known), of both of which consecutive ones
         count, a Redwood log of pairs, or tuples (source, target, target_from_source) of fragment numbers, with a 6x6
-        information matrix as a fourth entry where it is known.
+        information matrix as a fourth entry if it is known.
     audit : bool
         Ask the scans whether they contradict each other where the map puts them, and take edges
-        out that cannot be right. Clouds are needed, and prepared where `results` are given.
+        out that cannot be right. Clouds are needed, and prepared if `results` are given.
     refine : bool
         Refine all poses together at half the voxel size.
     options : RegistrationOptions, optional
@@ -86,7 +86,7 @@ def reconstruct(
     ValueError
         Naming the argument: a repeated pair, an unknown fragment, results of another number.
     IoError
-        Where fewer than two fragments can be used.
+        If fewer than two fragments can be used.
     BatchInterrupted
         After Ctrl-C during the alignment; its ``results`` hold what is done.
 

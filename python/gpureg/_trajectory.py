@@ -65,7 +65,7 @@ def evaluate_trajectory(
     Raises
     ------
     ValueError
-        Naming the argument; also where too few poses match.
+        Naming the argument; also if too few poses match.
 
     Examples
     --------

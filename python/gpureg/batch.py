@@ -144,9 +144,9 @@ def register_all(
     Raises
     ------
     ValueError
-        Where the folder holds another run; says what differs.
+        If the folder holds another run; names the difference.
     IoError
-        Where a file of the folder is damaged; names it. Where no pair has two usable fragments.
+        If a file of the folder is damaged; names it. If no pair has two usable fragments.
     KeyboardInterrupt
         After Ctrl-C; what was done is on disk.
 

@@ -51,7 +51,7 @@ def prepare_map(
 
     Parameters
     ----------
-    clouds : cloud; where poses are given a sequence of scans, a folder or a FragmentSet
+    clouds : cloud; if poses are given a sequence of scans, a folder or a FragmentSet
         Each whatever `prepare` takes as points. Scans that know where they were seen from (by
         cameras.txt, by the viewpoints of a `PointCloud`, or at the origin of their frame) are best:
         what was seen through tells places apart that look alike.
@@ -241,7 +241,7 @@ def change(
     Returns
     -------
     ChangeResult or None
-        Labels and probabilities of every point of both; None where the scan was not found.
+        Labels and probabilities of every point of both; None if the scan was not found.
 
     Raises
     ------

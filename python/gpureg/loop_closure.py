@@ -34,18 +34,18 @@ def _pair(source: Any, target: Any) -> tuple[int, int]:
 
 
 class LoopCloser:
-    """Finds, verifies and, where wanted, optimises the loops of a SLAM system.
+    """Finds, verifies and, if wanted, optimises the loops of a SLAM system.
 
     `process` registers pairs of fragments and says which loops changed their state. `save` and
     `load` wait for it. Every other method returns at once, also while another thread is in
-    `process`; only `add` takes the time of preparing points where it is given points. On a GPU that
+    `process`; only `add` takes the time of preparing points if it is given points. On a GPU that
     waits for the registrations under way. The same calls give the same bits, as long as `process`
     has no time limit.
 
     Parameters
     ----------
     voxel_size : float
-        Metres; every length follows from it. Not used where options are given.
+        Metres; every length follows from it. Not used if options are given.
     options : LoopClosureOptions, optional
         With ``optimize`` False the poses are left to the host, and `LoopUpdate.poses` is empty.
         ``graph.drift`` is the noise of odometry without covariance. `LoopClosureOptions.loopsmart`
@@ -232,8 +232,8 @@ class LoopCloser:
     def load(self, path: Path, clouds: Callable[[int], PreparedCloud]) -> None:
         """Replace the state by a saved one; ``clouds(id)`` returns the fragments' clouds again.
 
-        The state stays as it was where the file is damaged (IoError), where it is of another voxel
-        size or a cloud is another (InvalidArgument), and where ``clouds`` raises.
+        The state stays as it was if the file is damaged (IoError), if it is of another voxel
+        size or a cloud is another (InvalidArgument), and if ``clouds`` raises.
         """
 
         def cloud_of(id: int) -> PreparedCloud:

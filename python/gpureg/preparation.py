@@ -17,7 +17,7 @@ from ._core import Context, IoError, PreparedCloud, PrepareOptions
 from ._progress import Progress, Report, batch_progress
 from .fragments import FragmentSet
 
-_TOGETHER = 32  # clouds per call where progress is shown: enough to fill a device
+_TOGETHER = 32  # clouds per call if progress is shown: enough to fill a device
 _PIECE_SECONDS = 0.4  # on the CPU
 
 
@@ -41,7 +41,7 @@ def prepare(
         ``__cuda_array_interface__`` (cupy, ...) or nested lists. float32 rows are read in place;
         everything else is copied once, to float32. Rows with NaN or infinity are dropped and
         counted. What is on the context's GPU as float32, float16 or bfloat16 stays there; only to
-        infer viewpoints that are neither given nor said to be unknown are points copied to the host.
+        infer viewpoints that are neither given nor declared unknown are points copied to the host.
         float64 coordinates too large for float32 (those of a map) lose nothing: their
         centre is taken off first and put back into results.
     normals : (N, 3) array, optional
@@ -50,11 +50,11 @@ def prepare(
     features : (N, D) array, optional
         Features of your own instead of FPFH, 1 <= D <= 4096.
     viewpoints : (V, 3) or (3,) array, "auto", "none" or "model", optional
-        Sensor positions in the cloud's frame, towards which normals are turned where none are
+        Sensor positions in the cloud's frame, towards which normals are turned if none are
         given, and from which free space was seen. Given normals that face away from all of them are
         turned round, unless more than an eighth do: then a UserWarning says so, as the viewpoints
         are most likely in another frame, and count as evidence against correct poses. "auto", the
-        default: the origin if the surfaces agree with it, else unknown; none where normals are
+        default: the origin if the surfaces agree with it, else unknown; none if normals are
         given. "none": unknown. "model": seen from everywhere, with given normals that point outwards,
         as of a sampled mesh, which needs no word. ``statistics.viewpoint`` of the cloud has the decision. With an
         unknown viewpoint there is no free space, and alignments try both sides of the surfaces.
@@ -105,7 +105,7 @@ def prepare_batch(
     options, context
         As for `prepare`.
     progress : bool or callable
-        True: a bar of tqdm, where installed. A callable gets (clouds done, clouds).
+        True: a bar of tqdm, if installed. A callable gets (clouds done, clouds).
 
     Examples
     --------
@@ -129,7 +129,7 @@ def _prepare(
     context: Context,
     report: Report | None,
 ) -> list[PreparedCloud]:
-    """At once, or where somebody looks on in pieces. Each cloud is read with its piece."""
+    """At once, or if somebody looks on in pieces. Each cloud is read with its piece."""
 
     def load(k: int) -> CoreCloud:
         device = context.backend == "cuda"
@@ -191,7 +191,7 @@ def prepare_usable(
     options: PrepareOptions,
     unusable: dict[int, str],
 ) -> list[tuple[int, PreparedCloud]]:
-    """Fragments by position, together, and one by one where one of them cannot be prepared.
+    """Fragments by position, together, and one by one if one of them cannot be prepared.
     unusable gets those whose files cannot be read or that cannot be prepared, and why.
     """
     inputs: dict[int, CoreCloud] = {}
@@ -226,7 +226,7 @@ def usable_fragments(
     progress: Progress,
     unusable: dict[int, str],
 ) -> list[PreparedCloud]:
-    """Prepared. unusable gets the positions of those that cannot be, and why; raises IoError where
+    """Prepared. unusable gets the positions of those that cannot be, and why; raises IoError if
     fewer than two are left.
     """
     out: list[PreparedCloud] = []

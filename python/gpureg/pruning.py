@@ -105,8 +105,8 @@ def summarize_all(
 def likely_pairs(summaries: Sequence[CloudSummary], k: int = 20, *, consecutive: int = 0) -> Pairs:
     """Pairs of `summarize_all`'s fragments that are likely to overlap.
 
-    Two fragments are alike where their descriptors are, where matches of their key points agree with
-    one motion, and where a third fragment is like both.
+    Two fragments are alike if their descriptors are, if matches of their key points agree with
+    one motion, and if a third fragment is like both.
 
     Returns
     -------
@@ -128,7 +128,7 @@ class Nearest:
     k : int
         Pairs per fragment on average.
     consecutive : int
-        Also the so many fragments that follow each one by number: scans of a walk.
+        Also this many fragments that follow each one by number: scans of a walk.
     options : PrepareOptions, optional
         Those of the run, usually.
     context : Context, optional
@@ -187,7 +187,7 @@ class PruningReport:
 
     @property
     def recall(self) -> float:
-        """Part of the overlapping pairs that are still tried, [0, 1]; 1 where none overlaps."""
+        """Part of the overlapping pairs that are still tried, [0, 1]; 1 if none overlaps."""
         return self.kept / self.overlapping if self.overlapping else 1.0
 
     def __str__(self) -> str:

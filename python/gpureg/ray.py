@@ -103,7 +103,7 @@ def register_all(
     actors : int, optional
         Default: one per GPU of the cluster, or one per CPU.
     gpus : bool, optional
-        Whether actors use a GPU each. Default: where the cluster has any.
+        Whether actors use a GPU each. Default: if the cluster has any.
 
     Returns
     -------
@@ -112,7 +112,7 @@ def register_all(
     Raises
     ------
     ray.exceptions.RayActorError
-        Where an actor died more often than can be an accident; what was done is on disk.
+        If an actor died more often than can be an accident; what was done is on disk.
     """
     begin = time.monotonic()
     plan = make_plan(fragments, pairs, options, chunk_size, memory)
@@ -172,7 +172,7 @@ def _run(
 
 
 def _read(board: Any) -> dict[int, int]:
-    """Nothing where the board cannot be asked: a run does not fail for its progress."""
+    """Nothing if the board cannot be asked: a run does not fail for its progress."""
     if board is None:
         return {}
     try:

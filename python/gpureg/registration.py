@@ -22,7 +22,7 @@ from ._core import (
 from ._progress import batch_progress
 from .preparation import check_prepared, prepared
 
-#: Values of ``RegistrationResult.status`` where a pose is reported.
+#: Values of ``RegistrationResult.status`` if a pose is reported.
 ALIGNED = ("aligned", "aligned_up_to_symmetry")
 
 
@@ -182,11 +182,11 @@ def align_batch(
     pairs : (M, 2) integer array or list of pairs
         Rows (source, target): indices into fragments.
     priors : sequence of RegistrationPrior, optional
-        One for each pair, see `align`; ``RegistrationPrior()`` where nothing is known.
+        One for each pair, see `align`; ``RegistrationPrior()`` if nothing is known.
     options : RegistrationOptions, optional
     context : Context, optional
     progress : bool or callable
-        True: a bar of tqdm, where installed. A callable gets (pairs done, pairs) every few pairs.
+        True: a bar of tqdm, if installed. A callable gets (pairs done, pairs) every few pairs.
 
     Returns
     -------
@@ -259,7 +259,7 @@ def register(
     options : RegistrationOptions, optional
         Instead of voxel_size, quality and seed.
     time_budget_ms : float, optional
-        Instead of quality: as much of it as so many milliseconds allow for the alignment, without
+        Instead of quality: as much of it as this many milliseconds allow for the alignment, without
         preparation; see `align_within`. Not together with a prior.
     context : Context, optional
 

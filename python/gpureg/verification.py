@@ -37,7 +37,7 @@ def verify(
     search_alternatives : bool
         Also align the pair, so that the confidence takes the alternatives into account, as that of
         `align` does. Without, the poses compete with each other only: faster, and too confident
-        where the clouds overlap well in several poses.
+        if the clouds overlap well in several poses.
     options : RegistrationOptions, optional
     context : Context, optional
 

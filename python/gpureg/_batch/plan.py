@@ -56,7 +56,7 @@ class Plan:
         return list(map(tuple, self.numbers(self.chunk(index)).tolist()))
 
     def name(self, index: int) -> str:
-        """Of a chunk's file: another one where the chunk has other pairs."""
+        """Of a chunk's file: another one if the chunk has other pairs."""
         pairs = np.ascontiguousarray(self.numbers(self.chunk(index)), "<i8")
         return f"{index:06d}-{hashlib.blake2b(pairs.tobytes(), digest_size=4).hexdigest()}"
 
@@ -96,7 +96,7 @@ def options_dict(options: Any) -> Any:
 
 
 def difference(before: Any, now: Any, name: str = "") -> str:
-    """Names the first part of a manifest that is not the same; empty where all is."""
+    """Names the first part of a manifest that is not the same; empty if all is."""
     if isinstance(before, dict) and isinstance(now, dict):
         for key in sorted(set(before) | set(now)):
             inner = f"{name}.{key}" if name else str(key)

@@ -58,7 +58,7 @@ class Residency:
         under way: fragment j into fragment i. Leaves out the pairs of fragments that cannot be read
         or prepared.
 
-        Raises Stopped where stop says so; on_result has been called for what was done.
+        Raises Stopped if stop says so; on_result has been called for what was done.
         """
         group: list[int] = []
         held: dict[int, PreparedCloud] = {}

@@ -81,7 +81,7 @@ class Store:
             self._take_over()
 
     def _check_goes_on(self, before: Row, now: Row) -> None:
-        """Raises ValueError where the folder has pairs that are none of this run's."""
+        """Raises ValueError if the folder has pairs that are none of this run's."""
         keys = {key for table in self._tables() for key in _keys_of(table)}
         used = {number for key in keys for number in key}
         changed = difference(_of_fragments(before, used), _of_fragments(now, used))
