@@ -20,7 +20,7 @@ struct Fields<PoseEvidence> {
     v(&E::match_support, {"match_support", "The same as a normal-weighted share of all matches, the smaller one of both sides."});
     v(&E::source_overlap, &E::target_overlap, {"overlap", "Share of the source's points with a point of the target within max_correspondence_distance and a similar normal."});
     v(&E::source_overlap_any_normal, &E::target_overlap_any_normal, {"overlap_any_normal", "The same whatever the normals."});
-    v(&E::source_residual, &E::target_residual, {"residual", "RMS distance of the overlapping points over max_correspondence_distance; 1 where there are none."});
+    v(&E::source_residual, &E::target_residual, {"residual", "RMS distance of the overlapping points over max_correspondence_distance; 1 if there are none."});
     v(&E::source_normal_weighted_overlap, &E::target_normal_weighted_overlap, {"normal_weighted_overlap", "Overlap in which a point weighs less the more normals of its cloud share its direction."});
     v(&E::source_observed, &E::target_observed, {"observed", "Share of the source's points in directions that viewpoints of the target observed, weighted by incidence; 0: no viewpoint known."});
     v(&E::source_free_space_violation, &E::target_free_space_violation, {"free_space_violation", "Of these, with the same weights, the share in observed free space."});

@@ -46,7 +46,7 @@ struct Fields<localization::LocateOptions> {
     v(&O::max_matches, {"max_matches", from(limits::kMinMatches, limits::kMaxMatches), "Matches with a tile."});
     v(&O::coarse_factor, {"coarse_factor", from(1, 8), "Voxels of the coarse search, in voxels of the map."});
     v(&O::coarse_tiles, {"coarse_tiles", from(1, 1e6), "Tiles of the coarse search; of more, a coarser one chooses."});
-    v(&O::fine_tiles, {"fine_tiles", from(1, 1e6), "Tiles of the fine search, where the coarse one is not sure."});
+    v(&O::fine_tiles, {"fine_tiles", from(1, 1e6), "Tiles of the fine search, if the coarse one is not sure."});
     v(&O::candidates, {"candidates", from(1, 64), "Poses of a scan that are verified."});
     v(&O::neighborhood, {"neighborhood", kReach, kProportional, "Distance up to which the map verifies a pose."});
   }

@@ -34,7 +34,7 @@ template <>
 struct Fields<loop_closure::AcceptanceOptions> {
   static constexpr const char* kName = "LoopAcceptanceOptions";
   static constexpr const char* kGroup = "acceptance.";
-  static constexpr const char* kSentence = "When a loop is believed.";
+  static constexpr const char* kSentence = "When a loop is accepted.";
 
   // clang-format off: a field is a line.
   template <typename V>
@@ -65,7 +65,7 @@ struct Fields<loop_closure::Options> {
     using O = loop_closure::Options;
     v(&O::registration, {"registration", "Registration of two fragments."});
     v(&O::proposals, {"proposals", "Which pairs are registered."});
-    v(&O::acceptance, {"acceptance", "When a loop is believed."});
+    v(&O::acceptance, {"acceptance", "When a loop is accepted."});
     v(&O::noise, {"noise", "Noise of registered poses."});
     v(&O::information_unit, {"information_unit", kPositive.in("metres"), kProportional, "Length in which the information eigenvalues count rotations: twenty voxels."});
     v(&O::graph, {"graph", "Optimisation: robust kernel, drift of odometry without covariance, noise of loops of the host."});

@@ -40,7 +40,7 @@ struct Fields<PairConsistency> {
   static void visit(V&& v) {
     using P = PairConsistency;
     v(&P::confidence, {"confidence", "Probability that the mode is correct, given all pairs."});
-    v(&P::mode, {"mode", "Index into RegistrationResult.modes; 0, target_from_source, where there are none."});
+    v(&P::mode, {"mode", "Index into RegistrationResult.modes; 0, target_from_source, if there are none."});
     v(&P::loops, {"loops", "Loops of three that the pair is in."});
     v(&P::path, {"path", "Number of pairs on the most confident path that the pair was compared with; 0: none. Without loops and path the confidence is the result's score."});
   }

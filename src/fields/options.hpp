@@ -132,7 +132,7 @@ struct Fields<EvidenceOptions> {
     v(&O::sample, {"sample", from(limits::kMinSample, limits::kMaxSample), "Approximate number of points of each cloud that score a candidate."});
     v(&O::modes, {"modes", from(1, limits::kMaxModes), "Distinct poses that are refined and verified by all points."});
     v(&O::max_normal_angle, {"max_normal_angle", kDegrees, "Between the normals of an inlier."});
-    v(&O::mode_angle, {"mode_angle", kDegrees, "Two poses are one mode where their rotations differ by less than this ..."});
+    v(&O::mode_angle, {"mode_angle", kDegrees, "Two poses are one mode if their rotations differ by less than this ..."});
     v(&O::mode_distance, {"mode_distance", kLength, voxels(6), "... and the cloud's centre by less than this."});
     v(&O::degeneracy_search_distance, {"degeneracy_search_distance", kLengthOrZero, voxels(8), "Range of the degeneracy search: the most likely mode is perturbed along its weakest direction by up to this far, both ways; 0: no search."});
     v(&O::free_space_margin, {"free_space_margin", kLength, voxels(12, 5), "Distance in front of an observed surface within which a point does not violate free space."});

@@ -128,7 +128,7 @@ struct Fields<pose_graph::Options> {
     v(&O::drift, {"drift", "Noise of odometry without an information matrix."});
     v(&O::loop_noise, {"loop_noise", "Noise of loops without an information matrix."});
     v(&O::solver, {"solver", "Levenberg-Marquardt."});
-    v(&O::use_initial_poses, {"use_initial_poses", "Start from the poses of the nodes where they have one, not from the edges."});
+    v(&O::use_initial_poses, {"use_initial_poses", "Start from the poses of the nodes if they have one, not from the edges."});
     v(&O::threads, {"threads", from(0, 4096, "0 (one per core) to 4096"), "Threads; results do not depend on them."});
   }
   // clang-format on

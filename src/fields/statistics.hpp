@@ -67,7 +67,7 @@ struct Fields<PrepareStatistics> {
     using P = PrepareStatistics;
     v(&P::input_points, {"input_points", "Points that came in."});
     v(&P::invalid_points, {"invalid_points", "Of these, dropped for NaN or infinity."});
-    v(&P::stray_points, {"stray_points", "Dropped for having fewer than two points within the normal radius; only in clouds with so many that they would exhaust the memory."});
+    v(&P::stray_points, {"stray_points", "Dropped because they have fewer than two points within the normal radius; only in clouds with so many of them that they would exhaust the memory."});
     v(&P::points, {"points", "After downsampling."});
     v(&P::points_without_normal, {"points_without_normal", "Fewer than 3 neighbours."});
     v(&P::points_without_feature, {"points_without_feature", "Never matched."});
