@@ -14,11 +14,11 @@ namespace gpureg::io {
 
 /// Reads a PLY (text or binary of either byte order; of a mesh the vertices, see mesh.hpp for its
 /// faces) or PCD file (text, binary, compressed); of these two the content decides, not the
-/// extension. Coordinates of any numeric type become float; if that is too coarse, as for those
-/// of maps, the cloud gets an origin first. Normals are read if the file has them. Points with a
+/// extension. Coordinates of any numeric type become float; where that is too coarse, as for those
+/// of maps, the cloud gets an origin first. Normals are read where the file has them. Points with a
 /// NaN or infinite coordinate stay; prepare() drops them. A file that is neither and ends in .bin
 /// is a scan of KITTI (rows of float32 x y z reflectance) or of nuScenes (x y z intensity ring), or
-/// has rows of three or six numbers: the columns of 64 rows or more tell, and if they do not,
+/// has rows of three or six numbers: the columns of 64 rows or more tell, and where they do not,
 /// the file is refused. The VIEWPOINT of a PCD becomes the viewpoint unless it is the origin.
 /// Memory is bounded by the size of the file.
 /// @throws IoError naming file (and line, in text) and reason: missing, empty, truncated, a false
@@ -27,18 +27,18 @@ PointCloud read_point_cloud(const std::string& path);
 
 /// What the coordinates of a file have lost to float32: beyond 1e5, and with less than 2^17 steps
 /// across the cloud. Coordinates of finer types have an origin then, and lose nothing.
-/// @return a sentence for a note, with a remedy; empty if they are fine enough.
+/// @return a sentence for a note, with a remedy; empty where they are fine enough.
 std::string coarse_coordinates(const PointCloud& cloud);
 
-/// Writes a binary PLY with x y z (and normals if the cloud has them), all or nothing. x y z are
-/// float32, or double if the cloud has an origin.
-/// @throws IoError if writing fails.
-/// @throws InvalidArgument if the number of normals is neither 0 nor that of the points.
+/// Writes a binary PLY with x y z (and normals where the cloud has them), all or nothing. x y z are
+/// float32, or double where the cloud has an origin.
+/// @throws IoError where writing fails.
+/// @throws InvalidArgument where the number of normals is neither 0 nor that of the points.
 void write_point_cloud(const std::string& path, const PointCloud& cloud);
 
 /// Lists cloud_bin_<i>.ply|pcd|bin|stl|obj of a folder.
 /// @return number and path, ascending by number.
-/// @throws IoError if the folder has none, or a number twice.
+/// @throws IoError where the folder has none, or a number twice.
 std::vector<std::pair<int, std::string>> list_fragments(const std::string& folder);
 
 /// Reads cameras.txt: lines `fragment frame tx ty tz qx qy qz qw` (fragment_from_camera); '#'

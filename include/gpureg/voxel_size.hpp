@@ -38,9 +38,9 @@ struct VoxelSizeSuggestion {
 
 /// Suggests one voxel size for a set of clouds: about 5,000 points of the median cloud remain,
 /// enough for an accurate and fast registration, and the voxel is not below the spacing of the
-/// points. If the noise exceeds a third of a voxel, it grows until 3,000 points remain. It also
-/// grows if the neighbourhoods of the features have few points, as in sparse LiDAR scans, in
-/// proportion to them, and if most points have their neighbours on one line, as on the rings of
+/// points. Where the noise exceeds a third of a voxel, it grows until 3,000 points remain. It also
+/// grows where the neighbourhoods of the features have few points, as in sparse LiDAR scans, in
+/// proportion to them, and where most points have their neighbours on one line, as on the rings of
 /// a LiDAR, until they have an area. 1,000 points remain. Rounded to one or two digits. Reads at
 /// most 16 clouds, evenly chosen, and samples of their points; non-finite and repeated points do
 /// not matter. Deterministic, thread-safe.
