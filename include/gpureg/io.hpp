@@ -1,16 +1,45 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <cstddef>
 #include <map>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "gpureg/point_cloud.hpp"
+#include "gpureg/result.hpp"
 
 /// Component `io`: readers of clouds and lists, a writer of clouds. Needs no other library; every
 /// function is thread-safe.
 namespace gpureg::io {
+
+/// A scan of a file that holds several.
+struct StoredScan {
+  std::string name;        ///< may be empty
+  std::size_t points = 0;  ///< that the file announces; of PTX rows without a return are among them
+  /// Pose of the scan in the frame of its file, metres; none where the file gives none.
+  std::optional<UnalignedIsometry3d> file_from_scan;
+};
+
+/// The scans of a file of a format that can hold several: PTX, E57 (of which no point is read).
+/// Empty for any other file.
+/// @throws IoError where the file cannot be read, or its list of scans is damaged.
+std::vector<StoredScan> scans_in(const std::string& path);
+
+/// Number of scans of a file: that of scans_in(), and 1 for formats that hold one.
+/// @throws IoError as scans_in() does.
+std::size_t count_scans(const std::string& path);
+
+/// A scan of a file as the command and Python name it.
+struct ScanPath {
+  std::string file;
+  std::size_t part = 0;  ///< from 1; 0: the only scan of the file
+};
+
+/// "project.e57#2" is the second scan of project.e57, unless a file has that very name.
+ScanPath scan_path(const std::string& path);
 
 /// Reads a PLY (text or binary of either byte order; of a mesh the vertices, see mesh.hpp for its
 /// faces) or PCD file (text, binary, compressed); of these two the content decides, not the
@@ -19,11 +48,18 @@ namespace gpureg::io {
 /// NaN or infinite coordinate stay; prepare() drops them. A file that is neither and ends in .bin
 /// is a scan of KITTI (rows of float32 x y z reflectance) or of nuScenes (x y z intensity ring), or
 /// has rows of three or six numbers: the columns of 64 rows or more tell, and where they do not,
-/// the file is refused. The VIEWPOINT of a PCD becomes the viewpoint unless it is the origin.
-/// Memory is bounded by the size of the file.
+/// the file is refused. The VIEWPOINT of a PCD becomes the viewpoint unless it is the origin; the
+/// scanner of a PTX is its viewpoint. Rows of numbers in text (XYZ, TXT, ASC, CSV, PTS) are read,
+/// and OBJ and OFF without faces. Memory is bounded by the size of the file.
+/// @param path may name a scan, see scan_path().
+/// @param part of a file that holds several scans (PTX): the scan, from 1. 0: the only one.
+/// @param note gets what is strange about a file that is read nonetheless, such as rows after the
+///   last one that its header announces; empty where nothing is.
 /// @throws IoError naming file (and line, in text) and reason: missing, empty, truncated, a false
-///   count in the header, no x y z.
-PointCloud read_point_cloud(const std::string& path);
+///   count in the header, no x y z, several scans and none named (with a list of them), no such
+///   scan; of formats that are not read, what to do.
+PointCloud read_point_cloud(const std::string& path, std::size_t part = 0,
+                            std::string* note = nullptr);
 
 /// What the coordinates of a file have lost to float32: beyond 1e5, and with less than 2^17 steps
 /// across the cloud. Coordinates of finer types have an origin then, and lose nothing.

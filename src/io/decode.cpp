@@ -83,6 +83,21 @@ std::vector<Eigen::Vector3d> sample_of(const Table& table,
   return sample;
 }
 
+/// What the C library of Windows prints for NaN and infinity.
+bool parse_not_finite(std::string_view text, double& value) {
+  const bool negative = !text.empty() && text[0] == '-';
+  if (negative) text.remove_prefix(1);
+  const auto begins = [&](std::string_view with) { return text.substr(0, with.size()) == with; };
+  if (begins("1.#INF")) {
+    value = negative ? -std::numeric_limits<double>::infinity()
+                     : std::numeric_limits<double>::infinity();
+    return true;
+  }
+  value = std::numeric_limits<double>::quiet_NaN();
+  const bool in_parentheses = begins("nan(") && text.back() == ')';
+  return in_parentheses || begins("1.#IND") || begins("1.#QNAN") || begins("1.#SNAN");
+}
+
 }  // namespace
 
 ByteOrder host_order() {
@@ -123,7 +138,7 @@ bool parse_coordinate(std::string_view text, double& value) {
   const char* const end = text.data() + text.size();
   value = 0;
   const auto [stop, error] = files::from_chars(text.data(), end, value);
-  if (stop != end || error == std::errc::invalid_argument) return false;
+  if (stop != end || error == std::errc::invalid_argument) return parse_not_finite(text, value);
   if (error == std::errc::result_out_of_range) {
     const bool tiny = text.find("e-") != text.npos || text.find("E-") != text.npos;
     value = tiny ? 0.0 : std::numeric_limits<double>::infinity();
@@ -162,7 +177,8 @@ PointCloud decode_binary(const Table& table, const Source& source, const char* b
   return cloud;
 }
 
-PointCloud decode_text(const Table& table, Source& source) {
+PointCloud decode_text(const Table& table, Source& source,
+                       const std::function<void(std::vector<std::string_view>&)>& drop_lists) {
   const Axes axes = find_axes(table, source);
   const std::size_t values = table.values_per_row();
   check_text_size(table.rows, values, source);
@@ -194,6 +210,7 @@ PointCloud decode_text(const Table& table, Source& source) {
                   " points, the file ends after " + std::to_string(points.size()));
     split(line, fields);
     if (fields.empty()) continue;
+    if (drop_lists) drop_lists(fields);
     if (fields.size() != values)
       source.fail_line("point " + std::to_string(points.size() + 1) + " has " +
                        std::to_string(fields.size()) + " values, expected " +
@@ -203,6 +220,15 @@ PointCloud decode_text(const Table& table, Source& source) {
   }
   set_points(cloud, points);
   return cloud;
+}
+
+void note_further_lines(Source& source) {
+  std::size_t further = 0;
+  std::string_view line;
+  while (source.next_line(line)) further += line.find_first_not_of(" \t") != line.npos;
+  if (further > 0)
+    source.note(std::to_string(further) + (further == 1 ? " line was" : " lines were") +
+                " left out, after those that the header announces");
 }
 
 void check_text_size(std::size_t rows, std::size_t values_per_row, const Source& source) {

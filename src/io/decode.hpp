@@ -2,6 +2,9 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
+#include <string_view>
+#include <vector>
 
 #include "gpureg/point_cloud.hpp"
 #include "io/source.hpp"
@@ -20,7 +23,8 @@ ByteOrder host_order();
 /// One number, wherever it lies.
 double load(Scalar type, const char* bytes, bool swap);
 
-/// The whole text as a number. Those beyond the range of double become infinity or zero.
+/// The whole text as a number. Those beyond the range of double become infinity or zero. Knows how
+/// programs of any system write what is no number: nan, -nan(ind), 1.#QNAN, -1.#IND, 1.#INF.
 bool parse_coordinate(std::string_view text, double& value);
 
 /// The cloud in table.rows * table.bytes_per_row() bytes of body. Throws IoError for a table
@@ -30,7 +34,14 @@ PointCloud decode_binary(const Table& table, const Source& source, const char* b
 
 /// The cloud in the next table.rows lines that are not blank. Throws IoError naming the line that
 /// is malformed or missing.
-PointCloud decode_text(const Table& table, Source& source);
+/// @param drop_lists takes what is no column of the table out of the fields of a line; may be
+/// empty.
+PointCloud decode_text(
+    const Table& table, Source& source,
+    const std::function<void(std::vector<std::string_view>&)>& drop_lists = nullptr);
+
+/// Passes the lines that follow what the header announces, and notes how many they are.
+void note_further_lines(Source& source);
 
 /// Throws IoError unless the rest of the source can hold `rows` rows: the size of the file bounds
 /// the allocation.

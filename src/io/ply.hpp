@@ -25,7 +25,7 @@ struct PlyElement {
   std::vector<PlyProperty> properties;
 
   bool has_list() const;
-  Table table() const;  ///< of an element without lists
+  Table table() const;  ///< of the properties that are no lists
 };
 
 struct PlyHeader {

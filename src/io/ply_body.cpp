@@ -25,7 +25,7 @@ std::size_t checked_bytes(const PlyElement& element, const Source& source) {
 }
 
 // Lists have a size of their own in every row, so rows are walked one by one. Each takes at least a
-// byte: no count can make it hang. take(property, count, first) sees every list.
+// byte: no count can make it hang. take(property, count, first) sees every property.
 template <typename Take>
 void walk_binary_lists(const PlyElement& element, Source& source, bool swap, Take&& take) {
   const std::string_view bytes = source.rest();
@@ -39,6 +39,7 @@ void walk_binary_lists(const PlyElement& element, Source& source, bool swap, Tak
       const std::size_t size = size_of(property.column.type);
       if (!property.list_count) {
         pass(size);
+        take(property, std::size_t{1}, bytes.data() + at - size);
         continue;
       }
       const std::size_t before = at;
@@ -118,16 +119,51 @@ void read_text_faces(const PlyElement& element, Source& source, Polygons& faces)
 // final line end.
 void check_nothing_left(const PlyElement& last, Source& source, bool text) {
   if (text) {
-    std::string_view line;
-    while (source.next_line(line))
-      if (line.find_first_not_of(" \t") != line.npos)
-        source.fail_line("more data than the header announces, " + std::to_string(last.count) +
-                         " of element " + last.name);
+    note_further_lines(source);
   } else if (!last.has_list() &&
              source.rest().size() >= std::max<std::size_t>(last.table().bytes_per_row(), 1)) {
     source.fail(std::to_string(source.rest().size()) + " bytes more than the header announces, " +
                 std::to_string(last.count) + " of element " + last.name);
   }
+}
+
+// The other properties of vertices that have lists.
+PointCloud read_binary_with_lists(const PlyElement& element, Source& source, ByteOrder order) {
+  std::string rows;
+  walk_binary_lists(element, source, order != host_order(),
+                    [&](const PlyProperty& property, std::size_t, const char* first) {
+                      if (!property.list_count) rows.append(first, size_of(property.column.type));
+                    });
+  return decode_binary(element.table(), source, rows.data(), Order::by_row, order);
+}
+
+PointCloud read_text_with_lists(const PlyElement& element, Source& source) {
+  return decode_text(element.table(), source, [&](std::vector<std::string_view>& fields) {
+    std::size_t from = 0, to = 0;
+    for (const PlyProperty& property : element.properties) {
+      std::size_t count = 0;
+      if (from >= fields.size() || (property.list_count && !parse_count(fields[from], count)) ||
+          count > fields.size() - from - 1)
+        source.fail_line("a vertex has " + std::to_string(fields.size()) +
+                         " values, fewer than its lists announce");
+      if (!property.list_count) fields[to++] = fields[from];
+      from += 1 + count;
+    }
+    if (from == fields.size()) fields.resize(to);
+  });
+}
+
+PointCloud read_vertices(const PlyElement& element, Source& source, bool text, ByteOrder order) {
+  check_rows(element.count, source);
+  if (element.has_list())
+    return text ? read_text_with_lists(element, source)
+                : read_binary_with_lists(element, source, order);
+  if (text) return decode_text(element.table(), source);
+  const std::size_t bytes = checked_bytes(element, source);
+  PointCloud cloud =
+      decode_binary(element.table(), source, source.rest().data(), Order::by_row, order);
+  source.skip(bytes);
+  return cloud;
 }
 
 /// faces: where they go; null: they are skipped.
@@ -153,16 +189,7 @@ PointCloud read(Source& source, Polygons* faces) {
       text ? skip_text(element, source) : skip_binary(element, source, order != host_order());
       continue;
     }
-    if (element.has_list())
-      source.fail("element vertex has a property list, which is not supported");
-    check_rows(element.count, source);
-    if (text) {
-      cloud = decode_text(element.table(), source);
-    } else {
-      const std::size_t bytes = checked_bytes(element, source);
-      cloud = decode_binary(element.table(), source, source.rest().data(), Order::by_row, order);
-      source.skip(bytes);
-    }
+    cloud = read_vertices(element, source, text, order);
   }
   check_nothing_left(header.elements.back(), source, text);
   return cloud;

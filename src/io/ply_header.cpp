@@ -13,12 +13,12 @@ using files::quoted;
 
 Scalar scalar_type(std::string_view name, const Source& source) {
   static constexpr std::pair<std::string_view, Scalar> known[] = {
-      {"char", Scalar::int8},      {"int8", Scalar::int8},       {"uchar", Scalar::uint8},
-      {"uint8", Scalar::uint8},    {"short", Scalar::int16},     {"int16", Scalar::int16},
-      {"ushort", Scalar::uint16},  {"uint16", Scalar::uint16},   {"int", Scalar::int32},
-      {"int32", Scalar::int32},    {"uint", Scalar::uint32},     {"uint32", Scalar::uint32},
-      {"float", Scalar::float32},  {"float32", Scalar::float32}, {"double", Scalar::float64},
-      {"float64", Scalar::float64}};
+      {"char", Scalar::int8},      {"int8", Scalar::int8},      {"uchar", Scalar::uint8},
+      {"uint8", Scalar::uint8},    {"bool", Scalar::uint8},     {"short", Scalar::int16},
+      {"int16", Scalar::int16},    {"ushort", Scalar::uint16},  {"uint16", Scalar::uint16},
+      {"int", Scalar::int32},      {"int32", Scalar::int32},    {"uint", Scalar::uint32},
+      {"uint32", Scalar::uint32},  {"float", Scalar::float32},  {"float32", Scalar::float32},
+      {"double", Scalar::float64}, {"float64", Scalar::float64}};
   for (const auto& [text, type] : known)
     if (text == name) return type;
   source.fail_line("unknown type " + quoted(name));
@@ -66,7 +66,8 @@ bool PlyElement::has_list() const {
 Table PlyElement::table() const {
   Table table;
   table.rows = count;
-  for (const PlyProperty& property : properties) table.columns.push_back(property.column);
+  for (const PlyProperty& property : properties)
+    if (!property.list_count) table.columns.push_back(property.column);
   return table;
 }
 

@@ -23,8 +23,12 @@ class Source {
   [[noreturn]] void fail(const std::string& reason) const;
   [[noreturn]] void fail_line(const std::string& reason) const;
 
+  /// What is strange about a file that is read nonetheless.
+  void note(const std::string& sentence) { note_ += (note_.empty() ? "" : "; ") + sentence; }
+  const std::string& notes() const { return note_; }
+
  private:
-  std::string path_;
+  std::string path_, note_;
   std::string_view bytes_;
   std::size_t position_ = 0;
   std::size_t line_ = 0;

@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "io/table.hpp"
 
+#include <algorithm>
 #include <initializer_list>
 
 #include "common/limits.hpp"
+#include "files/text_file.hpp"
 
 namespace gpureg::io {
 
@@ -38,18 +40,34 @@ std::size_t Table::bytes_per_row() const {
 
 namespace {
 
+std::string lower_case(std::string text) {
+  for (char& c : text)
+    if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
+  return text;
+}
+
+/// A column of exactly that name, or else of one that differs in case: PDAL writes X Y Z.
 std::optional<std::size_t> find(const Table& table, std::initializer_list<const char*> names,
-                                const Source& source) {
+                                const Source& source, bool exactly = true) {
   std::optional<std::size_t> found;
   for (std::size_t k = 0; k < table.columns.size(); ++k)
     for (const char* name : names) {
-      if (table.columns[k].name != name) continue;
+      if ((exactly ? table.columns[k].name : lower_case(table.columns[k].name)) != name) continue;
       if (found) source.fail(std::string("the header declares ") + name + " twice");
       if (table.columns[k].count != 1)
         source.fail(std::string("the header gives ") + name + " several values per point");
       found = k;
     }
-  return found;
+  return found || !exactly ? found : find(table, names, source, false);
+}
+
+/// Names of the columns, for a message.
+std::string names_of(const Table& table) {
+  constexpr std::size_t kShown = 12;
+  std::string text;
+  for (std::size_t k = 0; k < std::min(kShown, table.columns.size()); ++k)
+    text += (k == 0 ? "" : ", ") + files::quoted(table.columns[k].name);
+  return table.columns.size() > kShown ? text + ", ..." : text;
 }
 
 }  // namespace
@@ -59,7 +77,9 @@ Axes find_axes(const Table& table, const Source& source) {
   const char* const names[3] = {"x", "y", "z"};
   for (std::size_t k = 0; k < 3; ++k) {
     const auto column = find(table, {names[k]}, source);
-    if (!column) source.fail(std::string("the points have no coordinate ") + names[k]);
+    if (!column)
+      source.fail(std::string("the points have no coordinate ") + names[k] + ", only " +
+                  (table.columns.empty() ? "nothing" : names_of(table)));
     axes.point[k] = *column;
   }
   // Names of normals in PLY and in PCL.

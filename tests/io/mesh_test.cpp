@@ -180,7 +180,9 @@ TEST(MeshFile, IsToldByItsFaces) {
   EXPECT_FALSE(is_mesh(folder.write("c.pcd", "")));
   EXPECT_FALSE(is_mesh(folder / "none.ply"));
   EXPECT_TRUE(is_mesh(folder / "d.STL"));
-  EXPECT_TRUE(is_mesh(folder / "d.obj"));
+  EXPECT_FALSE(is_mesh(folder / "none.obj"));
+  EXPECT_FALSE(is_mesh(folder.write("e.obj", "v 1 2 3\n")));
+  EXPECT_TRUE(is_mesh(folder.write("f.obj", test::obj_text(cube_vertices(), cube_faces()))));
   const std::string stl = folder.write("e.stl", test::stl_text(cube_vertices(), cube_faces()));
   expect_error<IoError>([&] { read_point_cloud(stl); }, {stl, "mesh", "read_mesh"});
 }

@@ -39,6 +39,7 @@ inline bool run_reader(Reader reader, std::string_view content) {
   try {
     switch (reader) {
       case Reader::point_cloud: {
+        io::scans_in(file.path());
         const PointCloud cloud = io::read_point_cloud(file.path());
         if (!cloud.normals.empty() && cloud.normals.size() != cloud.points.size())
           throw std::logic_error("normals without points");

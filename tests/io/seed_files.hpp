@@ -90,6 +90,16 @@ inline std::vector<SeedFile> seed_files() {
   // Two points of 12 zero bytes each: one literal byte, then a repetition of 23 bytes.
   cloud(pcd_header(2, "binary_compressed") + raw(std::uint32_t{5}) + raw(std::uint32_t{24}) +
         std::string("\x00\x00\xe0\x0e\x00", 5));
+  cloud(ply_header("binary_little_endian", 2, "float", false) +
+        "property list uchar int view\nend_header\n" + raw_points<float>(1, false, false) + "\1" +
+        raw(7) + raw_points<float>(1, false, false) + std::string(1, '\0'));
+  cloud("//X Y Z Nx Ny Nz\n2\n1 2 3 0 0 1\n4 -1.#IND 6 0 1 0\n");
+  cloud("sep=;\nt;x;\"y\";z [m]\n0;1.5;;-3e2\n1;4;5;6\n");
+  cloud("2\n1 2 3 -120 1 2 3\n4 5 6 9 1 2 3\n");
+  cloud(
+      "1\n2\n1 2 3\n1 0 0\n0 1 0\n0 0 1\n1 0 0 0\n0 1 0 0\n0 0 1 0\n1 2 3 1\n1 2 3 0.5\n0 0 0 "
+      "0.5\n");
+  cloud("CNOFF\n# points\n2 0 0\n1 2 3 0 0 1 9 9 9\n4 5 6 0 1 0 9 9 9\n");
   seeds.push_back({Reader::log, "0\t 2\t 57\n1 0 0 0.5\n0 1 0 0\n0 0 1 -1e-3\n0 0 0 1\n"});
   seeds.push_back(
       {Reader::information,

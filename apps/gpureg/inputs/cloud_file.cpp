@@ -5,25 +5,43 @@
 
 #include "gpureg/io.hpp"
 #include "gpureg/mesh.hpp"
+#include "inputs/python_file.hpp"
 #include "text.hpp"
 
 namespace gpureg::cli {
 
 double mesh_spacing(float voxel_size) { return 0.5 * static_cast<double>(voxel_size); }
 
-void note_coarse(const PointCloud& cloud, const std::string& path) {
-  const std::string what = io::coarse_coordinates(cloud);
-  static int count = 0;  // a folder has hundreds of them
+namespace {
+
+/// A folder has hundreds of files with the same to note.
+void print_note(const std::string& path, const std::string& what, int& count) {
   constexpr int kShown = 2;
   if (what.empty() || ++count > kShown) return;
   std::cerr << "gpureg: note: " << path << ": " << what
             << (count == kShown ? "; further files are not named" : "") << std::endl;
 }
 
+void note_strange(const std::string& what, const std::string& path) {
+  static int count = 0;
+  print_note(path, what, count);
+}
+
+}  // namespace
+
+void note_coarse(const PointCloud& cloud, const std::string& path) {
+  static int count = 0;
+  print_note(path, io::coarse_coordinates(cloud), count);
+}
+
 PointCloud read_cloud(const std::string& path, double spacing, MeshNote note) {
   if (!io::is_mesh(path)) {
-    PointCloud cloud = io::read_point_cloud(path);
-    if (note == MeshNote::print) note_coarse(cloud, path);
+    std::string strange;
+    PointCloud cloud =
+        is_for_python(path) ? read_by_python(path) : io::read_point_cloud(path, 0, &strange);
+    if (note == MeshNote::none) return cloud;
+    note_coarse(cloud, path);
+    note_strange(strange, path);
     return cloud;
   }
   const io::SurfaceMesh mesh = io::read_mesh(path);

@@ -7,10 +7,12 @@
 
 namespace gpureg::cli {
 
-/// Says on stderr what became of the faces of a mesh, and where coordinates are coarse; or nothing.
+/// Says on stderr what became of the faces of a mesh, where coordinates are coarse, and what else
+/// is strange about a file; or nothing.
 enum class MeshNote { print, none };
 
 /// Reads a cloud, or samples the faces of a mesh.
+/// @param path may name a scan of a file that holds several, as "project.e57#2".
 /// @param spacing of the samples of a mesh, see io::sample_mesh.
 /// @throws IoError naming the file.
 PointCloud read_cloud(const std::string& path, double spacing, MeshNote note);

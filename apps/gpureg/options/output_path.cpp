@@ -11,6 +11,7 @@
 #include <system_error>
 
 #include "gpureg/error.hpp"
+#include "gpureg/io.hpp"
 #include "inputs/map_input.hpp"
 
 namespace gpureg::cli {
@@ -39,7 +40,7 @@ void refuse_same(const NamedPath& output, const NamedPath& other) {
 }
 
 void check_input(const NamedPath& input) {
-  if (input.path.empty() || ::access(input.path.c_str(), R_OK) == 0) return;
+  if (input.path.empty() || ::access(io::scan_path(input.path).file.c_str(), R_OK) == 0) return;
   throw IoError(input.name + ": cannot read " + input.path + ": " +
                 std::generic_category().message(errno));
 }
@@ -76,9 +77,9 @@ void add_folder(const std::string& name, const fs::path& folder, std::vector<Nam
 
 /// The files that an input stands for.
 std::vector<NamedPath> files_of(const NamedPath& input) {
-  std::vector<NamedPath> files = {input};
+  const fs::path path(io::scan_path(input.path).file);
+  std::vector<NamedPath> files = {{input.name, path.string()}};
   std::error_code error;
-  const fs::path path(input.path);
   const bool is_folder = fs::is_directory(path, error);
   if (is_folder) add_folder(input.name, path, files);
   const fs::path reconstruction = is_folder ? path / kReconstruction : path;

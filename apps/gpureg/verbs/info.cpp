@@ -7,6 +7,7 @@
 
 #include "command.hpp"
 #include "gpureg/context.hpp"
+#include "gpureg/io.hpp"
 #include "gpureg/voxel_size.hpp"
 #include "inputs/cloud_file.hpp"
 #include "options/output_path.hpp"
@@ -21,7 +22,24 @@ std::string describe(const Eigen::Vector3d& v, int digits) {
          significant(v.z(), digits);
 }
 
+/// Of a file that holds several scans.
+void print_scans(const std::string& path, const std::vector<io::StoredScan>& scans) {
+  std::cout << path << "\n  scans            " << scans.size() << ", named " << path << "#1 to "
+            << path << "#" << scans.size() << "\n";
+  for (std::size_t k = 0; k < scans.size(); ++k) {
+    const io::StoredScan& scan = scans[k];
+    std::cout << "  #" << k + 1 << (scan.name.empty() ? "" : " " + scan.name) << ": "
+              << grouped(scan.points) << " points";
+    if (scan.file_from_scan)
+      std::cout << ", scanned from "
+                << describe(Eigen::Vector3d(scan.file_from_scan->translation()), 10);
+    std::cout << "\n";
+  }
+}
+
 void print_cloud(const std::string& path) {
+  const std::vector<io::StoredScan> scans = io::scans_in(io::scan_path(path).file);
+  if (scans.size() > 1 && io::scan_path(path).part == 0) return print_scans(path, scans);
   const PointCloud cloud = read_cloud(path, 0, MeshNote::print);
   const std::vector<Eigen::Vector3f> points = finite_points(cloud.points);
   std::cout << path << "\n  points           " << grouped(cloud.points.size())
@@ -65,7 +83,8 @@ int run(const std::vector<std::string>& clouds) {
 void add_info(CommandLine& line) {
   const auto clouds = std::make_shared<std::vector<std::string>>();
   Verb verb = line.verb("info", "Describe clouds; without any, version and devices");
-  verb.option("CLOUD", *clouds, "Clouds (PLY, PCD, KITTI .bin) or meshes (STL, OBJ, PLY)");
+  verb.option("CLOUD", *clouds,
+              "Clouds (PLY, PCD, LAS, E57, PTX, text, KITTI .bin) or meshes (STL, OBJ, OFF, PLY)");
   verb.run([clouds] { return run(*clouds); });
 }
 

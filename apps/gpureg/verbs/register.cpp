@@ -271,8 +271,9 @@ int run(RegisterOptions o) {
 
 void add_register(CommandLine& line) {
   const auto o = std::make_shared<RegisterOptions>();
-  Verb verb =
-      line.verb("register", "Align two clouds (PLY, PCD, KITTI .bin) or meshes (STL, OBJ, PLY)");
+  Verb verb = line.verb("register",
+                        "Align two clouds (PLY, PCD, LAS, E57, PTX, text, KITTI .bin) or meshes "
+                        "(STL, OBJ, OFF, PLY)");
   verb.option("SOURCE", o->source, "Cloud that is moved").required();
   verb.option("TARGET", o->target, "Cloud that stays").required();
   o->method.add_to(verb);

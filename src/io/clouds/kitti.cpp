@@ -7,6 +7,7 @@
 
 #include "io/clouds/row_width.hpp"
 #include "io/decode.hpp"
+#include "io/extension.hpp"
 
 namespace gpureg::io {
 namespace {
@@ -37,13 +38,7 @@ std::size_t width_of(const std::vector<float>& numbers, const Source& source) {
 
 }  // namespace
 
-bool looks_like_kitti(const std::string& path) {
-  if (path.size() < 4) return false;
-  std::string end = path.substr(path.size() - 4);
-  for (char& c : end)
-    if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
-  return end == ".bin";
-}
+bool looks_like_kitti(const std::string& path) { return extension_of(path) == ".bin"; }
 
 PointCloud read_kitti(Source& source) {
   const std::string_view bytes = source.rest();

@@ -183,14 +183,6 @@ std::string unpack(const Table& table, const Source& source) {
   return body;
 }
 
-void check_nothing_left(const Table& table, Source& source) {
-  std::string_view line;
-  while (source.next_line(line))
-    if (line.find_first_not_of(" \t") != line.npos)
-      source.fail_line("more data than the header announces, " + std::to_string(table.rows) +
-                       " points");
-}
-
 }  // namespace
 
 bool looks_like_pcd(std::string_view bytes) {
@@ -211,7 +203,7 @@ PointCloud read_pcd(Source& source) {
   PointCloud cloud;
   if (header.data == Data::ascii) {
     cloud = decode_text(table, source);
-    check_nothing_left(table, source);
+    note_further_lines(source);
   } else if (header.data == Data::binary) {
     cloud = decode_binary(table, source, checked_body(table, source).data(), Order::by_row,
                           ByteOrder::little);

@@ -4,7 +4,6 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
-#include <filesystem>
 #include <map>
 #include <random>
 #include <sstream>
@@ -13,7 +12,9 @@
 #include "common/float_origin.hpp"
 #include "files/text_file.hpp"
 #include "gpureg/error.hpp"
+#include "io/extension.hpp"
 #include "io/limits.hpp"
+#include "io/meshes/mesh_formats.hpp"
 #include "io/meshes/one_view.hpp"
 #include "io/ply.hpp"
 
@@ -22,17 +23,12 @@ namespace {
 
 constexpr double kFewestPoints = 2e4, kMostPoints = 2e6;
 
-std::string extension_of(const std::string& path) {
-  std::string extension = std::filesystem::path(path).extension().string();
-  for (char& c : extension)
-    if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
-  return extension;
-}
-
-bool ply_has_faces(const std::string& path) try {
+/// Of PLY and OFF.
+bool header_has_faces(const std::string& path) try {
   const std::string start = files::read_start(path, kMostHeaderBytes);
-  if (start.compare(0, 3, "ply") != 0) return false;
   Source source(path, start);
+  if (looks_like_off(start)) return off_has_faces(source);
+  if (start.compare(0, 3, "ply") != 0) return false;
   const PlyHeader header = read_ply_header(source);
   return std::any_of(header.elements.begin(), header.elements.end(), [](const PlyElement& e) {
     return e.name == "face" && e.has_list() && e.count > 0;
@@ -121,7 +117,8 @@ double SurfaceMesh::area() const {
 
 bool is_mesh(const std::string& path) {
   const std::string extension = extension_of(path);
-  return extension == ".stl" || extension == ".obj" || ply_has_faces(path);
+  return extension == ".stl" || (extension == ".obj" && obj_has_faces(path)) ||
+         header_has_faces(path);
 }
 
 std::string SurfaceMesh::notes() const {

@@ -10,6 +10,8 @@
 #include "files/text_file.hpp"
 #include "gpureg/error.hpp"
 #include "gpureg/mesh.hpp"
+#include "io/clouds/foreign.hpp"
+#include "io/extension.hpp"
 #include "io/limits.hpp"
 #include "io/meshes/mesh_formats.hpp"
 #include "io/ply.hpp"
@@ -46,21 +48,20 @@ std::vector<Eigen::Vector3d> merge_vertices(const std::vector<Eigen::Vector3d>& 
   return out;
 }
 
-bool ends_in_obj(const std::string& path) {
-  const std::string end = path.substr(path.size() - std::min<std::size_t>(4, path.size()));
-  return end == ".obj" || end == ".OBJ";
-}
-
 Polygons read_polygons(const std::string& path, Source& source) {
   const std::string_view bytes = source.rest();
   if (bytes.empty()) source.fail("the file is empty: it has no face");
   if (bytes.compare(0, 3, "ply") == 0) return read_ply_mesh(source);
-  return ends_in_obj(path) ? read_obj(source) : read_stl(source);
+  if (looks_like_off(bytes)) return read_off(source);
+  const std::string extension = extension_of(path);
+  const std::string foreign = foreign_format(path, bytes.substr(0, kMostHeaderBytes));
+  if (!foreign.empty()) source.fail(foreign);
+  return extension == ".obj" ? read_obj(source) : read_stl(source);
 }
 
 }  // namespace
 
-// Assimp, which reads buildings, crashes on damaged files; these three formats are simple.
+// Assimp, which reads buildings, crashes on damaged files; these formats are simple.
 SurfaceMesh read_mesh(const std::string& path) {
   files::read_start(path, 0);  // refuses what is not a regular file
   const std::string bytes = files::read_file(path, kMostDataBytes);

@@ -1,8 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <charconv>
+#include <fstream>
 #include <string>
 
+#include "common/float_origin.hpp"
 #include "files/text_file.hpp"
+#include "gpureg/error.hpp"
 #include "io/decode.hpp"
 #include "io/meshes/mesh_formats.hpp"
 
@@ -52,6 +55,46 @@ double corner_of(std::string_view field, std::size_t vertices, const Source& sou
 }
 
 }  // namespace
+
+bool obj_has_faces(const std::string& path) try {
+  files::read_start(path, 0);  // refuses what is not a regular file
+  std::ifstream file(path, std::ios::binary);
+  std::string piece(std::size_t{1} << 16, '\0');
+  // The first bytes of a line, of which no more is kept.
+  char first = '\0', second = '\0';
+  std::size_t column = 0;
+  while (file.read(piece.data(), static_cast<std::streamsize>(piece.size())) || file.gcount() > 0)
+    for (std::streamsize k = 0; k < file.gcount(); ++k) {
+      const char c = piece[static_cast<std::size_t>(k)];
+      if (c == '\n') {
+        column = 0;
+        continue;
+      }
+      if (column == 0 && (c == ' ' || c == '\t')) continue;
+      if (column == 0) first = c;
+      if (column == 1) second = c;
+      if (++column == 2 && first == 'f' && (second == ' ' || second == '\t')) return true;
+    }
+  return false;
+} catch (const IoError&) {
+  return false;
+}
+
+PointCloud read_obj_points(Source& source) {
+  PointCloud cloud;
+  std::vector<Eigen::Vector3d> points;
+  std::string text;
+  Fields fields;
+  while (next_statement(source, text, fields)) {
+    if (fields.empty()) continue;
+    if (fields[0] == "v") points.push_back(vertex_of(fields, source));
+    if (fields[0] == "vn") cloud.normals.push_back(vertex_of(fields, source).cast<float>());
+  }
+  if (points.empty()) source.fail("it has neither a face nor a vertex");
+  if (cloud.normals.size() != points.size()) cloud.normals.clear();
+  set_points(cloud, points);
+  return cloud;
+}
 
 Polygons read_obj(Source& source) {
   Polygons out;
