@@ -27,9 +27,7 @@ std::vector<Eigen::Vector3f> vectors_of(const py::object& array, const char* nam
   return out;
 }
 
-/// Warns where the float32 of a file are too coarse.
-void warn_of_large(const PointCloud& cloud, const std::string& path) {
-  const std::string what = io::coarse_coordinates(cloud);
+void warn(const std::string& path, const std::string& what) {
   if (!what.empty() && PyErr_WarnEx(PyExc_UserWarning, (path + ": " + what).c_str(), 2) != 0)
     throw py::error_already_set();
 }
@@ -72,16 +70,47 @@ void bind_files(py::module_& m) {
       .def("__repr__", [](const PointCloud& c) {
         return "<gpureg.PointCloud, " + std::to_string(c.points.size()) + " points>";
       });
+  py::class_<io::StoredScan>(m, "StoredScan", "A scan of a file that holds several.")
+      .def_readonly("name", &io::StoredScan::name, "May be empty.")
+      .def_readonly("points", &io::StoredScan::points,
+                    "That the file announces; of PTX rows without a return are among them.")
+      .def_property_readonly(
+          "file_from_scan",
+          [](const io::StoredScan& scan) -> py::object {
+            if (!scan.file_from_scan) return py::none();
+            return array_of(scan.file_from_scan->matrix());
+          },
+          "(4, 4) pose of the scan in the frame of its file, metres; None where there is none.")
+      .def("__repr__", [](const io::StoredScan& scan) {
+        return "<gpureg.StoredScan " + py::repr(py::str(scan.name)).cast<std::string>() + ", " +
+               std::to_string(scan.points) + " points>";
+      });
   m.def(
       "read_point_cloud",
-      [](const std::string& path) {
+      [](const std::string& path, std::size_t part) {
         PointCloud cloud;
+        std::string note;
         {
           const py::gil_scoped_release unlocked;
-          cloud = io::read_point_cloud(path);
+          cloud = io::read_point_cloud(path, part, &note);
         }
-        warn_of_large(cloud, path);
+        warn(path, note);
+        warn(path, io::coarse_coordinates(cloud));
         return cloud;
+      },
+      py::arg("path"), py::arg("part") = 0);
+  m.def(
+      "scans_in",
+      [](const std::string& path) {
+        const py::gil_scoped_release unlocked;
+        return io::scans_in(path);
+      },
+      py::arg("path"));
+  m.def(
+      "scan_path",
+      [](const std::string& path) {
+        const io::ScanPath scan = io::scan_path(path);
+        return std::make_pair(scan.file, scan.part);
       },
       py::arg("path"));
   m.def("is_mesh", &io::is_mesh, py::arg("path"), release());

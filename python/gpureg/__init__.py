@@ -71,6 +71,7 @@ from ._core import (
     RegistrationStatistics,
     SolverOptions,
     StageTimings,
+    StoredScan,
     TimedResult,
     TrajectoryEvaluation,
     VoxelSizeSuggestion,
@@ -81,7 +82,13 @@ from ._loop_consistency import loop_consistency
 from ._map import Map, MapEdge, MapLink, MapScan
 from ._reconstruction import reconstruct
 from ._trajectory import evaluate_trajectory, read_trajectory
-from .files import read_cameras, read_point_cloud, write_point_cloud
+from .files import (
+    from_depth_image,
+    read_cameras,
+    read_point_cloud,
+    scans_in,
+    write_point_cloud,
+)
 from .fragments import FragmentSet
 from .localization import CHANGE_LABELS, change, load_map, locate, locate_batch, prepare_map
 from .loop_closure import LoopCloser
@@ -178,6 +185,7 @@ __all__ = [
     "RiskThreshold",
     "SolverOptions",
     "StageTimings",
+    "StoredScan",
     "TimedResult",
     "TrajectoryEvaluation",
     "VoxelSizeSuggestion",
@@ -193,6 +201,7 @@ __all__ = [
     "describe_backends",
     "evaluate_trajectory",
     "fit_calibration",
+    "from_depth_image",
     "load_map",
     "locate",
     "locate_batch",
@@ -208,6 +217,7 @@ __all__ = [
     "reconstruct",
     "register",
     "register_all",
+    "scans_in",
     "suggest_voxel_size",
     "verify",
     "write_point_cloud",

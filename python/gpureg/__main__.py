@@ -18,7 +18,9 @@ def main() -> NoReturn:
             "gpureg: this installation has the library only. The command needs CLI11, nlohmann-json and libpng where it is"
             " built: on Debian and Ubuntu `apt install libcli11-dev nlohmann-json3-dev libpng-dev`, then install gpureg again."
         )
-    os.execv(COMMAND, ["gpureg", *sys.argv[1:]])
+    # It has this interpreter read the formats that libraries of Python read.
+    environment = {"GPUREG_PYTHON": sys.executable, **os.environ}
+    os.execve(COMMAND, ["gpureg", *sys.argv[1:]], environment)
 
 
 if __name__ == "__main__":

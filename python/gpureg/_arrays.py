@@ -15,7 +15,7 @@ import numpy.typing as npt
 from . import _core
 from ._core import PointCloud, PreparedCloud, PrepareOptions
 from ._device import DeviceRows, device_rows, on_device, stream_of
-from ._las import is_las, read_las
+from ._formats import read_foreign
 from ._mesh import mesh_as_cloud
 
 FloatArray = npt.NDArray[np.float32]
@@ -356,8 +356,9 @@ def _unpack(
     points: Any, normals: Any, viewpoints: Any, name: str, spacing: float
 ) -> tuple[Any, Any, Any]:
     """Clouds that carry their normals along. spacing: of the samples of a mesh."""
-    if isinstance(points, str | os.PathLike) and is_las(points):
-        return read_las(points), normals, viewpoints
+    scan = read_foreign(points)
+    if scan is not None:
+        return scan[0], normals, scan[1] if viewpoints is None else viewpoints
     mesh = mesh_as_cloud(points, name, spacing)
     if mesh is not None:
         points = mesh

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""LAS and LAZ files, through laspy: the optional extra ``gpureg[las]``."""
+"""LAS and LAZ files, through laspy: the optional extra ``gpureg[formats]``."""
 
 from __future__ import annotations
 
@@ -21,10 +21,6 @@ _LAYERS = {10: 9, 11: 1, 12: 2, 13: 1}
 _EXTRA_BYTES = 14
 
 
-def is_las(path: Any) -> bool:
-    return os.fspath(path)[-4:].lower() in (".las", ".laz")
-
-
 def read_las(path: str | os.PathLike[str]) -> npt.NDArray[np.float64]:
     """(N, 3) coordinates in the file's unit, with its scale and offset applied.
 
@@ -34,7 +30,7 @@ def read_las(path: str | os.PathLike[str]) -> npt.NDArray[np.float64]:
     Raises
     ------
     ImportError
-        Without laspy: ``pip install gpureg[las]``.
+        Without laspy: ``pip install gpureg[formats]``.
     IoError
         Naming the file and the reason.
     """
@@ -43,7 +39,7 @@ def read_las(path: str | os.PathLike[str]) -> npt.NDArray[np.float64]:
         import laspy
     except ImportError:
         raise ImportError(
-            f"{name}: LAS and LAZ files need laspy: pip install 'gpureg[las]'"
+            f"{name}: LAS and LAZ files need laspy: pip install 'gpureg[formats]'"
         ) from None
     try:
         return _read(laspy, name)

@@ -35,7 +35,7 @@ def prepare(
     Parameters
     ----------
     points : (N, 3) array, path, PointCloud, mesh or Open3D point cloud
-        A fourth column, intensities as of KITTI, is not used. A path: PLY, PCD, KITTI (.bin), LAS or LAZ (with ``gpureg[las]``), or a mesh (STL, OBJ, PLY
+        A fourth column, intensities as of KITTI, is not used. A path: what `read_point_cloud` reads, or a mesh (STL, OBJ, OFF, PLY
         with faces). Of these meshes, of trimesh's and of Open3D's, points of the faces are taken,
         half a voxel apart, with the normals of the faces. Metres, any real dtype and layout: numpy, DLPack (torch, jax, ...),
         ``__cuda_array_interface__`` (cupy, ...) or nested lists. float32 rows are read in place;

@@ -103,7 +103,7 @@ class TestLas:
 
     def test_without_laspy_the_error_says_what_to_install(self, tmp_path, monkeypatch):
         monkeypatch.setitem(__import__("sys").modules, "laspy", None)
-        with pytest.raises(ImportError, match=r"a\.las.*gpureg\[las\]"):
+        with pytest.raises(ImportError, match=r"a\.las.*gpureg\[formats\]"):
             gpureg.prepare(str(tmp_path / "a.las"))
 
 

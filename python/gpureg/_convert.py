@@ -1,0 +1,46 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""``python -m gpureg._convert FILE PART``: writes a scan to standard output, as a binary PLY.
+
+The command gpureg runs it for formats that libraries of Python read. One line on standard error
+says what is wrong.
+"""
+
+from __future__ import annotations
+
+import sys
+
+import numpy as np
+
+from ._formats import read_foreign
+
+_PIECE = 1 << 20  # points that are converted at a time
+
+
+def main() -> int:
+    path, part = sys.argv[1], int(sys.argv[2])
+    try:
+        scan = read_foreign(path, part)
+    except (ImportError, OSError) as error:
+        print(" ".join(str(error).split()), file=sys.stderr)
+        return 1
+    except KeyboardInterrupt:
+        return 130
+    if scan is None:
+        print(f"{path}: neither LAS nor E57", file=sys.stderr)
+        return 1
+    points, viewpoint = scan
+    header = ["ply", "format binary_little_endian 1.0"]
+    if viewpoint is not None:
+        header.append("comment viewpoint {:g} {:g} {:g}".format(*viewpoint[0]))
+    header.append(f"element vertex {len(points)}")
+    header += [f"property double {axis}" for axis in "xyz"]
+    out = sys.stdout.buffer
+    out.write("\n".join([*header, "end_header\n"]).encode())
+    for at in range(0, len(points), _PIECE):
+        out.write(np.ascontiguousarray(points[at : at + _PIECE], "<f8").tobytes())
+    out.flush()
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
