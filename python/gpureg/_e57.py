@@ -80,4 +80,15 @@ def _read(pye57: Any, path: str, index: int) -> tuple[npt.NDArray[np.float64], b
         points = np.stack(
             [flat * np.cos(azimuth), flat * np.sin(azimuth), distance * np.sin(elevation)], axis=1
         )
-    return np.asarray(points[(points != 0).any(axis=1)], np.float64), seen
+    points = np.asarray(points[(points != 0).any(axis=1)], np.float64)
+    return points, seen and _may_see_origin(points)
+
+
+def _may_see_origin(points: npt.NDArray[np.float64]) -> bool:
+    """False where it is farther from the points than they extend: they were moved since."""
+    finite = points[np.isfinite(points).all(axis=1)]
+    if not len(finite):
+        return False
+    low, high = finite.min(axis=0), finite.max(axis=0)
+    outside = np.maximum(np.maximum(low, -high), 0)
+    return bool(np.linalg.norm(outside) <= np.linalg.norm(high - low))

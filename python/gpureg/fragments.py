@@ -118,7 +118,7 @@ class FragmentSet:
         argument.
         """
         for source in self._sources:
-            if isinstance(source, str | os.PathLike) and not os.path.lexists(source):
+            if isinstance(source, str | os.PathLike) and not os.path.lexists(_file_of(source)):
                 raise FileNotFoundError(errno.ENOENT, os.strerror(errno.ENOENT), os.fspath(source))
 
     def fingerprint(self, position: int) -> str:
@@ -129,7 +129,8 @@ class FragmentSet:
         source = self._sources[position]
         if isinstance(source, str | os.PathLike):
             try:
-                with open(source, "rb") as file:
+                digest.update(os.fspath(source)[len(_file_of(source)) :].encode())  # its part
+                with open(_file_of(source), "rb") as file:
                     while piece := file.read(_PIECE):
                         digest.update(piece)
             except FileNotFoundError:
@@ -188,6 +189,11 @@ class FragmentSet:
             raise ValueError(f"pairs: {chosen[same][0].tolist()} is a fragment and itself")
         _, first = np.unique(positions, axis=0, return_index=True)
         return np.asarray(positions[np.sort(first)], np.int64)
+
+
+def _file_of(path: str | os.PathLike[str]) -> str:
+    """Without the scan that it names: "a.e57" of "a.e57#2"."""
+    return _core.scan_path(os.fspath(path))[0]
 
 
 def fragment_set(fragments: Any) -> FragmentSet:

@@ -209,6 +209,8 @@ std::vector<Flavour> text_flavours() {
       {"v.csv", "x,y,ranges\n1,2,3\n4,5,6\n", 2, "no column z", "2-D scan"},
       {"w.txt", with_crlf("% x y z\n" + rows(5, "  ", " ")), 5, "", "Windows, MATLAB's comments"},
       {"x.txt", "1,5 2,5 3,5\n", 0, ":1: '1,5 2,5 3,5' has decimal commas", "decimal commas"},
+      {"I.txt", "\"X\",\"Y\",\"Z\"\n" + rows(5, " "), 5, "",
+       "names and numbers separated differently"},
       {"y.csv", "x;y;z\n1,5;2,5;3,5\n", 0, ":2: '1,5;2,5;3,5' has decimal commas",
        "decimal commas, Excel"},
       {"z.csv", "a,b,c\n1,2,3\n", 0, "names with x, y and z among them; found 'a', 'b', 'c'",
@@ -230,7 +232,7 @@ std::vector<Flavour> other_flavours() {
   for (int k = 0; k < 3; ++k) kitti += raw_points<float>(1, false, false) + raw(0.5f);
   return {
       {"a.ptx", ptx("1 2 3"), 4, "", "Leica PTX"},
-      {"b.ptx", ptx("1 2 3") + ptx("4 5 6"), 0, "it holds 2 scans: 1, 2; name one of them",
+      {"b.ptx", ptx("1 2 3") + ptx("4 5 6"), 0, "it holds 2 scans: name one of them",
        "PTX of two scans"},
       {"c.ptx", ptx_header(3, 2, "0 0 0") + "1 2 3 0.5\n", 0, "truncated: a scan announces 6",
        "PTX, cut"},
@@ -362,11 +364,11 @@ TEST(Ptx, ScansWithTheirPosesAndViewpoints) {
     ASSERT_EQ(cloud.viewpoints.size(), 1u);
     EXPECT_TRUE(cloud.viewpoints[0].isZero(0));
   }
-  expect_error<IoError>([&] { read_point_cloud(path); }, {"name one of them", "a.ptx#2"});
+  expect_error<IoError>([&] { read_point_cloud(path); }, {"name one of them", "a.ptx#1' to '#2'"});
   expect_error<IoError>([&] { read_point_cloud(path + "#3"); }, {"there is no scan 3"});
   const std::string one = folder.write("one.ptx", ptx("1 2 3"));
   EXPECT_EQ(read_point_cloud(one + "#1").points.size(), 4u);
-  expect_error<IoError>([&] { read_point_cloud(one, 2); }, {"one scan"});
+  expect_error<IoError>([&] { read_point_cloud(one, 2); }, {"there is no scan 2, it holds 1"});
   // A file of that very name is itself.
   EXPECT_EQ(read_point_cloud(folder.write("b#2", rows(3, " "))).points.size(), 3u);
   EXPECT_EQ(count_scans(folder.write("c.xyz", rows(3, " "))), 1u);
@@ -376,9 +378,15 @@ TEST(Ptx, PointsInTheFrameOfTheProject) {
   const TemporaryFolder folder;
   const PointCloud cloud = read_point_cloud(
       folder.write("a.ptx",
-                   "1\n1\n10 20 30\n1 0 0\n0 1 0\n0 0 1\n1 0 0 0\n0 1 0 0\n0 0 1 0\n"
-                   "0 0 0 1\n11 20 30 0.5\n"));
+                   "1\n2\n10 20 30\n1 0 0\n0 1 0\n0 0 1\n1 0 0 0\n0 1 0 0\n0 0 1 0\n"
+                   "0 0 0 1\n11 20 30 0.5\n5 25 33 0.5\n"));
   EXPECT_EQ(cloud.viewpoints.at(0), Eigen::Vector3f(10, 20, 30));
+  // Moved into a map by a program that forgot the scanner.
+  const PointCloud moved = read_point_cloud(
+      folder.write("b.ptx",
+                   "1\n2\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n1 0 0 0\n0 1 0 0\n0 0 1 0\n0 0 0 1\n"
+                   "5000 5000 3 0.5\n5010 5010 4 0.5\n"));
+  EXPECT_TRUE(moved.viewpoints.empty());
 }
 
 /// An E57 file with this XML and nothing else, in pages of 1024 bytes.

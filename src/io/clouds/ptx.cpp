@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "io/clouds/ptx.hpp"
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <array>
 
@@ -96,6 +97,14 @@ std::optional<UnalignedIsometry3d> pose_of(const Header& header) {
   return pose;
 }
 
+/// False for a place farther from the points than they extend: they were moved since.
+bool may_see(const Eigen::Vector3d& place, const std::vector<Eigen::Vector3d>& points) {
+  Eigen::AlignedBox3d box;
+  for (const Eigen::Vector3d& p : points)
+    if (p.allFinite()) box.extend(p);
+  return !box.isEmpty() && box.exteriorDistance(place) <= box.diagonal().norm();
+}
+
 }  // namespace
 
 bool looks_like_ptx(std::string_view start) {
@@ -123,7 +132,13 @@ std::vector<StoredScan> index_ptx(Source& source) {
 
 PointCloud read_ptx(Source& source, std::size_t index) {
   Header header;
-  for (std::size_t k = 0; next_header(source, header) && k < index; ++k) skip_rows(source, header);
+  for (std::size_t k = 0;; ++k) {
+    if (!next_header(source, header))
+      source.fail("there is no scan " + std::to_string(index + 1) + ", it holds " +
+                  std::to_string(k));
+    if (k == index) break;
+    skip_rows(source, header);
+  }
   check_text_size(header.rows, 3, source);
   std::vector<Eigen::Vector3d> points;
   Fields fields;
@@ -142,7 +157,9 @@ PointCloud read_ptx(Source& source, std::size_t index) {
   set_points(cloud, points);
   // Some programs write the points in the frame of the project, without a pose.
   const bool in_frame_of_project = !header.moves() && header.scanner.allFinite();
-  cloud.set_viewpoints({in_frame_of_project ? header.scanner : Eigen::Vector3d::Zero().eval()});
+  const Eigen::Vector3d scanner =
+      in_frame_of_project ? header.scanner : Eigen::Vector3d::Zero().eval();
+  if (may_see(scanner, points)) cloud.set_viewpoints({scanner});
   return cloud;
 }
 

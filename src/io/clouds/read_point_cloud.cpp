@@ -31,28 +31,12 @@ bool is_among(const std::string& extension, const std::array<const char*, Count>
   return std::find(names.begin(), names.end(), extension) != names.end();
 }
 
-/// The scans of a file, for whoever has to name one.
-std::string list_of(const std::vector<StoredScan>& scans) {
-  constexpr std::size_t kShown = 8;
-  std::string text;
-  for (std::size_t k = 0; k < std::min(kShown, scans.size()); ++k)
-    text += (k == 0 ? "" : ", ") + std::to_string(k + 1) +
-            (scans[k].name.empty() ? "" : " " + files::quoted(scans[k].name));
-  return text + (scans.size() > kShown ? ", ... " + std::to_string(scans.size()) : "");
-}
-
-/// Index of the scan that is meant.
-std::size_t chosen(std::size_t part, const std::vector<StoredScan>& scans, const Source& source,
-                   const std::string& file) {
-  if (part > 1 && scans.size() == 1)
-    source.fail("it holds one scan, there is no scan " + std::to_string(part));
-  if (part > scans.size())
-    source.fail("there is no scan " + std::to_string(part) + ", it holds " +
-                std::to_string(scans.size()) + ": " + list_of(scans));
-  if (part == 0 && scans.size() > 1)
-    source.fail("it holds " + std::to_string(scans.size()) + " scans: " + list_of(scans) +
-                "; name one of them, as " + files::quoted(file + "#2"));
-  return part == 0 ? 0 : part - 1;
+/// Of a PTX of which no scan is named. source is at its begin.
+void check_only(Source source, const std::string& file) {
+  const std::size_t scans = index_ptx(source).size();
+  if (scans > 1)
+    source.fail("it holds " + std::to_string(scans) + " scans: name one of them, " +
+                files::quoted(file + "#1") + " to '#" + std::to_string(scans) + "'");
 }
 
 enum class Format { unknown, ply, pcd, ptx, off, obj, rows, text };
@@ -123,11 +107,10 @@ PointCloud read_point_cloud(const std::string& path, std::size_t part, std::stri
   const std::string bytes = files::read_file(file, kMostDataBytes);
   Source source(file, bytes);
   if (has_mark && format != Format::rows) source.skip(kUtf8Mark.size());
-  Source index = source;
-  const std::vector<StoredScan> scans =
-      format == Format::ptx ? index_ptx(index) : std::vector<StoredScan>(1);
-  const std::size_t scan_index = chosen(part, scans, source, file);
-  PointCloud cloud = read(format, file, source, scan_index);
+  if (format != Format::ptx && part > 1)
+    source.fail("it holds one scan, there is no scan " + std::to_string(part));
+  if (format == Format::ptx && part == 0) check_only(source, file);
+  PointCloud cloud = read(format, file, source, std::max<std::size_t>(part, 1) - 1);
   if (note != nullptr) *note = source.notes();
   return cloud;
 }

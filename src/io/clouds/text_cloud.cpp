@@ -168,7 +168,9 @@ class Reader {
       }
       if (!columns_ || points_.empty()) {
         if (is_preamble(line)) continue;
-        if (!separator_) separator_ = separator_of(line, false);
+        // Names may be separated in another way than numbers.
+        if (!separator_ || line.find(*separator_) == line.npos)
+          separator_ = separator_of(line, false);
       }
       if (!columns_ && !begin(line)) continue;
       add(line);
