@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""``python -m gpureg._convert FILE PART``: writes a scan to standard output, as a binary PLY.
+"""Writes a scan, ``sys.argv``'s file and part, to standard output as a binary PLY.
 
-The command gpureg runs it for formats that libraries of Python read. One line on standard error
-says what is wrong.
+The command gpureg has an interpreter run it for formats that libraries of Python read. The last
+line on standard error says what is wrong.
 """
 
 from __future__ import annotations
@@ -40,7 +40,3 @@ def main() -> int:
         out.write(np.ascontiguousarray(points[at : at + _PIECE], "<f8").tobytes())
     out.flush()
     return 0
-
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -49,7 +49,7 @@ TEST_F(BadCloud, HeaderThatLiesAboutTheCount) {
   expect_named(with_count("18446744073709551615"), {"count"});
 }
 
-TEST_F(BadCloud, SomethingElse) { expect_named("\x89PNG\r\n\x1a\n", {"neither a PLY nor a PCD"}); }
+TEST_F(BadCloud, SomethingElse) { expect_named("\x89PNG\r\n\x1a\n", {"an image"}); }
 
 TEST_F(BadCloud, MissingFilesAndFolders) {
   const std::string missing = scans_ / "none.ply";

@@ -222,6 +222,14 @@ std::vector<Flavour> text_flavours() {
       {"E.csv", "\xFF\xFEx\0,\0y\0,\0z\0\n\0001\0,\0002\0,\0003\0\n\0"s, 0, "UTF-16", "UTF-16"},
       {"F.xyz", "\0\1\2\3\4\5\6\7"s, 0, "neither a PLY nor a PCD", "binary"},
       {"G.txt", "500000.25 5400000.5 1\n500001.25 5400001.5 2\n", 2, "", "map coordinates"},
+      {"J.txt", "1 0 0 5\n0 0.6 0.8 6\n0 -0.8 0.6 7\n0 0 0 1\n", 0, "a list of poses (4 x 4",
+       "a matrix"},
+      {"K.log", "0 1 9\n1 0 0 5\n0 1 0 6\n0 0 1 7\n0 0 0 1\n", 0, "a list of poses (4 x 4",
+       "Redwood's log"},
+      {"L.txt", "# timestamp tx ty tz qx qy qz qw\n1.5 1 2 3 0 0 0.6 0.8\n2.5 1 2 3 0 0 0 1\n", 0,
+       "a list of poses (times, positions and quaternions)", "TUM"},
+      {"M.txt", "1 0 0 5 0 1 0 6 0 0 1 7\n1 0 0 6 0 1 0 6 0 0 1 7\n", 0,
+       "a list of poses (a matrix a line)", "KITTI's poses"},
       {"H.csv", "x,y,z\n", 0, "no row of numbers", "names only"},
   };
 }

@@ -24,6 +24,11 @@ extern char** environ;
 namespace gpureg::cli {
 namespace {
 
+/// No module is taken from the working folder, as `python -m` would.
+constexpr const char* kScript =
+    "import sys; sys.path[:] = filter(None, sys.path); from gpureg._convert import main; "
+    "sys.exit(main())";
+
 class Descriptor {
  public:
   explicit Descriptor(int fd = -1) : fd_(fd) {}
@@ -131,8 +136,8 @@ PointCloud read_by_python(const std::string& path) {
   if (::pipe(ends.data()) != 0) fail_system("cannot make a pipe");
   Descriptor errors(ends[0]), write_end(ends[1]);
   for (const int end : ends) ::fcntl(end, F_SETFD, FD_CLOEXEC);
-  const pid_t pid = start({python, "-m", "gpureg._convert", scan.file, std::to_string(scan.part)},
-                          out.get(), write_end.get());
+  const pid_t pid = start({python, "-c", kScript, scan.file, std::to_string(scan.part)}, out.get(),
+                          write_end.get());
   write_end.close();
   const std::string said = last_line(read_end(errors.get()));
   if (const int status = wait_for(pid); status != 0)

@@ -9,6 +9,7 @@
 
 #include "common/float_origin.hpp"
 #include "files/text_file.hpp"
+#include "io/clouds/pose_rows.hpp"
 #include "io/decode.hpp"
 #include "io/extension.hpp"
 
@@ -184,6 +185,7 @@ class Reader {
     const char separator = separator_ ? *separator_ : separator_of(text, true);
     cut(text, separator, kMostColumns, fields_);
     columns_ = columns_of(fields_);
+    named_ = columns_.has_value();
     if (columns_ && separator != kBlanks && text.find(separator) != text.npos)
       separator_ = separator;
     return columns_.has_value();
@@ -239,7 +241,20 @@ class Reader {
     return number;
   }
 
+  void look_for_poses(std::string_view line) {
+    constexpr std::size_t kMost = 17;  // one more than a matrix has
+    Fields fields;
+    cut(line, *separator_, kMost, fields);
+    std::vector<double>& row = first_rows_.emplace_back();
+    for (const std::string_view field : fields) {
+      double number = std::numeric_limits<double>::quiet_NaN();
+      parse_coordinate(field, number);
+      row.push_back(number);
+    }
+  }
+
   void add(std::string_view line) {
+    if (first_rows_.size() < kPoseRows) look_for_poses(line);
     cut(line, *separator_, columns_->last + 1, fields_);
     if (announced_ && fields_.size() == 1 && is_preamble(line)) return;  // of one more cloud
     if (announced_ && points_.size() == *announced_) {
@@ -269,6 +284,8 @@ class Reader {
       source_.fail("truncated: " + std::to_string(*announced_) +
                    " points are announced, the file ends after " + std::to_string(points_.size()));
     if (points_.empty()) source_.fail("it has no row of numbers x y z");
+    const std::string poses = named_ ? "" : poses_in(first_rows_);
+    if (!poses.empty()) source_.fail("a list of poses (" + poses + "), no cloud");
     if (further_ > 0)
       source_.note(std::to_string(further_) + " rows after the announced " +
                    std::to_string(*announced_) + " were left out");
@@ -285,6 +302,8 @@ class Reader {
   std::optional<Columns> columns_;
   std::optional<std::size_t> announced_;
   std::size_t further_ = 0;
+  bool named_ = false;  ///< the columns
+  std::vector<std::vector<double>> first_rows_;
   Fields fields_;
   std::vector<Eigen::Vector3d> points_;
   std::vector<Eigen::Vector3f> normals_;
