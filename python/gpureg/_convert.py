@@ -10,6 +10,7 @@ from __future__ import annotations
 import sys
 
 import numpy as np
+import numpy.typing as npt
 
 from ._formats import read_foreign
 
@@ -20,15 +21,17 @@ def main() -> int:
     path, part = sys.argv[1], int(sys.argv[2])
     try:
         scan = read_foreign(path, part)
-    except (ImportError, OSError) as error:
-        print(" ".join(str(error).split()), file=sys.stderr)
+        if scan is None:
+            raise OSError(f"{path}: neither LAS nor E57")
+        write(*scan)
+    except (ImportError, OSError, MemoryError) as error:
+        reason = " ".join(str(error).split()) or type(error).__name__
+        print(reason if path in reason else f"{path}: {reason}", file=sys.stderr)
         return 1
-    except KeyboardInterrupt:
-        return 130
-    if scan is None:
-        print(f"{path}: neither LAS nor E57", file=sys.stderr)
-        return 1
-    points, viewpoint = scan
+    return 0
+
+
+def write(points: npt.NDArray[np.float64], viewpoint: npt.NDArray[np.float64] | None) -> None:
     header = ["ply", "format binary_little_endian 1.0"]
     if viewpoint is not None:
         header.append("comment viewpoint {:g} {:g} {:g}".format(*viewpoint[0]))
@@ -39,4 +42,3 @@ def main() -> int:
     for at in range(0, len(points), _PIECE):
         out.write(np.ascontiguousarray(points[at : at + _PIECE], "<f8").tobytes())
     out.flush()
-    return 0

@@ -77,7 +77,9 @@ def _check_chunks(name: str, start: int, size: int) -> int:
             file.seek(-8, os.SEEK_END)
             (table,) = struct.unpack("<q", file.read(8))
         if not start < table <= os.path.getsize(name) - 8:
-            raise ValueError("no table of chunks: damaged, or an old LAZ, to be converted with PDAL")
+            raise ValueError(
+                "no table of chunks: damaged, or an old LAZ, to be converted with PDAL"
+            )
         file.seek(table + 4)
         chunks = int(struct.unpack("<I", file.read(4))[0])
     if (chunks - 1) * size > os.path.getsize(name):

@@ -111,6 +111,16 @@ class TestE57:
         with pytest.raises(ImportError, match=r"project\.e57.*pip install 'gpureg\[formats\]'"):
             gpureg.read_point_cloud(project[0], 1)
 
+    def test_stations_in_a_batch(self, project, tmp_path):
+        pytest.importorskip("pyarrow")
+        path, clouds = project
+        names = [f"{path}#{k + 1}" for k in range(len(clouds))]
+        fragments = gpureg.FragmentSet.from_clouds(names)
+        assert len({fragments.fingerprint(k) for k in range(3)}) == 3
+        options = gpureg.RegistrationOptions(prepare=gpureg.PrepareOptions(voxel_size=0.1))
+        run = gpureg.register_all(names, output=tmp_path / "o", options=options, progress=False)
+        assert run.log.read_text().count("\n") == 3 * 5  # all three pairs
+
     @with_command
     def test_the_command_aligns_two_stations(self, project):
         path, _ = project

@@ -35,8 +35,8 @@ bool is_among(const std::string& extension, const std::array<const char*, Count>
 void check_only(Source source, const std::string& file) {
   const std::size_t scans = index_ptx(source).size();
   if (scans > 1)
-    source.fail("it holds " + std::to_string(scans) + " scans: name one of them, " +
-                files::quoted(file + "#1") + " to '#" + std::to_string(scans) + "'");
+    source.fail("it holds " + std::to_string(scans) + " scans: name one of them, '" + file +
+                "#1' to '#" + std::to_string(scans) + "'");
 }
 
 enum class Format { unknown, ply, pcd, ptx, off, obj, rows, text };
