@@ -18,6 +18,7 @@
 #include "data/scene_files.hpp"
 #include "data/sensor/depth_sensor.hpp"
 #include "data/sensor/fusion.hpp"
+#include "data/sensor/planar_scanner.hpp"
 #include "data/sensor/rgbd.hpp"
 #include "data/surface.hpp"
 #include "data/tours/trajectory.hpp"
@@ -66,6 +67,18 @@ void validate(const GenerateOptions& o) {
   in("distortion", s.distortion, 0, 0.1, "0 to 0.1");
   in("odometry_translation", s.odometry_translation, 0, 0.1, "0 to 0.1 m");
   in("odometry_rotation_degrees", s.odometry_rotation_degrees, 0, 10, "0 to 10 degrees");
+  const PlanarScannerOptions& p = o.scanner;
+  if (p.step == 0) return;
+  require(!o.rgbd, "rgbd", "true", "false with a 2-D scanner: it has no images");
+  const auto of_scanner = [&](const char* name, double value, double low, double high,
+                              const char* rule) {
+    require(value >= low && value <= high, std::string("scanner.") + name, std::to_string(value),
+            rule);
+  };
+  of_scanner("step", p.step, 0.05, 5, "0.05 to 5 degrees");
+  of_scanner("field", p.field, 30, 360, "30 to 360 degrees");
+  of_scanner("range", p.range, 1, 100, "1 to 100 m");
+  of_scanner("noise", p.noise, 0, 1, "0 to 1 m");
 }
 
 /// Runs work(0) .. work(count - 1) on the threads; the first exception ends all and is thrown here.
@@ -120,6 +133,7 @@ class Generator {
         house_(building_of(options)),
         scene_(house_.mesh),
         sensor_(scene_, options.sensor, visit_seed(options)),
+        scanner_(scene_, options.scanner, visit_seed(options)),
         world_from_camera_(walk(house_, scene_, visit_seed(options),
                                 options.fragments * options.frames_per_fragment,
                                 static_cast<float>(options.no_return))),
@@ -187,6 +201,7 @@ class Generator {
   void scan(int i) {
     const int first = i * options_.frames_per_fragment;
     const auto at = static_cast<std::size_t>(i);
+    if (options_.scanner.step > 0) return scan_plane(i, first);
     fragments_[at].world_from_fragment = world_from_camera_[static_cast<std::size_t>(first)];
     cameras_[at] = odometry(first);
     FusionVolume volume;
@@ -209,7 +224,21 @@ class Generator {
         std::clamp(static_cast<float>(options_.frames_per_fragment) / 15.0f, 0.5f, 3.0f);
     const float farthest = static_cast<float>(options_.sensor.max_depth);
     fragments_[at].points = volume.extract(sightings / (farthest * farthest), kPointSpacing);
-    write_cloud(folder_ + "/cloud_bin_" + std::to_string(i) + ".ply", fragments_[at].points);
+    finish(i);
+  }
+
+  void scan_plane(int i, int frame) {
+    Fragment& fragment = fragments_[static_cast<std::size_t>(i)];
+    fragment.world_from_fragment =
+        scanner_.pose_under(world_from_camera_[static_cast<std::size_t>(frame)]);
+    fragment.points = scanner_.scan(fragment.world_from_fragment, frame);
+    cameras_[static_cast<std::size_t>(i)] = {Eigen::Isometry3d::Identity()};
+    finish(i);
+  }
+
+  void finish(int i) {
+    write_cloud(folder_ + "/cloud_bin_" + std::to_string(i) + ".ply",
+                fragments_[static_cast<std::size_t>(i)].points);
     step(options_.fragments, "fragments");
   }
 
@@ -242,6 +271,7 @@ class Generator {
   const House house_;
   const RayScene scene_;
   const DepthSensor sensor_;
+  const PlanarScanner scanner_;
   const std::vector<Eigen::Isometry3d> world_from_camera_;
   std::vector<Fragment> fragments_;
   std::vector<std::vector<Eigen::Isometry3d>> cameras_;  // fragment_from_camera

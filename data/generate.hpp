@@ -25,6 +25,14 @@ struct SensorOptions {
       0.01;  ///< drift inside a fragment: sigma in degrees per frame and axis
 };
 
+/// A 2-D scanner, 0.3 m above the floor.
+struct PlanarScannerOptions {
+  double step = 0;      ///< 0: the depth camera; else degrees between readings, 0.05 .. 5
+  double field = 360;   ///< degrees, 30 .. 360
+  double range = 12;    ///< metres, 1 .. 100
+  double noise = 0.01;  ///< sigma of the ranges, metres, 0 .. 1
+};
+
 struct GenerateOptions {
   int fragments = 20;            ///< 1 .. 10000; about 0.7 MB of memory each
   int frames_per_fragment = 50;  ///< 1 .. 1000; the camera moves about 1.5 cm per frame
@@ -47,6 +55,8 @@ struct GenerateOptions {
   bool rgbd = false;
   int threads = 0;  ///< 0: all cores; each holds one fragment's volume (about 100 MB)
   SensorOptions sensor;
+  /// Instead of the camera: every fragment is one scan, of the first frame.
+  PlanarScannerOptions scanner;
 };
 
 struct Progress {

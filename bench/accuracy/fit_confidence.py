@@ -68,6 +68,9 @@ MODELS = {
     "overlap_alone": Model(False, False),
     "model": Model(False, True, True),
 }
+# Of 2-D scans, which have the same features; see flat_scans.py.
+FLAT_MODELS = {"flat": Model(True, True), "flat_surface_sides": Model(False, True)}
+ALL_MODELS = {**MODELS, **FLAT_MODELS}
 REGRESSIONS = ("ranking", "confidence", "overlap")
 
 MAX_ERROR = 0.2  # metres, Redwood's rule for a correct pose
@@ -450,7 +453,7 @@ def read_header(text):
     """The models of header(), by name."""
     names = library()._confidence_feature_names()
     models = {}
-    for name in MODELS:
+    for name in ALL_MODELS:
         body = re.search(rf"ConfidenceModel {constant(name)}\{{(.*?)\}};", text, re.DOTALL)
         if body is None:
             raise ValueError(f"the header has no {constant(name)}")
@@ -475,7 +478,7 @@ def clang_format():
 def write_header(path, models):
     """Regressions that were not fitted stay as the header has them."""
     shipped = read_header((ROOT / "src/confidence/confidence_model.hpp").read_text())
-    models = {name: models.get(name, shipped.get(name)) for name in MODELS}
+    models = {name: models.get(name, shipped.get(name)) for name in ALL_MODELS}
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_text(header(models))
     tool = clang_format()

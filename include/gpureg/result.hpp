@@ -75,6 +75,9 @@ struct RegistrationResult {
   /// RegistrationMethod::quadruples.
   std::vector<RegistrationMode> modes;
   RegistrationStatistics statistics;
+  /// Both clouds are scans of a 2-D scanner (PrepareStatistics::flat). All poses move the plane of
+  /// the source onto that of the target, exactly, and the moments are those of points in the planes.
+  bool flat = false;
   /// What was known of the places that the clouds were seen from.
   ViewpointSource source_viewpoint = ViewpointSource::said;
   ViewpointSource target_viewpoint = ViewpointSource::said;

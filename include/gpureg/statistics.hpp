@@ -34,6 +34,7 @@ enum class RegistrationReason : std::uint8_t {
   /// The best candidate is below min_confidence because it shares its probability with poses that
   /// a symmetry makes equivalent. Together they pass: RegistrationOptions::accept_symmetry.
   symmetric,
+  flat_with_solid,  ///< one cloud is a scan of a 2-D scanner, the other one is not
   cancelled
 };
 
@@ -116,6 +117,9 @@ struct PrepareStatistics {
   ViewpointSource viewpoint = ViewpointSource::said;
   /// Prepared points whose input normal contradicted the normals around it and was flipped.
   std::uint32_t repaired_normals = 0;
+  /// A scan of a 2-D scanner: its points lie in a plane and form curves. It was prepared in layers
+  /// along the normal of the plane, and points counts all of them.
+  bool flat = false;
   double downsample = 0, normals = 0, features = 0, grid = 0, depth_maps = 0, surface_sides = 0;
   double total() const {
     return downsample + normals + features + grid + depth_maps + surface_sides;

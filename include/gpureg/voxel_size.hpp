@@ -31,6 +31,8 @@ struct VoxelSizeSuggestion {
   /// Median RMS distance of points from the plane fitted to their neighbourhood, about a voxel
   /// wide.
   double noise = 0;
+  /// Most of the clouds are scans of a 2-D scanner; noise is then the distance from a line.
+  bool flat = false;
   std::size_t points = 0;  ///< median number of points that a cloud keeps
 
   bool valid() const { return reason == VoxelSizeReason::none; }
@@ -41,7 +43,8 @@ struct VoxelSizeSuggestion {
 /// points. Where the noise exceeds a third of a voxel, it grows until 3,000 points remain. It also
 /// grows where the neighbourhoods of the features have few points, as in sparse LiDAR scans, in
 /// proportion to them, and where most points have their neighbours on one line, as on the rings of
-/// a LiDAR, until they have an area. 1,000 points remain. Rounded to one or two digits. Reads at
+/// a LiDAR, until they have an area. 1,000 points remain. Scans of 2-D
+/// scanners keep about 300 points, in layers. Rounded to one or two digits. Reads at
 /// most 16 clouds, evenly chosen, and samples of their points; non-finite and repeated points do
 /// not matter. Deterministic, thread-safe.
 /// @param views host memory, all in one unit.

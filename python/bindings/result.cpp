@@ -146,6 +146,7 @@ py::dict result_state(const RegistrationResult& r) {
   py::list modes;
   for (const RegistrationMode& mode : r.modes) modes.append(state_of(mode));
   state["modes"] = modes;
+  state["flat"] = r.flat;
   state["source_viewpoint"] = to_string(r.source_viewpoint);
   state["target_viewpoint"] = to_string(r.target_viewpoint);
   state["statistics"] = to_dict(r.statistics, fields_of<RegistrationStatistics>());
@@ -167,6 +168,7 @@ RegistrationResult result_from(const py::dict& state) {
   r.target_moments = moments_from(state["target_moments"]);
   for (const auto mode : state["modes"].cast<py::list>())
     r.modes.push_back(mode_from(mode.cast<py::dict>()));
+  r.flat = state["flat"].cast<bool>();
   r.source_viewpoint = convert<ViewpointSource>(state["source_viewpoint"]);
   r.target_viewpoint = convert<ViewpointSource>(state["target_viewpoint"]);
   assign(r.statistics, fields_of<RegistrationStatistics>(), state["statistics"],
@@ -213,6 +215,10 @@ void bind_registration_result(py::module_& m) {
                     "Of all correspondences: points of the source, in its frame.")
       .def_readonly("target_moments", &R::target_moments,
                     "Of all correspondences: points of the target, in its frame.")
+      .def_readonly("flat", &R::flat,
+                    "Both clouds are scans of a 2-D scanner: all poses move the plane of the "
+                    "source onto that of the target, exactly, and the moments are of points in "
+                    "the planes.")
       .def_property_readonly(
           "source_viewpoint", [](const R& r) { return to_string(r.source_viewpoint); },
           "What was known of the place that the source was seen from; see PrepareStatistics.")

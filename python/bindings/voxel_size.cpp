@@ -22,6 +22,9 @@ void bind_voxel_size(py::module_& m) {
       .def_readonly("spacing", &S::spacing, "Median distance of a point to its nearest neighbour.")
       .def_readonly("noise", &S::noise,
                     "Median distance of points from the plane of their surroundings.")
+      .def_readonly("flat", &S::flat,
+                    "Most of the clouds are scans of a 2-D scanner; noise is then the distance "
+                    "from a line.")
       .def_readonly("points", &S::points, "That a cloud keeps, in the median.")
       .def("__repr__", [](const S& s) {
         if (!s.valid())

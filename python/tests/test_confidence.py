@@ -140,7 +140,7 @@ def test_features_of_each_model_are_those_with_weights():
     for name, regressions in fit_confidence.read_header(HEADER).items():
         for stage, regressand in (("ranking", "ranking"), ("confidence", "confidence")):
             x = _core._confidence_features(
-                some_evidence(), *fit_confidence.MODELS[name], regressand
+                some_evidence(), *fit_confidence.ALL_MODELS[name], regressand
             )
             used = set(names[(x != 0).any(0)]) | (rank if stage == "confidence" else set())
             assert used == set(names[regressions[stage].weights != 0]), (name, stage)

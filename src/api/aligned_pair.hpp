@@ -7,6 +7,7 @@
 #include "api/frames.hpp"
 #include "confidence/confidence.hpp"
 #include "confidence/pose_evidence.hpp"
+#include "flat/planar_pose.hpp"
 
 namespace gpureg {
 
@@ -19,15 +20,18 @@ struct AlignedPair {
   bool swapped;  ///< the engine moved the target
   const RegistrationOptions& options;
 
+  bool flat() const { return planar_pair(source, target); }
+
   UnalignedIsometry3d transform_of(const Pose<double>& pose) const {
-    return to_transform(pose, source, target, swapped);
+    const UnalignedIsometry3d found = to_transform(pose, source, target, swapped);
+    return flat() ? planar(found, source.plane, target.plane, origin_of(source)) : found;
   }
   /// Of all modes, in their order.
   std::vector<PoseEvidence> evidence_of(const PairOutcome& outcome) const {
     const PreparedState &moved = swapped ? target : source, &fixed = swapped ? source : target;
     std::vector<const ModeOutcome*> modes;
     for (const ModeOutcome& mode : outcome.modes) modes.push_back(&mode);
-    const auto spectra = confidence::spectra_of(modes, moved);
+    const auto spectra = confidence::spectra_of(modes, moved, fixed);
     std::vector<PoseEvidence> out;
     for (std::size_t k = 0; k < modes.size(); ++k)
       out.push_back(confidence::evidence_of(outcome, *modes[k], spectra[k], moved, fixed, swapped));
@@ -36,11 +40,15 @@ struct AlignedPair {
   /// Points in correspondences. Measured: ModeOutcome or PairOutcome.
   template <typename Measured>
   CorrespondenceMoments source_moments(const Measured& pose) const {
-    return to_frame(swapped ? pose.target_moments : pose.source_moments, source);
+    return of_scan(to_frame(swapped ? pose.target_moments : pose.source_moments, source), source);
   }
   template <typename Measured>
   CorrespondenceMoments target_moments(const Measured& pose) const {
-    return to_frame(swapped ? pose.source_moments : pose.target_moments, target);
+    return of_scan(to_frame(swapped ? pose.source_moments : pose.target_moments, target), target);
+  }
+  CorrespondenceMoments of_scan(const CorrespondenceMoments& moments,
+                                const PreparedState& cloud) const {
+    return flat() ? planar(moments, cloud.plane) : moments;
   }
   double rmse(std::uint64_t residual, std::uint32_t inliers) const {
     const double distance = static_cast<double>(options.prepare.max_correspondence_distance);
@@ -53,7 +61,7 @@ struct AlignedPair {
             std::min(mode.source.tested, mode.target.tested)};
   }
   confidence::Ranking ranking_of(const std::vector<PoseEvidence>& poses) const {
-    return confidence::ranking_of(poses, source.statistics.viewpoint, target.statistics.viewpoint);
+    return confidence::ranking_of(poses, source, target);
   }
 };
 

@@ -7,7 +7,6 @@
 
 #include "api/outcome.hpp"
 #include "api/pair_input.hpp"
-#include "api/prior.hpp"
 #include "common/host_threads.hpp"
 #include "common/stop_scope.hpp"
 
@@ -41,9 +40,8 @@ Batch::Chunk Batch::next_chunk() {
   for (; next_ < end; ++next_) {
     const PairVariant& v = variants_[next_];
     const bool swapped = swaps(*v.source, *v.target, options_);
-    out.inputs.push_back(input_of(*v.source, *v.target, swapped));
-    if (!priors_.empty())
-      out.inputs.back().prior = prior_test(priors_[v.pair], *v.source, *v.target, swapped);
+    out.inputs.push_back(input_of(*v.source, *v.target, swapped,
+                                  priors_.empty() ? RegistrationPrior() : priors_[v.pair]));
   }
   out.outcomes.resize(out.size());
   return out;

@@ -201,6 +201,7 @@ RegistrationResult to_row_result(const PairOutcome& all, const AlignedPair& pair
   result.source_viewpoint = pair.source.statistics.viewpoint;
   result.target_viewpoint = pair.target.statistics.viewpoint;
   result.statistics.swapped = pair.swapped;
+  result.flat = pair.flat();
   if (pair.swapped) {
     std::swap(result.statistics.source_points, result.statistics.target_points);
     if (result.reason == RegistrationReason::too_few_source_points)
@@ -209,6 +210,13 @@ RegistrationResult to_row_result(const PairOutcome& all, const AlignedPair& pair
       result.reason = RegistrationReason::too_few_source_points;
   }
   if (pair.options.method == RegistrationMethod::compatibility) {
+    if (pair.source.plane.exists() != pair.target.plane.exists() && pair.source.size > 0 &&
+        pair.target.size > 0) {
+      result.reason = RegistrationReason::flat_with_solid;
+      result.status = RegistrationStatus::not_aligned;
+      result.has_candidate = false;
+      return result;
+    }
     if (!outcome.modes.empty()) add_modes(outcome, pair, result);
     result.reason = evidence_reason(result, some_contradict && outcome.modes.empty(), pair.options);
     result.status = status_of(result, pair.options);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "api/pair_input.hpp"
 
+#include "api/prior.hpp"
 #include "common/in_halves.hpp"
 #include "common/shown.hpp"
 
@@ -55,8 +56,12 @@ bool swaps(const PreparedState& source, const PreparedState& target,
   return options.smaller_as_source && target.size < source.size;
 }
 
-PairInput input_of(const PreparedState& source, const PreparedState& target, bool swapped) {
-  return swapped ? PairInput{&target, &source, {}, {}} : PairInput{&source, &target, {}, {}};
+PairInput input_of(const PreparedState& source, const PreparedState& target, bool swapped,
+                   const RegistrationPrior& prior) {
+  PairInput out =
+      swapped ? PairInput{&target, &source, {}, {}} : PairInput{&source, &target, {}, {}};
+  out.prior = prior_test(prior, source, target, swapped);
+  return out;
 }
 
 void align_all(Engine& engine, const std::vector<PairInput>& pairs,

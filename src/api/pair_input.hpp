@@ -25,7 +25,9 @@ void check_pairs(const Context& context, const std::vector<PreparedCloud>& cloud
 bool swaps(const PreparedState& source, const PreparedState& target,
            const RegistrationOptions& options);
 
-PairInput input_of(const PreparedState& source, const PreparedState& target, bool swapped);
+/// With the prior, and with the planes of two 2-D scans.
+PairInput input_of(const PreparedState& source, const PreparedState& target, bool swapped,
+                   const RegistrationPrior& prior = {});
 
 /// Aligns all pairs, together as far as limits and memory allow.
 void align_all(Engine& engine, const std::vector<PairInput>& pairs,

@@ -16,6 +16,9 @@ constexpr double kRadians = 3.14159265358979323846 / 180.0;
 /// Widens the limits by the rounding of directions and poses to float: poses exactly at a limit
 /// must pass.
 constexpr double kRounding = 1e-6;
+/// Largest angle between the planes of 2-D scans before the pose is made planar, degrees: layers of
+/// half a metre hold the tilt of a candidate loosely.
+constexpr double kMostTilt = 25;
 /// Shortest direction, far above the rounding of its components.
 constexpr double kMinNorm = 1e-9;
 
@@ -29,6 +32,10 @@ void require_direction(const Eigen::Vector3d& v, const std::string& name) {
 void require_degrees(double degrees, const std::string& name) {
   require(std::isfinite(degrees) && degrees > 0 && degrees <= 180, name.c_str(), degrees,
           "degrees in (0, 180]");
+}
+
+Eigen::Vector3d normal_of(const ScanPlane& plane) {
+  return Eigen::Vector3d(plane.normal[0], plane.normal[1], plane.normal[2]);
 }
 
 Vec3 to_vec3(const Eigen::Vector3d& v) {
@@ -55,14 +62,16 @@ PriorTest prior_test(const RegistrationPrior& prior, const PreparedState& source
                      const PreparedState& target, bool swapped) {
   PriorTest out;
   out.swapped = swapped;
-  if (prior.gravity) {
+  std::optional<GravityPrior> gravity = prior.gravity;
+  if (!gravity && planar_pair(source, target))
+    gravity = GravityPrior{normal_of(source.plane), normal_of(target.plane), kMostTilt};
+  if (gravity) {
     out.gravity = true;
-    const Eigen::Vector3d s = prior.gravity->source_up.normalized(),
-                          t = prior.gravity->target_up.normalized();
+    const Eigen::Vector3d s = gravity->source_up.normalized(), t = gravity->target_up.normalized();
     out.moved_up = to_vec3(swapped ? t : s);
     out.fixed_up = to_vec3(swapped ? s : t);
     out.min_up_cosine =
-        static_cast<float>(portable::cos(prior.gravity->max_angle * kRadians) - kRounding);
+        static_cast<float>(portable::cos(gravity->max_angle * kRadians) - kRounding);
   }
   if (prior.pose) {
     out.pose = true;

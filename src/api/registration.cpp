@@ -17,6 +17,7 @@
 #include "common/in_halves.hpp"
 #include "common/limits.hpp"
 #include "common/validate.hpp"
+#include "flat/extruded.hpp"
 #include "viewpoint/unknown_viewpoint.hpp"
 
 namespace gpureg {
@@ -39,20 +40,38 @@ void check_priors(const std::vector<RegistrationPrior>& priors, std::size_t pair
 /// Points from which another thread is worth its start.
 constexpr std::size_t kRawPointsPerThread = 200'000;
 
-/// Replaces clouds by those without their stray points. @return the owners of the rows.
+/// The owners of the rows that the engine gets of a cloud.
+struct Rows {
+  Extruded extruded;
+  WithoutStrayPoints kept;
+  Rows(const RawCloud& raw, bool model, const PrepareOptions& options)
+      : extruded(raw, model, options), kept(extruded.cloud(), options) {}
+  Rows(const Rows&) = delete;
+  Rows& operator=(const Rows&) = delete;
+};
+
+/// Replaces clouds by those that the engine gets: 2-D scans in layers, without stray points.
+/// @return the owners of the rows.
 template <typename Naming>
-std::vector<std::optional<WithoutStrayPoints>> drop_stray_points(const Engine& engine,
-                                                                 const PrepareOptions& options,
-                                                                 const Naming& naming,
-                                                                 std::vector<RawCloud>& raw) {
-  std::vector<std::optional<WithoutStrayPoints>> owners(raw.size());
+std::vector<std::optional<Rows>> replace_rows(const Engine& engine, const PrepareOptions& options,
+                                              const Naming& naming,
+                                              std::vector<CloudKnowledge>& knowledge,
+                                              std::vector<RawCloud>& raw) {
+  std::vector<std::optional<Rows>> owners(raw.size());
   std::size_t points = 0;
   for (const RawCloud& cloud : raw) points += cloud.size;
   const std::size_t workers = std::min<std::size_t>(
       {std::max(1u, engine.host_threads()), raw.size(), 1 + points / kRawPointsPerThread});
   on_threads(workers, [&](std::size_t worker) {
     for (std::size_t k = worker; k < raw.size(); k += workers)
-      naming(k, [&] { raw[k] = owners[k].emplace(raw[k], options).cloud(); });
+      naming(k, [&] {
+        const Rows& rows = owners[k].emplace(raw[k], knowledge[k].model, options);
+        raw[k] = rows.kept.cloud();
+        // The origin of the frame may be below the scanner.
+        if (rows.extruded.plane().exists() && !knowledge[k].viewpoints && raw[k].viewpoints)
+          for (int axis = 0; axis < 3; ++axis)
+            knowledge[k].origin[axis] = -static_cast<double>(raw[k].viewpoints[axis]);
+      });
   });
   return owners;
 }
@@ -83,7 +102,7 @@ std::vector<PreparedCloud> prepare_batch(const Context& context,
   }
   std::vector<PreparedCloud> out;
   if (raw.empty()) return out;
-  const auto owners = drop_stray_points(*Access::engine(context), options, naming, raw);
+  const auto owners = replace_rows(*Access::engine(context), options, naming, knowledge, raw);
   UnknownViewpoints unknown(*Access::engine(context), span_of(raw), knowledge, options);
   std::vector<std::shared_ptr<PreparedState>> states;
   unknown.during([&](const SurfaceWatcher& watcher) {
@@ -98,7 +117,10 @@ std::vector<PreparedCloud> prepare_batch(const Context& context,
       };
       for (auto& state : end - begin == 1 ? naming(begin, work) : work()) {
         set_frame_offset(clouds[states.size()].origin, *state);
-        owners[states.size()]->count(state->statistics);
+        const Rows& rows = *owners[states.size()];
+        state->plane = rows.extruded.plane();
+        rows.kept.count(state->statistics);
+        rows.extruded.count(state->statistics);
         states.push_back(std::move(state));
       }
     });

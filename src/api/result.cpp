@@ -40,6 +40,8 @@ const char* to_string(RegistrationReason reason) {
       return "confidence_too_low";
     case RegistrationReason::symmetric:
       return "symmetric";
+    case RegistrationReason::flat_with_solid:
+      return "flat_with_solid";
     case RegistrationReason::contradicts_prior:
       return "contradicts_prior";
     case RegistrationReason::cancelled:
@@ -100,6 +102,9 @@ const char* explain(RegistrationReason reason) {
       return "what speaks for the best pose found is too little, or too much speaks against it";
     case RegistrationReason::symmetric:
       return "a symmetry makes several poses equivalent; one of them is most likely correct";
+    case RegistrationReason::flat_with_solid:
+      return "one cloud is a scan of a 2-D scanner and the other one is not; cut the points at the "
+             "height of the 2-D scanner out of the other one";
     case RegistrationReason::contradicts_prior:
       return "every pose found contradicts what is known of gravity or of the pose";
     case RegistrationReason::cancelled:

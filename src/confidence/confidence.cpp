@@ -7,12 +7,14 @@
 
 #include "confidence/confidence_model.hpp"
 #include "math/exponential.hpp"
+#include "pipeline/prepared_state.hpp"
 
 namespace gpureg::confidence {
 namespace {
 
 const ConfidenceModel& model_of(AvailableEvidence available) {
   if (available.model) return kModel;
+  if (available.flat) return available.free_space ? kFlat : kFlatSurfaceSides;
   if (available.free_space) return available.surface_sides ? kFreeSpaceAndSurfaceSides : kFreeSpace;
   return available.surface_sides ? kSurfaceSides : kOverlapAlone;
 }
@@ -54,10 +56,12 @@ std::vector<double> rank_modes(const std::vector<PoseEvidence>& modes,
   return out;
 }
 
-Ranking ranking_of(const std::vector<PoseEvidence>& modes, ViewpointSource source,
-                   ViewpointSource target) {
+Ranking ranking_of(const std::vector<PoseEvidence>& modes, const PreparedState& source,
+                   const PreparedState& target) {
   Ranking out;
-  out.available = available_evidence(modes, source, target);
+  out.available =
+      available_evidence(modes, source.statistics.viewpoint, target.statistics.viewpoint);
+  out.available.flat = planar_pair(source, target);
   out.log_odds = rank_modes(modes, out.available);
   out.order.resize(modes.size());
   std::iota(out.order.begin(), out.order.end(), std::size_t(0));

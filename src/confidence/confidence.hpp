@@ -6,6 +6,10 @@
 
 #include "confidence/features.hpp"
 
+namespace gpureg {
+struct PreparedState;
+}
+
 /// From the evidence of a pair's modes to probabilities, by logistic regressions. `log` and `exp`
 /// appear here and nowhere before.
 namespace gpureg::confidence {
@@ -20,9 +24,9 @@ struct Ranking {
   std::vector<std::size_t> order;  ///< indices of the poses, the most likely first
 };
 
-/// @param source, target what was known of the viewpoints of the clouds.
-Ranking ranking_of(const std::vector<PoseEvidence>& modes, ViewpointSource source,
-                   ViewpointSource target);
+/// @param modes of the pair of the two clouds.
+Ranking ranking_of(const std::vector<PoseEvidence>& modes, const PreparedState& source,
+                   const PreparedState& target);
 
 /// Number of overlapping points of the side with fewer of them, and the points of that side.
 struct OverlapCount {

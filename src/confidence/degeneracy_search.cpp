@@ -73,12 +73,11 @@ PosesOfPair perturb(const PairInput& pair, const PairOutcome& outcome,
     modes.push_back(&mode);
   }
   if (modes.empty()) return out;
-  const std::vector<InformationSpectrum> spectra = spectra_of(modes, *pair.source);
+  const std::vector<InformationSpectrum> spectra = spectra_of(modes, *pair.source, *pair.target);
   for (std::size_t k = 0; k < modes.size(); ++k)
     evidence.push_back(
         evidence_of(outcome, *modes[k], spectra[k], *pair.source, *pair.target, false));
-  const Ranking ranking =
-      ranking_of(evidence, pair.source->statistics.viewpoint, pair.target->statistics.viewpoint);
+  const Ranking ranking = ranking_of(evidence, *pair.source, *pair.target);
   const std::size_t best = ranking.order.front();
   const ModeOutcome& mode = *modes[best];
   const InformationSpectrum& spectrum = spectra[best];

@@ -68,6 +68,7 @@ struct AvailableEvidence {
   /// One of the clouds is a model: a closed surface, so that all of the other cloud should lie on
   /// it. Other features than containment and the rank do not apply then.
   bool model = false;
+  bool flat = false;  ///< both clouds are scans of 2-D scanners
 };
 
 /// modes: of one pair. Free space is available where any mode has an observed point, the sides of

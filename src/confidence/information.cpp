@@ -46,6 +46,17 @@ Eigen::Matrix<double, 6, 6> centred_information(const ModeOutcome& mode, const P
   return turn * a * turn.transpose();
 }
 
+/// Restricts the information to the motions in the plane. Those out of it, which the layers of a
+/// 2-D scan hardly hold, are given more than any of these.
+void hold_in_plane(const ScanPlane& plane, Eigen::Matrix<double, 6, 6>& information) {
+  const Eigen::Vector3d n(plane.normal[0], plane.normal[1], plane.normal[2]);
+  Eigen::Matrix<double, 6, 6> in_plane = Eigen::Matrix<double, 6, 6>::Zero();
+  in_plane.topLeftCorner<3, 3>() = n * n.transpose();
+  in_plane.bottomRightCorner<3, 3>() = Eigen::Matrix3d::Identity() - n * n.transpose();
+  const Eigen::Matrix<double, 6, 6> held = in_plane * information * in_plane;
+  information = held + (1 + held.trace()) * (Eigen::Matrix<double, 6, 6>::Identity() - in_plane);
+}
+
 /// The project's own solver: Eigen's differs between its versions in the last bits.
 void decompose(const std::vector<Eigen::Matrix<double, 6, 6>>& matrices, std::size_t first,
                std::size_t count, std::vector<InformationSpectrum>& out) {
@@ -69,11 +80,14 @@ void decompose(const std::vector<Eigen::Matrix<double, 6, 6>>& matrices, std::si
 }  // namespace
 
 std::vector<InformationSpectrum> spectra_of(const std::vector<const ModeOutcome*>& modes,
-                                            const PreparedState& moved) {
+                                            const PreparedState& moved,
+                                            const PreparedState& fixed) {
   std::vector<InformationSpectrum> out(modes.size());
   std::vector<Eigen::Matrix<double, 6, 6>> matrices;
   for (std::size_t k = 0; k < modes.size(); ++k)
     matrices.push_back(centred_information(*modes[k], moved, out[k]));
+  if (planar_pair(moved, fixed))
+    for (auto& matrix : matrices) hold_in_plane(fixed.plane, matrix);
   for (std::size_t first = 0; first < modes.size(); first += Matrices6::kLanes)
     decompose(matrices, first, std::min<std::size_t>(Matrices6::kLanes, modes.size() - first), out);
   return out;

@@ -18,7 +18,8 @@ struct InformationSpectrum {
   Eigen::Matrix<double, 6, 1> weakest_direction;  ///< unit eigenvector of the first
 };
 
+/// Of 2-D scans the first three are of the motions in the plane; those out of it are held firmly.
 std::vector<InformationSpectrum> spectra_of(const std::vector<const ModeOutcome*>& modes,
-                                            const PreparedState& moved);
+                                            const PreparedState& moved, const PreparedState& fixed);
 
 }  // namespace gpureg::confidence

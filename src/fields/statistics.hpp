@@ -73,6 +73,7 @@ struct Fields<PrepareStatistics> {
     v(&P::points_without_feature, {"points_without_feature", "Never matched."});
     v(&P::viewpoint, {"viewpoint", "What is known of the place that the cloud was seen from."});
     v(&P::repaired_normals, {"repaired_normals", "Prepared points whose input normal contradicted the normals around it."});
+    v(&P::flat, {"flat", "A scan of a 2-D scanner, prepared in layers along the normal of its plane; points counts all of them."});
     v(&P::downsample, {"downsample", kMilliseconds, "Time of downsampling."});
     v(&P::normals, {"normals", kMilliseconds, "Time of the normals."});
     v(&P::features, {"features", kMilliseconds, "Time of the features."});

@@ -5,6 +5,7 @@
 #include <memory>
 #include <vector>
 
+#include "pipeline/scan_plane.hpp"
 #include "pipeline/types.hpp"
 
 namespace gpureg {
@@ -40,6 +41,7 @@ struct PreparedState {
   float origin[3] = {0, 0, 0};  ///< local origin, relative to the caller's rows
   double frame_offset[3] = {0, 0,
                             0};  ///< from the cloud's frame to the rows, PointCloudView::origin
+  ScanPlane plane;               ///< of a scan of a 2-D scanner
   std::uint32_t size = 0;
   std::uint32_t feature_dimension = 0;
   std::uint64_t normal_weight_total = 0;  ///< see CloudView
@@ -48,6 +50,11 @@ struct PreparedState {
   /// The same cloud with the other sides of its surfaces, where nobody knows them; else null.
   std::shared_ptr<PreparedState> other_sides;
 };
+
+/// Whether both clouds are scans of 2-D scanners: the pose is planar.
+inline bool planar_pair(const PreparedState& a, const PreparedState& b) {
+  return a.plane.exists() && b.plane.exists();
+}
 
 /// A pair of clouds for the engine, optionally with given correspondences.
 struct PairInput {

@@ -7,6 +7,8 @@
 #include <limits>
 #include <unordered_map>
 
+#include "flat/extruded.hpp"
+#include "flat/scan_plane.hpp"
 #include "math/jacobi.hpp"
 #include "spacing/sorted_rows.hpp"
 #include "spacing/voxel_keys.hpp"
@@ -34,6 +36,10 @@ constexpr double kMaxNoise = 1.0 / 3.0;     // of a voxel: its centroid averages
 // than the first, in squared lengths: those of a LiDAR with few rings lie on one ring.
 constexpr double kNormalRadius = 2, kLeastWidth = 0.2, kShareWithArea = 0.6;
 constexpr std::size_t kMinAreaPoints = 4, kAreaSample = 400;
+// Voxels along the curves of a 2-D scan. Its points are denser near the scanner, and half of them
+// are farther apart than in the median.
+constexpr std::size_t kWantedOfCurve = 300, kMinOfCurve = 150;
+constexpr double kSpacingsOfCurve = 2;
 constexpr double kGrowth = 1.1;
 constexpr std::size_t kFewestPoints = 1000;
 // Neighbourhoods of the features, in voxels, and their points (harmonic mean, so that each has the
@@ -101,13 +107,14 @@ class SortedCloud {
     return median(std::move(distances));
   }
 
-  /// Median over a sample of points of the RMS distance between their neighbourhood and its plane.
-  double noise(double radius) const {
+  /// Median over a sample of points of the RMS distance between their neighbourhood and its plane,
+  /// of a flat cloud its line.
+  double noise(double radius, bool flat) const {
     std::vector<double> distances;
     for_sample(kNoiseSample, [&](std::size_t at) {
       Eigen::Matrix3d covariance;
       if (neighborhood(at, radius, covariance) < kMinPlanePoints) return;
-      distances.push_back(std::sqrt(std::max(0.0, eigenvalues(covariance)[0])));
+      distances.push_back(std::sqrt(std::max(0.0, eigenvalues(covariance)[flat ? 1 : 0])));
     });
     return median(std::move(distances));
   }
@@ -255,14 +262,21 @@ VoxelSizeSuggestion suggest_voxel_size(const std::vector<PointCloudView>& views)
   if (views.empty()) return out;
   out.reason = VoxelSizeReason::too_few_points;
   std::vector<SortedCloud> clouds;
+  std::size_t flat = 0;
   const std::size_t chosen = std::min(views.size(), kClouds);
   for (std::size_t k = 0; k < chosen; ++k) {
     SortedCloud cloud(views[k * views.size() / chosen]);
     if (cloud.size() < 4) continue;
     out.reason = VoxelSizeReason::one_place;
-    if (cloud.extent() > 0) clouds.push_back(std::move(cloud));
+    if (cloud.extent() <= 0) continue;
+    clouds.push_back(std::move(cloud));
+    const PointCloudView& view = views[k * views.size() / chosen];
+    flat += find_scan_plane(view.points, view.size, view.point_stride).has_value();
   }
   if (clouds.empty()) return out;
+  out.flat = 2 * flat > clouds.size();
+  const std::size_t wanted_points = out.flat ? kWantedOfCurve : kWantedPoints,
+                    min_points = out.flat ? kMinOfCurve : kMinPoints;
 
   const std::size_t sample = std::max(kVoxelSample / clouds.size(), kMinVoxelSample);
   std::vector<std::uint64_t> keys;
@@ -282,14 +296,22 @@ VoxelSizeSuggestion suggest_voxel_size(const std::vector<PointCloudView>& views)
     }
     return high;
   };
-  double size = std::max(size_for(kWantedPoints), out.spacing);
+  double size = std::max(size_for(wanted_points), (out.flat ? kSpacingsOfCurve : 1) * out.spacing);
   const auto noise_at = [&](double s) {
-    return median_of(clouds,
-                     [&](const SortedCloud& cloud) { return cloud.noise(kNoiseRadius * s); });
+    return median_of(
+        clouds, [&](const SortedCloud& cloud) { return cloud.noise(kNoiseRadius * s, out.flat); });
   };
   out.noise = noise_at(size);
-  if (out.noise > kMaxNoise * size && points(size) > kMinPoints)
-    size = std::min(out.noise / kMaxNoise, size_for(kMinPoints));
+  if (out.noise > kMaxNoise * size && points(size) > static_cast<double>(min_points))
+    size = std::min(out.noise / kMaxNoise, size_for(min_points));
+  const auto finish = [&] {
+    size = rounded(size);
+    out.voxel_size = static_cast<float>(size);
+    out.points = static_cast<std::size_t>(points(size)) * (out.flat ? Extruded::kLayers : 1);
+    out.reason = VoxelSizeReason::none;
+    return out;
+  };
+  if (out.flat) return finish();
   const auto points_around = [&](double s) {
     return median_of(clouds, [&](const SortedCloud& cloud) {
       return cloud.downsampled(s).points_around(kFeatureRadius * s);
@@ -305,11 +327,7 @@ VoxelSizeSuggestion suggest_voxel_size(const std::vector<PointCloudView>& views)
   };
   while (points(size * kGrowth) >= kFewestPoints && share_with_area(size) < kShareWithArea)
     size *= kGrowth;
-  size = rounded(size);
-  out.voxel_size = static_cast<float>(size);
-  out.points = static_cast<std::size_t>(points(size));
-  out.reason = VoxelSizeReason::none;
-  return out;
+  return finish();
 }
 
 const char* to_string(VoxelSizeReason reason) {

@@ -114,16 +114,21 @@ struct Inheritance {
   PrepareStatistics statistics;
   float origin[3];
   double frame_offset[3];
+  ScanPlane plane;
   std::vector<Vec3> viewpoints;
 
   explicit Inheritance(const PreparedState& from)
-      : options(from.options), statistics(from.statistics), viewpoints(from.viewpoints) {
+      : options(from.options),
+        statistics(from.statistics),
+        plane(from.plane),
+        viewpoints(from.viewpoints) {
     std::copy(from.origin, from.origin + 3, origin);
     std::copy(from.frame_offset, from.frame_offset + 3, frame_offset);
   }
 
   void give(PreparedState& to) const {
     to.options = options;
+    to.plane = plane;
     const Vec3 moved{to.origin[0], to.origin[1], to.origin[2]};
     to.viewpoints.clear();
     for (const Vec3& viewpoint : viewpoints) to.viewpoints.push_back(viewpoint - moved);
@@ -137,6 +142,7 @@ struct Inheritance {
     s.stray_points = statistics.stray_points;
     s.viewpoint = statistics.viewpoint;
     s.repaired_normals = statistics.repaired_normals;
+    s.flat = statistics.flat;
     s.downsample += statistics.downsample;
     s.normals += statistics.normals;
     s.features += statistics.features;

@@ -126,6 +126,14 @@ void add_generate(CommandLine& line) {
               "Factor of all errors of the depth camera: shift, noise of disparities, distortion")
       .between(0.0, 10.0)
       .show_default();
+  verb.option("--scan-step", o->scene.scanner.step,
+              "Instead of the depth camera a 2-D scanner, with a reading every so many degrees: "
+              "each fragment is one scan");
+  verb.option("--scan-field", o->scene.scanner.field, "Field of view of the 2-D scanner, degrees")
+      .show_default();
+  verb.option("--scan-range", o->scene.scanner.range, "Range of the 2-D scanner, metres")
+      .show_default();
+  verb.option("--scan-noise", o->scene.scanner.noise, "Sigma of its ranges, metres").show_default();
   verb.flag("--rgbd", o->scene.rgbd,
             "Also write the frames as a sequence in TUM's layout, and the true surfaces");
   verb.flag("--quiet", o->quiet, "No progress, no summary");

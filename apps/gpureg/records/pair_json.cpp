@@ -81,6 +81,7 @@ RegistrationResult result_from_json(const Json& pair) {
   result.has_candidate = record.transform.has_value();
   if (record.transform) result.target_from_source.matrix() = *record.transform;
   result.score = record.score;
+  result.flat = pair.value("flat", false);
   if (const auto found = pair.find("inlier_ratio"); found != pair.end())
     result.inlier_ratio = number_or_nan(*found, "inlier_ratio");
   if (const auto found = pair.find("inlier_rmse"); found != pair.end())

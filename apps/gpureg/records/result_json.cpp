@@ -31,6 +31,7 @@ Json to_json(const RegistrationResult& result, const char* pose_name) {
   json["status"] = to_string(result.status);
   json["reason"] = to_string(result.reason);
   json["score"] = result.score;
+  if (result.flat) json["flat"] = true;
   json["inlier_ratio"] = result.inlier_ratio;
   json["inlier_rmse"] = result.inlier_rmse;
   json[pose_name] =

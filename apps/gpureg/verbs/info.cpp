@@ -59,11 +59,15 @@ void print_cloud(const std::string& path) {
                                    : std::string("none, ") + explain(suggestion.reason))
             << "\n";
   if (!suggestion.valid()) return;
+  if (suggestion.flat)
+    std::cout << "  flat             a scan of a 2-D scanner: poses stay in its plane\n";
   std::cout << "  noise            " << significant(suggestion.noise, 2)
-            << " (median distance from the plane of the surroundings)\n"
+            << (suggestion.flat ? " (median distance from the line of the surroundings)\n"
+                                : " (median distance from the plane of the surroundings)\n")
             << "  suggested        --voxel-size "
             << significant(static_cast<double>(suggestion.voxel_size), 3) << " (leaves about "
-            << grouped(suggestion.points) << " points)\n";
+            << grouped(suggestion.points)
+            << (suggestion.flat ? " points in layers)\n" : " points)\n");
 }
 
 int run(const std::vector<std::string>& clouds) {

@@ -50,6 +50,7 @@ std::string describe(const PrepareStatistics& s) {
   if (s.invalid_points > 0) text += " (" + grouped(s.invalid_points) + " not finite, dropped)";
   if (s.stray_points > 0) text += " (" + grouped(s.stray_points) + " stray, dropped)";
   text += ", " + grouped(s.points) + " prepared";
+  if (s.flat) text += " in layers (flat: a scan of a 2-D scanner)";
   if (s.points_without_feature > 0)
     text += " (" + grouped(s.points_without_feature) + " without a feature)";
   return text + "; viewpoint " + to_string(s.viewpoint) +
