@@ -66,6 +66,13 @@ PoseEvidence evidence_of(const PairOutcome& outcome, const ModeOutcome& mode,
     weakest.head<3>() = fixed_from_moved.transpose() * weakest.head<3>().eval();
     weakest.tail<3>() = fixed_from_moved.transpose() * weakest.tail<3>().eval();
   }
+  if (planar_pair(moved, fixed)) {
+    // The pose of the engine is planar but for its last digits.
+    const ScanPlane& plane = swapped ? moved.plane : fixed.plane;
+    const Eigen::Vector3d n(plane.normal[0], plane.normal[1], plane.normal[2]);
+    weakest.head<3>() = n * n.dot(weakest.head<3>());
+    weakest.tail<3>() -= n * n.dot(weakest.tail<3>());
+  }
   Eigen::Index largest = 0;
   weakest.cwiseAbs().maxCoeff(&largest);
   if (weakest[largest] < 0) weakest = -weakest;

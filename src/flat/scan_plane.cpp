@@ -24,7 +24,7 @@ constexpr std::size_t kSample = 50'000, kCurvePlaces = 128;
 /// Radius of the larger of two discs, in distances of neighbours and as a share of the extent; the
 /// other one is a fourth of it. A curve has four times as many points in the larger one, a filled
 /// plane sixteen times. It is wider than the noise of ranges, and narrower than a room.
-constexpr double kDiscInSpacings = 16, kDiscOfExtent = 1.0 / 64, kLargestDisc = 1.0 / 4;
+constexpr double kDiscInSpacings = 8, kDiscOfExtent = 1.0 / 32, kLargestDisc = 1.0 / 4;
 constexpr double kRatioOfDiscs = 4, kMostPointsOfCurve = 8;
 
 struct Point3 {

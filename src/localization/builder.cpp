@@ -76,6 +76,7 @@ void MapBuilder::add_cloud(const PointCloudView& cloud) {
 PreparedMap MapBuilder::build() const {
   PointCloud cloud = state_->cells.cloud();
   if (cloud.points.empty()) throw InvalidArgument("the map has no points");
+  refuse_flat(cloud.view(), "the map");
   check_map(cloud, state_->options);
   auto out = std::make_shared<MapState>();
   out->options = state_->options;

@@ -6,6 +6,7 @@
 
 #include "common/coordinates.hpp"
 #include "common/shown.hpp"
+#include "flat/scan_plane.hpp"
 #include "gpureg/voxel_size.hpp"
 
 namespace gpureg::localization {
@@ -90,6 +91,13 @@ void check_unit(const PointCloudView& scan, const MapState& map, const std::stri
     return;
   }
   throw InvalidArgument(text.str());
+}
+
+void refuse_flat(const PointCloudView& cloud, const std::string& name) {
+  if (find_scan_plane(cloud.points, cloud.size, cloud.point_stride))
+    throw InvalidArgument(name +
+                          " is of a 2-D scanner, and places are found in three dimensions only; "
+                          "align 2-D scans with one another");
 }
 
 void check_map(const PointCloud& cloud, const MapOptions& options) {

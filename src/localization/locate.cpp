@@ -135,7 +135,9 @@ std::vector<LocateResult> locate(const Context& context, const std::vector<Point
   check(state, options, scans.size(), priors, names);
   for (std::size_t k = 0; k < scans.size(); ++k) {
     scans[k].validate();
-    check_unit(scans[k], state, names.empty() ? "scans[" + std::to_string(k) + "]" : names[k]);
+    const std::string name = names.empty() ? "scans[" + std::to_string(k) + "]" : names[k];
+    check_unit(scans[k], state, name);
+    refuse_flat(scans[k], name);
   }
   const std::vector<PreparedCloud> prepared =
       prepare_batch(context, scans, state.options.prepare, names);

@@ -110,6 +110,7 @@ TEST(FlatScans, OtherCloudsAreNone) {
   EXPECT_FALSE(plane_of(patch(4, 3, 5000, 0, false))) << "a floor without noise, at random";
   EXPECT_FALSE(plane_of(patch(4, 3, 5000, 0.005f, true))) << "a floor";
   EXPECT_FALSE(plane_of(patch(10, 1, 5000, 0, true))) << "a strip";
+  EXPECT_FALSE(plane_of(patch(2, 0.2f, 1000, 0, true))) << "a narrow strip";
   EXPECT_FALSE(plane_of(patch(1, 1, 200, 0, false))) << "few points";
   Points box = patch(4, 3, 2000, 0, true);
   for (const Eigen::Vector3f& p : patch(4, 3, 2000, 0, true)) box.emplace_back(p.x(), p.y(), 0.1f);
@@ -148,6 +149,16 @@ TEST(FlatScans, AreRegisteredInTheirPlane) {
   EXPECT_LT(result.source_moments.count, first_scan().size());
   for (const int in : {2, 3, 4})
     for (const int out : {0, 1, 5}) EXPECT_EQ(information(in, out), 0);
+}
+
+TEST(FlatScans, TheSmallerCloudMayBeTheTarget) {
+  const RegistrationResult result = registered(second_scan(), first_scan());
+  ASSERT_TRUE(result.aligned()) << result.score;
+  ASSERT_TRUE(result.statistics.swapped);
+  for (const RegistrationMode& mode : result.modes) {
+    EXPECT_EQ(mode.target_from_source(2, 3), 0);
+    for (const std::size_t k : {0, 1, 5}) EXPECT_EQ(mode.evidence.weakest_direction[k], 0);
+  }
 }
 
 TEST(FlatScans, PlanesMayDiffer) {

@@ -7,6 +7,7 @@
 #include "gpureg/change.hpp"
 #include "localization/building.hpp"
 #include "support/expect_error.hpp"
+#include "support/floor_plan.hpp"
 
 namespace gpureg::test {
 namespace {
@@ -50,6 +51,13 @@ TEST_F(WrongInput, AnotherUnitIsRecognised) {
   scale(1e-5f);
   expect_error<InvalidArgument>([&] { locate_here(); },
                                 {"scans[0]", "metres", "millimetres", "1000"});
+}
+
+// The view from above knows floors and walls of 3-D scans alone.
+TEST_F(WrongInput, AScanOfA2dScannerIsRefused) {
+  query.scan.points = FloorPlan2d().scan(pose_in_plan(-1.2, 0.8, 0.2), 1);
+  query.scan.normals.clear();
+  expect_error<InvalidArgument>([&] { locate_here(); }, {"scans[0]", "2-D scanner"});
 }
 
 // Other scans of the call keep their results.
