@@ -5,6 +5,7 @@
 #include <Eigen/Geometry>
 #include <cstdint>
 #include <limits>
+#include <string>
 #include <vector>
 
 #include "gpureg/evidence.hpp"
@@ -58,14 +59,16 @@ struct RegistrationMode {
 struct RegistrationResult {
   RegistrationStatus status = RegistrationStatus::skipped;
   RegistrationReason reason = RegistrationReason::cancelled;
-  bool has_candidate = false;  ///< target_from_source holds a pose, reported or not
+  /// target_from_source holds a pose, reported or not. A pose that is not reported and brings no
+  /// points together is none.
+  bool has_candidate = false;
   /// Moves the source's points into the target's frame: p_target = target_from_source * p_source.
   /// Converts to Eigen::Isometry3d. NaN without a candidate.
   UnalignedIsometry3d target_from_source = no_pose();
   /// Ranks results: the confidence; with RegistrationMethod::quadruples the inlier ratio.
   double score = 0;
   double inlier_ratio = 0;  ///< verified inliers / points scored, [0, 1]
-  double inlier_rmse = 0;   ///< metres, over the inliers
+  double inlier_rmse = 0;   ///< over the inliers, in the unit of the points
   /// Moments of all correspondences within max_correspondence_distance, whatever their normals:
   /// points of the source, in its frame (Redwood's convention).
   CorrespondenceMoments source_moments;
@@ -95,5 +98,15 @@ struct RegistrationResult {
   /// confidences. The score without modes.
   double symmetry_confidence() const;
 };
+
+/// The most telling reason why the first mode is not confident, by its evidence, the other modes
+/// and the numbers of points. Does not read status, reason and score.
+/// @return confidence_too_low where no single reason stands out.
+RegistrationReason diagnose(const RegistrationResult& result);
+
+/// @return result.reason with the numbers of this result: one English sentence without full stop.
+std::string explain(const RegistrationResult& result);
+/// @return what to try next, in the names of this API; "" where there is nothing.
+const char* advice(RegistrationReason reason);
 
 }  // namespace gpureg

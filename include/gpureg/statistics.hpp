@@ -28,15 +28,29 @@ enum class RegistrationReason : std::uint8_t {
   degenerate_geometry,
   /// The best candidate is below quadruples.min_inlier_ratio (RegistrationMethod::quadruples).
   inlier_ratio_too_low,
-  /// The best candidate is below min_confidence (RegistrationMethod::compatibility).
+  /// The best candidate is below min_confidence (RegistrationMethod::compatibility) for no single
+  /// reason below: all of the evidence together is too weak.
   confidence_too_low,
   contradicts_prior,  ///< every pose found contradicts the RegistrationPrior of the pair
   /// The best candidate is below min_confidence because it shares its probability with poses that
   /// a symmetry makes equivalent. Together they pass: RegistrationOptions::accept_symmetry.
   symmetric,
   flat_with_solid,  ///< one cloud is a scan of a 2-D scanner, the other one is not
-  cancelled
+  cancelled,
+  // Why the best candidate is below min_confidence, see diagnose().
+  no_candidate,            ///< no pose brings points of both clouds together
+  too_few_points,          ///< a cloud has so few prepared points that some pose fits any other
+  too_little_overlap,      ///< too small a part of both clouds lies on the other one
+  underconstrained,        ///< what overlaps leaves a motion free: one plane, a bare corridor
+  ambiguous,               ///< several poses fit about equally well: RegistrationResult::modes
+  contradicts_free_space,  ///< points lie where the other cloud observed free space
+  clutter,  ///< the points of both clouds are close, but not their surfaces: vegetation, noise
+  outside_fitted_range,  ///< clouds of a size that the confidence was not fitted to
+  contradicts_loops      ///< loop consistency: the other pairs of the set contradict the pose
 };
+
+/// The last enumerator, for loops over all of them.
+constexpr RegistrationReason kLastRegistrationReason = RegistrationReason::contradicts_loops;
 
 /// How the viewpoint of a cloud is known. It decides about free space and about the sides of
 /// surfaces.

@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <string>
 #include <vector>
 
 #include "gpureg/point_cloud.hpp"
@@ -43,13 +44,30 @@ struct VoxelSizeSuggestion {
 /// points. Where the noise exceeds a third of a voxel, it grows until 3,000 points remain. It also
 /// grows where the neighbourhoods of the features have few points, as in sparse LiDAR scans, in
 /// proportion to them, and where most points have their neighbours on one line, as on the rings of
-/// a LiDAR, until they have an area. 1,000 points remain. Scans of 2-D
-/// scanners keep about 300 points, in layers. Rounded to one or two digits. Reads at
-/// most 16 clouds, evenly chosen, and samples of their points; non-finite and repeated points do
-/// not matter. Deterministic, thread-safe.
+/// a LiDAR, until they have an area. 1,000 points remain, of every cloud that has as many (a part
+/// on a scene), as far as the median cloud then keeps at most 100,000 (two clouds) or 20,000
+/// (more). Scans of 2-D scanners keep about 300 points, in layers. Rounded to one or two digits.
+/// Reads at most 16 clouds, evenly chosen, and samples of their points; non-finite and repeated
+/// points do not matter. Deterministic, thread-safe.
 /// @param views host memory, all in one unit.
 /// @return the suggestion, or the reason why the data allows none.
 /// @throws InvalidArgument as PointCloudView::validate().
 VoxelSizeSuggestion suggest_voxel_size(const std::vector<PointCloudView>& views);
+
+/// Ratio of extents that is suspect whatever became of the pair.
+constexpr double kSuspectRatio = 50;
+/// Ratio of feet to metres is the smallest that is worth a question, where a pair did not align: a
+/// part is smaller than its scene, too.
+constexpr double kLeastUnitRatio = 2.5;
+
+/// Asks whether two clouds have different units, where the ratio of their extents is that of usual
+/// units (within 20 %) or above kSuspectRatio. Stray points do not matter. Thread-safe.
+/// @param views host memory.
+/// @param least_ratio no question below.
+/// @return "are the units different? target is 1045 times larger than source, as with millimetres
+///   and metres"; empty: nothing suspect.
+/// @throws InvalidArgument as PointCloudView::validate().
+std::string question_units(const PointCloudView& source, const PointCloudView& target,
+                           double least_ratio = kSuspectRatio);
 
 }  // namespace gpureg

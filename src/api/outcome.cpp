@@ -25,11 +25,13 @@ RegistrationReason evidence_reason(const RegistrationResult& result, bool contra
   if (s.source_points < limits::kMinMatches) return RegistrationReason::too_few_source_points;
   if (s.target_points < limits::kMinMatches) return RegistrationReason::too_few_target_points;
   if (s.correspondences < limits::kMinMatches) return RegistrationReason::no_usable_features;
-  if (s.scored == 0) return RegistrationReason::degenerate_geometry;
+  if (s.scored == 0)
+    return diagnose(result) == RegistrationReason::too_few_points
+               ? RegistrationReason::too_few_points
+               : RegistrationReason::degenerate_geometry;
   if (contradicted) return RegistrationReason::contradicts_prior;
   if (result.score >= options.min_confidence) return RegistrationReason::none;
-  if (result.symmetry_confidence() < options.min_confidence)
-    return RegistrationReason::confidence_too_low;
+  if (result.symmetry_confidence() < options.min_confidence) return diagnose(result);
   return options.accept_symmetry ? RegistrationReason::none : RegistrationReason::symmetric;
 }
 
@@ -37,6 +39,13 @@ RegistrationStatus status_of(const RegistrationResult& result, const Registratio
   if (result.reason != RegistrationReason::none) return RegistrationStatus::not_aligned;
   return result.score >= options.min_confidence ? RegistrationStatus::aligned
                                                 : RegistrationStatus::aligned_up_to_symmetry;
+}
+
+/// A pose under which nothing overlaps is no candidate. Its confidence is 0.
+void drop_candidate(RegistrationResult& result) {
+  result.has_candidate = false;
+  result.target_from_source = no_pose();
+  result.modes.clear();
 }
 
 /// The modes of one pair, in the frames of its clouds.
@@ -220,6 +229,8 @@ RegistrationResult to_row_result(const PairOutcome& all, const AlignedPair& pair
     if (!outcome.modes.empty()) add_modes(outcome, pair, result);
     result.reason = evidence_reason(result, some_contradict && outcome.modes.empty(), pair.options);
     result.status = status_of(result, pair.options);
+    if (result.reason != RegistrationReason::none && result.statistics.inliers == 0)
+      drop_candidate(result);
     return result;
   }
   if (!outcome.has_pose) return result;

@@ -44,6 +44,24 @@ const char* to_string(RegistrationReason reason) {
       return "flat_with_solid";
     case RegistrationReason::contradicts_prior:
       return "contradicts_prior";
+    case RegistrationReason::no_candidate:
+      return "no_candidate";
+    case RegistrationReason::too_few_points:
+      return "too_few_points";
+    case RegistrationReason::too_little_overlap:
+      return "too_little_overlap";
+    case RegistrationReason::underconstrained:
+      return "underconstrained";
+    case RegistrationReason::ambiguous:
+      return "ambiguous";
+    case RegistrationReason::contradicts_free_space:
+      return "contradicts_free_space";
+    case RegistrationReason::clutter:
+      return "clutter";
+    case RegistrationReason::outside_fitted_range:
+      return "outside_fitted_range";
+    case RegistrationReason::contradicts_loops:
+      return "contradicts_loops";
     case RegistrationReason::cancelled:
       return "cancelled";
   }
@@ -99,7 +117,7 @@ const char* explain(RegistrationReason reason) {
     case RegistrationReason::inlier_ratio_too_low:
       return "the best pose found brings too few points together";
     case RegistrationReason::confidence_too_low:
-      return "what speaks for the best pose found is too little, or too much speaks against it";
+      return "all of the evidence for the best pose found together is too weak";
     case RegistrationReason::symmetric:
       return "a symmetry makes several poses equivalent; one of them is most likely correct";
     case RegistrationReason::flat_with_solid:
@@ -107,6 +125,24 @@ const char* explain(RegistrationReason reason) {
              "height of the 2-D scanner out of the other one";
     case RegistrationReason::contradicts_prior:
       return "every pose found contradicts what is known of gravity or of the pose";
+    case RegistrationReason::no_candidate:
+      return "no pose brings points of both clouds together";
+    case RegistrationReason::too_few_points:
+      return "a cloud has so few points after downsampling that some pose fits any other cloud";
+    case RegistrationReason::too_little_overlap:
+      return "the clouds overlap too little under the best pose found";
+    case RegistrationReason::underconstrained:
+      return "what overlaps leaves a motion free, as one plane or a bare corridor does";
+    case RegistrationReason::ambiguous:
+      return "several poses fit about equally well";
+    case RegistrationReason::contradicts_free_space:
+      return "under the best pose found, points lie where the other cloud observed free space";
+    case RegistrationReason::clutter:
+      return "points of both clouds are close, but their surfaces differ: vegetation or noise";
+    case RegistrationReason::outside_fitted_range:
+      return "the confidence was not fitted to clouds of this size";
+    case RegistrationReason::contradicts_loops:
+      return "the other pairs of the set contradict the best pose found";
     case RegistrationReason::cancelled:
       return "the batch was cancelled before this pair";
   }

@@ -42,6 +42,10 @@ constexpr std::size_t kWantedOfCurve = 300, kMinOfCurve = 150;
 constexpr double kSpacingsOfCurve = 2;
 constexpr double kGrowth = 1.1;
 constexpr std::size_t kFewestPoints = 1000;
+/// With what the voxels of prepare() lie differently, and rounding.
+constexpr std::size_t kFewestOfEach = 1100;
+/// Points of the median cloud up to which a smaller one may drive the size, for its own sake.
+constexpr std::size_t kMostOfPair = 100'000, kMostOfSet = 20'000;
 // Neighbourhoods of the features, in voxels, and their points (harmonic mean, so that each has the
 // weight of its area): rooms, halls and objects have 40 or more, scans of spinning LiDAR 20 to 30,
 // thinned ones 10 to 15. Where they have less than kFullNeighborhood, fewer points in larger voxels
@@ -241,10 +245,17 @@ double power_of_ten_below(double value) {
 }
 
 /// Rounds to a readable number: 0.0473 becomes 0.05, 0.0134 becomes 0.013.
-double rounded(double value) {
+template <typename Round>
+double readable(double value, Round&& round) {
   const double unit = power_of_ten_below(value);
   const double digits = value / unit;
-  return unit * (digits < 2 ? std::round(digits * 10) / 10 : std::round(digits * 2) / 2);
+  return unit * (digits < 2 ? round(digits * 10) / 10 : round(digits * 2) / 2);
+}
+double rounded(double value) {
+  return readable(value, [](double digits) { return std::round(digits); });
+}
+double rounded_down(double value) {
+  return readable(value, [](double digits) { return std::floor(digits); });
 }
 
 template <typename Measure>
@@ -327,6 +338,23 @@ VoxelSizeSuggestion suggest_voxel_size(const std::vector<PointCloudView>& views)
   };
   while (points(size * kGrowth) >= kFewestPoints && share_with_area(size) < kShareWithArea)
     size *= kGrowth;
+  size = rounded(size);
+  const std::size_t most = views.size() > 2 ? kMostOfSet : kMostOfPair;
+  const auto keeps_enough = [&](const SortedCloud& cloud, double s) {
+    return cloud.occupied(s, sample, keys) >= kFewestOfEach;
+  };
+  double least = 0;  // found where a cloud needs it
+  for (const SortedCloud& cloud : clouds) {
+    if (cloud.size() < kFewestOfEach || keeps_enough(cloud, size)) continue;
+    if (least == 0) least = std::max(size_for(most), out.spacing);
+    if (least >= size) break;
+    double low = least, high = size;
+    while (keeps_enough(cloud, low) && high > kSizeTolerance * low) {
+      const double middle = std::sqrt(low * high);
+      (keeps_enough(cloud, middle) ? low : high) = middle;
+    }
+    size = std::min(size, std::max(rounded_down(low), rounded(out.spacing)));
+  }
   return finish();
 }
 

@@ -161,7 +161,7 @@ void check_viewpoints(const CloudKnowledge& knowledge, const PreparedState& stat
     for (const float coordinate : {place.x, place.y, place.z})
       require(std::abs(coordinate) <= most, "cloud.viewpoints", coordinate,
               "coordinates within 2^23 times prepare.normal_radius of the cloud: float cannot tell "
-              "the rays of a farther viewpoint apart");
+              "the rays of a farther viewpoint apart; is it in the frame of the cloud?");
 }
 
 UnknownViewpoints::UnknownViewpoints(Engine& engine, Span<const RawCloud> raw,

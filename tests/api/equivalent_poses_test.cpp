@@ -145,7 +145,7 @@ TEST(EquivalentPoses, UsersSayWhetherTheyAcceptThem) {
   EXPECT_TRUE(accepted.aligned());
   EXPECT_EQ(accepted.score, refused.score);
   options.min_confidence = 0.5 * (1 + together);
-  EXPECT_EQ(registered(true, truth, options).reason, RegistrationReason::confidence_too_low);
+  EXPECT_EQ(registered(true, truth, options).reason, RegistrationReason::ambiguous);
 }
 
 std::vector<Vec3> to_vec3(const std::vector<Eigen::Vector3f>& rows) {

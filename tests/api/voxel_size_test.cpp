@@ -100,6 +100,25 @@ TEST(VoxelSize, ExceedsTheGapsBetweenRings) {
   EXPECT_GT(share(s.voxel_size), 0.9);
 }
 
+// The size follows the smaller cloud, of which it would else leave a hundred points.
+TEST(VoxelSize, LeavesAThousandPointsOfAPartOnAScene) {
+  Points scene, part;
+  for (unsigned k = 0; k < 9; ++k)
+    for (const Eigen::Vector3f& p : object(4, 30000, k + 1))
+      scene.push_back(
+          p + Eigen::Vector3f(6.f * static_cast<float>(k % 3), 6.f * static_cast<float>(k / 3), 0));
+  for (const Eigen::Vector3f& p : scene)
+    if ((p - scene.front()).norm() < 1) part.push_back(p);
+  const float alone = suggest({scene}).voxel_size, pair = suggest({part, scene}).voxel_size;
+  EXPECT_LT(prepared_points(part, alone), 300u);
+  EXPECT_LT(pair, alone);
+  EXPECT_GE(prepared_points(part, pair), 1000u);
+  EXPECT_EQ(suggest({scene, part}).voxel_size, pair);
+  // One part among many scenes does not make all of them slow.
+  const float set = suggest({scene, scene, scene, part}).voxel_size;
+  EXPECT_LE(prepared_points(scene, set), 25000u);
+}
+
 // Points that are missing at random leave gaps, which features must span.
 TEST(VoxelSize, ThinnedScansKeepLargeVoxels) {
   std::mt19937 random(3);
