@@ -75,6 +75,10 @@ TEST_F(View, WhatHasNoPage) {
   expect_refused({"view", write_cloud(out_, "a.ply", room_scan(0))}, {"a.ply", "gpureg register"});
   expect_refused({"view", out_.write("l.json", R"({"gpureg": "locate"})")},
                  {"l.json", "gpureg locate", "register, batch"});
+  for (const char* text :
+       {R"({"gpureg": "register"})", R"({"gpureg": "register", "result": {"status": 3}})",
+        R"({"gpureg": "register", "result": {}, "source": "a", "target": []})"})
+    expect_refused({"view", out_.write("p.json", text)}, {"p.json"});
 }
 
 // The desktop's program gets the page, whatever characters its name has.

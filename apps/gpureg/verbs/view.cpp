@@ -41,15 +41,22 @@ std::string map_page_in(const fs::path& folder) {
   return page.string();
 }
 
+/// The value at a JSON pointer; null if there is none.
+Json value_of(const Json& json, const char* pointer) {
+  const Json::json_pointer place(pointer);
+  return json.contains(place) ? json.at(place) : Json();
+}
+
 /// The page of a result of `register --json`.
 void write_pair_page(Json document, const std::string& page) {
   const std::string source = text_of(document, "/source/file"),
                     target = text_of(document, "/target/file");
-  Json pair = document["result"];
-  pair["T_ij"] = pair["target_from_source"];
+  Json pair = value_of(document, "/result");
+  if (!pair.is_object()) throw InvalidArgument("\"result\" is no object");
+  pair["T_ij"] = value_of(pair, "/target_from_source");
   pair["i"] = 0, pair["j"] = 1;  // the places of target and source in "fragments"
   document["fragments"] =
-      Json::array({document["target"]["prepare"], document["source"]["prepare"]});
+      Json::array({value_of(document, "/target/prepare"), value_of(document, "/source/prepare")});
 
   ReportEntry entry;
   entry.scene = base_name(source) + " onto " + base_name(target);
@@ -84,7 +91,11 @@ std::string page_of(const std::string& path) {
   if (made_by == "reconstruct") return map_page_in(fs::absolute(path).parent_path());
   const std::string page = path + ".html";
   if (made_by == "register") {
-    write_pair_page(std::move(document), page);
+    try {
+      write_pair_page(std::move(document), page);
+    } catch (const InvalidArgument& error) {
+      throw IoError(path + ": " + error.what());
+    }
   } else if (document.contains("pairs")) {
     const std::string folder = text_of(document, "/folder");
     const bool there = fs::is_directory(folder);
