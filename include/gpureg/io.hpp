@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <Eigen/Core>
 #include <cstddef>
 #include <map>
 #include <optional>
@@ -9,7 +10,6 @@
 #include <vector>
 
 #include "gpureg/point_cloud.hpp"
-#include "gpureg/result.hpp"
 
 /// Component `io`: readers of clouds and lists, a writer of clouds. Needs no other library; every
 /// function is thread-safe.
@@ -17,10 +17,12 @@ namespace gpureg::io {
 
 /// A scan of a file that holds several.
 struct StoredScan {
+  /// Without alignment, as UnalignedIsometry3d.
+  using Pose = Eigen::Matrix<double, 4, 4, Eigen::DontAlign>;
   std::string name;        ///< may be empty
   std::size_t points = 0;  ///< that the file announces; of PTX rows without a return are among them
   /// Pose of the scan in the frame of its file, metres; none where the file gives none.
-  std::optional<UnalignedIsometry3d> file_from_scan;
+  std::optional<Pose> file_from_scan;
 };
 
 /// The scans of a file of a format that can hold several: PTX, E57 (of which no point is read).

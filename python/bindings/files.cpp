@@ -78,7 +78,7 @@ void bind_files(py::module_& m) {
           "file_from_scan",
           [](const io::StoredScan& scan) -> py::object {
             if (!scan.file_from_scan) return py::none();
-            return array_of(scan.file_from_scan->matrix());
+            return array_of(*scan.file_from_scan);
           },
           "(4, 4) pose of the scan in the frame of its file, metres; None where there is none.")
       .def("__repr__", [](const io::StoredScan& scan) {

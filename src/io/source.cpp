@@ -41,6 +41,15 @@ void split(std::string_view line, std::vector<std::string_view>& fields) {
   }
 }
 
+bool next_fields(Source& source, std::vector<std::string_view>& fields, char comment) {
+  std::string_view line;
+  while (source.next_line(line)) {
+    split(comment == '\0' ? line : line.substr(0, line.find(comment)), fields);
+    if (!fields.empty()) return true;
+  }
+  return false;
+}
+
 bool parse_count(std::string_view field, std::size_t& value) {
   const char* const end = field.data() + field.size();
   const auto [stop, error] = std::from_chars(field.data(), end, value);

@@ -37,6 +37,10 @@ class Source {
 /// Cuts a line at spaces and tabs into fields, whose old content is replaced.
 void split(std::string_view line, std::vector<std::string_view>& fields);
 
+/// The fields of the next line that has some; false at the end.
+/// @param comment what follows this character in a line is left out; 0: nothing is.
+bool next_fields(Source& source, std::vector<std::string_view>& fields, char comment = '\0');
+
 /// The whole field as a decimal number of at most 18 digits; false for anything else.
 bool parse_count(std::string_view field, std::size_t& value);
 

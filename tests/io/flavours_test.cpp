@@ -363,8 +363,8 @@ TEST(Ptx, ScansWithTheirPosesAndViewpoints) {
   EXPECT_EQ(scans[1].points, 6u);
   ASSERT_TRUE(scans[1].file_from_scan);
   // The file has the transposed matrix: rows are multiplied from the left.
-  EXPECT_TRUE(
-      (*scans[1].file_from_scan * Eigen::Vector3d(1, 0, 0)).isApprox(Eigen::Vector3d(4, 6, 6)));
+  EXPECT_TRUE((*scans[1].file_from_scan * Eigen::Vector4d(1, 0, 0, 1))
+                  .isApprox(Eigen::Vector4d(4, 6, 6, 1)));
   for (const PointCloud& cloud :
        {read_point_cloud(path, 2), read_point_cloud(path + "#2"), read_point_cloud(path, 1)}) {
     ASSERT_EQ(cloud.points.size(), 4u);
@@ -438,7 +438,7 @@ TEST(E57, TheListOfScans) {
   EXPECT_EQ(scans[8].name, "Station <9>");
   EXPECT_EQ(scans[8].points, 123u);
   ASSERT_TRUE(scans[8].file_from_scan);
-  EXPECT_EQ(scans[8].file_from_scan->translation(), Eigen::Vector3d(9, 0, 0));
+  EXPECT_EQ((scans[8].file_from_scan->topRightCorner<3, 1>()), Eigen::Vector3d(9, 0, 0));
   expect_error<IoError>([&] { read_point_cloud(path); }, {"gpureg[formats]"});
 }
 

@@ -32,7 +32,7 @@ void print_scans(const std::string& path, const std::vector<io::StoredScan>& sca
               << grouped(scan.points) << " points";
     if (scan.file_from_scan)
       std::cout << ", scanned from "
-                << describe(Eigen::Vector3d(scan.file_from_scan->translation()), 10);
+                << describe(Eigen::Vector3d(scan.file_from_scan->topRightCorner<3, 1>()), 10);
     std::cout << "\n";
   }
 }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "io/clouds/e57.hpp"
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <fstream>
 #include <map>
@@ -128,7 +129,7 @@ std::size_t count_in(const std::string& attributes) {
   return parse_count(number.substr(0, number.find('"')), count) ? count : 0;
 }
 
-std::optional<UnalignedIsometry3d> pose_of(const std::map<std::string, double>& numbers) {
+std::optional<StoredScan::Pose> pose_of(const std::map<std::string, double>& numbers) {
   const auto at = [&](const char* name, double otherwise) {
     const auto found = numbers.find(name);
     return found == numbers.end() ? otherwise : found->second;
@@ -138,9 +139,9 @@ std::optional<UnalignedIsometry3d> pose_of(const std::map<std::string, double>& 
                        at("rotation/z", 0));
   const Eigen::Vector3d t(at("translation/x", 0), at("translation/y", 0), at("translation/z", 0));
   if (!(q.norm() > 0.9 && q.norm() < 1.1) || !t.allFinite()) return std::nullopt;
-  UnalignedIsometry3d pose = UnalignedIsometry3d::Identity();
-  pose.linear() = q.normalized().toRotationMatrix();
-  pose.translation() = t;
+  StoredScan::Pose pose = StoredScan::Pose::Identity();
+  pose.topLeftCorner<3, 3>() = q.normalized().toRotationMatrix();
+  pose.topRightCorner<3, 1>() = t;
   return pose;
 }
 

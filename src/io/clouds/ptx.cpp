@@ -16,11 +16,11 @@ namespace {
 using Fields = std::vector<std::string_view>;
 
 /// Numbers of the lines of a header: columns, rows, position of the scanner, its axes, the pose.
-constexpr std::array<std::size_t, 10> kHeader = {1, 1, 3, 3, 3, 3, 4, 4, 4, 4};
+constexpr std::array<std::size_t, 10> kNumbersOfLines = {1, 1, 3, 3, 3, 3, 4, 4, 4, 4};
 /// Largest deviation of a rotation from an orthogonal matrix.
 constexpr double kOrthogonal = 1e-3;
 
-struct Header {
+struct ScanHeader {
   std::size_t rows = 0;
   Eigen::Vector3d scanner;
   Eigen::Matrix4d pose;  ///< as a file has it: for rows that are multiplied from the left
@@ -36,32 +36,22 @@ bool parse(const Fields& fields, std::size_t count, double* values) {
   return true;
 }
 
-/// The next line that is not blank; false at the end.
-bool next_fields(Source& source, Fields& fields) {
-  std::string_view line;
-  while (source.next_line(line)) {
-    split(line, fields);
-    if (!fields.empty()) return true;
-  }
-  return false;
-}
-
 /// False at the end of the file.
-bool next_header(Source& source, Header& header) {
+bool next_header(Source& source, ScanHeader& header) {
   Fields fields;
   std::array<double, 30> numbers{};
   std::size_t at = 0, columns = 0, rows = 0;
-  for (std::size_t line = 0; line < kHeader.size(); ++line) {
+  for (std::size_t line = 0; line < kNumbersOfLines.size(); ++line) {
     if (!next_fields(source, fields)) {
       if (line == 0) return false;
       source.fail("truncated: the file ends in the header of a scan");
     }
     const bool counts = line < 2;
     if (counts ? fields.size() != 1 || !parse_count(fields[0], line == 0 ? columns : rows)
-               : !parse(fields, kHeader[line], numbers.data() + at))
+               : !parse(fields, kNumbersOfLines[line], numbers.data() + at))
       source.fail_line("line " + std::to_string(line + 1) + " of the header of a scan has to be " +
-                       (counts ? "a count" : std::to_string(kHeader[line]) + " numbers"));
-    if (!counts) at += kHeader[line];
+                       (counts ? "a count" : std::to_string(kNumbersOfLines[line]) + " numbers"));
+    if (!counts) at += kNumbersOfLines[line];
   }
   check_rows(columns, source);
   check_rows(rows, source);
@@ -72,12 +62,13 @@ bool next_header(Source& source, Header& header) {
   return true;
 }
 
-[[noreturn]] void fail_truncated(const Header& header, std::size_t found, const Source& source) {
+[[noreturn]] void fail_truncated(const ScanHeader& header, std::size_t found,
+                                 const Source& source) {
   source.fail("truncated: a scan announces " + std::to_string(header.rows) +
               " points, the file ends after " + std::to_string(found) + " of them");
 }
 
-void skip_rows(Source& source, const Header& header) {
+void skip_rows(Source& source, const ScanHeader& header) {
   std::string_view line;
   for (std::size_t row = 0; row < header.rows;) {
     if (!source.next_line(line)) fail_truncated(header, row, source);
@@ -85,16 +76,14 @@ void skip_rows(Source& source, const Header& header) {
   }
 }
 
-std::optional<UnalignedIsometry3d> pose_of(const Header& header) {
+std::optional<StoredScan::Pose> pose_of(const ScanHeader& header) {
   const Eigen::Matrix4d m = header.pose.transpose();
   const Eigen::Matrix3d r = m.topLeftCorner<3, 3>();
   const Eigen::RowVector4d last(0, 0, 0, 1);
   if (!m.allFinite() || !(r * r.transpose()).isIdentity(kOrthogonal) || r.determinant() < 0 ||
       !m.row(3).isApprox(last))
     return std::nullopt;
-  UnalignedIsometry3d pose;
-  pose.matrix() = m;
-  return pose;
+  return StoredScan::Pose(m);
 }
 
 /// False for a place farther from the points than they extend: they were moved since.
@@ -110,11 +99,11 @@ bool may_see(const Eigen::Vector3d& place, const std::vector<Eigen::Vector3d>& p
 bool looks_like_ptx(std::string_view start) {
   Source source("", start);
   Fields fields;
-  for (std::size_t line = 0; line < kHeader.size(); ++line) {
+  for (std::size_t line = 0; line < kNumbersOfLines.size(); ++line) {
     std::array<double, 4> numbers{};
     std::size_t count = 0;
     if (!next_fields(source, fields) || (line < 2 && !parse_count(fields[0], count)) ||
-        !parse(fields, kHeader[line], numbers.data()))
+        !parse(fields, kNumbersOfLines[line], numbers.data()))
       return false;
   }
   return true;
@@ -122,7 +111,7 @@ bool looks_like_ptx(std::string_view start) {
 
 std::vector<StoredScan> index_ptx(Source& source) {
   std::vector<StoredScan> scans;
-  Header header;
+  ScanHeader header;
   while (next_header(source, header)) {
     skip_rows(source, header);
     scans.push_back({"", header.rows, pose_of(header)});
@@ -131,7 +120,7 @@ std::vector<StoredScan> index_ptx(Source& source) {
 }
 
 PointCloud read_ptx(Source& source, std::size_t index) {
-  Header header;
+  ScanHeader header;
   for (std::size_t k = 0;; ++k) {
     if (!next_header(source, header))
       source.fail("there is no scan " + std::to_string(index + 1) + ", it holds " +

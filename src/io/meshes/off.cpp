@@ -14,28 +14,20 @@ namespace {
 
 using Fields = std::vector<std::string_view>;
 
-struct Header {
+struct OffHeader {
   std::size_t vertices = 0, faces = 0;
   bool normals = false;  ///< behind the coordinates of a vertex
 };
 
-/// The next line that is neither blank nor a comment, cut into fields; false at the end.
-bool next_fields(Source& source, Fields& fields) {
-  std::string_view line;
-  while (source.next_line(line)) {
-    split(line.substr(0, line.find('#')), fields);
-    if (!fields.empty()) return true;
-  }
-  return false;
-}
+constexpr char kComment = '#';
 
 /// The word that begins the file, up to OFF: "CN" of CNOFF.
 std::string_view prefix_of(std::string_view word) { return word.substr(0, word.find("OFF")); }
 
-Header read_header(Source& source) {
+OffHeader read_off_header(Source& source) {
   Fields fields;
-  next_fields(source, fields);
-  Header header;
+  next_fields(source, fields, kComment);
+  OffHeader header;
   const std::string_view prefix = prefix_of(fields[0]);
   if (prefix.find_first_of("4n") != prefix.npos)
     source.fail_line("vertices of another dimension than three are not read");
@@ -44,7 +36,7 @@ Header read_header(Source& source) {
   fields[0].remove_prefix(prefix.size() + 3);
   if (fields[0].empty()) fields.erase(fields.begin());
   if (!fields.empty() && fields[0] == "BINARY") source.fail_line("binary OFF is not read");
-  if (fields.empty() && !next_fields(source, fields))
+  if (fields.empty() && !next_fields(source, fields, kComment))
     source.fail("truncated: the numbers of vertices and faces are missing");
   if (fields.size() < 2 || !parse_count(fields[0], header.vertices) ||
       !parse_count(fields[1], header.faces))
@@ -55,13 +47,13 @@ Header read_header(Source& source) {
 
 /// take(coordinates, normal), the normal only where the file has them.
 template <typename Take>
-void read_vertices(const Header& header, Source& source, Take&& take) {
+void read_vertices(const OffHeader& header, Source& source, Take&& take) {
   const std::size_t numbers = header.normals ? 6 : 3;
   check_text_size(header.vertices, numbers, source);
   Fields fields;
   std::array<double, 6> p{};
   for (std::size_t vertex = 0; vertex < header.vertices; ++vertex) {
-    if (!next_fields(source, fields))
+    if (!next_fields(source, fields, kComment))
       source.fail("truncated: " + std::to_string(header.vertices) +
                   " vertices are announced, the file ends after " + std::to_string(vertex));
     if (fields.size() < numbers)
@@ -80,7 +72,7 @@ void read_vertices(const Header& header, Source& source, Take&& take) {
 bool looks_like_off(std::string_view start) {
   Source source("", start);
   Fields fields;
-  if (!next_fields(source, fields)) return false;
+  if (!next_fields(source, fields, kComment)) return false;
   const std::string_view word = fields[0], prefix = prefix_of(word);
   if (prefix.size() == word.size() || prefix.find_first_not_of("STCN4n") != prefix.npos)
     return false;
@@ -89,10 +81,10 @@ bool looks_like_off(std::string_view start) {
   return behind.empty() || parse_count(behind, count);
 }
 
-bool off_has_faces(Source& source) { return read_header(source).faces > 0; }
+bool off_has_faces(Source& source) { return read_off_header(source).faces > 0; }
 
 Polygons read_off(Source& source) {
-  const Header header = read_header(source);
+  const OffHeader header = read_off_header(source);
   Polygons out;
   read_vertices(header, source, [&](const Eigen::Vector3d& p, const Eigen::Vector3d&) {
     out.vertices.push_back(p);
@@ -100,7 +92,7 @@ Polygons read_off(Source& source) {
   check_text_size(header.faces, 1, source);
   Fields fields;
   for (std::size_t face = 0; face < header.faces; ++face) {
-    if (!next_fields(source, fields))
+    if (!next_fields(source, fields, kComment))
       source.fail("truncated: " + std::to_string(header.faces) +
                   " faces are announced, the file ends after " + std::to_string(face));
     std::size_t corners = 0;
@@ -121,7 +113,7 @@ Polygons read_off(Source& source) {
 }
 
 PointCloud read_off_points(Source& source) {
-  const Header header = read_header(source);
+  const OffHeader header = read_off_header(source);
   PointCloud cloud;
   std::vector<Eigen::Vector3d> points;
   read_vertices(header, source, [&](const Eigen::Vector3d& p, const Eigen::Vector3d& n) {
